@@ -17,6 +17,7 @@ from typing import Any
 import pytest
 
 from tests.hostile.forks import Command, Turns, run_in_fork
+from tests.hostile.surroundings import Begun, Surroundings
 
 IIBR = str(Path(sysconfig.get_path("scripts")) / "iibr")
 DEADLINE_S = 120.0
@@ -27,6 +28,10 @@ WITHOUT_PRIVILEGES = ("setpriv", "--bounding-set=-dac_override,-dac_read_search"
 
 FULL_DISK = "--fsize="
 PLAINLY = 'exec "$@"'
+CLOSED_OUTPUT = 'exec "$@" >&-'
+FULL_OUTPUT = 'exec "$@" >/dev/full'
+FIRST = {"NUMBA_NUM_THREADS", "DISPLAY"}
+"""Variables that end a command before or while it imports, or that libraries read but once."""
 
 
 def nothing(folder: Path) -> None:
@@ -60,6 +65,19 @@ class Case:
         return bool(self.environment or limits or self.is_mute) or self.shell != PLAINLY
 
     @property
+    def surroundings(self) -> Surroundings | None:
+        """What Python starts in, for a process that begins several commands; None where each is to start anew: where
+        memory is short, the folder is gone, or what `main` does before it imports anything is what counts.
+        """
+        if not self.runs_apart or self.is_mute or self.shell not in (PLAINLY, CLOSED_OUTPUT, FULL_OUTPUT):
+            return None
+        if any(limit.startswith(("--as=", "--nofile=16")) for limit in self.limits) or self.environment.keys() & FIRST:
+            return None
+        wrapper = ("prlimit", *self.limits) if self.limits else ()
+        wrapper += WITHOUT_PRIVILEGES if self.is_bound and os.geteuid() == 0 else ()
+        return Surroundings(wrapper, tuple(sorted(self.environment.items())), self.shell, self.shell != PLAINLY)
+
+    @property
     def takes_turns(self) -> bool:
         """Whether a process that runs others will do: it is refused, so that nothing of it may stay."""
         return not (self.runs_apart or self.limits or self.is_bound) and self.code != 0
@@ -80,12 +98,14 @@ class Ended:
     changed: tuple[str, ...]
 
 
-def run_case(case: Case, template: Path, folder: Path, turns: Turns | None = None) -> Ended:
-    """Copy the template to the folder, run the command there, and compare. turns: who runs what may be refused."""
+def run_case(case: Case, template: Path, folder: Path, turns: Turns | None = None, begun: Begun | None = None) -> Ended:
+    """Copy the template to the folder, run the command there, and compare. turns: who runs what may be refused. begun:
+    who runs what starts in its surroundings.
+    """
     work = _copied(template, folder)
     case.prepare(work)
     before = snapshot(work)
-    end = _ended(case, work, folder, turns, before)
+    end = _ended(case, work, folder, turns, before, begun)
     _unlock(folder)
     shutil.rmtree(folder)
     return end
@@ -99,7 +119,7 @@ class CaseRunner:
 
     def __init__(self, template: Path, folder: Path) -> None:
         self._template, self._folder = template, folder
-        self._turns = Turns()
+        self._turns, self._begun = Turns(), Begun()
         self._shared: tuple[Path, dict[str, str]] | None = None
 
     def __enter__(self) -> CaseRunner:
@@ -107,11 +127,12 @@ class CaseRunner:
 
     def __exit__(self, *_: object) -> None:
         self._turns.__exit__()
+        self._begun.__exit__()
 
     def run(self, case: Case) -> Ended:
         """How it ends."""
         if not case.changes_nothing:
-            return run_case(case, self._template, Path(tempfile.mkdtemp(dir=self._folder)), self._turns)
+            return run_case(case, self._template, Path(tempfile.mkdtemp(dir=self._folder)), self._turns, self._begun)
         if self._shared is None:
             folder = Path(tempfile.mkdtemp(dir=self._folder))
             self._shared = folder, snapshot(_copied(self._template, folder))
@@ -127,12 +148,22 @@ def _copied(template: Path, folder: Path) -> Path:
     return Path(shutil.copytree(template, folder / "work", symlinks=True))
 
 
-def _ended(case: Case, work: Path, folder: Path, turns: Turns | None, before: dict[str, str]) -> Ended:
+def _ended(
+    case: Case,
+    work: Path,
+    folder: Path,
+    turns: Turns | None,
+    before: dict[str, str],
+    begun: Begun | None = None,
+) -> Ended:
     home = folder / "home"
     environment = {"PATH": os.environ["PATH"], "HOME": str(home), "LANG": "C.UTF-8", **_inherited(), **case.environment}
     arguments = tuple(word.replace("{folder}", str(work)) for word in case.arguments)
     given = {name: value.replace("{folder}", str(work)) for name, value in environment.items() if value is not None}
-    if case.runs_apart:
+    surroundings = case.surroundings if begun else None
+    if begun and surroundings:
+        code = begun.run(surroundings, Command(arguments, work, given, folder), DEADLINE_S)
+    elif case.runs_apart:
         code = _run_apart(case, arguments, work, given, folder)
     else:
         sizes = [int(limit.removeprefix(FULL_DISK)) for limit in case.limits]
@@ -145,8 +176,9 @@ def _ended(case: Case, work: Path, folder: Path, turns: Turns | None, before: di
 
 
 def by_name(cases: tuple[Case, ...]) -> list[Any]:
-    """Parameters of a test."""
-    return [pytest.param(case, id=case.name) for case in cases]
+    """Parameters of a test, those that start in the same surroundings one after the other."""
+    places = list(dict.fromkeys(case.surroundings for case in cases))
+    return [pytest.param(case, id=case.name) for case in sorted(cases, key=lambda c: places.index(c.surroundings))]
 
 
 def require_good_end(case: Case, end: Ended) -> None:

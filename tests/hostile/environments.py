@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from tests.hostile.case import Case, nothing
+from tests.hostile.case import CLOSED_OUTPUT, FULL_OUTPUT, Case, nothing
 from tests.hostile.inputs import NOT_UTF8
 from tests.hostile.outputs import WRITING
 
@@ -82,15 +82,12 @@ _locales = [
     )[: 5 if number in (0, 2) else 3]
 ]
 
-_CLOSED = 'exec "$@" >&-'
-_FULL = 'exec "$@" >/dev/full'
-
 _streams = [
     case
     for command, makes in (*MAKING, (("--help",), ()), (("--version",), ()), (("plan", "--help"), ()))
     for case in (
-        Case(f"{' '.join(command[:1])} {command[-1]} onto a full output", command, 2, "", makes, shell=_FULL),
-        Case(f"{' '.join(command[:1])} {command[-1]} without an output", command, 2, "", makes, shell=_CLOSED),
+        Case(f"{' '.join(command[:1])} {command[-1]} onto a full output", command, 2, "", makes, shell=FULL_OUTPUT),
+        Case(f"{' '.join(command[:1])} {command[-1]} without an output", command, 2, "", makes, shell=CLOSED_OUTPUT),
     )
 ] + [
     Case("plan without errors", ("plan", "missing.png"), is_mute=True, shell='exec "$@" 2>&-'),

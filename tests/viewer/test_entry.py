@@ -14,6 +14,9 @@ import numpy as np
 import pytest
 
 from iibr_core.formats.images.photo import read_photo, write_image
+from tests.hostile.case import DEADLINE_S, PLAINLY
+from tests.hostile.forks import Command
+from tests.hostile.surroundings import Begun, Surroundings
 from tests.viewer.conftest import write_scene
 from viewer import entry
 
@@ -106,6 +109,25 @@ def test_what_is_ignored_stays_ignored() -> None:
     assert done.stdout.startswith(b"iibr ")
 
 
+@pytest.mark.parametrize("ignored", ["SIGINT", "SIGTERM", "SIGHUP"])
+def test_handlers_are_set_for_all_signals_but_those_that_are_ignored(ignored: str) -> None:
+    kinds = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP")]
+    before = [signal.getsignal(kind) for kind in kinds]
+
+    def handler(*_: object) -> None:
+        pass
+
+    try:
+        signal.signal(getattr(signal, ignored), signal.SIG_IGN)
+        entry._on_interruption(handler)
+        assert [signal.getsignal(kind) for kind in kinds] == [
+            signal.SIG_IGN if kind.name == ignored else handler for kind in kinds
+        ]
+    finally:
+        for kind, was in zip(kinds, before):
+            signal.signal(kind, was)
+
+
 @pytest.mark.parametrize("words", ["--version", "--help", "models"])
 @pytest.mark.parametrize("where", ["> /dev/full", ">&-", "| head -0"])
 def test_a_standard_output_that_takes_nothing_is_one_line(words: str, where: str) -> None:
@@ -196,13 +218,17 @@ def test_names_of_any_bytes_are_read_written_and_told(tmp_path: Path, encoding: 
     (tmp_path / "scene_disparity.npy").rename(os.fsdecode(folder + name + b"_d.npy"))
     photo, out = name + b".png", name + b"_o.png"
     disparity = (b"--disparity", name + b"_d.npy")
-    shot = run("screenshot", photo, *disparity, "--grid", 1, "-o", out, cwd=tmp_path, env=env)
-    assert shot.returncode == 0, shot.stderr
-    assert shot.stdout.strip() != b""
-    again = run("screenshot", photo, "--like", out, "--grid", 1, "-o", name + b"_p.png", cwd=tmp_path, env=env)
-    assert again.returncode == 0, again.stderr
-    field = run("generate", photo, *disparity, "--grid", 1, "--out", name + b"_f", cwd=tmp_path, env=env)
-    assert field.returncode == 0, field.stderr
+    shot = ("screenshot", photo, *disparity, "--grid", "1", "-o", out)
+    again = ("screenshot", photo, "--like", out, "--grid", "1", "-o", name + b"_p.png")
+    field = ("generate", photo, *disparity, "--grid", "1", "--out", name + b"_f")
+    with Begun() as begun:  # Python starts but once: it is then that it learns of the encoding
+        for number, words in enumerate((shot, again, field)):
+            told = tmp_path / f"told{number}"
+            told.mkdir()
+            command = Command(tuple(map(os.fsdecode, words)), tmp_path, env, told)
+            code = begun.run(Surroundings((), tuple(sorted(env.items())), PLAINLY, False), command, DEADLINE_S)
+            assert code == 0, (told / "errors").read_bytes()
+            assert (told / "output").read_bytes().strip() != b""
     for made in (out, name + b"_p.png", name + b"_f/input_Cam000.png"):
         assert os.path.getsize(folder + made) > 100
     assert "no such file" in the_error(run("plan", name + b"?", cwd=tmp_path, env=env))
@@ -216,7 +242,7 @@ def test_panels_ask_for_names_that_they_can_show(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("words", [("plan", "nothing.png"), ("--help",), ("models",)])
-@pytest.mark.parametrize("threads", ["0", "abc", "-1", "1e3", "99999999999999999999"])
+@pytest.mark.parametrize("threads", ["0", "abc", "-1", "1e3", "1025", "99999999999999999999"])
 def test_a_number_of_threads_that_is_none_is_named(threads: str, words: tuple[str, ...]) -> None:
     assert f"NUMBA_NUM_THREADS={threads}" in the_error(run(*words, env=environment(NUMBA_NUM_THREADS=threads)))
 
@@ -247,6 +273,30 @@ AS_NOBODY = (
 def test_where_no_thread_may_be_started_it_says_so(number: int, tmp_path: Path) -> None:
     limited = (*(AS_NOBODY if os.geteuid() == 0 else ()), "prlimit", f"--nproc={number}")
     assert "no more threads" in the_error(run("plan", write_scene(tmp_path), start=(*limited, *START)))
+
+
+HOME_OF_COMMANDS = """
+import os
+from viewer import entry
+entry._run_command = lambda: print(os.environ.get("HOME")) or 0
+entry.main()
+"""
+
+
+@pytest.mark.parametrize("home", ["", "somewhere", "/dev/null"])
+def test_commands_have_a_home_that_is_a_whole_path_or_none_is_named(tmp_path: Path, home: str) -> None:
+    """What libraries keep there would else be kept in the working folder."""
+    done = run(start=(sys.executable, "-P", "-c", HOME_OF_COMMANDS), cwd=tmp_path, env=environment(HOME=home))
+    assert done.stdout.decode().strip() == (home if os.path.isabs(home) else "None")
+
+
+def test_who_has_no_home_keeps_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As a user that the system's database does not know."""
+    monkeypatch.setenv("HOME", "nowhere")
+    with monkeypatch.context() as unknown:
+        unknown.setattr(os.path, "expanduser", lambda path: path)
+        entry._settle_home()
+    assert os.environ["HOME"] == os.devnull
 
 
 def test_a_home_that_windows_does_not_name_is_no_mistake(monkeypatch: pytest.MonkeyPatch) -> None:
