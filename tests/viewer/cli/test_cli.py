@@ -18,6 +18,7 @@ from iibr_core.rendering.gloss.settings import Gloss
 from iibr_core.rendering.optics import Optics
 from iibr_core.scenes.scene import Source
 from iibr_core.types import TOTAL_PARALLAX
+from tests.forked_iibr import run_forked
 from tests.iibr_core import red_inpainter
 from tests.opened_files import watch
 from tests.viewer.conftest import HEIGHT, WIDTH, write_scene
@@ -35,14 +36,11 @@ def run(monkeypatch: pytest.MonkeyPatch, *words: object) -> int:
     return int(ended.value.code or 0)
 
 
-def run_apart(
-    code_or_module: str, *words: object, cwd: Path = ROOT, **environment: str
-) -> subprocess.CompletedProcess[str]:
+def run_apart(code: str, *words: object, cwd: Path = ROOT, **environment: str) -> subprocess.CompletedProcess[str]:
     """Python in a process of its own, without a display."""
     environment = {"PYTHONPATH": str(ROOT), **environment}
     clean = {name: value for name, value in os.environ.items() if name not in ("DISPLAY", "WAYLAND_DISPLAY")}
-    flag = "-m" if code_or_module == "viewer" else "-c"
-    command = [sys.executable, "-P", flag, code_or_module, *map(str, words)]
+    command = [sys.executable, "-P", "-c", code, *map(str, words)]
     return subprocess.run(command, capture_output=True, text=True, cwd=cwd, env={**clean, **environment}, timeout=120)
 
 
@@ -74,14 +72,14 @@ def test_help_comes_by_its_short_name(
 
 
 def test_without_a_display_help_comes_without_asking_and_one_line_says_why() -> None:
-    done = run_apart("viewer")
+    done = run_apart("from viewer.entry import main; main()")
     assert ("Usage: " in done.stdout, done.returncode) == (True, 0)
     (line,) = done.stderr.splitlines()
     assert line.startswith("note: no window can be opened")
 
 
 def test_help_lists_commands_in_the_order_in_which_people_use_them() -> None:
-    words = [line.split()[1] for line in run_apart("viewer", "-h").stdout.splitlines() if re.match(r"│ [a-z]+ ", line)]
+    words = [line.split()[1] for line in run_forked("-h", cwd=ROOT).stdout.splitlines() if re.match(r"│ [a-z]+ ", line)]
     assert (words[:3], words[-2:]) == (["view", "export", "screenshot"], ["evaluate", "train"])
     assert {"generate", "depth", "batch", "plan", "demo", "models"} == set(words[3:-2])
 
@@ -89,15 +87,15 @@ def test_help_lists_commands_in_the_order_in_which_people_use_them() -> None:
 @pytest.mark.parametrize("name", ["scene.png", "missing.png", "missing/photo", "."])
 def test_a_path_in_place_of_a_command_is_viewed(photo_path: Path, name: str) -> None:
     """Here as far as the window that cannot be opened, or the file that is not there."""
-    alone, viewed = (run_apart("viewer", *words, name, cwd=photo_path.parent) for words in ((), ("view",)))
+    alone, viewed = (run_forked(*words, name, cwd=photo_path.parent) for words in ((), ("view",)))
     assert (alone.returncode, alone.stderr) == (viewed.returncode, viewed.stderr)
     assert "no such file" in alone.stderr if "missing" in name else "no window can be opened" in alone.stderr
 
 
 def test_a_command_goes_before_a_file_of_its_name_and_a_typo_is_no_path(photo_path: Path) -> None:
     (photo_path.parent / "plan").write_text("a file")
-    assert "argument 'photo'" in run_apart("viewer", "plan", cwd=photo_path.parent).stderr
-    assert "Did you mean 'view'" in run_apart("viewer", "veiw", cwd=photo_path.parent).stderr
+    assert "argument 'photo'" in run_forked("plan", cwd=photo_path.parent).stderr
+    assert "Did you mean 'view'" in run_forked("veiw", cwd=photo_path.parent).stderr
 
 
 def test_a_shell_completes_commands() -> None:
@@ -430,14 +428,14 @@ def test_ctrl_c_ends_with_130(monkeypatch: pytest.MonkeyPatch, photo_path: Path)
 
 
 def test_without_a_display_view_names_the_headless_way(photo_path: Path) -> None:
-    done = run_apart("viewer", "view", photo_path)
+    done = run_forked("view", photo_path, cwd=ROOT)
     assert done.returncode == 2
     assert len(done.stderr.splitlines()) == 1
     assert "iibr screenshot" in done.stderr
 
 
 def test_panels_through_osmesa_are_refused_in_one_line(photo_path: Path, tmp_path: Path) -> None:
-    done = run_apart("viewer", "screenshot", photo_path, "--ui", "--backend", "osmesa", "-o", tmp_path / "o.png")
+    done = run_forked("screenshot", photo_path, "--ui", "--backend", "osmesa", "-o", tmp_path / "o.png", cwd=ROOT)
     assert done.returncode == 2
     assert len(done.stderr.splitlines()) == 1
     assert not (tmp_path / "o.png").exists()

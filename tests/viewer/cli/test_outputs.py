@@ -15,7 +15,8 @@ import typer
 
 from iibr_core.rendering.gloss.settings import Gloss
 from iibr_core.types import GridShape
-from tests.viewer.cli.test_cli import run, run_apart
+from tests.forked_iibr import run_forked
+from tests.viewer.cli.test_cli import run
 from tests.viewer.conftest import write_scene
 from viewer.cli.lens_options import GlossOption
 from viewer.cli.main import app
@@ -176,7 +177,7 @@ def test_demo_says_in_one_line_where_it_cannot_write(tmp_path: Path, is_file: bo
         (tmp_path / "out").touch()
     else:
         (tmp_path / "out").symlink_to("gone/out")
-    done = run_apart("viewer", "demo", cwd=tmp_path)
+    done = run_forked("demo", cwd=tmp_path)
     assert (done.returncode, done.stdout, len(done.stderr.splitlines())) == (2, "", 1)
     assert done.stderr.startswith("iibr: out: ")
 
@@ -230,7 +231,7 @@ def test_of_two_commands_at_once_onto_one_new_place_the_second_says_so(tmp_path:
         (("export", photo, "--to", "disparity", "-o"), tmp_path / "new.pfm"),
     ):
         with ThreadPoolExecutor(2) as pool:
-            ended = list(pool.map(lambda _: run_apart("viewer", *words, place), range(2)))  # noqa: B023
+            ended = list(pool.map(lambda _: run_forked(*words, place, cwd=tmp_path), range(2)))  # noqa: B023
         assert sorted(end.returncode for end in ended) == [0, 2], [end.stderr for end in ended]
         (line,) = next(end.stderr for end in ended if end.returncode).splitlines()
         assert re.search("another program|is there already", line), line
