@@ -40,8 +40,12 @@ print(value, sum(encode.stats.cache_hits.values()) if hasattr(encode, "stats") e
 @pytest.fixture
 def package(tmp_path):
     """A copy of the package with what kernels need, and one kernel that uses things of other files."""
+    return make_package(tmp_path)
+
+
+def make_package(folder):
     source = Path(iibr_core.__file__).parent
-    copy = tmp_path / "iibr_core"
+    copy = folder / "iibr_core"
     needed = (
         "__init__",
         "runtime/__init__",
@@ -217,11 +221,19 @@ def test_kernels_run_without_compiler(package):
     assert encode_in_new_process(package, NUMBA_DISABLE_JIT="1") == (pytest.approx(0.01292), False)
 
 
-@pytest.fixture
-def equipped(package):
-    """The package with its kernels compiled, at another place than where they were, and no cache of the user's."""
+@pytest.fixture(scope="module")
+def compiled(tmp_path_factory):
+    """A package whose kernels have been run, and are kept."""
+    package = make_package(tmp_path_factory.mktemp("compiled"))
     encode_in_new_process(package)
-    place = package.parent / "elsewhere" / "iibr_core"
+    return package
+
+
+@pytest.fixture
+def equipped(compiled, tmp_path):
+    """The package with its kernels compiled, at another place than where they were, and no cache of the user's."""
+    package = compiled
+    place = tmp_path / "elsewhere" / "iibr_core"
     shutil.copytree(package, place, ignore=shutil.ignore_patterns("__pycache__"))
     for folder in (package, package / "runtime"):
         subpath = numba.core.caching._CacheLocator.get_suitable_cache_subpath(str(folder / "jit.py"))

@@ -87,7 +87,7 @@ def started_batch(*words: object, until: Path) -> subprocess.Popen[str]:
 
 
 def goes_on(archive: Path, out: Path, *words: object) -> None:
-    """What was finished is not made again, and of the rest one photo is."""
+    """What was finished is not made again, and of the rest one photo is, by one worker."""
     lines = [json.loads(line) for line in (out / "manifest.jsonl").read_text().splitlines()]
     finished = {line["name"] for line in lines if line["key"]} - {line["name"] for line in lines if not line["key"]}
     left = [path for path in sorted(archive.iterdir()) if path.stem not in finished]
@@ -95,15 +95,15 @@ def goes_on(archive: Path, out: Path, *words: object) -> None:
     assert left
     for path in left[1:]:
         path.unlink()
-    again = run_batch(*words)
+    again = run_batch(*words, "--workers", 1)
     assert again.stdout == f"{out}: 1 written, {len(finished)} there before, 0 failed\n", again.stderr
 
 
 @pytest.mark.skipif(os.name != "posix", reason="process groups")
 def test_an_interruption_is_one_line_and_the_next_run_goes_on(long_archive: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
-    words = (long_archive, "--to", "hci", "--grid", 3, "-o", out, "--workers", 2)
-    with started_batch(*words, until=out / "manifest.jsonl") as run:
+    words = (long_archive, "--to", "hci", "--grid", 3, "-o", out)
+    with started_batch(*words, "--workers", 2, until=out / "manifest.jsonl") as run:
         os.killpg(run.pid, signal.SIGINT)  # as a terminal does, to the workers too
         _, said = run.communicate(timeout=120)
     assert (run.returncode, said) == (130, "iibr: interrupted\n")
@@ -125,8 +125,8 @@ def test_an_interruption_while_workers_start_is_one_line(long_archive: Path, tmp
 @pytest.mark.skipif(os.name != "posix", reason="process groups")
 def test_workers_end_with_who_started_them(long_archive: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
-    words = (long_archive, "--to", "hci", "--grid", 3, "-o", out, "--workers", 2)
-    with started_batch(*words, until=out / "manifest.jsonl") as run:
+    words = (long_archive, "--to", "hci", "--grid", 3, "-o", out)
+    with started_batch(*words, "--workers", 2, until=out / "manifest.jsonl") as run:
         workers = workers_of(run)
         run.kill()
         run.communicate(timeout=120)
@@ -153,8 +153,8 @@ def test_a_worker_that_is_killed_costs_no_photo_and_nothing_listens(long_archive
 def test_when_all_is_killed_nothing_finished_is_lost(long_archive: Path, tmp_path: Path) -> None:
     """As by a power cut, to what the disk holds of it."""
     out = tmp_path / "out"
-    words = (long_archive, "--to", "hci", "--grid", 3, "-o", out, "--workers", 2)
-    with started_batch(*words, until=out / "manifest.jsonl") as run:
+    words = (long_archive, "--to", "hci", "--grid", 3, "-o", out)
+    with started_batch(*words, "--workers", 2, until=out / "manifest.jsonl") as run:
         for process in (*psutil.Process(run.pid).children(recursive=True), psutil.Process(run.pid)):
             process.kill()
         run.communicate(timeout=120)
@@ -196,7 +196,9 @@ def cluster_elsewhere(tmp_path: Path, tls_options: Sequence[str]) -> Iterator[tu
     while scheduler.poll() is None and not (told.is_file() and told.stat().st_size):
         time.sleep(0.01)
     address = json.loads(told.read_text())["address"]
-    worker = subprocess.Popen([*dask, "worker", address, "--nthreads", "1", "--no-dashboard", *tls], **quiet)  # type: ignore[call-overload]
+    worker = subprocess.Popen(
+        [*dask, "worker", address, "--nthreads", "1", "--no-nanny", "--no-dashboard", *tls], **quiet
+    )  # type: ignore[call-overload]
     yield scheduler, address
     for process in (*psutil.Process(worker.pid).children(recursive=True), worker, scheduler):
         process.kill()
@@ -216,7 +218,7 @@ def test_when_the_scheduler_is_killed_it_is_one_line_and_nothing_finished_is_los
     (line,) = said.splitlines()
     assert run.returncode == 2
     assert line.startswith("iibr: the workers were lost"), said
-    goes_on(long_archive, out, *words, "--workers", 1)
+    goes_on(long_archive, out, *words)
 
 
 @pytest.mark.parametrize("tls_options", ["tls"], indirect=True)

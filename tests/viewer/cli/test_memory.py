@@ -27,6 +27,17 @@ def large(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
+@pytest.fixture(scope="module")
+def saved_text(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    """Settings that lie in a picture of this program."""
+    folder = tmp_path_factory.mktemp("saved")
+    small, saved = folder / "small.png", folder / "saved.png"
+    write_image(small, np.random.default_rng(0).random((30, 40, 3), np.float32))
+    assert ended("screenshot", small, "--grid", 1, "-o", saved)[0] == 0
+    text: dict[str, Any] = json.loads(settings_text_in(saved))
+    return text
+
+
 MEASURED = """
 import json, os, resource, subprocess, sys
 limit = int(sys.argv[1])
@@ -100,14 +111,11 @@ def test_a_limited_address_space_is_refused_before_opengl_starts(
     ],
 )
 def test_settings_of_a_picture_ask_for_no_more_than_the_machine_has(
-    large: Path, tmp_path: Path, changed: dict[str, Any], words: str
+    large: Path, tmp_path: Path, saved_text: dict[str, Any], changed: dict[str, Any], words: str
 ) -> None:
-    small, saved = tmp_path / "small.png", tmp_path / "saved.png"
-    write_image(small, np.random.default_rng(0).random((30, 40, 3), np.float32))
-    assert ended("screenshot", small, "--grid", 1, "-o", saved)[0] == 0
-    text = json.loads(settings_text_in(saved))
-    source = {**text["source"], "grid": None, **changed.pop("source", {})}
-    write_image(saved, np.zeros((8, 8, 3), np.uint8), {ATTRIBUTE: json.dumps({**text, **changed, "source": source})})
+    saved, source = tmp_path / "saved.png", {**saved_text["source"], "grid": None, **changed.get("source", {})}
+    text = json.dumps({**saved_text, **changed, "source": source})
+    write_image(saved, np.zeros((8, 8, 3), np.uint8), {ATTRIBUTE: text})
     code, peak, lines = ended("screenshot", large, "--like", saved, "-o", tmp_path / "out.png")
     assert code == 2
     assert len(lines) == 1, lines
