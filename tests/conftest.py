@@ -12,6 +12,8 @@ from hypothesis import settings
 # Before torch and BLAS load: their threads spin while they wait for each other, so that tiny arrays take up to 28 times
 # as long where others use the cores.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
+# The same for pictures that Mesa draws without a GPU: each worker draws in its own thread.
+os.environ.setdefault("LP_NUM_THREADS", "0")
 
 # Where the caller ignores interruptions, as jobs in the background do, programs that are started here would, too.
 if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:

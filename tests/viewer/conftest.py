@@ -25,8 +25,10 @@ if TYPE_CHECKING:
 WIDTH, HEIGHT = 96, 64
 NEAR, FAR = 2.0, -1.0
 EGL_DRAW, EGL_READ = 0x3059, 0x305A
-SMALL_WINDOW = 0, 0, 720, 800
+SMALL_WINDOW = 0, 0, 560, 800
 """x, y, width, height: high enough for most of the panel; a small picture, as each test waits for it to converge."""
+WIDE_WINDOW = 0, 0, 720, 800
+"""For what needs room beside the panel."""
 SCROLL_DOWN = 5
 """The button that the X server takes for a turn of the wheel."""
 FRAME_CORNERS = 8
@@ -217,6 +219,12 @@ def no_egl_context() -> Iterator[None]:
     yield
     if context:
         egl.eglMakeCurrent(display, draw, read, context)
+
+
+@pytest.fixture
+def wide_window(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Windows open with room beside the panel."""
+    monkeypatch.setattr("tests.viewer.conftest.SMALL_WINDOW", WIDE_WINDOW)
 
 
 @pytest.fixture

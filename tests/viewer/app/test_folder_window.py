@@ -173,6 +173,7 @@ def test_one_goes_on_from_a_folder_whose_first_photo_cannot_be_read(open_window:
     shows(driver, "photo1")
 
 
+@pytest.mark.usefixtures("wide_window")
 def test_a_click_in_the_filmstrip_opens_that_photo(viewer: Driver) -> None:
     viewer.press("photo photo2.png", "filmstrip")
     shows(viewer, "photo2")

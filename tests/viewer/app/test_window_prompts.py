@@ -82,6 +82,7 @@ def test_tooltips_come_up_before_the_window_sleeps(viewer: Driver) -> None:
         viewer.until_idle()
 
 
+@pytest.mark.usefixtures("wide_window")
 @pytest.mark.parametrize("scale", [1.0, 2.0])
 def test_tooltips_of_a_prompt_leave_it_to_be_seen(viewer: Driver, scale: float) -> None:
     viewer.app.do(SetPreference("font_scale", scale), ShowPrompt(ExportPrompt("sbs", "a.png")))

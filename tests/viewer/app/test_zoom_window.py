@@ -62,6 +62,7 @@ def test_a_zoomed_picture_is_its_part_of_the_whole(viewer: Driver) -> None:
     assert np.abs(image - expected).mean() < 6
 
 
+@pytest.mark.usefixtures("wide_window")
 def test_the_middle_button_and_space_pull_the_picture(viewer: Driver) -> None:
     app = viewer.app
     app.do(SetZoom(Zoom(3 * app.layout().fit)))
