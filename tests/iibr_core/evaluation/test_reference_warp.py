@@ -128,6 +128,17 @@ def test_scale_and_shift_are_found_in_spite_of_wrong_pixels() -> None:
     np.testing.assert_allclose(fitted[good], truth[good], atol=1e-3)
 
 
+def test_a_shift_misleads_no_fit_with_strays() -> None:
+    """Far from 0, where an error with the wrong sign would leave out the pixels at one end."""
+    truth = np.linspace(5.0, 9.0, 400, dtype=np.float32).reshape(20, 20)
+    estimate = (truth + 20) / 2
+    estimate[::4, ::3] -= 3.0
+    fitted = fit_to_truth(estimate, truth)
+    is_stray = np.zeros(truth.shape, bool)
+    is_stray[::4, ::3] = True
+    np.testing.assert_allclose(fitted[~is_stray], truth[~is_stray], atol=1e-3)
+
+
 def test_flat_and_unknown_maps_are_fitted_without_harm() -> None:
     truth = np.linspace(0, 4, 30, dtype=np.float32).reshape(5, 6)
     np.testing.assert_allclose(fit_to_truth(np.zeros((5, 6), np.float32), truth), np.median(truth))

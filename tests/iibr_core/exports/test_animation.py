@@ -115,13 +115,6 @@ def test_between_keys_the_path_is_the_spline_of_catmull_and_rom(source: ExportSo
         np.testing.assert_allclose(slope, (after - before) / 2, rtol=0.02)
 
 
-def test_between_keys_the_aperture_closes_and_no_farther(source: ExportSource, tmp_path: Path) -> None:
-    """Where the spline runs below 0."""
-    (tmp_path / "keys.txt").write_text("-1 0 0 2\n1 0 0 0\n0 1 0 0\n0 -1 0 2\n")
-    path = path_of(source, keys=tmp_path / "keys.txt", frames=40)
-    assert min(optics.aperture_diameter for optics in path) == 0 < path[0].aperture_diameter
-
-
 @pytest.mark.parametrize("text", ["", "1", "1 2 3 4 5", "a b", "nan 0", "900 0", "0 0 500"])
 def test_keys_that_mean_nothing_are_refused(source: ExportSource, tmp_path: Path, text: str) -> None:
     keys = tmp_path / "keys.txt"

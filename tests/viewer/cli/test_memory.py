@@ -13,6 +13,12 @@ import pytest
 
 from iibr_core.formats.images.photo import write_image
 from iibr_core.formats.images.settings_text import ATTRIBUTE, settings_text_in
+from iibr_core.rendering.optics import Optics
+from iibr_core.scenes.scene import Source
+from iibr_core.scenes.screen_size import ScreenSize
+from iibr_core.types import InputError
+from viewer.model.saved_settings import require_saved_size
+from viewer.model.state.saving import SavedSettings
 
 MIB = 2**20
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="limits and peaks as Linux has them")
@@ -122,3 +128,16 @@ def test_settings_of_a_picture_ask_for_no_more_than_the_machine_has(
     assert words in lines[0]
     assert peak < 400
     assert not (tmp_path / "out.png").exists()
+
+
+@pytest.mark.parametrize(
+    ("size", "is_drawn"),
+    [((16_384, 6_000), True), ((16_385, 1), False), ((1, 16_385), False), ((12_000, 12_000), False)],
+)
+def test_sizes_that_settings_ask_for_have_limits(size: tuple[int, int], is_drawn: bool) -> None:
+    saved = SavedSettings(Optics(), 1.0, Source(""), ScreenSize(*size))
+    if is_drawn:
+        require_saved_size(saved, Path("a.png"))
+        return
+    with pytest.raises(InputError, match=f"a.png.*{size[0]}x{size[1]}"):
+        require_saved_size(saved, Path("a.png"))
