@@ -102,7 +102,7 @@ def batch(
     )
     photos = photos_in(folders)
     if not photos:
-        raise InputError(f"{' and '.join(map(str, folders))}: no photos there")
+        raise InputError(f"{' and '.join(map(str, folders))}: no photos in it")
     require_batch_place(output, folders, force)
     open_drawn: OpenDrawn | None = None
     if to.is_drawn:

@@ -14,7 +14,7 @@ from viewer.cli.terminal import print_notes, show_progress
 def depth(
     context: typer.Context,
     field: Annotated[Path, typer.Argument(metavar="PATH", help="A light field, or a stereo photo.")],
-    out: Annotated[Path, typer.Option("-o", "--out", metavar="FILE", help="PFM, EXR, NPY or 16-bit PNG to write.")],
+    out: Annotated[Path, typer.Option("--output", "-o", metavar="FILE", help="Map to write: PFM, EXR, NPY or PNG.")],
     memory: Memory = None,
     force: Force = False,
 ) -> None:

@@ -97,13 +97,16 @@ def evaluate(
             show_default=False,
         ),
     ],
-    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for the report (JSON, Markdown, HTML).")],
+    out: Annotated[
+        Path,
+        typer.Option("--output", "-o", metavar="DIR", help="Folder for the report (JSON, Markdown, HTML)."),
+    ],
     judging: _Judging,
     force: Force = False,
 ) -> None:
     """Judge views against data sets whose true views are known, beside a plain warp and beside doing nothing.
 
-    Example: iibr evaluate hci/dino hci/cotton --out report
+    Example: iibr evaluate hci/dino hci/cotton -o report
     """
     stages = _stages_without(judging.without or [])
     require_extra("evaluate", "scipy", "skimage", "jinja2", "flip_evaluator")

@@ -13,6 +13,7 @@ from iibr_core.exports import (
     EXPORTS,
     MOST_FRAMES,
     RATE_LIMITS,
+    USUAL_SECONDS,
     AnimationKind,
     ExportKind,
     ExportOptions,
@@ -63,13 +64,26 @@ To = Annotated[
 ]
 
 
+def usual_of(field: str) -> str:
+    """The numbers that kinds have where nothing is said: "mp4, webm 30, gif 15"."""
+    numbers: dict[float, list[str]] = {}
+    for name, kind in EXPORTS.items():
+        if getattr(kind, field):
+            numbers.setdefault(getattr(kind, field), []).append(name)
+    return "; ".join(f"{', '.join(names)} {number:g}" for number, names in numbers.items())
+
+
+USUAL_SIZE = f"the photo's; at most {usual_of('most_width_px')} wide"
+USUAL_FRAMES = f"{USUAL_SECONDS:g} s of them; {usual_of('frames')}"
+
+
 @dataclass(frozen=True)
 class KindOptions:
     """As `ExportOptions` has them."""
 
     size: Annotated[
         ScreenSize | None,
-        typer.Option(parser=size_from_text, metavar="WxH", help="Of each picture.", show_default="the photo's"),
+        typer.Option(parser=size_from_text, metavar="WxH", help="Of each picture.", show_default=USUAL_SIZE),
     ] = None
     device: Annotated[
         str | None,
@@ -80,7 +94,7 @@ class KindOptions:
     eyes: Annotated[
         float | None,
         typer.Option(
-            parser=not_negative_from_text, metavar="X", help="View steps between two eyes.", show_default="the grid"
+            parser=not_negative_from_text, metavar="X", help="View steps between two eyes.", show_default="all the grid"
         ),
     ] = None
     motion: Annotated[
@@ -88,10 +102,14 @@ class KindOptions:
         typer.Option(parser=motion_from_text, metavar="|".join(ANIMATIONS), help="What moves.", show_default="circle"),
     ] = None
     frames: Annotated[
-        int | None, typer.Option(min=1, max=MOST_FRAMES, help="Of an animation, or pictures of a stack.")
+        int | None,
+        typer.Option(
+            min=1, max=MOST_FRAMES, help="Of an animation, or pictures of a stack.", show_default=USUAL_FRAMES
+        ),
     ] = None
     rate: Annotated[
-        float | None, typer.Option(parser=rate_from_text, metavar="X", help="Frames a second.", show_default="30")
+        float | None,
+        typer.Option(parser=rate_from_text, metavar="X", help="Frames a second.", show_default=usual_of("rate")),
     ] = None
 
     def options(self, keys: Path | None = None, row: int | None = None, show: bool = False) -> ExportOptions:
@@ -103,13 +121,26 @@ HEEDED_BY_SOME = {"keys", "row", "show", *(field.name for field in (*fields(Lens
 """Options that some kinds heed and others do not."""
 
 
+def _what_for(option: tuple[str, str]) -> str:
+    """Of an option (as it is typed, and its name among those that kinds heed): which kinds it is for."""
+    typed, name = option
+    kinds = [kind for kind, about in EXPORTS.items() if name in heeded_by(about)]
+    if 2 * len(kinds) < len(EXPORTS):
+        return f"{typed} is for {', '.join(kinds)}"
+    return f"{typed} is for all but {', '.join(kind for kind in EXPORTS if kind not in kinds)}"
+
+
+def heeded_by(kind: ExportKind) -> set[str]:
+    """Names of the options about exports and the lens that mean something to it."""
+    return {*kind.heeds, "gloss"} if kind.has_colors else set(kind.heeds)
+
+
 def require_kind(context: typer.Context, kind: ExportKind) -> None:
     """Raise InputError for options given that this kind would not heed, and where packages are missing for it."""
-    heeded = {*kind.heeds, "gloss"} if kind.has_colors else set(kind.heeds)
-    given = (given_options(context) & HEEDED_BY_SOME) - heeded
+    given = (given_options(context) & HEEDED_BY_SOME) - heeded_by(kind)
     if given:
-        options = sorted(parameter.opts[0] for parameter in context.command.params if parameter.name in given)
+        options = sorted((each.opts[0], each.name or "") for each in context.command.params if each.name in given)
         name = next(name for name, known in EXPORTS.items() if known is kind)
-        raise InputError(f"{' and '.join(options)}: means nothing to --to {name}; leave it out")
+        raise InputError(f"not for --to {name}: {'; '.join(map(_what_for, options))}")
     if kind.needs:
         require_extra("export", *kind.needs)

@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 def generate(
     context: typer.Context,
     path: ScenePath,
-    out: Annotated[Path, typer.Option("--out", "-o", metavar="DIR", help="Folder to write.", show_default=False)],
+    out: Annotated[Path, typer.Option("--output", "-o", metavar="DIR", help="Folder to write.", show_default=False)],
     scene: SceneOptions,
     grid: Annotated[
         GridShape | None,
@@ -64,14 +64,14 @@ def generate(
     """Write the light field of a photo: a disparity map that is named counts as it is, in px from view to view; found
     or estimated depth gets the parallax that the window shows. Of a light field: its views and those between.
 
-    Example: iibr generate photo.png --disparity photo.pfm --grid 9 --out field --format hci
+    Example: iibr generate photo.png --disparity photo.pfm --grid 9 -o field --format hci
 
-    Example: iibr generate photo.png --grid 9 --gloss gloss.toml --out shiny
+    Example: iibr generate photo.png --grid 9 --gloss gloss.toml -o shiny
 
     With --poses: the pictures of any cameras; the photo's depth is fitted to the depths of its pose, else the nearest
     is 1 away (--literal: disparity counts as it is, in px per unit of length).
 
-    Example: iibr generate photo.png --poses transforms.json --out pictures
+    Example: iibr generate photo.png --poses transforms.json -o pictures
     """
     require_poses_for(photo_pose, poses)
     require_memory(scene.memory, keeps_views=False)

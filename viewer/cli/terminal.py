@@ -19,6 +19,8 @@ from iibr_core.runtime import TimeLeft, about_left, tell_compiling
 from iibr_core.types import ReportProgress
 
 MAKING = "making views"
+FORMER_NAMES = {"--out": "--output"}
+"""Of options: they are understood still, and no help speaks of them."""
 RARELY_USED = ("evaluate", "train")
 
 
@@ -33,6 +35,9 @@ class Commands(TyperGroup):
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """The command's name, the command and its arguments. Raises UsageError where there is none of that name."""
+        args = [
+            FORMER_NAMES.get(name, name) + equals + value for name, equals, value in (a.partition("=") for a in args)
+        ]
         is_viewed = args[0] not in self.commands and _is_path(args[0])
         return super().resolve_command(ctx, ["view", *args] if is_viewed else args)
 
@@ -45,6 +50,11 @@ class Commands(TyperGroup):
         """Run the command. Raises typer.Abort for KeyboardInterrupt, RuntimeError for EOFError."""
         with _interruption_aborts():
             return super().invoke(ctx)
+
+
+def _as_named_now(word: str) -> str:
+    name, equals, value = word.partition("=")
+    return FORMER_NAMES.get(name, name) + equals + value
 
 
 def _is_path(word: str) -> bool:

@@ -25,7 +25,7 @@ EXIT_INTERRUPTED = 130
 
 def train(
     steps: Annotated[int, typer.Option(min=1, max=10**9, help="Batches of rays to learn from.")],
-    out: Annotated[Path, typer.Option(metavar="FILE", help="Weights to write (.safetensors).")],
+    out: Annotated[Path, typer.Option("--output", "-o", metavar="FILE", help="Weights to write (.safetensors).")],
     seed: Annotated[int, typer.Option(min=0, max=2**32 - 1, help="The same seed gives the same weights.")] = 0,
     learning_rate: Annotated[float, typer.Option(max=1.0, help="Of the first step; it falls to 0 over all.")] = 1e-4,
     device: Annotated[str, typer.Option(metavar="NAME", help="auto, cpu, cuda, cuda:1 or mps.")] = "auto",
@@ -35,7 +35,7 @@ def train(
 ) -> None:
     """Train the ray transformer on made-up scenes. Ctrl-C saves, --resume goes on; a log lies beside the weights.
 
-    Example: iibr train --steps 2500 --learning-rate 3e-3 --out weights.safetensors
+    Example: iibr train --steps 2500 --learning-rate 3e-3 -o weights.safetensors
     """
     require_extra("train", "torch")
     from iibr_core.training import require_run_files

@@ -109,6 +109,8 @@ def open_light_field(path: Path) -> MultiView:
         require_file(path)
     scene = find_light_field(path)
     if scene is None:
+        if is_folder(path) and not any(path.iterdir()):
+            raise InputError(f"{path}: no photos in it")
         said = f"laid out as {LAYOUTS}" if is_folder(path) else FILES
         raise InputError(f"{path}: holds no light field; {said}")
     return scene

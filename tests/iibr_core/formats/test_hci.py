@@ -310,7 +310,7 @@ def test_parameters_that_are_none(tmp_path):
 
 
 def test_folder_without_light_field(tmp_path):
-    with pytest.raises(InputError, match="holds no light field"):
+    with pytest.raises(InputError, match="no photos in it"):
         read_light_field(tmp_path)
     with pytest.raises(InputError, match="no such file"):
         read_light_field(tmp_path / "none")

@@ -115,9 +115,11 @@ def test_where_stanford_s_positions_tell_nothing_rows_go_upwards(tmp_path: Path)
 
 def test_a_folder_that_no_reader_knows(tmp_path: Path) -> None:
     assert find_light_field(tmp_path) is None
-    with pytest.raises(InputError, match=r"holds no light field; laid out as HCI, Stanford"):
+    with pytest.raises(InputError, match="no photos in it"):
         open_light_field(tmp_path)
     (tmp_path / "photo.png").touch()
+    with pytest.raises(InputError, match=r"holds no light field; laid out as HCI, Stanford"):
+        open_light_field(tmp_path)
     with pytest.raises(InputError, match="is empty"):
         open_light_field(tmp_path / "photo.png")
 

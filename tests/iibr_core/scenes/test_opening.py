@@ -155,6 +155,9 @@ def test_views_that_stand_on_no_grid_are_refused_in_one_line(tmp_path: Path) -> 
 
 
 def test_a_folder_without_views_is_told_what_would_be_some(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="no photos in it"):
+        next(results_of(SceneRequest(1, Source(str(tmp_path))), lambda: False, lambda: CENTRE))
+    (tmp_path / "notes.txt").touch()
     with pytest.raises(InputError, match="holds no light field; laid out as HCI, Stanford"):
         next(results_of(SceneRequest(1, Source(str(tmp_path))), lambda: False, lambda: CENTRE))
 

@@ -371,7 +371,7 @@ GENERATE = ("--out", "{dir}/o", "--grid", "3")
             ("generate", "{photo}", "--grid", "3", "--out", "{dir}/o", "--format", "mp4"),
             "'mp4' is no layout that can be written: give hci",
         ),
-        (("screenshot", "{dir}/folder", "-o", "{dir}/o.png"), "holds no light field"),
+        (("screenshot", "{dir}/folder", "-o", "{dir}/o.png"), "no photos in it"),
         (("generate", "{photo}", "--grid", "3"), "--out"),
         (("generate", "{photo}", *GENERATE, "--memory", "lots"), "--memory"),
         (("generate", "{photo}", *GENERATE, "--disparity-scale", "nan"), "--disparity-scale"),
