@@ -21,7 +21,7 @@ from viewer.model.actions import DismissNotice, SetHover
 from viewer.model.state.app_state import Hover
 from viewer.model.state.inspection import SetInspection, SetOverlay
 from viewer.model.state.optics import ApertureShape, MoveEye, SetAperture, SetFocus, SetOptics
-from viewer.model.state.preferences import Section
+from viewer.model.state.preferences import Section, with_sections
 
 SIZE = 1200, 760
 MOST_BYTES = 700_000
@@ -65,8 +65,9 @@ def inspection(viewer: HeadlessViewer) -> NDArray[np.uint8]:
 
 
 def open_sections(viewer: HeadlessViewer, *sections: Section) -> None:
-    """Open these sections of the panel and no others."""
-    viewer.state = replace(viewer.state, preferences=replace(viewer.state.preferences, open_sections=sections))
+    """Open these sections of the panel, with those that they lie in, and no others."""
+    opened = with_sections((), *sections)
+    viewer.state = replace(viewer.state, preferences=replace(viewer.state.preferences, open_sections=opened))
 
 
 def hover_at(viewer: HeadlessViewer, x_share: float, y_share: float) -> Hover:

@@ -54,10 +54,13 @@ def write_scene(folder: Path, name: str = "scene", seed: int = 0) -> Path:
 
 @contextmanager
 def headless_with_scene(folder: Path, *open_sections: Section) -> Iterator[HeadlessViewer]:
-    """A scene opened without a window, its notices gone; open_sections: of the panel, the usual ones if none."""
+    """A scene opened without a window, its notices gone; open_sections: of the panel, with those that they lie in, the
+    ones that are used most if none. The panel is there however narrow the window is.
+    """
     from iibr_core.scenes.scene import Source
     from viewer.app.headless import HeadlessViewer
     from viewer.model.actions import DismissNotice
+    from viewer.model.state.preferences import with_sections
 
     try:
         viewer = HeadlessViewer("egl")
@@ -66,9 +69,9 @@ def headless_with_scene(folder: Path, *open_sections: Section) -> Iterator[Headl
     with viewer:
         viewer.open(Source(str(write_scene(folder)), grid=GridShape(3, 3)), 1.0, lambda _: None)
         viewer.do(*(DismissNotice(notice) for notice in viewer.state.notices))
-        if open_sections:
-            preferences = replace(viewer.state.preferences, open_sections=open_sections)
-            viewer.state = replace(viewer.state, preferences=preferences)
+        sections = with_sections((), *(open_sections or ("view", "focus", "aperture", "light")))
+        preferences = replace(viewer.state.preferences, open_sections=sections)
+        viewer.state = replace(viewer.state, preferences=preferences, hides_panel=False)
         yield viewer
 
 
@@ -173,7 +176,7 @@ class Driver:
 
         panel = self.app.layout().panel
         x, y = self.find(widget)
-        left, right = panel.x + 0.36 * panel.width, panel.x + 0.95 * panel.width
+        left, right = panel.x + 0.40 * panel.width, panel.x + 0.95 * panel.width
         self.send("mousemove", x, y, "mousedown", 1)
         self.app.step()
         end = round(left + share * (right - left))
@@ -229,18 +232,20 @@ def wide_window(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def open_window(display: str, no_egl_context: None) -> Iterator[Opener]:
-    """Opens the viewer on a photo; closes it after the test."""
+    """Opens the viewer on a photo, with the sections open that are used most; closes it after the test."""
     from iibr_core.scenes.scene import Source
     from viewer.app.main_loop import App, initial_state
     from viewer.model.actions import OpenPath
     from viewer.model.state.app_state import AppState
-    from viewer.model.state.preferences import Preferences
+    from viewer.model.state.preferences import Preferences, with_sections
 
     apps = []
+    sections = with_sections((), "view", "focus", "aperture", "light")
 
     def start(path: Path | None, kept_in: Path | None = None, **changes: object) -> Driver:
         state = initial_state(OpenPath(Source(str(path), **changes))) if path else None  # type: ignore[arg-type]
-        apps.append(App(replace(state or AppState(), preferences=Preferences(window=SMALL_WINDOW)), kept_in))
+        preferences = Preferences(window=SMALL_WINDOW, open_sections=sections)
+        apps.append(App(replace(state or AppState(), preferences=preferences), kept_in))
         return Driver(apps[-1])
 
     yield start

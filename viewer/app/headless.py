@@ -33,14 +33,14 @@ from viewer.display.scene_drawer import prepare_gloss
 from viewer.display.scene_view import SceneView
 from viewer.gpu.headless_context import Backend, create_headless
 from viewer.gpu.refocus.accumulation import views_seen
-from viewer.model.actions import Action, OpenPath, ProgressMade, SceneOpened
+from viewer.model.actions import Action, OpenPath, ProgressMade, SceneOpened, SetState
 from viewer.model.inspection_request import (
     NO_INSPECTION_TEXTURES,
     InspectionTextures,
     beside_of,
     make_inspection_request,
 )
-from viewer.model.layout import BACKGROUND, Layout, layout_of, letterbox
+from viewer.model.layout import BACKGROUND, Layout, is_narrow, layout_of, letterbox
 from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState
 from viewer.model.state.inspection import SetInspection
@@ -210,6 +210,7 @@ class HeadlessViewer:
         from viewer.ui.style import Look
 
         scene, preferences = self.state.scene, self.state.preferences
+        self.do(SetState("is_narrow", is_narrow(size, 1.0)))
         look = Look(preferences.font_scale, preferences.theme)
         picture_size = scene.size if scene else None
         layout = layout_of(
@@ -217,6 +218,7 @@ class HeadlessViewer:
             picture_size,
             ui_scale=look.ui_scale,
             beside=beside_of(self.state),
+            has_panel=not self.state.is_panel_hidden,
             zoom=self.state.zoom,
             own_width=self.own_size.width if scene else None,
         )

@@ -178,7 +178,7 @@ class JobQueue:
         if isinstance(result, Done):
             is_open = state.scene is not None and running.shows(state.scene)
             return [action for action in result.value if is_open or not isinstance(action, EditsSaved)]
-        lost = f"{running.path}: writing it stopped unexpectedly"
+        lost = f"{running.path}: writing it stopped unexpectedly, and there is no such file. Try it again."
         return [Notify(Notice(lost if result is None else result.message, is_error=True, stays=True))]
 
     def _end(self, job: Job) -> None:

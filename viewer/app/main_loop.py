@@ -45,12 +45,12 @@ from viewer.model.inspection_request import (
     beside_of,
     make_inspection_request,
 )
-from viewer.model.layout import Layout, layout_of
+from viewer.model.layout import Layout, is_narrow, layout_of
 from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState, Picture
 from viewer.model.state.inspection import SetInspection
 from viewer.model.state.motion import Tick, Touch
-from viewer.model.state.preferences import PlaceWindow
+from viewer.model.state.preferences import PlaceWindow, is_seen_open
 from viewer.model.state.tasks import ReadTruthTask
 from viewer.ui.host import UiHost
 from viewer.ui.overlays.filmstrip import filmstrip_paths
@@ -184,7 +184,7 @@ class App:
             ratio,
             scale,
             beside_of(self.state),
-            has_panel=not self.state.hides_panel,
+            has_panel=not self.state.is_panel_hidden,
             zoom=self.state.zoom,
             own_width=scene.own_size.width if scene and scene.own_size else None,
         )
@@ -231,6 +231,8 @@ class App:
         if self.state.motion.is_running:
             actions.append(Tick(self._pace.stepped_at))
         actions += self._place_window()
+        if is_narrow(self.window.size, self.window.ui_scale) != self.state.is_narrow:
+            actions.append(SetState("is_narrow", not self.state.is_narrow))
         if self.scene_loader.has_lost(self.state):
             actions.append(WorkerLost())
         return actions
@@ -245,7 +247,7 @@ class App:
 
     def _take_dropped(self) -> list[Action]:
         paths = self.window.take_dropped()
-        is_inspecting = "inspect" in self.state.preferences.open_sections
+        is_inspecting = is_seen_open("inspect", self.state.preferences.open_sections)
         on_panel = self.layout().panel.contains(*self.window.pointer)
         return actions_from_drop(paths, self.state, is_inspecting and on_panel) if paths else []
 

@@ -179,6 +179,13 @@ def _folder_order(kept: Any) -> FolderOrder:
     return "time" if kept == "time" else "name"
 
 
+def _folder(kept: Any) -> str:
+    """Nothing where it is gone: that is no damage."""
+    if not isinstance(kept, str):
+        raise ValueError
+    return kept if os.path.isdir(kept) else ""
+
+
 def _yes_or_no(kept: Any) -> bool:
     if not isinstance(kept, bool):
         raise ValueError
@@ -198,6 +205,7 @@ _READERS: dict[str, Callable[[Any], Any]] = {
     "told_aperture": _yes_or_no,
     "told_drag": _yes_or_no,
     "estimates_depth": _yes_or_no,
+    "last_folder": _folder,
 }
 
 

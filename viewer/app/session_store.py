@@ -26,7 +26,7 @@ from viewer.model.state.notices import Notice
 from viewer.model.state.preferences import SetPreference
 from viewer.model.state.saving import SavedSettings
 
-EDITS_KEPT = "Depth edits are kept: the photo opens as you leave it. Save the depth map for other programs."
+EDITS_KEPT = "Your depth edits are kept: this photo opens as you leave it. Save the depth map to use it elsewhere."
 FOLDER = "sessions"
 SIDECAR_ENDING = ".iibr"
 QUIET_S = 2.0

@@ -19,7 +19,7 @@ from viewer.model.window_words import notice_in_window
 COMPARED = 200
 """So many rows and columns of two maps are compared, at most."""
 PAIRS = 33
-STOPPED = "Estimating depth stopped unexpectedly."
+STOPPED = "Estimating depth stopped unexpectedly; the photo keeps the depth that it had. Try it again."
 
 
 @dataclass(frozen=True, eq=False)

@@ -137,4 +137,4 @@ def _unseen_notes(unseen: Sequence[float]) -> tuple[str, ...]:
     if not many:
         return ()
     named = ", ".join(many[:MOST_NAMED]) + (" and others" if len(many) > MOST_NAMED else "")
-    return (f"Most of what these poses show was made up, as the photo never saw it: {named}.",)
+    return (f"Most of what these poses show was inpainted, as the photo does not show it: {named}.",)

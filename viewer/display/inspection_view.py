@@ -281,7 +281,7 @@ class InspectionView:
     def _origin(self, hover: Hover, state: AppState, scene: Scene, field: LightFieldTexture) -> Origin:
         """By what the view nearest to the eye says of the surface under the pointer."""
         if scene.plan is None:
-            return "stored view"
+            return "from disk"
         eye = state.optics.eye
         view: ViewIndex = tuple(nearest_present(field.present)[view_near(eye, field.grid)].tolist())
         packed = self._inpainted.get(view)

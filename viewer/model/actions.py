@@ -143,8 +143,8 @@ class WorkerLost:
 class SetState:
     """Give one field of `AppState` this value; most have actions of their own, for more depends on them."""
 
-    field: Literal["is_fullscreen", "hides_panel", "keeps_sessions", "report"]
-    value: bool | DrawReport
+    field: Literal["is_fullscreen", "hides_panel", "is_narrow", "keeps_sessions", "report"]
+    value: bool | DrawReport | None
 
 
 @dataclass(frozen=True)

@@ -57,7 +57,7 @@ from viewer.model.state.saving import CopyTask, PasteTask, WriteSidecarTask
 from viewer.model.state.tasks import ChooseTask, ReadMaskTask, ReadTruthTask
 from viewer.model.zoom import SetZoom, Zoom
 
-NOTHING_BETWEEN = "There are no more views to make between: this is for light fields of few views, opened from disk."
+NOTHING_BETWEEN = "No views can be made between these: that is for light fields of few views."
 FONT_STEP = 1.1
 CAMERA_STEP = 0.05
 RECENT_SHOWN = 4
@@ -77,8 +77,8 @@ COMPARE_WORDS: dict[Comparison, str] = {
     "photo": "Compare photo and picture",
     "quality": "Compare fast and balanced",
     "truth": "Compare with ground truth",
-    "kept": "Compare with the kept state",
-    "difference": "Difference to the kept state",
+    "kept": "Compare with the snapshot",
+    "difference": "Difference from the snapshot",
 }
 BRUSH_WORDS: dict[BrushTool, str] = {
     "nearer": "Nearer",
@@ -87,6 +87,7 @@ BRUSH_WORDS: dict[BrushTool, str] = {
     "level": "Level",
     "fill": "Bucket",
 }
+OVERLAY_WORDS: dict[OverlayKind, str] = {"disparity": "depth", "entropy": "entropy", "inpainted": "inpainting"}
 LOOP_WORDS: dict[LoopKind, str] = {"circle": "Circle", "eight": "Figure of eight", "swing": "Swing"}
 
 
@@ -149,6 +150,12 @@ def _toggle_brush(state: AppState) -> Action:
     return SetBrush(replace(state.brush, is_on=not state.brush.is_on))
 
 
+def toggle_panel(state: AppState) -> Action:
+    """Hide or show it; where that is what the window's size asks for, it follows that again."""
+    hides = not state.is_panel_hidden
+    return SetState("hides_panel", None if hides == state.is_narrow else hides)
+
+
 def _own_pixels(state: AppState) -> Action:
     """About the pointer, where it is over the picture, else about what is in the middle."""
     scene, hover, centre = state.scene, state.hover, (0.5, 0.5) if state.zoom is None else state.zoom.centre
@@ -173,12 +180,12 @@ def _invert_depth(state: AppState) -> Action:
 
 COMMANDS: tuple[Command, ...] = (
     Command("Open a photo…", _always(DoTask(ChooseTask("photo"))), (Chord("o", ctrl=True),)),
-    Command("Open a folder of views…", _always(DoTask(ChooseTask("folder"))), (Chord("o", ctrl=True, shift=True),)),
+    Command("Open a folder…", _always(DoTask(ChooseTask("folder"))), (Chord("o", ctrl=True, shift=True),)),
     Command("See the demo", lambda state: OpenPath(Source(str(demo_photo())), is_demo=True)),
     Command("Save the picture…", _always(AskToSave()), (Chord("s", ctrl=True),)),
     Command("Copy the picture", _always(DoTask(CopyTask())), (Chord("c", ctrl=True),)),
     Command("Paste a picture, or the path of one", _always(DoTask(PasteTask())), (Chord("v", ctrl=True),)),
-    Command("Keep these settings beside the photo", _always(DoTask(WriteSidecarTask()))),
+    Command("Save these settings beside the photo", _always(DoTask(WriteSidecarTask()))),
     Command("Next photo of the folder", _always(StepPhoto(1)), (Chord("page_down"),), when_held="awaits photo"),
     Command("Previous photo of the folder", _always(StepPhoto(-1)), (Chord("page_up"),), when_held="awaits photo"),
     Command(
@@ -188,14 +195,14 @@ COMMANDS: tuple[Command, ...] = (
     ),
     Command("Photos by name", _always(SetFolderOrder("name"))),
     Command("Photos by time", _always(SetFolderOrder("time"))),
-    Command("Export…", _always(AskToExport()), (Chord("e", ctrl=True),)),
+    Command("Share or export…", _always(AskToExport()), (Chord("e", ctrl=True),)),
     Command("Undo", _always(Undo()), (Chord("z", ctrl=True),), "repeats"),
     Command("Redo", _always(Redo()), (Chord("z", ctrl=True, shift=True), Chord("y", ctrl=True)), "repeats"),
     Command("Reset viewpoint, focus and aperture", _always(ResetOptics()), (Chord("r"),)),
-    Command("Viewpoint back to the middle", _always(ReturnHome()), (Chord("c"),)),
+    Command("Recenter", _always(ReturnHome()), (Chord("c"),)),
     *(Command(f"Preset: {name}", _always(ApplyPreset(name))) for name in PRESETS),
     *(Command(f"Motion: {LOOP_WORDS[kind].lower()}", _always(SetLoop(kind))) for kind in LOOPS),
-    Command("Motion: pause or go on", lambda state: PauseMotion(not state.motion.is_paused), (Chord("space"),)),
+    Command("Motion: pause or resume", lambda state: PauseMotion(not state.motion.is_paused), (Chord("space"),)),
     Command("Motion: stop", _always(SetLoop(None))),
     Command("Step forward", _always(MoveCamera(forward=CAMERA_STEP)), (Chord("w"),), "paced"),
     Command("Step back", _always(MoveCamera(forward=-CAMERA_STEP)), (Chord("s"),), "paced"),
@@ -222,7 +229,7 @@ COMMANDS: tuple[Command, ...] = (
         (Chord("v"),),
     ),
     *(
-        Command(f"Overlay: {kind}", _toggle_overlay(kind), (Chord("d"),) if kind == "disparity" else ())
+        Command(f"Overlay: {OVERLAY_WORDS[kind]}", _toggle_overlay(kind), (Chord("d"),) if kind == "disparity" else ())
         for kind in OVERLAYS
     ),
     *(
@@ -230,15 +237,15 @@ COMMANDS: tuple[Command, ...] = (
         for kind in COMPARISONS
     ),
     Command("Open ground truth…", _always(DoTask(ChooseTask("truth")))),
-    Command("Fill between views", _fill_between),
+    Command("Make views between those of a light field", _fill_between),
     Command("Stop making views", _always(StopWork())),
     Command("Zoom: the whole picture", _always(SetZoom(None)), (Chord("_0"),)),
     Command("Zoom: the photo's own pixels, 1:1", _own_pixels, (Chord("_1"),)),
     *(Command(f"Section: {section}", _always(ToggleSection(section))) for section in SECTIONS),
     Command("Full screen", lambda s: SetState("is_fullscreen", not s.is_fullscreen), (Chord("f11"),)),
-    Command("Hide or show the panel", lambda s: SetState("hides_panel", not s.hides_panel), (Chord("tab"),)),
+    Command("Hide or show the panel", toggle_panel, (Chord("tab"),)),
     Command("Before and after", lambda s: ShowBefore(not s.shows_before), (Chord("backslash"),)),
-    Command("Keep this state to compare", _always(KeepState()), (Chord("k"),)),
+    Command("Take a snapshot to compare with", _always(KeepState()), (Chord("k"),)),
     Command("Light or dark", lambda s: SetPreference("theme", "dark" if s.preferences.theme == "light" else "light")),
     Command(
         "Units: a photographer's or a light field's",
@@ -251,7 +258,7 @@ COMMANDS: tuple[Command, ...] = (
         "repeats",
     ),
     Command("Smaller text", _scale_text(1 / FONT_STEP), (Chord("minus", ctrl=True),), "repeats"),
-    Command("Usual text size", _always(SetPreference("font_scale", 1.0)), (Chord("_0", ctrl=True),)),
+    Command("Reset text size", _always(SetPreference("font_scale", 1.0)), (Chord("_0", ctrl=True),)),
     Command("All commands", _toggle_palette, (Chord("p", ctrl=True),)),
     Command("Mouse and keys", _toggle_help, (Chord("f1"),)),
     Command("Quit", _always(Quit()), (Chord("q", ctrl=True),)),

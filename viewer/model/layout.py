@@ -15,6 +15,8 @@ BACKGROUND = 0.07, 0.07, 0.08, 1.0
 """Behind the picture, where the theme is dark."""
 PANEL_WIDTH = 300.0
 MARGIN = 12.0
+NARROW_WIDTH = 720.0
+"""A window narrower than this, at usual size, leaves the picture little more room than the panel takes."""
 
 
 class PixelRect(NamedTuple):
@@ -162,6 +164,11 @@ def whole_pixels(rect: Rect) -> PixelRect:
     """A rectangle in pixels, rounded so that neighbours still touch, at least one pixel each way."""
     left, top = round(rect.x), round(rect.y)
     return PixelRect(left, top, max(round(rect.x + rect.width) - left, 1), max(round(rect.y + rect.height) - top, 1))
+
+
+def is_narrow(window_size: ScreenSize, ui_scale: float) -> bool:
+    """Whether the panel folds away by itself. ui_scale: of the display; larger text alone folds nothing away."""
+    return window_size[0] < NARROW_WIDTH * ui_scale
 
 
 def layout_of(

@@ -1,4 +1,6 @@
-"""The panel at the right: common commands, what is open and how far the work is, then sections that open and close."""
+"""The panel at the right: what everybody needs of what is open; the rest in sections, one level down under "More", and
+for who studies light fields another one down, under "Advanced".
+"""
 
 from __future__ import annotations
 
@@ -13,11 +15,10 @@ from iibr_core.types import DEFAULT_QUALITY
 from viewer.model.actions import Action, OpenPath, ResumeWork, StopWork
 from viewer.model.commands import BY_NAME
 from viewer.model.layout import Layout
-from viewer.model.lens.presets import PRESETS
 from viewer.model.state.app_state import AppState, DrawReport
-from viewer.model.state.optics import ApplyPreset
-from viewer.model.state.preferences import SECTIONS, Section, ToggleSection
+from viewer.model.state.preferences import HOLDERS, SECTIONS, Section, ToggleSection, is_seen_open
 from viewer.ui.sections.depth import depth_line, depth_section
+from viewer.ui.sections.essentials import essentials
 from viewer.ui.sections.gloss import gloss_section
 from viewer.ui.sections.inspect import inspect_section
 from viewer.ui.sections.lens import aperture_section, focus_section, light_section
@@ -26,15 +27,23 @@ from viewer.ui.sections.view import view_section
 from viewer.ui.widgets import button, gap, heading, in_row, last_part, quiet, tooltip
 
 TOOLS = (
-    (icons.ICON_FA_IMAGE, "Open a photo…"),
-    (icons.ICON_FA_FOLDER_OPEN, "Open a folder of views…"),
-    (icons.ICON_FA_FLOPPY_DISK, "Save the picture…"),
-    (icons.ICON_FA_FILE_EXPORT, "Export…"),
+    (icons.ICON_FA_IMAGE, "Open", "Open a photo…"),
+    (icons.ICON_FA_FLOPPY_DISK, "Save", "Save the picture…"),
+    (icons.ICON_FA_SHARE_NODES, "Share", "Share or export…"),
+)
+"""Icon, word, and the command that it gives."""
+
+FURTHER_TOOLS = (
+    (icons.ICON_FA_FOLDER_OPEN, "Open a folder…"),
     (icons.ICON_FA_ROTATE_LEFT, "Undo"),
     (icons.ICON_FA_ROTATE_RIGHT, "Redo"),
     (icons.ICON_FA_CIRCLE_HALF_STROKE, "Light or dark"),
     (icons.ICON_FA_CIRCLE_QUESTION, "Mouse and keys"),
 )
+READY = "Ready"
+HINT = "Drag the picture to look around it, click to focus. Ctrl+Z undoes, F1 shows all keys."
+CANCEL_TIP = "Stop here: the picture stays as it is now, and moves less smoothly."
+FLAT_HINT = "All of it is equally far away, so nothing moves. Ctrl+Z undoes, F1 shows all keys."
 _FIXED = (
     imgui.WindowFlags_.no_title_bar
     | imgui.WindowFlags_.no_resize
@@ -55,21 +64,32 @@ def panel(state: AppState, layout: Layout) -> list[Action]:
     imgui.set_next_window_size(imgui.ImVec2(rect.width, rect.height))
     imgui.begin("panel", None, _FIXED)
     actions = _tools(state, layout)
-    gap(layout, 2)
     if state.scene is None:
         is_reading = bool(progress_text(state.progress))
-        actions += _progress(state, layout) if is_reading else _recent(state.recent, state.source, layout)
+        actions += _progress(state, layout) if is_reading else _nothing_open(state, layout)
     else:
-        imgui.text_wrapped(state.scene.name)
-        quiet(size_text(state.scene))
-        depth_line(state.scene, layout)
-        actions += _progress(state, layout)
-        if state.report is not None:
-            quiet(report_text(state.report, state.progress.is_complete))
-        actions += _presets(state.scene, layout)
-        for section in SECTIONS:
-            actions += _section(section, state, state.scene, layout)
+        actions += _picture(state, state.scene, layout)
     imgui.end()
+    return actions
+
+
+def _nothing_open(state: AppState, layout: Layout) -> list[Action]:
+    return _further_tools(state, layout) + _recent(state.recent, state.source, layout)
+
+
+def _picture(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
+    """What is open, how far the work is, what everybody needs, and the sections."""
+    gap(layout, 2)
+    imgui.text_wrapped(scene.name)
+    depth_line(scene, layout)
+    actions = _progress(state, layout)
+    gap(layout, 2)
+    actions += essentials(state, scene, layout)
+    gap(layout, 2)
+    quiet(HINT if aperture_limit(scene.grid) else FLAT_HINT)
+    gap(layout, 2)
+    for section in SECTIONS:
+        actions += _section(section, state, scene, layout)
     return actions
 
 
@@ -107,6 +127,11 @@ def view_count_text(number: int) -> str:
     return f"{number} view" if number == 1 else f"{number} views"
 
 
+def state_text(progress: Progress) -> str:
+    """The same where the panel's first lines say it: there it is enough to know when all is done."""
+    return READY if progress.is_complete else progress_text(progress)
+
+
 def size_text(scene: Scene) -> str:
     """Size, views, and how they are made where that is not the plain way: "600 × 400 px, 9 × 9 views, fast"."""
     words = f"{scene.width} × {scene.height} px, {scene.grid.rows} × {scene.grid.columns} views"
@@ -115,14 +140,27 @@ def size_text(scene: Scene) -> str:
 
 
 def _tools(state: AppState, layout: Layout) -> list[Action]:
-    """A row of icons for commands; what cannot be done now is grey."""
+    """A row of commands by icon and word; what cannot be done now is grey."""
     actions: list[Action] = []
-    for (icon, name), width in in_row(TOOLS, layout):
-        command = BY_NAME[name]
-        chords = f" ({command.chords[0].words})" if command.chords else ""
-        if button(f"{icon}##{name}", layout, name.rstrip("…") + chords, _is_possible(name, state), width):
-            actions.append(command.action(state))
+    for (icon, word, name), width in in_row(TOOLS, layout):
+        if _tool(f"{icon}  {word}##{name}", name, state, layout, width):
+            actions.append(BY_NAME[name].action(state))
     return actions
+
+
+def _further_tools(state: AppState, layout: Layout) -> list[Action]:
+    """The same of those that fewer people look for, by icon alone."""
+    actions: list[Action] = []
+    for (icon, name), width in in_row(FURTHER_TOOLS, layout):
+        if _tool(f"{icon}##{name}", name, state, layout, width):
+            actions.append(BY_NAME[name].action(state))
+    return actions
+
+
+def _tool(words: str, name: str, state: AppState, layout: Layout, width: float) -> bool:
+    chords = BY_NAME[name].chords
+    tip = name.rstrip("…") + (f" ({chords[0].words})" if chords else "")
+    return button(words, layout, tip, _is_possible(name, state), width)
 
 
 def _is_possible(name: str, state: AppState) -> bool:
@@ -130,7 +168,7 @@ def _is_possible(name: str, state: AppState) -> bool:
         "Undo": bool(state.history.past),
         "Redo": bool(state.history.future),
         "Save the picture…": state.scene is not None,
-        "Export…": state.scene is not None,
+        "Share or export…": state.scene is not None,
     }
     return needs.get(name, True)
 
@@ -150,17 +188,17 @@ def _recent(paths: tuple[str, ...], source: Source | None, layout: Layout) -> li
 def _progress(state: AppState, layout: Layout) -> list[Action]:
     """A bar that stays when the work is done, so that nothing below it jumps; a button stops the work."""
     progress = state.progress
-    words = progress_text(progress)
+    words = state_text(progress)
     if not words:
         return []
     actions: list[Action] = []
     imgui.progress_bar(progress.share, imgui.ImVec2(-1, 4 * layout.ui_scale), "")
     is_working = not progress.is_complete and state.stopped != state.generation
     if is_working:
-        if _words_and_button(words, "Cancel", "Make no more views; those that are there stay.", layout):
+        if _words_and_button(words, "Cancel", CANCEL_TIP, layout):
             actions.append(StopWork())
     elif state.stopped == state.generation and state.scene:
-        if _words_and_button(words, "Resume", "Make the views again.", layout):
+        if _words_and_button(words, "Resume", "Go on from where the work was stopped.", layout):
             actions.append(ResumeWork())
     else:
         quiet(words)
@@ -181,29 +219,14 @@ def _words_and_button(words: str, text: str, tip: str, layout: Layout) -> bool:
     return bool(pressed)
 
 
-def _presets(scene: Scene, layout: Layout) -> list[Action]:
-    """Three buttons as wide as their words ask."""
-    if not aperture_limit(scene.grid):
-        return []
-    actions: list[Action] = []
-    spacing = 4 * layout.ui_scale
-    words = [name.capitalize() for name in PRESETS]
-    room = imgui.get_content_region_avail().x - spacing * (len(words) - 1)
-    lengths = [imgui.calc_text_size(word).x for word in words]
-    padding = (room - sum(lengths)) / len(words)
-    for i, (name, word, length) in enumerate(zip(PRESETS, words, lengths)):
-        if i:
-            imgui.same_line(0, spacing)
-        if button(word, layout, "Sets focus and aperture; viewpoint and light stay.", width=length + padding):
-            actions.append(ApplyPreset(name))
-    return actions
-
-
 def _section(section: Section, state: AppState, scene: Scene, layout: Layout) -> list[Action]:
     """A heading that opens and closes what is under it. Where there is one view, focus and aperture mean nothing."""
+    sections = state.preferences.open_sections
+    if section in HOLDERS and not is_seen_open(HOLDERS[section], sections):
+        return []
     if section in ("focus", "aperture", "view") and not aperture_limit(scene.grid):
         return []
-    is_open = section in state.preferences.open_sections
+    is_open = section in sections
     toggled: list[Action] = [ToggleSection(section)] if heading(section.capitalize(), is_open, layout) else []
     return toggled + (BUILDERS[section](state, scene, layout) if is_open else [])
 
@@ -217,13 +240,29 @@ def _recent_elsewhere(state: AppState, layout: Layout) -> list[Action]:
     return _recent(others, state.source, layout)
 
 
+def _more(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
+    """Before the sections that lie in it: further tools and what else was open lately."""
+    return _further_tools(state, layout) + _recent_elsewhere(state, layout)
+
+
+def _figures(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
+    """How the views are made and drawn, before what else is known of the scene."""
+    quiet(size_text(scene))
+    quiet(progress_text(state.progress) or "No views asked for.")
+    quiet("" if state.report is None else report_text(state.report, state.progress.is_complete))
+    return scene_section(state, scene, layout)
+
+
 BUILDERS: dict[Section, Callable[[AppState, Scene, Layout], list[Action]]] = {
+    "more": _more,
     "view": view_section,
     "focus": focus_section,
     "aperture": aperture_section,
     "light": light_section,
     "gloss": gloss_section,
     "depth": depth_section,
+    "advanced": lambda state, scene, layout: [],
     "inspect": inspect_section,
-    "scene": lambda state, scene, layout: scene_section(state, scene, layout) + _recent_elsewhere(state, layout),
+    "scene": _figures,
 }
+"""What each section shows before those that lie in it."""

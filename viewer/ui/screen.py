@@ -12,7 +12,7 @@ from viewer.model.inspection_request import NO_INSPECTION_TEXTURES, InspectionTe
 from viewer.model.layout import Layout
 from viewer.model.state.app_state import AppState
 from viewer.model.state.folder import Thumbnail
-from viewer.ui.overlays.chips import chips
+from viewer.ui.overlays.chips import chips, panel_handle
 from viewer.ui.overlays.filmstrip import filmstrip
 from viewer.ui.overlays.inspection import draw_beside_picture, draw_over_picture
 from viewer.ui.overlays.minimap import draw_minimap
@@ -48,7 +48,7 @@ def build_screen(
             if textures.minimap is not None:
                 draw_minimap(layout, textures.minimap)
     actions = filmstrip(state, layout, thumbnails)
-    actions += chips(state, layout) + panel(state, layout)
+    actions += chips(state, layout) + panel_handle(state, layout) + panel(state, layout)
     return actions + welcome(state, layout) + notices(state, layout) + prompts(state, layout)
 
 

@@ -12,7 +12,7 @@ from imgui_bundle import imgui
 from viewer.model.layout import Layout
 
 Item = TypeVar("Item")
-LABEL_WIDTH = 92.0
+LABEL_WIDTH = 104.0
 GRIP_WIDTH, GRIP_HEIGHT = 12.0, 4.0
 TOOLTIP_WIDTH = 260.0
 

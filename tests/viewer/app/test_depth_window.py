@@ -20,7 +20,7 @@ from viewer.model.state.depth_editing import Brush, SetBrush, SetTone
 from viewer.model.state.inspection import SetInspection, SetOverlay
 from viewer.model.state.notices import Notice
 from viewer.model.state.optics import MoveEye
-from viewer.model.state.preferences import SECTIONS, SetPreference, ToggleSection
+from viewer.model.state.preferences import SECTIONS, SetPreference, ToggleSection, with_sections
 from viewer.model.state.prompts import PalettePrompt, PathPrompt, SavePrompt
 
 pytestmark = pytest.mark.usefixtures("no_dialogs")
@@ -31,7 +31,7 @@ GRID = GridShape(3, 3)
 def viewer(open_window: Opener, photo_path: Path) -> Iterator[Driver]:
     driver = open_window(photo_path, grid=GRID)
     driver.until_idle()
-    preferences = replace(driver.app.state.preferences, open_sections=("depth",))
+    preferences = replace(driver.app.state.preferences, open_sections=with_sections((), "depth"))
     driver.app.state = replace(driver.app.state, preferences=preferences)
     driver.send("mousemove", *driver.position(0.1, 0.1))
     driver.until_idle()
@@ -188,7 +188,7 @@ def test_the_key_that_takes_the_brush_brings_it_into_sight(viewer: Driver) -> No
     viewer.send("key", "b")
     viewer.until(lambda app: app.state.brush.is_on)
     viewer.until_idle()
-    assert viewer.app.state.preferences.open_sections == SECTIONS
+    assert set(viewer.app.state.preferences.open_sections) == set(SECTIONS)
     assert panel.scroll.y > 0
     viewer.press("Smooth")
     viewer.until(lambda app: app.state.brush.tool == "smooth")
@@ -298,6 +298,6 @@ def test_a_notice_in_a_low_window_leaves_the_strips_free(viewer: Driver) -> None
 
 def test_no_dialog_means_a_prompt(viewer: Driver) -> None:
     viewer.press("Open map…")
-    viewer.until(lambda app: app.state.prompt == PathPrompt("map"))
+    viewer.until(lambda app: isinstance(app.state.prompt, PathPrompt) and app.state.prompt.what == "map")
     viewer.app.do(ShowPrompt(None), SetPreference("font_scale", 1.0), ToggleSection("depth"))
     viewer.until_idle()

@@ -15,6 +15,7 @@ from viewer.app.save_places import inputs_of_scene
 from viewer.model.actions import ShowPrompt
 from viewer.model.commands import action_for_path
 from viewer.model.state.optics import SetOptics
+from viewer.model.state.preferences import with_sections
 from viewer.model.state.prompts import PathPrompt
 
 
@@ -22,7 +23,7 @@ from viewer.model.state.prompts import PathPrompt
 def viewer(open_window: Opener, photo_path: Path) -> Driver:
     driver = open_window(photo_path, grid=GridShape(3, 3))
     driver.until_idle()
-    preferences = replace(driver.app.state.preferences, open_sections=("gloss",))
+    preferences = replace(driver.app.state.preferences, open_sections=with_sections((), "gloss"))
     driver.app.state = replace(driver.app.state, preferences=preferences)
     driver.until_idle()
     return driver
@@ -102,8 +103,8 @@ def test_surroundings_are_chosen_in_the_panel_and_taken_away_again(viewer: Drive
     make_glossy(viewer)
     viewer.app.state = replace(viewer.app.state, has_dialogs=False)
     shiny = viewer.image()
-    viewer.press("Surroundings…")
-    viewer.until(lambda app: app.state.prompt == PathPrompt("surroundings"))
+    viewer.press("Environment map…")
+    viewer.until(lambda app: isinstance(app.state.prompt, PathPrompt) and app.state.prompt.what == "surroundings")
     viewer.app.do(ShowPrompt(None), action_for_path("surroundings", str(photo_path), viewer.app.state))
     viewer.until(lambda app: app.scene_view.gloss_request(app.state.optics.gloss) is None)
     viewer.until_idle()

@@ -47,7 +47,7 @@ def test_escape_closes_what_lies_over_the_picture(opens: tuple[Action, ...], clo
 
 def test_what_is_typed_too_early_is_no_command() -> None:
     """The palette comes up, and has the keyboard a frame later."""
-    keys = Keys(arrows=ViewOffset(1, 0), commands=("Keep this state to compare", "Save the picture…"))
+    keys = Keys(arrows=ViewOffset(1, 0), commands=("Take a snapshot to compare with", "Save the picture…"))
     assert actions_from_keys(keys, replace(STATE, prompt=PalettePrompt())) == [AskToSave()]
     assert len(actions_from_keys(keys, replace(STATE, prompt="help"))) == 3
 

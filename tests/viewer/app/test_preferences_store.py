@@ -32,7 +32,7 @@ def test_what_is_kept_comes_back(tmp_path: Path) -> None:
     store_preferences(state, folder)
     again = load_preferences(AppState(), folder)
     assert again.preferences == state.preferences
-    assert again.preferences.open_sections == ("view", "focus", "aperture", "light", "scene")
+    assert again.preferences.open_sections == ("more", "advanced", "scene")
     assert again.recent == ("/photos/ä.png", str(Path("b.png").absolute()))
     assert sorted(path.name for path in folder.iterdir()) == [PREFERENCES_FILE, RECENT_FILE]
 

@@ -115,7 +115,7 @@ def open_lenslet_image(viewer: Driver, folder: Path) -> Scene:
 
 
 def fill_between(viewer: Driver) -> None:
-    (fill,) = (command for command in COMMANDS if command.name == "Fill between views")
+    (fill,) = (command for command in COMMANDS if command.name == "Make views between those of a light field")
     viewer.app.do(fill.action(viewer.app.state))
     viewer.until(lambda app: bool(app.state.jobs))
 

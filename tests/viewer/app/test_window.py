@@ -198,8 +198,7 @@ def test_another_depth_strength_makes_the_views_anew_without_reading_the_photo(
     photo_path.unlink()
     scene = viewer.app.state.scene
     assert scene is not None
-    viewer.press("section Depth")
-    viewer.slide("##Parallax", 0.9)
+    viewer.slide("##Depth strength", 0.9)
     assert viewer.app.state.generation == 2
     assert viewer.app.state.depth_strength > 1
     viewer.until(lambda app: app.scene_view.generation == 2)

@@ -223,8 +223,8 @@ def test_what_was_chosen_is_there_again_the_next_time(open_window: Opener, photo
     kept = tmp_path / "kept"
     first = open_window(photo_path, kept_in=kept, grid=GridShape(1, 1))
     first.until_idle()
-    first.press("section Scene")
-    first.until(lambda app: "scene" in app.state.preferences.open_sections)
+    first.press("section Advanced")
+    first.until(lambda app: "advanced" in app.state.preferences.open_sections)
     first.until_idle()
     preferences = first.app.state.preferences
     assert load_preferences(AppState(), kept).preferences.open_sections == preferences.open_sections, "after a crash"
@@ -275,7 +275,7 @@ def test_a_lost_worker_is_told_and_replaced(
     monkeypatch.setattr(scene_worker, "results_of", dying)
     driver = open_window(photo_path)
     driver.until(lambda app: bool(app.state.notices))
-    assert "worker stopped" in driver.app.state.notices[0].text
+    assert "stopped unexpectedly" in driver.app.state.notices[0].text
     driver.app.do(OpenPath(Source(str(write_scene(tmp_path, "other", seed=1)), grid=GridShape(1, 1))))
     driver.until_idle()
     assert driver.app.state.scene is not None

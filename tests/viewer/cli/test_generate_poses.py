@@ -58,7 +58,7 @@ def test_what_is_mostly_made_up_is_told(
     poses = write_poses(tmp_path / "poses.json", [(0, 0, 0), (0, 0, 20)])
     words = ("generate", write_scene(tmp_path), "--poses", poses, "--photo-pose", "1", "-o", tmp_path / "new")
     assert run(monkeypatch, *words) == 0
-    assert "made up, as the photo never saw it: 2 (" in capsys.readouterr().err
+    assert "inpainted, as the photo does not show it: 2 (" in capsys.readouterr().err
     capsys.readouterr()
     assert run(monkeypatch, *words) == 2  # it is there already
     assert run(monkeypatch, *words, "--force") == 0

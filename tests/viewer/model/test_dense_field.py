@@ -97,11 +97,11 @@ def test_each_time_the_next_denser_grid_is_made_of_the_views_on_disk() -> None:
 
 
 def test_the_command_tells_where_nothing_lies_between() -> None:
-    (command,) = (command for command in COMMANDS if command.name == "Fill between views")
+    (command,) = (command for command in COMMANDS if command.name == "Make views between those of a light field")
     photo = replace(FIELD, given_grid=None)
     for scene in (photo, None):
         told = command.action(AppState(scene=scene))
-        assert "no more views" in told.notice.text  # type: ignore[union-attr]
+        assert "No views can be made" in told.notice.text  # type: ignore[union-attr]
     opened = command.action(AppState(scene=FIELD))
     assert opened == DoTask(FillTask(Source("field", filled_grid=DENSE)))
 

@@ -14,7 +14,7 @@ from iibr_core.scenes.scene import Scene, Source
 from iibr_core.types import GridShape, ViewOffset
 from viewer.model.actions import Action, EndGesture, SceneOpened, SetHover
 from viewer.model.colormap import VIRIDIS, map_color
-from viewer.model.commands import BY_NAME
+from viewer.model.commands import BY_NAME, OVERLAY_WORDS
 from viewer.model.inspection_request import (
     beside_of,
     make_inspection_request,
@@ -171,7 +171,11 @@ def test_the_place_pointed_at_last_stays_and_what_was_found_there_goes() -> None
 
 
 def test_every_kind_has_a_command_that_also_takes_it_away() -> None:
-    for name in (*(f"Overlay: {kind}" for kind in OVERLAYS), "Compare photo and picture", "Compare fast and balanced"):
+    for name in (
+        *(f"Overlay: {OVERLAY_WORDS[kind]}" for kind in OVERLAYS),
+        "Compare photo and picture",
+        "Compare fast and balanced",
+    ):
         state = after(OPEN, BY_NAME[name].action(OPEN))
         assert state.inspection != OPEN.inspection
         assert after(state, BY_NAME[name].action(state)).inspection == OPEN.inspection
@@ -289,8 +293,8 @@ def test_words() -> None:
     assert "px" not in hover_text(plain.optics, SCENE, hover)
     words = status_text(numbers, SCENE, hover, Probe((1, 20, 255), 7, 35, "inpainted"))
     assert words == ["12, 4", "−0.50 px", "0.50 behind", "inpainted", "RGB 1 20 255", "seen in 7 of 35 views"]
-    flat = status_text(plain, SCENE, replace(hover, disparity=None), Probe((0, 0, 0), None, 35, "stored view"))
-    assert flat == ["12, 4", "stored view", "RGB 0 0 0", "35 views"]
+    flat = status_text(plain, SCENE, replace(hover, disparity=None), Probe((0, 0, 0), None, 35, "from disk"))
+    assert flat == ["12, 4", "from disk", "RGB 0 0 0", "35 views"]
 
 
 def test_the_legend_speaks_the_units_of_the_panel() -> None:

@@ -308,7 +308,7 @@ def test_sharpening_edges_can_be_stopped() -> None:
     state = reduce(state_with(scene_of()), ProgressMade(1, Progress(81, 81, 0.1, drafts=20), (0, 0)))
     stopped = reduce(state, StopWork())
     assert stopped.stopped == 1
-    assert stopped.progress.doing == "stopped at 81 of 81 views, edges not sharpened in 20"
+    assert stopped.progress.doing == "stopped at 81 of 81 views, edges still soft in 20"
     assert not stopped.progress.is_complete
 
 

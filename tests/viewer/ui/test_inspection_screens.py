@@ -21,7 +21,7 @@ from viewer.model.state.notices import Notice
 from viewer.model.state.optics import MoveEye
 from viewer.model.state.preferences import SetPreference, Theme, ToggleSection
 
-SIZE = 640, 760
+SIZE = 640, 1000
 GRID = GridShape(3, 3)
 ENOUGH_PIXELS = 60
 HOVER = Hover(48.0, 32.0, 1.0)

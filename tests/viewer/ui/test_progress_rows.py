@@ -26,7 +26,7 @@ def test_each_job_has_a_row_and_a_cancel_of_its_own() -> None:
 def test_filling_between_views_has_such_a_row_too() -> None:
     filling = JobProgress(3, "fill", "field", "making views", 0.25, 8.0, Source("field", filled_grid=GridShape(9, 9)))
     (row,) = progress_rows(AppState(jobs=(filling,)))
-    assert (row.name, row.words) == ("Filling between the views of field", "making views, 25 %, about 8 s left")
+    assert (row.name, row.words) == ("Making views between those of field", "making views, 25 %, about 8 s left")
     assert row.cancel == DoTask(CancelJobTask(3))
 
 

@@ -33,13 +33,13 @@ from viewer.model.state.jobs import WRITING, JobProgress, JobsChanged
 from viewer.model.state.motion import SetLoop
 from viewer.model.state.notices import Notice
 from viewer.model.state.optics import SetAperture, SetOptics
-from viewer.model.state.preferences import SECTIONS, Section, SetPreference, ToggleSection
+from viewer.model.state.preferences import SECTIONS, Section, SetPreference, ToggleSection, with_sections
 from viewer.model.state.prompts import PalettePrompt, PathPrompt
 from viewer.model.state.saving import SavedSettings
 from viewer.ui.overlays.progress_rows import job_text
 from viewer.ui.style import DARK, LIGHT
 
-SIZE = 640, 880
+SIZE = 640, 1400
 ENOUGH_PIXELS = 60
 """That differ, at least, where something new is drawn: a short word."""
 
@@ -63,6 +63,9 @@ def in_panel(screen: np.ndarray, scale: float = 1.0) -> np.ndarray:
 
 @pytest.mark.parametrize("section", SECTIONS)
 def test_every_section_opens_and_closes(viewer: HeadlessViewer, section: Section) -> None:
+    preferences = viewer.state.preferences
+    sections = with_sections(preferences.open_sections, "inspect")  # what a section lies in is open before
+    viewer.state = replace(viewer.state, preferences=replace(preferences, open_sections=sections))
     first = viewer.screen(SIZE)
     changed = changed_after(viewer, ToggleSection(section))
     assert in_panel(changed).sum() > 10 * ENOUGH_PIXELS
@@ -111,6 +114,7 @@ def test_each_aperture_shape_shows_its_own_controls(viewer: HeadlessViewer, kind
     ids=lambda action: type(action).__name__,
 )
 def test_the_panel_tells(viewer: HeadlessViewer, action: Action) -> None:
+    viewer.do(ToggleSection("scene"))
     assert in_panel(changed_after(viewer, action)).sum() > ENOUGH_PIXELS
 
 
@@ -145,9 +149,9 @@ def _blurred(same: np.ndarray) -> np.ndarray:
 
 
 def test_an_empty_window_lists_recent_files(viewer: HeadlessViewer) -> None:
-    viewer.state = replace(AppState(), recent=())
+    viewer.state = replace(AppState(hides_panel=False), recent=())
     before = viewer.screen(SIZE).astype(int)
-    viewer.state = replace(AppState(), recent=("/photos/garden.jpg", "/photos/bridge.jpg"))
+    viewer.state = replace(AppState(hides_panel=False), recent=("/photos/garden.jpg", "/photos/bridge.jpg"))
     assert (np.abs(viewer.screen(SIZE) - before).max(axis=2) > 24).sum() > 3 * ENOUGH_PIXELS
 
 
@@ -167,7 +171,7 @@ def test_what_is_under_way_in_words() -> None:
 
 
 def test_the_scene_section_tells_what_reading_a_photo_changed(viewer: HeadlessViewer) -> None:
-    preferences = replace(viewer.state.preferences, open_sections=("scene",))
+    preferences = replace(viewer.state.preferences, open_sections=with_sections((), "scene"))
     viewer.state = replace(viewer.state, preferences=preferences)
     before = viewer.screen(SIZE).astype(int)
     assert viewer.state.scene is not None

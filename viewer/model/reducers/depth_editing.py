@@ -22,7 +22,7 @@ from viewer.model.state.depth_editing import (
     SetTone,
 )
 from viewer.model.state.notices import Notice
-from viewer.model.state.preferences import SECTIONS
+from viewer.model.state.preferences import with_sections
 
 POINT_SPACING = 1 / 6
 """Of the radius: a stroke is remembered by places this far apart."""
@@ -92,8 +92,7 @@ def is_depth_ahead(state: AppState, asked_for: DepthSettings) -> bool:
 
 def _with_depth_section(state: AppState) -> AppState:
     """Who takes the brush by its key sees what it is and can do."""
-    is_open = state.preferences.open_sections
-    sections = tuple(section for section in SECTIONS if section in (*is_open, "depth"))
+    sections = with_sections(state.preferences.open_sections, "depth")
     return replace(state, preferences=replace(state.preferences, open_sections=sections))
 
 

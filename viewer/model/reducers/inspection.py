@@ -28,11 +28,11 @@ from viewer.model.state.tasks import ChooseTask
 DIVIDER_MARGIN = 0.02
 """The divider stays so far (share of the picture's width) from its borders, where it could not be taken again."""
 
-NOT_MADE_HERE = "Only of views made here: these were read from disk."
-NOTHING_KEPT = "Nothing to compare with yet: keep a state first (K)."
-KEPT = "Kept. Change the lens, then compare: side by side, or as a difference."
-KEPT_COMMANDS = ("Compare with the kept state", "Difference to the kept state")
-NO_DISPARITY = "These views come without disparity."
+NOT_MADE_HERE = "Only of views that were made here: these were read from disk."
+NOTHING_KEPT = "There is no snapshot yet: take one first (K)."
+KEPT = "Snapshot taken. Change the picture, then compare with it: side by side, or as a difference."
+KEPT_COMMANDS = ("Compare with the snapshot", "Difference from the snapshot")
+NO_DISPARITY = "These views come without depth."
 
 
 def reduce_inspection(state: AppState, action: InspectionAction) -> AppState:

@@ -8,12 +8,13 @@ from typing import Any
 
 from iibr_core.scenes import clamp
 from viewer.model.state.preferences import (
-    SECTIONS,
     PlaceWindow,
     Preferences,
     PreferencesAction,
     SetPreference,
     ToggleSection,
+    is_seen_open,
+    with_sections,
 )
 from viewer.model.window_limits import FONT_SCALE_LIMITS
 
@@ -28,8 +29,10 @@ def reduce_preferences(preferences: Preferences, action: PreferencesAction) -> P
             change: dict[str, Any] = {field: value}
             return replace(preferences, **change)
         case ToggleSection(section):
-            is_open = preferences.open_sections
-            return replace(preferences, open_sections=tuple(s for s in SECTIONS if (s in is_open) != (s == section)))
+            sections = preferences.open_sections
+            if is_seen_open(section, sections):
+                return replace(preferences, open_sections=tuple(other for other in sections if other != section))
+            return replace(preferences, open_sections=with_sections(sections, section))
         case PlaceWindow(place):
             return replace(preferences, window=place or preferences.window, is_maximized=place is None)
     return preferences

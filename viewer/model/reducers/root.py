@@ -67,8 +67,8 @@ from viewer.model.window_limits import DEPTH_STRENGTH_LIMIT
 from viewer.model.zoom import LEAST_ZOOM, SetZoom, Zoom
 
 AS_LEFT = "As you left it. Undo (Ctrl+Z) starts afresh."
-FILLED = "the views between those on disk are there. Open it again to see them."
-LOST = "The worker stopped unexpectedly. Whatever you open or change next starts a new one."
+FILLED = "its further views are ready. Open it again to see them."
+LOST = "Making the views stopped unexpectedly; the picture stays as it is. Open the photo again to go on."
 
 
 def reduce(state: AppState, action: Action) -> AppState:

@@ -54,14 +54,14 @@ def stop_work(state: AppState) -> AppState:
         is_back = left.scene is not None and left.scene.source is left.source
         return left if is_back else replace(left, stopped=state.generation, source=None)
     if state.scene is not None and state.scene.is_sketch:
-        return replace(state, stopped=state.generation, progress=Progress(doing="stopped: this is a small picture"))
+        return replace(state, stopped=state.generation, progress=Progress(doing="stopped: this is a small preview"))
     if not progress.total or progress.is_complete:
         return state
     doing = f"stopped at {progress.done} of {progress.total} views"
     if progress.doing:
         doing = f"stopped {progress.doing}"
     elif progress.drafts:
-        doing += f", edges not sharpened in {progress.drafts}"
+        doing += f", edges still soft in {progress.drafts}"
     return replace(state, stopped=state.generation, progress=Progress(doing=doing))
 
 

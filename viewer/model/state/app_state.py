@@ -88,7 +88,8 @@ class AppState:
     shown_generation: whose views are shown; given_up: the newest one that led to nothing, so that no two jobs share a
     number. folder: the photos beside the one that is open, None before they are known. facts: what a photo's file says
     of it, perhaps of the one before. is_fullscreen,
-    hides_panel: of the window; shows_before: the photo as it was taken stands in place of the picture.
+    hides_panel: of the window, None: where that is_narrow, see `layout`; shows_before: the photo as it was taken stands
+    in place of the picture.
     models: of depth. keeps_sessions: whether the photo opens as it is left. awaits_touch: the demo is open and nobody
     has touched it yet: once all its views are there it sways. filled: the light field whose views between were made
     last, None before. focused_at: the place (see focal_plane) that was clicked last to be sharp, None where the focus
@@ -137,7 +138,8 @@ class AppState:
     folder: PhotoFolder | None = None
     facts: FactsRead = NO_FACTS
     is_fullscreen: bool = False
-    hides_panel: bool = False
+    hides_panel: bool | None = None
+    is_narrow: bool = False
     shows_before: bool = False
     keeps_sessions: bool = False
     awaits_touch: bool = False
@@ -160,6 +162,11 @@ class AppState:
     def next_generation(self) -> int:
         """Of the next job."""
         return max(self.generation, self.given_up) + 1
+
+    @property
+    def is_panel_hidden(self) -> bool:
+        """As the user wants it; else it gives way to the picture in a narrow window."""
+        return self.is_narrow if self.hides_panel is None else self.hides_panel
 
     @property
     def has_unsaved_edits(self) -> bool:

@@ -45,8 +45,8 @@ class Pair:
     flip: float | None = None
 
 
-Origin = Literal["photo", "generated", "inpainted", "stored view"]
-"""Where a pixel comes from; "stored view": from a light field on disk."""
+Origin = Literal["photo", "generated", "inpainted", "from disk"]
+"""Where a pixel comes from; "from disk": from a light field that was read."""
 
 
 @dataclass(frozen=True)

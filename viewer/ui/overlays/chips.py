@@ -1,4 +1,6 @@
-"""Chips in the picture's upper corners: what it is drawn from, where that is not the photo and its true depth."""
+"""Chips in the picture's upper corners: what it is drawn from, where that is not the photo and its true depth. And the
+handle at the window's right edge that brings a panel back that has folded away.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +8,7 @@ from imgui_bundle import icons_fontawesome_6 as icons
 from imgui_bundle import imgui
 
 from viewer.model.actions import Action
+from viewer.model.commands import toggle_panel
 from viewer.model.free_camera import LeaveCamera, is_at_end
 from viewer.model.layout import Layout
 from viewer.model.lens.photographic_units import mean_depth
@@ -16,10 +19,11 @@ from viewer.ui.style import DARK
 from viewer.ui.widgets import tooltip
 
 CHIP, BADGE = "free camera", "guess"
-FULL, SHORT = "Free camera: off the plane of views. C returns", "Free camera. C returns"
-AT_END = "The photo ends here. C returns"
-GUESS_TIP = "Depth is guessed: it moves, it is not true."
+FULL, SHORT = "Free camera: more is missing from the photo here. C goes back", "Free camera. C goes back"
+AT_END = "The photo shows nothing beyond this. C goes back"
+GUESS_TIP = "Depth is guessed: near and far may be wrong. Press to see how to get true depth."
 GAP = 8.0
+HANDLE, HANDLE_SIZE = "panel handle", (22.0, 56.0)
 _BARE = CARD_FLAGS | imgui.WindowFlags_.no_decoration | imgui.WindowFlags_.no_background
 
 
@@ -41,6 +45,22 @@ def chips(state: AppState, layout: Layout) -> list[Action]:
     elif scene.is_guessed and imgui.calc_text_size(BADGE).x + 4 * GAP * layout.ui_scale <= frame.width:
         actions += [ShowOffer(True)] if _chip(BADGE, BADGE, layout, GUESS_TIP) else []
     return actions
+
+
+def panel_handle(state: AppState, layout: Layout) -> list[Action]:
+    """Where the panel is hidden, or takes the place of half the picture: it comes back, or goes."""
+    if not (state.is_panel_hidden or state.is_narrow):
+        return []
+    imgui.set_next_window_pos(imgui.ImVec2(layout.panel.x, layout.window.height / 2), 0, imgui.ImVec2(1, 0.5))
+    imgui.push_style_var(imgui.StyleVar_.window_padding, imgui.ImVec2(0, 0))
+    imgui.begin(HANDLE, None, _BARE)
+    icon = icons.ICON_FA_CHEVRON_LEFT if state.is_panel_hidden else icons.ICON_FA_CHEVRON_RIGHT
+    width, height = (side * layout.ui_scale for side in HANDLE_SIZE)
+    pressed = imgui.button(f"{icon}###panel", imgui.ImVec2(width, height))
+    tooltip("Show the panel (Tab)" if state.is_panel_hidden else "Hide the panel (Tab)", layout)
+    imgui.end()
+    imgui.pop_style_var()
+    return [toggle_panel(state)] if pressed else []
 
 
 def _chip(name: str, words: str, layout: Layout, tip: str = "", is_right: bool = False) -> bool:

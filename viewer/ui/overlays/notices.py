@@ -44,6 +44,8 @@ def notices(state: AppState, layout: Layout) -> list[Action]:
     most = max(bottom - margin / 2, LEAST_HEIGHT * layout.ui_scale)
     imgui.set_next_window_size_constraints(imgui.ImVec2(width, 0), imgui.ImVec2(width, most))
     imgui.begin("notices", None, CARD_FLAGS)
+    if state.prompt is not None:  # what is asked has buttons that must be seen
+        imgui.internal.bring_window_to_display_back(imgui.internal.get_current_window())
     actions = build_rows(rows, layout)
     if state.notices:
         actions += _notice(state.notices[-1], state)
@@ -55,17 +57,17 @@ def notices(state: AppState, layout: Layout) -> list[Action]:
 
 def _offer(model: ModelOffer) -> list[Action]:
     """How to get true depth in place of a guess; nothing more is asked."""
-    words, button = f"{model.title} is on this machine.", "Estimate depth"
+    words, button = f"{model.title}, on this machine, finds true depth.", "Estimate depth"
     if model.lacks:
         words = f"{model.title} {model.lacks}"
     elif not model.is_here:
-        words = f"{model.title}, {model.megabytes:,} MB, {model.licence}, from {model.host}."
+        words = f"{model.title} finds true depth: {model.megabytes:,} MB, {model.licence}, from {model.host}."
         button = "Get true depth"
     actions: list[Action] = [ShowOffer(False)] if imgui.button("×##offer") else []
     imgui.same_line()
     imgui.begin_group()
     imgui.align_text_to_frame_padding()
-    imgui.text_wrapped("Depth is guessed.")
+    imgui.text_wrapped("Depth is guessed: near and far may be wrong.")
     quiet(words)
     if not model.lacks:
         actions += button_rows([(button, GetDepth())])

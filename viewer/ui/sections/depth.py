@@ -9,7 +9,7 @@ from imgui_bundle import imgui
 from iibr_core.depth import DepthStart
 from iibr_core.depth.editing import BRUSH_TOOLS, DEPTH_TOOLS, GAMMA_LIMITS, RADIUS_LIMITS, BrushTool, DepthEdits
 from iibr_core.scenes import Scene, source_with_depth
-from viewer.model.actions import Action, AskToSave, DoTask, OpenPath, SetDepthStrength, ShowPrompt
+from viewer.model.actions import Action, AskToSave, DoTask, OpenPath, ShowPrompt
 from viewer.model.commands import BRUSH_WORDS
 from viewer.model.layout import Layout
 from viewer.model.state.app_state import AppState
@@ -18,7 +18,6 @@ from viewer.model.state.inspection import SetOverlay
 from viewer.model.state.model_download import DepthModels, ModelsPrompt, UseModel
 from viewer.model.state.preferences import SetPreference
 from viewer.model.state.tasks import ChooseTask
-from viewer.model.window_limits import DEPTH_STRENGTH_LIMIT
 from viewer.model.window_words import words_in_window
 from viewer.ui.sections.depth_histogram import depth_histogram
 from viewer.ui.widgets import (
@@ -37,26 +36,25 @@ from viewer.ui.widgets import (
 )
 
 START_WORDS: dict[DepthStart, str] = {
-    "auto": "The best there is",
+    "auto": "Automatic",
     "embedded": "The photo's own",
     "model": "A depth model",
     "rough": "A rough guess",
     "flat": "None: flat",
 }
 START_TIPS: dict[DepthStart, str] = {
-    "auto": "A map beside the photo, what the camera stored in it, a depth model, a rough guess: the first there is.",
+    "auto": "A map beside the photo, else depth in the photo's file, else a depth model, else a guess.",
     "embedded": "What the camera stored in the file, as phones do with portraits.",
-    "model": "A network on this machine works it out from the picture.",
-    "rough": "Guessed from height in the picture and contours: it moves, it is not true.",
-    "flat": "Everything is equally far away: one view.",
+    "model": "A model on this machine estimates it from the picture.",
+    "rough": "From height in the picture and outlines: the picture moves, but near and far may be wrong.",
+    "flat": "Everything is equally far away, so nothing moves.",
 }
-FROM_TIP = "Where depth is looked for. The photo is opened anew."
-STRENGTH_TIP = "Multiplies the parallax the plan chose. The views are made anew when you let go."
-REFINE_TIP = "How far soft edges of the depth are drawn to the photo's edges. Exact maps stay as they are."
-FAR_TIP = "What is farther than this is put here. Drag the left handle above, too."
-NEAR_TIP = "What is nearer than this is put here. Drag the right handle above, too."
-GAMMA_TIP = "Above 1 gives more of the depth to what is near, below 1 to what is far."
-INVERT_TIP = "Near becomes far: for maps that mean it the other way round."
+FROM_TIP = "Where depth comes from. Another choice opens the photo again."
+REFINE_TIP = "How closely depth follows the photo's edges: more makes crisper outlines. Exact maps stay as they are."
+FAR_TIP = "All that is farther comes as near as this. The left handle above does the same."
+NEAR_TIP = "All that is nearer goes as far as this. The right handle above does the same."
+GAMMA_TIP = "Above 1, near things stand out more; below 1, far ones do."
+INVERT_TIP = "Swaps near and far: for maps that count the other way round."
 BRUSH_TIPS: dict[BrushTool, str] = {
     "nearer": "Drag over the picture to bring it nearer; strokes end at the photo's edges (B puts the brush away).",
     "farther": "Drag over the picture to push it away; strokes end at the photo's edges (B puts the brush away).",
@@ -64,12 +62,12 @@ BRUSH_TIPS: dict[BrushTool, str] = {
     "level": "Drag over the picture to give it one depth, up to the photo's edges (B puts the brush away).",
     "fill": "Click a surface to give it one depth, up to edges of the photo and of depth (B puts the bucket away).",
 }
-STROKE_TIP = "Of one stroke. Level and bucket always give the whole depth."
+STROKE_TIP = "How much one stroke changes. Level and Bucket always give the whole depth."
 SAMPLE_TIP = (
-    "Level and bucket give the depth where you press. Ctrl+click in the picture picks another, this forgets it."
+    "Level and Bucket give the depth of where you press. Ctrl+click picks the depth of another place; this forgets it."
 )
-OTHER_MODELS = "Depth models…", "What there is, and a file of your own."
-ESTIMATES_TIP = "By the recommended model, behind the guess; of photos that bring no depth along."
+OTHER_MODELS = "Depth models…", "All that can be had, and a file of your own."
+ESTIMATES_TIP = "Photos without depth get it from the recommended model. Until that is done, it is guessed."
 TOOLS_A_ROW = 3
 
 
@@ -84,10 +82,10 @@ def depth_line(scene: Scene, layout: Layout) -> None:
 def depth_section(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
     """Build the section. Edits tell when they end, because they cost a new light field; before they are previewed."""
     if scene.plan is None:
-        quiet("A light field from disk: its depth cannot be changed.")
+        quiet("The depth of a light field cannot be changed: its views hold it.")
         return []
     actions = _origin(state, scene, layout)
-    actions += _strengths(state, layout)
+    actions += _refine(state, layout)
     gap(layout, 2)
     actions += depth_histogram(state, scene, layout)
     actions += _tone(state, layout)
@@ -140,19 +138,13 @@ def _choice_text(start: DepthStart, model: str | None, path: str | None) -> str:
     return last_part(model) if start == "model" and model else START_WORDS[start]
 
 
-def _strengths(state: AppState, layout: Layout) -> list[Action]:
-    actions: list[Action] = []
-    limits = (0.0, DEPTH_STRENGTH_LIMIT)
-    strength = slider("Parallax", state.depth_strength, limits, "× %.2f", layout, STRENGTH_TIP)
-    is_finished = imgui.is_item_deactivated_after_edit()
-    if strength is not None or is_finished:
-        actions.append(SetDepthStrength(state.depth_strength if strength is None else strength, is_finished))
+def _refine(state: AppState, layout: Layout) -> list[Action]:
     form = "off" if state.depth.refine == 0 else "%.0f %%"
     percent = slider("Refine", 100 * state.depth.refine, (0.0, 100.0), form, layout, REFINE_TIP)
     is_finished = imgui.is_item_deactivated_after_edit()
-    if percent is not None or is_finished:
-        actions.append(SetRefine(state.depth.refine if percent is None else percent / 100, is_finished))
-    return actions
+    if percent is None and not is_finished:
+        return []
+    return [SetRefine(state.depth.refine if percent is None else percent / 100, is_finished)]
 
 
 def _tone(state: AppState, layout: Layout) -> list[Action]:
@@ -175,7 +167,7 @@ def _tone(state: AppState, layout: Layout) -> list[Action]:
         actions.append(SetTone(replace(edits, is_inverted=inverted), is_finished=True))
     imgui.same_line()
     shows = state.inspection.overlay == "disparity"
-    shown = checkbox("Show as colours", shows, layout, "The disparity over the picture (D), see Inspect.")
+    shown = checkbox("Show as colours", shows, layout, "Depth over the picture: the lighter, the nearer (D).")
     if shown is not None:
         actions.append(SetOverlay("disparity" if shown else None))
     return actions
@@ -191,7 +183,7 @@ def _brush(state: AppState, layout: Layout) -> list[Action]:
         if choice(BRUSH_WORDS[tool], is_in_hand, layout, (width, 0), BRUSH_TIPS[tool]):
             actions.append(SetBrush(replace(brush, tool=tool, is_on=not is_in_hand)))
     limits = (100 * RADIUS_LIMITS[0], 100 * RADIUS_LIMITS[1])
-    tip = "Radius, of the photo's width (wheel over the picture)."
+    tip = "How wide it paints, as a share of the photo's width (wheel over the picture)."
     size = slider("Size", 100 * brush.radius, limits, "%.1f %%", layout, tip, True, brush.is_on)
     actions += [] if size is None else [SetBrush(replace(brush, radius=size / 100))]
     actions += _strength(brush, layout) + _sample(brush, layout)
@@ -222,13 +214,13 @@ def _sample(brush: Brush, layout: Layout) -> list[Action]:
 
 def _files(state: AppState, layout: Layout) -> list[Action]:
     actions: list[Action] = []
-    if button("Open map…", layout, "A disparity map for this photo: PFM, EXR, NPY or 16-bit PNG."):
+    if button("Open map…", layout, "A depth map for this photo: PFM, EXR, NPY or 16-bit PNG."):
         actions.append(DoTask(ChooseTask("map")))
     imgui.same_line(0, 4 * layout.ui_scale)
-    if button("Save map…", layout, "The disparity with all edits; beside the photo it is found again."):
+    if button("Save map…", layout, "Depth with all your edits. Beside the photo it is found again the next time."):
         actions.append(AskToSave("map"))
     imgui.same_line(0, 4 * layout.ui_scale)
     is_edited = state.source is not None and state.depth.edits != DepthEdits()
-    if button("Reset", layout, "Depth as it was found: no edits, refined as at first.", is_edited):
+    if button("Reset", layout, "Depth as it was found, without your edits.", is_edited):
         actions.append(ResetDepth())
     return actions

@@ -18,7 +18,10 @@ from viewer.ui.widgets import tooltip
 
 HEIGHT = 56.0
 HANDLE_WIDTH = 12.0
-TIP = "How much of the picture lies how far: far left, near right. Drag the handles to clip; the line is the focus."
+TIP = (
+    "How much of the picture is how far away: far at the left, near at the right. The line is the focus; the handles"
+    " limit the depth."
+)
 
 
 def depth_histogram(state: AppState, scene: Scene, layout: Layout) -> list[Action]:

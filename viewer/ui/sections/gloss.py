@@ -40,9 +40,9 @@ REFLECTS_TIP = "How much of the light is reflected: 4 % for plastics and varnish
 BALL_TIP = "Drag to move the light about the scene."
 BRIGHT_TIP = "× 1 makes white paper that faces the light as bright as the photo's white."
 SHOWN_TIP = (
-    "The photo shows the light's highlight already: it runs over the surface. Without brightness, the light is found."
+    "The photo shows the highlight already: that one runs over the surface. At brightness 0, the light is found."
 )
-AROUND_TIP = "Choose a picture all around (equirectangular); the surface reflects it."
+AROUND_TIP = "Choose a picture taken all around (equirectangular): the surface reflects it."
 MARK_TIP = "Drag over the picture to make more of it glossy (Esc puts the brush away)."
 ERASE_TIP = "Drag over the picture to leave parts of it as they are (Esc puts the brush away)."
 ONLY_TIP = "Nothing is glossy but what the brush marks."
@@ -128,10 +128,10 @@ def _reflection(gloss: Gloss, layout: Layout) -> Gloss:
 
 def _environment(gloss: Gloss, layout: Layout) -> list[Action]:
     """What is reflected beside the light: the way to a picture or to none, and its name."""
-    is_asked = button("Surroundings…", layout, AROUND_TIP)
+    is_asked = button("Environment map…", layout, AROUND_TIP)
     imgui.same_line()
-    is_dropped = button("None", layout, "Reflect the light alone.", bool(gloss.environment))
-    quiet(PurePath(gloss.environment).name or "Nothing around it")
+    is_dropped = button("None", layout, "Reflect nothing but the light.", bool(gloss.environment))
+    quiet(PurePath(gloss.environment).name or "No environment map")
     if is_asked:
         return [DoTask(ChooseTask("surroundings"))]
     return [SetOptics("gloss", replace(gloss, environment=""))] if is_dropped else []
@@ -180,6 +180,6 @@ def _brush(brush: GlossBrush, gloss: Gloss, layout: Layout) -> list[Action]:
     if button("Wipe", layout, "Take all strokes away.", bool(gloss.surface.strokes), width):
         actions.append(SetOptics("gloss", replace(gloss, surface=replace(gloss.surface, strokes=()))))
     limits = (100 * STROKE_RADIUS_LIMITS[0], 100 * STROKE_RADIUS_LIMITS[1])
-    tip = "Radius, of the photo's width (wheel over the picture)."
+    tip = "How wide it paints, as a share of the photo's width (wheel over the picture)."
     size = slider("Brush size", 100 * brush.radius, limits, "%.1f %%", layout, tip, True, brush.is_on)
     return actions + ([] if size is None else [SetGlossBrush(replace(brush, radius=size / 100))])

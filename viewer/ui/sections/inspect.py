@@ -9,6 +9,7 @@ from imgui_bundle import imgui
 
 from iibr_core.scenes import Scene
 from viewer.model.actions import Action, DoTask
+from viewer.model.commands import OVERLAY_WORDS
 from viewer.model.inspection_request import grid_to_compare, view_label, view_to_compare
 from viewer.model.layout import Layout
 from viewer.model.reducers.inspection import NOTHING_KEPT, lacks_kept_state, obstacle_to_comparison, obstacle_to_overlay
@@ -33,15 +34,15 @@ EPI_TIP = (
 OVERLAY_TIPS: dict[OverlayKind, str] = {
     "disparity": "How near everything is, as colours.",
     "entropy": "How undecided the weights of the rays are: 1 where no ray of the photo shows anything.",
-    "inpainted": "What the photo never saw and had to be inpainted.",
+    "inpainted": "What the photo does not show, so that it was inpainted.",
 }
-OPACITY_TIP = "Of what lies over the picture."
+OPACITY_TIP = "How much of the picture the colours cover."
 TRUTH_TIP = "A light field on disk to compare with."
 COMPARISON_WORDS: dict[Comparison, str] = {
     "photo": "Photo",
     "quality": "Balanced",
     "truth": "Truth",
-    "kept": "Kept state",
+    "kept": "Snapshot",
     "difference": "Difference",
 }
 COMPARISON_TIPS: dict[Comparison, str] = {
@@ -49,8 +50,8 @@ COMPARISON_TIPS: dict[Comparison, str] = {
     "quality": "The view nearest to the viewpoint, made in fast and in balanced quality.",
     "truth": "The view nearest to the viewpoint beside the same one of a light field on disk. Drop its folder on the "
     "panel, or press again to choose another one.",
-    "kept": "The picture as it was when its state was kept (K), beside the present one.",
-    "difference": "How far the present picture is from the one whose state was kept (K).",
+    "kept": "The picture as it was at the snapshot (K), beside the present one.",
+    "difference": "How far the present picture is from the snapshot (K).",
 }
 
 
@@ -98,7 +99,9 @@ def _toggles(state: AppState, layout: Layout) -> list[Action]:
 def _overlays(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
     imgui.text("Over the picture")
     chosen = state.inspection.overlay
-    row = [(k.capitalize(), chosen == k, OVERLAY_TIPS[k], obstacle_to_overlay(scene, k)) for k in OVERLAYS]
+    row = [
+        (OVERLAY_WORDS[k].capitalize(), chosen == k, OVERLAY_TIPS[k], obstacle_to_overlay(scene, k)) for k in OVERLAYS
+    ]
     pressed = _choices(row, layout)
     actions: list[Action] = []
     if pressed is not None:

@@ -1,4 +1,4 @@
-"""The panel's sections for focus, aperture and light."""
+"""The sliders of focus and aperture, and the panel's sections for the rest of them and for light."""
 
 from __future__ import annotations
 
@@ -39,14 +39,17 @@ from viewer.ui.widgets import button, checkbox, choice, end_words, percent_slide
 FOCUS_TIP = "What is sharp, from near to far. Click in the picture, or turn the wheel."
 FOCUS_DISPARITY_TIP = "Disparity that is sharp, px per view step: larger is closer."
 DISTANCE_TIP = "Distance that is sharp; 1 is the plane that stays still when the viewpoint moves."
-RANGE_TIP = "Everything so close to the focus, before and behind it, is sharp."
+RANGE_TIP = "How much before and behind the focus is sharp, too."
 APERTURE_TIP = "How wide the lens is open: wider blurs more of what is out of focus."
 F_NUMBER_TIP = " The f-number is that of a full-frame lens focused at {:.0f} m."
 EQUIVALENT_TIP = " ≈ is the 85 mm lens on full frame, focused at 2 m, that would blur the background as much."
+ALL_SHARP = "all sharp"
+"""Of an aperture that is a pinhole."""
+
 CLOSED_STOPS = 6.0
 """From the widest aperture to where its slider ends: a pinhole."""
-TILT_TIP = "Shows two handles over the picture: drag them onto two things, and the plane of focus runs through both."
-HIGHLIGHT_TIP = "Lets clipped highlights count for more, so that they bloom where they are out of focus."
+TILT_TIP = "Two handles appear in the picture: drag them onto two things, and both are sharp, with all between them."
+HIGHLIGHT_TIP = "Bright spots, such as lamps, glow where they are out of focus."
 KIND_TIPS: dict[ApertureKind, str] = {
     "disc": "Disc",
     "polygon": "Blades",
@@ -57,9 +60,9 @@ KIND_TIPS: dict[ApertureKind, str] = {
 
 
 def focus_section(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
-    """Build the section: focus in disparity and distance, range, tilt."""
+    """Build the section: the focus as a distance where that is known, range, tilt."""
     optics = state.optics
-    actions = _focus(state, scene, layout)
+    actions = _distance(state, scene, layout) if state.preferences.units == "light field" else []
     span, unit = focus_span(scene), _unit_of_focus(state, scene)
     form = f"± {unit.form}" if optics.focus_range else "none"
     new = slider("Range", optics.focus_range / unit.size, (0.0, span / unit.size), form, layout, RANGE_TIP)
@@ -93,14 +96,14 @@ def _unit_of_focus(state: AppState, scene: Scene) -> _Unit:
     return _Unit(focus_span(scene) / 100, "%.0f %%")
 
 
-def _focus(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
-    """Where the focus is: from near to far, in metres where they are known; or as disparity, and distance with it."""
+def focus_slider(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
+    """Where the focus is: from near to far, in metres where they are known; or as disparity."""
     actions: list[Action] = []
     disparity = state.optics.focus_disparity
     if state.preferences.units == "light field" or not scene.has_view_disparity:  # else nothing is near or far yet
         new = slider("Focus", disparity, focus_limits(scene), "%.2f px", layout, FOCUS_DISPARITY_TIP)
         _add(actions, SetFocus, new)
-        return actions + (_distance(state, scene, layout) if state.preferences.units == "light field" else [])
+        return actions
     distance = metres(scene, disparity)
     form = "%.0f %%" if distance is None else metres_text(distance)
     new = slider("Focus", far_percent(scene, disparity), (0.0, 100.0), form, layout, FOCUS_TIP)
@@ -121,19 +124,22 @@ def _distance(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
     return [] if disparity is None else [SetFocus(disparity)]
 
 
-def aperture_section(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
-    """Build the section: diameter, shape, and what the shape asks for."""
-    actions: list[Action] = []
+def aperture_slider(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
+    """How wide the lens is open."""
     diameter, widest = state.optics.aperture_diameter, aperture_limit(scene.grid)
     words, is_exact = f_number_text(scene, diameter), f_number(scene, widest) is not None
     tip = APERTURE_TIP + (F_NUMBER_TIP.format(ASSUMED_DISTANCE_M) if is_exact else EQUIVALENT_TIP)
     if state.preferences.units == "light field":
-        form = "pinhole" if diameter == 0 else f"%.1f views  ·  {words}"
-        _add(actions, SetAperture, slider("Aperture", diameter, (0.0, widest), form, layout, tip))
-    else:
-        actions += _stops(diameter, widest, f_number_text(scene, diameter), layout, tip)
+        form = ALL_SHARP if diameter == 0 else f"%.1f views  ·  {words}"
+        new = slider("Aperture", diameter, (0.0, widest), form, layout, tip)
+        return [] if new is None else [SetAperture(new)]
+    return _stops(diameter, widest, ALL_SHARP if diameter == 0 else words, layout, tip)
+
+
+def aperture_section(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
+    """Build the section: the opening's shape, and what that asks for."""
     shape = state.optics.aperture_shape
-    actions += _kinds(shape, layout, palette_of(state.preferences.theme))
+    actions = _kinds(shape, layout, palette_of(state.preferences.theme))
     if shape.kind == "mask":
         actions += _mask_row(shape, layout)
     return actions + [SetOptics("aperture_shape", new) for new in _shape_edits(shape, layout)]

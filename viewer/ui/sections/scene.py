@@ -15,8 +15,8 @@ from viewer.model.window_words import words_in_window
 from viewer.ui.widgets import combo, gap, label, quiet
 
 BETWEEN_TIP = (
-    "Makes views between those on disk, of all that these see. First their disparity is found, where the files have"
-    " none: that takes longest. Exports take them along."
+    "Makes more views between those on disk, so that the picture moves more smoothly. That may take long; exports have"
+    " them, too."
 )
 
 
@@ -50,7 +50,7 @@ def _views_between(scene: Scene, chosen: GridShape, given: GridShape, layout: La
 
 def _grid_tip(grid: GridShape, given: GridShape) -> str:
     new = grid.rows * grid.columns - given.rows * given.columns
-    return f"{new} views between those on disk are made." if new else "No views are made."
+    return f"{new} views between those on disk are made." if new else "The views on disk, and no others."
 
 
 def _grid_words(grid: GridShape, given: GridShape) -> str:
@@ -66,5 +66,5 @@ def _of_light_field(scene: Scene) -> str:
 
 def _sizes(scene: Scene) -> tuple[tuple[str, str], ...]:
     width, height = scene.own_size or scene.size
-    shown = "" if (width, height) == scene.size else f", looked at with {scene.width} x {scene.height}"
+    shown = "" if (width, height) == scene.size else f", shown at {scene.width} x {scene.height}"
     return (("Size", f"{width} x {height}{shown}"), ("Colours", scene.color_space.name))

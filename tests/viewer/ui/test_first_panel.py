@@ -1,0 +1,150 @@
+"""What somebody sees who opens the program for the first time: few controls, and the rest where it is remembered."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
+
+import pytest
+from imgui_bundle import imgui
+
+from iibr_core.scenes.scene import Progress
+from iibr_core.scenes.screen_size import ScreenSize
+from tests.viewer.conftest import headless_with_scene
+from viewer.app.headless import HeadlessViewer
+from viewer.model.actions import SetState
+from viewer.model.commands import BY_NAME
+from viewer.model.reducers.root import reduce
+from viewer.model.state.app_state import AppState
+from viewer.model.state.preferences import (
+    HOLDERS,
+    SECTIONS,
+    Preferences,
+    Section,
+    ToggleSection,
+    is_seen_open,
+    with_sections,
+)
+from viewer.ui.sections.essentials import MOVE_TIPS, PRESET_TIPS
+
+WINDOW = ScreenSize(1280, 800)
+MOST_CONTROLS = 14
+CONTROLS = (
+    "button", "small_button", "invisible_button", "checkbox", "radio_button", "slider_float", "slider_int",
+    "begin_combo", "selectable", "input_int", "input_float", "input_text_with_hint", "color_edit3",
+)  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def opened(tmp_path_factory: pytest.TempPathFactory) -> Iterator[HeadlessViewer]:
+    with headless_with_scene(tmp_path_factory.mktemp("first")) as viewer:
+        yield viewer
+
+
+@pytest.fixture
+def first(viewer: HeadlessViewer) -> HeadlessViewer:
+    """As at the first start, with a scene open."""
+    viewer.state = replace(viewer.state, preferences=Preferences(), hides_panel=None)
+    return viewer
+
+
+@pytest.fixture
+def controls(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """The words of each control of the panel that was built last."""
+    found: list[str] = []
+
+    def watch(kind: str) -> None:
+        real = getattr(imgui, kind)
+
+        def build(words: str, *others: Any) -> Any:
+            if imgui.internal.get_current_window_read().name == "panel":
+                found.append(words)
+            return real(words, *others)
+
+        monkeypatch.setattr(imgui, kind, build)
+
+    for kind in CONTROLS:
+        watch(kind)
+    begin = imgui.begin
+
+    def begin_anew(name: str, *others: Any) -> Any:
+        if name == "panel":
+            found.clear()
+        return begin(name, *others)
+
+    monkeypatch.setattr(imgui, "begin", begin_anew)
+    return found
+
+
+@pytest.mark.parametrize("is_working", [False, True])
+def test_there_are_few_controls_at_the_first_start(
+    first: HeadlessViewer, controls: list[str], is_working: bool
+) -> None:
+    if is_working:
+        first.state = replace(first.state, progress=Progress(4, 9, 0.3))
+    first.screen(WINDOW)
+    assert "section More" in controls
+    assert len(controls) <= MOST_CONTROLS, controls
+    assert ("Cancel" in controls) is is_working
+
+
+def test_an_empty_window_has_few_too(first: HeadlessViewer, controls: list[str]) -> None:
+    first.state = AppState()
+    first.screen(WINDOW)
+    assert 0 < len(controls) <= MOST_CONTROLS
+
+
+def test_more_brings_headings_and_advanced_two_more(first: HeadlessViewer, controls: list[str]) -> None:
+    first.do(ToggleSection("more"))
+    first.screen(WINDOW)
+    headings = [words.removeprefix("section ") for words in controls if words.startswith("section ")]
+    assert headings == ["More", "View", "Focus", "Aperture", "Light", "Gloss", "Depth", "Advanced"]
+    first.do(ToggleSection("advanced"))
+    first.screen(WINDOW)
+    assert {"section Inspect", "section Scene"} <= set(controls)
+
+
+@pytest.mark.parametrize("section", SECTIONS)
+def test_a_section_that_is_asked_for_is_seen_whatever_it_lies_in(section: Section) -> None:
+    opened = reduce(AppState(), ToggleSection(section)).preferences.open_sections
+    assert is_seen_open(section, opened)
+    assert opened == with_sections((), section)
+    holder = HOLDERS.get(section)
+    assert holder is None or holder in opened
+    assert (
+        section
+        not in reduce(
+            AppState(preferences=Preferences(open_sections=opened)), ToggleSection(section)
+        ).preferences.open_sections
+    )
+
+
+def test_what_is_open_within_a_closed_section_opens_again_with_it() -> None:
+    state = AppState(preferences=Preferences(open_sections=with_sections((), "depth")))
+    closed = reduce(state, ToggleSection("more"))
+    assert not is_seen_open("depth", closed.preferences.open_sections)
+    assert reduce(closed, ToggleSection("more")) == state
+
+
+def test_each_preset_and_each_motion_says_what_it_does() -> None:
+    for tips in (PRESET_TIPS, MOVE_TIPS):
+        assert len(set(tips.values())) == len(tips)
+
+
+def test_in_a_narrow_window_the_panel_folds_away_and_comes_back_when_asked_for(
+    first: HeadlessViewer, controls: list[str]
+) -> None:
+    narrow, toggle = ScreenSize(700, 500), BY_NAME["Hide or show the panel"]
+    for size, is_there in ((WINDOW, True), (narrow, False), (WINDOW, True), (narrow, False)):
+        controls.clear()
+        first.screen(size)
+        assert bool(controls) is is_there
+    first.do(toggle.action(first.state))
+    first.screen(narrow)
+    assert controls
+    first.do(toggle.action(first.state))
+    assert first.state.hides_panel is None, "it follows the window again"
+    first.do(SetState("is_narrow", False))
+    first.do(toggle.action(first.state))
+    assert first.state.is_panel_hidden

@@ -1,0 +1,80 @@
+"""What the panel always shows of an open picture: presets, aperture, focus, depth strength, and loops."""
+
+from __future__ import annotations
+
+from imgui_bundle import imgui
+
+from iibr_core.exports import LOOPS, LoopKind
+from iibr_core.scenes import Scene, aperture_limit
+from viewer.model.actions import Action, SetDepthStrength
+from viewer.model.layout import Layout
+from viewer.model.lens.presets import PRESETS
+from viewer.model.state.app_state import AppState
+from viewer.model.state.motion import SetLoop
+from viewer.model.state.optics import ApplyPreset, PresetName
+from viewer.model.window_limits import DEPTH_STRENGTH_LIMIT
+from viewer.ui.sections.lens import aperture_slider, focus_slider
+from viewer.ui.widgets import button, choice, in_row, label, slider
+
+PRESET_TIPS: dict[PresetName, str] = {
+    "portrait": "What you clicked last is sharp, and all else soft. Before a click: what is most likely the subject.",
+    "macro": "What is nearest is sharp, and all behind it as soft as the picture allows.",
+    "everything sharp": "No blur: all of the picture as sharp as the photo is.",
+}
+STRENGTH_TIP = (
+    "How far near and far things are apart: more of it moves and blurs them more. Takes effect when you let go."
+)
+MOVE_WORDS: dict[LoopKind, str] = {"circle": "Circle", "eight": "Eight", "swing": "Swing"}
+MOVE_TIPS: dict[LoopKind, str] = {
+    "circle": "Let the viewpoint go round in a circle, over and over. Press again to stop.",
+    "eight": "Let the viewpoint go along a lying eight, over and over. Press again to stop.",
+    "swing": "Let the viewpoint swing from left to right and back, over and over. Press again to stop.",
+}
+
+
+def essentials(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
+    """Build the rows. Of one view alone, neither focus nor aperture nor a loop changes anything."""
+    has_views = bool(aperture_limit(scene.grid))
+    actions: list[Action] = []
+    if has_views:
+        actions += _presets(layout) + aperture_slider(state, scene, layout) + focus_slider(state, scene, layout)
+    if scene.plan is not None:
+        actions += _depth_strength(state, layout)
+    return actions + (_move(state, layout) if has_views else [])
+
+
+def _presets(layout: Layout) -> list[Action]:
+    """Three buttons as wide as their words ask."""
+    actions: list[Action] = []
+    spacing = 4 * layout.ui_scale
+    words = [name.capitalize() for name in PRESETS]
+    room = imgui.get_content_region_avail().x - spacing * (len(words) - 1)
+    lengths = [imgui.calc_text_size(word).x for word in words]
+    padding = (room - sum(lengths)) / len(words)
+    for i, (name, word, length) in enumerate(zip(PRESETS, words, lengths)):
+        if i:
+            imgui.same_line(0, spacing)
+        if button(word, layout, PRESET_TIPS[name], width=length + padding):
+            actions.append(ApplyPreset(name))
+    return actions
+
+
+def _depth_strength(state: AppState, layout: Layout) -> list[Action]:
+    """It tells when an edit ends, because that costs a new light field."""
+    limits = (0.0, DEPTH_STRENGTH_LIMIT)
+    strength = slider("Depth strength", state.depth_strength, limits, "× %.2f", layout, STRENGTH_TIP)
+    is_finished = imgui.is_item_deactivated_after_edit()
+    if strength is None and not is_finished:
+        return []
+    return [SetDepthStrength(state.depth_strength if strength is None else strength, is_finished)]
+
+
+def _move(state: AppState, layout: Layout) -> list[Action]:
+    """A button a loop; the one that runs is lit, and pressing it again stops it."""
+    actions: list[Action] = []
+    label("Move", layout)
+    for kind, width in in_row(LOOPS, layout):
+        is_chosen = state.motion.kind == kind
+        if choice(MOVE_WORDS[kind], is_chosen, layout, (width, 0), MOVE_TIPS[kind]):
+            actions.append(SetLoop(None if is_chosen else kind))
+    return actions
