@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 from iibr_core.formats.animations import VIDEOS
 from iibr_core.types import InputError
@@ -21,6 +22,9 @@ STACK_FILES = r"((focus|aperture)_\d+|all_in_focus)\.(png|tif)|disparity\.pfm"
 CAMERA_FILES = r"images/v\d+_u\d+\.png|poses_bounds\.npy|transforms\.json|sparse/0/\w+\.txt"
 STACK = ("view", "focus", "aperture", "size", "frames")
 EYES = ("focus", "aperture", "size", "eyes")
+Purpose = Literal["share", "display", "software"]
+PURPOSES: dict[Purpose, str] = {"share": "Share", "display": "3D displays", "software": "Other software"}
+"""What people export for, in their words."""
 
 
 @dataclass(frozen=True)
@@ -30,6 +34,7 @@ class ExportKind:
     expect. layout: of a light field, among `WRITERS`. own_files: what a folder may hold that is replaced, as a regular
     expression. needs: packages, of the extra `export`. frames: pictures of a stack. rate: frames a second.
     most_width_px: of pictures whose size nobody chose, 0: any. has_colors: else it is a map, and no gloss shows in it.
+    purpose: what people export it for; "share": everybody can look at it.
     """
 
     words: str
@@ -44,6 +49,7 @@ class ExportKind:
     rate: float = 0.0
     most_width_px: int = 0
     has_colors: bool = True
+    purpose: Purpose = "share"
 
     @property
     def is_drawn(self) -> bool:
@@ -58,54 +64,74 @@ class ExportKind:
 
 EXPORTS = {
     "quilt": ExportKind(
-        "Quilt for light-field displays", PICTURE, "quilt:write_quilt", ("focus", "aperture", "device", "show"),
-        path="quilt:quilt_path",
+        "Quilt for light-field displays", PICTURE, "quilt:write_quilt",
+        ("focus", "aperture", "device", "show"), path="quilt:quilt_path", purpose="display",
     ),
-    "rgbd": ExportKind("Picture with depth at the right", PICTURE, "rgbd:write_beside"),
-    "rgbd-left": ExportKind("Picture with depth at the left", PICTURE, "rgbd:write_before"),
-    "rgbd-below": ExportKind("Picture with depth below", PICTURE, "rgbd:write_below"),
-    "sbs": ExportKind("Side by side", PICTURE, "stereo:write_side_by_side", EYES, "stereo:full_path"),
+    "rgbd": ExportKind("Picture with depth at the right", PICTURE, "rgbd:write_beside", purpose="display"),
+    "rgbd-left": ExportKind("Picture with depth at the left", PICTURE, "rgbd:write_before", purpose="display"),
+    "rgbd-below": ExportKind("Picture with depth below", PICTURE, "rgbd:write_below", purpose="display"),
+    "sbs": ExportKind(
+        "Side by side", PICTURE, "stereo:write_side_by_side", EYES, "stereo:full_path", purpose="display",
+    ),
     "half-sbs": ExportKind(
-        "Side by side, half width", PICTURE, "stereo:write_half_side_by_side", EYES, "stereo:half_path"
+        "Side by side, half width", PICTURE, "stereo:write_half_side_by_side",
+        EYES, "stereo:half_path", purpose="display",
     ),
-    "over-under": ExportKind("Left eye over right", PICTURE, "stereo:write_over_under", EYES, "stereo:over_path"),
-    "cross-eyed": ExportKind("Side by side, crossed", PICTURE, "stereo:write_cross_eyed", EYES),
-    "anaglyph": ExportKind("Anaglyph, red-cyan", PICTURE, "stereo:write_anaglyph", EYES),
-    "spatial-photo": ExportKind("Spatial photo, HEIC", (".heic",), "spatial_photo:write_spatial", EYES),
+    "over-under": ExportKind(
+        "Left eye over right", PICTURE, "stereo:write_over_under", EYES, "stereo:over_path", purpose="display",
+    ),
+    "cross-eyed": ExportKind("Side by side, crossed", PICTURE, "stereo:write_cross_eyed", EYES, purpose="display"),
+    "anaglyph": ExportKind("Anaglyph, red-cyan", PICTURE, "stereo:write_anaglyph", EYES, purpose="display"),
+    "spatial-photo": ExportKind(
+        "Spatial photo, HEIC", (".heic",), "spatial_photo:write_spatial", EYES, purpose="display",
+    ),
     "mp4": ExportKind("Video, MP4", (".mp4",), "animation:write_motion", MOVING, needs=("av",), rate=30),
     "webm": ExportKind("Video, WebM", (".webm",), "animation:write_motion", MOVING, needs=("av",), rate=30),
     "gif": ExportKind("Animation, GIF", (".gif",), "animation:write_motion", MOVING, rate=15, most_width_px=480),
     "webp": ExportKind("Animation, WebP", (".webp",), "animation:write_motion", MOVING, rate=25, most_width_px=960),
     "apng": ExportKind("Animation, PNG", (".png",), "animation:write_motion", MOVING, rate=15, most_width_px=480),
     "focal-stack": ExportKind(
-        "Focal stack, PNGs", (), "stack:write_focal_stack", STACK, own_files=STACK_FILES, frames=16
+        "Focal stack, PNGs", (), "stack:write_focal_stack", STACK, own_files=STACK_FILES, frames=16, purpose="software",
     ),
     "focal-stack-tiff": ExportKind(
-        "Focal stack, 16-bit TIFFs", (), "stack:write_focal_tiffs", STACK, own_files=STACK_FILES, frames=16
+        "Focal stack, 16-bit TIFFs", (), "stack:write_focal_tiffs",
+        STACK, own_files=STACK_FILES, frames=16, purpose="software",
     ),
-    "focal-stack-exr": ExportKind("Focal stack, OpenEXR", (".exr",), "stack:write_focal_stack", STACK, frames=16),
+    "focal-stack-exr": ExportKind(
+        "Focal stack, OpenEXR", (".exr",), "stack:write_focal_stack", STACK, frames=16, purpose="software",
+    ),
     "aperture-sweep": ExportKind(
-        "Aperture sweep, PNGs", (), "stack:write_aperture_sweep", STACK, own_files=STACK_FILES, frames=9
+        "Aperture sweep, PNGs", (), "stack:write_aperture_sweep",
+        STACK, own_files=STACK_FILES, frames=9, purpose="software",
     ),
     "aperture-sweep-tiff": ExportKind(
-        "Aperture sweep, 16-bit TIFFs", (), "stack:write_aperture_tiffs", STACK, own_files=STACK_FILES, frames=9
+        "Aperture sweep, 16-bit TIFFs", (), "stack:write_aperture_tiffs",
+        STACK, own_files=STACK_FILES, frames=9, purpose="software",
     ),
     "aperture-sweep-exr": ExportKind(
-        "Aperture sweep, OpenEXR", (".exr",), "stack:write_aperture_sweep", STACK, frames=9
+        "Aperture sweep, OpenEXR", (".exr",), "stack:write_aperture_sweep", STACK, frames=9, purpose="software",
     ),
-    "epi": ExportKind("Epipolar plane image", DATA, "maps:write_epi", ("row",)),
-    "disparity": ExportKind("Disparity map", MAP, "maps:write_disparity", has_colors=False),
-    "depth": ExportKind("Depth map", MAP, "maps:write_depth", path="maps:depth_path", has_colors=False),
-    "splats": ExportKind("Gaussian splats, PLY", (".ply",), "points:write_gaussians"),
-    "point-cloud": ExportKind("Point cloud, PLY", (".ply",), "points:write_point_cloud"),
-    "llff": ExportKind("Cameras, LLFF", (), "cameras:write_llff_folder", own_files=CAMERA_FILES),
-    "nerfstudio": ExportKind("Cameras, nerfstudio", (), "cameras:write_nerfstudio_folder", own_files=CAMERA_FILES),
-    "colmap": ExportKind("Cameras, COLMAP", (), "cameras:write_colmap_folder", own_files=CAMERA_FILES),
-    "hci": ExportKind("Light field, HCI folder", (), *LIGHT_FIELD, layout="hci"),
-    "numbered-grid": ExportKind("Light field, numbered views", (), *LIGHT_FIELD, layout="numbered-grid"),
-    "stanford": ExportKind("Light field, Stanford archive", (), *LIGHT_FIELD, layout="stanford"),
-    "eslf": ExportKind("Light field, lenslet image", ("_eslf.png",), *LIGHT_FIELD, layout="eslf"),
-    "exr": ExportKind("Light field, one OpenEXR file", (".exr",), *LIGHT_FIELD, layout="exr"),
+    "epi": ExportKind("Epipolar plane image", DATA, "maps:write_epi", ("row",), purpose="software"),
+    "disparity": ExportKind("Disparity map", MAP, "maps:write_disparity", has_colors=False, purpose="software"),
+    "depth": ExportKind(
+        "Depth map", MAP, "maps:write_depth", path="maps:depth_path", has_colors=False, purpose="software",
+    ),
+    "splats": ExportKind("Gaussian splats, PLY", (".ply",), "points:write_gaussians", purpose="software"),
+    "point-cloud": ExportKind("Point cloud, PLY", (".ply",), "points:write_point_cloud", purpose="software"),
+    "llff": ExportKind("Cameras, LLFF", (), "cameras:write_llff_folder", own_files=CAMERA_FILES, purpose="software"),
+    "nerfstudio": ExportKind(
+        "Cameras, nerfstudio", (), "cameras:write_nerfstudio_folder", own_files=CAMERA_FILES, purpose="software",
+    ),
+    "colmap": ExportKind(
+        "Cameras, COLMAP", (), "cameras:write_colmap_folder", own_files=CAMERA_FILES, purpose="software",
+    ),
+    "hci": ExportKind("Light field, HCI folder", (), *LIGHT_FIELD, layout="hci", purpose="software"),
+    "numbered-grid": ExportKind(
+        "Light field, numbered views", (), *LIGHT_FIELD, layout="numbered-grid", purpose="software",
+    ),
+    "stanford": ExportKind("Light field, Stanford archive", (), *LIGHT_FIELD, layout="stanford", purpose="software"),
+    "eslf": ExportKind("Light field, lenslet image", ("_eslf.png",), *LIGHT_FIELD, layout="eslf", purpose="software"),
+    "exr": ExportKind("Light field, one OpenEXR file", (".exr",), *LIGHT_FIELD, layout="exr", purpose="software"),
 }  # fmt: skip
 """By the name that people type."""
 
@@ -113,11 +139,11 @@ EXPORTS = {
 def export_kind(name: str) -> ExportKind:
     """Raises InputError for a kind that nobody knows."""
     if name not in EXPORTS:
-        raise InputError(f"{name!r} is nothing that can be exported: give {', '.join(EXPORTS)}")
+        raise InputError(f"{name!r} is no known kind of export: give {', '.join(EXPORTS)}")
     return EXPORTS[name]
 
 
 def require_ending(kind: ExportKind, path: Path) -> None:
     """Raise InputError where a file's name does not say that it is of this kind."""
     if kind.endings and not path.name.lower().endswith(kind.endings):
-        raise InputError(f"{path}: is to end in {' or '.join(kind.endings)}")
+        raise InputError(f"{path}: must end in {' or '.join(kind.endings)}")

@@ -17,7 +17,7 @@ from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.exports.settings import ExportSettings
 from iibr_core.exports.source import ExportSource
 from iibr_core.formats.images.picture_kinds import BEST_QUALITY, PictureFormat
-from iibr_core.formats.images.side_by_side import FULL_TAG, HALF_TAG, OVER_TAG
+from iibr_core.formats.images.side_by_side import FULL_TAG, HALF_TAG, OVER_TAG, TAG
 from iibr_core.formats.quilts import tagged
 from iibr_core.scenes.scene import Scene
 from iibr_core.scenes.screen_size import ScreenSize
@@ -28,17 +28,24 @@ Eyes = tuple[NDArray[Any], NDArray[Any]]
 
 def full_path(path: Path, scene: Scene, options: ExportOptions) -> Path:
     """With the tag of pictures side by side."""
-    return tagged(path, FULL_TAG)
+    return _named(path, FULL_TAG)
 
 
 def half_path(path: Path, scene: Scene, options: ExportOptions) -> Path:
     """With the tag of pictures side by side, each of half the width."""
-    return tagged(path, HALF_TAG)
+    return _named(path, HALF_TAG)
 
 
 def over_path(path: Path, scene: Scene, options: ExportOptions) -> Path:
     """With the tag of one over the other."""
-    return tagged(path, OVER_TAG)
+    return _named(path, OVER_TAG)
+
+
+def _named(path: Path, tag: str) -> Path:
+    """The path as it is where its name says in any known way how the two pictures lie, else with this tag."""
+    found = TAG.search(path.stem)
+    said = found and (OVER_TAG if found[3] else HALF_TAG if found[1] or found[2] else FULL_TAG)
+    return path if said == tag else tagged(path, tag)
 
 
 def draw_eyes(source: ExportSource, settings: ExportSettings, squeeze: int = 1, color_space: ColorSpace = SRGB) -> Eyes:

@@ -5,9 +5,12 @@ from __future__ import annotations
 import os
 import shutil
 import sys
+from itertools import islice
 from typing import Any
 
-from viewer.model.state.prompts import ChoiceOf, SavePrompt
+from iibr_core.exports import export_kind
+from viewer.model.state.exporting import ExportPrompt
+from viewer.model.state.prompts import FOLDER_CHOICES, ChoiceOf, FolderContents, SavePrompt
 
 UNIX_HELPERS = ("zenity", "kdialog", "matedialog", "qarma")
 """Programs that show the dialog on Unix; the bundle calls the first it finds."""
@@ -20,12 +23,14 @@ FILE_KINDS: dict[ChoiceOf, str] = {
     "model": "onnx",
 }
 """Endings of what is no folder."""
+MOST_ENTRIES = 5000
+"""Of a folder: a list of more helps nobody."""
 
 DIALOG_TITLES: dict[ChoiceOf, str] = {
     "photo": "Open a photo, a stereo photo or a quilt",
-    "folder": "Open a folder of views",
-    "mask": "Aperture image",
-    "surroundings": "Picture all around, equirectangular",
+    "folder": "Open a folder of photos or views",
+    "mask": "Picture as the shape of the aperture",
+    "surroundings": "Environment map: a picture all around, equirectangular",
     "truth": "Ground truth: a folder of views",
     "map": "Open a disparity map for this photo",
     "model": "Open a depth model: an ONNX file",
@@ -54,7 +59,7 @@ class Dialog:
         self.what = what
         self._dialog: Any
         start = os.path.join(os.path.dirname(os.path.abspath(beside)), "") if beside else ""
-        if what not in FILE_KINDS:
+        if what in FOLDER_CHOICES:
             self._dialog = dialogs.select_folder(DIALOG_TITLES[what], start)
         else:
             filters = ["Models" if what == "model" else "Images", file_patterns(what), "All files", "*"]
@@ -69,15 +74,64 @@ class Dialog:
 
 
 class SaveDialog:
-    """An open dialog that asks where a file goes, and before one is replaced. prompt: what asked for it."""
+    """An open dialog that asks where a file goes, and before one is replaced; or into which folder a folder goes.
+    prompt: what asked for it.
+    """
 
-    def __init__(self, prompt: SavePrompt) -> None:
+    def __init__(self, prompt: SavePrompt | ExportPrompt) -> None:
         from imgui_bundle import portable_file_dialogs as dialogs
 
-        self.prompt = prompt
-        title = "Save the picture" if prompt.what == "picture" else "Save the depth map"
-        self._dialog: Any = dialogs.save_file(title, os.path.abspath(prompt.path), ["All files", "*"])
+        self.prompt, path = prompt, os.path.abspath(os.path.expanduser(prompt.path))
+        self._dialog: Any
+        self._name = os.path.basename(path) if _is_folder_export(prompt) else ""
+        if self._name:
+            self._dialog = dialogs.select_folder(_title_of(prompt), os.path.dirname(path))
+        else:
+            self._dialog = dialogs.save_file(_title_of(prompt), path, ["All files", "*"])
 
     def answer(self) -> str | None:
         """The path chosen, "" where the user chose none; None while it is open."""
-        return str(self._dialog.result()) if self._dialog.ready(0) else None
+        if not self._dialog.ready(0):
+            return None
+        chosen = str(self._dialog.result())
+        return os.path.join(chosen, self._name) if chosen and self._name else chosen
+
+
+def _is_folder_export(prompt: SavePrompt | ExportPrompt) -> bool:
+    return isinstance(prompt, ExportPrompt) and not export_kind(prompt.kind).endings
+
+
+def _title_of(prompt: SavePrompt | ExportPrompt) -> str:
+    if isinstance(prompt, ExportPrompt):
+        return f"Export: {export_kind(prompt.kind).words}"
+    return "Save the picture" if prompt.what == "picture" else "Save the depth map"
+
+
+def contents_of(folder: str, what: ChoiceOf) -> FolderContents:
+    """What can be chosen in a folder, by name; nothing that is hidden, or that a panel cannot show."""
+    endings = tuple(f".{ending}" for ending in FILE_KINDS.get(what, "").split())
+    folders, files = [], []
+    try:
+        with os.scandir(os.path.expanduser(folder) or os.curdir) as entries:
+            for entry in islice(entries, MOST_ENTRIES):
+                if entry.name.startswith(".") or not _can_be_shown(entry.name):
+                    continue
+                if entry.is_dir():
+                    folders.append(entry.name)
+                elif what == "place" or entry.name.lower().endswith(endings or "\0"):
+                    files.append(entry.name)
+    except OSError as error:
+        problem = f"This folder cannot be read: {error.strerror or error}."
+    except ValueError:
+        problem = "No folder can have this name."
+    else:
+        problem = ""
+    return FolderContents(folder, _in_order(folders), _in_order(files), is_read=True, problem=problem)
+
+
+def _can_be_shown(name: str) -> bool:
+    return name.encode(errors="replace").decode() == name
+
+
+def _in_order(names: list[str]) -> tuple[str, ...]:
+    return tuple(sorted(names, key=lambda name: (name.lower(), name)))

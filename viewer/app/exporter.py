@@ -8,16 +8,18 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-from iibr_core.exports import ExportOptions, ExportSource, export_kind, export_path, require_export_place, writer_of
+from iibr_core.exports import ExportOptions, ExportSource, export_kind, require_export_place, writer_of
 from iibr_core.formats import AlreadyThereError
 from iibr_core.runtime import require_extra
 from iibr_core.types import InputError
 from viewer.app.job import Job
 from viewer.app.job_queue import JobQueue
 from viewer.model.actions import Action, Notify, ShowPrompt
+from viewer.model.reducers.exporting import written_path
 from viewer.model.state.app_state import AppState
 from viewer.model.state.exporting import ExportPrompt, ExportTask
 from viewer.model.state.notices import Notice
+from viewer.model.state.preferences import SetPreference
 
 Write = Callable[[Path, ExportSource, ExportOptions], str | None]
 
@@ -29,19 +31,20 @@ def add_export(task: ExportTask, state: AppState, inputs: Sequence[Path], jobs: 
     asked = ExportPrompt(task.kind, task.path, task.options)
     try:
         kind = export_kind(task.kind)
-        path = export_path(kind, Path(os.path.expanduser(task.path.strip())), state.scene, task.options)
+        path = written_path(kind, os.path.expanduser(task.path.strip()), state.scene, task.options)
         require_export_place(kind, path, inputs, task.may_replace)
         if kind.needs:
             require_extra("export", *kind.needs)
         if jobs.writes(path):
-            raise InputError(f"{path}: is being written; choose another name")
+            raise InputError(f"{path} is being written by another export: choose another name.")
     except AlreadyThereError:
         return [ShowPrompt(replace(asked, already_there=True))]
     except InputError as error:
         return [ShowPrompt(replace(asked, problem=str(error)))]
     work = partial(_export, writer_of(kind), path, task.options)
     jobs.add(Job("export", path, state, lambda scene, optics: "views", work))
-    return [ShowPrompt(None)] if isinstance(state.prompt, ExportPrompt) else []
+    closed = [ShowPrompt(None)] if isinstance(state.prompt, ExportPrompt) else []
+    return [*closed, SetPreference("last_folder", os.path.abspath(path.parent))]
 
 
 def _export(write: Write, path: Path, options: ExportOptions, source: ExportSource) -> list[Action]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -25,10 +26,11 @@ from viewer.model.actions import Action, EditsSaved, Notify, ShowPrompt
 from viewer.model.state.app_state import AppState
 from viewer.model.state.jobs import WRITING
 from viewer.model.state.notices import Notice
+from viewer.model.state.preferences import SetPreference
 from viewer.model.state.prompts import SavePrompt
 from viewer.model.state.tasks import SaveTask
 
-NO_MAP = "this scene has no disparity map of its own"
+NO_MAP = "a light field has no depth map of its own to save"
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +83,8 @@ def add_save(task: SaveTask, state: AppState, inputs: Sequence[Path], jobs: JobQ
     else:
         shot = _Shot(path, task.size_px, task.form, state)
         jobs.add(Job("picture", path, state, shot.needs, partial(_save, shot), takes_part=True))
-    return [ShowPrompt(None)] if isinstance(state.prompt, SavePrompt) else []
+    closed: list[Action] = [ShowPrompt(None)] if isinstance(state.prompt, SavePrompt) else []
+    return closed if task.what == "map" else [*closed, SetPreference("last_folder", os.path.abspath(path.parent))]
 
 
 def add_copy(state: AppState, jobs: JobQueue) -> list[Action]:

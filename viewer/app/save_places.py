@@ -66,5 +66,5 @@ def _path_of(task: SaveTask, suffix: str) -> Path:
     """The path asked for; with this suffix where it has none."""
     path = Path(os.path.expanduser(task.path.strip()))
     if not path.name:
-        raise InputError(f"no file name was given: write one that ends in {suffix}")
+        raise InputError(f"There is no name yet: type one that ends in {suffix}, or press Browse…")
     return path if path.suffix else path.with_name(f"{path.name}{suffix}")

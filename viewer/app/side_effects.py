@@ -14,7 +14,7 @@ from iibr_core.exports import list_photos
 from iibr_core.rendering import ApertureMask
 from iibr_core.scenes import Source, source_beside
 from viewer.app.clipboard import Pasted, paste_picture
-from viewer.app.dialogs import Dialog, SaveDialog, has_dialogs
+from viewer.app.dialogs import Dialog, SaveDialog, contents_of, has_dialogs
 from viewer.app.exporter import add_export
 from viewer.app.image_export import settings_of
 from viewer.app.job_queue import JobQueue
@@ -46,8 +46,8 @@ from viewer.model.state.motion import Sway, Touch
 from viewer.model.state.notices import Notice
 from viewer.model.state.optics import SetOptics
 from viewer.model.state.photo_facts import FactsRead, ReadFactsTask
-from viewer.model.state.prompts import PathPrompt
-from viewer.model.state.saving import CopyTask, PasteTask, WriteSidecarTask
+from viewer.model.state.prompts import FolderContents, ListContentsTask, PathPrompt
+from viewer.model.state.saving import CopyTask, PasteTask, WriteSidecarTask, path_beside
 from viewer.model.state.tasks import (
     ChoosePlaceTask,
     ChooseTask,
@@ -108,9 +108,15 @@ class SideEffects:
         match task:
             case ChooseTask(what):
                 if not has_dialogs():
-                    return [ShowPrompt(PathPrompt(what))]
+                    return [ShowPrompt(PathPrompt(what, _folder_beside(state)))]
                 self._dialog = self._dialog or Dialog(what, state.source.path if state.source else "")
+            case ListContentsTask(folder, what):
+                self._submit(partial(contents_of, folder, what))
             case ChoosePlaceTask(prompt):
+                if not has_dialogs():
+                    return [
+                        ShowPrompt(PathPrompt("place", os.path.abspath(os.path.expanduser(prompt.path)), None, prompt))
+                    ]
                 self._dialog = self._dialog or SaveDialog(prompt)
             case ReadMaskTask(path):
                 self._masks.append(Path(os.path.expanduser(path)))
@@ -170,7 +176,9 @@ class SideEffects:
             actions += _actions_from(result, state)
         if self._files.is_lost and self._under_way:
             self._under_way.clear()
-            actions.append(Notify(Notice("Reading or writing a file stopped unexpectedly.", is_error=True)))
+            actions.append(
+                Notify(Notice("Reading or writing a file stopped unexpectedly. Try it again.", is_error=True))
+            )
         return actions
 
     def _take_downloads(self, state: AppState) -> list[Action]:
@@ -178,7 +186,10 @@ class SideEffects:
         while (result := self._downloads.next_result()) is not None:
             actions += _actions_from_download(result)
         if self._downloads.is_lost and state.models.downloading is not None:
-            actions += [DownloadingChanged(None), Notify(Notice("The download stopped unexpectedly.", is_error=True))]
+            actions += [
+                DownloadingChanged(None),
+                Notify(Notice("The download stopped unexpectedly. Try it again.", is_error=True)),
+            ]
         return actions
 
     def _take_answer(self, state: AppState) -> list[Action]:
@@ -194,6 +205,12 @@ class SideEffects:
         return [action_for_path(dialog.what, answer, state)]
 
 
+def _folder_beside(state: AppState) -> str:
+    """Where to look for what is to be opened: beside what is open, at home before anything was."""
+    path = "~/" if state.source is None else path_beside(state.source.path, "photo")
+    return os.path.join(os.path.dirname(os.path.abspath(os.path.expanduser(path))), "")
+
+
 def is_scene_open(state: AppState) -> bool:
     """Whether what was asked for last is open."""
     return state.scene is not None and state.scene.source is state.source
@@ -205,6 +222,8 @@ def _actions_from(result: FileResult, state: AppState) -> list[Action]:
     match result.value:
         case ApertureMask() as mask:
             return [SetOptics("aperture_shape", replace(state.optics.aperture_shape, kind="mask", mask=mask))]
+        case FolderContents() as contents:
+            return _show_contents(contents, state)
         case FolderListed() | FactsRead() | Sway() | Touch() | ModelsListed() as found:
             return [found]
         case Pasted(path):
@@ -214,6 +233,14 @@ def _actions_from(result: FileResult, state: AppState) -> list[Action]:
         case Path() as sidecar:
             return [Notify(Notice(f"Saved {sidecar}"))]
     raise AssertionError(f"nothing comes of {result.value!r}")
+
+
+def _show_contents(contents: FolderContents, state: AppState) -> list[Action]:
+    """Where they are still asked for."""
+    prompt = state.prompt
+    if not isinstance(prompt, PathPrompt) or prompt.contents is None or prompt.contents.folder != contents.folder:
+        return []
+    return [ShowPrompt(replace(prompt, contents=contents))]
 
 
 def _actions_from_download(result: DownloadResult) -> list[Action]:

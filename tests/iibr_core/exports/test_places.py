@@ -37,7 +37,7 @@ def test_every_kind_has_its_function_and_its_words(name: str) -> None:
     assert kind.words
     assert all(ending == ending.lower() for ending in kind.endings)
     if kind.endings:
-        with pytest.raises(InputError, match="is to end in"):
+        with pytest.raises(InputError, match="must end in"):
             require_ending(kind, Path("a.txt"))
     assert len({other.words for other in EXPORTS.values()}) == len(EXPORTS)
 

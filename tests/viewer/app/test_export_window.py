@@ -341,8 +341,8 @@ def test_the_window_asks_for_what_a_kind_can_be_told(viewer: Driver, tmp_path: P
     expected = ExportOptions()
     for field, text, said in (
         ("##width", "48", {"size": ScreenSize(48, 32)}),
-        ("##frames", "3", {"frames": 3}),
-        ("##rate", "12.5", {"rate": 12.5}),
+        ("##seconds", "0.2", {"frames": 3}),
+        ("##rate", "10", {"rate": 10.0, "frames": 2}),
     ):
         viewer.press(field, window)
         viewer.type(text)
@@ -350,9 +350,9 @@ def test_the_window_asks_for_what_a_kind_can_be_told(viewer: Driver, tmp_path: P
         expected = replace(expected, **said)  # type: ignore[arg-type]
         asked = ExportPrompt("gif", str(out), expected)
         viewer.until(lambda app, asked=asked: app.state.prompt == asked)  # type: ignore[misc]
-    viewer.press("Export", window)
+    viewer.press("Make it", window)
     viewer.until(lambda app: bool(texts(app)))
     assert texts(app) == [f"Exported {out}"]
     with Image.open(out) as image:
-        assert (image.size, image.n_frames) == ((48, 32), 3)  # type: ignore[attr-defined]
-        assert sum(frame.info["duration"] for frame in ImageSequence.Iterator(image)) == 240
+        assert (image.size, image.n_frames) == ((48, 32), 2)  # type: ignore[attr-defined]
+        assert sum(frame.info["duration"] for frame in ImageSequence.Iterator(image)) == 200

@@ -12,6 +12,7 @@ from iibr_core.formats.images.photo import write_image
 from iibr_core.scenes.scene import Source
 from iibr_core.types import GridShape
 from tests.viewer.conftest import SMALL_WINDOW, Driver, Opener
+from viewer.app.main_loop import App
 from viewer.app.window_slot import STEP
 from viewer.model.actions import AskToSave, Notify, OpenPath, SetState, ShowPrompt, StopWork
 from viewer.model.commands import BY_NAME, COMMANDS
@@ -20,7 +21,7 @@ from viewer.model.state.exporting import AskToExport, ExportPrompt
 from viewer.model.state.model_download import ModelsPrompt
 from viewer.model.state.notices import Notice
 from viewer.model.state.preferences import SetPreference, ToggleSection
-from viewer.model.state.prompts import PalettePrompt, PathPrompt, SavePrompt
+from viewer.model.state.prompts import FolderContents, PalettePrompt, PathPrompt, SavePrompt
 
 pytestmark = pytest.mark.usefixtures("no_dialogs")
 
@@ -218,10 +219,75 @@ def test_a_map_or_a_model_of_ones_own_is_opened(open_window: Opener, tmp_path: P
     driver.app.do(ToggleSection("depth"))
     driver.until_idle()
     driver.press("Open map…")
-    driver.until(lambda app: app.state.prompt == PathPrompt("map"))
+    driver.until(lambda app: asks_for(app, "map"))
     driver.send("key", "Escape")
     driver.until(lambda app: app.state.prompt is None)
     driver.app.do(BY_NAME["Depth models…"].action(driver.app.state))
     driver.until(lambda app: isinstance(app.state.prompt, ModelsPrompt))
     driver.press("Choose a file…", "prompt ModelsPrompt")
-    driver.until(lambda app: app.state.prompt == PathPrompt("model"))
+    driver.until(lambda app: asks_for(app, "model"))
+
+
+def asks_for(app: App, what: str) -> bool:
+    return isinstance(app.state.prompt, PathPrompt) and app.state.prompt.what == what
+
+
+def list_of(viewer: Driver, folder: Path) -> FolderContents:
+    """What the window for a path shows of this folder."""
+    shown = str(folder / "_")[:-1]
+
+    def is_shown(app: App) -> bool:
+        prompt = app.state.prompt
+        is_read = isinstance(prompt, PathPrompt) and prompt.contents is not None and prompt.contents.is_read
+        return is_read and prompt.contents.folder == shown  # type: ignore[union-attr]
+
+    viewer.until(is_shown)
+    viewer.until_idle()
+    prompt = viewer.app.state.prompt
+    assert isinstance(prompt, PathPrompt)
+    assert prompt.contents is not None
+    return prompt.contents
+
+
+def test_a_photo_is_looked_for_and_opened_without_a_dialog_of_the_system(viewer: Driver, tmp_path: Path) -> None:
+    (tmp_path / "inner" / ".hidden").mkdir(parents=True)
+    (tmp_path / "notes.txt").touch()
+    write_image(tmp_path / "inner" / "other.png", np.full((64, 96, 3), 100, np.uint8))
+    viewer.app.do(BY_NAME["Open a photo…"].action(viewer.app.state))
+    beside = list_of(viewer, tmp_path)
+    assert beside.folders == ("inner",)
+    assert beside.files == ("scene.png",)
+    viewer.type(str(tmp_path / "inner"))
+    viewer.send("key", "Return")
+    inner = list_of(viewer, tmp_path / "inner")
+    assert (inner.folders, inner.files) == ((), ("other.png",))
+    viewer.type(str(tmp_path / "inner" / "other.png"))
+    viewer.send("key", "Return")
+    viewer.until(lambda app: app.state.scene is not None and app.state.scene.name == "other")
+    assert viewer.app.state.prompt is None
+
+
+def test_a_folder_that_cannot_be_read_is_told(viewer: Driver, tmp_path: Path) -> None:
+    viewer.app.do(ShowPrompt(PathPrompt("photo", str(tmp_path / "gone" / "a.png"))))
+    assert "cannot be read" in list_of(viewer, tmp_path / "gone").problem
+
+
+def test_browse_brings_a_place_back_to_the_prompt_and_it_is_remembered(viewer: Driver, tmp_path: Path) -> None:
+    (tmp_path / "there").mkdir()
+    viewer.app.do(AskToExport())
+    viewer.until_idle()
+    viewer.press("Browse…", "prompt ExportPrompt")
+    list_of(viewer, tmp_path)
+    viewer.type(str(tmp_path / "there" / "a.gif"))
+    list_of(viewer, tmp_path / "there")
+    viewer.send("key", "Return")
+    viewer.until(lambda app: isinstance(app.state.prompt, ExportPrompt))
+    assert isinstance(viewer.app.state.prompt, ExportPrompt)
+    assert viewer.app.state.prompt.path == str(tmp_path / "there" / "a.gif")
+    viewer.until_idle()
+    viewer.send("key", "Return")
+    viewer.until(lambda app: app.state.prompt is None)
+    viewer.until(lambda app: (tmp_path / "there" / "a.gif").exists())
+    viewer.app.do(AskToExport())
+    assert isinstance(viewer.app.state.prompt, ExportPrompt)
+    assert viewer.app.state.prompt.path == str(tmp_path / "there" / "scene-iibr.gif")

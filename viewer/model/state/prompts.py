@@ -11,17 +11,32 @@ from iibr_core.scenes import ScreenSize
 from viewer.model.state.exporting import ExportPrompt
 from viewer.model.state.model_download import ModelsPrompt
 
-ChoiceOf = Literal["photo", "folder", "mask", "surroundings", "truth", "map", "model", "model folder"]
+ChoiceOf = Literal["photo", "folder", "mask", "surroundings", "truth", "map", "model", "model folder", "place"]
 """surroundings: what a glossy surface reflects; map: a disparity map for the photo that is open; model: an ONNX file
-of depth."""
+of depth; place: where a file goes."""
+FOLDER_CHOICES: tuple[ChoiceOf, ...] = ("folder", "truth", "model folder")
+"""What is a folder."""
 
 
 @dataclass(frozen=True)
-class PathPrompt:
-    """The question for a file, where the system has no file dialog."""
+class FolderContents:
+    """Names of the folders in a folder, and of the files that can be chosen. is_read: whether they are known.
+    problem: why they cannot be.
+    """
 
+    folder: str
+    folders: tuple[str, ...] = ()
+    files: tuple[str, ...] = ()
+    is_read: bool = False
+    problem: str = ""
+
+
+@dataclass(frozen=True)
+class ListContentsTask:
+    """Look what of this kind can be chosen in this folder."""
+
+    folder: str
     what: ChoiceOf
-    path: str = ""
 
 
 Saved = Literal["picture", "map"]
@@ -40,6 +55,19 @@ class SavePrompt:
     what: Saved = "picture"
     problem: str = ""
     form: PictureFormat = USUAL_FORM
+
+
+@dataclass(frozen=True)
+class PathPrompt:
+    """The question for a file or a folder, where the system has no file dialog. path: that is typed; with a separator
+    at its end that of a folder. contents: of its folder, None before that is asked for. returns_to: what is asked again
+    once a place is chosen.
+    """
+
+    what: ChoiceOf
+    path: str = ""
+    contents: FolderContents | None = None
+    returns_to: SavePrompt | ExportPrompt | None = None
 
 
 @dataclass(frozen=True)

@@ -7,28 +7,28 @@ from dataclasses import dataclass
 from iibr_core.formats import AS_USUAL as USUAL_FORM
 from iibr_core.formats import PictureFormat
 from iibr_core.scenes import ScreenSize
-from viewer.model.state.exporting import ExportTask
+from viewer.model.state.exporting import ExportPrompt, ExportTask
 from viewer.model.state.filling import FillTask
 from viewer.model.state.folder import ListFolderTask
 from viewer.model.state.jobs import CancelJobTask
 from viewer.model.state.model_download import CancelGetTask, GetModelTask, ListModelsTask
 from viewer.model.state.photo_facts import ReadFactsTask
-from viewer.model.state.prompts import ChoiceOf, Saved, SavePrompt
+from viewer.model.state.prompts import ChoiceOf, ListContentsTask, Saved, SavePrompt
 from viewer.model.state.saving import CopyTask, PasteTask, WriteSidecarTask
 
 
 @dataclass(frozen=True)
 class ChooseTask:
-    """Let the user choose in the system's dialog."""
+    """Let the user choose, in the system's dialog where it has one."""
 
     what: ChoiceOf
 
 
 @dataclass(frozen=True)
 class ChoosePlaceTask:
-    """Let the user choose in the system's dialog where the file goes that this prompt asks about."""
+    """Let the user choose where the file or folder goes that this prompt asks about."""
 
-    prompt: SavePrompt
+    prompt: SavePrompt | ExportPrompt
 
 
 @dataclass(frozen=True)
@@ -75,6 +75,7 @@ Task = (
     | MaySwayTask
     | ReadTruthTask
     | ListFolderTask
+    | ListContentsTask
     | ReadFactsTask
     | ListModelsTask
     | GetModelTask

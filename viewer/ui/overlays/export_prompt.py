@@ -1,7 +1,10 @@
-"""The window that asks what to export: the kinds of the registry, and for each the rows that it heeds."""
+"""The window that asks what to share or export: what for, the kinds of the registry for that, and for each the rows
+that it heeds.
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -12,34 +15,48 @@ from iibr_core.exports import (
     ANIMATIONS,
     EXPORTS,
     MOST_FRAMES,
+    PURPOSES,
     RATE_LIMITS,
     AnimationKind,
     ExportKind,
     ExportOptions,
     ExportSettings,
+    Purpose,
     settle,
     size_of_width,
 )
 from iibr_core.formats import DEVICES
 from iibr_core.scenes import Scene, clamp
-from viewer.model.actions import Action, DoTask, ShowPrompt
+from iibr_core.types import InputError
+from viewer.model.actions import Action, AskToSave, DoTask, ShowPrompt
 from viewer.model.layout import Layout
-from viewer.model.reducers.exporting import export_path_beside
+from viewer.model.reducers.exporting import as_other_kind, first_kind, kinds_for, written_path
 from viewer.model.state.app_state import AppState
 from viewer.model.state.exporting import ExportPrompt, ExportTask
+from viewer.model.state.preferences import is_seen_open
+from viewer.model.state.tasks import ChoosePlaceTask
 from viewer.ui.overlays.prompt_rows import (
     choice_row,
-    focus_on_appearing,
-    path_field,
+    path_row,
     prompt_actions,
     prompt_buttons,
     say_problem,
     size_rows,
     text_field,
 )
-from viewer.ui.widgets import checkbox, gap, label, slider, whole_slider
+from viewer.ui.widgets import checkbox, choice, gap, in_row, label, quiet, slider, whole_slider
 
+ADVANCED_ROWS = ("keys",)
+"""For who has opened that part of the panel."""
 ANY_DISPLAY = "any"
+ALREADY_THERE = "There is one of this name already. Replace it, or choose another name."
+NAME_REASON = ": programs read from the name what is in it."
+PICTURE, PICTURE_ENTRY = "picture", ("Picture: PNG, JPEG, …", "One picture, as it looks now, as large as you like.")
+PURPOSE_TIPS: dict[Purpose, str] = {
+    "share": "What everybody can look at, without this program.",
+    "display": "For light-field displays, headsets, 3D televisions and glasses.",
+    "software": "Views, cameras, depth and splats, to work on with other programs.",
+}
 MOTION_TIPS: dict[AnimationKind, str] = {
     "circle": "The viewpoint goes round.",
     "eight": "The viewpoint goes along a lying eight.",
@@ -62,29 +79,63 @@ class _Asked:
 def export_prompt(prompt: ExportPrompt, state: AppState, layout: Layout) -> list[Action]:
     """What, where to, and what this kind can be told."""
     assert state.scene is not None
-    imgui.text("Export")
+    imgui.text("Share or export")
     gap(layout, 2)
+    purpose = _purpose_row(EXPORTS[prompt.kind].purpose, layout)
     label("As", layout)
-    kinds = {name: (kind.words, _files_of(kind)) for name, kind in EXPORTS.items()}
-    chosen = choice_row("kind", prompt.kind, kinds, layout)
+    chosen = prompt.kind if purpose == EXPORTS[prompt.kind].purpose else first_kind(purpose)
+    chosen = choice_row("kind", chosen, _entries(purpose), layout)
+    if chosen == PICTURE:
+        return [AskToSave()]
     if chosen != prompt.kind:
-        return [ShowPrompt(ExportPrompt(chosen, export_path_beside(state, chosen)))]
-    kind, options = EXPORTS[chosen], prompt.options
+        return [ShowPrompt(as_other_kind(state, prompt, chosen))]
+    kind, options, sections = EXPORTS[chosen], prompt.options, state.preferences.open_sections
     asked = _Asked(kind, state.scene, settle(kind, options, state.scene, state.optics), layout)
     for name, row in ROWS.items():
-        if name in kind.heeds:
+        if name in kind.heeds and (name not in ADVANCED_ROWS or is_seen_open("advanced", sections)):
             options = row(options, asked)
-    focus_on_appearing()
-    label("File" if kind.endings else "Folder", layout)
-    path, entered = path_field(prompt.path, layout)
+    path, entered, browses = path_row("File" if kind.endings else "Folder", prompt.path, layout)
     edited = replace(prompt, path=path, options=options)
     if edited != prompt:
         edited = replace(edited, already_there=False, problem="")
-    say_problem(prompt.problem or ("There is one of this name already." if prompt.already_there else ""), state)
-    pressed, closed = prompt_buttons("Replace" if prompt.already_there else "Export", layout)
+    _say_written_name(kind, edited, state.scene)
+    say_problem(prompt.problem or (ALREADY_THERE if prompt.already_there else ""), state)
+    pressed, closed = prompt_buttons("Replace" if prompt.already_there else _word_of(kind), layout)
+    if browses:
+        return [ShowPrompt(edited), DoTask(ChoosePlaceTask(edited))]
     if pressed or entered:
         return [DoTask(ExportTask(chosen, path, options, prompt.already_there))]
     return prompt_actions(closed, edited, prompt)
+
+
+def _word_of(kind: ExportKind) -> str:
+    return "Make it" if kind.purpose == "share" else "Export"
+
+
+def _purpose_row(chosen: Purpose, layout: Layout) -> Purpose:
+    """A button a purpose; the chosen one is lit."""
+    label("For", layout)
+    pressed = chosen
+    for (purpose, words), width in in_row(tuple(PURPOSES.items()), layout):
+        if choice(words, purpose == chosen, layout, (width, 0), PURPOSE_TIPS[purpose]):
+            pressed = purpose
+    return pressed
+
+
+def _entries(purpose: Purpose) -> dict[str, tuple[str, str]]:
+    """The kinds, and among what is shared the picture itself, which has a window of its own."""
+    kinds = {name: (kind.words, _files_of(kind)) for name, kind in kinds_for(purpose).items()}
+    return kinds | ({PICTURE: PICTURE_ENTRY} if purpose == "share" else {})
+
+
+def _say_written_name(kind: ExportKind, prompt: ExportPrompt, scene: Scene) -> None:
+    """What becomes of a name that is not written as it was typed."""
+    try:
+        name = written_path(kind, prompt.path, scene, prompt.options).name
+    except InputError:
+        return
+    if name != Path(prompt.path.strip()).name:
+        quiet(f"It is written as {name}{NAME_REASON if kind.path else '.'}")
 
 
 def _files_of(kind: ExportKind) -> str:
@@ -97,7 +148,7 @@ def _shape_of(device: str) -> str:
 
 
 def _device(options: ExportOptions, asked: _Asked) -> ExportOptions:
-    label("Made for", asked.layout, "A display; without one, the photo's own shape.")
+    label("Made for", asked.layout, "Which display it is for. For any, the pictures keep the photo's shape.")
     shown = asked.settings.device or ANY_DISPLAY
     entries = {ANY_DISPLAY: (ANY_DISPLAY, "The photo's own shape.")} | {
         name: (name, _shape_of(name)) for name in DEVICES
@@ -107,27 +158,31 @@ def _device(options: ExportOptions, asked: _Asked) -> ExportOptions:
 
 
 def _motion(options: ExportOptions, asked: _Asked) -> ExportOptions:
-    label("Motion", asked.layout, "What moves; the end leads to the beginning.")
-    motion = choice_row("motion", asked.settings.motion, {n: (n, MOTION_TIPS[n]) for n in ANIMATIONS}, asked.layout)
+    label("Motion", asked.layout, "What moves. The end joins the beginning, so that it can run over and over.")
+    motion = choice_row(
+        "motion", asked.settings.motion, {n: (n.capitalize(), MOTION_TIPS[n]) for n in ANIMATIONS}, asked.layout
+    )
     return options if motion == asked.settings.motion else replace(options, motion=motion)
 
 
 def _keys(options: ExportOptions, asked: _Asked) -> ExportOptions:
-    label("Own path", asked.layout, "A text file with a line a key: s t, s t focus, or s t focus aperture.")
-    text, _ = text_field("keys", str(asked.settings.keys or ""), "a file of keys, instead of the motion")
+    label("Own path", asked.layout, "A text file, a line for each place: s t, s t focus, or s t focus aperture.")
+    text, _ = text_field("keys", str(asked.settings.keys or ""), "a text file, instead of the motion above")
     return replace(options, keys=Path(text) if text.strip() else None)
 
 
 def _eyes(options: ExportOptions, asked: _Asked) -> ExportOptions:
     limits = 0.0, float(max(asked.scene.grid.columns - 1, 1))
-    tip = "View steps from eye to eye. What is in focus lies in the screen."
+    tip = "How far apart the eyes are: more looks deeper. What is in focus seems to lie on the screen."
     eyes = slider("Eyes", asked.settings.eyes, limits, "%.1f views apart", asked.layout, tip)
     return options if eyes is None else replace(options, eyes=eyes)
 
 
 def _row(options: ExportOptions, asked: _Asked) -> ExportOptions:
     limits = 0, asked.scene.height - 1
-    row = whole_slider("Row", asked.settings.row, limits, asked.layout, "Of the picture, from its top.")
+    row = whole_slider(
+        "Row", asked.settings.row, limits, asked.layout, "Which row of the picture, counted from its top."
+    )
     return options if row is None else replace(options, row=row)
 
 
@@ -137,21 +192,41 @@ def _size(options: ExportOptions, asked: _Asked) -> ExportOptions:
 
 
 def _frames(options: ExportOptions, asked: _Asked) -> ExportOptions:
-    label("Pictures", asked.layout, "How many.")
+    """How many pictures: of an animation told by how long it lasts."""
+    if asked.kind.rate:
+        return _seconds(options, asked)
+    label("Pictures", asked.layout, "How many, from one end to the other.")
     changed, frames = imgui.input_int("##frames", asked.settings.frames, 0, 0)
     return replace(options, frames=min(max(frames, 1), MOST_FRAMES)) if changed else options
 
 
-def _rate(options: ExportOptions, asked: _Asked) -> ExportOptions:
+def _seconds(options: ExportOptions, asked: _Asked) -> ExportOptions:
     settings = asked.settings
-    label("Rate", asked.layout, f"Pictures a second: it lasts {settings.frames / settings.rate:.3g} seconds.")
-    changed, rate = imgui.input_float("##rate", settings.rate, 0, 0, "%.4g a second")
-    return replace(options, rate=clamp(rate, *RATE_LIMITS)) if changed else options
+    label("Length", asked.layout, "How long it lasts, until it begins again.")
+    changed, seconds = imgui.input_float("##seconds", settings.frames / settings.rate, 0, 0, "%.4g seconds")
+    return replace(options, frames=_frames_in(seconds, settings.rate)) if changed else options
+
+
+def _rate(options: ExportOptions, asked: _Asked) -> ExportOptions:
+    """More pictures a second make no longer film: there are more of them."""
+    settings = asked.settings
+    label("Smoothness", asked.layout, f"Pictures a second; {settings.frames} of them are made.")
+    changed, rate = imgui.input_float("##rate", settings.rate, 0, 0, "%.4g pictures a second")
+    if not changed:
+        return options
+    rate = clamp(rate, *RATE_LIMITS) if math.isfinite(rate) else settings.rate
+    frames = _frames_in(settings.frames / settings.rate, rate)
+    return replace(options, rate=rate, frames=None if options.frames is None else frames)
+
+
+def _frames_in(seconds: float, rate: float) -> int:
+    """At least two, or nothing moves."""
+    return round(clamp(seconds * rate if math.isfinite(seconds) else 0.0, 2, MOST_FRAMES))
 
 
 def _show(options: ExportOptions, asked: _Asked) -> ExportOptions:
     label("Display", asked.layout)
-    tip = "By Looking Glass Bridge, which must run."
+    tip = "Looking Glass Bridge, the display's own program, must be running."
     show = checkbox("Show it there when it is written", options.show, asked.layout, tip)
     return options if show is None else replace(options, show=show)
 

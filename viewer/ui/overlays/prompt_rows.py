@@ -23,6 +23,7 @@ PROMPT_FLAGS = (
     | imgui.WindowFlags_.no_saved_settings
     | imgui.WindowFlags_.always_auto_resize
 )
+BROWSE = "Browse…"
 CARD_FLAGS = PROMPT_FLAGS | imgui.WindowFlags_.no_nav | imgui.WindowFlags_.no_focus_on_appearing
 """Of a card that stands by itself over the picture."""
 
@@ -35,18 +36,27 @@ def prompt_actions(closed: bool, edited: Prompt, prompt: Prompt) -> list[Action]
 
 
 def prompt_buttons(word: str, layout: Layout) -> tuple[bool, bool]:
-    """(pressed, cancelled)."""
+    """(pressed, cancelled); Enter presses, too, but for one that ends typing into a number, or picks from a list."""
     gap(layout, 2)
     pressed = button(word, layout)
     imgui.same_line()
-    return pressed, button("Cancel", layout)
+    return pressed or _is_enter_free(), button("Cancel", layout)
+
+
+def _is_enter_free() -> bool:
+    is_taken = imgui.get_io().want_text_input or imgui.is_popup_open("", imgui.PopupFlags_.any_popup)
+    return is_enter() and not is_taken and not imgui.is_window_appearing()
+
+
+def is_enter() -> bool:
+    """Whether Enter went down in this frame, wherever it is on the keyboard."""
+    return bool(imgui.is_key_pressed(imgui.Key.enter, False) or imgui.is_key_pressed(imgui.Key.keypad_enter, False))
 
 
 def text_field(name: str, text: str, hint: str = "") -> tuple[str, bool]:
     """The text, and whether Enter was pressed in it."""
     _, new = imgui.input_text_with_hint(f"##{name}", hint, text)
-    is_enter = imgui.is_key_pressed(imgui.Key.enter) or imgui.is_key_pressed(imgui.Key.keypad_enter)
-    return new, bool(imgui.is_item_deactivated() and is_enter)
+    return new, bool(imgui.is_item_deactivated() and is_enter())
 
 
 def path_field(path: str, layout: Layout) -> tuple[str, bool]:
@@ -55,6 +65,17 @@ def path_field(path: str, layout: Layout) -> tuple[str, bool]:
     is_cut = imgui.calc_text_size(new).x > imgui.get_item_rect_size().x
     tooltip(new if is_cut else "", layout)
     return new, is_entered
+
+
+def path_row(text: str, path: str, layout: Layout) -> tuple[str, bool, bool]:
+    """A row for a path, whether Enter was pressed in it, and whether the user wants to look for one instead."""
+    width = imgui.calc_text_size(BROWSE).x + 2 * imgui.get_style().frame_padding.x
+    focus_on_appearing()
+    label(text, layout)
+    imgui.set_next_item_width(imgui.get_content_region_avail().x - width - imgui.get_style().item_spacing.x)
+    new, is_entered = path_field(path, layout)
+    imgui.same_line()
+    return new, is_entered, button(BROWSE, layout, "Look for the folder, and choose a name there.")
 
 
 def search_field(name: str, text: str, hint: str) -> tuple[str, bool]:

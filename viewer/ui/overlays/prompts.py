@@ -13,7 +13,7 @@ from iibr_core.formats import BEST_QUALITY, KINDS, PROFILES
 from iibr_core.scenes import ScreenSize
 from iibr_core.types import SRGB
 from viewer.model.actions import Action, AskToSave, DoTask, Quit, ShowPrompt
-from viewer.model.commands import COMMANDS, Command, action_for_path, commands_matching, recent_commands
+from viewer.model.commands import COMMANDS, Command, commands_matching, recent_commands
 from viewer.model.layout import PANEL_WIDTH, Layout
 from viewer.model.state.app_state import AppState
 from viewer.model.state.exporting import ExportPrompt
@@ -21,13 +21,14 @@ from viewer.model.state.jobs import JobProgress, QuitWhenDone
 from viewer.model.state.model_download import ModelsPrompt
 from viewer.model.state.prompts import PalettePrompt, PathPrompt, Prompt, SavePrompt
 from viewer.model.state.tasks import ChoosePlaceTask, SaveTask
-from viewer.ui.overlays.export_prompt import export_prompt
+from viewer.ui.overlays.export_prompt import ALREADY_THERE, export_prompt
+from viewer.ui.overlays.file_browser import file_browser
 from viewer.ui.overlays.models_prompt import models_prompt
 from viewer.ui.overlays.prompt_rows import (
     PROMPT_FLAGS,
     button_rows,
     focus_on_appearing,
-    path_field,
+    path_row,
     prompt_actions,
     prompt_buttons,
     say_problem,
@@ -43,31 +44,21 @@ ROWS_SHOWN = 12
 MOUSE = (
     ("Drag", "Move the viewpoint"),
     ("Click", "Focus there"),
-    ("Double click", "Viewpoint back to the middle"),
+    ("Double click", "Recenter: back to the photo's own viewpoint"),
     ("Wheel", "Focus nearer or farther"),
     ("Ctrl+wheel", "Zoom about the pointer"),
     ("Drag with the middle button", "Move the zoomed picture"),
     ("Drag with Space", "Move the zoomed picture"),
     ("Arrow keys", "Move the viewpoint"),
-    ("Drop", "Open a photo, a folder, a disparity map"),
+    ("Drop", "Open a photo, a folder, a depth map"),
     ("Ctrl+click a slider", "Type a value"),
     ("Drag with the depth brush", "Paint depth; the wheel makes it larger"),
     ("Ctrl+click with the depth brush", "Pick the depth that Level and Bucket give"),
     ("Gamepad", "Viewpoint, focus; triggers: aperture"),
     ("Esc", "Close what is open, put the brush away"),
 )
-PICTURE_ENDINGS = "The name's ending decides: .png, .jpg, .tif, .webp, .avif, or .exr in linear light."
-MAP_ENDINGS = "The name's ending decides: .pfm, .exr, .npy, or .png (16 bits, scaled)."
-PATH_WORDS = {
-    "photo": "Open a photo",
-    "folder": "Open a folder of views",
-    "mask": "Image for the aperture; white lets light through",
-    "surroundings": "A picture all around (equirectangular), to be reflected",
-    "truth": "Ground truth: a folder of views",
-    "map": "A disparity map for this photo",
-    "model": "A depth model: an ONNX file, or a folder",
-    "model folder": "The folder of a depth model",
-}
+PICTURE_ENDINGS = "The name's ending decides the kind: .png, .jpg, .tif, .webp, .avif, or .exr (HDR)."
+MAP_ENDINGS = "The name's ending decides the kind: .pfm, .exr, .npy, or .png (16 bits, scaled)."
 
 
 def prompts(state: AppState, layout: Layout) -> list[Action]:
@@ -107,7 +98,7 @@ def _contents(prompt: Prompt, state: AppState, layout: Layout) -> list[Action]:
         case ExportPrompt():
             return export_prompt(prompt, state, layout)
         case PathPrompt():
-            return _path(prompt, state, layout)
+            return file_browser(prompt, state, layout)
         case ModelsPrompt():
             return models_prompt(prompt, state, layout)
         case PalettePrompt():
@@ -124,20 +115,15 @@ def _save(prompt: SavePrompt, state: AppState, layout: Layout) -> list[Action]:
     is_map = prompt.what == "map"
     imgui.text("Save the depth map" if is_map else "Save the picture")
     gap(layout, 2)
-    focus_on_appearing()
-    label("File", layout)
-    path, entered = path_field(prompt.path, layout)
+    path, entered, browses = path_row("File", prompt.path, layout)
     edited = prompt if path == prompt.path else replace(prompt, path=path, already_there=False, problem="")
     edited = edited if is_map else _form_rows(_sized(edited, state, layout), state, layout)
     gap(layout, 2)
     quiet(MAP_ENDINGS if is_map else PICTURE_ENDINGS)
-    problem = prompt.problem or ("There is a file of this name already." if prompt.already_there else "")
-    say_problem(problem, state)
+    say_problem(prompt.problem or (ALREADY_THERE if prompt.already_there else ""), state)
     pressed, closed = prompt_buttons("Replace" if prompt.already_there else "Save", layout)
-    if state.has_dialogs:
-        imgui.same_line()
-        if button("Choose a folder and name…", layout):
-            return [DoTask(ChoosePlaceTask(edited))]
+    if browses:
+        return [ShowPrompt(edited), DoTask(ChoosePlaceTask(edited))]
     if pressed or entered:
         return [DoTask(SaveTask(edited.path, edited.size_px, prompt.already_there, prompt.what, edited.form))]
     return prompt_actions(closed, edited, prompt)
@@ -160,10 +146,10 @@ def _form_rows(prompt: SavePrompt, state: AppState, layout: Layout) -> SavePromp
     if form.bits not in kind.bits:
         form = replace(form, bits=None)  # of another kind, typed before
     if kind.has_quality:
-        label("Quality", layout, "Less makes smaller files.")
+        label("Quality", layout, "Less makes a smaller file, with coarser detail.")
         form = replace(form, quality=imgui.slider_int("##quality", form.quality, 1, BEST_QUALITY)[1])
     if len(kind.bits) > 1:
-        label("Bits", layout, "Of a channel: more of them leave room for edits.")
+        label("Bits", layout, "Of each colour: 16 keep smooth skies smooth when the picture is edited later.")
         usual = form.bits or kind.bits[0]
         chosen = _radio({str(bits): bits for bits in sorted(kind.bits)}, usual)
         form = form if chosen == usual else replace(form, bits=chosen)
@@ -187,19 +173,6 @@ def _radio(choices: Mapping[str, Option], chosen: Option) -> Option:
     return chosen
 
 
-def _path(prompt: PathPrompt, state: AppState, layout: Layout) -> list[Action]:
-    imgui.text(PATH_WORDS[prompt.what])
-    gap(layout, 2)
-    focus_on_appearing()
-    label("Path", layout)
-    path, entered = path_field(prompt.path, layout)
-    quiet("This system has no file dialog (zenity or kdialog): type a path, or drop a file on the window.")
-    pressed, closed = prompt_buttons("Open", layout)
-    if (pressed or entered) and path.strip():
-        return [ShowPrompt(None), action_for_path(prompt.what, path.strip(), state)]
-    return prompt_actions(closed, replace(prompt, path=path), prompt)
-
-
 def _palette(prompt: PalettePrompt, state: AppState, layout: Layout) -> list[Action]:
     """Commands that match what was typed; the arrow keys select one of them, Enter runs it."""
     focus_on_appearing()
@@ -211,7 +184,7 @@ def _palette(prompt: PalettePrompt, state: AppState, layout: Layout) -> list[Act
     chosen = matching[selected] if entered and matching else None
     pressed = _command_rows(matching, selected, has_moved=bool(steps))
     if not matching:
-        quiet("No command of that name.")
+        quiet("No command has these words: try fewer.")
     chosen = pressed or chosen
     if chosen is not None:
         return [ShowPrompt(None), chosen.action(replace(state, prompt=None))]
@@ -268,7 +241,7 @@ def _quit(state: AppState, layout: Layout) -> list[Action]:
         imgui.text("The depth edits are not saved.")
         offers.append(("Save the depth map…", AskToSave("map")))
     gap(layout, 2)
-    sure = "Quit without saving" if state.has_unsaved_edits else "Give up and quit" if state.jobs else "Quit"
+    sure = "Quit without saving" if state.has_unsaved_edits else "Cancel them and quit" if state.jobs else "Quit"
     return button_rows([*offers, (sure, Quit(is_sure=True)), ("Cancel", ShowPrompt(None))])
 
 

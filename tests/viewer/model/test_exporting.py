@@ -1,0 +1,92 @@
+"""What is offered to be exported, by purpose, and under which names it is written."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from iibr_core.exports.kinds import EXPORTS, PURPOSES, Purpose
+from iibr_core.exports.options import ExportOptions
+from iibr_core.generation.plan import ScenePlan
+from iibr_core.scenes.scene import Source
+from iibr_core.types import InputError
+from tests.viewer.model.test_reducers import scene_of, state_with
+from viewer.model.actions import AskToSave
+from viewer.model.reducers.exporting import as_other_kind, first_kind, kinds_for, usual_export_path, written_path
+from viewer.model.reducers.root import reduce
+from viewer.model.state.exporting import AskToExport, ExportPrompt
+from viewer.model.state.preferences import SetPreference
+from viewer.model.state.prompts import SavePrompt
+
+STATE = state_with(replace(scene_of(source=Source("/photos/bike.jpg")), name="bike"))
+PLAIN = ExportOptions()
+
+
+def test_every_kind_has_its_purpose_and_every_purpose_a_kind_that_can_be_made_anywhere() -> None:
+    offered = [name for purpose in PURPOSES for name in kinds_for(purpose)]
+    assert sorted(offered) == sorted(EXPORTS)
+    assert {"mp4", "gif"} <= kinds_for("share").keys()
+    assert {"quilt", "sbs", "anaglyph", "spatial-photo"} <= kinds_for("display").keys()
+    assert {"hci", "colmap", "splats", "depth"} <= kinds_for("software").keys()
+    assert not any(EXPORTS[first_kind(purpose)].needs for purpose in PURPOSES)
+
+
+@pytest.mark.parametrize(("purpose", "name"), [("display", "quilt"), ("software", "focal-stack")])
+def test_what_comes_first(purpose: Purpose, name: str) -> None:
+    assert first_kind(purpose) == name
+
+
+def test_the_folder_of_the_last_is_proposed_again() -> None:
+    assert usual_export_path(STATE, "gif") == "/photos/bike-iibr.gif"
+    assert usual_export_path(STATE, "anaglyph") == "/photos/bike-anaglyph.png"
+    assert usual_export_path(STATE, "hci") == "/photos/bike-hci"
+    assert STATE.scene is not None
+    plan = ScenePlan(STATE.scene.grid, 1.0, 0.0, (-2.0, 3.0), 0.1, True, 0, 0, ())
+    photo = replace(STATE, scene=replace(STATE.scene, plan=plan))
+    later = reduce(photo, SetPreference("last_folder", "/shared"))
+    exported, saved, mapped = (reduce(later, ask).prompt for ask in (AskToExport(), AskToSave(), AskToSave("map")))
+    assert isinstance(exported, ExportPrompt)
+    assert isinstance(saved, SavePrompt)
+    assert isinstance(mapped, SavePrompt)
+    assert Path(exported.path).parent == Path(saved.path).parent == Path("/shared")
+    assert Path(mapped.path).parent == Path("/photos"), "there it is found again"
+
+
+def test_another_kind_keeps_the_name_that_was_typed() -> None:
+    usual = ExportPrompt("gif", usual_export_path(STATE, "gif"))
+    assert as_other_kind(STATE, usual, "mp4") == ExportPrompt("mp4", "/photos/bike-iibr.mp4")
+    typed = ExportPrompt("gif", "/tmp/for_ann.gif", replace(PLAIN, frames=3))
+    assert as_other_kind(STATE, typed, "mp4").path == "/tmp/for_ann.mp4"
+    assert as_other_kind(STATE, typed, "hci").path == "/tmp/for_ann"
+    assert as_other_kind(STATE, ExportPrompt("hci", "/tmp/for_ann"), "sbs").path == "/tmp/for_ann.png"
+    assert as_other_kind(STATE, ExportPrompt("gif", "  "), "mp4").path == "/photos/bike-iibr.mp4"
+
+
+@pytest.mark.parametrize(
+    ("kind", "typed", "written"),
+    [
+        ("gif", "a.gif", "a.gif"),
+        ("gif", "a", "a.gif"),
+        ("anaglyph", "e_sbs.png", "e_sbs.png"),
+        ("sbs", "e_sbs.png", "e_sbs.png"),
+        ("sbs", "e_2x1.jpg", "e_2x1.jpg"),
+        ("half-sbs", "e_half_sbs.png", "e_half_sbs.png"),
+        ("over-under", "e_ou.png", "e_ou.png"),
+        ("sbs", "e.png", "e_LRF_Full_SBS.png"),
+        ("half-sbs", "e_sbs.png", "e_sbs_LRF_Half_SBS.png"),
+        ("depth", "a_depth.pfm", "a_depth.pfm"),
+        ("depth", "a.pfm", "a_depth.pfm"),
+        ("hci", "field", "field"),
+    ],
+)
+def test_a_name_is_written_as_typed_but_where_it_must_say_what_is_in_it(kind: str, typed: str, written: str) -> None:
+    assert STATE.scene is not None
+    assert written_path(EXPORTS[kind], f" {typed} ", STATE.scene, PLAIN) == Path(written)
+
+
+def test_no_name_is_told() -> None:
+    assert STATE.scene is not None
+    with pytest.raises(InputError, match="no name yet"):
+        written_path(EXPORTS["gif"], "  ", STATE.scene, PLAIN)
