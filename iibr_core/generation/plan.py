@@ -188,7 +188,7 @@ def _wide_notes(plan: ScenePlan, width: int) -> tuple[str, ...]:
         return ()
     return (
         f"The nearest moves {moved_px:.0f} px against the farthest from the first view to the last,"
-        f" {moved_px / width:.0%} of the width: most of it is made up. In the window it is {TOTAL_PARALLAX:.0%}.",
+        f" {moved_px / width:.0%} of the width: most of it is inpainted. In the window it is {TOTAL_PARALLAX:.0%}.",
     )
 
 

@@ -34,7 +34,7 @@ def edge_reasons(statistics: ParallaxStatistics, inpaint: str, outer_views: int)
         return [near_edges + "nothing is disoccluded, so nothing is inpainted."]
     name = inpaint.partition(":")[0]
     why = "nearest to true views, though smooth" if inpaint == DEFAULT_INPAINTER else "as asked"
-    reasons = [f"{near_edges}holes behind them are inpainted by {name}: {why}."]
+    reasons = [f"{near_edges}what they hide is inpainted by {name}: {why}."]
     if inpaint not in INPAINTERS:
         reasons.append(f"The model paints up to {outer_views} views, each in seconds on a GPU, in minutes without one.")
     return reasons
@@ -47,7 +47,7 @@ def quality_reason(costs: CostEstimates, quality: Quality, is_asked: bool) -> st
     if is_asked:
         why = ", as asked."
     elif quality == "balanced":
-        why = ": the transformer decides the rays that are ambiguous."
+        why = ": the trained ray transformer decides where rays are ambiguous."
     elif balanced > fast:
-        why = f": asking the transformer would take {balanced / fast:.1f} times as long and hardly show."
+        why = f": the trained ray transformer would take {balanced / fast:.1f} times as long and gain little."
     return f"{quality.capitalize()} quality{why}"

@@ -203,7 +203,7 @@ def test_the_transformer_is_asked_where_it_is_worth_its_time():
     assert rough.costs.balanced.seconds > 1.5 * rough.costs.fast.seconds
     assert rough.quality == "fast"
     assert rough.peak_bytes == rough.costs.fast.peak_bytes
-    assert any("Fast quality: asking the transformer would take" in reason for reason in rough.reasons)
+    assert any("Fast quality: the trained ray transformer would take" in reason for reason in rough.reasons)
     assert quality_planned(0.0).quality == "fast", "nothing to decide"
 
 

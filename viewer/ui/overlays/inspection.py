@@ -27,7 +27,7 @@ SIDES: dict[Comparison, tuple[str, str]] = {
     "photo": ("photo", "result"),
     "quality": ("fast", "balanced"),
     "truth": ("result", "truth"),
-    "kept": ("kept", "now"),
+    "kept": ("snapshot", "now"),
 }
 BLACK: Color = (0.0, 0.0, 0.0, 1.0)
 
@@ -44,7 +44,7 @@ def draw_over_picture(state: AppState, layout: Layout, textures: InspectionTextu
         _words("before", frame.x + 8 * layout.ui_scale, frame.y + 8 * layout.ui_scale, layout.ui_scale)
     if textures.difference is not None:
         _image(textures.difference, frame)
-        words = f"difference to the kept state, × {DIFFERENCE_GAIN}"
+        words = f"difference from the snapshot, × {DIFFERENCE_GAIN}"
         _words(words, frame.x + 8 * layout.ui_scale, frame.y + 8 * layout.ui_scale, layout.ui_scale)
     if textures.left is not None:
         _draw_comparison(state, scene, layout, frame, textures)
@@ -100,7 +100,7 @@ def _draw_legend(state: AppState, scene: Scene, layout: Layout, frame: Rect) -> 
     kind, scale = state.inspection.overlay, layout.ui_scale
     x, y, room = frame.x + 8 * scale, frame.y + 8 * scale, 5 * scale
     if kind == "inpainted":
-        _words("inpainted", x, y, scale)
+        _words("inpainting", x, y, scale)
         return
     draw, line = imgui.get_background_draw_list(), imgui.get_text_line_height()
     width, height = LEGEND_WIDTH * scale, LEGEND_HEIGHT * scale

@@ -24,7 +24,7 @@ VERBS: dict[JobKind, str] = {
     "map": "Saving",
     "copy": "Copying",
     "export": "Exporting",
-    "fill": "Filling between the views of",
+    "fill": "Making views between those of",
 }
 
 WAITING = "waiting for its turn"
@@ -92,7 +92,9 @@ def _work_on_views(state: AppState) -> Iterator[ProgressRow]:
     downloading = state.models.downloading
     if state.free_progress is not None:
         share = min(state.free_progress, 0.99)  # what is whole has no row
-        yield ProgressRow("looking", "Drawing what the photo hides", f"{round(100 * share)} %", share, LeaveCamera())
+        yield ProgressRow(
+            "looking", "Filling in what the photo does not show", f"{round(100 * share)} %", share, LeaveCamera()
+        )
     if downloading is not None:
         words = f"{downloading.done:,} of {downloading.total:,} MB"
         share = downloading.done / max(downloading.total, 1)
