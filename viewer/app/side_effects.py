@@ -207,7 +207,7 @@ class SideEffects:
 
 def _folder_beside(state: AppState) -> str:
     """Where to look for what is to be opened: beside what is open, at home before anything was."""
-    path = "~/" if state.source is None else path_beside(state.source.path, "photo")
+    path = "~/photo" if state.source is None else path_beside(state.source.path, "photo")
     return os.path.join(os.path.dirname(os.path.abspath(os.path.expanduser(path))), "")
 
 

@@ -24,6 +24,7 @@ from viewer.model.actions import Action, EditsSaved, Notify
 from viewer.model.saved_settings import read_settings
 from viewer.model.state.jobs import JobsChanged
 from viewer.model.state.optics import MoveEye, SetAperture, SetFocus
+from viewer.model.state.preferences import SetPreference
 from viewer.model.state.tasks import SaveTask
 
 
@@ -109,7 +110,7 @@ def test_a_picture_is_as_it_was_when_edited_depth_is_shown_meanwhile(tmp_path: P
         expected = scene_view.renderer.converged_picture(RenderSettings(state.optics, (90, 60)))
         jobs = JobQueue(scene_view, woken.set)
         actions: list[Action] = []
-        assert add_save(SaveTask(str(out), (90, 60)), state, (), jobs) == []
+        assert add_save(SaveTask(str(out), (90, 60)), state, (), jobs) == [SetPreference("last_folder", str(tmp_path))]
         scene_view.show_disparity(np.zeros((HEIGHT, WIDTH), np.float32))
         assert not np.array_equal(
             scene_view.renderer.converged_picture(RenderSettings(state.optics, (90, 60))), expected

@@ -119,7 +119,7 @@ def test_buttons_of_the_section_and_the_values_under_the_pointer(viewer: Driver)
     viewer.until_idle()
     viewer.press("Values")
     viewer.until(lambda app: app.layout().status is not None)
-    viewer.press("Disparity")
+    viewer.press("Depth")
     viewer.until(lambda app: app.state.inspection.overlay == "disparity")
     viewer.slide("##Opacity", 0.25)
     assert 0.1 < viewer.app.state.inspection.opacity < 0.4

@@ -167,7 +167,7 @@ def test_views_between_are_made_on_when_another_photo_is_opened_and_found_by_who
     viewer.until(lambda app: app.state.scene is not None and app.state.scene.source.path == photo.path)
     gate.set()
     viewer.until(lambda app: not app.state.jobs)
-    assert ["are there" in notice.text for notice in viewer.app.state.notices] == [True]
+    assert ["are ready" in notice.text for notice in viewer.app.state.notices] == [True]
     assert viewer.app.state.scene is not None
     assert viewer.app.state.scene.source.path == photo.path
     gate.clear()  # they are there, and not made again

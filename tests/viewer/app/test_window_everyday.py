@@ -223,8 +223,8 @@ def test_what_was_chosen_is_there_again_the_next_time(open_window: Opener, photo
     kept = tmp_path / "kept"
     first = open_window(photo_path, kept_in=kept, grid=GridShape(1, 1))
     first.until_idle()
-    first.press("section Advanced")
-    first.until(lambda app: "advanced" in app.state.preferences.open_sections)
+    first.press("section More")
+    first.until(lambda app: "more" in app.state.preferences.open_sections)
     first.until_idle()
     preferences = first.app.state.preferences
     assert load_preferences(AppState(), kept).preferences.open_sections == preferences.open_sections, "after a crash"

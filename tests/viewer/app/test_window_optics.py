@@ -177,7 +177,7 @@ def test_what_each_edit_rebuilds(viewer: Driver, monkeypatch: pytest.MonkeyPatch
     for action in ONLY_PANELS:
         assert cost_of(action) == (False, True, False, False), action
     assert cost_of(DRAWS[-1]) == (False, False, False, False), "the same again"
-    assert cost_of(SetDepthStrength(2.0, is_finished=False)) == (False, False, False, False), "its section is closed"
+    assert cost_of(SetDepthStrength(2.0, is_finished=False)) == (False, True, False, False), "its slider moves"
     assert cost_of(SetDepthStrength(2.0, is_finished=True)) == (True, True, True, True)
     assert cost_of(SetPreference("font_scale", 1.3))[2:] == (False, False)
 

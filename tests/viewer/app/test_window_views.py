@@ -62,7 +62,7 @@ def test_before_is_the_photo_until_the_key_or_an_edit_ends_it(viewer: Driver) ->
 def test_a_kept_state_is_compared_side_by_side_and_as_a_difference(viewer: Driver) -> None:
     viewer.app.do(Compare("difference"))
     assert viewer.app.state.inspection.comparison is None
-    assert "keep a state" in viewer.app.state.notices[-1].text
+    assert "no snapshot yet" in viewer.app.state.notices[-1].text
     viewer.app.do(DismissNotice(None), SetAperture(2.0))
     viewer.until_idle()
     kept = viewer.image()
