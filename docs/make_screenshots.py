@@ -40,7 +40,7 @@ def main() -> None:
 
 def whole_window(viewer: HeadlessViewer) -> NDArray[np.uint8]:
     """From the left, focused on the tank, wide open with seven blades."""
-    open_sections(viewer, "view", "focus", "aperture")
+    open_sections(viewer)
     viewer.do(MoveEye(ViewOffset(0.5, -1.5)))
     pointed = hover_at(viewer, *TANK)
     assert pointed.disparity is not None
@@ -53,7 +53,7 @@ def whole_window(viewer: HeadlessViewer) -> NDArray[np.uint8]:
 
 def inspection(viewer: HeadlessViewer) -> NDArray[np.uint8]:
     """Disparity over the picture, EPIs through the pointer, values under it."""
-    open_sections(viewer, "view", "inspect")
+    open_sections(viewer, "inspect")
     viewer.do(
         SetAperture(0.0),
         SetInspection("shows_epis", True),
