@@ -22,6 +22,8 @@ class ExportOptions:
     size: (width, height) of each picture in pixels. device: a display by name, see `DEVICES`. eyes: view steps between
     the two eyes. motion: of an animation. keys: file of a path of one's own. frames: of one turn, or pictures of a
     stack. rate: frames a second. row: of the picture. show: on a display, once it is written.
+    budget: bytes that a page may take. credit: whether it names the photo's title, author and rights. stills: whether
+    its views are a file each, for browsers that read no frames of moving pictures.
     """
 
     size: ScreenSize | None = None
@@ -33,6 +35,9 @@ class ExportOptions:
     rate: float | None = None
     row: int | None = None
     show: bool = False
+    budget: int | None = None
+    credit: bool = False
+    stills: bool = False
 
 
 USUAL_OPTIONS = ExportOptions()

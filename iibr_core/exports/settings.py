@@ -36,6 +36,9 @@ class ExportSettings:
     rate: float
     row: int
     show: bool
+    budget: int | None = None
+    credit: bool = False
+    stills: bool = False
 
 
 def settle(kind: ExportKind, options: ExportOptions, scene: Scene, optics: Optics) -> ExportSettings:
@@ -57,6 +60,9 @@ def settle(kind: ExportKind, options: ExportOptions, scene: Scene, optics: Optic
         rate,
         scene.height // 2 if options.row is None else options.row,
         options.show,
+        options.budget,
+        options.credit,
+        options.stills,
     )
 
 

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from iibr_core.runtime.extras import is_installed, require_extra
     from iibr_core.runtime.machine import core_count
     from iibr_core.runtime.resources import resource_folder
+    from iibr_core.runtime.shader_sources import FlatSource, ShaderError, flatten
     from iibr_core.runtime.tiling import Cancelled, ShouldStop, never, raise_if_stopped
     from iibr_core.runtime.time_left import TimeLeft, about_left
 else:

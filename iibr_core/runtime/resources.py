@@ -1,4 +1,4 @@
-"""Finds the shaders and assets that come with the program, in a checkout and in an installed copy alike."""
+"""Finds the shaders, assets and the page's parts that come with the program, in a checkout and in an installed copy alike."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from pathlib import Path
 
 
 def resource_folder(name: str) -> Path:
-    """The folder "shaders" or "assets".
+    """The folder "shaders", "assets" or "web".
 
     Raises FileNotFoundError where the installation lacks it.
     """

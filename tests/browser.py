@@ -1,0 +1,183 @@
+"""A real browser without a window, for tests and benchmarks of pages: Chromium, by its DevTools protocol over a pipe.
+
+https://chromedevtools.github.io/devtools-protocol; messages end with a zero byte (`--remote-debugging-pipe`).
+"""
+
+from __future__ import annotations
+
+import base64
+import json
+import os
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import IO, Any
+
+NAMES = ("chromium", "chromium-browser", "google-chrome")
+USUAL_FLAGS = (
+    "--headless=new",
+    "--no-sandbox",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-default-apps",
+    "--disable-extensions",
+    "--disable-sync",
+    "--hide-scrollbars",
+    "--mute-audio",
+    "--force-color-profile=srgb",
+)
+SOFTWARE = ("--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
+"""WebGL on the processor."""
+
+
+class PageError(RuntimeError):
+    """What a page or the browser says went wrong."""
+
+
+class Tab:
+    """One page. events: what it told so far, the latest last, by (method, parameters)."""
+
+    def __init__(self, pipe: Pipe, session: str) -> None:
+        self._pipe, self._session = pipe, session
+        self.events: list[tuple[str, dict[str, Any]]] = []
+        pipe.tabs[session] = self
+        for domain in ("Page", "Runtime", "Network", "Log"):
+            self.call(f"{domain}.enable")
+
+    def call(self, method: str, **parameters: Any) -> dict[str, Any]:
+        """A command of the protocol. Raises PageError where it fails."""
+        return self._pipe.call(method, parameters, self._session)
+
+    def open(self, url: str) -> None:
+        """Load a page and wait for its load event."""
+        self.events.clear()
+        self.call("Page.navigate", url=url)
+        self.wait_for("Page.loadEventFired")
+
+    def wait_for(self, method: str) -> dict[str, Any]:
+        """The next event of this name, or one that came already."""
+        while True:
+            for name, parameters in self.events:
+                if name == method:
+                    return parameters
+            self._pipe.read()
+
+    def evaluate(self, expression: str) -> Any:
+        """The value of a JavaScript expression, awaited. Raises PageError for what it throws."""
+        answer = self.call("Runtime.evaluate", expression=expression, awaitPromise=True, returnByValue=True)
+        if "exceptionDetails" in answer:
+            details = answer["exceptionDetails"]
+            raise PageError(details.get("exception", {}).get("description") or details["text"])
+        return answer["result"].get("value")
+
+    def wait_until(self, condition: str) -> None:
+        """Until a JavaScript condition holds, asked once a frame."""
+        self.evaluate(f"new Promise(done => {{ const ask = () => {condition} ? done() : requestAnimationFrame(ask); ask() }})")
+
+    def resize(self, width: int, height: int, ratio: float = 1.0, is_phone: bool = False) -> None:
+        """The size of the page, CSS pixels. is_phone: with touch instead of a mouse."""
+        self.call("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=ratio, mobile=is_phone)
+        self.call("Emulation.setTouchEmulationEnabled", enabled=is_phone)
+
+    def prefer(self, **features: str) -> None:
+        """Media features, as prefers_color_scheme="dark"."""
+        told = [{"name": name.replace("_", "-"), "value": value} for name, value in features.items()]
+        self.call("Emulation.setEmulatedMedia", features=told)
+
+    def screenshot(self) -> bytes:
+        """What is seen, a PNG."""
+        return base64.b64decode(self.call("Page.captureScreenshot", format="png")["data"])
+
+    @property
+    def requests(self) -> list[str]:
+        """The addresses of all that was asked for since the page was opened, but for the page and what it holds."""
+        asked = [told["request"]["url"] for name, told in self.events if name == "Network.requestWillBeSent"]
+        return [url for url in asked[1:] if not url.startswith(("data:", "blob:"))]
+
+    @property
+    def complaints(self) -> list[str]:
+        """Errors on the console, exceptions that nobody caught, and what the policy forbade."""
+        said = [told["exceptionDetails"] for name, told in self.events if name == "Runtime.exceptionThrown"]
+        logged = [told["entry"] for name, told in self.events if name == "Log.entryAdded"]
+        return [json.dumps(one) for one in said] + [one["text"] for one in logged if one["level"] == "error"]
+
+    def close(self) -> None:
+        """End the page."""
+        with suppress(PageError):
+            self.call("Page.close")
+        self._pipe.tabs.pop(self._session, None)
+
+
+class Pipe:
+    """The browser's end of the protocol."""
+
+    def __init__(self, to: IO[bytes], answers: IO[bytes]) -> None:
+        self._to, self._answers, self._count, self._rest = to, answers, 0, b""
+        self._done: dict[int, dict[str, Any]] = {}
+        self.tabs: dict[str, Tab] = {}
+
+    def call(self, method: str, parameters: dict[str, Any], session: str | None = None) -> dict[str, Any]:
+        """A command's result."""
+        self._count += 1
+        number = self._count
+        message = {"id": number, "method": method, "params": parameters} | ({"sessionId": session} if session else {})
+        self._to.write(json.dumps(message).encode() + b"\0")
+        self._to.flush()
+        while number not in self._done:
+            self.read()
+        answer = self._done.pop(number)
+        if "error" in answer:
+            raise PageError(f"{method}: {answer['error']['message']}")
+        result: dict[str, Any] = answer["result"]
+        return result
+
+    def read(self) -> None:
+        """Take the next message."""
+        while b"\0" not in self._rest:
+            data = os.read(self._answers.fileno(), 1 << 20)
+            if not data:
+                raise PageError("the browser has ended")
+            self._rest += data
+        text, _, self._rest = self._rest.partition(b"\0")
+        message = json.loads(text)
+        if "id" in message:
+            self._done[message["id"]] = message
+        elif tab := self.tabs.get(message.get("sessionId")):
+            tab.events.append((message["method"], message["params"]))
+
+    def new_tab(self) -> Tab:
+        """An empty page of its own."""
+        target = self.call("Target.createTarget", {"url": "about:blank"})["targetId"]
+        return Tab(self, self.call("Target.attachToTarget", {"targetId": target, "flatten": True})["sessionId"])
+
+
+@contextmanager
+def open_browser(*flags: str) -> Iterator[Pipe]:
+    """A browser with a profile of its own. flags: besides the usual ones, those of SOFTWARE if none are given.
+
+    Raises RuntimeError where there is none: `make test` installs it.
+    """
+    program = next(filter(None, map(shutil.which, NAMES)), None)
+    if program is None:
+        raise RuntimeError("install chromium: tests of web pages need it")
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
+        (read, their_write), (their_read, write) = os.pipe(), os.pipe()
+        command = [program, *USUAL_FLAGS, *(flags or SOFTWARE), f"--user-data-dir={folder}", "--remote-debugging-pipe"]
+        # The protocol wants exactly these descriptors.
+        shell = ["sh", "-c", f'exec "$@" 3<&{their_read} 4>&{their_write}', "sh", *command, "about:blank"]
+        with (Path(folder) / "log").open("wb") as log:
+            process = subprocess.Popen(shell, pass_fds=(their_read, their_write), stdout=log, stderr=log)
+        os.close(their_read)
+        os.close(their_write)
+        with os.fdopen(write, "wb") as to, os.fdopen(read, "rb", buffering=0) as answers:
+            pipe = Pipe(to, answers)
+            try:
+                yield pipe
+            finally:
+                with suppress(PageError, OSError):
+                    pipe.call("Browser.close", {})
+                process.wait()
