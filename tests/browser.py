@@ -76,11 +76,15 @@ class Tab:
 
     def wait_until(self, condition: str) -> None:
         """Until a JavaScript condition holds, asked once a frame."""
-        self.evaluate(f"new Promise(done => {{ const ask = () => {condition} ? done() : requestAnimationFrame(ask); ask() }})")
+        self.evaluate(
+            f"new Promise(done => {{ const ask = () => {condition} ? done() : requestAnimationFrame(ask); ask() }})"
+        )
 
     def resize(self, width: int, height: int, ratio: float = 1.0, is_phone: bool = False) -> None:
         """The size of the page, CSS pixels. is_phone: with touch instead of a mouse."""
-        self.call("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=ratio, mobile=is_phone)
+        self.call(
+            "Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=ratio, mobile=is_phone
+        )
         self.call("Emulation.setTouchEmulationEnabled", enabled=is_phone)
 
     def prefer(self, **features: str) -> None:

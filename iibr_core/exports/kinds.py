@@ -85,7 +85,10 @@ EXPORTS = {
     "spatial-photo": ExportKind(
         "Spatial photo, HEIC", (".heic",), "spatial_photo:write_spatial", EYES, purpose="display",
     ),
-    "web": ExportKind("Web page, one file", (".html",), "web:write_page", ("budget", "credit", "stills")),
+    "web": ExportKind(
+        "Web page, one file", (".html",), "web:write_page",
+        ("budget", "credit", "stills"), gallery="web_gallery:write_gallery",
+    ),
     "mp4": ExportKind("Video, MP4", (".mp4",), "animation:write_motion", MOVING, needs=("av",), rate=30),
     "webm": ExportKind("Video, WebM", (".webm",), "animation:write_motion", MOVING, needs=("av",), rate=30),
     "gif": ExportKind("Animation, GIF", (".gif",), "animation:write_motion", MOVING, rate=15, most_width_px=480),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from pathlib import Path
 from pkgutil import resolve_name
@@ -51,6 +51,15 @@ def writer_of(kind: ExportKind) -> Callable[[Path, ExportSource, ExportOptions],
         return writer(path, source, settle(kind, options, source.scene, source.optics))
 
     return write
+
+
+def gallery_of(kind: ExportKind) -> Callable[[Path, Iterable[str]], Path] | None:
+    """What writes the list of a batch's exports, by their names in its folder; None where there is none.
+
+    It returns where that is, and raises InputError where it cannot be.
+    """
+    gallery: Callable[[Path, Iterable[str]], Path] | None = _resolve(kind.gallery) if kind.gallery else None
+    return gallery
 
 
 def _resolve(entry: str) -> Any:

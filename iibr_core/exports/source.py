@@ -58,14 +58,15 @@ class ExportSource:
             yield item
         self.report_progress(total, total, doing)
 
-    def views(self, zero: float | None = None) -> Generator[ViewUpdate]:
+    def views(self, zero: float | None = None, with_disparity: bool = False) -> Generator[ViewUpdate]:
         """Every view of the scene's grid once, the centre first, none of them kept.
 
         zero: the disparity (as given) that stays still, where it is to be another than the plan's; for photos only.
+        with_disparity: of light fields from disk too, each view of its own, as far as it can be found.
         Raises Cancelled once the export should stop.
         """
         if self.loaded is None:
-            made = self._views_of_folder()
+            made = self._views_of_folder(with_disparity)
         else:
             source, plan = self.scene.source, self.plan(zero)
             made = views_of_photo(source, self.loaded, plan, self.should_stop, self.report_progress)
@@ -82,13 +83,14 @@ class ExportSource:
         before, after = self.plan(), self.plan(zero)
         return self.scene.infinity_px + (before.disparity_zero - after.disparity_zero) * after.disparity_scale
 
-    def _views_of_folder(self) -> Iterator[ViewUpdate]:
+    def _views_of_folder(self, with_disparity: bool) -> Iterator[ViewUpdate]:
         """As read; with disparity that was found, and with views between them, where the scene has such."""
         from iibr_core.formats.light_fields.registry import open_light_field
         from iibr_core.formats.light_fields.views import read_views
         from iibr_core.scenes.light_fields import showings_of_light_field
 
-        if self.scene.grid == self.scene.given_grid and self.scene.depth_source in ("none", "light field"):
+        is_as_read = self.scene.grid == self.scene.given_grid and self.scene.depth_source in ("none", "light field")
+        if is_as_read and not with_disparity:
             return read_views(open_light_field(Path(self.scene.source.path)))[1]
         known = self._found_centre.disparity if self._found_centre is not None else None
         showings = showings_of_light_field(

@@ -1,12 +1,10 @@
-"""A light field that anyone can open: one web page with its views and what draws them, for any browser, without a net."""
+"""A light field that anyone can open: one web page with its views and what draws them, for any browser, offline."""
 
 from __future__ import annotations
 
 import base64
 import hashlib
 import json
-from collections.abc import Iterable
-from dataclasses import replace
 from html import escape
 from pathlib import Path
 from string import Template
@@ -14,13 +12,14 @@ from typing import Any
 
 from iibr_core.exports.settings import ExportSettings
 from iibr_core.exports.source import ExportSource
-from iibr_core.exports.web_views import ViewStore, WebForm, WebViews, form_that_fits
+from iibr_core.exports.web_views import NO_VIEWS, ViewStore, WebViews, form_that_fits, require_avif
+from iibr_core.formats.images.caption import Caption, read_caption
 from iibr_core.formats.outputs import atomic_write
 from iibr_core.runtime.resources import resource_folder
 from iibr_core.runtime.shader_sources import flatten
 from iibr_core.scenes.lens_limits import aperture_limit, eye_limits, first_aperture, focus_limits
 from iibr_core.scenes.scene import Scene
-from iibr_core.types import DISPLAY_P3, SRGB, ImageSize, InputError
+from iibr_core.types import DISPLAY_P3, SRGB, ImageSize
 
 SHADERS = (
     "fullscreen.vert",
@@ -37,10 +36,9 @@ POLICY = (
     "default-src 'none'; script-src {script}; style-src {style}; img-src data: blob:; base-uri 'none';"
     " form-action 'none'"
 )
-QUALITIES = (1.0, 84), (0.68, 75), (0.47, 65), (0.33, 54)
-"""What colours of a quality take, of the best ones."""
-SMALLER = (1, 1.0), (2, 1.0), (2, 0.71), (2, 0.5), (4, 0.5), (4, 0.35), (8, 0.25), (64, 0.25), (64, 0.125)
-"""Every how many views, and how large, one after the other where the budget is too small for the one before."""
+ROOM_FOR_PLACES = 12_000
+"""Of a page: the list of where its views lie takes no more."""
+PARTS = "viewer.js", "page.css"
 
 
 def write_page(path: Path, source: ExportSource, settings: ExportSettings) -> str:
@@ -60,36 +58,50 @@ def write_page(path: Path, source: ExportSource, settings: ExportSettings) -> st
 
 def make_page(source: ExportSource, settings: ExportSettings) -> tuple[bytes, WebViews]:
     """The page and what it carries. Raises as `write_page` does."""
+    require_avif()
     scene = source.scene
-    space = SRGB if scene.color_space == SRGB else DISPLAY_P3
     form = form_that_fits(scene.grid, ImageSize(scene.height, scene.width), settings.stills)
-    views = list(source.views()) if settings.budget else source.views()
-    store = ViewStore(scene.grid, form, scene.color_space, space)
-    store.fill(views)
-    encoded = store.encode(form)
-    page = _page(scene, source, settings, encoded)
-    return page, encoded
+    store = ViewStore(scene.grid, form, scene.color_space, SRGB if scene.color_space == SRGB else DISPLAY_P3)
+    store.fill(source.views(with_disparity=True))
+    caption = read_caption(Path(scene.source.path)) if source.loaded is not None else Caption()
+    words = _words(scene, caption, settings.credit)
+    if settings.budget is None:
+        views = store.encode(store.fine_form())
+    else:
+        beside = len(_page(source, words, NO_VIEWS)) + ROOM_FOR_PLACES
+        views = store.encode_within(settings.budget - beside)
+    return _page(source, words, views), views
 
 
-def _page(scene: Scene, source: ExportSource, settings: ExportSettings, views: WebViews) -> bytes:
+def _words(scene: Scene, caption: Caption, is_credited: bool) -> dict[str, str]:
+    """What people read of the page, escaped, by its place in it."""
+    title = (caption.title if is_credited else "") or scene.name
+    credit = ", ".join(filter(None, (caption.author, caption.rights))) if is_credited else ""
+    meta = (("author", caption.author), ("dcterms.rights", caption.rights)) if is_credited else ()
+    heading = f"<h1>{escape(title)}</h1>" if is_credited else ""
+    return {
+        "title": escape(title),
+        "alt": escape(caption.description or f"Light field: {title}"),
+        "meta": "\n".join(f'<meta name="{name}" content="{escape(text)}">' for name, text in meta if text),
+        "heading": heading + (f"<p>{escape(credit)}</p>" if credit else ""),
+    }
+
+
+def _page(source: ExportSource, words: dict[str, str], views: WebViews) -> bytes:
     folder = resource_folder("web")
-    script, style = ((folder / name).read_text("utf-8") for name in ("viewer.js", "page.css"))
-    name = escape(scene.name)
+    script, style = ((folder / name).read_text("utf-8") for name in PARTS)
     filled = {
-        "policy": POLICY.format(script=_hash(script), style=_hash(style)),
-        "meta": "",
-        "title": name,
-        "heading": "",
-        "alt": f"Light field: {name}",
+        **words,
+        "policy": POLICY.format(script=hash_of(script), style=hash_of(style)),
         "style": style,
         "script": script,
         "first": f"data:{views.kind};base64,{_letters(views.first)}",
         "shaders": _json(_shaders(folder)),
-        "field": _json(_field(scene, source, views)),
+        "field": _json(_field(source, views)),
         "colors": "\n".join(map(_letters, views.colors)),
         "depths": "\n".join(map(_letters, views.depths)),
     }
-    return Template((folder / "page.html").read_text("utf-8")).substitute(filled).encode()
+    return Template((folder / "page.html").read_text("utf-8")).substitute(filled).encode("utf-8", "replace")
 
 
 def _shaders(folder: Path) -> dict[str, str]:
@@ -99,11 +111,11 @@ def _shaders(folder: Path) -> dict[str, str]:
     return {"preamble": (folder / "preamble.glsl").read_text("utf-8"), **without}
 
 
-def _field(scene: Scene, source: ExportSource, views: WebViews) -> dict[str, Any]:
+def _field(source: ExportSource, views: WebViews) -> dict[str, Any]:
     """What the script knows of the field; lengths in pixels are those of the views that the page carries."""
+    scene = source.scene
     scale = views.size.width / scene.width
     return {
-        "name": scene.name,
         "rows": scene.grid.rows,
         "columns": scene.grid.columns,
         "width": views.size.width,
@@ -132,5 +144,6 @@ def _letters(data: bytes) -> str:
     return base64.b64encode(data).decode("ascii")
 
 
-def _hash(text: str) -> str:
+def hash_of(text: str) -> str:
+    """Of a script or a style, as a content policy names it."""
     return f"'sha256-{_letters(hashlib.sha256(text.encode()).digest())}'"

@@ -7,16 +7,26 @@ single files or less (docs/web.md). Disparity goes the same way, in 8 bits.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from io import BytesIO
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.color import bytes_from_encoded, convert, encoded_from_stored, linear_from_srgb, srgb_from_linear
 from iibr_core.rendering.resized_light import mean_of_areas
-from iibr_core.types import SRGB, ColorSpace, FloatImage, GridShape, ImageSize, ViewOffset, ViewUpdate, image_size
+from iibr_core.types import (
+    SRGB,
+    ColorSpace,
+    FloatImage,
+    GridShape,
+    ImageSize,
+    InputError,
+    ViewOffset,
+    ViewUpdate,
+    image_size,
+)
 
 MOST_TEXELS = 56_000_000
 """Of all views together: a browser keeps each as six bytes."""
@@ -26,13 +36,47 @@ MOST_VIEWS = 256
 """What every WebGL 2 takes."""
 RANGE_MARGIN, OUTLIERS = 0.05, 0.0002
 """The range of disparities is that of the desktop's texture, see `light_field_texture.py`."""
-QUALITY, DEPTH_QUALITY, FIRST_QUALITY = 84, 70, 60
+QUALITY, DEPTH_QUALITY, FIRST_QUALITY = 78, 60, 50
 SPEED = 8
 """Of the AV1 encoder, 0 to 10: 6 takes four times as long for a third less."""
+FINE_QUALITY, CHEAP_BITS = 95, 1.0
+"""Of smooth pictures, which no quality makes large: of two views so many bits a pixel."""
 FIRST_SIDE_PX = 1600
 FRAME_MS = 40
 
 Bytes = NDArray[np.uint8]
+
+
+class Rung(NamedTuple):
+    """A step towards smaller pages: every how many views, how large, the colours' quality."""
+
+    every: int
+    scale: float
+    quality: int
+
+    @property
+    def share(self) -> float:
+        """What it takes of the best, about. Fewer views differ more, each from the next."""
+        return float(QUALITIES[self.quality] * self.scale**1.7 * self.every**-1.4)
+
+
+QUALITIES = {FINE_QUALITY: 2.2, QUALITY: 1.0, 68: 0.72, 58: 0.52, 48: 0.38}
+"""What colours of a quality take, of those of the best."""
+LADDER = tuple(
+    Rung(every, scale, quality)
+    for every, scale in (
+        (1, 1.0),
+        (2, 1.0),
+        (2, 0.71),
+        (2, 0.5),
+        (4, 0.5),
+        (4, 0.35),
+        (64, 0.35),
+        (64, 0.18),
+        (64, 0.09),
+    )
+    for quality in QUALITIES
+)
 
 
 @dataclass(frozen=True)
@@ -54,6 +98,11 @@ class WebForm:
         """Whether the view there is among them: the middle one always is."""
         return offset.t % self.every == 0 == offset.s % self.every
 
+    def smaller(self, rung: Rung) -> WebForm:
+        """Less of it."""
+        scale = self.scale * rung.scale
+        return replace(self, every=self.every * rung.every, scale=scale, quality=rung.quality)
+
 
 @dataclass(frozen=True, eq=False)
 class WebViews:
@@ -74,6 +123,20 @@ class WebViews:
     def byte_count(self) -> int:
         """In the page, where three bytes are four letters."""
         return sum(4 * -(-len(data) // 3) for data in (self.first, *self.colors, *self.depths))
+
+
+NO_VIEWS = WebViews(WebForm(), ImageSize(1, 1), (), (0.0, 0.0), "image/avif", b"", (), ())
+"""For the size of a page without them."""
+
+
+def require_avif() -> None:
+    """Raise InputError where Pillow was built without it."""
+    from PIL import features
+
+    if not features.check("avif"):
+        raise InputError(
+            "Pillow writes no AVIF here: install a wheel of it, with `pip install --force-reinstall pillow`"
+        )
 
 
 def form_that_fits(grid: GridShape, size: ImageSize, is_single: bool) -> WebForm:
@@ -104,7 +167,7 @@ class ViewStore:
         self._grid, self._form, self._source, self._space = grid, form, source, space
         self._colors: dict[ViewOffset, Bytes] = {}
         self._disparities: dict[ViewOffset, Bytes] = {}
-        self.range_px = (0.0, 0.0)
+        self._range_px = (0.0, 0.0)
 
     def fill(self, views: Iterable[ViewUpdate]) -> None:
         """Keep what is needed; the first one, the middle, says what range of disparities there is."""
@@ -112,49 +175,74 @@ class ViewStore:
             offset = self._grid.offset(view.row, view.column)
             if not self._form.takes(offset):
                 continue
-            self._colors[offset] = self._resized(self._converted(view))
+            self._colors[offset] = self._converted(view)
             if view.disparity is not None:
-                self._keep_disparity(offset, view.disparity)
+                self._disparities[offset] = self._levels(view.disparity)
 
     def _converted(self, view: ViewUpdate) -> Bytes:
         if view.colors.dtype == np.uint8 and self._source == self._space:
-            return view.colors.view(np.uint8)
+            return view.colors.view(np.uint8).copy()
         return bytes_from_encoded(convert(encoded_from_stored(view.colors), self._space, self._source))
 
-    def _resized(self, colors: Bytes) -> Bytes:
-        size = self._form.size_of(image_size(colors))
-        if size == image_size(colors):
-            return colors
-        return bytes_from_encoded(srgb_from_linear(mean_of_areas(linear_from_srgb(colors / np.float32(255)), size)))
-
-    def _keep_disparity(self, offset: ViewOffset, disparity: FloatImage) -> None:
-        size = self._form.size_of(image_size(disparity))
-        rows, columns = (((np.arange(n) + 0.5) * (m / n)).astype(int) for n, m in zip(size, disparity.shape))
-        values = disparity[np.ix_(rows, columns)] * np.float32(size.width / disparity.shape[1])
-        if self.range_px == (0.0, 0.0):
-            far, near = np.quantile(values, [OUTLIERS, 1 - OUTLIERS])
+    def _levels(self, disparity: FloatImage) -> Bytes:
+        if self._range_px == (0.0, 0.0):
+            far, near = np.quantile(disparity, [OUTLIERS, 1 - OUTLIERS])
             margin = RANGE_MARGIN * (near - far) + 1e-3
-            self.range_px = float(far - margin), float(near + margin)
-        far, near = self.range_px
-        levels = np.clip((values - far) * np.float32(255 / (near - far)), 0, 255)
-        self._disparities[offset] = np.rint(levels).astype(np.uint8)
+            self._range_px = float(far - margin), float(near + margin)
+        far, near = self._range_px
+        return np.rint(np.clip((disparity - far) * np.float32(255 / (near - far)), 0, 255)).astype(np.uint8)
 
     def encode(self, form: WebForm) -> WebViews:
-        """form: the store's, with any quality, or fewer of its views."""
+        """form: the store's, or less of it."""
         places = [place for place in _places(self._grid, form) if place in self._colors]
-        colors = [self._colors[place] for place in places]
-        depths = [self._disparities[place] for place in places if place in self._disparities]
+        height, width = size = form.size_of(image_size(self._colors[places[0]]))
+        colors = [_smaller_colors(self._colors[place], size) for place in places]
+        depths = [_smaller_depth(self._disparities[place], size) for place in places if place in self._disparities]
         depths = depths if len(depths) == len(colors) else []
+        scale = width / self._colors[places[0]].shape[1]
         return WebViews(
             form,
-            image_size(colors[0]),
+            ImageSize(height, width),
             tuple(places),
-            self.range_px,
+            (scale * self._range_px[0], scale * self._range_px[1]),
             "image/avif",
             encode_first(colors[0], self._space),
             tuple(_files(colors, form, form.quality, self._space)),
             tuple(_files(depths, form, DEPTH_QUALITY, SRGB)),
         )
+
+    def fine_form(self) -> WebForm:
+        """The store's, of finer colours where the first views say that they cost little."""
+        first = [self._colors[place] for place in _places(self._grid, self._form)[:2]]
+        letters = sum(map(len, _files(first, self._form, FINE_QUALITY, self._space)))
+        is_cheap = 8 * letters <= CHEAP_BITS * sum(colors[..., 0].size for colors in first)
+        return replace(self._form, quality=FINE_QUALITY) if is_cheap else self._form
+
+    def encode_within(self, letters: int) -> WebViews:
+        """The best form of which so many letters are enough. Raises InputError where none is."""
+        encoded, factor = None, 0.0
+        for rung in LADDER:
+            if encoded is not None and rung.share * factor > letters:
+                continue
+            encoded = self.encode(self._form.smaller(rung))
+            if encoded.byte_count <= letters:
+                return encoded
+            factor = encoded.byte_count / rung.share
+        least = 0 if encoded is None else encoded.byte_count
+        raise InputError(f"--budget: the least page takes {(least - letters) / 1e6:.2f} MB more; give so much")
+
+
+def _smaller_colors(colors: Bytes, size: ImageSize) -> Bytes:
+    if size == image_size(colors):
+        return colors
+    return bytes_from_encoded(srgb_from_linear(mean_of_areas(linear_from_srgb(colors / np.float32(255)), size)))
+
+
+def _smaller_depth(levels: Bytes, size: ImageSize) -> Bytes:
+    """By nearest pixels: what lies between two surfaces is nowhere."""
+    rows, columns = (((np.arange(n) + 0.5) * (m / n)).astype(int) for n, m in zip(size, levels.shape))
+    smaller: Bytes = levels[np.ix_(rows, columns)]
+    return smaller
 
 
 def encode_first(colors: Bytes, space: ColorSpace) -> bytes:

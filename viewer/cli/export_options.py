@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Annotated
@@ -59,6 +60,16 @@ def rate_from_text(text: str) -> float:
     return rate
 
 
+def budget_from_text(text: str) -> int:
+    """Bytes of a file from "3MB", "500kB" or "1000000"; K and M are powers of ten. Raises BadParameter."""
+    match = re.fullmatch(r"(\d+(?:\.\d+)?) ?([kM]?)B?", text.strip(), re.IGNORECASE)
+    budget = float(match[1]) * {"": 1, "K": 1e3, "M": 1e6}[match[2].upper()] if match else 0.0
+    if not 1 <= budget <= MOST_BUDGET:
+        raise typer.BadParameter(f"{text!r} is no size of a file: give bytes, or as 500kB or 3MB")
+    return int(budget)
+
+
+MOST_BUDGET = 10**9
 To = Annotated[
     ExportKind, typer.Option("--to", parser=kind_from_text, metavar="KIND", help=f"One of {', '.join(EXPORTS)}.")
 ]
@@ -112,9 +123,23 @@ class KindOptions:
         typer.Option(parser=rate_from_text, metavar="X", help="Frames a second.", show_default=usual_of("rate")),
     ] = None
 
+    budget: Annotated[
+        int | None,
+        typer.Option(
+            parser=budget_from_text, metavar="SIZE", help="Of a page at most, as 3MB.", show_default="what looks alike"
+        ),
+    ] = None
+    credit: Annotated[bool, typer.Option("--credit", help="Name the photo's title, author and rights in a page.")] = (
+        False
+    )
+    stills: Annotated[
+        bool, typer.Option("--stills", help="A page for Safari too: views a file each, thrice as large.")
+    ] = False
+
     def options(self, keys: Path | None = None, row: int | None = None, show: bool = False) -> ExportOptions:
         """With what is said of a single photo."""
-        return ExportOptions(self.size, self.device, self.eyes, self.motion, keys, self.frames, self.rate, row, show)
+        told = {field.name: getattr(self, field.name) for field in fields(self)}
+        return ExportOptions(**told, keys=keys, row=row, show=show)
 
 
 HEEDED_BY_SOME = {"keys", "row", "show", *(field.name for field in (*fields(LensOptions), *fields(KindOptions)))}

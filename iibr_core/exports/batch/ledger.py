@@ -111,6 +111,11 @@ class Ledger:
         known = self._entries.get(name)
         return known is not None and known.key == key and os.path.lexists(self.folder / known.output)
 
+    def outputs(self, kind: str) -> list[str]:
+        """What is there of a kind, by its name in the folder."""
+        entries = (entry for entry in self._entries.values() if entry.kind == kind and entry.key)
+        return [entry.output for entry in entries if os.path.lexists(self.folder / entry.output)]
+
     def add_finished(self, task: PhotoTask, outcome: Outcome) -> None:
         """One more export is there, on disk to stay: so is this line."""
         self._add(task.line(outcome.output, photo=task.photo, key=task.key, seconds=round(outcome.seconds, 3)))

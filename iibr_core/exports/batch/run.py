@@ -16,6 +16,7 @@ from iibr_core.exports.batch.task import BatchSettings, Outcome, PhotoTask, key_
 from iibr_core.exports.batch.work import export_photo
 from iibr_core.exports.batch.workers import WorkerSource, outcomes_of
 from iibr_core.exports.opening import OpenDrawn
+from iibr_core.exports.registry import gallery_of
 from iibr_core.formats.unfinished import remove_leftovers
 from iibr_core.runtime.machine import LEAST_USUAL_BYTES, MOST_USUAL_SHARE, core_count, memory_bytes, usual_budget_bytes
 from iibr_core.types import InputError, ReportProgress
@@ -97,6 +98,7 @@ def run_batch(
     tasks = batch.tasks(source.memory_bytes)
     first = next(tasks, None)
     if first is None:
+        _list_exports(ledger, settings)
         return batch.count
     report_progress(0, 0, "starting workers")
     try:
@@ -108,7 +110,15 @@ def run_batch(
     finally:
         for folder in batch.folders:
             remove_leftovers(folder)
+    _list_exports(ledger, settings)
     return batch.count
+
+
+def _list_exports(ledger: Ledger, settings: BatchSettings) -> None:
+    """Where the kind has such a list. Raises InputError where it cannot be written."""
+    write_gallery = gallery_of(settings.export_kind)
+    if write_gallery is not None:
+        write_gallery(ledger.folder, ledger.outputs(settings.kind))
 
 
 def workers_here(count: int | None = None) -> WorkerSource:

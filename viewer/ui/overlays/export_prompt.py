@@ -231,6 +231,26 @@ def _show(options: ExportOptions, asked: _Asked) -> ExportOptions:
     return options if show is None else replace(options, show=show)
 
 
+def _budget(options: ExportOptions, asked: _Asked) -> ExportOptions:
+    label("At most", asked.layout, "Size of the file; 0: as large as it takes to look alike.")
+    changed, megabytes = imgui.input_float("##budget", (options.budget or 0) / 1e6, 0, 0, "%.4g MB")
+    return replace(options, budget=int(clamp(megabytes, 0, 1000) * 1e6) or None) if changed else options
+
+
+def _credit(options: ExportOptions, asked: _Asked) -> ExportOptions:
+    label("Names", asked.layout)
+    tip = "As the photo's file has them; never where it was taken."
+    credit = checkbox("Title, author and rights", options.credit, asked.layout, tip)
+    return options if credit is None else replace(options, credit=credit)
+
+
+def _stills(options: ExportOptions, asked: _Asked) -> ExportOptions:
+    label("Views", asked.layout)
+    tip = "For Safari, which reads no frames of moving pictures: three times as large."
+    stills = checkbox("A file each", options.stills, asked.layout, tip)
+    return options if stills is None else replace(options, stills=stills)
+
+
 ROWS: dict[str, Callable[[ExportOptions, _Asked], ExportOptions]] = {
     "device": _device,
     "motion": _motion,
@@ -241,5 +261,8 @@ ROWS: dict[str, Callable[[ExportOptions, _Asked], ExportOptions]] = {
     "frames": _frames,
     "rate": _rate,
     "show": _show,
+    "budget": _budget,
+    "credit": _credit,
+    "stills": _stills,
 }
 """In their order from above, by the names that `ExportKind.heeds` has."""
