@@ -10,6 +10,7 @@ import json
 import os
 import shutil
 import subprocess
+import sys
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -32,6 +33,15 @@ USUAL_FLAGS = (
 )
 SOFTWARE = ("--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
 """WebGL on the processor."""
+
+AS_3_AND_4 = """
+import fcntl, os, sys
+ends = [fcntl.fcntl(int(end), fcntl.F_DUPFD, 10) for end in sys.argv[1:3]]
+for number, end in enumerate(ends, start=3):
+    os.dup2(end, number)
+os.execvp(sys.argv[3], sys.argv[3:])
+"""
+"""A program that becomes another, which finds the two descriptors named where the protocol wants them."""
 
 
 class PageError(RuntimeError):
@@ -171,8 +181,7 @@ def open_browser(*flags: str) -> Iterator[Pipe]:
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
         (read, their_write), (their_read, write) = os.pipe(), os.pipe()
         command = [program, *USUAL_FLAGS, *(flags or SOFTWARE), f"--user-data-dir={folder}", "--remote-debugging-pipe"]
-        # The protocol wants exactly these descriptors.
-        shell = ["sh", "-c", f'exec "$@" 3<&{their_read} 4>&{their_write}', "sh", *command, "about:blank"]
+        shell = [sys.executable, "-c", AS_3_AND_4, str(their_read), str(their_write), *command, "about:blank"]
         with (Path(folder) / "log").open("wb") as log:
             process = subprocess.Popen(shell, pass_fds=(their_read, their_write), stdout=log, stderr=log)
         os.close(their_read)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import hashlib
 import json
+import re
 from html import escape
 from pathlib import Path
 from string import Template
@@ -38,7 +39,9 @@ POLICY = (
 )
 ROOM_FOR_PLACES = 12_000
 """Of a page: the list of where its views lie takes no more."""
-PARTS = "viewer.js", "page.css"
+SCRIPTS = "renderer.js", "viewer.js"
+LINK = re.compile(r"^import [^;]*;\n|^export (?=const|class|function)", re.MULTILINE)
+"""Between scripts: in a page they are one module."""
 
 
 def write_page(path: Path, source: ExportSource, settings: ExportSettings) -> str:
@@ -89,7 +92,7 @@ def _words(scene: Scene, caption: Caption, is_credited: bool) -> dict[str, str]:
 
 def _page(source: ExportSource, words: dict[str, str], views: WebViews) -> bytes:
     folder = resource_folder("web")
-    script, style = ((folder / name).read_text("utf-8") for name in PARTS)
+    script, style = page_script(), (folder / "page.css").read_text("utf-8")
     filled = {
         **words,
         "policy": POLICY.format(script=hash_of(script), style=hash_of(style)),
@@ -102,6 +105,11 @@ def _page(source: ExportSource, words: dict[str, str], views: WebViews) -> bytes
         "depths": "\n".join(map(_letters, views.depths)),
     }
     return Template((folder / "page.html").read_text("utf-8")).substitute(filled).encode("utf-8", "replace")
+
+
+def page_script() -> str:
+    """All of it, one module: there is nowhere to import from."""
+    return LINK.sub("", "\n".join((resource_folder("web") / name).read_text("utf-8") for name in SCRIPTS))
 
 
 def _shaders(folder: Path) -> dict[str, str]:

@@ -1,4 +1,4 @@
-"""Finds the shaders, assets and the page's parts that come with the program, in a checkout and in an installed copy alike."""
+"""Finds the shaders, assets and pages that come with the program, in a checkout and in an installed copy alike."""
 
 from __future__ import annotations
 

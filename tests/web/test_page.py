@@ -1,0 +1,190 @@
+"""Web pages in a real browser: the same picture as the desktop's, by hand, cut off, without WebGL, of hostile names."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from iibr_core.scenes import Source
+from iibr_core.types import GridShape, ViewOffset
+from tests.browser import Pipe, Tab, open_browser
+from tests.viewer.conftest import HEIGHT, WIDTH, write_scene
+from tests.web.conftest import canvas, export, press, set_lens, slide, wait_until_still
+from viewer.app.headless import HeadlessViewer
+from viewer.model.state.optics import MoveEye, SetAperture, SetFocus
+
+SETTINGS = (
+    (0.0, 0.0, 0.0, 0.0),
+    (0.5, -0.25, 0.0, 0.0),
+    (-1.0, 0.75, 0.0, 0.0),
+    (0.0, 0.0, 0.4, 2.5),
+    (0.5, 0.5, -0.2, 3.0),
+)
+"""s, t, focus, aperture."""
+
+
+@pytest.fixture(scope="module")
+def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_scene(tmp_path_factory.mktemp("scene"))
+
+
+@pytest.fixture(scope="module")
+def page(scene: Path) -> Path:
+    return export(scene)
+
+
+@pytest.fixture
+def shown(tab: Tab, page: Path) -> Tab:
+    tab.resize(WIDTH, HEIGHT)
+    tab.open(page.as_uri())
+    wait_until_still(tab)
+    return tab
+
+
+def psnr(one: np.ndarray, other: np.ndarray) -> float:
+    return float(10 * np.log10(255**2 / max(np.mean((one.astype(float) - other) ** 2), 1e-9)))
+
+
+def test_the_canvas_is_the_desktops_picture(shown: Tab, scene: Path) -> None:
+    with HeadlessViewer("egl") as viewer:
+        viewer.open(Source(str(scene), grid=GridShape(3, 3)), 1.0, lambda made: None)
+        for s, t, focus, aperture in SETTINGS:
+            viewer.do(MoveEye(ViewOffset(t, s)), SetFocus(focus), SetAperture(aperture))
+            set_lens(shown, s, t, focus, aperture)
+            wait_until_still(shown)
+            drawn = canvas(shown)
+            assert drawn.shape == (HEIGHT, WIDTH, 3)
+            assert psnr(drawn, viewer.picture()) >= (36 if aperture else 38), (s, t, focus, aperture)
+
+
+def test_nothing_is_asked_of_any_network(shown: Tab) -> None:
+    assert shown.requests == []
+
+
+def test_it_shows_in_a_frame_that_may_do_next_to_nothing(tab: Tab, page: Path, tmp_path: Path) -> None:
+    (tmp_path / "frame.html").write_text(f'<iframe sandbox="allow-scripts" src="{page.as_uri()}"></iframe>', "utf-8")
+    tab.open((tmp_path / "frame.html").as_uri())
+    assert tab.complaints == []
+    assert len(tab.requests) <= 1, "the frame's page"
+
+
+def test_a_tap_focuses_where_it_lands_and_a_second_one_resets(shown: Tab) -> None:
+    before = shown.evaluate("document.getElementById('focus').valueAsNumber")
+    for place, is_near in (((WIDTH / 2, HEIGHT / 2), True), ((4, 4), False)):
+        for kind in ("mousePressed", "mouseReleased"):
+            x, y = place
+            shown.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", clickCount=1)
+        focus, aperture = shown.evaluate(
+            "['focus', 'aperture'].map(name => document.getElementById(name).valueAsNumber)"
+        )
+        assert (focus > before) == is_near
+        assert aperture > 0
+        press(shown, "r")
+    assert shown.evaluate("document.getElementById('aperture').valueAsNumber") == 0
+
+
+def test_fingers_on_a_phone_move_the_viewpoint_and_zoom(tab: Tab, page: Path) -> None:
+    tab.resize(390, 844, ratio=2, is_phone=True)
+    tab.open(page.as_uri())
+    wait_until_still(tab)
+    first = canvas(tab)
+    assert first.shape == (round(390 * HEIGHT / WIDTH) * 2, 780, 3)
+
+    def touch(kind: str, *places: tuple[int, int]) -> None:
+        points = [{"x": x, "y": y, "id": i} for i, (x, y) in enumerate(places)]
+        tab.call("Input.dispatchTouchEvent", type=kind, touchPoints=points)
+
+    touch("touchStart", (200, 420))
+    for x in (190, 170, 120):
+        touch("touchMove", (x, 420))
+    touch("touchEnd")
+    wait_until_still(tab)
+    moved = canvas(tab)
+    assert psnr(first, moved) < 40
+    touch("touchStart", (180, 420), (200, 420))
+    for apart in (20, 60, 100):
+        touch("touchMove", (180 - apart, 420), (200 + apart, 420))
+    touch("touchEnd")
+    wait_until_still(tab)
+    assert psnr(canvas(tab), moved) < 25
+
+
+def test_a_page_cut_off_in_its_data_says_so(tab: Tab, page: Path, tmp_path: Path) -> None:
+    whole = page.read_bytes()
+    for share in (0.97, 0.9):
+        (tmp_path / "cut.html").write_bytes(whole[: int(share * len(whole))])
+        tab.open((tmp_path / "cut.html").as_uri())
+        assert "cut off" in tab.evaluate("document.getElementById('said').textContent")
+
+
+def test_without_webgl_the_middle_picture_shows(page: Path) -> None:
+    with open_browser("--disable-gpu", "--disable-3d-apis", "--disable-software-rasterizer") as plain:
+        tab = plain.new_tab()
+        tab.open(page.as_uri())
+        tab.wait_until("document.getElementById('said').textContent.includes('WebGL')")
+        assert tab.evaluate("document.getElementById('first').naturalWidth") == WIDTH
+        assert tab.evaluate("document.getElementById('view').hidden")
+
+
+def test_it_swings_until_touched_unless_that_is_unwanted(tab: Tab, page: Path) -> None:
+    tab.prefer(prefers_reduced_motion="no-preference")
+    tab.resize(WIDTH, HEIGHT)
+    tab.open(page.as_uri())
+    tab.wait_until("+document.documentElement.dataset.views === 9")
+    before = canvas(tab)
+    tab.evaluate("new Promise(done => setTimeout(done, 700))")  # it is time that moves it
+    assert (canvas(tab) != before).any()
+    slide(tab, "focus", 0.2)
+    wait_until_still(tab)
+
+
+@pytest.mark.parametrize(
+    "name", ["<script>document.title='ran'</script>", '" onerror="document.title=1', "a&amp;b ünï 光"]
+)
+def test_names_are_words(tab: Tab, tmp_path: Path, name: str) -> None:
+    photo = write_scene(tmp_path, name.replace("/", "∕"))
+    tab.open(export(photo).as_uri())
+    wait_until_still(tab)
+    assert tab.evaluate("document.title") == photo.stem
+    assert photo.stem in tab.evaluate("document.getElementById('view').getAttribute('aria-label')")
+
+
+def test_the_policy_lets_nothing_else_run(shown: Tab) -> None:
+    shown.evaluate("document.body.insertAdjacentHTML('beforeend', '<img src=x onerror=\"document.title=1\">')")
+    shown.evaluate("fetch('https://example.org').catch(() => 0)")
+    assert shown.evaluate("document.title") == "scene"
+    assert shown.requests == []
+
+
+def test_readers_of_screens_find_words(shown: Tab) -> None:
+    tree = shown.call("Accessibility.getFullAXTree")["nodes"]
+    named = {(node["role"]["value"], node["name"]["value"]) for node in tree if node.get("name", {}).get("value")}
+    assert ("image", "Light field: scene") in named
+    assert {("slider", "Focus"), ("slider", "Aperture"), ("button", "Reset")} <= named
+
+
+def test_stills_show_the_same(tab: Tab, tmp_path: Path) -> None:
+    tab.resize(WIDTH, HEIGHT)
+    tab.open(export(write_scene(tmp_path), "--stills").as_uri())
+    wait_until_still(tab)
+    assert tab.evaluate("+document.documentElement.dataset.views") == 9
+
+
+@pytest.mark.parametrize("size", [(1, 1), (1, 7), (211, 97)])
+def test_odd_sizes_open(browser: Pipe, tab: Tab, tmp_path: Path, size: tuple[int, int]) -> None:
+    from iibr_core.formats.images.photo import write_image
+
+    height, width = size
+    write_image(tmp_path / "photo.png", np.random.default_rng(1).integers(0, 256, (height, width, 3), np.uint8))
+    np.save(tmp_path / "photo_disparity.npy", np.linspace(-1, 1, height * width, dtype=np.float32).reshape(size))
+    tab.open(export(tmp_path / "photo.png").as_uri())
+    wait_until_still(tab)
+
+
+def test_the_page_tells_json_and_no_tags(page: Path) -> None:
+    field = page.read_text("utf-8").partition('id="field">')[2].partition("</script>")[0]
+    assert json.loads(field)["order"][0] == {"t": 0, "s": 0}
+    assert "<" not in field
