@@ -31,6 +31,8 @@ USUAL_FLAGS = (
     "--mute-audio",
     "--force-color-profile=srgb",
 )
+DEADLINE_S = 100.0
+"""For a condition that always comes true."""
 SOFTWARE = ("--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
 """WebGL on the processor."""
 
@@ -85,9 +87,13 @@ class Tab:
         return answer["result"].get("value")
 
     def wait_until(self, condition: str) -> None:
-        """Until a JavaScript condition holds, asked once a frame."""
+        """Until a JavaScript condition holds, asked once a frame. Raises PageError, with what the page says, where that
+        takes longer than DEADLINE_S.
+        """
         self.evaluate(
-            f"new Promise(done => {{ const ask = () => {condition} ? done() : requestAnimationFrame(ask); ask() }})"
+            "new Promise((done, fail) => { const end = performance.now() + "
+            f"{1000 * DEADLINE_S}, ask = () => {condition} ? done() : performance.now() > end"
+            " ? fail(new Error(document.body.innerText)) : requestAnimationFrame(ask); ask() })"
         )
 
     def resize(self, width: int, height: int, ratio: float = 1.0, is_phone: bool = False) -> None:
@@ -108,9 +114,13 @@ class Tab:
 
     @property
     def requests(self) -> list[str]:
-        """The addresses of all that was asked for since the page was opened, but for the page and what it holds."""
-        asked = [told["request"]["url"] for name, told in self.events if name == "Network.requestWillBeSent"]
-        return [url for url in asked[1:] if not url.startswith(("data:", "blob:"))]
+        """The addresses of all that was asked for since the page was opened, but for the page, what it holds, and what
+        its policy stopped before it left.
+        """
+        stopped = {told["requestId"] for name, told in self.events if told.get("blockedReason") == "csp"}
+        asked = [told for name, told in self.events if name == "Network.requestWillBeSent"]
+        urls = [told["request"]["url"] for told in asked[1:] if told["requestId"] not in stopped]
+        return [url for url in urls if not url.startswith(("data:", "blob:"))]
 
     @property
     def complaints(self) -> list[str]:

@@ -9,10 +9,10 @@ const $ = (id) => document.getElementById(id);
 const say = (text) => ($("said").textContent = text);
 
 // The pictures of a data element in their order: a line is a file, which may hold many frames.
-async function* pictures(element, type) {
+async function* pictures(element, type, isMoving) {
     for (const line of element.textContent.trim().split("\n")) {
         const data = Uint8Array.from(atob(line), (letter) => letter.charCodeAt(0));
-        if (!globalThis.ImageDecoder || !await ImageDecoder.isTypeSupported(type)) {
+        if (!isMoving || !await globalThis.ImageDecoder?.isTypeSupported(type)) {
             yield await createImageBitmap(new Blob([data], { type }));  // of a moving picture the first frame
             continue;
         }
@@ -35,9 +35,9 @@ async function load(field, renderer, onView) {
         image.close();
         return context.getImageData(0, 0, width, height).data;
     };
-    const depths = field.hasDisparity && pictures($("depths"), field.type);
+    const depths = field.hasDisparity && pictures($("depths"), field.type, field.isMoving);
     let layer = 0;
-    for await (const image of pictures($("colors"), field.type)) {
+    for await (const image of pictures($("colors"), field.type, field.isMoving)) {
         const colors = pixels(image), depth = depths ? pixels((await depths.next()).value) : null;
         renderer.upload(layer, colors, depth);
         if (layer === 0 && depth) field.middle = Uint8Array.from({ length: width * height }, (_, i) => depth[4 * i]);

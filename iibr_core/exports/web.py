@@ -131,6 +131,7 @@ def _field(source: ExportSource, views: WebViews) -> dict[str, Any]:
         "step": views.form.every,
         "order": [{"t": place.t, "s": place.s} for place in views.places],
         "type": views.kind,
+        "isMoving": len(views.colors) < len(views.places),
         "hasDisparity": bool(views.depths),
         "range": views.range_px,
         "colorSpace": "srgb" if scene.color_space == SRGB else "display-p3",

@@ -56,7 +56,7 @@ class Rung(NamedTuple):
 
     @property
     def share(self) -> float:
-        """What it takes of the best, about. Fewer views differ more, each from the next."""
+        """What it takes of a page of all views at QUALITY, about. Fewer views differ more, each from the next."""
         return float(QUALITIES[self.quality] * self.scale**1.7 * self.every**-1.4)
 
 
