@@ -28,7 +28,7 @@ from benchmarks.harness.report import DOCS, git, is_wanted, made_by, markdown, p
 from iibr_core.formats.outputs import atomic_write
 
 ROOT = DOCS.parent
-SHAPING = ("iibr_core", "viewer", "shaders", "assets", "benchmarks")
+SHAPING = ("iibr_core", "viewer", "shaders", "web", "assets", "benchmarks")
 """Folders that decide figures."""
 COMMIT = re.compile(r"\bat commit ([0-9a-f]{7,40})\b")
 STAMP = re.compile(r"Made by `[^`]+`(?: at commit \w+(?: \(with changes\))?)?(?:, on \d+ cores)?")
@@ -58,6 +58,7 @@ NEEDS = {
     "DATA": "scenes as `iibr evaluate` takes them: DATA=DIR",
     "Linux": "Linux, which tells the most memory that a process filled",
     "X": "Linux with Xvfb and xdotool",
+    "chromium": "Linux with Chromium",
     "torch": "torch: pip install '.[train]'",
 }
 FIGURES = (
@@ -81,6 +82,7 @@ FIGURES = (
     Figure(("memory.md#bounds",), "benchmarks.memory bounds 12", 5, ("Linux",)),
     Figure(("memory.md#use",), "benchmarks.use --steps 150", 4, ("X",)),
     Figure(("memory.md#day",), "benchmarks.memory day", 2, ("Linux",)),
+    Figure(("web.md#pages",), "benchmarks.web --data DATA", 15, ("DATA", "chromium")),
     Figure(("edges_fork.png", "edges_handlebar.png"), "docs/make_edges.py OUT", 0.5),
     Figure(("screenshot.png", "inspection.png"), "docs/make_screenshots.py OUT", 0.5),
 )
@@ -128,6 +130,7 @@ def has(need: str, data: Path | None) -> bool:
         "DATA": data is not None,
         "Linux": sys.platform == "linux",
         "X": shutil.which("Xvfb") is not None and shutil.which("xdotool") is not None,
+        "chromium": sys.platform == "linux" and shutil.which("chromium") is not None,
         "torch": find_spec("torch") is not None,
     }[need]
 

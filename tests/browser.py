@@ -139,7 +139,8 @@ class Tab:
 class Pipe:
     """The browser's end of the protocol."""
 
-    def __init__(self, to: IO[bytes], answers: IO[bytes]) -> None:
+    def __init__(self, to: IO[bytes], answers: IO[bytes], process_id: int) -> None:
+        self.process_id = process_id
         self._to, self._answers, self._count, self._rest = to, answers, 0, b""
         self._done: dict[int, dict[str, Any]] = {}
         self.tabs: dict[str, Tab] = {}
@@ -197,7 +198,7 @@ def open_browser(*flags: str) -> Iterator[Pipe]:
         os.close(their_read)
         os.close(their_write)
         with os.fdopen(write, "wb") as to, os.fdopen(read, "rb", buffering=0) as answers:
-            pipe = Pipe(to, answers)
+            pipe = Pipe(to, answers, process.pid)
             try:
                 yield pipe
             finally:

@@ -42,6 +42,8 @@ ROOM_FOR_PLACES = 12_000
 SCRIPTS = "renderer.js", "viewer.js"
 LINK = re.compile(r"^import [^;]*;\n|^export (?=const|class|function)", re.MULTILINE)
 """Between scripts: in a page they are one module."""
+COMMENT = re.compile(r"[ \t]*//[^\n]*|\n(?=[ \t]*(?://[^\n]*)?\n)")
+"""Of a shader, and empty lines."""
 
 
 def write_page(path: Path, source: ExportSource, settings: ExportSettings) -> str:
@@ -113,9 +115,9 @@ def page_script() -> str:
 
 
 def _shaders(folder: Path) -> dict[str, str]:
-    """By name, their first lines, the version, left out: the preamble comes in its place."""
+    """By name, without comments; their first lines, the version, left out: the preamble comes in its place."""
     sources = {name: flatten(resource_folder("shaders") / name).text for name in SHADERS}
-    without = {name: text.partition("\n")[2] for name, text in sources.items()}
+    without = {name: COMMENT.sub("", text.partition("\n")[2]) for name, text in sources.items()}
     return {"preamble": (folder / "preamble.glsl").read_text("utf-8"), **without}
 
 
