@@ -34,6 +34,7 @@ class ExportKind:
     expect. layout: of a light field, among `WRITERS`. own_files: what a folder may hold that is replaced, as a regular
     expression. needs: packages, of the extra `export`. frames: pictures of a stack. rate: frames a second.
     most_width_px: of pictures whose size nobody chose, 0: any. has_colors: else it is a map, and no gloss shows in it.
+    gallery: writes what lists the exports of a batch, "" without.
     purpose: what people export it for; "share": everybody can look at it.
     """
 
@@ -49,6 +50,7 @@ class ExportKind:
     rate: float = 0.0
     most_width_px: int = 0
     has_colors: bool = True
+    gallery: str = ""
     purpose: Purpose = "share"
 
     @property

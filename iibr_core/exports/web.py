@@ -6,6 +6,7 @@ import base64
 import hashlib
 import json
 import re
+from dataclasses import replace
 from html import escape
 from pathlib import Path
 from string import Template
@@ -13,7 +14,7 @@ from typing import Any
 
 from iibr_core.exports.settings import ExportSettings
 from iibr_core.exports.source import ExportSource
-from iibr_core.exports.web_views import NO_VIEWS, ViewStore, WebViews, form_that_fits, require_avif
+from iibr_core.exports.web_views import NO_VIEWS, ViewStore, WebViews, form_that_fits, places_of, require_avif
 from iibr_core.formats.images.caption import Caption, read_caption
 from iibr_core.formats.outputs import atomic_write
 from iibr_core.runtime.resources import resource_folder
@@ -37,8 +38,6 @@ POLICY = (
     "default-src 'none'; script-src {script}; style-src {style}; img-src data: blob:; base-uri 'none';"
     " form-action 'none'"
 )
-ROOM_FOR_PLACES = 12_000
-"""Of a page: the list of where its views lie takes no more."""
 SCRIPTS = "renderer.js", "viewer.js"
 LINK = re.compile(r"^import [^;]*;\n|^export (?=const|class|function)", re.MULTILINE)
 """Between scripts: in a page they are one module."""
@@ -73,7 +72,7 @@ def make_page(source: ExportSource, settings: ExportSettings) -> tuple[bytes, We
     if settings.budget is None:
         views = store.encode(store.fine_form())
     else:
-        beside = len(_page(source, words, NO_VIEWS)) + ROOM_FOR_PLACES
+        beside = len(_page(source, words, replace(NO_VIEWS, places=places_of(scene.grid, form))))
         views = store.encode_within(settings.budget - beside)
     return _page(source, words, views), views
 

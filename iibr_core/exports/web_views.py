@@ -143,20 +143,20 @@ def form_that_fits(grid: GridShape, size: ImageSize, is_single: bool) -> WebForm
     """All views at their size, as far as browsers can hold that: else every second one, and smaller ones."""
     for every in range(1, max(grid) + 1):
         form = WebForm(every, min(1.0, MOST_SIDE_PX / max(size)), is_single=is_single)
-        count, (height, width) = len(_places(grid, form)), form.size_of(size)
+        count, (height, width) = len(places_of(grid, form)), form.size_of(size)
         if count <= MOST_VIEWS and count * height * width <= MOST_TEXELS:
             break
     return form
 
 
-def _places(grid: GridShape, form: WebForm) -> list[ViewOffset]:
+def places_of(grid: GridShape, form: WebForm) -> tuple[ViewOffset, ...]:
     """From the middle outwards, ring by ring, round each: neighbours in time are so in space."""
     every = (grid.offset(row, column) for row in range(grid.rows) for column in range(grid.columns))
 
     def key(place: ViewOffset) -> tuple[float, float]:
         return max(abs(place.t), abs(place.s)), float(np.arctan2(place.t, place.s))
 
-    return sorted(filter(form.takes, every), key=key)
+    return tuple(sorted(filter(form.takes, every), key=key))
 
 
 class ViewStore:
@@ -190,11 +190,12 @@ class ViewStore:
             margin = RANGE_MARGIN * (near - far) + 1e-3
             self._range_px = float(far - margin), float(near + margin)
         far, near = self._range_px
-        return np.rint(np.clip((disparity - far) * np.float32(255 / (near - far)), 0, 255)).astype(np.uint8)
+        levels: Bytes = np.rint(np.clip((disparity - far) * np.float32(255 / (near - far)), 0, 255)).astype(np.uint8)
+        return levels
 
     def encode(self, form: WebForm) -> WebViews:
         """form: the store's, or less of it."""
-        places = [place for place in _places(self._grid, form) if place in self._colors]
+        places = [place for place in places_of(self._grid, form) if place in self._colors]
         height, width = size = form.size_of(image_size(self._colors[places[0]]))
         colors = [_smaller_colors(self._colors[place], size) for place in places]
         depths = [_smaller_depth(self._disparities[place], size) for place in places if place in self._disparities]
@@ -213,7 +214,7 @@ class ViewStore:
 
     def fine_form(self) -> WebForm:
         """The store's, of finer colours where the first views say that they cost little."""
-        first = [self._colors[place] for place in _places(self._grid, self._form)[:2]]
+        first = [self._colors[place] for place in places_of(self._grid, self._form)[:2]]
         letters = sum(map(len, _files(first, self._form, FINE_QUALITY, self._space)))
         is_cheap = 8 * letters <= CHEAP_BITS * sum(colors[..., 0].size for colors in first)
         return replace(self._form, quality=FINE_QUALITY) if is_cheap else self._form

@@ -1,0 +1,122 @@
+"""Web pages as text: what they carry, within a budget, with the photo's words; and their index. Browsers: tests/web."""
+
+from __future__ import annotations
+
+import json
+import re
+from dataclasses import replace
+from io import BytesIO
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from iibr_core.exports import EXPORTS, ExportOptions, open_for_export, settle
+from iibr_core.exports.web import make_page
+from iibr_core.exports.web_gallery import write_gallery
+from iibr_core.exports.web_views import MOST_TEXELS, WebForm, form_that_fits
+from iibr_core.formats.images.caption import read_caption
+from iibr_core.scenes import LensChoice, Source
+from iibr_core.types import GridShape, ImageSize, InputError
+from tests.viewer.conftest import write_scene
+
+KIND = EXPORTS["web"]
+XMP = """<x:xmpmeta xmlns:x="adobe:ns:meta/"><rdf:RDF xmlns:rdf="http://www.w3.org/1999/02/22-rdf-syntax-ns#">
+<rdf:Description xmlns:dc="http://purl.org/dc/elements/1.1/">
+<dc:title><rdf:Alt><rdf:li>A &lt;b&gt;title&lt;/b&gt;</rdf:li>
+</rdf:Alt></dc:title></rdf:Description></rdf:RDF></x:xmpmeta>"""
+
+
+@pytest.fixture(scope="module")
+def opened(tmp_path_factory: pytest.TempPathFactory):
+    source = Source(str(write_scene(tmp_path_factory.mktemp("scene"))), grid=GridShape(5, 5))
+    return open_for_export(KIND, source, 1.0, LensChoice(), lambda scene: None, None)
+
+
+def page_of(opened, **options) -> tuple[str, dict]:
+    page, _ = make_page(opened, settle(KIND, ExportOptions(**options), opened.scene, opened.optics))
+    text = page.decode()
+    return text, json.loads(text.partition('id="field">')[2].partition("</script>")[0])
+
+
+def test_views_come_from_the_middle_outwards(opened) -> None:
+    text, field = page_of(opened)
+    rings = [max(abs(place["t"]), abs(place["s"])) for place in field["order"]]
+    assert rings == sorted(rings)
+    assert len(rings) == 25
+    assert text.index('id="first"') < text.index('type="module"') < text.index('id="colors"'), "shown before all runs"
+
+
+def test_a_budget_is_kept_and_the_most_is_made_of_it(opened) -> None:
+    whole = len(page_of(opened)[0].encode())
+    for share in (0.98, 0.9):
+        text, field = page_of(opened, budget=int(share * whole))
+        assert len(text.encode()) <= share * whole
+        assert len(field["order"]) in (1, 9, 25)
+
+
+def test_a_budget_that_holds_no_page_is_refused(opened) -> None:
+    with pytest.raises(InputError, match="--budget"):
+        page_of(opened, budget=10_000)
+
+
+def test_fields_that_browsers_cannot_hold_lose_views_then_size() -> None:
+    for grid, size in ((GridShape(9, 9), ImageSize(1224, 1632)), (GridShape(1, 1), ImageSize(8192, 8192)),
+                       (GridShape(33, 33), ImageSize(64, 64)), (GridShape(2, 1), ImageSize(1, 1))):  # fmt: skip
+        form = form_that_fits(grid, size, False)
+        height, width = form.size_of(size)
+        count = len(range(0, grid.rows, form.every)) * len(range(0, grid.columns, form.every))
+        assert count * height * width <= MOST_TEXELS
+        assert count <= 300
+    assert form == WebForm()
+
+
+def test_words_of_the_photo_come_only_if_asked(opened, tmp_path: Path) -> None:
+    photo = tmp_path / "photo.jpg"
+    exif = Image.Exif()
+    exif[0x010E], exif[0x013B], exif[0x8298] = "A <i>bridge</i>", 'Ann "A" O\'Neil', "(c) <Ann>"
+    exif.get_ifd(0x8825)[1] = "N"
+    Image.new("RGB", (8, 8)).save(photo, exif=exif, xmp=XMP.encode())
+    assert read_caption(photo).title == "A <b>title</b>"
+    source = replace(opened, scene=replace(opened.scene, source=replace(opened.scene.source, path=str(photo))))
+    plain, credited = page_of(source)[0], page_of(source, credit=True)[0]
+    assert "Ann" not in plain
+    assert 'alt="A &lt;i&gt;bridge&lt;/i&gt;"' in plain
+    assert "<title>A &lt;b&gt;title&lt;/b&gt;</title>" in credited
+    assert '<meta name="author" content="Ann &quot;A&quot; O&#x27;Neil">' in credited
+    assert "(c) &lt;Ann&gt;" in credited
+
+
+def test_files_without_words_have_no_caption(tmp_path: Path) -> None:
+    (tmp_path / "photo.jpg").write_bytes(b"\xff\xd8\xff\xe1 broken")
+    assert read_caption(tmp_path / "photo.jpg") == read_caption(tmp_path / "nowhere.jpg")
+
+
+def test_the_index_lists_pages_and_is_made_anew(opened, tmp_path: Path) -> None:
+    text, _ = page_of(opened)
+    for name in ("a#1.html", "<b>.html", "index.html"):
+        (tmp_path / name).write_text(text.replace("<title>scene", f"<title>{name.replace('<', '&lt;')}"), "utf-8")
+    first = write_gallery(tmp_path, ["a#1.html", "index.html", "gone.html"])
+    assert first.name == "index-of-pages.html"
+    (tmp_path / "index.html").unlink()
+    path = write_gallery(tmp_path, ["a#1.html", "<b>.html"])
+    assert path.name == "index.html"
+    listed = write_gallery(tmp_path, ["a#1.html", "<b>.html"]).read_text("utf-8")
+    assert re.findall(r'<a href="([^"]*)">', listed) == ["%3Cb%3E.html", "a%231.html"]
+    assert "<b>" not in listed
+    pictures = re.findall(r'src="(data:image/avif;base64,[^"]*)"', listed)
+    assert len(pictures) == 2
+    (tmp_path / "index.html").write_text("somebody's", "utf-8")
+    with pytest.raises(InputError, match="no gallery"):
+        write_gallery(tmp_path, ["a#1.html"])
+
+
+def test_the_first_picture_is_the_middle_view(opened) -> None:
+    import base64
+
+    letters = re.search(r'src="data:image/avif;base64,([^"]*)"', page_of(opened)[0])
+    with Image.open(BytesIO(base64.b64decode(letters[1]))) as image:
+        first = np.asarray(image.convert("RGB"))
+    middle = next(opened.views()).colors
+    assert np.abs(first.astype(int) - middle).mean() < 4
