@@ -59,6 +59,7 @@ def row_of(name: str, source: Source) -> tuple[Any, ...]:
         path.write_bytes(page)
         tab, before = browser.new_tab(), memory_of(browser)
         shown = show(tab, path, carried.size.width, carried.size.height)
+        tab.call("HeapProfiler.collectGarbage")
         memory = memory_of(browser) - before
         near = nearness(tab, source)
         requests = len(tab.requests)

@@ -297,7 +297,7 @@ export class Renderer {
         write(this.colors, gl.RGBA, gl.UNSIGNED_BYTE, colors, width, height);
         if (!depth) return;
         const across = Math.ceil(width / BLOCK_PX), down = Math.ceil(height / BLOCK_PX);
-        const values = new Float32Array(count), ranges = new Float32Array(2 * across * down);
+        const values = this.values ??= new Float32Array(count), ranges = new Float32Array(2 * across * down);
         for (let i = 0; i < ranges.length; i += 2) [ranges[i], ranges[i + 1]] = [Infinity, -Infinity];
         for (let y = 0, i = 0; y < height; y++) {
             for (let x = 0; x < width; x++, i++) {

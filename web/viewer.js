@@ -44,6 +44,7 @@ async function load(field, renderer, onView) {
         onView(++layer);
     }
     if (layer < order.length) return say("This browser shows one view and its depth: it lacks ImageDecoder.");
+    for (const name of ["colors", "depths"]) $(name).remove();  // they take memory
     order.forEach((place, i) => field.layers.set(hash(place), i));
     field.step = field.fullStep;
     return say("");

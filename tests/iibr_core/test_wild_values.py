@@ -633,6 +633,7 @@ READS_OR_TELLS = {
     "formats.maps.reader": "read_map read_map_header MapHeader",
     "formats.images.oiio_writer": "write_image_file encode_image_file",
     "formats.images.icc_profile": "icc_profile",
+    "formats.images.caption": "read_caption",
     "formats.images.metadata": "PictureMetadata read_metadata camera_facts exif_for xmp_for text_in_xmp unpack_text",
     "formats.images.picture_kinds": "PictureKind PictureFormat picture_kind require_picture_format is_float",
     "formats.images.picture_writers": "write_png write_exr write_jpeg write_webp write_avif write_tiff",
@@ -664,6 +665,7 @@ READS_OR_TELLS = {
     "runtime.kernel_cache": "KernelCache sources_hash fill",
     "runtime.offers": "offered_by",
     "runtime.resources": "resource_folder",
+    "runtime.shader_sources": "FlatSource ShaderError flatten",
     "runtime.extras": "is_installed require_extra said_by",
     "generation.memory_model": "Budget budget_of require_process process_bytes view_bytes whole_bytes pixels_within "
     "largest_side require_reading require_decoding require_map require_views require_field require_picture "
