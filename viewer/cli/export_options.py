@@ -133,7 +133,7 @@ class KindOptions:
         False
     )
     stills: Annotated[
-        bool, typer.Option("--stills", help="A page for Safari too: views a file each, thrice as large.")
+        bool, typer.Option("--stills", help="A page for Safari too: views a file each, several times as large.")
     ] = False
 
     def options(self, keys: Path | None = None, row: int | None = None, show: bool = False) -> ExportOptions:

@@ -246,7 +246,7 @@ def _credit(options: ExportOptions, asked: _Asked) -> ExportOptions:
 
 def _stills(options: ExportOptions, asked: _Asked) -> ExportOptions:
     label("Views", asked.layout)
-    tip = "For Safari, which reads no frames of moving pictures: three times as large."
+    tip = "For Safari, which reads no frames of moving pictures: several times as large."
     stills = checkbox("A file each", options.stills, asked.layout, tip)
     return options if stills is None else replace(options, stills=stills)
 
