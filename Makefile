@@ -10,7 +10,7 @@ COMPILE := $(BIN)/python -P -m viewer.precompile iibr_core/_kernels
 READY := $(VENV)/.ready
 READY_TESTS := $(VENV)/.ready-tests
 
-.PHONY: run test bench figures fuzz install wheel clean
+.PHONY: run test bench figures fuzz site install wheel clean
 
 # What is installed is compiled to bytecode where it is imported: not all of it ever is.
 run: $(READY)
@@ -32,7 +32,7 @@ bench: install
 	@mkdir -p "$(OUT)"
 	$(BIN)/python -m benchmarks.speed --out "$(OUT)" $(if $(DATA),--data "$(DATA)")
 
-# Every table and picture of README and docs/ anew. DATA: as above. ONLY: words of pages or programs, by commas.
+# Makes every table and picture of README and docs/ again. DATA: as above. ONLY: words of pages or programs, by commas.
 # ARGS: --list says what each needs, and how long it takes; --check which pages are older than what they are about.
 figures: install
 	@.ci/system-libraries test
@@ -42,6 +42,12 @@ fuzz: install
 	@.ci/system-libraries test
 	IIBR_TEST_ALL_VALUES=1 $(BIN)/pytest tests/iibr_core/test_wild_values.py
 	$(BIN)/python -m benchmarks.fuzz
+
+# The pages of docs/ as a web site; warnings, broken links among them, are errors.
+site: $(READY)
+	$(PIP) -e '.[docs]'
+	$(BIN)/python -P -m sphinx -q -W --keep-going -n -b html -d out/site-trees docs out/site
+	@echo "out/site/index.html"
 
 install: $(READY_TESTS)
 

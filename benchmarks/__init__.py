@@ -1,1 +1,1 @@
-"""Figures, not tests: `make bench` writes those that the README quotes; every module says how it is called."""
+"""Figures, not tests: `make bench` writes those in docs/speed.md; every module says how it is called."""

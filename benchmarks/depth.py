@@ -31,7 +31,7 @@ from iibr_core.training.degradation import blur
 from iibr_core.types import FloatImage, ImageSize, ViewOffset
 
 HELD_OUT = range(6, 14)
-"""Drawn scenes that no choice was made by."""
+"""Held-out drawn scenes: no parameter was chosen by them."""
 DRAWN_SIZE, JUDGED = ImageSize(240, 320), (ViewOffset(-4.0, -4.0), ViewOffset(0.0, 4.0))
 FAULTS: dict[str, Callable[[FloatImage], FloatImage]] = {
     "exact": lambda d: d,
@@ -70,7 +70,7 @@ def refinement(data: Path) -> Iterator[str]:
     for scene in data_scenes(data, with_soft=False):
         if scene.grid == FIELD:
             sets[scene.name] = [scene]
-    yield f"## Refinement\n\nPSNR of views, dB; drawn scenes of {DRAWN_SIZE} that no choice was made by.\n"
+    yield f"## Refinement\n\nPSNR of views, dB; drawn scenes of {DRAWN_SIZE} that were held out.\n"
     yield head("disparity", *(f"{name}: {way}" for name in sets for way in ("plain warp", "`--refine off`", "on")))
     for fault, spoil in FAULTS.items():
         means = (
@@ -104,7 +104,7 @@ def seconds() -> Iterator[str]:
     """CPU seconds of all threads tell the same on a busy machine; the clock does not."""
     scene = drawn_scene(4, ONE_MEGAPIXEL, 2.5)
     colors, disparity = scene.photo, scene.disparity
-    yield "Time of 1 MP, the least of several; CPU seconds are those of all threads together:\n"
+    yield "Time for 1 MP, minimum of several runs; CPU seconds are the sum over threads:\n"
     yield head("what", "s", "CPU s", "figure", "holds")
     for sigma in (0.0, 1.0, 2.0, 4.0, 8.0):
         soft = blur(disparity, sigma)
@@ -125,9 +125,9 @@ def guess_table(data: Path) -> Iterator[str]:
     """The guess beside a ramp and one plane, on scenes whose disparity is known."""
     yield f"""## The guess without a model
 
-Ordered: of pairs of points that differ by more than {LEAST_APART:.0%} of the range of disparities, those
-whose nearer point is guessed nearer; ramp: by their height in the picture alone. PSNR: of views made from
-the guess, and from one plane, both at the scale (not 0) and shift that suit them best.
+Ordered: share of the point pairs with the nearer point guessed nearer, among pairs whose disparities differ by more
+than {LEAST_APART:.0%} of the range. Ramp: the same for height in the picture alone. PSNR: of views made from the
+guess and from one plane, each at its best scale (not 0) and shift.
 """
     yield head("scene", "ordered: guess", "ramp", "PSNR dB: guess", "one plane", "holds")
     all_shares = []

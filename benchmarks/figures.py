@@ -1,11 +1,11 @@
-"""Writes every table and picture of README and docs/ anew, at one commit: `make figures [DATA=DIR] [ONLY=WORDS]`.
+"""Writes every table and picture of README and docs/ again, at one commit: `make figures [DATA=DIR] [ONLY=WORDS]`.
 
     python -m benchmarks.figures [--data DATA] [--only WORDS] [--list] [--check]
 
 FIGURES says which program makes what, what it needs and about how long it takes on two cores; what this machine lacks
 is said, and left as it is. A page is made whole, or between its marks, `<!-- NAME -->` and `<!-- /NAME -->`, and what
-people wrote around them stays. README's tables are copied from the pages. --list: says what there is. --check: says in
-a line each which pages are older than what shapes their figures; makes nothing.
+people wrote around them stays. The tables of README and docs/accuracy.md are copied from the other pages. --list: says
+what there is. --check: says in a line each which pages are older than what shapes their figures; makes nothing.
 """
 
 from __future__ import annotations
@@ -61,9 +61,18 @@ NEEDS = {
     "chromium": "Linux with Chromium",
     "torch": "torch: pip install '.[train]'",
 }
+EVALUATED = (
+    "blender_shop_9x9", "hci_antinous", "mb2003_teddy_quarter", "mb2005_moebius_third", "mb2014_motorcycle_quarter",
+    "fence", "shelf",
+)  # fmt: skip
+"""Of DATA and tests/data/thin_lens: each has a page of its own."""
+GALLERY = "moving.gif", "near.jpg", "far.jpg", "rgbd.jpg", "anaglyph.jpg", "crossed.jpg", "epi.png"
 FIGURES = (
     Figure(
-        ("evaluation/report.md",), "iibr evaluate DATA tests/data/thin_lens --views 24 --out OUT --force", 6, ("DATA",)
+        ("evaluation/report.md", *(f"evaluation/{scene}.md" for scene in EVALUATED)),
+        "benchmarks.scene_pages --data DATA --out OUT",
+        6,
+        ("DATA",),
     ),
     Figure(("speed.md", "speed.svg"), "benchmarks.speed --data DATA --repeats 2 --out OUT", 15, ("DATA",)),
     Figure(("peers.md", "peers.svg"), "benchmarks.peers --data DATA --out OUT", 12, ("DATA",)),
@@ -84,6 +93,7 @@ FIGURES = (
     Figure(("memory.md#day",), "benchmarks.memory day", 2, ("Linux",)),
     Figure(("web.md#pages",), "benchmarks.web --data DATA", 15, ("DATA", "chromium")),
     Figure(("edges_fork.png", "edges_handlebar.png"), "docs/make_edges.py OUT", 0.5),
+    Figure(tuple(f"gallery/{name}" for name in GALLERY), "docs/make_gallery.py OUT", 3),
     Figure(("screenshot.png", "inspection.png"), "docs/make_screenshots.py OUT", 0.5),
 )
 
@@ -120,7 +130,7 @@ def make_all(wanted: list[Figure], data: Path | None) -> bool:
         minutes = (time.monotonic() - begun) / 60
         print(f"{name}: {fault or f'made in {minutes:.1f} minutes'}", flush=True)
     for fault in write_readme(ROOT):
-        print(f"README.md: {fault}")
+        print(fault)
     return failed
 
 
@@ -184,7 +194,7 @@ def stale_pages() -> Iterator[str]:
             if later != "0" or not commit:
                 age = f"at {commit}, {later} commits behind" if later else f"at {commit}, which this history lacks"
                 yield f"docs/{page}: {age if commit else 'says no commit'}"
-    yield from (f"README.md: {fault}" for fault in write_readme(ROOT, only_check=True))
+    yield from write_readme(ROOT, only_check=True)
 
 
 if __name__ == "__main__":

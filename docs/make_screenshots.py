@@ -1,4 +1,4 @@
-"""Makes the README's pictures from the demo photo, without a display: python docs/make_screenshots.py [FOLDER]
+"""Makes the pictures of docs/window.md from the demo photo, without a display: python docs/make_screenshots.py [FOLDER]
 
 screenshot.png: the window, refocused. inspection.png: disparity, EPIs and values.
 """

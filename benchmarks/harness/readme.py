@@ -1,4 +1,4 @@
-"""README's tables of figures: copied out of the pages of docs/, so that each figure stands in both alike."""
+"""Tables of README and docs/accuracy.md: copied from the other pages of docs/, so that a figure is the same in both."""
 
 from __future__ import annotations
 
@@ -30,10 +30,10 @@ def switches(docs: Path) -> str:
 
 def views(docs: Path) -> str:
     """From the centre view and the map of the scene."""
-    report = docs / "evaluation" / "report.md"
 
     def words(scene: str, method: str) -> str:
-        full, seen, holes = (cell(report, f"{scene}: {CENTRE}", method, f"{part} dB") for part in PARTS)
+        page = docs / "evaluation" / f"{scene}.md"
+        full, seen, holes = (cell(page, f"{scene}: {CENTRE}", method, f"{part} dB") for part in PARTS)
         return f"{full} dB ({seen}, {holes})"
 
     rows = ((name, words(scene, "balanced"), words(scene, "reference warp")) for name, scene in SCENES.items())
@@ -53,19 +53,19 @@ def figures(docs: Path) -> str:
     free, speed, memory = docs / "free_views.md", docs / "speed.md", docs / "memory.md"
     field = partial(cell, docs / "figures.md", "field-disparity")
     stop = partial(cell, docs / "figures.md", "cancelled", "fast")
-    lens = partial(cell, docs / "evaluation" / "report.md", row="balanced", column="path-traced lens")
+    lens = partial(cell, row="balanced", column="path-traced lens")
     warm = partial(cell, speed, "Targets", column="measured")
     kept = [float(line[-1]) for line in table(memory, "predicted", "ratio")[1:]]
     ours, warp = (cell(free, "poses", f"all | {way}", "frame dB") for way in ("ours", "resampled"))
     rows = {
-        "[free cameras](docs/free_views.md), eight poses of eight scenes": f"{ours} dB; a resampling warp {warp} dB",
+        "[free cameras](free_views.md), eight poses of eight scenes": f"{ours} dB; a resampling warp {warp} dB",
         "a flat photo": "one view: nothing is made",
         "81 views of 512x512, warm, *fast*": warm(row="9x9 of 512x512, hci_antinous, fast"),
         "the same, *balanced*": warm(row="9x9 of 512x512, hci_antinous, balanced"),
         "a cancelled job at 4 MP": f"ends after {stop('after, ms')} ms (median), {stop('longest')} ms at the longest",
-        "[memory](docs/memory.md) predicted, over what twelve commands took": f"{min(kept):.2f} to {max(kept):.2f}",
+        "[memory](memory.md) predicted, over what twelve commands took": f"{min(kept):.2f} to {max(kept):.2f}",
         "two fields refocused, against a path-traced thin lens": " and ".join(
-            f"{lens(heading=f'{scene}: {CENTRE}')} dB" for scene in ("shelf", "fence")
+            f"{lens(docs / 'evaluation' / f'{scene}.md', f'{scene}: {CENTRE}')} dB" for scene in ("shelf", "fence")
         ),
         "HCI antinous without a map: disparity from its views": (
             f"{field(SOFT, 'bad pixels')} % of pixels off by more than 0.07 px; {field(SOFT, 'whole')} s of processor"
@@ -78,28 +78,30 @@ def figures(docs: Path) -> str:
     return markdown(("", ""), rows.items())
 
 
-TABLES: Mapping[str, Callable[[Path], str]] = {
-    "switches": switches,
-    "views": views,
-    "figures": figures,
-    "soft-maps": soft_maps,
+ACCURACY = "docs/accuracy.md"
+TABLES: Mapping[str, tuple[str, Callable[[Path], str]]] = {
+    "switches": (ACCURACY, switches),
+    "views": ("README.md", views),
+    "figures": (ACCURACY, figures),
+    "soft-maps": (ACCURACY, soft_maps),
 }
-"""By README's mark."""
+"""By mark: the page that it stands in, and what makes the table."""
 
 
 def write_readme(root: Path, only_check: bool = False) -> Iterator[str]:
     """Copy the tables; say which could not be, or with only_check, which are not what the pages say."""
-    path = root / "README.md"
-    text = path.read_text("utf-8")
-    for mark, make in TABLES.items():
+    for mark, (page, make) in TABLES.items():
+        path = root / page
+        text = path.read_text("utf-8")
         try:
             made = put_between(text, mark, make(root / "docs"))
         except InputError as error:
-            yield f"table {mark} stays: {error}"
+            yield f"{page}: table {mark} stays: {error}"
             continue
-        if only_check and made != text:
-            yield f"table {mark} is not what its page says"
-        text = made
-    if not only_check:
-        with atomic_write(path) as unfinished:
-            unfinished.write_text(text, "utf-8")
+        if made == text:
+            continue
+        if only_check:
+            yield f"{page}: table {mark} is not what its page says"
+        else:
+            with atomic_write(path) as unfinished:
+                unfinished.write_text(made, "utf-8")

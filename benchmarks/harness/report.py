@@ -19,7 +19,14 @@ from iibr_core.types import InputError
 WITH_CHANGES = " (with changes)"
 """After a commit's name: the files were not what that commit has."""
 DOCS = Path(__file__).parents[2] / "docs"
-NO_PAGES = (":/", ":(top,exclude)*.md", ":(top,exclude)docs/*.png", ":(top,exclude)docs/*.svg")
+NO_PAGES = (
+    ":/",
+    ":(top,exclude)*.md",
+    ":(top,exclude)docs/*.png",
+    ":(top,exclude)docs/*.svg",
+    ":(top,exclude)docs/*.jpg",
+    ":(top,exclude)docs/*.gif",
+)
 COMMON: dict[str, dict[str, Any]] = {
     "data": {"type": Path, "metavar": "DIR", "help": "a scene as `iibr evaluate` takes it, or a folder of them"},
     "out": {"type": Path, "help": "file for the report, which is printed, too"},

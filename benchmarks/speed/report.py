@@ -118,9 +118,9 @@ def means(scenes: Sequence[Figures]) -> dict[str, tuple[float, float, float]]:
     return found
 
 
-HEAD = f"""Time is of the whole field, processor time against that of *fast* in the same round (median of rounds).
-{FRONT_MARK}: on the Pareto front, where nothing else is as cheap and better, or as good and cheaper.
-Colours are looked up by cubic interpolation and kept in 32-bit floats until a view is stored: neither has a switch.
+HEAD = f"""Time is processor time of the whole light field over that of *fast* in the same round (median of rounds).
+{FRONT_MARK} marks the Pareto front: no other variant is both as fast and better, or as good and faster. Cubic
+interpolation of colours and 32-bit floats until a view is stored have no switch.
 
 ![Time against PSNR of every variant](speed.svg)
 """

@@ -69,10 +69,10 @@ def consistency_table(result: EvaluationResult) -> Table:
 
 
 ABOUT_CONSISTENCY = (
-    'The tables "views of" tell whether views agree with each other. What one view shows, carried by its disparity to'
-    " the view half-way to the given one, has to look the same there: what was inpainted in both (holes), and what the"
-    " photo shows (surfaces). In EPIs of the given view's row, each of its points has to lie on a straight line of its"
-    " own colour; the truth's figures there are what gloss and noise make of it. All 0 = they agree."
+    'The tables "views of" measure whether views agree with each other; 0 is full agreement. Each view is warped by its'
+    " disparity to the view half-way to the given one and compared with it: in pixels inpainted in both (holes) and in"
+    " pixels that the photo shows (surfaces). In EPIs of the given view's row, each point should draw a straight line"
+    " of one colour. The row of the true views shows how far gloss and noise alone change these figures."
 )
 
 

@@ -12,7 +12,7 @@ import pytest
 from benchmarks import figures
 from benchmarks.figures import FIGURES, NEEDS, ROOT, Figure, make_all, stale_pages
 from benchmarks.harness.pages import cell, put_between, table
-from benchmarks.harness.readme import TABLES, write_readme
+from benchmarks.harness.readme import ACCURACY, TABLES, write_readme
 from benchmarks.harness.report import DOCS, WITH_CHANGES, current_commit, made_by
 from iibr_core.types import InputError
 
@@ -37,6 +37,7 @@ What they wrote below.
 | all | warp | 30.1 |
 | all | ours | 32.5 |
 """
+PICTURES = (".png", ".svg", ".jpg", ".gif", ".webp", ".apng")
 REPORTS = sorted(str(path.relative_to(DOCS)) for path in DOCS.rglob("*.md") if "Made by" in path.read_text("utf-8"))
 
 
@@ -99,7 +100,7 @@ def test_the_list_is_whole() -> None:
     places = [place for one in FIGURES for place in one.places]
     assert len(places) == len(set(places))
     assert set(REPORTS) <= {place.partition("#")[0] for place in places}
-    pictures = {path.name for path in DOCS.iterdir() if path.suffix in (".png", ".svg")}
+    pictures = {path.relative_to(DOCS).as_posix() for path in DOCS.rglob("*.*") if path.suffix in PICTURES}
     assert pictures == {place for place in places if not place.partition("#")[0].endswith(".md")}
     for one in FIGURES:
         assert set(one.needs) <= NEEDS.keys()
@@ -122,18 +123,19 @@ def test_every_report_says_what_made_it(name: str) -> None:
 
 
 def test_the_readme_says_what_the_reports_say() -> None:
-    text = (ROOT / "README.md").read_text("utf-8")
-    assert all(text.count(f"<!-- {mark} -->") == 1 for mark in TABLES)
+    assert all((ROOT / page).read_text("utf-8").count(f"<!-- {mark} -->") == 1 for mark, (page, _) in TABLES.items())
     assert list(write_readme(ROOT, only_check=True)) == []
 
 
-def test_a_changed_readme_is_noticed(tmp_path: Path) -> None:
+@pytest.mark.parametrize(("page", "mark", "row"), [("README.md", "views", "HCI "), (ACCURACY, "switches", "balanced ")])
+def test_a_changed_table_is_noticed(tmp_path: Path, page: str, mark: str, row: str) -> None:
     shutil.copytree(DOCS, tmp_path / "docs")
-    text = (ROOT / "README.md").read_text("utf-8")
-    (tmp_path / "README.md").write_text(text.replace("| balanced ", "| unbalanced "))
-    assert "table switches is not what its page says" in list(write_readme(tmp_path, only_check=True))
+    shutil.copyfile(ROOT / "README.md", tmp_path / "README.md")
+    text = (tmp_path / page).read_text("utf-8")
+    (tmp_path / page).write_text(text.replace(f"| {row}", f"| un{row}"))
+    assert list(write_readme(tmp_path, only_check=True)) == [f"{page}: table {mark} is not what its page says"]
     list(write_readme(tmp_path))
-    assert (tmp_path / "README.md").read_text("utf-8") == text
+    assert (tmp_path / page).read_text("utf-8") == text
 
 
 def test_an_old_report_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

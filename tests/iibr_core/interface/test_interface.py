@@ -20,7 +20,10 @@ from iibr_core.types import Disparity, GridShape, InputError, Photo
 from tests.iibr_core.scenes import square_before_wall
 
 PAGE = Path(__file__).parents[3] / "docs" / "python.md"
-EXAMPLES = re.findall(r"```python\n(.*?)```", PAGE.read_text("utf-8"), re.DOTALL)
+README = Path(__file__).parents[3] / "README.md"
+EXAMPLES = [
+    code for page in (PAGE, README) for code in re.findall(r"```python\n(.*?)```", page.read_text("utf-8"), re.DOTALL)
+]
 
 
 @pytest.fixture

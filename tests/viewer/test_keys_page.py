@@ -1,4 +1,4 @@
-"""The README's table of keys, the help on F1 and the program agree."""
+"""The table of keys in docs/window.md, the help on F1 and the program agree."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from viewer.model.actions import ShowPrompt
 from viewer.model.commands import COMMANDS
 from viewer.ui.overlays.prompts import MOUSE
 
-README = Path(__file__).parents[2] / "README.md"
+PAGE = Path(__file__).parents[2] / "docs" / "window.md"
 
 
 def told_keys() -> set[str]:
     """What the first column of the table names."""
-    lines = README.read_text("utf-8").splitlines()
+    lines = PAGE.read_text("utf-8").splitlines()
     start = lines.index("| in the window | |") + 2
     rows = takewhile(lambda line: line.startswith("|"), lines[start:])
     cells = [row.split(" | ")[0].removeprefix("| ") for row in rows]
