@@ -15,8 +15,8 @@ from functools import partial
 from itertools import chain
 from pathlib import Path
 
-from benchmarks.harness.report import emit, head, is_wanted, parser_of, row, start
-from benchmarks.harness.scenes import FIELD, BenchScene, data_scenes, offsets_of, photo_scene
+from benchmarks.harness.bench_scenes import FIELD, BenchScene, data_scenes, offsets_of, photo_scene
+from benchmarks.harness.reports import emit, head, is_wanted, parser_of, row, start
 from benchmarks.harness.timing import cost_of, in_turns, make_field, median_cost, median_ratio
 from iibr_core.depth.edges.refine import refine
 from iibr_core.evaluation.reference_warp import reference_warp

@@ -15,7 +15,7 @@ from typing import get_args
 
 import numpy as np
 
-from benchmarks.harness.report import emit, head, parser_of, row, start
+from benchmarks.harness.reports import emit, head, parser_of, row, start
 from iibr_core.generation.light_field import generate
 from iibr_core.generation.plan import plan_literal
 from iibr_core.types import Disparity, GridShape, Photo, Quality

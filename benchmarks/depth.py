@@ -16,8 +16,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.harness.report import emit, head, holds, parser_of, row, start, title
-from benchmarks.harness.scenes import FIELD, BenchScene, data_scenes, drawn_scene
+from benchmarks.harness.bench_scenes import FIELD, BenchScene, data_scenes, drawn_scene
+from benchmarks.harness.reports import emit, head, holds, parser_of, row, start, title
 from benchmarks.harness.timing import cost_of
 from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.edges.refine import refine

@@ -19,10 +19,10 @@ from pathlib import Path
 import numpy as np
 import psutil
 
-from benchmarks.harness.report import emit, head, holds, parser_of, row, start, title
-from benchmarks.harness.scenes import DEMO
+from benchmarks.harness.bench_scenes import DEMO
+from benchmarks.harness.real_window import is_idle, open_window, run_until_idle
+from benchmarks.harness.reports import emit, head, holds, parser_of, row, start, title
 from benchmarks.harness.timing import Cost, added_bytes, in_own_process, median_cost
-from benchmarks.harness.window import is_settled, open_window, settle
 from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.estimators.catalog import model_to_use
 from iibr_core.depth.estimators.onnx_models import USUAL_PREPARATION, OnnxInput, run_onnx
@@ -109,9 +109,9 @@ def turns_while_estimating(photo: Path, model: Path) -> list[float]:
     """
     turns: list[float] = []
     with open_window(Source(str(photo))) as app:
-        settle(app)
+        run_until_idle(app)
         app.do(UseModel(str(model)))
-        while not (app.state.scene and app.state.scene.depth_model and is_settled(app)):
+        while not (app.state.scene and app.state.scene.depth_model and is_idle(app)):
             before = time.thread_time()
             app.step()
             turns.append((time.thread_time() - before) * 1e3)

@@ -24,7 +24,7 @@ from pathlib import Path
 
 from benchmarks.harness.pages import put_between
 from benchmarks.harness.readme import write_readme
-from benchmarks.harness.report import DOCS, git, is_wanted, made_by, markdown, parser_of, start
+from benchmarks.harness.reports import DOCS, git, is_wanted, made_by, markdown, parser_of, start
 from iibr_core.formats.outputs import atomic_write
 
 ROOT = DOCS.parent

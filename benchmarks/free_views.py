@@ -18,7 +18,7 @@ from math import cos, radians, sin
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.harness.report import emit, head, parser_of, row, start
+from benchmarks.harness.reports import emit, head, parser_of, row, start
 from benchmarks.harness.timing import cost_of
 from iibr_core.evaluation.metrics import bounded_psnr
 from iibr_core.evaluation.reference_warp import reference_warp_to
@@ -104,7 +104,7 @@ def truth(scene: RaycastScene, camera: Camera) -> tuple[FloatImage, FloatImage]:
     return colors, disparity / np.float32(camera.focal_px[0])
 
 
-def beyond_frame(disparity: FloatImage, photo_from_target: NDArray[np.float64], size: ImageSize) -> NDArray[np.bool_]:
+def outside_frame(disparity: FloatImage, photo_from_target: NDArray[np.float64], size: ImageSize) -> NDArray[np.bool_]:
     """Which pixels of a view with this disparity (H, W) see what lies beyond the frame of a photo of a size."""
     y, x = np.indices(disparity.shape)
     source = photo_from_target @ np.stack([x, y, np.ones_like(x), disparity]).reshape(4, -1)
@@ -155,7 +155,7 @@ def judge(scene: RaycastScene, size: ImageSize, table: Table) -> float:
     for name, camera in cameras.items():
         true, true_inverse = truth(scene, camera)
         matrix = target_from_photo(taken, camera, scale_px)
-        is_beyond = beyond_frame(true_inverse * np.float32(scale_px), np.linalg.inv(matrix), size)
+        is_beyond = outside_frame(true_inverse * np.float32(scale_px), np.linalg.inv(matrix), size)
         judged = reference_warp_to(photo, disparity, matrix, size)
         ways: dict[str, Callable[[], FloatImage]] = {
             "resampled": lambda at=matrix: reference_warp_to(photo, disparity, at, size).colors,

@@ -24,7 +24,7 @@ from pathlib import Path
 import psutil
 
 from benchmarks.fuzz_cases import READERS, case
-from benchmarks.harness.report import parser_of, start
+from benchmarks.harness.reports import parser_of, start
 from iibr_core.types import InputError
 
 TIME_LIMIT_S = 20.0

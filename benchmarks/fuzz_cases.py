@@ -58,7 +58,7 @@ def _open_with_depth(path: Path) -> None:
 
 
 def _read_field(path: Path) -> None:
-    from iibr_core.formats.light_fields.registry import open_light_field
+    from iibr_core.formats.light_fields.light_field_formats import open_light_field
     from iibr_core.formats.light_fields.views import read_views
 
     scene = open_light_field(path.parent)
@@ -67,7 +67,7 @@ def _read_field(path: Path) -> None:
 
 
 def _read_view_file(path: Path) -> None:
-    from iibr_core.formats.light_fields.registry import find_light_field
+    from iibr_core.formats.light_fields.light_field_formats import find_light_field
     from iibr_core.formats.light_fields.views import read_views
 
     scene = find_light_field(path)

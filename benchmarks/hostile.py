@@ -22,7 +22,7 @@ from concurrent.futures import ThreadPoolExecutor
 from itertools import product
 from pathlib import Path
 
-from benchmarks.harness.report import parser_of, start
+from benchmarks.harness.reports import parser_of, start
 from tests.hostile.case import Case, Ended, run_case
 from tests.hostile.forks import KILLED
 from tests.hostile.sandbox import make_template

@@ -19,8 +19,8 @@ from typing import Any
 import numpy as np
 import psutil
 
-from benchmarks.harness.report import emit, head, parser_of, row, start
-from benchmarks.harness.scenes import MEGAPIXELS, write_photo
+from benchmarks.harness.bench_scenes import MEGAPIXELS, write_photo
+from benchmarks.harness.reports import emit, head, parser_of, row, start
 from benchmarks.harness.timing import COMMAND_LINE, run
 from iibr_core.formats.maps.writer import write_map
 from iibr_core.runtime.allocator import limit_arenas
@@ -159,7 +159,7 @@ def take(worker: Any, scene_view: Any, generation: int, views: int) -> None:
     import time
 
     from iibr_core.scenes.opening import SceneReady, ViewReady
-    from viewer.background.jobs import Failed
+    from viewer.background.job_threads import Failed
 
     seen = 0
     while seen < views:

@@ -18,11 +18,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.harness.report import emit, head, parser_of, row, start
-from benchmarks.harness.scenes import offsets_of, read_views
+from benchmarks.harness.bench_scenes import offsets_of, read_views
+from benchmarks.harness.reports import emit, head, parser_of, row, start
 from benchmarks.harness.timing import cost_of
 from iibr_core.color import encoded_from_stored, srgb_from_linear
-from iibr_core.depth.multi_view.estimate import estimate_coarse, estimate_disparity
+from iibr_core.depth.multi_view.estimate_disparity import estimate_coarse, estimate_disparity
 from iibr_core.evaluation.metrics import bounded_psnr
 from iibr_core.formats.images.photo import write_image
 from iibr_core.scenes.scene import Source

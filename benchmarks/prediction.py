@@ -18,8 +18,8 @@ from typing import get_args
 
 import numpy as np
 
-from benchmarks.harness.report import emit, head, holds, is_wanted, parser_of, row, start, title
-from benchmarks.harness.scenes import DEMO, BenchScene, data_scenes, drawn_scene, photo_scene, squares_scene
+from benchmarks.harness.bench_scenes import DEMO, BenchScene, data_scenes, drawn_scene, photo_scene, squares_scene
+from benchmarks.harness.reports import emit, head, holds, is_wanted, parser_of, row, start, title
 from benchmarks.harness.timing import field_costs, make_field, peak_bytes
 from iibr_core.evaluation.tables import number
 from iibr_core.generation.cost_model import (

@@ -18,13 +18,13 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.harness.report import emit, is_wanted, parser_of, start
-from benchmarks.harness.scenes import BenchScene, data_scenes
+from benchmarks.harness.bench_scenes import BenchScene, data_scenes
+from benchmarks.harness.reports import emit, is_wanted, parser_of, start
 from benchmarks.harness.timing import Cost, cost_of, in_turns, median_cost, median_ratio
-from benchmarks.speed.report import Figures, Measured, table
+from benchmarks.speed.speed_report import Figures, Measured, table
 from iibr_core.color import encoded_from_stored, stored_from_encoded
+from iibr_core.evaluation.focal_stacks import FocalStack, Focus
 from iibr_core.evaluation.metrics import bounded_psnr, flip
-from iibr_core.evaluation.refocus import FocalStack, Focus
 from iibr_core.generation.cost_model import CORES
 from iibr_core.generation.light_field import generate
 from iibr_core.generation.plan import plan_literal
@@ -33,7 +33,7 @@ from iibr_core.types import FloatImage, GridShape, ViewOffset
 from viewer.gpu.context import GLContext
 from viewer.gpu.headless_context import create_headless
 from viewer.gpu.refocus.frame_budget import BEST_QUALITY, QualityLevel, scale_size, stretch_image
-from viewer.gpu.refocus.renderer import Renderer
+from viewer.gpu.refocus.picture_renderer import Renderer
 
 APERTURE_VIEWS = 6.0
 BETWEEN = ViewOffset(-0.5, 1.5)

@@ -14,7 +14,7 @@ import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
-from benchmarks.harness.report import DOCS, made_by, parser_of, start
+from benchmarks.harness.reports import DOCS, made_by, parser_of, start
 from iibr_core.formats.outputs import atomic_write
 from iibr_core.types import InputError
 

@@ -24,12 +24,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.harness.report import emit, head, holds, is_wanted, parser_of, row, start, title
-from benchmarks.harness.scenes import FIELD
+from benchmarks.harness.bench_scenes import FIELD
+from benchmarks.harness.reports import emit, head, holds, is_wanted, parser_of, row, start, title
 from iibr_core.color import stored_from_encoded
 from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.edges.refine import refine
-from iibr_core.depth.multi_view.estimate import estimate_disparity
+from iibr_core.depth.multi_view.estimate_disparity import estimate_disparity
 from iibr_core.evaluation.datasets import find_scenes, read_view
 from iibr_core.evaluation.metrics import bounded_psnr
 from iibr_core.evaluation.reference_warp import reference_warp

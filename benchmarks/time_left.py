@@ -23,8 +23,8 @@ from pathlib import Path
 
 import psutil
 
-from benchmarks.harness.report import emit, head, holds, is_wanted, parser_of, row, start
-from benchmarks.harness.scenes import DEMO, write_photos
+from benchmarks.harness.bench_scenes import DEMO, write_photos
+from benchmarks.harness.reports import emit, head, holds, is_wanted, parser_of, row, start
 from benchmarks.harness.timing import COMMAND_LINE
 from iibr_core.runtime.time_left import TimeLeft
 from iibr_core.scenes import opening_work

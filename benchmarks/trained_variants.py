@@ -21,14 +21,14 @@ import numpy as np
 import torch
 
 from benchmarks import plucker
-from benchmarks.harness.report import emit, parser_of, start
+from benchmarks.harness.reports import emit, parser_of, start
 from benchmarks.stages import Views, judge, make_views, report
 from iibr_core.formats.weights import save_weights
 from iibr_core.ray_transformer.inference import TrainedWeights
 from iibr_core.ray_transformer.model import RayTransformer
 from iibr_core.rendering.ambiguous_rays import UndecidedRays
 from iibr_core.rendering.hypotheses import FEATURES, SHARE, AmbiguousRays, describe_rays
-from iibr_core.rendering.laid_hypotheses import PLAIN
+from iibr_core.rendering.laid_hypotheses import PLAIN_SOURCE
 from iibr_core.rendering.ray_set import RaySet
 from iibr_core.stages import Stages
 from iibr_core.training.batches import AS_RENDERED, RayChoice, training_batch
@@ -48,7 +48,7 @@ COORDINATES_ONLY = [SHARE, 7, 8, 9, 10, 12, 14]
 def with_raw_coordinates(rays: RaySet, ambiguous: AmbiguousRays) -> AmbiguousRays:
     """Behind the features, the paper's: Pluecker coordinates of target and source ray, and disparity; in widths."""
     height, width = rays.view_size
-    offsets = rays.arrays.offsets[np.where(ambiguous.mask, ambiguous.source % PLAIN, 0)]
+    offsets = rays.arrays.offsets[np.where(ambiguous.mask, ambiguous.source % PLAIN_SOURCE, 0)]
     d = np.where(ambiguous.mask, ambiguous.disparity, 0)
     moved = np.array(ambiguous.offset) - offsets
     y, x = (ambiguous.pixel[:, i, None] - margin for i, margin in enumerate((rays.margins.top, rays.margins.left)))

@@ -19,12 +19,12 @@ from pathlib import Path
 
 import psutil
 
-from benchmarks.harness.report import emit, head, parser_of, row, start
-from benchmarks.harness.scenes import write_photo
+from benchmarks.harness.bench_scenes import write_photo
+from benchmarks.harness.real_window import open_window
+from benchmarks.harness.reports import emit, head, parser_of, row, start
 from benchmarks.harness.timing import in_own_process
-from benchmarks.harness.window import open_window
 from iibr_core.exports.options import ExportOptions
-from iibr_core.rendering.gloss.settings import Gloss
+from iibr_core.rendering.gloss.gloss_settings import Gloss
 from iibr_core.runtime.allocator import limit_arenas
 from iibr_core.scenes.scene import Source
 from iibr_core.scenes.screen_size import ScreenSize
@@ -36,7 +36,7 @@ from viewer.model.state.depth_editing import Paint
 from viewer.model.state.exporting import ExportTask
 from viewer.model.state.folder import StepPhoto
 from viewer.model.state.inspection import OVERLAYS, Compare, KeepState, SetInspection, SetOverlay
-from viewer.model.state.optics import FocusOn, MoveEye, ResetOptics, SetAperture, SetOptics
+from viewer.model.state.optics_actions import FocusOn, MoveEye, ResetOptics, SetAperture, SetOptics
 from viewer.model.state.preferences import SetPreference
 from viewer.model.state.tasks import SaveTask
 from viewer.model.zoom import SetZoom, Zoom

@@ -20,16 +20,16 @@ import numpy as np
 import psutil
 from PIL import Image, ImageSequence
 
-from benchmarks.harness.report import emit, markdown, parser_of, start
-from benchmarks.harness.scenes import DEMO
-from iibr_core.exports import EXPORTS, ExportOptions, ExportSource, open_for_export, settle
+from benchmarks.harness.bench_scenes import DEMO
+from benchmarks.harness.reports import emit, markdown, parser_of, start
+from iibr_core.exports import EXPORTS, ExportOptions, ExportSource, open_for_export, resolve_settings
 from iibr_core.exports.web import make_page
 from iibr_core.scenes import LensChoice, Source
 from iibr_core.types import GridShape, ViewOffset
 from tests.browser import Pipe, Tab, open_browser
 from tests.web.conftest import canvas, set_lens, wait_until_still
 from viewer.app.headless import HeadlessViewer
-from viewer.model.state.optics import MoveEye, SetAperture, SetFocus
+from viewer.model.state.optics_actions import MoveEye, SetAperture, SetFocus
 
 KIND = EXPORTS["web"]
 
@@ -50,7 +50,7 @@ def row_of(name: str, source: Source) -> tuple[Any, ...]:
     opened = open_for_export(KIND, source, 1.0, LensChoice(), lambda scene: None, None)
     views = list(opened.views(with_disparity=True))
     begun = time.perf_counter()
-    page, carried = make_page(Made(opened, views), settle(KIND, ExportOptions(), opened.scene, opened.optics))
+    page, carried = make_page(Made(opened, views), resolve_settings(KIND, ExportOptions(), opened.scene, opened.optics))
     seconds = time.perf_counter() - begun
     originals = {opened.scene.grid.offset(view.row, view.column): view.colors for view in views}
     flips = [flip(originals[place], frame) for place, frame in zip(carried.places, frames(carried.colors))]

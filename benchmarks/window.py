@@ -17,13 +17,13 @@ from dataclasses import dataclass
 import numpy as np
 import psutil
 
-from benchmarks.harness.report import emit, head, holds, parser_of, row, start
-from benchmarks.harness.scenes import DEMO
-from benchmarks.harness.window import open_window, settle
+from benchmarks.harness.bench_scenes import DEMO
+from benchmarks.harness.real_window import open_window, run_until_idle
+from benchmarks.harness.reports import emit, head, holds, parser_of, row, start
 from iibr_core.scenes.scene import Source
 from iibr_core.types import ViewOffset
 from viewer.app.main_loop import App
-from viewer.model.state.optics import SetAperture
+from viewer.model.state.optics_actions import SetAperture
 
 MOVES = 150
 STEP_PX = 2
@@ -60,14 +60,14 @@ def report(app: App, began: float, apertures: list[float], idle_s: float) -> Ite
         app.step()
     torch = "torch" in sys.modules
     yield row("first picture", "without torch", f"{time.perf_counter() - began:.2f} s", holds(not torch))
-    settle(app)
+    run_until_idle(app)
     said = f"{time.perf_counter() - began:.1f} s, {app.frames_shown} frames shown"
     yield row(f"all {app.state.progress.total} views", "", said, "")
     for aperture in apertures:
         app.do(SetAperture(aperture))
-        settle(app)
+        run_until_idle(app)
         yield drag_row(aperture, drag(app), app)
-        settle(app)
+        run_until_idle(app)
     process, frames = psutil.Process(), app.frames_shown
     before, since = process.cpu_times(), time.perf_counter()
     while time.perf_counter() - since < idle_s:

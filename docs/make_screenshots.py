@@ -20,7 +20,7 @@ from viewer.app.headless import HeadlessViewer
 from viewer.model.actions import DismissNotice, SetHover
 from viewer.model.state.app_state import Hover
 from viewer.model.state.inspection import SetInspection, SetOverlay
-from viewer.model.state.optics import ApertureShape, MoveEye, SetAperture, SetFocus, SetOptics
+from viewer.model.state.optics_actions import ApertureShape, MoveEye, SetAperture, SetFocus, SetOptics
 from viewer.model.state.preferences import Section, with_sections
 
 SIZE = 1200, 760

@@ -14,7 +14,7 @@ from iibr_core.runtime.offers import offered_by
 if TYPE_CHECKING:
     from iibr_core.interface.fields import FORMATS, LightField, View
     from iibr_core.interface.judging import Comparison, compare, evaluate
-    from iibr_core.interface.scenes import Scene, estimate_depth, from_arrays, open
+    from iibr_core.interface.public_scene import Scene, estimate_depth, from_arrays, open
     from iibr_core.runtime.tiling import Cancelled
     from iibr_core.stages import Stages
     from iibr_core.types import InputError

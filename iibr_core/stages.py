@@ -20,9 +20,9 @@ class Stages:
     """Lone disparities between two surfaces are filled anew by what looks like them."""
     label_edge_bands: bool = True
     """Pixels beside a depth edge, or a defocused boundary, go to the side whose colours they have."""
-    extrapolate_beyond_frame: bool = True
+    outpainting: bool = True
     """The photo is continued beyond its frame, once for all views."""
-    lines_beyond_frame: bool = True
+    outpainted_lines: bool = True
     """There lines go straight on."""
     split_mixed_pixels: bool = True
     """Pixels that show two surfaces become a ray of each."""

@@ -7,7 +7,7 @@
 uniform sampler2D focus_layer;
 #ifdef LAYERS
 #include "smoothing.glsl"
-uniform sampler2D front_layer, back_layer, smooth_front, smooth_back;
+uniform sampler2D foreground_layer, background_layer, smooth_foreground, smooth_background;
 #endif
 uniform float exposure;  // factor
 
@@ -19,17 +19,17 @@ out vec4 color;
 // the foreground) the foreground's own colour stands in.
 vec3 composed(vec2 at, ivec2 here) {
     vec4 focus = texelFetch(focus_layer, here, 0);
-    vec4 front = texelFetch(front_layer, here, 0), back = texelFetch(back_layer, here, 0);
-    float back_weight = back.a, total = max(focus.a + front.a + back_weight, 1e-9);
+    vec4 foreground = texelFetch(foreground_layer, here, 0), background = texelFetch(background_layer, here, 0);
+    float back_weight = background.a, total = max(focus.a + foreground.a + back_weight, 1e-9);
     // Less is smoothed than half the size blurs: a mean of both is as wide as asked for.
     vec2 smoothed = min(blur_width_px(at) * blur_width_px(at) / HALF_SIZE_BLUR, 1.0);
-    front = mix(front, textureLod(smooth_front, at, 0.0), smoothed.x);
-    back = mix(back, textureLod(smooth_back, at, 0.0), smoothed.y);
+    foreground = mix(foreground, textureLod(smooth_foreground, at, 0.0), smoothed.x);
+    background = mix(background, textureLod(smooth_background, at, 0.0), smoothed.y);
     // The smoothed background gets the weight that it had before smoothing.
-    float back_scale = back_weight / max(back.a, 1e-4 * total);
+    float back_scale = back_weight / max(background.a, 1e-4 * total);
     // Over both lies the smoothed foreground (alpha compositing).
-    vec4 beyond = focus + back_scale * back + 1e-3 * front;
-    return mix(beyond.rgb / max(beyond.a, 1e-9), front.rgb / max(front.a, 1e-9), min(front.a / total, 1.0));
+    vec4 beyond = focus + back_scale * background + 1e-3 * foreground;
+    return mix(beyond.rgb / max(beyond.a, 1e-9), foreground.rgb / max(foreground.a, 1e-9), min(foreground.a / total, 1.0));
 }
 #endif
 

@@ -3,7 +3,7 @@
 // at half the picture's size: so wide a blur needs no more. What half the size itself blurs too much, see present.frag.
 #include "smoothing.glsl"
 
-uniform sampler2D front_layer, back_layer;
+uniform sampler2D foreground_layer, background_layer;
 uniform vec2 texel_step;      // texture coordinates from one texel of the target to the next, in this direction
 uniform float empty_up_to_px; // as wide a blur is in the sharp layer
 
@@ -25,6 +25,6 @@ vec4 box_mean(sampler2D layer, float width_px) {
 
 void main() {
     vec2 width_px = blur_width_px(uv);
-    in_front = box_mean(front_layer, width_px.x);
-    behind = box_mean(back_layer, width_px.y);
+    in_front = box_mean(foreground_layer, width_px.x);
+    behind = box_mean(background_layer, width_px.y);
 }

@@ -54,7 +54,7 @@ def _run() -> int:
         _mend_standard_streams()
     else:
         _escape_unknown_characters()
-    _settle_home()
+    _ensure_home()
     _ignore_warnings()
     if not 1 <= _whole_number(os.environ.get(NUMBA_THREADS) or "1") <= MOST_NUMBA_THREADS:
         said = f"{NUMBA_THREADS}={os.environ[NUMBA_THREADS]}: is no number of threads"
@@ -244,7 +244,7 @@ def _ignore_warnings() -> None:
         warnings.simplefilter("ignore")
 
 
-def _settle_home() -> None:
+def _ensure_home() -> None:
     """Nothing is kept in the working folder: where HOME makes no sense the user database counts, and nowhere is home
     to users that it does not know.
     """

@@ -72,7 +72,7 @@ def main() -> None:
 
 
 def write_kernels(folder: Path, begin: Callable[[], None] = lambda: None, should_stop: ShouldStop = never) -> None:
-    """Have all kernels in the folder, compiled for the kind of processor that `kernel_cache` settles on, and none that
+    """Have all kernels in the folder, compiled for the kind of processor that `kernel_cache` chooses, and none that
     nobody reads, or of other sources. begin: is called once those of the first picture are there.
 
     Raises InputError where no process can be started, Cancelled once should_stop is true after that.
@@ -157,13 +157,13 @@ def _photo(scratch: Path, is_mapped: bool = True, is_hdr: bool = False) -> Sourc
 
     from iibr_core.formats import read_map, read_photo, write_image, write_map
     from iibr_core.scenes import Source
-    from viewer.model.demo import demo_photo
+    from viewer.model.demo_photo import demo_photo
 
     photo = scratch / ("photo.exr" if is_hdr else "photo.png")
     colors = read_photo(demo_photo()).pixels[PART]
     write_image(photo, 4 * colors if is_hdr else np.round(255 * colors).astype(np.uint8))
     if is_mapped:
-        # A pixel beside the photo, and with a hole: rims of measured maps are moved to it.
+        # A pixel beside the photo, and with a hole: edge bands of measured maps are moved to it.
         disparity = np.roll(read_map(demo_photo().with_name("motorcycle_disparity.pfm"))[PART], 1, axis=1)
         disparity[:4, :4] = np.nan
         write_map(scratch / "photo_disparity.pfm", disparity)
@@ -238,7 +238,7 @@ def _find_gloss(scratch: Path) -> None:
     from iibr_core.rendering import CENTRE
     from iibr_core.rendering.gloss import Gloss, GlossLight
     from iibr_core.scenes import GlossRequest, SceneReady, SceneRequest, Source, answer, results_of
-    from viewer.model.demo import demo_photo
+    from viewer.model.demo_photo import demo_photo
 
     large = Source(str(demo_photo()), max_pixels=GLOSSY_PIXELS)
     ready = next(results_of(SceneRequest(0, large), lambda: False, lambda: CENTRE))

@@ -457,14 +457,14 @@ export class Renderer {
         const narrowing = 1 / Math.sqrt(Math.max(pass, 1)), [tiles] = targets.wideTiles.textures;
         const textures = { focus_layer: targets.light.textures[0] };
         if (lens.keepsLayers) {
-            const { sums, across, smooth } = this.layersOf(targets), [, front, back] = sums.textures;
+            const { sums, across, smooth } = this.layersOf(targets), [, foreground, background] = sums.textures;
             const spread = (from, to, step) => this.draw("smooth.frag", [], to,
                 { narrowing, empty_up_to_px: lens.sharpUpTo[0], texel_step: step },
-                { front_layer: from[0], back_layer: from[1], tiles });
-            spread([front, back], across, [1 / across.width, 0]);
+                { foreground_layer: from[0], background_layer: from[1], tiles });
+            spread([foreground, background], across, [1 / across.width, 0]);
             spread(across.textures, smooth, [0, 1 / smooth.height]);
-            const [smooth_front, smooth_back] = smooth.textures;
-            Object.assign(textures, { front_layer: front, back_layer: back, smooth_front, smooth_back, tiles });
+            const [smooth_foreground, smooth_background] = smooth.textures;
+            Object.assign(textures, { foreground_layer: foreground, background_layer: background, smooth_foreground, smooth_background, tiles });
         }
         if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
         this.draw("present.frag", [lens.keepsLayers && "LAYERS"], { framebuffer: null, width, height },

@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 
 from benchmarks.harness.pages import cell, put_between, table
-from benchmarks.harness.report import markdown
+from benchmarks.harness.reports import markdown
 from iibr_core.formats.outputs import atomic_write
 from iibr_core.types import InputError
 

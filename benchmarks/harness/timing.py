@@ -22,7 +22,7 @@ from typing import TypeVar
 import numpy as np
 import psutil
 
-from benchmarks.harness.scenes import BenchScene
+from benchmarks.harness.bench_scenes import BenchScene
 from iibr_core.exports.batch.threads import set_environment
 from iibr_core.generation.light_field import generate
 from iibr_core.generation.plan import plan_literal

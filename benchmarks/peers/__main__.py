@@ -15,9 +15,9 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.harness.bench_scenes import BenchScene, data_scenes, require_scenes, squares_scene
 from benchmarks.harness.plots import Panel, on_the_front, plot_panels
-from benchmarks.harness.report import head, is_wanted, parser_of, row, start, title
-from benchmarks.harness.scenes import BenchScene, data_scenes, require_scenes, squares_scene
+from benchmarks.harness.reports import head, is_wanted, parser_of, row, start, title
 from benchmarks.harness.timing import Cost, cost_of, in_own_process, in_turns, make_field, median_cost, median_ratio
 from benchmarks.peers import planes, ray_march, splatting
 from benchmarks.speed.variants import Variant, evaluated_views, field_cost

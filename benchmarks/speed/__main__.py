@@ -15,8 +15,7 @@ from functools import partial
 
 import numpy as np
 
-from benchmarks.harness.report import parser_of, start
-from benchmarks.harness.scenes import (
+from benchmarks.harness.bench_scenes import (
     FIELD,
     BenchScene,
     data_scenes,
@@ -26,6 +25,7 @@ from benchmarks.harness.scenes import (
     soften,
     squares_scene,
 )
+from benchmarks.harness.reports import parser_of, start
 from benchmarks.harness.timing import (
     cost_of,
     field_costs,
@@ -33,7 +33,7 @@ from benchmarks.harness.timing import (
     median_cost,
     median_ratio,
 )
-from benchmarks.speed.report import Bench, Figures, Measured, SpeedTarget, write_bench
+from benchmarks.speed.speed_report import Bench, Figures, Measured, SpeedTarget, write_bench
 from benchmarks.speed.variants import REFERENCE, VARIANTS, Variant, evaluated_views, field_cost
 from iibr_core.evaluation.metrics import bounded_psnr, flip
 from iibr_core.generation.cost_model import CORES

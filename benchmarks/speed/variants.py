@@ -8,8 +8,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from benchmarks.harness.scenes import CENTRE, MOST_JUDGED, BenchScene
-from benchmarks.harness.scenes import bench_scenes as bench_scenes
+from benchmarks.harness.bench_scenes import CENTRE, MOST_JUDGED, BenchScene
 from benchmarks.harness.timing import Cost, cost_of
 from iibr_core.color import encoded_from_stored, stored_from_encoded
 from iibr_core.depth.edges.refine import refine

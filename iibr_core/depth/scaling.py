@@ -16,7 +16,7 @@ from iibr_core.types import TOTAL_PARALLAX, FloatImage, GridShape, InputError
 
 PERCENTILES = ((1.0, 99.0), (0.1, 99.9), (0.0, 100.0))
 """The near and the far end, without a few wild values; wider ones where nearly all is one plane."""
-FLAT_SHARE = 1e-5
+ROUNDING_SHARE = 1e-5
 """A range below this share of the values is rounding."""
 OUTLIER_SPANS = 2.0
 """Values farther outside the range are moved to here: thin things close by may well lie a range before the rest."""
@@ -84,7 +84,7 @@ def _scale_to_viewing_range(inverse: DoubleImage, grid: GridShape) -> FloatImage
     low = high = 0.0
     for percentiles in PERCENTILES:
         low, high = (float(value) for value in np.percentile(known, percentiles))
-        if high - low > FLAT_SHARE * max(abs(low), abs(high)):
+        if high - low > ROUNDING_SHARE * max(abs(low), abs(high)):
             break
     else:
         return np.where(np.isnan(inverse), np.nan, 0.0).astype(np.float32)

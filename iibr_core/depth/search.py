@@ -14,8 +14,8 @@ import numpy as np
 
 from iibr_core.depth.choice import BETTER_WAYS, DepthChoice, DepthKind, DepthOrigin
 from iibr_core.depth.edges.refine import refine
+from iibr_core.depth.embedded.embedded_depth import read_embedded
 from iibr_core.depth.embedded.picture import photo_in_focus, rotate_estimate
-from iibr_core.depth.embedded.reader import read_embedded
 from iibr_core.depth.estimates import DisparityMap, Estimate, MetricDepth, RelativeInverseDepth, values_of
 from iibr_core.depth.pictorial_cues import estimate_from_cues
 from iibr_core.depth.scaling import disparity_from, inverse_metres_over
@@ -26,7 +26,7 @@ from iibr_core.formats.maps.disparity_file import read_disparity
 from iibr_core.formats.maps.resample import resample_surfaces
 from iibr_core.inpainting.disparity_by_color import fill_disparity_by_color
 from iibr_core.inpainting.disparity_holes import say_filled
-from iibr_core.inpainting.protocol import EstimateDepth
+from iibr_core.inpainting.inpainter import EstimateDepth
 from iibr_core.runtime.tiling import ShouldStop, never, raise_if_stopped
 from iibr_core.types import (
     Disparity,
@@ -164,7 +164,7 @@ def estimator_of(found: PhotoWithDepth, choice: DepthChoice) -> EstimateDepth | 
 
     def estimate(colors: FloatImage, should_stop: ShouldStop) -> FloatImage:
         from iibr_core.depth.estimators.catalog import model_to_use
-        from iibr_core.depth.estimators.estimate import estimate_with
+        from iibr_core.depth.estimators.estimate_depth import estimate_with
 
         model = model_to_use(choice)
         if model is None:
@@ -242,7 +242,7 @@ class _DepthSearch:
         model = model_to_use(self.choice)
         if model is None:
             return None
-        from iibr_core.depth.estimators.estimate import estimate_with
+        from iibr_core.depth.estimators.estimate_depth import estimate_with
 
         raise_if_stopped(self.should_stop)
         estimate = estimate_with(model, self.photo, self.choice.memory_bytes, self.should_stop, self.report_progress)
@@ -293,7 +293,7 @@ def resize_estimate(estimate: Estimate, size: ImageSize) -> Estimate:
         case RelativeInverseDepth(values):
             return RelativeInverseDepth(resample_surfaces(values, size))
         case MetricDepth(metres):
-            # Surfaces are told apart by inverse distance: what is far would else be all that counts.
+            # Surfaces are distinguished by inverse distance: else only the far ones would count.
             return MetricDepth(np.reciprocal(resample_surfaces(np.reciprocal(metres), size)))
         case DisparityMap(px_per_view):
             ratio = np.float32(size.width / px_per_view.shape[1])

@@ -8,7 +8,7 @@ import numpy as np
 
 from iibr_core.color import stored_from_encoded
 from iibr_core.depth.estimates import DisparityMap
-from iibr_core.depth.multi_view.estimate import estimate_coarse, estimate_disparity, sweep_bytes
+from iibr_core.depth.multi_view.estimate_disparity import estimate_coarse, estimate_disparity, sweep_bytes
 from iibr_core.formats.images.photo import read_picture
 from iibr_core.formats.images.side_by_side import own_picture
 from iibr_core.formats.light_fields.stereo_file import read_stereo_file

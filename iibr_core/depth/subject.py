@@ -1,6 +1,6 @@
 """How near a picture's subject is: the nearest thing that takes a fair share of its middle.
 
-A person before a wall may fill less of the middle than the wall does, so the two are told apart by Otsu's threshold
+A person before a wall may fill less of the middle than the wall does, so the two are separated by Otsu's threshold
 (IEEE Trans. SMC 9(1), 1979) before anything is averaged.
 """
 
@@ -13,10 +13,10 @@ from iibr_core.types import FloatImage
 
 MIDDLE_ROWS, MIDDLE_COLUMNS = (0.25, 0.67), (0.25, 0.75)
 """Shares of the height, where faces are, and of the width."""
-BINS = 64
+HISTOGRAM_BINS = 64
 STRAY_PERCENT = 1.0
 """So much of the middle at either end does not stretch the histogram."""
-LEAST_SHARE = 0.1
+LEAST_SUBJECT_SHARE = 0.1
 """Of the middle, that a subject takes."""
 LEAST_SEPARATION = 0.85
 """Of the variance that lies between the two parts: an even slope, a floor, has 0.75 and no nearer thing on it."""
@@ -38,13 +38,13 @@ def subject_disparity(disparity: FloatImage) -> float:
     known = np.clip(known, low, high)
     threshold, separation = _otsu(known)
     near = known[known > threshold]
-    is_there = separation >= LEAST_SEPARATION and near.size >= LEAST_SHARE * known.size
+    is_there = separation >= LEAST_SEPARATION and near.size >= LEAST_SUBJECT_SHARE * known.size
     return float(np.median(near if is_there else known))
 
 
 def _otsu(values: NDArray[np.float64]) -> tuple[float, float]:
     """The threshold that parts the values best, and the share of their variance that lies between the parts."""
-    counts, edges = np.histogram(values, BINS)
+    counts, edges = np.histogram(values, HISTOGRAM_BINS)
     centres = (edges[1:] + edges[:-1]) / 2
     below = np.cumsum(counts)[:-1] / values.size
     mean, mean_below = np.sum(counts * centres) / values.size, np.cumsum(counts * centres)[:-1] / values.size

@@ -11,9 +11,9 @@ from iibr_core.runtime.offers import offered_by
 
 if TYPE_CHECKING:
     from iibr_core.evaluation.datasets import find_scenes
+    from iibr_core.evaluation.evaluate_scene import QUALITIES, Options, evaluate
+    from iibr_core.evaluation.evaluation_report import write_report
     from iibr_core.evaluation.metrics import flip, psnr
-    from iibr_core.evaluation.protocol import QUALITIES, Options, evaluate
-    from iibr_core.evaluation.report import write_report
     from iibr_core.evaluation.report_folder import require_report_folder
     from iibr_core.evaluation.tables import summary_line
     from iibr_core.evaluation.trials import DisparityFrom

@@ -13,7 +13,7 @@ from iibr_core.types import FloatImage, ViewOffset
 
 TRIMMED = 0.8
 """Share of the pixels that count in a fit: those that agree best. Edges are wrong in every estimate."""
-ROUNDS = 10
+ALIGNMENT_ROUNDS = 10
 FIT_PIXELS = 12_000
 END_SHARES = (-0.08, -0.04, -0.02, -0.01, 0.0, 0.01, 0.02, 0.04, 0.08)
 """How far the far and the near end move to the farthest view, in widths: what is tried first."""
@@ -31,7 +31,7 @@ def fit_to_truth(estimate: FloatImage, truth: FloatImage) -> FloatImage:
         return estimate
     counts = np.ones(len(x), bool)
     scale, shift = 0.0, float(np.median(y))
-    for _ in range(ROUNDS):
+    for _ in range(ALIGNMENT_ROUNDS):
         spread = x[counts].std()
         if not spread > 1e-9 * max(1.0, np.abs(x).max()):
             break

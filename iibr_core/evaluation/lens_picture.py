@@ -15,7 +15,7 @@ import numpy as np
 from iibr_core.formats.files import is_file, read_text
 from iibr_core.formats.images.oiio_reader import read_size
 from iibr_core.formats.images.photo import read_photo
-from iibr_core.formats.light_fields.scene import MultiView
+from iibr_core.formats.light_fields.multi_view_scene import MultiView
 from iibr_core.types import FloatImage, InputError
 
 PICTURE, ABOUT = "lens.png", "lens.json"

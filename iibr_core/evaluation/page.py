@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from PIL import Image
 
 from iibr_core.color import bytes_from_encoded
+from iibr_core.evaluation.focal_stacks import LENS
 from iibr_core.evaluation.metrics import flip_picture
-from iibr_core.evaluation.refocus import LENS
 from iibr_core.evaluation.results import TRUTH, Bytes, EvaluationResult
 from iibr_core.evaluation.tables import (
     ABOUT_CONSISTENCY,

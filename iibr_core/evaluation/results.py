@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.evaluation.consistency import Consistency
-from iibr_core.evaluation.refocus import RefocusResult
+from iibr_core.evaluation.focal_stacks import RefocusResult
 from iibr_core.types import ImageSize
 
 IDENTITY, REFERENCE, TRUTH = "identity", "reference warp", "truth"

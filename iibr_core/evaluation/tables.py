@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from iibr_core.evaluation.refocus import LENS
+from iibr_core.evaluation.focal_stacks import LENS
 from iibr_core.evaluation.results import EvaluationResult
 from iibr_core.evaluation.trials import CENTRE_TRIAL
 

@@ -24,7 +24,7 @@ from iibr_core.rendering.rendered_view import RenderedView
 from iibr_core.stages import ALL_STAGES, Stages
 from iibr_core.types import Camera, FloatImage, Quality, image_size
 
-LEAST_SHARE = 0.1
+LEAST_STATED_SHARE = 0.1
 """Of the least disparity that the data set states: what an estimate puts farther away, or behind us, is there."""
 
 
@@ -112,7 +112,7 @@ class FreeCameraViews:
         self._given = self._camera(trial.given).resized(image_size(photo))
         # Cameras are in view steps: a step at distance 1 is the focal length.
         self._scale_px = self._given.focal_px[0]
-        self._least_px = LEAST_SHARE * self._scale_px / (self._given.depth_range or (1.0, 1.0))[1]
+        self._least_px = LEAST_STATED_SHARE * self._scale_px / (self._given.depth_range or (1.0, 1.0))[1]
         cameras = [self._as_large_as_photo(self._camera(index)) for index in trial.judged]
         inverse_depth = np.maximum(disparity, np.float32(self._least_px)) / np.float32(self._scale_px)
         self._views = FreeViews(

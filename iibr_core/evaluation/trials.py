@@ -17,7 +17,7 @@ from iibr_core.depth.search import open_with_depth
 from iibr_core.evaluation.alignment import fit_to_truth, fit_to_views
 from iibr_core.evaluation.datasets import read_known_disparity, read_straight_view, read_view
 from iibr_core.evaluation.reference_warp import reference_warp
-from iibr_core.formats.light_fields.scene import KnownDisparity, MultiView
+from iibr_core.formats.light_fields.multi_view_scene import KnownDisparity, MultiView
 from iibr_core.inpainting.disparity_holes import fill_disparity_holes
 from iibr_core.types import Disparity, FloatImage, GridShape, InputError, ViewOffset, image_size
 

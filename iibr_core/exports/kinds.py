@@ -13,7 +13,7 @@ from typing import Literal
 from iibr_core.formats.animations import VIDEOS
 from iibr_core.types import InputError
 
-LIGHT_FIELD = ("light_field:write_light_field",)
+LIGHT_FIELD = ("light_field_export:write_light_field",)
 MAP = (".pfm", ".exr", ".npy", ".png")
 PICTURE = (".png", ".jpg", ".jpeg", ".webp", ".avif", ".tif", ".tiff")
 DATA = (".png",)
@@ -29,8 +29,8 @@ PURPOSES: dict[Purpose, str] = {"share": "Share", "display": "3D displays", "sof
 
 @dataclass(frozen=True)
 class ExportKind:
-    """words: for people. endings: of the file, the usual one first; none: a folder is written. write: writes it. heeds:
-    names of the options about exports and the lens that mean something to it. path: makes the file's name what players
+    """words: for people. endings: of the file, the usual one first; none: a folder is written. write: writes it.
+    supports: names of the supported options about exports and the lens. path: makes the file's name what players
     expect. layout: of a light field, among `WRITERS`. own_files: what a folder may hold that is replaced, as a regular
     expression. needs: packages, of the extra `export`. frames: pictures of a stack. rate: frames a second.
     most_width_px: of pictures whose size nobody chose, 0: any. has_colors: else it is a map, and no gloss shows in it.
@@ -41,7 +41,7 @@ class ExportKind:
     words: str
     endings: tuple[str, ...]
     write: str
-    heeds: tuple[str, ...] = ()
+    supports: tuple[str, ...] = ()
     path: str = ""
     layout: str = ""
     own_files: str = ""
@@ -56,7 +56,7 @@ class ExportKind:
     @property
     def is_drawn(self) -> bool:
         """Whether the graphics card draws it; else it is made of the views themselves."""
-        return "aperture" in self.heeds
+        return "aperture" in self.supports
 
     @property
     def is_video(self) -> bool:
@@ -66,26 +66,29 @@ class ExportKind:
 
 EXPORTS = {
     "quilt": ExportKind(
-        "Quilt for light-field displays", PICTURE, "quilt:write_quilt",
-        ("focus", "aperture", "device", "show"), path="quilt:quilt_path", purpose="display",
+        "Quilt for light-field displays", PICTURE, "quilt_export:write_quilt",
+        ("focus", "aperture", "device", "show"), path="quilt_export:quilt_path", purpose="display",
     ),
     "rgbd": ExportKind("Picture with depth at the right", PICTURE, "rgbd:write_beside", purpose="display"),
     "rgbd-left": ExportKind("Picture with depth at the left", PICTURE, "rgbd:write_before", purpose="display"),
     "rgbd-below": ExportKind("Picture with depth below", PICTURE, "rgbd:write_below", purpose="display"),
     "sbs": ExportKind(
-        "Side by side", PICTURE, "stereo:write_side_by_side", EYES, "stereo:full_path", purpose="display",
+        "Side by side", PICTURE, "stereo_export:write_side_by_side", EYES, "stereo_export:full_path", purpose="display",
     ),
     "half-sbs": ExportKind(
-        "Side by side, half width", PICTURE, "stereo:write_half_side_by_side",
-        EYES, "stereo:half_path", purpose="display",
+        "Side by side, half width", PICTURE, "stereo_export:write_half_side_by_side",
+        EYES, "stereo_export:half_path", purpose="display",
     ),
     "over-under": ExportKind(
-        "Left eye over right", PICTURE, "stereo:write_over_under", EYES, "stereo:over_path", purpose="display",
+        "Left eye over right", PICTURE, "stereo_export:write_over_under",
+        EYES, "stereo_export:over_path", purpose="display",
     ),
-    "cross-eyed": ExportKind("Side by side, crossed", PICTURE, "stereo:write_cross_eyed", EYES, purpose="display"),
-    "anaglyph": ExportKind("Anaglyph, red-cyan", PICTURE, "stereo:write_anaglyph", EYES, purpose="display"),
+    "cross-eyed": ExportKind(
+        "Side by side, crossed", PICTURE, "stereo_export:write_cross_eyed", EYES, purpose="display",
+    ),
+    "anaglyph": ExportKind("Anaglyph, red-cyan", PICTURE, "stereo_export:write_anaglyph", EYES, purpose="display"),
     "spatial-photo": ExportKind(
-        "Spatial photo, HEIC", (".heic",), "spatial_photo:write_spatial", EYES, purpose="display",
+        "Spatial photo, HEIC", (".heic",), "spatial_photo_export:write_spatial", EYES, purpose="display",
     ),
     "web": ExportKind(
         "Web page, one file", (".html",), "web:write_page",
@@ -124,12 +127,14 @@ EXPORTS = {
     ),
     "splats": ExportKind("Gaussian splats, PLY", (".ply",), "points:write_gaussians", purpose="software"),
     "point-cloud": ExportKind("Point cloud, PLY", (".ply",), "points:write_point_cloud", purpose="software"),
-    "llff": ExportKind("Cameras, LLFF", (), "cameras:write_llff_folder", own_files=CAMERA_FILES, purpose="software"),
+    "llff": ExportKind(
+        "Cameras, LLFF", (), "camera_export:write_llff_folder", own_files=CAMERA_FILES, purpose="software",
+    ),
     "nerfstudio": ExportKind(
-        "Cameras, nerfstudio", (), "cameras:write_nerfstudio_folder", own_files=CAMERA_FILES, purpose="software",
+        "Cameras, nerfstudio", (), "camera_export:write_nerfstudio_folder", own_files=CAMERA_FILES, purpose="software",
     ),
     "colmap": ExportKind(
-        "Cameras, COLMAP", (), "cameras:write_colmap_folder", own_files=CAMERA_FILES, purpose="software",
+        "Cameras, COLMAP", (), "camera_export:write_colmap_folder", own_files=CAMERA_FILES, purpose="software",
     ),
     "hci": ExportKind("Light field, HCI folder", (), *LIGHT_FIELD, layout="hci", purpose="software"),
     "numbered-grid": ExportKind(

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from iibr_core.exports.cameras import cameras_of, colors_of
+from iibr_core.exports.camera_export import cameras_of, colors_of
 from iibr_core.exports.options import ExportOptions
 from iibr_core.exports.settings import ExportSettings
 from iibr_core.exports.source import ExportSource

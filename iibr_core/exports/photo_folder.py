@@ -11,7 +11,7 @@ from typing import Literal
 
 from iibr_core.depth.sidecar import SIDECAR_KINDS
 from iibr_core.exports.kinds import EXPORTS
-from iibr_core.formats.light_fields.registry import find_light_field
+from iibr_core.formats.light_fields.light_field_formats import find_light_field
 
 PHOTO_ENDINGS = frozenset(
     [

@@ -1,4 +1,4 @@
-"""The scene in three dimensions: the photo's surfaces, and behind them what was made up where views saw past them."""
+"""The scene in three dimensions: the photo's surfaces, and the inpainted ones behind them."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.exports.cameras import cameras_of, colors_of
+from iibr_core.exports.camera_export import cameras_of, colors_of
 from iibr_core.exports.settings import ExportSettings
 from iibr_core.exports.source import ExportSource
 from iibr_core.formats.cameras import FieldCameras
@@ -33,7 +33,7 @@ def write_gaussians(path: Path, source: ExportSource, settings: ExportSettings) 
 
 
 def scene_points(source: ExportSource) -> Points:
-    """The centre view's pixels, and what was made up in the corner views. Raises InputError where nothing tells depth,
+    """The centre view's pixels, and what was inpainted in the corner views. Raises InputError without depth,
     Cancelled once the export should stop.
     """
     cameras = cameras_of(source)

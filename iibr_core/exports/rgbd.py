@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from iibr_core.color import bytes_from_encoded
-from iibr_core.exports.cameras import colors_of
+from iibr_core.exports.camera_export import colors_of
 from iibr_core.exports.pictures import write_with_metadata
 from iibr_core.exports.settings import ExportSettings
 from iibr_core.exports.source import ExportSource

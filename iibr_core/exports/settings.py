@@ -41,12 +41,12 @@ class ExportSettings:
     stills: bool = False
 
 
-def settle(kind: ExportKind, options: ExportOptions, scene: Scene, optics: Optics) -> ExportSettings:
+def resolve_settings(kind: ExportKind, options: ExportOptions, scene: Scene, optics: Optics) -> ExportSettings:
     """What the user said, and what is usual of this kind where nothing was said."""
     rate = options.rate or kind.rate
     eyes = float(scene.grid.columns - 1) if options.eyes is None else options.eyes
     width = scene.width
-    if "eyes" in kind.heeds:
+    if "eyes" in kind.supports:
         width = max(round(width * (1 - 2 * shear_margin(scene, optics, eyes))), 1)
     aspect = width / scene.height
     return ExportSettings(

@@ -16,10 +16,10 @@ from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.generation.plan import ScenePlan
 from iibr_core.rendering.optics import CENTRE, Optics
 from iibr_core.runtime.tiling import ShouldStop, raise_if_stopped
-from iibr_core.scenes.gloss import add_gloss
 from iibr_core.scenes.loaded_photo import LoadedPhoto
 from iibr_core.scenes.making import views_of_photo
 from iibr_core.scenes.scene import Progress, Scene
+from iibr_core.scenes.scene_gloss import add_gloss
 from iibr_core.types import FloatImage, ReportProgress, ViewUpdate
 
 Item = TypeVar("Item")
@@ -85,7 +85,7 @@ class ExportSource:
 
     def _views_of_folder(self, with_disparity: bool) -> Iterator[ViewUpdate]:
         """As read; with disparity that was found, and with views between them, where the scene has such."""
-        from iibr_core.formats.light_fields.registry import open_light_field
+        from iibr_core.formats.light_fields.light_field_formats import open_light_field
         from iibr_core.formats.light_fields.views import read_views
         from iibr_core.scenes.light_fields import showings_of_light_field
 

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from iibr_core.formats.images.picture_writers import write_picture
     from iibr_core.formats.images.settings_text import ATTRIBUTE, settings_text_in
     from iibr_core.formats.images.thumbnail import read_thumbnail
-    from iibr_core.formats.light_fields.registry import (
+    from iibr_core.formats.light_fields.light_field_formats import (
         WRITERS,
         LightFieldWriter,
         WriterFactory,
@@ -44,7 +44,7 @@ if TYPE_CHECKING:
         open_light_field,
         writer_for,
     )
-    from iibr_core.formats.light_fields.scene import common_size
+    from iibr_core.formats.light_fields.multi_view_scene import common_size
     from iibr_core.formats.light_fields.views import grid_of, read_stored_view
     from iibr_core.formats.maps.reader import read_map
     from iibr_core.formats.maps.writer import write_map

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from iibr_core.runtime.offers import offered_by
 
 if TYPE_CHECKING:
+    from iibr_core.generation.disparity_range import measure_disparity_range
     from iibr_core.generation.free_views import (
         FreeViews,
         depths_of,
@@ -29,7 +30,6 @@ if TYPE_CHECKING:
         whole_bytes,
     )
     from iibr_core.generation.plan import ScenePlan, plan_literal
-    from iibr_core.generation.relief import measure_relief
     from iibr_core.generation.stored_views import encode_for_storage, stored_colors
 else:
     __getattr__ = offered_by(__file__)

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.generation.memory_model import DRAFT_BYTES, Making, making_bytes, undecided_bytes
-from iibr_core.generation.outer_views import margins_beyond_frame, outer_views_of_grid
+from iibr_core.generation.outer_views import outer_views_of_grid, outpainting_margins
 from iibr_core.runtime.tiling import THREADS
 from iibr_core.types import FloatImage, GridShape, ImageSize, Quality, ViewOffset, image_size
 
@@ -120,7 +120,7 @@ def measure_parallax(disparity: FloatImage, outermost: float) -> ParallaxStatist
         around.soft,
         float(np.abs(moved).max()),
         _hole_share(moved),
-        margins_beyond_frame(moved, [ViewOffset(-1.0, -1.0), ViewOffset(1.0, 1.0)]).around(image_size(moved)),
+        outpainting_margins(moved, [ViewOffset(-1.0, -1.0), ViewOffset(1.0, 1.0)]).around(image_size(moved)),
     )
 
 

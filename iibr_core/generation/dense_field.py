@@ -23,7 +23,7 @@ from iibr_core.generation.light_field import nearest_first
 from iibr_core.generation.memory_model import MOST_COMPLETING
 from iibr_core.generation.stored_views import encode_for_storage
 from iibr_core.inpainting.background import fill_background
-from iibr_core.inpainting.protocol import Inpainter
+from iibr_core.inpainting.inpainter import Inpainter
 from iibr_core.rendering.photo_rays import rays_of_photo
 from iibr_core.rendering.ray_set import OWN_SURFACE_PX, RaySet
 from iibr_core.rendering.renderer import Renderer, open_renderer

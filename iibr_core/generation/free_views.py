@@ -14,12 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.formats.cameras import infinity_of
-from iibr_core.generation.outer_views import AROUND_PX, farthest_views, outer_views
-from iibr_core.generation.relief import measure_relief, rounding_step
+from iibr_core.generation.disparity_range import measure_disparity_range, rounding_step
+from iibr_core.generation.outer_views import LOOKUP_MARGIN_PX, farthest_views, outer_views
 from iibr_core.generation.update_loop import render_outer_views
 from iibr_core.inpainting.background import fill_background
-from iibr_core.inpainting.beyond_frame import extend_beyond_frame
-from iibr_core.inpainting.protocol import Inpainter
+from iibr_core.inpainting.inpainter import Inpainter
+from iibr_core.inpainting.outpainting import outpaint
 from iibr_core.rendering.free_view import render_free_view, target_from_photo
 from iibr_core.rendering.photo_rays import rays_of_photo
 from iibr_core.rendering.ray_set import NO_MARGINS
@@ -44,7 +44,7 @@ MOST_BEYOND = 0.5
 """Of the photo's width and height: so far on each side it is continued for cameras that look there."""
 LEAST_BEYOND_PX = 1e-3
 MOST_PARALLAX = 0.5
-"""Of the photo's longer side: cameras that see the nearest move farther against the farthest see what is made up."""
+"""Of the photo's longer side: where the nearest moves farther against the farthest, cameras see inpainted areas."""
 MOST_UNLIKE = 0.02
 """So far the sides of a pose's picture and the photo's may differ in their ratio: smaller copies are rounded."""
 LOOKED_AT = 33
@@ -59,17 +59,17 @@ Points = NDArray[np.float64]
 def inverse_depth_of(disparity: FloatImage, depth_range: tuple[float, float] | None) -> FloatImage:
     """1 / depth (H, W) in the unit of lengths that depth_range is in, of disparity (H, W) in any unit.
 
-    The range of what counts as relief becomes the range of depths. Where that is not known (None), lengths are in
+    The range of the disparity becomes the range of depths. Where that is not known (None), lengths are in
     distances of the nearest, and what is infinitely far as `infinity_of` has it.
     """
-    relief = measure_relief(disparity)
+    span = measure_disparity_range(disparity)
     if depth_range is None:
-        at_infinity = infinity_of(relief.low, relief.high)
-        farthest, nearest = (relief.low - at_infinity) / (relief.high - at_infinity), 1.0
+        at_infinity = infinity_of(span.low, span.high)
+        farthest, nearest = (span.low - at_infinity) / (span.high - at_infinity), 1.0
     else:
         nearest, farthest = (1.0 / depth for depth in depth_range)
     # What is flat is at the middle of both.
-    share = (np.clip(disparity, relief.low, relief.high) - relief.low) / relief.range if relief.range > 0 else 0.5
+    share = (np.clip(disparity, span.low, span.high) - span.low) / span.range if span.range > 0 else 0.5
     return np.full(disparity.shape, farthest + (nearest - farthest) * share, np.float32)
 
 
@@ -127,13 +127,13 @@ class FreeViews:
         Raises InputError for a camera that sees nothing of the photo, Cancelled once should_stop is true.
         """
         reach = reach_of(camera, cameras, depths_of(inverse_depth))
-        margins = reach.margins if stages.extrapolate_beyond_frame else NO_MARGINS
+        margins = reach.margins if stages.outpainting else NO_MARGINS
         self._should_stop, self._margins = should_stop, margins
         self.scale_px = camera.focal_px[0] * reach.step
         disparity = inverse_depth * np.float32(self.scale_px)
         self._step = rounding_step(disparity)
         farthest = farthest_views(reach.outer)
-        colors, disparity = extend_beyond_frame(photo, disparity, margins, should_stop, stages)
+        colors, disparity = outpaint(photo, disparity, margins, should_stop, stages)
         x, y = camera.centre_px
         centre_px = x + margins.left, y + margins.top
         self._camera = replace(camera, size=image_size(disparity), centre_px=centre_px)
@@ -217,7 +217,7 @@ def _margins(size: ImageSize, places: Points) -> Margins:
     (left, top), (right, bottom) = -0.5 - places.min(axis=0), 0.5 + places.max(axis=0) - (size.width, size.height)
 
     def margin(reach: float, length: int) -> int:
-        return ceil(min(reach + AROUND_PX, MOST_BEYOND * length)) if reach > LEAST_BEYOND_PX else 0
+        return ceil(min(reach + LOOKUP_MARGIN_PX, MOST_BEYOND * length)) if reach > LEAST_BEYOND_PX else 0
 
     return Margins(
         margin(top, size.height), margin(bottom, size.height), margin(left, size.width), margin(right, size.width)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from iibr_core.depth.multi_view.estimate import estimate_coarse, sweep_bytes
+from iibr_core.depth.multi_view.estimate_disparity import estimate_coarse, sweep_bytes
 from iibr_core.depth.multi_view.every_view import estimate_all
-from iibr_core.formats.light_fields.scene import MultiView
+from iibr_core.formats.light_fields.multi_view_scene import MultiView
 from iibr_core.formats.light_fields.views import grid_of, read_views
 from iibr_core.generation.dense_field import GivenView
 from iibr_core.generation.memory_model import WRITER_BYTES, Budget, require_dense_field

@@ -13,12 +13,12 @@ from functools import partial
 import numpy as np
 
 from iibr_core.generation.field_work import FieldWork
-from iibr_core.generation.outer_views import farthest_views, margins_beyond_frame, outer_views_of_grid
+from iibr_core.generation.outer_views import farthest_views, outer_views_of_grid, outpainting_margins
 from iibr_core.generation.plan import ScenePlan
 from iibr_core.generation.stored_views import Draft, StoredViews, encode_for_storage
 from iibr_core.generation.update_loop import render_outer_views
 from iibr_core.inpainting.background import fill_background
-from iibr_core.inpainting.protocol import Inpainter, InpaintingAids
+from iibr_core.inpainting.inpainter import Inpainter, InpaintingAids
 from iibr_core.inpainting.registry import DEFAULT_INPAINTER, INPAINTERS, load_inpainter, require_inpainter
 from iibr_core.rendering.hypotheses import AmbiguousRays
 from iibr_core.rendering.photo_rays import rays_of_photo
@@ -160,7 +160,7 @@ def ray_set(
     farthest = farthest_views(outer)
     if not plan.has_disocclusion:
         outer = []
-    margins = margins_beyond_frame(disparity.values, outer)
+    margins = outpainting_margins(disparity.values, outer)
     rays = rays_of_photo(photo.pixels, disparity.values, farthest, len(outer), should_stop, margins)
     return rays, render_outer_views(rays, outer, should_stop, inpainter)
 

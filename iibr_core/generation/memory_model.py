@@ -47,7 +47,7 @@ RAY_BYTES = bytes_of(colors="3f4", disparity="f4", coverage="f4", edge_level="u1
 """Of one source image, see `RaySet`."""
 STATISTICS_BYTES = bytes_of(low="f4", high="f4", step="f4")
 """Of one source image, where the transformer is asked."""
-DETAIL_BYTES = bytes_of(detail="f4", joined="u1")
+DETAIL_BYTES = bytes_of(detail="f4", connected="u1")
 FILLED_BYTES = bytes_of(colors="3f4", disparity="f4", coverage="f4")
 VIEW_BYTES = bytes_of(colors="3f4", disparity="f4", occluded="?", inpainted="?", uncovered="f4") + FILLED_BYTES
 """Of a view in the making, with what it adds to the rays."""
@@ -56,7 +56,7 @@ BAND_BYTES = CANDIDATE_BYTES + bytes_of(image="u1", colors="3f4")
 """Of the rows in the making."""
 HOLE_BYTES = bytes_of(pixel="2i8", number="i4", around="16i8", reach="f4", changed="3f4")
 """Of one pixel of a hole while it is filled: what surrounds it in sixteen directions."""
-DRAFT_BYTES = bytes_of(colors="3u1", with_specks="3u1", disparity="f4", inpainted="?")
+DRAFT_BYTES = bytes_of(colors="3u1", with_flying_pixels="3u1", disparity="f4", inpainted="?")
 MAP_BYTES = bytes_of(values="f4", is_known="?", is_finite="?")
 STORED_BYTES, STORED_HDR_BYTES = (bytes_of(colors=each, disparity="f4") for each in ("3u1", "3f2"))
 TARGET_BYTES = bytes_of(light="4f4", color="4f2")
@@ -253,7 +253,7 @@ def require_matching(
 
     range_px: least and greatest that it may have.
     """
-    from iibr_core.depth.multi_view.estimate import sweep_bytes
+    from iibr_core.depth.multi_view.estimate_disparity import sweep_bytes
 
     at = offsets[0]
     reach = max(max(abs(offset.t - at.t), abs(offset.s - at.s)) for offset in offsets)

@@ -13,7 +13,7 @@ MOST_MARGIN = 0.25
 """Of the photo's height or width: what views see farther beyond its frame they fill themselves."""
 NEARLY_ALL = 0.99
 """So much of a side of the frame counts: a few wild pixels do not make the canvas larger."""
-AROUND_PX = 2
+LOOKUP_MARGIN_PX = 2
 """So much more of a margin, that look-ups at its end find their neighbours."""
 
 
@@ -41,7 +41,7 @@ def farthest_views(outer: Iterable[ViewOffset]) -> float:
     return max([1.0, *(abs(part) for at in outer for part in at)])
 
 
-def margins_beyond_frame(disparity: FloatImage, outer: Iterable[ViewOffset]) -> Margins:
+def outpainting_margins(disparity: FloatImage, outer: Iterable[ViewOffset]) -> Margins:
     """How far beyond the frame of a photo with this disparity (H, W) the outer views see; 0 where they do not."""
     every = [ViewOffset(0.0, 0.0), *outer]
     top, bottom = min(at.t for at in every), max(at.t for at in every)
@@ -58,4 +58,4 @@ def margins_beyond_frame(disparity: FloatImage, outer: Iterable[ViewOffset]) -> 
 def _margin(outwards: FloatImage, first: float, last: float, length: int) -> int:
     """Of one side, whose pixels look outwards so many pixels per view step, in views from first to last."""
     reach = float(np.quantile(np.maximum(outwards * first, outwards * last), NEARLY_ALL))
-    return min(ceil(reach) + AROUND_PX, int(MOST_MARGIN * length)) if reach > 0 else 0
+    return min(ceil(reach) + LOOKUP_MARGIN_PX, int(MOST_MARGIN * length)) if reach > 0 else 0

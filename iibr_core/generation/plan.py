@@ -21,6 +21,7 @@ from iibr_core.generation.cost_model import (
     largest_offset,
     measure_parallax,
 )
+from iibr_core.generation.disparity_range import measure_disparity_range
 from iibr_core.generation.memory_model import (
     HEADROOM,
     LEAST_PIXELS,
@@ -34,7 +35,6 @@ from iibr_core.generation.memory_model import (
 )
 from iibr_core.generation.outer_views import outer_views_of_grid
 from iibr_core.generation.plan_reasons import edge_reasons, grid_reason, quality_reason, wild_reasons
-from iibr_core.generation.relief import measure_relief
 from iibr_core.inpainting.registry import DEFAULT_INPAINTER
 from iibr_core.types import (
     DEFAULT_QUALITY,
@@ -59,7 +59,7 @@ MOST_VIEWS_A_SIDE = 9
 MOST_COMFORTABLE = 2.0
 """Times the parallax for viewing: a disparity that is taken as given and moves more is told."""
 MOST_NOISE_PX = 1.0
-"""So much may a map's noise move from the first view to the last: relief that is hardly more than noise moves less."""
+"""So much may a map's noise move from the first view to the last: a range that hardly exceeds the noise moves less."""
 MOST_STRENGTH = 100.0
 """Parallax four times as wide as the picture."""
 
@@ -128,14 +128,14 @@ def plan_for_viewing(
     if not abs(wanted.depth_strength) <= MOST_STRENGTH:
         raise InputError(f"--depth-strength {wanted.depth_strength:g}: give a number up to {MOST_STRENGTH:g}")
     budget = budget_of(wanted.memory_bytes)
-    relief = measure_relief(disparity.values)
+    span = measure_disparity_range(disparity.values)
     given = disparity.values
-    disparity = replace(disparity, values=np.clip(given, relief.low, relief.high))
+    disparity = replace(disparity, values=np.clip(given, span.low, span.high))
     zero = float(np.median(disparity.values)) if wanted.focus_disparity is None else wanted.focus_disparity
     width = photo.size.width
     parallax_px = 0.0
-    if relief.range > 0:
-        carried_px = MOST_NOISE_PX * relief.range / relief.noise if relief.noise > 0 else np.inf
+    if span.range > 0:
+        carried_px = MOST_NOISE_PX * span.range / span.noise if span.noise > 0 else np.inf
         usual_px = TOTAL_PARALLAX * disparity.viewing_share * width
         parallax_px = min(usual_px, carried_px) * abs(wanted.depth_strength)
     reasons = []
@@ -143,20 +143,20 @@ def plan_for_viewing(
         grid = wanted.grid
         reasons.append(f"{grid.columns} x {grid.rows} views, as asked.")
     else:
-        most_moved = 0.5 * parallax_px / relief.range if parallax_px else 0.0
+        most_moved = 0.5 * parallax_px / span.range if parallax_px else 0.0
         statistics = measure_parallax(disparity.values - np.float32(zero), most_moved)
         grid = _grid_for(parallax_px, statistics, photo, budget, wanted.quality or DEFAULT_QUALITY)
         reasons.append(grid_reason(grid, parallax_px))
     steps = max(grid.rows, grid.columns) - 1
-    scale = parallax_px / steps / relief.range * np.sign(wanted.depth_strength) if steps and parallax_px else 0.0
+    scale = parallax_px / steps / span.range * np.sign(wanted.depth_strength) if steps and parallax_px else 0.0
     if parallax_px:
         reasons.append(
             f"The nearest moves {parallax_px:.0f} px against the farthest, {parallax_px / width:.1%} of the width."
         )
-    reasons += wild_reasons(given, relief)
+    reasons += wild_reasons(given, span)
     plan = _complete_plan(photo, disparity, grid, float(scale), zero, reasons, wanted.quality, wanted.inpaint, budget)
     _require_room(plan, photo, budget, keeps_views)
-    return replace(plan, given_range=(relief.low, relief.high))
+    return replace(plan, given_range=(span.low, span.high))
 
 
 def plan_literal(

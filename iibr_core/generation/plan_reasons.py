@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from iibr_core.generation.cost_model import CostEstimates, ParallaxStatistics
-from iibr_core.generation.relief import Relief
+from iibr_core.generation.disparity_range import DisparityRange
 from iibr_core.inpainting.registry import DEFAULT_INPAINTER, INPAINTERS
 from iibr_core.types import FloatImage, GridShape, Quality
 
@@ -18,10 +18,10 @@ def grid_reason(grid: GridShape, parallax_px: float) -> str:
     return f"{grid.columns} x {grid.rows} views: neighbours differ by {step:.1f} px, the renderer fills in between."
 
 
-def wild_reasons(given: FloatImage, relief: Relief) -> list[str]:
-    """A sentence where the map holds what lies far beyond its relief."""
-    far, near = relief.low - relief.range / 2, relief.high + relief.range / 2
-    count = int(np.count_nonzero((given < far) | (given > near))) if relief.range > 0 else 0
+def wild_reasons(given: FloatImage, span: DisparityRange) -> list[str]:
+    """A sentence where the map has values far outside its range."""
+    far, near = span.low - span.range / 2, span.high + span.range / 2
+    count = int(np.count_nonzero((given < far) | (given > near))) if span.range > 0 else 0
     if not count:
         return []
     return [f"{count} pixels lie far beyond that range, as mistakes do: they count as the nearest or the farthest."]

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 
 from iibr_core.color import stored_from_encoded
 from iibr_core.rendering.ambiguous_rays import UndecidedRays
+from iibr_core.rendering.flying_pixels import without_flying_pixels
 from iibr_core.rendering.ray_set import RaySet
 from iibr_core.rendering.rendered_view import RenderedView, ShownBefore
 from iibr_core.rendering.renderer import Renderer
-from iibr_core.rendering.specks import without_specks
 from iibr_core.runtime.tiling import ShouldStop, in_bands
 from iibr_core.types import FloatImage, GridShape, StoredColors, ViewOffset, ViewUpdate, image_size
 
@@ -25,17 +25,17 @@ from iibr_core.types import FloatImage, GridShape, StoredColors, ViewOffset, Vie
 class Draft:
     """A view in closed form, and its rays that the transformer is still to be asked for: see `Renderer`.
 
-    with_specks: its colours, stored, before its specks were taken out.
+    with_flying_pixels: its colours, stored, before its flying pixels were replaced.
     """
 
     update: ViewUpdate
-    with_specks: StoredColors
+    with_flying_pixels: StoredColors
     undecided: list[UndecidedRays]
 
     @property
     def nbytes(self) -> int:
         """Memory it takes."""
-        view = (self.update.colors, self.with_specks, self.update.disparity, self.update.inpainted)
+        view = (self.update.colors, self.with_flying_pixels, self.update.disparity, self.update.inpainted)
         return sum(part.nbytes for part in view if part is not None) + sum(part.nbytes for part in self.undecided)
 
 
@@ -57,7 +57,7 @@ class StoredViews:
         """A view in closed form, final where nothing is left to be decided."""
         view, undecided = self._renderer.draft(self._rays, offset)
         stored = encode_for_storage(view.colors, self._is_hdr, self._should_stop, 1)
-        colors = self._without_specks(offset, stored, view.disparity, view.inpainted)
+        colors = self._without_flying_pixels(offset, stored, view.disparity, view.inpainted)
         update = self._update(offset, colors, view.disparity, view.inpainted, not undecided)
         return Draft(update, stored, undecided)
 
@@ -65,7 +65,7 @@ class StoredViews:
         """The final view: its undecided rays are written over, the draft itself stays as it is."""
         assert draft.update.disparity is not None
         assert draft.update.inpainted is not None
-        stored, disparity = draft.with_specks.copy(), draft.update.disparity.copy()
+        stored, disparity = draft.with_flying_pixels.copy(), draft.update.disparity.copy()
         inpainted = draft.update.inpainted.copy()
         for part in draft.undecided:
             decided = self._renderer.decide(self._rays, part)
@@ -73,7 +73,7 @@ class StoredViews:
             stored[at] = stored_from_encoded(decided.colors, self._is_hdr)
             disparity[at], inpainted[at] = decided.disparity, decided.inpainted
         offset = self._grid.offset(draft.update.row, draft.update.column)
-        colors = self._without_specks(offset, stored, disparity, inpainted)
+        colors = self._without_flying_pixels(offset, stored, disparity, inpainted)
         return self._update(offset, colors, disparity, inpainted, True)
 
     def update(self, offset: ViewOffset, view: RenderedView, is_final: bool = True) -> ViewUpdate:
@@ -81,10 +81,10 @@ class StoredViews:
         colors = stored_colors(self._rays, offset, view, self._is_hdr, self._should_stop)
         return self._update(offset, colors, view.disparity, view.inpainted, is_final)
 
-    def _without_specks(
+    def _without_flying_pixels(
         self, offset: ViewOffset, stored: StoredColors, disparity: FloatImage, inpainted: NDArray[np.bool_]
     ) -> StoredColors:
-        return without_specks(self._rays, offset, stored, disparity, inpainted, self._should_stop, 1)
+        return without_flying_pixels(self._rays, offset, stored, disparity, inpainted, self._should_stop, 1)
 
     def _update(
         self,
@@ -101,13 +101,13 @@ class StoredViews:
 def stored_colors(
     rays: RaySet, offset: ViewOffset, view: RenderedView, is_hdr: bool, should_stop: ShouldStop
 ) -> StoredColors:
-    """The colours (H, W, 3) of a view made of the rays of a photo, as they are stored, without specks.
+    """The colours (H, W, 3) of a view made of the rays of a photo, as they are stored, without flying pixels.
 
     Specks are told from what is stored: so a draft that was finished is what was made at once. Raises Cancelled once
     should_stop is true.
     """
     stored = encode_for_storage(view.colors, is_hdr, should_stop, 1)
-    return without_specks(rays, offset, stored, view.disparity, view.inpainted, should_stop, 1)
+    return without_flying_pixels(rays, offset, stored, view.disparity, view.inpainted, should_stop, 1)
 
 
 def encode_for_storage(

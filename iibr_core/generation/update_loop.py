@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 
 from iibr_core.inpainting.background import fill_background
-from iibr_core.inpainting.protocol import Inpainter
+from iibr_core.inpainting.inpainter import Inpainter
 from iibr_core.rendering.ray_set import RaySet
 from iibr_core.rendering.rendered_view import RenderedView
 from iibr_core.rendering.renderer import open_renderer

@@ -9,15 +9,15 @@ from types import TracebackType
 
 from iibr_core.color import encoded_from_stored, stored_from_encoded
 from iibr_core.generation.light_field import transformer_for
-from iibr_core.generation.outer_views import farthest_views, margins_beyond_frame, outer_views
+from iibr_core.generation.outer_views import farthest_views, outer_views, outpainting_margins
 from iibr_core.generation.update_loop import render_outer_views
 from iibr_core.inpainting.background import fill_background
 from iibr_core.rendering.ambiguous_rays import HYPOTHESES
+from iibr_core.rendering.flying_pixels import postprocessed_view
 from iibr_core.rendering.photo_rays import rays_of_photo
 from iibr_core.rendering.ray_set import NO_MARGINS
 from iibr_core.rendering.rendered_view import RenderedView
 from iibr_core.rendering.renderer import Renderer, open_renderer
-from iibr_core.rendering.specks import settled_view
 from iibr_core.stages import ALL_STAGES, Stages
 from iibr_core.types import FloatImage, Quality, ViewOffset
 
@@ -46,7 +46,7 @@ class ViewMaker:
         """
         self._should_stop, self._slots = should_stop, slots
         self.outer = outer_views(offsets)
-        margins = margins_beyond_frame(disparity, self.outer) if stages.extrapolate_beyond_frame else NO_MARGINS
+        margins = outpainting_margins(disparity, self.outer) if stages.outpainting else NO_MARGINS
         farthest = farthest_views(self.outer)
         self._rays = rays_of_photo(photo, disparity, farthest, len(self.outer), should_stop, margins, stages)
         self._inpainter = partial(fill_background, stages=stages)
@@ -69,7 +69,7 @@ class ViewMaker:
             start = time.perf_counter()
             shared = self.outer if self._rays.stages.share_inpainted else ()
             for offset, view in render_outer_views(self._rays, shared, self._should_stop, self._inpainter, self._slots):
-                self._first[offset] = self._settled(offset, view), 1e3 * (time.perf_counter() - start)
+                self._first[offset] = self._postprocessed(offset, view), 1e3 * (time.perf_counter() - start)
                 start = time.perf_counter()
         except BaseException:
             self.__exit__(None, None, None)
@@ -91,18 +91,18 @@ class ViewMaker:
         if quality == "fast" and offset in self._first:
             return self._first[offset]
         start = time.perf_counter()
-        view = self._settled(offset, self._renderers[quality].render(self._rays, offset))
+        view = self._postprocessed(offset, self._renderers[quality].render(self._rays, offset))
         return view, 1e3 * (time.perf_counter() - start)
 
     def views(self, quality: Quality, offsets: Iterable[ViewOffset]) -> Iterator[RenderedView]:
         """Views at these offsets, in their order, several at a time, as `generate` makes them."""
         renderer = self._renderers[quality]
         return renderer.side_by_side(
-            lambda offset: self._settled(offset, renderer.render(self._rays, offset, alone=True), 1), offsets
+            lambda offset: self._postprocessed(offset, renderer.render(self._rays, offset, alone=True), 1), offsets
         )
 
-    def _settled(self, offset: ViewOffset, view: RenderedView, threads: int | None = None) -> RenderedView:
-        return settled_view(self._rays, offset, view, self._should_stop, threads)
+    def _postprocessed(self, offset: ViewOffset, view: RenderedView, threads: int | None = None) -> RenderedView:
+        return postprocessed_view(self._rays, offset, view, self._should_stop, threads)
 
 
 def quantise_as_stored(colors: FloatImage) -> FloatImage:

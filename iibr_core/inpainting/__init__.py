@@ -11,7 +11,7 @@ from iibr_core.runtime.offers import offered_by
 
 if TYPE_CHECKING:
     from iibr_core.inpainting.background import fill_background
-    from iibr_core.inpainting.protocol import Inpainter
+    from iibr_core.inpainting.inpainter import Inpainter
     from iibr_core.inpainting.registry import DEFAULT_INPAINTER, INPAINTER_FORMS, load_inpainter, require_inpainter
 else:
     __getattr__ = offered_by(__file__)

@@ -12,16 +12,16 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.inpainting.exemplars import copy_exemplars
+from iibr_core.inpainting.border_lines import find_lines, line_weight, mixed_beside
+from iibr_core.inpainting.inpainter import Inpainter
 from iibr_core.inpainting.nearest_known import (
     MOST_PIECE_PIXELS,
     flat_indices,
+    hole_borders,
     nearest_known,
     number_pixels,
-    rims_of_holes,
 )
-from iibr_core.inpainting.protocol import Inpainter
-from iibr_core.inpainting.rim_lines import find_lines, line_weight, mixed_beside
+from iibr_core.inpainting.patch_synthesis import copy_patches
 from iibr_core.runtime.jit import kernel, nearest_pixel
 from iibr_core.runtime.tiling import ShouldStop, in_pieces, never, pieces_of
 from iibr_core.stages import ALL_STAGES, Stages
@@ -29,7 +29,7 @@ from iibr_core.types import FloatImage, ViewOffset, image_size
 
 SMOOTH_STEPS_PX = (1, 2, 4, 8, 16, 32)
 """Colours are averaged over ever wider surroundings, as far as what is known is farther away."""
-AGREE_PX = 2
+MODE_PX = 2
 """Disparities follow the most of their surroundings, so far each way: a lone one would fly off in the next view."""
 SURFACE_PX = 2.0
 """Surfaces that part by less than this are one."""
@@ -114,9 +114,9 @@ def _fill_view(
     one_surface = SURFACE_PX / max(parallax, 1e-9)
     pixels = flat_indices(hole, should_stop, threads)
     known = nearest_known(hole, pixels, should_stop, threads)
-    rims, number = rims_of_holes(known, image_size(hole), should_stop, threads)
+    borders, number = hole_borders(known, image_size(hole), should_stop, threads)
     pure = np.where(mixed_beside(hole), np.float32(np.nan), disparity)
-    lines = np.zeros((len(rims), 2), np.float32)
+    lines = np.zeros((len(borders), 2), np.float32)
     reach, changed = np.empty(len(pixels), np.float32), np.empty((len(pixels), 3), np.float32)
 
     def run(step: Callable[[slice], None], count: int = len(pixels)) -> None:
@@ -128,7 +128,7 @@ def _fill_view(
         run(lambda part: _write_colors(changed[part], pixels[part], colors))
 
     if stages.lines_into_gaps:
-        run(lambda part: find_lines(colors, disparity, pure, rims[part], one_surface, lines[part]), len(rims))
+        run(lambda part: find_lines(colors, disparity, pure, borders[part], one_surface, lines[part]), len(borders))
     run(
         lambda part: _fill(
             colors, disparity, pixels[part], known[part], number, lines,
@@ -142,7 +142,7 @@ def _fill_view(
         smooth(step_px)
     if stages.synthesise_patches:
         number_pixels(pixels, number)
-        copy_exemplars(colors, disparity, pure, pixels, number, one_surface, should_stop, threads)
+        copy_patches(colors, disparity, pure, pixels, number, one_surface, should_stop, threads)
 
 
 def background_inpainter() -> Inpainter:
@@ -172,8 +172,8 @@ def _fill(
             nearest = min(nearest, distance)
             surface[k] = d = disparity[known_y, known_x]
             farthest = min(farthest, d)
-            rim = number[known_y, known_x]
-            along = line_weight(lines[rim, 0], lines[rim, 1], known_y - y, known_x - x)
+            border = number[known_y, known_x]
+            along = line_weight(lines[border, 0], lines[border, 1], known_y - y, known_x - x)
             likely = (1.0 + ALONG_LINES * along) / distance
             place = _place_in_photo(y + d * t, x + d * s, height, width)
             if place < 0 or photo[place] - d > hidden:
@@ -252,14 +252,14 @@ def _weigh_in_front(disparity, pixels, known, photo_disparity, s, t, one_surface
 
 @kernel
 def _agree(disparity, hole, pixels, agreed):
-    """The median of what was filled within AGREE_PX each way, as agreed[:, 0]."""
+    """The median of what was filled within MODE_PX each way, as agreed[:, 0]."""
     height, width = disparity.shape
-    around = np.empty((2 * AGREE_PX + 1) ** 2, np.float32)
+    around = np.empty((2 * MODE_PX + 1) ** 2, np.float32)
     for i in range(len(pixels)):
         y, x = pixels[i] // width, pixels[i] % width
         count = 0
-        for v in range(max(y - AGREE_PX, 0), min(y + AGREE_PX + 1, height)):
-            for u in range(max(x - AGREE_PX, 0), min(x + AGREE_PX + 1, width)):
+        for v in range(max(y - MODE_PX, 0), min(y + MODE_PX + 1, height)):
+            for u in range(max(x - MODE_PX, 0), min(x + MODE_PX + 1, width)):
                 if hole[v, u]:
                     around[count] = disparity[v, u]
                     count += 1

@@ -1,7 +1,7 @@
 """Large gaps painted by a latent-diffusion model from a local folder; all else as `background` fills it.
 
 What was painted gets its disparity from the estimator that gave the photo's, where there is one (the paper's
-D_new = F(I_new)), aligned to what is known around the gap; else surfaces go on from the rim.
+D_new = F(I_new)), aligned to what is known around the gap; else surfaces go on from the border.
 torch and diffusers are imported when the folder is loaded.
 """
 
@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.inpainting.background import fill_background
-from iibr_core.inpainting.protocol import Inpainter, InpaintingAids
+from iibr_core.inpainting.inpainter import Inpainter, InpaintingAids
 from iibr_core.runtime.extras import require_extra, said_by
 from iibr_core.runtime.tiling import Cancelled, ShouldStop, never, raise_if_stopped
 from iibr_core.types import FloatImage, ImageSize, InputError, ViewOffset, image_size
@@ -26,9 +26,9 @@ LARGE_PX = 8
 STEPS = 30
 USUAL_SIDE = 512
 """Pictures are shown to models that do not tell their size with this many pixels along the longer side."""
-RIM_PX = 12
+BORDER_PX = 12
 """Estimated disparity is aligned to what is known so near a gap, and stays within it."""
-LEAST_RIM = 16
+LEAST_BORDER = 16
 """Pixels, to align by."""
 
 
@@ -129,12 +129,12 @@ def align_in_gaps(
 
     Within the range of what is known there. Where too little is, or the fit says the opposite, it stays as it is.
     """
-    near = np.lib.stride_tricks.sliding_window_view(np.pad(large, RIM_PX), (2 * RIM_PX + 1, 1)).any(axis=(-2, -1))
-    near = np.lib.stride_tricks.sliding_window_view(near, 2 * RIM_PX + 1, axis=1).any(axis=-1)
-    rim = near & ~hole & np.isfinite(inverse_depth)
-    if rim.sum() < LEAST_RIM or not np.isfinite(inverse_depth[large]).all():
+    near = np.lib.stride_tricks.sliding_window_view(np.pad(large, BORDER_PX), (2 * BORDER_PX + 1, 1)).any(axis=(-2, -1))
+    near = np.lib.stride_tricks.sliding_window_view(near, 2 * BORDER_PX + 1, axis=1).any(axis=-1)
+    border = near & ~hole & np.isfinite(inverse_depth)
+    if border.sum() < LEAST_BORDER or not np.isfinite(inverse_depth[large]).all():
         return
-    x, y = inverse_depth[rim].astype(np.float64), disparity[rim].astype(np.float64)
+    x, y = inverse_depth[border].astype(np.float64), disparity[border].astype(np.float64)
     spread = float(np.mean((x - x.mean()) ** 2))
     slope = float(np.mean((x - x.mean()) * (y - y.mean()))) / spread if spread > 0 else 0.0
     if slope > 0:

@@ -1,6 +1,6 @@
 """Unknown disparity, filled by the photo: each pixel goes with those around it that look like it.
 
-The background side, which is the safe guess where nothing else is known, tears rims and wires off their surfaces.
+The background side, which is the safe guess where nothing else is known, tears borders and wires off their surfaces.
 """
 
 from __future__ import annotations
@@ -25,21 +25,21 @@ def nearness(reach_px: int, spread_px: float) -> NDArray[np.float64]:
     return np.asarray(np.exp(-0.5 * (steps[:, None] ** 2 + steps**2) / spread_px**2))
 
 
-REACH_PX = 4
+VOTE_REACH_PX = 4
 """Pixels that vote lie within so many, each way."""
 SPREAD_PX = 2.0
 """Standard deviation of their weights by distance."""
-NEARNESS = nearness(REACH_PX, SPREAD_PX)
-"""Those weights, (2 REACH_PX + 1, 2 REACH_PX + 1), the pixel itself in the middle."""
-ALIKE = 0.04
+VOTE_NEARNESS = nearness(VOTE_REACH_PX, SPREAD_PX)
+"""Those weights, (2 VOTE_REACH_PX + 1, 2 VOTE_REACH_PX + 1), the pixel itself in the middle."""
+COLOR_SIGMA = 0.04
 """Standard deviation of their weights by colour (sRGB-encoded, all channels together)."""
 UNLIKE_WEIGHT = 1e-3
 """Of a pixel that looks like another thing altogether: where nothing looks alike, the nearest decide."""
-BINS = 24
+VOTE_BINS = 24
 """The range of the disparities around a pixel is cut into so many; the vote is for one of them and its neighbours."""
 SIDE_BINS = 0.7
 """How much the neighbours of a bin count for it."""
-MOST_ROUNDS = 64
+MOST_VOTE_ROUNDS = 64
 """Pixels farther than this from all that is known are filled from the background side."""
 MOST_PIECE_PIXELS = 1 << 12
 
@@ -60,7 +60,7 @@ def fill_disparity_by_color(photo: FloatImage, values: FloatImage, should_stop: 
     if len(unknown) == filled.size:
         raise ValueError("no known value to fill from")
     pixels = _beside_known(filled, unknown, queued)
-    for _ in range(MOST_ROUNDS):
+    for _ in range(MOST_VOTE_ROUNDS):
         if not len(pixels):
             return filled
         parts = [pixels[part] for part in pieces_of(len(pixels), MOST_PIECE_PIXELS)]
@@ -107,11 +107,11 @@ def _unknown_around(values, pixels, queued):
 def _vote(colors, values, pixels):
     """The disparities (N) that pixels (flat indices) get from what is known around them; each has something there."""
     height, width = values.shape
-    result, bins, weight = np.empty(len(pixels), np.float32), np.empty(BINS), np.empty(NEARNESS.shape)
+    result, bins, weight = np.empty(len(pixels), np.float32), np.empty(VOTE_BINS), np.empty(VOTE_NEARNESS.shape)
     for n in range(len(pixels)):
         y, x = pixels[n] // width, pixels[n] % width
-        top, bottom = max(y - REACH_PX, 0), min(y + REACH_PX + 1, height)
-        left, right = max(x - REACH_PX, 0), min(x + REACH_PX + 1, width)
+        top, bottom = max(y - VOTE_REACH_PX, 0), min(y + VOTE_REACH_PX + 1, height)
+        left, right = max(x - VOTE_REACH_PX, 0), min(x + VOTE_REACH_PX + 1, width)
         low, high = np.inf, -np.inf
         for v in range(top, bottom):
             for u in range(left, right):
@@ -119,7 +119,7 @@ def _vote(colors, values, pixels):
                 if d == d:
                     low, high = min(low, d), max(high, d)
         # A histogram of votes; all in one bin where there is one disparity only.
-        scale = (BINS - 1) / (high - low) if high > low else 0.0
+        scale = (VOTE_BINS - 1) / (high - low) if high > low else 0.0
         bins[:] = 0.0
         for v in range(top, bottom):
             for u in range(left, right):
@@ -130,14 +130,16 @@ def _vote(colors, values, pixels):
                 for c in range(3):
                     apart += (colors[v, u, c] - colors[y, x, c]) ** 2
                 # Colours that are not finite are like no other.
-                likeness = exp(-0.5 * apart / (ALIKE * ALIKE)) if apart < np.inf else 0.0
-                w = (likeness + UNLIKE_WEIGHT) * NEARNESS[v - y + REACH_PX, u - x + REACH_PX]
+                likeness = exp(-0.5 * apart / (COLOR_SIGMA * COLOR_SIGMA)) if apart < np.inf else 0.0
+                w = (likeness + UNLIKE_WEIGHT) * VOTE_NEARNESS[v - y + VOTE_REACH_PX, u - x + VOTE_REACH_PX]
                 weight[v - top, u - left] = w
                 bins[int((d - low) * scale)] += w
         # Its mode: a surface that crosses the border of two bins keeps its votes together.
         elected, most = 0, -1.0
-        for k in range(BINS):
-            votes = bins[k] + SIDE_BINS * (bins[max(k - 1, 0)] * (k > 0) + bins[min(k + 1, BINS - 1)] * (k < BINS - 1))
+        for k in range(VOTE_BINS):
+            votes = bins[k] + SIDE_BINS * (
+                bins[max(k - 1, 0)] * (k > 0) + bins[min(k + 1, VOTE_BINS - 1)] * (k < VOTE_BINS - 1)
+            )
             if votes > most:
                 elected, most = k, votes
         # The mean of those who voted for it.

@@ -45,19 +45,19 @@ def nearest_known(
     return known
 
 
-def rims_of_holes(
+def hole_borders(
     known: NDArray[np.int64], size: ImageSize, should_stop: ShouldStop, threads: int
 ) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
     """The flat indices (M,) that occur in known (N, 16), ascending, and the number (H, W) of each among them, which
     means nothing elsewhere.
     """
-    is_rim, number = np.zeros(size, np.bool_), np.empty(size, np.int32)
+    is_border, number = np.zeros(size, np.bool_), np.empty(size, np.int32)
     parts = pieces_of(len(known), MOST_PIECE_PIXELS)
-    in_pieces(lambda part: _mark(known[part], is_rim), parts, should_stop, threads)
-    rims = flat_indices(is_rim, should_stop, threads)
+    in_pieces(lambda part: _mark(known[part], is_border), parts, should_stop, threads)
+    borders = flat_indices(is_border, should_stop, threads)
     raise_if_stopped(should_stop)
-    _number(rims, number)
-    return rims, number
+    _number(borders, number)
+    return borders, number
 
 
 def number_pixels(pixels: NDArray[np.int64], number: NDArray[np.int32]) -> None:
@@ -75,12 +75,12 @@ def _number(pixels, number):
 
 
 @kernel
-def _mark(known, is_rim):
-    width = is_rim.shape[1]
+def _mark(known, is_border):
+    width = is_border.shape[1]
     for i in range(len(known)):
         for pixel in known[i]:
             if pixel >= 0:
-                is_rim[pixel // width, pixel % width] = True
+                is_border[pixel // width, pixel % width] = True
 
 
 @kernel

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from pkgutil import resolve_name
 
-from iibr_core.inpainting.protocol import Inpainter, InpaintingAids
+from iibr_core.inpainting.inpainter import Inpainter, InpaintingAids
 from iibr_core.types import InputError
 
 INPAINTERS = {"background": "iibr_core.inpainting.background:background_inpainter"}

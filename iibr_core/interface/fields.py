@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.color import encoded_from_stored
-from iibr_core.evaluation.refocus import FocalStack, Focus
-from iibr_core.formats.light_fields.registry import WRITERS, writer_for
+from iibr_core.evaluation.focal_stacks import FocalStack, Focus
+from iibr_core.formats.light_fields.light_field_formats import WRITERS, writer_for
 from iibr_core.types import FloatImage, GridShape, InputError, StoredColors, ViewOffset, ViewUpdate
 
 FORMATS = tuple(WRITERS)

@@ -8,11 +8,11 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from iibr_core.evaluation import protocol
+from iibr_core.evaluation import evaluate_scene
 from iibr_core.evaluation.datasets import find_scenes
 from iibr_core.evaluation.metrics import flip, psnr, ssim
 from iibr_core.evaluation.results import EvaluationResult
-from iibr_core.interface.pictures import encoded
+from iibr_core.interface.encoded_pictures import encoded
 from iibr_core.runtime.extras import require_extra
 from iibr_core.runtime.tiling import ShouldStop, never
 from iibr_core.stages import ALL_STAGES, Stages
@@ -49,9 +49,9 @@ def evaluate(
 ) -> list[EvaluationResult]:
     """Judge views against those of a data set: a folder of one scene, or of several, as `iibr evaluate` takes it.
 
-    stages: between map and view, that are on. options: other fields of `iibr_core.evaluation.protocol.Options`. Raises
-    InputError, and Cancelled once should_stop is true.
+    stages: between map and view, that are on. options: other fields of `evaluate_scene.Options`. Raises InputError,
+    and Cancelled once should_stop is true.
     """
-    wanted = protocol.Options(stages=stages, **options)
+    wanted = evaluate_scene.Options(stages=stages, **options)
     scenes = find_scenes(Path(folder))
-    return [one for scene in scenes for one in protocol.evaluate(scene, wanted, report_progress, should_stop)]
+    return [one for scene in scenes for one in evaluate_scene.evaluate(scene, wanted, report_progress, should_stop)]

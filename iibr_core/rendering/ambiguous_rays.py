@@ -17,12 +17,12 @@ from numpy.typing import NDArray
 
 from iibr_core.rendering.candidates import Candidates
 from iibr_core.rendering.coherent_cells import land_marked
-from iibr_core.rendering.disparity_statistics import SOFT
+from iibr_core.rendering.disparity_statistics import SOFT_EDGE_SHARPNESS
 from iibr_core.rendering.laid_hypotheses import (
     AROUND,
     BESIDE,
-    LEAST_WEIGHT,
-    REACH_PX,
+    FAINT_WEIGHT,
+    SEARCH_PX,
     SHARP_RINGS,
     Hypotheses,
     Landed,
@@ -74,7 +74,7 @@ def find_undecided_rays(
     hypotheses: int = HYPOTHESES,
     decided: NDArray[np.bool_] | None = None,
 ) -> UndecidedRays:
-    """The ambiguous rays in rows [first, last) of these candidates, which should reach REACH_PX rows beyond them, but
+    """The ambiguous rays in rows [first, last) of these candidates, which should reach SEARCH_PX rows beyond them, but
     for those already decided (N, W).
 
     shown: what `resampling.heaviest_candidate` gives. every: take all rays near which anything lands, ambiguous or not.
@@ -84,10 +84,10 @@ def find_undecided_rays(
         raise ValueError(f"{hypotheses} hypotheses a ray: give 2 at least")
     offset, first_row, (height, width) = candidates.offset, candidates.first_row, candidates.number.shape
     around, to_view = rays.statistics, rays.to_view(offset)
-    is_soft = around.softness > SOFT
+    is_soft = around.softness > SOFT_EDGE_SHARPNESS
     looks = len(AROUND) if is_soft else len(BESIDE[0]) * SHARP_RINGS
     landed = Landed(rays.arrays, to_view, candidates, weights, shown, max(*map(abs, offset), 1e-9), looks)
-    near_soft = land_marked(rays.cells, to_view, rays.soft_cells, (first_row, first_row + height), REACH_PX)
+    near_soft = land_marked(rays.cells, to_view, rays.soft_cells, (first_row, first_row + height), SEARCH_PX)
     if decided is None:
         decided = np.zeros((height, width), np.bool_)
     pixel = np.empty(((rows[1] - rows[0]) * width, 2), np.int64)
@@ -125,10 +125,10 @@ def _is_open(number, source, weights, photo_images, y, x):
     heavy, fringed, covered = 0, False, 0.0
     for k in range(np.int64(number[y, x])):
         covered += weights[k, y, x]
-        if weights[k, y, x] > LEAST_WEIGHT:
+        if weights[k, y, x] > FAINT_WEIGHT:
             heavy += 1
             fringed |= 0 < source[k, y, x] < photo_images
-    return covered < 1.0 - LEAST_WEIGHT or (heavy != 1 and not fringed)
+    return covered < 1.0 - FAINT_WEIGHT or (heavy != 1 and not fringed)
 
 
 @kernel
@@ -154,7 +154,7 @@ def _select_rays(landed, soft, is_soft, near_soft, decided, selected_rows, every
                     continue
                 # Most rays: one surface that covers them.
                 is_ambiguous = every or (
-                    (number[y, x] != 1 or weights[0, y, x] < 1.0 - LEAST_WEIGHT)
+                    (number[y, x] != 1 or weights[0, y, x] < 1.0 - FAINT_WEIGHT)
                     and _is_open(number, candidates.source, weights, photo_images, y, x)
                 )
                 if not is_ambiguous and is_near_soft:

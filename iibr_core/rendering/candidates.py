@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.rendering.coherent_cells import backward_warp, find_coherent_cells, land_incoherent
-from iibr_core.rendering.joined_rays import BELOW, RIGHT
 from iibr_core.rendering.ray_cells import CELL_PX
 from iibr_core.rendering.ray_set import OWN_SURFACE_PX, RaySet
+from iibr_core.rendering.slope_connectivity import BELOW, RIGHT
 from iibr_core.runtime.jit import kernel, nearest_pixel
 from iibr_core.types import FloatImage, ViewOffset
 
@@ -77,31 +77,31 @@ def find_candidates(rays: RaySet, offset: ViewOffset, rows: tuple[int, int], mos
     arrays, cells = rays.arrays, rays.cells
     for k, (t, s) in enumerate(rays.to_view(offset)):
         needed = land_incoherent(cells, k, t, s, rows, smooth)
-        _land_rays(arrays, k, rays.joined, rays.steep_cells(k), needed, needed.any(axis=1), s, t, found)
+        _land_rays(arrays, k, rays.connected, rays.steep_cells(k), needed, needed.any(axis=1), s, t, found)
     _mean_disparity(found)
     backward_warp(arrays.disparity[0], offset, about, found)
     return found
 
 
 @kernel
-def _half_extent(nearer, shift, is_joined):
+def _half_extent(nearer, shift, is_connected):
     """How far a footprint reaches towards a neighbour that is nearer by so much, which moves it away by shift times
     that.
     """
     gap = nearer * shift
     # Wider gaps are disocclusions and stay open; neighbours that land on each other are two surfaces.
-    if abs(gap) <= SEALED_GAP_PX or (is_joined and LEAST_SHRUNK - 1.0 <= gap <= MOST_STRETCHED_PX):
+    if abs(gap) <= SEALED_GAP_PX or (is_connected and LEAST_SHRUNK - 1.0 <= gap <= MOST_STRETCHED_PX):
         return 0.5 + 0.5 * gap
     return 0.5 + gap if nearer > 0 and 0 < gap <= CLOSED_GAP_PX else 0.5
 
 
 @kernel
-def _slope(disparity, joined, bit, y, x, down, right):
+def _slope(disparity, connected, bit, y, x, down, right):
     """Change of disparity a pixel, that way, at a ray that a steep surface joins to a neighbour there; else 0."""
     here, rise, sides = disparity[y, x], 0.0, 0
-    if y >= down and x >= right and joined[y - down, x - right] & bit:
+    if y >= down and x >= right and connected[y - down, x - right] & bit:
         rise, sides = here - disparity[y - down, x - right], 1
-    if joined[y, x] & bit:
+    if connected[y, x] & bit:
         rise, sides = rise + disparity[y + down, x + right] - here, sides + 1
     return rise / max(sides, 1)
 
@@ -119,7 +119,7 @@ def _rearmost(coverage, disparity, row, column):
 
 
 @kernel
-def _land_rays(rays, index, joined, steep, needed, needed_rows, s, t, found):
+def _land_rays(rays, index, connected, steep, needed, needed_rows, s, t, found):
     """Let the rays in the needed cells of one source land on the target rows. Until `_mean_disparity`, found's
     disparity holds sums weighted by coverage.
 
@@ -147,22 +147,28 @@ def _land_rays(rays, index, joined, steep, needed, needed_rows, s, t, found):
                 landed_x, landed_y = x - d * s, y - d * t
                 to_left, to_right = max(x - 1, 0), min(x + 1, width - 1)
                 above, below = max(y - 1, 0), min(y + 1, height - 1)
-                is_joined, tolerance, slope_x, slope_y = False, same_surface, 0.0, 0.0
+                is_connected, tolerance, slope_x, slope_y = False, same_surface, 0.0, 0.0
                 if steep[y // CELL_PX, cell]:
-                    rise_x = _slope(ray_disparity, joined, RIGHT, y, x, 0, 1)
-                    rise_y = _slope(ray_disparity, joined, BELOW, y, x, 1, 0)
+                    rise_x = _slope(ray_disparity, connected, RIGHT, y, x, 0, 1)
+                    rise_y = _slope(ray_disparity, connected, BELOW, y, x, 1, 0)
                     # How much the view stretches the surface, as an area: the same slope is spread over more pixels.
                     stretched = 1.0 - s * rise_x - t * rise_y
-                    is_joined = (rise_x != 0.0 or rise_y != 0.0) and stretched >= LEAST_SHRUNK
-                if is_joined:
+                    is_connected = (rise_x != 0.0 or rise_y != 0.0) and stretched >= LEAST_SHRUNK
+                if is_connected:
                     slope_x, slope_y = rise_x / stretched, rise_y / stretched
                     tolerance = max(same_surface, abs(slope_x) + abs(slope_y))
                 left = landed_x - _half_extent(
-                    ray_disparity[y, to_left] - d, s, is_joined and joined[y, to_left] & RIGHT
+                    ray_disparity[y, to_left] - d, s, is_connected and connected[y, to_left] & RIGHT
                 )
-                right = landed_x + _half_extent(ray_disparity[y, to_right] - d, -s, is_joined and joined[y, x] & RIGHT)
-                top = landed_y - _half_extent(ray_disparity[above, x] - d, t, is_joined and joined[above, x] & BELOW)
-                bottom = landed_y + _half_extent(ray_disparity[below, x] - d, -t, is_joined and joined[y, x] & BELOW)
+                right = landed_x + _half_extent(
+                    ray_disparity[y, to_right] - d, -s, is_connected and connected[y, x] & RIGHT
+                )
+                top = landed_y - _half_extent(
+                    ray_disparity[above, x] - d, t, is_connected and connected[above, x] & BELOW
+                )
+                bottom = landed_y + _half_extent(
+                    ray_disparity[below, x] - d, -t, is_connected and connected[y, x] & BELOW
+                )
                 # Beside the target rows, or not finite.
                 if not (right > -0.5 and left < width and bottom > first_row - 0.5 and top < first_row + rows):
                     continue

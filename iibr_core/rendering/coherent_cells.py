@@ -14,7 +14,7 @@ from iibr_core.rendering.ray_set import OWN_SURFACE_PX, RaySet
 from iibr_core.runtime.jit import kernel
 from iibr_core.types import FloatImage, ViewOffset
 
-REACH_PX = 1.5
+LANDING_REACH_PX = 1.5
 """A ray that lands farther than this from a pixel's centre does not touch the pixel."""
 ONE_SURFACE_PX = 1.0
 """What lands on a cell with more parallax between its parts is not taken for one surface."""
@@ -71,7 +71,7 @@ def land_marked(
 def _target_cells(first, least, most):
     """The first and last cell that the pixels of cell `first` touch when moved by -least to -most pixels; fractions."""
     # Cells are counted from the border of the picture, half a pixel before the first pixel centre.
-    shrunk = 0.5 - REACH_PX
+    shrunk = 0.5 - LANDING_REACH_PX
     return first + (shrunk - max(least, most)) / CELL_PX, first + 1 - (shrunk + min(least, most)) / CELL_PX
 
 

@@ -14,7 +14,7 @@ from iibr_core.runtime.jit import kernel
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never
 from iibr_core.types import FloatImage, image_size
 
-AROUND_PX = 2
+STATISTICS_PX = 2
 """Reach of the range of disparities, and of the largest step, around a source ray."""
 EDGE_WINDOW_PX = 8
 """A depth edge softer than this is a slope."""
@@ -22,18 +22,18 @@ SOFT_EDGES_PX = (8, 12)
 """Widths of the soft edges that are looked for; the wider one is for a blur of 4 px and more."""
 MOST_SHOULDER = 0.33
 """By at most this share of a soft edge may the map rise or fall within its width on either side: a surface goes on."""
-SHARP_SHARE = 0.5
+SHARP_STEP_SHARE = 0.5
 """An edge whose largest step makes up this share of its steps is sharp."""
 SOFT_AROUND_PX = 8
 """Rays this close to the middle of a soft edge are marked."""
-SOFT = 0.5
+SOFT_EDGE_SHARPNESS = 0.5
 """Where depth edges are softer than this, surfaces are looked for farther around a ray."""
 EDGE_PARALLAX_PX = 2.0
 """Least parallax, in the outermost view, of the edges whose softness is measured."""
 
 
 class DisparityStatistics(NamedTuple):
-    """Of S source images. low, high (S, H, W): least and greatest disparity within AROUND_PX of each ray. step
+    """Of S source images. low, high (S, H, W): least and greatest disparity within STATISTICS_PX of each ray. step
     (S, H, W): the largest step between neighbours there; all px per view step, 0 where nothing is.
     softness: 0..1, of the photo's depth edges: 0 where each is one step, near 1 where they are slopes. soft (H, W):
     the photo's rays near a soft edge.
@@ -71,7 +71,7 @@ def find_soft_edges(
     step leaves to the others: 0 without edges.
 
     An edge: a change of at least least_edge within EDGE_WINDOW_PX along a row or a column; it counts by its change.
-    Its largest step is SHARP_SHARE of it, or both its shoulders are flat: a slope that goes on is a surface.
+    Its largest step is SHARP_STEP_SHARE of it, or both its shoulders are flat: a slope that goes on is a surface.
     Raises Cancelled once should_stop is true.
     """
     left = total = 0.0
@@ -122,7 +122,7 @@ def _mark_soft(values, width, least_edge, soft):
         largest = np.float32(0.0)
         for i in range(x, x + width):
             largest = max(largest, abs(values[i + 1] - values[i]))
-        if not largest < SHARP_SHARE * change:
+        if not largest < SHARP_STEP_SHARE * change:
             continue
         # Flat shoulders on both sides tell an edge from a surface.
         flat, end = MOST_SHOULDER * change, x + width
@@ -152,7 +152,7 @@ def _row_edges(rows, least_edge, changes, lefts, soft):
                 is_known &= step == step
             left = change - largest
             # A slope that is no soft edge is a surface.
-            if is_known and largest < SHARP_SHARE * every and not soft[y, x + EDGE_WINDOW_PX // 2]:
+            if is_known and largest < SHARP_STEP_SHARE * every and not soft[y, x + EDGE_WINDOW_PX // 2]:
                 continue
             changes[count] = change
             lefts[count] = left if is_known and left > 0 else np.float32(0.0)
@@ -164,7 +164,7 @@ def _row_edges(rows, least_edge, changes, lefts, soft):
 def _window_extremes(disparity, first, last, low, high, step):
     """Rows [first, last) of the range, and of the largest step, within a square: along rows first, then columns."""
     height, width = disparity.shape
-    top, bottom = max(first - AROUND_PX, 0), min(last + AROUND_PX, height)
+    top, bottom = max(first - STATISTICS_PX, 0), min(last + STATISTICS_PX, height)
     row_low, row_high = np.empty((bottom - top, width), np.float32), np.empty((bottom - top, width), np.float32)
     row_step, row_rise = np.empty((bottom - top, width), np.float32), np.empty((bottom - top, width), np.float32)
     _extremes_along_rows(disparity, top, row_low, row_high, row_step, row_rise)
@@ -178,23 +178,23 @@ def _extremes_along_rows(disparity, top, low, high, step, rise):
     NaN lies around the frame, as where nothing is: it is neither less nor greater than anything.
     """
     width = disparity.shape[1]
-    here = np.full(width + 2 * AROUND_PX, np.nan, np.float32)
-    above = np.full(width + 2 * AROUND_PX, np.nan, np.float32)
+    here = np.full(width + 2 * STATISTICS_PX, np.nan, np.float32)
+    above = np.full(width + 2 * STATISTICS_PX, np.nan, np.float32)
     for row in range(len(low)):
-        here[AROUND_PX : AROUND_PX + width] = disparity[top + row]
+        here[STATISTICS_PX : STATISTICS_PX + width] = disparity[top + row]
         if top + row > 0:
-            above[AROUND_PX : AROUND_PX + width] = disparity[top + row - 1]
+            above[STATISTICS_PX : STATISTICS_PX + width] = disparity[top + row - 1]
         for x in range(width):
             # Written out: NaN fails every comparison, where min and max might keep it.
             least, most = np.float32(np.inf), np.float32(-np.inf)
-            for i in range(2 * AROUND_PX + 1):
+            for i in range(2 * STATISTICS_PX + 1):
                 d = here[x + i]
                 least, most = d if d < least else least, d if d > most else most
             widest, steepest = np.float32(0.0), np.float32(0.0)
-            for i in range(2 * AROUND_PX):
+            for i in range(2 * STATISTICS_PX):
                 change = abs(here[x + i + 1] - here[x + i])
                 widest = change if change > widest else widest
-            for i in range(2 * AROUND_PX + 1):
+            for i in range(2 * STATISTICS_PX + 1):
                 change = abs(here[x + i] - above[x + i])
                 steepest = change if change > steepest else steepest
             low[row, x], high[row, x] = least, most
@@ -209,13 +209,13 @@ def _extremes_along_columns(row_low, row_high, row_step, row_rise, top, first, l
         least_here, most_here, widest_here = low[y], high[y], step[y]
         least_here[:], most_here[:], widest_here[:] = np.inf, -np.inf, 0.0
         # Row by row, so that the inner loops run along the rows in memory.
-        for v in range(max(y - AROUND_PX, 0), min(y + AROUND_PX + 1, bottom)):
+        for v in range(max(y - STATISTICS_PX, 0), min(y + STATISTICS_PX + 1, bottom)):
             for x in range(width):
                 widest_here[x] = max(widest_here[x], row_step[v - top, x])
                 least_here[x] = min(least_here[x], row_low[v - top, x])
                 most_here[x] = max(most_here[x], row_high[v - top, x])
             # A rise comes from the row before: that of the first row leads out of the square.
-            if v > y - AROUND_PX:
+            if v > y - STATISTICS_PX:
                 for x in range(width):
                     widest_here[x] = max(widest_here[x], row_rise[v - top, x])
         # Nothing near by: both 0.

@@ -24,7 +24,7 @@ from iibr_core.types import Camera, ImageSize, Margins
 
 COVERED_SAMPLES = 0.5
 """A pixel less of whose samples see anything is a hole."""
-FINE_PX = 1.25
+WIDE_FOOTPRINT_PX = 1.25
 """Where a target pixel spans more pixels of its source, every sample looks up its own colour: none may be skipped."""
 SEALED_STEPS = 1.5
 """Surfaces of a rounded map are stairs; steps up to so many times its own are no depth edges."""
@@ -101,7 +101,7 @@ def _scales_at(m, x, y, d):
     spans_y = max(abs(m[4] - at_y * m[8]), abs(m[5] - at_y * m[9])) / abs(w)
     moves = max(abs(m[3] - at_x * m[11]), abs(m[7] - at_y * m[11]), 1e-9)
     parallax = moves / max(abs(m[15] - at_d * m[11]), 1e-9)
-    return max(spans_x, spans_y) > FINE_PX, OWN_SURFACE_PX * abs(w) / moves, parallax
+    return max(spans_x, spans_y) > WIDE_FOOTPRINT_PX, OWN_SURFACE_PX * abs(w) / moves, parallax
 
 
 @kernel

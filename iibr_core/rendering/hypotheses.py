@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from iibr_core.rendering.ambiguous_rays import HYPOTHESES, UndecidedRays, find_undecided_rays
 from iibr_core.rendering.candidates import Candidates
-from iibr_core.rendering.disparity_statistics import SOFT
-from iibr_core.rendering.laid_hypotheses import LEAST_WEIGHT, PLAIN, REACH_PX
+from iibr_core.rendering.disparity_statistics import SOFT_EDGE_SHARPNESS
+from iibr_core.rendering.laid_hypotheses import FAINT_WEIGHT, PLAIN_SOURCE, SEARCH_PX
 from iibr_core.rendering.ray_set import RaySet
 from iibr_core.rendering.resampling import ShownRays, cubic, resample, resample_inpainted
 from iibr_core.runtime.jit import kernel, linear_scalar, nearest_pixel, srgb_scalar
@@ -33,7 +33,7 @@ LEAST_VOTE = 0.004
 """Weights below this change no colour by a visible step."""
 SAME_COLOR = 1e-5
 """Votes no farther apart than this need no mean: so a flat scene's views are the photo to the bit."""
-SAY = 0.6
+BLEND_WEIGHT = 0.6
 """T's say, 0..1, where surfaces of the photo share a ray they cover, at sharp edges: both are as often right there."""
 
 
@@ -80,14 +80,14 @@ def describe_rays(rays: RaySet, undecided: UndecidedRays) -> AmbiguousRays:
 
 
 def bound_weights(ambiguous: AmbiguousRays, weights: FloatImage) -> FloatImage:
-    """T's weights (N, K), moved towards the closed form's on rays that this one is fairly sure of: see SAY."""
+    """T's weights (N, K), moved towards the closed form's on rays that this one is fairly sure of: see BLEND_WEIGHT."""
     share = ambiguous.features[..., SHARE] * ambiguous.mask
     first = ambiguous.features[:, 0]
     has_inpainted = ((share > 0) & (ambiguous.features[..., INPAINTED] > 0)).any(axis=1)
-    sure = (first[:, UNCOVERED] <= LEAST_WEIGHT) & (first[:, SOFTNESS] <= SOFT) & ~has_inpainted
-    closed = share[sure] / np.maximum(share[sure].sum(axis=1, keepdims=True), np.float32(LEAST_WEIGHT))
+    sure = (first[:, UNCOVERED] <= FAINT_WEIGHT) & (first[:, SOFTNESS] <= SOFT_EDGE_SHARPNESS) & ~has_inpainted
+    closed = share[sure] / np.maximum(share[sure].sum(axis=1, keepdims=True), np.float32(FAINT_WEIGHT))
     bounded = weights.copy()
-    bounded[sure] = SAY * weights[sure] + (1 - SAY) * closed
+    bounded[sure] = BLEND_WEIGHT * weights[sure] + (1 - BLEND_WEIGHT) * closed
     return bounded
 
 
@@ -111,7 +111,7 @@ def blend_hypotheses(
     colors, disparity, source = np.zeros((len(weights), 3), np.float32), ambiguous.disparity, ambiguous.source
     _blend(rays.arrays, rays.to_view(ambiguous.offset), ambiguous.pixel, disparity, source, weights, colors)
     heaviest = np.arange(len(weights)), weights.argmax(axis=1)
-    return colors, disparity[heaviest], source[heaviest] % PLAIN
+    return colors, disparity[heaviest], source[heaviest] % PLAIN_SOURCE
 
 
 @kernel
@@ -154,10 +154,10 @@ def _describe(rays, around, offsets, parallax, pixel, undecided, features):
         y, x = pixel[n]
         # What the whole ray has in common: its nearest and farthest hypothesis.
         last = at + int(undecided.number[n])
-        front, back = undecided.disparity[at:last].max(), undecided.disparity[at:last].min()
+        foreground, background = undecided.disparity[at:last].max(), undecided.disparity[at:last].min()
         for a in range(at, last):
             # Backward warp: where in its source the hypothesis looks.
-            d, k = undecided.disparity[a], np.int64(undecided.source[a]) % np.int64(PLAIN)
+            d, k = undecided.disparity[a], np.int64(undecided.source[a]) % np.int64(PLAIN_SOURCE)
             out = features[n, a - at]
             source_x = min(max(x + d * offsets[k, 1], -0.5), width - 0.5)
             source_y = min(max(y + d * offsets[k, 0], -0.5), height - 0.5)
@@ -178,17 +178,17 @@ def _describe(rays, around, offsets, parallax, pixel, undecided, features):
             out[1] = _softsign((high - d) * parallax)  # what lies in front of it there
             out[2] = _softsign((d - low) * parallax)  # ... and behind
             out[3] = (own - low) / max(high - low, 1e-6)  # where between both its own lies
-            out[4] = _softsign((front - d) * parallax)  # against the nearest hypothesis
-            out[5] = _softsign((d - back) * parallax)  # ... and the farthest
+            out[4] = _softsign((foreground - d) * parallax)  # against the nearest hypothesis
+            out[5] = _softsign((d - background) * parallax)  # ... and the farthest
             out[SHARE] = undecided.share[a]
-            out[7] = undecided.nearest[a] / (REACH_PX + 1.0)  # how far away the surface lands, 0..1
+            out[7] = undecided.nearest[a] / (SEARCH_PX + 1.0)  # how far away the surface lands, 0..1
             out[INPAINTED] = 1.0 if k >= rays.photo_images else 0.0
             out[9] = log_parallax
             out[10] = rays.coverage[k, v, u]
             out[SOFTNESS] = around.softness
             out[UNCOVERED] = undecided.uncovered[n]  # share of the pixel that nothing covers
             out[13] = _softsign(around.step[k, v, u] * parallax)  # the depth edge beside it
-            out[14] = 1.0 if undecided.source[a] >= PLAIN else 0.0
+            out[14] = 1.0 if undecided.source[a] >= PLAIN_SOURCE else 0.0
         at = last
 
 
@@ -204,11 +204,11 @@ def _blend(rays, offsets, pixel, disparity, source, weights, colors):
             if not w > LEAST_VOTE:
                 continue
             # Each hypothesis votes with the colour that its disparity leads to (paper, section 3.2).
-            d, k = disparity[n, a], np.int64(source[n, a] % PLAIN)
+            d, k = disparity[n, a], np.int64(source[n, a] % PLAIN_SOURCE)
             t, s = offsets[k, 0], offsets[k, 1]
             x = min(max(pixel[n, 1] + d * s, -0.5), width - 0.5)
             y = min(max(pixel[n, 0] + d * t, -0.5), height - 0.5)
-            if source[n, a] >= PLAIN:
+            if source[n, a] >= PLAIN_SOURCE:
                 r, g, b = cubic(images, k, x, y)
             elif k < rays.photo_images:
                 r, g, b = resample(images, surfaces, k, x, y, d, max(abs(s), abs(t), 1e-9))

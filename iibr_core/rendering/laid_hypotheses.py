@@ -17,14 +17,14 @@ from iibr_core.rendering.resampling import ShownRays
 from iibr_core.runtime.jit import kernel
 from iibr_core.types import FloatImage
 
-PLAIN = 128
+PLAIN_SOURCE = 128
 """Added to the source of the hypothesis that the ray shows the front-most surface as the photo mixed it at its edge."""
-LEAST_WEIGHT = 0.02
+FAINT_WEIGHT = 0.02
 RINGS_PX = (1, 2, 3, 4, 6)
 """How far around a ray surfaces are looked for: this is enough to meet every one that is not a sliver."""
 SHARP_RINGS = 3
 """Where depth edges are not SOFT, only the first so many of RINGS_PX are looked at."""
-REACH_PX = RINGS_PX[-1]
+SEARCH_PX = RINGS_PX[-1]
 """Surfaces that land within this many pixels, each way, are considered."""
 BESIDE = ((0, 1), (0, -1), (1, 0), (-1, 0)), tuple(product((1, -1), repeat=2))
 """Down and right: the four places of every other ring."""
@@ -86,8 +86,8 @@ def _pick_apart(near_disparity, near_source, n, photo_images, parallax, disparit
     free; returns how many are picked. In a hole it begins with the front-most surface around it.
     """
     if picked == 0 and n > 0:
-        front = np.argmax(near_disparity[:n])
-        disparity[0], source[0], share[0] = near_disparity[front], near_source[front], 0.0
+        foreground = np.argmax(near_disparity[:n])
+        disparity[0], source[0], share[0] = near_disparity[foreground], near_source[foreground], 0.0
         picked = 1
     # How far what is near lies from what is picked.
     away = np.full(len(AROUND), np.inf)
@@ -124,7 +124,7 @@ def lay_out(landed, pixel, every, found):
         picked, mixed, left = 0, 0, 1.0
         for k in range(np.int64(candidates.number[y, x])):
             left -= weights[k, y, x]
-            if weights[k, y, x] > LEAST_WEIGHT and picked < len(disparity) - 1:
+            if weights[k, y, x] > FAINT_WEIGHT and picked < len(disparity) - 1:
                 disparity[picked], source[picked] = candidates.disparity[k, y, x], candidates.source[k, y, x]
                 share[picked] = weights[k, y, x]
                 mixed = picked if disparity[picked] > disparity[mixed] else mixed
@@ -136,11 +136,11 @@ def lay_out(landed, pixel, every, found):
         if picked == 0 or not (every or _is_undecided(landed, y, x, disparity[:picked], source)):
             continue
         # The plain hypothesis: the front-most surface on the ray, colours as the photo mixed them at its edge.
-        disparity[picked], source[picked], share[picked] = disparity[mixed], source[mixed] + PLAIN, 0.0
+        disparity[picked], source[picked], share[picked] = disparity[mixed], source[mixed] + PLAIN_SOURCE, 0.0
         found.number[ray] = picked + 1
         # How near each surface lands: 0 on the ray itself, else by the first landing like it.
         for j in range(picked + 1):
-            found.nearest[ray, j] = 0.0 if share[j] > 0 else REACH_PX + 1.0
+            found.nearest[ray, j] = 0.0 if share[j] > 0 else SEARCH_PX + 1.0
             if share[j] > 0:
                 continue
             for i in range(n):

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.rendering.candidates import SEALED_GAP_PX
-from iibr_core.rendering.joined_rays import BELOW, RIGHT
 from iibr_core.rendering.ray_cells import CELL_PX
 from iibr_core.rendering.ray_set import RaySet
+from iibr_core.rendering.slope_connectivity import BELOW, RIGHT
 from iibr_core.runtime.jit import kernel
 from iibr_core.runtime.tiling import ShouldStop, in_bands
 from iibr_core.types import FloatImage, ImageSize
@@ -60,12 +60,12 @@ def draw_rays(
     first, last = rows
     shape = SAMPLES * (last - first), SAMPLES * width
     nearest, source = np.full(shape, -np.inf, np.float32), np.zeros(shape, np.uint8)
-    apart = np.zeros_like(rays.joined)
+    apart = np.zeros_like(rays.connected)
     for k, matrix in enumerate(matrices):
-        joined = rays.joined if k == 0 else apart
-        # What the photo shows goes before what was made up beside it.
+        connected = rays.connected if k == 0 else apart
+        # The photo's rays go before inpainted ones beside them.
         ahead = surface if k >= rays.photo_images else 0.0
-        _draw_rays(rays.arrays, k, joined, landing[k], matrix, ahead, sealed_step, first, nearest, source)
+        _draw_rays(rays.arrays, k, connected, landing[k], matrix, ahead, sealed_step, first, nearest, source)
     return nearest, source
 
 
@@ -106,7 +106,7 @@ def _land_cells(low, high, m, first, last, landing):
 
 
 @kernel
-def _draw_rays(rays, index, joined, landing, m, ahead, sealed_step, first_row, nearest, source):
+def _draw_rays(rays, index, connected, landing, m, ahead, sealed_step, first_row, nearest, source):
     """Draw the rays of one image; see `draw_rays`. ahead: so much nearer than the photo's surface it must
     be to hide it.
     """
@@ -122,12 +122,12 @@ def _draw_rays(rays, index, joined, landing, m, ahead, sealed_step, first_row, n
             is_drawn[x] = is_near and coverage[y, x] > 0
             any_drawn = any_drawn or is_drawn[x]
         if any_drawn:
-            _land_squares(disparity, joined, m, y, sealed_step, corners, is_drawn)
+            _land_squares(disparity, connected, m, y, sealed_step, corners, is_drawn)
             _draw_squares(corners, is_drawn, coverage[y], index, rays.photo_images, ahead, first_row, nearest, source)
 
 
 @kernel
-def _land_squares(disparity, joined, m, y, sealed_step, corners, is_drawn):
+def _land_squares(disparity, connected, m, y, sealed_step, corners, is_drawn):
     """Where the corners of a row of pixels land: (X, Y, D) each; what reaches behind the camera is not drawn.
 
     A corner's disparity is the mean of those around it on the pixel's surface: where these agree, there are no cracks.
@@ -147,14 +147,14 @@ def _land_squares(disparity, joined, m, y, sealed_step, corners, is_drawn):
             has_row, has_column = 0 <= v < height, 0 <= u < width
             total, count, top, left = np.float64(here), 1, min(y, v), min(x, u)
             is_across = is_along = False
-            if has_column and (abs(disparity[y, u] - here) <= one_surface or joined[y, left] & RIGHT):
+            if has_column and (abs(disparity[y, u] - here) <= one_surface or connected[y, left] & RIGHT):
                 is_across, total, count = True, total + disparity[y, u], count + 1
-            if has_row and (abs(disparity[v, x] - here) <= one_surface or joined[top, x] & BELOW):
+            if has_row and (abs(disparity[v, x] - here) <= one_surface or connected[top, x] & BELOW):
                 is_along, total, count = True, total + disparity[v, x], count + 1
             if has_row and has_column:
                 down, right = abs(disparity[v, u] - disparity[y, u]), abs(disparity[v, u] - disparity[v, x])
-                by_way_of_row = is_across and (down <= one_surface or joined[top, u] & BELOW)
-                if by_way_of_row or (is_along and (right <= one_surface or joined[v, left] & RIGHT)):
+                by_way_of_row = is_across and (down <= one_surface or connected[top, u] & BELOW)
+                if by_way_of_row or (is_along and (right <= one_surface or connected[v, left] & RIGHT)):
                     total, count = total + disparity[v, u], count + 1
             at_x, at_y, d, w = project(m, 0.5 * (x + u), 0.5 * (y + v), total / count)
             corners[x, corner, 0], corners[x, corner, 1], corners[x, corner, 2] = at_x, at_y, d

@@ -13,18 +13,18 @@ from typing import NamedTuple
 
 import numpy as np
 
+from iibr_core.rendering.flying_pixels import postprocessed_view
 from iibr_core.rendering.photo_rays import rays_of_photo
 from iibr_core.rendering.ray_set import OWN_SURFACE_PX, RaySet
 from iibr_core.rendering.rendered_view import RenderedView
 from iibr_core.rendering.renderer import Renderer
-from iibr_core.rendering.specks import settled_view
 from iibr_core.runtime.jit import kernel
 from iibr_core.runtime.tiling import ShouldStop, never
 from iibr_core.types import FloatImage, ImageSize, ViewOffset, image_size
 
 TILE_PX = 1024
 """Side of a tile, what lies around it not counted."""
-AROUND_PX = 8
+TILE_MARGIN_PX = 8
 """What lies around a tile beside the parallax: filters and edges reach so far."""
 
 NO_RAY = np.float32(-1e6)
@@ -140,10 +140,10 @@ def views_of_tile(
     """
     farthest = max([1.0, *(abs(axis) for offset in offsets for axis in offset)])
     parallax_px = farthest * float(np.abs(photo.disparity).max(initial=0.0))
-    around = tile.grown(AROUND_PX + math.ceil(min(parallax_px, max(photo.size))), photo.bounds)
+    around = tile.grown(TILE_MARGIN_PX + math.ceil(min(parallax_px, max(photo.size))), photo.bounds)
     rays, shown = photo.rays(around, offsets, should_stop), tile.inside(around).slices
     for offset in offsets:
-        view = settled_view(rays, offset, renderer.render(rays, offset), should_stop)
+        view = postprocessed_view(rays, offset, renderer.render(rays, offset), should_stop)
         # Copies: a part is laid out like a whole view, and kernels need no second kind.
         yield RenderedView(
             view.colors[shown].copy(),

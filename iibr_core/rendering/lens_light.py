@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from iibr_core.rendering.large_views import AROUND_PX, TILE_PX, LargePhoto, Part, tiles_of, views_of_tile, whole
+from iibr_core.rendering.large_views import TILE_MARGIN_PX, TILE_PX, LargePhoto, Part, tiles_of, views_of_tile, whole
 from iibr_core.rendering.renderer import Renderer
 from iibr_core.rendering.resampling import keys_weights
 from iibr_core.rendering.resized_light import ENLARGED_BY, bring_to
@@ -18,7 +18,7 @@ from iibr_core.runtime.jit import kernel, linear_scalar
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never
 from iibr_core.types import FloatImage, ImageSize, ReportProgress, ViewOffset, ignore_progress, image_size
 
-TAPS = 2
+KERNEL_TAPS = 2
 """Pixels that the kernel reaches to each side."""
 DRAWING = "drawing at the photo's own size"
 ON_SURFACE_ROUNDS = 3
@@ -76,8 +76,8 @@ def largest_tile(size: ImageSize, lens: LargeLens, disparity_px: float) -> Image
 def _around_px(size: ImageSize, lens: LargeLens, disparity_px: float) -> int:
     """What is read around a tile, at most."""
     views = max([1.0, *(abs(axis) for offset in lens.offsets for axis in offset)])
-    around_px = AROUND_PX + math.ceil(min(max(size), abs(views * disparity_px)))
-    return around_px + (math.ceil(min(max(size), _moved_px(lens))) + TAPS if lens.share > 0 else 0)
+    around_px = TILE_MARGIN_PX + math.ceil(min(max(size), abs(views * disparity_px)))
+    return around_px + (math.ceil(min(max(size), _moved_px(lens))) + KERNEL_TAPS if lens.share > 0 else 0)
 
 
 def _moved_px(lens: LargeLens) -> float:
@@ -132,7 +132,7 @@ def _draw_tile(
     if not is_sharp:
         return
     in_focus, weights = np.zeros_like(light), np.zeros(tile.size, np.float32)
-    around = tile.grown(math.ceil(min(_moved_px(lens), max(photo.size))) + TAPS, whole(photo.size))
+    around = tile.grown(math.ceil(min(_moved_px(lens), max(photo.size))) + KERNEL_TAPS, whole(photo.size))
     views = views_of_tile(photo, around, lens.offsets[lens.share < 1 :], renderer, should_stop)
     for sample, view in zip(lens.samples, views):
         shown = _linear(view.colors, lens, should_stop)

@@ -1,4 +1,4 @@
-"""Pixels at depth edges show two surfaces at once. Left whole, they trail a rim of foreground colour into the
+"""Pixels at depth edges show two surfaces at once. Left whole, they trail an edge band of foreground colour into the
 background.
 
 A pixel on the far side of a depth edge is split: the background keeps its own colour, and the foreground gets a fringe
@@ -16,17 +16,17 @@ from iibr_core.runtime.jit import kernel, linear_scalar, srgb_scalar
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never
 from iibr_core.types import FloatImage, image_size
 
-LEAST_SHARE = 0.02
+LEAST_MATTE = 0.02
 """Smaller shares of foreground are noise."""
-REACH_PX = 5
+MATTING_PX = 5
 """Colours of both surfaces are taken from so far around."""
-NEARNESS = nearness(REACH_PX, 2.5)
-"""What a pixel there counts, (2 REACH_PX + 1)^2."""
-RIM_TRUST = 0.001
+MATTING_NEARNESS = nearness(MATTING_PX, 2.5)
+"""What a pixel there counts, (2 MATTING_PX + 1)^2."""
+EDGE_BAND_TRUST = 0.001
 """What pixels beside a depth edge count, which may be mixed themselves; they tell where there are no others."""
-NOISE = 2e-5
+COLOR_VARIANCE = 2e-5
 """Variance of a colour in linear light about what its surroundings say; and what is added for rounding, relative."""
-ROUNDING = 1e-6
+MATTING_ROUNDING = 1e-6
 STRAIGHT_SHARE = 0.12
 DIAGONAL_SHARE = 0.05
 """Of a pixel that its outline alone gives to the foreground, for each straight and diagonal neighbour that is."""
@@ -34,7 +34,7 @@ SHARE_DEVIATION = 0.2
 """Standard deviation of shares from that: supersampled layers had 0.1; edges of maps are not as exact."""
 SLOPE = 0.25
 """A pixel in front of one neighbour by more than this share of what it is behind another lies on a slope."""
-ROUNDS = 3
+MATTING_ROUNDS = 3
 
 
 def split_mixed_pixels(
@@ -48,52 +48,52 @@ def split_mixed_pixels(
     """
     own, fringe = np.empty_like(colors, order="C"), np.empty_like(colors, order="C")
     fringe_disparity, coverage = np.empty_like(disparity, order="C"), np.empty_like(disparity, order="C")
-    is_rim, size = np.empty(disparity.shape, np.bool_), image_size(disparity)
+    is_edge_band, size = np.empty(disparity.shape, np.bool_), image_size(disparity)
 
     def band(first: int, last: int) -> None:
         own[first:last] = fringe[first:last] = colors[first:last]
         fringe_disparity[first:last], coverage[first:last] = np.nan, 0.0
-        _split_rows(colors, disparity, is_rim, edge_step, first, last, own, fringe, fringe_disparity, coverage)
+        _split_rows(colors, disparity, is_edge_band, edge_step, first, last, own, fringe, fringe_disparity, coverage)
 
-    in_bands(lambda first, last: _mark_rims(disparity, edge_step, first, last, is_rim), size, should_stop)
+    in_bands(lambda first, last: _mark_edge_bands(disparity, edge_step, first, last, is_edge_band), size, should_stop)
     in_bands(band, size, should_stop)
     return own, fringe, fringe_disparity, coverage
 
 
 @kernel
-def _mark_rims(disparity, edge_step, first, last, is_rim):
+def _mark_edge_bands(disparity, edge_step, first, last, is_edge_band):
     """Rows [first, last): which pixels have a neighbour on the other side of a depth edge."""
     height, width = disparity.shape
     for y in range(first, last):
         for x in range(width):
-            here, is_rim[y, x] = disparity[y, x], False
+            here, is_edge_band[y, x] = disparity[y, x], False
             for v in range(max(y - 1, 0), min(y + 2, height)):
                 for u in range(max(x - 1, 0), min(x + 2, width)):
-                    is_rim[y, x] |= abs(disparity[v, u] - here) > edge_step
+                    is_edge_band[y, x] |= abs(disparity[v, u] - here) > edge_step
 
 
 @kernel
-def _front_beside(disparity, y, x, edge_step):
+def _foreground_beside(disparity, y, x, edge_step):
     """The disparity most in front beside a pixel, and the share of the pixel that the outline gives to it; its own and
     0 on a slope, which falls away on the other side, too.
     """
     height, width = disparity.shape
     here, share = disparity[y, x], 0.0
-    front = back = here
+    foreground = background = here
     for v in range(max(y - 1, 0), min(y + 2, height)):
         for u in range(max(x - 1, 0), min(x + 2, width)):
-            front, back = max(front, disparity[v, u]), min(back, disparity[v, u])
-    if here - back > SLOPE * (front - here):
+            foreground, background = max(foreground, disparity[v, u]), min(background, disparity[v, u])
+    if here - background > SLOPE * (foreground - here):
         return here, share
     for v in range(max(y - 1, 0), min(y + 2, height)):
         for u in range(max(x - 1, 0), min(x + 2, width)):
-            if abs(disparity[v, u] - front) <= edge_step:
+            if abs(disparity[v, u] - foreground) <= edge_step:
                 share += STRAIGHT_SHARE if v == y or u == x else DIAGONAL_SHARE
-    return front, share
+    return foreground, share
 
 
 @kernel
-def _color_statistics(colors, disparity, is_rim, y, x, front, edge_step, mean, spread, darkest, brightest):
+def _color_statistics(colors, disparity, is_edge_band, y, x, foreground, edge_step, mean, spread, darkest, brightest):
     """Mean colour (2, 3) and its covariance (2, 3, 3) of the pixel's own surface and of that in front, around it, in
     linear light; the darkest and brightest of its own (3), where they pass what is there; returns whether there are
     pixels of both.
@@ -101,14 +101,16 @@ def _color_statistics(colors, disparity, is_rim, y, x, front, edge_step, mean, s
     height, width = disparity.shape
     weights, color = np.zeros(2), np.empty(3)
     mean[:], spread[:] = 0.0, 0.0
-    for v in range(max(y - REACH_PX, 0), min(y + REACH_PX + 1, height)):
-        for u in range(max(x - REACH_PX, 0), min(x + REACH_PX + 1, width)):
-            to_own, to_front = abs(disparity[v, u] - disparity[y, x]), abs(disparity[v, u] - front)
+    for v in range(max(y - MATTING_PX, 0), min(y + MATTING_PX + 1, height)):
+        for u in range(max(x - MATTING_PX, 0), min(x + MATTING_PX + 1, width)):
+            to_own, to_foreground = abs(disparity[v, u] - disparity[y, x]), abs(disparity[v, u] - foreground)
             # A third surface, or none; or the pixel itself.
-            if not min(to_own, to_front) <= edge_step or (v == y and u == x):
+            if not min(to_own, to_foreground) <= edge_step or (v == y and u == x):
                 continue
-            surface = 1 if to_front < to_own else 0
-            weight = NEARNESS[v - y + REACH_PX, u - x + REACH_PX] * (RIM_TRUST if is_rim[v, u] else 1.0)
+            surface = 1 if to_foreground < to_own else 0
+            weight = MATTING_NEARNESS[v - y + MATTING_PX, u - x + MATTING_PX] * (
+                EDGE_BAND_TRUST if is_edge_band[v, u] else 1.0
+            )
             weights[surface] += weight
             for c in range(3):
                 color[c] = linear_scalar(colors[v, u, c])
@@ -124,7 +126,9 @@ def _color_statistics(colors, disparity, is_rim, y, x, front, edge_step, mean, s
             for e in range(c + 1):
                 spread[surface, c, e] -= mean[surface, c] * mean[surface, e]
                 spread[surface, e, c] = spread[surface, c, e]
-        noise = NOISE + ROUNDING * (spread[surface, 0, 0] + spread[surface, 1, 1] + spread[surface, 2, 2])
+        noise = COLOR_VARIANCE + MATTING_ROUNDING * (
+            spread[surface, 0, 0] + spread[surface, 1, 1] + spread[surface, 2, 2]
+        )
         for c in range(3):
             spread[surface, c, c] += noise
     return weights.min() > 0
@@ -145,23 +149,23 @@ def _mixture_precision(spread, share, precision):
 
 @kernel
 def _split_rows(
-    colors, disparity, is_rim, edge_step, first, last, own, fringe, fringe_disparity, coverage,
+    colors, disparity, is_edge_band, edge_step, first, last, own, fringe, fringe_disparity, coverage,
 ):  # fmt: skip
     """Rows [first, last) of what `split_mixed_pixels` returns, which hold the photo where nothing is split."""
     mean, spread, precision = np.empty((2, 3)), np.empty((2, 3, 3)), np.empty((3, 3))
     here, darkest, brightest = np.empty(3), np.empty(3), np.empty(3)
     for y in range(first, last):
         for x in range(disparity.shape[1]):
-            if not is_rim[y, x]:
+            if not is_edge_band[y, x]:
                 continue
-            front, outline = _front_beside(disparity, y, x, edge_step)
+            foreground, outline = _foreground_beside(disparity, y, x, edge_step)
             for c in range(3):
                 here[c] = darkest[c] = brightest[c] = linear_scalar(colors[y, x, c])
             # A pixel just behind an edge, and colours of both sides.
             if not (
-                front - disparity[y, x] > edge_step
+                foreground - disparity[y, x] > edge_step
                 and _color_statistics(
-                    colors, disparity, is_rim, y, x, front, edge_step, mean, spread, darkest, brightest
+                    colors, disparity, is_edge_band, y, x, foreground, edge_step, mean, spread, darkest, brightest
                 )
             ):
                 continue
@@ -169,32 +173,35 @@ def _split_rows(
             # from that spread, and the spread from the share.
             share, contrast = outline, mean[1] - mean[0]
             _mixture_precision(spread, share, precision)
-            for _ in range(ROUNDS):
+            for _ in range(MATTING_ROUNDS):
                 fits = 1.0 / SHARE_DEVIATION**2
                 expected = fits * outline
                 for c in range(3):
                     for e in range(3):
                         fits += contrast[c] * precision[c, e] * contrast[e]
                         expected += contrast[c] * precision[c, e] * (here[e] - mean[0, e])
-                share = min(max(expected / fits, 0.0), 1.0 - LEAST_SHARE)
+                share = min(max(expected / fits, 0.0), 1.0 - LEAST_MATTE)
                 _mixture_precision(spread, share, precision)
             # Colours that are not finite tell nothing.
-            if not share >= LEAST_SHARE:
+            if not share >= LEAST_MATTE:
                 continue
             # What is left goes to both by how far they spread: so both together are the pixel again.
             off = here - mean[0] - share * contrast
             for c in range(3):
-                back, fore = mean[0, c], mean[1, c]
+                background, fore = mean[0, c], mean[1, c]
                 for e in range(3):
                     part = precision[e, 0] * off[0] + precision[e, 1] * off[1] + precision[e, 2] * off[2]
-                    back, fore = back + (1.0 - share) * spread[0, c, e] * part, fore + share * spread[1, c, e] * part
+                    background, fore = (
+                        background + (1.0 - share) * spread[0, c, e] * part,
+                        fore + share * spread[1, c, e] * part,
+                    )
                 # Nothing is darker than black, and what is behind neither darker nor brighter than its surface all
                 # around, as a small share of it may seem: the other part takes what is left.
                 if fore < 0.0:
-                    back, fore = here[c] / (1.0 - share), 0.0
-                if not darkest[c] <= back <= brightest[c]:
-                    back = min(max(back, darkest[c]), brightest[c])
-                    fore = (here[c] - (1.0 - share) * back) / share
-                own[y, x, c], fringe[y, x, c] = srgb_scalar(back), srgb_scalar(fore)
+                    background, fore = here[c] / (1.0 - share), 0.0
+                if not darkest[c] <= background <= brightest[c]:
+                    background = min(max(background, darkest[c]), brightest[c])
+                    fore = (here[c] - (1.0 - share) * background) / share
+                own[y, x, c], fringe[y, x, c] = srgb_scalar(background), srgb_scalar(fore)
             # The fringe ray moves with the foreground and covers its share; the own ray stays and fills the pixel.
-            fringe_disparity[y, x], coverage[y, x] = front, share
+            fringe_disparity[y, x], coverage[y, x] = foreground, share

@@ -17,8 +17,8 @@ LEAST_COVERED = 0.2
 """A ray of which less is covered counts as occluded in every source."""
 MOSTLY_COVERED = 0.5
 """A ray of which more is covered has the disparity of what covers it."""
-WHOLE = 0.6
-"""Where less of a ray is covered, what lies behind shows, too. Above, it is a seam rather than a rim."""
+WHOLLY_COVERED = 0.6
+"""Where less of a ray is covered, what lies behind shows, too. Above, it is a seam rather than an edge."""
 
 
 def entropy(weights: FloatImage) -> FloatImage:

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from iibr_core.inpainting.beyond_frame import extend_beyond_frame
+from iibr_core.inpainting.outpainting import outpaint
+from iibr_core.rendering.flying_pixels import measure_detail
 from iibr_core.rendering.mixed_pixels import split_mixed_pixels
 from iibr_core.rendering.ray_set import NO_MARGINS, OWN_SURFACE_PX, RaySet
-from iibr_core.rendering.specks import measure_detail
 from iibr_core.runtime.tiling import ShouldStop, never
 from iibr_core.stages import ALL_STAGES, Stages
 from iibr_core.types import FloatImage, Margins, ViewOffset, image_size
 
-EDGE_PX = 1.0
+MIXING_STEP_PX = 1.0
 """A step of disparity mixes two surfaces if it opens a gap of at least this many pixels in the outermost view."""
 
 
@@ -31,8 +31,8 @@ def rays_of_photo(
     margins: so far beyond its frame the photo is continued. stages: that are on, here and in all views of these rays.
     Raises Cancelled once should_stop is true.
     """
-    colors, disparity = extend_beyond_frame(colors, disparity, margins, should_stop, stages)
-    centre, edge_step = ViewOffset(0.0, 0.0), EDGE_PX / farthest_views
+    colors, disparity = outpaint(colors, disparity, margins, should_stop, stages)
+    centre, edge_step = ViewOffset(0.0, 0.0), MIXING_STEP_PX / farthest_views
     detail = measure_detail(colors, should_stop)
     size, surface_step = image_size(disparity), OWN_SURFACE_PX / farthest_views
     rays = RaySet(2 + more, size, surface_step, farthest_views, margins, detail, stages)

@@ -13,9 +13,14 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.rendering.disparity_statistics import EDGE_PARALLAX_PX, SOFT, DisparityStatistics, measure_disparity
-from iibr_core.rendering.joined_rays import BELOW, RIGHT, join_rays, joined_either_way
+from iibr_core.rendering.disparity_statistics import (
+    EDGE_PARALLAX_PX,
+    SOFT_EDGE_SHARPNESS,
+    DisparityStatistics,
+    measure_disparity,
+)
 from iibr_core.rendering.ray_cells import CELL_PX, Cells, any_in_cells, largest_steps, sum_up
+from iibr_core.rendering.slope_connectivity import BELOW, RIGHT, connect_rays, connected_either_way
 from iibr_core.runtime.jit import kernel, nearest_pixel
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never
 from iibr_core.stages import ALL_STAGES, Stages
@@ -28,9 +33,9 @@ OWN_SURFACE_PX = 0.5
 SMOOTH_SHARE = 0.8
 """A smooth surface's steps stay below this share of the step between surfaces."""
 IN_FRONT_PX = 1.0
-"""What was made up is in front of what the photo shows if it parts from it by this much in the farthest view."""
-DOUBTED_PX = 2
-"""What was made up within so many pixels of that, each way, is no better: its slivers would fly about as crumbs."""
+"""Inpainted rays are in front of the photo's where their disparities differ by this much in the farthest view."""
+GUARD_BAND_PX = 2
+"""Inpainted rays this near to those in front are left out, too: else slivers of them appear as isolated outliers."""
 
 
 class RayArrays(NamedTuple):
@@ -54,8 +59,8 @@ class RaySet:
     """Source images of one size (height, width), at most `capacity` of them. Views show what lies within their margins.
 
     All arrays are of the images added so far. farthest_views: the largest view offset that will be rendered. margins:
-    of the images around every view. joined (H, W): which steps between the photo's rays are a steep surface's
-    (`joined_rays`). photo_images: so many, from the first on, hold what the photo shows; the others are inpainted.
+    of the images around every view. connected (H, W): which steps between the photo's rays are a steep surface's
+    (`slope_connectivity`). photo_images: so many, from the first on, hold what the photo shows; others are inpainted.
     """
 
     def __init__(
@@ -91,7 +96,7 @@ class RaySet:
         low, high = (np.empty((capacity, *in_cells), np.float32) for _ in range(2))
         row_ranges = np.empty((capacity, in_cells[0], 2), np.float32)
         self._cells_room = Cells(low, high, row_ranges, np.full(in_cells, np.inf, np.float32))
-        self.joined = np.zeros(size, np.uint8)
+        self.connected = np.zeros(size, np.uint8)
         self._steep, self._nowhere = np.zeros(in_cells, np.bool_), np.zeros(in_cells, np.bool_)
 
     def add(
@@ -102,7 +107,7 @@ class RaySet:
         coverage: FloatImage,
         should_stop: ShouldStop = never,
     ) -> None:
-        """Add the rays of one image (H, W), or of one view. All but the photo's, which come first, were made up: those
+        """Add the rays of one image (H, W), or of one view. All but the photo's, which come first, are inpainted: those
         in front of what the photo shows are left out, as it would show them, and those beside them. Raises Cancelled
         once should_stop is true; then nothing is added.
         """
@@ -110,12 +115,12 @@ class RaySet:
             colors, disparity, coverage = (
                 self._with_margins(part, none) for part, none in ((colors, 0.0), (disparity, np.nan), (coverage, 0.0))
             )
-        k, joined = self._count, np.zeros(self.size, np.uint8)
+        k, connected = self._count, np.zeros(self.size, np.uint8)
         room, cells = self._room, self._cells_room
         if k == 0 and self.stages.connect_slopes:
             least_edge = EDGE_PARALLAX_PX / max(self.farthest_views, 1e-9)
-            self.joined = joined = join_rays(disparity, self._surface_step, least_edge, should_stop)
-            self._steep = any_in_cells(joined_either_way(joined))
+            self.connected = connected = connect_rays(disparity, self._surface_step, least_edge, should_stop)
+            self._steep = any_in_cells(connected_either_way(connected))
         if k > 0 and any(offset) and self.stages.leave_out_in_front:
             step = IN_FRONT_PX / max(self.farthest_views, 1e-9)
             coverage = coverage.copy()
@@ -125,7 +130,7 @@ class RaySet:
             rows = slice(first, last)
             room.colors[k, rows], room.disparity[k, rows] = colors[rows], disparity[rows]
             room.coverage[k, rows] = coverage[rows]
-            _edge_level(disparity, joined, self._surface_step, first, last, room.edge_level[k])
+            _edge_level(disparity, connected, self._surface_step, first, last, room.edge_level[k])
             sum_up(disparity, coverage, first, last, cells.low[k], cells.high[k])
             if k == 0:
                 largest_steps(disparity, first, last, cells.step)
@@ -144,7 +149,7 @@ class RaySet:
                 found = measure_disparity(self.arrays.disparity, self.farthest_views, should_stop)
                 self._soft_cells = np.empty(self.cells.low.shape, np.bool_)
                 self._soft_cells[: self.photo_images] = any_in_cells(found.soft)
-                self._soft_cells[self.photo_images :] = found.softness > SOFT
+                self._soft_cells[self.photo_images :] = found.softness > SOFT_EDGE_SHARPNESS
                 self._statistics = found
             return self._statistics
 
@@ -198,7 +203,7 @@ class RaySet:
         return SMOOTH_SHARE * self._surface_step * max(larger, 1.0)
 
     def steep_cells(self, k: int) -> NDArray[np.bool_]:
-        """(M, N): cells of image k with joined rays. Only the photo has any."""
+        """(M, N): cells of image k with connected rays. Only the photo has any."""
         return self._steep if k == 0 else self._nowhere
 
     @property
@@ -215,7 +220,7 @@ class RaySet:
     @property
     def soft_cells(self) -> NDArray[np.bool_]:
         """(S, M, N): cells of rays that count as near a soft depth edge: those of the photo that do, and where edges
-        are SOFT all that was inpainted.
+        are SOFT_EDGE_SHARPNESS all that was inpainted.
         """
         self.survey()
         return self._soft_cells
@@ -227,7 +232,7 @@ class RaySet:
 
     @property
     def photo_detail(self) -> FloatImage:
-        """(H, W), as large as images: how far the photo's pixels stand out (`specks.measure_detail`). ValueError where
+        """(H, W), as large as images: how far the photo's pixels stand out (`measure_detail`). ValueError where
         the set was made without.
         """
         if self._photo_detail is None:
@@ -254,13 +259,13 @@ def _leave_out_in_front(disparity, photo_disparity, margins, t, s, step, coverag
                 # Only within its frame the photo shows anything.
                 v, u = nearest_pixel(y + d * t), nearest_pixel(x + d * s)
                 if top <= v < height - bottom and left <= u < width - right and d > photo_disparity[v, u] + step:
-                    for j in range(max(y - DOUBTED_PX, 0), min(y + DOUBTED_PX + 1, height)):
-                        for i in range(max(x - DOUBTED_PX, 0), min(x + DOUBTED_PX + 1, width)):
+                    for j in range(max(y - GUARD_BAND_PX, 0), min(y + GUARD_BAND_PX + 1, height)):
+                        for i in range(max(x - GUARD_BAND_PX, 0), min(x + GUARD_BAND_PX + 1, width)):
                             coverage[j, i] = 0.0
 
 
 @kernel
-def _edge_level(disparity, joined, surface_step, first, last, level):
+def _edge_level(disparity, connected, surface_step, first, last, level):
     """Of rows [first, last): the largest step between rays that no surface joins among the 4x4 pixels from
     (x - 1, y - 1) to (x + 2, y + 2), in surface_steps rounded up; HIGHEST_LEVEL where one is unknown, 0 up to one.
     """
@@ -272,8 +277,8 @@ def _edge_level(disparity, joined, surface_step, first, last, level):
             here = disparity[y, x]
             right = abs(disparity[y, min(x + 1, width - 1)] - here)
             below = abs(disparity[min(y + 1, height - 1), x] - here)
-            steps = 0.0 if joined[y, x] & RIGHT else right / surface_step
-            steps = steps if joined[y, x] & BELOW or below / surface_step <= steps else below / surface_step
+            steps = 0.0 if connected[y, x] & RIGHT else right / surface_step
+            steps = steps if connected[y, x] & BELOW or below / surface_step <= steps else below / surface_step
             # NaN, no surface, fails the comparison.
             is_known = right + below <= np.inf
             found = np.uint8(ceil(steps)) if is_known and steps < HIGHEST_LEVEL else np.uint8(HIGHEST_LEVEL)

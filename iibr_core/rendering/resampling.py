@@ -185,7 +185,7 @@ def resample_inpainted(images, surfaces, index, x, y, d, parallax):
 def _gather_plain(rays, limits, offsets, candidates, remaining, shown):
     """What `_gather` does, for the rays that are easiest, and most: one candidate, no edge and no border near it.
 
-    They are struck off from remaining. This is `cubic` written out, in single precision and without tests. All rays
+    They are cleared in remaining. This is `cubic` written out, in single precision and without tests. All rays
     with one candidate get their disparity and source.
     """
     images, edge_level, first_row, count = rays.colors, rays.edge_level, candidates.first_row, candidates.number

@@ -16,7 +16,7 @@ from iibr_core.types import FloatImage, ImageSize, image_size
 
 ENLARGED_BY = -0.5
 """Of Keys' cubic kernels (1981) the one that slopes come through unchanged."""
-ROUNDS = 2
+CORRECTION_ROUNDS = 2
 """Of bringing the picture, made smaller, to the one it is made of: an enlarged one, made smaller, is a bit softer."""
 
 
@@ -32,7 +32,7 @@ def bring_to(
     top, left = int(part.top / step_y), int(part.left / step_x)
     bottom, right = (min(math.ceil(a), n) for a, n in zip((part.bottom / step_y, part.right / step_x), smaller.shape))
     missing = np.empty((bottom - top, right - left, 3), np.float32)
-    for _ in range(ROUNDS):
+    for _ in range(CORRECTION_ROUNDS):
 
         def lack(first: int, last: int) -> None:
             _mean_of_areas(light, float(part.top), float(part.left), step_y, step_x, top, left, first, last, missing)

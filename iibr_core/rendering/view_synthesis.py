@@ -15,13 +15,13 @@ from numpy.typing import NDArray
 
 from iibr_core.color import linear_from_srgb, srgb_from_linear
 from iibr_core.inpainting.background import fill_background, goes_on_in_front
-from iibr_core.inpainting.protocol import Inpainter
+from iibr_core.inpainting.inpainter import Inpainter
 from iibr_core.rendering.ambiguous_rays import HYPOTHESES, UndecidedRays, find_undecided_rays
 from iibr_core.rendering.candidates import find_candidates
 from iibr_core.rendering.coherent_cells import land_marked
 from iibr_core.rendering.hypotheses import AmbiguousRays, blend_hypotheses, bound_weights, describe_rays
-from iibr_core.rendering.laid_hypotheses import REACH_PX
-from iibr_core.rendering.occlusion import LEAST_COVERED, MOSTLY_COVERED, WHOLE, covered_share, entropy
+from iibr_core.rendering.laid_hypotheses import SEARCH_PX
+from iibr_core.rendering.occlusion import LEAST_COVERED, MOSTLY_COVERED, WHOLLY_COVERED, covered_share, entropy
 from iibr_core.rendering.ray_cells import CELL_PX
 from iibr_core.rendering.ray_set import RaySet
 from iibr_core.rendering.rendered_view import DecidedRays, RaysBehind, RenderedView, ShownBefore
@@ -119,7 +119,7 @@ class ViewSynthesis:
         y, x = np.divmod(undecided.pixel, rays.size.width)
         pixel = (y - rays.margins.top) * rays.view_size.width + x - rays.margins.left
         inpainted = source >= rays.photo_images
-        inpainted |= _beyond_frame(pixel.astype(np.int64), disparity, *undecided.offset, *rays.view_size)
+        inpainted |= _outside_frame(pixel.astype(np.int64), disparity, *undecided.offset, *rays.view_size)
         return DecidedRays(pixel, colors, disparity, inpainted)
 
     def side_by_side(self, work: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Result]:
@@ -163,7 +163,7 @@ class ViewSynthesis:
         self, rays: RaySet, offset: ViewOffset, view: RenderedView, covered: FloatImage, threads: int
     ) -> RenderedView:
         """The view with its holes filled. covered (H, W): how much of each ray is covered: what covers a ray in part
-        comes over what was filled there. So no rim that two surfaces share is a seed for what is filled, either.
+        comes over what was filled there. So no pixel that two surfaces share is a seed for what is filled, either.
         """
         colors, disparity = view.colors.reshape(-1, 3), view.disparity.reshape(-1)
         part = np.flatnonzero((covered < _whole(rays)) & (covered > 0))
@@ -174,13 +174,13 @@ class ViewSynthesis:
             hole |= self._reopened(rays, offset, view, hole, threads)
         if not hole.any():
             return view
-        front, front_disparity = colors[part], disparity[part]
+        foreground, foreground_disparity = colors[part], disparity[part]
         self._inpainter(view.colors, view.disparity, hole, rays.photo_disparity, offset, self._should_stop, threads)
         if not len(part):
             return view
         behind, share = RaysBehind(part, colors[part], disparity[part]), covered.reshape(-1)[part]
-        colors[part] = _composite(front, behind.colors, share)
-        disparity[part] = np.where(share > MOSTLY_COVERED, front_disparity, behind.disparity)
+        colors[part] = _composite(foreground, behind.colors, share)
+        disparity[part] = np.where(share > MOSTLY_COVERED, foreground_disparity, behind.disparity)
         return replace(view, behind=behind)
 
     def _reopened(
@@ -191,7 +191,7 @@ class ViewSynthesis:
         """
         pixel, filled = np.flatnonzero(view.inpainted & ~hole), np.zeros_like(hole)
         disparity = view.disparity.reshape(-1)[pixel]
-        filled.reshape(-1)[pixel] = ~_beyond_frame(pixel, disparity, *offset, *rays.view_size)
+        filled.reshape(-1)[pixel] = ~_outside_frame(pixel, disparity, *offset, *rays.view_size)
         if filled.any():
             filled &= goes_on_in_front(
                 view.disparity, hole | filled, rays.photo_disparity, offset, self._should_stop, threads
@@ -215,7 +215,7 @@ class ViewSynthesis:
         """Write rows [first, last) of the view in closed form, holes not filled yet, and of how much of each ray is
         covered; the rays that are the transformer's to decide, if there is one.
         """
-        around = REACH_PX if self._transformer else 0
+        around = SEARCH_PX if self._transformer else 0
         # The images are larger than the view: their rows and columns count here.
         first, last = rows[0] + rays.margins.top, rows[1] + rays.margins.top
         left, right = rays.margins.left, rays.size.width - rays.margins.right
@@ -248,7 +248,7 @@ class ViewSynthesis:
         view.inpainted[shown] = occluded[inner] | (found.source[inner] >= rays.photo_images)
         if any(rays.margins):
             pixel = np.arange(rows[0] * rays.view_size.width, rows[1] * rays.view_size.width)
-            beyond = _beyond_frame(pixel, view.disparity[shown].reshape(-1), *offset, *rays.view_size)
+            beyond = _outside_frame(pixel, view.disparity[shown].reshape(-1), *offset, *rays.view_size)
             view.inpainted[shown] |= beyond.reshape(view.inpainted[shown].shape)
         if view.entropy is not None:
             view.entropy[shown] = entropy(weights)[inner]
@@ -257,7 +257,7 @@ class ViewSynthesis:
 
 def _whole(rays: RaySet) -> float:
     """Rays covered less show in part what lies behind them."""
-    return WHOLE if rays.stages.composite_partial_coverage else 0.0
+    return WHOLLY_COVERED if rays.stages.composite_partial_coverage else 0.0
 
 
 def _changed_pixels(rays: RaySet, offset: ViewOffset, rows: tuple[int, int], known: int) -> NDArray[np.bool_]:
@@ -281,7 +281,7 @@ def _is_within_margins(
 
 
 @kernel
-def _beyond_frame(pixel, disparity, t, s, height, width):
+def _outside_frame(pixel, disparity, t, s, height, width):
     """Which rays (N) of a view look beyond the photo's frame. pixel: indices into a view's pixels, row by row."""
     beyond = np.empty(len(pixel), np.bool_)
     for i in range(len(pixel)):
@@ -290,7 +290,9 @@ def _beyond_frame(pixel, disparity, t, s, height, width):
     return beyond
 
 
-def _composite(front: FloatImage, back: FloatImage, share: FloatImage) -> FloatImage:
-    """Colours (N, 3) of a front that covers these shares (N) of its pixels, over a back; summed in linear light."""
-    light = linear_from_srgb(back) + share[:, None] * (linear_from_srgb(front) - linear_from_srgb(back))
+def _composite(foreground: FloatImage, background: FloatImage, share: FloatImage) -> FloatImage:
+    """Colours (N, 3) of a foreground that covers these shares (N) of its pixels, over a background, in linear light."""
+    light = linear_from_srgb(background) + share[:, None] * (
+        linear_from_srgb(foreground) - linear_from_srgb(background)
+    )
     return np.asarray(srgb_from_linear(light), np.float32)

@@ -36,15 +36,17 @@ def _composite_front_to_back(candidates, weights):
             ahead_slot = -1
             for _ in range(used):
                 # The front-most surface behind the last one; equal disparities in slot order.
-                front = -1
+                foreground = -1
                 for k in range(used):
                     d = disparity[k, row, x]
-                    if (d < ahead or (d == ahead and k > ahead_slot)) and (front < 0 or d > disparity[front, row, x]):
-                        front = k
+                    if (d < ahead or (d == ahead and k > ahead_slot)) and (
+                        foreground < 0 or d > disparity[foreground, row, x]
+                    ):
+                        foreground = k
                 # Nothing behind, or the pixel is full.
-                if front < 0 or left <= 0:
+                if foreground < 0 or left <= 0:
                     break
                 # "Over": this surface takes what is left, as far as it covers the pixel.
-                ahead, ahead_slot = disparity[front, row, x], front
-                weights[front, row, x] = min(coverage[front, row, x], left)
-                left -= weights[front, row, x]
+                ahead, ahead_slot = disparity[foreground, row, x], foreground
+                weights[foreground, row, x] = min(coverage[foreground, row, x], left)
+                left -= weights[foreground, row, x]

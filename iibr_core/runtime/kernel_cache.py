@@ -51,7 +51,7 @@ def _import_numba() -> Any:
         import numba
         import numba.np.arraymath  # the part that looks for scipy, else at the first kernel
     numba.core.config._config_fname = os.devnull  # it looks again whenever it compiles
-    _settle_processor(numba)
+    _choose_processor(numba)
     return numba
 
 
@@ -60,7 +60,7 @@ PROCESSOR_FEATURES = {"avx", "avx2", "bmi", "bmi2", "cx16", "f16c", "fma", "lzcn
 """Of the x86-64 psABI's level 3, in LLVM's names: nearly every such processor since 2015."""
 
 
-def _settle_processor(numba: Any) -> None:
+def _choose_processor(numba: Any) -> None:
     """Compile for PROCESSOR wherever this one is of that kind, so that kernels compiled elsewhere count here, and
     results do not depend on the model. Whoever told Numba otherwise has it so; other processors get code of their own.
     """

@@ -11,7 +11,6 @@ from iibr_core.runtime.offers import offered_by
 
 if TYPE_CHECKING:
     from iibr_core.scenes.dense import read_dense
-    from iibr_core.scenes.gloss import GlossFound, GlossRequest, add_gloss, answer, read_environment
     from iibr_core.scenes.inputs import inputs_of, named_by
     from iibr_core.scenes.lens_limits import (
         BLADES_LIMITS,
@@ -60,6 +59,7 @@ if TYPE_CHECKING:
         source_with_depth,
         source_with_map,
     )
+    from iibr_core.scenes.scene_gloss import GlossFound, GlossRequest, add_gloss, answer, read_environment
     from iibr_core.scenes.screen_size import ScreenSize
 else:
     __getattr__ = offered_by(__file__)

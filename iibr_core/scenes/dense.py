@@ -11,7 +11,7 @@ from iibr_core.runtime.tiling import ShouldStop, never
 from iibr_core.types import GridShape, ReportProgress, ViewOffset, ViewUpdate, ignore_progress
 
 if TYPE_CHECKING:
-    from iibr_core.formats.light_fields.scene import MultiView
+    from iibr_core.formats.light_fields.multi_view_scene import MultiView
     from iibr_core.generation.dense_field import GivenView
     from iibr_core.generation.given_views import DenseFieldWork
 

@@ -34,7 +34,7 @@ from iibr_core.types import (
 )
 
 if TYPE_CHECKING:
-    from iibr_core.formats.light_fields.scene import MultiView
+    from iibr_core.formats.light_fields.multi_view_scene import MultiView
 
 UNKNOWN_DISPARITY_RANGE_PX = (-4.0, 4.0)
 """Where to look for the focus in a light field that says nothing about disparity."""
@@ -68,7 +68,7 @@ def showings_of_light_field(
     showing must be taken before the next is asked for. Raises InputError for a field or a map that cannot be read,
     Cancelled once should_stop is true.
     """
-    from iibr_core.formats.light_fields.registry import open_light_field
+    from iibr_core.formats.light_fields.light_field_formats import open_light_field
     from iibr_core.formats.light_fields.views import disparity_range, grid_of, read_views
 
     field = open_light_field(Path(source.path))
@@ -139,7 +139,7 @@ def find_disparity(field: MultiView, budget: Budget, report_progress: ReportProg
 
     Raises InputError, also where memory does not suffice.
     """
-    from iibr_core.depth.multi_view.estimate import FINDING, estimate_coarse, estimate_disparity
+    from iibr_core.depth.multi_view.estimate_disparity import FINDING, estimate_coarse, estimate_disparity
     from iibr_core.formats.light_fields.views import grid_of, read_views
 
     grid, (size, views) = grid_of(field), read_views(field)
@@ -194,7 +194,7 @@ def _with_disparity(
     takes_drafts: bool,
 ) -> Iterator[Showing]:
     """The field with the given disparity of its centre view, with the one it came with, or one found from its views."""
-    from iibr_core.depth.multi_view.estimate import estimate_coarse, estimate_disparity
+    from iibr_core.depth.multi_view.estimate_disparity import estimate_coarse, estimate_disparity
 
     if given is not None:
         file = field.scene.source.depth.file

@@ -199,7 +199,7 @@ def _pixels_to_read(source: Source, keeps_views: bool) -> tuple[int, ImageSize, 
     """
     from iibr_core.formats.images.header import read_photo_header
     from iibr_core.formats.images.photo import DEFAULT_MAX_PIXELS, size_within
-    from iibr_core.formats.light_fields.registry import is_view_file
+    from iibr_core.formats.light_fields.light_field_formats import is_view_file
 
     path, wanted = Path(source.path), source.max_pixels or DEFAULT_MAX_PIXELS
     if is_view_file(path):

@@ -8,9 +8,9 @@ import numpy as np
 
 from iibr_core.color import photo_in_srgb
 from iibr_core.depth.editing.edits import UNEDITED
+from iibr_core.generation.disparity_range import measure_disparity_range
 from iibr_core.generation.plan import MOST_STRENGTH, PlanOverrides, ScenePlan, plan_for_viewing, plan_literal
-from iibr_core.generation.relief import measure_relief
-from iibr_core.inpainting.protocol import InpaintingAids
+from iibr_core.inpainting.inpainter import InpaintingAids
 from iibr_core.runtime.tiling import ShouldStop, never
 from iibr_core.scenes.loaded_photo import LoadedPhoto
 from iibr_core.scenes.scene import Source
@@ -43,7 +43,9 @@ def make_plan(source: Source, loaded: LoadedPhoto, depth_strength: float, keeps_
     zero = source.focus_disparity
     if loaded.depth_settings.edits != UNEDITED:
         zero = still_disparity(source, loaded.canvas.before_strokes(loaded.depth_settings.edits))
-        range_px, edited_px = (measure_relief(map_.values).range for map_ in (loaded.refined, loaded.disparity))
+        range_px, edited_px = (
+            measure_disparity_range(map_.values).range for map_ in (loaded.refined, loaded.disparity)
+        )
         wanted = depth_strength * (edited_px / range_px if range_px else 1.0)
         depth_strength = min(max(wanted, -MOST_STRENGTH), MOST_STRENGTH)
     memory = source.depth.memory_bytes

@@ -14,9 +14,9 @@ import numpy as np
 from iibr_core.color import stored_from_encoded
 from iibr_core.depth.editing.edits import UNEDITED
 from iibr_core.depth.subject import subject_disparity
-from iibr_core.formats.light_fields.registry import is_light_field
+from iibr_core.formats.light_fields.light_field_formats import is_light_field
+from iibr_core.generation.disparity_range import measure_disparity_range
 from iibr_core.generation.plan import ScenePlan
-from iibr_core.generation.relief import measure_relief
 from iibr_core.runtime.allocator import give_back_memory
 from iibr_core.runtime.tiling import ShouldStop, never
 from iibr_core.scenes.light_fields import showings_of_light_field
@@ -144,7 +144,7 @@ def _found_span_px(loaded: LoadedPhoto, plan: ScenePlan) -> float:
         far, near = plan.disparity_range_px
         return near - far
     found = loaded.refined.values
-    span = float(np.ptp(found)) if plan.given_range is None else measure_relief(found).range
+    span = float(np.ptp(found)) if plan.given_range is None else measure_disparity_range(found).range
     return span * abs(plan.disparity_scale)
 
 

@@ -19,7 +19,7 @@ from iibr_core.generation.update_loop import complete_ray_set
 from iibr_core.rendering.ambiguous_rays import HYPOTHESES
 from iibr_core.rendering.candidates import find_candidates
 from iibr_core.rendering.hypotheses import SHARE, AmbiguousRays, find_ambiguous_rays, hypothesis_colors
-from iibr_core.rendering.laid_hypotheses import REACH_PX
+from iibr_core.rendering.laid_hypotheses import SEARCH_PX
 from iibr_core.rendering.photo_rays import rays_of_photo
 from iibr_core.rendering.ray_set import RaySet
 from iibr_core.rendering.resampling import heaviest_candidate
@@ -124,8 +124,8 @@ def ambiguous_rays_of_view(
     rays: RaySet, offset: ViewOffset, rows: tuple[int, int], every: bool, hypotheses: int = HYPOTHESES
 ) -> AmbiguousRays:
     """Those of rows [first, last) of the view at an offset, as `ViewSynthesis` finds them."""
-    above = min(rows[0], REACH_PX)
-    candidates = find_candidates(rays, offset, (rows[0] - above, min(rows[1] + REACH_PX, rays.size.height)))
+    above = min(rows[0], SEARCH_PX)
+    candidates = find_candidates(rays, offset, (rows[0] - above, min(rows[1] + SEARCH_PX, rays.size.height)))
     weights = visibility_weights(candidates)
     inner = above, above + rows[1] - rows[0]
     return find_ambiguous_rays(
@@ -144,7 +144,7 @@ def _epi(
     scene: RaycastScene, rays: RaySet, radius: int, rng: np.random.Generator, choice: RayChoice
 ) -> list[LabelledRays] | None:
     """Every ray of a piece of one row in EPI_VIEWS views from left to right; None where one has no hypothesis."""
-    row = int(rng.integers(REACH_PX, SIZE[0] - REACH_PX))
+    row = int(rng.integers(SEARCH_PX, SIZE[0] - SEARCH_PX))
     first = int(rng.integers(0, SIZE[1] - EPI_WIDTH + 1))
     columns = np.arange(first, first + EPI_WIDTH)
     parts = []

@@ -43,7 +43,7 @@ vec3 reprojected_place(vec2 uv, vec2 offset, FallbackView fallback, float focus)
     vec2 texel = 1.0 / view_size_px;
 #ifdef RANGE
     float disparity = max(nearest, focus), before;
-    for (int k = 0; k < 5; k++) {  // from the front: the nearest surface wins
+    for (int k = 0; k < 5; k++) {  // from the foreground: the nearest surface wins
         before = disparity;
         float sheared = clamp(disparity, focus - focus_range, focus + focus_range);
         vec2 at = uv - (offset * sheared + fallback.reprojection * disparity) * texel;

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.harness.scenes import BenchScene
+from benchmarks.harness.bench_scenes import BenchScene
 from benchmarks.refocus import APERTURE_VARIANTS, PINHOLE_VARIANTS, PLAIN, best_pictures, is_stored, measure_drawing
 from iibr_core.evaluation.metrics import psnr
 from iibr_core.rendering.optics import Optics

@@ -13,7 +13,7 @@ from benchmarks import figures
 from benchmarks.figures import FIGURES, NEEDS, ROOT, Figure, make_all, stale_pages
 from benchmarks.harness.pages import cell, put_between, table
 from benchmarks.harness.readme import ACCURACY, TABLES, write_readme
-from benchmarks.harness.report import DOCS, WITH_CHANGES, current_commit, made_by
+from benchmarks.harness.reports import DOCS, WITH_CHANGES, current_commit, made_by
 from iibr_core.types import InputError
 
 PAGE = """# A page

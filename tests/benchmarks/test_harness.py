@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.harness.report import emit, is_wanted, parser_of, start, title
+from benchmarks.harness.reports import emit, is_wanted, parser_of, start, title
 from iibr_core.types import InputError
 
 

@@ -13,9 +13,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from benchmarks.harness.plots import on_the_front, plot_panels
-from benchmarks.harness.report import holds, markdown
-from benchmarks.harness.scenes import (
+from benchmarks.harness.bench_scenes import (
     FIELD,
     BenchScene,
     bench_scenes,
@@ -26,6 +24,8 @@ from benchmarks.harness.scenes import (
     squares_scene,
     write_photo,
 )
+from benchmarks.harness.plots import on_the_front, plot_panels
+from benchmarks.harness.reports import holds, markdown
 from benchmarks.harness.timing import (
     COMMAND_LINE,
     Cost,
@@ -38,8 +38,8 @@ from benchmarks.harness.timing import (
 )
 from benchmarks.prediction import Prediction, fit_nanoseconds, fitted_scenes, is_near, judged_scenes, predict, sum_up
 from benchmarks.speed.__main__ import front_targets, measure_scene
-from benchmarks.speed.report import Bench, Figures, Measured, SpeedTarget, markdown_of, means, panels, write_bench
-from benchmarks.speed.report import table as report_table
+from benchmarks.speed.speed_report import Bench, Figures, Measured, SpeedTarget, markdown_of, means, panels, write_bench
+from benchmarks.speed.speed_report import table as report_table
 from benchmarks.speed.variants import REFERENCE, VARIANTS, Variant, evaluated_views, field_cost
 from iibr_core.evaluation.datasets import read_scene
 from iibr_core.evaluation.metrics import psnr

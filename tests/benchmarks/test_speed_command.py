@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.harness.report import start
+from benchmarks.harness.reports import start
 from benchmarks.speed.__main__ import main
 from tests.iibr_core.known_scenes import write_grid
 
@@ -24,7 +24,7 @@ def run(monkeypatch: pytest.MonkeyPatch, *words: object) -> int:
 def test_it_writes_tables_and_plots(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
-    monkeypatch.setattr("benchmarks.harness.scenes.MOST_JUDGED", 3)
+    monkeypatch.setattr("benchmarks.harness.bench_scenes.MOST_JUDGED", 3)
     write_grid(tmp_path / "square", 5)
     out = tmp_path / "docs"
     out.mkdir()

@@ -11,7 +11,7 @@ import pytest
 import torch
 
 from benchmarks import plucker, trained_variants
-from benchmarks.harness.scenes import BenchScene
+from benchmarks.harness.bench_scenes import BenchScene
 from benchmarks.stages import make_views
 from benchmarks.trained_variants import (
     COORDINATES_ONLY,
@@ -24,7 +24,7 @@ from benchmarks.trained_variants import (
 )
 from iibr_core.formats.weights import read_weights
 from iibr_core.rendering.hypotheses import FEATURES, SHARE
-from iibr_core.rendering.laid_hypotheses import PLAIN
+from iibr_core.rendering.laid_hypotheses import PLAIN_SOURCE
 from iibr_core.rendering.photo_rays import rays_of_photo
 from iibr_core.training.batches import ambiguous_rays_of_view, training_batch
 from iibr_core.training.degradation import blur
@@ -98,7 +98,7 @@ def test_raw_coordinates_are_lines_of_target_and_source(scene: BenchScene) -> No
     y, x = ambiguous.pixel[0] - np.array(SIZE) / 2
     d = ambiguous.disparity[0, 0]
     scale = np.r_[1, 1, 1, np.full(3, 1 / SIZE.width)]
-    assert ambiguous.source[0, 0] % PLAIN < 2  # the photo's own ray: its camera stands in the origin
+    assert ambiguous.source[0, 0] % PLAIN_SOURCE < 2  # the photo's own ray: its camera stands in the origin
     there = np.array([x + d * offset.s, y + d * offset.t, 1.0])
     np.testing.assert_allclose(raw[0, 0, :6], plucker.line_of_pixel(x, y, offset) * scale, atol=1e-4)
     np.testing.assert_allclose(raw[0, 0, 6:12], plucker.line_of(np.zeros(3), there) * scale, atol=1e-4)

@@ -39,7 +39,7 @@ def _import_as_the_program_does(modules: list[str], shell_has_output: bool) -> N
     environment = dict(os.environ)
     from viewer import entry
 
-    entry._settle_home()
+    entry._ensure_home()
     entry._ignore_warnings()
     for module in modules:
         __import__(module)

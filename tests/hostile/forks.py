@@ -22,7 +22,7 @@ PRELOADED = (
     "iibr_core.depth.search",
     "iibr_core.generation.light_field",
     "iibr_core.formats.light_fields.hci",
-    "iibr_core.evaluation.protocol",
+    "iibr_core.evaluation.evaluate_scene",
 )
 KILLED = 137
 CAPABILITIES_VERSION_3 = 0x20080522

@@ -18,7 +18,7 @@ from iibr_core.formats.images.settings_text import ATTRIBUTE
 from iibr_core.formats.images.spatial_photo import write_spatial_photo
 from iibr_core.formats.light_fields.hci import HciWriter
 from iibr_core.formats.maps.pfm import write_pfm
-from iibr_core.rendering.gloss.settings import Gloss
+from iibr_core.rendering.gloss.gloss_settings import Gloss
 from iibr_core.rendering.optics import Optics
 from iibr_core.scenes.scene import Source
 from iibr_core.scenes.screen_size import ScreenSize

@@ -188,7 +188,7 @@ def _with_second_as_depth(data: bytearray) -> bytes:
     while place < at[b"ipco"] + size[b"ipco"]:
         properties += 1
         place += int.from_bytes(data[place : place + 4], "big")
-    # From behind to the front, so that places stay right: the association of item 2 is the last of "ipma".
+    # From the end to the start, so that places stay right: the association of item 2 is the last of "ipma".
     count_at = at[b"ipma"] + 16 + 3 + data[at[b"ipma"] + 18] + 2
     ipma_end = at[b"ipma"] + size[b"ipma"]
     data[count_at] += 1

@@ -12,7 +12,7 @@ from iibr_core.types import ViewOffset
 from tests.iibr_core.scenes import smooth_texture
 
 HEIGHT, WIDTH = 40, 48
-FRONT, WALL = 2.0, 0.5
+FOREGROUND, WALL = 2.0, 0.5
 MARGIN = 40
 
 
@@ -34,9 +34,9 @@ def view_of_wall(offset: ViewOffset, disparity: float = WALL, size: tuple[int, i
 
 
 def view_of_square(offset: ViewOffset) -> np.ndarray:
-    """(H, W, 3) of a reddish square at FRONT before the wall; offsets at which it moves by whole pixels."""
+    """(H, W, 3) of a reddish square at FOREGROUND before the wall; offsets at which it moves by whole pixels."""
     pixels = view_of_wall(offset) * np.float32([0.4, 0.6, 1.0])
-    top, left = round(HEIGHT / 3 - FRONT * offset.t), round(WIDTH / 3 - FRONT * offset.s)
+    top, left = round(HEIGHT / 3 - FOREGROUND * offset.t), round(WIDTH / 3 - FOREGROUND * offset.s)
     square = np.s_[top : top + HEIGHT // 3, left : left + WIDTH // 3]
     own = (smooth_texture(HEIGHT, WIDTH, 1) * np.float32([1.0, 0.4, 0.2]))[: HEIGHT // 3, : WIDTH // 3]
     pixels[square] = own[: pixels[square].shape[0], : pixels[square].shape[1]]
@@ -47,7 +47,7 @@ def disparity_of_square() -> np.ndarray:
     """(H, W) of the centre view of `view_of_square`."""
     disparity = np.full((HEIGHT, WIDTH), WALL, np.float32)
     top, left = round(HEIGHT / 3), round(WIDTH / 3)
-    disparity[top : top + HEIGHT // 3, left : left + WIDTH // 3] = FRONT
+    disparity[top : top + HEIGHT // 3, left : left + WIDTH // 3] = FOREGROUND
     return disparity
 
 

@@ -17,14 +17,14 @@ import numpy as np
 import pytest
 from torch import nn
 
-from iibr_core.depth.embedded.reader import read_embedded
+from iibr_core.depth.embedded.embedded_depth import read_embedded
 from iibr_core.depth.estimates import RelativeInverseDepth
 from iibr_core.depth.estimators import estimate_cache
 from iibr_core.formats import files
 from iibr_core.formats.images.oiio_reader import read_raster
 from iibr_core.formats.images.photo import read_photo, write_image
 from iibr_core.formats.light_fields.hci import HciWriter
-from iibr_core.formats.light_fields.registry import open_light_field
+from iibr_core.formats.light_fields.light_field_formats import open_light_field
 from iibr_core.formats.light_fields.views import read_views
 from iibr_core.formats.maps.disparity_file import read_disparity
 from iibr_core.formats.maps.pfm import write_pfm

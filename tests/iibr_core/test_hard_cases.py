@@ -19,7 +19,7 @@ from iibr_core.formats.maps.disparity_file import read_disparity
 from iibr_core.generation.light_field import generate
 from iibr_core.generation.plan import plan_for_viewing, plan_literal
 from iibr_core.inpainting.background import fill_background
-from iibr_core.inpainting.exemplars import MOST_FINE
+from iibr_core.inpainting.patch_synthesis import MOST_FINE
 from iibr_core.ray_transformer.inference import SHAPES, TrainedWeights
 from iibr_core.rendering.candidates import find_candidates
 from iibr_core.rendering.hypotheses import FEATURES, SHARE, AmbiguousRays
@@ -129,7 +129,7 @@ def test_disparity_with_one_outlier_at_1e6(tmp_path):
 @pytest.mark.parametrize("quality", QUALITIES)
 def test_negative_disparity(quality):
     """Farther than what stands still: content moves the other way, and a nearer square still hides the wall."""
-    photo, disparity = square_before_wall(HEIGHT, WIDTH, front=-1.0, back=-3.0)
+    photo, disparity = square_before_wall(HEIGHT, WIDTH, foreground=-1.0, background=-3.0)
     view = field_of(photo, disparity, quality=quality)[1, 2]
     middle = HEIGHT // 2
     assert view.disparity[middle, WIDTH // 2 + 1] == pytest.approx(-1, abs=0.05)

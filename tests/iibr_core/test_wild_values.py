@@ -21,39 +21,39 @@ from benchmarks import plucker
 from iibr_core import color
 from iibr_core.depth import pictorial_cues, scaling, search, subject
 from iibr_core.depth.choice import DepthChoice
-from iibr_core.depth.edges import blur_fit, edge_blur, edge_labels, refine, rims
+from iibr_core.depth.edges import blur_fit, edge_band, edge_blur, edge_labels, refine
 from iibr_core.depth.embedded import apple, google
 from iibr_core.depth.embedded.xmp import Xmp
 from iibr_core.depth.estimates import DisparityMap, MetricDepth, RelativeInverseDepth
-from iibr_core.depth.multi_view import agreement, estimate, every_view, matching
+from iibr_core.depth.multi_view import agreement, estimate_disparity, every_view, matching
 from iibr_core.formats.images import oiio_reader, photo
 from iibr_core.formats.images.picture_kinds import KINDS
 from iibr_core.formats.images.picture_writers import write_picture
 from iibr_core.formats.images.xmp_packet import parse_packet
-from iibr_core.formats.light_fields import hci, registry, views
+from iibr_core.formats.light_fields import hci, light_field_formats, views
 from iibr_core.formats.maps import disparity_file, resample
-from iibr_core.generation import cost_model, dense_field, free_views, outer_views, plan, relief
+from iibr_core.generation import cost_model, dense_field, disparity_range, free_views, outer_views, plan
 from iibr_core.generation import light_field as generating
-from iibr_core.inpainting import beyond_frame, diffusion, disparity_by_color, disparity_holes
+from iibr_core.inpainting import diffusion, disparity_by_color, disparity_holes, outpainting
 from iibr_core.rendering import (
     ambiguous_rays,
     candidates,
     coherent_cells,
     disparity_statistics,
+    flying_pixels,
     free_view,
     hypotheses,
-    joined_rays,
     large_views,
     lens_light,
     mixed_pixels,
     occlusion,
     resampling,
-    specks,
+    slope_connectivity,
 )
-from iibr_core.rendering.gloss import environment, geometry, shading, surface
-from iibr_core.rendering.gloss.settings import Gloss, GlossLight, GlossSurface, of_maps
+from iibr_core.rendering.flying_pixels import postprocessed_view
+from iibr_core.rendering.gloss import environment, geometry, gloss_surface, shading
+from iibr_core.rendering.gloss.gloss_settings import Gloss, GlossLight, GlossSurface, of_maps
 from iibr_core.rendering.photo_rays import rays_of_photo
-from iibr_core.rendering.specks import settled_view
 from iibr_core.rendering.view_synthesis import ViewSynthesis
 from iibr_core.rendering.visibility_weights import visibility_weights
 from iibr_core.runtime.tiling import never
@@ -185,9 +185,11 @@ def rendered(offset, value=0.5):
         return synthesis.render(rays(value), offset)
 
 
-def settled(value):
+def without_flying(value):
     view = rendered(ViewOffset(0.5, 1.0), value)
-    return specks.without_specks(rays(value), ViewOffset(0.5, 1.0), view.colors, view.disparity, view.inpainted)
+    return flying_pixels.without_flying_pixels(
+        rays(value), ViewOffset(0.5, 1.0), view.colors, view.disparity, view.inpainted
+    )
 
 
 def large_picture(value):
@@ -236,7 +238,7 @@ def photo_file(folder, value, kind=".exr"):
 def field_on_disk(folder, value):
     with hci.HciWriter(folder / "field", GridShape(1, 1), 10.0, "wild", True) as writer:
         writer.add(ViewUpdate(0, 0, np.zeros((*SIZE, 3), np.uint8), depths(value)))
-    return list(views.read_views(registry.open_light_field(folder / "field"))[1])
+    return list(views.read_views(light_field_formats.open_light_field(folder / "field"))[1])
 
 
 def read_back(write, path, pixels):
@@ -259,9 +261,9 @@ def glossy(value):
 FINITE = {
     "rendering.gloss.environment.prefilter_environment": lambda v, _: environment.prefilter_environment(image(v), 0.5),
     "rendering.gloss.geometry.infinity_of": lambda v, _: geometry.infinity_of(Disparity(depths(v), "wild")),
-    "rendering.gloss.settings.of_maps": lambda v, _: of_maps(Gloss(roughness=v, reflectance=v)) and None,
+    "rendering.gloss.gloss_settings.of_maps": lambda v, _: of_maps(Gloss(roughness=v, reflectance=v)) and None,
     "rendering.gloss.shading.shade_views": lambda v, _: list(glossy(v)),
-    "rendering.gloss.surface.surface_mask": lambda v, _: surface.surface_mask(
+    "rendering.gloss.gloss_surface.surface_mask": lambda v, _: gloss_surface.surface_mask(
         GlossSurface(color=(0.5, 0.5, 0.5)), image(0.5), Disparity(depths(v), "wild").values
     ),
     "rendering.candidates.find_candidates": lambda v, _: [rendered(ViewOffset(v, 0.5)), rendered(ViewOffset(0.5, v))],
@@ -310,11 +312,13 @@ FINITE = {
     "depth.multi_view.agreement.find_confirmed": lambda v, _: agreement.find_confirmed(
         [depths(v), depths(1.0)], OFFSETS, 0
     ),
-    "depth.multi_view.estimate.estimate_coarse": lambda v, _: estimate.estimate_coarse(pair(v), OFFSETS, 0).values,
-    "depth.multi_view.estimate.refine_disparity": lambda v, _: estimate.refine_disparity(
+    "depth.multi_view.estimate_disparity.estimate_coarse": lambda v, _: (
+        estimate_disparity.estimate_coarse(pair(v), OFFSETS, 0).values
+    ),
+    "depth.multi_view.estimate_disparity.refine_disparity": lambda v, _: estimate_disparity.refine_disparity(
         pair(v), OFFSETS, 0, np.zeros_like(depths(0.5)), (-1.0, 1.0)
     ),
-    "depth.multi_view.estimate.estimate_disparity": lambda v, _: estimate.estimate_disparity(
+    "depth.multi_view.estimate_disparity.estimate_disparity": lambda v, _: estimate_disparity.estimate_disparity(
         pair(v), OFFSETS, 0, (-1.0, 1.0)
     ),
     "depth.pictorial_cues.estimate_from_cues": lambda v, _: pictorial_cues.estimate_from_cues(
@@ -328,9 +332,9 @@ FINITE = {
         blur_fit.fit_to_blur(image(v), depths(1.0), depths(0.5), soft_cells(), 0.1),
         blur_fit.fit_to_blur(image(0.5), np.nan_to_num(depths(v)), np.nan_to_num(depths(v)), soft_cells(), 0.1),
     ],
-    "depth.edges.rims.settle_rims": lambda v, _: [
-        rims.settle_rims(scene()[0].pixels, np.nan_to_num(known(v)), 0.5, np.isnan(known(v))),
-        rims.settle_rims(image(v), mixed_between_surfaces(), 0.5, np.zeros(SIZE, np.bool_)),
+    "depth.edges.edge_band.resolve_edge_band": lambda v, _: [
+        edge_band.resolve_edge_band(scene()[0].pixels, np.nan_to_num(known(v)), 0.5, np.isnan(known(v))),
+        edge_band.resolve_edge_band(image(v), mixed_between_surfaces(), 0.5, np.zeros(SIZE, np.bool_)),
     ],
     "depth.edges.edge_labels.step_distance": lambda v, _: edge_labels.step_distance(depths(v), 0.5),
     "depth.edges.edge_labels.label_edges": lambda v, _: [
@@ -367,9 +371,9 @@ FINITE = {
         field(scene()[0], depths(v)),
         field(Photo(image(v), 9.0, "wild"), depths(1.0)),
     ],
-    "generation.outer_views.margins_beyond_frame": lambda v, _: [
-        outer_views.margins_beyond_frame(depths(v), [ViewOffset(1.0, -1.0)]),
-        outer_views.margins_beyond_frame(depths(1.0), [ViewOffset(v, 1.0)]),
+    "generation.outer_views.outpainting_margins": lambda v, _: [
+        outer_views.outpainting_margins(depths(v), [ViewOffset(1.0, -1.0)]),
+        outer_views.outpainting_margins(depths(1.0), [ViewOffset(v, 1.0)]),
     ],
     "generation.dense_field.densify": lambda v, _: dense(depths(v)),
     "generation.free_views.inverse_depth_of": lambda v, _: [
@@ -389,7 +393,7 @@ FINITE = {
     "rendering.free_view.target_from_photo": lambda v, _: free_view.target_from_photo(
         camera(), camera(position=np.array([0.0, v, 0.1]), focal_px=(v, 20.0)), 10.0
     ),
-    "inpainting.beyond_frame.extend_beyond_frame": lambda v, _: beyond_frame.extend_beyond_frame(
+    "inpainting.outpainting.outpaint": lambda v, _: outpainting.outpaint(
         np.maximum(np.nan_to_num(image(v)), 0), known(v), Margins(1, 2, 3, 2)
     )[0],
     "generation.light_field.ray_set": lambda v, _: completed(depths(v)),
@@ -405,8 +409,8 @@ FINITE = {
         ImageSize(8, 8), lens_light.LargeLens(share=0.5, focus=v), v
     ),
     "rendering.lens_light.draw_large": lambda v, _: large_picture(v),
-    "rendering.specks.measure_detail": lambda v, _: specks.measure_detail(image(v)),
-    "rendering.specks.without_specks": lambda v, _: settled(v),
+    "rendering.flying_pixels.measure_detail": lambda v, _: flying_pixels.measure_detail(image(v)),
+    "rendering.flying_pixels.without_flying_pixels": lambda v, _: without_flying(v),
     "rendering.large_views.views_of_tile": lambda v, _: tile_views(v),
     "rendering.occlusion.covered_share": lambda v, _: occlusion.covered_share(np.nan_to_num(shares(v))),
     "rendering.occlusion.entropy": lambda v, _: occlusion.entropy(np.nan_to_num(shares(v))),
@@ -415,8 +419,10 @@ FINITE = {
         plan.plan_for_viewing(*scene(), plan.PlanOverrides(depth_strength=v)),
         plan.plan_for_viewing(*scene(), plan.PlanOverrides(focus_disparity=v)).field_disparity(scene()[1]),
     ],
-    "generation.relief.measure_relief": lambda v, _: relief.measure_relief(depths(v)),
-    "generation.relief.rounding_step": lambda v, _: relief.rounding_step(depths(v)),
+    "generation.disparity_range.measure_disparity_range": lambda v, _: disparity_range.measure_disparity_range(
+        depths(v)
+    ),
+    "generation.disparity_range.rounding_step": lambda v, _: disparity_range.rounding_step(depths(v)),
     "generation.plan.plan_literal": lambda v, _: plan.plan_literal(scene()[0], Disparity(depths(v), "wild"), GRID),
     "rendering.coherent_cells.find_coherent_cells": lambda v, _: [
         coherent_cells.find_coherent_cells(rays(v), ViewOffset(0.5, -1.0), (0, SIZE[0])),
@@ -429,11 +435,11 @@ FINITE = {
         coherent_cells.land_marked(rays(v).cells, np.array([[0.5, t]]), np.ones((1, 1, 4), np.bool_), (0, 4), 6)
         for t in (0.5, v)
     ],
-    "rendering.joined_rays.join_rays": lambda v, _: joined_rays.joined_either_way(
-        joined_rays.join_rays(depths(v), 0.5, 0.5)
+    "rendering.slope_connectivity.connect_rays": lambda v, _: slope_connectivity.connected_either_way(
+        slope_connectivity.connect_rays(depths(v), 0.5, 0.5)
     ),
-    "rendering.joined_rays.joined_either_way": lambda v, _: joined_rays.joined_either_way(
-        joined_rays.join_rays(depths(v), 0.5, 0.5)
+    "rendering.slope_connectivity.connected_either_way": lambda v, _: slope_connectivity.connected_either_way(
+        slope_connectivity.connect_rays(depths(v), 0.5, 0.5)
     ),
     "depth.subject.subject_disparity": lambda v, _: subject.subject_disparity(depths(v)),
     "rendering.disparity_statistics.find_soft_edges": lambda v, _: disparity_statistics.find_soft_edges(depths(v), 0.5),
@@ -442,7 +448,7 @@ FINITE = {
     ),
     "synthesis.ViewSynthesis.render": lambda v, _: rendered(ViewOffset(0.5, -1.0), v),
     "rendering.photo_rays.rays_of_photo": lambda v, _: rendered(ViewOffset(0.0, 2.0), v),
-    "rendering.specks.settled_view": lambda v, _: settled_view(
+    "rendering.flying_pixels.postprocessed_view": lambda v, _: postprocessed_view(
         rays(v), ViewOffset(0.5, 1.0), rendered(ViewOffset(0.5, 1.0), v)
     ),
     "types.Disparity": lambda v, _: Disparity(depths(v), "wild"),
@@ -458,17 +464,17 @@ FINITE = {
 """What comes back is finite, or InputError or another ValueError says why not."""
 
 NEVER_EMPTY = {
-    "depth.multi_view.estimate.estimate_coarse",
+    "depth.multi_view.estimate_disparity.estimate_coarse",
     "depth.pictorial_cues.estimate_from_cues",
     "depth.search.resize_estimate",
     "generation.free_views.FreeViews",
     "generation.free_views.inverse_depth_of",
     "generation.free_views.reach_of",
-    "generation.outer_views.margins_beyond_frame",
+    "generation.outer_views.outpainting_margins",
     "generation.plan.plan_for_viewing",
-    "generation.relief.measure_relief",
-    "generation.relief.rounding_step",
-    "inpainting.beyond_frame.extend_beyond_frame",
+    "generation.disparity_range.measure_disparity_range",
+    "generation.disparity_range.rounding_step",
+    "inpainting.outpainting.outpaint",
     "rendering.free_view.target_from_photo",
 }
 """Of photos, maps and views that were read: every reader refuses those without pixels."""
@@ -496,10 +502,10 @@ FINITE_BY_CONTRACT = {
     "rendering.gloss.separation.harmonics": GLOSSY,
     "rendering.gloss.separation.reflected_light": GLOSSY,
     "rendering.gloss.separation.separate_light": GLOSSY,
-    "rendering.gloss.settings.require_sound": "refuses what is not finite, tests/iibr_core/rendering/gloss",
+    "rendering.gloss.gloss_settings.require_sound": "refuses what is not finite, tests/iibr_core/rendering/gloss",
     "rendering.gloss.shading.make_gloss_maps": GLOSSY,
     "rendering.gloss.shading.shade": GLOSSY,
-    "rendering.gloss.surface.fit_normals": GLOSSY,
+    "rendering.gloss.gloss_surface.fit_normals": GLOSSY,
     "color.convert": "of a Photo, see color.photo_in_srgb",
     "color.primaries_matrix": "of colour spaces that the reader of profiles checked",
     "color.bytes_from_encoded": "of photos and of views, as for `stored_from_encoded`",
@@ -525,17 +531,17 @@ FINITE_BY_CONTRACT = {
     "inpainting.disparity_by_color.nearness": "of constants only",
     "inpainting.nearest_known.flat_indices": "of masks only",
     "inpainting.nearest_known.nearest_known": "of masks only",
-    "inpainting.nearest_known.rims_of_holes": "of indices only",
+    "inpainting.nearest_known.hole_borders": "of indices only",
     "inpainting.nearest_known.number_pixels": "of indices only",
-    "inpainting.exemplars.copy_exemplars": "of rendered views only",
-    "inpainting.rim_lines.mixed_beside": "of masks only",
+    "inpainting.patch_synthesis.copy_patches": "of rendered views only",
+    "inpainting.border_lines.mixed_beside": "of masks only",
     "depth.multi_view.matching.matching_views": "of lumas that `luma_of` made finite",
     "depth.multi_view.matching.sweep": "of `matching_views`, whose lumas `luma_of` made finite",
     "depth.multi_view.semi_global.choose_disparity": "of costs in 8 bits",
     "depth.multi_view.gradient_refinement.refine_by_gradients": "of `matching_views`, within a sweep's disparities",
     "depth.multi_view.guided_filter.GuidedFilter": "of what `luma_of` made finite",
     "generation.carried_disparity.carry_disparity": "of a Photo and a Disparity",
-    "depth.estimators.estimate.estimate_with": "of a Photo; what a model gives is cleaned by `disparity_from`",
+    "depth.estimators.estimate_depth.estimate_with": "of a Photo; what a model gives is cleaned by `disparity_from`",
     "depth.estimators.transformers_models.input_for": "sizes only",
     "depth.estimators.transformers_models.run_transformers": "of a Photo; `estimate_with` refuses non-finite results",
     "depth.estimators.onnx_models.input_for": "sizes only",
@@ -552,9 +558,9 @@ FINITE_BY_CONTRACT = {
     "formats.maps.pfm.write_pfm": "keeps every bit pattern, tests/core/test_pfm.py",
     "formats.maps.writer.write_map": "keeps what it gets; maps of the viewer are finite",
     "formats.maps.writer.write_depth_map": "keeps what it gets; maps of the viewer are finite",
-    "formats.light_fields.scene.middle": "of viewpoints that the readers of layouts checked",
-    "formats.light_fields.scene.nearest_view": "of viewpoints that the readers of layouts checked",
-    "formats.light_fields.scene.seen_from": "of viewpoints that the readers of layouts checked",
+    "formats.light_fields.multi_view_scene.middle": "of viewpoints that the readers of layouts checked",
+    "formats.light_fields.multi_view_scene.nearest_view": "of viewpoints that the readers of layouts checked",
+    "formats.light_fields.multi_view_scene.seen_from": "of viewpoints that the readers of layouts checked",
     "formats.weights.write_tensors": "training stops before, tests/iibr_core/training",
     "formats.weights.save_weights": "training stops before, tests/iibr_core/training",
     "ray_transformer.inference.TrainedWeights": "huge features: rendering/test_ambiguous_rays.py, test_hard_cases.py",
@@ -571,7 +577,7 @@ FINITE_BY_CONTRACT = {
 READS_OR_TELLS = {
     "depth.embedded.apple": "appended_estimate",
     "depth.estimates": "values_of",
-    "depth.embedded.reader": "read_embedded embedded_in_jpeg",
+    "depth.embedded.embedded_depth": "read_embedded embedded_in_jpeg",
     "depth.estimators.estimate_cache": "cache_folder key_of load store_seconds seconds_of",
     "depth.embedded.google": "all_in_focus dynamic_depth_estimate",
     "depth.estimators.config": "folder_of safetensors_in mentions read_config read_preparation",
@@ -580,7 +586,7 @@ READS_OR_TELLS = {
     "depth.estimators.hub": "HubRefusal hub_cache read_json hub_answer chunks_of failures_told",
     "depth.estimators.onnx_models": "weights_in",
     "depth.estimators.words": "words_about",
-    "depth.multi_view.estimate": "map_work sweep_bytes sweep_steps",
+    "depth.multi_view.estimate_disparity": "map_work sweep_bytes sweep_steps",
     "depth.multi_view.every_view": "matched_views",
     "depth.multi_view.matching": "choose_views",
     "depth.embedded.images": "picture_file decode_map",
@@ -623,9 +629,9 @@ READS_OR_TELLS = {
     "formats.light_fields.llff": "read_llff",
     "formats.light_fields.middlebury": "read_middlebury",
     "formats.light_fields.parameters": "read_parameters write_parameters stated_grid stated_focal_px stated_range_px",
-    "formats.light_fields.registry": "LightFieldWriter WriterFactory is_light_field find_light_field open_light_field "
-    "is_view_file writer_for",
-    "formats.light_fields.scene": "pictures_in common_size on_grid maps_in first_map numbers_in",
+    "formats.light_fields.light_field_formats": "LightFieldWriter WriterFactory is_light_field find_light_field "
+    "open_light_field is_view_file writer_for",
+    "formats.light_fields.multi_view_scene": "pictures_in common_size on_grid maps_in first_map numbers_in",
     "formats.light_fields.view_grid": "view_folder candidate_views set_view require_fitting missing_view grid_scene",
     "formats.light_fields.views": "grid_of read_stored_view disparity_range step_length",
     "formats.maps.npy": "read_array read_array_header",
@@ -656,7 +662,7 @@ READS_OR_TELLS = {
     "generation.outer_views": "outer_views outer_views_of_grid farthest_views",
     "generation.update_loop": "render_outer_views complete_ray_set",
     "inpainting.background": "background_inpainter",
-    "inpainting.protocol": "Inpainter",
+    "inpainting.inpainter": "Inpainter",
     "inpainting.diffusion": "diffusion_inpainter large_gaps",
     "inpainting.registry": "load_inpainter require_inpainter",
     "runtime.allocator": "limit_arenas give_back_memory",

@@ -232,7 +232,7 @@ def wide_window(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def open_window(display: str, no_egl_context: None) -> Iterator[Opener]:
-    """Opens the viewer on a photo, with the sections open that are used most; closes it after the test."""
+    """Opens the viewer on a photo, with the panel and the sections that are used most; closes it after the test."""
     from iibr_core.scenes.scene import Source
     from viewer.app.main_loop import App, initial_state
     from viewer.model.actions import OpenPath
@@ -245,7 +245,7 @@ def open_window(display: str, no_egl_context: None) -> Iterator[Opener]:
     def start(path: Path | None, kept_in: Path | None = None, **changes: object) -> Driver:
         state = initial_state(OpenPath(Source(str(path), **changes))) if path else None  # type: ignore[arg-type]
         preferences = Preferences(window=SMALL_WINDOW, open_sections=sections)
-        apps.append(App(replace(state or AppState(), preferences=preferences), kept_in))
+        apps.append(App(replace(state or AppState(), preferences=preferences, hides_panel=False), kept_in))
         return Driver(apps[-1])
 
     yield start

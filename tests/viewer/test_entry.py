@@ -295,7 +295,7 @@ def test_who_has_no_home_keeps_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("HOME", "nowhere")
     with monkeypatch.context() as unknown:
         unknown.setattr(os.path, "expanduser", lambda path: path)
-        entry._settle_home()
+        entry._ensure_home()
     assert os.environ["HOME"] == os.devnull
 
 
@@ -304,5 +304,5 @@ def test_a_home_that_windows_does_not_name_is_no_mistake(monkeypatch: pytest.Mon
     monkeypatch.setenv("USERPROFILE", "C:\\Users\\somebody")
     with monkeypatch.context() as windows:
         windows.setattr(os, "path", ntpath)
-        entry._settle_home()
+        entry._ensure_home()
     assert "HOME" not in os.environ

@@ -33,10 +33,10 @@ from tests.viewer.conftest import write_scene
 from viewer.app.headless import HeadlessViewer
 from viewer.app.image_export import export_picture, shot_of
 from viewer.app.preferences_store import load_preferences, store_preferences
-from viewer.background.jobs import Failed
+from viewer.background.job_threads import Failed
 from viewer.model.saved_settings import read_settings
 from viewer.model.state.app_state import AppState
-from viewer.model.state.optics import MoveEye, SetAperture
+from viewer.model.state.optics_actions import MoveEye, SetAperture
 
 GRID = GridShape(3, 3)
 

@@ -12,7 +12,7 @@ from iibr_core.scenes.screen_size import ScreenSize
 from tests.viewer.conftest import headless_with_scene
 from viewer.model.actions import ShowPrompt
 from viewer.model.commands import COMMANDS
-from viewer.ui.overlays.prompts import MOUSE
+from viewer.ui.overlays.prompt_overlay import MOUSE
 
 PAGE = Path(__file__).parents[2] / "docs" / "window.md"
 

@@ -8,7 +8,11 @@ import pytest
 
 from benchmarks.texts import Text, texts_in, texts_of
 
-ADVANCED = ("viewer/ui/sections/inspect.py", "viewer/ui/sections/scene.py", "viewer/ui/overlays/inspection.py")
+ADVANCED = (
+    "viewer/ui/sections/inspect.py",
+    "viewer/ui/sections/scene_section.py",
+    "viewer/ui/overlays/inspection_overlay.py",
+)
 """What these show is seen by who opened that part of the panel."""
 
 FOR_COMMAND_LINE = re.compile(r"iibr [a-z]|--(size|disparity|depth|max-pixels|memory|grid|quality|force|inpaint)\b")

@@ -14,7 +14,7 @@ from tests.browser import Pipe, Tab, open_browser
 from tests.viewer.conftest import HEIGHT, WIDTH, write_scene
 from tests.web.conftest import canvas, export, press, set_lens, slide, wait_until_still
 from viewer.app.headless import HeadlessViewer
-from viewer.model.state.optics import MoveEye, SetAperture, SetFocus
+from viewer.model.state.optics_actions import MoveEye, SetAperture, SetFocus
 
 SETTINGS = (
     (0.0, 0.0, 0.0, 0.0),

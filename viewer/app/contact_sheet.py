@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from iibr_core.scenes import ScreenSize, aperture_limit
 from iibr_core.types import ViewOffset
 from viewer.app.headless import HeadlessViewer
-from viewer.model.state.optics import MoveEye, ResetOptics, SetAperture, SetFocus
+from viewer.model.state.optics_actions import MoveEye, ResetOptics, SetAperture, SetFocus
 
 TILE_WIDTH = 480
 GAP = 8

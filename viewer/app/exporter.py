@@ -15,7 +15,7 @@ from iibr_core.types import InputError
 from viewer.app.job import Job
 from viewer.app.job_queue import JobQueue
 from viewer.model.actions import Action, Notify, ShowPrompt
-from viewer.model.reducers.exporting import written_path
+from viewer.model.reducers.exporting_reducer import written_path
 from viewer.model.state.app_state import AppState
 from viewer.model.state.exporting import ExportPrompt, ExportTask
 from viewer.model.state.notices import Notice

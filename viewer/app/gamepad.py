@@ -11,7 +11,7 @@ from viewer.model.actions import Action
 from viewer.model.state.app_state import AppState
 from viewer.model.state.folder import StepPhoto
 from viewer.model.state.motion import ReturnHome
-from viewer.model.state.optics import MoveEye, SetAperture, SetFocus
+from viewer.model.state.optics_actions import MoveEye, SetAperture, SetFocus
 
 DEAD_ZONE = 0.15
 """Sticks that nobody touches do not stand quite in the middle."""

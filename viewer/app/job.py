@@ -14,7 +14,7 @@ from iibr_core.runtime import TimeLeft
 from iibr_core.scenes import Scene, SceneRequest, Source
 from viewer.display.snapshot import SceneSnapshot
 from viewer.model.actions import Action
-from viewer.model.reducers.lens import carry_optics
+from viewer.model.reducers.lens_reducer import carry_optics
 from viewer.model.state.app_state import AppState
 from viewer.model.state.jobs import STOPPING, WAITING_FOR_VIEWS, JobKind, JobProgress
 

@@ -16,7 +16,7 @@ from viewer.model.free_camera import LeaveCamera
 from viewer.model.state.app_state import AppState
 from viewer.model.state.depth_editing import DropStroke, SetBrush
 from viewer.model.state.inspection import Compare, SetInspection, SetOverlay
-from viewer.model.state.optics import MoveEye, SetGlossBrush
+from viewer.model.state.optics_actions import MoveEye, SetGlossBrush
 
 ARROW_STEP_VIEWS = 0.5
 

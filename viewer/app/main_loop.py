@@ -11,7 +11,7 @@ from pathlib import Path
 from iibr_core.types import InputError
 from viewer.app.dialogs import has_dialogs
 from viewer.app.dropped_files import actions_from_drop
-from viewer.app.free_look import FreeLook
+from viewer.app.free_camera_view import FreeCameraView
 from viewer.app.gamepad import GamepadReader
 from viewer.app.keys import actions_from_keys, is_touched, read_keys
 from viewer.app.pace import DIALOG_LOOK_S, IDLE_WAIT_S, NoticeClock, Pace
@@ -32,7 +32,7 @@ from viewer.app.side_effects import SideEffects
 from viewer.app.window import Window, wake
 from viewer.app.window_slot import WindowSlot
 from viewer.background.comparison_worker import ComparisonWorker
-from viewer.background.gloss import GlossFinder
+from viewer.background.gloss_worker import GlossFinder
 from viewer.display.filmstrip_view import FilmstripView
 from viewer.display.inspection_view import InspectionView
 from viewer.display.scene_view import VIEW_REFRESH_S, SceneView
@@ -101,7 +101,7 @@ class App:
         self.scene_view = SceneView(self._gl)
         self.inspection_view = InspectionView(self._gl, self.scene_view)
         self.sharpener = Sharpener(self._gl, self.scene_view, wake)
-        self.free_look = FreeLook(self.scene_view, wake)
+        self.free_camera_view = FreeCameraView(self.scene_view, wake)
         self.gloss_finder = GlossFinder(self.scene_view.gloss_request, self.scene_view.take_gloss, wake)
         self._comparisons = ComparisonWorker(wake)
         self._ui = UiHost(self.look(), self.window.handle)
@@ -152,7 +152,7 @@ class App:
         self.do(*self._side_effects.draw(self.state, SAVE_BUDGET_S))
         self._inspect(is_moving=pointer.is_down or self.state.motion.is_running)
         self.do(*self.sharpener.advance(picture, self.state, is_still and self._is_resting, SAVE_BUDGET_S))
-        self.do(*self.free_look.advance(self.state))
+        self.do(*self.free_camera_view.advance(self.state))
         self._pace.is_busy |= bool(actions) or self._side_effects.is_drawing or self.sharpener.is_drawing
         self.scene_loader.advance(self.state)
         self.do(*self._preferences.keep_news(self.state))
@@ -205,7 +205,7 @@ class App:
         self._ui.release()
         self._filmstrip.release()
         self.sharpener.close()
-        self.free_look.close()
+        self.free_camera_view.close()
         self.inspection_view.release()
         self.scene_view.release()
         self._gl.release()

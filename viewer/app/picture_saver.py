@@ -21,7 +21,7 @@ from viewer.app.image_export import SavedShot, export_map, export_picture, shot_
 from viewer.app.job import Job, Needs
 from viewer.app.job_queue import JobQueue
 from viewer.app.save_places import map_path, picture_path
-from viewer.background.jobs import message_of
+from viewer.background.job_threads import message_of
 from viewer.model.actions import Action, EditsSaved, Notify, ShowPrompt
 from viewer.model.state.app_state import AppState
 from viewer.model.state.jobs import WRITING

@@ -16,7 +16,7 @@ from viewer.model.state.app_state import AppState, Hover
 from viewer.model.state.depth_editing import DepthSample, Paint, PickDepth, SetBrush
 from viewer.model.state.inspection import MoveDivider
 from viewer.model.state.motion import ReturnHome
-from viewer.model.state.optics import FocusOn, MoveEye, MoveTiltHandle, PaintGloss, SetFocus, SetGlossBrush
+from viewer.model.state.optics_actions import FocusOn, MoveEye, MoveTiltHandle, PaintGloss, SetFocus, SetGlossBrush
 from viewer.model.zoom import SetZoom
 
 DRAG_THRESHOLD = 4.0
@@ -249,7 +249,7 @@ def _grabbed_handle(pointer: Pointer, layout: Layout, state: AppState, picture: 
 def _eye_drag(pointer: Pointer, layout: Layout, scene: Scene, eye: ViewOffset) -> list[Action]:
     """Content follows the hand: a point of disparity d goes d px left for a step right, so the eye goes against it.
 
-    What it moved before it counted as a drag is made up for, and what it moved in the frame of its release counts.
+    What it moved before it counted as a drag is caught up, and what it moved in the frame of its release counts.
     """
     step_x, step_y = pointer.step_x, pointer.step_y
     if pointer.becomes_drag:

@@ -22,15 +22,15 @@ from iibr_core.scenes import (
 from iibr_core.types import InputError, ViewOffset
 from viewer.background.depth_estimate import DepthFinder, same_places
 from viewer.background.file_worker import FileRequest, FileWorker
-from viewer.background.jobs import Failed, ProgressReport
+from viewer.background.job_threads import Failed, ProgressReport
 from viewer.background.read_ahead import PhotoAhead, ReadAhead, photos_within_budget, read_whole_photo
 from viewer.background.scene_worker import PhotosFound, SceneResult, SceneWorker
 from viewer.display.depth_preview import DepthPreview
 from viewer.display.inspection_view import InspectionView
 from viewer.display.scene_view import SceneView
 from viewer.model.actions import Action, Notify, OpenFailed, OpenPath, ProgressMade, SceneOpened
-from viewer.model.reducers.depth_editing import depth_settings_for_worker, is_depth_ahead
-from viewer.model.reducers.folder import AHEAD, SKETCHED_AHEAD, photos_ahead
+from viewer.model.reducers.depth_editing_reducer import depth_settings_for_worker, is_depth_ahead
+from viewer.model.reducers.folder_reducer import AHEAD, SKETCHED_AHEAD, photos_ahead
 from viewer.model.state.app_state import AppState
 from viewer.model.state.depth_editing import DropStroke
 from viewer.model.state.notices import Notice
@@ -225,7 +225,7 @@ class SceneLoader:
 
     def _has_sketches(self, state: AppState) -> bool:
         count = SKETCHES_FIRST if self._submitted else 1
-        return all(map(self.sketches.is_settled, _photos_to_sketch(state)[:count]))
+        return all(map(self.sketches.is_done, _photos_to_sketch(state)[:count]))
 
     def _read_ahead(self, state: AppState) -> None:
         """What is likely to be opened next, once all of this photo is there; on the way to it nothing is begun."""
@@ -236,7 +236,7 @@ class SceneLoader:
             self.ahead.want(photos[1 : 1 + photos_within_budget(state.scene)])
         else:
             is_begun = self.ahead.is_reading(photos[0])
-            self.ahead.want([*photos[:is_begun], *filter(self.ahead.is_settled, photos)])
+            self.ahead.want([*photos[:is_begun], *filter(self.ahead.is_done, photos)])
 
 
 def _has_other_depth(before: LoadedPhoto, now: LoadedPhoto | None) -> bool:

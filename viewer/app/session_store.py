@@ -19,7 +19,7 @@ from iibr_core.scenes import Scene, Source
 from iibr_core.types import InputError
 from viewer.app.image_export import settings_of
 from viewer.background.file_worker import FileRequest, FileWorker
-from viewer.background.jobs import Failed
+from viewer.background.job_threads import Failed
 from viewer.model.actions import Action, Notify, RestoreSession, SetState
 from viewer.model.state.app_state import AppState
 from viewer.model.state.notices import Notice

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from iibr_core.exports import FullPicture, is_full, needs_smaller
 from iibr_core.scenes import WHOLE, LoadedPhoto, ScreenSize
 from iibr_core.types import FloatImage
-from viewer.background.jobs import Failed
+from viewer.background.job_threads import Failed
 from viewer.background.sharpening import SharpeningWorker, SharpPart
 from viewer.display.scene_view import SceneView
 from viewer.gpu.context import GLContext

@@ -23,8 +23,8 @@ from viewer.app.reduced_motion import prefers_reduced_motion
 from viewer.app.save_places import inputs_of_scene
 from viewer.app.session_store import write_sidecar
 from viewer.background.file_worker import FileRequest, FileResult, FileWorker
-from viewer.background.jobs import Failed
-from viewer.background.model_download import Downloaded, DownloadResult, ModelDownloads, ModelRequest, list_models
+from viewer.background.job_threads import Failed
+from viewer.background.model_downloader import Downloaded, DownloadResult, ModelDownloads, ModelRequest, list_models
 from viewer.display.scene_view import SceneView
 from viewer.model.actions import Action, Notify, OpenPath, ShowPrompt, TaskTaken
 from viewer.model.commands import action_for_path
@@ -44,7 +44,7 @@ from viewer.model.state.model_download import (
 )
 from viewer.model.state.motion import Sway, Touch
 from viewer.model.state.notices import Notice
-from viewer.model.state.optics import SetOptics
+from viewer.model.state.optics_actions import SetOptics
 from viewer.model.state.photo_facts import FactsRead, ReadFactsTask
 from viewer.model.state.prompts import FolderContents, ListContentsTask, PathPrompt
 from viewer.model.state.saving import CopyTask, PasteTask, WriteSidecarTask, path_beside

@@ -21,7 +21,7 @@ from iibr_core.inpainting import DEFAULT_INPAINTER, load_inpainter
 from iibr_core.runtime import is_installed
 from iibr_core.scenes import LoadedPhoto
 from iibr_core.types import SRGB, ColorSpace, FloatImage, GridShape, InputError, Quality, StoredColors, ViewOffset
-from viewer.background.jobs import Failed, Job, JobThread
+from viewer.background.job_threads import Failed, Job, JobThread
 from viewer.model.inspection_request import InspectionRequest
 
 if TYPE_CHECKING:

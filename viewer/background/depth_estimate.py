@@ -9,7 +9,7 @@ import numpy as np
 
 from iibr_core.scenes import LoadedPhoto, Source, deepen
 from iibr_core.types import FloatImage
-from viewer.background.jobs import Failed, Job, JobThread
+from viewer.background.job_threads import Failed, Job, JobThread
 from viewer.model.actions import Action, Notify, SamePlaces
 from viewer.model.reducers.depth_models import wanted_model
 from viewer.model.state.app_state import AppState

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from viewer.background.jobs import Failed, Job, JobThread
+from viewer.background.job_threads import Failed, Job, JobThread
 
 
 @dataclass(frozen=True, eq=False)

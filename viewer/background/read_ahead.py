@@ -10,7 +10,7 @@ from typing import Generic, TypeVar
 from iibr_core.generation import PHOTO_BYTES, READING_BYTES, ScenePlan, budget_of, whole_bytes
 from iibr_core.runtime import ShouldStop
 from iibr_core.scenes import LoadedPhoto, Scene, WantedPhoto, load_photo, make_plan
-from viewer.background.jobs import Job, JobThread
+from viewer.background.job_threads import Job, JobThread
 
 Read = TypeVar("Read")
 
@@ -73,7 +73,7 @@ class ReadAhead(Generic[Read]):
             self._reading = missing[0]
             self._thread.submit(missing[0])
 
-    def is_settled(self, photo: WantedPhoto) -> bool:
+    def is_done(self, photo: WantedPhoto) -> bool:
         """Whether there is no use in waiting for it: it was read, or cannot be."""
         self._take_results()
         return photo in self._known or self._thread.is_lost

@@ -1,6 +1,6 @@
 """The worker thread: reads a scene, plans it and makes its views, and hands each result over as soon as it is there.
 
-The newest request wins: the job before it stops at its next row band, see `viewer.background.jobs`.
+The newest request wins: the job before it stops at its next row band, see `viewer.background.job_threads`.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from iibr_core.rendering import CENTRE
 from iibr_core.runtime import tell_compiling
 from iibr_core.scenes import Progress, SceneReady, SceneRequest, ViewReady, results_of
 from iibr_core.types import ViewOffset
-from viewer.background.jobs import Failed, Job, JobThread, ProgressReport
+from viewer.background.job_threads import Failed, Job, JobThread, ProgressReport
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ SceneWork = Callable[[SceneRequest, Callable[[], bool], Callable[[], ViewOffset]
 
 
 class SceneWorker(JobThread[SceneRequest, SceneResult]):
-    """Carries out the newest request. Results are told apart by the generation of their request.
+    """Carries out the newest request. Results are distinguished by the generation of their request.
 
     eye: where the user looks now; views near it are made first. Set by the window, read by the job.
     """

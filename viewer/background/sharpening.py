@@ -14,7 +14,7 @@ from iibr_core.exports import FullPicture, encode_light
 from iibr_core.runtime import Cancelled
 from iibr_core.scenes import LoadedPhoto
 from iibr_core.types import SRGB
-from viewer.background.jobs import Failed, Job, JobThread
+from viewer.background.job_threads import Failed, Job, JobThread
 
 if TYPE_CHECKING:
     from iibr_core.rendering import LargePhoto

@@ -15,8 +15,8 @@ from iibr_core.types import InputError
 from viewer.cli.export_options import KindOptions, To, require_kind
 from viewer.cli.lens_options import Aperture, Focus, GlossFile
 from viewer.cli.option_records import with_option_records
-from viewer.cli.options import Force, Grid, Literal, require_memory, require_model
 from viewer.cli.scene_options import PhotoOptions
+from viewer.cli.shared_options import Force, Grid, Literal, require_memory, require_model
 from viewer.cli.terminal import show_progress
 
 if TYPE_CHECKING:

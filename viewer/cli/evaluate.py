@@ -17,7 +17,15 @@ from iibr_core.runtime import require_extra
 from iibr_core.stages import STAGE_NAMES, stages_without
 from iibr_core.types import InputError, Quality, ReportProgress
 from viewer.cli.option_records import with_option_records
-from viewer.cli.options import DepthModel, Force, MaxPixels, Refine, inputs_of_command, quality_from_text, require_model
+from viewer.cli.shared_options import (
+    DepthModel,
+    Force,
+    MaxPixels,
+    Refine,
+    inputs_of_command,
+    quality_from_text,
+    require_model,
+)
 from viewer.cli.terminal import print_notes, show_progress
 
 if TYPE_CHECKING:

@@ -14,7 +14,8 @@ from iibr_core.exports import export_path, require_ending, require_export_place,
 from viewer.cli.export_options import KindOptions, To, require_kind
 from viewer.cli.lens_options import LensOptions
 from viewer.cli.option_records import with_option_records
-from viewer.cli.options import (
+from viewer.cli.scene_options import SceneOptions, require_heeded
+from viewer.cli.shared_options import (
     MOST,
     FocusDisparity,
     Force,
@@ -26,7 +27,6 @@ from viewer.cli.options import (
     require_memory,
     require_model,
 )
-from viewer.cli.scene_options import SceneOptions, require_heeded
 from viewer.cli.terminal import print_depth, print_notes, show_progress, untimed
 
 if TYPE_CHECKING:

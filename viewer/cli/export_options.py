@@ -25,7 +25,7 @@ from iibr_core.runtime import require_extra
 from iibr_core.scenes import ScreenSize
 from iibr_core.types import InputError
 from viewer.cli.lens_options import LensOptions
-from viewer.cli.options import given_options, not_negative_from_text, size_from_text
+from viewer.cli.shared_options import given_options, not_negative_from_text, size_from_text
 
 
 def kind_from_text(text: str) -> ExportKind:
@@ -157,7 +157,7 @@ def _what_for(option: tuple[str, str]) -> str:
 
 def heeded_by(kind: ExportKind) -> set[str]:
     """Names of the options about exports and the lens that mean something to it."""
-    return {*kind.heeds, "gloss"} if kind.has_colors else set(kind.heeds)
+    return {*kind.supports, "gloss"} if kind.has_colors else set(kind.supports)
 
 
 def require_kind(context: typer.Context, kind: ExportKind) -> None:

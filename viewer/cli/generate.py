@@ -11,11 +11,17 @@ import typer
 from iibr_core.formats import is_light_field, writer_for
 from iibr_core.rendering.gloss import Gloss
 from iibr_core.types import GridShape, InputError
-from viewer.cli.dense_field import NOT_FOR_DENSE_FIELDS, write_dense_field
-from viewer.cli.free_views import require_heeded_with_poses, require_poses_for, require_views_folder, write_free_views
+from viewer.cli.dense_field_command import NOT_FOR_DENSE_FIELDS, write_dense_field
+from viewer.cli.free_views_command import (
+    require_heeded_with_poses,
+    require_poses_for,
+    require_views_folder,
+    write_free_views,
+)
 from viewer.cli.lens_options import GlossFile
 from viewer.cli.option_records import with_option_records
-from viewer.cli.options import (
+from viewer.cli.scene_options import SceneOptions, require_heeded
+from viewer.cli.shared_options import (
     Force,
     LightFieldFormat,
     PhotoPose,
@@ -27,7 +33,6 @@ from viewer.cli.options import (
     require_memory,
     require_model,
 )
-from viewer.cli.scene_options import SceneOptions, require_heeded
 from viewer.cli.terminal import MAKING, print_depth, print_notes, show_progress, untimed
 from viewer.cli.view_writing import write_views
 

@@ -10,7 +10,7 @@ import typer
 
 from iibr_core.rendering.gloss import Gloss
 from iibr_core.types import InputError, ViewOffset
-from viewer.cli.options import not_negative_from_text, number_option, view_from_text
+from viewer.cli.shared_options import not_negative_from_text, number_option, view_from_text
 
 if TYPE_CHECKING:
     from iibr_core.rendering import Optics
@@ -87,7 +87,7 @@ class LensOptions:
 
     def actions(self) -> list[Action]:
         """What sets the lens so."""
-        from viewer.model.state.optics import MoveEye, SetAperture, SetFocus, SetOptics
+        from viewer.model.state.optics_actions import MoveEye, SetAperture, SetFocus, SetOptics
 
         actions: list[Action] = [] if self.view is None else [MoveEye(self.view)]
         actions += [] if self.focus is None else [SetFocus(self.focus)]

@@ -11,17 +11,17 @@ from iibr_core.formats import CLAIMS
 from iibr_core.runtime import limit_arenas
 from iibr_core.types import InputError
 from viewer.cli.batch import batch
-from viewer.cli.demo import demo
-from viewer.cli.depth import depth
+from viewer.cli.demo_command import demo
+from viewer.cli.depth_command import depth
 from viewer.cli.evaluate import evaluate
 from viewer.cli.export import export
 from viewer.cli.generate import generate
 from viewer.cli.models import models
-from viewer.cli.plan import plan
+from viewer.cli.plan_command import plan
 from viewer.cli.screenshot import screenshot
 from viewer.cli.terminal import Commands, print_notes
 from viewer.cli.train import train
-from viewer.cli.view import open_window, view
+from viewer.cli.view_command import open_window, view
 
 UsageError: Any = typer.BadParameter.__base__
 """Click's, wherever this typer keeps it."""

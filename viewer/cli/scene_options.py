@@ -13,7 +13,7 @@ from iibr_core.depth import DepthChoice
 from iibr_core.formats import is_light_field
 from iibr_core.inpainting import DEFAULT_INPAINTER
 from iibr_core.types import GridShape, InputError
-from viewer.cli.options import (
+from viewer.cli.shared_options import (
     DepthFrom,
     DepthModel,
     DepthStrength,

@@ -16,7 +16,8 @@ from iibr_core.scenes import ScreenSize
 from iibr_core.types import ColorSpace, InputError
 from viewer.cli.lens_options import NO_LENS_OPTIONS, LensOptions
 from viewer.cli.option_records import with_option_records
-from viewer.cli.options import (
+from viewer.cli.scene_options import SceneOptions, require_heeded
+from viewer.cli.shared_options import (
     SCREEN_SIZE,
     FocusDisparity,
     Force,
@@ -31,7 +32,6 @@ from viewer.cli.options import (
     require_utf8,
     size_from_text,
 )
-from viewer.cli.scene_options import SceneOptions, require_heeded
 from viewer.cli.terminal import print_depth, print_notes, show_progress, untimed
 
 if TYPE_CHECKING:

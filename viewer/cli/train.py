@@ -11,7 +11,7 @@ import typer
 
 from iibr_core.formats import is_file
 from iibr_core.runtime import require_extra
-from viewer.cli.options import Force
+from viewer.cli.shared_options import Force
 from viewer.cli.terminal import show_progress
 
 if TYPE_CHECKING:

@@ -12,7 +12,7 @@ import numpy as np
 from iibr_core.depth.editing import DepthEdits
 from iibr_core.scenes import LoadedPhoto, Scene, still_disparity
 from viewer.display.scene_view import SceneView
-from viewer.model.reducers.depth_editing import current_depth_settings
+from viewer.model.reducers.depth_editing_reducer import current_depth_settings
 from viewer.model.state.app_state import AppState
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.types import InputError
-from viewer.background.jobs import Failed, Job, JobThread
+from viewer.background.job_threads import Failed, Job, JobThread
 from viewer.gpu.context import GLContext
 from viewer.gpu.thumbnails import CELL, ThumbnailTexture
 from viewer.model.state.folder import Thumbnail

@@ -16,7 +16,7 @@ from iibr_core.exports import RenderSettings
 from iibr_core.scenes import WHOLE, Rect, Scene, ScreenSize
 from iibr_core.types import DEFAULT_QUALITY, ViewUpdate
 from viewer.background.comparison_worker import ComparisonInputs, ComparisonResult, EntropyReady, PairReady, PairScored
-from viewer.background.jobs import Failed
+from viewer.background.job_threads import Failed
 from viewer.display.scene_view import SceneView
 from viewer.gpu.context import GLContext
 from viewer.gpu.inspection_passes import InspectionPasses, Line, OverlayStyle

@@ -21,7 +21,7 @@ from viewer.display.picking import is_kept_for_picking, pick_disparity
 from viewer.display.snapshot import SceneSnapshot
 from viewer.gpu.context import GLContext
 from viewer.gpu.light_field_texture import Box
-from viewer.gpu.refocus.renderer import Renderer
+from viewer.gpu.refocus.picture_renderer import Renderer
 from viewer.model.state.app_state import AppState, Picture
 
 VIEW_REFRESH_S = 0.25
@@ -63,7 +63,7 @@ class SceneView:
         self.previews = 0
         self._scene: Scene | None = None
         self.centre: ViewUpdate | None = None
-        self._stand_in: ViewUpdate | None = None
+        self._fallback_view: ViewUpdate | None = None
         self._gloss: GlossFound | None = None
         self._is_preview = self._is_edited = False
         self._waiting: deque[ViewUpdate] = deque()
@@ -80,7 +80,7 @@ class SceneView:
         Its first view is shown in a field of its own until the second comes: making room for all takes a while.
         """
         scene = ready.scene
-        self.stand_in(None)
+        self.show_fallback(None)
         known, self._gloss = self._gloss, None
         try:
             self._open_field(scene, PREVIEW_GRID)
@@ -118,11 +118,11 @@ class SceneView:
         self._disparities = {CENTRE: disparity}
         self.previews += 1
 
-    def stand_in(self, view: ViewUpdate | None) -> None:
+    def show_fallback(self, view: ViewUpdate | None) -> None:
         """Show this view, which has a disparity, in place of the scene's, through the same lens; None: those again."""
-        if view is not None or self._stand_in is not None:
-            self._stand_in = view
-            self.renderer.stand_in(view)
+        if view is not None or self._fallback_view is not None:
+            self._fallback_view = view
+            self.renderer.show_fallback(view)
             self.previews += 1
 
     def gloss_request(self, gloss: Gloss | None) -> GlossRequest | None:
@@ -187,8 +187,8 @@ class SceneView:
 
     def pick(self, eye: ViewOffset, x_px: float, y_px: float) -> float | None:
         """Disparity seen at a pixel of the picture; None where the scene has none."""
-        if self._stand_in is not None and self._stand_in.disparity is not None:
-            return pick_disparity({CENTRE: self._stand_in.disparity}, eye, x_px, y_px)
+        if self._fallback_view is not None and self._fallback_view.disparity is not None:
+            return pick_disparity({CENTRE: self._fallback_view.disparity}, eye, x_px, y_px)
         return pick_disparity(self._disparities, eye, x_px, y_px)
 
     def draw(self, state: AppState, size_px: ScreenSize, part: Rect = WHOLE) -> Picture | None:
@@ -236,7 +236,7 @@ class SceneView:
         """What is shown now, to be released; None before anything is open."""
         if self._scene is None or self.centre is None:
             return None
-        is_free, field = self._stand_in is not None, self.renderer.drawn_field.share()
+        is_free, field = self._fallback_view is not None, self.renderer.drawn_field.share()
         return SceneSnapshot(self._scene, self.loaded, self.centre, field, self._gloss, is_free)
 
     def is_shown(self, snapshot: SceneSnapshot) -> bool:

@@ -56,7 +56,7 @@ class RenderTarget:
 class LayerTargets:
     """Light kept apart by its defocus, see shaders/include/layers.glsl.
 
-    sums: sharp, in front, behind. across, smooth: front and behind, smoothed, at half
+    sums: sharp, in front, behind. across, smooth: foreground and behind, smoothed, at half
     the size.
     """
 

@@ -18,7 +18,7 @@ from viewer.model.state.jobs import JobsChanged, QuitWhenDone
 from viewer.model.state.model_download import ModelAction
 from viewer.model.state.motion import MotionAction
 from viewer.model.state.notices import Notice
-from viewer.model.state.optics import LensAction, SetGlossBrush
+from viewer.model.state.optics_actions import LensAction, SetGlossBrush
 from viewer.model.state.photo_facts import FactsRead
 from viewer.model.state.preferences import PreferencesAction
 from viewer.model.state.prompts import Prompt, Saved

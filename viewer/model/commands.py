@@ -28,8 +28,8 @@ from viewer.model.actions import (
     StopWork,
     Undo,
 )
-from viewer.model.demo import demo_photo
-from viewer.model.dense_field import next_denser
+from viewer.model.demo_photo import demo_photo
+from viewer.model.dense_grid import next_denser
 from viewer.model.free_camera import MoveCamera, StepPose
 from viewer.model.lens.presets import PRESETS
 from viewer.model.state.app_state import AppState
@@ -50,7 +50,7 @@ from viewer.model.state.inspection import (
 from viewer.model.state.model_download import GetDepth, ModelsPrompt, UseModel
 from viewer.model.state.motion import PauseMotion, ReturnHome, SetLoop
 from viewer.model.state.notices import Notice
-from viewer.model.state.optics import FIRST_GLOSS, ApplyPreset, ResetOptics, SetOptics
+from viewer.model.state.optics_actions import FIRST_GLOSS, ApplyPreset, ResetOptics, SetOptics
 from viewer.model.state.preferences import SECTIONS, SetPreference, ToggleSection
 from viewer.model.state.prompts import ChoiceOf, PalettePrompt
 from viewer.model.state.saving import CopyTask, PasteTask, WriteSidecarTask

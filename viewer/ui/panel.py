@@ -17,13 +17,13 @@ from viewer.model.commands import BY_NAME
 from viewer.model.layout import Layout
 from viewer.model.state.app_state import AppState, DrawReport
 from viewer.model.state.preferences import HOLDERS, SECTIONS, Section, ToggleSection, is_seen_open
-from viewer.ui.sections.depth import depth_line, depth_section
+from viewer.ui.sections.depth_section import depth_line, depth_section
 from viewer.ui.sections.essentials import essentials
-from viewer.ui.sections.gloss import gloss_section
+from viewer.ui.sections.gloss_section import gloss_section
 from viewer.ui.sections.inspect import inspect_section
-from viewer.ui.sections.lens import aperture_section, focus_section, light_section
-from viewer.ui.sections.scene import scene_section
-from viewer.ui.sections.view import view_section
+from viewer.ui.sections.lens_section import aperture_section, focus_section, light_section
+from viewer.ui.sections.scene_section import scene_section
+from viewer.ui.sections.view_section import view_section
 from viewer.ui.widgets import button, gap, heading, in_row, last_part, quiet, tooltip
 
 TOOLS = (

@@ -14,10 +14,10 @@ from viewer.model.state.app_state import AppState
 from viewer.model.state.folder import Thumbnail
 from viewer.ui.overlays.chips import chips, panel_handle
 from viewer.ui.overlays.filmstrip import filmstrip
-from viewer.ui.overlays.inspection import draw_beside_picture, draw_over_picture
+from viewer.ui.overlays.inspection_overlay import draw_beside_picture, draw_over_picture
 from viewer.ui.overlays.minimap import draw_minimap
-from viewer.ui.overlays.notices import notices
-from viewer.ui.overlays.prompts import prompts
+from viewer.ui.overlays.notice_corner import notices
+from viewer.ui.overlays.prompt_overlay import prompts
 from viewer.ui.overlays.reticle import overlays
 from viewer.ui.overlays.welcome import welcome
 from viewer.ui.panel import panel

@@ -1,1 +1,1 @@
-"""Where a map's surfaces end: soft edges made sharp, rims moved to where the photo's colours end."""
+"""Where a map's surfaces end: soft edges made sharp, edge bands moved to where the photo's colours end."""

@@ -15,13 +15,13 @@ from iibr_core.runtime.jit import kernel
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never
 from iibr_core.types import FloatImage, ImageSize, image_size
 
-REACH_SIGMAS = 3.0
+FITTED_SIGMAS = 3.0
 """Where a Gaussian ends."""
-WIDEST_SIGMA_PX = 4.5
+WIDEST_FITTED_SIGMA_PX = 4.5
 """Work grows with the blur's area: wider ones stay as they are."""
-SWEEPS = 4
+DESCENT_SWEEPS = 4
 """Of moving edges."""
-STIRRED_PX = 2
+REVISIT_RADIUS_PX = 2
 """Beside a pixel that moved, so far around, the next sweep looks again."""
 COLOR_WEIGHT = 6.0
 """What a colour that is clearly one side's counts, in what a whole pixel on the wrong side adds to the misfit."""
@@ -35,7 +35,7 @@ SAME_SIDE = 0.3
 """Of the step, up to which a height is that side's."""
 MOVED_EDGES = 2.0
 """Times the least edge: lower steps stay where they are."""
-MOST_MISFIT = 0.09
+MOST_CELL_MISFIT = 0.09
 """Of the fitted map, blurred again, from the given map, relative to what the blur changed (rms of a cell)."""
 
 
@@ -56,27 +56,27 @@ def fit_to_blur(
     if not reach.any():
         return sharp
     cells, width = (taps, reach, blur.cell_px), values.shape[1]
-    fitted, missing, settled = sharp.copy(), np.zeros_like(sharp), np.zeros(sharp.shape, np.bool_)
+    fitted, missing, visited = sharp.copy(), np.zeros_like(sharp), np.zeros(sharp.shape, np.bool_)
 
     def find_missing(first: int, last: int) -> None:
         _find_missing(values, fitted, *cells, first, last, missing)
 
     def move(first: int, last: int) -> None:
-        _move_edges(photo, fitted, missing, *cells, MOVED_EDGES * least_edge, first, last, settled)
+        _move_edges(photo, fitted, missing, *cells, MOVED_EDGES * least_edge, first, last, visited)
 
     in_bands(find_missing, ImageSize(len(reach), blur.cell_px * width), should_stop)
-    for _ in range(SWEEPS):
+    for _ in range(DESCENT_SWEEPS):
         # One band after the other: each move sees what those before it left missing.
         in_bands(move, image_size(values), should_stop, threads=1)
     changed, misfit = _cell_squares(values - fitted, blur), _cell_squares(missing, blur)
-    found = np.isfinite(misfit) & (misfit <= MOST_MISFIT**2 * changed)
+    found = np.isfinite(misfit) & (misfit <= MOST_CELL_MISFIT**2 * changed)
     return np.where(blur.at_pixels(found, image_size(values)), fitted, sharp)
 
 
 def _taps(blur: EdgeBlur) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
     """Of each cell (M, N): a Gaussian (M, N, R) that sums to 1, and how far it reaches to both sides, 0 = none."""
-    fits = blur.sigma_px <= WIDEST_SIGMA_PX
-    reach = np.where(fits, np.ceil(REACH_SIGMAS * blur.sigma_px), 0).astype(np.int64)
+    fits = blur.sigma_px <= WIDEST_FITTED_SIGMA_PX
+    reach = np.where(fits, np.ceil(FITTED_SIGMAS * blur.sigma_px), 0).astype(np.int64)
     apart = np.abs(np.arange(2 * int(reach.max()) + 1) - reach[..., None])
     sigma = np.maximum(blur.sigma_px, 1e-3)[..., None]
     taps = np.where(apart <= reach[..., None], np.exp(-0.5 * (apart / sigma) ** 2), 0.0)
@@ -161,7 +161,7 @@ def _color_vote(photo, fitted, y, x, here, there, least_edge, sums):
 
 
 @kernel
-def _fellows(fitted, y, x, here, there):
+def _same_surface_neighbours(fitted, y, x, here, there):
     """How many more of the eight neighbours have about the height `here` than `there`."""
     height, width = fitted.shape
     more, near = -1, 0.5 * abs(there - here)
@@ -187,10 +187,10 @@ def _correlate(missing, y, x, taps, far):
 
 
 @kernel
-def _move_edges(photo, fitted, missing, taps, reach, cell, least_edge, first, last, settled):
+def _move_edges(photo, fitted, missing, taps, reach, cell, least_edge, first, last, visited):
     """Rows [first, last): pixels take over the height of a neighbour across an edge where that fits better.
 
-    Coordinate descent; `missing` is kept up to date. settled (H, W): what was looked at, until something moves near it.
+    Coordinate descent; `missing` is kept up to date. visited (H, W): what was looked at, until something moves near it.
     """
     height, width = fitted.shape
     sums = np.empty((2, 4))
@@ -198,14 +198,14 @@ def _move_edges(photo, fitted, missing, taps, reach, cell, least_edge, first, la
         for x in range(width):
             here = fitted[y, x]
             # Most pixels end here.
-            if settled[y, x] or not (
+            if visited[y, x] or not (
                 abs(fitted[max(y - 1, 0), x] - here) >= least_edge
                 or abs(fitted[min(y + 1, height - 1), x] - here) >= least_edge
                 or abs(fitted[y, max(x - 1, 0)] - here) >= least_edge
                 or abs(fitted[y, min(x + 1, width - 1)] - here) >= least_edge
             ):
                 continue
-            row, column, settled[y, x] = y // cell, x // cell, True
+            row, column, visited[y, x] = y // cell, x // cell, True
             far, own = reach[row, column], taps[row, column]
             if far == 0:
                 continue
@@ -218,15 +218,15 @@ def _move_edges(photo, fitted, missing, taps, reach, cell, least_edge, first, la
                 there = fitted[v, u]
                 # Change of the misfit |missing|^2, relative to that of a whole pixel; then of the outline and colours.
                 change = 1.0 - 2.0 * wanted / ((there - here) * energy)
-                change += OUTLINE_WEIGHT * _fellows(fitted, y, x, here, there)
+                change += OUTLINE_WEIGHT * _same_surface_neighbours(fitted, y, x, here, there)
                 if change - COLOR_WEIGHT < best:
                     change -= COLOR_WEIGHT * _color_vote(photo, fitted, y, x, here, there, least_edge, sums)
                     if change < best:
                         best, value = change, there
             if value != here:
                 fitted[y, x] = value
-                top, left = max(y - STIRRED_PX, 0), max(x - STIRRED_PX, 0)
-                settled[top : y + STIRRED_PX + 1, left : x + STIRRED_PX + 1] = False
+                top, left = max(y - REVISIT_RADIUS_PX, 0), max(x - REVISIT_RADIUS_PX, 0)
+                visited[top : y + REVISIT_RADIUS_PX + 1, left : x + REVISIT_RADIUS_PX + 1] = False
                 left, right = max(x - far, 0), min(x + far, width - 1) + 1
                 for v in range(max(y - far, 0), min(y + far, height - 1) + 1):
                     _add((here - value) * own[v - y + far], own[left - x + far :], missing[v, left:right])

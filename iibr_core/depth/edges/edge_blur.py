@@ -20,12 +20,12 @@ from iibr_core.types import FloatImage, ImageSize
 
 SHARP_PX = 0.65
 """Edges blurred by less (sigma) count as exact: a step between two pixels measures 0.4, one pixel between them 0.8."""
-WIDEST_SIGMA_PX = 16.0
+WIDEST_MEASURED_SIGMA_PX = 16.0
 EDGE_SIGMAS = sqrt(2 * np.pi)
 """The height of a blurred step over its steepest slope, in sigmas of the blur."""
 MEASURED_EDGE = 0.1
 """The blur is measured on steps of at least this share of the map's range."""
-MEASURED_PIXELS = 300_000
+MOST_BLUR_PIXELS = 300_000
 MEASURING_REACH_PX = 20
 MEASURED_SIGMA_PX = MEASURING_REACH_PX / 5
 """Wider edges are measured on a smaller map."""
@@ -37,16 +37,16 @@ STEEPEST_SHOULDER = 0.15
 """Slope there, relative to the step's."""
 CHANGE_NOISE = 0.003
 """Squared change of colour (sRGB-encoded) that is no edge of the photo."""
-CELL_PX = 32
+BLUR_CELL_PX = 32
 CELLS = 16
 """At most so many cells along each side of the map."""
 NEAREST_EDGES = 64
 """Whose median is the blur of a cell."""
-WITNESSES = 512
+MOST_SAMPLES = 512
 """Edges at which the photo is asked whether they are any."""
-ALIKE = 1.5
+SIMILAR_BLUR_RATIO = 1.5
 """Up to this factor edges are as soft as each other."""
-WITNESS_PX = 16
+SAMPLE_CELL_PX = 16
 """Edges nearer to each other show the same of the photo: they count as one."""
 CHANCE = 0.5
 """Share of shoulders at which any photo changes less than in the middle of a slope."""
@@ -58,7 +58,7 @@ LIKELY = 0.55
 """Share from which it is believed of a place, where it is sure of edges as soft as these all over the map."""
 MOST_EDGES = 4096
 """Kept of a map."""
-LEAST_STEPS = 0.2
+LEAST_STEP_SHARE = 0.2
 """Share of soft edges with flat shoulders, among all that are as soft, from which they are steps; hills have few."""
 LEAST_SOFT = 0.2
 """A map of which a smaller share of edges is soft, is exact."""
@@ -85,7 +85,7 @@ def measure_edge_blur(photo: FloatImage, disparity: FloatImage, should_stop: Sho
     Raises Cancelled once should_stop is true.
     """
     height, width = disparity.shape
-    cell = max(CELL_PX, ceil(max(height, width, 1) / CELLS))
+    cell = max(BLUR_CELL_PX, ceil(max(height, width, 1) / CELLS))
     sigmas = np.zeros((ceil(height / cell), ceil(width / cell)), np.float32)
     edges = _edges(photo, disparity, should_stop)
     if _soft_share(edges) >= LEAST_SOFT:
@@ -105,25 +105,29 @@ def extent(disparity: FloatImage) -> float:
 def _sigma_at(edges: NDArray[np.float32], x: float, y: float) -> float:
     """The blur about a place; 0 where the nearest edges are exact, or may as well be slopes."""
     away = np.maximum(np.abs(edges[0] - x), np.abs(edges[1] - y))
-    near = np.argpartition(away, 2 * WITNESSES)[: 2 * WITNESSES] if len(away) > 2 * WITNESSES else np.arange(len(away))
+    near = (
+        np.argpartition(away, 2 * MOST_SAMPLES)[: 2 * MOST_SAMPLES]
+        if len(away) > 2 * MOST_SAMPLES
+        else np.arange(len(away))
+    )
     nearest = edges[:, near[np.argsort(away[near], kind="stable")]]
-    steps = nearest[:, nearest[5] > 0][:, :WITNESSES]
+    steps = nearest[:, nearest[5] > 0][:, :MOST_SAMPLES]
     sigma = _weighted_median(steps[2, :NEAREST_EDGES], steps[3, :NEAREST_EDGES])
     if sigma < CLEARLY_SOFT_PX:
         return 0.0
     # Only edges about as soft as these tell whether they are edges.
-    around, here = _as_soft_as(sigma, nearest[:, :WITNESSES]), _as_soft_as(sigma, steps)
-    if not around.shape[1] or around[5].mean() < LEAST_STEPS:
+    around, here = _as_soft_as(sigma, nearest[:, :MOST_SAMPLES]), _as_soft_as(sigma, steps)
+    if not around.shape[1] or around[5].mean() < LEAST_STEP_SHARE:
         return 0.0
     if not _photo_is_sure(here):
         anywhere = _as_soft_as(sigma, edges[:, edges[5] > 0])
         if here[4].mean() < LIKELY or not _photo_is_sure(anywhere):
             return 0.0
-    return min(sigma, WIDEST_SIGMA_PX)
+    return min(sigma, WIDEST_MEASURED_SIGMA_PX)
 
 
 def _as_soft_as(sigma: float, edges: NDArray[np.float32]) -> NDArray[np.float32]:
-    return edges[:, (edges[2] < ALIKE * sigma) & (edges[2] > sigma / ALIKE)]
+    return edges[:, (edges[2] < SIMILAR_BLUR_RATIO * sigma) & (edges[2] > sigma / SIMILAR_BLUR_RATIO)]
 
 
 def _soft_share(edges: NDArray[np.float32]) -> float:
@@ -136,7 +140,7 @@ def _photo_is_sure(edges: NDArray[np.float32]) -> bool:
     """Whether the photo changes at so many of them as chance would hardly have it."""
     if not edges.shape[1]:
         return False
-    places = len(np.unique(edges[0] // WITNESS_PX + (edges[1] // WITNESS_PX) * 4096))
+    places = len(np.unique(edges[0] // SAMPLE_CELL_PX + (edges[1] // SAMPLE_CELL_PX) * 4096))
     return bool(edges[4].mean() >= CHANCE + CERTAINTY * sqrt(CHANCE_VARIANCE / places))
 
 
@@ -149,11 +153,11 @@ def _edges(photo: FloatImage, disparity: FloatImage, should_stop: ShouldStop) ->
     found: list[NDArray[np.float32]] = [np.empty((6, 0), np.float32)]
     scale, least_sigma = 1, 0.0
     while least_edge > 0 and min(disparity.shape) >= (2 if scale == 1 else 4 * MEASURING_REACH_PX):
-        edges = _edges_of_level(photo, disparity, least_edge, least_sigma, MEASURED_PIXELS // scale, should_stop)
+        edges = _edges_of_level(photo, disparity, least_edge, least_sigma, MOST_BLUR_PIXELS // scale, should_stop)
         edges[:2] = (edges[:2] + 0.5) * scale - 0.5
         edges[2] *= scale
         found.append(edges)
-        if 2 * scale * MEASURED_SIGMA_PX > WIDEST_SIGMA_PX:
+        if 2 * scale * MEASURED_SIGMA_PX > WIDEST_MEASURED_SIGMA_PX:
             break
         photo, disparity = _half(photo), _half(disparity)
         scale, least_sigma = 2 * scale, MEASURED_SIGMA_PX / 2

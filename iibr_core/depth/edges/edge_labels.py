@@ -23,33 +23,33 @@ from iibr_core.runtime.jit import kernel
 from iibr_core.runtime.tiling import ShouldStop, in_pieces, pieces_of
 from iibr_core.types import FloatImage
 
-BAND_PX = 4
+LABELLED_PX = 4
 """Pixels with fewer others between them and a step are labelled; those with as many tell how often colours mislead."""
 SLOPE = 0.25
 """Of a step, which goes on by so much before and after it, that it is a slope's."""
-REACH_PX, STRIDE_PX, SPREAD_PX = 8, 2, 4.0
+LABEL_PX, STRIDE_PX, SPREAD_PX = 8, 2, 4.0
 """Every second pixel within so many, each way, tells both surfaces' colours; standard deviation of their weights by
 distance.
 """
-NEARNESS = nearness(REACH_PX, SPREAD_PX).astype(np.float32)
-NEARNESS[REACH_PX, REACH_PX] = 0
-"""Those weights, (2 REACH_PX + 1, 2 REACH_PX + 1); the pixel itself, in the middle, tells nothing."""
-TRUST = np.append(np.geomspace(0.1, 1.0, BAND_PX + 1), 1.0).astype(np.float32)
+LABEL_NEARNESS = nearness(LABEL_PX, SPREAD_PX).astype(np.float32)
+LABEL_NEARNESS[LABEL_PX, LABEL_PX] = 0
+"""Those weights, (2 LABEL_PX + 1, 2 LABEL_PX + 1); the pixel itself, in the middle, tells nothing."""
+TRUST = np.append(np.geomspace(0.1, 1.0, LABELLED_PX + 1), 1.0).astype(np.float32)
 """Their weights by how many pixels lie between them and a step: nearer ones are mixed, or on the wrong side."""
 FILLED_TRUST = np.float32(0.2)
 """Of pixels that were unknown, besides."""
 LIKENESS_STEPS = 64
-LIKENESS = np.append(np.exp(-0.5 * (np.arange(16 * LIKENESS_STEPS) + 0.5) / LIKENESS_STEPS), 0).astype(np.float32)
+LIKENESS_TABLE = np.append(np.exp(-0.5 * (np.arange(16 * LIKENESS_STEPS) + 0.5) / LIKENESS_STEPS), 0).astype(np.float32)
 """Likeness by squared distance of colours, in such steps of a variance, 0 from the last one on."""
-LEAST_WEIGHT = 0.05
+LEAST_COLOR_WEIGHT = 0.05
 """Weight of all pixels of a surface together, below which its colours are not known."""
 LEAST_FOREGROUND = 0.7
 """The same of foregrounds, below which they keep their pixels: they are a pixel thin."""
-ALIKE, LIKE_NEIGHBOUR = 0.5, 0.6
+LIKE_CONTRAST, LIKE_NEIGHBOUR = 0.5, 0.6
 """Standard deviations of likeness, of a pixel to a surface and to a neighbour, in mean steps of colour in the band."""
 UNLIKE, UNSEEN_WEIGHT = 0.03, 0.3
 """Likelihood of a colour that nothing on a surface has; weight of that possibility against what was seen."""
-LEAST_SHARE = 0.05
+LEAST_FOREGROUND_SHARE = 0.05
 """Of the foreground, from which a mixed pixel is its own, if that is more than a deviation of the background's colours;
 left behind, it would be a ghost, and tint what is filled beside it.
 """
@@ -61,7 +61,7 @@ CLEAR = 1.5
 """Log likelihood ratio from which colours are clear."""
 LEAST_CLEAR = 0.2
 """Share of the pixels beside steps whose colours must be clear to tell of the map: both sides of a slope look alike."""
-MIXED = (0.1, 0.25)
+MIXED_SHARES = (0.1, 0.25)
 """Share of the pixels just behind and just in front of exact steps whose colours contradict the map: they are mixed."""
 WRONG = (0.02, 0.9)
 """Least and largest share of pixels that a map is taken to have on the wrong side."""
@@ -71,11 +71,11 @@ light rather than surfaces.
 """
 EXACT = 0.1
 """Where it has a smaller share there everywhere, it stays as it is."""
-RELUCTANCE = 1.5
+DATA_TERM_WEIGHT = 1.5
 """How much the map counts: factor of the log odds of its being right."""
-SURE = 4.0
+SURE_LOG_ODDS = 4.0
 """Log odds of colours' being right inside surfaces, from which they count in full."""
-MEASURED_PIXELS = 1 << 14
+MOST_MEASURED_PIXELS = 1 << 14
 """Of the band, at most, tell how far the map is wrong."""
 PASSES = 8
 """Of mean field (Kraehenbuehl and Koltun 2011)."""
@@ -91,24 +91,24 @@ def label_edges(
     contradict the map beside steps no more often than an exact one. Raises Cancelled once should_stop is true.
     """
     distance = step_distance(values, least_edge)
-    pixels = np.flatnonzero(distance <= BAND_PX)
+    pixels = np.flatnonzero(distance <= LABELLED_PX)
     if not len(pixels):
         return values
     contrast = _mean_color_step(colors, pixels)
     trust = TRUST[distance] * np.where(unknown, FILLED_TRUST, np.float32(1))
-    weigh = partial(_weigh_colors, colors, values, trust, least_edge, ALIKE * contrast)
+    weigh = partial(_weigh_colors, colors, values, trust, least_edge, LIKE_CONTRAST * contrast)
     away, own, known = distance.reshape(-1), values.reshape(-1), ~unknown.reshape(-1)
-    few = pixels[:: ceil(len(pixels) / MEASURED_PIXELS)]
+    few = pixels[:: ceil(len(pixels) / MOST_MEASURED_PIXELS)]
     weighed = _in_parts(weigh, few, should_stop)
     wrong, sureness = _measure_errors(weighed, own[few], away[few], known[few])
     if wrong.max() <= EXACT:
         return values
     other, evidence = weighed if len(few) == len(pixels) else _in_parts(weigh, pixels, should_stop)
     away, own, known = away[pixels], own[pixels], known[pixels]
-    odds = np.float32(RELUCTANCE) * np.log((1 - wrong) / wrong)
+    odds = np.float32(DATA_TERM_WEIGHT) * np.log((1 - wrong) / wrong)
     prior = np.where(known, odds[(own > other).astype(np.intp), away], np.float32(0))
     # The farthest pixels only look on.
-    looks_on = (other == own) | (known & (away == BAND_PX))
+    looks_on = (other == own) | (known & (away == LABELLED_PX))
     drive = np.where(looks_on, np.float32(np.inf), np.float32(sureness) * evidence + prior)
     belief = _mean_field(colors, values, pixels, other, drive, LIKE_NEIGHBOUR * contrast, should_stop)
     labelled = values.copy()
@@ -117,7 +117,7 @@ def label_edges(
 
 
 def step_distance(
-    values: FloatImage, least_edge: float, reach_px: int = BAND_PX, counts_slopes: bool = False
+    values: FloatImage, least_edge: float, reach_px: int = LABELLED_PX, counts_slopes: bool = False
 ) -> NDArray[np.uint8]:
     """(H, W): how many pixels lie between each and the nearest step larger than least_edge; at most reach_px + 1.
 
@@ -149,23 +149,23 @@ def _in_parts(
 def _measure_errors(
     weighed: tuple[FloatImage, FloatImage], own: FloatImage, away: NDArray[np.uint8], known: NDArray[np.bool_]
 ) -> tuple[FloatImage, float]:
-    """(2, BAND_PX + 1): the share of pixels that a map has on the wrong side, behind and in front of a step, by how
+    """(2, LABELLED_PX + 1): the share of pixels that a map has on the wrong side, behind and in front of a step, by how
     many pixels lie between; and how much colours count, 0..1.
     """
     other, evidence = weighed
     clear, in_front = known & (np.abs(evidence) > CLEAR), own > other
-    wrong = np.empty((2, BAND_PX + 1), np.float32)
+    wrong = np.empty((2, LABELLED_PX + 1), np.float32)
     for side in range(2):
-        misled = _contradicted(evidence[clear & (in_front == side) & (away == BAND_PX)])
-        for k in range(BAND_PX + 1):
-            by_chance = max(misled, MIXED[side]) if k == 0 else misled
+        misled = _contradicted(evidence[clear & (in_front == side) & (away == LABELLED_PX)])
+        for k in range(LABELLED_PX + 1):
+            by_chance = max(misled, MIXED_SHARES[side]) if k == 0 else misled
             here = (in_front == side) & (away == k)
             contradicted = _contradicted(evidence[clear & here], misled)
             is_told = np.count_nonzero(clear & here) >= LEAST_CLEAR * np.count_nonzero(known & here)
             tells = is_told and misled <= MOST_MISLED * contradicted
             wrong[side, k] = (contradicted - by_chance) / max(1 - misled - by_chance, 0.1) if tells else 0.0
-    misled = _contradicted(evidence[clear & (away == BAND_PX)])
-    return np.clip(wrong, *WRONG), min(max(log((1 - misled) / misled) / SURE, 0.0), 1.0)
+    misled = _contradicted(evidence[clear & (away == LABELLED_PX)])
+    return np.clip(wrong, *WRONG), min(max(log((1 - misled) / misled) / SURE_LOG_ODDS, 0.0), 1.0)
 
 
 def _contradicted(evidence: FloatImage, expected: float = 0.05) -> float:
@@ -226,9 +226,9 @@ def _measure_distance(values, least_edge, reach, counts_slopes, distance):
 def _nearest_other(values, y, x, least_edge):
     """The disparity of the nearest pixel on another surface; the pixel's own where there is none within reach."""
     height, width = values.shape
-    found, nearest = values[y, x], 2 * (BAND_PX + 1) ** 2 + 1
-    for v in range(max(y - BAND_PX - 1, 0), min(y + BAND_PX + 2, height)):
-        for u in range(max(x - BAND_PX - 1, 0), min(x + BAND_PX + 2, width)):
+    found, nearest = values[y, x], 2 * (LABELLED_PX + 1) ** 2 + 1
+    for v in range(max(y - LABELLED_PX - 1, 0), min(y + LABELLED_PX + 2, height)):
+        for u in range(max(x - LABELLED_PX - 1, 0), min(x + LABELLED_PX + 2, width)):
             away = (v - y) ** 2 + (u - x) ** 2
             if away < nearest and abs(values[v, u] - values[y, x]) > least_edge:
                 found, nearest = values[v, u], away
@@ -245,7 +245,7 @@ def _weigh_colors(colors, values, trust, least_edge, alike, pixels):
     others, evidence = np.empty(len(pixels), np.float32), np.zeros(len(pixels), np.float32)
     # Of its own surface and of the other: weight, likeness, sum of colours, sum of their squares.
     weight, like, total, squares = np.empty(2), np.empty(2), np.empty((2, 3)), np.empty(2)
-    steps, most = np.float32(LIKENESS_STEPS / (alike * alike)), np.float32(len(LIKENESS) - 1)
+    steps, most = np.float32(LIKENESS_STEPS / (alike * alike)), np.float32(len(LIKENESS_TABLE) - 1)
     for n in range(len(pixels)):
         y, x = pixels[n] // width, pixels[n] % width
         own, other = values[y, x], _nearest_other(values, y, x, least_edge)
@@ -254,14 +254,14 @@ def _weigh_colors(colors, values, trust, least_edge, alike, pixels):
             continue
         half, disparity = 0.5 * abs(other - own), 0.0
         weight[:], like[:], total[:], squares[:] = 0.0, 0.0, 0.0, 0.0
-        for v in range(y - min(y, REACH_PX) // STRIDE_PX * STRIDE_PX, min(y + REACH_PX + 1, height), STRIDE_PX):
-            for u in range(x - min(x, REACH_PX) // STRIDE_PX * STRIDE_PX, min(x + REACH_PX + 1, width), STRIDE_PX):
+        for v in range(y - min(y, LABEL_PX) // STRIDE_PX * STRIDE_PX, min(y + LABEL_PX + 1, height), STRIDE_PX):
+            for u in range(x - min(x, LABEL_PX) // STRIDE_PX * STRIDE_PX, min(x + LABEL_PX + 1, width), STRIDE_PX):
                 to_own, to_other = abs(values[v, u] - own), abs(values[v, u] - other)
                 # A third surface, or none.
                 if not min(to_own, to_other) <= half:
                     continue
                 side = 0 if to_own <= to_other else 1
-                w = NEARNESS[v - y + REACH_PX, u - x + REACH_PX] * trust[v, u]
+                w = LABEL_NEARNESS[v - y + LABEL_PX, u - x + LABEL_PX] * trust[v, u]
                 apart = np.float32(0.0)
                 for c in range(3):
                     color = colors[v, u, c]
@@ -271,39 +271,39 @@ def _weigh_colors(colors, values, trust, least_edge, alike, pixels):
                 # Colours that are not finite are like no other.
                 at = apart * steps
                 weight[side] += w
-                like[side] += w * LIKENESS[int(at if at < most else most)]
+                like[side] += w * LIKENESS_TABLE[int(at if at < most else most)]
                 disparity += side * w * (values[v, u] - other)
         # A wire that the map has beside its place would be lost: nothing knows its colours.
-        if not weight[1] > LEAST_WEIGHT or (own > other and weight[0] < LEAST_FOREGROUND):
+        if not weight[1] > LEAST_COLOR_WEIGHT or (own > other and weight[0] < LEAST_FOREGROUND):
             continue
         others[n] = other + disparity / weight[1]
-        back = 0 if other > own else 1
+        background = 0 if other > own else 1
         for side in range(2):
             like[side] = (like[side] + UNSEEN_WEIGHT * UNLIKE) / (weight[side] + UNSEEN_WEIGHT)
         if weight[0] > 0:
-            mixed = _mixed_likelihood(colors[y, x], weight, total, squares[back], back, alike)
-            like[1 - back] = max(like[1 - back], mixed)
+            mixed = _mixed_likelihood(colors[y, x], weight, total, squares[background], background, alike)
+            like[1 - background] = max(like[1 - background], mixed)
         evidence[n] = log((like[0] + UNLIKE) / (like[1] + UNLIKE))
     return others, evidence
 
 
 @kernel
-def _mixed_likelihood(color, weight, total, back_squares, back, alike):
+def _mixed_likelihood(color, weight, total, background_squares, background, alike):
     """How likely a colour is a mixture of both surfaces' mean colours, by all shares alike; 0 where the foreground's
-    share is too little. weight (2), total (2, 3): see `_weigh_colors`; back: which of both is the background.
+    share is too little. weight (2), total (2, 3): see `_weigh_colors`; background: which of both is the background.
     """
     contrast = along = away = 0.0
-    spread = back_squares / weight[back]
+    spread = background_squares / weight[background]
     for c in range(3):
-        behind = total[back, c] / weight[back]
-        way, off = total[1 - back, c] / weight[1 - back] - behind, color[c] - behind
+        behind = total[background, c] / weight[background]
+        way, off = total[1 - background, c] / weight[1 - background] - behind, color[c] - behind
         contrast, along, away = contrast + way * way, along + way * off, away + off * off
         spread -= behind * behind
     # Colours that are not finite fail the comparison.
     if not contrast > 1e-9:
         return 0.0
     share = along / contrast
-    if not max(LEAST_SHARE, sqrt(max(spread, 0.0) / contrast)) < share < 1.0:
+    if not max(LEAST_FOREGROUND_SHARE, sqrt(max(spread, 0.0) / contrast)) < share < 1.0:
         return 0.0
     aside = max(away - along * share, 0.0)
     return exp(-0.5 * aside / (alike * alike)) * min(sqrt(2.0 * np.pi / contrast) * alike, 1.0)

@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.depth.edges.blur_fit import fit_to_blur
+from iibr_core.depth.edges.edge_band import resolve_edge_band
 from iibr_core.depth.edges.edge_blur import EDGE_SIGMAS, SHARP_PX, extent, measure_edge_blur
 from iibr_core.depth.edges.edge_profiles import gradient, height_at, walk
 from iibr_core.depth.edges.ridges import SHARES, structure_at
-from iibr_core.depth.edges.rims import settle_rims
 from iibr_core.inpainting.disparity_by_color import fill_disparity_by_color
 from iibr_core.runtime.jit import kernel
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never
@@ -49,9 +49,9 @@ BEND = 2.0
 """How much faster than beyond its blur a surface bends away from the view at the edge itself: round things do."""
 STEPS_A_SIGMA = 2.5
 """Ramps are walked in steps so fine, or of a pixel."""
-REACH_SIGMAS = 5.0
+RAMP_SIGMAS = 5.0
 """From a pixel to the ends of its ramp, at most."""
-FLAT_SHARE = 0.2
+FLAT_EDGE_SHARE = 0.2
 """Of the least edge, up to which a map is flat."""
 CREST_SHARE = 0.5
 """Of the least edge that the map falls beside a crest, from which it may be one."""
@@ -73,7 +73,7 @@ def refine(
     unknown: (H, W), what was filled like that before; None: nothing. stages: that are on.
     Returns (H, W) float32, within the range of what was given but for a slope's continuation and for what is thin: that
     gets the height back which the blur took. Where nothing says that the map is blurred, its bits are those given, but
-    in the rims of depth edges (`settle_rims`).
+    in the edge bands of depth edges (`resolve_edge_band`).
     Raises ValueError if the sizes differ, InputError if strength is not within 0..1 or no disparity is known, Cancelled
     once should_stop is true.
     """
@@ -90,9 +90,9 @@ def refine(
     if not least_edge > 0:
         return sharp
     filled = ~np.isfinite(disparity) if unknown is None else unknown | ~np.isfinite(disparity)
-    settled = settle_rims(colors, sharp, least_edge, filled, soft, should_stop, stages)
-    # Rims, too, go so far only.
-    return settled if strength == 1 else sharp + np.float32(strength) * (settled - sharp)
+    resolved = resolve_edge_band(colors, sharp, least_edge, filled, soft, should_stop, stages)
+    # Edge bands, too, go so far only.
+    return resolved if strength == 1 else sharp + np.float32(strength) * (resolved - sharp)
 
 
 def _sharpen(
@@ -153,19 +153,19 @@ def _tail(far, sigma):
 
 
 @kernel
-def _foreground_colour(photo, x, y, across, down, front, behind):
+def _foreground_colour(photo, x, y, across, down, foreground, behind):
     """Matting: a colour between those so far away; -0.5 background .. 0.5 foreground, nearer 0 the less sure."""
     height, width = photo.shape[:2]
     # Pixels of both surfaces, beyond the ramp.
-    front_x = min(max(floor(x + across * front + 0.5), 0), width - 1)
-    front_y = min(max(floor(y + down * front + 0.5), 0), height - 1)
-    back_x = min(max(floor(x - across * behind + 0.5), 0), width - 1)
-    back_y = min(max(floor(y - down * behind + 0.5), 0), height - 1)
+    foreground_x = min(max(floor(x + across * foreground + 0.5), 0), width - 1)
+    foreground_y = min(max(floor(y + down * foreground + 0.5), 0), height - 1)
+    background_x = min(max(floor(x - across * behind + 0.5), 0), width - 1)
+    background_y = min(max(floor(y - down * behind + 0.5), 0), height - 1)
     # Matting: where the colour lies on the line between theirs, how far apart they are, how far off it is.
     along = contrast = away = 0.0
     for c in range(3):
-        background = photo[back_y, back_x, c]
-        difference = photo[front_y, front_x, c] - background
+        background = photo[background_y, background_x, c]
+        difference = photo[foreground_y, foreground_x, c] - background
         own = photo[y, x, c] - background
         along, contrast, away = along + own * difference, contrast + difference**2, away + own**2
     share = along / max(contrast, 1e-9)
@@ -238,10 +238,10 @@ def _as_step(values, photo, x, y, across, down, sigma, least_edge, softness, sha
     here = values[y, x]
     # Wide ramps are walked in longer steps: all of them take about as many.
     pace = max(1.0, sigma / STEPS_A_SIGMA)
-    reach = ceil(REACH_SIGMAS * sigma / pace) + 1
+    reach = ceil(RAMP_SIGMAS * sigma / pace) + 1
     # Where the ramp ends both ways; its height there.
     up, top, end_up, steepest_up, at_up = walk(values, x, y, across, down, 1.0, reach, pace, PLATEAU_SIGMAS * sigma)
-    back, bottom, end_down, steepest_down, at_down = walk(
+    to_foot, bottom, end_down, steepest_down, at_down = walk(
         values, x, y, across, down, -1.0, reach, pace, PLATEAU_SIGMAS * sigma
     )
     steepest = max(steepest_up, steepest_down)
@@ -250,41 +250,43 @@ def _as_step(values, photo, x, y, across, down, sigma, least_edge, softness, sha
         return here
     # The step was where the ramp is steepest (px up it from here); its plateaus lie some sigmas to both sides.
     edge = at_up if steepest_up >= steepest_down else -at_down
-    up, back = min(up, edge + PLATEAU_SIGMAS * sigma), min(back, PLATEAU_SIGMAS * sigma - edge)
+    up, to_foot = min(up, edge + PLATEAU_SIGMAS * sigma), min(to_foot, PLATEAU_SIGMAS * sigma - edge)
     top = height_at(values, x + across * up, y + down * up)
-    bottom = height_at(values, x - across * back, y - down * back)
+    bottom = height_at(values, x - across * to_foot, y - down * to_foot)
     # Higher than a step of this slope can be after a blur of sigma: a slanted surface. Lower: an exact edge.
     unit = EDGE_SIGMAS * steepest
     if not (max(least_edge, SHARP_PX * unit) <= top - bottom <= TOLERANCE * sigma * unit):
         return here
     # Where the map returns to the other side's height as soon as it can, there is no plateau, but something thin.
     middle, height = 0.5 * (top + bottom), top - bottom
-    beyond, before = 2 * up - edge + PLATEAU_SIGMAS * sigma, 2 * back + edge + PLATEAU_SIGMAS * sigma
+    beyond, before = 2 * up - edge + PLATEAU_SIGMAS * sigma, 2 * to_foot + edge + PLATEAU_SIGMAS * sigma
     if height_at(values, x + across * beyond, y + down * beyond) < middle:
         value = _as_structure(values, photo, x, y, across, down, up, 1.0, sigma, least_edge, softness, shares, taps)
         if value == value:
             return value
     if height_at(values, x - across * before, y - down * before) > middle:
-        value = _as_structure(values, photo, x, y, across, down, -back, -1.0, sigma, least_edge, softness, shares, taps)
+        value = _as_structure(
+            values, photo, x, y, across, down, -to_foot, -1.0, sigma, least_edge, softness, shares, taps
+        )
         if value == value:
             return value
     # Plateaus may be slanted: their slopes go on part of the way to here, but not past the value here.
     limit = MOST_EXTENSION * steepest
     top = max(_continue_plateau(values, x, y, across, down, up, top, limit), here)
-    bottom = min(_continue_plateau(values, x, y, -across, -down, back, bottom, limit), here)
+    bottom = min(_continue_plateau(values, x, y, -across, -down, to_foot, bottom, limit), here)
     if not top > bottom:
         return here
 
     # Where does this pixel belong? By its height on the ramp and by its colour in the photo, ...
-    front = min(up, edge + COLOR_SIGMAS * sigma + 1)
-    behind = min(back, COLOR_SIGMAS * sigma + 1 - edge)
-    colour = _foreground_colour(photo, x, y, across, down, front, behind)
+    foreground = min(up, edge + COLOR_SIGMAS * sigma + 1)
+    behind = min(to_foot, COLOR_SIGMAS * sigma + 1 - edge)
+    colour = _foreground_colour(photo, x, y, across, down, foreground, behind)
     # ... steepened about the middle of the ramp; softness near 0 makes a step.
     place = (here - bottom) / (top - bottom) - 0.5
     place = (place + COLOR_SHARE * (1.0 - softness) * colour) / softness + 0.5
-    # Beside the edge, the blur took from the front and left on the back: as much as the map shows, and a Gaussian does.
+    # Beside the edge, the blur took from the foreground and left on the background: as the map shows.
     edge += (middle - height_at(values, x + across * edge, y + down * edge)) / steepest
-    above, below, end = _tail(up - edge, sigma), _tail(back + edge, sigma), TAIL_SIGMAS * sigma
+    above, below, end = _tail(up - edge, sigma), _tail(to_foot + edge, sigma), TAIL_SIGMAS * sigma
     step, limit = (1.0 - softness) * height / (1.0 - above - below), BEND * limit
     lost = _beyond_blur(values, x, y, across, down, end + edge, sigma, limit) - top
     left = bottom - _beyond_blur(values, x, y, -across, -down, end - edge, sigma, limit)
@@ -302,7 +304,7 @@ def _refine(values, photo, least_edge, sigmas, cell, softness, first_row, last_r
             refined[y, x] = values[y, x]
             sigma = sigmas[y // cell, x // cell]
             # Exact edges here, or none: most pixels end here.
-            if sigma == 0 or _is_flat(values, x, y, int(PLATEAU_SIGMAS * sigma), FLAT_SHARE * least_edge):
+            if sigma == 0 or _is_flat(values, x, y, int(PLATEAU_SIGMAS * sigma), FLAT_EDGE_SHARE * least_edge):
                 continue
             across, down = gradient(values, x, y)
             crest = _as_crest(values, photo, x, y, across, down, sigma, least_edge, softness, shares, taps)
@@ -311,7 +313,7 @@ def _refine(values, photo, least_edge, sigmas, cell, softness, first_row, last_r
                 continue
             slope = sqrt(across * across + down * down)
             # Too flat to belong to an edge.
-            if slope * 4 * (REACH_SIGMAS * sigma + 1) > least_edge:
+            if slope * 4 * (RAMP_SIGMAS * sigma + 1) > least_edge:
                 refined[y, x] = _as_step(
                     values, photo, x, y, across / slope, down / slope, sigma, least_edge, softness, shares, taps
                 )

@@ -19,21 +19,21 @@ WIDEST_SIGMAS = 4.0
 """A structure wider than that has a crest as high as it was."""
 BESIDE_SIGMAS = 2.0
 """So far to both sides of a structure the map is compared with it, blurred again."""
-LEAST_LEFT = 0.25
+LEAST_CREST_HEIGHT = 0.25
 """Of a structure's height, after the blur: lower ones are guesses."""
-MOST_MISFIT = 0.06
+MOST_CREST_MISFIT = 0.06
 """Deviation (rms) of the structure, blurred again, from the given map, relative to its height there."""
 SEARCHED_PX = 24
 """How far from the crest the photo is looked at, at most."""
 SHARES = 2 * SEARCHED_PX * SAMPLES_A_PX + 1
 """Places looked at."""
-LEAST_SIDE = 0.4
+LEAST_SIDE_HEIGHT = 0.4
 """A crest's height over its higher side, relative to that over its lower one, from which it is no step."""
 FLAT_SIDE = 0.15
 """Change of height beside a structure, relative to its own, up to which nothing else is there."""
 BLURS = 0.65 * 1.15 ** np.arange(16)
 """Tried (sigma, px) where the blur of a map is measured on a structure."""
-REACH_SIGMAS = 4.0
+GAUSSIAN_SIGMAS = 4.0
 """Where a Gaussian ends."""
 LEAST_CONTRAST = 0.01
 """Squared distance of colours (sRGB-encoded) from what is beside, below which a structure has no outline."""
@@ -121,7 +121,7 @@ def _fit_structure(values, x, y, across, down, shares, first, last, sigma, taps)
     end = ceil((last - middle) * spacing + BESIDE_SIGMAS * sigma)
     # The blur, by distance in places.
     scale = spacing / (sqrt(2.0 * np.pi) * sigma)
-    reach = min(int(REACH_SIGMAS * sigma * SAMPLES_A_PX) + 1, len(taps))
+    reach = min(int(GAUSSIAN_SIGMAS * sigma * SAMPLES_A_PX) + 1, len(taps))
     for k in range(reach):
         taps[k] = scale * exp(-0.5 * (k * spacing / sigma) ** 2)
     # Least squares for ground + slope * t + height * blurred(t).
@@ -142,7 +142,7 @@ def _fit_structure(values, x, y, across, down, shares, first, last, sigma, taps)
     rest_b = b2 - b0 * b0 / n - line_b * line_b * spread
     rest_pb = pb - p0 * b0 / n - line_b * line_p * spread
     rest_p = pp - p0 * p0 / n - line_p * line_p * spread
-    if not (rest_b > 1e-6 and strongest >= LEAST_LEFT):
+    if not (rest_b > 1e-6 and strongest >= LEAST_CREST_HEIGHT):
         return 0.0, 0.0, 0.0, np.inf
     height = rest_pb / rest_b
     slope = line_p - height * line_b
@@ -178,7 +178,7 @@ def _feet(values, x, y, across, down, sign, reach, least_edge):
         return 0.0, 0.0
     after, high, _, _, _ = walk(values, x, y, -sign * across, -sign * down, -sign, reach, 1.0, np.inf)
     drops = sign * (crest - low), sign * (crest - high)
-    if not (min(drops) >= max(least_edge, LEAST_SIDE * max(drops)) and min(before, after) > 0):
+    if not (min(drops) >= max(least_edge, LEAST_SIDE_HEIGHT * max(drops)) and min(before, after) > 0):
         return 0.0, 0.0
     return before, after
 
@@ -208,7 +208,7 @@ def structure_at(values, photo, x, y, across, down, far, sign, sigma, least_edge
     height, ground, slope, misfit = _fit_structure(
         values, crest_x, crest_y, across, down, shares, first, last, sigma, taps
     )
-    if not (misfit <= MOST_MISFIT and sign * height > 0):
+    if not (misfit <= MOST_CREST_MISFIT and sign * height > 0):
         return 0.0, 0.0, 0.0
     place = len(shares) // 2 - far * SAMPLES_A_PX
     k = min(max(floor(place + 0.5), 0), len(shares) - 1)
@@ -237,7 +237,7 @@ def structure_blur(values, photo, x, y, across, down, sign, least_edge, shares, 
         if not abs(beyond - level) <= FLAT_SIDE * abs(crest - level):
             return 0.0, 0.0, 0.0
     first, last = _structure_shares(photo, x, y, across, down, feet, np.inf, shares)
-    best, sigma, height = MOST_MISFIT, 0.0, 0.0
+    best, sigma, height = MOST_CREST_MISFIT, 0.0, 0.0
     if first <= last:
         for blur in BLURS:
             fitted, _, _, misfit = _fit_structure(values, x, y, across, down, shares, first, last, blur, taps)

@@ -25,7 +25,7 @@ MOST_POINTS = 10_000
 
 EXTENT_PERCENTILES = (0.1, 99.9)
 """The far and the near end of a map's range, without a few wild values."""
-FLAT_SHARE = 1e-6
+FLAT_RANGE_SHARE = 1e-6
 """A range below this share of the values is rounding: the map is flat."""
 FLAT_SPAN_WIDTHS = 0.01
 """What counts as the range of a flat map, in photo widths: so that it can be painted on."""
@@ -116,7 +116,7 @@ def extent_of(disparity: FloatImage) -> tuple[float, float]:
     if not known.size:
         raise InputError("editing depth: no disparity is known; give another map")
     low, high = (float(end) for end in np.percentile(known.astype(np.float64), EXTENT_PERCENTILES))
-    if high - low > FLAT_SHARE * max(abs(low), abs(high)):
+    if high - low > FLAT_RANGE_SHARE * max(abs(low), abs(high)):
         return low, high
     span = FLAT_SPAN_WIDTHS * disparity.shape[1]
     return low - span / 2, low + span / 2

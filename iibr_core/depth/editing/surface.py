@@ -19,9 +19,9 @@ DEPTH_EDGE = 0.05
 """A step of disparity across a pixel that parts surfaces, as a share of the map's range."""
 OTHER_SURFACE = 0.25
 """Colours so far from those under the stroke are another surface, however softly one turns into the other."""
-GAP_PX = 2
+EDGE_GAP_PX = 2
 """Edges that lie this near to each other count as one: surfaces do not run out through gaps."""
-EDGE_PX = 3
+BLURRED_EDGE_PX = 3
 """Half the width of a blurred edge: so much of it is asked which side it belongs to."""
 EDGE, SPACE, SURFACE = np.uint8(0), np.uint8(1), np.uint8(2)
 
@@ -44,13 +44,13 @@ def surface_at(
     clearance = np.empty(disparity.shape, np.int32)
     _measure_clearance(parts, clearance)
     row, column = _start_near(clearance, int(y * height), int(x * width))
-    gap = min(GAP_PX, int(clearance[row, column]) - 1)
+    gap = min(EDGE_GAP_PX, int(clearance[row, column]) - 1)
     if gap < 0:
         return _is_surface(parts)
     _flood(np.where(clearance > gap, SPACE, EDGE).astype(np.uint8), parts, row, column)
     for _ in range(gap):
         _grow(parts, clearance)
-    for _ in range(EDGE_PX):
+    for _ in range(BLURRED_EDGE_PX):
         _share_edges(guide, disparity, step, parts.copy(), parts)
     _fill_holes(parts, pi * stroke.radius_px(width) ** 2)
     return _is_surface(parts)
@@ -64,8 +64,8 @@ def _start_near(clearance: NDArray[np.int32], row: int, column: int) -> tuple[in
     """The place itself, or on an edge the one nearby that is freest of edges."""
     if clearance[row, column] > 0:
         return row, column
-    top, left = max(row - EDGE_PX, 0), max(column - EDGE_PX, 0)
-    around = clearance[top : row + EDGE_PX + 1, left : column + EDGE_PX + 1]
+    top, left = max(row - BLURRED_EDGE_PX, 0), max(column - BLURRED_EDGE_PX, 0)
+    around = clearance[top : row + BLURRED_EDGE_PX + 1, left : column + BLURRED_EDGE_PX + 1]
     down, across = divmod(int(np.argmax(around)), around.shape[1])
     return top + down, left + across
 
@@ -172,7 +172,7 @@ def _share_edges(guide, disparity, depth_step, before, parts):
                     continue
                 # The other side: the first pixel that is no edge, or the last one of a wide edge.
                 m, n = y, x
-                for _ in range(2 * EDGE_PX):
+                for _ in range(2 * BLURRED_EDGE_PX):
                     if not (0 <= m - down < height and 0 <= n - across < width):
                         break
                     m, n = m - down, n - across

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+from iibr_core.depth.embedded.embedded_depth import EmbeddedDepth
 from iibr_core.depth.embedded.images import picture_file
-from iibr_core.depth.embedded.reader import EmbeddedDepth
 from iibr_core.depth.estimates import Estimate, values_of
 from iibr_core.formats.images.oiio_reader import read_orientation, upright
 from iibr_core.formats.images.photo import read_photo

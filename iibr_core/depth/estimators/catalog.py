@@ -7,10 +7,10 @@ from pathlib import Path
 
 from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.estimators.config import folder_of, read_config
+from iibr_core.depth.estimators.depth_estimator import Family, KnownModel, LocalModel
 from iibr_core.depth.estimators.download import download, verified_folder
 from iibr_core.depth.estimators.estimate_cache import seconds_of
-from iibr_core.depth.estimators.protocol import Family, KnownModel, LocalModel
-from iibr_core.depth.estimators.registry import FAMILIES
+from iibr_core.depth.estimators.known_models import FAMILIES
 from iibr_core.depth.estimators.words import ModelState
 from iibr_core.formats.files import is_file, is_folder
 from iibr_core.runtime.tiling import ShouldStop, never

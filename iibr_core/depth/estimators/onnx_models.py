@@ -17,8 +17,8 @@ import numpy as np
 
 from iibr_core.depth.estimates import Estimate, MetricDepth, RelativeInverseDepth
 from iibr_core.depth.estimators.config import CONFIG, PREPROCESSOR, read_config, read_preparation
+from iibr_core.depth.estimators.depth_estimator import Family, KnownModel, LocalModel, Run
 from iibr_core.depth.estimators.preparation import Preparation, affordable_pixels, input_size, network_input
-from iibr_core.depth.estimators.protocol import Family, KnownModel, LocalModel, Run
 from iibr_core.formats.files import is_file
 from iibr_core.runtime.extras import said_by
 from iibr_core.runtime.machine import core_count

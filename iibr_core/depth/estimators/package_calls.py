@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from iibr_core.depth.estimates import Estimate
-from iibr_core.depth.estimators.protocol import LocalModel, Run
+from iibr_core.depth.estimators.depth_estimator import LocalModel, Run
 from iibr_core.runtime.extras import said_by
 from iibr_core.runtime.tiling import ShouldStop
 from iibr_core.types import FloatImage, ImageSize, InputError, Photo, ReportProgress

@@ -15,8 +15,8 @@ import numpy as np
 
 from iibr_core.depth.estimates import Estimate, MetricDepth, RelativeInverseDepth
 from iibr_core.depth.estimators.config import read_config, read_preparation, safetensors_in
+from iibr_core.depth.estimators.depth_estimator import Family, KnownModel, LocalModel, Run
 from iibr_core.depth.estimators.preparation import Preparation, affordable_pixels, input_size, network_input
-from iibr_core.depth.estimators.protocol import Family, KnownModel, LocalModel, Run
 from iibr_core.formats.files import is_folder
 from iibr_core.runtime.extras import said_by
 from iibr_core.runtime.machine import core_count

@@ -8,8 +8,8 @@ from pathlib import Path
 from iibr_core.color import bytes_from_encoded
 from iibr_core.depth.estimates import MetricDepth
 from iibr_core.depth.estimators.config import mentions, safetensors_in
+from iibr_core.depth.estimators.depth_estimator import Family, LocalModel
 from iibr_core.depth.estimators.package_calls import positive, prepare_by
-from iibr_core.depth.estimators.protocol import Family, LocalModel
 from iibr_core.formats.files import is_folder
 from iibr_core.types import Photo
 

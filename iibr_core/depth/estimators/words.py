@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from iibr_core.depth.estimators.protocol import KnownModel
+from iibr_core.depth.estimators.depth_estimator import KnownModel
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,13 @@ import numpy as np
 
 from iibr_core.color import encoded_from_stored
 from iibr_core.depth.multi_view.agreement import reconcile
-from iibr_core.depth.multi_view.estimate import FINDING, estimate_disparity, map_work, refine_disparity, sweep_steps
+from iibr_core.depth.multi_view.estimate_disparity import (
+    FINDING,
+    estimate_disparity,
+    map_work,
+    refine_disparity,
+    sweep_steps,
+)
 from iibr_core.inpainting.disparity_by_color import fill_disparity_by_color
 from iibr_core.rendering.photo_rays import rays_of_photo
 from iibr_core.rendering.renderer import open_renderer

@@ -11,7 +11,7 @@ from iibr_core.runtime.jit import kernel
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never, raise_if_stopped
 from iibr_core.types import FloatImage, image_size
 
-ROUNDS = 2
+REFINEMENT_ROUNDS = 2
 UNLIKE = 0.02
 """Differences of texture (1 = white) from which on a view counts as hidden there (Geman and McClure's weights)."""
 SMOOTHNESS = 1e-2
@@ -31,7 +31,7 @@ def refine_by_gradients(views: MatchingViews, disparity: FloatImage, should_stop
     size = image_size(disparity)
     longest = np.float32(STEP_PX / max(views.reach, 1e-6))
     curvature, pull = np.empty(size, np.float32), np.empty(size, np.float32)
-    for _ in range(ROUNDS):
+    for _ in range(REFINEMENT_ROUNDS):
         _measure_all(views, disparity, curvature, pull, should_stop)
         target = disparity + np.clip(-pull / (curvature + LITTLE), -longest, longest)
         across, down = np.zeros(size, np.float32), np.zeros(size, np.float32)

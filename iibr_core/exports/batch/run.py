@@ -15,8 +15,8 @@ from iibr_core.exports.batch.processes import local_workers
 from iibr_core.exports.batch.task import BatchSettings, Outcome, PhotoTask, key_of, target_name
 from iibr_core.exports.batch.work import export_photo
 from iibr_core.exports.batch.workers import WorkerSource, outcomes_of
-from iibr_core.exports.opening import OpenDrawn
-from iibr_core.exports.registry import gallery_of
+from iibr_core.exports.export_opening import OpenDrawn
+from iibr_core.exports.writers import gallery_of
 from iibr_core.formats.unfinished import remove_leftovers
 from iibr_core.runtime.machine import LEAST_USUAL_BYTES, MOST_USUAL_SHARE, core_count, memory_bytes, usual_budget_bytes
 from iibr_core.types import InputError, ReportProgress

@@ -16,7 +16,7 @@ from iibr_core.exports.batch.archive import ArchivePhoto
 from iibr_core.exports.kinds import EXPORTS, ExportKind
 from iibr_core.exports.options import USUAL_OPTIONS, ExportOptions
 from iibr_core.formats.files import open_binary
-from iibr_core.rendering.gloss.settings import Gloss
+from iibr_core.rendering.gloss.gloss_settings import Gloss
 from iibr_core.scenes.scene import Source
 
 CLAIM_PREFIX = ".iibr-batch-"

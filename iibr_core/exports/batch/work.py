@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from iibr_core.exports.batch.task import Outcome, PhotoTask
 
 if TYPE_CHECKING:
-    from iibr_core.exports.opening import OpenDrawn
+    from iibr_core.exports.export_opening import OpenDrawn
     from iibr_core.scenes.scene import Scene
 
 
@@ -26,7 +26,7 @@ def export_photo(task: PhotoTask, open_drawn: OpenDrawn | None) -> Outcome:
     started = time.perf_counter()
     try:
         output = _export(task, open_drawn)
-        _settle_on_disk(output)
+        _flush_to_disk(output)
     except InputError as error:
         return Outcome(reason=str(error))
     except MemoryError as error:
@@ -38,8 +38,8 @@ def export_photo(task: PhotoTask, open_drawn: OpenDrawn | None) -> Outcome:
 
 def _export(task: PhotoTask, open_drawn: OpenDrawn | None) -> Path:
     """Raises InputError."""
-    from iibr_core.exports.opening import open_for_export
-    from iibr_core.exports.registry import export_path, require_export_place, writer_of
+    from iibr_core.exports.export_opening import open_for_export
+    from iibr_core.exports.writers import export_path, require_export_place, writer_of
     from iibr_core.formats.outputs import AlreadyThereError, make_folder, release_place
     from iibr_core.formats.places import require_no_link
     from iibr_core.scenes.inputs import inputs_of
@@ -80,7 +80,7 @@ def _claim(task: PhotoTask, output: Path) -> None:
     _sync(task.place.claim.parent)
 
 
-def _settle_on_disk(output: Path) -> None:
+def _flush_to_disk(output: Path) -> None:
     """Whatever happens to the power now, what was written stays, under its name."""
     inside = [Path(place, name) for place, _, names in os.walk(output) for name in names]
     for path in (*inside, output, output.parent):

@@ -12,8 +12,8 @@ import re
 from pathlib import Path
 
 from iibr_core.formats.light_fields.folder_writer import FolderWriter
+from iibr_core.formats.light_fields.multi_view_scene import MultiView
 from iibr_core.formats.light_fields.parameters import read_parameters, stated_grid, write_parameters
-from iibr_core.formats.light_fields.scene import MultiView
 from iibr_core.formats.light_fields.view_grid import (
     candidate_views,
     grid_scene,

@@ -10,17 +10,17 @@ from pathlib import Path
 from iibr_core.formats.files import shown_name
 from iibr_core.formats.images.oiio_reader import PictureRows, text_attribute
 from iibr_core.formats.images.picture_source import PicturePart, PictureSource
-from iibr_core.formats.light_fields.scene import KnownView, MultiView
+from iibr_core.formats.light_fields.multi_view_scene import KnownView, MultiView
 from iibr_core.formats.light_fields.whole_field import LENSLET_KEY, LENSLET_TAG
 from iibr_core.types import GridShape, ImageSize, InputError, ViewOffset
 
 LYTRO_LENSLET = GridShape(14, 14)
 USABLE = slice(3, 11)
-"""Rows and columns of a Lytro's views: beyond them the lens's rim darkens the corners."""
+"""Rows and columns of a Lytro's views: beyond them the lens's edge darkens the corners."""
 
 
 def read_lenslet_image(path: Path) -> MultiView | None:
-    """The views of a lenslet image, None where the file is not named as one; a Lytro's without those at its rim.
+    """The views of a lenslet image, None where the file is not named as one; a Lytro's without those at its edge.
 
     Raises InputError where its sides are no multiples of a lens's.
     """

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from iibr_core.formats.files import is_file, is_folder, shown_name
 from iibr_core.formats.images.oiio_reader import read_size
 from iibr_core.formats.images.picture_source import PictureSource
-from iibr_core.formats.light_fields.scene import KnownView, MultiView, pictures_in
+from iibr_core.formats.light_fields.multi_view_scene import KnownView, MultiView, pictures_in
 from iibr_core.formats.poses import central_camera, read_llff_poses
 from iibr_core.types import Camera, InputError, ViewOffset
 

@@ -12,7 +12,7 @@ from pathlib import Path
 from iibr_core.formats.files import is_file, shown_name
 from iibr_core.formats.images.oiio_reader import read_size
 from iibr_core.formats.images.picture_source import PictureSource
-from iibr_core.formats.light_fields.scene import (
+from iibr_core.formats.light_fields.multi_view_scene import (
     KnownDisparity,
     KnownView,
     MultiView,

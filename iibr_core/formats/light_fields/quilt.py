@@ -6,7 +6,7 @@ from pathlib import Path
 
 from iibr_core.formats.files import shown_name
 from iibr_core.formats.images.picture_source import PicturePart, PictureSource, source_size
-from iibr_core.formats.light_fields.scene import KnownView, MultiView
+from iibr_core.formats.light_fields.multi_view_scene import KnownView, MultiView
 from iibr_core.formats.quilts import TAG, Quilt, quilt_named
 from iibr_core.types import GridShape, ImageSize, ViewOffset
 

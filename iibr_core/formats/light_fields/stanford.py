@@ -16,7 +16,7 @@ import numpy as np
 from iibr_core.formats.files import is_file, is_folder, read_text, shown_name
 from iibr_core.formats.images.picture_source import PictureSource, source_size
 from iibr_core.formats.light_fields.folder_writer import FolderWriter
-from iibr_core.formats.light_fields.scene import KnownView, MultiView, on_grid, pictures_in
+from iibr_core.formats.light_fields.multi_view_scene import KnownView, MultiView, on_grid, pictures_in
 from iibr_core.types import InputError, ViewOffset
 
 NUMBER = r"[-+]?\d{1,9}(?:\.\d{0,12})?"

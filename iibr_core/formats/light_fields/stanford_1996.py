@@ -10,7 +10,7 @@ from pathlib import Path
 
 from iibr_core.formats.files import entries_of, shown_name
 from iibr_core.formats.images.picture_source import PictureSource
-from iibr_core.formats.light_fields.scene import KnownView, MultiView, on_grid
+from iibr_core.formats.light_fields.multi_view_scene import KnownView, MultiView, on_grid
 from iibr_core.types import InputError, ViewOffset
 
 NAME = re.compile(r"(.+)\.(\d{1,3})\.(\d{1,3})\.(?:rgb|sgi|ppm|png)$", re.IGNORECASE)

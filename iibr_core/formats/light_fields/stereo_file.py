@@ -10,7 +10,7 @@ from iibr_core.formats.images.lif import SOURCE_IMAGE, open_lif
 from iibr_core.formats.images.mpo import is_jpeg, is_stereo_mpo
 from iibr_core.formats.images.picture_source import PictureSource
 from iibr_core.formats.images.side_by_side import require_developed, side_by_side_pair
-from iibr_core.formats.light_fields.scene import KnownView, MultiView
+from iibr_core.formats.light_fields.multi_view_scene import KnownView, MultiView
 from iibr_core.types import GridShape, ViewOffset
 
 EYES = "left", "right"

@@ -11,8 +11,7 @@ from typing import TypeVar
 from iibr_core.formats.files import entries_of, is_folder, shown_name
 from iibr_core.formats.images.oiio_reader import read_size
 from iibr_core.formats.images.picture_source import PictureSource
-from iibr_core.formats.light_fields.parameters import read_parameters, stated_focal_px, stated_range_px
-from iibr_core.formats.light_fields.scene import (
+from iibr_core.formats.light_fields.multi_view_scene import (
     MAP_EXTENSIONS,
     PICTURE_EXTENSIONS,
     GridIndex,
@@ -24,6 +23,7 @@ from iibr_core.formats.light_fields.scene import (
     numbers_in,
     pictures_in,
 )
+from iibr_core.formats.light_fields.parameters import read_parameters, stated_focal_px, stated_range_px
 from iibr_core.types import GridShape, InputError, ViewOffset
 
 Key = TypeVar("Key")

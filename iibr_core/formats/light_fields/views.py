@@ -9,7 +9,7 @@ from iibr_core.color import stored_from_encoded
 from iibr_core.formats.images.oiio_reader import Raster
 from iibr_core.formats.images.photo import encoded_colors
 from iibr_core.formats.images.picture_source import PictureSource, part_of, read_source
-from iibr_core.formats.light_fields.scene import GridIndex, MultiView, common_size
+from iibr_core.formats.light_fields.multi_view_scene import GridIndex, MultiView, common_size
 from iibr_core.formats.maps.disparity_file import read_disparity
 from iibr_core.types import FloatImage, GridShape, ImageSize, InputError, StoredColors, ViewUpdate, image_size
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from iibr_core.runtime.offers import offered_by
 
 if TYPE_CHECKING:
-    from iibr_core.rendering.gloss.settings import (
+    from iibr_core.rendering.gloss.gloss_settings import (
         LIGHT_RADIUS_LIMITS_DEG,
         MOST_POINTS,
         MOST_TOLERANCE,

@@ -7,13 +7,13 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from iibr_core.rendering.gloss.gloss_settings import Gloss, Triple
 from iibr_core.rendering.gloss.microfacet import lobe_shares
 from iibr_core.rendering.gloss.separation import CLIPPED, eroded, harmonics
-from iibr_core.rendering.gloss.settings import Gloss, Triple
 from iibr_core.runtime.tiling import Cancelled, ShouldStop, never
 from iibr_core.types import FloatImage
 
-MOST_FITTED = 4000
+MOST_HIGHLIGHT_PIXELS = 4000
 MOST_CANDIDATES = 400
 FIRST_STEP, LAST_STEP = 0.15, 0.002
 """Of the climb from the best candidate, radians."""
@@ -21,7 +21,7 @@ LEAST_EXPLAINED = 0.45
 """Of what the matt part leaves. On 48 made-up surfaces with paint of all kinds and no highlight, no light explained
 more than 0.40; on 36 with paint that is no mere grey and a highlight, its light explained 0.56 and more.
 """
-LEAST_SEEN = 0.02
+LEAST_HIGHLIGHT = 0.02
 """Of white, linear, at its brightest: what is weaker is no highlight."""
 LEAST_OWN = 1e-3
 """Of a lobe that the matt part cannot explain, else it tells nothing."""
@@ -47,7 +47,7 @@ def find_light(
     inside = np.flatnonzero(eroded(mask > 0.5))
     colors, facing = linear.reshape(-1, 3), normals.reshape(-1, 3)
     fitted = inside[colors[inside].max(axis=1) < CLIPPED]
-    fitted = fitted[:: max(-(-len(fitted) // MOST_FITTED), 1)]
+    fitted = fitted[:: max(-(-len(fitted) // MOST_HIGHLIGHT_PIXELS), 1)]
     if not len(fitted):
         return None
     basis = _matt_basis(colors[fitted], facing[fitted])
@@ -68,7 +68,7 @@ def find_light(
         if not energy > LEAST_OWN * (lobe @ lobe):
             return 0.0
         strength = max(own @ rest, 0.0) / energy
-        is_seen = strength * lobe.max() > LEAST_SEEN
+        is_seen = strength * lobe.max() > LEAST_HIGHLIGHT
         return float(strength**2 * energy / (rest @ rest)) if is_seen else 0.0
 
     tried = _spread(inside, colors)

@@ -1,4 +1,4 @@
-"""What a glossy photo shows of light that is reflected, told apart from its matt part.
+"""Separates the reflected light in a glossy photo from its matt part.
 
 Under any light, a matt surface of one colour is a quadratic form of its normal (Ramamoorthi and Hanrahan 2001).
 """
@@ -13,14 +13,14 @@ from iibr_core.types import FloatImage
 FIT_ROUNDS = 12
 CLEAR_DEVIATIONS = 5.0
 """What lies so many deviations above the matt part is reflected."""
-MOST_FITTED = 20_000
+MOST_MATT_PIXELS = 20_000
 """Pixels that the matt part is fitted to."""
 RIDGE = 1e-4
 CLIPPED = 0.97
 """Of white, linear: brighter pixels of a photo may have been brighter still."""
 HIGHLIGHT = 0.7
 """Of white, linear, in every channel: paint is hardly ever so bright."""
-RIM_PX = 2
+EDGE_BAND_PX = 2
 
 
 def separate_light(
@@ -35,7 +35,7 @@ def separate_light(
     """
     terms, colors, amount = harmonics(normals.reshape(-1, 3)), linear.reshape(-1, 3), lobe.reshape(-1)
     inside = (mask.reshape(-1) > 0.5) & (colors.max(axis=1) < CLIPPED)
-    chosen = np.flatnonzero(inside)[:: max(-(-int(inside.sum()) // MOST_FITTED), 1)]
+    chosen = np.flatnonzero(inside)[:: max(-(-int(inside.sum()) // MOST_MATT_PIXELS), 1)]
     if len(chosen) <= terms.shape[1] or not amount[chosen].any():
         return np.zeros(3, np.float32), np.zeros_like(linear)
     unknowns = np.concatenate([terms[chosen], amount[chosen, None] / amount[chosen].max()], axis=1).astype(np.float64)
@@ -63,7 +63,7 @@ def reflected_light(linear: FloatImage, normals: FloatImage, mask: FloatImage) -
     inside = np.flatnonzero(inner)
     if not len(inside) or linear.min(axis=2)[inner].max() < HIGHLIGHT:
         return np.zeros_like(linear)
-    fitted = inside[:: -(-len(inside) // MOST_FITTED)]
+    fitted = inside[:: -(-len(inside) // MOST_MATT_PIXELS)]
     terms, colors = harmonics(normals.reshape(-1, 3)), linear.reshape(-1, 3)
     above = np.empty_like(colors)
     for channel in range(3):
@@ -74,11 +74,11 @@ def reflected_light(linear: FloatImage, normals: FloatImage, mask: FloatImage) -
 
 
 def eroded(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Without RIM_PX at its edges, where pixels mix it with what is beside it: (H, W)."""
-    inner: NDArray[np.bool_] = np.pad(mask, RIM_PX, mode="edge")
+    """Without EDGE_BAND_PX at its edges, where pixels mix it with what is beside it: (H, W)."""
+    inner: NDArray[np.bool_] = np.pad(mask, EDGE_BAND_PX, mode="edge")
     for axis in (0, 1):
-        count = inner.shape[axis] - 2 * RIM_PX
-        inner = np.all([inner.take(range(k, k + count), axis) for k in range(2 * RIM_PX + 1)], axis=0)
+        count = inner.shape[axis] - 2 * EDGE_BAND_PX
+        inner = np.all([inner.take(range(k, k + count), axis) for k in range(2 * EDGE_BAND_PX + 1)], axis=0)
     return inner
 
 

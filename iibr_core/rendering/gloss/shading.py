@@ -14,17 +14,17 @@ import numpy as np
 from iibr_core.color import encoded_from_stored, linear_from_srgb, stored_from_encoded
 from iibr_core.rendering.gloss.environment import prefilter_environment
 from iibr_core.rendering.gloss.geometry import SceneGeometry
+from iibr_core.rendering.gloss.gloss_settings import Gloss, Triple, require_sound
+from iibr_core.rendering.gloss.gloss_surface import fit_normals, surface_mask
 from iibr_core.rendering.gloss.light_search import find_light
 from iibr_core.rendering.gloss.microfacet import lobe_shares, reflected_share
 from iibr_core.rendering.gloss.reflection import reflection_disparity
 from iibr_core.rendering.gloss.separation import reflected_light, separate_light
-from iibr_core.rendering.gloss.settings import Gloss, Triple, require_sound
-from iibr_core.rendering.gloss.surface import fit_normals, surface_mask
 from iibr_core.runtime.jit import kernel, linear_scalar, srgb_scalar
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never
 from iibr_core.types import FloatImage, GridShape, ViewOffset, ViewUpdate, image_size
 
-SAME_SURFACE_PX = 1.0
+SHADED_SURFACE_PX = 1.0
 """A pixel whose place in the photo is another by more than this, by the disparity seen there, shows another surface."""
 FIXED_POINT_STEPS = 4
 NO_ENVIRONMENT = np.zeros((1, 2, 3), np.float32)
@@ -151,7 +151,7 @@ def _is_inside(v, u, height, width):
 @kernel
 def _is_same(apart, t, s):
     """Whether disparities so far apart are of the same surface, as the view at (t, s) sees it."""
-    return apart * apart * (t * t + s * s) <= SAME_SURFACE_PX * SAME_SURFACE_PX
+    return apart * apart * (t * t + s * s) <= SHADED_SURFACE_PX * SHADED_SURFACE_PX
 
 
 @kernel

@@ -24,9 +24,9 @@ from iibr_core.types import FloatImage, ImageSize, ViewOffset
 CHUNK_PIXELS = 4096
 FARTHEST = 1e7
 """Positions (px) and view offsets are cast no farther out than this."""
-SAME_SURFACE_PX = 1e-3
+SAME_POINT_PX = 1e-3
 """Disparities that differ by no more are of one point."""
-STEEPEST = 0.5
+COARSE_PATTERN_COSINE = 0.5
 """A surface seen at a smaller cosine than this gets a coarser pattern; above, the samples of a pixel average it."""
 TENT_STEPS = sqrt(6.0)
 
@@ -110,7 +110,7 @@ def is_visible_from(
     x, y, d = (np.asarray(a, np.float64) for a in (x, y, disparity))
     across, down = offset.s - other.s, offset.t - other.t
     there = disparity_at(scene, x + d * across, y + d * down, other)
-    return np.abs(there - d) <= SAME_SURFACE_PX
+    return np.abs(there - d) <= SAME_POINT_PX
 
 
 def _clamp_finite(values: ArrayLike) -> NDArray[np.float64]:
@@ -231,7 +231,7 @@ def _cast(xs, ys, places, weights, margin, primitives, axes, origins, bounds, ca
             px, py = camera[0] + depth * wx, camera[1] + depth * wy
             towards = nx * px + ny * py + nz * depth
             cosine = abs(towards) / sqrt(px * px + py * py + depth * depth)
-            pixel = depth / focal * min(max(STEEPEST / max(cosine, 1e-6), 1.0), 20.0)
+            pixel = depth / focal * min(max(COARSE_PATTERN_COSINE / max(cosine, 1e-6), 1.0), 20.0)
             r, g, b = albedo_at(p, u, v, w, pixel)
 
             # Planes have the same light on both sides, or a view from the other side would change their colour.

@@ -80,7 +80,7 @@ def slow_step(photo: np.ndarray, stroke: Stroke, index: int, distance: np.ndarra
     guide = guide_of(photo)
     photo, colors = guide[1:-1, 1:-1] / GUIDE_STEPS, stroke_colours(guide, stroke, index).T / GUIDE_STEPS
     away = np.linalg.norm(photo[:, :, None] - colors, axis=3).min(axis=2)
-    unlike = np.maximum(away - LIKENESS, 0)  # of blocks of 5 x 5: there are no specks but at the window's border
+    unlike = np.maximum(away - LIKENESS, 0)  # of blocks of 5 x 5: there are none but at the window's border
     while waiting:
         here, row, column = heapq.heappop(waiting)
         if here > distance[row, column]:

@@ -11,8 +11,8 @@ import pytest
 from PIL import Image
 
 from iibr_core.depth.embedded.apple import heic_estimate
+from iibr_core.depth.embedded.embedded_depth import embedded_in_jpeg, read_embedded
 from iibr_core.depth.embedded.images import MAX_MAP_PIXELS, decode_map
-from iibr_core.depth.embedded.reader import embedded_in_jpeg, read_embedded
 from iibr_core.depth.embedded.xmp import jpeg_layout
 from iibr_core.depth.estimates import MetricDepth, RelativeInverseDepth
 from iibr_core.formats.images.photo import read_photo

@@ -13,7 +13,7 @@ import pytest
 from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.estimators import catalog, estimate_cache
 from iibr_core.depth.estimators.catalog import KNOWN_MODELS, USUAL_MODEL, known_model, model_to_use, state_of
-from iibr_core.depth.estimators.estimate import estimate_with
+from iibr_core.depth.estimators.estimate_depth import estimate_with
 from iibr_core.depth.estimators.words import ModelState, words_about
 from iibr_core.types import Photo
 from tests.iibr_core.depth.onnx_graphs import weighing

@@ -21,11 +21,11 @@ from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.estimates import MetricDepth, RelativeInverseDepth
 from iibr_core.depth.estimators import estimate_cache, onnx_models
 from iibr_core.depth.estimators.catalog import USUAL_MODEL, known_model, model_to_use
+from iibr_core.depth.estimators.depth_estimator import LocalModel
 from iibr_core.depth.estimators.download import VERIFIED
-from iibr_core.depth.estimators.estimate import estimate_with
+from iibr_core.depth.estimators.estimate_depth import estimate_with
 from iibr_core.depth.estimators.onnx_models import USUAL_PREPARATION, OnnxInput, run_onnx
 from iibr_core.depth.estimators.preparation import network_input
-from iibr_core.depth.estimators.protocol import LocalModel
 from iibr_core.formats.images.photo import write_image
 from iibr_core.runtime.tiling import Cancelled, never
 from iibr_core.types import FloatImage, ImageSize, InputError, Photo, ignore_progress

@@ -20,11 +20,11 @@ from iibr_core.depth.estimates import DisparityMap, Estimate, MetricDepth, Relat
 from iibr_core.depth.estimators import estimate_cache
 from iibr_core.depth.estimators.catalog import fetch, known_model, model_here, model_to_use
 from iibr_core.depth.estimators.config import read_preparation
+from iibr_core.depth.estimators.depth_estimator import LocalModel
 from iibr_core.depth.estimators.download import VERIFIED
-from iibr_core.depth.estimators.estimate import estimate_with
+from iibr_core.depth.estimators.estimate_depth import estimate_with
+from iibr_core.depth.estimators.known_models import FAMILIES
 from iibr_core.depth.estimators.preparation import Preparation, input_size
-from iibr_core.depth.estimators.protocol import LocalModel
-from iibr_core.depth.estimators.registry import FAMILIES
 from iibr_core.depth.estimators.transformers_models import FAMILY, KINDS
 from iibr_core.depth.search import estimator_of, open_with_depth
 from iibr_core.formats.images.photo import write_image

@@ -14,10 +14,10 @@ from iibr_core.evaluation.datasets import (
     read_straight_view,
     undo_rotation,
 )
-from iibr_core.evaluation.protocol import Options, evaluate
+from iibr_core.evaluation.evaluate_scene import Options, evaluate
 from iibr_core.formats.images.photo import write_image
 from iibr_core.formats.images.picture_source import PictureSource
-from iibr_core.formats.light_fields.scene import KnownView, MultiView, nearest_view
+from iibr_core.formats.light_fields.multi_view_scene import KnownView, MultiView, nearest_view
 from iibr_core.types import InputError, ViewOffset
 from tests.iibr_core.known_scenes import (
     HEIGHT,

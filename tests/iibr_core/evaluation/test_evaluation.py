@@ -16,17 +16,17 @@ from PIL import Image
 
 from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.search import open_with_depth
-from iibr_core.evaluation import report
+from iibr_core.evaluation import evaluation_report
 from iibr_core.evaluation.datasets import read_scene
+from iibr_core.evaluation.evaluate_scene import Options, evaluate
 from iibr_core.evaluation.metrics import flip, psnr, ssim
-from iibr_core.evaluation.protocol import Options, evaluate
 from iibr_core.evaluation.reference_warp import reference_warp
 from iibr_core.evaluation.report_folder import FILES, require_report_folder
 from iibr_core.evaluation.results import EvaluationResult
 from iibr_core.evaluation.tables import ABOUT_CONSISTENCY
 from iibr_core.evaluation.trials import CENTRE_TRIAL, CORNER_TRIAL, trial_input, trials_of
 from iibr_core.formats.images.photo import read_photo
-from iibr_core.formats.light_fields.scene import MultiView
+from iibr_core.formats.light_fields.multi_view_scene import MultiView
 from iibr_core.generation.light_field import generate
 from iibr_core.generation.view_maker import ViewMaker, quantise_as_stored
 from iibr_core.runtime import tiling
@@ -216,7 +216,9 @@ def test_stopping_ends_it(folder: Path) -> None:
 
 
 def test_the_json_holds_every_figure(results: list[EvaluationResult]) -> None:
-    read = json.loads(report.json_of(results, "iibr evaluate x"), parse_constant=lambda name: pytest.fail(name))
+    read = json.loads(
+        evaluation_report.json_of(results, "iibr evaluate x"), parse_constant=lambda name: pytest.fail(name)
+    )
     assert read["command"] == "iibr evaluate x"
     for result, stored in zip(results, read["judgements"]):
         assert stored["trial"] == result.trial
@@ -228,13 +230,13 @@ def test_the_json_holds_every_figure(results: list[EvaluationResult]) -> None:
 
 
 def test_the_markdown_has_a_table_for_each_result(results: list[EvaluationResult]) -> None:
-    text = report.markdown_of(results, "iibr evaluate x")
+    text = evaluation_report.markdown_of(results, "iibr evaluate x")
     for method in ALWAYS:
         assert len(re.findall(rf"(?m)^\| {method} \|", text)) >= len(results)
     for line in text.splitlines():
         assert "nan" not in line
     assert text.count(ABOUT_CONSISTENCY) == 1
-    assert ABOUT_CONSISTENCY not in report.markdown_of([replace(results[0], consistency={})], "x")
+    assert ABOUT_CONSISTENCY not in evaluation_report.markdown_of([replace(results[0], consistency={})], "x")
     assert f"| fast | – | {results[0].consistency['fast'].hole_pixels} |" in text
     blocks = re.findall(r"(?m)(?:^\|.*\n?)+", text)
     assert len(blocks) == 1 + sum(2 + bool(result.refocus) for result in results)
@@ -243,7 +245,7 @@ def test_the_markdown_has_a_table_for_each_result(results: list[EvaluationResult
 
 
 def test_the_page_needs_nothing_else(results: list[EvaluationResult]) -> None:
-    text = report.page_of(results, "iibr <evaluate>")
+    text = evaluation_report.page_of(results, "iibr <evaluate>")
     assert "iibr &lt;evaluate&gt;" in text
     assert not re.findall(r'(?:src|href)="(?!data:)|url\(|@import|<script|<link', text)
     images = re.findall(r'alt="([^"]+)" src="data:image/\w+;base64,([^"]+)"', text)
@@ -269,8 +271,8 @@ def test_epis_of_the_truth_hold_the_views_own_rows(folder: Path, results: list[E
 
 def test_reports_replace_older_ones_whole(results: list[EvaluationResult], tmp_path: Path) -> None:
     out = tmp_path / "made" / "report"
-    report.write_report(out, results, "first")
-    report.write_report(out, results[:1], "second")
+    evaluation_report.write_report(out, results, "first")
+    evaluation_report.write_report(out, results[:1], "second")
     assert sorted(path.name for path in out.iterdir()) == sorted(FILES)
     assert "`second`" in (out / "report.md").read_text()
 
@@ -298,6 +300,6 @@ def test_unknown_disparity_is_filled_by_the_photo_as_the_program_does_it(tmp_pat
 
 def test_the_summary_takes_means_over_scenes(results: list[EvaluationResult]) -> None:
     other = replace(results[0], scene="other")
-    text = report.markdown_of([*results, other], "x")
+    text = evaluation_report.markdown_of([*results, other], "x")
     assert re.search(r"(?m)^\| mean of 2 scenes \|", text)
-    assert "mean of" not in report.markdown_of(results, "x")
+    assert "mean of" not in evaluation_report.markdown_of(results, "x")

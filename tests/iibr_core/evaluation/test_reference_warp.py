@@ -14,7 +14,15 @@ from iibr_core.evaluation.reference_warp import LOBES, SAMPLES, reference_warp, 
 from iibr_core.evaluation.trials import warp_disparity
 from iibr_core.rendering.rendered_view import RenderedView
 from iibr_core.types import ImageSize, ViewOffset
-from tests.iibr_core.known_scenes import FRONT, HEIGHT, WALL, WIDTH, disparity_of_square, view_of_square, view_of_wall
+from tests.iibr_core.known_scenes import (
+    FOREGROUND,
+    HEIGHT,
+    WALL,
+    WIDTH,
+    disparity_of_square,
+    view_of_square,
+    view_of_wall,
+)
 from tests.iibr_core.scenes import smooth_texture
 
 CENTRE = ViewOffset(0.0, 0.0)
@@ -112,8 +120,8 @@ def test_carried_disparity_is_that_of_the_other_view() -> None:
     at = ViewOffset(-1.0, 1.0)
     own = warp_disparity(disparity_of_square(), at)
     wanted = np.full((HEIGHT, WIDTH), WALL, np.float32)
-    top, left = round(HEIGHT / 3 + FRONT), round(WIDTH / 3 - FRONT)
-    wanted[top : top + HEIGHT // 3, left : left + WIDTH // 3] = FRONT
+    top, left = round(HEIGHT / 3 + FOREGROUND), round(WIDTH / 3 - FOREGROUND)
+    wanted[top : top + HEIGHT // 3, left : left + WIDTH // 3] = FOREGROUND
     np.testing.assert_allclose(own, wanted, atol=1e-5)
 
 

@@ -11,8 +11,8 @@ import pytest
 
 from iibr_core.exports.kinds import export_kind
 from iibr_core.exports.options import ExportOptions
-from iibr_core.exports.registry import export_path, writer_of
 from iibr_core.exports.source import ExportSource
+from iibr_core.exports.writers import export_path, writer_of
 from iibr_core.scenes.lens_limits import LensChoice
 from iibr_core.scenes.scene import Source
 from iibr_core.types import GridShape, InputError

@@ -16,7 +16,7 @@ from iibr_core.exports.animation import optics_on_path
 from iibr_core.exports.kinds import EXPORTS
 from iibr_core.exports.options import ANIMATIONS, ExportOptions
 from iibr_core.exports.render_settings import RenderSettings
-from iibr_core.exports.settings import settle
+from iibr_core.exports.settings import resolve_settings
 from iibr_core.exports.source import ExportSource
 from iibr_core.formats.animations import write_animation
 from iibr_core.rendering.optics import Optics
@@ -30,7 +30,7 @@ COUNT = 6
 
 
 def path_of(source: ExportSource, **options: Any) -> list[Optics]:
-    settings = settle(EXPORTS["gif"], ExportOptions(**options), source.scene, source.optics)
+    settings = resolve_settings(EXPORTS["gif"], ExportOptions(**options), source.scene, source.optics)
     return optics_on_path(source.scene, source.optics, settings)
 
 

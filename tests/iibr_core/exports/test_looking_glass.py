@@ -16,8 +16,8 @@ import pytest
 from iibr_core.exports import looking_glass
 from iibr_core.exports.kinds import EXPORTS
 from iibr_core.exports.options import ExportOptions
-from iibr_core.exports.registry import writer_of
 from iibr_core.exports.source import ExportSource
+from iibr_core.exports.writers import writer_of
 from iibr_core.types import InputError
 from tests.iibr_core.exports.conftest import exported
 

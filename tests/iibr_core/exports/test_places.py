@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from iibr_core.exports.kinds import EXPORTS, export_kind, require_ending
-from iibr_core.exports.registry import require_export_place, writer_of
 from iibr_core.exports.source import ExportSource
+from iibr_core.exports.writers import require_export_place, writer_of
 from iibr_core.formats.outputs import AlreadyThereError
 from iibr_core.types import InputError
 from tests.iibr_core.exports.conftest import exported
@@ -20,7 +20,7 @@ FOLDERS = [name for name, kind in EXPORTS.items() if not kind.endings]
 def test_a_folder_of_other_things_is_never_replaced(source: ExportSource, tmp_path: Path, name: str) -> None:
     kind, folder = EXPORTS[name], tmp_path / "out"
     require_export_place(kind, folder, (), False)
-    exported(source, name, folder, **({"frames": 1} if "frames" in kind.heeds else {}))
+    exported(source, name, folder, **({"frames": 1} if "frames" in kind.supports else {}))
     with pytest.raises(AlreadyThereError):
         require_export_place(kind, folder, (), False)
     require_export_place(kind, folder, (), True)

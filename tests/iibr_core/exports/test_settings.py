@@ -8,7 +8,7 @@ import pytest
 
 from iibr_core.exports.kinds import EXPORTS
 from iibr_core.exports.options import ExportOptions
-from iibr_core.exports.settings import settle, shear_margin
+from iibr_core.exports.settings import resolve_settings, shear_margin
 from iibr_core.rendering.optics import Optics
 from iibr_core.scenes.scene import Scene, Source
 from iibr_core.scenes.screen_size import ScreenSize
@@ -29,19 +29,21 @@ SHARP_NEAR = Optics(focus_disparity=10.0)
     ],
 )
 def test_usual_settings(kind: str, size: tuple[int, int], frames: int, rate: float) -> None:
-    settings = settle(EXPORTS[kind], ExportOptions(), SCENE, SHARP_NEAR)
+    settings = resolve_settings(EXPORTS[kind], ExportOptions(), SCENE, SHARP_NEAR)
     assert (settings.size, settings.frames, settings.rate, settings.eyes, settings.row) == (size, frames, rate, 3, 250)
 
 
 def test_what_is_said_counts() -> None:
     said = ExportOptions(ScreenSize(10, 20), "go", 0.0, "swing", None, 7, 3.5, 0)
-    settings = settle(EXPORTS["mp4"], said, SCENE, SHARP_NEAR)
+    settings = resolve_settings(EXPORTS["mp4"], said, SCENE, SHARP_NEAR)
     assert (settings.size, settings.frames, settings.rate, settings.eyes, settings.row) == ((10, 20), 7, 3.5, 0, 0)
-    assert settle(EXPORTS["mp4"], replace(said, frames=None), SCENE, SHARP_NEAR).frames == 14, "four seconds"
+    assert resolve_settings(EXPORTS["mp4"], replace(said, frames=None), SCENE, SHARP_NEAR).frames == 14, "four seconds"
 
 
 def test_pictures_for_eyes_are_as_wide_as_what_both_hold() -> None:
     """Of 4 views the middle lies half a step beside view 2: the left eye stands 2 steps from it, moved by 20 px."""
     assert shear_margin(SCENE, SHARP_NEAR, 3.0) == pytest.approx(20 / 741)
-    assert settle(EXPORTS["sbs"], ExportOptions(), SCENE, SHARP_NEAR).size == (741 - 40, 500)
-    assert settle(EXPORTS["sbs"], ExportOptions(), SCENE, Optics(focus_disparity=1e6)).size == (1, 500), "refused later"
+    assert resolve_settings(EXPORTS["sbs"], ExportOptions(), SCENE, SHARP_NEAR).size == (741 - 40, 500)
+    assert resolve_settings(EXPORTS["sbs"], ExportOptions(), SCENE, Optics(focus_disparity=1e6)).size == (1, 500), (
+        "refused later"
+    )

@@ -12,13 +12,13 @@ import pytest
 from PIL import Image
 from plyfile import PlyData
 
-from iibr_core.exports.cameras import cameras_of
+from iibr_core.exports.camera_export import cameras_of
 from iibr_core.exports.points import SAME_DISPARITY_PX, _new, scene_points
 from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.exports.source import ExportSource
 from iibr_core.formats.cameras import FieldCameras
+from iibr_core.formats.light_fields.light_field_formats import open_light_field
 from iibr_core.formats.light_fields.llff import read_llff
-from iibr_core.formats.light_fields.registry import open_light_field
 from iibr_core.formats.maps.pfm import read_pfm
 from iibr_core.rendering.optics import Optics
 from iibr_core.scenes.screen_size import ScreenSize
@@ -111,7 +111,7 @@ def test_splats_are_the_photo_with_something_behind_it(source: ExportSource, tmp
     assert np.exp(np.asarray(vertex["scale_0"])) == pytest.approx(0.6 * depth / cameras.focal_px, rel=1e-4)
     assert depth.min() == pytest.approx(1, rel=1e-4)
     square = (colors[:, 0] - colors[:, 2]) > 0.3
-    assert np.median(depth[count:]) > 1.1 * np.median(depth[:count][square[:count]]), "made up behind what is near"
+    assert np.median(depth[count:]) > 1.1 * np.median(depth[:count][square[:count]]), "inpainted behind what is near"
 
 
 def test_what_stays_still_changes_neither_distances_nor_places(source: ExportSource) -> None:
@@ -150,7 +150,7 @@ def test_what_several_views_had_made_up_in_one_place_is_taken_once() -> None:
 
 
 def test_points_are_the_centre_view_s_and_what_the_corner_views_had_made_up(source: ExportSource) -> None:
-    """Every place that was made up is taken once: seen from where the photo was taken, and as far away."""
+    """Every inpainted place is taken once: seen from where the photo was taken, and as far away."""
     found, places = 0, set()
     for view in source.views():
         if view.row == view.column == 1:

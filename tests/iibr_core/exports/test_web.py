@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from iibr_core.exports import EXPORTS, ExportOptions, open_for_export, settle
+from iibr_core.exports import EXPORTS, ExportOptions, open_for_export, resolve_settings
 from iibr_core.exports.web import make_page
 from iibr_core.exports.web_gallery import write_gallery
 from iibr_core.exports.web_views import MOST_TEXELS, WebForm, form_that_fits
@@ -35,7 +35,7 @@ def opened(tmp_path_factory: pytest.TempPathFactory):
 
 
 def page_of(opened, **options) -> tuple[str, dict]:
-    page, _ = make_page(opened, settle(KIND, ExportOptions(**options), opened.scene, opened.optics))
+    page, _ = make_page(opened, resolve_settings(KIND, ExportOptions(**options), opened.scene, opened.optics))
     text = page.decode()
     return text, json.loads(text.partition('id="field">')[2].partition("</script>")[0])
 

@@ -12,7 +12,7 @@ from iibr_core.color import linear_from_srgb
 from iibr_core.formats.images.photo import write_image
 from iibr_core.formats.light_fields import folder_writer
 from iibr_core.formats.light_fields.hci import HciWriter
-from iibr_core.formats.light_fields.registry import find_light_field, open_light_field
+from iibr_core.formats.light_fields.light_field_formats import find_light_field, open_light_field
 from iibr_core.formats.light_fields.views import read_views
 from iibr_core.formats.maps.pfm import read_pfm, write_pfm
 from iibr_core.types import GridShape, InputError, ViewUpdate

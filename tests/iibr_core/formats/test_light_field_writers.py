@@ -10,7 +10,7 @@ import pytest
 from PIL import Image
 
 from iibr_core.color import linear_from_srgb
-from iibr_core.formats.light_fields.registry import WRITERS, open_light_field, writer_for
+from iibr_core.formats.light_fields.light_field_formats import WRITERS, open_light_field, writer_for
 from iibr_core.formats.light_fields.views import read_views
 from iibr_core.types import GridShape, InputError, ViewUpdate
 

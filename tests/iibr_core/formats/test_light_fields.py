@@ -12,7 +12,7 @@ from PIL import Image
 from iibr_core.evaluation.datasets import read_known_disparity, read_scene
 from iibr_core.formats.images.photo import write_image
 from iibr_core.formats.light_fields.hci import HciWriter
-from iibr_core.formats.light_fields.registry import (
+from iibr_core.formats.light_fields.light_field_formats import (
     READERS,
     WRITERS,
     WriterFactory,
@@ -20,7 +20,7 @@ from iibr_core.formats.light_fields.registry import (
     open_light_field,
     writer_for,
 )
-from iibr_core.formats.light_fields.scene import MultiView
+from iibr_core.formats.light_fields.multi_view_scene import MultiView
 from iibr_core.formats.light_fields.views import disparity_range, grid_of, read_stored_view, read_views, step_length
 from iibr_core.formats.maps.pfm import write_pfm
 from iibr_core.types import GridShape, ImageSize, InputError, ViewOffset, ViewUpdate
@@ -74,9 +74,9 @@ def test_every_layout_opens_through_one_function_for_viewer_and_evaluation(tmp_p
 
 @pytest.mark.parametrize("entry", [*READERS, *WRITERS.values()])
 def test_entries_name_files_of_the_folder(entry: str) -> None:
-    from iibr_core.formats.light_fields import registry
+    from iibr_core.formats.light_fields import light_field_formats
 
-    assert callable(registry._resolve(entry))
+    assert callable(light_field_formats._resolve(entry))
 
 
 def test_views_of_no_grid_are_refused_by_saying_what_reads_them(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""Cameras from files: what the program writes comes back, other programs' conventions, and what are no poses."""
+"""Cameras from files: what the program writes comes background, other programs' conventions, and what are no poses."""
 
 from __future__ import annotations
 

@@ -13,7 +13,7 @@ import OpenImageIO as oiio
 import pytest
 from PIL import Image
 
-from iibr_core.depth.embedded.reader import read_embedded
+from iibr_core.depth.embedded.embedded_depth import read_embedded
 from iibr_core.depth.estimates import RelativeInverseDepth
 from iibr_core.formats.images.lif import open_lif
 from iibr_core.formats.images.oiio_reader import Raster
@@ -21,7 +21,12 @@ from iibr_core.formats.images.photo import read_photo
 from iibr_core.formats.images.picture_source import PicturePart, PictureSource, part_of, read_source, source_size
 from iibr_core.formats.images.spatial_photo import write_spatial_photo
 from iibr_core.formats.light_fields import views as views_module
-from iibr_core.formats.light_fields.registry import find_light_field, is_light_field, open_light_field, writer_for
+from iibr_core.formats.light_fields.light_field_formats import (
+    find_light_field,
+    is_light_field,
+    open_light_field,
+    writer_for,
+)
 from iibr_core.formats.light_fields.views import read_views
 from iibr_core.formats.quilts import Quilt, lay_out, quilt_named
 from iibr_core.types import GridShape, ImageSize, InputError, ViewUpdate

@@ -19,7 +19,7 @@ from iibr_core.types import ImageSize, InputError
 from tests.iibr_core.rendering.test_free_view import about, camera, square_scene
 
 
-def test_depths_that_are_known_are_those_of_the_relief():
+def test_depths_that_are_known_are_those_of_the_range():
     given = np.tile(np.linspace(5.0, 9.0, 50, dtype=np.float32), (40, 1))
     inverse_depth = inverse_depth_of(given, (2.0, 10.0))
     assert (inverse_depth.min(), inverse_depth.max()) == (pytest.approx(0.1), pytest.approx(0.5))

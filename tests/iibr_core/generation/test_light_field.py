@@ -51,8 +51,8 @@ def test_a_constant_disparity_shifts_the_photo(row, column):
 
 def test_a_square_before_a_wall_against_the_true_view():
     """The true view is known: both textures are smooth functions of position."""
-    height, width, front = 60, 80, 2.0
-    photo, disparity = square_before_wall(height, width, front)
+    height, width, foreground = 60, 80, 2.0
+    photo, disparity = square_before_wall(height, width, foreground)
     view = views_of(photo, disparity, 5)[2, 4]
     truth = photo.pixels.copy()
     square = np.s_[height // 3 : 2 * height // 3, width // 3 - 4 : 2 * width // 3 - 4]
@@ -63,7 +63,7 @@ def test_a_square_before_a_wall_against_the_true_view():
     assert view.inpainted[uncovered].all()
     assert view.inpainted.sum() == view.inpainted[uncovered].size
     assert psnr(view.colors, truth * 255) > 34
-    assert view.disparity[square] == pytest.approx(front)
+    assert view.disparity[square] == pytest.approx(foreground)
     assert view.disparity[uncovered] == pytest.approx(0, abs=0.01)
 
 

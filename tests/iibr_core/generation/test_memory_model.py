@@ -121,7 +121,7 @@ def test_plans_stay_within_their_budget(monkeypatch):
 
 def test_holes_count():
     """What fills them looks around in sixteen directions: 128 bytes a pixel of them."""
-    photo, disparity = square_before_wall(120, 160, front=6.0)
+    photo, disparity = square_before_wall(120, 160, foreground=6.0)
     grid = GridShape(9, 9)
     statistics = plan.measure_parallax(disparity.values, 4.0)
     assert 0.05 < statistics.hole_share <= 1

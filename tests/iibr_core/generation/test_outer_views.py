@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from iibr_core.generation.outer_views import (
-    AROUND_PX,
+    LOOKUP_MARGIN_PX,
     MOST_MARGIN,
     farthest_views,
-    margins_beyond_frame,
     outer_views,
     outer_views_of_grid,
+    outpainting_margins,
 )
 from iibr_core.types import GridShape, ViewOffset
 
@@ -36,23 +36,23 @@ def test_the_photo_s_own_view_is_none_and_none_comes_twice():
 @pytest.mark.parametrize("disparity", [1.5, -1.5])
 def test_margins_are_what_views_see_beyond_the_frame(disparity):
     """The view at (t, s) shows at y what the photo would show at y + d t."""
-    margins = margins_beyond_frame(np.full((80, 90), disparity, np.float32), [UPPER_LEFT, LOWER_RIGHT])
+    margins = outpainting_margins(np.full((80, 90), disparity, np.float32), [UPPER_LEFT, LOWER_RIGHT])
     far = {"top": 3.0, "bottom": 1.5, "left": 1.5, "right": 4.5}
     if disparity < 0:
         far = {"top": 1.5, "bottom": 3.0, "left": 4.5, "right": 1.5}
-    assert margins._asdict() == {side: int(np.ceil(reach)) + AROUND_PX for side, reach in far.items()}
+    assert margins._asdict() == {side: int(np.ceil(reach)) + LOOKUP_MARGIN_PX for side, reach in far.items()}
 
 
 def test_each_side_s_own_disparity_counts_and_nothing_where_no_view_looks_out():
     disparity = np.zeros((40, 400), np.float32)
     disparity[:, -1] = 2.0
-    assert margins_beyond_frame(disparity, [UPPER_LEFT, LOWER_RIGHT]) == (0, 0, 0, 6 + AROUND_PX)
-    assert margins_beyond_frame(disparity, [ViewOffset(0.0, -3.0)]) == (0, 0, 0, 0)
+    assert outpainting_margins(disparity, [UPPER_LEFT, LOWER_RIGHT]) == (0, 0, 0, 6 + LOOKUP_MARGIN_PX)
+    assert outpainting_margins(disparity, [ViewOffset(0.0, -3.0)]) == (0, 0, 0, 0)
 
 
 def test_margins_are_bounded_and_wild_pixels_do_not_count():
-    wide = margins_beyond_frame(np.full((80, 120), 50.0, np.float32), [UPPER_LEFT, LOWER_RIGHT])
+    wide = outpainting_margins(np.full((80, 120), 50.0, np.float32), [UPPER_LEFT, LOWER_RIGHT])
     assert wide == (MOST_MARGIN * 80, MOST_MARGIN * 80, MOST_MARGIN * 120, MOST_MARGIN * 120)
     disparity = np.zeros((400, 400), np.float32)
     disparity[0, :3] = 9.0
-    assert margins_beyond_frame(disparity, [UPPER_LEFT, LOWER_RIGHT]).top == 0
+    assert outpainting_margins(disparity, [UPPER_LEFT, LOWER_RIGHT]).top == 0

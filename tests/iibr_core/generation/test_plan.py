@@ -78,14 +78,14 @@ def test_a_flat_scene_needs_next_to_nothing():
 
 
 def test_needs_follow_views_pixels_and_depth_edges():
-    def seconds(size, side, front=2.0):
-        photo, disparity = square_before_wall(*size, front=front)
+    def seconds(size, side, foreground=2.0):
+        photo, disparity = square_before_wall(*size, foreground=foreground)
         return plan_literal(photo, disparity, GridShape(side, side)).costs
 
     small, wider = seconds((120, 160), 5), seconds((240, 320), 5)
     assert 3 < wider.fast.seconds / small.fast.seconds < 4.2
     assert seconds((120, 160), 9).fast.seconds / small.fast.seconds == pytest.approx(80 / 24, rel=0.2)
-    even = seconds((120, 160), 5, front=0.0)
+    even = seconds((120, 160), 5, foreground=0.0)
     assert even.balanced.seconds == pytest.approx(even.fast.seconds)
     assert small.balanced.seconds > 1.2 * small.fast.seconds
 
@@ -217,7 +217,7 @@ def test_the_quality_asked_for_wins(wanted):
 
 def test_generation_follows_the_plan():
     """Where the plan says fast, no weights are read: views are those of the closed form."""
-    photo, disparity = square_before_wall(60, 80, front=3.0)
+    photo, disparity = square_before_wall(60, 80, foreground=3.0)
     disparity = disparity_of(np.mean([np.roll(disparity.values, k, axis=1) for k in range(-2, 3)], axis=0))
     plan = plan_literal(photo, disparity, GridShape(1, 3))
     made = {
@@ -236,7 +236,7 @@ def test_no_time_is_told_before_anything_was_measured():
 
 @pytest.mark.parametrize(("step_px", "meets"), [(1.4, False), (1.6, True)])
 def test_surfaces_meet_from_a_step_of_one_and_a_half_pixels_on(step_px, meets):
-    _, disparity = square_before_wall(front=step_px, back=0.0)
+    _, disparity = square_before_wall(foreground=step_px, background=0.0)
     statistics = measure_parallax(disparity.values, 1.0)
     assert (statistics.edge_share > 0) == meets
     assert (statistics.ambiguous_share(1.0) > 0) == meets

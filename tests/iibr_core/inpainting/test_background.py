@@ -2,18 +2,18 @@ import numpy as np
 import pytest
 
 from iibr_core.inpainting.background import (
-    AGREE_PX,
     ALONG_LINES,
     HIDDEN_PX,
+    MODE_PX,
     SMOOTH_STEPS_PX,
     SURFACE_PX,
     fill_background,
     goes_on_in_front,
 )
+from iibr_core.inpainting.border_lines import ANGLE_POWER, LINE_NOISE, LINE_REACH_PX, MIXED_PX, STRENGTH_POWER
 from iibr_core.inpainting.nearest_known import DIRECTIONS
-from iibr_core.inpainting.rim_lines import ANGLE_POWER, MIXED_PX, NOISE, REACH_PX, STRENGTH_POWER
 from iibr_core.types import ViewOffset
-from tests.iibr_core.inpainting.test_exemplars import copy_slowly
+from tests.iibr_core.inpainting.test_patch_synthesis import copy_slowly
 
 
 def own_surface(disparity, hole, pixel, one_surface):
@@ -24,13 +24,13 @@ def line_slowly(colors, own, pixel):
     """(cos 2a, sin 2a) of the way a line runs at a pixel, of length 1 if nothing else does."""
     tensor = np.zeros((2, 2))
     for v, u in np.ndindex(own.shape[0] - 1, own.shape[1] - 1):
-        if max(abs(v - pixel[0]), abs(u - pixel[1])) <= REACH_PX and own[v : v + 2, u : u + 2].all():
+        if max(abs(v - pixel[0]), abs(u - pixel[1])) <= LINE_REACH_PX and own[v : v + 2, u : u + 2].all():
             square = colors[v : v + 2, u : u + 2].astype(float)
             steps = np.stack([np.diff(square, axis=1).mean((0, 1)), np.diff(square, axis=0).mean((0, 1))])
             tensor += steps @ steps.T
     (least, most), axes = np.linalg.eigh(tensor)
     angle = np.arctan2(axes[1, 0], axes[0, 0])
-    strength = (most - least) / (least + most + 3 * (2 * REACH_PX + 1) ** 2 * NOISE**2)
+    strength = (most - least) / (least + most + 3 * (2 * LINE_REACH_PX + 1) ** 2 * LINE_NOISE**2)
     return strength * np.array([np.cos(2 * angle), np.sin(2 * angle)])
 
 
@@ -49,7 +49,7 @@ def along_line(line, way):
 def agree_slowly(disparity, hole):
     agreed = disparity.copy()
     for y, x in np.argwhere(hole):
-        block = np.s_[max(y - AGREE_PX, 0) : y + AGREE_PX + 1, max(x - AGREE_PX, 0) : x + AGREE_PX + 1]
+        block = np.s_[max(y - MODE_PX, 0) : y + MODE_PX + 1, max(x - MODE_PX, 0) : x + MODE_PX + 1]
         around = np.sort(disparity[block][hole[block]])
         agreed[y, x] = around[(len(around) - 1) // 2]
     return agreed

@@ -10,7 +10,7 @@ import pytest
 from iibr_core.inpainting import diffusion
 from iibr_core.inpainting.background import fill_background
 from iibr_core.inpainting.diffusion import LARGE_PX, align_in_gaps, large_gaps
-from iibr_core.inpainting.protocol import InpaintingAids
+from iibr_core.inpainting.inpainter import InpaintingAids
 from iibr_core.inpainting.registry import load_inpainter
 from iibr_core.runtime.tiling import Cancelled
 from iibr_core.types import InputError, ViewOffset

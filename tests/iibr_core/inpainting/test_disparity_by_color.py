@@ -21,15 +21,15 @@ def cable_before_wall():
 
 def slow_vote(photo, values, y, x):
     """The mean of who voted for the mode of a histogram, votes by nearness and likeness."""
-    reach = disparity_by_color.REACH_PX
+    reach = disparity_by_color.VOTE_REACH_PX
     near = [(v, u) for v, u in np.argwhere(~np.isnan(values)) if max(abs(v - y), abs(u - x)) <= reach]
     d = np.array([values[p] for p in near], np.float64)
     apart = np.array([np.sum((photo[p] - photo[y, x]) ** 2) for p in near])
     away = np.array([(v - y) ** 2 + (u - x) ** 2 for v, u in near])
-    likeness = np.exp(-apart / (2 * disparity_by_color.ALIKE**2)) + disparity_by_color.UNLIKE_WEIGHT
+    likeness = np.exp(-apart / (2 * disparity_by_color.COLOR_SIGMA**2)) + disparity_by_color.UNLIKE_WEIGHT
     votes = likeness * np.exp(-away / (2 * disparity_by_color.SPREAD_PX**2))
-    bins = ((d - d.min()) * (disparity_by_color.BINS - 1) / np.ptp(d)).astype(int)
-    total = np.bincount(bins, votes, disparity_by_color.BINS)
+    bins = ((d - d.min()) * (disparity_by_color.VOTE_BINS - 1) / np.ptp(d)).astype(int)
+    total = np.bincount(bins, votes, disparity_by_color.VOTE_BINS)
     elected = np.argmax(np.convolve(total, [disparity_by_color.SIDE_BINS, 1, disparity_by_color.SIDE_BINS], "same"))
     return np.average(d, weights=votes * (abs(bins - elected) <= 1))
 
@@ -71,7 +71,7 @@ def test_without_colours_that_tell_the_nearest_decide():
 
 
 def test_what_is_far_from_all_that_is_known_comes_from_the_background(monkeypatch):
-    monkeypatch.setattr(disparity_by_color, "MOST_ROUNDS", 2)
+    monkeypatch.setattr(disparity_by_color, "MOST_VOTE_ROUNDS", 2)
     values = np.full((9, 40), np.nan, np.float32)
     values[:, 0], values[:, -1] = 3.0, 1.0
     filled = fill_disparity_by_color(np.full((9, 40, 3), 0.5, np.float32), values)

@@ -11,8 +11,8 @@ from iibr_core.generation.outer_views import outer_views
 from iibr_core.generation.update_loop import complete_ray_set
 from iibr_core.rendering.candidates import find_candidates
 from iibr_core.rendering.hypotheses import blend_hypotheses, find_ambiguous_rays
-from iibr_core.rendering.laid_hypotheses import LEAST_WEIGHT
-from iibr_core.rendering.occlusion import WHOLE, covered_share
+from iibr_core.rendering.laid_hypotheses import FAINT_WEIGHT
+from iibr_core.rendering.occlusion import WHOLLY_COVERED, covered_share
 from iibr_core.rendering.photo_rays import rays_of_photo
 from iibr_core.rendering.resampling import resample_colors
 from iibr_core.rendering.visibility_weights import visibility_weights
@@ -64,14 +64,14 @@ def squared_errors(seed, spoil):
         shown = resample_colors(rays, candidates, weights)
         ambiguous = find_ambiguous_rays(rays, candidates, weights, shown, (0, SIZE.height))
         # Where less is covered, T is not asked: what was filled behind shows there, too.
-        asked = covered_share(weights)[tuple(ambiguous.pixel.T)] >= WHOLE
+        asked = covered_share(weights)[tuple(ambiguous.pixel.T)] >= WHOLLY_COVERED
         ambiguous = replace(ambiguous, **{name: getattr(ambiguous, name)[asked] for name in ARRAYS})
         y, x = ambiguous.pixel.T
         truth = cast(scene, x, y, offset)[0]
         chosen = blend_hypotheses(rays, ambiguous, transformer(ambiguous))[0]
-        heavy = weights > LEAST_WEIGHT
+        heavy = weights > FAINT_WEIGHT
         inpainted = (heavy & (candidates.source >= rays.photo_images)).any(axis=0)[y, x]
-        covered = weights.sum(axis=0)[y, x] >= 1 - LEAST_WEIGHT
+        covered = weights.sum(axis=0)[y, x] >= 1 - FAINT_WEIGHT
         kind = np.select(
             [~covered, inpainted, heavy.sum(axis=0)[y, x] > 1],
             ["covered in part", "beside what is inpainted", "between surfaces"],

@@ -12,11 +12,11 @@ from iibr_core.rendering.ambiguous_rays import HYPOTHESES
 from iibr_core.rendering.candidates import find_candidates
 from iibr_core.rendering.disparity_statistics import SOFT_AROUND_PX
 from iibr_core.rendering.hypotheses import (
+    BLEND_WEIGHT,
     FEATURES,
     INPAINTED,
     LEAST_VOTE,
     PROFILE_PX,
-    SAY,
     SHARE,
     SOFTNESS,
     UNCOVERED,
@@ -26,7 +26,7 @@ from iibr_core.rendering.hypotheses import (
     find_ambiguous_rays,
     hypothesis_colors,
 )
-from iibr_core.rendering.laid_hypotheses import LEAST_WEIGHT, PLAIN, VISIBLE
+from iibr_core.rendering.laid_hypotheses import FAINT_WEIGHT, PLAIN_SOURCE, VISIBLE
 from iibr_core.rendering.photo_rays import rays_of_photo
 from iibr_core.rendering.ray_set import RaySet
 from iibr_core.rendering.resampling import resample_colors
@@ -83,9 +83,9 @@ def test_rays_that_the_closed_form_leaves_open_are_ambiguous_and_no_others():
     candidates = find_candidates(rays, OFFSET, (0, photo.size.height))
     weights = visibility_weights(candidates)
     ambiguous, _, _ = ambiguous_of(photo, disparity.values)
-    heavy = weights > LEAST_WEIGHT
+    heavy = weights > FAINT_WEIGHT
     fringed = (heavy & (candidates.source == 1)).any(axis=0)
-    is_open = (weights.sum(axis=0) < 1 - LEAST_WEIGHT) | ((heavy.sum(axis=0) > 1) & ~fringed)
+    is_open = (weights.sum(axis=0) < 1 - FAINT_WEIGHT) | ((heavy.sum(axis=0) > 1) & ~fringed)
     asked = np.zeros_like(is_open)
     asked[tuple(ambiguous.pixel.T)] = True
     assert not (asked & ~is_open).any()
@@ -112,8 +112,8 @@ def test_only_near_soft_edges_covered_rays_are_ambiguous():
     values[:, :35] = blur(values, 2)[:, :35]
     ambiguous, weights, rays = ambiguous_of(motley(photo.size), values, offset=ViewOffset(1.0, 0.0))
     assert 0 < rays.statistics.soft.mean() < 0.6
-    heavy = (weights > LEAST_WEIGHT).sum(axis=0)
-    certain = ((weights.sum(axis=0) >= 1 - LEAST_WEIGHT) & (heavy == 1))[tuple(ambiguous.pixel.T)]
+    heavy = (weights > FAINT_WEIGHT).sum(axis=0)
+    certain = ((weights.sum(axis=0) >= 1 - FAINT_WEIGHT) & (heavy == 1))[tuple(ambiguous.pixel.T)]
     assert certain.sum() > 30
     assert ambiguous.pixel[certain, 1].max() < 35 + SOFT_AROUND_PX
 
@@ -219,7 +219,9 @@ def test_t_has_only_some_say_where_surfaces_of_the_photo_share_a_covered_ray():
     bounded = bound_weights(ambiguous, chosen)
     assert (bounded[1:4] == chosen[1:4]).all()
     for n in (0, 4, 5):
-        assert bounded[n] == pytest.approx([0.75 * (1 - SAY), 0.25 * (1 - SAY), SAY, 0, 0, 0])
+        assert bounded[n] == pytest.approx(
+            [0.75 * (1 - BLEND_WEIGHT), 0.25 * (1 - BLEND_WEIGHT), BLEND_WEIGHT, 0, 0, 0]
+        )
 
 
 def test_untrained_it_is_the_closed_form():
@@ -279,7 +281,7 @@ def test_decisions_blend_in_linear_light_and_follow_the_heaviest():
     assert colors == pytest.approx(srgb_from_linear(linear), abs=1e-4)
     at = np.arange(len(weights)), weights.argmax(axis=1)
     assert (disparities == ambiguous.disparity[at]).all()
-    assert (source == ambiguous.source[at] % PLAIN).all()
+    assert (source == ambiguous.source[at] % PLAIN_SOURCE).all()
 
 
 def test_a_transformer_that_repeats_the_closed_form_changes_nothing():

@@ -93,18 +93,18 @@ def test_a_narrow_gap_shows_the_farther_of_both_surfaces_and_nothing_behind_them
 
 
 def test_two_surfaces_make_two_candidates_however_many_rays_land():
-    front, back = np.full((6, 10), 2.0), np.full((6, 10), 0.25)
-    found = find_candidates(ray_set(back, front), ViewOffset(0.0, 1.0), (0, 6))
+    foreground, background = np.full((6, 10), 2.0), np.full((6, 10), 0.25)
+    found = find_candidates(ray_set(background, foreground), ViewOffset(0.0, 1.0), (0, 6))
     assert (found.number[:, :7] == 2).all()
     assert {*found.source[:2, 3, 3]} == {0, 1}
 
 
 def test_behind_what_the_photo_shows_and_covers_nothing_else_lands():
-    front, back = np.full((6, 10), 2.0), np.full((6, 10), 0.25)
-    found = find_candidates(ray_set(front, back), ViewOffset(0.0, 1.0), (0, 6))
+    foreground, background = np.full((6, 10), 2.0), np.full((6, 10), 0.25)
+    found = find_candidates(ray_set(foreground, background), ViewOffset(0.0, 1.0), (0, 6))
     assert (found.source[0, :, :7] == 0).all()
     assert (found.number[:, :7] == 1).all()
-    assert (found.source[0, :, 8] == 1).all(), "the front has moved away"
+    assert (found.source[0, :, 8] == 1).all(), "the foreground has moved away"
 
 
 def test_surfaces_closer_than_the_tolerance_are_one():

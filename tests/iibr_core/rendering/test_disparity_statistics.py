@@ -2,12 +2,12 @@ import numpy as np
 import pytest
 
 from iibr_core.rendering.disparity_statistics import (
-    AROUND_PX,
     EDGE_WINDOW_PX,
     MOST_SHOULDER,
-    SHARP_SHARE,
+    SHARP_STEP_SHARE,
     SOFT_AROUND_PX,
     SOFT_EDGES_PX,
+    STATISTICS_PX,
     find_soft_edges,
     measure_disparity,
 )
@@ -20,10 +20,16 @@ def slow_surroundings(disparity: np.ndarray) -> tuple[np.ndarray, np.ndarray, np
     low, high, step = (np.zeros_like(disparity) for _ in range(3))
     for y in range(height):
         for x in range(width):
-            near = disparity[max(y - AROUND_PX, 0) : y + AROUND_PX + 1, max(x - AROUND_PX, 0) : x + AROUND_PX + 1]
+            near = disparity[
+                max(y - STATISTICS_PX, 0) : y + STATISTICS_PX + 1,
+                max(x - STATISTICS_PX, 0) : x + STATISTICS_PX + 1,
+            ]
             if np.isfinite(near).any():
                 low[y, x], high[y, x] = np.nanmin(near), np.nanmax(near)
-            wide = disparity[max(y - AROUND_PX, 0) : y + AROUND_PX + 1, max(x - AROUND_PX, 0) : x + AROUND_PX + 1]
+            wide = disparity[
+                max(y - STATISTICS_PX, 0) : y + STATISTICS_PX + 1,
+                max(x - STATISTICS_PX, 0) : x + STATISTICS_PX + 1,
+            ]
             steps = [np.abs(np.diff(wide, axis=axis)).ravel() for axis in (0, 1)]
             step[y, x] = max((s for s in np.concatenate(steps) if np.isfinite(s)), default=0)
     return low, high, step
@@ -59,7 +65,7 @@ def slow_soft(line: np.ndarray, least_edge: float) -> np.ndarray:
         for x in range(width // 2, len(line) - width - width // 2):
             change = abs(line[x + width] - line[x])
             shoulders = line[max(x - width, 0) : x + 1], line[x + width : x + 2 * width + 1]
-            is_slope = np.nanmax(np.append(np.abs(np.diff(line[x : x + width + 1])), 0)) < SHARP_SHARE * change
+            is_slope = np.nanmax(np.append(np.abs(np.diff(line[x : x + width + 1])), 0)) < SHARP_STEP_SHARE * change
             if (
                 change >= least_edge
                 and is_slope
@@ -76,7 +82,7 @@ def slow_softness(disparity: np.ndarray, least_edge: float) -> float:
         for x in range(len(values) - EDGE_WINDOW_PX):
             steps = np.abs(np.diff(values[x : x + EDGE_WINDOW_PX + 1]))
             change = abs(values[x + EDGE_WINDOW_PX] - values[x])
-            is_surface = np.isfinite(steps).all() and steps.max() < SHARP_SHARE * steps.sum()
+            is_surface = np.isfinite(steps).all() and steps.max() < SHARP_STEP_SHARE * steps.sum()
             if change >= least_edge and not (is_surface and not soft[x + EDGE_WINDOW_PX // 2]):
                 total.append(change)
                 left.append(np.fmax(change - steps.max(), 0))

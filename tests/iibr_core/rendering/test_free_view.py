@@ -43,7 +43,7 @@ def view_of(pixels, inverse_depth, target, photo=None):
 
 def square_scene(height=40, width=48):
     """Colours and 1 / depth: a square at 1 before a wall at 3."""
-    photo, disparity = square_before_wall(height, width, front=1.0, back=1 / 3)
+    photo, disparity = square_before_wall(height, width, foreground=1.0, background=1 / 3)
     return photo.pixels, disparity.values
 
 
@@ -120,7 +120,7 @@ def test_the_photos_own_camera_gives_the_photo():
 
 
 def test_a_camera_beside_sees_the_fields_view():
-    photo, disparity = square_before_wall(60, 80, front=2.0, back=1.0)
+    photo, disparity = square_before_wall(60, 80, foreground=2.0, background=1.0)
     offset = ViewOffset(-1.5, 2.25)
     rays = rays_of_photo(photo.pixels, disparity.values, 4.0, 0)
     with ViewSynthesis() as synthesis:
@@ -260,7 +260,7 @@ def test_it_can_be_cancelled():
 
 @pytest.mark.parametrize(("shown", "is_hidden"), [(1, False), (2, True), (0, True)])
 def test_what_is_made_up_must_lie_clearly_before_what_the_photo_shows(shown, is_hidden):
-    """Images 0 of the photo and 1 of what is made up have the sources 1 and 2; 0 is none."""
+    """Images 0 of the photo and 1 of inpainted rays have the sources 1 and 2; 0 is none."""
     corners = np.array([[[-1.0, -1.0, 1.2], [2.0, -1.0, 1.2], [2.0, 2.0, 1.2], [-1.0, 2.0, 1.2]]])
     nearest, source = np.full((SAMPLES, SAMPLES), 1.0, np.float32), np.full((SAMPLES, SAMPLES), shown, np.uint8)
     for ahead in (0.5, 0.1):

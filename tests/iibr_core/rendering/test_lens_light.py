@@ -8,11 +8,11 @@ from scipy import ndimage
 
 from iibr_core.generation.light_field import ray_set
 from iibr_core.rendering import large_views
-from iibr_core.rendering.large_views import AROUND_PX, LargePhoto, Part, tiles_of, views_of_tile, whole
+from iibr_core.rendering.flying_pixels import without_flying_pixels
+from iibr_core.rendering.large_views import TILE_MARGIN_PX, LargePhoto, Part, tiles_of, views_of_tile, whole
 from iibr_core.rendering.lens_light import LargeLens, LensSample, draw_large
 from iibr_core.rendering.photo_rays import rays_of_photo
 from iibr_core.rendering.resized_light import bring_to, mean_of_areas
-from iibr_core.rendering.specks import without_specks
 from iibr_core.rendering.view_synthesis import ViewSynthesis
 from iibr_core.runtime.tiling import Cancelled
 from iibr_core.types import Disparity, ImageSize, Photo, ViewOffset, image_size
@@ -21,8 +21,8 @@ from tests.iibr_core.scenes import literal_plan, smooth_texture, square_before_w
 OFFSET = ViewOffset(0.6, -1.5)
 
 
-def large(height: int = 96, width: int = 120, front: float = 3.0) -> LargePhoto:
-    photo, disparity = square_before_wall(height, width, front=front)
+def large(height: int = 96, width: int = 120, foreground: float = 3.0) -> LargePhoto:
+    photo, disparity = square_before_wall(height, width, foreground=foreground)
     return LargePhoto(photo.pixels, disparity.values)
 
 
@@ -48,15 +48,15 @@ def test_a_view_in_tiles_is_the_view_made_at_once(side: int) -> None:
         for tile in tiles_of(whole(photo.size), side):
             (view,) = views_of_tile(photo, tile, [OFFSET], synthesis)
             seen[tile.slices] = view.colors
-    colors = without_specks(rays, OFFSET, expected.colors, expected.disparity, expected.inpainted)
-    # What nobody sees is filled tile by tile; beside it specks are told by it.
+    colors = without_flying_pixels(rays, OFFSET, expected.colors, expected.disparity, expected.inpainted)
+    # Holes are filled tile by tile; flying pixels beside them depend on that.
     known = ~ndimage.binary_dilation(expected.occluded, np.ones((3, 3)))
     assert known.mean() > 0.85
     assert np.abs(seen - colors)[known].max() < 0.02
 
 
 def test_holes_show_what_the_smaller_light_field_shows() -> None:
-    photo, disparity = square_before_wall(48, 60, front=1.5)
+    photo, disparity = square_before_wall(48, 60, foreground=1.5)
     red = Photo(np.tile(np.float32([0.9, 0.1, 0.1]), (48, 60, 1)), 50.0, "red")
     plan = literal_plan(photo, disparity, 3)
     rays, outer = ray_set(photo, disparity, plan)
@@ -81,7 +81,7 @@ def test_a_pinhole_in_the_middle_gives_the_photo_back() -> None:
 
 
 def test_what_is_in_focus_is_sharp_and_all_else_is_as_in_the_smaller_picture() -> None:
-    photo = large(front=0.0)
+    photo = large(foreground=0.0)
     photo.disparity[:, 60:] = 4.0
     samples = tuple(LensSample(ViewOffset(t, s), 0.25) for t in (-1.0, 1.0) for s in (-1.0, 1.0))
     lens = LargeLens(samples=samples, share=1.0, diameter=4.0, sharp_up_to_px=(2.0, 4.0))
@@ -135,7 +135,7 @@ def test_the_mean_of_a_part_counts_the_shares_of_its_border() -> None:
 def test_progress_counts_the_pixels_that_are_read_for_a_tile() -> None:
     told: list[tuple[float, float]] = []
     with ViewSynthesis() as synthesis:
-        photo = large(20, 1100, front=3.0)
+        photo = large(20, 1100, foreground=3.0)
         draw_large(photo, LargeLens(), whole(photo.size), synthesis, report_progress=lambda *now: told.append(now[:2]))
-    first, second = 20 * (1024 + AROUND_PX + 3), 20 * (1100 - 1024 + AROUND_PX + 3)
+    first, second = 20 * (1024 + TILE_MARGIN_PX + 3), 20 * (1100 - 1024 + TILE_MARGIN_PX + 3)
     assert told == [(first, first + second), (first + second, first + second)]

@@ -5,14 +5,14 @@ from iibr_core.color import linear_from_srgb, srgb_from_linear
 from iibr_core.rendering import mixed_pixels
 from iibr_core.rendering.mixed_pixels import split_mixed_pixels
 
-FRONT, BACK = np.float32([0.9, 0.6, 0.3]), np.float32([0.1, 0.2, 0.5])
+FOREGROUND, BACK = np.float32([0.9, 0.6, 0.3]), np.float32([0.1, 0.2, 0.5])
 
 
 def edge_photo(share):
     """Background left, foreground right, and one mixed column labelled as background at x = 5."""
     colors = np.tile(BACK, (9, 12, 1))
-    colors[:, 6:] = FRONT
-    colors[:, 5] = srgb_from_linear(share * linear_from_srgb(FRONT) + (1 - share) * linear_from_srgb(BACK))
+    colors[:, 6:] = FOREGROUND
+    colors[:, 5] = srgb_from_linear(share * linear_from_srgb(FOREGROUND) + (1 - share) * linear_from_srgb(BACK))
     disparity = np.where(np.arange(12) < 6, 0.0, 2.0) * np.ones((9, 1))
     return colors, disparity.astype(np.float32)
 
@@ -22,7 +22,7 @@ def test_a_mixed_pixel_splits_into_its_surfaces(share):
     own, fringe, fringe_disparity, coverage = split_mixed_pixels(*edge_photo(share), edge_step=0.5)
     assert coverage[4, 5] == pytest.approx(share, abs=2e-3)
     assert own[4, 5] == pytest.approx(BACK, abs=6e-3)
-    assert fringe[4, 5] == pytest.approx(FRONT, abs=2e-3)
+    assert fringe[4, 5] == pytest.approx(FOREGROUND, abs=2e-3)
     assert fringe_disparity[4, 5] == 2.0
 
 
@@ -39,8 +39,8 @@ def test_shares_are_those_of_a_darker_photo_however_bright_an_hdr_one_is():
 
 def test_a_pixel_that_is_all_foreground_goes_with_it():
     _, fringe, _, coverage = split_mixed_pixels(*edge_photo(1.0), edge_step=0.5)
-    assert coverage[4, 5] == pytest.approx(1 - mixed_pixels.LEAST_SHARE)
-    assert fringe[4, 5] == pytest.approx(FRONT, abs=1e-2)
+    assert coverage[4, 5] == pytest.approx(1 - mixed_pixels.LEAST_MATTE)
+    assert fringe[4, 5] == pytest.approx(FOREGROUND, abs=1e-2)
 
 
 def test_where_colors_tell_nothing_the_outline_tells_the_share():
@@ -78,20 +78,20 @@ def obvious_split(colors, disparity, y, x):
     """Share, own and fringe colour of a pixel, None where it is not split; surfaces are 2 apart."""
     v, u = np.mgrid[: len(disparity), : disparity.shape[1]]
     beside = (abs(v - y) <= 1) & (abs(u - x) <= 1)
-    window = (abs(v - y) <= mixed_pixels.REACH_PX) & (abs(u - x) <= mixed_pixels.REACH_PX) & ((v != y) | (u != x))
+    window = (abs(v - y) <= mixed_pixels.MATTING_PX) & (abs(u - x) <= mixed_pixels.MATTING_PX) & ((v != y) | (u != x))
     in_front, behind = disparity == 2.0, disparity == 0.0
     if not (behind[y, x] and (in_front & beside).any() and (behind & window).any()):
         return None
     straight = in_front & beside & ((v == y) | (u == x))
     outline = mixed_pixels.STRAIGHT_SHARE * straight.sum()
     outline += mixed_pixels.DIAGONAL_SHARE * ((in_front & beside).sum() - straight.sum())
-    is_rim = np.array(
+    is_edge_band = np.array(
         [
             any(abs(disparity[max(j - 1, 0) : j + 2, max(i - 1, 0) : i + 2].reshape(-1) - disparity[j, i]) > 0.5)
             for j, i in np.ndindex(disparity.shape)
         ]
     ).reshape(disparity.shape)
-    weight = np.exp(-((v - y) ** 2 + (u - x) ** 2) / 12.5) * np.where(is_rim, mixed_pixels.RIM_TRUST, 1.0)
+    weight = np.exp(-((v - y) ** 2 + (u - x) ** 2) / 12.5) * np.where(is_edge_band, mixed_pixels.EDGE_BAND_TRUST, 1.0)
     light = linear_from_srgb(colors).astype(np.float64)
     means, spreads = [], []
     for surface in (behind, in_front):
@@ -99,24 +99,26 @@ def obvious_split(colors, disparity, y, x):
         means.append((part[..., None] * light).sum((0, 1)))
         off = light - means[-1]
         spread = np.einsum("yx,yxc,yxe->ce", part, off, off)
-        spreads.append(spread + (mixed_pixels.NOISE + mixed_pixels.ROUNDING * np.trace(spread)) * np.eye(3))
+        spreads.append(
+            spread + (mixed_pixels.COLOR_VARIANCE + mixed_pixels.MATTING_ROUNDING * np.trace(spread)) * np.eye(3)
+        )
     share, contrast = outline, means[1] - means[0]
-    for _ in range(mixed_pixels.ROUNDS):
+    for _ in range(mixed_pixels.MATTING_ROUNDS):
         precision = np.linalg.inv((1 - share) ** 2 * spreads[0] + share**2 * spreads[1])
         fits = 1 / mixed_pixels.SHARE_DEVIATION**2 + contrast @ precision @ contrast
         expected = outline / mixed_pixels.SHARE_DEVIATION**2 + contrast @ precision @ (light[y, x] - means[0])
-        share = np.clip(expected / fits, 0, 1 - mixed_pixels.LEAST_SHARE)
-    if share < mixed_pixels.LEAST_SHARE:
+        share = np.clip(expected / fits, 0, 1 - mixed_pixels.LEAST_MATTE)
+    if share < mixed_pixels.LEAST_MATTE:
         return None
     precision = np.linalg.inv((1 - share) ** 2 * spreads[0] + share**2 * spreads[1])
     off = precision @ (light[y, x] - means[0] - share * contrast)
-    back = means[0] + (1 - share) * spreads[0] @ off
-    front = means[1] + share * spreads[1] @ off
+    background = means[0] + (1 - share) * spreads[0] @ off
+    foreground = means[1] + share * spreads[1] @ off
     around = light[behind & window | (v == y) & (u == x)]
-    back, front = np.where(front < 0, light[y, x] / (1 - share), back), np.maximum(front, 0)
-    bounded = np.clip(back, around.min(axis=0), around.max(axis=0))
-    front = np.where(bounded == back, front, (light[y, x] - (1 - share) * bounded) / share)
-    return share, srgb_from_linear(bounded), srgb_from_linear(front)
+    background, foreground = np.where(foreground < 0, light[y, x] / (1 - share), background), np.maximum(foreground, 0)
+    bounded = np.clip(background, around.min(axis=0), around.max(axis=0))
+    foreground = np.where(bounded == background, foreground, (light[y, x] - (1 - share) * bounded) / share)
+    return share, srgb_from_linear(bounded), srgb_from_linear(foreground)
 
 
 def test_both_parts_together_are_the_pixel_again():
@@ -151,7 +153,7 @@ def test_what_is_not_mixed_stays():
 
 @pytest.mark.parametrize(("fall", "is_split"), [(0.0, True), (0.4, True), (1.4, False)])
 def test_on_a_slope_nothing_is_split(fall, is_split):
-    """What falls away behind a pixel by much less than the step in front of it is a halo of the back."""
+    """What falls away behind a pixel by much less than the step in front of it is a halo of the background."""
     colors, disparity = edge_photo(0.5)
     disparity[:, :5] -= fall
     assert (split_mixed_pixels(colors, disparity, edge_step=0.5)[3][4, 5] > 0) == is_split
@@ -162,8 +164,8 @@ def test_an_edge_that_resampling_has_made_a_ramp_is_not_split():
     colors, disparity = edge_photo(0.5)
     disparity[:, 4:8] = 0.0, 0.5, 1.5, 2.0
     assert split_mixed_pixels(colors, disparity, edge_step=0.3)[3][4, 5] == 0
-    assert mixed_pixels._front_beside(disparity, 4, 5, 0.3) == (0.5, 0.0)
-    assert mixed_pixels._front_beside(disparity, 4, 4, 0.3)[0] == 0.5, "before a ramp it is flat"
+    assert mixed_pixels._foreground_beside(disparity, 4, 5, 0.3) == (0.5, 0.0)
+    assert mixed_pixels._foreground_beside(disparity, 4, 4, 0.3)[0] == 0.5, "before a ramp it is flat"
 
 
 @pytest.mark.parametrize("size", [(1, 1), (1, 7), (2, 2), (4, 4)])

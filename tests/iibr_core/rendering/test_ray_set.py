@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from iibr_core.rendering.ray_cells import CELL_PX
-from iibr_core.rendering.ray_set import DOUBTED_PX, HIGHEST_LEVEL, IN_FRONT_PX, SMOOTH_SHARE, RaySet
+from iibr_core.rendering.ray_set import GUARD_BAND_PX, HIGHEST_LEVEL, IN_FRONT_PX, SMOOTH_SHARE, RaySet
 from iibr_core.types import ImageSize, Margins, ViewOffset
 
 SURFACE_STEP = 0.6
@@ -82,7 +82,9 @@ def test_what_was_made_up_in_front_of_what_the_photo_shows_is_left_out_and_what_
         v, u = round(y + d * offset.t), round(x + d * offset.s)
         is_shown = v in range(margins.top, 20 - margins.bottom) and u in range(margins.left, 24 - margins.right)
         if is_shown and d > photo[v, u] + IN_FRONT_PX / 2.0:
-            expected[max(y - DOUBTED_PX, 0) : y + DOUBTED_PX + 1, max(x - DOUBTED_PX, 0) : x + DOUBTED_PX + 1] = 0
+            expected[
+                max(y - GUARD_BAND_PX, 0) : y + GUARD_BAND_PX + 1, max(x - GUARD_BAND_PX, 0) : x + GUARD_BAND_PX + 1
+            ] = 0
     np.testing.assert_array_equal(rays.arrays.coverage, [np.ones(size), coverage, expected])
     np.testing.assert_array_equal(
         rays.cells.high[2], slow_cells(np.where(expected > 0, made_up, np.float32(-np.inf)), np.max)

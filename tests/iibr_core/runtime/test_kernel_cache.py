@@ -302,6 +302,6 @@ LEVEL_3 = ",".join(f"+{name}" for name in sorted(PROCESSOR_FEATURES))
     ids=["newer", "older", "arm", "unknown", "named", "features named"],
 )
 def test_kernels_are_compiled_for_one_kind_of_processor_where_this_one_is_of_that_kind(fake, name):
-    kernel_cache._settle_processor(fake)
+    kernel_cache._choose_processor(fake)
     config = fake.core.config
     assert (config.CPU_NAME, config.CPU_FEATURES == "") == (name, name == PROCESSOR)

@@ -27,14 +27,14 @@ def disparity_of(values: np.ndarray) -> Disparity:
 
 
 def square_before_wall(
-    height: int = 60, width: int = 80, front: float = 2.0, back: float = 0.0
+    height: int = 60, width: int = 80, foreground: float = 2.0, background: float = 0.0
 ) -> tuple[Photo, Disparity]:
     """A reddish square in front of a bluish, smoothly textured wall; no mixed pixels."""
     pixels = smooth_texture(height, width) * np.float32([0.3, 0.5, 1.0])
-    disparity = np.full((height, width), back, np.float32)
+    disparity = np.full((height, width), background, np.float32)
     square = np.s_[height // 3 : 2 * height // 3, width // 3 : 2 * width // 3]
     pixels[square] = (smooth_texture(height, width, 1) * np.float32([1.0, 0.4, 0.2]))[square]
-    disparity[square] = front
+    disparity[square] = foreground
     return photo_of(pixels), disparity_of(disparity)
 
 

@@ -23,7 +23,7 @@ from iibr_core.types import GridShape, InputError
 from viewer.model.actions import OpenPath, ProgressMade, SceneOpened
 from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState
-from viewer.model.state.optics import SetAperture, SetFocus
+from viewer.model.state.optics_actions import SetAperture, SetFocus
 
 WALL_PX, SQUARE_PX = -0.5, 1.25
 

@@ -34,8 +34,8 @@ def primitive(shape, centre, half, axes=None, color=(0.5, 0.5, 0.5)):
     return p
 
 
-def scene_of(*primitives, back=(0.1, 0.1, 0.1)):
-    last = primitive(PLANE, (0, 0, GREATEST_Z), (ENDLESS, ENDLESS, 0), color=back)
+def scene_of(*primitives, background=(0.1, 0.1, 0.1)):
+    last = primitive(PLANE, (0, 0, GREATEST_Z), (ENDLESS, ENDLESS, 0), color=background)
     return RaycastScene(
         primitives=np.array([*primitives, last], PRIMITIVE),
         centre_px=(31.5, 23.5),
@@ -168,17 +168,17 @@ def test_more_samples_converge():
 
 
 def test_an_edge_mixes_in_linear_light_by_its_coverage():
-    front, back = np.float32([0.8, 0.5, 0.1]), np.float32([0.05, 0.1, 0.4])
+    foreground, background = np.float32([0.8, 0.5, 0.1]), np.float32([0.05, 0.1, 0.4])
     z = depth_at(1.0)
     width = ENDLESS
     for share in (0.2, 0.5, 0.9):
         edge = (20.5 - share - 31.5) * z / FOCAL  # covers this share of column 20, and all to its right
-        plane = primitive(PLANE, (edge + width, 0, z), (width, ENDLESS, 0), color=front)
-        colors, _ = render(scene_of(plane, back=back), SIZE, CENTRE, samples=8)
+        plane = primitive(PLANE, (edge + width, 0, z), (width, ENDLESS, 0), color=foreground)
+        colors, _ = render(scene_of(plane, background=background), SIZE, CENTRE, samples=8)
         mixed = linear_from_srgb(colors[10, 20])
-        assert mixed == pytest.approx(share * front + (1 - share) * back, abs=0.02)
-        assert linear_from_srgb(colors[10, 21]) == pytest.approx(front, abs=1e-5)
-        assert linear_from_srgb(colors[10, 19]) == pytest.approx(back, abs=1e-5)
+        assert mixed == pytest.approx(share * foreground + (1 - share) * background, abs=0.02)
+        assert linear_from_srgb(colors[10, 21]) == pytest.approx(foreground, abs=1e-5)
+        assert linear_from_srgb(colors[10, 19]) == pytest.approx(background, abs=1e-5)
 
 
 @pytest.mark.parametrize("samples", [1, 2, 3, 4])
@@ -204,7 +204,7 @@ def test_a_wire_one_pixel_wide_is_whole_in_every_view(shape, offset):
     axes = np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]]) if shape == WIRE else np.eye(3)
     half = (pixel / 2, pixel / 2, ENDLESS) if shape == WIRE else (pixel / 2, ENDLESS, 0)
     wire = primitive(shape, (1.0, 0, z), half, axes, color=(1, 1, 1))
-    colors, _ = render(scene_of(wire, back=(0, 0, 0)), SIZE, offset, samples=3)
+    colors, _ = render(scene_of(wire, background=(0, 0, 0)), SIZE, offset, samples=3)
     light_in_rows = linear_from_srgb(colors[..., 0]).sum(1)
     assert light_in_rows == pytest.approx(1.0, abs=0.12), "one pixel's worth of light in each row"
     places = (linear_from_srgb(colors[..., 0]) * np.arange(SIZE[1])).sum(1) / light_in_rows

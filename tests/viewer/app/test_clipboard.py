@@ -14,7 +14,7 @@ from iibr_core.types import GridShape, InputError
 from tests.viewer.conftest import Driver, Opener, write_scene
 from viewer.app.clipboard import MOST_KEPT, paste_picture
 from viewer.model.actions import DismissNotice, DoTask
-from viewer.model.state.optics import SetAperture
+from viewer.model.state.optics_actions import SetAperture
 from viewer.model.state.saving import CopyTask, PasteTask
 
 CLIPBOARD = ["xclip", "-selection", "clipboard"]

@@ -19,7 +19,7 @@ from viewer.model.actions import AskToSave, EndGesture, Notify, SetDepthStrength
 from viewer.model.state.depth_editing import Brush, SetBrush, SetTone
 from viewer.model.state.inspection import SetInspection, SetOverlay
 from viewer.model.state.notices import Notice
-from viewer.model.state.optics import MoveEye
+from viewer.model.state.optics_actions import MoveEye
 from viewer.model.state.preferences import SECTIONS, SetPreference, ToggleSection, with_sections
 from viewer.model.state.prompts import PalettePrompt, PathPrompt, SavePrompt
 

@@ -17,7 +17,7 @@ from iibr_core.exports.options import ExportOptions
 from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.exports.source import ExportSource
 from iibr_core.formats.images.photo import read_photo
-from iibr_core.rendering.gloss.settings import Gloss
+from iibr_core.rendering.gloss.gloss_settings import Gloss
 from iibr_core.runtime.tiling import raise_if_stopped
 from iibr_core.scenes.scene import Source
 from iibr_core.scenes.screen_size import ScreenSize
@@ -37,7 +37,7 @@ from viewer.model.actions import (
 from viewer.model.state.depth_editing import Paint, SetTone
 from viewer.model.state.exporting import ExportPrompt, ExportTask
 from viewer.model.state.jobs import WAITING_FOR_VIEWS, CancelJobTask
-from viewer.model.state.optics import MoveEye, SetAperture, SetFocus, SetOptics
+from viewer.model.state.optics_actions import MoveEye, SetAperture, SetFocus, SetOptics
 from viewer.model.state.tasks import SaveTask
 
 SMALL = ExportOptions(size=ScreenSize(96, 64), frames=4)

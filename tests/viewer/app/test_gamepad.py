@@ -13,7 +13,7 @@ from viewer.app.gamepad import ACROSS_S, LONGEST_STEP_S, Gamepad, actions_from_g
 from viewer.model.state.app_state import AppState
 from viewer.model.state.folder import StepPhoto
 from viewer.model.state.motion import ReturnHome
-from viewer.model.state.optics import MoveEye, SetAperture, SetFocus
+from viewer.model.state.optics_actions import MoveEye, SetAperture, SetFocus
 
 STATE = state_with(scene_of())
 RESTING = Gamepad()

@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from iibr_core.rendering.gloss.settings import Gloss
+from iibr_core.rendering.gloss.gloss_settings import Gloss
 from iibr_core.types import GridShape
 from tests.viewer.conftest import Driver, Opener
 from viewer.app.save_places import inputs_of_scene
 from viewer.model.actions import ShowPrompt
 from viewer.model.commands import action_for_path
-from viewer.model.state.optics import SetOptics
+from viewer.model.state.optics_actions import SetOptics
 from viewer.model.state.preferences import with_sections
 from viewer.model.state.prompts import PathPrompt
 

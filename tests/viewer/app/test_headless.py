@@ -17,7 +17,7 @@ from viewer.app.headless import HeadlessViewer
 from viewer.app.side_effects import read_truth
 from viewer.model.actions import Action
 from viewer.model.layout import layout_of
-from viewer.model.state.optics import MoveEye, ResetOptics, SetAperture, SetOptics
+from viewer.model.state.optics_actions import MoveEye, ResetOptics, SetAperture, SetOptics
 
 
 @pytest.fixture

@@ -23,7 +23,7 @@ from viewer.app.picture_saver import add_save
 from viewer.model.actions import Action, EditsSaved, Notify
 from viewer.model.saved_settings import read_settings
 from viewer.model.state.jobs import JobsChanged
-from viewer.model.state.optics import MoveEye, SetAperture, SetFocus
+from viewer.model.state.optics_actions import MoveEye, SetAperture, SetFocus
 from viewer.model.state.preferences import SetPreference
 from viewer.model.state.tasks import SaveTask
 

@@ -25,7 +25,7 @@ from viewer.model.inspection_request import sheet_cells
 from viewer.model.state.app_state import AppState
 from viewer.model.state.inspection import Compare, KeepState, SetInspection, SetOverlay
 from viewer.model.state.motion import SetLoop
-from viewer.model.state.optics import MoveEye
+from viewer.model.state.optics_actions import MoveEye
 from viewer.model.state.preferences import ToggleSection
 from viewer.model.state.tasks import ReadTruthTask
 
@@ -158,9 +158,9 @@ def test_fast_and_exact_are_scored_when_all_is_still_and_never_while_dragging(vi
     app.do(SetLoop("circle"))
     for _ in range(5):
         app.step()
-    settled = app.state.inspection.pair
+    at_rest = app.state.inspection.pair
     viewer.until(lambda app: app.state.motion.turns > 0.3)
-    assert app.state.inspection.pair == settled
+    assert app.state.inspection.pair == at_rest
 
 
 def test_a_folder_dropped_on_the_panel_is_ground_truth(viewer: Driver, photo_path: Path, tmp_path: Path) -> None:

@@ -16,7 +16,7 @@ from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState
 from viewer.model.state.folder import StepPhoto
 from viewer.model.state.inspection import Compare, SetInspection, SetOverlay
-from viewer.model.state.optics import MoveEye, ResetOptics
+from viewer.model.state.optics_actions import MoveEye, ResetOptics
 from viewer.model.state.prompts import PalettePrompt
 
 SCENE = Scene(Source("photo.png", max_pixels=7), "photo", 600, 400, GridShape(9, 9), (-2.0, 3.0), "photo.pfm")

@@ -25,7 +25,7 @@ from viewer.model.lens.focal_plane import handle_points
 from viewer.model.state.app_state import AppState, Hover, TiltHandles
 from viewer.model.state.history import History
 from viewer.model.state.motion import ReturnHome
-from viewer.model.state.optics import FocusOn, MoveEye, MoveTiltHandle, SetFocus
+from viewer.model.state.optics_actions import FocusOn, MoveEye, MoveTiltHandle, SetFocus
 from viewer.model.zoom import SetZoom, Zoom
 
 SCENE = Scene(Source("photo.png", max_pixels=7), "photo", 600, 400, GridShape(9, 9), (-2.0, 3.0), "photo.pfm")

@@ -11,10 +11,10 @@ import pytest
 from iibr_core.types import InputError
 from tests.viewer.model.test_reducers import scene_of, state_with
 from viewer.app.preferences_store import PREFERENCES_FILE, RECENT_FILE, last_opened, load_preferences, store_preferences
-from viewer.model.reducers.lens import APERTURE_OPENED
+from viewer.model.reducers.lens_reducer import APERTURE_OPENED
 from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState
-from viewer.model.state.optics import FocusOn
+from viewer.model.state.optics_actions import FocusOn
 from viewer.model.state.preferences import PlaceWindow, Preferences, SetPreference, ToggleSection
 from viewer.model.window_limits import FONT_SCALE_LIMITS
 

@@ -27,7 +27,7 @@ from viewer.app.pace import SETTLING_FRAMES
 from viewer.model.actions import AskToSave, DismissNotice, DoTask
 from viewer.model.saved_settings import read_settings
 from viewer.model.state.jobs import WAITING_FOR_VIEWS, WRITING, CancelJobTask, JobProgress
-from viewer.model.state.optics import MoveEye, SetAperture
+from viewer.model.state.optics_actions import MoveEye, SetAperture
 from viewer.model.state.prompts import Saved, SavePrompt
 from viewer.model.state.tasks import ReadMaskTask, SaveTask
 

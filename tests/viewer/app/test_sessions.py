@@ -14,7 +14,7 @@ import pytest
 
 from iibr_core.depth.editing.canvas import DepthCanvas, apply_edits
 from iibr_core.depth.editing.edits import UNEDITED, DepthEdits, Stroke
-from iibr_core.rendering.gloss.settings import Gloss
+from iibr_core.rendering.gloss.gloss_settings import Gloss
 from iibr_core.rendering.optics import Optics
 from iibr_core.scenes.scene import Source
 from iibr_core.scenes.screen_size import ScreenSize
@@ -25,7 +25,7 @@ from viewer.app.session_store import EDITS_KEPT, sidecar_of
 from viewer.model.actions import DoTask, Quit, ShowPrompt, Undo
 from viewer.model.saved_settings import settings_text
 from viewer.model.state.depth_editing import Paint, SetBrush, SetTone
-from viewer.model.state.optics import MoveEye, SetAperture, SetFocus, SetOptics
+from viewer.model.state.optics_actions import MoveEye, SetAperture, SetFocus, SetOptics
 from viewer.model.state.saving import SavedSettings, WriteSidecarTask
 
 ONE = GridShape(1, 1)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from iibr_core.formats.light_fields.registry import writer_for
+from iibr_core.formats.light_fields.light_field_formats import writer_for
 from iibr_core.formats.quilts import Quilt, lay_out
 from iibr_core.generation import dense_field
 from iibr_core.runtime.tiling import ShouldStop, raise_if_stopped
@@ -20,10 +20,10 @@ from tests.iibr_core.known_scenes import view_of_wall
 from tests.viewer.conftest import Driver
 from viewer.model.actions import DismissNotice, DoTask, OpenPath, SetDepthStrength, StopWork, Undo
 from viewer.model.commands import COMMANDS
-from viewer.model.dense_field import with_views_between
+from viewer.model.dense_grid import with_views_between
 from viewer.model.state.filling import FillTask
 from viewer.model.state.jobs import CancelJobTask
-from viewer.model.state.optics import SetAperture, SetFocus
+from viewer.model.state.optics_actions import SetAperture, SetFocus
 
 SIZE = 48, 64
 DISPARITY = 1.0

@@ -20,7 +20,7 @@ from viewer.app.pointer import units_per_view
 from viewer.app.preferences_store import PREFERENCES_FILE
 from viewer.display.scene_view import WAITING_VIEWS
 from viewer.model.actions import DismissNotice, SetDepthStrength
-from viewer.model.state.optics import MoveEye
+from viewer.model.state.optics_actions import MoveEye
 
 
 @pytest.fixture

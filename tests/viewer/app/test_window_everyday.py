@@ -22,7 +22,7 @@ from viewer.model.actions import DoTask, OpenPath, ShowPrompt, StopWork
 from viewer.model.saved_settings import read_settings
 from viewer.model.state.app_state import AppState
 from viewer.model.state.exporting import ExportPrompt
-from viewer.model.state.optics import MoveEye, SetAperture
+from viewer.model.state.optics_actions import MoveEye, SetAperture
 from viewer.model.state.prompts import PalettePrompt, SavePrompt
 from viewer.model.state.tasks import ReadMaskTask, SaveTask
 

@@ -6,7 +6,7 @@ import dataclasses
 
 import pytest
 
-from iibr_core.rendering.gloss.settings import Gloss
+from iibr_core.rendering.gloss.gloss_settings import Gloss
 from iibr_core.rendering.optics import ApertureShape, Optics
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import FAR, NEAR, Driver
@@ -14,7 +14,7 @@ from viewer.model.actions import Action, Notify, SetDepthStrength, ShowPrompt, S
 from viewer.model.lens.focal_plane import handle_points, sharp_disparity
 from viewer.model.state.app_state import TiltHandles
 from viewer.model.state.notices import Notice
-from viewer.model.state.optics import ApplyPreset, MoveEye, SetOptics
+from viewer.model.state.optics_actions import ApplyPreset, MoveEye, SetOptics
 from viewer.model.state.preferences import SetPreference
 
 

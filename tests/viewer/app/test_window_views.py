@@ -12,7 +12,7 @@ from viewer.display.inspection_view import ROUNDING
 from viewer.model.actions import DismissNotice
 from viewer.model.inspection_request import DIFFERENCE_GAIN
 from viewer.model.state.inspection import Compare, KeepState
-from viewer.model.state.optics import MoveEye, SetAperture, SetOptics
+from viewer.model.state.optics_actions import MoveEye, SetAperture, SetOptics
 from viewer.ui.overlays.reticle import pointer_text
 
 

@@ -11,7 +11,7 @@ from iibr_core.formats.images.photo import read_photo
 from iibr_core.scenes.rect import Rect
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import NEAR, Driver, Opener
-from viewer.model.state.optics import MoveEye, SetAperture
+from viewer.model.state.optics_actions import MoveEye, SetAperture
 from viewer.model.zoom import SetZoom, Zoom
 
 

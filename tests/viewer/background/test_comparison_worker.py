@@ -14,7 +14,7 @@ import pytest
 from iibr_core.evaluation.metrics import flip, psnr
 from iibr_core.formats.images.photo import write_image
 from iibr_core.formats.light_fields.hci import HciWriter
-from iibr_core.formats.light_fields.registry import open_light_field
+from iibr_core.formats.light_fields.light_field_formats import open_light_field
 from iibr_core.formats.light_fields.views import read_stored_view, read_views
 from iibr_core.generation.light_field import generate, ray_set
 from iibr_core.generation.plan import plan_for_viewing, plan_literal
@@ -35,7 +35,7 @@ from viewer.background.comparison_worker import (
     PairReady,
     PairScored,
 )
-from viewer.background.jobs import Failed
+from viewer.background.job_threads import Failed
 from viewer.model.inspection_request import InspectionRequest
 from viewer.model.state.inspection import GroundTruth
 

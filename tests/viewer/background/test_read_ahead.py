@@ -47,9 +47,9 @@ class Shelf:
         self.held = ""
         self._may_go_on.set()
 
-    def want_until_settled(self, *wanted: WantedPhoto) -> None:
+    def want_until_done(self, *wanted: WantedPhoto) -> None:
         self.ahead.want(wanted)
-        while not all(map(self.ahead.is_settled, wanted)):
+        while not all(map(self.ahead.is_done, wanted)):
             assert self._woken.acquire(timeout=DEADLINE_S), "the reader went silent"
             self.ahead.want(wanted)
 
@@ -69,23 +69,23 @@ def shelf() -> Iterator[Shelf]:
 
 
 def test_photos_are_read_in_their_order_and_once_and_forgotten_when_wanted_no_more(shelf: Shelf) -> None:
-    shelf.want_until_settled(B, A)
-    shelf.want_until_settled(A, B, C)
+    shelf.want_until_done(B, A)
+    shelf.want_until_done(A, B, C)
     assert shelf.begun == ["b", "a", "c"]
     assert [shelf.ahead.get(wanted) for wanted in (A, B, C)] == ["a 1", "b 1", "c 1"]
     shelf.ahead.want([C])
     assert [shelf.ahead.get(wanted) for wanted in (A, B, C)] == [None, None, "c 1"]
-    assert not shelf.ahead.is_settled(A)
+    assert not shelf.ahead.is_done(A)
 
 
 def test_what_was_planned_with_another_strength_is_another_photo(shelf: Shelf) -> None:
-    shelf.want_until_settled(A, photo("a", 0.5))
+    shelf.want_until_done(A, photo("a", 0.5))
     assert (shelf.ahead.get(A), shelf.ahead.get(photo("a", 0.5))) == ("a 1", "a 0.5")
 
 
-def test_what_cannot_be_read_is_settled_and_not_tried_again(shelf: Shelf) -> None:
-    shelf.want_until_settled(BAD, A)
-    shelf.want_until_settled(A, BAD)
+def test_what_cannot_be_read_is_done_and_not_tried_again(shelf: Shelf) -> None:
+    shelf.want_until_done(BAD, A)
+    shelf.want_until_done(A, BAD)
     assert shelf.ahead.get(BAD) is None
     assert shelf.begun == ["bad", "a"]
 
@@ -97,23 +97,23 @@ def test_what_is_wanted_first_does_not_wait_for_another(shelf: Shelf, wanted: tu
     shelf.ahead.want(wanted)
     assert shelf.ahead.is_reading(B)
     shelf.let_go()
-    shelf.want_until_settled(*wanted)
+    shelf.want_until_done(*wanted)
     assert shelf.begun == ["a", "b", *("a" for photo in wanted if photo is A)]
 
 
 def test_what_is_being_read_goes_on_while_the_first_is_there(shelf: Shelf) -> None:
-    shelf.want_until_settled(A)
+    shelf.want_until_done(A)
     shelf.held = "b"
     shelf.want_until_begun("b", A, B)
     shelf.ahead.want([A, C, B])
     assert shelf.ahead.is_reading(B)
     shelf.let_go()
-    shelf.want_until_settled(A, C, B)
+    shelf.want_until_done(A, C, B)
     assert shelf.begun == ["a", "b", "c"]
 
 
 def test_one_that_was_read_elsewhere_is_kept_as_long_as_it_is_wanted(shelf: Shelf) -> None:
     shelf.ahead.keep(A, "as it was")
-    shelf.want_until_settled(A, B)
+    shelf.want_until_done(A, B)
     assert shelf.ahead.get(A) == "as it was"
     assert shelf.begun == ["b"]

@@ -16,13 +16,13 @@ from iibr_core.runtime import compiling
 from iibr_core.scenes.opening import SceneReady, SceneRequest, ViewReady, results_of
 from iibr_core.scenes.scene import DepthSettings, Progress, Source
 from iibr_core.types import GridShape, InputError, ViewUpdate
-from viewer.background.jobs import QUEUED_RESULTS, Failed
+from viewer.background.job_threads import QUEUED_RESULTS, Failed
 from viewer.background.scene_worker import SceneResult, SceneWork, SceneWorker, _telling_compiling
 from viewer.model.actions import OpenPath, SceneOpened
 from viewer.model.lens.photographic_units import equivalent_f_number
 from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState
-from viewer.model.state.optics import SetAperture
+from viewer.model.state.optics_actions import SetAperture
 
 DEADLINE_S = 120.0
 VIEW = ViewUpdate(0, 0, np.zeros((1, 1, 3), np.uint8), None)

@@ -14,7 +14,7 @@ import pytest
 
 from iibr_core.formats.maps.pfm import read_pfm
 from iibr_core.inpainting.registry import INPAINTERS
-from iibr_core.rendering.gloss.settings import Gloss
+from iibr_core.rendering.gloss.gloss_settings import Gloss
 from iibr_core.rendering.optics import Optics
 from iibr_core.scenes.scene import Source
 from iibr_core.types import TOTAL_PARALLAX

@@ -109,5 +109,5 @@ except SystemExit as ended:
     ended = run_apart(code, "generate", photo_path, "--grid", 3, "--out", tmp_path / "new")
     assert (
         ended.stdout.splitlines()[-1]
-        == "0 ['iibr_core.rendering.gloss.settings', 'iibr_core.rendering.gloss.geometry']"
+        == "0 ['iibr_core.rendering.gloss.gloss_settings', 'iibr_core.rendering.gloss.geometry']"
     ), ended.stderr

@@ -22,9 +22,9 @@ from iibr_core.scenes.scene import Progress, Source
 from iibr_core.types import GridShape, InputError
 from tests.local_hub import Hub, local_hub
 from tests.viewer.conftest import write_scene
-from viewer.background.jobs import ProgressReport
+from viewer.background.job_threads import ProgressReport
 from viewer.background.scene_worker import SceneWorker
-from viewer.cli.options import depth_start_from_text, refine_from_text
+from viewer.cli.shared_options import depth_start_from_text, refine_from_text
 
 
 def run_models(

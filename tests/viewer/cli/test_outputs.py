@@ -13,14 +13,14 @@ import numpy as np
 import pytest
 import typer
 
-from iibr_core.rendering.gloss.settings import Gloss
+from iibr_core.rendering.gloss.gloss_settings import Gloss
 from iibr_core.types import GridShape
 from tests.forked_iibr import run_forked
 from tests.viewer.cli.test_cli import run
 from tests.viewer.conftest import write_scene
 from viewer.cli.lens_options import GlossOption
 from viewer.cli.main import app
-from viewer.cli.options import OUTPUT_OPTIONS, inputs_of_command
+from viewer.cli.shared_options import OUTPUT_OPTIONS, inputs_of_command
 
 INPUTS = (
     "{dir}/field/input_Cam000.png",

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from iibr_core.depth.multi_view import estimate
-from iibr_core.formats.light_fields.registry import open_light_field
+from iibr_core.depth.multi_view import estimate_disparity
+from iibr_core.formats.light_fields.light_field_formats import open_light_field
 from iibr_core.formats.maps.pfm import read_pfm
 from iibr_core.types import GridShape, ViewOffset
 from tests.iibr_core.known_scenes import FRONT, WALL, disparity_of_square, view_of_square, view_of_wall, write_grid
@@ -78,7 +78,7 @@ def test_depth_of_a_pair_is_the_left_views(monkeypatch: Monkey, capsys: Capture,
 
 def test_depth_asks_for_memory_before_it_takes_it(monkeypatch: Monkey, capsys: Capture, tmp_path: Path) -> None:
     field = write_grid(tmp_path / "field")
-    monkeypatch.setattr(estimate, "sweep_bytes", lambda *_: 2**40)
+    monkeypatch.setattr(estimate_disparity, "sweep_bytes", lambda *_: 2**40)
     assert run(monkeypatch, "depth", field, "-o", tmp_path / "a.pfm") == 2
     assert "finding its disparity takes" in capsys.readouterr().err
     assert not (tmp_path / "a.pfm").exists()
@@ -88,8 +88,8 @@ def test_depth_asks_for_memory_before_it_takes_it(monkeypatch: Monkey, capsys: C
 def test_disparity_is_found_once_for_an_export(monkeypatch: Monkey, tmp_path: Path, kind: str) -> None:
     field = write_grid(tmp_path / "field")
     next(field.glob("gt_disp*")).unlink()
-    calls, found = [], estimate.estimate_disparity
-    monkeypatch.setattr(estimate, "estimate_disparity", lambda *given: calls.append(given) or found(*given))
+    calls, found = [], estimate_disparity.estimate_disparity
+    monkeypatch.setattr(estimate_disparity, "estimate_disparity", lambda *given: calls.append(given) or found(*given))
     out = tmp_path / {"point-cloud": "a.ply", "disparity": "a.pfm", "numbered-grid": "new"}[kind]
     assert run(monkeypatch, "export", field, "--to", kind, "-o", out) == 0
     assert len(calls) == (kind != "numbered-grid")

@@ -15,7 +15,7 @@ from iibr_core.types import DISPLAY_P3, SRGB, ViewOffset
 from tests.iibr_core.formats.test_color_profile import converted, profile_bytes
 from viewer.app.headless import HeadlessViewer
 from viewer.app.image_export import export_picture, shot_of
-from viewer.model.state.optics import MoveEye, SetAperture
+from viewer.model.state.optics_actions import MoveEye, SetAperture
 
 PATCHES = ((200, 80, 60), (255, 0, 0), (0, 255, 0), (20, 30, 250), (128, 128, 128), (255, 255, 255))
 IN_SRGB = converted(np.array([PATCHES], np.uint8), profile_bytes())[0].astype(float)
@@ -65,7 +65,7 @@ def test_srgb_photos_are_not_touched(tmp_path):
 @pytest.mark.parametrize("name", ["out.png", "out.jpg", "out.tif"])
 @pytest.mark.parametrize("is_wide", [True, False], ids=["P3", "sRGB"])
 def test_saved_colours_are_those_of_the_photo(tmp_path, name, is_wide):
-    """Seen by a reader that heeds profiles, within 1 of 255."""
+    """Seen by a reader that supports profiles, within 1 of 255."""
     options = {"icc_profile": profile_bytes()} if is_wide else {}
     source, out = photo_of_patches(tmp_path / "in.png", **options), tmp_path / name
     form = PictureFormat(bits=8, quality=100)

@@ -16,7 +16,7 @@ from tests.viewer.conftest import headless_with_scene
 from viewer.app.headless import HeadlessViewer
 from viewer.display import scene_view
 from viewer.display.scene_view import SceneView
-from viewer.model.state.optics import SetAperture
+from viewer.model.state.optics_actions import SetAperture
 
 SIZE = ScreenSize(384, 256)
 
@@ -78,7 +78,7 @@ def test_a_view_stands_in_before_the_second_view_of_the_scene_has_come(opened: H
     assert scene is not None
     assert view.centre is not None
     view.open(SceneReady(view.generation, scene, view.loaded, view.centre))
-    view.stand_in(replace(view.centre, colors=np.full_like(view.centre.colors, 255)))
+    view.show_fallback(replace(view.centre, colors=np.full_like(view.centre.colors, 255)))
     view.converge(opened.state, SIZE)
     assert view.renderer.read_image().min() == 255
     view.add(replace(view.centre, row=0, column=1))

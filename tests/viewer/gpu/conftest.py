@@ -8,7 +8,7 @@ import pytest
 
 from viewer.gpu.context import GLContext
 from viewer.gpu.headless_context import create_headless
-from viewer.gpu.refocus.renderer import Renderer
+from viewer.gpu.refocus.picture_renderer import Renderer
 
 
 @pytest.fixture(scope="module")

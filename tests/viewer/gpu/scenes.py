@@ -9,29 +9,29 @@ from numpy.typing import NDArray
 
 from iibr_core.color import linear_from_srgb, srgb_from_linear
 from iibr_core.types import GridShape, ViewOffset
-from viewer.gpu.refocus.renderer import Renderer
+from viewer.gpu.refocus.picture_renderer import Renderer
 
 
 @dataclass(frozen=True)
 class TwoPlanes:
-    """back, front: disparities of background and disc, px per view step. Colours are smooth, the edge is hard."""
+    """background, foreground: disparities of wall and disc, px per view step. Colours are smooth, the edge is hard."""
 
     width: int = 96
     height: int = 72
-    back: float = -1.0
-    front: float = 2.0
+    background: float = -1.0
+    foreground: float = 2.0
     radius_px: float = 18.0
     contrast: float = 0.2
 
     def view(self, eye: ViewOffset) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
         """Colours (H, W, 3) and disparity (H, W) seen from an eye, pixel centres only."""
         y, x = np.indices((self.height, self.width)).astype(float)
-        far = self._texture(x + self.back * eye.s, y + self.back * eye.t, hue=0.0)
-        near = self._texture(x + self.front * eye.s, y + self.front * eye.t, hue=2.0)
-        centre_x, centre_y = self.width / 2 - self.front * eye.s, self.height / 2 - self.front * eye.t
+        far = self._texture(x + self.background * eye.s, y + self.background * eye.t, hue=0.0)
+        near = self._texture(x + self.foreground * eye.s, y + self.foreground * eye.t, hue=2.0)
+        centre_x, centre_y = self.width / 2 - self.foreground * eye.s, self.height / 2 - self.foreground * eye.t
         in_front = np.hypot(x - centre_x, y - centre_y) < self.radius_px
         colors = np.where(in_front[..., None], near, far)
-        disparity = np.where(in_front, self.front, self.back).astype(np.float32)
+        disparity = np.where(in_front, self.foreground, self.background).astype(np.float32)
         return np.rint(colors * 255).astype(np.uint8), disparity
 
     def _texture(self, x: NDArray[np.float64], y: NDArray[np.float64], hue: float) -> NDArray[np.float64]:

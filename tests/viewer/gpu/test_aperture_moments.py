@@ -12,7 +12,7 @@ from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.rendering.optics import CENTRE, ApertureMask, ApertureShape, Optics
 from iibr_core.types import GridShape, ViewOffset
 from viewer.gpu.refocus.frame_budget import BEST_QUALITY, QualityLevel
-from viewer.gpu.refocus.renderer import Renderer
+from viewer.gpu.refocus.picture_renderer import Renderer
 from viewer.gpu.refocus.view_sampling import ApertureSample, aperture_samples
 
 GRID = GridShape(17, 17)

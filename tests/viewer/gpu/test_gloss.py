@@ -9,14 +9,14 @@ import pytest
 
 from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.rendering.gloss.geometry import SceneGeometry
-from iibr_core.rendering.gloss.settings import Gloss, GlossLight, GlossSurface
+from iibr_core.rendering.gloss.gloss_settings import Gloss, GlossLight, GlossSurface
 from iibr_core.rendering.gloss.shading import GlossMaps, make_gloss_maps, shade
 from iibr_core.rendering.optics import Optics
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.gpu.scenes import rms
 from viewer.gpu.inspection_passes import InspectionPasses, Line
-from viewer.gpu.refocus.renderer import Renderer
+from viewer.gpu.refocus.picture_renderer import Renderer
 
 GRID = GridShape(3, 3)
 WIDTH, HEIGHT = 96, 72

@@ -13,11 +13,11 @@ from iibr_core.types import GridShape, ViewOffset
 from tests.image_compare import SAME_RASTERISER, assert_close, read_png, write_png
 from tests.viewer.gpu.scenes import TwoPlanes
 from viewer.gpu.headless_context import Backend, create_headless
-from viewer.gpu.refocus.renderer import Renderer
+from viewer.gpu.refocus.picture_renderer import Renderer
 
 GOLDEN = Path(__file__).parents[2] / "golden"
 GRID = GridShape(5, 5)
-SCENE = TwoPlanes(width=160, height=120, back=-4.0, front=3.0, radius_px=30.0)
+SCENE = TwoPlanes(width=160, height=120, background=-4.0, foreground=3.0, radius_px=30.0)
 EVERY_VIEW = list(range(25))
 PICTURES = {
     "preview": ([12], Optics(ViewOffset(1.0, -1.5))),

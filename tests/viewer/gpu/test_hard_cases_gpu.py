@@ -22,7 +22,7 @@ from iibr_core.types import GridShape, ViewOffset
 from tests.image_compare import ROUNDING, assert_close
 from tests.viewer.gpu.scenes import TwoPlanes, rms
 from viewer.gpu.context import GLContext
-from viewer.gpu.refocus.renderer import Renderer
+from viewer.gpu.refocus.picture_renderer import Renderer
 
 SCENE = TwoPlanes(width=48, height=32, radius_px=8.0)
 SIZE = SCENE.width, SCENE.height
@@ -155,27 +155,27 @@ def test_a_grid_of_1x1(renderer: Renderer, tmp_path: Path, with_disparity: bool)
 
 def test_two_surfaces_1e_4_apart(renderer: Renderer) -> None:
     """No seam between them."""
-    scene = replace(SCENE, back=1.0, front=1.0001)
+    scene = replace(SCENE, background=1.0, foreground=1.0001)
     scene.fill(renderer, GRID)
     eye = ViewOffset(0.5, 0.5)
     truth = scene.view(eye)[0].astype(int)
     difference = np.abs(picture(renderer, Optics(eye)) - truth).max(axis=2)[4:-4, 4:-4]
     y, x = np.indices(truth.shape[:2])
-    rim = np.abs(np.hypot(x - scene.width / 2 + 0.5, y - scene.height / 2 + 0.5) - scene.radius_px) < 2
-    assert difference[~rim[4:-4, 4:-4]].max() <= 4
+    edge = np.abs(np.hypot(x - scene.width / 2 + 0.5, y - scene.height / 2 + 0.5) - scene.radius_px) < 2
+    assert difference[~edge[4:-4, 4:-4]].max() <= 4
 
 
 def test_a_one_pixel_wire(renderer: Renderer) -> None:
     """Between stored views it is still there, about as bright and as wide as it is."""
-    width, height, front = 40, 24, 3.0
+    width, height, foreground = 40, 24, 3.0
     renderer.open_field(GRID, width, height, hdr=False, with_disparity=True)
     for row in range(3):
         for column in range(3):
-            at = round(20 - front * (column - 1))
+            at = round(20 - foreground * (column - 1))
             colors, disparity = np.full((height, width, 3), 30, np.uint8), np.zeros((height, width), np.float32)
-            colors[:, at], disparity[:, at] = 220, front
+            colors[:, at], disparity[:, at] = 220, foreground
             renderer.upload_view(row, column, colors, disparity)
     for s in (0.0, 1.0, 1 / 3):
         row = picture(renderer, Optics(ViewOffset(0.0, s)), (width, height))[12, :, 0]
-        assert row[round(20 - front * s)] > 180, s
+        assert row[round(20 - foreground * s)] > 180, s
         assert (row > 100).sum() <= 2

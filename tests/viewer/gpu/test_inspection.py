@@ -1,4 +1,4 @@
-"""The passes of inspection against plain numpy: EPIs, sheet, overlays, views read back, who sees a surface."""
+"""The passes of inspection against plain numpy: EPIs, sheet, overlays, views read background, who sees a surface."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from tests.viewer.gpu.scenes import TwoPlanes
 from viewer.gpu.context import GLContext
 from viewer.gpu.inspection_passes import SAME_SURFACE, SAME_SURFACE_PX, InspectionPasses, Line, OverlayStyle
 from viewer.gpu.light_field_texture import LightFieldTexture
-from viewer.gpu.refocus.renderer import Renderer
+from viewer.gpu.refocus.picture_renderer import Renderer
 from viewer.model.colormap import VIRIDIS, map_color
 from viewer.model.layout import PixelRect
 
@@ -79,7 +79,7 @@ def test_edges_in_an_epi_are_straight_and_as_steep_as_the_disparity(
     left = is_front.argmax(axis=1)
     s = np.arange(GRID.columns) - GRID.centre[1]
     slope, middle = np.polyfit(s, left, 1)
-    assert slope == pytest.approx(-scene.front, abs=1e-6)
+    assert slope == pytest.approx(-scene.foreground, abs=1e-6)
     np.testing.assert_allclose(left, slope * s + middle, atol=1e-6)
 
 
@@ -221,7 +221,7 @@ def test_how_many_views_see_a_surface(
 
 
 def test_views_that_are_not_there_see_nothing(renderer: Renderer, passes: InspectionPasses) -> None:
-    seen = passes.seen_in(middle_only(renderer), ViewOffset(0, 0), 48, 36, SCENE.front)
+    seen = passes.seen_in(middle_only(renderer), ViewOffset(0, 0), 48, 36, SCENE.foreground)
     assert seen.sum() == 1
     assert seen[GRID.centre]
 

@@ -14,13 +14,13 @@ from iibr_core.rendering.optics import CENTRE, HIGHLIGHT_GAIN, ApertureMask, Ape
 from iibr_core.types import GridShape, ViewOffset
 from tests.image_compare import FILTERING, assert_close
 from tests.viewer.gpu.scenes import TwoPlanes, rms, through_aperture
-from viewer.gpu.refocus.renderer import Renderer
+from viewer.gpu.refocus.picture_renderer import Renderer
 from viewer.gpu.refocus.view_sampling import aperture_samples
 
 GRID = GridShape(5, 5)
 FULL = np.ones(GRID, bool)
 SCENE = TwoPlanes()
-FLAT = TwoPlanes(front=-1.0)
+FLAT = TwoPlanes(foreground=-1.0)
 """One plane in effect: disc and background have the same disparity."""
 
 CROSS = ApertureMask("cross", 3, 3, bytes([0, 255, 0, 255, 255, 255, 0, 255, 0]))
@@ -68,14 +68,16 @@ def of_background(scene: TwoPlanes, optics: Optics) -> NDArray[np.uint8]:
     """Twin: the background alone through the lens, every ray followed."""
     y, x = np.indices((scene.height, scene.width)).astype(float)
     t, s = eyes_of_pixels(optics, scene)
-    by = scene.back - focus_of_pixels(optics, scene)
+    by = scene.background - focus_of_pixels(optics, scene)
     samples = aperture_samples(optics.eye, max(optics.aperture_diameter, 1.0), GRID, FULL)
     if optics.aperture_diameter == 0:
         samples = [sample._replace(wanted=optics.eye, weight=1 / len(samples)) for sample in samples]
     total = np.zeros((scene.height, scene.width, 3))
     for sample in samples:
         ds, dt = sample.wanted.s - optics.eye.s, sample.wanted.t - optics.eye.t
-        total += sample.weight * background(scene, x + scene.back * s + by * ds, y + scene.back * t + by * dt)
+        total += sample.weight * background(
+            scene, x + scene.background * s + by * ds, y + scene.background * t + by * dt
+        )
     return np.rint(srgb_from_linear(total / sum(sample.weight for sample in samples)) * 255).astype(np.uint8)
 
 
@@ -137,7 +139,7 @@ def test_tilt_against_numpy(renderer: Renderer, tilt: tuple[float, float]) -> No
 
 
 def test_everything_within_the_focus_range_is_as_sharp_as_through_a_pinhole(renderer: Renderer) -> None:
-    scene = TwoPlanes(back=-3.0, front=4.0)
+    scene = TwoPlanes(background=-3.0, foreground=4.0)
     scene.fill(renderer, GRID)
     eye = ViewOffset(0.2, -0.3)
     truth = scene.view(eye)[0]

@@ -12,15 +12,15 @@ from iibr_core.color import srgb_from_linear
 from iibr_core.rendering.optics import CENTRE, Optics
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.gpu.scenes import TwoPlanes, rms
-from viewer.gpu.refocus.lens import Lens, lens_of
 from viewer.gpu.refocus.passes import TILE_PX, Passes, _search_steps
 from viewer.gpu.refocus.picture_cells import WHOLE_CELL
-from viewer.gpu.refocus.renderer import Renderer
+from viewer.gpu.refocus.picture_lens import Lens, lens_of
+from viewer.gpu.refocus.picture_renderer import Renderer
 from viewer.gpu.refocus.view_sampling import pinhole_sources
 from viewer.gpu.render_targets import RenderTargets
 
 GRID = GridShape(5, 5)
-SCENE = TwoPlanes(width=160, height=96, back=-4.0, front=5.0, radius_px=25.0)
+SCENE = TwoPlanes(width=160, height=96, background=-4.0, foreground=5.0, radius_px=25.0)
 SIZE = SCENE.width, SCENE.height
 RANDOM = np.random.default_rng(5)
 
@@ -185,16 +185,18 @@ def test_layers_are_laid_over_each_other(
     assert wide.keeps_layers
     covered, bright = 0.5, {"raw": (0.3, 0.6), "smooth": (0.8, 0.1)}
     sharp = np.full((SIZE[1], SIZE[0], 4), (1 - covered) * np.array([0.2, 0.4, 0.6, 1.0]), "f4")
-    front = {name: np.zeros((SIZE[1] // half, SIZE[0] // half, 4), "f4") for name, half in (("raw", 1), ("smooth", 2))}
-    for name, layer in front.items():
+    foreground = {
+        name: np.zeros((SIZE[1] // half, SIZE[0] // half, 4), "f4") for name, half in (("raw", 1), ("smooth", 2))
+    }
+    for name, layer in foreground.items():
         for side, value in zip(np.split(layer, 2, axis=1), bright[name]):
             side[:] = covered * np.array([value, value, value, 1.0])
     for texture, values in (
         (targets.light.textures[0], sharp),
-        (targets.layers.sums.textures[1], front["raw"]),
-        (targets.layers.sums.textures[2], np.zeros_like(front["raw"])),
-        (targets.layers.smooth.textures[0], front["smooth"]),
-        (targets.layers.smooth.textures[1], np.zeros_like(front["smooth"])),
+        (targets.layers.sums.textures[1], foreground["raw"]),
+        (targets.layers.sums.textures[2], np.zeros_like(foreground["raw"])),
+        (targets.layers.smooth.textures[0], foreground["smooth"]),
+        (targets.layers.smooth.textures[1], np.zeros_like(foreground["smooth"])),
     ):
         texture.write(values.tobytes())
     fill_tiles(targets, width_px, 0.0)
@@ -211,7 +213,7 @@ def test_layers_are_laid_over_each_other(
 
 def test_outside_all_views_mirror_images_stand_in(renderer: Renderer) -> None:
     """Seen from far beside the grid, a flat scene goes on as its mirror image: no streaks."""
-    scene = TwoPlanes(width=96, height=64, back=6.0, front=6.0)
+    scene = TwoPlanes(width=96, height=64, background=6.0, foreground=6.0)
     grid = GridShape(3, 3)
     scene.fill(renderer, grid)
     eye = ViewOffset(0.0, 3.0)

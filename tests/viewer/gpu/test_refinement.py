@@ -18,10 +18,10 @@ from viewer.gpu.refocus import accumulation
 from viewer.gpu.refocus.accumulation import EDGE_PASSES, r2_sequence
 from viewer.gpu.refocus.error_estimate import ErrorEstimate
 from viewer.gpu.refocus.frame_budget import QualityLevel
-from viewer.gpu.refocus.renderer import Renderer
+from viewer.gpu.refocus.picture_renderer import Renderer
 
 GRID = GridShape(5, 5)
-SCENE = TwoPlanes(width=160, height=120, back=-6.0, front=0.0, radius_px=25.0)
+SCENE = TwoPlanes(width=160, height=120, background=-6.0, foreground=0.0, radius_px=25.0)
 SIZE = SCENE.width, SCENE.height
 WIDE = Optics(aperture_diameter=4.0)
 

@@ -13,15 +13,15 @@ import numpy as np
 import pytest
 
 from iibr_core.color import stored_from_encoded
+from iibr_core.evaluation.focal_stacks import LENS, Focus, within
 from iibr_core.evaluation.metrics import psnr
-from iibr_core.evaluation.refocus import LENS, Focus, within
 from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.generation.light_field import generate
 from iibr_core.rendering.optics import Optics
 from iibr_core.types import Disparity, FloatImage, Quality, ViewUpdate
 from tests.iibr_core.lens_scenes import GRID, NAMES, LensScene, lens_scene
 from tests.iibr_core.scenes import by_index, literal_plan
-from viewer.gpu.refocus.renderer import Renderer
+from viewer.gpu.refocus.picture_renderer import Renderer
 
 LEAST_DB = {"shelf": 43.4, "fence": 40.4}
 Field = Mapping[tuple[int, int], ViewUpdate]

@@ -17,7 +17,7 @@ from viewer.model.reducers.camera_motion import HOME_S, LONGEST_STEP_S, ease
 from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState
 from viewer.model.state.motion import PauseMotion, ReturnHome, SetLoop, SetSpeed, Tick
-from viewer.model.state.optics import MoveEye, ResetOptics, SetOptics
+from viewer.model.state.optics_actions import MoveEye, ResetOptics, SetOptics
 from viewer.model.window_limits import SPEED_LIMITS
 
 grids = st.builds(GridShape, st.integers(1, 17), st.integers(1, 17))

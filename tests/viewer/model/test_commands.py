@@ -11,7 +11,7 @@ from iibr_core.scenes.scene import Source
 from tests.viewer.model.test_reducers import scene_of, state_with
 from viewer.model.actions import AskToSave
 from viewer.model.commands import BY_NAME, COMMANDS, Chord, Command, commands_matching, recent_commands
-from viewer.model.demo import demo_photo
+from viewer.model.demo_photo import demo_photo
 from viewer.model.lens.presets import PRESETS
 from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState

@@ -36,7 +36,11 @@ from viewer.app.pointer import Pointer, actions_from_pointer
 from viewer.model.actions import AskToSave, EndGesture, OpenFailed, OpenPath, Redo, SceneOpened, Undo
 from viewer.model.commands import BY_NAME, action_for_path
 from viewer.model.layout import layout_of
-from viewer.model.reducers.depth_editing import current_depth_settings, depth_settings_for_worker, is_depth_ahead
+from viewer.model.reducers.depth_editing_reducer import (
+    current_depth_settings,
+    depth_settings_for_worker,
+    is_depth_ahead,
+)
 from viewer.model.reducers.root import reduce
 from viewer.model.saved_settings import settings_from_text, settings_text
 from viewer.model.state.app_state import AppState
@@ -52,7 +56,7 @@ from viewer.model.state.depth_editing import (
     SetTone,
 )
 from viewer.model.state.model_download import UseModel
-from viewer.model.state.optics import MoveEye, SetFocus
+from viewer.model.state.optics_actions import MoveEye, SetFocus
 from viewer.model.state.prompts import PathPrompt, SavePrompt
 from viewer.ui.sections.depth_histogram import bar_heights, focus_share
 

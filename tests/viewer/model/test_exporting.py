@@ -14,7 +14,13 @@ from iibr_core.scenes.scene import Source
 from iibr_core.types import InputError
 from tests.viewer.model.test_reducers import scene_of, state_with
 from viewer.model.actions import AskToSave
-from viewer.model.reducers.exporting import as_other_kind, first_kind, kinds_for, usual_export_path, written_path
+from viewer.model.reducers.exporting_reducer import (
+    as_other_kind,
+    first_kind,
+    kinds_for,
+    usual_export_path,
+    written_path,
+)
 from viewer.model.reducers.root import reduce
 from viewer.model.state.exporting import AskToExport, ExportPrompt
 from viewer.model.state.preferences import SetPreference

@@ -23,7 +23,7 @@ from viewer.model.lens.focal_plane import (
 )
 from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import TiltHandles
-from viewer.model.state.optics import FocusOn, MoveTiltHandle
+from viewer.model.state.optics_actions import FocusOn, MoveTiltHandle
 
 shares = st.floats(-1, 1)
 places = st.tuples(shares, shares)

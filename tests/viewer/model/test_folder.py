@@ -10,7 +10,7 @@ from iibr_core.exports.photo_folder import FolderPhoto, in_order
 from iibr_core.scenes.scene import Source
 from tests.viewer.model.test_reducers import scene_of
 from viewer.model.actions import OpenFailed, OpenPath, SceneOpened, StopWork
-from viewer.model.reducers.folder import AHEAD, filmstrip_range, photos_ahead
+from viewer.model.reducers.folder_reducer import AHEAD, filmstrip_range, photos_ahead
 from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState
 from viewer.model.state.folder import FolderListed, ScrollFilmstrip, SetFolderOrder, StepPhoto

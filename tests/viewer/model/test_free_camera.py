@@ -33,7 +33,7 @@ from viewer.model.lens.photographic_units import mean_depth
 from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState
 from viewer.model.state.motion import ReturnHome
-from viewer.model.state.optics import MoveEye, ResetOptics, SetAperture, SetFocus
+from viewer.model.state.optics_actions import MoveEye, ResetOptics, SetAperture, SetFocus
 from viewer.model.state.prompts import SavePrompt
 
 

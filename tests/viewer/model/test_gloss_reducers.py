@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from iibr_core.rendering.gloss.settings import Gloss, GlossLight
+from iibr_core.rendering.gloss.gloss_settings import Gloss, GlossLight
 from iibr_core.types import GridShape
 from tests.viewer.model.test_reducers import plan_of, scene_of, state_with
 from viewer.model.actions import EndGesture, Undo
 from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState
 from viewer.model.state.depth_editing import Brush, SetBrush
-from viewer.model.state.optics import FIRST_GLOSS, GlossBrush, PaintGloss, ResetOptics, SetGlossBrush, SetOptics
+from viewer.model.state.optics_actions import FIRST_GLOSS, GlossBrush, PaintGloss, ResetOptics, SetGlossBrush, SetOptics
 
 BRUSH = GlossBrush(radius=0.1, is_on=True)
 

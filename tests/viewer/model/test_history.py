@@ -20,12 +20,12 @@ from viewer.model.actions import (
     ShowTiltHandles,
     Undo,
 )
-from viewer.model.reducers.history import EDITS_KEPT
-from viewer.model.reducers.lens import APERTURE_OPENED
+from viewer.model.reducers.history_reducer import EDITS_KEPT
+from viewer.model.reducers.lens_reducer import APERTURE_OPENED
 from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState
 from viewer.model.state.motion import ReturnHome, SetLoop, Tick
-from viewer.model.state.optics import (
+from viewer.model.state.optics_actions import (
     ApplyPreset,
     FocusOn,
     MoveEye,

@@ -25,7 +25,7 @@ from viewer.model.inspection_request import (
     view_to_compare,
 )
 from viewer.model.layout import Beside, layout_of
-from viewer.model.reducers.inspection import KEPT
+from viewer.model.reducers.inspection_reducer import KEPT
 from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState, Hover
 from viewer.model.state.inspection import (
@@ -43,10 +43,10 @@ from viewer.model.state.inspection import (
     SetOverlay,
     TruthRead,
 )
-from viewer.model.state.optics import MoveEye
+from viewer.model.state.optics_actions import MoveEye
 from viewer.model.state.preferences import SetPreference
 from viewer.model.state.tasks import ChooseTask
-from viewer.ui.overlays.inspection import legend_words, status_text
+from viewer.ui.overlays.inspection_overlay import legend_words, status_text
 from viewer.ui.overlays.reticle import hover_text
 from viewer.ui.sections.inspect import pair_text, score_text
 
@@ -208,9 +208,9 @@ def test_nothing_slow_begins_while_the_viewpoint_moves() -> None:
     moved = after(state, MoveEye(ViewOffset(1, 1)))
     assert make_inspection_request(moved, is_moving=True, before=request) == request
     assert make_inspection_request(moved, is_moving=True, before=None) is None
-    settled = make_inspection_request(moved, is_moving=False, before=request)
-    assert settled is not None
-    assert settled.view == (3, 4)
+    at_rest = make_inspection_request(moved, is_moving=False, before=request)
+    assert at_rest is not None
+    assert at_rest.view == (3, 4)
 
 
 def test_ground_truth_follows_the_hand_and_is_scored_when_all_is_still() -> None:

@@ -41,14 +41,14 @@ from viewer.model.actions import (
     Undo,
 )
 from viewer.model.lens.presets import PRESETS
-from viewer.model.reducers.lens import carry_optics
-from viewer.model.reducers.notices import NOTICES_KEPT
+from viewer.model.reducers.lens_reducer import carry_optics
+from viewer.model.reducers.notices_reducer import NOTICES_KEPT
 from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState, Hover, Picture
 from viewer.model.state.depth_editing import SetTone
 from viewer.model.state.jobs import JobProgress, JobsChanged, QuitWhenDone
 from viewer.model.state.notices import Notice
-from viewer.model.state.optics import (
+from viewer.model.state.optics_actions import (
     ApplyPreset,
     FocusOn,
     MoveEye,

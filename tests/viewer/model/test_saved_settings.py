@@ -17,7 +17,7 @@ from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.editing.edits import BRUSH_TOOLS, DepthEdits, Stroke
 from iibr_core.formats.images.photo import write_image
 from iibr_core.formats.images.settings_text import ATTRIBUTE, settings_text_in
-from iibr_core.rendering.gloss.settings import Gloss, GlossLight, GlossSurface
+from iibr_core.rendering.gloss.gloss_settings import Gloss, GlossLight, GlossSurface
 from iibr_core.rendering.optics import APERTURE_KINDS, ApertureMask, ApertureShape, Optics
 from iibr_core.scenes.scene import Source
 from iibr_core.types import GridShape, InputError, ViewOffset

@@ -16,7 +16,7 @@ from viewer.model.reducers.camera_motion import SWAY_TURN_S, SWAY_TURNS
 from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState
 from viewer.model.state.motion import PauseMotion, SetLoop, Sway, Tick, Touch
-from viewer.model.state.optics import MoveEye, SetFocus
+from viewer.model.state.optics_actions import MoveEye, SetFocus
 from viewer.model.state.saving import SavedSettings
 from viewer.model.state.tasks import MaySwayTask
 

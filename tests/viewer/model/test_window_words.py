@@ -13,7 +13,7 @@ from iibr_core.depth.sidecar import flat_disparity
 from iibr_core.generation.memory_model import budget_of, require_views
 from iibr_core.types import GridShape, ImageSize, InputError
 from viewer.model.commands import BY_NAME
-from viewer.model.reducers.notices import add_notice
+from viewer.model.reducers.notices_reducer import add_notice
 from viewer.model.state.app_state import AppState
 from viewer.model.state.notices import Notice
 from viewer.model.window_words import DEPTH_COMMANDS, notice_in_window, words_in_window

@@ -18,7 +18,7 @@ from viewer.model.layout import PANEL_WIDTH, Layout, layout_of
 from viewer.model.state.app_state import Hover
 from viewer.model.state.inspection import OVERLAYS, Compare, MoveDivider, OverlayKind, SetInspection, SetOverlay
 from viewer.model.state.notices import Notice
-from viewer.model.state.optics import MoveEye
+from viewer.model.state.optics_actions import MoveEye
 from viewer.model.state.preferences import SetPreference, Theme, ToggleSection
 
 SIZE = 640, 1000

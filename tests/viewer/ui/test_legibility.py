@@ -18,18 +18,18 @@ from iibr_core.scenes.scene import DepthSettings
 from iibr_core.scenes.screen_size import ScreenSize
 from tests.viewer.conftest import headless_with_scene
 from viewer.app.headless import HeadlessViewer
-from viewer.background.model_download import list_models
+from viewer.background.model_downloader import list_models
 from viewer.model.actions import ShowPrompt
 from viewer.model.layout import PANEL_WIDTH
 from viewer.model.state.app_state import AppState
 from viewer.model.state.exporting import ExportPrompt
 from viewer.model.state.jobs import JobProgress
 from viewer.model.state.model_download import ModelsPrompt
-from viewer.model.state.optics import SetAperture, SetOptics
+from viewer.model.state.optics_actions import SetAperture, SetOptics
 from viewer.model.state.preferences import SECTIONS, SetPreference, Theme, Units
 from viewer.model.state.prompts import PalettePrompt, PathPrompt, Prompt, SavePrompt
 from viewer.ui.overlays.export_prompt import MOTION_TIPS
-from viewer.ui.sections.depth import START_TIPS, START_WORDS
+from viewer.ui.sections.depth_section import START_TIPS, START_WORDS
 from viewer.ui.style import Color, Look, apply_style, palette_of
 from viewer.ui.widgets import GRIP_HEIGHT
 

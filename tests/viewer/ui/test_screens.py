@@ -32,7 +32,7 @@ from viewer.model.state.app_state import AppState, DrawReport, Hover
 from viewer.model.state.jobs import WRITING, JobProgress, JobsChanged
 from viewer.model.state.motion import SetLoop
 from viewer.model.state.notices import Notice
-from viewer.model.state.optics import SetAperture, SetOptics
+from viewer.model.state.optics_actions import SetAperture, SetOptics
 from viewer.model.state.preferences import SECTIONS, Section, SetPreference, ToggleSection, with_sections
 from viewer.model.state.prompts import PalettePrompt, PathPrompt
 from viewer.model.state.saving import SavedSettings

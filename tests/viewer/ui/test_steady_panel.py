@@ -17,7 +17,7 @@ from viewer.model.actions import Action, ShowTiltHandles
 from viewer.model.state.depth_editing import Brush, DepthSample, PickDepth, SetBrush
 from viewer.model.state.inspection import Compare, KeepState, SetInspection, SetOverlay
 from viewer.model.state.motion import SetLoop
-from viewer.model.state.optics import FIRST_GLOSS, GlossBrush, SetGlossBrush, SetOptics
+from viewer.model.state.optics_actions import FIRST_GLOSS, GlossBrush, SetGlossBrush, SetOptics
 from viewer.model.state.preferences import SECTIONS
 
 MASK = ApertureMask("star.png", 1, 1, b"\xff")

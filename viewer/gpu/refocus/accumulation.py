@@ -17,9 +17,9 @@ from iibr_core.scenes import ScreenSize, clamp_to_grid
 from iibr_core.types import SRGB, ColorSpace, GridShape, ViewOffset
 from viewer.gpu.light_field_texture import LightFieldTexture
 from viewer.gpu.programs import ProgramCache
-from viewer.gpu.refocus.lens import Lens
 from viewer.gpu.refocus.passes import MAX_SAMPLES, Passes
 from viewer.gpu.refocus.picture_cells import WHOLE_CELL, PictureCell
+from viewer.gpu.refocus.picture_lens import Lens
 from viewer.gpu.refocus.view_sampling import ApertureSample, aperture_samples, nearest_present, pinhole_sources
 from viewer.gpu.render_targets import RenderTarget, RenderTargets
 

@@ -14,8 +14,8 @@ from iibr_core.scenes import WHOLE
 from iibr_core.types import SRGB, ColorSpace, ViewOffset
 from viewer.gpu.light_field_texture import BLOCK_PX, LightFieldTexture
 from viewer.gpu.programs import Program, ProgramCache, set_primaries
-from viewer.gpu.refocus.lens import Lens
 from viewer.gpu.refocus.picture_cells import PictureCell, cells_between_views, covering_pixels, pixels_of
+from viewer.gpu.refocus.picture_lens import Lens
 from viewer.gpu.refocus.view_sampling import (
     MAX_SOURCES,
     ApertureSample,
@@ -241,14 +241,14 @@ class Passes:
         program, quad = self._programs.get("smooth.frag")
         targets.wide_tiles.textures[0].use(2)
         program.set_uniforms(
-            front_layer=0, back_layer=1, tiles=2, narrowing=narrowing, empty_up_to_px=lens.sharp_up_to_px[0]
+            foreground_layer=0, background_layer=1, tiles=2, narrowing=narrowing, empty_up_to_px=lens.sharp_up_to_px[0]
         )
         layers = targets.layers
         across = layers.sums.textures[1:], layers.across, (1, 0)
         down = layers.across.textures, layers.smooth, (0, 1)
-        for (front, back), target, direction in (across, down):
-            front.use(0)
-            back.use(1)
+        for (foreground, background), target, direction in (across, down):
+            foreground.use(0)
+            background.use(1)
             width, height = target.framebuffer.size
             program.set_uniforms(texel_step=(direction[0] / width, direction[1] / height))
             target.use()
@@ -276,7 +276,9 @@ class Passes:
             layers = (*targets.layers.sums.textures[1:], *targets.layers.smooth.textures)
             for unit, texture in enumerate((*layers, targets.wide_tiles.textures[0]), start=1):
                 texture.use(unit)
-            program.set_uniforms(front_layer=1, back_layer=2, smooth_front=3, smooth_back=4, tiles=5)
+            program.set_uniforms(
+                foreground_layer=1, background_layer=2, smooth_foreground=3, smooth_background=4, tiles=5
+            )
             program.set_uniforms(narrowing=narrowing)
         quad.render(moderngl.TRIANGLES, vertices=3)
 

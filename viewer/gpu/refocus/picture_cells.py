@@ -11,7 +11,7 @@ import numpy as np
 
 from iibr_core.scenes import Rect
 from iibr_core.types import GridShape
-from viewer.gpu.refocus.lens import Lens
+from viewer.gpu.refocus.picture_lens import Lens
 
 
 class PictureCell(NamedTuple):

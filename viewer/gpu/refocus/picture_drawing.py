@@ -15,7 +15,7 @@ from viewer.gpu.context import GLContext
 from viewer.gpu.light_field_texture import LightFieldTexture
 from viewer.gpu.refocus.accumulation import Accumulator, ProgressiveAccumulation
 from viewer.gpu.refocus.passes import TILE_PX
-from viewer.gpu.refocus.tiling import PictureTile, picture_tiles
+from viewer.gpu.refocus.picture_tiling import PictureTile, picture_tiles
 from viewer.gpu.render_targets import RenderTarget, RenderTargets, unbind
 
 STEP_S = 0.005

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from iibr_core.rendering import ApertureShape, Optics
 from iibr_core.scenes import Scene, aperture_limit, focus_span
-from viewer.model.state.optics import PresetName
+from viewer.model.state.optics_actions import PresetName
 
 PRESETS: tuple[PresetName, ...] = ("portrait", "macro", "everything sharp")
 

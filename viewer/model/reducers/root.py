@@ -37,17 +37,17 @@ from viewer.model.actions import (
     WorkerLost,
 )
 from viewer.model.free_camera import FreeCameraAction
-from viewer.model.reducers.depth_editing import end_stroke, reduce_depth
+from viewer.model.reducers.depth_editing_reducer import end_stroke, reduce_depth
 from viewer.model.reducers.depth_models import reduce_models
-from viewer.model.reducers.exporting import ask_to_export, ask_to_save
-from viewer.model.reducers.folder import list_folder, photo_after, scroll_filmstrip
-from viewer.model.reducers.free_camera import reduce_free_camera
-from viewer.model.reducers.history import end_gesture, record_edit, redo, undo
-from viewer.model.reducers.inspection import move_pointer, reduce_inspection, release_divider
-from viewer.model.reducers.lens import reduce_lens, with_focus_of
-from viewer.model.reducers.motion import reduce_motion, touch
-from viewer.model.reducers.notices import add_notice
-from viewer.model.reducers.preferences import reduce_preferences
+from viewer.model.reducers.exporting_reducer import ask_to_export, ask_to_save
+from viewer.model.reducers.folder_reducer import list_folder, photo_after, scroll_filmstrip
+from viewer.model.reducers.free_camera_reducer import reduce_free_camera
+from viewer.model.reducers.history_reducer import end_gesture, record_edit, redo, undo
+from viewer.model.reducers.inspection_reducer import move_pointer, reduce_inspection, release_divider
+from viewer.model.reducers.lens_reducer import reduce_lens, with_focus_of
+from viewer.model.reducers.motion_reducer import reduce_motion, touch
+from viewer.model.reducers.notices_reducer import add_notice
+from viewer.model.reducers.preferences_reducer import reduce_preferences
 from viewer.model.reducers.worker_events import reduce_worker_event, stop_work
 from viewer.model.state.app_state import AppState, FinishedField, TiltHandles
 from viewer.model.state.depth_editing import DepthAction
@@ -59,7 +59,15 @@ from viewer.model.state.jobs import JobsChanged, QuitWhenDone
 from viewer.model.state.model_download import ModelAction
 from viewer.model.state.motion import Motion, MotionAction
 from viewer.model.state.notices import Notice
-from viewer.model.state.optics import FocusOn, GlossBrush, LensAction, MoveEye, ResetOptics, SetGlossBrush, SetOptics
+from viewer.model.state.optics_actions import (
+    FocusOn,
+    GlossBrush,
+    LensAction,
+    MoveEye,
+    ResetOptics,
+    SetGlossBrush,
+    SetOptics,
+)
 from viewer.model.state.photo_facts import FactsRead
 from viewer.model.state.preferences import PreferencesAction
 from viewer.model.state.saving import SavedSettings

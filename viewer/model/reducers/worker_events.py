@@ -10,10 +10,10 @@ from iibr_core.rendering import Optics
 from iibr_core.scenes import DepthSettings, Progress, Scene, clamp_optics, first_aperture, focus_limits
 from iibr_core.types import InputError
 from viewer.model.actions import OpenFailed, ProgressMade, SamePlaces, SceneOpened, WorkerEvent
-from viewer.model.reducers.folder import is_stepped_to
-from viewer.model.reducers.history import map_optics
-from viewer.model.reducers.lens import carry_optics, carry_to_depth, with_focus_of
-from viewer.model.reducers.notices import NOTICES_KEPT, add_notice
+from viewer.model.reducers.folder_reducer import is_stepped_to
+from viewer.model.reducers.history_reducer import map_optics
+from viewer.model.reducers.lens_reducer import carry_optics, carry_to_depth, with_focus_of
+from viewer.model.reducers.notices_reducer import NOTICES_KEPT, add_notice
 from viewer.model.state.app_state import AppState
 from viewer.model.state.folder import ListFolderTask
 from viewer.model.state.history import History

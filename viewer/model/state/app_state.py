@@ -19,7 +19,7 @@ from viewer.model.state.jobs import JobProgress
 from viewer.model.state.model_download import DepthModels
 from viewer.model.state.motion import Motion
 from viewer.model.state.notices import Notice
-from viewer.model.state.optics import GlossBrush
+from viewer.model.state.optics_actions import GlossBrush
 from viewer.model.state.photo_facts import NO_FACTS, FactsRead
 from viewer.model.state.preferences import Preferences
 from viewer.model.state.prompts import Prompt

@@ -1,6 +1,6 @@
 """What the user does to the depth that was found: records of the state, and the actions that change them.
 
-`viewer.model.reducers.depth_editing` says what each action does.
+`viewer.model.reducers.depth_editing_reducer` says what each action does.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """The photos that lie beside the one that is open, and the actions that go from one to the next.
 
-`viewer.model.reducers.folder` says what each action does.
+`viewer.model.reducers.folder_reducer` says what each action does.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """What is looked at beside the picture: records of the state, and the actions that change them.
 
-`viewer.model.reducers.inspection` says what each action does.
+`viewer.model.reducers.inspection_reducer` says what each action does.
 """
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
 """The window that asks what to share or export: what for, the kinds of the registry for that, and for each the rows
-that it heeds.
+that it supports.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from iibr_core.exports import (
     ExportOptions,
     ExportSettings,
     Purpose,
-    settle,
+    resolve_settings,
     size_of_width,
 )
 from iibr_core.formats import DEVICES
@@ -30,7 +30,7 @@ from iibr_core.scenes import Scene, clamp
 from iibr_core.types import InputError
 from viewer.model.actions import Action, AskToSave, DoTask, ShowPrompt
 from viewer.model.layout import Layout
-from viewer.model.reducers.exporting import as_other_kind, first_kind, kinds_for, written_path
+from viewer.model.reducers.exporting_reducer import as_other_kind, first_kind, kinds_for, written_path
 from viewer.model.state.app_state import AppState
 from viewer.model.state.exporting import ExportPrompt, ExportTask
 from viewer.model.state.preferences import is_seen_open
@@ -90,9 +90,9 @@ def export_prompt(prompt: ExportPrompt, state: AppState, layout: Layout) -> list
     if chosen != prompt.kind:
         return [ShowPrompt(as_other_kind(state, prompt, chosen))]
     kind, options, sections = EXPORTS[chosen], prompt.options, state.preferences.open_sections
-    asked = _Asked(kind, state.scene, settle(kind, options, state.scene, state.optics), layout)
+    asked = _Asked(kind, state.scene, resolve_settings(kind, options, state.scene, state.optics), layout)
     for name, row in ROWS.items():
-        if name in kind.heeds and (name not in ADVANCED_ROWS or is_seen_open("advanced", sections)):
+        if name in kind.supports and (name not in ADVANCED_ROWS or is_seen_open("advanced", sections)):
             options = row(options, asked)
     path, entered, browses = path_row("File" if kind.endings else "Folder", prompt.path, layout)
     edited = replace(prompt, path=path, options=options)
@@ -265,4 +265,4 @@ ROWS: dict[str, Callable[[ExportOptions, _Asked], ExportOptions]] = {
     "credit": _credit,
     "stills": _stills,
 }
-"""In their order from above, by the names that `ExportKind.heeds` has."""
+"""In their order from above, by the names that `ExportKind.supports` has."""

@@ -10,7 +10,7 @@ from imgui_bundle import imgui
 from iibr_core.scenes import Rect
 from viewer.model.actions import Action
 from viewer.model.layout import Layout
-from viewer.model.reducers.folder import filmstrip_range, place_of_photo
+from viewer.model.reducers.folder_reducer import filmstrip_range, place_of_photo
 from viewer.model.state.app_state import AppState
 from viewer.model.state.folder import ScrollFilmstrip, StepPhoto, Thumbnail
 from viewer.ui.style import corners, pack_color, palette_of

@@ -11,9 +11,9 @@ from viewer.model.layout import Layout
 from viewer.model.lens.presets import PRESETS
 from viewer.model.state.app_state import AppState
 from viewer.model.state.motion import SetLoop
-from viewer.model.state.optics import ApplyPreset, PresetName
+from viewer.model.state.optics_actions import ApplyPreset, PresetName
 from viewer.model.window_limits import DEPTH_STRENGTH_LIMIT
-from viewer.ui.sections.lens import aperture_slider, focus_slider
+from viewer.ui.sections.lens_section import aperture_slider, focus_slider
 from viewer.ui.widgets import button, choice, in_row, label, slider
 
 PRESET_TIPS: dict[PresetName, str] = {

@@ -12,7 +12,12 @@ from viewer.model.actions import Action, DoTask
 from viewer.model.commands import OVERLAY_WORDS
 from viewer.model.inspection_request import grid_to_compare, view_label, view_to_compare
 from viewer.model.layout import Layout
-from viewer.model.reducers.inspection import NOTHING_KEPT, lacks_kept_state, obstacle_to_comparison, obstacle_to_overlay
+from viewer.model.reducers.inspection_reducer import (
+    NOTHING_KEPT,
+    lacks_kept_state,
+    obstacle_to_comparison,
+    obstacle_to_overlay,
+)
 from viewer.model.state.app_state import AppState
 from viewer.model.state.inspection import (
     COMPARISONS,

@@ -11,7 +11,7 @@ from iibr_core.types import GridShape, ViewOffset
 from viewer.model.actions import Action
 from viewer.model.layout import Layout
 from viewer.model.state.app_state import AppState
-from viewer.model.state.optics import MoveEye
+from viewer.model.state.optics_actions import MoveEye
 from viewer.ui.style import Palette, corners, pack_color, palette_of
 
 PAD_SIDE = 136.0

@@ -67,7 +67,7 @@ def test_cells_without_blur_keep_their_bits() -> None:
     fitted = fit_to_blur(photo, blur(exact, SIGMA), start, EdgeBlur(sigmas, 32), LEAST_EDGE)
     np.testing.assert_array_equal(fitted[:, :64], start[:, :64])
     assert not np.array_equal(fitted[:, 64:], start[:, 64:])
-    too_wide = EdgeBlur(np.full((3, 4), 1.1 * blur_fit.WIDEST_SIGMA_PX, np.float32), 32)
+    too_wide = EdgeBlur(np.full((3, 4), 1.1 * blur_fit.WIDEST_FITTED_SIGMA_PX, np.float32), 32)
     assert fit_to_blur(photo, blur(exact, 5.0), start, too_wide, LEAST_EDGE) is start
 
 
@@ -171,15 +171,15 @@ def test_votes_and_moves_are_those_of_the_definition() -> None:
             vote = blur_fit._color_vote(photo, start, y, x, here, there, LEAST_EDGE, sums)
             assert vote == pytest.approx(slow_vote(photo, start, y, x, here, there), abs=1e-4)
             around, near = start[y - 1 : y + 2, x - 1 : x + 2], abs(there - here) / 2
-            fellows = np.count_nonzero(abs(around - here) < near) - np.count_nonzero(abs(around - there) < near) - 1
-            assert blur_fit._fellows(start, y, x, here, there) == fellows
+            neighbours = np.count_nonzero(abs(around - here) < near) - np.count_nonzero(abs(around - there) < near) - 1
+            assert blur_fit._same_surface_neighbours(start, y, x, here, there) == neighbours
             change = 1 - 2 * wanted / ((there - here) * (full_taps() ** 2).sum())
-            change += blur_fit.OUTLINE_WEIGHT * fellows - blur_fit.COLOR_WEIGHT * vote
+            change += blur_fit.OUTLINE_WEIGHT * neighbours - blur_fit.COLOR_WEIGHT * vote
             if change < best:
                 best, expected = change, there
-        fitted, settled = start.copy(), np.ones(SIZE, np.bool_)
-        settled[y, x] = False
-        blur_fit._move_edges(photo, fitted, missing.copy(), *cells(), LEAST_EDGE, y, y + 1, settled)
+        fitted, visited = start.copy(), np.ones(SIZE, np.bool_)
+        visited[y, x] = False
+        blur_fit._move_edges(photo, fitted, missing.copy(), *cells(), LEAST_EDGE, y, y + 1, visited)
         assert fitted[y, x] == expected
         moved += expected != here
     assert moved > 5
@@ -188,8 +188,8 @@ def test_votes_and_moves_are_those_of_the_definition() -> None:
 def test_colours_of_clean_pixels_on_both_sides_vote() -> None:
     photo, exact = disc()
     photo[exact > 1.2], photo[exact < 1.2] = [0.8, 0.2, 0.1], [0.1, 0.3, 0.7]
-    on_rim = [(45, 37), (45, 36), (45, 82), (45, 84)]
-    for y, x in on_rim:
+    on_edge = [(45, 37), (45, 36), (45, 82), (45, 84)]
+    for y, x in on_edge:
         here, there = (2.0, 0.3) if exact[y, x] > 1.2 else (exact[y, x], 2.0)
         assert blur_fit._color_vote(photo, exact, y, x, here, there, LEAST_EDGE, np.empty((2, 4))) < -0.9
         photo[y, x] = photo[5, 5] if exact[y, x] > 1.2 else photo[45, 60]

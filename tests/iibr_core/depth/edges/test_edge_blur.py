@@ -15,9 +15,11 @@ from tests.iibr_core.scenes import smooth_texture
 def disc(size: int = 160) -> tuple[np.ndarray, np.ndarray]:
     """Photo and exact disparity of a disc before a wall."""
     y, x = np.mgrid[:size, :size]
-    front = (x - 0.47 * size) ** 2 + (y - 0.52 * size) ** 2 < (size / 4) ** 2
-    photo = np.where(front[..., None], smooth_texture(size, size, 1) * [1, 0.6, 0.3], smooth_texture(size, size) * 0.4)
-    return photo.astype(np.float32), np.where(front, 2.0, 0.5).astype(np.float32)
+    foreground = (x - 0.47 * size) ** 2 + (y - 0.52 * size) ** 2 < (size / 4) ** 2
+    photo = np.where(
+        foreground[..., None], smooth_texture(size, size, 1) * [1, 0.6, 0.3], smooth_texture(size, size) * 0.4
+    )
+    return photo.astype(np.float32), np.where(foreground, 2.0, 0.5).astype(np.float32)
 
 
 @pytest.mark.parametrize("sigma", [1.0, 1.5, 2.0, 3.0, 4.0])
@@ -99,7 +101,7 @@ def found_edges(agree: float, count: int, apart: int, sigma: float = 2.0) -> np.
 
 def test_the_photo_is_believed_where_it_agrees_more_often_than_chance_has_it() -> None:
     """Chance has half of the shoulders; edges near to each other are one witness."""
-    far, near = 2 * edge_blur.WITNESS_PX, 1
+    far, near = 2 * edge_blur.SAMPLE_CELL_PX, 1
     assert edge_blur._photo_is_sure(found_edges(1.0, 8, far))
     assert not edge_blur._photo_is_sure(found_edges(0.5, 500, far))
     assert edge_blur._photo_is_sure(found_edges(0.65, 60, far))
@@ -148,7 +150,7 @@ def test_the_photo_agrees_where_it_changes_most_at_the_middle() -> None:
 def test_where_the_photo_is_not_sure_of_a_place_it_must_be_of_the_rest_and_likely_here(
     agree: float, sigma: float
 ) -> None:
-    near, far = found_edges(agree, edge_blur.WITNESSES, 1), found_edges(1.0, 900, 2 * edge_blur.WITNESS_PX)
+    near, far = found_edges(agree, edge_blur.MOST_SAMPLES, 1), found_edges(1.0, 900, 2 * edge_blur.SAMPLE_CELL_PX)
     far[0] += 10_000
     assert edge_blur._sigma_at(np.concatenate([near, far], axis=1), 100.0, 0.0) == sigma
     # Without the rest, a place must be sure by itself.
@@ -156,7 +158,7 @@ def test_where_the_photo_is_not_sure_of_a_place_it_must_be_of_the_rest_and_likel
 
 
 def test_nothing_is_soft_where_edges_measure_as_exact_ones_or_few_of_them_are_steps() -> None:
-    edges = found_edges(1.0, 200, 2 * edge_blur.WITNESS_PX)
+    edges = found_edges(1.0, 200, 2 * edge_blur.SAMPLE_CELL_PX)
     assert edge_blur._sigma_at(edges, 0.0, 0.0) == 2
     exact, hills = edges.copy(), edges.copy()
     exact[2], hills[5] = 0.7, np.arange(200) % 10 == 0
@@ -164,4 +166,4 @@ def test_nothing_is_soft_where_edges_measure_as_exact_ones_or_few_of_them_are_st
     assert edge_blur._sigma_at(hills, 0.0, 0.0) == 0
     wide = edges.copy()
     wide[2] = 40.0
-    assert edge_blur._sigma_at(wide, 0.0, 0.0) == edge_blur.WIDEST_SIGMA_PX
+    assert edge_blur._sigma_at(wide, 0.0, 0.0) == edge_blur.WIDEST_MEASURED_SIGMA_PX

@@ -37,29 +37,29 @@ def slow_distance(values):
     steps += [((y, x), (y + 1, x)) for y in range(height - 1) for x in range(width)]
     beside = [p for pair in steps if abs(values[pair[0]] - values[pair[1]]) > EDGE for p in pair]
     away = [[min(max(abs(y - v), abs(x - u)) for v, u in beside) for x in range(width)] for y in range(height)]
-    return np.minimum(away, edge_labels.BAND_PX + 1)
+    return np.minimum(away, edge_labels.LABELLED_PX + 1)
 
 
 def slow_mixed(color, colors, weights, behind, alike):
     """colors, weights: two lists each, of its own surface and the other; behind: which of both is the background."""
-    back, front = (np.average(colors[side], axis=0, weights=weights[side]) for side in (behind, 1 - behind))
-    way = front - back
-    share = (color - back) @ way / (way @ way)
-    spread = np.average(np.sum((np.array(colors[behind]) - back) ** 2, axis=1), weights=weights[behind])
-    if not max(edge_labels.LEAST_SHARE, np.sqrt(spread / (way @ way))) < share < 1:
+    background, foreground = (np.average(colors[side], axis=0, weights=weights[side]) for side in (behind, 1 - behind))
+    way = foreground - background
+    share = (color - background) @ way / (way @ way)
+    spread = np.average(np.sum((np.array(colors[behind]) - background) ** 2, axis=1), weights=weights[behind])
+    if not max(edge_labels.LEAST_FOREGROUND_SHARE, np.sqrt(spread / (way @ way))) < share < 1:
         return 0.0
-    aside = np.sum((color - back - share * way) ** 2)
+    aside = np.sum((color - background - share * way) ** 2)
     return np.exp(-aside / (2 * alike**2)) * min(np.sqrt(2 * np.pi) * alike / np.linalg.norm(way), 1)
 
 
 def slow_weigh(colors, values, unknown, distance, y, x, alike):
     own = float(values[y, x])
-    others = [p for p in around(values, y, x, edge_labels.BAND_PX + 1) if abs(values[p] - own) > EDGE]
+    others = [p for p in around(values, y, x, edge_labels.LABELLED_PX + 1) if abs(values[p] - own) > EDGE]
     if not others:
         return own, 0.0
     other = float(values[min(others, key=lambda p: (p[0] - y) ** 2 + (p[1] - x) ** 2)])
     weights, seen, likes, disparity = ([], []), ([], []), [0.0, 0.0], 0.0
-    for p in around(values, y, x, edge_labels.REACH_PX):
+    for p in around(values, y, x, edge_labels.LABEL_PX):
         apart = abs(values[p] - own), abs(values[p] - other)
         if (p[0] - y) % 2 or (p[1] - x) % 2 or min(apart) > 0.5 * abs(other - own):
             continue
@@ -70,7 +70,7 @@ def slow_weigh(colors, values, unknown, distance, y, x, alike):
         seen[side].append(colors[p].astype(np.float64))
         likes[side] += w * np.exp(-np.sum((colors[p] - colors[y, x]) ** 2) / (2 * alike**2))
         disparity += side * w * values[p]
-    if sum(weights[1]) <= edge_labels.LEAST_WEIGHT:
+    if sum(weights[1]) <= edge_labels.LEAST_COLOR_WEIGHT:
         return own, 0.0
     if own > other and sum(weights[0]) < edge_labels.LEAST_FOREGROUND:
         return own, 0.0
@@ -106,32 +106,34 @@ def slow_errors(evidence, side, distance, known):
         clear = evidence[np.logical_and.reduce([known, np.abs(evidence) > edge_labels.CLEAR, *where])]
         return ((clear < 0).sum() + 20 * expected) / (len(clear) + 20)
 
-    wrong, far = {}, edge_labels.BAND_PX
+    wrong, far = {}, edge_labels.LABELLED_PX
     for s in (0, 1):
         misled = contradicted(side == s, distance == far)
         for k in range(far + 1):
-            chance = max(misled, edge_labels.MIXED[s] if k == 0 else 0)
+            chance = max(misled, edge_labels.MIXED_SHARES[s] if k == 0 else 0)
             share = contradicted(side == s, distance == k, expected=misled)
             here = known & (side == s) & (distance == k)
             is_told = (np.abs(evidence[here]) > edge_labels.CLEAR).mean() >= edge_labels.LEAST_CLEAR
             share = share - chance if is_told and misled <= edge_labels.MOST_MISLED * share else 0
             wrong[s, k] = np.clip(share / max(1 - misled - chance, 0.1), *edge_labels.WRONG)
     misled = contradicted(distance == far)
-    return wrong, np.clip(np.log((1 - misled) / misled) / edge_labels.SURE, 0, 1)
+    return wrong, np.clip(np.log((1 - misled) / misled) / edge_labels.SURE_LOG_ODDS, 0, 1)
 
 
 def slow_labels(colors, values, unknown):
     distance = slow_distance(values)
-    band = distance <= edge_labels.BAND_PX
+    band = distance <= edge_labels.LABELLED_PX
     contrast = edge_labels._mean_color_step(colors, np.flatnonzero(band))
     other, evidence = values.astype(np.float64), np.zeros(values.shape)
     for y, x in np.argwhere(band):
-        other[y, x], evidence[y, x] = slow_weigh(colors, values, unknown, distance, y, x, edge_labels.ALIKE * contrast)
+        other[y, x], evidence[y, x] = slow_weigh(
+            colors, values, unknown, distance, y, x, edge_labels.LIKE_CONTRAST * contrast
+        )
     side = (values > other).astype(int)
     wrong, sureness = slow_errors(evidence, side, distance, ~unknown & band)
-    odds = {at: edge_labels.RELUCTANCE * np.log((1 - share) / share) for at, share in wrong.items()}
+    odds = {at: edge_labels.DATA_TERM_WEIGHT * np.log((1 - share) / share) for at, share in wrong.items()}
     drive = np.full(values.shape, np.inf)
-    for p in map(tuple, np.argwhere(band & (other != values) & (unknown | (distance < edge_labels.BAND_PX)))):
+    for p in map(tuple, np.argwhere(band & (other != values) & (unknown | (distance < edge_labels.LABELLED_PX)))):
         drive[p] = sureness * evidence[p] + (0 if unknown[p] else odds[side[p], distance[p]])
     belief = np.ones(values.shape)
     for _ in range(edge_labels.PASSES):
@@ -225,14 +227,14 @@ def test_what_is_mixed_is_the_foregrounds_several_pixels_wide():
     weight, total = np.ones(2), np.float64([[0.7, 0.75, 0.8], [0.2, 0.15, 0.1]])
     squares = (total[0] ** 2).sum()
 
-    def likelihood(share, aside=0.0, back=0):
-        color = (1 - share) * total[back] + share * total[1 - back] + [0, 0, aside]
-        return edge_labels._mixed_likelihood(color, weight, total, (total[back] ** 2).sum(), back, 0.1)
+    def likelihood(share, aside=0.0, background=0):
+        color = (1 - share) * total[background] + share * total[1 - background] + [0, 0, aside]
+        return edge_labels._mixed_likelihood(color, weight, total, (total[background] ** 2).sum(), background, 0.1)
 
     expected = np.sqrt(2 * np.pi) * 0.1 / np.linalg.norm(total[1] - total[0])
     assert [likelihood(share) for share in (0.1, 0.5, 0.95)] == pytest.approx([expected] * 3)
     assert likelihood(0.04) == likelihood(1.02) == 0
-    assert likelihood(0.3, back=1) == pytest.approx(expected)
+    assert likelihood(0.3, background=1) == pytest.approx(expected)
     assert likelihood(0.5, aside=0.2) < 0.5 * expected
     # Shares that the background's own colours have by chance tell nothing.
     away = 0.2 * np.linalg.norm(total[1] - total[0])
@@ -262,7 +264,7 @@ def test_outside_the_band_bits_stay():
     photo, _, given = square("dilated")
     given += np.random.default_rng(1).normal(0, 0.01, given.shape).astype(np.float32)
     labelled = label_edges(photo, given, np.zeros(given.shape, np.bool_), EDGE, never)
-    outside = edge_labels.step_distance(given, EDGE) > edge_labels.BAND_PX
+    outside = edge_labels.step_distance(given, EDGE) > edge_labels.LABELLED_PX
     np.testing.assert_array_equal(labelled[outside], given[outside])
 
 

@@ -20,10 +20,12 @@ CENTRE = ViewOffset(0.0, 0.0)
 def disc_before_slope(size: int = 120) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Photo, exact disparity, foreground: a tilted disc before a tilted wall."""
     y, x = np.mgrid[:size, :size]
-    front = (x - 55) ** 2 + (y - 62) ** 2 < 32**2
-    photo = np.where(front[..., None], smooth_texture(size, size, 1) * [1, 0.6, 0.3], smooth_texture(size, size) * 0.4)
-    disparity = np.where(front, 2.0 + 0.002 * x, 0.3 + 0.003 * y)
-    return photo.astype(np.float32), disparity.astype(np.float32), front
+    foreground = (x - 55) ** 2 + (y - 62) ** 2 < 32**2
+    photo = np.where(
+        foreground[..., None], smooth_texture(size, size, 1) * [1, 0.6, 0.3], smooth_texture(size, size) * 0.4
+    )
+    disparity = np.where(foreground, 2.0 + 0.002 * x, 0.3 + 0.003 * y)
+    return photo.astype(np.float32), disparity.astype(np.float32), foreground
 
 
 def rms(a: np.ndarray, b: np.ndarray) -> float:
@@ -32,11 +34,11 @@ def rms(a: np.ndarray, b: np.ndarray) -> float:
 
 @pytest.mark.parametrize("sigma", [1.0, 2.0, 4.0])
 def test_blurred_edges_become_steps_where_they_were(sigma: float) -> None:
-    photo, disparity, front = disc_before_slope()
+    photo, disparity, foreground = disc_before_slope()
     soft = blur(disparity, sigma)
     sharp = refine(photo, soft)
     assert rms(sharp, disparity) < 0.35 * rms(soft, disparity)
-    assert np.mean((sharp > 1.2) != front) < 0.01
+    assert np.mean((sharp > 1.2) != foreground) < 0.01
     flying = (sharp > 0.9) & (sharp < 1.7)
     assert flying.mean() < 0.05 * ((soft > 0.9) & (soft < 1.7)).mean()
 
@@ -48,10 +50,10 @@ def test_half_resolution_becomes_steps() -> None:
 
 
 def test_the_edge_follows_the_photo_where_the_map_is_beside_it() -> None:
-    photo, disparity, front = disc_before_slope()
+    photo, disparity, foreground = disc_before_slope()
     soft = blur(np.roll(disparity, 1, axis=1), 1.5)
     without_photo = refine(np.full_like(photo, 0.5), soft)
-    wrong, wrong_without = ((sharp > 1.2) != front for sharp in (refine(photo, soft), without_photo))
+    wrong, wrong_without = ((sharp > 1.2) != foreground for sharp in (refine(photo, soft), without_photo))
     assert wrong.sum() < 0.7 * wrong_without.sum()
 
 

@@ -117,8 +117,8 @@ def test_a_relief_beside_blurred_edges_stays_as_it_is(period: int, sigma: float)
     np.testing.assert_array_equal(refined[:, :120], soft[:, :120])
     if period < 40:
         return  # The disc's own surroundings are no flat shoulders.
-    rim = np.abs(np.hypot(x - 200, y - 80) - 35) < 2 * sigma
-    assert np.abs(refined - exact)[rim].mean() < 0.75 * np.abs(soft - exact)[rim].mean()
+    band = np.abs(np.hypot(x - 200, y - 80) - 35) < 2 * sigma
+    assert np.abs(refined - exact)[band].mean() < 0.75 * np.abs(soft - exact)[band].mean()
 
 
 @pytest.mark.parametrize("sigma", [1.0, 2.0, 4.0])

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from iibr_core.depth.multi_view.estimate import estimate_coarse
+from iibr_core.depth.multi_view.estimate_disparity import estimate_coarse
 from iibr_core.depth.multi_view.every_view import _carry, estimate_all, matched_views
 from iibr_core.runtime.tiling import Cancelled, never
 from iibr_core.training.scenes.random_scene import random_scene

@@ -12,7 +12,7 @@ from iibr_core.exports.batch import ledger
 from iibr_core.exports.batch.archive import ArchivePhoto
 from iibr_core.exports.batch.ledger import FAILURES, MANIFEST, MOST_LINE_BYTES, Ledger, require_batch_place
 from iibr_core.exports.batch.task import BatchSettings, Outcome, PhotoTask, Place, key_of
-from iibr_core.rendering.gloss.settings import Gloss
+from iibr_core.rendering.gloss.gloss_settings import Gloss
 from iibr_core.scenes.scene import Source
 from iibr_core.types import GridShape, InputError
 

@@ -19,7 +19,7 @@ from iibr_core.exports.batch.run import BatchCount, run_batch, workers_here
 from iibr_core.exports.batch.task import CLAIM_PREFIX, BatchSettings
 from iibr_core.exports.batch.workers import Workers, WorkerSource
 from iibr_core.exports.kinds import ExportKind
-from iibr_core.exports.registry import writer_of
+from iibr_core.exports.writers import writer_of
 from iibr_core.formats.images.photo import write_image
 from iibr_core.scenes.scene import Source
 from iibr_core.types import InputError, ignore_progress
@@ -165,7 +165,7 @@ def test_what_a_worker_wrote_that_died_of_it_is_ours_afterwards(
         return write
 
     with monkeypatch.context() as patch, Ledger(out) as ledger:
-        patch.setattr("iibr_core.exports.registry.writer_of", write_and_die)
+        patch.setattr("iibr_core.exports.writers.writer_of", write_and_die)
         with pytest.raises(Died):
             run_batch(ledger, DEPTH, photos_in([archive]), source_of(Lossy()), None, ignore_progress)
     assert (out / "a_depth.pfm").is_file()

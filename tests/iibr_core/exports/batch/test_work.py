@@ -12,7 +12,7 @@ from PIL import Image
 
 from iibr_core.exports.batch.task import BatchSettings, PhotoTask, Place
 from iibr_core.exports.batch.work import _claim, export_photo
-from iibr_core.rendering.gloss.settings import Gloss, GlossLight
+from iibr_core.rendering.gloss.gloss_settings import Gloss, GlossLight
 from iibr_core.scenes.scene import Source
 from iibr_core.types import GridShape
 from viewer.display.scene_drawer import open_drawn

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from iibr_core.rendering.gloss.gloss_settings import Gloss, GlossLight
 from iibr_core.rendering.gloss.light_search import find_light
 from iibr_core.rendering.gloss.microfacet import lobe_shares, reflected_share
-from iibr_core.rendering.gloss.settings import Gloss, GlossLight
 from iibr_core.runtime.tiling import Cancelled
 from tests.iibr_core.rendering.gloss.scenes import GEOMETRY, SIZE, plane, sphere
 

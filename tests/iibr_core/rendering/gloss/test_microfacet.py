@@ -5,8 +5,8 @@ from math import cos, pi, radians, sin, sqrt
 import numpy as np
 import pytest
 
+from iibr_core.rendering.gloss.gloss_settings import Gloss, GlossLight
 from iibr_core.rendering.gloss.microfacet import reflected_share
-from iibr_core.rendering.gloss.settings import Gloss, GlossLight
 
 UP = np.array([0.0, 0.0, 1.0])
 

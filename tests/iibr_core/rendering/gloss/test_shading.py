@@ -5,8 +5,8 @@ import pytest
 
 from iibr_core.color import linear_from_srgb, srgb_from_linear
 from iibr_core.rendering.gloss.geometry import SceneGeometry
+from iibr_core.rendering.gloss.gloss_settings import Gloss, GlossLight, GlossSurface
 from iibr_core.rendering.gloss.microfacet import reflected_share
-from iibr_core.rendering.gloss.settings import Gloss, GlossLight, GlossSurface
 from iibr_core.rendering.gloss.shading import make_gloss_maps, shade, shade_views
 from iibr_core.types import GridShape, InputError, ViewOffset, ViewUpdate
 from tests.iibr_core.rendering.gloss.scenes import GEOMETRY, SIZE, plane, sphere

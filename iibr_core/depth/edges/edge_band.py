@@ -1,0 +1,157 @@
+"""Edge bands: beside a depth edge maps err, and the photo's colours tell which side a pixel belongs to.
+
+What is left of the foreground on the background's disparity stays behind as a ghost when the view moves, and
+disparities between both appear detached. Where colours do not distinguish the sides nothing changes.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iibr_core.depth.edges.edge_labels import label_edges, step_distance
+from iibr_core.inpainting.disparity_by_color import fill_disparity_by_color
+from iibr_core.runtime.jit import kernel
+from iibr_core.runtime.tiling import ShouldStop, in_bands, never
+from iibr_core.stages import ALL_STAGES, Stages
+from iibr_core.types import FloatImage, image_size
+
+BAND_PX = 2
+"""Disparities between surfaces are counted among pixels with fewer others between them and a step."""
+PLATEAU_SHARE = 0.15
+"""A pixel clearly lies between two surfaces if each changes by at most this share of their distance ..."""
+PLATEAU_PX = 2
+"""... over so many pixels."""
+BETWEEN_SHARES = (0.1, 0.8)
+"""How far up from the lower to the higher of both it lies; above that, a round thing turns away from the view."""
+MIXED_EDGES = 5.0
+"""Times the least edge: what lies between nearer surfaces may be a slope."""
+LEAST_MEASURED = 0.025
+"""Where a smaller share of the edge bands is clearly between two surfaces, it shows wires or slopes."""
+LEAST_BLURRED_SHARE = 0.022
+"""Likewise of a sharpened map: where a smaller share is still between two surfaces, the blur is gone."""
+MOST_CLEAR_NEIGHBOURS = 4
+"""What is clearly between has at most so many neighbours on its own disparity."""
+MOST_NEIGHBOURS = (2, 4)
+"""So has in other maps all that lies between, on thin things too: so many within one pixel, and within two."""
+CROWD_PX = 5
+CROWDED = 0.3
+"""Where steps are at so large a share of the pixels within CROWD_PX, as in meshes, a lone value may be a wire's."""
+
+
+def resolve_edge_band(
+    photo: FloatImage,
+    values: FloatImage,
+    least_edge: float,
+    unknown: NDArray[np.bool_],
+    soft: NDArray[np.bool_] | None = None,
+    should_stop: ShouldStop = never,
+    stages: Stages = ALL_STAGES,
+) -> FloatImage:
+    """The map (H, W) with every pixel beside a depth edge on one of its two sides, by the photo (H, W, 3).
+
+    least_edge: the step that counts as a depth edge, more than 0. unknown: (H, W), where values were filled in.
+    soft: (H, W), where the map was soft before it was sharpened; None: nowhere. stages: that are on.
+    Lone disparities between two surfaces, which maps have that were measured or resampled, are taken for unknown, and
+    all that is unknown is filled anew: mixed pixels, which look like one another, had passed them on. Then pixels
+    change sides where the colours say so (`label_edges`). Raises Cancelled once should_stop is true.
+    """
+    colors = np.ascontiguousarray(photo, np.float32)
+    is_band = step_distance(values, least_edge, BAND_PX, counts_slopes=True) < BAND_PX
+    between, clear = _find_between(values, least_edge, should_stop)
+    is_measured = clear > LEAST_MEASURED * np.count_nonzero(is_band)
+    is_left = soft is not None and np.count_nonzero(between & soft) > LEAST_BLURRED_SHARE * np.count_nonzero(
+        is_band & soft
+    )
+    unsure, filled = unknown, values
+    if (is_measured or is_left) and stages.refill_between_surfaces:
+        between |= _find_between(np.where(unknown, np.float32(np.nan), values), least_edge, should_stop)[0]
+        # Where a map was not soft that has its disparities between surfaces from softness alone, it is exact.
+        unsure = between | unknown if is_measured or soft is None else (between & soft) | unknown
+        filled = fill_disparity_by_color(colors, np.where(unsure, np.float32(np.nan), values), should_stop)
+    return label_edges(colors, filled, unsure, least_edge, should_stop) if stages.label_edge_bands else filled
+
+
+def _find_between(values: FloatImage, least_edge: float, should_stop: ShouldStop) -> tuple[NDArray[np.bool_], int]:
+    """(H, W): lone pixels of no surface, between two, NaN being none; how many are so clearly."""
+    between = np.zeros(values.shape, np.bool_)
+    clear = in_bands(
+        lambda first, last: _find_between_rows(values, least_edge, first, last, between),
+        image_size(values),
+        should_stop,
+    )
+    return between, sum(clear)
+
+
+@kernel
+def _is_between(values, y, x, right, down, least_edge):
+    """Whether, along this direction, a lower plateau ends just before a pixel and a higher one begins just after it."""
+    here = values[y, x]
+    # One of the sides may begin a pixel later: edge bands are up to two pixels wide.
+    for after in range(1, 3):
+        for before in range(1, 4 - after):
+            a, b = values[y + after * down, x + after * right], values[y - before * down, x - before * right]
+            high, low = max(a, b), min(a, b)
+            if (
+                high - low > MIXED_EDGES * least_edge
+                and high - here > least_edge
+                and here - low > least_edge
+                and BETWEEN_SHARES[0] * (high - low) <= here - low <= BETWEEN_SHARES[1] * (high - low)
+            ):
+                flat, is_flat = PLATEAU_SHARE * (high - low), True
+                for beyond in range(1, PLATEAU_PX + 1):
+                    far_a = values[y + (after + beyond) * down, x + (after + beyond) * right]
+                    far_b = values[y - (before + beyond) * down, x - (before + beyond) * right]
+                    is_flat &= abs(far_a - a) <= flat and abs(far_b - b) <= flat
+                if is_flat:
+                    return True
+    return False
+
+
+@kernel
+def _find_between_rows(values, least_edge, first, last, between):
+    """Rows [first, last) of `_find_between`."""
+    height, width = values.shape
+    margin, clear = 2 + PLATEAU_PX, 0
+    for y in range(first, last):
+        for x in range(width):
+            # Neighbours above and below it, and few on its own disparity: most pixels end here.
+            neighbours, higher, lower = -1, False, False
+            for v in range(max(y - 1, 0), min(y + 2, height)):
+                for u in range(max(x - 1, 0), min(x + 2, width)):
+                    step = values[v, u] - values[y, x]
+                    higher, lower = higher or step > least_edge, lower or step < -least_edge
+                    neighbours += abs(step) <= least_edge
+            if not (higher and lower and neighbours <= MOST_CLEAR_NEIGHBOURS):
+                continue
+            if margin <= y < height - margin and margin <= x < width - margin:
+                is_clear = (
+                    _is_between(values, y, x, 1, 0, least_edge)
+                    or _is_between(values, y, x, 0, 1, least_edge)
+                    or _is_between(values, y, x, 1, 1, least_edge)
+                    or _is_between(values, y, x, 1, -1, least_edge)
+                )
+                clear += is_clear
+                between[y, x] = is_clear
+            if neighbours > MOST_NEIGHBOURS[0] or between[y, x]:
+                continue
+            # Things of two pixels and more, before one surface and behind another, have neighbours farther off.
+            neighbours = -1
+            for v in range(max(y - 2, 0), min(y + 3, height)):
+                for u in range(max(x - 2, 0), min(x + 3, width)):
+                    neighbours += abs(values[v, u] - values[y, x]) <= least_edge
+            between[y, x] = neighbours <= MOST_NEIGHBOURS[1] and not _is_crowded(values, y, x, least_edge)
+    return clear
+
+
+@kernel
+def _is_crowded(values, y, x, least_edge):
+    """Whether a pixel has depth edges all around it."""
+    height, width = values.shape
+    steps, places = 0, 0
+    for v in range(max(y - CROWD_PX, 0), min(y + CROWD_PX, height - 2) + 1):
+        for u in range(max(x - CROWD_PX, 0), min(x + CROWD_PX, width - 2) + 1):
+            right, down = abs(values[v, u + 1] - values[v, u]), abs(values[v + 1, u] - values[v, u])
+            steps += right > least_edge or down > least_edge
+            places += 1
+    return steps >= CROWDED * places

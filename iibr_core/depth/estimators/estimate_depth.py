@@ -1,0 +1,60 @@
+"""Depth by a trained model: a photo in, an estimate out whose type says what is known; kept, so that the same photo
+costs nothing the second time.
+"""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+
+from iibr_core.color import photo_in_srgb
+from iibr_core.depth.estimates import DisparityMap, Estimate, MetricDepth, RelativeInverseDepth
+from iibr_core.depth.estimators import estimate_cache
+from iibr_core.depth.estimators.config import CONFIG, PREPROCESSOR
+from iibr_core.depth.estimators.depth_estimator import LocalModel
+from iibr_core.depth.estimators.download import require_unchanged
+from iibr_core.runtime.machine import usual_budget_bytes
+from iibr_core.runtime.tiling import ShouldStop, never
+from iibr_core.types import InputError, Photo, ReportProgress, ignore_progress
+
+
+def estimate_with(
+    model: LocalModel,
+    photo: Photo,
+    memory_bytes: int | None = None,
+    should_stop: ShouldStop = never,
+    report_progress: ReportProgress = ignore_progress,
+) -> Estimate:
+    """What a model makes of a photo, at a size of the model's choosing; from the cache where it is there.
+
+    memory_bytes: what the model may take; its input is made smaller for it. Raises InputError where the model cannot
+    be used or its result is of no use, Cancelled where should_stop says so.
+    """
+    require_unchanged(model.folder)
+    photo = photo_in_srgb(photo)
+    report_progress(0, 0, f"looking for an earlier estimate by {model.title}")
+    options, run = model.family.prepare(model, photo.size, memory_bytes or usual_budget_bytes())
+    files = (model.folder / CONFIG, model.folder / PREPROCESSOR, *model.weights)
+    key = estimate_cache.key_of(photo.pixels, files, f"{model.family.packages[0]} {options}")
+    found = estimate_cache.load(key)
+    if found is None:
+        begun_s = time.monotonic()
+        found = run(photo, should_stop, report_progress)
+        _require_use(model, found)
+        estimate_cache.store(key, found)
+        estimate_cache.store_seconds(model.title, time.monotonic() - begun_s)
+    return found
+
+
+def _require_use(model: LocalModel, estimate: Estimate) -> None:
+    """Raises InputError for results that say nothing about the photo."""
+    match estimate:
+        case RelativeInverseDepth(values) | MetricDepth(values) | DisparityMap(values):
+            known = values[~np.isnan(values)] if model.family.leaves_gaps else values
+    if not known.size or not np.isfinite(known).all():
+        raise InputError(f"{model.title} gave NaN or infinity for this photo")
+    if isinstance(estimate, MetricDepth) and not (known > 0).all():
+        raise InputError(f"{model.title} gave distances of 0 or less for this photo")
+    if known.max() == known.min():
+        raise InputError(f"{model.title} gave the same depth everywhere")

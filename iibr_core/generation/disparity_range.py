@@ -1,0 +1,81 @@
+"""The range of a disparity map: how far the scene reaches from its farthest to its nearest, and how surely.
+
+Lone wild pixels do not count, small objects do; noise is no range, however far it is amplified.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from iibr_core.types import FloatImage
+
+LEAST_SHARE_PERCENT = 0.02
+"""Of the picture: what is smaller and wild does not set the range."""
+NOISE_OF_SECOND_DIFFERENCE = 1.652
+"""Median of |a - 2b + c| over the deviation of independent Gaussian noise in a, b and c."""
+LEAST_OVER_NOISE = 4.0
+"""A range that is not this often the noise's deviation is noise itself."""
+LEAST_OVER_VALUE = 1e-4
+"""A range below this share of the disparities it is found at lies beyond what maps state."""
+
+MOST_STEP = 1 / 30
+"""Of the range: maps with larger steps than five bits have are made of edges."""
+
+
+@dataclass(frozen=True)
+class DisparityRange:
+    """low, high: the farthest and the nearest disparity that count, equal where the map is flat. noise: the deviation
+    of what differs from pixel to pixel alone. All in the map's units.
+    """
+
+    low: float
+    high: float
+    noise: float
+
+    @property
+    def range(self) -> float:
+        """From the farthest to the nearest."""
+        return self.high - self.low
+
+
+def measure_disparity_range(disparity: FloatImage) -> DisparityRange:
+    """Of a map (H, W); what is not finite counts as its middle. What counts fills a square of three pixels at least,
+    and a few of those.
+    """
+    finite = np.isfinite(disparity)
+    middle = float(np.median(disparity[finite])) if finite.any() else 0.0
+    if not finite.all():
+        disparity = np.where(finite, disparity, np.float32(middle))
+    low = float(np.percentile(_of_squares(disparity, np.maximum), LEAST_SHARE_PERCENT))
+    high = float(np.percentile(_of_squares(disparity, np.minimum), 100 - LEAST_SHARE_PERCENT))
+    noise = min(_noise(disparity), _noise(disparity.T))
+    if high - low <= max(LEAST_OVER_NOISE * noise, LEAST_OVER_VALUE * max(abs(low), abs(high))):
+        return DisparityRange(middle, middle, noise)
+    return DisparityRange(low, high, noise)
+
+
+def rounding_step(disparity: FloatImage) -> float:
+    """What the values of a map (H, W) are rounded to, quarter pixels or 8 bits, say: the usual step between neighbours
+    that differ. 0 where such steps are edges; of maps that are not rounded it is their usual slope.
+    """
+    steps = np.concatenate([np.abs(np.diff(disparity, axis=axis)).ravel() for axis in (0, 1)])
+    range_ = measure_disparity_range(disparity).range
+    steps = steps[steps > LEAST_OVER_VALUE * range_]
+    step = float(np.median(steps)) if steps.size else 0.0
+    return step if step <= MOST_STEP * range_ else 0.0
+
+
+def _of_squares(values: FloatImage, extreme: np.ufunc) -> FloatImage:
+    """The extreme of all three by three pixels; of fewer where the picture is smaller."""
+    for _ in range(2):
+        values = extreme(values[1:], values[:-1]) if len(values) > 1 else values
+        values = extreme(values[:, 1:], values[:, :-1]) if values.shape[1] > 1 else values
+    return values
+
+
+def _noise(values: FloatImage) -> float:
+    """The deviation of independent noise, of the lines of the map; planes have none."""
+    second = values[:, 2:] - 2 * values[:, 1:-1] + values[:, :-2]
+    return float(np.median(np.abs(second))) / NOISE_OF_SECOND_DIFFERENCE if second.size else 0.0

@@ -1,0 +1,169 @@
+"""The photo continued beyond its frame, once, so that all views show the same there.
+
+The nearest surface of the frame goes on, and lines go straight on. Other colours are those that a surface has there,
+averaged along the frame ever wider the farther out: who can tell which of them goes on. They get the fine texture of
+what lies as far inside.
+"""
+
+from __future__ import annotations
+
+from math import hypot, log2
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iibr_core.inpainting.border_lines import find_lines, line_weight
+from iibr_core.runtime.jit import kernel, nearest_pixel
+from iibr_core.runtime.tiling import ShouldStop, in_bands, never
+from iibr_core.stages import ALL_STAGES, Stages
+from iibr_core.types import FloatImage, ImageSize, Margins, image_size
+
+BINOMIAL = np.array([1, 4, 6, 4, 1], np.float32) / 16
+"""Texture is what differs from a mean with these weights, each way."""
+SPREAD = 1.6
+"""Colours at distance r are a mean with a standard deviation of 0.41 px times 2 to the power of this, times r."""
+LINES_PX = 4.0
+"""So far from the frame all else counts half against lines; at the frame nothing, far away 1."""
+TEXTURE_SHARE, TEXTURE_PX = 0.6, 16.0
+"""So much of the photo's texture is seen far beyond its frame, half of that at this distance: its place there is a
+guess, and close to the frame nobody misses it.
+"""
+SLANT, PLACES = 2.0, 12
+"""Lines are followed from so many places each way on the frame, from up to SLANT times as far as the frame is."""
+
+
+def outpaint(
+    colors: FloatImage,
+    disparity: FloatImage,
+    margins: Margins,
+    should_stop: ShouldStop = never,
+    stages: Stages = ALL_STAGES,
+) -> tuple[FloatImage, FloatImage]:
+    """The photo's colors (H, W, 3) and disparity (H, W) in the middle of larger ones, which are filled around it.
+
+    margins: so many pixels on each side. stages: that are on. Raises Cancelled once should_stop is true.
+    """
+    size = image_size(disparity)
+    if not any(margins):
+        return colors, disparity
+    larger = margins.around(size)
+    grown, surfaces = np.empty((*larger, 3), np.float32), np.empty(larger, np.float32)
+    frame = _frame_pixels(size)
+    means = _means_along_frame(colors.reshape(-1, 3)[frame], max(margins))
+    lines = np.empty((len(frame), 2), np.float32)
+    find_lines(colors, disparity, disparity, frame, np.inf, lines)
+
+    def band(first: int, last: int) -> None:
+        _extend_rows(colors, disparity, means, margins.top, margins.left, first, last, grown, surfaces)
+        if stages.outpainted_lines:
+            _follow_lines(size.height, size.width, frame, means, lines, margins.top, margins.left, first, last, grown)
+
+    in_bands(band, larger, should_stop)
+    return grown, surfaces
+
+
+def _frame_pixels(size: ImageSize) -> NDArray[np.int64]:
+    """Flat indices (N,) of the frame's pixels, clockwise from the upper left."""
+    height, width = size
+    right, left = np.arange(1, height), np.arange(1, height - 1)[::-1]
+    top, bottom = np.arange(width), np.arange(width - 1)[::-1]
+    return np.concatenate([top, right * width + width - 1, (height - 1) * width + bottom, left * width])
+
+
+def _means_along_frame(frame: FloatImage, farthest: int) -> FloatImage:
+    """(K, N, 3): the colours of the frame's N pixels, then ever wider means of them.
+
+    The standard deviation of mean k is 0.41 sqrt(4**k - 1) px (weights 1 2 1; each step doubles the distances).
+    """
+    mean = frame.astype(np.float64)
+    means = [mean]
+    for k in range(_level(hypot(farthest, farthest)).__ceil__()):
+        mean = 0.5 * mean + 0.25 * (np.roll(mean, 2**k, axis=0) + np.roll(mean, -(2**k), axis=0))
+        means.append(mean)
+    return np.stack(means).astype(np.float32)
+
+
+@kernel
+def _level(distance):
+    """Which of `_means_along_frame` counts so far from the frame, a fraction between two."""
+    return max(SPREAD + log2(distance), 0.0)
+
+
+@kernel
+def _place_on_frame(height, width, y, x):
+    """The number of a pixel of the frame among `_means_along_frame`."""
+    if y == 0:
+        return x
+    if x == width - 1:
+        return width - 1 + y
+    if y == height - 1:
+        return 2 * (width - 1) + height - 1 - x
+    return 2 * (width - 1) + 2 * (height - 1) - y
+
+
+@kernel
+def _texture(colors, y, x, c):
+    """How a pixel differs from its surroundings; at the border its neighbours there count for those beyond."""
+    height, width, _ = colors.shape
+    mean = np.float32(0.0)
+    for j in range(-2, 3):
+        v = min(max(y + j, 0), height - 1)
+        for i in range(-2, 3):
+            mean += BINOMIAL[j + 2] * BINOMIAL[i + 2] * colors[v, min(max(x + i, 0), width - 1), c]
+    return colors[y, x, c] - mean
+
+
+@kernel
+def _extend_rows(colors, disparity, means, top, left, first, last, grown, surfaces):
+    height, width = disparity.shape
+    for row in range(first, last):
+        for column in range(grown.shape[1]):
+            y, x = min(max(row - top, 0), height - 1), min(max(column - left, 0), width - 1)
+            away = hypot(row - top - y, column - left - x)
+            if away == 0.0:
+                surfaces[row, column] = disparity[y, x]
+                for c in range(3):
+                    grown[row, column, c] = colors[y, x, c]
+                continue
+            place, level = _place_on_frame(height, width, y, x), _level(away)
+            surfaces[row, column] = disparity[y, x]
+            k = min(int(level), len(means) - 2)
+            part = np.float32(level - k)
+            # What lies as far inside, on the other side of that place, gives the texture.
+            share = np.float32(TEXTURE_SHARE * away / (away + TEXTURE_PX))
+            v = min(max(2 * y - row + top, 0), height - 1)
+            u = min(max(2 * x - column + left, 0), width - 1)
+            for c in range(3):
+                mean = means[k, place, c] + part * (means[k + 1, place, c] - means[k, place, c])
+                grown[row, column, c] = max(mean + share * _texture(colors, v, u, c), 0.0)
+
+
+@kernel
+def _follow_lines(height, width, frame, means, lines, top, left, first, last, grown):
+    """Of rows [first, last): where lines of the frame lead, they show instead, the more so the straighter they do."""
+    for row in range(first, last):
+        for column in range(grown.shape[1]):
+            y, x = min(max(row - top, 0), height - 1), min(max(column - left, 0), width - 1)
+            away = hypot(row - top - y, column - left - x)
+            if away == 0.0:
+                continue
+            place, step = _place_on_frame(height, width, y, x), SLANT * away / PLACES
+            # As wide as places lie apart.
+            level = _level(step)
+            k = min(int(level), len(means) - 2)
+            part = np.float32(level - k)
+            total = red = green = blue = 0.0
+            for j in range(-PLACES, PLACES + 1):
+                n = nearest_pixel(place + j * step) % len(frame)
+                down, across = row - top - frame[n] // width, column - left - frame[n] % width
+                weight = line_weight(lines[n, 0], lines[n, 1], down, across) * away / hypot(down, across)
+                total += weight
+                red += weight * (means[k, n, 0] + part * (means[k + 1, n, 0] - means[k, n, 0]))
+                green += weight * (means[k, n, 1] + part * (means[k + 1, n, 1] - means[k, n, 1]))
+                blue += weight * (means[k, n, 2] + part * (means[k + 1, n, 2] - means[k, n, 2]))
+            # Against all else: where lines lead is the surer the closer they are.
+            other = away / (away + LINES_PX)
+            rest = 1.0 / (other + total)
+            grown[row, column, 0] = rest * (other * grown[row, column, 0] + red)
+            grown[row, column, 1] = rest * (other * grown[row, column, 1] + green)
+            grown[row, column, 2] = rest * (other * grown[row, column, 2] + blue)

@@ -1,0 +1,244 @@
+"""Patch synthesis: gives smoothly filled holes their surface's texture. From the border inwards, each patch is copied
+from the place around that looks most like what is there (Efros & Leung, 1999; Criminisi et al., 2004).
+
+Where a patch fits what is known it is taken as it is, so that lines go on; farther in, and where nothing fits, only its
+fine texture: nobody sees that the place of that is wrong. Content is only copied within one surface. Patches overlap; a
+pixel gets a mean of what all of them show there (Wexler et al., 2007), or seams between them would look like grain.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iibr_core.runtime.jit import kernel
+from iibr_core.runtime.tiling import ShouldStop, in_pieces
+from iibr_core.types import FloatImage, ImageSize, image_size
+
+RADIUS_PX = 3
+"""Patches are 7 x 7 pixels."""
+SEARCH_PX, STEP_PX = 32, 4
+"""Places are looked for so far away each way, so far apart; then around the best."""
+GUESS = np.float32(0.6)
+"""What a pixel that is only filled smoothly counts when patches are compared; known and copied ones count 1."""
+MISSING = np.float32(0.1)
+"""Where a place does not show a pixel's surface, their colours count as this different, squared and summed."""
+FIT = np.float32(0.1)
+"""Patches that differ by this from what is known, root mean square, are hardly trusted."""
+MOST_FINE = np.float32(0.05)
+"""Larger differences are no texture: of them so much is copied where patches are not trusted."""
+LEAST_TRUST = np.float32(1e-6)
+"""In what was copied."""
+FIRST_PATCH_WEIGHT = np.float32(3.0)
+"""What the first patch over a pixel counts in the mean; those that follow count 1."""
+FINE_TEXTURE_PX = 5
+"""Texture is what differs from the mean so far around."""
+PATCH_BLOCK_PX = 64
+"""Blocks of this side are filled side by side; no two that touch."""
+
+
+def copy_patches(
+    colors: FloatImage,
+    disparity: FloatImage,
+    pure: FloatImage,
+    pixels: NDArray[np.int64],
+    number: NDArray[np.int32],
+    one_surface: float,
+    should_stop: ShouldStop,
+    threads: int,
+) -> None:
+    """Give the hole pixels, flat indices (N,), which colors (H, W, 3) hold as smoothly filled, the looks of their
+    surface. number (H, W): of each hole pixel among them, negative elsewhere. pure (H, W): disparities, NaN in holes
+    and where no surface may show purely. Surfaces are one whose disparities (H, W) differ by one_surface at most.
+    Raises Cancelled once should_stop is true.
+    """
+    smooth = np.take(colors.reshape(-1, 3), pixels, axis=0)
+    trust = np.zeros(len(pixels), np.float32)
+    shown = np.zeros((len(pixels), 4), np.float32)
+    for blocks in _blocks_apart(pixels, image_size(pure)):
+        in_pieces(
+            lambda block: _copy_block(colors, disparity, pure, number, *block, np.float32(one_surface), trust, shown),
+            blocks, should_stop, threads,
+        )  # fmt: skip
+    counts = shown[:, 3:]
+    change = np.where(counts > 0, shown[:, :3] / np.maximum(counts, 1) - smooth, np.float32(0.0))
+    parts = [slice(first, first + PATCH_BLOCK_PX**2) for first in range(0, len(pixels), PATCH_BLOCK_PX**2)]
+    in_pieces(
+        lambda part: _blend(number, pixels, part.start, smooth, change, trust, colors), parts, should_stop, threads
+    )
+
+
+def _blocks_apart(pixels: NDArray[np.int64], size: ImageSize) -> list[list[tuple[int, int]]]:
+    """Row and column of the blocks in which these pixels lie, in four lists of blocks that do not touch."""
+    columns = -(-size.width // PATCH_BLOCK_PX)
+    y, x = np.divmod(pixels, size.width)
+    is_found = np.zeros((-(-size.height // PATCH_BLOCK_PX), columns), np.bool_)
+    is_found[y // PATCH_BLOCK_PX, x // PATCH_BLOCK_PX] = True
+    found = [(int(row), int(column)) for row, column in np.argwhere(is_found)]
+    return [
+        [block for block in found if (block[0] % 2, block[1] % 2) == odd] for odd in ((0, 0), (1, 1), (0, 1), (1, 0))
+    ]
+
+
+@kernel
+def _copy_block(colors, disparity, pure, number, row, column, one_surface, trust, shown):
+    """Copy patches into the holes of a block. trust (N,): 0 of what is not copied yet. shown (N, 4): the sum of what
+    patches show, and what they count.
+    """
+    height, width = number.shape
+    top, left = row * PATCH_BLOCK_PX, column * PATCH_BLOCK_PX
+    bottom, right = min(top + PATCH_BLOCK_PX, height), min(left + PATCH_BLOCK_PX, width)
+    queue, is_queued, end = (
+        np.empty(PATCH_BLOCK_PX**2, np.int64),
+        np.zeros((PATCH_BLOCK_PX, PATCH_BLOCK_PX), np.bool_),
+        0,
+    )
+    # First those beside what is known of their surface, then what lies around each patch.
+    for y in range(top, bottom):
+        for x in range(left, right):
+            if number[y, x] < 0:
+                continue
+            for v, u in ((y - 1, x), (y + 1, x), (y, x - 1), (y, x + 1)):
+                if 0 <= v < height and 0 <= u < width and not is_queued[y - top, x - left]:
+                    is_known = number[v, u] < 0 or trust[number[v, u]] > 0
+                    if is_known and abs(disparity[v, u] - disparity[y, x]) <= one_surface:
+                        queue[end], end = y * width + x, end + 1
+                        is_queued[y - top, x - left] = True
+    tap = np.empty(((2 * RADIUS_PX + 1) ** 2, 2), np.int64)
+    patch = np.empty((len(tap), 5), np.float32)
+    first = 0
+    while first < end:
+        y, x = queue[first] // width, queue[first] % width
+        first += 1
+        if trust[number[y, x]] > 0:
+            continue
+        taps, trusted = _take_patch(colors, disparity, number, y, x, one_surface, trust, tap, patch)
+        source_y, source_x, unlike = _find_place(colors, disparity, pure, y, x, one_surface, tap[:taps], patch[:taps])
+        if source_y < 0:
+            continue
+        # As much as what it goes on from, and less where it does not fit that.
+        patch_trust = max(np.float32(trusted * np.exp(-unlike / FIT**2)), LEAST_TRUST)
+        for k in range(taps):
+            v, u, a, b = y + tap[k, 0], x + tap[k, 1], source_y + tap[k, 0], source_x + tap[k, 1]
+            i = number[v, u]
+            if i < 0 or not abs(pure[a, b] - patch[k, 3]) <= one_surface:
+                continue
+            count = np.float32(1.0)
+            if trust[i] == 0:
+                # Those that follow are compared with this one.
+                colors[v, u] = colors[a, b]
+                trust[i], count = patch_trust, FIRST_PATCH_WEIGHT
+            for c in range(3):
+                shown[i, c] += count * colors[a, b, c]
+            shown[i, 3] += count
+        for v in range(max(y - RADIUS_PX - 1, top), min(y + RADIUS_PX + 2, bottom)):
+            for u in range(max(x - RADIUS_PX - 1, left), min(x + RADIUS_PX + 2, right)):
+                if number[v, u] < 0 or trust[number[v, u]] > 0 or is_queued[v - top, u - left]:
+                    continue
+                if abs(disparity[v, u] - disparity[y, x]) <= one_surface:
+                    queue[end], end = v * width + u, end + 1
+                    is_queued[v - top, u - left] = True
+
+
+@kernel
+def _take_patch(colors, disparity, number, y, x, one_surface, trust, tap, patch):
+    """Write where a patch shows the surface of its middle, tap (M, 2), and what is there, patch (M, 5): colour,
+    disparity, what it counts. Returns M and the mean trust of what is there, which is 1 where it is known.
+    """
+    height, width = number.shape
+    taps, there, total = 0, 0, np.float32(0.0)
+    for v in range(max(y - RADIUS_PX, 0), min(y + RADIUS_PX + 1, height)):
+        for u in range(max(x - RADIUS_PX, 0), min(x + RADIUS_PX + 1, width)):
+            if abs(disparity[v, u] - disparity[y, x]) <= one_surface:
+                i = number[v, u]
+                here = np.float32(1.0) if i < 0 else trust[i]
+                tap[taps, 0], tap[taps, 1] = v - y, u - x
+                patch[taps, 0], patch[taps, 1], patch[taps, 2] = colors[v, u, 0], colors[v, u, 1], colors[v, u, 2]
+                patch[taps, 3], patch[taps, 4] = disparity[v, u], np.float32(1.0) if here > 0 else GUESS
+                taps, there, total = taps + 1, there + (1 if here > 0 else 0), total + here
+    return taps, total / max(there, 1)
+
+
+@kernel
+def _find_place(colors, disparity, pure, y, x, one_surface, tap, patch):
+    """Where the surface looks most like a patch, row and column, -1 if it shows nowhere; and by how much that differs
+    from what is known, mean square.
+    """
+    height, width = pure.shape
+    side, around = 2 * (SEARCH_PX // STEP_PX) + 1, 2 * STEP_PX - 1
+    best, best_y, best_x, middle_y, middle_x = np.float32(np.inf), -1, -1, -1, -1
+    for k in range(side**2 + around**2):
+        if k < side**2:
+            v, u = y + (k // side) * STEP_PX - SEARCH_PX, x + (k % side) * STEP_PX - SEARCH_PX
+            middle_y, middle_x = best_y, best_x
+        else:
+            j = k - side**2
+            v, u = middle_y + j // around - STEP_PX + 1, middle_x + j % around - STEP_PX + 1
+        if not (RADIUS_PX <= v < height - RADIUS_PX and RADIUS_PX <= u < width - RADIUS_PX):
+            continue
+        if not abs(pure[v, u] - disparity[y, x]) <= one_surface:
+            continue
+        unlike = np.float32(0.0)
+        for m in range(len(tap)):
+            # Within the frame: unsigned indices need no test for counting from the end.
+            a, b = np.uint64(v + tap[m, 0]), np.uint64(u + tap[m, 1])
+            if abs(pure[a, b] - patch[m, 3]) <= one_surface:
+                red, green = colors[a, b, 0] - patch[m, 0], colors[a, b, 1] - patch[m, 1]
+                blue = colors[a, b, 2] - patch[m, 2]
+                unlike += patch[m, 4] * (red * red + green * green + blue * blue)
+            else:
+                unlike += patch[m, 4] * MISSING
+            # Given up once it is worse than the best.
+            if unlike >= best:
+                break
+        if unlike < best:
+            best, best_y, best_x = unlike, v, u
+    unlike, total = np.float32(0.0), 0
+    for m in range(len(tap)):
+        a, b = best_y + tap[m, 0], best_x + tap[m, 1]
+        if best_y >= 0 and patch[m, 4] == 1:
+            total += 1
+            if abs(pure[a, b] - patch[m, 3]) <= one_surface:
+                for c in range(3):
+                    unlike += (colors[a, b, c] - patch[m, c]) ** 2
+            else:
+                unlike += MISSING
+    return best_y, best_x, unlike / max(total, 1)
+
+
+@kernel
+def _blend(number, pixels, first, smooth, change, trust, colors):
+    """Write up to PATCH_BLOCK_PX^2 hole pixels, from `first` on: what was filled smoothly (N, 3), changed (N, 3) as far
+    as it is trusted (N,).
+    """
+    height, width = number.shape
+    mean, fine = np.empty(4, np.float32), np.empty(3, np.float32)
+    # Of each column around a pixel: the sum of its changes, and their number. The next pixel needs one column more.
+    columns, before = np.empty((2 * FINE_TEXTURE_PX + 1, 4), np.float32), -2
+    for i in range(first, min(first + PATCH_BLOCK_PX**2, len(pixels))):
+        y, x = pixels[i] // width, pixels[i] % width
+        goes_on = x > 0 and pixels[i] == before + 1
+        before = pixels[i]
+        for u in range(x + FINE_TEXTURE_PX if goes_on else x - FINE_TEXTURE_PX, x + FINE_TEXTURE_PX + 1):
+            column = columns[u % len(columns)]
+            column[:] = 0.0
+            if not 0 <= u < width:
+                continue
+            for v in range(max(y - FINE_TEXTURE_PX, 0), min(y + FINE_TEXTURE_PX + 1, height)):
+                j = number[v, u]
+                if j >= 0:
+                    column[3] += 1
+                    for c in range(3):
+                        column[c] += change[j, c]
+        mean[:] = 0.0
+        for k in range(len(columns)):
+            for c in range(4):
+                mean[c] += columns[k, c]
+        most = np.float32(0.0)
+        for c in range(3):
+            fine[c] = change[i, c] - mean[c] / mean[3]
+            most = max(most, abs(fine[c]))
+        scale, share = MOST_FINE / max(most, MOST_FINE), trust[i]
+        for c in range(3):
+            changed = share * change[i, c] + (1 - share) * scale * fine[c]
+            colors[y, x, c] = max(smooth[i, c] + changed, np.float32(0.0))

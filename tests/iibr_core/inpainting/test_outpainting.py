@@ -1,0 +1,167 @@
+"""The photo beyond its frame: continued once, for all views alike."""
+
+import numpy as np
+import pytest
+
+from iibr_core.generation.outer_views import outer_views_of_grid, outpainting_margins
+from iibr_core.generation.update_loop import complete_ray_set
+from iibr_core.inpainting.outpainting import (
+    LINES_PX,
+    PLACES,
+    SLANT,
+    TEXTURE_PX,
+    TEXTURE_SHARE,
+    _level,
+    outpaint,
+)
+from iibr_core.rendering.photo_rays import rays_of_photo
+from iibr_core.rendering.view_synthesis import ViewSynthesis
+from iibr_core.runtime.tiling import Cancelled
+from iibr_core.types import GridShape, ImageSize, Margins, ViewOffset
+from tests.iibr_core.inpainting.test_background import along_line, line_slowly
+from tests.iibr_core.scenes import smooth_texture
+
+SIZE = ImageSize(24, 36)
+MARGINS = Margins(2, 5, 3, 4)
+
+
+def noise(height, width):
+    return np.random.default_rng(3).random((height, width, 3), np.float32)
+
+
+def mean_at(means, level, place):
+    k = int(level)
+    return means[k][place] * (k + 1 - level) + means[k + 1][place] * (level - k)
+
+
+def extend_slowly(colors, disparity, margins):
+    """The same, pixel by pixel, from the definitions."""
+    height, width = disparity.shape
+    places = [(0, x) for x in range(width)] + [(y, width - 1) for y in range(1, height)]
+    places += [(height - 1, x) for x in range(width - 2, -1, -1)] + [(y, 0) for y in range(height - 2, 0, -1)]
+    means = [np.array([colors[at] for at in places], np.float64)]
+    for k in range(12):
+        last = means[-1]
+        means.append(last / 2 + np.roll(last, 2**k, 0) / 4 + np.roll(last, -(2**k), 0) / 4)
+    own = np.ones(disparity.shape, bool)
+    lines = [line_slowly(colors, own, at) for at in places]
+    kernel = np.outer([1, 4, 6, 4, 1], [1, 4, 6, 4, 1]) / 256
+    around = np.pad(colors, ((2, 2), (2, 2), (0, 0)), "edge").astype(np.float64)
+    grown = np.empty((*margins.around(SIZE), 3))
+    surfaces = np.empty(margins.around(SIZE))
+    for row, column in np.ndindex(surfaces.shape):
+        y, x = np.clip(row - margins.top, 0, height - 1), np.clip(column - margins.left, 0, width - 1)
+        away = np.hypot(row - margins.top - y, column - margins.left - x)
+        if not away:
+            surfaces[row, column], grown[row, column] = disparity[y, x], colors[y, x]
+            continue
+        nearest = places.index((y, x))
+        surfaces[row, column] = disparity[y, x]
+        mean = mean_at(means, _level(away), nearest)
+        v, u = 2 * y - row + margins.top, 2 * x - column + margins.left
+        detail = colors[v, u] - np.einsum("ij,ijc->c", kernel, around[v : v + 5, u : u + 5])
+        colour = np.maximum(mean + TEXTURE_SHARE * away / (away + TEXTURE_PX) * detail, 0)
+        other, step = away / (away + LINES_PX), SLANT * away / PLACES
+        total, colour = other, other * colour
+        for j in range(-PLACES, PLACES + 1):
+            n = int(np.floor(nearest + j * step + 0.5)) % len(places)
+            way = column - margins.left - places[n][1], row - margins.top - places[n][0]
+            weight = along_line(lines[n], way) * away / np.hypot(*way)
+            total, colour = total + weight, colour + weight * mean_at(means, _level(step), n)
+        grown[row, column] = colour / total
+    return grown, surfaces
+
+
+def test_against_the_definitions():
+    colors, disparity = noise(*SIZE), noise(*SIZE)[..., 0]
+    for found, expected in zip(outpaint(colors, disparity, MARGINS), extend_slowly(colors, disparity, MARGINS)):
+        np.testing.assert_allclose(found, expected, atol=2e-6)
+
+
+def test_the_photo_stands_in_the_middle_to_the_bit_and_no_margins_leave_it_alone():
+    colors, disparity = noise(*SIZE), noise(*SIZE)[..., 0]
+    grown, surfaces = outpaint(colors, disparity, MARGINS)
+    np.testing.assert_array_equal(grown[2:-5, 3:-4], colors)
+    np.testing.assert_array_equal(surfaces[2:-5, 3:-4], disparity)
+    assert outpaint(colors, disparity, Margins())[0] is colors
+
+
+@pytest.mark.parametrize("size", [(1, 1), (1, 9), (9, 1), (2, 2)], ids=str)
+def test_tiny_photos_of_one_colour_go_on_in_it(size):
+    colors = np.full((*size, 3), 0.25, np.float32)
+    grown, _ = outpaint(colors, np.zeros(size, np.float32), Margins(7, 1, 2, 3))
+    np.testing.assert_allclose(grown, 0.25, atol=1e-6)
+
+
+def test_a_line_that_leaves_the_frame_goes_on_straight():
+    y, x = np.indices((60, 80))
+    bar = lambda y, x: np.exp(-(((x - y / 2 - 25) / 3) ** 2))  # noqa: E731
+    colors = bar(y, x)[..., None].repeat(3, axis=2).astype(np.float32)
+    grown, _ = outpaint(colors, np.zeros((60, 80), np.float32), Margins(12, 12, 12, 12))
+    for row in (4, 80):
+        expected = bar(row - 12, np.arange(104) - 12)
+        assert abs(int(grown[row, :, 0].argmax()) - int(expected.argmax())) <= 1
+        assert grown[row, :, 0].max() > 0.35
+
+
+def test_means_widen_with_the_distance():
+    assert _level(0.01) == 0
+    assert _level(1.0) < _level(2.0) < _level(64.0)
+
+
+def test_a_stop_is_heard():
+    with pytest.raises(Cancelled):
+        outpaint(noise(*SIZE), noise(*SIZE)[..., 0], MARGINS, lambda: True)
+
+
+def test_margins_are_what_the_outer_views_see_on_each_side():
+    disparity = np.zeros((160, 240), np.float32)
+    outer = outer_views_of_grid(GridShape(3, 5))
+    assert outpainting_margins(disparity, outer) == (0, 0, 0, 0)
+    disparity[:, -1] = 3.0
+    assert outpainting_margins(disparity, outer) == (0, 0, 0, 8)
+    # To the left and right alike, whatever the sign; rows move half as far; a lone pixel does not count.
+    disparity[:] = -2.0
+    disparity[0, 7] = 1e6
+    assert outpainting_margins(disparity, outer) == (4, 4, 6, 6)
+    disparity[:] = 1e6
+    assert outpainting_margins(disparity, outer) == (40, 40, 60, 60)
+
+
+def textured_wall(disparity):
+    """The ray set of a wall that moves as a whole, complete, and its size; grid 5 x 5."""
+    values = np.full((40, 44), disparity, np.float32)
+    outer = outer_views_of_grid(GridShape(5, 5))
+    rays = rays_of_photo(smooth_texture(40, 44), values, 2.0, 8, margins=outpainting_margins(values, outer))
+    complete_ray_set(rays, outer)
+    return rays
+
+
+def test_views_agree_beyond_the_frame_and_say_that_it_is_inpainted():
+    rays = textured_wall(3.0)
+    assert rays.view_size == (40, 44)
+    assert rays.size == (56, 60)
+    with ViewSynthesis() as synthesis:
+        corner, half = (synthesis.render(rays, ViewOffset(t, s)) for t, s in ((2.0, 2.0), (1.0, 1.0)))
+        photo = synthesis.render(rays, ViewOffset(0.0, 0.0))
+    np.testing.assert_array_equal(photo.colors, smooth_texture(40, 44))
+    assert not photo.inpainted.any()
+    assert not corner.occluded.any()
+    expected = np.ones((40, 44), np.bool_)
+    expected[:34, :38] = False
+    np.testing.assert_array_equal(corner.inpainted, expected)
+    # The same content, three pixels on.
+    np.testing.assert_allclose(corner.colors[:-3, :-3], half.colors[3:, 3:], atol=1e-5)
+
+
+def test_nothing_joins_the_rays_where_the_canvas_shows_all():
+    assert len(textured_wall(2.5)) == 1
+
+
+def test_what_moves_farther_than_the_canvas_reaches_is_filled_by_the_views():
+    rays = textured_wall(20.0)
+    assert rays.margins == (10, 10, 11, 11)
+    with ViewSynthesis() as synthesis:
+        view = synthesis.render(rays, ViewOffset(2.0, 2.0))
+    assert np.isfinite(view.colors).all()
+    assert view.inpainted.all()

@@ -1,0 +1,144 @@
+"""Specks are found and taken out; what stands out in the photo, too, stays."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy import ndimage
+
+from iibr_core.color import encoded_from_stored, stored_from_encoded
+from iibr_core.rendering.flying_pixels import (
+    STANDS_OUT,
+    STANDS_OUT_TIMES,
+    TEARING_GAP_PX,
+    _interpolated,
+    measure_detail,
+    without_flying_pixels,
+)
+from iibr_core.rendering.photo_rays import rays_of_photo
+from iibr_core.rendering.ray_set import OWN_SURFACE_PX, RaySet
+from iibr_core.rendering.view_synthesis import ViewSynthesis
+from iibr_core.types import ImageSize, ViewOffset
+from tests.iibr_core.scenes import smooth_texture, square_before_wall
+
+OFFSET = ViewOffset(-0.5, 1.5)
+
+
+def median(colors: np.ndarray) -> np.ndarray:
+    return ndimage.median_filter(colors, (3, 3, 1), mode="nearest")
+
+
+def slowly(
+    rays: RaySet, colors: np.ndarray, disparity: np.ndarray, inpainted: np.ndarray, detail: np.ndarray
+) -> np.ndarray:
+    """The same, pixel by pixel; views of a photo without margins."""
+    replaced, medians = colors.copy(), median(colors)
+    height, width = disparity.shape
+    for y, x in np.ndindex(height, width):
+        v, u = np.clip(np.array([y, x]) + disparity[y, x] * np.array(OFFSET), 0, [height - 1, width - 1])
+        level = rays.arrays.edge_level[0][int(v + 0.5), int(u + 0.5)]
+        is_torn = level * OWN_SURFACE_PX > TEARING_GAP_PX * rays.edge_limits(OFFSET)[0]
+        own = ndimage.map_coordinates(detail.astype(float), [[v], [u]], order=1, mode="nearest")[0]
+        stands_out = np.abs(colors[y, x] - medians[y, x]).max()
+        is_flying = is_torn and not inpainted[y, x] and stands_out > STANDS_OUT + STANDS_OUT_TIMES * own
+        if is_flying:
+            replaced[y, x] = medians[y, x]
+    return replaced
+
+
+def test_the_kernel_is_its_slow_twin() -> None:
+    rng = np.random.default_rng(5)
+    photo = np.clip(smooth_texture(30, 40) + rng.normal(0, 0.01, (30, 40, 3)), 0, 1).astype(np.float32)
+    values = np.where((np.indices((30, 40)) // 9).sum(0) % 2, 2.0, 0.5).astype(np.float32)
+    rays = rays_of_photo(photo, values, 1.5, 0)
+    detail = measure_detail(photo)
+    np.testing.assert_allclose(detail, np.abs(photo - median(photo)).max(-1), atol=1e-6)
+    with ViewSynthesis() as synthesis:
+        view = synthesis.render(rays, OFFSET)
+    colors = np.where(rng.random((30, 40, 1)) < 0.1, rng.random((30, 40, 3)), view.colors).astype(np.float32)
+    replaced = without_flying_pixels(rays, OFFSET, colors, view.disparity, view.inpainted)
+    np.testing.assert_allclose(replaced, slowly(rays, colors, view.disparity, view.inpainted, detail), atol=1e-5)
+    changed = (replaced != colors).any(-1)
+    assert changed.any()
+    assert not changed[view.inpainted].any()
+    for is_hdr in (False, True):
+        stored = stored_from_encoded(colors, is_hdr)
+        expected = slowly(rays, encoded_from_stored(stored), view.disparity, view.inpainted, detail)
+        replaced = without_flying_pixels(rays, OFFSET, stored, view.disparity, view.inpainted)
+        assert replaced.dtype == stored.dtype
+        np.testing.assert_array_equal(replaced, stored_from_encoded(expected, is_hdr))
+
+
+def test_pixels_whose_disparity_is_the_other_surfaces_are_flying() -> None:
+    """Lone foreground pixels that move with the wall, lone wall pixels that move with the foreground."""
+    photo, disparity = square_before_wall(60, 80, foreground=4.0)
+    near = disparity.values > 2
+    beside = ndimage.binary_dilation(near, iterations=2) & ~ndimage.binary_erosion(near, iterations=2)
+
+    def with_and_without(values: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        rays = rays_of_photo(photo.pixels, values, 1.5, 0)
+        with ViewSynthesis() as synthesis:
+            view = synthesis.render(rays, OFFSET)
+        return (
+            view.colors,
+            without_flying_pixels(rays, OFFSET, view.colors, view.disparity, view.inpainted),
+            view.inpainted,
+        )
+
+    truth, replaced, inpainted = with_and_without(disparity.values)
+    errors = []
+    for seed in range(4):
+        swapped = beside & (np.random.default_rng(seed).random(near.shape) < 0.05)
+        *views, also = with_and_without(np.where(swapped, 4.0 - disparity.values, disparity.values).astype(np.float32))
+        # What is inpainted is made of other patches.
+        errors.append([((colors - truth) ** 2)[~(inpainted | also)].mean() for colors in views])
+    with_flying_pixels, without = np.mean(errors, axis=0)
+    assert without < 0.75 * with_flying_pixels
+    assert ((replaced - truth) ** 2).mean() < 0.01 * with_flying_pixels
+
+
+def test_a_thin_wire_stays() -> None:
+    photo = np.full((40, 60, 3), 0.8, np.float32)
+    values = np.zeros((40, 60), np.float32)
+    rows, columns = np.arange(40), np.arange(40) // 2 + 15
+    photo[rows, columns], values[rows, columns] = 0.1, 3.0
+    rays = rays_of_photo(photo, values, 1.5, 0)
+    with ViewSynthesis() as synthesis:
+        view = synthesis.render(rays, ViewOffset(0.0, 1.0))
+    replaced = without_flying_pixels(rays, ViewOffset(0.0, 1.0), view.colors, view.disparity, view.inpainted)
+    wire = view.disparity > 2.5
+    assert wire.sum() >= 38
+    assert (replaced[wire] == view.colors[wire]).all()
+
+
+def test_the_photos_own_view_stays() -> None:
+    rng = np.random.default_rng(3)
+    photo = rng.random((20, 30, 3)).astype(np.float32)
+    values = rng.integers(0, 3, (20, 30)).astype(np.float32)
+    rays = rays_of_photo(photo, values, 1.0, 0)
+    nothing = np.zeros((20, 30), np.bool_)
+    assert (without_flying_pixels(rays, ViewOffset(0.0, 0.0), photo, values, nothing) == photo).all()
+
+
+def test_detail_between_pixels_is_bilinear() -> None:
+    size = 5, 7
+    image = np.random.default_rng(0).random(size).astype(np.float32)
+    places = np.random.default_rng(1).uniform(0, 1, (50, 2)) * np.subtract(size, 1)
+    places = np.concatenate([places, [(4, 6), (4, 0), (0, 6), (0, 0), (2, 3)]])
+    expected = ndimage.map_coordinates(image.astype(float), places.T, order=1)
+    np.testing.assert_allclose([_interpolated(image, *place) for place in places.astype(float)], expected, atol=1e-6)
+
+
+@pytest.mark.parametrize("size", [(1, 1), (1, 7), (2, 2)])
+def test_tiny_photos(size: tuple[int, int]) -> None:
+    photo, values = np.ones((*size, 3), np.float32), np.ones(size, np.float32)
+    rays = rays_of_photo(photo, values, 1.0, 0)
+    view = without_flying_pixels(rays, ViewOffset(0.0, 1.0), photo, values, np.zeros(size, np.bool_))
+    assert (view == 1).all()
+
+
+def test_rays_of_no_photo_say_so() -> None:
+    rays = RaySet(1, ImageSize(4, 5), 0.5)
+    rays.add(ViewOffset(0.0, 0.0), *(np.ones((4, 5, *more), np.float32) for more in ((3,), (), ())))
+    with pytest.raises(ValueError, match="rays_of_photo"):
+        _ = rays.photo_detail

@@ -1,0 +1,126 @@
+"""A camera that leaves the plane of the views, in a real window, by real key events."""
+
+from __future__ import annotations
+
+import threading
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from iibr_core.formats.images.photo import read_photo
+from iibr_core.types import Camera, ImageSize
+from tests.viewer.conftest import HEIGHT, WIDTH, Driver
+from viewer.app import picture_saver
+from viewer.model.actions import DoTask
+from viewer.model.free_camera import FreeCamera, Poses
+from viewer.model.state.optics_actions import SetAperture, SetFocus
+from viewer.model.state.tasks import SaveTask
+from viewer.ui.overlays.chips import CHIP
+
+
+def seen(viewer: Driver) -> np.ndarray:
+    """What the free camera sees, once that is shown."""
+    viewer.until(
+        lambda app: (
+            app.free_camera_view.shown is not None and app.free_camera_view.shown.camera == app.state.free_camera
+        )
+    )
+    viewer.until_idle()
+    return viewer.image().astype(int)
+
+
+def red_places(pixels: np.ndarray) -> np.ndarray:
+    """(N, 2): x and y of the near square, as shares of the picture."""
+    y, x = np.nonzero(pixels[..., 0] > pixels[..., 1] + 60)
+    return np.stack([x / pixels.shape[1], y / pixels.shape[0]], axis=-1)
+
+
+def test_a_step_forward_makes_what_is_near_larger_and_c_goes_back(viewer: Driver) -> None:
+    before = viewer.image()
+    viewer.send("key", "w", "key", "w")
+    viewer.until(lambda app: app.state.free_camera == FreeCamera(forward=0.1))
+    pixels = seen(viewer)
+    width = np.ptp(red_places(pixels)[:, 0])
+    assert width == pytest.approx(1 / 3 / 0.9, abs=0.02)
+    viewer.find("###leave", CHIP)
+    viewer.send("key", "c")
+    viewer.until(lambda app: app.state.free_camera is None and app.free_camera_view.shown is None)
+    viewer.until_idle()
+    np.testing.assert_array_equal(viewer.image(), before)
+
+
+def test_the_chip_says_that_it_is_off_the_plane_and_goes_back(viewer: Driver) -> None:
+    viewer.send("key", "w")
+    seen(viewer)
+    viewer.press("###leave", CHIP)
+    viewer.until(lambda app: app.state.free_camera is None)
+    assert viewer.app.state.optics.focus_disparity == 0, "nothing behind it was clicked"
+
+
+def test_looking_right_moves_everything_to_the_left(viewer: Driver) -> None:
+    viewer.send("key", "w", "key", "s", "key", "shift+d", "key", "shift+d")
+    viewer.until(lambda app: app.state.free_camera is not None and app.state.free_camera.right == pytest.approx(0.1))
+    assert red_places(seen(viewer))[:, 0].mean() == pytest.approx(0.45, abs=0.02)
+
+
+def test_the_lens_blurs_what_it_sees_and_a_saved_picture_shows_that(viewer: Driver, tmp_path: Path) -> None:
+    viewer.send("key", "w")
+    viewer.until(lambda app: app.state.free_camera is not None)
+    viewer.app.do(SetAperture(0.0))
+    sharp = seen(viewer)
+    viewer.app.do(SetAperture(3.0), SetFocus(0.0))
+    blurred = seen(viewer)
+    assert np.abs(blurred - sharp).mean() > 1.0
+    path = tmp_path / "seen.png"
+    viewer.app.do(DoTask(SaveTask(str(path), (blurred.shape[1], blurred.shape[0]))))
+    viewer.until(lambda app: path.exists() and not app.state.jobs)
+    viewer.send("key", "Escape")
+    viewer.until(lambda app: app.state.free_camera is None and app.free_camera_view.shown is None)
+    viewer.until_idle()
+    saved, beside = 255 * read_photo(path).pixels, viewer.image()
+    assert np.abs(saved - blurred).mean() < np.abs(saved - beside).mean() / 4
+
+
+def test_pictures_that_wait_show_what_the_camera_saw(
+    viewer: Driver, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each of its own camera, however far that has moved when its turn comes."""
+    app, paths = viewer.app, [tmp_path / f"{k}.png" for k in range(3)]
+    held, export = threading.Event(), picture_saver.export_picture
+
+    def export_when_held(*arguments: Any) -> Path:
+        assert held.wait(60)
+        return export(*arguments)
+
+    monkeypatch.setattr(picture_saver, "export_picture", export_when_held)
+    expected = []
+    for path in paths:
+        viewer.send("key", "w")
+        before = app.state.free_camera
+        viewer.until(lambda app, before=before: app.state.free_camera != before)  # type: ignore[misc]
+        expected.append(seen(viewer))
+        app.do(DoTask(SaveTask(str(path), (expected[-1].shape[1], expected[-1].shape[0]))))
+        viewer.until(lambda app: not app.state.tasks)
+    held.set()
+    viewer.until(lambda app: not app.state.jobs)
+    for path, image in zip(paths, expected):
+        np.testing.assert_allclose(255 * read_photo(path).pixels, image, atol=1.01)
+    assert not np.array_equal(expected[0], expected[2])
+
+
+def test_poses_are_stepped_through_and_what_sees_nothing_is_told(viewer: Driver) -> None:
+    straight = Camera(
+        np.eye(3), np.zeros(3), ImageSize(HEIGHT, WIDTH), (100.0, 100.0), ((WIDTH - 1) / 2, (HEIGHT - 1) / 2), "own"
+    )
+    aside = replace(straight, position=np.array([0.1, 0.0, 0.0]), source="aside")
+    viewer.app.state = replace(viewer.app.state, poses=Poses((straight, aside), 0))
+    viewer.send("key", "n")
+    viewer.until(lambda app: app.state.free_camera == FreeCamera(1))
+    moved_px = 100.0 * 0.1  # the nearest is 1 away
+    assert red_places(seen(viewer))[:, 0].mean() == pytest.approx(0.5 - moved_px / WIDTH, abs=0.02)
+    away = replace(straight, world_from_camera=np.diag([-1.0, 1.0, -1.0]), source="pose away")
+    viewer.app.state = replace(viewer.app.state, poses=Poses((straight, away), 0))
+    viewer.until(lambda app: any("pose away: sees nothing" in notice.text for notice in app.state.notices))

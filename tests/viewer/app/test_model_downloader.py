@@ -1,0 +1,283 @@
+"""One click from a guess to true depth, in a real window: a hub on this machine stands in for the network."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from threading import Event
+
+import numpy as np
+import pytest
+
+from iibr_core.depth.estimators import estimate_cache
+from iibr_core.depth.estimators.catalog import fetch, known_model, model_here
+from iibr_core.depth.estimators.download import VERIFIED
+from iibr_core.formats.images.photo import write_image
+from iibr_core.runtime.tiling import Cancelled, ShouldStop
+from iibr_core.scenes.scene import Source, source_beside
+from iibr_core.types import GridShape, ViewOffset, ignore_progress
+from tests.iibr_core.depth.onnx_graphs import published, weighing
+from tests.local_hub import Hub, local_hub
+from tests.viewer.conftest import Driver, Opener
+from viewer.app.main_loop import App
+from viewer.model.actions import EndGesture, OpenPath, Redo, ShowPrompt, Undo
+from viewer.model.lens.focal_plane import place_of, sharp_disparity
+from viewer.model.reducers.depth_models import offered_model
+from viewer.model.state.depth_editing import Brush, Paint, SetBrush
+from viewer.model.state.model_download import ModelsPrompt, UseModel
+from viewer.model.state.optics_actions import FocusOn, MoveEye, SetAperture, SetFocus
+from viewer.model.state.preferences import SetPreference
+
+MODEL = known_model("depth-anything-v2-small")
+GRID = GridShape(3, 3)
+GET, ESTIMATE = "Get true depth", "Estimate depth"
+
+
+def write_photo(path: Path, seed: int = 0) -> Path:
+    """A light square before a dark wall, the square in the upper half, where a guess by height has it far away."""
+    pixels = np.full((64, 96, 3), 60, np.uint8)
+    pixels[8:28, 36:66] = 220
+    pixels[60:, :4] = seed
+    write_image(path, pixels)
+    return path
+
+
+@pytest.fixture
+def hub(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Hub]:
+    with local_hub(MODEL.commit, published(tmp_path / "network")) as server:
+        server.may_finish.clear()
+        # read once, at import: HF_ENDPOINT and HF_HOME come too late here
+        monkeypatch.setattr("huggingface_hub.constants.ENDPOINT", server.address)
+        monkeypatch.setattr("huggingface_hub.constants.HF_HUB_CACHE", str(tmp_path / "hub"))
+        monkeypatch.setattr(estimate_cache, "cache_folder", lambda: tmp_path / "estimates")
+        yield server
+
+
+@pytest.fixture
+def downloaded(hub: Hub) -> Hub:
+    """The model is here already."""
+    hub.may_finish.set()
+    fetch(MODEL, ignore_progress)
+    hub.asked.clear()
+    return hub
+
+
+@pytest.fixture
+def viewer(hub: Hub, open_window: Opener, tmp_path: Path) -> Driver:
+    """A photo without depth, and what to do about that."""
+    return with_offer(open_window(write_photo(tmp_path / "photo.png"), grid=GRID))
+
+
+def with_offer(driver: Driver) -> Driver:
+    driver.until(lambda app: offered_model(app.state) is not None)
+    driver.until_idle()
+    return driver
+
+
+def is_deep(app: App) -> bool:
+    scene = app.state.scene
+    origin = scene.depth_origin if scene is not None and scene.source is app.state.source else None
+    return origin is not None and origin.kind == "model"
+
+
+def depth_kind(app: App) -> str | None:
+    scene = app.state.scene
+    return scene.depth_origin.kind if scene is not None and scene.depth_origin is not None else None
+
+
+def wall_slope(viewer: Driver) -> float:
+    """How much nearer the wall is below than above, px a view."""
+    above, below = (viewer.app.scene_view.pick(ViewOffset(0, 0), 90, y) for y in (3, 58))
+    assert above is not None
+    assert below is not None
+    return below - above
+
+
+def test_one_click_deepens_the_picture_as_it_is_seen_and_edited(viewer: Driver, hub: Hub) -> None:
+    assert depth_kind(viewer.app) == "rough"
+    assert not hub.asked, "nothing is fetched unasked"
+    at = place_of(50, 20, viewer.app.state.scene)  # type: ignore[arg-type]
+    before = viewer.app.scene_view.pick(ViewOffset(0, 0), 50, 20)
+    viewer.app.do(MoveEye(ViewOffset(0.5, -0.5)), EndGesture(), FocusOn(at, before or 0.0), SetAperture(1.0))
+    viewer.app.do(SetBrush(Brush(radius=0.1, strength=1.0)), Paint((0.1, 0.9)), EndGesture())
+    viewer.until_idle()
+    edits = viewer.app.state.depth.edits
+    assert wall_slope(viewer) > 0.5, "a guess has what is low near"
+    viewer.press(GET, "notices")
+    viewer.until(lambda app: app.state.models.downloading is not None)
+    assert viewer.app.state.prompt is None, "the click was the consent"
+    hub.may_finish.set()
+    viewer.until(is_deep)
+    viewer.until_idle()
+    state, found = viewer.app.state, model_here(MODEL)
+    assert found is not None
+    assert (found.folder / VERIFIED).is_file()
+    assert wall_slope(viewer) < 0.05, "all of the wall is as dark, and so as far away"
+    square = viewer.app.scene_view.pick(ViewOffset(0, 0), 50, 20)
+    assert square != pytest.approx(before, abs=0.05)
+    assert state.optics.eye == ViewOffset(0.5, -0.5)
+    assert state.optics.aperture_diameter == 1.0
+    assert sharp_disparity(state.optics, at) == pytest.approx(square, abs=0.02), "what was sharp is sharp"
+    assert state.depth.edits == edits
+    assert viewer.app.scene_view.loaded.depth_settings.edits == edits  # type: ignore[union-attr]
+    assert state.preferences.estimates_depth
+    assert offered_model(state) is None
+
+
+def test_undo_works_across_the_estimate(viewer: Driver, hub: Hub) -> None:
+    viewer.app.do(MoveEye(ViewOffset(0.5, 0.0)), EndGesture())
+    hub.may_finish.set()
+    viewer.press(GET, "notices")
+    viewer.until(is_deep)
+    viewer.until_idle()
+    viewer.app.do(Undo())
+    assert viewer.app.state.optics.eye == ViewOffset(0.0, 0.0)
+    viewer.app.do(Redo())
+    viewer.until_idle()
+    assert viewer.app.state.optics.eye == ViewOffset(0.5, 0.0)
+    assert is_deep(viewer.app)
+
+
+def test_one_click_cancels_the_download_and_another_goes_on_with_it(viewer: Driver, hub: Hub) -> None:
+    before = viewer.app.state.source
+    viewer.press(GET, "notices")
+    viewer.until(lambda app: app.state.models.downloading is not None)
+    viewer.press("Cancel##download", "notices")
+    viewer.until(lambda app: app.state.models.downloading is None)
+    hub.may_finish.set()
+    viewer.until_idle()
+    assert model_here(MODEL) is None
+    assert viewer.app.state.source is before
+    assert depth_kind(viewer.app) == "rough"
+    viewer.press(GET, "notices")
+    viewer.until(is_deep)
+
+
+def test_a_failed_download_says_why_and_is_offered_again(viewer: Driver, hub: Hub) -> None:
+    model = hub.files["onnx/model.onnx"]
+    hub.files["onnx/model.onnx"] = model[::-1]
+    hub.may_finish.set()
+    viewer.press(GET, "notices")
+    viewer.until(lambda app: any(notice.is_error for notice in app.state.notices))
+    assert depth_kind(viewer.app) == "rough"
+    hub.files["onnx/model.onnx"] = model
+    viewer.press(GET, "notices")
+    viewer.until(is_deep)
+
+
+def test_the_next_photo_is_estimated_unasked(downloaded: Hub, open_window: Opener, tmp_path: Path) -> None:
+    driver = with_offer(open_window(write_photo(tmp_path / "photo.png"), grid=GRID))
+    assert depth_kind(driver.app) == "rough", "nobody asked for it yet"
+    driver.press(ESTIMATE, "notices")
+    driver.until(is_deep)
+    driver.until_idle()
+    source = source_beside(driver.app.state.source, str(write_photo(tmp_path / "other.png", seed=9)))
+    seen: list[str | None] = []
+    driver.app.do(OpenPath(source))
+
+    def is_next_deep(app: App) -> bool:
+        if app.state.scene is not None and app.state.scene.source is source:
+            seen.append(depth_kind(app))
+        return app.state.scene is not None and app.state.scene.source is source and is_deep(app)
+
+    driver.until(is_next_deep)
+    assert seen[0] == "rough", "the guess comes first"
+    assert not downloaded.asked
+    driver.app.do(SetPreference("estimates_depth", False))
+    driver.app.do(OpenPath(source_beside(source, str(write_photo(tmp_path / "third.png", seed=99)))))
+    with_offer(driver)
+    assert depth_kind(driver.app) == "rough"
+
+
+def test_nothing_is_fetched_unasked(hub: Hub, open_window: Opener, tmp_path: Path) -> None:
+    hub.may_finish.set()
+    driver = open_window(write_photo(tmp_path / "photo.png"), grid=GRID)
+    driver.app.do(SetPreference("estimates_depth", True), ShowPrompt(ModelsPrompt()))
+    with_offer(driver)
+    assert not hub.asked
+
+
+def test_the_offer_is_dismissed_for_this_photo_and_comes_back_by_the_badge(viewer: Driver, tmp_path: Path) -> None:
+    first = viewer.app.state.source
+    assert first is not None
+    viewer.press("×##offer", "notices")
+    viewer.until(lambda app: offered_model(app.state) is None)
+    other = source_beside(first, str(write_photo(tmp_path / "other.png", seed=9)))
+    viewer.app.do(OpenPath(other))
+    with_offer(viewer)
+    viewer.app.do(OpenPath(replace(first)))
+    viewer.until(lambda app: app.state.scene is not None and app.state.scene.source is app.state.source)
+    viewer.until_idle()
+    assert offered_model(viewer.app.state) is None
+    viewer.press("guess", "guess")
+    viewer.until(lambda app: offered_model(app.state) is not None)
+
+
+def test_the_button_is_in_reach_where_the_panel_leaves_no_room(viewer: Driver) -> None:
+    viewer.app.do(SetPreference("font_scale", 2.3))
+    viewer.until_idle()
+    viewer.find(GET, "notices")
+
+
+def test_a_running_estimate_is_given_up_by_one_click(
+    downloaded: Hub, viewer: Driver, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def wait_to_be_stopped(source: Source, loaded: object, refine: float, should_stop: ShouldStop) -> None:
+        while not should_stop():
+            is_running.set()
+        raise Cancelled
+
+    is_running = Event()
+    with monkeypatch.context() as patched:
+        patched.setattr("viewer.background.depth_estimate.deepen", wait_to_be_stopped)
+        viewer.press(ESTIMATE, "notices")
+        viewer.until(lambda app: is_running.is_set())
+        viewer.press("Cancel##estimate", "notices")
+        with_offer(viewer)
+    assert depth_kind(viewer.app) == "rough"
+    assert not viewer.app.state.notices
+    viewer.press(ESTIMATE, "notices")
+    viewer.until(is_deep)
+
+
+def test_a_broken_model_leaves_the_guess(viewer: Driver, tmp_path: Path) -> None:
+    (tmp_path / "broken.onnx").write_bytes(b"no model")
+    viewer.app.do(UseModel(str(tmp_path / "broken.onnx")))
+    viewer.until(lambda app: any(notice.is_error for notice in app.state.notices))
+    viewer.until_idle()
+    assert depth_kind(viewer.app) == "rough"
+    assert viewer.app.state.scene is not None
+    assert viewer.app.state.scene.source is viewer.app.state.source
+
+
+def test_a_photo_opens_with_the_focus_that_it_was_left_with(
+    downloaded: Hub, open_window: Opener, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("viewer.app.session_store.QUIET_S", 0.0)
+    photo, kept = write_photo(tmp_path / "photo.png"), tmp_path / "kept"
+    first = with_offer(open_window(photo, kept_in=kept, grid=GRID))
+    first.press(ESTIMATE, "notices")
+    first.until(is_deep)
+    first.until_idle()
+    assert not list((kept / "sessions").glob("*.json")), "the user did nothing yet"
+    first.app.do(MoveEye(ViewOffset(0.5, 0.0)), SetFocus(0.25), EndGesture())
+    first.until_idle()
+    left = first.app.state.optics
+    first.app.close()
+    second = open_window(photo, kept_in=kept, grid=GRID)
+    assert second.app.state.preferences.estimates_depth
+    second.until(is_deep)
+    second.until_idle()
+    assert second.app.state.optics == left
+
+
+def test_a_file_of_ones_own_is_used_in_place_and_is_said_to_be(viewer: Driver, tmp_path: Path) -> None:
+    file = weighing(tmp_path / "own.onnx", (1, 1, 1))
+    viewer.app.do(MoveEye(ViewOffset(0.5, 0.5)), EndGesture(), UseModel(str(file)))
+    viewer.until(is_deep)
+    viewer.until_idle()
+    assert viewer.app.state.optics.eye == ViewOffset(0.5, 0.5)
+    assert viewer.app.state.source is not None
+    assert viewer.app.state.source.depth.model == str(file)
+    assert not viewer.app.state.preferences.estimates_depth

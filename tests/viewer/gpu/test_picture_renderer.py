@@ -1,0 +1,268 @@
+"""The passes against plain numpy: pinhole view, aperture sum, smoothing, exposure, and every state in between."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from iibr_core.color import linear_from_srgb, srgb_from_linear
+from iibr_core.rendering.optics import Optics
+from iibr_core.types import GridShape, ViewOffset
+from tests.image_compare import FILTERING, ROUNDING, assert_close
+from tests.viewer.gpu.scenes import TwoPlanes, rms, through_aperture
+from viewer.gpu.refocus.picture_renderer import Renderer
+from viewer.gpu.refocus.view_sampling import aperture_samples
+
+GRID = GridShape(5, 5)
+CENTRE = ViewOffset(0.0, 0.0)
+SCENE = TwoPlanes()
+GROWTH = 0.004
+"""How much a view that arrives may worsen the picture (rms, 1 = white): one more view moves a depth edge by a pixel."""
+
+
+def picture(renderer: Renderer, scene: TwoPlanes = SCENE, **optics: object) -> np.ndarray:
+    renderer.render(Optics(**optics), (scene.width, scene.height))  # type: ignore[arg-type]
+    return renderer.read_image()
+
+
+def test_centre_through_a_pinhole_is_the_photo(renderer: Renderer, tmp_path: Path) -> None:
+    random = np.random.default_rng(0)
+    photo = random.integers(0, 256, (40, 60, 3), dtype=np.uint8)
+    renderer.open_field(GridShape(9, 9), 60, 40, hdr=False, with_disparity=True)
+    renderer.upload_view(4, 4, photo, random.normal(size=(40, 60)).astype(np.float32))
+    renderer.render(Optics(focus_disparity=1.5), (60, 40))
+    assert_close(renderer.read_image(), photo, ROUNDING, tmp_path)
+
+
+@pytest.mark.parametrize("with_disparity", [True, False])
+def test_pinhole_at_stored_views_is_those_views(renderer: Renderer, tmp_path: Path, with_disparity: bool) -> None:
+    SCENE.fill(renderer, GRID, with_disparity)
+    for row, column in [(0, 0), (2, 2), (4, 1)]:
+        eye = GRID.offset(row, column)
+        assert_close(picture(renderer, eye=eye), SCENE.view(eye)[0], ROUNDING, tmp_path, f"view_{row}_{column}")
+
+
+def test_pinhole_between_views_against_the_scene(renderer: Renderer) -> None:
+    SCENE.fill(renderer, GRID)
+    for eye in (ViewOffset(0.5, 0.5), ViewOffset(-1.3, 0.2), ViewOffset(1.9, -1.7)):
+        truth = SCENE.view(eye)[0]
+        assert rms(picture(renderer, eye=eye), truth) < 0.025, "depth edges within a pixel, all else sharp"
+        assert np.median(np.abs(picture(renderer, eye=eye).astype(int) - truth)) <= 1
+
+
+def test_preview_from_one_view_against_the_scene(renderer: Renderer) -> None:
+    """Where the photo saw the surface it is right; the hole beside the disc shows background, not a stretched disc."""
+    scene = replace(SCENE, contrast=0.03)
+    scene.open(renderer, GRID)
+    scene.upload(renderer, GRID, 2, 2)
+    eye = ViewOffset(0.0, 2.0)
+    image = picture(renderer, scene, eye=eye).astype(int)
+    truth, disparity = scene.view(eye)
+    y, x = np.indices(disparity.shape)
+    inner = np.abs(x - scene.width / 2) < 40
+    disc = disparity == scene.foreground
+    x_of_hidden = scene.width / 2 - scene.background * eye.s  # where the disc of the photo covers the background
+    hidden = ~disc & (np.hypot(x - x_of_hidden, y - scene.height / 2) < scene.radius_px)
+    near_hidden = np.hypot(x - x_of_hidden, y - scene.height / 2) < scene.radius_px + 3
+    edge = (
+        np.abs(np.hypot(x - scene.width / 2 + scene.foreground * eye.s, y - scene.height / 2) - scene.radius_px) < 1.5
+    )
+    assert hidden.sum() > 50
+    assert np.abs(image - truth)[(disc | ~near_hidden) & ~edge & inner].max() <= 3
+    to_background = np.linalg.norm(image - truth[~disc].mean(0), axis=-1)
+    to_disc = np.linalg.norm(image - truth[disc].mean(0), axis=-1)
+    assert np.mean((to_background < to_disc)[hidden & ~edge]) > 0.98
+
+
+def test_pinhole_does_not_jump_as_the_eye_moves(renderer: Renderer) -> None:
+    SCENE.fill(renderer, GRID)
+    path = [ViewOffset(0.1 * k - 0.5, 0.07 * k) for k in range(12)]
+    images = [picture(renderer, eye=eye) for eye in path]
+    truths = [SCENE.view(eye)[0] for eye in path]
+    for k in range(len(path) - 1):
+        assert rms(images[k], images[k + 1]) < rms(truths[k], truths[k + 1]) + 0.02
+
+
+def test_far_outside_the_grid_stays_finite_and_close(renderer: Renderer) -> None:
+    SCENE.fill(renderer, GRID)
+    eye = ViewOffset(0.0, 4.0)
+    assert rms(picture(renderer, eye=eye), SCENE.view(eye)[0], border=14) < 0.06
+    picture(renderer, eye=ViewOffset(1e4, -1e4))
+    samples = aperture_samples(eye, 3.0, GRID, np.ones(GRID, bool))
+    offsets, weights = [sample.wanted for sample in samples], [sample.weight for sample in samples]
+    assert max(offset.s for offset in offsets) == 5.0, "the lens is not cut off where the stored views end"
+    focused = through_aperture(SCENE, offsets, weights, eye, 2.0)
+    through_lens = picture(renderer, eye=eye, focus_disparity=2.0, aperture_diameter=3.0)
+    assert rms(through_lens, focused, border=14) < 0.04
+
+
+@pytest.mark.parametrize("focus", [-1.0, 2.0, 3.0])
+@pytest.mark.parametrize("diameter", [2.0, 3.0, 99.0])
+def test_aperture_sum_against_numpy(renderer: Renderer, tmp_path: Path, focus: float, diameter: float) -> None:
+    """Whole-pixel shears and no smoothing: the same sum, so the same picture."""
+    SCENE.fill(renderer, GRID)
+    renderer.prefilter = False
+    samples = aperture_samples(CENTRE, diameter, GRID, np.ones(GRID, bool))
+    offsets, weights = [sample.wanted for sample in samples], [sample.weight for sample in samples]
+    expected = through_aperture(SCENE, offsets, weights, CENTRE, focus)
+    image = picture(renderer, focus_disparity=focus, aperture_diameter=diameter)
+    inside = slice(6, -6)  # the twin wraps at the border
+    assert_close(image[inside, inside], expected[inside, inside], FILTERING, tmp_path)
+
+
+@pytest.mark.parametrize("with_disparity", [True, False])
+@pytest.mark.parametrize("present", [1, 7, 25])
+def test_constant_photo_stays_constant(renderer: Renderer, with_disparity: bool, present: int) -> None:
+    """Whatever is summed, warped, smoothed or missing: weights are weights."""
+    renderer.open_field(GRID, 64, 48, hdr=False, with_disparity=with_disparity)
+    order = np.random.default_rng(1).permutation(25)
+    for index in (12, *order[order != 12][: present - 1]):
+        _, disparity = replace(SCENE, width=64, height=48, background=-6, foreground=9).view(
+            GRID.offset(index // 5, index % 5)
+        )
+        colors = np.full((48, 64, 3), (10, 130, 250), np.uint8)
+        renderer.upload_view(index // 5, index % 5, colors, disparity if with_disparity else None)
+    for diameter in (0.0, 0.3, 1.0, 1.5, 3.0, 50.0):
+        for focus in (-6.0, 0.0, 4.0, 40.0):
+            optics = Optics(ViewOffset(0.4, -0.7), focus_disparity=focus, aperture_diameter=diameter)
+            renderer.render(optics, (64, 48))
+            error = np.abs(renderer.read_image().astype(int) - (10, 130, 250)).max()
+            assert error <= 1, optics
+
+
+def test_small_apertures_converge_to_the_pinhole_without_a_jump(renderer: Renderer) -> None:
+    SCENE.fill(renderer, GRID)
+    diameters = [0.0, 1e-3, *np.linspace(0.1, 3, 30)]
+    images = [picture(renderer, eye=ViewOffset(0.3, 0.2), focus_disparity=2.0, aperture_diameter=d) for d in diameters]
+    assert np.array_equal(images[0], images[1])
+    steps = [rms(before, after) for before, after in pairwise(images)]
+    assert max(steps) < 0.02
+
+
+def test_aperture_edge_is_smooth_in_the_eye(renderer: Renderer) -> None:
+    SCENE.fill(renderer, GRID)
+    eyes = [ViewOffset(0.0, 0.05 * k) for k in range(21)]
+    images = [picture(renderer, eye=eye, focus_disparity=2.0, aperture_diameter=2.5) for eye in eyes]
+    assert max(rms(before, after) for before, after in pairwise(images)) < 0.01
+
+
+def test_smoothing_brings_sparse_views_near_a_dense_aperture(renderer: Renderer) -> None:
+    """Eight pixels between the copies of the background. The truth is a square aperture, one hundred views for each."""
+    scene = TwoPlanes(width=160, height=120, background=-8.0, foreground=0.0, radius_px=25.0)
+    grid = GridShape(3, 3)
+    scene.fill(renderer, grid)
+    dense = (np.arange(30) + 0.5) / 10 - 1.5
+    offsets = [ViewOffset(t, s) for t in dense for s in dense]
+    truth = through_aperture(scene, offsets, [1.0] * len(offsets), CENTRE, 0.0)
+    errors = {}
+    for renderer.prefilter in (True, False):
+        image = picture(renderer, scene, aperture_diameter=5.0)  # so wide that the grid alone cuts it off
+        errors[renderer.prefilter] = rms(image, truth, border=16)
+    assert errors[True] < 0.6 * errors[False]
+    assert errors[True] < 0.03
+
+
+def test_smoothing_leaves_what_is_in_focus_alone(renderer: Renderer, tmp_path: Path) -> None:
+    scene = TwoPlanes(background=-8.0, foreground=0.0)
+    scene.fill(renderer, GridShape(3, 3))
+    image = picture(renderer, scene, aperture_diameter=3.0)
+    photo, _ = scene.view(CENTRE)
+    y, x = np.indices(photo.shape[:2])
+    disc = np.hypot(x - scene.width / 2, y - scene.height / 2) < scene.radius_px - 2
+    assert np.abs(image.astype(int) - photo)[disc].max() <= 2
+
+
+@pytest.mark.parametrize(
+    "optics",
+    [
+        Optics(ViewOffset(1.2, -0.6)),
+        Optics(ViewOffset(0.0, 0.0), focus_disparity=2.0, aperture_diameter=3.0),
+        Optics(ViewOffset(0.4, 0.3), focus_disparity=-1.0, aperture_diameter=5.0),
+        Optics(ViewOffset(0.0, 0.5), focus_disparity=0.5, aperture_diameter=0.8),
+    ],
+)
+def test_error_never_grows_while_the_field_fills(renderer: Renderer, optics: Optics) -> None:
+    SCENE.fill(renderer, GRID)
+    size = SCENE.width, SCENE.height
+    renderer.render(optics, size)
+    final = renderer.read_image()
+    SCENE.open(renderer, GRID)
+    renderer.render(optics, size)
+    assert renderer.read_image().max() == 0, "black before the first view"
+    corners_then_inner = sorted(np.ndindex(*GRID), key=lambda at: (at != (2, 2), -np.hypot(at[0] - 2, at[1] - 2)))
+    errors = []
+    for row, column in corners_then_inner:
+        SCENE.upload(renderer, GRID, row, column)
+        renderer.render(optics, size)
+        errors.append(rms(renderer.read_image(), final, border=1))
+    assert errors[-1] == 0
+    assert errors[0] < 0.12
+    worst_growth = max(after - min(errors[: k + 1]) for k, after in enumerate(errors))
+    assert worst_growth < GROWTH, errors
+
+
+def test_views_without_disparity_are_sheared_to_the_focus(renderer: Renderer, tmp_path: Path) -> None:
+    """Halfway between two views, with focus on a plane: that plane is where it should be, seen from in between."""
+    scene = TwoPlanes(background=2.0, foreground=2.0)
+    scene.fill(renderer, GRID, with_disparity=False)
+    eye = ViewOffset(0.0, 0.5)
+    image = picture(renderer, scene, eye=eye, focus_disparity=2.0)
+    inside = slice(3, -3)
+    assert_close(image[inside, inside], scene.view(eye)[0][inside, inside], FILTERING, tmp_path)
+
+
+def test_one_view_without_disparity_leaves_the_picture_unsmoothed(renderer: Renderer) -> None:
+    """Its defocus is not known; the rest must not be smoothed by a guess."""
+    scene = TwoPlanes(background=-8.0, foreground=0.0)
+    scene.fill(renderer, GridShape(3, 3))
+    images = []
+    for with_disparity in (True, False):
+        scene.upload(renderer, GridShape(3, 3), 0, 1, with_disparity)
+        for renderer.prefilter in (True, False):
+            images.append(picture(renderer, scene, aperture_diameter=3.0))
+    assert not np.array_equal(images[0], images[1])
+    assert np.array_equal(images[2], images[3])
+
+
+def test_exposure_and_srgb_of_hdr(renderer: Renderer) -> None:
+    ramp = np.geomspace(0.001, 30, 48).astype(np.float16)
+    colors = np.repeat(ramp[None, :, None], 4, axis=0).repeat(3, axis=2)
+    renderer.open_field(GridShape(1, 1), 48, 4, hdr=True, with_disparity=False)
+    renderer.upload_view(0, 0, colors, None)
+    for stops in (-4.0, 0.0, 2.5):
+        renderer.render(Optics(exposure_stops=stops), (48, 4))
+        expected = np.clip(srgb_from_linear(linear_from_srgb(ramp.astype(np.float32)) * 2**stops), 0, 1) * 255
+        assert np.abs(renderer.read_image()[2, :, 0] - expected).max() <= 1
+
+
+def test_row_zero_is_the_top(renderer: Renderer) -> None:
+    colors = np.zeros((4, 6, 3), np.uint8)
+    colors[0], colors[:, 0] = (255, 0, 0), (0, 255, 0)
+    renderer.open_field(GridShape(1, 1), 6, 4, hdr=False, with_disparity=False)
+    renderer.upload_view(0, 0, colors, None)
+    renderer.render(Optics(), (6, 4))
+    assert np.array_equal(renderer.read_image(), colors)
+
+
+def test_other_sizes_and_fields_follow_each_other(renderer: Renderer) -> None:
+    for grid, size in ((GridShape(1, 1), (33, 17)), (GridShape(3, 3), (64, 48)), (GridShape(1, 7), (1, 1))):
+        scene = TwoPlanes(*size)
+        scene.fill(renderer, grid)
+        for out in ((33, 17), (1, 1), (200, 3)):
+            renderer.render(Optics(ViewOffset(0.2, 0.1), focus_disparity=0.5, aperture_diameter=2.0), out)
+            assert renderer.read_image().shape == (out[1], out[0], 3)
+            assert renderer.ctx.error == "GL_NO_ERROR"
+
+
+def test_more_views_than_one_draw_holds(renderer: Renderer) -> None:
+    """The sum is split into several draws; a constant field shows whether the weights still add up."""
+    grid = GridShape(25, 25)
+    renderer.open_field(grid, 4, 4, hdr=False, with_disparity=False)
+    for row, column in np.ndindex(*grid):
+        renderer.upload_view(row, column, np.full((4, 4, 3), 100, np.uint8), None)
+    renderer.render(Optics(aperture_diameter=99.0), (4, 4))
+    assert np.abs(renderer.read_image().astype(int) - 100).max() <= 1

@@ -1,0 +1,193 @@
+"""Pictures drawn in parts: nothing twice, nothing left out, no seams, and light beyond 8 bits."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from iibr_core.color import srgb_from_linear
+from iibr_core.exports.render_settings import RenderSettings
+from iibr_core.rendering.optics import ApertureShape, Optics
+from iibr_core.types import GridShape, ViewOffset
+from tests.viewer.gpu.scenes import TwoPlanes
+from viewer.gpu.context import GLContext
+from viewer.gpu.refocus.picture_renderer import Renderer
+from viewer.gpu.refocus.picture_tiling import MARGIN_PX, PART_PX, picture_tiles
+
+GRID = GridShape(5, 5)
+SCENE = TwoPlanes(width=160, height=120, background=-6.0, foreground=1.0, radius_px=25.0)
+LARGE = 384, 256
+"""Whole tiles: those of the parts are then the same."""
+
+
+@given(width=st.integers(1, 9000), height=st.integers(1, 700), largest=st.integers(64, 4096))
+def test_every_pixel_is_kept_once_and_no_part_is_too_large(width: int, height: int, largest: int) -> None:
+    kept = np.zeros((height, width), np.uint8)
+    for part in picture_tiles((width, height), largest):
+        assert max(part.size_px) <= min(largest, PART_PX)
+        rows, columns = part.kept_of_drawn
+        assert 0 <= rows.start <= rows.stop <= part.size_px[1]
+        assert 0 <= columns.start <= columns.stop <= part.size_px[0]
+        kept[part.kept] += 1
+        assert kept[part.kept].shape == (rows.stop - rows.start, columns.stop - columns.start)
+        left, top, across, down = part.window
+        first_px = part.kept[1].start - columns.start, part.kept[0].start - rows.start
+        assert (left * width, top * height) == pytest.approx(first_px)
+        assert (across * width, down * height) == pytest.approx(part.size_px)
+    assert (kept == 1).all()
+
+
+def test_parts_overlap_as_far_as_light_is_spread() -> None:
+    for part in picture_tiles((6000, 3000), 16384):
+        for axis, length in ((0, 3000), (1, 6000)):
+            kept, of_drawn, size = part.kept[axis], part.kept_of_drawn[axis], part.size_px[1 - axis]
+            assert of_drawn.start == (0 if kept.start == 0 else MARGIN_PX)
+            assert size - of_drawn.stop >= MARGIN_PX or kept.start - of_drawn.start + size >= length
+
+
+OPTICS = [
+    Optics(ViewOffset(0.3, -0.7)),
+    Optics(ViewOffset(0.3, 0.2), focus_disparity=1.0, aperture_diameter=4.0),
+    Optics(
+        ViewOffset(0.0, 0.4),
+        dolly=1.5,
+        focus_disparity=-2.0,
+        focus_tilt=(2.0, 1.0),
+        aperture_diameter=1.6,
+        aperture_shape=ApertureShape("cat_eye", cat_eye=1.0),
+    ),
+]
+
+
+@pytest.mark.parametrize("optics", OPTICS)
+def test_parts_have_no_seams(
+    renderer: Renderer, gl: GLContext, monkeypatch: pytest.MonkeyPatch, optics: Optics
+) -> None:
+    SCENE.fill(renderer, GRID)
+    whole = renderer.converged_picture(RenderSettings(optics, LARGE)).astype(int)
+    monkeypatch.setattr(gl, "max_texture_size", 160)
+    assert len(picture_tiles(LARGE, gl.max_texture_size)) == 12
+    in_parts = renderer.converged_picture(RenderSettings(optics, LARGE))
+    difference = np.abs(in_parts - whole).max(-1)
+    assert np.mean(difference > 2) < 0.001, "rounding may decide a depth edge otherwise here and there"
+    assert np.mean(difference) < 0.05
+
+
+def test_the_converged_picture_is_what_refining_ends_at(renderer: Renderer) -> None:
+    SCENE.fill(renderer, GRID)
+    for optics in OPTICS:
+        renderer.render(optics, (160, 120))
+        renderer.refine()
+        assert np.array_equal(renderer.read_image(), renderer.converged_picture(RenderSettings(optics, (160, 120))))
+
+
+def test_light_is_finer_than_eight_bits_and_not_cut_off(renderer: Renderer) -> None:
+    ramp = np.linspace(0.2, 3.0, 64).astype(np.float16)
+    renderer.open_field(GridShape(1, 1), 64, 4, hdr=True, with_disparity=False)
+    renderer.upload_view(0, 0, np.repeat(np.tile(ramp[None, :, None], (4, 1, 1)), 3, axis=2), None)
+    light = renderer.converged_picture(RenderSettings(Optics(exposure_stops=1.0), (64, 4), is_linear=True))
+    assert light.dtype == np.float32
+    assert srgb_from_linear(light[1, :, 0] / 2) == pytest.approx(ramp.astype(float), rel=2e-3)
+    assert light.max() > 5
+    encoded = renderer.converged_picture(RenderSettings(Optics(exposure_stops=1.0), (64, 4)))
+    assert np.abs(np.clip(srgb_from_linear(light), 0, 1) * 255 - encoded).max() <= 0.51
+
+
+def test_light_between_the_steps_of_eight_bits(renderer: Renderer) -> None:
+    """A sum of many samples takes more values than 256."""
+    SCENE.fill(renderer, GRID)
+    light = renderer.converged_picture(RenderSettings(OPTICS[1], (160, 120), is_linear=True))
+    steps = srgb_from_linear(light) * 255
+    assert np.mean(np.abs(steps - np.rint(steps)) > 0.1) > 0.5
+
+
+@pytest.mark.parametrize("is_linear", [False, True])
+@pytest.mark.parametrize("optics", OPTICS)
+def test_a_picture_drawn_in_steps_is_the_one_drawn_at_once(
+    renderer: Renderer, gl: GLContext, monkeypatch: pytest.MonkeyPatch, optics: Optics, is_linear: bool
+) -> None:
+    SCENE.fill(renderer, GRID)
+    settings = RenderSettings(optics, (192, 96), is_linear=is_linear)
+    monkeypatch.setattr(gl, "max_texture_size", 160)
+    assert len(picture_tiles(settings.size_px, gl.max_texture_size)) > 1
+    at_once = renderer.converged_picture(settings)
+    monkeypatch.setattr("viewer.gpu.refocus.picture_drawing.STEP_S", 1e-5)
+    drawing = renderer.start_picture(settings)
+    seen = [drawing.progress]
+    while not drawing.is_done:
+        drawing.advance(budget_s=0.0)
+        seen.append(drawing.progress)
+    assert len(seen) > 50, "a step is small"
+    assert seen == sorted(seen)
+    assert (seen[0], seen[-1]) == (0.0, 1.0)
+    np.testing.assert_array_equal(drawing.image, at_once)
+
+
+def test_the_picture_on_the_screen_is_drawn_between_the_steps(
+    renderer: Renderer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Dragging while a picture is saved: neither disturbs the other."""
+    SCENE.fill(renderer, GRID)
+    monkeypatch.setattr("viewer.gpu.refocus.picture_drawing.STEP_S", 1e-4)
+    saved, alone = Optics(ViewOffset(0.3, 0.2), aperture_diameter=4.0), []
+    expected = renderer.converged_picture(RenderSettings(saved, (160, 120)))
+    eyes = [Optics(ViewOffset(0.1 * i, -0.2), dolly=0.5, aperture_diameter=2.0) for i in range(5)]
+    for optics in eyes:
+        renderer.render(optics, (80, 60))
+        alone.append(renderer.read_image())
+    drawing = renderer.start_picture(RenderSettings(saved, (160, 120)))
+    for optics, image in zip(eyes, alone):
+        drawing.advance(budget_s=0.0)
+        renderer.render(optics, (80, 60))
+        np.testing.assert_array_equal(renderer.read_image(), image)
+    assert not drawing.is_done
+    drawing.advance()
+    np.testing.assert_array_equal(drawing.image, expected)
+    np.testing.assert_array_equal(renderer.read_image(), alone[-1])
+
+
+def test_views_that_come_while_a_picture_is_drawn_are_not_seen_in_it(renderer: Renderer) -> None:
+    SCENE.open(renderer, GRID)
+    for view in ((0, 0), (2, 2)):
+        SCENE.upload(renderer, GRID, *view)
+    optics = Optics(ViewOffset(0.3, 0.2), aperture_diameter=4.0)
+    expected = renderer.converged_picture(RenderSettings(optics, (160, 120)))
+    drawing = renderer.start_picture(RenderSettings(optics, (160, 120)))
+    drawing.advance(budget_s=0.0)
+    SCENE.upload(renderer, GRID, 4, 4)
+    drawing.advance()
+    assert drawing.is_done
+    np.testing.assert_array_equal(drawing.image, expected)
+
+
+def test_another_field_changes_nothing_in_a_picture_that_is_being_drawn(renderer: Renderer) -> None:
+    """It holds the arrays that it is drawn from, until it is stopped."""
+    SCENE.fill(renderer, GRID)
+    settings = RenderSettings(Optics(aperture_diameter=4.0), (160, 120))
+    expected = renderer.converged_picture(settings)
+    drawing, field = renderer.start_picture(settings), renderer.field
+    assert field is not None
+    drawing.advance(budget_s=0.0)
+    renderer.open_field(GridShape(1, 1), 8, 8, hdr=False, with_disparity=False)
+    assert not field.is_shared, "the drawing alone holds it"
+    drawing.advance()
+    np.testing.assert_array_equal(drawing.image, expected)
+    drawing.stop()
+    assert drawing.is_done
+    assert not drawing.is_stopped
+
+
+def test_a_picture_that_is_stopped_stays_unfinished(renderer: Renderer) -> None:
+    SCENE.fill(renderer, GRID)
+    drawing = renderer.start_picture(RenderSettings(Optics(aperture_diameter=4.0), (160, 120)))
+    drawing.advance(budget_s=0.0)
+    assert renderer.field is not None
+    assert renderer.field.is_shared
+    for _ in range(2):
+        drawing.stop()
+    assert drawing.is_stopped
+    assert not renderer.field.is_shared
+    drawing.advance()
+    assert not drawing.is_done

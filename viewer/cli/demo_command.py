@@ -1,0 +1,59 @@
+"""`iibr demo`: the window on the photo that comes along, or pictures of it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from iibr_core.formats import make_folder, require_files_in
+from iibr_core.scenes import inputs_of
+from iibr_core.types import InputError
+from viewer.cli.shared_options import SCREEN_SIZE
+from viewer.cli.terminal import show_progress
+from viewer.model.demo_photo import demo_photo
+
+if TYPE_CHECKING:
+    from iibr_core.scenes import Source
+
+DEMO_FOLDER = Path("out")
+
+
+def demo() -> None:
+    """Open the viewer on the demo photo; without a display, render it to out/demo.png and out/demo-views.png.
+
+    Example: iibr demo
+    """
+    from iibr_core.scenes import Source
+    from viewer.app.main_loop import App, initial_state
+    from viewer.app.preferences_store import user_folder
+    from viewer.model.actions import OpenPath
+
+    source = Source(str(demo_photo()))
+    try:
+        window = App(initial_state(OpenPath(source, is_demo=True)), user_folder())
+    except InputError as error:
+        _demo_pictures(source, str(error))
+        return
+    try:
+        window.run()
+    finally:
+        window.close()
+
+
+def _demo_pictures(source: Source, why: str) -> None:
+    """why: there is no window, for people."""
+    from viewer.app.contact_sheet import contact_sheet
+    from viewer.app.headless import HeadlessViewer
+    from viewer.app.image_export import export_image
+
+    window, views = DEMO_FOLDER / "demo.png", DEMO_FOLDER / "demo-views.png"
+    require_files_in(DEMO_FOLDER, (window.name, views.name), inputs_of(source), may_replace=True)
+    make_folder(DEMO_FOLDER)
+    print(f"{why}. Rendering without one.")
+    with HeadlessViewer() as viewer:
+        with show_progress("reading") as show:
+            viewer.open(source, 1.0, lambda made: show(made.share, float(made.total > 0), made.doing))
+        export_image(window, viewer.screen(SCREEN_SIZE) if viewer.has_panels else viewer.picture())
+        export_image(views, contact_sheet(viewer))
+    print(f"{window}: the viewer's window")
+    print(f"{views}: viewpoints above, focus from near to far below")

@@ -1,0 +1,78 @@
+"""`iibr view`: the window."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from iibr_core.formats import is_light_field
+from iibr_core.types import InputError
+from viewer.cli.free_views_command import poses_of, require_poses_for
+from viewer.cli.option_records import with_option_records
+from viewer.cli.scene_options import SceneOptions, require_heeded
+from viewer.cli.shared_options import (
+    SCENE_HELP,
+    FocusDisparity,
+    Grid,
+    PhotoPose,
+    PosesFile,
+    require_existing,
+    require_memory,
+    require_model,
+    require_utf8,
+)
+from viewer.model.demo_photo import demo_photo
+
+
+def open_window() -> None:
+    """The window with what was open last, if that is still there. Raises InputError where no window can be opened."""
+    from iibr_core.scenes import Source
+    from viewer.app.main_loop import initial_state, run
+    from viewer.app.preferences_store import last_opened, user_folder
+    from viewer.model.actions import OpenPath
+    from viewer.model.state.app_state import AppState
+
+    last = last_opened(user_folder())
+    run(initial_state(OpenPath(Source(last))) if last is not None else AppState(), user_folder())
+
+
+@with_option_records
+def view(
+    context: typer.Context,
+    path: Annotated[Path | None, typer.Argument(help=SCENE_HELP, show_default="a demo")] = None,
+    *,
+    scene: SceneOptions,
+    focus_disparity: FocusDisparity = None,
+    grid: Grid = None,
+    poses: PosesFile = None,
+    photo_pose: PhotoPose = None,
+    ground_truth: Annotated[
+        Path | None,
+        typer.Option("--ground-truth", metavar="FOLDER", help="A light field to compare with.", show_default=False),
+    ] = None,
+) -> None:
+    """Open the viewer.
+
+    Example: iibr view holiday.jpg --disparity holiday.pfm
+    """
+    require_utf8(path, scene.disparity, scene.depth_model, ground_truth, poses)
+    path = path.absolute() if path else demo_photo()
+    source = scene.source(path, grid, focus_disparity)
+    require_heeded(context, path)
+    require_memory(scene.memory, keeps_views=True)
+    require_existing(source)
+    require_model(source.depth)
+    if ground_truth is not None and not is_light_field(ground_truth):
+        raise InputError(f"{ground_truth}: is not a folder; --ground-truth names one with the views of a light field")
+    require_poses_for(photo_pose, poses)
+    if poses is not None and is_light_field(path):
+        raise InputError(f"--poses: {path} is a light field, whose views stand where they stand; open a photo with it")
+    cameras = None if poses is None else poses_of(poses, photo_pose)
+    from viewer.app.main_loop import initial_state, run
+    from viewer.app.preferences_store import user_folder
+    from viewer.model.actions import OpenPath
+
+    truth = str(ground_truth.absolute()) if ground_truth else None
+    run(initial_state(OpenPath(source), scene.depth_strength, truth, cameras), user_folder())

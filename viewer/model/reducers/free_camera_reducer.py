@@ -1,0 +1,42 @@
+"""What becomes of the state when the camera leaves the plane of the views, or goes back."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from viewer.model.free_camera import (
+    CameraProgress,
+    FreeCamera,
+    FreeCameraAction,
+    LeaveCamera,
+    MoveCamera,
+    StepPose,
+    moved,
+    stepped,
+)
+from viewer.model.lens.photographic_units import mean_depth
+from viewer.model.reducers.notices_reducer import add_notice
+from viewer.model.state.app_state import AppState
+from viewer.model.state.notices import Notice
+
+FOR_PHOTOS = "A light field from disk has views from its own plane only: open a photo to look around."
+NO_POSES = "There are no poses: the photo was opened without any."
+
+
+def reduce_free_camera(state: AppState, action: FreeCameraAction) -> AppState:
+    """The state after one of these actions. The lens is the free camera's, too."""
+    if isinstance(action, LeaveCamera):
+        return replace(state, free_camera=None)
+    if isinstance(action, CameraProgress):
+        return replace(state, free_progress=action.done)
+    if state.scene is None:
+        return state
+    if state.scene.plan is None:
+        return add_notice(state, Notice(FOR_PHOTOS))
+    camera = state.free_camera or FreeCamera()
+    match action:
+        case MoveCamera():
+            return replace(state, free_camera=moved(camera, action, mean_depth(state.scene)))
+        case StepPose(steps) if state.poses is not None:
+            return replace(state, free_camera=stepped(camera, state.poses, steps))
+    return add_notice(state, Notice(NO_POSES))

@@ -1,0 +1,59 @@
+"""The panel's section for the viewpoint: the pad, and beside and below it how fast loops go, and dolly."""
+
+from __future__ import annotations
+
+from imgui_bundle import imgui
+
+from iibr_core.exports import LOOPS
+from iibr_core.scenes import Scene, dolly_limit
+from viewer.model.actions import Action
+from viewer.model.layout import Layout
+from viewer.model.state.app_state import AppState
+from viewer.model.state.motion import PauseMotion, ReturnHome, SetSpeed
+from viewer.model.state.optics_actions import SetOptics
+from viewer.model.window_limits import SPEED_LIMITS
+from viewer.ui.sections.viewpoint_pad import pad
+from viewer.ui.widgets import button, slider, tooltip
+
+PAD_TIP = "Drag to move the viewpoint. Dots are views, faint ones still to be made; beyond the light area is a guess."
+RECENTER_TIP = "Glide back to the photo's own viewpoint (double click, or C)."
+PAUSE_TIP = "Hold the motion where it is, or let it run again (Space)."
+SPEED_TIP = "How fast a motion goes round."
+
+
+def view_section(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
+    """Build the section."""
+    actions = pad(state, scene, layout)
+    if not state.motion.is_running:
+        tooltip("" if imgui.is_item_active() else PAD_TIP, layout)
+    imgui.same_line()
+    imgui.begin_group()
+    actions += _beside_pad(state, layout)
+    _place(state)
+    imgui.end_group()
+    speed = slider("Speed", state.motion.speed, SPEED_LIMITS, "%.2f turns/s", layout, SPEED_TIP, is_logarithmic=True)
+    actions += [] if speed is None else [SetSpeed(speed)]
+    if farthest := dolly_limit(scene.grid):
+        tip = "Step into the picture, or back out of it. The end of the slider is as far as the views reach."
+        dolly = slider("Dolly", state.optics.dolly, (-farthest, farthest), "%+.2f views", layout, tip)
+        actions += [] if dolly is None else [SetOptics("dolly", dolly)]
+    return actions
+
+
+def _beside_pad(state: AppState, layout: Layout) -> list[Action]:
+    """Back to the photo's own viewpoint, and a loop held."""
+    actions: list[Action] = []
+    width = imgui.get_content_region_avail().x
+    if button("Recenter", layout, RECENTER_TIP, width=width):
+        actions.append(ReturnHome())
+    word = "Resume" if state.motion.is_paused else "Pause"
+    if button(f"{word}##motion", layout, PAUSE_TIP, state.motion.kind in LOOPS, width):
+        actions.append(PauseMotion(not state.motion.is_paused))
+    return actions
+
+
+def _place(state: AppState) -> None:
+    """Where the viewpoint is, in one line that never wraps."""
+    eye = state.optics.eye
+    s, t = (round(value, 1) + 0.0 for value in (eye.s, eye.t))  # + 0.0 takes the sign of -0.0 away
+    imgui.text_disabled(f"{abs(s):.1f} {'←' if s < 0 else '→'}  {abs(t):.1f} {'↑' if t < 0 else '↓'}")
