@@ -290,4 +290,4 @@ def test_browse_brings_a_place_back_to_the_prompt_and_it_is_remembered(viewer: D
     viewer.until(lambda app: (tmp_path / "there" / "a.html").exists())
     viewer.app.do(AskToExport())
     assert isinstance(viewer.app.state.prompt, ExportPrompt)
-    assert viewer.app.state.prompt.path == str(tmp_path / "there" / "scene-iibr.html")
+    assert viewer.app.state.prompt.path == str(tmp_path / "there" / "scene-web.html")
