@@ -15,9 +15,11 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 # The same for pictures that Mesa draws without a GPU: each worker draws in its own thread.
 os.environ.setdefault("LP_NUM_THREADS", "0")
 
-# Where the caller ignores interruptions, as jobs in the background do, programs that are started here would, too.
+# Where the caller ignores signals, as jobs in the background and nohup do, programs that are started here would, too.
 if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
+if hasattr(signal, "SIGHUP"):
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 # The first example of a test may compile a kernel, which takes seconds; nothing is timed in a test anyway.
 settings.register_profile("untimed", deadline=None)

@@ -21,7 +21,7 @@ def files_of(cell: str) -> list[Path]:
     """Names without a folder lie in that of the name before."""
     found: list[Path] = []
     for name in re.findall(r"`([\w/.]+)`", cell):
-        place = ROOT / name if name.startswith(("viewer/", "shaders/")) else ROOT / "iibr_core" / name
+        place = ROOT / name if name.startswith(("viewer/", "shaders/", "web/")) else ROOT / "iibr_core" / name
         found.append(found[-1].parent / name if "/" not in name and found else place)
     return found
 

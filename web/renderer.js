@@ -464,7 +464,8 @@ export class Renderer {
             spread([foreground, background], across, [1 / across.width, 0]);
             spread(across.textures, smooth, [0, 1 / smooth.height]);
             const [smooth_foreground, smooth_background] = smooth.textures;
-            Object.assign(textures, { foreground_layer: foreground, background_layer: background, smooth_foreground, smooth_background, tiles });
+            Object.assign(textures, { smooth_foreground, smooth_background, tiles },
+                { foreground_layer: foreground, background_layer: background });
         }
         if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
         this.draw("present.frag", [lens.keepsLayers && "LAYERS"], { framebuffer: null, width, height },

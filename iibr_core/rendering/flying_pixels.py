@@ -1,4 +1,4 @@
-"""Specks: single pixels of a view that stand out though the photo's own do not.
+"""Flying pixels: single pixels of a view that stand out though the photo's own do not.
 
 Beside depth edges a map's errors tear rays off their surface: alone among others, they catch the eye. A ray that stands
 out from what surrounds it in the view by far more than it does in the photo was torn off, and takes the median of what

@@ -222,7 +222,7 @@ _full = [
 _EXPORTS = {
     "mp4": "new.mp4", "gif": "new.gif", "apng": "new.png", "spatial-photo": "new.heic", "exr": "new.exr",
     "focal-stack-exr": "new.exr", "focal-stack-tiff": "new", "splats": "new.ply", "disparity": "new.pfm",
-    "eslf": "new_eslf.png", "hci": "new", "nerfstudio": "new",
+    "eslf": "new_eslf.png", "hci": "new", "nerfstudio": "new", "web": "new.html",
 }  # fmt: skip
 """Kinds of export whose files are written in different ways, and what each is to write."""
 

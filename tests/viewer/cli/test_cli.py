@@ -218,7 +218,7 @@ def test_weights_missing_or_damaged_are_one_line_and_fast_still_works(
 ) -> None:
     damage(trained)
     before = sorted(tmp_path.rglob("*"))
-    for words in (("generate", "--out", tmp_path / "field"), ("screenshot", "-o", tmp_path / "o.png")):
+    for words in (("generate", "--out", tmp_path / "field"), ("screenshot", "--view", "1,0", "-o", tmp_path / "o.png")):
         command, *options = words
         assert run(monkeypatch, command, photo_path, "--grid", 3, *options, "--quality", "balanced") == 2
         (line,) = capsys.readouterr().err.splitlines()

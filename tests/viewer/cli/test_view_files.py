@@ -12,7 +12,7 @@ from iibr_core.depth.multi_view import estimate_disparity
 from iibr_core.formats.light_fields.light_field_formats import open_light_field
 from iibr_core.formats.maps.pfm import read_pfm
 from iibr_core.types import GridShape, ViewOffset
-from tests.iibr_core.known_scenes import FRONT, WALL, disparity_of_square, view_of_square, view_of_wall, write_grid
+from tests.iibr_core.known_scenes import FOREGROUND, WALL, disparity_of_square, view_of_square, view_of_wall, write_grid
 from tests.viewer.cli.test_cli import run
 
 Monkey = pytest.MonkeyPatch
@@ -73,7 +73,7 @@ def test_depth_of_a_pair_is_the_left_views(monkeypatch: Monkey, capsys: Capture,
     Image.fromarray(np.hstack(eyes)).save(tmp_path / "square_SBS.png")
     assert run(monkeypatch, "depth", tmp_path / "square_SBS.png", "-o", out) == 0
     error = np.abs(read_pfm(out) / 2 - disparity_of_square())[4:-4, 4:-4]
-    assert np.mean(error < 0.2 * (FRONT - WALL)) > 0.7
+    assert np.mean(error < 0.2 * (FOREGROUND - WALL)) > 0.7
 
 
 def test_depth_asks_for_memory_before_it_takes_it(monkeypatch: Monkey, capsys: Capture, tmp_path: Path) -> None:

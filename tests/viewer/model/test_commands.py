@@ -81,4 +81,4 @@ def test_nothing_is_proposed_to_be_put_into_a_folder_of_the_program(path: str) -
     saved, exported = (reduce(state, action).prompt for action in (AskToSave(), AskToExport()))
     assert isinstance(saved, SavePrompt)
     assert isinstance(exported, ExportPrompt)
-    assert (saved.path, exported.path) == ("~/photo-iibr.png", "~/photo-iibr.gif")
+    assert (saved.path, exported.path) == ("~/photo-iibr.png", "~/photo-web.html")
