@@ -18,6 +18,6 @@ def _is_working_folder(path: str) -> bool:
 if __name__ == "__main__":
     if not sys.flags.safe_path and _is_working_folder(sys.path[0]) and sys.path[0] != _HERE:
         del sys.path[0]
-    from viewer.entry import main
+    from viewer.entry import command
 
-    main()
+    command()

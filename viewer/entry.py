@@ -6,6 +6,8 @@ what nobody expected, end in one line as all else does.
 
 from __future__ import annotations
 
+import atexit
+import gc
 import io
 import os
 import sys
@@ -27,8 +29,21 @@ LEAST_ADDRESS_SPACE = 256 * 2**20
 """With less, OpenBLAS ends the process by itself."""
 TOO_LITTLE_MEMORY = ("failed to map segment", "Cannot allocate memory")
 """What libraries say that are loaded."""
+COLLECT_AFTER = 100_000, 20, 100
+"""Thresholds of Python's garbage collector. Its own, from 700 objects on, cost 0.3 s while modules are imported."""
 TRACEBACK_VARIABLE = "IIBR_TRACEBACK"
 """With this in the environment, errors that are told here come with their traceback."""
+
+
+def command() -> None:
+    """The `iibr` command: `main`, then the end of the process. Only functions registered at exit run before: freeing
+    half a million objects takes 0.2 s.
+    """
+    try:
+        main()
+    except SystemExit as ending:
+        atexit._run_exitfuncs()
+        os._exit(ending.code if isinstance(ending.code, int) else EXIT_UNEXPECTED)
 
 
 def main() -> None:
@@ -50,6 +65,7 @@ def main() -> None:
 def _run() -> int:
     """The exit code. Raises KeyboardInterrupt."""
     _on_interruption(_end_at_once)
+    gc.set_threshold(*COLLECT_AFTER)
     if os.name == "posix":
         _mend_standard_streams()
     else:
