@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from iibr_core.formats.images.header import read_photo_header
     from iibr_core.formats.images.metadata import PictureMetadata, camera_facts, read_metadata
     from iibr_core.formats.images.oiio_reader import read_raster, read_size
-    from iibr_core.formats.images.photo import DEFAULT_MAX_PIXELS, read_photo, write_image
+    from iibr_core.formats.images.photo import DEFAULT_MAX_PIXELS, MADE_SMALLER, read_photo, write_image
     from iibr_core.formats.images.picture_kinds import (
         AS_USUAL,
         BEST_QUALITY,

@@ -190,6 +190,7 @@ def _size_of(shot: _Shot, viewer: HeadlessViewer) -> ScreenSize | None:
 
 def _write(shot: _Shot, output: Path, ui: bool, backend: Backend) -> tuple[tuple[str, ...], DepthOrigin | None]:
     """Draw the picture and write it; returns what is to be said of the scene, and where its depth came from."""
+    from iibr_core.formats import MADE_SMALLER
     from viewer.app.headless import HeadlessViewer
     from viewer.app.image_export import export_image, export_picture, shot_of
 
@@ -223,4 +224,6 @@ def _write(shot: _Shot, output: Path, ui: bool, backend: Backend) -> tuple[tuple
     else:
         export_picture(output, pixels, saved)
     clamped = shot.lens.notes(viewer.state.optics)
-    return scene.notes + clamped, scene.depth_origin
+    # Where all of the photo's pixels are drawn, the size of the views does not matter.
+    notes = tuple(note for note in scene.notes if not (draws_long and note.startswith(MADE_SMALLER)))
+    return notes + clamped, scene.depth_origin

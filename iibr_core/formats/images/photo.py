@@ -28,6 +28,7 @@ from iibr_core.types import SRGB, FloatImage, ImageSize, InputError, Photo
 
 DEFAULT_MAX_PIXELS = 2_000_000
 DEFAULT_FOV_DEG = 50.0
+MADE_SMALLER = "Made smaller by area averaging"
 FILM_DIAGONAL_MM = math.hypot(36.0, 24.0)  # "35 mm equivalent" compares diagonals (CIPA DCG-001)
 MM_PER_RESOLUTION_UNIT = {2: 25.4, 3: 10.0, 4: 1.0, 5: 0.001}  # Exif 2.3, FocalPlaneResolutionUnit
 
@@ -75,7 +76,7 @@ def read_picture(
     notes = _color_notes(spec) + _alpha_notes(is_opaque)
     if size != stored_size:
         said = f"{stored_size} to {size}"
-        notes += (f"Made smaller by area averaging, from {said} (--max-pixels {max_pixels}).",)
+        notes += (f"{MADE_SMALLER}, from {said} (--max-pixels {max_pixels}).",)
     pixels = upright(encoded, spec.get_int_attribute("Orientation", 1))
     focal_px = _exif_focal_px(spec)
     if focal_px is None:

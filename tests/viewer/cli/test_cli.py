@@ -244,7 +244,11 @@ def test_screenshot_writes_an_image_of_the_size_asked_for(
 
 @pytest.mark.parametrize("options", [(), ("--view", "0.5,-0.7"), ("--aperture", 3, "--focus", "-0.2")], ids=str)
 def test_a_picture_at_the_photos_own_size_equals_the_usual_one_made_smaller(
-    monkeypatch: pytest.MonkeyPatch, photo_path: Path, tmp_path: Path, options: tuple[object, ...]
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    photo_path: Path,
+    tmp_path: Path,
+    options: tuple[object, ...],
 ) -> None:
     from iibr_core.color import linear_from_srgb, srgb_from_linear
     from iibr_core.formats.images.photo import read_photo
@@ -254,7 +258,9 @@ def test_a_picture_at_the_photos_own_size_equals_the_usual_one_made_smaller(
     full, usual, half = (tmp_path / f"{name}.png" for name in ("full", "usual", "half"))
     words = ("--max-pixels", 32 * 48, "--grid", 3, *options)
     assert run(monkeypatch, "screenshot", photo_path, "--full", *words, "-o", full) == 0
+    assert "--max-pixels" not in capsys.readouterr().err, "all of the photo's pixels count"
     assert run(monkeypatch, "screenshot", photo_path, *words, "-o", usual) == 0
+    assert "--max-pixels" in capsys.readouterr().err
     assert read_photo(full).size == (HEIGHT, WIDTH)
     expected = read_photo(usual).pixels
     assert expected.shape == (HEIGHT // 2, WIDTH // 2, 3)
