@@ -4,7 +4,7 @@ python -m benchmarks.estimate [--photo PHOTO] [--out FILE]
 
 Load (ONNX Runtime's import and the photo's preparation included), estimate, and the memory that both add are medians
 over fresh processes of two threads. Turns of the window's loop, on a private X server, are counted by the processor
-time of the drawing thread, from asking for the estimate until it has come and all views are made anew.
+time of the drawing thread, from asking for the estimate until it has come and all views are made again.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What the plan predicts beside what is measured; constants fitted anew on some scenes and judged on others.
+"""What the plan predicts beside what is measured; constants fitted again on some scenes and judged on others.
 
     python -m benchmarks.prediction [--data DATA] [--photos DIR] [--qualities fast,balanced] [--only WORDS]
 

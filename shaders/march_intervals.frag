@@ -10,7 +10,7 @@ uniform float block_px;
 uniform vec2 tile_uv;           // extent of a tile in the target, texture coordinates
 uniform vec2 pixel_uv;          // of a pixel: surfaces are looked for beside its middle too
 
-const int CHUNKS = 16;          // so many parts of the search are told apart
+const int CHUNKS = 16;          // so many parts of the search are distinguished
 const float SEAM_PX = 3.0;      // farther than edges are looked for beside a surface
 
 layout(location = 0) out vec4 intervals_of_0_and_1;

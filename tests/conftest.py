@@ -44,7 +44,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    parser.addoption("--regenerate-golden", action="store_true", help="write the golden images anew, then look at them")
+    parser.addoption("--regenerate-golden", action="store_true", help="write golden images again; then look at them")
 
 
 @pytest.fixture

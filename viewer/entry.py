@@ -73,7 +73,7 @@ def _run() -> int:
     _ensure_home()
     _ignore_warnings()
     if not 1 <= _whole_number(os.environ.get(NUMBA_THREADS) or "1") <= MOST_NUMBA_THREADS:
-        said = f"{NUMBA_THREADS}={os.environ[NUMBA_THREADS]}: is no number of threads"
+        said = f"{NUMBA_THREADS}={os.environ[NUMBA_THREADS]}: is not a number of threads"
         return _tell(f"{said}; give 1 to {MOST_NUMBA_THREADS}, or leave it out", EXIT_BAD_INPUT)
     try:
         os.getcwd()

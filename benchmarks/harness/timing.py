@@ -121,7 +121,7 @@ def peak_bytes(work: Callable[..., object], *args: object) -> float:
 
 @cache
 def _gauge() -> ProcessPoolExecutor:
-    """A process that gives freed arrays back to the system at once: kept ones would hide what is taken anew."""
+    """A process that gives freed arrays back to the system at once: kept ones would hide what is taken again."""
     with set_environment({"MALLOC_MMAP_THRESHOLD_": str(1 << 17)}):
         gauge = ProcessPoolExecutor(1, get_context("spawn"))
         gauge.submit(gc.collect).result()  # it starts with its first work

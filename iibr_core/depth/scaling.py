@@ -61,7 +61,7 @@ def _finite_or_nan(values: NDArray[Any]) -> DoubleImage:
     """Values, NaN where they are not finite."""
     known = np.where(np.isfinite(values), values, np.nan).astype(np.float64)
     if np.isnan(known).all():
-        raise InputError("the depth estimate knows no value at all; give another map")
+        raise InputError("the depth estimate has no known value; give another map")
     return known
 
 

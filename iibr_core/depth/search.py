@@ -168,7 +168,7 @@ def estimator_of(found: PhotoWithDepth, choice: DepthChoice) -> EstimateDepth | 
 
         model = model_to_use(choice)
         if model is None:
-            raise InputError(f"{found.origin.words}: the model is not there any more")
+            raise InputError(f"{found.origin.words}: the model no longer exists")
         depth = estimate_with(model, replace(found.photo, pixels=colors), choice.memory_bytes, should_stop)
         return disparity_from(resize_estimate(depth, found.photo.size), USUAL_GRID)
 
@@ -269,7 +269,7 @@ def _finish(found: _FoundDepth, choice: DepthChoice, grid: GridShape | None, sho
         inverse_metres = inverse_metres_over(estimate, values)
         holes = np.isnan(values)
         if holes.all():
-            raise InputError("it knows no depth anywhere")
+            raise InputError("it has no known depth")
         if holes.any():
             notes += (say_filled("its depth", float(holes.mean())),)
         values = fill_disparity_by_color(photo.pixels, values, should_stop)

@@ -25,7 +25,7 @@ def read_scene(folder: Path) -> MultiView | None:
     if scene is None:
         return None
     if len(scene.views) < 2:
-        raise InputError(f"{scene.views[0].path}: is the only view; at least two are needed to compare")
+        raise InputError(f"{scene.views[0].path}: is the only view; a comparison needs at least two")
     common_size(scene.views)
     return scene
 
@@ -33,7 +33,7 @@ def read_scene(folder: Path) -> MultiView | None:
 def find_scenes(folder: Path) -> Iterator[MultiView]:
     """The scene of a folder, or those of its subfolders. Raises InputError where there is none, or one is damaged."""
     if not is_folder(folder):
-        raise InputError(f"{folder}: is no folder; give the folder of a data set ({LAYOUTS})")
+        raise InputError(f"{folder}: is not a folder; give the folder of a data set ({LAYOUTS})")
     scene = read_scene(folder)
     if scene is not None:
         yield scene

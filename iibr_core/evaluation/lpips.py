@@ -32,7 +32,7 @@ class Lpips:
     def __init__(self, folder: Path) -> None:
         """folder: holds FILES. Raises InputError, naming the file, where one is missing or something else."""
         if not is_folder(folder):
-            raise InputError(f"{folder}: is no folder; --lpips wants one with {FILES}")
+            raise InputError(f"{folder}: is not a folder; --lpips wants one with {FILES}")
         backbone = next(iter(sorted(folder.glob("alexnet*.pth"))), folder / "alexnet-owt-7be5be79.pth")
         kinds = ("weight", "bias")
         names = [f"features.{number}.{kind}" for number in LAYERS for kind in kinds]

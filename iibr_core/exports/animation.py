@@ -66,7 +66,7 @@ def read_keys(path: Path) -> list[tuple[float, ...]]:
         except ValueError:
             values = ()
         if not 2 <= len(values) <= 4 or not all(map(math.isfinite, values)):
-            raise InputError(f"{path}: line {number} is no key; give numbers: s t [focus [aperture]]")
+            raise InputError(f"{path}: line {number} is not a key; give numbers: s t [focus [aperture]]")
         keys.append(values)
     if not 1 <= len(keys) <= MOST_KEYS:
         raise InputError(f"{path}: holds {len(keys)} keys; give 1 to {MOST_KEYS} lines: s t [focus [aperture]]")

@@ -34,7 +34,7 @@ def cameras_of(source: ExportSource) -> FieldCameras:
     if source.loaded is None:
         low, high = scene.disparity_range_px
         if scene.depth_source == "none":
-            raise InputError(f"{scene.name}: nothing tells how far things are; open a photo with a disparity map")
+            raise InputError(f"{scene.name}: no depth is known; open a photo with a disparity map")
         return FieldCameras(scene.grid, size, scene.focal_px or float(scene.width), (low, high), infinity_of(low, high))
     plan = source.plan()
     at_infinity = (_given_infinity(source) - plan.disparity_zero) * plan.disparity_scale
@@ -45,7 +45,7 @@ def _given_infinity(source: ExportSource) -> float:
     """The disparity, as given, of what is infinitely far from the photo. Raises InputError where all is flat."""
     plan = source.plan()
     if plan.disparity_scale <= 0:
-        raise InputError(f"{source.scene.name}: is flat, or turned inside out; give it depth")
+        raise InputError(f"{source.scene.name}: is flat or inverted; give it depth")
     low, high = (value / plan.disparity_scale + plan.disparity_zero for value in plan.disparity_range_px)
     return infinity_of(low, high)
 

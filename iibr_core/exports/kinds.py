@@ -150,7 +150,7 @@ EXPORTS = {
 def export_kind(name: str) -> ExportKind:
     """Raises InputError for a kind that nobody knows."""
     if name not in EXPORTS:
-        raise InputError(f"{name!r} is no known kind of export: give {', '.join(EXPORTS)}")
+        raise InputError(f"{name!r} is not a known kind of export: give {', '.join(EXPORTS)}")
     return EXPORTS[name]
 
 

@@ -37,7 +37,7 @@ class Bridge:
         self._session = ""
         session = _value(self._ask("enter_orchestration", name="default"), "payload")
         if not isinstance(session, str) or not session:
-            raise InputError(f"what answers at {ADDRESS} is no Looking Glass Bridge (it names no session); update it")
+            raise InputError(f"the program at {ADDRESS} is not Looking Glass Bridge (it names no session); update it")
         self._session = session
         displays = _value(self._ask("available_output_devices"), "payload")
         names = displays if isinstance(displays, dict) else {}
@@ -71,12 +71,12 @@ class Bridge:
             answer = _answer_to(endpoint, content)
         except (OSError, HTTPException, ValueError, RecursionError) as error:
             raise InputError(
-                f"no Looking Glass Bridge answers at {ADDRESS} ({reason_of(error)}); start it, or do not show it there"
+                f"Looking Glass Bridge does not answer at {ADDRESS} ({reason_of(error)}); start it, or leave out --show"
             ) from error
         status = _value(answer, "status")
         if not may_fail and (not isinstance(status, str) or status in FAILURES):
             said = reason_of(str(status)) if status else "no answer"
-            raise InputError(f"Looking Glass Bridge did not do {endpoint} ({said}); update it")
+            raise InputError(f"Looking Glass Bridge refused {endpoint} ({said}); update it")
         return answer if isinstance(answer, dict) else {}
 
 
@@ -102,7 +102,7 @@ def _answer_to(endpoint: str, content: bytes) -> Any:
 
 @contextmanager
 def _shut_after(connected: socket.socket, seconds: float) -> Iterator[None]:
-    """Raise TimeoutError where the block takes longer: its socket's own limit begins anew with every byte."""
+    """Raise TimeoutError where the block takes longer: its socket's own limit begins again with every byte."""
     is_late = Event()
 
     def shut() -> None:

@@ -35,8 +35,8 @@ def side_pictures(scene: Scene, settings: RenderSettings, count: int, span_views
     if width < LEAST_WIDTH:
         moved = optics.focus_disparity * span_views
         raise InputError(
-            f"{scene.name}: what is in focus moves by {moved:.0f} px from the first view to the last, too much to be"
-            " held still; focus nearer to 0, or take fewer view steps"
+            f"{scene.name}: the focused surface moves by {moved:.0f} px from the first view to the last, too much for"
+            " a common frame; focus nearer to 0, or take fewer view steps"
         )
     return [
         replace(

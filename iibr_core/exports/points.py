@@ -49,7 +49,7 @@ def scene_points(source: ExportSource) -> Points:
         places = cameras.points(view.disparity, cameras.grid.offset(*at))[mask]
         found.append((places, colors_of(view)[mask], places[:, 2] / np.float32(cameras.focal_px)))
     if not found:
-        raise InputError(f"{source.scene.name}: nothing tells how far things are; open it with a disparity map")
+        raise InputError(f"{source.scene.name}: no depth is known; open it with a disparity map")
     places, colors, pixel = (np.concatenate(arrays) for arrays in zip(*found))
     return places, colors, pixel
 

@@ -1,4 +1,4 @@
-"""What an export is made of: the scene as it is open, pictures that are drawn of it, views that are made of it anew.
+"""What an export is made of: the scene as it is open, pictures that are drawn of it, views that are made of it again.
 
 A kind of export is a function that writes one file or folder of this, in whatever thread; drawing is handed over.
 """

@@ -36,9 +36,7 @@ def write_gallery(folder: Path, outputs: Iterable[str]) -> Path:
     pages = sorted(outputs)
     path = folder / (NAME if NAME not in pages else OTHER_NAME)
     if os.path.lexists(path) and not _is_ours(path):
-        raise InputError(
-            f"{path}: is there already, and is no gallery; move it, for the index of these pages goes there"
-        )
+        raise InputError(f"{path}: already exists and is no gallery; move it, for the index of these pages goes there")
     parts = resource_folder("web")
     style = (parts / "gallery.css").read_text("utf-8")
     filled = {

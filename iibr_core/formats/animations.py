@@ -57,7 +57,7 @@ def write_animation(path: Path, frames: Iterable[NDArray[np.uint8]], size: Image
         else:
             count = _write_frames(temporary, frames, rate)
         if not count:
-            raise InputError(f"{path}: no frames; an animation has at least one")
+            raise InputError(f"{path}: has no frames; an animation needs at least one")
 
 
 def _write_video(path: Path, temporary: Path, frames: Iterable[NDArray[np.uint8]], size: ImageSize, rate: float) -> int:

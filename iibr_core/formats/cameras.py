@@ -39,7 +39,8 @@ class FieldCameras:
         low, high = self.range_px
         numbers = (self.focal_px, low, high, self.at_infinity)
         if not (np.isfinite(numbers).all() and self.focal_px > 0 and self.at_infinity < low <= high):
-            raise InputError(f"focal length {self.focal_px:g}, disparities {low:g} to {high:g}: these make no cameras")
+            said = f"focal length {self.focal_px:g}, disparities {low:g} to {high:g}"
+            raise InputError(f"{said}: no cameras can be computed from these")
 
     @property
     def step(self) -> float:
@@ -99,7 +100,7 @@ def write_llff(folder: Path, cameras: FieldCameras, views: Views) -> None:
     """
     if cameras.at_infinity != 0:
         raise InputError(
-            f"{folder.name}: what stands still in these views is not at infinity, which poses_bounds.npy cannot say;"
+            f"{folder.name}: points at rest in these views are not at infinity, which poses_bounds.npy cannot express;"
             " export cameras for nerfstudio or COLMAP"
         )
     axes = np.array([[0, 1, 0], [-1, 0, 0], [0, 0, 1]], float)

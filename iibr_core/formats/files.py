@@ -138,7 +138,7 @@ def require_file(path: Path) -> None:
         raise InputError(f"{path}: no such file")
     if not stat.S_ISREG(status.st_mode):
         kind = next((name for is_kind, name in SPECIAL_FILES if is_kind(status.st_mode)), "no ordinary file")
-        raise InputError(f"{path}: is {kind}, not an ordinary file; copy what it holds into one")
+        raise InputError(f"{path}: is {kind}, not an ordinary file; copy its content into one")
     if status.st_size == 0:
         raise InputError(f"{path}: the file is empty (0 bytes)")
     if not os.access(path, os.R_OK):
@@ -182,5 +182,5 @@ def refuse_bomb(path: Path, decoded_bytes: int) -> None:
     if decoded_bytes > max(HARMLESS_BYTES, MOST_INFLATION * stored):
         raise InputError(
             f"{path}: its {stored:,} bytes claim to hold {decoded_bytes / 2**20:,.0f} MiB, as no photo does;"
-            " save it anew, smaller"
+            " save it again, smaller"
         )

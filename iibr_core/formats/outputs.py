@@ -65,7 +65,7 @@ def require_file_place(path: Path, inputs: Iterable[Path] = (), may_replace: boo
         if status is not None and reads_file(read, status):
             raise InputError(f"{path}: is read here ({read}), and no input is overwritten; choose another name")
     if status is not None and not may_replace:
-        raise AlreadyThereError(f"{path}: is there already; give --force to replace it, or choose another name")
+        raise AlreadyThereError(f"{path}: already exists; give --force to replace it, or choose another name")
     _claim_place(real, may_replace)
 
 
@@ -88,7 +88,7 @@ def require_folder_place(
     if status is not None and is_whole and os.path.ismount(real):
         raise InputError(f"{folder}: a disk is mounted there; name a folder in it")
     if status is not None and not may_replace and entries_of(real):
-        raise AlreadyThereError(f"{folder}: is there already; give --force to replace it, or choose another folder")
+        raise AlreadyThereError(f"{folder}: already exists; give --force to replace it, or choose another folder")
     if is_whole:
         _claim_place(real, may_replace)
 
@@ -122,7 +122,7 @@ def require_own_folder(folder: Path, own_files: str) -> None:
 def require_files_in(
     folder: Path, names: Iterable[str], inputs: Iterable[Path] = (), may_replace: bool = False
 ) -> None:
-    """Raise as `require_folder_place` does, and as `require_file_place` for what is there already of the files that a
+    """Raise as `require_folder_place` does, and as `require_file_place` for what already exists of the files that a
     folder is to hold.
     """
     inputs = tuple(inputs)
@@ -159,7 +159,7 @@ def open_to_append(path: Path) -> int:
 
 def _require_single_file(path: Path, status: os.stat_result | None) -> None:
     if status is not None and (not stat.S_ISREG(status.st_mode) or status.st_nlink > 1):
-        raise InputError(f"{path}: is a link or no ordinary file, and nothing is written there; remove it")
+        raise InputError(f"{path}: is a link or not an ordinary file, so it is not overwritten; remove it")
 
 
 def make_folder(folder: Path) -> None:

@@ -25,7 +25,7 @@ def real_place(path: Path) -> Path:
         longest = max((len(os.fsencode(part)) for part in path.parts), default=0)
         real = Path(os.path.realpath(path))
     except (OSError, ValueError) as error:
-        raise InputError(f"{path}: is no place to write to ({reason_of(error)}); choose another") from error
+        raise InputError(f"{path}: is not a place to write to ({reason_of(error)}); choose another") from error
     if longest > MOST_NAME_BYTES:
         raise InputError(f"{path}: a name has {longest} bytes, {MOST_NAME_BYTES} at most are possible; shorten it")
     if len(os.fsencode(real)) > MOST_PATH_BYTES:
@@ -54,7 +54,7 @@ def require_no_dangling_link(folder: Path, real: Path) -> None:
     """Raise InputError for a link to what is not there: a disk that is absent must not be replaced by a folder."""
     for place in (folder, *folder.parents):
         if os.path.islink(place) and status_of(place) is None and not (place == folder and is_folder(real.parent)):
-            raise InputError(f"{folder}: {place} is a link to what is not there; choose another place")
+            raise InputError(f"{folder}: {place} is a broken link; choose another place")
 
 
 def require_no_link(path: Path, folder: Path) -> None:

@@ -45,7 +45,7 @@ def read_poses(path: Path) -> tuple[Camera, ...]:
         return read_llff_poses(path)
     if path.suffix.lower() == ".json":
         return _read_transforms(path)
-    raise InputError(f"{path}: holds no poses that are known; give poses_bounds.npy, transforms.json or a folder")
+    raise InputError(f"{path}: holds no known poses; give poses_bounds.npy, transforms.json or a folder")
 
 
 def central_camera(cameras: Sequence[Camera]) -> int:
@@ -100,7 +100,7 @@ def _read_transforms(path: Path) -> tuple[Camera, ...]:
         if isinstance(error, InputError):
             raise
         raise InputError(
-            f"{path}: is no transforms.json with poses ({reason_of(error)}); get the file again"
+            f"{path}: is not a transforms.json with poses ({reason_of(error)}); get the file again"
         ) from error
 
 
@@ -138,7 +138,7 @@ def _frame_size(frame: dict[str, Any], path: Path, source: str) -> ImageSize:
     try:
         return read_size(picture if picture.suffix else picture.with_suffix(".png"))
     except InputError as error:
-        raise InputError(f"{source} says no size, and its picture none: {error}") from error
+        raise InputError(f"{source} states no size, and its picture has none: {error}") from error
 
 
 def _read_colmap(model: Path) -> tuple[Camera, ...]:
@@ -153,7 +153,7 @@ def _read_colmap(model: Path) -> tuple[Camera, ...]:
     except (ValueError, KeyError, IndexError, ArithmeticError) as error:
         if isinstance(error, InputError):
             raise
-        raise InputError(f"{model}: is no text model of COLMAP ({reason_of(error)}); export it anew") from error
+        raise InputError(f"{model}: is not a text model of COLMAP ({reason_of(error)}); export it again") from error
 
 
 def _lines(path: Path) -> list[str]:

@@ -99,7 +99,7 @@ def quilt_for(device: str | None, view: ImageSize) -> Quilt:
     """
     if device is not None:
         if device not in DEVICES:
-            raise InputError(f"{device!r} is no display that is known: give {', '.join(DEVICES)}")
+            raise InputError(f"{device!r} is not a known display: give {', '.join(DEVICES)}")
         return DEVICES[device]
     columns, rows = USUAL_VIEWS
     scale = min(1.0, USUAL_SIDE_PX / (columns * view.width), USUAL_SIDE_PX / (rows * view.height))

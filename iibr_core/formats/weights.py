@@ -87,7 +87,7 @@ def _read(path: Path, content: str) -> tuple[dict[str, NDArray[Any]], dict[str, 
             # Copied, because these may lie in the mapped file, which must be free to be replaced.
             arrays = {name: np.array(file.get_tensor(name)) for name in file.keys()}  # noqa: SIM118
     except (SafetensorError, OSError) as error:
-        raise InputError(f"{path}: is no safetensors file, or is damaged ({reason_of(error)})") from error
+        raise InputError(f"{path}: is not a safetensors file, or is damaged ({reason_of(error)})") from error
     for name, array in arrays.items():
         if not np.isfinite(array).all():
             raise InputError(f"{path}: {name} holds values that are not finite; train again or use another file")
@@ -102,7 +102,7 @@ def require_shapes(
         if name not in tensors:
             raise InputError(f"{path}: lacks {name}; it was made for another model")
         if name not in expected:
-            raise InputError(f"{path}: holds {name}, which this model has not; it was made for another model")
+            raise InputError(f"{path}: holds {name}, which this model lacks; it was made for another model")
         there, wanted = tuple(tensors[name].shape), tuple(expected[name])
         if there != wanted:
             raise InputError(f"{path}: {name} is {there}, this model needs {wanted}; it was made for another model")

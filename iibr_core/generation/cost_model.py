@@ -1,7 +1,7 @@
 """What making a scene's views will cost, before any is made: time and memory in each quality.
 
 Time is three measured rates, each times what there is of it: pixels of all views, those of them where surfaces part,
-rays that the transformer is asked for. `python -m benchmarks.prediction` fits the rates anew.
+rays that the transformer is asked for. `python -m benchmarks.prediction` fits the rates again.
 """
 
 from __future__ import annotations

@@ -177,7 +177,7 @@ def transformer_for(quality: Quality) -> Callable[[AmbiguousRays], FloatImage] |
     try:
         return TrainedWeights(resource_folder("assets") / "weights" / "ray_transformer.safetensors")
     except InputError as error:
-        raise InputError(f"{error}; use --quality fast, or train them anew with `iibr train`") from error
+        raise InputError(f"{error}; use --quality fast, or train them again with `iibr train`") from error
 
 
 def nearest_first(remaining: list[ViewOffset], nearest_to: Callable[[], ViewOffset]) -> Iterator[ViewOffset]:

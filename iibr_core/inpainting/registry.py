@@ -39,6 +39,6 @@ def require_inpainter(typed: str) -> None:
     """Raise InputError where this is no way of inpainting, or its model's folder is not there; nothing is loaded."""
     name, _, folder = typed.partition(":")
     if typed not in INPAINTERS and not (name in MODEL_INPAINTERS and folder):
-        raise InputError(f"--inpaint {typed}: is no way of inpainting; give {' or '.join(INPAINTER_FORMS)}")
+        raise InputError(f"--inpaint {typed}: unknown inpainter; give {' or '.join(INPAINTER_FORMS)}")
     if name in MODEL_INPAINTERS and not os.path.isdir(os.path.expanduser(folder)):
         raise InputError(f"--inpaint {typed}: no such folder; give that of an inpainting pipeline")

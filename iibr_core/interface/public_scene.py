@@ -283,7 +283,7 @@ def _grid_shape(grid: Grid) -> GridShape | None:
 def _require_known(options: ViewOptions, known: Iterable[str]) -> None:
     unknown = [name for name in options if name not in known]
     if unknown:
-        raise InputError(f"{', '.join(unknown)}: means nothing here; give {', '.join(known)}")
+        raise InputError(f"{', '.join(unknown)}: unknown option; give {', '.join(known)}")
 
 
 def _inpainting(options: ViewOptions) -> str:

@@ -29,7 +29,7 @@ class Renderer(AbstractContextManager["Renderer"], Protocol):
         self, rays: RaySet, offset: ViewOffset, alone: bool = False, known: ShownBefore | None = None
     ) -> RenderedView:
         """The view at an offset, its holes filled. alone: in the calling thread. known: what it showed before others
-        connected the ray set: only what those change is looked up anew, and the view is the same.
+        joined the ray set: only what those change is looked up again, and the view is the same.
         """
 
     def draft(self, rays: RaySet, offset: ViewOffset) -> tuple[RenderedView, list[UndecidedRays]]:

@@ -137,7 +137,7 @@ def fill(folder: Path) -> None:
 
 class KernelCache(numba.core.caching.FunctionCache):  # type: ignore[misc, name-defined]
     """Of one kernel: Numba's, but for the stamp, the names of the files, that what came along is read too, and that
-    nothing goes wrong in it: what cannot be read is a miss and goes, what cannot be written is compiled anew the next
+    nothing goes wrong in it: what cannot be read is a miss and goes, what cannot be written is compiled again the next
     time.
 
     Raises OSError or RuntimeError where the kernel's source cannot be read, or Numba is told of no place to write to.

@@ -197,7 +197,7 @@ class TrainingRun:
         return LogRow(step, total, color, entropy, epi, gradient_norm, rate, self._seconds())
 
     def save(self) -> None:
-        """Write the checkpoint, unless it is there already or nothing has been trained.
+        """Write the checkpoint, unless it already exists or nothing has been trained.
 
         Raises TrainingDiverged, and keeps the file, if a number in it were not finite.
         """
@@ -226,10 +226,10 @@ class TrainingRun:
             if step < 1:
                 raise ValueError(step)
         except (KeyError, TypeError, ValueError) as error:
-            raise InputError(f"{path}: is damaged (step, seconds or config cannot be read); start anew") from error
+            raise InputError(f"{path}: is damaged (step, seconds or config cannot be read); start again") from error
         _require_same_course(path, before, self.config)
         if step > self.config.steps:
-            raise InputError(f"{path}: is at step {step} already; give --steps {step} or more, or start anew")
+            raise InputError(f"{path}: is at step {step} already; give --steps {step} or more, or start again")
         own = {name.removeprefix("model."): t for name, t in tensors.items() if name.startswith("model.")}
         rest = {name: tensor for name, tensor in tensors.items() if not name.startswith("model.")}
         require_shapes(path, own, {name: tensor.shape for name, tensor in self.model.state_dict().items()})
@@ -271,7 +271,7 @@ def _require_same_course(path: Path, before: Mapping[str, object], now: TrainCon
     for name, value in json.loads(json.dumps(asdict(now))).items():
         if name not in free and before.get(name) != value:
             was = before.get(name)
-            raise InputError(f"{path}: was trained with {name} {was}, not {value}; give {was} or start anew")
+            raise InputError(f"{path}: was trained with {name} {was}, not {value}; give {was} or start again")
 
 
 @contextmanager

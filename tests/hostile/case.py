@@ -66,7 +66,7 @@ class Case:
 
     @property
     def surroundings(self) -> Surroundings | None:
-        """What Python starts in, for a process that begins several commands; None where each is to start anew: where
+        """What Python starts in, for a process that begins several commands; None where each is to start again: where
         memory is short, the folder is gone, or what `main` does before it imports anything is what counts.
         """
         if not self.runs_apart or self.is_mute or self.shell not in (PLAINLY, CLOSED_OUTPUT, FULL_OUTPUT):

@@ -54,7 +54,7 @@ def load_preferences(state: AppState, folder: Path) -> AppState:
     try:
         recent = _recent(_read(folder / RECENT_FILE))
     except InputError as error:
-        notices = (*notices, Notice(f"{error}; the list of recent files starts anew"))
+        notices = (*notices, Notice(f"{error}; the list of recent files starts again"))
     return dataclasses.replace(state, preferences=preferences, recent=recent, notices=notices)
 
 

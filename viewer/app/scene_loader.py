@@ -240,7 +240,7 @@ class SceneLoader:
 
 
 def _has_other_depth(before: LoadedPhoto, now: LoadedPhoto | None) -> bool:
-    """Whether the same photo's depth was found anew."""
+    """Whether the same photo's depth was found again."""
     return now is not None and now.photo is before.photo and now.found is not before.found
 
 

@@ -1,4 +1,4 @@
-"""The part of the picture that is seen, drawn anew from the photo at its own size while nothing moves.
+"""The part of the picture that is seen, drawn again from the photo at its own size while nothing moves.
 
 It takes the place of the one drawn from the views as soon as it is there, and gives it back when anything changes.
 """

@@ -39,7 +39,7 @@ def kind_from_text(text: str) -> ExportKind:
 def device_from_text(text: str) -> str:
     """A light-field display, by name. Raises BadParameter."""
     if text not in DEVICES:
-        raise typer.BadParameter(f"{text!r} is no display that is known: give {', '.join(DEVICES)}")
+        raise typer.BadParameter(f"{text!r} is not a known display: give {', '.join(DEVICES)}")
     return text
 
 

@@ -189,7 +189,7 @@ def refine_from_text(text: str) -> float:
 def format_from_text(text: str) -> str:
     """A layout that a light field can be written in, by name. Raises BadParameter."""
     if text not in WRITERS:
-        raise typer.BadParameter(f"{text!r} is no layout that can be written: give {' or '.join(WRITERS)}")
+        raise typer.BadParameter(f"{text!r} is not a layout that can be written: give {' or '.join(WRITERS)}")
     return text
 
 
@@ -259,7 +259,7 @@ Literal = Annotated[
     bool,
     typer.Option("--literal", help="Disparity counts as given, in px from view to view, not as the window shows it."),
 ]
-Force = Annotated[bool, typer.Option("--force", help="Replace what is there already; what is read, never.")]
+Force = Annotated[bool, typer.Option("--force", help="Replace what already exists; what is read, never.")]
 PosesFile = Annotated[
     Path | None,
     typer.Option(

@@ -152,7 +152,7 @@ class InspectionView:
         return self._once("minimap", (base.generation, base.exposure, size_px), draw)
 
     def _once(self, name: str, record: object, draw: Callable[[], int]) -> int:
-        """The image of this name, drawn anew only if its record changed."""
+        """The image of this name, drawn again only if its record changed."""
         if name not in self._drawn or self._drawn[name][0] != record:
             self._drawn[name] = record, draw()
         return self._drawn[name][1]

@@ -192,7 +192,7 @@ class SceneView:
         return pick_disparity(self._disparities, eye, x_px, y_px)
 
     def draw(self, state: AppState, size_px: ScreenSize, part: Rect = WHOLE) -> Picture | None:
-        """Draw the picture this state asks for, or a part of it, stretched to size_px, unless it is there already;
+        """Draw the picture this state asks for, or a part of it, stretched to size_px, unless it already exists;
         return its record, None without views.
         """
         if self.views_uploaded == 0:

@@ -227,7 +227,7 @@ class InspectionPasses:
         set_primaries(program, SRGB, field.color_space)
 
     def _use_image(self, name: str, size_px: ScreenSize) -> int:
-        """Draw into this image from now on; a new size makes it anew."""
+        """Draw into this image from now on; a new size makes it again."""
         if name not in self._images or self._images[name].framebuffer.size != size_px:
             self._drop(name)
             self._images[name] = RenderTarget(self._ctx, [self._ctx.texture(size_px, 4)])

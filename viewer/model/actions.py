@@ -38,7 +38,7 @@ class ShowTiltHandles:
 
 @dataclass(frozen=True)
 class SetDepthStrength:
-    """Multiply the planned parallax; the field is generated anew once the edit is finished."""
+    """Multiply the planned parallax; the field is generated again once the edit is finished."""
 
     strength: float
     is_finished: bool
@@ -96,7 +96,7 @@ class ResumeWork:
 
 @dataclass(frozen=True)
 class SamePlaces:
-    """Field disparities of the same places of a photo, (before, now), where its depth was found anew.
+    """Field disparities of the same places of a photo, (before, now), where its depth was found again.
 
     pairs: over the whole range, in order of what was before. in_focus: of the place that was clicked to be sharp, None
     where none was.

@@ -23,7 +23,7 @@ _WORDS = (
     (r" \(--max-pixels \d+\)", ""),
     (r"the budget \(--memory\) is|--memory is", "the memory this program may take is"),
     (r"`iibr models get ([\w.-]+)`|iibr models get ([\w.-]+)", r"the button below"),
-    (r"use --quality fast, or train them anew with `iibr train`", "install the program anew"),
+    (r"use --quality fast, or train them again with `iibr train`", "install the program again"),
     (r"give --force to replace it, or choose", "choose"),
     (r"--([a-z]+)-([a-z]+)", r"\1 \2"),
     (r"--([a-z]+)", r"\1"),

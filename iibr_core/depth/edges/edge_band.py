@@ -53,7 +53,7 @@ def resolve_edge_band(
     least_edge: the step that counts as a depth edge, more than 0. unknown: (H, W), where values were filled in.
     soft: (H, W), where the map was soft before it was sharpened; None: nowhere. stages: that are on.
     Lone disparities between two surfaces, which maps have that were measured or resampled, are taken for unknown, and
-    all that is unknown is filled anew: mixed pixels, which look like one another, had passed them on. Then pixels
+    all that is unknown is filled again: mixed pixels, which look like one another, had passed them on. Then pixels
     change sides where the colours say so (`label_edges`). Raises Cancelled once should_stop is true.
     """
     colors = np.ascontiguousarray(photo, np.float32)

@@ -94,7 +94,7 @@ def require_sound(edits: DepthEdits) -> None:
     ]
     for stroke in edits.strokes:
         if stroke.tool not in BRUSH_TOOLS or not 1 <= len(stroke.points) <= MOST_POINTS:
-            raise InputError(f"depth edits: a stroke {stroke.tool!r} with {len(stroke.points)} points; paint it anew")
+            raise InputError(f"depth edits: a stroke {stroke.tool!r} with {len(stroke.points)} points; paint it again")
         checks += [("brush radius", stroke.radius, RADIUS_LIMITS), ("brush strength", stroke.strength, (0.0, 1.0))]
         places = (*stroke.points, *([stroke.taken_from] if stroke.taken_from else []))
         checks += [("place of a stroke", at, (-inf, inf)) for place in places for at in place]

@@ -31,7 +31,7 @@ ROUNDED = 1e-3
 HALF_UP_PX = 1e-6
 """Added to places: what lies between two pixels, but for rounding, belongs to the second."""
 SAME = np.float32(1e-6)
-"""Distances that differ by less are one: a stroke that runs back over itself begins no ways anew."""
+"""Distances that differ by less are one: a stroke that runs back over itself begins no ways again."""
 UNKNOWN = np.float32(-1.0)
 UNQUEUED, LAST = np.int32(-2), np.int32(-1)
 

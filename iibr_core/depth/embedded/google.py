@@ -181,4 +181,4 @@ def _from_base64(text: str, what: str) -> bytes:
     try:
         return base64.b64decode("".join(text.split()), validate=True)
     except (binascii.Error, ValueError) as error:
-        raise InputError(f"{what} is no whole base64 text ({error})") from error
+        raise InputError(f"{what} is not complete base64 ({error})") from error

@@ -45,7 +45,7 @@ def picture_file(data: bytes, what: str) -> Iterator[Path]:
     Raises InputError for bytes that are neither.
     """
     if not data.startswith((PNG_START, JPEG_START)):
-        raise InputError(f"{what} is no PNG and no JPEG picture ({len(data):,} bytes)")
+        raise InputError(f"{what} is neither a PNG nor a JPEG picture ({len(data):,} bytes)")
     with tempfile.TemporaryDirectory(prefix="iibr-") as folder:
         path = Path(folder) / ("picture.png" if data.startswith(PNG_START) else "picture.jpg")
         path.write_bytes(data)
@@ -69,7 +69,7 @@ def decode_map(data: bytes, what: str) -> FloatImage:
                 raise InputError(f"{what}: {width}x{height} pixels are not from 1 to {MAX_MAP_PIXELS:,}")
             values = _grey(picture)
     except UnidentifiedImageError as error:
-        raise InputError(f"{what} is no PNG and no JPEG picture ({len(data):,} bytes)") from error
+        raise InputError(f"{what} is neither a PNG nor a JPEG picture ({len(data):,} bytes)") from error
     except DECODE_ERRORS as error:
         if isinstance(error, InputError):
             raise

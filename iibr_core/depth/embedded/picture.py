@@ -41,7 +41,7 @@ def rotate_estimate(estimate: Estimate, size: ImageSize, orientation: int) -> Es
         if _is_alike(candidate.shape, size):
             return type(estimate)(candidate)
     shape, photo_shape = (f"{width}x{height}" for height, width in (values.shape, size))
-    raise InputError(f"its {shape} pixels have another shape than the photo, {photo_shape}")
+    raise InputError(f"its {shape} pixels differ in shape from the photo, {photo_shape}")
 
 
 def _is_alike(shape: tuple[int, ...], size: ImageSize) -> bool:

@@ -99,7 +99,7 @@ def _model_at(path: Path) -> LocalModel:
     family = next((family for family in FAMILIES if family.accepts(path)), None)
     if family is None and is_file(path):
         raise InputError(
-            f"{path}: is no ONNX file; --depth-model takes one, a model's folder, or a name `iibr models` lists"
+            f"{path}: is not an ONNX file; --depth-model takes one, a model's folder, or a name `iibr models` lists"
         )
     if family is None:
         raise InputError(f"{path}: no known models are of its type, {read_config(path).get('model_type')!r}")

@@ -48,8 +48,8 @@ def read_config(folder: Path) -> dict[str, Any]:
     elsewhere = _backbone_elsewhere(config)
     if elsewhere:
         raise InputError(
-            f"{folder / CONFIG}: needs another model, {printable(elsewhere)}, which is not fetched; get a folder that"
-            " holds all of it"
+            f"{folder / CONFIG}: needs another model, {printable(elsewhere)}, which is not downloaded; get a"
+            " folder that holds all of it"
         )
     return config
 

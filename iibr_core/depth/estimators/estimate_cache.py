@@ -80,7 +80,7 @@ def load(key: str) -> Estimate | None:
 def store(key: str, estimate: Estimate) -> None:
     """Keep an estimate; the least recently used ones go where all exceed MAX_BYTES."""
     folder = cache_folder()
-    # read-only or full: the estimate is made anew the next time
+    # read-only or full: the estimate is made again the next time
     with contextlib.suppress(OSError, InputError):
         folder.mkdir(parents=True, exist_ok=True)
         with atomic_write(folder / f"{key}.npz") as temporary:

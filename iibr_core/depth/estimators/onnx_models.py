@@ -96,7 +96,7 @@ def _open(file: Path) -> Any:
     try:
         return onnxruntime.InferenceSession(str(file), options, providers=["CPUExecutionProvider"])
     except Exception as error:  # its errors share no class of their own
-        raise InputError(f"{file}: is no ONNX model that can be run ({said_by(error)}); get it again") from error
+        raise InputError(f"{file}: is not an ONNX model that can be run ({said_by(error)}); get it again") from error
 
 
 def _input_of(session: Any, file: Path) -> tuple[str, ImageSize | None, str]:

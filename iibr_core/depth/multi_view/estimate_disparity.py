@@ -162,7 +162,7 @@ def _matching_views(
     should_stop: ShouldStop,
 ) -> MatchingViews:
     if len({(offset.t, offset.s) for offset in offsets}) < 2:
-        raise InputError("all views have one viewpoint: nothing tells how far things are")
+        raise InputError("all views have the same viewpoint, so no depth can be found")
     chosen = choose_views(list(offsets), reference)
     lumas = [luma_of(views[index], shrink) for index in chosen]
     return matching_views(lumas, [offsets[index] for index in chosen], should_stop)

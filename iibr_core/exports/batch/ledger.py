@@ -103,7 +103,7 @@ class Ledger:
         entry = self._entries.get(name)
         place = Place(os.path.abspath(self.folder), name, entry.output if entry is not None else "", self._may_replace)
         if entry is None and not self._may_replace and os.path.lexists(place.target):
-            raise InputError(f"{place.target}: is there already, and no batch wrote it; give --force to replace it")
+            raise InputError(f"{place.target}: already exists, and no batch wrote it; give --force to replace it")
         return place
 
     def has(self, name: str, key: str) -> bool:

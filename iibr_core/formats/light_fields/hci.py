@@ -74,7 +74,8 @@ def _grid(folder: Path, pictures: dict[int, Path], stated: GridShape | None) -> 
     side = math.isqrt(len(pictures))
     if side**2 != len(pictures):
         raise InputError(
-            f"{folder}: {len(pictures)} views are no square grid; say num_cams_x and num_cams_y in parameters.cfg"
+            f"{folder}: {len(pictures)} views do not form a square grid; state num_cams_x and num_cams_y in"
+            " parameters.cfg"
         )
     return GridShape(side, side)
 

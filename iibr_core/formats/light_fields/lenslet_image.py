@@ -50,7 +50,7 @@ def read_lenslet_image(path: Path) -> MultiView | None:
 def _view_size(path: Path, size: ImageSize, lenslet: GridShape) -> ImageSize:
     if min(lenslet) < 1 or size.height % lenslet.rows or size.width % lenslet.columns:
         raise InputError(
-            f"{path}: {size} pixels are no whole number of lenses of {lenslet.columns}x{lenslet.rows};"
+            f"{path}: {size} pixels are not a whole number of lenses of {lenslet.columns}x{lenslet.rows};"
             " is its name right?"
         )
     return ImageSize(size.height // lenslet.rows, size.width // lenslet.columns)

@@ -119,7 +119,7 @@ def open_light_field(path: Path) -> MultiView:
 def writer_for(layout: str) -> WriterFactory:
     """The writer of a layout, one of WRITERS. Raises InputError for others."""
     if layout not in WRITERS:
-        raise InputError(f"{layout!r} is no layout that can be written: give {' or '.join(WRITERS)}")
+        raise InputError(f"{layout!r} is not a layout that can be written: give {' or '.join(WRITERS)}")
     factory: WriterFactory = _resolve(WRITERS[layout])
     return factory
 

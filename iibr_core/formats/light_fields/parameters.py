@@ -28,7 +28,7 @@ def read_parameters(folder: Path) -> dict[str, float]:
     try:
         parser.read_string(text)
     except configparser.Error as error:
-        raise InputError(f"{path}: cannot be read as parameters ({reason_of(error)}); correct or remove it") from error
+        raise InputError(f"{path}: is not a valid parameter file ({reason_of(error)}); correct or remove it") from error
     numbers: dict[str, float] = {}
     for section in parser.sections():
         for key, text in parser.items(section):

@@ -46,7 +46,7 @@ class _FileWriter(ABC):
     def require_place(cls, path: Path, inputs: Iterable[Path] = (), may_replace: bool = False) -> None:
         """Raise InputError as `require_file_place` does, and for another ending."""
         if not path.name.lower().endswith(cls.ending):
-            raise InputError(f"{path}: a light field in one file is to end in {cls.ending}")
+            raise InputError(f"{path}: a light field in one file must end in {cls.ending}")
         require_file_place(path, inputs, may_replace)
 
     def __enter__(self) -> Self:

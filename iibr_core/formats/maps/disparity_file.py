@@ -70,7 +70,7 @@ def _require_aspect(path: Path, map_size: ImageSize, size: ImageSize) -> None:
     (map_height, map_width), (height, width) = map_size, size
     if map_size != size and abs(map_width * height / (map_height * width) - 1) > MAX_ASPECT_DIFFERENCE:
         raise InputError(
-            f"{path}: {map_width}x{map_height} has another shape than the photo, {width}x{height}; "
+            f"{path}: {map_width}x{map_height} differs in shape from the photo, {width}x{height}; "
             "crop or rotate it to match"
         )
 

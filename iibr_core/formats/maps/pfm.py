@@ -76,5 +76,5 @@ def _scale(path: Path, text: bytes) -> float:
     except ValueError:
         scale = 0.0
     if scale == 0 or not np.isfinite(scale):
-        raise InputError(f"{path}: scale '{text.decode()}' in the header is no number other than 0")
+        raise InputError(f"{path}: scale '{text.decode()}' in the header must be a number other than 0")
     return scale

@@ -41,7 +41,7 @@ def write_depth_map(path: Path, values: FloatImage) -> str:
     """The same for an (H, W) map of depths, in any unit. Raises InputError for names that do not end in `_depth`."""
     kind = path.suffix.lower()
     if kind not in MAP_SUFFIXES or not path.stem.endswith("_depth"):
-        raise InputError(f"{path}: a depth map is to end in _depth and {', '.join(MAP_SUFFIXES)}")
+        raise InputError(f"{path}: a depth map must end in _depth and {', '.join(MAP_SUFFIXES)}")
     if kind == ".png":
         step, low = _write_png(path, values)
         return f"Its values are depth: {step:.6g} times the value, and {low - step:.6g}."

@@ -98,7 +98,7 @@ def test_both_trials_show_every_row(results: list[EvaluationResult]) -> None:
 
 
 def test_figures_are_of_the_right_pictures(folder: Path, results: list[EvaluationResult]) -> None:
-    """Identity and reference warp, worked out anew from the files."""
+    """Identity and reference warp, worked out again from the files."""
     photo = read_photo(folder / "views/v01_u01.png").pixels
     truth = read_photo(folder / "views/v00_u02.png").pixels
     offset = ViewOffset(-1.0, 1.0)

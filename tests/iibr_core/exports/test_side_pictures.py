@@ -67,7 +67,7 @@ def test_parts_that_are_held_still_are_as_wide_as_may_be(source: ExportSource) -
 
 
 def test_a_focus_too_far_off_is_refused(source: ExportSource) -> None:
-    with pytest.raises(InputError, match="too much to be held still"):
+    with pytest.raises(InputError, match="too much for a common frame"):
         side_pictures(source.scene, RenderSettings(Optics(focus_disparity=30.0), ScreenSize(96, 64)), 2, 2.0)
 
 

@@ -88,7 +88,7 @@ def test_a_field_with_a_gap_is_not_written(tmp_path: Path, layout: str) -> None:
 
 @pytest.mark.parametrize("layout", ENDINGS)
 def test_files_have_their_endings_and_replace_nothing_unasked(tmp_path: Path, layout: str) -> None:
-    with pytest.raises(InputError, match="is to end in"):
+    with pytest.raises(InputError, match="must end in"):
         writer_for(layout).require_place(tmp_path / "a.gif", (), False)
     there = tmp_path / f"a{ENDINGS[layout]}"
     there.touch()

@@ -231,7 +231,7 @@ def test_what_says_all_of_a_field_is_read_again(tmp_path: Path, layout: str) -> 
 
 
 def test_a_layout_that_none_writes_is_refused_by_those_there_are() -> None:
-    with pytest.raises(InputError, match=r"'mp4' is no layout that can be written: give hci"):
+    with pytest.raises(InputError, match=r"'mp4' is not a layout that can be written: give hci"):
         writer_for("mp4")
     expected: WriterFactory = HciWriter
     assert writer_for("hci") is expected

@@ -132,9 +132,9 @@ def test_no_folder_is_written_into_one_that_is_read(photo: Path, tmp_path: Path,
 
 
 def test_what_is_there_is_replaced_only_where_that_is_allowed(photo: Path, tmp_path: Path) -> None:
-    with pytest.raises(AlreadyThereError, match=r"link\.png: is there already; give --force"):
+    with pytest.raises(AlreadyThereError, match=r"link\.png: already exists; give --force"):
         require_file_place(tmp_path / "link.png")
-    with pytest.raises(AlreadyThereError, match=r"field: is there already; give --force"):
+    with pytest.raises(AlreadyThereError, match=r"field: already exists; give --force"):
         require_folder_place(tmp_path / "field")
     require_file_place(photo, may_replace=True)
     require_folder_place(tmp_path / "field", may_replace=True)
@@ -160,7 +160,7 @@ def test_a_file_of_a_folder_may_not_lead_to_an_input(photo: Path, tmp_path: Path
         ("field", "is a folder, not a file"),
         ("n" * 252 + ".png", "a name has 256 bytes"),
         ("ä" * 126 + ".png", "a name has 256 bytes"),
-        ("nul\0.png", "is no place to write to"),
+        ("nul\0.png", "is not a place to write to"),
         ("loop", "lead in a circle"),
         ("pipe", "is a device or a pipe"),
     ],
@@ -181,8 +181,8 @@ def test_places_where_no_file_can_be(photo: Path, tmp_path: Path, name: str, rea
         ("field/photo.png", "is a file, not a folder"),
         ("field/photo.png/new", "photo.png is a file"),
         ("new/" + "n" * 256, "a name has 256 bytes"),
-        ("gone-disk/field", "gone-disk is a link to what is not there"),
-        ("gone-disk", "gone-disk is a link to what is not there"),
+        ("gone-disk/field", "gone-disk is a broken link"),
+        ("gone-disk", "gone-disk is a broken link"),
         ("loop", "lead in a circle"),
     ],
 )

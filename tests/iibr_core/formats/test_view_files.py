@@ -115,7 +115,7 @@ def test_of_a_lytros_lenslet_image_the_middle_views_are_taken(tmp_path: Path) ->
 
 def test_a_lenslet_image_of_no_whole_lenses(tmp_path: Path) -> None:
     Image.fromarray(pictures(1, 29, 28)[0]).save(tmp_path / "a_eslf.png")
-    with pytest.raises(InputError, match=r"a_eslf\.png: 28x29 pixels are no whole number of lenses of 14x14"):
+    with pytest.raises(InputError, match=r"a_eslf\.png: 28x29 pixels are not a whole number of lenses of 14x14"):
         open_light_field(tmp_path / "a_eslf.png")
 
 

@@ -152,7 +152,7 @@ def test_a_damaged_entry_is_a_miss_and_goes(tmp_path, monkeypatch, damage, endin
     (path,) = (file for file in files if file.suffix == f".{ending}")
     damage(path)
     assert not run_anew()
-    assert run_anew(), "it was written anew"
+    assert run_anew(), "it was written again"
     assert sorted(tmp_path.rglob("*.nb?")) == files
 
 

@@ -94,7 +94,7 @@ def test_the_window_lives_on_while_a_picture_is_saved(viewer: Driver, tmp_path: 
 
 
 def test_views_that_come_again_wait_until_the_picture_is_drawn(viewer: Driver, tmp_path: Path) -> None:
-    """Else each would make it begin anew."""
+    """Else each would make it begin again."""
     app, out = viewer.app, tmp_path / "large.png"
     start(viewer, out, LARGER)
     uploaded = app.scene_view.views_uploaded

@@ -249,7 +249,7 @@ def test_a_dropped_name_that_is_no_text_is_told_as_not_found(viewer: Driver) -> 
 
 
 def test_views_come_nearest_first_to_where_the_user_looks(open_window: Opener, photo_path: Path) -> None:
-    """From the hand to the worker: the viewpoint in a corner, the views made anew."""
+    """From the hand to the worker: the viewpoint in a corner, the views made again."""
     driver = open_window(photo_path, grid=GridShape(9, 9))
     driver.until_idle()
     before = driver.app.state.scene

@@ -159,7 +159,7 @@ ONLY_PANELS = (
 
 
 def test_what_each_edit_rebuilds(viewer: Driver, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Optics draw the picture and nothing else; panels draw panels; only depth strength makes the views anew."""
+    """Optics draw the picture and nothing else; panels draw panels; only depth strength makes the views again."""
     app = viewer.app
     uploads = count_calls(monkeypatch, app.scene_view.renderer, "upload_view")
 

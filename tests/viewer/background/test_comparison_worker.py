@@ -158,9 +158,9 @@ def test_a_pair_is_made_once_and_scored_when_asked(inputs: ComparisonInputs, tru
     assert again is pair, "told again, for the first may have been dropped, but not made again"
     assert isinstance(scored, PairScored)
     job.forget()
-    (anew,) = job.results_of(request, inputs, never)
-    assert isinstance(anew, PairReady)
-    assert anew is not pair
+    (again,) = job.results_of(request, inputs, never)
+    assert isinstance(again, PairReady)
+    assert again is not pair
 
 
 def test_a_look_that_is_not_wanted_any_more_stops(inputs: ComparisonInputs) -> None:

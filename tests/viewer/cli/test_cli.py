@@ -375,7 +375,7 @@ GENERATE = ("--out", "{dir}/o", "--grid", "3")
         (("generate", "{photo}", "--grid", "3", "--out", "{dir}/file/o"), "file"),
         (
             ("generate", "{photo}", "--grid", "3", "--out", "{dir}/o", "--format", "mp4"),
-            "'mp4' is no layout that can be written: give hci",
+            "'mp4' is not a layout that can be written: give hci",
         ),
         (("screenshot", "{dir}/folder", "-o", "{dir}/o.png"), "no photos in it"),
         (("generate", "{photo}", "--grid", "3"), "--out"),

@@ -72,7 +72,7 @@ def test_a_report_that_is_there_is_replaced_only_by_force(
     (out / "notes.txt").write_text("mine")
     words = ("evaluate", data / "row", "--out", out, "--views", 1, "--quality", "fast", "--refine", "off")
     assert run(monkeypatch, *words) == 2
-    assert "is there already; give --force" in capsys.readouterr().err
+    assert "already exists; give --force" in capsys.readouterr().err
     assert run(monkeypatch, *words, "--force") == 0
     assert sorted(path.name for path in out.iterdir()) == sorted([*REPORT, "notes.txt"])
 

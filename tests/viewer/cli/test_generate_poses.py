@@ -60,5 +60,5 @@ def test_what_is_mostly_made_up_is_told(
     assert run(monkeypatch, *words) == 0
     assert "inpainted, as the photo does not show it: 2 (" in capsys.readouterr().err
     capsys.readouterr()
-    assert run(monkeypatch, *words) == 2  # it is there already
+    assert run(monkeypatch, *words) == 2  # it already exists
     assert run(monkeypatch, *words, "--force") == 0

@@ -119,7 +119,7 @@ def test_what_is_there_is_replaced_only_by_force(
     capsys.readouterr()
     assert run(monkeypatch, command, photo_path, "--grid", 1, *options) == 2
     (line,) = capsys.readouterr().err.splitlines()
-    assert line.startswith(f"iibr: {options[-1]}: is there already; give --force")
+    assert line.startswith(f"iibr: {options[-1]}: already exists; give --force")
     assert {path: path.is_file() and path.stat().st_mtime_ns for path in folder.rglob("*")} == before
     assert run(monkeypatch, command, photo_path, "--grid", 1, *options, "--force") == 0
 
@@ -234,5 +234,5 @@ def test_of_two_commands_at_once_onto_one_new_place_the_second_says_so(tmp_path:
             ended = list(pool.map(lambda _: run_forked(*words, place, cwd=tmp_path), range(2)))  # noqa: B023
         assert sorted(end.returncode for end in ended) == [0, 2], [end.stderr for end in ended]
         (line,) = next(end.stderr for end in ended if end.returncode).splitlines()
-        assert re.search("another program|is there already", line), line
+        assert re.search("another program|already exists", line), line
         assert not list(tmp_path.glob(".iibr*"))

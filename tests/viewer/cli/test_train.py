@@ -148,7 +148,7 @@ def test_what_is_there_is_replaced_only_by_force(
     words = (*WORDS, "--steps", 1, "--out", tmp_path / "w.safetensors")
     assert run(monkeypatch, *words) == 2
     (line,) = capsys.readouterr().err.splitlines()
-    assert line.startswith(f"iibr: {tmp_path / name}: is there already; give --force")
+    assert line.startswith(f"iibr: {tmp_path / name}: already exists; give --force")
     assert (tmp_path / name).read_text() == "mine"
     assert names(tmp_path) == [name]
     assert run(monkeypatch, *words, "--force") == 0

@@ -59,16 +59,16 @@ def test_a_part_with_other_disparity_leaves_what_all_of_it_anew_would(gl: GLCont
     before = random.normal(size=(37, 53)).astype(np.float32)
     after = before.copy()
     after[box] = random.uniform(-2, 2, after[box].shape)
-    changed, anew = (LightFieldTexture(gl.ctx, GRID, 53, 37, hdr, with_disparity=True) for _ in range(2))
-    for field in (changed, anew):
+    changed, again = (LightFieldTexture(gl.ctx, GRID, 53, 37, hdr, with_disparity=True) for _ in range(2))
+    for field in (changed, again):
         field.upload(1, 2, colors, before)
     changed.change_disparity(1, 2, after, box)
-    anew.upload(1, 2, colors, after)
+    again.upload(1, 2, colors, after)
     for name in ("colors", "disparities", "blocks"):
-        assert getattr(changed, name).read() == getattr(anew, name).read(), name
-    assert changed.uploads.tolist() == anew.uploads.tolist()
+        assert getattr(changed, name).read() == getattr(again, name).read(), name
+    assert changed.uploads.tolist() == again.uploads.tolist()
     changed.release()
-    anew.release()
+    again.release()
 
 
 def test_blocks_know_the_least_and_the_greatest_disparity_in_them(gl: GLContext) -> None:

@@ -226,7 +226,7 @@ def test_outside_all_views_mirror_images_stand_in(renderer: Renderer) -> None:
 
 
 def test_edits_of_the_optics_rebuild_nothing(renderer: Renderer) -> None:
-    """No program, texture or view is made anew: numbers change, and the picture is drawn."""
+    """No program, texture or view is made again: numbers change, and the picture is drawn."""
     SCENE.fill(renderer, GRID)
     first = Optics(ViewOffset(0.2, 0.1), focus_disparity=1.0, aperture_diameter=3.0)
     renderer.render(first, SIZE)

@@ -67,7 +67,7 @@ def test_views_between_are_told_elsewhere_and_found_by_who_goes_back(open_now: S
     assert state.source == Source("field", filled_grid=DENSE)
     assert state.filled is not None
     assert state.filled.is_of(state.source)
-    assert reduce(state, OpenPath(FIELD.source)).source == FIELD.source, "who is there already asks for those on disk"
+    assert reduce(state, OpenPath(FIELD.source)).source == FIELD.source, "who already exists asks for those on disk"
 
 
 @pytest.mark.parametrize(

@@ -411,7 +411,7 @@ def test_reset_brings_the_first_optics_back() -> None:
     ],
 )
 def test_what_an_edit_costs(action: object, draws: bool, restarts: bool) -> None:
-    """The picture is drawn anew only if its record differs, the worker restarts only if the generation does."""
+    """The picture is drawn again only if its record differs, the worker restarts only if the generation does."""
     before = replace(state_with(scene_of()), has_chosen_aperture=True)
     after = reduce(before, action)  # type: ignore[arg-type]
     picture = [Picture(1, 5, state.optics, (60, 40)) for state in (before, after)]

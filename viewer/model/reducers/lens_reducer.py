@@ -182,7 +182,7 @@ def carry_optics(optics: Optics, old: Scene | None, new: Scene) -> Optics:
 def carry_to_depth(
     optics: Optics, old: Scene, new: Scene, same: SamePlaces, focused_at: tuple[float, float] | None
 ) -> Optics:
-    """The optics that show a photo whose depth was found anew as it was seen before: what was sharp stays sharp."""
+    """The optics that show a photo whose depth was found again as it was seen before: what was sharp stays sharp."""
     carried = carry_optics(optics, old, new)
     (first, first_now), (last, last_now) = same.pairs[0], same.pairs[-1]
     ratio = abs(last_now - first_now) / (last - first) if last > first else 1.0

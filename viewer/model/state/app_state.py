@@ -1,6 +1,6 @@
 """The viewer's whole state, frozen. Everything the screen shows is a function of it.
 
-Comparing two records decides what an edit costs: a new `generation` restarts the worker, a new `Picture` draws anew.
+Comparing two records decides what an edit costs: a new `generation` restarts the worker, a new `Picture` draws again.
 """
 
 from __future__ import annotations

@@ -34,7 +34,7 @@ class Brush:
 
 @dataclass(frozen=True)
 class SetRefine:
-    """Draw the edges of disparity to the photo's, 0..1; made anew once the edit is finished."""
+    """Draw the edges of disparity to the photo's, 0..1; made again once the edit is finished."""
 
     strength: float
     is_finished: bool

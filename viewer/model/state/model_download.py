@@ -127,7 +127,7 @@ class GiveUpEstimate:
 
 @dataclass(frozen=True)
 class DepthEstimated:
-    """The open photo has another depth now, from this model: its views are to be made anew."""
+    """The open photo has another depth now, from this model: its views are to be made again."""
 
     model: str
 

@@ -1,4 +1,4 @@
-"""A batch by an executor of this process: what is made, made anew, and never replaced; each worker's part."""
+"""A batch by an executor of this process: what is made, made again, and never replaced; each worker's part."""
 
 from __future__ import annotations
 
@@ -118,7 +118,7 @@ def test_a_file_that_no_batch_wrote_stays_unless_forced(
         done = export(archive, out, settings)
         assert done.failed == 1
         assert (out / name).read_bytes() == b"mine"
-        assert "is there already" in failures(out)["a.png"]
+        assert "already exists" in failures(out)["a.png"]
         assert "--force" in failures(out)["a.png"]
     assert export(archive, out, settings, may_replace=True).written == 1
     assert (out / name).read_bytes().startswith(b"Pf")
