@@ -15,18 +15,17 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.harness.bench_scenes import BenchScene, data_scenes, require_scenes, squares_scene
+from benchmarks.harness.bench_scenes import BenchScene, data_scenes, require_scenes
 from benchmarks.harness.plots import Panel, on_the_front, plot_panels
 from benchmarks.harness.reports import head, is_wanted, parser_of, row, start, title
-from benchmarks.harness.timing import Cost, cost_of, in_own_process, in_turns, make_field, median_cost, median_ratio
+from benchmarks.harness.timing import Cost, cost_of, in_turns, median_cost, median_ratio
 from benchmarks.peers import planes, ray_march, splatting
+from benchmarks.peers.scaling import pixel_lines, thread_lines
 from benchmarks.speed.variants import Variant, evaluated_views, field_cost
 from benchmarks.stages import judge_view
 from iibr_core.evaluation.metrics import flip, ssim
 from iibr_core.evaluation.reference_warp import reference_warp
-from iibr_core.exports.batch.threads import set_environment, thread_variables
 from iibr_core.formats.outputs import atomic_write
-from iibr_core.generation.cost_model import CORES
 from iibr_core.types import FloatImage, ViewOffset
 from viewer.cli.terminal import show_progress
 
@@ -35,8 +34,6 @@ ABOUT = """Every way gets the map as it comes; what it makes of it once is part 
 ours on all of the machine's; processor time counts."""
 TIMED_VIEWS = 4
 WARP = "plain warp"
-THREADS = (1, 2, 4, 8, 16)
-MEGAPIXELS = (0.25, 1.0, 3.0, 12.0)
 
 
 def plain_warp(photo: FloatImage, disparity: FloatImage) -> Callable[[ViewOffset], FloatImage]:
@@ -150,42 +147,6 @@ def report(found: Mapping[str, list[Result]]) -> Iterator[str]:
             if own.name in OURS and peer.name in PEERS and peer.ratio <= own.ratio and peer.psnr_db >= own.psnr_db
         ]
         yield f"\nBold: none is both faster and better. Ahead of ours in both: {', '.join(ahead) or 'none'}."
-
-
-def thread_lines(repeats: int) -> Iterator[str]:
-    """A drawn field made by 1 to 16 threads, as far as the machine goes, each in a process of its own."""
-    yield f"\n## Threads\n\n{head('threads', 'seconds', 'times as fast as one')}"
-    alone = 0.0
-    for threads in (count for count in THREADS if count <= CORES):
-        with set_environment(thread_variables(threads)):
-            seconds = in_own_process(field_seconds, 1024, repeats)
-        alone = alone or seconds
-        yield row(threads, f"{seconds:.2f}", f"{alone / seconds:.2f}")
-
-
-def pixel_lines(repeats: int) -> Iterator[str]:
-    """The same drawing from 0.25 to 12 megapixels."""
-    yield f"\n## Pixels\n\n{head('megapixels', 'seconds', 'ns a pixel and view')}"
-    costs = []
-    for megapixels in MEGAPIXELS:
-        side = round(1000 * megapixels**0.5)
-        scene = squares_scene(side, 2.0, 16)
-        costs.append(_field_cpu(scene, 1 if megapixels > 1 else repeats))
-        views = len(scene.field)
-        yield row(megapixels, f"{costs[-1]:.2f}", f"{1e9 * costs[-1] / (side * side * views):.0f}")
-    exponent = np.polyfit(np.log(MEGAPIXELS), np.log(costs), 1)[0]
-    yield f"\nProcessor time grows with pixels to the power of {exponent:.2f}."
-
-
-def field_seconds(side: int, repeats: int) -> float:
-    """Seconds by the clock for a field of a drawn scene in fast quality; the best of a few rounds."""
-    scene = squares_scene(side, 2.0, 16)
-    make_field(scene, "fast")
-    return min(cost_of(partial(make_field, scene, "fast")).wall_s for _ in range(repeats))
-
-
-def _field_cpu(scene: BenchScene, repeats: int) -> float:
-    return min(cost_of(partial(make_field, scene, "fast")).cpu_s for _ in range(repeats))
 
 
 def _write(path: Path, content: bytes) -> None:
