@@ -7,7 +7,7 @@ from functools import partial
 
 import numpy as np
 
-from benchmarks.harness.bench_scenes import squares_scene
+from benchmarks.harness.bench_scenes import BenchScene, squares_scene
 from benchmarks.harness.reports import head, row
 from benchmarks.harness.timing import cost_of, in_own_process, make_field
 from iibr_core.exports.batch.threads import set_environment, thread_variables
