@@ -12,9 +12,12 @@ from benchmarks.harness.reports import head, row
 from benchmarks.harness.timing import cost_of, in_own_process, make_field
 from iibr_core.exports.batch.threads import set_environment, thread_variables
 from iibr_core.generation.cost_model import CORES
+from iibr_core.types import GridShape
 
 THREADS = (1, 2, 4, 8, 16)
 MEGAPIXELS = (0.25, 1.0, 3.0, 12.0)
+FEW_VIEWS = GridShape(5, 5)
+"""Of 12 megapixels, they fit into 6 GB."""
 
 
 def thread_lines(repeats: int) -> Iterator[str]:
@@ -34,7 +37,7 @@ def pixel_lines(repeats: int) -> Iterator[str]:
     costs = []
     for megapixels in MEGAPIXELS:
         side = round(1000 * megapixels**0.5)
-        scene = squares_scene(side, 2.0, 16)
+        scene = squares_scene(side, 2.0, 16, FEW_VIEWS)
         costs.append(_field_cpu(scene, 1 if megapixels > 1 else repeats))
         views = len(scene.field)
         yield row(megapixels, f"{costs[-1]:.2f}", f"{1e9 * costs[-1] / (side * side * views):.0f}")
