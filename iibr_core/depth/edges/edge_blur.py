@@ -64,6 +64,10 @@ LEAST_SOFT = 0.2
 """A map of which a smaller share of edges is soft, is exact."""
 CLEARLY_SOFT_PX = 0.8
 """A part of a map with edges blurred by less is exact: single edges measure up to this by chance."""
+MOST_SPREAD = 1 / 3
+"""A filter blurs all edges of a map alike. Where the interquartile range of the blur exceeds this share of its median,
+no filter made it: matching left ramps, and they stay.
+"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,7 +92,7 @@ def measure_edge_blur(photo: FloatImage, disparity: FloatImage, should_stop: Sho
     cell = max(BLUR_CELL_PX, ceil(max(height, width, 1) / CELLS))
     sigmas = np.zeros((ceil(height / cell), ceil(width / cell)), np.float32)
     edges = _edges(photo, disparity, should_stop)
-    if _soft_share(edges) >= LEAST_SOFT:
+    if _soft_share(edges) >= LEAST_SOFT and _is_one_blur(edges):
         for row, column in np.ndindex(*sigmas.shape):
             raise_if_stopped(should_stop)
             sigmas[row, column] = _sigma_at(edges, (column + 0.5) * cell, (row + 0.5) * cell)
@@ -134,6 +138,13 @@ def _soft_share(edges: NDArray[np.float32]) -> float:
     """Of the steps, by height."""
     steps = edges[:, edges[5] > 0]
     return float(steps[3, (steps[2] >= CLEARLY_SOFT_PX) & (steps[4] > 0)].sum() / max(steps[3].sum(), 1e-30))
+
+
+def _is_one_blur(edges: NDArray[np.float32]) -> bool:
+    """Whether all soft steps are about as soft."""
+    sigmas = edges[2, (edges[5] > 0) & (edges[2] >= CLEARLY_SOFT_PX)]
+    low, middle, high = np.quantile(sigmas, (0.25, 0.5, 0.75))
+    return bool(high - low <= MOST_SPREAD * middle)
 
 
 def _photo_is_sure(edges: NDArray[np.float32]) -> bool:

@@ -38,15 +38,25 @@ def test_exact_edges_have_none() -> None:
     assert not measure_edge_blur(photo, disparity).sigma_px.any()
 
 
-def test_each_part_of_a_map_has_its_own() -> None:
+def parts_blurred(*sigmas: float) -> tuple[edge_blur.EdgeBlur, list[np.ndarray]]:
+    """What is measured of a disc thrice side by side, its map blurred so in each part; and the cells of each."""
     photo, disparity = disc()
-    photo, disparity = np.tile(photo, (1, 3, 1)), np.tile(disparity, (1, 3))
-    disparity = np.concatenate([disparity[:, :160], blur(disparity, 1.5)[:, 160:320], blur(disparity, 4.0)[:, 320:]], 1)
-    measured = measure_edge_blur(photo, disparity)
-    parts = [measured.sigma_px[:, round(at / measured.cell_px)] for at in (60, 235, 400)]
+    maps = [blur(np.tile(disparity, (1, 3)), sigma) if sigma else np.tile(disparity, (1, 3)) for sigma in sigmas]
+    disparity = np.concatenate([values[:, k * 160 : (k + 1) * 160] for k, values in enumerate(maps)], 1)
+    measured = measure_edge_blur(np.tile(photo, (1, 3, 1)), disparity)
+    return measured, [measured.sigma_px[:, round(at / measured.cell_px)] for at in (60, 235, 400)]
+
+
+def test_each_part_of_a_map_has_its_own() -> None:
+    _, parts = parts_blurred(0, 1.5, 2.0)
     assert not parts[0].any()
     np.testing.assert_allclose(parts[1], 1.5, rtol=0.15)
-    np.testing.assert_allclose(parts[2], 4.0, rtol=0.15)
+    np.testing.assert_allclose(parts[2], 2.0, rtol=0.15)
+
+
+def test_blurs_that_differ_much_are_no_filters() -> None:
+    measured, _ = parts_blurred(1.0, 2.0, 4.0)
+    assert not measured.sigma_px.any()
 
 
 def test_an_edge_that_the_photo_does_not_share_proves_nothing() -> None:
