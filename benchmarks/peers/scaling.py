@@ -15,9 +15,9 @@ from iibr_core.generation.cost_model import CORES
 from iibr_core.types import GridShape
 
 THREADS = (1, 2, 4, 8, 16)
-MEGAPIXELS = (0.25, 1.0, 3.0, 12.0)
+MEGAPIXELS = (0.25, 1.0, 3.0, 10.0)
 FEW_VIEWS = GridShape(5, 5)
-"""Of 12 megapixels, they fit into 6 GB."""
+"""Of 10 megapixels, they fit into 6 GB."""
 
 
 def thread_lines(repeats: int) -> Iterator[str]:
@@ -32,7 +32,7 @@ def thread_lines(repeats: int) -> Iterator[str]:
 
 
 def pixel_lines(repeats: int) -> Iterator[str]:
-    """The same drawing from 0.25 to 12 megapixels."""
+    """The same drawing from 0.25 to 10 megapixels."""
     yield f"\n## Pixels\n\n{head('megapixels', 'seconds', 'ns a pixel and view')}"
     costs = []
     for megapixels in MEGAPIXELS:
