@@ -3,7 +3,7 @@
     python -m benchmarks.against_warp [--data DATA] [--only NAME,...] [--repeats 3]
 
 Scenes of DATA are made with 9 x 9 views at their own disparity; the demo photo comes along, with the parallax that the
-plan gives it. The warp is `iibr_core.evaluation.reference_warp`. Ratios are medians over rounds: other programs disturb
+plan gives it. The warp is `benchmarks.peers.warp`. Ratios are medians over rounds: other programs disturb
 them little.
 """
 
@@ -18,8 +18,8 @@ from pathlib import Path
 from benchmarks.harness.bench_scenes import FIELD, BenchScene, data_scenes, offsets_of, photo_scene
 from benchmarks.harness.reports import emit, head, is_wanted, parser_of, row, start
 from benchmarks.harness.timing import cost_of, in_turns, make_field, median_cost, median_ratio
+from benchmarks.peers import warp
 from iibr_core.depth.edges.refine import refine
-from iibr_core.evaluation.reference_warp import reference_warp
 from iibr_core.generation.plan import plan_literal
 from iibr_core.types import Quality
 
@@ -47,14 +47,15 @@ def scenes(data: Path | None) -> Iterator[BenchScene]:
 
 def compare(scene: BenchScene, qualities: list[Quality], repeats: int) -> str:
     """A line of the table."""
+    view = warp.prepare(scene.photo, scene.disparity)
 
     def warp_all() -> None:
         for at in scene.field:
-            reference_warp(scene.photo, scene.disparity, at)
+            view(at)
 
     for quality in qualities:  # compiles
         make_field(scene, quality)
-    reference_warp(scene.photo, scene.disparity, scene.field[0])
+    view(scene.field[0])
     ways = {"warp": warp_all, **{quality: partial(make_field, scene, quality) for quality in qualities}}
     costs = in_turns({name: partial(cost_of, way) for name, way in ways.items()}, repeats)
     ratios = (f"{median_ratio(costs[quality], costs['warp']):.2f}" for quality in qualities)

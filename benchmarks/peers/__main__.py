@@ -19,7 +19,7 @@ from benchmarks.harness.bench_scenes import BenchScene, data_scenes, require_sce
 from benchmarks.harness.plots import Panel, on_the_front, plot_panels
 from benchmarks.harness.reports import head, is_wanted, parser_of, row, start, title
 from benchmarks.harness.timing import Cost, cost_of, in_turns, median_cost, median_ratio
-from benchmarks.peers import planes, ray_march, splatting
+from benchmarks.peers import planes, ray_march, splatting, warp
 from benchmarks.peers.scaling import pixel_lines, thread_lines
 from benchmarks.speed.variants import Variant, evaluated_views, field_cost
 from benchmarks.stages import judge_view
@@ -36,13 +36,8 @@ TIMED_VIEWS = 4
 WARP = "plain warp"
 
 
-def plain_warp(photo: FloatImage, disparity: FloatImage) -> Callable[[ViewOffset], FloatImage]:
-    """The reference warp as a peer."""
-    return lambda at: reference_warp(photo, disparity, at).colors
-
-
 PEERS: Mapping[str, Prepare] = {
-    WARP: plain_warp,
+    WARP: warp.prepare,
     "ray march (DepthFlow)": ray_march.prepare,
     "dilated forward warp (iw3)": splatting.prepare_dilated,
     "softmax splatting": splatting.prepare,
@@ -125,8 +120,8 @@ def _peer_cost(prepare: Prepare, scene: BenchScene) -> Cost:
 
 def gains(rows: list[Result]) -> dict[str, tuple[float, float]]:
     """Time and gain of each way against the plain warp."""
-    warp = next(one for one in rows if one.name == WARP)
-    return {one.name: (one.ratio, one.psnr_db - warp.psnr_db) for one in rows}
+    plain = next(one for one in rows if one.name == WARP)
+    return {one.name: (one.ratio, one.psnr_db - plain.psnr_db) for one in rows}
 
 
 def report(found: Mapping[str, list[Result]]) -> Iterator[str]:
