@@ -24,6 +24,8 @@ SETTINGS = (
     (0.5, 0.5, -0.2, 3.0),
 )
 """s, t, focus, aperture."""
+BLOCK_PX, MOST_IN_BLOCK = 8, 8.0
+"""A seam would change the whole of some block, of 255; compression changes each by less."""
 
 
 @pytest.fixture(scope="module")
@@ -58,6 +60,18 @@ def test_the_canvas_is_the_desktops_picture(shown: Tab, scene: Path) -> None:
             drawn = canvas(shown)
             assert drawn.shape == (HEIGHT, WIDTH, 3)
             assert psnr(drawn, viewer.picture()) >= (36 if aperture else 38), (s, t, focus, aperture)
+
+
+def test_between_views_there_is_no_seam_that_the_desktop_has_not(shown: Tab, scene: Path) -> None:
+    with HeadlessViewer("egl") as viewer:
+        viewer.open(Source(str(scene), grid=GridShape(3, 3)), 1.0, lambda made: None)
+        for s in np.linspace(0, 1, 9):
+            viewer.do(MoveEye(ViewOffset(0.5 * s, s)), SetAperture(0.0))
+            set_lens(shown, s, 0.5 * s, 0.0, 0.0)
+            wait_until_still(shown)
+            difference = np.abs(canvas(shown).astype(float) - viewer.picture()).mean(axis=2)
+            blocks = difference.reshape(HEIGHT // BLOCK_PX, BLOCK_PX, WIDTH // BLOCK_PX, BLOCK_PX).mean(axis=(1, 3))
+            assert blocks.max() <= MOST_IN_BLOCK, s
 
 
 def test_nothing_is_asked_of_any_network(shown: Tab) -> None:

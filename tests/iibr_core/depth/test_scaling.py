@@ -100,7 +100,7 @@ def test_rounding_is_no_depth() -> None:
     ],
 )
 def test_nothing_known_is_told(estimate: RelativeInverseDepth | MetricDepth | DisparityMap) -> None:
-    with pytest.raises(InputError, match="knows no value"):
+    with pytest.raises(InputError, match="has no known value"):
         disparity_from(estimate, GRID)
 
 

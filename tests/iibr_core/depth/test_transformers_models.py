@@ -457,13 +457,13 @@ def test_a_config_cannot_have_another_model_fetched(tmp_path: Path, changes: dic
     model = depth_anything(tmp_path / "model")
     path = model.folder / "config.json"
     path.write_text(json.dumps({**json.loads(path.read_text()), **changes}))
-    with pytest.raises(InputError, match="needs another model, somebody/model, which is not fetched"):
+    with pytest.raises(InputError, match="needs another model, somebody/model, which is not downloaded"):
         estimate_with(model, PHOTO)
 
 
 def test_a_file_is_no_model(tmp_path: Path) -> None:
     (tmp_path / "a.safetensors").touch()
-    with pytest.raises(InputError, match="is no ONNX file"):
+    with pytest.raises(InputError, match="is not an ONNX file"):
         model_to_use(DepthChoice(model=str(tmp_path / "a.safetensors")))
 
 

@@ -90,7 +90,7 @@ def test_a_quilt_is_shown(
 @pytest.mark.parametrize(
     ("trouble", "says"),
     [
-        ("nobody", "no Looking Glass Bridge answers"),
+        ("nobody", "Looking Glass Bridge does not answer"),
         ("no display", "sees no display"),
         ("old", "enter_orchestration .no answer"),
         ("failing", "play_playlist .Failure"),
@@ -158,19 +158,19 @@ class RawHandler(socketserver.BaseRequestHandler):
 @pytest.mark.parametrize(
     ("answers", "says"),
     [
-        pytest.param([b""], "no Looking Glass Bridge answers", id="closed at once"),
-        pytest.param([b"\x00\xff garbage\r\n\r\n"], "no Looking Glass Bridge answers", id="no HTTP"),
+        pytest.param([b""], "Looking Glass Bridge does not answer", id="closed at once"),
+        pytest.param([b"\x00\xff garbage\r\n\r\n"], "Looking Glass Bridge does not answer", id="no HTTP"),
         pytest.param([_answer(b"oh no", b"500 Oh no")], "HTTP status 500", id="500"),
-        pytest.param([_answer(b"<html>")], "no Looking Glass Bridge answers", id="no JSON"),
+        pytest.param([_answer(b"<html>")], "Looking Glass Bridge does not answer", id="no JSON"),
         pytest.param([_answer(b" " * (2 << 20))], "more than 1,048,576 bytes", id="huge"),
-        pytest.param([_answer(b"[" * 100_000)], "no Looking Glass Bridge answers", id="deep"),
-        pytest.param([_answer(b"\xff\xfe\xfd")], "no Looking Glass Bridge answers", id="no text"),
+        pytest.param([_answer(b"[" * 100_000)], "Looking Glass Bridge does not answer", id="deep"),
+        pytest.param([_answer(b"\xff\xfe\xfd")], "Looking Glass Bridge does not answer", id="no text"),
         pytest.param([b"HTTP/1.1 200 OK\r\nContent-Length: 99\r\n\r\n{}"], "97 bytes are missing", id="cut off"),
         pytest.param([DRIPS], "no whole answer within", id="drips"),
         pytest.param([DRIPS + b"HTTP/1.1 200 OK\r\nA: "], "no whole answer within", id="drips a header"),
         pytest.param([DRIPS + b"HTTP/1.1 200 OK\r\n\r\n"], "no whole answer within", id="drips a body"),
         *(
-            pytest.param([_answer(body)], "did not do enter_orchestration", id=f"answers {body.decode()}")
+            pytest.param([_answer(body)], "refused enter_orchestration", id=f"answers {body.decode()}")
             for body in (b"null", b"[1]", b"7", b'"x"', b'{"status": []}', b'{"status": {"value": [1]}}')
         ),
         *(

@@ -128,7 +128,7 @@ def test_what_stays_still_changes_neither_distances_nor_places(source: ExportSou
 @pytest.mark.parametrize("scale", [0.0, -0.5])
 def test_a_photo_that_is_flat_or_inside_out_has_no_cameras(source: ExportSource, scale: float) -> None:
     plan = replace(source.plan(), disparity_scale=scale)
-    with pytest.raises(InputError, match="is flat, or turned inside out"):
+    with pytest.raises(InputError, match="is flat or inverted"):
         cameras_of(replace(source, scene=replace(source.scene, plan=plan)))
 
 

@@ -236,7 +236,7 @@ def test_a_folder_without_parameters_is_a_square(tmp_path):
     assert (by_index[0, 2].disparity == 1).all()
     assert by_index[1, 1].disparity is None
     (tmp_path / "input_Cam008.png").unlink()
-    with pytest.raises(InputError, match="8 views are no square"):
+    with pytest.raises(InputError, match="8 views do not form a square"):
         read_light_field(tmp_path)
 
 
@@ -305,7 +305,7 @@ def test_parameters_that_are_none(tmp_path):
     edit_parameters(tmp_path / "lf", "meta", disp_min="low", disp_max="nan", scene="100 % %(x)s".replace("%", "%%"))
     assert read_light_field(tmp_path / "lf")[0].range_px is None
     (tmp_path / "lf" / "parameters.cfg").write_bytes(b"\xff\xfe no sections")
-    with pytest.raises(InputError, match=r"parameters\.cfg: cannot be read"):
+    with pytest.raises(InputError, match=r"parameters\.cfg: is not a valid parameter file"):
         read_light_field(tmp_path / "lf")
 
 

@@ -80,9 +80,9 @@ def test_missing_empty_and_foreign_files(tmp_path):
     refused(tmp_path, "is a folder")
     for name, content, match in [
         ("empty", b"", "empty"),
-        ("text", b"not weights at all, but long enough to hold a header length", "no safetensors file"),
-        ("pickle", b"\x80\x02}q\x00.", "no safetensors file"),
-        ("huge header", b"\xff" * 64, "no safetensors file"),
+        ("text", b"not weights at all, but long enough to hold a header length", "not a safetensors file"),
+        ("pickle", b"\x80\x02}q\x00.", "not a safetensors file"),
+        ("huge header", b"\xff" * 64, "not a safetensors file"),
     ]:
         path = tmp_path / f"{name}.safetensors"
         path.write_bytes(content)
@@ -96,7 +96,7 @@ def test_every_truncation_is_refused(tmp_path):
     cut = tmp_path / "cut.safetensors"
     for length in range(1, len(data)):
         cut.write_bytes(data[:length])
-        refused(cut, "no safetensors file, or is damaged")
+        refused(cut, "not a safetensors file, or is damaged")
 
 
 def test_a_damaged_header_is_refused_or_harmless(tmp_path):
@@ -137,7 +137,7 @@ def test_weights_of_another_model(tmp_path):
     save_weights(nn.Linear(3, 4), path)
     refused(path, "lacks 0.bias")
     save_weights(nn.Sequential(*small_model(), nn.Linear(1, 1)), path)
-    refused(path, "holds 3.bias, which this model has not")
+    refused(path, "holds 3.bias, which this model lacks")
 
 
 @pytest.mark.parametrize("bad", [float("nan"), float("inf")])

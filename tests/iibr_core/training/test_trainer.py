@@ -359,7 +359,7 @@ def test_resume_needs_a_whole_checkpoint_of_this_model_and_course(out):
     save_weights(Scorer(), path)
     refused("holds iibr-weights, not iibr-checkpoint")
     path.write_bytes(path.read_bytes()[:-7])
-    refused("no safetensors file, or is damaged")
+    refused("not a safetensors file, or is damaged")
 
 
 def test_bad_paths_are_known_before_the_first_step(tmp_path):
