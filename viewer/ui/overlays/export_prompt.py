@@ -232,8 +232,9 @@ def _show(options: ExportOptions, asked: _Asked) -> ExportOptions:
 
 
 def _budget(options: ExportOptions, asked: _Asked) -> ExportOptions:
-    label("At most", asked.layout, "Size of the file; 0: as large as it takes to look alike.")
-    changed, megabytes = imgui.input_float("##budget", (options.budget or 0) / 1e6, 0, 0, "%.4g MB")
+    label("Size limit", asked.layout, "To keep it, pictures lose detail, or there are fewer. 0: none.")
+    form = "%.4g MB" if options.budget else "none"
+    changed, megabytes = imgui.input_float("##budget", (options.budget or 0) / 1e6, 0, 0, form)
     return replace(options, budget=int(clamp(megabytes, 0, 1000) * 1e6) or None) if changed else options
 
 
@@ -245,9 +246,9 @@ def _credit(options: ExportOptions, asked: _Asked) -> ExportOptions:
 
 
 def _stills(options: ExportOptions, asked: _Asked) -> ExportOptions:
-    label("Views", asked.layout)
-    tip = "For Safari, which reads no frames of moving pictures: several times as large."
-    stills = checkbox("A file each", options.stills, asked.layout, tip)
+    label("Safari", asked.layout)
+    tip = "Stores each view as a picture of its own, as Safari needs it. The file is several times as large."
+    stills = checkbox("All views in Safari, too", options.stills, asked.layout, tip)
     return options if stills is None else replace(options, stills=stills)
 
 
