@@ -29,7 +29,7 @@ from iibr_core.types import FloatImage, ViewOffset, image_size
 
 SMOOTH_STEPS_PX = (1, 2, 4, 8, 16, 32)
 """Colours are averaged over ever wider surroundings, as far as what is known is farther away."""
-MODE_PX = 2
+MEDIAN_PX = 2
 """Disparities follow the most of their surroundings, so far each way: a lone one would fly off in the next view."""
 SURFACE_PX = 2.0
 """Surfaces that part by less than this are one."""
@@ -252,14 +252,14 @@ def _weigh_in_front(disparity, pixels, known, photo_disparity, s, t, one_surface
 
 @kernel
 def _agree(disparity, hole, pixels, agreed):
-    """The median of what was filled within MODE_PX each way, as agreed[:, 0]."""
+    """The median of what was filled within MEDIAN_PX each way, as agreed[:, 0]."""
     height, width = disparity.shape
-    around = np.empty((2 * MODE_PX + 1) ** 2, np.float32)
+    around = np.empty((2 * MEDIAN_PX + 1) ** 2, np.float32)
     for i in range(len(pixels)):
         y, x = pixels[i] // width, pixels[i] % width
         count = 0
-        for v in range(max(y - MODE_PX, 0), min(y + MODE_PX + 1, height)):
-            for u in range(max(x - MODE_PX, 0), min(x + MODE_PX + 1, width)):
+        for v in range(max(y - MEDIAN_PX, 0), min(y + MEDIAN_PX + 1, height)):
+            for u in range(max(x - MEDIAN_PX, 0), min(x + MEDIAN_PX + 1, width)):
                 if hole[v, u]:
                     around[count] = disparity[v, u]
                     count += 1

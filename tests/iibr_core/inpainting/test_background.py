@@ -4,7 +4,7 @@ import pytest
 from iibr_core.inpainting.background import (
     ALONG_LINES,
     HIDDEN_PX,
-    MODE_PX,
+    MEDIAN_PX,
     SMOOTH_STEPS_PX,
     SURFACE_PX,
     fill_background,
@@ -49,7 +49,7 @@ def along_line(line, way):
 def agree_slowly(disparity, hole):
     agreed = disparity.copy()
     for y, x in np.argwhere(hole):
-        block = np.s_[max(y - MODE_PX, 0) : y + MODE_PX + 1, max(x - MODE_PX, 0) : x + MODE_PX + 1]
+        block = np.s_[max(y - MEDIAN_PX, 0) : y + MEDIAN_PX + 1, max(x - MEDIAN_PX, 0) : x + MEDIAN_PX + 1]
         around = np.sort(disparity[block][hole[block]])
         agreed[y, x] = around[(len(around) - 1) // 2]
     return agreed
