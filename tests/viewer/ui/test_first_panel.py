@@ -12,6 +12,7 @@ from imgui_bundle import imgui
 from iibr_core.scenes.scene import Progress
 from iibr_core.scenes.screen_size import ScreenSize
 from tests.viewer.conftest import headless_with_scene
+from tests.viewer.ui.watched_widgets import watch_widgets
 from viewer.app.headless import HeadlessViewer
 from viewer.model.actions import SetState
 from viewer.model.commands import BY_NAME
@@ -54,26 +55,11 @@ def controls(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """The words of each control of the panel that was built last."""
     found: list[str] = []
 
-    def watch(kind: str) -> None:
-        real = getattr(imgui, kind)
+    def record(kind: str, arguments: tuple[Any, ...]) -> None:
+        if imgui.internal.get_current_window_read().name == "panel":
+            found.append(arguments[0])
 
-        def build(words: str, *others: Any) -> Any:
-            if imgui.internal.get_current_window_read().name == "panel":
-                found.append(words)
-            return real(words, *others)
-
-        monkeypatch.setattr(imgui, kind, build)
-
-    for kind in CONTROLS:
-        watch(kind)
-    begin = imgui.begin
-
-    def begin_anew(name: str, *others: Any) -> Any:
-        if name == "panel":
-            found.clear()
-        return begin(name, *others)
-
-    monkeypatch.setattr(imgui, "begin", begin_anew)
+    watch_widgets(monkeypatch, CONTROLS, found, record)
     return found
 
 

@@ -17,6 +17,7 @@ from iibr_core.rendering.optics import APERTURE_KINDS, ApertureShape
 from iibr_core.scenes.scene import DepthSettings
 from iibr_core.scenes.screen_size import ScreenSize
 from tests.viewer.conftest import headless_with_scene
+from tests.viewer.ui.watched_widgets import watch_widgets
 from viewer.app.headless import HeadlessViewer
 from viewer.background.model_downloader import list_models
 from viewer.model.actions import ShowPrompt
@@ -67,29 +68,13 @@ def items(monkeypatch: pytest.MonkeyPatch) -> list[Item]:
     """Every widget that is built from now on, in windows of whatever name; the real ones, watched."""
     found: list[Item] = []
 
-    def watch(kind: str) -> None:
-        real = getattr(imgui, kind)
+    def record(kind: str, arguments: tuple[Any, ...]) -> None:
+        words = words_of(kind, arguments)
+        low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
+        width = imgui.calc_text_size(words).x
+        found.append(Item(kind, words, low.x, low.y, high.x, high.y, width))
 
-        def build(*arguments: Any) -> Any:
-            result = real(*arguments)
-            words = words_of(kind, arguments)
-            low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
-            width = imgui.calc_text_size(words).x
-            found.append(Item(kind, words, low.x, low.y, high.x, high.y, width))
-            return result
-
-        monkeypatch.setattr(imgui, kind, build)
-
-    for kind in WIDGETS:
-        watch(kind)
-    begin = imgui.begin
-
-    def begin_anew(name: str, *others: Any) -> Any:
-        if name == "panel":
-            found.clear()
-        return begin(name, *others)
-
-    monkeypatch.setattr(imgui, "begin", begin_anew)
+    watch_widgets(monkeypatch, WIDGETS, found, record)
     return found
 
 
