@@ -10,7 +10,7 @@ ROOMS = "iibr_core", "viewer", "benchmarks", "docs", "shaders", "web", "tests"
 KINDS = {".py", ".md", ".glsl", ".frag", ".js"}
 OWN_WORDS = re.compile(
     r"\b(crumbs?|specks?|rims?|rim_\w+|exemplars?|fellows?|beyond_frame|joined_\w+|settled_\w+|stand_in|free_?look|heeds"
-    r"|made up of nothing|what is made up|told apart|struck off|widen_fronts|soft_outlines|leaving_surfaces"
+    r"|made up|told apart|struck off|widen_fronts|soft_outlines|leaving_surfaces"
     r"|WITNESS\w*|SAY|STIRRED_PX|DOUBTED_PX|RELUCTANCE|class Relief)\b"
 )
 

@@ -71,7 +71,8 @@ class Bridge:
             answer = _answer_to(endpoint, content)
         except (OSError, HTTPException, ValueError, RecursionError) as error:
             raise InputError(
-                f"Looking Glass Bridge does not answer at {ADDRESS} ({reason_of(error)}); start it, or leave out --show"
+                f"Looking Glass Bridge does not answer at {ADDRESS} ({reason_of(error)}); start it, or do not show"
+                " it there"
             ) from error
         status = _value(answer, "status")
         if not may_fail and (not isinstance(status, str) or status in FAILURES):

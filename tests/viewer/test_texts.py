@@ -24,7 +24,7 @@ SHARED = ("viewer/model/saved_settings.py", "viewer/model/gloss_file.py", "viewe
 
 FORBIDDEN = re.compile(
     r"asking the transformer|\bholes?\b|stored view|kept state|best there is|to the middle|usual text|surroundings"
-    r"|made up|\bworker\b|\brims?\b|\bcrumbs?\b|\bspecks?\b|must end in|means nothing to",
+    r"|made up|\bworker\b|\brims?\b|\bcrumbs?\b|\bspecks?\b|is to end in|means nothing to",
     re.IGNORECASE,
 )
 
