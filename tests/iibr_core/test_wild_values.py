@@ -104,11 +104,6 @@ def known(value):
     return np.where(np.isfinite(depths(value)), depths(value), np.float32(np.nan))
 
 
-def soft_cells():
-    """A blur of the whole map."""
-    return edge_blur.EdgeBlur(np.full((2, 2), 1.0, np.float32), 8)
-
-
 def mixed_between_surfaces():
     """Two surfaces, and a column between them that is of neither."""
     columns = np.repeat(np.float32([0.0, 0.9, 2.0]), [6, 1, USUAL_SIZE[1] - 7])
@@ -329,8 +324,8 @@ FINITE = {
         image(0.5), np.nan_to_num(depths(v))
     ),
     "depth.edges.blur_fit.fit_to_blur": lambda v, _: [
-        blur_fit.fit_to_blur(image(v), depths(1.0), depths(0.5), soft_cells(), 0.1),
-        blur_fit.fit_to_blur(image(0.5), np.nan_to_num(depths(v)), np.nan_to_num(depths(v)), soft_cells(), 0.1),
+        blur_fit.fit_to_blur(image(v), depths(1.0), depths(0.5), 1.0, 0.1),
+        blur_fit.fit_to_blur(image(0.5), np.nan_to_num(depths(v)), np.nan_to_num(depths(v)), 1.0, 0.1),
     ],
     "depth.edges.edge_band.resolve_edge_band": lambda v, _: [
         edge_band.resolve_edge_band(scene()[0].pixels, np.nan_to_num(known(v)), 0.5, np.isnan(known(v))),

@@ -1,19 +1,17 @@
 """A sharpened map, blurred again, should give the map that it was made of: where it does not, its edges move.
 
-Colours alone leave outlines ragged where both sides are textured: what the blurred map misses shows it. Where maps and
-photo contradict each other, so that no outline satisfies both, or where the map was made soft in some other way than by
-this blur, nothing changes.
+Ramps cut at half their height leave corners round and outlines ragged: what the blurred map misses shows it.
 """
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
+from math import ceil
 
-from iibr_core.depth.edges.edge_blur import EdgeBlur
+import numpy as np
+
 from iibr_core.runtime.jit import kernel
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never
-from iibr_core.types import FloatImage, ImageSize, image_size
+from iibr_core.types import FloatImage, image_size
 
 FITTED_SIGMAS = 3.0
 """Where a Gaussian ends."""
@@ -35,86 +33,61 @@ SAME_SIDE = 0.3
 """Of the step, up to which a height is that side's."""
 MOVED_EDGES = 2.0
 """Times the least edge: lower steps stay where they are."""
-MOST_CELL_MISFIT = 0.09
-"""Of the fitted map, blurred again, from the given map, relative to what the blur changed (rms of a cell)."""
 
 
 def fit_to_blur(
     photo: FloatImage,
     values: FloatImage,
     sharp: FloatImage,
-    blur: EdgeBlur,
+    sigma: float,
     least_edge: float,
     should_stop: ShouldStop = never,
 ) -> FloatImage:
-    """The map `sharp` (H, W) with its edges moved so that, blurred, it gives `values` (H, W).
+    """The map `sharp` (H, W) with its edges moved so that, blurred by sigma (px), it gives `values` (H, W).
 
     photo: (H, W, 3), sRGB-encoded; it counts, too, in where an edge lies. least_edge: the step that counts as one.
-    Cells in which no such map is found keep their bits. Raises Cancelled once should_stop is true.
+    Edges move where `sharp` differs from `values`, and from there on. Raises Cancelled once should_stop is true.
     """
-    taps, reach = _taps(blur)
-    if not reach.any():
+    if sigma > WIDEST_FITTED_SIGMA_PX:
         return sharp
-    cells, width = (taps, reach, blur.cell_px), values.shape[1]
-    fitted, missing, visited = sharp.copy(), np.zeros_like(sharp), np.zeros(sharp.shape, np.bool_)
+    taps = _taps(sigma)
+    fitted, missing, settled = sharp.copy(), np.empty_like(sharp), sharp == values
 
     def find_missing(first: int, last: int) -> None:
-        _find_missing(values, fitted, *cells, first, last, missing)
+        _find_missing(values, fitted, taps, first, last, missing)
 
     def move(first: int, last: int) -> None:
-        _move_edges(photo, fitted, missing, *cells, MOVED_EDGES * least_edge, first, last, visited)
+        _move_edges(photo, fitted, missing, taps, MOVED_EDGES * least_edge, first, last, settled)
 
-    in_bands(find_missing, ImageSize(len(reach), blur.cell_px * width), should_stop)
+    in_bands(find_missing, image_size(values), should_stop)
     for _ in range(DESCENT_SWEEPS):
         # One band after the other: each move sees what those before it left missing.
         in_bands(move, image_size(values), should_stop, threads=1)
-    changed, misfit = _cell_squares(values - fitted, blur), _cell_squares(missing, blur)
-    found = np.isfinite(misfit) & (misfit <= MOST_CELL_MISFIT**2 * changed)
-    return np.where(blur.at_pixels(found, image_size(values)), fitted, sharp)
+    return fitted
 
 
-def _taps(blur: EdgeBlur) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
-    """Of each cell (M, N): a Gaussian (M, N, R) that sums to 1, and how far it reaches to both sides, 0 = none."""
-    fits = blur.sigma_px <= WIDEST_FITTED_SIGMA_PX
-    reach = np.where(fits, np.ceil(FITTED_SIGMAS * blur.sigma_px), 0).astype(np.int64)
-    apart = np.abs(np.arange(2 * int(reach.max()) + 1) - reach[..., None])
-    sigma = np.maximum(blur.sigma_px, 1e-3)[..., None]
-    taps = np.where(apart <= reach[..., None], np.exp(-0.5 * (apart / sigma) ** 2), 0.0)
-    return (taps / taps.sum(axis=2, keepdims=True)).astype(np.float32), reach
-
-
-def _cell_squares(values: FloatImage, blur: EdgeBlur) -> NDArray[np.float64]:
-    """(M, N): sum of squares of the pixels (H, W) of each cell."""
-    rows, columns = (np.arange(0, length, blur.cell_px) for length in values.shape)
-    squares = np.square(values, dtype=np.float64)
-    return np.asarray(np.add.reduceat(np.add.reduceat(squares, rows, 0), columns, 1))
+def _taps(sigma: float) -> FloatImage:
+    """A Gaussian that sums to 1."""
+    reach = ceil(FITTED_SIGMAS * sigma)
+    taps = np.exp(-0.5 * (np.arange(-reach, reach + 1) / sigma) ** 2)
+    return np.asarray(taps / taps.sum(), np.float32)
 
 
 @kernel
-def _find_missing(values, fitted, taps, reach, cell, first, last, missing):
-    """Rows [first, last) of cells: the given map less the fitted one, blurred."""
+def _find_missing(values, fitted, taps, first, last, missing):
+    """Rows [first, last): the given map less the fitted one, blurred. The border's pixels go on."""
     height, width = values.shape
-    for row in range(first, last):
-        for column in range(reach.shape[1]):
-            far, own = reach[row, column], taps[row, column]
-            if far == 0:
-                continue
-            top, left = row * cell, column * cell
-            bottom, right = min(top + cell, height), min(left + cell, width)
-            # Separable: rows of the cell and of what its blur reaches, then columns. The border's pixels go on.
-            line = np.empty(right - left + 2 * far, np.float32)
-            blurred = np.zeros((bottom - top + 2 * far, right - left), np.float32)
-            for y in range(len(blurred)):
-                v = min(max(top + y - far, 0), height - 1)
-                for x in range(len(line)):
-                    line[x] = fitted[v, min(max(left + x - far, 0), width - 1)]
-                for i in range(-far, far + 1):
-                    _add(own[far + i], line[far + i :], blurred[y])
-            for y in range(top, bottom):
-                total = -values[y, left:right]
-                for j in range(-far, far + 1):
-                    _add(own[far + j], blurred[y - top + far + j], total)
-                missing[y, left:right] = -total
+    far = len(taps) // 2
+    line = np.empty(width + 2 * far, np.float32)
+    for y in range(first, last):
+        # Separable: columns, then rows.
+        line[:] = 0.0
+        for j in range(-far, far + 1):
+            _add(taps[far + j], fitted[min(max(y + j, 0), height - 1)], line[far : far + width])
+        line[:far], line[far + width :] = line[far], line[far + width - 1]
+        missing[y] = values[y]
+        for i in range(2 * far + 1):
+            _add(-taps[i], line[i:], missing[y])
 
 
 @kernel
@@ -187,29 +160,26 @@ def _correlate(missing, y, x, taps, far):
 
 
 @kernel
-def _move_edges(photo, fitted, missing, taps, reach, cell, least_edge, first, last, visited):
+def _move_edges(photo, fitted, missing, taps, least_edge, first, last, settled):
     """Rows [first, last): pixels take over the height of a neighbour across an edge where that fits better.
 
-    Coordinate descent; `missing` is kept up to date. visited (H, W): what was looked at, until something moves near it.
+    Coordinate descent; `missing` is kept up to date. settled (H, W): not looked at until something moves near it.
     """
     height, width = fitted.shape
-    sums = np.empty((2, 4))
+    far, energy, sums = len(taps) // 2, (taps * taps).sum() ** 2, np.empty((2, 4))
     for y in range(first, last):
         for x in range(width):
             here = fitted[y, x]
             # Most pixels end here.
-            if visited[y, x] or not (
+            if settled[y, x] or not (
                 abs(fitted[max(y - 1, 0), x] - here) >= least_edge
                 or abs(fitted[min(y + 1, height - 1), x] - here) >= least_edge
                 or abs(fitted[y, max(x - 1, 0)] - here) >= least_edge
                 or abs(fitted[y, min(x + 1, width - 1)] - here) >= least_edge
             ):
                 continue
-            row, column, visited[y, x] = y // cell, x // cell, True
-            far, own = reach[row, column], taps[row, column]
-            if far == 0:
-                continue
-            wanted, energy = _correlate(missing, y, x, own, far), (own * own).sum() ** 2
+            settled[y, x] = True
+            wanted = _correlate(missing, y, x, taps, far)
             best, value = 0.0, here
             for side in range(4):
                 v, u = y + (side == 0) - (side == 1), x + (side == 2) - (side == 3)
@@ -226,7 +196,7 @@ def _move_edges(photo, fitted, missing, taps, reach, cell, least_edge, first, la
             if value != here:
                 fitted[y, x] = value
                 top, left = max(y - REVISIT_RADIUS_PX, 0), max(x - REVISIT_RADIUS_PX, 0)
-                visited[top : y + REVISIT_RADIUS_PX + 1, left : x + REVISIT_RADIUS_PX + 1] = False
+                settled[top : y + REVISIT_RADIUS_PX + 1, left : x + REVISIT_RADIUS_PX + 1] = False
                 left, right = max(x - far, 0), min(x + far, width - 1) + 1
                 for v in range(max(y - far, 0), min(y + far, height - 1) + 1):
-                    _add((here - value) * own[v - y + far], own[left - x + far :], missing[v, left:right])
+                    _add((here - value) * taps[v - y + far], taps[left - x + far :], missing[v, left:right])

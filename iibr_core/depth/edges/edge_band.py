@@ -28,15 +28,10 @@ MIXED_EDGES = 5.0
 """Times the least edge: what lies between nearer surfaces may be a slope."""
 LEAST_MEASURED = 0.025
 """Where a smaller share of the edge bands is clearly between two surfaces, it shows wires or slopes."""
-LEAST_BLURRED_SHARE = 0.022
-"""Likewise of a sharpened map: where a smaller share is still between two surfaces, the blur is gone."""
 MOST_CLEAR_NEIGHBOURS = 4
 """What is clearly between has at most so many neighbours on its own disparity."""
 MOST_NEIGHBOURS = (2, 4)
 """So has in other maps all that lies between, on thin things too: so many within one pixel, and within two."""
-CROWD_PX = 5
-CROWDED = 0.3
-"""Where steps are at so large a share of the pixels within CROWD_PX, as in meshes, a lone value may be a wire's."""
 
 
 def resolve_edge_band(
@@ -44,14 +39,13 @@ def resolve_edge_band(
     values: FloatImage,
     least_edge: float,
     unknown: NDArray[np.bool_],
-    soft: NDArray[np.bool_] | None = None,
     should_stop: ShouldStop = never,
     stages: Stages = ALL_STAGES,
 ) -> FloatImage:
     """The map (H, W) with every pixel beside a depth edge on one of its two sides, by the photo (H, W, 3).
 
     least_edge: the step that counts as a depth edge, more than 0. unknown: (H, W), where values were filled in.
-    soft: (H, W), where the map was soft before it was sharpened; None: nowhere. stages: that are on.
+    stages: that are on.
     Lone disparities between two surfaces, which maps have that were measured or resampled, are taken for unknown, and
     all that is unknown is filled again: mixed pixels, which look like one another, had passed them on. Then pixels
     change sides where the colours say so (`label_edges`). Raises Cancelled once should_stop is true.
@@ -60,14 +54,10 @@ def resolve_edge_band(
     is_band = step_distance(values, least_edge, BAND_PX, counts_slopes=True) < BAND_PX
     between, clear = _find_between(values, least_edge, should_stop)
     is_measured = clear > LEAST_MEASURED * np.count_nonzero(is_band)
-    is_left = soft is not None and np.count_nonzero(between & soft) > LEAST_BLURRED_SHARE * np.count_nonzero(
-        is_band & soft
-    )
     unsure, filled = unknown, values
-    if (is_measured or is_left) and stages.refill_between_surfaces:
+    if is_measured and stages.refill_between_surfaces:
         between |= _find_between(np.where(unknown, np.float32(np.nan), values), least_edge, should_stop)[0]
-        # Where a map was not soft that has its disparities between surfaces from softness alone, it is exact.
-        unsure = between | unknown if is_measured or soft is None else (between & soft) | unknown
+        unsure = between | unknown
         filled = fill_disparity_by_color(colors, np.where(unsure, np.float32(np.nan), values), should_stop)
     return label_edges(colors, filled, unsure, least_edge, should_stop) if stages.label_edge_bands else filled
 
@@ -140,18 +130,5 @@ def _find_between_rows(values, least_edge, first, last, between):
             for v in range(max(y - 2, 0), min(y + 3, height)):
                 for u in range(max(x - 2, 0), min(x + 3, width)):
                     neighbours += abs(values[v, u] - values[y, x]) <= least_edge
-            between[y, x] = neighbours <= MOST_NEIGHBOURS[1] and not _is_crowded(values, y, x, least_edge)
+            between[y, x] = neighbours <= MOST_NEIGHBOURS[1]
     return clear
-
-
-@kernel
-def _is_crowded(values, y, x, least_edge):
-    """Whether a pixel has depth edges all around it."""
-    height, width = values.shape
-    steps, places = 0, 0
-    for v in range(max(y - CROWD_PX, 0), min(y + CROWD_PX, height - 2) + 1):
-        for u in range(max(x - CROWD_PX, 0), min(x + CROWD_PX, width - 2) + 1):
-            right, down = abs(values[v, u + 1] - values[v, u]), abs(values[v + 1, u] - values[v, u])
-            steps += right > least_edge or down > least_edge
-            places += 1
-    return steps >= CROWDED * places

@@ -1,4 +1,4 @@
-"""How soft the depth edges of a map are, place by place; measured on edges that can be nothing but steps, blurred.
+"""How soft the depth edges of a map are, measured on edges that can be nothing but steps, blurred.
 
 A slope, a hill or a fold may rise like a blurred step, but few have flat shoulders, and the photo changes along those
 no more often than chance has it. Where nothing is sure, the blur is 0: the map stays.
@@ -6,7 +6,6 @@ no more often than chance has it. Where nothing is sure, the blur is 0: the map 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import ceil, sqrt
 
 import numpy as np
@@ -15,7 +14,7 @@ from numpy.typing import NDArray
 from iibr_core.depth.edges.edge_profiles import gradient, height_at, is_inside, strongest_change, walk
 from iibr_core.depth.edges.ridges import SHARES, structure_blur
 from iibr_core.runtime.jit import kernel
-from iibr_core.runtime.tiling import ShouldStop, in_bands, never, raise_if_stopped
+from iibr_core.runtime.tiling import ShouldStop, in_bands, never
 from iibr_core.types import FloatImage, ImageSize
 
 SHARP_PX = 0.65
@@ -37,15 +36,6 @@ STEEPEST_SHOULDER = 0.15
 """Slope there, relative to the step's."""
 CHANGE_NOISE = 0.003
 """Squared change of colour (sRGB-encoded) that is no edge of the photo."""
-BLUR_CELL_PX = 32
-CELLS = 16
-"""At most so many cells along each side of the map."""
-NEAREST_EDGES = 64
-"""Whose median is the blur of a cell."""
-MOST_SAMPLES = 512
-"""Edges at which the photo is asked whether they are any."""
-SIMILAR_BLUR_RATIO = 1.5
-"""Up to this factor edges are as soft as each other."""
 SAMPLE_CELL_PX = 16
 """Edges nearer to each other show the same of the photo: they count as one."""
 CHANCE = 0.5
@@ -54,49 +44,32 @@ CHANCE_VARIANCE = 1 / 6
 """Of that share of two shoulders: three changes in any order."""
 CERTAINTY = 2.0
 """Standard deviations above chance from which the photo is believed."""
-LIKELY = 0.55
-"""Share from which it is believed of a place, where it is sure of edges as soft as these all over the map."""
 MOST_EDGES = 4096
 """Kept of a map."""
-LEAST_STEP_SHARE = 0.2
-"""Share of soft edges with flat shoulders, among all that are as soft, from which they are steps; hills have few."""
 LEAST_SOFT = 0.2
 """A map of which a smaller share of edges is soft, is exact."""
 CLEARLY_SOFT_PX = 0.8
-"""A part of a map with edges blurred by less is exact: single edges measure up to this by chance."""
+"""Edges blurred by less may be exact: single ones measure up to this by chance."""
 MOST_SPREAD = 1 / 3
 """A filter blurs all edges of a map alike. Where the interquartile range of the blur exceeds this share of its median,
 no filter made it: matching left ramps, and they stay.
 """
 
 
-@dataclass(frozen=True, eq=False)
-class EdgeBlur:
-    """Standard deviation (px) of the blur of a map, for each of its cells; 0 where its edges are exact or unknown."""
+def measure_edge_blur(photo: FloatImage, disparity: FloatImage, should_stop: ShouldStop = never) -> float:
+    """The blur (standard deviation, px) of the depth edges of a (H, W) map; 0 where they are exact or nothing is sure.
 
-    sigma_px: NDArray[np.float32]
-    """(rows, columns)"""
-    cell_px: int
-
-    def at_pixels(self, cells: NDArray[np.bool_], size: ImageSize) -> NDArray[np.bool_]:
-        """(H, W), what is true of a pixel's cell, from (rows, columns)."""
-        return cells.repeat(self.cell_px, 0).repeat(self.cell_px, 1)[: size.height, : size.width]
-
-
-def measure_edge_blur(photo: FloatImage, disparity: FloatImage, should_stop: ShouldStop = never) -> EdgeBlur:
-    """The blur of the depth edges of a (H, W) map, place by place. photo: (H, W, 3), sRGB-encoded.
-
-    Raises Cancelled once should_stop is true.
+    photo: (H, W, 3), sRGB-encoded. Raises Cancelled once should_stop is true.
     """
-    height, width = disparity.shape
-    cell = max(BLUR_CELL_PX, ceil(max(height, width, 1) / CELLS))
-    sigmas = np.zeros((ceil(height / cell), ceil(width / cell)), np.float32)
-    edges = _edges(photo, disparity, should_stop)
-    if _soft_share(edges) >= LEAST_SOFT and _is_one_blur(edges):
-        for row, column in np.ndindex(*sigmas.shape):
-            raise_if_stopped(should_stop)
-            sigmas[row, column] = _sigma_at(edges, (column + 0.5) * cell, (row + 0.5) * cell)
-    return EdgeBlur(sigmas, cell)
+    steps = _steps(photo, disparity, should_stop)
+    soft = steps[:, steps[2] >= CLEARLY_SOFT_PX]
+    agree = soft[3, soft[4] > 0].sum()
+    if not (agree > 0 and agree >= LEAST_SOFT * steps[3].sum() and _photo_is_sure(soft)):
+        return 0.0
+    low, middle, high = np.quantile(soft[2], (0.25, 0.5, 0.75))
+    if high - low > MOST_SPREAD * middle:
+        return 0.0
+    return min(_weighted_median(soft[2], soft[3]), WIDEST_MEASURED_SIGMA_PX)
 
 
 def extent(disparity: FloatImage) -> float:
@@ -104,47 +77,6 @@ def extent(disparity: FloatImage) -> float:
     step = max(1, disparity.size // 200_000)
     low, high = np.percentile(disparity.reshape(-1)[::step].astype(np.float64), [2, 98]) if disparity.size else (0, 0)
     return float(high - low)
-
-
-def _sigma_at(edges: NDArray[np.float32], x: float, y: float) -> float:
-    """The blur about a place; 0 where the nearest edges are exact, or may as well be slopes."""
-    away = np.maximum(np.abs(edges[0] - x), np.abs(edges[1] - y))
-    near = (
-        np.argpartition(away, 2 * MOST_SAMPLES)[: 2 * MOST_SAMPLES]
-        if len(away) > 2 * MOST_SAMPLES
-        else np.arange(len(away))
-    )
-    nearest = edges[:, near[np.argsort(away[near], kind="stable")]]
-    steps = nearest[:, nearest[5] > 0][:, :MOST_SAMPLES]
-    sigma = _weighted_median(steps[2, :NEAREST_EDGES], steps[3, :NEAREST_EDGES])
-    if sigma < CLEARLY_SOFT_PX:
-        return 0.0
-    # Only edges about as soft as these tell whether they are edges.
-    around, here = _as_soft_as(sigma, nearest[:, :MOST_SAMPLES]), _as_soft_as(sigma, steps)
-    if not around.shape[1] or around[5].mean() < LEAST_STEP_SHARE:
-        return 0.0
-    if not _photo_is_sure(here):
-        anywhere = _as_soft_as(sigma, edges[:, edges[5] > 0])
-        if here[4].mean() < LIKELY or not _photo_is_sure(anywhere):
-            return 0.0
-    return min(sigma, WIDEST_MEASURED_SIGMA_PX)
-
-
-def _as_soft_as(sigma: float, edges: NDArray[np.float32]) -> NDArray[np.float32]:
-    return edges[:, (edges[2] < SIMILAR_BLUR_RATIO * sigma) & (edges[2] > sigma / SIMILAR_BLUR_RATIO)]
-
-
-def _soft_share(edges: NDArray[np.float32]) -> float:
-    """Of the steps, by height."""
-    steps = edges[:, edges[5] > 0]
-    return float(steps[3, (steps[2] >= CLEARLY_SOFT_PX) & (steps[4] > 0)].sum() / max(steps[3].sum(), 1e-30))
-
-
-def _is_one_blur(edges: NDArray[np.float32]) -> bool:
-    """Whether all soft steps are about as soft."""
-    sigmas = edges[2, (edges[5] > 0) & (edges[2] >= CLEARLY_SOFT_PX)]
-    low, middle, high = np.quantile(sigmas, (0.25, 0.5, 0.75))
-    return bool(high - low <= MOST_SPREAD * middle)
 
 
 def _photo_is_sure(edges: NDArray[np.float32]) -> bool:
@@ -155,16 +87,16 @@ def _photo_is_sure(edges: NDArray[np.float32]) -> bool:
     return bool(edges[4].mean() >= CHANCE + CERTAINTY * sqrt(CHANCE_VARIANCE / places))
 
 
-def _edges(photo: FloatImage, disparity: FloatImage, should_stop: ShouldStop) -> NDArray[np.float32]:
-    """(6, N): x, y, blur (sigma), height, how far the photo agrees (0..1), whether it is a step (0, 1); px of the map.
+def _steps(photo: FloatImage, disparity: FloatImage, should_stop: ShouldStop) -> NDArray[np.float32]:
+    """(5, N): x, y, blur (sigma), height, how far the photo agrees (0..1), of steps; px of the map.
 
     At most MOST_EDGES. Soft ones are measured on smaller maps, where they are as short as the others.
     """
     least_edge = MEASURED_EDGE * extent(disparity)
-    found: list[NDArray[np.float32]] = [np.empty((6, 0), np.float32)]
+    found: list[NDArray[np.float32]] = [np.empty((5, 0), np.float32)]
     scale, least_sigma = 1, 0.0
     while least_edge > 0 and min(disparity.shape) >= (2 if scale == 1 else 4 * MEASURING_REACH_PX):
-        edges = _edges_of_level(photo, disparity, least_edge, least_sigma, MOST_BLUR_PIXELS // scale, should_stop)
+        edges = _steps_of_level(photo, disparity, least_edge, least_sigma, MOST_BLUR_PIXELS // scale, should_stop)
         edges[:2] = (edges[:2] + 0.5) * scale - 0.5
         edges[2] *= scale
         found.append(edges)
@@ -176,7 +108,7 @@ def _edges(photo: FloatImage, disparity: FloatImage, should_stop: ShouldStop) ->
     return edges[:, :: max(1, ceil(edges.shape[1] / MOST_EDGES))]
 
 
-def _edges_of_level(
+def _steps_of_level(
     photo: FloatImage,
     disparity: FloatImage,
     least_edge: float,
@@ -184,12 +116,12 @@ def _edges_of_level(
     pixels: int,
     should_stop: ShouldStop,
 ) -> NDArray[np.float32]:
-    """(6, N), see `_edges`; looks at as many rows as hold so many pixels."""
+    """(5, N), see `_steps`; looks at as many rows as hold so many pixels."""
     step = max(1, ceil(disparity.size / pixels))
     height, width = -(-disparity.shape[0] // step), disparity.shape[1]
 
     def band(first: int, last: int) -> NDArray[np.float32]:
-        found = np.empty((6, (last - first) * width), np.float32)
+        found = np.empty((5, (last - first) * width), np.float32)
         count = _measure_edges(disparity, photo, least_edge, least_sigma, MEASURING_REACH_PX, step, first, last, found)
         return found[:, :count].copy()
 
@@ -213,7 +145,7 @@ def _half(values: FloatImage) -> FloatImage:
 
 @kernel
 def _measure_edges(values, photo, least_edge, least_sigma, reach, step, first, last, found):
-    """At the steepest places of edges: what `_edges` says, px of these values, into found (6, N); returns how many.
+    """At the steepest places of edges: what `_steps` says, px of these values, into found (5, N); returns how many.
 
     Looks at every step-th row, from the first-th to before the last-th of those.
     """
@@ -241,7 +173,7 @@ def _measure_edges(values, photo, least_edge, least_sigma, reach, step, first, l
             # A step blurred by a Gaussian is height / (sqrt(2 pi) sigma) steep at its middle.
             edge = at_up if steepest_up >= steepest_down else -at_down
             sigma = height / (EDGE_SIGMAS * steepest)
-            agrees, is_step = 1.0, 1.0
+            agrees = 1.0
             if sigma < SHARP_PX:
                 # Steep within two pixels: a step, whatever the photo shows.
                 if max(end_up, end_down) > STEEPEST_PLATEAU * steepest:
@@ -250,7 +182,7 @@ def _measure_edges(values, photo, least_edge, least_sigma, reach, step, first, l
                 agrees = _photo_agrees(photo, x, y, across, down, edge, sigma)
             else:
                 # A wire or a slit is no step, but two.
-                blur = is_step = 0.0
+                blur = 0.0
                 for sign in (1.0, -1.0):
                     far = up if sign > 0 else -back
                     if blur == 0:
@@ -266,12 +198,12 @@ def _measure_edges(values, photo, least_edge, least_sigma, reach, step, first, l
                             shares,
                             taps,
                         )
-                if blur > 0:
-                    sigma, height, agrees, is_step = blur, fitted, sides, 1.0
+                if blur == 0:
+                    continue
+                sigma, height, agrees = blur, fitted, sides
             if least_sigma <= sigma < MEASURED_SIGMA_PX:
                 found[0, count], found[1, count] = x + across * edge, y + down * edge
                 found[2, count], found[3, count], found[4, count] = sigma, height, agrees
-                found[5, count] = is_step
                 count += 1
     return count
 

@@ -36,8 +36,6 @@ LABEL_NEARNESS[LABEL_PX, LABEL_PX] = 0
 """Those weights, (2 LABEL_PX + 1, 2 LABEL_PX + 1); the pixel itself, in the middle, tells nothing."""
 TRUST = np.append(np.geomspace(0.1, 1.0, LABELLED_PX + 1), 1.0).astype(np.float32)
 """Their weights by how many pixels lie between them and a step: nearer ones are mixed, or on the wrong side."""
-FILLED_TRUST = np.float32(0.2)
-"""Of pixels that were unknown, besides."""
 LIKENESS_STEPS = 64
 LIKENESS_TABLE = np.append(np.exp(-0.5 * (np.arange(16 * LIKENESS_STEPS) + 0.5) / LIKENESS_STEPS), 0).astype(np.float32)
 """Likeness by squared distance of colours, in such steps of a variance, 0 from the last one on."""
@@ -49,14 +47,8 @@ LIKE_CONTRAST, LIKE_NEIGHBOUR = 0.5, 0.6
 """Standard deviations of likeness, of a pixel to a surface and to a neighbour, in mean steps of colour in the band."""
 UNLIKE, UNSEEN_WEIGHT = 0.03, 0.3
 """Likelihood of a colour that nothing on a surface has; weight of that possibility against what was seen."""
-LEAST_FOREGROUND_SHARE = 0.05
-"""Of the foreground, from which a mixed pixel is its own, if that is more than a deviation of the background's colours;
-left behind, it would be a ghost, and tint what is filled beside it.
-"""
 COHESION = 1.2
-"""How much a neighbour on the same surface counts, in units of log likelihood."""
-UNLIKE_NEIGHBOUR, DIAGONAL = 0.1, 0.7
-"""Share of that for neighbours that do not look alike; factor for diagonal ones."""
+"""How much a neighbour counts that is on the same surface and looks alike, in units of log likelihood."""
 CLEAR = 1.5
 """Log likelihood ratio from which colours are clear."""
 LEAST_CLEAR = 0.2
@@ -73,8 +65,6 @@ EXACT = 0.1
 """Where it has a smaller share there everywhere, it stays as it is."""
 DATA_TERM_WEIGHT = 1.5
 """How much the map counts: factor of the log odds of its being right."""
-SURE_LOG_ODDS = 4.0
-"""Log odds of colours' being right inside surfaces, from which they count in full."""
 MOST_MEASURED_PIXELS = 1 << 14
 """Of the band, at most, tell how far the map is wrong."""
 PASSES = 8
@@ -95,12 +85,11 @@ def label_edges(
     if not len(pixels):
         return values
     contrast = _mean_color_step(colors, pixels)
-    trust = TRUST[distance] * np.where(unknown, FILLED_TRUST, np.float32(1))
-    weigh = partial(_weigh_colors, colors, values, trust, least_edge, LIKE_CONTRAST * contrast)
+    weigh = partial(_weigh_colors, colors, values, TRUST[distance], least_edge, LIKE_CONTRAST * contrast)
     away, own, known = distance.reshape(-1), values.reshape(-1), ~unknown.reshape(-1)
     few = pixels[:: ceil(len(pixels) / MOST_MEASURED_PIXELS)]
     weighed = _in_parts(weigh, few, should_stop)
-    wrong, sureness = _measure_errors(weighed, own[few], away[few], known[few])
+    wrong = _measure_errors(weighed, own[few], away[few], known[few])
     if wrong.max() <= EXACT:
         return values
     other, evidence = weighed if len(few) == len(pixels) else _in_parts(weigh, pixels, should_stop)
@@ -109,7 +98,7 @@ def label_edges(
     prior = np.where(known, odds[(own > other).astype(np.intp), away], np.float32(0))
     # The farthest pixels only look on.
     looks_on = (other == own) | (known & (away == LABELLED_PX))
-    drive = np.where(looks_on, np.float32(np.inf), np.float32(sureness) * evidence + prior)
+    drive = np.where(looks_on, np.float32(np.inf), evidence + prior)
     belief = _mean_field(colors, values, pixels, other, drive, LIKE_NEIGHBOUR * contrast, should_stop)
     labelled = values.copy()
     labelled.reshape(-1)[pixels] = np.where(belief < 0.5, other, own)
@@ -148,9 +137,9 @@ def _in_parts(
 
 def _measure_errors(
     weighed: tuple[FloatImage, FloatImage], own: FloatImage, away: NDArray[np.uint8], known: NDArray[np.bool_]
-) -> tuple[FloatImage, float]:
+) -> FloatImage:
     """(2, LABELLED_PX + 1): the share of pixels that a map has on the wrong side, behind and in front of a step, by how
-    many pixels lie between; and how much colours count, 0..1.
+    many pixels lie between.
     """
     other, evidence = weighed
     clear, in_front = known & (np.abs(evidence) > CLEAR), own > other
@@ -164,8 +153,7 @@ def _measure_errors(
             is_told = np.count_nonzero(clear & here) >= LEAST_CLEAR * np.count_nonzero(known & here)
             tells = is_told and misled <= MOST_MISLED * contradicted
             wrong[side, k] = (contradicted - by_chance) / max(1 - misled - by_chance, 0.1) if tells else 0.0
-    misled = _contradicted(evidence[clear & (away == LABELLED_PX)])
-    return np.clip(wrong, *WRONG), min(max(log((1 - misled) / misled) / SURE_LOG_ODDS, 0.0), 1.0)
+    return np.clip(wrong, *WRONG)
 
 
 def _contradicted(evidence: FloatImage, expected: float = 0.05) -> float:
@@ -252,7 +240,7 @@ def _weigh_colors(colors, values, trust, least_edge, alike, pixels):
         others[n] = own
         if other == own:
             continue
-        half, disparity = 0.5 * abs(other - own), 0.0
+        half = 0.5 * abs(other - own)
         weight[:], like[:], total[:], squares[:] = 0.0, 0.0, 0.0, 0.0
         for v in range(y - min(y, LABEL_PX) // STRIDE_PX * STRIDE_PX, min(y + LABEL_PX + 1, height), STRIDE_PX):
             for u in range(x - min(x, LABEL_PX) // STRIDE_PX * STRIDE_PX, min(x + LABEL_PX + 1, width), STRIDE_PX):
@@ -272,11 +260,10 @@ def _weigh_colors(colors, values, trust, least_edge, alike, pixels):
                 at = apart * steps
                 weight[side] += w
                 like[side] += w * LIKENESS_TABLE[int(at if at < most else most)]
-                disparity += side * w * (values[v, u] - other)
         # A wire that the map has beside its place would be lost: nothing knows its colours.
         if not weight[1] > LEAST_COLOR_WEIGHT or (own > other and weight[0] < LEAST_FOREGROUND):
             continue
-        others[n] = other + disparity / weight[1]
+        others[n] = other
         background = 0 if other > own else 1
         for side in range(2):
             like[side] = (like[side] + UNSEEN_WEIGHT * UNLIKE) / (weight[side] + UNSEEN_WEIGHT)
@@ -290,7 +277,8 @@ def _weigh_colors(colors, values, trust, least_edge, alike, pixels):
 @kernel
 def _mixed_likelihood(color, weight, total, background_squares, background, alike):
     """How likely a colour is a mixture of both surfaces' mean colours, by all shares alike; 0 where the foreground's
-    share is too little. weight (2), total (2, 3): see `_weigh_colors`; background: which of both is the background.
+    share is lost in the spread of the background's colours. weight (2), total (2, 3): see `_weigh_colors`; background:
+    which of both is the background.
     """
     contrast = along = away = 0.0
     spread = background_squares / weight[background]
@@ -303,7 +291,7 @@ def _mixed_likelihood(color, weight, total, background_squares, background, alik
     if not contrast > 1e-9:
         return 0.0
     share = along / contrast
-    if not max(LEAST_FOREGROUND_SHARE, sqrt(max(spread, 0.0) / contrast)) < share < 1.0:
+    if not sqrt(max(spread, 0.0) / contrast) < share < 1.0:
         return 0.0
     aside = max(away - along * share, 0.0)
     return exp(-0.5 * aside / (alike * alike)) * min(sqrt(2.0 * np.pi / contrast) * alike, 1.0)
@@ -340,5 +328,5 @@ def _believe(colors, values, pixels, number, other, drive, alike, believed, beli
                 for c in range(3):
                     apart += (colors[v, u, c] - colors[y, x, c]) ** 2
                 like = exp(-0.5 * apart / (alike * alike)) if apart < np.inf else 0.0
-                total += COHESION * (like + UNLIKE_NEIGHBOUR) * (1.0 if v == y or u == x else DIAGONAL) * votes
+                total += COHESION * like * votes
         belief[n] = 1.0 / (1.0 + exp(-min(max(total, -30.0), 30.0)))

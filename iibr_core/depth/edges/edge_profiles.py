@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import floor
+from math import ceil, floor
 
 import numpy as np
 
@@ -32,6 +32,20 @@ def height_at(values, x, y):
 def is_inside(values, x, y):
     """Whether a real position lies between the centres of the map's outermost pixels."""
     return 0 <= x <= values.shape[1] - 1 and 0 <= y <= values.shape[0] - 1
+
+
+@kernel
+def passes(values, x, y, across, down, near, far, sign, level):
+    """Whether the map is above (sign 1) or below (-1) a level somewhere between these distances from (x, y); outside
+    the map it may be.
+    """
+    if not is_inside(values, x + across * far, y + down * far):
+        return True
+    for k in range(ceil(far - near) + 1):
+        at = min(near + k, far)
+        if sign * (height_at(values, x + across * at, y + down * at) - level) > 0:
+            return True
+    return False
 
 
 @kernel

@@ -1,21 +1,21 @@
 """Sharp depth edges from soft ones: what lies between foreground and background is given to one of them.
 
-A soft map is a sharp one, blurred; how much is measured on the map itself, place by place. Only slopes that such a blur
+A soft map is a sharp one, blurred; how much is measured on the map itself. Only slopes that such a blur
 makes of a step or of something thin are changed, so exact maps, slanted and curved surfaces stay as they are.
 """
 
 from __future__ import annotations
 
-from math import ceil, erfc, floor, sqrt
+from math import ceil, erfc, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.depth.edges.blur_fit import fit_to_blur
 from iibr_core.depth.edges.edge_band import resolve_edge_band
-from iibr_core.depth.edges.edge_blur import EDGE_SIGMAS, SHARP_PX, extent, measure_edge_blur
-from iibr_core.depth.edges.edge_profiles import gradient, height_at, walk
-from iibr_core.depth.edges.ridges import SHARES, structure_at
+from iibr_core.depth.edges.edge_blur import EDGE_SIGMAS, extent, measure_edge_blur
+from iibr_core.depth.edges.edge_profiles import gradient, height_at, passes, walk
+from iibr_core.depth.edges.ridges import RETURN_SIGMAS, SHARES, structure_at
 from iibr_core.inpainting.disparity_by_color import fill_disparity_by_color
 from iibr_core.runtime.jit import kernel
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never
@@ -24,18 +24,14 @@ from iibr_core.types import FloatImage, InputError, image_size
 
 LEAST_EDGE = 0.03
 """Lower steps are left alone: share of the map's range."""
+LEAST_STEP = 0.5
+"""A ramp is at least so long, of what the blur makes it; shorter ones are exact edges."""
 TOLERANCE = 1.5
 """A ramp may be longer than the blur makes it by this factor; longer ones are surfaces."""
-STEEPEST_END = 0.4
-"""Of a ramp's steepest slope, at its ends."""
 PLATEAU_SIGMAS = 2.0
 """From a ramp's steepest place to its plateaus, at most."""
-COLOR_SIGMAS = 1.0
-"""From there to where the colours of both surfaces are taken, beyond one pixel; nearer ones are shaded more alike."""
-COLOR_SHARE = 0.5
-"""How much the photo counts against the height on the ramp in deciding for a surface."""
-COLOR_NOISE = 0.003
-"""Squared distance of colours (sRGB-encoded) that tells nothing."""
+STEEPEST_RISE = 0.3
+"""Of a ramp's steepest slope, over one sigma beyond its plateaus: steeper ones are surfaces."""
 EXTENSION = 0.7
 """How far the plateaus' own slopes are continued under the ramp: 1 = all the way."""
 MOST_EXTENSION = 0.05
@@ -86,11 +82,11 @@ def refine(
     if strength == 0:
         return values
     least_edge, softness = LEAST_EDGE * extent(values), max(1.0 - strength, FINE_STRENGTH)
-    sharp, soft = _sharpen(colors, values, least_edge, softness, should_stop, stages)
+    sharp = _sharpen(colors, values, least_edge, softness, should_stop, stages)
     if not least_edge > 0:
         return sharp
     filled = ~np.isfinite(disparity) if unknown is None else unknown | ~np.isfinite(disparity)
-    resolved = resolve_edge_band(colors, sharp, least_edge, filled, soft, should_stop, stages)
+    resolved = resolve_edge_band(colors, sharp, least_edge, filled, should_stop, stages)
     # Edge bands, too, go so far only.
     return resolved if strength == 1 else sharp + np.float32(strength) * (resolved - sharp)
 
@@ -102,25 +98,21 @@ def _sharpen(
     softness: float,
     should_stop: ShouldStop,
     stages: Stages,
-) -> tuple[FloatImage, NDArray[np.bool_] | None]:
-    """The map with its soft edges snapped to the photo's, its bits where nothing says that it is blurred; and where
-    that is said (H, W), None: nowhere.
-    """
-    if not stages.sharpen_soft_edges:
-        return values, None
-    blur = measure_edge_blur(colors, values, should_stop)
-    if not blur.sigma_px.any():
-        return values, None
+) -> FloatImage:
+    """The map with its soft edges snapped to the photo's; its bits where nothing says that it is blurred."""
+    sigma = measure_edge_blur(colors, values, should_stop) if stages.sharpen_soft_edges else 0.0
+    if sigma == 0:
+        return values
     refined = np.empty_like(values)
 
     def band(first: int, last: int) -> None:
-        _refine(values, colors, least_edge, blur.sigma_px, blur.cell_px, softness, first, last, refined)
+        _refine(values, colors, least_edge, sigma, softness, first, last, refined)
 
     in_bands(band, image_size(values), should_stop)
     # Slopes that are only shortened give no map that this could be the blur of.
     if stages.fit_to_blur and softness == FINE_STRENGTH:
-        refined = fit_to_blur(colors, values, refined, blur, least_edge, should_stop)
-    return refined, blur.at_pixels(blur.sigma_px > 0, image_size(values))
+        return fit_to_blur(colors, values, refined, sigma, least_edge, should_stop)
+    return refined
 
 
 def _fill_unknown(colors: FloatImage, disparity: FloatImage, should_stop: ShouldStop) -> FloatImage:
@@ -150,28 +142,6 @@ def _beyond_blur(values, x, y, across, down, far, sigma, limit):
 def _tail(far, sigma):
     """Share of a step, blurred by sigma, that is not reached yet so far from its middle."""
     return min(0.5 * erfc(far / (sqrt(2.0) * sigma)), MOST_TAIL)
-
-
-@kernel
-def _foreground_colour(photo, x, y, across, down, foreground, behind):
-    """Matting: a colour between those so far away; -0.5 background .. 0.5 foreground, nearer 0 the less sure."""
-    height, width = photo.shape[:2]
-    # Pixels of both surfaces, beyond the ramp.
-    foreground_x = min(max(floor(x + across * foreground + 0.5), 0), width - 1)
-    foreground_y = min(max(floor(y + down * foreground + 0.5), 0), height - 1)
-    background_x = min(max(floor(x - across * behind + 0.5), 0), width - 1)
-    background_y = min(max(floor(y - down * behind + 0.5), 0), height - 1)
-    # Matting: where the colour lies on the line between theirs, how far apart they are, how far off it is.
-    along = contrast = away = 0.0
-    for c in range(3):
-        background = photo[background_y, background_x, c]
-        difference = photo[foreground_y, foreground_x, c] - background
-        own = photo[y, x, c] - background
-        along, contrast, away = along + own * difference, contrast + difference**2, away + own**2
-    share = along / max(contrast, 1e-9)
-    # Sure where both surfaces differ by more than noise and the colour lies on the line.
-    residual = max(away - share * along, 0.0)
-    return (min(max(share, 0.0), 1.0) - 0.5) * contrast / (contrast + residual + COLOR_NOISE)
 
 
 @kernel
@@ -209,9 +179,20 @@ def _curvature(values, x, y, apart):
 
 
 @kernel
-def _as_structure(values, photo, x, y, across, down, far, sign, sigma, least_edge, softness, shares, taps):
-    """The pixel's value as part of a ridge (sign 1) or slit (-1), or of what is beside it; NaN where there is none."""
-    height, ground, share = structure_at(values, photo, x, y, across, down, far, sign, sigma, least_edge, shares, taps)
+def _as_crest(values, photo, x, y, across, down, sigma, least_edge, softness, shares, taps):
+    """The pixel's value on or near the crest of a ridge or slit, or beside it; NaN where there is none. (across, down):
+    its slope.
+    """
+    apart = max(int(sigma + 0.5), 1)
+    bend, line_x, line_y = _curvature(values, x, y, apart)
+    # Too straight to be lower by an edge beside it, or too far from where it is level.
+    along = across * line_x + down * line_y
+    if not (abs(bend) * apart * apart >= CREST_SHARE * least_edge and abs(along) < abs(bend) * apart):
+        return np.nan
+    sign, far = 1.0 if bend < 0 else -1.0, -along / bend
+    height, ground, share = structure_at(
+        values, photo, x, y, line_x, line_y, far, sign, sigma, least_edge, shares, taps
+    )
     if height == 0:
         return np.nan
     sharp = ground + height if share >= 0.5 else ground
@@ -219,57 +200,39 @@ def _as_structure(values, photo, x, y, across, down, far, sign, sigma, least_edg
 
 
 @kernel
-def _as_crest(values, photo, x, y, across, down, sigma, least_edge, softness, shares, taps):
-    """The pixel's value on or near the crest of a ridge or slit; NaN where there is none. (across, down): its slope."""
-    apart = max(int(sigma + 0.5), 1)
-    bend, line_x, line_y = _curvature(values, x, y, apart)
-    # Too straight to be lower by an edge beside it, or too far from where it is level.
-    along = across * line_x + down * line_y
-    if not (abs(bend) * apart * apart >= CREST_SHARE * least_edge and abs(along) < abs(bend) * apart):
-        return np.nan
-    sign = 1.0 if bend < 0 else -1.0
-    far = -along / bend
-    return _as_structure(values, photo, x, y, line_x, line_y, far, sign, sigma, least_edge, softness, shares, taps)
-
-
-@kernel
-def _as_step(values, photo, x, y, across, down, sigma, least_edge, softness, shares, taps):
+def _as_step(values, x, y, across, down, sigma, least_edge, softness):
     """The pixel's value as part of one of the two surfaces of a step along the (unit) direction; as given elsewhere."""
     here = values[y, x]
     # Wide ramps are walked in longer steps: all of them take about as many.
     pace = max(1.0, sigma / STEPS_A_SIGMA)
     reach = ceil(RAMP_SIGMAS * sigma / pace) + 1
     # Where the ramp ends both ways; its height there.
-    up, top, end_up, steepest_up, at_up = walk(values, x, y, across, down, 1.0, reach, pace, PLATEAU_SIGMAS * sigma)
-    to_foot, bottom, end_down, steepest_down, at_down = walk(
+    up, top, _, steepest_up, at_up = walk(values, x, y, across, down, 1.0, reach, pace, PLATEAU_SIGMAS * sigma)
+    to_foot, bottom, _, steepest_down, at_down = walk(
         values, x, y, across, down, -1.0, reach, pace, PLATEAU_SIGMAS * sigma
     )
-    steepest = max(steepest_up, steepest_down)
-    # Where it still rises like this so far from its middle, it is a surface.
-    if top - bottom < least_edge or max(end_up, end_down) > STEEPEST_END * steepest:
+    if top - bottom < least_edge:
         return here
     # The step was where the ramp is steepest (px up it from here); its plateaus lie some sigmas to both sides.
+    steepest = max(steepest_up, steepest_down)
     edge = at_up if steepest_up >= steepest_down else -at_down
     up, to_foot = min(up, edge + PLATEAU_SIGMAS * sigma), min(to_foot, PLATEAU_SIGMAS * sigma - edge)
     top = height_at(values, x + across * up, y + down * up)
     bottom = height_at(values, x - across * to_foot, y - down * to_foot)
     # Higher than a step of this slope can be after a blur of sigma: a slanted surface. Lower: an exact edge.
     unit = EDGE_SIGMAS * steepest
-    if not (max(least_edge, SHARP_PX * unit) <= top - bottom <= TOLERANCE * sigma * unit):
+    if not (max(least_edge, LEAST_STEP * sigma * unit) <= top - bottom <= TOLERANCE * sigma * unit):
         return here
-    # Where the map returns to the other side's height as soon as it can, there is no plateau, but something thin.
-    middle, height = 0.5 * (top + bottom), top - bottom
-    beyond, before = 2 * up - edge + PLATEAU_SIGMAS * sigma, 2 * to_foot + edge + PLATEAU_SIGMAS * sigma
-    if height_at(values, x + across * beyond, y + down * beyond) < middle:
-        value = _as_structure(values, photo, x, y, across, down, up, 1.0, sigma, least_edge, softness, shares, taps)
-        if value == value:
-            return value
-    if height_at(values, x - across * before, y - down * before) > middle:
-        value = _as_structure(
-            values, photo, x, y, across, down, -to_foot, -1.0, sigma, least_edge, softness, shares, taps
-        )
-        if value == value:
-            return value
+    # Where it goes on rising so far from its middle, or comes back to it on both sides, it is a surface.
+    rise = height_at(values, x + across * (up + sigma), y + down * (up + sigma)) - top
+    fall = bottom - height_at(values, x - across * (to_foot + sigma), y - down * (to_foot + sigma))
+    if max(rise, fall) > STEEPEST_RISE * steepest * sigma:
+        return here
+    middle, height, returns = 0.5 * (top + bottom), top - bottom, RETURN_SIGMAS * sigma
+    returns_up = passes(values, x, y, across, down, up, returns + edge, -1.0, middle)
+    returns_down = passes(values, x, y, -across, -down, to_foot, returns - edge, 1.0, middle)
+    if returns_up and returns_down:
+        return here
     # Plateaus may be slanted: their slopes go on part of the way to here, but not past the value here.
     limit = MOST_EXTENSION * steepest
     top = max(_continue_plateau(values, x, y, across, down, up, top, limit), here)
@@ -277,34 +240,31 @@ def _as_step(values, photo, x, y, across, down, sigma, least_edge, softness, sha
     if not top > bottom:
         return here
 
-    # Where does this pixel belong? By its height on the ramp and by its colour in the photo, ...
-    foreground = min(up, edge + COLOR_SIGMAS * sigma + 1)
-    behind = min(to_foot, COLOR_SIGMAS * sigma + 1 - edge)
-    colour = _foreground_colour(photo, x, y, across, down, foreground, behind)
-    # ... steepened about the middle of the ramp; softness near 0 makes a step.
-    place = (here - bottom) / (top - bottom) - 0.5
-    place = (place + COLOR_SHARE * (1.0 - softness) * colour) / softness + 0.5
+    # Where the pixel is on the ramp, steepened about its middle; softness near 0 makes a step.
+    place = ((here - bottom) / (top - bottom) - 0.5) / softness + 0.5
     # Beside the edge, the blur took from the foreground and left on the background: as the map shows.
     edge += (middle - height_at(values, x + across * edge, y + down * edge)) / steepest
     above, below, end = _tail(up - edge, sigma), _tail(to_foot + edge, sigma), TAIL_SIGMAS * sigma
     step, limit = (1.0 - softness) * height / (1.0 - above - below), BEND * limit
-    lost = _beyond_blur(values, x, y, across, down, end + edge, sigma, limit) - top
-    left = bottom - _beyond_blur(values, x, y, -across, -down, end - edge, sigma, limit)
-    top, bottom = top + min(max(lost, 0.0), above * step), bottom - min(max(left, 0.0), below * step)
+    if not returns_up:
+        lost = _beyond_blur(values, x, y, across, down, end + edge, sigma, limit) - top
+        top += min(max(lost, 0.0), above * step)
+    if not returns_down:
+        left = bottom - _beyond_blur(values, x, y, -across, -down, end - edge, sigma, limit)
+        bottom -= min(max(left, 0.0), below * step)
     return bottom + (top - bottom) * min(max(place, 0.0), 1.0)
 
 
 @kernel
-def _refine(values, photo, least_edge, sigmas, cell, softness, first_row, last_row, refined):
+def _refine(values, photo, least_edge, sigma, softness, first_row, last_row, refined):
     """Rows [first_row, last_row) of the refined map. softness: 0 = steps, 1 = as given."""
     width = values.shape[1]
     shares, taps = np.empty(SHARES), np.empty(SHARES)
     for y in range(first_row, last_row):
         for x in range(width):
             refined[y, x] = values[y, x]
-            sigma = sigmas[y // cell, x // cell]
-            # Exact edges here, or none: most pixels end here.
-            if sigma == 0 or _is_flat(values, x, y, int(PLATEAU_SIGMAS * sigma), FLAT_EDGE_SHARE * least_edge):
+            # Most pixels end here.
+            if _is_flat(values, x, y, int(PLATEAU_SIGMAS * sigma), FLAT_EDGE_SHARE * least_edge):
                 continue
             across, down = gradient(values, x, y)
             crest = _as_crest(values, photo, x, y, across, down, sigma, least_edge, softness, shares, taps)
@@ -314,6 +274,4 @@ def _refine(values, photo, least_edge, sigmas, cell, softness, first_row, last_r
             slope = sqrt(across * across + down * down)
             # Too flat to belong to an edge.
             if slope * 4 * (RAMP_SIGMAS * sigma + 1) > least_edge:
-                refined[y, x] = _as_step(
-                    values, photo, x, y, across / slope, down / slope, sigma, least_edge, softness, shares, taps
-                )
+                refined[y, x] = _as_step(values, x, y, across / slope, down / slope, sigma, least_edge, softness)

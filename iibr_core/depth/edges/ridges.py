@@ -10,7 +10,7 @@ from math import ceil, exp, floor, sqrt
 
 import numpy as np
 
-from iibr_core.depth.edges.edge_profiles import height_at, is_inside, strongest_change, walk
+from iibr_core.depth.edges.edge_profiles import height_at, is_inside, passes, strongest_change, walk
 from iibr_core.runtime.jit import kernel
 
 SAMPLES_A_PX = 2
@@ -21,8 +21,12 @@ BESIDE_SIGMAS = 2.0
 """So far to both sides of a structure the map is compared with it, blurred again."""
 LEAST_CREST_HEIGHT = 0.25
 """Of a structure's height, after the blur: lower ones are guesses."""
-MOST_CREST_MISFIT = 0.06
+MOST_CREST_MISFIT = 0.05
 """Deviation (rms) of the structure, blurred again, from the given map, relative to its height there."""
+RETURN_SIGMAS = 6.0
+"""What rises again on both sides within so much of its middle, be it a step or a crest, is a relief ..."""
+RETURN_SHARE = 0.25
+"""... a crest if it does so by this share of its height."""
 SEARCHED_PX = 24
 """How far from the crest the photo is looked at, at most."""
 SHARES = 2 * SEARCHED_PX * SAMPLES_A_PX + 1
@@ -184,6 +188,19 @@ def _feet(values, x, y, across, down, sign, reach, least_edge):
 
 
 @kernel
+def _is_relief(values, x, y, across, down, feet, sign, far):
+    """Whether the map rises (sign 1) or falls (-1) again beyond both feet of a crest, up to so far from it."""
+    crest = height_at(values, x, y)
+    for side in (-1, 1):
+        foot, across_side, down_side = feet[0] if side < 0 else feet[1], side * across, side * down
+        ground = height_at(values, x + across_side * foot, y + down_side * foot)
+        level = ground + RETURN_SHARE * (crest - ground)
+        if not passes(values, x, y, across_side, down_side, foot, max(far, foot), sign, level):
+            return False
+    return True
+
+
+@kernel
 def structure_at(values, photo, x, y, across, down, far, sign, sigma, least_edge, shares, taps):
     """What the pixel (x, y) is to a ridge (sign 1) or slit (-1) whose crest lies about `far` px along the line.
 
@@ -200,7 +217,7 @@ def structure_at(values, photo, x, y, across, down, far, sign, sigma, least_edge
     far, crest_x, crest_y = far + found, crest_x + across * found, crest_y + down * found
     reach = ceil((BESIDE_SIGMAS + 0.5 + WIDEST_SIGMAS / 2) * sigma)
     feet = _feet(values, crest_x, crest_y, across, down, sign, min(reach, SEARCHED_PX - 4), least_edge)
-    if feet[0] == 0:
+    if feet[0] == 0 or _is_relief(values, crest_x, crest_y, across, down, feet, sign, RETURN_SIGMAS * sigma):
         return 0.0, 0.0, 0.0
     first, last = _structure_shares(photo, crest_x, crest_y, across, down, feet, WIDEST_SIGMAS * sigma + 1, shares)
     if last < first:

@@ -67,7 +67,7 @@ STAGES = {
     "survey": surveyed,
     "softness": lambda stop: list(find_soft_edges(SOFT, 0.5, stop)),
     "refine": lambda stop: [refine(COLORS, np.where(HOLES, np.nan, SOFT), 1.0, None, stop)],
-    "blur": lambda stop: [measure_edge_blur(COLORS, SOFT, stop).sigma_px],
+    "blur": lambda stop: [np.float64(measure_edge_blur(COLORS, SOFT, stop))],
     "offline": lambda stop: [estimate_from_cues(Photo(COLORS, 100.0, "test"), stop).values],
     "unknown depth": lambda stop: [fill_disparity_holes(np.where(HOLES, np.nan, LAYERS), stop)],
 }

@@ -7,7 +7,6 @@ import pytest
 
 from iibr_core.depth.edges import blur_fit
 from iibr_core.depth.edges.blur_fit import fit_to_blur
-from iibr_core.depth.edges.edge_blur import EdgeBlur
 from iibr_core.runtime import tiling
 from iibr_core.runtime.tiling import Cancelled
 from iibr_core.training.degradation import blur
@@ -16,7 +15,6 @@ from tests.iibr_core.scenes import smooth_texture
 SIZE = (96, 128)
 SIGMA = 2.0
 LEAST_EDGE = 0.06
-CELLS = EdgeBlur(np.full((3, 4), SIGMA, np.float32), 32)
 
 
 def disc() -> tuple[np.ndarray, np.ndarray]:
@@ -41,34 +39,32 @@ def wrong_side(fitted: np.ndarray, exact: np.ndarray) -> int:
 
 
 def fit(photo: np.ndarray, values: np.ndarray, sharp: np.ndarray) -> np.ndarray:
-    return fit_to_blur(photo, values, sharp, CELLS, LEAST_EDGE)
+    return fit_to_blur(photo, values, sharp, SIGMA, LEAST_EDGE)
 
 
 def test_ragged_outlines_become_whole() -> None:
     photo, exact = disc()
-    start, one_cell = ragged(exact), EdgeBlur(np.full((1, 1), SIGMA, np.float32), 128)
-    fitted = fit_to_blur(photo, blur(exact, SIGMA), start, one_cell, LEAST_EDGE)
+    start = ragged(exact)
+    fitted = fit(photo, blur(exact, SIGMA), start)
     assert wrong_side(start, exact) > 80
     assert wrong_side(fitted, exact) < 0.1 * wrong_side(start, exact)
 
 
-def test_a_map_that_is_the_blur_of_none_keeps_its_bits() -> None:
+def test_what_was_not_sharpened_stays_as_long_as_nothing_moves_beside_it() -> None:
+    photo, exact = disc()
+    soft, start = blur(exact, SIGMA), ragged(exact)
+    np.testing.assert_array_equal(fit(photo, start, start), start)
+    # The left half is exact.
+    soft[:, :60] = start[:, :60]
+    fitted = fit(photo, soft, start)
+    np.testing.assert_array_equal(fitted[:, :48], start[:, :48])
+    assert not np.array_equal(fitted[:, 66:], start[:, 66:])
+
+
+def test_wide_blurs_are_left_alone() -> None:
     photo, exact = disc()
     start = ragged(exact)
-    # Soft as by this blur, but somewhere else than the photo's edges.
-    elsewhere = blur(np.roll(exact, 3, axis=1), SIGMA)
-    np.testing.assert_array_equal(fit(photo, elsewhere, start), start)
-
-
-def test_cells_without_blur_keep_their_bits() -> None:
-    photo, exact = disc()
-    start, sigmas = ragged(exact), np.full((3, 4), SIGMA, np.float32)
-    sigmas[:, :2] = 0
-    fitted = fit_to_blur(photo, blur(exact, SIGMA), start, EdgeBlur(sigmas, 32), LEAST_EDGE)
-    np.testing.assert_array_equal(fitted[:, :64], start[:, :64])
-    assert not np.array_equal(fitted[:, 64:], start[:, 64:])
-    too_wide = EdgeBlur(np.full((3, 4), 1.1 * blur_fit.WIDEST_FITTED_SIGMA_PX, np.float32), 32)
-    assert fit_to_blur(photo, blur(exact, 5.0), start, too_wide, LEAST_EDGE) is start
+    assert fit_to_blur(photo, blur(exact, 5.0), start, 1.1 * blur_fit.WIDEST_FITTED_SIGMA_PX, LEAST_EDGE) is start
 
 
 def test_bands_and_threads_do_not_matter(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -84,11 +80,7 @@ def test_it_can_be_cancelled() -> None:
     photo, exact = disc()
     answers = iter([False] * 3)
     with pytest.raises(Cancelled):
-        fit_to_blur(photo, blur(exact, SIGMA), ragged(exact), CELLS, LEAST_EDGE, lambda: next(answers, True))
-
-
-def cells() -> tuple[np.ndarray, np.ndarray, int]:
-    return *blur_fit._taps(CELLS), CELLS.cell_px
+        fit_to_blur(photo, blur(exact, SIGMA), ragged(exact), SIGMA, LEAST_EDGE, lambda: next(answers, True))
 
 
 def full_taps() -> np.ndarray:
@@ -106,7 +98,7 @@ def window(image: np.ndarray, y: int, x: int) -> np.ndarray:
 def test_what_is_missing_against_a_blur_pixel_by_pixel() -> None:
     _, exact = disc()
     values, missing = np.zeros(SIZE, np.float32), np.empty(SIZE, np.float32)
-    blur_fit._find_missing(values, exact, *cells(), 0, 3, missing)
+    blur_fit._find_missing(values, exact, blur_fit._taps(SIGMA), 0, SIZE[0], missing)
     for y, x in [(0, 0), (45, 35), (45, 83), (95, 127), (31, 64), (20, 60)]:
         assert -missing[y, x] == pytest.approx((window(exact, y, x) * full_taps()).sum(), abs=1e-5)
 
@@ -117,12 +109,14 @@ def test_edges_move_where_the_misfit_falls() -> None:
     photo, fitted = np.full((*SIZE, 3), 0.5, np.float32), ragged(exact)
     soft = blur(exact, SIGMA)
     missing = np.zeros(SIZE, np.float32)
-    blur_fit._find_missing(soft, fitted, *cells(), 0, 3, missing)
+    blur_fit._find_missing(soft, fitted, blur_fit._taps(SIGMA), 0, SIZE[0], missing)
     for y in range(25, 40):
         before, left = fitted.copy(), missing.copy()
-        blur_fit._move_edges(photo, fitted, missing, *cells(), LEAST_EDGE, y, y + 1, np.zeros(SIZE, np.bool_))
+        blur_fit._move_edges(
+            photo, fitted, missing, blur_fit._taps(SIGMA), LEAST_EDGE, y, y + 1, np.zeros(SIZE, np.bool_)
+        )
         blurred_again = np.zeros(SIZE, np.float32)
-        blur_fit._find_missing(soft, fitted, *cells(), 0, 3, blurred_again)
+        blur_fit._find_missing(soft, fitted, blur_fit._taps(SIGMA), 0, SIZE[0], blurred_again)
         np.testing.assert_allclose(missing, blurred_again, atol=1e-4)
         unlike = [np.count_nonzero(np.abs(np.diff(m, axis=axis)) > 0.5) for m in (before, fitted) for axis in (0, 1)]
         assert np.sum(missing**2) <= np.sum(left**2) or sum(unlike[2:]) < sum(unlike[:2])
@@ -157,7 +151,7 @@ def test_votes_and_moves_are_those_of_the_definition() -> None:
     start, soft, moved = ragged(exact), blur(exact, SIGMA), 0
     start[:5, :9] = 2.0  # a corner of the map
     missing = np.empty(SIZE, np.float32)
-    blur_fit._find_missing(soft, start, *cells(), 0, 3, missing)
+    blur_fit._find_missing(soft, start, blur_fit._taps(SIGMA), 0, SIZE[0], missing)
     padded = np.pad(missing, 6)
     beside = [(y, x) for y in range(1, 95) for x in range(1, 127) if np.ptp(start[y - 1 : y + 2, x]) > LEAST_EDGE]
     for y, x in beside[::11]:
@@ -177,9 +171,9 @@ def test_votes_and_moves_are_those_of_the_definition() -> None:
             change += blur_fit.OUTLINE_WEIGHT * neighbours - blur_fit.COLOR_WEIGHT * vote
             if change < best:
                 best, expected = change, there
-        fitted, visited = start.copy(), np.ones(SIZE, np.bool_)
-        visited[y, x] = False
-        blur_fit._move_edges(photo, fitted, missing.copy(), *cells(), LEAST_EDGE, y, y + 1, visited)
+        fitted, settled = start.copy(), np.ones(SIZE, np.bool_)
+        settled[y, x] = False
+        blur_fit._move_edges(photo, fitted, missing.copy(), blur_fit._taps(SIGMA), LEAST_EDGE, y, y + 1, settled)
         assert fitted[y, x] == expected
         moved += expected != here
     assert moved > 5

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from iibr_core.depth.edges import refine
-from iibr_core.depth.edges.ridges import SHARES
+from iibr_core.depth.edges.edge_profiles import passes
 
 Y, X = np.mgrid[:21, :61].astype(np.float32)
 GREY = np.full((21, 61, 3), 0.5, np.float32)
@@ -45,21 +45,6 @@ def test_a_tail_is_what_a_gaussian_leaves_there(sigma):
     assert refine._tail(0.0, sigma) == refine.MOST_TAIL < 0.5
 
 
-def test_a_colour_lies_between_those_of_both_surfaces():
-    photo = GREY.copy()
-    photo[:, 30:], photo[:, :30] = (0.9, 0.5, 0.3), (0.1, 0.2, 0.4)
-    vote = lambda: refine._foreground_colour(photo, 30, 10, 1.0, 0.0, 4.0, 4.0)  # noqa: E731
-    assert vote() == pytest.approx(0.5, abs=0.01)
-    photo[10, 30] = photo[10, 10]
-    assert vote() == pytest.approx(-0.5, abs=0.01)
-    photo[10, 30] = 0.75 * photo[10, 50] + 0.25 * photo[10, 10]
-    assert vote() == pytest.approx(0.25, abs=0.01)
-    assert refine._foreground_colour(GREY, 30, 10, 1.0, 0.0, 4.0, 4.0) == 0
-    # Off the line between both it tells the less.
-    photo[10, 30] = 0.75 * photo[10, 50] + 0.25 * photo[10, 10] + np.float32([-0.4, 0.9, 0.0])
-    assert 0 < vote() < 0.15
-
-
 def test_flat_is_what_differs_on_no_side():
     for place in ((10, 27), (10, 33), (7, 30), (13, 30)):
         values = np.zeros((21, 61), np.float32)
@@ -92,26 +77,40 @@ def test_a_blurred_step_becomes_the_step_it_was(sigma, at, turned):
     values, across = blurred_step(at, sigma), 1.0
     if turned:
         values, across, at = np.ascontiguousarray(values[:, ::-1]), -1.0, 60 - at
-    shares, taps = np.empty(SHARES), np.empty(SHARES)
     for x in range(round(at - 2 * sigma), round(at + 2 * sigma) + 1):
-        found = refine._as_step(values, GREY, x, 10, across, 0.0, sigma, 0.2, 1e-3, shares, taps)
+        found = refine._as_step(values, x, 10, across, 0.0, sigma, 0.2, 1e-3)
         if abs(x - at) > 0.3:
             assert found == pytest.approx(3.0 if (x - at) * across > 0 else 1.0, abs=0.06)
 
 
 def test_half_way_a_ramp_is_steeper_about_its_middle():
-    values, shares, taps = blurred_step(30.0, 2.0), np.empty(SHARES), np.empty(SHARES)
-    found = [refine._as_step(values, GREY, x, 10, 1.0, 0.0, 2.0, 0.2, 0.5, shares, taps) for x in range(26, 35)]
+    values = blurred_step(30.0, 2.0)
+    found = [refine._as_step(values, x, 10, 1.0, 0.0, 2.0, 0.2, 0.5) for x in range(26, 35)]
     assert found == sorted(found)
     assert found[4] == pytest.approx(2.0, abs=0.06)
     assert found[5] - found[3] == pytest.approx(2 * (values[10, 31] - values[10, 29]), rel=0.15)
 
 
 def test_what_is_lower_than_an_edge_or_rises_like_a_slant_stays():
-    shares, taps = np.empty(SHARES), np.empty(SHARES)
     low, slant = blurred_step(30.0, 2.0, height=0.19), blurred_step(30.0, 2.0, height=0.0, slope=0.2)
     for values in (low, slant):
-        assert refine._as_step(values, GREY, 31, 10, 1.0, 0.0, 2.0, 0.2, 1e-3, shares, taps) == values[10, 31]
+        assert refine._as_step(values, 31, 10, 1.0, 0.0, 2.0, 0.2, 1e-3) == values[10, 31]
     # Three times as wide as this blur makes a step.
     wide = blurred_step(30.0, 6.0)
-    assert refine._as_step(wide, GREY, 31, 10, 1.0, 0.0, 2.0, 0.2, 1e-3, shares, taps) == wide[10, 31]
+    assert refine._as_step(wide, 31, 10, 1.0, 0.0, 2.0, 0.2, 1e-3) == wide[10, 31]
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_what_comes_back_on_both_sides_is_a_relief_and_on_one_side_no_tail_is_added(turned):
+    """A step of blur 2 px is looked at up to 12 px from its middle."""
+    step = blurred_step(30.0, 2.0) - 1
+    step = step[:, ::-1] if turned else step
+    across = -1.0 if turned else 1.0
+    once = np.ascontiguousarray(step * (1 - (np.roll(step, across * 10, axis=1) / 2)) + 1).astype(np.float32)
+    assert passes(once, 30, 10, across, 0.0, 4.0, 12.0, -1.0, 2.0)
+    assert not passes(once, 30, 10, across, 0.0, 4.0, 8.0, -1.0, 2.0)
+    assert not passes(once, 30, 10, -across, 0.0, 4.0, 12.0, 1.0, 2.0)
+    assert passes(once, 30, 10, -across, 0.0, 4.0, 31.0, 1.0, 2.0), "outside"
+    twice = 2 + np.sin((X - 30) * np.pi / 8)
+    for x in range(27, 34):
+        assert refine._as_step(twice, x, 10, 1.0, 0.0, 2.0, 0.2, 1e-3) == twice[10, x]
