@@ -27,7 +27,7 @@ EDGE_BAND_TRUST = 0.001
 COLOR_VARIANCE = 2e-5
 """Variance of a colour in linear light about what its surroundings say; and what is added for rounding, relative."""
 MATTING_ROUNDING = 1e-6
-OUTLINE_SHARE = 0.1
+OUTLINE_SHARE = 0.085
 """Of a pixel that its outline alone gives to the foreground, for each neighbour that is."""
 SHARE_DEVIATION = 0.2
 """Standard deviation of shares from that: supersampled layers had 0.1; edges of maps are not as exact."""
