@@ -46,7 +46,7 @@ def test_a_pixel_that_is_all_foreground_goes_with_it():
 def test_where_colors_tell_nothing_the_outline_tells_the_share():
     _, disparity = edge_photo(0.5)
     own, fringe, _, coverage = split_mixed_pixels(np.tile(BACK, (9, 12, 1)), disparity, edge_step=0.5)
-    straight_edge = 3 * mixed_pixels.OUTLINE_SHARE
+    straight_edge = mixed_pixels.STRAIGHT_SHARE + 2 * mixed_pixels.DIAGONAL_SHARE
     assert coverage[4] == pytest.approx(np.where(np.arange(12) == 5, straight_edge, 0.0))
     assert np.stack([own, fringe]) == pytest.approx(np.broadcast_to(BACK, (2, 9, 12, 3)), abs=1e-5)
 
@@ -82,7 +82,9 @@ def obvious_split(colors, disparity, y, x):
     in_front, behind = disparity == 2.0, disparity == 0.0
     if not (behind[y, x] and (in_front & beside).any() and (behind & window).any()):
         return None
-    outline = mixed_pixels.OUTLINE_SHARE * (in_front & beside).sum()
+    straight = in_front & beside & ((v == y) | (u == x))
+    outline = mixed_pixels.STRAIGHT_SHARE * straight.sum()
+    outline += mixed_pixels.DIAGONAL_SHARE * ((in_front & beside).sum() - straight.sum())
     is_edge_band = np.array(
         [
             any(abs(disparity[max(j - 1, 0) : j + 2, max(i - 1, 0) : i + 2].reshape(-1) - disparity[j, i]) > 0.5)
