@@ -124,7 +124,7 @@ class RaySet:
         if k > 0 and any(offset) and self.stages.leave_out_in_front:
             step = IN_FRONT_PX / max(self.farthest_views, 1e-9)
             coverage = coverage.copy()
-            _leave_out_in_front(disparity, room.disparity[0], self.margins, *offset, step, coverage)
+            _leave_out_in_front(disparity, room.disparity[0], *offset, step, coverage)
 
         def band(first: int, last: int) -> None:
             rows = slice(first, last)
@@ -247,18 +247,19 @@ class RaySet:
 
 
 @kernel
-def _leave_out_in_front(disparity, photo_disparity, margins, t, s, step, coverage):
-    """No coverage for rays seen from (t, s) that lie more than a step in front of the photo's, or beside such a ray."""
+def _leave_out_in_front(disparity, photo_disparity, t, s, step, coverage):
+    """No coverage for rays seen from (t, s) that lie more than a step in front of the photo's, or beside such a ray.
+
+    Beyond its frame the photo as it is continued counts: what one view inpaints there would cover what it shows.
+    """
     height, width = disparity.shape
-    top, bottom, left, right = margins
     made_up = coverage > 0
     for y in range(height):
         for x in range(width):
             if made_up[y, x]:
                 d = disparity[y, x]
-                # Only within its frame the photo shows anything.
                 v, u = nearest_pixel(y + d * t), nearest_pixel(x + d * s)
-                if top <= v < height - bottom and left <= u < width - right and d > photo_disparity[v, u] + step:
+                if 0 <= v < height and 0 <= u < width and d > photo_disparity[v, u] + step:
                     for j in range(max(y - GUARD_BAND_PX, 0), min(y + GUARD_BAND_PX + 1, height)):
                         for i in range(max(x - GUARD_BAND_PX, 0), min(x + GUARD_BAND_PX + 1, width)):
                             coverage[j, i] = 0.0
