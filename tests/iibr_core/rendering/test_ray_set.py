@@ -68,8 +68,9 @@ def test_in_nearer_views_larger_steps_are_those_of_one_surface():
 
 
 @pytest.mark.parametrize("margins", [Margins(), Margins(3, 2, 0, 4)])
-def test_what_was_made_up_in_front_of_what_the_photo_shows_is_left_out_and_what_is_beside_it(margins):
-    random, size, offset = np.random.default_rng(2), ImageSize(20, 24), ViewOffset(-2.0, 1.0)
+@pytest.mark.parametrize("seed", range(2, 10))
+def test_what_was_made_up_in_front_of_what_the_photo_shows_is_left_out_and_what_is_beside_it(margins, seed):
+    random, size, offset = np.random.default_rng(seed), ImageSize(20, 24), ViewOffset(-2.0, 1.0)
     photo, made_up = (random.uniform(low, low + 6, size).astype(np.float32) for low in (1.3, -3))
     coverage, black = (random.random(size) > 0.3).astype(np.float32), np.zeros((*size, 3), np.float32)
     rays = RaySet(3, size, SURFACE_STEP, 2.0, margins)
