@@ -14,7 +14,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.rendering.coherent_cells import backward_warp, find_coherent_cells, land_incoherent
+from iibr_core.rendering.coherent_cells import (
+    LANDING_REACH_PX,
+    backward_warp,
+    cells_in,
+    find_coherent_cells,
+    land_incoherent,
+)
 from iibr_core.rendering.ray_cells import CELL_PX
 from iibr_core.rendering.ray_set import OWN_SURFACE_PX, RaySet
 from iibr_core.rendering.slope_connectivity import BELOW, RIGHT
@@ -55,15 +61,20 @@ class Candidates(NamedTuple):
     smooth: NDArray[np.bool_]
 
 
-def find_candidates(rays: RaySet, offset: ViewOffset, rows: tuple[int, int], most: int = 5) -> Candidates:
+def find_candidates(
+    rays: RaySet, offset: ViewOffset, rows: tuple[int, int], most: int = 5, columns: tuple[int, int] | None = None
+) -> Candidates:
     """Candidates of the target rays in rows [first, last) of the view at `offset`.
 
-    At most `most` for each ray, the front-most kept.
+    At most `most` for each ray, the front-most kept. Only of those in columns [first, last), by default all, they are
+    looked for.
     """
     first_row, last_row = rows
+    columns = columns or (0, rays.size.width)
     offset = ViewOffset(*map(float, offset))  # kernels are compiled for one kind of offset
     # Where one smooth surface shows, its rays are found backwards, cell by cell; elsewhere source rays are splatted.
-    smooth, about = find_coherent_cells(rays, offset, rows)
+    smooth, about = find_coherent_cells(rays, offset, rows, columns)
+    splat = cells_in(columns, smooth.shape) & ~smooth
     shape = (most, last_row - first_row, rays.size.width)
     found = Candidates(
         offset,
@@ -76,9 +87,9 @@ def find_candidates(rays: RaySet, offset: ViewOffset, rows: tuple[int, int], mos
     )
     arrays, cells = rays.arrays, rays.cells
     for k, (t, s) in enumerate(rays.to_view(offset)):
-        needed = land_incoherent(cells, k, t, s, rows, smooth)
-        _land_rays(arrays, k, rays.connected, rays.steep_cells(k), needed, needed.any(axis=1), s, t, found)
-    _mean_disparity(found)
+        needed = land_incoherent(cells, k, t, s, rows, splat)
+        _land_rays(arrays, k, rays.connected, rays.steep_cells(k), needed, splat, columns, s, t, found)
+    _mean_disparity(found, splat)
     backward_warp(arrays.disparity[0], offset, about, found)
     return found
 
@@ -119,8 +130,8 @@ def _rearmost(coverage, disparity, row, column):
 
 
 @kernel
-def _land_rays(rays, index, connected, steep, needed, needed_rows, s, t, found):
-    """Let the rays in the needed cells of one source land on the target rows. Until `_mean_disparity`, found's
+def _land_rays(rays, index, connected, steep, needed, splat, columns, s, t, found):
+    """Let the rays in the needed cells of one source land on the cells to splat. Until `_mean_disparity`, found's
     disparity holds sums weighted by coverage.
 
     A footprint's overlap goes to the candidate of its surface, or starts one; where slots run out the rearmost gives
@@ -132,9 +143,8 @@ def _land_rays(rays, index, connected, steep, needed, needed_rows, s, t, found):
     height = len(ray_disparity)
     # The same as a difference of disparities.
     same_surface = OWN_SURFACE_PX / max(abs(s), abs(t), 1e-9)
+    above_cells, reach = first_row // CELL_PX, LANDING_REACH_PX / CELL_PX
     for y in range(height):
-        if not needed_rows[y // CELL_PX]:
-            continue
         for cell in range(needed.shape[1]):
             if not needed[y // CELL_PX, cell]:
                 continue
@@ -145,6 +155,12 @@ def _land_rays(rays, index, connected, steep, needed, needed_rows, s, t, found):
                     continue
                 d = ray_disparity[y, x]
                 landed_x, landed_y = x - d * s, y - d * t
+                # Only beside what is smooth, unless a steep surface may stretch the ray.
+                if not (
+                    steep[y // CELL_PX, cell]
+                    or _touches_any(splat, (landed_y + 0.5) / CELL_PX - above_cells, (landed_x + 0.5) / CELL_PX, reach)
+                ):
+                    continue
                 to_left, to_right = max(x - 1, 0), min(x + 1, width - 1)
                 above, below = max(y - 1, 0), min(y + 1, height - 1)
                 is_connected, tolerance, slope_x, slope_y = False, same_surface, 0.0, 0.0
@@ -177,7 +193,7 @@ def _land_rays(rays, index, connected, steep, needed, needed_rows, s, t, found):
                 for target_y in range(first_y, last_y + 1):
                     from_y, to_y = max(top, target_y - 0.5), min(bottom, target_y + 0.5)
                     overlap_y, across = filled * (to_y - from_y), 0.5 * (from_y + to_y) - landed_y
-                    for target_x in range(max(nearest_pixel(left), 0), min(ceil(right - 0.5) + 1, width)):
+                    for target_x in range(max(nearest_pixel(left), columns[0]), min(ceil(right - 0.5) + 1, columns[1])):
                         from_x, to_x = max(left, target_x - 0.5), min(right, target_x + 0.5)
                         overlap = np.float32(overlap_y * (to_x - from_x))
                         if not overlap > LEAST_OVERLAP:
@@ -219,11 +235,27 @@ def _land_rays(rays, index, connected, steep, needed, needed_rows, s, t, found):
 
 
 @kernel
-def _mean_disparity(found):
+def _touches_any(splat, row, column, reach):
+    """Whether any of the cells within reach of a position, all in cells, is to be splatted."""
+    rows, columns = splat.shape
+    if not (row + reach >= 0 and row - reach < rows and column + reach >= 0 and column - reach < columns):
+        return False
+    for v in range(int(max(row - reach, 0.0)), int(min(row + reach, rows - 1.0)) + 1):
+        for u in range(int(max(column - reach, 0.0)), int(min(column + reach, columns - 1.0)) + 1):
+            if splat[v, u]:
+                return True
+    return False
+
+
+@kernel
+def _mean_disparity(found, splat):
     """Turn the weighted sums of disparity into means."""
-    count, coverage, disparity = found.number, found.coverage, found.disparity
+    count, coverage, disparity, above = found.number, found.coverage, found.disparity, found.first_row % CELL_PX
     rows, width = count.shape
     for row in range(rows):
-        for x in range(width):
-            for k in range(np.int64(count[row, x])):
-                disparity[k, row, x] /= coverage[k, row, x]
+        for cell in range(splat.shape[1]):
+            if not splat[(row + above) // CELL_PX, cell]:
+                continue
+            for x in range(cell * CELL_PX, min((cell + 1) * CELL_PX, width)):
+                for k in range(np.int64(count[row, x])):
+                    disparity[k, row, x] /= coverage[k, row, x]

@@ -18,25 +18,27 @@ LANDING_REACH_PX = 1.5
 """A ray that lands farther than this from a pixel's centre does not touch the pixel."""
 ONE_SURFACE_PX = 1.0
 """What lands on a cell with more parallax between its parts is not taken for one surface."""
-SETTLED_PX = 0.002
-"""A ray is followed until it moves by less than this."""
+SETTLED_PX = 0.02
+"""A ray is followed until it moves by less than this: the step after that would be far shorter."""
+LEAST_LEFT = 0.2
+"""A smooth surface is compressed to no less than this share of its width (see `ray_set.SMOOTH_SHARE`)."""
 MOST_ROUNDS = 30
 """On a smooth surface each round comes at least a fifth closer, mostly far more (see `ray_set.SMOOTH_SHARE`)."""
-ONE = np.uint64(1)
 
 
 def find_coherent_cells(
-    rays: RaySet, offset: ViewOffset, rows: tuple[int, int]
+    rays: RaySet, offset: ViewOffset, rows: tuple[int, int], columns: tuple[int, int] | None = None
 ) -> tuple[NDArray[np.bool_], FloatImage]:
     """Where all that shows in a cell of the view at `offset` is one smooth surface of the photo, (N, M); and about
     which disparity that has, (N, M).
 
-    The first row of cells holds the target row rows[0], the last the row before rows[1].
+    The first row of cells holds the target row rows[0], the last the row before rows[1]. Cells without any of columns
+    [first, last), by default all, are not looked at, and not smooth.
     """
     cells, first = rays.cells, rows[0] // CELL_PX
     shape = -(-rows[1] // CELL_PX) - first, cells.low.shape[2]
     far, near = np.full(shape, np.inf, np.float32), np.full(shape, -np.inf, np.float32)
-    smooth = np.ones(shape, np.bool_)
+    smooth = cells_in(columns or (0, rays.size.width), shape)
     parallax = max(*map(abs, offset), 1e-9)
     incoherent = ~(cells.step <= rays.smooth_step(offset))
     _land_cells(cells, incoherent, rays.to_view(offset), first, rays.photo_images, parallax, far, near, smooth)
@@ -45,12 +47,19 @@ def find_coherent_cells(
     return smooth, np.where(smooth, far, np.float32(0.0))
 
 
+def cells_in(columns: tuple[int, int], shape: tuple[int, int]) -> NDArray[np.bool_]:
+    """Cells of this shape (N, M) that hold any of the columns [first, last)."""
+    inside = np.zeros(shape, np.bool_)
+    inside[:, columns[0] // CELL_PX : -(-columns[1] // CELL_PX)] = True
+    return inside
+
+
 def land_incoherent(
-    cells: Cells, k: int, t: float, s: float, rows: tuple[int, int], smooth: NDArray[np.bool_]
+    cells: Cells, k: int, t: float, s: float, rows: tuple[int, int], splat: NDArray[np.bool_]
 ) -> NDArray[np.bool_]:
-    """Which cells (M, N) of source k, t and s away, land on any cell of these rows that is not smooth."""
+    """Which cells (M, N) of source k, t and s away, may land on any cell of these rows that is to be splatted."""
     needed = np.zeros(cells.step.shape, np.bool_)
-    _land_incoherent(cells, k, t, s, rows[0] // CELL_PX, smooth, needed)
+    _land_incoherent(cells, k, t, s, rows[0] // CELL_PX, splat, needed)
     return needed
 
 
@@ -112,9 +121,9 @@ def _land_cells(cells, incoherent, offsets, first_cell, photo_images, parallax, 
 
 
 @kernel
-def _land_incoherent(cells, k, t, s, first_cell, smooth, needed):
+def _land_incoherent(cells, k, t, s, first_cell, splat, needed):
     low, high, row_ranges = cells.low[k], cells.high[k], cells.row_ranges[k]
-    rows, columns = smooth.shape
+    rows, columns = splat.shape
     for v in range(low.shape[0]):
         if not _touches(row_ranges[v, 0], row_ranges[v, 1], t, v - first_cell, rows):
             continue
@@ -127,7 +136,7 @@ def _land_incoherent(cells, k, t, s, first_cell, smooth, needed):
             for row in range(int(max(top, 0.0)), int(min(bottom, rows - 1.0)) + 1):
                 for column in range(int(max(left, 0.0)), int(min(right, columns - 1.0)) + 1):
                     # One target cell that needs splatting is enough.
-                    needed[v, u] |= not smooth[row, column]
+                    needed[v, u] |= splat[row, column]
 
 
 @kernel
@@ -157,43 +166,74 @@ def backward_warp(surface, offset, about, found):
 
     Its disparity d is the fixed point of d = surface(x + d s, y + d t), bilinear.
     """
-    (t, s), first_row, smooth = offset, found.first_row, found.smooth
-    count, coverage, disparity, source = found.number, found.coverage, found.disparity, found.source
+    t, s = np.float32(offset[0]), np.float32(offset[1])
+    first_row, smooth = found.first_row, found.smooth
+    count, coverage, disparity, source = found.number, found.coverage[0], found.disparity[0], found.source[0]
     rows, width = count.shape
-    # The bilinear taps of the last position, too, lie inside.
-    last_u, last_v = surface.shape[1] - 1.001, surface.shape[0] - 1.001
     above = first_row % CELL_PX
-    parallax = max(abs(s), abs(t))
-    guess = np.empty(CELL_PX)
+    guess, is_settled = np.empty(width, np.float32), np.empty(width, np.bool_)
     for cell_row in range(smooth.shape[0]):
         top, bottom = cell_row * CELL_PX - above, min((cell_row + 1) * CELL_PX - above, rows)
-        for cell in range(smooth.shape[1]):
-            if not smooth[cell_row, cell]:
+        cell = 0
+        while cell < smooth.shape[1]:
+            first = cell
+            # Smooth cells side by side.
+            while cell < smooth.shape[1] and smooth[cell_row, cell]:
+                guess[cell * CELL_PX : (cell + 1) * CELL_PX] = about[cell_row, cell]
+                cell += 1
+            if cell == first:
+                cell += 1
                 continue
-            left = cell * CELL_PX
-            columns = min(CELL_PX, width - left)
+            left, right = first * CELL_PX, min(cell * CELL_PX, width)
             # Rows above the band are followed too, so that the results do not depend on where it begins.
-            guess[:] = about[cell_row, cell]
             for row in range(top, bottom):
-                # Fixed-point iteration, from what the row before came to. A slope of at most 0.4 px a pixel along each
-                # axis
-                # (SMOOTH_SHARE of the step that OWN_SURFACE_PX gives) makes it contract.
+                # From what the row before came to.
+                is_settled[left:right] = False
                 for _ in range(MOST_ROUNDS):
-                    moved = 0.0
-                    for i in range(columns):
-                        d = guess[i]
-                        source_x = min(max(left + i + d * s, 0.0), last_u)
-                        source_y = min(max(first_row + row + d * t, 0.0), last_v)
-                        column, line = int(source_x), int(source_y)
-                        fx, fy = source_x - column, source_y - line
-                        u, v = np.uint64(column), np.uint64(line)
-                        upper = (1 - fx) * surface[v, u] + fx * surface[v, u + ONE]
-                        lower = (1 - fx) * surface[v + ONE, u] + fx * surface[v + ONE, u + ONE]
-                        guess[i] = upper + fy * (lower - upper)
-                        moved = max(moved, abs(guess[i] - d))
-                    if moved * parallax < SETTLED_PX:
+                    if not _follow(surface, guess, is_settled, left, right, first_row + row, t, s):
                         break
+                if row < 0:
+                    continue
                 # One candidate that covers its ray whole.
-                for i in range(columns if row >= 0 else 0):
-                    count[row, left + i], coverage[0, row, left + i], source[0, row, left + i] = 1, 1.0, 0
-                    disparity[0, row, left + i] = guess[i]
+                count[row, left:right], coverage[row, left:right], source[row, left:right] = 1, np.float32(1.0), 0
+                disparity[row, left:right] = guess[left:right]
+
+
+@kernel
+def _follow(surface, guess, is_settled, left, right, y, t, s):
+    """One of Newton's steps towards the fixed point for the rays [left, right) of a row; whether any is to follow.
+
+    A slope of at most 0.4 px a pixel along each axis (SMOOTH_SHARE of the step that OWN_SURFACE_PX gives) keeps
+    it stable.
+    """
+    height, width = surface.shape
+    flat, parallax, moves_on = surface.reshape(-1), max(abs(s), abs(t)), 0
+    one, least_left, settled = np.float32(1.0), np.float32(LEAST_LEFT), np.float32(SETTLED_PX)
+    x = left
+    while x < right:
+        # Rays side by side that look between the same pixels side by side are followed together.
+        column, line = np.floor(guess[x] * s), np.floor(guess[x] * t)
+        end, last = x + 1, min(right, width - 1 - column)
+        is_inside = 0 <= y + line < height - 1 and 0 <= x + column < width - 1
+        while is_inside and end < last and np.floor(guess[end] * s) == column and np.floor(guess[end] * t) == line:
+            end += 1
+        if is_inside:
+            upper = np.uint64((y + int(line)) * width + x + int(column))
+            lower, at, next_ = upper + np.uint64(width), np.uint64(x), np.uint64(1)
+            for i in range(np.uint64(end - x)):
+                d = guess[at + i]
+                fx, fy = d * s - column, d * t - line
+                a, b, c, e = flat[upper + i], flat[upper + i + next_], flat[lower + i], flat[lower + i + next_]
+                above, below = a + fx * (b - a), c + fx * (e - c)
+                slope = s * ((one - fy) * (b - a) + fy * (e - c)) + t * (below - above)
+                step = (above + fy * (below - above) - d) / max(one - slope, least_left)
+                # Rays that have settled wait for the others.
+                guess[at + i] = d if is_settled[at + i] else d + step
+                is_settled[at + i] = is_settled[at + i] or abs(step) * parallax < settled
+                moves_on += not is_settled[at + i]
+        else:
+            # Off the picture nothing is to be followed.
+            v, u = min(max(y + guess[x] * t, 0.0), height - 1.0), min(max(x + guess[x] * s, 0.0), width - 1.0)
+            guess[x] = surface[int(v), int(u)]
+        x = end
+    return moves_on > 0

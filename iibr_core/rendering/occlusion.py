@@ -29,24 +29,6 @@ def entropy(weights: FloatImage) -> FloatImage:
     return np.asarray(_entropy(weights))
 
 
-def covered_share(weights: FloatImage) -> FloatImage:
-    """(N, W) in [0, 1]: how much of each ray its candidates cover, by weights (K, N, W)."""
-    return np.asarray(_covered(weights))
-
-
-@kernel
-def _covered(weights):
-    _, rows, width = weights.shape
-    result = np.empty((rows, width), np.float32)
-    for row in range(rows):
-        for x in range(width):
-            # Most rays: the first surface covers them, and the others have no share.
-            result[row, x] = 1.0
-            if weights[0, row, x] < 1.0:
-                result[row, x] = _coverage(weights, row, x)
-    return result
-
-
 @kernel
 def _coverage(weights, row, x):
     # Rounding may bring the sum above 1.

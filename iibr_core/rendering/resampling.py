@@ -26,8 +26,6 @@ SOLE = 1 - 1e-6
 """A candidate with at least this share of the weights is the only one."""
 LEAST_TAP_WEIGHT = 0.3
 """Less cubic weight than this on the own surface: take its nearest pixel instead."""
-ONE, TWO = np.uint64(1), np.uint64(2)
-"""Unsigned indices need no test for counting from the end."""
 
 
 class ShownRays(NamedTuple):
@@ -41,15 +39,22 @@ class ShownRays(NamedTuple):
 
 
 def resample_colors(
-    rays: RaySet, candidates: Candidates, weights: FloatImage, wanted: NDArray[np.bool_] | None = None
+    rays: RaySet,
+    candidates: Candidates,
+    weights: FloatImage,
+    wanted: NDArray[np.bool_] | None = None,
+    into: tuple[FloatImage, int, int] | None = None,
 ) -> ShownRays:
-    """Rays without candidates, or not wanted (N, W), are black; the former at disparity 0 of source 0."""
+    """Rays without candidates are black, at disparity 0 of source 0. Of rays that are not wanted (N, W) the colours are
+    left as they are. into: where colours (N', W', 3) are written, and the row and column at which that begins.
+    """
     shape = candidates.number.shape
-    shown = ShownRays(np.zeros((*shape, 3), np.float32), np.zeros(shape, np.float32), np.zeros(shape, np.uint8))
+    colors, top, left = into or (np.zeros((*shape, 3), np.float32), 0, 0)
+    shown = ShownRays(colors, np.zeros(shape, np.float32), np.zeros(shape, np.uint8))
     remaining = np.ones(shape, np.bool_) if wanted is None else wanted.copy()
     arrays, limits, to_view = rays.arrays, rays.edge_limits(candidates.offset), rays.to_view(candidates.offset)
-    _gather_plain(arrays, limits, to_view, candidates, remaining, shown)
-    _gather(arrays, limits, to_view, candidates, weights, remaining, shown)
+    _gather_plain(arrays, limits, to_view, candidates, remaining, top, left, shown)
+    _gather(arrays, limits, to_view, candidates, weights, remaining, top, left, shown)
     return shown
 
 
@@ -182,18 +187,22 @@ def resample_inpainted(images, surfaces, index, x, y, d, parallax):
 
 
 @kernel
-def _gather_plain(rays, limits, offsets, candidates, remaining, shown):
+def _gather_plain(rays, limits, offsets, candidates, remaining, first_y, first_x, shown):
     """What `_gather` does, for the rays that are easiest, and most: one candidate, no edge and no border near it.
 
-    They are cleared in remaining. This is `cubic` written out, in single precision and without tests. All rays
-    with one candidate get their disparity and source.
+    They are cleared in remaining. All rays with one candidate get their disparity and source.
     """
     images, edge_level, first_row, count = rays.colors, rays.edge_level, candidates.first_row, candidates.number
     candidate_disparity, candidate_source = candidates.disparity[0], candidates.source[0]
-    colors, disparity, source = shown.colors, shown.disparity, shown.source
+    disparity, source = shown.disparity, shown.source
     _, height, width, _ = images.shape
+    flat, colors, shown_width = images.reshape(-1), shown.colors.reshape(-1), shown.colors.shape[1]
+    # Of one row: where in the images each ray looks, -1: not here; the fractions, once a channel.
+    begin = np.empty(count.shape[1], np.int64)
+    across, down = np.empty(3 * count.shape[1], np.float32), np.empty(3 * count.shape[1], np.float32)
     for row in range(count.shape[0]):
         for x in range(count.shape[1]):
+            begin[x] = -1
             if count[row, x] != 1:
                 continue
             d, k = candidate_disparity[row, x], np.uint64(candidate_source[row, x])
@@ -207,29 +216,60 @@ def _gather_plain(rays, limits, offsets, candidates, remaining, shown):
                 continue
             # By way of signed integers: from and to floats those are converted faster.
             left, top = int(source_x), int(source_y)
-            u, v = np.uint64(left), np.uint64(top)
-            if edge_level[k, v, u] > limits[k]:
+            if edge_level[k, np.uint64(top), np.uint64(left)] > limits[k]:
                 continue
             remaining[row, x] = False
-            # Separable: along the rows, then across them. Single precision is far finer than an 8-bit step.
-            x0, x1, x2, x3 = keys_weights(np.float32(source_x - left), KEYS_A)
-            y0, y1, y2, y3 = keys_weights(np.float32(source_y - top), KEYS_A)
-            for c in range(3):
-                colors[row, x, c] = max(
-                    y0 * (x0 * images[k, v - ONE, u - ONE, c] + x1 * images[k, v - ONE, u, c]
-                          + x2 * images[k, v - ONE, u + ONE, c] + x3 * images[k, v - ONE, u + TWO, c])
-                    + y1 * (x0 * images[k, v, u - ONE, c] + x1 * images[k, v, u, c]
-                            + x2 * images[k, v, u + ONE, c] + x3 * images[k, v, u + TWO, c])
-                    + y2 * (x0 * images[k, v + ONE, u - ONE, c] + x1 * images[k, v + ONE, u, c]
-                            + x2 * images[k, v + ONE, u + ONE, c] + x3 * images[k, v + ONE, u + TWO, c])
-                    + y3 * (x0 * images[k, v + TWO, u - ONE, c] + x1 * images[k, v + TWO, u, c]
-                            + x2 * images[k, v + TWO, u + ONE, c] + x3 * images[k, v + TWO, u + TWO, c]),
-                    np.float32(0.0),
-                )  # fmt: skip
+            begin[x] = 3 * ((np.int64(k) * height + top) * width + left)
+            fx, fy = np.float32(source_x - left), np.float32(source_y - top)
+            across[3 * x], across[3 * x + 1], across[3 * x + 2] = fx, fx, fx
+            down[3 * x], down[3 * x + 1], down[3 * x + 2] = fy, fy, fy
+        # Rays side by side that look at pixels side by side: all their channels at once.
+        x = 0
+        while x < count.shape[1]:
+            end = x + 1
+            if begin[x] >= 0:
+                while end < count.shape[1] and begin[end] - begin[x] == 3 * (end - x):
+                    end += 1
+                to = 3 * ((row - first_y) * shown_width + x - first_x)
+                _look_up_run(flat, begin[x], 3 * width, across, down, x, end, colors, to)
+            x = end
 
 
 @kernel
-def _gather(rays, limits, offsets, candidates, weights, wanted, shown):
+def _look_up_run(flat, begin, pitch, across, down, first, end, colors, to):
+    """`cubic` written out, in single precision and without tests, for the rays [first, end) of a row. flat: all images'
+    values; begin, pitch: where those of the first ray's pixel begin, and how far it is to the next row; to: where in
+    colors they go.
+    """
+    one, three, six, nine = np.float32(1.0), np.uint64(3), np.uint64(6), np.uint64(9)
+    steep, bent = KEYS_A + np.float32(2.0), KEYS_A + np.float32(3.0)
+    # Unsigned indices need no test for counting from the end: so the loop runs eight values at a time.
+    a, to = np.uint64(begin - pitch - 3), np.uint64(to)
+    b = a + np.uint64(pitch)
+    c = b + np.uint64(pitch)
+    d = c + np.uint64(pitch)
+    at = np.uint64(3 * first)
+    for i in range(np.uint64(3 * (end - first))):
+        # `keys_weights`, twice.
+        f, v = across[at + i], down[at + i]
+        g, w = one - f, one - v
+        x0, x1 = KEYS_A * f * g * g, one - f * f * (bent - steep * f)
+        x2, x3 = one - g * g * (bent - steep * g), KEYS_A * g * f * f
+        y0, y1 = KEYS_A * v * w * w, one - v * v * (bent - steep * v)
+        y2, y3 = one - w * w * (bent - steep * w), KEYS_A * w * v * v
+        # Separable: along the rows, then across them. Single precision is far finer than an 8-bit step.
+        a_, b_, c_, d_ = a + i, b + i, c + i, d + i
+        colors[to + i] = max(
+            y0 * (x0 * flat[a_] + x1 * flat[a_ + three] + x2 * flat[a_ + six] + x3 * flat[a_ + nine])
+            + y1 * (x0 * flat[b_] + x1 * flat[b_ + three] + x2 * flat[b_ + six] + x3 * flat[b_ + nine])
+            + y2 * (x0 * flat[c_] + x1 * flat[c_ + three] + x2 * flat[c_ + six] + x3 * flat[c_ + nine])
+            + y3 * (x0 * flat[d_] + x1 * flat[d_ + three] + x2 * flat[d_ + six] + x3 * flat[d_ + nine]),
+            np.float32(0.0),
+        )
+
+
+@kernel
+def _gather(rays, limits, offsets, candidates, weights, wanted, first_y, first_x, shown):
     """What `resample_colors` returns. offsets (S, 2): from each source to the target view."""
     images, surfaces, edge_level, photo_images = rays.colors, rays.disparity, rays.edge_level, rays.photo_images
     first_row, count = candidates.first_row, candidates.number
@@ -239,7 +279,11 @@ def _gather(rays, limits, offsets, candidates, weights, wanted, shown):
     for row in range(count.shape[0]):
         for x in range(count.shape[1]):
             used = np.int64(count[row, x])
-            if used < 2 and not (used == 1 and wanted[row, x]):
+            if used < 2 and not wanted[row, x]:
+                continue
+            v, u = row - first_y, x - first_x
+            if used == 0:
+                colors[v, u, 0], colors[v, u, 1], colors[v, u, 2] = 0.0, 0.0, 0.0
                 continue
             # Weights of a ray sum to what is covered of it; the heaviest candidate gives its disparity and source.
             total, heavy = 0.0, 0
@@ -281,4 +325,4 @@ def _gather(rays, limits, offsets, candidates, weights, wanted, shown):
                     sum_b += w * linear_scalar(b)
             if not sole:
                 sum_r, sum_g, sum_b = srgb_scalar(sum_r), srgb_scalar(sum_g), srgb_scalar(sum_b)
-            colors[row, x, 0], colors[row, x, 1], colors[row, x, 2] = sum_r, sum_g, sum_b
+            colors[v, u, 0], colors[v, u, 1], colors[v, u, 2] = sum_r, sum_g, sum_b

@@ -21,12 +21,12 @@ from iibr_core.rendering.candidates import find_candidates
 from iibr_core.rendering.coherent_cells import land_marked
 from iibr_core.rendering.hypotheses import AmbiguousRays, blend_hypotheses, bound_weights, describe_rays
 from iibr_core.rendering.laid_hypotheses import SEARCH_PX
-from iibr_core.rendering.occlusion import LEAST_COVERED, MOSTLY_COVERED, WHOLLY_COVERED, covered_share, entropy
+from iibr_core.rendering.occlusion import LEAST_COVERED, MOSTLY_COVERED, WHOLLY_COVERED, entropy
 from iibr_core.rendering.ray_cells import CELL_PX
 from iibr_core.rendering.ray_set import RaySet
 from iibr_core.rendering.rendered_view import DecidedRays, RaysBehind, RenderedView, ShownBefore
 from iibr_core.rendering.resampling import resample_colors
-from iibr_core.rendering.visibility_weights import visibility_weights
+from iibr_core.rendering.visibility_weights import weights_and_coverage
 from iibr_core.runtime import tiling
 from iibr_core.runtime.jit import kernel
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never, raise_if_stopped
@@ -220,18 +220,22 @@ class ViewSynthesis:
         first, last = rows[0] + rays.margins.top, rows[1] + rays.margins.top
         left, right = rays.margins.left, rays.size.width - rays.margins.right
         above = min(first, around)
-        candidates = find_candidates(rays, offset, (first - above, min(last + around, rays.size.height)), self._slots)
+        seen = first - above, min(last + around, rays.size.height)
+        columns = max(left - around, 0), min(right + around, rays.size.width)
+        candidates = find_candidates(rays, offset, seen, self._slots, columns)
         raise_if_stopped(self._should_stop)
-        weights = visibility_weights(candidates)
-        share = covered_share(weights)
+        weights, share = weights_and_coverage(candidates)
         occluded = share < LEAST_COVERED
         inner = slice(above, above + last - first), slice(left, right)
         raise_if_stopped(self._should_stop)
+        shown = slice(*rows)
         wanted = np.zeros(occluded.shape, np.bool_)
-        wanted[inner] = (
-            True if known is None else _changed_pixels(rays, offset, (first, last), known.images)[:, left:right]
-        )
-        found = resample_colors(rays, candidates, weights, wanted)
+        if known is None:
+            wanted[inner] = True
+        else:
+            wanted[inner] = _changed_pixels(rays, offset, (first, last), known.images)[:, left:right]
+            view.colors[shown] = known.colors[shown]
+        found = resample_colors(rays, candidates, weights, wanted, (view.colors[shown], above, left))
         raise_if_stopped(self._should_stop)
         undecided = None
         if self._transformer:
@@ -240,16 +244,13 @@ class ViewSynthesis:
             undecided = find_undecided_rays(
                 rays, candidates, weights, found, (above, above + last - first), self._every, self._hypotheses, decided
             )
-        shown = slice(*rows)
-        view.colors[shown], view.disparity[shown] = found.colors[inner], found.disparity[inner]
-        if known is not None:
-            np.copyto(view.colors[shown], known.colors[shown], where=~wanted[inner][..., None])
+        view.disparity[shown] = found.disparity[inner]
         view.occluded[shown], covered[shown] = occluded[inner], share[inner]
         view.inpainted[shown] = occluded[inner] | (found.source[inner] >= rays.photo_images)
         if any(rays.margins):
-            pixel = np.arange(rows[0] * rays.view_size.width, rows[1] * rays.view_size.width)
-            beyond = _outside_frame(pixel, view.disparity[shown].reshape(-1), *offset, *rays.view_size)
-            view.inpainted[shown] |= beyond.reshape(view.inpainted[shown].shape)
+            _mark_outside_frame(
+                view.disparity[shown], rows[0], *map(float, offset), rays.view_size.height, view.inpainted[shown]
+            )
         if view.entropy is not None:
             view.entropy[shown] = entropy(weights)[inner]
         return undecided
@@ -288,6 +289,16 @@ def _outside_frame(pixel, disparity, t, s, height, width):
         v, u = pixel[i] // width + disparity[i] * t, pixel[i] % width + disparity[i] * s
         beyond[i] = v < -0.5 or v > height - 0.5 or u < -0.5 or u > width - 0.5
     return beyond
+
+
+@kernel
+def _mark_outside_frame(disparity, first_row, t, s, height, inpainted):
+    """The same for rows of a view, from first_row on: marked in inpainted (N, W)."""
+    rows, width = disparity.shape
+    for row in range(rows):
+        for x in range(width):
+            v, u = first_row + row + disparity[row, x] * t, x + disparity[row, x] * s
+            inpainted[row, x] |= (v < -0.5) | (v > height - 0.5) | (u < -0.5) | (u > width - 0.5)
 
 
 def _composite(foreground: FloatImage, background: FloatImage, share: FloatImage) -> FloatImage:

@@ -15,21 +15,29 @@ from iibr_core.types import FloatImage
 
 def visibility_weights(candidates: Candidates) -> FloatImage:
     """Weights (K, N, W) in [0, 1], 0 in unused slots; their sum over K is the covered share of the pixel."""
-    weights = np.zeros_like(candidates.coverage)
-    _composite_front_to_back(candidates, weights)
-    return weights
+    return weights_and_coverage(candidates)[0]
+
+
+def weights_and_coverage(candidates: Candidates) -> tuple[FloatImage, FloatImage]:
+    """`visibility_weights`, and their sum (N, W): how much of each ray its candidates cover, at most 1."""
+    weights = np.zeros(candidates.coverage.shape, np.float32)
+    covered = np.empty(candidates.number.shape, np.float32)
+    _composite_front_to_back(candidates, weights, covered)
+    return weights, covered
 
 
 @kernel
-def _composite_front_to_back(candidates, weights):
+def _composite_front_to_back(candidates, weights, covered):
     count, coverage, disparity = candidates.number, candidates.coverage, candidates.disparity
     rows, width = count.shape
     for row in range(rows):
+        # Most rays: one surface, or none.
+        for x in range(width):
+            share = min(coverage[0, row, x], np.float32(1.0)) if count[row, x] == 1 else np.float32(0.0)
+            weights[0, row, x] = covered[row, x] = share
         for x in range(width):
             used = np.int64(count[row, x])
-            # Most rays: one surface.
-            if used == 1:
-                weights[0, row, x] = min(coverage[0, row, x], np.float32(1.0))
+            if used < 2:
                 continue
             left = np.float32(1.0)
             ahead = np.float32(np.inf)
@@ -50,3 +58,4 @@ def _composite_front_to_back(candidates, weights):
                 ahead, ahead_slot = disparity[foreground, row, x], foreground
                 weights[foreground, row, x] = min(coverage[foreground, row, x], left)
                 left -= weights[foreground, row, x]
+            covered[row, x] = np.float32(1.0) - left

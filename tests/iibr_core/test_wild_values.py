@@ -55,7 +55,7 @@ from iibr_core.rendering.gloss import environment, geometry, gloss_surface, shad
 from iibr_core.rendering.gloss.gloss_settings import Gloss, GlossLight, GlossSurface, of_maps
 from iibr_core.rendering.photo_rays import rays_of_photo
 from iibr_core.rendering.view_synthesis import ViewSynthesis
-from iibr_core.rendering.visibility_weights import visibility_weights
+from iibr_core.rendering.visibility_weights import visibility_weights, weights_and_coverage
 from iibr_core.runtime.tiling import never
 from iibr_core.types import DISPLAY_P3, Camera, Disparity, GridShape, ImageSize, Margins, Photo, ViewOffset, ViewUpdate
 from tests.iibr_core import embedded_files as embedded
@@ -407,7 +407,6 @@ FINITE = {
     "rendering.flying_pixels.measure_detail": lambda v, _: flying_pixels.measure_detail(image(v)),
     "rendering.flying_pixels.without_flying_pixels": lambda v, _: without_flying(v),
     "rendering.large_views.views_of_tile": lambda v, _: tile_views(v),
-    "rendering.occlusion.covered_share": lambda v, _: occlusion.covered_share(np.nan_to_num(shares(v))),
     "rendering.occlusion.entropy": lambda v, _: occlusion.entropy(np.nan_to_num(shares(v))),
     "generation.plan.plan_for_viewing": lambda v, _: [
         plan.plan_for_viewing(scene()[0], Disparity(depths(v), "wild")),
@@ -455,6 +454,7 @@ FINITE = {
     ),
     "types.Photo": lambda v, _: Photo(image(v), 20.0, "wild"),
     "rendering.visibility_weights.visibility_weights": lambda v, _: visibility_weights(found(v)),
+    "rendering.visibility_weights.weights_and_coverage": lambda v, _: weights_and_coverage(found(v)),
 }
 """What comes back is finite, or InputError or another ValueError says why not."""
 
@@ -652,6 +652,7 @@ READS_OR_TELLS = {
     "generation.dense_field": "GivenView require_steps",
     "generation.given_views": "read_given_views DenseFieldWork",
     "generation.field_work": "FieldWork",
+    "rendering.coherent_cells": "cells_in",
     "runtime.time_left": "TimeLeft about_left",
     "generation.view_maker": "ViewMaker quantise_as_stored",
     "generation.outer_views": "outer_views outer_views_of_grid farthest_views",

@@ -102,9 +102,9 @@ def test_no_view_is_made_twice(monkeypatch):
         counted.append(("rows", offset, span[1] - span[0]))
         return render_rows(self, rays, offset, span, *rest)
 
-    def counting_pixels(rays, candidates, weights, wanted):
+    def counting_pixels(rays, candidates, weights, wanted, into):
         counted.append(("pixels", candidates.offset, wanted.sum()))
-        return resample(rays, candidates, weights, wanted)
+        return resample(rays, candidates, weights, wanted, into)
 
     monkeypatch.setattr(ViewSynthesis, "_render_rows", counting_rows)
     monkeypatch.setattr(view_synthesis, "resample_colors", counting_pixels)

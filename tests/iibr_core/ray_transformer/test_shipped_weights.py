@@ -12,10 +12,10 @@ from iibr_core.generation.update_loop import complete_ray_set
 from iibr_core.rendering.candidates import find_candidates
 from iibr_core.rendering.hypotheses import blend_hypotheses, find_ambiguous_rays
 from iibr_core.rendering.laid_hypotheses import FAINT_WEIGHT
-from iibr_core.rendering.occlusion import WHOLLY_COVERED, covered_share
+from iibr_core.rendering.occlusion import WHOLLY_COVERED
 from iibr_core.rendering.photo_rays import rays_of_photo
 from iibr_core.rendering.resampling import resample_colors
-from iibr_core.rendering.visibility_weights import visibility_weights
+from iibr_core.rendering.visibility_weights import weights_and_coverage
 from iibr_core.training.degradation import blur, degrade
 from iibr_core.training.scenes.random_scene import cast, random_scene, render
 from iibr_core.types import ImageSize, ViewOffset
@@ -60,11 +60,11 @@ def squared_errors(seed, spoil):
     transformer, found = transformer_for("balanced"), []
     for offset in OFFSETS:
         candidates = find_candidates(rays, offset, (0, SIZE.height))
-        weights = visibility_weights(candidates)
+        weights, share = weights_and_coverage(candidates)
         shown = resample_colors(rays, candidates, weights)
         ambiguous = find_ambiguous_rays(rays, candidates, weights, shown, (0, SIZE.height))
         # Where less is covered, T is not asked: what was filled behind shows there, too.
-        asked = covered_share(weights)[tuple(ambiguous.pixel.T)] >= WHOLLY_COVERED
+        asked = share[tuple(ambiguous.pixel.T)] >= WHOLLY_COVERED
         ambiguous = replace(ambiguous, **{name: getattr(ambiguous, name)[asked] for name in ARRAYS})
         y, x = ambiguous.pixel.T
         truth = cast(scene, x, y, offset)[0]

@@ -154,3 +154,15 @@ def test_rays_without_coverage_do_not_land():
     found = find_candidates(ray_set(np.zeros((5, 5)), coverage=coverage), ViewOffset(0.0, 1.0), (0, 5))
     assert found.number.sum() == 1
     assert found.coverage[0, 2, 2] == pytest.approx(0.25)
+
+
+@pytest.mark.parametrize("columns", [(0, 24), (5, 11), (23, 24)])
+def test_columns_are_looked_at_alone(columns):
+    random = np.random.default_rng(5)
+    rays, offset = ray_set(random.uniform(-3, 3, (12, 24)).round()), ViewOffset(0.7, -1.2)
+    whole, some = find_candidates(rays, offset, (0, 12)), find_candidates(rays, offset, (0, 12), columns=columns)
+    inside = slice(*columns)
+    assert (some.number[:, inside] == whole.number[:, inside]).all()
+    used = np.arange(5)[:, None, None] < whole.number[:, inside]
+    assert (some.disparity[:, :, inside] == whole.disparity[:, :, inside])[used].all()
+    assert (np.delete(some.number, np.r_[inside], axis=1) == 0).all()

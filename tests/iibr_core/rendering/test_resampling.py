@@ -90,3 +90,17 @@ def test_no_candidates_are_black():
     colors, disparity, _ = resample_colors(rays, candidates, visibility_weights(candidates))
     assert colors.max() == 0
     assert disparity.max() == 0
+
+
+def test_colours_go_into_a_part_of_a_picture_where_they_are_wanted():
+    random = np.random.default_rng(2)
+    rays = RaySet(1, ImageSize(9, 14), 0.5)
+    disparity = random.uniform(-1, 1, (9, 14)).round().astype(np.float32)
+    rays.add(ViewOffset(0, 0), random.random((9, 14, 3)).astype(np.float32), disparity, np.ones_like(disparity))
+    candidates = find_candidates(rays, ViewOffset(0.4, 1.3), (0, 9))
+    weights, wanted = visibility_weights(candidates), np.zeros((9, 14), np.bool_)
+    wanted[2:7, 3:12] = random.random((5, 9)) < 0.7
+    whole = resample_colors(rays, candidates, weights).colors
+    part = np.full((5, 9, 3), 0.25, np.float32)
+    assert resample_colors(rays, candidates, weights, wanted, (part, 2, 3)).colors is part
+    assert (part == np.where(wanted[2:7, 3:12, None], whole[2:7, 3:12], np.float32(0.25))).all()

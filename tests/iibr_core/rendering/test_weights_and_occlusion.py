@@ -4,8 +4,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from iibr_core.rendering.candidates import Candidates
-from iibr_core.rendering.occlusion import covered_share, entropy
-from iibr_core.rendering.visibility_weights import visibility_weights
+from iibr_core.rendering.occlusion import entropy
+from iibr_core.rendering.visibility_weights import visibility_weights, weights_and_coverage
 from iibr_core.types import ViewOffset
 
 
@@ -55,12 +55,13 @@ def test_the_front_surface_wins_and_coverage_blends():
 
 @given(pairs_of_floats)
 def test_the_covered_share_is_what_the_weights_sum_to(pairs):
-    weights = visibility_weights(one_ray(pairs))
-    assert covered_share(weights)[0, 0] == pytest.approx(min(weights.sum(), 1), abs=1e-5)
+    weights, covered = weights_and_coverage(one_ray(pairs))
+    assert covered[0, 0] == pytest.approx(min(weights.sum(), 1), abs=1e-5)
 
 
 def test_no_candidates_have_no_weight():
-    assert visibility_weights(one_ray([])).sum() == 0
+    weights, covered = weights_and_coverage(one_ray([]))
+    assert weights.sum() == covered.sum() == 0
 
 
 @given(pairs_of_floats)
