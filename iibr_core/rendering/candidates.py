@@ -87,7 +87,7 @@ def find_candidates(
     )
     arrays, cells = rays.arrays, rays.cells
     for k, (t, s) in enumerate(rays.to_view(offset)):
-        needed = land_incoherent(cells, k, t, s, rows, splat)
+        needed = np.argwhere(land_incoherent(cells, k, t, s, rows, splat))
         _land_rays(arrays, k, rays.connected, rays.steep_cells(k), needed, splat, columns, s, t, found)
     _mean_disparity(found, splat)
     backward_warp(arrays.disparity[0], offset, about, found)
@@ -131,8 +131,8 @@ def _rearmost(coverage, disparity, row, column):
 
 @kernel
 def _land_rays(rays, index, connected, steep, needed, splat, columns, s, t, found):
-    """Let the rays in the needed cells of one source land on the cells to splat. Until `_mean_disparity`, found's
-    disparity holds sums weighted by coverage.
+    """Let the rays in the needed cells (N, 2) of one source land on the cells to splat. Until `_mean_disparity`,
+    found's disparity holds sums weighted by coverage.
 
     A footprint's overlap goes to the candidate of its surface, or starts one; where slots run out the rearmost gives
     way.
@@ -144,10 +144,10 @@ def _land_rays(rays, index, connected, steep, needed, splat, columns, s, t, foun
     # The same as a difference of disparities.
     same_surface = OWN_SURFACE_PX / max(abs(s), abs(t), 1e-9)
     above_cells, reach = first_row // CELL_PX, LANDING_REACH_PX / CELL_PX
-    for y in range(height):
-        for cell in range(needed.shape[1]):
-            if not needed[y // CELL_PX, cell]:
-                continue
+    for i in range(len(needed)):
+        cell_row, cell = needed[i]
+        is_steep = steep[cell_row, cell]
+        for y in range(cell_row * CELL_PX, min((cell_row + 1) * CELL_PX, height)):
             for x in range(cell * CELL_PX, min((cell + 1) * CELL_PX, width)):
                 # Forward warp: where the ray lands, and the footprint there that meets its neighbours' half-way.
                 filled = ray_coverage[y, x]
@@ -157,14 +157,14 @@ def _land_rays(rays, index, connected, steep, needed, splat, columns, s, t, foun
                 landed_x, landed_y = x - d * s, y - d * t
                 # Only beside what is smooth, unless a steep surface may stretch the ray.
                 if not (
-                    steep[y // CELL_PX, cell]
+                    is_steep
                     or _touches_any(splat, (landed_y + 0.5) / CELL_PX - above_cells, (landed_x + 0.5) / CELL_PX, reach)
                 ):
                     continue
                 to_left, to_right = max(x - 1, 0), min(x + 1, width - 1)
                 above, below = max(y - 1, 0), min(y + 1, height - 1)
                 is_connected, tolerance, slope_x, slope_y = False, same_surface, 0.0, 0.0
-                if steep[y // CELL_PX, cell]:
+                if is_steep:
                     rise_x = _slope(ray_disparity, connected, RIGHT, y, x, 0, 1)
                     rise_y = _slope(ray_disparity, connected, BELOW, y, x, 1, 0)
                     # How much the view stretches the surface, as an area: the same slope is spread over more pixels.
