@@ -287,7 +287,7 @@ def _outside_frame(pixel, disparity, t, s, height, width):
     beyond = np.empty(len(pixel), np.bool_)
     for i in range(len(pixel)):
         v, u = pixel[i] // width + disparity[i] * t, pixel[i] % width + disparity[i] * s
-        beyond[i] = v < -0.5 or v > height - 0.5 or u < -0.5 or u > width - 0.5
+        beyond[i] = _is_outside(v, u, height, width)
     return beyond
 
 
@@ -298,7 +298,13 @@ def _mark_outside_frame(disparity, first_row, t, s, height, inpainted):
     for row in range(rows):
         for x in range(width):
             v, u = first_row + row + disparity[row, x] * t, x + disparity[row, x] * s
-            inpainted[row, x] |= (v < -0.5) | (v > height - 0.5) | (u < -0.5) | (u > width - 0.5)
+            inpainted[row, x] |= _is_outside(v, u, height, width)
+
+
+@kernel
+def _is_outside(v, u, height, width):
+    # Without branches: rows are compared many at a time.
+    return (v < -0.5) | (v > height - 0.5) | (u < -0.5) | (u > width - 0.5)
 
 
 def _composite(foreground: FloatImage, background: FloatImage, share: FloatImage) -> FloatImage:
