@@ -47,7 +47,7 @@ def main() -> None:
 
 def row_of(name: str, source: Source) -> tuple[Any, ...]:
     """Of the table."""
-    opened = open_for_export(KIND, source, 1.0, LensChoice(), lambda scene: None, None)
+    opened = open_for_export(KIND, ExportOptions(), source, 1.0, LensChoice(), lambda scene: None, None)
     views = list(opened.views(with_disparity=True))
     begun = time.perf_counter()
     page, carried = make_page(Made(opened, views), resolve_settings(KIND, ExportOptions(), opened.scene, opened.optics))

@@ -22,6 +22,10 @@ STACK_FILES = r"((focus|aperture)_\d+|all_in_focus)\.(png|tif)|disparity\.pfm"
 CAMERA_FILES = r"images/v\d+_u\d+\.png|poses_bounds\.npy|transforms\.json|sparse/0/\w+\.txt"
 STACK = ("view", "focus", "aperture", "size", "frames")
 EYES = ("focus", "aperture", "size", "eyes")
+OF_EYES = "stereo_export:optics_of_eyes"
+ON_PATH = "animation:optics_on_path"
+OF_STACK = "stack:optics_of_focal_stack"
+OF_SWEEP = "stack:optics_of_aperture_sweep"
 Purpose = Literal["share", "display", "software"]
 PURPOSES: dict[Purpose, str] = {"share": "Share", "display": "3D displays", "software": "Other software"}
 """What people export for, in their words."""
@@ -33,8 +37,9 @@ class ExportKind:
     supports: names of the supported options about exports and the lens. path: makes the file's name what players
     expect. layout: of a light field, among `WRITERS`. own_files: what a folder may hold that is replaced, as a regular
     expression. needs: packages, of the extra `export`. frames: pictures of a stack. rate: frames a second.
-    most_width_px: of pictures whose size nobody chose, 0: any. has_colors: else it is a map, and no gloss shows in it.
-    gallery: writes what lists the exports of a batch, "" without.
+    optics: finds what its pictures are drawn with, "" where nothing is drawn. most_width_px: of pictures whose size
+    nobody chose, 0: any. has_colors: else it is a map, and no gloss shows in it. gallery: writes what lists the exports
+    of a batch, "" without.
     purpose: what people export it for; "share": everybody can look at it.
     """
 
@@ -48,6 +53,7 @@ class ExportKind:
     needs: tuple[str, ...] = ()
     frames: int = 0
     rate: float = 0.0
+    optics: str = ""
     most_width_px: int = 0
     has_colors: bool = True
     gallery: str = ""
@@ -67,58 +73,76 @@ class ExportKind:
 EXPORTS = {
     "quilt": ExportKind(
         "Quilt for light-field displays", PICTURE, "quilt_export:write_quilt",
-        ("focus", "aperture", "device", "show"), path="quilt_export:quilt_path", purpose="display",
+        ("focus", "aperture", "device", "show"), path="quilt_export:quilt_path",
+        optics="quilt_export:optics_of_quilt", purpose="display",
     ),
     "rgbd": ExportKind("Picture with depth at the right", PICTURE, "rgbd:write_beside", purpose="display"),
     "rgbd-left": ExportKind("Picture with depth at the left", PICTURE, "rgbd:write_before", purpose="display"),
     "rgbd-below": ExportKind("Picture with depth below", PICTURE, "rgbd:write_below", purpose="display"),
     "sbs": ExportKind(
-        "Side by side", PICTURE, "stereo_export:write_side_by_side", EYES, "stereo_export:full_path", purpose="display",
+        "Side by side", PICTURE, "stereo_export:write_side_by_side", EYES, "stereo_export:full_path",
+        optics=OF_EYES, purpose="display",
     ),
     "half-sbs": ExportKind(
         "Side by side, half width", PICTURE, "stereo_export:write_half_side_by_side",
-        EYES, "stereo_export:half_path", purpose="display",
+        EYES, "stereo_export:half_path", optics=OF_EYES, purpose="display",
     ),
     "over-under": ExportKind(
         "Left eye over right", PICTURE, "stereo_export:write_over_under",
-        EYES, "stereo_export:over_path", purpose="display",
+        EYES, "stereo_export:over_path", optics=OF_EYES, purpose="display",
     ),
     "cross-eyed": ExportKind(
-        "Side by side, crossed", PICTURE, "stereo_export:write_cross_eyed", EYES, purpose="display",
+        "Side by side, crossed", PICTURE, "stereo_export:write_cross_eyed", EYES, optics=OF_EYES, purpose="display",
     ),
-    "anaglyph": ExportKind("Anaglyph, red-cyan", PICTURE, "stereo_export:write_anaglyph", EYES, purpose="display"),
+    "anaglyph": ExportKind(
+        "Anaglyph, red-cyan", PICTURE, "stereo_export:write_anaglyph", EYES, optics=OF_EYES, purpose="display",
+    ),
     "spatial-photo": ExportKind(
-        "Spatial photo, HEIC", (".heic",), "spatial_photo_export:write_spatial", EYES, purpose="display",
+        "Spatial photo, HEIC", (".heic",), "spatial_photo_export:write_spatial", EYES,
+        optics=OF_EYES, purpose="display",
     ),
     "web": ExportKind(
         "Web page, one file", (".html",), "web:write_page",
         ("budget", "credit", "stills"), gallery="web_gallery:write_gallery",
     ),
-    "mp4": ExportKind("Video, MP4", (".mp4",), "animation:write_motion", MOVING, needs=("av",), rate=30),
-    "webm": ExportKind("Video, WebM", (".webm",), "animation:write_motion", MOVING, needs=("av",), rate=30),
-    "gif": ExportKind("Animation, GIF", (".gif",), "animation:write_motion", MOVING, rate=15, most_width_px=480),
-    "webp": ExportKind("Animation, WebP", (".webp",), "animation:write_motion", MOVING, rate=25, most_width_px=960),
-    "apng": ExportKind("Animation, PNG", (".png",), "animation:write_motion", MOVING, rate=15, most_width_px=480),
+    "mp4": ExportKind(
+        "Video, MP4", (".mp4",), "animation:write_motion", MOVING, optics=ON_PATH, needs=("av",), rate=30,
+    ),
+    "webm": ExportKind(
+        "Video, WebM", (".webm",), "animation:write_motion", MOVING, optics=ON_PATH, needs=("av",), rate=30,
+    ),
+    "gif": ExportKind(
+        "Animation, GIF", (".gif",), "animation:write_motion", MOVING, optics=ON_PATH, rate=15, most_width_px=480,
+    ),
+    "webp": ExportKind(
+        "Animation, WebP", (".webp",), "animation:write_motion", MOVING, optics=ON_PATH, rate=25, most_width_px=960,
+    ),
+    "apng": ExportKind(
+        "Animation, PNG", (".png",), "animation:write_motion", MOVING, optics=ON_PATH, rate=15, most_width_px=480,
+    ),
     "focal-stack": ExportKind(
-        "Focal stack, PNGs", (), "stack:write_focal_stack", STACK, own_files=STACK_FILES, frames=16, purpose="software",
+        "Focal stack, PNGs", (), "stack:write_focal_stack", STACK,
+        optics=OF_STACK, own_files=STACK_FILES, frames=16, purpose="software",
     ),
     "focal-stack-tiff": ExportKind(
         "Focal stack, 16-bit TIFFs", (), "stack:write_focal_tiffs",
-        STACK, own_files=STACK_FILES, frames=16, purpose="software",
+        STACK, optics=OF_STACK, own_files=STACK_FILES, frames=16, purpose="software",
     ),
     "focal-stack-exr": ExportKind(
-        "Focal stack, OpenEXR", (".exr",), "stack:write_focal_stack", STACK, frames=16, purpose="software",
+        "Focal stack, OpenEXR", (".exr",), "stack:write_focal_stack", STACK,
+        optics=OF_STACK, frames=16, purpose="software",
     ),
     "aperture-sweep": ExportKind(
         "Aperture sweep, PNGs", (), "stack:write_aperture_sweep",
-        STACK, own_files=STACK_FILES, frames=9, purpose="software",
+        STACK, optics=OF_SWEEP, own_files=STACK_FILES, frames=9, purpose="software",
     ),
     "aperture-sweep-tiff": ExportKind(
         "Aperture sweep, 16-bit TIFFs", (), "stack:write_aperture_tiffs",
-        STACK, own_files=STACK_FILES, frames=9, purpose="software",
+        STACK, optics=OF_SWEEP, own_files=STACK_FILES, frames=9, purpose="software",
     ),
     "aperture-sweep-exr": ExportKind(
-        "Aperture sweep, OpenEXR", (".exr",), "stack:write_aperture_sweep", STACK, frames=9, purpose="software",
+        "Aperture sweep, OpenEXR", (".exr",), "stack:write_aperture_sweep", STACK,
+        optics=OF_SWEEP, frames=9, purpose="software",
     ),
     "epi": ExportKind("Epipolar plane image", DATA, "maps:write_epi", ("row",), purpose="software"),
     "disparity": ExportKind("Disparity map", MAP, "maps:write_disparity", has_colors=False, purpose="software"),

@@ -38,7 +38,9 @@ def write_epi(path: Path, source: ExportSource, settings: ExportSettings) -> Non
     scene = source.scene
     if not 0 <= settings.row < scene.height:
         raise InputError(f"row {settings.row}: {scene.name} has rows 0 to {scene.height - 1}")
-    lines = {view.column: colors_of(view)[settings.row] for view in source.views() if view.row == scene.grid.centre[0]}
+    middle, columns = scene.grid.centre[0], range(scene.grid.columns)
+    views = source.views(wanted=[scene.grid.offset(middle, column) for column in columns])
+    lines = {view.column: colors_of(view)[settings.row] for view in views if view.row == middle}
     write_image(path, np.stack([lines[column] for column in sorted(lines)]))
 
 

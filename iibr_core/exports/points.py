@@ -41,7 +41,7 @@ def scene_points(source: ExportSource) -> Points:
     seen: set[tuple[int, int, int]] = set()
     rows, columns = cameras.grid
     corners = {(row, column) for row in (0, rows - 1) for column in (0, columns - 1)}
-    for view in source.views():
+    for view in source.views(wanted=[cameras.grid.offset(*corner) for corner in corners]):
         at = view.row, view.column
         if view.disparity is None or (at != cameras.grid.centre and (at not in corners or view.inpainted is None)):
             continue

@@ -13,6 +13,7 @@ from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.exports.settings import ExportSettings
 from iibr_core.exports.source import ExportSource
 from iibr_core.formats.quilts import Quilt, lay_out, quilt_for, tagged
+from iibr_core.rendering.optics import Optics
 from iibr_core.scenes.scene import Scene
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import ImageSize
@@ -21,6 +22,12 @@ from iibr_core.types import ImageSize
 def quilt_path(path: Path, scene: Scene, options: ExportOptions) -> Path:
     """With the numbers that players read from the name. Raises InputError for a display that nobody knows."""
     return tagged(path, _quilt_of(scene, options.device).tag)
+
+
+def optics_of_quilt(scene: Scene, optics: Optics, settings: ExportSettings) -> list[Optics]:
+    """Of its views, from the leftmost. Raises InputError where what is in focus cannot be held still."""
+    tile, count = RenderSettings(optics, settings.size), _quilt_of(scene, settings.device).views
+    return [picture.optics for picture in side_pictures(scene, tile, count, settings.eyes)]
 
 
 def write_quilt(path: Path, source: ExportSource, settings: ExportSettings) -> str | None:

@@ -5,7 +5,7 @@ A kind of export is a function that writes one file or folder of this, in whatev
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Iterable, Iterator
+from collections.abc import Callable, Collection, Generator, Iterable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeVar
@@ -20,7 +20,7 @@ from iibr_core.scenes.loaded_photo import LoadedPhoto
 from iibr_core.scenes.making import views_of_photo
 from iibr_core.scenes.scene import Progress, Scene
 from iibr_core.scenes.scene_gloss import add_gloss
-from iibr_core.types import FloatImage, ReportProgress, ViewUpdate
+from iibr_core.types import FloatImage, ReportProgress, ViewOffset, ViewUpdate
 
 Item = TypeVar("Item")
 
@@ -58,18 +58,22 @@ class ExportSource:
             yield item
         self.report_progress(total, total, doing)
 
-    def views(self, zero: float | None = None, with_disparity: bool = False) -> Generator[ViewUpdate]:
+    def views(
+        self, zero: float | None = None, with_disparity: bool = False, wanted: Collection[ViewOffset] | None = None
+    ) -> Generator[ViewUpdate]:
         """Every view of the scene's grid once, the centre first, none of them kept.
 
         zero: the disparity (as given) that stays still, where it is to be another than the plan's; for photos only.
         with_disparity: of light fields from disk too, each view of its own, as far as it can be found.
-        Raises Cancelled once the export should stop.
+        wanted: of a photo, only these and the centre; None: all. Raises Cancelled once the export should stop.
         """
         if self.loaded is None:
             made = self._views_of_folder(with_disparity)
         else:
             source, plan = self.scene.source, self.plan(zero)
-            made = views_of_photo(source, self.loaded, plan, self.should_stop, self.report_progress)
+            made = views_of_photo(
+                source, self.loaded, plan, self.should_stop, self.report_progress, wanted=lambda: wanted
+            )
         scene = self.scene if zero is None else replace(self.scene, infinity_px=self._infinity_px(zero))
         made = add_gloss(made, self.optics.gloss, scene, self.should_stop)
         for view in made:

@@ -52,6 +52,20 @@ def aperture_sweep(scene: Scene, optics: Optics, count: int) -> Stack:
     ]
 
 
+def optics_of_focal_stack(scene: Scene, optics: Optics, settings: ExportSettings) -> list[Optics]:
+    """Of its pictures, the one that is sharp everywhere last."""
+    return [each for _, each in _with_all_in_focus(focal_stack(scene, optics, settings.frames), optics)]
+
+
+def optics_of_aperture_sweep(scene: Scene, optics: Optics, settings: ExportSettings) -> list[Optics]:
+    """Likewise."""
+    return [each for _, each in _with_all_in_focus(aperture_sweep(scene, optics, settings.frames), optics)]
+
+
+def _with_all_in_focus(stack: Stack, optics: Optics) -> Stack:
+    return [*stack, (ALL_IN_FOCUS, replace(optics, aperture_diameter=0.0))]
+
+
 def write_focal_stack(path: Path, source: ExportSource, settings: ExportSettings) -> None:
     """A folder of PNGs, or an OpenEXR file; so do the others, with TIFFs where their names say so.
 
@@ -82,8 +96,7 @@ def _write(
     stack_of: Callable[[Scene, Optics, int], Stack],
     ending: str,
 ) -> None:
-    stack = stack_of(source.scene, source.optics, settings.frames)
-    stack = [*stack, (ALL_IN_FOCUS, replace(source.optics, aperture_diameter=0.0))]
+    stack = _with_all_in_focus(stack_of(source.scene, source.optics, settings.frames), source.optics)
     disparity = source.disparity_seen()
     if path.suffix.lower() == ".exr":
         _write_parts(path, source, settings.size, stack, disparity)

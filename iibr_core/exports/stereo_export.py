@@ -19,6 +19,7 @@ from iibr_core.exports.source import ExportSource
 from iibr_core.formats.images.picture_kinds import BEST_QUALITY, PictureFormat
 from iibr_core.formats.images.side_by_side import FULL_TAG, HALF_TAG, OVER_TAG, TAG
 from iibr_core.formats.quilts import tagged
+from iibr_core.rendering.optics import Optics
 from iibr_core.scenes.scene import Scene
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import SRGB, ColorSpace
@@ -46,6 +47,11 @@ def _named(path: Path, tag: str) -> Path:
     found = TAG.search(path.stem)
     said = found and (OVER_TAG if found[3] else HALF_TAG if found[1] or found[2] else FULL_TAG)
     return path if said == tag else tagged(path, tag)
+
+
+def optics_of_eyes(scene: Scene, optics: Optics, settings: ExportSettings) -> list[Optics]:
+    """Of the left eye and the right one. Raises InputError as `draw_eyes` does."""
+    return [eye.optics for eye in side_pictures(scene, RenderSettings(optics, settings.size), 2, settings.eyes)]
 
 
 def draw_eyes(source: ExportSource, settings: ExportSettings, squeeze: int = 1, color_space: ColorSpace = SRGB) -> Eyes:

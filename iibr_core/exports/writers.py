@@ -16,6 +16,7 @@ from iibr_core.formats.outputs import require_file_place, require_folder_place, 
 if TYPE_CHECKING:
     from iibr_core.exports.options import ExportOptions
     from iibr_core.exports.source import ExportSource
+    from iibr_core.rendering.optics import Optics
     from iibr_core.scenes.scene import Scene
 
 
@@ -51,6 +52,19 @@ def writer_of(kind: ExportKind) -> Callable[[Path, ExportSource, ExportOptions],
         return writer(path, source, resolve_settings(kind, options, source.scene, source.optics))
 
     return write
+
+
+def optics_of(kind: ExportKind, options: ExportOptions) -> Callable[[Scene, Optics], Sequence[Optics]]:
+    """What finds, for the scene as the window shows it, what its pictures are drawn with; of a kind that is drawn.
+
+    It raises InputError where they cannot be drawn.
+    """
+
+    def find(scene: Scene, optics: Optics) -> Sequence[Optics]:
+        found: Sequence[Optics] = _resolve(kind.optics)(scene, optics, resolve_settings(kind, options, scene, optics))
+        return found
+
+    return find
 
 
 def gallery_of(kind: ExportKind) -> Callable[[Path, Iterable[str]], Path] | None:

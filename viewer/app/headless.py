@@ -32,7 +32,7 @@ from viewer.display.inspection_view import InspectionView
 from viewer.display.scene_drawer import prepare_gloss
 from viewer.display.scene_view import SceneView
 from viewer.gpu.headless_context import Backend, create_headless
-from viewer.gpu.refocus.accumulation import views_seen
+from viewer.gpu.refocus.views_seen import views_seen
 from viewer.model.actions import Action, OpenPath, ProgressMade, SceneOpened, SetState
 from viewer.model.inspection_request import (
     NO_INSPECTION_TEXTURES,

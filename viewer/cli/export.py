@@ -116,6 +116,8 @@ def _carry_out(
 
             open_drawn = held.enter_context(SceneDrawer()).open
         with show_progress("reading") as show:
-            made = open_for_export(kind, source, depth_strength, lens.choice, on_ready, open_drawn, untimed(show))
+            made = open_for_export(
+                kind, options, source, depth_strength, lens.choice, on_ready, open_drawn, untimed(show)
+            )
         with show_progress("exporting") as show:
             return made, writer_of(kind)(target(), replace(made, report_progress=show), options)

@@ -10,14 +10,15 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from iibr_core.exports import ExportSource, RenderSettings, require_size
+from iibr_core.exports import ExportSource, OpticsOf, RenderSettings, require_size
 from iibr_core.rendering import CENTRE
 from iibr_core.rendering.gloss import Gloss
 from iibr_core.runtime import never
 from iibr_core.scenes import LensChoice, Scene, SceneReady, SceneRequest, Source, ViewReady, answer, results_of
-from iibr_core.types import ReportProgress, ignore_progress
+from iibr_core.types import ReportProgress, ViewOffset, ignore_progress
 from viewer.display.scene_view import SceneView
 from viewer.gpu.headless_context import create_headless
+from viewer.gpu.refocus.views_seen import views_seen_by
 
 _own = threading.local()
 """Of a thread: its drawer, kept from photo to photo. GL contexts belong to threads."""
@@ -29,12 +30,13 @@ def open_drawn(
     lens: LensChoice,
     on_ready: Callable[[Scene], None],
     report_progress: ReportProgress = ignore_progress,
+    optics_of: OpticsOf | None = None,
 ) -> ExportSource:
     """See `OpenDrawn`; by the thread's own drawer, for as long as it opens nothing else."""
     if not hasattr(_own, "drawer"):
         _own.drawer = SceneDrawer()
     drawer: SceneDrawer = _own.drawer
-    return drawer.open(source, depth_strength, lens, on_ready, report_progress)
+    return drawer.open(source, depth_strength, lens, on_ready, report_progress, optics_of)
 
 
 class SceneDrawer:
@@ -59,21 +61,27 @@ class SceneDrawer:
         lens: LensChoice,
         on_ready: Callable[[Scene], None],
         report_progress: ReportProgress = ignore_progress,
+        optics_of: OpticsOf | None = None,
     ) -> ExportSource:
-        """See `OpenDrawn`. Raises InputError also where there is no GL."""
+        """See `OpenDrawn`; optics_of: None where any picture may be drawn. Raises InputError also without GL."""
+        wanted: set[ViewOffset] | None = None
         view = self._view = self._view or self._make_view()
         request = SceneRequest(0, source, depth_strength, takes_drafts=False)
-        results = results_of(request, never, lambda: CENTRE, lambda made: made.report_to(report_progress))
+        results = results_of(
+            request, never, lambda: CENTRE, lambda made: made.report_to(report_progress), lambda: wanted
+        )
         ready = next(results)
         assert isinstance(ready, SceneReady)
         on_ready(ready.scene)
+        optics = lens.optics_on(ready.scene)
+        if optics_of is not None:
+            wanted = views_seen_by(optics_of(ready.scene, optics), ready.scene.grid)
         view.open(ready)
         for made in results:
             assert isinstance(made, ViewReady)
             view.add(made.view)
             view.upload_all()
             made.progress.report_to(report_progress)
-        optics = lens.optics_on(ready.scene)
         return ExportSource(ready.scene, ready.loaded, optics, self.draw, ignore_progress, never, view.centre)
 
     def draw(self, settings: RenderSettings) -> NDArray[Any]:

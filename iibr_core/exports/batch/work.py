@@ -58,7 +58,7 @@ def _export(task: PhotoTask, open_drawn: OpenDrawn | None) -> Path:
 
     settings = task.settings
     lens = LensChoice(None, settings.focus, settings.aperture, settings.gloss)
-    opened = open_for_export(kind, task.source, settings.depth_strength, lens, require_place, open_drawn)
+    opened = open_for_export(kind, options, task.source, settings.depth_strength, lens, require_place, open_drawn)
     try:
         writer_of(kind)(target, opened, options)
     except AlreadyThereError:  # somebody put it there meanwhile

@@ -32,7 +32,7 @@ XMP = """<x:xmpmeta xmlns:x="adobe:ns:meta/"><rdf:RDF xmlns:rdf="http://www.w3.o
 @pytest.fixture(scope="module")
 def opened(tmp_path_factory: pytest.TempPathFactory):
     source = Source(str(write_scene(tmp_path_factory.mktemp("scene"))), grid=GridShape(5, 5))
-    return open_for_export(KIND, source, 1.0, LensChoice(), lambda scene: None, None)
+    return open_for_export(KIND, ExportOptions(), source, 1.0, LensChoice(), lambda scene: None, None)
 
 
 def page_of(opened, **options) -> tuple[str, dict]:

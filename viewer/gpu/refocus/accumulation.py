@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 import time
 from collections.abc import Iterator
@@ -10,17 +9,15 @@ from dataclasses import dataclass
 from dataclasses import field as dataclass_field
 
 import moderngl
-import numpy as np
 
-from iibr_core.rendering import Optics
 from iibr_core.scenes import ScreenSize, clamp_to_grid
-from iibr_core.types import SRGB, ColorSpace, GridShape, ViewOffset
+from iibr_core.types import SRGB, ColorSpace, ViewOffset
 from viewer.gpu.light_field_texture import LightFieldTexture
 from viewer.gpu.programs import ProgramCache
 from viewer.gpu.refocus.passes import MAX_SAMPLES, Passes
 from viewer.gpu.refocus.picture_cells import WHOLE_CELL, PictureCell
 from viewer.gpu.refocus.picture_lens import Lens
-from viewer.gpu.refocus.view_sampling import ApertureSample, aperture_samples, nearest_present, pinhole_sources
+from viewer.gpu.refocus.view_sampling import ApertureSample, nearest_present
 from viewer.gpu.render_targets import RenderTarget, RenderTargets
 
 MAX_PASSES = 16
@@ -92,20 +89,6 @@ def r2_sequence(count: int) -> list[ViewOffset]:
         ViewOffset(*((k * step + 0.5) % 1.0 - 0.5 for step in (0.7548776662466927, 0.5698402909980532)))
         for k in range(count)
     ]
-
-
-def views_seen(optics: Optics, grid: GridShape) -> set[ViewOffset] | None:
-    """The views of a grid that a picture through these optics is made of, once it has converged; None: all."""
-    if optics.dolly != 0:
-        return None
-    everywhere = np.ones(grid, np.bool_)
-    seen = {(row, column) for row, column, _ in pinhole_sources(optics.eye, grid, everywhere)}
-    if optics.aperture_diameter > 1:
-        for moved, leaves_room in itertools.product(r2_sequence(MAX_PASSES), (False, True)):
-            shape, diameter = optics.aperture_shape, optics.aperture_diameter
-            samples = aperture_samples(optics.eye, diameter, grid, everywhere, shape, 1, moved, leaves_room)
-            seen |= {(row, column) for _, row, column, _ in samples}
-    return {grid.offset(row, column) for row, column in seen}
 
 
 HIGHLIGHT_SPREAD = 2.0

@@ -1,0 +1,130 @@
+"""Of a photo only the views are made that an export shows, and the file is that of all views."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from iibr_core.exports import source as export_source
+from iibr_core.exports.export_opening import open_for_export
+from iibr_core.exports.kinds import EXPORTS
+from iibr_core.exports.options import ExportOptions
+from iibr_core.exports.source import ExportSource
+from iibr_core.exports.writers import export_path, writer_of
+from iibr_core.rendering.optics import Optics
+from iibr_core.scenes import making, opening
+from iibr_core.scenes.lens_limits import LensChoice
+from iibr_core.scenes.scene import Source
+from iibr_core.types import GridShape, InputError, ViewOffset, ViewUpdate
+from tests.viewer.conftest import write_scene
+from viewer.display.scene_drawer import SceneDrawer
+from viewer.gpu.refocus.views_seen import MOST_OPEN, views_seen_by
+
+OF_A_ROW, OF_A_LENS = 4, 20
+FEW = {"frames": 5}
+CASES: list[tuple[str, dict[str, Any], float, int]] = [
+    *((kind, {}, 0.0, 2) for kind in ("sbs", "half-sbs", "over-under", "cross-eyed", "anaglyph", "spatial-photo")),
+    ("anaglyph", {"eyes": 0.0}, 0.0, 0),
+    ("anaglyph", {"eyes": 1.0}, 0.0, 2),
+    ("anaglyph", {}, 1.5, 14),
+    ("quilt", {}, 0.0, OF_A_ROW),
+    *((kind, {"motion": "swing", **FEW}, 0.0, OF_A_ROW) for kind in ("gif", "webp", "apng", "mp4")),
+    ("gif", {"motion": "focus", **FEW}, 2.5, OF_A_LENS),
+    ("gif", {"motion": "aperture", **FEW}, 2.5, OF_A_LENS),
+    ("focal-stack", FEW, 2.5, OF_A_LENS),
+    ("focal-stack-exr", FEW, 2.5, OF_A_LENS),
+    ("aperture-sweep", FEW, 0.0, 24),
+    ("epi", {}, 0.0, OF_A_ROW),
+    ("point-cloud", {}, 0.0, 4),
+    ("splats", {}, 0.0, 4),
+    ("disparity", {}, 0.0, 0),
+    ("numbered-grid", {}, 0.0, 24),
+]
+
+
+@pytest.fixture
+def made(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[ViewUpdate]]:
+    """The views beside the photo's own that are made of it."""
+    views: list[ViewUpdate] = []
+
+    def counted(*arguments: Any, **named: Any) -> Iterator[ViewUpdate]:
+        for view in making.views_of_photo(*arguments, **named):
+            views.extend([view] if (view.row, view.column) != (2, 2) else [])
+            yield view
+
+    for module in (opening, export_source):
+        monkeypatch.setattr(module, "views_of_photo", counted)
+    return views
+
+
+def written(path: Path) -> dict[str, str]:
+    """What the file or folder holds."""
+    files = sorted(path.rglob("*")) if path.is_dir() else [path]
+    return {
+        str(file.relative_to(path)): hashlib.sha256(file.read_bytes()).hexdigest() for file in files if file.is_file()
+    }
+
+
+@pytest.mark.parametrize(("kind", "options", "aperture", "most"), CASES)
+def test_an_export_makes_only_the_views_that_it_shows(
+    tmp_path: Path,
+    made: list[ViewUpdate],
+    monkeypatch: pytest.MonkeyPatch,
+    kind: str,
+    options: dict[str, Any],
+    aperture: float,
+    most: int,
+) -> None:
+    if EXPORTS[kind].needs:
+        pytest.importorskip("av")
+    source, asked = Source(str(write_scene(tmp_path)), grid=GridShape(5, 5)), ExportOptions(**options)
+    lens = LensChoice(aperture=aperture)
+
+    def export(name: str, drawer: SceneDrawer) -> dict[str, str]:
+        made.clear()
+        try:
+            opened = open_for_export(EXPORTS[kind], asked, source, 1.0, lens, lambda scene: None, drawer.open)
+        except InputError as error:
+            pytest.skip(str(error))
+        target = export_path(EXPORTS[kind], tmp_path / f"{name}{(*EXPORTS[kind].endings, '')[0]}", opened.scene, asked)
+        writer_of(EXPORTS[kind])(target, opened, asked)
+        return written(target)
+
+    with SceneDrawer() as drawer:
+        few = export("few", drawer)
+        assert len(made) <= most
+        make_all(monkeypatch)
+        every = export("all", drawer)
+        assert len(made) == 24 or kind == "disparity"
+    assert few == every
+
+
+def make_all(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Have all views made from now on, whatever is shown."""
+    monkeypatch.setattr("viewer.display.scene_drawer.views_seen_by", lambda pictures, grid: None)
+    views = ExportSource.views
+    monkeypatch.setattr(ExportSource, "views", lambda self, *given, wanted=None, **named: views(self, *given, **named))
+
+
+def test_what_is_drawn_says_with_what() -> None:
+    assert all(bool(kind.optics) == kind.is_drawn for kind in EXPORTS.values())
+
+
+@pytest.mark.parametrize(
+    ("pictures", "count"),
+    [
+        ([], 0),
+        ([Optics(), Optics(focus_disparity=1.0)], 1),
+        ([Optics(ViewOffset(0.0, 1.5)), Optics(ViewOffset(-1.0, 0.0))], 3),
+        ([Optics(), Optics(dolly=0.1)], None),
+        ((Optics(aperture_diameter=1 + k / 50) for k in range(1, MOST_OPEN + 1)), 9),
+        ((Optics(aperture_diameter=1 + k / 50) for k in range(1, MOST_OPEN + 2)), None),
+    ],
+)
+def test_pictures_show_what_each_of_them_does(pictures: Iterable[Optics], count: int | None) -> None:
+    seen = views_seen_by(pictures, GridShape(5, 5))
+    assert (None if seen is None else len(seen)) == count
