@@ -25,6 +25,10 @@ COLOR_WEIGHT = 6.0
 """What a colour that is clearly one side's counts, in what a whole pixel on the wrong side adds to the misfit."""
 OUTLINE_WEIGHT = 1.0
 """What each of the eight neighbours counts that is on the other side."""
+FULL_WEIGHT_SIGMA_PX = 2.0
+"""Blur from which colours and outline count in full: the narrower, the better the map itself shows where its edges are,
+by the square.
+"""
 COLOR_PX = 3
 """Colours of both sides are taken from so far around."""
 COLOR_NOISE = 0.003
@@ -50,14 +54,14 @@ def fit_to_blur(
     """
     if sigma > WIDEST_FITTED_SIGMA_PX:
         return sharp
-    taps = _taps(sigma)
+    taps, weight = _taps(sigma), min((sigma / FULL_WEIGHT_SIGMA_PX) ** 2, 1.0)
     fitted, missing, settled = sharp.copy(), np.empty_like(sharp), sharp == values
 
     def find_missing(first: int, last: int) -> None:
         _find_missing(values, fitted, taps, first, last, missing)
 
     def move(first: int, last: int) -> None:
-        _move_edges(photo, fitted, missing, taps, MOVED_EDGES * least_edge, first, last, settled)
+        _move_edges(photo, fitted, missing, taps, weight, MOVED_EDGES * least_edge, first, last, settled)
 
     in_bands(find_missing, image_size(values), should_stop)
     for _ in range(DESCENT_SWEEPS):
@@ -160,10 +164,11 @@ def _correlate(missing, y, x, taps, far):
 
 
 @kernel
-def _move_edges(photo, fitted, missing, taps, least_edge, first, last, settled):
+def _move_edges(photo, fitted, missing, taps, weight, least_edge, first, last, settled):
     """Rows [first, last): pixels take over the height of a neighbour across an edge where that fits better.
 
-    Coordinate descent; `missing` is kept up to date. settled (H, W): not looked at until something moves near it.
+    Coordinate descent; `missing` is kept up to date. weight: of outline and colours. settled (H, W): not looked at
+    until something moves near it.
     """
     height, width = fitted.shape
     far, energy, sums = len(taps) // 2, (taps * taps).sum() ** 2, np.empty((2, 4))
@@ -188,9 +193,10 @@ def _move_edges(photo, fitted, missing, taps, least_edge, first, last, settled):
                 there = fitted[v, u]
                 # Change of the misfit |missing|^2, relative to that of a whole pixel; then of the outline and colours.
                 change = 1.0 - 2.0 * wanted / ((there - here) * energy)
-                change += OUTLINE_WEIGHT * _same_surface_neighbours(fitted, y, x, here, there)
-                if change - COLOR_WEIGHT < best:
-                    change -= COLOR_WEIGHT * _color_vote(photo, fitted, y, x, here, there, least_edge, sums)
+                change += weight * OUTLINE_WEIGHT * _same_surface_neighbours(fitted, y, x, here, there)
+                if change - weight * COLOR_WEIGHT < best:
+                    vote = _color_vote(photo, fitted, y, x, here, there, least_edge, sums)
+                    change -= weight * COLOR_WEIGHT * vote
                     if change < best:
                         best, value = change, there
             if value != here:

@@ -14,6 +14,7 @@ from tests.iibr_core.scenes import smooth_texture
 
 SIZE = (96, 128)
 SIGMA = 2.0
+WEIGHT = 0.4
 LEAST_EDGE = 0.06
 
 
@@ -48,6 +49,17 @@ def test_ragged_outlines_become_whole() -> None:
     fitted = fit(photo, blur(exact, SIGMA), start)
     assert wrong_side(start, exact) > 80
     assert wrong_side(fitted, exact) < 0.1 * wrong_side(start, exact)
+
+
+def test_edges_of_a_narrow_blur_stay_where_the_map_has_them() -> None:
+    """Pixels just inside the disc have the wall's colours, as mixed ones nearly do."""
+    photo, exact = disc()
+    photo[exact > 1.2], photo[exact < 1.2] = [0.8, 0.2, 0.1], [0.1, 0.3, 0.7]
+    y, x = np.mgrid[: SIZE[0], : SIZE[1]]
+    photo[(exact > 1.2) & (np.hypot(x - 60, y - 45) > 23)] = photo[5, 5]
+    narrow, wide = (fit_to_blur(photo, blur(exact, sigma), exact, sigma, LEAST_EDGE) for sigma in (0.8, 3.0))
+    assert wrong_side(narrow, exact) < 10
+    assert wrong_side(wide, exact) > 30
 
 
 def test_what_was_not_sharpened_stays_as_long_as_nothing_moves_beside_it() -> None:
@@ -113,7 +125,7 @@ def test_edges_move_where_the_misfit_falls() -> None:
     for y in range(25, 40):
         before, left = fitted.copy(), missing.copy()
         blur_fit._move_edges(
-            photo, fitted, missing, blur_fit._taps(SIGMA), LEAST_EDGE, y, y + 1, np.zeros(SIZE, np.bool_)
+            photo, fitted, missing, blur_fit._taps(SIGMA), 1.0, LEAST_EDGE, y, y + 1, np.zeros(SIZE, np.bool_)
         )
         blurred_again = np.zeros(SIZE, np.float32)
         blur_fit._find_missing(soft, fitted, blur_fit._taps(SIGMA), 0, SIZE[0], blurred_again)
@@ -168,12 +180,14 @@ def test_votes_and_moves_are_those_of_the_definition() -> None:
             neighbours = np.count_nonzero(abs(around - here) < near) - np.count_nonzero(abs(around - there) < near) - 1
             assert blur_fit._same_surface_neighbours(start, y, x, here, there) == neighbours
             change = 1 - 2 * wanted / ((there - here) * (full_taps() ** 2).sum())
-            change += blur_fit.OUTLINE_WEIGHT * neighbours - blur_fit.COLOR_WEIGHT * vote
+            change += WEIGHT * (blur_fit.OUTLINE_WEIGHT * neighbours - blur_fit.COLOR_WEIGHT * vote)
             if change < best:
                 best, expected = change, there
         fitted, settled = start.copy(), np.ones(SIZE, np.bool_)
         settled[y, x] = False
-        blur_fit._move_edges(photo, fitted, missing.copy(), blur_fit._taps(SIGMA), LEAST_EDGE, y, y + 1, settled)
+        blur_fit._move_edges(
+            photo, fitted, missing.copy(), blur_fit._taps(SIGMA), WEIGHT, LEAST_EDGE, y, y + 1, settled
+        )
         assert fitted[y, x] == expected
         moved += expected != here
     assert moved > 5
