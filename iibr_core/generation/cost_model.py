@@ -28,7 +28,7 @@ SMOOTH_PX = 0.4
 AMBIGUOUS_PX = 1.5
 """Where a step of disparity moves its sides apart by more than this, surfaces meet: some rays there are ambiguous."""
 OPEN_SHARE = 0.28
-"""Of the rays where surfaces meet, so many are left open by the closed form."""
+"""Of the rays where surfaces meet, and near soft edges, so many are left open by the closed form."""
 MOST_PARALLAX_PX = 1e6
 
 
@@ -101,7 +101,7 @@ class ParallaxStatistics:
     def ambiguous_share(self, parallax: float) -> float:
         """Share of the rays that are ambiguous there: where surfaces meet, and near soft edges."""
         soft = float(self.soft.mean() * parallax)
-        return min(OPEN_SHARE * self._share_beyond(AMBIGUOUS_PX, parallax) + soft, 1.0)
+        return OPEN_SHARE * min(self._share_beyond(AMBIGUOUS_PX, parallax) + soft, 1.0)
 
     def _share_beyond(self, least_px: float, parallax: float) -> float:
         return float((self.step * np.float32(parallax) > least_px).mean())

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from iibr_core.rendering.disparity_statistics import (
     EDGE_PARALLAX_PX,
-    SOFT_EDGE_SHARPNESS,
     DisparityStatistics,
     measure_disparity,
 )
@@ -82,7 +81,6 @@ class RaySet:
         self.farthest_views = farthest_views
         self._photo_detail = photo_detail
         self._statistics: DisparityStatistics | None = None
-        self._soft_cells = np.zeros((0, 0, 0), np.bool_)
         self._surveying = threading.Lock()
         self._room = RayArrays(
             np.empty((capacity, 2)),
@@ -146,11 +144,7 @@ class RaySet:
         """`statistics`, cancellable: raises Cancelled once should_stop is true. Threads may ask at the same time."""
         with self._surveying:
             if self._statistics is None:
-                found = measure_disparity(self.arrays.disparity, self.farthest_views, should_stop)
-                self._soft_cells = np.empty(self.cells.low.shape, np.bool_)
-                self._soft_cells[: self.photo_images] = any_in_cells(found.soft)
-                self._soft_cells[self.photo_images :] = found.softness > SOFT_EDGE_SHARPNESS
-                self._statistics = found
+                self._statistics = measure_disparity(self.arrays.disparity, self.farthest_views, should_stop)
             return self._statistics
 
     def __len__(self) -> int:
@@ -216,14 +210,6 @@ class RaySet:
     def statistics(self) -> DisparityStatistics:
         """What lies around the rays added so far; made when first asked for after the last was added."""
         return self._statistics or self.survey()
-
-    @property
-    def soft_cells(self) -> NDArray[np.bool_]:
-        """(S, M, N): cells of rays that count as near a soft depth edge: those of the photo that do, and where edges
-        are SOFT_EDGE_SHARPNESS all that was inpainted.
-        """
-        self.survey()
-        return self._soft_cells
 
     @property
     def photo_disparity(self) -> FloatImage:

@@ -10,7 +10,6 @@ from iibr_core.ray_transformer.inference import TrainedWeights
 from iibr_core.ray_transformer.model import RayTransformer
 from iibr_core.rendering.ambiguous_rays import HYPOTHESES
 from iibr_core.rendering.candidates import find_candidates
-from iibr_core.rendering.disparity_statistics import SOFT_AROUND_PX
 from iibr_core.rendering.hypotheses import (
     BLEND_WEIGHT,
     FEATURES,
@@ -105,17 +104,16 @@ def test_no_ray_of_a_steep_surface_is_ambiguous(slope):
         assert not (np.abs(ambiguous.pixel[:, 1] - 45) < inside).any()
 
 
-def test_only_near_soft_edges_covered_rays_are_ambiguous():
-    """A map that is soft on the left and sharp on the right."""
+@pytest.mark.parametrize("softness_px", [0, 2])
+def test_rays_that_one_surface_covers_are_never_ambiguous(softness_px):
+    """However soft the edges beside them are."""
     photo, disparity = square_before_wall()
-    values = disparity.values.copy()
-    values[:, :35] = blur(values, 2)[:, :35]
-    ambiguous, weights, rays = ambiguous_of(motley(photo.size), values, offset=ViewOffset(1.0, 0.0))
-    assert 0 < rays.statistics.soft.mean() < 0.6
+    values = blur(disparity.values, softness_px) if softness_px else disparity.values
+    ambiguous, weights, _ = ambiguous_of(motley(photo.size), values)
     heavy = (weights > FAINT_WEIGHT).sum(axis=0)
-    certain = ((weights.sum(axis=0) >= 1 - FAINT_WEIGHT) & (heavy == 1))[tuple(ambiguous.pixel.T)]
-    assert certain.sum() > 30
-    assert ambiguous.pixel[certain, 1].max() < 35 + SOFT_AROUND_PX
+    is_sure = (weights.sum(axis=0) >= 1 - FAINT_WEIGHT) & (heavy == 1)
+    assert len(ambiguous.pixel) > 20
+    assert not is_sure[tuple(ambiguous.pixel.T)].any()
 
 
 def test_where_hypotheses_look_alike_nothing_is_ambiguous():
