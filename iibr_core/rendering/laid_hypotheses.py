@@ -32,7 +32,7 @@ AROUND = np.array([(ring * v, ring * u) for i, ring in enumerate(RINGS_PX) for v
 AROUND_DISTANCE = np.hypot(*AROUND.T)
 OWN_LANDING_PX = 0.75
 """What lands near by and differs from a hypothesis by less parallax than this is of its surface."""
-VISIBLE = 0.08
+VISIBLE = 0.12
 """Where the colours of a ray's hypotheses lie no farther apart than this, sRGB-encoded, nothing is to be decided."""
 INPAINTED_APART_PX = 100.0
 """What is inpainted and what the photo shows are different hypotheses, however close their disparities."""
