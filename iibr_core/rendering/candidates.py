@@ -87,7 +87,7 @@ def find_candidates(
     )
     arrays, cells = rays.arrays, rays.cells
     for k, (t, s) in enumerate(rays.to_view(offset)):
-        needed = np.argwhere(land_incoherent(cells, k, t, s, rows, splat))
+        needed = np.flatnonzero(land_incoherent(cells, k, t, s, rows, splat))
         _land_rays(arrays, k, rays.connected, rays.steep_cells(k), needed, splat, columns, s, t, found)
     _mean_disparity(found, splat)
     backward_warp(arrays.disparity[0], offset, about, found)
@@ -131,7 +131,7 @@ def _rearmost(coverage, disparity, row, column):
 
 @kernel
 def _land_rays(rays, index, connected, steep, needed, splat, columns, s, t, found):
-    """Let the rays in the needed cells (N, 2) of one source land on the cells to splat. Until `_mean_disparity`,
+    """Let the rays in the needed cells (N) of one source land on the cells to splat. Until `_mean_disparity`,
     found's disparity holds sums weighted by coverage.
 
     A footprint's overlap goes to the candidate of its surface, or starts one; where slots run out the rearmost gives
@@ -145,7 +145,7 @@ def _land_rays(rays, index, connected, steep, needed, splat, columns, s, t, foun
     same_surface = OWN_SURFACE_PX / max(abs(s), abs(t), 1e-9)
     above_cells, reach = first_row // CELL_PX, LANDING_REACH_PX / CELL_PX
     for i in range(len(needed)):
-        cell_row, cell = needed[i]
+        cell_row, cell = divmod(needed[i], steep.shape[1])
         is_steep = steep[cell_row, cell]
         for y in range(cell_row * CELL_PX, min((cell_row + 1) * CELL_PX, height)):
             for x in range(cell * CELL_PX, min((cell + 1) * CELL_PX, width)):
