@@ -32,9 +32,6 @@ MOST_CLEAR_NEIGHBOURS = 4
 """What is clearly between has at most so many neighbours on its own disparity."""
 MOST_NEIGHBOURS = (2, 4)
 """So has in other maps all that lies between, on thin things too: so many within one pixel, and within two."""
-CROWD_PX = 5
-CROWDED = 0.3
-"""Where steps are at so large a share of the pixels within CROWD_PX, as in meshes, a lone value may be a wire's."""
 
 
 def resolve_edge_band(
@@ -133,18 +130,5 @@ def _find_between_rows(values, least_edge, first, last, between):
             for v in range(max(y - 2, 0), min(y + 3, height)):
                 for u in range(max(x - 2, 0), min(x + 3, width)):
                     neighbours += abs(values[v, u] - values[y, x]) <= least_edge
-            between[y, x] = neighbours <= MOST_NEIGHBOURS[1] and not _is_crowded(values, y, x, least_edge)
+            between[y, x] = neighbours <= MOST_NEIGHBOURS[1]
     return clear
-
-
-@kernel
-def _is_crowded(values, y, x, least_edge):
-    """Whether a pixel has depth edges all around it."""
-    height, width = values.shape
-    steps, places = 0, 0
-    for v in range(max(y - CROWD_PX, 0), min(y + CROWD_PX, height - 2) + 1):
-        for u in range(max(x - CROWD_PX, 0), min(x + CROWD_PX, width - 2) + 1):
-            right, down = abs(values[v, u + 1] - values[v, u]), abs(values[v + 1, u] - values[v, u])
-            steps += right > least_edge or down > least_edge
-            places += 1
-    return steps >= CROWDED * places

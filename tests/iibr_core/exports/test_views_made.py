@@ -36,7 +36,6 @@ CASES: list[tuple[str, dict[str, Any], float, int]] = [
     ("gif", {"motion": "focus", **FEW}, 2.5, OF_A_LENS),
     ("gif", {"motion": "aperture", **FEW}, 2.5, OF_A_LENS),
     ("focal-stack", FEW, 2.5, OF_A_LENS),
-    ("focal-stack-exr", FEW, 2.5, OF_A_LENS),
     ("aperture-sweep", FEW, 0.0, 24),
     ("epi", {}, 0.0, OF_A_ROW),
     ("point-cloud", {}, 0.0, 4),
