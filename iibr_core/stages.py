@@ -36,12 +36,6 @@ class Stages:
     """What covers a pixel in part is laid over what was inpainted behind it."""
     ray_transformer: bool = True
     """Where several surfaces contest a ray, the ray transformer decides; else closed form. Quality "fast" has none."""
-    reopen_holes: bool = True
-    """What was inpainted behind one of the photo's surfaces does not show through a hole in that surface."""
-    lines_into_gaps: bool = True
-    """Lines go straight on into what is inpainted."""
-    median_in_gaps: bool = True
-    """Inpainted disparities are the median of those around them."""
     smooth_gaps: bool = True
     """Inpainted colours get smoother the farther they are from what is known."""
     synthesise_patches: bool = True

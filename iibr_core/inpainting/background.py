@@ -12,29 +12,18 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.inpainting.border_lines import find_lines, line_weight, mixed_beside
 from iibr_core.inpainting.inpainter import Inpainter
-from iibr_core.inpainting.nearest_known import (
-    MOST_PIECE_PIXELS,
-    flat_indices,
-    hole_borders,
-    nearest_known,
-    number_pixels,
-)
-from iibr_core.inpainting.patch_synthesis import copy_patches
+from iibr_core.inpainting.nearest_known import MOST_PIECE_PIXELS, flat_indices, nearest_known, number_pixels
+from iibr_core.inpainting.patch_synthesis import copy_patches, mixed_beside
 from iibr_core.runtime.jit import kernel, nearest_pixel
 from iibr_core.runtime.tiling import ShouldStop, in_pieces, never, pieces_of
 from iibr_core.stages import ALL_STAGES, Stages
-from iibr_core.types import FloatImage, ViewOffset, image_size
+from iibr_core.types import FloatImage, ViewOffset
 
 SMOOTH_STEPS_PX = (1, 2, 4, 8, 16, 32)
 """Colours are averaged over ever wider surroundings, as far as what is known is farther away."""
-MEDIAN_PX = 2
-"""Disparities follow the most of their surroundings, so far each way: a lone one would fly off in the next view."""
 SURFACE_PX = 2.0
 """Surfaces that part by less than this are one."""
-ALONG_LINES = 30.0
-"""A seed counts so many times more along a line, see `line_weight`."""
 HIDDEN_PX = 0.5
 """Something hides a surface if it lands at least this far from it."""
 
@@ -52,10 +41,9 @@ def fill_background(
     """Fill the holes of a view in place: colors (H, W, 3), disparity (H, W) where hole (H, W) is True.
 
     photo_disparity: the centre view's. Of the nearest known pixels in sixteen directions those count that are possible
-    there, weighted by 1 / distance, more along the lines that run there. The colour is their mean, smoother the farther
-    away they are, and gets their surface's fine texture. The disparity is that of one surface, the one with the most
-    weight: a mean of several would lie on none. A view that is all hole stays as it is. stages: that are on. Raises
-    Cancelled once should_stop is true.
+    there, weighted by 1 / distance. The colour is their mean, smoother the farther away they are, and gets their
+    surface's fine texture. The disparity is that of one surface, the one with the most weight: a mean of several would
+    lie on none. A view that is all hole stays as it is. stages: that are on. Raises Cancelled once should_stop is true.
     """
     _fill_view(colors, disparity, hole, photo_disparity, offset, max(map(abs, offset)), should_stop, threads, stages)
 
@@ -76,29 +64,6 @@ def continue_farthest(
     _fill_view(colors, disparity, hole, nothing_hides, ViewOffset(0.0, 0.0), farthest_views, should_stop, 1, stages)
 
 
-def goes_on_in_front(
-    disparity: FloatImage,
-    hole: NDArray[np.bool_],
-    photo_disparity: FloatImage,
-    offset: ViewOffset,
-    should_stop: ShouldStop = never,
-    threads: int = 1,
-) -> NDArray[np.bool_]:
-    """(H, W): where in a hole (H, W) of a view most of what may continue there from around it is in front of the view's
-    disparity (H, W) there. Raises Cancelled once should_stop is true.
-    """
-    pixels = flat_indices(hole, should_stop, threads)
-    known = nearest_known(hole, pixels, should_stop, threads)
-    in_front, one_surface = np.zeros_like(hole), SURFACE_PX / max(*map(abs, offset), 1e-9)
-    in_pieces(
-        lambda part: _weigh_in_front(
-            disparity, pixels[part], known[part], photo_disparity, offset.s, offset.t, one_surface, in_front
-        ),
-        pieces_of(len(pixels), MOST_PIECE_PIXELS), should_stop, threads,
-    )  # fmt: skip
-    return in_front
-
-
 def _fill_view(
     colors: FloatImage,
     disparity: FloatImage,
@@ -114,34 +79,27 @@ def _fill_view(
     one_surface = SURFACE_PX / max(parallax, 1e-9)
     pixels = flat_indices(hole, should_stop, threads)
     known = nearest_known(hole, pixels, should_stop, threads)
-    borders, number = hole_borders(known, image_size(hole), should_stop, threads)
-    pure = np.where(mixed_beside(hole), np.float32(np.nan), disparity)
-    lines = np.zeros((len(borders), 2), np.float32)
     reach, changed = np.empty(len(pixels), np.float32), np.empty((len(pixels), 3), np.float32)
 
-    def run(step: Callable[[slice], None], count: int = len(pixels)) -> None:
-        in_pieces(step, pieces_of(count, MOST_PIECE_PIXELS), should_stop, threads)
+    def run(step: Callable[[slice], None]) -> None:
+        in_pieces(step, pieces_of(len(pixels), MOST_PIECE_PIXELS), should_stop, threads)
 
     def smooth(step_px: int) -> None:
         run(lambda part: _smooth(colors, hole, pixels[part], reach[part], step_px, changed[part]))
         # Only when all is computed: neighbours are taken as they were before a step, not after it.
         run(lambda part: _write_colors(changed[part], pixels[part], colors))
 
-    if stages.lines_into_gaps:
-        run(lambda part: find_lines(colors, disparity, pure, borders[part], one_surface, lines[part]), len(borders))
     run(
         lambda part: _fill(
-            colors, disparity, pixels[part], known[part], number, lines,
-            photo_disparity, offset.s, offset.t, one_surface, reach[part],
+            colors, disparity, pixels[part], known[part], photo_disparity, offset.s, offset.t, one_surface, reach[part],
         ),
     )  # fmt: skip
-    if stages.median_in_gaps:
-        run(lambda part: _agree(disparity, hole, pixels[part], changed[part]))
-        np.put(disparity, pixels, changed[:, 0])
     for step_px in SMOOTH_STEPS_PX if stages.smooth_gaps else ():
         smooth(step_px)
     if stages.synthesise_patches:
+        number = np.empty(hole.shape, np.int32)
         number_pixels(pixels, number)
+        pure = np.where(mixed_beside(hole), np.float32(np.nan), disparity)
         copy_patches(colors, disparity, pure, pixels, number, one_surface, should_stop, threads)
 
 
@@ -152,7 +110,7 @@ def background_inpainter() -> Inpainter:
 
 @kernel
 def _fill(
-    colors, disparity, pixels, known, number, lines, photo_disparity, s, t, one_surface, reach,
+    colors, disparity, pixels, known, photo_disparity, s, t, one_surface, reach,
 ):  # fmt: skip
     """What `fill_background` says; and how far away the nearest known pixel is, reach (N,)."""
     height, width = disparity.shape
@@ -172,15 +130,12 @@ def _fill(
             nearest = min(nearest, distance)
             surface[k] = d = disparity[known_y, known_x]
             farthest = min(farthest, d)
-            border = number[known_y, known_x]
-            along = line_weight(lines[border, 0], lines[border, 1], known_y - y, known_x - x)
-            likely = (1.0 + ALONG_LINES * along) / distance
             place = _place_in_photo(y + d * t, x + d * s, height, width)
             if place < 0 or photo[place] - d > hidden:
-                weight[k] = likely
+                weight[k] = 1.0 / distance
                 any_possible = True
             else:
-                weight[k] = -likely
+                weight[k] = -1.0 / distance
         reach[i] = nearest
         # Where nothing is possible (the disparity contradicts itself), the farthest is the likeliest.
         for k in range(directions):
@@ -227,43 +182,6 @@ def _place_in_photo(y, x, height, width):
     """
     row, column = nearest_pixel(y), nearest_pixel(x)
     return row * width + column if 0 <= column < width and 0 <= row < height else -1
-
-
-@kernel
-def _weigh_in_front(disparity, pixels, known, photo_disparity, s, t, one_surface, in_front):
-    """Write `goes_on_in_front` for these pixels."""
-    height, width = disparity.shape
-    photo, hidden = photo_disparity.ravel(), one_surface * HIDDEN_PX / SURFACE_PX
-    for i in range(len(pixels)):
-        y, x = pixels[i] // width, pixels[i] % width
-        balance = 0.0
-        for k in range(known.shape[1]):
-            if known[i, k] < 0:
-                continue
-            # As in `_fill`, but for lines.
-            known_y, known_x = known[i, k] // width, known[i, k] % width
-            d = disparity[known_y, known_x]
-            place = _place_in_photo(y + d * t, x + d * s, height, width)
-            if place < 0 or photo[place] - d > hidden:
-                likely = 1.0 / np.sqrt((known_x - x) ** 2 + (known_y - y) ** 2)
-                balance += likely if d > disparity[y, x] + one_surface else -likely
-        in_front[y, x] = balance > 0.0
-
-
-@kernel
-def _agree(disparity, hole, pixels, agreed):
-    """The median of what was filled within MEDIAN_PX each way, as agreed[:, 0]."""
-    height, width = disparity.shape
-    around = np.empty((2 * MEDIAN_PX + 1) ** 2, np.float32)
-    for i in range(len(pixels)):
-        y, x = pixels[i] // width, pixels[i] % width
-        count = 0
-        for v in range(max(y - MEDIAN_PX, 0), min(y + MEDIAN_PX + 1, height)):
-            for u in range(max(x - MEDIAN_PX, 0), min(x + MEDIAN_PX + 1, width)):
-                if hole[v, u]:
-                    around[count] = disparity[v, u]
-                    count += 1
-        agreed[i, 0] = np.sort(around[:count])[(count - 1) // 2]
 
 
 @kernel

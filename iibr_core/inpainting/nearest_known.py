@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.runtime.jit import kernel
-from iibr_core.runtime.tiling import ShouldStop, in_bands, in_pieces, pieces_of, raise_if_stopped
-from iibr_core.types import ImageSize, image_size
+from iibr_core.runtime.tiling import ShouldStop, in_bands, in_pieces, raise_if_stopped
+from iibr_core.types import image_size
 
 DIRECTIONS = np.array(
     [
@@ -45,21 +45,6 @@ def nearest_known(
     return known
 
 
-def hole_borders(
-    known: NDArray[np.int64], size: ImageSize, should_stop: ShouldStop, threads: int
-) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
-    """The flat indices (M,) that occur in known (N, 16), ascending, and the number (H, W) of each among them, which
-    means nothing elsewhere.
-    """
-    is_border, number = np.zeros(size, np.bool_), np.empty(size, np.int32)
-    parts = pieces_of(len(known), MOST_PIECE_PIXELS)
-    in_pieces(lambda part: _mark(known[part], is_border), parts, should_stop, threads)
-    borders = flat_indices(is_border, should_stop, threads)
-    raise_if_stopped(should_stop)
-    _number(borders, number)
-    return borders, number
-
-
 def number_pixels(pixels: NDArray[np.int64], number: NDArray[np.int32]) -> None:
     """Write to number (H, W) which one of these pixels (N,) each of them is; -1 elsewhere."""
     number[:] = -1
@@ -72,15 +57,6 @@ def _number(pixels, number):
     width = number.shape[1]
     for i in range(len(pixels)):
         number[pixels[i] // width, pixels[i] % width] = i
-
-
-@kernel
-def _mark(known, is_border):
-    width = is_border.shape[1]
-    for i in range(len(known)):
-        for pixel in known[i]:
-            if pixel >= 0:
-                is_border[pixel // width, pixel % width] = True
 
 
 @kernel

@@ -1,18 +1,17 @@
 """The photo continued beyond its frame, once, so that all views show the same there.
 
-The nearest surface of the frame goes on, and lines go straight on. Other colours are those that a surface has there,
-averaged along the frame ever wider the farther out: who can tell which of them goes on. They get the fine texture of
-what lies as far inside.
+The nearest surface of the frame goes on, and lines go straight on (coherence transport, Bornemann & Maerz, 2007). Other
+colours are those that a surface has there, averaged along the frame ever wider the farther out: who can tell which of
+them goes on. They get the fine texture of what lies as far inside.
 """
 
 from __future__ import annotations
 
-from math import hypot, log2
+from math import hypot, log2, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.inpainting.border_lines import find_lines, line_weight
 from iibr_core.runtime.jit import kernel, nearest_pixel
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never
 from iibr_core.stages import ALL_STAGES, Stages
@@ -28,6 +27,12 @@ TEXTURE_SHARE, TEXTURE_PX = 0.6, 16.0
 """So much of the photo's texture is seen far beyond its frame, half of that at this distance: its place there is a
 guess, and close to the frame nobody misses it.
 """
+LINE_REACH_PX = 5
+"""Lines are found in 11 x 11 pixels."""
+STRENGTH_POWER, ANGLE_POWER = 2, 16
+"""Lines count by their strength, and by the cosine of the angle off them, to these powers."""
+LINE_NOISE = 0.01
+"""Steps between neighbouring pixels, standard deviation, that make no line."""
 SLANT, PLACES = 2.0, 12
 """Lines are followed from so many places each way on the frame, from up to SLANT times as far as the frame is."""
 
@@ -51,7 +56,7 @@ def outpaint(
     frame = _frame_pixels(size)
     means = _means_along_frame(colors.reshape(-1, 3)[frame], max(margins))
     lines = np.empty((len(frame), 2), np.float32)
-    find_lines(colors, disparity, disparity, frame, np.inf, lines)
+    _find_lines(colors, frame, lines)
 
     def band(first: int, last: int) -> None:
         _extend_rows(colors, disparity, means, margins.top, margins.left, first, last, grown, surfaces)
@@ -139,6 +144,44 @@ def _extend_rows(colors, disparity, means, top, left, first, last, grown, surfac
 
 
 @kernel
+def _find_lines(colors, pixels, lines):
+    """Write lines (N, 2) at these pixels, flat indices (N,): (cos 2a, sin 2a), a the angle at which colours change the
+    least; as long as they change across that line only, 0 where no way differs from others.
+    """
+    height, width, _ = colors.shape
+    for i in range(len(pixels)):
+        y, x = pixels[i] // width, pixels[i] % width
+        # The structure tensor, summed over colours, along the diagonals of 2 x 2 pixels: unlike steps to the right and
+        # down, those are of one place.
+        falls = both = rises = 0.0
+        for v in range(max(y - LINE_REACH_PX, 0), min(y + LINE_REACH_PX + 1, height - 1)):
+            for u in range(max(x - LINE_REACH_PX, 0), min(x + LINE_REACH_PX + 1, width - 1)):
+                for c in range(3):
+                    # Squares of huge colours are beyond single precision.
+                    falling = np.float64(colors[v + 1, u + 1, c] - colors[v, u, c])
+                    rising = np.float64(colors[v, u + 1, c] - colors[v + 1, u, c])
+                    falls += falling * falling
+                    both += falling * rising
+                    rises += rising * rising
+        # Turned by 45 degrees, xx + yy = (falls + rises) / 2, yy - xx = -both, 4 xy = falls - rises. The eigenvalues
+        # differ by sqrt((xx - yy)^2 + 4 xy^2); the line runs across the larger one's direction.
+        total = 0.5 * (falls + rises) + 3 * (2 * LINE_REACH_PX + 1) ** 2 * LINE_NOISE**2
+        lines[i, 0], lines[i, 1] = -both / total, 0.5 * (rises - falls) / total
+
+
+@kernel
+def _line_weight(line_cos, line_sin, down, across):
+    """How well the way (down, across) runs along one of those lines, 0 to 1."""
+    strength = sqrt(line_cos * line_cos + line_sin * line_sin)
+    if strength == 0.0:
+        return 0.0
+    # cos(2 angle), the angle between the line and the way.
+    squared = float(down * down + across * across)
+    double = (line_cos * (across * across - down * down) + line_sin * 2.0 * across * down) / (strength * squared)
+    return strength**STRENGTH_POWER * max(0.5 + 0.5 * double, 0.0) ** (ANGLE_POWER // 2)
+
+
+@kernel
 def _follow_lines(height, width, frame, means, lines, top, left, first, last, grown):
     """Of rows [first, last): where lines of the frame lead, they show instead, the more so the straighter they do."""
     for row in range(first, last):
@@ -156,7 +199,7 @@ def _follow_lines(height, width, frame, means, lines, top, left, first, last, gr
             for j in range(-PLACES, PLACES + 1):
                 n = nearest_pixel(place + j * step) % len(frame)
                 down, across = row - top - frame[n] // width, column - left - frame[n] % width
-                weight = line_weight(lines[n, 0], lines[n, 1], down, across) * away / hypot(down, across)
+                weight = _line_weight(lines[n, 0], lines[n, 1], down, across) * away / hypot(down, across)
                 total += weight
                 red += weight * (means[k, n, 0] + part * (means[k + 1, n, 0] - means[k, n, 0]))
                 green += weight * (means[k, n, 1] + part * (means[k + 1, n, 1] - means[k, n, 1]))

@@ -35,6 +35,21 @@ FINE_TEXTURE_PX = 5
 """Texture is what differs from the mean so far around."""
 PATCH_BLOCK_PX = 64
 """Blocks of this side are filled side by side; no two that touch."""
+MIXED_PX = 2
+"""Colours this close to a hole may be mixed with those of what hides it."""
+
+
+def mixed_beside(hole: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """The hole (H, W) and what is MIXED_PX from it at most, across, down or both."""
+    tall = hole.copy()
+    for k in range(1, MIXED_PX + 1):
+        tall[k:] |= hole[:-k]
+        tall[:-k] |= hole[k:]
+    mixed = tall.copy()
+    for k in range(1, MIXED_PX + 1):
+        mixed[:, k:] |= tall[:, :-k]
+        mixed[:, :-k] |= tall[:, k:]
+    return mixed
 
 
 def copy_patches(

@@ -1,58 +1,17 @@
 import numpy as np
 import pytest
 
-from iibr_core.inpainting.background import (
-    ALONG_LINES,
-    HIDDEN_PX,
-    MEDIAN_PX,
-    SMOOTH_STEPS_PX,
-    SURFACE_PX,
-    fill_background,
-    goes_on_in_front,
-)
-from iibr_core.inpainting.border_lines import ANGLE_POWER, LINE_NOISE, LINE_REACH_PX, MIXED_PX, STRENGTH_POWER
+from iibr_core.inpainting.background import HIDDEN_PX, SMOOTH_STEPS_PX, SURFACE_PX, fill_background
 from iibr_core.inpainting.nearest_known import DIRECTIONS
+from iibr_core.inpainting.patch_synthesis import MIXED_PX
 from iibr_core.types import ViewOffset
 from tests.iibr_core.inpainting.test_patch_synthesis import copy_slowly
-
-
-def own_surface(disparity, hole, pixel, one_surface):
-    return ~hole & (np.abs(disparity - disparity[pixel]) <= one_surface)
-
-
-def line_slowly(colors, own, pixel):
-    """(cos 2a, sin 2a) of the way a line runs at a pixel, of length 1 if nothing else does."""
-    tensor = np.zeros((2, 2))
-    for v, u in np.ndindex(own.shape[0] - 1, own.shape[1] - 1):
-        if max(abs(v - pixel[0]), abs(u - pixel[1])) <= LINE_REACH_PX and own[v : v + 2, u : u + 2].all():
-            square = colors[v : v + 2, u : u + 2].astype(float)
-            steps = np.stack([np.diff(square, axis=1).mean((0, 1)), np.diff(square, axis=0).mean((0, 1))])
-            tensor += steps @ steps.T
-    (least, most), axes = np.linalg.eigh(tensor)
-    angle = np.arctan2(axes[1, 0], axes[0, 0])
-    strength = (most - least) / (least + most + 3 * (2 * LINE_REACH_PX + 1) ** 2 * LINE_NOISE**2)
-    return strength * np.array([np.cos(2 * angle), np.sin(2 * angle)])
 
 
 def mixed_slowly(hole):
     """(H, W): what has a hole's pixel MIXED_PX beside it, or nearer."""
     around = [slice(max(k - MIXED_PX, 0), k + MIXED_PX + 1) for k in range(max(hole.shape))]
     return np.array([[hole[around[y], around[x]].any() for x in range(hole.shape[1])] for y in range(hole.shape[0])])
-
-
-def along_line(line, way):
-    """How well a way (x, y) runs along it."""
-    angle = np.arctan2(way[1], way[0]) - np.arctan2(line[1], line[0]) / 2
-    return np.hypot(*line) ** STRENGTH_POWER * np.cos(angle) ** ANGLE_POWER
-
-
-def agree_slowly(disparity, hole):
-    agreed = disparity.copy()
-    for y, x in np.argwhere(hole):
-        block = np.s_[max(y - MEDIAN_PX, 0) : y + MEDIAN_PX + 1, max(x - MEDIAN_PX, 0) : x + MEDIAN_PX + 1]
-        around = np.sort(disparity[block][hole[block]])
-        agreed[y, x] = around[(len(around) - 1) // 2]
-    return agreed
 
 
 def smooth_slowly(colors, hole, reach, step):
@@ -95,10 +54,7 @@ def fill_slowly(colors, disparity, hole, photo_disparity, offset):
         chosen = possible or [(u, v) for u, v in seen if disparity[v, u] <= farthest]
         if chosen:
             reach[y, x] = min(np.hypot(u - x, v - y) for u, v in seen)
-            clean = [own_surface(disparity, hole, (v, u), one_surface) & ~mixed for u, v in chosen]
-            lines = [line_slowly(colors, own, (v, u)) for own, (u, v) in zip(clean, chosen)]
-            w = [1 / np.hypot(u - x, v - y) for u, v in chosen]
-            w *= np.array([1 + ALONG_LINES * along_line(line, (u - x, v - y)) for line, (u, v) in zip(lines, chosen)])
+            w = np.array([1 / np.hypot(u - x, v - y) for u, v in chosen])
             d = np.array([disparity[v, u] for u, v in chosen])
             filled_colors[y, x] = sum(k * colors[v, u] for k, (u, v) in zip(w, chosen)) / w.sum()
             alike = np.abs(d[:, None] - d) <= one_surface
@@ -106,8 +62,7 @@ def fill_slowly(colors, disparity, hole, photo_disparity, offset):
             filled_disparity[y, x] = (w * d)[mine].sum() / w[mine].sum()
     for step in SMOOTH_STEPS_PX:
         filled_colors = smooth_slowly(filled_colors, hole, reach, step)
-    agreed = agree_slowly(filled_disparity, hole)
-    return copy_slowly(filled_colors, agreed, hole, mixed, one_surface), agreed
+    return copy_slowly(filled_colors, filled_disparity, hole, mixed, one_surface), filled_disparity
 
 
 @pytest.mark.parametrize("contrast", [1.0, 0.15])
@@ -124,26 +79,6 @@ def test_agrees_with_a_slow_twin(contrast):
     fill_background(colors, disparity, hole, photo_disparity, offset)
     assert colors == pytest.approx(expected_colors, abs=1e-5)
     assert disparity == pytest.approx(expected_disparity, abs=1e-5)
-
-
-def test_what_goes_on_in_front_is_weighed_like_a_slow_twin():
-    random = np.random.default_rng(4)
-    size = (27, 31)
-    disparity = random.choice([0.0, 2.0, 3.0], size).astype(np.float32)
-    photo_disparity = random.choice([0.0, 2.5, 4.0], size).astype(np.float32)
-    hole = random.random(size) < 0.1
-    hole[5:12, 12:] = True
-    offset = ViewOffset(1.0, -2.0)
-    expected = np.zeros(size, bool)
-    for y, x in np.argwhere(hole):
-        balance = 0.0
-        for u, v in around_slowly(hole, y, x):
-            if is_possible(float(disparity[v, u]), photo_disparity, offset, y, x):
-                in_front = disparity[v, u] > disparity[y, x] + SURFACE_PX / 2
-                balance += (1 if in_front else -1) / np.hypot(u - x, v - y)
-        expected[y, x] = balance > 0
-    assert expected.any()
-    np.testing.assert_array_equal(goes_on_in_front(disparity, hole, photo_disparity, offset), expected)
 
 
 def test_a_disocclusion_takes_the_background_not_what_hid_it():
@@ -189,20 +124,6 @@ def test_a_view_that_is_all_hole_stays_and_stays_finite():
     fill_background(colors, disparity, np.ones((5, 6), bool), disparity, ViewOffset(50.0, 50.0))
     assert colors.max() == 0
     assert np.isfinite(disparity).all()
-
-
-def test_a_line_goes_on_straight():
-    disparity = np.full((60, 90), 12.0, np.float32)
-    y, x = np.indices((60, 90))
-    truth = np.exp(-(((y - 5 - x / 2) / 4) ** 2))[..., None].repeat(3, axis=2).astype(np.float32)
-    hole = x >= 78
-    colors = np.where(hole[..., None], np.float32(0.5), truth)
-    fill_background(colors, disparity, hole, disparity, ViewOffset(0.0, 1.0))
-    found, expected = colors[:, 83, 0], truth[:, 83, 0]
-    middle, true_middle = (np.flatnonzero(line > line.max() / 2).mean() for line in (found, expected))
-    assert abs(middle - true_middle) <= 1
-    assert found.max() > 0.6
-    assert found[expected < 0.01].max() < 0.2
 
 
 def test_holes_get_the_texture_of_what_lies_behind_and_none_where_that_is_smooth():

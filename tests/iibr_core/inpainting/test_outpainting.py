@@ -6,9 +6,13 @@ import pytest
 from iibr_core.generation.outer_views import outer_views_of_grid, outpainting_margins
 from iibr_core.generation.update_loop import complete_ray_set
 from iibr_core.inpainting.outpainting import (
+    ANGLE_POWER,
+    LINE_NOISE,
+    LINE_REACH_PX,
     LINES_PX,
     PLACES,
     SLANT,
+    STRENGTH_POWER,
     TEXTURE_PX,
     TEXTURE_SHARE,
     _level,
@@ -18,7 +22,6 @@ from iibr_core.rendering.photo_rays import rays_of_photo
 from iibr_core.rendering.view_synthesis import ViewSynthesis
 from iibr_core.runtime.tiling import Cancelled
 from iibr_core.types import GridShape, ImageSize, Margins, ViewOffset
-from tests.iibr_core.inpainting.test_background import along_line, line_slowly
 from tests.iibr_core.scenes import smooth_texture
 
 SIZE = ImageSize(24, 36)
@@ -34,6 +37,26 @@ def mean_at(means, level, place):
     return means[k][place] * (k + 1 - level) + means[k + 1][place] * (level - k)
 
 
+def line_slowly(colors, pixel):
+    """(cos 2a, sin 2a) of the way a line runs at a pixel, of length 1 if nothing else does."""
+    tensor = np.zeros((2, 2))
+    for v, u in np.ndindex(colors.shape[0] - 1, colors.shape[1] - 1):
+        if max(abs(v - pixel[0]), abs(u - pixel[1])) <= LINE_REACH_PX:
+            square = colors[v : v + 2, u : u + 2].astype(float)
+            steps = np.stack([np.diff(square, axis=1).mean((0, 1)), np.diff(square, axis=0).mean((0, 1))])
+            tensor += steps @ steps.T
+    (least, most), axes = np.linalg.eigh(tensor)
+    angle = np.arctan2(axes[1, 0], axes[0, 0])
+    strength = (most - least) / (least + most + 3 * (2 * LINE_REACH_PX + 1) ** 2 * LINE_NOISE**2)
+    return strength * np.array([np.cos(2 * angle), np.sin(2 * angle)])
+
+
+def along_line(line, way):
+    """How well a way (x, y) runs along it."""
+    angle = np.arctan2(way[1], way[0]) - np.arctan2(line[1], line[0]) / 2
+    return np.hypot(*line) ** STRENGTH_POWER * np.cos(angle) ** ANGLE_POWER
+
+
 def extend_slowly(colors, disparity, margins):
     """The same, pixel by pixel, from the definitions."""
     height, width = disparity.shape
@@ -43,8 +66,7 @@ def extend_slowly(colors, disparity, margins):
     for k in range(12):
         last = means[-1]
         means.append(last / 2 + np.roll(last, 2**k, 0) / 4 + np.roll(last, -(2**k), 0) / 4)
-    own = np.ones(disparity.shape, bool)
-    lines = [line_slowly(colors, own, at) for at in places]
+    lines = [line_slowly(colors, at) for at in places]
     kernel = np.outer([1, 4, 6, 4, 1], [1, 4, 6, 4, 1]) / 256
     around = np.pad(colors, ((2, 2), (2, 2), (0, 0)), "edge").astype(np.float64)
     grown = np.empty((*margins.around(SIZE), 3))
