@@ -14,13 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.rendering.coherent_cells import (
-    LANDING_REACH_PX,
-    backward_warp,
-    cells_in,
-    find_coherent_cells,
-    land_incoherent,
-)
+from iibr_core.rendering.coherent_cells import backward_warp, cells_in, find_coherent_cells, land_incoherent
 from iibr_core.rendering.ray_cells import CELL_PX
 from iibr_core.rendering.ray_set import OWN_SURFACE_PX, RaySet
 from iibr_core.rendering.slope_connectivity import BELOW, RIGHT
@@ -88,7 +82,7 @@ def find_candidates(
     arrays, cells = rays.arrays, rays.cells
     for k, (t, s) in enumerate(rays.to_view(offset)):
         needed = np.flatnonzero(land_incoherent(cells, k, t, s, rows, splat))
-        _land_rays(arrays, k, rays.connected, rays.steep_cells(k), needed, splat, columns, s, t, found)
+        _land_rays(arrays, k, rays.connected, rays.steep_cells(k), needed, columns, s, t, found)
     _mean_disparity(found, splat)
     backward_warp(arrays.disparity[0], offset, about, found)
     return found
@@ -130,9 +124,9 @@ def _rearmost(coverage, disparity, row, column):
 
 
 @kernel
-def _land_rays(rays, index, connected, steep, needed, splat, columns, s, t, found):
-    """Let the rays in the needed cells (N) of one source land on the cells to splat. Until `_mean_disparity`,
-    found's disparity holds sums weighted by coverage.
+def _land_rays(rays, index, connected, steep, needed, columns, s, t, found):
+    """Let the rays in the needed cells (N) of one source land; what that does to smooth cells, `backward_warp` writes
+    over. Until `_mean_disparity`, found's disparity holds sums weighted by coverage.
 
     A footprint's overlap goes to the candidate of its surface, or starts one; where slots run out the rearmost gives
     way.
@@ -143,7 +137,6 @@ def _land_rays(rays, index, connected, steep, needed, splat, columns, s, t, foun
     height = len(ray_disparity)
     # The same as a difference of disparities.
     same_surface = OWN_SURFACE_PX / max(abs(s), abs(t), 1e-9)
-    above_cells, reach = first_row // CELL_PX, LANDING_REACH_PX / CELL_PX
     for i in range(len(needed)):
         cell_row, cell = divmod(needed[i], steep.shape[1])
         is_steep = steep[cell_row, cell]
@@ -155,12 +148,6 @@ def _land_rays(rays, index, connected, steep, needed, splat, columns, s, t, foun
                     continue
                 d = ray_disparity[y, x]
                 landed_x, landed_y = x - d * s, y - d * t
-                # Only beside what is smooth, unless a steep surface may stretch the ray.
-                if not (
-                    is_steep
-                    or _touches_any(splat, (landed_y + 0.5) / CELL_PX - above_cells, (landed_x + 0.5) / CELL_PX, reach)
-                ):
-                    continue
                 to_left, to_right = max(x - 1, 0), min(x + 1, width - 1)
                 above, below = max(y - 1, 0), min(y + 1, height - 1)
                 is_connected, tolerance, slope_x, slope_y = False, same_surface, 0.0, 0.0
@@ -232,19 +219,6 @@ def _land_rays(rays, index, connected, steep, needed, splat, columns, s, t, foun
                         coverage[slot, row, column] = overlap
                         disparity[slot, row, column] = overlap * d_here
                         source[slot, row, column] = index
-
-
-@kernel
-def _touches_any(splat, row, column, reach):
-    """Whether any of the cells within reach of a position, all in cells, is to be splatted."""
-    rows, columns = splat.shape
-    if not (row + reach >= 0 and row - reach < rows and column + reach >= 0 and column - reach < columns):
-        return False
-    for v in range(int(max(row - reach, 0.0)), int(min(row + reach, rows - 1.0)) + 1):
-        for u in range(int(max(column - reach, 0.0)), int(min(column + reach, columns - 1.0)) + 1):
-            if splat[v, u]:
-                return True
-    return False
 
 
 @kernel
