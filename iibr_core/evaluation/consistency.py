@@ -16,10 +16,9 @@ from scipy.ndimage import gaussian_filter, map_coordinates, maximum_filter, mini
 
 from iibr_core.generation.outer_views import outer_views
 from iibr_core.rendering.rendered_view import RenderedView
+from iibr_core.surfaces import SAME_SURFACE_PX, step_of
 from iibr_core.types import FloatImage, ViewOffset
 
-SAME_SURFACE_PX = 0.5
-"""Disparities that land closer than this in the other view are one surface."""
 LINE_VIEWS = 9
 WINDOW_PX = 2.0
 LEAST_TEXTURE = 1e-4
@@ -83,7 +82,7 @@ def disagreement(
     in both. Pixels near edges, and those inpainted in one view only, are left out.
     """
     t, s = other_at.t - at.t, other_at.s - at.s
-    tolerance = SAME_SURFACE_PX / max(abs(t), abs(s), 1e-9)
+    tolerance = step_of(SAME_SURFACE_PX, max(abs(t), abs(s)))
     y, x = np.nonzero(_inside_a_surface(one.disparity, tolerance))
     d = one.disparity[y, x]
     there = np.stack([y - d * t, x - d * s]).astype(np.float64)
@@ -108,7 +107,7 @@ def line_straightness(photo: FloatImage, disparity: FloatImage, row: Sequence[Li
     slope = np.gradient(photo.mean(axis=2), axis=1) if photo.shape[1] > 1 else np.zeros(photo.shape[:2])
     texture = gaussian_filter(slope**2, WINDOW_PX)
     for view in row:
-        tolerance = SAME_SURFACE_PX / abs(view.s)
+        tolerance = step_of(SAME_SURFACE_PX, abs(view.s))
         there = np.stack([y, x - disparity * view.s])
         inside = (there[1] >= 1) & (there[1] <= photo.shape[1] - 2)
         seen = np.abs(map_coordinates(view.disparity, there, order=0, mode="nearest") - disparity) < tolerance

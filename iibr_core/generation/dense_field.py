@@ -25,9 +25,10 @@ from iibr_core.generation.stored_views import encode_for_storage
 from iibr_core.inpainting.background import fill_background
 from iibr_core.inpainting.inpainter import Inpainter
 from iibr_core.rendering.photo_rays import rays_of_photo
-from iibr_core.rendering.ray_set import OWN_SURFACE_PX, RaySet
+from iibr_core.rendering.ray_set import RaySet
 from iibr_core.rendering.renderer import Renderer, open_renderer
 from iibr_core.runtime.tiling import Cancelled, ShouldStop, never
+from iibr_core.surfaces import SAME_SURFACE_PX, step_of
 from iibr_core.types import (
     FloatImage,
     GridShape,
@@ -189,7 +190,7 @@ class _ViewsBetween:
         if view.hole.any():
             if self._inpainted is None:
                 size = image_size(view.disparity)
-                rays = RaySet(MOST_COMPLETING, size, OWN_SURFACE_PX / self._farthest, self._farthest)
+                rays = RaySet(MOST_COMPLETING, size, step_of(SAME_SURFACE_PX, self._farthest), self._farthest)
                 self._inpainted = offset, rays
             origin, rays = self._inpainted
             disparity = np.where(view.hole, view.disparity, np.float32(np.nan))

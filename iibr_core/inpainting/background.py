@@ -18,14 +18,11 @@ from iibr_core.inpainting.patch_synthesis import copy_patches, mixed_beside
 from iibr_core.runtime.jit import kernel, nearest_pixel
 from iibr_core.runtime.tiling import ShouldStop, in_pieces, never, pieces_of
 from iibr_core.stages import ALL_STAGES, Stages
+from iibr_core.surfaces import SAME_SURFACE_PX, WIDE_EDGE_PX, is_in_front, same_surface, step_of
 from iibr_core.types import FloatImage, ViewOffset
 
 SMOOTH_STEPS_PX = (1, 2, 4, 8, 16, 32)
 """Colours are averaged over ever wider surroundings, as far as what is known is farther away."""
-SURFACE_PX = 2.0
-"""Surfaces that part by less than this are one."""
-HIDDEN_PX = 0.5
-"""Something hides a surface if it lands at least this far from it."""
 
 
 def fill_background(
@@ -58,7 +55,7 @@ def continue_farthest(
 ) -> None:
     """The same in a picture of which nobody knows what the photo hides there: the farthest surface around goes on.
 
-    farthest_views: surfaces are one that part by less than SURFACE_PX so many view steps away. stages: that are on.
+    farthest_views: surfaces are one that part by less than WIDE_EDGE_PX so many view steps away. stages: that are on.
     """
     nothing_hides = np.full(disparity.shape, -np.inf, np.float32)
     _fill_view(colors, disparity, hole, nothing_hides, ViewOffset(0.0, 0.0), farthest_views, should_stop, 1, stages)
@@ -76,7 +73,7 @@ def _fill_view(
     stages: Stages,
 ) -> None:
     """See `fill_background`. parallax: px that surfaces part by for each px of disparity."""
-    one_surface = SURFACE_PX / max(parallax, 1e-9)
+    one_surface = step_of(WIDE_EDGE_PX, parallax)
     pixels = flat_indices(hole, should_stop, threads)
     known = nearest_known(hole, pixels, should_stop, threads)
     reach, changed = np.empty(len(pixels), np.float32), np.empty((len(pixels), 3), np.float32)
@@ -116,7 +113,7 @@ def _fill(
     height, width = disparity.shape
     photo, directions = photo_disparity.ravel(), known.shape[1]
     surface, weight = np.zeros(directions), np.zeros(directions)
-    hidden = one_surface * HIDDEN_PX / SURFACE_PX
+    hidden = one_surface * (SAME_SURFACE_PX / WIDE_EDGE_PX)
     for i in range(len(pixels)):
         y, x = pixels[i] // width, pixels[i] % width
         nearest, farthest, any_possible = np.inf, np.inf, False
@@ -131,7 +128,7 @@ def _fill(
             surface[k] = d = disparity[known_y, known_x]
             farthest = min(farthest, d)
             place = _place_in_photo(y + d * t, x + d * s, height, width)
-            if place < 0 or photo[place] - d > hidden:
+            if place < 0 or is_in_front(photo[place], d, hidden):
                 weight[k] = 1.0 / distance
                 any_possible = True
             else:
@@ -154,7 +151,7 @@ def _fill(
             r += w * colors[known_y, known_x, 0]
             g += w * colors[known_y, known_x, 1]
             b += w * colors[known_y, known_x, 2]
-            if abs(surface[k] - surface[chosen]) <= one_surface:
+            if same_surface(surface[k], surface[chosen], one_surface):
                 sum_d += w * surface[k]
         colors[y, x, 0], colors[y, x, 1], colors[y, x, 2] = r / total, g / total, b / total
         disparity[y, x] = sum_d / most
@@ -168,7 +165,7 @@ def _heaviest(surface, weight, one_surface):
         votes = 0.0
         if weight[k] > 0:
             for j in range(len(surface)):
-                if abs(surface[j] - surface[k]) <= one_surface:
+                if same_surface(surface[j], surface[k], one_surface):
                     votes += weight[j]
         if votes > most or (votes > 0 and votes == most and surface[k] < surface[chosen]):
             chosen, most = k, votes
@@ -178,7 +175,7 @@ def _heaviest(surface, weight, one_surface):
 @kernel
 def _place_in_photo(y, x, height, width):
     """Index among the photo's pixels, -1 off its frame: a surface that lies there may go on unseen only where something
-    nearer hides it by HIDDEN_PX, or off the frame.
+    nearer hides it, or off the frame.
     """
     row, column = nearest_pixel(y), nearest_pixel(x)
     return row * width + column if 0 <= column < width and 0 <= row < height else -1

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from iibr_core.runtime.jit import kernel
 from iibr_core.runtime.tiling import ShouldStop, in_pieces
+from iibr_core.surfaces import same_surface
 from iibr_core.types import FloatImage, ImageSize, image_size
 
 RADIUS_PX = 3
@@ -116,7 +117,7 @@ def _copy_block(colors, disparity, pure, number, row, column, one_surface, trust
             for v, u in ((y - 1, x), (y + 1, x), (y, x - 1), (y, x + 1)):
                 if 0 <= v < height and 0 <= u < width and not is_queued[y - top, x - left]:
                     is_known = number[v, u] < 0 or trust[number[v, u]] > 0
-                    if is_known and abs(disparity[v, u] - disparity[y, x]) <= one_surface:
+                    if is_known and same_surface(disparity[v, u], disparity[y, x], one_surface):
                         queue[end], end = y * width + x, end + 1
                         is_queued[y - top, x - left] = True
     tap = np.empty(((2 * RADIUS_PX + 1) ** 2, 2), np.int64)
@@ -136,7 +137,7 @@ def _copy_block(colors, disparity, pure, number, row, column, one_surface, trust
         for k in range(taps):
             v, u, a, b = y + tap[k, 0], x + tap[k, 1], source_y + tap[k, 0], source_x + tap[k, 1]
             i = number[v, u]
-            if i < 0 or not abs(pure[a, b] - patch[k, 3]) <= one_surface:
+            if i < 0 or not same_surface(pure[a, b], patch[k, 3], one_surface):
                 continue
             count = np.float32(1.0)
             if trust[i] == 0:
@@ -150,7 +151,7 @@ def _copy_block(colors, disparity, pure, number, row, column, one_surface, trust
             for u in range(max(x - RADIUS_PX - 1, left), min(x + RADIUS_PX + 2, right)):
                 if number[v, u] < 0 or trust[number[v, u]] > 0 or is_queued[v - top, u - left]:
                     continue
-                if abs(disparity[v, u] - disparity[y, x]) <= one_surface:
+                if same_surface(disparity[v, u], disparity[y, x], one_surface):
                     queue[end], end = v * width + u, end + 1
                     is_queued[v - top, u - left] = True
 
@@ -164,7 +165,7 @@ def _take_patch(colors, disparity, number, y, x, one_surface, trust, tap, patch)
     taps, there, total = 0, 0, np.float32(0.0)
     for v in range(max(y - RADIUS_PX, 0), min(y + RADIUS_PX + 1, height)):
         for u in range(max(x - RADIUS_PX, 0), min(x + RADIUS_PX + 1, width)):
-            if abs(disparity[v, u] - disparity[y, x]) <= one_surface:
+            if same_surface(disparity[v, u], disparity[y, x], one_surface):
                 i = number[v, u]
                 here = np.float32(1.0) if i < 0 else trust[i]
                 tap[taps, 0], tap[taps, 1] = v - y, u - x
@@ -191,13 +192,13 @@ def _find_place(colors, disparity, pure, y, x, one_surface, tap, patch):
             v, u = middle_y + j // around - STEP_PX + 1, middle_x + j % around - STEP_PX + 1
         if not (RADIUS_PX <= v < height - RADIUS_PX and RADIUS_PX <= u < width - RADIUS_PX):
             continue
-        if not abs(pure[v, u] - disparity[y, x]) <= one_surface:
+        if not same_surface(pure[v, u], disparity[y, x], one_surface):
             continue
         unlike = np.float32(0.0)
         for m in range(len(tap)):
             # Within the frame: unsigned indices need no test for counting from the end.
             a, b = np.uint64(v + tap[m, 0]), np.uint64(u + tap[m, 1])
-            if abs(pure[a, b] - patch[m, 3]) <= one_surface:
+            if same_surface(pure[a, b], patch[m, 3], one_surface):
                 red, green = colors[a, b, 0] - patch[m, 0], colors[a, b, 1] - patch[m, 1]
                 blue = colors[a, b, 2] - patch[m, 2]
                 unlike += patch[m, 4] * (red * red + green * green + blue * blue)
@@ -213,7 +214,7 @@ def _find_place(colors, disparity, pure, y, x, one_surface, tap, patch):
         a, b = best_y + tap[m, 0], best_x + tap[m, 1]
         if best_y >= 0 and patch[m, 4] == 1:
             total += 1
-            if abs(pure[a, b] - patch[m, 3]) <= one_surface:
+            if same_surface(pure[a, b], patch[m, 3], one_surface):
                 for c in range(3):
                     unlike += (colors[a, b, c] - patch[m, c]) ** 2
             else:

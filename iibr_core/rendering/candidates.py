@@ -16,9 +16,10 @@ from numpy.typing import NDArray
 
 from iibr_core.rendering.coherent_cells import backward_warp, cells_in, find_coherent_cells, land_incoherent
 from iibr_core.rendering.ray_cells import CELL_PX
-from iibr_core.rendering.ray_set import OWN_SURFACE_PX, RaySet
+from iibr_core.rendering.ray_set import RaySet
 from iibr_core.rendering.slope_connectivity import BELOW, RIGHT
 from iibr_core.runtime.jit import kernel, nearest_pixel
+from iibr_core.surfaces import SAME_SURFACE_PX, same_surface
 from iibr_core.types import FloatImage, ViewOffset
 
 SEALED_GAP_PX = 0.75
@@ -135,8 +136,7 @@ def _land_rays(rays, index, connected, steep, needed, columns, s, t, found):
     count, coverage, disparity, source = found.number, found.coverage, found.disparity, found.source
     slots, rows, width = coverage.shape
     height = len(ray_disparity)
-    # The same as a difference of disparities.
-    same_surface = OWN_SURFACE_PX / max(abs(s), abs(t), 1e-9)
+    one_surface = SAME_SURFACE_PX / max(abs(s), abs(t), 1e-9)
     for i in range(len(needed)):
         cell_row, cell = divmod(needed[i], steep.shape[1])
         is_steep = steep[cell_row, cell]
@@ -150,7 +150,7 @@ def _land_rays(rays, index, connected, steep, needed, columns, s, t, found):
                 landed_x, landed_y = x - d * s, y - d * t
                 to_left, to_right = max(x - 1, 0), min(x + 1, width - 1)
                 above, below = max(y - 1, 0), min(y + 1, height - 1)
-                is_connected, tolerance, slope_x, slope_y = False, same_surface, 0.0, 0.0
+                is_connected, tolerance, slope_x, slope_y = False, one_surface, 0.0, 0.0
                 if is_steep:
                     rise_x = _slope(ray_disparity, connected, RIGHT, y, x, 0, 1)
                     rise_y = _slope(ray_disparity, connected, BELOW, y, x, 1, 0)
@@ -159,7 +159,7 @@ def _land_rays(rays, index, connected, steep, needed, columns, s, t, found):
                     is_connected = (rise_x != 0.0 or rise_y != 0.0) and stretched >= LEAST_SHRUNK
                 if is_connected:
                     slope_x, slope_y = rise_x / stretched, rise_y / stretched
-                    tolerance = max(same_surface, abs(slope_x) + abs(slope_y))
+                    tolerance = max(one_surface, abs(slope_x) + abs(slope_y))
                 left = landed_x - _half_extent(
                     ray_disparity[y, to_left] - d, s, is_connected and connected[y, to_left] & RIGHT
                 )
@@ -198,9 +198,8 @@ def _land_rays(rays, index, connected, steep, needed, columns, s, t, found):
                         slot = 0
                         while slot < used:
                             c = coverage[slot, row, column]
-                            if (
-                                source[slot, row, column] == index
-                                and abs(disparity[slot, row, column] - d_here * c) <= tolerance * c
+                            if source[slot, row, column] == index and same_surface(
+                                disparity[slot, row, column], d_here * c, tolerance * c
                             ):
                                 break
                             slot += 1

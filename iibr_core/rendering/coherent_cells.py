@@ -10,14 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.rendering.ray_cells import CELL_PX, Cells
-from iibr_core.rendering.ray_set import OWN_SURFACE_PX, RaySet
+from iibr_core.rendering.ray_set import RaySet
 from iibr_core.runtime.jit import kernel
+from iibr_core.surfaces import EDGE_PX, SAME_SURFACE_PX
 from iibr_core.types import FloatImage, ViewOffset
 
 LANDING_REACH_PX = 1.5
 """A ray that lands farther than this from a pixel's centre does not touch the pixel."""
-ONE_SURFACE_PX = 1.0
-"""What lands on a cell with more parallax between its parts is not taken for one surface."""
 SETTLED_PX = 0.02
 """A ray is followed until it moves by less than this: the step after that would be far shorter."""
 LEAST_LEFT = 0.2
@@ -43,7 +42,7 @@ def find_coherent_cells(
     incoherent = ~(cells.step <= rays.smooth_step(offset))
     _land_cells(cells, incoherent, rays.to_view(offset), first, rays.photo_images, parallax, far, near, smooth)
     # Something lands, and its parts stay together.
-    smooth &= (near >= far) & ((near - far) * parallax <= ONE_SURFACE_PX)
+    smooth &= (near >= far) & ((near - far) * parallax <= EDGE_PX)
     return smooth, np.where(smooth, far, np.float32(0.0))
 
 
@@ -116,7 +115,7 @@ def _land_cells(cells, incoherent, offsets, first_cell, photo_images, parallax, 
                         if k == 0 and not incoherent[v, u]:
                             far[row, column] = min(far[row, column], least)
                             near[row, column] = max(near[row, column], most)
-                        elif k < photo_images or (most - far[row, column]) * parallax > OWN_SURFACE_PX:
+                        elif k < photo_images or (most - far[row, column]) * parallax > SAME_SURFACE_PX:
                             smooth[row, column] = False
 
 
@@ -203,7 +202,7 @@ def backward_warp(surface, offset, about, found):
 def _follow(surface, guess, is_settled, left, right, y, t, s):
     """One of Newton's steps towards the fixed point for the rays [left, right) of a row; whether any is to follow.
 
-    A slope of at most 0.4 px a pixel along each axis (SMOOTH_SHARE of the step that OWN_SURFACE_PX gives) keeps
+    A slope of at most 0.4 px a pixel along each axis (SMOOTH_SHARE of the step that SAME_SURFACE_PX gives) keeps
     it stable.
     """
     height, width = surface.shape

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from iibr_core.runtime.jit import kernel
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never
+from iibr_core.surfaces import WIDE_EDGE_PX, step_of
 from iibr_core.types import FloatImage, image_size
 
 STATISTICS_PX = 2
@@ -28,8 +29,6 @@ SOFT_AROUND_PX = 8
 """Rays this close to the middle of a soft edge are marked."""
 SOFT_EDGE_SHARPNESS = 0.5
 """Where depth edges are softer than this, surfaces are looked for farther around a ray."""
-EDGE_PARALLAX_PX = 2.0
-"""Least parallax, in the outermost view, of the edges whose softness is measured."""
 
 
 class DisparityStatistics(NamedTuple):
@@ -56,7 +55,7 @@ def measure_disparity(
     low, high, step = (np.empty(disparity.shape, np.float32) for _ in range(3))
     for source, *found in zip(disparity, low, high, step):
         _measure_rows(source, found, should_stop)
-    soft, softness = find_soft_edges(disparity[0], EDGE_PARALLAX_PX / max(farthest_views, 1e-9), should_stop)
+    soft, softness = find_soft_edges(disparity[0], step_of(WIDE_EDGE_PX, farthest_views), should_stop)
     return DisparityStatistics(low, high, step, softness, soft)
 
 

@@ -15,11 +15,12 @@ from numpy.typing import NDArray
 
 from iibr_core.inpainting.background import continue_farthest
 from iibr_core.rendering.landed_squares import SAMPLES, draw_rays, project, rows_landed_on
-from iibr_core.rendering.ray_set import HIGHEST_LEVEL, OWN_SURFACE_PX, RaySet
+from iibr_core.rendering.ray_set import HIGHEST_LEVEL, RaySet
 from iibr_core.rendering.rendered_view import RenderedView
 from iibr_core.rendering.resampling import SOLE, cubic, resample, resample_inpainted
 from iibr_core.runtime.jit import kernel, linear_scalar, srgb_scalar
 from iibr_core.runtime.tiling import MOST_BAND_PIXELS, ShouldStop, in_bands, never
+from iibr_core.surfaces import SAME_SURFACE_PX, same_surface, step_of
 from iibr_core.types import Camera, ImageSize, Margins
 
 COVERED_SAMPLES = 0.5
@@ -69,7 +70,7 @@ def render_free_view(
     drawing = [tuple(map(float, matrix.ravel())) for matrix in matrices]
     looking_up = np.stack([np.linalg.inv(matrix).ravel() for matrix in matrices])
     landing = [rows_landed_on(rays, k, matrix, should_stop) for k, matrix in enumerate(drawing)]
-    surface, sealed_step = OWN_SURFACE_PX / rays.farthest_views, SEALED_STEPS * rounding_step
+    surface, sealed_step = step_of(SAME_SURFACE_PX, rays.farthest_views), SEALED_STEPS * rounding_step
 
     def band(first: int, last: int) -> None:
         nearest, source = draw_rays(rays, drawing, landing, surface, sealed_step, (first, last), size.width)
@@ -101,7 +102,7 @@ def _scales_at(m, x, y, d):
     spans_y = max(abs(m[4] - at_y * m[8]), abs(m[5] - at_y * m[9])) / abs(w)
     moves = max(abs(m[3] - at_x * m[11]), abs(m[7] - at_y * m[11]), 1e-9)
     parallax = moves / max(abs(m[15] - at_d * m[11]), 1e-9)
-    return max(spans_x, spans_y) > WIDE_FOOTPRINT_PX, OWN_SURFACE_PX * abs(w) / moves, parallax
+    return max(spans_x, spans_y) > WIDE_FOOTPRINT_PX, SAME_SURFACE_PX * abs(w) / moves, parallax
 
 
 @kernel
@@ -137,7 +138,7 @@ def _resolve(rays, inverses, frame, farthest_views, first_row, nearest, seen, co
                 for other in range(sample, SAMPLES**2):
                     j, i = other // SAMPLES, other % SAMPLES
                     v, u = row * SAMPLES + j, x * SAMPLES + i
-                    if is_taken[other] or seen[v, u] != k + 1 or abs(nearest[v, u] - d) > one_surface:
+                    if is_taken[other] or seen[v, u] != k + 1 or not same_surface(nearest[v, u], d, one_surface):
                         continue
                     is_taken[other] = True
                     count, total_d = count + 1, total_d + nearest[v, u]

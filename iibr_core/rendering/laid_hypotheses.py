@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.rendering.candidates import Candidates
-from iibr_core.rendering.ray_set import OWN_SURFACE_PX, RayArrays
+from iibr_core.rendering.ray_set import RayArrays
 from iibr_core.rendering.resampling import ShownRays
 from iibr_core.runtime.jit import kernel
+from iibr_core.surfaces import SAME_SURFACE_PX
 from iibr_core.types import FloatImage
 
 PLAIN_SOURCE = 128
@@ -98,7 +99,7 @@ def _pick_apart(near_disparity, near_source, n, photo_images, parallax, disparit
             for i in range(n):
                 between = INPAINTED_APART_PX if (near_source[i] >= photo_images) != is_guess else 0.0
                 away[i] = min(away[i], abs(near_disparity[i] - d) * parallax + between)
-        best, best_distance = -1, OWN_SURFACE_PX
+        best, best_distance = -1, SAME_SURFACE_PX
         for i in range(n):
             if away[i] > best_distance:
                 best, best_distance = i, away[i]
@@ -170,4 +171,4 @@ def _is_undecided(landed, y, x, disparity, source):
             r, g, b = images[k, v, u, 0], images[k, v, u, 1], images[k, v, u, 2]
             low_r, low_g, low_b = min(low_r, r), min(low_g, g), min(low_b, b)
             high_r, high_g, high_b = max(high_r, r), max(high_g, g), max(high_b, b)
-    return apart > OWN_SURFACE_PX and max(high_r - low_r, high_g - low_g, high_b - low_b) > VISIBLE
+    return apart > SAME_SURFACE_PX and max(high_r - low_r, high_g - low_g, high_b - low_b) > VISIBLE

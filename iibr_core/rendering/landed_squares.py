@@ -16,6 +16,7 @@ from iibr_core.rendering.ray_set import RaySet
 from iibr_core.rendering.slope_connectivity import BELOW, RIGHT
 from iibr_core.runtime.jit import kernel
 from iibr_core.runtime.tiling import ShouldStop, in_bands
+from iibr_core.surfaces import same_surface
 from iibr_core.types import FloatImage, ImageSize
 
 SAMPLES = 3
@@ -147,14 +148,14 @@ def _land_squares(disparity, connected, m, y, sealed_step, corners, is_drawn):
             has_row, has_column = 0 <= v < height, 0 <= u < width
             total, count, top, left = np.float64(here), 1, min(y, v), min(x, u)
             is_across = is_along = False
-            if has_column and (abs(disparity[y, u] - here) <= one_surface or connected[y, left] & RIGHT):
+            if has_column and (same_surface(disparity[y, u], here, one_surface) or connected[y, left] & RIGHT):
                 is_across, total, count = True, total + disparity[y, u], count + 1
-            if has_row and (abs(disparity[v, x] - here) <= one_surface or connected[top, x] & BELOW):
+            if has_row and (same_surface(disparity[v, x], here, one_surface) or connected[top, x] & BELOW):
                 is_along, total, count = True, total + disparity[v, x], count + 1
             if has_row and has_column:
-                down, right = abs(disparity[v, u] - disparity[y, u]), abs(disparity[v, u] - disparity[v, x])
-                by_way_of_row = is_across and (down <= one_surface or connected[top, u] & BELOW)
-                if by_way_of_row or (is_along and (right <= one_surface or connected[v, left] & RIGHT)):
+                down = same_surface(disparity[v, u], disparity[y, u], one_surface) or connected[top, u] & BELOW
+                right = same_surface(disparity[v, u], disparity[v, x], one_surface) or connected[v, left] & RIGHT
+                if (is_across and down) or (is_along and right):
                     total, count = total + disparity[v, u], count + 1
             at_x, at_y, d, w = project(m, 0.5 * (x + u), 0.5 * (y + v), total / count)
             corners[x, corner, 0], corners[x, corner, 1], corners[x, corner, 2] = at_x, at_y, d

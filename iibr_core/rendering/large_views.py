@@ -15,11 +15,12 @@ import numpy as np
 
 from iibr_core.rendering.flying_pixels import postprocessed_view
 from iibr_core.rendering.photo_rays import rays_of_photo
-from iibr_core.rendering.ray_set import OWN_SURFACE_PX, RaySet
+from iibr_core.rendering.ray_set import RaySet
 from iibr_core.rendering.rendered_view import RenderedView
 from iibr_core.rendering.renderer import Renderer
 from iibr_core.runtime.jit import kernel
 from iibr_core.runtime.tiling import ShouldStop, never
+from iibr_core.surfaces import SAME_SURFACE_PX, same_surface
 from iibr_core.types import FloatImage, ImageSize, ViewOffset, image_size
 
 TILE_PX = 1024
@@ -212,7 +213,7 @@ def _enlarge_rays(
             for v in range(max(math.floor(y), 0), min(math.floor(y) + 2, disparity.shape[0])):
                 for u in range(max(math.floor(x), 0), min(math.floor(x) + 2, disparity.shape[1])):
                     # Of the nearest ray's surface only; NaN, no surface, fails the comparison.
-                    if not (coverage[v, u] > 0 and abs(disparity[v, u] - own) <= OWN_SURFACE_PX):
+                    if not (coverage[v, u] > 0 and same_surface(disparity[v, u], own, SAME_SURFACE_PX)):
                         continue
                     weight = (1.0 - abs(v - y)) * (1.0 - abs(u - x))
                     total += weight

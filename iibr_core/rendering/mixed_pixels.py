@@ -14,6 +14,7 @@ import numpy as np
 from iibr_core.inpainting.disparity_by_color import nearness
 from iibr_core.runtime.jit import kernel, linear_scalar, srgb_scalar
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never
+from iibr_core.surfaces import SLOPE_SHARE, is_in_front, same_surface
 from iibr_core.types import FloatImage, image_size
 
 LEAST_MATTE = 0.02
@@ -32,8 +33,6 @@ DIAGONAL_SHARE = 0.05
 """Of a pixel that its outline alone gives to the foreground, for each straight and diagonal neighbour that is."""
 SHARE_DEVIATION = 0.2
 """Standard deviation of shares from that: supersampled layers had 0.1; edges of maps are not as exact."""
-SLOPE = 0.25
-"""A pixel in front of one neighbour by more than this share of what it is behind another lies on a slope."""
 MATTING_ROUNDS = 3
 
 
@@ -83,11 +82,11 @@ def _foreground_beside(disparity, y, x, edge_step):
     for v in range(max(y - 1, 0), min(y + 2, height)):
         for u in range(max(x - 1, 0), min(x + 2, width)):
             foreground, background = max(foreground, disparity[v, u]), min(background, disparity[v, u])
-    if here - background > SLOPE * (foreground - here):
+    if here - background > SLOPE_SHARE * (foreground - here):
         return here, share
     for v in range(max(y - 1, 0), min(y + 2, height)):
         for u in range(max(x - 1, 0), min(x + 2, width)):
-            if abs(disparity[v, u] - foreground) <= edge_step:
+            if same_surface(disparity[v, u], foreground, edge_step):
                 share += STRAIGHT_SHARE if v == y or u == x else DIAGONAL_SHARE
     return foreground, share
 
@@ -163,7 +162,7 @@ def _split_rows(
                 here[c] = darkest[c] = brightest[c] = linear_scalar(colors[y, x, c])
             # A pixel just behind an edge, and colours of both sides.
             if not (
-                foreground - disparity[y, x] > edge_step
+                is_in_front(foreground, disparity[y, x], edge_step)
                 and _color_statistics(
                     colors, disparity, is_edge_band, y, x, foreground, edge_step, mean, spread, darkest, brightest
                 )

@@ -7,13 +7,11 @@ import numpy as np
 from iibr_core.inpainting.outpainting import outpaint
 from iibr_core.rendering.flying_pixels import measure_detail
 from iibr_core.rendering.mixed_pixels import split_mixed_pixels
-from iibr_core.rendering.ray_set import NO_MARGINS, OWN_SURFACE_PX, RaySet
+from iibr_core.rendering.ray_set import NO_MARGINS, RaySet
 from iibr_core.runtime.tiling import ShouldStop, never
 from iibr_core.stages import ALL_STAGES, Stages
+from iibr_core.surfaces import EDGE_PX, SAME_SURFACE_PX, step_of
 from iibr_core.types import FloatImage, Margins, ViewOffset, image_size
-
-MIXING_STEP_PX = 1.0
-"""A step of disparity mixes two surfaces if it opens a gap of at least this many pixels in the outermost view."""
 
 
 def rays_of_photo(
@@ -32,9 +30,9 @@ def rays_of_photo(
     Raises Cancelled once should_stop is true.
     """
     colors, disparity = outpaint(colors, disparity, margins, should_stop, stages)
-    centre, edge_step = ViewOffset(0.0, 0.0), MIXING_STEP_PX / farthest_views
+    centre, edge_step = ViewOffset(0.0, 0.0), step_of(EDGE_PX, farthest_views)
     detail = measure_detail(colors, should_stop)
-    size, surface_step = image_size(disparity), OWN_SURFACE_PX / farthest_views
+    size, surface_step = image_size(disparity), step_of(SAME_SURFACE_PX, farthest_views)
     rays = RaySet(2 + more, size, surface_step, farthest_views, margins, detail, stages)
     everywhere = np.ones_like(disparity)
     if not stages.split_mixed_pixels:

@@ -13,26 +13,19 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.rendering.disparity_statistics import (
-    EDGE_PARALLAX_PX,
-    DisparityStatistics,
-    measure_disparity,
-)
+from iibr_core.rendering.disparity_statistics import DisparityStatistics, measure_disparity
 from iibr_core.rendering.ray_cells import CELL_PX, Cells, any_in_cells, largest_steps, sum_up
 from iibr_core.rendering.slope_connectivity import BELOW, RIGHT, connect_rays, connected_either_way
 from iibr_core.runtime.jit import kernel, nearest_pixel
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never
 from iibr_core.stages import ALL_STAGES, Stages
+from iibr_core.surfaces import EDGE_PX, WIDE_EDGE_PX, is_in_front, step_of
 from iibr_core.types import FloatImage, ImageSize, Margins, ViewOffset, image_size
 
 NO_MARGINS = Margins()
 HIGHEST_LEVEL = 255
-OWN_SURFACE_PX = 0.5
-"""Rays whose landing, or look-ups, differ by more parallax than this are of several surfaces."""
 SMOOTH_SHARE = 0.8
 """A smooth surface's steps stay below this share of the step between surfaces."""
-IN_FRONT_PX = 1.0
-"""Inpainted rays are in front of the photo's where their disparities differ by this much in the farthest view."""
 GUARD_BAND_PX = 2
 """Inpainted rays this near to those in front are left out, too: else slivers of them appear as isolated outliers."""
 
@@ -116,11 +109,11 @@ class RaySet:
         k, connected = self._count, np.zeros(self.size, np.uint8)
         room, cells = self._room, self._cells_room
         if k == 0 and self.stages.connect_slopes:
-            least_edge = EDGE_PARALLAX_PX / max(self.farthest_views, 1e-9)
+            least_edge = step_of(WIDE_EDGE_PX, self.farthest_views)
             self.connected = connected = connect_rays(disparity, self._surface_step, least_edge, should_stop)
             self._steep = any_in_cells(connected_either_way(connected))
         if k > 0 and any(offset) and self.stages.leave_out_in_front:
-            step = IN_FRONT_PX / max(self.farthest_views, 1e-9)
+            step = step_of(EDGE_PX, self.farthest_views)
             coverage = coverage.copy()
             _leave_out_in_front(disparity, room.disparity[0], *offset, step, coverage)
 
@@ -245,7 +238,7 @@ def _leave_out_in_front(disparity, photo_disparity, t, s, step, coverage):
             if made_up[y, x]:
                 d = disparity[y, x]
                 v, u = nearest_pixel(y + d * t), nearest_pixel(x + d * s)
-                if 0 <= v < height and 0 <= u < width and d > photo_disparity[v, u] + step:
+                if 0 <= v < height and 0 <= u < width and is_in_front(d, photo_disparity[v, u], step):
                     for j in range(max(y - GUARD_BAND_PX, 0), min(y + GUARD_BAND_PX + 1, height)):
                         for i in range(max(x - GUARD_BAND_PX, 0), min(x + GUARD_BAND_PX + 1, width)):
                             coverage[j, i] = 0.0

@@ -12,10 +12,11 @@ from iibr_core.rendering.candidates import find_candidates
 from iibr_core.rendering.hypotheses import find_ambiguous_rays
 from iibr_core.rendering.mixed_pixels import split_mixed_pixels
 from iibr_core.rendering.occlusion import entropy
-from iibr_core.rendering.photo_rays import MIXING_STEP_PX, rays_of_photo
+from iibr_core.rendering.photo_rays import rays_of_photo
 from iibr_core.rendering.resampling import KEYS_A, resample_colors
 from iibr_core.rendering.view_synthesis import ViewSynthesis
 from iibr_core.rendering.visibility_weights import visibility_weights
+from iibr_core.surfaces import EDGE_PX
 from iibr_core.types import ViewOffset
 from tests.iibr_core.scenes import smooth_texture
 
@@ -73,7 +74,7 @@ def test_a_view_offset_of_zero_gives_the_photo_back(seed):
     """
     pixels, disparity = scene(seed)
     view = rendered(pixels, disparity, ViewOffset(0.0, 0.0))
-    is_split = split_mixed_pixels(pixels, disparity, MIXING_STEP_PX / 2.0)[3] > 0
+    is_split = split_mixed_pixels(pixels, disparity, EDGE_PX / 2.0)[3] > 0
     assert (view.colors == pixels)[~is_split].all()
     error = np.abs(view.colors - pixels).max(axis=2)
     assert (error > 1e-3).mean() <= 0.01
@@ -88,7 +89,7 @@ def test_at_a_view_offset_of_zero_the_transformer_errs_at_split_pixels_only(seed
     """No field is made of such a view, for the photo itself stands there; half a share of a pixel is what it costs."""
     pixels, disparity = scene(seed)
     view = rendered(pixels, disparity, ViewOffset(0.0, 0.0), transformer=transformer_for("balanced"))
-    coverage = split_mixed_pixels(pixels, disparity, MIXING_STEP_PX / 2.0)[3]
+    coverage = split_mixed_pixels(pixels, disparity, EDGE_PX / 2.0)[3]
     error = np.abs(view.colors - pixels).max(axis=2)
     assert error[coverage == 0].max() <= 1e-4
     assert error.max() <= 0.4

@@ -21,12 +21,11 @@ from iibr_core.inpainting.nearest_known import number_pixels
 from iibr_core.runtime import tiling
 from iibr_core.runtime.jit import kernel
 from iibr_core.runtime.tiling import ShouldStop, in_pieces, pieces_of
+from iibr_core.surfaces import SLOPE_SHARE, same_surface
 from iibr_core.types import FloatImage
 
 LABELLED_PX = 4
 """Pixels with fewer others between them and a step are labelled; those with as many tell how often colours mislead."""
-SLOPE = 0.25
-"""Of a step, which goes on by so much before and after it, that it is a slope's."""
 LABEL_PX, STRIDE_PX, SPREAD_PX = 8, 2, 4.0
 """Every second pixel within so many, each way, tells both surfaces' colours; standard deviation of their weights by
 distance.
@@ -190,7 +189,7 @@ def _is_slope(values, y, x, v, u, step):
     # The border hides one of both.
     before = values[y, x] - values[above, left] if above >= 0 and left >= 0 else step
     after = values[below, right] - values[v, u] if below < height and right < width else step
-    least = SLOPE * abs(step)
+    least = SLOPE_SHARE * abs(step)
     return before * step > 0 and after * step > 0 and min(abs(before), abs(after)) >= least
 
 
@@ -316,13 +315,13 @@ def _believe(colors, values, pixels, number, other, drive, alike, believed, beli
                 k = number[v, u]
                 stays, elsewhere = (float(believed[k]), other[k]) if k >= 0 else (1.0, values[v, u])
                 votes = 0.0
-                if abs(values[v, u] - own) <= half:
+                if same_surface(values[v, u], own, half):
                     votes += stays
-                elif abs(values[v, u] - other[n]) <= half:
+                elif same_surface(values[v, u], other[n], half):
                     votes -= stays
-                if abs(elsewhere - own) <= half:
+                if same_surface(elsewhere, own, half):
                     votes += 1.0 - stays
-                elif abs(elsewhere - other[n]) <= half:
+                elif same_surface(elsewhere, other[n], half):
                     votes -= 1.0 - stays
                 apart = np.float32(0.0)
                 for c in range(3):

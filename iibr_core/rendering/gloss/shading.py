@@ -22,10 +22,9 @@ from iibr_core.rendering.gloss.reflection import reflection_disparity
 from iibr_core.rendering.gloss.separation import reflected_light, separate_light
 from iibr_core.runtime.jit import kernel, linear_scalar, srgb_scalar
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never
+from iibr_core.surfaces import EDGE_PX
 from iibr_core.types import FloatImage, GridShape, ViewOffset, ViewUpdate, image_size
 
-SHADED_SURFACE_PX = 1.0
-"""A pixel whose place in the photo is another by more than this, by the disparity seen there, shows another surface."""
 FIXED_POINT_STEPS = 4
 NO_ENVIRONMENT = np.zeros((1, 2, 3), np.float32)
 
@@ -151,7 +150,7 @@ def _is_inside(v, u, height, width):
 @kernel
 def _is_same(apart, t, s):
     """Whether disparities so far apart are of the same surface, as the view at (t, s) sees it."""
-    return apart * apart * (t * t + s * s) <= SHADED_SURFACE_PX * SHADED_SURFACE_PX
+    return apart * apart * (t * t + s * s) <= EDGE_PX * EDGE_PX
 
 
 @kernel

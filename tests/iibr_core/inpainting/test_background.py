@@ -1,9 +1,10 @@
 import numpy as np
 import pytest
 
-from iibr_core.inpainting.background import HIDDEN_PX, SMOOTH_STEPS_PX, SURFACE_PX, fill_background
+from iibr_core.inpainting.background import SMOOTH_STEPS_PX, fill_background
 from iibr_core.inpainting.nearest_known import DIRECTIONS
 from iibr_core.inpainting.patch_synthesis import MIXED_PX
+from iibr_core.surfaces import SAME_SURFACE_PX, WIDE_EDGE_PX
 from iibr_core.types import ViewOffset
 from tests.iibr_core.inpainting.test_patch_synthesis import copy_slowly
 
@@ -39,12 +40,12 @@ def is_possible(d, photo_disparity, offset, y, x):
     height, width = photo_disparity.shape
     column, row = int(np.floor(x + d * offset.s + 0.5)), int(np.floor(y + d * offset.t + 0.5))
     inside = 0 <= column < width and 0 <= row < height
-    return not inside or (photo_disparity[row, column] - d) * max(map(abs, offset)) > HIDDEN_PX
+    return not inside or (photo_disparity[row, column] - d) * max(map(abs, offset)) > SAME_SURFACE_PX
 
 
 def fill_slowly(colors, disparity, hole, photo_disparity, offset):
     parallax = max(map(abs, offset))
-    one_surface = SURFACE_PX / parallax
+    one_surface = WIDE_EDGE_PX / parallax
     filled_colors, filled_disparity, reach = colors.copy(), disparity.copy(), np.full(hole.shape, np.inf)
     mixed = mixed_slowly(hole)
     for y, x in np.argwhere(hole):

@@ -2,7 +2,8 @@ import numpy as np
 import pytest
 
 from iibr_core.rendering.candidates import CLOSED_GAP_PX, SEALED_GAP_PX, find_candidates
-from iibr_core.rendering.ray_set import OWN_SURFACE_PX, RaySet
+from iibr_core.rendering.ray_set import RaySet
+from iibr_core.surfaces import SAME_SURFACE_PX
 from iibr_core.types import ViewOffset, image_size
 
 
@@ -109,7 +110,7 @@ def test_behind_what_the_photo_shows_and_covers_nothing_else_lands():
 
 def test_surfaces_closer_than_the_tolerance_are_one():
     near = np.full((4, 8), 1.0)
-    near[:, ::2] += 0.9 * OWN_SURFACE_PX / 2
+    near[:, ::2] += 0.9 * SAME_SURFACE_PX / 2
     found = find_candidates(ray_set(near), ViewOffset(0.0, 2.0), (0, 4))
     assert (found.number[:, :5] == 1).all()
     two_surfaces_1e_minus_4_apart = np.full((4, 8), 1.0)

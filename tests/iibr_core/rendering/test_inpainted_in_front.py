@@ -8,8 +8,8 @@ from iibr_core.evaluation.reference_warp import reference_warp
 from iibr_core.generation.outer_views import outer_views_of_grid, outpainting_margins
 from iibr_core.generation.update_loop import complete_ray_set
 from iibr_core.rendering.photo_rays import rays_of_photo
-from iibr_core.rendering.ray_set import IN_FRONT_PX
 from iibr_core.rendering.view_synthesis import ViewSynthesis
+from iibr_core.surfaces import EDGE_PX
 from iibr_core.types import GridShape
 from tests.iibr_core.scenes import smooth_texture
 
@@ -45,5 +45,5 @@ def test_no_view_shows_anything_inpainted_in_front_of_the_photo_and_its_continua
             shown = reference_warp(np.zeros((*continued.shape, 3), np.float32), continued, offset)
             # Landings are rounded: what lies within a pixel counts.
             nearest = rays.in_view(maximum_filter(np.where(shown.hole, -np.inf, shown.disparity), 3))
-            in_front = view.inpainted & known & (view.disparity > nearest + IN_FRONT_PX / FARTHEST)
+            in_front = view.inpainted & known & (view.disparity > nearest + EDGE_PX / FARTHEST)
             assert not in_front.any()

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from iibr_core.rendering.ray_cells import CELL_PX
-from iibr_core.rendering.ray_set import GUARD_BAND_PX, HIGHEST_LEVEL, IN_FRONT_PX, SMOOTH_SHARE, RaySet
+from iibr_core.rendering.ray_set import GUARD_BAND_PX, HIGHEST_LEVEL, SMOOTH_SHARE, RaySet
+from iibr_core.surfaces import EDGE_PX
 from iibr_core.types import ImageSize, Margins, ViewOffset
 
 SURFACE_STEP = 0.6
@@ -81,7 +82,7 @@ def test_what_was_made_up_in_front_of_what_the_photo_shows_is_left_out_and_what_
     for y, x in np.argwhere(coverage > 0):
         d = made_up[y, x]
         v, u = round(y + d * offset.t), round(x + d * offset.s)
-        if v in range(20) and u in range(24) and d > photo[v, u] + IN_FRONT_PX / 2.0:
+        if v in range(20) and u in range(24) and d > photo[v, u] + EDGE_PX / 2.0:
             expected[
                 max(y - GUARD_BAND_PX, 0) : y + GUARD_BAND_PX + 1, max(x - GUARD_BAND_PX, 0) : x + GUARD_BAND_PX + 1
             ] = 0
