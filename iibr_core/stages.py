@@ -36,6 +36,8 @@ class Stages:
     """What covers a pixel in part is laid over what was inpainted behind it."""
     ray_transformer: bool = True
     """Where several surfaces contest a ray, the ray transformer decides; else closed form. Quality "fast" has none."""
+    reopen_holes: bool = True
+    """What was inpainted behind one of the photo's surfaces does not show through a hole in that surface."""
     smooth_gaps: bool = True
     """Inpainted colours get smoother the farther they are from what is known."""
     synthesise_patches: bool = True

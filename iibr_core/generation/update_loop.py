@@ -29,7 +29,7 @@ def render_outer_views(
     Weights are the closed form's in every quality: its disparity is smoother, and so is what is inpainted.
     inpainter, slots: see `ViewSynthesis`. Taking a view raises Cancelled once should_stop is true.
     """
-    with open_renderer(should_stop, slots=slots, inpainter=inpainter) as renderer:
+    with open_renderer(should_stop, slots=slots, inpainter=inpainter, reopens_holes=True) as renderer:
         for offset in outer:
             view = renderer.render(rays, offset)
             renderer.add_rays(rays, offset, view)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.color import linear_from_srgb, srgb_from_linear
-from iibr_core.inpainting.background import fill_background
+from iibr_core.inpainting.background import fill_background, goes_on_in_front
 from iibr_core.inpainting.inpainter import Inpainter
 from iibr_core.rendering.ambiguous_rays import HYPOTHESES, UndecidedRays, find_undecided_rays
 from iibr_core.rendering.candidates import find_candidates
@@ -51,16 +51,18 @@ class ViewSynthesis:
         keeps_entropy: bool = False,
         hypotheses: int = HYPOTHESES,
         inpainter: Inpainter = fill_background,
+        reopens_holes: bool = False,
     ) -> None:
         """transformer: gives the weights (N, K) of ambiguous rays; None: closed form. every: of all rays.
 
         slots: candidates kept a ray. keeps_entropy: whether views bring the entropy of their weights. hypotheses: the
-        transformer's K. inpainter: fills what no source shows.
+        transformer's K. inpainter: fills what no source shows. reopens_holes: and where only what was inpainted behind
+        one of the photo's surfaces shows through a hole in that surface.
         """
         self._asked_to_stop, self._is_over = should_stop, False
         self._transformer, self._every = transformer, every
         self._slots, self._hypotheses, self._keeps_entropy = slots, hypotheses, keeps_entropy
-        self._inpainter = inpainter
+        self._inpainter, self._reopens_holes = inpainter, reopens_holes
         self._threads = ThreadPoolExecutor(tiling.THREADS, thread_name_prefix="iibr-views")
 
     def __enter__(self) -> ViewSynthesis:
@@ -168,6 +170,8 @@ class ViewSynthesis:
         part = part[_is_within_margins(rays, part, disparity[part], offset) | view.occluded.reshape(-1)[part]]
         hole = view.occluded.copy()
         hole.reshape(-1)[part] = True
+        if self._reopens_holes and rays.stages.reopen_holes:
+            hole |= self._reopened(rays, offset, view, hole, threads)
         if not hole.any():
             return view
         foreground, foreground_disparity = colors[part], disparity[part]
@@ -178,6 +182,22 @@ class ViewSynthesis:
         colors[part] = _composite(foreground, behind.colors, share)
         disparity[part] = np.where(share > MOSTLY_COVERED, foreground_disparity, behind.disparity)
         return replace(view, behind=behind)
+
+    def _reopened(
+        self, rays: RaySet, offset: ViewOffset, view: RenderedView, hole: NDArray[np.bool_], threads: int
+    ) -> NDArray[np.bool_]:
+        """Where another view's filling shows, (H, W), but the photo's surfaces go on in front of it: there, that view
+        saw what lies farther back. They count as occluded from now on.
+        """
+        pixel, filled = np.flatnonzero(view.inpainted & ~hole), np.zeros_like(hole)
+        disparity = view.disparity.reshape(-1)[pixel]
+        filled.reshape(-1)[pixel] = ~_outside_frame(pixel, disparity, *offset, *rays.view_size)
+        if filled.any():
+            filled &= goes_on_in_front(
+                view.disparity, hole | filled, rays.photo_disparity, offset, self._should_stop, threads
+            )
+            view.occluded[filled] = True
+        return filled
 
     @property
     def _most_band_pixels(self) -> int:

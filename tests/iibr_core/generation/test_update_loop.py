@@ -92,3 +92,20 @@ def test_a_stop_is_heard_and_adds_nothing():
     with pytest.raises(Cancelled):
         complete_ray_set(seen, [LEFT], should_stop=lambda: True)
     assert len(seen) == before
+
+
+def test_what_was_inpainted_farther_back_does_not_show_through_a_hole_in_the_photos_surface():
+    disparity = np.full((30, 40), 3.0, np.float32)
+    disparity[:, 18:26] = 6.0
+    card, pole, wall = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+    colors = np.where(disparity[..., None] > 3, np.float32(pole), np.float32(card))
+    seen = rays_of_photo(colors, disparity, 2.0, 2)
+    everywhere = np.ones_like(disparity)
+    seen.add(LEFT, everywhere[..., None] * np.float32(wall), 0 * everywhere, everywhere)
+    with ViewSynthesis() as synthesis:
+        assert (synthesis.render(seen, RIGHT).colors[15, 15:19] == wall).all()
+    ((_, view),) = render_outer_views(seen, [RIGHT])
+    assert (view.occluded & view.inpainted)[15, 15:19].all()
+    np.testing.assert_allclose(view.colors[15, 15:19], np.tile(np.float32(card), (4, 1)), atol=1e-5)
+    with ViewSynthesis() as synthesis:
+        np.testing.assert_array_equal(synthesis.render(seen, RIGHT).colors[15, 15:19], view.colors[15, 15:19])

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from iibr_core.inpainting.background import SMOOTH_STEPS_PX, fill_background
+from iibr_core.inpainting.background import SMOOTH_STEPS_PX, fill_background, goes_on_in_front
 from iibr_core.inpainting.nearest_known import DIRECTIONS
 from iibr_core.inpainting.patch_synthesis import MIXED_PX
 from iibr_core.surfaces import SAME_SURFACE_PX, WIDE_EDGE_PX
@@ -80,6 +80,26 @@ def test_agrees_with_a_slow_twin(contrast):
     fill_background(colors, disparity, hole, photo_disparity, offset)
     assert colors == pytest.approx(expected_colors, abs=1e-5)
     assert disparity == pytest.approx(expected_disparity, abs=1e-5)
+
+
+def test_what_goes_on_in_front_is_weighed_like_a_slow_twin():
+    random = np.random.default_rng(4)
+    size = (27, 31)
+    disparity = random.choice([0.0, 2.0, 3.0], size).astype(np.float32)
+    photo_disparity = random.choice([0.0, 2.5, 4.0], size).astype(np.float32)
+    hole = random.random(size) < 0.1
+    hole[5:12, 12:] = True
+    offset = ViewOffset(1.0, -2.0)
+    expected = np.zeros(size, bool)
+    for y, x in np.argwhere(hole):
+        balance = 0.0
+        for u, v in around_slowly(hole, y, x):
+            if is_possible(float(disparity[v, u]), photo_disparity, offset, y, x):
+                in_front = disparity[v, u] > disparity[y, x] + WIDE_EDGE_PX / 2
+                balance += (1 if in_front else -1) / np.hypot(u - x, v - y)
+        expected[y, x] = balance > 0
+    assert expected.any()
+    np.testing.assert_array_equal(goes_on_in_front(disparity, hole, photo_disparity, offset), expected)
 
 
 def test_a_disocclusion_takes_the_background_not_what_hid_it():
