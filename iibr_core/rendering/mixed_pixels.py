@@ -34,6 +34,7 @@ DIAGONAL_SHARE = 0.05
 SHARE_DEVIATION = 0.2
 """Standard deviation of shares from that: supersampled layers had 0.1; edges of maps are not as exact."""
 MATTING_ROUNDS = 3
+STRAIGHT = np.array([(-1, 0), (0, -1), (0, 1), (1, 0)])
 
 
 def split_mixed_pixels(
@@ -57,6 +58,40 @@ def split_mixed_pixels(
     in_bands(lambda first, last: _mark_edge_bands(disparity, edge_step, first, last, is_edge_band), size, should_stop)
     in_bands(band, size, should_stop)
     return own, fringe, fringe_disparity, coverage
+
+
+def move_with_foreground(
+    disparity: FloatImage, steps: tuple[float, float], should_stop: ShouldStop = never
+) -> FloatImage:
+    """Disparity (H, W) with that of the foreground where pixels lie just behind a small step of it: above the first of
+    steps, up to the second.
+
+    Such pixels show both surfaces, too. Moved with the foreground, their light stays as it is beside it; surfaces that
+    small steps part are hardly moved against each other. Raises Cancelled once should_stop is true.
+    """
+    moved = np.empty_like(disparity, order="C")
+    in_bands(lambda first, last: _move(disparity, *steps, first, last, moved), image_size(disparity), should_stop)
+    return moved
+
+
+@kernel
+def _move(disparity, least_step, most_step, first, last, moved):
+    """Rows [first, last) of `move_with_foreground`."""
+    height, width = disparity.shape
+    for y in range(first, last):
+        for x in range(width):
+            here = foreground = background = beyond = disparity[y, x]
+            for k in range(4):
+                down, right = STRAIGHT[k]
+                v, u = min(max(y + down, 0), height - 1), min(max(x + right, 0), width - 1)
+                background = min(background, disparity[v, u])
+                if disparity[v, u] > foreground:
+                    foreground = disparity[v, u]
+                    beyond = disparity[min(max(v + down, 0), height - 1), min(max(u + right, 0), width - 1)]
+            # A slope goes on, on either side.
+            step = foreground - here
+            goes_on = max(here - background, beyond - foreground) > SLOPE_SHARE * step
+            moved[y, x] = foreground if least_step < step <= most_step and not goes_on else here
 
 
 @kernel

@@ -6,12 +6,15 @@ import numpy as np
 
 from iibr_core.inpainting.outpainting import outpaint
 from iibr_core.rendering.flying_pixels import measure_detail
-from iibr_core.rendering.mixed_pixels import split_mixed_pixels
+from iibr_core.rendering.mixed_pixels import move_with_foreground, split_mixed_pixels
 from iibr_core.rendering.ray_set import NO_MARGINS, RaySet
 from iibr_core.runtime.tiling import ShouldStop, never
 from iibr_core.stages import ALL_STAGES, Stages
 from iibr_core.surfaces import EDGE_PX, SAME_SURFACE_PX, step_of
 from iibr_core.types import FloatImage, Margins, ViewOffset, image_size
+
+LEAST_STEP_PX = 0.1
+"""Pixels behind smaller steps, down to this, move with the foreground; below it, steps are slopes and noise."""
 
 
 def rays_of_photo(
@@ -39,6 +42,7 @@ def rays_of_photo(
         rays.add(centre, colors, disparity, everywhere, should_stop)
         return rays
     own, fringe, fringe_disparity, coverage = split_mixed_pixels(colors, disparity, edge_step, should_stop)
+    disparity = move_with_foreground(disparity, (step_of(LEAST_STEP_PX, farthest_views), edge_step), should_stop)
     rays.add(centre, own, disparity, everywhere, should_stop)
     if coverage.any():
         rays.add(centre, fringe, fringe_disparity, coverage, should_stop)
