@@ -13,7 +13,12 @@ from functools import partial
 import numpy as np
 
 from iibr_core.generation.field_work import FieldWork
-from iibr_core.generation.outer_views import farthest_views, outer_views_of_grid, outpainting_margins
+from iibr_core.generation.outer_views import (
+    farthest_views,
+    outer_views_beside,
+    outer_views_of_grid,
+    outpainting_margins,
+)
 from iibr_core.generation.plan import ScenePlan
 from iibr_core.generation.stored_views import Draft, StoredViews, encode_for_storage
 from iibr_core.generation.update_loop import render_outer_views
@@ -50,6 +55,7 @@ def generate(
     draft_bytes: int | None = None,
     aids: InpaintingAids | None = None,
     wanted: Callable[[], Collection[ViewOffset] | None] = lambda: None,
+    fills_beside: bool = False,
 ) -> Generator[ViewUpdate, None, None]:
     """Yield every view of `plan.grid` once: the photo's own first, then the outer ones, then those nearest to
     `nearest_to()`.
@@ -58,7 +64,8 @@ def generate(
     is true the generator returns. Pixels do not depend on the order of the views. quality: None for the plan's; "fast"
     weighs by the closed form, "balanced" asks the trained transformer where surfaces contest a ray. inpaint: as
     `load_inpainter` takes it. aids: what it may ask. wanted: asked once, after the photo's own view, which views of the
-    grid are to follow; None: all. They have the pixels that they have among all.
+    grid are to follow; None: all. They have the pixels that they have among all; with fills_beside only where the photo
+    saw something: what they disocclude is then inpainted in fewer outer views, see `outer_views_beside`.
 
     draft_bytes: for who wants to see something soon. As far as so much memory holds what is left to be done for them,
     views come twice: as drafts in closed form, in the order above; then, when every view is there, with the
@@ -83,11 +90,15 @@ def generate(
         views = [at for at in views if at != (0.0, 0.0) and (chosen is None or at in chosen)]
         if not views:
             return
-        outer = set(outer_views_of_grid(plan.grid)) if plan.has_disocclusion else set()
-        wanted_outer = len(outer.intersection(views))
+        outer = outer_views_of_grid(plan.grid) if plan.has_disocclusion else []
+        if fills_beside:
+            outer = outer_views_beside(outer, views)
+        wanted_outer = len(set(outer).intersection(views))
         counts = len(outer), wanted_outer, len(views) - wanted_outer
         work = FieldWork(plan.costs, quality, counts, inpaint not in INPAINTERS)
-        yield from _generate_views(photo, disparity, plan, should_stop, nearest_to, load, draft_bytes, work, views)
+        yield from _generate_views(
+            photo, disparity, plan, should_stop, nearest_to, load, draft_bytes, work, views, outer
+        )
 
 
 def _generate_views(
@@ -100,11 +111,12 @@ def _generate_views(
     draft_bytes: int | None,
     work: FieldWork,
     inner: list[ViewOffset],
+    outer: list[ViewOffset],
 ) -> Iterator[ViewUpdate]:
-    """The views that follow the photo's own. inner: all that are wanted; it is used up."""
+    """The views that follow the photo's own. inner: all that are wanted; it is used up. outer: see `ray_set`."""
     grid = plan.grid
     transformer, inpainter = transformer_for(work.quality), load()
-    rays, outer_views = ray_set(photo, disparity, plan, should_stop, inpainter)
+    rays, outer_views = ray_set(photo, disparity, plan, should_stop, inpainter, outer)
     with open_renderer(should_stop, transformer, inpainter=inpainter) as renderer:
         views = StoredViews(renderer, rays, grid, photo.is_hdr, should_stop)
         # What is left to be done for views that are there, or in the ray set.
@@ -150,17 +162,20 @@ def ray_set(
     plan: ScenePlan,
     should_stop: ShouldStop = never,
     inpainter: Inpainter = fill_background,
+    outer: list[ViewOffset] | None = None,
 ) -> tuple[RaySet, Iterator[tuple[ViewOffset, RenderedView]]]:
-    """The rays that every view of `plan.grid` is made of, and the outer views by their offsets.
+    """The rays that every view of `plan.grid` is made of, and the outer views by their offsets. outer: which of those
+    are made; None: all.
 
     The set is final once the outer views have been taken: each adds what it disoccluded. Taking one raises Cancelled
     once should_stop is true.
     """
-    outer = outer_views_of_grid(plan.grid)
-    farthest = farthest_views(outer)
+    every = outer_views_of_grid(plan.grid)
+    farthest = farthest_views(every)
     if not plan.has_disocclusion:
-        outer = []
-    margins = outpainting_margins(disparity.values, outer)
+        every = []
+    margins = outpainting_margins(disparity.values, every)
+    outer = every if outer is None else outer
     rays = rays_of_photo(photo.pixels, disparity.values, farthest, len(outer), should_stop, margins)
     return rays, render_outer_views(rays, outer, should_stop, inpainter)
 

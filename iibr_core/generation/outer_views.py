@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable, Sequence
 from math import ceil
 
 import numpy as np
@@ -34,6 +34,19 @@ def outer_views(offsets: Iterable[ViewOffset]) -> list[ViewOffset]:
 def outer_views_of_grid(grid: GridShape) -> list[ViewOffset]:
     """`outer_views` of all views of a grid."""
     return outer_views([grid.offset(0, 0), grid.offset(grid.rows - 1, grid.columns - 1)])
+
+
+def outer_views_beside(outer: Sequence[ViewOffset], wanted: Collection[ViewOffset]) -> list[ViewOffset]:
+    """Those of the outer views that see nearly all that the wanted ones disocclude: the first two, which come before
+    all others and so decide most, and those on the side of the photo where a wanted one lies.
+    """
+    beside = {far for far in outer for at in wanted if _is_on_side_of(far, at)}
+    return [far for far in outer if far in outer[:2] or far in beside]
+
+
+def _is_on_side_of(far: ViewOffset, at: ViewOffset) -> bool:
+    t, s = far.t * at.t, far.s * at.s
+    return t >= 0 and s >= 0 and (t > 0 or s > 0)
 
 
 def farthest_views(outer: Iterable[ViewOffset]) -> float:

@@ -68,6 +68,7 @@ def views_of_photo(
     draft_bytes: int | None = None,
     in_srgb: bool = True,
     wanted: Callable[[], Collection[ViewOffset] | None] = lambda: None,
+    fills_beside: bool = False,
 ) -> Generator[ViewUpdate]:
     """As `generate` yields them. report_progress: hears of inpainting that takes long. in_srgb: else in the photo's
     colour space. Raises InputError as `generate` does.
@@ -87,4 +88,5 @@ def views_of_photo(
         draft_bytes,
         aids,
         wanted,
+        fills_beside,
     )

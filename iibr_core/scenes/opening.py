@@ -34,7 +34,7 @@ class SceneRequest:
 
     plan: of what is loaded, where it is made already. takes_drafts: views may come twice, so that there is something
     to look at soon; else each comes once, final. filled: the same light field, where all its views are made already.
-    asks_model: else depth is guessed where a model would be asked.
+    asks_model: else depth is guessed where a model would be asked. fills_beside: see `generate`.
     """
 
     generation: int
@@ -46,6 +46,7 @@ class SceneRequest:
     plan: ScenePlan | None = None
     filled: FilledField | None = None
     asks_model: bool = True
+    fills_beside: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,7 +178,9 @@ def _results_of_photo(
     yield SceneReady(request.generation, scene_of_photo(source, loaded, plan), loaded, _centre_view(loaded, plan))
 
     draft_bytes = plan.draft_bytes if request.takes_drafts else None
-    views = views_of_photo(source, loaded, plan, should_stop, tell, nearest_to, draft_bytes, False, wanted)
+    views = views_of_photo(
+        source, loaded, plan, should_stop, tell, nearest_to, draft_bytes, False, wanted, request.fills_beside
+    )
     work = ViewsWork(plan.grid.rows * plan.grid.columns)
     yield from _count_views(
         request.generation, views, lambda there, drafts, share: work.advance((share, 1.0), there, drafts)

@@ -106,7 +106,12 @@ class HeadlessViewer:
         on_progress(self.state.progress)
         depth_settings = DepthSettings(source.depth.refine, edits)
         request = SceneRequest(
-            self.state.generation, source, depth_strength, depth_settings=depth_settings, takes_drafts=False
+            self.state.generation,
+            source,
+            depth_strength,
+            depth_settings=depth_settings,
+            takes_drafts=False,
+            fills_beside=True,
         )
         self._results = results_of(request, lambda: False, lambda: CENTRE, on_progress, lambda: self._wanted)
         ready = next(self._results)
@@ -119,7 +124,9 @@ class HeadlessViewer:
         self._scene_view.upload_all()
 
     def make_views(self, on_progress: Callable[[Progress], None], only_seen: bool = False) -> None:
-        """The second part of `open`. only_seen: only the views of a photo's grid that its `picture` is made of."""
+        """The second part of `open`. only_seen: only the views of a photo's grid that its `picture` is made of; what a
+        few of them disocclude is inpainted in fewer outer views than for all.
+        """
         self._wanted = views_seen(self.state.optics, self.scene.grid) if only_seen else None
         for result in self._results:
             assert isinstance(result, ViewReady)

@@ -10,6 +10,7 @@ from iibr_core.generation.outer_views import (
     MOST_MARGIN,
     farthest_views,
     outer_views,
+    outer_views_beside,
     outer_views_of_grid,
     outpainting_margins,
 )
@@ -31,6 +32,23 @@ def test_the_photo_s_own_view_is_none_and_none_comes_twice():
     assert outer_views([]) == []
     assert outer_views_of_grid(GridShape(1, 5)) == [(0, -2), (0, 2)]
     assert outer_views_of_grid(GridShape(3, 5)) == outer_views(GridShape(3, 5).offset(*at) for at in np.ndindex(3, 5))
+
+
+@pytest.mark.parametrize(
+    ("wanted", "expected"),
+    [
+        ([], [(-2, -2), (2, 2)]),
+        ([(0, 1)], [(-2, -2), (2, 2), (-2, 2), (0, 2)]),
+        ([(1, 0.5)], [(-2, -2), (2, 2), (0, 2), (2, 0)]),
+        ([(0, 1), (0, -1)], [(-2, -2), (2, 2), (-2, 2), (2, -2), (0, -2), (0, 2)]),
+        ([(1, 1), (-1, -1)], [(-2, -2), (2, 2), (0, -2), (0, 2), (-2, 0), (2, 0)]),
+        (list(np.ndindex(5, 5)), None),
+    ],
+)
+def test_few_views_need_the_first_two_outer_ones_and_those_on_their_side(wanted, expected):
+    outer, grid = outer_views_of_grid(GridShape(5, 5)), GridShape(5, 5)
+    wanted = [ViewOffset(*at) for at in wanted] if expected else [grid.offset(*at) for at in wanted]
+    assert outer_views_beside(outer, wanted) == (expected or outer)
 
 
 @pytest.mark.parametrize("disparity", [1.5, -1.5])
