@@ -13,6 +13,7 @@ from typing import Any, TypeVar
 from numpy.typing import NDArray
 
 from iibr_core.exports.render_settings import RenderSettings
+from iibr_core.generation.outer_views import WantedViews
 from iibr_core.generation.plan import ScenePlan
 from iibr_core.rendering.optics import CENTRE, Optics
 from iibr_core.runtime.tiling import ShouldStop, raise_if_stopped
@@ -72,7 +73,7 @@ class ExportSource:
         else:
             source, plan = self.scene.source, self.plan(zero)
             made = views_of_photo(
-                source, self.loaded, plan, self.should_stop, self.report_progress, wanted=lambda: wanted
+                source, self.loaded, plan, self.should_stop, self.report_progress, wanted=lambda: WantedViews(wanted)
             )
         scene = self.scene if zero is None else replace(self.scene, infinity_px=self._infinity_px(zero))
         made = add_gloss(made, self.optics.gloss, scene, self.should_stop)

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
         require_process,
         whole_bytes,
     )
+    from iibr_core.generation.outer_views import ALL_VIEWS, WantedViews
     from iibr_core.generation.plan import ScenePlan, plan_literal
     from iibr_core.generation.stored_views import encode_for_storage, stored_colors
 else:

@@ -5,7 +5,7 @@ The outer views come first and complete the ray set (`update_loop`); the remaini
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Generator, Iterator
+from collections.abc import Callable, Generator, Iterator
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
@@ -14,8 +14,10 @@ import numpy as np
 
 from iibr_core.generation.field_work import FieldWork
 from iibr_core.generation.outer_views import (
+    ALL_VIEWS,
+    WantedViews,
     farthest_views,
-    outer_views_beside,
+    outer_views_for,
     outer_views_of_grid,
     outpainting_margins,
 )
@@ -54,8 +56,7 @@ def generate(
     inpaint: str = DEFAULT_INPAINTER,
     draft_bytes: int | None = None,
     aids: InpaintingAids | None = None,
-    wanted: Callable[[], Collection[ViewOffset] | None] = lambda: None,
-    fills_beside: bool = False,
+    wanted: Callable[[], WantedViews] = lambda: ALL_VIEWS,
 ) -> Generator[ViewUpdate, None, None]:
     """Yield every view of `plan.grid` once: the photo's own first, then the outer ones, then those nearest to
     `nearest_to()`.
@@ -64,8 +65,7 @@ def generate(
     is true the generator returns. Pixels do not depend on the order of the views. quality: None for the plan's; "fast"
     weighs by the closed form, "balanced" asks the trained transformer where surfaces contest a ray. inpaint: as
     `load_inpainter` takes it. aids: what it may ask. wanted: asked once, after the photo's own view, which views of the
-    grid are to follow; None: all. They have the pixels that they have among all; with fills_beside only where the photo
-    saw something: what they disocclude is then inpainted in fewer outer views, see `outer_views_beside`.
+    grid are to follow, and what for: a sum is of fast quality where nobody asked for another.
 
     draft_bytes: for who wants to see something soon. As far as so much memory holds what is left to be done for them,
     views come twice: as drafts in closed form, in the order above; then, when every view is there, with the
@@ -78,7 +78,6 @@ def generate(
     if disparity.values.shape != photo.size:
         raise ValueError(f"disparity is {image_size(disparity.values)}, the photo {photo.size}")
     with suppress(Cancelled):
-        quality = quality or plan.quality
         require_inpainter(inpaint)
         # A model is not loaded for nothing.
         load = partial(load_inpainter, inpaint if plan.has_disocclusion else DEFAULT_INPAINTER, aids)
@@ -87,12 +86,11 @@ def generate(
         nothing = np.zeros(photo.size, np.bool_)
         yield ViewUpdate(*plan.grid.centre, colors, disparity.values, nothing, share=float(len(views) == 1))
         chosen = wanted()
-        views = [at for at in views if at != (0.0, 0.0) and (chosen is None or at in chosen)]
+        views = [at for at in views if at != (0.0, 0.0) and (chosen.offsets is None or at in chosen.offsets)]
         if not views:
             return
-        outer = outer_views_of_grid(plan.grid) if plan.has_disocclusion else []
-        if fills_beside:
-            outer = outer_views_beside(outer, views)
+        quality = quality or ("fast" if chosen.seen == "sum" else plan.quality)
+        outer = outer_views_for(outer_views_of_grid(plan.grid), chosen) if plan.has_disocclusion else []
         wanted_outer = len(set(outer).intersection(views))
         counts = len(outer), wanted_outer, len(views) - wanted_outer
         work = FieldWork(plan.costs, quality, counts, inpaint not in INPAINTERS)

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Sequence
+from dataclasses import dataclass
 from math import ceil
+from typing import Literal
 
 import numpy as np
 
@@ -15,6 +17,21 @@ NEARLY_ALL = 0.99
 """So much of a side of the frame counts: a few wild pixels do not make the canvas larger."""
 LOOKUP_MARGIN_PX = 2
 """So much more of a margin, that look-ups at its end find their neighbours."""
+
+
+@dataclass(frozen=True)
+class WantedViews:
+    """Which views of a grid are made beside the photo's own. offsets: None for all.
+
+    seen: "each": as they are among all. "one": of one picture by a pinhole, so their fills need not be those of others.
+    "sum": only their sum through a lens is, in which neither fills nor what the transformer says can be told.
+    """
+
+    offsets: Collection[ViewOffset] | None = None
+    seen: Literal["each", "one", "sum"] = "each"
+
+
+ALL_VIEWS = WantedViews()
 
 
 def outer_views(offsets: Iterable[ViewOffset]) -> list[ViewOffset]:
@@ -36,12 +53,14 @@ def outer_views_of_grid(grid: GridShape) -> list[ViewOffset]:
     return outer_views([grid.offset(0, 0), grid.offset(grid.rows - 1, grid.columns - 1)])
 
 
-def outer_views_beside(outer: Sequence[ViewOffset], wanted: Collection[ViewOffset]) -> list[ViewOffset]:
-    """Those of the outer views that see nearly all that the wanted ones disocclude: the first two, which come before
-    all others and so decide most, and those on the side of the photo where a wanted one lies.
+def outer_views_for(outer: Sequence[ViewOffset], wanted: WantedViews) -> list[ViewOffset]:
+    """Those of the outer views that complete the ray set for the wanted ones. For each as among all: all. For a sum the
+    first two, which come before all others and so decide most; for one picture also those on its side of the photo.
     """
-    beside = {far for far in outer for at in wanted if _is_on_side_of(far, at)}
-    return [far for far in outer if far in outer[:2] or far in beside]
+    if wanted.offsets is None or wanted.seen == "each":
+        return list(outer)
+    beside = wanted.offsets if wanted.seen == "one" else ()
+    return [far for far in outer if far in outer[:2] or any(_is_on_side_of(far, at) for at in beside)]
 
 
 def _is_on_side_of(far: ViewOffset, at: ViewOffset) -> bool:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Generator
+from collections.abc import Callable, Generator
 
 import numpy as np
 
 from iibr_core.color import photo_in_srgb
 from iibr_core.depth.editing.edits import UNEDITED
 from iibr_core.generation.disparity_range import measure_disparity_range
+from iibr_core.generation.outer_views import ALL_VIEWS, WantedViews
 from iibr_core.generation.plan import MOST_STRENGTH, PlanOverrides, ScenePlan, plan_for_viewing, plan_literal
 from iibr_core.inpainting.inpainter import InpaintingAids
 from iibr_core.runtime.tiling import ShouldStop, never
@@ -67,8 +68,7 @@ def views_of_photo(
     nearest_to: Callable[[], ViewOffset] = lambda: ViewOffset(0.0, 0.0),
     draft_bytes: int | None = None,
     in_srgb: bool = True,
-    wanted: Callable[[], Collection[ViewOffset] | None] = lambda: None,
-    fills_beside: bool = False,
+    wanted: Callable[[], WantedViews] = lambda: ALL_VIEWS,
 ) -> Generator[ViewUpdate]:
     """As `generate` yields them. report_progress: hears of inpainting that takes long. in_srgb: else in the photo's
     colour space. Raises InputError as `generate` does.
@@ -88,5 +88,4 @@ def views_of_photo(
         draft_bytes,
         aids,
         wanted,
-        fills_beside,
     )

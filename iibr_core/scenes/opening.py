@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Collection, Generator, Iterator
+from collections.abc import Callable, Generator, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -16,6 +16,7 @@ from iibr_core.depth.editing.edits import UNEDITED
 from iibr_core.depth.subject import subject_disparity
 from iibr_core.formats.light_fields.light_field_formats import is_light_field
 from iibr_core.generation.disparity_range import measure_disparity_range
+from iibr_core.generation.outer_views import ALL_VIEWS, WantedViews
 from iibr_core.generation.plan import ScenePlan
 from iibr_core.runtime.allocator import give_back_memory
 from iibr_core.runtime.tiling import ShouldStop, never
@@ -34,7 +35,7 @@ class SceneRequest:
 
     plan: of what is loaded, where it is made already. takes_drafts: views may come twice, so that there is something
     to look at soon; else each comes once, final. filled: the same light field, where all its views are made already.
-    asks_model: else depth is guessed where a model would be asked. fills_beside: see `generate`.
+    asks_model: else depth is guessed where a model would be asked.
     """
 
     generation: int
@@ -46,7 +47,6 @@ class SceneRequest:
     plan: ScenePlan | None = None
     filled: FilledField | None = None
     asks_model: bool = True
-    fills_beside: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,12 +73,12 @@ def results_of(
     should_stop: Callable[[], bool],
     nearest_to: Callable[[], ViewOffset],
     report_progress: Callable[[Progress], None] = lambda progress: None,
-    wanted: Callable[[], Collection[ViewOffset] | None] = lambda: None,
+    wanted: Callable[[], WantedViews] = lambda: ALL_VIEWS,
 ) -> Generator[SceneReady | ViewReady]:
     """Everything a job has to say, in order: the scene, then each of its views; a light field perhaps more than once.
 
     report_progress: is told what it does while there is nothing new to show. wanted: asked once the scene is there,
-    which views of a photo's grid are to be made beside its own; None: all. Raises InputError for a file that cannot
+    which views of a photo's grid are to be made beside its own. Raises InputError for a file that cannot
     be opened, Cancelled where should_stop says so while it is read.
     """
     try:
@@ -161,7 +161,7 @@ def _results_of_photo(
     should_stop: Callable[[], bool],
     nearest_to: Callable[[], ViewOffset],
     report_progress: Callable[[Progress], None],
-    wanted: Callable[[], Collection[ViewOffset] | None],
+    wanted: Callable[[], WantedViews],
 ) -> Iterator[SceneReady | ViewReady]:
     source = request.source
     depth_settings = request.depth_settings or DepthSettings(source.depth.refine)
@@ -178,9 +178,7 @@ def _results_of_photo(
     yield SceneReady(request.generation, scene_of_photo(source, loaded, plan), loaded, _centre_view(loaded, plan))
 
     draft_bytes = plan.draft_bytes if request.takes_drafts else None
-    views = views_of_photo(
-        source, loaded, plan, should_stop, tell, nearest_to, draft_bytes, False, wanted, request.fills_beside
-    )
+    views = views_of_photo(source, loaded, plan, should_stop, tell, nearest_to, draft_bytes, False, wanted)
     work = ViewsWork(plan.grid.rows * plan.grid.columns)
     yield from _count_views(
         request.generation, views, lambda there, drafts, share: work.advance((share, 1.0), there, drafts)

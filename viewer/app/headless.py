@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from iibr_core.color import linear_from_srgb
 from iibr_core.depth.editing import UNEDITED, DepthEdits
 from iibr_core.exports import FullPicture, RenderSettings, encode_light, is_full, needs_smaller, require_size
+from iibr_core.generation import ALL_VIEWS
 from iibr_core.rendering import CENTRE
 from iibr_core.scenes import (
     DepthSettings,
@@ -26,13 +27,13 @@ from iibr_core.scenes import (
     ViewReady,
     results_of,
 )
-from iibr_core.types import SRGB, ColorSpace, FloatImage, ReportProgress, ViewOffset, ignore_progress
+from iibr_core.types import SRGB, ColorSpace, FloatImage, ReportProgress, ignore_progress
 from viewer.background.comparison_worker import ComparisonJob
 from viewer.display.inspection_view import InspectionView
 from viewer.display.scene_drawer import prepare_gloss
 from viewer.display.scene_view import SceneView
 from viewer.gpu.headless_context import Backend, create_headless
-from viewer.gpu.refocus.views_seen import views_seen
+from viewer.gpu.refocus.views_seen import wanted_for
 from viewer.model.actions import Action, OpenPath, ProgressMade, SceneOpened, SetState
 from viewer.model.inspection_request import (
     NO_INSPECTION_TEXTURES,
@@ -60,7 +61,7 @@ class HeadlessViewer:
         self._inspection_view = InspectionView(self._gl, self._scene_view)
         self._comparison_job = ComparisonJob()
         self._results: Iterator[SceneReady | ViewReady] = iter(())
-        self._wanted: set[ViewOffset] | None = None
+        self._wanted = ALL_VIEWS
 
     def __enter__(self) -> HeadlessViewer:
         """Nothing more to do."""
@@ -106,13 +107,9 @@ class HeadlessViewer:
         on_progress(self.state.progress)
         depth_settings = DepthSettings(source.depth.refine, edits)
         request = SceneRequest(
-            self.state.generation,
-            source,
-            depth_strength,
-            depth_settings=depth_settings,
-            takes_drafts=False,
-            fills_beside=True,
+            self.state.generation, source, depth_strength, depth_settings=depth_settings, takes_drafts=False
         )
+        self._wanted = ALL_VIEWS
         self._results = results_of(request, lambda: False, lambda: CENTRE, on_progress, lambda: self._wanted)
         ready = next(self._results)
         assert isinstance(ready, SceneReady)
@@ -124,10 +121,9 @@ class HeadlessViewer:
         self._scene_view.upload_all()
 
     def make_views(self, on_progress: Callable[[Progress], None], only_seen: bool = False) -> None:
-        """The second part of `open`. only_seen: only the views of a photo's grid that its `picture` is made of; what a
-        few of them disocclude is inpainted in fewer outer views than for all.
-        """
-        self._wanted = views_seen(self.state.optics, self.scene.grid) if only_seen else None
+        """The second part of `open`. only_seen: only the views of a photo's grid that its `picture` is made of."""
+        if only_seen:
+            self._wanted = wanted_for(self.state.optics, self.scene.grid)
         for result in self._results:
             assert isinstance(result, ViewReady)
             self._scene_view.add(result.view)

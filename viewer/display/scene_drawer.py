@@ -11,11 +11,12 @@ from typing import Any
 from numpy.typing import NDArray
 
 from iibr_core.exports import ExportSource, OpticsOf, RenderSettings, require_size
+from iibr_core.generation import ALL_VIEWS, WantedViews
 from iibr_core.rendering import CENTRE
 from iibr_core.rendering.gloss import Gloss
 from iibr_core.runtime import never
 from iibr_core.scenes import LensChoice, Scene, SceneReady, SceneRequest, Source, ViewReady, answer, results_of
-from iibr_core.types import ReportProgress, ViewOffset, ignore_progress
+from iibr_core.types import ReportProgress, ignore_progress
 from viewer.display.scene_view import SceneView
 from viewer.gpu.headless_context import create_headless
 from viewer.gpu.refocus.views_seen import views_seen_by
@@ -64,7 +65,7 @@ class SceneDrawer:
         optics_of: OpticsOf | None = None,
     ) -> ExportSource:
         """See `OpenDrawn`; optics_of: None where any picture may be drawn. Raises InputError also without GL."""
-        wanted: set[ViewOffset] | None = None
+        wanted = ALL_VIEWS
         view = self._view = self._view or self._make_view()
         request = SceneRequest(0, source, depth_strength, takes_drafts=False)
         results = results_of(
@@ -75,7 +76,7 @@ class SceneDrawer:
         on_ready(ready.scene)
         optics = lens.optics_on(ready.scene)
         if optics_of is not None:
-            wanted = views_seen_by(optics_of(ready.scene, optics), ready.scene.grid)
+            wanted = WantedViews(views_seen_by(optics_of(ready.scene, optics), ready.scene.grid))
         view.open(ready)
         for made in results:
             assert isinstance(made, ViewReady)

@@ -1,4 +1,5 @@
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -6,6 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from iibr_core.generation.light_field import generate
+from iibr_core.generation.outer_views import WantedViews
 from iibr_core.inpainting.registry import INPAINTERS
 from iibr_core.rendering.photo_rays import rays_of_photo
 from iibr_core.rendering.view_synthesis import ViewSynthesis
@@ -65,6 +67,21 @@ def test_a_square_before_a_wall_against_the_true_view():
     assert psnr(view.colors, truth * 255) > 34
     assert view.disparity[square] == pytest.approx(foreground)
     assert view.disparity[uncovered] == pytest.approx(0, abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("seen", "asked", "made"),
+    [("one", None, "balanced"), ("sum", None, "fast")]
+    + [("sum", quality, quality) for quality in ("fast", "balanced")],
+)
+def test_views_of_a_sum_are_fast_where_nobody_asked_for_more(monkeypatch, seen, asked, made):
+    photo, disparity = square_before_wall()
+    plan, qualities = replace(literal_plan(photo, disparity, 5), quality="balanced"), []
+    monkeypatch.setattr("iibr_core.generation.light_field.transformer_for", qualities.append)
+    at = ViewOffset(1.0, -1.0)
+    views = list(generate(photo, disparity, plan, quality=asked, wanted=lambda: WantedViews([at], seen)))
+    assert [plan.grid.offset(view.row, view.column) for view in views] == [(0, 0), at]
+    assert qualities == [made]
 
 
 def test_order_and_bands_do_not_change_a_pixel(monkeypatch):

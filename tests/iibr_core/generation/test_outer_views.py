@@ -6,11 +6,13 @@ import numpy as np
 import pytest
 
 from iibr_core.generation.outer_views import (
+    ALL_VIEWS,
     LOOKUP_MARGIN_PX,
     MOST_MARGIN,
+    WantedViews,
     farthest_views,
     outer_views,
-    outer_views_beside,
+    outer_views_for,
     outer_views_of_grid,
     outpainting_margins,
 )
@@ -42,13 +44,14 @@ def test_the_photo_s_own_view_is_none_and_none_comes_twice():
         ([(1, 0.5)], [(-2, -2), (2, 2), (0, 2), (2, 0)]),
         ([(0, 1), (0, -1)], [(-2, -2), (2, 2), (-2, 2), (2, -2), (0, -2), (0, 2)]),
         ([(1, 1), (-1, -1)], [(-2, -2), (2, 2), (0, -2), (0, 2), (-2, 0), (2, 0)]),
-        (list(np.ndindex(5, 5)), None),
     ],
 )
-def test_few_views_need_the_first_two_outer_ones_and_those_on_their_side(wanted, expected):
-    outer, grid = outer_views_of_grid(GridShape(5, 5)), GridShape(5, 5)
-    wanted = [ViewOffset(*at) for at in wanted] if expected else [grid.offset(*at) for at in wanted]
-    assert outer_views_beside(outer, wanted) == (expected or outer)
+def test_one_picture_needs_the_first_two_outer_views_and_those_on_its_side(wanted, expected):
+    outer, at = outer_views_of_grid(GridShape(5, 5)), [ViewOffset(*offset) for offset in wanted]
+    assert outer_views_for(outer, WantedViews(at, "one")) == expected
+    assert outer_views_for(outer, WantedViews(at, "sum")) == expected[:2]
+    assert outer_views_for(outer, WantedViews(at)) == outer
+    assert outer_views_for(outer, WantedViews(None, "sum")) == outer_views_for(outer, ALL_VIEWS) == outer
 
 
 @pytest.mark.parametrize("disparity", [1.5, -1.5])

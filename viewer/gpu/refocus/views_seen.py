@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from iibr_core.generation import WantedViews
 from iibr_core.rendering import Optics
 from iibr_core.types import GridShape, ViewOffset
 from viewer.gpu.refocus.accumulation import MAX_PASSES, r2_sequence
@@ -15,6 +16,16 @@ from viewer.gpu.refocus.view_sampling import aperture_samples, pinhole_sources
 
 MOST_OPEN = 32
 """Of so many different open apertures the views are found in 0.3 s; more show nearly all."""
+
+
+ALL_LENS = 2.0
+"""From this aperture on a picture is the sum over the lens, see `Lens.aperture_share`."""
+
+
+def wanted_for(optics: Optics, grid: GridShape) -> WantedViews:
+    """What a picture through these optics is made of, once it has converged, and how that is seen in it."""
+    is_sum = optics.aperture_diameter >= ALL_LENS and optics.dolly == 0
+    return WantedViews(views_seen(optics, grid), "sum" if is_sum else "one")
 
 
 def views_seen(optics: Optics, grid: GridShape) -> set[ViewOffset] | None:
