@@ -32,8 +32,6 @@ MOST_CLEAR_NEIGHBOURS = 4
 """What is clearly between has at most so many neighbours on its own disparity."""
 MOST_NEIGHBOURS = (2, 4)
 """So has in other maps all that lies between, on thin things too: so many within one pixel, and within two."""
-CROWD_PX, CROWDED = 5, 0.3
-"""Not so where steps are at so large a share of the pixels within CROWD_PX, as in meshes: there it may be a wire's."""
 
 
 def resolve_edge_band(
@@ -41,38 +39,34 @@ def resolve_edge_band(
     values: FloatImage,
     least_edge: float,
     unknown: NDArray[np.bool_],
-    is_sharpened: bool = False,
     should_stop: ShouldStop = never,
     stages: Stages = ALL_STAGES,
 ) -> FloatImage:
     """The map (H, W) with every pixel beside a depth edge on one of its two sides, by the photo (H, W, 3).
 
     least_edge: the step that counts as a depth edge, more than 0. unknown: (H, W), where values were filled in.
-    is_sharpened: whether its edges were soft. stages: that are on.
+    stages: that are on.
     Lone disparities between two surfaces, which maps have that were measured or resampled, are taken for unknown, and
     all that is unknown is filled again: mixed pixels, which look like one another, had passed them on. Then pixels
     change sides where the colours say so (`label_edges`). Raises Cancelled once should_stop is true.
     """
     colors = np.ascontiguousarray(photo, np.float32)
     is_band = step_distance(values, least_edge, BAND_PX, counts_slopes=True) < BAND_PX
-    between, clear = _find_between(values, least_edge, is_sharpened, should_stop)
+    between, clear = _find_between(values, least_edge, should_stop)
     is_measured = clear > LEAST_MEASURED * np.count_nonzero(is_band)
     unsure, filled = unknown, values
     if is_measured and stages.refill_between_surfaces:
-        known = np.where(unknown, np.float32(np.nan), values)
-        between |= _find_between(known, least_edge, is_sharpened, should_stop)[0]
+        between |= _find_between(np.where(unknown, np.float32(np.nan), values), least_edge, should_stop)[0]
         unsure = between | unknown
         filled = fill_disparity_by_color(colors, np.where(unsure, np.float32(np.nan), values), should_stop)
     return label_edges(colors, filled, unsure, least_edge, should_stop) if stages.label_edge_bands else filled
 
 
-def _find_between(
-    values: FloatImage, least_edge: float, is_sharpened: bool, should_stop: ShouldStop
-) -> tuple[NDArray[np.bool_], int]:
+def _find_between(values: FloatImage, least_edge: float, should_stop: ShouldStop) -> tuple[NDArray[np.bool_], int]:
     """(H, W): lone pixels of no surface, between two, NaN being none; how many are so clearly."""
     between = np.zeros(values.shape, np.bool_)
     clear = in_bands(
-        lambda first, last: _find_between_rows(values, least_edge, is_sharpened, first, last, between),
+        lambda first, last: _find_between_rows(values, least_edge, first, last, between),
         image_size(values),
         should_stop,
     )
@@ -105,7 +99,7 @@ def _is_between(values, y, x, right, down, least_edge):
 
 
 @kernel
-def _find_between_rows(values, least_edge, is_sharpened, first, last, between):
+def _find_between_rows(values, least_edge, first, last, between):
     """Rows [first, last) of `_find_between`."""
     height, width = values.shape
     margin, clear = 2 + PLATEAU_PX, 0
@@ -136,20 +130,5 @@ def _find_between_rows(values, least_edge, is_sharpened, first, last, between):
             for v in range(max(y - 2, 0), min(y + 3, height)):
                 for u in range(max(x - 2, 0), min(x + 3, width)):
                     neighbours += abs(values[v, u] - values[y, x]) <= least_edge
-            between[y, x] = neighbours <= MOST_NEIGHBOURS[1] and (
-                is_sharpened or not _is_crowded(values, y, x, least_edge)
-            )
+            between[y, x] = neighbours <= MOST_NEIGHBOURS[1]
     return clear
-
-
-@kernel
-def _is_crowded(values, y, x, least_edge):
-    """Whether a pixel has depth edges all around it."""
-    height, width = values.shape
-    steps, places = 0, 0
-    for v in range(max(y - CROWD_PX, 0), min(y + CROWD_PX, height - 2) + 1):
-        for u in range(max(x - CROWD_PX, 0), min(x + CROWD_PX, width - 2) + 1):
-            right, down = abs(values[v, u + 1] - values[v, u]), abs(values[v + 1, u] - values[v, u])
-            steps += right > least_edge or down > least_edge
-            places += 1
-    return steps >= CROWDED * places

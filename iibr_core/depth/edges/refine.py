@@ -86,7 +86,7 @@ def refine(
     if not least_edge > 0:
         return sharp
     filled = ~np.isfinite(disparity) if unknown is None else unknown | ~np.isfinite(disparity)
-    resolved = resolve_edge_band(colors, sharp, least_edge, filled, sharp is not values, should_stop, stages)
+    resolved = resolve_edge_band(colors, sharp, least_edge, filled, should_stop, stages)
     # Edge bands, too, go so far only.
     return resolved if strength == 1 else sharp + np.float32(strength) * (resolved - sharp)
 

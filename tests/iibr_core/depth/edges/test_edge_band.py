@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from iibr_core.depth.edges.edge_band import CROWD_PX, CROWDED, _find_between, _is_crowded, resolve_edge_band
+from iibr_core.depth.edges.edge_band import _find_between, resolve_edge_band
 from iibr_core.runtime import tiling
 from iibr_core.runtime.tiling import Cancelled
 from tests.iibr_core.scenes import smooth_texture, square_before_wall
@@ -87,9 +87,9 @@ def test_a_lone_pixel_between_two_surfaces_is_none_of_them_but_the_tip_of_a_thin
     values = np.full((40, 40), FAR, np.float32)
     values[:, 21:] = NEAR
     values[10, 20] = height
-    assert np.argwhere(_find_between(values, EDGE, False, tiling.never)[0]).tolist() == [[10, 20]]
+    assert np.argwhere(_find_between(values, EDGE, tiling.never)[0]).tolist() == [[10, 20]]
     values[11, 20:22] = values[12, 19:22] = values[13:, 19:22] = height
-    found, clear = _find_between(values, EDGE, False, tiling.never)
+    found, clear = _find_between(values, EDGE, tiling.never)
     assert found.sum() == clear == (height == 5.0)
 
 
@@ -98,7 +98,7 @@ def test_beside_the_border_nothing_is_clearly_between():
     values = np.full((40, 40), FAR, np.float32)
     values[:, :6], values[:, -1], values[10, -2] = NEAR, NEAR, 5.0
     for turn in range(4):
-        found, clear = _find_between(np.ascontiguousarray(np.rot90(values, turn)), EDGE, False, tiling.never)
+        found, clear = _find_between(np.ascontiguousarray(np.rot90(values, turn)), EDGE, tiling.never)
         assert (found.sum(), clear) == (1, 0)
 
 
@@ -134,31 +134,3 @@ def test_a_stop_is_heard():
     photo, truth = disc()
     with pytest.raises(Cancelled):
         resolve(photo, resampled(truth), should_stop=lambda: True)
-
-
-def is_crowded_slowly(values, y, x):
-    """Steps right or down at CROWDED of the pixels within CROWD_PX that have both neighbours."""
-    around = values[max(y - CROWD_PX, 0) : y + CROWD_PX + 2, max(x - CROWD_PX, 0) : x + CROWD_PX + 2]
-    steps = (np.abs(np.diff(around, axis=1))[:-1] > EDGE) | (np.abs(np.diff(around, axis=0))[:, :-1] > EDGE)
-    return steps.mean() >= CROWDED
-
-
-@pytest.mark.parametrize("at", [(0, 0), (4, 5), (14, 17), (29, 33), (20, 33), (29, 2)])
-@pytest.mark.parametrize("period", [3, 4, 5, 6, 7])
-def test_crowds_of_steps_agree_with_a_slow_twin(at, period):
-    y, x = np.mgrid[:30, :34]
-    values = np.where((x % period == 0) | (y % 9 == 0), np.float32(NEAR), np.float32(FAR))
-    assert _is_crowded(values, *at, EDGE) == is_crowded_slowly(values, *at)
-
-
-def test_lone_disparities_in_a_mesh_stay():
-    """Crossing wires, every few pixels, some of them farther away; what lies between alone on a wire is found."""
-    values = np.full((60, 120), FAR, np.float32)
-    values[4:56:3, 4:56], values[4:56, 4:56:3] = NEAR, NEAR
-    values[4:56:6, 4:56:3] = 5.0
-    values[30, 80:100], values[30, 90] = NEAR, 5.0
-    between, _ = _find_between(values, EDGE, False, tiling.never)
-    assert not between[10:50, 10:50].any()
-    assert between[30, 90]
-    # A blur lowered such wires, and sharpening left what lies between.
-    assert _find_between(values, EDGE, True, tiling.never)[0][10:50, 10:50].any()
