@@ -12,12 +12,14 @@ SAME_SURFACE_PX = 0.5
 """What parts by no more is of one surface: it lands as one, and look-ups meet it as one."""
 EDGE_PX = 1.0
 """What parts by more is two surfaces, one in front of the other: between them is a depth edge, which mixes both."""
-WIDE_EDGE_PX = 2.0
-"""Where both sides part by more than this, nobody takes them for one: rays tear off there, and nothing is inpainted
-from one side to the other.
-"""
+EDGE_SHARE = 0.03
+"""Of a map's range: a larger step is a depth edge where no views are known yet."""
+SMOOTH_SHARE = 0.8
+"""A smooth surface's steps stay below this share of the step that parts surfaces."""
 SLOPE_SHARE = 0.25
-"""A step that goes on by more than this share of it on its other side, or on both, is a slope's and no edge."""
+"""What changes by more than this share of a step beside it makes a slope of it, no depth edge; on a surface, steps that
+follow each other differ by no more.
+"""
 
 
 def step_of(px: float, views: float) -> float:

@@ -18,7 +18,7 @@ from iibr_core.inpainting.patch_synthesis import copy_patches, mixed_beside
 from iibr_core.runtime.jit import kernel, nearest_pixel
 from iibr_core.runtime.tiling import ShouldStop, in_pieces, never, pieces_of
 from iibr_core.stages import ALL_STAGES, Stages
-from iibr_core.surfaces import SAME_SURFACE_PX, WIDE_EDGE_PX, is_in_front, same_surface, step_of
+from iibr_core.surfaces import EDGE_PX, SAME_SURFACE_PX, is_in_front, same_surface, step_of
 from iibr_core.types import FloatImage, ViewOffset
 
 SMOOTH_STEPS_PX = (1, 2, 4, 8, 16, 32)
@@ -55,7 +55,7 @@ def continue_farthest(
 ) -> None:
     """The same in a picture of which nobody knows what the photo hides there: the farthest surface around goes on.
 
-    farthest_views: surfaces are one that part by less than WIDE_EDGE_PX so many view steps away. stages: that are on.
+    farthest_views: surfaces are one that part by less than EDGE_PX so many view steps away. stages: that are on.
     """
     nothing_hides = np.full(disparity.shape, -np.inf, np.float32)
     _fill_view(colors, disparity, hole, nothing_hides, ViewOffset(0.0, 0.0), farthest_views, should_stop, 1, stages)
@@ -74,7 +74,7 @@ def goes_on_in_front(
     """
     pixels = flat_indices(hole, should_stop, threads)
     known = nearest_known(hole, pixels, should_stop, threads)
-    in_front, one_surface = np.zeros_like(hole), step_of(WIDE_EDGE_PX, max(map(abs, offset)))
+    in_front, one_surface = np.zeros_like(hole), step_of(EDGE_PX, max(map(abs, offset)))
     in_pieces(
         lambda part: _weigh_in_front(
             disparity, pixels[part], known[part], photo_disparity, offset.s, offset.t, one_surface, in_front
@@ -96,7 +96,7 @@ def _fill_view(
     stages: Stages,
 ) -> None:
     """See `fill_background`. parallax: px that surfaces part by for each px of disparity."""
-    one_surface = step_of(WIDE_EDGE_PX, parallax)
+    one_surface = step_of(EDGE_PX, parallax)
     pixels = flat_indices(hole, should_stop, threads)
     known = nearest_known(hole, pixels, should_stop, threads)
     reach, changed = np.empty(len(pixels), np.float32), np.empty((len(pixels), 3), np.float32)
@@ -136,7 +136,7 @@ def _fill(
     height, width = disparity.shape
     photo, directions = photo_disparity.ravel(), known.shape[1]
     surface, weight = np.zeros(directions), np.zeros(directions)
-    hidden = one_surface * (SAME_SURFACE_PX / WIDE_EDGE_PX)
+    hidden = one_surface * (SAME_SURFACE_PX / EDGE_PX)
     for i in range(len(pixels)):
         y, x = pixels[i] // width, pixels[i] % width
         nearest, farthest, any_possible = np.inf, np.inf, False
@@ -208,7 +208,7 @@ def _place_in_photo(y, x, height, width):
 def _weigh_in_front(disparity, pixels, known, photo_disparity, s, t, one_surface, in_front):
     """Write `goes_on_in_front` for these pixels."""
     height, width = disparity.shape
-    photo, hidden = photo_disparity.ravel(), one_surface * (SAME_SURFACE_PX / WIDE_EDGE_PX)
+    photo, hidden = photo_disparity.ravel(), one_surface * (SAME_SURFACE_PX / EDGE_PX)
     for i in range(len(pixels)):
         y, x = pixels[i] // width, pixels[i] % width
         balance = 0.0

@@ -20,9 +20,9 @@ LANDING_REACH_PX = 1.5
 SETTLED_PX = 0.02
 """A ray is followed until it moves by less than this: the step after that would be far shorter."""
 LEAST_LEFT = 0.2
-"""A smooth surface is compressed to no less than this share of its width (see `ray_set.SMOOTH_SHARE`)."""
+"""A smooth surface is compressed to no less than this share of its width (see `surfaces.SMOOTH_SHARE`)."""
 MOST_ROUNDS = 30
-"""On a smooth surface each round comes at least a fifth closer, mostly far more (see `ray_set.SMOOTH_SHARE`)."""
+"""On a smooth surface each round comes at least a fifth closer, mostly far more (see `surfaces.SMOOTH_SHARE`)."""
 
 
 def find_coherent_cells(

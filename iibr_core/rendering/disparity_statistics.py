@@ -12,21 +12,17 @@ from numpy.typing import NDArray
 
 from iibr_core.runtime.jit import kernel
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never
-from iibr_core.surfaces import WIDE_EDGE_PX, step_of
+from iibr_core.surfaces import EDGE_PX, SLOPE_SHARE, step_of
 from iibr_core.types import FloatImage, image_size
 
 STATISTICS_PX = 2
 """Reach of the range of disparities, and of the largest step, around a source ray."""
 EDGE_WINDOW_PX = 8
-"""A depth edge softer than this is a slope."""
+"""A depth edge softer than this is a slope; rays this close to the middle of a soft edge are marked."""
 SOFT_EDGES_PX = (8, 12)
 """Widths of the soft edges that are looked for; the wider one is for a blur of 4 px and more."""
-MOST_SHOULDER = 0.33
-"""By at most this share of a soft edge may the map rise or fall within its width on either side: a surface goes on."""
 SHARP_STEP_SHARE = 0.5
 """An edge whose largest step makes up this share of its steps is sharp."""
-SOFT_AROUND_PX = 8
-"""Rays this close to the middle of a soft edge are marked."""
 SOFT_EDGE_SHARPNESS = 0.5
 """Where depth edges are softer than this, surfaces are looked for farther around a ray."""
 
@@ -55,7 +51,7 @@ def measure_disparity(
     low, high, step = (np.empty(disparity.shape, np.float32) for _ in range(3))
     for source, *found in zip(disparity, low, high, step):
         _measure_rows(source, found, should_stop)
-    soft, softness = find_soft_edges(disparity[0], step_of(WIDE_EDGE_PX, farthest_views), should_stop)
+    soft, softness = find_soft_edges(disparity[0], step_of(EDGE_PX, farthest_views), should_stop)
     return DisparityStatistics(low, high, step, softness, soft)
 
 
@@ -124,10 +120,10 @@ def _mark_soft(values, width, least_edge, soft):
         if not largest < SHARP_STEP_SHARE * change:
             continue
         # Flat shoulders on both sides tell an edge from a surface.
-        flat, end = MOST_SHOULDER * change, x + width
+        flat, end = SLOPE_SHARE * change, x + width
         if _rise(values, x - width, x) <= flat and _rise(values, end, end + width) <= flat:
             middle = x + width // 2
-            soft[max(middle - SOFT_AROUND_PX, 0) : middle + SOFT_AROUND_PX + 1] = True
+            soft[max(middle - EDGE_WINDOW_PX, 0) : middle + EDGE_WINDOW_PX + 1] = True
 
 
 @kernel

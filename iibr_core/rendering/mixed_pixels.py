@@ -26,14 +26,12 @@ MATTING_NEARNESS = nearness(MATTING_PX, 2.5)
 EDGE_BAND_TRUST = 0.001
 """What pixels beside a depth edge count, which may be mixed themselves; they tell where there are no others."""
 COLOR_VARIANCE = 2e-5
-"""Variance of a colour in linear light about what its surroundings say; and what is added for rounding, relative."""
-MATTING_ROUNDING = 1e-6
-STRAIGHT_SHARE = 0.12
-DIAGONAL_SHARE = 0.05
-"""Of a pixel that its outline alone gives to the foreground, for each straight and diagonal neighbour that is."""
+"""Variance of a colour in linear light about what its surroundings say, and added to theirs for rounding: a share."""
+OUTLINE_SHARE = 0.08
+"""Of a pixel that its outline alone gives to the foreground, for each of the eight neighbours that is."""
 SHARE_DEVIATION = 0.2
 """Standard deviation of shares from that: supersampled layers had 0.1; edges of maps are not as exact."""
-MATTING_ROUNDS = 3
+MATTING_ROUNDS = 2
 STRAIGHT = np.array([(-1, 0), (0, -1), (0, 1), (1, 0)])
 
 
@@ -122,7 +120,7 @@ def _foreground_beside(disparity, y, x, edge_step):
     for v in range(max(y - 1, 0), min(y + 2, height)):
         for u in range(max(x - 1, 0), min(x + 2, width)):
             if same_surface(disparity[v, u], foreground, edge_step):
-                share += STRAIGHT_SHARE if v == y or u == x else DIAGONAL_SHARE
+                share += OUTLINE_SHARE
     return foreground, share
 
 
@@ -160,9 +158,7 @@ def _color_statistics(colors, disparity, is_edge_band, y, x, foreground, edge_st
             for e in range(c + 1):
                 spread[surface, c, e] -= mean[surface, c] * mean[surface, e]
                 spread[surface, e, c] = spread[surface, c, e]
-        noise = COLOR_VARIANCE + MATTING_ROUNDING * (
-            spread[surface, 0, 0] + spread[surface, 1, 1] + spread[surface, 2, 2]
-        )
+        noise = COLOR_VARIANCE * (1.0 + spread[surface, 0, 0] + spread[surface, 1, 1] + spread[surface, 2, 2])
         for c in range(3):
             spread[surface, c, c] += noise
     return weights.min() > 0

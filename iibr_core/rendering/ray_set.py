@@ -19,13 +19,11 @@ from iibr_core.rendering.slope_connectivity import BELOW, RIGHT, connect_rays, c
 from iibr_core.runtime.jit import kernel, nearest_pixel
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never
 from iibr_core.stages import ALL_STAGES, Stages
-from iibr_core.surfaces import EDGE_PX, WIDE_EDGE_PX, is_in_front, step_of
+from iibr_core.surfaces import EDGE_PX, SMOOTH_SHARE, is_in_front, step_of
 from iibr_core.types import FloatImage, ImageSize, Margins, ViewOffset, image_size
 
 NO_MARGINS = Margins()
 HIGHEST_LEVEL = 255
-SMOOTH_SHARE = 0.8
-"""A smooth surface's steps stay below this share of the step between surfaces."""
 GUARD_BAND_PX = 2
 """Inpainted rays this near to those in front are left out, too: else slivers of them appear as isolated outliers."""
 
@@ -109,7 +107,7 @@ class RaySet:
         k, connected = self._count, np.zeros(self.size, np.uint8)
         room, cells = self._room, self._cells_room
         if k == 0 and self.stages.connect_slopes:
-            least_edge = step_of(WIDE_EDGE_PX, self.farthest_views)
+            least_edge = step_of(EDGE_PX, self.farthest_views)
             self.connected = connected = connect_rays(disparity, self._surface_step, least_edge, should_stop)
             self._steep = any_in_cells(connected_either_way(connected))
         if k > 0 and any(offset) and self.stages.leave_out_in_front:

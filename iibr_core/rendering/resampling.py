@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from iibr_core.rendering.candidates import Candidates
 from iibr_core.rendering.ray_set import RaySet
 from iibr_core.runtime.jit import kernel, linear_scalar, srgb_scalar
-from iibr_core.surfaces import SAME_SURFACE_PX, same_surface
+from iibr_core.surfaces import SAME_SURFACE_PX
 from iibr_core.types import FloatImage
 
 KEYS_A = np.float32(-0.75)
@@ -119,7 +119,7 @@ def resample(images, surfaces, index, x, y, d, parallax):
         for i in range(4):
             u = np.uint64(min(max(column - 1 + i, 0), width - 1))
             # Another surface, or none: NaN fails the comparison.
-            if same_surface(surfaces[k, v, u], own, tolerance):
+            if abs(surfaces[k, v, u] - own) <= tolerance:
                 w = weight_x[i] * wy
                 r, g, b = images[k, v, u, 0], images[k, v, u, 1], images[k, v, u, 2]
                 total, red, green, blue = total + w, red + w * r, green + w * g, blue + w * b
@@ -152,7 +152,7 @@ def _nearest_tap(images, surfaces, k, x, y, own, tolerance):
     for v in range(max(row - 1, 0), min(row + 3, height)):
         for u in range(max(column - 1, 0), min(column + 3, width)):
             distance = (u - x) ** 2 + (v - y) ** 2
-            if distance < nearest and same_surface(surfaces[k, v, u], own, tolerance):
+            if distance < nearest and abs(surfaces[k, v, u] - own) <= tolerance:
                 nearest, near_x, near_y = distance, np.uint64(u), np.uint64(v)
     return (
         np.float64(images[k, near_y, near_x, 0]),
@@ -175,7 +175,7 @@ def resample_inpainted(images, surfaces, index, x, y, d, parallax):
         for i in range(2):
             u = np.uint64(min(max(column + i, 0), width - 1))
             # Another surface, or none: NaN fails the comparison.
-            if same_surface(surfaces[k, v, u], own, tolerance):
+            if abs(surfaces[k, v, u] - own) <= tolerance:
                 w = weight_y * (fx if i else np.float32(1.0) - fx)
                 total += w
                 red += w * images[k, v, u, 0]

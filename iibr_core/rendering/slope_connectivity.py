@@ -12,16 +12,17 @@ from numpy.typing import NDArray
 from iibr_core.rendering.disparity_statistics import find_soft_edges
 from iibr_core.runtime.jit import kernel
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never
+from iibr_core.surfaces import SLOPE_SHARE
 from iibr_core.types import FloatImage, image_size
 
 RIGHT, BELOW = 1, 2
 """Bits: this ray and the next one to the right, or below, lie on one steep surface."""
 STEEP_SHARE = 0.5
-"""Where steps are larger than this share of the step between surfaces, a surface is steep."""
+"""Where steps are larger than this share of what parts surfaces, a surface is steep. From SMOOTH_SHARE on only, a plane
+of slope 0.3 would be 0.03 px off.
+"""
 MINIMUM_RUN = 3
 """So many steps beyond it, on one side, must follow the step between two rays, each about as large as the last."""
-SIMILAR_STEP_SHARE = 0.35
-"""Steps that follow each other on a surface differ by at most this share of the larger."""
 
 
 def connect_rays(
@@ -68,7 +69,7 @@ def _is_connected(disparity, least_step, y, x, down, right):
                 break
             far = disparity[v + down, u + right] - disparity[v, u]
             # NaN, no surface, fails the comparison.
-            if not abs(far - near) <= SIMILAR_STEP_SHARE * max(abs(far), abs(near)):
+            if not abs(far - near) <= SLOPE_SHARE * max(abs(far), abs(near)):
                 break
             near, alike = far, alike + 1
         if alike == MINIMUM_RUN:

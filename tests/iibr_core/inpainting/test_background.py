@@ -4,7 +4,7 @@ import pytest
 from iibr_core.inpainting.background import SMOOTH_STEPS_PX, fill_background, goes_on_in_front
 from iibr_core.inpainting.nearest_known import DIRECTIONS
 from iibr_core.inpainting.patch_synthesis import MIXED_PX
-from iibr_core.surfaces import SAME_SURFACE_PX, WIDE_EDGE_PX
+from iibr_core.surfaces import EDGE_PX, SAME_SURFACE_PX
 from iibr_core.types import ViewOffset
 from tests.iibr_core.inpainting.test_patch_synthesis import copy_slowly
 
@@ -45,7 +45,7 @@ def is_possible(d, photo_disparity, offset, y, x):
 
 def fill_slowly(colors, disparity, hole, photo_disparity, offset):
     parallax = max(map(abs, offset))
-    one_surface = WIDE_EDGE_PX / parallax
+    one_surface = EDGE_PX / parallax
     filled_colors, filled_disparity, reach = colors.copy(), disparity.copy(), np.full(hole.shape, np.inf)
     mixed = mixed_slowly(hole)
     for y, x in np.argwhere(hole):
@@ -95,7 +95,7 @@ def test_what_goes_on_in_front_is_weighed_like_a_slow_twin():
         balance = 0.0
         for u, v in around_slowly(hole, y, x):
             if is_possible(float(disparity[v, u]), photo_disparity, offset, y, x):
-                in_front = disparity[v, u] > disparity[y, x] + WIDE_EDGE_PX / 2
+                in_front = disparity[v, u] > disparity[y, x] + EDGE_PX / 2
                 balance += (1 if in_front else -1) / np.hypot(u - x, v - y)
         expected[y, x] = balance > 0
     assert expected.any()

@@ -3,14 +3,13 @@ import pytest
 
 from iibr_core.rendering.disparity_statistics import (
     EDGE_WINDOW_PX,
-    MOST_SHOULDER,
     SHARP_STEP_SHARE,
-    SOFT_AROUND_PX,
     SOFT_EDGES_PX,
     STATISTICS_PX,
     find_soft_edges,
     measure_disparity,
 )
+from iibr_core.surfaces import SLOPE_SHARE
 from iibr_core.training.degradation import blur
 
 
@@ -69,9 +68,9 @@ def slow_soft(line: np.ndarray, least_edge: float) -> np.ndarray:
             if (
                 change >= least_edge
                 and is_slope
-                and all(np.nanmax(s) - np.nanmin(s) <= MOST_SHOULDER * change for s in shoulders)
+                and all(np.nanmax(s) - np.nanmin(s) <= SLOPE_SHARE * change for s in shoulders)
             ):
-                soft[max(x + width // 2 - SOFT_AROUND_PX, 0) : x + width // 2 + SOFT_AROUND_PX + 1] = True
+                soft[max(x + width // 2 - EDGE_WINDOW_PX, 0) : x + width // 2 + EDGE_WINDOW_PX + 1] = True
     return soft
 
 

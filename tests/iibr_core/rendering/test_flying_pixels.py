@@ -10,6 +10,7 @@ from iibr_core.color import encoded_from_stored, stored_from_encoded
 from iibr_core.rendering.flying_pixels import (
     STANDS_OUT,
     STANDS_OUT_TIMES,
+    TEARING_GAP_PX,
     _interpolated,
     measure_detail,
     without_flying_pixels,
@@ -17,7 +18,7 @@ from iibr_core.rendering.flying_pixels import (
 from iibr_core.rendering.photo_rays import rays_of_photo
 from iibr_core.rendering.ray_set import RaySet
 from iibr_core.rendering.view_synthesis import ViewSynthesis
-from iibr_core.surfaces import SAME_SURFACE_PX, WIDE_EDGE_PX
+from iibr_core.surfaces import SAME_SURFACE_PX
 from iibr_core.types import ImageSize, ViewOffset
 from tests.iibr_core.scenes import smooth_texture, square_before_wall
 
@@ -37,7 +38,7 @@ def slowly(
     for y, x in np.ndindex(height, width):
         v, u = np.clip(np.array([y, x]) + disparity[y, x] * np.array(OFFSET), 0, [height - 1, width - 1])
         level = rays.arrays.edge_level[0][int(v + 0.5), int(u + 0.5)]
-        is_torn = level * SAME_SURFACE_PX > WIDE_EDGE_PX * rays.edge_limits(OFFSET)[0]
+        is_torn = level * SAME_SURFACE_PX > TEARING_GAP_PX * rays.edge_limits(OFFSET)[0]
         own = ndimage.map_coordinates(detail.astype(float), [[v], [u]], order=1, mode="nearest")[0]
         stands_out = np.abs(colors[y, x] - medians[y, x]).max()
         is_flying = is_torn and not inpainted[y, x] and stands_out > STANDS_OUT + STANDS_OUT_TIMES * own

@@ -46,7 +46,7 @@ def test_a_pixel_that_is_all_foreground_goes_with_it():
 def test_where_colors_tell_nothing_the_outline_tells_the_share():
     _, disparity = edge_photo(0.5)
     own, fringe, _, coverage = split_mixed_pixels(np.tile(BACK, (9, 12, 1)), disparity, edge_step=0.5)
-    straight_edge = mixed_pixels.STRAIGHT_SHARE + 2 * mixed_pixels.DIAGONAL_SHARE
+    straight_edge = 3 * mixed_pixels.OUTLINE_SHARE
     assert coverage[4] == pytest.approx(np.where(np.arange(12) == 5, straight_edge, 0.0))
     assert np.stack([own, fringe]) == pytest.approx(np.broadcast_to(BACK, (2, 9, 12, 3)), abs=1e-5)
 
@@ -82,9 +82,7 @@ def obvious_split(colors, disparity, y, x):
     in_front, behind = disparity == 2.0, disparity == 0.0
     if not (behind[y, x] and (in_front & beside).any() and (behind & window).any()):
         return None
-    straight = in_front & beside & ((v == y) | (u == x))
-    outline = mixed_pixels.STRAIGHT_SHARE * straight.sum()
-    outline += mixed_pixels.DIAGONAL_SHARE * ((in_front & beside).sum() - straight.sum())
+    outline = mixed_pixels.OUTLINE_SHARE * (in_front & beside).sum()
     is_edge_band = np.array(
         [
             any(abs(disparity[max(j - 1, 0) : j + 2, max(i - 1, 0) : i + 2].reshape(-1) - disparity[j, i]) > 0.5)
@@ -99,9 +97,7 @@ def obvious_split(colors, disparity, y, x):
         means.append((part[..., None] * light).sum((0, 1)))
         off = light - means[-1]
         spread = np.einsum("yx,yxc,yxe->ce", part, off, off)
-        spreads.append(
-            spread + (mixed_pixels.COLOR_VARIANCE + mixed_pixels.MATTING_ROUNDING * np.trace(spread)) * np.eye(3)
-        )
+        spreads.append(spread + mixed_pixels.COLOR_VARIANCE * (1 + np.trace(spread)) * np.eye(3))
     share, contrast = outline, means[1] - means[0]
     for _ in range(mixed_pixels.MATTING_ROUNDS):
         precision = np.linalg.inv((1 - share) ** 2 * spreads[0] + share**2 * spreads[1])

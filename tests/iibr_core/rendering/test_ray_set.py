@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from iibr_core.rendering.ray_cells import CELL_PX
-from iibr_core.rendering.ray_set import GUARD_BAND_PX, HIGHEST_LEVEL, SMOOTH_SHARE, RaySet
-from iibr_core.surfaces import EDGE_PX
+from iibr_core.rendering.ray_set import GUARD_BAND_PX, HIGHEST_LEVEL, RaySet
+from iibr_core.surfaces import EDGE_PX, SMOOTH_SHARE
 from iibr_core.types import ImageSize, Margins, ViewOffset
 
 SURFACE_STEP = 0.6

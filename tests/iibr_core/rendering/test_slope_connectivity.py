@@ -7,12 +7,12 @@ from iibr_core.rendering.slope_connectivity import (
     BELOW,
     MINIMUM_RUN,
     RIGHT,
-    SIMILAR_STEP_SHARE,
     STEEP_SHARE,
     connect_rays,
     connected_either_way,
 )
 from iibr_core.rendering.visibility_weights import visibility_weights
+from iibr_core.surfaces import SLOPE_SHARE
 from iibr_core.training.degradation import blur
 from iibr_core.types import ViewOffset, image_size
 
@@ -28,7 +28,7 @@ def slow_connect(disparity):
             for x, own in enumerate(steps):
                 for side in (steps[x : x + MINIMUM_RUN + 1], steps[max(x - MINIMUM_RUN, 0) : x + 1]):
                     sizes = np.abs(side)
-                    alike = np.abs(np.diff(side)) <= SIMILAR_STEP_SHARE * np.maximum(sizes[1:], sizes[:-1])
+                    alike = np.abs(np.diff(side)) <= SLOPE_SHARE * np.maximum(sizes[1:], sizes[:-1])
                     if abs(own) > STEEP_SHARE * STEP and len(side) > MINIMUM_RUN and alike.all():
                         marks[x] |= bit
     return connected
