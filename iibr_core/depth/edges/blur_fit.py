@@ -9,34 +9,27 @@ from math import ceil
 
 import numpy as np
 
+from iibr_core.depth.edges.edge_profiles import COLOR_NOISE, GAUSSIAN_SIGMAS
 from iibr_core.runtime.jit import kernel
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never
 from iibr_core.types import FloatImage, image_size
 
-FITTED_SIGMAS = 3.0
-"""Where a Gaussian ends."""
-WIDEST_FITTED_SIGMA_PX = 4.5
+WIDEST_FITTED_SIGMA_PX = 4.0
 """Work grows with the blur's area: wider ones stay as they are."""
 DESCENT_SWEEPS = 4
 """Of moving edges."""
 REVISIT_RADIUS_PX = 2
 """Beside a pixel that moved, so far around, the next sweep looks again."""
 COLOR_WEIGHT = 6.0
-"""What a colour that is clearly one side's counts, in what a whole pixel on the wrong side adds to the misfit."""
-OUTLINE_WEIGHT = 1.0
-"""What each of the eight neighbours counts that is on the other side."""
+"""What a colour that is clearly one side's counts, in what a whole pixel on the wrong side adds to the misfit; each of
+the eight neighbours that is on the other side counts 1.
+"""
 FULL_WEIGHT_SIGMA_PX = 2.0
 """Blur from which colours and outline count in full: the narrower, the better the map itself shows where its edges are,
 by the square.
 """
 COLOR_PX = 3
 """Colours of both sides are taken from so far around."""
-COLOR_NOISE = 0.003
-"""Squared distance of colours (sRGB-encoded) that tells nothing."""
-SAME_SIDE = 0.3
-"""Of the step, up to which a height is that side's."""
-MOVED_EDGES = 2.0
-"""Times the least edge: lower steps stay where they are."""
 
 
 def fit_to_blur(
@@ -61,7 +54,7 @@ def fit_to_blur(
         _find_missing(values, fitted, taps, first, last, missing)
 
     def move(first: int, last: int) -> None:
-        _move_edges(photo, fitted, missing, taps, weight, MOVED_EDGES * least_edge, first, last, settled)
+        _move_edges(photo, fitted, missing, taps, weight, least_edge, first, last, settled)
 
     in_bands(find_missing, image_size(values), should_stop)
     for _ in range(DESCENT_SWEEPS):
@@ -72,7 +65,7 @@ def fit_to_blur(
 
 def _taps(sigma: float) -> FloatImage:
     """A Gaussian that sums to 1."""
-    reach = ceil(FITTED_SIGMAS * sigma)
+    reach = ceil(GAUSSIAN_SIGMAS * sigma)
     taps = np.exp(-0.5 * (np.arange(-reach, reach + 1) / sigma) ** 2)
     return np.asarray(taps / taps.sum(), np.float32)
 
@@ -106,7 +99,7 @@ def _color_vote(photo, fitted, y, x, here, there, least_edge, sums):
     less sure.
     """
     height, width = fitted.shape
-    near = max(SAME_SIDE * abs(there - here), least_edge)
+    near = max(0.5 * abs(there - here), least_edge)
     sums[:] = 0.0
     for v in range(max(y - COLOR_PX, 1), min(y + COLOR_PX, height - 2) + 1):
         for u in range(max(x - COLOR_PX, 1), min(x + COLOR_PX, width - 2) + 1):
@@ -193,7 +186,7 @@ def _move_edges(photo, fitted, missing, taps, weight, least_edge, first, last, s
                 there = fitted[v, u]
                 # Change of the misfit |missing|^2, relative to that of a whole pixel; then of the outline and colours.
                 change = 1.0 - 2.0 * wanted / ((there - here) * energy)
-                change += weight * OUTLINE_WEIGHT * _same_surface_neighbours(fitted, y, x, here, there)
+                change += weight * _same_surface_neighbours(fitted, y, x, here, there)
                 if change - weight * COLOR_WEIGHT < best:
                     vote = _color_vote(photo, fitted, y, x, here, there, least_edge, sums)
                     change -= weight * COLOR_WEIGHT * vote

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.depth.edges.edge_labels import label_edges, step_distance
+from iibr_core.depth.edges.edge_profiles import FLAT_SHARE
 from iibr_core.inpainting.disparity_by_color import fill_disparity_by_color
 from iibr_core.runtime.jit import kernel
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never
@@ -17,21 +18,17 @@ from iibr_core.stages import ALL_STAGES, Stages
 from iibr_core.types import FloatImage, image_size
 
 BAND_PX = 2
-"""Disparities between surfaces are counted among pixels with fewer others between them and a step."""
-PLATEAU_SHARE = 0.15
-"""A pixel clearly lies between two surfaces if each changes by at most this share of their distance ..."""
-PLATEAU_PX = 2
-"""... over so many pixels."""
-BETWEEN_SHARES = (0.1, 0.8)
-"""How far up from the lower to the higher of both it lies; above that, a round thing turns away from the view."""
+"""Disparities between surfaces are counted among pixels with fewer others between them and a step; a pixel clearly lies
+between two surfaces if each is flat over so many pixels.
+"""
 MIXED_EDGES = 5.0
 """Times the least edge: what lies between nearer surfaces may be a slope."""
 LEAST_MEASURED = 0.025
 """Where a smaller share of the edge bands is clearly between two surfaces, it shows wires or slopes."""
-MOST_CLEAR_NEIGHBOURS = 4
-"""What is clearly between has at most so many neighbours on its own disparity."""
-MOST_NEIGHBOURS = (2, 4)
-"""So has in other maps all that lies between, on thin things too: so many within one pixel, and within two."""
+MOST_NEIGHBOURS = 4
+"""What is clearly between has at most so many neighbours on its own disparity; so has, within two pixels, all that lies
+between, on thin things too.
+"""
 
 
 def resolve_edge_band(
@@ -86,10 +83,10 @@ def _is_between(values, y, x, right, down, least_edge):
                 high - low > MIXED_EDGES * least_edge
                 and high - here > least_edge
                 and here - low > least_edge
-                and BETWEEN_SHARES[0] * (high - low) <= here - low <= BETWEEN_SHARES[1] * (high - low)
+                and FLAT_SHARE * (high - low) <= min(high - here, here - low)
             ):
-                flat, is_flat = PLATEAU_SHARE * (high - low), True
-                for beyond in range(1, PLATEAU_PX + 1):
+                flat, is_flat = FLAT_SHARE * (high - low), True
+                for beyond in range(1, BAND_PX + 1):
                     far_a = values[y + (after + beyond) * down, x + (after + beyond) * right]
                     far_b = values[y - (before + beyond) * down, x - (before + beyond) * right]
                     is_flat &= abs(far_a - a) <= flat and abs(far_b - b) <= flat
@@ -102,7 +99,7 @@ def _is_between(values, y, x, right, down, least_edge):
 def _find_between_rows(values, least_edge, first, last, between):
     """Rows [first, last) of `_find_between`."""
     height, width = values.shape
-    margin, clear = 2 + PLATEAU_PX, 0
+    margin, clear = 2 + BAND_PX, 0
     for y in range(first, last):
         for x in range(width):
             # Neighbours above and below it, and few on its own disparity: most pixels end here.
@@ -112,7 +109,7 @@ def _find_between_rows(values, least_edge, first, last, between):
                     step = values[v, u] - values[y, x]
                     higher, lower = higher or step > least_edge, lower or step < -least_edge
                     neighbours += abs(step) <= least_edge
-            if not (higher and lower and neighbours <= MOST_CLEAR_NEIGHBOURS):
+            if not (higher and lower and neighbours <= MOST_NEIGHBOURS):
                 continue
             if margin <= y < height - margin and margin <= x < width - margin:
                 is_clear = (
@@ -123,12 +120,12 @@ def _find_between_rows(values, least_edge, first, last, between):
                 )
                 clear += is_clear
                 between[y, x] = is_clear
-            if neighbours > MOST_NEIGHBOURS[0] or between[y, x]:
+            if between[y, x]:
                 continue
             # Things of two pixels and more, before one surface and behind another, have neighbours farther off.
             neighbours = -1
             for v in range(max(y - 2, 0), min(y + 3, height)):
                 for u in range(max(x - 2, 0), min(x + 3, width)):
                     neighbours += abs(values[v, u] - values[y, x]) <= least_edge
-            between[y, x] = neighbours <= MOST_NEIGHBOURS[1]
+            between[y, x] = neighbours <= MOST_NEIGHBOURS
     return clear

@@ -11,13 +11,22 @@ from math import ceil, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.depth.edges.edge_profiles import gradient, height_at, is_inside, strongest_change, walk
-from iibr_core.depth.edges.ridges import SHARES, structure_blur
+from iibr_core.depth.edges.edge_profiles import (
+    COLOR_NOISE,
+    FLAT_SHARE,
+    PLATEAU_SIGMAS,
+    gradient,
+    height_at,
+    is_inside,
+    strongest_change,
+    walk,
+)
+from iibr_core.depth.edges.ridges import SEARCHED_PX, SHARES, structure_blur
 from iibr_core.runtime.jit import kernel
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never
 from iibr_core.types import FloatImage, ImageSize
 
-SHARP_PX = 0.65
+SHARP_PX = 0.8
 """Edges blurred by less (sigma) count as exact: a step between two pixels measures 0.4, one pixel between them 0.8."""
 WIDEST_MEASURED_SIGMA_PX = 16.0
 EDGE_SIGMAS = sqrt(2 * np.pi)
@@ -25,31 +34,14 @@ EDGE_SIGMAS = sqrt(2 * np.pi)
 MEASURED_EDGE = 0.1
 """The blur is measured on steps of at least this share of the map's range."""
 MOST_BLUR_PIXELS = 300_000
-MEASURING_REACH_PX = 20
-MEASURED_SIGMA_PX = MEASURING_REACH_PX / 5
+MEASURED_SIGMA_PX = SEARCHED_PX / 5
 """Wider edges are measured on a smaller map."""
-STEEPEST_PLATEAU = 0.35
+STEEPEST_PLATEAU = 0.3
 """Slopes beside a sharp step, relative to its own, above which it is none."""
-SHOULDERS = (2.5, 4.0)
-"""Where the surfaces beside a blurred step must be flat: from its middle, in sigmas."""
-STEEPEST_SHOULDER = 0.15
-"""Slope there, relative to the step's."""
-CHANGE_NOISE = 0.003
-"""Squared change of colour (sRGB-encoded) that is no edge of the photo."""
-SAMPLE_CELL_PX = 16
-"""Edges nearer to each other show the same of the photo: they count as one."""
-CHANCE = 0.5
-"""Share of shoulders at which any photo changes less than in the middle of a slope."""
-CHANCE_VARIANCE = 1 / 6
-"""Of that share of two shoulders: three changes in any order."""
 CERTAINTY = 2.0
 """Standard deviations above chance from which the photo is believed."""
-MOST_EDGES = 4096
-"""Kept of a map."""
 LEAST_SOFT = 0.2
 """A map of which a smaller share of edges is soft, is exact."""
-CLEARLY_SOFT_PX = 0.8
-"""Edges blurred by less may be exact: single ones measure up to this by chance."""
 MOST_SPREAD = 1 / 3
 """A filter blurs all edges of a map alike. Where the interquartile range of the blur exceeds this share of its median,
 no filter made it: matching left ramps, and they stay.
@@ -62,7 +54,7 @@ def measure_edge_blur(photo: FloatImage, disparity: FloatImage, should_stop: Sho
     photo: (H, W, 3), sRGB-encoded. Raises Cancelled once should_stop is true.
     """
     steps = _steps(photo, disparity, should_stop)
-    soft = steps[:, steps[2] >= CLEARLY_SOFT_PX]
+    soft = steps[:, steps[2] >= SHARP_PX]
     agree = soft[3, soft[4] > 0].sum()
     if not (agree > 0 and agree >= LEAST_SOFT * steps[3].sum() and _photo_is_sure(soft)):
         return 0.0
@@ -80,22 +72,25 @@ def extent(disparity: FloatImage) -> float:
 
 
 def _photo_is_sure(edges: NDArray[np.float32]) -> bool:
-    """Whether the photo changes at so many of them as chance would hardly have it."""
+    """Whether the photo changes at so many of them as chance would hardly have it: at half of the shoulders, with a
+    variance of 1/6 for both of an edge, as of three changes in any order.
+    """
     if not edges.shape[1]:
         return False
-    places = len(np.unique(edges[0] // SAMPLE_CELL_PX + (edges[1] // SAMPLE_CELL_PX) * 4096))
-    return bool(edges[4].mean() >= CHANCE + CERTAINTY * sqrt(CHANCE_VARIANCE / places))
+    # Edges nearer to each other show the same of the photo: they count as one.
+    places = len(np.unique(edges[0] // SEARCHED_PX + (edges[1] // SEARCHED_PX) * 4096))
+    return bool(edges[4].mean() >= 0.5 + CERTAINTY * sqrt(1 / 6 / places))
 
 
 def _steps(photo: FloatImage, disparity: FloatImage, should_stop: ShouldStop) -> NDArray[np.float32]:
     """(5, N): x, y, blur (sigma), height, how far the photo agrees (0..1), of steps; px of the map.
 
-    At most MOST_EDGES. Soft ones are measured on smaller maps, where they are as short as the others.
+    Soft ones are measured on smaller maps, where they are as short as the others.
     """
     least_edge = MEASURED_EDGE * extent(disparity)
     found: list[NDArray[np.float32]] = [np.empty((5, 0), np.float32)]
     scale, least_sigma = 1, 0.0
-    while least_edge > 0 and min(disparity.shape) >= (2 if scale == 1 else 4 * MEASURING_REACH_PX):
+    while least_edge > 0 and min(disparity.shape) >= (2 if scale == 1 else 4 * SEARCHED_PX):
         edges = _steps_of_level(photo, disparity, least_edge, least_sigma, MOST_BLUR_PIXELS // scale, should_stop)
         edges[:2] = (edges[:2] + 0.5) * scale - 0.5
         edges[2] *= scale
@@ -104,8 +99,7 @@ def _steps(photo: FloatImage, disparity: FloatImage, should_stop: ShouldStop) ->
             break
         photo, disparity = _half(photo), _half(disparity)
         scale, least_sigma = 2 * scale, MEASURED_SIGMA_PX / 2
-    edges = np.concatenate(found, axis=1)
-    return edges[:, :: max(1, ceil(edges.shape[1] / MOST_EDGES))]
+    return np.concatenate(found, axis=1)
 
 
 def _steps_of_level(
@@ -122,7 +116,7 @@ def _steps_of_level(
 
     def band(first: int, last: int) -> NDArray[np.float32]:
         found = np.empty((5, (last - first) * width), np.float32)
-        count = _measure_edges(disparity, photo, least_edge, least_sigma, MEASURING_REACH_PX, step, first, last, found)
+        count = _measure_edges(disparity, photo, least_edge, least_sigma, SEARCHED_PX, step, first, last, found)
         return found[:, :count].copy()
 
     return np.concatenate(in_bands(band, ImageSize(height, width), should_stop), axis=1)
@@ -210,8 +204,8 @@ def _measure_edges(values, photo, least_edge, least_sigma, reach, step, first, l
 
 @kernel
 def _has_flat_shoulders(values, x, y, across, down, edge, sigma, steepest):
-    near, far = SHOULDERS[0] * sigma, SHOULDERS[1] * sigma
-    limit = STEEPEST_SHOULDER * steepest * (far - near)
+    near, far = PLATEAU_SIGMAS * sigma, 2 * PLATEAU_SIGMAS * sigma
+    limit = FLAT_SHARE * steepest * (far - near)
     for sign in (-1.0, 1.0):
         # Outside, pixels of the border go on: as flat as nothing else is.
         if not is_inside(values, x + across * (edge + sign * far), y + down * (edge + sign * far)):
@@ -230,6 +224,6 @@ def _photo_agrees(photo, x, y, across, down, edge, sigma):
     middle = strongest_change(photo, x, y, across, down, edge - near, edge + near)
     lower = strongest_change(photo, x, y, across, down, edge - 4 * near, edge - 2 * near)
     upper = strongest_change(photo, x, y, across, down, edge + 2 * near, edge + 4 * near)
-    if max(middle, lower, upper) <= CHANGE_NOISE:
+    if max(middle, lower, upper) <= COLOR_NOISE:
         return 0.5
     return 0.5 * (middle > lower) + 0.5 * (middle > upper)

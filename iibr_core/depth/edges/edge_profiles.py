@@ -8,6 +8,14 @@ import numpy as np
 
 from iibr_core.runtime.jit import kernel
 
+GAUSSIAN_SIGMAS = 3.0
+"""Where a Gaussian ends."""
+PLATEAU_SIGMAS = 2.0
+"""From the middle of a blurred step, or from where a blurred structure ended, to the plateaus beside it."""
+FLAT_SHARE = 0.15
+"""What changes by no more than this share of a step beside it is flat."""
+COLOR_NOISE = 0.003
+"""Squared distance of colours (sRGB-encoded) that tells nothing."""
 FLATNESS = 0.08
 """A ramp ends where its slope falls below this share of its steepest."""
 

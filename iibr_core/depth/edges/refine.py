@@ -13,44 +13,34 @@ from numpy.typing import NDArray
 
 from iibr_core.depth.edges.blur_fit import fit_to_blur
 from iibr_core.depth.edges.edge_band import resolve_edge_band
-from iibr_core.depth.edges.edge_blur import EDGE_SIGMAS, extent, measure_edge_blur
-from iibr_core.depth.edges.edge_profiles import gradient, height_at, passes, walk
+from iibr_core.depth.edges.edge_blur import EDGE_SIGMAS, STEEPEST_PLATEAU, extent, measure_edge_blur
+from iibr_core.depth.edges.edge_profiles import (
+    FLAT_SHARE,
+    GAUSSIAN_SIGMAS,
+    PLATEAU_SIGMAS,
+    gradient,
+    height_at,
+    passes,
+    walk,
+)
 from iibr_core.depth.edges.ridges import RETURN_SIGMAS, SHARES, structure_at
 from iibr_core.inpainting.disparity_by_color import fill_disparity_by_color
 from iibr_core.runtime.jit import kernel
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never
 from iibr_core.stages import ALL_STAGES, Stages
+from iibr_core.surfaces import EDGE_SHARE
 from iibr_core.types import FloatImage, InputError, image_size
 
-LEAST_EDGE = 0.03
-"""Lower steps are left alone: share of the map's range."""
-LEAST_STEP = 0.5
-"""A ramp is at least so long, of what the blur makes it; shorter ones are exact edges."""
-TOLERANCE = 1.5
-"""A ramp may be longer than the blur makes it by this factor; longer ones are surfaces."""
-PLATEAU_SIGMAS = 2.0
-"""From a ramp's steepest place to its plateaus, at most."""
-STEEPEST_RISE = 0.3
-"""Of a ramp's steepest slope, over one sigma beyond its plateaus: steeper ones are surfaces."""
+RAMP_TOLERANCE = 2.0
+"""By this factor a ramp may be longer or shorter than the blur makes it: longer ones are surfaces, shorter exact."""
 EXTENSION = 0.7
 """How far the plateaus' own slopes are continued under the ramp: 1 = all the way."""
 MOST_EXTENSION = 0.05
 """Limit on those slopes, relative to the ramp's steepest."""
-TAIL_SIGMAS = 3.0
-"""From a step's middle to where its blur ends: what the map rises up to there is the step's, within what a Gaussian
-leaves there."""
-MOST_TAIL = 0.2
-"""Of a step: its middle is only known to a part of a pixel."""
 BEND = 2.0
 """How much faster than beyond its blur a surface bends away from the view at the edge itself: round things do."""
-STEPS_A_SIGMA = 2.5
-"""Ramps are walked in steps so fine, or of a pixel."""
-RAMP_SIGMAS = 5.0
+RAMP_SIGMAS = PLATEAU_SIGMAS + GAUSSIAN_SIGMAS
 """From a pixel to the ends of its ramp, at most."""
-FLAT_EDGE_SHARE = 0.2
-"""Of the least edge, up to which a map is flat."""
-CREST_SHARE = 0.5
-"""Of the least edge that the map falls beside a crest, from which it may be one."""
 FINE_STRENGTH = 1e-3
 
 
@@ -81,7 +71,7 @@ def refine(
     values = _fill_unknown(colors, disparity, should_stop)
     if strength == 0:
         return values
-    least_edge, softness = LEAST_EDGE * extent(values), max(1.0 - strength, FINE_STRENGTH)
+    least_edge, softness = EDGE_SHARE * extent(values), max(1.0 - strength, FINE_STRENGTH)
     sharp = _sharpen(colors, values, least_edge, softness, should_stop, stages)
     if not least_edge > 0:
         return sharp
@@ -141,7 +131,7 @@ def _beyond_blur(values, x, y, across, down, far, sigma, limit):
 @kernel
 def _tail(far, sigma):
     """Share of a step, blurred by sigma, that is not reached yet so far from its middle."""
-    return min(0.5 * erfc(far / (sqrt(2.0) * sigma)), MOST_TAIL)
+    return 0.5 * erfc(far / (sqrt(2.0) * sigma))
 
 
 @kernel
@@ -187,7 +177,7 @@ def _as_crest(values, photo, x, y, across, down, sigma, least_edge, softness, sh
     bend, line_x, line_y = _curvature(values, x, y, apart)
     # Too straight to be lower by an edge beside it, or too far from where it is level.
     along = across * line_x + down * line_y
-    if not (abs(bend) * apart * apart >= CREST_SHARE * least_edge and abs(along) < abs(bend) * apart):
+    if not (abs(bend) * apart * apart >= FLAT_SHARE * least_edge and abs(along) < abs(bend) * apart):
         return np.nan
     sign, far = 1.0 if bend < 0 else -1.0, -along / bend
     height, ground, share = structure_at(
@@ -204,7 +194,7 @@ def _as_step(values, x, y, across, down, sigma, least_edge, softness):
     """The pixel's value as part of one of the two surfaces of a step along the (unit) direction; as given elsewhere."""
     here = values[y, x]
     # Wide ramps are walked in longer steps: all of them take about as many.
-    pace = max(1.0, sigma / STEPS_A_SIGMA)
+    pace = max(1.0, 0.5 * sigma)
     reach = ceil(RAMP_SIGMAS * sigma / pace) + 1
     # Where the ramp ends both ways; its height there.
     up, top, _, steepest_up, at_up = walk(values, x, y, across, down, 1.0, reach, pace, PLATEAU_SIGMAS * sigma)
@@ -221,12 +211,12 @@ def _as_step(values, x, y, across, down, sigma, least_edge, softness):
     bottom = height_at(values, x - across * to_foot, y - down * to_foot)
     # Higher than a step of this slope can be after a blur of sigma: a slanted surface. Lower: an exact edge.
     unit = EDGE_SIGMAS * steepest
-    if not (max(least_edge, LEAST_STEP * sigma * unit) <= top - bottom <= TOLERANCE * sigma * unit):
+    if not (max(least_edge, sigma * unit / RAMP_TOLERANCE) <= top - bottom <= RAMP_TOLERANCE * sigma * unit):
         return here
     # Where it goes on rising so far from its middle, or comes back to it on both sides, it is a surface.
     rise = height_at(values, x + across * (up + sigma), y + down * (up + sigma)) - top
     fall = bottom - height_at(values, x - across * (to_foot + sigma), y - down * (to_foot + sigma))
-    if max(rise, fall) > STEEPEST_RISE * steepest * sigma:
+    if max(rise, fall) > STEEPEST_PLATEAU * steepest * sigma:
         return here
     middle, height, returns = 0.5 * (top + bottom), top - bottom, RETURN_SIGMAS * sigma
     returns_up = passes(values, x, y, across, down, up, returns + edge, -1.0, middle)
@@ -244,7 +234,7 @@ def _as_step(values, x, y, across, down, sigma, least_edge, softness):
     place = ((here - bottom) / (top - bottom) - 0.5) / softness + 0.5
     # Beside the edge, the blur took from the foreground and left on the background: as the map shows.
     edge += (middle - height_at(values, x + across * edge, y + down * edge)) / steepest
-    above, below, end = _tail(up - edge, sigma), _tail(to_foot + edge, sigma), TAIL_SIGMAS * sigma
+    above, below, end = _tail(up - edge, sigma), _tail(to_foot + edge, sigma), GAUSSIAN_SIGMAS * sigma
     step, limit = (1.0 - softness) * height / (1.0 - above - below), BEND * limit
     if not returns_up:
         lost = _beyond_blur(values, x, y, across, down, end + edge, sigma, limit) - top
@@ -264,7 +254,7 @@ def _refine(values, photo, least_edge, sigma, softness, first_row, last_row, ref
         for x in range(width):
             refined[y, x] = values[y, x]
             # Most pixels end here.
-            if _is_flat(values, x, y, int(PLATEAU_SIGMAS * sigma), FLAT_EDGE_SHARE * least_edge):
+            if _is_flat(values, x, y, int(PLATEAU_SIGMAS * sigma), FLAT_SHARE * least_edge):
                 continue
             across, down = gradient(values, x, y)
             crest = _as_crest(values, photo, x, y, across, down, sigma, least_edge, softness, shares, taps)

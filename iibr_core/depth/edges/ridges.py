@@ -10,37 +10,37 @@ from math import ceil, exp, floor, sqrt
 
 import numpy as np
 
-from iibr_core.depth.edges.edge_profiles import height_at, is_inside, passes, strongest_change, walk
+from iibr_core.depth.edges.edge_profiles import (
+    COLOR_NOISE,
+    FLAT_SHARE,
+    GAUSSIAN_SIGMAS,
+    PLATEAU_SIGMAS,
+    height_at,
+    is_inside,
+    passes,
+    strongest_change,
+    walk,
+)
 from iibr_core.runtime.jit import kernel
 
 SAMPLES_A_PX = 2
 """Of the photo along the line across a structure."""
-WIDEST_SIGMAS = 4.0
+WIDEST_SIGMAS = 2 * PLATEAU_SIGMAS
 """A structure wider than that has a crest as high as it was."""
-BESIDE_SIGMAS = 2.0
-"""So far to both sides of a structure the map is compared with it, blurred again."""
 LEAST_CREST_HEIGHT = 0.25
 """Of a structure's height, after the blur: lower ones are guesses."""
 MOST_CREST_MISFIT = 0.05
 """Deviation (rms) of the structure, blurred again, from the given map, relative to its height there."""
-RETURN_SIGMAS = 6.0
-"""What rises again on both sides within so much of its middle, be it a step or a crest, is a relief ..."""
-RETURN_SHARE = 0.25
-"""... a crest if it does so by this share of its height."""
-SEARCHED_PX = 24
-"""How far from the crest the photo is looked at, at most."""
+RETURN_SIGMAS = 2 * GAUSSIAN_SIGMAS
+"""What rises again on both sides within so much of its middle, be it a step or a crest, is a relief."""
+SEARCHED_PX = 20
+"""How far from a step or a crest map and photo are looked at, at most."""
 SHARES = 2 * SEARCHED_PX * SAMPLES_A_PX + 1
 """Places looked at."""
-LEAST_SIDE_HEIGHT = 0.4
+LEAST_SIDE_HEIGHT = 0.5
 """A crest's height over its higher side, relative to that over its lower one, from which it is no step."""
-FLAT_SIDE = 0.15
-"""Change of height beside a structure, relative to its own, up to which nothing else is there."""
 BLURS = 0.65 * 1.15 ** np.arange(16)
 """Tried (sigma, px) where the blur of a map is measured on a structure."""
-GAUSSIAN_SIGMAS = 4.0
-"""Where a Gaussian ends."""
-LEAST_CONTRAST = 0.01
-"""Squared distance of colours (sRGB-encoded) from what is beside, below which a structure has no outline."""
 
 
 @kernel
@@ -87,7 +87,7 @@ def _structure_shares(photo, x, y, across, down, feet, widest, shares):
         contrast = min(_product(color, color, before), _product(color, color, after))
         if contrast > most:
             own, own_at, most = color, k, contrast
-    if most < LEAST_CONTRAST:
+    if most < COLOR_NOISE:
         return 1, 0
     shares[:] = 0.0
     middle = len(shares) // 2
@@ -121,8 +121,8 @@ def _fit_structure(values, x, y, across, down, shares, first, last, sigma, taps)
     """
     middle, crest = len(shares) // 2, height_at(values, x, y)
     spacing = 1.0 / SAMPLES_A_PX
-    begin = floor((first - middle) * spacing - BESIDE_SIGMAS * sigma)
-    end = ceil((last - middle) * spacing + BESIDE_SIGMAS * sigma)
+    begin = floor((first - middle) * spacing - PLATEAU_SIGMAS * sigma)
+    end = ceil((last - middle) * spacing + PLATEAU_SIGMAS * sigma)
     # The blur, by distance in places.
     scale = spacing / (sqrt(2.0 * np.pi) * sigma)
     reach = min(int(GAUSSIAN_SIGMAS * sigma * SAMPLES_A_PX) + 1, len(taps))
@@ -194,7 +194,7 @@ def _is_relief(values, x, y, across, down, feet, sign, far):
     for side in (-1, 1):
         foot, across_side, down_side = feet[0] if side < 0 else feet[1], side * across, side * down
         ground = height_at(values, x + across_side * foot, y + down_side * foot)
-        level = ground + RETURN_SHARE * (crest - ground)
+        level = ground + FLAT_SHARE * (crest - ground)
         if not passes(values, x, y, across_side, down_side, foot, max(far, foot), sign, level):
             return False
     return True
@@ -208,15 +208,15 @@ def structure_at(values, photo, x, y, across, down, far, sign, sigma, least_edge
     """
     crest_x, crest_y = x + across * far, y + down * far
     # Nearly always there is none, and this tells: lower on both sides.
-    beside, crest = 0.5 * (BESIDE_SIGMAS + WIDEST_SIGMAS - 1) * sigma, height_at(values, crest_x, crest_y)
+    beside, crest = 0.5 * (PLATEAU_SIGMAS + WIDEST_SIGMAS - 1) * sigma, height_at(values, crest_x, crest_y)
     before = height_at(values, crest_x - across * beside, crest_y - down * beside)
     after = height_at(values, crest_x + across * beside, crest_y + down * beside)
     if not min(sign * (crest - before), sign * (crest - after)) > 0.5 * least_edge:
         return 0.0, 0.0, 0.0
     found = _crest(values, crest_x, crest_y, across, down, sign)
     far, crest_x, crest_y = far + found, crest_x + across * found, crest_y + down * found
-    reach = ceil((BESIDE_SIGMAS + 0.5 + WIDEST_SIGMAS / 2) * sigma)
-    feet = _feet(values, crest_x, crest_y, across, down, sign, min(reach, SEARCHED_PX - 4), least_edge)
+    reach = ceil((PLATEAU_SIGMAS + 0.5 + WIDEST_SIGMAS / 2) * sigma)
+    feet = _feet(values, crest_x, crest_y, across, down, sign, min(reach, SEARCHED_PX), least_edge)
     if feet[0] == 0 or _is_relief(values, crest_x, crest_y, across, down, feet, sign, RETURN_SIGMAS * sigma):
         return 0.0, 0.0, 0.0
     first, last = _structure_shares(photo, crest_x, crest_y, across, down, feet, WIDEST_SIGMAS * sigma + 1, shares)
@@ -240,7 +240,7 @@ def structure_blur(values, photo, x, y, across, down, sign, least_edge, shares, 
     """
     far = _crest(values, x, y, across, down, sign)
     x, y = x + across * far, y + down * far
-    feet = _feet(values, x, y, across, down, sign, SEARCHED_PX - 4, least_edge)
+    feet = _feet(values, x, y, across, down, sign, SEARCHED_PX, least_edge)
     if feet[0] == 0:
         return 0.0, 0.0, 0.0
     crest = height_at(values, x, y)
@@ -251,7 +251,7 @@ def structure_blur(values, photo, x, y, across, down, sign, least_edge, shares, 
             return 0.0, 0.0, 0.0
         level = height_at(values, x + side * foot * across, y + side * foot * down)
         beyond = height_at(values, x + side * 1.6 * foot * across, y + side * 1.6 * foot * down)
-        if not abs(beyond - level) <= FLAT_SIDE * abs(crest - level):
+        if not abs(beyond - level) <= FLAT_SHARE * abs(crest - level):
             return 0.0, 0.0, 0.0
     first, last = _structure_shares(photo, x, y, across, down, feet, np.inf, shares)
     best, sigma, height = MOST_CREST_MISFIT, 0.0, 0.0

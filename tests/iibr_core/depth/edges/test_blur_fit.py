@@ -137,7 +137,7 @@ def test_edges_move_where_the_misfit_falls() -> None:
 
 def slow_vote(photo: np.ndarray, fitted: np.ndarray, y: int, x: int, here: float, there: float) -> float:
     """Mean colours of clean pixels of both heights, by 1 / squared distance; how far on the way between them."""
-    near = max(blur_fit.SAME_SIDE * abs(there - here), LEAST_EDGE)
+    near = max(0.5 * abs(there - here), LEAST_EDGE)
     found: tuple[list, list] = ([], [])
     reach = range(-blur_fit.COLOR_PX, blur_fit.COLOR_PX + 1)
     for v, u in ((y + j, x + i) for j in reach for i in reach):
@@ -180,7 +180,7 @@ def test_votes_and_moves_are_those_of_the_definition() -> None:
             neighbours = np.count_nonzero(abs(around - here) < near) - np.count_nonzero(abs(around - there) < near) - 1
             assert blur_fit._same_surface_neighbours(start, y, x, here, there) == neighbours
             change = 1 - 2 * wanted / ((there - here) * (full_taps() ** 2).sum())
-            change += WEIGHT * (blur_fit.OUTLINE_WEIGHT * neighbours - blur_fit.COLOR_WEIGHT * vote)
+            change += WEIGHT * (neighbours - blur_fit.COLOR_WEIGHT * vote)
             if change < best:
                 best, expected = change, there
         fitted, settled = start.copy(), np.ones(SIZE, np.bool_)

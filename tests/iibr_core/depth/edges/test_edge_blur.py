@@ -7,6 +7,7 @@ import pytest
 
 from iibr_core.depth.edges import edge_blur
 from iibr_core.depth.edges.edge_blur import extent, measure_edge_blur
+from iibr_core.depth.edges.edge_profiles import FLAT_SHARE
 from iibr_core.training.degradation import blur
 from tests.iibr_core.scenes import smooth_texture
 
@@ -105,7 +106,7 @@ def found_edges(agree: float, count: int, apart: int, sigma: float = 2.0) -> np.
 
 def test_the_photo_is_believed_where_it_agrees_more_often_than_chance_has_it() -> None:
     """Chance has half of the shoulders; edges near to each other are one witness."""
-    far, near = 2 * edge_blur.SAMPLE_CELL_PX, 1
+    far, near = 2 * edge_blur.SEARCHED_PX, 1
     assert edge_blur._photo_is_sure(found_edges(1.0, 8, far))
     assert not edge_blur._photo_is_sure(found_edges(0.5, 500, far))
     assert edge_blur._photo_is_sure(found_edges(0.65, 60, far))
@@ -121,7 +122,7 @@ def test_shoulders_are_flat_or_not() -> None:
         )
         return bool(edge_blur._has_flat_shoulders(values.astype(np.float32), at, 4.0, 1.0, 0.0, 30 - at, 2.0, 0.2))
 
-    limit = edge_blur.STEEPEST_SHOULDER * 0.2
+    limit = FLAT_SHARE * 0.2
     assert shoulders(0.0)
     assert shoulders(0.9 * limit)
     assert shoulders(-0.9 * limit)
