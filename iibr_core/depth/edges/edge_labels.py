@@ -181,8 +181,7 @@ def _is_slope(values, y, x, v, u, step):
     # The border hides one of both.
     before = values[y, x] - values[above, left] if above >= 0 and left >= 0 else step
     after = values[below, right] - values[v, u] if below < height and right < width else step
-    least = SLOPE_SHARE * abs(step)
-    return before * step > 0 and after * step > 0 and min(abs(before), abs(after)) >= least
+    return min(before * step, after * step) >= SLOPE_SHARE * step * step
 
 
 @kernel

@@ -175,9 +175,9 @@ def _as_crest(values, photo, x, y, across, down, sigma, least_edge, softness, sh
     """
     apart = max(int(sigma + 0.5), 1)
     bend, line_x, line_y = _curvature(values, x, y, apart)
-    # Too straight to be lower by an edge beside it, or too far from where it is level.
+    # Too far from where it is level.
     along = across * line_x + down * line_y
-    if not (abs(bend) * apart * apart >= FLAT_SHARE * least_edge and abs(along) < abs(bend) * apart):
+    if not abs(along) < abs(bend) * apart:
         return np.nan
     sign, far = 1.0 if bend < 0 else -1.0, -along / bend
     height, ground, share = structure_at(

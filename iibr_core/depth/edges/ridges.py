@@ -146,7 +146,7 @@ def _fit_structure(values, x, y, across, down, shares, first, last, sigma, taps)
     rest_b = b2 - b0 * b0 / n - line_b * line_b * spread
     rest_pb = pb - p0 * b0 / n - line_b * line_p * spread
     rest_p = pp - p0 * p0 / n - line_p * line_p * spread
-    if not (rest_b > 1e-6 and strongest >= LEAST_CREST_HEIGHT):
+    if not strongest >= LEAST_CREST_HEIGHT:
         return 0.0, 0.0, 0.0, np.inf
     height = rest_pb / rest_b
     slope = line_p - height * line_b
