@@ -131,7 +131,7 @@ def _color_statistics(colors, disparity, is_edge_band, y, x, foreground, edge_st
     pixels of both.
     """
     height, width = disparity.shape
-    weights, color = np.zeros(2), np.empty(3)
+    weights, color = np.zeros(2), np.empty_like(darkest)
     mean[:], spread[:] = 0.0, 0.0
     for v in range(max(y - MATTING_PX, 0), min(y + MATTING_PX + 1, height)):
         for u in range(max(x - MATTING_PX, 0), min(x + MATTING_PX + 1, width)):

@@ -47,8 +47,8 @@ def test_a_tail_is_what_a_gaussian_leaves_there(sigma):
 
 def test_flat_is_what_differs_on_no_side():
     for place in ((10, 27), (10, 33), (7, 30), (13, 30)):
-        values = np.zeros((21, 61), np.float32)
-        values[place] = 0.5
+        values = np.full((21, 61), 7, np.float32)
+        values[place] = 7.5
         assert not refine._is_flat(values, 30, 10, 3, 0.5)
         assert refine._is_flat(values, 30, 10, 3, 0.51)
         assert refine._is_flat(values, 30, 10, 2, 0.1)
