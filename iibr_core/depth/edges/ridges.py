@@ -207,12 +207,6 @@ def structure_at(values, photo, x, y, across, down, far, sign, sigma, least_edge
     Returns (its height, height of the ground, share of the pixel it covers); a height of 0 where there is none.
     """
     crest_x, crest_y = x + across * far, y + down * far
-    # Nearly always there is none, and this tells: lower on both sides.
-    beside, crest = 0.5 * (PLATEAU_SIGMAS + WIDEST_SIGMAS - 1) * sigma, height_at(values, crest_x, crest_y)
-    before = height_at(values, crest_x - across * beside, crest_y - down * beside)
-    after = height_at(values, crest_x + across * beside, crest_y + down * beside)
-    if not min(sign * (crest - before), sign * (crest - after)) > 0.5 * least_edge:
-        return 0.0, 0.0, 0.0
     found = _crest(values, crest_x, crest_y, across, down, sign)
     far, crest_x, crest_y = far + found, crest_x + across * found, crest_y + down * found
     reach = ceil((PLATEAU_SIGMAS + 0.5 + WIDEST_SIGMAS / 2) * sigma)
