@@ -9,6 +9,7 @@ from dataclasses import replace
 from iibr_core.scenes import (
     DepthSettings,
     LoadedPhoto,
+    Scene,
     SceneReady,
     SceneRequest,
     Source,
@@ -71,6 +72,7 @@ class SceneLoader:
         self._submitted = 0
         self._depth_settings = DepthSettings()
         self._stopped: int | None = None
+        self._room_beside: tuple[Scene, int] | None = None
 
     def has_lost(self, state: AppState) -> bool:
         """Whether what the state waits for will never come."""
@@ -233,10 +235,16 @@ class SceneLoader:
             return
         photos = _wanted(state, (state.source, *photos_ahead(state, AHEAD)))
         if _is_whole(state):
-            self.ahead.want(photos[1 : 1 + photos_within_budget(state.scene)])
+            self.ahead.want(photos[1 : 1 + self._photos_beside(state.scene)])
         else:
             is_begun = self.ahead.is_reading(photos[0])
             self.ahead.want([*photos[:is_begun], *filter(self.ahead.is_done, photos)])
+
+    def _photos_beside(self, scene: Scene) -> int:
+        """`photos_within_budget`, looked up once a scene: it reads a dozen files of the system."""
+        if self._room_beside is None or self._room_beside[0] is not scene:
+            self._room_beside = scene, photos_within_budget(scene)
+        return self._room_beside[1]
 
 
 def _has_other_depth(before: LoadedPhoto, now: LoadedPhoto | None) -> bool:

@@ -10,9 +10,6 @@ import time
 from collections import deque
 from dataclasses import replace
 
-import numpy as np
-from numpy.typing import NDArray
-
 from iibr_core.rendering import CENTRE, Optics
 from iibr_core.rendering.gloss import Gloss
 from iibr_core.scenes import WHOLE, GlossFound, GlossRequest, LoadedPhoto, Rect, Scene, SceneReady, ScreenSize
@@ -20,7 +17,7 @@ from iibr_core.types import FloatImage, GridShape, InputError, ViewOffset, ViewU
 from viewer.display.picking import is_kept_for_picking, pick_disparity
 from viewer.display.snapshot import SceneSnapshot
 from viewer.gpu.context import GLContext
-from viewer.gpu.light_field_texture import Box
+from viewer.gpu.light_field_texture import box_around
 from viewer.gpu.refocus.picture_renderer import Renderer
 from viewer.model.state.app_state import AppState, Picture
 
@@ -71,6 +68,7 @@ class SceneView:
         self._disparities: dict[ViewOffset, FloatImage] = {}
         self.picture_drawn: Picture | None = None
         self._drawn_at = 0.0
+        self._shows_one_view = False
         self._unprepared = list(USUAL_NEXT)
         self._view_came_at = 0.0
 
@@ -114,7 +112,7 @@ class SceneView:
             self._waiting.clear()
             self.renderer.upload_view(0, 0, centre.colors, disparity)
         elif differs.any():
-            self.renderer.change_disparity(0, 0, disparity, _box_around(differs))
+            self.renderer.change_disparity(0, 0, disparity, box_around(differs))
         self._disparities = {CENTRE: disparity}
         self.previews += 1
 
@@ -201,6 +199,8 @@ class SceneView:
             self.generation, self.views_uploaded, state.shown_optics, size_px, previews=self.previews, part=part
         )
         budget_s = self._gl.frame_budget_s
+        if self.picture_drawn is not None and self._shows_one_view and self._differs_by_views_only(wanted):
+            self.picture_drawn = replace(self.picture_drawn, views_uploaded=self.views_uploaded)
         if self.picture_drawn is None or (not self._is_same(wanted) and not self._can_wait(wanted)):
             is_still = self._differs_by_views_only(wanted)
             if is_still and self.renderer.passes_shown:  # it is seen on, and must not become softer
@@ -210,6 +210,7 @@ class SceneView:
                 self.renderer.render_in_time(wanted.optics, wanted.size_px, budget_s, part)
             self._drawn_at = time.perf_counter()
             self.pictures_drawn += 1
+            self._shows_one_view = self._is_one_view(wanted.optics)
             self.picture_drawn = replace(wanted, samples=self.renderer.report.samples)
         elif self.renderer.is_renewing or (self._is_same(wanted) and self._refines()):
             self.renderer.refine(budget_s)
@@ -268,6 +269,13 @@ class SceneView:
         drawn = self.picture_drawn
         return drawn is not None and self._is_same(replace(wanted, views_uploaded=drawn.views_uploaded))
 
+    def _is_one_view(self, optics: Optics) -> bool:
+        """Whether this picture is one view, there as it will stay: those that still come change nothing."""
+        if self._scene is None or self._fallback_view is not None or optics.aperture_diameter > 1 or optics.dolly != 0:
+            return False
+        (v, u), (t, s) = self._scene.grid.centre, map(round, optics.eye)
+        return (t, s) == optics.eye and self._is_final.get((v + t, u + s), False)
+
     def _is_same(self, wanted: Picture) -> bool:
         """Whether the picture drawn last is this one, however far it has come."""
         drawn = self.picture_drawn
@@ -280,7 +288,7 @@ class SceneView:
         scene = self._scene
         views_final = sum(self._is_final.values())
         has_all = scene is not None and views_final == scene.grid.rows * scene.grid.columns
-        return has_all or time.perf_counter() - self._view_came_at > NO_MORE_VIEWS_S
+        return has_all or self._shows_one_view or time.perf_counter() - self._view_came_at > NO_MORE_VIEWS_S
 
     def release(self) -> None:
         """Free the GL objects."""
@@ -290,9 +298,3 @@ class SceneView:
 def _is_beyond(values: FloatImage, range_px: tuple[float, float]) -> bool:
     far, near = range_px
     return bool(values.size and (values.min() < far or values.max() > near))
-
-
-def _box_around(marks: NDArray[np.bool_]) -> Box:
-    """The least rows and columns that hold all marks, of which there are some."""
-    rows, columns = (np.flatnonzero(marks.any(axis)) for axis in (1, 0))
-    return slice(int(rows[0]), int(rows[-1]) + 1), slice(int(columns[0]), int(columns[-1]) + 1)

@@ -272,3 +272,9 @@ def _range_of(disparity: FloatImage) -> tuple[float, float]:
     far, near = np.quantile(disparity, [0.0002, 0.9998])
     margin = RANGE_MARGIN * (near - far) + 1e-3
     return float(far - margin), float(near + margin)
+
+
+def box_around(marks: NDArray[np.bool_]) -> Box:
+    """The least rows and columns that hold all marks, of which there are some."""
+    rows, columns = (np.flatnonzero(marks.any(axis)) for axis in (1, 0))
+    return slice(int(rows[0]), int(rows[-1]) + 1), slice(int(columns[0]), int(columns[-1]) + 1)

@@ -12,11 +12,13 @@ import pytest
 from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.scenes.opening import SceneReady
 from iibr_core.scenes.screen_size import ScreenSize
+from iibr_core.types import ViewOffset
 from tests.viewer.conftest import headless_with_scene
 from viewer.app.headless import HeadlessViewer
 from viewer.display import scene_view
 from viewer.display.scene_view import SceneView
-from viewer.model.state.optics_actions import SetAperture
+from viewer.model.actions import Action
+from viewer.model.state.optics_actions import MoveEye, SetAperture
 
 SIZE = ScreenSize(384, 256)
 
@@ -71,6 +73,38 @@ def test_views_that_come_meanwhile_do_not_put_off_what_is_shown(opened: Headless
     view.renderer.refine()
     shown = view.renderer.read_image().astype(int)
     assert np.abs(shown - view.renderer.converged_picture(RenderSettings(opened.state.optics, SIZE))).max() <= 1
+
+
+@pytest.mark.parametrize(
+    ("lens", "draws"),
+    [((), False), ((MoveEye(ViewOffset(-0.5, 0.0)),), True), ((SetAperture(3.0),), True)],
+    ids=["one view", "between views", "a lens"],
+)
+def test_a_picture_that_is_one_view_is_not_drawn_for_others(
+    opened: HeadlessViewer, lens: tuple[Action, ...], draws: bool
+) -> None:
+    view = opened._scene_view
+    opened.do(SetAperture(0.0), *lens)
+    view.converge(opened.state, SIZE)
+    pictures, shown = view.pictures_drawn, view.renderer.read_image()
+    a_view_comes(view)
+    view.converge(opened.state, SIZE)
+    assert view.pictures_drawn == pictures + draws
+    assert np.array_equal(view.renderer.read_image(), shown) != draws
+    assert view.shows_all_views()
+
+
+def test_a_view_that_is_there_as_a_draft_is_drawn_again(opened: HeadlessViewer) -> None:
+    view, at = opened._scene_view, (0, 1)
+    view._is_final[at] = False
+    assert opened.state.scene is not None
+    opened.do(SetAperture(0.0), MoveEye(opened.state.scene.grid.offset(*at)))
+    view.converge(opened.state, SIZE)
+    pictures = view.pictures_drawn
+    for _ in range(2):
+        a_view_comes(view)
+        view.converge(opened.state, SIZE)
+    assert view.pictures_drawn == pictures + 1
 
 
 def test_a_view_stands_in_before_the_second_view_of_the_scene_has_come(opened: HeadlessViewer) -> None:
