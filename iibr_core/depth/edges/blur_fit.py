@@ -14,7 +14,7 @@ from iibr_core.runtime.jit import kernel
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never
 from iibr_core.types import FloatImage, image_size
 
-WIDEST_FITTED_SIGMA_PX = 4.0
+WIDEST_FITTED_SIGMA_PX = 4.5
 """Work grows with the blur's area: wider ones stay as they are."""
 DESCENT_SWEEPS = 4
 """Of moving edges."""

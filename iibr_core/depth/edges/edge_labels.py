@@ -46,7 +46,7 @@ UNLIKE, UNSEEN_WEIGHT = 0.03, 0.05
 """Likelihood of a colour that nothing on a surface has; weight of that possibility against what was seen."""
 CLEAR = 1.5
 """Log likelihood ratio from which colours are clear."""
-MIXED_SHARE = 0.2
+MIXED_SHARE = 0.1
 """Share of the pixels beside exact steps whose colours contradict the map: they are mixed."""
 WRONG = (0.02, 0.9)
 """Least and largest share of pixels that a map is taken to have on the wrong side."""
