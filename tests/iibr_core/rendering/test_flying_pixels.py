@@ -130,6 +130,15 @@ def test_detail_between_pixels_is_bilinear() -> None:
     np.testing.assert_allclose([_interpolated(image, *place) for place in places.astype(float)], expected, atol=1e-6)
 
 
+@pytest.mark.parametrize("shape", [(3, 5), (5, 3)])
+def test_detail_at_the_border_takes_nothing_from_beyond_it(shape: tuple[int, int]) -> None:
+    around = np.full((shape[0] + 1, shape[1] + 1), np.nan, np.float32)
+    image = around[:-1, :-1]
+    image[:] = np.random.default_rng(4).random(shape)
+    for y, x in np.ndindex(shape):
+        assert _interpolated(image, float(y), float(x)) == image[y, x]
+
+
 @pytest.mark.parametrize("size", [(1, 1), (1, 7), (2, 2)])
 def test_tiny_photos(size: tuple[int, int]) -> None:
     photo, values = np.ones((*size, 3), np.float32), np.ones(size, np.float32)
