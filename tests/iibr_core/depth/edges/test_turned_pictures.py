@@ -125,6 +125,25 @@ def test_what_lies_between_surfaces_does_so_however_they_are_turned(turn):
     assert clear == clear_again > 5
 
 
+@pytest.mark.parametrize("height", [-64.0, 64.0])
+def test_a_raised_map_is_as_before(height):
+    rng = np.random.default_rng(3)
+    values = np.float32([0, 2, 1.25, 3, 2.5])[things()]
+    between = rng.random(values.shape) < 0.1
+    values[between] = rng.integers(0, 48, between.sum()) / 16
+    raised = values + np.float32(height)
+    found, clear = _find_between(values, EDGE, never)
+    again, clear_again = _find_between(raised, EDGE, never)
+    np.testing.assert_array_equal(again, found)
+    assert clear == clear_again > 5
+    np.testing.assert_array_equal(edge_labels.step_distance(raised, EDGE), edge_labels.step_distance(values, EDGE))
+    photo, soft = scene()
+    for given in (maximum_filter(np.float32([0, 2, 1.25, 3, 2.5])[things()], 3), soft):
+        expected = refine_map(photo, given)
+        assert (abs(refine_map(photo, given + np.float32(height)) - height - expected) > 0.02).mean() < 0.01
+        assert (expected != given).mean() > 0.02
+
+
 def grey_in_one_channel(photo, channel):
     """Its brightness in one channel, nothing in the others."""
     shown = np.full_like(photo, 0.5)
