@@ -100,6 +100,38 @@ def test_a_place_along_a_turned_line_is_as_before(what):
     assert len(seen) > 1, "it depends on the place"
 
 
+BOTH_WAYS: dict[str, Callable[..., object]] = {
+    "change": lambda v, p, x, y, a, d, way: edge_profiles.strongest_change(
+        p, x, y, a, d, *((-4.0, 5.0) if way > 0 else (-5.0, 4.0))
+    ),
+    "flat shoulders": lambda v, p, x, y, a, d, way: edge_blur._has_flat_shoulders(v, x, y, a, d, 0.4 * way, SIGMA, 0.4),
+    "photo": lambda v, p, x, y, a, d, way: edge_blur._photo_agrees(p, x, y, a, d, 0.13 * way, SIGMA),
+    "crest": lambda v, p, x, y, a, d, way: way * ridges._crest(v, x, y, a, d, 1.0),
+    "feet": lambda v, p, x, y, a, d, way: feet(v, x, y, a, d)[:: int(way)],
+    "slit": lambda v, p, x, y, a, d, way: feet(-v, x, y, a, d, -1.0)[:: int(way)],
+    "relief": lambda v, p, x, y, a, d, way: ridges._is_relief(v, x, y, a, d, (3.0, 4.0)[:: int(way)], 1.0, 9.0),
+    "structure": lambda v, p, x, y, a, d, way: ridges.structure_at(
+        v, p, int(x), int(y), a, d, 0.6 * way, 1.0, SIGMA, EDGE, SHARES, TAPS
+    )[:2],
+    "blur of a structure": lambda v, p, x, y, a, d, way: ridges.structure_blur(
+        v, p, x, y, a, d, 1.0, EDGE, SHARES, TAPS
+    )[:2],
+}
+
+
+@pytest.mark.parametrize("what", BOTH_WAYS)
+def test_a_line_is_alike_from_both_ends(what):
+    photo, values = scene()
+    seen = set()
+    at = np.argwhere(np.hypot(*np.gradient(values)) > 0.02)[::7].astype(float)
+    for k, (y, x) in enumerate(at):
+        across, down = [(1.0, 0.0), (0.6, 0.8), (-0.8, 0.6), (0.0, -1.0)][k % 4]
+        one, other = (BOTH_WAYS[what](values, photo, x, y, way * across, way * down, way) for way in (1.0, -1.0))
+        np.testing.assert_allclose(other, one, atol=2e-4)
+        seen.add(str(one))
+    assert len(seen) > 1, "it depends on the place"
+
+
 @pytest.mark.parametrize("turn", TURNS.values(), ids=TURNS)
 def test_a_turned_map_is_refined_alike(turn):
     """But for ties. Edges that the fit to the blur moves one after the other are left out."""
