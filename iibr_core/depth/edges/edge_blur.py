@@ -92,8 +92,7 @@ def _steps(photo: FloatImage, disparity: FloatImage, should_stop: ShouldStop) ->
     scale, least_sigma = 1, 0.0
     while least_edge > 0 and min(disparity.shape) >= (2 if scale == 1 else 4 * SEARCHED_PX):
         edges = _steps_of_level(photo, disparity, least_edge, least_sigma, MOST_BLUR_PIXELS // scale, should_stop)
-        edges[:2] = (edges[:2] + 0.5) * scale - 0.5
-        edges[2] *= scale
+        edges[:3] *= scale
         found.append(edges)
         if 2 * scale * MEASURED_SIGMA_PX > WIDEST_MEASURED_SIGMA_PX:
             break
