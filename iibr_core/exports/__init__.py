@@ -27,6 +27,6 @@ if TYPE_CHECKING:
         size_of_width,
     )
     from iibr_core.exports.source import ExportSource
-    from iibr_core.exports.writers import export_path, require_export_place, writer_of
+    from iibr_core.exports.writers import export_path, optics_of, require_export_place, writer_of
 else:
     __getattr__ = offered_by(__file__)

@@ -8,9 +8,11 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-from iibr_core.exports import ExportOptions, ExportSource, export_kind, require_export_place, writer_of
+from iibr_core.exports import ExportOptions, ExportSource, export_kind, optics_of, require_export_place, writer_of
 from iibr_core.formats import AlreadyThereError
+from iibr_core.rendering import Optics
 from iibr_core.runtime import require_extra
+from iibr_core.scenes import Scene
 from iibr_core.types import InputError
 from viewer.app.job import Job
 from viewer.app.job_queue import JobQueue
@@ -42,9 +44,14 @@ def add_export(task: ExportTask, state: AppState, inputs: Sequence[Path], jobs: 
     except InputError as error:
         return [ShowPrompt(replace(asked, problem=str(error)))]
     work = partial(_export, writer_of(kind), path, task.options)
-    jobs.add(Job("export", path, state, lambda scene, optics: "views", work))
+    pictures = optics_of(kind, task.options) if kind.is_drawn else _no_pictures
+    jobs.add(Job("export", path, state, lambda scene, optics: "views", work, pictures))
     closed = [ShowPrompt(None)] if isinstance(state.prompt, ExportPrompt) else []
     return [*closed, SetPreference("last_folder", os.path.abspath(path.parent))]
+
+
+def _no_pictures(scene: Scene, optics: Optics) -> Sequence[Optics]:
+    return ()
 
 
 def _export(write: Write, path: Path, options: ExportOptions, source: ExportSource) -> list[Action]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
@@ -27,9 +27,9 @@ Lane = Literal["pictures", "exports", "fills"]
 @dataclass(eq=False)
 class Job:
     """state: of the window when it was asked for. needs: asked again as more of the scene is known. work: what it does,
-    in a thread; what comes of it is returned; None where it fills. takes_part: of the views will do where the user
-    makes no more. fills: the light field as it is to be, None of another kind. is_ours: path is not for the user's
-    eyes.
+    in a thread; what comes of it is returned; None where it fills. pictures: finds what those that it draws are taken
+    with. takes_part: of the views will do where the user makes no more. fills: the light field as it is to be, None of
+    another kind. is_ours: path is not for the user's eyes.
 
     generation: whose views it shows; request: makes the same once more, where is_left: the window does not make them.
     snapshot: None until it is there.
@@ -40,6 +40,7 @@ class Job:
     state: AppState
     needs: Callable[[Scene, Optics], Needs]
     work: Callable[[ExportSource], list[Action]] | None = None
+    pictures: Callable[[Scene, Optics], Iterable[Optics]] = lambda scene, optics: (optics,)
     takes_part: bool = False
     fills: Source | None = None
     id: int = 0

@@ -13,6 +13,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 from iibr_core.exports import ExportSource, RenderSettings, require_size
+from iibr_core.generation import ALL_VIEWS, WantedViews
 from iibr_core.rendering import CENTRE
 from iibr_core.runtime import raise_if_stopped
 from iibr_core.scenes import FilledField, GlossRequest, Progress, SceneReady, ViewReady, answer, results_of
@@ -21,6 +22,7 @@ from viewer.app.job import Job
 from viewer.background.window_work import Result, Steps, WindowWork
 from viewer.display.scene_view import SceneView
 from viewer.display.snapshot import SceneSnapshot, snapshot_of
+from viewer.gpu.refocus.views_seen import views_seen_by
 
 MAKING_VIEWS = "making views"
 DRAWING = "drawing"
@@ -84,12 +86,15 @@ class JobScenes:
             self._report(job, progress.done, progress.total, progress.doing or MAKING_VIEWS)
 
         assert job.request is not None
-        results = results_of(job.request, job.should_stop, lambda: CENTRE, report)
+        wanted = ALL_VIEWS
+        results = results_of(job.request, job.should_stop, lambda: CENTRE, report, lambda: wanted)
         with closing(results):
             ready = next(results)
             assert isinstance(ready, SceneReady)
             snapshot = self._run(job, _in_one_step(lambda: self._open(job, ready)))
-            if job.needs(ready.scene, job.optics_on(ready.scene)) != "scene":
+            scene, optics = ready.scene, job.optics_on(ready.scene)
+            if job.needs(scene, optics) != "scene":
+                wanted = WantedViews(views_seen_by(job.pictures(scene, optics), scene.grid))
                 self._make_views(job, snapshot, results, report)
 
     def _open(self, job: Job, ready: SceneReady) -> SceneSnapshot:

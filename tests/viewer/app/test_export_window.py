@@ -21,9 +21,12 @@ from iibr_core.rendering.gloss.gloss_settings import Gloss
 from iibr_core.runtime.tiling import raise_if_stopped
 from iibr_core.scenes.scene import Source
 from iibr_core.scenes.screen_size import ScreenSize
-from iibr_core.types import GridShape, ViewOffset
+from iibr_core.types import GridShape, ViewOffset, ViewUpdate
 from tests.viewer.conftest import Driver, Opener, write_scene
+from viewer.app import job_scene
 from viewer.app.main_loop import App
+from viewer.background.window_work import Steps
+from viewer.display.snapshot import SceneSnapshot
 from viewer.model.actions import (
     Action,
     DismissNotice,
@@ -214,6 +217,30 @@ def test_what_is_asked_for_before_all_views_are_there_is_not_lost_with_its_photo
     viewer.until(lambda app: f"Exported {tmp_path / f'late.{kind}'}" in texts(app))
     early, late = (bytes_of(tmp_path / f"{when}.{kind}") for when in ("early", "late"))
     assert list(early.values()) == list(late.values())
+
+
+@pytest.mark.parametrize(("kind", "most"), [("anaglyph", 2), ("numbered-grid", 0)])
+def test_of_a_scene_that_was_left_only_the_views_are_made_that_are_shown(
+    open_window: Opener, photo_path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: str, most: int
+) -> None:
+    made, store = list[ViewUpdate](), job_scene._store
+
+    def counted(snapshot: SceneSnapshot, view: ViewUpdate) -> Steps[None]:
+        made.append(view)
+        return store(snapshot, view)
+
+    monkeypatch.setattr(job_scene, "_store", counted)
+    viewer = open_window(photo_path, grid=GridShape(5, 5))
+    app = viewer.app
+    viewer.until(lambda app: app.state.scene is not None and not app.state.scene.is_sketch)
+    path = tmp_path / f"early{'.png' if kind == 'anaglyph' else ''}"
+    app.do(DoTask(ExportTask(kind, str(path), ExportOptions())))
+    app.step()
+    assert [job.doing for job in app.state.jobs] == [WAITING_FOR_VIEWS]
+    app.do(other_photo(tmp_path))
+    viewer.until(lambda app: not app.state.jobs)
+    assert any(text.startswith("Exported") for text in texts(app))
+    assert len({(view.row, view.column) for view in made}) == most
 
 
 def test_waiting_jobs_do_not_hold_the_views_of_scenes_that_were_left(
