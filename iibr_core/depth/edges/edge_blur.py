@@ -15,13 +15,15 @@ from iibr_core.depth.edges.edge_profiles import (
     COLOR_NOISE,
     FLAT_SHARE,
     PLATEAU_SIGMAS,
+    SEARCHED_PX,
+    SHARES,
     gradient,
     height_at,
     is_inside,
     strongest_change,
+    structure_blur,
     walk,
 )
-from iibr_core.depth.edges.ridges import SEARCHED_PX, SHARES, structure_blur
 from iibr_core.runtime.jit import kernel
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never
 from iibr_core.types import FloatImage, ImageSize

@@ -40,14 +40,18 @@ LIKENESS_TABLE = np.append(np.exp(-0.5 * (np.arange(16 * LIKENESS_STEPS) + 0.5) 
 """Likeness by squared distance of colours, in such steps of a variance, 0 from the last one on."""
 LEAST_FOREGROUND = 0.7
 """Weight of all pixels of a foreground together, below which it keeps its pixels: it is a pixel thin."""
-LIKE_CONTRAST = 0.5
-"""Standard deviation of likeness, of a pixel to a surface and to a neighbour, in mean steps of colour in the band."""
-UNLIKE, UNSEEN_WEIGHT = 0.03, 0.05
+LIKE_CONTRAST, LIKE_NEIGHBOUR = 0.5, 0.6
+"""Standard deviations of likeness, of a pixel to a surface and to a neighbour, in mean steps of colour in the band."""
+UNLIKE, UNSEEN_WEIGHT = 0.03, 0.3
 """Likelihood of a colour that nothing on a surface has; weight of that possibility against what was seen."""
+COHESION = 1.2
+"""How much a neighbour counts that is on the same surface and looks alike, in units of log likelihood."""
+DATA_TERM_WEIGHT = 1.5
+"""How much the map counts: factor of the log odds of its being right. With less, thin wires are lost."""
 CLEAR = 1.5
 """Log likelihood ratio from which colours are clear."""
-MIXED_SHARE = 0.1
-"""Share of the pixels beside exact steps whose colours contradict the map: they are mixed."""
+MIXED_SHARES = (0.1, 0.25)
+"""Share of the pixels just behind and just in front of exact steps whose colours contradict the map: they are mixed."""
 WRONG = (0.02, 0.9)
 """Least and largest share of pixels that a map is taken to have on the wrong side."""
 TELLING = 0.2
@@ -58,7 +62,7 @@ EXACT = 0.1
 """Where it has a smaller share there everywhere, it stays as it is."""
 MOST_MEASURED_PIXELS = 1 << 14
 """Of the band, at most, tell how far the map is wrong."""
-PASSES = 5
+PASSES = 8
 """Of mean field (Kraehenbuehl and Koltun 2011)."""
 MOST_PIECE_PIXELS = 1 << 12
 
@@ -85,12 +89,12 @@ def label_edges(
         return values
     other, evidence = weighed if len(few) == len(pixels) else _in_parts(weigh, pixels, should_stop)
     away, own, known = away[pixels], own[pixels], known[pixels]
-    odds = np.log((1 - wrong) / wrong)
+    odds = np.float32(DATA_TERM_WEIGHT) * np.log((1 - wrong) / wrong)
     prior = np.where(known, odds[(own > other).astype(np.intp), away], np.float32(0))
     # The farthest pixels only look on.
     looks_on = (other == own) | (known & (away == LABELLED_PX))
     drive = np.where(looks_on, np.float32(np.inf), evidence + prior)
-    belief = _mean_field(colors, values, pixels, other, drive, LIKE_CONTRAST * contrast, should_stop)
+    belief = _mean_field(colors, values, pixels, other, drive, LIKE_NEIGHBOUR * contrast, should_stop)
     labelled = values.copy()
     labelled.reshape(-1)[pixels] = np.where(belief < 0.5, other, own)
     return labelled
@@ -138,7 +142,7 @@ def _measure_errors(
     for side in range(2):
         misled = _contradicted(evidence[clear & (in_front == side) & (away == LABELLED_PX)])
         for k in range(LABELLED_PX + 1):
-            by_chance = max(misled, MIXED_SHARE) if k == 0 else misled
+            by_chance = max(misled, MIXED_SHARES[side]) if k == 0 else misled
             here = (in_front == side) & (away == k)
             contradicted = _contradicted(evidence[clear & here], misled)
             is_told = np.count_nonzero(clear & here) >= TELLING * np.count_nonzero(known & here)
@@ -318,5 +322,5 @@ def _believe(colors, values, pixels, number, other, drive, alike, believed, beli
                 for c in range(3):
                     apart += (colors[v, u, c] - colors[y, x, c]) ** 2
                 like = exp(-0.5 * apart / (alike * alike)) if apart < np.inf else 0.0
-                total += like * votes
+                total += COHESION * like * votes
         belief[n] = 1.0 / (1.0 + exp(-min(max(total, -30.0), 30.0)))

@@ -18,12 +18,14 @@ from iibr_core.depth.edges.edge_profiles import (
     FLAT_SHARE,
     GAUSSIAN_SIGMAS,
     PLATEAU_SIGMAS,
+    RETURN_SIGMAS,
+    SHARES,
     gradient,
     height_at,
     passes,
+    structure_at,
     walk,
 )
-from iibr_core.depth.edges.ridges import RETURN_SIGMAS, SHARES, structure_at
 from iibr_core.inpainting.disparity_by_color import fill_disparity_by_color
 from iibr_core.runtime.jit import kernel
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never

@@ -92,7 +92,7 @@ def slow_pass(colors, values, other, drive, alike, believed):
         for p in around(values, y, x, 1):
             like = np.exp(-np.sum((colors[p] - colors[y, x]) ** 2) / (2 * alike**2))
             votes = believed[p] * says(values[p]) + (1 - believed[p]) * says(other[p])
-            total += like * votes
+            total += edge_labels.COHESION * like * votes
         belief[y, x] = 1 / (1 + np.exp(-np.clip(total, -30, 30)))
     return belief
 
@@ -108,7 +108,7 @@ def slow_errors(evidence, side, distance, known):
     for s in (0, 1):
         misled = contradicted(side == s, distance == far)
         for k in range(far + 1):
-            chance = max(misled, edge_labels.MIXED_SHARE if k == 0 else 0)
+            chance = max(misled, edge_labels.MIXED_SHARES[s] if k == 0 else 0)
             share = contradicted(side == s, distance == k, expected=misled)
             here = known & (side == s) & (distance == k)
             is_told = (np.abs(evidence[here]) > edge_labels.CLEAR).mean() >= edge_labels.TELLING
@@ -126,13 +126,13 @@ def slow_labels(colors, values, unknown):
         other[y, x], evidence[y, x] = slow_weigh(colors, values, distance, y, x, edge_labels.LIKE_CONTRAST * contrast)
     side = (values > other).astype(int)
     wrong = slow_errors(evidence, side, distance, ~unknown & band)
-    odds = {at: np.log((1 - share) / share) for at, share in wrong.items()}
+    odds = {at: edge_labels.DATA_TERM_WEIGHT * np.log((1 - share) / share) for at, share in wrong.items()}
     drive = np.full(values.shape, np.inf)
     for p in map(tuple, np.argwhere(band & (other != values) & (unknown | (distance < edge_labels.LABELLED_PX)))):
         drive[p] = evidence[p] + (0 if unknown[p] else odds[side[p], distance[p]])
     belief = np.ones(values.shape)
     for _ in range(edge_labels.PASSES):
-        belief = slow_pass(colors, values, other, drive, edge_labels.LIKE_CONTRAST * contrast, belief)
+        belief = slow_pass(colors, values, other, drive, edge_labels.LIKE_NEIGHBOUR * contrast, belief)
     return np.where(belief < 0.5, other, values).astype(np.float32)
 
 
