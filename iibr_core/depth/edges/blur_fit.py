@@ -28,6 +28,8 @@ FULL_WEIGHT_SIGMA_PX = 2.0
 """Blur from which colours and outline count in full: the narrower, the better the map itself shows where its edges are,
 by the square.
 """
+MOVED_EDGES = 2.0
+"""Times the least edge: lower steps stay where they are."""
 COLOR_PX = 3
 """Colours of both sides are taken from so far around."""
 
@@ -54,7 +56,7 @@ def fit_to_blur(
         _find_missing(values, fitted, taps, first, last, missing)
 
     def move(first: int, last: int) -> None:
-        _move_edges(photo, fitted, missing, taps, weight, least_edge, first, last, settled)
+        _move_edges(photo, fitted, missing, taps, weight, MOVED_EDGES * least_edge, first, last, settled)
 
     in_bands(find_missing, image_size(values), should_stop)
     for _ in range(DESCENT_SWEEPS):
