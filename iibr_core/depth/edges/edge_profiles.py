@@ -279,7 +279,7 @@ def _feet(values, x, y, across, down, sign, reach, least_edge):
         return 0.0, 0.0
     after, high, _, _, _ = walk(values, x, y, -sign * across, -sign * down, -sign, reach, 1.0, np.inf)
     drops = sign * (crest - low), sign * (crest - high)
-    if not (min(drops) >= max(least_edge, LEAST_SIDE_HEIGHT * max(drops)) and min(before, after) > 0):
+    if not min(drops) >= max(least_edge, LEAST_SIDE_HEIGHT * max(drops)):
         return 0.0, 0.0
     return before, after
 
@@ -307,7 +307,7 @@ def structure_at(values, photo, x, y, across, down, far, sign, sigma, least_edge
     found = _crest(values, crest_x, crest_y, across, down, sign)
     far, crest_x, crest_y = far + found, crest_x + across * found, crest_y + down * found
     reach = ceil((PLATEAU_SIGMAS + 0.5 + WIDEST_SIGMAS / 2) * sigma)
-    feet = _feet(values, crest_x, crest_y, across, down, sign, min(reach, SEARCHED_PX), least_edge)
+    feet = _feet(values, crest_x, crest_y, across, down, sign, reach, least_edge)
     if feet[0] == 0 or _is_relief(values, crest_x, crest_y, across, down, feet, sign, RETURN_SIGMAS * sigma):
         return 0.0, 0.0, 0.0
     first, last = _structure_shares(photo, crest_x, crest_y, across, down, feet, WIDEST_SIGMAS * sigma + 1, shares)
