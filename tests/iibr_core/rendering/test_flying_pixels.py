@@ -98,6 +98,19 @@ def test_pixels_whose_disparity_is_the_other_surfaces_are_flying() -> None:
     assert ((replaced - truth) ** 2).mean() < 0.01 * with_flying_pixels
 
 
+@pytest.mark.parametrize(("gap_px", "is_torn"), [(1.5, False), (2.5, True)])
+def test_only_steps_that_open_a_gap_tear_rays_off(gap_px: float, is_torn: bool) -> None:
+    """A lone odd pixel of a view beside a step that is so wide there; or far from it, where it never goes."""
+    photo = np.full((20, 30, 3), 0.5, np.float32)
+    values = np.where(np.arange(30) < 15, 0.0, gap_px).astype(np.float32) * np.ones((20, 1), np.float32)
+    rays = rays_of_photo(photo, values, 1.0, 0)
+    view, disparity = photo.copy(), np.zeros((20, 30), np.float32)
+    view[10, 14], view[10, 6] = 0.9, 0.9
+    made = without_flying_pixels(rays, ViewOffset(0.0, 1.0), view, disparity, np.zeros((20, 30), np.bool_))
+    assert (made[10, 14] == 0.5).all() == is_torn
+    assert (made[10, 6] == view[10, 6]).all()
+
+
 def test_a_thin_wire_stays() -> None:
     photo = np.full((40, 60, 3), 0.8, np.float32)
     values = np.zeros((40, 60), np.float32)
