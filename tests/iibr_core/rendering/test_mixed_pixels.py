@@ -37,6 +37,16 @@ def test_shares_are_those_of_a_darker_photo_however_bright_an_hdr_one_is():
     np.testing.assert_allclose(bright, usual, atol=3e-3)
 
 
+@pytest.mark.parametrize("turn", [1, 2])
+def test_shares_of_a_bright_photo_do_not_depend_on_which_channel_is_brightest(turn):
+    colors, disparity = edge_photo(0.35)
+    light = linear_from_srgb(colors) * np.random.default_rng(0).uniform(0.5, 1.5, (9, 12, 1)).astype(np.float32)
+    bright = srgb_from_linear(light * np.float32([1e7, 1e5, 1e4]))
+    expected = split_mixed_pixels(bright, disparity, edge_step=0.5)[3]
+    found = split_mixed_pixels(np.roll(bright, turn, axis=2), disparity, edge_step=0.5)[3]
+    np.testing.assert_allclose(found, expected, atol=3e-3)
+
+
 def test_a_pixel_that_is_all_foreground_goes_with_it():
     _, fringe, _, coverage = split_mixed_pixels(*edge_photo(1.0), edge_step=0.5)
     assert coverage[4, 5] == pytest.approx(1 - mixed_pixels.LEAST_MATTE)
