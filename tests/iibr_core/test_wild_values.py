@@ -397,6 +397,9 @@ FINITE = {
         rays(v), found(v), shown(v)[0]
     ),
     "rendering.resampling.resample_colors": lambda v, _: shown(v)[1],
+    "rendering.mixed_pixels.move_with_foreground": lambda v, _: mixed_pixels.move_with_foreground(known(v), (0.1, 1.0))[
+        np.isfinite(known(v))
+    ],
     "rendering.mixed_pixels.split_mixed_pixels": lambda v, _: mixed_pixels.split_mixed_pixels(
         image(0.5), known(v), 0.5
     )[:2],
