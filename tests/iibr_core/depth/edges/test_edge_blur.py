@@ -28,9 +28,17 @@ def test_the_blur_of_a_map_is_measured(sigma: float) -> None:
     np.testing.assert_allclose(measure_edge_blur(photo, blur(disparity, sigma)), sigma, rtol=0.15)
 
 
-def test_a_wide_blur_is_measured_on_a_smaller_map() -> None:
-    photo, disparity = disc(480)
+@pytest.mark.parametrize("size", [180, 480])
+def test_a_wide_blur_is_measured_on_a_smaller_map(size: int) -> None:
+    photo, disparity = disc(size)
     np.testing.assert_allclose(measure_edge_blur(photo, blur(disparity, 8.0)), 8.0, rtol=0.15)
+
+
+def test_a_small_map_tells_of_narrow_blurs_only() -> None:
+    """Half of it would hold no more than an edge."""
+    photo, disparity = disc(140)
+    assert measure_edge_blur(photo, blur(disparity, 8.0)) == 0
+    assert measure_edge_blur(photo, blur(disparity, 4.0)) > 0
 
 
 def test_exact_edges_have_none() -> None:
