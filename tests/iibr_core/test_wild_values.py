@@ -514,7 +514,6 @@ FINITE_BY_CONTRACT = {
     "geometry.offset_of_line": "lines along the plane give infinity or NaN, as it says",
     "geometry.pixel_of_line": "lines along the plane give infinity or NaN, as it says",
     "stages.stages_without": "names only",
-    "rendering.mixed_pixels.move_with_foreground": "of maps that are finite; NaN moves nothing",
     "surfaces.step_of": "of constants and of view offsets, which are finite",
     "inpainting.background.fill_background": "of rendered views only",
     "inpainting.background.continue_farthest": "of rendered views only",

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter, maximum_filter
 
-from iibr_core.depth.edges import edge_blur, edge_labels, edge_profiles, refine, ridges
+from iibr_core.depth.edges import edge_blur, edge_labels, edge_profiles, refine
 from iibr_core.depth.edges.edge_band import _find_between
 from iibr_core.depth.edges.refine import refine as refine_map
 from iibr_core.rendering.flying_pixels import measure_detail
@@ -22,7 +22,7 @@ TURNS = {
     "rows and columns": lambda values: values.swapaxes(0, 1),
 }
 NO_FIT = stages_without(["fit-to-blur"])
-SHARES, TAPS = np.empty(ridges.SHARES), np.empty(ridges.SHARES)
+SHARES, TAPS = np.empty(edge_profiles.SHARES), np.empty(edge_profiles.SHARES)
 
 
 def things():
@@ -46,7 +46,7 @@ def scene():
 
 
 def feet(values, x, y, across, down, sign=1.0):
-    return ridges._feet(values, x, y, across, down, sign, 12, EDGE)
+    return edge_profiles._feet(values, x, y, across, down, sign, 12, EDGE)
 
 
 PLACES: dict[str, Callable[..., object]] = {
@@ -62,17 +62,17 @@ PLACES: dict[str, Callable[..., object]] = {
     "beyond the blur": lambda v, p, x, y, a, d: refine._beyond_blur(v, x, y, a, d, 4.0, SIGMA, 0.2),
     "flat": lambda v, p, x, y, a, d: refine._is_flat(v, int(x), int(y), 2, 0.2),
     "step": lambda v, p, x, y, a, d: refine._as_step(v, int(x), int(y), a, d, SIGMA, EDGE, 1e-3),
-    "color": lambda v, p, x, y, a, d: ridges._color_at(p, x + 0.3 * a, y + 0.3 * d),
-    "crest": lambda v, p, x, y, a, d: ridges._crest(v, x, y, a, d, 1.0),
+    "color": lambda v, p, x, y, a, d: edge_profiles._color_at(p, x + 0.3 * a, y + 0.3 * d),
+    "crest": lambda v, p, x, y, a, d: edge_profiles._crest(v, x, y, a, d, 1.0),
     "feet": lambda v, p, x, y, a, d: feet(v, x, y, a, d),
-    "relief": lambda v, p, x, y, a, d: ridges._is_relief(v, x, y, a, d, (3.0, 4.0), 1.0, 9.0),
-    "shares": lambda v, p, x, y, a, d: ridges._structure_shares(p, x, y, a, d, (5.0, 6.0), 9.0, SHARES),
-    "structure": lambda v, p, x, y, a, d: ridges.structure_at(
+    "relief": lambda v, p, x, y, a, d: edge_profiles._is_relief(v, x, y, a, d, (3.0, 4.0), 1.0, 9.0),
+    "shares": lambda v, p, x, y, a, d: edge_profiles._structure_shares(p, x, y, a, d, (5.0, 6.0), 9.0, SHARES),
+    "structure": lambda v, p, x, y, a, d: edge_profiles.structure_at(
         v, p, int(x), int(y), a, d, 0.5, 1.0, SIGMA, EDGE, SHARES, TAPS
     ),
-    "blur of a structure": lambda v, p, x, y, a, d: ridges.structure_blur(v, p, x, y, a, d, 1.0, EDGE, SHARES, TAPS)[
-        :2
-    ],
+    "blur of a structure": lambda v, p, x, y, a, d: edge_profiles.structure_blur(
+        v, p, x, y, a, d, 1.0, EDGE, SHARES, TAPS
+    )[:2],
 }
 
 
@@ -106,14 +106,14 @@ BOTH_WAYS: dict[str, Callable[..., object]] = {
     ),
     "flat shoulders": lambda v, p, x, y, a, d, way: edge_blur._has_flat_shoulders(v, x, y, a, d, 0.4 * way, SIGMA, 0.4),
     "photo": lambda v, p, x, y, a, d, way: edge_blur._photo_agrees(p, x, y, a, d, 0.13 * way, SIGMA),
-    "crest": lambda v, p, x, y, a, d, way: way * ridges._crest(v, x, y, a, d, 1.0),
+    "crest": lambda v, p, x, y, a, d, way: way * edge_profiles._crest(v, x, y, a, d, 1.0),
     "feet": lambda v, p, x, y, a, d, way: feet(v, x, y, a, d)[:: int(way)],
     "slit": lambda v, p, x, y, a, d, way: feet(-v, x, y, a, d, -1.0)[:: int(way)],
-    "relief": lambda v, p, x, y, a, d, way: ridges._is_relief(v, x, y, a, d, (3.0, 4.0)[:: int(way)], 1.0, 9.0),
-    "structure": lambda v, p, x, y, a, d, way: ridges.structure_at(
+    "relief": lambda v, p, x, y, a, d, way: edge_profiles._is_relief(v, x, y, a, d, (3.0, 4.0)[:: int(way)], 1.0, 9.0),
+    "structure": lambda v, p, x, y, a, d, way: edge_profiles.structure_at(
         v, p, int(x), int(y), a, d, 0.6 * way, 1.0, SIGMA, EDGE, SHARES, TAPS
     )[:2],
-    "blur of a structure": lambda v, p, x, y, a, d, way: ridges.structure_blur(
+    "blur of a structure": lambda v, p, x, y, a, d, way: edge_profiles.structure_blur(
         v, p, x, y, a, d, 1.0, EDGE, SHARES, TAPS
     )[:2],
 }
