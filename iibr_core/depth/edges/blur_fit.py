@@ -30,6 +30,8 @@ by the square.
 """
 MOVED_EDGES = 2.0
 """Times the least edge: lower steps stay where they are."""
+SAME_SIDE = 0.3
+"""Of the step, up to which a height is that side's."""
 COLOR_PX = 3
 """Colours of both sides are taken from so far around."""
 
@@ -101,7 +103,7 @@ def _color_vote(photo, fitted, y, x, here, there, least_edge, sums):
     less sure.
     """
     height, width = fitted.shape
-    near = max(0.5 * abs(there - here), least_edge)
+    near = max(SAME_SIDE * abs(there - here), least_edge)
     sums[:] = 0.0
     for v in range(max(y - COLOR_PX, 1), min(y + COLOR_PX, height - 2) + 1):
         for u in range(max(x - COLOR_PX, 1), min(x + COLOR_PX, width - 2) + 1):

@@ -21,6 +21,8 @@ BAND_PX = 2
 """Disparities between surfaces are counted among pixels with fewer others between them and a step; a pixel clearly lies
 between two surfaces if each is flat over so many pixels.
 """
+BETWEEN_SHARES = (0.1, 0.8)
+"""How far up from the lower to the higher of both it lies; above that, a round thing turns away from the view."""
 MIXED_EDGES = 5.0
 """Times the least edge: what lies between nearer surfaces may be a slope."""
 LEAST_MEASURED = 0.025
@@ -83,7 +85,7 @@ def _is_between(values, y, x, right, down, least_edge):
                 high - low > MIXED_EDGES * least_edge
                 and high - here > least_edge
                 and here - low > least_edge
-                and FLAT_SHARE * (high - low) <= min(high - here, here - low)
+                and BETWEEN_SHARES[0] * (high - low) <= here - low <= BETWEEN_SHARES[1] * (high - low)
             ):
                 flat, is_flat = FLAT_SHARE * (high - low), True
                 for beyond in range(1, BAND_PX + 1):
