@@ -38,6 +38,8 @@ class Stages:
     """Where several surfaces contest a ray, the ray transformer decides; else closed form. Quality "fast" has none."""
     reopen_holes: bool = True
     """What was inpainted behind one of the photo's surfaces does not show through a hole in that surface."""
+    median_in_gaps: bool = True
+    """Inpainted disparities are the median of those around them."""
     smooth_gaps: bool = True
     """Inpainted colours get smoother the farther they are from what is known."""
     synthesise_patches: bool = True

@@ -23,6 +23,8 @@ from iibr_core.types import FloatImage, ViewOffset
 
 SMOOTH_STEPS_PX = (1, 2, 4, 8, 16, 32)
 """Colours are averaged over ever wider surroundings, as far as what is known is farther away."""
+MEDIAN_PX = 2
+"""Disparities follow the most of their surroundings, so far each way: a lone one would fly off in the next view."""
 
 
 def fill_background(
@@ -114,6 +116,9 @@ def _fill_view(
             colors, disparity, pixels[part], known[part], photo_disparity, offset.s, offset.t, one_surface, reach[part],
         ),
     )  # fmt: skip
+    if stages.median_in_gaps:
+        run(lambda part: _agree(disparity, hole, pixels[part], changed[part]))
+        np.put(disparity, pixels, changed[:, 0])
     for step_px in SMOOTH_STEPS_PX if stages.smooth_gaps else ():
         smooth(step_px)
     if stages.synthesise_patches:
@@ -223,6 +228,22 @@ def _weigh_in_front(disparity, pixels, known, photo_disparity, s, t, one_surface
                 likely = 1.0 / np.sqrt((known_x - x) ** 2 + (known_y - y) ** 2)
                 balance += likely if is_in_front(d, disparity[y, x], one_surface) else -likely
         in_front[y, x] = balance > 0.0
+
+
+@kernel
+def _agree(disparity, hole, pixels, agreed):
+    """The median of what was filled within MEDIAN_PX each way, as agreed[:, 0]."""
+    height, width = disparity.shape
+    around = np.empty((2 * MEDIAN_PX + 1) ** 2, np.float32)
+    for i in range(len(pixels)):
+        y, x = pixels[i] // width, pixels[i] % width
+        count = 0
+        for v in range(max(y - MEDIAN_PX, 0), min(y + MEDIAN_PX + 1, height)):
+            for u in range(max(x - MEDIAN_PX, 0), min(x + MEDIAN_PX + 1, width)):
+                if hole[v, u]:
+                    around[count] = disparity[v, u]
+                    count += 1
+        agreed[i, 0] = np.sort(around[:count])[(count - 1) // 2]
 
 
 @kernel

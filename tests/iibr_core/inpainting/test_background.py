@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from iibr_core.inpainting.background import SMOOTH_STEPS_PX, fill_background, goes_on_in_front
+from iibr_core.inpainting.background import MEDIAN_PX, SMOOTH_STEPS_PX, fill_background, goes_on_in_front
 from iibr_core.inpainting.nearest_known import DIRECTIONS
 from iibr_core.inpainting.patch_synthesis import MIXED_PX
 from iibr_core.surfaces import EDGE_PX, SAME_SURFACE_PX
@@ -13,6 +13,15 @@ def mixed_slowly(hole):
     """(H, W): what has a hole's pixel MIXED_PX beside it, or nearer."""
     around = [slice(max(k - MIXED_PX, 0), k + MIXED_PX + 1) for k in range(max(hole.shape))]
     return np.array([[hole[around[y], around[x]].any() for x in range(hole.shape[1])] for y in range(hole.shape[0])])
+
+
+def agree_slowly(disparity, hole):
+    agreed = disparity.copy()
+    for y, x in np.argwhere(hole):
+        block = np.s_[max(y - MEDIAN_PX, 0) : y + MEDIAN_PX + 1, max(x - MEDIAN_PX, 0) : x + MEDIAN_PX + 1]
+        around = np.sort(disparity[block][hole[block]])
+        agreed[y, x] = around[(len(around) - 1) // 2]
+    return agreed
 
 
 def smooth_slowly(colors, hole, reach, step):
@@ -63,7 +72,8 @@ def fill_slowly(colors, disparity, hole, photo_disparity, offset):
             filled_disparity[y, x] = (w * d)[mine].sum() / w[mine].sum()
     for step in SMOOTH_STEPS_PX:
         filled_colors = smooth_slowly(filled_colors, hole, reach, step)
-    return copy_slowly(filled_colors, filled_disparity, hole, mixed, one_surface), filled_disparity
+    agreed = agree_slowly(filled_disparity, hole)
+    return copy_slowly(filled_colors, agreed, hole, mixed, one_surface), agreed
 
 
 @pytest.mark.parametrize("contrast", [1.0, 0.15])
