@@ -3,7 +3,7 @@
 // viewer/gpu/refocus, where everything is explained at length.
 
 const MAX_SAMPLES = 512, MAX_SOURCES = 4, MAX_SEARCH_STEPS = 96, TILE_PX = 16, BLOCK_PX = 16, MAX_TILE_TAPS = 8;
-const GOLDEN = 0.618, MAX_PASSES = 8, ONE_PASS_UP_TO_PX = 3, PASS_BLUR_PX = 2, STILL_SAMPLES = 600, EDGE_PASSES = 5;
+const MAX_PASSES = 16, ONE_PASS_UP_TO_PX = 3, PASS_BLUR_PX = 1.5, STILL_SAMPLES = 600, EDGE_PASSES = 5;
 const FADE_FROM_PX = 4, FADE_TO_PX = 6, LEAST_ACROSS = 2, SPARSE_UP_TO_PX = 1.2, OFF_BORDER_PX = 1 / 256;
 const LEAST_WEIGHT = 2e-4, LEAST_SCALE = 0.4, FINE = 48, HALVINGS = 14;
 export const LEVELS = [[1, 4, 1], [1, 2, 1], [1, 1, 1], [1, 1, 0.7], [1, 1, 0.5], [2, 1, 0.7], [2, 1, 0.5], [3, 1, 0.5],
@@ -125,20 +125,9 @@ export function passPlaces(lens, field) {
         count = Math.min(close, MAX_PASSES, Math.trunc(STILL_SAMPLES / samples));
     }
     if (lens.share < 1 && field.hasDisparity && !isStored) count = Math.max(count, EDGE_PASSES);
-    return latticePlaces(Math.max(count, 1));
-}
-
-// As pass_places in viewer/gpu/refocus/accumulation.py: the lattice of so many points that lie farthest apart.
-export function latticePlaces(count) {
-    const numbers = Array.from({ length: count }, (_, k) => k), half = Math.trunc(count / 2);
-    const part = (k) => ((k + half) % count - half) / count;
-    const apart = (slope) => Math.min(...numbers.slice(1).map((k) => Math.hypot(part(k), part(k * slope))));
-    const divisor = (a, b) => b ? divisor(b, a % b) : a;
-    const bestOf = (among, value) => among.reduce((best, k) => value(k) > value(best) ? k : best);
-    const slope = bestOf(numbers, apart);
-    const skip = bestOf(numbers.map((k) => k + 1).filter((k) => divisor(k, count) === 1),
-        (k) => -Math.abs(k - GOLDEN * count));
-    return numbers.map((k) => k * skip % count).map((k) => ({ t: part(k), s: part(k * slope) }));
+    return Array.from({ length: Math.max(count, 1) }, (_, k) => ({  // the R2 sequence
+        t: (k * 0.7548776662466927 + 0.5) % 1 - 0.5, s: (k * 0.5698402909980532 + 0.5) % 1 - 0.5,
+    }));
 }
 
 function samplesOf(lens, field, moved, coarser = 1, isSmoothed = true) {

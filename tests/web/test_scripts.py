@@ -13,7 +13,6 @@ import pytest
 from iibr_core.exports.web import page_script
 from iibr_core.runtime.resources import resource_folder
 from iibr_core.types import GridShape, ViewOffset
-from viewer.gpu.refocus.accumulation import MAX_PASSES, pass_places
 from viewer.gpu.refocus.view_sampling import aperture_samples, pinhole_sources
 
 WEB = resource_folder("web")
@@ -86,13 +85,6 @@ def test_samples_of_the_lens_are_the_desktops(diameter: float, is_smoothed: bool
         ours = {(round(one["t"], 6), round(one["s"], 6)): one["weight"] for one in samples}
         for place in weights.keys() | ours.keys():
             assert ours.get(place, 0) == pytest.approx(weights.get(place, 0), abs=4e-3), place
-
-
-def test_passes_are_drawn_at_the_desktops_places() -> None:
-    counts = list(range(1, MAX_PASSES + 1))
-    found = node("given.map(count => renderer.latticePlaces(count))", counts)
-    for count, places in zip(counts, found):
-        assert np.array([(one["t"], one["s"]) for one in places]) == pytest.approx(np.array(pass_places(count)))
 
 
 def test_a_tap_finds_the_first_surface_on_its_ray() -> None:

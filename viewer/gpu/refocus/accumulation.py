@@ -7,7 +7,6 @@ import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from dataclasses import field as dataclass_field
-from functools import cache
 
 import moderngl
 
@@ -21,13 +20,13 @@ from viewer.gpu.refocus.picture_lens import Lens
 from viewer.gpu.refocus.view_sampling import ApertureSample, nearest_present
 from viewer.gpu.render_targets import RenderTarget, RenderTargets
 
-MAX_PASSES = 8
+MAX_PASSES = 16
 """A still picture is the mean of at most so many passes, each with its samples elsewhere."""
 
 ONE_PASS_UP_TO_PX = 3.0
 """As long as neighbouring samples are no farther apart, smoothing tells as much as more samples would."""
 
-PASS_BLUR_PX = 2.0
+PASS_BLUR_PX = 1.5
 """Elsewhere so many passes are drawn that they are no farther apart than this."""
 
 STILL_SAMPLES = 600
@@ -84,23 +83,13 @@ def is_stored(eye: ViewOffset, field: LightFieldTexture) -> bool:
     return is_on_grid and row.is_integer() and column.is_integer() and bool(field.present[int(row), int(column)])
 
 
-@cache
-def pass_places(count: int) -> tuple[ViewOffset, ...]:
-    """Places in a square of side 1, one a pass, the first in the middle: of the lattices of so many points with one in
-    every row and column, repeated beyond the square, the one whose points lie farthest apart (Korobov, 1959).
-    """
+def r2_sequence(count: int) -> list[ViewOffset]:
+    """Places in a square of side 1, one a pass, evenly spread, the first in the middle (the R2 sequence)."""
+    return [
+        ViewOffset(*((k * step + 0.5) % 1.0 - 0.5 for step in (0.7548776662466927, 0.5698402909980532)))
+        for k in range(count)
+    ]
 
-    def place(k: int, slope: int) -> ViewOffset:
-        return ViewOffset(*(((part + count // 2) % count - count // 2) / count for part in (k, k * slope)))
-
-    slope = max(range(count), key=lambda slope: min((math.hypot(*place(k, slope)) for k in range(1, count)), default=0))
-    # Those that follow one another lie apart, too: what is drawn so far is about as even as the whole.
-    skip = min((k for k in range(1, count + 1) if math.gcd(k, count) == 1), key=lambda k: abs(k - GOLDEN * count))
-    return tuple(place(k * skip % count, slope) for k in range(count))
-
-
-GOLDEN = 0.618
-"""Multiples of this share of a circle lie apart."""
 
 HIGHLIGHT_SPREAD = 2.0
 """Samples of many passes lie unevenly: beside single bright pixels their gaps show, unless smoothing is wider."""

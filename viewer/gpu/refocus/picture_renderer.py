@@ -21,7 +21,7 @@ from iibr_core.types import SRGB, ColorSpace, FloatImage, GridShape, StoredColor
 from viewer.gpu.context import GLContext
 from viewer.gpu.light_field_texture import Box, LightFieldTexture, field_that_fits
 from viewer.gpu.programs import ProgramCache
-from viewer.gpu.refocus.accumulation import Accumulator, ProgressiveAccumulation, is_stored, pass_count, pass_places
+from viewer.gpu.refocus.accumulation import Accumulator, ProgressiveAccumulation, is_stored, pass_count, r2_sequence
 from viewer.gpu.refocus.error_estimate import ErrorEstimate
 from viewer.gpu.refocus.frame_budget import (
     BEST_QUALITY,
@@ -319,7 +319,7 @@ class Renderer:
         whole_width_px = round(size_px[0] / part.width)
         lens = replace(lens_of(optics, field, whole_width_px, self.prefilter, level), part=part)
         count = pass_count(lens, field) if level == BEST_QUALITY and field.present.any() else 1
-        return ProgressiveAccumulation(lens, size_px, pass_places(count))
+        return ProgressiveAccumulation(lens, size_px, tuple(r2_sequence(count)))
 
     def _draw(self, budget_s: float, passes: int) -> None:
         accumulation = self._current()

@@ -11,7 +11,7 @@ import numpy as np
 from iibr_core.generation import WantedViews
 from iibr_core.rendering import Optics
 from iibr_core.types import GridShape, ViewOffset
-from viewer.gpu.refocus.accumulation import MAX_PASSES, pass_places
+from viewer.gpu.refocus.accumulation import MAX_PASSES, r2_sequence
 from viewer.gpu.refocus.view_sampling import aperture_samples, pinhole_sources
 
 MOST_OPEN = 32
@@ -20,9 +20,6 @@ MOST_OPEN = 32
 
 ALL_LENS = 2.0
 """From this aperture on a picture is the sum over the lens, see `Lens.aperture_share`."""
-
-
-_PLACES = sorted({place for count in range(1, MAX_PASSES + 1) for place in pass_places(count)})
 
 
 def wanted_for(optics: Optics, grid: GridShape) -> WantedViews:
@@ -38,7 +35,7 @@ def views_seen(optics: Optics, grid: GridShape) -> set[ViewOffset] | None:
     everywhere = np.ones(grid, np.bool_)
     seen = {(row, column) for row, column, _ in pinhole_sources(optics.eye, grid, everywhere)}
     if optics.aperture_diameter > 1:
-        for moved, leaves_room in itertools.product(_PLACES, (False, True)):
+        for moved, leaves_room in itertools.product(r2_sequence(MAX_PASSES), (False, True)):
             shape, diameter = optics.aperture_shape, optics.aperture_diameter
             samples = aperture_samples(optics.eye, diameter, grid, everywhere, shape, 1, moved, leaves_room)
             seen |= {(row, column) for _, row, column, _ in samples}
