@@ -106,14 +106,13 @@ class RaySet:
             )
         k, connected = self._count, np.zeros(self.size, np.uint8)
         room, cells = self._room, self._cells_room
+        edge_step = step_of(EDGE_PX, self.farthest_views)
         if k == 0 and self.stages.connect_slopes:
-            least_edge = step_of(EDGE_PX, self.farthest_views)
-            self.connected = connected = connect_rays(disparity, self._surface_step, least_edge, should_stop)
+            self.connected = connected = connect_rays(disparity, self._surface_step, edge_step, should_stop)
             self._steep = any_in_cells(connected_either_way(connected))
         if k > 0 and any(offset) and self.stages.leave_out_in_front:
-            step = step_of(EDGE_PX, self.farthest_views)
             coverage = coverage.copy()
-            _leave_out_in_front(disparity, room.disparity[0], *offset, step, coverage)
+            _leave_out_in_front(disparity, room.disparity[0], *offset, edge_step, coverage)
 
         def band(first: int, last: int) -> None:
             rows = slice(first, last)

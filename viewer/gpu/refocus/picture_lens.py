@@ -117,7 +117,7 @@ def lens_of(
         stride=stride,
         dolly=(-2.0 * optics.dolly, -2.0 * optics.dolly * field.height / field.width),
         focus_range=max(optics.focus_range, 0.0),
-        aperture_share=min(max(diameter - 1.0, 0.0), 1.0),
+        aperture_share=aperture_share_of(diameter),
         blur_px=blur_px,
         widest_blur_px=blur_px * beside,
         samples_across=samples_across,
@@ -133,3 +133,8 @@ def _most_beside_focus(optics: Optics, range_px: tuple[float, float]) -> float:
     tilt = sum(map(abs, optics.focus_tilt))
     farthest = max(abs(edge - optics.focus_disparity) for edge in range_px) + tilt
     return max(farthest - max(optics.focus_range, 0.0), 0.0)
+
+
+def aperture_share_of(diameter: float) -> float:
+    """How much of a picture is the sum over an aperture of so many view steps; the rest is the pinhole's."""
+    return min(max(diameter - 1.0, 0.0), 1.0)

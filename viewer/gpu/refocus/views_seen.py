@@ -12,19 +12,16 @@ from iibr_core.generation import WantedViews
 from iibr_core.rendering import Optics
 from iibr_core.types import GridShape, ViewOffset
 from viewer.gpu.refocus.accumulation import MAX_PASSES, r2_sequence
+from viewer.gpu.refocus.picture_lens import aperture_share_of
 from viewer.gpu.refocus.view_sampling import aperture_samples, pinhole_sources
 
 MOST_OPEN = 32
 """Of so many different open apertures the views are found in 0.3 s; more show nearly all."""
 
 
-ALL_LENS = 2.0
-"""From this aperture on a picture is the sum over the lens, see `Lens.aperture_share`."""
-
-
 def wanted_for(optics: Optics, grid: GridShape) -> WantedViews:
     """What a picture through these optics is made of, once it has converged, and how that is seen in it."""
-    is_sum = optics.aperture_diameter >= ALL_LENS and optics.dolly == 0
+    is_sum = aperture_share_of(optics.aperture_diameter) == 1 and optics.dolly == 0
     return WantedViews(views_seen(optics, grid), "sum" if is_sum else "one")
 
 
