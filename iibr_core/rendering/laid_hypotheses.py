@@ -33,8 +33,10 @@ AROUND = np.array([(ring * v, ring * u) for i, ring in enumerate(RINGS_PX) for v
 AROUND_DISTANCE = np.hypot(*AROUND.T)
 OWN_LANDING_PX = 0.75
 """What lands near by and differs from a hypothesis by less parallax than this is of its surface."""
-VISIBLE = 0.12
-"""Where the colours of a ray's hypotheses lie no farther apart than this, sRGB-encoded, nothing is to be decided."""
+LEAST_STAKE = 0.02
+"""Nothing is to be decided where what the heaviest surface leaves of a ray, times how far the colours of its hypotheses
+lie apart, sRGB-encoded, is no more than this.
+"""
 INPAINTED_APART_PX = 100.0
 """What is inpainted and what the photo shows are different hypotheses, however close their disparities."""
 
@@ -134,7 +136,7 @@ def lay_out(landed, pixel, every, found):
         n = _surfaces_around(landed, y, x, near_d, near_k, near_px)
         picked = _pick_apart(near_d, near_k, n, landed.rays.photo_images, parallax, disparity, source, share, picked)
         found.number[ray] = 0
-        if picked == 0 or not (every or _is_undecided(landed, y, x, disparity[:picked], source)):
+        if picked == 0 or not (every or _is_undecided(landed, y, x, disparity[:picked], source, 1.0 - share[:picked].max())):
             continue
         # The plain hypothesis: the front-most surface on the ray, colours as the photo mixed them at its edge.
         disparity[picked], source[picked], share[picked] = disparity[mixed], source[mixed] + PLAIN_SOURCE, 0.0
@@ -151,9 +153,9 @@ def lay_out(landed, pixel, every, found):
 
 
 @kernel
-def _is_undecided(landed, y, x, disparity, source):
-    """Whether a ray's surfaces are not all one, and the colours that they look up, the four pixels around each, differ
-    visibly.
+def _is_undecided(landed, y, x, disparity, source, left):
+    """Whether a ray's surfaces are not all one, and what the heaviest leaves of it may change its colour visibly: see
+    LEAST_STAKE. Looked at are the four pixels around where each looks its colour up.
     """
     images, offsets = landed.rays.colors, landed.to_view
     _, height, width, _ = images.shape
@@ -171,4 +173,5 @@ def _is_undecided(landed, y, x, disparity, source):
             r, g, b = images[k, v, u, 0], images[k, v, u, 1], images[k, v, u, 2]
             low_r, low_g, low_b = min(low_r, r), min(low_g, g), min(low_b, b)
             high_r, high_g, high_b = max(high_r, r), max(high_g, g), max(high_b, b)
-    return apart > SAME_SURFACE_PX and max(high_r - low_r, high_g - low_g, high_b - low_b) > VISIBLE
+    range_ = max(high_r - low_r, high_g - low_g, high_b - low_b)
+    return apart > SAME_SURFACE_PX and left * range_ > LEAST_STAKE

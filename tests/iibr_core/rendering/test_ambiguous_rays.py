@@ -25,7 +25,7 @@ from iibr_core.rendering.hypotheses import (
     find_ambiguous_rays,
     hypothesis_colors,
 )
-from iibr_core.rendering.laid_hypotheses import FAINT_WEIGHT, PLAIN_SOURCE, VISIBLE
+from iibr_core.rendering.laid_hypotheses import FAINT_WEIGHT, LEAST_STAKE, PLAIN_SOURCE
 from iibr_core.rendering.photo_rays import rays_of_photo
 from iibr_core.rendering.ray_set import RaySet
 from iibr_core.rendering.resampling import resample_colors
@@ -36,6 +36,7 @@ from iibr_core.types import ViewOffset
 from tests.iibr_core.scenes import photo_of, smooth_texture, square_before_wall
 
 OFFSET = ViewOffset(0.0, 2.0)
+CONTRAST = 0.18
 
 
 def ambiguous_of(photo, disparity, every=False, offset=OFFSET, fringe=True):
@@ -120,10 +121,12 @@ def test_where_hypotheses_look_alike_nothing_is_ambiguous():
     """A square that looks like the wall behind it, but for its lower half."""
     photo, disparity = square_before_wall()
     pixels, is_lower = np.full_like(photo.pixels, 0.5), np.arange(photo.size.height) > 30
-    pixels[(disparity.values > 0) & is_lower[:, None]] = 0.5 + 1.5 * VISIBLE
-    ambiguous, _, _ = ambiguous_of(photo_of(pixels), disparity.values)
+    pixels[(disparity.values > 0) & is_lower[:, None]] = 0.5 + CONTRAST
+    ambiguous, weights, _ = ambiguous_of(photo_of(pixels), disparity.values)
     assert len(ambiguous.pixel) > 20
     assert ambiguous.pixel[:, 0].min() > 25
+    left = 1 - weights.max(axis=0)[tuple(ambiguous.pixel.T)]
+    assert (left * CONTRAST > LEAST_STAKE).all(), "whatever is decided, the colour hardly changes"
     everything, _, _ = ambiguous_of(photo_of(pixels), disparity.values, every=True)
     assert len(everything.pixel) == disparity.values.size
 
