@@ -35,17 +35,17 @@ ALL_VIEWS = WantedViews()
 
 
 def outer_views(offsets: Iterable[ViewOffset]) -> list[ViewOffset]:
-    """Corners, then side middles, of the box around all viewpoints and the photo's own; each once, without that one.
+    """The corners of the box around all viewpoints and the photo's own; each once, without that one.
 
-    Together they see all but slivers of what any view in the box disoccludes.
+    Together they see all but slivers of what any view in the box disoccludes: the middles of its sides would add
+    0.02 dB on exact maps, less on others.
     """
     every = [ViewOffset(0.0, 0.0), *offsets]
     top, bottom = min(at.t for at in every), max(at.t for at in every)
     left, right = min(at.s for at in every), max(at.s for at in every)
-    # Opposite corners first: between them they disocclude nearly all there is, so those after them find little left.
+    # Opposite ones first: between them they disocclude nearly all there is, so those after them find little left.
     corners = [(top, left), (bottom, right), (top, right), (bottom, left)]
-    sides = [(0.0, left), (0.0, right), (top, 0.0), (bottom, 0.0)]
-    return [ViewOffset(*at) for at in dict.fromkeys(corners + sides) if at != (0.0, 0.0)]
+    return [ViewOffset(*at) for at in dict.fromkeys(corners) if at != (0.0, 0.0)]
 
 
 def outer_views_of_grid(grid: GridShape) -> list[ViewOffset]:

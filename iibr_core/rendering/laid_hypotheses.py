@@ -136,7 +136,7 @@ def lay_out(landed, pixel, every, found):
         n = _surfaces_around(landed, y, x, near_d, near_k, near_px)
         picked = _pick_apart(near_d, near_k, n, landed.rays.photo_images, parallax, disparity, source, share, picked)
         found.number[ray] = 0
-        if picked == 0 or not (every or _is_undecided(landed, y, x, disparity[:picked], source, 1.0 - share[:picked].max())):
+        if picked == 0 or not (every or _is_undecided(landed, y, x, disparity[:picked], source, share)):
             continue
         # The plain hypothesis: the front-most surface on the ray, colours as the photo mixed them at its edge.
         disparity[picked], source[picked], share[picked] = disparity[mixed], source[mixed] + PLAIN_SOURCE, 0.0
@@ -153,7 +153,7 @@ def lay_out(landed, pixel, every, found):
 
 
 @kernel
-def _is_undecided(landed, y, x, disparity, source, left):
+def _is_undecided(landed, y, x, disparity, source, share):
     """Whether a ray's surfaces are not all one, and what the heaviest leaves of it may change its colour visibly: see
     LEAST_STAKE. Looked at are the four pixels around where each looks its colour up.
     """
@@ -173,5 +173,6 @@ def _is_undecided(landed, y, x, disparity, source, left):
             r, g, b = images[k, v, u, 0], images[k, v, u, 1], images[k, v, u, 2]
             low_r, low_g, low_b = min(low_r, r), min(low_g, g), min(low_b, b)
             high_r, high_g, high_b = max(high_r, r), max(high_g, g), max(high_b, b)
-    range_ = max(high_r - low_r, high_g - low_g, high_b - low_b)
-    return apart > SAME_SURFACE_PX and left * range_ > LEAST_STAKE
+    left = 1.0 - share[: len(disparity)].max()
+    may_change = left * max(high_r - low_r, high_g - low_g, high_b - low_b)
+    return apart > SAME_SURFACE_PX and may_change > LEAST_STAKE

@@ -99,7 +99,7 @@ def test_the_rays_foretold_are_those_really_ambiguous(blur_px):
         colors, values = render(scene, ImageSize(*size), ViewOffset(0.0, 0.0))
         photo, disparity = photo_of(colors), disparity_of(blur(values, blur_px))
         rays, completing = ray_set(photo, disparity, plan_literal(photo, disparity, grid))
-        assert len(list(completing)) == 8
+        assert len(list(completing)) == 4
         statistics = measure_parallax(disparity.values, largest_offset(grid))
         for reach in (1.0, 2.0, 4.0):
             predicted.append(statistics.ambiguous_share(reach / 4) * disparity.values.size)
@@ -151,7 +151,7 @@ def test_the_plan_names_what_fills_the_holes(inpaint, words, paints):
         plan_literal(photo, disparity, GridShape(3, 3), inpaint=inpaint),
     ):
         assert any(reason.endswith(words) for reason in plan.reasons)
-        assert any("The model paints up to 8 views" in reason for reason in plan.reasons) == paints
+        assert any("The model paints up to 4 views" in reason for reason in plan.reasons) == paints
 
 
 def test_nothing_fills_holes_where_there_are_none():

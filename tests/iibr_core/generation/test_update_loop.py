@@ -22,17 +22,17 @@ def rays():
     return rays_of_photo(photo.pixels, disparity.values, 2.0, 2)
 
 
-def test_outer_views_are_corners_and_side_middles_of_what_is_asked_for():
+def test_outer_views_are_the_corners_of_what_is_asked_for():
     square = [ViewOffset(float(t), float(s)) for t in (-2, 0, 1) for s in (-1, 3)]
-    assert set(outer_views(square)) == {(-2, -1), (1, 3), (-2, 3), (1, -1), (0, -1), (0, 3), (-2, 0), (1, 0)}
+    assert set(outer_views(square)) == {(-2, -1), (1, 3), (-2, 3), (1, -1)}
     assert outer_views([ViewOffset(0.0, 1.0)]) == [(0, 1)]
     assert outer_views([ViewOffset(0.0, 0.0)]) == []
 
 
 @pytest.mark.parametrize("grid", [GridShape(*shape) for shape in itertools.product((1, 2, 3, 4, 9), repeat=2)], ids=str)
 def test_those_of_a_grid_are_views_of_it_in_the_order_of_its_indices(grid):
-    bottom, right, (v, u) = grid.rows - 1, grid.columns - 1, grid.centre
-    indices = [(0, 0), (bottom, right), (0, right), (bottom, 0), (v, 0), (v, right), (0, u), (bottom, u)]
+    bottom, right = grid.rows - 1, grid.columns - 1
+    indices = [(0, 0), (bottom, right), (0, right), (bottom, 0)]
     expected = [grid.offset(*index) for index in dict.fromkeys(indices) if index != grid.centre]
     every = [grid.offset(v, u) for v in range(grid.rows) for u in range(grid.columns)]
     assert outer_views_of_grid(grid) == outer_views(every) == expected
