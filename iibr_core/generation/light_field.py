@@ -30,7 +30,7 @@ from iibr_core.inpainting.registry import DEFAULT_INPAINTER, INPAINTERS, load_in
 from iibr_core.rendering.hypotheses import AmbiguousRays
 from iibr_core.rendering.photo_rays import rays_of_photo
 from iibr_core.rendering.ray_set import RaySet
-from iibr_core.rendering.rendered_view import RenderedView, ShownBefore
+from iibr_core.rendering.rendered_view import RenderedView
 from iibr_core.rendering.renderer import open_renderer
 from iibr_core.runtime.resources import resource_folder
 from iibr_core.runtime.tiling import Cancelled, ShouldStop, never
@@ -69,8 +69,9 @@ def generate(
 
     draft_bytes: for who wants to see something soon. As far as so much memory holds what is left to be done for them,
     views come twice: as drafts in closed form, in the order above; then, when every view is there, with the
-    transformer's say, again nearest first, and nothing else is made again. Outer views, whose drafts are kept anyway,
-    do so whatever it is. None: every view comes once, final, in balanced quality the outer ones last.
+    transformer's say, again nearest first, and nothing else is made again. Outer views, which are rendered again when
+    the ray set is complete, do so whatever it is. None: every view comes once, final, in balanced quality the outer
+    ones last.
 
     Raises ValueError if photo and disparity differ in size, InputError if the trained weights cannot be read or there
     is no such way of inpainting.
@@ -119,17 +120,14 @@ def _generate_views(
         views = StoredViews(renderer, rays, grid, photo.is_hdr, should_stop)
         # What is left to be done for views that are there, or in the ray set.
         unfinished: dict[ViewOffset, Callable[[], ViewUpdate]] = {}
-        images, outer_offsets = len(rays), set[ViewOffset]()
+        outer_offsets = set[ViewOffset]()
         for offset, view in outer_views:
             is_wanted, share = offset in inner, work.add(work.outer)
             if is_wanted:
                 inner.remove(offset)
                 outer_offsets.add(offset)
             if is_wanted and transformer is not None:
-                # What joined the set is kept there.
-                before = view.colors if len(rays) == images else rays.in_view(rays.arrays.colors[images])
-                unfinished[offset] = partial(views.make, offset, ShownBefore(before, images))
-            images = len(rays)
+                unfinished[offset] = partial(views.make, offset)
             if is_wanted and (transformer is None or draft_bytes is not None):
                 yield replace(views.update(offset, view, is_final=transformer is None), share=share)
         room = draft_bytes or 0 if transformer is not None else 0

@@ -15,7 +15,7 @@ from iibr_core.color import stored_from_encoded
 from iibr_core.rendering.ambiguous_rays import UndecidedRays
 from iibr_core.rendering.flying_pixels import without_flying_pixels
 from iibr_core.rendering.ray_set import RaySet
-from iibr_core.rendering.rendered_view import RenderedView, ShownBefore
+from iibr_core.rendering.rendered_view import RenderedView
 from iibr_core.rendering.renderer import Renderer
 from iibr_core.runtime.tiling import ShouldStop, in_bands
 from iibr_core.types import FloatImage, GridShape, StoredColors, ViewOffset, ViewUpdate, image_size
@@ -49,9 +49,9 @@ class StoredViews:
         self._renderer, self._rays, self._grid = renderer, rays, grid
         self._is_hdr, self._should_stop = is_hdr, should_stop
 
-    def make(self, offset: ViewOffset, known: ShownBefore | None = None) -> ViewUpdate:
-        """A final view. known: see `Renderer.render`."""
-        return self.update(offset, self._renderer.render(self._rays, offset, alone=True, known=known))
+    def make(self, offset: ViewOffset) -> ViewUpdate:
+        """A final view."""
+        return self.update(offset, self._renderer.render(self._rays, offset, alone=True))
 
     def draft(self, offset: ViewOffset) -> Draft:
         """A view in closed form, final where nothing is left to be decided."""

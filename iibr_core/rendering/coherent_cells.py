@@ -62,19 +62,6 @@ def land_incoherent(
     return needed
 
 
-def land_marked(
-    cells: Cells, offsets: NDArray[np.float64], marked: NDArray[np.bool_], rows: tuple[int, int], around_px: int
-) -> NDArray[np.bool_]:
-    """Which target cells (N, M) of these rows have rays of the marked cells (S, M, M') land within around_px of them.
-
-    offsets (S, 2): from each source to the view.
-    """
-    first = rows[0] // CELL_PX
-    landed = np.zeros((-(-rows[1] // CELL_PX) - first, marked.shape[2]), np.bool_)
-    _land_marked(cells, offsets, marked, first, around_px, landed)
-    return landed
-
-
 @kernel
 def _target_cells(first, least, most):
     """The first and last cell that the pixels of cell `first` touch when moved by -least to -most pixels; fractions."""
@@ -136,27 +123,6 @@ def _land_incoherent(cells, k, t, s, first_cell, splat, needed):
                 for column in range(int(max(left, 0.0)), int(min(right, columns - 1.0)) + 1):
                     # One target cell that needs splatting is enough.
                     needed[v, u] |= splat[row, column]
-
-
-@kernel
-def _land_marked(cells, offsets, marked, first_cell, around_px, landed):
-    low, high = cells.low, cells.high
-    rows, columns = landed.shape
-    around = around_px / CELL_PX
-    for k in range(len(marked)):
-        t, s = offsets[k]
-        for v in range(low.shape[1]):
-            for u in range(low.shape[2]):
-                if not marked[k, v, u]:
-                    continue
-                least, most = np.float64(low[k, v, u]), np.float64(high[k, v, u])
-                top, bottom = _target_cells(v - first_cell, least * t, most * t)
-                left, right = _target_cells(u, least * s, most * s)
-                top, bottom, left, right = top - around, bottom + around, left - around, right + around
-                if not (least <= most and bottom >= 0 and top < rows and right >= 0 and left < columns):
-                    continue
-                for row in range(int(max(top, 0.0)), int(min(bottom, rows - 1.0)) + 1):
-                    landed[row, int(max(left, 0.0)) : int(min(right, columns - 1.0)) + 1] = True
 
 
 @kernel

@@ -71,14 +71,3 @@ class DecidedRays:
     colors: FloatImage
     disparity: FloatImage
     inpainted: NDArray[np.bool_]
-
-
-@dataclass(frozen=True, eq=False)
-class ShownBefore:
-    """A view as it was when the ray set was smaller.
-
-    colors: (H, W, 3), wrong only where later images show. images: how many there were, its own not counted.
-    """
-
-    colors: FloatImage
-    images: int

@@ -8,7 +8,7 @@ from typing import Protocol, TypeVar
 
 from iibr_core.rendering.ambiguous_rays import UndecidedRays
 from iibr_core.rendering.ray_set import RaySet
-from iibr_core.rendering.rendered_view import DecidedRays, RenderedView, ShownBefore
+from iibr_core.rendering.rendered_view import DecidedRays, RenderedView
 from iibr_core.rendering.view_synthesis import ViewSynthesis
 from iibr_core.types import FloatImage, ViewOffset
 
@@ -25,12 +25,8 @@ class Renderer(AbstractContextManager["Renderer"], Protocol):
     def add_rays(self, rays: RaySet, offset: ViewOffset, view: RenderedView) -> None:
         """What was filled in the view at an offset joins the ray set."""
 
-    def render(
-        self, rays: RaySet, offset: ViewOffset, alone: bool = False, known: ShownBefore | None = None
-    ) -> RenderedView:
-        """The view at an offset, its holes filled. alone: in the calling thread. known: what it showed before others
-        joined the ray set: only what those change is looked up again, and the view is the same.
-        """
+    def render(self, rays: RaySet, offset: ViewOffset, alone: bool = False) -> RenderedView:
+        """The view at an offset, its holes filled. alone: in the calling thread."""
 
     def draft(self, rays: RaySet, offset: ViewOffset) -> tuple[RenderedView, list[UndecidedRays]]:
         """The view in closed form, alone; and the rays that are the transformer's, none where there is nothing to

@@ -18,13 +18,11 @@ from iibr_core.inpainting.background import fill_background, goes_on_in_front
 from iibr_core.inpainting.inpainter import Inpainter
 from iibr_core.rendering.ambiguous_rays import HYPOTHESES, UndecidedRays, find_undecided_rays
 from iibr_core.rendering.candidates import find_candidates
-from iibr_core.rendering.coherent_cells import land_marked
 from iibr_core.rendering.hypotheses import AmbiguousRays, blend_hypotheses, bound_weights, describe_rays
 from iibr_core.rendering.laid_hypotheses import SEARCH_PX
 from iibr_core.rendering.occlusion import LEAST_COVERED, MOSTLY_COVERED, WHOLLY_COVERED, entropy
-from iibr_core.rendering.ray_cells import CELL_PX
 from iibr_core.rendering.ray_set import RaySet
-from iibr_core.rendering.rendered_view import DecidedRays, RaysBehind, RenderedView, ShownBefore
+from iibr_core.rendering.rendered_view import DecidedRays, RaysBehind, RenderedView
 from iibr_core.rendering.resampling import resample_colors
 from iibr_core.rendering.visibility_weights import weights_and_coverage
 from iibr_core.runtime import tiling
@@ -80,16 +78,14 @@ class ViewSynthesis:
         if view.has_filled_rays:
             rays.add(offset, *view.filled_rays(), self._should_stop)
 
-    def render(
-        self, rays: RaySet, offset: ViewOffset, alone: bool = False, known: ShownBefore | None = None
-    ) -> RenderedView:
+    def render(self, rays: RaySet, offset: ViewOffset, alone: bool = False) -> RenderedView:
         """Row bands run side by side; alone, one after the other: the way for many views."""
 
         def decide(undecided: UndecidedRays) -> DecidedRays:
             return self.decide(rays, undecided)
 
         threads = 1 if alone else tiling.THREADS
-        view, covered, decided = self._closed_form(rays, offset, decide, threads, known)
+        view, covered, decided = self._closed_form(rays, offset, decide, threads)
         view = self._fill(rays, offset, view, covered, threads)
         for part in decided:
             at = np.unravel_index(part.pixel, rays.view_size)
@@ -141,7 +137,6 @@ class ViewSynthesis:
         offset: ViewOffset,
         use: Callable[[UndecidedRays], Result],
         threads: int = 1,
-        known: ShownBefore | None = None,
     ) -> tuple[RenderedView, FloatImage, list[Result]]:
         """The view in closed form, its holes open; how much of each ray is covered (H, W); and of what bands leave to
         the transformer, what `use` makes in its band.
@@ -153,7 +148,7 @@ class ViewSynthesis:
         view, covered = RenderedView.blank(rays.view_size, self._keeps_entropy), np.empty(rays.view_size, np.float32)
 
         def band(first: int, last: int) -> list[Result]:
-            undecided = self._render_rows(rays, offset, (first, last), view, covered, known)
+            undecided = self._render_rows(rays, offset, (first, last), view, covered)
             return [use(undecided)] if undecided is not None else []
 
         made = in_bands(band, rays.view_size, self._should_stop, threads, self._most_band_pixels)
@@ -210,7 +205,6 @@ class ViewSynthesis:
         rows: tuple[int, int],
         view: RenderedView,
         covered: FloatImage,
-        known: ShownBefore | None = None,
     ) -> UndecidedRays | None:
         """Write rows [first, last) of the view in closed form, holes not filled yet, and of how much of each ray is
         covered; the rays that are the transformer's to decide, if there is one.
@@ -230,11 +224,7 @@ class ViewSynthesis:
         raise_if_stopped(self._should_stop)
         shown = slice(*rows)
         wanted = np.zeros(occluded.shape, np.bool_)
-        if known is None:
-            wanted[inner] = True
-        else:
-            wanted[inner] = _changed_pixels(rays, offset, (first, last), known.images)[:, left:right]
-            view.colors[shown] = known.colors[shown]
+        wanted[inner] = True
         found = resample_colors(rays, candidates, weights, wanted, (view.colors[shown], above, left))
         raise_if_stopped(self._should_stop)
         undecided = None
@@ -259,17 +249,6 @@ class ViewSynthesis:
 def _whole(rays: RaySet) -> float:
     """Rays covered less show in part what lies behind them."""
     return WHOLLY_COVERED if rays.stages.composite_partial_coverage else 0.0
-
-
-def _changed_pixels(rays: RaySet, offset: ViewOffset, rows: tuple[int, int], known: int) -> NDArray[np.bool_]:
-    """Where, in rows [first, last) of a view, images from `known` on may show: (N, W)."""
-    cells = rays.cells
-    later = np.zeros(cells.low.shape, np.bool_)
-    later[known:] = True
-    landed = land_marked(cells, rays.to_view(offset), later, rows, 0)
-    pixels = landed.repeat(CELL_PX, axis=0).repeat(CELL_PX, axis=1)
-    above = rows[0] % CELL_PX
-    return np.asarray(pixels[above : above + rows[1] - rows[0], : rays.size.width])
 
 
 def _is_within_margins(

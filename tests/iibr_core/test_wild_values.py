@@ -428,10 +428,6 @@ FINITE = {
     "rendering.coherent_cells.land_incoherent": lambda v, _: [
         coherent_cells.land_incoherent(rays(v).cells, 0, t, 0.5, (0, 4), np.eye(1, 4, dtype=np.bool_)) for t in (0.5, v)
     ],
-    "rendering.coherent_cells.land_marked": lambda v, _: [
-        coherent_cells.land_marked(rays(v).cells, np.array([[0.5, t]]), np.ones((1, 1, 4), np.bool_), (0, 4), 6)
-        for t in (0.5, v)
-    ],
     "rendering.slope_connectivity.connect_rays": lambda v, _: slope_connectivity.connected_either_way(
         slope_connectivity.connect_rays(depths(v), 0.5, 0.5)
     ),

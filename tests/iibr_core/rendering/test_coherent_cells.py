@@ -3,7 +3,7 @@ import pytest
 
 from iibr_core.rendering import candidates as candidates_module
 from iibr_core.rendering.candidates import find_candidates
-from iibr_core.rendering.coherent_cells import find_coherent_cells, land_marked
+from iibr_core.rendering.coherent_cells import find_coherent_cells
 from iibr_core.rendering.ray_cells import CELL_PX
 from iibr_core.rendering.ray_set import RaySet
 from iibr_core.rendering.resampling import resample_colors
@@ -126,18 +126,3 @@ def test_unknown_disparity_is_never_smooth():
     smooth, _ = find_coherent_cells(rays, ViewOffset(0.0, 0.01), (0, SIZE[0]))
     assert not smooth[2, 3]
     assert smooth[4, 8]
-
-
-@pytest.mark.parametrize("offset", OFFSETS)
-@pytest.mark.parametrize("rows", [(0, 48), (6, 29)])
-def test_marked_cells_land_wherever_their_rays_come_near(offset, rows):
-    around, random = 6, np.random.default_rng(3)
-    rays = ray_set(STEP)
-    marked = random.random(rays.cells.low.shape) < 0.02
-    near = by_pixel(land_marked(rays.cells, np.array([offset]), marked, rows, around), rows)
-    y, x = np.nonzero(by_pixel(marked[0], (0, SIZE[0])))
-    landed = y - STEP[y, x] * offset.t, x - STEP[y, x] * offset.s
-    target_y, target_x = np.mgrid[rows[0] : rows[1], : SIZE[1]]
-    apart = np.maximum(abs(target_y[..., None] - landed[0]), abs(target_x[..., None] - landed[1])).min(axis=-1)
-    assert near[apart <= around].all()
-    assert not near[apart > around + 3 * CELL_PX].any()
