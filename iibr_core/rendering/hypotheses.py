@@ -14,15 +14,14 @@ from numpy.typing import NDArray
 
 from iibr_core.rendering.ambiguous_rays import HYPOTHESES, UndecidedRays, find_undecided_rays
 from iibr_core.rendering.candidates import Candidates
-from iibr_core.rendering.disparity_statistics import SOFT_EDGE_SHARPNESS
-from iibr_core.rendering.laid_hypotheses import FAINT_WEIGHT, PLAIN_SOURCE, SEARCH_PX
+from iibr_core.rendering.laid_hypotheses import PLAIN_SOURCE, SEARCH_PX
 from iibr_core.rendering.ray_set import RaySet
 from iibr_core.rendering.resampling import ShownRays, cubic, resample, resample_inpainted
 from iibr_core.runtime.jit import kernel, linear_scalar, nearest_pixel, srgb_scalar
 from iibr_core.types import FloatImage, ViewOffset
 
-SHARE, INPAINTED, SOFTNESS, UNCOVERED = 6, 8, 11, 12
-"""Features: the closed form's weight, whether inpainted, the map's softness, the share that nothing covers."""
+SHARE = 6
+"""The feature that is the closed form's weight."""
 PROFILE = 15
 PROFILE_PX = (-4.0, -2.5, -1.0, 1.0, 2.5, 4.0)
 """Where the disparity around a source ray is sampled, along the parallax and across it."""
@@ -33,8 +32,6 @@ LEAST_VOTE = 0.004
 """Weights below this change no colour by a visible step."""
 SAME_COLOR = 1e-5
 """Votes no farther apart than this need no mean: so a flat scene's views are the photo to the bit."""
-BLEND_WEIGHT = 0.6
-"""T's say, 0..1, where surfaces of the photo share a ray they cover, at sharp edges: both are as often right there."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,18 +74,6 @@ def describe_rays(rays: RaySet, undecided: UndecidedRays) -> AmbiguousRays:
     parallax = max(*map(abs, offset), 1e-9)
     _describe(rays.arrays, rays.statistics, rays.to_view(offset), parallax, pixel, undecided, features)
     return AmbiguousRays(offset, pixel, mask, disparity, source, features)
-
-
-def bound_weights(ambiguous: AmbiguousRays, weights: FloatImage) -> FloatImage:
-    """T's weights (N, K), moved towards the closed form's on rays that this one is fairly sure of: see BLEND_WEIGHT."""
-    share = ambiguous.features[..., SHARE] * ambiguous.mask
-    first = ambiguous.features[:, 0]
-    has_inpainted = ((share > 0) & (ambiguous.features[..., INPAINTED] > 0)).any(axis=1)
-    sure = (first[:, UNCOVERED] <= FAINT_WEIGHT) & (first[:, SOFTNESS] <= SOFT_EDGE_SHARPNESS) & ~has_inpainted
-    closed = share[sure] / np.maximum(share[sure].sum(axis=1, keepdims=True), np.float32(FAINT_WEIGHT))
-    bounded = weights.copy()
-    bounded[sure] = BLEND_WEIGHT * weights[sure] + (1 - BLEND_WEIGHT) * closed
-    return bounded
 
 
 def hypothesis_colors(rays: RaySet, ambiguous: AmbiguousRays) -> FloatImage:
@@ -182,11 +167,11 @@ def _describe(rays, around, offsets, parallax, pixel, undecided, features):
             out[5] = _softsign((d - background) * parallax)  # ... and the farthest
             out[SHARE] = undecided.share[a]
             out[7] = undecided.nearest[a] / (SEARCH_PX + 1.0)  # how far away the surface lands, 0..1
-            out[INPAINTED] = 1.0 if k >= rays.photo_images else 0.0
+            out[8] = 1.0 if k >= rays.photo_images else 0.0  # whether it is inpainted
             out[9] = log_parallax
             out[10] = rays.coverage[k, v, u]
-            out[SOFTNESS] = around.softness
-            out[UNCOVERED] = undecided.uncovered[n]  # share of the pixel that nothing covers
+            out[11] = around.softness
+            out[12] = undecided.uncovered[n]  # share of the pixel that nothing covers
             out[13] = _softsign(around.step[k, v, u] * parallax)  # the depth edge beside it
             out[14] = 1.0 if undecided.source[a] >= PLAIN_SOURCE else 0.0
         at = last

@@ -18,7 +18,7 @@ from iibr_core.inpainting.background import fill_background, goes_on_in_front
 from iibr_core.inpainting.inpainter import Inpainter
 from iibr_core.rendering.ambiguous_rays import HYPOTHESES, UndecidedRays, find_undecided_rays
 from iibr_core.rendering.candidates import find_candidates
-from iibr_core.rendering.hypotheses import AmbiguousRays, blend_hypotheses, bound_weights, describe_rays
+from iibr_core.rendering.hypotheses import AmbiguousRays, blend_hypotheses, describe_rays
 from iibr_core.rendering.laid_hypotheses import SEARCH_PX
 from iibr_core.rendering.occlusion import LEAST_COVERED, MOSTLY_COVERED, WHOLLY_COVERED, entropy
 from iibr_core.rendering.ray_set import RaySet
@@ -102,14 +102,12 @@ class ViewSynthesis:
         return self._closed_form(rays, offset, lambda part: part)[:2]
 
     def decide(self, rays: RaySet, undecided: UndecidedRays) -> DecidedRays:
-        """The closed form, too, has some say: see `bound_weights`."""
+        """By the transformer's weights alone."""
         assert self._transformer is not None
         raise_if_stopped(self._should_stop)
         ambiguous = describe_rays(rays, undecided)
         raise_if_stopped(self._should_stop)
         chosen = self._transformer(ambiguous)
-        if not self._every:
-            chosen = bound_weights(ambiguous, chosen)
         raise_if_stopped(self._should_stop)
         colors, disparity, source = blend_hypotheses(rays, ambiguous, chosen)
         y, x = np.divmod(undecided.pixel, rays.size.width)

@@ -263,9 +263,6 @@ FINITE = {
     ),
     "rendering.candidates.find_candidates": lambda v, _: [rendered(ViewOffset(v, 0.5)), rendered(ViewOffset(0.5, v))],
     "rendering.hypotheses.blend_hypotheses": lambda v, _: decided(v),
-    "rendering.hypotheses.bound_weights": lambda v, _: hypotheses.bound_weights(
-        contest(v), generating.transformer_for("balanced")(contest(v))
-    ),
     "rendering.hypotheses.describe_rays": lambda v, _: hypotheses.describe_rays(rays(v), undecided(v)),
     "rendering.hypotheses.find_ambiguous_rays": lambda v, _: in_use(contest(v)),
     "rendering.ambiguous_rays.find_undecided_rays": lambda v, _: undecided(v),

@@ -11,17 +11,12 @@ from iibr_core.ray_transformer.model import RayTransformer
 from iibr_core.rendering.ambiguous_rays import HYPOTHESES
 from iibr_core.rendering.candidates import find_candidates
 from iibr_core.rendering.hypotheses import (
-    BLEND_WEIGHT,
     FEATURES,
-    INPAINTED,
     LEAST_VOTE,
     PROFILE_PX,
     SHARE,
-    SOFTNESS,
-    UNCOVERED,
     AmbiguousRays,
     blend_hypotheses,
-    bound_weights,
     find_ambiguous_rays,
     hypothesis_colors,
 )
@@ -205,24 +200,6 @@ def test_the_order_of_hypotheses_does_not_matter():
     ambiguous, model = random_ambiguous(), trained()
     order = np.array([3, 0, 4, 1, 5, 2])
     assert weights_of(model, ambiguous, order) == pytest.approx(weights_of(model, ambiguous)[:, order], abs=1e-5)
-
-
-def test_t_has_only_some_say_where_surfaces_of_the_photo_share_a_covered_ray():
-    ambiguous = random_ambiguous(6)
-    ambiguous.mask[:] = True
-    ambiguous.features[:] = 0
-    ambiguous.features[:, :2, SHARE] = 0.75, 0.25
-    ambiguous.features[1, :, UNCOVERED] = 0.1
-    ambiguous.features[2, :, SOFTNESS] = 0.8
-    ambiguous.features[3, 1, INPAINTED] = 1  # it shows
-    ambiguous.features[4, 4, INPAINTED] = 1  # it only lands near by
-    chosen = np.tile(np.eye(HYPOTHESES, dtype=np.float32)[2], (6, 1))
-    bounded = bound_weights(ambiguous, chosen)
-    assert (bounded[1:4] == chosen[1:4]).all()
-    for n in (0, 4, 5):
-        assert bounded[n] == pytest.approx(
-            [0.75 * (1 - BLEND_WEIGHT), 0.25 * (1 - BLEND_WEIGHT), BLEND_WEIGHT, 0, 0, 0]
-        )
 
 
 def test_untrained_it_is_the_closed_form():
