@@ -16,12 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.rendering.candidates import Candidates
-from iibr_core.rendering.disparity_statistics import SOFT_EDGE_SHARPNESS
 from iibr_core.rendering.laid_hypotheses import (
-    AROUND,
-    BESIDE,
     FAINT_WEIGHT,
-    SHARP_RINGS,
     Hypotheses,
     Landed,
     lay_out,
@@ -79,9 +75,7 @@ def find_undecided_rays(
     if hypotheses < 2:
         raise ValueError(f"{hypotheses} hypotheses a ray: give 2 at least")
     offset, first_row, (height, width) = candidates.offset, candidates.first_row, candidates.number.shape
-    is_soft = rays.statistics.softness > SOFT_EDGE_SHARPNESS
-    looks = len(AROUND) if is_soft else len(BESIDE[0]) * SHARP_RINGS
-    landed = Landed(rays.arrays, rays.to_view(offset), candidates, weights, shown, max(*map(abs, offset), 1e-9), looks)
+    landed = Landed(rays.arrays, rays.to_view(offset), candidates, weights, shown, max(*map(abs, offset), 1e-9))
     if decided is None:
         decided = np.zeros((height, width), np.bool_)
     pixel = np.empty(((rows[1] - rows[0]) * width, 2), np.int64)

@@ -23,8 +23,6 @@ SOFT_EDGES_PX = (8, 12)
 """Widths of the soft edges that are looked for; the wider one is for a blur of 4 px and more."""
 SHARP_STEP_SHARE = 0.5
 """An edge whose largest step makes up this share of its steps is sharp."""
-SOFT_EDGE_SHARPNESS = 0.5
-"""Where depth edges are softer than this, surfaces are looked for farther around a ray."""
 
 
 class DisparityStatistics(NamedTuple):

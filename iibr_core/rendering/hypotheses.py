@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from iibr_core.rendering.ambiguous_rays import HYPOTHESES, UndecidedRays, find_undecided_rays
 from iibr_core.rendering.candidates import Candidates
-from iibr_core.rendering.laid_hypotheses import PLAIN_SOURCE, SEARCH_PX
+from iibr_core.rendering.laid_hypotheses import NOWHERE_PX, PLAIN_SOURCE
 from iibr_core.rendering.ray_set import RaySet
 from iibr_core.rendering.resampling import ShownRays, cubic, resample, resample_inpainted
 from iibr_core.runtime.jit import kernel, linear_scalar, nearest_pixel, srgb_scalar
@@ -166,7 +166,7 @@ def _describe(rays, around, offsets, parallax, pixel, undecided, features):
             out[4] = _softsign((foreground - d) * parallax)  # against the nearest hypothesis
             out[5] = _softsign((d - background) * parallax)  # ... and the farthest
             out[SHARE] = undecided.share[a]
-            out[7] = undecided.nearest[a] / (SEARCH_PX + 1.0)  # how far away the surface lands, 0..1
+            out[7] = undecided.nearest[a] / NOWHERE_PX  # how far away the surface lands, 0..1
             out[8] = 1.0 if k >= rays.photo_images else 0.0  # whether it is inpainted
             out[9] = log_parallax
             out[10] = rays.coverage[k, v, u]
