@@ -28,14 +28,10 @@ AROUND = np.concatenate([BESIDE, 2 * DIAGONAL, 3 * BESIDE])
 AROUND_DISTANCE = np.hypot(*AROUND.T)
 NOWHERE_PX = 7.0
 """How far away a surface counts as landing that lands nowhere around: as the transformer was trained."""
-OWN_LANDING_PX = 0.75
-"""What lands near by and differs from a hypothesis by less parallax than this is of its surface."""
 LEAST_STAKE = 0.02
 """Nothing is to be decided where what the heaviest surface leaves of a ray, times how far the colours of its hypotheses
 lie apart, sRGB-encoded, is no more than this.
 """
-INPAINTED_APART_PX = 100.0
-"""What is inpainted and what the photo shows are different hypotheses, however close their disparities."""
 
 
 class Landed(NamedTuple):
@@ -80,7 +76,7 @@ def _surfaces_around(landed, y, x, near_disparity, near_source, near_px):
 
 
 @kernel
-def _pick_apart(near_disparity, near_source, n, photo_images, parallax, disparity, source, share, picked):
+def _pick_apart(near_disparity, near_source, n, parallax, disparity, source, share, picked):
     """Farthest-point sampling of the disparities around a ray, until slots or distinct ones run out, one slot staying
     free; returns how many are picked. In a hole it begins with the front-most surface around it.
     """
@@ -93,10 +89,9 @@ def _pick_apart(near_disparity, near_source, n, photo_images, parallax, disparit
     compared = 0
     while 0 < picked < len(disparity) - 1:
         for j in range(compared, picked):
-            d, is_guess = np.float64(disparity[j]), source[j] >= photo_images
+            d = np.float64(disparity[j])
             for i in range(n):
-                between = INPAINTED_APART_PX if (near_source[i] >= photo_images) != is_guess else 0.0
-                away[i] = min(away[i], abs(near_disparity[i] - d) * parallax + between)
+                away[i] = min(away[i], abs(near_disparity[i] - d) * parallax)
         best, best_distance = -1, SAME_SURFACE_PX
         for i in range(n):
             if away[i] > best_distance:
@@ -130,7 +125,7 @@ def lay_out(landed, pixel, every, found):
                 picked += 1
         found.uncovered[ray] = max(left, 0.0)
         n = _surfaces_around(landed, y, x, near_d, near_k, near_px)
-        picked = _pick_apart(near_d, near_k, n, landed.rays.photo_images, parallax, disparity, source, share, picked)
+        picked = _pick_apart(near_d, near_k, n, parallax, disparity, source, share, picked)
         found.number[ray] = 0
         if picked == 0 or not (every or _is_undecided(landed, y, x, disparity[:picked], source, share)):
             continue
@@ -143,7 +138,7 @@ def lay_out(landed, pixel, every, found):
             if share[j] > 0:
                 continue
             for i in range(n):
-                if abs(near_d[i] - disparity[j]) * parallax < OWN_LANDING_PX:
+                if abs(near_d[i] - disparity[j]) * parallax < SAME_SURFACE_PX:
                     found.nearest[ray, j] = near_px[i]
                     break
 
