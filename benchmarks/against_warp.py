@@ -1,27 +1,39 @@
-"""Processor time of making fields, in turns with a plain warp of the same views, in one process.
+"""Processor time of making fields, in turns with a plain warp of the same views, on one thread.
 
     python -m benchmarks.against_warp [--data DATA] [--only NAME,...] [--repeats 3]
 
 Scenes of DATA are made with 9 x 9 views at their own disparity; the demo photo comes along, with the parallax that the
-plan gives it. The warp is `benchmarks.peers.warp`. Ratios are medians over rounds: other programs disturb
-them little.
+plan gives it. The warp is `benchmarks.peers.warp`: forward, holes filled from the background. Edges: the share of the
+default's time, refining the map and making the views in the plan's quality, that goes into refining and into splitting
+mixed pixels. Two threads: the default's views by the clock, as many times as fast as on one. All are medians over
+rounds of what was taken in the same round: other programs disturb them little.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from functools import partial
 from itertools import chain
 from pathlib import Path
 
+import cv2
+import numpy as np
+
 from benchmarks.harness.bench_scenes import FIELD, BenchScene, data_scenes, offsets_of, photo_scene
 from benchmarks.harness.reports import emit, head, is_wanted, parser_of, row, start
-from benchmarks.harness.timing import cost_of, in_turns, make_field, median_cost, median_ratio
+from benchmarks.harness.timing import Cost, cost_of, in_turns, make_field, median_cost, median_ratio, process_of
 from benchmarks.peers import warp
+from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.edges.refine import refine
+from iibr_core.generation.outer_views import farthest_views, outer_views
 from iibr_core.generation.plan import plan_literal
-from iibr_core.types import Quality
+from iibr_core.rendering.mixed_pixels import split_mixed_pixels
+from iibr_core.surfaces import EDGE_PX, step_of
+from iibr_core.types import FloatImage, Quality
+
+REFINING, SPLITTING, WARP = "refining", "splitting", "warp"
 
 
 def main() -> None:
@@ -29,38 +41,62 @@ def main() -> None:
     parser.add_argument("--qualities", default="fast,balanced")
     options = parser.parse_args()
     qualities = options.qualities.split(",")
-    wanted = (scene for scene in scenes(options.data) if is_wanted(scene.name, options.only))
-    rows = (compare(scene, qualities, options.repeats) for scene in wanted)
-    emit(
-        chain([head("scene", "the plan's", "warp, s", *(f"{quality}, times the warp" for quality in qualities))], rows)
-    )
+    wanted = (found for found in scenes(options.data) if is_wanted(found[0].name, options.only))
+    rows = (compare(*found, qualities, options.repeats) for found in wanted)
+    ratios = (f"{quality}, times the warp" for quality in qualities)
+    emit(chain([head("scene", "the plan's", "warp, s", *ratios, "edges, %", "two threads, times as fast")], rows))
 
 
-def scenes(data: Path | None) -> Iterator[BenchScene]:
-    """The demo photo, and those of a folder with refined maps."""
-    demo = photo_scene()
+def scenes(data: Path | None) -> Iterator[tuple[BenchScene, FloatImage]]:
+    """The demo photo, and those of a folder, with refined maps; the maps as they were."""
+    demo, given = photo_scene(), photo_scene(choice=DepthChoice(refine=0.0))
     assert demo is not None
-    yield demo
+    assert given is not None
+    yield demo, given.disparity
     for scene in data_scenes(data, with_soft=False):
-        yield replace(scene, disparity=refine(scene.photo, scene.disparity), field=offsets_of(FIELD))
+        field = offsets_of(FIELD)
+        yield replace(scene, disparity=refine(scene.photo, scene.disparity), truth={}, field=field), scene.disparity
 
 
-def compare(scene: BenchScene, qualities: list[Quality], repeats: int) -> str:
+def compare(scene: BenchScene, given: FloatImage, qualities: Sequence[Quality], repeats: int) -> str:
     """A line of the table."""
-    view = warp.prepare(scene.photo, scene.disparity)
-
-    def warp_all() -> None:
-        for at in scene.field:
-            view(at)
-
-    for quality in qualities:  # compiles
-        make_field(scene, quality)
-    view(scene.field[0])
-    ways = {"warp": warp_all, **{quality: partial(make_field, scene, quality) for quality in qualities}}
-    costs = in_turns({name: partial(cost_of, way) for name, way in ways.items()}, repeats)
-    ratios = (f"{median_ratio(costs[quality], costs['warp']):.2f}" for quality in qualities)
     planned = plan_literal(*scene.given, scene.grid).quality
-    return row(scene.name, planned, f"{median_cost(costs['warp']).cpu_s:.2f}", *ratios)
+    with process_of(1) as one, process_of(2) as two:
+        costs = one.submit(_alone, scene, given, list(dict.fromkeys((*qualities, planned))), repeats).result()
+        processes = {"one": one, "two": two}
+        ways = {name: partial(_field_cost, process, scene, planned) for name, process in processes.items()}
+        for way in ways.values():  # compiles
+            way()
+        clock = in_turns(ways, repeats)
+    ratios = (f"{median_ratio(costs[quality], costs[WARP]):.2f}" for quality in qualities)
+    edges = _sums(costs[REFINING], costs[SPLITTING]), _sums(costs[REFINING], costs[planned])
+    faster = np.median([slow.wall_s / quick.wall_s for slow, quick in zip(clock["one"], clock["two"])])
+    warp_s = f"{median_cost(costs[WARP]).cpu_s:.2f}"
+    return row(scene.name, planned, warp_s, *ratios, f"{100 * median_ratio(*edges):.0f}", f"{faster:.2f}")
+
+
+def _alone(scene: BenchScene, given: FloatImage, qualities: list[Quality], repeats: int) -> dict[str, list[Cost]]:
+    """What the warp, each quality and the work at edges cost in this process."""
+    cv2.setNumThreads(1)
+    view = warp.prepare(scene.photo, scene.disparity)
+    edge_step = step_of(EDGE_PX, farthest_views(outer_views(scene.field)))
+    works = {
+        WARP: lambda: [view(at) for at in scene.field],
+        REFINING: partial(refine, scene.photo, given),
+        SPLITTING: partial(split_mixed_pixels, scene.photo, scene.disparity, edge_step),
+        **{quality: partial(make_field, scene, quality) for quality in qualities},
+    }
+    ways = {name: partial(cost_of, work) for name, work in works.items()}
+    in_turns(ways, 1)  # compiles
+    return in_turns(ways, repeats)
+
+
+def _field_cost(process: ProcessPoolExecutor, scene: BenchScene, quality: Quality) -> Cost:
+    return process.submit(cost_of, partial(make_field, scene, quality)).result()
+
+
+def _sums(some: list[Cost], others: list[Cost]) -> list[Cost]:
+    return [one + other for one, other in zip(some, others)]
 
 
 if __name__ == "__main__":

@@ -79,7 +79,7 @@ FIGURES = (
     Figure(("depth.md",), "benchmarks.depth --data DATA", 4, ("DATA",)),
     Figure(("stages.md",), "benchmarks.stages --data DATA", 20, ("DATA",)),
     Figure(("free_views.md#poses",), "benchmarks.free_views --scenes 8 --size 384x288 --seed 7", 2),
-    Figure(("figures.md#against-warp",), "benchmarks.against_warp --data DATA --repeats 2", 2, ("DATA",)),
+    Figure(("figures.md#against-warp",), "benchmarks.against_warp --data DATA --repeats 2", 4, ("DATA",)),
     Figure(("figures.md#window",), "benchmarks.window", 1, ("X",)),
     Figure(("figures.md#estimate",), "benchmarks.estimate", 2, ("X", "torch")),
     Figure(("figures.md#cancelled",), "benchmarks.cancel --times 10", 2),

@@ -11,8 +11,9 @@ import os
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache, partial
 from multiprocessing import get_context
@@ -23,7 +24,7 @@ import numpy as np
 import psutil
 
 from benchmarks.harness.bench_scenes import BenchScene
-from iibr_core.exports.batch.threads import set_environment
+from iibr_core.exports.batch.threads import set_environment, thread_variables
 from iibr_core.generation.light_field import generate
 from iibr_core.generation.plan import plan_literal
 from iibr_core.types import FloatImage, Quality, ReportProgress, StoredColors, ignore_progress
@@ -108,6 +109,15 @@ def in_own_process(work: Callable[..., Result], *args: object) -> Result:
     """What work(*args) gives, in a process that ends with it."""
     with ProcessPoolExecutor(1, get_context("spawn")) as process:
         return process.submit(work, *args).result()
+
+
+@contextmanager
+def process_of(threads: int) -> Iterator[ProcessPoolExecutor]:
+    """A process that uses so many threads, for all work of the block."""
+    with ProcessPoolExecutor(1, get_context("spawn")) as process:
+        with set_environment(thread_variables(threads)):
+            process.submit(gc.collect).result()  # it starts with its first work
+        yield process
 
 
 def peak_bytes(work: Callable[..., object], *args: object) -> float:
