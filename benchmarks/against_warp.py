@@ -11,7 +11,7 @@ rounds of what was taken in the same round: other programs disturb them little.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from functools import partial
@@ -80,7 +80,7 @@ def _alone(scene: BenchScene, given: FloatImage, qualities: list[Quality], repea
     cv2.setNumThreads(1)
     view = warp.prepare(scene.photo, scene.disparity)
     edge_step = step_of(EDGE_PX, farthest_views(outer_views(scene.field)))
-    works = {
+    works: dict[str, Callable[[], object]] = {
         WARP: lambda: [view(at) for at in scene.field],
         REFINING: partial(refine, scene.photo, given),
         SPLITTING: partial(split_mixed_pixels, scene.photo, scene.disparity, edge_step),

@@ -70,7 +70,7 @@ def _instead(node: ast.expr) -> Iterator[str]:
             yield f"({ast.unparse(ast.BinOp(left, swapped, right))})"
         case ast.BoolOp(operator, values):
             yield f"({ast.unparse(ast.BoolOp(ast.Or() if isinstance(operator, ast.And) else ast.And(), values))})"
-        case ast.Constant(value) if type(value) in (int, float):
+        case ast.Constant(int() | float() as value) if not isinstance(value, bool):
             yield repr(2 * value or type(value)(1))
             if value:
                 yield repr(value // 2 if isinstance(value, int) else value / 2)
