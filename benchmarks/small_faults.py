@@ -39,7 +39,7 @@ def faults_of(name: str, source: str) -> Iterator[Fault]:
         last = starts[(node.end_lineno or 0) - 1] + (node.end_col_offset or 0)
         was = " ".join(text[first:last].decode().split())
         faulty = (text[:first] + now.encode() + text[last:]).decode()
-        yield Fault(name, f"{name}:{node.lineno}: `{was}` -> `{now}`", faulty)
+        yield Fault(name, f"{name}:{node.lineno}:{node.col_offset + 1}: `{was}` -> `{now}`", faulty)
 
 
 def _changes(tree: ast.AST) -> Iterator[tuple[ast.expr | ast.stmt, str]]:

@@ -135,6 +135,22 @@ def test_edges_move_where_the_misfit_falls() -> None:
     assert wrong_side(fitted[25:40], exact[25:40]) < wrong_side(ragged(exact)[25:40], exact[25:40])
 
 
+def test_what_is_missing_is_known_up_to_the_frame_after_moves() -> None:
+    """An outline two pixels from all four sides of a map: what moves there counts at the frame, too."""
+    frame = np.s_[19:72, 34:87]
+    exact, fitted = (np.ascontiguousarray(values[frame]) for values in (disc()[1], ragged(disc()[1])))
+    photo, taps, height = np.full((*exact.shape, 3), 0.5, np.float32), blur_fit._taps(SIGMA), len(exact)
+    soft, start = blur(exact, SIGMA), fitted.copy()
+    missing, again = np.empty_like(exact), np.empty_like(exact)
+    blur_fit._find_missing(soft, fitted, taps, 0, height, missing)
+    blur_fit._move_edges(photo, fitted, missing, taps, 1.0, LEAST_EDGE, 0, height, np.zeros(exact.shape, np.bool_))
+    blur_fit._find_missing(soft, fitted, taps, 0, height, again)
+    np.testing.assert_allclose(missing, again, atol=1e-4)
+    moved = np.argwhere(fitted != start)
+    assert (moved.min(axis=0) < 5).all()
+    assert (moved.max(axis=0) > np.array(exact.shape) - 6).all()
+
+
 def slow_vote(photo: np.ndarray, fitted: np.ndarray, y: int, x: int, here: float, there: float) -> float:
     """Mean colours of clean pixels of both heights, by 1 / squared distance; how far on the way between them."""
     near = max(0.5 * abs(there - here), LEAST_EDGE)

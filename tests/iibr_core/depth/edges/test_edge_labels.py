@@ -144,6 +144,29 @@ def test_labels_are_those_of_the_slow_field_and_of_the_truth():
     assert (np.abs(labelled - truth) > 1).sum() <= 4
 
 
+@pytest.mark.parametrize(("seed", "contrast", "noise"), [(2, 0.25, 0.03), (4, 0.4, 0.02)])
+def test_labels_of_any_outline_are_those_of_the_slow_field(seed, contrast, noise):
+    """Outlines up to the frame, textures like their difference: every pixel that tells colours counts somewhere."""
+    rng = np.random.default_rng(seed)
+    truth = np.where(ndimage.gaussian_filter(rng.normal(size=(40, 30)), 3) > 0, NEAR, FAR).astype(np.float32)
+    given = ndimage.minimum_filter(truth, 3)
+    light = np.where(truth == NEAR, 0.35, 0.2)[..., None] + rng.normal(0, noise, (40, 30, 3))
+    photo = (contrast * smooth_texture(40, 30) + light).astype(np.float32)
+    unknown = rng.random((40, 30)) < 0.05
+    labelled = label_edges(photo, given, unknown, EDGE, never)
+    np.testing.assert_allclose(labelled, slow_labels(photo, given, unknown), atol=1e-4)
+    assert (labelled != given).sum() > 100
+
+
+def test_distances_are_those_to_the_nearest_step_up_to_the_frame():
+    """Single pixels and things of several, some of them in the outermost rows and columns."""
+    truth = np.random.default_rng(1).choice(np.float32([FAR, NEAR]), (18, 24), p=(0.97, 0.03))
+    truth[3:7, 9:14] = truth[17, 20:] = truth[12:16, 23] = NEAR
+    found = edge_labels.step_distance(truth, EDGE, counts_slopes=True)
+    np.testing.assert_array_equal(found, slow_distance(truth))
+    assert set(found.flat) == set(range(edge_labels.LABELLED_PX + 2))
+
+
 def test_a_pass_of_the_field_is_the_slow_one():
     """Beliefs, sides and drives at random: every neighbour's vote counts, for whichever surface."""
     photo, given, _, _ = dilated_square()
