@@ -232,6 +232,16 @@ def test_a_wire_beside_its_place_is_not_lost():
     assert (labelled[:, 50] == NEAR).all()
 
 
+@pytest.mark.parametrize("at", [(13, 30), (30, 13), (47, 30), (30, 47)])
+def test_what_is_unknown_goes_where_its_colours_are_as_far_as_the_band_reaches(at):
+    """On all sides of a square, four pixels lying between."""
+    photo, _, given = square("dilated")
+    unknown = np.zeros(given.shape, np.bool_)
+    unknown[at], photo[at] = True, photo[30, 30]
+    assert label_edges(photo, given, unknown, EDGE, never)[at] == NEAR
+    assert label_edges(photo, given, np.zeros_like(unknown), EDGE, never)[at] == FAR
+
+
 def test_what_is_mixed_is_the_foregrounds_several_pixels_wide():
     """Out of focus, its light reaches pixels that the map has behind it."""
     weight, total = np.ones(2), np.float64([[0.7, 0.75, 0.8], [0.2, 0.15, 0.1]])
