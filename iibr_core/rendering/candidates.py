@@ -34,7 +34,6 @@ MOST_STRETCHED_PX = 8.0
 """Even a surface is torn by a gap this wide: little can be told from so few of its rays."""
 LEAST_SHRUNK = 0.05
 """A surface compressed to less than this share of its width turns its back to the view."""
-LEAST_OVERLAP = 1e-4
 COVERED = 0.999
 """A surface that covers this much of a pixel hides what lies behind it."""
 
@@ -183,7 +182,7 @@ def _land_rays(rays, index, connected, steep, needed, columns, s, t, found):
                     for target_x in range(max(nearest_pixel(left), columns[0]), min(ceil(right - 0.5) + 1, columns[1])):
                         from_x, to_x = max(left, target_x - 0.5), min(right, target_x + 0.5)
                         overlap = np.float32(overlap_y * (to_x - from_x))
-                        if not overlap > LEAST_OVERLAP:
+                        if not overlap > 0.0:
                             continue
                         # A steep surface's disparity in the middle of the overlap.
                         d_here = np.float32(d + slope_y * across + slope_x * (0.5 * (from_x + to_x) - landed_x))
