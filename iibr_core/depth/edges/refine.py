@@ -43,7 +43,6 @@ BEND = 2.0
 """How much faster than beyond its blur a surface bends away from the view at the edge itself: round things do."""
 RAMP_SIGMAS = PLATEAU_SIGMAS + GAUSSIAN_SIGMAS
 """From a pixel to the ends of its ramp, at most."""
-FINE_STRENGTH = 1e-3
 
 
 def refine(
@@ -57,7 +56,7 @@ def refine(
     """The disparity with its soft edges snapped to the photo's edges; no values between foreground and background.
 
     photo: (H, W, 3), sRGB-encoded. disparity: (H, W), any unit in which larger is closer; what is not finite is filled
-    by what looks like it beside it. strength: 0 changes nothing, 1 makes steps, between them the slopes are shortened.
+    by what looks like it beside it. strength: 0 changes nothing, 1 makes steps; between them the map lies between both.
     unknown: (H, W), what was filled like that before; None: nothing. stages: that are on.
     Returns (H, W) float32, within the range of what was given but for a slope's continuation and for what is thin: that
     gets the height back which the blur took. Where nothing says that the map is blurred, its bits are those given, but
@@ -71,40 +70,29 @@ def refine(
         raise InputError(f"refinement strength {strength}: give a number from 0 (off) to 1")
     colors = np.ascontiguousarray(photo, np.float32)
     values = _fill_unknown(colors, disparity, should_stop)
-    if strength == 0:
+    least_edge = EDGE_SHARE * extent(values)
+    if strength == 0 or not least_edge > 0:
         return values
-    least_edge, softness = EDGE_SHARE * extent(values), max(1.0 - strength, FINE_STRENGTH)
-    sharp = _sharpen(colors, values, least_edge, softness, should_stop, stages)
-    if not least_edge > 0:
-        return sharp
+    sharp = _sharpen(colors, values, least_edge, should_stop, stages)
     filled = ~np.isfinite(disparity) if unknown is None else unknown | ~np.isfinite(disparity)
-    resolved = resolve_edge_band(colors, sharp, least_edge, filled, should_stop, stages)
-    # Edge bands, too, go so far only.
-    return resolved if strength == 1 else sharp + np.float32(strength) * (resolved - sharp)
+    refined = resolve_edge_band(colors, sharp, least_edge, filled, should_stop, stages)
+    return refined if strength == 1 else values + np.float32(strength) * (refined - values)
 
 
 def _sharpen(
-    colors: FloatImage,
-    values: FloatImage,
-    least_edge: float,
-    softness: float,
-    should_stop: ShouldStop,
-    stages: Stages,
+    colors: FloatImage, values: FloatImage, least_edge: float, should_stop: ShouldStop, stages: Stages
 ) -> FloatImage:
     """The map with its soft edges snapped to the photo's; its bits where nothing says that it is blurred."""
     sigma = measure_edge_blur(colors, values, should_stop) if stages.sharpen_soft_edges else 0.0
     if sigma == 0:
         return values
     refined = np.empty_like(values)
-
-    def band(first: int, last: int) -> None:
-        _refine(values, colors, least_edge, sigma, softness, first, last, refined)
-
-    in_bands(band, image_size(values), should_stop)
-    # Slopes that are only shortened give no map that this could be the blur of.
-    if stages.fit_to_blur and softness == FINE_STRENGTH:
-        return fit_to_blur(colors, values, refined, sigma, least_edge, should_stop)
-    return refined
+    in_bands(
+        lambda first, last: _refine(values, colors, least_edge, sigma, first, last, refined),
+        image_size(values),
+        should_stop,
+    )
+    return fit_to_blur(colors, values, refined, sigma, least_edge, should_stop) if stages.fit_to_blur else refined
 
 
 def _fill_unknown(colors: FloatImage, disparity: FloatImage, should_stop: ShouldStop) -> FloatImage:
@@ -171,7 +159,7 @@ def _curvature(values, x, y, apart):
 
 
 @kernel
-def _as_crest(values, photo, x, y, across, down, sigma, least_edge, softness, shares, taps):
+def _as_crest(values, photo, x, y, across, down, sigma, least_edge, shares, taps):
     """The pixel's value on or near the crest of a ridge or slit, or beside it; NaN where there is none. (across, down):
     its slope.
     """
@@ -187,12 +175,11 @@ def _as_crest(values, photo, x, y, across, down, sigma, least_edge, softness, sh
     )
     if height == 0:
         return np.nan
-    sharp = ground + height if share >= 0.5 else ground
-    return values[y, x] + (1.0 - softness) * (sharp - values[y, x])
+    return ground + height if share >= 0.5 else ground
 
 
 @kernel
-def _as_step(values, x, y, across, down, sigma, least_edge, softness):
+def _as_step(values, x, y, across, down, sigma, least_edge):
     """The pixel's value as part of one of the two surfaces of a step along the (unit) direction; as given elsewhere."""
     here = values[y, x]
     # Wide ramps are walked in longer steps: all of them take about as many.
@@ -231,25 +218,23 @@ def _as_step(values, x, y, across, down, sigma, least_edge, softness):
     bottom = min(_continue_plateau(values, x, y, -across, -down, to_foot, bottom, limit), here)
     if not top > bottom:
         return here
-
-    # Where the pixel is on the ramp, steepened about its middle; softness near 0 makes a step.
-    place = ((here - bottom) / (top - bottom) - 0.5) / softness + 0.5
+    is_above = 2.0 * here >= top + bottom
     # Beside the edge, the blur took from the foreground and left on the background: as the map shows.
     edge += (middle - height_at(values, x + across * edge, y + down * edge)) / steepest
     above, below, end = _tail(up - edge, sigma), _tail(to_foot + edge, sigma), GAUSSIAN_SIGMAS * sigma
-    step, limit = (1.0 - softness) * height / (1.0 - above - below), BEND * limit
+    step, limit = height / (1.0 - above - below), BEND * limit
     if not returns_up:
         lost = _beyond_blur(values, x, y, across, down, end + edge, sigma, limit) - top
         top += min(max(lost, 0.0), above * step)
     if not returns_down:
         left = bottom - _beyond_blur(values, x, y, -across, -down, end - edge, sigma, limit)
         bottom -= min(max(left, 0.0), below * step)
-    return bottom + (top - bottom) * min(max(place, 0.0), 1.0)
+    return top if is_above else bottom
 
 
 @kernel
-def _refine(values, photo, least_edge, sigma, softness, first_row, last_row, refined):
-    """Rows [first_row, last_row) of the refined map. softness: 0 = steps, 1 = as given."""
+def _refine(values, photo, least_edge, sigma, first_row, last_row, refined):
+    """Rows [first_row, last_row) of the refined map."""
     width = values.shape[1]
     shares, taps = np.empty(SHARES), np.empty(SHARES)
     for y in range(first_row, last_row):
@@ -259,11 +244,11 @@ def _refine(values, photo, least_edge, sigma, softness, first_row, last_row, ref
             if _is_flat(values, x, y, int(PLATEAU_SIGMAS * sigma), FLAT_SHARE * least_edge):
                 continue
             across, down = gradient(values, x, y)
-            crest = _as_crest(values, photo, x, y, across, down, sigma, least_edge, softness, shares, taps)
+            crest = _as_crest(values, photo, x, y, across, down, sigma, least_edge, shares, taps)
             if crest == crest:
                 refined[y, x] = crest
                 continue
             slope = sqrt(across * across + down * down)
             # Too flat to belong to an edge.
             if slope * 4 * (RAMP_SIGMAS * sigma + 1) > least_edge:
-                refined[y, x] = _as_step(values, x, y, across / slope, down / slope, sigma, least_edge, softness)
+                refined[y, x] = _as_step(values, x, y, across / slope, down / slope, sigma, least_edge)

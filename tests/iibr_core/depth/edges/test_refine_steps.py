@@ -78,26 +78,18 @@ def test_a_blurred_step_becomes_the_step_it_was(sigma, at, turned):
     if turned:
         values, across, at = np.ascontiguousarray(values[:, ::-1]), -1.0, 60 - at
     for x in range(round(at - 2 * sigma), round(at + 2 * sigma) + 1):
-        found = refine._as_step(values, x, 10, across, 0.0, sigma, 0.2, 1e-3)
+        found = refine._as_step(values, x, 10, across, 0.0, sigma, 0.2)
         if abs(x - at) > 0.3:
             assert found == pytest.approx(3.0 if (x - at) * across > 0 else 1.0, abs=0.06)
-
-
-def test_half_way_a_ramp_is_steeper_about_its_middle():
-    values = blurred_step(30.0, 2.0)
-    found = [refine._as_step(values, x, 10, 1.0, 0.0, 2.0, 0.2, 0.5) for x in range(26, 35)]
-    assert found == sorted(found)
-    assert found[4] == pytest.approx(2.0, abs=0.06)
-    assert found[5] - found[3] == pytest.approx(2 * (values[10, 31] - values[10, 29]), rel=0.15)
 
 
 def test_what_is_lower_than_an_edge_or_rises_like_a_slant_stays():
     low, slant = blurred_step(30.0, 2.0, height=0.19), blurred_step(30.0, 2.0, height=0.0, slope=0.2)
     for values in (low, slant):
-        assert refine._as_step(values, 31, 10, 1.0, 0.0, 2.0, 0.2, 1e-3) == values[10, 31]
+        assert refine._as_step(values, 31, 10, 1.0, 0.0, 2.0, 0.2) == values[10, 31]
     # Three times as wide as this blur makes a step.
     wide = blurred_step(30.0, 6.0)
-    assert refine._as_step(wide, 31, 10, 1.0, 0.0, 2.0, 0.2, 1e-3) == wide[10, 31]
+    assert refine._as_step(wide, 31, 10, 1.0, 0.0, 2.0, 0.2) == wide[10, 31]
 
 
 @pytest.mark.parametrize("turned", [False, True])
@@ -113,4 +105,4 @@ def test_what_comes_back_on_both_sides_is_a_relief_and_on_one_side_no_tail_is_ad
     assert passes(once, 30, 10, -across, 0.0, 4.0, 31.0, 1.0, 2.0), "outside"
     twice = 2 + np.sin((X - 30) * np.pi / 8)
     for x in range(27, 34):
-        assert refine._as_step(twice, x, 10, 1.0, 0.0, 2.0, 0.2, 1e-3) == twice[10, x]
+        assert refine._as_step(twice, x, 10, 1.0, 0.0, 2.0, 0.2) == twice[10, x]
