@@ -108,7 +108,9 @@ def step_distance(
     counts_slopes: whether a step counts that goes on before and after it.
     """
     distance = np.full(values.shape, reach_px + 1, np.uint8)
-    _measure_distance(values, least_edge, reach_px, counts_slopes, distance)
+    _mark_steps(values, least_edge, counts_slopes, distance)
+    _spread(distance)
+    _spread(distance[::-1, ::-1])
     return distance
 
 
@@ -189,19 +191,26 @@ def _is_slope(values, y, x, v, u, step):
 
 
 @kernel
-def _measure_distance(values, least_edge, reach, counts_slopes, distance):
-    """What `step_distance` returns, where that is less than distance (H, W) has."""
+def _mark_steps(values, least_edge, counts_slopes, distance):
+    """0 where `step_distance` is."""
     height, width = values.shape
     for y in range(height):
         for x in range(width):
             for v, u in ((y, min(x + 1, width - 1)), (min(y + 1, height - 1), x)):
                 step = values[v, u] - values[y, x]
-                if not abs(step) > least_edge or (not counts_slopes and _is_slope(values, y, x, v, u, step)):
-                    continue
-                for j in range(max(y - reach, 0), min(v + reach + 1, height)):
-                    for i in range(max(x - reach, 0), min(u + reach + 1, width)):
-                        away = np.uint8(max(y - j, j - v, x - i, i - u, 0))
-                        distance[j, i] = min(distance[j, i], away)
+                if abs(step) > least_edge and (counts_slopes or not _is_slope(values, y, x, v, u, step)):
+                    distance[y, x] = distance[v, u] = 0
+
+
+@kernel
+def _spread(distance):
+    """Each distance at most one more than those above and to the left of it."""
+    height, width = distance.shape
+    for y in range(height):
+        for x in range(width):
+            left, right, above = max(x - 1, 0), min(x + 1, width - 1), max(y - 1, 0)
+            least = min(distance[above, left], distance[above, x], distance[above, right], distance[y, left])
+            distance[y, x] = min(distance[y, x], least + 1)
 
 
 @kernel

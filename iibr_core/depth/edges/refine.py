@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from iibr_core.depth.edges.blur_fit import fit_to_blur
 from iibr_core.depth.edges.edge_band import resolve_edge_band
 from iibr_core.depth.edges.edge_blur import EDGE_SIGMAS, STEEPEST_PLATEAU, extent, measure_edge_blur
+from iibr_core.depth.edges.edge_labels import step_distance
 from iibr_core.depth.edges.edge_profiles import (
-    FLAT_SHARE,
     GAUSSIAN_SIGMAS,
     PLATEAU_SIGMAS,
     RETURN_SIGMAS,
@@ -86,9 +86,12 @@ def _sharpen(
     sigma = measure_edge_blur(colors, values, should_stop) if stages.sharpen_soft_edges else 0.0
     if sigma == 0:
         return values
-    refined = np.empty_like(values)
+    # No ramp that this blur made of an edge is flatter at its steepest, and none is longer.
+    slope, reach = least_edge / (RAMP_TOLERANCE * EDGE_SIGMAS * sigma), ceil(GAUSSIAN_SIGMAS * sigma)
+    is_near = step_distance(values, slope / sqrt(2), reach, counts_slopes=True) <= reach
+    refined = values.copy()
     in_bands(
-        lambda first, last: _refine(values, colors, least_edge, sigma, first, last, refined),
+        lambda first, last: _refine(values, colors, is_near, least_edge, sigma, first, last, refined),
         image_size(values),
         should_stop,
     )
@@ -122,16 +125,6 @@ def _beyond_blur(values, x, y, across, down, far, sigma, limit):
 def _tail(far, sigma):
     """Share of a step, blurred by sigma, that is not reached yet so far from its middle."""
     return 0.5 * erfc(far / (sqrt(2.0) * sigma))
-
-
-@kernel
-def _is_flat(values, x, y, apart, least):
-    """Whether the map is as high as at a pixel on all four sides of it, so many pixels away."""
-    height, width = values.shape
-    here = values[y, x]
-    across = max(abs(values[y, max(x - apart, 0)] - here), abs(values[y, min(x + apart, width - 1)] - here))
-    down = max(abs(values[max(y - apart, 0), x] - here), abs(values[min(y + apart, height - 1), x] - here))
-    return max(across, down) < least
 
 
 @kernel
@@ -233,22 +226,17 @@ def _as_step(values, x, y, across, down, sigma, least_edge):
 
 
 @kernel
-def _refine(values, photo, least_edge, sigma, first_row, last_row, refined):
-    """Rows [first_row, last_row) of the refined map."""
-    width = values.shape[1]
+def _refine(values, photo, is_near, least_edge, sigma, first_row, last_row, refined):
+    """Rows [first_row, last_row) of the refined map. is_near (H, W): which pixels may belong to a ramp."""
     shares, taps = np.empty(SHARES), np.empty(SHARES)
     for y in range(first_row, last_row):
-        for x in range(width):
-            refined[y, x] = values[y, x]
-            # Most pixels end here.
-            if _is_flat(values, x, y, int(PLATEAU_SIGMAS * sigma), FLAT_SHARE * least_edge):
+        for x in range(values.shape[1]):
+            if not is_near[y, x]:
                 continue
             across, down = gradient(values, x, y)
             crest = _as_crest(values, photo, x, y, across, down, sigma, least_edge, shares, taps)
+            slope = sqrt(across * across + down * down)
             if crest == crest:
                 refined[y, x] = crest
-                continue
-            slope = sqrt(across * across + down * down)
-            # Too flat to belong to an edge.
-            if slope * 4 * (RAMP_SIGMAS * sigma + 1) > least_edge:
+            elif slope > 0:
                 refined[y, x] = _as_step(values, x, y, across / slope, down / slope, sigma, least_edge)

@@ -45,15 +45,6 @@ def test_a_tail_is_what_a_gaussian_leaves_there(sigma):
     assert refine._tail(0.0, sigma) == 0.5
 
 
-def test_flat_is_what_differs_on_no_side():
-    for place in ((10, 27), (10, 33), (7, 30), (13, 30)):
-        values = np.full((21, 61), 7, np.float32)
-        values[place] = 7.5
-        assert not refine._is_flat(values, 30, 10, 3, 0.5)
-        assert refine._is_flat(values, 30, 10, 3, 0.51)
-        assert refine._is_flat(values, 30, 10, 2, 0.1)
-
-
 @pytest.mark.parametrize("apart", [1, 2])
 @pytest.mark.parametrize("form", [(0.03, 0.01, 0.0), (-0.01, -0.05, 0.02), (0.0, 0.02, 0.03), (0.02, -0.04, -0.01)])
 def test_curvature_is_the_larger_eigenvalue_of_the_second_derivatives(form, apart):

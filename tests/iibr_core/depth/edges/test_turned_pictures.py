@@ -60,7 +60,6 @@ PLACES: dict[str, Callable[..., object]] = {
     "photo": lambda v, p, x, y, a, d: edge_blur._photo_agrees(p, x, y, a, d, 0.13, SIGMA),
     "plateau": lambda v, p, x, y, a, d: refine._continue_plateau(v, x, y, a, d, 3.0, 1.0, 0.2),
     "beyond the blur": lambda v, p, x, y, a, d: refine._beyond_blur(v, x, y, a, d, 4.0, SIGMA, 0.2),
-    "flat": lambda v, p, x, y, a, d: refine._is_flat(v, int(x), int(y), 2, 0.2),
     "step": lambda v, p, x, y, a, d: refine._as_step(v, int(x), int(y), a, d, SIGMA, EDGE),
     "color": lambda v, p, x, y, a, d: edge_profiles._color_at(p, x + 0.3 * a, y + 0.3 * d),
     "crest": lambda v, p, x, y, a, d: edge_profiles._crest(v, x, y, a, d, 1.0),
