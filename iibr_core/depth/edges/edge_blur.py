@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.depth.edges.edge_profiles import (
-    COLOR_NOISE,
     FLAT_SHARE,
     PLATEAU_SIGMAS,
     SEARCHED_PX,
@@ -157,8 +156,8 @@ def _measure_edges(values, photo, least_edge, least_sigma, reach, step, first, l
                 continue
             across, down = across / slope, down / slope
             # Both ends of the ramp, as far as they go.
-            up, top, end_up, steepest_up, at_up = walk(values, x, y, across, down, 1.0, reach, 1.0, np.inf)
-            back, bottom, end_down, steepest_down, at_down = walk(values, x, y, across, down, -1.0, reach, 1.0, np.inf)
+            up, top, steepest_up, at_up = walk(values, x, y, across, down, 1.0, reach, 1.0, np.inf)
+            back, bottom, steepest_down, at_down = walk(values, x, y, across, down, -1.0, reach, 1.0, np.inf)
             steepest = max(steepest_up, steepest_down)
             nearest = at_up if steepest_up >= steepest_down else at_down
             # Only from the steepest pixel of an edge.
@@ -168,35 +167,17 @@ def _measure_edges(values, photo, least_edge, least_sigma, reach, step, first, l
             # A step blurred by a Gaussian is height / (sqrt(2 pi) sigma) steep at its middle.
             edge = at_up if steepest_up >= steepest_down else -at_down
             sigma = height / (EDGE_SIGMAS * steepest)
+            # Steep within two pixels: a step, whatever the photo shows.
             agrees = 1.0
-            if sigma < SHARP_PX:
-                # Steep within two pixels: a step, whatever the photo shows.
-                if max(end_up, end_down) > STEEPEST_PLATEAU * steepest:
-                    continue
-            elif _has_flat_shoulders(values, x, y, across, down, edge, sigma, steepest):
+            if sigma >= SHARP_PX and _has_flat_shoulders(values, x, y, across, down, edge, sigma, steepest):
                 agrees = _photo_agrees(photo, x, y, across, down, edge, sigma)
-            else:
+            elif sigma >= SHARP_PX:
                 # A wire or a slit is no step, but two.
-                blur = 0.0
-                for sign in (1.0, -1.0):
-                    far = up if sign > 0 else -back
-                    if blur == 0:
-                        blur, fitted, sides = structure_blur(
-                            values,
-                            photo,
-                            x + across * far,
-                            y + down * far,
-                            across,
-                            down,
-                            sign,
-                            least_edge,
-                            shares,
-                            taps,
-                        )
-                if blur == 0:
-                    continue
-                sigma, height, agrees = blur, fitted, sides
-            if least_sigma <= sigma < MEASURED_SIGMA_PX:
+                top, foot = (x + across * up, y + down * up), (x - across * back, y - down * back)
+                sigma, height = structure_blur(values, photo, *top, across, down, 1.0, least_edge, shares, taps)
+                if sigma == 0:
+                    sigma, height = structure_blur(values, photo, *foot, across, down, -1.0, least_edge, shares, taps)
+            if least_sigma < sigma < MEASURED_SIGMA_PX:
                 found[0, count], found[1, count] = x + across * edge, y + down * edge
                 found[2, count], found[3, count], found[4, count] = sigma, height, agrees
                 count += 1
@@ -225,6 +206,4 @@ def _photo_agrees(photo, x, y, across, down, edge, sigma):
     middle = strongest_change(photo, x, y, across, down, edge - near, edge + near)
     lower = strongest_change(photo, x, y, across, down, edge - 4 * near, edge - 2 * near)
     upper = strongest_change(photo, x, y, across, down, edge + 2 * near, edge + 4 * near)
-    if max(middle, lower, upper) <= COLOR_NOISE:
-        return 0.5
     return 0.5 * (middle > lower) + 0.5 * (middle > upper)

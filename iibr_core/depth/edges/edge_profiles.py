@@ -100,11 +100,11 @@ def gradient(values, x, y):
 
 @kernel
 def walk(values, x, y, across, down, sign, reach, pace, beyond):
-    """From (x, y) up (sign 1) or down (-1) the ramp: (length, value at its end, slope there, steepest slope, where).
+    """From (x, y) up (sign 1) or down (-1) the ramp: (length, value at its end, steepest slope, where).
 
     reach: at most so many steps; pace: of so many pixels; beyond: no farther than that past the steepest place, px.
     """
-    before, steepest, slope, last, steepest_at = height_at(values, x, y), 0.0, 0.0, 0.0, 0.0
+    before, steepest, last, steepest_at = height_at(values, x, y), 0.0, 0.0, 0.0
     # A march along the gradient, one sample a step.
     for k in range(1, reach + 1):
         far = sign * k * pace
@@ -114,11 +114,11 @@ def walk(values, x, y, across, down, sign, reach, pace, beyond):
         levelled = slope < 0.5 * steepest and slope > 0.85 * last
         # The plateau: nearly flat, or no longer rising, or levelled off on a slanted surface, or too far past the edge.
         if slope <= FLATNESS * steepest or slope <= 0 or levelled or (k - 1) * pace > steepest_at + beyond:
-            return (k - 1) * pace, before, slope, steepest, steepest_at
+            return (k - 1) * pace, before, steepest, steepest_at
         if slope > steepest:
             steepest, steepest_at = slope, (k - 0.5) * pace
         last, before = slope, value
-    return reach * pace, before, slope, steepest, steepest_at
+    return reach * pace, before, steepest, steepest_at
 
 
 @kernel
@@ -274,10 +274,10 @@ def _feet(values, x, y, across, down, sign, reach, least_edge):
     Both sides must be lower than the crest by least_edge, and not much higher than each other.
     """
     crest = height_at(values, x, y)
-    before, low, _, _, _ = walk(values, x, y, sign * across, sign * down, -sign, reach, 1.0, np.inf)
+    before, low, _, _ = walk(values, x, y, sign * across, sign * down, -sign, reach, 1.0, np.inf)
     if not sign * (crest - low) >= least_edge:
         return 0.0, 0.0
-    after, high, _, _, _ = walk(values, x, y, -sign * across, -sign * down, -sign, reach, 1.0, np.inf)
+    after, high, _, _ = walk(values, x, y, -sign * across, -sign * down, -sign, reach, 1.0, np.inf)
     drops = sign * (crest - low), sign * (crest - high)
     if not min(drops) >= max(least_edge, LEAST_SIDE_HEIGHT * max(drops)):
         return 0.0, 0.0
@@ -325,7 +325,7 @@ def structure_at(values, photo, x, y, across, down, far, sign, sigma, least_edge
 
 @kernel
 def structure_blur(values, photo, x, y, across, down, sign, least_edge, shares, taps):
-    """The blur of a ridge (sign 1) or slit (-1) with its crest about (x, y): (sigma, height, photo's agreement, 0..1).
+    """The blur of a ridge (sign 1) or slit (-1) with its crest about (x, y): (sigma, height).
 
     Sigma is 0 where it may as well be a hill: its sides are not flat, or no blur makes it of what the photo shows.
     """
@@ -333,17 +333,17 @@ def structure_blur(values, photo, x, y, across, down, sign, least_edge, shares, 
     x, y = x + across * far, y + down * far
     feet = _feet(values, x, y, across, down, sign, SEARCHED_PX, least_edge)
     if feet[0] == 0:
-        return 0.0, 0.0, 0.0
+        return 0.0, 0.0
     crest = height_at(values, x, y)
     for side in (-1, 1):
         foot = feet[0] if side < 0 else feet[1]
         # Outside, pixels of the border go on: as flat as nothing else is.
         if not is_inside(values, x + side * 1.6 * foot * across, y + side * 1.6 * foot * down):
-            return 0.0, 0.0, 0.0
+            return 0.0, 0.0
         level = height_at(values, x + side * foot * across, y + side * foot * down)
         beyond = height_at(values, x + side * 1.6 * foot * across, y + side * 1.6 * foot * down)
         if not abs(beyond - level) <= FLAT_SHARE * abs(crest - level):
-            return 0.0, 0.0, 0.0
+            return 0.0, 0.0
     first, last = _structure_shares(photo, x, y, across, down, feet, np.inf, shares)
     best, sigma, height = MOST_CREST_MISFIT, 0.0, 0.0
     if first <= last:
@@ -351,13 +351,4 @@ def structure_blur(values, photo, x, y, across, down, sign, least_edge, shares, 
             fitted, _, _, misfit = _fit_structure(values, x, y, across, down, shares, first, last, blur, taps)
             if misfit < best and sign * fitted > 0:
                 best, sigma, height = misfit, blur, abs(fitted)
-    # What no blur is wide enough for is a hill.
-    if sigma == BLURS[-1]:
-        sigma = 0.0
-    # Both outlines of it stand out from what the photo shows beside it.
-    agrees = 0.0
-    for side in (-1, 1):
-        foot = feet[0] if side < 0 else feet[1]
-        outline = strongest_change(photo, x, y, side * across, side * down, 0.0, foot)
-        agrees += 0.5 * (outline > strongest_change(photo, x, y, side * across, side * down, foot + 1, 2 * foot + 1))
-    return sigma, height, agrees
+    return sigma, height

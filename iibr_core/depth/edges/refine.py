@@ -179,8 +179,8 @@ def _as_step(values, x, y, across, down, sigma, least_edge):
     pace = max(1.0, 0.5 * sigma)
     reach = ceil(RAMP_SIGMAS * sigma / pace) + 1
     # Where the ramp ends both ways; its height there.
-    up, top, _, steepest_up, at_up = walk(values, x, y, across, down, 1.0, reach, pace, PLATEAU_SIGMAS * sigma)
-    to_foot, bottom, _, steepest_down, at_down = walk(
+    up, top, steepest_up, at_up = walk(values, x, y, across, down, 1.0, reach, pace, PLATEAU_SIGMAS * sigma)
+    to_foot, bottom, steepest_down, at_down = walk(
         values, x, y, across, down, -1.0, reach, pace, PLATEAU_SIGMAS * sigma
     )
     if top - bottom < least_edge:

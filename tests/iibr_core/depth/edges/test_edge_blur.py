@@ -151,4 +151,3 @@ def test_the_photo_agrees_where_it_changes_most_at_the_middle() -> None:
     assert agrees((30, 0.4), (24, 0.6)) == 0.5
     assert agrees((30, 0.4), (24, 0.6), (36, 0.6)) == 0
     assert agrees((30, 0.4), (45, 0.6)) == 1, "too far to count"
-    assert agrees((30, 0.01)) == 0.5, "nothing tells"

@@ -44,9 +44,8 @@ def ramp(first, last, height=1.0, slant=0.0):
 def test_a_walk_ends_where_the_ramp_does(slant, late):
     """On a steeper surface it takes one step more to see that it has levelled off."""
     values = ramp(20.0, 30.0, slant=slant)
-    length, end, slope, steepest, at = walk(values, 25.0, 4.0, 1.0, 0.0, 1, 20, 1.0, 9.0)
+    length, end, steepest, at = walk(values, 25.0, 4.0, 1.0, 0.0, 1, 20, 1.0, 9.0)
     assert (length, end) == (5.0 + late, pytest.approx(1 + (30 + late) * slant))
-    assert slope == pytest.approx(slant, abs=1e-6)
     assert steepest == pytest.approx(0.1 + slant, abs=1e-6)
     assert 0 < at <= 5
     down = walk(values, 25.0, 4.0, 1.0, 0.0, -1, 20, 1.0, 9.0)
@@ -57,7 +56,7 @@ def test_shorter_steps_end_at_the_same_place():
     for pace in (0.5, 2.5):
         found = walk(ramp(20.0, 30.0), 25.0, 4.0, 1.0, 0.0, 1, 20, pace, 9.0)
         assert found[:2] == (5.0, pytest.approx(1))
-        assert found[3] == pytest.approx(0.1, abs=1e-6)
+        assert found[2] == pytest.approx(0.1, abs=1e-6)
 
 
 def test_a_walk_goes_no_farther_than_told_and_ends_where_it_falls():
