@@ -35,25 +35,22 @@ LABEL_NEARNESS[LABEL_PX, LABEL_PX] = 0
 """Those weights, (2 LABEL_PX + 1, 2 LABEL_PX + 1); the pixel itself, in the middle, tells nothing."""
 TRUST = np.append(np.geomspace(0.1, 1.0, LABELLED_PX + 1), 1.0).astype(np.float32)
 """Their weights by how many pixels lie between them and a step: nearer ones are mixed, or on the wrong side."""
-LIKENESS_STEPS = 64
-LIKENESS_TABLE = np.append(np.exp(-0.5 * (np.arange(16 * LIKENESS_STEPS) + 0.5) / LIKENESS_STEPS), 0).astype(np.float32)
-"""Likeness by squared distance of colours, in such steps of a variance, 0 from the last one on."""
 LEAST_FOREGROUND = 0.7
 """Weight of all pixels of a foreground together, below which it keeps its pixels: it is a pixel thin."""
-LIKE_CONTRAST, LIKE_NEIGHBOUR = 0.5, 0.6
-"""Standard deviations of likeness, of a pixel to a surface and to a neighbour, in mean steps of colour in the band."""
+LIKENESS = 0.5
+"""Its standard deviation, of a pixel to a surface and to a neighbour, in mean steps of colour in the band."""
 UNLIKE, UNSEEN_WEIGHT = 0.03, 0.3
 """Likelihood of a colour that nothing on a surface has; weight of that possibility against what was seen."""
-COHESION = 1.2
-"""How much a neighbour counts that is on the same surface and looks alike, in units of log likelihood."""
-DATA_TERM_WEIGHT = 1.5
-"""How much the map counts: factor of the log odds of its being right. With less, thin wires are lost."""
+PRIOR_WEIGHT = 1.5
+"""How much the map counts, by the log odds of its being right, and each neighbour that is on the same surface and looks
+alike, in units of log likelihood of the colours. With less, thin wires are lost.
+"""
 CLEAR = 1.5
 """Log likelihood ratio from which colours are clear."""
 MIXED_SHARES = (0.1, 0.25)
 """Share of the pixels just behind and just in front of exact steps whose colours contradict the map: they are mixed."""
-WRONG = (0.02, 0.9)
-"""Least and largest share of pixels that a map is taken to have on the wrong side."""
+LEAST_WRONG = 0.02
+"""Share of pixels that a map is taken to have on the wrong side, and on the right one, at least."""
 TELLING = 0.2
 """Share of the pixels beside steps whose colours must be clear to tell of the map, as both sides of a slope look alike.
 Where colours contradict the map inside surfaces in a larger share of what they do there, they tell shade from light.
@@ -79,8 +76,8 @@ def label_edges(
     pixels = np.flatnonzero(distance <= LABELLED_PX)
     if not len(pixels):
         return values
-    contrast = _mean_color_step(colors, pixels)
-    weigh = partial(_weigh_colors, colors, values, TRUST[distance], least_edge, LIKE_CONTRAST * contrast)
+    alike = LIKENESS * _mean_color_step(colors, pixels)
+    weigh = partial(_weigh_colors, colors, values, TRUST[distance], least_edge, alike)
     away, own, known = distance.reshape(-1), values.reshape(-1), ~unknown.reshape(-1)
     few = pixels[:: ceil(len(pixels) / MOST_MEASURED_PIXELS)]
     weighed = _in_parts(weigh, few, should_stop)
@@ -89,12 +86,10 @@ def label_edges(
         return values
     other, evidence = weighed if len(few) == len(pixels) else _in_parts(weigh, pixels, should_stop)
     away, own, known = away[pixels], own[pixels], known[pixels]
-    odds = np.float32(DATA_TERM_WEIGHT) * np.log((1 - wrong) / wrong)
+    odds = np.float32(PRIOR_WEIGHT) * np.log((1 - wrong) / wrong)
     prior = np.where(known, odds[(own > other).astype(np.intp), away], np.float32(0))
-    # The farthest pixels only look on.
-    looks_on = (other == own) | (known & (away == LABELLED_PX))
-    drive = np.where(looks_on, np.float32(np.inf), evidence + prior)
-    belief = _mean_field(colors, values, pixels, other, drive, LIKE_NEIGHBOUR * contrast, should_stop)
+    drive = np.where(other == own, np.float32(np.inf), evidence + prior)
+    belief = _mean_field(colors, values, pixels, other, drive, alike, should_stop)
     labelled = values.copy()
     labelled.reshape(-1)[pixels] = np.where(belief < 0.5, other, own)
     return labelled
@@ -150,7 +145,7 @@ def _measure_errors(
             is_told = np.count_nonzero(clear & here) >= TELLING * np.count_nonzero(known & here)
             tells = is_told and misled <= TELLING * contradicted
             wrong[side, k] = (contradicted - by_chance) / max(1 - misled - by_chance, 0.1) if tells else 0.0
-    return np.clip(wrong, *WRONG)
+    return np.clip(wrong, LEAST_WRONG, 1 - LEAST_WRONG)
 
 
 def _contradicted(evidence: FloatImage, expected: float = 0.05) -> float:
@@ -236,7 +231,7 @@ def _weigh_colors(colors, values, trust, least_edge, alike, pixels):
     others, evidence = np.empty(len(pixels), np.float32), np.zeros(len(pixels), np.float32)
     # Of its own surface and of the other: weight, likeness, sum of colours, sum of their squares.
     weight, like, total, squares = np.empty(2), np.empty(2), np.empty((2, 3)), np.empty(2)
-    steps, most = np.float32(LIKENESS_STEPS / (alike * alike)), np.float32(len(LIKENESS_TABLE) - 1)
+    sharpness = np.float32(-0.5 / (alike * alike))
     for n in range(len(pixels)):
         y, x = pixels[n] // width, pixels[n] % width
         own, other = values[y, x], _nearest_other(values, y, x, least_edge)
@@ -260,9 +255,8 @@ def _weigh_colors(colors, values, trust, least_edge, alike, pixels):
                     total[side, c] += w * color
                     squares[side] += w * color * color
                 # Colours that are not finite are like no other.
-                at = apart * steps
                 weight[side] += w
-                like[side] += w * LIKENESS_TABLE[int(at if at < most else most)]
+                like[side] += w * exp(apart * sharpness) if apart < np.inf else 0.0
         # A wire that the map has beside its place would be lost: nothing knows its colours.
         if not weight[1] > 0 or (own > other and weight[0] < LEAST_FOREGROUND):
             continue
@@ -331,5 +325,5 @@ def _believe(colors, values, pixels, number, other, drive, alike, believed, beli
                 for c in range(3):
                     apart += (colors[v, u, c] - colors[y, x, c]) ** 2
                 like = exp(-0.5 * apart / (alike * alike)) if apart < np.inf else 0.0
-                total += COHESION * like * votes
+                total += PRIOR_WEIGHT * like * votes
         belief[n] = 1.0 / (1.0 + exp(-min(max(total, -30.0), 30.0)))

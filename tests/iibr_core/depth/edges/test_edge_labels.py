@@ -92,7 +92,7 @@ def slow_pass(colors, values, other, drive, alike, believed):
         for p in around(values, y, x, 1):
             like = np.exp(-np.sum((colors[p] - colors[y, x]) ** 2) / (2 * alike**2))
             votes = believed[p] * says(values[p]) + (1 - believed[p]) * says(other[p])
-            total += edge_labels.COHESION * like * votes
+            total += edge_labels.PRIOR_WEIGHT * like * votes
         belief[y, x] = 1 / (1 + np.exp(-np.clip(total, -30, 30)))
     return belief
 
@@ -113,26 +113,27 @@ def slow_errors(evidence, side, distance, known):
             here = known & (side == s) & (distance == k)
             is_told = (np.abs(evidence[here]) > edge_labels.CLEAR).mean() >= edge_labels.TELLING
             share = share - chance if is_told and misled <= edge_labels.TELLING * share else 0
-            wrong[s, k] = np.clip(share / max(1 - misled - chance, 0.1), *edge_labels.WRONG)
+            share /= max(1 - misled - chance, 0.1)
+            wrong[s, k] = np.clip(share, edge_labels.LEAST_WRONG, 1 - edge_labels.LEAST_WRONG)
     return wrong
 
 
 def slow_labels(colors, values, unknown):
     distance = slow_distance(values)
     band = distance <= edge_labels.LABELLED_PX
-    contrast = edge_labels._mean_color_step(colors, np.flatnonzero(band))
+    alike = edge_labels.LIKENESS * edge_labels._mean_color_step(colors, np.flatnonzero(band))
     other, evidence = values.astype(np.float64), np.zeros(values.shape)
     for y, x in np.argwhere(band):
-        other[y, x], evidence[y, x] = slow_weigh(colors, values, distance, y, x, edge_labels.LIKE_CONTRAST * contrast)
+        other[y, x], evidence[y, x] = slow_weigh(colors, values, distance, y, x, alike)
     side = (values > other).astype(int)
     wrong = slow_errors(evidence, side, distance, ~unknown & band)
-    odds = {at: edge_labels.DATA_TERM_WEIGHT * np.log((1 - share) / share) for at, share in wrong.items()}
+    odds = {at: edge_labels.PRIOR_WEIGHT * np.log((1 - share) / share) for at, share in wrong.items()}
     drive = np.full(values.shape, np.inf)
-    for p in map(tuple, np.argwhere(band & (other != values) & (unknown | (distance < edge_labels.LABELLED_PX)))):
+    for p in map(tuple, np.argwhere(band & (other != values))):
         drive[p] = evidence[p] + (0 if unknown[p] else odds[side[p], distance[p]])
     belief = np.ones(values.shape)
     for _ in range(edge_labels.PASSES):
-        belief = slow_pass(colors, values, other, drive, edge_labels.LIKE_NEIGHBOUR * contrast, belief)
+        belief = slow_pass(colors, values, other, drive, alike, belief)
     return np.where(belief < 0.5, other, values).astype(np.float32)
 
 
