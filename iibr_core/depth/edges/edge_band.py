@@ -15,6 +15,7 @@ from iibr_core.inpainting.disparity_by_color import fill_disparity_by_color
 from iibr_core.runtime.jit import kernel
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never
 from iibr_core.stages import ALL_STAGES, Stages
+from iibr_core.surfaces import is_in_front, same_surface
 from iibr_core.types import FloatImage, image_size
 
 BAND_PX = 2
@@ -28,9 +29,7 @@ MIXED_EDGES = 5.0
 LEAST_MEASURED = 0.025
 """Where a smaller share of the edge bands is clearly between two surfaces, it shows wires or slopes."""
 MOST_NEIGHBOURS = 4
-"""What is clearly between has at most so many neighbours on its own disparity; so has, within two pixels, all that lies
-between, on thin things too.
-"""
+"""What lies between has at most so many neighbours on its own disparity within two pixels."""
 
 
 def resolve_edge_band(
@@ -51,18 +50,17 @@ def resolve_edge_band(
     """
     colors = np.ascontiguousarray(photo, np.float32)
     is_band = step_distance(values, least_edge, BAND_PX, counts_slopes=True) < BAND_PX
-    between, clear = _find_between(values, least_edge, should_stop)
+    between, clear = _find_between(np.where(unknown, np.float32(np.nan), values), least_edge, should_stop)
     is_measured = clear > LEAST_MEASURED * np.count_nonzero(is_band)
     unsure, filled = unknown, values
     if is_measured and stages.refill_between_surfaces:
-        between |= _find_between(np.where(unknown, np.float32(np.nan), values), least_edge, should_stop)[0]
         unsure = between | unknown
         filled = fill_disparity_by_color(colors, np.where(unsure, np.float32(np.nan), values), should_stop)
     return label_edges(colors, filled, unsure, least_edge, should_stop) if stages.label_edge_bands else filled
 
 
 def _find_between(values: FloatImage, least_edge: float, should_stop: ShouldStop) -> tuple[NDArray[np.bool_], int]:
-    """(H, W): lone pixels of no surface, between two, NaN being none; how many are so clearly."""
+    """(H, W): lone pixels of no surface, between two, NaN being none; how many lie clearly between plateaus."""
     between = np.zeros(values.shape, np.bool_)
     clear = in_bands(
         lambda first, last: _find_between_rows(values, least_edge, first, last, between),
@@ -83,8 +81,8 @@ def _is_between(values, y, x, right, down, least_edge):
             high, low = max(a, b), min(a, b)
             if (
                 high - low > MIXED_EDGES * least_edge
-                and high - here > least_edge
-                and here - low > least_edge
+                and is_in_front(high, here, least_edge)
+                and is_in_front(here, low, least_edge)
                 and BETWEEN_SHARES[0] * (high - low) <= here - low <= BETWEEN_SHARES[1] * (high - low)
             ):
                 flat, is_flat = FLAT_SHARE * (high - low), True
@@ -104,30 +102,25 @@ def _find_between_rows(values, least_edge, first, last, between):
     margin, clear = 2 + BAND_PX, 0
     for y in range(first, last):
         for x in range(width):
-            # Neighbours above and below it, and few on its own disparity: most pixels end here.
-            neighbours, higher, lower = -1, False, False
+            here, higher, lower = values[y, x], False, False
             for v in range(max(y - 1, 0), min(y + 2, height)):
                 for u in range(max(x - 1, 0), min(x + 2, width)):
-                    step = values[v, u] - values[y, x]
-                    higher, lower = higher or step > least_edge, lower or step < -least_edge
-                    neighbours += abs(step) <= least_edge
-            if not (higher and lower and neighbours <= MOST_NEIGHBOURS):
+                    higher |= is_in_front(values[v, u], here, least_edge)
+                    lower |= is_in_front(here, values[v, u], least_edge)
+            # Most pixels end here.
+            if not (higher and lower):
                 continue
             if margin <= y < height - margin and margin <= x < width - margin:
-                is_clear = (
+                clear += (
                     _is_between(values, y, x, 1, 0, least_edge)
                     or _is_between(values, y, x, 0, 1, least_edge)
                     or _is_between(values, y, x, 1, 1, least_edge)
                     or _is_between(values, y, x, 1, -1, least_edge)
                 )
-                clear += is_clear
-                between[y, x] = is_clear
-            if between[y, x]:
-                continue
             # Things of two pixels and more, before one surface and behind another, have neighbours farther off.
             neighbours = -1
             for v in range(max(y - 2, 0), min(y + 3, height)):
                 for u in range(max(x - 2, 0), min(x + 3, width)):
-                    neighbours += abs(values[v, u] - values[y, x]) <= least_edge
+                    neighbours += same_surface(values[v, u], here, least_edge)
             between[y, x] = neighbours <= MOST_NEIGHBOURS
     return clear
