@@ -106,19 +106,11 @@ def _fill_unknown(colors: FloatImage, disparity: FloatImage, should_stop: Should
 
 
 @kernel
-def _continue_plateau(values, x, y, across, down, length, level, limit):
-    """The height at (x, y) of a plateau that begins `length` away at `level`, from its slope over two pixels there."""
-    far = length + 2
-    slope = (height_at(values, x + across * far, y + down * far) - level) / 2
-    return level - EXTENSION * length * min(max(slope, -limit), limit)
-
-
-@kernel
-def _beyond_blur(values, x, y, across, down, far, sigma, limit):
-    """The height at (x, y) of a plateau, from where the blur of its edge ends, `far` away, and its slope there."""
+def _continued(values, x, y, across, down, far, sigma, share, limit):
+    """The height at (x, y) of a surface that begins `far` away along the direction, by a share of its slope there."""
     level = height_at(values, x + across * far, y + down * far)
     slope = (height_at(values, x + across * (far + sigma), y + down * (far + sigma)) - level) / sigma
-    return level - BEND * far * min(max(slope, -limit), limit)
+    return level - share * far * min(max(slope, -limit), limit)
 
 
 @kernel
@@ -207,8 +199,8 @@ def _as_step(values, x, y, across, down, sigma, least_edge):
         return here
     # Plateaus may be slanted: their slopes go on part of the way to here, but not past the value here.
     limit = MOST_EXTENSION * steepest
-    top = max(_continue_plateau(values, x, y, across, down, up, top, limit), here)
-    bottom = min(_continue_plateau(values, x, y, -across, -down, to_foot, bottom, limit), here)
+    top = max(_continued(values, x, y, across, down, up, sigma, EXTENSION, limit), here)
+    bottom = min(_continued(values, x, y, -across, -down, to_foot, sigma, EXTENSION, limit), here)
     if not top > bottom:
         return here
     is_above = 2.0 * here >= top + bottom
@@ -217,10 +209,10 @@ def _as_step(values, x, y, across, down, sigma, least_edge):
     above, below, end = _tail(up - edge, sigma), _tail(to_foot + edge, sigma), GAUSSIAN_SIGMAS * sigma
     step, limit = height / (1.0 - above - below), BEND * limit
     if not returns_up:
-        lost = _beyond_blur(values, x, y, across, down, end + edge, sigma, limit) - top
+        lost = _continued(values, x, y, across, down, end + edge, sigma, BEND, limit) - top
         top += min(max(lost, 0.0), above * step)
     if not returns_down:
-        left = bottom - _beyond_blur(values, x, y, -across, -down, end - edge, sigma, limit)
+        left = bottom - _continued(values, x, y, -across, -down, end - edge, sigma, BEND, limit)
         bottom -= min(max(left, 0.0), below * step)
     return top if is_above else bottom
 

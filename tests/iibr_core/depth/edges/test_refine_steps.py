@@ -18,25 +18,12 @@ def blurred_step(at, sigma, height=2.0, slope=0.0):
     return np.tile(1 + height * share + slope * np.arange(61), (21, 1)).astype(np.float32)
 
 
-def test_a_plateau_s_own_slope_goes_on_part_of_the_way():
+def test_a_surface_goes_on_by_a_share_of_its_slope_up_to_a_limit():
     plane = 1 + 0.02 * X
-    level = plane[10, 40]
-    found = refine._continue_plateau(plane, 30, 10, 1.0, 0.0, 10.0, level, 1.0)
-    assert found == pytest.approx(level - refine.EXTENSION * 10 * 0.02, abs=1e-5)
-    assert refine._continue_plateau(plane, 30, 10, 1.0, 0.0, 10.0, level, 0.01) == pytest.approx(
-        level - refine.EXTENSION * 10 * 0.01, abs=1e-5
-    )
-    assert refine._continue_plateau(-plane, 30, 10, 1.0, 0.0, 10.0, -level, 0.01) == pytest.approx(
-        -level + refine.EXTENSION * 10 * 0.01, abs=1e-5
-    )
-
-
-def test_beyond_the_blur_a_surface_bends_faster():
-    plane = 1 + 0.02 * X
-    found = refine._beyond_blur(plane, 30, 10, 1.0, 0.0, 6.0, 2.0, 1.0)
-    assert found == pytest.approx(plane[10, 36] - refine.BEND * 6 * 0.02, abs=1e-5)
-    found = refine._beyond_blur(plane, 30, 10, 1.0, 0.0, 6.0, 2.0, 0.005)
-    assert found == pytest.approx(plane[10, 36] - refine.BEND * 6 * 0.005, abs=1e-5)
+    for values, limit, slope in ((plane, 1.0, 0.02), (plane, 0.01, 0.01), (-plane, 0.01, -0.01)):
+        for share in (refine.EXTENSION, refine.BEND):
+            found = refine._continued(values, 30, 10, 1.0, 0.0, 6.0, 2.0, share, limit)
+            assert found == pytest.approx(values[10, 36] - share * 6 * slope, abs=1e-5)
 
 
 @pytest.mark.parametrize("sigma", [1.0, 3.0])
