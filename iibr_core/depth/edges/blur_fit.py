@@ -12,6 +12,7 @@ import numpy as np
 from iibr_core.depth.edges.edge_profiles import COLOR_NOISE, GAUSSIAN_SIGMAS
 from iibr_core.runtime.jit import kernel
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never
+from iibr_core.surfaces import same_surface
 from iibr_core.types import FloatImage, image_size
 
 WIDEST_FITTED_SIGMA_PX = 4.5
@@ -142,7 +143,7 @@ def _same_surface_neighbours(fitted, y, x, here, there):
     for j in range(-1, 2):
         for i in range(-1, 2):
             value = fitted[min(max(y + j, 0), height - 1), min(max(x + i, 0), width - 1)]
-            more += (1 if abs(value - here) < near else 0) - (1 if abs(value - there) < near else 0)
+            more += same_surface(value, here, near) - same_surface(value, there, near)
     return more
 
 
@@ -171,22 +172,17 @@ def _move_edges(photo, fitted, missing, taps, weight, least_edge, first, last, s
     far, energy, sums = len(taps) // 2, (taps * taps).sum() ** 2, np.empty((2, 4))
     for y in range(first, last):
         for x in range(width):
-            here = fitted[y, x]
-            # Most pixels end here.
-            if settled[y, x] or not (
-                abs(fitted[max(y - 1, 0), x] - here) >= least_edge
-                or abs(fitted[min(y + 1, height - 1), x] - here) >= least_edge
-                or abs(fitted[y, max(x - 1, 0)] - here) >= least_edge
-                or abs(fitted[y, min(x + 1, width - 1)] - here) >= least_edge
-            ):
+            if settled[y, x]:
                 continue
             settled[y, x] = True
-            wanted = _correlate(missing, y, x, taps, far)
-            best, value = 0.0, here
+            here = value = fitted[y, x]
+            best, wanted = 0.0, np.nan
             for side in range(4):
                 v, u = y + (side == 0) - (side == 1), x + (side == 2) - (side == 3)
-                if not (0 <= v < height and 0 <= u < width) or abs(fitted[v, u] - here) < least_edge:
+                if not (0 <= v < height and 0 <= u < width) or same_surface(fitted[v, u], here, least_edge):
                     continue
+                if wanted != wanted:
+                    wanted = _correlate(missing, y, x, taps, far)
                 there = fitted[v, u]
                 # Change of the misfit |missing|^2, relative to that of a whole pixel; then of the outline and colours.
                 change = 1.0 - 2.0 * wanted / ((there - here) * energy)

@@ -216,7 +216,7 @@ def _nearest_other(values, y, x, least_edge):
     for v in range(max(y - LABELLED_PX - 1, 0), min(y + LABELLED_PX + 2, height)):
         for u in range(max(x - LABELLED_PX - 1, 0), min(x + LABELLED_PX + 2, width)):
             away = (v - y) ** 2 + (u - x) ** 2
-            if away < nearest and abs(values[v, u] - values[y, x]) > least_edge:
+            if away < nearest and not same_surface(values[v, u], values[y, x], least_edge):
                 found, nearest = values[v, u], away
     return found
 
