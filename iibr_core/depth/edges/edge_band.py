@@ -50,10 +50,11 @@ def resolve_edge_band(
     """
     colors = np.ascontiguousarray(photo, np.float32)
     is_band = step_distance(values, least_edge, BAND_PX, counts_slopes=True) < BAND_PX
-    between, clear = _find_between(np.where(unknown, np.float32(np.nan), values), least_edge, should_stop)
+    between, clear = _find_between(values, least_edge, should_stop)
     is_measured = clear > LEAST_MEASURED * np.count_nonzero(is_band)
     unsure, filled = unknown, values
     if is_measured and stages.refill_between_surfaces:
+        between |= _find_between(np.where(unknown, np.float32(np.nan), values), least_edge, should_stop)[0]
         unsure = between | unknown
         filled = fill_disparity_by_color(colors, np.where(unsure, np.float32(np.nan), values), should_stop)
     return label_edges(colors, filled, unsure, least_edge, should_stop) if stages.label_edge_bands else filled
