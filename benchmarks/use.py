@@ -3,8 +3,8 @@
 python -m benchmarks.use [--steps 1000] [--seed 0]
 
 Says what memory the process fills after so many actions and once it rests, against a fresh window that rests with the
-same photo and grid: photos differ in size, and grids in views; and how threads and open files stand. How long frames
-take `benchmarks.window` tells.
+same photo and grid: photos differ in size, and grids in views; how threads and open files stand; and of which action
+the longest frame was, in processor time of the thread that draws.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from benchmarks.harness.bench_scenes import write_photo
 from benchmarks.harness.real_window import open_window
 from benchmarks.harness.reports import emit, head, parser_of, row, start
 from benchmarks.harness.timing import in_own_process
+from benchmarks.harness.turn_times import Turn, Turns, watched_turns
 from iibr_core.exports.options import ExportOptions
 from iibr_core.rendering.gloss.gloss_settings import Gloss
 from iibr_core.runtime.allocator import limit_arenas
@@ -61,13 +62,14 @@ class User:
     def __init__(self, app: App, out: Path, seed: int = 0) -> None:
         self.app, self.out, self.random = app, out, random.Random(seed)
 
-    def step(self) -> None:
-        """Do something, often what is often done."""
+    def step(self) -> str:
+        """Do something, often what is often done; what it was."""
         thing = self.random.choice(2 * OFTEN + SELDOM)
         if thing in ASKED:
             self.do(*ASKED[thing](self))
         else:
             DONE[thing](self)
+        return thing
 
     def between(self, low: float, high: float) -> float:
         """A random number."""
@@ -198,7 +200,8 @@ def report(steps: int, seed: int) -> Iterator[str]:
         with open_window(Source(str(folder))) as app:
             user = User(app, Path(name), seed)
             open_first(user)
-            yield from take_steps(user, steps)
+            with watched_turns(app) as turns:
+                yield from take_steps(user, steps, turns)
     yield f"\nThreads of Python left when the window is closed: {threading.active_count() - threads_before}."
 
 
@@ -217,9 +220,10 @@ def memory_of_fresh_window(path: str, grid: GridShape) -> float:
         return float(psutil.Process().memory_info().rss) / MIB
 
 
-def take_steps(user: User, steps: int) -> Iterator[str]:
-    """What the process takes after some of them, and at the end."""
+def take_steps(user: User, steps: int, turns: Turns) -> Iterator[str]:
+    """What the process takes after some of them, and at the end; then the longest frame of each action."""
     process = psutil.Process()
+    longest: dict[str, Turn] = {}
 
     def line(when: str) -> str:
         scene = user.app.state.scene
@@ -230,7 +234,9 @@ def take_steps(user: User, steps: int) -> Iterator[str]:
 
     yield head("after", "memory, MiB", "fresh, MiB", "times", "open files", "threads")
     for number in range(1, steps + 1):
-        user.step()
+        turns.longest = Turn()
+        thing = user.step()
+        longest[thing] = max(longest.get(thing, Turn()), turns.longest)
         if number in COUNTED_AFTER or number == steps:
             yield line(f"{number} actions")
         if number in (RESTS_AFTER, steps):
@@ -239,6 +245,9 @@ def take_steps(user: User, steps: int) -> Iterator[str]:
             go_back(user)
             user.rest()
             yield line(f"{number} actions, back at the first photo")
+    yield "\n" + head("action", "longest frame")
+    for thing, turn in sorted(longest.items(), key=lambda item: item[1], reverse=True):
+        yield row(thing, turn)
 
 
 if __name__ == "__main__":
