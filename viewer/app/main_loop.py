@@ -169,7 +169,8 @@ class App:
     @property
     def wait_s(self) -> float:
         """How long the next turn may sleep before it looks."""
-        idle_s = IDLE_WAIT_S if self.scene_view.shows_all_views() else VIEW_REFRESH_S
+        is_behind = self.scene_loader.has_untold or not self.scene_view.shows_all_views()
+        idle_s = VIEW_REFRESH_S if is_behind else IDLE_WAIT_S
         idle_s = DIALOG_LOOK_S if self._side_effects.is_waiting else idle_s
         is_moving, is_over_panel = self.state.motion.is_running, self._pointer.is_over_panel
         return self._pace.wait_s(is_moving, is_over_panel, self._gamepads.is_resting, idle_s)

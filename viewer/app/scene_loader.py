@@ -45,6 +45,11 @@ The photo that is opened first does not wait for the next ones.
 TAKE_BUDGET_S = 0.006
 """A turn: making room for a scene, and then for all its views, is too much for one frame."""
 
+PROGRESS_S = 0.25
+"""While views come, their number is told this often: to show each would take a frame, and that the time of a fifth of a
+view.
+"""
+
 
 class SceneLoader:
     """Everything is called from the one GL thread. ahead, sketches: photos that are read before they are asked for, and
@@ -73,6 +78,8 @@ class SceneLoader:
         self._depth_settings = DepthSettings()
         self._stopped: int | None = None
         self._room_beside: tuple[Scene, int] | None = None
+        self._untold: list[Action] = []
+        self._told_at = 0.0
 
     def has_lost(self, state: AppState) -> bool:
         """Whether what the state waits for will never come."""
@@ -83,14 +90,22 @@ class SceneLoader:
         self._worker.eye = eye
 
     def take_results(self, state: AppState) -> list[Action]:
-        """The worker's results, as actions, for about TAKE_BUDGET_S, at least one; the one place where they arrive."""
+        """The worker's results, as actions, for about TAKE_BUDGET_S, at least one; the one place where they arrive.
+        Progress alone is told every PROGRESS_S, and when it is complete.
+        """
         actions = self._show_sketch(state) + self._depth_finder.advance(state, self._scene_view.loaded)
         end = time.perf_counter() + TAKE_BUDGET_S
         while self._scene_view.has_room and (result := self._worker.next_result()) is not None:
             actions += self._take(result, state)
             if time.perf_counter() >= end:
                 break
-        return actions
+        self._untold += actions
+        return self._take_untold()
+
+    @property
+    def has_untold(self) -> bool:
+        """Whether progress was made that was not told yet."""
+        return bool(self._untold)
 
     def preview_depth(self, state: AppState) -> list[Action]:
         """While depth is edited, show it; the views of what it was before need not be made."""
@@ -119,6 +134,16 @@ class SceneLoader:
         self.sketches.close()
         self.ahead.close()
         self._brush_loader.close()
+
+    def _take_untold(self) -> list[Action]:
+        """What is to be told now."""
+        told, now = self._untold, time.perf_counter()
+        is_progress = all(isinstance(news, ProgressMade) and not news.progress.is_complete for news in told)
+        if is_progress and now - self._told_at < PROGRESS_S:
+            return []
+        if told:
+            self._untold, self._told_at = [], now
+        return told
 
     def _show_sketch(self, state: AppState) -> list[Action]:
         """What was asked for, in small, as long as nothing else of it is there."""

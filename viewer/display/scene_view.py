@@ -200,7 +200,7 @@ class SceneView:
         )
         budget_s = self._gl.frame_budget_s
         if self.picture_drawn is not None and self._shows_one_view and self._differs_by_views_only(wanted):
-            self.picture_drawn = replace(self.picture_drawn, views_uploaded=self.views_uploaded)
+            wanted = self.picture_drawn
         if self.picture_drawn is None or (not self._is_same(wanted) and not self._can_wait(wanted)):
             is_still = self._differs_by_views_only(wanted)
             if is_still and self.renderer.passes_shown:  # it is seen on, and must not become softer
@@ -246,8 +246,9 @@ class SceneView:
         return field is not None and field.colors is snapshot.field.colors
 
     def shows_all_views(self) -> bool:
-        """Whether the picture last drawn knows every view uploaded."""
-        return self.picture_drawn is None or self.picture_drawn.views_uploaded == self.views_uploaded
+        """Whether the picture last drawn knows every view uploaded, or they change nothing in it."""
+        drawn = self.picture_drawn
+        return drawn is None or self._shows_one_view or drawn.views_uploaded == self.views_uploaded
 
     def _open_field(self, scene: Scene, grid: GridShape) -> None:
         self.renderer.open_field(

@@ -86,10 +86,11 @@ def test_a_picture_that_is_one_view_is_not_drawn_for_others(
     view = opened._scene_view
     opened.do(SetAperture(0.0), *lens)
     view.converge(opened.state, SIZE)
-    pictures, shown = view.pictures_drawn, view.renderer.read_image()
+    pictures, shown, record = view.pictures_drawn, view.renderer.read_image(), view.picture_drawn
     a_view_comes(view)
     view.converge(opened.state, SIZE)
     assert view.pictures_drawn == pictures + draws
+    assert (view.picture_drawn != record) == draws, "else a frame would be shown for it"
     assert np.array_equal(view.renderer.read_image(), shown) != draws
     assert view.shows_all_views()
 
