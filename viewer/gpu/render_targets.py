@@ -15,30 +15,24 @@ from iibr_core.scenes import ScreenSize
 
 
 class RenderTarget:
-    """Textures of one size that a pass draws into together.
-
-    holds_sum: whether what comes next is to be added to what is here; to replace it costs less than to clear it.
-    """
+    """Textures of one size that a pass draws into together."""
 
     def __init__(self, ctx: moderngl.Context, textures: list[moderngl.Texture]) -> None:
         self.textures = textures
         self.framebuffer = ctx.framebuffer(textures)
         self._ctx = ctx
-        self.holds_sum = False
 
     def use(self) -> None:
         """Draw here from now on."""
         self.framebuffer.use()
 
-    def add(self, keeps: bool) -> None:
-        """Add what is drawn from now on to what is here, or, unless it keeps that, put it in its place."""
+    def add(self) -> None:
+        """Add what is drawn from now on to what is here: the first light, too, for drivers compile a program again for
+        passes that replace.
+        """
         self.framebuffer.use()
-        if keeps:
-            self._ctx.enable(moderngl.BLEND)
-            self._ctx.blend_func = moderngl.ONE, moderngl.ONE
-        else:
-            self._ctx.disable(moderngl.BLEND)
-        self.holds_sum = True
+        self._ctx.enable(moderngl.BLEND)
+        self._ctx.blend_func = moderngl.ONE, moderngl.ONE
 
     def read(self, dtype: type[np.uint8] | type[np.float32]) -> NDArray[Any]:
         """What was drawn, (H, W, 3), bytes or floats, row 0 at the top."""

@@ -191,15 +191,13 @@ class Accumulator:
         batch = _first_batch(accumulation.samples[accumulation.at :][:count], field)
         has_pinhole = accumulation.at == 0 and lens.aperture_share < 1
         target = targets.sum_of(lens.keeps_layers)
-        keeps = target.holds_sum
         for rows in _row_bands(target, pixels_per_step / PINHOLE_SAMPLES) if has_pinhole else ():
             self._disable_tests()
-            self.passes.draw_pinhole(field, lens, accumulation.within_px, targets, rows, keeps)
+            self.passes.draw_pinhole(field, lens, accumulation.within_px, targets, rows)
             yield
-        keeps = target.holds_sum
         for rows in _row_bands(target, pixels_per_step / len(batch)) if batch else ():
             self._disable_tests()
-            self.passes.draw_aperture(field, lens, batch, accumulation.sparse, targets, rows, keeps)
+            self.passes.draw_aperture(field, lens, batch, accumulation.sparse, targets, rows)
             yield
         accumulation.at += len(batch)
         accumulation.done += max(len(batch), 1)
@@ -225,7 +223,7 @@ class Accumulator:
             )
         if accumulation.pass_index > 0:
             return
-        targets.sum_of(lens.keeps_layers).holds_sum = False
+        targets.sum_of(lens.keeps_layers).framebuffer.clear()
         if lens.has_dolly:
             self.passes.update_fallback_views(field)
         if lens.keeps_layers:

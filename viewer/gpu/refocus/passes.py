@@ -64,12 +64,10 @@ class Passes:
         within_px: ViewOffset,
         targets: RenderTargets,
         rows: PictureCell,
-        keeps: bool,
     ) -> None:
         """Add the share of the pinhole view in some rows of the target.
 
-        within_px: where in a pixel of the target it is asked which surface shows, from the middle. keeps: whether to
-        add to what is there; else it is replaced.
+        within_px: where in a pixel of the target it is asked which surface shows, from the middle.
         """
         kinds = ("FLAT", "EDGES") if self.adaptive and field.has_disparity.any() else ("",)
         target = targets.sum_of(lens.keeps_layers)
@@ -81,7 +79,7 @@ class Passes:
             if "FLAT" in kinds:
                 self._find_march_intervals(field, lens, cell, drawn, targets)
             target.framebuffer.scissor = pixels_of(drawn, *size_px)
-            target.add(keeps)
+            target.add()
             for kind in kinds:
                 self._draw_pinhole_tiles(field, lens, cell, drawn, within_px, targets, kind)
         target.framebuffer.scissor = 0, 0, *size_px
@@ -169,9 +167,8 @@ class Passes:
         sparse: dict[ViewOffset, float],
         targets: RenderTargets,
         rows: PictureCell,
-        keeps: bool,
     ) -> None:
-        """Add samples of the lens, at most MAX_SAMPLES. rows, keeps: see `draw_pinhole`.
+        """Add samples of the lens, at most MAX_SAMPLES. rows: see `draw_pinhole`.
 
         sparse: weights of the samples that suffice where all is sharp; those among `samples` must come first.
         """
@@ -199,7 +196,7 @@ class Passes:
                 program, tiles=UNITS["tiles"], sparse_count=sparse_count, sparse_up_to_px=lens.sparse_up_to_px
             )
         target.framebuffer.scissor = pixels_of(rows, *target.framebuffer.size)
-        target.add(keeps)
+        target.add()
         quad.render(moderngl.TRIANGLES, vertices=3)
         target.framebuffer.scissor = 0, 0, *target.framebuffer.size
 

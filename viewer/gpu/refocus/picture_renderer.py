@@ -41,7 +41,9 @@ from viewer.model.state.app_state import DrawReport
 if TYPE_CHECKING:
     from iibr_core.rendering.gloss import GlossMaps
 
-PREPARED_SIZE = ScreenSize(16, 16)
+PREPARED_SIZE = ScreenSize(48, 48)
+"""Of three tiles: software GL compiles programs again for textures whose sides are powers of two, as a single tile's.
+"""
 JUDGED_EVERY = 3
 """The pixels, both ways, that tell how far a picture is from the converged one: all of them would take a frame."""
 
