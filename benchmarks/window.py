@@ -63,7 +63,6 @@ def main() -> None:
 
 def report(app: App, began: tuple[float, float], apertures: list[float], idle_s: float) -> Iterator[str]:
     """began: on the clock, and of processor time."""
-
     view = app.scene_view
     yield head("what", "figure", "measured", "holds")
     with watched_turns(app) as turns:
