@@ -10,7 +10,6 @@ uniform int search_steps;
 uniform vec3 color_map[STOPS]; // sRGB, evenly spaced
 uniform vec2 map_ends;         // the values at its first and last colour
 uniform float opacity;
-uniform vec4 part;             // of the picture: left, top, width, height
 #ifdef VALUES
 uniform sampler2D values;      // of the view; row 0 first
 #endif
@@ -25,9 +24,8 @@ vec3 mapped(float value) {
 }
 
 void main() {
-    vec2 place = part.xy + uv * part.zw;
-    vec2 delta = (to_view - dolly * (place - 0.5)) / view_size_px;
-    Surface found = first_hit(place, layer, delta, search_steps, ivec2(0, search_steps));
+    vec2 delta = (to_view - dolly * (uv - 0.5)) / view_size_px;
+    Surface found = first_hit(uv, layer, delta, search_steps, ivec2(0, search_steps));
 #ifdef VALUES
     float value = textureLod(values, found.at, 0.0).r;
 #else

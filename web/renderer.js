@@ -325,7 +325,7 @@ export class Renderer {
         gl.blendFunc(gl.ONE, gl.ONE);
         const bound = Object.entries(textures).map(([name, texture]) => [name, [gl.TEXTURE_2D, texture]]);
         const arrays = ["colors", "disparities", "blocks"].map((name) => [name, [gl.TEXTURE_2D_ARRAY, this[name]]]);
-        this.programs.get(key).use(values, Object.fromEntries([...arrays, ...bound]));
+        this.programs.get(key).use({ part: [0, 0, 1, 1], ...values }, Object.fromEntries([...arrays, ...bound]));
         gl.drawArrays(gl.TRIANGLES, 0, vertices);
     }
 
@@ -371,8 +371,8 @@ export class Renderer {
         };
     }
 
-    switches({ lens, part }, ...names) {
-        return [lens.keepsLayers && "LAYERS", ...names, part !== WHOLE && "PART"];
+    switches({ lens }, ...names) {
+        return [lens.keepsLayers && "LAYERS", ...names];
     }
 
     drawPinhole(picture, sum, place) {
@@ -395,7 +395,7 @@ export class Renderer {
         if (!steps.some((count) => count)) {
             this.draw("pinhole.frag", this.switches(picture), sum, values, {}, 3, picture.holdsSum);
         } else {
-            this.draw("march_intervals.frag", [part !== WHOLE && "PART"], targets.spans, values);
+            this.draw("march_intervals.frag", [], targets.spans, values);
             const [first, second] = targets.spans.textures, tiles = targets.across * targets.down;
             const spans = { intervals_of_0_and_1: first, intervals_of_2_and_3: second };
             for (const kind of ["FLAT", "EDGES"]) {
@@ -446,7 +446,7 @@ export class Renderer {
             taps: Math.min(1 + Math.ceil(tilePx / BLOCK_PX), MAX_TILE_TAPS),
         };
         const reprojects = samples.some((sample) => !sample.isDirect) && "REPROJECT";
-        this.draw("defocus_tiles.frag", [reprojects, part !== WHOLE && "PART"], targets.tiles, values);
+        this.draw("defocus_tiles.frag", [reprojects], targets.tiles, values);
         const reach = Math.min(Math.ceil((lens.widestBlurPx / 2 + TILE_PX / 2) / TILE_PX), 4);
         this.draw("widen_tiles.frag", [], targets.wideTiles, { reach }, { tiles: targets.tiles.textures[0] });
     }

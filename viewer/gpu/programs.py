@@ -12,6 +12,7 @@ import moderngl
 
 from iibr_core.color import primaries_matrix
 from iibr_core.runtime import FlatSource, ShaderError, flatten, resource_folder
+from iibr_core.scenes import WHOLE
 from iibr_core.types import ColorSpace
 
 _UNIFORM = re.compile(r"^\s*uniform\s+\w+\s+([^;]+);", re.MULTILINE)
@@ -127,4 +128,5 @@ class ProgramCache:
 
     def _compile(self, fragment: str, switches: tuple[str, ...]) -> tuple[Program, moderngl.VertexArray]:
         program = load_program(self._ctx, "fullscreen.vert", fragment, dict.fromkeys(switches, 1))
+        program.set_uniform("part", WHOLE)  # of the picture, until a pass says otherwise
         return program, self._ctx.vertex_array(program.program, [])

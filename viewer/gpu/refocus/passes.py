@@ -10,7 +10,6 @@ from typing import Any
 import moderngl
 import numpy as np
 
-from iibr_core.scenes import WHOLE
 from iibr_core.types import SRGB, ColorSpace, ViewOffset
 from viewer.gpu.light_field_texture import BLOCK_PX, LightFieldTexture
 from viewer.gpu.programs import Program, ProgramCache, set_primaries
@@ -358,7 +357,6 @@ def _switches(lens: Lens, *names: str | bool) -> tuple[str, ...]:
         "RANGE" if lens.focus_range > 0 else "",
         "HIGHLIGHTS" if lens.highlight_gain > 0 else "",
         "CAT_EYE" if lens.optics.aperture_shape.kind == "cat_eye" else "",
-        "PART" if lens.part != WHOLE else "",
     )
     return tuple(str(name) for name in (*names, *by_lens) if name)
 
