@@ -77,6 +77,7 @@ numba = _import_numba()
 PACKAGE = Path(__file__).resolve().parents[1]
 PRECOMPILED = PACKAGE / "_kernels"
 """What comes along with an installation: the folders of the package again, with its compiled kernels."""
+_NOTHING = numba.core.codegen.ll.parse_assembly("").as_bitcode()
 _NAMES = re.compile(rf"\b{PACKAGE.name}(?:\.\w+)*".encode())
 _LINE_NUMBER = re.compile(r"-\d+(?=\.py\d+\w*$)")
 
@@ -118,8 +119,32 @@ class _Along(_Nowhere):
         return cls(_folder_along(py_func))
 
 
+class _Library(numba.core.codegen.JITCodeLibrary):  # type: ignore[misc, name-defined]
+    """A loaded kernel, whose code for inlining is read only once another kernel is compiled that calls it: of the time
+    that loading takes, with all other threads waiting, it is the larger part.
+    """
+
+    _bitcode = b""
+
+    def _get_module_for_linking(self) -> Any:
+        if self._shared_module is None:
+            self._shared_module = numba.core.codegen.ll.parse_bitcode(self._bitcode)
+            self._codegen._engine._load_defined_symbols(self._shared_module)
+        return self._shared_module
+
+
 class _Implementation(numba.core.caching.CompileResultCacheImpl):  # type: ignore[misc, name-defined]
     _locator_classes = (*numba.core.caching.CompileResultCacheImpl._locator_classes, _Nowhere)
+
+    def rebuild(self, target_context: Any, payload: Any) -> Any:
+        """As Numba's, see `_Library`."""
+        (name, kind, (code, bitcode)), about, *_ = payload
+        names = about.llvm_func_name, about.llvm_cpython_wrapper_name, about.llvm_cfunc_wrapper_name
+        target_context.codegen()._engine._defined_symbols.update(names)
+        kernel = super().rebuild(target_context, ((name, kind, (code, _NOTHING)), *payload[1:]))
+        kernel.library.__class__ = _Library
+        kernel.library._bitcode, kernel.library._shared_module = bitcode, None
+        return kernel
 
 
 def _folder_along(function: Callable[..., Any]) -> Path:
