@@ -38,7 +38,7 @@ def stages_of(app: App) -> dict[str, tuple[Any, str]]:
     return {
         "results taken in": (app.scene_loader, "take_results"),
         "views uploaded": (app.scene_view, "upload"),
-        "programs prepared": (app.scene_view.renderer, "prepare"),
+        "programs prepared": (app._preparation, "advance"),
         "picture drawn": (app.scene_view, "draw"),
         "inspection drawn": (app.inspection_view, "draw"),
         "frame shown": (app, "_show"),

@@ -35,6 +35,7 @@ from viewer.background.comparison_worker import ComparisonWorker
 from viewer.background.gloss_worker import GlossFinder
 from viewer.display.filmstrip_view import FilmstripView
 from viewer.display.inspection_view import InspectionView
+from viewer.display.preparation import Preparation
 from viewer.display.scene_view import VIEW_REFRESH_S, SceneView
 from viewer.gpu.glfw_context import create_for_window
 from viewer.model.actions import Action, DoTask, OpenPath, Quit, SetState, WorkerLost
@@ -57,7 +58,9 @@ from viewer.ui.overlays.filmstrip import filmstrip_paths
 from viewer.ui.screen import build_screen
 from viewer.ui.style import Look
 
-UPLOAD_BUDGET_S = 0.006
+VIEWS_BUDGET_S = 0.006
+"""A turn: making room for a scene, and then for all its views, is enough for one frame."""
+
 SAVE_BUDGET_S = 0.025
 """A turn, for a picture that is being saved: about as long as a frame, so that whoever drags gets every other turn."""
 
@@ -100,6 +103,7 @@ class App:
             raise
         self.scene_view = SceneView(self._gl)
         self.inspection_view = InspectionView(self._gl, self.scene_view)
+        self._preparation = Preparation(self.scene_view.renderer)
         self.sharpener = Sharpener(self._gl, self.scene_view, wake)
         self.free_camera_view = FreeCameraView(self.scene_view, wake)
         self.gloss_finder = GlossFinder(self.scene_view.gloss_request, self.scene_view.take_gloss, wake)
@@ -125,9 +129,10 @@ class App:
         """One turn of the loop; sleeps first where nothing was going on in the last ones."""
         self.window.poll(self.wait_s)
         start = time.perf_counter()
-        news = self.scene_loader.take_results(self.state) + self._take_dropped() + self._take_events()
+        views_end = start + VIEWS_BUDGET_S
+        news = self.scene_loader.take_results(self.state, views_end) + self._take_dropped() + self._take_events()
         self.do(*news)
-        self._pace.is_busy = self.scene_view.upload(UPLOAD_BUDGET_S) or bool(news)
+        self._pace.is_busy = self.scene_view.upload(views_end - time.perf_counter()) or bool(news)
         self.do(*self.scene_loader.preview_depth(self.state))
         self.do(*self.gloss_finder.advance(self.state.optics.gloss))
         layout, look = self.layout(), self.look()
@@ -154,6 +159,8 @@ class App:
         self.do(*self.sharpener.advance(picture, self.state, is_still and self._is_resting, SAVE_BUDGET_S))
         self.do(*self.free_camera_view.advance(self.state))
         self._pace.is_busy |= bool(actions) or self._side_effects.is_drawing or self.sharpener.is_drawing
+        if not self._pace.is_busy:
+            self._pace.is_busy = self._preparation.advance(picture, is_still and self._is_resting)
         self.scene_loader.advance(self.state)
         self.do(*self._preferences.keep_news(self.state))
         self._pace.took_s.append(time.perf_counter() - start)
@@ -207,6 +214,7 @@ class App:
         self._filmstrip.release()
         self.sharpener.close()
         self.free_camera_view.close()
+        self._preparation.release()
         self.inspection_view.release()
         self.scene_view.release()
         self._gl.release()

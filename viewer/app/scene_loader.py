@@ -42,9 +42,6 @@ SKETCHES_FIRST = 3
 The photo that is opened first does not wait for the next ones.
 """
 
-TAKE_BUDGET_S = 0.006
-"""A turn: making room for a scene, and then for all its views, is too much for one frame."""
-
 PROGRESS_S = 0.25
 """While views come, their number is told this often: to show each would take a frame, and that the time of a fifth of a
 view.
@@ -89,15 +86,14 @@ class SceneLoader:
         """Views near this place are made first."""
         self._worker.eye = eye
 
-    def take_results(self, state: AppState) -> list[Action]:
-        """The worker's results, as actions, for about TAKE_BUDGET_S, at least one; the one place where they arrive.
+    def take_results(self, state: AppState, until: float) -> list[Action]:
+        """The worker's results, as actions, until then on the clock, at least one; the one place where they arrive.
         Progress alone is told every PROGRESS_S, and when it is complete.
         """
         actions = self._show_sketch(state) + self._depth_finder.advance(state, self._scene_view.loaded)
-        end = time.perf_counter() + TAKE_BUDGET_S
         while self._scene_view.has_room and (result := self._worker.next_result()) is not None:
             actions += self._take(result, state)
-            if time.perf_counter() >= end:
+            if time.perf_counter() >= until:
                 break
         self._untold += actions
         return self._take_untold()

@@ -31,14 +31,6 @@ NO_MORE_VIEWS_S = 2.0
 """After so long without a new view none is thought to be on its way."""
 
 WAITING_VIEWS = 4
-PREPARED_AFTER_S = 0.05
-USUAL_NEXT = (
-    Optics(ViewOffset(0.2, 0.3), aperture_diameter=1.5),
-    Optics(ViewOffset(0.2, 0.3), aperture_diameter=3.0),
-    Optics(ViewOffset(0.2, 0.3)),
-)
-"""What is drawn next, the last of them first: what that takes is compiled while nothing else is to be done."""
-
 PREVIEW_GRID = GridShape(1, 1)
 
 
@@ -69,7 +61,6 @@ class SceneView:
         self.picture_drawn: Picture | None = None
         self._drawn_at = 0.0
         self._shows_one_view = False
-        self._unprepared = list(USUAL_NEXT)
         self._view_came_at = 0.0
 
     def open(self, ready: SceneReady) -> None:
@@ -161,12 +152,12 @@ class SceneView:
         return len(self._waiting) < WAITING_VIEWS
 
     def upload(self, budget_s: float) -> bool:
-        """Upload waiting views until the time is spent, at least one. True where some still wait.
+        """Upload waiting views until the time is spent. True where some still wait.
 
         A view that is there is not replaced while somebody else holds the views, to draw a picture of them.
         """
         end = time.perf_counter() + budget_s
-        while self._waiting:
+        while self._waiting and time.perf_counter() < end:
             field, view = self.renderer.field, self._waiting[0]
             if (view.row, view.column) in self._is_final and field is not None and field.is_shared:
                 break
@@ -174,8 +165,6 @@ class SceneView:
             self.renderer.upload_view(view.row, view.column, view.colors, view.disparity)
             self.views_uploaded += 1
             self._is_final[view.row, view.column] = view.is_final
-            if time.perf_counter() >= end:
-                break
         return bool(self._waiting)
 
     def upload_all(self) -> None:
@@ -215,8 +204,6 @@ class SceneView:
         elif self.renderer.is_renewing or (self._is_same(wanted) and self._refines()):
             self.renderer.refine(budget_s)
             self.picture_drawn = replace(self.picture_drawn, samples=self.picture_drawn.samples + 1)
-        if self._unprepared and self._is_same(wanted) and self._drawn_at < time.perf_counter() - PREPARED_AFTER_S:
-            self.renderer.prepare(self._unprepared.pop())
         return self.picture_drawn
 
     def converge(self, state: AppState, size_px: ScreenSize, part: Rect = WHOLE) -> Picture | None:

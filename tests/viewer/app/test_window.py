@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import json
+import math
 from pathlib import Path
 
 import glfw
@@ -272,7 +273,7 @@ def test_edges_are_sharpened_nearest_first_to_where_the_user_looks_then(open_win
     """The eye moves to the opposite corner once every view is there as a draft."""
     driver = open_window(photo_path, grid=GridShape(9, 9))
     driver.app.do(MoveEye(ViewOffset(-4.0, -4.0)))
-    driver.until(lambda app: len(app.state.views_there) == 81)
+    driver.until(has_every_view)
     assert not driver.app.state.progress.is_complete
     field = driver.app.scene_view.renderer.field
     assert field is not None
@@ -292,10 +293,17 @@ def test_edges_are_sharpened_nearest_first_to_where_the_user_looks_then(open_win
     assert np.mean(distances[:15]) < 0.7 * np.mean(distances[15:])
 
 
+def has_every_view(app: App) -> bool:
+    """Whether all 81 are there, as drafts or final."""
+    field = app.scene_view.renderer.field
+    return field is not None and field.present.sum() == 81
+
+
 def test_a_drafted_picture_is_not_called_final_and_changes_when_it_is(open_window: Opener, photo_path: Path) -> None:
     driver = open_window(photo_path, grid=GridShape(9, 9))
+    driver.until(lambda app: app.state.scene is not None)
     driver.app.do(MoveEye(ViewOffset(2.5, -3.0)))
-    driver.until(lambda app: len(app.state.views_there) == 81 and app.scene_view.renderer.field.present.sum() == 81)
+    driver.until(has_every_view)
     uploaded = driver.app.scene_view.views_uploaded
     driver.until_idle()
     assert driver.app.scene_view.views_uploaded > uploaded
@@ -303,3 +311,22 @@ def test_a_drafted_picture_is_not_called_final_and_changes_when_it_is(open_windo
     assert driver.app.scene_view.picture_drawn is not None
     assert driver.app.scene_view.picture_drawn.views_uploaded == driver.app.scene_view.views_uploaded
     assert driver.app.scene_view.renderer.field.present.sum() == 81
+
+
+def test_views_that_come_are_counted_now_and_then_not_each(
+    open_window: Opener, photo_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("viewer.app.scene_loader.PROGRESS_S", math.inf)
+    driver = open_window(photo_path, grid=GridShape(9, 9))
+    driver.until(lambda app: app.scene_view.pictures_drawn > 0)
+    frames, counted = driver.app.frames_shown, set[int]()
+
+    def is_done(app: App) -> bool:
+        counted.add(app.state.progress.done)
+        return app.state.progress.is_complete and rests(app)
+
+    driver.until(is_done)
+    assert len(driver.app.state.views_there) == 81
+    assert driver.app.scene_view.views_uploaded > 81, "drafts, too"
+    assert len(counted) == 2, "the photo, and all"
+    assert driver.app.frames_shown - frames < 20

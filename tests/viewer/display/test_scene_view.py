@@ -120,3 +120,14 @@ def test_a_view_stands_in_before_the_second_view_of_the_scene_has_come(opened: H
     view.upload_all()
     view.converge(opened.state, SIZE)
     assert view.renderer.read_image().min() == 255
+
+
+def test_no_view_is_uploaded_in_a_turn_whose_time_is_over(opened: HeadlessViewer) -> None:
+    view = opened._scene_view
+    assert view.centre is not None
+    uploaded = view.views_uploaded
+    view.add(replace(view.centre, row=0, column=1))
+    assert view.upload(0.0)
+    assert view.views_uploaded == uploaded
+    view.upload_all()
+    assert view.views_uploaded == uploaded + 1

@@ -114,7 +114,7 @@ def test_defocus_of_tiles_against_numpy(renderer: Renderer, passes: Passes, targ
     field, wide = renderer.field, lens(renderer, Optics(focus_disparity=1.0, aperture_diameter=3.0))
     assert field is not None
     samples = wide.samples(GRID, field.present)
-    passes.find_defocus(field, wide, samples, targets)
+    list(passes.find_defocus(field, wide, samples, targets))
     seen = read(targets.tiles.textures[0])
     rows, columns = SIZE[1] // TILE_PX, SIZE[0] // TILE_PX
     widest = np.zeros((rows, columns, 2))

@@ -148,7 +148,8 @@ class Accumulator:
         targets: RenderTargets,
         pixels_per_step: float,
     ) -> Iterator[None]:
-        """All passes, in steps of about so many pixels and samples; between two, anything else may be drawn.
+        """All passes, in steps of about so many pixels and samples, and of one program; between two, anything else may
+        be drawn.
 
         The sum is the same to the last bit however small the steps are: they part rows, never samples.
         """
@@ -187,14 +188,17 @@ class Accumulator:
         """Draw the next samples, at most count; the pinhole's share comes with the first of a pass."""
         lens = accumulation.lens
         if accumulation.at == 0:
-            self._start_pass(field, accumulation, targets)
+            for _ in self._start_pass(field, accumulation, targets):
+                yield
+                self._disable_tests()
         batch = _first_batch(accumulation.samples[accumulation.at :][:count], field)
         has_pinhole = accumulation.at == 0 and lens.aperture_share < 1
         target = targets.sum_of(lens.keeps_layers)
         for rows in _row_bands(target, pixels_per_step / PINHOLE_SAMPLES) if has_pinhole else ():
             self._disable_tests()
-            self.passes.draw_pinhole(field, lens, accumulation.within_px, targets, rows)
-            yield
+            for _ in self.passes.draw_pinhole(field, lens, accumulation.within_px, targets, rows):
+                yield
+                self._disable_tests()
         for rows in _row_bands(target, pixels_per_step / len(batch)) if batch else ():
             self._disable_tests()
             self.passes.draw_aperture(field, lens, batch, accumulation.sparse, targets, rows)
@@ -209,7 +213,7 @@ class Accumulator:
 
     def _start_pass(
         self, field: LightFieldTexture, accumulation: ProgressiveAccumulation, targets: RenderTargets
-    ) -> None:
+    ) -> Iterator[None]:
         lens, place = accumulation.lens, accumulation.places[accumulation.pass_index]
         moved = ViewOffset(lens.stride * place.t, lens.stride * place.s)
         accumulation.samples, accumulation.sparse = [], {}
@@ -227,7 +231,8 @@ class Accumulator:
         if lens.has_dolly:
             self.passes.update_fallback_views(field)
         if lens.keeps_layers:
-            self.passes.find_defocus(field, lens, accumulation.samples or [_eye_sample(lens, field)], targets)
+            samples = accumulation.samples or [_eye_sample(lens, field)]
+            yield from self.passes.find_defocus(field, lens, samples, targets)
 
 
 def _row_bands(target: RenderTarget, pixels: float) -> list[PictureCell]:

@@ -5,6 +5,7 @@ renderer decides.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import Any
 
 import moderngl
@@ -63,8 +64,9 @@ class Passes:
         within_px: ViewOffset,
         targets: RenderTargets,
         rows: PictureCell,
-    ) -> None:
-        """Add the share of the pinhole view in some rows of the target.
+    ) -> Iterator[None]:
+        """Add the share of the pinhole view in some rows of the target, a program a step; between two, anything else
+        may be drawn.
 
         within_px: where in a pixel of the target it is asked which surface shows, from the middle.
         """
@@ -77,11 +79,13 @@ class Passes:
                 continue
             if "FLAT" in kinds:
                 self._find_march_intervals(field, lens, cell, drawn, targets)
-            target.framebuffer.scissor = pixels_of(drawn, *size_px)
-            target.add()
+                yield
             for kind in kinds:
+                target.framebuffer.scissor = pixels_of(drawn, *size_px)
+                target.add()
                 self._draw_pinhole_tiles(field, lens, cell, drawn, within_px, targets, kind)
-        target.framebuffer.scissor = 0, 0, *size_px
+                target.framebuffer.scissor = 0, 0, *size_px
+                yield
 
     def _draw_pinhole_tiles(
         self,
@@ -201,8 +205,8 @@ class Passes:
 
     def find_defocus(
         self, field: LightFieldTexture, lens: Lens, samples: list[ApertureSample], targets: RenderTargets
-    ) -> None:
-        """Fill the tiles with the widest blur in each, and around each."""
+    ) -> Iterator[None]:
+        """Fill the tiles with the widest blur in each, and around each, in steps as `draw_pinhole`."""
         self._ctx.disable(moderngl.BLEND)
         # Stored views tell the blur without reprojection, if they are most of the samples.
         direct = [sample for sample in samples if field.grid.offset(sample.row, sample.column) == sample.wanted]
@@ -222,14 +226,17 @@ class Passes:
         program.set_uniforms(taps=min(taps, MAX_TILE_TAPS))
         targets.tiles.use()
         quad.render(moderngl.TRIANGLES, vertices=3)
+        yield
 
         # Light spreads over tile borders by half the widest blur.
         program, quad = self._programs.get("widen_tiles.frag")
         self._bind(targets.tiles.textures[0], "tiles")
         reach = min(math.ceil((lens.widest_blur_px / 2 + TILE_PX / 2) / TILE_PX), 4)
         program.set_uniforms(tiles=UNITS["tiles"], reach=reach)
+        self._ctx.disable(moderngl.BLEND)
         targets.wide_tiles.use()
         quad.render(moderngl.TRIANGLES, vertices=3)
+        yield
 
     def smooth(self, lens: Lens, targets: RenderTargets, narrowing: float) -> None:
         """Spread the blurred layers over what lies between samples. narrowing: of the blur that the tiles tell."""

@@ -21,7 +21,14 @@ from iibr_core.types import SRGB, ColorSpace, FloatImage, GridShape, StoredColor
 from viewer.gpu.context import GLContext
 from viewer.gpu.light_field_texture import Box, LightFieldTexture, field_that_fits
 from viewer.gpu.programs import ProgramCache
-from viewer.gpu.refocus.accumulation import Accumulator, ProgressiveAccumulation, is_stored, pass_count, r2_sequence
+from viewer.gpu.refocus.accumulation import (
+    MAX_PASSES,
+    Accumulator,
+    ProgressiveAccumulation,
+    is_stored,
+    pass_count,
+    r2_sequence,
+)
 from viewer.gpu.refocus.error_estimate import ErrorEstimate
 from viewer.gpu.refocus.frame_budget import (
     BEST_QUALITY,
@@ -44,6 +51,8 @@ if TYPE_CHECKING:
 PREPARED_SIZE = ScreenSize(48, 48)
 """Of three tiles: software GL compiles programs again for textures whose sides are powers of two, as a single tile's.
 """
+PREPARED_PASSES = 2
+"""Those that follow take the same programs."""
 JUDGED_EVERY = 3
 """The pixels, both ways, that tell how far a picture is from the converged one: all of them would take a frame."""
 
@@ -232,15 +241,19 @@ class Renderer:
             self._errors.add(self.read_image(JUDGED_EVERY), accumulation.pass_index)
         self._learn(accumulation.done, seconds)
 
-    def start_picture(self, settings: RenderSettings, field: LightFieldTexture | None = None) -> PictureDrawing:
+    def start_picture(
+        self, settings: RenderSettings, field: LightFieldTexture | None = None, most_passes: int = MAX_PASSES
+    ) -> PictureDrawing:
         """A picture with every sample it will get, to be drawn step by step, and stopped once it is no longer wanted.
 
-        What was drawn last stays as it is. field: it is drawn from, by default what the screen shows.
+        What was drawn last stays as it is. field: it is drawn from, by default what the screen shows. most_passes: else
+        it is left as it is by then.
         """
         field = self.drawn_field if field is None else field
         accumulator = Accumulator(self.ctx, self.programs)
         accumulator.passes.adaptive = self.adaptive
         whole = self._accumulation_of(settings.optics, settings.size_px, BEST_QUALITY, settings.part, field)
+        whole.places = whole.places[:most_passes]
         return PictureDrawing(self.gl, accumulator, field, whole, settings.is_linear, settings.color_space)
 
     def converged_picture(self, settings: RenderSettings) -> NDArray[Any]:
@@ -260,9 +273,18 @@ class Renderer:
         """Whether what is shown still waits for what `renew` has begun."""
         return self._accumulation is not None and self._accumulation.pass_index < self._shown_from_pass
 
-    def prepare(self, optics: Optics) -> None:
-        """Have what draws such a picture compiled, so that the first frame of it does not wait; none is shown."""
-        self.converged_picture(RenderSettings(optics, PREPARED_SIZE))
+    def start_preparing(self, optics: Optics, size_px: ScreenSize) -> PictureDrawing:
+        """A drawing that nobody needs: what draws such a picture is compiled by it, a program a step."""
+        width, height = (min(wanted / there, 1.0) for wanted, there in zip(PREPARED_SIZE, size_px))
+        settings = RenderSettings(optics, PREPARED_SIZE, part=Rect(0.5 - width / 2, 0.5 - height / 2, width, height))
+        if self.field is not None:
+            return self.start_picture(settings, most_passes=PREPARED_PASSES)
+        field = LightFieldTexture(self.ctx, GridShape(1, 1), *PREPARED_SIZE, hdr=False, with_disparity=True)
+        colors, disparity = np.zeros((*PREPARED_SIZE[::-1], 3), np.uint8), np.zeros(PREPARED_SIZE[::-1], np.float32)
+        field.upload(0, 0, colors, disparity)
+        drawing = self.start_picture(settings, field, PREPARED_PASSES)
+        field.release()
+        return drawing
 
     @property
     def samples_drawn(self) -> int:
