@@ -423,7 +423,7 @@ export class Renderer {
         const values = {
             ...this.fieldValues(picture), ...this.setSamples(batch, lens), share: lens.share,
             sparse_count: batch.filter((sample) => sample.sparse !== undefined).length,
-            sparse_up_to_px: lens.sparseUpToPx,
+            sparse_up_to_px: picture.samples.some(({ sparse }) => sparse !== undefined) ? lens.sparseUpToPx : 0,
         };
         const switches = this.switches(picture, tiles, reprojects && "REPROJECT");
         const textures = tiles ? { tiles: targets.tiles.textures[0] } : {};

@@ -11,9 +11,11 @@ import pytest
 
 from iibr_core.color import linear_from_srgb, srgb_from_linear
 from iibr_core.rendering.optics import Optics
+from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, ViewOffset
 from tests.image_compare import FILTERING, ROUNDING, assert_close
 from tests.viewer.gpu.scenes import TwoPlanes, rms, through_aperture
+from viewer.gpu.refocus.frame_budget import QUALITY_LEVELS, QualityLevel
 from viewer.gpu.refocus.picture_renderer import Renderer
 from viewer.gpu.refocus.view_sampling import aperture_samples
 
@@ -266,3 +268,14 @@ def test_more_views_than_one_draw_holds(renderer: Renderer) -> None:
         renderer.upload_view(row, column, np.full((4, 4, 3), 100, np.uint8), None)
     renderer.render(Optics(aperture_diameter=99.0), (4, 4))
     assert np.abs(renderer.read_image().astype(int) - 100).max() <= 1
+
+
+@pytest.mark.parametrize("level", QUALITY_LEVELS)
+def test_what_is_in_focus_is_never_black_however_few_samples_the_lens_has(
+    renderer: Renderer, level: QualityLevel
+) -> None:
+    """At this eye and aperture none of the few samples is one of every other."""
+    scene = TwoPlanes(width=192, height=144, background=0.0, foreground=8.0)
+    scene.fill(renderer, GridShape(5, 5))
+    renderer.render(Optics(ViewOffset(-1.25, 1.0), aperture_diameter=2.0), ScreenSize(384, 288), level)
+    assert renderer.read_image().min() > 0

@@ -195,9 +195,8 @@ class Passes:
         if tiles:
             self._bind(targets.tiles.textures[0], "tiles")
             sparse_count = sum(sample.wanted in sparse for sample in samples)
-            _set_declared(
-                program, tiles=UNITS["tiles"], sparse_count=sparse_count, sparse_up_to_px=lens.sparse_up_to_px
-            )
+            sparse_up_to_px = lens.sparse_up_to_px if sparse else 0.0  # of few samples none may be one of every other
+            _set_declared(program, tiles=UNITS["tiles"], sparse_count=sparse_count, sparse_up_to_px=sparse_up_to_px)
         target.framebuffer.scissor = pixels_of(rows, *target.framebuffer.size)
         target.add()
         quad.render(moderngl.TRIANGLES, vertices=3)
