@@ -131,3 +131,15 @@ def test_no_view_is_uploaded_in_a_turn_whose_time_is_over(opened: HeadlessViewer
     assert view.views_uploaded == uploaded
     view.upload_all()
     assert view.views_uploaded == uploaded + 1
+
+
+def test_a_picture_of_one_view_drawn_in_a_hurry_becomes_whole_though_views_come(opened: HeadlessViewer) -> None:
+    view = opened._scene_view
+    opened.do(SetAperture(0.0))
+    view.draw(opened.state, SIZE)
+    assert view.renderer.passes_shown == 0, "softer than it will be"
+    a_view_comes(view)
+    view.converge(opened.state, SIZE)
+    assert view.renderer.passes_shown > 0
+    whole = view.renderer.converged_picture(RenderSettings(opened.state.optics, SIZE))
+    assert np.array_equal(view.renderer.read_image(), whole)

@@ -130,8 +130,6 @@ class Renderer:
     def upload_view(self, row: int, column: int, colors: StoredColors, disparity: FloatImage | None) -> None:
         """Add or replace one view; see LightFieldTexture.upload."""
         self._loaded.upload(row, column, colors, disparity)
-        if not self.is_renewing:
-            self._accumulation = None
 
     def change_disparity(self, row: int, column: int, disparity: FloatImage, box: Box) -> None:
         """Replace the disparity of the view uploaded last; see LightFieldTexture.change_disparity."""
