@@ -124,6 +124,7 @@ class _Library(numba.core.codegen.JITCodeLibrary):  # type: ignore[misc, name-de
     that loading takes, with all other threads waiting, it is the larger part.
     """
 
+    _shared_module: Any
     _bitcode = b""
 
     def _get_module_for_linking(self) -> Any:
