@@ -77,6 +77,8 @@ numba = _import_numba()
 PACKAGE = Path(__file__).resolve().parents[1]
 PRECOMPILED = PACKAGE / "_kernels"
 """What comes along with an installation: the folders of the package again, with its compiled kernels."""
+KNOWN_NUMBA = "0.68."
+"""Of these versions it is known how a compiled kernel is kept: see `_Library`."""
 _NOTHING = numba.core.codegen.ll.parse_assembly("").as_bitcode()
 _NAMES = re.compile(rf"\b{PACKAGE.name}(?:\.\w+)*".encode())
 _LINE_NUMBER = re.compile(r"-\d+(?=\.py\d+\w*$)")
@@ -139,6 +141,8 @@ class _Implementation(numba.core.caching.CompileResultCacheImpl):  # type: ignor
 
     def rebuild(self, target_context: Any, payload: Any) -> Any:
         """As Numba's, see `_Library`."""
+        if not numba.__version__.startswith(KNOWN_NUMBA):
+            return super().rebuild(target_context, payload)
         (name, kind, (code, bitcode)), about, *_ = payload
         names = about.llvm_func_name, about.llvm_cpython_wrapper_name, about.llvm_cfunc_wrapper_name
         target_context.codegen()._engine._defined_symbols.update(names)
