@@ -59,9 +59,11 @@ class SceneWorker(JobThread[SceneRequest, SceneResult]):
 def _telling_compiling(
     results: Iterator[SceneReady | ViewReady], report_progress: Callable[[Progress], None]
 ) -> Iterator[SceneReady | ViewReady]:
-    """The same results; meanwhile, kernels that must be compiled are told beside what is there."""
+    """The same results; meanwhile, kernels that must be compiled are told beside what is there, with the time that this
+    takes.
+    """
     there = Progress()
-    with tell_compiling(lambda words: report_progress(replace(there, doing=words))):
+    with tell_compiling(lambda words: report_progress(replace(there, doing=words, left_s=None))):
         for result in results:
             if isinstance(result, ViewReady):
                 there = result.progress

@@ -273,9 +273,10 @@ def test_kernels_that_are_compiled_are_told_beside_the_views_that_are_there(monk
 
     def results() -> Iterator[ViewReady]:
         compiling.note_kernel(came_along=False)
-        yield ViewReady(0, VIEW, Progress(3, 9))
+        yield ViewReady(0, VIEW, Progress(3, 9, left_s=7.0))
         compiling.note_kernel(came_along=False)
 
     assert len(list(_telling_compiling(results(), told.append))) == 1
     assert [(progress.done, progress.total) for progress in told] == [(0, 0), (3, 9)]
     assert all(progress.doing.startswith(compiling.COMPILING) for progress in told)
+    assert all(progress.left_s is None for progress in told), "of two times left, one is wrong"
