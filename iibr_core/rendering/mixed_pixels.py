@@ -225,8 +225,10 @@ def _split_rows(
                         background + (1.0 - share) * spread[0, c, e] * part,
                         fore + share * spread[1, c, e] * part,
                     )
-                # What is behind is neither darker nor brighter than its surface all around, as a small share of it may
-                # seem: the other part takes what is left.
+                # Nothing is darker than black, and what is behind neither darker nor brighter than its surface all
+                # around, as a small share of it may seem: the other part takes what is left.
+                if fore < 0.0:
+                    background, fore = here[c] / (1.0 - share), 0.0
                 if not darkest[c] <= background <= brightest[c]:
                     background = min(max(background, darkest[c]), brightest[c])
                     fore = (here[c] - (1.0 - share) * background) / share

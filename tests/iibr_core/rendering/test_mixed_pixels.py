@@ -121,6 +121,7 @@ def obvious_split(colors, disparity, y, x):
     background = means[0] + (1 - share) * spreads[0] @ off
     foreground = means[1] + share * spreads[1] @ off
     around = light[behind & window | (v == y) & (u == x)]
+    background, foreground = np.where(foreground < 0, light[y, x] / (1 - share), background), np.maximum(foreground, 0)
     bounded = np.clip(background, around.min(axis=0), around.max(axis=0))
     foreground = np.where(bounded == background, foreground, (light[y, x] - (1 - share) * bounded) / share)
     return share, srgb_from_linear(bounded), srgb_from_linear(foreground)
