@@ -11,9 +11,8 @@ import os
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache, partial
 from multiprocessing import get_context
@@ -111,13 +110,9 @@ def in_own_process(work: Callable[..., Result], *args: object) -> Result:
         return process.submit(work, *args).result()
 
 
-@contextmanager
-def process_of(threads: int) -> Iterator[ProcessPoolExecutor]:
-    """A process that uses so many threads, for all work of the block."""
-    with ProcessPoolExecutor(1, get_context("spawn")) as process:
-        with set_environment(thread_variables(threads)):
-            process.submit(gc.collect).result()  # it starts with its first work
-        yield process
+def process_of(threads: int) -> ProcessPoolExecutor:
+    """A process that uses so many threads; a context manager."""
+    return _process_in(thread_variables(threads))
 
 
 def peak_bytes(work: Callable[..., object], *args: object) -> float:
@@ -132,10 +127,15 @@ def peak_bytes(work: Callable[..., object], *args: object) -> float:
 @cache
 def _gauge() -> ProcessPoolExecutor:
     """A process that gives freed arrays back to the system at once: kept ones would hide what is taken again."""
-    with set_environment({"MALLOC_MMAP_THRESHOLD_": str(1 << 17)}):
-        gauge = ProcessPoolExecutor(1, get_context("spawn"))
-        gauge.submit(gc.collect).result()  # it starts with its first work
-    return gauge
+    return _process_in({"MALLOC_MMAP_THRESHOLD_": str(1 << 17)})
+
+
+def _process_in(environment: Mapping[str, str]) -> ProcessPoolExecutor:
+    """A process that was started in such an environment."""
+    process = ProcessPoolExecutor(1, get_context("spawn"))
+    with set_environment(environment):
+        process.submit(gc.collect).result()  # it starts with its first work
+    return process
 
 
 def _peak_of(work: Callable[..., object], args: tuple[object, ...]) -> float:
