@@ -125,7 +125,6 @@ class Accumulator:
 
         seconds_per_sample: how long one is thought to take; no more are drawn at once than there is time for.
         """
-        self._disable_tests()
         if not field.present.any():
             targets.sum_of(accumulation.lens.keeps_layers).framebuffer.clear()
             accumulation.pass_index = len(accumulation.places)
@@ -186,21 +185,28 @@ class Accumulator:
         pixels_per_step: float,
     ) -> Iterator[None]:
         """Draw the next samples, at most count; the pinhole's share comes with the first of a pass."""
+        self._disable_tests()
+        for _ in self._draw_batch(field, accumulation, targets, count, pixels_per_step):
+            yield
+            self._disable_tests()  # anything else may have been drawn meanwhile
+
+    def _draw_batch(
+        self,
+        field: LightFieldTexture,
+        accumulation: ProgressiveAccumulation,
+        targets: RenderTargets,
+        count: int,
+        pixels_per_step: float,
+    ) -> Iterator[None]:
         lens = accumulation.lens
         if accumulation.at == 0:
-            for _ in self._start_pass(field, accumulation, targets):
-                yield
-                self._disable_tests()
+            yield from self._start_pass(field, accumulation, targets)
         batch = _first_batch(accumulation.samples[accumulation.at :][:count], field)
         has_pinhole = accumulation.at == 0 and lens.aperture_share < 1
         target = targets.sum_of(lens.keeps_layers)
         for rows in _row_bands(target, pixels_per_step / PINHOLE_SAMPLES) if has_pinhole else ():
-            self._disable_tests()
-            for _ in self.passes.draw_pinhole(field, lens, accumulation.within_px, targets, rows):
-                yield
-                self._disable_tests()
+            yield from self.passes.draw_pinhole(field, lens, accumulation.within_px, targets, rows)
         for rows in _row_bands(target, pixels_per_step / len(batch)) if batch else ():
-            self._disable_tests()
             self.passes.draw_aperture(field, lens, batch, accumulation.sparse, targets, rows)
             yield
         accumulation.at += len(batch)

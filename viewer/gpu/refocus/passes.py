@@ -232,7 +232,6 @@ class Passes:
         self._bind(targets.tiles.textures[0], "tiles")
         reach = min(math.ceil((lens.widest_blur_px / 2 + TILE_PX / 2) / TILE_PX), 4)
         program.set_uniforms(tiles=UNITS["tiles"], reach=reach)
-        self._ctx.disable(moderngl.BLEND)
         targets.wide_tiles.use()
         quad.render(moderngl.TRIANGLES, vertices=3)
         yield
