@@ -79,7 +79,6 @@ PRECOMPILED = PACKAGE / "_kernels"
 """What comes along with an installation: the folders of the package again, with its compiled kernels."""
 KNOWN_NUMBA = "0.68."
 """Of these versions it is known how a compiled kernel is kept: see `_Library`."""
-_NOTHING = numba.core.codegen.ll.parse_assembly("").as_bitcode()
 _NAMES = re.compile(rf"\b{PACKAGE.name}(?:\.\w+)*".encode())
 _LINE_NUMBER = re.compile(r"-\d+(?=\.py\d+\w*$)")
 
@@ -136,6 +135,12 @@ class _Library(numba.core.codegen.JITCodeLibrary):  # type: ignore[misc, name-de
         return self._shared_module
 
 
+@cache
+def _no_code() -> bytes:
+    """An empty module."""
+    return bytes(numba.core.codegen.ll.parse_assembly("").as_bitcode())
+
+
 class _Implementation(numba.core.caching.CompileResultCacheImpl):  # type: ignore[misc, name-defined]
     _locator_classes = (*numba.core.caching.CompileResultCacheImpl._locator_classes, _Nowhere)
 
@@ -146,7 +151,7 @@ class _Implementation(numba.core.caching.CompileResultCacheImpl):  # type: ignor
         (name, kind, (code, bitcode)), about, *_ = payload
         names = about.llvm_func_name, about.llvm_cpython_wrapper_name, about.llvm_cfunc_wrapper_name
         target_context.codegen()._engine._defined_symbols.update(names)
-        kernel = super().rebuild(target_context, ((name, kind, (code, _NOTHING)), *payload[1:]))
+        kernel = super().rebuild(target_context, ((name, kind, (code, _no_code())), *payload[1:]))
         kernel.library.__class__ = _Library
         kernel.library._bitcode, kernel.library._shared_module = bitcode, None
         return kernel
