@@ -27,9 +27,8 @@ class Turn:
 
 @dataclass
 class Turns:
-    """Those that were watched. count: how many. longest: which of them took longest."""
+    """Those that were watched. longest: which of them took longest."""
 
-    count: int = 0
     longest: Turn = field(default_factory=Turn)
 
 
@@ -63,7 +62,6 @@ def watched_turns(app: App) -> Iterator[Turns]:
         step()
         seconds = time.thread_time() - began
         stage = max(spent, key=lambda name: spent[name])
-        turns.count += 1
         turns.longest = max(turns.longest, Turn(seconds, stage, spent[stage]))
 
     app.step = watched_step  # type: ignore[method-assign]
