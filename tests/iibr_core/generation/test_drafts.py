@@ -191,7 +191,7 @@ def test_what_leaves_nothing_to_decide_comes_once(quality):
 
 
 def test_outer_views_that_disclose_nothing_are_finished_too():
-    """They join no ray set; what they showed is kept for them all the same. A step is open to one side only."""
+    """They join no ray set, and are rendered again all the same. A step is open to one side only."""
     photo = square_before_wall(60, 80, 3.0)[0]
     disparity = disparity_of(np.where(np.arange(80) < 40, 3.0, 0.0) * np.ones((60, 1)))
     plan = literal_plan(photo, disparity, 5)
