@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from iibr_core.inpainting.inpainter import Inpainter
 from iibr_core.inpainting.nearest_known import MOST_PIECE_PIXELS, flat_indices, nearest_known, number_pixels
-from iibr_core.inpainting.patch_synthesis import copy_patches, mixed_beside
+from iibr_core.inpainting.patch_synthesis import copy_patches
 from iibr_core.runtime.jit import kernel, nearest_pixel
 from iibr_core.runtime.tiling import ShouldStop, in_pieces, never, pieces_of
 from iibr_core.stages import ALL_STAGES, Stages
@@ -124,8 +124,7 @@ def _fill_view(
     if stages.synthesise_patches:
         number = np.empty(hole.shape, np.int32)
         number_pixels(pixels, number)
-        pure = np.where(mixed_beside(hole), np.float32(np.nan), disparity)
-        copy_patches(colors, disparity, pure, pixels, number, one_surface, should_stop, threads)
+        copy_patches(colors, disparity, pixels, number, one_surface, should_stop, threads)
 
 
 def background_inpainter() -> Inpainter:

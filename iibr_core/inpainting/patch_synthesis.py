@@ -36,27 +36,11 @@ FINE_TEXTURE_PX = 5
 """Texture is what differs from the mean so far around."""
 PATCH_BLOCK_PX = 64
 """Blocks of this side are filled side by side; no two that touch."""
-MIXED_PX = 2
-"""Colours this close to a hole may be mixed with those of what hides it."""
-
-
-def mixed_beside(hole: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """The hole (H, W) and what is MIXED_PX from it at most, across, down or both."""
-    tall = hole.copy()
-    for k in range(1, MIXED_PX + 1):
-        tall[k:] |= hole[:-k]
-        tall[:-k] |= hole[k:]
-    mixed = tall.copy()
-    for k in range(1, MIXED_PX + 1):
-        mixed[:, k:] |= tall[:, :-k]
-        mixed[:, :-k] |= tall[:, k:]
-    return mixed
 
 
 def copy_patches(
     colors: FloatImage,
     disparity: FloatImage,
-    pure: FloatImage,
     pixels: NDArray[np.int64],
     number: NDArray[np.int32],
     one_surface: float,
@@ -64,16 +48,16 @@ def copy_patches(
     threads: int,
 ) -> None:
     """Give the hole pixels, flat indices (N,), which colors (H, W, 3) hold as smoothly filled, the looks of their
-    surface. number (H, W): of each hole pixel among them, negative elsewhere. pure (H, W): disparities, NaN in holes
-    and where no surface may show purely. Surfaces are one whose disparities (H, W) differ by one_surface at most.
-    Raises Cancelled once should_stop is true.
+    surface. number (H, W): of each hole pixel among them, negative elsewhere. Surfaces are one whose disparities (H, W)
+    differ by one_surface at most. Raises Cancelled once should_stop is true.
     """
     smooth = np.take(colors.reshape(-1, 3), pixels, axis=0)
+    known = np.where(number < 0, disparity, np.float32(np.nan))
     trust = np.zeros(len(pixels), np.float32)
     shown = np.zeros((len(pixels), 4), np.float32)
-    for blocks in _blocks_apart(pixels, image_size(pure)):
+    for blocks in _blocks_apart(pixels, image_size(known)):
         in_pieces(
-            lambda block: _copy_block(colors, disparity, pure, number, *block, np.float32(one_surface), trust, shown),
+            lambda block: _copy_block(colors, disparity, known, number, *block, np.float32(one_surface), trust, shown),
             blocks, should_stop, threads,
         )  # fmt: skip
     counts = shown[:, 3:]
@@ -97,7 +81,7 @@ def _blocks_apart(pixels: NDArray[np.int64], size: ImageSize) -> list[list[tuple
 
 
 @kernel
-def _copy_block(colors, disparity, pure, number, row, column, one_surface, trust, shown):
+def _copy_block(colors, disparity, known, number, row, column, one_surface, trust, shown):
     """Copy patches into the holes of a block. trust (N,): 0 of what is not copied yet. shown (N, 4): the sum of what
     patches show, and what they count.
     """
@@ -129,7 +113,7 @@ def _copy_block(colors, disparity, pure, number, row, column, one_surface, trust
         if trust[number[y, x]] > 0:
             continue
         taps, trusted = _take_patch(colors, disparity, number, y, x, one_surface, trust, tap, patch)
-        source_y, source_x, unlike = _find_place(colors, disparity, pure, y, x, one_surface, tap[:taps], patch[:taps])
+        source_y, source_x, unlike = _find_place(colors, disparity, known, y, x, one_surface, tap[:taps], patch[:taps])
         if source_y < 0:
             continue
         # As much as what it goes on from, and less where it does not fit that.
@@ -137,7 +121,7 @@ def _copy_block(colors, disparity, pure, number, row, column, one_surface, trust
         for k in range(taps):
             v, u, a, b = y + tap[k, 0], x + tap[k, 1], source_y + tap[k, 0], source_x + tap[k, 1]
             i = number[v, u]
-            if i < 0 or not same_surface(pure[a, b], patch[k, 3], one_surface):
+            if i < 0 or not same_surface(known[a, b], patch[k, 3], one_surface):
                 continue
             count = np.float32(1.0)
             if trust[i] == 0:
@@ -176,11 +160,11 @@ def _take_patch(colors, disparity, number, y, x, one_surface, trust, tap, patch)
 
 
 @kernel
-def _find_place(colors, disparity, pure, y, x, one_surface, tap, patch):
+def _find_place(colors, disparity, known, y, x, one_surface, tap, patch):
     """Where the surface looks most like a patch, row and column, -1 if it shows nowhere; and by how much that differs
     from what is known, mean square.
     """
-    height, width = pure.shape
+    height, width = known.shape
     side, around = 2 * (SEARCH_PX // STEP_PX) + 1, 2 * STEP_PX - 1
     best, best_y, best_x, middle_y, middle_x = np.float32(np.inf), -1, -1, -1, -1
     for k in range(side**2 + around**2):
@@ -192,13 +176,13 @@ def _find_place(colors, disparity, pure, y, x, one_surface, tap, patch):
             v, u = middle_y + j // around - STEP_PX + 1, middle_x + j % around - STEP_PX + 1
         if not (RADIUS_PX <= v < height - RADIUS_PX and RADIUS_PX <= u < width - RADIUS_PX):
             continue
-        if not same_surface(pure[v, u], disparity[y, x], one_surface):
+        if not same_surface(known[v, u], disparity[y, x], one_surface):
             continue
         unlike = np.float32(0.0)
         for m in range(len(tap)):
             # Within the frame: unsigned indices need no test for counting from the end.
             a, b = np.uint64(v + tap[m, 0]), np.uint64(u + tap[m, 1])
-            if same_surface(pure[a, b], patch[m, 3], one_surface):
+            if same_surface(known[a, b], patch[m, 3], one_surface):
                 red, green = colors[a, b, 0] - patch[m, 0], colors[a, b, 1] - patch[m, 1]
                 blue = colors[a, b, 2] - patch[m, 2]
                 unlike += patch[m, 4] * (red * red + green * green + blue * blue)
@@ -214,7 +198,7 @@ def _find_place(colors, disparity, pure, y, x, one_surface, tap, patch):
         a, b = best_y + tap[m, 0], best_x + tap[m, 1]
         if best_y >= 0 and patch[m, 4] == 1:
             total += 1
-            if same_surface(pure[a, b], patch[m, 3], one_surface):
+            if same_surface(known[a, b], patch[m, 3], one_surface):
                 for c in range(3):
                     unlike += (colors[a, b, c] - patch[m, c]) ** 2
             else:

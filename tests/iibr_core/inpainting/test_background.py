@@ -3,16 +3,9 @@ import pytest
 
 from iibr_core.inpainting.background import MEDIAN_PX, SMOOTH_STEPS_PX, fill_background, goes_on_in_front
 from iibr_core.inpainting.nearest_known import DIRECTIONS
-from iibr_core.inpainting.patch_synthesis import MIXED_PX
 from iibr_core.surfaces import EDGE_PX, SAME_SURFACE_PX
 from iibr_core.types import ViewOffset
 from tests.iibr_core.inpainting.test_patch_synthesis import copy_slowly
-
-
-def mixed_slowly(hole):
-    """(H, W): what has a hole's pixel MIXED_PX beside it, or nearer."""
-    around = [slice(max(k - MIXED_PX, 0), k + MIXED_PX + 1) for k in range(max(hole.shape))]
-    return np.array([[hole[around[y], around[x]].any() for x in range(hole.shape[1])] for y in range(hole.shape[0])])
 
 
 def agree_slowly(disparity, hole):
@@ -56,7 +49,6 @@ def fill_slowly(colors, disparity, hole, photo_disparity, offset):
     parallax = max(map(abs, offset))
     one_surface = EDGE_PX / parallax
     filled_colors, filled_disparity, reach = colors.copy(), disparity.copy(), np.full(hole.shape, np.inf)
-    mixed = mixed_slowly(hole)
     for y, x in np.argwhere(hole):
         seen = around_slowly(hole, y, x)
         possible = [(u, v) for u, v in seen if is_possible(float(disparity[v, u]), photo_disparity, offset, y, x)]
@@ -73,7 +65,7 @@ def fill_slowly(colors, disparity, hole, photo_disparity, offset):
     for step in SMOOTH_STEPS_PX:
         filled_colors = smooth_slowly(filled_colors, hole, reach, step)
     agreed = agree_slowly(filled_disparity, hole)
-    return copy_slowly(filled_colors, agreed, hole, mixed, one_surface), agreed
+    return copy_slowly(filled_colors, agreed, hole, one_surface), agreed
 
 
 @pytest.mark.parametrize("contrast", [1.0, 0.15])

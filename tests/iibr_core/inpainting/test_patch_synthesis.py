@@ -34,7 +34,7 @@ def steps_beside(size, y, x):
     return [(v, u) for v, u in beside if 0 <= v < size[0] and 0 <= u < size[1]]
 
 
-def copy_slowly(smooth, disparity, hole, mixed, one_surface):
+def copy_slowly(smooth, disparity, hole, one_surface):
     """What `copy_patches` makes of a smoothly filled image, which stays as it is."""
     size, colors, trust = hole.shape, smooth.astype(np.float64), np.where(hole, 0.0, 1.0)
     shown = {at: [] for at in map(tuple, np.argwhere(hole))}
@@ -47,7 +47,7 @@ def copy_slowly(smooth, disparity, hole, mixed, one_surface):
         there = [(v - middle[0] + place[0], u - middle[1] + place[1]) for v, u in patch]
         return np.array(
             [
-                ((colors[b] - colors[a]) ** 2).sum() if not mixed[b] and is_one(a, b) else MISSING
+                ((colors[b] - colors[a]) ** 2).sum() if not hole[b] and is_one(a, b) else MISSING
                 for a, b in zip(patch, there)
             ]
         )
@@ -58,7 +58,7 @@ def copy_slowly(smooth, disparity, hole, mixed, one_surface):
             (v, u)
             for v, u in places
             if RADIUS_PX <= v < size[0] - RADIUS_PX and RADIUS_PX <= u < size[1] - RADIUS_PX
-            if not mixed[v, u] and is_one((v, u), middle)
+            if not hole[v, u] and is_one((v, u), middle)
         ]
         return min(inside, key=lambda place: (unlike(patch, middle, place) * weights).sum(), default=None)
 
@@ -75,7 +75,7 @@ def copy_slowly(smooth, disparity, hole, mixed, one_surface):
         trusted = max(np.mean([trust[at] for at in patch if trust[at] > 0]) * np.exp(-misfit / FIT**2), LEAST_TRUST)
         for at in patch:
             source = at[0] - middle[0] + place[0], at[1] - middle[1] + place[1]
-            if hole[at] and not mixed[source] and is_one(at, source):
+            if hole[at] and not hole[source] and is_one(at, source):
                 shown[at] += [colors[source].copy()] * (int(FIRST_PATCH_WEIGHT) if trust[at] == 0 else 1)
                 if trust[at] == 0:
                     colors[at], trust[at] = colors[source], trusted
@@ -106,12 +106,11 @@ def copy_slowly(smooth, disparity, hole, mixed, one_surface):
     return blended
 
 
-def copied(smooth, disparity, hole, mixed, should_stop=never, threads=2):
+def copied(smooth, disparity, hole, should_stop=never, threads=2):
     colors, number = smooth.copy(), np.empty(hole.shape, np.int32)
     pixels = np.flatnonzero(hole)
     number_pixels(pixels, number)
-    pure = np.where(mixed, np.float32(np.nan), disparity)
-    copy_patches(colors, disparity, pure, pixels, number, ONE_SURFACE, should_stop, threads)
+    copy_patches(colors, disparity, pixels, number, ONE_SURFACE, should_stop, threads)
     return colors
 
 
@@ -122,10 +121,9 @@ def test_agrees_with_a_slow_twin_across_blocks():
     disparity = np.where(x + y < 70, 0.0, 2.0).astype(np.float32)
     colors = (0.5 + 0.3 * np.sin(x / 3)[..., None] + random.normal(0, 0.03, (*size, 3))).astype(np.float32)
     hole = (abs(x - PATCH_BLOCK_PX) < 4) & (y > 50) | (random.random(size) < 0.01)
-    mixed = hole | (random.random(size) < 0.02)
-    expected = copy_slowly(colors, disparity, hole, mixed, ONE_SURFACE)
-    assert np.abs(expected - colors)[hole].max() > 0.1
-    assert copied(colors, disparity, hole, mixed) == pytest.approx(expected, abs=1e-4)
+    expected = copy_slowly(colors, disparity, hole, ONE_SURFACE)
+    assert np.abs(expected - colors)[hole].max() > 0.08
+    assert copied(colors, disparity, hole) == pytest.approx(expected, abs=1e-4)
 
 
 @pytest.mark.parametrize("threads", [1, 4])
@@ -134,24 +132,22 @@ def test_stripes_go_on_sharp_into_what_was_filled_smoothly(threads):
     truth = np.where((x + y) // 4 % 2, np.float32(0.3), np.float32(0.6))[..., None].repeat(3, axis=2)
     hole = (abs(x - 70) < 6) & (y > 8)
     smooth = np.where(hole[..., None], np.float32(0.45), truth)
-    result = copied(smooth, np.zeros(hole.shape, np.float32), hole, hole, threads=threads)
+    result = copied(smooth, np.zeros(hole.shape, np.float32), hole, threads=threads)
     assert np.abs(result - truth)[hole].mean() < np.abs(smooth - truth)[hole].mean() / 20
 
 
-def test_nothing_is_copied_from_another_surface_or_from_what_is_mixed():
+def test_nothing_is_copied_from_another_surface():
     x = np.indices((60, 90))[1]
     disparity = np.where(x < 40, 3.0, 0.0).astype(np.float32)
     colors = np.random.default_rng(5).uniform(0, 1, (60, 90, 3)).astype(np.float32)
     hole = (x >= 40) & (x < 50)
     colors[x >= 40] = 0.5
-    mixed = hole | (x >= 50) & (x < 54)
-    colors[mixed & ~hole] = 1.0
-    assert copied(colors, disparity, hole, mixed)[hole] == pytest.approx(0.5)
+    assert copied(colors, disparity, hole)[hole] == pytest.approx(0.5)
 
 
 def test_stays_as_it_is_where_nothing_is_known_and_can_be_cancelled():
     colors, disparity = np.full((20, 30, 3), 0.3, np.float32), np.zeros((20, 30), np.float32)
     everywhere = np.ones((20, 30), np.bool_)
-    np.testing.assert_array_equal(copied(colors, disparity, everywhere, everywhere), colors)
+    np.testing.assert_array_equal(copied(colors, disparity, everywhere), colors)
     with pytest.raises(Cancelled):
-        copied(colors, disparity, everywhere, everywhere, should_stop=lambda: True)
+        copied(colors, disparity, everywhere, should_stop=lambda: True)
