@@ -21,8 +21,6 @@ BINOMIAL = np.array([1, 4, 6, 4, 1], np.float32) / 16
 """Texture is what differs from a mean with these weights, each way."""
 SPREAD = 1.6
 """Colours at distance r are a mean with a standard deviation of 0.41 px times 2 to the power of this, times r."""
-LINES_PX = 4.0
-"""So far from the frame all else counts half against lines; at the frame nothing, far away 1."""
 TEXTURE_SHARE, TEXTURE_PX = 0.6, 16.0
 """So much of the photo's texture is seen far beyond its frame, half of that at this distance: its place there is a
 guess, and close to the frame nobody misses it.
@@ -204,9 +202,8 @@ def _follow_lines(height, width, frame, means, lines, top, left, first, last, gr
                 red += weight * (means[k, n, 0] + part * (means[k + 1, n, 0] - means[k, n, 0]))
                 green += weight * (means[k, n, 1] + part * (means[k + 1, n, 1] - means[k, n, 1]))
                 blue += weight * (means[k, n, 2] + part * (means[k + 1, n, 2] - means[k, n, 2]))
-            # Against all else: where lines lead is the surer the closer they are.
-            other = away / (away + LINES_PX)
-            rest = 1.0 / (other + total)
-            grown[row, column, 0] = rest * (other * grown[row, column, 0] + red)
-            grown[row, column, 1] = rest * (other * grown[row, column, 1] + green)
-            grown[row, column, 2] = rest * (other * grown[row, column, 2] + blue)
+            # All else counts 1 against them.
+            rest = 1.0 / (1.0 + total)
+            grown[row, column, 0] = rest * (grown[row, column, 0] + red)
+            grown[row, column, 1] = rest * (grown[row, column, 1] + green)
+            grown[row, column, 2] = rest * (grown[row, column, 2] + blue)

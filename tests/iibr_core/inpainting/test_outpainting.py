@@ -9,7 +9,6 @@ from iibr_core.inpainting.outpainting import (
     ANGLE_POWER,
     LINE_NOISE,
     LINE_REACH_PX,
-    LINES_PX,
     PLACES,
     SLANT,
     STRENGTH_POWER,
@@ -83,8 +82,7 @@ def extend_slowly(colors, disparity, margins):
         v, u = 2 * y - row + margins.top, 2 * x - column + margins.left
         detail = colors[v, u] - np.einsum("ij,ijc->c", kernel, around[v : v + 5, u : u + 5])
         colour = np.maximum(mean + TEXTURE_SHARE * away / (away + TEXTURE_PX) * detail, 0)
-        other, step = away / (away + LINES_PX), SLANT * away / PLACES
-        total, colour = other, other * colour
+        total, step = 1.0, SLANT * away / PLACES
         for j in range(-PLACES, PLACES + 1):
             n = int(np.floor(nearest + j * step + 0.5)) % len(places)
             way = column - margins.left - places[n][1], row - margins.top - places[n][0]
