@@ -26,9 +26,19 @@ from benchmarks.stages import Views, judge, make_views, report
 from iibr_core.formats.weights import save_weights
 from iibr_core.ray_transformer.inference import TrainedWeights
 from iibr_core.ray_transformer.model import RayTransformer
-from iibr_core.rendering.ambiguous_rays import UndecidedRays
-from iibr_core.rendering.hypotheses import FEATURES, SHARE, AmbiguousRays, describe_rays
-from iibr_core.rendering.laid_hypotheses import PLAIN_SOURCE
+from iibr_core.rendering.ambiguous_rays import PLAIN_SOURCE, UndecidedRays
+from iibr_core.rendering.hypotheses import (
+    COVERAGE,
+    FEATURES,
+    INPAINTED,
+    LANDS,
+    PARALLAX,
+    PLAIN,
+    SHARE,
+    UNCOVERED,
+    AmbiguousRays,
+    describe_rays,
+)
 from iibr_core.rendering.ray_set import RaySet
 from iibr_core.stages import Stages
 from iibr_core.training.batches import AS_RENDERED, RayChoice, training_batch
@@ -41,7 +51,7 @@ STEPS, SEED, LEARNING_RATE = 2500, 0, 3e-3
 """Of the shipped weights."""
 CHECKPOINT_EVERY = 250
 LAMBDAS = LossWeights(entropy=ENTROPY_WEIGHT)
-COORDINATES_ONLY = [SHARE, 7, 8, 9, 10, 12, 14]
+COORDINATES_ONLY = [SHARE, LANDS, INPAINTED, PARALLAX, COVERAGE, UNCOVERED, PLAIN]
 """The features of `hypotheses._describe` that know nothing of disparity."""
 
 

@@ -13,11 +13,10 @@ from dataclasses import dataclass
 from typing import NamedTuple, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
 from iibr_core.generation.memory_model import DRAFT_BYTES, Making, making_bytes, undecided_bytes
 from iibr_core.generation.outer_views import outer_views_of_grid, outpainting_margins
-from iibr_core.runtime.tiling import THREADS
+from iibr_core.runtime.tiling import THREADS, in_bands
 from iibr_core.types import FloatImage, GridShape, ImageSize, Quality, ViewOffset, image_size
 
 CORES = THREADS
@@ -26,9 +25,9 @@ STILL_PX = 0.5
 SMOOTH_PX = 0.4
 """A surface whose pixels move apart by less than this is smooth: see `ray_set.SMOOTH_SHARE`."""
 AMBIGUOUS_PX = 1.5
-"""Where a step of disparity moves its sides apart by more than this, surfaces meet: some rays there are ambiguous."""
-OPEN_SHARE = 0.28
-"""Of the rays where surfaces meet, and near soft edges, so many are left open by the closed form."""
+"""Where disparities move apart by more than this, surfaces meet: some rays there are ambiguous."""
+OPEN_SHARE = 0.165
+"""Of the rays where surfaces meet, so many are left open by the closed form."""
 MOST_PARALLAX_PX = 1e6
 
 
@@ -73,21 +72,28 @@ NO_COST = CostEstimates(*2 * [CostEstimate(0.0, 0)])
 
 @dataclass(frozen=True, eq=False)
 class ParallaxStatistics:
-    """How content moves in the outermost view, px. step (H, W): the largest difference between neighbours near each
-    pixel. soft (H, W): see `DisparityStatistics`. most_px: of all content. hole_share: of the pixels, those it shows
-    and the photo hides, at most. canvas: the photo with what the outer views see beyond its frame.
+    """How content of a photo of a size moves in the outermost view, px. step (M, N): the largest difference between
+    neighbours in each cell of CELL_PX x CELL_PX pixels. spread (M, N): from the least to the most in it and the cells
+    to the right and below. most_px: of all content. hole_share: of the pixels, those it shows and the photo hides, at
+    most. canvas: the photo with what the outer views see beyond its frame.
     """
 
+    size: ImageSize
     step: FloatImage
-    soft: NDArray[np.bool_]
+    spread: FloatImage
     most_px: float
     hole_share: float
     canvas: ImageSize
 
     @property
+    def pixels(self) -> int:
+        """Of a view."""
+        return math.prod(self.size)
+
+    @property
     def edge_share(self) -> float:
         """Share of the pixels near an edge where surfaces meet in the outermost view."""
-        return self._share_beyond(AMBIGUOUS_PX, 1.0)
+        return _share_beyond(self.step, AMBIGUOUS_PX, 1.0)
 
     @property
     def has_disocclusion(self) -> bool:
@@ -96,32 +102,47 @@ class ParallaxStatistics:
 
     def rough_share(self, parallax: float) -> float:
         """Share of the pixels where no smooth surface shows, with so much of the outermost view's parallax."""
-        return self._share_beyond(SMOOTH_PX, parallax)
+        return _share_beyond(self.step, SMOOTH_PX, parallax)
 
     def ambiguous_share(self, parallax: float) -> float:
-        """Share of the rays that are ambiguous there: where surfaces meet, and near soft edges."""
-        soft = float(self.soft.mean() * parallax)
-        return OPEN_SHARE * min(self._share_beyond(AMBIGUOUS_PX, parallax) + soft, 1.0)
+        """Share of the rays that are ambiguous there: where surfaces meet, at a step or within some pixels."""
+        return OPEN_SHARE * _share_beyond(self.spread, AMBIGUOUS_PX, parallax)
 
-    def _share_beyond(self, least_px: float, parallax: float) -> float:
-        return float((self.step * np.float32(parallax) > least_px).mean())
+
+def _share_beyond(moved_px: FloatImage, least_px: float, parallax: float) -> float:
+    return float((moved_px * np.float32(parallax) > least_px).mean())
 
 
 def measure_parallax(disparity: FloatImage, outermost: float) -> ParallaxStatistics:
     """Of field disparity (H, W), px per view step; NaN counts as 0. outermost: the largest view offset."""
     # Kernels: numba must not load before the first plan is made, and the window's state imports this file at start.
-    from iibr_core.rendering.disparity_statistics import measure_disparity
+    from iibr_core.rendering.ray_cells import CELL_PX, largest_steps
 
     moved = np.nan_to_num(disparity * np.float32(outermost))
     moved = np.clip(moved, -MOST_PARALLAX_PX, MOST_PARALLAX_PX)
-    around = measure_disparity(moved[None], 1.0)
+    # A cell more on every side: the border of the picture is no edge here.
+    around = np.pad(moved, CELL_PX, mode="edge")
+    step = np.empty([-(-length // CELL_PX) for length in around.shape], np.float32)
+    in_bands(lambda first, last: largest_steps(around, first, last, step), image_size(around))
     return ParallaxStatistics(
-        around.step[0],
-        around.soft,
+        image_size(moved),
+        step[1:-1, 1:-1],
+        _spread(moved, CELL_PX),
         float(np.abs(moved).max()),
         _hole_share(moved),
         outpainting_margins(moved, [ViewOffset(-1.0, -1.0), ViewOffset(1.0, 1.0)]).around(image_size(moved)),
     )
+
+
+def _spread(moved: FloatImage, cell_px: int) -> FloatImage:
+    """`ParallaxStatistics.spread` of disparities (H, W)."""
+    rows, columns = (np.arange(0, length, cell_px) for length in moved.shape)
+    around = []
+    for extreme in (np.maximum, np.minimum):
+        found = np.pad(extreme.reduceat(extreme.reduceat(moved, rows, 0), columns, 1), ((0, 1), (0, 1)), mode="edge")
+        found = extreme(found[1:], found[:-1])
+        around.append(extreme(found[:, 1:], found[:, :-1]))
+    return np.asarray(around[0] - around[1])
 
 
 def _hole_share(moved: FloatImage) -> float:
@@ -154,7 +175,7 @@ def estimate_costs(statistics: ParallaxStatistics, grid: GridShape) -> CostEstim
 
 def estimate_workload(statistics: ParallaxStatistics, grid: GridShape, quality: Quality) -> Workload:
     """What there is to do for all views of a grid in one quality."""
-    pixels, views, asks = statistics.step.size, grid.rows * grid.columns - 1, quality != "fast"
+    pixels, views, asks = statistics.pixels, grid.rows * grid.columns - 1, quality != "fast"
     # The outer views complete the ray set, which takes as long as they do; for the transformer they are made again.
     more = (2 if asks else 1) * _inpainted_views(statistics, grid)
     rough = _sum_over_views(statistics.rough_share, grid) + more * statistics.rough_share(1.0)
@@ -179,7 +200,7 @@ def _peak_bytes(statistics: ParallaxStatistics, grid: GridShape, quality: Qualit
     asked = statistics.ambiguous_share(1.0) if quality == "balanced" else 0.0
     images = 2 + _inpainted_views(statistics, grid)
     holes = statistics.hole_share if statistics.has_disocclusion else 0.0
-    return making_bytes(Making(statistics.step.size, math.prod(statistics.canvas), images, holes, asked, quality))
+    return making_bytes(Making(statistics.pixels, math.prod(statistics.canvas), images, holes, asked, quality))
 
 
 def _draft_bytes(statistics: ParallaxStatistics, grid: GridShape) -> int:
@@ -187,4 +208,4 @@ def _draft_bytes(statistics: ParallaxStatistics, grid: GridShape) -> int:
     views = grid.rows * grid.columns - 1
     drafts = views - _inpainted_views(statistics, grid)
     undecided = _sum_over_views(statistics.ambiguous_share, grid) * drafts / max(views, 1)
-    return round(statistics.step.size * (drafts * DRAFT_BYTES + undecided * undecided_bytes()))
+    return round(statistics.pixels * (drafts * DRAFT_BYTES + undecided * undecided_bytes()))

@@ -12,21 +12,19 @@ from math import floor
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.rendering.ambiguous_rays import HYPOTHESES, UndecidedRays, find_undecided_rays
+from iibr_core.rendering.ambiguous_rays import HYPOTHESES, NOWHERE_PX, PLAIN_SOURCE, UndecidedRays, find_undecided_rays
 from iibr_core.rendering.candidates import Candidates
-from iibr_core.rendering.laid_hypotheses import NOWHERE_PX, PLAIN_SOURCE
 from iibr_core.rendering.ray_set import RaySet
 from iibr_core.rendering.resampling import ShownRays, cubic, resample, resample_inpainted
 from iibr_core.runtime.jit import kernel, linear_scalar, nearest_pixel, srgb_scalar
 from iibr_core.types import FloatImage, ViewOffset
 
-SHARE = 6
-"""The feature that is the closed form's weight."""
-PROFILE = 15
+AGREES, TO_NEAREST, TO_FARTHEST, SHARE, LANDS, INPAINTED, PARALLAX, COVERAGE, UNCOVERED, PLAIN, PROFILE = range(11)
+"""The features, in this order; SHARE is the closed form's weight, PROFILE the first of several."""
 PROFILE_PX = (-4.0, -2.5, -1.0, 1.0, 2.5, 4.0)
 """Where the disparity around a source ray is sampled, along the parallax and across it."""
-FEATURES = PROFILE + 2 * len(PROFILE_PX) + 1
-"""The last is 0: a multiple of four suits the arithmetic."""
+FEATURES = PROFILE + 2 * len(PROFILE_PX) + 2
+"""The last two are 0: a multiple of four suits the arithmetic."""
 MOST_PX = 1e4
 LEAST_VOTE = 0.004
 """Weights below this change no colour by a visible step."""
@@ -72,7 +70,7 @@ def describe_rays(rays: RaySet, undecided: UndecidedRays) -> AmbiguousRays:
     pixel = np.stack(np.divmod(undecided.pixel.astype(np.int64), rays.size.width), axis=1)
     features = np.zeros((*mask.shape, FEATURES), np.float32)
     parallax = max(*map(abs, offset), 1e-9)
-    _describe(rays.arrays, rays.statistics, rays.to_view(offset), parallax, pixel, undecided, features)
+    _describe(rays.arrays, rays.to_view(offset), parallax, pixel, undecided, features)
     return AmbiguousRays(offset, pixel, mask, disparity, source, features)
 
 
@@ -126,7 +124,7 @@ def _own_disparity(surfaces, k, x, y, d):
 
 
 @kernel
-def _describe(rays, around, offsets, parallax, pixel, undecided, features):
+def _describe(rays, offsets, parallax, pixel, undecided, features):
     surfaces = rays.disparity
     _, height, width = surfaces.shape
     # Unit vectors along each source's parallax.
@@ -158,22 +156,16 @@ def _describe(rays, around, offsets, parallax, pixel, undecided, features):
 
             # All differences in pixels of parallax in this view: T need not know the scene's scale.
             v, u = min(max(nearest_pixel(source_y), 0), height - 1), min(max(nearest_pixel(source_x), 0), width - 1)
-            low, high = min(around.low[k, v, u], d), max(around.high[k, v, u], d)
-            out[0] = _softsign((d - own) * parallax)  # does the source agree?
-            out[1] = _softsign((high - d) * parallax)  # what lies in front of it there
-            out[2] = _softsign((d - low) * parallax)  # ... and behind
-            out[3] = (own - low) / max(high - low, 1e-6)  # where between both its own lies
-            out[4] = _softsign((foreground - d) * parallax)  # against the nearest hypothesis
-            out[5] = _softsign((d - background) * parallax)  # ... and the farthest
+            out[AGREES] = _softsign((d - own) * parallax)  # does the source agree?
+            out[TO_NEAREST] = _softsign((foreground - d) * parallax)  # against the nearest hypothesis
+            out[TO_FARTHEST] = _softsign((d - background) * parallax)  # ... and the farthest
             out[SHARE] = undecided.share[a]
-            out[7] = undecided.nearest[a] / NOWHERE_PX  # how far away the surface lands, 0..1
-            out[8] = 1.0 if k >= rays.photo_images else 0.0  # whether it is inpainted
-            out[9] = log_parallax
-            out[10] = rays.coverage[k, v, u]
-            out[11] = around.softness
-            out[12] = undecided.uncovered[n]  # share of the pixel that nothing covers
-            out[13] = _softsign(around.step[k, v, u] * parallax)  # the depth edge beside it
-            out[14] = 1.0 if undecided.source[a] >= PLAIN_SOURCE else 0.0
+            out[LANDS] = undecided.nearest[a] / NOWHERE_PX  # how far away the surface lands, 0..1
+            out[INPAINTED] = 1.0 if k >= rays.photo_images else 0.0  # whether it is inpainted
+            out[PARALLAX] = log_parallax
+            out[COVERAGE] = rays.coverage[k, v, u]
+            out[UNCOVERED] = undecided.uncovered[n]  # share of the pixel that nothing covers
+            out[PLAIN] = 1.0 if undecided.source[a] >= PLAIN_SOURCE else 0.0
         at = last
 
 

@@ -6,14 +6,12 @@ may be larger than the views made of them: so rays beyond the photo's frame belo
 
 from __future__ import annotations
 
-import threading
 from math import ceil
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.rendering.disparity_statistics import DisparityStatistics, measure_disparity
 from iibr_core.rendering.ray_cells import CELL_PX, Cells, any_in_cells, largest_steps, sum_up
 from iibr_core.rendering.slope_connectivity import BELOW, RIGHT, connect_rays, connected_either_way
 from iibr_core.runtime.jit import kernel, nearest_pixel
@@ -71,8 +69,6 @@ class RaySet:
         self._surface_step = surface_step
         self.farthest_views = farthest_views
         self._photo_detail = photo_detail
-        self._statistics: DisparityStatistics | None = None
-        self._surveying = threading.Lock()
         self._room = RayArrays(
             np.empty((capacity, 2)),
             np.empty((capacity, *size, 3), np.float32),
@@ -108,7 +104,7 @@ class RaySet:
         room, cells = self._room, self._cells_room
         edge_step = step_of(EDGE_PX, self.farthest_views)
         if k == 0 and self.stages.connect_slopes:
-            self.connected = connected = connect_rays(disparity, self._surface_step, edge_step, should_stop)
+            self.connected = connected = connect_rays(disparity, self._surface_step, should_stop)
             self._steep = any_in_cells(connected_either_way(connected))
         if k > 0 and any(offset) and self.stages.leave_out_in_front:
             coverage = coverage.copy()
@@ -128,14 +124,6 @@ class RaySet:
         room.offsets[k] = offset
         self._count += 1
         self.photo_images += not any(offset)
-        self._statistics = None
-
-    def survey(self, should_stop: ShouldStop = never) -> DisparityStatistics:
-        """`statistics`, cancellable: raises Cancelled once should_stop is true. Threads may ask at the same time."""
-        with self._surveying:
-            if self._statistics is None:
-                self._statistics = measure_disparity(self.arrays.disparity, self.farthest_views, should_stop)
-            return self._statistics
 
     def __len__(self) -> int:
         return self._count
@@ -195,11 +183,6 @@ class RaySet:
         """The rays added so far, summarised."""
         added, room = slice(self._count), self._cells_room
         return Cells(room.low[added], room.high[added], room.row_ranges[added], room.step)
-
-    @property
-    def statistics(self) -> DisparityStatistics:
-        """What lies around the rays added so far; made when first asked for after the last was added."""
-        return self._statistics or self.survey()
 
     @property
     def photo_disparity(self) -> FloatImage:

@@ -9,7 +9,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.rendering.disparity_statistics import find_soft_edges
 from iibr_core.runtime.jit import kernel
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never
 from iibr_core.surfaces import SLOPE_SHARE
@@ -25,12 +24,10 @@ MINIMUM_RUN = 3
 """So many steps beyond it, on one side, must follow the step between two rays, each about as large as the last."""
 
 
-def connect_rays(
-    disparity: FloatImage, surface_step: float, least_edge: float, should_stop: ShouldStop = never
-) -> NDArray[np.uint8]:
+def connect_rays(disparity: FloatImage, surface_step: float, should_stop: ShouldStop = never) -> NDArray[np.uint8]:
     """(H, W): bits RIGHT and BELOW, of steps larger than STEEP_SHARE of surface_step only: others need no proof.
 
-    Slopes that are blurred depth edges, of least_edge or more, join nothing. Raises Cancelled once should_stop is true.
+    Raises Cancelled once should_stop is true.
     """
     connected = np.zeros(disparity.shape, np.uint8)
     in_bands(
@@ -38,8 +35,6 @@ def connect_rays(
         image_size(disparity),
         should_stop,
     )
-    if connected.any():
-        connected[find_soft_edges(disparity, least_edge, should_stop)[0]] = 0
     return connected
 
 

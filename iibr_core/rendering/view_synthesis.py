@@ -16,15 +16,19 @@ from numpy.typing import NDArray
 from iibr_core.color import linear_from_srgb, srgb_from_linear
 from iibr_core.inpainting.background import fill_background, goes_on_in_front
 from iibr_core.inpainting.inpainter import Inpainter
-from iibr_core.rendering.ambiguous_rays import HYPOTHESES, UndecidedRays, find_undecided_rays
+from iibr_core.rendering.ambiguous_rays import HYPOTHESES, SEARCH_PX, UndecidedRays, find_undecided_rays
 from iibr_core.rendering.candidates import find_candidates
 from iibr_core.rendering.hypotheses import AmbiguousRays, blend_hypotheses, describe_rays
-from iibr_core.rendering.laid_hypotheses import SEARCH_PX
-from iibr_core.rendering.occlusion import LEAST_COVERED, MOSTLY_COVERED, WHOLLY_COVERED, entropy
 from iibr_core.rendering.ray_set import RaySet
 from iibr_core.rendering.rendered_view import DecidedRays, RaysBehind, RenderedView
 from iibr_core.rendering.resampling import resample_colors
-from iibr_core.rendering.visibility_weights import weights_and_coverage
+from iibr_core.rendering.visibility_weights import (
+    LEAST_COVERED,
+    MOSTLY_COVERED,
+    WHOLLY_COVERED,
+    entropy,
+    weights_and_coverage,
+)
 from iibr_core.runtime import tiling
 from iibr_core.runtime.jit import kernel
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never, raise_if_stopped
@@ -141,8 +145,6 @@ class ViewSynthesis:
         """
         if not np.isfinite(offset).all():
             raise ValueError(f"view offset {tuple(offset)}: give finite numbers")
-        if self._transformer:
-            rays.survey(self._should_stop)
         view, covered = RenderedView.blank(rays.view_size, self._keeps_entropy), np.empty(rays.view_size, np.float32)
 
         def band(first: int, last: int) -> list[Result]:

@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from iibr_core.color import linear_from_srgb
+from iibr_core.depth.edges.refine import refine
 from iibr_core.generation.update_loop import complete_ray_set
-from iibr_core.rendering.ambiguous_rays import HYPOTHESES
+from iibr_core.rendering.ambiguous_rays import HYPOTHESES, SEARCH_PX
 from iibr_core.rendering.candidates import find_candidates
 from iibr_core.rendering.hypotheses import SHARE, AmbiguousRays, find_ambiguous_rays, hypothesis_colors
-from iibr_core.rendering.laid_hypotheses import SEARCH_PX
 from iibr_core.rendering.photo_rays import rays_of_photo
 from iibr_core.rendering.ray_set import RaySet
 from iibr_core.rendering.resampling import heaviest_candidate
@@ -40,6 +40,8 @@ PARALLAX_PX = 4.0, 45.0
 """Between the outermost view and the photo, at the largest disparity."""
 TYPICAL_ERROR, LEAST_ERROR = 0.004, 0.0005
 """Of colours, squared: which scenes count once, and below which a scene's error is no matter."""
+REFINED = 0.75
+"""Share of the maps that are refined, as the program does unless it is told not to."""
 
 
 class LabelledRays(NamedTuple):
@@ -85,7 +87,10 @@ def _scene_batch(rng: np.random.Generator, choice: RayChoice) -> Batch | None:
     largest = float(np.exp(rng.uniform(*np.log(PARALLAX_PX)))) / radius
     scene = random_scene(rng, SIZE, largest)
     colors, disparity = render(scene, SIZE, ViewOffset(0.0, 0.0))
-    rays = _ray_set(colors, degrade(disparity, rng, radius), radius, choice.inpainted)
+    disparity = degrade(disparity, rng, radius)
+    if rng.random() < REFINED:
+        disparity = refine(colors, disparity)
+    rays = _ray_set(colors, disparity, radius, choice.inpainted)
     epi = _epi(scene, rays, radius, rng, choice)
     parts = list(epi or [])
     parts += [_sample_ambiguous(scene, rays, _random_offset(radius, rng), rng, choice) for _ in range(VIEWS)]

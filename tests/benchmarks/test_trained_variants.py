@@ -23,8 +23,8 @@ from benchmarks.trained_variants import (
     without_disparity,
 )
 from iibr_core.formats.weights import read_weights
+from iibr_core.rendering.ambiguous_rays import PLAIN_SOURCE
 from iibr_core.rendering.hypotheses import FEATURES, SHARE
-from iibr_core.rendering.laid_hypotheses import PLAIN_SOURCE
 from iibr_core.rendering.photo_rays import rays_of_photo
 from iibr_core.training.batches import ambiguous_rays_of_view, training_batch
 from iibr_core.training.degradation import blur

@@ -11,11 +11,10 @@ from iibr_core.generation.light_field import transformer_for
 from iibr_core.rendering.candidates import find_candidates
 from iibr_core.rendering.hypotheses import find_ambiguous_rays
 from iibr_core.rendering.mixed_pixels import move_with_foreground, split_mixed_pixels
-from iibr_core.rendering.occlusion import entropy
 from iibr_core.rendering.photo_rays import LEAST_STEP_PX, rays_of_photo
 from iibr_core.rendering.resampling import KEYS_A, resample_colors
 from iibr_core.rendering.view_synthesis import ViewSynthesis
-from iibr_core.rendering.visibility_weights import visibility_weights
+from iibr_core.rendering.visibility_weights import entropy, visibility_weights
 from iibr_core.surfaces import EDGE_PX
 from iibr_core.types import ViewOffset
 from tests.iibr_core.scenes import smooth_texture

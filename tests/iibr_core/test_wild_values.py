@@ -39,14 +39,12 @@ from iibr_core.rendering import (
     ambiguous_rays,
     candidates,
     coherent_cells,
-    disparity_statistics,
     flying_pixels,
     free_view,
     hypotheses,
     large_views,
     lens_light,
     mixed_pixels,
-    occlusion,
     resampling,
     slope_connectivity,
 )
@@ -55,7 +53,7 @@ from iibr_core.rendering.gloss import environment, geometry, gloss_surface, shad
 from iibr_core.rendering.gloss.gloss_settings import Gloss, GlossLight, GlossSurface, of_maps
 from iibr_core.rendering.photo_rays import rays_of_photo
 from iibr_core.rendering.view_synthesis import ViewSynthesis
-from iibr_core.rendering.visibility_weights import visibility_weights, weights_and_coverage
+from iibr_core.rendering.visibility_weights import entropy, visibility_weights, weights_and_coverage
 from iibr_core.runtime.tiling import never
 from iibr_core.types import DISPLAY_P3, Camera, Disparity, GridShape, ImageSize, Margins, Photo, ViewOffset, ViewUpdate
 from tests.iibr_core import embedded_files as embedded
@@ -407,7 +405,7 @@ FINITE = {
     "rendering.flying_pixels.measure_detail": lambda v, _: flying_pixels.measure_detail(image(v)),
     "rendering.flying_pixels.without_flying_pixels": lambda v, _: without_flying(v),
     "rendering.large_views.views_of_tile": lambda v, _: tile_views(v),
-    "rendering.occlusion.entropy": lambda v, _: occlusion.entropy(np.nan_to_num(shares(v))),
+    "rendering.visibility_weights.entropy": lambda v, _: entropy(np.nan_to_num(shares(v))),
     "generation.plan.plan_for_viewing": lambda v, _: [
         plan.plan_for_viewing(scene()[0], Disparity(depths(v), "wild")),
         plan.plan_for_viewing(*scene(), plan.PlanOverrides(depth_strength=v)),
@@ -426,16 +424,12 @@ FINITE = {
         coherent_cells.land_incoherent(rays(v).cells, 0, t, 0.5, (0, 4), np.eye(1, 4, dtype=np.bool_)) for t in (0.5, v)
     ],
     "rendering.slope_connectivity.connect_rays": lambda v, _: slope_connectivity.connected_either_way(
-        slope_connectivity.connect_rays(depths(v), 0.5, 0.5)
+        slope_connectivity.connect_rays(depths(v), 0.5)
     ),
     "rendering.slope_connectivity.connected_either_way": lambda v, _: slope_connectivity.connected_either_way(
-        slope_connectivity.connect_rays(depths(v), 0.5, 0.5)
+        slope_connectivity.connect_rays(depths(v), 0.5)
     ),
     "depth.subject.subject_disparity": lambda v, _: subject.subject_disparity(depths(v)),
-    "rendering.disparity_statistics.find_soft_edges": lambda v, _: disparity_statistics.find_soft_edges(depths(v), 0.5),
-    "rendering.disparity_statistics.measure_disparity": lambda v, _: (
-        disparity_statistics.measure_disparity(depths(v)[None], 1.0).softness
-    ),
     "synthesis.ViewSynthesis.render": lambda v, _: rendered(ViewOffset(0.5, -1.0), v),
     "rendering.photo_rays.rays_of_photo": lambda v, _: rendered(ViewOffset(0.0, 2.0), v),
     "rendering.flying_pixels.postprocessed_view": lambda v, _: postprocessed_view(
@@ -525,7 +519,6 @@ FINITE_BY_CONTRACT = {
     "inpainting.nearest_known.nearest_known": "of masks only",
     "inpainting.nearest_known.number_pixels": "of indices only",
     "inpainting.patch_synthesis.copy_patches": "of rendered views only",
-    "inpainting.patch_synthesis.mixed_beside": "of masks only",
     "depth.multi_view.matching.matching_views": "of lumas that `luma_of` made finite",
     "depth.multi_view.matching.sweep": "of `matching_views`, whose lumas `luma_of` made finite",
     "depth.multi_view.semi_global.choose_disparity": "of costs in 8 bits",
@@ -676,9 +669,7 @@ READS_OR_TELLS = {
     "depth.embedded.picture": "photo_in_focus rotate_estimate",
     "depth.search": "ask_model estimator_of read_shown_photo",
     "rendering.ambiguous_rays": "UndecidedRays",
-    "rendering.laid_hypotheses": "Hypotheses Landed",
     "rendering.candidates": "Candidates",
-    "rendering.disparity_statistics": "DisparityStatistics",
     "rendering.large_views": "Part tiles_of whole",
     "rendering.ray_cells": "Cells any_in_cells",
     "rendering.ray_set": "RayArrays",

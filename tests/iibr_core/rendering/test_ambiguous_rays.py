@@ -8,7 +8,7 @@ from iibr_core.color import linear_from_srgb, srgb_from_linear
 from iibr_core.formats.weights import save_weights
 from iibr_core.ray_transformer.inference import TrainedWeights
 from iibr_core.ray_transformer.model import RayTransformer
-from iibr_core.rendering.ambiguous_rays import HYPOTHESES
+from iibr_core.rendering.ambiguous_rays import FAINT_WEIGHT, HYPOTHESES, LEAST_STAKE, PLAIN_SOURCE
 from iibr_core.rendering.candidates import find_candidates
 from iibr_core.rendering.hypotheses import (
     FEATURES,
@@ -20,7 +20,6 @@ from iibr_core.rendering.hypotheses import (
     find_ambiguous_rays,
     hypothesis_colors,
 )
-from iibr_core.rendering.laid_hypotheses import FAINT_WEIGHT, LEAST_STAKE, PLAIN_SOURCE
 from iibr_core.rendering.photo_rays import rays_of_photo
 from iibr_core.rendering.ray_set import RaySet
 from iibr_core.rendering.resampling import resample_colors

@@ -16,7 +16,7 @@ from iibr_core.surfaces import SLOPE_SHARE
 from iibr_core.training.degradation import blur
 from iibr_core.types import ViewOffset, image_size
 
-STEP, EDGE = 0.5, 2.0
+STEP = 0.5
 
 
 def slow_connect(disparity):
@@ -42,7 +42,7 @@ def test_joined_rays_against_a_slow_twin(noise, unknown):
     disparity = (0.4 * x - 0.7 * y + noise * random.normal(size=y.shape)).astype(np.float32)
     disparity[:, 20:] += 6
     disparity[random.random(disparity.shape) < unknown] = np.nan
-    connected = connect_rays(disparity, STEP, 1e9)
+    connected = connect_rays(disparity, STEP)
     assert (connected == slow_connect(disparity)).all()
     assert (connected > 0).mean() > 0.8 or noise > 0
     either = connected_either_way(connected)
@@ -53,11 +53,11 @@ def test_joined_rays_against_a_slow_twin(noise, unknown):
     )
 
 
-def test_depth_edges_sharp_or_soft_join_nothing():
+def test_sharp_depth_edges_join_nothing():
     sharp = np.zeros((40, 60), np.float32)
     sharp[:, 30:] = 12
-    for sigma in (0, 0.7, 1.5, 3, 4):
-        assert not connect_rays(blur(sharp, sigma), STEP, EDGE).any(), sigma
+    for sigma in (0, 0.7):
+        assert not connect_rays(blur(sharp, sigma), STEP).any(), sigma
 
 
 def ray_set(disparity, farthest=1.0):

@@ -4,8 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from iibr_core.rendering.candidates import Candidates
-from iibr_core.rendering.occlusion import entropy
-from iibr_core.rendering.visibility_weights import visibility_weights, weights_and_coverage
+from iibr_core.rendering.visibility_weights import entropy, visibility_weights, weights_and_coverage
 from iibr_core.types import ViewOffset
 
 

@@ -14,7 +14,6 @@ from iibr_core.generation.light_field import generate
 from iibr_core.inpainting import background
 from iibr_core.inpainting.background import fill_background
 from iibr_core.inpainting.disparity_holes import fill_disparity_holes
-from iibr_core.rendering.disparity_statistics import find_soft_edges, measure_disparity
 from iibr_core.rendering.mixed_pixels import split_mixed_pixels
 from iibr_core.rendering.photo_rays import rays_of_photo
 from iibr_core.rendering.ray_set import RaySet
@@ -53,19 +52,12 @@ def rendered(should_stop):
     return view.colors, view.disparity, view.occluded, view.inpainted, view.entropy
 
 
-def surveyed(should_stop):
-    around = measure_disparity(np.stack([LAYERS, np.where(HOLES, np.nan, SOFT)]), 2.0, should_stop)
-    return around.low, around.high, around.step, around.softness
-
-
 STAGES = {
     "rays of a photo": lambda stop: rays_of_photo(COLORS, LAYERS, 2.0, 1, stop).arrays,
     "split": lambda stop: split_mixed_pixels(COLORS, LAYERS, 0.5, stop),
     "add": added,
     "render": rendered,
     "fill": filled,
-    "survey": surveyed,
-    "softness": lambda stop: list(find_soft_edges(SOFT, 0.5, stop)),
     "refine": lambda stop: [refine(COLORS, np.where(HOLES, np.nan, SOFT), 1.0, None, stop)],
     "blur": lambda stop: [np.float64(measure_edge_blur(COLORS, SOFT, stop))],
     "offline": lambda stop: [estimate_from_cues(Photo(COLORS, 100.0, "test"), stop).values],
@@ -151,16 +143,7 @@ def test_a_ray_set_that_was_told_to_stop_is_as_before():
     count = len(rays)
     with pytest.raises(Cancelled):
         rays.add(ViewOffset(0.0, 1.0), COLORS, LAYERS, FULL, lambda: True)
-    with pytest.raises(Cancelled):
-        rays.survey(lambda: True)
     assert len(rays) == count
-    assert rays.statistics is rays.survey(lambda: True)  # made by now
-
-
-def test_threads_that_ask_at_once_get_the_same_statistics():
-    rays = rays_of_photo(COLORS, LAYERS, 2.0, 0)
-    found = in_pieces(lambda _: rays.survey(), range(8), threads=8)
-    assert all(around is found[0] for around in found)
 
 
 @pytest.mark.parametrize("size", [(1, 1), (5, 1), (1, 5), (17, 4), (100, 3), (0, 4), (4, 0), (0, 0)])

@@ -5,7 +5,7 @@ import torch
 from iibr_core.ray_transformer.inference import TrainedWeights
 from iibr_core.ray_transformer.model import RayTransformer
 from iibr_core.rendering.ambiguous_rays import HYPOTHESES
-from iibr_core.rendering.hypotheses import FEATURES
+from iibr_core.rendering.hypotheses import FEATURES, INPAINTED
 from iibr_core.training import batches
 from iibr_core.training.batches import RayChoice, training_batch
 from iibr_core.training.losses import LossWeights, color_loss, to_perceptual
@@ -71,7 +71,7 @@ def test_other_rays_for_ablations_are_finite_and_whole_too(choice):
     assert batch.mask.shape[1] == choice.hypotheses
     assert batch.mask.any(dim=1).all()
     assert all(torch.isfinite(tensor).all() for tensor in (batch.features, batch.colors, batch.truth))
-    is_inpainted = batch.features[..., 8] > 0
+    is_inpainted = batch.features[..., INPAINTED] > 0
     assert choice.inpainted or not is_inpainted.any()
 
 
