@@ -42,7 +42,7 @@ class Workload(NamedTuple):
     rays: float
 
 
-NANOSECONDS = Workload(45.0, 420.0, 1000.0)
+NANOSECONDS = Workload(45.0, 585.0, 1295.0)
 """What each takes one core."""
 
 
@@ -200,7 +200,7 @@ def _peak_bytes(statistics: ParallaxStatistics, grid: GridShape, quality: Qualit
     asked = statistics.ambiguous_share(1.0) if quality == "balanced" else 0.0
     images = 2 + _inpainted_views(statistics, grid)
     holes = statistics.hole_share if statistics.has_disocclusion else 0.0
-    return making_bytes(Making(statistics.pixels, math.prod(statistics.canvas), images, holes, asked, quality))
+    return making_bytes(Making(statistics.pixels, math.prod(statistics.canvas), images, holes, asked))
 
 
 def _draft_bytes(statistics: ParallaxStatistics, grid: GridShape) -> int:

@@ -21,7 +21,7 @@ from iibr_core.runtime.machine import (
     usual_budget_bytes,
 )
 from iibr_core.runtime.tiling import MOST_BAND_PIXELS, THREADS
-from iibr_core.types import GridShape, ImageSize, InputError, Quality, ViewOffset
+from iibr_core.types import GridShape, ImageSize, InputError, ViewOffset
 
 
 def bytes_of(**arrays: str) -> int:
@@ -45,8 +45,6 @@ USUAL_HOLES, USUAL_AMBIGUOUS = 0.12, 0.2
 PHOTO_BYTES = bytes_of(colors="3f4", found="f4", refined="f4", field="f4", stored="3u1", inpainted="?")
 RAY_BYTES = bytes_of(colors="3f4", disparity="f4", coverage="f4", edge_level="u1")
 """Of one source image, see `RaySet`."""
-STATISTICS_BYTES = bytes_of(low="f4", high="f4", step="f4")
-"""Of one source image, where the transformer is asked."""
 DETAIL_BYTES = bytes_of(detail="f4", connected="u1")
 FILLED_BYTES = bytes_of(colors="3f4", disparity="f4", coverage="f4")
 VIEW_BYTES = bytes_of(colors="3f4", disparity="f4", occluded="?", inpainted="?", uncovered="f4") + FILLED_BYTES
@@ -85,13 +83,12 @@ class Making(NamedTuple):
     images: int
     hole_share: float
     ambiguous_share: float
-    quality: Quality
 
     @classmethod
     def usual(cls, pixels: float) -> Making:
         """What scenes take before anything is known of them but their size."""
         images = 2 + len(outer_views_of_grid(USUAL_GRID))
-        return cls(pixels, pixels, images, USUAL_HOLES, USUAL_AMBIGUOUS, "balanced")
+        return cls(pixels, pixels, images, USUAL_HOLES, USUAL_AMBIGUOUS)
 
 
 def undecided_bytes() -> int:
@@ -114,11 +111,11 @@ def making_bytes(making: Making) -> int:
     """The most that is held while views are made, beside the photo and views that are done: the ray set; and then a
     view for each core, or the one whose holes are filled.
     """
-    pixels, asks = making.pixels, making.quality != "fast"
+    pixels = making.pixels
     band = min(pixels, MOST_BAND_PIXELS)
     in_flight = THREADS * (pixels * VIEW_BYTES + band * (BAND_BYTES + making.ambiguous_share * _ambiguous_bytes()))
     filling = pixels * (VIEW_BYTES + making.hole_share * HOLE_BYTES)
-    rays = making.images * (RAY_BYTES + (STATISTICS_BYTES if asks else 0)) + DETAIL_BYTES
+    rays = making.images * RAY_BYTES + DETAIL_BYTES
     return round(making.canvas_pixels * rays + max(in_flight, filling))
 
 
@@ -294,8 +291,7 @@ def require_free_views(budget: Budget, canvas: ImageSize, largest: ImageSize) ->
     """Raise InputError where views of cameras cannot be made. canvas: (height, width) of the photo as far as they look
     beyond its frame; largest: of their pictures.
     """
-    usual = Making.usual(math.prod(canvas))._replace(quality="fast")
-    needed = WRITER_BYTES + math.prod(canvas) * PHOTO_BYTES + making_bytes(usual)
+    needed = WRITER_BYTES + math.prod(canvas) * PHOTO_BYTES + making_bytes(Making.usual(math.prod(canvas)))
     needed += math.prod(largest) * FLOAT_PICTURE_BYTES
     budget.require(needed, f"views of {largest} from a canvas of {canvas}", "raise --memory or lower --max-pixels")
 

@@ -10,6 +10,7 @@ from iibr_core.generation.memory_model import DRAFT_BYTES, undecided_bytes
 from iibr_core.generation.stored_views import StoredViews
 from iibr_core.rendering.view_synthesis import ViewSynthesis
 from iibr_core.runtime import tiling
+from iibr_core.training.degradation import blur
 from iibr_core.types import GridShape, ViewOffset
 from tests.iibr_core.scenes import by_index, disparity_of, literal_plan, photo_of, smooth_texture, square_before_wall
 
@@ -20,8 +21,7 @@ OUTER = {(0, 0), (0, 4), (4, 0), (4, 4)}
 def blurred_square():
     """Its edges are soft, so that many rays are undecided."""
     photo, disparity = square_before_wall(60, 80, 3.0)
-    soft = np.mean([np.roll(disparity.values, k, axis=1) for k in range(-2, 3)], axis=0)
-    return photo, disparity_of(soft)
+    return photo, disparity_of(blur(disparity.values, 0.7))
 
 
 def crossing_bars():

@@ -12,7 +12,6 @@ from iibr_core.generation.memory_model import (
     MIB,
     PHOTO_BYTES,
     RAY_BYTES,
-    STATISTICS_BYTES,
     VIEWER_BYTES,
     WRITER_BYTES,
     Budget,
@@ -157,12 +156,12 @@ def test_a_ray_takes_what_is_counted_for_it():
     image = np.zeros((64, 80), np.float32)
     rays.add(ViewOffset(0.0, 0.0), np.zeros((64, 80, 3), np.float32), image, np.ones_like(image))
     assert sum(part.nbytes for part in rays.arrays if np.ndim(part) > 2) == 5120 * RAY_BYTES
-    more = making_bytes(Making(5120, 5120, 3, 0, 0, "balanced")) - making_bytes(Making(5120, 5120, 2, 0, 0, "balanced"))
-    assert more == 5120 * (RAY_BYTES + STATISTICS_BYTES)
+    more = making_bytes(Making(5120, 5120, 3, 0, 0)) - making_bytes(Making(5120, 5120, 2, 0, 0))
+    assert more == 5120 * RAY_BYTES
 
 
 def test_views_in_flight_and_the_one_that_is_filled_do_not_add_up():
-    counts = [making_bytes(Making(10**6, 10**6, 2, hole, 0, "fast")) for hole in (0.0, 0.2, 0.9)]
+    counts = [making_bytes(Making(10**6, 10**6, 2, hole, 0)) for hole in (0.0, 0.2, 0.9)]
     assert counts[0] == counts[1] < counts[2]
 
 
