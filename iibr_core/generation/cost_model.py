@@ -26,7 +26,7 @@ SMOOTH_PX = 0.4
 """A surface whose pixels move apart by less than this is smooth: see `ray_set.SMOOTH_SHARE`."""
 AMBIGUOUS_PX = 1.5
 """Where disparities move apart by more than this, surfaces meet: some rays there are ambiguous."""
-OPEN_SHARE = 0.165
+OPEN_SHARE = 0.11
 """Of the rays where surfaces meet, so many are left open by the closed form."""
 MOST_PARALLAX_PX = 1e6
 

@@ -12,7 +12,6 @@ from math import ceil
 import numpy as np
 
 from iibr_core.generation.cost_model import (
-    CORES,
     NO_COST,
     STILL_PX,
     CostEstimates,
@@ -49,11 +48,6 @@ from iibr_core.types import (
 STEP_PX = 8.0
 """For viewing: neighbouring views may differ by this much parallax; the renderer interpolates along disparity. A
 quarter of the views costs a third of a decibel (docs/speed.md).
-"""
-MOST_LONGER, MOST_LONGER_S = 0.5, 0.25
-"""What the transformer gains, a tenth of a decibel, hardly depends on how many rays it is asked for; its time does.
-It is not asked if that takes longer by this share of the closed form's time, and by so much
-processor time.
 """
 MOST_VIEWS_A_SIDE = 9
 MOST_COMFORTABLE = 2.0
@@ -241,7 +235,7 @@ def _complete_plan(
     field = (disparity.values - np.float32(zero)) * np.float32(scale)
     statistics = measure_parallax(field, largest_offset(grid))
     costs = estimate_costs(statistics, grid)
-    quality = wanted or _choose_quality(costs)
+    quality = wanted or ("balanced" if statistics.ambiguous_share(1.0) > 0 else "fast")
     pixels, peak_bytes = photo.size.height * photo.size.width, costs.of(quality).peak_bytes
     field_bytes = grid.rows * grid.columns * view_bytes(pixels, photo.is_hdr)
     draft_bytes = 0
@@ -261,7 +255,7 @@ def _complete_plan(
         (
             *reasons,
             *edge_reasons(statistics, inpaint, len(outer_views_of_grid(grid))),
-            quality_reason(costs, quality, wanted is not None),
+            quality_reason(quality, wanted is not None),
             f"Memory: {mebibytes(field_bytes)} for the views, {mebibytes(peak_bytes + draft_bytes)} to make them,"
             f" {mebibytes(in_all)} in all.",
         ),
@@ -269,10 +263,3 @@ def _complete_plan(
         quality=quality,
         draft_bytes=draft_bytes,
     )
-
-
-def _choose_quality(costs: CostEstimates) -> Quality:
-    """Fast where the transformer has nothing to decide, or takes too long for what it gains; else balanced."""
-    longer_s = CORES * (costs.balanced.seconds - costs.fast.seconds)
-    is_dear = longer_s > max(MOST_LONGER_S, MOST_LONGER * CORES * costs.fast.seconds)
-    return "fast" if is_dear or longer_s <= 0 else "balanced"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from iibr_core.generation.cost_model import CostEstimates, ParallaxStatistics
+from iibr_core.generation.cost_model import ParallaxStatistics
 from iibr_core.generation.disparity_range import DisparityRange
 from iibr_core.inpainting.registry import DEFAULT_INPAINTER, INPAINTERS
 from iibr_core.types import FloatImage, GridShape, Quality
@@ -40,14 +40,11 @@ def edge_reasons(statistics: ParallaxStatistics, inpaint: str, outer_views: int)
     return reasons
 
 
-def quality_reason(costs: CostEstimates, quality: Quality, is_asked: bool) -> str:
+def quality_reason(quality: Quality, is_asked: bool) -> str:
     """Why the views are made in this quality."""
-    fast, balanced = costs.fast.seconds, costs.balanced.seconds
-    why = ": no ray is ambiguous."
+    why = ": the trained ray transformer decides where rays are ambiguous."
     if is_asked:
         why = ", as asked."
-    elif quality == "balanced":
-        why = ": the trained ray transformer decides where rays are ambiguous."
-    elif balanced > fast:
-        why = f": the trained ray transformer would take {balanced / fast:.1f} times as long and gain little."
+    elif quality == "fast":
+        why = ": no ray is ambiguous."
     return f"{quality.capitalize()} quality{why}"

@@ -36,7 +36,7 @@ AROUND = np.concatenate([BESIDE, 2 * DIAGONAL, 3 * BESIDE])
 AROUND_DISTANCE = np.hypot(*AROUND.T)
 NOWHERE_PX = 7.0
 """How far away a surface counts as landing that lands nowhere around: as the transformer was trained."""
-LEAST_STAKE = 0.02
+LEAST_STAKE = 0.05
 """Nothing is to be decided where what the heaviest surface leaves of a ray, times how far the colours of its hypotheses
 lie apart, sRGB-encoded, is no more than this.
 """
@@ -129,15 +129,14 @@ def find_undecided_rays(
 @kernel
 def _is_open(number, source, weights, photo_images, y, x):
     """Whether the closed form leaves open what a ray shows: it covers the ray in part, or by several surfaces of which
-    none is a fringe: a fringe tells the shares.
+    none is a fringe, as a fringe tells the shares; and the heaviest leaves enough of the ray.
     """
-    heavy, fringed, covered = 0, False, 0.0
+    heaviest, covered, fringed = 0.0, 0.0, False
     for k in range(np.int64(number[y, x])):
         covered += weights[k, y, x]
-        if weights[k, y, x] > FAINT_WEIGHT:
-            heavy += 1
-            fringed |= 0 < source[k, y, x] < photo_images
-    return covered < 1.0 - FAINT_WEIGHT or (heavy != 1 and not fringed)
+        heaviest = max(heaviest, weights[k, y, x])
+        fringed |= weights[k, y, x] > FAINT_WEIGHT and 0 < source[k, y, x] < photo_images
+    return 1.0 - heaviest > LEAST_STAKE and (covered < 1.0 - FAINT_WEIGHT or not fringed)
 
 
 @kernel
