@@ -23,7 +23,7 @@ CORES = THREADS
 STILL_PX = 0.5
 """Less parallax than this across the whole grid cannot be seen: the scene is flat."""
 SMOOTH_PX = 0.4
-"""A surface whose pixels move apart by less than this is smooth: see `ray_set.SMOOTH_SHARE`."""
+"""A surface whose pixels move apart by less than this is smooth: see `surfaces.SMOOTH_SHARE`."""
 AMBIGUOUS_PX = 1.5
 """Where disparities move apart by more than this, surfaces meet: some rays there are ambiguous."""
 OPEN_SHARE = 0.11

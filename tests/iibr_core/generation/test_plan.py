@@ -2,6 +2,7 @@ import re
 import subprocess
 import sys
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from iibr_core.generation.plan import (
     plan_for_viewing,
     plan_literal,
 )
+from iibr_core.rendering.ray_cells import CELL_PX
 from iibr_core.training.batches import ambiguous_rays_of_view
 from iibr_core.training.degradation import blur
 from iibr_core.training.scenes.random_scene import random_scene, render
@@ -240,3 +242,20 @@ def test_surfaces_meet_from_a_step_of_one_and_a_half_pixels_on(step_px, meets):
     assert (statistics.edge_share > 0) == meets
     assert (statistics.ambiguous_share(1.0) > 0) == meets
     assert statistics.ambiguous_share(0.5) == 0
+
+
+@pytest.mark.parametrize("size", [(1, 1), (3, 9), (8, 12), (11, 6)])
+def test_steps_and_spread_of_cells_against_a_slow_twin(size):
+    values = np.random.default_rng(3).normal(0, 2, size).astype(np.float32)
+    found = measure_parallax(values, 1.0)
+    assert found.step.shape == found.spread.shape == (-(-size[0] // CELL_PX), -(-size[1] // CELL_PX))
+    for row, column in np.ndindex(found.step.shape):
+        y, x = CELL_PX * row, CELL_PX * column
+        around = values[y : y + 2 * CELL_PX, x : x + 2 * CELL_PX]
+        assert found.spread[row, column] == around.max() - around.min()
+        steps = [0.0]
+        for v, u in product(range(y, min(y + CELL_PX, size[0])), range(x, min(x + CELL_PX, size[1]))):
+            beside = [(v - 1, u), (v + 1, u), (v, u - 1), (v, u + 1)]
+            steps += [abs(values[v, u] - values[b]) for b in beside if 0 <= b[0] < size[0] and 0 <= b[1] < size[1]]
+        assert found.step[row, column] == max(steps)
+    assert found.pixels == size[0] * size[1]
