@@ -198,7 +198,7 @@ def test_a_choice_fails_that_is_slower_than_one_as_good(time, psnr_db, is_good_e
 def test_a_plan_that_chose_balanced_here_would_be_found_out(
     quality: Quality, is_met: bool, scenes: list[BenchScene], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Errors as they are; times as the plan predicts them."""
+    """Errors as they are; times as if the transformer took half as long again."""
 
     def planned(*given: Any) -> ScenePlan:
         return replace(plan_literal(*given), quality=quality)
@@ -206,9 +206,7 @@ def test_a_plan_that_chose_balanced_here_would_be_found_out(
     monkeypatch.setattr("benchmarks.speed.__main__.plan_literal", planned)
     variants = [REFERENCE, Variant("balanced", "balanced")]
     found = measure_scene(scenes[0], variants, 1, quiet)
-    costs = plan_literal(*scenes[0].given, scenes[0].grid).costs
-    seconds = {variant.name: costs.of(variant.quality).seconds for variant in variants}
-    timed = tuple(replace(m, ratio=seconds[m.name] / seconds["fast"]) for m in found.measured)
+    timed = tuple(replace(m, ratio=1.5 if m.name == "balanced" else 1.0) for m in found.measured)
     _, slower = front_targets([replace(found, measured=timed)])
     assert found.planned == quality
     assert slower.is_met == is_met

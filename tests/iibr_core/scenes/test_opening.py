@@ -63,6 +63,10 @@ def test_a_cut_jpeg_has_no_sketch_and_fails_as_it_did_without(tmp_path: Path) ->
 
 @pytest.mark.parametrize("takes_drafts", [True, False])
 def test_views_come_twice_where_they_may_and_progress_counts_them_once(photo_path: Path, takes_drafts: bool) -> None:
+    random = np.random.default_rng(0)  # every view has undecided rays
+    Image.fromarray(random.integers(0, 256, (64, 96, 3), np.uint8)).save(photo_path)
+    depths = random.uniform(0, 20, (8, 12)).astype(np.float32).repeat(8, 0).repeat(8, 1)
+    np.save(photo_path.with_name("scene_disparity.npy"), depths)
     source = Source(str(photo_path), grid=GridShape(3, 3))
     request = SceneRequest(1, source, takes_drafts=takes_drafts)
     ready, *results = results_of(request, lambda: False, lambda: CENTRE)
