@@ -86,7 +86,7 @@ FIGURES = (
     Figure(("figures.md#field-disparity",), "benchmarks.multi_view_depth --data DATA", 2, ("DATA",)),
     Figure(("figures.md#refocus",), "benchmarks.refocus --data DATA --repeats 2", 3, ("DATA",)),
     Figure(("figures.md#time-left",), "benchmarks.time_left", 4),
-    Figure(("figures.md#plan",), "benchmarks.prediction --data DATA --photos DATA", 6, ("DATA", "Linux")),
+    Figure(("plan.md",), "benchmarks.prediction --data DATA --photos DATA", 6, ("DATA", "Linux")),
     Figure(("memory.md#predicted",), "benchmarks.memory predicted", 3, ("Linux",)),
     Figure(("memory.md#bounds",), "benchmarks.memory bounds 12", 5, ("Linux",)),
     Figure(("memory.md#use",), "benchmarks.use --steps 150", 4, ("X",)),
