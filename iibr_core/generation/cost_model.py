@@ -127,19 +127,20 @@ def measure_parallax(disparity: FloatImage, outermost: float) -> ParallaxStatist
     return ParallaxStatistics(
         image_size(moved),
         step[1:-1, 1:-1],
-        _spread(moved, CELL_PX),
+        _spread(moved),
         float(np.abs(moved).max()),
         _hole_share(moved),
         outpainting_margins(moved, [ViewOffset(-1.0, -1.0), ViewOffset(1.0, 1.0)]).around(image_size(moved)),
     )
 
 
-def _spread(moved: FloatImage, cell_px: int) -> FloatImage:
+def _spread(moved: FloatImage) -> FloatImage:
     """`ParallaxStatistics.spread` of disparities (H, W)."""
-    rows, columns = (np.arange(0, length, cell_px) for length in moved.shape)
+    from iibr_core.rendering.ray_cells import over_cells
+
     around = []
     for extreme in (np.maximum, np.minimum):
-        found = np.pad(extreme.reduceat(extreme.reduceat(moved, rows, 0), columns, 1), ((0, 1), (0, 1)), mode="edge")
+        found = np.pad(over_cells(extreme, moved), ((0, 1), (0, 1)), mode="edge")
         found = extreme(found[1:], found[:-1])
         around.append(extreme(found[:, 1:], found[:, :-1]))
     return np.asarray(around[0] - around[1])

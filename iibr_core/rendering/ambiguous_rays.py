@@ -155,11 +155,8 @@ def _select_rays(landed, decided, selected_rows, every, pixel):
             if smooth[cell_row, cell] and not every:
                 continue
             for x in range(cell * CELL_PX, min((cell + 1) * CELL_PX, width)):
-                # Most rays: one surface that covers them.
-                is_sole = number[y, x] == 1 and weights[0, y, x] >= 1.0 - FAINT_WEIGHT
-                if decided[y, x] or (is_sole and not every):
-                    continue
-                if every or _is_open(number, candidates.source, weights, photo_images, y, x):
+                is_open = every or _is_open(number, candidates.source, weights, photo_images, y, x)
+                if is_open and not decided[y, x]:
                     pixel[found, 0], pixel[found, 1] = y, x
                     found += 1
     return found

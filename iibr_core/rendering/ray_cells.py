@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,10 +26,10 @@ class Cells(NamedTuple):
     step: FloatImage
 
 
-def any_in_cells(marked: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """(M, N): cells of which any pixel (H, W) is marked."""
-    rows, columns = (np.arange(0, length, CELL_PX) for length in marked.shape)
-    return np.asarray(np.logical_or.reduceat(np.logical_or.reduceat(marked, rows, 0), columns, 1))
+def over_cells(combine: np.ufunc, pixels: NDArray[Any]) -> NDArray[Any]:
+    """(M, N): what combine makes of the pixels (H, W) of each cell: np.logical_or, np.maximum."""
+    rows, columns = (np.arange(0, length, CELL_PX) for length in pixels.shape)
+    return np.asarray(combine.reduceat(combine.reduceat(pixels, rows, 0), columns, 1))
 
 
 @kernel

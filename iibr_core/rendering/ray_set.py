@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.rendering.ray_cells import CELL_PX, Cells, any_in_cells, largest_steps, sum_up
+from iibr_core.rendering.ray_cells import CELL_PX, Cells, largest_steps, over_cells, sum_up
 from iibr_core.rendering.slope_connectivity import BELOW, RIGHT, connect_rays, connected_either_way
 from iibr_core.runtime.jit import kernel, nearest_pixel
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never
@@ -102,12 +102,12 @@ class RaySet:
             )
         k, connected = self._count, np.zeros(self.size, np.uint8)
         room, cells = self._room, self._cells_room
-        edge_step = step_of(EDGE_PX, self.farthest_views)
         if k == 0 and self.stages.connect_slopes:
             self.connected = connected = connect_rays(disparity, self._surface_step, should_stop)
-            self._steep = any_in_cells(connected_either_way(connected))
+            self._steep = over_cells(np.logical_or, connected_either_way(connected))
         if k > 0 and any(offset) and self.stages.leave_out_in_front:
             coverage = coverage.copy()
+            edge_step = step_of(EDGE_PX, self.farthest_views)
             _leave_out_in_front(disparity, room.disparity[0], *offset, edge_step, coverage)
 
         def band(first: int, last: int) -> None:

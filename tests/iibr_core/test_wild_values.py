@@ -671,7 +671,7 @@ READS_OR_TELLS = {
     "rendering.ambiguous_rays": "UndecidedRays",
     "rendering.candidates": "Candidates",
     "rendering.large_views": "Part tiles_of whole",
-    "rendering.ray_cells": "Cells any_in_cells",
+    "rendering.ray_cells": "Cells over_cells",
     "rendering.ray_set": "RayArrays",
     "rendering.renderer": "Renderer",
     "rendering.resampling": "ShownRays",

@@ -119,10 +119,10 @@ def test_agrees_with_a_slow_twin_across_blocks():
     size = (PATCH_BLOCK_PX + 6, PATCH_BLOCK_PX + 20)
     y, x = np.indices(size)
     disparity = np.where(x + y < 70, 0.0, 2.0).astype(np.float32)
-    colors = (0.5 + 0.3 * np.sin(x / 3)[..., None] + random.normal(0, 0.03, (*size, 3))).astype(np.float32)
+    colors = (0.5 + 0.3 * np.sin(x / 3)[..., None] + random.normal(0, 0.04, (*size, 3))).astype(np.float32)
     hole = (abs(x - PATCH_BLOCK_PX) < 4) & (y > 50) | (random.random(size) < 0.01)
     expected = copy_slowly(colors, disparity, hole, ONE_SURFACE)
-    assert np.abs(expected - colors)[hole].max() > 0.08
+    assert np.abs(expected - colors)[hole].max() > 0.1
     assert copied(colors, disparity, hole) == pytest.approx(expected, abs=1e-4)
 
 
