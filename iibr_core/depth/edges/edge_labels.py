@@ -62,6 +62,11 @@ MOST_MEASURED_PIXELS = 1 << 14
 PASSES = 8
 """Of mean field (Kraehenbuehl and Koltun 2011)."""
 MOST_PIECE_PIXELS = 1 << 12
+AROUND = np.indices((2 * LABELLED_PX + 3,) * 2).reshape(2, -1).T - LABELLED_PX - 1
+AROUND = AROUND[np.argsort((AROUND**2).sum(axis=1), kind="stable")][1:]
+"""Rows and columns from a pixel to those around it, nearest first: where its other surface is looked for."""
+NEIGHBOURS = AROUND[:8]
+"""The eight that touch it."""
 
 
 def label_edges(
@@ -165,11 +170,14 @@ def _mean_field(
     """(N): how likely each pixel (flat index) is on its own surface rather than on the other."""
     number = np.empty(values.shape, np.int32)
     number_pixels(pixels, number)
+    drive, votes = drive.copy(), np.empty((len(pixels), len(NEIGHBOURS)), np.float32)
     belief = np.ones(len(pixels), np.float32)
     firsts = range(0, len(pixels), MOST_PIECE_PIXELS)
+    count = partial(_count_votes, colors, values, pixels, number, other, alike, drive, votes)
+    in_pieces(count, firsts, should_stop, tiling.THREADS)
     for _ in range(PASSES):
         believed, belief = belief, np.empty_like(belief)
-        work = partial(_believe, colors, values, pixels, number, other, drive, alike, believed, belief)
+        work = partial(_believe, pixels, number, drive, votes, believed, belief)
         in_pieces(work, firsts, should_stop, tiling.THREADS)
     return belief
 
@@ -212,13 +220,11 @@ def _spread(distance):
 def _nearest_other(values, y, x, least_edge):
     """The disparity of the nearest pixel on another surface; the pixel's own where there is none within reach."""
     height, width = values.shape
-    found, nearest = values[y, x], 2 * (LABELLED_PX + 1) ** 2 + 1
-    for v in range(max(y - LABELLED_PX - 1, 0), min(y + LABELLED_PX + 2, height)):
-        for u in range(max(x - LABELLED_PX - 1, 0), min(x + LABELLED_PX + 2, width)):
-            away = (v - y) ** 2 + (u - x) ** 2
-            if away < nearest and not same_surface(values[v, u], values[y, x], least_edge):
-                found, nearest = values[v, u], away
-    return found
+    for n in range(len(AROUND)):
+        v, u = y + AROUND[n, 0], x + AROUND[n, 1]
+        if 0 <= v < height and 0 <= u < width and not same_surface(values[v, u], values[y, x], least_edge):
+            return values[v, u]
+    return values[y, x]
 
 
 @kernel
@@ -248,12 +254,13 @@ def _weigh_colors(colors, values, trust, least_edge, alike, pixels):
                     continue
                 side = 0 if to_own <= to_other else 1
                 w = LABEL_NEARNESS[v - y + LABEL_PX, u - x + LABEL_PX] * trust[v, u]
-                apart = np.float32(0.0)
+                apart = square = np.float32(0.0)
                 for c in range(3):
                     color = colors[v, u, c]
                     apart += (color - colors[y, x, c]) ** 2
+                    square += color * color
                     total[side, c] += w * color
-                    squares[side] += w * color * color
+                squares[side] += w * square
                 # Colours that are not finite are like no other.
                 weight[side] += w
                 like[side] += w * exp(apart * sharpness) if apart < np.inf else 0.0
@@ -295,35 +302,51 @@ def _mixed_likelihood(color, weight, total, background_squares, background, alik
 
 
 @kernel
-def _believe(colors, values, pixels, number, other, drive, alike, believed, belief, first):
-    """One pass of mean field over MOST_PIECE_PIXELS pixels from the first on: their belief by the neighbours'."""
+def _count_votes(colors, values, pixels, number, other, alike, drive, votes, first):
+    """For MOST_PIECE_PIXELS pixels from the first on: what each neighbour adds if it is on its own surface rather than
+    on its other one, votes (N, 8); what it says on its other one goes to drive (N).
+    """
     height, width = values.shape
     for n in range(first, min(first + MOST_PIECE_PIXELS, len(pixels))):
         y, x = pixels[n] // width, pixels[n] % width
         own, half = values[y, x], 0.5 * abs(other[n] - values[y, x])
-        belief[n] = 1.0
+        votes[n] = 0.0
         if half == 0:
             continue
-        total = np.float64(drive[n])
-        for v in range(max(y - 1, 0), min(y + 2, height)):
-            for u in range(max(x - 1, 0), min(x + 2, width)):
-                if v == y and u == x:
-                    continue
-                # On its own surface a neighbour votes for whichever of both that is, on its other one likewise.
-                k = number[v, u]
-                stays, elsewhere = (float(believed[k]), other[k]) if k >= 0 else (1.0, values[v, u])
-                votes = 0.0
-                if same_surface(values[v, u], own, half):
-                    votes += stays
-                elif same_surface(values[v, u], other[n], half):
-                    votes -= stays
-                if same_surface(elsewhere, own, half):
-                    votes += 1.0 - stays
-                elif same_surface(elsewhere, other[n], half):
-                    votes -= 1.0 - stays
-                apart = np.float32(0.0)
-                for c in range(3):
-                    apart += (colors[v, u, c] - colors[y, x, c]) ** 2
-                like = exp(-0.5 * apart / (alike * alike)) if apart < np.inf else 0.0
-                total += PRIOR_WEIGHT * like * votes
+        for j in range(len(NEIGHBOURS)):
+            v, u = y + NEIGHBOURS[j, 0], x + NEIGHBOURS[j, 1]
+            if not (0 <= v < height and 0 <= u < width):
+                continue
+            # On its own surface a neighbour votes for whichever of both that is, on its other one likewise.
+            k = number[v, u]
+            stays = _vote(values[v, u], own, other[n], half)
+            leaves = _vote(other[k], own, other[n], half) if k >= 0 else stays
+            if stays == 0 and leaves == 0:
+                continue
+            apart = np.float32(0.0)
+            for c in range(3):
+                apart += (colors[v, u, c] - colors[y, x, c]) ** 2
+            weight = PRIOR_WEIGHT * exp(-0.5 * apart / (alike * alike)) if apart < np.inf else 0.0
+            drive[n] += weight * leaves
+            votes[n, j] = weight * (stays - leaves)
+
+
+@kernel
+def _vote(value, own, other, half):
+    """1 for a pixel's own surface, -1 for the other one, 0 for none: on which of both this disparity is."""
+    if same_surface(value, own, half):
+        return 1.0
+    return -1.0 if same_surface(value, other, half) else 0.0
+
+
+@kernel
+def _believe(pixels, number, drive, votes, believed, belief, first):
+    """One pass of mean field over MOST_PIECE_PIXELS pixels from the first on: their belief by the neighbours'."""
+    width = number.shape[1]
+    for n in range(first, min(first + MOST_PIECE_PIXELS, len(pixels))):
+        y, x = pixels[n] // width, pixels[n] % width
+        total = drive[n]
+        for j in range(len(NEIGHBOURS)):
+            if votes[n, j] != 0:
+                total += votes[n, j] * believed[number[y + NEIGHBOURS[j, 0], x + NEIGHBOURS[j, 1]]]
         belief[n] = 1.0 / (1.0 + exp(-min(max(total, -30.0), 30.0)))

@@ -181,7 +181,9 @@ def test_a_pass_of_the_field_is_the_slow_one():
     number.ravel()[pixels] = np.arange(len(pixels))
     belief = np.empty(len(pixels), np.float32)
     others, drives, beliefs = (np.float32(each.ravel()[pixels]) for each in (other, drive, believed))
-    edge_labels._believe(photo, values, pixels, number, others, drives, 0.2, beliefs, belief, 0)
+    votes = np.empty((len(pixels), 8), np.float32)
+    edge_labels._count_votes(photo, values, pixels, number, others, 0.2, drives, votes, 0)
+    edge_labels._believe(pixels, number, drives, votes, beliefs, belief, 0)
     expected = slow_pass(photo, values, other, drive, 0.2, believed)
     np.testing.assert_allclose(belief, expected.ravel()[pixels], atol=1e-5)
 
