@@ -1,13 +1,16 @@
 #version 330 core
 // Light through the aperture: the weighted sum over its samples, each sheared to the focus plane.
-// REPROJECT: other views stand in for those wanted. TILES: where all is sharp few samples suffice.
+// REPROJECT: other views stand in for those wanted. TILES: where all is sharp few samples suffice, and a tile that has
+// its passes gets no more.
 #include "samples.glsl"
 #include "layers.glsl"
 #include "gloss.glsl"
 
 uniform float share;     // of this pass in the picture; the rest comes from the pinhole pass
 #ifdef TILES
-uniform sampler2D tiles;    // see defocus_tiles.frag
+uniform sampler2D tiles;       // see defocus_tiles.frag
+uniform sampler2D wide_tiles;  // see widen_tiles.frag
+uniform float passes;          // that are drawn before this one
 uniform int sparse_count;   // the first samples that suffice where all is sharp
 uniform float sparse_up_to_px;
 #endif
@@ -50,9 +53,11 @@ void main() {
     bool is_sparse = false;
 #ifdef TILES
     // All sharp: the first few samples suffice, with weights of their own.
-    vec2 widest = texelFetch(tiles, ivec2(target_uv * vec2(textureSize(tiles, 0))), 0).xy;
+    ivec2 tile = ivec2(target_uv * vec2(textureSize(tiles, 0)));
+    vec2 widest = texelFetch(tiles, tile, 0).xy;
     is_sparse = max(widest.x, widest.y) < sparse_up_to_px;
     if (is_sparse) count = sparse_count;
+    if (passes >= texelFetch(wide_tiles, tile, 0).z) count = 0;
 #endif
     vec4 all = vec4(0.0), sharp = vec4(0.0), front = vec4(0.0);
 #ifdef LAYERS

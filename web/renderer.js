@@ -3,7 +3,8 @@
 // viewer/gpu/refocus, where everything is explained at length.
 
 const MAX_SAMPLES = 512, MAX_SOURCES = 4, MAX_SEARCH_STEPS = 96, TILE_PX = 16, BLOCK_PX = 16, MAX_TILE_TAPS = 8;
-const MAX_PASSES = 16, ONE_PASS_UP_TO_PX = 3, PASS_BLUR_PX = 1.5, STILL_SAMPLES = 600, EDGE_PASSES = 5;
+const MAX_PASSES = 16, ONE_PASS_UP_TO_PX = 1.75, PASS_BLUR_PX = 1.5, LEAST_PASSES = 4;
+const STILL_SAMPLES = 600, EDGE_PASSES = 5;
 const FADE_FROM_PX = 4, FADE_TO_PX = 6, LEAST_ACROSS = 2, SPARSE_UP_TO_PX = 1.2, OFF_BORDER_PX = 1 / 256;
 const LEAST_WEIGHT = 2e-4, LEAST_SCALE = 0.4, FINE = 48, HALVINGS = 14;
 export const LEVELS = [[1, 4, 1], [1, 2, 1], [1, 1, 1], [1, 1, 0.7], [1, 1, 0.5], [2, 1, 0.7], [2, 1, 0.5], [3, 1, 0.5],
@@ -122,7 +123,7 @@ export function passPlaces(lens, field) {
     if (lens.share > 0 && lens.keepsLayers && lens.widestBlurPx > ONE_PASS_UP_TO_PX) {
         const samples = samplesOf(lens, field, { t: 0, s: 0 }).length;
         const close = Math.ceil((lens.widestBlurPx / PASS_BLUR_PX) ** 2);
-        count = Math.min(close, MAX_PASSES, Math.trunc(STILL_SAMPLES / samples));
+        count = Math.min(Math.max(close, LEAST_PASSES), MAX_PASSES, Math.trunc(STILL_SAMPLES / samples));
     }
     if (lens.share < 1 && field.hasDisparity && !isStored) count = Math.max(count, EDGE_PASSES);
     return Array.from({ length: Math.max(count, 1) }, (_, k) => ({  // the R2 sequence
@@ -311,7 +312,8 @@ export class Renderer {
         write(this.blocks, gl.RG, gl.FLOAT, ranges, across, down);
     }
 
-    // Draws with the program of a shader and its switches. values, textures: see Program.use.
+    // Draws with the program of a shader and its switches. values, textures: see Program.use. keeps: whether what is
+    // there is added to, or, with "multiplies", multiplied.
     draw(fragment, switches, target, values, textures = {}, vertices = 3, keeps = false) {
         const { gl, shaders } = this, names = switches.filter(Boolean), key = [fragment, ...names].join(" ");
         if (!this.programs.has(key)) {
@@ -322,7 +324,8 @@ export class Renderer {
         gl.bindFramebuffer(gl.FRAMEBUFFER, target.framebuffer);
         gl.viewport(0, 0, target.width, target.height);
         (keeps ? gl.enable : gl.disable).call(gl, gl.BLEND);
-        gl.blendFunc(gl.ONE, gl.ONE);
+        if (keeps === "multiplies") gl.blendFunc(gl.ZERO, gl.SRC_COLOR);
+        else gl.blendFunc(gl.ONE, gl.ONE);
         const bound = Object.entries(textures).map(([name, texture]) => [name, [gl.TEXTURE_2D, texture]]);
         const arrays = ["colors", "disparities", "blocks"].map((name) => [name, [gl.TEXTURE_2D_ARRAY, this[name]]]);
         this.programs.get(key).use({ part: [0, 0, 1, 1], ...values }, Object.fromEntries([...arrays, ...bound]));
@@ -358,6 +361,10 @@ export class Renderer {
         picture.at += batch.length;
         if (picture.at < picture.samples.length) return false;
         Object.assign(picture, { pass: picture.pass + 1, samples: null, at: 0 });
+        if (lens.keepsLayers && picture.pass > 1) {
+            const tiles = targets.wideTiles.textures[0];
+            this.draw("finished_tiles.frag", [], sum, { passes: picture.pass }, { tiles }, 3, "multiplies");
+        }
         this.finish(picture);
         return true;
     }
@@ -421,12 +428,13 @@ export class Renderer {
         const { lens, targets } = picture, reprojects = batch.some((sample) => !sample.isDirect);
         const tiles = lens.keepsLayers && "TILES";
         const values = {
-            ...this.fieldValues(picture), ...this.setSamples(batch, lens), share: lens.share,
+            ...this.fieldValues(picture), ...this.setSamples(batch, lens), share: lens.share, passes: picture.pass,
             sparse_count: batch.filter((sample) => sample.sparse !== undefined).length,
             sparse_up_to_px: picture.samples.some(({ sparse }) => sparse !== undefined) ? lens.sparseUpToPx : 0,
         };
         const switches = this.switches(picture, tiles, reprojects && "REPROJECT");
-        const textures = tiles ? { tiles: targets.tiles.textures[0] } : {};
+        const [blurs, passes] = [targets.tiles, targets.wideTiles].map(({ textures: [first] }) => first);
+        const textures = tiles ? { tiles: blurs, wide_tiles: passes } : {};
         this.draw("aperture.frag", switches, sum, values, textures, 3, picture.holdsSum);
         picture.holdsSum = true;
     }
@@ -448,18 +456,22 @@ export class Renderer {
         const reprojects = samples.some((sample) => !sample.isDirect) && "REPROJECT";
         this.draw("defocus_tiles.frag", [reprojects], targets.tiles, values);
         const reach = Math.min(Math.ceil((lens.widestBlurPx / 2 + TILE_PX / 2) / TILE_PX), 4);
-        this.draw("widen_tiles.frag", [], targets.wideTiles, { reach }, { tiles: targets.tiles.textures[0] });
+        // The pinhole's share comes with every pass.
+        const [onePassPx, least] = lens.share === 1 ? [ONE_PASS_UP_TO_PX, LEAST_PASSES] : [-1, 1e9];
+        const limits = { one_pass_up_to_px: onePassPx, pass_blur_px: PASS_BLUR_PX, least_passes: least };
+        const [tiles] = targets.tiles.textures;
+        this.draw("widen_tiles.frag", [], targets.wideTiles, { reach, ...limits }, { tiles });
     }
 
     // Smooths what is summed up, and shows it: always at the canvas' own size.
     finish(picture) {
         const { lens, targets, width, height, pass } = picture, { gl, canvas } = this;
-        const narrowing = 1 / Math.sqrt(Math.max(pass, 1)), [tiles] = targets.wideTiles.textures;
+        const smoothing = { passes: Math.max(pass, 1), spread: 1 }, [tiles] = targets.wideTiles.textures;
         const textures = { focus_layer: targets.light.textures[0] };
         if (lens.keepsLayers) {
             const { sums, across, smooth } = this.layersOf(targets), [, foreground, background] = sums.textures;
             const spread = (from, to, step) => this.draw("smooth.frag", [], to,
-                { narrowing, empty_up_to_px: lens.sharpUpTo[0], texel_step: step },
+                { ...smoothing, empty_up_to_px: lens.sharpUpTo[0], texel_step: step },
                 { foreground_layer: from[0], background_layer: from[1], tiles });
             spread([foreground, background], across, [1 / across.width, 0]);
             spread(across.textures, smooth, [0, 1 / smooth.height]);
@@ -469,7 +481,7 @@ export class Renderer {
         }
         if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
         this.draw("present.frag", [lens.keepsLayers && "LAYERS"], { framebuffer: null, width, height },
-            { exposure: 1, narrowing }, textures);
+            { exposure: 1, ...smoothing }, textures);
         gl.flush();
     }
 }

@@ -30,6 +30,7 @@ SHADERS = (
     "aperture.frag",
     "defocus_tiles.frag",
     "widen_tiles.frag",
+    "finished_tiles.frag",
     "smooth.frag",
     "present.frag",
 )

@@ -34,6 +34,12 @@ class RenderTarget:
         self._ctx.enable(moderngl.BLEND)
         self._ctx.blend_func = moderngl.ONE, moderngl.ONE
 
+    def multiply(self) -> None:
+        """Multiply what is here by what is drawn from now on."""
+        self.framebuffer.use()
+        self._ctx.enable(moderngl.BLEND)
+        self._ctx.blend_func = moderngl.ZERO, moderngl.SRC_COLOR
+
     def read(self, dtype: type[np.uint8] | type[np.float32]) -> NDArray[Any]:
         """What was drawn, (H, W, 3), bytes or floats, row 0 at the top."""
         width, height = self.framebuffer.size
@@ -75,8 +81,8 @@ class LayerTargets:
 class RenderTargets:
     """The targets of one picture size.
 
-    light: all of it, or what is sharp. tiles, wide_tiles: blur widths. spans: where searches begin and end. image: the
-    finished picture, RGBA8, rows bottom-up.
+    light: all of it, or what is sharp. tiles, wide_tiles: blur widths, and passes. spans: where searches begin and end.
+    image: the finished picture, RGBA8, rows bottom-up.
     """
 
     def __init__(self, ctx: moderngl.Context, size_px: ScreenSize, tile_px: int) -> None:

@@ -12,7 +12,7 @@ from iibr_core.color import srgb_from_linear
 from iibr_core.rendering.optics import CENTRE, Optics
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.gpu.scenes import TwoPlanes, rms
-from viewer.gpu.refocus.passes import TILE_PX, Passes, _search_steps
+from viewer.gpu.refocus.passes import TILE_PX, Passes, _search_steps, passes_for
 from viewer.gpu.refocus.picture_cells import WHOLE_CELL
 from viewer.gpu.refocus.picture_lens import Lens, lens_of
 from viewer.gpu.refocus.picture_renderer import Renderer
@@ -138,6 +138,40 @@ def test_defocus_of_tiles_against_numpy(renderer: Renderer, passes: Passes, targ
     assert np.array_equal(around, windows.max((-2, -1)))
 
 
+def test_tiles_get_the_passes_that_their_blur_needs_and_weigh_alike(renderer: Renderer) -> None:
+    scene = TwoPlanes(width=480, height=96, background=1.0, foreground=5.0, radius_px=25.0)
+    scene.fill(renderer, GRID)
+    renderer.render(Optics(focus_disparity=0.5, aperture_diameter=4.0), (scene.width, scene.height))
+    while not renderer.is_converged:
+        renderer.refine(budget_s=1.0)
+    targets, accumulation = renderer._screen.shown, renderer._current()
+    count = len(accumulation.places)
+    widest = read(targets.wide_tiles.textures[0])
+    blur = widest[..., :2].max(-1)
+    np.testing.assert_array_equal(widest[..., 2], np.vectorize(passes_for)(blur))
+    assert (widest[..., 2].min(), widest[..., 2].max(), count) == (1, 9, 10)
+    weight = sum(read(texture)[..., 3] for texture in targets.layers.sums.textures)
+    # Beside the border some samples know nothing.
+    np.testing.assert_allclose(weight[24:-24, 24:-24], count, rtol=1e-4)
+
+
+def test_smoothing_narrows_with_the_passes_that_a_tile_got(
+    renderer: Renderer, passes: Passes, targets: RenderTargets
+) -> None:
+    SCENE.fill(renderer, GRID)
+    wide = lens(renderer, Optics(focus_disparity=1.0, aperture_diameter=4.0))
+    layer = RANDOM.random((SIZE[1], SIZE[0], 4)).astype(np.float32)
+    targets.layers.sums.textures[1].write(layer.tobytes())
+
+    def smoothed(width_px: float, drawn: int, wanted: int) -> NDArray[np.float32]:
+        fill_tiles(targets, width_px, 0.0, wanted)
+        passes.smooth(wide, targets, passes=drawn, spread=1.0)
+        return read(targets.layers.smooth.textures[0]).copy()
+
+    np.testing.assert_allclose(smoothed(24.0, 9, 4), smoothed(12.0, 1, 1), atol=1e-5)
+    np.testing.assert_allclose(smoothed(24.0, 4, 9), smoothed(12.0, 1, 1), atol=1e-5)
+
+
 def half_size(image: NDArray[np.float64]) -> NDArray[np.float64]:
     """The mean of every two by two pixels."""
     return image.reshape(image.shape[0] // 2, 2, image.shape[1] // 2, 2, -1).mean((1, 3))
@@ -152,7 +186,7 @@ def test_smoothing_is_a_box_as_wide_as_told(
     for texture, layer in zip(targets.layers.sums.textures[1:], layers):
         texture.write(layer.tobytes())
     fill_tiles(targets, width_px, 0.0)
-    passes.smooth(lens(renderer, Optics(focus_disparity=1.0, aperture_diameter=4.0)), targets, narrowing=1.0)
+    passes.smooth(lens(renderer, Optics(focus_disparity=1.0, aperture_diameter=4.0)), targets, passes=1, spread=1.0)
     reach = 0.25 * np.sqrt(max(width_px**2 - 11, 4.0))
     whole = int(np.ceil(reach - 0.5))
     taps = np.clip(reach + 0.5 - np.abs(np.arange(-whole, whole + 1)), 0, 1) / (2 * reach)
@@ -168,10 +202,10 @@ def test_smoothing_is_a_box_as_wide_as_told(
     assert not smooth[1].any(), "nothing is smoothed where tiles tell of nothing"
 
 
-def fill_tiles(targets: RenderTargets, front_px: float, behind_px: float) -> None:
-    """The same blur all over."""
+def fill_tiles(targets: RenderTargets, front_px: float, behind_px: float, passes: int = 1) -> None:
+    """The same blur and as many passes all over."""
     tiles = np.zeros((SIZE[1] // TILE_PX, SIZE[0] // TILE_PX, 4), np.float32)
-    tiles[..., :2] = front_px, behind_px
+    tiles[..., :3] = front_px, behind_px, passes
     targets.wide_tiles.textures[0].write(tiles.tobytes())
 
 
@@ -201,7 +235,7 @@ def test_layers_are_laid_over_each_other(
         texture.write(values.tobytes())
     fill_tiles(targets, width_px, 0.0)
     targets.image.use()
-    passes.present(wide, targets, narrowing=1.0, is_linear=False)
+    passes.present(wide, targets, passes=1, spread=1.0, is_linear=False)
     renderer._screen.show(targets)
     image = renderer.read_image()
     smoothed = min(width_px**2 / 11, 1.0)

@@ -14,7 +14,7 @@ from iibr_core.scenes import ScreenSize, clamp_to_grid
 from iibr_core.types import SRGB, ColorSpace, ViewOffset
 from viewer.gpu.light_field_texture import LightFieldTexture
 from viewer.gpu.programs import ProgramCache
-from viewer.gpu.refocus.passes import MAX_SAMPLES, Passes
+from viewer.gpu.refocus.passes import MAX_SAMPLES, Passes, passes_for
 from viewer.gpu.refocus.picture_cells import WHOLE_CELL, PictureCell
 from viewer.gpu.refocus.picture_lens import Lens
 from viewer.gpu.refocus.view_sampling import ApertureSample, nearest_present
@@ -22,12 +22,6 @@ from viewer.gpu.render_targets import RenderTarget, RenderTargets
 
 MAX_PASSES = 16
 """A still picture is the mean of at most so many passes, each with its samples elsewhere."""
-
-ONE_PASS_UP_TO_PX = 3.0
-"""As long as neighbouring samples are no farther apart, smoothing tells as much as more samples would."""
-
-PASS_BLUR_PX = 1.5
-"""Elsewhere so many passes are drawn that they are no farther apart than this."""
 
 STILL_SAMPLES = 600
 """More passes than these samples need are not worth the wait."""
@@ -65,11 +59,11 @@ class ProgressiveAccumulation:
 
 
 def pass_count(lens: Lens, field: LightFieldTexture) -> int:
-    """How many passes, until neighbouring samples are close and edges smooth."""
+    """How many passes, until neighbouring samples are close wherever the picture blurs most, and edges smooth."""
     count = 1
-    if lens.aperture_share > 0 and lens.keeps_layers and lens.widest_blur_px > ONE_PASS_UP_TO_PX:
+    if lens.aperture_share > 0 and lens.keeps_layers:
         affordable = STILL_SAMPLES // len(lens.samples(field.grid, field.present))
-        count = min(math.ceil((lens.widest_blur_px / PASS_BLUR_PX) ** 2), MAX_PASSES, affordable)
+        count = min(passes_for(lens.widest_blur_px), MAX_PASSES, affordable)
     is_warped = field.has_disparity.any() and (lens.has_dolly or not is_stored(lens.eye, field))
     if lens.aperture_share < 1 and is_warped:
         count = max(count, EDGE_PASSES)
@@ -170,11 +164,11 @@ class Accumulator:
         """
         self._disable_tests()
         lens = accumulation.lens
-        narrowing = min(_smoothing_spread(lens) / math.sqrt(max(accumulation.pass_index, 1)), 1.0)
+        passes, spread = max(accumulation.pass_index, 1), _smoothing_spread(lens)
         if lens.keeps_layers:
-            self.passes.smooth(lens, targets, narrowing)
+            self.passes.smooth(lens, targets, passes, spread)
         framebuffer.use()
-        self.passes.present(lens, targets, narrowing, is_linear, color_space)
+        self.passes.present(lens, targets, passes, spread, is_linear, color_space)
 
     def _batch_steps(
         self,
@@ -207,12 +201,15 @@ class Accumulator:
         for rows in _row_bands(target, pixels_per_step / PINHOLE_SAMPLES) if has_pinhole else ():
             yield from self.passes.draw_pinhole(field, lens, accumulation.within_px, targets, rows)
         for rows in _row_bands(target, pixels_per_step / len(batch)) if batch else ():
-            self.passes.draw_aperture(field, lens, batch, accumulation.sparse, targets, rows)
+            self.passes.draw_aperture(field, lens, batch, accumulation.sparse, targets, rows, accumulation.pass_index)
             yield
         accumulation.at += len(batch)
         accumulation.done += max(len(batch), 1)
         if accumulation.at >= len(accumulation.samples):
             accumulation.pass_index, accumulation.at = accumulation.pass_index + 1, 0
+            if lens.keeps_layers and accumulation.pass_index > 1:
+                self.passes.weigh_alike(targets, accumulation.pass_index)
+                yield
 
     def _disable_tests(self) -> None:
         self._ctx.disable(moderngl.DEPTH_TEST | moderngl.CULL_FACE | moderngl.BLEND)

@@ -37,8 +37,25 @@ OFF_BORDER_PX = 1 / 256
 TILE_PX = 16
 MAX_TILE_TAPS = 8
 
-UNITS = {"colors": 0, "disparities": 1, "tiles": 2, "fallback_views": 3, "blocks": 4}
+ONE_PASS_UP_TO_PX = 1.75
+"""As long as neighbouring samples are no farther apart, nothing is seen between them."""
+
+PASS_BLUR_PX = 1.5
+"""Elsewhere so many passes are drawn that the samples of all are no farther apart than this."""
+
+LEAST_PASSES = 4
+"""And no fewer: those of two or three lie in lines."""
+
+EVERY_PASS = 1e9
+"""More than there are."""
+
+UNITS = {"colors": 0, "disparities": 1, "tiles": 2, "fallback_views": 3, "blocks": 4, "wide_tiles": 5}
 SPANS = "intervals_of_0_and_1", "intervals_of_2_and_3"
+
+
+def passes_for(blur_px: float) -> int:
+    """In how many passes a tile is drawn, by the blur from one sample to the next: see shaders/widen_tiles.frag."""
+    return 1 if blur_px <= ONE_PASS_UP_TO_PX else max(math.ceil((blur_px / PASS_BLUR_PX) ** 2), LEAST_PASSES)
 
 
 class Passes:
@@ -170,10 +187,12 @@ class Passes:
         sparse: dict[ViewOffset, float],
         targets: RenderTargets,
         rows: PictureCell,
+        passes: int,
     ) -> None:
-        """Add samples of the lens, at most MAX_SAMPLES. rows: see `draw_pinhole`.
+        """Add samples of the lens, at most MAX_SAMPLES, to what has not all its passes. rows: see `draw_pinhole`.
 
-        sparse: weights of the samples that suffice where all is sharp; those among `samples` must come first.
+        sparse: weights of the samples that suffice where all is sharp; those among `samples` must come first. passes:
+        that are drawn before this one.
         """
         tiles = self.adaptive and lens.keeps_layers
         reprojects = _needs_reprojection(field, lens, samples)
@@ -194,9 +213,11 @@ class Passes:
         program.set_uniforms(share=lens.aperture_share)
         if tiles:
             self._bind(targets.tiles.textures[0], "tiles")
+            self._bind(targets.wide_tiles.textures[0], "wide_tiles")
             sparse_count = sum(sample.wanted in sparse for sample in samples)
             sparse_up_to_px = lens.sparse_up_to_px if sparse else 0.0  # of few samples none may be one of every other
             _set_declared(program, tiles=UNITS["tiles"], sparse_count=sparse_count, sparse_up_to_px=sparse_up_to_px)
+            _set_declared(program, wide_tiles=UNITS["wide_tiles"], passes=float(passes))
         target.framebuffer.scissor = pixels_of(rows, *target.framebuffer.size)
         target.add()
         quad.render(moderngl.TRIANGLES, vertices=3)
@@ -205,7 +226,9 @@ class Passes:
     def find_defocus(
         self, field: LightFieldTexture, lens: Lens, samples: list[ApertureSample], targets: RenderTargets
     ) -> Iterator[None]:
-        """Fill the tiles with the widest blur in each, and around each, in steps as `draw_pinhole`."""
+        """Fill the tiles with the widest blur in each, and around each, and with the passes that each is drawn in, in
+        steps as `draw_pinhole`.
+        """
         self._ctx.disable(moderngl.BLEND)
         # Stored views tell the blur without reprojection, if they are most of the samples.
         direct = [sample for sample in samples if field.grid.offset(sample.row, sample.column) == sample.wanted]
@@ -231,19 +254,36 @@ class Passes:
         program, quad = self._programs.get("widen_tiles.frag")
         self._bind(targets.tiles.textures[0], "tiles")
         reach = min(math.ceil((lens.widest_blur_px / 2 + TILE_PX / 2) / TILE_PX), 4)
-        program.set_uniforms(tiles=UNITS["tiles"], reach=reach)
+        # The pinhole's share comes with every pass.
+        skips = self.adaptive and lens.aperture_share == 1
+        program.set_uniforms(
+            tiles=UNITS["tiles"],
+            reach=reach,
+            one_pass_up_to_px=ONE_PASS_UP_TO_PX if skips else -1.0,
+            pass_blur_px=PASS_BLUR_PX,
+            least_passes=float(LEAST_PASSES) if skips else EVERY_PASS,
+        )
         targets.wide_tiles.use()
         quad.render(moderngl.TRIANGLES, vertices=3)
         yield
 
-    def smooth(self, lens: Lens, targets: RenderTargets, narrowing: float) -> None:
-        """Spread the blurred layers over what lies between samples. narrowing: of the blur that the tiles tell."""
+    def weigh_alike(self, targets: RenderTargets, passes: int) -> None:
+        """Let tiles that had all their passes before the last of these weigh as much as those that got it."""
+        program, quad = self._programs.get("finished_tiles.frag")
+        self._bind(targets.wide_tiles.textures[0], "tiles")
+        program.set_uniforms(tiles=UNITS["tiles"], passes=float(passes))
+        targets.layers.sums.multiply()
+        quad.render(moderngl.TRIANGLES, vertices=3)
+
+    def smooth(self, lens: Lens, targets: RenderTargets, passes: int, spread: float) -> None:
+        """Spread the blurred layers over what lies between samples. passes: that are drawn. spread: after one of them,
+        of the blur that the tiles tell.
+        """
         self._ctx.disable(moderngl.BLEND)
         program, quad = self._programs.get("smooth.frag")
         targets.wide_tiles.textures[0].use(2)
-        program.set_uniforms(
-            foreground_layer=0, background_layer=1, tiles=2, narrowing=narrowing, empty_up_to_px=lens.sharp_up_to_px[0]
-        )
+        program.set_uniforms(foreground_layer=0, background_layer=1, tiles=2, empty_up_to_px=lens.sharp_up_to_px[0])
+        program.set_uniforms(passes=float(passes), spread=spread)
         layers = targets.layers
         across = layers.sums.textures[1:], layers.across, (1, 0)
         down = layers.across.textures, layers.smooth, (0, 1)
@@ -259,11 +299,12 @@ class Passes:
         self,
         lens: Lens,
         targets: RenderTargets,
-        narrowing: float,
+        passes: int,
+        spread: float,
         is_linear: bool,
         color_space: ColorSpace = SRGB,
     ) -> None:
-        """The finished picture, into the framebuffer in use. narrowing: as smoothed with. is_linear: as light,
+        """The finished picture, into the framebuffer in use. passes, spread: as smoothed with. is_linear: as light,
         unbounded, not encoded. color_space: of the result.
         """
         self._ctx.disable(moderngl.BLEND)
@@ -280,7 +321,7 @@ class Passes:
             program.set_uniforms(
                 foreground_layer=1, background_layer=2, smooth_foreground=3, smooth_background=4, tiles=5
             )
-            program.set_uniforms(narrowing=narrowing)
+            program.set_uniforms(passes=float(passes), spread=spread)
         quad.render(moderngl.TRIANGLES, vertices=3)
 
     def update_fallback_views(self, field: LightFieldTexture) -> None:
