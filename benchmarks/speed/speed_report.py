@@ -127,10 +127,10 @@ interpolation of colours and 32-bit floats until a view is stored have no switch
 
 
 def markdown_of(bench: Bench) -> str:
-    """All tables. The first, the means over the scenes, is what to show elsewhere."""
+    """The means over the scenes, of which the first is what to show elsewhere, and each scene with its own map."""
     parts = [title("Speed against error", "benchmarks.speed", bench.machine), HEAD]
     parts += (f"## {what}\n\n{means_table(scenes)}\n" for what, scenes in bench.kinds)
-    parts += (f"## {each.what}\n\n{each.about}\n\n{table(each)}\n" for each in bench.scenes)
+    parts += (f"## {each.what}\n\n{each.about}\n\n{table(each)}\n" for each in bench.scenes if not each.is_soft)
     rows = ((target.what, target.target, target.measured, holds(target.is_met)) for target in bench.targets)
     parts.append(f"## Targets\n\n{markdown(('figure', 'target', 'measured', 'holds'), rows)}\n")
     return "\n".join(parts)
