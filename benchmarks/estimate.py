@@ -21,7 +21,7 @@ import psutil
 
 from benchmarks.harness.bench_scenes import DEMO
 from benchmarks.harness.real_window import is_idle, open_window, run_until_idle
-from benchmarks.harness.reports import emit, head, holds, parser_of, row, start, title
+from benchmarks.harness.reports import emit, head, holds, parser_of, row, start
 from benchmarks.harness.timing import Cost, added_bytes, in_own_process, median_cost
 from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.estimators.catalog import model_to_use
@@ -57,8 +57,7 @@ def main() -> None:
 
 def report(photo: Path, model: Path, repeats: int) -> Iterator[str]:
     """model: where it is to be saved."""
-    busy = f"Load average before: {psutil.getloadavg()[0]:.1f}."
-    yield title("Depth by a model, beside the window", "benchmarks.estimate", busy)
+    yield f"Load average before: {psutil.getloadavg()[0]:.1f}.\n"
     yield head("what", "wanted", "measured", "holds")
     in_own_process(save_model, model)
     loads, runs, added = zip(*(in_own_process(estimate, model, photo) for _ in range(repeats)))

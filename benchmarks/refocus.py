@@ -117,7 +117,7 @@ def main() -> None:
     gl = create_headless()
     try:
         drawn = (figures for scene in large for figures in measure_drawing(gl, scene, options.repeats))
-        emit(f"### {each.what}\n\n{table(each)}\n" for each in drawn)
+        emit(f"## {each.what}\n\n{table(each)}\n" for each in drawn)
     finally:
         gl.release()
 
