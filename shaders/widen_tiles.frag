@@ -3,7 +3,7 @@
 // tile is drawn (z): in as many as its samples need to lie close.
 uniform sampler2D tiles;
 uniform int reach;  // tiles
-uniform float one_pass_up_to_px, pass_blur_px;  // blur from one sample to the next: see passes.py
+uniform float one_pass_up_to_px, pass_blur_px;  // blur from one sample to the next: see picture_lens.py
 uniform float least_passes;                     // where it is more than one
 
 out vec4 width_px;

@@ -361,7 +361,7 @@ export class Renderer {
         picture.at += batch.length;
         if (picture.at < picture.samples.length) return false;
         Object.assign(picture, { pass: picture.pass + 1, samples: null, at: 0 });
-        if (lens.keepsLayers && picture.pass > 1) {
+        if (lens.keepsLayers && lens.share === 1 && picture.pass > 1) {
             const tiles = targets.wideTiles.textures[0];
             this.draw("finished_tiles.frag", [], sum, { passes: picture.pass }, { tiles }, 3, "multiplies");
         }
@@ -433,8 +433,8 @@ export class Renderer {
             sparse_up_to_px: picture.samples.some(({ sparse }) => sparse !== undefined) ? lens.sparseUpToPx : 0,
         };
         const switches = this.switches(picture, tiles, reprojects && "REPROJECT");
-        const [blurs, passes] = [targets.tiles, targets.wideTiles].map(({ textures: [first] }) => first);
-        const textures = tiles ? { tiles: blurs, wide_tiles: passes } : {};
+        const textures = tiles
+            ? { tiles: targets.tiles.textures[0], wide_tiles: targets.wideTiles.textures[0] } : {};
         this.draw("aperture.frag", switches, sum, values, textures, 3, picture.holdsSum);
         picture.holdsSum = true;
     }

@@ -39,7 +39,7 @@ LARGE = 1500, 1000
 @pytest.fixture
 def viewer(open_window: Opener, photo_path: Path, monkeypatch: pytest.MonkeyPatch) -> Driver:
     """One small step of a picture a turn, and many passes: so there are many turns however fast the machine is."""
-    monkeypatch.setattr("viewer.gpu.refocus.passes.PASS_BLUR_PX", 1.0)
+    monkeypatch.setattr("viewer.gpu.refocus.picture_lens.PASS_BLUR_PX", 1.0)
     monkeypatch.setattr("viewer.app.main_loop.SAVE_BUDGET_S", 0.0)
     monkeypatch.setattr("viewer.gpu.refocus.picture_drawing.STEP_S", 1e-4)
     driver = open_window(photo_path, grid=GridShape(3, 3))

@@ -12,9 +12,9 @@ from iibr_core.color import srgb_from_linear
 from iibr_core.rendering.optics import CENTRE, Optics
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.gpu.scenes import TwoPlanes, rms
-from viewer.gpu.refocus.passes import TILE_PX, Passes, _search_steps, passes_for
+from viewer.gpu.refocus.passes import TILE_PX, Passes, _search_steps
 from viewer.gpu.refocus.picture_cells import WHOLE_CELL
-from viewer.gpu.refocus.picture_lens import Lens, lens_of
+from viewer.gpu.refocus.picture_lens import Lens, lens_of, passes_for
 from viewer.gpu.refocus.picture_renderer import Renderer
 from viewer.gpu.refocus.view_sampling import pinhole_sources
 from viewer.gpu.render_targets import RenderTargets
@@ -165,7 +165,7 @@ def test_smoothing_narrows_with_the_passes_that_a_tile_got(
 
     def smoothed(width_px: float, drawn: int, wanted: int) -> NDArray[np.float32]:
         fill_tiles(targets, width_px, 0.0, wanted)
-        passes.smooth(wide, targets, passes=drawn, spread=1.0)
+        passes.smooth(wide, targets, passes=drawn)
         return read(targets.layers.smooth.textures[0]).copy()
 
     np.testing.assert_allclose(smoothed(24.0, 9, 4), smoothed(12.0, 1, 1), atol=1e-5)
@@ -186,7 +186,7 @@ def test_smoothing_is_a_box_as_wide_as_told(
     for texture, layer in zip(targets.layers.sums.textures[1:], layers):
         texture.write(layer.tobytes())
     fill_tiles(targets, width_px, 0.0)
-    passes.smooth(lens(renderer, Optics(focus_disparity=1.0, aperture_diameter=4.0)), targets, passes=1, spread=1.0)
+    passes.smooth(lens(renderer, Optics(focus_disparity=1.0, aperture_diameter=4.0)), targets, passes=1)
     reach = 0.25 * np.sqrt(max(width_px**2 - 11, 4.0))
     whole = int(np.ceil(reach - 0.5))
     taps = np.clip(reach + 0.5 - np.abs(np.arange(-whole, whole + 1)), 0, 1) / (2 * reach)
@@ -235,7 +235,7 @@ def test_layers_are_laid_over_each_other(
         texture.write(values.tobytes())
     fill_tiles(targets, width_px, 0.0)
     targets.image.use()
-    passes.present(wide, targets, passes=1, spread=1.0, is_linear=False)
+    passes.present(wide, targets, passes=1, is_linear=False)
     renderer._screen.show(targets)
     image = renderer.read_image()
     smoothed = min(width_px**2 / 11, 1.0)

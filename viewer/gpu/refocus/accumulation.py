@@ -14,9 +14,9 @@ from iibr_core.scenes import ScreenSize, clamp_to_grid
 from iibr_core.types import SRGB, ColorSpace, ViewOffset
 from viewer.gpu.light_field_texture import LightFieldTexture
 from viewer.gpu.programs import ProgramCache
-from viewer.gpu.refocus.passes import MAX_SAMPLES, Passes, passes_for
+from viewer.gpu.refocus.passes import MAX_SAMPLES, Passes
 from viewer.gpu.refocus.picture_cells import WHOLE_CELL, PictureCell
-from viewer.gpu.refocus.picture_lens import Lens
+from viewer.gpu.refocus.picture_lens import Lens, passes_for
 from viewer.gpu.refocus.view_sampling import ApertureSample, nearest_present
 from viewer.gpu.render_targets import RenderTarget, RenderTargets
 
@@ -84,9 +84,6 @@ def r2_sequence(count: int) -> list[ViewOffset]:
         for k in range(count)
     ]
 
-
-HIGHLIGHT_SPREAD = 2.0
-"""Samples of many passes lie unevenly: beside single bright pixels their gaps show, unless smoothing is wider."""
 
 PINHOLE_SAMPLES = 24
 """What the pinhole view costs a pixel, in samples of the aperture, about: it searches."""
@@ -163,12 +160,11 @@ class Accumulator:
         the result.
         """
         self._disable_tests()
-        lens = accumulation.lens
-        passes, spread = max(accumulation.pass_index, 1), _smoothing_spread(lens)
+        lens, passes = accumulation.lens, max(accumulation.pass_index, 1)
         if lens.keeps_layers:
-            self.passes.smooth(lens, targets, passes, spread)
+            self.passes.smooth(lens, targets, passes)
         framebuffer.use()
-        self.passes.present(lens, targets, passes, spread, is_linear, color_space)
+        self.passes.present(lens, targets, passes, is_linear, color_space)
 
     def _batch_steps(
         self,
@@ -207,8 +203,8 @@ class Accumulator:
         accumulation.done += max(len(batch), 1)
         if accumulation.at >= len(accumulation.samples):
             accumulation.pass_index, accumulation.at = accumulation.pass_index + 1, 0
-            if lens.keeps_layers and accumulation.pass_index > 1:
-                self.passes.weigh_alike(targets, accumulation.pass_index)
+            if lens.keeps_layers:
+                self.passes.weigh_alike(lens, targets, accumulation.pass_index)
                 yield
 
     def _disable_tests(self) -> None:
@@ -222,7 +218,7 @@ class Accumulator:
         accumulation.samples, accumulation.sparse = [], {}
         if lens.aperture_share > 0:
             # Smoothing narrows with the passes: in all it stays as much as that of the first, which leave room for it.
-            leaves_room = accumulation.pass_index < _smoothing_spread(lens) ** 2
+            leaves_room = accumulation.pass_index < lens.smoothing_spread**2
             every = lens.samples(field.grid, field.present, moved, is_smoothed=leaves_room)
             accumulation.sparse = _sparse_weights(every, lens, field, moved)
             accumulation.samples = sorted(
@@ -245,11 +241,6 @@ def _row_bands(target: RenderTarget, pixels: float) -> list[PictureCell]:
         return [WHOLE_CELL]
     rows = max(int(pixels / width), LEAST_ROWS)
     return [PictureCell(0.0, top / height, 1.0, min(top + rows, height) / height) for top in range(0, height, rows)]
-
-
-def _smoothing_spread(lens: Lens) -> float:
-    """How wide smoothing is, as a share of what lies between samples of one pass."""
-    return HIGHLIGHT_SPREAD if lens.highlight_gain > 0 else 1.0
 
 
 def _sparse_weights(

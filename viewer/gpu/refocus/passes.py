@@ -15,7 +15,7 @@ from iibr_core.types import SRGB, ColorSpace, ViewOffset
 from viewer.gpu.light_field_texture import BLOCK_PX, LightFieldTexture
 from viewer.gpu.programs import Program, ProgramCache, set_primaries
 from viewer.gpu.refocus.picture_cells import PictureCell, cells_between_views, covering_pixels, pixels_of
-from viewer.gpu.refocus.picture_lens import Lens
+from viewer.gpu.refocus.picture_lens import Lens, pass_limits
 from viewer.gpu.refocus.view_sampling import (
     MAX_SOURCES,
     ApertureSample,
@@ -37,25 +37,8 @@ OFF_BORDER_PX = 1 / 256
 TILE_PX = 16
 MAX_TILE_TAPS = 8
 
-ONE_PASS_UP_TO_PX = 1.75
-"""As long as neighbouring samples are no farther apart, nothing is seen between them."""
-
-PASS_BLUR_PX = 1.5
-"""Elsewhere so many passes are drawn that the samples of all are no farther apart than this."""
-
-LEAST_PASSES = 4
-"""And no fewer: those of two or three lie in lines."""
-
-EVERY_PASS = 1e9
-"""More than there are."""
-
 UNITS = {"colors": 0, "disparities": 1, "tiles": 2, "fallback_views": 3, "blocks": 4, "wide_tiles": 5}
 SPANS = "intervals_of_0_and_1", "intervals_of_2_and_3"
-
-
-def passes_for(blur_px: float) -> int:
-    """In how many passes a tile is drawn, by the blur from one sample to the next: see shaders/widen_tiles.frag."""
-    return 1 if blur_px <= ONE_PASS_UP_TO_PX else max(math.ceil((blur_px / PASS_BLUR_PX) ** 2), LEAST_PASSES)
 
 
 class Passes:
@@ -254,36 +237,28 @@ class Passes:
         program, quad = self._programs.get("widen_tiles.frag")
         self._bind(targets.tiles.textures[0], "tiles")
         reach = min(math.ceil((lens.widest_blur_px / 2 + TILE_PX / 2) / TILE_PX), 4)
-        # The pinhole's share comes with every pass.
-        skips = self.adaptive and lens.aperture_share == 1
-        program.set_uniforms(
-            tiles=UNITS["tiles"],
-            reach=reach,
-            one_pass_up_to_px=ONE_PASS_UP_TO_PX if skips else -1.0,
-            pass_blur_px=PASS_BLUR_PX,
-            least_passes=float(LEAST_PASSES) if skips else EVERY_PASS,
-        )
+        program.set_uniforms(tiles=UNITS["tiles"], reach=reach, **pass_limits(self._finishes_tiles(lens)))
         targets.wide_tiles.use()
         quad.render(moderngl.TRIANGLES, vertices=3)
         yield
 
-    def weigh_alike(self, targets: RenderTargets, passes: int) -> None:
+    def weigh_alike(self, lens: Lens, targets: RenderTargets, passes: int) -> None:
         """Let tiles that had all their passes before the last of these weigh as much as those that got it."""
+        if passes == 1 or not self._finishes_tiles(lens):
+            return
         program, quad = self._programs.get("finished_tiles.frag")
         self._bind(targets.wide_tiles.textures[0], "tiles")
         program.set_uniforms(tiles=UNITS["tiles"], passes=float(passes))
         targets.layers.sums.multiply()
         quad.render(moderngl.TRIANGLES, vertices=3)
 
-    def smooth(self, lens: Lens, targets: RenderTargets, passes: int, spread: float) -> None:
-        """Spread the blurred layers over what lies between samples. passes: that are drawn. spread: after one of them,
-        of the blur that the tiles tell.
-        """
+    def smooth(self, lens: Lens, targets: RenderTargets, passes: int) -> None:
+        """Spread the blurred layers over what lies between samples. passes: that are drawn."""
         self._ctx.disable(moderngl.BLEND)
         program, quad = self._programs.get("smooth.frag")
         targets.wide_tiles.textures[0].use(2)
         program.set_uniforms(foreground_layer=0, background_layer=1, tiles=2, empty_up_to_px=lens.sharp_up_to_px[0])
-        program.set_uniforms(passes=float(passes), spread=spread)
+        program.set_uniforms(passes=float(passes), spread=lens.smoothing_spread)
         layers = targets.layers
         across = layers.sums.textures[1:], layers.across, (1, 0)
         down = layers.across.textures, layers.smooth, (0, 1)
@@ -300,11 +275,10 @@ class Passes:
         lens: Lens,
         targets: RenderTargets,
         passes: int,
-        spread: float,
         is_linear: bool,
         color_space: ColorSpace = SRGB,
     ) -> None:
-        """The finished picture, into the framebuffer in use. passes, spread: as smoothed with. is_linear: as light,
+        """The finished picture, into the framebuffer in use. passes: that are drawn. is_linear: as light,
         unbounded, not encoded. color_space: of the result.
         """
         self._ctx.disable(moderngl.BLEND)
@@ -321,7 +295,7 @@ class Passes:
             program.set_uniforms(
                 foreground_layer=1, background_layer=2, smooth_foreground=3, smooth_background=4, tiles=5
             )
-            program.set_uniforms(passes=float(passes), spread=spread)
+            program.set_uniforms(passes=float(passes), spread=lens.smoothing_spread)
         quad.render(moderngl.TRIANGLES, vertices=3)
 
     def update_fallback_views(self, field: LightFieldTexture) -> None:
@@ -337,6 +311,10 @@ class Passes:
                 self._fallback_views.release()
             self._fallback_views = self._ctx.texture((columns, rows), 4, dtype="f4")
         self._fallback_views.write(table.tobytes())
+
+    def _finishes_tiles(self, lens: Lens) -> bool:
+        """Whether tiles that have their passes get no more; the pinhole's share comes with every pass."""
+        return self.adaptive and lens.aperture_share == 1
 
     def _bind(self, texture: moderngl.Texture, name: str) -> None:
         texture.use(UNITS[name])

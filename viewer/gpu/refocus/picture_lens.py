@@ -24,6 +24,21 @@ LEAST_ACROSS = 2.0
 SPARSE_UP_TO_PX = 1.2
 """As long as the whole blur of a tile is narrower, every other sample across and down shows the same."""
 
+ONE_PASS_UP_TO_PX = 1.75
+"""As long as neighbouring samples are no farther apart, nothing is seen between them."""
+
+PASS_BLUR_PX = 1.5
+"""Elsewhere so many passes are drawn that the samples of all are no farther apart than this."""
+
+LEAST_PASSES = 4
+"""And no fewer: those of two or three lie in lines."""
+
+EVERY_PASS = 1e9
+"""More than there are."""
+
+HIGHLIGHT_SPREAD = 2.0
+"""Samples of many passes lie unevenly: beside single bright pixels their gaps show, unless smoothing is wider."""
+
 
 @dataclass(frozen=True)
 class Lens:
@@ -65,6 +80,11 @@ class Lens:
         return SPARSE_UP_TO_PX / self.samples_across
 
     @property
+    def smoothing_spread(self) -> float:
+        """How wide smoothing is, as a share of what lies between samples of one pass."""
+        return HIGHLIGHT_SPREAD if self.highlight_gain > 0 else 1.0
+
+    @property
     def has_dolly(self) -> bool:
         """Whether rays of different pixels cross the grid at different places."""
         return self.dolly != (0.0, 0.0)
@@ -95,6 +115,18 @@ class Lens:
         return aperture_samples(
             self.eye, self.diameter, grid, present, self.optics.aperture_shape, stride, moved, leaves_room
         )
+
+
+def passes_for(blur_px: float) -> int:
+    """In how many passes a tile is drawn, by the blur from one sample to the next: see shaders/widen_tiles.frag."""
+    return 1 if blur_px <= ONE_PASS_UP_TO_PX else max(math.ceil((blur_px / PASS_BLUR_PX) ** 2), LEAST_PASSES)
+
+
+def pass_limits(finishes_tiles: bool) -> dict[str, float]:
+    """The numbers of `passes_for`, as that shader names them; or such that every tile gets every pass."""
+    if not finishes_tiles:
+        return {"one_pass_up_to_px": -1.0, "pass_blur_px": PASS_BLUR_PX, "least_passes": EVERY_PASS}
+    return {"one_pass_up_to_px": ONE_PASS_UP_TO_PX, "pass_blur_px": PASS_BLUR_PX, "least_passes": float(LEAST_PASSES)}
 
 
 def lens_of(
