@@ -152,7 +152,7 @@ def read_shown_photo(path: Path, max_pixels: int, kind: DepthKind) -> Photo:
 
     Raises InputError as that does.
     """
-    photo = read_photo(path, max_pixels)
+    photo = read_photo(path, max_pixels, keeps_primaries=True)
     embedded = read_embedded(path) if kind == "embedded" else None
     return photo if embedded is None else photo_in_focus(path, photo, embedded, max_pixels)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from io import BytesIO
 
 import numpy as np
@@ -53,6 +54,14 @@ def test_wide_colours_keep_their_numbers_and_are_shown_as_srgb(tmp_path, eye):
         assert light.min() < -0.01, "light that sRGB lacks is not cut off where nothing asks for it"
         stored = viewer._inspection_view._passes.read_view(viewer._scene_view.renderer.field, 0, 0)
         assert np.abs(middles(stored) - IN_SRGB).max() <= 3
+
+
+def test_wide_colours_keep_their_numbers_at_the_photos_own_size(tmp_path):
+    photo = photo_of_patches(tmp_path / "p3.png", icc_profile=profile_bytes())
+    with HeadlessViewer() as viewer:
+        viewer.open(replace(photo, max_pixels=SIDE * SIDE), 1.0, lambda made: None)
+        assert viewer.draws_own_pixels(viewer.own_size)
+        assert np.abs(middles(viewer.picture(viewer.own_size, color_space=DISPLAY_P3)) - PATCHES).max() <= 1
 
 
 def test_srgb_photos_are_not_touched(tmp_path):
