@@ -28,11 +28,6 @@ TILE_PX = 1024
 TILE_MARGIN_PX = 8
 """What lies around a tile beside the parallax: filters and edges reach so far."""
 
-NO_RAY = np.float32(-1e6)
-"""The disparity where an inpainted image has no ray, far from any there is: where it were NaN, as it is elsewhere, each
-pixel would count as an edge, and take as long.
-"""
-
 
 class Part(NamedTuple):
     """Rows [top, bottom) and columns [left, right) of an image; below 0 they lie beyond its frame."""
@@ -181,7 +176,7 @@ def _enlarge(fills: RaySet, k: int, size: ImageSize, part: Part) -> tuple[FloatI
     """
     found = (
         np.zeros((*part.size, 3), np.float32),
-        np.full(part.size, NO_RAY, np.float32),
+        np.full(part.size, np.nan, np.float32),
         np.zeros(part.size, np.float32),
     )
     _enlarge_rays(

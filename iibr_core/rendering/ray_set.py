@@ -104,7 +104,8 @@ class RaySet:
         room, cells = self._room, self._cells_room
         if k == 0 and self.stages.connect_slopes:
             self.connected = connected = connect_rays(disparity, self._surface_step, should_stop)
-            self._steep = over_cells(np.logical_or, connected_either_way(connected))
+            if connected.any():
+                self._steep = over_cells(np.logical_or, connected_either_way(connected))
         if k > 0 and any(offset) and self.stages.leave_out_in_front:
             coverage = coverage.copy()
             edge_step = step_of(EDGE_PX, self.farthest_views)
@@ -231,19 +232,23 @@ def _edge_level(disparity, connected, surface_step, first, last, level):
     """
     height, width = disparity.shape
     level[first:last] = 0
+    # Of one row, with two more pixels on both sides: the steps there; the largest within two pixels.
+    steps, largest = np.zeros(width + 4, np.uint8), np.empty(width, np.uint8)
     # Steps in the rows around the band reach into it.
     for y in range(max(first - 2, 0), min(last + 2, height)):
         for x in range(width):
             here = disparity[y, x]
             right = abs(disparity[y, min(x + 1, width - 1)] - here)
             below = abs(disparity[min(y + 1, height - 1), x] - here)
-            steps = 0.0 if connected[y, x] & RIGHT else right / surface_step
-            steps = steps if connected[y, x] & BELOW or below / surface_step <= steps else below / surface_step
+            step = 0.0 if connected[y, x] & RIGHT else right / surface_step
+            step = step if connected[y, x] & BELOW or below / surface_step <= step else below / surface_step
             # NaN, no surface, fails the comparison.
             is_known = right + below <= np.inf
-            found = np.uint8(ceil(steps)) if is_known and steps < HIGHEST_LEVEL else np.uint8(HIGHEST_LEVEL)
+            found = np.uint8(ceil(step)) if is_known and step < HIGHEST_LEVEL else np.uint8(HIGHEST_LEVEL)
             # What stays below the first limit counts as nothing: no surface is quite flat.
-            if found > 1:
-                for v in range(max(y - 2, first), min(y + 3, last)):
-                    for u in range(max(x - 2, 0), min(x + 3, width)):
-                        level[v, u] = max(level[v, u], found)
+            steps[x + 2] = found if found > 1 else 0
+        for x in range(width):
+            largest[x] = max(steps[x], steps[x + 1], steps[x + 2], steps[x + 3], steps[x + 4])
+        for v in range(max(y - 2, first), min(y + 3, last)):
+            for x in range(width):
+                level[v, x] = max(level[v, x], largest[x])

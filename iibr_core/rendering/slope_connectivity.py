@@ -74,8 +74,14 @@ def _is_connected(disparity, least_step, y, x, down, right):
 
 @kernel
 def _connect(disparity, least_step, first, last, connected):
+    height, width = disparity.shape
     for y in range(first, last):
-        for x in range(disparity.shape[1]):
+        for x in range(width):
+            # Most steps are small: a test of both is cheaper than two calls.
+            right = abs(disparity[y, min(x + 1, width - 1)] - disparity[y, x])
+            below = abs(disparity[min(y + 1, height - 1), x] - disparity[y, x])
+            if not (right > least_step or below > least_step):
+                continue
             if _is_connected(disparity, least_step, y, x, 0, 1):
                 connected[y, x] |= RIGHT
             if _is_connected(disparity, least_step, y, x, 1, 0):
