@@ -5,8 +5,9 @@
 Scenes of DATA are made with 9 x 9 views at their own disparity; the demo photo comes along, with the parallax that the
 plan gives it. The warp is `benchmarks.peers.warp`: forward, holes filled from the background. Edges: the share of the
 default's time, refining the map and making the views in the plan's quality, that goes into refining and into splitting
-mixed pixels. Two threads: the default's views by the clock, as many times as fast as on one. All are medians over
-rounds of what was taken in the same round: other programs disturb them little.
+mixed pixels. Look-ups: what a view of the first quality takes, in times of looking every pixel of the photo up by Keys'
+kernel. Two threads: the default's views by the clock, as many times as fast as on one. All are medians over rounds of
+what was taken in the same round: other programs disturb them little.
 """
 
 from __future__ import annotations
@@ -30,10 +31,12 @@ from iibr_core.depth.edges.refine import refine
 from iibr_core.generation.outer_views import farthest_views, outer_views
 from iibr_core.generation.plan import plan_literal
 from iibr_core.rendering.mixed_pixels import split_mixed_pixels
+from iibr_core.rendering.resampling import cubic
+from iibr_core.runtime.jit import kernel
 from iibr_core.surfaces import EDGE_PX, step_of
 from iibr_core.types import FloatImage, Quality
 
-REFINING, SPLITTING, WARP = "refining", "splitting", "warp"
+REFINING, SPLITTING, WARP, LOOK_UP = "refining", "splitting", "warp", "look-up"
 
 
 def main() -> None:
@@ -44,7 +47,8 @@ def main() -> None:
     wanted = (found for found in scenes(options.data) if is_wanted(found[0].name, options.only))
     rows = (compare(*found, qualities, options.repeats) for found in wanted)
     ratios = (f"{quality}, times the warp" for quality in qualities)
-    emit(chain([head("scene", "the plan's", "warp, s", *ratios, "edges, %", "two threads, times as fast")], rows))
+    figures = "a view, look-ups", "edges, %", "two threads, times as fast"
+    emit(chain([head("scene", "the plan's", "warp, s", *ratios, *figures)], rows))
 
 
 def scenes(data: Path | None) -> Iterator[tuple[BenchScene, FloatImage]]:
@@ -72,7 +76,8 @@ def compare(scene: BenchScene, given: FloatImage, qualities: Sequence[Quality], 
     edges = _sums(costs[REFINING], costs[SPLITTING]), _sums(costs[REFINING], costs[planned])
     faster = np.median([slow.wall_s / quick.wall_s for slow, quick in zip(clock["one"], clock["two"])])
     warp_s = f"{median_cost(costs[WARP]).cpu_s:.2f}"
-    return row(scene.name, planned, warp_s, *ratios, f"{100 * median_ratio(*edges):.0f}", f"{faster:.2f}")
+    look_ups = f"{median_ratio(costs[qualities[0]], costs[LOOK_UP]) / len(scene.field):.1f}"
+    return row(scene.name, planned, warp_s, *ratios, look_ups, f"{100 * median_ratio(*edges):.0f}", f"{faster:.2f}")
 
 
 def _alone(scene: BenchScene, given: FloatImage, qualities: list[Quality], repeats: int) -> dict[str, list[Cost]]:
@@ -83,12 +88,21 @@ def _alone(scene: BenchScene, given: FloatImage, qualities: list[Quality], repea
     works: dict[str, Callable[[], object]] = {
         WARP: lambda: [view(at) for at in scene.field],
         REFINING: partial(refine, scene.photo, given),
+        LOOK_UP: partial(_look_up, np.ascontiguousarray(scene.photo[None]), np.empty_like(scene.photo)),
         SPLITTING: partial(split_mixed_pixels, scene.photo, scene.disparity, edge_step),
         **{quality: partial(make_field, scene, quality) for quality in qualities},
     }
     ways = {name: partial(cost_of, work) for name, work in works.items()}
     in_turns(ways, 1)  # compiles
     return in_turns(ways, repeats)
+
+
+@kernel
+def _look_up(images, shown):
+    """Every pixel of the first image, looked up beside its place."""
+    for y in range(shown.shape[0]):
+        for x in range(shown.shape[1]):
+            shown[y, x, 0], shown[y, x, 1], shown[y, x, 2] = cubic(images, 0, x + 0.3, y + 0.6)
 
 
 def _field_cost(process: ProcessPoolExecutor, scene: BenchScene, quality: Quality) -> Cost:

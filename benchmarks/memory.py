@@ -1,8 +1,8 @@
 """What memory the commands take at most under `--memory`, and what stays after many photos in one process.
 
-python -m benchmarks.memory predicted | bounds [12 24 ...] | day: what twelve commands were predicted to take, and took;
-the peaks of fresh processes for photos of so many MP; memory after 10 and after 150 photos. docs/memory.md has what
-they printed.
+python -m benchmarks.memory predicted | bounds [12 24 ...] | day | beyond: what twelve commands were predicted to take,
+and took; the peaks of fresh processes for photos of so many MP; memory after 10 and after 150 photos; what making a
+field takes at most beside its views and its rays. docs/memory.md has what they printed.
 """
 
 from __future__ import annotations
@@ -21,16 +21,19 @@ import psutil
 
 from benchmarks.harness.bench_scenes import MEGAPIXELS, write_photo
 from benchmarks.harness.reports import emit, head, parser_of, row, start
-from benchmarks.harness.timing import COMMAND_LINE, run
+from benchmarks.harness.timing import COMMAND_LINE, in_own_process, run
 from iibr_core.formats.maps.writer import write_map
-from iibr_core.runtime.allocator import limit_arenas
-from iibr_core.types import GridShape
+from iibr_core.runtime.allocator import give_back_memory, limit_arenas
+from iibr_core.types import Disparity, GridShape, Photo
 
 MIB = 2**20
 BUDGETS = {"700M": 700, "1G": 1024, "2G": 2048}
 KINDS = (".jpg", ".png", ".exr")
 PHOTOS, LOOKED_AT, LARGEST = 150, 10, 600_000
 SQUARES = 16
+FIELD = GridShape(5, 5)
+FIELDS = ((500, 500), (1000, 1000), (1200, 1600))
+"""(height, width) of photos whose fields are made."""
 PREDICTED = (
     ((480, 640), "generate PHOTO --grid 3 --out OUT"),
     ((760, 800), "generate PHOTO --grid 17 --quality fast --out OUT"),
@@ -57,9 +60,9 @@ UNDER_BUDGET = (
 
 
 def main() -> None:
-    ways = {"predicted": predicted, "watched": watched, "bounds": bounds, "day": day}
+    ways = {"predicted": predicted, "watched": watched, "bounds": bounds, "day": day, "beyond": beyond}
     parser = parser_of(__doc__)
-    parser.add_argument("way", choices=ways, metavar="predicted | bounds | day")
+    parser.add_argument("way", choices=ways, metavar="predicted | bounds | day | beyond")
     parser.add_argument("more", nargs=argparse.REMAINDER, help=argparse.SUPPRESS)
     given = parser.parse_args()
     emit(ways[given.way](*given.more))
@@ -152,6 +155,39 @@ def day() -> Iterator[str]:
             take(worker, scene_view, k, 4 if k % 3 == 2 else 9)
             if k + 1 in (LOOKED_AT, PHOTOS):
                 yield row(k + 1, f"{psutil.Process().memory_info().rss / MIB:.0f}")
+
+
+def beyond() -> Iterator[str]:
+    """Fields of 5 x 5 views in balanced quality, each in a process of its own."""
+    yield head("photo", "views, MiB", "rays, MiB", "beside both at most, MiB")
+    for size in FIELDS:
+        found = in_own_process(_making_field, size)
+        yield row(f"{math.prod(size) / 1e6:.2f} MP", *(f"{mebibytes:.0f}" for mebibytes in found))
+
+
+def _making_field(size: tuple[int, int]) -> tuple[float, float, float]:
+    """Of a second field: what is loaded and kept by the first is not counted."""
+    from iibr_core.generation.light_field import generate, ray_set
+    from iibr_core.generation.plan import plan_literal
+
+    limit_arenas()
+    pixels = np.random.default_rng(0).random((*size, 3), np.float32)
+    given = Photo(pixels, float(size[1]), "drawn"), Disparity(squares_before_wall(size), "drawn")
+    plan = plan_literal(*given, FIELD)
+    for _ in generate(*given, plan, quality="balanced"):
+        pass
+    give_back_memory()
+    before = psutil.Process().memory_info().rss
+    Path("/proc/self/clear_refs").write_text("5")  # the peak is counted from here
+    views = list(generate(*given, plan, quality="balanced"))
+    peak = next(line.split()[1] for line in Path("/proc/self/status").read_text().splitlines() if "VmHWM" in line)
+    of_views = sum(part.nbytes for view in views for part in (view.colors, view.disparity, view.inpainted))
+    rays, outer = ray_set(*given, plan)
+    for _ in outer:
+        pass
+    parts = *rays.arrays, rays.connected, rays.photo_detail
+    of_rays = sum(part.nbytes for part in parts if isinstance(part, np.ndarray))
+    return of_views / MIB, of_rays / MIB, (int(peak) * 1024 - before - of_views - of_rays) / MIB
 
 
 def take(worker: Any, scene_view: Any, generation: int, views: int) -> None:
