@@ -115,12 +115,18 @@ def _draw_rays(rays, index, connected, landing, m, ahead, sealed_step, first_row
     height, width = disparity.shape
     last_row = first_row + len(nearest) // SAMPLES - 1
     corners, is_drawn = np.empty((width, 4, 3)), np.empty(width, np.bool_)
+    is_near = np.empty(landing.shape[1], np.bool_)
     for y in range(height):
+        # Most cells land on other rows: they are looked at once, not pixel by pixel.
+        if y % CELL_PX == 0:
+            for u in range(len(is_near)):
+                first_landed, last_landed = landing[y // CELL_PX, u]
+                is_near[u] = last_landed >= first_row - 1 and first_landed <= last_row + 1
+        if not is_near.any():
+            continue
         any_drawn = False
         for x in range(width):
-            v, u = y // CELL_PX, x // CELL_PX
-            is_near = landing[v, u, 1] >= first_row - 1 and landing[v, u, 0] <= last_row + 1
-            is_drawn[x] = is_near and coverage[y, x] > 0
+            is_drawn[x] = is_near[x // CELL_PX] and coverage[y, x] > 0
             any_drawn = any_drawn or is_drawn[x]
         if any_drawn:
             _land_squares(disparity, connected, m, y, sealed_step, corners, is_drawn)
