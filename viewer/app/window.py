@@ -28,8 +28,10 @@ def wake() -> None:
 class Window:
     """A window with an OpenGL 3.3 core context.
 
-    handle: GLFW's window. damages: how often the system asked for a redraw. struck: by what is written on a key, what
-    was held down when it was pressed last: (Ctrl or Super, Shift).
+    handle: GLFW's window. size: (width, height) in window units; framebuffer_size: in pixels, (0, 0) while minimised:
+    both are as `poll` found them, since each is a question to the display server. damages: how often the system asked
+    for a redraw. struck: by what is written on a key, what was held down when it was pressed last: (Ctrl or Super,
+    Shift).
     """
 
     def __init__(self, title: str, place: tuple[int, int, int, int] | None = None, is_maximized: bool = False) -> None:
@@ -55,12 +57,7 @@ class Window:
         glfw.set_window_refresh_callback(self.handle, self._on_damage)
         glfw.make_context_current(self.handle)
         glfw.swap_interval(1)
-
-    @property
-    def size(self) -> ScreenSize:
-        """(width, height) in window units."""
-        width, height = glfw.get_window_size(self.handle)
-        return ScreenSize(width, height)
+        self._take_sizes()
 
     @property
     def place(self) -> tuple[int, int, int, int] | None:
@@ -96,12 +93,6 @@ class Window:
         return bool(glfw.get_window_attrib(self.handle, glfw.ICONIFIED))
 
     @property
-    def framebuffer_size(self) -> ScreenSize:
-        """(width, height) in pixels; (0, 0) while minimised."""
-        width, height = glfw.get_framebuffer_size(self.handle)
-        return ScreenSize(width, height)
-
-    @property
     def pixel_ratio(self) -> float:
         """Framebuffer pixels per window unit."""
         return self.framebuffer_size[0] / max(self.size[0], 1) or 1.0
@@ -131,6 +122,11 @@ class Window:
                 glfw.poll_events()
         except UnicodeDecodeError as error:  # what was dropped has a name that is not UTF-8: it is told as not found
             self._dropped.append(error.object.decode(errors="replace"))
+        self._take_sizes()
+
+    def _take_sizes(self) -> None:
+        self.size = ScreenSize(*glfw.get_window_size(self.handle))
+        self.framebuffer_size = ScreenSize(*glfw.get_framebuffer_size(self.handle))
 
     def on_drop(self, _: Any, paths: Any) -> None:
         """GLFW calls this when files are dropped."""
