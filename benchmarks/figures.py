@@ -91,6 +91,7 @@ FIGURES = (
     Figure(("memory.md#bounds",), "benchmarks.memory bounds 12", 5, ("Linux",)),
     Figure(("memory.md#use",), "benchmarks.use --steps 150", 4, ("X",)),
     Figure(("memory.md#day",), "benchmarks.memory day", 2, ("Linux",)),
+    Figure(("memory.md#beyond",), "benchmarks.memory beyond", 0.5, ("Linux",)),
     Figure(("web.md#pages",), "benchmarks.web --data DATA", 15, ("DATA", "chromium")),
     Figure(("edges_fork.png", "edges_handlebar.png"), "docs/make_edges.py OUT", 0.5),
     Figure(tuple(f"gallery/{name}" for name in GALLERY), "docs/make_gallery.py OUT", 3),
