@@ -60,20 +60,30 @@ class ExportSource:
         self.report_progress(total, total, doing)
 
     def views(
-        self, zero: float | None = None, with_disparity: bool = False, wanted: Collection[ViewOffset] | None = None
+        self,
+        zero: float | None = None,
+        with_disparity: bool = False,
+        wanted: Collection[ViewOffset] | None = None,
+        in_srgb: bool = True,
     ) -> Generator[ViewUpdate]:
         """Every view of the scene's grid once, the centre first, none of them kept.
 
         zero: the disparity (as given) that stays still, where it is to be another than the plan's; for photos only.
         with_disparity: of light fields from disk too, each view of its own, as far as it can be found.
-        wanted: of a photo, only these and the centre; None: all. Raises Cancelled once the export should stop.
+        wanted: of a photo, only these and the centre; None: all. in_srgb: else in the scene's colour space. Raises
+        Cancelled once the export should stop.
         """
         if self.loaded is None:
             made = self._views_of_folder(with_disparity)
         else:
-            source, plan = self.scene.source, self.plan(zero)
             made = views_of_photo(
-                source, self.loaded, plan, self.should_stop, self.report_progress, wanted=lambda: WantedViews(wanted)
+                self.scene.source,
+                self.loaded,
+                self.plan(zero),
+                self.should_stop,
+                self.report_progress,
+                in_srgb=in_srgb,
+                wanted=lambda: WantedViews(wanted),
             )
         scene = self.scene if zero is None else replace(self.scene, infinity_px=self._infinity_px(zero))
         made = add_gloss(made, self.optics.gloss, scene, self.should_stop)

@@ -67,7 +67,7 @@ def make_page(source: ExportSource, settings: ExportSettings) -> tuple[bytes, We
     scene = source.scene
     form = form_that_fits(scene.grid, ImageSize(scene.height, scene.width), settings.stills)
     store = ViewStore(scene.grid, form, scene.color_space, SRGB if scene.color_space == SRGB else DISPLAY_P3)
-    store.fill(source.views(with_disparity=True))
+    store.fill(source.views(with_disparity=True, in_srgb=False))
     caption = read_caption(Path(scene.source.path)) if source.loaded is not None else Caption()
     words = _words(scene, caption, settings.credit)
     if settings.budget is None:

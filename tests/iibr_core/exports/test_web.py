@@ -13,13 +13,15 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from iibr_core.depth.choice import DepthChoice
 from iibr_core.exports import EXPORTS, ExportOptions, open_for_export, resolve_settings
 from iibr_core.exports.web import make_page
 from iibr_core.exports.web_gallery import write_gallery
 from iibr_core.exports.web_views import MOST_TEXELS, WebForm, form_that_fits
 from iibr_core.formats.images.caption import read_caption
+from iibr_core.formats.images.icc_profile import icc_profile
 from iibr_core.scenes import LensChoice, Source
-from iibr_core.types import GridShape, ImageSize, InputError
+from iibr_core.types import DISPLAY_P3, GridShape, ImageSize, InputError
 from tests.viewer.conftest import write_scene
 
 KIND = EXPORTS["web"]
@@ -129,3 +131,17 @@ def test_the_first_picture_is_the_middle_view(opened) -> None:
         first = np.asarray(image.convert("RGB"))
     middle = next(opened.views()).colors
     assert np.abs(first.astype(int) - middle).mean() < 4
+
+
+def test_wide_colours_keep_their_numbers(tmp_path: Path) -> None:
+    photo = tmp_path / "photo.png"
+    Image.new("RGB", (48, 32), (200, 80, 60)).save(photo, icc_profile=icc_profile(DISPLAY_P3))
+    source = Source(str(photo), grid=GridShape(3, 3), depth=DepthChoice(start="flat"))
+    text, field = page_of(open_for_export(KIND, ExportOptions(), source, 1.0, LensChoice(), lambda scene: None, None))
+    assert field["colorSpace"] == "display-p3"
+    pictures = [Image.open(BytesIO(base64.b64decode(part))) for part in re.findall(r"[A-Za-z0-9+/=]{200,}", text)]
+    colored = [picture for picture in pictures if picture.mode == "RGB"]
+    assert len(colored) == 2, "the first, and the only view"
+    for picture in colored:
+        assert picture.info["icc_profile"] == icc_profile(DISPLAY_P3)
+        np.testing.assert_allclose(picture.getpixel((24, 16)), (200, 80, 60), atol=3)
