@@ -12,9 +12,6 @@ from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.exports.source import ExportSource
 from iibr_core.scenes.screen_size import ScreenSize
 
-THINNEST_BAR_PX = 2
-"""Of less room than that at both sides together, the picture takes all: it comes of whole numbers of pixels."""
-
 
 def draw_framed(source: ExportSource, settings: RenderSettings, frame_aspect: float | None = None) -> NDArray[Any]:
     """The picture whole and undistorted in a frame of the settings' size.
@@ -23,7 +20,8 @@ def draw_framed(source: ExportSource, settings: RenderSettings, frame_aspect: fl
     """
     part, frame = settings.part, settings.size_px
     aspect = part.width * source.scene.width / (part.height * source.scene.height)
-    size = fitted(aspect, frame, frame_aspect or frame.width / frame.height)
+    enlarged = frame.width / (part.width * source.scene.width)
+    size = fitted(aspect, frame, frame_aspect or frame.width / frame.height, enlarged)
     pixels = source.draw(replace(settings, size_px=size))
     if size == frame:
         return pixels
@@ -33,12 +31,16 @@ def draw_framed(source: ExportSource, settings: RenderSettings, frame_aspect: fl
     return whole
 
 
-def fitted(aspect: float, frame: ScreenSize, frame_aspect: float) -> ScreenSize:
-    """The size of a picture of this aspect, whole in a frame that is shown with frame_aspect."""
+def fitted(aspect: float, frame: ScreenSize, frame_aspect: float, enlarged: float = 1.0) -> ScreenSize:
+    """The size of a picture of this aspect, whole in a frame that is shown with frame_aspect.
+
+    enlarged: by so much views are, whose whole numbers of pixels the aspect comes of. Where that is all that leaves
+    room beside the picture, it takes all: a photo at its own size fills its frame.
+    """
     width, height = frame
     if aspect > frame_aspect:
         height = max(round(height * frame_aspect / aspect), 1)
     else:
         width = max(round(width * aspect / frame_aspect), 1)
     room = frame.width - width + frame.height - height
-    return frame if room < THINNEST_BAR_PX else ScreenSize(width, height)
+    return frame if room < 1 + max(enlarged, 1.0) else ScreenSize(width, height)

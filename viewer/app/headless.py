@@ -12,13 +12,12 @@ from numpy.typing import NDArray
 
 from iibr_core.color import linear_from_srgb
 from iibr_core.depth.editing import UNEDITED, DepthEdits
-from iibr_core.exports import FullPicture, RenderSettings, encode_light, is_full, needs_smaller, require_size
+from iibr_core.exports import FullPicture, RenderSettings, encode_light, fitted, is_full, needs_smaller, require_size
 from iibr_core.generation import ALL_VIEWS
 from iibr_core.rendering import CENTRE
 from iibr_core.scenes import (
     DepthSettings,
     Progress,
-    Rect,
     Scene,
     SceneReady,
     SceneRequest,
@@ -41,7 +40,7 @@ from viewer.model.inspection_request import (
     beside_of,
     make_inspection_request,
 )
-from viewer.model.layout import BACKGROUND, Layout, is_narrow, layout_of, letterbox
+from viewer.model.layout import BACKGROUND, Layout, is_narrow, layout_of
 from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState
 from viewer.model.state.inspection import SetInspection
@@ -155,13 +154,8 @@ class HeadlessViewer:
         """
         scene = self.state.scene
         assert scene is not None
-        width, height = size or scene.size
-        box = letterbox(Rect(0, 0, width, height), scene.size)
-        assert box is not None
-        layout = Layout(Rect(0, 0, width, height), Rect(width, 0, 0, height), box)
-        assert layout.frame_px is not None
-        x, y, box_width, box_height = layout.frame_px
-        box_size = layout.frame_px.size
+        frame = size or scene.size
+        box_size = fitted(scene.width / scene.height, frame, frame.width / frame.height, frame.width / scene.width)
         require_size(box_size)
         prepare_gloss(self._scene_view, self.state.optics.gloss)
         if is_full(scene, self.state.optics, box_size):
@@ -170,12 +164,13 @@ class HeadlessViewer:
         else:
             settings = RenderSettings(self.state.optics, box_size, is_linear=is_linear, color_space=color_space)
             pixels = self._scene_view.renderer.converged_picture(settings)
-        if box_size == (width, height):
+        if box_size == frame:
             return pixels
-        image = np.empty((height, width, 3), np.float32 if is_linear else np.uint8)
+        image = np.empty((frame.height, frame.width, 3), np.float32 if is_linear else np.uint8)
         background = np.array(BACKGROUND[:3])
         image[:] = linear_from_srgb(background) if is_linear else np.round(background * 255)
-        image[y : y + box_height, x : x + box_width] = pixels
+        top, left = (frame.height - box_size.height) // 2, (frame.width - box_size.width) // 2
+        image[top : top + box_size.height, left : left + box_size.width] = pixels
         return image
 
     def _full_picture(self, scene: Scene, size: ScreenSize, report_progress: ReportProgress) -> FloatImage:

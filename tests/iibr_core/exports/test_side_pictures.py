@@ -88,6 +88,8 @@ def test_tiles_of_a_display_are_stretched_to_its_shape(source: ExportSource, tmp
     assert fitted(1.5, ScreenSize(857, 857), 1.777) == (round(857 * 1.5 / 1.777), 857)
     assert fitted(2.5, ScreenSize(857, 857), 1.777) == (857, round(857 * 1.777 / 2.5))
     assert fitted(741 / 500, ScreenSize(740, 500), 740 / 500) == (740, 500), "no bar of a single row"
+    assert fitted(1732 / 1154, ScreenSize(6000, 4000), 1.5, 6000 / 1732) == (6000, 4000), "views of 2 MP are rounded"
+    assert fitted(1732 / 1154, ScreenSize(6000, 4100), 6000 / 4100, 6000 / 1732) == (6000, 3998)
 
 
 def test_a_size_of_another_shape_shows_the_whole_picture_undistorted(source: ExportSource, tmp_path: Path) -> None:

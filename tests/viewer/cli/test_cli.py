@@ -274,6 +274,18 @@ def test_a_picture_at_the_photos_own_size_equals_the_usual_one_made_smaller(
     assert read_photo(half).size == (60, 80)
 
 
+def test_full_gives_the_photo_back_where_the_views_shape_is_rounded(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    from iibr_core.formats.images.photo import read_photo, write_image
+
+    photo, out = tmp_path / "photo.png", tmp_path / "out.png"
+    write_image(photo, np.random.default_rng(1).integers(0, 256, (200, 300, 3), np.uint8))
+    words = ("--depth", "flat", "--full", "--max-pixels", 5000)
+    assert run(monkeypatch, "screenshot", photo, *words, "-o", out) == 0
+    np.testing.assert_allclose(read_photo(out).pixels, read_photo(photo).pixels, atol=1.01 / 255)
+
+
 def test_full_gives_the_size_and_needs_memory(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], photo_path: Path, tmp_path: Path
 ) -> None:
