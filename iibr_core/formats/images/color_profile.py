@@ -22,6 +22,8 @@ KNOTS = 65536
 """Of a curve: one for each value of 16 bits."""
 SAME_PRIMARIES = 2e-3
 """Of XYZ: as much as the programs that write profiles differ about sRGB's and Display P3's."""
+SAME_CURVE = 1 / 255
+"""Of encoded values: a step of 8 bits, as much as sRGB's own curve is off in small profiles."""
 LEAST_DETERMINANT = 1e-4
 """Of the matrix: primaries on one line are none."""
 BRADFORD = np.array([[0.8951, 0.2664, -0.1614], [-0.7502, 1.7135, 0.0367], [0.0389, -0.0685, 1.0296]])
@@ -78,12 +80,14 @@ def color_profile_of(spec: Any) -> tuple[ColorProfile | None, str]:
     if str(spec.format) in FLOATING_TYPES or spec.nchannels < 3:
         return None, ""
     value = spec.getattribute("ICCProfile")
-    name = text_attribute(spec, "ICCProfile:profile_description") or "without a name"
-    if value is None or "sRGB" in name:
+    if value is None:
         return None, ""
+    name = text_attribute(spec, "ICCProfile:profile_description") or "without a name"
     profile, complaint = _read(bytes(value) if isinstance(value, np.ndarray) else b"")
     if profile is None:
-        return None, f"The colour profile '{name}' {complaint} and is ignored: colours are taken as sRGB."
+        is_told = complaint and "sRGB" not in name
+        told = f"The colour profile '{name}' {complaint} and is ignored: colours are taken as sRGB."
+        return None, told if is_told else ""
     if profile.color_space.name not in (SRGB.name, DISPLAY_P3.name):
         profile = replace(profile, color_space=replace(profile.color_space, name=name))
     return profile, f"Colours are those of the photo's profile, '{name}'."
@@ -91,10 +95,17 @@ def color_profile_of(spec: Any) -> tuple[ColorProfile | None, str]:
 
 @lru_cache(maxsize=4)  # a photo is read in many parts
 def _read(data: bytes) -> tuple[ColorProfile | None, str]:
+    """None, "" for sRGB: by what is in it, as some that are linear have that in their names."""
     try:
-        return color_profile(data), ""
+        profile = color_profile(data)
+        return (None if _is_srgb(profile) else profile), ""
     except UnusableProfileError as error:
         return None, str(error)
+
+
+def _is_srgb(profile: ColorProfile) -> bool:
+    off = np.abs(srgb_from_linear(profile.curves) - np.linspace(0, 1, KNOTS, dtype=np.float32))
+    return profile.color_space == SRGB and float(off.max()) < SAME_CURVE
 
 
 def color_profile(data: bytes) -> ColorProfile:

@@ -159,12 +159,28 @@ def test_grey_stays_grey():
     assert np.allclose(linear[..., 1], linear_from_srgb(grey[..., 1] / 255), atol=1e-3)
 
 
-@pytest.mark.parametrize("named", ["sRGB IEC61966-2.1", "sRGB built-in"])
-def test_srgb_passes_untouched(tmp_path, named):
-    Image.fromarray(COLORS).save(tmp_path / "a.png", icc_profile=profile_bytes(name=named))
+@pytest.mark.parametrize(
+    "data",
+    [
+        profile_bytes(SRGB_PRIMARIES, name="sRGB IEC61966-2.1"),
+        profile_bytes(SRGB_PRIMARIES),
+        ImageCms.ImageCmsProfile(ImageCms.createProfile("sRGB")).tobytes(),
+    ],
+    ids=["named", "unnamed", "littleCMS"],
+)
+def test_srgb_passes_untouched(tmp_path, data):
+    Image.fromarray(COLORS).save(tmp_path / "a.png", icc_profile=data)
     photo = read_photo(tmp_path / "a.png")
     assert np.array_equal(np.rint(255 * photo.pixels), COLORS)
     assert photo.notes == ()
+
+
+def test_a_linear_profile_is_one_whatever_its_name(tmp_path):
+    data = profile_bytes(SRGB_PRIMARIES, CURVES["linear"], name="GIMP built-in Linear sRGB")
+    Image.fromarray(COLORS).save(tmp_path / "a.png", icc_profile=data)
+    photo = read_photo(tmp_path / "a.png")
+    assert np.abs(255 * photo.pixels - converted(COLORS, data).astype(float)).max() < 1.6
+    assert photo.notes == ("Colours are those of the photo's profile, 'GIMP built-in Linear sRGB'.",)
 
 
 BAD = {
