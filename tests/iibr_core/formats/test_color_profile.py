@@ -151,6 +151,17 @@ def test_alpha_is_taken_over_black_in_linear_light(tmp_path):
     assert np.allclose(linear, opaque * (128 / 255), atol=4e-3)
 
 
+def test_what_a_heic_says_in_numbers_counts_where_it_has_no_profile(tmp_path):
+    patch = Image.fromarray(np.full((32, 32, 3), (200, 80, 60), np.uint8))
+    for primaries, expected in ((12, DISPLAY_P3), (1, SRGB)):
+        codes = {"color_primaries": primaries, "transfer_characteristics": 13, "matrix_coefficients": 6}
+        file = pillow_heif.from_pillow(patch)
+        file.save(tmp_path / "a.heic", quality=100, chroma=444, full_range_flag=1, save_nclx_profile=True, **codes)
+        photo = read_photo(tmp_path / "a.heic", keeps_primaries=True)
+        assert photo.color_space == expected
+        assert np.abs(255 * photo.pixels - (200, 80, 60)).max() < 2.5
+
+
 def test_grey_stays_grey():
     grey = np.repeat(np.arange(256, dtype=np.uint8)[:, None, None], 3, axis=2)
     linear = color_profile(profile_bytes()).linear(grey)
