@@ -58,9 +58,15 @@ def settings_of(state: AppState, size_px: ScreenSize) -> SavedSettings:
     """What it takes to take the present picture again. size_px: (width, height)."""
     assert state.source is not None
     source = replace(state.source, path="", depth=replace(state.source.depth, file=None, refine=state.depth.refine))
-    has_model = state.scene is not None and state.scene.has_model_depth
+    scene = state.scene
     return SavedSettings(
-        state.optics, state.depth_strength, source, size_px, state.depth.edits, has_model_depth=has_model
+        state.optics,
+        state.depth_strength,
+        source,
+        size_px,
+        state.depth.edits,
+        has_model_depth=scene is not None and scene.has_model_depth,
+        view_width=scene.width if scene is not None else None,
     )
 
 

@@ -68,6 +68,7 @@ class SettingsText(FormatText, frozen=True, kw_only=True):
     size_px: tuple[SidePx, SidePx]
     depth_edits: DepthEdits = UNEDITED
     has_model_depth: bool = False
+    view_width: SidePx | None = None
 
 
 def settings_text(settings: SavedSettings, folder: Path | None = None) -> str:
@@ -83,6 +84,8 @@ def settings_text(settings: SavedSettings, folder: Path | None = None) -> str:
         whole["depth_edits"] = settings.depth_edits
     if settings.has_model_depth:
         whole["has_model_depth"] = True
+    if settings.view_width is not None:
+        whole["view_width"] = settings.view_width
     # not by msgspec, which refuses numpy's numbers
     return json.dumps(whole, separators=(",", ":"), allow_nan=False, default=_json_value)
 
@@ -119,7 +122,7 @@ def settings_from_text(text: str, name: str, folder: Path | None = None, is_own:
     source = _source_from_text(Source(""), read.source)
     size = ScreenSize(*read.size_px)
     edits, has_model = read.depth_edits, read.has_model_depth
-    return SavedSettings(optics, read.depth_strength, source, size, edits, unknown, refused, has_model)
+    return SavedSettings(optics, read.depth_strength, source, size, edits, unknown, refused, has_model, read.view_width)
 
 
 def read_settings(path: Path) -> SavedSettings:

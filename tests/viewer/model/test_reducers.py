@@ -280,6 +280,8 @@ def test_settings_of_another_picture_are_made_to_fit_and_can_be_taken_back() -> 
     assert after.optics == Optics(eye=ViewOffset(2, 2), aperture_diameter=5, focus_disparity=1)
     assert after.notices == ()
     assert reduce(after, Undo()).optics == state.optics
+    wider = replace(saved, view_width=2 * state.scene.width)
+    assert reduce(offered, TakeSettings(wider)).optics == replace(after.optics, focus_disparity=0.5)
     broken = replace(saved, optics=replace(optics, dolly=math.nan))
     assert reduce(state, TakeSettings(broken)).optics == state.optics
 

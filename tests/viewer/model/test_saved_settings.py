@@ -60,7 +60,8 @@ sources = st.builds(
     st.none() | numbers,
     quality=st.sampled_from(("fast", "balanced")),
 )
-settings = st.builds(SavedSettings, optics, numbers, sources, st.tuples(st.integers(1, 9999), st.integers(1, 9999)))
+pixels = st.integers(1, 9999)
+settings = st.builds(SavedSettings, optics, numbers, sources, st.tuples(pixels, pixels), view_width=st.none() | pixels)
 ONE = SavedSettings(Optics(eye=ViewOffset(1, 2)), 1.5, Source("", grid=GridShape(3, 5)), (60, 40))
 
 

@@ -270,7 +270,7 @@ def _take_settings(state: AppState, settings: SavedSettings) -> AppState:
     """The optics, made to fit. What needs a new field, depth strength and all that is decided at opening, stays."""
     if state.scene is None or not is_finite(settings.optics):
         return state
-    optics = clamp_optics(settings.optics, state.scene)
+    optics = clamp_optics(settings.optics_at(state.scene.width), state.scene)
     notices = tuple(notice for notice in state.notices if notice.offer != settings)
     return replace(touch(state), optics=optics, notices=notices, motion=Motion(speed=state.motion.speed))
 
@@ -283,7 +283,8 @@ def _restore(state: AppState, settings: SavedSettings) -> AppState:
     has_aperture = settings.optics.aperture_diameter > 0
     restored = replace(restored, has_chosen_focus=True, has_chosen_aperture=has_aperture)
     if settings.has_model_depth and state.scene.is_guessed:  # the focus is of another depth than this
-        models, optics = replace(state.models, left_focus=settings.optics), with_focus_of(restored.optics, Optics())
+        models = replace(state.models, left_focus=settings.optics_at(state.scene.width))
+        optics = with_focus_of(restored.optics, Optics())
         restored = replace(restored, optics=optics, has_chosen_focus=False, models=models)
     if state.scene.plan is None:
         return restored

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import PurePath
 
 from iibr_core.depth.editing import UNEDITED, DepthEdits
@@ -29,7 +29,7 @@ class SavedSettings:
 
     depth_edits: of the photo's disparity. unknown_fields: names of what was saved too, but is not known here.
     refused_file: a file that they named and that is not opened, "" without. has_model_depth: whether a model estimated
-    the depth that the focus is of.
+    the depth that the focus is of. view_width: of the views, in whose pixels the optics are; None in older pictures.
     """
 
     optics: Optics
@@ -40,6 +40,18 @@ class SavedSettings:
     unknown_fields: tuple[str, ...] = ()
     refused_file: str = ""
     has_model_depth: bool = False
+    view_width: int | None = None
+
+    def optics_at(self, view_width: int) -> Optics:
+        """The same focus among views of this width, as wide as those it was set in where that is not known."""
+        enlarged = view_width / (self.view_width or view_width)
+        tilt_x, tilt_y = self.optics.focus_tilt
+        return replace(
+            self.optics,
+            focus_disparity=enlarged * self.optics.focus_disparity,
+            focus_range=enlarged * self.optics.focus_range,
+            focus_tilt=(enlarged * tilt_x, enlarged * tilt_y),
+        )
 
 
 @dataclass(frozen=True)
