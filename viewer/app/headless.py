@@ -154,7 +154,7 @@ class HeadlessViewer:
         """
         scene = self.state.scene
         assert scene is not None
-        frame = size or scene.size
+        frame = ScreenSize(*(size or scene.size))
         box_size = fitted(scene.width / scene.height, frame, frame.width / frame.height, frame.width / scene.width)
         require_size(box_size)
         prepare_gloss(self._scene_view, self.state.optics.gloss)
