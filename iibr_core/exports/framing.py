@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 
 from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.exports.source import ExportSource
+from iibr_core.scenes.rect import WHOLE, Rect
+from iibr_core.scenes.scene import Scene
 from iibr_core.scenes.screen_size import ScreenSize
 
 
@@ -18,10 +20,8 @@ def draw_framed(source: ExportSource, settings: RenderSettings, frame_aspect: fl
 
     frame_aspect: width / height that the frame is shown with, where that is another than its pixels'.
     """
-    part, frame = settings.part, settings.size_px
-    aspect = part.width * source.scene.width / (part.height * source.scene.height)
-    enlarged = frame.width / (part.width * source.scene.width)
-    size = fitted(aspect, frame, frame_aspect or frame.width / frame.height, enlarged)
+    frame = settings.size_px
+    size = size_in_frame(source.scene, frame, settings.part, frame_aspect)
     pixels = source.draw(replace(settings, size_px=size))
     if size == frame:
         return pixels
@@ -31,11 +31,19 @@ def draw_framed(source: ExportSource, settings: RenderSettings, frame_aspect: fl
     return whole
 
 
+def size_in_frame(scene: Scene, frame: ScreenSize, part: Rect = WHOLE, frame_aspect: float | None = None) -> ScreenSize:
+    """Of a part of the scene's picture, whole in a frame; see `draw_framed`."""
+    across, down = part.width * scene.width, part.height * scene.height
+    is_rounded = scene.own_size is not None and scene.own_size.width > scene.width
+    enlarged = frame.width / across if is_rounded else 1.0
+    return fitted(across / down, frame, frame_aspect or frame.width / frame.height, enlarged)
+
+
 def fitted(aspect: float, frame: ScreenSize, frame_aspect: float, enlarged: float = 1.0) -> ScreenSize:
     """The size of a picture of this aspect, whole in a frame that is shown with frame_aspect.
 
-    enlarged: by so much views are, whose whole numbers of pixels the aspect comes of. Where that is all that leaves
-    room beside the picture, it takes all: a photo at its own size fills its frame.
+    enlarged: by so much views are that are smaller than the photo: the aspect comes of their whole numbers of pixels.
+    Where that is all that leaves room beside the picture, it takes all: a photo at its own size fills its frame.
     """
     width, height = frame
     if aspect > frame_aspect:

@@ -12,7 +12,15 @@ from numpy.typing import NDArray
 
 from iibr_core.color import linear_from_srgb
 from iibr_core.depth.editing import UNEDITED, DepthEdits
-from iibr_core.exports import FullPicture, RenderSettings, encode_light, fitted, is_full, needs_smaller, require_size
+from iibr_core.exports import (
+    FullPicture,
+    RenderSettings,
+    encode_light,
+    is_full,
+    needs_smaller,
+    require_size,
+    size_in_frame,
+)
 from iibr_core.generation import ALL_VIEWS
 from iibr_core.rendering import CENTRE
 from iibr_core.scenes import (
@@ -155,7 +163,7 @@ class HeadlessViewer:
         scene = self.state.scene
         assert scene is not None
         frame = ScreenSize(*(size or scene.size))
-        box_size = fitted(scene.width / scene.height, frame, frame.width / frame.height, frame.width / scene.width)
+        box_size = size_in_frame(scene, frame)
         require_size(box_size)
         prepare_gloss(self._scene_view, self.state.optics.gloss)
         if is_full(scene, self.state.optics, box_size):

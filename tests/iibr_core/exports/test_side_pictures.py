@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from PIL import Image
 
-from iibr_core.exports.framing import fitted
+from iibr_core.exports.framing import fitted, size_in_frame
 from iibr_core.exports.parallax import side_pictures
 from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.exports.source import ExportSource
@@ -80,6 +81,14 @@ def test_every_display_gets_what_it_asks_for(name: str) -> None:
     assert places[-1][0].start == quilt.size.height - quilt.rows * quilt.tile.height
     assert places[-1][1].stop == quilt.columns * quilt.tile.width
     assert len({(rows.start, columns.start) for rows, columns in places}) == quilt.views
+
+
+def test_a_small_photo_keeps_its_shape_however_much_it_is_enlarged(source: ExportSource) -> None:
+    width, height = source.scene.size
+    frame = ScreenSize(40 * width, 40 * height + 30)
+    assert size_in_frame(source.scene, frame) == (40 * width, 40 * height)
+    smaller = replace(source.scene, own_size=ScreenSize(40 * width, 40 * height + 30))
+    assert size_in_frame(smaller, frame) == frame, "a whole number of pixels is all that is known of its shape"
 
 
 def test_tiles_of_a_display_are_stretched_to_its_shape(source: ExportSource, tmp_path: Path) -> None:
