@@ -75,7 +75,9 @@ def goes_on_in_front(
     disparity (H, W) there. Raises Cancelled once should_stop is true.
     """
     pixels = flat_indices(hole, should_stop, threads)
-    known = nearest_known(hole, pixels, should_stop, threads)
+    number = np.empty(hole.shape, np.int32)
+    number_pixels(pixels, number)
+    known = nearest_known(hole, pixels, number, should_stop, threads)
     in_front, one_surface = np.zeros_like(hole), step_of(EDGE_PX, max(map(abs, offset)))
     in_pieces(
         lambda part: _weigh_in_front(
@@ -100,7 +102,9 @@ def _fill_view(
     """See `fill_background`. parallax: px that surfaces part by for each px of disparity."""
     one_surface = step_of(EDGE_PX, parallax)
     pixels = flat_indices(hole, should_stop, threads)
-    known = nearest_known(hole, pixels, should_stop, threads)
+    number = np.empty(hole.shape, np.int32)
+    number_pixels(pixels, number)
+    known = nearest_known(hole, pixels, number, should_stop, threads)
     reach, changed = np.empty(len(pixels), np.float32), np.empty((len(pixels), 3), np.float32)
 
     def run(step: Callable[[slice], None]) -> None:
@@ -122,9 +126,7 @@ def _fill_view(
     for step_px in SMOOTH_STEPS_PX if stages.smooth_gaps else ():
         smooth(step_px)
     if stages.synthesise_patches:
-        number = np.empty(hole.shape, np.int32)
-        number_pixels(pixels, number)
-        copy_patches(colors, disparity, pixels, number, one_surface, should_stop, threads)
+        copy_patches(colors, disparity, hole, pixels, number, one_surface, should_stop, threads)
 
 
 def background_inpainter() -> Inpainter:

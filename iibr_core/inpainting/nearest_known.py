@@ -30,13 +30,18 @@ def flat_indices(mask: NDArray[np.bool_], should_stop: ShouldStop, threads: int)
 
 
 def nearest_known(
-    hole: NDArray[np.bool_], pixels: NDArray[np.int64], should_stop: ShouldStop, threads: int
-) -> NDArray[np.int64]:
-    """Flat indices (N, 16) of the known pixels around each hole pixel (N), one a direction, -1 if there is none."""
+    hole: NDArray[np.bool_],
+    pixels: NDArray[np.int64],
+    number: NDArray[np.int32],
+    should_stop: ShouldStop,
+    threads: int,
+) -> NDArray[np.int32]:
+    """Flat indices (N, 16) of the known pixels around each hole pixel (N), one a direction, -1 if there is none.
+
+    number: see `number_pixels`.
+    """
     raise_if_stopped(should_stop)
-    number = np.empty(hole.shape, np.int32)
-    _number(pixels, number)
-    known = np.empty((len(pixels), len(DIRECTIONS)), np.int64)
+    known = np.empty((len(pixels), len(DIRECTIONS)), np.int32)
 
     def look(k: int) -> None:
         _nearest_known_towards(hole, pixels, number, *DIRECTIONS[k], known, k)
@@ -45,15 +50,9 @@ def nearest_known(
     return known
 
 
-def number_pixels(pixels: NDArray[np.int64], number: NDArray[np.int32]) -> None:
-    """Write to number (H, W) which one of these pixels (N,) each of them is; -1 elsewhere."""
-    number[:] = -1
-    _number(pixels, number)
-
-
 @kernel
-def _number(pixels, number):
-    """Tell each of these pixels which one it is."""
+def number_pixels(pixels, number):
+    """Write to number (H, W) which one of these pixels (N,), flat indices, each of them is."""
     width = number.shape[1]
     for i in range(len(pixels)):
         number[pixels[i] // width, pixels[i] % width] = i

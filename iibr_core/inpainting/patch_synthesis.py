@@ -41,31 +41,32 @@ PATCH_BLOCK_PX = 64
 def copy_patches(
     colors: FloatImage,
     disparity: FloatImage,
+    hole: NDArray[np.bool_],
     pixels: NDArray[np.int64],
     number: NDArray[np.int32],
     one_surface: float,
     should_stop: ShouldStop,
     threads: int,
 ) -> None:
-    """Give the hole pixels, flat indices (N,), which colors (H, W, 3) hold as smoothly filled, the looks of their
-    surface. number (H, W): of each hole pixel among them, negative elsewhere. Surfaces are one whose disparities (H, W)
-    differ by one_surface at most. Raises Cancelled once should_stop is true.
+    """Give the pixels of holes (H, W), flat indices (N,), which colors (H, W, 3) hold as smoothly filled, the looks of
+    their surface. number: see `number_pixels`. Surfaces are one whose disparities (H, W) differ by one_surface at most.
+    Raises Cancelled once should_stop is true.
     """
     smooth = np.take(colors.reshape(-1, 3), pixels, axis=0)
-    known = np.where(number < 0, disparity, np.float32(np.nan))
     trust = np.zeros(len(pixels), np.float32)
     shown = np.zeros((len(pixels), 4), np.float32)
-    for blocks in _blocks_apart(pixels, image_size(known)):
+    for blocks in _blocks_apart(pixels, image_size(hole)):
         in_pieces(
-            lambda block: _copy_block(colors, disparity, known, number, *block, np.float32(one_surface), trust, shown),
+            lambda block: _copy_block(colors, disparity, hole, number, *block, np.float32(one_surface), trust, shown),
             blocks, should_stop, threads,
         )  # fmt: skip
     counts = shown[:, 3:]
     change = np.where(counts > 0, shown[:, :3] / np.maximum(counts, 1) - smooth, np.float32(0.0))
     parts = [slice(first, first + PATCH_BLOCK_PX**2) for first in range(0, len(pixels), PATCH_BLOCK_PX**2)]
     in_pieces(
-        lambda part: _blend(number, pixels, part.start, smooth, change, trust, colors), parts, should_stop, threads
-    )
+        lambda part: _blend(hole, number, pixels, part.start, smooth, change, trust, colors),
+        parts, should_stop, threads,
+    )  # fmt: skip
 
 
 def _blocks_apart(pixels: NDArray[np.int64], size: ImageSize) -> list[list[tuple[int, int]]]:
@@ -81,7 +82,7 @@ def _blocks_apart(pixels: NDArray[np.int64], size: ImageSize) -> list[list[tuple
 
 
 @kernel
-def _copy_block(colors, disparity, known, number, row, column, one_surface, trust, shown):
+def _copy_block(colors, disparity, hole, number, row, column, one_surface, trust, shown):
     """Copy patches into the holes of a block. trust (N,): 0 of what is not copied yet. shown (N, 4): the sum of what
     patches show, and what they count.
     """
@@ -96,11 +97,11 @@ def _copy_block(colors, disparity, known, number, row, column, one_surface, trus
     # First those beside what is known of their surface, then what lies around each patch.
     for y in range(top, bottom):
         for x in range(left, right):
-            if number[y, x] < 0:
+            if not hole[y, x]:
                 continue
             for v, u in ((y - 1, x), (y + 1, x), (y, x - 1), (y, x + 1)):
                 if 0 <= v < height and 0 <= u < width and not is_queued[y - top, x - left]:
-                    is_known = number[v, u] < 0 or trust[number[v, u]] > 0
+                    is_known = not hole[v, u] or trust[number[v, u]] > 0
                     if is_known and same_surface(disparity[v, u], disparity[y, x], one_surface):
                         queue[end], end = y * width + x, end + 1
                         is_queued[y - top, x - left] = True
@@ -112,18 +113,17 @@ def _copy_block(colors, disparity, known, number, row, column, one_surface, trus
         first += 1
         if trust[number[y, x]] > 0:
             continue
-        taps, trusted = _take_patch(colors, disparity, number, y, x, one_surface, trust, tap, patch)
-        source_y, source_x, unlike = _find_place(colors, disparity, known, y, x, one_surface, tap[:taps], patch[:taps])
+        taps, trusted = _take_patch(colors, disparity, hole, number, y, x, one_surface, trust, tap, patch)
+        source_y, source_x, unlike = _find_place(colors, disparity, hole, y, x, one_surface, tap[:taps], patch[:taps])
         if source_y < 0:
             continue
         # As much as what it goes on from, and less where it does not fit that.
         patch_trust = max(np.float32(trusted * np.exp(-unlike / FIT**2)), LEAST_TRUST)
         for k in range(taps):
             v, u, a, b = y + tap[k, 0], x + tap[k, 1], source_y + tap[k, 0], source_x + tap[k, 1]
-            i = number[v, u]
-            if i < 0 or not same_surface(known[a, b], patch[k, 3], one_surface):
+            if not hole[v, u] or hole[a, b] or not same_surface(disparity[a, b], patch[k, 3], one_surface):
                 continue
-            count = np.float32(1.0)
+            i, count = number[v, u], np.float32(1.0)
             if trust[i] == 0:
                 # Those that follow are compared with this one.
                 colors[v, u] = colors[a, b]
@@ -133,7 +133,7 @@ def _copy_block(colors, disparity, known, number, row, column, one_surface, trus
             shown[i, 3] += count
         for v in range(max(y - RADIUS_PX - 1, top), min(y + RADIUS_PX + 2, bottom)):
             for u in range(max(x - RADIUS_PX - 1, left), min(x + RADIUS_PX + 2, right)):
-                if number[v, u] < 0 or trust[number[v, u]] > 0 or is_queued[v - top, u - left]:
+                if not hole[v, u] or trust[number[v, u]] > 0 or is_queued[v - top, u - left]:
                     continue
                 if same_surface(disparity[v, u], disparity[y, x], one_surface):
                     queue[end], end = v * width + u, end + 1
@@ -141,7 +141,7 @@ def _copy_block(colors, disparity, known, number, row, column, one_surface, trus
 
 
 @kernel
-def _take_patch(colors, disparity, number, y, x, one_surface, trust, tap, patch):
+def _take_patch(colors, disparity, hole, number, y, x, one_surface, trust, tap, patch):
     """Write where a patch shows the surface of its middle, tap (M, 2), and what is there, patch (M, 5): colour,
     disparity, what it counts. Returns M and the mean trust of what is there, which is 1 where it is known.
     """
@@ -150,8 +150,7 @@ def _take_patch(colors, disparity, number, y, x, one_surface, trust, tap, patch)
     for v in range(max(y - RADIUS_PX, 0), min(y + RADIUS_PX + 1, height)):
         for u in range(max(x - RADIUS_PX, 0), min(x + RADIUS_PX + 1, width)):
             if same_surface(disparity[v, u], disparity[y, x], one_surface):
-                i = number[v, u]
-                here = np.float32(1.0) if i < 0 else trust[i]
+                here = trust[number[v, u]] if hole[v, u] else np.float32(1.0)
                 tap[taps, 0], tap[taps, 1] = v - y, u - x
                 patch[taps, 0], patch[taps, 1], patch[taps, 2] = colors[v, u, 0], colors[v, u, 1], colors[v, u, 2]
                 patch[taps, 3], patch[taps, 4] = disparity[v, u], np.float32(1.0) if here > 0 else GUESS
@@ -160,11 +159,11 @@ def _take_patch(colors, disparity, number, y, x, one_surface, trust, tap, patch)
 
 
 @kernel
-def _find_place(colors, disparity, known, y, x, one_surface, tap, patch):
+def _find_place(colors, disparity, hole, y, x, one_surface, tap, patch):
     """Where the surface looks most like a patch, row and column, -1 if it shows nowhere; and by how much that differs
     from what is known, mean square.
     """
-    height, width = known.shape
+    height, width = hole.shape
     side, around = 2 * (SEARCH_PX // STEP_PX) + 1, 2 * STEP_PX - 1
     best, best_y, best_x, middle_y, middle_x = np.float32(np.inf), -1, -1, -1, -1
     for k in range(side**2 + around**2):
@@ -176,13 +175,13 @@ def _find_place(colors, disparity, known, y, x, one_surface, tap, patch):
             v, u = middle_y + j // around - STEP_PX + 1, middle_x + j % around - STEP_PX + 1
         if not (RADIUS_PX <= v < height - RADIUS_PX and RADIUS_PX <= u < width - RADIUS_PX):
             continue
-        if not same_surface(known[v, u], disparity[y, x], one_surface):
+        if hole[v, u] or not same_surface(disparity[v, u], disparity[y, x], one_surface):
             continue
         unlike = np.float32(0.0)
         for m in range(len(tap)):
             # Within the frame: unsigned indices need no test for counting from the end.
             a, b = np.uint64(v + tap[m, 0]), np.uint64(u + tap[m, 1])
-            if same_surface(known[a, b], patch[m, 3], one_surface):
+            if not hole[a, b] and same_surface(disparity[a, b], patch[m, 3], one_surface):
                 red, green = colors[a, b, 0] - patch[m, 0], colors[a, b, 1] - patch[m, 1]
                 blue = colors[a, b, 2] - patch[m, 2]
                 unlike += patch[m, 4] * (red * red + green * green + blue * blue)
@@ -198,7 +197,7 @@ def _find_place(colors, disparity, known, y, x, one_surface, tap, patch):
         a, b = best_y + tap[m, 0], best_x + tap[m, 1]
         if best_y >= 0 and patch[m, 4] == 1:
             total += 1
-            if same_surface(known[a, b], patch[m, 3], one_surface):
+            if not hole[a, b] and same_surface(disparity[a, b], patch[m, 3], one_surface):
                 for c in range(3):
                     unlike += (colors[a, b, c] - patch[m, c]) ** 2
             else:
@@ -207,7 +206,7 @@ def _find_place(colors, disparity, known, y, x, one_surface, tap, patch):
 
 
 @kernel
-def _blend(number, pixels, first, smooth, change, trust, colors):
+def _blend(hole, number, pixels, first, smooth, change, trust, colors):
     """Write up to PATCH_BLOCK_PX^2 hole pixels, from `first` on: what was filled smoothly (N, 3), changed (N, 3) as far
     as it is trusted (N,).
     """
@@ -225,8 +224,8 @@ def _blend(number, pixels, first, smooth, change, trust, colors):
             if not 0 <= u < width:
                 continue
             for v in range(max(y - FINE_TEXTURE_PX, 0), min(y + FINE_TEXTURE_PX + 1, height)):
-                j = number[v, u]
-                if j >= 0:
+                if hole[v, u]:
+                    j = number[v, u]
                     column[3] += 1
                     for c in range(3):
                         column[c] += change[j, c]

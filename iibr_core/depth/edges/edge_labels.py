@@ -168,7 +168,7 @@ def _mean_field(
     should_stop: ShouldStop,
 ) -> FloatImage:
     """(N): how likely each pixel (flat index) is on its own surface rather than on the other."""
-    number = np.empty(values.shape, np.int32)
+    number = np.full(values.shape, -1, np.int32)
     number_pixels(pixels, number)
     drive, votes = drive.copy(), np.empty((len(pixels), len(NEIGHBOURS)), np.float32)
     belief = np.ones(len(pixels), np.float32)

@@ -110,7 +110,7 @@ def copied(smooth, disparity, hole, should_stop=never, threads=2):
     colors, number = smooth.copy(), np.empty(hole.shape, np.int32)
     pixels = np.flatnonzero(hole)
     number_pixels(pixels, number)
-    copy_patches(colors, disparity, pixels, number, ONE_SURFACE, should_stop, threads)
+    copy_patches(colors, disparity, hole, pixels, number, ONE_SURFACE, should_stop, threads)
     return colors
 
 
