@@ -194,7 +194,7 @@ class _ViewsBetween:
                 self._inpainted = offset, rays
             origin, rays = self._inpainted
             disparity = np.where(view.hole, view.disparity, np.float32(np.nan))
-            rays.add(_between(origin, offset), view.colors, disparity, view.hole.astype(np.float32), self._should_stop)
+            rays.add(_between(origin, offset), view.colors, disparity, view.hole, self._should_stop)
         return view
 
     def make(self, offset: ViewOffset) -> _Merged:

@@ -46,13 +46,18 @@ PHOTO_BYTES = bytes_of(colors="3f4", found="f4", refined="f4", field="f4", store
 RAY_BYTES = bytes_of(colors="3f4", disparity="f4", coverage="f4", edge_level="u1")
 """Of one source image, see `RaySet`."""
 DETAIL_BYTES = bytes_of(detail="f4", connected="u1")
-FILLED_BYTES = bytes_of(colors="3f4", disparity="f4", coverage="f4")
-VIEW_BYTES = bytes_of(colors="3f4", disparity="f4", occluded="?", inpainted="?", uncovered="f4") + FILLED_BYTES
-"""Of a view in the making, with what it adds to the rays."""
+KEPT_BYTES = 15
+"""Measured: what the allocator keeps of each view that is done."""
+VIEW_BYTES = KEPT_BYTES + bytes_of(
+    colors="3f4", disparity="f4", occluded="?", inpainted="?", uncovered="f4", hole="?", number="i4"
+)
+"""Of a view in the making."""
 CANDIDATE_BYTES = bytes_of(coverage="5f4", disparity="5f4", source="5u1", weights="5f4", count="u1", shown="f4")
 BAND_BYTES = CANDIDATE_BYTES + bytes_of(image="u1", colors="3f4")
 """Of the rows in the making."""
-HOLE_BYTES = bytes_of(pixel="2i8", number="i4", around="16i8", reach="f4", changed="3f4")
+HOLE_BYTES = bytes_of(
+    pixel="i8", around="16i4", reach="f4", changed="3f4", smooth="3f4", trust="f4", shown="4f4", patched="3f4"
+)
 """Of one pixel of a hole while it is filled: what surrounds it in sixteen directions."""
 DRAFT_BYTES = bytes_of(colors="3u1", with_flying_pixels="3u1", disparity="f4", inpainted="?")
 MAP_BYTES = bytes_of(values="f4", is_known="?", is_finite="?")

@@ -37,7 +37,7 @@ def rays_of_photo(
     detail = measure_detail(colors, should_stop)
     size, surface_step = image_size(disparity), step_of(SAME_SURFACE_PX, farthest_views)
     rays = RaySet(2 + more, size, surface_step, farthest_views, margins, detail, stages)
-    everywhere = np.ones_like(disparity)
+    everywhere = np.ones(size, np.bool_)
     if not stages.split_mixed_pixels:
         rays.add(centre, colors, disparity, everywhere, should_stop)
         return rays

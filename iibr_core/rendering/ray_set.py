@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.rendering.ray_cells import CELL_PX, Cells, largest_steps, over_cells, sum_up
+from iibr_core.rendering.rendered_view import RaysBehind
 from iibr_core.rendering.slope_connectivity import BELOW, RIGHT, connect_rays, connected_either_way
 from iibr_core.runtime.jit import kernel, nearest_pixel
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never
@@ -68,7 +69,7 @@ class RaySet:
         self.margins, self.stages = margins, stages
         self._surface_step = surface_step
         self.farthest_views = farthest_views
-        self._photo_detail = photo_detail
+        self._photo_detail, self._photo_disparity = photo_detail, np.empty((0, 0), np.float32)
         self._room = RayArrays(
             np.empty((capacity, 2)),
             np.empty((capacity, *size, 3), np.float32),
@@ -89,40 +90,36 @@ class RaySet:
         offset: ViewOffset,
         colors: FloatImage,
         disparity: FloatImage,
-        coverage: FloatImage,
+        coverage: FloatImage | NDArray[np.bool_],
         should_stop: ShouldStop = never,
+        behind: RaysBehind | None = None,
     ) -> None:
         """Add the rays of one image (H, W), or of one view. All but the photo's, which come first, are inpainted: those
-        in front of what the photo shows are left out, as it would show them, and those beside them. Raises Cancelled
-        once should_stop is true; then nothing is added.
+        in front of what the photo shows are left out, as it would show them, and those beside them. behind: of a view,
+        what counts instead at some pixels. Raises Cancelled once should_stop is true; then nothing is added.
         """
-        if image_size(disparity) != self.size:
-            colors, disparity, coverage = (
-                self._with_margins(part, none) for part, none in ((colors, 0.0), (disparity, np.nan), (coverage, 0.0))
-            )
-        k, connected = self._count, np.zeros(self.size, np.uint8)
-        room, cells = self._room, self._cells_room
+        k, connected, cells = self._count, np.zeros(self.size, np.uint8), self._cells_room
+        self._write(k, colors, disparity, coverage, behind)
+        disparity, covered = self._room.disparity[k], self._room.coverage[k]
+        if k == 0:
+            self._photo_disparity = np.ascontiguousarray(self.in_view(disparity))
         if k == 0 and self.stages.connect_slopes:
             self.connected = connected = connect_rays(disparity, self._surface_step, should_stop)
             if connected.any():
                 self._steep = over_cells(np.logical_or, connected_either_way(connected))
         if k > 0 and any(offset) and self.stages.leave_out_in_front:
-            coverage = coverage.copy()
             edge_step = step_of(EDGE_PX, self.farthest_views)
-            _leave_out_in_front(disparity, room.disparity[0], *offset, edge_step, coverage)
+            _leave_out_in_front(disparity, self._room.disparity[0], *offset, edge_step, covered)
 
         def band(first: int, last: int) -> None:
-            rows = slice(first, last)
-            room.colors[k, rows], room.disparity[k, rows] = colors[rows], disparity[rows]
-            room.coverage[k, rows] = coverage[rows]
-            _edge_level(disparity, connected, self._surface_step, first, last, room.edge_level[k])
-            sum_up(disparity, coverage, first, last, cells.low[k], cells.high[k])
+            _edge_level(disparity, connected, self._surface_step, first, last, self._room.edge_level[k])
+            sum_up(disparity, covered, first, last, cells.low[k], cells.high[k])
             if k == 0:
                 largest_steps(disparity, first, last, cells.step)
 
         in_bands(band, self.size, should_stop)
         cells.row_ranges[k, :, 0], cells.row_ranges[k, :, 1] = cells.low[k].min(axis=1), cells.high[k].max(axis=1)
-        room.offsets[k] = offset
+        self._room.offsets[k] = offset
         self._count += 1
         self.photo_images += not any(offset)
 
@@ -188,7 +185,7 @@ class RaySet:
     @property
     def photo_disparity(self) -> FloatImage:
         """(H, W) disparity of the photo, as large as views."""
-        return np.ascontiguousarray(self.in_view(self._room.disparity[0]))
+        return self._photo_disparity
 
     @property
     def photo_detail(self) -> FloatImage:
@@ -199,11 +196,26 @@ class RaySet:
             raise ValueError("these rays are no photo's: make them by rays_of_photo")
         return self._photo_detail
 
-    def _with_margins(self, view: FloatImage, around: float) -> FloatImage:
-        """A view (H, W, ...) as large as the images."""
-        image = np.full((*self.size, *view.shape[2:]), around, np.float32)
-        self.in_view(image)[:] = view
-        return image
+    def _write(
+        self,
+        k: int,
+        colors: FloatImage,
+        disparity: FloatImage,
+        coverage: FloatImage | NDArray[np.bool_],
+        behind: RaysBehind | None,
+    ) -> None:
+        """Image k as `add` takes it; there are no rays around what is as small as a view."""
+        image = self._room.colors[k], self._room.disparity[k], self._room.coverage[k]
+        for room, given, none in zip(image, (colors, disparity, coverage), (0.0, np.nan, 0.0)):
+            if image_size(given) == self.size:
+                room[:] = given
+            else:
+                room[:] = none
+                self.in_view(room)[:] = given
+        if behind is not None:
+            at = np.unravel_index(behind.pixel, self.view_size)
+            for room, instead in zip(image, (behind.colors, behind.disparity, 1.0)):
+                self.in_view(room)[at] = instead
 
 
 @kernel

@@ -50,16 +50,6 @@ class RenderedView:
         """Whether anything was filled here."""
         return self.behind is not None or bool(self.occluded.any())
 
-    def filled_rays(self) -> tuple[FloatImage, FloatImage, FloatImage]:
-        """What was filled here, as an image for the ray set: colours (H, W, 3), disparity and coverage (H, W)."""
-        if self.behind is None:
-            return self.colors, self.disparity, self.occluded.astype(np.float32)
-        colors, disparity, filled = self.colors.copy(), self.disparity.copy(), self.occluded.copy()
-        colors.reshape(-1, 3)[self.behind.pixel] = self.behind.colors
-        disparity.reshape(-1)[self.behind.pixel] = self.behind.disparity
-        filled.reshape(-1)[self.behind.pixel] = True
-        return colors, disparity, filled.astype(np.float32)
-
 
 @dataclass(frozen=True, eq=False)
 class DecidedRays:

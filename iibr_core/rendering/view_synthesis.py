@@ -80,7 +80,7 @@ class ViewSynthesis:
     def add_rays(self, rays: RaySet, offset: ViewOffset, view: RenderedView) -> None:
         """See `Renderer`, as for all that follow."""
         if view.has_filled_rays:
-            rays.add(offset, *view.filled_rays(), self._should_stop)
+            rays.add(offset, view.colors, view.disparity, view.occluded, self._should_stop, view.behind)
 
     def render(self, rays: RaySet, offset: ViewOffset, alone: bool = False) -> RenderedView:
         """Row bands run side by side; alone, one after the other: the way for many views."""

@@ -5,6 +5,7 @@ import pytest
 
 from iibr_core.rendering.ray_cells import CELL_PX
 from iibr_core.rendering.ray_set import GUARD_BAND_PX, HIGHEST_LEVEL, RaySet
+from iibr_core.rendering.rendered_view import RaysBehind
 from iibr_core.surfaces import EDGE_PX, SMOOTH_SHARE
 from iibr_core.types import ImageSize, Margins, ViewOffset
 
@@ -91,3 +92,28 @@ def test_what_was_made_up_in_front_of_what_the_photo_shows_is_left_out_and_what_
         rays.cells.high[2], slow_cells(np.where(expected > 0, made_up, np.float32(-np.inf)), np.max)
     )
     assert 0 < expected.sum() < coverage.sum()
+
+
+@pytest.mark.parametrize("margins", [Margins(), Margins(3, 2, 0, 4)])
+def test_what_was_filled_in_a_view_joins_within_the_margins_with_what_lies_behind_instead(margins):
+    random, size = np.random.default_rng(3), ImageSize(20, 24)
+    view = ImageSize(size.height - margins.top - margins.bottom, size.width - margins.left - margins.right)
+    colors, disparity = random.random((*view, 3), np.float32), random.random(view, np.float32)
+    occluded, changed = random.random(view) > 0.7, random.random(view) > 0.9
+    pixel = np.flatnonzero(changed)
+    behind = RaysBehind(pixel, random.random((len(pixel), 3), np.float32), random.random(len(pixel), np.float32) - 2)
+    given = [part.copy() for part in (colors, disparity, occluded)]
+    rays = RaySet(2, size, SURFACE_STEP, margins=margins)
+    rays.add(ViewOffset(0.0, 0.0), np.zeros((*size, 3), np.float32), np.full(size, 9, np.float32), np.ones(size, bool))
+    rays.add(ViewOffset(1.0, 0.0), colors, disparity, occluded, behind=behind)
+    np.testing.assert_equal([colors, disparity, occluded], given)
+    colors[changed], disparity[changed] = behind.colors, behind.disparity
+    for image, shown, around in (
+        (rays.arrays.colors[1], colors, 0),
+        (rays.arrays.disparity[1], disparity, np.nan),
+        (rays.arrays.coverage[1], occluded | changed, 0),
+    ):
+        expected = np.full(image.shape, around, np.float32)
+        rays.in_view(expected)[:] = shown
+        np.testing.assert_array_equal(image, expected)
+    assert (rays.photo_disparity == np.full(view, 9)).all()
