@@ -517,7 +517,6 @@ FINITE_BY_CONTRACT = {
     "inpainting.disparity_by_color.nearness": "of constants only",
     "inpainting.nearest_known.flat_indices": "of masks only",
     "inpainting.nearest_known.nearest_known": "of masks only",
-    "inpainting.nearest_known.number_pixels": "of indices only",
     "inpainting.patch_synthesis.copy_patches": "of rendered views only",
     "depth.multi_view.matching.matching_views": "of lumas that `luma_of` made finite",
     "depth.multi_view.matching.sweep": "of `matching_views`, whose lumas `luma_of` made finite",
