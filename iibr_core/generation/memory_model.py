@@ -45,7 +45,7 @@ USUAL_HOLES, USUAL_AMBIGUOUS = 0.12, 0.2
 PHOTO_BYTES = bytes_of(colors="3f4", found="f4", refined="f4", field="f4", stored="3u1", inpainted="?")
 RAY_BYTES = bytes_of(colors="3f4", disparity="f4", coverage="f4", edge_level="u1")
 """Of one source image, see `RaySet`."""
-DETAIL_BYTES = bytes_of(detail="f4", connected="u1")
+DETAIL_BYTES = bytes_of(detail="f4", disparity="f4", connected="u1")
 KEPT_BYTES = 15
 """Measured: what the allocator keeps of each view that is done."""
 VIEW_BYTES = KEPT_BYTES + bytes_of(

@@ -49,7 +49,8 @@ class RaySet:
 
     All arrays are of the images added so far. farthest_views: the largest view offset that will be rendered. margins:
     of the images around every view. connected (H, W): which steps between the photo's rays are a steep surface's
-    (`slope_connectivity`). photo_images: so many, from the first on, hold what the photo shows; others are inpainted.
+    (`slope_connectivity`). photo_disparity: the photo's, as large as views. photo_images: so many, from the first on,
+    hold what the photo shows; others are inpainted.
     """
 
     def __init__(
@@ -69,7 +70,7 @@ class RaySet:
         self.margins, self.stages = margins, stages
         self._surface_step = surface_step
         self.farthest_views = farthest_views
-        self._photo_detail, self._photo_disparity = photo_detail, np.empty((0, 0), np.float32)
+        self._photo_detail, self.photo_disparity = photo_detail, np.empty((0, 0), np.float32)
         self._room = RayArrays(
             np.empty((capacity, 2)),
             np.empty((capacity, *size, 3), np.float32),
@@ -102,7 +103,7 @@ class RaySet:
         self._write(k, colors, disparity, coverage, behind)
         disparity, covered = self._room.disparity[k], self._room.coverage[k]
         if k == 0:
-            self._photo_disparity = np.ascontiguousarray(self.in_view(disparity))
+            self.photo_disparity = np.ascontiguousarray(self.in_view(disparity))
         if k == 0 and self.stages.connect_slopes:
             self.connected = connected = connect_rays(disparity, self._surface_step, should_stop)
             if connected.any():
@@ -181,11 +182,6 @@ class RaySet:
         """The rays added so far, summarised."""
         added, room = slice(self._count), self._cells_room
         return Cells(room.low[added], room.high[added], room.row_ranges[added], room.step)
-
-    @property
-    def photo_disparity(self) -> FloatImage:
-        """(H, W) disparity of the photo, as large as views."""
-        return self._photo_disparity
 
     @property
     def photo_detail(self) -> FloatImage:
