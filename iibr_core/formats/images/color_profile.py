@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.color import srgb_from_linear
+from iibr_core.formats.images.icc_profile import icc_profile
 from iibr_core.formats.images.oiio_reader import FLOATING_TYPES, text_attribute
 from iibr_core.types import DISPLAY_P3, SRGB, ColorSpace, FloatImage
 
@@ -29,6 +30,8 @@ LEAST_DETERMINANT = 1e-4
 BRADFORD = np.array([[0.8951, 0.2664, -0.1614], [-0.7502, 1.7135, 0.0367], [0.0389, -0.0685, 1.0296]])
 """Cones from XYZ (ICC.1:2022, annex E.3)."""
 D50 = np.array([0.9642, 1.0, 0.8249])
+P3_CODES = 12, 13
+"""Display P3's primaries and sRGB's curve, by the numbers of ITU-T H.273."""
 PARAMETRIC = {0: 1, 1: 3, 2: 4, 3: 5, 4: 7}
 """Parameters of each kind of formula (ICC.1:2022, table 68)."""
 MOST_PROFILE_BYTES = 4 * 2**20
@@ -79,10 +82,13 @@ def color_profile_of(spec: Any) -> tuple[ColorProfile | None, str]:
     """
     if str(spec.format) in FLOATING_TYPES or spec.nchannels < 3:
         return None, ""
-    value = spec.getattribute("ICCProfile")
+    value, codes = spec.getattribute("ICCProfile"), spec.getattribute("CICP")
+    name = text_attribute(spec, "ICCProfile:profile_description") or "without a name"
+    # They count more than a profile beside them (PNG, third edition, 11.3.2.6).
+    if isinstance(codes, tuple) and codes[:2] == P3_CODES:
+        value, name = np.frombuffer(icc_profile(DISPLAY_P3), np.uint8), DISPLAY_P3.name
     if value is None:
         return None, ""
-    name = text_attribute(spec, "ICCProfile:profile_description") or "without a name"
     profile, complaint = _read(bytes(value) if isinstance(value, np.ndarray) else b"")
     if profile is None:
         is_told = complaint and "sRGB" not in name

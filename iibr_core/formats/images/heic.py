@@ -13,9 +13,8 @@ import OpenImageIO as oiio
 from numpy.typing import NDArray
 
 from iibr_core.formats.files import MAX_FILE_PIXELS, open_binary, reason_of, refuse_bomb, require_file
-from iibr_core.formats.images.icc_profile import icc_profile
 from iibr_core.formats.images.oiio_reader import Raster
-from iibr_core.types import DISPLAY_P3, FloatImage, ImageSize, InputError
+from iibr_core.types import FloatImage, ImageSize, InputError
 
 BRANDS = frozenset({b"heic", b"heix", b"heim", b"heis", b"hevc", b"hevx", b"mif1", b"msf1"})
 EXIF_FOLDER = 0x8769
@@ -26,8 +25,8 @@ EXIF_NUMBERS = {
     0xA210: "Exif:FocalPlaneResolutionUnit",
     0xA002: "Exif:PixelXDimension",
 }
-P3_CODES = 12, 13
-"""Display P3's primaries and sRGB's curve, by the numbers of ITU-T H.273."""
+COLOR_CODES = "color_primaries", "transfer_characteristics", "matrix_coefficients", "full_range_flag"
+"""What a HEIC may say of its colours in numbers, in the order in which PNGs do (`CICP`)."""
 DECODE_ERRORS = (ValueError, OSError, RuntimeError, EOFError, SyntaxError, MemoryError, IndexError, struct.error)
 
 
@@ -150,16 +149,12 @@ def describe(spec: Any, info: Mapping[Any, Any]) -> None:
                 spec.attribute(name, float(tags[tag]))
     except (*DECODE_ERRORS, TypeError, ZeroDivisionError, KeyError):
         pass  # a photo is one without its Exif too
-    if profile := info.get("icc_profile") or _profile_of_codes(info.get("nclx_profile") or {}):
+    if profile := info.get("icc_profile"):
         values = np.frombuffer(profile, np.uint8)
         spec.attribute("ICCProfile", oiio.TypeDesc(f"uint8[{len(values)}]"), values)
         spec.attribute("ICCProfile:profile_description", _profile_name(profile))
-
-
-def _profile_of_codes(codes: Mapping[str, Any]) -> bytes:
-    """What a file without a profile says of its colours in numbers; nothing where that is not Display P3."""
-    found = codes.get("color_primaries"), codes.get("transfer_characteristics")
-    return icc_profile(DISPLAY_P3) if found == P3_CODES else b""
+    elif codes := info.get("nclx_profile"):
+        spec.attribute("CICP", "int[4]", tuple(int(codes.get(name, 0)) for name in COLOR_CODES))
 
 
 def _profile_name(profile: bytes) -> str:

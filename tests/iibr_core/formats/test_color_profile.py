@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+import zlib
 from io import BytesIO
 
 import numpy as np
@@ -160,6 +161,23 @@ def test_what_a_heic_says_in_numbers_counts_where_it_has_no_profile(tmp_path):
         photo = read_photo(tmp_path / "a.heic", keeps_primaries=True)
         assert photo.color_space == expected
         assert np.abs(255 * photo.pixels - (200, 80, 60)).max() < 2.5
+
+
+@pytest.mark.parametrize(
+    ("codes", "profile", "expected"),
+    [((12, 13), b"", DISPLAY_P3), ((1, 13), b"", SRGB), ((12, 13), profile_bytes(SRGB_PRIMARIES), DISPLAY_P3)],
+    ids=["P3", "sRGB", "beside a profile"],
+)
+def test_what_a_png_says_in_numbers_counts_even_beside_a_profile(tmp_path, codes, profile, expected):
+    path = tmp_path / "a.png"
+    Image.fromarray(COLORS).save(path, icc_profile=profile)
+    data, chunk = path.read_bytes(), b"cICP" + bytes((*codes, 0, 1))
+    chunk = len(chunk[4:]).to_bytes(4, "big") + chunk + zlib.crc32(chunk).to_bytes(4, "big")
+    first = data.index(b"iCCP" if profile else b"IDAT") - 4
+    path.write_bytes(data[:first] + chunk + data[first:])
+    photo = read_photo(path, keeps_primaries=True)
+    assert photo.color_space == expected
+    assert np.abs(255 * photo.pixels - COLORS).max() < 0.01
 
 
 def test_grey_stays_grey():
