@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.inpainting.inpainter import Inpainter
-from iibr_core.inpainting.nearest_known import MOST_PIECE_PIXELS, flat_indices, nearest_known, number_pixels
+from iibr_core.inpainting.nearest_known import MOST_PIECE_PIXELS, nearest_known
 from iibr_core.inpainting.patch_synthesis import copy_patches
 from iibr_core.runtime.jit import kernel, nearest_pixel
 from iibr_core.runtime.tiling import ShouldStop, in_pieces, never, pieces_of
@@ -74,10 +74,7 @@ def goes_on_in_front(
     """(H, W): where in a hole (H, W) of a view most of what may continue there from around it is in front of the view's
     disparity (H, W) there. Raises Cancelled once should_stop is true.
     """
-    pixels = flat_indices(hole, should_stop, threads)
-    number = np.empty(hole.shape, np.int32)
-    number_pixels(pixels, number)
-    known = nearest_known(hole, pixels, number, should_stop, threads)
+    pixels, _, known = nearest_known(hole, should_stop, threads)
     in_front, one_surface = np.zeros_like(hole), step_of(EDGE_PX, max(map(abs, offset)))
     in_pieces(
         lambda part: _weigh_in_front(
@@ -101,10 +98,7 @@ def _fill_view(
 ) -> None:
     """See `fill_background`. parallax: px that surfaces part by for each px of disparity."""
     one_surface = step_of(EDGE_PX, parallax)
-    pixels = flat_indices(hole, should_stop, threads)
-    number = np.empty(hole.shape, np.int32)
-    number_pixels(pixels, number)
-    known = nearest_known(hole, pixels, number, should_stop, threads)
+    pixels, number, known = nearest_known(hole, should_stop, threads)
     reach, changed = np.empty(len(pixels), np.float32), np.empty((len(pixels), 3), np.float32)
 
     def run(step: Callable[[slice], None]) -> None:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.runtime.jit import kernel
-from iibr_core.runtime.tiling import ShouldStop, in_bands, in_pieces, raise_if_stopped
+from iibr_core.runtime.tiling import ShouldStop, in_bands, in_pieces
 from iibr_core.types import image_size
 
 DIRECTIONS = np.array(
@@ -19,35 +21,32 @@ MOST_PIECE_PIXELS = 1 << 15
 """Hole pixels that are filled between two questions whether to stop."""
 
 
-def flat_indices(mask: NDArray[np.bool_], should_stop: ShouldStop, threads: int) -> NDArray[np.int64]:
-    """(N,): of the pixels where mask (H, W) is True, ascending."""
-    size = image_size(mask)
+class AroundHoles(NamedTuple):
+    """pixels (N,): flat indices of the hole pixels, ascending. number (H, W): see `number_pixels`. known (N, 16): flat
+    indices of the known pixels around each, one a direction, -1 if there is none.
+    """
+
+    pixels: NDArray[np.int64]
+    number: NDArray[np.int32]
+    known: NDArray[np.int32]
+
+
+def nearest_known(hole: NDArray[np.bool_], should_stop: ShouldStop, threads: int) -> AroundHoles:
+    """What is around holes (H, W). Raises Cancelled once should_stop is true."""
+    size = image_size(hole)
 
     def band(first: int, last: int) -> NDArray[np.int64]:
-        return first * size.width + np.flatnonzero(mask[first:last])
+        return first * size.width + np.flatnonzero(hole[first:last])
 
-    return np.concatenate(in_bands(band, size, should_stop, threads))
-
-
-def nearest_known(
-    hole: NDArray[np.bool_],
-    pixels: NDArray[np.int64],
-    number: NDArray[np.int32],
-    should_stop: ShouldStop,
-    threads: int,
-) -> NDArray[np.int32]:
-    """Flat indices (N, 16) of the known pixels around each hole pixel (N), one a direction, -1 if there is none.
-
-    number: see `number_pixels`.
-    """
-    raise_if_stopped(should_stop)
+    pixels, number = np.concatenate(in_bands(band, size, should_stop, threads)), np.empty(size, np.int32)
+    number_pixels(pixels, number)
     known = np.empty((len(pixels), len(DIRECTIONS)), np.int32)
 
     def look(k: int) -> None:
         _nearest_known_towards(hole, pixels, number, *DIRECTIONS[k], known, k)
 
     in_pieces(look, range(len(DIRECTIONS)), should_stop, threads)
-    return known
+    return AroundHoles(pixels, number, known)
 
 
 @kernel
