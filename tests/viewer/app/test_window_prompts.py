@@ -258,6 +258,7 @@ def test_a_photo_is_looked_for_and_opened_without_a_dialog_of_the_system(viewer:
     assert beside.folders == ("inner",)
     assert beside.files == ("scene.png",)
     viewer.type(str(tmp_path / "inner"))
+    assert list_of(viewer, tmp_path).folders == ("inner",)  # read again: before that Enter opens whatever is there
     viewer.send("key", "Return")
     inner = list_of(viewer, tmp_path / "inner")
     assert (inner.folders, inner.files) == ((), ("other.png",))
