@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.runtime.jit import kernel
-from iibr_core.runtime.tiling import ShouldStop, in_pieces
+from iibr_core.runtime.tiling import ShouldStop, in_pieces, pieces_of
 from iibr_core.surfaces import same_surface
 from iibr_core.types import FloatImage, ImageSize, image_size
 
@@ -62,10 +62,9 @@ def copy_patches(
         )  # fmt: skip
     counts = shown[:, 3:]
     change = np.where(counts > 0, shown[:, :3] / np.maximum(counts, 1) - smooth, np.float32(0.0))
-    parts = [slice(first, first + PATCH_BLOCK_PX**2) for first in range(0, len(pixels), PATCH_BLOCK_PX**2)]
     in_pieces(
         lambda part: _blend(hole, number, pixels, part.start, smooth, change, trust, colors),
-        parts, should_stop, threads,
+        pieces_of(len(pixels), PATCH_BLOCK_PX**2), should_stop, threads,
     )  # fmt: skip
 
 
