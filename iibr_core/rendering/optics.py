@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
 from iibr_core.rendering.gloss.gloss_settings import Gloss
@@ -76,6 +76,16 @@ class Optics:
     highlight_recovery: float = within(0.0, 1.0, 0.0)
     exposure_stops: float = within(-EXPOSURE_LIMIT_STOPS, EXPOSURE_LIMIT_STOPS, 0.0)
     gloss: Gloss | None = None
+
+    def with_focus_scaled(self, ratio: float) -> Optics:
+        """The same plane of focus where disparities are so many times as large."""
+        tilt_x, tilt_y = self.focus_tilt
+        return replace(
+            self,
+            focus_disparity=self.focus_disparity * ratio,
+            focus_range=self.focus_range * abs(ratio),
+            focus_tilt=(tilt_x * ratio, tilt_y * ratio),
+        )
 
     def highlight_gain(self, diameter: float, is_hdr: bool) -> float:
         """What clipped light counts for beyond white through an aperture so many view steps wide."""

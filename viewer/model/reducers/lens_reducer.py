@@ -169,12 +169,10 @@ def carry_optics(optics: Optics, old: Scene | None, new: Scene) -> Optics:
         shift = (old.plan.disparity_zero - new.plan.disparity_zero) * new.plan.disparity_scale
     aperture = min(optics.aperture_diameter * _steps(new.grid[0]) / _steps(old.grid[0]), aperture_limit(new.grid))
     return replace(
-        optics,
+        optics.with_focus_scaled(ratio),
         eye=clamp_eye(eye, new.grid),
         dolly=optics.dolly * columns,
         focus_disparity=optics.focus_disparity * ratio + shift,
-        focus_range=optics.focus_range * abs(ratio),
-        focus_tilt=(optics.focus_tilt[0] * ratio, optics.focus_tilt[1] * ratio),
         aperture_diameter=aperture,
     )
 
@@ -183,13 +181,12 @@ def carry_to_depth(
     optics: Optics, old: Scene, new: Scene, same: SamePlaces, focused_at: tuple[float, float] | None
 ) -> Optics:
     """The optics that show a photo whose depth was found again as it was seen before: what was sharp stays sharp."""
-    carried = carry_optics(optics, old, new)
     (first, first_now), (last, last_now) = same.pairs[0], same.pairs[-1]
     ratio = abs(last_now - first_now) / (last - first) if last > first else 1.0
-    tilt = (optics.focus_tilt[0] * ratio, optics.focus_tilt[1] * ratio)
     # nobody chose a focus of 0: it is the plan's own, and stays that
     focus = _disparity_now(optics.focus_disparity, same.pairs) if optics.focus_disparity else 0.0
-    carried = replace(carried, focus_disparity=focus, focus_range=optics.focus_range * ratio, focus_tilt=tilt)
+    carried = with_focus_of(carry_optics(optics, old, new), optics.with_focus_scaled(ratio))
+    carried = replace(carried, focus_disparity=focus)
     if same.in_focus is None or focused_at is None:
         return carried
     before, now = same.in_focus

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import PurePath
 
 from iibr_core.depth.editing import UNEDITED, DepthEdits
@@ -44,14 +44,7 @@ class SavedSettings:
 
     def optics_at(self, view_width: int) -> Optics:
         """The same focus among views of this width, as wide as those it was set in where that is not known."""
-        enlarged = view_width / (self.view_width or view_width)
-        tilt_x, tilt_y = self.optics.focus_tilt
-        return replace(
-            self.optics,
-            focus_disparity=enlarged * self.optics.focus_disparity,
-            focus_range=enlarged * self.optics.focus_range,
-            focus_tilt=(enlarged * tilt_x, enlarged * tilt_y),
-        )
+        return self.optics.with_focus_scaled(view_width / (self.view_width or view_width))
 
 
 @dataclass(frozen=True)
