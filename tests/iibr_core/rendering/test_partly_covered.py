@@ -8,6 +8,7 @@ from iibr_core.generation.update_loop import render_outer_views
 from iibr_core.rendering.photo_rays import rays_of_photo
 from iibr_core.rendering.view_synthesis import ViewSynthesis
 from iibr_core.types import ViewOffset
+from tests.iibr_core.filled_rays import filled_rays
 from tests.iibr_core.red_inpainter import paint_red
 
 FOREGROUND, WALL = np.float32([0.9, 0.6, 0.3]), np.float32([0.1, 0.2, 0.5])
@@ -63,4 +64,5 @@ def test_where_nothing_lies_open_nothing_is_behind():
     with ViewSynthesis() as synthesis:
         view = synthesis.render(bar(0.0), ViewOffset(0.0, 0.0))
     assert view.behind is None
+    assert filled_rays(view)[2].max() == 0
     assert not view.has_filled_rays
