@@ -12,7 +12,7 @@ from iibr_core.runtime.offers import offered_by
 if TYPE_CHECKING:
     from iibr_core.exports.animation import read_keys
     from iibr_core.exports.export_opening import OpenDrawn, OpticsOf, open_for_export
-    from iibr_core.exports.framing import size_in_frame
+    from iibr_core.exports.framing import centred, size_in_frame
     from iibr_core.exports.full_picture import FullPicture, encode_light, is_full, needs_smaller, require_full
     from iibr_core.exports.kinds import EXPORTS, PURPOSES, ExportKind, Purpose, export_kind, require_ending
     from iibr_core.exports.loops import LOOPS, LoopKind, point_on_loop

@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.exports.source import ExportSource
@@ -22,12 +22,19 @@ def draw_framed(source: ExportSource, settings: RenderSettings, frame_aspect: fl
     """
     frame = settings.size_px
     size = size_in_frame(source.scene, frame, settings.part, frame_aspect)
-    pixels = source.draw(replace(settings, size_px=size))
-    if size == frame:
+    return centred(source.draw(replace(settings, size_px=size)), frame)
+
+
+def centred(pixels: NDArray[Any], frame: ScreenSize, around: ArrayLike = 0) -> NDArray[Any]:
+    """Pixels (H, W, 3) in the middle of a frame that is no smaller; around them one colour, (3) or grey, as they are
+    encoded.
+    """
+    height, width = pixels.shape[:2]
+    if (width, height) == frame:
         return pixels
-    whole: NDArray[Any] = np.zeros((frame.height, frame.width, 3), pixels.dtype)
-    top, left = (frame.height - size.height) // 2, (frame.width - size.width) // 2
-    whole[top : top + size.height, left : left + size.width] = pixels
+    whole: NDArray[Any] = np.full((frame.height, frame.width, 3), around, pixels.dtype)
+    top, left = (frame.height - height) // 2, (frame.width - width) // 2
+    whole[top : top + height, left : left + width] = pixels
     return whole
 
 

@@ -15,6 +15,7 @@ from iibr_core.depth.editing import UNEDITED, DepthEdits
 from iibr_core.exports import (
     FullPicture,
     RenderSettings,
+    centred,
     encode_light,
     is_full,
     needs_smaller,
@@ -172,14 +173,8 @@ class HeadlessViewer:
         else:
             settings = RenderSettings(self.state.optics, box_size, is_linear=is_linear, color_space=color_space)
             pixels = self._scene_view.renderer.converged_picture(settings)
-        if box_size == frame:
-            return pixels
-        image = np.empty((frame.height, frame.width, 3), np.float32 if is_linear else np.uint8)
         background = np.array(BACKGROUND[:3])
-        image[:] = linear_from_srgb(background) if is_linear else np.round(background * 255)
-        top, left = (frame.height - box_size.height) // 2, (frame.width - box_size.width) // 2
-        image[top : top + box_size.height, left : left + box_size.width] = pixels
-        return image
+        return centred(pixels, frame, linear_from_srgb(background) if is_linear else np.round(background * 255))
 
     def _full_picture(self, scene: Scene, size: ScreenSize, report_progress: ReportProgress) -> FloatImage:
         loaded, optics = self._scene_view.loaded, self.state.optics
