@@ -1,255 +1,253 @@
-"""The renderer's switches: time of a picture, drawn in many ways and by the plainest shader, against its error.
+"""Every lens of the program against its definition: the mean of 256 pinhole views, and the time that takes.
 
-    python -m benchmarks.refocus --data FOLDER [--only NAME,...] [--repeats 3]
+    python -m benchmarks.refocus [--data FOLDER] [--only NAME,...] [--max-pixels N] [--apertures N]
 
-Fields of the scenes of FOLDER are drawn through an aperture and through a pinhole between the views, in turns: *at
-once*, which the viewer shows first, and otherwise. Errors are against a plain float sum in numpy over four times as
-many views as are stored. The plain shader shifts and sums views from their texture, and does nothing else.
+The demo, three drawn scenes and, of FOLDER, photos and a wide field are drawn through apertures from 0.2 view steps to
+the grid, at three planes of focus, from three viewpoints. The reference sums views that the core makes at the cameras'
+own places; nothing in it is blended from stored views. Times are medians, and ratios to a plain gather.
 """
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
+from dataclasses import dataclass
 from functools import partial
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
 
 import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.harness.bench_scenes import BenchScene, data_scenes
-from benchmarks.harness.reports import emit, is_wanted, parser_of, start
-from benchmarks.harness.timing import Cost, cost_of, in_turns, median_cost, median_ratio
-from benchmarks.speed.speed_report import Figures, Measured, table
-from iibr_core.color import encoded_from_stored, stored_from_encoded
-from iibr_core.evaluation.focal_stacks import FocalStack, Focus
-from iibr_core.evaluation.metrics import bounded_psnr, flip
-from iibr_core.generation.cost_model import CORES
-from iibr_core.generation.light_field import generate
-from iibr_core.generation.plan import plan_literal
-from iibr_core.rendering.optics import Optics
-from iibr_core.types import FloatImage, GridShape, ViewOffset
+from benchmarks.harness.bench_scenes import DEMO, BenchScene, data_scenes, drawn_scene, offsets_of
+from benchmarks.harness.reports import emit, is_wanted, markdown, parser_of, start
+from benchmarks.harness.timing import cost_of, in_turns, median_cost
+from iibr_core.color import encoded_from_stored, srgb_from_linear
+from iibr_core.depth.choice import DepthChoice
+from iibr_core.depth.search import open_with_depth
+from iibr_core.evaluation.metrics import bounded_psnr
+from iibr_core.exports.render_settings import RenderSettings
+from iibr_core.generation.light_field import generate, ray_set
+from iibr_core.generation.plan import plan_for_viewing, plan_literal
+from iibr_core.interface.public_scene import from_arrays
+from iibr_core.rendering.aperture_sampling import aperture_points
+from iibr_core.rendering.flying_pixels import postprocessed_view
+from iibr_core.rendering.lens import LensSum
+from iibr_core.rendering.optics import CENTRE, ApertureShape, Optics
+from iibr_core.rendering.renderer import open_renderer
+from iibr_core.scenes.screen_size import ScreenSize
+from iibr_core.types import FloatImage, GridShape, ImageSize, ViewOffset, image_size
 from viewer.gpu.context import GLContext
 from viewer.gpu.headless_context import create_headless
-from viewer.gpu.refocus.frame_budget import BEST_QUALITY, QualityLevel, scale_size, stretch_image
 from viewer.gpu.refocus.picture_renderer import Renderer
 
-APERTURE_VIEWS = 6.0
-BETWEEN = ViewOffset(-0.5, 1.5)
-"""An eye between the stored views, on one of those that only the best picture has."""
-LEAST_SIDE = 5
-"""Fields with fewer views a side have none to leave out."""
-FINER = 2
-"""Views of the best picture, to each stored one across and down."""
-PLAIN = "plain shader"
+CAMERAS = 256
+VIEWPOINTS = (CENTRE, ViewOffset(0.37, -0.81), ViewOffset(-0.5, 0.5))
+FOCUS_PERCENT = (5, 50, 95)
+INTERFACE_APERTURES = (0.6, 1.1, 2.0)
+DRAWN_SIZE, DRAWN_PX, DRAWN_GRID, DRAWN_SEEDS = ImageSize(240, 320), 5.0, GridShape(5, 5), (3, 8, 21)
+BESIDE = ViewOffset(0.0, 0.2)
+"""A viewpoint beside a stored view."""
 PLAIN_VERTEX = """#version 330 core
 out vec2 uv;
 void main() { uv = vec2(gl_VertexID % 2, gl_VertexID / 2) * 2.0; gl_Position = vec4(uv * 2.0 - 1.0, 0.0, 1.0); }
 """
 PLAIN_FRAGMENT = """#version 330 core
 uniform sampler2DArray views;
-uniform int columns, first, last;
-uniform vec2 shear, eye;
-uniform float radius;
+uniform int fetches;
+uniform vec2 shear;
 in vec2 uv;
 out vec4 color;
 void main() {
-    vec4 sum = vec4(0.0);
-    for (int v = first; v <= last; v++)
-        for (int u = first; u <= last; u++) {
-            vec2 offset = vec2(u, v) - eye;
-            vec3 root = textureLod(views, vec3(uv + shear * offset, v * columns + u), 0.0).rgb;
-            sum += clamp(radius + 0.5 - length(offset), 0.0, 1.0) * vec4(root * root, 1.0);
-        }
-    color = vec4(sqrt(sum.rgb / sum.a), 1.0);
+    vec3 sum = vec3(0.0);
+    for (int i = 0; i < fetches; i++) {
+        vec3 root = textureLod(views, vec3(uv + shear * float(i), i), 0.0).rgb;
+        sum += root * root;
+    }
+    color = vec4(sqrt(sum / float(fetches)), 1.0);
 }
 """
 
 
-@dataclass(frozen=True)
-class DrawVariant:
-    """One way to draw the same picture. every: of the views across and down, one in so many is stored; 0: centre and
-    corners only. is_half_float: textures of half floats instead of bytes. is_converged: every sample there is.
+@dataclass
+class Figures:
+    """Errors of one scene's pictures.
+
+    settled: dB against the reference. first_db, first_mean: the first frame of a drag against the settled picture, dB
+    and share of white. rises: growth of the mean gradient from one aperture to the next. interface: dB of
+    `field.refocus`. sharpness: gradient beside a stored view over that at it.
     """
 
-    name: str
-    level: QualityLevel = BEST_QUALITY
-    prefilter: bool = True
-    adaptive: bool = True
-    every: int = 1
-    is_half_float: bool = False
-    knows_disparity: bool = True
-    is_converged: bool = False
+    settled: list[float]
+    first_db: list[float]
+    first_mean: list[float]
+    rises: list[float]
+    interface: list[float]
+    sharpness: float = 1.0
 
-
-REFERENCE = DrawVariant("at once")
-SHARED = (
-    DrawVariant("until converged", is_converged=True),
-    DrawVariant("half the picture's width", QualityLevel(scale=0.5)),
-    DrawVariant("textures of half floats", is_half_float=True),
-    DrawVariant("every 2nd view stored", every=2),
-    DrawVariant("centre and corners stored", every=0),
-    DrawVariant("views without disparity", knows_disparity=False),
-)
-APERTURE_VARIANTS = (
-    REFERENCE,
-    *SHARED,
-    DrawVariant("every 2nd sample across and down", QualityLevel(stride=2)),
-    DrawVariant("every 2nd sample, half width", QualityLevel(stride=2, scale=0.5)),
-    DrawVariant("no smoothing", prefilter=False),
-    DrawVariant("tiles skip nothing", adaptive=False),
-    DrawVariant(PLAIN),
-)
-PINHOLE_VARIANTS = (
-    REFERENCE,
-    *SHARED,
-    DrawVariant("of 2 views", QualityLevel(sources=2)),
-    DrawVariant("of 1 view", QualityLevel(sources=1)),
-)
+    @property
+    def row(self) -> tuple[Any, ...]:
+        """Cells of the table."""
+        least, mean = min(self.settled), float(np.mean(self.settled))
+        first = f"{min(self.first_db):.1f}", f"{100 * max(self.first_mean):.2f} %"
+        rest = f"{100 * max(self.rises):+.1f} %", f"{min(self.interface):.1f}", f"{100 * (self.sharpness - 1):+.1f} %"
+        return f"{least:.1f}", f"{mean:.1f}", *first, *rest
 
 
 def main() -> None:
-    parser = parser_of(__doc__, "repeats", "only", data={"required": True})
+    parser = parser_of(__doc__, "data", "only", "repeats")
+    parser.add_argument("--max-pixels", type=int, default=120_000, help="of each photo")
+    parser.add_argument("--apertures", type=int, default=12)
     options = parser.parse_args()
-    scenes = (scene for scene in data_scenes(options.data, with_soft=False) if is_wanted(scene.name, options.only))
-    large = (scene for scene in scenes if 2 * scene.reach + 1 >= LEAST_SIDE)
     gl = create_headless()
+    heads = ("scene", "settled, least dB", "mean dB", "first frame, least dB", "mean off by", "gradient rises by")
+    heads = (*heads, "`field.refocus`, least dB", "sharpness at 0.2,0")
     try:
-        drawn = (figures for scene in large for figures in measure_drawing(gl, scene, options.repeats))
-        emit(f"## {each.what}\n\n{table(each)}\n" for each in drawn)
+        scenes = [s for s in scenes_of(options.data, options.max_pixels) if is_wanted(s.name, options.only)]
+        rows = [(scene.name, *figures_of(gl, scene, options.apertures).row) for scene in scenes]
+        times = [(scene.name, *times_of(gl, scene, options.repeats)) for scene in scenes]
+        names = ("scene", "first frame, ms", "settled, ms", "first frame / 25 fetches", "first frame / 81 fetches")
+        emit(["## Error\n", markdown(heads, rows), "\n## Time, aperture of 4 view steps or the grid\n"])
+        emit([markdown(names, times)])
     finally:
         gl.release()
 
 
-def measure_drawing(gl: GLContext, scene: BenchScene, repeats: int) -> Iterator[Figures]:
-    """A refocused picture, and one through a pinhole between the views, of a scene's field, drawn in every way."""
-    focus, diameter = float(np.median(scene.disparity)), min(APERTURE_VIEWS, 2.0 * scene.reach)
-    refocused = Optics(focus_disparity=focus, aperture_diameter=diameter)
-    pictures = {
-        f"{scene.name}, refocused, aperture of {diameter:g} view steps": (refocused, APERTURE_VARIANTS),
-        f"{scene.name}, pinhole between views": (Optics(eye=BETWEEN), PINHOLE_VARIANTS),
-    }
-    drawer = _Drawer(gl, scene)
-    try:
-        for truth, (what, (optics, variants)) in zip(best_pictures(scene, refocused), pictures.items()):
-            errors = [drawer.errors(optics, variant, truth) for variant in variants]
-            costs = in_turns({variant.name: partial(drawer.cost, optics, variant) for variant in variants}, repeats)
-            drawn = tuple(
-                Measured(name, median_cost(own), median_ratio(own, costs[REFERENCE.name]), *figures)
-                for (name, own), figures in zip(costs.items(), errors)
-            )
-            yield Figures(what, "", drawn)
-    finally:
-        drawer.renderer.release()
+def scenes_of(data: Path | None, max_pixels: int) -> Iterator[BenchScene]:
+    """The scenes to draw, each with the field that the window makes of it."""
+    yield photo_field("demo", DEMO, DepthChoice(), max_pixels)
+    if data is not None:
+        antinous = data / "hci_antinous"
+        choice = DepthChoice(file=str(antinous / "gt_disp_u04_v04.npy"))
+        yield photo_field("antinous", antinous / "views" / "v04_u04.png", choice, max_pixels)
+        yield photo_field("pug", data / "apple_pug_heic" / "pug.heic", DepthChoice(), max_pixels)
+        yield photo_field("coffee", data / "photos_free" / "coffee.png", DepthChoice("rough"), max_pixels)
+        yield from (s for s in data_scenes(data, with_soft=False) if s.name == "blender_shop_9x9")
+    for seed in DRAWN_SEEDS:
+        yield drawn_scene(seed, DRAWN_SIZE, DRAWN_PX, DRAWN_GRID)
 
 
-Work = tuple[Callable[[], None], Callable[[], NDArray[np.uint8]]]
-"""What draws a picture, and what reads it."""
+def photo_field(name: str, path: Path, choice: DepthChoice, max_pixels: int) -> BenchScene:
+    """A photo with its plan's grid and disparity."""
+    found = open_with_depth(path, choice, max_pixels)
+    plan = plan_for_viewing(found.photo, found.disparity)
+    return BenchScene(name, found.photo.pixels, plan.field_disparity(found.disparity).values, {}, offsets_of(plan.grid))
 
 
-class _Drawer:
-    """Draws variants of one field, with the views that each wants uploaded."""
+class Reference:
+    """The definition: views made at the cameras' places, summed by the core's lens."""
 
-    def __init__(self, gl: GLContext, scene: BenchScene) -> None:
-        self.gl, self.renderer = gl, Renderer(gl)
-        self._grid, self._size_px = scene.grid, (scene.photo.shape[1], scene.photo.shape[0])
-        self._views = list(generate(*scene.given, plan_literal(*scene.given, scene.grid), quality="fast"))
-        self._uploaded: tuple[int, bool, bool] | None = None
+    def __init__(self, scene: BenchScene) -> None:
+        photo, disparity = scene.given
+        self._size, self._widest = image_size(disparity.values), float(max(scene.grid))
+        self._rays, outer = ray_set(photo, disparity, plan_literal(photo, disparity, scene.grid))
+        for _ in outer:  # completes the ray set
+            pass
 
-    def cost(self, optics: Optics, variant: DrawVariant) -> Cost:
-        """Of one picture. cpu_s: what it takes alone: on software GL processor time over the cores, which other
-        programs disturb less, else time by the clock.
-        """
-        draw, _ = self._drawing(optics, variant)
-        draw()  # what is uploaded has to arrive first
-        self.gl.ctx.finish()
-        cost = cost_of(lambda: (draw(), self.gl.ctx.finish()))
-        return Cost(cost.wall_s, cost.cpu_s / CORES if self.gl.is_software else cost.wall_s)
-
-    def errors(self, optics: Optics, variant: DrawVariant, truth: FloatImage) -> tuple[float, float, int]:
-        """PSNR, FLIP, samples drawn."""
-        draw, read = self._drawing(optics, variant)
-        draw()
-        image = stretch_image(read(), self._size_px).astype(np.float32) / np.float32(255)
-        margin = (image.shape[0] - truth.shape[0]) // 2
-        image = image[margin : margin + truth.shape[0], margin : margin + truth.shape[1]]
-        return bounded_psnr(image, truth), flip(image, truth), self.renderer.samples_drawn
-
-    def _drawing(self, optics: Optics, variant: DrawVariant) -> Work:
-        """The picture, its views uploaded."""
-        if variant.name == PLAIN:
-            return self._plain(optics)
-        renderer = self.renderer
-        self._upload(variant)
-
-        def draw() -> None:
-            renderer.prefilter, renderer.adaptive = variant.prefilter, variant.adaptive
-            renderer.render(optics, scale_size(self._size_px, variant.level.scale), level=variant.level)
-            if variant.is_converged:
-                renderer.refine()
-
-        return draw, renderer.read_image
-
-    def _upload(self, variant: DrawVariant) -> None:
-        stored = variant.every, variant.is_half_float, variant.knows_disparity
-        if stored == self._uploaded:
-            return
-        self.renderer.open_field(
-            self._grid, *self._size_px, hdr=variant.is_half_float, with_disparity=variant.knows_disparity
-        )
-        for view in self._views:
-            if is_stored(self._grid.offset(view.row, view.column), self._grid.centre[0], variant.every):
-                colors = view.colors
-                if variant.is_half_float:
-                    colors = stored_from_encoded(encoded_from_stored(colors), True)
-                disparity = view.disparity if variant.knows_disparity else None
-                self.renderer.upload_view(view.row, view.column, colors, disparity)
-        self._uploaded = stored
-
-    def _plain(self, optics: Optics) -> Work:
-        """The plain shader, for an eye in the middle."""
-        ctx, (width, height), centre = self.gl.ctx, self._size_px, self._grid.centre[0]
-        in_order = sorted(self._views, key=lambda view: (view.row, view.column))
-        pixels = b"".join(view.colors.tobytes() for view in in_order)
-        texture = ctx.texture_array((width, height, len(in_order)), 3, pixels, alignment=1)
-        texture.filter, texture.repeat_x, texture.repeat_y = (moderngl.LINEAR, moderngl.LINEAR), False, False
-        program, radius = ctx.program(PLAIN_VERTEX, PLAIN_FRAGMENT), optics.aperture_diameter / 2
-        reach, shear = math.floor(radius + 0.5), -optics.focus_disparity
-        told = {"columns": self._grid.columns, "radius": radius, "eye": (float(centre), float(centre))}
-        bounds = {"first": max(centre - reach, 0), "last": min(centre + reach, self._grid.columns - 1)}
-        for name, value in {**told, **bounds, "shear": (shear / width, shear / height)}.items():
-            program[name] = value
-        target, quad = ctx.simple_framebuffer(self._size_px, components=3), ctx.vertex_array(program, [])
-
-        def draw() -> None:
-            texture.use(0)
-            target.use()
-            quad.render(moderngl.TRIANGLES, vertices=3)
-
-        return draw, lambda: np.frombuffer(target.read(alignment=1), np.uint8).reshape(height, width, 3)
+    def pictures(self, eye: ViewOffset, diameter: float, foci: list[float]) -> list[FloatImage]:
+        """Encoded pictures (H, W, 3), one a focus."""
+        sums = [LensSum(Optics(eye, focus_disparity=focus), self._size) for focus in foci]
+        with open_renderer() as renderer:
+            for t, s in aperture_points(ApertureShape(), diameter, self._widest, CAMERAS, 0).tolist():
+                at = ViewOffset(eye.t + t, eye.s + s)
+                view = postprocessed_view(self._rays, at, renderer.render(self._rays, at))
+                for total in sums:
+                    total.add(at, view.colors)
+        return [srgb_from_linear(total.light()) for total in sums]
 
 
-def is_stored(at: ViewOffset, reach: int, every: int) -> bool:
-    """Whether a field that stores every so manieth view has this one; 0: the centre and the corners."""
-    if every == 0:
-        return at == (0, 0) or abs(at.t) == abs(at.s) == reach
-    return at.t % every == 0 and at.s % every == 0
+def renderer_of(gl: GLContext, scene: BenchScene) -> Renderer:
+    """The scene's field, open."""
+    renderer, (height, width) = Renderer(gl), scene.photo.shape[:2]
+    renderer.open_field(scene.grid, width, height, hdr=False, with_disparity=True)
+    for view in generate(*scene.given, plan_literal(*scene.given, scene.grid)):
+        renderer.upload_view(view.row, view.column, view.colors, view.disparity)
+    return renderer
 
 
-def best_pictures(scene: BenchScene, optics: Optics, eye: ViewOffset = BETWEEN) -> tuple[FloatImage, FloatImage]:
-    """Of views FINER times as close as the field's: refocused by evaluation's plain sum, the part that all
-    show, and the one of an eye; (H, W, 3), sRGB-encoded.
-    """
-    side = FINER * 2 * scene.reach + 1
-    grid, (photo, disparity) = GridShape(side, side), replace(scene, disparity=scene.disparity / FINER).given
-    stack = FocalStack([Focus("", optics.focus_disparity / FINER, FINER * optics.aperture_diameter / 2)])
-    for view in generate(photo, disparity, plan_literal(photo, disparity, grid), quality="fast"):
-        at, colors = grid.offset(view.row, view.column), encoded_from_stored(view.colors)
-        stack.add(at, colors)
-        if at == (FINER * eye.t, FINER * eye.s):
-            between = colors
-    return stack.pictures()[0], between
+def figures_of(gl: GLContext, scene: BenchScene, count: int) -> Figures:
+    """Draw the scene in every way."""
+    reference, renderer = Reference(scene), renderer_of(gl, scene)
+    size = ScreenSize(scene.photo.shape[1], scene.photo.shape[0])
+    foci = [float(np.percentile(scene.disparity, percent)) for percent in FOCUS_PERCENT]
+    apertures = np.geomspace(0.2, max(scene.grid), count).tolist()
+    found = Figures([], [], [], [], [])
+
+    def settled(optics: Optics) -> FloatImage:
+        return float_of(renderer.converged_picture(RenderSettings(optics, size)))
+
+    for eye in VIEWPOINTS:
+        gradients: list[list[float]] = [[gradient(settled(Optics(eye)))] for _ in foci]
+        for diameter in apertures:
+            for k, expected in enumerate(reference.pictures(eye, diameter, foci)):
+                optics = Optics(eye, focus_disparity=foci[k], aperture_diameter=diameter)
+                picture = settled(optics)
+                renderer.render(optics, size)
+                first = float_of(renderer.read_image())
+                found.settled.append(bounded_psnr(picture, expected))
+                found.first_db.append(bounded_psnr(first, picture))
+                found.first_mean.append(abs(float(first.mean() - picture.mean())))
+                gradients[k].append(gradient(picture))
+        found.rises += [after / before - 1 for series in gradients for before, after in pairwise(series)]
+    found.sharpness = gradient(settled(Optics(BESIDE))) / gradient(settled(Optics()))
+    field = from_arrays(scene.photo, scene.disparity).light_field(tuple(scene.grid), parallax="literal")
+    for diameter in INTERFACE_APERTURES:
+        for focus, expected in zip(foci, reference.pictures(CENTRE, diameter, foci)):
+            found.interface.append(bounded_psnr(field.refocus(focus, diameter), expected))
+    renderer.release()
+    return found
+
+
+def times_of(gl: GLContext, scene: BenchScene, repeats: int) -> tuple[str, ...]:
+    """Milliseconds of the first frame and of the settled picture, and the first over plain gathers."""
+    renderer, size = renderer_of(gl, scene), ScreenSize(scene.photo.shape[1], scene.photo.shape[0])
+    focus = float(np.percentile(scene.disparity, FOCUS_PERCENT[0]))
+    optics = Optics(focus_disparity=focus, aperture_diameter=min(4.0, float(max(scene.grid))))
+    first = partial(renderer.render, optics, size)
+    settled = partial(renderer.converged_picture, RenderSettings(optics, size))
+    ways = {"first": first, "settled": settled, **{f"{n}": plain_gather(gl, scene, n) for n in (25, 81)}}
+    for way in ways.values():
+        way()
+    costs = in_turns(
+        {k: partial(cost_of, lambda way=way: (way(), gl.ctx.finish())) for k, way in ways.items()}, repeats
+    )
+    ms = {name: 1e3 * median_cost(own).wall_s for name, own in costs.items()}
+    renderer.release()
+    ratios = (f"{ms['first'] / ms[name]:.2f}" for name in ("25", "81"))
+    return f"{ms['first']:.0f}", f"{ms['settled']:.0f}", *ratios
+
+
+def plain_gather(gl: GLContext, scene: BenchScene, fetches: int) -> Any:
+    """What draws the mean of so many layers, each moved, by the plainest shader."""
+    height, width = scene.photo.shape[:2]
+    pixels = np.rint(255 * np.clip(scene.photo, 0, 1)).astype(np.uint8)
+    texture = gl.ctx.texture_array(
+        (width, height, fetches), 3, np.repeat(pixels[None], fetches, 0).tobytes(), alignment=1
+    )
+    texture.filter, texture.repeat_x, texture.repeat_y = (moderngl.LINEAR, moderngl.LINEAR), False, False
+    program = gl.ctx.program(PLAIN_VERTEX, PLAIN_FRAGMENT)
+    program["fetches"], program["shear"] = fetches, (0.3 / width, 0.2 / height)
+    target, quad = gl.ctx.simple_framebuffer((width, height), components=4), gl.ctx.vertex_array(program, [])
+
+    def draw() -> None:
+        texture.use(0)
+        target.use()
+        gl.ctx.disable(moderngl.BLEND)
+        quad.render(moderngl.TRIANGLES, vertices=3)
+
+    return draw
+
+
+def float_of(picture: NDArray[Any]) -> FloatImage:
+    """Bytes as floats, 1 = white."""
+    return np.asarray(encoded_from_stored(picture), np.float32)
+
+
+def gradient(picture: FloatImage) -> float:
+    """Mean difference of neighbouring pixels."""
+    grey = picture.mean(axis=-1)
+    return float(np.abs(np.diff(grey, axis=0)).mean() + np.abs(np.diff(grey, axis=1)).mean())
 
 
 if __name__ == "__main__":

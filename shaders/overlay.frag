@@ -6,7 +6,6 @@ const int STOPS = 10;
 
 uniform vec2 to_view;          // (s, t) from the eye to the view, view steps
 uniform float layer;
-uniform int search_steps;
 uniform vec3 color_map[STOPS]; // sRGB, evenly spaced
 uniform vec2 map_ends;         // the values at its first and last colour
 uniform float opacity;
@@ -24,8 +23,7 @@ vec3 mapped(float value) {
 }
 
 void main() {
-    vec2 delta = (to_view - dolly * (uv - 0.5)) / view_size_px;
-    Surface found = first_hit(uv, layer, delta, search_steps, ivec2(0, search_steps));
+    Surface found = first_hit(Ray(uv, vec2(0.0), (to_view - dolly * (uv - 0.5)) / view_size_px, layer, 0.0));
 #ifdef VALUES
     float value = textureLod(values, found.at, 0.0).r;
 #else

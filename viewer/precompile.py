@@ -261,8 +261,8 @@ def _draw_at_own_size(scratch: Path) -> None:
     ready = next(results_of(SceneRequest(0, small, loaded=loaded, plan=plan), lambda: False, lambda: CENTRE))
     assert isinstance(ready, SceneReady)
     height, width = loaded.photo.size
-    smaller = np.zeros((height, width, 3), np.float32)
-    FullPicture(ready.scene, plan, loaded, Optics(aperture_diameter=3.0), ScreenSize(width, height), smaller).draw()
+    full = FullPicture(ready.scene, plan, loaded, Optics(aperture_diameter=3.0), ScreenSize(width, height))
+    full.make(lambda settings: np.zeros((settings.size_px.height, settings.size_px.width, 3), np.float32))
 
 
 def _search_views(scratch: Path) -> None:

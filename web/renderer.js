@@ -1,26 +1,88 @@
 // Draws a light field through a virtual lens, by the desktop's shaders in WebGL 2. Offsets are { t, s } in view steps
 // (down, right), disparities px per view step, as in the core. Names, numbers and their reasons are those of
-// viewer/gpu/refocus, where everything is explained at length.
+// viewer/gpu/refocus and iibr_core/rendering/aperture_sampling.py, where everything is explained at length.
 
-const MAX_SAMPLES = 512, MAX_SOURCES = 4, MAX_SEARCH_STEPS = 96, TILE_PX = 16, BLOCK_PX = 16, MAX_TILE_TAPS = 8;
-const MAX_PASSES = 16, ONE_PASS_UP_TO_PX = 1.75, PASS_BLUR_PX = 1.5, LEAST_PASSES = 4;
-const STILL_SAMPLES = 600, EDGE_PASSES = 5;
-const FADE_FROM_PX = 4, FADE_TO_PX = 6, LEAST_ACROSS = 2, SPARSE_UP_TO_PX = 1.2, OFF_BORDER_PX = 1 / 256;
-const LEAST_WEIGHT = 2e-4, LEAST_SCALE = 0.4, FINE = 48, HALVINGS = 14;
-export const LEVELS = [[1, 4, 1], [1, 2, 1], [1, 1, 1], [1, 1, 0.7], [1, 1, 0.5], [2, 1, 0.7], [2, 1, 0.5], [3, 1, 0.5],
-    [4, 1, 0.35]].map(([stride, sources, scale]) => ({ stride, sources, scale }));
+export const FIRST_SPACING_PX = 6.5, MIN_PASS = 4, MAX_PASS = 12, CAMERAS_PER_PX = 4, MIN_CAMERAS = 64;
+export const MAX_CAMERAS = 144, EDGE_PASSES = 5, BLEND_POINTS = 1024, MIN_WEIGHT = 2e-4;
+export const MAX_SAMPLES = 256, NEAR_PX = 16, OFF_BORDER_PX = 1 / 256;
+export const GRID_SIDE = 64, EDGE = 1 / GRID_SIDE, COARSENESS_VARIANCE = 1 / 12;
+export const GOLDEN_ANGLE = Math.PI * (3 - Math.sqrt(5));
+export const TURN_STEP = 0.7548776662466927, SHIFT_STEP = 0.5698402909980532;
+export const SQRT_STEPS = [
+    0.41421356237309515, 0.7320508075688772, 0.23606797749978969, 0.6457513110645906, 0.3166247903553998];
+export const LEVELS = [[1, 4, 1], [1, 2, 1], [1, 1, 1], [1, 1, 0.7], [0.5, 1, 0.7], [0.5, 1, 0.5], [0.25, 1, 0.35]]
+    .map(([cameras, sources, scale]) => ({ cameras, sources, scale }));
 export const WHOLE = { x: 0, y: 0, width: 1, height: 1 };
 
 export const clamp = (x, low, high) => Math.min(Math.max(x, low), high);
 export const hash = (place) => `${place.t},${place.s}`;
+export const rounded = (x) => (x % 1 === 0.5 ? 2 * Math.round(x / 2) : Math.round(x));  // halves to even, as in Python
 
-// ---- Which stored views a picture is made of: plain numbers, see view_sampling.py. field: { rows, columns, width,
+const sumOf = (weighted) => weighted.reduce((sum, one) => sum + one.weight, 0);
+const fraction = (number, step) => (number * step + 0.5) % 1;
+
+// ---- Where in the aperture the cameras of a picture lie: see aperture_sampling.py. The aperture is a disc.
+
+// Diameter of the circle around it, for a diameter of 1. cut: side of the square of views, which cuts it off.
+const reachOf = (cut) => Math.min(Math.SQRT2 * cut, 1);
+
+// How open it is at a point, for a diameter of 1.
+function openness(t, s, cut) {
+    const inside = Math.min(0.5 - Math.hypot(t, s), cut / 2 - Math.max(Math.abs(t), Math.abs(s)));
+    return clamp(0.5 + inside / (EDGE * reachOf(cut)), 0, 1);
+}
+
+// Its area, as a share of the circle's, and its second moment about the middle, per axis, for a diameter of 1.
+function measure(cut) {
+    const places = Array.from({ length: GRID_SIDE }, (_, i) => reachOf(cut) * ((i + 0.5) / GRID_SIDE - 0.5));
+    let total = 0, moment = 0;
+    for (const t of places) {
+        for (const s of places) {
+            const weight = openness(t, s, cut);
+            total += weight;
+            moment += weight * (t * t + s * s);
+        }
+    }
+    return { area: Math.min(total / GRID_SIDE ** 2 * 4 / Math.PI, 1), moment: moment / total / 2 };
+}
+
+// Those of `count` points of a spiral that pass, for a diameter of 1.
+function openSpiral(cut, count, passIndex) {
+    const all = Array.from({ length: count }, (_, i) => {
+        const radius = reachOf(cut) / 2 * Math.sqrt((i + fraction(passIndex, SHIFT_STEP)) / count);
+        const angle = GOLDEN_ANGLE * i + 2 * Math.PI * TURN_STEP * passIndex;
+        return { t: radius * Math.sin(angle), s: radius * Math.cos(angle) };
+    });
+    return all.filter(({ t, s }, i) => openness(t, s, cut) > fraction(passIndex * count + i, SQRT_STEPS[2]));
+}
+
+// About `count` points of the aperture from its middle, for one pass; the first is moved and scaled to its centre and
+// its width.
+export function aperturePoints(diameter, widest, count, passIndex, cell = 0) {
+    const cut = Math.min(widest / diameter, 1), { area, moment } = measure(cut);
+    const points = openSpiral(cut, Math.max(rounded(count / area), count), passIndex);
+    if (!points.length) return [{ t: 0, s: 0 }];
+    const mean = (of) => points.reduce((sum, point) => sum + of(point), 0) / points.length;
+    const middle = passIndex ? { t: 0, s: 0 } : { t: mean(({ t }) => t), s: mean(({ s }) => s) };
+    const own = passIndex ? moment : mean(({ t, s }) => ((t - middle.t) ** 2 + (s - middle.s) ** 2) / 2);
+    const wanted = Math.max(moment - COARSENESS_VARIANCE * (cell / diameter) ** 2, 0);
+    const scale = own > 0 ? Math.sqrt(wanted / own) : 1;
+    return points.map((point) => {
+        const t = scale * (point.t - middle.t), s = scale * (point.s - middle.s);
+        const beyond = Math.max(Math.hypot(t, s) / (reachOf(cut) / 2), 1);  // it stays in the circle
+        return { t: diameter * t / beyond, s: diameter * s / beyond };
+    });
+}
+
+// ---- Which stored views answer the cameras: plain numbers, see view_sampling.py. field: { rows, columns, width,
 // height, range, hasDisparity, step, layers }; step: between views that are there, in view steps, the middle one among
-// them; layers: theirs, by "t,s".
+// them; layers: theirs, by "t,s". Samples are { t, s, view, weight }: a camera's place from the eye, the view that
+// answers it, and how much it counts, all together 1.
 
 // The first and the last offset along an axis of so many views, of those that are there.
 const ends = (count, step) => [-(count >> 1), count - 1 - (count >> 1)].map((end) => Math.trunc(end / step) * step);
 
+// The views before and after a place along an axis, and their shares, without those of 0.
 function bracket(x, count, step) {
     const [first, last] = ends(count, step), inside = clamp(x, first, last);
     const low = clamp(Math.floor(inside / step) * step, first, Math.max(last - step, first));
@@ -28,123 +90,87 @@ function bracket(x, count, step) {
     return [[low, 1 - share], [low + step, share]].filter(([, weight]) => weight > 0);
 }
 
-// Up to four views around the eye, bilinear, the heaviest first.
-export function pinholeSources(eye, { rows, columns, step }) {
-    const across = bracket(eye.s, columns, step);
-    return bracket(eye.t, rows, step).flatMap(([t, wt]) => across.map(([s, ws]) => ({ t, s, weight: wt * ws })))
-        .sort((a, b) => b.weight - a.weight);
+// The corners of a place's cell of the grid, with bilinear weights.
+function cornersOf({ t, s }, { rows, columns, step }) {
+    const across = bracket(s, columns, step);
+    return bracket(t, rows, step).flatMap(([row, wt]) => across.map(([column, ws]) => (
+        { t: row, s: column, weight: wt * ws })));
 }
 
-function nearestView({ t, s }, { rows, columns, step }) {
-    const nearest = (x, count) => clamp(step * Math.floor(x / step + 0.5), ...ends(count, step));
-    return { t: nearest(t, rows), s: nearest(s, columns) };
+// Up to four views around the eye, the heaviest first.
+export function pinholeSources(eye, field) {
+    return cornersOf(eye, field).sort((a, b) => b.weight - a.weight);
 }
 
-const sumOf = (weighted) => weighted.reduce((sum, one) => sum + one.weight, 0);
-
-function openness(t, s, diameter, widest, width) {
-    const within = clamp(0.5 + (widest / 2 - Math.max(Math.abs(t), Math.abs(s))) / width, 0, 1);
-    return Math.min(clamp(0.5 + (diameter / 2 - Math.hypot(t, s)) / width, 0, 1), within);
+// Cameras at these points of the lens, each answered by a corner of its cell: which one is chosen by a sequence.
+export function answeredSamples(points, first, eye, { rows, columns, step }) {
+    const chosen = (two, number) => (number < two.at(-1)[1] ? two.at(-1) : two[0])[0];
+    return points.map(({ t, s }, i) => {
+        const row = chosen(bracket(eye.t + t, rows, step), fraction(first + i, SQRT_STEPS[0]));
+        const column = chosen(bracket(eye.s + s, columns, step), fraction(first + i, SQRT_STEPS[1]));
+        return { t, s, view: { t: row, s: column }, weight: 1 / points.length };
+    });
 }
 
-function secondMoment(places, weight) {
-    let total = 0, moment = 0;
-    for (const t of places.t) {
-        for (const s of places.s) {
-            const w = weight(t, s);
-            total += w;
-            moment += w * (t * t + s * s);
+// The stored views themselves in place of cameras, each weighted by what the points ask of it: without disparity views
+// cannot be warped.
+export function blendedSamples(points, eye, field) {
+    const asked = new Map();
+    for (const point of points) {
+        for (const corner of cornersOf({ t: eye.t + point.t, s: eye.s + point.s }, field)) {
+            const weight = corner.weight + (asked.get(hash(corner))?.weight ?? 0);
+            asked.set(hash(corner), { ...corner, weight });
         }
     }
-    return total > 0 ? moment / total / 2 : 0;
+    const kept = [...asked.values()].filter(({ weight }) => weight > MIN_WEIGHT * points.length), total = sumOf(kept);
+    return kept.map((view) => ({ t: view.t - eye.t, s: view.s - eye.s, view, weight: view.weight / total }));
 }
 
-// How much smaller an opening is taken, so that its samples blur like the opening itself: see aperture_moments.py.
-export function scaleOf(place, diameter, widest, stride, isSmoothed) {
-    const most = Math.trunc(Math.min(diameter, widest) / 2 / stride) + 2, width = Math.min(stride, diameter);
-    const around = (start) => Array.from({ length: 2 * most + 1 }, (_, i) => start + stride * (i - most));
-    const lattice = { t: around(place.t), s: around(place.s) }, cut = Math.min(widest / diameter, 1);
-    const fine = Array.from({ length: FINE }, (_, i) => cut * ((i + 0.5) / FINE - 0.5));
-    const own = diameter ** 2 * secondMoment({ t: fine, s: fine }, (t, s) => openness(t, s, 1, cut, cut / FINE));
-    const wanted = Math.max(own - (isSmoothed ? width ** 2 / 12 : 0), 0) / clamp(diameter - 1, 1e-3, 1);
-    const tooWide = (scale) =>
-        secondMoment(lattice, (t, s) => openness(t, s, scale * diameter, scale * widest, width)) - wanted;
-    let low = LEAST_SCALE, high = 1;
-    if (tooWide(high) <= 0) return high;
-    for (let k = 0; k < HALVINGS; k++) {
-        const middle = (low + high) / 2;
-        [low, high] = tooWide(middle) > 0 ? [low, middle] : [middle, high];
-    }
-    return low;
-}
-
-export function apertureSamples(eye, diameter, field, stride = 1, moved = { t: 0, s: 0 }, isSmoothed = false) {
-    const width = Math.min(stride, diameter), most = Math.max(field.rows, field.columns);
-    const beside = (x) => x - stride * Math.round(x / stride);
-    const place = { t: beside(moved.t - eye.t), s: beside(moved.s - eye.s) };
-    const scale = scaleOf(place, diameter, most, stride, isSmoothed), widest = scale * most;
-    diameter *= scale;
-    const reach = Math.min(diameter, widest) / 2 + stride;
-    const lattice = (middle, start) => {
-        const [first, last] = [Math.ceil((middle - reach - start) / stride), (middle + reach - start) / stride];
-        return Array.from({ length: Math.floor(last) - first + 1 }, (_, i) => start + stride * (first + i));
-    };
-    const across = lattice(eye.s, moved.s);
-    const all = lattice(eye.t, moved.t).flatMap((t) => across.map((s) => (
-        { t, s, weight: openness(t - eye.t, s - eye.s, diameter, widest, width) })));
-    const total = sumOf(all), chosen = all.filter((sample) => sample.weight > LEAST_WEIGHT * total);
-    const kept = sumOf(chosen);
-    return chosen.map(({ t, s, weight }) => ({ t, s, weight: weight / kept, ...answered({ t, s }, field) }));
-}
-
-function answered(place, field) {
-    const stored = nearestView(place, field);
-    return { stored, isDirect: stored.t === place.t && stored.s === place.s };
-}
+// ---- What the optics mean for one picture: see picture_lens.py
 
 export function lensOf(optics, field, widthPx, level = LEVELS[0]) {
-    const diameter = Math.max(optics.aperture, 0), [far, near] = field.range;
-    const stride = Math.min(level.stride, Math.max(Math.trunc(diameter / LEAST_ACROSS), 1));
-    const step = Math.max(Math.min(diameter, stride), 1e-6);
-    const blurPx = diameter > 0 ? step * widthPx / field.width : 0;
-    const across = Math.max(Math.min(diameter, Math.max(field.rows, field.columns)) / step, 1);
-    const beside = Math.max(Math.abs(far - optics.focus), Math.abs(near - optics.focus));
-    return {
-        ...optics, diameter, stride, blurPx, widestBlurPx: blurPx * beside, share: clamp(diameter - 1, 0, 1),
-        keepsLayers: field.hasDisparity && Math.max(blurPx, blurPx * across / FADE_FROM_PX) * beside > 1,
-        sharpUpTo: [Math.min(1, FADE_FROM_PX / across), Math.min(2, FADE_TO_PX / across)],
-        sparseUpToPx: SPARSE_UP_TO_PX / across, mostSources: level.sources,
-    };
+    const diameter = Math.max(optics.aperture, 0), widest = Math.max(field.rows, field.columns);
+    const beside = Math.max(...field.range.map((edge) => Math.abs(edge - optics.focus)));
+    const blurPx = Math.min(diameter, widest) * beside * widthPx / field.width;
+    const best = clamp(Math.ceil(blurPx / FIRST_SPACING_PX), MIN_PASS, MAX_PASS);
+    return { ...optics, diameter, widest, blurPx, level, camerasPerPass: Math.max(rounded(best * level.cameras), 1) };
 }
 
-export function passPlaces(lens, field) {
-    const isStored = field.layers.has(hash(lens.eye));
-    let count = 1;
-    if (lens.share > 0 && lens.keepsLayers && lens.widestBlurPx > ONE_PASS_UP_TO_PX) {
-        const samples = samplesOf(lens, field, { t: 0, s: 0 }).length;
-        const close = Math.ceil((lens.widestBlurPx / PASS_BLUR_PX) ** 2);
-        count = Math.min(Math.max(close, LEAST_PASSES), MAX_PASSES, Math.trunc(STILL_SAMPLES / samples));
+// Number of passes until the most blurred surface is smooth.
+function passesThroughAperture({ level, blurPx, camerasPerPass }) {
+    if (level !== LEVELS[0]) return 1;
+    return Math.ceil(clamp(CAMERAS_PER_PX * blurPx, MIN_CAMERAS, MAX_CAMERAS) / camerasPerPass);
+}
+
+// The same for the picture, whose edges are to be smooth, too.
+export function passCount(lens, field) {
+    if (!field.hasDisparity) return 1;
+    if (lens.diameter > 0) return passesThroughAperture(lens);
+    return lens.level === LEVELS[0] && !field.layers.has(hash(lens.eye)) ? EDGE_PASSES : 1;
+}
+
+// Side, in view steps, of the square of the aperture that each camera of a pass stands for: among those of the first
+// pass, which is shown alone, or among all.
+export function cellOf(lens, passIndex) {
+    const { diameter, widest, camerasPerPass } = lens;
+    if (diameter === 0) return 0;
+    const cut = Math.min(widest / diameter, 1), passes = passIndex > 0 ? passesThroughAperture(lens) : 1;
+    const area = measure(cut).area * Math.PI / 4 * (diameter * reachOf(cut)) ** 2;
+    return Math.sqrt(area / (camerasPerPass * passes));
+}
+
+// The cameras of a pass, and which views answer them.
+export function samplesOf(lens, field, passIndex) {
+    const { eye, diameter, widest, camerasPerPass: count } = lens;
+    if (diameter === 0) {
+        const sources = pinholeSources(eye, field).slice(0, lens.level.sources), total = sumOf(sources);
+        return sources.map((view) => ({ t: 0, s: 0, view, weight: view.weight / total }));
     }
-    if (lens.share < 1 && field.hasDisparity && !isStored) count = Math.max(count, EDGE_PASSES);
-    return Array.from({ length: Math.max(count, 1) }, (_, k) => ({  // the R2 sequence
-        t: (k * 0.7548776662466927 + 0.5) % 1 - 0.5, s: (k * 0.5698402909980532 + 0.5) % 1 - 0.5,
-    }));
-}
-
-function samplesOf(lens, field, moved, coarser = 1, isSmoothed = true) {
-    const { eye, diameter, stride, keepsLayers } = lens;
-    return apertureSamples(eye, diameter, field, stride * coarser, moved, isSmoothed && keepsLayers);
-}
-
-// Those of a pass in the order they are drawn: what suffices where all is sharp first, `sparse` its weight.
-export function samplesOfPass(lens, field, place, passIndex) {
-    const moved = { t: lens.stride * place.t, s: lens.stride * place.s };
-    const all = samplesOf(lens, field, moved, 1, passIndex < 1);
-    const wanted = new Set(all.map(hash));
-    const coarse = samplesOf(lens, field, moved, 2, false).filter((sample) => wanted.has(hash(sample)));
-    const total = sumOf(coarse), sparse = new Map(coarse.map((sample) => [hash(sample), sample.weight / total]));
-    const rank = (sample) => 2 * !sparse.has(hash(sample)) + !sample.isDirect;
-    return all.map((sample) => ({ ...sample, sparse: sparse.get(hash(sample)) })).sort((a, b) => rank(a) - rank(b));
+    if (!field.hasDisparity) {
+        return blendedSamples(aperturePoints(diameter, widest, BLEND_POINTS, passIndex), eye, field);
+    }
+    const points = aperturePoints(diameter, widest, count, passIndex, cellOf(lens, passIndex));
+    return answeredSamples(points, passIndex * count, eye, field);
 }
 
 // Disparity at a place of the picture (0..1) as the eye sees it: the first surface met in the middle view.
@@ -179,19 +205,19 @@ class Program {
         }
         this.uniforms = new Map();
         for (let i = gl.getProgramParameter(this.program, gl.ACTIVE_UNIFORMS) - 1; i >= 0; i--) {
-            const { name: full, type } = gl.getActiveUniform(this.program, i);
+            const { name: declared, type } = gl.getActiveUniform(this.program, i);
             const put = {
                 [gl.FLOAT]: "uniform1fv", [gl.FLOAT_VEC2]: "uniform2fv", [gl.FLOAT_VEC4]: "uniform4fv",
             }[type] ?? "uniform1iv";  // integers and samplers
-            const place = gl.getUniformLocation(this.program, full);
-            if (place) this.uniforms.set(full.replace("[0]", ""), (value) => gl[put](place, [value].flat(2)));
+            const place = gl.getUniformLocation(this.program, declared);
+            if (place) this.uniforms.set(declared, (value) => gl[put](place, [value].flat()));
         }
         const block = gl.getUniformBlockIndex(this.program, "Samples");
         if (block !== gl.INVALID_INDEX) gl.uniformBlockBinding(this.program, block, 0);
     }
 
     // textures: by the names of their samplers. Names that the compiler left out are skipped.
-    use(values, textures = {}) {
+    use(values, textures) {
         const { gl } = this;
         gl.useProgram(this.program);
         Object.entries(textures).forEach(([name, [target, texture]], unit) => {
@@ -207,26 +233,24 @@ export class Renderer {
     constructor(canvas, shaders, field) {
         const gl = canvas.getContext("webgl2", { alpha: false, antialias: false, preserveDrawingBuffer: true });
         if (!gl || !gl.getExtension("EXT_color_buffer_float")) throw new Error("no WebGL 2 that draws floats");
-        const isWhole = gl.getExtension("EXT_float_blend") && gl.getExtension("OES_texture_float_linear");
-        Object.assign(this, { gl, canvas, shaders, field, programs: new Map(), made: [] });
-        this.floats = isWhole ? gl.RGBA32F : gl.RGBA16F;
+        Object.assign(this, { gl, canvas, shaders, field, programs: new Map() });
+        this.floats = gl.getExtension("EXT_float_blend") ? gl.RGBA32F : gl.RGBA16F;
         if ("drawingBufferColorSpace" in gl) gl.drawingBufferColorSpace = field.colorSpace;
         if (field.order.length > gl.getParameter(gl.MAX_ARRAY_TEXTURE_LAYERS)
             || Math.max(field.width, field.height) > gl.getParameter(gl.MAX_TEXTURE_SIZE)) {
             throw new Error("too many or too large views for this graphics driver");
         }
         gl.disable(gl.DITHER);
+        gl.blendFunc(gl.ONE, gl.ONE);
+        gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
         gl.bindVertexArray(gl.createVertexArray());
-        const { width, height, order: { length: layers } } = field;
+        const { width, height, order: { length: layers }, range: [far, near] } = field;
         this.colors = this.texture(gl.TEXTURE_2D_ARRAY, gl.RGBA8, gl.LINEAR, width, height, layers);
         this.disparities = this.texture(gl.TEXTURE_2D_ARRAY, gl.R16F, gl.NEAREST, width, height, layers);
-        const blocks = [Math.ceil(width / BLOCK_PX), Math.ceil(height / BLOCK_PX)];
-        this.blocks = this.texture(gl.TEXTURE_2D_ARRAY, gl.RG16F, gl.NEAREST, ...blocks, layers);
-        this.samples = gl.createBuffer();
-        gl.bindBufferBase(gl.UNIFORM_BUFFER, 0, this.samples);
-        gl.bufferData(gl.UNIFORM_BUFFER, 2 * MAX_SAMPLES * 16, gl.DYNAMIC_DRAW);
-        this.table = new Float32Array(2 * MAX_SAMPLES * 4);
-        const [far, near] = field.range;
+        this.values = new Float32Array(width * height);
+        this.table = new Float32Array(3 * MAX_SAMPLES * 4);
+        gl.bindBufferBase(gl.UNIFORM_BUFFER, 0, gl.createBuffer());
+        gl.bufferData(gl.UNIFORM_BUFFER, this.table, gl.DYNAMIC_DRAW);
         this.disparityOf = Float32Array.from({ length: 256 }, (_, i) => far + (near - far) * i / 255);
         this.rootOf = Uint8Array.from({ length: 256 }, (_, i) => {  // square root of linear light, see srgb.glsl
             const x = i / 255, light = x <= 0.04045 ? x / 12.92 : ((x + 0.055) / 1.055) ** 2.4;
@@ -244,245 +268,108 @@ export class Renderer {
         return texture;
     }
 
-    // Targets of one size that a pass draws into together; row 0 comes first. shared: a first texture that is there.
-    target(width, height, count, shared = null) {
-        const { gl } = this, framebuffer = gl.createFramebuffer(), textures = shared ? [shared] : [];
-        while (textures.length < count) {
-            textures.push(this.texture(gl.TEXTURE_2D, this.floats, gl.LINEAR, width, height));
-        }
+    // The sum of light of a picture of this size, weighted by alpha, row 0 first; that of the size before is freed.
+    targetOf(width, height) {
+        const { gl, light } = this;
+        if (light?.width === width && light.height === height) return light;
+        gl.deleteFramebuffer(light?.framebuffer ?? null);
+        gl.deleteTexture(light?.texture ?? null);
+        const texture = this.texture(gl.TEXTURE_2D, this.floats, gl.NEAREST, width, height);
+        const framebuffer = gl.createFramebuffer();
         gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);
-        textures.forEach((texture, i) =>
-            gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0 + i, gl.TEXTURE_2D, texture, 0));
-        gl.drawBuffers(textures.map((_, i) => gl.COLOR_ATTACHMENT0 + i));
-        this.made.push({ framebuffer, textures });
-        return { framebuffer, textures, width, height };
+        gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, texture, 0);
+        return this.light = { framebuffer, texture, width, height };
     }
 
-    // Of one picture size; those of the size before are freed.
-    targetsOf(width, height) {
-        if (this.targets?.width === width && this.targets.height === height) return this.targets;
-        for (const { framebuffer, textures } of this.made.splice(0)) {
-            this.gl.deleteFramebuffer(framebuffer);
-            textures.forEach((texture) => this.gl.deleteTexture(texture));
-        }
-        const across = Math.ceil(width / TILE_PX), down = Math.ceil(height / TILE_PX);
-        this.targets = { width, height, across, down, light: this.target(width, height, 1) };
-        for (const name of ["tiles", "wideTiles"]) this.targets[name] = this.target(across, down, 1);
-        this.targets.spans = this.target(across, down, 2);
-        return this.targets;
-    }
-
-    layersOf(targets) {
-        const half = [(targets.width + 1) >> 1, (targets.height + 1) >> 1];
-        targets.layers ??= {
-            sums: this.target(targets.width, targets.height, 3, targets.light.textures[0]),
-            across: this.target(...half, 2), smooth: this.target(...half, 2),
-        };
-        return targets.layers;
-    }
-
-    // Stores a view. colors: RGBA bytes, sRGB-encoded; depth: RGBA bytes whose red is the disparity, or null.
+    // Stores a view. colors: RGBA bytes, sRGB-encoded; depth: RGBA bytes whose red is the disparity, or null. On the
+    // desktop alpha has the disparity too, for gloss, which a page has not.
     upload(layer, colors, depth) {
-        const { gl, field: { width, height }, rootOf, disparityOf } = this, count = width * height;
-        for (let i = 0; i < 4 * count; i += 4) {
+        const { gl, field: { width, height }, rootOf, disparityOf, values } = this;
+        for (let i = 0; i < colors.length; i += 4) {
             colors[i] = rootOf[colors[i]];
             colors[i + 1] = rootOf[colors[i + 1]];
             colors[i + 2] = rootOf[colors[i + 2]];
-            colors[i + 3] = depth ? depth[i] : 0;
+            if (depth) values[i / 4] = disparityOf[depth[i]];
         }
-        const write = (texture, format, type, data, w, h) => {
+        const write = (texture, format, type, data) => {
             gl.bindTexture(gl.TEXTURE_2D_ARRAY, texture);
-            gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
-            gl.texSubImage3D(gl.TEXTURE_2D_ARRAY, 0, 0, 0, layer, w, h, 1, format, type, data);
+            gl.texSubImage3D(gl.TEXTURE_2D_ARRAY, 0, 0, 0, layer, width, height, 1, format, type, data);
         };
-        write(this.colors, gl.RGBA, gl.UNSIGNED_BYTE, colors, width, height);
-        if (!depth) return;
-        const across = Math.ceil(width / BLOCK_PX), down = Math.ceil(height / BLOCK_PX);
-        const values = this.values ??= new Float32Array(count), ranges = new Float32Array(2 * across * down);
-        for (let i = 0; i < ranges.length; i += 2) [ranges[i], ranges[i + 1]] = [Infinity, -Infinity];
-        for (let y = 0, i = 0; y < height; y++) {
-            for (let x = 0; x < width; x++, i++) {
-                const value = disparityOf[depth[4 * i]], block = 2 * ((y >> 4) * across + (x >> 4));
-                values[i] = value;
-                if (value < ranges[block]) ranges[block] = value;
-                if (value > ranges[block + 1]) ranges[block + 1] = value;
-            }
-        }
-        write(this.disparities, gl.RED, gl.FLOAT, values, width, height);
-        write(this.blocks, gl.RG, gl.FLOAT, ranges, across, down);
+        write(this.colors, gl.RGBA, gl.UNSIGNED_BYTE, colors);
+        if (depth) write(this.disparities, gl.RED, gl.FLOAT, values);
     }
 
-    // Draws with the program of a shader and its switches. values, textures: see Program.use. keeps: whether what is
-    // there is added to, or, with "multiplies", multiplied.
-    draw(fragment, switches, target, values, textures = {}, vertices = 3, keeps = false) {
+    // Draws with the program of a shader and its switches. values, textures: see Program.use.
+    draw(fragment, switches, { framebuffer, width, height }, values, textures) {
         const { gl, shaders } = this, names = switches.filter(Boolean), key = [fragment, ...names].join(" ");
         if (!this.programs.has(key)) {
             const defines = names.map((name) => `#define ${name} 1\n`).join("");
             const source = (name) => shaders.preamble + defines + shaders[name];
             this.programs.set(key, new Program(gl, source("fullscreen.vert"), source(fragment), key));
         }
-        gl.bindFramebuffer(gl.FRAMEBUFFER, target.framebuffer);
-        gl.viewport(0, 0, target.width, target.height);
-        (keeps ? gl.enable : gl.disable).call(gl, gl.BLEND);
-        if (keeps === "multiplies") gl.blendFunc(gl.ZERO, gl.SRC_COLOR);
-        else gl.blendFunc(gl.ONE, gl.ONE);
-        const bound = Object.entries(textures).map(([name, texture]) => [name, [gl.TEXTURE_2D, texture]]);
-        const arrays = ["colors", "disparities", "blocks"].map((name) => [name, [gl.TEXTURE_2D_ARRAY, this[name]]]);
-        this.programs.get(key).use({ part: [0, 0, 1, 1], ...values }, Object.fromEntries([...arrays, ...bound]));
-        gl.drawArrays(gl.TRIANGLES, 0, vertices);
+        gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);
+        gl.viewport(0, 0, width, height);
+        this.programs.get(key).use(values, textures);
+        gl.drawArrays(gl.TRIANGLES, 0, 3);
     }
 
     // ---- Pictures: summed up in passes, as accumulation.py and passes.py have it
 
     begin(optics, part, width, height, level = LEVELS[0]) {
-        const lens = lensOf(optics, this.field, Math.round(width / part.width), level);
-        const places = level === LEVELS[0] ? passPlaces(lens, this.field) : [{ t: 0, s: 0 }];
-        this.picture = { lens, part, width, height, places, pass: 0, samples: null, at: 0, holdsSum: false };
-        this.picture.targets = this.targetsOf(width, height);
+        const { gl, field } = this, lens = lensOf(optics, field, Math.round(width / part.width), level);
+        const target = this.targetOf(width, height), passes = passCount(lens, field);
+        this.picture = { lens, part, width, height, target, passes, pass: 0, done: 0 };
+        gl.bindFramebuffer(gl.FRAMEBUFFER, target.framebuffer);
+        gl.clear(gl.COLOR_BUFFER_BIT);
     }
 
     get isComplete() {
-        return !this.picture || this.picture.pass >= this.picture.places.length;
+        return !this.picture || this.picture.pass === this.picture.passes;
     }
 
-    // The next samples, as many as one program takes; true where a pass was finished, and the picture with it.
+    // Draws the next pass, and shows what there is.
     step() {
-        const { picture, field } = this, { lens, targets } = picture, place = picture.places[picture.pass];
-        const sum = lens.keepsLayers ? this.layersOf(targets).sums : targets.light;
-        if (!picture.samples) {
-            picture.samples = lens.share > 0 ? samplesOfPass(lens, field, place, picture.pass) : [];
-            if (picture.pass === 0 && lens.keepsLayers) this.findDefocus(picture);
-        }
-        if (picture.at === 0 && lens.share < 1) this.drawPinhole(picture, sum, place);
-        let batch = picture.samples.slice(picture.at, picture.at + MAX_SAMPLES);
-        const change = batch.findIndex((sample) => sample.isDirect !== batch[0].isDirect);
-        if (change > 0) batch = batch.slice(0, change);
-        if (batch.length) this.drawAperture(picture, sum, batch);
-        picture.at += batch.length;
-        if (picture.at < picture.samples.length) return false;
-        Object.assign(picture, { pass: picture.pass + 1, samples: null, at: 0 });
-        if (lens.keepsLayers && lens.share === 1 && picture.pass > 1) {
-            const tiles = targets.wideTiles.textures[0];
-            this.draw("finished_tiles.frag", [], sum, { passes: picture.pass }, { tiles }, 3, "multiplies");
-        }
-        this.finish(picture);
-        return true;
+        const { gl, picture, field } = this, { lens, pass } = picture, samples = samplesOf(lens, field, pass);
+        this.setSamples(samples);
+        gl.enable(gl.BLEND);
+        this.drawLens(samples);
+        gl.disable(gl.BLEND);
+        Object.assign(picture, { pass: pass + 1, done: picture.done + samples.length });
+        this.show();
     }
 
-    fieldValues({ lens, part }) {
-        const { range: [farthest, nearest], width, height } = this.field;
-        return {
-            view_size_px: [width, height], nearest, farthest, focus_disparity: lens.focus, focus_tilt: [0, 0],
-            focus_range: 0, dolly: [0, 0], blur_px: lens.blurPx, sharp_up_to_px: lens.sharpUpTo,
-            part: [part.x, part.y, part.width, part.height],
-        };
-    }
-
-    switches({ lens }, ...names) {
-        return [lens.keepsLayers && "LAYERS", ...names];
-    }
-
-    drawPinhole(picture, sum, place) {
-        const { lens, part, width, height, targets } = picture, { field } = this;
-        const sources = pinholeSources(lens.eye, field).slice(0, lens.mostSources);
-        const total = sumOf(sources);
-        const rows = new Array(4 * MAX_SOURCES).fill(0), steps = new Array(MAX_SOURCES).fill(0);
-        sources.forEach(({ t, s, weight }, i) => {
-            const layer = field.layers.get(hash({ t, s }));
-            rows.splice(4 * i, 4, s - lens.eye.s, t - lens.eye.t, layer, weight / total);
-            const parallaxPx = Math.hypot(t - lens.eye.t, s - lens.eye.s) * (field.range[1] - field.range[0]);
-            steps[i] = field.hasDisparity ? clamp(Math.ceil(parallaxPx), 2, MAX_SEARCH_STEPS) : 0;
+    setSamples(samples) {
+        const { gl, table, field: { layers, hasDisparity }, picture: { lens, pass, done } } = this;
+        samples.forEach(({ t, s, view, weight }, i) => {
+            // All views that answer a pinhole are asked at the same place of the pixel.
+            const number = lens.diameter === 0 ? pass : done + i;
+            const within = SQRT_STEPS.slice(3).map((step) => fraction(number, step) - 0.5 + OFF_BORDER_PX);
+            table.set([s, t, ...within], 4 * i);
+            table.set([view.s - lens.eye.s - s, view.t - lens.eye.t - t, 0, 0], 4 * (MAX_SAMPLES + i));
+            table.set([layers.get(hash(view)), Number(hasDisparity), weight, 0], 4 * (2 * MAX_SAMPLES + i));
         });
-        const pixel = [part.width / width, part.height / height];
-        const values = {
-            ...this.fieldValues(picture), source_count: sources.length, sources: rows, search_steps: steps,
-            share: 1 - lens.share, pixel_uv: pixel, block_px: BLOCK_PX, tile_uv: [1 / targets.across, 1 / targets.down],
-            within_pixel: [(place.s + OFF_BORDER_PX) * pixel[0], (place.t + OFF_BORDER_PX) * pixel[1]],
-        };
-        if (!steps.some((count) => count)) {
-            this.draw("pinhole.frag", this.switches(picture), sum, values, {}, 3, picture.holdsSum);
-        } else {
-            this.draw("march_intervals.frag", [], targets.spans, values);
-            const [first, second] = targets.spans.textures, tiles = targets.across * targets.down;
-            const spans = { intervals_of_0_and_1: first, intervals_of_2_and_3: second };
-            for (const kind of ["FLAT", "EDGES"]) {
-                const switches = this.switches(picture, kind);
-                this.draw("pinhole.frag", switches, sum, values, spans, 6 * tiles, picture.holdsSum);
-            }
-        }
-        picture.holdsSum = true;
+        gl.bufferSubData(gl.UNIFORM_BUFFER, 0, table);
     }
 
-    setSamples(samples, lens) {
-        const { layers, hasDisparity } = this.field;
-        samples.forEach(({ t, s, weight, stored, sparse }, i) => {
-            this.table.set([s - lens.eye.s, t - lens.eye.t, layers.get(hash(stored)), weight], 4 * i);
-            const reprojection = [stored.s - s, stored.t - t, Number(hasDisparity), sparse ?? 0];
-            this.table.set(reprojection, 4 * (MAX_SAMPLES + i));
-        });
-        this.gl.bufferSubData(this.gl.UNIFORM_BUFFER, 0, this.table);
-        return { sample_count: samples.length };
+    drawLens(samples) {
+        const { gl, field, picture: { lens, part, width, height, target, pass } } = this;
+        const { hasDisparity, range: [farthest, nearest] } = field;
+        const isNear = samples.every(({ t, s, view }) =>
+            Math.hypot(view.t - lens.eye.t - t, view.s - lens.eye.s - s) * (nearest - farthest) <= NEAR_PX);
+        this.draw("lens.frag", [hasDisparity && "WARP", hasDisparity && isNear && "NEAR"], target, {
+            sample_count: samples.length, cell_views: cellOf(lens, pass), view_size_px: [field.width, field.height],
+            pixel_uv: [part.width / width, part.height / height], farthest, nearest, focus_disparity: lens.focus,
+            focus_tilt: [0, 0], focus_range: 0, dolly: [0, 0], part: [part.x, part.y, part.width, part.height],
+            field_part: [0, 0, 1, 1],
+        }, { colors: [gl.TEXTURE_2D_ARRAY, this.colors], disparities: [gl.TEXTURE_2D_ARRAY, this.disparities] });
     }
 
-    drawAperture(picture, sum, batch) {
-        const { lens, targets } = picture, reprojects = batch.some((sample) => !sample.isDirect);
-        const tiles = lens.keepsLayers && "TILES";
-        const values = {
-            ...this.fieldValues(picture), ...this.setSamples(batch, lens), share: lens.share, passes: picture.pass,
-            sparse_count: batch.filter((sample) => sample.sparse !== undefined).length,
-            sparse_up_to_px: picture.samples.some(({ sparse }) => sparse !== undefined) ? lens.sparseUpToPx : 0,
-        };
-        const switches = this.switches(picture, tiles, reprojects && "REPROJECT");
-        const textures = tiles
-            ? { tiles: targets.tiles.textures[0], wide_tiles: targets.wideTiles.textures[0] } : {};
-        this.draw("aperture.frag", switches, sum, values, textures, 3, picture.holdsSum);
-        picture.holdsSum = true;
-    }
-
-    findDefocus(picture) {
-        const { lens, part, targets } = picture, { field } = this, { width, height } = field;
-        const eye = { ...lens.eye, weight: 1, ...answered(lens.eye, field) };
-        let samples = picture.samples.length ? picture.samples : [eye];
-        const direct = samples.filter((sample) => sample.isDirect);
-        if (2 * direct.length > samples.length) samples = direct;
-        const every = Math.ceil(samples.length / MAX_SAMPLES);
-        samples = samples.filter((_, i) => i % every === 0);
-        const tilePx = Math.max(part.width * width / targets.across, part.height * height / targets.down);
-        const values = {
-            ...this.fieldValues(picture), ...this.setSamples(samples, lens), block_px: BLOCK_PX,
-            tile_uv: [1 / targets.across, 1 / targets.down],
-            taps: Math.min(1 + Math.ceil(tilePx / BLOCK_PX), MAX_TILE_TAPS),
-        };
-        const reprojects = samples.some((sample) => !sample.isDirect) && "REPROJECT";
-        this.draw("defocus_tiles.frag", [reprojects], targets.tiles, values);
-        const reach = Math.min(Math.ceil((lens.widestBlurPx / 2 + TILE_PX / 2) / TILE_PX), 4);
-        // The pinhole's share comes with every pass.
-        const [onePassPx, least] = lens.share === 1 ? [ONE_PASS_UP_TO_PX, LEAST_PASSES] : [-1, 1e9];
-        const limits = { one_pass_up_to_px: onePassPx, pass_blur_px: PASS_BLUR_PX, least_passes: least };
-        const [tiles] = targets.tiles.textures;
-        this.draw("widen_tiles.frag", [], targets.wideTiles, { reach, ...limits }, { tiles });
-    }
-
-    // Smooths what is summed up, and shows it: always at the canvas' own size.
-    finish(picture) {
-        const { lens, targets, width, height, pass } = picture, { gl, canvas } = this;
-        const smoothing = { passes: Math.max(pass, 1), spread: 1 }, [tiles] = targets.wideTiles.textures;
-        const textures = { focus_layer: targets.light.textures[0] };
-        if (lens.keepsLayers) {
-            const { sums, across, smooth } = this.layersOf(targets), [, foreground, background] = sums.textures;
-            const spread = (from, to, step) => this.draw("smooth.frag", [], to,
-                { ...smoothing, empty_up_to_px: lens.sharpUpTo[0], texel_step: step },
-                { foreground_layer: from[0], background_layer: from[1], tiles });
-            spread([foreground, background], across, [1 / across.width, 0]);
-            spread(across.textures, smooth, [0, 1 / smooth.height]);
-            const [smooth_foreground, smooth_background] = smooth.textures;
-            Object.assign(textures, { smooth_foreground, smooth_background, tiles },
-                { foreground_layer: foreground, background_layer: background });
-        }
+    // On the canvas, which gets the picture's own size.
+    show() {
+        const { gl, canvas, picture: { width, height, target } } = this;
         if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
-        this.draw("present.frag", [lens.keepsLayers && "LAYERS"], { framebuffer: null, width, height },
-            { exposure: 1, ...smoothing }, textures);
+        const values = { exposure: 1, part: [0, 0, 1, 1] }, textures = { light_sum: [gl.TEXTURE_2D, target.texture] };
+        this.draw("present.frag", [], { framebuffer: null, width, height }, values, textures);
         gl.flush();
     }
 }
-

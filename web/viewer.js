@@ -115,7 +115,7 @@ class Page {
             renderer.begin(this.optics, this.part, w, h, level);
             this.isBest = level === LEVELS[0];
             [this.drawnAt, this.changed] = [now, false];
-            while (!renderer.step());
+            renderer.step();
         } else if (!renderer.isComplete) {
             renderer.step();
         } else if (this.isBest && !this.swings) {

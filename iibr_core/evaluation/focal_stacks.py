@@ -1,7 +1,4 @@
-"""Whether a made light field, refocused, looks as the true one does: plain sums of sheared views, in linear light.
-
-The views are added up one by one and not kept. Nothing is shared with the viewer's renderer, so that this can judge it.
-"""
+"""Whether a made light field, refocused, looks as the true one does: sums of sheared views, by the core's lens."""
 
 from __future__ import annotations
 
@@ -12,10 +9,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.color import linear_from_srgb, srgb_from_linear, stored_from_encoded
+from iibr_core.color import srgb_from_linear, stored_from_encoded
 from iibr_core.evaluation.lens_picture import LensPicture
 from iibr_core.evaluation.metrics import bounded_psnr, flip
-from iibr_core.types import FloatImage, ViewOffset
+from iibr_core.rendering.lens import LensSum
+from iibr_core.rendering.optics import Optics
+from iibr_core.types import FloatImage, ViewOffset, image_size
 
 NEAR, MIDDLE, FAR, LENS = "near", "middle", "far", "path-traced lens"
 BEYOND_PERCENT = 5
@@ -106,33 +105,21 @@ class FocalStack:
 
     def __init__(self, foci: Sequence[Focus]) -> None:
         self.foci = foci
-        self._sums: list[FloatImage] = [np.zeros((), np.float32)] * len(foci)
-        self._weights = [0.0] * len(foci)
+        self._sums: list[LensSum] = []
         self.views = [0] * len(foci)
 
     def add(self, offset: ViewOffset, view: FloatImage) -> None:
-        """A view (H, W, 3), sRGB-encoded."""
-        weights = [weight_of(offset, focus.radius) for focus in self.foci]
-        if not any(weights):
-            return
-        linear = linear_from_srgb(view)
-        for k, (focus, weight) in enumerate(zip(self.foci, weights)):
-            if weight > 0:
-                self._sums[k] = self._sums[k] + np.float32(weight) * shear(linear, offset, focus)
-                self._weights[k] += weight
+        """Add a view (H, W, 3), sRGB-encoded."""
+        if not self._sums:
+            self._sums = [LensSum(Optics(focus_disparity=focus.disparity), image_size(view)) for focus in self.foci]
+        for k, focus in enumerate(self.foci):
+            if (weight := weight_of(offset, focus.radius)) > 0:
+                self._sums[k].add(offset, view, weight)
                 self.views[k] += 1
 
     def pictures(self) -> list[FloatImage]:
         """One for each focus, sRGB-encoded; only the part that all views show, see `within`."""
-        return [srgb_from_linear(total / np.float32(weight)) for total, weight in zip(self._sums, self._weights)]
-
-
-def shear(view: FloatImage, offset: ViewOffset, focus: Focus) -> FloatImage:
-    """The view (H, W, 3) moved so that what lies in focus is where the given view has it, see `within`."""
-    for axis, at in enumerate(offset):
-        size, margin = view.shape[axis], focus.margin_px
-        view = _shift(view, axis, margin - focus.disparity * at, size - 2 * margin)
-    return view
+        return [srgb_from_linear(within(total.light(), focus)) for total, focus in zip(self._sums, self.foci)]
 
 
 def within(image: FloatImage, focus: Focus) -> FloatImage:
@@ -144,24 +131,6 @@ def within(image: FloatImage, focus: Focus) -> FloatImage:
 def _is_worth_it(focus: Focus, image: FloatImage) -> bool:
     """Whether enough of the picture lies within all views."""
     return bool(min(image.shape[:2]) - 2 * focus.margin_px >= LEAST_PX)
-
-
-def _shift(image: FloatImage, axis: int, start: float, length: int) -> FloatImage:
-    """`length` values from a real place on, one pixel apart, by cubic convolution (Keys 1981)."""
-    low = math.floor(start)
-    f = start - low
-    taps = (
-        -0.5 * f + f**2 - 0.5 * f**3,
-        1 - 2.5 * f**2 + 1.5 * f**3,
-        0.5 * f + 2 * f**2 - 1.5 * f**3,
-        -0.5 * f**2 + 0.5 * f**3,
-    )
-    parts = [np.float32(tap) * _part(image, axis, low - 1 + k, length) for k, tap in enumerate(taps) if tap]
-    return np.asarray(sum(parts), np.float32)
-
-
-def _part(image: FloatImage, axis: int, start: int, length: int) -> FloatImage:
-    return image[start : start + length] if axis == 0 else image[:, start : start + length]
 
 
 def score_methods(

@@ -13,12 +13,12 @@ if TYPE_CHECKING:
     from iibr_core.exports.animation import read_keys
     from iibr_core.exports.export_opening import OpenDrawn, OpticsOf, open_for_export
     from iibr_core.exports.framing import centred, size_in_frame
-    from iibr_core.exports.full_picture import FullPicture, encode_light, is_full, needs_smaller, require_full
+    from iibr_core.exports.full_picture import FullPicture, encode_light, is_full, require_full
     from iibr_core.exports.kinds import EXPORTS, PURPOSES, ExportKind, Purpose, export_kind, require_ending
     from iibr_core.exports.loops import LOOPS, LoopKind, point_on_loop
     from iibr_core.exports.options import ANIMATIONS, USUAL_OPTIONS, AnimationKind, ExportOptions
     from iibr_core.exports.photo_folder import FolderOrder, FolderPhoto, first_photo, in_order, list_photos
-    from iibr_core.exports.render_settings import RenderSettings, require_size
+    from iibr_core.exports.render_settings import LensTile, RenderSettings, require_size
     from iibr_core.exports.settings import (
         MOST_FRAMES,
         RATE_LIMITS,

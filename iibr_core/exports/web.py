@@ -23,18 +23,8 @@ from iibr_core.scenes.lens_limits import aperture_limit, eye_limits, first_apert
 from iibr_core.scenes.scene import Scene
 from iibr_core.types import DISPLAY_P3, SRGB, ImageSize
 
-SHADERS = (
-    "fullscreen.vert",
-    "pinhole.frag",
-    "march_intervals.frag",
-    "aperture.frag",
-    "defocus_tiles.frag",
-    "widen_tiles.frag",
-    "finished_tiles.frag",
-    "smooth.frag",
-    "present.frag",
-)
-"""Those that the page draws with; see `web/viewer.js`."""
+SHADERS = "fullscreen.vert", "lens.frag", "present.frag"
+"""Those that the page draws with; see `web/renderer.js`."""
 POLICY = (
     "default-src 'none'; script-src {script}; style-src {style}; img-src data: blob:; base-uri 'none';"
     " form-action 'none'"

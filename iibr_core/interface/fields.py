@@ -10,10 +10,17 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.color import encoded_from_stored
-from iibr_core.evaluation.focal_stacks import FocalStack, Focus
+from iibr_core.color import encoded_from_stored, srgb_from_linear
 from iibr_core.formats.light_fields.light_field_formats import WRITERS, writer_for
-from iibr_core.types import FloatImage, GridShape, InputError, StoredColors, ViewOffset, ViewUpdate
+from iibr_core.rendering.aperture_sampling import aperture_points, grid_weights
+from iibr_core.rendering.lens import LensSum
+from iibr_core.rendering.optics import CENTRE, ApertureShape, Optics
+from iibr_core.types import FloatImage, GridShape, InputError, StoredColors, ViewOffset, ViewUpdate, image_size
+
+CAMERAS_PER_PX = 4.0
+"""Views that `LightField.refocus` makes for each pixel of its widest blur."""
+MIN_CAMERAS, MAX_CAMERAS = 16, 256
+"""Least and greatest number of these views."""
 
 FORMATS = tuple(WRITERS)
 """That `LightField.save` knows."""
@@ -68,7 +75,8 @@ class LightField:
         """A picture through a round lens in the middle of the field, (H, W, 3) float32, 1 = white: the mean, in linear
         light, of the views inside it, moved so that what has this disparity (px from view to view) is sharp.
 
-        aperture: diameter in view steps; 0 is the middle view. Raises InputError where it is negative or not finite.
+        aperture: diameter in view steps; 0 is the middle view. A photo's light field makes the views for it, up to 256;
+        of a light field from disk the stored ones count. Raises InputError where it is negative or not finite.
         """
         if not (math.isfinite(disparity) and math.isfinite(aperture) and aperture >= 0):
             raise InputError(
@@ -76,13 +84,32 @@ class LightField:
             )
         if aperture == 0:
             return self.view(0, 0)
-        focus = Focus("asked for", disparity, aperture / 2)
-        stack = FocalStack([focus])
-        beside = ((focus.margin_px, focus.margin_px),) * 2 + ((0, 0),)
-        for row, column in np.ndindex(*self.grid):
-            colors = encoded_from_stored(self.views[row, column])
-            stack.add(self.grid.offset(row, column), np.pad(colors, beside, mode="edge"))
-        return stack.pictures()[0]
+        picture = LensSum(Optics(focus_disparity=disparity), image_size(self.views[0, 0]))
+        for offset, weight, colors in self._views_through(disparity, aperture):
+            picture.add(offset, colors, weight)
+        return srgb_from_linear(picture.light())
+
+    def _views_through(self, focus: float, aperture: float) -> Iterator[tuple[ViewOffset, float, FloatImage]]:
+        """Views that a lens sums up: offset, weight and colours of each."""
+        widest = float(max(self.grid))
+        if self._view_between is None:
+            points = aperture_points(ApertureShape(), aperture, widest, MAX_CAMERAS, 0)
+            weights = grid_weights(points, CENTRE, self.grid)
+            for row, column in np.argwhere(weights > 0):
+                colors = encoded_from_stored(self.views[row, column])
+                yield self.grid.offset(row, column), float(weights[row, column]), colors
+            return
+        count = self._camera_count(focus, min(aperture, widest))
+        for t, s in aperture_points(ApertureShape(), aperture, widest, count, 0).tolist():
+            yield ViewOffset(t, s), 1.0, self._view_between(ViewOffset(t, s))
+
+    def _camera_count(self, focus: float, aperture: float) -> int:
+        """Number of views that turn the edge blurred most into a smooth ramp."""
+        if self.disparity is None:
+            return MAX_CAMERAS
+        middle = self.disparity[self.grid.centre]
+        blur_px = aperture * max(abs(float(middle.min()) - focus), abs(float(middle.max()) - focus))
+        return math.ceil(min(max(CAMERAS_PER_PX * blur_px, MIN_CAMERAS), MAX_CAMERAS))
 
     def save(self, path: str | Path, format: str = "hci", may_replace: bool = False) -> None:
         """Write the field: a folder, or one file, as the format says; one of FORMATS.

@@ -10,7 +10,14 @@ from typing import TYPE_CHECKING
 from iibr_core.runtime.offers import offered_by
 
 if TYPE_CHECKING:
-    from iibr_core.rendering.aperture_shape import opening, openness
+    from iibr_core.rendering.aperture_sampling import (
+        SQRT_STEPS,
+        Points,
+        aperture_points,
+        fractions,
+        grid_weights,
+        open_area,
+    )
     from iibr_core.rendering.large_views import LargePhoto
     from iibr_core.rendering.optics import (
         APERTURE_KINDS,

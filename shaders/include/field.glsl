@@ -16,23 +16,53 @@ float focus_at(vec2 uv) {
     return focus_disparity + dot(focus_tilt, 2.0 * uv - 1.0);
 }
 
-vec4 linear_from_stored(vec4 stored) {
-    vec4 light = vec4(stored.rgb * stored.rgb, stored.a);
+// Outside every view, sample mirrored content: clamping would show streaks.
+vec2 mirrored(vec2 at) {
+    return 1.0 - abs(1.0 - abs(at));
+}
+
+// 1 inside a view, next to nothing outside: other views know better there.
+float in_picture(vec2 at) {
+    vec2 off_centre = abs(at - 0.5);
+    return max(off_centre.x, off_centre.y) > 0.5 ? 1e-4 : 1.0;
+}
+
+vec4 light_from_root(vec4 root) {
+    vec4 light = vec4(root.rgb * root.rgb, root.a);
 #ifdef HIGHLIGHTS
-    // Only where all channels clip: one alone is a saturated colour.
-    float clipped = clamp(20.0 * min(min(stored.r, stored.g), stored.b) - 19.0, 0.0, 1.0);
+    // Only where all channels clip: a single clipped channel is a saturated colour.
+    float clipped = clamp(20.0 * min(min(root.r, root.g), root.b) - 19.0, 0.0, 1.0);
     light.rgb *= 1.0 + highlight_gain * clipped * clipped;
 #endif
     return light;
 }
 
-// Where no view has the content asked for, beyond all borders, the views' mirror images stand in: streaks would be seen.
-vec2 mirrored(vec2 at) {
-    return 1.0 - abs(1.0 - abs(at));
+void add_tap(vec2 texel, float layer, float weight, inout vec4 roots, inout vec4 light) {
+    vec4 root = textureLod(colors, vec3((texel + 0.5) / view_size_px, layer), 0.0);
+    roots += weight * root;
+    light += weight * light_from_root(root);
 }
 
-// 1 where a view has the content asked for, next to nothing beyond its border: there, other views know better.
-float in_picture(vec2 at) {
-    vec2 off_centre = abs(at - 0.5);
-    return max(off_centre.x, off_centre.y) > 0.5 ? 1e-4 : 1.0;
+// Linear light and depth (0..1) of a stored view, between pixels, by five bilinear fetches. What is in focus is
+// interpolated by Keys' kernel (1981; a = -0.75, which keeps the view's sharpness best), without the corners of its 16
+// taps, whose weights are next to nothing. What moves by cell_px from one camera to the next is averaged over as much.
+vec4 light_at(vec2 at, float layer, float cell_px) {
+    at = clamp(mirrored(at), 0.0, 1.0);
+    vec2 texel = at * view_size_px - 0.5, f = fract(texel), first = floor(texel);
+    vec2 before = -0.75 * f * (1.0 - f) * (1.0 - f), after = -0.75 * f * f * (1.0 - f), inner = 1.0 - before - after;
+    vec2 centre = first + f * (0.75 + f * (1.5 - 1.25 * f)) / inner;
+    vec4 ends = vec4(first - 1.0, first + 2.0), weights = vec4(before, after) * inner.yxyx;
+    // Five taps in a cross have the second moment of a square: 2/5 reach^2 = 1/12 cell^2.
+    float soft = clamp(cell_px - 0.5, 0.0, 1.0), reach = 0.456 * cell_px, middle = mix(inner.x * inner.y, 0.2, soft);
+    centre = mix(centre, texel, soft);
+    ends = mix(ends, vec4(texel - reach, texel + reach), soft);
+    weights = mix(weights, vec4(0.2), soft);
+    vec4 roots = vec4(0.0), light = vec4(0.0);
+    add_tap(centre, layer, middle, roots, light);
+    add_tap(vec2(ends.x, centre.y), layer, weights.x, roots, light);
+    add_tap(vec2(centre.x, ends.y), layer, weights.y, roots, light);
+    add_tap(vec2(ends.z, centre.y), layer, weights.z, roots, light);
+    add_tap(vec2(centre.x, ends.w), layer, weights.w, roots, light);
+    float total = middle + dot(weights, vec4(1.0));
+    return mix(light_from_root(max(roots / total, 0.0)), light / total, soft);
 }

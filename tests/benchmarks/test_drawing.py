@@ -1,18 +1,15 @@
-"""The renderer's bench: its best picture against slow twins, and figures of a small field."""
+"""The benchmark of the lens: its reference against the scene, and figures of a small field."""
 
 from __future__ import annotations
-
-from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from benchmarks.harness.bench_scenes import BenchScene
-from benchmarks.refocus import APERTURE_VARIANTS, PINHOLE_VARIANTS, PLAIN, best_pictures, is_stored, measure_drawing
+from benchmarks.refocus import Reference, figures_of, times_of
 from iibr_core.evaluation.metrics import psnr
-from iibr_core.rendering.optics import Optics
 from iibr_core.types import ViewOffset
-from tests.iibr_core.known_scenes import disparity_of_square, offsets_of, view_of_square
+from tests.iibr_core.known_scenes import WALL, disparity_of_square, offsets_of, view_of_square
 from viewer.gpu.context import GLContext
 
 
@@ -22,48 +19,28 @@ def scene() -> BenchScene:
     return BenchScene("square", view_of_square(ViewOffset(0.0, 0.0)), disparity_of_square(), {}, field)
 
 
-def inside(image: np.ndarray, like: np.ndarray) -> np.ndarray:
-    """The middle, as large as another."""
-    margin = (image.shape[0] - like.shape[0]) // 2
-    return image[margin : margin + like.shape[0], margin : margin + like.shape[1]]
+def test_the_reference_through_a_small_hole_is_the_view_there(scene: BenchScene) -> None:
+    eye = ViewOffset(0.5, -1.0)
+    (picture,) = Reference(scene).pictures(eye, 0.01, [0.0])
+    assert psnr(picture, view_of_square(eye)) > 38
 
 
-def test_the_best_pictures_without_depth_are_the_photo(scene: BenchScene) -> None:
-    flat = replace(scene, disparity=np.zeros_like(scene.disparity))
-    for picture in best_pictures(flat, Optics(aperture_diameter=4.0)):
-        assert psnr(picture, inside(scene.photo, picture)) > 50
+def test_what_is_in_focus_is_sharp_in_the_reference(scene: BenchScene) -> None:
+    near, far = Reference(scene).pictures(ViewOffset(0.0, 0.0), 3.0, [2.0, WALL])
+    is_near = scene.disparity == 2.0
+    away = [np.median(np.abs(picture - scene.photo)[is_near]) for picture in (near, far)]
+    assert 3 * away[0] < away[1]
+    assert away[0] < 0.01
 
 
-def test_the_best_picture_through_a_pinhole_is_the_view_there(scene: BenchScene) -> None:
-    _, picture = best_pictures(scene, Optics(aperture_diameter=4.0), ViewOffset(1.0, -1.0))
-    assert psnr(picture, view_of_square(ViewOffset(1.0, -1.0))) > 40
-
-
-def test_what_is_in_focus_is_sharp_in_the_best_picture(scene: BenchScene) -> None:
-    picture, _ = best_pictures(scene, Optics(focus_disparity=2.0, aperture_diameter=4.0))
-    is_near = inside(scene.disparity, picture) == 2.0
-    away = np.abs(picture - inside(scene.photo, picture)).max(axis=-1)
-    sharp, blurred = np.median(away[is_near]), np.median(away[~is_near])
-    assert 3 * sharp < blurred, (sharp, blurred)
-    assert sharp < 0.005
-
-
-def test_every_way_to_draw_is_measured(scene: BenchScene, gl: GLContext) -> None:
-    refocused, between = measure_drawing(gl, scene, 1)
-    for figures, variants in ((refocused, APERTURE_VARIANTS), (between, PINHOLE_VARIANTS)):
-        assert [drawn.name for drawn in figures.measured] == [variant.name for variant in variants]
-        assert figures.measured[0].ratio == 1
-        assert all(drawn.cost.wall_s > 0 and 15 < drawn.psnr_db < 100 for drawn in figures.measured)
-        assert figures.front
-    by_name = {drawn.name: drawn.psnr_db for drawn in between.measured}
-    assert by_name["views without disparity"] < by_name["at once"] - 3
-    by_name = {drawn.name: drawn.psnr_db for drawn in refocused.measured}
-    assert by_name[PLAIN] > by_name["every 2nd view stored"] - 3
-    samples = {drawn.name: drawn.samples for drawn in refocused.measured}
-    # Samples this near to each other converge in one pass.
-    assert samples["every 2nd sample across and down"] < samples["at once"] == samples["until converged"]
-
-
-def test_views_are_left_out_of_a_field(scene: BenchScene) -> None:
-    counts = [sum(is_stored(at, scene.reach, every) for at in scene.field) for every in (1, 2, 0)]
-    assert counts == [25, 9, 5]
+def test_every_lens_is_measured(scene: BenchScene, gl: GLContext) -> None:
+    found = figures_of(gl, scene, 3)
+    assert len(found.settled) == len(found.first_db) == 27
+    assert min(found.settled) > 30
+    assert min(found.interface) > 35
+    assert max(found.first_mean) < 0.01
+    assert 0.9 < found.sharpness < 1.1
+    assert all(found.row)
+    first, settled, *ratios = map(float, times_of(gl, scene, 1))
+    assert 0 < first <= settled
+    assert min(ratios) > 0

@@ -43,7 +43,6 @@ from iibr_core.rendering import (
     free_view,
     hypotheses,
     large_views,
-    lens_light,
     mixed_pixels,
     resampling,
     slope_connectivity,
@@ -183,16 +182,6 @@ def without_flying(value):
     return flying_pixels.without_flying_pixels(
         rays(value), ViewOffset(0.5, 1.0), view.colors, view.disparity, view.inpainted
     )
-
-
-def large_picture(value):
-    """Through a lens, of a photo with a wild disparity, and with a wild number of the lens."""
-    photos = [large_views.LargePhoto(image(0.5), np.nan_to_num(depths(v))) for v in (value, 1.0)]
-    samples = (lens_light.LensSample(ViewOffset(0.5, -0.5), 1.0),)
-    lenses = [lens_light.LargeLens(ViewOffset(0.5, -1.0), samples, 0.5, 1.5, focus) for focus in (0.5, value)]
-    part, smaller = large_views.Part(1, 11, 2, 12), np.full((6, 7, 3), 0.5, np.float32)
-    with ViewSynthesis() as synthesis:
-        return [lens_light.draw_large(photo, lens, part, synthesis, smaller) for photo, lens in zip(photos, lenses)]
 
 
 def tile_views(value):
@@ -398,10 +387,6 @@ FINITE = {
     "rendering.mixed_pixels.split_mixed_pixels": lambda v, _: mixed_pixels.split_mixed_pixels(
         image(0.5), known(v), 0.5
     )[:2],
-    "rendering.lens_light.largest_tile": lambda v, _: lens_light.largest_tile(
-        ImageSize(8, 8), lens_light.LargeLens(share=0.5, focus=v), v
-    ),
-    "rendering.lens_light.draw_large": lambda v, _: large_picture(v),
     "rendering.flying_pixels.measure_detail": lambda v, _: flying_pixels.measure_detail(image(v)),
     "rendering.flying_pixels.without_flying_pixels": lambda v, _: without_flying(v),
     "rendering.large_views.views_of_tile": lambda v, _: tile_views(v),
@@ -547,8 +532,12 @@ FINITE_BY_CONTRACT = {
     "formats.weights.save_weights": "training stops before, tests/iibr_core/training",
     "ray_transformer.inference.TrainedWeights": "huge features: rendering/test_ambiguous_rays.py, test_hard_cases.py",
     "ray_transformer.model.RayTransformer": "huge features: rendering/test_ambiguous_rays.py",
-    "rendering.resized_light.bring_to": "of light that `draw_large` made, and of a drawn picture",
-    "rendering.resized_light.mean_of_areas": "of light that `draw_large` made",
+    "rendering.resized_light.mean_of_areas": "of light that was drawn",
+    "rendering.lens.LensSum": "optics that the interface checked; far cameras: rendering/test_lens.py",
+    "rendering.aperture_sampling.grid_weights": "points of an aperture that the interface checked",
+    "rendering.aperture_sampling.aperture_points": "an aperture that the interface or the window checked",
+    "rendering.aperture_sampling.open_area": "an aperture that the interface or the window checked",
+    "rendering.aperture_sampling.fractions": "counts",
     "rendering.ray_set.RaySet": "NaN is no surface; infinity is refused by Disparity",
     "depth.estimators.estimate_cache.store": "an Estimate, in which NaN is unknown",
     "depth.estimators.package_calls.prepare_by": "of a Photo; the package's NaN is unknown",

@@ -72,7 +72,7 @@ def set_lens(tab: Tab, s: float, t: float, focus: float, aperture: float) -> Non
 
 
 def canvas(tab: Tab) -> np.ndarray:
-    """What is drawn, (H, W, 3) uint8."""
+    """Return what is drawn, (H, W, 3) uint8."""
     url = tab.evaluate("document.getElementById('view').toDataURL()")
     with Image.open(BytesIO(base64.b64decode(url.partition(",")[2]))) as image:
         return np.asarray(image.convert("RGB"))

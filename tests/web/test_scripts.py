@@ -5,20 +5,48 @@ from __future__ import annotations
 import json
 import shutil
 import subprocess
-from typing import Any
+from collections.abc import Callable
+from dataclasses import asdict
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
 
+import iibr_core.rendering.aperture_sampling as points_module
 from iibr_core.exports.web import page_script
+from iibr_core.rendering.aperture_sampling import aperture_points
+from iibr_core.rendering.optics import ApertureShape, Optics
 from iibr_core.runtime.resources import resource_folder
-from iibr_core.types import GridShape, ViewOffset
-from viewer.gpu.refocus.view_sampling import aperture_samples, pinhole_sources
+from iibr_core.types import SRGB, GridShape, ViewOffset
+from viewer.gpu.light_field_texture import LightFieldTexture
+from viewer.gpu.refocus import passes, picture_lens, view_sampling
+from viewer.gpu.refocus.frame_budget import QUALITY_LEVELS
+from viewer.gpu.refocus.picture_lens import lens_of
+from viewer.gpu.refocus.view_sampling import Samples, answered_samples, blended_samples, pinhole_sources
 
 WEB = resource_folder("web")
 SCRIPTS = sorted(WEB.glob("*.js"))
 GRID = GridShape(5, 7)
-MOST_LINES, MOST_WIDTH = 600, 120
+PRESENT = np.ones(GRID, bool)
+MOST_LINES, MOST_WIDTH = 400, 120
+CONSTANTS = {
+    picture_lens: "FIRST_SPACING_PX MIN_PASS MAX_PASS CAMERAS_PER_PX MIN_CAMERAS MAX_CAMERAS EDGE_PASSES BLEND_POINTS",
+    passes: "MAX_SAMPLES NEAR_PX OFF_BORDER_PX",
+    view_sampling: "MIN_WEIGHT",
+    points_module: "GRID_SIDE EDGE GOLDEN_ANGLE TURN_STEP SHIFT_STEP SQRT_STEPS COARSENESS_VARIANCE",
+}
+DESKTOP_FIELD = {
+    "grid": GRID,
+    "width": 96,
+    "height": 64,
+    "range_px": (-2.0, 2.0),
+    "present": PRESENT,
+    "hdr": False,
+    "color_space": SRGB,
+}
+"""The field of `node` as the desktop has it."""
+DIAMETERS = (0.3, 1.2, 3.0, 7.0, 9.5)
 EYES = (
     ViewOffset(0.0, 0.0),
     ViewOffset(0.5, -0.25),
@@ -29,7 +57,7 @@ EYES = (
 
 
 def node(code: str, given: Any = None) -> Any:
-    """What a module prints as JSON. given: what it finds as `given`."""
+    """Return what a module prints as JSON. given: what it finds as `given`."""
     program = shutil.which("node")
     assert program is not None, "make test installs node"
     field = (
@@ -41,6 +69,32 @@ def node(code: str, given: Any = None) -> Any:
     )
     done = subprocess.run([program, "--input-type=module", "-e", text], capture_output=True, text=True, check=True)
     return json.loads(done.stdout)
+
+
+def told(offset: ViewOffset) -> dict[str, float]:
+    """Return an offset as the page has it."""
+    return {"t": offset.t, "s": offset.s}
+
+
+def pairs(places: list[dict[str, float]]) -> np.ndarray:
+    """Return offsets of the page as (N, 2) of (t, s)."""
+    return np.array([(place["t"], place["s"]) for place in places])
+
+
+def weights_of(cameras: np.ndarray, views: np.ndarray, weights: np.ndarray) -> dict[tuple[float, ...], float]:
+    """Return weights by camera and view, whatever their order."""
+    return {(*view, *camera): weight for view, camera, weight in zip(views, np.round(cameras, 6) + 0.0, weights)}
+
+
+def found_weights(samples: list[dict[str, Any]]) -> dict[tuple[float, ...], float]:
+    """Return the same for samples of the page."""
+    weights = np.array([sample["weight"] for sample in samples])
+    return weights_of(pairs(samples), pairs([sample["view"] for sample in samples]), weights)
+
+
+def wanted_weights(samples: Samples, grid: GridShape, step: int = 1) -> dict[tuple[float, ...], float]:
+    """Return the same for those of the desktop. step: from one view of the grid to the next, view steps."""
+    return weights_of(step * samples.cameras, step * (samples.views - np.array(grid.centre)), samples.weights)
 
 
 @pytest.mark.parametrize("path", SCRIPTS, ids=lambda path: path.name)
@@ -60,31 +114,86 @@ def test_the_pages_script_is_one_module_that_ends_no_element(tmp_path) -> None:
     assert "<!--" not in script
 
 
+def test_constants_are_the_desktops() -> None:
+    wanted = {name: getattr(module, name) for module, names in CONSTANTS.items() for name in names.split()}
+    found = node("Object.fromEntries(given.map(name => [name, renderer[name]]))", list(wanted))
+    for name, value in wanted.items():
+        assert found[name] == pytest.approx(value, rel=1e-12), name
+
+
+def test_levels_are_the_desktops() -> None:
+    assert node("renderer.LEVELS") == [asdict(level) for level in QUALITY_LEVELS]
+
+
+def test_halves_are_rounded_as_in_python() -> None:
+    halves = [k / 2 for k in range(20)]
+    assert node("given.map(renderer.rounded)", halves) == list(map(round, halves))
+
+
 def test_pinhole_views_are_the_desktops() -> None:
-    present = np.ones(GRID, bool)
-    found = node("given.map(eye => renderer.pinholeSources(eye, field))", [{"t": t, "s": s} for t, s in EYES])
+    found = node("given.map(eye => renderer.pinholeSources(eye, field))", list(map(told, EYES)))
     for eye, sources in zip(EYES, found):
-        wanted = {GRID.offset(row, column): weight for row, column, weight in pinhole_sources(eye, GRID, present)}
+        wanted = {GRID.offset(row, column): weight for row, column, weight in pinhole_sources(eye, GRID, PRESENT)}
         assert {(one["t"], one["s"]): one["weight"] for one in sources} == pytest.approx(wanted)
 
 
-@pytest.mark.parametrize("diameter", [1.2, 3.0, 7.0])
-@pytest.mark.parametrize("is_smoothed", [False, True])
-def test_samples_of_the_lens_are_the_desktops(diameter: float, is_smoothed: bool) -> None:
-    moved = ViewOffset(0.25, -0.4)
-    told = {"diameter": diameter, "isSmoothed": is_smoothed, "moved": {"t": moved.t, "s": moved.s}}
-    told["eyes"] = [{"t": t, "s": s} for t, s in EYES[:4]]
+@pytest.mark.parametrize("diameter", DIAMETERS)
+def test_points_of_the_aperture_are_the_desktops(diameter: float) -> None:
+    asked = [(count, index, cell) for count, cell in ((1, 0.0), (5, 0.3), (12, 0.7)) for index in range(8)]
+    found = node("given.map(numbers => renderer.aperturePoints(...numbers))", [(diameter, 7, *one) for one in asked])
+    for one, points in zip(asked, found):
+        wanted = aperture_points(ApertureShape(), diameter, 7.0, *one)
+        assert pairs(points) == pytest.approx(wanted, abs=1e-9), one
+
+
+@pytest.mark.parametrize(
+    ("name", "samples_of"), [("answeredSamples", answered_samples), ("blendedSamples", blended_samples)]
+)
+@pytest.mark.parametrize("step", [1, 2, 3, 1000])
+def test_views_that_answer_are_the_desktops(name: str, samples_of: Callable[..., Samples], step: int) -> None:
+    """The desktop is told that the views that are there are a whole grid: its view step is `step` of the page's."""
+    grid = GridShape(*(2 * (middle // step) + 1 for middle in GRID.centre))
+    points = aperture_points(ApertureShape(), 5.0, 7.0, 100, 3)
+    first = () if name == "blendedSamples" else (300,)
+    told_points = [told(ViewOffset(*point)) for point in points.tolist()]
     found = node(
-        "given.eyes.map(eye => renderer.apertureSamples(eye, given.diameter, field, 1, given.moved, given.isSmoothed))",
-        told,
+        f"given.eyes.map(eye => renderer.{name}(given.points, ...given.first, eye, {{ ...field, step: {step} }}))",
+        {"points": told_points, "first": first, "eyes": list(map(told, EYES))},
     )
     for eye, samples in zip(EYES, found):
-        present = np.ones(GRID, bool)
-        wanted = aperture_samples(eye, diameter, GRID, present, moved=moved, is_smoothed=is_smoothed)
-        weights = {(round(one.wanted.t, 6), round(one.wanted.s, 6)): one.weight for one in wanted}
-        ours = {(round(one["t"], 6), round(one["s"], 6)): one["weight"] for one in samples}
-        for place in weights.keys() | ours.keys():
-            assert ours.get(place, 0) == pytest.approx(weights.get(place, 0), abs=4e-3), place
+        eye_there = ViewOffset(eye.t / step, eye.s / step)
+        wanted = samples_of(points / step, *first, eye_there, grid, np.ones(grid, bool))
+        assert found_weights(samples) == pytest.approx(wanted_weights(wanted, grid, step)), eye
+
+
+@pytest.mark.parametrize("has_disparity", [True, False])
+@pytest.mark.parametrize("diameter", [0.0, *DIAMETERS])
+def test_a_lens_is_the_desktops(diameter: float, has_disparity: bool) -> None:
+    code = """given.map(({ eye, aperture, widthPx, level, passIndex, hasDisparity }) => {
+        const places = Array.from({ length: 35 }, (_, i) => [`${Math.floor(i / 7) - 2},${i % 7 - 3}`, i]);
+        const there = { ...field, hasDisparity, layers: new Map(places) };
+        const lens = renderer.lensOf({ eye, focus: 0.5, aperture }, there, widthPx, renderer.LEVELS[level]);
+        return {
+            cameras: lens.camerasPerPass, blurPx: lens.blurPx, passes: renderer.passCount(lens, there),
+            cell: renderer.cellOf(lens, passIndex), samples: renderer.samplesOf(lens, there, passIndex),
+        };
+    })"""
+    drawn = ((0, 0), (0, 3), (1, 0), (4, 0), (6, 0))
+    asked = [(eye, width, *one) for eye in EYES for width in (48, 190, 960) for one in drawn]
+    told_lenses = [
+        {"eye": told(eye), "widthPx": width, "level": level, "passIndex": index}
+        | {"aperture": diameter, "hasDisparity": has_disparity}
+        for eye, width, level, index in asked
+    ]
+    field = cast(LightFieldTexture, SimpleNamespace(**DESKTOP_FIELD, has_disparity=np.full(GRID, has_disparity)))
+    for (eye, width, level, index), found in zip(asked, node(code, told_lenses)):
+        optics = Optics(eye=eye, focus_disparity=0.5, aperture_diameter=diameter)
+        lens = lens_of(optics, field, width, QUALITY_LEVELS[level])
+        assert found["cameras"] == lens.cameras_per_pass
+        assert found["blurPx"] == pytest.approx(lens.blur_px)
+        assert found["passes"] == lens.pass_count(field)
+        assert found["cell"] == pytest.approx(lens.cell(index))
+        assert found_weights(found["samples"]) == pytest.approx(wanted_weights(lens.samples(field, index), GRID))
 
 
 def test_a_tap_finds_the_first_surface_on_its_ray() -> None:

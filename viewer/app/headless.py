@@ -18,7 +18,6 @@ from iibr_core.exports import (
     centred,
     encode_light,
     is_full,
-    needs_smaller,
     require_size,
     size_in_frame,
 )
@@ -181,9 +180,7 @@ class HeadlessViewer:
         assert loaded is not None
         assert scene.plan is not None
         full = FullPicture(scene, scene.plan, loaded, optics, size)
-        if needs_smaller(optics):
-            full = full.with_smaller(self._scene_view.renderer.converged_picture(full.smaller_settings))
-        return full.draw(report_progress=report_progress)
+        return full.make(self._scene_view.renderer.converged_picture, report_progress=report_progress)
 
     @property
     def scene(self) -> Scene:
@@ -198,7 +195,7 @@ class HeadlessViewer:
 
     def needs_views(self, size: ScreenSize | None) -> bool:
         """Whether `picture` at this size shows views other than the photo."""
-        return needs_smaller(self.state.optics) or not self.draws_own_pixels(size)
+        return not self.draws_own_pixels(size)
 
     def draws_own_pixels(self, size: ScreenSize | None) -> bool:
         """Whether `picture` at this size is drawn from the photo's own pixels: it takes long after the views."""

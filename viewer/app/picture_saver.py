@@ -11,7 +11,7 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from iibr_core.exports import ExportSource, FullPicture, RenderSettings, encode_light, is_full, needs_smaller
+from iibr_core.exports import ExportSource, FullPicture, RenderSettings, encode_light, is_full
 from iibr_core.formats import AS_USUAL, AlreadyThereError, PictureFormat, is_float, make_folder
 from iibr_core.rendering import Optics
 from iibr_core.scenes import Scene, ScreenSize
@@ -55,7 +55,7 @@ class _Shot:
         """What is copied, and what a free camera sees, is what is seen."""
         if self.is_copied or self.is_free:
             return "shown"
-        return "scene" if self.is_full(scene, optics) and not needs_smaller(optics) else "views"
+        return "scene" if self.is_full(scene, optics) else "views"
 
     def saved_of(self, optics: Optics) -> SavedShot:
         """What the file says of it."""
@@ -144,7 +144,5 @@ def _drawn_full(shot: _Shot, source: ExportSource, is_linear: bool, saved: Saved
     assert scene.plan is not None
     assert source.loaded is not None
     full = FullPicture(scene, scene.plan, source.loaded, source.optics, shot.size)
-    if needs_smaller(source.optics):
-        full = full.with_smaller(source.draw(full.smaller_settings))
-    light = full.draw(source.should_stop, source.report_progress)
+    light = full.make(source.draw, source.should_stop, source.report_progress)
     return encode_light(light, is_linear, saved.color_space, scene.color_space, source.should_stop)

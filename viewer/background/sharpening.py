@@ -1,20 +1,21 @@
-"""Parts of pictures drawn from the photo at its own size, in a thread; the newest request counts."""
+"""Parts of pictures made from the photo at its own size, in a thread; the newest request counts."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.exports import FullPicture, encode_light
+from iibr_core.exports import FullPicture, RenderSettings, encode_light
 from iibr_core.runtime import Cancelled
 from iibr_core.scenes import LoadedPhoto
 from iibr_core.types import SRGB
 from viewer.background.job_threads import Failed, Job, JobThread
+from viewer.background.window_work import WindowWork
 
 if TYPE_CHECKING:
     from iibr_core.rendering import LargePhoto
@@ -28,27 +29,35 @@ class SharpPart:
 
 
 SharpResult = SharpPart | Failed[None]
+DrawSteps = Callable[[RenderSettings], Generator[None, None, NDArray[Any]]]
+"""Draws a tile, in steps, in the window's thread."""
 
 
 class SharpeningWorker(JobThread[FullPicture, SharpResult]):
-    """The photo is kept: the next part of it is then drawn at once."""
+    """Keeps the photo: the next part of it is then drawn at once. window_work: has the tiles drawn."""
 
-    def __init__(self, wake: Callable[[], None]) -> None:
-        """wake: called, in the thread, when a part is drawn."""
-        super().__init__("iibr-sharp", wake, self._draw, lambda request, message: Failed(None, message))
+    def __init__(self, wake: Callable[[], None], draw: DrawSteps) -> None:
+        """wake: called, in the thread, when there is something to draw, or a part is drawn."""
+        super().__init__("iibr-sharp", wake, self._make, lambda request, message: Failed(None, message))
+        self.window_work = WindowWork(wake)
+        self._draw_steps = draw
         self._photo: tuple[LoadedPhoto, LargePhoto] | None = None
 
     def forget(self) -> None:
         """Free the photo."""
         self._photo = None
 
-    def _draw(self, job: Job[FullPicture, SharpResult]) -> Iterator[SharpResult]:
+    def _make(self, job: Job[FullPicture, SharpResult]) -> Iterator[SharpResult]:
         request, kept = job.request, self._photo
+
+        def draw(settings: RenderSettings) -> NDArray[Any]:
+            return self.window_work.run(self._draw_steps(settings), job.should_stop)
+
         with suppress(Cancelled):
             photo = kept[1] if kept is not None and kept[0] is request.loaded else request.load(job.should_stop)
             self._photo = request.loaded, photo
             if request.needs_fills and photo.fills is None:
                 photo = photo.with_fills(request.fill(job.should_stop))
                 self._photo = request.loaded, photo
-            light = request.draw_from(photo, job.should_stop)
+            light = request.make_from(photo, draw, job.should_stop)
             yield SharpPart(encode_light(light, False, SRGB, request.scene.color_space, job.should_stop))

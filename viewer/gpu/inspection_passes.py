@@ -23,7 +23,6 @@ MAX_VIEWS = 128
 """As in shaders/epi.frag: of one row or column of the grid."""
 
 MAX_TAPS = 3
-MAX_SEARCH_STEPS = 96
 SAME_SURFACE = 0.02
 """Of the scene's disparity: as close as that, two disparities are of one surface. Plus SAME_SURFACE_PX."""
 SAME_SURFACE_PX = 0.05
@@ -157,11 +156,9 @@ class InspectionPasses:
         to_view = at.s - optics.eye.s, at.t - optics.eye.t
         far, near = field.range_px
         dolly = -2.0 * optics.dolly, -2.0 * optics.dolly * field.height / field.width
-        distance = math.hypot(*to_view) + math.hypot(*dolly) / 2
         field.disparities.use(1)
         program.set_uniforms(disparities=1, view_size_px=(field.width, field.height), nearest=near, farthest=far)
         program.set_uniforms(dolly=dolly, to_view=to_view, layer=float(field.layer(*view)))
-        program.set_uniforms(search_steps=min(max(math.ceil(distance * (near - far)), 2), MAX_SEARCH_STEPS))
         colors = [tuple(value / 255 for value in color) for color in style.color_map]
         program.set_uniforms(color_map=colors, map_ends=style.map_ends, opacity=style.opacity)
         program.set_uniforms(part=part)

@@ -6,6 +6,7 @@ Colours are stored as the square root of linear light: summing light then costs 
 from __future__ import annotations
 
 from copy import copy
+from functools import cache
 from typing import TYPE_CHECKING
 
 import moderngl
@@ -24,9 +25,6 @@ _ROOT_FROM_SRGB = np.round(np.sqrt(linear_from_srgb(np.arange(256) / 255)) * 255
 
 HALF_MAX = float(np.finfo(np.float16).max)
 
-BLOCK_PX = 16
-"""Side of the squares whose nearest and farthest disparity is kept, to tell quickly what a part of a view contains."""
-
 Box = tuple[slice, slice]
 """Rows and columns of pixels."""
 
@@ -38,7 +36,7 @@ class LightFieldTexture:
     """Texture arrays of the views present.
 
     colors: RGBA8, or RGBA16F for HDR; alpha is the disparity scaled to 0..1 over `range_px`. disparities: R16F, px per
-    view step. blocks: RG16F, least and greatest disparity of each BLOCK_PX square. present, has_disparity: (V, U) bool.
+    view step. present, has_disparity: (V, U) bool.
     uploads: (V, U), how often each was stored.
     color_space: of the light; sRGB until something else is said. gloss: what gloss means for the field, None without.
     range_px: (farthest, nearest) disparity, known from the first view that has any.
@@ -76,9 +74,6 @@ class LightFieldTexture:
         self.colors.filter = (moderngl.LINEAR, moderngl.LINEAR)
         self.disparities = _allocate(ctx, (width, height, layers) if with_disparity else (1, 1, 1), 1, "f2")
         self.disparities.filter = (moderngl.NEAREST, moderngl.NEAREST)
-        blocks = (-(-width // BLOCK_PX), -(-height // BLOCK_PX), layers)
-        self.blocks = _allocate(ctx, blocks if with_disparity else (1, 1, 1), 2, "f2")
-        self.blocks.filter = (moderngl.NEAREST, moderngl.NEAREST)
         self._texels = np.zeros((height, width, 4), self._dtype)
         self._holders = Holders(self._free)
 
@@ -115,18 +110,14 @@ class LightFieldTexture:
         """Store another disparity (H, W) of the view that was uploaded last, whose colours stay. box: outside of it
         nothing changed.
         """
-        box = _whole_blocks(box[0], self.height), _whole_blocks(box[1], self.width)
         self._store_disparity(row, column, disparity, box)
         self.colors.write(np.ascontiguousarray(self._texels[box]), self._viewport(row, column, box))
         self.uploads[row, column] += 1
 
     def _store_disparity(self, row: int, column: int, disparity: FloatImage, box: Box) -> None:
-        """Store what lies within a box of whole blocks; the texels' alpha is set, and left to be written."""
+        """Store what lies within a box; the texels' alpha is set, and left to be written."""
         values = _finite_half(disparity[box])
         self.disparities.write(values.astype(np.float16), self._viewport(row, column, box))
-        blocks = _block_ranges(values)
-        top, left = (span.start // BLOCK_PX for span in box)
-        self.blocks.write(blocks, (left, top, self.layer(row, column), blocks.shape[1], blocks.shape[0], 1))
         far, near = self.range_px
         top_value = 1.0 if self.hdr else 255.0
         depth = np.clip((values - far) * (top_value / (near - far)), 0, top_value)
@@ -163,7 +154,6 @@ class LightFieldTexture:
     def _free(self) -> None:
         self.colors.release()
         self.disparities.release()
-        self.blocks.release()
 
     def _viewport(self, row: int, column: int, box: Box) -> tuple[int, int, int, int, int, int]:
         rows, columns = box
@@ -238,33 +228,25 @@ def _no_memory(size: tuple[int, int, int], components: int, dtype: str, problem:
 
 def _root_of_linear(colors: StoredColors, hdr: bool) -> StoredColors:
     if hdr:
-        root = np.sqrt(linear_from_srgb(encoded_from_stored(colors)))
-        return np.minimum(root, HALF_MAX).astype(np.float16)
+        halves = colors if colors.dtype == np.float16 else encoded_from_stored(colors).astype(np.float16)
+        return _root_from_half()[halves.view(np.uint16)]
     if colors.dtype != np.uint8:
         raise ValueError("float colours in a field opened without hdr")
     return _ROOT_FROM_SRGB[colors.view(np.uint8)]
 
 
+@cache
+def _root_from_half() -> NDArray[np.float16]:
+    """Root of linear light for each half float, by its bits, of encoded colours."""
+    every = np.arange(2**16, dtype=np.uint16).view(np.float16)
+    with np.errstate(invalid="ignore", over="ignore"):
+        root = np.sqrt(linear_from_srgb(encoded_from_stored(np.nan_to_num(every))))
+    return np.minimum(root, HALF_MAX).astype(np.float16)
+
+
 def _finite_half(disparity: FloatImage) -> FloatImage:
     """Half floats hold no more, and differences of the largest floats are infinite."""
     return np.clip(disparity, -HALF_MAX, HALF_MAX)
-
-
-def _whole_blocks(span: slice, size: int) -> slice:
-    """The pixels of all blocks that a span of so many pixels touches."""
-    return slice(span.start // BLOCK_PX * BLOCK_PX, min(-(-span.stop // BLOCK_PX) * BLOCK_PX, size))
-
-
-def _block_ranges(disparity: FloatImage) -> NDArray[np.float16]:
-    """(blocks down, blocks across, 2): least and greatest value of each square, those at the border cut off."""
-    below, beside = (-size % BLOCK_PX for size in disparity.shape)
-    values = np.pad(disparity, ((0, below), (0, beside)), "edge")
-    down, across = (size // BLOCK_PX for size in values.shape)
-    ranges = np.empty((down, across, 2), np.float16)
-    for k, end in enumerate((np.minimum, np.maximum)):
-        rows = end.reduce(values.reshape(down, BLOCK_PX, -1), axis=1)
-        ranges[..., k] = end.reduce(rows.reshape(down, across, BLOCK_PX), axis=2)
-    return ranges
 
 
 def _range_of(disparity: FloatImage) -> tuple[float, float]:

@@ -34,12 +34,6 @@ class RenderTarget:
         self._ctx.enable(moderngl.BLEND)
         self._ctx.blend_func = moderngl.ONE, moderngl.ONE
 
-    def multiply(self) -> None:
-        """Multiply what is here by what is drawn from now on."""
-        self.framebuffer.use()
-        self._ctx.enable(moderngl.BLEND)
-        self._ctx.blend_func = moderngl.ZERO, moderngl.SRC_COLOR
-
     def read(self, dtype: type[np.uint8] | type[np.float32]) -> NDArray[Any]:
         """What was drawn, (H, W, 3), bytes or floats, row 0 at the top."""
         width, height = self.framebuffer.size
@@ -53,67 +47,23 @@ class RenderTarget:
             texture.release()
 
 
-class LayerTargets:
-    """Light kept apart by its defocus, see shaders/include/layers.glsl.
-
-    sums: sharp, in front, behind. across, smooth: foreground and behind, smoothed, at half
-    the size.
-    """
-
-    def __init__(self, ctx: moderngl.Context, sharp: moderngl.Texture) -> None:
-        """sharp: where its layer is summed up, not released with the others."""
-        size_px = ScreenSize(*sharp.size)
-        self._added = [_light(ctx, size_px) for _ in range(2)]
-        self.sums = RenderTarget(ctx, [sharp, *self._added])
-        half = ScreenSize((size_px.width + 1) // 2, (size_px.height + 1) // 2)
-        self.across = RenderTarget(ctx, [_light(ctx, half) for _ in range(2)])
-        self.smooth = RenderTarget(ctx, [_light(ctx, half) for _ in range(2)])
-
-    def release(self) -> None:
-        """Free framebuffers and textures."""
-        self.sums.framebuffer.release()
-        for texture in self._added:
-            texture.release()
-        self.across.release()
-        self.smooth.release()
-
-
 class RenderTargets:
     """The targets of one picture size.
 
-    light: all of it, or what is sharp. tiles, wide_tiles: blur widths, and passes. spans: where searches begin and end.
-    image: the finished picture, RGBA8, rows bottom-up.
+    light: the sum of light, weighted by alpha. image: the finished picture, RGBA8, rows bottom-up.
     """
 
-    def __init__(self, ctx: moderngl.Context, size_px: ScreenSize, tile_px: int) -> None:
+    def __init__(self, ctx: moderngl.Context, size_px: ScreenSize) -> None:
         self._ctx = ctx
-        width, height = self.size_px = size_px
-        tiles = ScreenSize(-(-width // tile_px), -(-height // tile_px))
+        self.size_px = size_px
         self.image = RenderTarget(ctx, [ctx.texture(size_px, 4)])
         self.light = RenderTarget(ctx, [_light(ctx, size_px)])
-        self.tiles = RenderTarget(ctx, [_light(ctx, tiles)])
-        self.wide_tiles = RenderTarget(ctx, [_light(ctx, tiles)])
-        self.spans = RenderTarget(ctx, [_light(ctx, tiles) for _ in range(2)])
-        self._layers: LayerTargets | None = None
-
-    @property
-    def layers(self) -> LayerTargets:
-        """Allocated when first asked for: most pictures that are sharp all over need none."""
-        if self._layers is None:
-            self._layers = LayerTargets(self._ctx, self.light.textures[0])
-        return self._layers
-
-    def sum_of(self, keeps_layers: bool) -> RenderTarget:
-        """Where light is summed up, apart by its defocus or not."""
-        return self.layers.sums if keeps_layers else self.light
 
     def release(self) -> None:
         """Free framebuffers and textures."""
         unbind(self._ctx)
-        if self._layers is not None:
-            self._layers.release()
-        for target in (self.image, self.light, self.tiles, self.wide_tiles, self.spans):
-            target.release()
+        self.image.release()
+        self.light.release()
 
 
 def unbind(ctx: moderngl.Context) -> None:

@@ -106,13 +106,13 @@ def progress_text(progress: Progress) -> str:
 
 
 def report_text(report: DrawReport, has_all_views: bool) -> str:
-    """How long drawing took and how far it is from the picture of these views: "Drawn in 12 ms, error 0.3 %"; final
-    only where has_all_views.
+    """Say how long drawing took, and whether the picture becomes better: "Drawn in 12 ms, refining". It is final only
+    where has_all_views.
     """
     words = f"Drawn in {report.draw_ms:.0f} ms"
     if report.samples >= report.samples_converged:
         return f"{words}, final" if has_all_views else words
-    return words if report.error is None else f"{words}, error {report.error:.1%}".replace("%", " %")
+    return f"{words}, refining"
 
 
 def time_text(seconds: float) -> str:

@@ -19,7 +19,7 @@ from iibr_core.depth.choice import DepthChoice
 from iibr_core.evaluation import evaluation_report
 from iibr_core.evaluation.datasets import read_scene
 from iibr_core.evaluation.evaluate_scene import Options, evaluate
-from iibr_core.evaluation.focal_stacks import LENS, FocalStack, Focus, foci_of, lens_focus, shear, weight_of, within
+from iibr_core.evaluation.focal_stacks import LENS, FocalStack, Focus, foci_of, lens_focus, weight_of, within
 from iibr_core.evaluation.lens_picture import read_lens_picture
 from iibr_core.evaluation.metrics import psnr
 from iibr_core.evaluation.reference_warp import reference_warp
@@ -74,12 +74,6 @@ def test_a_constant_stays_constant_at_every_focus() -> None:
     views = {at: np.full((30, 32, 3), 0.3, np.float32) for at in offsets_of(3, 5).values()}
     for picture in stack_of(views, Focus("near", 2.3, 1.0), Focus("far", -0.7, 2.0)):
         np.testing.assert_allclose(picture, 0.3, atol=1e-5)
-
-
-def test_whole_shifts_are_exact() -> None:
-    view, focus = smooth_texture(30, 32), Focus("x", 2.0, 1.0)
-    at, margin = ViewOffset(1.0, -0.5), 5
-    np.testing.assert_array_equal(shear(view, at, focus), view[margin - 2 : -margin - 2, margin + 1 : -margin + 1])
 
 
 @pytest.mark.parametrize("radius", [0.5, 1.0, 2.0, 3.3])

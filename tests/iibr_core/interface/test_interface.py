@@ -5,12 +5,15 @@ from __future__ import annotations
 import re
 import subprocess
 import sys
+from itertools import pairwise, product
 from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.ndimage import shift
 
 import iibr_core as iibr
+from iibr_core.color import linear_from_srgb, srgb_from_linear
 from iibr_core.formats.images.photo import write_image
 from iibr_core.formats.maps.pfm import write_pfm
 from iibr_core.generation.light_field import generate
@@ -115,6 +118,37 @@ def test_refocusing_keeps_sharp_what_has_that_disparity() -> None:
     }
     assert 5 * error["near"] < error["far"]
     np.testing.assert_array_equal(field.refocus(0.0, 0.0), field.view(0, 0))
+
+
+def test_refocusing_blurs_more_the_wider_the_aperture_from_closed_on() -> None:
+    pixels = np.random.default_rng(0).random((60, 80, 3)).astype(np.float32)
+    field = iibr.from_arrays(pixels, np.full((60, 80), -1.0, np.float32)).light_field(5, parallax="literal")
+    sharpness = [np.abs(np.diff(field.refocus(1.0, a), axis=1)).mean() for a in (0.0, 0.4, 0.8, 1.2, 2.0, 3.0, 5.0)]
+    assert all(after < 0.96 * before for before, after in pairwise(sharpness)), sharpness
+
+
+def test_refocusing_is_the_mean_of_the_views_inside_the_aperture() -> None:
+    """A plain sum of views made at the cameras' places, by another way of moving them."""
+    pixels, values = square_scene()
+    field = iibr.from_arrays(pixels, values).light_field(5, parallax="literal")
+    total, cameras = np.zeros_like(pixels, np.float64), 0
+    for t, s in product(np.linspace(-0.75, 0.75, 13), repeat=2):
+        if np.hypot(t, s) <= 0.75:
+            light = linear_from_srgb(field.view(s, t))
+            total += shift(light, (2.0 * t, 2.0 * s, 0), order=3, mode="nearest")
+            cameras += 1
+    expected, drawn = srgb_from_linear(total / cameras), field.refocus(2.0, 1.5)
+    assert iibr.compare(drawn[8:-8, 8:-8], expected[8:-8, 8:-8].astype(np.float32)).psnr_db > 38
+
+
+def test_a_field_from_disk_is_refocused_from_its_stored_views(tmp_path: Path) -> None:
+    pixels, values = square_scene()
+    made = iibr.from_arrays(pixels, values).light_field(5, parallax="literal")
+    made.save(tmp_path / "field")
+    read = iibr.open(tmp_path / "field").light_field()
+    focus = float(values.min())
+    assert iibr.compare(read.refocus(focus, 3.0), made.refocus(focus, 3.0)).psnr_db > 30
+    np.testing.assert_array_equal(read.refocus(focus, 0.0), read.view(0, 0))
 
 
 @pytest.mark.parametrize("format", iibr.FORMATS)

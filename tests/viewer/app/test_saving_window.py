@@ -39,7 +39,8 @@ LARGE = 1500, 1000
 @pytest.fixture
 def viewer(open_window: Opener, photo_path: Path, monkeypatch: pytest.MonkeyPatch) -> Driver:
     """One small step of a picture a turn, and many passes: so there are many turns however fast the machine is."""
-    monkeypatch.setattr("viewer.gpu.refocus.picture_lens.PASS_BLUR_PX", 1.0)
+    monkeypatch.setattr("viewer.gpu.refocus.picture_lens.MIN_CAMERAS", 64)
+    monkeypatch.setattr("viewer.gpu.refocus.picture_lens.MAX_CAMERAS", 64)
     monkeypatch.setattr("viewer.app.main_loop.SAVE_BUDGET_S", 0.0)
     monkeypatch.setattr("viewer.gpu.refocus.picture_drawing.STEP_S", 1e-4)
     driver = open_window(photo_path, grid=GridShape(3, 3))
@@ -268,14 +269,14 @@ def test_a_picture_at_the_photos_own_size_can_be_given_up(
 ) -> None:
     begun, before = threading.Event(), set(tmp_path.iterdir())
 
-    def draw(self: FullPicture, should_stop: Callable[[], bool], _: object) -> None:
+    def make(self: FullPicture, draw: object, should_stop: Callable[[], bool], _: object) -> None:
         begun.set()
         while not should_stop():
             time.sleep(0.001)
         raise Cancelled
 
     with monkeypatch.context() as endless:
-        endless.setattr(FullPicture, "draw", draw)
+        endless.setattr(FullPicture, "make", make)
         large.app.do(DoTask(SaveTask(str(tmp_path / "out.png"), (WIDTH, HEIGHT))))
         large.until(lambda app: begun.is_set())
         large.app.do(DoTask(CancelJobTask(job_of(large).id)), DoTask(SaveTask(str(tmp_path / "next.png"), (16, 12))))

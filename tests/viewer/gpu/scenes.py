@@ -8,8 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.color import linear_from_srgb, srgb_from_linear
+from iibr_core.exports.render_settings import RenderSettings
+from iibr_core.rendering.aperture_shape import openness
+from iibr_core.rendering.optics import Optics
+from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, ViewOffset
 from viewer.gpu.refocus.picture_renderer import Renderer
+
+Numbers = float | NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -26,13 +32,17 @@ class TwoPlanes:
     def view(self, eye: ViewOffset) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
         """Colours (H, W, 3) and disparity (H, W) seen from an eye, pixel centres only."""
         y, x = np.indices((self.height, self.width)).astype(float)
-        far = self._texture(x + self.background * eye.s, y + self.background * eye.t, hue=0.0)
-        near = self._texture(x + self.foreground * eye.s, y + self.foreground * eye.t, hue=2.0)
-        centre_x, centre_y = self.width / 2 - self.foreground * eye.s, self.height / 2 - self.foreground * eye.t
-        in_front = np.hypot(x - centre_x, y - centre_y) < self.radius_px
-        colors = np.where(in_front[..., None], near, far)
-        disparity = np.where(in_front, self.foreground, self.background).astype(np.float32)
+        colors, disparity = self.seen(x, y, eye.t, eye.s)
         return np.rint(colors * 255).astype(np.uint8), disparity
+
+    def seen(self, x: Numbers, y: Numbers, t: Numbers, s: Numbers) -> tuple[NDArray[np.float64], NDArray[np.float32]]:
+        """Colours and disparity at real places of the picture of a camera at (t, s); each place may have its own."""
+        far = self._texture(x + self.background * s, y + self.background * t, hue=0.0)
+        near = self._texture(x + self.foreground * s, y + self.foreground * t, hue=2.0)
+        centre_x, centre_y = self.width / 2 - self.foreground * s, self.height / 2 - self.foreground * t
+        in_front = np.hypot(x - centre_x, y - centre_y) < self.radius_px
+        disparity = np.where(in_front, self.foreground, self.background).astype(np.float32)
+        return np.where(in_front[..., None], near, far), disparity
 
     def _texture(self, x: NDArray[np.float64], y: NDArray[np.float64], hue: float) -> NDArray[np.float64]:
         waves = [np.sin(0.31 * x + 0.17 * y + hue), np.sin(0.11 * x - 0.29 * y + 2 * hue), np.sin(0.23 * y + hue)]
@@ -55,16 +65,80 @@ class TwoPlanes:
                 self.upload(renderer, grid, row, column, with_disparity)
 
 
-def through_aperture(
-    scene: TwoPlanes, offsets: list[ViewOffset], weights: list[float], eye: ViewOffset, focus: float
-) -> NDArray[np.uint8]:
-    """Twin of the aperture pass: the plain weighted mean, in linear light, of views moved by whole pixels."""
-    total = np.zeros((scene.height, scene.width, 3))
-    for offset, weight in zip(offsets, weights):
-        light = linear_from_srgb(scene.view(offset)[0] / 255)
-        moved = round(focus * (offset.t - eye.t)), round(focus * (offset.s - eye.s))
-        total += weight * np.roll(light, moved, axis=(0, 1))
-    return np.rint(srgb_from_linear(total / sum(weights)) * 255).astype(np.uint8)
+class PhotoLike(TwoPlanes):
+    """Its waves are of many lengths, and the higher the longer, as in photos: blurred more, it is always smoother."""
+
+    def _texture(self, x: NDArray[np.float64], y: NDArray[np.float64], hue: float) -> NDArray[np.float64]:
+        random, waves = np.random.default_rng(round(hue)), np.zeros_like(x)
+        for period in np.geomspace(6, 60, 30):
+            angle, phase = 2 * np.pi * random.random(2)
+            waves += period * np.sin(2 * np.pi / period * (x * np.cos(angle) + y * np.sin(angle)) + phase)
+        return np.clip(0.5 + 0.0017 * waves[..., None] * np.array([1.0, 0.8, 0.6]), 0, 1)
+
+
+def through_lens(scene: TwoPlanes, optics: Optics, grid: GridShape, across: int = 20) -> NDArray[np.uint8]:
+    """The picture by brute force: the mean, in linear light, of cameras `across` the opening in each direction, each
+    seeing the scene itself. The opening is as wide as the grid at most.
+    """
+    y, x = np.indices((scene.height, scene.width)).astype(float)
+    t, s = eyes_of_pixels(optics, scene)
+    focus, total, weights = focus_of_pixels(optics, scene), np.zeros((scene.height, scene.width, 3)), 0.0
+    for (dt, ds), weight in zip(*camera_grid(optics, grid, across)):
+        colors, _ = scene.seen(x - focus * ds, y - focus * dt, t + dt, s + ds)
+        left = weight * barrel_share(optics, scene, dt, ds)[..., None]
+        total += left * linear_from_srgb(colors)
+        weights += left
+    return np.rint(np.clip(srgb_from_linear(total / weights), 0, 1) * 255).astype(np.uint8)
+
+
+def camera_grid(optics: Optics, grid: GridShape, across: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Places (N, 2) all over the opening, (t, s) from its middle, and how open it is there."""
+    diameter = optics.aperture_diameter
+    widest = min(diameter, float(max(grid)))
+    places = widest * ((np.arange(across) + 0.5) / across - 0.5)
+    t, s = (axis.ravel() for axis in np.meshgrid(places, places, indexing="ij"))
+    weights = openness(optics.aperture_shape, t, s, diameter, widest, widest / across)
+    return np.stack([t, s], -1)[weights > 0], weights[weights > 0]
+
+
+def eyes_of_pixels(optics: Optics, scene: TwoPlanes) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """(t, s) at which each pixel's ray crosses the grid."""
+    right, lower = from_middle(scene)
+    aspect = scene.height / scene.width
+    return optics.eye.t - optics.dolly * lower * aspect, optics.eye.s - optics.dolly * right
+
+
+def focus_of_pixels(optics: Optics, scene: TwoPlanes) -> NDArray[np.float64]:
+    """The sharp disparity of each pixel."""
+    right, lower = from_middle(scene)
+    return optics.focus_disparity + optics.focus_tilt[0] * right + optics.focus_tilt[1] * lower
+
+
+def barrel_share(optics: Optics, scene: TwoPlanes, dt: float, ds: float) -> NDArray[np.float64]:
+    """1 where the barrel lets light through this place of the lens; in the corners it has moved by `cat_eye` radii."""
+    shape, radius = optics.aperture_shape, optics.aperture_diameter / 2
+    if shape.kind != "cat_eye":
+        return np.ones((scene.height, scene.width))
+    right, lower = from_middle(scene)
+    by = radius * shape.cat_eye / np.hypot(scene.width, scene.height)
+    return (np.hypot(dt - by * scene.height * lower, ds - by * scene.width * right) < radius).astype(float)
+
+
+def from_middle(scene: TwoPlanes) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Each pixel's place, -1 at the left and the upper border, 1 at the right and the lower one."""
+    y, x = np.indices((scene.height, scene.width)) + 0.5
+    return 2 * x / scene.width - 1, 2 * y / scene.height - 1
+
+
+def settled(renderer: Renderer, optics: Optics, scene: TwoPlanes) -> NDArray[np.uint8]:
+    """The picture with every camera that it gets."""
+    return renderer.converged_picture(RenderSettings(optics, ScreenSize(scene.width, scene.height)))
+
+
+def first_frame(renderer: Renderer, optics: Optics, scene: TwoPlanes) -> NDArray[np.uint8]:
+    """The picture that is drawn at once."""
+    renderer.render(optics, ScreenSize(scene.width, scene.height))
+    return renderer.read_image()
 
 
 def rms(image: NDArray[np.uint8], expected: NDArray[np.uint8], border: int = 8) -> float:
@@ -72,3 +146,14 @@ def rms(image: NDArray[np.uint8], expected: NDArray[np.uint8], border: int = 8) 
     inside = slice(border, -border)
     difference = image[inside, inside].astype(float) - expected[inside, inside]
     return float(np.sqrt(np.mean(difference**2)) / 255)
+
+
+def psnr(image: NDArray[np.uint8], expected: NDArray[np.uint8], border: int = 8) -> float:
+    """Likeness inside the border, dB."""
+    return float(-20 * np.log10(max(rms(image, expected, border), 1e-9)))
+
+
+def sharpness(image: NDArray[np.uint8], border: int = 8) -> float:
+    """Mean step between neighbouring pixels inside the border, 1 = white."""
+    inside = image[border:-border, border:-border].astype(float) / 255
+    return float(np.abs(np.diff(inside, axis=0)).mean() + np.abs(np.diff(inside, axis=1)).mean())

@@ -66,7 +66,7 @@ def test_an_aperture_larger_than_the_grid_sees_all_views(renderer: Renderer) -> 
 
 @pytest.mark.parametrize("far", [1e2, 1e6, 1e30, 3e38])
 def test_view_offset_far_outside_the_grid(renderer: Renderer, far: float) -> None:
-    """What is shown are colours of the scene: the stored views end, so their edges are continued."""
+    """Colours of the scene are shown: the stored views end, so their edges are continued."""
     open_constant(renderer, GRID, 1.5)
     for optics in (Optics(ViewOffset(far, -far)), Optics(ViewOffset(-far, 0.0), aperture_diameter=2.0)):
         assert np.abs(picture(renderer, optics) - COLOR).max() <= 1
@@ -133,7 +133,7 @@ def test_float16_sums_of_289_views(renderer: Renderer) -> None:
 
 
 def test_texture_arrays_over_the_layer_limit_keep_fewer_views(renderer: Renderer, gl: GLContext) -> None:
-    """Of this driver's own limit: every other view is shown, and said."""
+    """This driver's own limit: every other view is shown, and said."""
     side = math.isqrt(gl.max_layers) + 1
     renderer.open_field(GridShape(side, side), 4, 4, hdr=False, with_disparity=False)
     assert "2nd view across and down" in renderer.note

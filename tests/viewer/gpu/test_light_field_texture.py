@@ -43,7 +43,7 @@ def test_a_view_that_comes_again_takes_the_place_of_its_draft(gl: GLContext) -> 
     field.upload(1, 1, draft, near)
     for texture in (field, once):
         texture.upload(1, 1, final, far)
-    for name in ("colors", "disparities", "blocks"):
+    for name in ("colors", "disparities"):
         assert getattr(field, name).read() == getattr(once, name).read()
     assert field.uploads.tolist() == [[1, 0, 0], [0, 2, 0]]
     assert field.present.sum() == 2
@@ -64,23 +64,11 @@ def test_a_part_with_other_disparity_leaves_what_all_of_it_anew_would(gl: GLCont
         field.upload(1, 2, colors, before)
     changed.change_disparity(1, 2, after, box)
     again.upload(1, 2, colors, after)
-    for name in ("colors", "disparities", "blocks"):
+    for name in ("colors", "disparities"):
         assert getattr(changed, name).read() == getattr(again, name).read(), name
     assert changed.uploads.tolist() == again.uploads.tolist()
     changed.release()
     again.release()
-
-
-def test_blocks_know_the_least_and_the_greatest_disparity_in_them(gl: GLContext) -> None:
-    field = LightFieldTexture(gl.ctx, GRID, 53, 37, hdr=False, with_disparity=True)
-    disparity = np.random.default_rng(0).normal(size=(37, 53)).astype(np.float32)
-    field.upload(0, 0, np.zeros((37, 53, 3), np.uint8), disparity)
-    blocks = np.frombuffer(field.blocks.read(), np.float16).reshape(6, 3, 4, 2)[0]
-    for row in range(3):
-        for column in range(4):
-            square = disparity[16 * row : 16 * row + 16, 16 * column : 16 * column + 16].astype(np.float16)
-            assert blocks[row, column].tolist() == [square.min(), square.max()]
-    field.release()
 
 
 def test_stray_disparities_do_not_stretch_the_range(gl: GLContext) -> None:

@@ -57,7 +57,7 @@ def drawn_db(renderer: Renderer, scene: LensScene, field: Field, optics: Optics)
 
 
 def db(picture: FloatImage, scene: LensScene) -> float:
-    """Of the part that all views see."""
+    """Likeness of the part that all views see."""
     focus = Focus(LENS, scene.lens.focus_disparity, scene.lens.radius_views)
     return psnr(within(picture, focus), within(scene.lens.picture, focus))
 

@@ -9,7 +9,14 @@ from hypothesis import strategies as st
 
 from iibr_core.scenes.lens_limits import clamp_to_grid
 from iibr_core.types import GridShape, ViewOffset
-from viewer.gpu.refocus.view_sampling import aperture_samples, nearest_present, pinhole_sources
+from viewer.gpu.refocus.view_sampling import (
+    Samples,
+    answered_samples,
+    blended_samples,
+    nearest_present,
+    pinhole_samples,
+    pinhole_sources,
+)
 
 GRID = GridShape(5, 5)
 FULL = np.ones(GRID, bool)
@@ -29,6 +36,16 @@ def weights_by_view(sources: list) -> np.ndarray:
     return weights
 
 
+def shares_of_views(samples: Samples) -> np.ndarray:
+    shares = np.zeros(GRID)
+    np.add.at(shares, tuple(samples.views.T), samples.weights)
+    return shares
+
+
+def spread_points(count: int, radius: float) -> np.ndarray:
+    return np.random.default_rng(1).uniform(-radius, radius, (count, 2))
+
+
 def test_full_field_is_bilinear() -> None:
     weights = weights_by_view(pinhole_sources(ViewOffset(0.25, -0.5), GRID, FULL))
     assert weights[2, 1:3] == pytest.approx([0.375, 0.375])
@@ -42,6 +59,7 @@ def test_pinhole_weights_sum_to_one_over_present_views(eye: ViewOffset, seed: in
     assert sum(source.weight for source in sources) == pytest.approx(1, abs=1e-4)
     assert len(sources) <= 4
     assert all(present[source.row, source.column] and source.weight > 0 for source in sources)
+    assert pinhole_samples(sources[:2]).weights.sum() == pytest.approx(1)
 
 
 @given(eye=st.builds(ViewOffset, st.floats(-2, 2), st.floats(-2, 2)))
@@ -64,32 +82,59 @@ def test_no_views_no_sources() -> None:
     assert pinhole_sources(ViewOffset(0.0, 0.0), GRID, np.zeros(GRID, bool)) == []
 
 
-@given(eye=places, diameter=st.floats(1, 20))
-def test_aperture_weights_sum_to_one(eye: ViewOffset, diameter: float) -> None:
-    samples = aperture_samples(eye, diameter, GRID, FULL)
-    assert sum(sample.weight for sample in samples) == pytest.approx(1, abs=1e-3)
+@given(eye=places, first=st.integers(0, 1000))
+def test_a_camera_is_answered_by_a_corner_of_its_cell(eye: ViewOffset, first: int) -> None:
+    points = spread_points(40, 3.0)
+    samples = answered_samples(points, first, eye, GRID, FULL)
+    assert np.array_equal(samples.cameras, points)
+    assert samples.weights == pytest.approx(np.full(40, 1 / 40))
+    beside = np.clip(np.array(eye) + GRID.centre + points, 0, 4) - samples.views
+    assert np.abs(beside).max() < 1 + 1e-9
 
 
-def test_aperture_is_a_disc_with_a_soft_edge() -> None:
-    """Three kinds of views take part; the blur is as wide as the disc's, which tells how much each counts."""
-    weights = weights_by_view(aperture_samples(ViewOffset(0.0, 0.0), 3.0, GRID, FULL))
-    middle, side, corner = weights[2, 2], weights[2, 1], weights[1, 1]
-    assert middle > side > corner > 0
-    assert side / middle - corner / middle == pytest.approx(np.sqrt(2) - 1), "the edge fades over one view step"
-    assert weights == pytest.approx(weights.T)
-    assert weights == pytest.approx(weights[::-1])
-    assert weights[2, 0] == weights[0, 0] == 0
-    assert 2 * side + 4 * corner == pytest.approx(1.5**2 / 4, rel=0.01)
+@pytest.mark.parametrize("eye", [ViewOffset(0.25, -0.5), ViewOffset(-1.9, 1.2), ViewOffset(3.0, 0.1)])
+def test_cameras_together_blend_views_as_a_pinhole_does(eye: ViewOffset) -> None:
+    """And in passes as at once: each goes on in the sequence."""
+    count = 600
+    samples = answered_samples(np.zeros((count, 2)), 0, eye, GRID, FULL)
+    assert shares_of_views(samples) == pytest.approx(weights_by_view(pinhole_sources(eye, GRID, FULL)), abs=0.01)
+    later = answered_samples(np.zeros((20, 2)), 100, eye, GRID, FULL)
+    assert np.array_equal(later.views, samples.views[100:120])
 
 
 def test_missing_views_are_answered_by_the_nearest_present() -> None:
     present = np.zeros(GRID, bool)
     present[2, 2] = present[0, 0] = True
-    samples = aperture_samples(ViewOffset(0.0, 0.0), 20.0, GRID, present)
-    assert len(samples) == 25
-    answers = {sample.wanted: (sample.row, sample.column) for sample in samples}
-    assert answers[ViewOffset(-2.0, -1.0)] == (0, 0)
-    assert answers[ViewOffset(2.0, 2.0)] == (2, 2)
+    points = np.array([(-2.0, -1.0), (2.0, 2.0), (0.0, 0.0)])
+    samples = answered_samples(points, 0, ViewOffset(0.0, 0.0), GRID, present)
+    assert samples.views.tolist() == [[0, 0], [2, 2], [2, 2]]
+    blended = blended_samples(points, ViewOffset(0.0, 0.0), GRID, present)
+    assert sorted(blended.views.tolist()) == [[0, 0], [2, 2]]
+
+
+@given(eye=places, radius=st.floats(0, 6), seed=st.integers(0, 50))
+def test_blended_views_weigh_one_and_are_there(eye: ViewOffset, radius: float, seed: int) -> None:
+    present = some_views(seed)
+    samples = blended_samples(spread_points(200, radius), eye, GRID, present)
+    assert samples.weights.sum() == pytest.approx(1)
+    assert present[tuple(samples.views.T)].all()
+    assert np.allclose(samples.cameras + np.array(eye), samples.views - np.array(GRID.centre))
+
+
+def test_blended_views_weigh_what_the_points_ask_of_them() -> None:
+    points = spread_points(300, 0.8)
+    eye = ViewOffset(0.25, -0.5)
+    expected = np.mean(
+        [weights_by_view(pinhole_sources(ViewOffset(*(point + eye)), GRID, FULL)) for point in points], axis=0
+    )
+    assert shares_of_views(blended_samples(points, eye, GRID, FULL)) == pytest.approx(expected, abs=1e-3)
+
+
+def test_through_next_to_no_aperture_a_stored_view_is_shown_alone() -> None:
+    samples = blended_samples(spread_points(200, 1e-6), ViewOffset(1.0, -1.0), GRID, FULL)
+    assert samples.views.tolist() == [[3, 1]]
+    answered = answered_samples(np.zeros((50, 2)), 7, ViewOffset(1.0, -1.0), GRID, FULL)
+    assert np.unique(answered.views, axis=0).tolist() == [[3, 1]]
 
 
 def test_nearest_present_against_a_plain_search() -> None:

@@ -43,7 +43,7 @@ def test_a_picture_is_final_only_with_all_views_as_they_stay() -> None:
     converged = DrawReport(samples=4, samples_converged=4, draw_ms=12.0)
     assert report_text(converged, has_all_views=True) == "Drawn in 12 ms, final"
     assert report_text(converged, has_all_views=False) == "Drawn in 12 ms"
-    assert report_text(DrawReport(1, 4, 12.0, 0.003), has_all_views=True) == "Drawn in 12 ms, error 0.3 %"
+    assert report_text(DrawReport(1, 4, 12.0), has_all_views=True) == "Drawn in 12 ms, refining"
 
 
 @pytest.mark.parametrize(

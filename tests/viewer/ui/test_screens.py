@@ -41,7 +41,7 @@ from viewer.ui.style import DARK, LIGHT
 
 SIZE = 640, 1400
 ENOUGH_PIXELS = 60
-"""That differ, at least, where something new is drawn: a short word."""
+"""Least number of pixels that differ where something new is drawn: a short word."""
 
 
 @pytest.fixture(scope="module")
@@ -109,7 +109,7 @@ def test_each_aperture_shape_shows_its_own_controls(viewer: HeadlessViewer, kind
         SetLoop("eight"),
         SetAperture(2.0),
         ProgressMade(1, Progress(4, 9, 0.3)),
-        SetState("report", DrawReport(3, 9, 12.0, 0.004)),
+        SetState("report", DrawReport(3, 9, 12.0)),
     ],
     ids=lambda action: type(action).__name__,
 )

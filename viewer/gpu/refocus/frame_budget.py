@@ -19,11 +19,11 @@ from viewer.gpu.refocus.view_sampling import MAX_SOURCES
 class QualityLevel:
     """What is left out.
 
-    stride: view steps between samples of the aperture. sources: stored views that a pinhole view is made of, at most.
+    cameras: share of a pass's cameras in the aperture. sources: stored views that answer a pinhole, at most.
     scale: of the picture's width and height.
     """
 
-    stride: int = 1
+    cameras: float = 1.0
     sources: int = MAX_SOURCES
     scale: float = 1.0
 
@@ -31,20 +31,18 @@ class QualityLevel:
 BEST_QUALITY = QualityLevel()
 QUALITY_LEVELS = (
     BEST_QUALITY,
-    QualityLevel(sources=2),
-    QualityLevel(sources=1),
-    QualityLevel(sources=1, scale=0.7),
-    QualityLevel(sources=1, scale=0.5),
-    QualityLevel(2, 1, 0.7),
-    QualityLevel(2, 1, 0.5),
-    QualityLevel(3, 1, 0.5),
-    QualityLevel(4, 1, 0.35),
+    QualityLevel(1.0, 2),
+    QualityLevel(1.0, 1),
+    QualityLevel(1.0, 1, 0.7),
+    QualityLevel(0.5, 1, 0.7),
+    QualityLevel(0.5, 1, 0.5),
+    QualityLevel(0.25, 1, 0.35),
 )
-"""From the best picture to the quickest. Fewer pixels show less than fewer samples: see docs/speed.md, Drawing."""
+"""From the best picture to the quickest. Fewer pixels show less than fewer cameras: see docs/refocus.md."""
 
-PICTURE_FETCHES, LAYERS_FETCHES = 4.0, 8.0
-PINHOLE_FETCHES, SOURCE_FETCHES = 4.0, 5.0
-REPROJECTION_FETCHES = 3.0
+PICTURE_FETCHES = 4.0
+COLOR_FETCHES, WARP_FETCHES = 5.0, 4.0
+"""Cost of interpolating a camera's colour, and of finding the surface that it sees."""
 UNMEASURED = 4.0
 """What was not drawn yet may take so many times as long as guessed: the first frame of a drag must not stall."""
 OVERHEAD_S = 0.003
@@ -63,52 +61,44 @@ def scale_size(size_px: ScreenSize, scale: float) -> ScreenSize:
     return ScreenSize(max(round(width * scale), 1), max(round(height * scale), 1))
 
 
-def stretch_image(image: NDArray[np.uint8], size_px: ScreenSize, every: int = 1) -> NDArray[np.uint8]:
-    """A picture (H, W, 3) drawn smaller, at (width, height): interpolated linearly, as the screen shows it.
-
-    every: of the pixels there, only each so manieth, both ways.
-    """
-    rows, columns = (_taps(there, here, every) for there, here in zip(size_px[::-1], image.shape))
+def stretch_image(image: NDArray[np.uint8], size_px: ScreenSize) -> NDArray[np.uint8]:
+    """A picture (H, W, 3) drawn smaller, at (width, height): interpolated linearly, as the screen shows it."""
+    rows, columns = (_taps(there, here) for there, here in zip(size_px[::-1], image.shape))
     light = image.astype(np.float32)
     light = light[rows[0]] + rows[2][:, None, None] * (light[rows[1]] - light[rows[0]])
     light = light[:, columns[0]] + columns[2][:, None] * (light[:, columns[1]] - light[:, columns[0]])
     return np.rint(light).astype(np.uint8)
 
 
-def _taps(there: int, here: int, every: int) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.float32]]:
+def _taps(there: int, here: int) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.float32]]:
     """For each pixel asked for: the two beside its place here, and how much the second counts."""
-    places = np.clip((np.arange(0, there, every) + 0.5) * (here / there) - 0.5, 0, here - 1)
+    places = np.clip((np.arange(there) + 0.5) * (here / there) - 0.5, 0, here - 1)
     low = places.astype(np.intp)
     return low, np.minimum(low + 1, here - 1), (places - low).astype(np.float32)
 
 
 @dataclass(frozen=True)
 class DrawCost:
-    """What drawing a picture takes. samples: of the aperture, 0 without. sources: of the pinhole view, 0 without.
+    """What drawing a picture takes.
 
-    has_reprojection: whether views stand in for others. keeps_layers: see `Lens`. pixels: of the picture as drawn.
-    searches: whether the pinhole view looks for surfaces, as it does wherever no stored view lies.
+    samples: cameras; of a pinhole, views that answer it. warps: whether views are warped by their disparity. pixels:
+    size of the picture as drawn.
     """
 
     samples: int
-    sources: int
-    has_reprojection: bool
-    keeps_layers: bool
+    warps: bool
     pixels: int
-    searches: bool = False
 
     @property
     def fetches(self) -> float:
         """How many fetches of a texel it costs, about."""
-        of_samples = self.samples * (REPROJECTION_FETCHES if self.has_reprojection else 1.0)
-        of_pinhole = PINHOLE_FETCHES + SOURCE_FETCHES * self.sources
-        of_picture = PICTURE_FETCHES + LAYERS_FETCHES * self.keeps_layers
-        return self.pixels * (of_picture + of_samples + of_pinhole * (self.sources > 0))
+        of_sample = COLOR_FETCHES + WARP_FETCHES * self.warps
+        return self.pixels * (PICTURE_FETCHES + self.samples * of_sample)
 
     @property
     def kind(self) -> tuple[bool, ...]:
         """What sorts of work there are: the estimate of each is off in its own way."""
-        return self.samples > 0, self.sources > 0, self.has_reprojection, self.keeps_layers, self.searches
+        return (self.warps,)
 
 
 class FrameTimeModel:

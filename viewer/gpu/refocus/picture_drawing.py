@@ -14,7 +14,6 @@ from iibr_core.types import ColorSpace
 from viewer.gpu.context import GLContext
 from viewer.gpu.light_field_texture import LightFieldTexture
 from viewer.gpu.refocus.accumulation import Accumulator, ProgressiveAccumulation
-from viewer.gpu.refocus.passes import TILE_PX
 from viewer.gpu.refocus.picture_tiling import PictureTile, picture_tiles
 from viewer.gpu.render_targets import RenderTarget, RenderTargets, unbind
 
@@ -64,7 +63,7 @@ class PictureDrawing:
     @property
     def progress(self) -> float:
         """How much of it is drawn, 0..1."""
-        passes = len(self._whole.places)
+        passes = self._whole.passes
         begun = self._under_way.pass_index if self._under_way is not None else 0
         return (self._tiles_done * passes + begun) / (len(self._tiles) * passes)
 
@@ -92,7 +91,7 @@ class PictureDrawing:
             target = RenderTarget(
                 self._gl.ctx, [self._gl.ctx.texture(tile.size_px, 4, dtype="f4" if self._is_linear else "f1")]
             )
-            targets = RenderTargets(self._gl.ctx, tile.size_px, TILE_PX)
+            targets = RenderTargets(self._gl.ctx, tile.size_px)
             try:
                 yield from self._draw_tile(tile, targets, target)
             finally:
@@ -111,4 +110,4 @@ class PictureDrawing:
         self._accumulator.finish(accumulation, targets, target.framebuffer, self._is_linear, self._color_space)
         yield
         drawn = target.read(np.float32 if self._is_linear else np.uint8)
-        self.image[tile.kept] = drawn[tile.kept_of_drawn]
+        self.image[tile.rows, tile.columns] = drawn

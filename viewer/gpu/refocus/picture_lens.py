@@ -5,89 +5,77 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
-from iibr_core.rendering import Optics
+from iibr_core.rendering import Optics, aperture_points, open_area
 from iibr_core.scenes import WHOLE, Rect
-from iibr_core.types import SRGB, ColorSpace, GridShape, ViewOffset
+from iibr_core.types import SRGB, ColorSpace, ViewOffset
 from viewer.gpu.light_field_texture import LightFieldTexture
 from viewer.gpu.refocus.frame_budget import BEST_QUALITY, QualityLevel
-from viewer.gpu.refocus.view_sampling import UNMOVED, ApertureSample, aperture_samples
+from viewer.gpu.refocus.view_sampling import (
+    Samples,
+    answered_samples,
+    blended_samples,
+    every_corner,
+    pinhole_samples,
+    pinhole_sources,
+)
 
-FADE_FROM_PX, FADE_TO_PX = 4.0, 6.0
-"""Over these widths of the whole blur, light moves from the sharp layer to those that are smoothed."""
+FIRST_SPACING_PX = 6.5
+"""Blur of the picture, in output pixels, for which its first pass has one more camera."""
 
-LEAST_ACROSS = 2.0
-"""Samples across the aperture, at least, however low the quality."""
+MIN_PASS, MAX_PASS = 4, 12
+"""Least and greatest number of cameras of a pass."""
 
-SPARSE_UP_TO_PX = 1.2
-"""As long as the whole blur of a tile is narrower, every other sample across and down shows the same."""
+CAMERAS_PER_PX = 4.0
+"""Cameras of a finished picture for each output pixel of its widest blur: an edge then turns into a smooth ramp."""
 
-ONE_PASS_UP_TO_PX = 1.75
-"""As long as neighbouring samples are no farther apart, nothing is seen between them."""
+MIN_CAMERAS, MAX_CAMERAS = 64, 144
+"""Least and greatest number of cameras of a finished picture; between views that many blend them smoothly, too."""
 
-PASS_BLUR_PX = 1.5
-"""Elsewhere so many passes are drawn that the samples of all are no farther apart than this."""
+EDGE_PASSES = 5
+"""Passes that make the edges of a warped pinhole view smooth."""
 
-LEAST_PASSES = 4
-"""And no fewer: those of two or three lie in lines."""
+BLEND_POINTS = 1024
+"""Points of the aperture that weigh views without disparity."""
 
-EVERY_PASS = 1e9
-"""More than there are."""
-
-HIGHLIGHT_SPREAD = 2.0
-"""Samples of many passes lie unevenly: beside single bright pixels their gaps show, unless smoothing is wider."""
+BARREL_EDGE = 1 / 16
+"""Width of the edge of a cat's-eye, as a share of the aperture's diameter."""
 
 
 @dataclass(frozen=True)
 class Lens:
     """What the optics mean for one picture. optics: as given; shaders take some of its numbers as they are.
 
-    aperture_share: of the aperture sum in the picture, the rest is the pinhole pass. stride: view steps between
-    samples. dolly: view steps (s, t) by which the ray crosses the grid elsewhere, per picture size. blur_px: output
-    pixels that one px of disparity beside the focus moves from one sample to the next. widest_blur_px: the most that
-    comes to in this field. samples_across: the whole blur in units of blur_px. keeps_layers: whether light is kept
-    apart by defocus and smoothed. most_sources: stored views that a pinhole view is made of. part: what is drawn.
-    color_space: of the field's light.
+    diameter: of the aperture, view steps, 0 for a pinhole. widest: side of the square of views, which cuts it off.
+    dolly: view steps (s, t) by which the ray crosses the grid elsewhere, per picture size. blur_px: width, in output
+    pixels, of the widest blur in this field. level: what is left out. part: what is drawn. field_part: what of the
+    picture the field's views show. color_space: of the field's light.
     """
 
     optics: Optics
-    eye: ViewOffset
     diameter: float
-    stride: int
+    widest: float
     dolly: tuple[float, float]
-    focus_range: float
-    aperture_share: float
     blur_px: float
-    widest_blur_px: float
-    samples_across: float
-    keeps_layers: bool
     highlight_gain: float
-    exposure: float
-    most_sources: int
+    level: QualityLevel
     part: Rect = WHOLE
+    field_part: Rect = WHOLE
     color_space: ColorSpace = SRGB
 
     @property
-    def sharp_up_to_px(self) -> tuple[float, float]:
-        """Blur from one sample to the next at which the sharp layer begins to fade, and at which it is empty."""
-        return min(1.0, FADE_FROM_PX / self.samples_across), min(2.0, FADE_TO_PX / self.samples_across)
-
-    @property
-    def sparse_up_to_px(self) -> float:
-        """See SPARSE_UP_TO_PX, as blur from one sample to the next."""
-        return SPARSE_UP_TO_PX / self.samples_across
-
-    @property
-    def smoothing_spread(self) -> float:
-        """How wide smoothing is, as a share of what lies between samples of one pass."""
-        return HIGHLIGHT_SPREAD if self.highlight_gain > 0 else 1.0
+    def eye(self) -> ViewOffset:
+        """Viewpoint in view steps."""
+        return self.optics.eye
 
     @property
     def has_dolly(self) -> bool:
         """Whether rays of different pixels cross the grid at different places."""
         return self.dolly != (0.0, 0.0)
+
+    @property
+    def exposure(self) -> float:
+        """Factor on light."""
+        return float(2.0**self.optics.exposure_stops)
 
     def barrel(self, aspect: float) -> tuple[float, float, float]:
         """How far the barrel's opening moves across the picture (s, t), and its radius, view steps. aspect: H / W."""
@@ -95,78 +83,90 @@ class Lens:
         across = 2 * self.optics.aperture_shape.cat_eye * radius / math.hypot(1.0, aspect)
         return across, across * aspect, radius
 
-    def eye_at(self, u: float, v: float) -> ViewOffset:
-        """Where the ray of the pixel at texture coordinates (u, v) crosses the grid."""
-        return ViewOffset(self.eye.t + self.dolly[1] * (v - 0.5), self.eye.s + self.dolly[0] * (u - 0.5))
+    @property
+    def cameras_per_pass(self) -> int:
+        """Number of cameras of a pass through an aperture, at this quality."""
+        best = min(max(math.ceil(self.blur_px / FIRST_SPACING_PX), MIN_PASS), MAX_PASS)
+        return max(round(best * self.level.cameras), 1)
 
-    def samples(
-        self,
-        grid: GridShape,
-        present: NDArray[np.bool_],
-        moved: ViewOffset = UNMOVED,
-        coarser: int = 1,
-        is_smoothed: bool = True,
-    ) -> list[ApertureSample]:
-        """Points of the lens and who answers; moved: the lattice; coarser: every how many of them.
+    @property
+    def passes_through_aperture(self) -> int:
+        """Number of passes until the most blurred surface is smooth."""
+        if self.level != BEST_QUALITY:
+            return 1
+        cameras = min(max(CAMERAS_PER_PX * self.blur_px, MIN_CAMERAS), MAX_CAMERAS)
+        return math.ceil(cameras / self.cameras_per_pass)
 
-        is_smoothed: whether these are to leave room for the smoothing, if there is any.
+    def pass_count(self, field: LightFieldTexture) -> int:
+        """Number of passes until the most blurred surface and all edges are smooth."""
+        is_warped = bool(field.has_disparity.any())
+        if not (is_warped or self.has_dolly):
+            return 1
+        if self.diameter > 0:
+            return self.passes_through_aperture
+        is_moved = self.has_dolly or not is_stored(self.eye, field)
+        return EDGE_PASSES if self.level == BEST_QUALITY and is_moved else 1
+
+    def samples(self, field: LightFieldTexture, pass_index: int) -> Samples:
+        """The cameras of a pass, and which views answer them. field: has views."""
+        grid, present = field.grid, field.present
+        if self.diameter == 0 and self.has_dolly:
+            return every_corner()
+        if self.diameter == 0:
+            return pinhole_samples(pinhole_sources(self.eye, grid, present)[: self.level.sources])
+        is_blend = not (field.has_disparity.any() or self.has_dolly)
+        count = BLEND_POINTS if is_blend else self.cameras_per_pass
+        cell = 0.0 if is_blend else self.cell(pass_index)
+        points = aperture_points(self.optics.aperture_shape, self.diameter, self.widest, count, pass_index, cell)
+        if is_blend:
+            return blended_samples(points, self.eye, grid, present)
+        return answered_samples(points, pass_index * count, self.eye, grid, present)
+
+    def cell(self, pass_index: int) -> float:
+        """Side, in view steps, of the square of the aperture that each camera of a pass stands for: among those of the
+        first pass, which is shown alone, or among all.
         """
-        stride, leaves_room = self.stride * coarser, is_smoothed and self.keeps_layers
-        return aperture_samples(
-            self.eye, self.diameter, grid, present, self.optics.aperture_shape, stride, moved, leaves_room
-        )
+        if self.diameter == 0:
+            return 0.0
+        passes = self.passes_through_aperture if pass_index > 0 else 1
+        area = open_area(self.optics.aperture_shape, self.diameter, self.widest)
+        return math.sqrt(area / (self.cameras_per_pass * passes))
 
-
-def passes_for(blur_px: float) -> int:
-    """In how many passes a tile is drawn, by the blur from one sample to the next: see shaders/widen_tiles.frag."""
-    return 1 if blur_px <= ONE_PASS_UP_TO_PX else max(math.ceil((blur_px / PASS_BLUR_PX) ** 2), LEAST_PASSES)
-
-
-def pass_limits(finishes_tiles: bool) -> dict[str, float]:
-    """The numbers of `passes_for`, as that shader names them; or such that every tile gets every pass."""
-    if not finishes_tiles:
-        return {"one_pass_up_to_px": -1.0, "pass_blur_px": PASS_BLUR_PX, "least_passes": EVERY_PASS}
-    return {"one_pass_up_to_px": ONE_PASS_UP_TO_PX, "pass_blur_px": PASS_BLUR_PX, "least_passes": float(LEAST_PASSES)}
+    def sample_count(self, field: LightFieldTexture) -> int:
+        """Number of samples of a pass."""
+        return len(self.samples(field, 0)) if field.present.any() else 0
 
 
 def lens_of(
-    optics: Optics, field: LightFieldTexture, width_px: int, prefilter: bool, level: QualityLevel = BEST_QUALITY
+    optics: Optics,
+    field: LightFieldTexture,
+    width_px: int,
+    level: QualityLevel = BEST_QUALITY,
+    widest: float | None = None,
 ) -> Lens:
-    """The lens for a picture of that width."""
+    """The lens for a picture of that width. widest: see `Lens`; the grid's side by default."""
     diameter = max(optics.aperture_diameter, 0.0)
-    stride = min(level.stride, max(int(diameter / LEAST_ACROSS), 1))
-    step = max(min(diameter, float(stride)), 1e-6)
-    blur_px = step * width_px / field.width if diameter > 0 else 0.0
-    samples_across = max(min(diameter, float(max(field.grid))) / step, 1.0)
-    # Layers pay where something is blurred: from one sample to the next, or in all by more than the sharp layer holds.
-    beside = _most_beside_focus(optics, field.range_px)
-    knows_depth = bool(field.has_disparity[field.present].all())
-    keeps = prefilter and knows_depth and max(blur_px, blur_px * samples_across / FADE_FROM_PX) * beside > 1.0
+    widest = float(max(field.grid)) if widest is None else widest
     return Lens(
         optics=optics,
-        eye=optics.eye,
         diameter=diameter,
-        stride=stride,
+        widest=widest,
         dolly=(-2.0 * optics.dolly, -2.0 * optics.dolly * field.height / field.width),
-        focus_range=max(optics.focus_range, 0.0),
-        aperture_share=aperture_share_of(diameter),
-        blur_px=blur_px,
-        widest_blur_px=blur_px * beside,
-        samples_across=samples_across,
-        keeps_layers=keeps,
+        blur_px=min(diameter, widest) * _most_beside_focus(optics, field.range_px) * width_px / field.width,
         highlight_gain=optics.highlight_gain(diameter, field.hdr),
-        exposure=2.0**optics.exposure_stops,
-        most_sources=level.sources,
+        level=level,
         color_space=field.color_space,
     )
+
+
+def is_stored(eye: ViewOffset, field: LightFieldTexture) -> bool:
+    """Whether a view that is there lies at this viewpoint."""
+    row, column = float(eye.t + field.grid.centre[0]), float(eye.s + field.grid.centre[1])
+    is_on_grid = 0 <= row < field.grid.rows and 0 <= column < field.grid.columns
+    return is_on_grid and row.is_integer() and column.is_integer() and bool(field.present[int(row), int(column)])
 
 
 def _most_beside_focus(optics: Optics, range_px: tuple[float, float]) -> float:
     tilt = sum(map(abs, optics.focus_tilt))
     farthest = max(abs(edge - optics.focus_disparity) for edge in range_px) + tilt
     return max(farthest - max(optics.focus_range, 0.0), 0.0)
-
-
-def aperture_share_of(diameter: float) -> float:
-    """How much of a picture is the sum over an aperture of so many view steps; the rest is the pinhole's."""
-    return min(max(diameter - 1.0, 0.0), 1.0)

@@ -14,22 +14,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.exports import RenderSettings
+from iibr_core.exports import LensTile, RenderSettings
 from iibr_core.rendering import Optics
 from iibr_core.scenes import WHOLE, Rect, ScreenSize
 from iibr_core.types import SRGB, ColorSpace, FloatImage, GridShape, StoredColors, ViewUpdate
 from viewer.gpu.context import GLContext
 from viewer.gpu.light_field_texture import Box, LightFieldTexture, field_that_fits
 from viewer.gpu.programs import ProgramCache
-from viewer.gpu.refocus.accumulation import (
-    MAX_PASSES,
-    Accumulator,
-    ProgressiveAccumulation,
-    is_stored,
-    pass_count,
-    r2_sequence,
-)
-from viewer.gpu.refocus.error_estimate import ErrorEstimate
+from viewer.gpu.refocus.accumulation import Accumulator, ProgressiveAccumulation
 from viewer.gpu.refocus.frame_budget import (
     BEST_QUALITY,
     QUALITY_LEVELS,
@@ -53,28 +45,23 @@ PREPARED_SIZE = ScreenSize(48, 48)
 """
 PREPARED_PASSES = 2
 """Those that follow take the same programs."""
-JUDGED_EVERY = 3
-"""The pixels, both ways, that tell how far a picture is from the converged one: all of them would take a frame."""
 
 
 class Renderer:
     """Draws one light field at a time. Call it only from the thread its context belongs to.
 
-    prefilter: smooth what lies between sparse samples; off, it shows them as separate copies. adaptive: tiles take few
-    samples where all is sharp, and skip searches that find nothing. report: what is known of the picture drawn last.
-    passes_shown: how many passes of the best picture what is shown is made of; 0: it is softer than that. field: None
-    before the first. note: what of it had to be left out, a sentence for people.
+    report: what is known of the picture drawn last. passes_shown: how many passes of the best picture what is shown is
+    made of; 0: it is softer than that. field: None before the first. note: what of it had to be left out, a sentence
+    for people.
     """
 
     def __init__(self, gl: GLContext) -> None:
         self.gl = gl
         self.ctx = gl.ctx
-        self.prefilter = True
         self.report = DrawReport()
         self.passes_shown = 0
         self.programs = ProgramCache(self.ctx)
         self._accumulator = Accumulator(self.ctx, self.programs)
-        self.adaptive = True
         self.field: LightFieldTexture | None = None
         self.note = ""
         self._fallback_view: LightFieldTexture | None = None
@@ -84,16 +71,6 @@ class Renderer:
         self._frame_time = FrameTimeModel(gl.seconds_per_fetch)
         self._refining_s = 4 * gl.seconds_per_fetch
         self._level = 0
-        self._errors = ErrorEstimate()
-
-    @property
-    def adaptive(self) -> bool:
-        """Whether tiles leave out samples and searches that they have no use for."""
-        return self._accumulator.passes.adaptive
-
-    @adaptive.setter
-    def adaptive(self, is_on: bool) -> None:
-        self._accumulator.passes.adaptive = is_on
 
     @property
     def drawn_field(self) -> LightFieldTexture:
@@ -174,7 +151,6 @@ class Renderer:
         self._accumulation, self._shown_from_pass = self._accumulation_of(optics, size_px, level, part), 0
         self._draw(math.inf, passes=1)
         self._finish()
-        self._errors.begin(level)
 
     def render_in_time(
         self,
@@ -212,19 +188,16 @@ class Renderer:
         come in between are seen in the passes that follow, so that they do not keep the new one from being shown.
         """
         self._accumulation = self._accumulation_of(optics, size_px, BEST_QUALITY, part)
-        self._shown_from_pass = min(self.passes_shown, len(self._accumulation.places))
-        self._errors.begin(BEST_QUALITY)
+        self._shown_from_pass = min(self.passes_shown, self._accumulation.passes)
 
     def refine(self, budget_s: float = math.inf) -> None:
         """Draw more samples of the same picture, for about that long; the image changes after each pass."""
         if self.is_converged:
             return
         accumulation = self._current()
-        if self._errors.is_new and not self.is_renewing:
-            self._errors.add(self.read_image(JUDGED_EVERY), 0)
         start = time.perf_counter()
         pass_before, done_before, programs_before = accumulation.pass_index, accumulation.done, len(self.programs)
-        self._draw(budget_s, passes=len(accumulation.places))
+        self._draw(budget_s, passes=accumulation.passes)
         if accumulation.pass_index > pass_before and not self.is_renewing:
             self._finish()
         self.ctx.finish()
@@ -233,26 +206,44 @@ class Renderer:
             self._refining_s = seconds / max(accumulation.done - done_before, 1) / math.prod(accumulation.size_px)
         if self.is_renewing:
             return
-        if accumulation.pass_index > pass_before and (
-            accumulation.is_complete or math.log2(accumulation.pass_index).is_integer()
-        ):
-            self._errors.add(self.read_image(JUDGED_EVERY), accumulation.pass_index)
         self._learn(accumulation.done, seconds)
 
     def start_picture(
-        self, settings: RenderSettings, field: LightFieldTexture | None = None, most_passes: int = MAX_PASSES
+        self, settings: RenderSettings, field: LightFieldTexture | None = None, most_passes: int | None = None
     ) -> PictureDrawing:
         """A picture with every sample it will get, to be drawn step by step, and stopped once it is no longer wanted.
 
         What was drawn last stays as it is. field: it is drawn from, by default what the screen shows. most_passes: else
         it is left as it is by then.
         """
+        if settings.tile is not None:
+            return self._start_tile(settings, settings.tile)
         field = self.drawn_field if field is None else field
         accumulator = Accumulator(self.ctx, self.programs)
-        accumulator.passes.adaptive = self.adaptive
         whole = self._accumulation_of(settings.optics, settings.size_px, BEST_QUALITY, settings.part, field)
-        whole.places = whole.places[:most_passes]
+        if most_passes is not None:
+            whole.passes = min(whole.passes, most_passes)
         return PictureDrawing(self.gl, accumulator, field, whole, settings.is_linear, settings.color_space)
+
+    def _start_tile(self, settings: RenderSettings, tile: LensTile) -> PictureDrawing:
+        """A picture of the tile's own views, which nothing else shows."""
+        height, width = tile.views[0].colors.shape[:2]
+        field = LightFieldTexture(self.ctx, tile.grid, width, height, hdr=True, with_disparity=True)
+        field.color_space = settings.color_space
+        for view in tile.views:
+            field.upload(view.row, view.column, view.colors, view.disparity)
+        whole_width_px = settings.size_px.width / settings.part.width
+        lens = replace(
+            lens_of(settings.optics, field, round(whole_width_px * tile.window.width), widest=math.inf),
+            highlight_gain=tile.highlight_gain,
+            part=settings.part,
+            field_part=tile.window,
+        )
+        whole = ProgressiveAccumulation(lens, settings.size_px, lens.pass_count(field))
+        accumulator = Accumulator(self.ctx, self.programs)
+        drawing = PictureDrawing(self.gl, accumulator, field, whole, settings.is_linear, settings.color_space)
+        field.release()
+        return drawing
 
     def converged_picture(self, settings: RenderSettings) -> NDArray[Any]:
         """The picture of `start_picture`, at once."""
@@ -293,24 +284,19 @@ class Renderer:
     def samples_converged(self) -> int:
         """How many the converged picture is made of, about."""
         accumulation, field = self._current(), self.drawn_field
-        per_pass = 1
-        if accumulation.lens.aperture_share > 0 and field.present.any():
-            per_pass = len(accumulation.lens.samples(field.grid, field.present))
-        return accumulation.done if self.is_converged else max(per_pass * len(accumulation.places), accumulation.done)
+        in_all = accumulation.lens.sample_count(field) * accumulation.passes
+        return accumulation.done if self.is_converged else max(in_all, accumulation.done)
 
     @property
     def image_texture(self) -> int:
         """GL name of the renderer's own image (RGBA8, rows bottom-up). Another picture may change it."""
         return self._screen.shown.image.textures[0].glo
 
-    def read_image(self, every: int = 1) -> NDArray[np.uint8]:
-        """The picture as (H, W, 3) uint8, sRGB-encoded, row 0 at the top; stretched where it was drawn smaller.
-
-        every: see `stretch_image`.
-        """
+    def read_image(self) -> NDArray[np.uint8]:
+        """The picture as (H, W, 3) uint8, sRGB-encoded, row 0 at the top; stretched where it was drawn smaller."""
         image, drawn_px = self._screen.read(), self._screen.shown.size_px
         size_px = self._accumulation.size_px if self._accumulation else drawn_px
-        return image[::every, ::every] if drawn_px == size_px else stretch_image(image, size_px, every)
+        return image if drawn_px == size_px else stretch_image(image, size_px)
 
     def read_pixel(self, u: float, v: float) -> tuple[int, int, int]:
         """The picture at texture coordinates (0..1, row 0 at the top), sRGB bytes."""
@@ -339,9 +325,8 @@ class Renderer:
     ) -> ProgressiveAccumulation:
         field = self.drawn_field if field is None else field
         whole_width_px = round(size_px[0] / part.width)
-        lens = replace(lens_of(optics, field, whole_width_px, self.prefilter, level), part=part)
-        count = pass_count(lens, field) if level == BEST_QUALITY and field.present.any() else 1
-        return ProgressiveAccumulation(lens, size_px, tuple(r2_sequence(count)))
+        lens = replace(lens_of(optics, field, whole_width_px, level), part=part)
+        return ProgressiveAccumulation(lens, size_px, lens.pass_count(field))
 
     def _draw(self, budget_s: float, passes: int) -> None:
         accumulation = self._current()
@@ -357,17 +342,13 @@ class Renderer:
 
     def _work(self, optics: Optics, size_px: ScreenSize, part: Rect, level: QualityLevel) -> DrawCost:
         field = self.drawn_field
-        lens = lens_of(optics, field, round(size_px[0] / part.width * level.scale), self.prefilter, level)
-        samples = lens.samples(field.grid, field.present) if lens.aperture_share > 0 and field.present.any() else []
+        lens = lens_of(optics, field, round(size_px[0] / part.width * level.scale), level)
         return DrawCost(
-            samples=len(samples),
-            sources=min(lens.most_sources, int(field.present.sum())) if lens.aperture_share < 1 else 0,
-            has_reprojection=lens.has_dolly or lens.focus_range > 0 or not field.present.all(),
-            keeps_layers=lens.keeps_layers,
+            samples=lens.sample_count(field),
+            warps=bool(field.has_disparity.any()),
             pixels=math.prod(scale_size(size_px, level.scale)),
-            searches=lens.has_dolly or not is_stored(lens.eye, field),
         )
 
     def _learn(self, samples: int, seconds: float) -> None:
         in_all = max(self.samples_converged, samples)
-        self.report = DrawReport(samples, in_all, 1e3 * seconds, self._errors.estimate)
+        self.report = DrawReport(samples, in_all, 1e3 * seconds)

@@ -7,7 +7,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.scenes import ScreenSize
-from viewer.gpu.refocus.passes import TILE_PX
 from viewer.gpu.render_targets import RenderTargets
 
 KEPT_SIZES = 2
@@ -24,7 +23,7 @@ class ScreenImage:
 
     def targets_of(self, size_px: ScreenSize) -> RenderTargets:
         """Those of this size; beside them only the ones that were asked for last are kept."""
-        targets = self._targets.pop(size_px, None) or RenderTargets(self._ctx, size_px, TILE_PX)
+        targets = self._targets.pop(size_px, None) or RenderTargets(self._ctx, size_px)
         while len(self._targets) >= KEPT_SIZES:
             oldest = self._targets.pop(next(iter(self._targets)))
             self._shown = None if self._shown is oldest else self._shown

@@ -1,27 +1,25 @@
-"""Which stored views a picture is made of, and with what weights. Plain arrays, no GL; offsets in view steps (t, s).
+"""Which stored views answer the cameras of a picture, and with what weights. Plain arrays, no GL; offsets in view steps
+(t, s).
 
 Weights change smoothly with the eye and the aperture, so that nothing jumps while the user drags.
 """
 
 from __future__ import annotations
 
-import math
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.rendering import ApertureShape, openness
+from iibr_core.rendering import SQRT_STEPS, Points, fractions, grid_weights
 from iibr_core.scenes import clamp_to_grid
 from iibr_core.types import GridShape, ViewOffset
-from viewer.gpu.refocus.aperture_moments import scale_of
 
 MAX_SOURCES = 4
-DISC = ApertureShape()
-UNMOVED = ViewOffset(0.0, 0.0)
-LEAST_WEIGHT = 2e-4
-"""A sample that counts for less is not worth its drawing: it changes white by a twentieth of an 8-bit step."""
+MIN_WEIGHT = 2e-4
+"""Least weight of a view that is drawn: a lighter one changes white by a twentieth of an 8-bit step."""
 
 
 class WeightedView(NamedTuple):
@@ -32,17 +30,29 @@ class WeightedView(NamedTuple):
     weight: float
 
 
-class ApertureSample(NamedTuple):
-    """A view that the aperture asks for, at `wanted`, and the stored one that answers: itself where it is present."""
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """Cameras of a picture, each with the stored view that answers it.
 
-    wanted: ViewOffset
-    row: int
-    column: int
-    weight: float
+    cameras: (N, 2) offsets (t, s) from the eye. views: (N, 2) row and column. weights: (N,), their sum is 1.
+    """
+
+    cameras: Points
+    views: NDArray[np.intp]
+    weights: NDArray[np.float64]
+
+    def __len__(self) -> int:
+        """Return the number of cameras."""
+        return len(self.weights)
+
+    def part(self, first: int, last: int) -> Samples:
+        """Those from number `first` up to, but without, number `last`."""
+        span = slice(first, last)
+        return Samples(self.cameras[span], self.views[span], self.weights[span])
 
 
 def pinhole_sources(eye: ViewOffset, grid: GridShape, present: NDArray[np.bool_]) -> list[WeightedView]:
-    """Up to four views around the eye, nearest first: bilinear where the four corners of its cell are present.
+    """Up to four views around the eye, nearest first: the corners of its cell, where all are present.
 
     Elsewhere the nearest ones, weighted by reciprocal distance less that of the next view left out: continuous in the
     eye, and a stored view's own place belongs to it alone. present: (V, U) bool; empty if none is.
@@ -50,18 +60,18 @@ def pinhole_sources(eye: ViewOffset, grid: GridShape, present: NDArray[np.bool_]
     return _cell_corners(eye, grid, present) or _nearest_present(eye, grid, present)
 
 
-def pinhole_weights(sources: list[WeightedView], eyes: list[ViewOffset], grid: GridShape) -> NDArray[np.float64]:
-    """(sources, eyes): bilinear weights for other eyes in the same cell; where the sources are no cell's, as given."""
-    rows, columns = {source.row for source in sources}, {source.column for source in sources}
-    if max(rows) - min(rows) > 1 or max(columns) - min(columns) > 1 or len(sources) != len(rows) * len(columns):
-        return np.repeat([[source.weight] for source in sources], len(eyes), axis=1)
-    inside = [clamp_to_grid(eye, grid) for eye in eyes]
-    v, u = (np.array([eye[axis] + grid.centre[axis] for eye in inside]) for axis in (0, 1))
-    weights = np.ones((len(sources), len(eyes)))
-    for i, source in enumerate(sources):
-        weights[i] *= 1 - np.abs(source.row - v) if len(rows) > 1 else 1.0
-        weights[i] *= 1 - np.abs(source.column - u) if len(columns) > 1 else 1.0
-    return weights
+def pinhole_samples(sources: list[WeightedView]) -> Samples:
+    """The camera at the eye, answered by each of these views."""
+    views = np.array([(source.row, source.column) for source in sources], np.intp)
+    weights = np.array([source.weight for source in sources])
+    return Samples(np.zeros((len(sources), 2)), views, weights / weights.sum())
+
+
+def every_corner() -> Samples:
+    """A camera at the eye for each corner of a cell: with dolly, each pixel's ray tells which cell, and the weights."""
+    return Samples(
+        np.zeros((MAX_SOURCES, 2)), np.zeros((MAX_SOURCES, 2), np.intp), np.full(MAX_SOURCES, 1 / MAX_SOURCES)
+    )
 
 
 def _cell_corners(eye: ViewOffset, grid: GridShape, present: NDArray[np.bool_]) -> list[WeightedView]:
@@ -76,8 +86,8 @@ def _cell_corners(eye: ViewOffset, grid: GridShape, present: NDArray[np.bool_]) 
 
 def _bracket(index: float, count: int) -> list[tuple[int, float]]:
     low = min(int(index), max(count - 2, 0))
-    fraction = index - low
-    return [(low, 1 - fraction), (min(low + 1, count - 1), fraction)]
+    share = index - low
+    return [(low, 1 - share), (min(low + 1, count - 1), share)]
 
 
 def _nearest_present(eye: ViewOffset, grid: GridShape, present: NDArray[np.bool_]) -> list[WeightedView]:
@@ -95,52 +105,34 @@ def _nearest_present(eye: ViewOffset, grid: GridShape, present: NDArray[np.bool_
     return [WeightedView(int(rows[i]), int(columns[i]), float(w)) for i, w in zip(order, weights) if w > 1e-5]
 
 
-def aperture_samples(
-    eye: ViewOffset,
-    diameter: float,
-    grid: GridShape,
-    present: NDArray[np.bool_],
-    shape: ApertureShape = DISC,
-    stride: int = 1,
-    moved: ViewOffset = UNMOVED,
-    is_smoothed: bool = False,
-) -> list[ApertureSample]:
-    """Places of a square lattice inside the aperture around the eye. present: (V, U) bool, not all False.
+def answered_samples(
+    points: Points, first: int, eye: ViewOffset, grid: GridShape, present: NDArray[np.bool_]
+) -> Samples:
+    """Cameras at these points (N, 2) of the lens, of equal weight, each answered by a corner of its cell of the grid.
 
-    diameter: view steps, at least 1; beyond the grid's own it is cut to a square. stride: view steps between places,
-    each weighted by what the aperture leaves of its square. moved: where the lattice lies, (0, 0) = on the stored
-    views, those of the centre view's row and column among them. What lies off the grid is answered by its border.
-    is_smoothed: whether what is drawn will be spread over what lies between places. With or without, it blurs as wide
-    as the aperture asks for: see `aperture_moments`.
+    Which corner is chosen by a sequence, in the shares that `pinhole_sources` would give: so all cameras together
+    blend views as a pinhole does. first: number of the first point in the sequence. present: (V, U) bool, some True.
     """
-    width, widest = min(float(stride), diameter), float(max(grid))
-    place = math.remainder(moved.t - eye.t, stride), math.remainder(moved.s - eye.s, stride)
-    scale = scale_of(shape, place, diameter, widest, stride, is_smoothed)
-    diameter, widest = scale * diameter, scale * widest
-    reach = min(diameter, widest) / 2 + stride
-    # The lattice around the eye, one place beyond the opening: soft edges reach there.
-    t, s = np.meshgrid(*(_lattice(middle, reach, stride, start) for middle, start in zip(eye, moved)), indexing="ij")
-    weights = openness(shape, t - eye.t, s - eye.s, diameter, widest, width)
-    if weights.sum() <= 0:  # a mask's hole, or one smaller than the samples
-        weights = (np.hypot(t - eye.t, s - eye.s) == np.hypot(t - eye.t, s - eye.s).min()).astype(float)
-    chosen = weights > LEAST_WEIGHT * weights.sum()
-    weights /= weights[chosen].sum()
-    fallback_view = nearest_present(present)
-    return [
-        ApertureSample(wanted, *_fallback_view(wanted, grid, fallback_view), weight)
-        for wanted, weight in zip(map(ViewOffset, t[chosen].tolist(), s[chosen].tolist()), weights[chosen].tolist())
-    ]
+    places = np.array(eye) + np.array(grid.centre) + points
+    last = np.array(grid) - 1
+    inside = np.clip(places, 0, last)
+    cell = np.floor(inside)
+    chosen = cell + (fractions(first, len(points), SQRT_STEPS[:2]) < inside - cell)
+    rows, columns = np.minimum(chosen, last).astype(np.intp).T
+    return Samples(points, nearest_present(present)[rows, columns], np.full(len(points), 1 / len(points)))
 
 
-def _lattice(middle: float, reach: float, stride: int, start: float) -> NDArray[np.float64]:
-    first, last = math.ceil((middle - reach - start) / stride), math.floor((middle + reach - start) / stride)
-    return start + stride * np.arange(first, last + 1, dtype=float)
+def blended_samples(points: Points, eye: ViewOffset, grid: GridShape, present: NDArray[np.bool_]) -> Samples:
+    """The stored views themselves in place of cameras at these points, each weighted by what the points ask of it.
 
-
-def _fallback_view(wanted: ViewOffset, grid: GridShape, fallback_view: NDArray[np.intp]) -> tuple[int, int]:
-    row = min(max(math.floor(wanted.t + 0.5) + grid.centre[0], 0), grid.rows - 1)
-    column = min(max(math.floor(wanted.s + 0.5) + grid.centre[1], 0), grid.columns - 1)
-    return int(fallback_view[row, column, 0]), int(fallback_view[row, column, 1])
+    For views without disparity, which cannot be warped. Arguments: see `answered_samples`.
+    """
+    weights = np.zeros(tuple(grid))
+    np.add.at(weights, tuple(np.moveaxis(nearest_present(present), -1, 0)), grid_weights(points, eye, grid))
+    views = np.argwhere(weights > MIN_WEIGHT * weights.sum())
+    kept = weights[tuple(views.T)]
+    cameras = views - np.array(grid.centre) - np.array(eye)
+    return Samples(cameras.astype(np.float64), views, kept / kept.sum())
 
 
 def nearest_present(present: NDArray[np.bool_]) -> NDArray[np.intp]:

@@ -61,14 +61,12 @@ class FinishedField:
 class DrawReport:
     """What is known of the picture drawn last.
 
-    samples: drawn so far, of samples_converged. draw_ms: what the last drawing took. error: estimated root mean square
-    difference to the converged picture, 1 = white; None where it is not known.
+    samples: drawn so far, of samples_converged. draw_ms: what the last drawing took.
     """
 
     samples: int = 0
     samples_converged: int = 0
     draw_ms: float = 0.0
-    error: float | None = None
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,104 @@
+#version 330 core
+// The picture: the mean, in linear light, of what pinhole cameras spread over the aperture see, sheared to the focus.
+// Each camera is answered by one stored view, warped by that view's own disparity. A pinhole is a lens with one camera,
+// which up to four views answer.
+// WARP: some views have disparity. NEAR: all answering views are near their cameras. DOLLY: the rays of different pixels
+// cross the grid at different places.
+#include "first_hit.glsl"
+#include "gloss.glsl"
+
+const int MAX_SAMPLES = 256;
+
+layout(std140) uniform Samples {
+    vec4 cameras[MAX_SAMPLES];  // xy: (s, t) from the eye, view steps; zw: where in its pixel a camera looks
+    vec4 answers[MAX_SAMPLES];  // xy: (s, t) from the camera to the stored view; DOLLY: thresholds that choose a
+                                // corner of the cell, or with z = 1 the corner itself
+    vec4 numbers[MAX_SAMPLES];  // x: layer; y: 1 = has disparity; z: weight
+};
+uniform int sample_count;
+uniform vec4 field_part;      // of the picture that the views show: left, top, width, height
+uniform float cell_views;     // side of the square of the aperture that a camera stands for, view steps
+uniform vec2 pixel_uv;        // size of a pixel, texture coordinates of the views
+#ifdef DOLLY
+uniform sampler2D nearest_views;  // by place in the grid: nearest view's (column, row); z: 1 = has disparity; w: layer
+uniform vec2 eye_in_grid;         // (column, row), real
+#endif
+#ifdef CAT_EYE
+uniform vec3 barrel;          // xy: how far its opening moves across the picture, view steps; z: radius
+uniform float barrel_edge;    // view steps over which it closes
+#endif
+
+in vec2 uv;
+out vec4 sum;
+
+struct Answer {
+    vec2 to_view;  // (s, t) from the camera to the stored view
+    float layer;
+    bool has_disparity;
+    float weight;
+};
+
+// The view that answers camera i.
+Answer answer_of(int i) {
+#ifdef DOLLY
+    // A corner of the cell that this pixel's ray crosses: by thresholds, or each corner with its bilinear weight.
+    vec2 last = vec2(textureSize(nearest_views, 0) - 1), wanted = eye_in_grid + dolly * (uv - 0.5) + cameras[i].xy;
+    vec2 inside = clamp(wanted, vec2(0.0), last), cell = min(floor(inside), max(last - 1.0, 0.0)), f = inside - cell;
+    bool is_blend = answers[i].z > 0.5;
+    vec2 corner = is_blend ? answers[i].xy : step(answers[i].xy, f), share = mix(1.0 - f, f, corner);
+    vec4 view = texelFetch(nearest_views, ivec2(min(cell + corner, last)), 0);
+    float weight = numbers[i].z * (is_blend ? max(share.x * share.y, 1e-6) : 1.0);
+    return Answer(view.xy - wanted, view.w, view.z > 0.5, weight);
+#else
+    return Answer(answers[i].xy, numbers[i].x, numbers[i].y > 0.5, numbers[i].z);
+#endif
+}
+
+// The surface that camera i sees. Which one is asked somewhere in the pixel, elsewhere by each camera, so that edges
+// become smooth; the colour is that of the pixel's middle, so that nothing else is blurred.
+Surface surface_seen(int i, Answer answer, float focus) {
+    vec2 in_view = (uv - field_part.xy) / field_part.zw;
+    Ray ray = Ray(in_view, cameras[i].xy / view_size_px, answer.to_view / view_size_px, answer.layer, focus);
+#ifdef WARP
+    vec2 within = cameras[i].zw * pixel_uv;
+    ray.uv += within;
+#ifdef NEAR
+    Surface found = nearby_hit(ray);
+#else
+    Surface found = first_hit(ray);
+#endif
+    found.at -= within;
+    if (answer.has_disparity) return found;
+    ray.uv = in_view;
+#endif
+    return Surface(focus, place_at(ray, focus), false);
+}
+
+// How much of a camera the lens barrel leaves.
+float barrel_share(vec2 camera) {
+#ifdef CAT_EYE
+    return clamp(0.5 + (barrel.z - length(camera - barrel.xy * (uv - 0.5))) / barrel_edge, 1e-6, 1.0);
+#else
+    return 1.0;
+#endif
+}
+
+void main() {
+    float focus = focus_at(uv);
+    sum = vec4(0.0);
+    // At least one camera: a loop that asks first costs software GL a whole turn more.
+    int i = 0;
+    do {
+        Answer answer = answer_of(i);
+        Surface seen = surface_seen(i, answer, focus);
+        float beside = max(abs(seen.disparity - focus) - focus_range, 0.0);
+        vec4 light = light_at(seen.at, answer.layer, cell_views * beside);
+#ifdef GLOSS
+        vec2 ray = eye + dolly * (uv - 0.5) + cameras[i].xy;
+        light.rgb = glossy(light.rgb, seen.at, ray + answer.to_view, light.a, ray);
+#endif
+        // A view that does not see the surface counts only where no other does.
+        float known = in_picture(seen.at) * (seen.is_hidden ? 1e-3 : 1.0);
+        sum += answer.weight * known * barrel_share(cameras[i].xy) * vec4(light.rgb, 1.0);
+    } while (++i < sample_count);
+}

@@ -1,0 +1,81 @@
+"""Views of a photo at its own size, tile by tile, and light made smaller."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy import ndimage
+
+from iibr_core.generation.light_field import ray_set
+from iibr_core.rendering.flying_pixels import without_flying_pixels
+from iibr_core.rendering.large_views import LargePhoto, Part, tiles_of, views_of_tile, whole
+from iibr_core.rendering.photo_rays import rays_of_photo
+from iibr_core.rendering.resized_light import mean_of_areas
+from iibr_core.rendering.view_synthesis import ViewSynthesis
+from iibr_core.types import ImageSize, Photo, ViewOffset, image_size
+from tests.iibr_core.scenes import literal_plan, square_before_wall
+
+OFFSET = ViewOffset(0.6, -1.5)
+
+
+def large(height: int = 96, width: int = 120, foreground: float = 3.0) -> LargePhoto:
+    photo, disparity = square_before_wall(height, width, foreground=foreground)
+    return LargePhoto(photo.pixels, disparity.values)
+
+
+def test_tiles_cover_a_part_once() -> None:
+    part, seen = Part(3, 50, 7, 61), np.zeros((64, 64), int)
+    for tile in tiles_of(part, 20):
+        seen[tile.slices] += 1
+        assert max(tile.size) <= 20
+    assert seen.sum() == seen[part.slices].sum() == seen[part.slices].size
+
+
+@pytest.mark.parametrize("side", [24, 40])
+def test_a_view_in_tiles_is_the_view_made_at_once(side: int) -> None:
+    photo = large()
+    with ViewSynthesis() as synthesis:
+        rays = rays_of_photo(photo.pixels, photo.disparity, 1.5, 0)
+        expected = synthesis.render(rays, OFFSET)
+        seen = np.empty_like(photo.pixels)
+        for tile in tiles_of(whole(photo.size), side):
+            (view,) = views_of_tile(photo, tile, [OFFSET], synthesis)
+            seen[tile.slices] = view.colors
+    colors = without_flying_pixels(rays, OFFSET, expected.colors, expected.disparity, expected.inpainted)
+    # Holes are filled tile by tile; flying pixels beside them depend on that.
+    known = ~ndimage.binary_dilation(expected.occluded, np.ones((3, 3)))
+    assert known.mean() > 0.85
+    assert np.abs(seen - colors)[known].max() < 0.02
+
+
+def test_holes_show_what_the_smaller_light_field_shows() -> None:
+    photo, disparity = square_before_wall(48, 60, foreground=1.5)
+    red = Photo(np.tile(np.float32([0.9, 0.1, 0.1]), (48, 60, 1)), 50.0, "red")
+    plan = literal_plan(photo, disparity, 3)
+    rays, outer = ray_set(photo, disparity, plan)
+    views = dict(outer)
+    # Every inpainted ray is made red: so the larger photo's holes are.
+    rays.arrays.colors[rays.photo_images : len(rays)] = red.pixels
+    large_photo = LargePhoto(*(np.repeat(np.repeat(a, 2, 0), 2, 1) for a in (photo.pixels, 2 * disparity.values)), rays)
+    offset = ViewOffset(-1.0, -1.0)
+    with ViewSynthesis() as synthesis:
+        (view,) = views_of_tile(large_photo, whole(large_photo.size), [offset], synthesis)
+    hole = views[offset].occluded
+    assert hole.sum() > 20
+    shown = view.colors[::2, ::2][hole]
+    assert (np.abs(shown - red.pixels[0, 0]).max(axis=1) < 0.05).mean() > 0.8
+
+
+def test_the_mean_of_areas_is_a_box_filter() -> None:
+    light = np.random.default_rng(0).random((6, 8, 3)).astype(np.float32)
+    expected = light.reshape(3, 2, 4, 2, 3).mean(axis=(1, 3))
+    np.testing.assert_allclose(mean_of_areas(light, ImageSize(3, 4)), expected, rtol=1e-5)
+    assert mean_of_areas(light, image_size(light)) is light
+
+
+def test_the_mean_of_a_part_counts_the_shares_of_its_border() -> None:
+    light = np.random.default_rng(3).random((5, 6, 3), np.float32)
+    fine = light.repeat(4, 0).repeat(4, 1)
+    part = mean_of_areas(light, ImageSize(3, 4), area=(0.5, 1.25, 3.0, 4.0))
+    expected = fine[2:14, 5:21].reshape(3, 4, 4, 4, 3).mean((1, 3))
+    np.testing.assert_allclose(part, expected, rtol=1e-5)
