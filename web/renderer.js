@@ -4,7 +4,7 @@
 
 export const FIRST_SPACING_PX = 6.5, MIN_PASS = 4, MAX_PASS = 12, CAMERAS_PER_PX = 4, MIN_CAMERAS = 64;
 export const MAX_CAMERAS = 144, EDGE_PASSES = 5, BLEND_POINTS = 1024, MIN_WEIGHT = 2e-4;
-export const MAX_SAMPLES = 256, NEAR_PX = 16, OFF_BORDER_PX = 1 / 256;
+export const MAX_SAMPLES = 256, NEAR_PX = 16, ALONE_NEAR_PX = 2, OFF_BORDER_PX = 1 / 256;
 export const GRID_SIDE = 64, EDGE = 1 / GRID_SIDE, COARSENESS_VARIANCE = 1 / 12;
 export const GOLDEN_ANGLE = Math.PI * (3 - Math.sqrt(5));
 export const TURN_STEP = 0.7548776662466927, SHIFT_STEP = 0.5698402909980532;
@@ -77,7 +77,7 @@ export function aperturePoints(diameter, widest, count, passIndex, cell = 0) {
 // ---- Which stored views answer the cameras: plain numbers, see view_sampling.py. field: { rows, columns, width,
 // height, range, hasDisparity, step, layers }; step: between views that are there, in view steps, the middle one among
 // them; layers: theirs, by "t,s". Samples are { t, s, view, weight }: a camera's place from the eye, the view that
-// answers it, and how much it counts, all together 1.
+// answers it, and how much it counts.
 
 // The first and the last offset along an axis of so many views, of those that are there.
 const ends = (count, step) => [-(count >> 1), count - 1 - (count >> 1)].map((end) => Math.trunc(end / step) * step);
@@ -108,7 +108,7 @@ export function answeredSamples(points, first, eye, { rows, columns, step }) {
     return points.map(({ t, s }, i) => {
         const row = chosen(bracket(eye.t + t, rows, step), fraction(first + i, SQRT_STEPS[0]));
         const column = chosen(bracket(eye.s + s, columns, step), fraction(first + i, SQRT_STEPS[1]));
-        return { t, s, view: { t: row, s: column }, weight: 1 / points.length };
+        return { t, s, view: { t: row, s: column }, weight: 1 };
     });
 }
 
@@ -354,8 +354,12 @@ export class Renderer {
     drawLens(samples) {
         const { gl, field, picture: { lens, part, width, height, target, pass } } = this;
         const { hasDisparity, range: [farthest, nearest] } = field;
-        const isNear = samples.every(({ t, s, view }) =>
-            Math.hypot(view.t - lens.eye.t - t, view.s - lens.eye.s - s) * (nearest - farthest) <= NEAR_PX);
+        const mostPx = field.layers.size > 1 ? NEAR_PX : ALONE_NEAR_PX;
+        const isNear = samples.every(({ t, s, view }) => {
+            const [dt, ds] = [view.t - lens.eye.t - t, view.s - lens.eye.s - s];
+            const isInCell = Math.max(Math.abs(dt), Math.abs(ds)) <= field.step;
+            return isInCell && Math.hypot(dt, ds) * (nearest - farthest) <= mostPx;
+        });
         this.draw("lens.frag", [hasDisparity && "WARP", hasDisparity && isNear && "NEAR"], target, {
             sample_count: samples.length, cell_views: cellOf(lens, pass), view_size_px: [field.width, field.height],
             pixel_uv: [part.width / width, part.height / height], farthest, nearest, focus_disparity: lens.focus,

@@ -31,12 +31,22 @@ float disparity_at(vec2 at, float layer) {
     return textureLod(disparities, vec3(at, layer), 0.0).r;
 }
 
+// Pixels at a depth edge mix both sides. Background shown apart from its foreground must not carry that seam along: it is
+// read a little farther from the edge. seam: 2 px along the parallax, or all of it, in texture coordinates.
+vec2 clear_of_seam(vec2 at, float layer, float disparity, float edge_height, vec2 seam) {
+    bool covered_after = disparity_at(at + seam, layer) > disparity + edge_height;
+    bool covered_before = disparity_at(at - seam, layer) > disparity + edge_height;
+    return at + seam * (float(covered_before) - float(covered_after));
+}
+
 // A ray march from the nearest disparity to the farthest. A step over a depth edge is no surface (accepting it stretches
 // the foreground like a rubber sheet): the search goes on behind it, and where it ends there, the camera sees what the
 // view does not.
 Surface first_hit(Ray ray) {
     vec2 edge = place_at(ray, farthest);
-    float parallax_px = length((edge - place_at(ray, nearest)) * view_size_px);
+    vec2 parallax = edge - place_at(ray, nearest);
+    float parallax_px = length(parallax * view_size_px);
+    vec2 seam = parallax * min(1.0, 2.0 / max(parallax_px, 1e-6));
     int steps = int(clamp(ceil(parallax_px), 2.0, MAX_SEARCH_STEPS));
     float stride = (nearest - farthest) / float(steps);  // disparity of one step
     for (int k = 0; k <= steps; k++) {
@@ -54,9 +64,11 @@ Surface first_hit(Ray ray) {
         // One step of the fixed point d = disparity(place_at(d)): sharper than the stride.
         float refined = disparity_at(place_at(ray, seen), ray.layer);
         if (refined < seen - 1.5 * stride) continue;  // beside the edge of a surface, not on it
-        return Surface(refined, place_at(ray, refined), false);
+        vec2 at = clear_of_seam(place_at(ray, refined), ray.layer, refined, 1.5 * stride, seam);
+        return Surface(refined, at, false);
     }
-    return Surface(disparity_at(edge, ray.layer), edge, true);
+    // Nothing found: the background beside the last edge.
+    return Surface(disparity_at(edge - seam, ray.layer), edge - seam, true);
 }
 
 // The same for a view near the camera, a few pixels of parallax away: three steps of the fixed point, from the nearest

@@ -86,10 +86,11 @@ def test_a_picture_at_the_photos_own_size_is_that_of_views_so_large(
     assert bounded_psnr(full, expected) > LEAST_DB
 
 
+@pytest.mark.parametrize("name", ["wide, beside the middle", "tilt", "cat's-eye"])
 def test_tiles_are_as_sharp_as_the_whole(
-    viewers: tuple[HeadlessViewer, HeadlessViewer], monkeypatch: pytest.MonkeyPatch
+    viewers: tuple[HeadlessViewer, HeadlessViewer], monkeypatch: pytest.MonkeyPatch, name: str
 ) -> None:
-    optics = LENSES["wide, beside the middle"]
+    optics = LENSES[name]
     at_once = picture(viewers[0], optics)
     monkeypatch.setattr("iibr_core.exports.full_picture.TILE_PX", 64)
     tiled = picture(viewers[0], optics)

@@ -25,7 +25,7 @@ SIZE = SCENE.width, SCENE.height
 def test_three_steps_find_the_same_surfaces_as_the_whole_search(
     renderer: Renderer, monkeypatch: pytest.MonkeyPatch, optics: Optics
 ) -> None:
-    """Up to a view step away, and 8 px of parallax: only beside an edge they may differ."""
+    """Up to a view step away, and 8 px of parallax: they differ only beside edges, which the whole search avoids."""
     SCENE.fill(renderer, GRID)
     images, programs = [], []
     for near_px in (100.0, 0.0):
@@ -33,8 +33,8 @@ def test_three_steps_find_the_same_surfaces_as_the_whole_search(
         images.append(settled(renderer, optics, SCENE))
         programs.append(len(renderer.programs))
     assert programs[0] < programs[1], "another program has drawn it"
-    assert np.mean(np.abs(images[0].astype(int) - images[1]).max(-1) > 2) < 0.02
-    assert rms(images[0], images[1]) < 0.004
+    assert np.mean(np.abs(images[0].astype(int) - images[1]).max(-1) > 2) < 0.04
+    assert rms(images[0], images[1]) < 0.006
 
 
 def test_a_pass_drawn_in_parts_is_the_same(renderer: Renderer, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -38,7 +38,7 @@ def weights_by_view(sources: list) -> np.ndarray:
 
 def shares_of_views(samples: Samples) -> np.ndarray:
     shares = np.zeros(GRID)
-    np.add.at(shares, tuple(samples.views.T), samples.weights)
+    np.add.at(shares, tuple(samples.views.T), samples.weights / samples.weights.sum())
     return shares
 
 
@@ -87,7 +87,7 @@ def test_a_camera_is_answered_by_a_corner_of_its_cell(eye: ViewOffset, first: in
     points = spread_points(40, 3.0)
     samples = answered_samples(points, first, eye, GRID, FULL)
     assert np.array_equal(samples.cameras, points)
-    assert samples.weights == pytest.approx(np.full(40, 1 / 40))
+    assert samples.weights == pytest.approx(np.ones(40))
     beside = np.clip(np.array(eye) + GRID.centre + points, 0, 4) - samples.views
     assert np.abs(beside).max() < 1 + 1e-9
 

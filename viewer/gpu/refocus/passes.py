@@ -27,6 +27,9 @@ OFF_BORDER_PX = 1 / 256
 NEAR_PX = 16.0
 """Parallax between a camera and its view, at most, up to which three steps find the surface: see first_hit.glsl."""
 
+ALONE_NEAR_PX = 2.0
+"""The same where there is only one view."""
+
 UNITS = {"colors": 0, "disparities": 1, "nearest_views": 2}
 CORNERS = np.array([(0, 0), (1, 1), (1, 0), (0, 1)], np.float32)
 """Corners (s, t) of a cell of the grid: with dolly they answer a pinhole's ray together."""
@@ -118,6 +121,7 @@ class Passes:
         field.colors.use(UNITS["colors"])
         field.disparities.use(UNITS["disparities"])
         far, near = field.range_px
+        aspect = field.height / field.width * lens.field_part.width / lens.field_part.height
         _set_declared(
             program,
             colors=UNITS["colors"],
@@ -130,7 +134,7 @@ class Passes:
             focus_range=max(lens.optics.focus_range, 0.0),
             dolly=lens.dolly,
             highlight_gain=lens.highlight_gain,
-            barrel=lens.barrel(field.height / field.width),
+            barrel=lens.barrel(aspect),
             barrel_edge=max(BARREL_EDGE * lens.diameter, 1e-6),
             part=lens.part,
         )
@@ -175,12 +179,17 @@ def switches(**names: bool) -> tuple[str, ...]:
 
 
 def _are_near(field: LightFieldTexture, lens: Lens, samples: Samples) -> bool:
-    """Whether all cameras are a few pixels of parallax from the views that answer them."""
+    """Whether all cameras are a few pixels of parallax from the views that answer them: corners of their own cells.
+
+    Where a single view stands in for all, what it does not see is shown too: that takes the whole search.
+    """
     if lens.has_dolly:
         return False
     to_views = samples.views - np.array(field.grid.centre) - np.array(lens.eye) - samples.cameras
     parallax_px = np.hypot(*to_views.T) * (field.range_px[1] - field.range_px[0])
-    return bool((parallax_px + np.hypot(*samples.cameras.T) * 2 * lens.optics.focus_range).max() <= NEAR_PX)
+    most_px = NEAR_PX if field.present.sum() > 1 else ALONE_NEAR_PX
+    is_in_cell = bool(np.abs(to_views).max() <= 1)
+    return is_in_cell and (parallax_px + np.hypot(*samples.cameras.T) * 2 * lens.optics.focus_range).max() <= most_px
 
 
 def _layers(field: LightFieldTexture, views: NDArray[np.intp]) -> NDArray[np.float32]:

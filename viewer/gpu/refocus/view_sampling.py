@@ -34,7 +34,8 @@ class WeightedView(NamedTuple):
 class Samples:
     """Cameras of a picture, each with the stored view that answers it.
 
-    cameras: (N, 2) offsets (t, s) from the eye. views: (N, 2) row and column. weights: (N,), their sum is 1.
+    cameras: (N, 2) offsets (t, s) from the eye. views: (N, 2) row and column. weights: (N,), the picture is divided by
+    their sum.
     """
 
     cameras: Points
@@ -119,7 +120,7 @@ def answered_samples(
     cell = np.floor(inside)
     chosen = cell + (fractions(first, len(points), SQRT_STEPS[:2]) < inside - cell)
     rows, columns = np.minimum(chosen, last).astype(np.intp).T
-    return Samples(points, nearest_present(present)[rows, columns], np.full(len(points), 1 / len(points)))
+    return Samples(points, nearest_present(present)[rows, columns], np.ones(len(points)))
 
 
 def blended_samples(points: Points, eye: ViewOffset, grid: GridShape, present: NDArray[np.bool_]) -> Samples:
