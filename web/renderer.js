@@ -10,7 +10,7 @@ export const GOLDEN_ANGLE = Math.PI * (3 - Math.sqrt(5));
 export const TURN_STEP = 0.7548776662466927, SHIFT_STEP = 0.5698402909980532;
 export const SQRT_STEPS = [
     0.41421356237309515, 0.7320508075688772, 0.23606797749978969, 0.6457513110645906, 0.3166247903553998];
-export const LEVELS = [[1, 4, 1], [1, 2, 1], [1, 1, 1], [1, 1, 0.7], [0.5, 1, 0.7], [0.5, 1, 0.5], [0.25, 1, 0.35]]
+export const LEVELS = [[1, 4, 1], [1, 2, 1], [1, 1, 1], [1, 1, 0.7], [1, 1, 0.5], [1, 1, 0.35], [0.5, 1, 0.35]]
     .map(([cameras, sources, scale]) => ({ cameras, sources, scale }));
 export const WHOLE = { x: 0, y: 0, width: 1, height: 1 };
 

@@ -51,10 +51,10 @@ def test_the_pace_is_learnt_for_each_sort_of_work() -> None:
     frame_time = FrameTimeModel(5e-9)
     guess = frame_time.seconds(BLEND)
     for _ in range(12):
-        frame_time.learn(LENS, 0.3)
-    assert frame_time.seconds(LENS) == pytest.approx(0.3, rel=0.01)
+        frame_time.learn(LENS, 0.1)
+    assert frame_time.seconds(LENS) == pytest.approx(0.1, rel=0.01)
     assert frame_time.seconds(replace(LENS, pixels=PIXELS // 4)) == pytest.approx(
-        (0.3 - OVERHEAD_S) / 4 + OVERHEAD_S, 0.02
+        (0.1 - OVERHEAD_S) / 4 + OVERHEAD_S, 0.02
     )
     assert frame_time.seconds(BLEND) == guess
 
