@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Generator
+from collections.abc import Generator, Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.types import ColorSpace
+from iibr_core.types import ColorSpace, ViewUpdate
 from viewer.gpu.context import GLContext
 from viewer.gpu.light_field_texture import LightFieldTexture
 from viewer.gpu.refocus.accumulation import Accumulator, ProgressiveAccumulation
@@ -39,11 +39,13 @@ class PictureDrawing:
         whole: ProgressiveAccumulation,
         is_linear: bool,
         color_space: ColorSpace,
+        views: Sequence[ViewUpdate] = (),
     ) -> None:
         """Draw nothing yet. accumulator: its own, released with it. whole: the picture, not begun.
 
         is_linear, color_space: see `RenderSettings`. field: held until `stop`, so that another may take its place on
-        the screen. Views that it gets from now on are not seen: all tiles show the same.
+        the screen. Views that it gets from now on are not seen: all tiles show the same. views: those that this picture
+        alone shows, uploaded first, a view a step.
         """
         width, height = whole.size_px
         self.image: Pixels = np.empty((height, width, 3), np.float32 if is_linear else np.uint8)
@@ -51,7 +53,7 @@ class PictureDrawing:
         self._gl = gl
         self._accumulator = accumulator
         self._field = field.share()
-        self._whole = whole
+        self._whole, self._views = whole, views
         self._is_linear = is_linear
         self._color_space = color_space
         self._tiles = picture_tiles(whole.size_px, gl.max_texture_size)
@@ -87,6 +89,9 @@ class PictureDrawing:
         self._field.release()
 
     def _draw(self) -> Generator[None]:
+        for view in self._views:
+            self._field.upload(view.row, view.column, view.colors, view.disparity)
+            yield
         for tile in self._tiles:
             target = RenderTarget(
                 self._gl.ctx, [self._gl.ctx.texture(tile.size_px, 4, dtype="f4" if self._is_linear else "f1")]

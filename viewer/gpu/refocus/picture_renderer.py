@@ -41,8 +41,7 @@ if TYPE_CHECKING:
     from iibr_core.rendering.gloss import GlossMaps
 
 PREPARED_SIZE = ScreenSize(48, 48)
-"""Of three tiles: software GL compiles programs again for textures whose sides are powers of two, as a single tile's.
-"""
+"""Size of what is drawn to compile programs; not a power of two, for which software GL compiles them again."""
 PREPARED_PASSES = 2
 """Those that follow take the same programs."""
 
@@ -227,11 +226,11 @@ class Renderer:
 
     def _start_tile(self, settings: RenderSettings, tile: LensTile) -> PictureDrawing:
         """A picture of the tile's own views, which nothing else shows."""
-        height, width = tile.views[0].colors.shape[:2]
+        first, *others = tile.views
+        height, width = first.colors.shape[:2]
         field = LightFieldTexture(self.ctx, tile.grid, width, height, hdr=True, with_disparity=True)
         field.color_space = settings.color_space
-        for view in tile.views:
-            field.upload(view.row, view.column, view.colors, view.disparity)
+        field.upload(first.row, first.column, first.colors, first.disparity)
         whole_width_px = settings.size_px.width / settings.part.width
         lens = replace(
             lens_of(settings.optics, field, round(whole_width_px * tile.window.width), widest=math.inf),
@@ -241,7 +240,7 @@ class Renderer:
         )
         whole = ProgressiveAccumulation(lens, settings.size_px, lens.pass_count(field))
         accumulator = Accumulator(self.ctx, self.programs)
-        drawing = PictureDrawing(self.gl, accumulator, field, whole, settings.is_linear, settings.color_space)
+        drawing = PictureDrawing(self.gl, accumulator, field, whole, settings.is_linear, settings.color_space, others)
         field.release()
         return drawing
 
