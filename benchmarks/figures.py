@@ -84,7 +84,7 @@ FIGURES = (
     Figure(("figures.md#estimate",), "benchmarks.estimate", 2, ("X", "torch")),
     Figure(("figures.md#cancelled",), "benchmarks.cancel --times 10", 2),
     Figure(("figures.md#field-disparity",), "benchmarks.multi_view_depth --data DATA", 2, ("DATA",)),
-    Figure(("refocus.md#pictures",), "benchmarks.refocus --data DATA --apertures 6", 60, ("DATA",)),
+    Figure(("refocus.md#pictures",), "benchmarks.refocus --data DATA --apertures 6 --max-pixels 150000", 40, ("DATA",)),
     Figure(("figures.md#time-left",), "benchmarks.time_left", 4),
     Figure(("plan.md",), "benchmarks.prediction --data DATA --photos DATA", 6, ("DATA", "Linux")),
     Figure(("memory.md#predicted",), "benchmarks.memory predicted", 3, ("Linux",)),
