@@ -219,7 +219,7 @@ def times_of(gl: GLContext, scene: BenchScene, repeats: int) -> tuple[str, ...]:
 
 
 def plain_gather(gl: GLContext, scene: BenchScene, fetches: int) -> Any:
-    """What draws the mean of so many layers, each moved, by the plainest shader."""
+    """Return a function that draws the mean of so many layers, each moved, by the plainest shader."""
     height, width = scene.photo.shape[:2]
     pixels = np.rint(255 * np.clip(scene.photo, 0, 1)).astype(np.uint8)
     texture = gl.ctx.texture_array(

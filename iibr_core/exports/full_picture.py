@@ -49,7 +49,7 @@ TILE_PX = 768
 """Side of a tile in pixels of the photo, without what its views show around it."""
 
 MARGIN_PX = 4
-"""What the views of a tile show around it beside parallax, in pixels: kernels reach so far."""
+"""Margin of a tile's views beside parallax, in pixels: kernels reach so far."""
 
 PARALLAX_PX = (1.5, 16.0)
 """Parallax within a tile from the eye to the border of the aperture, in pixels of the photo, above which the tile needs
@@ -88,13 +88,13 @@ class FullPicture:
         return self.optics.eye != CENTRE or self.optics.aperture_diameter > 0
 
     def load(self, should_stop: ShouldStop = never) -> LargePhoto:
-        """What it is drawn from, without fills. Raises as `make` does."""
+        """Read the photo at its own size, without fills. Raises as `make` does."""
         from iibr_core.scenes.large_photo import load_large
 
         return load_large(self.scene.source, self.loaded, self.plan, MAX_PIXELS, should_stop)
 
     def fill(self, should_stop: ShouldStop = never) -> RaySet | None:
-        """What the photo hides. Raises as `make` does."""
+        """Make the rays that the photo hides, None where it hides nothing. Raises as `make` does."""
         from iibr_core.scenes.large_photo import complete_fills
 
         return complete_fills(self.scene.source, self.loaded, self.plan, should_stop)

@@ -24,7 +24,7 @@ from iibr_core.scenes.scene import Scene
 from iibr_core.types import DISPLAY_P3, SRGB, ImageSize
 
 SHADERS = "fullscreen.vert", "lens.frag", "present.frag"
-"""Those that the page draws with; see `web/renderer.js`."""
+"""Shaders that the page draws with; see `web/renderer.js`."""
 POLICY = (
     "default-src 'none'; script-src {script}; style-src {style}; img-src data: blob:; base-uri 'none';"
     " form-action 'none'"

@@ -1,4 +1,4 @@
-"""Where in the aperture the pinhole cameras of a picture lie.
+"""Places of a picture's pinhole cameras in the aperture.
 
 Each pass has a spiral of cameras (Vogel's sunflower), turned and shifted from pass to pass: so its points are spread
 evenly, alone and with those of other passes, and lie in no lines. The first spiral, which may be all there is, is moved
@@ -90,7 +90,7 @@ def grid_weights(points: Points, eye: ViewOffset, grid: GridShape) -> NDArray[np
 
 
 def _open_spiral(shape: ApertureShape, cut: float, count: int, pass_index: int) -> Points:
-    """Those of `count` points of a spiral that pass, for a diameter of 1; grey parts of a mask let some pass."""
+    """Points of a spiral of `count` that pass, for a diameter of 1; grey parts of a mask let some pass."""
     numbers, reach = np.arange(count), _reach(shape, cut)
     radius = reach / 2 * np.sqrt((numbers + (0.5 + pass_index * SHIFT_STEP) % 1.0) / max(count, 1))
     angle = GOLDEN_ANGLE * numbers + 2 * math.pi * TURN_STEP * pass_index

@@ -89,7 +89,7 @@ def gap(points: NDArray[np.float64]) -> float:
 
 @pytest.mark.parametrize("count", [4, 6, 8, 12, 32])
 def test_cameras_lie_all_over_the_opening(count: int) -> None:
-    """Those of a pass, and of all; random ones would leave gaps of 1.7."""
+    """Cameras of one pass, and of all; random ones would leave gaps of 1.7."""
     assert max(gap(aperture_points(DISC, 2.0, UNLIMITED, count, k)) for k in range(8)) < 1.15
     assert gap(union(DISC, 2.0, count, 12)) < 2.0
 

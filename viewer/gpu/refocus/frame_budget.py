@@ -81,7 +81,7 @@ def _taps(there: int, here: int) -> tuple[NDArray[np.intp], NDArray[np.intp], ND
 
 @dataclass(frozen=True)
 class DrawCost:
-    """What drawing a picture takes.
+    """Cost of drawing a picture.
 
     samples: cameras; of a pinhole, views that answer it. warps: whether views are warped by their disparity. pixels:
     size of the picture as drawn.

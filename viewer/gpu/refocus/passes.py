@@ -24,7 +24,7 @@ MAX_SAMPLES = 256
 OFF_BORDER_PX = 1 / 256
 """Halfway between views a look-up may hit the border between two texels: rounding must not decide which one is read."""
 
-NEAR_PX = 16.0
+NEAR_PX = 32.0
 """Parallax between a camera and its view, at most, up to which three steps find the surface: see first_hit.glsl."""
 
 ALONE_NEAR_PX = 2.0

@@ -47,7 +47,7 @@ class Samples:
         return len(self.weights)
 
     def part(self, first: int, last: int) -> Samples:
-        """Those from number `first` up to, but without, number `last`."""
+        """Return samples number `first` up to, but without, number `last`."""
         span = slice(first, last)
         return Samples(self.cameras[span], self.views[span], self.weights[span])
 
