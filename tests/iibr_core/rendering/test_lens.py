@@ -68,6 +68,15 @@ def test_within_the_focus_range_content_stays_where_the_eye_sees_it() -> None:
     np.testing.assert_allclose(light_of(nearer, (CAMERA, view), disparity=wall)[INSIDE], expected[INSIDE], atol=0.01)
 
 
+@pytest.mark.parametrize("ratio", [-1.0, -0.5, 2.0])
+def test_what_is_within_the_range_stays_so_where_all_disparities_are_scaled(ratio: float) -> None:
+    """Also where depth is turned inside out."""
+    view, wall = smooth_texture(*SIZE), np.full(SIZE, 1.2 * ratio, np.float32)
+    optics = Optics(focus_disparity=0.5, focus_range=1.0).with_focus_scaled(ratio)
+    moved = sheared(view, wall, CAMERA)
+    np.testing.assert_allclose(light_of(optics, (CAMERA, view), disparity=wall)[INSIDE], moved[INSIDE], atol=0.01)
+
+
 def test_light_is_averaged_linear_not_encoded() -> None:
     dark, bright = (np.full((*SIZE, 3), value, np.float32) for value in (0.0, 1.0))
     np.testing.assert_allclose(light_of(Optics(), (CENTRE, dark), (CENTRE, bright)), 0.5, atol=1e-5)
