@@ -85,7 +85,7 @@ class FullPicture:
     @property
     def needs_fills(self) -> bool:
         """Whether it shows what the photo hides."""
-        return self.optics.eye != CENTRE or self.optics.aperture_diameter > 0
+        return _shows_hidden(self.optics)
 
     def load(self, should_stop: ShouldStop = never) -> LargePhoto:
         """Read the photo at its own size, without fills. Raises as `make` does."""
@@ -173,7 +173,7 @@ def _lens_of(optics: Optics, scene: Scene, photo: LargePhoto, tile: Part) -> _Ti
     enlarged = photo.size.width / scene.width
     diameter = min(max(optics.aperture_diameter, 0.0), float(max(scene.grid)))
     reach, focus = diameter / 2, optics.with_focus_scaled(enlarged)
-    farthest = float(np.abs(photo.disparity).max())
+    farthest = photo.greatest_disparity
     steepest = abs(focus.focus_disparity) + sum(map(abs, focus.focus_tilt)) + max(focus.focus_range, 0.0)
     margin_px = MARGIN_PX + math.ceil(min(reach * (steepest + 1.5 * farthest), max(photo.size)))
     moved_px = math.ceil(min(max(map(abs, optics.eye)) * farthest, max(photo.size)))
@@ -182,6 +182,10 @@ def _lens_of(optics: Optics, scene: Scene, photo: LargePhoto, tile: Part) -> _Ti
     step = reach / steps if steps else max(reach, 1.0)
     scaled = replace(focus.with_focus_scaled(step), eye=CENTRE, aperture_diameter=diameter / step)
     return _TileLens(GridShape(2 * steps + 1, 2 * steps + 1), step, scaled, margin_px)
+
+
+def _shows_hidden(optics: Optics) -> bool:
+    return optics.eye != CENTRE or optics.aperture_diameter > 0
 
 
 def _share_of(part: Part, size: ImageSize) -> Rect:
@@ -238,5 +242,4 @@ def require_full(scene: Scene, optics: Optics) -> None:
     views = max(map(abs, optics.eye)) + optics.aperture_diameter
     reach_px = views * max(map(abs, scene.disparity_range_px)) * read.width / width
     tile = ImageSize(*(min(side, TILE_PX + 2 * math.ceil(min(reach_px, side))) for side in read))
-    shows_hidden = optics.eye != CENTRE or optics.aperture_diameter > 0
-    require_own_size(budget, read, ImageSize(height, width), 0, tile, shows_hidden)
+    require_own_size(budget, read, ImageSize(height, width), 0, tile, _shows_hidden(optics))

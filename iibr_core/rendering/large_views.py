@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -91,6 +92,11 @@ class LargePhoto:
         """Of the photo."""
         return image_size(self.disparity)
 
+    @cached_property
+    def greatest_disparity(self) -> float:
+        """Greatest disparity either way, px of the photo per view step."""
+        return float(np.abs(self.disparity).max(initial=0.0))
+
     def with_fills(self, fills: RaySet | None) -> LargePhoto:
         """The same with what was inpainted."""
         return replace(self, fills=fills)
@@ -135,7 +141,7 @@ def views_of_tile(
     Raises Cancelled once should_stop is true, ValueError for offsets that are not finite.
     """
     farthest = max([1.0, *(abs(axis) for offset in offsets for axis in offset)])
-    parallax_px = farthest * float(np.abs(photo.disparity).max(initial=0.0))
+    parallax_px = farthest * photo.greatest_disparity
     around = tile.grown(TILE_MARGIN_PX + math.ceil(min(parallax_px, max(photo.size))), photo.bounds)
     rays, shown = photo.rays(around, offsets, should_stop), tile.inside(around).slices
     for offset in offsets:
