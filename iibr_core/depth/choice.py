@@ -49,15 +49,20 @@ class DepthOrigin:
 class DepthChoice:
     """What the user decided about depth.
 
-    start: where the search begins. file: a map that must be used (a bad one is an error), times file_scale. model: a
-    folder or a known model's name, None for the usual one if it is there. refine: how far disparity edges are drawn to
-    the photo's, 0 (not at all) to 1. memory_bytes: what a model may take, and the views made with its depth; None for a
-    share of what there is.
+    start: where the search begins. file: a map that must be used (a bad one is an error). file_scale: multiplies its
+    values, which are then px per view step; None: as the file has them. inverts: near and far change places, whatever
+    was found. is_metric: the map or the model gives distances. stretches: a map of another shape shows the whole photo.
+    model: a folder or a known model's name, None for the usual one if it is there. refine: how far disparity edges are
+    drawn to the photo's, 0 (not at all) to 1. memory_bytes: what a model may take, and the views made with its depth;
+    None for a share of what there is.
     """
 
     start: DepthStart = "auto"
     file: str | None = None
-    file_scale: float = 1.0
+    file_scale: float | None = None
+    inverts: bool = False
+    is_metric: bool = False
+    stretches: bool = False
     model: str | None = None
     refine: float = 1.0
     memory_bytes: int | None = None

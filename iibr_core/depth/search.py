@@ -199,7 +199,7 @@ class _DepthSearch:
             yield kind, ways[kind]
 
     def of_file(self, path: Path) -> _FoundDepth:
-        disparity = read_disparity(path, self.photo.size, self.choice.file_scale, self.photo.pixels)
+        disparity = read_disparity(path, self.photo.size, self.choice.file_scale or 1.0, self.photo.pixels)
         disparity = replace(disparity, notes=disparity.notes + self._unused_maps(path))
         return _FoundDepth(self.photo, DepthOrigin("file", disparity.source, file=str(path)), disparity)
 

@@ -70,7 +70,7 @@ def _disparity(source: Source, loaded: LoadedPhoto, photo: Photo, should_stop: S
         return loaded.disparity.values
     file = _larger_map(loaded)
     if file is not None:
-        given = read_disparity(file, photo.size, source.depth.file_scale, photo.pixels)
+        given = read_disparity(file, photo.size, source.depth.file_scale or 1.0, photo.pixels)
         values, unknown = given.values, given.unknown
     else:
         values, unknown = resample_surfaces(loaded.disparity.values, photo.size) * enlarged, None

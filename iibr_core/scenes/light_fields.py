@@ -252,7 +252,7 @@ def _read_map(source: Source, size: ImageSize) -> FloatImage:
     from iibr_core.formats.maps.disparity_file import read_disparity
 
     assert source.depth.file is not None
-    return read_disparity(Path(source.depth.file), size, source.depth.file_scale).values
+    return read_disparity(Path(source.depth.file), size, source.depth.file_scale or 1.0).values
 
 
 def _keep(read: list[ViewUpdate], views: Iterator[ViewUpdate]) -> Iterator[ViewUpdate]:

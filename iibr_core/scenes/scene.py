@@ -54,8 +54,9 @@ def source_with_depth(source: Source, start: DepthStart, model: str | None = Non
 
 
 def _with_depth(source: Source, **changes: Any) -> Source:
-    """What was said in the units of the map before, its scale and the focus, counts no longer."""
-    return replace(source, depth=replace(source.depth, file_scale=1.0, **changes), focus_disparity=None)
+    """What was said of the map before, and the focus in its units, counts no longer."""
+    forgotten = {"file_scale": None, "inverts": False, "is_metric": False, "stretches": False}
+    return replace(source, depth=replace(source.depth, **(forgotten | changes)), focus_disparity=None)
 
 
 @dataclass(frozen=True)

@@ -203,7 +203,8 @@ def _key_of(source: Source) -> str:
     path = Path(source.path)
     digest = hashlib.blake2b(digest_size=16)
     said = source.depth
-    digest.update(repr((said.file and str(said.file), said.file_scale, said.start, said.model)).encode())
+    told = (said.file_scale, said.inverts, said.is_metric, said.stretches)
+    digest.update(repr((said.file and str(said.file), *told, said.start, said.model)).encode())
     if is_folder(path):
         digest.update(str(path.absolute()).encode("utf-8", "surrogateescape"))
         return digest.hexdigest()

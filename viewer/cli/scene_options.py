@@ -20,10 +20,13 @@ from viewer.cli.shared_options import (
     DisparityFile,
     DisparityScale,
     Inpaint,
+    InvertDepth,
     MaxPixels,
     Memory,
+    Metric,
     QualityChoice,
     Refine,
+    Stretch,
     given_options,
 )
 
@@ -39,6 +42,9 @@ class PhotoOptions:
     depth_model: DepthModel = None
     refine: Refine = 1.0
     depth_strength: DepthStrength = 1.0
+    invert_depth: InvertDepth = False
+    metric: Metric = False
+    stretch: Stretch = False
     max_pixels: MaxPixels = None
     memory: Memory = None
     quality: QualityChoice = None
@@ -50,7 +56,15 @@ class PhotoOptions:
         if self.depth_model is not None and self.depth not in ("auto", "model"):
             raise InputError(f"--depth {self.depth} asks no model: leave out --depth-model")
         start = self.depth if self.depth_model is None else "model"
-        return DepthChoice(start, model=self.depth_model, refine=self.refine, memory_bytes=self.memory)
+        return DepthChoice(
+            start,
+            inverts=self.invert_depth,
+            is_metric=self.metric,
+            stretches=self.stretch,
+            model=self.depth_model,
+            refine=self.refine,
+            memory_bytes=self.memory,
+        )
 
     def source(
         self, path: Path | str, grid: GridShape | None, focus_disparity: float | None = None, is_literal: bool = False
@@ -73,7 +87,7 @@ class SceneOptions(PhotoOptions):
     """Of commands that open one photo or light field: its disparity may be named."""
 
     disparity: DisparityFile = None
-    disparity_scale: DisparityScale = 1.0
+    disparity_scale: DisparityScale = None
 
     @property
     def depth_choice(self) -> DepthChoice:

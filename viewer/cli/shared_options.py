@@ -208,13 +208,16 @@ DisparityFile = Annotated[
     typer.Option(
         "--disparity",
         metavar="FILE",
-        help="Disparity map: PFM, EXR, NPY or 16-bit PNG; px per view step (LLFF: per mean distance of neighbours).",
+        help="Depth map. PFM, EXR, NPY: disparity, px per view step; PNG, JPEG, WebP: white is near, unless it shows.",
         show_default=False,
     ),
 ]
 DisparityScale = Annotated[
-    float, number_option("Multiply the disparity file's values by this (a 16-bit PNG needs it).")
+    float | None, number_option("The map's values times this are disparity, px per view step; -1 turns near and far.")
 ]
+InvertDepth = Annotated[bool, typer.Option("--invert-depth", help="Near and far change places.")]
+Metric = Annotated[bool, typer.Option("--metric", help="The map or the model gives distances: more is farther.")]
+Stretch = Annotated[bool, typer.Option("--stretch", help="A map of another shape shows the whole photo.")]
 DepthFrom = Annotated[
     DepthStart,
     typer.Option(

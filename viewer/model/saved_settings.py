@@ -46,7 +46,10 @@ class SourceText(msgspec.Struct, frozen=True, kw_only=True):
     quality: "exact" was written by earlier programs and counts as "balanced".
     """
 
-    disparity_scale: float
+    disparity_scale: float | None = None
+    invert_depth: bool = False
+    metric: bool = False
+    stretch: bool = False
     grid: tuple[Views, Views] | None = None
     focus_disparity: float | None = None
     quality: Quality | Literal["exact"] | None
@@ -194,6 +197,9 @@ def _json_value(value: Any) -> Any:
 def _text_of_source(source: Source) -> SourceText:
     return SourceText(
         disparity_scale=source.depth.file_scale,
+        invert_depth=source.depth.inverts,
+        metric=source.depth.is_metric,
+        stretch=source.depth.stretches,
         grid=source.grid,
         focus_disparity=source.focus_disparity,
         quality=source.quality,
@@ -205,7 +211,14 @@ def _source_from_text(source: Source, text: SourceText) -> Source:
     """The source with what the text says; its paths, where depth is looked for, and the machine's limits stay."""
     return dataclasses.replace(
         source,
-        depth=dataclasses.replace(source.depth, file_scale=text.disparity_scale, refine=text.refine),
+        depth=dataclasses.replace(
+            source.depth,
+            file_scale=text.disparity_scale,
+            inverts=text.invert_depth,
+            is_metric=text.metric,
+            stretches=text.stretch,
+            refine=text.refine,
+        ),
         grid=None if text.grid is None else GridShape(*text.grid),
         focus_disparity=text.focus_disparity,
         quality="balanced" if text.quality == "exact" else text.quality,
