@@ -25,7 +25,7 @@ class DepthOrigin:
 
     words: a name for it ("scene.pfm", "the photo itself (Google GDepth)"). failures: what was tried before and why it
     was not used, a sentence each. advice: how to get better depth, "" where there is none to give. file: path of the
-    map, where it came from one.
+    map, where it came from one. near: which end of its values was taken as near, "" where nothing says it.
     """
 
     kind: DepthKind
@@ -33,6 +33,7 @@ class DepthOrigin:
     failures: tuple[str, ...] = ()
     advice: str = ""
     file: str | None = None
+    near: str = ""
 
     @property
     def line(self) -> str:

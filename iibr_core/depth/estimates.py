@@ -47,3 +47,14 @@ def values_of(estimate: Estimate) -> FloatImage:
     match estimate:
         case RelativeInverseDepth(values) | MetricDepth(values) | DisparityMap(values):
             return values
+
+
+def inverted(estimate: Estimate) -> Estimate:
+    """The same with near and far swapped: distances become inverse distances."""
+    match estimate:
+        case RelativeInverseDepth(values):
+            return RelativeInverseDepth(-values)
+        case MetricDepth(metres):
+            return RelativeInverseDepth(metres)
+        case DisparityMap(px_per_view):
+            return DisparityMap(-px_per_view)

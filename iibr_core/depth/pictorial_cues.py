@@ -40,10 +40,10 @@ def estimate_from_cues(photo: Photo, should_stop: ShouldStop = never) -> Relativ
     Cancelled once should_stop is true.
     """
     pixels = np.clip(photo.pixels, 0, 1)
-    small = _resize(pixels, _small_size(photo.size), "box", should_stop)
+    small = resize_picture(pixels, _small_size(photo.size), "box", should_stop)
     smooth = small
     for _ in range(3):
-        smooth = _box_filter(smooth, DETAIL_PX)
+        smooth = box_filter(smooth, DETAIL_PX)
     raise_if_stopped(should_stop)
     way = _way_from_top(smooth)
     raise_if_stopped(should_stop)
@@ -58,8 +58,10 @@ def _small_size(size: ImageSize) -> ImageSize:
     return ImageSize(max(round(size.height * ratio), 1), max(round(size.width * ratio), 1))
 
 
-def _resize(image: FloatImage, size: ImageSize, filter_name: str, should_stop: ShouldStop) -> FloatImage:
-    """(H, W, C) at another (height, width)."""
+def resize_picture(
+    image: FloatImage, size: ImageSize, filter_name: str = "box", should_stop: ShouldStop = never
+) -> FloatImage:
+    """A picture (H, W, C) at another (height, width), by one of OpenImageIO's filters: the box averages areas."""
     if image.shape[:2] == size:
         return image
     channels = image.shape[2]
@@ -88,8 +90,8 @@ def _way_from_top(image: FloatImage) -> FloatImage:
     return way
 
 
-def _box_filter(image: FloatImage, radius: int) -> FloatImage:
-    """Means over squares, (H, W, ...); at the frame over what of them lies inside.
+def box_filter(image: FloatImage, radius: int) -> FloatImage:
+    """Means over squares of 2 * radius + 1 pixels, (H, W, ...); at the frame over what of them lies inside.
 
     scipy's would save 7 of 12 ms, and cost the window 140 MB of installation.
     """
@@ -118,11 +120,11 @@ def _guided_upsample(
     """
     # The regression of the map on the guide in every square: gain = covariance / (variance + contrast^2).
     products = np.stack([values, guide, guide * values, guide * guide], axis=2)
-    mean, guide_mean, product, square = np.moveaxis(_box_filter(products, GUIDE_PX), 2, 0)
+    mean, guide_mean, product, square = np.moveaxis(box_filter(products, GUIDE_PX), 2, 0)
     gain = (product - guide_mean * mean) / (square - guide_mean**2 + GUIDE_CONTRAST**2)
     # Every pixel lies in many squares: it takes the mean of their models.
-    model = _box_filter(np.stack([gain, mean - gain * guide_mean], axis=2), GUIDE_PX)
-    model = _resize(model, image_size(pixels), "triangle", should_stop)
+    model = box_filter(np.stack([gain, mean - gain * guide_mean], axis=2), GUIDE_PX)
+    model = resize_picture(model, image_size(pixels), "triangle", should_stop)
     guided = np.empty(pixels.shape[:2], np.float32)
 
     def band(first: int, last: int) -> None:

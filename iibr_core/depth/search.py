@@ -16,23 +16,21 @@ from iibr_core.depth.choice import BETTER_WAYS, DepthChoice, DepthKind, DepthOri
 from iibr_core.depth.edges.refine import refine
 from iibr_core.depth.embedded.embedded_depth import read_embedded
 from iibr_core.depth.embedded.picture import photo_in_focus, rotate_estimate
-from iibr_core.depth.estimates import DisparityMap, Estimate, MetricDepth, RelativeInverseDepth, values_of
+from iibr_core.depth.estimates import Estimate, inverted
+from iibr_core.depth.map_file import depth_from_file
 from iibr_core.depth.pictorial_cues import estimate_from_cues
 from iibr_core.depth.scaling import disparity_from, inverse_metres_over
 from iibr_core.depth.sidecar import find_sidecar, flat_disparity, sidecars_of
 from iibr_core.formats.images.oiio_reader import read_orientation
 from iibr_core.formats.images.photo import DEFAULT_MAX_PIXELS, read_photo
-from iibr_core.formats.maps.disparity_file import read_disparity
-from iibr_core.formats.maps.resample import resample_surfaces
+from iibr_core.formats.maps.disparity_file import filling_note, map_at_size
 from iibr_core.inpainting.disparity_by_color import fill_disparity_by_color
-from iibr_core.inpainting.disparity_holes import say_filled
 from iibr_core.inpainting.inpainter import EstimateDepth
 from iibr_core.runtime.tiling import ShouldStop, never, raise_if_stopped
 from iibr_core.types import (
     Disparity,
     FloatImage,
     GridShape,
-    ImageSize,
     InputError,
     Photo,
     ReportProgress,
@@ -62,14 +60,12 @@ class PhotoWithDepth:
 
 @dataclass(frozen=True, eq=False)
 class _FoundDepth:
-    """What one source gave: an estimate of any kind and size, or disparity that counts as it is (from a file).
-
-    photo: the one to show with it.
-    """
+    """What one source gave: an estimate of any kind and size. photo: the one to show with it."""
 
     photo: Photo
     origin: DepthOrigin
-    depth: Estimate | Disparity
+    depth: Estimate
+    notes: tuple[str, ...] = ()
 
 
 def open_with_depth(
@@ -170,9 +166,21 @@ def estimator_of(found: PhotoWithDepth, choice: DepthChoice) -> EstimateDepth | 
         if model is None:
             raise InputError(f"{found.origin.words}: the model no longer exists")
         depth = estimate_with(model, replace(found.photo, pixels=colors), choice.memory_bytes, should_stop)
-        return disparity_from(resize_estimate(depth, found.photo.size), USUAL_GRID)
+        values = disparity_from(depth, USUAL_GRID)
+        return map_at_size(values, found.photo.size)
 
     return estimate
+
+
+def disparity_of_file(
+    file: Path, photo: Photo, choice: DepthChoice, grid: GridShape | None = None, photo_path: Path | None = None
+) -> Disparity:
+    """The disparity that a map's file gives a photo, px of the photo from view to view, unknown values filled.
+
+    photo_path: where the photo is, see `depth_from_file`. Raises InputError where the map cannot be used.
+    """
+    found = depth_from_file(file, photo, choice, photo_path)
+    return _disparity_at(photo, found.estimate, file.name, choice, grid, never)
 
 
 @dataclass(frozen=True, eq=False)
@@ -199,9 +207,9 @@ class _DepthSearch:
             yield kind, ways[kind]
 
     def of_file(self, path: Path) -> _FoundDepth:
-        disparity = read_disparity(path, self.photo.size, self.choice.file_scale or 1.0, self.photo.pixels)
-        disparity = replace(disparity, notes=disparity.notes + self._unused_maps(path))
-        return _FoundDepth(self.photo, DepthOrigin("file", disparity.source, file=str(path)), disparity)
+        found = depth_from_file(path, self.photo, self.choice, self.path)
+        origin = DepthOrigin("file", path.name, file=str(path), near=found.near)
+        return _FoundDepth(self.photo, origin, found.estimate, found.notes + self._unused_maps(path))
 
     def _unused_maps(self, used: Path) -> tuple[str, ...]:
         """A note where the photo has other maps, too: they may say something else."""
@@ -259,42 +267,48 @@ class _DepthSearch:
 
 def _finish(found: _FoundDepth, choice: DepthChoice, grid: GridShape | None, should_stop: ShouldStop) -> PhotoWithDepth:
     """Disparity at the photo's size, whole, its edges drawn to the photo's. Raises InputError where none is known."""
-    photo, origin, inverse_metres = found.photo, found.origin, None
-    notes = origin.failures + ((origin.advising_line,) if origin.advice else ())
-    if isinstance(found.depth, Disparity):
-        values, notes, holes = found.depth.values, found.depth.notes + notes, found.depth.unknown
-    else:
-        estimate = resize_estimate(found.depth, photo.size)
-        values = disparity_from(estimate, grid or USUAL_GRID)
-        inverse_metres = inverse_metres_over(estimate, values)
-        holes = np.isnan(values)
-        if holes.all():
-            raise InputError("it has no known depth")
-        if holes.any():
-            notes += (say_filled("its depth", float(holes.mean())),)
-        values = fill_disparity_by_color(photo.pixels, values, should_stop)
+    photo, origin = found.photo, found.origin
+    name = origin.words if origin.kind == "file" else "its depth"
+    disparity = _disparity_at(photo, found.depth, name, choice, grid, should_stop)
+    values, holes = disparity.values, disparity.unknown
     if choice.refine > 0:
         values = refine(photo.pixels, values, choice.refine, holes, should_stop)
     share = GUESS_SHARE if origin.kind == "rough" else 1.0
-    return PhotoWithDepth(photo, Disparity(values, origin.words, notes, inverse_metres, holes, share), origin)
+    notes = found.notes + origin.failures + ((origin.advising_line,) if origin.advice else ())
+    disparity = replace(
+        disparity, values=values, source=origin.words, notes=disparity.notes + notes, viewing_share=share
+    )
+    return PhotoWithDepth(photo, disparity, origin)
+
+
+def _disparity_at(
+    photo: Photo,
+    estimate: Estimate,
+    name: str,
+    choice: DepthChoice,
+    grid: GridShape | None,
+    should_stop: ShouldStop,
+) -> Disparity:
+    """An estimate's disparity at the photo's size, what is unknown filled by what looks like it.
+
+    name: for the notes. Raises InputError where nothing is known.
+    """
+    estimate = inverted(estimate) if choice.inverts else estimate
+    values = disparity_from(estimate, grid or USUAL_GRID)
+    inverse_metres = inverse_metres_over(estimate, values)
+    ratio, notes = photo.size.width / values.shape[1], filling_note(name, values)
+    values = map_at_size(values, photo.size) * np.float32(ratio)
+    if inverse_metres is not None:
+        inverse_metres = inverse_metres[0] / ratio, inverse_metres[1]
+    holes = np.isnan(values)
+    if holes.all():
+        raise InputError(f"{name}: too few known values survive at the photo's size; give a denser map")
+    if holes.any():
+        values = fill_disparity_by_color(photo.pixels, values, should_stop)
+    return Disparity(values, name, notes, inverse_metres, holes if holes.any() else None)
 
 
 def _flat(photo: Photo, failures: tuple[str, ...]) -> PhotoWithDepth:
     flat = flat_disparity(photo.size)
     origin = DepthOrigin("flat", flat.source, failures, BETTER_WAYS)
     return PhotoWithDepth(photo, replace(flat, notes=flat.notes + failures), origin)
-
-
-def resize_estimate(estimate: Estimate, size: ImageSize) -> Estimate:
-    """The estimate for a picture of another (height, width), surface by surface; lengths in pixels are scaled along."""
-    if values_of(estimate).shape == size:
-        return estimate
-    match estimate:
-        case RelativeInverseDepth(values):
-            return RelativeInverseDepth(resample_surfaces(values, size))
-        case MetricDepth(metres):
-            # Surfaces are distinguished by inverse distance: else only the far ones would count.
-            return MetricDepth(np.reciprocal(resample_surfaces(np.reciprocal(metres), size)))
-        case DisparityMap(px_per_view):
-            ratio = np.float32(size.width / px_per_view.shape[1])
-            return DisparityMap(resample_surfaces(px_per_view, size) * ratio)

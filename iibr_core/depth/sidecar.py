@@ -1,6 +1,6 @@
 """The map that lies beside a photo, and no map at all.
 
-A name ending in `_depth` holds depth (larger = farther, any unit); every other map is disparity (larger = closer).
+A name ending in `_depth` holds depth, every other map disparity; what their numbers mean is seen in them.
 """
 
 from __future__ import annotations
@@ -14,11 +14,13 @@ from iibr_core.formats.files import is_file
 from iibr_core.types import Disparity, ImageSize
 
 SIDECAR_KINDS = ("_disparity", "_depth")
-SIDECAR_EXTENSIONS = (".pfm", ".exr", ".npy", ".png")
+SIDECAR_EXTENSIONS = (".pfm", ".exr", ".npy", ".npz", ".tif", ".tiff", ".png", ".webp", ".jpg", ".jpeg")
 
 
 def find_sidecar(photo_path: Path) -> Path | None:
-    """The map beside a photo `name.*`: `name_disparity` before `name_depth`; each as .pfm, .exr, .npy, .png in turn."""
+    """The map beside a photo `name.*`: `name_disparity` before `name_depth`, each as one of the kinds
+    above, in turn.
+    """
     found = sidecars_of(photo_path)
     return found[0] if found else None
 
@@ -44,6 +46,6 @@ def flat_disparity(size: ImageSize) -> Disparity:
     """Disparity 0 everywhere, for a photo of (height, width) that comes without any."""
     note = (
         "No depth: the photo opens flat. Give a map with --disparity FILE, or put one beside the photo, "
-        "named like it with _disparity (.pfm, .exr, .npy, .png) or _depth."
+        "named like it with _depth or _disparity, as a picture (white is near), .pfm, .exr, .tif, .npy or .npz."
     )
     return Disparity(np.zeros(size, np.float32), "none", (note,))

@@ -10,7 +10,8 @@ from iibr_core.exports.camera_export import cameras_of, colors_of
 from iibr_core.exports.options import ExportOptions
 from iibr_core.exports.settings import ExportSettings
 from iibr_core.exports.source import ExportSource
-from iibr_core.formats.maps.writer import write_depth_map, write_map
+from iibr_core.formats.maps.map_text import MapText
+from iibr_core.formats.maps.writer import write_map
 from iibr_core.formats.quilts import tagged
 from iibr_core.scenes.scene import Scene
 from iibr_core.types import InputError
@@ -27,8 +28,11 @@ def write_disparity(path: Path, source: ExportSource, settings: ExportSettings) 
 
 
 def write_depth(path: Path, source: ExportSource, settings: ExportSettings) -> str:
-    """In distances of the nearest; returns what is to be known of the file."""
-    return write_depth_map(path, cameras_of(source).depth(_disparity_of(source)))
+    """In metres where they are known, else in distances of the nearest; returns what is to be known of the file."""
+    cameras = cameras_of(source)
+    inverse = (cameras.range_px[1] - cameras.at_infinity, cameras.at_infinity)
+    text = MapText("depth", unit="distances of the nearest", inverse=inverse)
+    return write_map(path, cameras.depth(_disparity_of(source)), text)
 
 
 def write_epi(path: Path, source: ExportSource, settings: ExportSettings) -> None:

@@ -245,13 +245,13 @@ def estimate_depth(
     from iibr_core.depth.estimates import MetricDepth, values_of
     from iibr_core.depth.estimators.catalog import model_to_use
     from iibr_core.depth.estimators.estimate_depth import estimate_with
-    from iibr_core.depth.search import resize_estimate
+    from iibr_core.formats.maps.disparity_file import map_at_size
 
     local = model_to_use(DepthChoice("model", model=None if model is None else str(model)))
     assert local is not None, "what was asked for is there, or was refused"
     estimate = estimate_with(local, given, None, should_stop, report_progress)
-    values = values_of(resize_estimate(estimate, given.size))
-    return np.reciprocal(values) if isinstance(estimate, MetricDepth) else values
+    values = values_of(estimate)
+    return map_at_size(np.reciprocal(values) if isinstance(estimate, MetricDepth) else values, given.size)
 
 
 class _ViewsBetween:

@@ -62,7 +62,7 @@ def _disparity(source: Source, loaded: LoadedPhoto, photo: Photo, should_stop: S
     """Of the larger photo, px of it; what was made of it in the smaller one is made of it too."""
     from iibr_core.depth.edges.refine import refine
     from iibr_core.depth.editing.canvas import apply_edits
-    from iibr_core.formats.maps.disparity_file import read_disparity
+    from iibr_core.depth.search import disparity_of_file
     from iibr_core.formats.maps.resample import resample_surfaces
 
     settings, enlarged = loaded.depth_settings, np.float32(photo.size.width / loaded.photo.size.width)
@@ -70,7 +70,7 @@ def _disparity(source: Source, loaded: LoadedPhoto, photo: Photo, should_stop: S
         return loaded.disparity.values
     file = _larger_map(loaded)
     if file is not None:
-        given = read_disparity(file, photo.size, source.depth.file_scale or 1.0, photo.pixels)
+        given = disparity_of_file(file, photo, source.depth, source.grid, Path(source.path))
         values, unknown = given.values, given.unknown
     else:
         values, unknown = resample_surfaces(loaded.disparity.values, photo.size) * enlarged, None

@@ -14,6 +14,8 @@ import pytest
 from PIL import Image
 
 from iibr_core.color import encoded_from_stored
+from iibr_core.depth.choice import DepthChoice
+from iibr_core.depth.search import disparity_of_file
 from iibr_core.formats.images.photo import read_photo
 from iibr_core.formats.maps.disparity_file import read_disparity
 from iibr_core.generation.light_field import generate
@@ -26,7 +28,7 @@ from iibr_core.rendering.hypotheses import FEATURES, SHARE, AmbiguousRays
 from iibr_core.rendering.photo_rays import rays_of_photo
 from iibr_core.rendering.view_synthesis import ViewSynthesis
 from iibr_core.rendering.visibility_weights import visibility_weights
-from iibr_core.types import Disparity, GridShape, ImageSize, ViewOffset
+from iibr_core.types import Disparity, GridShape, InputError, ViewOffset
 from tests.iibr_core.scenes import by_index, disparity_of, photo_of, smooth_texture, square_before_wall
 
 HEIGHT, WIDTH = 20, 26
@@ -152,12 +154,12 @@ def test_depth_of_0(tmp_path):
     depth[:, :9] = 1.0
     depth[6:9, 6:9] = 0.0
     np.save(tmp_path / "a_depth.npy", depth)
-    read = read_disparity(tmp_path / "a_depth.npy", ImageSize(HEIGHT, WIDTH))
+    read = disparity_of_file(tmp_path / "a_depth.npy", plain_photo(), DepthChoice())
     assert (read.values[:, :6] > read.values[:, 12:].max()).all()
     field_of(plain_photo(), read, quality="balanced")
     np.save(tmp_path / "b_depth.npy", depth * 0)
-    with pytest.raises(ValueError, match=r"b_depth\.npy: no value is known"):
-        read_disparity(tmp_path / "b_depth.npy", ImageSize(HEIGHT, WIDTH))
+    with pytest.raises(InputError, match=r"no known value"):
+        disparity_of_file(tmp_path / "b_depth.npy", plain_photo(), DepthChoice())
 
 
 @pytest.mark.parametrize("quality", QUALITIES)

@@ -19,7 +19,8 @@ import pytest
 import iibr_core
 from benchmarks import plucker
 from iibr_core import color
-from iibr_core.depth import pictorial_cues, scaling, search, subject
+from iibr_core.depth import map_file as depth_maps
+from iibr_core.depth import near_end, pictorial_cues, scaling, search, subject
 from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.edges import blur_fit, edge_band, edge_blur, edge_labels, refine
 from iibr_core.depth.embedded import apple, google
@@ -329,7 +330,7 @@ FINITE = {
     ),
     "formats.maps.disparity_file.read_disparity": lambda v, to: [
         disparity_file.read_disparity(map_file(to, v), SIZE),
-        disparity_file.read_disparity(map_file(to, v, "map_depth"), ImageSize(7, 8)),
+        disparity_file.read_disparity(map_file(to, v), ImageSize(7, 8)),
     ],
     "depth.search.open_with_depth": lambda v, to: [
         search.open_with_depth(photo_file(to, v)),
@@ -338,9 +339,16 @@ FINITE = {
     "depth.search.sketch_depth": lambda v, to: [
         search.sketch_depth(to, photo.read_photo(photo_file(to, 1.0)), DepthChoice(file=str(map_file(to, v)))),
     ],
-    "depth.search.resize_estimate": lambda v, _: known_of(
-        search.resize_estimate(DisparityMap(known(v)), ImageSize(7, 9))
+    "depth.search.disparity_of_file": lambda v, to: [
+        search.disparity_of_file(map_file(to, v, "map_depth"), photo.read_photo(photo_file(to, 1.0)), DepthChoice()),
+    ],
+    "depth.map_file.depth_from_file": lambda v, to: known_of(
+        depth_maps.depth_from_file(map_file(to, v), photo.read_photo(photo_file(to, 1.0)), DepthChoice()).estimate
     ),
+    "depth.near_end.near_evidence": lambda v, _: [near_end.near_evidence(image(v), known(v))],
+    "depth.near_end.is_better_turned": lambda v, _: [
+        float(near_end.is_better_turned(image(v), known(v), known(v)[::-1, ::-1]))
+    ],
     "formats.light_fields.views.read_views": lambda v, to: field_on_disk(to, v),
     "formats.images.photo.read_photo": lambda v, to: photo.read_photo(photo_file(to, v), max_pixels=90),
     "formats.images.photo.write_image": lambda v, to: [
@@ -436,7 +444,6 @@ FINITE = {
 NEVER_EMPTY = {
     "depth.multi_view.estimate_disparity.estimate_coarse",
     "depth.pictorial_cues.estimate_from_cues",
-    "depth.search.resize_estimate",
     "generation.free_views.FreeViews",
     "generation.free_views.inverse_depth_of",
     "generation.free_views.reach_of",
@@ -524,7 +531,6 @@ FINITE_BY_CONTRACT = {
     "formats.images.photo.size_within": "sizes only",
     "formats.maps.pfm.write_pfm": "keeps every bit pattern, tests/core/test_pfm.py",
     "formats.maps.writer.write_map": "keeps what it gets; maps of the viewer are finite",
-    "formats.maps.writer.write_depth_map": "keeps what it gets; maps of the viewer are finite",
     "formats.light_fields.multi_view_scene.middle": "of viewpoints that the readers of layouts checked",
     "formats.light_fields.multi_view_scene.nearest_view": "of viewpoints that the readers of layouts checked",
     "formats.light_fields.multi_view_scene.seen_from": "of viewpoints that the readers of layouts checked",
@@ -547,7 +553,7 @@ FINITE_BY_CONTRACT = {
 
 READS_OR_TELLS = {
     "depth.embedded.apple": "appended_estimate",
-    "depth.estimates": "values_of",
+    "depth.estimates": "values_of inverted",
     "depth.embedded.embedded_depth": "read_embedded embedded_in_jpeg",
     "depth.estimators.estimate_cache": "cache_folder key_of load store_seconds seconds_of",
     "depth.embedded.google": "all_in_focus dynamic_depth_estimate",
@@ -563,6 +569,12 @@ READS_OR_TELLS = {
     "depth.embedded.images": "picture_file decode_map",
     "depth.embedded.samsung": "samsung_estimate",
     "depth.embedded.leia": "leia_estimate",
+    "depth.near_end": "zeros_are_depth",
+    "depth.pictorial_cues": "box_filter resize_picture",
+    "formats.maps.color_maps": "values_of_colors",
+    "formats.maps.map_text": "MapText text_of text_from",
+    "formats.maps.disparity_file": "has_shape_of require_scale scaled_disparity map_at_size filling_note "
+    "resampling_note",
     "depth.sidecar": "find_sidecar sidecars_of map_to_read flat_disparity",
     "depth.embedded.xmp": "is_jpeg jpeg_layout number_in xmp_of",
     "formats.animations": "even_size require_video_size write_animation",
@@ -605,9 +617,9 @@ READS_OR_TELLS = {
     "formats.light_fields.multi_view_scene": "pictures_in common_size on_grid maps_in first_map numbers_in",
     "formats.light_fields.view_grid": "view_folder candidate_views set_view require_fitting missing_view grid_scene",
     "formats.light_fields.views": "grid_of read_stored_view disparity_range step_length",
-    "formats.maps.npy": "read_array read_array_header",
+    "formats.maps.npy": "read_array read_array_header npz_member",
     "formats.maps.pfm": "read_pfm read_pfm_size",
-    "formats.maps.reader": "read_map read_map_header MapHeader",
+    "formats.maps.reader": "read_map read_map_file read_map_header MapHeader MapFile",
     "formats.images.oiio_writer": "write_image_file encode_image_file",
     "formats.images.icc_profile": "icc_profile",
     "formats.images.caption": "read_caption",

@@ -213,7 +213,7 @@ DisparityFile = Annotated[
     ),
 ]
 DisparityScale = Annotated[
-    float | None, number_option("The map's values times this are disparity, px per view step; -1 turns near and far.")
+    float | None, number_option("The map's values times this are disparity, px per view step; -1: black is near.")
 ]
 InvertDepth = Annotated[bool, typer.Option("--invert-depth", help="Near and far change places.")]
 Metric = Annotated[bool, typer.Option("--metric", help="The map or the model gives distances: more is farther.")]

@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 
 from iibr_core.depth.choice import DepthChoice, DepthStart
-from iibr_core.depth.estimates import DisparityMap, MetricDepth, RelativeInverseDepth
 from iibr_core.depth.estimators import estimate_cache
 from iibr_core.depth.estimators.catalog import USUAL_MODEL, known_model
 from iibr_core.depth.estimators.download import VERIFIED
-from iibr_core.depth.search import PhotoWithDepth, open_with_depth, resize_estimate, sketch_depth
+from iibr_core.depth.search import PhotoWithDepth, open_with_depth, sketch_depth
 from iibr_core.formats.images.photo import read_photo
 from iibr_core.runtime.tiling import Cancelled
 from iibr_core.types import ImageSize, InputError
@@ -265,19 +264,6 @@ def test_a_bad_photo_is_an_error(tmp_path: Path) -> None:
     (tmp_path / "a.jpg").write_bytes(b"\xff\xd8\xff nothing")
     with pytest.raises(InputError, match=r"a\.jpg"):
         open_with_depth(tmp_path / "a.jpg")
-
-
-def test_lengths_in_pixels_scale_with_the_picture() -> None:
-    halves = np.repeat(np.array([[1.0, 4.0]], np.float32), 2, 0)
-    disparity = resize_estimate(DisparityMap(halves), ImageSize(4, 4))
-    assert isinstance(disparity, DisparityMap)
-    np.testing.assert_array_equal(disparity.px_per_view[0], [2, 2, 8, 8])
-    metric = resize_estimate(MetricDepth(halves), ImageSize(4, 4))
-    assert isinstance(metric, MetricDepth)
-    np.testing.assert_allclose(metric.metres[0], [1, 1, 4, 4])
-    relative = resize_estimate(RelativeInverseDepth(halves), ImageSize(4, 4))
-    assert isinstance(relative, RelativeInverseDepth)
-    np.testing.assert_array_equal(relative.values[0], [1, 1, 4, 4])
 
 
 def test_other_maps_of_the_photo_are_named_once(tmp_path: Path) -> None:

@@ -1,0 +1,79 @@
+"""Depth maps that were drawn in colours, as depth models show them: the colours are looked up in their scale."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iibr_core.types import FloatImage
+
+SCALES = {
+    "turbo": "30123b 4040a2 466be3 4293ff 28bbec 18dcc3 31f299 6bfe64 a2fc3c cced34 edd03a fdad35 fb8022 ec520f d23105"
+    " ac1701 7a0403",
+    "jet": "000080 0000c0 0000ff 003fff 007fff 00bfff 01fefe 40ffc0 80ff80 c0ff40 fefe01 ffbf00 ff7f00 ff3f00 ff0000"
+    " c00000 800000",
+    "inferno": "000004 0b0724 210c4a 3d0965 56106e 70196e 89226a a32c61 bb3654 d14545 e35932 f1721e f98c0a fcaa0f"
+    " f9c932 f2e865 fcffa4",
+    "magma": "000004 0a0822 1d1147 36106b 50127c 691c81 822681 9c2e7f b6367a cf4070 e65164 f46a5c fb8861 fea571 fec287"
+    " fde0a1 fcfdbf",
+    "plasma": "0d0887 310597 4c02a1 6600a7 7e03a8 9511a1 a92395 bc3587 cc4678 d9596a e56b5d f07f4f f89441 fdab33"
+    " fdc328 f9dd25 f0f921",
+    "viridis": "440154 48186a 472d7b 424086 3b528b 33638d 2c728e 26828e 21908c 1f9f88 27ad81 3ebc74 5cc863 82d34d"
+    " aadc32 d5e21a fde725",
+    "cividis": "00224e 002e6a 1a386f 32436d 434e6c 535a6d 61656f 6f7073 7c7c78 8b8778 9a9376 aaa073 bbad6d ccba64"
+    " ddc858 efd748 fee838",
+    "Spectral": "5e4fa2 3288bd 66c2a5 abdda4 e6f598 ffffbf fee08b fdae61 f46d43 d53e4f 9e0142",
+}
+"""Colours at equal steps, from the low end to the high one, which is near where the other is far: as matplotlib and
+OpenCV have them.
+"""
+STEPS = 1024
+USUAL_DISTANCE, MOST_DISTANCE = 8.0, 40.0
+"""From a scale's colours, in 255ths: half of a map's pixels lie nearer than the first, 19 of 20 than the second."""
+LEAST_RANGE = 0.25
+"""A map takes at least this share of its scale."""
+AT_ONCE = 4096
+
+
+def values_of_colors(pixels: NDArray[Any]) -> tuple[FloatImage, str] | None:
+    """Places in a scale of colours (H, W), 0..1, and its name; None where a picture's colours are of no scale.
+
+    pixels: (H, W, 3) uint8 or uint16.
+    """
+    shift = 8 * (pixels.dtype.itemsize - 1)
+    bytes_ = (pixels[..., :3] >> shift).astype(np.uint32)
+    packed = bytes_[..., 0] << 16 | bytes_[..., 1] << 8 | bytes_[..., 2]
+    colors, where, counts = np.unique(packed.ravel(), return_inverse=True, return_counts=True)
+    found = [(name, *_nearest(colors, _scale(text))) for name, text in SCALES.items()]
+    name, places, distances = min(found, key=lambda each: float((np.minimum(each[2], MOST_DISTANCE) * counts).sum()))
+    order = np.argsort(distances)
+    share = np.cumsum(counts[order]) / packed.size
+    usual, most = (distances[order][np.searchsorted(share, at)] for at in (0.5, 0.95))
+    values = places[where].reshape(packed.shape)
+    if usual > USUAL_DISTANCE or most > MOST_DISTANCE or np.ptp(np.percentile(values, (2, 98))) < LEAST_RANGE:
+        return None
+    return values, name
+
+
+def _scale(text: str) -> FloatImage:
+    """(STEPS, 3), 0..255."""
+    stops = np.array([list(bytes.fromhex(color)) for color in text.split()], np.float32)
+    at = np.linspace(0, len(stops) - 1, STEPS)
+    return np.stack([np.interp(at, np.arange(len(stops)), stops[:, c]) for c in range(3)], axis=1).astype(np.float32)
+
+
+def _nearest(colors: NDArray[np.uint32], scale: FloatImage) -> tuple[FloatImage, FloatImage]:
+    """For packed colours (N,): the place of the nearest colour of a scale, 0..1, and how far away it is."""
+    rgb = np.stack([colors >> 16, colors >> 8 & 255, colors & 255], axis=1).astype(np.float32)
+    places, distances = np.empty(len(rgb), np.float32), np.empty(len(rgb), np.float32)
+    squares = (scale**2).sum(axis=1)
+    for first in range(0, len(rgb), AT_ONCE):
+        part = rgb[first : first + AT_ONCE]
+        apart = squares - 2 * part @ scale.T
+        best = apart.argmin(axis=1)
+        places[first : first + AT_ONCE] = best / np.float32(STEPS - 1)
+        left = np.take_along_axis(apart, best[:, None], axis=1)[:, 0] + (part**2).sum(axis=1)
+        distances[first : first + AT_ONCE] = np.sqrt(np.maximum(left, 0))
+    return places, distances

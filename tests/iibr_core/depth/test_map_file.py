@@ -1,0 +1,250 @@
+"""Maps as people have them: any kind of file, any numbers, either end near, turned, squashed, drawn in colours.
+
+The scene: a wall that is far at its top, a disc before it on the left, a box on the right between both.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from PIL import Image
+
+from iibr_core.depth.choice import DepthChoice
+from iibr_core.depth.search import PhotoWithDepth, open_with_depth
+from iibr_core.formats.maps.map_text import MapText
+from iibr_core.formats.maps.writer import write_map
+from iibr_core.types import FloatImage, InputError
+
+HEIGHT, WIDTH = 160, 240
+DISC, BOX, WALL, TOP = (80, 68), (110, 170), (120, 20), (8, 60)
+
+
+def scene(has_sky: bool = False) -> tuple[Image.Image, FloatImage]:
+    """A photo, and its nearness, 0..1."""
+    y, x = np.mgrid[:HEIGHT, :WIDTH] / np.array([HEIGHT, WIDTH])[:, None, None]
+    noise = np.random.default_rng(0).normal(0, 14, (HEIGHT, WIDTH))
+    colors = np.stack([100 + noise, 120 + noise, 90 + noise], -1)
+    near = 0.1 + 0.15 * y
+    if has_sky:
+        colors[y < 0.4], near[y < 0.4] = (140, 180, 230), 0
+    box = (abs(x - 0.72) < 0.12) & (abs(y - 0.68) < 0.22)
+    disc = np.hypot((x - 0.28) * WIDTH / HEIGHT, y - 0.5) < 0.22
+    colors[box] = (np.array([50, 80, 190]) + noise[..., None])[box]
+    colors[disc] = (np.array([200, 60, 50]) + noise[..., None])[disc]
+    near[box], near[disc] = 0.5, 0.95
+    return Image.fromarray(np.clip(colors, 0, 255).astype(np.uint8)), near.astype(np.float32)
+
+
+def unit(near: FloatImage) -> FloatImage:
+    return np.asarray((near - near.min()) / np.ptp(near))
+
+
+def opened(folder: Path, name: str, picture: Image.Image | None = None, **choice: object) -> PhotoWithDepth:
+    (scene()[0] if picture is None else picture).save(folder / "photo.png")
+    said = replace(DepthChoice(file=str(folder / name), refine=0.0), **choice)  # type: ignore[arg-type]
+    return open_with_depth(folder / "photo.png", said)
+
+
+def assert_true_to_scene(found: PhotoWithDepth) -> None:
+    disc, box, wall, top = (found.disparity.values[place] for place in (DISC, BOX, WALL, TOP))
+    assert disc > box > wall > top
+    assert (disc - top) / (box - top) == pytest.approx(0.85 / 0.4, rel=0.1)
+
+
+def integers(near: FloatImage, dtype: type, black_is_near: bool = False) -> Image.Image:
+    values = 0.05 + 0.95 * unit(near)
+    return Image.fromarray(((1 - values if black_is_near else values) * np.iinfo(dtype).max).astype(dtype))
+
+
+@pytest.mark.parametrize("black_is_near", [False, True])
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16])
+@pytest.mark.parametrize("name", ["map.png", "photo_depth.png", "photo_disparity.png"])
+def test_integers_are_relative_and_the_photo_tells_which_end_is_near(
+    tmp_path: Path, name: str, dtype: type, black_is_near: bool
+) -> None:
+    integers(scene()[1], dtype, black_is_near).save(tmp_path / name)
+    found = opened(tmp_path, name)
+    assert_true_to_scene(found)
+    assert np.ptp(found.disparity.values) < 0.02 * WIDTH
+    assert found.origin.near == ("black" if black_is_near else "white")
+    assert any(f"{found.origin.near} counts as near" in note for note in found.disparity.notes)
+
+
+def test_white_is_near_where_the_photo_says_nothing(tmp_path: Path) -> None:
+    flat = Image.new("RGB", (WIDTH, HEIGHT), (90, 90, 90))
+    half = np.full((HEIGHT, WIDTH), 60, np.uint8)
+    half[:, WIDTH // 2 :] = 200
+    Image.fromarray(half).save(tmp_path / "map.png")
+    values = opened(tmp_path, "map.png", flat).disparity.values
+    assert values[0, -1] > values[0, 0]
+
+
+def test_near_and_far_can_be_turned(tmp_path: Path) -> None:
+    integers(scene()[1], np.uint8).save(tmp_path / "map.png")
+    plain = opened(tmp_path, "map.png").disparity.values
+    turned = opened(tmp_path, "map.png", inverts=True)
+    assert turned.disparity.values[DISC] < turned.disparity.values[BOX] < turned.disparity.values[TOP]
+    assert turned.origin.near == "black"
+    assert np.allclose(turned.disparity.values, -plain, atol=1e-4)
+    integers(scene()[1], np.uint8, black_is_near=True).save(tmp_path / "map.png")
+    assert_true_to_scene(opened(tmp_path, "map.png", file_scale=-1.0))
+
+
+def test_a_scale_makes_integers_disparity(tmp_path: Path) -> None:
+    integers(scene()[1], np.uint8).save(tmp_path / "map.png")
+    values = opened(tmp_path, "map.png", file_scale=1 / 50).disparity.values
+    assert values[DISC] == pytest.approx(5.1, abs=0.02)
+
+
+def test_float_maps_are_disparity_and_warn_where_they_look_swapped(tmp_path: Path) -> None:
+    near = scene()[1]
+    np.save(tmp_path / "map.npy", near * 4)
+    assert np.allclose(opened(tmp_path, "map.npy").disparity.values, near * 4, atol=1e-5)
+    np.save(tmp_path / "map.npy", near * -4)
+    found = opened(tmp_path, "map.npy")
+    assert found.disparity.values[DISC] < found.disparity.values[WALL]
+    assert any("swapped" in note and "--invert-depth" in note for note in found.disparity.notes)
+
+
+@pytest.mark.parametrize("name", ["photo_depth.npy", "photo_depth.tif", "map.npy"])
+def test_metres_are_metres(tmp_path: Path, name: str) -> None:
+    metres = (1 / (0.1 + scene()[1])).astype(np.float32)
+    if name.endswith("npy"):
+        np.save(tmp_path / name, metres)
+    else:
+        Image.fromarray(metres).save(tmp_path / name)
+    found = opened(tmp_path, name, is_metric=name == "map.npy")
+    assert_true_to_scene(found)
+    assert found.disparity.inverse_metres is not None
+    slope, offset = found.disparity.inverse_metres
+    assert slope * found.disparity.values[DISC] + offset == pytest.approx(1.05, rel=0.02)
+
+
+def test_inverse_depth_under_the_name_of_depth_is_told(tmp_path: Path) -> None:
+    """Many programs write NAME_depth.npy so."""
+    np.save(tmp_path / "photo_depth.npy", 3 + 5 * scene()[1])
+    assert_true_to_scene(opened(tmp_path, "photo_depth.npy"))
+
+
+def test_millimetres_of_a_depth_camera(tmp_path: Path) -> None:
+    metres = 1 / (0.1 + scene()[1])
+    metres[40:44, 100:110] = 0  # no echo
+    Image.fromarray((metres * 1000).astype(np.uint16)).save(tmp_path / "photo_depth.png")
+    found = opened(tmp_path, "photo_depth.png")
+    assert_true_to_scene(found)
+    assert found.disparity.unknown is not None
+    assert found.disparity.unknown[41, 105]
+    assert found.disparity.values[41, 105] == pytest.approx(found.disparity.values[41, 90], abs=0.2)
+
+
+def test_a_sky_of_zeros_is_far_away(tmp_path: Path) -> None:
+    photo, near = scene(has_sky=True)
+    Image.fromarray((unit(near) * 255).astype(np.uint8)).save(tmp_path / "map.png")
+    values = opened(tmp_path, "map.png", photo).disparity.values
+    assert values[TOP] < values[WALL] < values[BOX] < values[DISC]
+    assert values[TOP] == pytest.approx(values[5, 200])
+
+
+def test_zeros_that_go_on_from_the_other_values_are_depth(tmp_path: Path) -> None:
+    Image.fromarray((unit(scene()[1]) * 65535).astype(np.uint16)).save(tmp_path / "map.png")
+    found = opened(tmp_path, "map.png")
+    assert_true_to_scene(found)
+    assert found.disparity.unknown is None
+
+
+def test_scattered_zeros_are_unknown(tmp_path: Path) -> None:
+    stored = np.array(integers(scene()[1] + 1, np.uint8))
+    stored[::3, ::5] = 0
+    Image.fromarray(np.where(stored == 0, 0, np.maximum(stored, 80)).astype(np.uint8)).save(tmp_path / "map.png")
+    found = opened(tmp_path, "map.png")
+    assert found.disparity.unknown is not None
+    assert found.disparity.unknown[::3, ::5].all()
+
+
+@pytest.mark.parametrize("name", ["map.jpg", "map.webp", "RGB.png", "RGBA.png", "LA.png", "P.png", "almost.png"])
+def test_pictures_of_all_kinds_are_read_alike(tmp_path: Path, name: str) -> None:
+    grey = integers(scene()[1], np.uint8)
+    picture = grey.convert(Path(name).stem if Path(name).stem.isupper() else "RGB")
+    if name == "almost.png":
+        pixels = np.array(picture)
+        pixels[::7, ::5, 2] ^= 1
+        picture = Image.fromarray(pixels)
+    picture.save(tmp_path / name, quality=85)
+    assert_true_to_scene(opened(tmp_path, name))
+
+
+@pytest.mark.parametrize("scale", ["TURBO", "INFERNO", "MAGMA", "VIRIDIS", "JET", "PLASMA", "CIVIDIS"])
+def test_maps_drawn_in_colours_are_read_back(tmp_path: Path, scale: str) -> None:
+    grey = np.array(integers(scene()[1], np.uint8))
+    cv2.imwrite(str(tmp_path / "map.jpg"), cv2.applyColorMap(grey, getattr(cv2, f"COLORMAP_{scale}")))
+    found = opened(tmp_path, "map.jpg")
+    assert_true_to_scene(found)
+    assert any(f"colours of {scale.lower()}" in note for note in found.disparity.notes)
+
+
+def test_a_photo_is_no_map(tmp_path: Path) -> None:
+    scene()[0].save(tmp_path / "map.jpg")
+    with pytest.raises(InputError, match=r"map\.jpg: is a colour picture; .*save it as grey"):
+        opened(tmp_path, "map.jpg")
+
+
+@pytest.mark.parametrize("shape", [(1, HEIGHT, WIDTH), (HEIGHT, WIDTH, 1), (1, HEIGHT, WIDTH, 1)])
+def test_arrays_with_idle_axes(tmp_path: Path, shape: tuple[int, ...]) -> None:
+    np.save(tmp_path / "map.npy", scene()[1].reshape(shape).astype(np.float16))
+    assert_true_to_scene(opened(tmp_path, "map.npy"))
+
+
+def test_a_squashed_map_is_refused_with_the_way_out(tmp_path: Path) -> None:
+    integers(scene()[1], np.uint8).resize((112, 112)).save(tmp_path / "map.png")
+    with pytest.raises(InputError, match=r"112x112 .* 240x160; add --stretch"):
+        opened(tmp_path, "map.png")
+    assert_true_to_scene(opened(tmp_path, "map.png", stretches=True))
+
+
+@pytest.mark.parametrize(("orientation", "back"), [(3, Image.Transpose.ROTATE_180), (6, Image.Transpose.ROTATE_90)])
+def test_a_map_lies_like_the_stored_photo_or_is_turned_itself(
+    tmp_path: Path, orientation: int, back: Image.Transpose
+) -> None:
+    photo, near = scene()
+    exif = Image.Exif()
+    exif[0x0112] = orientation
+    photo.transpose(back).save(tmp_path / "turned.jpg", quality=95, exif=exif)
+    grey = integers(near, np.uint8)
+    grey.save(tmp_path / "upright.png")
+    grey.transpose(back).save(tmp_path / "stored.png")
+    grey.transpose(back).convert("RGB").save(tmp_path / "own_exif.jpg", quality=95, exif=exif)
+    for name in ("upright.png", "stored.png", "own_exif.jpg"):
+        choice = DepthChoice(file=str(tmp_path / name), refine=0.0)
+        assert_true_to_scene(open_with_depth(tmp_path / "turned.jpg", choice))
+
+
+@pytest.mark.parametrize("name", ["photo_depth.jpg", "photo_depth.tif", "photo_depth.webp", "photo_depth.npz"])
+def test_maps_beside_a_photo_are_found(tmp_path: Path, name: str) -> None:
+    photo, near = scene()
+    photo.save(tmp_path / "photo.png")
+    if name.endswith("npz"):
+        np.savez(tmp_path / name, depth=1 / (0.1 + near))
+    else:
+        integers(near, np.uint8).save(tmp_path / name)
+    found = open_with_depth(tmp_path / "photo.png", DepthChoice(refine=0.0))
+    assert found.origin.file == str(tmp_path / name)
+    assert_true_to_scene(found)
+
+
+@pytest.mark.parametrize("suffix", [".png", ".tif", ".exr"])
+def test_our_own_maps_come_back(tmp_path: Path, suffix: str) -> None:
+    disparity = 4 * scene()[1] - 1
+    write_map(tmp_path / f"a{suffix}", disparity)
+    assert np.allclose(opened(tmp_path, f"a{suffix}").disparity.values, disparity, atol=1e-3)
+    inverse = (6.0, -2.0)
+    depth = inverse[0] / (disparity - inverse[1])
+    write_map(tmp_path / f"a_depth{suffix}", depth, MapText("depth", unit="distances of the nearest", inverse=inverse))
+    assert np.allclose(opened(tmp_path, f"a_depth{suffix}").disparity.values, disparity, atol=1e-2)
+    write_map(tmp_path / f"b_depth{suffix}", depth, MapText("depth", unit="m"))
+    found = opened(tmp_path, f"b_depth{suffix}").disparity
+    assert found.inverse_metres is not None
+    assert np.allclose(found.inverse_metres[0] * found.values + found.inverse_metres[1], 1 / depth, atol=1e-3)
