@@ -10,6 +10,7 @@ import numpy as np
 from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.estimates import DisparityMap, Estimate, MetricDepth, RelativeInverseDepth
 from iibr_core.depth.near_end import is_better_turned, near_evidence, zeros_are_depth
+from iibr_core.formats.images.exr_depth import read_depth_channel
 from iibr_core.formats.images.oiio_reader import read_orientation, upright
 from iibr_core.formats.maps.disparity_file import has_shape_of, require_scale, resampling_note, scaled_disparity
 from iibr_core.formats.maps.map_text import MapText
@@ -48,11 +49,21 @@ def depth_from_file(path: Path, photo: Photo, choice: DepthChoice, photo_path: P
     path = Path(path)
     found = read_map_file(path)
     found = _brought_upright(path, found, photo, photo_path)
-    _require_shape(path, found.values, photo, choice.stretches)
+    found = _stretched(path, found, photo, choice.stretches)
     found = _with_zeros_told(found)
     estimate, near, notes = _meaning(path, found, photo, choice)
     notes = (*found.notes, *resampling_note(path.name, found.values, photo.size), *notes)
     return DepthFromFile(estimate, near, notes)
+
+
+def depth_from_channel(path: Path, photo: Photo, choice: DepthChoice) -> DepthFromFile | None:
+    """The depth channel of the picture itself, where it is an EXR that has one; see `depth_from_file`."""
+    values = read_depth_channel(path)
+    if values is None:
+        return None
+    found = _stretched(path, MapFile(values, "floats"), photo, choice.stretches)
+    estimate, near, note = _by_evidence(path, found, photo, choice, are_distances=True)
+    return DepthFromFile(estimate, near, (*found.notes, *note))
 
 
 def _brought_upright(path: Path, found: MapFile, photo: Photo, photo_path: Path | None) -> MapFile:
@@ -69,14 +80,17 @@ def _brought_upright(path: Path, found: MapFile, photo: Photo, photo_path: Path 
     return replace(found, values=turned, is_zero=is_zero, notes=(*found.notes, note))
 
 
-def _require_shape(path: Path, values: FloatImage, photo: Photo, is_stretched: bool) -> None:
-    if is_stretched or has_shape_of(image_size(values), photo.size):
-        return
-    sizes = [f"{width}x{height}" for height, width in (values.shape, photo.size)]
-    raise InputError(
-        f"{path}: {sizes[0]} differs in shape from the photo, {sizes[1]}; add --stretch if it shows the whole photo,"
-        " else crop or rotate it to match"
-    )
+def _stretched(path: Path, found: MapFile, photo: Photo, stretches: bool) -> MapFile:
+    """The map with a note where its shape is not the photo's. Raises InputError where that is not wanted."""
+    own, size = image_size(found.values), photo.size
+    if has_shape_of(own, size):
+        return found
+    if not stretches:
+        raise InputError(
+            f"{path}: {own} differs in shape from the photo, {size}; add --stretch if it shows the whole photo,"
+            " else crop or rotate it to match"
+        )
+    return replace(found, notes=(*found.notes, f"{path.name}, {own}, was stretched to the photo's shape."))
 
 
 def _with_zeros_told(found: MapFile) -> MapFile:
@@ -94,7 +108,9 @@ def _meaning(path: Path, found: MapFile, photo: Photo, choice: DepthChoice) -> t
     is_scaled = choice.file_scale is not None and not (found.numbers != "floats" and choice.file_scale == BLACK_IS_NEAR)
     if not is_depth and (found.numbers == "floats" or is_scaled):
         return _disparity(path, found.values, photo, choice)
-    return _by_evidence(path, found, photo, choice)
+    # Distances by their name, unless they were spread over a range, as pictures are.
+    are_distances = choice.is_metric or (path.stem.endswith("_depth") and not _is_spread(found))
+    return _by_evidence(path, found, photo, choice, are_distances)
 
 
 def _as_written(text: MapText, values: FloatImage, choice: DepthChoice) -> tuple[Estimate, str, tuple[str, ...]]:
@@ -120,13 +136,10 @@ def _disparity(
 
 
 def _by_evidence(
-    path: Path, found: MapFile, photo: Photo, choice: DepthChoice
+    path: Path, found: MapFile, photo: Photo, choice: DepthChoice, are_distances: bool
 ) -> tuple[Estimate, str, tuple[str, ...]]:
     """Depth of unknown scale: the photo decides which end is near, and the usual way where it does not."""
     values = found.values
-    is_spread = _is_spread(found)
-    # Distances by their name, unless they were spread over a range, as pictures are.
-    are_distances = choice.is_metric or (path.stem.endswith("_depth") and not is_spread)
     evidence = near_evidence(photo.pixels, values)
     if choice.file_scale is not None and choice.file_scale < 0:
         large_is_near = False
@@ -134,7 +147,7 @@ def _by_evidence(
         large_is_near = not are_distances if choice.is_metric or abs(evidence) <= 1 else evidence > 0
     if large_is_near:
         estimate: Estimate = RelativeInverseDepth(values)
-    elif is_spread and not choice.is_metric:
+    elif _is_spread(found) and not choice.is_metric:
         estimate = RelativeInverseDepth(-values)
     else:
         step = MILLIMETRES if found.numbers == "integers" else 1.0

@@ -17,7 +17,7 @@ from iibr_core.depth.edges.refine import refine
 from iibr_core.depth.embedded.embedded_depth import read_embedded
 from iibr_core.depth.embedded.picture import photo_in_focus, rotate_estimate
 from iibr_core.depth.estimates import Estimate, inverted
-from iibr_core.depth.map_file import depth_from_file
+from iibr_core.depth.map_file import depth_from_channel, depth_from_file
 from iibr_core.depth.pictorial_cues import estimate_from_cues
 from iibr_core.depth.scaling import disparity_from, inverse_metres_over
 from iibr_core.depth.sidecar import find_sidecar, flat_disparity, sidecars_of
@@ -227,6 +227,10 @@ class _DepthSearch:
         return self.embedded_map() or self.of_pair()
 
     def embedded_map(self) -> _FoundDepth | None:
+        channel = depth_from_channel(self.path, self.photo, self.choice)
+        if channel is not None:
+            origin = DepthOrigin("embedded", "the photo itself (depth channel)", near=channel.near)
+            return _FoundDepth(self.photo, origin, channel.estimate, channel.notes)
         embedded = read_embedded(self.path)
         if embedded is None:
             return None

@@ -44,8 +44,8 @@ def source_beside(source: Source | None, path: str) -> Source:
 
 
 def source_with_map(source: Source, path: str) -> Source:
-    """The same photo with this disparity map."""
-    return _with_depth(source, file=path, start="auto")
+    """The same photo with this map; one of another shape is stretched over it."""
+    return _with_depth(source, file=path, start="auto", stretches=True)
 
 
 def source_with_depth(source: Source, start: DepthStart, model: str | None = None) -> Source:

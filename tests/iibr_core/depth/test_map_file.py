@@ -15,6 +15,7 @@ from PIL import Image
 
 from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.search import PhotoWithDepth, open_with_depth
+from iibr_core.formats.images.oiio_writer import write_image_file
 from iibr_core.formats.maps.map_text import MapText
 from iibr_core.formats.maps.writer import write_map
 from iibr_core.types import FloatImage, InputError
@@ -202,7 +203,9 @@ def test_a_squashed_map_is_refused_with_the_way_out(tmp_path: Path) -> None:
     integers(scene()[1], np.uint8).resize((112, 112)).save(tmp_path / "map.png")
     with pytest.raises(InputError, match=r"112x112 .* 240x160; add --stretch"):
         opened(tmp_path, "map.png")
-    assert_true_to_scene(opened(tmp_path, "map.png", stretches=True))
+    found = opened(tmp_path, "map.png", stretches=True)
+    assert_true_to_scene(found)
+    assert any("stretched" in note for note in found.disparity.notes)
 
 
 @pytest.mark.parametrize(("orientation", "back"), [(3, Image.Transpose.ROTATE_180), (6, Image.Transpose.ROTATE_90)])
@@ -248,3 +251,20 @@ def test_our_own_maps_come_back(tmp_path: Path, suffix: str) -> None:
     found = opened(tmp_path, f"b_depth{suffix}").disparity
     assert found.inverse_metres is not None
     assert np.allclose(found.inverse_metres[0] * found.values + found.inverse_metres[1], 1 / depth, atol=1e-3)
+
+
+@pytest.mark.parametrize("channels", ["RGBAZ", "Blender"])
+def test_the_depth_channel_of_a_rendered_picture(tmp_path: Path, channels: str) -> None:
+    photo, near = scene(has_sky=True)
+    names: tuple[str, ...] = ("R", "G", "B", "A", "Z")
+    if channels == "Blender":
+        names = (*(f"ViewLayer.Combined.{name}" for name in "RGBA"), "ViewLayer.Depth.Z")
+    colors = np.asarray(photo, np.float32) / 255
+    depth = np.where(near > 0, 1 / np.maximum(near, 0.05), 1e10)
+    pixels = np.dstack([colors, np.ones_like(near), depth]).astype(np.float32)
+    write_image_file(tmp_path / "render.exr", pixels, "float", channels=names)
+    found = open_with_depth(tmp_path / "render.exr", DepthChoice(refine=0.0))
+    assert found.origin.kind == "embedded"
+    values = found.disparity.values
+    assert values[TOP] < values[WALL] < values[BOX] < values[DISC]
+    assert np.isfinite(values).all()

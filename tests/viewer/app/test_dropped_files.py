@@ -26,7 +26,8 @@ STATE = AppState(source=SCENE.source, scene=SCENE)
 )
 def test_dropped_files(paths: list[str], opened: str, disparity: str | None) -> None:
     (action,) = actions_from_drop(paths, STATE)
-    assert action == OpenPath(Source(opened, DepthChoice(file=disparity), max_pixels=7))
+    choice = DepthChoice(file=disparity, stretches=disparity is not None)
+    assert action == OpenPath(Source(opened, choice, max_pixels=7))
 
 
 def test_a_map_dropped_on_nothing_is_tried_as_a_photo() -> None:

@@ -54,6 +54,7 @@ REFINE_TIP = "How closely depth follows the photo's edges: more makes crisper ou
 FAR_TIP = "All that is farther comes as near as this. The left handle above does the same."
 NEAR_TIP = "All that is nearer goes as far as this. The right handle above does the same."
 GAMMA_TIP = "Above 1, near things stand out more; below 1, far ones do."
+NEAR_END_TIP = "Which end of the map's values counts as near. Invert, below, turns it."
 INVERT_TIP = "Swaps near and far: for maps that count the other way round."
 BRUSH_TIPS: dict[BrushTool, str] = {
     "nearer": "Drag over the picture to bring it nearer; strokes end at the photo's edges (B puts the brush away).",
@@ -103,6 +104,10 @@ def _origin(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
     for failure in origin.failures if origin is not None else ():
         imgui.bullet()
         quiet(words_in_window(failure))
+    if origin is not None and origin.near:
+        end = origin.near if not state.depth.edits.is_inverted else "the other end"
+        quiet(f"Near in the map: {end}.")
+        tooltip(NEAR_END_TIP, layout)
     source = state.source
     if source is None:
         return []

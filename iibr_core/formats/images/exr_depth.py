@@ -1,0 +1,47 @@
+"""Depth that lies in an OpenEXR picture as a channel beside its colours, as renderers write it."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import OpenImageIO as oiio
+
+from iibr_core.formats.files import MAX_FILE_PIXELS
+from iibr_core.formats.images.oiio_names import oiio_name
+from iibr_core.formats.images.oiio_reader import complaint_of
+from iibr_core.types import FloatImage, InputError
+
+DEPTH_CHANNEL = re.compile(r"(?:.*\.)?(?:Z|depth|depth\.[YVRXZ])", re.IGNORECASE)
+"""`Z` by the format's own convention, `ViewLayer.Depth.Z` by Blender."""
+MOST_PARTS = 64
+BACKGROUND = 1e9
+"""Renderers write such distances where nothing is hit."""
+
+
+def read_depth_channel(path: Path) -> FloatImage | None:
+    """Distances (H, W) float32, infinite where nothing is; None where a file is no EXR, or has no such channel.
+
+    Raises InputError where the file is damaged.
+    """
+    if path.suffix.lower() != ".exr":
+        return None
+    source = oiio.ImageInput.open(oiio_name(path))
+    if source is None:
+        complaint_of(oiio)
+        return None
+    for part in range(MOST_PARTS):
+        if not source.seek_subimage(part, 0):
+            complaint_of(source)
+            return None
+        spec = source.spec()
+        found = [k for k, name in enumerate(spec.channelnames) if DEPTH_CHANNEL.fullmatch(name)]
+        # A map that is all of its file is no picture with depth.
+        if found and (part > 0 or spec.nchannels > 2) and spec.width * spec.height <= MAX_FILE_PIXELS:
+            values = source.read_image(part, 0, found[0], found[0] + 1, "float")
+            if values is None:
+                raise InputError(f"{path}: its depth channel is damaged ({complaint_of(source)}); get the file again")
+            depth = np.asarray(values, np.float32).reshape(spec.height, spec.width)
+            return np.where(depth >= BACKGROUND, np.float32(np.inf), depth)
+    return None
