@@ -12,9 +12,10 @@ from iibr_core.depth.estimates import DisparityMap, Estimate, MetricDepth, Relat
 from iibr_core.depth.near_end import is_better_turned, near_evidence, zeros_are_depth
 from iibr_core.formats.images.exr_depth import read_depth_channel
 from iibr_core.formats.images.oiio_reader import read_orientation, upright
+from iibr_core.formats.images.rgbd import rgbd_parts
 from iibr_core.formats.maps.disparity_file import has_shape_of, require_scale, resampling_note, scaled_disparity
 from iibr_core.formats.maps.map_text import MapText
-from iibr_core.formats.maps.reader import MapFile, read_map_file
+from iibr_core.formats.maps.reader import MapFile, read_map_file, read_map_picture
 from iibr_core.types import FloatImage, InputError, Photo, image_size
 
 DISTANCE_SHARE = 0.5
@@ -59,11 +60,21 @@ def depth_from_file(path: Path, photo: Photo, choice: DepthChoice, photo_path: P
 def depth_from_channel(path: Path, photo: Photo, choice: DepthChoice) -> DepthFromFile | None:
     """The depth channel of the picture itself, where it is an EXR that has one; see `depth_from_file`."""
     values = read_depth_channel(path)
-    if values is None:
+    return None if values is None else _within(path, MapFile(values, "floats"), photo, choice, are_distances=True)
+
+
+def depth_beside_picture(path: Path, photo: Photo, choice: DepthChoice) -> DepthFromFile | None:
+    """The map that is the other half of a picture's file, where it is a pair of both; see `depth_from_file`."""
+    parts = rgbd_parts(path)
+    if parts is None:
         return None
-    found = _stretched(path, MapFile(values, "floats"), photo, choice.stretches)
-    estimate, near, note = _by_evidence(path, found, photo, choice, are_distances=True)
-    return DepthFromFile(estimate, near, (*found.notes, *note))
+    found = _with_zeros_told(read_map_picture(parts[1]))
+    return _within(path, found, photo, choice, are_distances=choice.is_metric)
+
+
+def _within(path: Path, found: MapFile, photo: Photo, choice: DepthChoice, are_distances: bool) -> DepthFromFile:
+    estimate, near, notes = _by_evidence(path, found, photo, choice, are_distances)
+    return DepthFromFile(estimate, near, (*found.notes, *notes))
 
 
 def _brought_upright(path: Path, found: MapFile, photo: Photo, photo_path: Path | None) -> MapFile:

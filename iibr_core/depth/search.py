@@ -17,7 +17,7 @@ from iibr_core.depth.edges.refine import refine
 from iibr_core.depth.embedded.embedded_depth import read_embedded
 from iibr_core.depth.embedded.picture import photo_in_focus, rotate_estimate
 from iibr_core.depth.estimates import Estimate, inverted
-from iibr_core.depth.map_file import depth_from_channel, depth_from_file
+from iibr_core.depth.map_file import depth_beside_picture, depth_from_channel, depth_from_file
 from iibr_core.depth.pictorial_cues import estimate_from_cues
 from iibr_core.depth.scaling import disparity_from, inverse_metres_over
 from iibr_core.depth.sidecar import find_sidecar, flat_disparity, sidecars_of
@@ -31,6 +31,7 @@ from iibr_core.types import (
     Disparity,
     FloatImage,
     GridShape,
+    ImageSize,
     InputError,
     Photo,
     ReportProgress,
@@ -166,8 +167,7 @@ def estimator_of(found: PhotoWithDepth, choice: DepthChoice) -> EstimateDepth | 
         if model is None:
             raise InputError(f"{found.origin.words}: the model no longer exists")
         depth = estimate_with(model, replace(found.photo, pixels=colors), choice.memory_bytes, should_stop)
-        values = disparity_from(depth, USUAL_GRID)
-        return map_at_size(values, found.photo.size)
+        return _at_size(disparity_from(_as_chosen(depth, choice), USUAL_GRID), found.photo.size)
 
     return estimate
 
@@ -227,10 +227,11 @@ class _DepthSearch:
         return self.embedded_map() or self.of_pair()
 
     def embedded_map(self) -> _FoundDepth | None:
-        channel = depth_from_channel(self.path, self.photo, self.choice)
-        if channel is not None:
-            origin = DepthOrigin("embedded", "the photo itself (depth channel)", near=channel.near)
-            return _FoundDepth(self.photo, origin, channel.estimate, channel.notes)
+        for read, words in ((depth_from_channel, "depth channel"), (depth_beside_picture, "its other half")):
+            found = read(self.path, self.photo, self.choice)
+            if found is not None:
+                origin = DepthOrigin("embedded", f"the photo itself ({words})", near=found.near)
+                return _FoundDepth(self.photo, origin, found.estimate, found.notes)
         embedded = read_embedded(self.path)
         if embedded is None:
             return None
@@ -297,11 +298,11 @@ def _disparity_at(
 
     name: for the notes. Raises InputError where nothing is known.
     """
-    estimate = inverted(estimate) if choice.inverts else estimate
+    estimate = _as_chosen(estimate, choice)
     values = disparity_from(estimate, grid or USUAL_GRID)
     inverse_metres = inverse_metres_over(estimate, values)
     ratio, notes = photo.size.width / values.shape[1], filling_note(name, values)
-    values = map_at_size(values, photo.size) * np.float32(ratio)
+    values = _at_size(values, photo.size)
     if inverse_metres is not None:
         inverse_metres = inverse_metres[0] / ratio, inverse_metres[1]
     holes = np.isnan(values)
@@ -310,6 +311,15 @@ def _disparity_at(
     if holes.any():
         values = fill_disparity_by_color(photo.pixels, values, should_stop)
     return Disparity(values, name, notes, inverse_metres, holes if holes.any() else None)
+
+
+def _as_chosen(estimate: Estimate, choice: DepthChoice) -> Estimate:
+    return inverted(estimate) if choice.inverts else estimate
+
+
+def _at_size(disparity: FloatImage, size: ImageSize) -> FloatImage:
+    """Disparity (h, w) of a picture that is made (height, width) large, px of that."""
+    return map_at_size(disparity, size) * np.float32(size.width / disparity.shape[1])
 
 
 def _flat(photo: Photo, failures: tuple[str, ...]) -> PhotoWithDepth:

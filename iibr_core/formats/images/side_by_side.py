@@ -7,6 +7,7 @@ from pathlib import Path
 
 from iibr_core.formats.images.oiio_reader import read_orientation
 from iibr_core.formats.images.picture_source import PicturePart, PictureSource, source_size
+from iibr_core.formats.images.rgbd import rgbd_parts
 from iibr_core.types import ImageSize, InputError
 
 FULL_TAG, HALF_TAG, OVER_TAG = "_LRF_Full_SBS", "_LRF_Half_SBS", "_TB"
@@ -37,13 +38,14 @@ def side_by_side_pair(path: Path) -> tuple[PictureSource, PictureSource] | None:
 
 
 def own_picture(path: Path) -> PictureSource:
-    """What a file shows as a photo: the left eye's picture where its name says that it holds two, else all of it.
+    """What a file shows as a photo: the left eye's picture where it holds two, the picture where it holds one and its
+    map, else all of it.
 
     Raises InputError as `side_by_side_pair` does, and for raw files of light-field cameras.
     """
     require_developed(path)
-    pair = side_by_side_pair(path)
-    return PictureSource(path) if pair is None else pair[0]
+    parts = side_by_side_pair(path) or rgbd_parts(path)
+    return PictureSource(path) if parts is None else parts[0]
 
 
 def require_developed(path: Path) -> None:

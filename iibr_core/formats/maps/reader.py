@@ -74,8 +74,13 @@ def read_map_file(path: Path) -> MapFile:
         return MapFile(read_pfm(path), "floats")
     if kind in (".npy", ".npz"):
         return _read_numpy(path)
-    raster = read_source(PictureSource(path))
-    return _in_its_own_units(_of_picture(path, raster), text_from(text_attribute(raster.spec, KEY)))
+    return read_map_picture(PictureSource(path))
+
+
+def read_map_picture(source: PictureSource) -> MapFile:
+    """A map that is a picture of a file, or a part of one. Raises InputError as `read_map` does."""
+    raster = read_source(source)
+    return _in_its_own_units(_of_picture(source.path, raster), text_from(text_attribute(raster.spec, KEY)))
 
 
 def read_map_header(path: Path) -> MapHeader:

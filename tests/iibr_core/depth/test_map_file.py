@@ -268,3 +268,25 @@ def test_the_depth_channel_of_a_rendered_picture(tmp_path: Path, channels: str) 
     values = found.disparity.values
     assert values[TOP] < values[WALL] < values[BOX] < values[DISC]
     assert np.isfinite(values).all()
+
+
+@pytest.mark.parametrize("name", ["photo_rgbd.jpg", "IMG_1.png", "below.jpg", "left_RGBD.png"])
+def test_a_picture_with_its_map_beside_it_in_one_file(tmp_path: Path, name: str) -> None:
+    photo, near = scene()
+    grey = integers(near, np.uint8).convert("RGB")
+    parts = (grey, photo) if name.startswith("left") else (photo, grey)
+    both = np.concatenate([np.asarray(part) for part in parts], axis=0 if name.startswith("below") else 1)
+    if name.startswith("below"):
+        both = both[:, :150]  # halves one over the other are looked for in high pictures
+    Image.fromarray(both).save(tmp_path / name, quality=95)
+    found = open_with_depth(tmp_path / name, DepthChoice(refine=0.0))
+    assert found.photo.size == (HEIGHT, 150 if name.startswith("below") else WIDTH)
+    assert found.origin.kind == "embedded"
+    values = found.disparity.values
+    assert values[DISC] > values[WALL] > values[TOP]
+
+
+def test_a_wide_photo_is_no_pair(tmp_path: Path) -> None:
+    photo = np.asarray(scene()[0])
+    Image.fromarray(np.concatenate([photo, photo[::-1]], axis=1)).save(tmp_path / "wide.jpg")
+    assert open_with_depth(tmp_path / "wide.jpg").photo.size == (HEIGHT, 2 * WIDTH)

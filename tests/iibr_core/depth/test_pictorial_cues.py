@@ -39,7 +39,7 @@ def test_ways_are_the_shortest() -> None:
 
 def test_averages_are_those_of_what_lies_inside() -> None:
     image = np.random.default_rng(0).random((7, 9, 2), np.float32)
-    got = pictorial_cues._box_filter(image, 2)
+    got = pictorial_cues.box_filter(image, 2)
     for y, x in np.ndindex(7, 9):
         expected = image[max(y - 2, 0) : y + 3, max(x - 2, 0) : x + 3].mean(axis=(0, 1))
         np.testing.assert_allclose(got[y, x], expected, rtol=1e-5)
