@@ -14,7 +14,7 @@ from iibr_core.formats.animations import VIDEOS
 from iibr_core.types import InputError
 
 LIGHT_FIELD = ("light_field_export:write_light_field",)
-MAP = (".pfm", ".exr", ".npy", ".png")
+MAP = (".pfm", ".exr", ".npy", ".png", ".tif")
 PICTURE = (".png", ".jpg", ".jpeg", ".webp", ".avif", ".tif", ".tiff")
 DATA = (".png",)
 MOVING = ("view", "focus", "aperture", "size", "motion", "keys", "frames", "rate")

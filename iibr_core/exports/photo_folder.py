@@ -57,20 +57,20 @@ def list_photos(path: str) -> tuple[FolderPhoto, ...]:
     try:
         with os.scandir(path) as entries:
             for entry in entries:
-                stem, ending = os.path.splitext(entry.name)
-                is_photo = ending.lower() in PHOTO_ENDINGS and not stem.endswith(SIDECAR_KINDS)
-                if is_photo and not entry.name.startswith(".") and entry.is_file():
+                is_picture = os.path.splitext(entry.name)[1].lower() in PHOTO_ENDINGS
+                if is_picture and not entry.name.startswith(".") and entry.is_file():
                     found.append(FolderPhoto(entry.name, entry.stat().st_mtime))
     except OSError:
         return ()
     stems = {os.path.splitext(photo.name)[0] for photo in found}
-    return tuple(photo for photo in found if not _is_made_of(os.path.splitext(photo.name)[0], stems))
+    return tuple(photo for photo in found if not belongs_to_another(os.path.splitext(photo.name)[0], stems))
 
 
-def _is_made_of(stem: str, stems: Container[str]) -> bool:
-    """Whether a picture of this name is made of a photo that has one of these."""
+def belongs_to_another(stem: str, stems: Container[str]) -> bool:
+    """Whether a picture of this name is a map of a photo that has one of these, or was made of it."""
     made = MADE_OF_ANOTHER.fullmatch(stem)
-    return made is not None and made[1] in stems
+    is_map = any(stem.removesuffix(kind) in stems for kind in SIDECAR_KINDS if stem.endswith(kind))
+    return is_map or (made is not None and made[1] in stems)
 
 
 def first_photo(folder: Path) -> Path | None:

@@ -10,7 +10,9 @@ from viewer.model.actions import Action, DoTask, OpenPath
 from viewer.model.state.app_state import AppState
 from viewer.model.state.tasks import ReadTruthTask
 
-DISPARITY_SUFFIXES = frozenset({".pfm", ".npy"})
+MAP_SUFFIXES = (".pfm", ".npy", ".npz")
+MAP_NAMES = ("_depth", "_disparity")
+"""At the end of a map's name, whatever kind of file it is."""
 
 
 def actions_from_drop(paths: Sequence[str], state: AppState, is_ground_truth: bool = False) -> list[Action]:
@@ -20,7 +22,7 @@ def actions_from_drop(paths: Sequence[str], state: AppState, is_ground_truth: bo
     """
     if is_ground_truth and state.scene is not None:
         return [DoTask(ReadTruthTask(paths[0]))]
-    maps = [path for path in paths if PurePath(path).suffix.lower() in DISPARITY_SUFFIXES]
+    maps = [path for path in paths if _is_map(PurePath(path))]
     others = [path for path in paths if path not in maps]
     if others:
         source = source_beside(state.source, others[0])
@@ -28,3 +30,7 @@ def actions_from_drop(paths: Sequence[str], state: AppState, is_ground_truth: bo
     if maps and state.source:
         return [OpenPath(source_with_map(state.source, maps[0]))]
     return [OpenPath(Source(path)) for path in maps[:1]]
+
+
+def _is_map(path: PurePath) -> bool:
+    return path.suffix.lower() in MAP_SUFFIXES or path.stem.lower().endswith(MAP_NAMES)

@@ -15,10 +15,10 @@ GREY = np.full((4, 6, 3), 100, np.uint8)
 
 
 def test_maps_hidden_files_and_others_are_no_photos(tmp_path: Path) -> None:
-    for name in ("b.JPG", "a.png", "a_disparity.png", "a_depth.exr", ".c.png", "d.txt"):
+    for name in ("b.JPG", "a.png", "a_disparity.png", "a_depth.exr", "b_depth.jpg", ".c.png", "d.txt", "low_depth.jpg"):
         (tmp_path / name).write_bytes(b"-")
     (tmp_path / "folder.jpg").mkdir()
-    assert {photo.name for photo in list_photos(str(tmp_path))} == {"b.JPG", "a.png"}
+    assert {photo.name for photo in list_photos(str(tmp_path))} == {"b.JPG", "a.png", "low_depth.jpg"}
     assert list_photos(str(tmp_path / "gone")) == ()
 
 

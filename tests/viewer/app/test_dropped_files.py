@@ -22,6 +22,8 @@ STATE = AppState(source=SCENE.source, scene=SCENE)
         (["a.jpg", "b.jpg"], "a.jpg", None),
         (["a.PFM", "b.jpg"], "b.jpg", "a.PFM"),
         (["better.npy"], "photo.png", "better.npy"),
+        (["dog_depth.png", "dog.jpg"], "dog.jpg", "dog_depth.png"),
+        (["dog_depth.JPG"], "photo.png", "dog_depth.JPG"),
     ],
 )
 def test_dropped_files(paths: list[str], opened: str, disparity: str | None) -> None:

@@ -58,7 +58,7 @@ MOUSE = (
     ("Esc", "Close what is open, put the brush away"),
 )
 PICTURE_ENDINGS = "The name's ending decides the kind: .png, .jpg, .tif, .webp, .avif, or .exr (HDR)."
-MAP_ENDINGS = "The name's ending decides the kind: .pfm, .exr, .npy, or .png (16 bits, scaled)."
+MAP_ENDINGS = "The name's ending decides the kind: .pfm, .exr, .npy, .tif, or .png (16 bits, scaled)."
 
 
 def prompts(state: AppState, layout: Layout) -> list[Action]:
