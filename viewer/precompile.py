@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import re
 import subprocess
 import sys
 import tempfile
@@ -38,6 +39,8 @@ PART = (slice(150, 310), slice(200, 400))
 """Of the demo photo: so small that compiling is nearly all the work, with edges, wires and slopes of every kind."""
 MADE_OF = f"made_of.py{sys.version_info.major}{sys.version_info.minor}{getattr(sys, 'abiflags', '')}"
 """Beside the kernels, written after all of them: of what. One for each Python, whose kernels lie side by side."""
+OWN_FILE = re.compile(r".*\.nb[ci]|made_of\.\w+")
+"""What it writes, and may remove."""
 GLOSSY_PIXELS = 250_000
 """So many that normals are smoothed, as those of large photos are."""
 LOOK_S = 0.5
@@ -66,6 +69,8 @@ def main() -> None:
     except InputError as error:
         print(error, file=sys.stderr)
         begin()
+        if not window:
+            sys.exit(2)
     except (Cancelled, KeyboardInterrupt):
         pass
     sys.exit(window[0].wait() if window else 0)
@@ -75,8 +80,10 @@ def write_kernels(folder: Path, begin: Callable[[], None] = lambda: None, should
     """Have all kernels in the folder, compiled for the kind of processor that `kernel_cache` chooses, and none that
     nobody reads, or of other sources. begin: is called once those of the first picture are there.
 
-    Raises InputError where no process can be started, Cancelled once should_stop is true after that.
+    Raises InputError where the folder holds anything else, or no process can be started, Cancelled once should_stop is
+    true after that.
     """
+    _require_own_folder(folder)
     mark, sources = folder / MADE_OF, digest_of_sources()
     made_of = f"{sources}\n{_runtime()}\n"
     if _text(mark) == made_of:
@@ -87,11 +94,18 @@ def write_kernels(folder: Path, begin: Callable[[], None] = lambda: None, should
     _take_steps(folder, begin, should_stop)
     read = _take_steps(folder, lambda: None, should_stop)
     marks = [path for path in folder.glob("made_of.*") if _text(path).startswith(sources)]
-    for path in folder.rglob("*.*"):
+    for path in folder.rglob("*.nb?"):
         is_others = path in marks or any(f"{other.suffix}." in path.name for other in marks)
         if path.is_file() and str(path) not in read and not is_others:
             path.unlink()
     mark.write_text(made_of)
+
+
+def _require_own_folder(folder: Path) -> None:
+    """Raise InputError where a folder holds files other than kernels: it is somebody's, and named by mistake."""
+    other = next((p for p in folder.rglob("*") if p.is_file() and not OWN_FILE.fullmatch(p.name)), None)
+    if other is not None:
+        raise InputError(f"{folder}: holds other files ({other.name}); give an empty folder")
 
 
 def digest_of_sources(root: Path = ROOT) -> str:

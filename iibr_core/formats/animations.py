@@ -63,6 +63,7 @@ def write_animation(path: Path, frames: Iterable[NDArray[np.uint8]], size: Image
 def _write_video(path: Path, temporary: Path, frames: Iterable[NDArray[np.uint8]], size: ImageSize, rate: float) -> int:
     """4:2:0 of 8 bits, BT.709, as every player takes it; returns how many frames there were."""
     import av
+    from av.codec.codec import UnknownCodecError
 
     codec, told = VIDEOS[path.suffix.lower()]
     count = 0
@@ -79,6 +80,8 @@ def _write_video(path: Path, temporary: Path, frames: Iterable[NDArray[np.uint8]
                 frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(pixels), format="rgb24")
                 container.mux(stream.encode(_as_yuv(frame)))
             container.mux(stream.encode(None))
+    except UnknownCodecError as error:
+        raise InputError(f"{path}: PyAV here has no encoder {codec}; write .gif or .webp") from error
     except av.error.FFmpegError as error:
         # Of what failed in writing to the file PyAV says only that something did.
         reason = error.__context__ if isinstance(error.__context__, OSError) else error

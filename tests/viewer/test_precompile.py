@@ -71,6 +71,19 @@ def test_they_count_for_their_sources_only(tmp_path: Path) -> None:
     assert digest_of_sources(tmp_path) != before
 
 
+def test_a_folder_of_other_files_is_refused_and_left_alone(tmp_path: Path) -> None:
+    photo = tmp_path / "holiday" / "photo.jpg"
+    photo.parent.mkdir()
+    photo.write_bytes(b"dear")
+    command = [sys.executable, "-P", "-m", "viewer.precompile", str(tmp_path)]
+    done = subprocess.run(
+        command, cwd=ROOT, env={**os.environ, "PYTHONPATH": str(ROOT)}, capture_output=True, text=True
+    )
+    assert done.returncode == 2
+    assert "holds other files (photo.jpg); give an empty folder" in done.stderr
+    assert photo.read_bytes() == b"dear"
+
+
 @pytest.fixture
 def one_step(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(precompile, "STEPS", (compile_one,))

@@ -27,6 +27,8 @@ MAP_WORDS = re.compile(r"disp|depth|mask|label|normal|edge|reliable", re.IGNOREC
 V_U = re.compile(r"v(\d{1,9})_u(\d{1,9})$")
 JPEG_PLENO = re.compile(r"(\d{3})_(\d{3})\.ppm$", re.IGNORECASE)
 """Column and row, both three digits."""
+LEAST_SIDE = 9
+"""Of a square grid that only the number of its pictures tells."""
 HEBER_GRID = GridShape(11, 11)
 
 
@@ -97,15 +99,18 @@ def _by_any_numbers(folder: Path, pictures: list[Path]) -> dict[GridIndex, Path]
 
 
 def _row_by_row(folder: Path, pictures: dict[int, Path]) -> dict[GridIndex, Path]:
-    """Pictures by their one number, in rows of the stated grid, else of a square."""
+    """Pictures by their one number, in rows of the grid that a parameters file states, else of a large square: a few
+    numbered pictures may be of a holiday.
+    """
     side = math.isqrt(len(pictures))
-    if side**2 != len(pictures):
+    stated = stated_grid(read_parameters(folder))
+    if stated is None and (side < LEAST_SIDE or side**2 != len(pictures)):
         return {}
+    grid = stated or GridShape(side, side)
     numbers = sorted(pictures)
     gaps = sorted(set(range(numbers[0], numbers[-1] + 1)) - set(numbers))
     if gaps and len(gaps) < len(pictures):
         raise InputError(f"{folder}: view {gaps[0]} is missing ({len(gaps)} are); get the whole data set")
-    grid = stated_grid(read_parameters(folder)) or GridShape(side, side)
     if grid.rows * grid.columns != len(pictures):
         raise InputError(
             f"{folder}: {len(pictures)} views do not fill a grid of {grid.rows}x{grid.columns};"

@@ -357,3 +357,10 @@ def test_views_of_two_depths_of_colour_and_two_grids_in_a_folder(tmp_path: Path)
     write_numbered(mixed, {f"b_{k}_{k}.png": ViewOffset(0.0, 0.0) for k in range(3)})
     with pytest.raises(InputError, match="holds no light field"):
         open_light_field(mixed)
+
+
+@pytest.mark.parametrize("count", [4, 9, 16, 25])
+def test_a_few_numbered_photos_are_no_light_field(tmp_path: Path, count: int) -> None:
+    write_numbered(tmp_path, {f"beach {n + 1}.png": ViewOffset(0, n) for n in range(count)}, (4, 4))
+    with pytest.raises(InputError, match="holds no light field"):
+        open_light_field(tmp_path)
