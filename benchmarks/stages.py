@@ -1,9 +1,10 @@
-"""What each stage between map and view is worth: left out alone, on five kinds of maps of drawn and real scenes.
+"""What each stage between map and view is worth: left out alone, on six kinds of maps of drawn and real scenes.
 
     python -m benchmarks.stages --data DATA [--out docs/stages.md] [--drawn 10] [--only STAGE,...]
 
 Kinds: exact; measured, by matching views (of DATA: as they come); soft, blurred by 1, 2 or 4 px; resampled, from a half
-or a third of the size or dilated; a phone's, of a third of the size, 8 bits, dilated or not, soft. Gaps are what a
+or a third of the size or dilated; a phone's, of a third of the size, 8 bits, dilated or not, soft; a network's, small,
+soft here more and there less, its edges off by up to 8 px, thin things missing, corners round. Gaps are what a
 plain warp of the given map leaves open within the frame, edges what lies within 3 px of them; flying pixels stand out
 from their 5 x 5 median within 12 px of gaps, where the truth's do not, in 10,000; texture is the gradient energy of
 wide gaps against the truth's. A stage earns its place by 0.05 dB on whole views or 0.1 at edges on the mean of a kind,
@@ -28,12 +29,14 @@ from benchmarks.harness.bench_scenes import FIELD
 from benchmarks.harness.reports import emit, head, holds, is_wanted, parser_of, row, start, title
 from iibr_core.color import stored_from_encoded
 from iibr_core.depth.choice import DepthChoice
+from iibr_core.depth.edges.map_alignment import lies_at_corners
 from iibr_core.depth.edges.refine import refine
 from iibr_core.depth.multi_view.estimate_disparity import estimate_disparity
 from iibr_core.evaluation.datasets import find_scenes, read_view
 from iibr_core.evaluation.metrics import bounded_psnr
 from iibr_core.evaluation.reference_warp import reference_warp
 from iibr_core.evaluation.trials import trial_input, trials_of
+from iibr_core.formats.maps.resample import resample_map
 from iibr_core.generation.view_maker import ViewMaker, quantise_as_stored
 from iibr_core.rendering.ambiguous_rays import HYPOTHESES
 from iibr_core.stages import ALL_STAGES, STAGE_NAMES, Stages, stages_without
@@ -41,7 +44,8 @@ from iibr_core.training.degradation import blur, quantise
 from iibr_core.training.scenes.random_scene import random_scene, render
 from iibr_core.types import FloatImage, ImageSize, ViewOffset
 
-KINDS = ("exact", "measured", "soft", "resampled", "a phone's")
+NETWORK = "a network's"
+KINDS = ("exact", "measured", "soft", "resampled", "a phone's", NETWORK)
 SIZE, FIRST_SEED, DISPARITIES_PX = ImageSize(240, 320), 41_000, (0.5, 4.0)
 JUDGED = [ViewOffset(t * v, s * u) for v, u in ((4, 4), (3, 1)) for t in (-1, 1) for s in (-1, 1)]
 MOST_PIXELS, MOST_JUDGED = 180_000, 6
@@ -133,7 +137,11 @@ def _judge_drawn(seed: int, ways: Mapping[str, Way]) -> list[Judged]:
     measured = estimate_disparity(views, offsets, 0, (float(exact.min()) - 0.2, float(exact.max()) + 0.2))
     maps = {"exact": exact, "measured": measured.astype(np.float32), **_worse(exact, seed)}
     field = [FIELD.offset(row, column) for row, column in np.ndindex(*FIELD)]
-    return [(kind, _figures(photo, exact, values, None, truth, field, ways)) for kind, values in maps.items()]
+    maps[NETWORK] = at_photo_size(photo, network_map(exact, seed))
+    return [
+        (kind, _figures(photo, exact, values, None, truth, field, _ways_for(kind, ways)))
+        for kind, values in maps.items()
+    ]
 
 
 def _judge_real(data: Path, place: int, ways: Mapping[str, Way]) -> list[Judged]:
@@ -142,9 +150,10 @@ def _judge_real(data: Path, place: int, ways: Mapping[str, Way]) -> list[Judged]
     given = trial_input(trial, "auto", DepthChoice(), MOST_PIXELS)
     truth = {trial.offset(k): read_view(scene.views[k], MOST_PIXELS) for k in trial.judged}
     own, known = given.maps[0], "exact" if given.maps[0].unknown is None else "measured"
-    maps = {known: (own.values, own.unknown), **{kind: (v, None) for kind, v in _worse(own.values, place).items()}}
+    worse = {**_worse(own.values, place), NETWORK: at_photo_size(given.photo, network_map(own.values, place))}
+    maps = {known: (own.values, own.unknown), **{kind: (v, None) for kind, v in worse.items()}}
     return [
-        (kind, _figures(given.photo, own.values, values, unknown, truth, list(truth), ways))
+        (kind, _figures(given.photo, own.values, values, unknown, truth, list(truth), _ways_for(kind, ways)))
         for kind, (values, unknown) in maps.items()
     ]
 
@@ -164,6 +173,42 @@ def _worse(exact: FloatImage, seed: int) -> dict[str, FloatImage]:
     phone = blur(quantise(_through(dilated if seed % 2 else exact, 3, cv2.INTER_LINEAR), step), 1.0)
     made = {"soft": blur(exact, (1.0, 2.0, 4.0)[seed % 3]), "resampled": resampled[seed % 6](), "a phone's": phone}
     return {kind: np.ascontiguousarray(values, np.float32) for kind, values in made.items()}
+
+
+def network_map(exact: FloatImage, seed: int) -> FloatImage:
+    """A map (h, w), smaller than the exact one (H, W), with the faults of a network's; each seed has others."""
+    rng, (height, width) = np.random.default_rng(seed), exact.shape
+    # Thin things missing and corners round; then edges off, by up to about two standard deviations.
+    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * (seed % 2) + 3,) * 2)
+    values = cv2.morphologyEx(cv2.morphologyEx(exact, cv2.MORPH_OPEN, disc), cv2.MORPH_CLOSE, disc)
+    off_px = width * (0.002, 0.004, 0.007)[seed % 3]
+    rows, columns = np.indices(exact.shape, np.float32)
+    down, right = (off_px * _waves(rng, exact.shape, width / 16) for _ in range(2))
+    values = cv2.remap(values, columns + right, rows + down, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    times = (2.0, 3.0, 1.5)[seed % 3]
+    small = cv2.resize(values, (round(width / times), round(height / times)), interpolation=cv2.INTER_AREA)
+    least = (0.5, 0.8, 1.2)[seed // 3 % 3]
+    share = 1 / (1 + np.exp(-3 * _waves(rng, small.shape, small.shape[1] / 8)))
+    small = share * blur(small, least) + (1 - share) * blur(small, 2 * least + 0.6)
+    small = quantise(small, float(np.ptp(exact)) / 255) if seed % 2 else small
+    return np.ascontiguousarray(small, np.float32)
+
+
+def _waves(rng: np.random.Generator, shape: tuple[int, ...], length_px: float) -> FloatImage:
+    """Smooth noise (H, W) of standard deviation 1."""
+    noise = cv2.GaussianBlur(rng.normal(size=shape), (0, 0), length_px)
+    return np.asarray(noise / noise.std(), np.float32)
+
+
+def at_photo_size(photo: FloatImage, small: FloatImage) -> FloatImage:
+    """A map as the search for depth enlarges it."""
+    return resample_map(small, ImageSize(*photo.shape[:2]), lies_at_corners(photo, small))
+
+
+def _ways_for(kind: str, ways: Mapping[str, Way]) -> Mapping[str, Way]:
+    if kind != NETWORK:
+        return ways
+    return {name: functools.partial(way, is_enlarged=True) for name, way in ways.items()}
 
 
 def _through(values: FloatImage, factor: int, filter_: int) -> FloatImage:
@@ -203,9 +248,10 @@ def make_views(
     field: Sequence[ViewOffset],
     stages: Stages = ALL_STAGES,
     hypotheses: int = HYPOTHESES,
+    is_enlarged: bool = False,
 ) -> Views:
-    """Those that are judged, at balanced quality, as they are stored. field: all views of it."""
-    disparity = refine(photo, given, 1.0, unknown, stages=stages)
+    """Those that are judged, at balanced quality, as they are stored. field: all views of it. is_enlarged: the map."""
+    disparity = refine(photo, given, 1.0, unknown, stages=stages, is_enlarged=is_enlarged)
     with ViewMaker(photo, disparity, field, ("balanced",), hypotheses=hypotheses, stages=stages) as maker:
         colors = {offset: maker.view("balanced", offset).colors for offset in truth}
         return {offset: quantise_as_stored(made) for offset, made in colors.items()}

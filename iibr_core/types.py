@@ -156,7 +156,8 @@ class Disparity:
     values: (H, W) float32, finite, pixels per view step. source: where it came from, in words for people
     ("scene.pfm", "none"). inverse_metres: (slope, offset) of 1 / distance in metres over the values, None where only
     their order is known. unknown: (H, W) bool, where the source knew nothing and values were filled in; None: nowhere.
-    viewing_share: of TOTAL_PARALLAX that viewing plans for; a guess moves less. Raises InputError for values that are
+    viewing_share: of TOTAL_PARALLAX that viewing plans for; a guess moves less. is_enlarged: values come from a smaller
+    map with soft edges. Raises InputError for values that are
     not finite, so that no later step has to check.
     """
 
@@ -166,6 +167,7 @@ class Disparity:
     inverse_metres: tuple[float, float] | None = None
     unknown: NDArray[np.bool_] | None = None
     viewing_share: float = 1.0
+    is_enlarged: bool = False
 
     def __post_init__(self) -> None:
         if not np.isfinite(self.values).all():

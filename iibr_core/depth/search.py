@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from iibr_core.depth.choice import BETTER_WAYS, DepthChoice, DepthKind, DepthOrigin
+from iibr_core.depth.edges.map_alignment import lies_at_corners
 from iibr_core.depth.edges.refine import refine
 from iibr_core.depth.embedded.embedded_depth import read_embedded
 from iibr_core.depth.embedded.picture import photo_in_focus, rotate_estimate
@@ -24,6 +25,7 @@ from iibr_core.depth.sidecar import find_sidecar, flat_disparity, sidecars_of
 from iibr_core.formats.images.oiio_reader import read_orientation
 from iibr_core.formats.images.photo import DEFAULT_MAX_PIXELS, read_photo
 from iibr_core.formats.maps.disparity_file import filling_note, map_at_size
+from iibr_core.formats.maps.resample import is_enlarged_smoothly, without_repeats
 from iibr_core.inpainting.disparity_by_color import fill_disparity_by_color
 from iibr_core.inpainting.inpainter import EstimateDepth
 from iibr_core.runtime.tiling import ShouldStop, never, raise_if_stopped
@@ -31,7 +33,6 @@ from iibr_core.types import (
     Disparity,
     FloatImage,
     GridShape,
-    ImageSize,
     InputError,
     Photo,
     ReportProgress,
@@ -167,7 +168,7 @@ def estimator_of(found: PhotoWithDepth, choice: DepthChoice) -> EstimateDepth | 
         if model is None:
             raise InputError(f"{found.origin.words}: the model no longer exists")
         depth = estimate_with(model, replace(found.photo, pixels=colors), choice.memory_bytes, should_stop)
-        return _at_size(disparity_from(_as_chosen(depth, choice), USUAL_GRID), found.photo.size)
+        return _at_size(disparity_from(_as_chosen(depth, choice), USUAL_GRID), found.photo)
 
     return estimate
 
@@ -277,7 +278,7 @@ def _finish(found: _FoundDepth, choice: DepthChoice, grid: GridShape | None, sho
     disparity = _disparity_at(photo, found.depth, name, choice, grid, should_stop)
     values, holes = disparity.values, disparity.unknown
     if choice.refine > 0:
-        values = refine(photo.pixels, values, choice.refine, holes, should_stop)
+        values = refine(photo.pixels, values, choice.refine, holes, should_stop, is_enlarged=disparity.is_enlarged)
     share = GUESS_SHARE if origin.kind == "rough" else 1.0
     notes = found.notes + origin.failures + ((origin.advising_line,) if origin.advice else ())
     disparity = replace(
@@ -302,7 +303,8 @@ def _disparity_at(
     values = disparity_from(estimate, grid or USUAL_GRID)
     inverse_metres = inverse_metres_over(estimate, values)
     ratio, notes = photo.size.width / values.shape[1], filling_note(name, values)
-    values = _at_size(values, photo.size)
+    is_enlarged = is_enlarged_smoothly(without_repeats(values), photo.size)
+    values = _at_size(values, photo)
     if inverse_metres is not None:
         inverse_metres = inverse_metres[0] / ratio, inverse_metres[1]
     holes = np.isnan(values)
@@ -310,16 +312,18 @@ def _disparity_at(
         raise InputError(f"{name}: too few known values survive at the photo's size; give a denser map")
     if holes.any():
         values = fill_disparity_by_color(photo.pixels, values, should_stop)
-    return Disparity(values, name, notes, inverse_metres, holes if holes.any() else None)
+    return Disparity(values, name, notes, inverse_metres, holes if holes.any() else None, is_enlarged=is_enlarged)
 
 
 def _as_chosen(estimate: Estimate, choice: DepthChoice) -> Estimate:
     return inverted(estimate) if choice.inverts else estimate
 
 
-def _at_size(disparity: FloatImage, size: ImageSize) -> FloatImage:
-    """Disparity (h, w) of a picture that is made (height, width) large, px of that."""
-    return map_at_size(disparity, size) * np.float32(size.width / disparity.shape[1])
+def _at_size(disparity: FloatImage, photo: Photo) -> FloatImage:
+    """Disparity (h, w) of a photo, px of the map, at the photo's size, px of that."""
+    small = without_repeats(disparity)
+    values = map_at_size(small, photo.size, lies_at_corners(photo.pixels, small))
+    return values * np.float32(photo.size.width / disparity.shape[1])
 
 
 def _flat(photo: Photo, failures: tuple[str, ...]) -> PhotoWithDepth:

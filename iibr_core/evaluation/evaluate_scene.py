@@ -132,7 +132,9 @@ class _Evaluator:
         self.refined = disparity.values
         if options.choice.refine > 0:
             strength, unknown = options.choice.refine, disparity.unknown
-            self.refined = refine(given.photo, disparity.values, strength, unknown, should_stop, options.stages)
+            self.refined = refine(
+                given.photo, disparity.values, strength, unknown, should_stop, options.stages, disparity.is_enlarged
+            )
         self.figures: dict[str, dict[str, Figures]] = {}
         self.hole_shares: list[float] = []
         self.lines: list[LineView] = []

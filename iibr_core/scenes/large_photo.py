@@ -71,12 +71,13 @@ def _disparity(source: Source, loaded: LoadedPhoto, photo: Photo, should_stop: S
     file = _larger_map(loaded)
     if file is not None:
         given = disparity_of_file(file, photo, source.depth, source.grid, Path(source.path))
-        values, unknown = given.values, given.unknown
+        values, unknown, is_enlarged = given.values, given.unknown, given.is_enlarged
     else:
         values, unknown = resample_surfaces(loaded.disparity.values, photo.size) * enlarged, None
+        is_enlarged = False
     raise_if_stopped(should_stop)
     if settings.refine > 0:
-        values = refine(photo.pixels, values, settings.refine, unknown, should_stop)
+        values = refine(photo.pixels, values, settings.refine, unknown, should_stop, is_enlarged=is_enlarged)
     if file is None or settings.edits == UNEDITED:
         return values
     return apply_edits(photo.pixels, values / enlarged, settings.edits, should_stop) * enlarged

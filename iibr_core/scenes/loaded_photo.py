@@ -277,6 +277,9 @@ def _refine(loaded: LoadedPhoto, strength: float, should_stop: ShouldStop) -> Lo
 
     values = loaded.found.values
     if strength > 0:
-        values = refine(loaded.photo.pixels, values, strength, loaded.found.unknown, should_stop)
+        found = loaded.found
+        values = refine(
+            loaded.photo.pixels, values, strength, found.unknown, should_stop, is_enlarged=found.is_enlarged
+        )
     canvas = DepthCanvas(loaded.photo.pixels, values)
     return replace(loaded, refined=replace(loaded.found, values=values), levels=levels_of(values), canvas=canvas)

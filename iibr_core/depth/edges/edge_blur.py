@@ -47,12 +47,16 @@ MOST_SPREAD = 1 / 3
 """A filter blurs all edges of a map alike. Where the interquartile range of the blur exceeds this share of its median,
 no filter made it: matching left ramps, and they stay.
 """
+MOST_ENLARGED_SPREAD = 0.7
+"""The same for a map that was enlarged: networks are surer of some edges than of others, but all are ramps."""
 
 
-def measure_edge_blur(photo: FloatImage, disparity: FloatImage, should_stop: ShouldStop = never) -> float:
+def measure_edge_blur(
+    photo: FloatImage, disparity: FloatImage, should_stop: ShouldStop = never, most_spread: float = MOST_SPREAD
+) -> float:
     """The blur (standard deviation, px) of the depth edges of a (H, W) map; 0 where they are exact or nothing is sure.
 
-    photo: (H, W, 3), sRGB-encoded. Raises Cancelled once should_stop is true.
+    photo: (H, W, 3), sRGB-encoded. most_spread: see MOST_SPREAD. Raises Cancelled once should_stop is true.
     """
     steps = _steps(photo, disparity, should_stop)
     soft = steps[:, steps[2] >= SHARP_PX]
@@ -60,7 +64,7 @@ def measure_edge_blur(photo: FloatImage, disparity: FloatImage, should_stop: Sho
     if not (agree > 0 and agree >= LEAST_SOFT * steps[3].sum() and _photo_is_sure(soft)):
         return 0.0
     low, middle, high = np.quantile(soft[2], (0.25, 0.5, 0.75))
-    if high - low > MOST_SPREAD * middle:
+    if high - low > most_spread * middle:
         return 0.0
     return min(_weighted_median(soft[2], soft[3]), WIDEST_MEASURED_SIGMA_PX)
 

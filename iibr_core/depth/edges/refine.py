@@ -13,7 +13,14 @@ from numpy.typing import NDArray
 
 from iibr_core.depth.edges.blur_fit import fit_to_blur
 from iibr_core.depth.edges.edge_band import resolve_edge_band
-from iibr_core.depth.edges.edge_blur import EDGE_SIGMAS, STEEPEST_PLATEAU, extent, measure_edge_blur
+from iibr_core.depth.edges.edge_blur import (
+    EDGE_SIGMAS,
+    MOST_ENLARGED_SPREAD,
+    MOST_SPREAD,
+    STEEPEST_PLATEAU,
+    extent,
+    measure_edge_blur,
+)
 from iibr_core.depth.edges.edge_labels import step_distance
 from iibr_core.depth.edges.edge_profiles import (
     GAUSSIAN_SIGMAS,
@@ -26,13 +33,19 @@ from iibr_core.depth.edges.edge_profiles import (
     structure_at,
     walk,
 )
+from iibr_core.depth.pictorial_cues import resize_picture
+from iibr_core.formats.maps.resample import resample_surfaces
 from iibr_core.inpainting.disparity_by_color import fill_disparity_by_color
 from iibr_core.runtime.jit import kernel
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never
 from iibr_core.stages import ALL_STAGES, Stages
 from iibr_core.surfaces import EDGE_SHARE
-from iibr_core.types import FloatImage, InputError, image_size
+from iibr_core.types import FloatImage, ImageSize, InputError, image_size
 
+WIDE_SIGMA_PX, WORK_SIGMA_PX = 4.5, 2.0
+"""A map that is blurred by more than the first is sharpened at a size at which it is blurred by the second."""
+LEAST_SMALL_SIDE_PX = 40
+"""Of that size."""
 RAMP_TOLERANCE = 2.0
 """By this factor a ramp may be longer or shorter than the blur makes it: longer ones are surfaces, shorter exact."""
 EXTENSION = 0.7
@@ -52,12 +65,14 @@ def refine(
     unknown: NDArray[np.bool_] | None = None,
     should_stop: ShouldStop = never,
     stages: Stages = ALL_STAGES,
+    is_enlarged: bool = False,
 ) -> FloatImage:
     """The disparity with its soft edges snapped to the photo's edges; no values between foreground and background.
 
     photo: (H, W, 3), sRGB-encoded. disparity: (H, W), any unit in which larger is closer; what is not finite is filled
     by what looks like it beside it. strength: 0 changes nothing, 1 makes steps; between them the map lies between both.
-    unknown: (H, W), what was filled like that before; None: nothing. stages: that are on.
+    unknown: (H, W), what was filled like that before; None: nothing. stages: that are on. is_enlarged: the map was
+    smaller and soft, so all its edges are blurred, though not all alike.
     Returns (H, W) float32, within the range of what was given but for a slope's continuation and for what is thin: that
     gets the height back which the blur took. Where nothing says that the map is blurred, its bits are those given, but
     in the edge bands of depth edges (`resolve_edge_band`).
@@ -73,17 +88,41 @@ def refine(
     least_edge = EDGE_SHARE * extent(values)
     if strength == 0 or not least_edge > 0:
         return values
-    sharp = _sharpen(colors, values, least_edge, should_stop, stages)
     filled = ~np.isfinite(disparity) if unknown is None else unknown | ~np.isfinite(disparity)
+    most_spread = MOST_ENLARGED_SPREAD if is_enlarged else MOST_SPREAD
+    sigma = measure_edge_blur(colors, values, should_stop, most_spread) if stages.sharpen_soft_edges else 0.0
+    if sigma > WIDE_SIGMA_PX and min(values.shape) > LEAST_SMALL_SIDE_PX * sigma / WORK_SIGMA_PX:
+        sharp = _sharpen_small(colors, values, sigma / WORK_SIGMA_PX, least_edge, should_stop, stages)
+    else:
+        sharp = _sharpen(colors, values, sigma, least_edge, should_stop, stages)
     refined = resolve_edge_band(colors, sharp, least_edge, filled, should_stop, stages)
     return refined if strength == 1 else values + np.float32(strength) * (refined - values)
 
 
+def _sharpen_small(
+    colors: FloatImage, values: FloatImage, times: float, least_edge: float, should_stop: ShouldStop, stages: Stages
+) -> FloatImage:
+    """A widely blurred map, sharpened at a size at which its blur is narrow, and enlarged again in steps, in each of
+    which its edges follow the photo's. times: how much smaller.
+    """
+    height, width = values.shape
+    size = ImageSize(round(height / times), round(width / times))
+    photo, small = resize_picture(colors, size), resize_picture(values[..., None], size)[..., 0]
+    sigma = measure_edge_blur(photo, small, should_stop, MOST_ENLARGED_SPREAD)
+    sharp = _sharpen(photo, small, sigma, least_edge, should_stop, stages)
+    while size != values.shape:
+        nothing = np.zeros(size, np.bool_)
+        sharp = resolve_edge_band(photo, sharp, least_edge, nothing, should_stop, stages)
+        is_last = 2 * min(size) >= min(height, width)
+        size = ImageSize(height, width) if is_last else ImageSize(2 * size.height, 2 * size.width)
+        photo, sharp = resize_picture(colors, size), resample_surfaces(sharp, size)
+    return sharp
+
+
 def _sharpen(
-    colors: FloatImage, values: FloatImage, least_edge: float, should_stop: ShouldStop, stages: Stages
+    colors: FloatImage, values: FloatImage, sigma: float, least_edge: float, should_stop: ShouldStop, stages: Stages
 ) -> FloatImage:
     """The map with its soft edges snapped to the photo's; its bits where nothing says that it is blurred."""
-    sigma = measure_edge_blur(colors, values, should_stop) if stages.sharpen_soft_edges else 0.0
     if sigma == 0:
         return values
     # No ramp that this blur made of an edge is flatter at its steepest, and none is longer.

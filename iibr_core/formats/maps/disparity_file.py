@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from iibr_core.formats.maps.reader import read_map
-from iibr_core.formats.maps.resample import resample_surfaces
+from iibr_core.formats.maps.resample import resample_map
 from iibr_core.inpainting.disparity_by_color import fill_disparity_by_color
 from iibr_core.inpainting.disparity_holes import fill_disparity_holes, say_filled
 from iibr_core.types import Disparity, FloatImage, ImageSize, InputError, image_size
@@ -79,13 +79,16 @@ def scaled_disparity(path: Path, values: FloatImage, scale: float) -> tuple[Floa
     return known, (f"{count} values of {path.name} beyond {limit_px:g} px per view step count as unknown.",)
 
 
-def map_at_size(values: FloatImage, size: ImageSize) -> FloatImage:
-    """A map (h, w) at another (height, width), its values as they are, NaN where little is known."""
+def map_at_size(values: FloatImage, size: ImageSize, is_at_corners: bool = False) -> FloatImage:
+    """A map (h, w) at another (height, width), its values as they are, NaN where little is known.
+
+    is_at_corners: see `resample_map`.
+    """
     if values.shape == size:
         return values
     if MOSTLY_UNKNOWN < np.isnan(values).mean() < 1:
         values = fill_disparity_holes(values)
-    return resample_surfaces(values, size)
+    return resample_map(values, size, is_at_corners)
 
 
 def filling_note(name: str, values: FloatImage) -> tuple[str, ...]:

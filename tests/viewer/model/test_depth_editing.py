@@ -230,7 +230,7 @@ def test_another_file_keeps_what_was_decided_about_depth(way: str) -> None:
 
 
 def test_a_map_is_for_the_photo_that_is_open() -> None:
-    depth = DepthChoice("auto", file="b.pfm", model="midas", refine=0.25)
+    depth = DepthChoice("auto", file="b.pfm", model="midas", refine=0.25, stretches=True)
     wanted = replace(DECIDED, depth=depth, focus_disparity=None)
     assert action_for_path("map", "b.pfm", opened(DECIDED)) == OpenPath(wanted)
     assert actions_from_drop(["b.pfm"], opened(DECIDED)) == [OpenPath(wanted)]

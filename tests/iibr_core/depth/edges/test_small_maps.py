@@ -1,0 +1,104 @@
+"""Maps that are smaller than their photo: soft ones are enlarged smoothly and sharpened, exact ones by surfaces."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+
+from benchmarks.stages import at_photo_size, network_map
+from iibr_core.depth.edges.map_alignment import lies_at_corners
+from iibr_core.depth.edges.refine import refine
+from iibr_core.formats.maps.resample import has_soft_edges, is_enlarged_smoothly, resample_map, without_repeats
+from iibr_core.training.scenes.random_scene import random_scene, render
+from iibr_core.types import FloatImage, ImageSize, ViewOffset
+
+SIZE = ImageSize(240, 320)
+SMALL = (107, 80)
+"""(width, height), as OpenCV has it."""
+
+
+def drawn(seed: int) -> tuple[FloatImage, FloatImage]:
+    """A photo and its exact disparity."""
+    photo, exact = render(random_scene(np.random.default_rng(seed), SIZE, 2.0), SIZE, ViewOffset(0, 0))
+    return np.ascontiguousarray(photo, np.float32), exact
+
+
+def soft(exact: FloatImage) -> FloatImage:
+    small = cv2.resize(exact, SMALL, interpolation=cv2.INTER_AREA)
+    return np.asarray(cv2.GaussianBlur(small, (0, 0), 1.2))
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_soft_and_exact_maps_are_told_apart(seed: int) -> None:
+    exact = drawn(seed)[1]
+    assert has_soft_edges(soft(exact))
+    assert has_soft_edges(cv2.resize(exact, SMALL, interpolation=cv2.INTER_AREA))
+    assert not has_soft_edges(cv2.resize(exact, SMALL, interpolation=cv2.INTER_NEAREST_EXACT))
+    assert not is_enlarged_smoothly(soft(exact), ImageSize(40, 50))
+
+
+@pytest.mark.parametrize("value", [np.nan, 0.0, np.inf])
+def test_maps_that_say_nothing_are_not_soft(value: float) -> None:
+    assert not has_soft_edges(np.full((9, 9), value, np.float32))
+    assert not has_soft_edges(np.zeros((1, 1), np.float32))
+
+
+def test_a_soft_map_becomes_a_ramp_and_an_exact_one_stays_a_step() -> None:
+    step = np.zeros((20, 20), np.float32)
+    step[:, 10:] = 8
+    assert set(np.unique(resample_map(step, ImageSize(60, 60)))) == {0.0, 8.0}
+    ramp = resample_map(np.asarray(cv2.GaussianBlur(step, (0, 0), 1.2)), ImageSize(60, 60))[30]
+    assert (np.diff(ramp) >= 0).all()
+    assert np.diff(ramp).max() < 1.2
+
+
+@pytest.mark.parametrize("times", [2, 3, 4, 6])
+def test_repeated_pixels_are_one(times: int) -> None:
+    values = np.random.default_rng(0).normal(size=(35, 41)).astype(np.float32)
+    values[2, 3] = np.nan
+    np.testing.assert_array_equal(without_repeats(values.repeat(times, 0).repeat(times, 1)), values)
+    np.testing.assert_array_equal(without_repeats(np.ones((1, 1), np.float32)), np.ones((1, 1)))
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_maps_made_by_leaving_out_pixels_lie_at_corners(seed: int) -> None:
+    photo, exact = drawn(seed)
+    assert lies_at_corners(photo, cv2.resize(exact, SMALL, interpolation=cv2.INTER_NEAREST))
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_all_other_maps_lie_in_the_middles_of_their_pixels(seed: int) -> None:
+    photo, exact = drawn(seed)
+    assert not lies_at_corners(photo, cv2.resize(exact, SMALL, interpolation=cv2.INTER_AREA))
+    assert not lies_at_corners(photo, soft(exact))
+    assert not lies_at_corners(photo, cv2.resize(exact, SMALL, interpolation=cv2.INTER_NEAREST_EXACT))
+    assert not lies_at_corners(photo, exact)
+    assert not lies_at_corners(photo, np.full((60, 80), np.nan, np.float32))
+
+
+def test_values_at_corners_come_out_where_they_were() -> None:
+    plane = np.add.outer(np.arange(12, dtype=np.float32), 2 * np.arange(16, dtype=np.float32))
+    found = resample_map(plane[::3, ::4], ImageSize(12, 16), is_at_corners=True)
+    np.testing.assert_allclose(found[:9, :12], plane[:9, :12], atol=1e-4)
+
+
+@pytest.mark.parametrize("make", [soft, lambda exact: network_map(exact, 1)])
+def test_refining_brings_small_maps_nearer_to_the_truth(make) -> None:
+    """Over some scenes together: errors of more than a tenth of the range become much fewer."""
+    before = after = 0.0
+    for seed in range(4):
+        photo, exact = drawn(seed)
+        values = at_photo_size(photo, make(exact))
+        refined = refine(photo, values, is_enlarged=True)
+        before += float((np.abs(values - exact) > 0.1 * np.ptp(exact)).mean())
+        after += float((np.abs(refined - exact) > 0.1 * np.ptp(exact)).mean())
+    assert after < 0.75 * before
+
+
+def test_a_very_soft_map_is_sharpened_at_a_smaller_size() -> None:
+    photo, exact = drawn(2)
+    values = np.asarray(cv2.GaussianBlur(exact, (0, 0), 6.0))
+    refined = refine(photo, values)
+    wrong = [float((np.abs(each - exact) > 0.1 * np.ptp(exact)).mean()) for each in (values, refined)]
+    assert wrong[1] < 0.7 * wrong[0]
