@@ -5,6 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from iibr_core.formats.files import open_binary, require_file
+from iibr_core.formats.images.heic import COLOR_CODES
+from iibr_core.formats.images.iso_boxes import color_codes_of
 from iibr_core.formats.images.oiio_reader import Raster
 from iibr_core.formats.images.pillow_reader import open_with_pillow, raster_of
 from iibr_core.types import ImageSize
@@ -24,8 +26,11 @@ def is_avif(path: Path) -> bool:
 
 def read_avif(path: Path) -> Raster:
     """Decode an AVIF's photo, in 8 bits, as it is stored. Raises InputError as `read_raster` does."""
-    require_file(path)
+    with open_binary(path) as file:
+        codes = color_codes_of(file.read())
     with open_with_pillow(path, *AVIF) as image:
+        if codes is not None:  # Pillow does not pass them on
+            image.info["nclx_profile"] = dict(zip(COLOR_CODES, codes))
         return raster_of(image)
 
 

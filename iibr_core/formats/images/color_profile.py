@@ -1,56 +1,78 @@
-"""What a photo's numbers mean where its embedded colour profile (ICC) says that they are not sRGB.
+"""Colours of photos that are not sRGB, as their files state them: by a colour profile (ICC), or by numbers (CICP).
 
-Photos carry profiles of one kind: a curve for each of red, green and blue, then a matrix (ICC.1:2022, annex F.3). They
+Photos have profiles of one kind: a curve for each of red, green and blue, then a matrix (ICC.1:2022, annex F.3). They
 are computed here with all the bits that the photo has. The primaries stay the photo's own, so no colour is lost.
+Numbers are those of ITU-T H.273; PQ and HLG, the curves of HDR photos, are known by them.
 """
 
 from __future__ import annotations
 
+import re
 import struct
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.color import srgb_from_linear
-from iibr_core.formats.images.icc_profile import icc_profile
+from iibr_core.color import linear_from_srgb, srgb_from_linear
+from iibr_core.formats.images.color_primaries import (
+    MIN_DETERMINANT,
+    OWN_NAME,
+    space_of_chromaticities,
+    space_of_matrix,
+    space_of_number,
+)
+from iibr_core.formats.images.hdr import hlg_display_light, hlg_scene_light, pq_light
 from iibr_core.formats.images.oiio_reader import FLOATING_TYPES, text_attribute
-from iibr_core.types import DISPLAY_P3, SRGB, ColorSpace, FloatImage
+from iibr_core.types import SRGB, ColorSpace, FloatImage
 
 KNOTS = 65536
 """Of a curve: one for each value of 16 bits."""
-SAME_PRIMARIES = 2e-3
-"""Of XYZ: as much as the programs that write profiles differ about sRGB's and Display P3's."""
 SAME_CURVE = 1 / 255
 """Of encoded values: a step of 8 bits, as much as sRGB's own curve is off in small profiles."""
-LEAST_DETERMINANT = 1e-4
-"""Of the matrix: primaries on one line are none."""
-BRADFORD = np.array([[0.8951, 0.2664, -0.1614], [-0.7502, 1.7135, 0.0367], [0.0389, -0.0685, 1.0296]])
-"""Cones from XYZ (ICC.1:2022, annex E.3)."""
-D50 = np.array([0.9642, 1.0, 0.8249])
-P3_CODES = 12, 13
-"""Display P3's primaries and sRGB's curve, by the numbers of ITU-T H.273."""
 PARAMETRIC = {0: 1, 1: 3, 2: 4, 3: 5, 4: 7}
 """Parameters of each kind of formula (ICC.1:2022, table 68)."""
 MOST_PROFILE_BYTES = 4 * 2**20
 """Those with a table for every colour, for printers, take one or two megabytes."""
+Curve = Callable[[NDArray[Any]], NDArray[Any]]
+Hdr = Literal["", "PQ", "HLG"]
+PQ, HLG = 16, 18
+CURVES_OF_CODES: dict[int, Curve] = {
+    **dict.fromkeys((1, 6, 13, 14, 15), linear_from_srgb),
+    4: lambda x: x**2.2,
+    5: lambda x: x**2.8,
+    8: lambda x: x,
+    PQ: pq_light,
+    HLG: hlg_scene_light,
+}
+"""Light of encoded values 0..1 by the number of the transfer curve (ITU-T H.273, table 3). Screens show the cameras'
+curves (1, 6, 14, 15) as they show sRGB.
+"""
+HDR_CODES: dict[int, Hdr] = {PQ: "PQ", HLG: "HLG"}
 
 
 @dataclass(frozen=True, eq=False)
 class ColorProfile:
-    """curves: (3, KNOTS), linear light of red, green and blue. color_space: what these are."""
+    """Meaning of a photo's numbers.
+
+    curves: (3, KNOTS), linear light of red, green and blue, 1 = white; HLG's before it is displayed. color_space: its
+    primaries. hdr: the curve of an HDR photo, whose light may exceed white; "" for other photos.
+    """
 
     curves: FloatImage
     color_space: ColorSpace
+    hdr: Hdr = ""
 
     def linear(self, pixels: NDArray[Any]) -> FloatImage:
-        """Linear light of `color_space`, 0..1, float32, of pixels (H, W, 3), uint8 or uint16."""
-        return _look_up(self.curves, pixels)
+        """Linear light of `color_space`, float32, of pixels (H, W, 3), uint8 or uint16."""
+        light = _look_up(self.curves, pixels)
+        return hlg_display_light(light) if self.hdr == "HLG" else light
 
     def encoded(self, pixels: NDArray[Any]) -> FloatImage:
-        """The same, encoded by sRGB's curve."""
+        """The same, encoded by sRGB's curve; not for HDR."""
         return _look_up(srgb_from_linear(self.curves), pixels)
 
 
@@ -68,47 +90,67 @@ def _look_up(curves: FloatImage, pixels: NDArray[Any]) -> FloatImage:
 
 
 def color_space_of(spec: Any) -> ColorSpace:
-    """Of a picture's numbers: by its profile, or what OpenEXR has in its place; sRGB where it says nothing."""
+    """Return the colour space of a picture: by its profile, or OpenEXR's chromaticities; sRGB where it states none."""
     if str(spec.format) in FLOATING_TYPES:
-        return _space_of_chromaticities(spec.getattribute("chromaticities"))
+        return space_of_chromaticities(spec.getattribute("chromaticities"))
     profile = color_profile_of(spec)[0]
     return SRGB if profile is None else profile.color_space
 
 
 def color_profile_of(spec: Any) -> tuple[ColorProfile | None, str]:
-    """The profile in the header of a picture of whole numbers, and a note about it; None, "" without one, or for sRGB.
+    """Return the profile in the header of a picture of whole numbers, and a note about it; None, "" for sRGB.
 
-    None and a note where it cannot be used: the picture counts as sRGB then. Grey has no primaries.
+    Numbers count more than a profile beside them (PNG, third edition, 11.3.2.6). A profile that cannot be used gives
+    None and a note: the picture counts as sRGB. Grey has no primaries, so only its HDR curve matters.
     """
-    if str(spec.format) in FLOATING_TYPES or spec.nchannels < 3:
+    if str(spec.format) in FLOATING_TYPES:
         return None, ""
     value, codes = spec.getattribute("ICCProfile"), spec.getattribute("CICP")
-    name = text_attribute(spec, "ICCProfile:profile_description") or "without a name"
-    # They count more than a profile beside them (PNG, third edition, 11.3.2.6).
-    if isinstance(codes, tuple) and codes[:2] == P3_CODES:
-        value, name = np.frombuffer(icc_profile(DISPLAY_P3), np.uint8), DISPLAY_P3.name
-    if value is None:
+    name, complaint = text_attribute(spec, "ICCProfile:profile_description") or "without a name", ""
+    profile = profile_of_codes(codes[:2] if isinstance(codes, tuple) else codes_named(name))
+    if profile is not None:
+        name = profile.color_space.name
+    elif value is not None:
+        profile, complaint = _read(bytes(value) if isinstance(value, np.ndarray) else b"")
+    if profile is not None and profile.hdr:
+        return profile, f"HDR photo ({profile.hdr}): its highlights are compressed to the range of ordinary photos."
+    if spec.nchannels < 3 or (profile is not None and _is_srgb(profile)):
         return None, ""
-    profile, complaint = _read(bytes(value) if isinstance(value, np.ndarray) else b"")
     if profile is None:
-        is_told = complaint and "sRGB" not in name
-        told = f"The colour profile '{name}' {complaint} and is ignored: colours are taken as sRGB."
-        return None, told if is_told else ""
-    if profile.color_space.name not in (SRGB.name, DISPLAY_P3.name):
+        note = f"The colour profile '{name}' {complaint} and is ignored: colours are taken as sRGB."
+        return None, note if complaint and "sRGB" not in name else ""
+    if profile.color_space.name == OWN_NAME:
         profile = replace(profile, color_space=replace(profile.color_space, name=name))
     return profile, f"Colours are those of the photo's profile, '{name}'."
 
 
+@lru_cache(maxsize=8)
+def profile_of_codes(codes: tuple[int, ...]) -> ColorProfile | None:
+    """Return the meaning of colours in numbers, primaries and transfer curve (ITU-T H.273); None for unknown ones."""
+    if len(codes) != 2 or codes[1] not in CURVES_OF_CODES or (space := space_of_number(codes[0])) is None:
+        return None
+    curve = np.tile(CURVES_OF_CODES[codes[1]](np.linspace(0, 1, KNOTS)), (3, 1)).astype(np.float32)
+    return ColorProfile(curve, space, HDR_CODES.get(codes[1], ""))
+
+
+def codes_named(name: str) -> tuple[int, ...]:
+    """Return the colours in numbers that a profile's name states, as HDR photos have them; () for other names.
+
+    "ITUR_2100_PQ_FULL" is the name that W3C's note on BT.2100 in PNG gives to such a profile.
+    """
+    curve = re.search(r"(?<![^\W_])(PQ|HLG)(?![^\W_])", name)
+    return () if curve is None else (12 if "P3" in name else 9, PQ if curve[0] == "PQ" else HLG)
+
+
 @lru_cache(maxsize=4)  # a photo is read in many parts
 def _read(data: bytes) -> tuple[ColorProfile | None, str]:
-    """None, "" for sRGB: by what is in it, as some that are linear have that in their names."""
     try:
-        profile = color_profile(data)
-        return (None if _is_srgb(profile) else profile), ""
+        return color_profile(data), ""
     except UnusableProfileError as error:
         return None, str(error)
 
 
+@lru_cache(maxsize=8)  # the profiles are kept, too
 def _is_srgb(profile: ColorProfile) -> bool:
     off = np.abs(srgb_from_linear(profile.curves) - np.linspace(0, 1, KNOTS, dtype=np.float32))
     return profile.color_space == SRGB and float(off.max()) < SAME_CURVE
@@ -120,43 +162,17 @@ def color_profile(data: bytes) -> ColorProfile:
         if data[16:24] != b"RGB XYZ ":
             raise UnusableProfileError("is not for red, green and blue")
         tags = _tags(data)
+        if (coded := profile_of_codes(tuple(tags.get(b"cicp", b"")[8:10]))) is not None and coded.hdr:
+            return coded
         matrix = np.stack([_xyz(tags[name]) for name in (b"rXYZ", b"gXYZ", b"bXYZ")], axis=1)
         curves = np.stack([_curve(tags[name]) for name in (b"rTRC", b"gTRC", b"bTRC")])
     except KeyError as error:
         raise UnusableProfileError("has no curves with a matrix") from error
     except (struct.error, IndexError) as error:
         raise UnusableProfileError("is damaged") from error
-    if not (np.isfinite(curves).all() and abs(np.linalg.det(matrix)) > LEAST_DETERMINANT):
+    if not (np.isfinite(curves).all() and abs(np.linalg.det(matrix)) > MIN_DETERMINANT):
         raise UnusableProfileError("is damaged")
-    return ColorProfile(np.clip(curves, 0, 1).astype(np.float32), _color_space(matrix))
-
-
-def _color_space(matrix: NDArray[np.float64]) -> ColorSpace:
-    """The space of these primaries; one that is known where they hardly differ."""
-    for known in (SRGB, DISPLAY_P3):
-        if np.abs(matrix - np.array(known.xyz_from_linear)).max() < SAME_PRIMARIES:
-            return known
-    red, green, blue = (tuple(map(float, row)) for row in matrix)
-    return ColorSpace("its own", (red, green, blue))  # type: ignore[arg-type]  # three numbers each
-
-
-def _space_of_chromaticities(value: Any) -> ColorSpace:
-    """Of red's, green's, blue's and white's x and y (OpenEXR's `chromaticities`), seen under D50 (Bradford); sRGB where
-    they mean nothing.
-    """
-    if not isinstance(value, tuple) or len(value) != 8:
-        return SRGB
-    xy = np.array(value, np.float64).reshape(4, 2)
-    if not (np.isfinite(xy).all() and np.abs(xy).max() < 10 and np.abs(xy[:, 1]).min() > 0):
-        return SRGB
-    xyz = np.stack([xy[:, 0] / xy[:, 1], np.ones(4), (1 - xy.sum(axis=1)) / xy[:, 1]])
-    if abs(np.linalg.det(xyz[:, :3])) < LEAST_DETERMINANT:
-        return SRGB
-    cones = BRADFORD @ np.stack([D50, xyz[:, 3]], axis=1)
-    if not (cones > 0).all():
-        return SRGB
-    adapted = np.linalg.solve(BRADFORD, (cones[:, :1] / cones[:, 1:]) * BRADFORD)
-    return _color_space(adapted @ (xyz[:, :3] * np.linalg.solve(xyz[:, :3], xyz[:, 3])))
+    return ColorProfile(np.clip(curves, 0, 1).astype(np.float32), space_of_matrix(matrix))
 
 
 def _tags(data: bytes) -> dict[bytes, bytes]:

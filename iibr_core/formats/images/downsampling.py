@@ -59,11 +59,14 @@ def downsampled_linear(
 
 
 def linear_light(raster: Raster) -> FloatImage:
-    """Linear light over black, (H, W, 3), of finite pixels; by the profile that comes with them, of its space."""
+    """Linear light over black, (H, W, 3), of finite pixels; by the profile that comes with them, of its space.
+
+    HDR photos exceed white, 1, as floating-point files do.
+    """
     pixels = raster.pixels
     profile = color_profile_of(raster.spec)[0]
-    if profile is not None and pixels.dtype.kind == "u" and pixels.shape[2] == 3:
-        linear: NDArray[Any] = profile.linear(pixels)
+    if profile is not None and pixels.dtype.kind == "u":
+        linear: NDArray[Any] = profile.linear(np.repeat(pixels, 3, axis=2) if pixels.shape[2] == 1 else pixels)
     elif pixels.dtype.kind == "u":
         steps = full_scale(pixels.dtype)
         linear = linear_from_srgb(np.arange(steps + 1, dtype=np.float32) / steps)[pixels]

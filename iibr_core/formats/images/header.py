@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import struct
 from pathlib import Path
 from typing import NamedTuple
 
 from iibr_core.formats.files import open_binary
 from iibr_core.formats.images.avif import avif_size, is_avif
 from iibr_core.formats.images.heic import heic_size, is_heic
+from iibr_core.formats.images.jpeg_segments import jpeg_segments
 from iibr_core.formats.images.oiio_reader import PictureRows
 from iibr_core.formats.images.picture_source import source_size
 from iibr_core.formats.images.side_by_side import own_picture
@@ -21,7 +21,6 @@ HEIC_BYTES = 8
 PART_BYTES = 6
 """Of a pixel of a picture of which a part is taken: 16 bits a channel at most."""
 COEFFICIENT_BYTES = 2
-JPEG_START, START_OF_SCAN = b"\xff\xd8", 0xDA
 PROGRESSIVE_FRAMES = (0xC2, 0xC6, 0xCA, 0xCE)
 PNG_INTERLACE_AT, MOST_TILE_ROWS = 28, 1024
 
@@ -65,14 +64,9 @@ def _is_interlaced(path: Path) -> bool:
 def _coefficient_bytes(path: Path) -> float:
     """A progressive JPEG's coefficients, bytes a pixel: it has them all before it has any row. 0 for others."""
     with open_binary(path) as file:
-        if file.read(2) != JPEG_START:
-            return 0.0
-        while len(mark := file.read(4)) == 4 and mark[0] == 0xFF and mark[1] != START_OF_SCAN:
-            length = struct.unpack(">H", mark[2:])[0]
-            if mark[1] in PROGRESSIVE_FRAMES:
-                return _samples_a_pixel(file.read(length - 2)) * COEFFICIENT_BYTES
-            file.seek(max(length - 2, 0), 1)
-    return 0.0
+        frames = (content for marker, content in jpeg_segments(file) if marker in PROGRESSIVE_FRAMES)
+        frame = next(frames, None)
+    return 0.0 if frame is None else _samples_a_pixel(frame) * COEFFICIENT_BYTES
 
 
 def _samples_a_pixel(frame: bytes) -> float:

@@ -26,7 +26,9 @@ EXIF_NUMBERS = {
     0xA002: "Exif:PixelXDimension",
 }
 COLOR_CODES = "color_primaries", "transfer_characteristics", "matrix_coefficients", "full_range_flag"
-"""What a HEIC may say of its colours in numbers, in the order in which PNGs do (`CICP`)."""
+"""A HEIC's colours in numbers, in the order in which PNGs have them (`CICP`)."""
+HDR_TRANSFERS = (16, 18)
+"""PQ and HLG, by the numbers of ITU-T H.273."""
 DECODE_ERRORS = (ValueError, OSError, RuntimeError, EOFError, SyntaxError, MemoryError, IndexError, struct.error)
 
 
@@ -137,7 +139,10 @@ def _pixels(path: Path, picture: Any) -> NDArray[Any]:
 
 
 def describe(spec: Any, info: Mapping[Any, Any]) -> None:
-    """Put what `read_photo` asks for into a header: focal length and colour profile, of what Pillow calls info."""
+    """Put what `read_photo` asks for into a header: focal length and colour profile, of what Pillow calls info.
+
+    A profile counts more than colours in numbers, but for the curves of HDR.
+    """
     from PIL import Image
 
     exif = Image.Exif()
@@ -149,12 +154,14 @@ def describe(spec: Any, info: Mapping[Any, Any]) -> None:
                 spec.attribute(name, float(tags[tag]))
     except (*DECODE_ERRORS, TypeError, ZeroDivisionError, KeyError):
         pass  # a photo is one without its Exif too
-    if profile := info.get("icc_profile"):
+    codes = info.get("nclx_profile") or {}
+    profile, numbers = info.get("icc_profile"), tuple(int(codes.get(name, 0)) for name in COLOR_CODES)
+    if codes and (not profile or numbers[1] in HDR_TRANSFERS):
+        spec.attribute("CICP", "int[4]", numbers)
+    elif profile:
         values = np.frombuffer(profile, np.uint8)
         spec.attribute("ICCProfile", oiio.TypeDesc(f"uint8[{len(values)}]"), values)
         spec.attribute("ICCProfile:profile_description", _profile_name(profile))
-    elif codes := info.get("nclx_profile"):
-        spec.attribute("CICP", "int[4]", tuple(int(codes.get(name, 0)) for name in COLOR_CODES))
 
 
 def _profile_name(profile: bytes) -> str:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from iibr_core.color import ROWS_AT_ONCE
 from iibr_core.formats.files import MAX_FILE_PIXELS, open_binary, reason_of, refuse_bomb, require_file
+from iibr_core.formats.images.file_kinds import raw_kind, unreadable_kind
 from iibr_core.formats.images.oiio_names import oiio_name
 from iibr_core.types import ImageSize, InputError, image_size
 
@@ -25,6 +26,11 @@ NO_READER = "could not find a format reader"
 MOST_PNG_SIDE = 1_000_000
 """As libpng has it."""
 FLOATING_TYPES = ("half", "float", "double")
+LINEAR_TRANSFERS = (2, 8)
+"""Transfer curves of ITU-T H.273 that leave light as it is: "unspecified" and "linear"."""
+MAX_ICON_PICTURES = 100
+READABLE_FORMATS = str(oiio.get_string_attribute("input_format_list")).split(",")
+PNG_ENDINGS = (".png", ".pns")
 PNG_START = b"\x89PNG\r\n\x1a\n"
 
 
@@ -93,7 +99,7 @@ class PictureRows:
         """Read the header. Raises InputError as `read_raster` does."""
         self._path = path
         self._source = _open(path)
-        self.spec = self._source.spec()
+        self.spec = _spec_of_whole_numbers(self._source.spec())
         self.format_name = str(self._source.format_name())
         self.size = ImageSize(self.spec.height, self.spec.width)
         self._colors, self._alpha_at = _channels(path, self.spec)
@@ -166,16 +172,22 @@ def _channels(path: Path, spec: Any) -> tuple[int, int]:
 
 def _open(path: Path) -> Any:
     require_file(path)
-    if path.suffix.lower() == ".png":
+    if "raw" not in READABLE_FORMATS and (raw := raw_kind(path)) is not None:
+        raise InputError(f"{path}: is {raw.name}; {raw.way_out}")
+    if path.suffix.lower() in PNG_ENDINGS:
         require_whole_png(path)
     hints = oiio.ImageSpec()
     hints.attribute("oiio:UnassociatedAlpha", 1)
     source = oiio.ImageInput.open(oiio_name(path), hints)
     if source is None:
         complaint = complaint_of(oiio)
+        if (kind := unreadable_kind(path)) is not None:
+            raise InputError(f"{path}: is {kind.name}; {kind.way_out}")
         if NO_READER in complaint:
             raise InputError(f"{path}: cannot be read as a picture (of no known kind); save it as JPEG, PNG or TIFF")
         raise InputError(f"{path}: cannot be read as a picture ({_reason(complaint, path)})")
+    if source.format_name() == "ico":
+        _seek_largest(source)
     spec = source.spec()
     if spec.width * spec.height > MAX_FILE_PIXELS:
         raise InputError(f"{path}: {spec.width}x{spec.height} exceed {MAX_FILE_PIXELS:,} pixels; make it smaller")
@@ -183,6 +195,15 @@ def _open(path: Path) -> Any:
         raise InputError(f"{path}: {spec.width}x{spec.height}x{spec.depth} is no flat picture")
     refuse_bomb(path, spec.image_bytes())
     return source
+
+
+def _seek_largest(source: Any) -> None:
+    """Go to the largest picture of an icon."""
+    sizes: list[int] = []
+    while len(sizes) < MAX_ICON_PICTURES and source.seek_subimage(len(sizes), 0):
+        sizes.append(source.spec().width * source.spec().height)
+    complaint_of(source)
+    source.seek_subimage(sizes.index(max(sizes)), 0)
 
 
 def require_whole_png(path: Path) -> None:
@@ -213,6 +234,14 @@ def require_whole_png(path: Path) -> None:
 def full_scale(dtype: Any) -> int:
     """The value of pixels of this type that is white, or opaque."""
     return np.iinfo(dtype).max if dtype.kind == "u" else 1
+
+
+def _spec_of_whole_numbers(spec: Any) -> Any:
+    """Return the header of a picture, with 16 bits for floating-point numbers that are encoded (JPEG XL), not light."""
+    codes = spec.getattribute("CICP")
+    if str(spec.format) in FLOATING_TYPES and isinstance(codes, tuple) and codes[1] not in LINEAR_TRANSFERS:
+        spec.set_format("uint16")
+    return spec
 
 
 def _reading_type(stored: Any) -> str:

@@ -1,12 +1,13 @@
-"""Photos in, pictures out. Integer files are sRGB-encoded as they are; floating-point files hold linear light.
+"""Photos in, pictures out. Integer files are encoded as they state; floating-point files hold linear light.
 
-Everything that changes the photo on the way in (alpha, size, odd values, colour profile) is said in its notes.
+Everything that changes the photo on the way in (alpha, size, odd values, colour profile, HDR) is said in its notes.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,8 @@ from iibr_core.formats.files import require_file, shown_name
 from iibr_core.formats.images.avif import is_avif
 from iibr_core.formats.images.color_profile import color_profile_of, color_space_of
 from iibr_core.formats.images.downsampling import OddValues, downsampled_linear, finite_pixels, linear_light
+from iibr_core.formats.images.file_notes import file_notes
+from iibr_core.formats.images.hdr import tone_map
 from iibr_core.formats.images.heic import is_heic
 from iibr_core.formats.images.oiio_reader import PictureRows, Raster, text_attribute, upright
 from iibr_core.formats.images.oiio_writer import PNG_SETTINGS, write_image_file
@@ -40,14 +43,15 @@ def read_photo(
     keeps_primaries: bool = False,
     should_stop: ShouldStop = never,
 ) -> Photo:
-    """Read a JPEG, PNG, TIFF, EXR, HDR, WebP (whatever OpenImageIO reads), HEIC or AVIF as a photo, upright,
-    max_pixels large at most; of two pictures side by side, as their file's name says, the left eye's.
+    """Read a JPEG, PNG, TIFF, EXR, HDR, WebP, JPEG XL (whatever OpenImageIO reads), HEIC or AVIF as a photo, upright,
+    max_pixels large at most: of a stereo pair the left eye's picture, of an animation the first.
 
     fov_deg: horizontal field of view where the file gives no focal length. keeps_primaries: the photo stays in the
     colour space of its file, else it is converted to sRGB, which cuts off what that lacks. Raises InputError, naming
     the file, if it is missing, no picture, cut off, or absurdly large; Cancelled once should_stop is true.
     """
-    return read_picture(own_picture(Path(path)), max_pixels, fov_deg, keeps_primaries, should_stop)
+    photo = read_picture(own_picture(Path(path)), max_pixels, fov_deg, keeps_primaries, should_stop)
+    return replace(photo, notes=photo.notes + file_notes(Path(path)))
 
 
 def read_picture(
@@ -69,7 +73,7 @@ def read_picture(
     else:
         averaged = downsampled_linear(lambda: rows if rows.is_at_start else _open_rows(source), size, should_stop)
         linear, is_opaque, odd = averaged
-        encoded = _encode_in_place(linear)
+        encoded = _encode_light(linear, spec)
     space = color_space_of(spec)
     if not keeps_primaries:
         encoded, space = convert(encoded, SRGB, space), SRGB
@@ -135,7 +139,7 @@ def _encode(raster: Raster) -> tuple[FloatImage, bool, OddValues]:
     Opaque integer files without a profile pass untouched: they are encoded already.
     """
     profile = color_profile_of(raster.spec)[0]
-    if raster.pixels.dtype.kind == "u" and raster.alpha is None:
+    if raster.pixels.dtype.kind == "u" and raster.alpha is None and not (profile and profile.hdr):
         if profile is not None and raster.pixels.shape[2] == 3:
             return profile.encoded(raster.pixels), True, OddValues(0, 0.0)
         encoded = raster.pixels.astype(np.float32) * np.float32(1 / np.iinfo(raster.pixels.dtype).max)
@@ -143,11 +147,18 @@ def _encode(raster: Raster) -> tuple[FloatImage, bool, OddValues]:
         whole = np.repeat(encoded, 3, axis=2) if encoded.shape[2] == 1 else encoded
         return np.ascontiguousarray(whole), True, OddValues(0, 0.0)
     pixels, odd = finite_pixels(raster.pixels)
-    return _encode_in_place(linear_light(Raster(pixels, raster.alpha, raster.spec))), raster.alpha is None, odd
+    linear = linear_light(Raster(pixels, raster.alpha, raster.spec))
+    return _encode_light(linear, raster.spec), raster.alpha is None, odd
 
 
-def _encode_in_place(linear: FloatImage) -> FloatImage:
-    """The same array, sRGB-encoded; a few rows at a time, as that takes some times their memory."""
+def _encode_light(linear: FloatImage, spec: Any) -> FloatImage:
+    """The same array, tone-mapped where the photo is HDR by its profile, then sRGB-encoded.
+
+    A few rows at a time, as that takes some times their memory.
+    """
+    profile = color_profile_of(spec)[0]
+    if profile is not None and profile.hdr:
+        tone_map(linear)
     for first in range(0, len(linear), ROWS_AT_ONCE):
         rows = linear[first : first + ROWS_AT_ONCE]
         rows[:] = srgb_from_linear(rows)
@@ -170,6 +181,8 @@ def _color_notes(spec: Any) -> tuple[str, ...]:
     stored_as = text_attribute(spec, "jpeg:ColorSpace") or text_attribute(spec, "tiff:ColorSpace")
     if "CMYK" in stored_as or "YCCK" in stored_as:
         return ("CMYK was converted to RGB without its colour profile.",)
+    if "LAB" in stored_as:
+        return ("Lab was converted to RGB with a tint: save the photo as RGB for its true colours.",)
     note = color_profile_of(spec)[1]
     return (note,) if note else ()
 

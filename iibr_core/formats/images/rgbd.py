@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import re
-from contextlib import suppress
 from functools import lru_cache
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image
 
 from iibr_core.formats.files import status_of
-from iibr_core.formats.images.oiio_reader import read_orientation, upright
+from iibr_core.formats.images.oiio_reader import read_orientation
 from iibr_core.formats.images.picture_source import PicturePart, PictureSource, source_size
+from iibr_core.formats.images.small_picture import small_picture
 from iibr_core.types import ImageSize
 
 TAG = re.compile(r"(?:[_.-]|^)rgbd$", re.IGNORECASE)
@@ -47,23 +46,13 @@ def _parts(path: Path, modified_ns: int, size_bytes: int) -> tuple[PictureSource
     is_named = TAG.search(path.stem) is not None
     if min(size) < 2 or not (is_named or max(size) >= LEAST_ASPECT * min(size)):
         return None
-    pixels = _small_picture(path)
+    pixels = small_picture(path, LOOKED_AT_PX)
     # A named one may have any shape: the longer side is tried first.
     axes = (0, 1) if size.height > size.width else (1, 0)
     for axis in axes if is_named else axes[:1]:
         grey = None if pixels is None else _grey_half(pixels, axis, 0.0 if is_named else LEAST_COLORED)
         if grey is not None:
             return _halves(path, size, axis, grey)
-    return None
-
-
-def _small_picture(path: Path) -> NDArray[np.uint8] | None:
-    """(h, w, 3), upright, not smoothed; None where Pillow does not read the file."""
-    with suppress(OSError, ValueError, SyntaxError, Image.DecompressionBombError), Image.open(path) as picture:
-        picture.draft("RGB", (2 * LOOKED_AT_PX, 2 * LOOKED_AT_PX))
-        ratio = max(max(picture.size) / LOOKED_AT_PX, 1.0)
-        small = picture.resize([max(round(side / ratio), 2) for side in picture.size], Image.Resampling.NEAREST)
-        return upright(np.asarray(small.convert("RGB")), read_orientation(path))
     return None
 
 

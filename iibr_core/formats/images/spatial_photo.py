@@ -7,7 +7,6 @@ pillow-heif encodes the pictures; what makes two of them a pair, a `ster` group 
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterator
 from io import BytesIO
 from pathlib import Path
 from uuid import UUID
@@ -16,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.formats.files import reason_of
+from iibr_core.formats.images.iso_boxes import box, boxes
 from iibr_core.formats.outputs import atomic_write
 from iibr_core.types import InputError
 
@@ -58,11 +58,11 @@ def _encode(path: Path, left: NDArray[np.uint8], right: NDArray[np.uint8]) -> by
 
 def _with_pair(file: bytes, focal: float) -> bytes:
     """With the pair's boxes. focal: focal length as a share of the width."""
-    top = dict(_boxes(file))
-    meta = dict(_boxes(top[b"meta"][4:]))
-    iprp = dict(_boxes(meta[b"iprp"]))
+    top = dict(boxes(file))
+    meta = dict(boxes(top[b"meta"][4:]))
+    iprp = dict(boxes(meta[b"iprp"]))
     left, right = (item for item, _ in _associations(iprp[b"ipma"]))
-    known = sum(1 for _ in _boxes(iprp[b"ipco"]))
+    known = sum(1 for _ in boxes(iprp[b"ipco"]))
     # Properties are counted from 1, in their order.
     new = [
         _intrinsics(focal),
@@ -74,34 +74,21 @@ def _with_pair(file: bytes, focal: float) -> bytes:
     entries = [(item, [*held, *(known + i for i in own[item])]) for item, held in _associations(iprp[b"ipma"])]
     iprp[b"ipco"] += b"".join(new)
     iprp[b"ipma"] = _ipma(entries)
-    meta[b"iprp"] = b"".join(_box(kind, content) for kind, content in iprp.items())
+    meta[b"iprp"] = b"".join(box(kind, content) for kind, content in iprp.items())
     group = struct.pack(">IIIII", 0, max(left, right) + 1, 2, left, right)
-    meta[b"grpl"] = _box(b"ster", group)
+    meta[b"grpl"] = box(b"ster", group)
     moved = len(_meta(top[b"meta"], meta)) - len(top[b"meta"])
     meta[b"iloc"] = _moved_iloc(meta[b"iloc"], moved)
     top[b"meta"] = _meta(top[b"meta"], meta)
-    return b"".join(_box(kind, content) for kind, content in top.items())
+    return b"".join(box(kind, content) for kind, content in top.items())
 
 
-def _boxes(content: bytes) -> Iterator[tuple[bytes, bytes]]:
-    """The kind and content of each box in another."""
-    at = 0
-    while at < len(content):
-        size, kind = struct.unpack_from(">I4s", content, at)
-        yield kind, content[at + 8 : at + size]
-        at += size
-
-
-def _box(kind: bytes, content: bytes) -> bytes:
-    return struct.pack(">I4s", 8 + len(content), kind) + content
-
-
-def _meta(before: bytes, boxes: dict[bytes, bytes]) -> bytes:
-    return before[:4] + b"".join(_box(kind, content) for kind, content in boxes.items())
+def _meta(before: bytes, contents: dict[bytes, bytes]) -> bytes:
+    return before[:4] + b"".join(box(kind, content) for kind, content in contents.items())
 
 
 def _uuid(kind: bytes, flags: int, *numbers: int) -> bytes:
-    return _box(b"uuid", kind + struct.pack(f">I{len(numbers)}i", flags, *numbers))
+    return box(b"uuid", kind + struct.pack(f">I{len(numbers)}i", flags, *numbers))
 
 
 def _intrinsics(focal: float) -> bytes:

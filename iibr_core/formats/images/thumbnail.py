@@ -54,13 +54,14 @@ def _jpeg_thumbnail(path: Path, within: ImageSize) -> NDArray[np.uint8] | None:
 
 
 def _any_thumbnail(path: Path, within: ImageSize, should_stop: ShouldStop) -> NDArray[np.uint8]:
-    from iibr_core.formats.images.photo import read_photo
+    from iibr_core.formats.images.photo import read_picture
 
     size = read_photo_header(path).size
     if math.prod(size) > MAX_FILE_PIXELS:
         raise InputError(f"{path}: {size} is more than any photo has")
     smaller = min(within.height / size.height, within.width / size.width, 1.0)
-    pixels = read_photo(path, max(math.floor(math.prod(size) * smaller**2), 1), should_stop=should_stop).pixels
+    max_pixels = max(math.floor(math.prod(size) * smaller**2), 1)
+    pixels = read_picture(own_picture(path), max_pixels, should_stop=should_stop).pixels
     # One that was turned may still be too large, as may a very narrow one.
     step = max(math.ceil(pixels.shape[0] / within.height), math.ceil(pixels.shape[1] / within.width), 1)
     return np.round(np.nan_to_num(pixels[::step, ::step]).clip(0.0, 1.0) * 255).astype(np.uint8)

@@ -35,9 +35,8 @@ def read_stereo_file(path: Path) -> MultiView | None:
 
 def _pair(path: Path) -> tuple[str, tuple[PictureSource, PictureSource]] | None:
     """What it is, and the left eye's picture and the right one's."""
-    if is_heic(path):
-        numbers = heic_pair(path)
-        return None if numbers is None else ("spatial HEIC", _numbered(path, *numbers))
+    if is_heic(path) and (numbers := heic_pair(path)) is not None:
+        return "spatial HEIC", _numbered(path, *numbers)
     side_by_side = side_by_side_pair(path)
     if side_by_side is not None:
         return "side-by-side stereo", side_by_side

@@ -292,10 +292,10 @@ def test_missing_folder_empty_or_no_picture(tmp_path):
     (tmp_path / "notes.txt").write_text("this is no picture")
     (tmp_path / "folder.png").mkdir()
     for name, reason in [
-        ("notes.txt", r"no known kind\); save it as JPEG"),
+        ("notes.txt", "is a text file, not a picture"),
         ("none.png", "no such file"),
         ("empty.png", "empty"),
-        ("text.jpg", "cannot be read"),
+        ("text.jpg", "is a text file, not a picture"),
         ("folder.png", "is a folder"),
     ]:
         with pytest.raises(InputError, match=reason) as caught:

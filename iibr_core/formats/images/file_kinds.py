@@ -1,0 +1,87 @@
+"""Kinds of files that people take for pictures and that are not read here, with what to do instead."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import NamedTuple
+
+from iibr_core.formats.files import open_binary
+
+START_BYTES = 1024
+BYTE_ORDER_MARK = b"\xef\xbb\xbf"
+RAW_ENDING = re.compile(
+    r"\.(3fr|arw|cr[23w]|dcr|dng|erf|fff|gpr|iiq|kdc|mef|mos|mrw|n[er][fw]|orf|pef|raf|rw[2l]|sr[2fw]|x3f)",
+    re.IGNORECASE,
+)
+RAW_STARTS = re.compile(
+    rb"II\*\0.{4}CR|II\x1a\0.{4}HEAPCCDR|FUJIFILMCCD-RAW|FOVb|\0MRM|IIU\0|IIR[OS]\x08?|MMOR|.{4}ftypcrx ", re.DOTALL
+)
+TIFF_STARTS = (b"II*\0", b"MM\0*")
+
+
+class FileKind(NamedTuple):
+    """name: of the kind, with its article. way_out: what to do to get a picture."""
+
+    name: str
+    way_out: str
+
+
+RAW = FileKind("a camera's RAW file", "develop it and save it as TIFF or JPEG")
+VIDEO = FileKind("a video", "save one of its frames as PNG or JPEG")
+ARCHIVE = FileKind("an archive", "unpack it and open the picture in it")
+DAMAGED_JPEG_XL = FileKind("JPEG XL, but damaged or of a newer kind", "save it as PNG or AVIF")
+KINDS: tuple[tuple[bytes, FileKind], ...] = (
+    (rb"\xff\x0a|\0\0\0\x0cJXL ", DAMAGED_JPEG_XL),
+    (rb"%PDF-", FileKind("a PDF document", "save the page or its picture as PNG")),
+    (rb"%!PS|\xc5\xd0\xd3\xc6", FileKind("a PostScript drawing", "save it as PNG")),
+    (rb"(?i)(<\?xml[^>]*>|<!--.*?-->|<!DOCTYPE svg[^>]*>|\s)*<svg\b", FileKind("a drawing (SVG)", "save it as PNG")),
+    (
+        rb"(?i)(<\?xml[^>]*>|<!--.*?-->|\s)*<(!DOCTYPE html|html|head|body|script)\b",
+        FileKind("a web page, not a picture", "download the picture itself"),
+    ),
+    (rb"gimp xcf", FileKind("a GIMP image (XCF)", "export it as PNG")),
+    (rb"\x93NUMPY", FileKind("an array of numbers (NumPy)", "give it as a map with --disparity")),
+    (rb"ply\r?\n|glTF", FileKind("a 3D model", "save a view of it as PNG")),
+    (rb"version https://git-lfs", FileKind("a pointer of Git LFS", "get the file itself with `git lfs pull`")),
+    (rb"PK\x03\x04|\x1f\x8b|7z\xbc\xaf\x27\x1c|Rar!|\xfd7zXZ|BZh|\x28\xb5\x2f\xfd", ARCHIVE),
+    (rb"\x1aE\xdf\xa3|RIFF.{4}AVI |\x30\x26\xb2\x75|FLV\x01|\0\0\x01[\xb3\xba]", VIDEO),
+    (rb"[\0-\x08].{3}(moov|mdat|wide|free|skip|ftyp(?!mif|msf|miaf|hei|hev|avi|jp|tmap))", VIDEO),
+)
+"""Starts of files, as regular expressions, and what kind each begins."""
+TEXT = FileKind("a text file, not a picture", "get the picture itself")
+
+
+def raw_kind(path: Path) -> FileKind | None:
+    """Return the kind of a camera's RAW file; None for other files. Raises InputError where it cannot be read.
+
+    Most begin as TIFF does, and hold a small preview that other programs take for the picture.
+    """
+    start = _start(path)
+    is_raw = RAW_STARTS.match(start) or (RAW_ENDING.fullmatch(path.suffix) and start.startswith(TIFF_STARTS))
+    return RAW if is_raw else None
+
+
+def unreadable_kind(path: Path) -> FileKind | None:
+    """Return the kind of a file that no reader took; None for an unknown one. Raises InputError as `raw_kind` does."""
+    start = _start(path).removeprefix(BYTE_ORDER_MARK)
+    for pattern, kind in KINDS:
+        if re.match(pattern, start, re.DOTALL):
+            return kind
+    if RAW_ENDING.fullmatch(path.suffix):
+        return RAW
+    return TEXT if _is_text(start) else None
+
+
+def _start(path: Path) -> bytes:
+    with open_binary(path) as file:
+        return file.read(START_BYTES)
+
+
+def _is_text(start: bytes) -> bool:
+    try:
+        text = start.decode()
+    except UnicodeDecodeError as error:
+        # A character may be cut in two.
+        text = start[: error.start].decode() if error.start >= START_BYTES - 6 else ""
+    return bool(text) and all(character.isprintable() or character.isspace() for character in text)

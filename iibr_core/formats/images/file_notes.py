@@ -1,0 +1,58 @@
+"""Notes about a photo's file, for people: stereo pairs, panoramas, animations; of these one flat picture is shown."""
+
+from __future__ import annotations
+
+import warnings
+from contextlib import suppress
+from pathlib import Path
+
+from iibr_core.formats.images.heic import DECODE_ERRORS
+from iibr_core.formats.images.metadata import read_metadata
+from iibr_core.formats.images.side_by_side import stated_pair
+from iibr_core.formats.images.xmp_packet import parse_packet, value_in
+from iibr_core.types import InputError
+
+GPANO = "http://ns.google.com/photos/1.0/panorama/"
+GIMAGE = "http://ns.google.com/photos/1.0/image/"
+GDEPTH = "http://ns.google.com/photos/1.0/depthmap/"
+ANIMATED_FORMATS = ("GIF", "PNG", "WEBP", "AVIF")
+
+
+def file_notes(path: Path) -> tuple[str, ...]:
+    """Return a sentence for each thing in a photo's file that is shown in part or otherwise than it is meant.
+
+    Raises InputError as `stated_pair` does; a damaged header gives no notes.
+    """
+    pair = stated_pair(path)
+    return (*(() if pair is None else (pair.note,)), *_panorama_notes(path), *_animation_notes(path))
+
+
+def _panorama_notes(path: Path) -> tuple[str, ...]:
+    """Notes by the photo's XMP, as Google's cameras write it for panoramas and photos with a right eye's picture."""
+    xmp = read_metadata(path).xmp
+    if GPANO.encode() not in xmp and GIMAGE.encode() not in xmp:
+        return ()
+    try:
+        tree = parse_packet(xmp)
+    except InputError:
+        return ()
+    notes: tuple[str, ...] = ()
+    projection = value_in(tree, GPANO, "ProjectionType")
+    if projection is not None or value_in(tree, GPANO, "FullPanoWidthPixels") is not None:
+        kind = f" ({projection.strip()})" if projection and projection.strip().isalpha() else ""
+        notes += (f"Panorama{kind}: shown flat, as if it were an ordinary photo, so straight lines look bent.",)
+    # Photos with a depth map hold the picture before it was blurred.
+    if value_in(tree, GIMAGE, "Mime") is not None and GDEPTH.encode() not in xmp:
+        notes += ("The right eye's picture in it (Cardboard Camera, VR180) is not used.",)
+    return notes
+
+
+def _animation_notes(path: Path) -> tuple[str, ...]:
+    from PIL import Image
+
+    count = 1
+    with suppress(*DECODE_ERRORS, Image.DecompressionBombError), warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        with Image.open(path, formats=ANIMATED_FORMATS) as image:
+            count = getattr(image, "n_frames", 1)
+    return (f"Animation: the first of its {count} pictures is used.",) if count > 1 else ()

@@ -1,0 +1,70 @@
+"""Boxes of ISO base media files (ISO/IEC 14496-12), which AVIF and HEIC files consist of."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterator
+
+COLOR_CODES_BYTES = 11
+"""Size of a `colr` box's content that gives colours in numbers: its type, three numbers of 2 bytes, a flag."""
+
+
+def boxes(content: bytes) -> Iterator[tuple[bytes, bytes]]:
+    """Yield the kind and content of each box in `content`; a box that is cut off ends them."""
+    at = 0
+    while at + 8 <= len(content):
+        size, kind = struct.unpack_from(">I4s", content, at)
+        header = 8
+        if size == 1 and at + 16 <= len(content):
+            (size,), header = struct.unpack_from(">Q", content, at + 8), 16
+        end = len(content) if size == 0 else at + size
+        if not at + header <= end <= len(content):
+            return
+        yield kind, content[at + header : end]
+        at = end
+
+
+def box(kind: bytes, content: bytes) -> bytes:
+    """Return a box with a header of 8 bytes."""
+    return struct.pack(">I4s", 8 + len(content), kind) + content
+
+
+def color_codes_of(file: bytes) -> tuple[int, int, int, int] | None:
+    """Return a picture's colours in numbers (ITU-T H.273): primaries, transfer curve, matrix, full range; None without.
+
+    file: an AVIF or HEIC file, as far as its `meta` box at least. The codes are those of its primary picture.
+    """
+    try:
+        meta = dict(boxes(dict(boxes(file))[b"meta"][4:]))
+        iprp = dict(boxes(meta[b"iprp"]))
+        properties = list(boxes(iprp[b"ipco"]))
+        numbers = _properties_of(_primary_item(meta[b"pitm"]), iprp[b"ipma"])
+    except (KeyError, IndexError, struct.error):
+        return None
+    held = (properties[number - 1] for number in numbers if 1 <= number <= len(properties))
+    for kind, content in held:
+        if kind == b"colr" and content[:4] == b"nclx" and len(content) >= COLOR_CODES_BYTES:
+            primaries, transfer, matrix = struct.unpack_from(">HHH", content, 4)
+            return primaries, transfer, matrix, content[10] >> 7
+    return None
+
+
+def _primary_item(pitm: bytes) -> int:
+    item: int = struct.unpack_from(">I" if pitm[0] else ">H", pitm, 4)[0]
+    return item
+
+
+def _properties_of(wanted: int, ipma: bytes) -> list[int]:
+    """Return the numbers of an item's properties, counted from 1 (ISO/IEC 23008-12, `ipma`)."""
+    version, has_wide_numbers = ipma[0], ipma[3] & 1
+    (count,), at = struct.unpack_from(">I", ipma, 4), 8
+    item_form, item_bytes = (">H", 2) if version < 1 else (">I", 4)
+    for _ in range(count):
+        (item,), held = struct.unpack_from(item_form, ipma, at), ipma[at + item_bytes]
+        at += item_bytes + 1
+        size = 2 if has_wide_numbers else 1
+        if item == wanted:
+            entries = (int.from_bytes(ipma[at + size * k : at + size * (k + 1)], "big") for k in range(held))
+            return [entry & (0x7FFF if has_wide_numbers else 0x7F) for entry in entries]
+        at += size * held
+    return []

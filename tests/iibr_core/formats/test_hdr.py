@@ -1,0 +1,239 @@
+"""HDR photos (PQ, HLG) in every kind of file: ordinary light comes back as it was, highlights are compressed."""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from pathlib import Path
+
+import numpy as np
+import OpenImageIO as oiio
+import pillow_heif
+import pytest
+from numpy.typing import NDArray
+from PIL import Image
+
+from iibr_core.color import linear_from_srgb, srgb_from_linear
+from iibr_core.formats.images.color_primaries import space_of_chromaticities, space_of_number
+from iibr_core.formats.images.color_profile import codes_named, color_profile, profile_of_codes
+from iibr_core.formats.images.hdr import KNEE, hlg_display_light, hlg_scene_light, pq_light, tone_map
+from iibr_core.formats.images.photo import read_photo
+from iibr_core.formats.images.thumbnail import read_thumbnail
+from iibr_core.types import DISPLAY_P3, SRGB, ImageSize
+from tests.iibr_core.formats.test_color_profile import profile_bytes
+
+PQ, HLG = (9, 16, 0, 1), (9, 18, 0, 1)
+BT2020_FROM_SRGB = np.array([[0.6274, 0.3293, 0.0433], [0.0691, 0.9195, 0.0114], [0.0164, 0.0880, 0.8956]])
+
+
+def scene(height: int = 48, width: int = 64) -> NDArray[np.uint8]:
+    """Smooth colours below white, which lossy formats keep."""
+    y, x = np.mgrid[0:height, 0:width]
+    return np.stack([110 + x, 170 - y, 130 + 40 * np.sin(x / 15)], axis=-1).astype(np.uint8)
+
+
+def encoded(linear: NDArray[np.float64], codes: tuple[int, ...]) -> NDArray[np.uint16]:
+    """Light of sRGB, 1 = white, as PQ or HLG of BT.2020, by their inverse: a table of what each value means."""
+    values = np.linspace(0, 1, 65536)
+    light = linear @ BT2020_FROM_SRGB.T
+    if codes == HLG:
+        # The other way round of the display: light in front of the camera, of its luminance.
+        luminance = np.maximum(light @ (0.2627, 0.6780, 0.0593), 1e-9) * 203 / 1000
+        light = light * (203 / 1000) * (luminance ** (1 / 1.2 - 1))[..., None]
+    table = hlg_scene_light(values) if codes == HLG else pq_light(values)
+    return np.interp(light, table, values * 65535).round().astype(np.uint16)
+
+
+def chunked(png: bytes, kind: bytes, content: bytes) -> bytes:
+    """A PNG with one more chunk behind its header."""
+    chunk = struct.pack(">I", len(content)) + kind + content + struct.pack(">I", zlib.crc32(kind + content))
+    return png[:33] + chunk + png[33:]
+
+
+def write_oiio(path: Path, pixels: NDArray[np.uint16], kind: str = "uint16", **attributes: tuple[int, ...]) -> None:
+    spec = oiio.ImageSpec(pixels.shape[1], pixels.shape[0], pixels.shape[2], "uint16")
+    spec.set_format(kind)
+    spec.attribute("oiio:UnassociatedAlpha", 1)
+    for name, value in attributes.items():
+        spec.attribute(name, f"int[{len(value)}]", value)
+    output = oiio.ImageOutput.create(str(path))
+    assert output.open(str(path), spec), output.geterror()
+    assert output.write_image(pixels)
+    output.close()
+
+
+def write_png(path: Path, pixels: NDArray[np.uint16], codes: tuple[int, ...]) -> None:
+    write_oiio(path, pixels)
+    path.write_bytes(chunked(path.read_bytes(), b"cICP", bytes(codes)))
+
+
+def write_heic(path: Path, pixels: NDArray[np.uint16], codes: tuple[int, ...]) -> None:
+    size = pixels.shape[1::-1]
+    file = pillow_heif.from_bytes(mode="RGB;16", size=size, data=np.ascontiguousarray(pixels).tobytes())
+    numbers = {"color_primaries": codes[0], "transfer_characteristics": codes[1], "matrix_coefficients": 9}
+    file.save(path, quality=100, chroma=444, full_range_flag=1, **numbers)
+
+
+def write_avif(path: Path, pixels: NDArray[np.uint16], codes: tuple[int, ...]) -> None:
+    """Pillow writes 8 bits, and sRGB's numbers, which are changed here."""
+    Image.fromarray((pixels / 257).round().astype(np.uint8)).save(path, quality=100, subsampling="4:4:4")
+    data = path.read_bytes()
+    assert data.count(b"nclx\0\x01\0\x0d") == 1
+    path.write_bytes(data.replace(b"nclx\0\x01\0\x0d", b"nclx" + struct.pack(">HH", *codes[:2])))
+
+
+def write_jxl(path: Path, pixels: NDArray[np.uint16], codes: tuple[int, ...]) -> None:
+    write_oiio(path, pixels, CICP=codes)
+
+
+def write_float_jxl(path: Path, pixels: NDArray[np.uint16], codes: tuple[int, ...]) -> None:
+    write_oiio(path, pixels, "float", CICP=codes)
+
+
+# How much a value differs on average, of 255.
+WRITERS = {
+    "a.png": (write_png, 0.05),
+    "a.heic": (write_heic, 0.8),
+    "a.avif": (write_avif, 3.5),
+    "a.jxl": (write_jxl, 0.05),
+    "float.jxl": (write_float_jxl, 0.05),
+}
+
+
+@pytest.mark.parametrize("codes", [PQ, HLG], ids=["PQ", "HLG"])
+@pytest.mark.parametrize("name", WRITERS)
+def test_light_up_to_white_comes_back_and_the_photo_says_that_it_was_hdr(
+    tmp_path: Path, name: str, codes: tuple[int, ...]
+) -> None:
+    write, tolerance = WRITERS[name]
+    write(tmp_path / name, encoded(linear_from_srgb(scene() / 255), codes), codes)
+    photo = read_photo(tmp_path / name)
+    assert np.abs(255 * photo.pixels - scene()).mean() < tolerance
+    assert not photo.is_hdr
+    curve = "PQ" if codes == PQ else "HLG"
+    assert photo.notes == (f"HDR photo ({curve}): its highlights are compressed to the range of ordinary photos.",)
+    kept = read_photo(tmp_path / name, keeps_primaries=True)
+    assert kept.color_space.name == "BT.2020"
+    smaller = read_photo(tmp_path / name, max_pixels=48 * 64 // 4)
+    halved = linear_from_srgb(scene() / 255).reshape(24, 2, 32, 2, 3).mean(axis=(1, 3))
+    assert np.abs(255 * (smaller.pixels - srgb_from_linear(halved))).mean() < tolerance
+    thumbnail = read_thumbnail(tmp_path / name, ImageSize(24, 32))
+    assert np.abs(thumbnail - 255 * srgb_from_linear(halved)).mean() < tolerance + 0.5
+
+
+@pytest.mark.parametrize("codes", [PQ, HLG], ids=["PQ", "HLG"])
+def test_highlights_are_compressed_and_keep_their_order_and_hue(tmp_path: Path, codes: tuple[int, ...]) -> None:
+    ramp = np.linspace(0.02, 4, 64)
+    light = np.stack([np.tile(ramp, (8, 1))] * 3, axis=-1)
+    light[4:] *= (1.0, 0.5, 0.25)
+    write_png(tmp_path / "a.png", encoded(light, codes), codes)
+    photo = read_photo(tmp_path / "a.png")
+    found = linear_from_srgb(photo.pixels)
+    is_low = light[0, :, 0] < KNEE
+    assert np.abs(found[:, is_low] - light[:, is_low]).max() < 2e-3
+    assert (np.diff(found[0, :, 0]) > 0).all()
+    assert found.max() == pytest.approx(1, abs=1e-3)
+    assert not photo.is_hdr
+    kept = linear_from_srgb(read_photo(tmp_path / "a.png", keeps_primaries=True).pixels)
+    np.testing.assert_allclose(kept[5, :, 1] / kept[5, :, 0], kept[5, 0, 1] / kept[5, 0, 0], rtol=0.01)
+
+
+def test_a_grey_photo_may_be_hdr(tmp_path: Path) -> None:
+    grey = linear_from_srgb(np.linspace(0.1, 0.9, 32))[None, :, None] * np.ones((8, 1, 3))
+    write_oiio(tmp_path / "a.png", encoded(grey, PQ)[..., :1])
+    (tmp_path / "a.png").write_bytes(chunked((tmp_path / "a.png").read_bytes(), b"cICP", bytes(PQ)))
+    assert np.abs(linear_from_srgb(read_photo(tmp_path / "a.png").pixels) - grey).max() < 1e-3
+
+
+def test_of_transparent_photos_the_light_is_laid_over_black(tmp_path: Path) -> None:
+    pixels = encoded(linear_from_srgb(scene() / 255), PQ)
+    rgba = np.dstack([pixels, np.full(pixels.shape[:2], 32768, np.uint16)])
+    write_png(tmp_path / "a.png", rgba, PQ)
+    found = linear_from_srgb(read_photo(tmp_path / "a.png").pixels)
+    assert np.abs(found - linear_from_srgb(scene() / 255) / 2).max() < 2e-3
+
+
+@pytest.mark.parametrize(
+    ("name", "codes"),
+    [
+        ("ITUR_2100_PQ_FULL", (9, 16)),
+        ("Rec. ITU-R BT.2100 HLG", (9, 18)),
+        ("Display P3 PQ", (12, 16)),
+        ("HP PQ27 monitor", ()),
+        ("sRGB IEC61966-2.1", ()),
+    ],
+)
+def test_profiles_of_hdr_are_known_by_their_names(name: str, codes: tuple[int, ...]) -> None:
+    assert codes_named(name) == codes
+
+
+@pytest.mark.parametrize("kind", ["jpg", "tif", "png"])
+def test_a_profile_may_say_in_numbers_that_it_is_pq(tmp_path: Path, kind: str) -> None:
+    """As profiles of version 4.4 do: ICC.1:2022, clause 9.2.17."""
+    profile = bytearray(profile_bytes())
+    count = int.from_bytes(profile[128:132], "big")
+    at = 132 + 12 * (count - 1)
+    profile[at : at + 12] = struct.pack(">4sII", b"cicp", len(profile), 12)
+    profile += b"cicp\0\0\0\0" + bytes(PQ)
+    profile[:4] = len(profile).to_bytes(4, "big")
+    assert color_profile(bytes(profile)).hdr == "PQ"
+    pixels = (encoded(linear_from_srgb(scene() / 255), PQ) / 257).round().astype(np.uint8)
+    options = {"quality": 100, "subsampling": 0} if kind == "jpg" else {}
+    Image.fromarray(pixels).save(tmp_path / f"a.{kind}", icc_profile=bytes(profile), **options)
+    photo = read_photo(tmp_path / f"a.{kind}")
+    assert np.abs(255 * photo.pixels - scene()).mean() < (3 if kind == "jpg" else 1.5)
+    assert photo.notes[0].startswith("HDR photo (PQ)")
+
+
+def test_curves_have_the_values_of_the_standards() -> None:
+    """BT.2100, BT.2408: 58 % of PQ and 75 % of HLG are 203 cd/m2, reference white."""
+    assert pq_light(np.array([0.0, 0.5807, 1.0])) == pytest.approx([0, 1, 10000 / 203], rel=2e-3)
+    grey = np.full((1, 1, 3), hlg_scene_light(np.array(0.75)), np.float32)
+    assert hlg_display_light(grey) == pytest.approx(1, rel=5e-3)
+    white = np.full((1, 1, 3), hlg_scene_light(np.array(1.0)), np.float32)
+    assert hlg_display_light(white) == pytest.approx(1000 / 203, rel=1e-3)
+
+
+def test_tone_mapping_leaves_pictures_up_to_white_as_they_are() -> None:
+    light = np.random.default_rng(1).random((9, 7, 3)).astype(np.float32)
+    mapped = light.copy()
+    tone_map(mapped)
+    assert np.array_equal(mapped, light)
+
+
+@pytest.mark.parametrize("peak", [1.0001, 1.5, 10.0, 49.0])
+def test_tone_mapping_starts_at_the_knee_and_ends_at_white(peak: float) -> None:
+    ramp = np.linspace(0, peak, 400, dtype=np.float32)
+    light = np.repeat(ramp[None, :, None], 3, axis=2)
+    tone_map(light)
+    mapped = light[0, :, 0]
+    np.testing.assert_allclose(mapped[ramp <= KNEE], ramp[ramp <= KNEE])
+    assert (np.diff(mapped) >= 0).all()
+    assert (mapped <= ramp + 1e-6).all()
+    assert mapped[-1] == pytest.approx(1, abs=1e-6)
+    assert light.max() <= 1
+
+
+@pytest.mark.parametrize(
+    ("codes", "name"), [((9, 1), "BT.2020"), ((1, 4), "sRGB"), ((11, 13), "DCI-P3"), ((5, 6), "BT.601 (625 lines)")]
+)
+def test_other_numbers_are_colours_of_their_spaces(tmp_path: Path, codes: tuple[int, int], name: str) -> None:
+    flat = np.full((8, 8, 3), (180 * 257, 90 * 257, 40 * 257), np.uint16)
+    write_png(tmp_path / "a.png", flat, (*codes, 0, 1))
+    photo = read_photo(tmp_path / "a.png", keeps_primaries=True)
+    assert photo.color_space.name == name
+    assert photo.notes == (f"Colours are those of the photo's profile, '{name}'.",)
+
+
+@pytest.mark.parametrize("codes", [(2, 2), (9, 2), (2, 16), (9,), (), (77, 16), (9, 99), (9, 16, 0)])
+def test_numbers_that_say_nothing_are_ignored(codes: tuple[int, ...]) -> None:
+    assert profile_of_codes(codes) is None
+
+
+def test_primaries_that_are_known_are_told_apart() -> None:
+    assert space_of_number(1) == SRGB
+    assert space_of_number(12) == DISPLAY_P3
+    assert space_of_number(3) is None
+    assert space_of_chromaticities((0.64, 0.33, 0.3, 0.6, 0.15, 0.06, 0.3127, 0.329)) == SRGB
+    assert space_of_chromaticities((float("nan"),) * 8) == SRGB
+    assert space_of_chromaticities("no numbers") == SRGB

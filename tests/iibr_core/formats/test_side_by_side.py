@@ -1,0 +1,264 @@
+"""Two pictures in one: names and headers that state it, halves that agree or not, and which eye is where."""
+
+from __future__ import annotations
+
+import re
+import struct
+from io import BytesIO
+from pathlib import Path
+
+import numpy as np
+import pillow_heif
+import pytest
+from numpy.typing import NDArray
+from PIL import Image
+
+from iibr_core.formats.images.alike_halves import is_one_scene
+from iibr_core.formats.images.jps import read_jps_descriptor
+from iibr_core.formats.images.photo import read_photo, write_image
+from iibr_core.formats.images.side_by_side import own_picture, side_by_side_pair, stated_layout, stated_pair
+from iibr_core.formats.light_fields.light_field_formats import open_light_field
+from iibr_core.formats.light_fields.views import read_views
+from iibr_core.types import ImageSize, InputError
+
+SIZE = ImageSize(60, 80)
+
+
+def photo(height: int = 96, width: int = 128, seed: int = 0) -> NDArray[np.uint8]:
+    """A wall of blurred noise, a red disc at the left and a blue box at the right, none of which repeats."""
+    small = np.random.default_rng(seed).integers(0, 256, (height // 6, width // 6, 3), np.uint8)
+    picture = np.array(Image.fromarray(small).resize((width, height), Image.Resampling.BICUBIC))
+    y, x = np.mgrid[:height, :width]
+    picture[(x - 0.28 * width) ** 2 + (y - 0.5 * height) ** 2 < (0.22 * height) ** 2] //= np.array([1, 4, 4], np.uint8)
+    picture[(x > 0.6 * width) & (x < 0.85 * width) & (y > 0.45 * height) & (y < 0.9 * height)] //= 3
+    return picture
+
+
+def eyes(size: ImageSize = SIZE, apart_px: int = 4) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
+    """What the left eye and the right one see of a scene: near things are farther left for the right eye."""
+    wall = photo(size.height, size.width + 20)
+    left, right = wall[:, 10 : 10 + size.width].copy(), wall[:, 11 : 11 + size.width].copy()
+    top, first = size.height // 3, size.width // 2
+    for picture, at in ((left, first), (right, first - apart_px)):
+        picture[top : 2 * top, at : at + size.width // 4] = photo(top, size.width // 4, seed=5)
+    return left, right
+
+
+LEFT, RIGHT = eyes()
+
+
+def squeezed(picture: NDArray[np.uint8], axis: int) -> NDArray[np.uint8]:
+    return picture[::2] if axis == 0 else picture[:, ::2]
+
+
+NAMES = {
+    "a_LRF_Full_SBS.png": ("beside", False, False),
+    "a_LRF_Half_SBS.png": ("beside", True, False),
+    "a_sbs.png": ("beside", False, False),
+    "a_2x1.png": ("beside", False, False),
+    "a_half_2x1.png": ("beside", True, False),
+    "a.left-right.png": ("beside", False, False),
+    "a.right-left.png": ("beside", False, True),
+    "a-hsbs.png": ("beside", True, False),
+    "a.3D.H-SBS.png": ("beside", True, False),
+    "a-half-sbs.png": ("beside", True, False),
+    "a-lr.png": ("beside", False, False),
+    "a-lrq.png": ("beside", True, False),
+    "a_RL.png": ("beside", False, True),
+    "a-crosseyed.png": ("beside", False, True),
+    "a_cross-eye.png": ("beside", False, True),
+    "a (sbs).png": ("beside", False, False),
+    "a_sbs (1).png": ("beside", False, False),
+    "a_TB.png": ("over", False, False),
+    "a_ou.png": ("over", False, False),
+    "a.top-bottom.png": ("over", False, False),
+    "a.bottom-top.png": ("over", False, True),
+    "a-htab.png": ("over", True, False),
+    "a_HOU.png": ("over", True, False),
+    "a-half-ou.png": ("over", True, False),
+    "a-abq.png": ("over", True, False),
+    "a-ab.png": ("over", False, False),
+    "a.jps": ("beside", False, True),
+    "a.PNS": ("beside", False, True),
+    "a_lr.jps": ("beside", False, False),
+}
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_pairs_open_by_their_names_and_show_the_left_eye(tmp_path: Path, name: str) -> None:
+    arrangement, is_half, right_first = NAMES[name]
+    axis = 0 if arrangement == "over" else 1
+    pictures = (RIGHT, LEFT) if right_first else (LEFT, RIGHT)
+    parts = [squeezed(picture, axis) if is_half else picture for picture in pictures]
+    path = tmp_path / name
+    kind = {".jps": "JPEG", ".png": "PNG", ".pns": "PNG"}[path.suffix.lower()]
+    Image.fromarray(np.concatenate(parts, axis=axis)).save(path, kind, quality=95, subsampling=0)
+    shown = read_photo(path)
+    assert shown.size == SIZE
+    assert "Taken for a stereo pair" in shown.notes[0]
+    assert ("side by side" if axis == 1 else "one over the other") in shown.notes[0]
+    tolerance = 12 if is_half else 4
+    assert np.abs(255 * shown.pixels - LEFT).mean() < tolerance
+    size, updates = read_views(open_light_field(path))
+    assert size == SIZE
+    views = {update.column: update.colors.astype(float) for update in updates}
+    for column, expected in enumerate((LEFT, RIGHT)):
+        assert np.abs(views[column] - expected).mean() < tolerance
+
+
+ORDINARY = ["Corfou_ou", "portrait_tb", "collage_2x1", "IMG_0001_TB", "logo_sbs", "photo-lr", "two side-by-side"]
+
+
+@pytest.mark.parametrize("name", ORDINARY)
+def test_ordinary_photos_are_not_cut_whatever_their_name(tmp_path: Path, name: str) -> None:
+    path = tmp_path / f"{name}.jpg"
+    Image.fromarray(photo()).save(path, quality=95)
+    shown = read_photo(path)
+    assert shown.size == (96, 128)
+    assert side_by_side_pair(path) is None
+    (note,) = shown.notes
+    assert re.fullmatch(
+        r"Shown whole: its name \('.\w\S+'\) is that of a stereo pair, but its halves differ\. If it is a pair, let the"
+        r" name end in '\.(left-right|top-bottom)'\.",
+        note,
+    )
+
+
+def test_the_ending_that_the_note_recommends_is_heeded(tmp_path: Path) -> None:
+    """Though nothing in the halves agrees: nobody names another picture like this."""
+    Image.fromarray(photo()).save(tmp_path / "a.top-bottom.jpg", quality=95)
+    shown = read_photo(tmp_path / "a.top-bottom.jpg")
+    assert shown.size == (48, 128)
+    assert "though its halves differ" in shown.notes[0]
+
+
+@pytest.mark.parametrize("name", ["scuba", "fab", "outback", "table", "Southern_Cross", "leftover", "club2x12", "hab"])
+def test_names_of_another_meaning(tmp_path: Path, name: str) -> None:
+    path = tmp_path / f"a{name}.jpg"
+    Image.fromarray(photo()).save(path)
+    found = stated_pair(path)
+    assert found is None or found.eyes is None
+    assert own_picture(path).part is None
+
+
+def write_jps(path: Path, picture: NDArray[np.uint8], layout: int, flags: int, kind: int = 1) -> None:
+    """A JPEG with VRex's descriptor behind its first segment, as cameras write it."""
+    stored = BytesIO()
+    Image.fromarray(picture).save(stored, "JPEG", quality=95, subsampling=0)
+    content = b"_JPSJPS_" + struct.pack(">H4BH", 4, 0, flags, layout, kind, 0)
+    data, marker = stored.getvalue(), b"\xff\xe3" + struct.pack(">H", len(content) + 2) + content
+    path.write_bytes(data[:2] + marker + data[2:])
+
+
+ROWS = np.stack([LEFT, RIGHT], axis=1).reshape(2 * SIZE.height, SIZE.width, 3)
+
+
+@pytest.mark.parametrize("name", ["a.jps", "a.jpg"])
+@pytest.mark.parametrize(
+    ("picture", "layout", "flags"),
+    [
+        (np.hstack([RIGHT, LEFT]), 2, 0),
+        (np.hstack([LEFT, RIGHT]), 2, 4),
+        (np.hstack([squeezed(RIGHT, 1), squeezed(LEFT, 1)]), 2, 2),
+        (np.vstack([RIGHT, LEFT]), 3, 0),
+        (np.vstack([squeezed(LEFT, 0), squeezed(RIGHT, 0)]), 3, 5),
+    ],
+    ids=["crossed", "left first", "half width", "over", "half height, left first"],
+)
+def test_the_descriptor_of_a_jps_says_how_its_pictures_lie(
+    tmp_path: Path, name: str, picture: NDArray[np.uint8], layout: int, flags: int
+) -> None:
+    write_jps(tmp_path / name, picture, layout, flags)
+    shown = read_photo(tmp_path / name)
+    assert shown.size == SIZE
+    assert np.abs(255 * shown.pixels - LEFT).mean() < 12
+    assert "JPS descriptor" in shown.notes[0]
+
+
+def test_a_jps_may_interleave_its_rows(tmp_path: Path) -> None:
+    write_jps(tmp_path / "a.jps", ROWS, 1, 4)
+    shown = read_photo(tmp_path / "a.jps")
+    assert shown.size == ROWS.shape[:2]
+    assert np.abs(255 * shown.pixels[::2] - LEFT).mean() < 12
+
+
+@pytest.mark.parametrize(("layout", "kind"), [(4, 1), (2, 0), (9, 1), (0, 0)])
+def test_other_descriptors_state_no_pair(tmp_path: Path, layout: int, kind: int) -> None:
+    """Anaglyphs, and single pictures."""
+    write_jps(tmp_path / "a.jpg", photo(), layout, 0, kind)
+    assert read_jps_descriptor(tmp_path / "a.jpg") is None
+    assert read_photo(tmp_path / "a.jpg").notes == ()
+
+
+def test_cut_off_descriptors_are_none(tmp_path: Path) -> None:
+    (tmp_path / "a.jpg").write_bytes(b"\xff\xd8\xff\xe3\0\x0c_JPSJPS_\0\x04")
+    assert read_jps_descriptor(tmp_path / "a.jpg") is None
+
+
+@pytest.mark.parametrize("ending", ["png", "jpg", "exr", "heic", "avif", "tif"])
+def test_halves_of_every_format_are_compared(tmp_path: Path, ending: str) -> None:
+    both, path = np.hstack([LEFT, RIGHT]), tmp_path / f"a_sbs.{ending}"
+    if ending == "heic":
+        pillow_heif.from_pillow(Image.fromarray(both)).save(path, quality=95)
+    elif ending == "exr":
+        write_image(path, both)
+    elif ending == "tif":
+        Image.fromarray(both[..., 1].astype(np.uint16) * 257).save(path)
+    else:
+        Image.fromarray(both).save(path, quality=95)
+    pair = stated_pair(path)
+    assert pair is not None
+    assert pair.eyes is not None
+    assert read_photo(path).size == SIZE
+    assert open_light_field(path).layout == "side-by-side stereo"
+
+
+def test_a_picture_of_one_pixel_has_no_halves(tmp_path: Path) -> None:
+    for name in ("a_tb.png", "a.top-bottom.png"):
+        Image.new("RGB", (5, 1)).save(tmp_path / name)
+    assert read_photo(tmp_path / "a_tb.png").size == (1, 5)
+    with pytest.raises(InputError, match=r"a\.top-bottom\.png: of 5x1 pixels there are none for each eye"):
+        read_photo(tmp_path / "a.top-bottom.png")
+
+
+def test_turned_pairs_are_cut_as_they_are_seen(tmp_path: Path) -> None:
+    exif = Image.Exif()
+    exif[0x0112] = 6  # to be turned clockwise
+    upright = Image.fromarray(np.hstack([LEFT, RIGHT]))
+    upright.transpose(Image.Transpose.ROTATE_90).save(tmp_path / "a_sbs.jpg", exif=exif, quality=95)
+    assert read_photo(tmp_path / "a_sbs.jpg").size == SIZE
+
+
+def test_a_file_that_changed_is_looked_at_again(tmp_path: Path) -> None:
+    path = tmp_path / "a_sbs.png"
+    Image.fromarray(photo()).save(path)
+    assert side_by_side_pair(path) is None
+    Image.fromarray(np.hstack([LEFT, RIGHT])).save(path)
+    assert side_by_side_pair(path) is not None
+
+
+def test_most_files_state_nothing(tmp_path: Path) -> None:
+    Image.fromarray(photo()).save(tmp_path / "a.jpg")
+    assert stated_layout(tmp_path / "a.jpg") is None
+    assert stated_pair(tmp_path / "a.jpg") is None
+    assert stated_pair(tmp_path / "missing_tb.jpg") is None
+
+
+@pytest.mark.parametrize("apart_px", [0, 1, 4, 8])
+@pytest.mark.parametrize(("gain", "offset"), [(1.0, 0.0), (0.7, 30.0)])
+def test_two_views_of_a_scene_are_alike_whatever_their_exposure(apart_px: int, gain: float, offset: float) -> None:
+    left, right = eyes(apart_px=apart_px)
+    assert is_one_scene(left, np.clip(gain * right + offset, 0, 255).astype(np.uint8))
+    assert is_one_scene(left[:, ::2], right[:, ::2])
+
+
+def test_other_pictures_are_not_alike() -> None:
+    for other in (photo(60, 80, seed=3), LEFT[::-1], LEFT[:, ::-1], 255 - LEFT, np.full_like(LEFT, 90)):
+        assert not is_one_scene(LEFT, np.ascontiguousarray(other))
+
+
+def test_plain_pictures_are_alike_if_they_have_one_colour() -> None:
+    red, blue = (np.full((9, 7, 3), color, np.uint8) for color in ((200, 0, 0), (0, 0, 200)))
+    assert is_one_scene(red, red + np.uint8(3))
+    assert not is_one_scene(red, blue)
+    assert is_one_scene(red[:1, :1], red[:1, :1])
