@@ -14,8 +14,30 @@ from iibr_core.exports.kinds import EXPORTS
 from iibr_core.formats.light_fields.light_field_formats import find_light_field
 
 PHOTO_ENDINGS = frozenset(
-    ".jpg .jpeg .png .tif .tiff .exr .hdr .webp .bmp .heic .heif .hif .avif .mpo .lif .jps .pns .jxl .jp2 .gif .psd"
-    " .tga".split()
+    [
+        ".jpg",
+        ".jpeg",
+        ".png",
+        ".tif",
+        ".tiff",
+        ".exr",
+        ".hdr",
+        ".webp",
+        ".bmp",
+        ".heic",
+        ".heif",
+        ".hif",
+        ".avif",
+        ".mpo",
+        ".lif",
+        ".jps",
+        ".pns",
+        ".jxl",
+        ".jp2",
+        ".gif",
+        ".psd",
+        ".tga",
+    ]
 )
 CAMERA_NAME = re.compile(r"([A-Z0-9_]{4}\d{4}|(IMG|PXL|MVIMG)[_-]\d{8}[_-].*)\.(jpe?g|heic|heif|hif)$", re.IGNORECASE)
 """Names that cameras and phones give (DCF): such pictures are photos, however many there are."""
