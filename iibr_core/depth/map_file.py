@@ -72,6 +72,11 @@ def depth_beside_picture(path: Path, photo: Photo, choice: DepthChoice) -> Depth
     return _within(path, found, photo, choice, are_distances=choice.is_metric)
 
 
+def depth_of_picture(path: Path, values: FloatImage, photo: Photo, choice: DepthChoice) -> DepthFromFile:
+    """The meaning of a map (H, W), 0..1, that lies in a photo's file without any description; see `depth_from_file`."""
+    return _within(path, MapFile(values, "integers", 1.0), photo, choice, are_distances=choice.is_metric)
+
+
 def _within(path: Path, found: MapFile, photo: Photo, choice: DepthChoice, are_distances: bool) -> DepthFromFile:
     estimate, near, notes = _by_evidence(path, found, photo, choice, are_distances)
     return DepthFromFile(estimate, near, (*found.notes, *notes))
@@ -169,7 +174,7 @@ def _by_evidence(
 
 def _is_spread(found: MapFile) -> bool:
     """Whether the values were stretched to a fixed range: 8 bits, a whole range of integers, 0..1, colours."""
-    if found.numbers == "colours" or found.largest == 255:
+    if found.numbers == "colours" or (found.numbers == "integers" and found.largest <= 255):
         return True
     known = found.values[np.isfinite(found.values)]
     low, high = (float(known.min()), float(known.max())) if known.size else (0.0, 0.0)
@@ -179,7 +184,7 @@ def _is_spread(found: MapFile) -> bool:
 
 
 def _end(found: MapFile, large: bool) -> str:
-    if found.numbers == "integers" and found.largest in (255, 65535):
+    if found.numbers == "integers" and found.largest in (1, 255, 65535):
         return "white" if large else "black"
     return "the high end" if large else "the low end"
 

@@ -15,10 +15,10 @@ import numpy as np
 from iibr_core.depth.choice import BETTER_WAYS, DepthChoice, DepthKind, DepthOrigin
 from iibr_core.depth.edges.map_alignment import lies_at_corners
 from iibr_core.depth.edges.refine import refine
-from iibr_core.depth.embedded.embedded_depth import read_embedded
+from iibr_core.depth.embedded.embedded_depth import SECOND_PICTURE, read_embedded
 from iibr_core.depth.embedded.picture import photo_in_focus, rotate_estimate
-from iibr_core.depth.estimates import Estimate, inverted
-from iibr_core.depth.map_file import depth_beside_picture, depth_from_channel, depth_from_file
+from iibr_core.depth.estimates import Estimate, inverted, values_of
+from iibr_core.depth.map_file import depth_beside_picture, depth_from_channel, depth_from_file, depth_of_picture
 from iibr_core.depth.pictorial_cues import estimate_from_cues
 from iibr_core.depth.scaling import disparity_from, inverse_metres_over
 from iibr_core.depth.sidecar import find_sidecar, flat_disparity, sidecars_of
@@ -239,6 +239,9 @@ class _DepthSearch:
         photo = photo_in_focus(self.path, self.photo, embedded, self.max_pixels)
         origin = DepthOrigin("embedded", f"the photo itself ({embedded.format})")
         estimate = rotate_estimate(embedded.estimate, photo.size, read_orientation(self.path))
+        if embedded.format == SECOND_PICTURE:
+            told = depth_of_picture(self.path, values_of(estimate), photo, self.choice)
+            return _FoundDepth(photo, replace(origin, near=told.near), told.estimate, told.notes)
         return _FoundDepth(photo, origin, estimate)
 
     def of_pair(self) -> _FoundDepth | None:

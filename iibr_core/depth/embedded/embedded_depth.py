@@ -10,6 +10,7 @@ from iibr_core.depth.embedded.apple import appended_estimate, heic_estimate
 from iibr_core.depth.embedded.google import all_in_focus, dynamic_depth_estimate, gdepth_estimate
 from iibr_core.depth.embedded.leia import leia_estimate
 from iibr_core.depth.embedded.samsung import samsung_estimate
+from iibr_core.depth.embedded.trailers import huawei_estimate, second_picture_estimate
 from iibr_core.depth.embedded.xmp import Xmp, is_jpeg, jpeg_layout, xmp_of
 from iibr_core.depth.estimates import Estimate
 from iibr_core.formats.files import open_binary
@@ -18,6 +19,8 @@ from iibr_core.types import InputError
 
 MAX_FILE_BYTES = 512 * 2**20
 GDEPTH = "Google GDepth"
+SECOND_PICTURE = "a second, grey picture"
+"""What no header describes: it may be near where it is white, or where it is black."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,6 +78,8 @@ def embedded_in_jpeg(data: bytes) -> EmbeddedDepth | None:
         ("Apple portrait", lambda: appended_estimate(data, layout.end)),
         ("Samsung Live focus", lambda: samsung_estimate(data)),
         ("Leia", lambda: leia_estimate(data)),
+        ("Huawei", lambda: huawei_estimate(data, layout.end)),
+        (SECOND_PICTURE, lambda: second_picture_estimate(data, layout.end)),
     )
     for name, read in readers:
         try:

@@ -37,7 +37,10 @@ MAX_METRES = 1e6
 
 @dataclass(frozen=True)
 class DepthRange:
-    """How stored values mean distances. is_inverse: linear in 1 / distance. metres_per_unit: None where not known."""
+    """How stored values mean distances. is_inverse: linear in 1 / distance. metres_per_unit: None where not known.
+
+    near, far: NaN where they make no sense: then only the order of the values counts, dark before bright.
+    """
 
     near: float
     far: float
@@ -143,15 +146,12 @@ def _content(items: list[_Item], index: int, data: bytes, layout: JpegLayout) ->
 
 
 def _depth_range(properties: dict[str, str | None]) -> DepthRange:
-    """Raises InputError where the range makes no sense."""
-    kind = (properties["Format"] or "").strip()
-    if kind not in ("RangeInverse", "RangeLinear"):
-        raise InputError(f"depth format {kind[:40]!r} is neither RangeInverse nor RangeLinear")
+    """By the properties; RangeInverse where no known format is told."""
     near, far = number_in(properties["Near"]), number_in(properties["Far"])
-    is_inverse = kind == "RangeInverse"
+    is_inverse = (properties["Format"] or "").strip().lower() != "rangelinear"
     # An inverse range may reach to infinity and a linear one may begin at the lens.
     if not (near > 0 if is_inverse else near >= 0) or not far > near or (not is_inverse and math.isinf(far)):
-        raise InputError(f"depth range from {properties['Near']} to {properties['Far']} spans no distances")
+        near = far = math.nan
     units = (properties["Units"] or "").strip().lower()
     metres = 1.0 if units in METRES else 0.001 if units in MILLIMETRES else None
     return DepthRange(near, far, is_inverse, metres)
@@ -162,11 +162,16 @@ def _estimate(stored: FloatImage, confidence: FloatImage | None, depth_range: De
     near, far = depth_range.near, depth_range.far
     values = stored.astype(np.float64)
     with np.errstate(divide="ignore"):
-        inverse = (1 - values) / near + values / far if depth_range.is_inverse else 1 / (near + values * (far - near))
+        if math.isnan(near):
+            inverse = 1 - values
+        elif depth_range.is_inverse:
+            inverse = (1 - values) / near + values / far
+        else:
+            inverse = 1 / (near + values * (far - near))
     inverse[~np.isfinite(inverse)] = np.nan
     if confidence is not None and confidence.shape == stored.shape and (confidence >= MIN_CONFIDENCE).any():
         inverse[confidence < MIN_CONFIDENCE] = np.nan
-    if depth_range.metres_per_unit is None:
+    if depth_range.metres_per_unit is None or math.isnan(near):
         with np.errstate(over="ignore"):
             relative = inverse.astype(np.float32)
         return RelativeInverseDepth(np.where(np.isfinite(relative), relative, np.float32(np.nan)))

@@ -35,13 +35,20 @@ def photo_in_focus(path: Path, photo: Photo, embedded: EmbeddedDepth, max_pixels
 
 
 def rotate_estimate(estimate: Estimate, size: ImageSize, orientation: int) -> Estimate:
-    """The estimate, turned upright as the photo was. Some writers turn the map already; others' maps fit no way."""
+    """The estimate, turned upright as the photo was, unless its writer has turned it already. Maps of another shape
+    show the whole photo, stretched, as GDepth's specification says; those that lie across it fit no way.
+    """
     values = values_of(estimate)
-    for candidate in (upright(values, orientation), values):
+    turned = upright(values, orientation)
+    for candidate in (turned, values):
         if _is_alike(candidate.shape, size):
             return type(estimate)(candidate)
+    is_high = size.height > size.width
+    for candidate in (turned, values):
+        if (candidate.shape[0] > candidate.shape[1]) == is_high or candidate.shape[0] == candidate.shape[1]:
+            return type(estimate)(candidate)
     shape, photo_shape = (f"{width}x{height}" for height, width in (values.shape, size))
-    raise InputError(f"its {shape} pixels differ in shape from the photo, {photo_shape}")
+    raise InputError(f"its {shape} pixels lie across the photo, {photo_shape}")
 
 
 def _is_alike(shape: tuple[int, ...], size: ImageSize) -> bool:

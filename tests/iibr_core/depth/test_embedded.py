@@ -15,6 +15,7 @@ from iibr_core.depth.embedded.embedded_depth import embedded_in_jpeg, read_embed
 from iibr_core.depth.embedded.images import MAX_MAP_PIXELS, decode_map
 from iibr_core.depth.embedded.xmp import jpeg_layout
 from iibr_core.depth.estimates import MetricDepth, RelativeInverseDepth
+from iibr_core.depth.search import open_with_depth
 from iibr_core.formats.images.photo import read_photo
 from iibr_core.formats.images.xmp_packet import MAX_ELEMENTS, parse_packet
 from iibr_core.types import ImageSize, InputError
@@ -254,17 +255,59 @@ def test_samsung_of_another_size_than_told() -> None:
         {"near": "", "far": 3},
         {"near": "near", "far": 3},
         {"near": 1, "far": "inf", "kind": "RangeLinear"},
-        {"kind": "RangeLogarithmic"},
-        {"kind": ""},
+        {"near": 5, "far": 3, "kind": ""},
+        {"near": 5, "far": 3, "kind": "RangeLogarithmic"},
     ],
 )
-def test_senseless_ranges(range_: dict[str, object]) -> None:
-    with pytest.raises(InputError):
-        embedded_in_jpeg(gdepth(**range_))
-    with pytest.raises(InputError):
-        embedded_in_jpeg(
-            files.dynamic_depth_jpeg(files.grey_photo(SIZE), files.picture(STORED, "PNG"), **range_)  # type: ignore[arg-type]
-        )
+def test_of_senseless_ranges_and_formats_the_order_counts(range_: dict[str, object]) -> None:
+    """Dark is near."""
+    dynamic = files.dynamic_depth_jpeg(files.grey_photo(SIZE), files.picture(STORED, "PNG"), **range_)  # type: ignore[arg-type]
+    for data in (gdepth(**range_), dynamic):
+        found = relative(data)
+        assert np.corrcoef(found.ravel(), STORED.ravel())[0, 1] < -0.7
+
+
+def scene(seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
+    """A coloured photo of a disc before a wall, and its map, white near."""
+    y, x = np.mgrid[:96, :128]
+    disc = np.hypot(x - 60, y - 60) < 30
+    pixels = np.array([90, 120, 60]) + np.random.default_rng(seed).integers(0, 60, (96, 128, 3))
+    pixels[disc] = [250, 130, 90]
+    return pixels.astype(np.uint8), np.where(disc, 230, 20 + y // 2).astype(np.uint8)
+
+
+def test_huawei_maps_are_mirrored_and_white_is_near() -> None:
+    pixels, depth = scene()
+    small = depth[::2, ::2]
+    header = bytearray(68)
+    header[16:20] = small.shape[1].to_bytes(2, "little") + small.shape[0].to_bytes(2, "little")
+    photo = files.picture(pixels, "JPEG")
+    data = photo + photo + b"\x56\xe9edof" + bytes(header) + small[:, ::-1].tobytes()
+    found = relative(data)
+    np.testing.assert_allclose(found, small / 255, atol=0.01)
+    with pytest.raises(InputError, match="cut off"):
+        embedded_in_jpeg(data[:-100])
+
+
+@pytest.mark.parametrize("white_is_near", [True, False])
+def test_a_grey_picture_behind_a_photo_is_its_map(tmp_path: Path, white_is_near: bool) -> None:
+    pixels, depth = scene()
+    stored = depth if white_is_near else 255 - depth
+    (tmp_path / "a.jpg").write_bytes(files.picture(pixels, "JPEG") + files.picture(stored[::2, ::2], "JPEG"))
+    found = open_with_depth(tmp_path / "a.jpg")
+    assert found.origin.kind == "embedded"
+    assert found.disparity.values[60, 60] > found.disparity.values[90, 10] > found.disparity.values[4, 10]
+    assert any("counts as near" in note for note in found.disparity.notes)
+
+
+def test_copies_gain_maps_and_pictures_of_other_shapes_are_no_maps() -> None:
+    pixels, depth = scene()
+    photo, grey = files.picture(pixels, "JPEG"), files.picture(depth, "JPEG")
+    copy = files.picture(np.asarray(Image.fromarray(pixels).convert("L").resize((64, 48))), "JPEG")
+    gain = grey[:2] + b"\xff\xe1\x00\x25http://ns.adobe.com/xap/1.0/\0<hdrgm>" + grey[2:]
+    wide = files.picture(depth[:40], "JPEG")
+    for behind in (photo, copy, gain, wide):
+        assert embedded_in_jpeg(photo + behind) is None
 
 
 PNG = files.picture(STORED, "PNG")

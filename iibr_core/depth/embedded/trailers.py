@@ -1,0 +1,124 @@
+"""Depth maps that phones append to their JPEG photos without describing them in XMP: Huawei's, and plain second JPEGs.
+
+No maker publishes these layouts; they are as users of such files found them. White is near in both.
+"""
+
+from __future__ import annotations
+
+import re
+import struct
+from io import BytesIO
+
+import numpy as np
+from PIL import Image
+
+from iibr_core.depth.embedded.images import DECODE_ERRORS, MAX_MAP_PIXELS, decode_map
+from iibr_core.depth.embedded.xmp import jpeg_layout
+from iibr_core.depth.estimates import RelativeInverseDepth
+from iibr_core.types import FloatImage, ImageSize, InputError
+
+HUAWEI_MARK = b"edof"
+HUAWEI_SIZE_AT, HUAWEI_HEADER_BYTES = 16, 68
+"""Behind the mark: width and height, two bytes each; then the map, a byte a pixel, mirrored."""
+MAX_PICTURES = 8
+COMPARED = (32, 24)
+MOST_LIKENESS = 0.97
+"""Correlation with the photo's brightness from which a grey picture is a small copy of it, not a map."""
+OTHER_USE = re.compile(rb"http://ns.adobe.com/xap/|urn:iso:std:iso:ts:21496|hdrgm:|GainMap", re.IGNORECASE)
+"""Pictures whose headers hold these are gain maps, mattes and others that say what they are."""
+HEADER_BYTES = 0x10000
+LEAST_RANGE = 16
+"""Of 255, between the darkest and the brightest place of a map."""
+GREY_TOLERANCE = 10
+MAX_ASPECT_DIFFERENCE = 0.03
+
+
+def huawei_estimate(data: bytes, end: int) -> RelativeInverseDepth | None:
+    """The map of a photo with "wide aperture"; None where a JPEG, which ends at `end`, is followed by none.
+
+    Raises InputError where the map is cut off.
+    """
+    at = data.find(HUAWEI_MARK, end)
+    header = data[at + len(HUAWEI_MARK) :][:HUAWEI_HEADER_BYTES] if at >= 0 else b""
+    if len(header) < HUAWEI_HEADER_BYTES:
+        return None
+    width, height = struct.unpack_from("<HH", header, HUAWEI_SIZE_AT)
+    if not 0 < width * height <= MAX_MAP_PIXELS:
+        return None
+    start = at + len(HUAWEI_MARK) + HUAWEI_HEADER_BYTES
+    content = data[start : start + width * height]
+    if len(content) < width * height:
+        raise InputError(f"Huawei's depth map of {width}x{height} pixels is cut off after {len(content):,} bytes")
+    stored = np.frombuffer(content, np.uint8).reshape(height, width)[:, ::-1]
+    return RelativeInverseDepth(stored.astype(np.float32) / np.float32(255))
+
+
+def second_picture_estimate(data: bytes, end: int) -> RelativeInverseDepth | None:
+    """A grey picture of the photo's shape in a JPEG that follows it (it ends at `end`), which is no small copy of it.
+
+    None where there is none, or it cannot be read, or where the photo has a gain map.
+    """
+    if OTHER_USE.search(data, 0, min(end, HEADER_BYTES)) and b"GainMap" in data[:end]:
+        return None
+    for start, last in appended_pictures(data, end):
+        content = data[start:last]
+        size = None if OTHER_USE.search(content[:HEADER_BYTES]) else grey_size(content)
+        if size is not None and _fits(size, data) and not _is_copy(content, data):
+            try:
+                return RelativeInverseDepth(decode_map(content, "the picture behind the photo"))
+            except InputError:
+                continue
+    return None
+
+
+def appended_pictures(data: bytes, end: int) -> list[tuple[int, int]]:
+    """Where the JPEG pictures that follow a photo (which ends at `end`) begin and end; the first few."""
+    found: list[tuple[int, int]] = []
+    while len(found) < MAX_PICTURES:
+        start = data.find(b"\xff\xd8\xff", end)
+        if start < 0:
+            break
+        end = max(jpeg_layout(data, start).end, start + 2)
+        found.append((start, end))
+    return found
+
+
+def grey_size(content: bytes) -> ImageSize | None:
+    """The size of a picture's bytes, None for colours and what cannot be read."""
+    colors = _small(content)
+    if colors is None or (np.ptp(colors, axis=2) > GREY_TOLERANCE).mean() > 0.01:
+        return None
+    with Image.open(BytesIO(content)) as picture:
+        return ImageSize(picture.height, picture.width)
+
+
+def _fits(size: ImageSize, data: bytes) -> bool:
+    try:
+        with Image.open(BytesIO(data)) as photo:
+            ratio = photo.width * size.height / (photo.height * size.width)
+    except DECODE_ERRORS:
+        return False
+    return abs(ratio - 1) <= MAX_ASPECT_DIFFERENCE
+
+
+def _is_copy(content: bytes, data: bytes) -> bool:
+    """Whether a picture looks like the photo, or shows nothing."""
+    own, photo = _small(content), _small(data)
+    if own is None or photo is None or np.ptp(own) < LEAST_RANGE:
+        return True
+    first, second = (_standardised(pixels.astype(np.float32).mean(axis=2)) for pixels in (own, photo))
+    return float((first * second).mean()) > MOST_LIKENESS
+
+
+def _small(content: bytes) -> np.ndarray | None:
+    try:
+        with Image.open(BytesIO(content), formats=("JPEG",)) as picture:
+            picture.draft("RGB", (4 * COMPARED[0], 4 * COMPARED[1]))
+            return np.asarray(picture.convert("RGB").resize(COMPARED, Image.Resampling.BOX), np.int16)
+    except DECODE_ERRORS:
+        return None
+
+
+def _standardised(values: FloatImage) -> FloatImage:
+    spread = float(values.std())
+    return np.asarray((values - values.mean()) / spread if spread > 0 else values * 0, np.float32)
