@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from iibr_core.depth.choice import DepthChoice
-from iibr_core.depth.estimates import DisparityMap, Estimate, MetricDepth, RelativeInverseDepth
+from iibr_core.depth.estimates import DisparityMap, Estimate, MetricDepth, RelativeInverseDepth, values_of
 from iibr_core.depth.near_end import is_better_turned, near_evidence, zeros_are_depth
 from iibr_core.formats.images.exr_depth import read_depth_channel
 from iibr_core.formats.images.oiio_reader import read_orientation, upright
@@ -24,6 +24,8 @@ UNIT_RANGE = (0.98, 1.0)
 """Floats that end here were spread from 0 to 1: no distances."""
 MILLIMETRES = 0.001
 """Metres in a step of an integer map of distances, as depth cameras write them."""
+SURE_AGAINST_CONFIG = 2.0
+"""Evidence from which the photo is believed rather than a model's config.json."""
 BLACK_IS_NEAR = -1.0
 """This scale says which end of a map of integers is near, and nothing of how much."""
 
@@ -75,6 +77,32 @@ def depth_beside_picture(path: Path, photo: Photo, choice: DepthChoice) -> Depth
 def depth_of_picture(path: Path, values: FloatImage, photo: Photo, choice: DepthChoice) -> DepthFromFile:
     """The meaning of a map (H, W), 0..1, that lies in a photo's file without any description; see `depth_from_file`."""
     return _within(path, MapFile(values, "integers", 1.0), photo, choice, are_distances=choice.is_metric)
+
+
+def depth_of_model(
+    title: str, estimate: Estimate, is_published: bool, photo: Photo, choice: DepthChoice
+) -> tuple[Estimate, tuple[str, ...]]:
+    """What a model's estimate means, and a note where that was not said by a published model or --metric.
+
+    Files of one's own say it in a config.json or not at all: where the photo shows the contrary, it decides.
+    """
+    if isinstance(estimate, DisparityMap) or is_published:
+        return estimate, ()
+    values = values_of(estimate)
+    if choice.is_metric:
+        return MetricDepth(values), ()
+    evidence = near_evidence(photo.pixels, values)
+    if isinstance(estimate, MetricDepth):
+        if evidence < SURE_AGAINST_CONFIG:
+            return estimate, ()
+        note = f"Large values of {title} count as near, as the photo shows; its config.json says that they are metres."
+        return RelativeInverseDepth(values), (note,)
+    if evidence >= -1:
+        hint = () if evidence > 1 else (f"Large values of {title} count as near; --metric if they are distances.",)
+        return estimate, hint
+    is_positive = bool((values[np.isfinite(values)] > 0).all())
+    note = f"Large values of {title} count as far, as the photo shows; --metric says so, --invert-depth turns it."
+    return MetricDepth(values) if is_positive else RelativeInverseDepth(-values), (note,)
 
 
 def _within(path: Path, found: MapFile, photo: Photo, choice: DepthChoice, are_distances: bool) -> DepthFromFile:

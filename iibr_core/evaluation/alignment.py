@@ -1,4 +1,4 @@
-"""Scale and shift that an estimated disparity leaves open, fitted to the truth: what a better scale would be worth."""
+"""Scale and shift that an estimated disparity leaves open, fitted to true views: what a better scale would be worth."""
 
 from __future__ import annotations
 
@@ -11,41 +11,17 @@ from scipy.optimize import minimize
 from iibr_core.evaluation.reference_warp import reference_warp
 from iibr_core.types import FloatImage, ViewOffset
 
-TRIMMED = 0.8
-"""Share of the pixels that count in a fit: those that agree best. Edges are wrong in every estimate."""
-ALIGNMENT_ROUNDS = 10
 FIT_PIXELS = 12_000
 END_SHARES = (-0.08, -0.04, -0.02, -0.01, 0.0, 0.01, 0.02, 0.04, 0.08)
 """How far the far and the near end move to the farthest view, in widths: what is tried first."""
 END_STEP = 0.005
 
 
-def fit_to_truth(estimate: FloatImage, truth: FloatImage) -> FloatImage:
-    """The estimate (H, W) scaled and shifted to lie nearest to the truth (H, W; NaN unknown): trimmed least squares.
-
-    A flat estimate becomes the truth's median.
-    """
-    known = np.isfinite(truth) & np.isfinite(estimate)
-    x, y = estimate[known].astype(np.float64), truth[known].astype(np.float64)
-    if not len(x):
-        return estimate
-    counts = np.ones(len(x), bool)
-    scale, shift = 0.0, float(np.median(y))
-    for _ in range(ALIGNMENT_ROUNDS):
-        spread = x[counts].std()
-        if not spread > 1e-9 * max(1.0, np.abs(x).max()):
-            break
-        scale, shift = np.polyfit(x[counts], y[counts], 1)
-        error = np.abs(scale * x + shift - y)
-        counts = error <= np.quantile(error, TRIMMED)
-    return (estimate * np.float32(scale) + np.float32(shift)).astype(np.float32)
-
-
 def fit_to_views(
     photo: FloatImage, estimate: FloatImage, truths: Sequence[tuple[ViewOffset, FloatImage]]
 ) -> FloatImage:
     """The estimate (H, W) scaled and shifted so that warping the photo (H, W, 3) comes nearest to true views
-    [(offset, (H, W, 3)), ...]. For scenes without true disparity; done on small copies.
+    [(offset, (H, W, 3)), ...], and never farther from them than without; done on small copies.
     """
     low, high = (float(p) for p in np.percentile(estimate, (1, 99)))
     farthest = max((max(abs(at.t), abs(at.s)) for at, _ in truths), default=0.0)
@@ -62,7 +38,8 @@ def fit_to_views(
         warped = ((reference_warp(small_photo, disparity, at).colors, truth) for at, truth in small_truths)
         return float(np.mean([np.abs(colors - truth).mean() for colors, truth in warped]))
 
-    start = min((np.array([far, near]) for far in END_SHARES for near in END_SHARES), key=error)
+    own = np.array([low, high]) / (unit * step)
+    start = min((own, *(np.array([far, near]) for far in END_SHARES for near in END_SHARES)), key=error)
     around = start + np.array([[0, 0], [1, 0], [0, 1]]) * END_STEP
     far, near = minimize(error, start, method="Nelder-Mead", options={"initial_simplex": around, "maxiter": 60}).x
     return np.asarray((far + (near - far) * share) * (unit * step), np.float32)

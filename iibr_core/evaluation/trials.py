@@ -14,7 +14,7 @@ import numpy as np
 
 from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.search import open_with_depth
-from iibr_core.evaluation.alignment import fit_to_truth, fit_to_views
+from iibr_core.evaluation.alignment import fit_to_views
 from iibr_core.evaluation.datasets import read_known_disparity, read_straight_view, read_view
 from iibr_core.evaluation.reference_warp import reference_warp
 from iibr_core.formats.light_fields.multi_view_scene import KnownDisparity, MultiView
@@ -127,7 +127,7 @@ def trial_input(
     if given is not None:
         return TrialInput(photo, (given,), truth or given, given.notes)
     estimate = _estimate_disparity(trial, choice, max_pixels, should_stop)
-    aligned = _align_to_truth(trial, photo, estimate, truth, max_pixels)
+    aligned = _align_to_views(trial, photo, estimate, max_pixels)
     return TrialInput(photo, (estimate, aligned), truth or aligned, estimate.notes)
 
 
@@ -181,13 +181,8 @@ def _within(values: FloatImage, range_px: tuple[float, float]) -> FloatImage:
     return np.float32(range_px[0]) + np.float32(range_px[1] - range_px[0]) * share
 
 
-def _align_to_truth(
-    trial: Trial, photo: FloatImage, estimate: Disparity, truth: Disparity | None, max_pixels: int
-) -> Disparity:
-    if truth is not None:
-        values, to = fit_to_truth(estimate.values, truth.values), "the true disparity"
-    else:
-        farthest = sorted(trial.judged, key=lambda k: -max(map(abs, trial.offset(k))))[:ALIGNING_VIEWS]
-        truths = [(trial.offset(k), read_straight_view(trial.scene.views[k], max_pixels)[0]) for k in farthest]
-        values, to = fit_to_views(photo, estimate.values, truths), "true views"
-    return Disparity(values, f"{estimate.source}, scale and shift fitted to {to}")
+def _align_to_views(trial: Trial, photo: FloatImage, estimate: Disparity, max_pixels: int) -> Disparity:
+    farthest = sorted(trial.judged, key=lambda k: -max(map(abs, trial.offset(k))))[:ALIGNING_VIEWS]
+    truths = [(trial.offset(k), read_straight_view(trial.scene.views[k], max_pixels)[0]) for k in farthest]
+    values = fit_to_views(photo, estimate.values, truths)
+    return Disparity(values, f"{estimate.source}, scale and shift fitted to true views")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -46,8 +47,19 @@ def _given_infinity(source: ExportSource) -> float:
     plan = source.plan()
     if plan.disparity_scale <= 0:
         raise InputError(f"{source.scene.name}: is flat or inverted; give it depth")
+    known = source.scene.inverse_metres
     low, high = (value / plan.disparity_scale + plan.disparity_zero for value in plan.disparity_range_px)
-    return infinity_of(low, high)
+    at_infinity = -known[1] / known[0] if known is not None else math.inf
+    return at_infinity if at_infinity < low else infinity_of(low, high)
+
+
+def nearest_metres(source: ExportSource) -> float | None:
+    """How far away the nearest of the scene is; None where no metres are known."""
+    known, plan = source.scene.inverse_metres, source.scene.plan
+    if known is None or plan is None or plan.disparity_scale <= 0:
+        return None
+    inverse = known[0] * (plan.disparity_range_px[1] / plan.disparity_scale + plan.disparity_zero) + known[1]
+    return 1 / inverse if inverse > 0 else None
 
 
 def _straight_cameras(source: ExportSource) -> tuple[FieldCameras, float | None]:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from iibr_core.exports.camera_export import cameras_of, colors_of
+from iibr_core.exports.camera_export import cameras_of, colors_of, nearest_metres
 from iibr_core.exports.options import ExportOptions
 from iibr_core.exports.settings import ExportSettings
 from iibr_core.exports.source import ExportSource
@@ -30,9 +30,11 @@ def write_disparity(path: Path, source: ExportSource, settings: ExportSettings) 
 def write_depth(path: Path, source: ExportSource, settings: ExportSettings) -> str:
     """In metres where they are known, else in distances of the nearest; returns what is to be known of the file."""
     cameras = cameras_of(source)
+    depth, metres = cameras.depth(_disparity_of(source)), nearest_metres(source)
+    if metres is not None:
+        return write_map(path, depth * np.float32(metres), MapText("depth", unit="m"))
     inverse = (cameras.range_px[1] - cameras.at_infinity, cameras.at_infinity)
-    text = MapText("depth", unit="distances of the nearest", inverse=inverse)
-    return write_map(path, cameras.depth(_disparity_of(source)), text)
+    return write_map(path, depth, MapText("depth", unit="distances of the nearest", inverse=inverse))
 
 
 def write_epi(path: Path, source: ExportSource, settings: ExportSettings) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.exports.camera_export import cameras_of, colors_of
+from iibr_core.exports.camera_export import cameras_of, colors_of, nearest_metres
 from iibr_core.exports.settings import ExportSettings
 from iibr_core.exports.source import ExportSource
 from iibr_core.formats.cameras import FieldCameras
@@ -22,8 +22,9 @@ Points = tuple[FloatImage, NDArray[np.uint8], FloatImage]
 
 
 def write_point_cloud(path: Path, source: ExportSource, settings: ExportSettings) -> None:
-    """As a PLY, y up and z backwards, as most viewers of points look."""
+    """As a PLY, y up and z backwards, as most viewers of points look; in metres where they are known."""
     places, colors, _ = scene_points(source)
+    places = places * np.float32(nearest_metres(source) or 1.0)
     write_points(path, places * np.array([1, -1, -1], np.float32), colors)
 
 

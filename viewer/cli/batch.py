@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from iibr_core.depth import BETTER_WAYS
 from iibr_core.exports import EXPORTS
 from iibr_core.runtime import require_extra
 from iibr_core.types import InputError
@@ -110,5 +111,7 @@ def batch(
     with Ledger(output, force) as ledger, show_progress("looking", counts=True) as show:
         done = run_batch(ledger, settings, photos, worker_source, open_drawn, show)
     print(f"{output}: {done.written} written, {done.there_before} there before, {done.failed} failed")
+    if done.guessed:
+        print(f"{done.guessed} of {done.written} have guessed depth: {BETTER_WAYS}")
     if done.failed:
         raise InputError(f"{output / FAILURES}: tells what failed, and why")

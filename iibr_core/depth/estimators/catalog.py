@@ -52,8 +52,8 @@ def model_to_use(choice: DepthChoice) -> LocalModel | None:
     path = Path(os.path.expanduser(wanted))
     if is_folder(path) or is_file(path):
         return _model_at(path)
-    if "/" in wanted or "\\" in wanted:
-        raise InputError(f"{wanted}: no such folder")
+    if "/" in wanted or "\\" in wanted or path.suffix.lower() == ".onnx":
+        raise InputError(f"{wanted}: no such file or folder")
     model = known_model(wanted)
     _require_installed(model.title, family_of(model))
     found = model_here(model)
@@ -72,6 +72,11 @@ def model_here(model: KnownModel) -> LocalModel | None:
         return LocalModel(model.title, folder, family, family.weights_in(folder))
     except InputError:
         return None
+
+
+def is_published(model: LocalModel) -> bool:
+    """Whether it is one of the known models, whose meaning is known, rather than a user's own."""
+    return any(model.title == known.title for known in KNOWN_MODELS)
 
 
 def state_of(model: KnownModel) -> ModelState:

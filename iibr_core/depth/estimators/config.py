@@ -60,6 +60,8 @@ def read_preparation(folder: Path, usual: Preparation) -> Preparation:
     Raises InputError where it is missing, damaged or absurd.
     """
     told = _json_object(folder, PREPROCESSOR)
+    if told.get("do_normalize") is False:
+        told = {**told, "image_mean": 0, "image_std": 1}
     try:
         size = _size(told.get("size", usual.size))
         multiple = int(told.get("ensure_multiple_of", usual.multiple))

@@ -1,6 +1,6 @@
 """Depth models as ONNX files, run by ONNX Runtime: no torch, one file of weights.
 
-Name and size of the input are read from the file. The JSON files beside it say how the photo is prepared, and
+Layout and size of the input are read from the file. The JSON files beside it say how the photo is prepared, and
 whether the output is depth or inverse depth; without them, both are as Depth Anything V2 has them.
 """
 
@@ -8,20 +8,18 @@ from __future__ import annotations
 
 import math
 from concurrent.futures import ThreadPoolExecutor, wait
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from iibr_core.depth.estimates import Estimate, MetricDepth, RelativeInverseDepth
 from iibr_core.depth.estimators.config import CONFIG, PREPROCESSOR, read_config, read_preparation
 from iibr_core.depth.estimators.depth_estimator import Family, KnownModel, LocalModel, Run
+from iibr_core.depth.estimators.onnx_file import depth_output, external_files, open_session, picture_input
 from iibr_core.depth.estimators.preparation import Preparation, affordable_pixels, input_size, network_input
 from iibr_core.formats.files import is_file
 from iibr_core.runtime.extras import said_by
-from iibr_core.runtime.machine import core_count
 from iibr_core.runtime.tiling import Cancelled, ShouldStop
 from iibr_core.types import ImageSize, InputError, Photo, ReportProgress
 
@@ -33,7 +31,8 @@ ACTIVATION_BYTES = 1500
 """For each pixel of the input; measured with Depth Anything V2 Small: 1,320 at 686x518, 1,900 at 980x518."""
 USUAL_WEIGHT_BYTES = 99e6
 """Of that model. Activations grow with a network's width, weights with its square."""
-NUMBER_TYPES = {"tensor(float)": "float32", "tensor(float16)": "float16"}
+BYTES = (0.0, 0.0, 0.0), (1 / 255, 1 / 255, 1 / 255)
+"""Mean and deviation for networks that take 0..255."""
 LOOK_S = 0.05
 """How often a running estimate looks whether it is still wanted."""
 
@@ -66,52 +65,20 @@ def run_onnx(
 
     Raises InputError where the file is no depth model, Cancelled once should_stop is true.
     """
-    (file,) = model.weights
+    file = model.weights[0]
     report_progress(0, 0, f"loading {model.title}")
-    session = _open(file)
-    name, size, number_type = _input_of(session, file)
-    values = network_input(photo.pixels, wanted.preparation, size or wanted.size).astype(number_type)
+    session = open_session(file)
+    taken = picture_input(session, file)
+    preparation = replace(wanted.preparation, mean=BYTES[0], std=BYTES[1]) if taken.takes_bytes else wanted.preparation
+    values = taken.arranged(network_input(photo.pixels, preparation, taken.size_for(wanted.size)))
     report_progress(0, 0, f"estimating depth with {model.title}")
-    output = _run(session, file, {name: values}, should_stop)
-    depth = np.asarray(output, np.float32)
-    depth = depth[:, 0] if depth.ndim == 4 and depth.shape[1] == 1 else depth
-    if depth.ndim != 3 or len(depth) != 1 or not depth.size:
-        raise InputError(f"{file}: gives an array of shape {depth.shape}, not one map of depth; choose a depth model")
-    return MetricDepth(depth[0]) if wanted.is_metric else RelativeInverseDepth(depth[0])
+    outputs = _run(session, file, {taken.name: values}, should_stop)
+    depth = depth_output(file, list(outputs), list(outputs.values()))
+    return MetricDepth(depth) if wanted.is_metric else RelativeInverseDepth(depth)
 
 
-def _open(file: Path) -> Any:
-    """A session for the file. Raises InputError where it is no ONNX model, or ONNX Runtime is not installed."""
-    try:
-        import onnxruntime
-    except ImportError as error:
-        raise InputError(
-            f"{file}: running it needs ONNX Runtime, which has no package for this Python yet; use Python 3.11 to 3.14"
-        ) from error
-    options = onnxruntime.SessionOptions()
-    options.intra_op_num_threads = core_count()
-    # Threads that spin while they wait would take the cores from the window.
-    options.add_session_config_entry("session.intra_op.allow_spinning", "0")
-    options.log_severity_level = 4
-    try:
-        return onnxruntime.InferenceSession(str(file), options, providers=["CPUExecutionProvider"])
-    except Exception as error:  # its errors share no class of their own
-        raise InputError(f"{file}: is not an ONNX model that can be run ({said_by(error)}); get it again") from error
-
-
-def _input_of(session: Any, file: Path) -> tuple[str, ImageSize | None, str]:
-    """Name, (height, width) where the file fixes it, and number type of the one input."""
-    inputs = session.get_inputs()
-    if len(inputs) != 1 or len(inputs[0].shape) != 4 or inputs[0].type not in NUMBER_TYPES:
-        told = ", ".join(f"{each.name} {each.shape} {each.type}" for each in inputs)[:160]
-        raise InputError(f"{file}: does not take one picture (N, 3, H, W) but {told}; choose a depth model")
-    height, width = inputs[0].shape[2:]
-    is_fixed = isinstance(height, int) and isinstance(width, int)
-    return inputs[0].name, ImageSize(height, width) if is_fixed else None, NUMBER_TYPES[inputs[0].type]
-
-
-def _run(session: Any, file: Path, values: dict[str, Any], should_stop: ShouldStop) -> Any:
-    """The first output. The session runs in a thread of its own, so that it can be stopped."""
+def _run(session: Any, file: Path, values: dict[str, Any], should_stop: ShouldStop) -> dict[str, Any]:
+    """All outputs by name. The session runs in a thread of its own, so that it can be stopped."""
     import onnxruntime
 
     options = onnxruntime.RunOptions()
@@ -122,7 +89,7 @@ def _run(session: Any, file: Path, values: dict[str, Any], should_stop: ShouldSt
     if options.terminate:
         raise Cancelled
     try:
-        return running.result()[0]
+        return dict(zip([each.name for each in session.get_outputs()], running.result()))
     except Exception as error:  # as above
         raise InputError(f"{file}: failed on this photo ({said_by(error)})") from error
 
@@ -140,16 +107,17 @@ def _files_in(folder: Path) -> list[Path]:
 
 
 def weights_in(path: Path) -> tuple[Path, ...]:
-    """The one ONNX file of a model's folder, `model.onnx` where there are several; a file is its own.
+    """The one ONNX file of a model's folder, `model.onnx` where there are several, and the files that hold its weights.
 
-    Raises InputError where that leaves open which is meant.
+    Raises InputError where that leaves open which is meant, or one of those files is missing.
     """
     files = [path] if is_file(path) else _files_in(path)
     full = [file for file in files if file.name == "model.onnx"]
     if len(files) != 1 and len(full) != 1:
         names = ", ".join(file.name for file in files[:3]) or "none"
         raise InputError(f"{path}: which ONNX file is meant ({names})? Name it with --depth-model {path}/FILE.onnx")
-    return ((full or files)[0],)
+    file = (full or files)[0]
+    return file, *external_files(file)
 
 
 def _prepare(model: LocalModel, size: ImageSize, memory_bytes: int) -> tuple[object, Run]:

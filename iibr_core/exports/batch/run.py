@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from itertools import chain
 from pathlib import Path
@@ -24,12 +24,13 @@ from iibr_core.types import InputError, ReportProgress
 
 @dataclass
 class BatchCount:
-    """Photos of a batch, as far as it has come."""
+    """Photos of a batch, as far as it has come. guessed: of those written, whose depth was guessed."""
 
     total: int
     written: int = 0
     there_before: int = 0
     failed: int = 0
+    guessed: int = field(default=0, compare=False)
 
     @property
     def done(self) -> int:
@@ -69,6 +70,7 @@ class _Batch:
         else:
             self._ledger.add_finished(task, outcome)
             self.count.written += 1
+            self.count.guessed += outcome.is_guess
         self._tell("exporting")
 
     def _fail(self, photo: str, reason: str) -> None:

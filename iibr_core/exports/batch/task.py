@@ -112,11 +112,14 @@ class PhotoTask:
 
 @dataclass(frozen=True)
 class Outcome:
-    """output: what was written, or reason: why it could not be. seconds: that it took."""
+    """output: what was written, or reason: why it could not be. seconds: that it took. is_guess: its
+    depth was guessed.
+    """
 
     output: str = ""
     reason: str = ""
     seconds: float = 0.0
+    is_guess: bool = False
 
 
 def target_name(settings: BatchSettings, photo: ArchivePhoto) -> str:

@@ -25,7 +25,7 @@ def export_photo(task: PhotoTask, open_drawn: OpenDrawn | None) -> Outcome:
 
     started = time.perf_counter()
     try:
-        output = _export(task, open_drawn)
+        output, is_guess = _export(task, open_drawn)
         _flush_to_disk(output)
     except InputError as error:
         return Outcome(reason=str(error))
@@ -33,11 +33,11 @@ def export_photo(task: PhotoTask, open_drawn: OpenDrawn | None) -> Outcome:
         return Outcome(reason=f"out of memory ({reason_of(error)}): lower --max-pixels, or --workers")
     except Exception as error:
         return Outcome(reason=f"unexpected {type(error).__name__}: {reason_of(error)} (please report it)")
-    return Outcome(str(output), seconds=time.perf_counter() - started)
+    return Outcome(str(output), seconds=time.perf_counter() - started, is_guess=is_guess)
 
 
-def _export(task: PhotoTask, open_drawn: OpenDrawn | None) -> Path:
-    """Raises InputError."""
+def _export(task: PhotoTask, open_drawn: OpenDrawn | None) -> tuple[Path, bool]:
+    """What was written, and whether its depth was guessed. Raises InputError."""
     from iibr_core.exports.export_opening import open_for_export
     from iibr_core.exports.writers import export_path, require_export_place, writer_of
     from iibr_core.formats.outputs import AlreadyThereError, make_folder, release_place
@@ -68,7 +68,7 @@ def _export(task: PhotoTask, open_drawn: OpenDrawn | None) -> Path:
         release_place(target)
     if not place.claim.exists():  # whoever waited for this photo has gone
         _claim(task, target)
-    return target
+    return target, opened.scene.is_guessed
 
 
 def _claim(task: PhotoTask, output: Path) -> None:

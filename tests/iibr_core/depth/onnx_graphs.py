@@ -44,3 +44,41 @@ def published(folder: Path) -> dict[str, bytes]:
         "preprocessor_config.json": json.dumps(preparation).encode(),
         "onnx/model.onnx": model.read_bytes(),
     }
+
+
+def of_channels(
+    file: Path,
+    last: bool = False,
+    as_bytes: bool = False,
+    extra_first: bool = False,
+    rank: int = 3,
+    farness: bool = False,
+    size: int = 112,
+) -> Path:
+    """A network of one channel, red: its depth, or, with `farness`, 300 less it. last: channels; as_bytes: uint8 input;
+    extra_first: gives its input before the depth; rank: of the depth.
+    """
+    axis = 3 if last else 1
+    kind = TensorProto.UINT8 if as_bytes else TensorProto.FLOAT
+    shape = [1, size, size, 3] if last else [1, 3, "h", "w"]
+    nodes = [
+        helper.make_node("Cast", ["x"], ["floats"], to=TensorProto.FLOAT),
+        helper.make_node("Gather", ["floats", "red"], ["picked"], axis=axis),
+        helper.make_node("Sub", ["most", "picked"], ["far"]),
+        helper.make_node("Identity", ["far" if farness else "picked"], ["whole"]),
+        helper.make_node("Squeeze", ["whole", "axis"], ["depth"])
+        if rank == 3
+        else helper.make_node("Identity", ["whole"], ["depth"]),
+    ]
+    constants = [
+        helper.make_tensor("red", TensorProto.INT64, [1], [0]),
+        helper.make_tensor("axis", TensorProto.INT64, [1], [axis]),
+        helper.make_tensor("most", TensorProto.FLOAT, [], [300.0]),
+    ]
+    outputs = [helper.make_tensor_value_info("depth", TensorProto.FLOAT, None)]
+    if extra_first:
+        nodes.append(helper.make_node("Identity", ["floats"], ["features"]))
+        outputs.insert(0, helper.make_tensor_value_info("features", TensorProto.FLOAT, None))
+    graph = helper.make_graph(nodes, "g", [helper.make_tensor_value_info("x", kind, shape)], outputs, constants)
+    onnx.save(helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)], ir_version=9), file)
+    return file

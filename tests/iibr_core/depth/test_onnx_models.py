@@ -10,6 +10,7 @@ import sys
 import threading
 from pathlib import Path
 
+import cv2
 import numpy as np
 import onnx
 import pytest
@@ -18,7 +19,7 @@ import transformers
 from onnx import TensorProto, helper, numpy_helper
 
 from iibr_core.depth.choice import DepthChoice
-from iibr_core.depth.estimates import MetricDepth, RelativeInverseDepth
+from iibr_core.depth.estimates import MetricDepth, RelativeInverseDepth, values_of
 from iibr_core.depth.estimators import estimate_cache, onnx_models
 from iibr_core.depth.estimators.catalog import USUAL_MODEL, known_model, model_to_use
 from iibr_core.depth.estimators.depth_estimator import LocalModel
@@ -26,10 +27,11 @@ from iibr_core.depth.estimators.download import VERIFIED
 from iibr_core.depth.estimators.estimate_depth import estimate_with
 from iibr_core.depth.estimators.onnx_models import USUAL_PREPARATION, OnnxInput, run_onnx
 from iibr_core.depth.estimators.preparation import network_input
+from iibr_core.depth.search import open_with_depth
 from iibr_core.formats.images.photo import write_image
 from iibr_core.runtime.tiling import Cancelled, never
 from iibr_core.types import FloatImage, ImageSize, InputError, Photo, ignore_progress
-from tests.iibr_core.depth.onnx_graphs import published, weighing
+from tests.iibr_core.depth.onnx_graphs import of_channels, published, weighing
 from tests.iibr_core.depth.random_networks import export_depth_anything
 from tests.iibr_core.depth.test_transformers_models import depth_anything as depth_anything_folder
 
@@ -277,3 +279,41 @@ def test_neither_torch_nor_transformers_is_imported(tmp_path: Path) -> None:
     environment = {**os.environ, "XDG_CACHE_HOME": str(tmp_path)}
     done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=False)
     assert (done.stdout.strip(), done.stderr) == ("model []", "")
+
+
+@pytest.mark.parametrize(
+    "told", [{"last": True}, {"as_bytes": True}, {"last": True, "as_bytes": True}, {"extra_first": True}, {"rank": 4}]
+)
+def test_networks_of_other_layouts_are_read_alike(tmp_path: Path, told: dict[str, object]) -> None:
+    pixels = smooth_photo(ImageSize(112, 112))
+    found = values_of(estimate(of_channels(tmp_path / "model.onnx", **told), pixels))  # type: ignore[arg-type]
+    red = cv2.resize(pixels[..., 0], found.shape[::-1], interpolation=cv2.INTER_AREA)
+    assert np.corrcoef(found.ravel(), red.ravel())[0, 1] > 0.999
+
+
+@pytest.mark.parametrize(("farness", "config"), [(False, ""), (True, ""), (False, "metric"), (True, "metric")])
+def test_the_photo_tells_which_way_round_a_file_of_ones_own_counts(tmp_path: Path, farness: bool, config: str) -> None:
+    """Red grows downwards in this photo, where things are nearer; with or without a config, true or not."""
+    file = of_channels(tmp_path / "model.onnx", farness=farness)
+    if config:
+        (tmp_path / "config.json").write_text(f'{{"depth_estimation_type": "{config}"}}')
+    pixels = np.zeros((60, 80, 3), np.float32)
+    pixels[..., 0] = np.linspace(0.5, 0.9, 60)[:, None]
+    pixels[20:30, 30:50, 1] = 0.5
+    write_image(tmp_path / "photo.png", pixels)
+    found = open_with_depth(tmp_path / "photo.png", DepthChoice(model=str(file), refine=0.0))
+    assert found.disparity.values[-5].mean() > found.disparity.values[5].mean()
+    is_told_wrong = farness != (config == "metric")
+    assert any("as the photo shows" in note for note in found.disparity.notes) == is_told_wrong
+
+
+def test_metres_are_taken_for_metres_where_that_is_said(tmp_path: Path) -> None:
+    file = of_channels(tmp_path / "model.onnx")
+    write_image(tmp_path / "photo.png", smooth_photo(ImageSize(60, 80)))
+    found = open_with_depth(tmp_path / "photo.png", DepthChoice(model=str(file), is_metric=True, refine=0.0))
+    assert found.disparity.values[30, 5] > found.disparity.values[30, -5]
+
+
+def test_a_file_that_is_not_there_is_told(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"gone\.onnx: no such file"):
+        model_to_use(DepthChoice(model="gone.onnx"))

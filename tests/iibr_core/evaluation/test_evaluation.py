@@ -152,7 +152,7 @@ def test_an_estimate_is_judged_as_it_is_and_aligned(folder: Path) -> None:
     options = Options("estimate", choice, ("fast",), most_views=2, with_consistency=False)
     plain, aligned = evaluate(scene_of(folder), options)[:2]
     assert "estimate" in plain.disparity
-    assert aligned.disparity.endswith("scale and shift fitted to the true disparity")
+    assert aligned.disparity.endswith("scale and shift fitted to true views")
     assert aligned.consistency == {}
     # holes are told by the true disparity, whatever is judged
     assert plain.hole_share == aligned.hole_share
