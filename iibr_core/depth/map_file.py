@@ -80,13 +80,13 @@ def depth_of_picture(path: Path, values: FloatImage, photo: Photo, choice: Depth
 
 
 def depth_of_model(
-    title: str, estimate: Estimate, is_published: bool, photo: Photo, choice: DepthChoice
+    title: str, estimate: Estimate, is_meaning_known: bool, photo: Photo, choice: DepthChoice
 ) -> tuple[Estimate, tuple[str, ...]]:
     """What a model's estimate means, and a note where that was not said by a published model or --metric.
 
     Files of one's own say it in a config.json or not at all: where the photo shows the contrary, it decides.
     """
-    if isinstance(estimate, DisparityMap) or is_published:
+    if isinstance(estimate, DisparityMap) or is_meaning_known:
         return estimate, ()
     values = values_of(estimate)
     if choice.is_metric:

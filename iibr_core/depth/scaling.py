@@ -43,7 +43,7 @@ def disparity_from(estimate: Estimate, grid: GridShape) -> FloatImage:
 def inverse_metres_over(estimate: Estimate, values: FloatImage) -> tuple[float, float] | None:
     """(slope, offset) of 1 / distance in metres over the disparity (H, W) that `disparity_from` made of an estimate.
 
-    None where the estimate knows no metres, or is flat. From the quartiles: beyond them outliers were moved in.
+    None where the estimate knows no metres, or is flat. From both ends: beyond them outliers were moved in.
     """
     if not isinstance(estimate, MetricDepth):
         return None
@@ -51,7 +51,11 @@ def inverse_metres_over(estimate: Estimate, values: FloatImage) -> tuple[float, 
     is_known = np.isfinite(inverse) & np.isfinite(values)
     if not is_known.any():
         return None
-    (low, high), (below, above) = (np.percentile(v[is_known], (25.0, 75.0)) for v in (values, inverse))
+    low = high = below = above = 0.0
+    for ends in PERCENTILES:
+        (low, high), (below, above) = (np.percentile(v[is_known], ends) for v in (values, inverse))
+        if high > low:
+            break
     slope = (above - below) / (high - low) if high > low else np.nan
     offset = below - slope * low
     return (float(slope), float(offset)) if np.isfinite(slope) and np.isfinite(offset) and slope > 0 else None

@@ -167,14 +167,14 @@ def estimator_of(found: PhotoWithDepth, choice: DepthChoice) -> EstimateDepth | 
         return None
 
     def estimate(colors: FloatImage, should_stop: ShouldStop) -> FloatImage:
-        from iibr_core.depth.estimators.catalog import is_published, model_to_use
+        from iibr_core.depth.estimators.catalog import is_meaning_known, model_to_use
         from iibr_core.depth.estimators.estimate_depth import estimate_with
 
         model = model_to_use(choice)
         if model is None:
             raise InputError(f"{found.origin.words}: the model no longer exists")
         depth = estimate_with(model, replace(found.photo, pixels=colors), choice.memory_bytes, should_stop)
-        depth = depth_of_model(model.title, depth, is_published(model), found.photo, choice)[0]
+        depth = depth_of_model(model.title, depth, is_meaning_known(model), found.photo, choice)[0]
         return _at_size(disparity_from(_as_chosen(depth, choice), USUAL_GRID), found.photo)
 
     return estimate
@@ -261,7 +261,7 @@ class _DepthSearch:
         return _FoundDepth(self.photo, DepthOrigin("embedded", f"the photo's two views ({layout})"), estimate)
 
     def model(self) -> _FoundDepth | None:
-        from iibr_core.depth.estimators.catalog import is_published, model_to_use
+        from iibr_core.depth.estimators.catalog import is_meaning_known, model_to_use
 
         model = model_to_use(self.choice)
         if model is None:
@@ -270,7 +270,7 @@ class _DepthSearch:
 
         raise_if_stopped(self.should_stop)
         estimate = estimate_with(model, self.photo, self.choice.memory_bytes, self.should_stop, self.report_progress)
-        estimate, notes = depth_of_model(model.title, estimate, is_published(model), self.photo, self.choice)
+        estimate, notes = depth_of_model(model.title, estimate, is_meaning_known(model), self.photo, self.choice)
         return _FoundDepth(self.photo, DepthOrigin("model", f"estimated by {model.title}"), estimate, notes)
 
     def rough(self) -> _FoundDepth:

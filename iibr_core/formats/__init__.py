@@ -40,6 +40,7 @@ if TYPE_CHECKING:
         WRITERS,
         LightFieldWriter,
         WriterFactory,
+        find_light_field,
         is_light_field,
         open_light_field,
         writer_for,

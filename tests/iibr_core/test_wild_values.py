@@ -565,7 +565,7 @@ READS_OR_TELLS = {
     "depth.estimators.estimate_cache": "cache_folder key_of load store_seconds seconds_of",
     "depth.embedded.google": "all_in_focus dynamic_depth_estimate",
     "depth.estimators.config": "folder_of safetensors_in mentions read_config read_preparation",
-    "depth.estimators.catalog": "known_model family_of model_to_use model_here state_of fetch is_published",
+    "depth.estimators.catalog": "known_model family_of model_to_use model_here state_of fetch is_meaning_known",
     "depth.estimators.download": "verified_folder download require_unchanged",
     "depth.estimators.hub": "HubRefusal hub_cache read_json hub_answer chunks_of failures_told",
     "depth.estimators.onnx_models": "weights_in",

@@ -25,12 +25,12 @@ def depth(
     Example: iibr depth field -o field_disparity.pfm
     """
     require_memory(memory, keeps_views=True)
-    from iibr_core.formats import is_light_field, open_light_field, require_file_place, write_map
+    from iibr_core.formats import find_light_field, is_file, open_light_field, require_file_place, write_map
     from iibr_core.generation import budget_of
     from iibr_core.scenes import find_disparity
 
     require_file_place(out, inputs_of_command(context), force)
-    if not is_light_field(field):
+    if is_file(field) and find_light_field(field) is None:
         _write_of_photo(field, out, memory)
         return
     scene = open_light_field(field)

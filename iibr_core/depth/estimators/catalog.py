@@ -74,9 +74,9 @@ def model_here(model: KnownModel) -> LocalModel | None:
         return None
 
 
-def is_published(model: LocalModel) -> bool:
-    """Whether it is one of the known models, whose meaning is known, rather than a user's own."""
-    return any(model.title == known.title for known in KNOWN_MODELS)
+def is_meaning_known(model: LocalModel) -> bool:
+    """Whether it is one of the known models, or of a family that says what its output means, rather than any ONNX file."""
+    return model.weights[0].suffix != ".onnx" or any(model.title == known.title for known in KNOWN_MODELS)
 
 
 def state_of(model: KnownModel) -> ModelState:

@@ -76,6 +76,27 @@ def test_depth_of_a_pair_is_the_left_views(monkeypatch: Monkey, capsys: Capture,
     assert np.mean(error < 0.2 * (FOREGROUND - WALL)) > 0.7
 
 
+def test_depth_of_a_photo_is_what_it_opens_with(monkeypatch: Monkey, capsys: Capture, tmp_path: Path) -> None:
+    pixels = np.rint(view_of_square(ViewOffset(0, 0)) * 255).astype(np.uint8)
+    Image.fromarray(pixels).save(tmp_path / "square.png")
+    np.save(tmp_path / "square_disparity.npy", disparity_of_square())
+    assert run(monkeypatch, "depth", tmp_path / "square.png", "-o", tmp_path / "a.pfm") == 0
+    assert "square_disparity.npy" in capsys.readouterr().err
+    error = np.abs(read_pfm(tmp_path / "a.pfm") - disparity_of_square())
+    assert np.mean(error < 0.1) > 0.9
+
+
+def test_metres_reach_exports(monkeypatch: Monkey, tmp_path: Path) -> None:
+    pixels = np.rint(view_of_square(ViewOffset(0, 0)) * 255).astype(np.uint8)
+    Image.fromarray(pixels).save(tmp_path / "square.png")
+    metres = np.where(disparity_of_square() > WALL, 1.5, 6.0).astype(np.float32)
+    np.save(tmp_path / "square_depth.npy", metres)
+    out = tmp_path / "out_depth.npy"
+    assert run(monkeypatch, "export", tmp_path / "square.png", "--metric", "--to", "depth", "-o", out) == 0
+    found = np.load(out)
+    assert np.mean(np.abs(found - metres) < 0.1) > 0.9
+
+
 def test_depth_asks_for_memory_before_it_takes_it(monkeypatch: Monkey, capsys: Capture, tmp_path: Path) -> None:
     field = write_grid(tmp_path / "field")
     monkeypatch.setattr(estimate_disparity, "sweep_bytes", lambda *_: 2**40)
