@@ -75,7 +75,7 @@ def model_here(model: KnownModel) -> LocalModel | None:
 
 
 def is_meaning_known(model: LocalModel) -> bool:
-    """Whether it is one of the known models, or of a family that says what its output means, rather than any ONNX file."""
+    """Whether it is a known model, or of a family that says what its output means, rather than any ONNX file."""
     return model.weights[0].suffix != ".onnx" or any(model.title == known.title for known in KNOWN_MODELS)
 
 
