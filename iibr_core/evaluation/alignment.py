@@ -15,13 +15,15 @@ FIT_PIXELS = 12_000
 END_SHARES = (-0.08, -0.04, -0.02, -0.01, 0.0, 0.01, 0.02, 0.04, 0.08)
 """How far the far and the near end move to the farthest view, in widths: what is tried first."""
 END_STEP = 0.005
+LEAST_ERROR = 1e-12
+"""Squared errors below count as this."""
 
 
 def fit_to_views(
     photo: FloatImage, estimate: FloatImage, truths: Sequence[tuple[ViewOffset, FloatImage]]
 ) -> FloatImage:
     """The estimate (H, W) scaled and shifted so that warping the photo (H, W, 3) comes nearest to true views
-    [(offset, (H, W, 3)), ...], and never farther from them than without; done on small copies.
+    [(offset, (H, W, 3)), ...]: found on small copies, and kept as it is where that is nearer at full size.
     """
     low, high = (float(p) for p in np.percentile(estimate, (1, 99)))
     farthest = max((max(abs(at.t), abs(at.s)) for at, _ in truths), default=0.0)
@@ -35,14 +37,22 @@ def fit_to_views(
 
     def error(ends: np.ndarray) -> float:
         disparity = (ends[0] + (ends[1] - ends[0]) * small_share) * np.float32(unit)
-        warped = ((reference_warp(small_photo, disparity, at).colors, truth) for at, truth in small_truths)
-        return float(np.mean([np.abs(colors - truth).mean() for colors, truth in warped]))
+        return _error_db(small_photo, disparity, small_truths)
 
     own = np.array([low, high]) / (unit * step)
     start = min((own, *(np.array([far, near]) for far in END_SHARES for near in END_SHARES)), key=error)
     around = start + np.array([[0, 0], [1, 0], [0, 1]]) * END_STEP
     far, near = minimize(error, start, method="Nelder-Mead", options={"initial_simplex": around, "maxiter": 60}).x
-    return np.asarray((far + (near - far) * share) * (unit * step), np.float32)
+    fitted = np.asarray((far + (near - far) * share) * (unit * step), np.float32)
+    return min((estimate, fitted), key=lambda disparity: _error_db(photo, disparity, truths))
+
+
+def _error_db(
+    photo: FloatImage, disparity: FloatImage, truths: Sequence[tuple[ViewOffset, FloatImage]]
+) -> float:
+    """Mean over true views of the squared error of the warped photo, in decibels: what PSNR counts."""
+    errors = [((reference_warp(photo, disparity, at).colors - truth) ** 2).mean() for at, truth in truths]
+    return float(np.mean(10 * np.log10(np.maximum(errors, LEAST_ERROR))))
 
 
 def _smaller(image: FloatImage, step: int) -> FloatImage:

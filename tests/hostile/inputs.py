@@ -128,7 +128,7 @@ _view_files = [
     *(
         Case(f"{command} {name}", _opening(command, name), says=name)
         for command in ("plan", "generate", "screenshot")
-        for name in ("none_qs0x6a1.png", "odd_eslf.png", "raw.lfp", "thin_SBS.png")
+        for name in ("none_qs0x6a1.png", "odd_eslf.png", "raw.lfp")
     ),
 ]
 

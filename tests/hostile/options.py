@@ -239,7 +239,6 @@ _others = [
     Case(f"{' '.join(words)[:60]}", words, says=says)
     for words, says in (
         (("screenshot", "field", "-o", "new.png", "--disparity", "missing.pfm"), "missing.pfm"),
-        (("depth", "photo.png", "-o", "new.pfm"), "photo.png"),
         (("depth", "missing", "-o", "new.pfm"), "missing"),
         (("depth", "field", "-o", "new.jpg"), "new.jpg"),
         (("depth", "field", "-o", "field/new.pfm"), "new.pfm"),

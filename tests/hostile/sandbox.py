@@ -44,7 +44,7 @@ BAD_MAPS = (
 
 BAD_VIEW_FILES = (
     "cut.mpo", "cut.lif", "lie.lif", "cut-pair.heic", "none_qs0x6a1.png", "many_qs32x32a1.png", "odd_eslf.png",
-    "uneven_qs2x2a1.png", "raw.lfp", "thin_SBS.png", "photo.png", "missing_SBS.png",
+    "uneven_qs2x2a1.png", "raw.lfp", "missing_SBS.png",
 )  # fmt: skip
 """Of the template: files that hold no whole light field or stereo photo."""
 
