@@ -21,9 +21,14 @@ HUAWEI_MARK = b"edof"
 HUAWEI_SIZE_AT, HUAWEI_HEADER_BYTES = 16, 68
 """Behind the mark: width and height, two bytes each; then the map, a byte a pixel, mirrored."""
 MAX_PICTURES = 8
-COMPARED = (32, 24)
+COMPARED, LOOKED_AT = (32, 24), (256, 192)
+"""(width, height) at which a picture is compared with the photo, and at which its texture is looked at."""
 MOST_LIKENESS = 0.97
-"""Correlation with the photo's brightness from which a grey picture is a small copy of it, not a map."""
+"""Correlation with the photo's brightness, or its negative, from which a grey picture is a copy of it, not a map."""
+TEXTURE_STEP, MOST_TEXTURED = 3, 0.35
+"""A map is smooth inside surfaces: in no larger share of it do neighbours differ by more than this step of 255."""
+LEAST_LEVELS = 8
+"""A matte has fewer grey values that are seen in more than one of 200 pixels."""
 OTHER_USE = re.compile(rb"http://ns.adobe.com/xap/|urn:iso:std:iso:ts:21496|hdrgm:|GainMap", re.IGNORECASE)
 """Pictures whose headers hold these are gain maps, mattes and others that say what they are."""
 HEADER_BYTES = 0x10000
@@ -102,19 +107,31 @@ def _fits(size: ImageSize, data: bytes) -> bool:
 
 
 def _is_copy(content: bytes, data: bytes) -> bool:
-    """Whether a picture looks like the photo, or shows nothing."""
-    own, photo = _small(content), _small(data)
+    """Whether a picture looks like the photo, has texture as photos have it, or shows nothing but a matte."""
+    own, photo, fine = _small(content), _small(data), _small(content, LOOKED_AT)
     if own is None or photo is None or np.ptp(own) < LEAST_RANGE:
         return True
+    if fine is None or _is_textured(fine[..., 0]) or _is_matte(fine[..., 0]):
+        return True
     first, second = (_standardised(pixels.astype(np.float32).mean(axis=2)) for pixels in (own, photo))
-    return float((first * second).mean()) > MOST_LIKENESS
+    return abs(float((first * second).mean())) > MOST_LIKENESS
 
 
-def _small(content: bytes) -> np.ndarray | None:
+def _is_textured(grey: np.ndarray) -> bool:
+    steps = np.maximum(np.abs(np.diff(grey, axis=0))[:, 1:], np.abs(np.diff(grey, axis=1))[1:])
+    return bool((steps > TEXTURE_STEP).mean() > MOST_TEXTURED)
+
+
+def _is_matte(grey: np.ndarray) -> bool:
+    counts = np.bincount(grey.ravel().astype(np.intp) // 4)
+    return bool((counts > grey.size / 200).sum() < LEAST_LEVELS)
+
+
+def _small(content: bytes, size: tuple[int, int] = COMPARED) -> np.ndarray | None:
     try:
         with Image.open(BytesIO(content), formats=("JPEG",)) as picture:
-            picture.draft("RGB", (4 * COMPARED[0], 4 * COMPARED[1]))
-            return np.asarray(picture.convert("RGB").resize(COMPARED, Image.Resampling.BOX), np.int16)
+            picture.draft("RGB", (2 * size[0], 2 * size[1]))
+            return np.asarray(picture.convert("RGB").resize(size, Image.Resampling.BOX), np.int16)
     except DECODE_ERRORS:
         return None
 

@@ -306,7 +306,10 @@ def test_copies_gain_maps_and_pictures_of_other_shapes_are_no_maps() -> None:
     copy = files.picture(np.asarray(Image.fromarray(pixels).convert("L").resize((64, 48))), "JPEG")
     gain = grey[:2] + b"\xff\xe1\x00\x25http://ns.adobe.com/xap/1.0/\0<hdrgm>" + grey[2:]
     wide = files.picture(depth[:40], "JPEG")
-    for behind in (photo, copy, gain, wide):
+    grey_photo = np.asarray(Image.fromarray(pixels).convert("L"))
+    shifted, negative, matte = np.roll(grey_photo, 12, axis=1), 255 - grey_photo, np.where(depth > 200, 255, 0)
+    others = [files.picture(other.astype(np.uint8), "JPEG") for other in (shifted, negative, matte)]
+    for behind in (photo, copy, gain, wide, *others):
         assert embedded_in_jpeg(photo + behind) is None
 
 
