@@ -81,28 +81,40 @@ def depth_of_picture(path: Path, values: FloatImage, photo: Photo, choice: Depth
 
 def depth_of_model(
     title: str, estimate: Estimate, is_meaning_known: bool, photo: Photo, choice: DepthChoice
-) -> tuple[Estimate, tuple[str, ...]]:
-    """What a model's estimate means, and a note where that was not said by a published model or --metric.
+) -> DepthFromFile:
+    """Return what a model's estimate means; nothing is said (near is "") of published models and disparity.
 
     Files of one's own say it in a config.json or not at all: where the photo shows the contrary, it decides.
     """
     if isinstance(estimate, DisparityMap) or is_meaning_known:
-        return estimate, ()
-    values = values_of(estimate)
+        return DepthFromFile(estimate, "", ())
+    evidence, says_metres = near_evidence(photo.pixels, values_of(estimate)), isinstance(estimate, MetricDepth)
     if choice.is_metric:
-        return MetricDepth(values), ()
-    evidence = near_evidence(photo.pixels, values)
-    if isinstance(estimate, MetricDepth):
-        if evidence < SURE_AGAINST_CONFIG:
-            return estimate, ()
-        note = f"Large values of {title} count as near, as the photo shows; its config.json says that they are metres."
-        return RelativeInverseDepth(values), (note,)
-    if evidence >= -1:
-        hint = () if evidence > 1 else (f"Large values of {title} count as near; --metric if they are distances.",)
-        return estimate, hint
-    is_positive = bool((values[np.isfinite(values)] > 0).all())
-    note = f"Large values of {title} count as far, as the photo shows; --metric says so, --invert-depth turns it."
-    return MetricDepth(values) if is_positive else RelativeInverseDepth(-values), (note,)
+        large_is_near, reason = False, "as said"
+    elif says_metres:
+        large_is_near = evidence >= SURE_AGAINST_CONFIG
+        reason = (
+            "as the photo shows, though its config.json says metres" if large_is_near else "as its config.json says"
+        )
+    else:
+        large_is_near = evidence >= -1
+        shown = "as the photo shows" if abs(evidence) > 1 else "as usual"
+        reason = f"{shown}; --metric if they are distances, --invert-depth if that is wrong"
+    near = "the high end" if large_is_near != choice.inverts else "the low end"
+    note = f"Large values of {title} count as {'near' if large_is_near else 'far'}, {reason}."
+    return DepthFromFile(turned_estimate(estimate, large_is_near, choice), near, (note,))
+
+
+def turned_estimate(estimate: Estimate, large_is_near: bool, choice: DepthChoice) -> Estimate:
+    """Return a model's values with this end near. Those that are far where large count as distances where that was
+    said, or all are above 0.
+    """
+    values = values_of(estimate)
+    if large_is_near:
+        return RelativeInverseDepth(values)
+    are_metres = choice.is_metric or isinstance(estimate, MetricDepth)
+    are_distances = are_metres or bool((values[np.isfinite(values)] > 0).all())
+    return MetricDepth(values) if are_distances else RelativeInverseDepth(-values)
 
 
 def _within(path: Path, found: MapFile, photo: Photo, choice: DepthChoice, are_distances: bool) -> DepthFromFile:

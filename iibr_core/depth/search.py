@@ -15,8 +15,9 @@ import numpy as np
 from iibr_core.depth.choice import BETTER_WAYS, DepthChoice, DepthKind, DepthOrigin
 from iibr_core.depth.edges.map_alignment import lies_at_corners
 from iibr_core.depth.edges.refine import refine
-from iibr_core.depth.embedded.embedded_depth import SECOND_PICTURE, read_embedded
+from iibr_core.depth.embedded.embedded_depth import read_embedded
 from iibr_core.depth.embedded.picture import photo_in_focus, rotate_estimate
+from iibr_core.depth.embedded.unread import unread_parts
 from iibr_core.depth.estimates import Estimate, inverted, values_of
 from iibr_core.depth.map_file import (
     depth_beside_picture,
@@ -24,6 +25,7 @@ from iibr_core.depth.map_file import (
     depth_from_file,
     depth_of_model,
     depth_of_picture,
+    turned_estimate,
 )
 from iibr_core.depth.pictorial_cues import estimate_from_cues
 from iibr_core.depth.scaling import disparity_from, inverse_metres_over
@@ -167,14 +169,15 @@ def estimator_of(found: PhotoWithDepth, choice: DepthChoice) -> EstimateDepth | 
         return None
 
     def estimate(colors: FloatImage, should_stop: ShouldStop) -> FloatImage:
-        from iibr_core.depth.estimators.catalog import is_meaning_known, model_to_use
+        from iibr_core.depth.estimators.catalog import model_to_use
         from iibr_core.depth.estimators.estimate_depth import estimate_with
 
         model = model_to_use(choice)
         if model is None:
             raise InputError(f"{found.origin.words}: the model no longer exists")
         depth = estimate_with(model, replace(found.photo, pixels=colors), choice.memory_bytes, should_stop)
-        depth = depth_of_model(model.title, depth, is_meaning_known(model), found.photo, choice)[0]
+        if found.origin.near:  # the first estimate decided, for all
+            depth = turned_estimate(depth, (found.origin.near == "the high end") != choice.inverts, choice)
         return _at_size(disparity_from(_as_chosen(depth, choice), USUAL_GRID), found.photo)
 
     return estimate
@@ -246,10 +249,10 @@ class _DepthSearch:
         photo = photo_in_focus(self.path, self.photo, embedded, self.max_pixels)
         origin = DepthOrigin("embedded", f"the photo itself ({embedded.format})")
         estimate = rotate_estimate(embedded.estimate, photo.size, read_orientation(self.path))
-        if embedded.format == SECOND_PICTURE:
-            told = depth_of_picture(self.path, values_of(estimate), photo, self.choice)
-            return _FoundDepth(photo, replace(origin, near=told.near), told.estimate, told.notes)
-        return _FoundDepth(photo, origin, estimate)
+        if embedded.says_near_end:
+            return _FoundDepth(photo, origin, estimate, embedded.notes)
+        told = depth_of_picture(self.path, values_of(estimate), photo, self.choice)
+        return _FoundDepth(photo, replace(origin, near=told.near), told.estimate, embedded.notes + told.notes)
 
     def of_pair(self) -> _FoundDepth | None:
         from iibr_core.depth.stereo_pair import estimate_from_pair
@@ -270,16 +273,16 @@ class _DepthSearch:
 
         raise_if_stopped(self.should_stop)
         estimate = estimate_with(model, self.photo, self.choice.memory_bytes, self.should_stop, self.report_progress)
-        estimate, notes = depth_of_model(model.title, estimate, is_meaning_known(model), self.photo, self.choice)
-        return _FoundDepth(self.photo, DepthOrigin("model", f"estimated by {model.title}"), estimate, notes)
+        told = depth_of_model(model.title, estimate, is_meaning_known(model), self.photo, self.choice)
+        origin = DepthOrigin("model", f"estimated by {model.title}", near=told.near)
+        return _FoundDepth(self.photo, origin, told.estimate, told.notes)
 
     def rough(self) -> _FoundDepth:
         raise_if_stopped(self.should_stop)
         self.report_progress(0, 0, "guessing depth")
         estimate = estimate_from_cues(self.photo, self.should_stop)
-        return _FoundDepth(
-            self.photo, DepthOrigin("rough", "rough, guessed without a model", (), BETTER_WAYS), estimate
-        )
+        origin = DepthOrigin("rough", "rough, guessed without a model", (), BETTER_WAYS)
+        return _FoundDepth(self.photo, origin, estimate, unread_parts(self.path))
 
 
 def _finish(found: _FoundDepth, choice: DepthChoice, grid: GridShape | None, should_stop: ShouldStop) -> PhotoWithDepth:

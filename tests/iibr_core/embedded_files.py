@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import hashlib
 import io
+import json
 import struct
 
 import numpy as np
@@ -166,8 +167,19 @@ def samsung_jpeg(photo: bytes, depth: np.ndarray, size: tuple[int, int] | None =
     return photo + trailer
 
 
-def heic(pixels: np.ndarray, depth: np.ndarray | None = None, exif: bytes | None = None) -> bytes:
-    """A HEIC photo, with an auxiliary depth picture if asked: the second picture of a file of two, made one by hand."""
+HEIC_DEPTH = b"urn:mpeg:hevc:2015:auxid:2"
+
+
+def heic(
+    pixels: np.ndarray,
+    depth: np.ndarray | None = None,
+    exif: bytes | None = None,
+    auxiliary: bytes = HEIC_DEPTH,
+) -> bytes:
+    """A HEIC photo, with an auxiliary picture if asked: the second picture of a file of two, made one by hand.
+
+    auxiliary: its type, depth or another one.
+    """
     import pillow_heif
 
     file = pillow_heif.from_bytes("RGB", (pixels.shape[1], pixels.shape[0]), pixels.tobytes())
@@ -175,12 +187,12 @@ def heic(pixels: np.ndarray, depth: np.ndarray | None = None, exif: bytes | None
         file.add_frombytes("L", (depth.shape[1], depth.shape[0]), depth.tobytes())
     whole = io.BytesIO()
     file.save(whole, format="HEIF", quality=-1, **({"exif": exif} if exif else {}))
-    return whole.getvalue() if depth is None else _with_second_as_depth(bytearray(whole.getvalue()))
+    return whole.getvalue() if depth is None else _with_second_as(bytearray(whole.getvalue()), auxiliary)
 
 
-def _with_second_as_depth(data: bytearray) -> bytes:
+def _with_second_as(data: bytearray, auxiliary_type: bytes) -> bytes:
     """Adds a reference "auxl" from item 2 to item 1, and the property that says what it is."""
-    auxiliary = _box(b"auxC", bytes(4) + b"urn:mpeg:hevc:2015:auxid:2\0")
+    auxiliary = _box(b"auxC", bytes(4) + auxiliary_type + b"\0")
     reference = _box(b"iref", bytes(4) + _box(b"auxl", struct.pack(">HHH", 2, 1, 1)))
     at = {name: data.index(name) - 4 for name in (b"meta", b"iloc", b"iprp", b"ipco", b"ipma")}
     size = {name: int.from_bytes(data[start : start + 4], "big") for name, start in at.items()}
@@ -208,3 +220,55 @@ def _with_second_as_depth(data: bytearray) -> bytes:
 
 def _box(name: bytes, content: bytes) -> bytes:
     return struct.pack(">I", len(content) + 8) + name + content
+
+
+def disc_scene() -> tuple[np.ndarray, np.ndarray]:
+    """A coloured photo (96, 128, 3) of a disc before a wall, and its map (96, 128), white near."""
+    y, x = np.mgrid[:96, :128]
+    disc = np.hypot(x - 60, y - 60) < 30
+    pixels = np.array([90, 120, 60]) + np.random.default_rng(0).integers(0, 60, (96, 128, 3))
+    pixels[disc] = [250, 130, 90]
+    return pixels.astype(np.uint8), np.where(disc, 230, 20 + y // 2).astype(np.uint8)
+
+
+def huawei_jpeg(photo: bytes, stored: np.ndarray, orientation: int = 0) -> bytes:
+    """A "wide aperture" photo: the shown and the sharp picture, then the map (h, w) uint8 as it is stored."""
+    header = bytearray(68)
+    header[7] = orientation
+    header[16:20] = struct.pack("<HH", stored.shape[1], stored.shape[0])
+    return photo + photo + b"\x56\xe9edof" + bytes(header) + stored.tobytes()
+
+
+def avif(pixels: np.ndarray, depth: np.ndarray, orientation: int = 1) -> bytes:
+    """An AVIF photo with an auxiliary depth map of its size: Pillow's alpha, by another name."""
+    file, exif = io.BytesIO(), Image.Exif()
+    exif[0x0112] = orientation
+    Image.fromarray(np.dstack([pixels, depth])).save(file, "AVIF", quality=95, exif=exif)
+    assert b":auxiliary:alpha\0" in file.getvalue()
+    return file.getvalue().replace(b":auxiliary:alpha\0", b":auxiliary:depth\0")
+
+
+def lytro_file(text: dict[str, object], chunks: dict[str, bytes]) -> bytes:
+    """A Lytro file of a JSON and named chunks."""
+    sections = [(b"M", "json", json.dumps(text).encode()), *((b"C", name, chunks[name]) for name in chunks)]
+    data = b"\x89LFP\r\n\x1a\n" + struct.pack(">II", 1, 0)
+    for kind, name, content in sections:
+        data += b"\x89LF" + kind + b"\r\n\x1a\n" + struct.pack(">II", 0, len(content)) + name.encode().ljust(80, b"\0")
+        data += content + bytes(-len(content) % 16)
+    return data
+
+
+def lytro_stack(pictures: dict[float, bytes], depth: np.ndarray, size: tuple[int, int], is_illum: bool) -> bytes:
+    """A processed file: pictures by their lambda, as first cameras or as the Illum list them; depth (h, w) float32."""
+    height, width = size
+    chunks = {f"sha1-{number}": content for number, content in enumerate(pictures.values())} | {
+        "sha1-map": depth.astype("<f4").tobytes()
+    }
+    listed = [{"imageRef": f"sha1-{k}", "focus" if is_illum else "lambda": at} for k, at in enumerate(pictures)]
+    described = {"width": depth.shape[1], "height": depth.shape[0], "imageRef": "sha1-map"}
+    if is_illum:
+        entry = {"kind": "focusStack", "width": width, "height": height, "depthMap": described, "perImage": listed}
+        return lytro_file({"views": [{"accelerations": [entry]}]}, chunks)
+    listed = [{"width": width, "height": height, **picture} for picture in listed]
+    content = {"depthLut": described, "imageArray": listed}
+    return lytro_file({"picture": {"accelerationArray": [{"vendorContent": content}]}}, chunks)

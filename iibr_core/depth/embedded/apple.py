@@ -21,14 +21,14 @@ MAX_APPENDED = 8
 """Pictures that are looked at behind a photo: depth, mattes, gain map, and some to spare."""
 
 # HEVC's depth representation information: what the stored values are linear in.
-INVERSE_DISTANCE_TYPES = (0, 1)
+INVERSE_DISTANCE_TYPES = (0, 1, 3)
 DISTANCE_TYPE = 2
 
 
 def heic_estimate(depth: FloatImage, metadata: dict[str, Any]) -> RelativeInverseDepth:
-    """Depth of a HEIC's auxiliary picture: (H, W), 0..1, with what libheif tells of it.
+    """Return the depth of a HEIC's auxiliary picture: (H, W), 0..1, with what libheif tells of it.
 
-    Raises InputError where the range makes no sense.
+    Raises InputError where the values mean something unknown.
     """
     kind = metadata.get("representation_type", 1)
     if kind in INVERSE_DISTANCE_TYPES:
@@ -62,14 +62,16 @@ def appended_estimate(data: bytes, end: int) -> RelativeInverseDepth | None:
 
 
 def _linear_in_inverse(stored: FloatImage, low: float, high: float) -> RelativeInverseDepth:
+    """A range that makes no sense is left out: it changes nothing but the unknown scale."""
     if not (math.isfinite(low) and high > low and math.isfinite(high)):
-        raise InputError(f"the depth map's range from {low:g} to {high:g} spans nothing")
+        return RelativeInverseDepth(stored)
     return RelativeInverseDepth(np.float32(low) + stored * np.float32(high - low))
 
 
 def _linear_in_distance(stored: FloatImage, near: float, far: float) -> RelativeInverseDepth:
+    """Of a range that makes no sense only the order of the values counts."""
     if not (0 < near < far < math.inf):
-        raise InputError(f"the depth map's range from {near:g} to {far:g} spans no distances")
+        return RelativeInverseDepth(1 - stored)
     return RelativeInverseDepth((1 / (near + stored.astype(np.float64) * (far - near))).astype(np.float32))
 
 

@@ -17,6 +17,7 @@ import numpy as np
 from iibr_core.depth.embedded.images import JPEG_START, PNG_START, decode_map
 from iibr_core.depth.embedded.xmp import JpegLayout, Xmp, number_in
 from iibr_core.depth.estimates import Estimate, MetricDepth, RelativeInverseDepth
+from iibr_core.formats.files import printable
 from iibr_core.formats.images.xmp_packet import value_in
 from iibr_core.types import FloatImage, InputError
 
@@ -60,6 +61,16 @@ def gdepth_estimate(xmp: Xmp) -> Estimate | None:
     confidence = xmp.value(GDEPTH, "Confidence")
     sure = decode_map(_from_base64(confidence, "GDepth:Confidence"), "its confidence") if confidence else None
     return _estimate(stored, sure, depth_range)
+
+
+def range_notes(xmp: Xmp) -> tuple[str, ...]:
+    """Return a note where the range of GDepth or Dynamic Depth makes no sense, else none."""
+    for namespace in (DEPTH_MAP, GDEPTH):
+        found = {name: xmp.value(namespace, name) for name in ("Format", "Near", "Far", "Units")}
+        if (found["Near"] or found["Far"]) and math.isnan(_depth_range(found).near):
+            near, far = (printable(found[name] or "nothing") for name in ("Near", "Far"))
+            return (f"The depth map's range from {near} to {far} makes no sense: only the order of its values counts.",)
+    return ()
 
 
 def all_in_focus(xmp: Xmp) -> bytes | None:

@@ -24,8 +24,9 @@ PNG_START, JPEG_START = b"\x89PNG\r\n\x1a\n", b"\xff\xd8\xff"
 GREY_TOLERANCE = 10
 """By how many of 255 steps the channels of a grey picture may differ: it may have been a JPEG."""
 
-# What Pillow raises for damaged PNGs and JPEGs.
+# Pillow raises these for damaged pictures; the runtime error is of AVIF.
 DECODE_ERRORS = (
+    RuntimeError,
     OSError,
     ValueError,
     SyntaxError,
@@ -55,15 +56,17 @@ def picture_file(data: bytes, what: str) -> Iterator[Path]:
             raise InputError(f"{what}: {str(error).removeprefix(f'{path}: ')}") from error
 
 
-def decode_map(data: bytes, what: str) -> FloatImage:
-    """A grey picture's values as (H, W) float32, 0..1. Raises InputError where it is damaged, coloured or absurd.
+def decode_map(data: bytes, what: str, formats: tuple[str, ...] = ("PNG", "JPEG", "WEBP")) -> FloatImage:
+    """Return a grey picture's values as (H, W) float32, 0..1; formats: by Pillow's names.
+
+    Raises InputError where it is damaged, coloured or absurd.
 
     Decoded by Pillow: libpng, as OpenImageIO calls it, tells of damage on stderr, where it would spoil our one line.
     """
     if data.startswith(PNG_START) and PNG_END not in data:
         raise InputError(f"{what}: cut off after {len(data):,} bytes")
     try:
-        with Image.open(io.BytesIO(data), formats=("PNG", "JPEG")) as picture:
+        with Image.open(io.BytesIO(data), formats=formats) as picture:
             width, height = picture.size
             if not 0 < width * height <= MAX_MAP_PIXELS:
                 raise InputError(f"{what}: {width}x{height} pixels are not from 1 to {MAX_MAP_PIXELS:,}")

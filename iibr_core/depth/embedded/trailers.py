@@ -1,6 +1,7 @@
 """Depth maps that phones append to their JPEG photos without describing them in XMP: Huawei's, and plain second JPEGs.
 
-No maker publishes these layouts; they are as users of such files found them. White is near in both.
+No maker publishes these layouts; they are as users of such files found them. Which end is near is not known for sure:
+white is taken for near, and the photo decides.
 """
 
 from __future__ import annotations
@@ -10,16 +11,19 @@ import struct
 from io import BytesIO
 
 import numpy as np
+from numpy.typing import NDArray
 from PIL import Image
 
-from iibr_core.depth.embedded.images import DECODE_ERRORS, MAX_MAP_PIXELS, decode_map
+from iibr_core.depth.embedded.images import DECODE_ERRORS, decode_map
 from iibr_core.depth.embedded.xmp import jpeg_layout
 from iibr_core.depth.estimates import RelativeInverseDepth
 from iibr_core.types import FloatImage, ImageSize, InputError
 
-HUAWEI_MARK = b"edof"
-HUAWEI_SIZE_AT, HUAWEI_HEADER_BYTES = 16, 68
-"""Behind the mark: width and height, two bytes each; then the map, a byte a pixel, mirrored."""
+HUAWEI_MARK = re.compile(b"edof")
+HUAWEI_ORIENTATION_AT, HUAWEI_SIZE_AT, HUAWEI_HEADER_BYTES = 7, 16, 68
+"""Behind the mark: how the phone was held, width and height, two bytes each; then the map, a byte a pixel."""
+HUAWEI_SIDES = range(16, 8193)
+"""Sides of a map in pixels; the four letters of the mark stand in other data as well."""
 MAX_PICTURES = 8
 COMPARED, LOOKED_AT = (32, 24), (256, 192)
 """(width, height) at which a picture is compared with the photo, and at which its texture is looked at."""
@@ -43,19 +47,36 @@ def huawei_estimate(data: bytes, end: int) -> RelativeInverseDepth | None:
 
     Raises InputError where the map is cut off.
     """
-    at = data.find(HUAWEI_MARK, end)
-    header = data[at + len(HUAWEI_MARK) :][:HUAWEI_HEADER_BYTES] if at >= 0 else b""
-    if len(header) < HUAWEI_HEADER_BYTES:
-        return None
-    width, height = struct.unpack_from("<HH", header, HUAWEI_SIZE_AT)
-    if not 0 < width * height <= MAX_MAP_PIXELS:
-        return None
-    start = at + len(HUAWEI_MARK) + HUAWEI_HEADER_BYTES
-    content = data[start : start + width * height]
-    if len(content) < width * height:
-        raise InputError(f"Huawei's depth map of {width}x{height} pixels is cut off after {len(content):,} bytes")
-    stored = np.frombuffer(content, np.uint8).reshape(height, width)[:, ::-1]
-    return RelativeInverseDepth(stored.astype(np.float32) / np.float32(255))
+    cut_off = ""
+    for mark in HUAWEI_MARK.finditer(data, end):
+        header = data[mark.end() : mark.end() + HUAWEI_HEADER_BYTES]
+        if len(header) < HUAWEI_HEADER_BYTES:
+            break
+        width, height = struct.unpack_from("<HH", header, HUAWEI_SIZE_AT)
+        start = mark.end() + HUAWEI_HEADER_BYTES
+        content = data[start : start + width * height]
+        if width in HUAWEI_SIDES and height in HUAWEI_SIDES and len(content) == width * height:
+            stored = np.frombuffer(content, np.uint8).reshape(height, width)
+            turned = _as_held(stored, header[HUAWEI_ORIENTATION_AT])
+            return RelativeInverseDepth(turned.astype(np.float32) / np.float32(255))
+        if width in HUAWEI_SIDES and height in HUAWEI_SIDES:
+            cut_off = cut_off or f"{width}x{height} pixels is cut off after {len(content):,} bytes"
+    if cut_off:
+        raise InputError(f"Huawei's depth map of {cut_off}; get the whole file again")
+    return None
+
+
+def _as_held(stored: NDArray[np.uint8], orientation: int) -> NDArray[np.uint8]:
+    """Return a Huawei map (h, w) as the photo is; the first phones wrote 0 and always mirrored it."""
+    match orientation:
+        case 0x10:
+            return stored[::-1]
+        case 0x11:
+            return stored[::-1, ::-1].T
+        case 0x13:
+            return stored.T
+        case _:
+            return stored[:, ::-1]
 
 
 def second_picture_estimate(data: bytes, end: int) -> RelativeInverseDepth | None:

@@ -6,11 +6,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 from iibr_core.formats.files import open_binary
-from iibr_core.formats.images.avif import avif_size, is_avif
-from iibr_core.formats.images.heic import heic_size, is_heic
 from iibr_core.formats.images.jpeg_segments import jpeg_segments
 from iibr_core.formats.images.oiio_reader import PictureRows
-from iibr_core.formats.images.picture_source import source_size
+from iibr_core.formats.images.picture_source import PictureSource, is_read_whole, source_size
 from iibr_core.formats.images.side_by_side import own_picture
 from iibr_core.types import ImageSize
 
@@ -44,8 +42,8 @@ def read_photo_header(path: Path) -> PhotoHeader:
 
 
 def _whole_header(path: Path) -> PhotoHeader:
-    if is_avif(path) or is_heic(path):
-        size = avif_size(path) if is_avif(path) else heic_size(path)
+    if is_read_whole(path):
+        size = source_size(PictureSource(path))
         return PhotoHeader(size, size.height * size.width * HEIC_BYTES)
     rows = PictureRows(path)
     size, kind, pixels = rows.size, rows.format_name, rows.size.height * rows.size.width

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,7 +18,7 @@ from iibr_core.formats.images.oiio_reader import Raster
 from iibr_core.types import FloatImage, ImageSize, InputError
 
 BRANDS = frozenset({b"heic", b"heix", b"heim", b"heis", b"hevc", b"hevx", b"mif1", b"msf1"})
-EXIF_FOLDER = 0x8769
+EXIF_FOLDER, ORIENTATION_TAG = 0x8769, 0x0112
 EXIF_NUMBERS = {
     0x920A: "Exif:FocalLength",
     0xA405: "Exif:FocalLengthIn35mmFilm",
@@ -105,6 +106,25 @@ def read_heic_depth(path: Path) -> HeicDepth | None:
     pixels = _pixels(path, maps[0])
     scale = np.float32(1 / np.iinfo(pixels.dtype).max)
     return HeicDepth(np.ascontiguousarray(pixels[..., 0]) * scale, dict(maps[0].info.get("metadata") or {}))
+
+
+def heic_orientation(path: Path) -> int:
+    """Return Exif's Orientation, 1..8, of a HEIC; its photo is read upright. Raises InputError as `read_heic` does."""
+    from PIL import Image
+
+    exif = Image.Exif()
+    with suppress(*DECODE_ERRORS, TypeError):
+        exif.load(_open(path).info.get("exif") or b"")
+    orientation = exif.get(ORIENTATION_TAG, 1)
+    return int(orientation) if orientation in range(1, 9) else 1
+
+
+def heic_auxiliaries(path: Path) -> tuple[str, ...]:
+    """Return the types of the auxiliary pictures of a HEIC, but depth and alpha.
+
+    Raises InputError as `read_heic` does.
+    """
+    return tuple(str(kind) for kind in _open(path).info.get("aux") or {})
 
 
 def _open_file(path: Path) -> Any:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import struct
 from collections.abc import Iterator
 
+DAMAGE = (KeyError, IndexError, struct.error)
 COLOR_CODES_BYTES = 11
 """Size of a `colr` box's content that gives colours in numbers: its type, three numbers of 2 bytes, a flag."""
 
@@ -36,12 +37,9 @@ def color_codes_of(file: bytes) -> tuple[int, int, int, int] | None:
     """
     try:
         meta = dict(boxes(dict(boxes(file))[b"meta"][4:]))
-        iprp = dict(boxes(meta[b"iprp"]))
-        properties = list(boxes(iprp[b"ipco"]))
-        numbers = _properties_of(_primary_item(meta[b"pitm"]), iprp[b"ipma"])
-    except (KeyError, IndexError, struct.error):
+        held = _item_properties(meta)[_primary_item(meta[b"pitm"])]
+    except DAMAGE:
         return None
-    held = (properties[number - 1] for number in numbers if 1 <= number <= len(properties))
     for kind, content in held:
         if kind == b"colr" and content[:4] == b"nclx" and len(content) >= COLOR_CODES_BYTES:
             primaries, transfer, matrix = struct.unpack_from(">HHH", content, 4)
@@ -49,22 +47,51 @@ def color_codes_of(file: bytes) -> tuple[int, int, int, int] | None:
     return None
 
 
+def with_auxiliary_shown(file: bytes, types: tuple[bytes, ...]) -> bytes | None:
+    """Return the file with an auxiliary picture of one of these types (`auxC`) in the place of its primary one.
+
+    None where it has no such picture. file: an AVIF or HEIC file, whole.
+    """
+    try:
+        meta = dict(boxes(dict(boxes(file))[b"meta"][4:]))
+        held, pitm = _item_properties(meta), meta[b"pitm"]
+        form = ">I" if pitm[0] else ">H"
+        for item, properties in held.items():
+            kinds = [content[4:].split(b"\0")[0] for kind, content in properties if kind == b"auxC"]
+            if any(kind in types for kind in kinds):
+                shown = pitm[:4] + struct.pack(form, item) + pitm[4 + struct.calcsize(form) :]
+                return file.replace(box(b"pitm", pitm), box(b"pitm", shown), 1)
+    except DAMAGE:
+        pass
+    return None
+
+
+def _item_properties(meta: dict[bytes, bytes]) -> dict[int, list[tuple[bytes, bytes]]]:
+    """Return the kind and content of each item's properties."""
+    iprp = dict(boxes(meta[b"iprp"]))
+    properties = list(boxes(iprp[b"ipco"]))
+    return {
+        item: [properties[number - 1] for number in numbers if 1 <= number <= len(properties)]
+        for item, numbers in _associations(iprp[b"ipma"]).items()
+    }
+
+
 def _primary_item(pitm: bytes) -> int:
     item: int = struct.unpack_from(">I" if pitm[0] else ">H", pitm, 4)[0]
     return item
 
 
-def _properties_of(wanted: int, ipma: bytes) -> list[int]:
-    """Return the numbers of an item's properties, counted from 1 (ISO/IEC 23008-12, `ipma`)."""
+def _associations(ipma: bytes) -> dict[int, list[int]]:
+    """Return the numbers of each item's properties, counted from 1 (ISO/IEC 23008-12, `ipma`)."""
     version, has_wide_numbers = ipma[0], ipma[3] & 1
     (count,), at = struct.unpack_from(">I", ipma, 4), 8
     item_form, item_bytes = (">H", 2) if version < 1 else (">I", 4)
+    size = 2 if has_wide_numbers else 1
+    found = {}
     for _ in range(count):
         (item,), held = struct.unpack_from(item_form, ipma, at), ipma[at + item_bytes]
         at += item_bytes + 1
-        size = 2 if has_wide_numbers else 1
-        if item == wanted:
-            entries = (int.from_bytes(ipma[at + size * k : at + size * (k + 1)], "big") for k in range(held))
-            return [entry & (0x7FFF if has_wide_numbers else 0x7F) for entry in entries]
+        entries = (int.from_bytes(ipma[at + size * k : at + size * (k + 1)], "big") for k in range(held))
+        found[item] = [entry & (0x7FFF if has_wide_numbers else 0x7F) for entry in entries]
         at += size * held
-    return []
+    return found

@@ -16,15 +16,13 @@ from numpy.typing import NDArray
 
 from iibr_core.color import ROWS_AT_ONCE, bytes_from_encoded, convert, linear_from_srgb, srgb_from_linear
 from iibr_core.formats.files import require_file, shown_name
-from iibr_core.formats.images.avif import is_avif
 from iibr_core.formats.images.color_profile import color_profile_of, color_space_of
 from iibr_core.formats.images.downsampling import OddValues, downsampled_linear, finite_pixels, linear_light
 from iibr_core.formats.images.file_notes import file_notes
 from iibr_core.formats.images.hdr import tone_map
-from iibr_core.formats.images.heic import is_heic
 from iibr_core.formats.images.oiio_reader import PictureRows, Raster, text_attribute, upright
 from iibr_core.formats.images.oiio_writer import PNG_SETTINGS, write_image_file
-from iibr_core.formats.images.picture_source import PictureSource, read_source
+from iibr_core.formats.images.picture_source import PictureSource, is_read_whole, read_source
 from iibr_core.formats.images.side_by_side import own_picture
 from iibr_core.runtime.tiling import ShouldStop, never
 from iibr_core.types import SRGB, FloatImage, ImageSize, InputError, Photo
@@ -129,7 +127,7 @@ def size_within(size: ImageSize, max_pixels: int) -> ImageSize:
 
 def _open_rows(source: PictureSource) -> PictureRows | Raster:
     path = source.path
-    is_read_by_rows = source == PictureSource(path) and not is_avif(path) and not is_heic(path)
+    is_read_by_rows = source == PictureSource(path) and not is_read_whole(path)
     return PictureRows(path) if is_read_by_rows else read_source(source)
 
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from iibr_core.formats.images.avif import avif_size, is_avif, read_avif
 from iibr_core.formats.images.heic import heic_size, is_heic, read_heic
+from iibr_core.formats.images.lfp import is_lfp, lfp_size, read_lfp
 from iibr_core.formats.images.lif import lif_picture_size, open_lif, read_lif_picture
 from iibr_core.formats.images.mpo import mpo_picture_size, read_mpo_picture
 from iibr_core.formats.images.oiio_reader import Raster, read_raster, read_size, upright
@@ -57,9 +58,16 @@ def source_size(source: PictureSource) -> ImageSize:
         return avif_size(path)
     if is_heic(path):
         return heic_size(path, number)
+    if is_lfp(path):
+        return lfp_size(path)
     if number == 0:
         return read_size(path)
     return lif_picture_size(path, number) if open_lif(path) is not None else mpo_picture_size(path, number)
+
+
+def is_read_whole(path: Path) -> bool:
+    """Whether a file is decoded by another library than OpenImageIO, all at once."""
+    return is_avif(path) or is_heic(path) or is_lfp(path)
 
 
 def read_source(source: PictureSource) -> Raster:
@@ -94,6 +102,8 @@ def _read_whole(path: Path, number: int) -> Raster:
         return read_avif(path)
     if is_heic(path):
         return read_heic(path, number)
+    if is_lfp(path):
+        return read_lfp(path)
     if number == 0:
         return read_raster(path)
     return read_lif_picture(path, number) if open_lif(path) is not None else read_mpo_picture(path, number)

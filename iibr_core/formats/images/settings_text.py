@@ -16,12 +16,13 @@ def settings_text_in(path: Path) -> str:
     from iibr_core.formats.files import require_file
     from iibr_core.formats.images.avif import is_avif
     from iibr_core.formats.images.heic import is_heic
+    from iibr_core.formats.images.lfp import is_lfp
     from iibr_core.formats.images.metadata import text_in_xmp, unpack_text
     from iibr_core.formats.images.oiio_names import oiio_name
     from iibr_core.formats.images.oiio_reader import complaint_of
 
     require_file(path)
-    if is_heic(path):
+    if is_heic(path) or is_lfp(path):
         return ""  # this program writes none
     if is_avif(path):
         return text_in_xmp(path, ATTRIBUTE)

@@ -17,6 +17,7 @@ from iibr_core.formats.files import status_of
 from iibr_core.formats.images.alike_halves import is_one_scene
 from iibr_core.formats.images.file_kinds import raw_kind
 from iibr_core.formats.images.jps import Arrangement, read_jps_descriptor
+from iibr_core.formats.images.lfp import open_lfp
 from iibr_core.formats.images.oiio_reader import read_orientation
 from iibr_core.formats.images.picture_source import PicturePart, PictureSource, source_size
 from iibr_core.formats.images.rgbd import rgbd_parts
@@ -191,7 +192,7 @@ def own_picture(path: Path) -> PictureSource:
 
 def require_developed(path: Path) -> None:
     """Raise InputError for raw files of light-field cameras: a mosaic of what lies under each microlens."""
-    if path.suffix.lower() in LIGHT_FIELD_ENDINGS and raw_kind(path) is None:
+    if path.suffix.lower() in LIGHT_FIELD_ENDINGS and raw_kind(path) is None and open_lfp(path) is None:
         raise InputError(
             f"{path}: is a raw light field (Lytro), which must be decoded first: PlenoptiCam or the Light Field Toolbox"
             " make views of it, and their folder opens here"

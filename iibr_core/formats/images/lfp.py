@@ -1,0 +1,252 @@
+"""Processed files of Lytro's light-field cameras (`-stk.lfp`, and `.LFP` of the Illum): pictures of one scene focused
+at several depths, or seen from several places, with a map of depth.
+
+Lytro publishes no description; readers of others found that a file is a list of chunks, named by their hash, and a JSON
+that names them. Depth is "lambda", how far the focus is from the captured one: linear in disparity, small is near.
+"""
+
+from __future__ import annotations
+
+import json
+import struct
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from io import BytesIO
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+import OpenImageIO as oiio
+from numpy.typing import NDArray
+
+from iibr_core.formats.files import MAX_FILE_PIXELS, open_binary, reason_of
+from iibr_core.formats.images.oiio_reader import Raster
+from iibr_core.formats.images.pillow_reader import open_with_pillow
+from iibr_core.types import FloatImage, ImageSize, InputError
+
+LFP_START = b"\x89LFP\r\n\x1a\n"
+SECTION_START = b"\x89LF"
+JSON_KIND = b"M"
+HEADER_BYTES, NAME_BYTES, ALIGNMENT = 16, 80, 16
+MAX_SECTIONS, MAX_JSON_BYTES, MAX_PICTURES = 10_000, 1 << 24, 64
+PICTURE = ("JPEG", "PNG"), "a picture in a Lytro file"
+DAMAGE = (KeyError, TypeError, ValueError, AttributeError, RecursionError, OverflowError, struct.error)
+
+
+@dataclass(frozen=True)
+class LfpPictures:
+    """Pictures of one size, and which of them each depth is sharp in.
+
+    chunks: the file of each picture; or one chunk, a film of H.264, for all. focus: lambda of each, ascending where
+    there are several pictures. frames: the number of each picture in the film, () for pictures of their own.
+    """
+
+    chunks: tuple[str, ...]
+    focus: tuple[float, ...]
+    frames: tuple[int, ...]
+    size: ImageSize
+
+
+@dataclass(frozen=True)
+class Lfp:
+    """What a processed file holds.
+
+    chunks: first byte and length of each by its name. pictures: None where it holds the map only. depth: the chunk and
+    the size of the map, None without.
+    """
+
+    chunks: Mapping[str, tuple[int, int]]
+    pictures: LfpPictures | None
+    depth: tuple[str, ImageSize] | None
+
+
+def is_lfp(path: Path) -> bool:
+    """Whether a file begins as Lytro's do, raw or processed. Raises InputError where it cannot be read."""
+    with open_binary(path) as file:
+        return file.read(len(LFP_START)) == LFP_START
+
+
+def open_lfp(path: Path) -> Lfp | None:
+    """Return what a processed Lytro file holds; None for raw ones and other files.
+
+    Raises InputError where it is damaged.
+    """
+    if not is_lfp(path):
+        return None
+    try:
+        with open_binary(path) as file:
+            text, chunks = _sections(file)
+        return _processed(list(_objects(json.loads(text))), chunks) if text else None
+    except DAMAGE as error:
+        raise InputError(f"{path}: damaged or too new ({reason_of(error)}); get the whole file again") from error
+
+
+def lfp_size(path: Path) -> ImageSize:
+    """Return the size of the picture. Raises InputError as `read_lfp` does."""
+    return _pictures(path)[1].size
+
+
+def read_lfp(path: Path) -> Raster:
+    """Decode the picture that is sharp everywhere: each pixel from the picture focused at its depth.
+
+    Raises InputError where the file is damaged, holds a map only, or a film while PyAV is not installed.
+    """
+    lfp, pictures = _pictures(path)
+    frames = _film(path, lfp, pictures) if pictures.frames else _decoded(path, lfp, pictures)
+    depth = read_lfp_depth(path)
+    pixels = next(frames) if depth is None or len(pictures.focus) < 2 else _in_focus(frames, pictures, depth)
+    return Raster(np.ascontiguousarray(pixels), None, oiio.ImageSpec(pixels.shape[1], pixels.shape[0], 3, "uint8"))
+
+
+def read_lfp_depth(path: Path) -> FloatImage | None:
+    """Return the map (h, w) of lambda, small is near; None without. Raises InputError as `open_lfp` does."""
+    lfp = open_lfp(path)
+    if lfp is None or lfp.depth is None:
+        return None
+    name, size = lfp.depth
+    content = _content(path, lfp, name)
+    if len(content) != 4 * size.height * size.width:
+        raise InputError(f"{path}: its depth map of {size} holds {len(content):,} bytes; get the whole file again")
+    return np.frombuffer(content, "<f4").reshape(size).astype(np.float32)
+
+
+def _sections(file: BinaryIO) -> tuple[bytes, dict[str, tuple[int, int]]]:
+    """Return the first JSON, b"" without, and where each named chunk lies."""
+    text, at = b"", 0
+    chunks: dict[str, tuple[int, int]] = {}
+    for _ in range(MAX_SECTIONS):
+        file.seek(at)
+        header = file.read(HEADER_BYTES)
+        if len(header) < HEADER_BYTES or not header.startswith(SECTION_START):
+            break
+        length = int.from_bytes(header[12:], "big")
+        name = file.read(NAME_BYTES).rstrip(b"\0").decode("latin-1") if length else ""
+        first = at + HEADER_BYTES + (NAME_BYTES if length else 0)
+        if length and header[3:4] == JSON_KIND:
+            text = text or file.read(min(length, MAX_JSON_BYTES))
+        elif length:
+            chunks.setdefault(name, (first, length))
+        at = first + length + -(first + length) % ALIGNMENT
+    return text, chunks
+
+
+def _objects(value: Any) -> Iterator[dict[str, Any]]:
+    """Yield all objects of a JSON, the outer ones first."""
+    if isinstance(value, dict):
+        yield value
+    for inner in value.values() if isinstance(value, dict) else value if isinstance(value, list) else ():
+        yield from _objects(inner)
+
+
+def _processed(entries: list[dict[str, Any]], chunks: Mapping[str, tuple[int, int]]) -> Lfp | None:
+    found = [pictures for entry in entries if (pictures := _pictures_of(entry, chunks)) is not None]
+    maps = [described for entry in entries if (described := _map_of(entry, chunks)) is not None]
+    # Views come before a focal stack: each of them is sharp everywhere.
+    pictures = min(found, key=lambda pictures: len(pictures.focus), default=None)
+    return Lfp(chunks, pictures, maps[0] if maps else None) if found or maps else None
+
+
+def _map_of(entry: Mapping[str, Any], chunks: Mapping[str, Any]) -> tuple[str, ImageSize] | None:
+    """Return the chunk and the size of the map that an object of the JSON describes; None for other objects."""
+    described = entry.get("depthMap", entry.get("depthLut"))
+    if not isinstance(described, dict) or described.get("imageRef") not in chunks:
+        return None
+    return described["imageRef"], _size_in({**entry, **described})
+
+
+def _pictures_of(entry: Mapping[str, Any], chunks: Mapping[str, Any]) -> LfpPictures | None:
+    """Return the pictures that an object of the JSON lists, files or a film; None for other objects."""
+    listed, film = entry.get("imageArray", entry.get("perImage")), entry.get("blockOfImages")
+    if film is not None and film["blockOfImagesRef"] in chunks:
+        names, listed = [film["blockOfImagesRef"]], film["metadataArray"]
+    elif listed and all(picture.get("imageRef") in chunks for picture in listed):
+        names, film = [picture["imageRef"] for picture in listed], None
+    else:
+        return None
+    if not 0 < len(listed) <= MAX_PICTURES:
+        raise ValueError(f"{len(listed)} pictures")
+    size, (order, focus) = _size_in({**entry, **listed[0]}), _order_of(listed)
+    return LfpPictures(tuple(names if film else (names[k] for k in order)), focus, order if film else (), size)
+
+
+def _order_of(listed: Sequence[Mapping[str, Any]]) -> tuple[tuple[int, ...], tuple[float, ...]]:
+    """Return the numbers of the pictures that are used, and lambda of each: of views, the middle one alone."""
+    if any("coord" in picture for picture in listed):
+        places = [abs(picture["coord"]["x"]) + abs(picture["coord"]["y"]) for picture in listed]
+        return (int(np.argmin(places)),), (0.0,)
+    depths = [float(picture.get("lambda", picture.get("focus"))) for picture in listed]
+    if not np.isfinite(depths).all():
+        raise ValueError("a focus that is no number")
+    order = sorted(range(len(depths)), key=depths.__getitem__)
+    return tuple(order), tuple(depths[k] for k in order)
+
+
+def _size_in(entry: Mapping[str, Any]) -> ImageSize:
+    size = ImageSize(int(entry["height"]), int(entry["width"]))
+    if min(size) < 1 or size.height * size.width > MAX_FILE_PIXELS:
+        raise ValueError(f"a picture of {size}")
+    return size
+
+
+def _pictures(path: Path) -> tuple[Lfp, LfpPictures]:
+    lfp = open_lfp(path)
+    if lfp is None or lfp.pictures is None:
+        raise InputError(f"{path}: holds a map of depth without its picture; open the file that ends in -stk.lfp")
+    return lfp, lfp.pictures
+
+
+def _content(path: Path, lfp: Lfp, name: str) -> bytes:
+    first, length = lfp.chunks[name]
+    with open_binary(path) as file:
+        file.seek(first)
+        return file.read(length)
+
+
+def _decoded(path: Path, lfp: Lfp, pictures: LfpPictures) -> Iterator[NDArray[np.uint8]]:
+    """Yield the pictures, (H, W, 3). Raises InputError where one is damaged or of another size."""
+    for name in pictures.chunks:
+        with open_with_pillow(path, *PICTURE, _content(path, lfp, name)) as image:
+            pixels = np.asarray(image.convert("RGB"))
+        if pixels.shape[:2] != pictures.size:
+            raise InputError(f"{path}: its pictures differ in size; get the whole file again")
+        yield pixels
+
+
+def _film(path: Path, lfp: Lfp, pictures: LfpPictures) -> Iterator[NDArray[np.uint8]]:
+    """Yield the pictures of a film, (H, W, 3), in the order of their focus."""
+    try:
+        import av
+    except ImportError as error:
+        raise InputError(f"{path}: its pictures are H.264; install PyAV with `pip install 'iibr[export]'`") from error
+    frames: dict[int, NDArray[np.uint8]] = {}
+    try:
+        with av.open(BytesIO(_content(path, lfp, pictures.chunks[0])), mode="r", format="h264") as film:
+            for number, frame in enumerate(film.decode(video=0)):
+                if number in pictures.frames:
+                    frames[number] = np.asarray(frame.to_ndarray(format="rgb24"), np.uint8)
+                if len(frames) == len(pictures.frames):
+                    break
+    except (av.error.FFmpegError, ValueError) as error:
+        raise InputError(f"{path}: damaged or cut off ({reason_of(error)}); get the whole file again") from error
+    for number in pictures.frames:
+        if number not in frames or frames[number].shape[:2] != pictures.size:
+            raise InputError(f"{path}: damaged or cut off (picture {number} is missing); get the whole file again")
+        yield frames[number]
+
+
+def _in_focus(frames: Iterator[NDArray[np.uint8]], pictures: LfpPictures, depth: FloatImage) -> NDArray[np.uint8]:
+    """Mix the pictures (H, W, 3) of a focal stack by the map (h, w): between two depths, both count."""
+    from PIL import Image
+
+    height, width = pictures.size
+    known = np.nan_to_num(np.clip(depth, pictures.focus[0], pictures.focus[-1]), nan=pictures.focus[0])
+    whole = np.asarray(Image.fromarray(known).resize((width, height), Image.Resampling.BILINEAR))
+    mixed = np.zeros((height, width, 3), np.float32)
+    for number, pixels in enumerate(frames):
+        mixed += _weight(whole, pictures.focus, number)[..., None] * pixels
+    return np.rint(mixed).astype(np.uint8)
+
+
+def _weight(depth: FloatImage, focus: Sequence[float], number: int) -> FloatImage:
+    """Return how much a picture counts at each depth: linear from 1 at its own to 0 at its neighbours'."""
+    return np.asarray(np.interp(depth, focus, np.eye(len(focus))[number]), np.float32)

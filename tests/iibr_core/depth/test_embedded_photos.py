@@ -1,0 +1,262 @@
+"""Depth within photos as people open it: trailers of phones, AVIF, HEIC of other makers, Lytro; what is not read."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+from PIL.PngImagePlugin import PngInfo
+
+from iibr_core.depth.embedded.embedded_depth import embedded_in_jpeg, read_embedded
+from iibr_core.depth.embedded.unread import unread_parts
+from iibr_core.depth.search import PhotoWithDepth, open_with_depth
+from iibr_core.formats.images.header import read_photo_header
+from iibr_core.formats.images.lfp import open_lfp, read_lfp
+from iibr_core.formats.images.photo import read_photo
+from iibr_core.types import InputError
+from tests.iibr_core import embedded_files as files
+
+PIXELS, DEPTH = files.disc_scene()
+PHOTO = files.picture(PIXELS)
+SMALL = DEPTH[::2, ::2]
+
+
+def opened(tmp_path: Path, name: str, data: bytes) -> PhotoWithDepth:
+    (tmp_path / name).write_bytes(data)
+    return open_with_depth(tmp_path / name)
+
+
+def assert_disc_is_nearest(found: PhotoWithDepth) -> None:
+    assert found.origin.kind == "embedded"
+    assert found.disparity.values[60, 60] > found.disparity.values[90, 10] > found.disparity.values[4, 10]
+
+
+# ---- Google
+
+
+@pytest.mark.parametrize("kind", ["", "RangeInverse"])
+@pytest.mark.parametrize(("near", "far"), [(5, 3), (0, 0), ("nan", "inf"), ("", "")])
+def test_a_senseless_range_is_told_and_dark_is_near(tmp_path: Path, kind: str, near: object, far: object) -> None:
+    segments = files.gdepth_segments(files.picture(255 - SMALL, "PNG"), kind=kind, near=near, far=far)
+    found = opened(tmp_path, "a.jpg", files.with_segments(PHOTO, segments))
+    assert_disc_is_nearest(found)
+    assert any("makes no sense: only the order" in note for note in found.disparity.notes) is (near != "")
+
+
+def test_a_map_of_another_shape_is_stretched(tmp_path: Path) -> None:
+    square = np.asarray(Image.fromarray(255 - DEPTH).resize((72, 64)))
+    segments = files.gdepth_segments(files.picture(square, "PNG"))
+    assert_disc_is_nearest(opened(tmp_path, "a.jpg", files.with_segments(PHOTO, segments)))
+
+
+@pytest.mark.parametrize("kind", ["PNG", "WEBP", "AVIF"])
+def test_gdepth_in_other_kinds_of_files(tmp_path: Path, kind: str) -> None:
+    xmp = files.gdepth_segments(files.picture(255 - SMALL, "PNG"))[0].removeprefix(files.STANDARD)
+    file, info = io.BytesIO(), PngInfo()
+    info.add_itxt("XML:com.adobe.xmp", xmp.decode())
+    Image.fromarray(PIXELS).save(file, kind, **({"pnginfo": info} if kind == "PNG" else {"xmp": xmp}))
+    assert_disc_is_nearest(opened(tmp_path, f"a.{kind.lower()}", file.getvalue()))
+
+
+# ---- phones' trailers
+
+
+@pytest.mark.parametrize("white_is_near", [True, False])
+@pytest.mark.parametrize(
+    ("orientation", "stored"),
+    [
+        (0, SMALL[:, ::-1]),
+        (0x10, SMALL[::-1]),
+        (0x12, SMALL[:, ::-1]),
+        (0x13, SMALL.T),
+        (0x11, SMALL.T[::-1, ::-1]),
+    ],
+)
+def test_huawei_maps_lie_as_the_phone_was_held(
+    tmp_path: Path, orientation: int, stored: np.ndarray, white_is_near: bool
+) -> None:
+    stored = stored if white_is_near else 255 - stored
+    found = opened(tmp_path, "a.jpg", files.huawei_jpeg(PHOTO, stored, orientation))
+    assert_disc_is_nearest(found)
+    assert any("counts as near" in note for note in found.disparity.notes)
+
+
+def test_huawei_maps_that_are_cut_off_are_told() -> None:
+    data = files.huawei_jpeg(PHOTO, SMALL)
+    with pytest.raises(InputError, match="64x48 pixels is cut off after"):
+        embedded_in_jpeg(data[:-100])
+
+
+def test_a_mask_behind_a_photo_is_no_map(tmp_path: Path) -> None:
+    mask = files.picture(np.where(SMALL > 200, 255, 0).astype(np.uint8))
+    found = opened(tmp_path, "a.jpg", PHOTO + mask)
+    assert found.origin.kind == "rough"
+    assert "a.jpg holds a second picture (64x48, grey); this is not read." in found.disparity.notes
+
+
+# ---- AVIF and HEIC
+
+
+@pytest.mark.parametrize("orientation", [1, 6])
+@pytest.mark.parametrize("white_is_near", [True, False])
+def test_the_depth_of_an_avif(tmp_path: Path, orientation: int, white_is_near: bool) -> None:
+    turns = 1 if orientation == 6 else 0  # stored a quarter turn counter-clockwise
+    depth = DEPTH if white_is_near else 255 - DEPTH
+    data = files.avif(np.rot90(PIXELS, turns), np.rot90(depth, turns), orientation)
+    found = opened(tmp_path, "a.avif", data)
+    assert found.photo.size == (96, 128)
+    assert_disc_is_nearest(found)
+
+
+def test_alpha_of_an_avif_is_no_depth(tmp_path: Path) -> None:
+    data = files.avif(PIXELS, DEPTH).replace(b":auxiliary:depth\0", b":auxiliary:alpha\0")
+    (tmp_path / "a.avif").write_bytes(data)
+    assert read_embedded(tmp_path / "a.avif") is None
+
+
+def test_a_damaged_depth_of_an_avif_is_told(tmp_path: Path) -> None:
+    data = files.avif(PIXELS, DEPTH)
+    start = data.index(b"mdat") + 4  # the auxiliary picture comes first
+    found = opened(tmp_path, "a.avif", data[:start] + bytes(60) + data[start + 60 :])
+    assert found.origin.kind == "rough"
+    assert any("own depth was not used" in note and "damaged" in note for note in found.disparity.notes)
+
+
+def test_a_samsung_heic(tmp_path: Path) -> None:
+    data = files.samsung_jpeg(files.heic(PIXELS), 255 - SMALL)
+    assert_disc_is_nearest(opened(tmp_path, "a.heic", data))
+
+
+def test_mattes_of_a_heic_are_named_and_not_taken_for_depth(tmp_path: Path) -> None:
+    kind = b"urn:com:apple:photo:2018:aux:portraiteffectsmatte"
+    found = opened(tmp_path, "a.heic", files.heic(PIXELS, SMALL, auxiliary=kind))
+    assert found.origin.kind == "rough"
+    words = "a.heic holds mattes (portrait effects), which are no depth maps; this is not read."
+    assert words in found.disparity.notes
+
+
+# ---- what is not read
+
+
+def test_what_is_behind_a_photo_and_not_read_is_named(tmp_path: Path) -> None:
+    grey = files.picture(np.asarray(Image.fromarray(PIXELS).convert("L").resize((64, 48))))
+    matte = files.apple_jpeg(b"", SMALL, 0, 1, "urn:com:apple:photo:2019:aux:semanticskinmatte")
+    xiaomi = b"PMPD\x02\0\x64\0\x01\0" + bytes(100)
+    for behind, words in (
+        (PHOTO, "a second picture (128x96, colour)"),
+        (grey, "a second picture (64x48, grey)"),
+        (matte, "mattes (skin), which are no depth maps"),
+        (xiaomi, "a depth map of Xiaomi's kind (PMPD)"),
+    ):
+        found = opened(tmp_path, "a.jpg", PHOTO + behind)
+        assert found.origin.kind == "rough"
+        assert f"a.jpg holds {words}; this is not read." in found.disparity.notes
+
+
+def test_gain_maps_previews_and_plain_photos_need_no_words(tmp_path: Path) -> None:
+    path = tmp_path / "a.jpg"
+    gain = files.with_segments(files.picture(SMALL), [files.STANDARD + b"<x hdrgm:Version='1.0'/>"])
+    listed = PHOTO[:2] + b"\xff\xe2\0\x0aMPF\0\0\0\0\0" + PHOTO[2:] + PHOTO
+    for data in (PHOTO, PHOTO + gain, listed, PHOTO + b"some other trailer", b"no photo"):
+        path.write_bytes(data)
+        assert unread_parts(path) == ()
+
+
+# ---- Lytro
+
+BLURRED = files.picture(np.full((96, 128, 3), 200, np.uint8))
+
+
+def stack(is_illum: bool, depth: np.ndarray | None = None) -> bytes:
+    """The disc is sharp at lambda -4, all else at 6."""
+    disc, wall = (PIXELS.copy() for _ in range(2))
+    is_disc = DEPTH == 230
+    disc[~is_disc], wall[is_disc] = 200, 200
+    focus = np.where(is_disc, -4.0, 6.0)
+    pictures = {6.0: files.picture(wall, "PNG"), -4.0: files.picture(disc, "PNG")}
+    return files.lytro_stack(pictures, focus if depth is None else depth, (96, 128), is_illum)
+
+
+@pytest.mark.parametrize("is_illum", [True, False])
+@pytest.mark.parametrize("name", ["IMG_0001-stk.lfp", "a.LFP", "a.jpg"])
+def test_a_processed_lytro_file_opens_with_its_depth(tmp_path: Path, name: str, is_illum: bool) -> None:
+    found = opened(tmp_path, name, stack(is_illum))
+    assert found.origin.line == "Depth: the photo itself (Lytro)."
+    assert found.disparity.values[60, 60] > found.disparity.values[4, 10]
+    assert read_photo_header(tmp_path / name).size == (96, 128)
+    np.testing.assert_allclose(read_photo(tmp_path / name).pixels * 255, PIXELS, atol=1)
+
+
+def test_between_two_depths_both_pictures_count(tmp_path: Path) -> None:
+    pictures = {k: files.picture(np.full((8, 12, 3), v, np.uint8), "PNG") for k, v in ((0.0, 40), (2.0, 80))}
+    depth = np.tile(np.array([-3.0, 0.0, 0.5, 2.0, 9.0, np.nan]), (4, 1)).repeat(2, axis=1).repeat(2, axis=0)
+    (tmp_path / "a.lfp").write_bytes(files.lytro_stack(pictures, depth, (8, 12), True))
+    row = read_lfp(tmp_path / "a.lfp").pixels[4, ::2, 0]
+    np.testing.assert_array_equal(row, [40, 40, 50, 80, 80, 40])
+
+
+def test_the_middle_view_of_a_film(tmp_path: Path) -> None:
+    av = pytest.importorskip("av")
+    file = io.BytesIO()
+    with av.open(file, "w", format="h264") as film:
+        stream = film.add_stream("h264", rate=25)
+        stream.width, stream.height, stream.pix_fmt = 64, 48, "yuv420p"
+        for grey in (40, 120, 200):
+            frame = av.VideoFrame.from_ndarray(np.full((48, 64, 3), grey, np.uint8), format="rgb24")
+            film.mux(stream.encode(frame))
+        film.mux(stream.encode(None))
+    views = [{"width": 64, "height": 48, "coord": {"x": x, "y": 0.0}} for x in (-0.2, 0.0, 0.2)]
+    block = {"representation": "h264", "blockOfImagesRef": "sha1-film", "metadataArray": views}
+    depth = {"width": 4, "height": 3, "depthMap": {"representation": "raw", "imageRef": "sha1-map"}}
+    entries = [{"vendorContent": {"blockOfImages": block}}, {"vendorContent": depth}]
+    chunks = {"sha1-film": file.getvalue(), "sha1-map": np.ones((3, 4), "<f4").tobytes()}
+    path = tmp_path / "a-stk.lfp"
+    path.write_bytes(files.lytro_file({"picture": {"accelerationArray": entries}}, chunks))
+    assert abs(int(read_lfp(path).pixels[20, 30, 0]) - 120) < 6
+    found = read_embedded(path)
+    assert found is not None
+    assert found.estimate.values.shape == (3, 4)  # type: ignore[union-attr]
+    path.write_bytes(files.lytro_file({"picture": {"accelerationArray": entries}}, {**chunks, "sha1-film": b"none"}))
+    with pytest.raises(InputError, match=r"a-stk\.lfp: damaged"):
+        read_lfp(path)
+
+
+def test_a_map_without_its_picture_says_where_that_is(tmp_path: Path) -> None:
+    entry = {"width": 4, "height": 3, "depthMap": {"imageRef": "sha1-map"}}
+    path = tmp_path / "a-dm.lfp"
+    path.write_bytes(files.lytro_file({"x": [entry]}, {"sha1-map": bytes(48)}))
+    with pytest.raises(InputError, match=r"without its picture; open the file that ends in -stk\.lfp"):
+        read_photo(path)
+
+
+@pytest.mark.parametrize("cut", [0.1, 0.5, 0.95])
+def test_damaged_lytro_files_are_refused_in_a_line(tmp_path: Path, cut: float) -> None:
+    data = stack(True)
+    path = tmp_path / "a.lfp"
+    path.write_bytes(data[: int(cut * len(data))])
+    with pytest.raises(InputError, match=r"a\.lfp: ") as told:
+        read_photo(path)
+    assert "\n" not in str(told.value)
+
+
+@pytest.mark.parametrize(
+    "change", [(b'"width": 128', b'"width": -28'), (b'"focus": 6.0', b'"focus": NaN'), (b"{", b"[")]
+)
+def test_absurd_lytro_files_are_refused_in_a_line(tmp_path: Path, change: tuple[bytes, bytes]) -> None:
+    path = tmp_path / "a.lfp"
+    path.write_bytes(stack(True).replace(*change))
+    with pytest.raises(InputError, match=r"a\.lfp: damaged or too new"):
+        open_lfp(path)
+
+
+def test_raw_lytro_files_are_no_pictures(tmp_path: Path) -> None:
+    path = tmp_path / "a.lfp"
+    path.write_bytes(
+        files.lytro_file({"picture": {"frameArray": [{"frame": {"imageRef": "sha1-raw"}}]}}, {"sha1-raw": b"0"})
+    )
+    assert open_lfp(path) is None
+    with pytest.raises(InputError, match="raw light field"):
+        read_photo(path)
