@@ -7,48 +7,61 @@ from typing import Annotated
 
 import typer
 
-from viewer.cli.shared_options import Force, Memory, inputs_of_command, require_memory
+from viewer.cli.scene_options import PhotoOptions, require_heeded
+from viewer.cli.shared_options import (
+    DepthFrom,
+    DepthModel,
+    Force,
+    InvertDepth,
+    Memory,
+    Metric,
+    Refine,
+    inputs_of_command,
+    require_memory,
+    require_model,
+)
 from viewer.cli.terminal import print_depth, print_notes, show_progress
 
 
 def depth(
     context: typer.Context,
-    field: Annotated[Path, typer.Argument(metavar="PATH", help="A light field, a stereo photo, or any photo.")],
+    path: Annotated[Path, typer.Argument(help="A light field, a stereo photo, or any photo.")],
     out: Annotated[Path, typer.Option("--output", "-o", metavar="FILE", help="Map to write: PFM, EXR, NPY or PNG.")],
+    depth_from: DepthFrom = "auto",
+    depth_model: DepthModel = None,
+    refine: Refine = 1.0,
+    invert_depth: InvertDepth = False,
+    metric: Metric = False,
     memory: Memory = None,
     force: Force = False,
 ) -> None:
     """Find the disparity of the centre view, of a pair the left one, from all views, in pixels per view step.
 
-    Of a photo it is what it opens with: a map beside it, its own, a model's, or a guess.
+    Of a photo, also of a pair where --depth or --depth-model is given, it is what it opens with: a map beside it, its
+    own, a model's, or a guess.
 
-    Example: iibr depth field -o field_disparity.pfm
+    Example: iibr depth photo.jpg -o photo_disparity.png
     """
+    options = PhotoOptions(depth_from, depth_model, refine, invert_depth=invert_depth, metric=metric, memory=memory)
+    source = options.source(path, grid=None)
+    require_heeded(context, path)
     require_memory(memory, keeps_views=True)
     from iibr_core.formats import find_light_field, is_file, open_light_field, require_file_place, write_map
     from iibr_core.generation import budget_of
-    from iibr_core.scenes import find_disparity
+    from iibr_core.scenes import find_disparity, load_photo
 
-    require_file_place(out, inputs_of_command(context), force)
-    if is_file(field) and find_light_field(field) is None:
-        _write_of_photo(field, out, memory)
-        return
-    scene = open_light_field(field)
-    with show_progress("reading") as show:
-        values = find_disparity(scene, budget_of(memory), show)
+    require_file_place(out, inputs_of_command(context, source), force)
+    require_model(source.depth)
+    if is_file(path) and (source.depth.start != "auto" or find_light_field(path) is None):
+        loaded = load_photo(source)
+        name, values, notes = loaded.photo.name, loaded.disparity.values, loaded.disparity.notes
+        origin = loaded.origin
+    else:
+        scene = open_light_field(path)
+        with show_progress("reading") as show:
+            name, values, notes = scene.name, find_disparity(scene, budget_of(memory), show), ()
+        origin = None
     note = write_map(out, values)
-    print(f"{scene.name}: disparity {values.min():.2f} to {values.max():.2f} px per view step: {out}")
-    print_notes((note,) if note else ())
-
-
-def _write_of_photo(photo: Path, out: Path, memory: int | None) -> None:
-    from iibr_core.depth import DepthChoice
-    from iibr_core.formats import write_map
-    from iibr_core.scenes import Source, load_photo
-
-    loaded = load_photo(Source(str(photo), DepthChoice(memory_bytes=memory)))
-    values = loaded.disparity.values
-    note = write_map(out, values)
-    print(f"{loaded.photo.name}: disparity {values.min():.2f} to {values.max():.2f} px per view step: {out}")
-    print_depth(loaded.origin)
-    print_notes((*loaded.disparity.notes, *((note,) if note else ())))
+    print(f"{name}: disparity {values.min():.2f} to {values.max():.2f} px per view step: {out}")
+    print_depth(origin)
+    print_notes((*notes, *((note,) if note else ())))

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 from pathlib import Path
 
 from iibr_core.depth.choice import DepthChoice
+from iibr_core.depth.estimators import onnx_models
 from iibr_core.depth.estimators.config import folder_of, read_config
 from iibr_core.depth.estimators.depth_estimator import Family, KnownModel, LocalModel
 from iibr_core.depth.estimators.download import download, verified_folder
 from iibr_core.depth.estimators.estimate_cache import seconds_of
 from iibr_core.depth.estimators.known_models import FAMILIES
+from iibr_core.depth.estimators.own_models import copy_own_model, list_own_models, own_name
 from iibr_core.depth.estimators.words import ModelState
 from iibr_core.formats.files import is_file, is_folder
 from iibr_core.runtime.tiling import ShouldStop, never
@@ -27,7 +30,7 @@ def known_model(name: str) -> KnownModel:
     for model in KNOWN_MODELS:
         if model.name == name:
             return model
-    names = ", ".join(model.name for model in KNOWN_MODELS)
+    names = ", ".join([*(model.name for model in KNOWN_MODELS), *list_own_models()])
     raise InputError(f"{name}: no depth model of this name is known; there are {names}")
 
 
@@ -37,8 +40,8 @@ def family_of(model: KnownModel) -> Family:
 
 
 def model_to_use(choice: DepthChoice) -> LocalModel | None:
-    """The model that the user wants (a folder, an ONNX file or a known name), else the usual one if it is ready, else
-    None.
+    """The model that the user wants (a folder, an ONNX file, the name of a copied or a known one), else the usual one
+    if it is ready, else None.
 
     Raises InputError where what is wanted is not here, or the package that runs it is not installed.
     """
@@ -54,6 +57,9 @@ def model_to_use(choice: DepthChoice) -> LocalModel | None:
         return _model_at(path)
     if "/" in wanted or "\\" in wanted or path.suffix.lower() == ".onnx":
         raise InputError(f"{wanted}: no such file or folder")
+    own = list_own_models().get(wanted)
+    if own is not None:
+        return _own_model(own)
     model = known_model(wanted)
     _require_installed(model.title, family_of(model))
     found = model_here(model)
@@ -74,9 +80,24 @@ def model_here(model: KnownModel) -> LocalModel | None:
         return None
 
 
+def register(path: Path) -> LocalModel:
+    """Copy an ONNX file of one's own, or the one in a folder, to where its name finds it.
+
+    Raises InputError where it is no model that takes one picture, or its name is taken.
+    """
+    if not (is_folder(path) or is_file(path)):
+        raise InputError(f"{path}: no such file or folder")
+    if _model_at(path).family is not onnx_models.FAMILY:
+        raise InputError(f"{path}: only ONNX files are copied; use this folder as it is with --depth-model {path}")
+    name = own_name(path)
+    if any(model.name == name for model in KNOWN_MODELS):
+        raise InputError(f"{path}: {name} is the name of a published model; rename the file")
+    return _own_model(copy_own_model(path))
+
+
 def is_meaning_known(model: LocalModel) -> bool:
     """Whether it is a known model, or of a family that says what its output means, rather than any ONNX file."""
-    return model.weights[0].suffix != ".onnx" or any(model.title == known.title for known in KNOWN_MODELS)
+    return model.family is not onnx_models.FAMILY or any(model.title == known.title for known in KNOWN_MODELS)
 
 
 def state_of(model: KnownModel) -> ModelState:
@@ -97,6 +118,10 @@ def fetch(
     family = family_of(model)
     folder = download(model.repository, model.commit, family.fetched, report_progress, should_stop)
     return LocalModel(model.title, folder, family, family.weights_in(folder))
+
+
+def _own_model(file: Path) -> LocalModel:
+    return replace(_model_at(file), title=f"the model {file.stem}")
 
 
 def _model_at(path: Path) -> LocalModel:

@@ -65,15 +65,16 @@ def read_preparation(folder: Path, usual: Preparation) -> Preparation:
     try:
         size = _size(told.get("size", usual.size))
         multiple = int(told.get("ensure_multiple_of", usual.multiple))
+        white = 255 * float(told.get("rescale_factor", 1 / 255)) if told.get("do_rescale", True) else 255.0
         preparation = Preparation(
             size,
             bool(told.get("keep_aspect_ratio", usual.keeps_aspect)),
             max(multiple, 1),
             usual.pads and bool(told.get("do_pad", True)),
-            _channels(told.get("image_mean", usual.mean)),
-            _channels(told.get("image_std", usual.std)),
+            tuple(value / white for value in _channels(told.get("image_mean", usual.mean))),
+            tuple(value / white for value in _channels(told.get("image_std", usual.std))),
         )
-    except (TypeError, ValueError, KeyError, OverflowError) as error:
+    except (TypeError, ValueError, KeyError, ArithmeticError) as error:
         raise InputError(f"{folder / PREPROCESSOR}: makes no sense ({' '.join(str(error).split())[:80]})") from error
     is_possible = all(1 <= side <= MAX_SIDE for side in size) and multiple <= MAX_SIDE
     if not is_possible or 0 in preparation.std or not all(map(math.isfinite, preparation.mean + preparation.std)):

@@ -54,7 +54,7 @@ def _require_use(model: LocalModel, estimate: Estimate) -> None:
             known = values[~np.isnan(values)] if model.family.leaves_gaps else values
     if not known.size or not np.isfinite(known).all():
         raise InputError(f"{model.title} gave NaN or infinity for this photo")
-    if isinstance(estimate, MetricDepth) and not (known > 0).all():
-        raise InputError(f"{model.title} gave distances of 0 or less for this photo")
+    if isinstance(estimate, MetricDepth) and not (known > 0).any():
+        raise InputError(f"{model.title} gave no distance above 0 for this photo")
     if known.max() == known.min():
         raise InputError(f"{model.title} gave the same depth everywhere")

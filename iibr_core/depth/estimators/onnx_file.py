@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import mmap
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -30,8 +30,14 @@ EXTERNAL_FILE = re.compile(rb"\n\x08location\x12(.)", re.DOTALL)
 """
 MAX_GRAPH_BYTES = 64 * 2**20
 """Larger ONNX files hold their weights themselves: they are not searched for names of others."""
-DEPTH_WORDS, OTHER_WORDS = ("depth", "disp", "dist"), ("conf", "mask", "normal", "sky", "std", "var", "uncert")
-"""Parts of the names of outputs that are maps of depth, and of those that say something else of one."""
+DEPTH_WORDS = ("depth", "disp", "dist")
+"""Parts of the names of outputs that are maps of depth."""
+OTHER_WORDS = ("conf", "feature", "mask", "normal", "prob", "seg", "sky", "std", "var", "uncert", "weight")
+"""Parts of the names of outputs that are no depth, whatever their shape."""
+MIN_MAP_SIDE = 8
+"""Least height and width of a map, in pixels: smaller outputs are matrices, of a camera for example."""
+MAX_ASPECT_CHANGE = 1.25
+"""Most that the aspects of a picture and its map differ by: outputs of other shapes are lists of features."""
 
 
 @dataclass(frozen=True)
@@ -102,16 +108,16 @@ def picture_input(session: Any, file: Path) -> PictureInput:
     return PictureInput(inputs[0].name, height, width, axis, len(shape), NUMBER_TYPES[inputs[0].type])
 
 
-def depth_output(file: Path, names: Sequence[str], outputs: Sequence[Any]) -> FloatImage:
-    """The map (H, W) float32 among a model's outputs: the one with depth in its name, else the largest, else the first.
+def depth_output(file: Path, outputs: Mapping[str, Any], size: ImageSize) -> FloatImage:
+    """The map (h, w) float32 among a model's outputs: the one with depth in its name, else the largest, else the first.
 
-    Raises InputError where no output is a map.
+    outputs: arrays by name. size: of the picture that the model was given. Raises InputError where no output is a map.
     """
-    maps = [(name, np.squeeze(values)) for name, values in zip(names, outputs) if _is_map(values)]
+    maps = [(name, np.squeeze(values)) for name, values in outputs.items() if _is_map(name, values, size)]
     if not maps:
-        shapes = ", ".join(f"{name} {getattr(values, 'shape', 'a list')}" for name, values in zip(names, outputs))
+        shapes = ", ".join(f"{name} {getattr(values, 'shape', 'a list')}" for name, values in outputs.items())
         raise InputError(f"{file}: gives {shapes[:160]}, not one map of depth (H, W); choose a depth model")
-    _, values = min(maps, key=lambda each: (not _names_depth(each[0]), -each[1].size))
+    _, values = min(maps, key=lambda each: (not _has_word(each[0], DEPTH_WORDS), -each[1].size))
     return np.asarray(values, np.float32)
 
 
@@ -142,13 +148,16 @@ def _channel_axis(shape: Sequence[Any]) -> int | None:
     return None if isinstance(shape[first], int) else first
 
 
-def _is_map(values: Any) -> bool:
-    """Whether an output has two sides and numbers."""
-    if not isinstance(values, np.ndarray) or values.dtype.kind not in "fiu":
+def _is_map(name: str, values: Any, size: ImageSize) -> bool:
+    """Whether an output is as many numbers across and down as a map of a picture of this size may have."""
+    if not isinstance(values, np.ndarray) or values.dtype.kind not in "fiu" or _has_word(name, OTHER_WORDS):
         return False
-    return values.size > 0 and sum(side > 1 for side in values.shape) == 2
+    sides = [side for side in values.shape if side != 1]
+    if len(sides) != 2 or min(sides) < MIN_MAP_SIDE:
+        return False
+    change: float = sides[1] / sides[0] * size.height / size.width
+    return 1 / MAX_ASPECT_CHANGE <= change <= MAX_ASPECT_CHANGE
 
 
-def _names_depth(name: str) -> bool:
-    lower = name.lower()
-    return any(word in lower for word in DEPTH_WORDS) and not any(word in lower for word in OTHER_WORDS)
+def _has_word(name: str, words: Sequence[str]) -> bool:
+    return any(word in name.lower() for word in words)

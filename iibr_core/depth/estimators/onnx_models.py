@@ -33,6 +33,8 @@ USUAL_WEIGHT_BYTES = 99e6
 """Of that model. Activations grow with a network's width, weights with its square."""
 BYTES = (0.0, 0.0, 0.0), (1 / 255, 1 / 255, 1 / 255)
 """Mean and deviation for networks that take 0..255."""
+COMMON_MULTIPLE = 224
+"""Multiple of the patches and strides in use, 14, 16 and 32 px: sides for networks that refuse multiples of 14."""
 LOOK_S = 0.05
 """How often a running estimate looks whether it is still wanted."""
 
@@ -70,11 +72,29 @@ def run_onnx(
     session = open_session(file)
     taken = picture_input(session, file)
     preparation = replace(wanted.preparation, mean=BYTES[0], std=BYTES[1]) if taken.takes_bytes else wanted.preparation
-    values = taken.arranged(network_input(photo.pixels, preparation, taken.size_for(wanted.size)))
     report_progress(0, 0, f"estimating depth with {model.title}")
-    outputs = _run(session, file, {taken.name: values}, should_stop)
-    depth = depth_output(file, list(outputs), list(outputs.values()))
+
+    def outputs_at(size: ImageSize) -> dict[str, Any]:
+        values = taken.arranged(network_input(photo.pixels, preparation, size))
+        return _run(session, file, {taken.name: values}, should_stop)
+
+    size = taken.size_for(wanted.size)
+    try:
+        outputs = outputs_at(size)
+    except InputError:
+        before, size = size, taken.size_for(_size_for_any(preparation, photo.size, wanted.size))
+        if size == before:
+            raise
+        outputs = outputs_at(size)
+    depth = depth_output(file, outputs, size)
     return MetricDepth(depth) if wanted.is_metric else RelativeInverseDepth(depth)
+
+
+def _size_for_any(preparation: Preparation, size: ImageSize, wanted: ImageSize) -> ImageSize:
+    """The size for networks that refuse `wanted`, not larger, for a photo of (height, width); `wanted` without any."""
+    if math.prod(wanted) < (2 * COMMON_MULTIPLE) ** 2:
+        return wanted
+    return input_size(replace(preparation, multiple=COMMON_MULTIPLE), size, math.prod(wanted))
 
 
 def _run(session: Any, file: Path, values: dict[str, Any], should_stop: ShouldStop) -> dict[str, Any]:
@@ -91,13 +111,16 @@ def _run(session: Any, file: Path, values: dict[str, Any], should_stop: ShouldSt
     try:
         return dict(zip([each.name for each in session.get_outputs()], running.result()))
     except Exception as error:  # as above
-        raise InputError(f"{file}: failed on this photo ({said_by(error)})") from error
+        raise InputError(
+            f"{file}: failed on this photo ({said_by(error)}); if it needs pictures of other sizes, state size and"
+            f" ensure_multiple_of in a {PREPROCESSOR} beside it"
+        ) from error
 
 
 def _accepts(path: Path) -> bool:
     """An ONNX file, or a folder with some whose output means what this family takes it for."""
     if is_file(path):
-        return path.suffix == ".onnx"
+        return path.suffix.lower() == ".onnx"
     is_told = is_file(path / CONFIG)
     return bool(_files_in(path)) and (not is_told or read_config(path).get("model_type") in KINDS)
 

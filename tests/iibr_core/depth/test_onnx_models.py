@@ -303,8 +303,7 @@ def test_the_photo_tells_which_way_round_a_file_of_ones_own_counts(tmp_path: Pat
     write_image(tmp_path / "photo.png", pixels)
     found = open_with_depth(tmp_path / "photo.png", DepthChoice(model=str(file), refine=0.0))
     assert found.disparity.values[-5].mean() > found.disparity.values[5].mean()
-    is_told_wrong = farness != (config == "metric")
-    assert any("as the photo shows" in note for note in found.disparity.notes) == is_told_wrong
+    assert any(f"count as {'far' if farness else 'near'}, as" in note for note in found.disparity.notes)
 
 
 def test_metres_are_taken_for_metres_where_that_is_said(tmp_path: Path) -> None:

@@ -16,10 +16,12 @@ import typer
 
 from iibr_core.depth.estimators.catalog import KNOWN_MODELS, known_model
 from iibr_core.depth.estimators.download import VERIFIED, require_unchanged
+from iibr_core.formats.images.photo import write_image
 from iibr_core.rendering.optics import CENTRE
 from iibr_core.scenes.opening import SceneReady, SceneRequest, results_of
 from iibr_core.scenes.scene import Progress, Source
 from iibr_core.types import GridShape, InputError
+from tests.iibr_core.depth.onnx_graphs import of_channels
 from tests.local_hub import Hub, local_hub
 from tests.viewer.conftest import write_scene
 from viewer.background.job_threads import ProgressReport
@@ -30,10 +32,18 @@ from viewer.cli.shared_options import depth_start_from_text, refine_from_text
 def run_models(
     home: Path, *words: str, typed: str = "", endpoint: str = "http://127.0.0.1:9"
 ) -> subprocess.CompletedProcess[str]:
-    """In a process of its own: the hub library reads its address once. Nobody listens at the usual one."""
-    environment = {**os.environ, "HF_ENDPOINT": endpoint, "HF_HOME": str(home), "XDG_CACHE_HOME": str(home)}
+    """`iibr models`, with nobody who listens at the hub's usual address."""
+    return run_iibr(home, "models", *words, typed=typed, endpoint=endpoint)
+
+
+def run_iibr(
+    home: Path, *words: object, typed: str = "", endpoint: str = "http://127.0.0.1:9"
+) -> subprocess.CompletedProcess[str]:
+    """Any command in a process of its own: the hub library reads its address once."""
+    folders = dict.fromkeys(("HF_HOME", "XDG_CACHE_HOME", "XDG_DATA_HOME"), str(home))
+    environment = {**os.environ, "HF_ENDPOINT": endpoint, **folders}
     return subprocess.run(
-        [sys.executable, "-P", "-m", "viewer", "models", *words],
+        [sys.executable, "-P", "-m", "viewer", *map(str, words)],
         env=environment,
         input=typed,
         capture_output=True,
@@ -45,7 +55,7 @@ def run_models(
 def test_the_list_names_every_model_with_size_and_licence(tmp_path: Path) -> None:
     done = run_models(tmp_path)
     assert done.returncode == 0
-    *lines, last = done.stdout.splitlines()
+    *lines, getting, using = done.stdout.splitlines()
     for model, line in zip(KNOWN_MODELS, (line for line in lines if not line.startswith(" ")), strict=True):
         assert line.startswith(model.name + " ")
         assert f"{model.megabytes:,} MB" in line
@@ -56,7 +66,30 @@ def test_the_list_names_every_model_with_size_and_licence(tmp_path: Path) -> Non
         assert below.startswith(f"Good for {model.good_for}.")
         assert ("Recommended." in below) == model.is_recommended
     assert "Needs the package depth_anything_3 first: pip install depth-anything-3." in done.stdout
-    assert "iibr models get" in last
+    assert "iibr models get" in getting
+    assert "--depth-model NAME" in using
+
+
+def test_a_file_of_ones_own_is_copied_listed_and_found_by_name(tmp_path: Path) -> None:
+    home, photo, out = tmp_path / "home", tmp_path / "photo.png", tmp_path / "map.npy"
+    file = of_channels(tmp_path / "metres.onnx", farness=True)
+    done = run_models(home, "get", str(file))
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.splitlines()[-1] == "Use it: iibr view PHOTO --depth-model metres"
+    file.unlink()
+    assert any(line.startswith("metres ") and "your own" in line for line in run_models(home).stdout.splitlines())
+    write_image(photo, np.tile(np.linspace(0.2, 0.9, 60, dtype=np.float32)[:, None, None], (1, 80, 3)))
+    used = run_iibr(home, "export", photo, "--to", "disparity", "--depth-model", "metres", "--metric", "-o", out)
+    assert used.returncode == 0, used.stderr
+    disparity = np.load(out)
+    assert disparity[-9].mean() > disparity[9].mean(), "300 less red are the metres"
+
+
+def test_a_file_that_is_not_there_is_told(tmp_path: Path) -> None:
+    write_image(tmp_path / "photo.png", np.zeros((20, 30, 3), np.float32))
+    words = ("export", tmp_path / "photo.png", "--to", "depth", "--depth-model", "gone.onnx", "-o", tmp_path / "d.npy")
+    for done in (run_models(tmp_path, "get", "gone.onnx"), run_iibr(tmp_path, *words)):
+        assert (done.returncode, done.stderr) == (2, "iibr: gone.onnx: no such file or folder\n")
 
 
 def test_without_a_network_get_is_one_line(tmp_path: Path) -> None:

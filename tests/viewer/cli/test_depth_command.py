@@ -1,0 +1,85 @@
+"""`iibr depth` of photos: where the map comes from, how it is written, and what is never overwritten."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from iibr_core.formats.images.photo import write_image
+from tests.iibr_core.depth.onnx_graphs import of_channels
+from tests.iibr_core.known_scenes import WALL, disparity_of_square
+from tests.viewer.cli.test_cli import run
+from tests.viewer.cli.test_view_files import write_pair
+
+Monkey = pytest.MonkeyPatch
+Capture = pytest.CaptureFixture[str]
+
+
+@pytest.fixture
+def red_below(tmp_path: Path, monkeypatch: Monkey) -> Path:
+    """A photo that is redder further down; nothing on this machine is known of it."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    path = tmp_path / "photo.png"
+    write_image(path, np.tile(np.linspace(0.2, 0.9, 60, dtype=np.float32)[:, None, None], (1, 80, 3)))
+    return path
+
+
+@pytest.mark.parametrize(
+    ("options", "is_nearer_below"),
+    [
+        ([], True),
+        (["--depth", "rough"], True),
+        (["--depth", "rough", "--invert-depth"], False),
+        (["--depth-model", "red.onnx"], True),
+        (["--depth-model", "red.onnx", "--metric"], False),
+        (["--depth-model", "red.onnx", "--metric", "--invert-depth"], True),
+    ],
+)
+def test_a_photo_without_depth_gets_a_guess_or_a_models(
+    monkeypatch: Monkey, red_below: Path, options: list[str], is_nearer_below: bool
+) -> None:
+    of_channels(red_below.parent / "red.onnx")
+    monkeypatch.chdir(red_below.parent)
+    assert run(monkeypatch, "depth", red_below, *options, "-o", "map.npy") == 0
+    disparity = np.load("map.npy")
+    assert disparity.shape == (60, 80)
+    assert (np.median(disparity[-12:]) > np.median(disparity[:12])) == is_nearer_below
+
+
+def test_a_map_written_as_a_picture_comes_back_as_it_was(monkeypatch: Monkey, tmp_path: Path) -> None:
+    Image.new("RGB", (80, 64), "gray").save(tmp_path / "a.png")
+    relief = np.hypot(*np.mgrid[-32:32, -40:40]).astype(np.float32) / 10
+    np.save(tmp_path / "a_disparity.npy", relief)
+    assert run(monkeypatch, "depth", tmp_path / "a.png", "--refine", "off", "-o", tmp_path / "b.png") == 0
+    (tmp_path / "a_disparity.npy").unlink()
+    (tmp_path / "b.png").rename(tmp_path / "a_disparity.png")
+    assert run(monkeypatch, "depth", tmp_path / "a.png", "--refine", "off", "-o", tmp_path / "c.npy") == 0
+    np.testing.assert_allclose(np.load(tmp_path / "c.npy"), relief, atol=1e-3)
+
+
+def test_the_map_that_is_read_is_never_overwritten(monkeypatch: Monkey, capsys: Capture, tmp_path: Path) -> None:
+    Image.new("RGB", (48, 40), "gray").save(tmp_path / "a.png")
+    map_path = tmp_path / "a_disparity.npy"
+    np.save(map_path, disparity_of_square())
+    before = map_path.read_bytes()
+    assert run(monkeypatch, "depth", tmp_path / "a.png", "--force", "-o", map_path) == 2
+    assert "no input is overwritten" in capsys.readouterr().err
+    assert map_path.read_bytes() == before
+
+
+def test_of_a_pair_a_model_is_asked_where_one_is_named(monkeypatch: Monkey, red_below: Path, capsys: Capture) -> None:
+    pair, out = write_pair(red_below.parent / "a_2x1.png"), red_below.parent / "map.npy"
+    assert run(monkeypatch, "depth", pair, "-o", out) == 0
+    assert np.median(np.load(out)) == pytest.approx(3 * WALL, abs=0.5)
+    file = of_channels(red_below.parent / "red.onnx")
+    assert run(monkeypatch, "depth", pair, "--depth-model", file, "--force", "-o", out) == 0
+    assert "estimated by the model red.onnx" in capsys.readouterr().err
+
+
+def test_what_is_not_there_is_told(monkeypatch: Monkey, capsys: Capture, tmp_path: Path) -> None:
+    assert run(monkeypatch, "depth", tmp_path / "gone.jpg", "-o", tmp_path / "map.png") == 2
+    assert "gone.jpg: no such file" in capsys.readouterr().err
+    assert not (tmp_path / "map.png").exists()
