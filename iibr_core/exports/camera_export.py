@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -26,6 +25,8 @@ from iibr_core.types import ImageSize, InputError, ViewOffset, ViewUpdate
 
 MOST_POINTS = 20_000
 """For COLMAP: as many as a reconstruction finds."""
+MAX_DEPTH_RATIO = 1000.0
+"""Ratio of the farthest distance to the nearest one: what is farther, as the sky is, is put there."""
 
 
 def cameras_of(source: ExportSource) -> FieldCameras:
@@ -39,22 +40,28 @@ def cameras_of(source: ExportSource) -> FieldCameras:
         return FieldCameras(scene.grid, size, scene.focal_px or float(scene.width), (low, high), infinity_of(low, high))
     plan = source.plan()
     at_infinity = (_given_infinity(source) - plan.disparity_zero) * plan.disparity_scale
-    return FieldCameras(scene.grid, size, source.loaded.photo.focal_px, plan.disparity_range_px, at_infinity)
+    low, high = plan.disparity_range_px
+    low = max(low, at_infinity + (high - at_infinity) / MAX_DEPTH_RATIO)
+    return FieldCameras(scene.grid, size, source.loaded.photo.focal_px, (low, high), at_infinity)
 
 
 def _given_infinity(source: ExportSource) -> float:
-    """The disparity, as given, of what is infinitely far from the photo. Raises InputError where all is flat."""
+    """The disparity, as given, of what is infinitely far from the photo: known where distances are known in metres.
+
+    Raises InputError where all is flat.
+    """
     plan = source.plan()
     if plan.disparity_scale <= 0:
         raise InputError(f"{source.scene.name}: is flat or inverted; give it depth")
     known = source.scene.inverse_metres
     low, high = (value / plan.disparity_scale + plan.disparity_zero for value in plan.disparity_range_px)
-    at_infinity = -known[1] / known[0] if known is not None else math.inf
-    return at_infinity if at_infinity < low else infinity_of(low, high)
+    if known is not None and -known[1] / known[0] < high:
+        return -known[1] / known[0]
+    return infinity_of(low, high)
 
 
 def nearest_metres(source: ExportSource) -> float | None:
-    """How far away the nearest of the scene is; None where no metres are known."""
+    """The distance of what is nearest in the scene, in metres; None where distances in metres are not known."""
     known, plan = source.scene.inverse_metres, source.scene.plan
     if known is None or plan is None or plan.disparity_scale <= 0:
         return None

@@ -22,9 +22,8 @@ Points = tuple[FloatImage, NDArray[np.uint8], FloatImage]
 
 
 def write_point_cloud(path: Path, source: ExportSource, settings: ExportSettings) -> None:
-    """As a PLY, y up and z backwards, as most viewers of points look; in metres where they are known."""
+    """As a PLY, y up and z backwards, as most viewers of points look."""
     places, colors, _ = scene_points(source)
-    places = places * np.float32(nearest_metres(source) or 1.0)
     write_points(path, places * np.array([1, -1, -1], np.float32), colors)
 
 
@@ -34,8 +33,10 @@ def write_gaussians(path: Path, source: ExportSource, settings: ExportSettings) 
 
 
 def scene_points(source: ExportSource) -> Points:
-    """The centre view's pixels, and what was inpainted in the corner views. Raises InputError without depth,
-    Cancelled once the export should stop.
+    """The centre view's pixels, and what was inpainted in the corner views; in metres where distances are known in
+    them, else in distances of the nearest.
+
+    Raises InputError without depth, Cancelled once the export should stop.
     """
     cameras = cameras_of(source)
     found: list[Points] = []
@@ -52,7 +53,8 @@ def scene_points(source: ExportSource) -> Points:
     if not found:
         raise InputError(f"{source.scene.name}: no depth is known; open it with a disparity map")
     places, colors, pixel = (np.concatenate(arrays) for arrays in zip(*found))
-    return places, colors, pixel
+    unit = np.float32(nearest_metres(source) or 1.0)
+    return places * unit, colors, pixel * unit
 
 
 def _new(view: ViewUpdate, cameras: FieldCameras, seen: set[tuple[int, int, int]]) -> NDArray[np.bool_]:

@@ -112,6 +112,6 @@ def batch(
         done = run_batch(ledger, settings, photos, worker_source, open_drawn, show)
     print(f"{output}: {done.written} written, {done.there_before} there before, {done.failed} failed")
     if done.guessed:
-        print(f"{done.guessed} of {done.written} have guessed depth: {BETTER_WAYS}")
+        print(f"{done.guessed} of {done.exported} photos have guessed depth. {BETTER_WAYS}")
     if done.failed:
         raise InputError(f"{output / FAILURES}: tells what failed, and why")

@@ -36,13 +36,16 @@ def require_batch_place(folder: Path, inputs: Sequence[Path], may_replace: bool)
 
 
 class Entry(NamedTuple):
-    """A line of the manifest. output: in the folder. settings: their digest. key: "" for what may be unfinished."""
+    """A line of the manifest. output: in the folder. settings: their digest. key: "" for what may be unfinished.
+    is_guess: whether the photo's depth was guessed.
+    """
 
     name: str
     output: str
     kind: str
     settings: str
     key: str
+    is_guess: bool = False
 
 
 class Ledger:
@@ -111,6 +114,10 @@ class Ledger:
         known = self._entries.get(name)
         return known is not None and known.key == key and os.path.lexists(self.folder / known.output)
 
+    def is_guess(self, name: str) -> bool:
+        """Whether the export of that name was made with guessed depth."""
+        return name in self._entries and self._entries[name].is_guess
+
     def outputs(self, kind: str) -> list[str]:
         """What is there of a kind, by its name in the folder."""
         entries = (entry for entry in self._entries.values() if entry.kind == kind and entry.key)
@@ -118,7 +125,8 @@ class Ledger:
 
     def add_finished(self, task: PhotoTask, outcome: Outcome) -> None:
         """One more export is there, on disk to stay: so is this line."""
-        self._add(task.line(outcome.output, photo=task.photo, key=task.key, seconds=round(outcome.seconds, 3)))
+        about = {"photo": task.photo, "key": task.key, "seconds": round(outcome.seconds, 3)}
+        self._add(task.line(outcome.output, **about, is_guess=outcome.is_guess))
         task.place.claim.unlink(missing_ok=True)
 
     def add_failure(self, photo: str, reason: str) -> None:
@@ -161,6 +169,7 @@ def _entries_of(line: bytes) -> Iterator[Entry]:
             str(told.get("kind", "")),
             str(told.get("settings", "")),
             str(told.get("key", "")),
+            bool(told.get("is_guess", False)),
         )
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
         return

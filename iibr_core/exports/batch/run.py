@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import partial
 from itertools import chain
 from pathlib import Path
@@ -24,18 +24,23 @@ from iibr_core.types import InputError, ReportProgress
 
 @dataclass
 class BatchCount:
-    """Photos of a batch, as far as it has come. guessed: of those written, whose depth was guessed."""
+    """Numbers of photos of a batch, as far as it has come. guessed: those with guessed depth."""
 
     total: int
     written: int = 0
     there_before: int = 0
     failed: int = 0
-    guessed: int = field(default=0, compare=False)
+    guessed: int = 0
+
+    @property
+    def exported(self) -> int:
+        """Photos whose exports are there."""
+        return self.written + self.there_before
 
     @property
     def done(self) -> int:
-        """Those that need nothing more."""
-        return self.written + self.there_before + self.failed
+        """Photos that need nothing more."""
+        return self.exported + self.failed
 
 
 class _Batch:
@@ -59,6 +64,7 @@ class _Batch:
                     yield PhotoTask(os.path.abspath(photo.path), place, key, self._settings, share_bytes)
                     continue
                 self.count.there_before += 1
+                self.count.guessed += self._ledger.is_guess(name)
             except InputError as error:
                 self._fail(photo.path, str(error))
             self._tell("looking")

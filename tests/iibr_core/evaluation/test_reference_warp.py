@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from scipy.ndimage import gaussian_filter
 
 from iibr_core.evaluation.alignment import fit_to_views
 from iibr_core.evaluation.consistency import LineView, consistency, disagreement, line_straightness
@@ -137,6 +138,22 @@ def test_views_tell_scale_and_shift(scale: float, shift: float) -> None:
     offsets = [ViewOffset(t, s) for t in (-1.0, 1.0) for s in (-1.0, 1.0)]
     fitted = fit_to_views(view_of_square(CENTRE), estimate, [(at, view_of_square(at)) for at in offsets])
     assert np.abs(fitted - truth).max() < 0.2
+
+
+@pytest.mark.parametrize("blur", [0.0, 1.0, 3.0])
+def test_a_fit_never_takes_views_farther_from_the_true_ones(blur: float) -> None:
+    """Small copies of sharp pictures, which the fit is found on, may say otherwise."""
+    photo = np.random.default_rng(2).random((240, 320, 3)).astype(np.float32)
+    truth = np.full((240, 320), 1.0, np.float32)
+    truth[60:180, 100:220] = 4.0
+    views = [(at, reference_warp(photo, truth, at).colors) for at in (ViewOffset(0.0, 2.0), ViewOffset(0.0, -2.0))]
+    estimate = gaussian_filter(truth, blur)
+    fitted = fit_to_views(photo, estimate, views)
+    before, after = (
+        np.mean([psnr(reference_warp(photo, disparity, at).colors, view) for at, view in views])
+        for disparity in (estimate, fitted)
+    )
+    assert after >= before
 
 
 def rendered(offset: ViewOffset, shift_px: float = 0.0, inpainted: bool = False) -> RenderedView:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from dataclasses import replace
 from pathlib import Path
 
@@ -123,6 +124,32 @@ def test_what_stays_still_changes_neither_distances_nor_places(source: ExportSou
         )
         assert cameras.depth_range == pytest.approx(straight.depth_range)
         assert cameras.step == pytest.approx(straight.step)
+
+
+def with_metres(source: ExportSource, nearest: float, farthest: float) -> ExportSource:
+    """The source where these distances in metres are known of its nearest and farthest disparity."""
+    plan = source.plan()
+    low, high = (value / plan.disparity_scale + plan.disparity_zero for value in plan.disparity_range_px)
+    slope = (1 / nearest - 1 / farthest) / (high - low)
+    return replace(source, scene=replace(source.scene, inverse_metres=(slope, 1 / nearest - slope * high)))
+
+
+@pytest.mark.parametrize(("nearest", "farthest"), [(1.02, 3.9), (0.5, 200.0)])
+def test_distances_known_in_metres_are_written_in_metres(
+    source: ExportSource, tmp_path: Path, nearest: float, farthest: float
+) -> None:
+    known = with_metres(source, nearest, farthest)
+    depth = np.load(exported(known, "depth", tmp_path / "a.npy"))
+    assert (depth.min(), depth.max()) == pytest.approx((nearest, farthest), rel=1e-3)
+    z = -np.asarray(PlyData.read(str(exported(known, "point-cloud", tmp_path / "a.ply")))["vertex"]["z"])
+    assert (z.min(), z.max()) == pytest.approx((nearest, farthest), rel=1e-3)
+    assert cameras_of(known).depth_range == pytest.approx((1, farthest / nearest), rel=1e-3)
+
+
+@pytest.mark.parametrize("farthest", [1e9, math.inf, -50.0])
+def test_a_sky_at_infinity_is_far_but_not_infinitely(source: ExportSource, farthest: float) -> None:
+    """Also where the map's edges were drawn a little beyond infinity."""
+    assert cameras_of(with_metres(source, 2.0, farthest)).depth_range == pytest.approx((1, 1000), rel=1e-3)
 
 
 @pytest.mark.parametrize("scale", [0.0, -0.5])

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from iibr_core.exports.batch.archive import photos_in
 from iibr_core.exports.batch.ledger import FAILURES, MANIFEST, Ledger
@@ -76,16 +77,40 @@ def files(folder: Path) -> dict[str, bytes]:
 
 def test_what_is_there_stays_and_what_changed_is_made_anew(archive: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
-    assert export(archive, out) == BatchCount(2, written=2)
+    assert export(archive, out) == BatchCount(2, written=2, guessed=2)
     before = files(out)
     assert set(before) == {"a_depth.pfm", "sub/b_depth.pfm", MANIFEST, FAILURES}
-    assert export(archive, out) == BatchCount(2, there_before=2)
+    assert export(archive, out) == BatchCount(2, there_before=2, guessed=2)
     assert files(out) == before
     write_photo(archive / "a.png", 7)
-    assert export(archive, out) == BatchCount(2, written=1, there_before=1)
+    assert export(archive, out) == BatchCount(2, written=1, there_before=1, guessed=2)
     changed = files(out)
     assert changed["a_depth.pfm"] != before["a_depth.pfm"]
     assert changed["sub/b_depth.pfm"] == before["sub/b_depth.pfm"]
+
+
+def test_guesses_are_counted_also_of_what_was_there_before(archive: Path, tmp_path: Path) -> None:
+    """A photo with a map beside it is no guess."""
+    np.save(archive / "a_disparity.npy", np.tile(np.arange(32, dtype=np.float32), (24, 1)))
+    assert export(archive, tmp_path / "out") == BatchCount(2, written=2, guessed=1)
+    assert export(archive, tmp_path / "out") == BatchCount(2, there_before=2, guessed=1)
+
+
+def test_every_photo_of_a_mixed_folder_is_exported_and_no_map(archive: Path, tmp_path: Path) -> None:
+    """Also photos that are named like maps, and those that share a name."""
+    for number, name in enumerate(("b.jpg", "b.png", "c.jpg", "shallow_depth.jpg", "c_depth.jpg", "a_disparity.png")):
+        Image.fromarray(np.random.default_rng(number).integers(0, 255, (24, 32, 3)).astype(np.uint8)).save(
+            archive / name
+        )
+    Image.fromarray(np.tile(np.arange(0, 256, 8, dtype=np.uint8), (24, 1))).save(archive / "c_depth.jpg")
+    Image.fromarray(np.tile(np.arange(0, 256, 8, dtype=np.uint8), (24, 1))).save(archive / "a_disparity.png")
+    (archive / "broken.jpg").write_bytes(b"\xff\xd8\xff\xe0oops")
+    (archive / "notes.txt").write_text("x")
+    out = tmp_path / "out"
+    assert export(archive, out, RGBD) == BatchCount(7, written=6, failed=1, guessed=4)
+    written = {name for name in files(out) if name.endswith(".png")}
+    assert written == {"a.png", "b.jpg.png", "b.png.png", "c.png", "shallow_depth.png", "sub/b.png"}
+    assert list(failures(out)) == ["broken.jpg"]
 
 
 def test_another_kind_or_other_settings_replace_nothing_unless_forced(archive: Path, tmp_path: Path) -> None:
@@ -97,7 +122,7 @@ def test_another_kind_or_other_settings_replace_nothing_unless_forced(archive: P
     with pytest.raises(InputError, match=r"a\.png: was exported with other options;"):
         export(archive, out, replace(RGBD, depth_strength=2.0))
     assert files(out) == before
-    assert export(archive, out, replace(RGBD, kind="epi"), may_replace=True) == BatchCount(2, written=2)
+    assert export(archive, out, replace(RGBD, kind="epi"), may_replace=True) == BatchCount(2, written=2, guessed=2)
     assert files(out)["a.png"] != before["a.png"]
 
 
@@ -145,7 +170,7 @@ def test_what_was_written_and_not_reported_is_ours_afterwards(archive: Path, tmp
         run_batch(ledger, DEPTH, photos_in([archive]), source_of(Lossy()), None, ignore_progress)
     assert (out / "a_depth.pfm").is_file()
     assert not list(out.glob(f"{CLAIM_PREFIX}*"))
-    assert export(archive, out) == BatchCount(2, written=2)
+    assert export(archive, out) == BatchCount(2, written=2, guessed=2)
 
 
 class Died(BaseException):
@@ -169,7 +194,7 @@ def test_what_a_worker_wrote_that_died_of_it_is_ours_afterwards(
         with pytest.raises(Died):
             run_batch(ledger, DEPTH, photos_in([archive]), source_of(Lossy()), None, ignore_progress)
     assert (out / "a_depth.pfm").is_file()
-    assert export(archive, out) == BatchCount(2, written=2)
+    assert export(archive, out) == BatchCount(2, written=2, guessed=2)
 
 
 def test_a_killed_run_leaves_a_claim_that_the_next_one_takes(archive: Path, tmp_path: Path) -> None:
@@ -179,7 +204,7 @@ def test_a_killed_run_leaves_a_claim_that_the_next_one_takes(archive: Path, tmp_
         run_batch(killed, DEPTH, photos_in([archive]), source_of(Lossy()), None, ignore_progress)
     killed._manifest.close()  # as the system does
     assert len(list(out.glob(f"{CLAIM_PREFIX}*"))) == 1
-    assert export(archive, out) == BatchCount(2, written=2)
+    assert export(archive, out) == BatchCount(2, written=2, guessed=2)
     assert not list(out.glob(f"{CLAIM_PREFIX}*"))
 
 
