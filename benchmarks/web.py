@@ -22,9 +22,14 @@ from PIL import Image, ImageSequence
 
 from benchmarks.harness.bench_scenes import DEMO
 from benchmarks.harness.reports import emit, markdown, parser_of, start
-from iibr_core.exports import EXPORTS, ExportOptions, ExportSource, open_for_export, resolve_settings
+from iibr_core.exports.export_opening import open_for_export
+from iibr_core.exports.kinds import EXPORTS
+from iibr_core.exports.options import ExportOptions
+from iibr_core.exports.settings import resolve_settings
+from iibr_core.exports.source import ExportSource
 from iibr_core.exports.web import make_page
-from iibr_core.scenes import LensChoice, Source
+from iibr_core.scenes.lens_limits import LensChoice
+from iibr_core.scenes.scene import Source
 from iibr_core.types import GridShape, ViewOffset
 from tests.browser import Pipe, Tab, open_browser
 from tests.web.conftest import canvas, set_lens, wait_until_still

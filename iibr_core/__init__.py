@@ -5,27 +5,16 @@ Pictures are (H, W, 3), encoded by sRGB's curve: float32 with 1 = white, or uint
 is closer. Light fields are (V, U, H, W, ...), v down, u right; their disparity is in px from view to view.
 """
 
-from __future__ import annotations
+import lazy_loader
 
-from typing import TYPE_CHECKING
-
-from iibr_core.runtime.offers import offered_by
-
-if TYPE_CHECKING:
-    from iibr_core.interface.fields import FORMATS, LightField, View
-    from iibr_core.interface.judging import Comparison, compare, evaluate
-    from iibr_core.interface.public_scene import Scene, estimate_depth, from_arrays, open
-    from iibr_core.runtime.tiling import Cancelled
-    from iibr_core.stages import Stages
-    from iibr_core.types import InputError
-else:
-    __getattr__ = offered_by(__file__)
-
-__all__ = [
-    "FORMATS", "Cancelled", "Comparison", "InputError", "LightField", "Scene", "Stages", "View", "compare",
-    "estimate_depth", "evaluate", "from_arrays", "open",
-]  # fmt: skip
-
-
-def __dir__() -> list[str]:
-    return __all__
+__getattr__, __dir__, __all__ = lazy_loader.attach(
+    __name__,
+    submod_attrs={
+        "interface.fields": ["FORMATS", "LightField", "View"],
+        "interface.judging": ["Comparison", "compare", "evaluate"],
+        "interface.public_scene": ["Scene", "estimate_depth", "from_arrays", "open"],
+        "runtime.tiling": ["Cancelled"],
+        "stages": ["Stages"],
+        "types": ["InputError"],
+    },
+)

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import ast
 import re
-from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -34,34 +32,3 @@ def test_files_and_records_are_there(files: str, records: str) -> None:
     assert all(sources)
     for record in re.findall(r"`(\w+)`", records):
         assert re.search(rf"^class {record}\b", core, re.MULTILINE), record
-
-
-MOST_CORE_MODULES = 20
-"""That the viewer and the command line import. A room offers names in its `__init__.py`: take them from there."""
-
-
-def taken_of_the_core() -> dict[str, set[str]]:
-    """Names that the viewer and the command line take, by module."""
-    taken: dict[str, set[str]] = {}
-    for path in (ROOT / "viewer").rglob("*.py"):
-        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
-            if isinstance(node, ast.ImportFrom) and node.module and node.module.split(".")[0] == "iibr_core":
-                taken.setdefault(node.module, set()).update(name.name for name in node.names)
-    return taken
-
-
-def test_the_viewer_reaches_the_core_by_its_rooms() -> None:
-    taken = taken_of_the_core()
-    assert len(taken) <= MOST_CORE_MODULES, sorted(taken)
-
-
-@pytest.mark.parametrize(
-    "init", [path for path in (ROOT / "iibr_core").rglob("__init__.py")], ids=lambda p: p.parent.name
-)
-def test_a_room_has_every_name_that_it_offers_and_none_in_vain(init: Path) -> None:
-    blocks = [node for node in ast.parse(init.read_text("utf-8")).body if isinstance(node, ast.If)]
-    room = import_module(".".join(init.parent.relative_to(ROOT).parts))
-    offered = {name.name for block in blocks for node in block.body for name in getattr(node, "names", ())}
-    assert all(hasattr(room, name) for name in offered)
-    assert init == ROOT / "iibr_core" / "__init__.py" or offered <= taken_of_the_core().get(room.__name__, set())
-    assert not any((init.parent / f"{name}.py").exists() for name in offered), "a file hides a name"

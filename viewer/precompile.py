@@ -28,11 +28,13 @@ from typing import TYPE_CHECKING, Any, get_args
 
 import psutil
 
-from iibr_core.runtime import COMPILING, Cancelled, ShouldStop, core_count, never
+from iibr_core.runtime.compiling import COMPILING
+from iibr_core.runtime.machine import core_count
+from iibr_core.runtime.tiling import Cancelled, ShouldStop, never
 from iibr_core.types import InputError, Quality
 
 if TYPE_CHECKING:
-    from iibr_core.scenes import Source
+    from iibr_core.scenes.scene import Source
 
 ROOT = Path(__file__).resolve().parents[1]
 PART = (slice(150, 310), slice(200, 400))
@@ -128,7 +130,7 @@ def _text(path: Path) -> str:
 
 def _take_steps(folder: Path, begin: Callable[[], None], should_stop: ShouldStop) -> set[str]:
     """Each step in whichever process is free. Returns the files of kernels that were read or written."""
-    from iibr_core.exports.batch import local_workers
+    from iibr_core.exports.batch.processes import local_workers
 
     with local_workers(core_count(), 1) as workers:
         steps = [workers.executor.submit(_work_in, folder, step) for step in STEPS]
@@ -169,8 +171,10 @@ def _photo(scratch: Path, is_mapped: bool = True, is_hdr: bool = False) -> Sourc
     """A part of the demo photo as a file."""
     import numpy as np
 
-    from iibr_core.formats import read_map, read_photo, write_image, write_map
-    from iibr_core.scenes import Source
+    from iibr_core.formats.images.photo import read_photo, write_image
+    from iibr_core.formats.maps.reader import read_map
+    from iibr_core.formats.maps.writer import write_map
+    from iibr_core.scenes.scene import Source
     from viewer.model.demo_photo import demo_photo
 
     photo = scratch / ("photo.exr" if is_hdr else "photo.png")
@@ -186,23 +190,23 @@ def _photo(scratch: Path, is_mapped: bool = True, is_hdr: bool = False) -> Sourc
 
 def _open(source: Source) -> None:
     """All that the window's worker does with a photo."""
-    from iibr_core.rendering import CENTRE
-    from iibr_core.scenes import SceneRequest, results_of
+    from iibr_core.rendering.optics import CENTRE
+    from iibr_core.scenes.opening import SceneRequest, results_of
 
     for _ in results_of(SceneRequest(0, source), lambda: False, lambda: CENTRE):
         pass
 
 
 def _show_first_picture(scratch: Path) -> None:
-    from iibr_core.rendering import CENTRE
-    from iibr_core.scenes import SceneRequest, results_of
+    from iibr_core.rendering.optics import CENTRE
+    from iibr_core.scenes.opening import SceneRequest, results_of
 
     next(results_of(SceneRequest(0, _photo(scratch)), lambda: False, lambda: CENTRE))
 
 
 def _make_views(scratch: Path) -> None:
     """Without what comes before the first picture."""
-    from iibr_core.depth import DepthChoice
+    from iibr_core.depth.choice import DepthChoice
 
     _open(replace(_photo(scratch), depth=DepthChoice(refine=0.0)))
 
@@ -216,7 +220,7 @@ def _open_smaller(scratch: Path) -> None:
 
 
 def _open_guessed(scratch: Path) -> None:
-    from iibr_core.depth import DepthChoice
+    from iibr_core.depth.choice import DepthChoice
 
     _open(replace(_photo(scratch, is_mapped=False), depth=DepthChoice(start="rough")))
 
@@ -227,7 +231,7 @@ def _open_hdr(scratch: Path) -> None:
 
 def _paint(scratch: Path) -> None:
     """What the first stroke of the depth brush needs."""
-    from iibr_core.scenes import prepare_brush
+    from iibr_core.scenes.loaded_photo import prepare_brush
 
     prepare_brush()
 
@@ -236,8 +240,8 @@ def _look_around(scratch: Path) -> None:
     """What a camera needs that leaves the plane of the views."""
     import numpy as np
 
-    from iibr_core.generation import FreeViews, inverse_depth_of, steered
-    from iibr_core.scenes import load_photo
+    from iibr_core.generation.free_views import FreeViews, inverse_depth_of, steered
+    from iibr_core.scenes.loaded_photo import load_photo
     from iibr_core.types import Camera
 
     loaded = load_photo(_photo(scratch))
@@ -249,9 +253,11 @@ def _look_around(scratch: Path) -> None:
 
 def _find_gloss(scratch: Path) -> None:
     """What the window waits for when a surface becomes glossy, with a light that is to be found in the photo, too."""
-    from iibr_core.rendering import CENTRE
-    from iibr_core.rendering.gloss import Gloss, GlossLight
-    from iibr_core.scenes import GlossRequest, SceneReady, SceneRequest, Source, answer, results_of
+    from iibr_core.rendering.gloss.gloss_settings import Gloss, GlossLight
+    from iibr_core.rendering.optics import CENTRE
+    from iibr_core.scenes.opening import SceneReady, SceneRequest, results_of
+    from iibr_core.scenes.scene import Source
+    from iibr_core.scenes.scene_gloss import GlossRequest, answer
     from viewer.model.demo_photo import demo_photo
 
     large = Source(str(demo_photo()), max_pixels=GLOSSY_PIXELS)
@@ -265,9 +271,12 @@ def _draw_at_own_size(scratch: Path) -> None:
     """What a picture at the photo's own size needs, with all that the photo hides, through a lens."""
     import numpy as np
 
-    from iibr_core.exports import FullPicture
-    from iibr_core.rendering import CENTRE, Optics
-    from iibr_core.scenes import SceneReady, SceneRequest, ScreenSize, load_photo, make_plan, results_of
+    from iibr_core.exports.full_picture import FullPicture
+    from iibr_core.rendering.optics import CENTRE, Optics
+    from iibr_core.scenes.loaded_photo import load_photo
+    from iibr_core.scenes.making import make_plan
+    from iibr_core.scenes.opening import SceneReady, SceneRequest, results_of
+    from iibr_core.scenes.screen_size import ScreenSize
 
     small = replace(_photo(scratch), max_pixels=16_000)
     loaded = load_photo(small)
@@ -283,8 +292,8 @@ def _search_views(scratch: Path) -> None:
     """A light field without disparity: `iibr depth` looks for it in the same way."""
     import numpy as np
 
-    from iibr_core.formats import write_image
-    from iibr_core.scenes import Source
+    from iibr_core.formats.images.photo import write_image
+    from iibr_core.scenes.scene import Source
 
     folder = scratch / "field"
     folder.mkdir()

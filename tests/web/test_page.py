@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from iibr_core.scenes import Source
+from iibr_core.scenes.scene import Source
 from iibr_core.types import GridShape, ViewOffset
 from tests.browser import Pipe, Tab, open_browser
 from tests.viewer.conftest import HEIGHT, WIDTH, write_scene

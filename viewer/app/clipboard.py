@@ -12,7 +12,7 @@ from datetime import datetime
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
-from iibr_core.formats import atomic_write
+from iibr_core.formats.outputs import atomic_write
 from iibr_core.types import InputError
 from viewer.model.state.saving import PASTED_FOLDER
 

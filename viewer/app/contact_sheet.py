@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.scenes import ScreenSize, aperture_limit
+from iibr_core.scenes.lens_limits import aperture_limit
+from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import ViewOffset
 from viewer.app.headless import HeadlessViewer
 from viewer.model.state.optics_actions import MoveEye, ResetOptics, SetAperture, SetFocus

@@ -8,7 +8,7 @@ import sys
 from itertools import islice
 from typing import Any
 
-from iibr_core.exports import export_kind
+from iibr_core.exports.kinds import export_kind
 from viewer.model.state.exporting import ExportPrompt
 from viewer.model.state.prompts import FOLDER_CHOICES, ChoiceOf, FolderContents, SavePrompt
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import PurePath
 
-from iibr_core.scenes import Source, source_beside, source_with_map
+from iibr_core.scenes.scene import Source, source_beside, source_with_map
 from viewer.model.actions import Action, DoTask, OpenPath
 from viewer.model.state.app_state import AppState
 from viewer.model.state.tasks import ReadTruthTask

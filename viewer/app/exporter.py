@@ -8,11 +8,14 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-from iibr_core.exports import ExportOptions, ExportSource, export_kind, optics_of, require_export_place, writer_of
-from iibr_core.formats import AlreadyThereError
-from iibr_core.rendering import Optics
-from iibr_core.runtime import require_extra
-from iibr_core.scenes import Scene
+from iibr_core.exports.kinds import export_kind
+from iibr_core.exports.options import ExportOptions
+from iibr_core.exports.source import ExportSource
+from iibr_core.exports.writers import optics_of, require_export_place, writer_of
+from iibr_core.formats.outputs import AlreadyThereError
+from iibr_core.rendering.optics import Optics
+from iibr_core.runtime.extras import require_extra
+from iibr_core.scenes.scene import Scene
 from iibr_core.types import InputError
 from viewer.app.job import Job
 from viewer.app.job_queue import JobQueue

@@ -15,8 +15,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.runtime import Cancelled, never
-from iibr_core.scenes import LoadedPhoto, ScreenSize
+from iibr_core.runtime.tiling import Cancelled, never
+from iibr_core.scenes.loaded_photo import LoadedPhoto
+from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import Camera, ImageSize, ViewUpdate, image_size
 from viewer.background.job_threads import Failed, Job, JobThread
 from viewer.display.scene_view import SceneView
@@ -27,7 +28,7 @@ from viewer.model.state.app_state import AppState
 from viewer.model.state.notices import Notice
 
 if TYPE_CHECKING:
-    from iibr_core.generation import FreeViews
+    from iibr_core.generation.free_views import FreeViews
 
 DRAFT_PIXELS = 40_000
 """Of the photo's copy that drafts are made of: they are there within a tenth of a second."""
@@ -143,15 +144,9 @@ class FreeCameraView:
 def _make_ready(job: Job[FreeRequest, FreeResult], is_draft: bool) -> _Ready:
     """Raises InputError for poses that see nothing of the photo, Cancelled once the job should stop."""
     from iibr_core.color import photo_in_srgb
-    from iibr_core.generation import (
-        FreeViews,
-        depths_of,
-        fitted_cameras,
-        inverse_depth_of,
-        measure_disparity_range,
-        steered,
-    )
-    from iibr_core.inpainting import fill_background
+    from iibr_core.generation.disparity_range import measure_disparity_range
+    from iibr_core.generation.free_views import FreeViews, depths_of, fitted_cameras, inverse_depth_of, steered
+    from iibr_core.inpainting.background import fill_background
 
     request = job.request
     photo, poses, disparity = photo_in_srgb(request.loaded.photo), request.poses, request.centre.disparity
@@ -187,7 +182,8 @@ def _make_ready(job: Job[FreeRequest, FreeResult], is_draft: bool) -> _Ready:
 
 def _view(job: Job[FreeRequest, FreeResult], ready: _Ready) -> ViewUpdate:
     """What the camera sees, with the size and the disparities of the scene's views."""
-    from iibr_core.generation import encode_for_storage, steered
+    from iibr_core.generation.free_views import steered
+    from iibr_core.generation.stored_views import encode_for_storage
 
     free, centre = job.request.camera, job.request.centre
     camera = ready.camera if free.pose is None else ready.others[free.pose].resized(ready.camera.size)

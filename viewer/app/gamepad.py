@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from iibr_core.scenes import aperture_limit, focus_span
+from iibr_core.scenes.lens_limits import aperture_limit, focus_span
 from iibr_core.types import ViewOffset
 from viewer.model.actions import Action
 from viewer.model.state.app_state import AppState

@@ -11,29 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.color import linear_from_srgb
-from iibr_core.depth.editing import UNEDITED, DepthEdits
-from iibr_core.exports import (
-    FullPicture,
-    RenderSettings,
-    centred,
-    encode_light,
-    is_full,
-    require_size,
-    size_in_frame,
-)
-from iibr_core.generation import ALL_VIEWS
-from iibr_core.rendering import CENTRE
-from iibr_core.scenes import (
-    DepthSettings,
-    Progress,
-    Scene,
-    SceneReady,
-    SceneRequest,
-    ScreenSize,
-    Source,
-    ViewReady,
-    results_of,
-)
+from iibr_core.depth.editing.edits import UNEDITED, DepthEdits
+from iibr_core.exports.framing import centred, size_in_frame
+from iibr_core.exports.full_picture import FullPicture, encode_light, is_full
+from iibr_core.exports.render_settings import RenderSettings, require_size
+from iibr_core.generation.outer_views import ALL_VIEWS
+from iibr_core.rendering.optics import CENTRE
+from iibr_core.scenes.opening import SceneReady, SceneRequest, ViewReady, results_of
+from iibr_core.scenes.scene import DepthSettings, Progress, Scene, Source
+from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import SRGB, ColorSpace, FloatImage, ReportProgress, ignore_progress
 from viewer.background.comparison_worker import ComparisonJob
 from viewer.display.inspection_view import InspectionView

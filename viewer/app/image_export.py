@@ -8,8 +8,9 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from iibr_core.formats import PictureFormat, is_folder
-from iibr_core.scenes import ScreenSize
+from iibr_core.formats.files import is_folder
+from iibr_core.formats.images.picture_kinds import PictureFormat
+from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import SRGB, ColorSpace, FloatImage
 from viewer.model.state.app_state import AppState
 from viewer.model.state.saving import SavedSettings
@@ -27,7 +28,7 @@ class SavedShot:
 
 def export_image(path: Path, pixels: NDArray[Any]) -> None:
     """Write sRGB bytes (H, W, 3), whole or not at all. Raises InputError where that cannot be."""
-    from iibr_core.formats import write_picture
+    from iibr_core.formats.images.picture_writers import write_picture
 
     write_picture(path, pixels)
 
@@ -37,7 +38,9 @@ def export_picture(path: Path, drawn: NDArray[Any], shot: SavedShot) -> Path:
 
     What it takes to take it again is put inside, and what the photo's file says of the photo. Raises InputError.
     """
-    from iibr_core.formats import ATTRIBUTE, PictureMetadata, read_metadata, write_picture
+    from iibr_core.formats.images.metadata import PictureMetadata, read_metadata
+    from iibr_core.formats.images.picture_writers import write_picture
+    from iibr_core.formats.images.settings_text import ATTRIBUTE
     from viewer.model.saved_settings import settings_text
 
     of_photo = PictureMetadata() if shot.photo is None else read_metadata(shot.photo)
@@ -49,7 +52,7 @@ def export_picture(path: Path, drawn: NDArray[Any], shot: SavedShot) -> Path:
 
 def export_map(path: Path, values: FloatImage) -> str:
     """Write a disparity map (H, W); returns a sentence for people. Raises InputError as `write_map` does."""
-    from iibr_core.formats import write_map
+    from iibr_core.formats.maps.writer import write_map
 
     return f"Saved {path}. {write_map(path, values)}".strip()
 

@@ -8,10 +8,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
-from iibr_core.exports import ExportSource
-from iibr_core.rendering import Optics
-from iibr_core.runtime import TimeLeft
-from iibr_core.scenes import Scene, SceneRequest, Source
+from iibr_core.exports.source import ExportSource
+from iibr_core.rendering.optics import Optics
+from iibr_core.runtime.time_left import TimeLeft
+from iibr_core.scenes.opening import SceneRequest
+from iibr_core.scenes.scene import Scene, Source
 from viewer.display.snapshot import SceneSnapshot
 from viewer.model.actions import Action
 from viewer.model.reducers.lens_reducer import carry_optics

@@ -12,9 +12,10 @@ from functools import partial
 from itertools import count
 from pathlib import Path
 
-from iibr_core.formats import release_place
-from iibr_core.runtime import Cancelled, raise_if_stopped
-from iibr_core.scenes import SceneRequest, Source, is_same_field
+from iibr_core.formats.outputs import release_place
+from iibr_core.runtime.tiling import Cancelled, raise_if_stopped
+from iibr_core.scenes.opening import SceneRequest
+from iibr_core.scenes.scene import Source, is_same_field
 from viewer.app.job import Job, Lane
 from viewer.app.job_scene import JobScenes
 from viewer.app.save_places import inputs_of_scene

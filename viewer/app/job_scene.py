@@ -12,11 +12,14 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from iibr_core.exports import ExportSource, RenderSettings, require_size
-from iibr_core.generation import ALL_VIEWS, WantedViews
-from iibr_core.rendering import CENTRE
-from iibr_core.runtime import raise_if_stopped
-from iibr_core.scenes import FilledField, GlossRequest, Progress, SceneReady, ViewReady, answer, results_of
+from iibr_core.exports.render_settings import RenderSettings, require_size
+from iibr_core.exports.source import ExportSource
+from iibr_core.generation.outer_views import ALL_VIEWS, WantedViews
+from iibr_core.rendering.optics import CENTRE
+from iibr_core.runtime.tiling import raise_if_stopped
+from iibr_core.scenes.opening import SceneReady, ViewReady, results_of
+from iibr_core.scenes.scene import FilledField, Progress
+from iibr_core.scenes.scene_gloss import GlossRequest, answer
 from iibr_core.types import ViewUpdate
 from viewer.app.job import Job
 from viewer.background.window_work import Result, Steps, WindowWork

@@ -11,10 +11,14 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from iibr_core.exports import ExportSource, FullPicture, RenderSettings, encode_light, is_full
-from iibr_core.formats import AS_USUAL, AlreadyThereError, PictureFormat, is_float, make_folder
-from iibr_core.rendering import Optics
-from iibr_core.scenes import Scene, ScreenSize
+from iibr_core.exports.full_picture import FullPicture, encode_light, is_full
+from iibr_core.exports.render_settings import RenderSettings
+from iibr_core.exports.source import ExportSource
+from iibr_core.formats.images.picture_kinds import AS_USUAL, PictureFormat, is_float
+from iibr_core.formats.outputs import AlreadyThereError, make_folder
+from iibr_core.rendering.optics import Optics
+from iibr_core.scenes.scene import Scene
+from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import InputError
 from viewer.app.clipboard import copied_path, copy_picture
 from viewer.app.image_export import SavedShot, export_map, export_picture, shot_of

@@ -6,7 +6,9 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from iibr_core.scenes import Rect, Scene, focus_limits
+from iibr_core.scenes.lens_limits import focus_limits
+from iibr_core.scenes.rect import Rect
+from iibr_core.scenes.scene import Scene
 from iibr_core.types import ViewOffset
 from viewer.model.actions import Action, EndGesture, SetHover
 from viewer.model.inspection_request import view_at

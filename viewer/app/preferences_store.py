@@ -14,9 +14,10 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from iibr_core.exports import FolderOrder
-from iibr_core.formats import atomic_write, read_text, status_of
-from iibr_core.scenes import clamp
+from iibr_core.exports.photo_folder import FolderOrder
+from iibr_core.formats.files import read_text, status_of
+from iibr_core.formats.outputs import atomic_write
+from iibr_core.scenes.lens_limits import clamp
 from iibr_core.types import InputError
 from viewer.model.actions import Action, Notify
 from viewer.model.reducers.worker_events import RECENT_KEPT

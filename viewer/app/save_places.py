@@ -8,9 +8,12 @@ import os
 from collections.abc import Sequence
 from pathlib import Path
 
-from iibr_core.exports import require_size
-from iibr_core.formats import AS_USUAL, PictureFormat, is_file, require_file_place, require_picture_format
-from iibr_core.scenes import ScreenSize, inputs_of, named_by
+from iibr_core.exports.render_settings import require_size
+from iibr_core.formats.files import is_file
+from iibr_core.formats.images.picture_kinds import AS_USUAL, PictureFormat, require_picture_format
+from iibr_core.formats.outputs import require_file_place
+from iibr_core.scenes.inputs import inputs_of, named_by
+from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import ImageSize, InputError
 from viewer.model.state.app_state import AppState
 from viewer.model.state.tasks import SaveTask

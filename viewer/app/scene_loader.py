@@ -6,20 +6,9 @@ import time
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 
-from iibr_core.scenes import (
-    DepthSettings,
-    LoadedPhoto,
-    Scene,
-    SceneReady,
-    SceneRequest,
-    Source,
-    ViewReady,
-    WantedPhoto,
-    prepare_brush,
-    sketch_of,
-    source_beside,
-    without_history,
-)
+from iibr_core.scenes.loaded_photo import LoadedPhoto, prepare_brush, without_history
+from iibr_core.scenes.opening import SceneReady, SceneRequest, ViewReady, WantedPhoto, sketch_of
+from iibr_core.scenes.scene import DepthSettings, Scene, Source, source_beside
 from iibr_core.types import InputError, ViewOffset
 from viewer.background.depth_estimate import DepthFinder, same_places
 from viewer.background.file_worker import FileRequest, FileWorker

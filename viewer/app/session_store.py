@@ -13,9 +13,10 @@ from functools import partial
 from itertools import count
 from pathlib import Path
 
-from iibr_core.depth.editing import UNEDITED
-from iibr_core.formats import atomic_write, is_folder, ordinary_file, read_text
-from iibr_core.scenes import Scene, Source
+from iibr_core.depth.editing.edits import UNEDITED
+from iibr_core.formats.files import is_folder, ordinary_file, read_text
+from iibr_core.formats.outputs import atomic_write
+from iibr_core.scenes.scene import Scene, Source
 from iibr_core.types import InputError
 from viewer.app.image_export import settings_of
 from viewer.background.file_worker import FileRequest, FileWorker

@@ -10,9 +10,9 @@ from itertools import count
 from pathlib import Path
 from typing import Any
 
-from iibr_core.exports import list_photos
-from iibr_core.rendering import ApertureMask
-from iibr_core.scenes import Source, source_beside
+from iibr_core.exports.photo_folder import list_photos
+from iibr_core.rendering.optics import ApertureMask
+from iibr_core.scenes.scene import Source, source_beside
 from viewer.app.clipboard import Pasted, paste_picture
 from viewer.app.dialogs import Dialog, SaveDialog, contents_of, has_dialogs
 from viewer.app.exporter import add_export
@@ -258,7 +258,9 @@ def _actions_from_download(result: DownloadResult) -> list[Action]:
 
 def read_truth(path: str) -> GroundTruth:
     """The light field of a folder to compare with, as far as its size. Raises InputError where it is none."""
-    from iibr_core.formats import common_size, grid_of, open_light_field
+    from iibr_core.formats.light_fields.light_field_formats import open_light_field
+    from iibr_core.formats.light_fields.multi_view_scene import common_size
+    from iibr_core.formats.light_fields.views import grid_of
 
     field = open_light_field(Path(os.path.expanduser(path)))
     grid, (height, width) = grid_of(field), common_size(field.views)
@@ -267,7 +269,7 @@ def read_truth(path: str) -> GroundTruth:
 
 def _read_facts(path: str) -> FactsRead:
     """Nothing where the file is gone by now."""
-    from iibr_core.formats import camera_facts, read_metadata
+    from iibr_core.formats.images.metadata import camera_facts, read_metadata
 
     return FactsRead(path, camera_facts(read_metadata(Path(path))))
 

@@ -13,7 +13,7 @@ import imgui_bundle  # noqa: F401
 import glfw
 
 # isort: on
-from iibr_core.scenes import ScreenSize
+from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import InputError
 from viewer.app.gamepad import Gamepad
 

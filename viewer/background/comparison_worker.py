@@ -15,18 +15,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.color import bytes_from_encoded, convert, encoded_from_stored
-from iibr_core.evaluation import flip, psnr
-from iibr_core.generation import ScenePlan, plan_literal
-from iibr_core.inpainting import DEFAULT_INPAINTER, load_inpainter
-from iibr_core.runtime import is_installed
-from iibr_core.scenes import LoadedPhoto
+from iibr_core.evaluation.metrics import flip, psnr
+from iibr_core.generation.plan import ScenePlan, plan_literal
+from iibr_core.inpainting.registry import DEFAULT_INPAINTER, load_inpainter
+from iibr_core.runtime.extras import is_installed
+from iibr_core.scenes.loaded_photo import LoadedPhoto
 from iibr_core.types import SRGB, ColorSpace, FloatImage, GridShape, InputError, Quality, StoredColors, ViewOffset
 from viewer.background.job_threads import Failed, Job, JobThread
 from viewer.model.inspection_request import InspectionRequest
 
 if TYPE_CHECKING:
-    from iibr_core.inpainting import Inpainter
-    from iibr_core.rendering import RaySet
+    from iibr_core.inpainting.inpainter import Inpainter
+    from iibr_core.rendering.ray_set import RaySet
 
 Bytes = NDArray[np.uint8]
 
@@ -128,7 +128,8 @@ class ComparisonJob:
         self, request: InspectionRequest, inputs: ComparisonInputs, should_stop: Callable[[], bool]
     ) -> tuple[Bytes, Bytes]:
         if request.truth is not None:
-            from iibr_core.formats import open_light_field, read_stored_view
+            from iibr_core.formats.light_fields.light_field_formats import open_light_field
+            from iibr_core.formats.light_fields.views import read_stored_view
 
             truth = read_stored_view(open_light_field(Path(os.path.expanduser(request.truth.path))), *request.view)
             made = inputs.stored
@@ -144,8 +145,9 @@ class ComparisonJob:
         self, request: InspectionRequest, inputs: ComparisonInputs, quality: Quality, should_stop: Callable[[], bool]
     ) -> StoredColors:
         """The view as the light field stores it; the middle one is the photo."""
-        from iibr_core.generation import encode_for_storage, stored_colors, transformer_for
-        from iibr_core.rendering import open_renderer
+        from iibr_core.generation.light_field import transformer_for
+        from iibr_core.generation.stored_views import encode_for_storage, stored_colors
+        from iibr_core.rendering.renderer import open_renderer
 
         loaded, plan = _given(request, inputs)
         if request.view == plan.grid.centre:
@@ -162,7 +164,7 @@ class ComparisonJob:
         self, request: InspectionRequest, inputs: ComparisonInputs, should_stop: Callable[[], bool]
     ) -> FloatImage:
         """Of the weights of the view (H, W), in [0, 1]; in the middle every ray is the photo's own."""
-        from iibr_core.rendering import open_renderer
+        from iibr_core.rendering.renderer import open_renderer
 
         loaded, plan = _given(request, inputs)
         if request.view == plan.grid.centre:
@@ -182,7 +184,8 @@ class ComparisonJob:
         should_stop: Callable[[], bool],
     ) -> RaySet:
         """The ray set of the scene's plan, or of the ground truth's places."""
-        from iibr_core.generation import ray_set, stored_colors
+        from iibr_core.generation.light_field import ray_set
+        from iibr_core.generation.stored_views import stored_colors
 
         loaded, plan = _given(request, inputs)
         rays_of = request.generation, request.truth.grid if request.truth is not None else None

@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from iibr_core.scenes import LoadedPhoto, Source, deepen
+from iibr_core.scenes.loaded_photo import LoadedPhoto, deepen
+from iibr_core.scenes.scene import Source
 from iibr_core.types import FloatImage
 from viewer.background.job_threads import Failed, Job, JobThread
 from viewer.model.actions import Action, Notify, SamePlaces

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 
-from iibr_core.rendering.gloss import Gloss
-from iibr_core.runtime import Cancelled
-from iibr_core.scenes import GlossFound, GlossRequest, answer
+from iibr_core.rendering.gloss.gloss_settings import Gloss
+from iibr_core.runtime.tiling import Cancelled
+from iibr_core.scenes.scene_gloss import GlossFound, GlossRequest, answer
 from viewer.background.job_threads import Failed, Job, JobThread
 from viewer.model.actions import Action, Notify
 from viewer.model.state.notices import Notice

@@ -8,12 +8,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
 
-from iibr_core.runtime import Cancelled
+from iibr_core.runtime.tiling import Cancelled
 from viewer.background.job_threads import Failed, Job, JobThread
 from viewer.model.state.model_download import Downloading, ModelOffer, ModelsListed
 
 if TYPE_CHECKING:
-    from iibr_core.depth.estimators import KnownModel
+    from iibr_core.depth.estimators.depth_estimator import KnownModel
 
 BYTES_OF_MEGABYTE = 1e6
 
@@ -45,7 +45,7 @@ class ModelDownloads(JobThread[ModelRequest, DownloadResult]):
 
 
 def _results_of(job: Job[ModelRequest, DownloadResult]) -> Iterator[DownloadResult]:
-    from iibr_core.depth.estimators import fetch, known_model
+    from iibr_core.depth.estimators.catalog import fetch, known_model
 
     model = known_model(job.request.name)
     told = Downloading(model.title, 0, model.megabytes)
@@ -67,7 +67,7 @@ def _results_of(job: Job[ModelRequest, DownloadResult]) -> Iterator[DownloadResu
 
 def list_models() -> ModelsListed:
     """What can be had, and what is here. Takes half a second the first time."""
-    from iibr_core.depth.estimators import KNOWN_MODELS
+    from iibr_core.depth.estimators.catalog import KNOWN_MODELS
 
     return ModelsListed(tuple(map(_offer_of, KNOWN_MODELS)))
 
@@ -76,7 +76,8 @@ def _offer_of(model: KnownModel) -> ModelOffer:
     """What the window says of a model."""
     from huggingface_hub import constants
 
-    from iibr_core.depth.estimators import state_of, words_about
+    from iibr_core.depth.estimators.catalog import state_of
+    from iibr_core.depth.estimators.words import words_about
 
     state = state_of(model)
     words = words_about(model, state)

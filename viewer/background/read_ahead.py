@@ -7,9 +7,13 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
-from iibr_core.generation import PHOTO_BYTES, READING_BYTES, ScenePlan, budget_of, whole_bytes
-from iibr_core.runtime import ShouldStop
-from iibr_core.scenes import LoadedPhoto, Scene, WantedPhoto, load_photo, make_plan
+from iibr_core.generation.memory_model import PHOTO_BYTES, READING_BYTES, budget_of, whole_bytes
+from iibr_core.generation.plan import ScenePlan
+from iibr_core.runtime.tiling import ShouldStop
+from iibr_core.scenes.loaded_photo import LoadedPhoto, load_photo
+from iibr_core.scenes.making import make_plan
+from iibr_core.scenes.opening import WantedPhoto
+from iibr_core.scenes.scene import Scene
 from viewer.background.job_threads import Job, JobThread
 
 Read = TypeVar("Read")

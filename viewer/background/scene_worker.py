@@ -9,11 +9,12 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from iibr_core.exports import first_photo
-from iibr_core.formats import is_folder
-from iibr_core.rendering import CENTRE
-from iibr_core.runtime import tell_compiling
-from iibr_core.scenes import Progress, SceneReady, SceneRequest, ViewReady, results_of
+from iibr_core.exports.photo_folder import first_photo
+from iibr_core.formats.files import is_folder
+from iibr_core.rendering.optics import CENTRE
+from iibr_core.runtime.compiling import tell_compiling
+from iibr_core.scenes.opening import SceneReady, SceneRequest, ViewReady, results_of
+from iibr_core.scenes.scene import Progress
 from iibr_core.types import ViewOffset
 from viewer.background.job_threads import Failed, Job, JobThread, ProgressReport
 

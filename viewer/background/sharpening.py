@@ -10,15 +10,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.exports import FullPicture, RenderSettings, encode_light
-from iibr_core.runtime import Cancelled
-from iibr_core.scenes import LoadedPhoto
+from iibr_core.exports.full_picture import FullPicture, encode_light
+from iibr_core.exports.render_settings import RenderSettings
+from iibr_core.runtime.tiling import Cancelled
+from iibr_core.scenes.loaded_photo import LoadedPhoto
 from iibr_core.types import SRGB
 from viewer.background.job_threads import Failed, Job, JobThread
 from viewer.background.window_work import WindowWork
 
 if TYPE_CHECKING:
-    from iibr_core.rendering import LargePhoto
+    from iibr_core.rendering.large_views import LargePhoto
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,7 +9,7 @@ from collections.abc import Callable, Generator
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
-from iibr_core.runtime import ShouldStop, raise_if_stopped
+from iibr_core.runtime.tiling import ShouldStop, raise_if_stopped
 
 LOOK_S = 0.05
 """How often a thread that waits looks whether its job is still wanted."""

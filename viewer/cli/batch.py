@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from iibr_core.depth import BETTER_WAYS
-from iibr_core.exports import EXPORTS
-from iibr_core.runtime import require_extra
+from iibr_core.depth.choice import BETTER_WAYS
+from iibr_core.exports.kinds import EXPORTS
+from iibr_core.runtime.extras import require_extra
 from iibr_core.types import InputError
 from viewer.cli.export_options import KindOptions, To, require_kind
 from viewer.cli.lens_options import Aperture, Focus, GlossFile
@@ -21,8 +21,8 @@ from viewer.cli.shared_options import Force, Grid, Literal, require_memory, requ
 from viewer.cli.terminal import show_progress
 
 if TYPE_CHECKING:
-    from iibr_core.exports import OpenDrawn
-    from iibr_core.exports.batch import WorkerSource
+    from iibr_core.exports.batch.workers import WorkerSource
+    from iibr_core.exports.export_opening import OpenDrawn
 
 MOST_WORKERS = 1024
 
@@ -54,13 +54,14 @@ class WorkerOptions:
         if tls and (len(tls) < 3 or self.scheduler is None):
             raise InputError("--tls-ca, --tls-cert, --tls-key: give all three, with --scheduler")
         if self.scheduler is None:
-            from iibr_core.exports.batch import workers_here
+            from iibr_core.exports.batch.run import workers_here
 
             return workers_here(self.workers)
         if self.workers is not None:
             raise InputError("--workers starts processes here, --scheduler uses those elsewhere: leave one out")
         require_extra("batch", "distributed")
-        from iibr_core.exports.batch import TlsFiles, WorkerSource, remote_workers
+        from iibr_core.exports.batch.scheduler import TlsFiles, remote_workers
+        from iibr_core.exports.batch.workers import WorkerSource
 
         return WorkerSource(partial(remote_workers, self.scheduler, TlsFiles(*tls) if tls else None), None)
 
@@ -90,11 +91,14 @@ def batch(
     worker_source = workers.source()
     source = photo.source("", grid, is_literal=literal)
     require_memory(photo.memory, keeps_views=to.is_drawn)
-    from iibr_core.exports.batch import FAILURES, BatchSettings, Ledger, photos_in, require_batch_place, run_batch
+    from iibr_core.exports.batch.archive import photos_in
+    from iibr_core.exports.batch.ledger import FAILURES, Ledger, require_batch_place
+    from iibr_core.exports.batch.run import run_batch
+    from iibr_core.exports.batch.task import BatchSettings
 
     require_model(source.depth)
     if gloss is not None:
-        from iibr_core.scenes import read_environment
+        from iibr_core.scenes.scene_gloss import read_environment
 
         read_environment(gloss.gloss)
     name = next(name for name, kind in EXPORTS.items() if kind is to)

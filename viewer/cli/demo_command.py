@@ -5,15 +5,15 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from iibr_core.formats import make_folder, require_files_in
-from iibr_core.scenes import inputs_of
+from iibr_core.formats.outputs import make_folder, require_files_in
+from iibr_core.scenes.inputs import inputs_of
 from iibr_core.types import InputError
 from viewer.cli.shared_options import SCREEN_SIZE
 from viewer.cli.terminal import show_progress
 from viewer.model.demo_photo import demo_photo
 
 if TYPE_CHECKING:
-    from iibr_core.scenes import Source
+    from iibr_core.scenes.scene import Source
 
 DEMO_FOLDER = Path("out")
 
@@ -23,7 +23,7 @@ def demo() -> None:
 
     Example: iibr demo
     """
-    from iibr_core.scenes import Source
+    from iibr_core.scenes.scene import Source
     from viewer.app.main_loop import App, initial_state
     from viewer.app.preferences_store import user_folder
     from viewer.model.actions import OpenPath

@@ -12,8 +12,8 @@ from viewer.cli.terminal import MAKING, print_notes, show_progress
 from viewer.cli.view_writing import write_views
 
 if TYPE_CHECKING:
-    from iibr_core.formats import WriterFactory
-    from iibr_core.scenes import Source
+    from iibr_core.formats.light_fields.light_field_formats import WriterFactory
+    from iibr_core.scenes.scene import Source
 
 NOT_FOR_DENSE_FIELDS = NOT_FOR_LIGHT_FIELDS - {"grid", "inpaint"} | {"disparity", "disparity_scale", "literal", "gloss"}
 """Options that say nothing about views between those of a light field."""
@@ -23,9 +23,9 @@ def write_dense_field(
     source: Source, grid: GridShape, out: Path, new_writer: WriterFactory, with_disparity: bool
 ) -> None:
     """To a place that the writer admits. Raises InputError, also where the views find no places on the grid."""
-    from iibr_core.formats import open_light_field
-    from iibr_core.generation import budget_of
-    from iibr_core.scenes import read_dense
+    from iibr_core.formats.light_fields.light_field_formats import open_light_field
+    from iibr_core.generation.memory_model import budget_of
+    from iibr_core.scenes.dense import read_dense
 
     field = open_light_field(Path(source.path))
     with show_progress("reading") as show:

@@ -46,9 +46,13 @@ def depth(
     source = options.source(path, grid=None)
     require_heeded(context, path)
     require_memory(memory, keeps_views=True)
-    from iibr_core.formats import find_light_field, is_file, open_light_field, require_file_place, write_map
-    from iibr_core.generation import budget_of
-    from iibr_core.scenes import find_disparity, load_photo
+    from iibr_core.formats.files import is_file
+    from iibr_core.formats.light_fields.light_field_formats import find_light_field, open_light_field
+    from iibr_core.formats.maps.writer import write_map
+    from iibr_core.formats.outputs import require_file_place
+    from iibr_core.generation.memory_model import budget_of
+    from iibr_core.scenes.light_fields import find_disparity
+    from iibr_core.scenes.loaded_photo import load_photo
 
     require_file_place(out, inputs_of_command(context, source), force)
     require_model(source.depth)

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Annotated, Any, get_args
 
 import typer
 
-from iibr_core.depth import DepthChoice
-from iibr_core.formats import is_file
-from iibr_core.runtime import require_extra
+from iibr_core.depth.choice import DepthChoice
+from iibr_core.formats.files import is_file
+from iibr_core.runtime.extras import require_extra
 from iibr_core.stages import STAGE_NAMES, stages_without
 from iibr_core.types import InputError, Quality, ReportProgress
 from viewer.cli.option_records import with_option_records
@@ -29,7 +29,8 @@ from viewer.cli.shared_options import (
 from viewer.cli.terminal import print_notes, show_progress
 
 if TYPE_CHECKING:
-    from iibr_core.evaluation import DisparityFrom, Options
+    from iibr_core.evaluation.evaluate_scene import Options
+    from iibr_core.evaluation.trials import DisparityFrom
     from iibr_core.stages import Stages
 
 
@@ -83,8 +84,8 @@ class _Judging:
 
     def options(self, stages: Stages) -> Options:
         """The same as a record of the core. Raises InputError for a model or a map that is not there."""
-        from iibr_core.evaluation import QUALITIES, Options
-        from iibr_core.formats import DEFAULT_MAX_PIXELS
+        from iibr_core.evaluation.evaluate_scene import QUALITIES, Options
+        from iibr_core.formats.images.photo import DEFAULT_MAX_PIXELS
 
         chosen: tuple[Quality, ...] = tuple(dict.fromkeys(self.quality)) if self.quality else QUALITIES
         choice = DepthChoice(model=self.depth_model, refine=self.refine)
@@ -120,12 +121,14 @@ def evaluate(
     require_extra("evaluate", "scipy", "skimage", "jinja2", "flip_evaluator")
     if judging.lpips is not None:
         require_extra("train", "torch")
-    from iibr_core.evaluation import require_report_folder
+    from iibr_core.evaluation.report_folder import require_report_folder
 
     require_report_folder(out, inputs_of_command(context) + judging.inputs(), force)
 
-    from iibr_core.evaluation import evaluate as evaluate_scene
-    from iibr_core.evaluation import find_scenes, summary_line, write_report
+    from iibr_core.evaluation.datasets import find_scenes
+    from iibr_core.evaluation.evaluate_scene import evaluate as evaluate_scene
+    from iibr_core.evaluation.evaluation_report import write_report
+    from iibr_core.evaluation.tables import summary_line
 
     options = judging.options(stages)
     scenes = [scene for folder in datasets for scene in find_scenes(folder)]
@@ -156,7 +159,7 @@ def _stages_without(names: list[str]) -> Stages:
 
 def _disparity_source(text: str) -> DisparityFrom | Path:
     """Where disparity comes from. Raises InputError for what is neither a word nor a file."""
-    from iibr_core.evaluation import DisparityFrom
+    from iibr_core.evaluation.trials import DisparityFrom
 
     words: tuple[DisparityFrom, ...] = get_args(DisparityFrom)
     for word in words:

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from iibr_core.exports import export_path, require_ending, require_export_place, writer_of
+from iibr_core.exports.kinds import require_ending
+from iibr_core.exports.writers import export_path, require_export_place, writer_of
 from viewer.cli.export_options import KindOptions, To, require_kind
 from viewer.cli.lens_options import LensOptions
 from viewer.cli.option_records import with_option_records
@@ -30,8 +31,11 @@ from viewer.cli.shared_options import (
 from viewer.cli.terminal import print_depth, print_notes, show_progress, untimed
 
 if TYPE_CHECKING:
-    from iibr_core.exports import ExportKind, ExportOptions, ExportSource, OpenDrawn
-    from iibr_core.scenes import Scene, Source
+    from iibr_core.exports.export_opening import OpenDrawn
+    from iibr_core.exports.kinds import ExportKind
+    from iibr_core.exports.options import ExportOptions
+    from iibr_core.exports.source import ExportSource
+    from iibr_core.scenes.scene import Scene, Source
 
 
 @with_option_records
@@ -75,7 +79,7 @@ def export(
     require_ending(to, output)
     inputs = inputs_of_command(context, source)
     if keys is not None:
-        from iibr_core.exports import read_keys
+        from iibr_core.exports.animation import read_keys
 
         read_keys(keys)
     if not to.path:
@@ -107,7 +111,7 @@ def _carry_out(
     options: ExportOptions,
 ) -> tuple[ExportSource, str | None]:
     """Open the scene and write it; a graphics card is needed for what is drawn alone. target: known by `on_ready`."""
-    from iibr_core.exports import open_for_export
+    from iibr_core.exports.export_opening import open_for_export
 
     open_drawn: OpenDrawn | None = None
     with ExitStack() as held:

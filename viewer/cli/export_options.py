@@ -9,20 +9,12 @@ from typing import Annotated
 
 import typer
 
-from iibr_core.exports import (
-    ANIMATIONS,
-    EXPORTS,
-    MOST_FRAMES,
-    RATE_LIMITS,
-    USUAL_SECONDS,
-    AnimationKind,
-    ExportKind,
-    ExportOptions,
-    export_kind,
-)
-from iibr_core.formats import DEVICES
-from iibr_core.runtime import require_extra
-from iibr_core.scenes import ScreenSize
+from iibr_core.exports.kinds import EXPORTS, ExportKind, export_kind
+from iibr_core.exports.options import ANIMATIONS, AnimationKind, ExportOptions
+from iibr_core.exports.settings import MOST_FRAMES, RATE_LIMITS, USUAL_SECONDS
+from iibr_core.formats.quilts import DEVICES
+from iibr_core.runtime.extras import require_extra
+from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import InputError
 from viewer.cli.lens_options import LensOptions
 from viewer.cli.shared_options import given_options, not_negative_from_text, size_from_text

@@ -11,14 +11,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 import typer
 
-from iibr_core.formats import UnfinishedFolder, require_folder_place, require_own_folder
+from iibr_core.formats.outputs import UnfinishedFolder, require_folder_place, require_own_folder
 from iibr_core.types import Camera, FloatImage, InputError
 from viewer.cli.shared_options import given_options, require_model
 from viewer.cli.terminal import print_depth, print_notes, show_progress, untimed
 from viewer.model.free_camera import Poses
 
 if TYPE_CHECKING:
-    from iibr_core.scenes import LoadedPhoto, Source
+    from iibr_core.scenes.loaded_photo import LoadedPhoto
+    from iibr_core.scenes.scene import Source
 
 OWN_FILES = r"view_\d{4,5}\.(png|exr)"
 NOT_WITH_POSES = {"format": "--format", "depth_strength": "--depth-strength", "with_disparity": "--with-disparity",
@@ -46,7 +47,7 @@ def poses_of(path: Path, photo_pose: int | None) -> Poses:
 
     Raises InputError.
     """
-    from iibr_core.formats import central_camera, read_poses
+    from iibr_core.formats.poses import central_camera, read_poses
 
     cameras = read_poses(path)
     if photo_pose is not None and photo_pose > len(cameras):
@@ -69,10 +70,10 @@ def write_free_views(source: Source, poses: Path, photo_pose: int | None, is_lit
     require_model(source.depth)
     known = poses_of(poses, photo_pose)
     with show_progress("reading") as show:
-        from iibr_core.scenes import load_photo
+        from iibr_core.scenes.loaded_photo import load_photo
 
         loaded = load_photo(source, report_progress=untimed(show), keeps_views=False)
-    from iibr_core.generation import fitted_cameras
+    from iibr_core.generation.free_views import fitted_cameras
 
     given = known.given
     pictures = fitted_cameras(known.cameras, given, loaded.photo.size)
@@ -95,11 +96,13 @@ def _written(
     all have been taken.
     """
     from iibr_core.color import photo_in_srgb
-    from iibr_core.formats import write_image
-    from iibr_core.generation import FreeViews, budget_of, depths_of, encode_for_storage, reach_of, require_free_views
-    from iibr_core.inpainting import load_inpainter
-    from iibr_core.runtime import never
-    from iibr_core.scenes import inpainting_aids
+    from iibr_core.formats.images.photo import write_image
+    from iibr_core.generation.free_views import FreeViews, depths_of, reach_of
+    from iibr_core.generation.memory_model import budget_of, require_free_views
+    from iibr_core.generation.stored_views import encode_for_storage
+    from iibr_core.inpainting.registry import load_inpainter
+    from iibr_core.runtime.tiling import never
+    from iibr_core.scenes.making import inpainting_aids
 
     photo, inverse_depth = photo_in_srgb(loaded.photo), _inverse_depth(loaded, is_literal, cameras[given])
     canvas = reach_of(cameras[given], cameras, depths_of(inverse_depth)).margins.around(photo.size)
@@ -121,7 +124,7 @@ def _written(
 
 def _inverse_depth(loaded: LoadedPhoto, is_literal: bool, camera: Camera) -> FloatImage:
     """1 / depth (H, W) of the photo in the unit of the poses. Raises InputError where disparity does not say it."""
-    from iibr_core.generation import inverse_depth_of
+    from iibr_core.generation.free_views import inverse_depth_of
 
     values = loaded.disparity.values
     if not is_literal:

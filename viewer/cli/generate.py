@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from iibr_core.formats import is_light_field, writer_for
-from iibr_core.rendering.gloss import Gloss
+from iibr_core.formats.light_fields.light_field_formats import is_light_field, writer_for
+from iibr_core.rendering.gloss.gloss_settings import Gloss
 from iibr_core.types import GridShape, InputError
 from viewer.cli.dense_field_command import NOT_FOR_DENSE_FIELDS, write_dense_field
 from viewer.cli.free_views_command import (
@@ -37,8 +37,8 @@ from viewer.cli.terminal import MAKING, print_depth, print_notes, show_progress,
 from viewer.cli.view_writing import write_views
 
 if TYPE_CHECKING:
-    from iibr_core.formats import WriterFactory
-    from iibr_core.scenes import Source
+    from iibr_core.formats.light_fields.light_field_formats import WriterFactory
+    from iibr_core.scenes.scene import Source
 
 
 @with_option_records
@@ -128,7 +128,10 @@ def _write_light_field(
 ) -> None:
     require_model(source.depth)
 
-    from iibr_core.scenes import add_gloss, load_photo, make_plan, scene_of_photo, views_of_photo
+    from iibr_core.scenes.loaded_photo import load_photo
+    from iibr_core.scenes.making import make_plan, views_of_photo
+    from iibr_core.scenes.opening import scene_of_photo
+    from iibr_core.scenes.scene_gloss import add_gloss
 
     with show_progress("reading") as show:
         tell = untimed(show)

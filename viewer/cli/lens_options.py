@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from iibr_core.rendering.gloss import Gloss
+from iibr_core.rendering.gloss.gloss_settings import Gloss
 from iibr_core.types import InputError, ViewOffset
 from viewer.cli.shared_options import not_negative_from_text, number_option, view_from_text
 
 if TYPE_CHECKING:
-    from iibr_core.rendering import Optics
-    from iibr_core.scenes import LensChoice, Scene
+    from iibr_core.rendering.optics import Optics
+    from iibr_core.scenes.lens_limits import LensChoice
+    from iibr_core.scenes.scene import Scene
     from viewer.model.actions import Action
 
 View = Annotated[
@@ -81,7 +82,7 @@ class LensOptions:
     @property
     def choice(self) -> LensChoice:
         """For what knows no window."""
-        from iibr_core.scenes import LensChoice
+        from iibr_core.scenes.lens_limits import LensChoice
 
         return LensChoice(self.view, self.focus, self.aperture, self.gloss.gloss if self.gloss else None)
 
@@ -98,7 +99,7 @@ class LensOptions:
         """Raise InputError for a viewpoint that this scene does not reach, rather than show the nearest that it does.
         Where there is a single view, it is what every viewpoint shows.
         """
-        from iibr_core.scenes import eye_limits
+        from iibr_core.scenes.lens_limits import eye_limits
 
         if self.view is None or scene.grid == (1, 1):
             return

@@ -7,8 +7,8 @@ from typing import Annotated, Any
 
 import typer
 
-from iibr_core.formats import CLAIMS
-from iibr_core.runtime import limit_arenas
+from iibr_core.formats.unfinished import CLAIMS
+from iibr_core.runtime.allocator import limit_arenas
 from iibr_core.types import InputError
 from viewer.cli.batch import batch
 from viewer.cli.demo_command import demo

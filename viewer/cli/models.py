@@ -25,7 +25,9 @@ def list_models(context: typer.Context) -> None:
     """
     if context.invoked_subcommand is not None:
         return
-    from iibr_core.depth.estimators import KNOWN_MODELS, list_own_models, state_of, words_about
+    from iibr_core.depth.estimators.catalog import KNOWN_MODELS, state_of
+    from iibr_core.depth.estimators.own_models import list_own_models
+    from iibr_core.depth.estimators.words import words_about
 
     own = list_own_models()
     names = max(map(len, [*(model.name for model in KNOWN_MODELS), *own]))
@@ -49,7 +51,8 @@ def get(
 
     Example: iibr models get depth-anything-v2-small
     """
-    from iibr_core.depth.estimators import KNOWN_MODELS, fetch, known_model, model_here, state_of, words_about
+    from iibr_core.depth.estimators.catalog import KNOWN_MODELS, fetch, known_model, model_here, state_of
+    from iibr_core.depth.estimators.words import words_about
 
     is_published = any(model.name == name for model in KNOWN_MODELS)
     if not is_published and (Path(name).suffix.lower() == ".onnx" or Path(name).exists()):
@@ -75,7 +78,7 @@ def get(
 
 
 def _copy(path: Path) -> None:
-    from iibr_core.depth.estimators import register
+    from iibr_core.depth.estimators.catalog import register
 
     model = register(path)
     print(f"{model.folder} ({model.weight_bytes / 1e6:,.0f} MB)")

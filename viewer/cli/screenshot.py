@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from iibr_core.depth.editing import UNEDITED, DepthEdits
-from iibr_core.formats import AS_USUAL, BEST_QUALITY, KINDS, PROFILES, PictureFormat, is_float
-from iibr_core.scenes import ScreenSize
+from iibr_core.depth.editing.edits import UNEDITED, DepthEdits
+from iibr_core.formats.images.picture_kinds import AS_USUAL, BEST_QUALITY, KINDS, PROFILES, PictureFormat, is_float
+from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import ColorSpace, InputError
 from viewer.cli.lens_options import NO_LENS_OPTIONS, LensOptions
 from viewer.cli.option_records import with_option_records
@@ -35,8 +35,8 @@ from viewer.cli.shared_options import (
 from viewer.cli.terminal import print_depth, print_notes, show_progress, untimed
 
 if TYPE_CHECKING:
-    from iibr_core.depth import DepthOrigin
-    from iibr_core.scenes import Source
+    from iibr_core.depth.choice import DepthOrigin
+    from iibr_core.scenes.scene import Source
     from viewer.app.headless import HeadlessViewer
     from viewer.model.actions import Action
 
@@ -178,7 +178,7 @@ def _shot_like(shot: _Shot, like: Path, given: Collection[str], ui: bool) -> _Sh
 
 def _size_of(shot: _Shot, viewer: HeadlessViewer) -> ScreenSize | None:
     """Of the picture. Raises InputError where all of the photo's pixels are asked for and cannot be drawn."""
-    from iibr_core.exports import require_full
+    from iibr_core.exports.full_picture import require_full
 
     if not shot.is_full:
         return shot.size
@@ -190,7 +190,7 @@ def _size_of(shot: _Shot, viewer: HeadlessViewer) -> ScreenSize | None:
 
 def _write(shot: _Shot, output: Path, ui: bool, backend: Backend) -> tuple[tuple[str, ...], DepthOrigin | None]:
     """Draw the picture and write it; returns what is to be said of the scene, and where its depth came from."""
-    from iibr_core.formats import MADE_SMALLER
+    from iibr_core.formats.images.photo import MADE_SMALLER
     from viewer.app.headless import HeadlessViewer
     from viewer.app.image_export import export_image, export_picture, shot_of
 

@@ -9,14 +9,15 @@ from typing import TYPE_CHECKING, Annotated, Any, get_args
 
 import typer
 
-from iibr_core.depth import DepthChoice, DepthStart
-from iibr_core.formats import WRITERS, status_of
-from iibr_core.inpainting import INPAINTER_FORMS, require_inpainter
-from iibr_core.scenes import ScreenSize
+from iibr_core.depth.choice import DepthChoice, DepthStart
+from iibr_core.formats.files import status_of
+from iibr_core.formats.light_fields.light_field_formats import WRITERS
+from iibr_core.inpainting.registry import INPAINTER_FORMS, require_inpainter
+from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, ImageSize, InputError, Quality, ViewOffset
 
 if TYPE_CHECKING:
-    from iibr_core.scenes import Source
+    from iibr_core.scenes.scene import Source
 
 MAX_GRID = 99
 MOST = 2**62
@@ -103,14 +104,14 @@ def given_options(context: typer.Context) -> set[str]:
 
 def require_memory(memory_bytes: int | None, keeps_views: bool) -> None:
     """Raise InputError before anything heavy is loaded where that is more than what may be taken."""
-    from iibr_core.generation import budget_of, require_process
+    from iibr_core.generation.memory_model import budget_of, require_process
 
     require_process(budget_of(memory_bytes), keeps_views)
 
 
 def require_picture_memory(size: ScreenSize | None, memory_bytes: int | None, is_float: bool) -> None:
     """Raise InputError where a picture of that size, None for the usual one, takes more than may be taken."""
-    from iibr_core.generation import budget_of, require_picture
+    from iibr_core.generation.memory_model import budget_of, require_picture
 
     if size is not None:
         require_picture(budget_of(memory_bytes), ImageSize(size.height, size.width), is_float)
@@ -126,7 +127,7 @@ def require_existing(source: Source) -> None:
 def require_model(choice: DepthChoice) -> None:
     """Raise InputError where a depth model is asked for that cannot be used."""
     if choice.asks_for_model:
-        from iibr_core.depth.estimators import model_to_use
+        from iibr_core.depth.estimators.catalog import model_to_use
 
         model_to_use(choice)
 
@@ -135,7 +136,7 @@ def inputs_of_command(context: typer.Context, source: Source | None = None) -> t
     """What a command reads, and nothing may be written onto: every path that it was given but the one that it writes
     to, what those files name (`reads` of an option's value says it), and what is read to open a source.
     """
-    from iibr_core.scenes import inputs_of
+    from iibr_core.scenes.inputs import inputs_of
 
     given = [value for name, value in context.params.items() if name not in OUTPUT_OPTIONS]
     named = [path for value in given for path in _paths_in(value)]

@@ -14,8 +14,9 @@ from typing import Any
 import typer
 from typer.core import TyperGroup
 
-from iibr_core.depth import DepthOrigin
-from iibr_core.runtime import TimeLeft, about_left, tell_compiling
+from iibr_core.depth.choice import DepthOrigin
+from iibr_core.runtime.compiling import tell_compiling
+from iibr_core.runtime.time_left import TimeLeft, about_left
 from iibr_core.types import ReportProgress
 
 MAKING = "making views"

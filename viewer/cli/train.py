@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from iibr_core.formats import is_file
-from iibr_core.runtime import require_extra
+from iibr_core.formats.files import is_file
+from iibr_core.runtime.extras import require_extra
 from viewer.cli.shared_options import Force
 from viewer.cli.terminal import show_progress
 
 if TYPE_CHECKING:
-    from iibr_core.training import Batch
+    from iibr_core.training.trainer import Batch
 
 ENTROPY_WEIGHT = 0.01
 """The paper's 1 for the entropy outweighs the colours where hypotheses share a pixel, and makes edges ragged."""
@@ -38,7 +38,7 @@ def train(
     Example: iibr train --steps 2500 --learning-rate 3e-3 -o weights.safetensors
     """
     require_extra("train", "torch")
-    from iibr_core.training import require_run_files
+    from iibr_core.training.run_files import require_run_files
 
     require_run_files(out, may_replace=force or resume)
     raise typer.Exit(train_weights(steps, out, seed, learning_rate, device, resume, checkpoint_every, force))
@@ -60,9 +60,12 @@ def train_weights(
     """
     import torch
 
-    from iibr_core.formats import shown_name
+    from iibr_core.formats.files import shown_name
     from iibr_core.ray_transformer.model import RayTransformer
-    from iibr_core.training import LossWeights, checkpoint_path, trainer, training_batch
+    from iibr_core.training import trainer
+    from iibr_core.training.batches import training_batch
+    from iibr_core.training.losses import LossWeights
+    from iibr_core.training.run_files import checkpoint_path
 
     config = trainer.TrainConfig(
         steps,

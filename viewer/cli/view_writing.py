@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from iibr_core.types import GridShape, ImageSize, ViewUpdate
 
 if TYPE_CHECKING:
-    from iibr_core.formats import LightFieldWriter
+    from iibr_core.formats.light_fields.light_field_formats import LightFieldWriter
 
 
 def write_views(

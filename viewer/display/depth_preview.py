@@ -9,14 +9,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from iibr_core.depth.editing import DepthEdits
-from iibr_core.scenes import LoadedPhoto, Scene, still_disparity
+from iibr_core.depth.editing.edits import DepthEdits
+from iibr_core.scenes.loaded_photo import LoadedPhoto
+from iibr_core.scenes.making import still_disparity
+from iibr_core.scenes.scene import Scene
 from viewer.display.scene_view import SceneView
 from viewer.model.reducers.depth_editing_reducer import current_depth_settings
 from viewer.model.state.app_state import AppState
 
 if TYPE_CHECKING:
-    from iibr_core.depth.editing import DepthCanvas
+    from iibr_core.depth.editing.canvas import DepthCanvas
 
 MOST_STROKES = 8
 """That the drawing thread paints for one frame."""
@@ -53,7 +55,7 @@ class DepthPreview:
 
     def _is_quick(self, edits: DepthEdits, loaded: LoadedPhoto) -> bool:
         """Whether a frame may wait for them; else they are seen when the worker has painted them."""
-        from iibr_core.depth.editing import DepthCanvas
+        from iibr_core.depth.editing.canvas import DepthCanvas
 
         self._canvas = self._canvas or DepthCanvas(loaded.photo.pixels, loaded.refined.values)
         if self._canvas.strokes_ahead(edits) > MOST_STROKES and self._resumed is not loaded:

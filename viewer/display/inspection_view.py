@@ -12,8 +12,10 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.exports import RenderSettings
-from iibr_core.scenes import WHOLE, Rect, Scene, ScreenSize
+from iibr_core.exports.render_settings import RenderSettings
+from iibr_core.scenes.rect import WHOLE, Rect
+from iibr_core.scenes.scene import Scene
+from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import DEFAULT_QUALITY, ViewUpdate
 from viewer.background.comparison_worker import ComparisonInputs, ComparisonResult, EntropyReady, PairReady, PairScored
 from viewer.background.job_threads import Failed

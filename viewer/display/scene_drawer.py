@@ -10,12 +10,17 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from iibr_core.exports import ExportSource, OpticsOf, RenderSettings, require_size
-from iibr_core.generation import ALL_VIEWS, WantedViews
-from iibr_core.rendering import CENTRE
-from iibr_core.rendering.gloss import Gloss
-from iibr_core.runtime import never
-from iibr_core.scenes import LensChoice, Scene, SceneReady, SceneRequest, Source, ViewReady, answer, results_of
+from iibr_core.exports.export_opening import OpticsOf
+from iibr_core.exports.render_settings import RenderSettings, require_size
+from iibr_core.exports.source import ExportSource
+from iibr_core.generation.outer_views import ALL_VIEWS, WantedViews
+from iibr_core.rendering.gloss.gloss_settings import Gloss
+from iibr_core.rendering.optics import CENTRE
+from iibr_core.runtime.tiling import never
+from iibr_core.scenes.lens_limits import LensChoice
+from iibr_core.scenes.opening import SceneReady, SceneRequest, ViewReady, results_of
+from iibr_core.scenes.scene import Scene, Source
+from iibr_core.scenes.scene_gloss import answer
 from iibr_core.types import ReportProgress, ignore_progress
 from viewer.display.scene_view import SceneView
 from viewer.gpu.headless_context import create_headless

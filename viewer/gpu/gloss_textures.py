@@ -8,12 +8,12 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.rendering.gloss import Gloss
+from iibr_core.rendering.gloss.gloss_settings import Gloss
 from viewer.gpu.programs import Program
 from viewer.gpu.shared import Holders
 
 if TYPE_CHECKING:
-    from iibr_core.rendering.gloss import GlossMaps
+    from iibr_core.rendering.gloss.shading import GlossMaps
 
 FIRST_UNIT = 8
 """Units below belong to the passes."""

@@ -11,8 +11,9 @@ from typing import Any
 import moderngl
 
 from iibr_core.color import primaries_matrix
-from iibr_core.runtime import FlatSource, ShaderError, flatten, resource_folder
-from iibr_core.scenes import WHOLE
+from iibr_core.runtime.resources import resource_folder
+from iibr_core.runtime.shader_sources import FlatSource, ShaderError, flatten
+from iibr_core.scenes.rect import WHOLE
 from iibr_core.types import ColorSpace
 
 _UNIFORM = re.compile(r"^\s*uniform\s+\w+\s+([^;]+);", re.MULTILINE)

@@ -11,7 +11,7 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.scenes import ScreenSize
+from iibr_core.scenes.screen_size import ScreenSize
 
 
 class RenderTarget:

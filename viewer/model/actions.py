@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from iibr_core.depth.editing import DepthEdits
-from iibr_core.scenes import Progress, Scene, Source
+from iibr_core.depth.editing.edits import DepthEdits
+from iibr_core.scenes.scene import Progress, Scene, Source
 from viewer.model.free_camera import FreeCameraAction
 from viewer.model.state.app_state import DrawReport, Hover
 from viewer.model.state.depth_editing import DepthAction

@@ -10,9 +10,9 @@ from dataclasses import dataclass, replace
 from pathlib import PurePath
 from typing import Literal
 
-from iibr_core.depth.editing import BRUSH_TOOLS, BrushTool
-from iibr_core.exports import LOOPS, LoopKind
-from iibr_core.scenes import Source, source_beside, source_with_map
+from iibr_core.depth.editing.edits import BRUSH_TOOLS, BrushTool
+from iibr_core.exports.loops import LOOPS, LoopKind
+from iibr_core.scenes.scene import Source, source_beside, source_with_map
 from viewer.model.actions import (
     Action,
     AskToSave,

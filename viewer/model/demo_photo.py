@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from iibr_core.runtime import resource_folder
+from iibr_core.runtime.resources import resource_folder
 
 
 def demo_photo() -> Path:

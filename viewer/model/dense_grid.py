@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import replace
 
-from iibr_core.scenes import Scene, Source, is_same_field
+from iibr_core.scenes.scene import Scene, Source, is_same_field
 from iibr_core.types import GridShape
 from viewer.model.state.jobs import STOPPING, JobProgress
 

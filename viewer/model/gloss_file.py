@@ -11,8 +11,8 @@ from pathlib import Path
 
 import msgspec
 
-from iibr_core.formats import read_text
-from iibr_core.rendering.gloss import Gloss, require_sound
+from iibr_core.formats.files import read_text
+from iibr_core.rendering.gloss.gloss_settings import Gloss, require_sound
 from iibr_core.types import InputError
 from viewer.model.saved_settings import unknown_fields
 
@@ -41,7 +41,7 @@ def require_environment(path: Path, gloss: Gloss) -> None:
     """Raise InputError, naming the file that a gloss was read from too, where the environment is no picture."""
     if not gloss.environment:
         return
-    from iibr_core.formats import read_photo_header
+    from iibr_core.formats.images.header import read_photo_header
 
     try:
         read_photo_header(Path(gloss.environment))

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from iibr_core.scenes import Rect, Scene
+from iibr_core.scenes.rect import Rect
+from iibr_core.scenes.scene import Scene
 from iibr_core.types import GridShape, ViewOffset
 from viewer.model.layout import Beside
 from viewer.model.state.app_state import AppState

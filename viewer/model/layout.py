@@ -8,7 +8,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
-from iibr_core.scenes import WHOLE, Rect, ScreenSize
+from iibr_core.scenes.rect import WHOLE, Rect
+from iibr_core.scenes.screen_size import ScreenSize
 from viewer.model.zoom import MOST_ZOOM, Zoom
 
 BACKGROUND = 0.07, 0.07, 0.08, 1.0

@@ -16,11 +16,14 @@ from typing import Annotated, Any, Literal
 
 import msgspec
 
-from iibr_core.depth.editing import UNEDITED, DepthEdits, require_sound
-from iibr_core.formats import file_within, printable, settings_text_in
-from iibr_core.rendering import ApertureShape, Optics
-from iibr_core.rendering.gloss import require_sound as require_sound_gloss
-from iibr_core.scenes import BLADES_LIMITS, ScreenSize, Source
+from iibr_core.depth.editing.edits import UNEDITED, DepthEdits, require_sound
+from iibr_core.formats.files import file_within, printable
+from iibr_core.formats.images.settings_text import settings_text_in
+from iibr_core.rendering.gloss.gloss_settings import require_sound as require_sound_gloss
+from iibr_core.rendering.optics import ApertureShape, Optics
+from iibr_core.scenes.lens_limits import BLADES_LIMITS
+from iibr_core.scenes.scene import Source
+from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, InputError, Quality
 from viewer.model.painting_work import require_bounded
 from viewer.model.state.saving import SavedSettings

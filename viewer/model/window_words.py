@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 
-from iibr_core.depth import BETTER_WAYS
+from iibr_core.depth.choice import BETTER_WAYS
 from viewer.model.state.notices import Notice
 
 DEPTH_COMMANDS = ("Depth models…", "Open a depth map…")

@@ -9,8 +9,9 @@ from collections.abc import Callable
 from imgui_bundle import icons_fontawesome_6 as icons
 from imgui_bundle import imgui
 
-from iibr_core.runtime import about_left
-from iibr_core.scenes import Progress, Scene, Source, aperture_limit, source_beside
+from iibr_core.runtime.time_left import about_left
+from iibr_core.scenes.lens_limits import aperture_limit
+from iibr_core.scenes.scene import Progress, Scene, Source, source_beside
 from iibr_core.types import DEFAULT_QUALITY
 from viewer.model.actions import Action, OpenPath, ResumeWork, StopWork
 from viewer.model.commands import BY_NAME

@@ -8,7 +8,7 @@ from pathlib import Path
 import imgui_bundle
 from imgui_bundle import imgui
 
-from iibr_core.scenes import Rect
+from iibr_core.scenes.rect import Rect
 from viewer.model.layout import BACKGROUND
 from viewer.model.state.preferences import Theme
 

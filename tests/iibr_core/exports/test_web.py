@@ -14,13 +14,17 @@ import pytest
 from PIL import Image
 
 from iibr_core.depth.choice import DepthChoice
-from iibr_core.exports import EXPORTS, ExportOptions, open_for_export, resolve_settings
+from iibr_core.exports.export_opening import open_for_export
+from iibr_core.exports.kinds import EXPORTS
+from iibr_core.exports.options import ExportOptions
+from iibr_core.exports.settings import resolve_settings
 from iibr_core.exports.web import make_page
 from iibr_core.exports.web_gallery import write_gallery
 from iibr_core.exports.web_views import MOST_TEXELS, WebForm, form_that_fits
 from iibr_core.formats.images.caption import read_caption
 from iibr_core.formats.images.icc_profile import icc_profile
-from iibr_core.scenes import LensChoice, Source
+from iibr_core.scenes.lens_limits import LensChoice
+from iibr_core.scenes.scene import Source
 from iibr_core.types import DISPLAY_P3, GridShape, ImageSize, InputError
 from tests.viewer.conftest import write_scene
 

@@ -17,7 +17,7 @@ import numpy as np
 import psutil
 import pytest
 
-from iibr_core.depth import BETTER_WAYS
+from iibr_core.depth.choice import BETTER_WAYS
 from iibr_core.formats.images.photo import write_image
 
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import moderngl
 
-from iibr_core.scenes import ScreenSize
+from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import SRGB, ColorSpace
 from viewer.gpu.light_field_texture import LightFieldTexture
 from viewer.gpu.programs import ProgramCache

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.scenes import ScreenSize
+from iibr_core.scenes.screen_size import ScreenSize
 from viewer.gpu.refocus.view_sampling import MAX_SOURCES
 
 

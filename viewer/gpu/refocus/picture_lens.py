@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from iibr_core.rendering import Optics, aperture_points, open_area
-from iibr_core.scenes import WHOLE, Rect
+from iibr_core.rendering.aperture_sampling import aperture_points, open_area
+from iibr_core.rendering.optics import Optics
+from iibr_core.scenes.rect import WHOLE, Rect
 from iibr_core.types import SRGB, ColorSpace, ViewOffset
 from viewer.gpu.light_field_texture import LightFieldTexture
 from viewer.gpu.refocus.frame_budget import BEST_QUALITY, QualityLevel

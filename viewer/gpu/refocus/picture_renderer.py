@@ -14,9 +14,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.exports import LensTile, RenderSettings
-from iibr_core.rendering import Optics
-from iibr_core.scenes import WHOLE, Rect, ScreenSize
+from iibr_core.exports.render_settings import LensTile, RenderSettings
+from iibr_core.rendering.optics import Optics
+from iibr_core.scenes.rect import WHOLE, Rect
+from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import SRGB, ColorSpace, FloatImage, GridShape, StoredColors, ViewUpdate
 from viewer.gpu.context import GLContext
 from viewer.gpu.light_field_texture import Box, LightFieldTexture, field_that_fits
@@ -38,7 +39,7 @@ from viewer.gpu.refocus.screen_image import ScreenImage
 from viewer.model.state.app_state import DrawReport
 
 if TYPE_CHECKING:
-    from iibr_core.rendering.gloss import GlossMaps
+    from iibr_core.rendering.gloss.shading import GlossMaps
 
 PREPARED_SIZE = ScreenSize(48, 48)
 """Size of what is drawn to compile programs; not a power of two, for which software GL compiles them again."""

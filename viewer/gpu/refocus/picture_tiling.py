@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from iibr_core.scenes import Rect, ScreenSize
+from iibr_core.scenes.rect import Rect
+from iibr_core.scenes.screen_size import ScreenSize
 
 PART_PX = 2048
 """Side of a part, at most, in pixels: its targets take 20 bytes a pixel."""

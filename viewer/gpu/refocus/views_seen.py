@@ -7,9 +7,9 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from iibr_core.generation import WantedViews
-from iibr_core.rendering import Optics
-from iibr_core.scenes import clamp_to_grid
+from iibr_core.generation.outer_views import WantedViews
+from iibr_core.rendering.optics import Optics
+from iibr_core.scenes.lens_limits import clamp_to_grid
 from iibr_core.types import GridShape, ViewOffset
 
 

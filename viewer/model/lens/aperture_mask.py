@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.rendering import ApertureMask
+from iibr_core.rendering.optics import ApertureMask
 from iibr_core.types import InputError
 
 LARGEST_SIDE = 64
@@ -22,7 +22,7 @@ def read_mask(path: Path) -> ApertureMask:
 
     Raises InputError, naming the file, if it is no picture, far too large, or black all over.
     """
-    from iibr_core.formats import read_raster, read_size
+    from iibr_core.formats.images.oiio_reader import read_raster, read_size
 
     height, width = read_size(path)
     if height * width > MOST_FILE_PIXELS:

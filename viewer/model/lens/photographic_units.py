@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import math
 
-from iibr_core.scenes import Scene, focus_limits
+from iibr_core.scenes.lens_limits import focus_limits
+from iibr_core.scenes.scene import Scene
 
 ASSUMED_DISTANCE_M = 2.0
 """Of the plane that stays still; f-numbers are those of a lens on full frame focused there."""

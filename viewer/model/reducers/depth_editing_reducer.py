@@ -5,8 +5,17 @@ from __future__ import annotations
 from dataclasses import replace
 from math import hypot, isfinite
 
-from iibr_core.depth.editing import DEPTH_TOOLS, GAMMA_LIMITS, MOST_POINTS, RADIUS_LIMITS, UNEDITED, DepthEdits, Stroke
-from iibr_core.scenes import DepthSettings, clamp
+from iibr_core.depth.editing.edits import (
+    DEPTH_TOOLS,
+    GAMMA_LIMITS,
+    MOST_POINTS,
+    RADIUS_LIMITS,
+    UNEDITED,
+    DepthEdits,
+    Stroke,
+)
+from iibr_core.scenes.lens_limits import clamp
+from iibr_core.scenes.scene import DepthSettings
 from viewer.model.reducers.history_reducer import record_edit
 from viewer.model.reducers.notices_reducer import add_notice
 from viewer.model.state.app_state import AppState

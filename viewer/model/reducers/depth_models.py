@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from iibr_core.scenes import Scene, source_with_depth
+from iibr_core.scenes.scene import Scene, source_with_depth
 from viewer.model.state.app_state import AppState
 from viewer.model.state.model_download import (
     DepthEstimated,

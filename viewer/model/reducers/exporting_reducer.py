@@ -5,8 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path, PurePath
 
-from iibr_core.exports import EXPORTS, ExportKind, ExportOptions, Purpose, export_path
-from iibr_core.scenes import Scene
+from iibr_core.exports.kinds import EXPORTS, ExportKind, Purpose
+from iibr_core.exports.options import ExportOptions
+from iibr_core.exports.writers import export_path
+from iibr_core.scenes.scene import Scene
 from iibr_core.types import InputError
 from viewer.model.state.app_state import AppState
 from viewer.model.state.exporting import ExportPrompt

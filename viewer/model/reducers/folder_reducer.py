@@ -6,8 +6,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import PurePath
 
-from iibr_core.exports import FolderPhoto, in_order
-from iibr_core.scenes import Source, source_beside
+from iibr_core.exports.photo_folder import FolderPhoto, in_order
+from iibr_core.scenes.scene import Source, source_beside
 from viewer.model.state.app_state import AppState
 from viewer.model.state.folder import PhotoFolder
 

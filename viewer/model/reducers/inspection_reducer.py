@@ -6,7 +6,8 @@ import math
 from dataclasses import replace
 from typing import Any
 
-from iibr_core.scenes import Scene, clamp
+from iibr_core.scenes.lens_limits import clamp
+from iibr_core.scenes.scene import Scene
 from viewer.model.reducers.notices_reducer import add_notice
 from viewer.model.state.app_state import AppState, Hover
 from viewer.model.state.inspection import (

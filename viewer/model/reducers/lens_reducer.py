@@ -7,11 +7,9 @@ from itertools import pairwise
 from math import hypot
 from typing import Any
 
-from iibr_core.rendering import Optics
-from iibr_core.rendering.gloss import MOST_POINTS, Gloss, GlossStroke
-from iibr_core.scenes import (
-    Scene,
-    Source,
+from iibr_core.rendering.gloss.gloss_settings import MOST_POINTS, Gloss, GlossStroke
+from iibr_core.rendering.optics import Optics
+from iibr_core.scenes.lens_limits import (
     aperture_limit,
     clamp,
     clamp_eye,
@@ -20,6 +18,7 @@ from iibr_core.scenes import (
     has_sound_gloss,
     is_finite,
 )
+from iibr_core.scenes.scene import Scene, Source
 from iibr_core.types import ViewOffset
 from viewer.model.actions import SamePlaces
 from viewer.model.lens.focal_plane import focus_on, sharp_disparity, tilt_through

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from iibr_core.scenes import clamp, clamp_optics
+from iibr_core.scenes.lens_limits import clamp, clamp_optics
 from viewer.model.reducers.camera_motion import advance_motion, start_motion
 from viewer.model.reducers.history_reducer import record_edit
 from viewer.model.reducers.lens_reducer import take_back_opening

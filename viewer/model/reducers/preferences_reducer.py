@@ -6,7 +6,7 @@ import math
 from dataclasses import replace
 from typing import Any
 
-from iibr_core.scenes import clamp
+from iibr_core.scenes.lens_limits import clamp
 from viewer.model.state.preferences import (
     PlaceWindow,
     Preferences,

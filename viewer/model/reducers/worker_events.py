@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import PurePath
 
-from iibr_core.depth.editing import UNEDITED
-from iibr_core.rendering import Optics
-from iibr_core.scenes import DepthSettings, Progress, Scene, clamp_optics, first_aperture, focus_limits
+from iibr_core.depth.editing.edits import UNEDITED
+from iibr_core.rendering.optics import Optics
+from iibr_core.scenes.lens_limits import clamp_optics, first_aperture, focus_limits
+from iibr_core.scenes.scene import DepthSettings, Progress, Scene
 from iibr_core.types import InputError
 from viewer.model.actions import OpenFailed, ProgressMade, SamePlaces, SceneOpened, WorkerEvent
 from viewer.model.reducers.folder_reducer import is_stepped_to

@@ -7,9 +7,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
-from iibr_core.depth.editing import UNEDITED, DepthEdits, Stroke
-from iibr_core.rendering import Optics
-from iibr_core.scenes import AS_FOUND, WHOLE, DepthSettings, FilledField, Progress, Rect, Scene, ScreenSize, Source
+from iibr_core.depth.editing.edits import UNEDITED, DepthEdits, Stroke
+from iibr_core.rendering.optics import Optics
+from iibr_core.scenes.rect import WHOLE, Rect
+from iibr_core.scenes.scene import AS_FOUND, DepthSettings, FilledField, Progress, Scene, Source
+from iibr_core.scenes.screen_size import ScreenSize
 from viewer.model.free_camera import FreeCamera, Poses
 from viewer.model.state.depth_editing import Brush
 from viewer.model.state.folder import PhotoFolder

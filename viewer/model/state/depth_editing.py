@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from iibr_core.depth.editing import BrushTool, DepthEdits
+from iibr_core.depth.editing.edits import BrushTool, DepthEdits
 
 
 @dataclass(frozen=True)

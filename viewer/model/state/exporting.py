@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from iibr_core.exports import USUAL_OPTIONS, ExportOptions
+from iibr_core.exports.options import USUAL_OPTIONS, ExportOptions
 
 
 @dataclass(frozen=True)

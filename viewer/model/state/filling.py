@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from iibr_core.scenes import FilledField, Source
+from iibr_core.scenes.scene import FilledField, Source
 
 
 @dataclass(frozen=True)

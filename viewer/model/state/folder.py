@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from iibr_core.exports import FolderOrder, FolderPhoto
+from iibr_core.exports.photo_folder import FolderOrder, FolderPhoto
 
 
 @dataclass(frozen=True)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from iibr_core.rendering import Optics
-from iibr_core.scenes import AS_FOUND, DepthSettings
+from iibr_core.rendering.optics import Optics
+from iibr_core.scenes.scene import AS_FOUND, DepthSettings
 
 
 @dataclass(frozen=True)

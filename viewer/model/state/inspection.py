@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from iibr_core.rendering import Optics
+from iibr_core.rendering.optics import Optics
 from iibr_core.types import GridShape
 
 OverlayKind = Literal["disparity", "entropy", "inpainted"]

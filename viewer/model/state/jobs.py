@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from iibr_core.scenes import Source
+from iibr_core.scenes.scene import Source
 
 JobKind = Literal["picture", "map", "copy", "export", "fill"]
 

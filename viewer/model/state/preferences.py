@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from iibr_core.exports import FolderOrder
+from iibr_core.exports.photo_folder import FolderOrder
 
 Theme = Literal["dark", "light"]
 Units = Literal["photographic", "light field"]

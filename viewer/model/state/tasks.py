@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from iibr_core.formats import AS_USUAL as USUAL_FORM
-from iibr_core.formats import PictureFormat
-from iibr_core.scenes import ScreenSize
+from iibr_core.formats.images.picture_kinds import AS_USUAL as USUAL_FORM
+from iibr_core.formats.images.picture_kinds import PictureFormat
+from iibr_core.scenes.screen_size import ScreenSize
 from viewer.model.state.exporting import ExportPrompt, ExportTask
 from viewer.model.state.filling import FillTask
 from viewer.model.state.folder import ListFolderTask

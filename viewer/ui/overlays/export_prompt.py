@@ -11,22 +11,12 @@ from pathlib import Path
 
 from imgui_bundle import imgui
 
-from iibr_core.exports import (
-    ANIMATIONS,
-    EXPORTS,
-    MOST_FRAMES,
-    PURPOSES,
-    RATE_LIMITS,
-    AnimationKind,
-    ExportKind,
-    ExportOptions,
-    ExportSettings,
-    Purpose,
-    resolve_settings,
-    size_of_width,
-)
-from iibr_core.formats import DEVICES
-from iibr_core.scenes import Scene, clamp
+from iibr_core.exports.kinds import EXPORTS, PURPOSES, ExportKind, Purpose
+from iibr_core.exports.options import ANIMATIONS, AnimationKind, ExportOptions
+from iibr_core.exports.settings import MOST_FRAMES, RATE_LIMITS, ExportSettings, resolve_settings, size_of_width
+from iibr_core.formats.quilts import DEVICES
+from iibr_core.scenes.lens_limits import clamp
+from iibr_core.scenes.scene import Scene
 from iibr_core.types import InputError
 from viewer.model.actions import Action, AskToSave, DoTask, ShowPrompt
 from viewer.model.layout import Layout

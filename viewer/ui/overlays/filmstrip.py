@@ -7,7 +7,7 @@ from pathlib import PurePath
 
 from imgui_bundle import imgui
 
-from iibr_core.scenes import Rect
+from iibr_core.scenes.rect import Rect
 from viewer.model.actions import Action
 from viewer.model.layout import Layout
 from viewer.model.reducers.folder_reducer import filmstrip_range, place_of_photo

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from imgui_bundle import imgui
 
-from iibr_core.scenes import Rect, Scene
+from iibr_core.scenes.rect import Rect
+from iibr_core.scenes.scene import Scene
 from iibr_core.types import ViewOffset
 from viewer.model.colormap import VIRIDIS, map_color
 from viewer.model.inspection_request import (

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from imgui_bundle import imgui
 
-from iibr_core.runtime import about_left
+from iibr_core.runtime.time_left import about_left
 from viewer.model.actions import Action, DoTask
 from viewer.model.free_camera import LeaveCamera
 from viewer.model.layout import Layout

@@ -6,9 +6,11 @@ import math
 
 from imgui_bundle import imgui
 
-from iibr_core.depth.editing import DEPTH_TOOLS, BrushTool
-from iibr_core.rendering import Optics
-from iibr_core.scenes import Rect, Scene, aperture_limit
+from iibr_core.depth.editing.edits import DEPTH_TOOLS, BrushTool
+from iibr_core.rendering.optics import Optics
+from iibr_core.scenes.lens_limits import aperture_limit
+from iibr_core.scenes.rect import Rect
+from iibr_core.scenes.scene import Scene
 from viewer.model.layout import Layout
 from viewer.model.lens.focal_plane import handle_points, place_of, sharp_disparity
 from viewer.model.lens.photographic_units import far_percent, metres, metres_text, relative_distance

@@ -6,8 +6,9 @@ from dataclasses import replace
 
 from imgui_bundle import imgui
 
-from iibr_core.depth.editing import DepthEdits, Levels, invert_tone_curve, tone_curve
-from iibr_core.scenes import Rect, Scene
+from iibr_core.depth.editing.edits import DepthEdits, Levels, invert_tone_curve, tone_curve
+from iibr_core.scenes.rect import Rect
+from iibr_core.scenes.scene import Scene
 from viewer.model.actions import Action
 from viewer.model.colormap import map_color
 from viewer.model.layout import Layout

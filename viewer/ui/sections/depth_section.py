@@ -6,9 +6,9 @@ from dataclasses import replace
 
 from imgui_bundle import imgui
 
-from iibr_core.depth import DepthStart
-from iibr_core.depth.editing import BRUSH_TOOLS, DEPTH_TOOLS, GAMMA_LIMITS, RADIUS_LIMITS, BrushTool, DepthEdits
-from iibr_core.scenes import Scene, source_with_depth
+from iibr_core.depth.choice import DepthStart
+from iibr_core.depth.editing.edits import BRUSH_TOOLS, DEPTH_TOOLS, GAMMA_LIMITS, RADIUS_LIMITS, BrushTool, DepthEdits
+from iibr_core.scenes.scene import Scene, source_with_depth
 from viewer.model.actions import Action, AskToSave, DoTask, OpenPath, ShowPrompt
 from viewer.model.commands import BRUSH_WORDS
 from viewer.model.layout import Layout

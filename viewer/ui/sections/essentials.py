@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from imgui_bundle import imgui
 
-from iibr_core.exports import LOOPS, LoopKind
-from iibr_core.scenes import Scene, aperture_limit
+from iibr_core.exports.loops import LOOPS, LoopKind
+from iibr_core.scenes.lens_limits import aperture_limit
+from iibr_core.scenes.scene import Scene
 from viewer.model.actions import Action, SetDepthStrength
 from viewer.model.layout import Layout
 from viewer.model.lens.presets import PRESETS

@@ -8,7 +8,7 @@ from pathlib import PurePath
 
 from imgui_bundle import imgui
 
-from iibr_core.rendering.gloss import (
+from iibr_core.rendering.gloss.gloss_settings import (
     LIGHT_RADIUS_LIMITS_DEG,
     MOST_TOLERANCE,
     STROKE_RADIUS_LIMITS,
@@ -17,7 +17,7 @@ from iibr_core.rendering.gloss import (
     GlossSurface,
     Triple,
 )
-from iibr_core.scenes import Scene
+from iibr_core.scenes.scene import Scene
 from viewer.model.actions import Action, DoTask
 from viewer.model.layout import Layout
 from viewer.model.state.app_state import AppState

@@ -7,7 +7,7 @@ from typing import Literal
 
 from imgui_bundle import imgui
 
-from iibr_core.scenes import Scene
+from iibr_core.scenes.scene import Scene
 from viewer.model.actions import Action, DoTask
 from viewer.model.commands import OVERLAY_WORDS
 from viewer.model.inspection_request import grid_to_compare, view_label, view_to_compare

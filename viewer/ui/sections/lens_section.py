@@ -9,8 +9,15 @@ from typing import cast
 
 from imgui_bundle import imgui
 
-from iibr_core.rendering import APERTURE_KINDS, EXPOSURE_LIMIT_STOPS, RING_INNER_LIMIT, ApertureKind, ApertureShape
-from iibr_core.scenes import BLADES_LIMITS, Scene, aperture_limit, focus_limits, focus_span
+from iibr_core.rendering.optics import (
+    APERTURE_KINDS,
+    EXPOSURE_LIMIT_STOPS,
+    RING_INNER_LIMIT,
+    ApertureKind,
+    ApertureShape,
+)
+from iibr_core.scenes.lens_limits import BLADES_LIMITS, aperture_limit, focus_limits, focus_span
+from iibr_core.scenes.scene import Scene
 from viewer.model.actions import Action, DoTask, ShowTiltHandles
 from viewer.model.layout import Layout
 from viewer.model.lens.photographic_units import (

@@ -4,7 +4,7 @@ and why, and what reading it changed.
 
 from __future__ import annotations
 
-from iibr_core.scenes import Scene
+from iibr_core.scenes.scene import Scene
 from iibr_core.types import GridShape
 from viewer.model.actions import Action, DoTask
 from viewer.model.dense_grid import chosen_grid, denser_grids, with_views_between

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from imgui_bundle import imgui
 
-from iibr_core.exports import LOOPS
-from iibr_core.scenes import Scene, dolly_limit
+from iibr_core.exports.loops import LOOPS
+from iibr_core.scenes.lens_limits import dolly_limit
+from iibr_core.scenes.scene import Scene
 from viewer.model.actions import Action
 from viewer.model.layout import Layout
 from viewer.model.state.app_state import AppState

@@ -6,7 +6,9 @@ from dataclasses import dataclass
 
 from imgui_bundle import imgui
 
-from iibr_core.scenes import Rect, Scene, eye_limits
+from iibr_core.scenes.lens_limits import eye_limits
+from iibr_core.scenes.rect import Rect
+from iibr_core.scenes.scene import Scene
 from iibr_core.types import GridShape, ViewOffset
 from viewer.model.actions import Action
 from viewer.model.layout import Layout
