@@ -1,23 +1,22 @@
 # Two commands for people: `make run` opens the viewer on the demo photo, `make test` checks everything.
 # Both set up what they need, and no more: the environment in .venv, and system GL libraries where that is allowed.
 
-# Of several, as in `make wheel PYTHON="python3.11 python3.12"`, the first is that of the environment.
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 PIP := HATCH_BUILD_NO_HOOKS=true $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt
-COMPILE := $(BIN)/python -P -m viewer.precompile iibr_core/_kernels
 READY := $(VENV)/.ready
 READY_TESTS := $(VENV)/.ready-tests
+KERNELS := $(VENV)/.kernels
 
-.PHONY: run test bench figures fuzz site install wheel clean
+.PHONY: run test bench figures fuzz site install kernels wheel clean
 
 # What is installed is compiled to bytecode where it is imported: not all of it ever is.
 run: $(READY)
 	@.ci/system-libraries run
-	@$(COMPILE) $(BIN)/iibr demo
+	@$(BIN)/iibr demo
 
-test: install
+test: install kernels
 	@.ci/system-libraries test
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
@@ -52,21 +51,27 @@ site: $(READY)
 install: $(READY_TESTS)
 
 $(READY): pyproject.toml constraints.txt
-	@$(firstword $(PYTHON)) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
 		{ echo "iibr needs Python 3.11 or later; name one with: make PYTHON=python3.11 ..."; exit 1; }
-	$(firstword $(PYTHON)) -m venv $(VENV)
+	$(PYTHON) -m venv $(VENV)
 	$(PIP) --no-compile -e .
 	@touch $(READY)
 
 $(READY_TESTS): $(READY)
 	@.ci/cpu-torch $(BIN)/python
 	$(PIP) -e '.[dev]'
-	$(COMPILE)
 	@touch $(READY_TESTS)
 
-# One wheel with the kernels of each Python named.
-wheel:
-	.ci/wheel $(PYTHON)
+# Compiles all kernels of the present sources, in a minute or two; what is missing is compiled where it is first used.
+kernels: $(KERNELS)
+
+$(KERNELS): $(READY) $(shell find iibr_core viewer -name '*.py')
+	$(BIN)/python -P -m viewer.precompile iibr_core/_kernels
+	@touch $@
+
+# dist/iibr-*.whl, with its kernels compiled by the versions in constraints.txt.
+wheel: $(READY)
+	$(BIN)/python -m pip wheel --quiet --no-deps -c constraints.txt --wheel-dir dist .
 
 clean:
 	rm -rf $(VENV) out dist iibr_core/_kernels

@@ -1,7 +1,6 @@
-"""Has the kernels compiled while a wheel is built, for it to bring along (`viewer/precompile.py`).
+"""Compile the kernels while a wheel is built, for it to bring along (`viewer/precompile.py`).
 
-They are data, checked against sources, Python, Numba and processor where they are loaded: the wheel stays one for all.
-What lies there of other Pythons, made of the same sources, comes along too (`make wheel`).
+They are data, checked against sources, Python, Numba and processor where they are loaded: the wheel fits all machines.
 """
 
 from __future__ import annotations
@@ -16,13 +15,12 @@ KERNELS = "iibr_core/_kernels"
 
 
 class KernelsHook(BuildHookInterface[Any]):
-    """A wheel where they cannot be compiled goes without."""
+    """Add the kernels to a wheel; a wheel where they cannot be compiled goes without."""
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
-        """Before the wheel is packed. An editable installation is the checkout, where `make` compiles them."""
+        """Compile before the wheel is packed. An editable installation is the checkout, which compiles them itself."""
         if version == "editable":
             return
-        # From the sources' folder, not by PYTHONPATH: what isolates the build may take that off again.
         done = subprocess.run([sys.executable, "-m", "viewer.precompile", KERNELS], cwd=self.root, check=False)
         if done.returncode == 0:
             build_data["force_include"][KERNELS] = KERNELS

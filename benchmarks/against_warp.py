@@ -32,7 +32,7 @@ from iibr_core.generation.outer_views import farthest_views, outer_views
 from iibr_core.generation.plan import plan_literal
 from iibr_core.rendering.mixed_pixels import split_mixed_pixels
 from iibr_core.rendering.resampling import cubic
-from iibr_core.runtime.jit import kernel
+from iibr_core.runtime.kernels import kernel
 from iibr_core.surfaces import EDGE_PX, step_of
 from iibr_core.types import FloatImage, Quality
 

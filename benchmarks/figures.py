@@ -25,7 +25,7 @@ from pathlib import Path
 from benchmarks.harness.pages import put_between
 from benchmarks.harness.readme import write_readme
 from benchmarks.harness.reports import DOCS, git, is_wanted, made_by, markdown, parser_of, start
-from iibr_core.formats.outputs import atomic_write
+from iibr_core.formats.outputs import write_file
 
 ROOT = DOCS.parent
 SHAPING = ("iibr_core", "viewer", "shaders", "web", "assets", "benchmarks")
@@ -165,7 +165,7 @@ def make(figure: Figure, data: Path | None) -> str:
             elif made.suffix == ".md":
                 write_page(place, figure, made.read_text("utf-8"))
             else:
-                with atomic_write(DOCS / place) as unfinished:
+                with write_file(DOCS / place) as unfinished:
                     shutil.copyfile(made, unfinished)
     return ""
 
@@ -178,7 +178,7 @@ def write_page(place: str, figure: Figure, text: str) -> None:
     text = stamped if count else f"{said}.\n\n{stamped}"
     if mark:
         text = put_between((DOCS / name).read_text("utf-8"), mark, text)
-    with atomic_write(DOCS / name) as unfinished:
+    with write_file(DOCS / name) as unfinished:
         unfinished.write_text(text.rstrip("\n") + "\n", "utf-8")
 
 

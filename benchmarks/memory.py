@@ -23,7 +23,7 @@ from benchmarks.harness.bench_scenes import MEGAPIXELS, write_photo
 from benchmarks.harness.reports import emit, head, parser_of, row, start
 from benchmarks.harness.timing import COMMAND_LINE, in_own_process, run
 from iibr_core.formats.maps.writer import write_map
-from iibr_core.runtime.allocator import give_back_memory, limit_arenas
+from iibr_core.runtime.machine import give_back_memory, limit_arenas
 from iibr_core.types import Disparity, GridShape, Photo
 
 MIB = 2**20

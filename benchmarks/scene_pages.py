@@ -15,7 +15,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from benchmarks.harness.reports import DOCS, made_by, parser_of, start
-from iibr_core.formats.outputs import atomic_write
+from iibr_core.formats.outputs import write_file
 from iibr_core.types import InputError
 
 THIN_LENS = DOCS.parent / "tests" / "data" / "thin_lens"
@@ -35,7 +35,7 @@ def main() -> None:
     options.out.mkdir(parents=True, exist_ok=True)
     said = made_by(["python", "-m", "benchmarks.scene_pages", *sys.argv[1:]])
     for name, text in pages_of(report, said):
-        with atomic_write(options.out / name) as unfinished:
+        with write_file(options.out / name) as unfinished:
             unfinished.write_text(text, "utf-8")
         print(f"{name}: {text.count(chr(10))} lines")
 

@@ -26,7 +26,7 @@ from benchmarks.harness.timing import in_own_process
 from benchmarks.harness.turn_times import Turn, Turns, watched_turns
 from iibr_core.exports.options import ExportOptions
 from iibr_core.rendering.gloss.gloss_settings import Gloss
-from iibr_core.runtime.allocator import limit_arenas
+from iibr_core.runtime.machine import limit_arenas
 from iibr_core.scenes.scene import Source
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, ViewOffset

@@ -6,7 +6,7 @@ judged once, in the outermost view: what is of one surface there is so everywher
 
 from __future__ import annotations
 
-from iibr_core.runtime.jit import kernel
+from iibr_core.runtime.kernels import kernel
 
 SAME_SURFACE_PX = 0.5
 """What parts by no more is of one surface: it lands as one, and look-ups meet it as one."""

@@ -1,24 +1,65 @@
-"""`iibr` in a fork of a process that has imported it: as in a process of its own, but for how Python starts."""
+"""`iibr` in a fork of a process that has imported it: as in a process of its own, but it starts at once."""
 
 from __future__ import annotations
 
+import multiprocessing
 import os
+import signal
 import subprocess
+import sys
 import tempfile
 from pathlib import Path
 
-from tests.hostile.forks import Command, run_in_fork
-
+PRELOADED = (
+    "viewer.cli.main",
+    "viewer.app.headless",
+    "iibr_core.depth.search",
+    "iibr_core.generation.light_field",
+    "iibr_core.evaluation.evaluate_scene",
+)
 DEADLINE_S = 120.0
 NO_WINDOWS = ("DISPLAY", "WAYLAND_DISPLAY")
 
 
-def run_forked(*words: object, cwd: Path, **environment: str) -> subprocess.CompletedProcess[str]:
-    """How it ended, without a display."""
+def run_forked(
+    *words: object, cwd: Path, most_bytes: int | None = None, **environment: str
+) -> subprocess.CompletedProcess[str]:
+    """Run `iibr` without a display. most_bytes: of a file that it writes, as on a full disk."""
     clean = {name: value for name, value in os.environ.items() if name not in NO_WINDOWS}
-    arguments = tuple(map(str, words))
+    arguments = [str(word) for word in words]
+    forks = multiprocessing.get_context("forkserver")
+    forks.set_forkserver_preload(list(PRELOADED))
     with tempfile.TemporaryDirectory() as folder:
-        told = Path(folder)
-        code = run_in_fork(Command(arguments, cwd, {**clean, **environment}, told), DEADLINE_S)
-        output, errors = ((told / name).read_text("utf-8") for name in ("output", "errors"))
-    return subprocess.CompletedProcess(["iibr", *arguments], code, output, errors)
+        process = forks.Process(
+            target=_become_iibr, args=(arguments, cwd, {**clean, **environment}, Path(folder), most_bytes), daemon=True
+        )
+        process.start()
+        process.join(DEADLINE_S)
+        if process.exitcode is None:
+            process.kill()
+            process.join()
+        output, errors = ((Path(folder) / name).read_text("utf-8") for name in ("output", "errors"))
+    return subprocess.CompletedProcess(["iibr", *arguments], process.exitcode or 0, output, errors)
+
+
+def _become_iibr(
+    arguments: list[str], cwd: Path, environment: dict[str, str], folder: Path, most_bytes: int | None
+) -> None:
+    for descriptor, name in ((1, folder / "output"), (2, folder / "errors")):
+        os.dup2(os.open(name, os.O_WRONLY | os.O_CREAT), descriptor)
+    os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
+    sys.stdin = os.fdopen(0, closefd=False)
+    sys.stdout, sys.stderr = (os.fdopen(descriptor, "w", encoding="utf-8", closefd=False) for descriptor in (1, 2))
+    os.environ.clear()
+    os.environ.update(environment)
+    os.chdir(cwd)
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    if most_bytes is not None:
+        import resource
+
+        sys.dont_write_bytecode = True  # modules that are cut off would be kept
+        resource.setrlimit(resource.RLIMIT_FSIZE, (most_bytes, most_bytes))
+    sys.argv = ["iibr", *arguments]
+    from viewer.entry import command
+
+    command()

@@ -1,170 +1,70 @@
-"""Compiles the kernels that opening a photo needs, for an installation to bring along: nobody waits for them then.
+"""Compile the kernels that opening a photo needs, for an installation to bring along.
 
-    python -P -m viewer.precompile iibr_core/_kernels [COMMAND ...]
+    python -P -m viewer.precompile iibr_core/_kernels
 
-As many processes as there are cores do the real work on small photos, from reading to the last view: only so are
-kernels compiled for just those arrays that they will meet. All keep them in that one folder, where each finds those of
-the others, and where what was left half done goes on. A command is run as soon as those of the first picture are
-there; the rest follows beside it.
-
-What training and evaluation need beside is compiled where it is used. Kernels that only ever become part of others are
-left out: where the others are compiled, nobody asks for them.
+It does the real work on small photos, from reading to the last view: only so are kernels compiled for just those arrays
+that they will meet. What training and evaluation need beside is compiled where it is used.
 """
 
 from __future__ import annotations
 
-import hashlib
 import os
-import re
-import subprocess
+import shutil
 import sys
 import tempfile
 from collections.abc import Callable
-from concurrent.futures import wait
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
-from functools import cache, partial
+from functools import partial
+from multiprocessing import get_context
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, get_args
+from typing import TYPE_CHECKING, get_args
 
-import psutil
-
-from iibr_core.runtime.compiling import COMPILING
+from iibr_core.runtime.compiling import COMPILING, FOLDER_VARIABLE
 from iibr_core.runtime.machine import core_count
-from iibr_core.runtime.tiling import Cancelled, ShouldStop, never
 from iibr_core.types import InputError, Quality
 
 if TYPE_CHECKING:
     from iibr_core.scenes.scene import Source
 
-ROOT = Path(__file__).resolve().parents[1]
 PART = (slice(150, 310), slice(200, 400))
 """Of the demo photo: so small that compiling is nearly all the work, with edges, wires and slopes of every kind."""
-MADE_OF = f"made_of.py{sys.version_info.major}{sys.version_info.minor}{getattr(sys, 'abiflags', '')}"
-"""Beside the kernels, written after all of them: of what. One for each Python, whose kernels lie side by side."""
-OWN_FILE = re.compile(r".*\.nb[ci]|made_of\.\w+")
-"""What it writes, and may remove."""
 GLOSSY_PIXELS = 250_000
 """So many that normals are smoothed, as those of large photos are."""
-LOOK_S = 0.5
-"""How often it is asked whether to stop."""
-LOWEST_PRIORITY: int = psutil.IDLE_PRIORITY_CLASS if sys.platform == "win32" else 19
+KERNEL_FILES = (".nbi", ".nbc")
 
 
 def main() -> None:
-    """Fill the folder named on the command line, and run the command that follows it."""
-    folder, *command = sys.argv[1:]
-    environment = dict(os.environ)
-    for name in [name for name in os.environ if name.startswith("NUMBA_")]:
-        del os.environ[name]
-    os.environ["NUMBA_DISABLE_INTEL_SVML"] = "1"  # a library that not every machine has
-    window: list[subprocess.Popen[bytes]] = []
-
-    def begin() -> None:
-        others = psutil.Process().children()
-        if command:
-            window.append(subprocess.Popen(command, env=environment))
-            for process in (psutil.Process(), *others):
-                process.nice(LOWEST_PRIORITY)
-
+    """Fill the folder named on the command line with compiled kernels. Raises SystemExit."""
     try:
-        write_kernels(Path(folder).absolute(), begin, lambda: bool(window) and window[0].poll() is not None)
+        write_kernels(Path(sys.argv[1]).absolute())
     except InputError as error:
-        print(error, file=sys.stderr)
-        begin()
-        if not window:
-            sys.exit(2)
-    except (Cancelled, KeyboardInterrupt):
-        pass
-    sys.exit(window[0].wait() if window else 0)
+        print(f"iibr: {error}", file=sys.stderr)
+        sys.exit(2)
 
 
-def write_kernels(folder: Path, begin: Callable[[], None] = lambda: None, should_stop: ShouldStop = never) -> None:
-    """Have all kernels in the folder, compiled for the kind of processor that `kernel_cache` chooses, and none that
-    nobody reads, or of other sources. begin: is called once those of the first picture are there.
+def write_kernels(folder: Path) -> None:
+    """Compile all kernels into a fresh folder, with as many processes as there are cores, and put it in the place of
+    `folder`.
 
-    Raises InputError where the folder holds anything else, or no process can be started, Cancelled once should_stop is
-    true after that.
+    Raises InputError where that holds files that are no kernels.
     """
-    _require_own_folder(folder)
-    mark, sources = folder / MADE_OF, digest_of_sources()
-    made_of = f"{sources}\n{_runtime()}\n"
-    if _text(mark) == made_of:
-        begin()
-        return
-    print(COMPILING, file=sys.stderr)
-    mark.unlink(missing_ok=True)
-    _take_steps(folder, begin, should_stop)
-    read = _take_steps(folder, lambda: None, should_stop)
-    marks = [path for path in folder.glob("made_of.*") if _text(path).startswith(sources)]
-    for path in folder.rglob("*.nb?"):
-        is_others = path in marks or any(f"{other.suffix}." in path.name for other in marks)
-        if path.is_file() and str(path) not in read and not is_others:
-            path.unlink()
-    mark.write_text(made_of)
-
-
-def _require_own_folder(folder: Path) -> None:
-    """Raise InputError where a folder holds files other than kernels: it is somebody's, and named by mistake."""
-    other = next((p for p in folder.rglob("*") if p.is_file() and not OWN_FILE.fullmatch(p.name)), None)
+    other = next((path for path in folder.rglob("*") if path.is_file() and path.suffix not in KERNEL_FILES), None)
     if other is not None:
         raise InputError(f"{folder}: holds other files ({other.name}); give an empty folder")
+    print(COMPILING, file=sys.stderr)
+    with tempfile.TemporaryDirectory(dir=folder.parent) as scratch:
+        fresh = Path(scratch) / "kernels"
+        os.environ[FOLDER_VARIABLE] = str(fresh)
+        with ProcessPoolExecutor(core_count(), get_context("spawn")) as processes:
+            list(processes.map(_take, STEPS))
+        shutil.rmtree(folder, ignore_errors=True)
+        fresh.rename(folder)
 
 
-def digest_of_sources(root: Path = ROOT) -> str:
-    """Of all that decides which kernels there are, and what becomes of them."""
-    digest = hashlib.sha256()
-    for path in sorted(path for room in ("iibr_core", "viewer") for path in (root / room).rglob("*.py")):
-        digest.update(f"{path.relative_to(root).as_posix()} {hashlib.sha256(path.read_bytes()).hexdigest()}\n".encode())
-    return digest.hexdigest()
-
-
-def _runtime() -> str:
-    from iibr_core.runtime.kernel_cache import numba
-
-    return f"{' '.join(sys.version.split())}; numba {numba.__version__}; {numba.core.config.CPU_NAME}"
-
-
-def _text(path: Path) -> str:
-    return path.read_text() if path.is_file() else ""
-
-
-def _take_steps(folder: Path, begin: Callable[[], None], should_stop: ShouldStop) -> set[str]:
-    """Each step in whichever process is free. Returns the files of kernels that were read or written."""
-    from iibr_core.exports.batch.processes import local_workers
-
-    with local_workers(core_count(), 1) as workers:
-        steps = [workers.executor.submit(_work_in, folder, step) for step in STEPS]
-        steps[0].result()
-        begin()
-        while not should_stop():
-            if not wait(steps, LOOK_S).not_done:
-                return set[str]().union(*(step.result() for step in steps))
-    raise Cancelled
-
-
-_used: set[str] = set()
-"""The files that this process has read, or put in their place."""
-
-
-def _note_use(event: str, arguments: tuple[Any, ...]) -> None:
-    if event in ("open", "os.rename"):
-        _used.add(str(arguments[event == "os.rename"]))
-
-
-@cache
-def _begin_to_fill(folder: Path) -> None:
-    from iibr_core.runtime.kernel_cache import fill
-
-    fill(folder)
-    sys.addaudithook(_note_use)
-
-
-def _work_in(folder: Path, step: Callable[[Path], None]) -> set[str]:
-    """Do what needs kernels, with those in the folder; add what has to be compiled."""
-    _begin_to_fill(folder)
+def _take(step: Callable[[Path], None]) -> None:
     with tempfile.TemporaryDirectory() as scratch:
         step(Path(scratch))
-    return _used
 
 
 def _photo(scratch: Path, is_mapped: bool = True, is_hdr: bool = False) -> Source:
@@ -316,7 +216,6 @@ STEPS: tuple[Callable[[Path], None], ...] = (
     _open_hdr,
     _draw_at_own_size,
 )
-"""The first picture first; steps that begin together compile little that is the same."""
 
 
 if __name__ == "__main__":

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from benchmarks.harness.pages import cell, put_between, table
 from benchmarks.harness.reports import markdown
-from iibr_core.formats.outputs import atomic_write
+from iibr_core.formats.outputs import write_file
 from iibr_core.types import InputError
 
 CENTRE = "centre to all others"
@@ -103,5 +103,5 @@ def write_readme(root: Path, only_check: bool = False) -> Iterator[str]:
         if only_check:
             yield f"{page}: table {mark} is not what its page says"
         else:
-            with atomic_write(path) as unfinished:
+            with write_file(path) as unfinished:
                 unfinished.write_text(made, "utf-8")

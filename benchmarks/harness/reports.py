@@ -12,7 +12,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-from iibr_core.formats.outputs import atomic_write
+from iibr_core.formats.outputs import write_file
 from iibr_core.generation.cost_model import CORES
 from iibr_core.types import InputError
 
@@ -66,7 +66,7 @@ def emit(lines: Iterable[str], out: Path | None = None) -> None:
         told.append(line)
         print(line, flush=True)
     if out is not None:
-        with atomic_write(out) as unfinished:
+        with write_file(out) as unfinished:
             unfinished.write_text("\n".join(told).rstrip("\n") + "\n", "utf-8")
 
 

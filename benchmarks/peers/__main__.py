@@ -25,7 +25,7 @@ from benchmarks.speed.variants import Variant, evaluated_views, field_cost
 from benchmarks.stages import judge_view
 from iibr_core.evaluation.metrics import flip, ssim
 from iibr_core.evaluation.reference_warp import reference_warp
-from iibr_core.formats.outputs import atomic_write
+from iibr_core.formats.outputs import write_file
 from iibr_core.types import FloatImage, ViewOffset
 from viewer.cli.terminal import show_progress
 
@@ -145,7 +145,7 @@ def report(found: Mapping[str, list[Result]]) -> Iterator[str]:
 
 
 def _write(path: Path, content: bytes) -> None:
-    with atomic_write(path) as unfinished:
+    with write_file(path) as unfinished:
         unfinished.write_bytes(content)
     print(os.fspath(path))
 

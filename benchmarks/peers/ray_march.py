@@ -11,7 +11,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from iibr_core.runtime.jit import kernel
+from iibr_core.runtime.kernels import kernel
 from iibr_core.types import FloatImage, ViewOffset
 
 COARSE_PX = 1.0

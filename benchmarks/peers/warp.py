@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 
 from iibr_core.evaluation.reference_warp import NOWHERE, SAME_SURFACE, SAMPLES, fill_holes
-from iibr_core.runtime.jit import kernel
+from iibr_core.runtime.kernels import kernel
 from iibr_core.types import FloatImage, ViewOffset, image_size
 
 

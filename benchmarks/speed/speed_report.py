@@ -12,7 +12,7 @@ from benchmarks.harness.plots import Panel, on_the_front, plot_panels
 from benchmarks.harness.reports import holds, markdown, title
 from benchmarks.harness.timing import Cost
 from iibr_core.evaluation.tables import number
-from iibr_core.formats.outputs import atomic_write
+from iibr_core.formats.outputs import write_file
 
 FRONT_MARK = "●"
 
@@ -102,7 +102,7 @@ def write_bench(folder: Path, bench: Bench) -> list[Path]:
     """
     made = {"speed.md": markdown_of(bench).encode(), "speed.svg": plot_panels(panels(bench), "svg")}
     for name, content in made.items():
-        with atomic_write(folder / name) as temporary:
+        with write_file(folder / name) as temporary:
             temporary.write_bytes(content)
     return [folder / name for name in made]
 

@@ -15,7 +15,7 @@ import OpenImageIO as oiio
 
 from iibr_core.depth.estimates import RelativeInverseDepth
 from iibr_core.runtime import tiling
-from iibr_core.runtime.jit import kernel
+from iibr_core.runtime.kernels import kernel
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never, raise_if_stopped
 from iibr_core.types import FloatImage, ImageSize, Photo, image_size
 

@@ -24,7 +24,7 @@ from iibr_core.evaluation.tables import (
     refocus_table,
     summary_table,
 )
-from iibr_core.formats.outputs import atomic_write, make_folder
+from iibr_core.formats.outputs import make_folder, write_file
 
 
 def write_report(folder: Path, results: Sequence[EvaluationResult], command: str) -> None:
@@ -35,7 +35,7 @@ def write_report(folder: Path, results: Sequence[EvaluationResult], command: str
     texts = (json_of(results, command), markdown_of(results, command), page_of(results, command))
     make_folder(folder)
     for name, text in zip(FILES, texts):
-        with atomic_write(folder / name) as temporary:
+        with write_file(folder / name) as temporary:
             temporary.write_text(text, encoding="utf-8", errors="backslashreplace")
 
 

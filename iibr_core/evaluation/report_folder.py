@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from pathlib import Path
 
-from iibr_core.formats.outputs import require_files_in
+from iibr_core.formats.outputs import check_output_folder
 
 FILES = ("report.json", "report.md", "index.html")
 
@@ -16,4 +16,4 @@ def require_report_folder(folder: Path, inputs: Iterable[Path] = (), may_replace
     inputs: files and folders that are read. AlreadyThereError where something lies in the folder that may not be
     replaced.
     """
-    require_files_in(folder, FILES, inputs, may_replace)
+    check_output_folder(folder, inputs, may_replace)

@@ -20,7 +20,7 @@ from iibr_core.formats.cameras import (
     write_llff,
     write_nerfstudio,
 )
-from iibr_core.formats.outputs import UnfinishedFolder
+from iibr_core.formats.outputs import write_folder
 from iibr_core.types import ImageSize, InputError, ViewOffset, ViewUpdate
 
 MOST_POINTS = 20_000
@@ -114,11 +114,10 @@ def _write(path: Path, source: ExportSource, write: Callable[[Path, FieldCameras
     from iibr_core.formats.images.photo import write_image
 
     cameras, zero = _straight_cameras(source)
-    unfinished = UnfinishedFolder(path)
     places: dict[str, ViewOffset] = {}
     centre: ViewUpdate | None = None
-    try:
-        images = unfinished.path / "images"
+    with write_folder(path) as unfinished:
+        images = unfinished / "images"
         images.mkdir()
         for view in source.views(zero):
             name = f"v{view.row:02d}_u{view.column:02d}.png"
@@ -126,9 +125,4 @@ def _write(path: Path, source: ExportSource, write: Callable[[Path, FieldCameras
             places[name] = cameras.grid.offset(view.row, view.column)
             centre = view if centre is None else centre
         assert centre is not None
-        write(unfinished.path, cameras, places, centre)
-        unfinished.put_in_place()
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written ({error.strerror or error}); choose another place") from error
-    finally:
-        unfinished.discard()
+        write(unfinished, cameras, places, centre)

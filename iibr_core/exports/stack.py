@@ -17,7 +17,7 @@ from iibr_core.exports.settings import ExportSettings
 from iibr_core.exports.source import ExportSource
 from iibr_core.formats.images.picture_kinds import is_float
 from iibr_core.formats.maps.pfm import write_pfm
-from iibr_core.formats.outputs import UnfinishedFolder
+from iibr_core.formats.outputs import write_folder
 from iibr_core.rendering.optics import Optics
 from iibr_core.scenes.lens_limits import aperture_limit
 from iibr_core.scenes.scene import Scene
@@ -107,17 +107,14 @@ def _write(
 def _write_folder(
     path: Path, source: ExportSource, size: ScreenSize, stack: Stack, disparity: FloatImage | None, ending: str
 ) -> None:
-    unfinished, space = UnfinishedFolder(path), saved_space(source)
-    try:
+    space = saved_space(source)
+    with write_folder(path) as unfinished:
         for name, optics in source.watched(stack, len(stack), "drawing"):
-            place = unfinished.path / f"{name}{ending}"
+            place = unfinished / f"{name}{ending}"
             pixels = draw_framed(source, RenderSettings(optics, size, is_linear=is_float(place), color_space=space))
             write_with_metadata(place, pixels, source, color_space=space)
         if disparity is not None:
-            write_pfm(unfinished.path / "disparity.pfm", disparity)
-        unfinished.put_in_place()
-    finally:
-        unfinished.discard()
+            write_pfm(unfinished / "disparity.pfm", disparity)
 
 
 def _write_parts(

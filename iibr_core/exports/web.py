@@ -16,7 +16,7 @@ from iibr_core.exports.settings import ExportSettings
 from iibr_core.exports.source import ExportSource
 from iibr_core.exports.web_views import NO_VIEWS, ViewStore, WebViews, form_that_fits, places_of, require_avif
 from iibr_core.formats.images.caption import Caption, read_caption
-from iibr_core.formats.outputs import atomic_write
+from iibr_core.formats.outputs import write_file
 from iibr_core.runtime.resources import resource_folder
 from iibr_core.runtime.shader_sources import flatten
 from iibr_core.scenes.lens_limits import aperture_limit, eye_limits, first_aperture, focus_limits
@@ -41,7 +41,7 @@ def write_page(path: Path, source: ExportSource, settings: ExportSettings) -> st
     too small for any page, Cancelled once the export should stop.
     """
     page, views = make_page(source, settings)
-    with atomic_write(path) as temporary:
+    with write_file(path) as temporary:
         temporary.write_bytes(page)
     height, width = views.size
     depth = "" if views.depths else ", without depth"

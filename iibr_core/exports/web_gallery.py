@@ -14,7 +14,7 @@ from urllib.parse import quote
 
 from iibr_core.exports.web import POLICY, hash_of
 from iibr_core.formats.files import is_file, read_text
-from iibr_core.formats.outputs import atomic_write
+from iibr_core.formats.outputs import write_file
 from iibr_core.runtime.resources import resource_folder
 from iibr_core.types import InputError
 
@@ -47,7 +47,7 @@ def write_gallery(folder: Path, outputs: Iterable[str]) -> Path:
         "entries": "\n".join(filter(None, (_entry(folder, page) for page in pages))),
     }
     text = Template((parts / "gallery.html").read_text("utf-8")).substitute(filled)
-    with atomic_write(path) as temporary:
+    with write_file(path) as temporary:
         temporary.write_bytes(text.encode("utf-8", "replace"))
     return path
 

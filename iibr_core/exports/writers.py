@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from iibr_core.exports.kinds import ExportKind, require_ending
 from iibr_core.exports.settings import resolve_settings
 from iibr_core.formats.light_fields.light_field_formats import writer_for
-from iibr_core.formats.outputs import require_file_place, require_folder_place, require_own_folder
+from iibr_core.formats.outputs import check_output, check_output_folder
 
 if TYPE_CHECKING:
     from iibr_core.exports.options import ExportOptions
@@ -34,10 +34,9 @@ def require_export_place(kind: ExportKind, path: Path, inputs: Sequence[Path], m
     if kind.layout:
         writer_for(kind.layout).require_place(path, inputs, may_replace)
     elif kind.endings:
-        require_file_place(path, inputs, may_replace)
+        check_output(path, inputs, may_replace)
     else:
-        require_own_folder(path, kind.own_files)
-        require_folder_place(path, inputs, may_replace, is_whole=True)
+        check_output_folder(path, inputs, may_replace, kind.own_files)
 
 
 def writer_of(kind: ExportKind) -> Callable[[Path, ExportSource, ExportOptions], str | None]:

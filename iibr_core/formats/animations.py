@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.formats.files import reason_of
-from iibr_core.formats.outputs import atomic_write
+from iibr_core.formats.outputs import write_file
 from iibr_core.types import ImageSize, InputError
 
 VIDEOS: dict[str, tuple[str, dict[str, str]]] = {
@@ -49,7 +49,7 @@ def write_animation(path: Path, frames: Iterable[NDArray[np.uint8]], size: Image
     if kind not in SUFFIXES:
         raise InputError(f"{path}: an animation can be written as {', '.join(SUFFIXES)}")
     require_video_size(path, size)
-    with atomic_write(path) as temporary:
+    with write_file(path) as temporary:
         if kind in VIDEOS:
             count = _write_video(path, temporary, frames, size, rate)
         elif kind == ".gif":

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.formats.outputs import atomic_write
+from iibr_core.formats.outputs import write_file
 from iibr_core.types import FloatImage
 
 SH_BASIS_0 = 0.28209479177387814
@@ -52,6 +52,6 @@ def write_ply(path: Path, columns: Mapping[str, NDArray[Any]]) -> None:
         table[name] = column
     lines = ["ply", "format binary_little_endian 1.0", f"element vertex {len(table)}"]
     lines += [f"property {PLY_TYPES[dtype.str[1:]]} {name}" for name, dtype in fields]
-    with atomic_write(path) as temporary, temporary.open("wb") as file:
+    with write_file(path) as temporary, temporary.open("wb") as file:
         file.write("\n".join([*lines, "end_header", ""]).encode("ascii"))
         file.write(table.tobytes())

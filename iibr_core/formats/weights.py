@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from safetensors import SafetensorError, safe_open
 
 from iibr_core.formats.files import reason_of, require_file
-from iibr_core.formats.outputs import atomic_write
+from iibr_core.formats.outputs import write_file
 from iibr_core.types import InputError
 
 if TYPE_CHECKING:
@@ -63,7 +63,7 @@ def write_tensors(path: Path, content: str, tensors: Mapping[str, Tensor], metad
     # Cloned, because safetensors refuses tensors that share memory, as tied layers do.
     copies = {name: tensor.detach().cpu().clone().contiguous() for name, tensor in tensors.items()}
     data = save(copies, {**metadata, "content": content, "version": VERSION})
-    with atomic_write(path) as temporary:
+    with write_file(path) as temporary:
         temporary.write_bytes(data)
 
 

@@ -14,10 +14,7 @@ import numpy as np
 
 from iibr_core.generation.outer_views import outer_views_of_grid
 from iibr_core.runtime.machine import (
-    MAPPED_BYTES,
-    MOST_USUAL_SHARE,
     memory_bytes,
-    own_limit_bytes,
     usual_budget_bytes,
 )
 from iibr_core.runtime.tiling import MOST_BAND_PIXELS, THREADS
@@ -150,12 +147,7 @@ def budget_of(wanted_bytes: int | None) -> Budget:
 def require_process(budget: Budget, keeps_views: bool) -> None:
     """Raise InputError where not even the smallest photo fits."""
     needed = process_bytes(keeps_views) + LEAST_PIXELS * READING_BYTES
-    allowed = own_limit_bytes()
     what = "showing the smallest photo" if keeps_views else "writing the views of the smallest photo"
-    if MOST_USUAL_SHARE * allowed < needed:
-        least, limit = needed / MOST_USUAL_SHARE + MAPPED_BYTES, allowed + MAPPED_BYTES
-        said = f"{what} takes an address space of {mebibytes(least)}, it is limited to {mebibytes(limit)}"
-        raise InputError(f"{said} (ulimit -v, or -d): raise that limit")
     budget.require(needed, what, "raise --memory, or take a machine that has as much")
 
 

@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from iibr_core.inpainting.inpainter import Inpainter
 from iibr_core.inpainting.nearest_known import MOST_PIECE_PIXELS, nearest_known
 from iibr_core.inpainting.patch_synthesis import copy_patches
-from iibr_core.runtime.jit import kernel, nearest_pixel
+from iibr_core.runtime.kernels import kernel
+from iibr_core.runtime.scalars import nearest_pixel
 from iibr_core.runtime.tiling import ShouldStop, in_pieces, never, pieces_of
 from iibr_core.stages import ALL_STAGES, Stages
 from iibr_core.surfaces import EDGE_PX, SAME_SURFACE_PX, is_in_front, same_surface, step_of

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from iibr_core.inpainting.background import fill_background
 from iibr_core.inpainting.inpainter import Inpainter, InpaintingAids
-from iibr_core.runtime.extras import require_extra, said_by
+from iibr_core.runtime.extras import require_extra
 from iibr_core.runtime.tiling import Cancelled, ShouldStop, never, raise_if_stopped
 from iibr_core.types import FloatImage, ImageSize, InputError, ViewOffset, image_size
 
@@ -84,7 +84,7 @@ class DiffusionInpainter:
         except Cancelled:
             raise
         except Exception as error:  # pipelines raise whatever their parts do
-            raise InputError(f"{self._folder}: failed to paint ({said_by(error)})") from error
+            raise InputError(f"{self._folder}: failed to paint ({str(error)[:160]})") from error
         finally:
             for hook in hooks:
                 hook.remove()
@@ -163,7 +163,7 @@ def _load_pipeline(folder: str) -> Any:
     except (torch.OutOfMemoryError, MemoryError) as error:
         raise InputError(f"{folder}: out of memory; give a smaller model") from error
     except Exception as error:  # diffusers, torch, safetensors raise what they like for folders of something else
-        raise InputError(f"{folder}: cannot be loaded as an inpainting pipeline ({said_by(error)})") from error
+        raise InputError(f"{folder}: cannot be loaded as an inpainting pipeline ({str(error)[:160]})") from error
 
 
 def _resized(image: Any, size: ImageSize) -> Any:

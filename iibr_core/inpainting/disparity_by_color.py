@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from iibr_core.inpainting.disparity_holes import fill_disparity_holes
 from iibr_core.runtime import tiling
-from iibr_core.runtime.jit import kernel
+from iibr_core.runtime.kernels import kernel
 from iibr_core.runtime.tiling import ShouldStop, in_pieces, never, pieces_of
 from iibr_core.types import FloatImage
 

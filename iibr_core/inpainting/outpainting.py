@@ -12,7 +12,8 @@ from math import hypot, log2, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.runtime.jit import kernel, nearest_pixel
+from iibr_core.runtime.kernels import kernel
+from iibr_core.runtime.scalars import nearest_pixel
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never
 from iibr_core.stages import ALL_STAGES, Stages
 from iibr_core.types import FloatImage, ImageSize, Margins, image_size

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.runtime.jit import kernel
+from iibr_core.runtime.kernels import kernel
 from iibr_core.runtime.tiling import ShouldStop, in_pieces, pieces_of
 from iibr_core.surfaces import same_surface
 from iibr_core.types import FloatImage, ImageSize, image_size

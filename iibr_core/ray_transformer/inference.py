@@ -11,7 +11,7 @@ import numpy as np
 
 from iibr_core.formats.weights import read_weights, require_shapes
 from iibr_core.rendering.hypotheses import FEATURES, SHARE, AmbiguousRays
-from iibr_core.runtime.jit import kernel
+from iibr_core.runtime.kernels import kernel
 from iibr_core.types import FloatImage
 
 WIDTH = 16

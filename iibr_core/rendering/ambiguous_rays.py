@@ -19,7 +19,7 @@ from iibr_core.rendering.candidates import Candidates
 from iibr_core.rendering.ray_cells import CELL_PX
 from iibr_core.rendering.ray_set import RayArrays, RaySet
 from iibr_core.rendering.resampling import ShownRays
-from iibr_core.runtime.jit import kernel
+from iibr_core.runtime.kernels import kernel
 from iibr_core.surfaces import SAME_SURFACE_PX
 from iibr_core.types import FloatImage, ViewOffset
 

@@ -18,7 +18,8 @@ from iibr_core.rendering.coherent_cells import backward_warp, cells_in, find_coh
 from iibr_core.rendering.ray_cells import CELL_PX
 from iibr_core.rendering.ray_set import RaySet
 from iibr_core.rendering.slope_connectivity import BELOW, RIGHT
-from iibr_core.runtime.jit import kernel, nearest_pixel
+from iibr_core.runtime.kernels import kernel
+from iibr_core.runtime.scalars import nearest_pixel
 from iibr_core.surfaces import SAME_SURFACE_PX, same_surface
 from iibr_core.types import FloatImage, ViewOffset
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from iibr_core.rendering.ray_cells import CELL_PX, Cells
 from iibr_core.rendering.ray_set import RaySet
-from iibr_core.runtime.jit import kernel
+from iibr_core.runtime.kernels import kernel
 from iibr_core.surfaces import EDGE_PX, SAME_SURFACE_PX
 from iibr_core.types import FloatImage, ViewOffset
 

@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 
 from iibr_core.rendering.ray_set import HIGHEST_LEVEL, RaySet
 from iibr_core.rendering.rendered_view import RenderedView
-from iibr_core.runtime.jit import kernel, nearest_pixel
+from iibr_core.runtime.kernels import kernel
+from iibr_core.runtime.scalars import nearest_pixel
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never
 from iibr_core.surfaces import SAME_SURFACE_PX
 from iibr_core.types import FloatImage, ViewOffset, image_size

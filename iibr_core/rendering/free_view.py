@@ -18,7 +18,8 @@ from iibr_core.rendering.landed_squares import SAMPLES, draw_rays, project, rows
 from iibr_core.rendering.ray_set import HIGHEST_LEVEL, RaySet
 from iibr_core.rendering.rendered_view import RenderedView
 from iibr_core.rendering.resampling import SOLE, cubic, resample, resample_inpainted
-from iibr_core.runtime.jit import kernel, linear_scalar, srgb_scalar
+from iibr_core.runtime.kernels import kernel
+from iibr_core.runtime.scalars import linear_scalar, srgb_scalar
 from iibr_core.runtime.tiling import MOST_BAND_PIXELS, ShouldStop, in_bands, never
 from iibr_core.surfaces import SAME_SURFACE_PX, same_surface, step_of
 from iibr_core.types import Camera, ImageSize, Margins

@@ -16,7 +16,8 @@ from iibr_core.rendering.ambiguous_rays import HYPOTHESES, NOWHERE_PX, PLAIN_SOU
 from iibr_core.rendering.candidates import Candidates
 from iibr_core.rendering.ray_set import RaySet
 from iibr_core.rendering.resampling import ShownRays, cubic, resample, resample_inpainted
-from iibr_core.runtime.jit import kernel, linear_scalar, nearest_pixel, srgb_scalar
+from iibr_core.runtime.kernels import kernel
+from iibr_core.runtime.scalars import linear_scalar, nearest_pixel, srgb_scalar
 from iibr_core.types import FloatImage, ViewOffset
 
 AGREES, TO_NEAREST, TO_FARTHEST, SHARE, LANDS, INPAINTED, PARALLAX, COVERAGE, UNCOVERED, PLAIN, PROFILE = range(11)

@@ -14,7 +14,7 @@ from iibr_core.rendering.candidates import SEALED_GAP_PX
 from iibr_core.rendering.ray_cells import CELL_PX
 from iibr_core.rendering.ray_set import RaySet
 from iibr_core.rendering.slope_connectivity import BELOW, RIGHT
-from iibr_core.runtime.jit import kernel
+from iibr_core.runtime.kernels import kernel
 from iibr_core.runtime.tiling import ShouldStop, in_bands
 from iibr_core.surfaces import same_surface
 from iibr_core.types import FloatImage, ImageSize

@@ -19,7 +19,7 @@ from iibr_core.rendering.photo_rays import rays_of_photo
 from iibr_core.rendering.ray_set import RaySet
 from iibr_core.rendering.rendered_view import RenderedView
 from iibr_core.rendering.renderer import Renderer
-from iibr_core.runtime.jit import kernel
+from iibr_core.runtime.kernels import kernel
 from iibr_core.runtime.tiling import ShouldStop, never
 from iibr_core.surfaces import SAME_SURFACE_PX, same_surface
 from iibr_core.types import FloatImage, ImageSize, ViewOffset, image_size

@@ -13,7 +13,8 @@ import numpy as np
 
 from iibr_core.rendering.optics import Optics
 from iibr_core.rendering.resampling import KEYS_A, keys_weights
-from iibr_core.runtime.jit import kernel, linear_scalar
+from iibr_core.runtime.kernels import kernel
+from iibr_core.runtime.scalars import linear_scalar
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never
 from iibr_core.types import FloatImage, ImageSize, ViewOffset
 

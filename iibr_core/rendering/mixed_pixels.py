@@ -12,7 +12,8 @@ from __future__ import annotations
 import numpy as np
 
 from iibr_core.inpainting.disparity_by_color import nearness
-from iibr_core.runtime.jit import kernel, linear_scalar, srgb_scalar
+from iibr_core.runtime.kernels import kernel
+from iibr_core.runtime.scalars import linear_scalar, srgb_scalar
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never
 from iibr_core.surfaces import SLOPE_SHARE, is_in_front, same_surface
 from iibr_core.types import FloatImage, image_size

@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from iibr_core.rendering.ray_cells import CELL_PX, Cells, largest_steps, over_cells, sum_up
 from iibr_core.rendering.rendered_view import RaysBehind
 from iibr_core.rendering.slope_connectivity import BELOW, RIGHT, connect_rays, connected_either_way
-from iibr_core.runtime.jit import kernel, nearest_pixel
+from iibr_core.runtime.kernels import kernel
+from iibr_core.runtime.scalars import nearest_pixel
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never
 from iibr_core.stages import ALL_STAGES, Stages
 from iibr_core.surfaces import EDGE_PX, SMOOTH_SHARE, is_in_front, step_of

@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 from iibr_core.rendering.candidates import Candidates
 from iibr_core.rendering.ray_set import RaySet
-from iibr_core.runtime.jit import kernel, linear_scalar, srgb_scalar
+from iibr_core.runtime.kernels import kernel
+from iibr_core.runtime.scalars import linear_scalar, srgb_scalar
 from iibr_core.surfaces import SAME_SURFACE_PX
 from iibr_core.types import FloatImage
 

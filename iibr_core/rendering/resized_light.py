@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from iibr_core.runtime.jit import kernel
+from iibr_core.runtime.kernels import kernel
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never
 from iibr_core.types import FloatImage, ImageSize, image_size
 

@@ -30,7 +30,7 @@ from iibr_core.rendering.visibility_weights import (
     weights_and_coverage,
 )
 from iibr_core.runtime import tiling
-from iibr_core.runtime.jit import kernel
+from iibr_core.runtime.kernels import kernel
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never, raise_if_stopped
 from iibr_core.types import FloatImage, ViewOffset
 

@@ -15,7 +15,7 @@ from __future__ import annotations
 import numpy as np
 
 from iibr_core.rendering.candidates import Candidates
-from iibr_core.runtime.jit import kernel
+from iibr_core.runtime.kernels import kernel
 from iibr_core.types import FloatImage
 
 LEAST_COVERED = 0.2

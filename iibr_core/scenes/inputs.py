@@ -11,7 +11,7 @@ from iibr_core.scenes.scene import Source
 
 def inputs_of(source: Source) -> tuple[Path, ...]:
     """What is read to open it, the map beside it and folders of models included: nothing may be written there. See
-    `require_file_place`.
+    `check_output`.
     """
     named, found = named_by(source), map_to_read(Path(source.path), source.depth)
     return named if found is None or found in named else (*named, found)

@@ -24,7 +24,7 @@ from iibr_core.generation.memory_model import (
     require_reading,
     require_views,
 )
-from iibr_core.runtime.allocator import give_back_memory
+from iibr_core.runtime.machine import give_back_memory
 from iibr_core.runtime.tiling import ShouldStop, never
 from iibr_core.scenes.scene import DepthSettings, Source
 from iibr_core.types import Disparity, ImageSize, InputError, Photo, ReportProgress, ignore_progress

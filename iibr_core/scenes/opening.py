@@ -18,7 +18,7 @@ from iibr_core.formats.light_fields.light_field_formats import is_light_field
 from iibr_core.generation.disparity_range import measure_disparity_range
 from iibr_core.generation.outer_views import ALL_VIEWS, WantedViews
 from iibr_core.generation.plan import ScenePlan
-from iibr_core.runtime.allocator import give_back_memory
+from iibr_core.runtime.machine import give_back_memory
 from iibr_core.runtime.tiling import ShouldStop, never
 from iibr_core.scenes.light_fields import showings_of_light_field
 from iibr_core.scenes.loaded_photo import LoadedPhoto, apply_depth_settings, load_photo, sketch_photo

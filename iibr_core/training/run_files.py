@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from iibr_core.formats.files import is_file
-from iibr_core.formats.outputs import atomic_write, require_file_place
+from iibr_core.formats.outputs import check_output, write_file
 from iibr_core.types import InputError
 
 
@@ -43,7 +43,7 @@ def require_run_files(out: Path, may_replace: bool = True) -> None:
     if out.suffix != ".safetensors":
         raise InputError(f"{out}: weights are written as .safetensors; name the file so")
     for path in (out, checkpoint_path(out), log_path(out)):
-        require_file_place(path, may_replace=may_replace)
+        check_output(path, may_replace=may_replace)
 
 
 @contextmanager
@@ -54,7 +54,7 @@ def training_log(path: Path, done: int) -> Iterator[Callable[[LogRow], None]]:
     """
     rows = path.read_text(errors="replace").splitlines() if done and is_file(path) else []
     kept = [row for row in rows if row.count(",") == len(LogRow._fields) - 1 and _step_of(row) <= done]
-    with atomic_write(path) as temporary:
+    with write_file(path) as temporary:
         temporary.write_text("".join(line + "\n" for line in [",".join(LogRow._fields), *kept]))
     is_empty = not kept
 

@@ -602,8 +602,8 @@ READS_OR_TELLS = {
     "formats.stereo": "anaglyph",
     "formats.files": "reason_of shown_name printable status_of is_file is_folder ordinary_file file_within "
     "stays_within entries_of require_file open_binary read_text refuse_bomb",
-    "formats.outputs": "AlreadyThereError require_file_place require_folder_place require_files_in make_folder "
-    "atomic_write UnfinishedFolder release_place require_own_folder open_to_append",
+    "formats.outputs": "AlreadyThereError check_output check_output_folder require_files_in make_folder "
+    "write_file UnfinishedFolder release_place require_own_folder open_to_append",
     "formats.places": "real_place require_folder_for require_writable require_no_dangling_link require_no_link "
     "require_outside is_within places_of reads_file",
     "formats.unfinished": "Claims remove_leftovers remove_around make_temporary lock_of unlock",
@@ -680,7 +680,7 @@ READS_OR_TELLS = {
     "inpainting.registry": "load_inpainter require_inpainter",
     "runtime.allocator": "limit_arenas give_back_memory",
     "runtime.machine": "core_count memory_bytes usual_budget_bytes cgroup_memory_bytes cgroup_cores own_limit_bytes",
-    "runtime.compiling": "tell_compiling note_kernel",
+    "runtime.compiling": "watch_compiling note_kernel",
     "runtime.kernel_cache": "KernelCache sources_hash fill",
     "runtime.offers": "offered_by",
     "runtime.resources": "resource_folder",

@@ -240,28 +240,3 @@ def test_a_refused_gl_context_is_one_line(tmp_path: Path) -> None:
     assert done.returncode == 2
     assert done.stderr.strip().splitlines()[-1].startswith("iibr: no OpenGL 3.3 without a display: egl")
     assert not (tmp_path / "o.png").exists()
-
-
-STARVED = """
-import resource, sys
-import psutil
-from viewer.cli.main import main
-import iibr_core.generation.light_field, viewer.background.scene_worker
-import iibr_core.formats.images.photo, iibr_core.depth.search
-room = psutil.Process().memory_info().vms + (160 << 20)
-resource.setrlimit(resource.RLIMIT_AS, (room, room))
-main()
-"""
-
-
-def test_memory_that_runs_out_of_a_command_is_one_line(tmp_path: Path) -> None:
-    """The system will give no more: that is told before anything is done, and the way out is named."""
-    write_image(tmp_path / "large.png", np.zeros((3000, 4000, 3), np.uint8))
-    given = ["generate", "large.png", "--depth", "flat", "--max-pixels", "12000000", "--grid", "3", "--out", "field"]
-    done = subprocess.run(
-        [sys.executable, "-c", STARVED, *given], cwd=tmp_path, capture_output=True, text=True, check=False
-    )
-    assert done.returncode == 2, done.stderr
-    assert "ulimit -v" in done.stderr.splitlines()[-1]
-    assert "Traceback" not in done.stderr
-    assert {path.name for path in tmp_path.iterdir()} == {"large.png"}

@@ -12,7 +12,7 @@ from datetime import datetime
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
-from iibr_core.formats.outputs import atomic_write
+from iibr_core.formats.outputs import write_file
 from iibr_core.types import InputError
 from viewer.model.state.saving import PASTED_FOLDER
 
@@ -78,7 +78,7 @@ def _paste_pixels(folder: Path) -> Pasted:
     try:
         folder.mkdir(parents=True, exist_ok=True)
         path = folder / f"pasted-{datetime.now():%Y-%m-%d-%H%M%S-%f}.png"
-        with atomic_write(path) as temporary:
+        with write_file(path) as temporary:
             held.save(temporary, "PNG")
     except (OSError, ValueError) as error:
         raise InputError(f"{folder}: the pasted picture cannot be kept there ({error})") from error

@@ -12,7 +12,6 @@ from functools import partial
 from itertools import count
 from pathlib import Path
 
-from iibr_core.formats.outputs import release_place
 from iibr_core.runtime.tiling import Cancelled, raise_if_stopped
 from iibr_core.scenes.opening import SceneRequest
 from iibr_core.scenes.scene import Source, is_same_field
@@ -185,7 +184,6 @@ class JobQueue:
     def _end(self, job: Job) -> None:
         self._jobs.remove(job)
         job.is_given_up.set()  # a thread that was lost left steps behind
-        release_place(job.path)
         if job.snapshot is not None:
             job.snapshot.release()
             job.snapshot = None

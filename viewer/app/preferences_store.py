@@ -16,7 +16,7 @@ from typing import Any
 
 from iibr_core.exports.photo_folder import FolderOrder
 from iibr_core.formats.files import read_text, status_of
-from iibr_core.formats.outputs import atomic_write
+from iibr_core.formats.outputs import write_file
 from iibr_core.scenes.lens_limits import clamp
 from iibr_core.types import InputError
 from viewer.model.actions import Action, Notify
@@ -109,7 +109,7 @@ def _worth_keeping(state: AppState) -> tuple[tuple[str, ...], Preferences]:
 
 
 def _write(path: Path, value: Any) -> None:
-    with atomic_write(path) as temporary:
+    with write_file(path) as temporary:
         temporary.write_text(json.dumps(value, indent=1), "utf-8")
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from iibr_core.exports.render_settings import require_size
 from iibr_core.formats.files import is_file
 from iibr_core.formats.images.picture_kinds import AS_USUAL, PictureFormat, require_picture_format
-from iibr_core.formats.outputs import require_file_place
+from iibr_core.formats.outputs import check_output
 from iibr_core.scenes.inputs import inputs_of, named_by
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import ImageSize, InputError
@@ -43,12 +43,12 @@ def require_picture_place(
     """Find out before a picture is drawn, which may take minutes, whether it can be written. inputs: what is read.
 
     Raises AlreadyThereError, and InputError for what its kind of file does not have, sizes beyond MAX_PIXELS, and as
-    `require_file_place`.
+    `check_output`.
     """
     if size_px is not None:
         require_size(size_px)
     require_picture_format(path, form, None if size_px is None else ImageSize(size_px[1], size_px[0]))
-    require_file_place(path, inputs, may_replace)
+    check_output(path, inputs, may_replace)
 
 
 def picture_path(task: SaveTask, inputs: Sequence[Path]) -> Path:
@@ -59,9 +59,9 @@ def picture_path(task: SaveTask, inputs: Sequence[Path]) -> Path:
 
 
 def map_path(task: SaveTask, inputs: Sequence[Path]) -> Path:
-    """Where this disparity map goes. Raises as `require_file_place` does, and InputError without a name."""
+    """Where this disparity map goes. Raises as `check_output` does, and InputError without a name."""
     path = _path_of(task, ".pfm")
-    require_file_place(path, inputs, task.may_replace)
+    check_output(path, inputs, task.may_replace)
     return path
 
 

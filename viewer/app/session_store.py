@@ -14,8 +14,8 @@ from itertools import count
 from pathlib import Path
 
 from iibr_core.depth.editing.edits import UNEDITED
-from iibr_core.formats.files import is_folder, ordinary_file, read_text
-from iibr_core.formats.outputs import atomic_write
+from iibr_core.formats.files import is_file, is_folder, read_text
+from iibr_core.formats.outputs import write_file
 from iibr_core.scenes.scene import Scene, Source
 from iibr_core.types import InputError
 from viewer.app.image_export import settings_of
@@ -158,9 +158,9 @@ def _find(folder: Path, scene: Scene) -> SessionFound:
     sidecar = sidecar_of(Path(scene.source.path))
     kept = folder / f"{_key_of(scene.source)}.json"
     try:
-        if ordinary_file(kept) is not None:
+        if is_file(kept):
             return SessionFound(scene, settings_from_text(read_text(kept, MOST_BYTES), str(kept), is_own=True))
-        if ordinary_file(sidecar) is not None:
+        if is_file(sidecar):
             return SessionFound(scene, settings_from_text(read_text(sidecar, MOST_BYTES), str(sidecar), sidecar.parent))
     except InputError as error:
         return SessionFound(scene, None, str(error))
@@ -185,7 +185,7 @@ def _keep(folder: Path, source: Source, settings: SavedSettings) -> None:
 def _write(path: Path, settings: SavedSettings, names_files_in: Path | None = None) -> None:
     from viewer.model.saved_settings import settings_text
 
-    with atomic_write(path) as temporary:
+    with write_file(path) as temporary:
         temporary.write_text(settings_text(settings, names_files_in), "utf-8")
 
 

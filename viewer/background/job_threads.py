@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
-from iibr_core.runtime.allocator import give_back_memory
+from iibr_core.runtime.machine import give_back_memory
 from iibr_core.scenes.scene import Progress
 from iibr_core.types import InputError
 

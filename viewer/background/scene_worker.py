@@ -12,7 +12,7 @@ from pathlib import Path
 from iibr_core.exports.photo_folder import first_photo
 from iibr_core.formats.files import is_folder
 from iibr_core.rendering.optics import CENTRE
-from iibr_core.runtime.compiling import tell_compiling
+from iibr_core.runtime.compiling import watch_compiling
 from iibr_core.scenes.opening import SceneReady, SceneRequest, ViewReady, results_of
 from iibr_core.scenes.scene import Progress
 from iibr_core.types import ViewOffset
@@ -64,7 +64,7 @@ def _telling_compiling(
     takes.
     """
     there = Progress()
-    with tell_compiling(lambda words: report_progress(replace(there, doing=words, left_s=None))):
+    with watch_compiling(lambda words: report_progress(replace(there, doing=words, left_s=None))):
         for result in results:
             if isinstance(result, ViewReady):
                 there = result.progress

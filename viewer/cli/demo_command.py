@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from iibr_core.formats.outputs import make_folder, require_files_in
+from iibr_core.formats.outputs import check_output_folder, make_folder
 from iibr_core.scenes.inputs import inputs_of
 from iibr_core.types import InputError
 from viewer.cli.shared_options import SCREEN_SIZE
@@ -47,7 +47,7 @@ def _demo_pictures(source: Source, why: str) -> None:
     from viewer.app.image_export import export_image
 
     window, views = DEMO_FOLDER / "demo.png", DEMO_FOLDER / "demo-views.png"
-    require_files_in(DEMO_FOLDER, (window.name, views.name), inputs_of(source), may_replace=True)
+    check_output_folder(DEMO_FOLDER, inputs_of(source), may_replace=True)
     make_folder(DEMO_FOLDER)
     print(f"{why}. Rendering without one.")
     with HeadlessViewer() as viewer:

@@ -49,12 +49,12 @@ def depth(
     from iibr_core.formats.files import is_file
     from iibr_core.formats.light_fields.light_field_formats import find_light_field, open_light_field
     from iibr_core.formats.maps.writer import write_map
-    from iibr_core.formats.outputs import require_file_place
+    from iibr_core.formats.outputs import check_output
     from iibr_core.generation.memory_model import budget_of
     from iibr_core.scenes.light_fields import find_disparity
     from iibr_core.scenes.loaded_photo import load_photo
 
-    require_file_place(out, inputs_of_command(context, source), force)
+    check_output(out, inputs_of_command(context, source), force)
     require_model(source.depth)
     if is_file(path) and (source.depth.start != "auto" or find_light_field(path) is None):
         loaded = load_photo(source)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import typer
 
-from iibr_core.formats.outputs import UnfinishedFolder, require_folder_place, require_own_folder
+from iibr_core.formats.outputs import check_output_folder, write_folder
 from iibr_core.types import Camera, FloatImage, InputError
 from viewer.cli.shared_options import given_options, require_model
 from viewer.cli.terminal import print_depth, print_notes, show_progress, untimed
@@ -57,8 +57,7 @@ def poses_of(path: Path, photo_pose: int | None) -> Poses:
 
 def require_views_folder(out: Path, inputs: Sequence[Path], may_replace: bool) -> None:
     """Raise InputError where the views may not be written. inputs: what is read."""
-    require_own_folder(out, OWN_FILES)
-    require_folder_place(out, inputs, may_replace, is_whole=True)
+    check_output_folder(out, inputs, may_replace, OWN_FILES)
 
 
 def write_free_views(source: Source, poses: Path, photo_pose: int | None, is_literal: bool, out: Path) -> None:
@@ -110,16 +109,12 @@ def _written(
     require_free_views(budget_of(source.depth.memory_bytes), canvas, largest)
     inpainter = load_inpainter(source.inpaint, inpainting_aids(source, loaded))
     views = FreeViews(photo.pixels, inverse_depth, cameras[given], cameras, inpainter=inpainter)
-    unfinished = UnfinishedFolder(out)
-    try:
+    with write_folder(out) as unfinished:
         for number, camera in enumerate(cameras, 1):
             view = views.view(camera)
             name = f"view_{number:04d}{'.exr' if photo.is_hdr else '.png'}"
-            write_image(unfinished.path / name, encode_for_storage(view.colors, photo.is_hdr, never))
+            write_image(unfinished / name, encode_for_storage(view.colors, photo.is_hdr, never))
             yield float(view.inpainted.mean())
-        unfinished.put_in_place()
-    finally:
-        unfinished.discard()
 
 
 def _inverse_depth(loaded: LoadedPhoto, is_literal: bool, camera: Camera) -> FloatImage:

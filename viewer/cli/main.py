@@ -1,14 +1,11 @@
-"""The `iibr` command: which commands there are, and how bad input and interruption end. Heavy imports wait."""
+"""The `iibr` command: which commands there are. Heavy imports wait."""
 
 from __future__ import annotations
 
-import sys
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
-from iibr_core.formats.unfinished import CLAIMS
-from iibr_core.runtime.allocator import limit_arenas
 from iibr_core.types import InputError
 from viewer.cli.batch import batch
 from viewer.cli.demo_command import demo
@@ -23,12 +20,6 @@ from viewer.cli.terminal import Commands, print_notes
 from viewer.cli.train import train
 from viewer.cli.view_command import open_window, view
 
-UsageError: Any = typer.BadParameter.__base__
-"""Click's, wherever this typer keeps it."""
-
-EXIT_BAD_INPUT = 2
-EXIT_INTERRUPTED = 130
-
 app = typer.Typer(
     name="iibr",
     cls=Commands,
@@ -41,28 +32,6 @@ app = typer.Typer(
 for command in (view, export, screenshot, generate, depth, batch, plan, demo, evaluate, train):
     app.command()(command)
 app.add_typer(models, name="models")
-
-
-def main() -> None:
-    """Run the command line. Bad input ends in one line on stderr and exit code 2, interruption in one and 130."""
-    limit_arenas()
-    try:
-        sys.exit(app(standalone_mode=False) or 0)
-    except UsageError as error:
-        _end(str(error.format_message()) + " (--help tells more)", EXIT_BAD_INPUT)
-    except InputError as error:
-        _end(str(error), EXIT_BAD_INPUT)
-    except MemoryError as error:
-        _end(f"out of memory ({error}): lower --max-pixels, or the --grid", EXIT_BAD_INPUT)
-    except (KeyboardInterrupt, typer.Abort):
-        _end("interrupted", EXIT_INTERRUPTED)
-    finally:
-        CLAIMS.release_all()
-
-
-def _end(message: str, code: int) -> None:
-    print(f"iibr: {' '.join(message.split())}", file=sys.stderr)
-    sys.exit(code)
 
 
 def _print_version(wanted: bool) -> None:

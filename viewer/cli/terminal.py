@@ -15,7 +15,7 @@ import typer
 from typer.core import TyperGroup
 
 from iibr_core.depth.choice import DepthOrigin
-from iibr_core.runtime.compiling import tell_compiling
+from iibr_core.runtime.compiling import watch_compiling
 from iibr_core.runtime.time_left import TimeLeft, about_left
 from iibr_core.types import ReportProgress
 
@@ -119,7 +119,7 @@ def show_progress(doing: str, counts: bool = False) -> Iterator[Callable[..., No
                 told=", ".join(told),
             )
 
-        with tell_compiling(lambda words: show(0, 0, words)):
+        with watch_compiling(lambda words: show(0, 0, words)):
             yield show
 
 

@@ -17,7 +17,7 @@ from typing import Annotated, Any, Literal
 import msgspec
 
 from iibr_core.depth.editing.edits import UNEDITED, DepthEdits, require_sound
-from iibr_core.formats.files import file_within, printable
+from iibr_core.formats.files import is_file, printable
 from iibr_core.formats.images.settings_text import settings_text_in
 from iibr_core.rendering.gloss.gloss_settings import require_sound as require_sound_gloss
 from iibr_core.rendering.optics import ApertureShape, Optics
@@ -175,8 +175,9 @@ def _with_own_files(optics: Optics, folder: Path | None) -> tuple[Optics, str]:
     gloss = optics.gloss
     if gloss is None or not gloss.environment:
         return optics, ""
-    found = None if folder is None else file_within(folder, gloss.environment)
-    environment, refused = ("", gloss.environment) if found is None else (str(found), "")
+    is_plain = gloss.environment == Path(gloss.environment).name and "\\" not in gloss.environment
+    is_there = folder is not None and is_plain and is_file(folder / gloss.environment)
+    environment, refused = (str(folder / gloss.environment), "") if folder and is_there else ("", gloss.environment)
     return dataclasses.replace(optics, gloss=dataclasses.replace(gloss, environment=environment)), refused
 
 

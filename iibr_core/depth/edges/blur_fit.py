@@ -10,7 +10,7 @@ from math import ceil
 import numpy as np
 
 from iibr_core.depth.edges.edge_profiles import COLOR_NOISE, GAUSSIAN_SIGMAS
-from iibr_core.runtime.jit import kernel
+from iibr_core.runtime.kernels import kernel
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never
 from iibr_core.surfaces import same_surface
 from iibr_core.types import FloatImage, image_size

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from iibr_core.depth.edges.edge_labels import label_edges, step_distance
 from iibr_core.depth.edges.edge_profiles import FLAT_SHARE
 from iibr_core.inpainting.disparity_by_color import fill_disparity_by_color
-from iibr_core.runtime.jit import kernel
+from iibr_core.runtime.kernels import kernel
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never
 from iibr_core.stages import ALL_STAGES, Stages
 from iibr_core.surfaces import is_in_front, same_surface

@@ -23,7 +23,7 @@ from iibr_core.depth.edges.edge_profiles import (
     structure_blur,
     walk,
 )
-from iibr_core.runtime.jit import kernel
+from iibr_core.runtime.kernels import kernel
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never
 from iibr_core.types import FloatImage, ImageSize
 

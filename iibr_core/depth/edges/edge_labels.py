@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from iibr_core.inpainting.disparity_by_color import nearness
 from iibr_core.inpainting.nearest_known import number_pixels
 from iibr_core.runtime import tiling
-from iibr_core.runtime.jit import kernel
+from iibr_core.runtime.kernels import kernel
 from iibr_core.runtime.tiling import ShouldStop, in_pieces, pieces_of
 from iibr_core.surfaces import SLOPE_SHARE, same_surface
 from iibr_core.types import FloatImage

@@ -11,7 +11,7 @@ from math import ceil, exp, floor, sqrt
 
 import numpy as np
 
-from iibr_core.runtime.jit import kernel
+from iibr_core.runtime.kernels import kernel
 
 GAUSSIAN_SIGMAS = 3.0
 """Where a Gaussian ends."""

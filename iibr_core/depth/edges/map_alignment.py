@@ -9,7 +9,7 @@ from math import sqrt
 import numpy as np
 
 from iibr_core.depth.edges.edge_profiles import gradient, height_at
-from iibr_core.runtime.jit import kernel
+from iibr_core.runtime.kernels import kernel
 from iibr_core.types import FloatImage
 
 LEAST_ENLARGEMENT = 1.25

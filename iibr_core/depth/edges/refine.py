@@ -36,7 +36,7 @@ from iibr_core.depth.edges.edge_profiles import (
 from iibr_core.depth.pictorial_cues import resize_picture
 from iibr_core.formats.maps.resample import resample_surfaces
 from iibr_core.inpainting.disparity_by_color import fill_disparity_by_color
-from iibr_core.runtime.jit import kernel
+from iibr_core.runtime.kernels import kernel
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never
 from iibr_core.stages import ALL_STAGES, Stages
 from iibr_core.surfaces import EDGE_SHARE

@@ -20,7 +20,7 @@ from iibr_core.depth.editing.smoothing import smooth_within_contours, texture_co
 from iibr_core.depth.editing.stroke_distance import Window, falloff, measure_from
 from iibr_core.depth.editing.surface import surface_at
 from iibr_core.depth.editing.touched_colors import Guide, guide_of
-from iibr_core.runtime.jit import kernel
+from iibr_core.runtime.kernels import kernel
 from iibr_core.runtime.tiling import ShouldStop, never, raise_if_stopped
 from iibr_core.types import FloatImage
 

@@ -7,7 +7,7 @@ from math import exp, sqrt
 import numpy as np
 
 from iibr_core.depth.editing.stroke_distance import CONTOUR_CONTRAST
-from iibr_core.runtime.jit import kernel
+from iibr_core.runtime.kernels import kernel
 from iibr_core.types import FloatImage
 
 NOISE_MEDIANS = 2.5

@@ -19,7 +19,8 @@ from iibr_core.depth.editing.touched_colors import (
     stroke_colours,
     unlikeness,
 )
-from iibr_core.runtime.jit import kernel, nearest_pixel
+from iibr_core.runtime.kernels import kernel
+from iibr_core.runtime.scalars import nearest_pixel
 from iibr_core.types import FloatImage, ImageSize
 
 CONTOUR_CONTRAST = 0.12

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from iibr_core.depth.editing.edits import Stroke
 from iibr_core.depth.editing.stroke_distance import CONTOUR_CONTRAST
 from iibr_core.depth.editing.touched_colors import GUIDE_STEPS, Guide, stroke_colours, unlikeness
-from iibr_core.runtime.jit import kernel
+from iibr_core.runtime.kernels import kernel
 from iibr_core.types import FloatImage
 
 BASE_PX = 2

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.depth.editing.edits import Stroke
-from iibr_core.runtime.jit import kernel
+from iibr_core.runtime.kernels import kernel
 from iibr_core.types import FloatImage, ImageSize
 
 LIKENESS = 0.08

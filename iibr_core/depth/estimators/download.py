@@ -26,7 +26,7 @@ from iibr_core.depth.estimators.hub import (
     read_json,
 )
 from iibr_core.formats.files import is_file, printable, read_text, reason_of, stays_within
-from iibr_core.formats.outputs import atomic_write
+from iibr_core.formats.outputs import write_file
 from iibr_core.runtime.tiling import ShouldStop, never
 from iibr_core.types import InputError, ReportProgress, ignore_progress
 
@@ -75,7 +75,7 @@ def download(
         for name in _unlike(folder, digests):
             _remove(folder / name)
             raise InputError(_unlike_words(repository, commit, name))
-        with atomic_write(folder / VERIFIED) as temporary:
+        with write_file(folder / VERIFIED) as temporary:
             temporary.write_text(json.dumps(digests, indent=1) + "\n", "utf-8")
     return folder
 

@@ -22,7 +22,7 @@ import numpy as np
 from iibr_core.depth.estimates import DisparityMap, Estimate, MetricDepth, RelativeInverseDepth
 from iibr_core.formats.files import read_text
 from iibr_core.formats.maps import npy
-from iibr_core.formats.outputs import atomic_write
+from iibr_core.formats.outputs import write_file
 from iibr_core.types import FloatImage, InputError
 
 MAX_BYTES = 512 * 2**20
@@ -83,7 +83,7 @@ def store(key: str, estimate: Estimate) -> None:
     # read-only or full: the estimate is made again the next time
     with contextlib.suppress(OSError, InputError):
         folder.mkdir(parents=True, exist_ok=True)
-        with atomic_write(folder / f"{key}.npz") as temporary:
+        with write_file(folder / f"{key}.npz") as temporary:
             match estimate:
                 case RelativeInverseDepth(values) | MetricDepth(values) | DisparityMap(values):
                     kind = next(name for name, record in KINDS.items() if isinstance(estimate, record))
@@ -93,7 +93,7 @@ def store(key: str, estimate: Estimate) -> None:
 
 def store_seconds(title: str, seconds: float) -> None:
     """Keep how long a model of this title took for a photo on this machine, the last time."""
-    with contextlib.suppress(OSError, InputError), atomic_write(cache_folder() / TIMES) as temporary:
+    with contextlib.suppress(OSError, InputError), write_file(cache_folder() / TIMES) as temporary:
         temporary.write_text(json.dumps({**_times(), title: round(seconds, 2)}, indent=1) + "\n", "utf-8")
 
 

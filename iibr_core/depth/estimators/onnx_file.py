@@ -11,8 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from iibr_core.formats.files import is_file, printable, stays_within
-from iibr_core.runtime.extras import said_by
+from iibr_core.formats.files import is_file, printable, reason_of, stays_within
 from iibr_core.runtime.machine import core_count
 from iibr_core.types import FloatImage, ImageSize, InputError
 
@@ -89,7 +88,7 @@ def open_session(file: Path) -> Any:
     try:
         return onnxruntime.InferenceSession(str(file), options, providers=["CPUExecutionProvider"])
     except Exception as error:  # its errors share no class of their own
-        raise InputError(f"{file}: is not an ONNX model that can be run ({said_by(error)}); get it again") from error
+        raise InputError(f"{file}: is not an ONNX model that can be run ({reason_of(error)}); get it again") from error
 
 
 def picture_input(session: Any, file: Path) -> PictureInput:

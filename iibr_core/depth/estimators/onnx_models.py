@@ -18,8 +18,7 @@ from iibr_core.depth.estimators.config import CONFIG, PREPROCESSOR, read_config,
 from iibr_core.depth.estimators.depth_estimator import Family, KnownModel, LocalModel, Run
 from iibr_core.depth.estimators.onnx_file import depth_output, external_files, open_session, picture_input
 from iibr_core.depth.estimators.preparation import Preparation, affordable_pixels, input_size, network_input
-from iibr_core.formats.files import is_file
-from iibr_core.runtime.extras import said_by
+from iibr_core.formats.files import is_file, reason_of
 from iibr_core.runtime.tiling import Cancelled, ShouldStop
 from iibr_core.types import ImageSize, InputError, Photo, ReportProgress
 
@@ -112,7 +111,7 @@ def _run(session: Any, file: Path, values: dict[str, Any], should_stop: ShouldSt
         return dict(zip([each.name for each in session.get_outputs()], running.result()))
     except Exception as error:  # as above
         raise InputError(
-            f"{file}: failed on this photo ({said_by(error)}); if it needs pictures of other sizes, state size and"
+            f"{file}: failed on this photo ({reason_of(error)}); if it needs pictures of other sizes, state size and"
             f" ensure_multiple_of in a {PREPROCESSOR} beside it"
         ) from error
 

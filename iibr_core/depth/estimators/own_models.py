@@ -10,7 +10,7 @@ from iibr_core.depth.estimators.config import CONFIG, PREPROCESSOR, folder_of
 from iibr_core.depth.estimators.onnx_file import open_session, picture_input
 from iibr_core.depth.estimators.onnx_models import weights_in
 from iibr_core.formats.files import entries_of, is_file, is_folder
-from iibr_core.formats.outputs import UnfinishedFolder
+from iibr_core.formats.outputs import write_folder
 from iibr_core.types import InputError
 
 UNSPECIFIC_NAMES = ("model", "onnx")
@@ -60,13 +60,7 @@ def copy_own_model(path: Path) -> Path:
 
 def _copy_into(folder: Path, files: dict[Path, str]) -> None:
     """Make a folder of copies, each under its name in it, all or nothing. Raises InputError where that cannot be."""
-    unfinished = UnfinishedFolder(folder)
-    try:
+    with write_folder(folder) as unfinished:
         for source, name in files.items():
-            (unfinished.path / name).parent.mkdir(parents=True, exist_ok=True)
-            shutil.copyfile(source, unfinished.path / name)
-        unfinished.put_in_place()
-    except OSError as error:
-        raise InputError(f"{folder}: cannot be written ({error.strerror or error}); make room there") from error
-    finally:
-        unfinished.discard()
+            (unfinished / name).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(source, unfinished / name)

@@ -12,7 +12,7 @@ import numpy as np
 
 from iibr_core.depth.estimates import Estimate
 from iibr_core.depth.estimators.depth_estimator import LocalModel, Run
-from iibr_core.runtime.extras import said_by
+from iibr_core.formats.files import reason_of
 from iibr_core.runtime.tiling import ShouldStop
 from iibr_core.types import FloatImage, ImageSize, InputError, Photo, ReportProgress
 
@@ -30,7 +30,7 @@ def prepare_by(call: Callable[[LocalModel, Photo], Estimate]) -> Callable[..., t
             except FAILURES as error:
                 if isinstance(error, InputError):
                     raise
-                raise InputError(f"{model.title} ({model.family.packages[0]}) failed: {said_by(error)}") from error
+                raise InputError(f"{model.title} ({model.family.packages[0]}) failed: {reason_of(error)}") from error
 
         return None, run
 

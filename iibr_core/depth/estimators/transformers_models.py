@@ -17,8 +17,7 @@ from iibr_core.depth.estimates import Estimate, MetricDepth, RelativeInverseDept
 from iibr_core.depth.estimators.config import read_config, read_preparation, safetensors_in
 from iibr_core.depth.estimators.depth_estimator import Family, KnownModel, LocalModel, Run
 from iibr_core.depth.estimators.preparation import Preparation, affordable_pixels, input_size, network_input
-from iibr_core.formats.files import is_folder
-from iibr_core.runtime.extras import said_by
+from iibr_core.formats.files import is_folder, reason_of
 from iibr_core.runtime.machine import core_count
 from iibr_core.runtime.tiling import ShouldStop, raise_if_stopped
 from iibr_core.types import FloatImage, ImageSize, InputError, Photo, ReportProgress, image_size
@@ -101,7 +100,7 @@ def run_transformers(
         with torch.inference_mode(), _LayerProgress(network, doing, should_stop, report_progress):
             output = network.to(device)(pixel_values=pixels)
     except (RuntimeError, ValueError, IndexError, TypeError) as error:
-        raise InputError(f"{model.title} failed on this photo ({said_by(error)})") from error
+        raise InputError(f"{model.title} failed on this photo ({reason_of(error)})") from error
     return _estimate_of(network.config, output, photo.size, wanted.preparation)
 
 
@@ -118,7 +117,7 @@ def _load_network(model: LocalModel) -> Any:
             model.folder, local_files_only=True, use_safetensors=True, trust_remote_code=False, output_loading_info=True
         )
     except (*LOAD_ERRORS, SafetensorError) as error:
-        raise InputError(f"{model.folder}: cannot be loaded as a depth model ({said_by(error)})") from error
+        raise InputError(f"{model.folder}: cannot be loaded as a depth model ({reason_of(error)})") from error
     lacking = sorted(report["missing_keys"])
     if lacking:
         raise InputError(f"{model.folder}: its weights lack {len(lacking)} parts ({lacking[0]}, ...); get them all")

@@ -17,7 +17,7 @@ from iibr_core.depth.multi_view.matching import STEP_PX, MatchingViews, choose_v
 from iibr_core.depth.multi_view.semi_global import choose_disparity
 from iibr_core.formats.maps.resample import resample_surfaces
 from iibr_core.inpainting.disparity_by_color import fill_disparity_by_color
-from iibr_core.runtime.jit import kernel
+from iibr_core.runtime.kernels import kernel
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never
 from iibr_core.types import (
     FloatImage,

@@ -7,7 +7,7 @@ from __future__ import annotations
 import numpy as np
 
 from iibr_core.depth.multi_view.matching import STEP_PX, MatchingViews
-from iibr_core.runtime.jit import kernel
+from iibr_core.runtime.kernels import kernel
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never, raise_if_stopped
 from iibr_core.types import FloatImage, image_size
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from iibr_core.color import encoded_from_stored
 from iibr_core.depth.multi_view.guided_filter import GuidedFilter
 from iibr_core.runtime import tiling
-from iibr_core.runtime.jit import kernel
+from iibr_core.runtime.kernels import kernel
 from iibr_core.runtime.tiling import ShouldStop, in_pieces, never
 from iibr_core.types import FloatImage, StoredColors, ViewOffset
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.runtime import tiling
-from iibr_core.runtime.jit import kernel
+from iibr_core.runtime.kernels import kernel
 from iibr_core.runtime.tiling import ShouldStop, in_pieces, never
 from iibr_core.types import FloatImage
 

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 
 from iibr_core.exports.batch.task import CLAIM_PREFIX, BatchSettings, Outcome, PhotoTask, Place
 from iibr_core.formats.files import is_file, is_folder
-from iibr_core.formats.outputs import make_folder, open_to_append, require_folder_place
+from iibr_core.formats.outputs import check_output_folder, make_folder, open_to_append
 from iibr_core.types import InputError
 
 try:
@@ -32,7 +32,7 @@ MOST_LINE_BYTES = 1 << 17
 def require_batch_place(folder: Path, inputs: Sequence[Path], may_replace: bool) -> None:
     """Raise InputError where exports may not go: into what is read, or, unless allowed, among files of others."""
     is_ours = is_folder(folder) and is_file(folder / MANIFEST)
-    require_folder_place(folder, inputs, may_replace or is_ours)
+    check_output_folder(folder, inputs, may_replace or is_ours)
 
 
 class Entry(NamedTuple):

@@ -155,7 +155,7 @@ def _begin_worker() -> None:
     """In a worker, before anything else. A terminal's Ctrl-C goes to every process: workers ignore it, are ended from
     above, and say nothing.
     """
-    from iibr_core.runtime.allocator import limit_arenas
+    from iibr_core.runtime.machine import limit_arenas
 
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     limit_arenas()

@@ -72,9 +72,9 @@ def _export(task: PhotoTask, open_drawn: OpenDrawn | None) -> tuple[Path, bool]:
 
 
 def _claim(task: PhotoTask, output: Path) -> None:
-    from iibr_core.formats.outputs import atomic_write
+    from iibr_core.formats.outputs import write_file
 
-    with atomic_write(task.place.claim) as temporary:
+    with write_file(task.place.claim) as temporary:
         temporary.write_bytes(task.line(str(output), key=task.key))
         _sync(temporary)
     _sync(task.place.claim.parent)

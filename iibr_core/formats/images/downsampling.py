@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from iibr_core.color import linear_from_srgb
 from iibr_core.formats.images.color_profile import color_profile_of
 from iibr_core.formats.images.oiio_reader import Raster, full_scale
-from iibr_core.runtime.jit import kernel
+from iibr_core.runtime.kernels import kernel
 from iibr_core.runtime.tiling import ShouldStop, never, raise_if_stopped
 from iibr_core.types import FloatImage, ImageSize
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from iibr_core.formats.files import reason_of
 from iibr_core.formats.images.oiio_names import oiio_name
 from iibr_core.formats.images.oiio_reader import complaint_of
-from iibr_core.formats.outputs import atomic_write
+from iibr_core.formats.outputs import write_file
 from iibr_core.types import ImageSize, InputError
 
 COLORS = {"R": "half", "G": "half", "B": "half"}
@@ -36,7 +36,7 @@ def write_exr_parts(path: Path, size: ImageSize, parts: Sequence[ExrPart], pictu
     Raises InputError where it cannot be written; what the pictures raise goes through.
     """
     specs = [_spec(size, part) for part in parts]
-    with atomic_write(path) as temporary:
+    with write_file(path) as temporary:
         name = oiio_name(temporary)
         target: Any = oiio.ImageOutput.create(name)
         is_written = target is not None and target.open(name, tuple(specs))

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from iibr_core.formats.files import reason_of
 from iibr_core.formats.images.oiio_names import oiio_name
 from iibr_core.formats.images.oiio_reader import complaint_of, require_whole_png
-from iibr_core.formats.outputs import atomic_write
+from iibr_core.formats.outputs import write_file
 from iibr_core.types import InputError
 
 PNG_SETTINGS: Mapping[str, str | int | float] = {"png:compressionLevel": 1, "png:filter": 64}
@@ -33,7 +33,7 @@ def write_image_file(
     attributes: of the file's header. channels: their names, where they are not those of grey, RGB or RGBA. Raises
     InputError where that cannot be done.
     """
-    with atomic_write(path) as temporary:
+    with write_file(path) as temporary:
         try:
             encode_image_file(temporary, values, dtype, attributes, channels)
         except InputError as error:

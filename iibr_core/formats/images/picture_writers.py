@@ -24,7 +24,7 @@ from iibr_core.formats.images.icc_profile import icc_profile
 from iibr_core.formats.images.metadata import PictureMetadata, exif_for, xmp_for
 from iibr_core.formats.images.oiio_writer import PNG_SETTINGS, encode_image_file
 from iibr_core.formats.images.picture_kinds import AS_USUAL, PictureFormat, picture_kind, require_picture_format
-from iibr_core.formats.outputs import atomic_write
+from iibr_core.formats.outputs import write_file
 from iibr_core.types import SRGB, ColorSpace, InputError, image_size
 
 PNG_START_BYTES = 8
@@ -91,7 +91,7 @@ def write_picture(
     stored = _stored(pixels, form.bits_for(path), kind.is_linear)
     exif = exif_for(metadata.exif, size, color_space, form.keeps_position)
     encoded = _Encoded(stored, color_space, form.quality, exif, metadata)
-    with atomic_write(path) as temporary:
+    with write_file(path) as temporary:
         try:
             resolve_name(f"{__name__}:{kind.write}")(temporary, encoded)
         except InputError as error:

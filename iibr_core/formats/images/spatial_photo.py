@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from iibr_core.formats.files import reason_of
 from iibr_core.formats.images.iso_boxes import box, boxes
-from iibr_core.formats.outputs import atomic_write
+from iibr_core.formats.outputs import write_file
 from iibr_core.types import InputError
 
 QUALITY = 92
@@ -38,7 +38,7 @@ def write_spatial_photo(path: Path, left: NDArray[np.uint8], right: NDArray[np.u
     if left.shape != right.shape:
         raise ValueError(f"the left picture is {left.shape}, the right one {right.shape}")
     stored = _with_pair(_encode(path, left, right), focal_px / left.shape[1])
-    with atomic_write(path) as temporary:
+    with write_file(path) as temporary:
         temporary.write_bytes(stored)
 
 

@@ -7,6 +7,7 @@ import re
 from abc import ABC, abstractmethod
 from collections.abc import Iterable
 from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import ExitStack
 from pathlib import Path
 from threading import Semaphore
 from types import TracebackType
@@ -16,8 +17,7 @@ import numpy as np
 
 from iibr_core.formats.files import entries_of, is_folder
 from iibr_core.formats.maps.pfm import write_pfm
-from iibr_core.formats.outputs import UnfinishedFolder, require_folder_place
-from iibr_core.formats.unfinished import remove_leftovers
+from iibr_core.formats.outputs import check_output_folder, write_folder
 from iibr_core.types import GridShape, ImageSize, InputError, ViewUpdate, image_size
 
 WRITING_THREADS = 2
@@ -49,15 +49,14 @@ class FolderWriter(ABC):
 
     @classmethod
     def require_place(cls, folder: Path, inputs: Iterable[Path] = (), may_replace: bool = False) -> None:
-        """Raise InputError as `require_folder_place` does, and where the folder holds anything but a light field."""
+        """Raise InputError as `check_output_folder` does, and where the folder holds anything but a light field."""
         cls._require_own(folder)
-        require_folder_place(folder, inputs, may_replace, is_whole=True)
+        check_output_folder(folder, inputs, may_replace)
 
     @classmethod
     def _require_own(cls, folder: Path) -> None:
         if not is_folder(folder):
             return
-        remove_leftovers(folder)
         foreign = next((file.name for file in entries_of(folder) if not cls.own_file.fullmatch(file.name)), None)
         if foreign is not None:
             raise InputError(f"{folder}: holds other files ({foreign}); choose an empty or new folder with --out")
@@ -65,7 +64,8 @@ class FolderWriter(ABC):
     def __enter__(self) -> Self:
         """Make the temporary folder."""
         self._require_own(self.folder)
-        self._unfinished = UnfinishedFolder(self.folder)
+        self._stack = ExitStack()
+        self._unfinished = self._stack.enter_context(write_folder(self.folder))
         self._pool = ThreadPoolExecutor(WRITING_THREADS, thread_name_prefix="view-writer")
         return self
 
@@ -89,13 +89,12 @@ class FolderWriter(ABC):
         self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
     ) -> None:
         """Put the folder in its place, or remove it."""
-        try:
+        with self._stack:
             self._pool.shutdown(wait=True, cancel_futures=kind is not None)
-            if kind is None:
-                self._finish()
-        finally:
             self._end_writing()
-            self._unfinished.discard()
+            if value is not None:
+                raise value
+            self._finish()
 
     def _end_writing(self) -> None:
         """Wait for what is being written: the pool knows no thread that an interruption struck while it began."""
@@ -109,8 +108,7 @@ class FolderWriter(ABC):
         total = self.grid.rows * self.grid.columns
         if len(self._added) != total:
             raise InputError(f"{self.folder}: only {len(self._added)} of {total} views were made; nothing was written")
-        self.finish_folder(self._unfinished.path)
-        self._unfinished.put_in_place()
+        self.finish_folder(self._unfinished)
 
     def _write(self, update: ViewUpdate) -> None:
         try:
@@ -118,13 +116,13 @@ class FolderWriter(ABC):
                 if not self._is_over:
                     self._write_view(update)
         except InputError as error:  # the temporary folder's name says nothing to people
-            raise InputError(str(error).replace(str(self._unfinished.path), str(self.folder))) from error
+            raise InputError(str(error).replace(str(self._unfinished), str(self.folder))) from error
 
     def _write_view(self, update: ViewUpdate) -> None:
         from iibr_core.formats.images.photo import write_image  # brings numba, for which no refusal should wait
 
         extension = ".png" if update.colors.dtype == np.uint8 else ".exr"
-        folder = self._unfinished.path
+        folder = self._unfinished
         view = folder / self.view_name(update.row, update.column, extension)
         view.parent.mkdir(exist_ok=True)
         write_image(view, update.colors)

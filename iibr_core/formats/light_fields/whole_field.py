@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.color import encoded_from_stored, linear_from_srgb
-from iibr_core.formats.outputs import require_file_place
+from iibr_core.formats.outputs import check_output
 from iibr_core.types import FloatImage, GridShape, ImageSize, InputError, StoredColors, ViewUpdate, image_size
 
 LENSLET_TAG = re.compile(r"_eslf$", re.IGNORECASE)
@@ -44,10 +44,10 @@ class _FileWriter(ABC):
 
     @classmethod
     def require_place(cls, path: Path, inputs: Iterable[Path] = (), may_replace: bool = False) -> None:
-        """Raise InputError as `require_file_place` does, and for another ending."""
+        """Raise InputError as `check_output` does, and for another ending."""
         if not path.name.lower().endswith(cls.ending):
             raise InputError(f"{path}: a light field in one file must end in {cls.ending}")
-        require_file_place(path, inputs, may_replace)
+        check_output(path, inputs, may_replace)
 
     def __enter__(self) -> Self:
         self._views = tempfile.TemporaryFile()

@@ -10,7 +10,7 @@ import numpy as np
 
 from iibr_core.color import ROWS_AT_ONCE
 from iibr_core.formats.files import MAX_FILE_PIXELS, open_binary
-from iibr_core.formats.outputs import atomic_write
+from iibr_core.formats.outputs import write_file
 from iibr_core.types import FloatImage, ImageSize, InputError
 
 # The header ends with exactly one white-space character (or CR LF); the next byte is data.
@@ -65,7 +65,7 @@ def _header(path: Path, file: BinaryIO) -> tuple[ImageSize, np.dtype[Any], int]:
 def write_pfm(path: Path, values: FloatImage) -> None:
     """Write an (H, W) map, little-endian float32, whole or not at all. Raises InputError where it cannot be written."""
     height, width = values.shape
-    with atomic_write(Path(path)) as temporary:
+    with write_file(Path(path)) as temporary:
         header = f"Pf\n{width} {height}\n-1.0\n".encode()
         temporary.write_bytes(header + values[::-1].astype("<f4").tobytes())
 

@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 
-from iibr_core.runtime.jit import kernel
+from iibr_core.runtime.kernels import kernel
 from iibr_core.types import FloatImage, ImageSize
 
 # Values under one filter footprint that differ by more than this share of the map's range belong to different surfaces.

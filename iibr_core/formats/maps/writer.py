@@ -10,7 +10,7 @@ import numpy as np
 from iibr_core.formats.images.oiio_writer import write_image_file
 from iibr_core.formats.maps.map_text import KEY, MapText, text_of
 from iibr_core.formats.maps.pfm import write_pfm
-from iibr_core.formats.outputs import atomic_write
+from iibr_core.formats.outputs import write_file
 from iibr_core.types import FloatImage, InputError
 
 MAP_SUFFIXES = (".pfm", ".exr", ".npy", ".png", ".tif", ".tiff")
@@ -37,7 +37,7 @@ def write_map(path: Path, values: FloatImage, text: MapText = DISPARITY) -> str:
     if kind == ".pfm":
         write_pfm(path, values)
     elif kind == ".npy":
-        with atomic_write(path) as temporary:
+        with write_file(path) as temporary:
             np.save(temporary, np.asarray(values, np.float32))
     else:
         _write_plane(path, np.asarray(values, np.float32), "float", text)

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from iibr_core.rendering.gloss.geometry import SceneGeometry
 from iibr_core.rendering.gloss.gloss_settings import GlossStroke, GlossSurface
-from iibr_core.runtime.jit import kernel
+from iibr_core.runtime.kernels import kernel
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never, raise_if_stopped
 from iibr_core.types import FloatImage, image_size
 

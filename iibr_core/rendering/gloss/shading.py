@@ -20,7 +20,8 @@ from iibr_core.rendering.gloss.light_search import find_light
 from iibr_core.rendering.gloss.microfacet import lobe_shares, reflected_share
 from iibr_core.rendering.gloss.reflection import reflection_disparity
 from iibr_core.rendering.gloss.separation import reflected_light, separate_light
-from iibr_core.runtime.jit import kernel, linear_scalar, srgb_scalar
+from iibr_core.runtime.kernels import kernel
+from iibr_core.runtime.scalars import linear_scalar, srgb_scalar
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never
 from iibr_core.surfaces import EDGE_PX
 from iibr_core.types import FloatImage, GridShape, ViewOffset, ViewUpdate, image_size

@@ -6,7 +6,7 @@ from math import inf, sqrt
 
 import numpy as np
 
-from iibr_core.runtime.jit import kernel
+from iibr_core.runtime.kernels import kernel
 from iibr_core.training.scenes.textures import inside_pattern, noise, pattern, rough_noise
 
 PLANE, BOX, BALL, WIRE = range(4)

@@ -15,7 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from iibr_core.runtime.jit import kernel, srgb_scalar
+from iibr_core.runtime.kernels import kernel
+from iibr_core.runtime.scalars import srgb_scalar
 from iibr_core.runtime.tiling import THREADS
 from iibr_core.training.scenes.primitives import PLANE, albedo_at, distance_along, normal_at
 from iibr_core.training.scenes.textures import is_cut

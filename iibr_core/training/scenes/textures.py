@@ -10,7 +10,7 @@ from math import cos, floor, pi, sin, sqrt
 
 import numpy as np
 
-from iibr_core.runtime.jit import kernel
+from iibr_core.runtime.kernels import kernel
 
 NOISE, WAVES, STRIPES, CHECKS, SPOTS = range(5)
 PATTERNS = (NOISE, WAVES, STRIPES, CHECKS, SPOTS)

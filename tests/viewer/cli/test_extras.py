@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from tests.viewer.conftest import write_scene
+from viewer import entry
 
 ROOT = Path(__file__).parents[3]
 EXTRAS = (
@@ -27,8 +28,8 @@ EXTRAS = (
 START = f"""
 import sys
 sys.modules.update(dict.fromkeys({EXTRAS!r}))  # None: there is no such module
-from viewer.entry import main
-main()
+from viewer.entry import command
+command()
 """
 
 
@@ -81,12 +82,9 @@ def test_what_needs_one_names_it_in_one_line(tmp_path: Path, words: tuple[object
 def test_lpips_asks_for_torch(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
-    from viewer.cli.main import main
-
     monkeypatch.setitem(sys.modules, "torch", None)
     monkeypatch.setattr(sys, "argv", ["iibr", "evaluate", str(tmp_path), "--out", str(tmp_path / "r"), "--lpips", "x"])
-    with pytest.raises(SystemExit, match="2"):
-        main()
+    assert entry.run() == 2
     assert "torch; install with: pip install 'iibr[train]'" in capsys.readouterr().err
 
 

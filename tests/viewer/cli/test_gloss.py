@@ -100,11 +100,8 @@ def test_maps_take_no_gloss(
 def test_without_gloss_none_of_it_is_even_imported(photo_path: Path, tmp_path: Path) -> None:
     code = """
 import sys
-from viewer.cli.main import main
-try:
-    main()
-except SystemExit as ended:
-    print(ended.code, [name for name in sys.modules if name.startswith("iibr_core.rendering.gloss.")])
+from viewer.entry import run
+print(run(), [name for name in sys.modules if name.startswith("iibr_core.rendering.gloss.")])
 """
     ended = run_apart(code, "generate", photo_path, "--grid", 3, "--out", tmp_path / "new")
     assert (

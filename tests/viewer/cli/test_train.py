@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import math
 import signal
-import sys
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from tests.viewer.cli.test_cli import run, run_apart
-from viewer.cli.main import main
 
 WORDS = ("train", "--device", "cpu", "--seed", 3)
 WRITTEN = ["w.checkpoint.safetensors", "w.csv", "w.safetensors"]
@@ -153,13 +151,6 @@ def test_what_is_there_is_replaced_only_by_force(
     assert names(tmp_path) == [name]
     assert run(monkeypatch, *words, "--force") == 0
     assert names(tmp_path) == WRITTEN
-
-
-def test_a_bug_in_a_batch_is_shown_as_one(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr("iibr_core.training.batches.training_batch", lambda step, seed: 1 / 0)
-    monkeypatch.setattr(sys, "argv", ["iibr", "train", "--steps", "2", "--out", str(tmp_path / "w.safetensors")])
-    with pytest.raises(ZeroDivisionError):
-        main()
 
 
 def test_help_does_not_wait_for_torch() -> None:

@@ -1,1 +1,0 @@
-"""Every command against what goes wrong: bad files, paths, options, environments, limits. One line, nothing harmed."""
