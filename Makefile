@@ -39,7 +39,6 @@ figures: install
 
 fuzz: install
 	@.ci/system-libraries test
-	IIBR_TEST_ALL_VALUES=1 $(BIN)/pytest tests/iibr_core/test_wild_values.py
 	$(BIN)/python -m benchmarks.fuzz
 
 # The pages of docs/ as a web site; warnings, broken links among them, are errors.

@@ -50,12 +50,11 @@ def soft_maps(docs: Path) -> str:
 
 def figures(docs: Path) -> str:
     """One line each."""
-    free, speed, memory = docs / "free_views.md", docs / "speed.md", docs / "memory.md"
+    free, speed = docs / "free_views.md", docs / "speed.md"
     field = partial(cell, docs / "figures.md", "field-disparity")
     stop = partial(cell, docs / "figures.md", "cancelled", "fast")
     lens = partial(cell, row="balanced", column="path-traced lens")
     warm = partial(cell, speed, "Targets", column="measured")
-    kept = [float(line[-1]) for line in table(memory, "predicted", "ratio")[1:]]
     ours, warp = (cell(free, "poses", f"all | {way}", "frame dB") for way in ("ours", "resampled"))
     rows = {
         "[free cameras](free_views.md), eight poses of eight scenes": f"{ours} dB; a resampling warp {warp} dB",
@@ -63,7 +62,6 @@ def figures(docs: Path) -> str:
         "81 views of 512x512, warm, *fast*": warm(row="9x9 of 512x512, hci_antinous, fast"),
         "the same, *balanced*": warm(row="9x9 of 512x512, hci_antinous, balanced"),
         "a cancelled job at 4 MP": f"ends after {stop('after, ms')} ms (median), {stop('longest')} ms at the longest",
-        "[memory](memory.md) predicted, over what twelve commands took": f"{min(kept):.2f} to {max(kept):.2f}",
         "two fields refocused, against a path-traced thin lens": " and ".join(
             f"{lens(docs / 'evaluation' / f'{scene}.md', f'{scene}: {CENTRE}')} dB" for scene in ("shelf", "fence")
         ),

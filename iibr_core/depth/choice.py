@@ -54,8 +54,7 @@ class DepthChoice:
     values, which are then px per view step; None: as the file has them. inverts: near and far change places, whatever
     was found. is_metric: the map or the model gives distances. stretches: a map of another shape shows the whole photo.
     model: a folder or a known model's name, None for the usual one if it is there. refine: how far disparity edges are
-    drawn to the photo's, 0 (not at all) to 1. memory_bytes: what a model may take, and the views made with its depth;
-    None for a share of what there is.
+    drawn to the photo's, 0 (not at all) to 1.
     """
 
     start: DepthStart = "auto"
@@ -66,7 +65,6 @@ class DepthChoice:
     stretches: bool = False
     model: str | None = None
     refine: float = 1.0
-    memory_bytes: int | None = None
 
     @property
     def asks_for_model(self) -> bool:

@@ -175,7 +175,7 @@ def estimator_of(found: PhotoWithDepth, choice: DepthChoice) -> EstimateDepth | 
         model = model_to_use(choice)
         if model is None:
             raise InputError(f"{found.origin.words}: the model no longer exists")
-        depth = estimate_with(model, replace(found.photo, pixels=colors), choice.memory_bytes, should_stop)
+        depth = estimate_with(model, replace(found.photo, pixels=colors), should_stop)
         if found.origin.near:  # the first estimate decided, for all
             depth = turned_estimate(depth, (found.origin.near == "the high end") != choice.inverts, choice)
         return _at_size(disparity_from(_as_chosen(depth, choice), USUAL_GRID), found.photo)
@@ -257,7 +257,7 @@ class _DepthSearch:
     def of_pair(self) -> _FoundDepth | None:
         from iibr_core.depth.stereo_pair import estimate_from_pair
 
-        found = estimate_from_pair(self.path, self.choice.memory_bytes, self.should_stop, self.report_progress)
+        found = estimate_from_pair(self.path, self.should_stop, self.report_progress)
         if found is None:
             return None
         estimate, layout = found
@@ -272,7 +272,7 @@ class _DepthSearch:
         from iibr_core.depth.estimators.estimate_depth import estimate_with
 
         raise_if_stopped(self.should_stop)
-        estimate = estimate_with(model, self.photo, self.choice.memory_bytes, self.should_stop, self.report_progress)
+        estimate = estimate_with(model, self.photo, self.should_stop, self.report_progress)
         told = depth_of_model(model.title, estimate, is_meaning_known(model), self.photo, self.choice)
         origin = DepthOrigin("model", f"estimated by {model.title}", near=told.near)
         return _FoundDepth(self.photo, origin, told.estimate, told.notes)

@@ -12,7 +12,7 @@ from iibr_core.depth.multi_view.estimate_disparity import estimate_coarse, estim
 from iibr_core.formats.images.photo import read_picture
 from iibr_core.formats.images.side_by_side import own_picture
 from iibr_core.formats.light_fields.stereo_file import read_stereo_file
-from iibr_core.runtime.machine import usual_budget_bytes
+from iibr_core.runtime.machine import free_memory_bytes
 from iibr_core.runtime.tiling import ShouldStop, never
 from iibr_core.types import InputError, ReportProgress, ignore_progress, image_size
 
@@ -22,7 +22,6 @@ MATCHED_PIXELS = 400_000
 
 def estimate_from_pair(
     path: Path,
-    memory_bytes: int | None = None,
     should_stop: ShouldStop = never,
     report_progress: ReportProgress = ignore_progress,
 ) -> tuple[DisparityMap, str] | None:
@@ -45,8 +44,7 @@ def estimate_from_pair(
     offsets = [view.offset for view in scene.views]
     reference = held.index(own_picture(path))
     coarse = estimate_coarse(views, offsets, reference, should_stop)
-    allowed = memory_bytes or usual_budget_bytes()
-    if sweep_bytes(coarse.values.shape, coarse.range_px, 1.0) > allowed:
-        raise InputError(f"{path}: matching its two views takes more memory than there is: raise --memory")
+    if sweep_bytes(coarse.values.shape, coarse.range_px, 1.0) > free_memory_bytes():
+        raise InputError(f"{path}: matching its two views takes more memory than there is")
     values = estimate_disparity(views, offsets, reference, coarse.range_px, should_stop)
     return DisparityMap(values.astype(np.float32)), scene.layout

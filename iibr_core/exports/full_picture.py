@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from iibr_core.color import bytes_from_encoded, primaries_matrix, srgb_from_linear, stored_from_encoded
 from iibr_core.exports.render_settings import LensTile, RenderSettings
 from iibr_core.exports.source import Draw
-from iibr_core.generation.memory_model import budget_of, require_own_size
+from iibr_core.generation.memory import require_memory
 from iibr_core.generation.plan import ScenePlan
 from iibr_core.rendering.optics import CENTRE, Optics
 from iibr_core.runtime.tiling import ShouldStop, in_bands, never, raise_if_stopped
@@ -45,6 +45,8 @@ if TYPE_CHECKING:
 MAX_PIXELS = 100_000_000
 """Greatest number of the photo's pixels; a larger photo is read that large."""
 
+OWN_SIZE_BYTES = 60
+"""Of a pixel of a picture at the photo's own size, while it is drawn."""
 TILE_PX = 768
 """Side of a tile in pixels of the photo, without what its views show around it."""
 
@@ -235,11 +237,6 @@ def require_full(scene: Scene, optics: Optics) -> None:
 
     if scene.plan is None or scene.own_size is None:
         return
-    (width, height), (own_width, own_height) = scene.size, scene.own_size
-    budget = budget_of(scene.source.depth.memory_bytes)
+    own_width, own_height = scene.own_size
     read = size_within(ImageSize(own_height, own_width), MAX_PIXELS)
-    # Views of a tile reach around it by the parallax from the eye; the lens adds less than a tile.
-    views = max(map(abs, optics.eye)) + optics.aperture_diameter
-    reach_px = views * max(map(abs, scene.disparity_range_px)) * read.width / width
-    tile = ImageSize(*(min(side, TILE_PX + 2 * math.ceil(min(reach_px, side))) for side in read))
-    require_own_size(budget, read, ImageSize(height, width), 0, tile, _shows_hidden(optics))
+    require_memory(math.prod(read) * OWN_SIZE_BYTES, f"a picture at the photo's own size, {read},")

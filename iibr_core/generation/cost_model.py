@@ -14,12 +14,13 @@ from typing import NamedTuple, get_args
 
 import numpy as np
 
-from iibr_core.generation.memory_model import DRAFT_BYTES, Making, making_bytes, undecided_bytes
-from iibr_core.generation.outer_views import outer_views_of_grid, outpainting_margins
+from iibr_core.generation.outer_views import outer_views_of_grid
 from iibr_core.runtime.tiling import THREADS, in_bands
-from iibr_core.types import FloatImage, GridShape, ImageSize, Quality, ViewOffset, image_size
+from iibr_core.types import FloatImage, GridShape, ImageSize, Quality, image_size
 
 CORES = THREADS
+DRAFT_BYTES = 11
+"""Of a pixel of a draft: colours twice, disparity, whether it is inpainted."""
 STILL_PX = 0.5
 """Less parallax than this across the whole grid cannot be seen: the scene is flat."""
 SMOOTH_PX = 0.4
@@ -47,12 +48,9 @@ NANOSECONDS = Workload(45.0, 585.0, 1295.0)
 
 
 class CostEstimate(NamedTuple):
-    """What making all views takes: seconds on all cores of a machine like the one measured on, and memory at most,
-    the finished views not counted. draft_bytes: beside that, where all views may wait as drafts.
-    """
+    """Cost of making all views: seconds on all cores of a machine like the one measured on, and bytes of all drafts."""
 
     seconds: float
-    peak_bytes: int
     draft_bytes: int = 0
 
 
@@ -67,23 +65,20 @@ class CostEstimates(NamedTuple):
         return self.fast if quality == "fast" else self.balanced
 
 
-NO_COST = CostEstimates(*2 * [CostEstimate(0.0, 0)])
+NO_COST = CostEstimates(*2 * [CostEstimate(0.0)])
 
 
 @dataclass(frozen=True, eq=False)
 class ParallaxStatistics:
     """How content of a photo of a size moves in the outermost view, px. step (M, N): the largest difference between
     neighbours in each cell of CELL_PX x CELL_PX pixels. spread (M, N): from the least to the most in it and the cells
-    to the right and below. most_px: of all content. hole_share: of the pixels, those it shows and the photo hides, at
-    most. canvas: the photo with what the outer views see beyond its frame.
+    to the right and below. most_px: of all content.
     """
 
     size: ImageSize
     step: FloatImage
     spread: FloatImage
     most_px: float
-    hole_share: float
-    canvas: ImageSize
 
     @property
     def pixels(self) -> int:
@@ -129,8 +124,6 @@ def measure_parallax(disparity: FloatImage, outermost: float) -> ParallaxStatist
         step[1:-1, 1:-1],
         _spread(moved),
         float(np.abs(moved).max()),
-        _hole_share(moved),
-        outpainting_margins(moved, [ViewOffset(-1.0, -1.0), ViewOffset(1.0, 1.0)]).around(image_size(moved)),
     )
 
 
@@ -146,18 +139,6 @@ def _spread(moved: FloatImage) -> FloatImage:
     return np.asarray(around[0] - around[1])
 
 
-def _hole_share(moved: FloatImage) -> float:
-    """At most that share of a view is hidden in the photo, content moving by so much (H, W) both ways."""
-    share = 0.0
-    for axis in (0, 1):
-        steps = np.abs(np.diff(moved, axis=axis))
-        # What one edge discloses its opposite hides: half of the steps count.
-        share += 0.5 * float(steps.sum(where=steps > STILL_PX, dtype=np.float64)) / moved.size
-        ends = moved.take([0, -1], axis)
-        share += float(np.abs(ends).max()) / moved.shape[axis]
-    return min(share, 1.0)
-
-
 def largest_offset(grid: GridShape) -> float:
     """The largest view offset of a grid, view steps."""
     return max(abs(part) for v in (0, grid.rows - 1) for u in (0, grid.columns - 1) for part in grid.offset(v, u))
@@ -170,7 +151,7 @@ def estimate_costs(statistics: ParallaxStatistics, grid: GridShape) -> CostEstim
         work = estimate_workload(statistics, grid, quality)
         seconds = sum(amount * each for amount, each in zip(work, NANOSECONDS)) * 1e-9 / CORES
         drafts = _draft_bytes(statistics, grid) if quality == "balanced" else 0
-        found.append(CostEstimate(seconds, _peak_bytes(statistics, grid, quality), drafts))
+        found.append(CostEstimate(seconds, drafts))
     return CostEstimates(*found)
 
 
@@ -196,17 +177,16 @@ def _inpainted_views(statistics: ParallaxStatistics, grid: GridShape) -> int:
     return len(outer_views_of_grid(grid)) if statistics.has_disocclusion else 0
 
 
-def _peak_bytes(statistics: ParallaxStatistics, grid: GridShape, quality: Quality) -> int:
-    """Memory while views are made, see `making_bytes`."""
-    asked = statistics.ambiguous_share(1.0) if quality == "balanced" else 0.0
-    images = 2 + _inpainted_views(statistics, grid)
-    holes = statistics.hole_share if statistics.has_disocclusion else 0.0
-    return making_bytes(Making(statistics.pixels, math.prod(statistics.canvas), images, holes, asked))
-
-
 def _draft_bytes(statistics: ParallaxStatistics, grid: GridShape) -> int:
     """What drafts take once all views are there. Those of inpainted views lie in the ray set."""
     views = grid.rows * grid.columns - 1
     drafts = views - _inpainted_views(statistics, grid)
     undecided = _sum_over_views(statistics.ambiguous_share, grid) * drafts / max(views, 1)
     return round(statistics.pixels * (drafts * DRAFT_BYTES + undecided * undecided_bytes()))
+
+
+def undecided_bytes() -> int:
+    """Of a ray that the transformer is still to be asked for. Imported here: a plan loads kernels once it is made."""
+    from iibr_core.rendering.ambiguous_rays import HYPOTHESES
+
+    return 9 + 13 * HYPOTHESES

@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 from iibr_core.color import encoded_from_stored
 from iibr_core.generation.field_work import OUTER_WORK
 from iibr_core.generation.light_field import nearest_first
-from iibr_core.generation.memory_model import MOST_COMPLETING
 from iibr_core.generation.stored_views import encode_for_storage
 from iibr_core.inpainting.background import fill_background
 from iibr_core.inpainting.inpainter import Inpainter
@@ -39,6 +38,8 @@ from iibr_core.types import (
     image_size,
 )
 
+MOST_COMPLETING = 10
+"""Views that complete the rays of several photos: three rows of three at most, and the centre."""
 BESIDE_WEIGHT = 0.02
 """Of a given view a whole step away, against 1 for one in the very place: it counts where nearer ones see nothing."""
 COVERED_POWER = 2

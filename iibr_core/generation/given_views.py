@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 from iibr_core.depth.multi_view.estimate_disparity import estimate_coarse, sweep_bytes
@@ -9,10 +10,12 @@ from iibr_core.depth.multi_view.every_view import estimate_all
 from iibr_core.formats.light_fields.multi_view_scene import MultiView
 from iibr_core.formats.light_fields.views import grid_of, read_views
 from iibr_core.generation.dense_field import GivenView
-from iibr_core.generation.memory_model import WRITER_BYTES, Budget, require_dense_field
+from iibr_core.generation.memory import require_memory
 from iibr_core.runtime.tiling import ShouldStop, never, raise_if_stopped
 from iibr_core.types import GridShape, ReportProgress, ViewUpdate, ignore_progress
 
+VIEW_BYTES = 60
+"""Of a pixel of each view: its colours, its disparity, and two images of rays."""
 READ_WORK, NEW_VIEW_WORK = 0.05, 0.3
 """What reading a view takes, and making a new one, where finding disparity by carrying that of others takes 1."""
 
@@ -36,7 +39,6 @@ class DenseFieldWork:
 
 def read_given_views(
     scene: MultiView,
-    budget: Budget,
     should_stop: ShouldStop = never,
     report_progress: ReportProgress = ignore_progress,
 ) -> list[GivenView]:
@@ -46,7 +48,8 @@ def read_given_views(
     should_stop is true.
     """
     grid, (size, views) = grid_of(scene), read_views(scene)
-    require_dense_field(budget, scene.name, size, grid)
+    what = f"making views between {grid.columns} x {grid.rows} of {scene.name} ({size})"
+    require_memory(math.prod(size) * math.prod(grid) * VIEW_BYTES, what)
     read: list[ViewUpdate] = []
     for view in views:
         raise_if_stopped(should_stop)
@@ -56,8 +59,7 @@ def read_given_views(
         colors, offsets = [view.colors for view in read], [grid.offset(view.row, view.column) for view in read]
         # The centre comes first.
         range_px = estimate_coarse(colors, offsets, 0, should_stop).range_px
-        needed = WRITER_BYTES + sweep_bytes(size, range_px, float(max(grid) - 1))
-        budget.require(needed, f"{scene.name}: finding its disparity", "raise --memory")
+        require_memory(sweep_bytes(size, range_px, float(max(grid) - 1)), f"{scene.name}: finding its disparity")
         before = READ_WORK * len(read)
 
         def report(done: float, total: float, doing: str) -> None:

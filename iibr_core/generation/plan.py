@@ -6,6 +6,7 @@ and half floats gain 0.03 dB over bytes for 1.4 times the memory of the field, s
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from math import ceil
 
@@ -15,23 +16,12 @@ from iibr_core.generation.cost_model import (
     NO_COST,
     STILL_PX,
     CostEstimates,
-    ParallaxStatistics,
     estimate_costs,
     largest_offset,
     measure_parallax,
 )
 from iibr_core.generation.disparity_range import measure_disparity_range
-from iibr_core.generation.memory_model import (
-    HEADROOM,
-    LEAST_PIXELS,
-    Budget,
-    budget_of,
-    largest_side,
-    mebibytes,
-    process_bytes,
-    view_bytes,
-    whole_bytes,
-)
+from iibr_core.generation.memory import MAKING_BYTES, budget_bytes, mebibytes, require_memory, scene_bytes, view_bytes
 from iibr_core.generation.outer_views import outer_views_of_grid
 from iibr_core.generation.plan_reasons import edge_reasons, grid_reason, quality_reason, wild_reasons
 from iibr_core.inpainting.registry import DEFAULT_INPAINTER
@@ -63,14 +53,13 @@ class PlanOverrides:
     """What the user decided; None leaves the choice to the plan.
 
     depth_strength multiplies the parallax the plan chose; focus_disparity (px per view step, as given) is the plane
-    that stays still. memory_bytes: what the whole process may take. quality: that views will be made in. inpaint: what
+    that stays still. quality: that views will be made in. inpaint: what
     will fill their holes, see `load_inpainter`.
     """
 
     grid: GridShape | None = None
     depth_strength: float = 1.0
     focus_disparity: float | None = None
-    memory_bytes: int | None = None
     quality: Quality | None = None
     inpaint: str = DEFAULT_INPAINTER
 
@@ -82,10 +71,10 @@ class ScenePlan:
     grid: stored views. disparity_scale, disparity_zero: the field's disparity is (given - zero) * scale. given_range:
     farther and nearer ones count as its ends; None where all count as they are.
     disparity_range_px: least and greatest field disparity (px per view step). edge_fraction: share of pixels within 3
-    px of a depth edge. has_disocclusion: whether any view shows what the photo hides. field_bytes, peak_bytes: memory
-    of the light field, and at most while generating it, the field not counted. reasons: the same in sentences. costs:
+    px of a depth edge. has_disocclusion: whether any view shows what the photo hides. field_bytes: memory
+    of the light field. reasons: the same in sentences. costs:
     time and memory of making all views, in each quality. quality: the one to make them in. draft_bytes: what drafts of
-    views may take, beside peak_bytes. notes: what the user should know of the choices, one sentence each.
+    views may take. notes: what the user should know of the choices, one sentence each.
     """
 
     grid: GridShape
@@ -95,7 +84,6 @@ class ScenePlan:
     edge_fraction: float
     has_disocclusion: bool
     field_bytes: int
-    peak_bytes: int
     reasons: tuple[str, ...]
     costs: CostEstimates = NO_COST
     given_range: tuple[float, float] | None = None
@@ -121,7 +109,6 @@ def plan_for_viewing(
     wanted = overrides or PlanOverrides()
     if not abs(wanted.depth_strength) <= MOST_STRENGTH:
         raise InputError(f"--depth-strength {wanted.depth_strength:g}: give a number up to {MOST_STRENGTH:g}")
-    budget = budget_of(wanted.memory_bytes)
     span = measure_disparity_range(disparity.values)
     given = disparity.values
     disparity = replace(disparity, values=np.clip(given, span.low, span.high))
@@ -137,9 +124,7 @@ def plan_for_viewing(
         grid = wanted.grid
         reasons.append(f"{grid.columns} x {grid.rows} views, as asked.")
     else:
-        most_moved = 0.5 * parallax_px / span.range if parallax_px else 0.0
-        statistics = measure_parallax(disparity.values - np.float32(zero), most_moved)
-        grid = _grid_for(parallax_px, statistics, photo, budget, wanted.quality or DEFAULT_QUALITY)
+        grid = _grid_for(parallax_px, photo)
         reasons.append(grid_reason(grid, parallax_px))
     steps = max(grid.rows, grid.columns) - 1
     scale = parallax_px / steps / span.range * np.sign(wanted.depth_strength) if steps and parallax_px else 0.0
@@ -148,8 +133,8 @@ def plan_for_viewing(
             f"The nearest moves {parallax_px:.0f} px against the farthest, {parallax_px / width:.1%} of the width."
         )
     reasons += wild_reasons(given, span)
-    plan = _complete_plan(photo, disparity, grid, float(scale), zero, reasons, wanted.quality, wanted.inpaint, budget)
-    _require_room(plan, photo, budget, keeps_views)
+    plan = _complete_plan(photo, disparity, grid, float(scale), zero, reasons, wanted.quality, wanted.inpaint)
+    _require_room(plan, photo, keeps_views)
     return replace(plan, given_range=(span.low, span.high))
 
 
@@ -157,7 +142,6 @@ def plan_literal(
     photo: Photo,
     disparity: Disparity,
     grid: GridShape,
-    memory_bytes: int | None = None,
     quality: Quality | None = None,
     keeps_views: bool = False,
     inpaint: str = DEFAULT_INPAINTER,
@@ -168,9 +152,8 @@ def plan_literal(
     Raises InputError if the grid has no view or generating it does not fit into memory.
     """
     reasons = [f"{grid.columns} x {grid.rows} views at the given disparity."]
-    budget = budget_of(memory_bytes)
     plan = _complete_plan(photo, disparity, grid, 1.0, 0.0, reasons, quality, inpaint)
-    _require_room(plan, photo, budget, keeps_views)
+    _require_room(plan, photo, keeps_views)
     return replace(plan, notes=_wide_notes(plan, photo.size.width))
 
 
@@ -186,32 +169,18 @@ def _wide_notes(plan: ScenePlan, width: int) -> tuple[str, ...]:
     )
 
 
-def _require_room(plan: ScenePlan, photo: Photo, budget: Budget, keeps_views: bool) -> None:
-    """Raise InputError where the whole does not fit, telling what would."""
-    pixels, making = photo.size.height * photo.size.width, plan.peak_bytes
-    needed = whole_bytes(pixels, plan.field_bytes, making, keeps_views)
+def _require_room(plan: ScenePlan, photo: Photo, keeps_views: bool) -> None:
     what = f"{plan.grid.columns} x {plan.grid.rows} views of {photo.name} ({photo.size})"
-    beside = needed - round(HEADROOM * plan.field_bytes)
-    side = largest_side(budget, beside, view_bytes(pixels, photo.is_hdr)) if keeps_views else 0
-    fits = f"at most --grid {side}, or " if side > 1 else ""
-    # Nearly all of it grows with the pixels.
-    process = process_bytes(keeps_views)
-    fitting = max(int(0.95 * pixels * (budget.bytes - process) / (needed - process)), 0)
-    lower = f"lower --max-pixels to {fitting}" if fitting > LEAST_PIXELS else "lower --max-pixels"
-    budget.require(needed, what, f"{fits}raise --memory or {lower}")
+    require_memory(scene_bytes(math.prod(photo.size), plan.field_bytes if keeps_views else 0), what)
 
 
-def _grid_for(
-    parallax_px: float, statistics: ParallaxStatistics, photo: Photo, budget: Budget, quality: Quality
-) -> GridShape:
-    """The smallest odd grid whose neighbouring views differ by at most STEP_PX, as far as memory allows."""
+def _grid_for(parallax_px: float, photo: Photo) -> GridShape:
+    """Return the smallest odd grid whose neighbouring views differ by at most STEP_PX, as far as memory allows."""
     if parallax_px < STILL_PX:
         return GridShape(1, 1)
     side = min(2 * ceil(parallax_px / STEP_PX / 2) + 1, MOST_VIEWS_A_SIDE)
-    making = estimate_costs(statistics, GridShape(side, side)).of(quality).peak_bytes
-    pixels = photo.size.height * photo.size.width
-    each_view = view_bytes(pixels, photo.is_hdr)
-    while side > 3 and whole_bytes(pixels, side * side * each_view, making, keeps_views=True) > budget.bytes:
+    pixels, budget = math.prod(photo.size), budget_bytes()
+    while side > 3 and scene_bytes(pixels, side * side * view_bytes(pixels, photo.is_hdr)) > budget:
         side -= 2
     return GridShape(side, side)
 
@@ -225,24 +194,18 @@ def _complete_plan(
     reasons: list[str],
     wanted: Quality | None,
     inpaint: str,
-    draft_budget: Budget | None = None,
 ) -> ScenePlan:
-    """The plan with what follows from grid and scale. wanted: the quality the user asked for. draft_budget: what it
-    leaves may go to drafts.
-    """
+    """The plan with what follows from grid and scale. wanted: the quality the user asked for."""
     if grid.rows < 1 or grid.columns < 1:
         raise InputError(f"--grid {grid.columns}x{grid.rows}: give at least one view each way, such as 9")
     field = (disparity.values - np.float32(zero)) * np.float32(scale)
     statistics = measure_parallax(field, largest_offset(grid))
     costs = estimate_costs(statistics, grid)
     quality = wanted or ("balanced" if statistics.ambiguous_share(1.0) > 0 else "fast")
-    pixels, peak_bytes = photo.size.height * photo.size.width, costs.of(quality).peak_bytes
+    pixels = math.prod(photo.size)
     field_bytes = grid.rows * grid.columns * view_bytes(pixels, photo.is_hdr)
-    draft_bytes = 0
-    if draft_budget is not None:
-        left = draft_budget.bytes - whole_bytes(pixels, field_bytes, peak_bytes, keeps_views=True)
-        draft_bytes = max(min(costs.of(quality).draft_bytes, int(left / HEADROOM)), 0)
-    in_all = whole_bytes(pixels, field_bytes, peak_bytes + draft_bytes, keeps_views=True)
+    left = budget_bytes() - scene_bytes(pixels, field_bytes)
+    draft_bytes = max(min(costs.of(quality).draft_bytes, left), 0)
     return ScenePlan(
         grid,
         scale,
@@ -251,13 +214,11 @@ def _complete_plan(
         statistics.edge_share,
         statistics.has_disocclusion,
         field_bytes,
-        peak_bytes,
         (
             *reasons,
             *edge_reasons(statistics, inpaint, len(outer_views_of_grid(grid))),
             quality_reason(quality, wanted is not None),
-            f"Memory: {mebibytes(field_bytes)} for the views, {mebibytes(peak_bytes + draft_bytes)} to make them,"
-            f" {mebibytes(in_all)} in all.",
+            f"Memory: {mebibytes(field_bytes)} for the views, {mebibytes(pixels * MAKING_BYTES)} to make them.",
         ),
         costs,
         quality=quality,

@@ -18,7 +18,6 @@ from iibr_core.formats.images.photo import DEFAULT_MAX_PIXELS, read_photo
 from iibr_core.formats.light_fields.light_field_formats import is_light_field, open_light_field
 from iibr_core.formats.light_fields.multi_view_scene import MultiView
 from iibr_core.formats.light_fields.views import grid_of, read_stored_view, read_views
-from iibr_core.generation.memory_model import budget_of
 from iibr_core.generation.plan import ScenePlan
 from iibr_core.generation.view_maker import ViewMaker
 from iibr_core.inpainting.registry import DEFAULT_INPAINTER
@@ -53,14 +52,12 @@ class ViewOptions(TypedDict, total=False):
 
     parallax: see `Parallax`; "viewing" if left out. depth_strength: times the viewing parallax. quality: "fast"
     or "balanced"; else the plan chooses. inpaint: what fills holes, as `iibr generate --inpaint` takes it.
-    memory_bytes: what the process may take; else a share of what there is.
     """
 
     parallax: Parallax
     depth_strength: float
     quality: Quality
     inpaint: str
-    memory_bytes: int
 
 
 class Scene(ABC):
@@ -86,7 +83,7 @@ class Scene(ABC):
         """All views, in memory.
 
         grid: None for the plan's; of a light field from disk its own. options: see `ViewOptions`; a light field
-        from disk takes inpaint and memory_bytes, for views between its own. report_progress: told the share that is
+        from disk takes inpaint, for views between its own. report_progress: told the share that is
         done. Raises InputError where an option means nothing or memory does not suffice, Cancelled once should_stop is
         true.
         """
@@ -156,9 +153,8 @@ class PhotoScene(Scene):
             raise InputError(f"parallax {parallax!r}: give 'viewing' or 'literal'")
         if parallax == "literal" and (shape is None or options.get("depth_strength", 1) != 1):
             raise InputError("parallax 'literal' takes disparity as it is: give a grid, and no depth_strength")
-        depth = replace(self._source.depth, memory_bytes=options.get("memory_bytes"))
         inpaint, is_literal = _inpainting(options), parallax == "literal"
-        return replace(self._source, depth=depth, grid=shape, quality=quality, inpaint=inpaint, is_literal=is_literal)
+        return replace(self._source, grid=shape, quality=quality, inpaint=inpaint, is_literal=is_literal)
 
     def _make(self, grid: Grid, options: ViewOptions, should_stop: ShouldStop) -> _Making:
         plan = self.plan(grid, **options)
@@ -177,12 +173,11 @@ class FieldScene(Scene):
         self.depth_source = "the light field" if found.disparity else "none"
 
     def _make(self, grid: Grid, options: ViewOptions, should_stop: ShouldStop) -> _Making:
-        _require_known(options, ("inpaint", "memory_bytes"))
+        _require_known(options, ("inpaint",))
         wanted = _grid_shape(grid) or self._grid
         if wanted == self._grid:
             return _Making(wanted, read_views(self._field)[1], None, "reading views")
-        budget = budget_of(options.get("memory_bytes"))
-        dense = read_dense(self._field, wanted, budget, _inpainting(options), should_stop)
+        dense = read_dense(self._field, wanted, _inpainting(options), should_stop)
         return _Making(wanted, dense.views, None, "making views")
 
 
@@ -204,7 +199,7 @@ def open(
     if is_light_field(path):
         return FieldScene(open_light_field(path))
     source = Source(str(path), _choice_of(depth, refine), max_pixels=max_pixels)
-    return PhotoScene(load_photo(source, should_stop, report_progress, keeps_views=False), source)
+    return PhotoScene(load_photo(source, should_stop, report_progress), source)
 
 
 def from_arrays(
@@ -249,7 +244,7 @@ def estimate_depth(
 
     local = model_to_use(DepthChoice("model", model=None if model is None else str(model)))
     assert local is not None, "what was asked for is there, or was refused"
-    estimate = estimate_with(local, given, None, should_stop, report_progress)
+    estimate = estimate_with(local, given, should_stop, report_progress)
     values = values_of(estimate)
     return map_at_size(np.reciprocal(values) if isinstance(estimate, MetricDepth) else values, given.size)
 

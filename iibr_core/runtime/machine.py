@@ -13,10 +13,6 @@ import psutil
 THREADS_VARIABLE = "IIBR_THREADS"
 """In the environment, the most threads: several processes share a machine by it."""
 CGROUPS, OWN_CGROUP = Path("/sys/fs/cgroup"), Path("/proc/self/cgroup")
-USUAL_SHARE = 4
-"""This part of the memory is taken by default, ..."""
-LEAST_USUAL_BYTES, MOST_USUAL_SHARE = 3 * 2**29, 0.8
-"""... but so much on small machines, as far as they have it."""
 M_ARENA_MAX, MOST_ARENAS = -8, 2
 """The number is glibc's, in malloc.h. With two heaps that are trimmed, 150 photos peak at 391 MiB instead of 657, for
 1.07 of the processor time.
@@ -31,20 +27,15 @@ def core_count() -> int:
     return max(1, math.ceil(min(allowed, cgroup_cores(), most)))
 
 
-def memory_bytes() -> int:
-    """Return the memory that this process may fill: the machine's, or the limit of its control group."""
-    return int(min(psutil.virtual_memory().total, cgroup_memory_bytes()))
+def free_memory_bytes() -> int:
+    """Return the memory that is free for this process: the machine's, or what its control groups leave of it."""
+    return int(max(min(psutil.virtual_memory().available, cgroup_free_bytes()), 0))
 
 
-def usual_budget_bytes() -> int:
-    """Return the memory that this program takes at most by default."""
-    whole = memory_bytes()
-    return max(whole // USUAL_SHARE, min(LEAST_USUAL_BYTES, int(MOST_USUAL_SHARE * whole)))
-
-
-def cgroup_memory_bytes(mount: Path = CGROUPS, own: Path = OWN_CGROUP) -> float:
-    """Return the memory limit of this process's control groups (version 2), infinite without."""
-    return min((_number(folder / "memory.max") for folder in _folders(mount, own)), default=math.inf)
+def cgroup_free_bytes(mount: Path = CGROUPS, own: Path = OWN_CGROUP) -> float:
+    """Return the memory that this process's control groups (version 2) have left, infinite without limits."""
+    left = (_number(folder / "memory.max") - _used(folder / "memory.current") for folder in _folders(mount, own))
+    return min(left, default=math.inf)
 
 
 def cgroup_cores(mount: Path = CGROUPS, own: Path = OWN_CGROUP) -> float:
@@ -86,6 +77,11 @@ def _text(path: Path) -> str:
 def _number(path: Path) -> float:
     text = _text(path)
     return float(text) if text.isdigit() else math.inf
+
+
+def _used(path: Path) -> float:
+    text = _text(path)
+    return float(text) if text.isdigit() else 0.0
 
 
 def _share(path: Path) -> float:

@@ -6,7 +6,6 @@ from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from iibr_core.generation.memory_model import Budget
 from iibr_core.runtime.tiling import ShouldStop, never
 from iibr_core.types import GridShape, ReportProgress, ViewOffset, ViewUpdate, ignore_progress
 
@@ -31,7 +30,6 @@ class DenseField:
 def read_dense(
     field: MultiView,
     grid: GridShape,
-    budget: Budget,
     inpaint: str,
     should_stop: ShouldStop = never,
     report_progress: ReportProgress = ignore_progress,
@@ -52,5 +50,5 @@ def read_dense(
     def report(done: float, total: float, doing: str) -> None:
         report_progress(*work.reading(done, total), doing)
 
-    given = read_given_views(field, budget, should_stop, report)
+    given = read_given_views(field, should_stop, report)
     return DenseField(given, steps, densify(given, own, grid, should_stop, inpainter, nearest_to), work)

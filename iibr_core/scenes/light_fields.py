@@ -5,7 +5,7 @@ focusing, wide apertures and viewpoints between the views work as with a photo; 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
@@ -15,8 +15,7 @@ import numpy as np
 
 from iibr_core.color import encoded_from_stored
 from iibr_core.depth.subject import subject_disparity
-from iibr_core.generation.memory_model import Budget, budget_of, require_field, require_matching
-from iibr_core.runtime.machine import memory_bytes
+from iibr_core.generation.memory import require_memory, view_bytes
 from iibr_core.runtime.tiling import ShouldStop
 from iibr_core.scenes.dense import read_dense
 from iibr_core.scenes.opening_work import MeasureViews, OpeningWork, ViewsWork
@@ -73,10 +72,9 @@ def showings_of_light_field(
 
     field = open_light_field(Path(source.path))
     grid, (size, views) = grid_of(field), read_views(field)
-    budget = budget_of(source.depth.memory_bytes or memory_bytes())
-    require_field(budget, field.name, size, source.filled_grid or grid)
+    _require_field(field.name, size, source.filled_grid or grid)
     if source.filled_grid is not None and source.filled_grid != grid:
-        yield _filled_between(source, field, budget, should_stop, report_progress, nearest_to)
+        yield _filled_between(source, field, should_stop, report_progress, nearest_to)
         return
     given = known if source.depth.file is None else _read_map(source, size)
     read: list[ViewUpdate] = [next(views)]
@@ -93,14 +91,13 @@ def showings_of_light_field(
         for view in views:
             read.append(view)
             report_progress(work.advance("reading", view.share))
-    found = _Field(scene, grid, read, budget, work)
+    found = _Field(scene, grid, read, work)
     yield from _with_disparity(found, given, should_stop, report_progress, takes_drafts)
 
 
 def _filled_between(
     source: Source,
     field: MultiView,
-    budget: Budget,
     should_stop: ShouldStop,
     report_progress: Callable[[Progress], None],
     nearest_to: Callable[[], ViewOffset],
@@ -120,7 +117,7 @@ def _filled_between(
     def report(done: float, total: float, doing: str) -> None:
         report_progress(opening.advance((done, total), doing=doing))
 
-    dense = read_dense(field, wanted, budget, source.inpaint, should_stop, report, nearest_to)
+    dense = read_dense(field, wanted, source.inpaint, should_stop, report, nearest_to)
     low, high = min(view.disparity.min() for view in dense.given), max(view.disparity.max() for view in dense.given)
     middle, steps = dense.given[0], dense.steps
     centre = ViewUpdate(middle.row, middle.column, middle.colors, middle.disparity / np.float32(steps))
@@ -134,7 +131,7 @@ def _filled_between(
     return Showing(scene, dense.views, lambda there, drafts, share: opening.advance(work.making(share), there, drafts))
 
 
-def find_disparity(field: MultiView, budget: Budget, report_progress: ReportProgress = ignore_progress) -> FloatImage:
+def find_disparity(field: MultiView, report_progress: ReportProgress = ignore_progress) -> FloatImage:
     """Disparity (H, W) of the centre view, of a pair the left one, from all views: px per view step.
 
     Raises InputError, also where memory does not suffice.
@@ -143,14 +140,29 @@ def find_disparity(field: MultiView, budget: Budget, report_progress: ReportProg
     from iibr_core.formats.light_fields.views import grid_of, read_views
 
     grid, (size, views) = grid_of(field), read_views(field)
-    require_field(budget, field.name, size, grid)
+    _require_field(field.name, size, grid)
     # Of a pair it is the left one's.
     read = sorted(views, key=lambda view: (view.row, view.column) != field.views[field.centre].place)
     colors, offsets = [view.colors for view in read], [grid.offset(view.row, view.column) for view in read]
     report_progress(0, 0, FINDING)
     coarse = estimate_coarse(colors, offsets, 0)
-    require_matching(budget, field.name, size, coarse.range_px, offsets)
+    _require_matching(field.name, size, coarse.range_px, offsets)
     return estimate_disparity(colors, offsets, 0, coarse.range_px, report_progress=report_progress)
+
+
+def _require_field(name: str, size: ImageSize, grid: GridShape) -> None:
+    """Raise InputError where so many views of this (height, width) do not fit into memory."""
+    needed = view_bytes(math.prod(size) * math.prod(grid), is_hdr=False)
+    require_memory(needed, f"{name}: {grid.columns} x {grid.rows} views of {size}")
+
+
+def _require_matching(name: str, size: ImageSize, range_px: tuple[float, float], offsets: Sequence[ViewOffset]) -> None:
+    """Raise InputError where finding the disparity of the first of these views, between these two, takes too much."""
+    from iibr_core.depth.multi_view.estimate_disparity import sweep_bytes
+
+    at = offsets[0]
+    reach = max(max(abs(offset.t - at.t), abs(offset.s - at.s)) for offset in offsets)
+    require_memory(sweep_bytes(size, range_px, reach), f"{name}: finding its disparity")
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,7 +172,6 @@ class _Field:
     scene: Scene
     grid: GridShape
     views: list[ViewUpdate]
-    budget: Budget
     work: OpeningWork
 
     def showing(
@@ -209,7 +220,7 @@ def _with_disparity(
     report_progress(field.work.advance("searching", 0.0))
     try:
         coarse = estimate_coarse(colors, offsets, 0, should_stop)
-        require_matching(field.budget, field.scene.name, image_size(coarse.values), coarse.range_px, offsets)
+        _require_matching(field.scene.name, image_size(coarse.values), coarse.range_px, offsets)
     except InputError as error:
         # The views can be looked at without.
         scene = replace(field.scene, notes=(*field.scene.notes, f"{error}."), problems=(f"{error}.",))

@@ -13,17 +13,6 @@ import numpy as np
 from iibr_core.depth.choice import DepthOrigin
 from iibr_core.depth.editing.edits import Levels, levels_of
 from iibr_core.formats.files import require_file
-from iibr_core.generation.memory_model import (
-    Budget,
-    budget_of,
-    mebibytes,
-    pixels_within,
-    require_decoding,
-    require_map,
-    require_process,
-    require_reading,
-    require_views,
-)
 from iibr_core.runtime.machine import give_back_memory
 from iibr_core.runtime.tiling import ShouldStop, never
 from iibr_core.scenes.scene import DepthSettings, Source
@@ -79,16 +68,13 @@ def load_photo(
     should_stop: ShouldStop = never,
     report_progress: ReportProgress = ignore_progress,
     depth_settings: DepthSettings | None = None,
-    keeps_views: bool = True,
     asks_model: bool = True,
 ) -> LoadedPhoto:
     """Read a photo and find its disparity, telling what is going on, not more often than people can see.
 
-    depth_settings: what to make of the disparity, None for what the source says. keeps_views: its views will be shown:
-    the photo is then made as small as memory asks for, else refused. asks_model: see `open_with_depth`. Raises
-    InputError, and Cancelled once should_stop is true.
+    depth_settings: what to make of the disparity, None for what the source says. asks_model: see `open_with_depth`.
+    Raises InputError, and Cancelled once should_stop is true.
     """
-    require_process(budget_of(source.depth.memory_bytes), keeps_views)
     from iibr_core.depth.search import open_with_depth
     from iibr_core.formats.images.settings_text import settings_text_in
 
@@ -101,7 +87,7 @@ def load_photo(
             report_progress(done, total, doing)
 
     path = Path(source.path)
-    max_pixels, stored_size, notes = _pixels_to_read(source, keeps_views)
+    max_pixels, stored_size = _pixels_to_read(source)
     stamp = stamp_of(path)
     found = open_with_depth(
         path,
@@ -112,7 +98,6 @@ def load_photo(
         report_at_times,
         asks_model,
     )
-    found = replace(found, photo=replace(found.photo, notes=found.photo.notes + notes))
     give_back_memory()
     settings = settings_text_in(path)
     settings_wanted = depth_settings or DepthSettings(source.depth.refine)
@@ -144,7 +129,7 @@ def sketch_photo(source: Source, should_stop: ShouldStop = never) -> LoadedPhoto
     from iibr_core.formats.images.thumbnail import read_thumbnail
 
     path = Path(source.path)
-    max_pixels, stored, _ = _pixels_to_read(source, keeps_views=True)
+    max_pixels, stored = _pixels_to_read(source)
     stamp = stamp_of(path)
     if source.is_literal or min(math.prod(stored), max_pixels) < SKETCH_WORTH_PIXELS:
         return None
@@ -192,52 +177,18 @@ def _turned_like(size: ImageSize, upright: ImageSize) -> ImageSize:
     return ImageSize(size.width, size.height) if is_turned else size
 
 
-def _pixels_to_read(source: Source, keeps_views: bool) -> tuple[int, ImageSize, tuple[str, ...]]:
-    """How large a photo is read, how large it is stored, and a note where that is less than was asked for.
-
-    Raises InputError where memory does not allow it, before any of it is taken.
-    """
+def _pixels_to_read(source: Source) -> tuple[int, ImageSize]:
+    """How large a photo is read, and how large it is stored. Raises InputError for files of views."""
     from iibr_core.formats.images.header import read_photo_header
-    from iibr_core.formats.images.photo import DEFAULT_MAX_PIXELS, size_within
+    from iibr_core.formats.images.photo import DEFAULT_MAX_PIXELS
     from iibr_core.formats.light_fields.light_field_formats import is_view_file
 
-    path, wanted = Path(source.path), source.max_pixels or DEFAULT_MAX_PIXELS
+    path = Path(source.path)
     if is_view_file(path):
         raise InputError(
             f"{path}: holds the views of a light field, not a photo; `iibr view`, export and depth read it"
         )
-    budget = budget_of(source.depth.memory_bytes)
-    header = read_photo_header(path)
-    require_decoding(budget, path.name, header.decoding_bytes, keeps_views)
-    _require_map(source, budget, keeps_views)
-    size = size_within(header.size, wanted)
-    if not keeps_views:
-        require_reading(budget, size)
-        return wanted, header.size, ()
-    fitting = pixels_within(budget, source.grid)
-    is_less = fitting < size.height * size.width
-    size = size_within(size, fitting) if is_less else size
-    if source.grid is not None:
-        require_views(budget, path.name, size, source.grid)
-    note = f"{budget.said} {mebibytes(budget.bytes)}: no room for more than {fitting:,} pixels of the photo."
-    return (fitting, header.size, (note,)) if is_less else (wanted, header.size, ())
-
-
-def _require_map(source: Source, budget: Budget, keeps_views: bool) -> None:
-    """Raise InputError where the map to be read is too large; one that nobody named may be a bad one."""
-    from iibr_core.depth.sidecar import map_to_read
-    from iibr_core.formats.maps.reader import read_map_header
-
-    path = map_to_read(Path(source.path), source.depth)
-    if path is None:
-        return
-    try:
-        header = read_map_header(path)
-    except InputError:
-        if source.depth.file is not None:
-            raise
-        return
-    require_map(budget, path.name, header.size, header.bytes_beside, keeps_views)
+    return source.max_pixels or DEFAULT_MAX_PIXELS, read_photo_header(path).size
 
 
 def prepare_brush() -> None:

@@ -37,10 +37,7 @@ def make_plan(source: Source, loaded: LoadedPhoto, depth_strength: float, keeps_
     if source.is_literal:
         if source.grid is None:
             raise InputError("--literal counts disparity in px from view to view: say how many with --grid")
-        memory = source.depth.memory_bytes
-        return plan_literal(
-            loaded.photo, loaded.disparity, source.grid, memory, source.quality, keeps_views, source.inpaint
-        )
+        return plan_literal(loaded.photo, loaded.disparity, source.grid, source.quality, keeps_views, source.inpaint)
     zero = source.focus_disparity
     if loaded.depth_settings.edits != UNEDITED:
         zero = still_disparity(source, loaded.canvas.before_strokes(loaded.depth_settings.edits))
@@ -49,8 +46,7 @@ def make_plan(source: Source, loaded: LoadedPhoto, depth_strength: float, keeps_
         )
         wanted = depth_strength * (edited_px / range_px if range_px else 1.0)
         depth_strength = min(max(wanted, -MOST_STRENGTH), MOST_STRENGTH)
-    memory = source.depth.memory_bytes
-    overrides = PlanOverrides(source.grid, depth_strength, zero, memory, source.quality, source.inpaint)
+    overrides = PlanOverrides(source.grid, depth_strength, zero, source.quality, source.inpaint)
     return plan_for_viewing(loaded.photo, loaded.disparity, overrides, keeps_views)
 
 

@@ -19,7 +19,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from iibr_core.depth.choice import DepthChoice
 from iibr_core.formats.images.photo import write_image
 from iibr_core.formats.images.picture_kinds import PictureFormat, is_float
 from iibr_core.formats.images.settings_text import settings_text_in
@@ -101,9 +100,13 @@ def test_a_photo_that_went_bad_is_one_line_and_the_worker_goes_on(
     goes_on(desk, tmp_path, 2)
 
 
-def test_too_little_memory_is_one_line_and_the_worker_goes_on(desk: Desk, tmp_path: Path) -> None:
-    message = failure(desk, SceneRequest(1, Source(str(write_scene(tmp_path)), DepthChoice(memory_bytes=10_000))))
-    assert re.search(r"takes \d+ MiB, --memory is 1 MiB", message)
+def test_too_little_memory_is_one_line_and_the_worker_goes_on(
+    desk: Desk, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with monkeypatch.context() as small:
+        small.setattr("iibr_core.generation.memory.free_memory_bytes", lambda: 20_000)
+        message = failure(desk, SceneRequest(1, Source(str(write_scene(tmp_path)))))
+    assert re.search(r"takes \d+ MiB, half of the free memory is 1 MiB", message)
     goes_on(desk, tmp_path, 2)
 
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
-from iibr_core.generation.memory_model import PHOTO_BYTES, READING_BYTES, budget_of, whole_bytes
+from iibr_core.generation.memory import PHOTO_BYTES, budget_bytes
 from iibr_core.generation.plan import ScenePlan
 from iibr_core.runtime.tiling import ShouldStop
 from iibr_core.scenes.loaded_photo import LoadedPhoto, load_photo
@@ -42,9 +42,7 @@ def photos_within_budget(scene: Scene) -> int:
     plan, pixels = scene.plan, scene.width * scene.height
     if plan is None:
         return 0
-    room = budget_of(scene.source.depth.memory_bytes).bytes
-    room -= whole_bytes(pixels, plan.field_bytes, plan.peak_bytes + plan.draft_bytes, keeps_views=True)
-    return max(math.floor((room - pixels * READING_BYTES) / (pixels * PHOTO_BYTES)), 0)
+    return math.floor(budget_bytes() / (2 * pixels * PHOTO_BYTES))
 
 
 class ReadAhead(Generic[Read]):

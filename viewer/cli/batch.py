@@ -17,7 +17,7 @@ from viewer.cli.export_options import KindOptions, To, require_kind
 from viewer.cli.lens_options import Aperture, Focus, GlossFile
 from viewer.cli.option_records import with_option_records
 from viewer.cli.scene_options import PhotoOptions
-from viewer.cli.shared_options import Force, Grid, Literal, require_memory, require_model
+from viewer.cli.shared_options import Force, Grid, Literal, require_model
 from viewer.cli.terminal import show_progress
 
 if TYPE_CHECKING:
@@ -90,7 +90,6 @@ def batch(
     require_kind(context, to)
     worker_source = workers.source()
     source = photo.source("", grid, is_literal=literal)
-    require_memory(photo.memory, keeps_views=to.is_drawn)
     from iibr_core.exports.batch.archive import photos_in
     from iibr_core.exports.batch.ledger import FAILURES, Ledger, require_batch_place
     from iibr_core.exports.batch.run import run_batch

@@ -24,12 +24,11 @@ def write_dense_field(
 ) -> None:
     """To a place that the writer admits. Raises InputError, also where the views find no places on the grid."""
     from iibr_core.formats.light_fields.light_field_formats import open_light_field
-    from iibr_core.generation.memory_model import budget_of
     from iibr_core.scenes.dense import read_dense
 
     field = open_light_field(Path(source.path))
     with show_progress("reading") as show:
-        dense = read_dense(field, grid, budget_of(source.depth.memory_bytes), source.inpaint, report_progress=show)
+        dense = read_dense(field, grid, source.inpaint, report_progress=show)
         size = image_size(dense.given[0].colors)
         with (
             new_writer(out, grid, field.focal_px or float(size.width), field.name, with_disparity) as writer,

@@ -13,11 +13,9 @@ from viewer.cli.shared_options import (
     DepthModel,
     Force,
     InvertDepth,
-    Memory,
     Metric,
     Refine,
     inputs_of_command,
-    require_memory,
     require_model,
 )
 from viewer.cli.terminal import print_depth, print_notes, show_progress
@@ -32,7 +30,6 @@ def depth(
     refine: Refine = 1.0,
     invert_depth: InvertDepth = False,
     metric: Metric = False,
-    memory: Memory = None,
     force: Force = False,
 ) -> None:
     """Find the disparity of the centre view, of a pair the left one, from all views, in pixels per view step.
@@ -42,15 +39,13 @@ def depth(
 
     Example: iibr depth photo.jpg -o photo_disparity.png
     """
-    options = PhotoOptions(depth_from, depth_model, refine, invert_depth=invert_depth, metric=metric, memory=memory)
+    options = PhotoOptions(depth_from, depth_model, refine, invert_depth=invert_depth, metric=metric)
     source = options.source(path, grid=None)
     require_heeded(context, path)
-    require_memory(memory, keeps_views=True)
     from iibr_core.formats.files import is_file
     from iibr_core.formats.light_fields.light_field_formats import find_light_field, open_light_field
     from iibr_core.formats.maps.writer import write_map
     from iibr_core.formats.outputs import check_output
-    from iibr_core.generation.memory_model import budget_of
     from iibr_core.scenes.light_fields import find_disparity
     from iibr_core.scenes.loaded_photo import load_photo
 
@@ -63,7 +58,7 @@ def depth(
     else:
         scene = open_light_field(path)
         with show_progress("reading") as show:
-            name, values, notes = scene.name, find_disparity(scene, budget_of(memory), show), ()
+            name, values, notes = scene.name, find_disparity(scene, show), ()
         origin = None
     note = write_map(out, values)
     print(f"{name}: disparity {values.min():.2f} to {values.max():.2f} px per view step: {out}")

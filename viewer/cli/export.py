@@ -25,7 +25,6 @@ from viewer.cli.shared_options import (
     ScenePath,
     inputs_of_command,
     require_existing,
-    require_memory,
     require_model,
 )
 from viewer.cli.terminal import print_depth, print_notes, show_progress, untimed
@@ -74,7 +73,6 @@ def export(
     require_kind(context, to)
     source = scene.source(path, grid, focus_disparity, literal)
     require_heeded(context, path)
-    require_memory(scene.memory, keeps_views=to.is_drawn)
     require_existing(source)
     require_ending(to, output)
     inputs = inputs_of_command(context, source)

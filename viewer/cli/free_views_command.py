@@ -71,7 +71,7 @@ def write_free_views(source: Source, poses: Path, photo_pose: int | None, is_lit
     with show_progress("reading") as show:
         from iibr_core.scenes.loaded_photo import load_photo
 
-        loaded = load_photo(source, report_progress=untimed(show), keeps_views=False)
+        loaded = load_photo(source, report_progress=untimed(show))
     from iibr_core.generation.free_views import fitted_cameras
 
     given = known.given
@@ -97,7 +97,7 @@ def _written(
     from iibr_core.color import photo_in_srgb
     from iibr_core.formats.images.photo import write_image
     from iibr_core.generation.free_views import FreeViews, depths_of, reach_of
-    from iibr_core.generation.memory_model import budget_of, require_free_views
+    from iibr_core.generation.memory import MAKING_BYTES, require_memory
     from iibr_core.generation.stored_views import encode_for_storage
     from iibr_core.inpainting.registry import load_inpainter
     from iibr_core.runtime.tiling import never
@@ -106,7 +106,7 @@ def _written(
     photo, inverse_depth = photo_in_srgb(loaded.photo), _inverse_depth(loaded, is_literal, cameras[given])
     canvas = reach_of(cameras[given], cameras, depths_of(inverse_depth)).margins.around(photo.size)
     largest = max((camera.size for camera in cameras), key=math.prod)
-    require_free_views(budget_of(source.depth.memory_bytes), canvas, largest)
+    require_memory(math.prod(canvas) * MAKING_BYTES, f"making views of {largest} from a canvas of {canvas}")
     inpainter = load_inpainter(source.inpaint, inpainting_aids(source, loaded))
     views = FreeViews(photo.pixels, inverse_depth, cameras[given], cameras, inpainter=inpainter)
     with write_folder(out) as unfinished:

@@ -30,7 +30,6 @@ from viewer.cli.shared_options import (
     grid_from_text,
     inputs_of_command,
     require_existing,
-    require_memory,
     require_model,
 )
 from viewer.cli.terminal import MAKING, print_depth, print_notes, show_progress, untimed
@@ -79,7 +78,6 @@ def generate(
     Example: iibr generate photo.png --poses transforms.json -o pictures
     """
     require_poses_for(photo_pose, poses)
-    require_memory(scene.memory, keeps_views=False)
     if poses is not None:
         if grid is not None:
             raise InputError("--grid makes a light field, --poses pictures of any cameras: give one of them")
@@ -135,7 +133,7 @@ def _write_light_field(
 
     with show_progress("reading") as show:
         tell = untimed(show)
-        loaded = load_photo(source, report_progress=tell, keeps_views=False)
+        loaded = load_photo(source, report_progress=tell)
         plan = make_plan(source, loaded, depth_strength, keeps_views=False)
         with (
             new_writer(out, grid, loaded.photo.focal_px, loaded.photo.name, with_disparity) as writer,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from viewer.cli.option_records import with_option_records
 from viewer.cli.scene_options import SceneOptions
-from viewer.cli.shared_options import FocusDisparity, Grid, PhotoPath, require_memory
+from viewer.cli.shared_options import FocusDisparity, Grid, PhotoPath
 
 
 @with_option_records
@@ -13,7 +13,6 @@ def plan(photo: PhotoPath, scene: SceneOptions, focus_disparity: FocusDisparity 
 
     Example: iibr plan photo.png --disparity photo.pfm
     """
-    require_memory(scene.memory, keeps_views=True)
     from iibr_core.scenes.loaded_photo import load_photo
     from iibr_core.scenes.making import make_plan
 

@@ -22,7 +22,6 @@ from viewer.cli.shared_options import (
     Inpaint,
     InvertDepth,
     MaxPixels,
-    Memory,
     Metric,
     QualityChoice,
     Refine,
@@ -46,7 +45,6 @@ class PhotoOptions:
     metric: Metric = False
     stretch: Stretch = False
     max_pixels: MaxPixels = None
-    memory: Memory = None
     quality: QualityChoice = None
     inpaint: Inpaint = DEFAULT_INPAINTER
 
@@ -63,7 +61,6 @@ class PhotoOptions:
             stretches=self.stretch,
             model=self.depth_model,
             refine=self.refine,
-            memory_bytes=self.memory,
         )
 
     def source(
@@ -98,7 +95,7 @@ class SceneOptions(PhotoOptions):
         return replace(super().depth_choice, file=file, file_scale=self.disparity_scale)
 
 
-NOT_FOR_LIGHT_FIELDS = {field.name for field in fields(PhotoOptions)} - {"memory"} | {"focus_disparity", "grid"}
+NOT_FOR_LIGHT_FIELDS = {field.name for field in fields(PhotoOptions)} | {"focus_disparity", "grid"}
 """Options about how views are made: a light field brings its own. Its centre view's disparity may be given."""
 
 

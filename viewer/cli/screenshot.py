@@ -26,9 +26,7 @@ from viewer.cli.shared_options import (
     given_options,
     inputs_of_command,
     require_existing,
-    require_memory,
     require_model,
-    require_picture_memory,
     require_utf8,
     size_from_text,
 )
@@ -139,7 +137,6 @@ def screenshot(
 
     shot = _Shot(scene.source(path, grid, focus_disparity), scene.depth_strength, size)
     require_heeded(context, path)
-    require_memory(scene.memory, keeps_views=True)
     require_existing(shot.source)
     if full and (ui or size is not None):
         raise InputError(f"--full: gives the picture its size, leave {'--ui' if ui else '--size'} away")
@@ -149,7 +146,6 @@ def screenshot(
         shot = _shot_like(shot, like, given_options(context), ui)
     form = file.form
     require_picture_place(output, shot.size, inputs_of_command(context, shot.source), force, form)
-    require_picture_memory(shot.size, shot.source.depth.memory_bytes, is_float(output, form))
     require_model(shot.source.depth)
     shot = replace(shot, lens=lens, is_full=full, form=form)
     notes, origin = _write(shot, output, ui, backend)

@@ -14,7 +14,7 @@ from iibr_core.formats.files import status_of
 from iibr_core.formats.light_fields.light_field_formats import WRITERS
 from iibr_core.inpainting.registry import INPAINTER_FORMS, require_inpainter
 from iibr_core.scenes.screen_size import ScreenSize
-from iibr_core.types import GridShape, ImageSize, InputError, Quality, ViewOffset
+from iibr_core.types import GridShape, InputError, Quality, ViewOffset
 
 if TYPE_CHECKING:
     from iibr_core.scenes.scene import Source
@@ -99,22 +99,7 @@ def given_options(context: typer.Context) -> set[str]:
     """Names of the options that were given, not left at their defaults; as fields of `SourceText` where they are."""
     sources = {name: context.get_parameter_source(name) for name in context.params}
     names = {name for name, source in sources.items() if source is not None and source.name != "DEFAULT"}
-    return names | {"memory_bytes"} if "memory" in names else names
-
-
-def require_memory(memory_bytes: int | None, keeps_views: bool) -> None:
-    """Raise InputError before anything heavy is loaded where that is more than what may be taken."""
-    from iibr_core.generation.memory_model import budget_of, require_process
-
-    require_process(budget_of(memory_bytes), keeps_views)
-
-
-def require_picture_memory(size: ScreenSize | None, memory_bytes: int | None, is_float: bool) -> None:
-    """Raise InputError where a picture of that size, None for the usual one, takes more than may be taken."""
-    from iibr_core.generation.memory_model import budget_of, require_picture
-
-    if size is not None:
-        require_picture(budget_of(memory_bytes), ImageSize(size.height, size.width), is_float)
+    return names
 
 
 def require_existing(source: Source) -> None:
@@ -158,15 +143,6 @@ def require_utf8(*names: object) -> None:
             raise InputError(
                 f"{name}: its name is not UTF-8 here, and cannot be shown: rename it, or set LC_ALL=C.UTF-8"
             ) from None
-
-
-def memory_from_text(text: str) -> int:
-    """Bytes from "2G", "500M" or "1000000". Raises BadParameter."""
-    match = re.fullmatch(r"(\d+(?:\.\d+)?)([KMGT]?)(?:i?B)?", text.strip(), re.IGNORECASE)
-    memory = float(match[1]) * _UNITS[match[2].upper()] if match else 0.0
-    if not 1 <= memory <= MOST:
-        raise typer.BadParameter(f"{text!r} is no amount of memory: give bytes, or as 500M or 2G")
-    return int(memory)
 
 
 def depth_start_from_text(text: str) -> DepthStart:
@@ -254,10 +230,6 @@ Grid = Annotated[
 ]
 MaxPixels = Annotated[
     int | None, typer.Option(min=1, max=MOST, help="Larger photos are made smaller.", show_default="2000000")
-]
-Memory = Annotated[
-    int | None,
-    typer.Option(parser=memory_from_text, metavar="SIZE", help="At most this much, as 2G.", show_default="RAM / 4"),
 ]
 Literal = Annotated[
     bool,

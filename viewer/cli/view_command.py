@@ -19,7 +19,6 @@ from viewer.cli.shared_options import (
     PhotoPose,
     PosesFile,
     require_existing,
-    require_memory,
     require_model,
     require_utf8,
 )
@@ -61,7 +60,6 @@ def view(
     path = path.absolute() if path else demo_photo()
     source = scene.source(path, grid, focus_disparity)
     require_heeded(context, path)
-    require_memory(scene.memory, keeps_views=True)
     require_existing(source)
     require_model(source.depth)
     if ground_truth is not None and not is_light_field(ground_truth):

@@ -14,7 +14,7 @@ from iibr_core.depth.estimators import estimate_cache
 from iibr_core.depth.estimators.config import CONFIG, PREPROCESSOR
 from iibr_core.depth.estimators.depth_estimator import LocalModel
 from iibr_core.depth.estimators.download import require_unchanged
-from iibr_core.runtime.machine import usual_budget_bytes
+from iibr_core.runtime.machine import free_memory_bytes
 from iibr_core.runtime.tiling import ShouldStop, never
 from iibr_core.types import InputError, Photo, ReportProgress, ignore_progress
 
@@ -22,19 +22,18 @@ from iibr_core.types import InputError, Photo, ReportProgress, ignore_progress
 def estimate_with(
     model: LocalModel,
     photo: Photo,
-    memory_bytes: int | None = None,
     should_stop: ShouldStop = never,
     report_progress: ReportProgress = ignore_progress,
 ) -> Estimate:
     """What a model makes of a photo, at a size of the model's choosing; from the cache where it is there.
 
-    memory_bytes: what the model may take; its input is made smaller for it. Raises InputError where the model cannot
+    Its input is made smaller where memory is scarce. Raises InputError where the model cannot
     be used or its result is of no use, Cancelled where should_stop says so.
     """
     require_unchanged(model.folder)
     photo = photo_in_srgb(photo)
     report_progress(0, 0, f"looking for an earlier estimate by {model.title}")
-    options, run = model.family.prepare(model, photo.size, memory_bytes or usual_budget_bytes())
+    options, run = model.family.prepare(model, photo.size, free_memory_bytes() // 2)
     files = (model.folder / CONFIG, model.folder / PREPROCESSOR, *model.weights)
     key = estimate_cache.key_of(photo.pixels, files, f"{model.family.packages[0]} {options}")
     found = estimate_cache.load(key)

@@ -40,8 +40,8 @@ def affordable_pixels(
     if pixels < least_pixels:
         least = weights_bytes + least_pixels * pixel_bytes
         raise InputError(
-            f"{title} takes {least / 2**20:,.0f} MiB, the budget is {memory_bytes / 2**20:,.0f} MiB: raise "
-            "--memory or choose a smaller model"
+            f"{title} takes {least / 2**20:,.0f} MiB, half of the free memory is {memory_bytes / 2**20:,.0f} MiB:"
+            " choose a smaller model"
         )
     return pixels
 

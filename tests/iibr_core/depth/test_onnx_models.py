@@ -123,7 +123,7 @@ def test_the_input_fits_the_memory(tmp_path: Path) -> None:
     size = ImageSize(1000, 1000)
     small = input_for(file, size, 100 * 2**20).size
     assert small.height * small.width * 1000 < 100 * 2**20
-    with pytest.raises(InputError, match="raise --memory"):
+    with pytest.raises(InputError, match="choose a smaller model"):
         input_for(file, size, 2**20)
 
 

@@ -5,8 +5,8 @@ from collections import Counter
 import numpy as np
 import pytest
 
+from iibr_core.generation.cost_model import DRAFT_BYTES, undecided_bytes
 from iibr_core.generation.light_field import generate, ray_set, transformer_for
-from iibr_core.generation.memory_model import DRAFT_BYTES, undecided_bytes
 from iibr_core.generation.stored_views import StoredViews
 from iibr_core.rendering.view_synthesis import ViewSynthesis
 from iibr_core.runtime import tiling

@@ -21,7 +21,7 @@ def groups(tmp_path, own, files):
 @pytest.mark.parametrize(
     ("own", "files", "memory", "cores"),
     [
-        ("0::/\n", {"memory.max": "500\n", "cpu.max": "150000 100000\n"}, 500, 1.5),
+        ("0::/\n", {"memory.max": "500\n", "memory.current": "100", "cpu.max": "150000 100000\n"}, 400, 1.5),
         ("0::/a/b\n", {"a/memory.max": "300", "a/b/memory.max": "max", "a/b/cpu.max": "max 100000"}, 300, math.inf),
         ("0::/of/the/host\n", {"memory.max": "700", "cpu.max": "200000 100000"}, 700, 2),
         ("nonsense", {"memory.max": "many"}, math.inf, math.inf),
@@ -30,15 +30,14 @@ def groups(tmp_path, own, files):
 )
 def test_limits_of_control_groups(tmp_path, own, files, memory, cores):
     where = groups(tmp_path, own, files)
-    assert machine.cgroup_memory_bytes(*where) == memory
+    assert machine.cgroup_free_bytes(*where) == memory
     assert machine.cgroup_cores(*where) == cores
 
 
 def test_no_limit_files_no_limits(tmp_path):
-    assert machine.cgroup_memory_bytes(tmp_path / "none", tmp_path / "neither") == math.inf
+    assert machine.cgroup_free_bytes(tmp_path / "none", tmp_path / "neither") == math.inf
 
 
 def test_the_machine_is_no_larger_than_the_host():
     assert 1 <= machine.core_count() <= (os.cpu_count() or 1)
-    assert 0 < machine.memory_bytes() <= psutil.virtual_memory().total
-    assert 0 < machine.usual_budget_bytes() < machine.memory_bytes()
+    assert 0 < machine.free_memory_bytes() <= psutil.virtual_memory().total

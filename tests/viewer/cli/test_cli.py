@@ -294,7 +294,8 @@ def test_full_gives_the_size_and_needs_memory(
     assert "--full" in capsys.readouterr().err
     large = tmp_path / "large.png"
     write_image(large, np.zeros((2000, 3000, 3), np.uint8))
-    assert run(monkeypatch, "screenshot", large, "--depth", "flat", "--full", "--memory", "420M", "-o", out) == 2
+    monkeypatch.setattr("iibr_core.exports.full_picture.OWN_SIZE_BYTES", 10**9)
+    assert run(monkeypatch, "screenshot", large, "--depth", "flat", "--full", "-o", out) == 2
     assert "own size" in capsys.readouterr().err
     assert not out.exists()
 
@@ -389,7 +390,6 @@ GENERATE = ("--out", "{dir}/o", "--grid", "3")
         ),
         (("screenshot", "{dir}/folder", "-o", "{dir}/o.png"), "no photos in it"),
         (("generate", "{photo}", "--grid", "3"), "--out"),
-        (("generate", "{photo}", *GENERATE, "--memory", "lots"), "--memory"),
         (("generate", "{photo}", *GENERATE, "--disparity-scale", "nan"), "--disparity-scale"),
         (("generate", "{photo}", *GENERATE, "--max-pixels", "0"), "--max-pixels"),
         (("generate", "{photo}", *GENERATE, "--quality", "best"), "--quality"),

@@ -10,8 +10,8 @@ import pytest
 import iibr_core
 from iibr_core.depth.choice import BETTER_WAYS
 from iibr_core.depth.sidecar import flat_disparity
-from iibr_core.generation.memory_model import budget_of, require_views
-from iibr_core.types import GridShape, ImageSize, InputError
+from iibr_core.generation.memory import require_memory
+from iibr_core.types import ImageSize, InputError
 from viewer.model.commands import BY_NAME
 from viewer.model.reducers.notices_reducer import add_notice
 from viewer.model.state.app_state import AppState
@@ -39,7 +39,7 @@ def test_a_photo_without_depth_offers_what_helps() -> None:
 
 def test_what_does_not_fit_says_what_would_without_options() -> None:
     with pytest.raises(InputError) as refused:
-        require_views(budget_of(2**30), "a.jpg", ImageSize(4000, 6000), GridShape(17, 17))
+        require_memory(2**60, "17 x 17 views of a.jpg")
     assert "--" in str(refused.value)
     said = add_notice(AppState(), Notice(str(refused.value), is_error=True)).notices[0]
     assert "--" not in said.text
