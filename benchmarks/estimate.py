@@ -20,13 +20,13 @@ import numpy as np
 import psutil
 
 from benchmarks.harness.bench_scenes import DEMO
+from benchmarks.harness.environment import set_environment, thread_variables
 from benchmarks.harness.real_window import is_idle, open_window, run_until_idle
 from benchmarks.harness.reports import emit, head, holds, parser_of, row, start
 from benchmarks.harness.timing import Cost, added_bytes, in_own_process, median_cost
 from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.estimators.catalog import model_to_use
 from iibr_core.depth.estimators.onnx_models import USUAL_PREPARATION, OnnxInput, run_onnx
-from iibr_core.exports.batch.threads import set_environment, thread_variables
 from iibr_core.formats.images.photo import read_photo
 from iibr_core.runtime.tiling import never
 from iibr_core.scenes.scene import Source

@@ -108,9 +108,9 @@ def _view_and_lens(folder: Path) -> None:
 
 def _read_lens_picture(path: Path) -> None:
     from iibr_core.evaluation.lens_picture import read_lens_picture
-    from iibr_core.formats.light_fields.numbered_grid import read_numbered_grid
+    from iibr_core.formats.light_fields.grids import read_grid
 
-    scene = read_numbered_grid(path.parent)
+    scene = read_grid(path.parent)
     assert scene is not None
     found = read_lens_picture(scene, MAX_PIXELS)
     assert found is not None

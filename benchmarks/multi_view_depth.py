@@ -24,7 +24,7 @@ from benchmarks.harness.timing import cost_of
 from iibr_core.color import encoded_from_stored, srgb_from_linear
 from iibr_core.depth.multi_view.estimate_disparity import estimate_coarse, estimate_disparity
 from iibr_core.evaluation.metrics import bounded_psnr
-from iibr_core.formats.images.photo import write_image
+from iibr_core.formats.images.write import write_image
 from iibr_core.scenes.scene import Source
 from iibr_core.types import FloatImage, GridShape, ViewOffset
 from viewer.app.headless import HeadlessViewer

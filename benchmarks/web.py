@@ -22,11 +22,8 @@ from PIL import Image, ImageSequence
 
 from benchmarks.harness.bench_scenes import DEMO
 from benchmarks.harness.reports import emit, markdown, parser_of, start
-from iibr_core.exports.export_opening import open_for_export
-from iibr_core.exports.kinds import EXPORTS
-from iibr_core.exports.options import ExportOptions
-from iibr_core.exports.settings import resolve_settings
-from iibr_core.exports.source import ExportSource
+from iibr_core.exports.kinds import EXPORTS, ExportOptions
+from iibr_core.exports.source import ExportSource, open_for_export
 from iibr_core.exports.web import make_page
 from iibr_core.scenes.lens_limits import LensChoice
 from iibr_core.scenes.scene import Source
@@ -55,7 +52,7 @@ def row_of(name: str, source: Source) -> tuple[Any, ...]:
     opened = open_for_export(KIND, ExportOptions(), source, 1.0, LensChoice(), lambda scene: None, None)
     views = list(opened.views(with_disparity=True))
     begun = time.perf_counter()
-    page, carried = make_page(Made(opened, views), resolve_settings(KIND, ExportOptions(), opened.scene, opened.optics))
+    page, carried = make_page(Made(opened, views), ExportOptions())
     seconds = time.perf_counter() - begun
     originals = {opened.scene.grid.offset(view.row, view.column): view.colors for view in views}
     flips = [flip(originals[place], frame) for place, frame in zip(carried.places, frames(carried.colors))]
@@ -74,14 +71,14 @@ def row_of(name: str, source: Source) -> tuple[Any, ...]:
 
 
 class Made(ExportSource):
-    """With views that are made already: what writing takes beyond that is measured."""
+    """A source whose views are in memory, to measure the time of writing only."""
 
     def __init__(self, source: ExportSource, views: list[Any]) -> None:
         super().__init__(**vars(replace(source)))
         object.__setattr__(self, "_made", views)
 
-    def views(self, zero: float | None = None, with_disparity: bool = False) -> Iterator[Any]:  # type: ignore[override]
-        """Those."""
+    def views(self, *_: Any, **__: Any) -> Iterator[Any]:  # type: ignore[override]
+        """Yield the views."""
         yield from self._made  # type: ignore[attr-defined]
 
 

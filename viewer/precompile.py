@@ -71,7 +71,8 @@ def _photo(scratch: Path, is_mapped: bool = True, is_hdr: bool = False) -> Sourc
     """A part of the demo photo as a file."""
     import numpy as np
 
-    from iibr_core.formats.images.photo import read_photo, write_image
+    from iibr_core.formats.images.photo import read_photo
+    from iibr_core.formats.images.write import write_image
     from iibr_core.formats.maps.reader import read_map
     from iibr_core.formats.maps.writer import write_map
     from iibr_core.scenes.scene import Source
@@ -192,7 +193,7 @@ def _search_views(scratch: Path) -> None:
     """A light field without disparity: `iibr depth` looks for it in the same way."""
     import numpy as np
 
-    from iibr_core.formats.images.photo import write_image
+    from iibr_core.formats.images.write import write_image
     from iibr_core.scenes.scene import Source
 
     folder = scratch / "field"

@@ -23,7 +23,7 @@ import numpy as np
 import psutil
 
 from benchmarks.harness.bench_scenes import BenchScene
-from iibr_core.exports.batch.threads import set_environment, thread_variables
+from benchmarks.harness.environment import set_environment, thread_variables
 from iibr_core.generation.light_field import generate
 from iibr_core.generation.plan import plan_literal
 from iibr_core.types import FloatImage, Quality, ReportProgress, StoredColors, ignore_progress

@@ -8,9 +8,9 @@ from functools import partial
 import numpy as np
 
 from benchmarks.harness.bench_scenes import BenchScene, squares_scene
+from benchmarks.harness.environment import set_environment, thread_variables
 from benchmarks.harness.reports import head, row
 from benchmarks.harness.timing import cost_of, in_own_process, make_field
-from iibr_core.exports.batch.threads import set_environment, thread_variables
 from iibr_core.generation.cost_model import CORES
 from iibr_core.types import GridShape
 

@@ -30,7 +30,7 @@ from iibr_core.depth.map_file import (
 from iibr_core.depth.pictorial_cues import estimate_from_cues
 from iibr_core.depth.scaling import disparity_from, inverse_metres_over
 from iibr_core.depth.sidecar import find_sidecar, flat_disparity, sidecars_of
-from iibr_core.formats.images.oiio_reader import read_orientation
+from iibr_core.formats.images.decode import read_orientation
 from iibr_core.formats.images.photo import DEFAULT_MAX_PIXELS, read_photo
 from iibr_core.formats.maps.disparity_file import filling_note, map_at_size
 from iibr_core.formats.maps.resample import is_enlarged_smoothly, without_repeats

@@ -11,7 +11,7 @@ from iibr_core.depth.estimates import DisparityMap
 from iibr_core.depth.multi_view.estimate_disparity import estimate_coarse, estimate_disparity, sweep_bytes
 from iibr_core.formats.images.photo import read_picture
 from iibr_core.formats.images.side_by_side import own_picture
-from iibr_core.formats.light_fields.stereo_file import read_stereo_file
+from iibr_core.formats.light_fields.view_files import read_stereo_file
 from iibr_core.runtime.machine import free_memory_bytes
 from iibr_core.runtime.tiling import ShouldStop, never
 from iibr_core.types import InputError, ReportProgress, ignore_progress, image_size

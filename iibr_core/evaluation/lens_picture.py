@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from iibr_core.formats.files import is_file, read_text
-from iibr_core.formats.images.oiio_reader import read_size
+from iibr_core.formats.images.decode import read_size
 from iibr_core.formats.images.photo import read_photo
 from iibr_core.formats.light_fields.multi_view_scene import MultiView
 from iibr_core.types import FloatImage, InputError

@@ -1,1 +1,1 @@
-"""What a scene can be exported as: one file a kind, one line each in `kinds.py`."""
+"""Exports of a scene: the table in `kinds.py` names the function of each kind."""

@@ -1,4 +1,4 @@
-"""Animations: the viewpoint on its loops, the focus or the aperture going and coming back, or a path of the user's own.
+"""Animations: the viewpoint on a loop, the focus or the aperture going back and forth, or a camera path from a file.
 
 Every path is closed: the last frame leads to the first.
 """
@@ -13,51 +13,49 @@ from pathlib import Path
 import numpy as np
 
 from iibr_core.exports.framing import draw_framed
+from iibr_core.exports.kinds import AnimationKind, ExportOptions
 from iibr_core.exports.loops import point_on_loop
-from iibr_core.exports.options import AnimationKind
 from iibr_core.exports.render_settings import RenderSettings
-from iibr_core.exports.settings import ExportSettings
 from iibr_core.exports.source import ExportSource
+from iibr_core.exports.stack import open_diameter
 from iibr_core.formats.animations import require_video_size, write_animation
 from iibr_core.formats.files import read_text
 from iibr_core.rendering.optics import Optics
-from iibr_core.scenes.lens_limits import aperture_limit, clamp_optics
+from iibr_core.scenes.lens_limits import clamp_optics
 from iibr_core.scenes.scene import Scene
 from iibr_core.types import ImageSize, InputError, ViewOffset
 
-OPENED = 0.8
-"""Of the widest aperture, for motions that need an open one."""
-MOST_PATH_BYTES = 1_000_000
-MOST_KEYS = 1000
+MAX_PATH_BYTES = 1_000_000
+MAX_KEYS = 1000
 
 
-def write_motion(path: Path, source: ExportSource, settings: ExportSettings) -> None:
-    """Raises InputError where it cannot be written, Cancelled once the export should stop."""
-    size = ImageSize(settings.size.height, settings.size.width)
+def write_motion(path: Path, source: ExportSource, options: ExportOptions) -> None:
+    """Write an animation. Raises InputError if it cannot be written, Cancelled once the export should stop."""
+    size = ImageSize(options.size.height, options.size.width)
     require_video_size(path, size)
-    optics = optics_on_path(source.scene, source.optics, settings)
-    drawn = (draw_framed(source, RenderSettings(each, settings.size)) for each in optics)
-    frames = source.watched(drawn, settings.frames, "drawing frames")
-    write_animation(path, frames, size, settings.rate)
+    frames = optics_on_path(source.scene, source.optics, options)
+    drawn = (draw_framed(source, RenderSettings(optics, options.size)) for optics in frames)
+    write_animation(path, source.watched(drawn, options.frames, "drawing frames"), size, options.rate)
 
 
-def optics_on_path(scene: Scene, optics: Optics, settings: ExportSettings) -> list[Optics]:
-    """One a frame, evenly spread over one turn of a closed path. Raises InputError for a path that cannot be read."""
-    turns = [k / settings.frames for k in range(settings.frames)]
-    if settings.keys is not None:
-        keys = read_keys(settings.keys)
-        if any(not _is_within(scene, _between(keys, k / len(keys), optics)) for k in range(len(keys))):
-            raise InputError(f"{settings.keys}: a key lies beyond what {scene.name} has; take smaller numbers")
-        return [clamp_optics(_between(keys, turn, optics), scene) for turn in turns]
-    return [_on_motion(scene, optics, settings.motion, turn) for turn in turns]
+def optics_on_path(scene: Scene, optics: Optics, options: ExportOptions) -> list[Optics]:
+    """Return the optics of every frame, evenly spread over a closed path. Raises InputError for an invalid file."""
+    turns = [k / options.frames for k in range(options.frames)]
+    if options.keys is None:
+        return [_on_motion(scene, optics, options.motion, turn) for turn in turns]
+    keys = read_keys(options.keys)
+    if any(not _is_within(scene, _between(keys, k / len(keys), optics)) for k in range(len(keys))):
+        raise InputError(f"{options.keys}: a key lies beyond what {scene.name} has; take smaller numbers")
+    return [clamp_optics(_between(keys, turn, optics), scene) for turn in turns]
 
 
 def read_keys(path: Path) -> list[tuple[float, ...]]:
-    """A path of the user's own: a text with a line a key, "s t focus aperture", the last two as they are where they are
-    left out; # begins a comment. Raises InputError.
+    """Return the keys of a camera path, each (s, t), (s, t, focus) or (s, t, focus, aperture).
+
+    The file has one key a line, and comments that begin with #. Raises InputError for any other text.
     """
     keys: list[tuple[float, ...]] = []
-    for number, line in enumerate(read_text(path, MOST_PATH_BYTES).splitlines(), 1):
+    for number, line in enumerate(read_text(path, MAX_PATH_BYTES).splitlines(), 1):
         words = line.split("#")[0].replace(",", " ").split()
         if not words:
             continue
@@ -68,15 +66,15 @@ def read_keys(path: Path) -> list[tuple[float, ...]]:
         if not 2 <= len(values) <= 4 or not all(map(math.isfinite, values)):
             raise InputError(f"{path}: line {number} is not a key; give numbers: s t [focus [aperture]]")
         keys.append(values)
-    if not 1 <= len(keys) <= MOST_KEYS:
-        raise InputError(f"{path}: holds {len(keys)} keys; give 1 to {MOST_KEYS} lines: s t [focus [aperture]]")
+    if not 1 <= len(keys) <= MAX_KEYS:
+        raise InputError(f"{path}: holds {len(keys)} keys; give 1 to {MAX_KEYS} lines: s t [focus [aperture]]")
     return keys
 
 
 def _between(keys: Sequence[tuple[float, ...]], turn: float, optics: Optics) -> Optics:
-    """On the closed Catmull-Rom spline through the keys; what a key leaves out is the optics'."""
-    whole = np.array([(*key, optics.focus_disparity, optics.aperture_diameter)[:4] if len(key) == 2 else
-                      (*key, optics.aperture_diameter)[:4] for key in keys])  # fmt: skip
+    """Return the optics on the closed Catmull-Rom spline through the keys; short keys keep the given optics."""
+    kept = (0.0, 0.0, optics.focus_disparity, optics.aperture_diameter)
+    whole = np.array([(*key, *kept[len(key) :]) for key in keys])
     at = turn * len(keys)
     first, x = int(at), at - int(at)
     a, b, c, d = (whole[(first + i) % len(keys)] for i in (-1, 0, 1, 2))
@@ -90,18 +88,17 @@ def _between(keys: Sequence[tuple[float, ...]], turn: float, optics: Optics) -> 
 
 
 def _is_within(scene: Scene, optics: Optics) -> bool:
-    allowed = clamp_optics(optics, scene)
-    asked, taken = ((*o.eye, o.focus_disparity, o.aperture_diameter) for o in (optics, allowed))
-    return np.allclose(asked, taken, atol=1e-6)
+    wanted, allowed = ((*o.eye, o.focus_disparity, o.aperture_diameter) for o in (optics, clamp_optics(optics, scene)))
+    return np.allclose(wanted, allowed, atol=1e-6)
 
 
 def _on_motion(scene: Scene, optics: Optics, motion: AnimationKind, turn: float) -> Optics:
     wave = (1 - math.cos(2 * math.pi * turn)) / 2
-    opened = optics.aperture_diameter or OPENED * aperture_limit(scene.grid)
+    diameter = open_diameter(scene, optics)
     match motion:
         case "focus":
             far, near = scene.disparity_range_px
-            return replace(optics, focus_disparity=near + wave * (far - near), aperture_diameter=opened)
+            return replace(optics, focus_disparity=near + wave * (far - near), aperture_diameter=diameter)
         case "aperture":
-            return replace(optics, aperture_diameter=wave * opened)
+            return replace(optics, aperture_diameter=wave * diameter)
     return replace(optics, eye=point_on_loop(motion, turn, scene.grid))

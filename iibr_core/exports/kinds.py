@@ -1,68 +1,117 @@
-"""Every kind of export: the command line and the window's menu ask here. A new kind is a file of its own in
-`iibr_core.exports` and one line.
+"""The table of all kinds of export, and the options of an export.
 
-Light, so that they can be listed before anything is loaded: functions are "module:name" there.
+The window's dialog and the command line read this table; a new kind is one line here and one function in this package.
+Functions are named as "module:function" and imported when they are used, so that the table loads quickly.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
-from typing import Literal
+from pkgutil import resolve_name
+from typing import Any, Literal
 
-from iibr_core.formats.animations import VIDEOS
-from iibr_core.types import InputError
+from iibr_core.formats.animations import VIDEOS, even_size
+from iibr_core.formats.light_fields.write import check_light_field
+from iibr_core.formats.outputs import check_output, check_output_folder
+from iibr_core.rendering.optics import Optics
+from iibr_core.scenes.scene import Scene
+from iibr_core.scenes.screen_size import ScreenSize
+from iibr_core.types import ImageSize, InputError
 
-LIGHT_FIELD = ("light_field_export:write_light_field",)
-MAP = (".pfm", ".exr", ".npy", ".png", ".tif")
-PICTURE = (".png", ".jpg", ".jpeg", ".webp", ".avif", ".tif", ".tiff")
-DATA = (".png",)
-MOVING = ("view", "focus", "aperture", "size", "motion", "keys", "frames", "rate")
-STACK_FILES = r"((focus|aperture)_\d+|all_in_focus)\.(png|tif)|disparity\.pfm"
-CAMERA_FILES = r"images/v\d+_u\d+\.png|poses_bounds\.npy|transforms\.json|sparse/0/\w+\.txt"
-STACK = ("view", "focus", "aperture", "size", "frames")
-EYES = ("focus", "aperture", "size", "eyes")
-OF_EYES = "stereo_export:optics_of_eyes"
-ON_PATH = "animation:optics_on_path"
-OF_STACK = "stack:optics_of_focal_stack"
-OF_SWEEP = "stack:optics_of_aperture_sweep"
+AnimationKind = Literal["circle", "eight", "swing", "focus", "aperture"]
+ANIMATIONS: tuple[AnimationKind, ...] = ("circle", "eight", "swing", "focus", "aperture")
+"""Motions of an animation: the viewpoint on a loop, the focus from near to far and back, or the aperture."""
+DepthLayout = Literal["right", "left", "below"]
+DEPTH_LAYOUTS: tuple[DepthLayout, ...] = ("right", "left", "below")
+"""Places of the depth map beside its picture."""
+STACK_BITS = 8, 16
+DEFAULT_SIZE = ScreenSize(0, 0)
+DEFAULT_SECONDS = 4.0
+"""Length of an animation."""
+MAX_FRAMES = 10_000
+RATE_LIMITS = 0.1, 240.0
+"""Lowest and highest frame rate, in frames a second."""
 Purpose = Literal["share", "display", "software"]
 PURPOSES: dict[Purpose, str] = {"share": "Share", "display": "3D displays", "software": "Other software"}
-"""What people export for, in their words."""
+"""Purposes of an export, with their words for the user."""
+
+
+@dataclass(frozen=True)
+class ExportOptions:
+    """Options of an export. Zero sizes, frames and rates and negative eyes and rows stand for the default of the kind,
+    which `with_defaults` fills in.
+
+    size: (width, height) of each picture in pixels. device: name of a display in `DEVICES`, None for any. eyes: view
+    steps from the first viewpoint to the last. keys: file with a camera path, which replaces the motion. frames: number
+    of frames of an animation or pictures of a stack. rate: frames a second. row: row of an epipolar plane image.
+    show: whether a quilt is shown on a display. budget: maximum size of a web page in bytes, None for no limit.
+    credit: whether the page names the photo's title, author and rights. stills: whether the page stores each view as a
+    file, for browsers that cannot decode frames of moving pictures. layout: place of the depth map beside its picture.
+    bits: bits a channel of the pictures of a stack.
+    """
+
+    size: ScreenSize = DEFAULT_SIZE
+    device: str | None = None
+    eyes: float = -1.0
+    motion: AnimationKind = "circle"
+    keys: Path | None = None
+    frames: int = 0
+    rate: float = 0.0
+    row: int = -1
+    show: bool = False
+    budget: int | None = None
+    credit: bool = False
+    stills: bool = False
+    layout: DepthLayout = "right"
+    bits: int = 8
+
+
+DEFAULT_OPTIONS = ExportOptions()
 
 
 @dataclass(frozen=True)
 class ExportKind:
-    """words: for people. endings: of the file, the usual one first; none: a folder is written. write: writes it.
-    supports: names of the supported options about exports and the lens. path: makes the file's name what players
-    expect. layout: of a light field, among `WRITERS`. own_files: what a folder may hold that is replaced, as a regular
-    expression. needs: packages, of the extra `export`. frames: pictures of a stack. rate: frames a second.
-    optics: finds what its pictures are drawn with, "" where nothing is drawn. most_width_px: of pictures whose size
-    nobody chose, 0: any. has_colors: else it is a map, and no gloss shows in it. gallery: writes what lists the exports
-    of a batch, "" without.
-    purpose: what people export it for; "share": everybody can look at it.
+    """A kind of export.
+
+    words: its name for the user. endings: endings of the file, the default first; none for a folder. write: function
+    that writes it. supports: names of the supported options, those of the lens included. variant: argument of the
+    functions that several kinds share. optics: function that finds the optics of the drawn pictures, "" if nothing is
+    drawn. path: function that completes the file name. own_files: regular expression of the files in a folder that may
+    be replaced. needs: packages of the extra `export`. frames: default number of pictures of a stack. rate: default
+    frames a second. max_width_px: largest default width, 0 for any. has_colors: whether gloss is visible in it.
+    is_light_field: whether it is a light field in the layout `variant`. gallery: function that lists the exports of a
+    batch.
     """
 
     words: str
     endings: tuple[str, ...]
     write: str
     supports: tuple[str, ...] = ()
+    variant: str = ""
+    optics: str = ""
     path: str = ""
-    layout: str = ""
     own_files: str = ""
     needs: tuple[str, ...] = ()
     frames: int = 0
     rate: float = 0.0
-    optics: str = ""
-    most_width_px: int = 0
+    max_width_px: int = 0
     has_colors: bool = True
+    is_light_field: bool = False
     gallery: str = ""
     purpose: Purpose = "share"
 
     @property
     def is_drawn(self) -> bool:
-        """Whether the graphics card draws it; else it is made of the views themselves."""
-        return "aperture" in self.supports
+        """Whether the graphics card draws it; otherwise it is made from the views."""
+        return bool(self.optics)
+
+    def function(self, entry: str) -> Callable[..., Any]:
+        """Return the function of an entry such as `write`, with the variant if the kind has one."""
+        function: Callable[..., Any] = resolve_name(f"{__package__}.{entry}")
+        return partial(function, variant=self.variant) if self.variant else function
 
     @property
     def is_video(self) -> bool:
@@ -70,115 +119,164 @@ class ExportKind:
         return bool(set(self.endings) & set(VIDEOS))
 
 
+MAP = (".pfm", ".exr", ".npy", ".png", ".tif")
+PICTURE = (".png", ".jpg", ".jpeg", ".webp", ".avif", ".tif", ".tiff")
+EYES = ("focus", "aperture", "size", "eyes")
+STACK_FILES = r"(focus_\d+|all_in_focus)\.png|disparity\.pfm"
+CAMERA_FILES = r"images/v\d+_u\d+\.png|poses_bounds\.npy|transforms\.json|sparse/0/\w+\.txt"
+
+
+def _stereo(words: str, variant: str, path: str = "stereo:stereo_path") -> ExportKind:
+    optics = "stereo:optics_of_eyes"
+    return ExportKind(words, PICTURE, "stereo:write_stereo", EYES, variant, optics, path, purpose="display")
+
+
+def _animation(words: str, ending: str, rate: float, max_width_px: int = 0, needs: tuple[str, ...] = ()) -> ExportKind:
+    supports = ("view", "focus", "aperture", "size", "motion", "keys", "frames", "rate")
+    return ExportKind(
+        words, (ending,), "animation:write_motion", supports,
+        optics="animation:optics_on_path", needs=needs, rate=rate, max_width_px=max_width_px,
+    )  # fmt: skip
+
+
+def _cameras(words: str, variant: str) -> ExportKind:
+    write = "cameras:write_cameras"
+    return ExportKind(words, (), write, variant=variant, own_files=CAMERA_FILES, purpose="software")
+
+
+def _light_field(words: str, variant: str, endings: tuple[str, ...] = ()) -> ExportKind:
+    write = "light_field:write_light_field"
+    return ExportKind(words, endings, write, variant=variant, is_light_field=True, purpose="software")
+
+
 EXPORTS = {
     "quilt": ExportKind(
-        "Quilt for light-field displays", PICTURE, "quilt_export:write_quilt",
-        ("focus", "aperture", "device", "show"), path="quilt_export:quilt_path",
-        optics="quilt_export:optics_of_quilt", purpose="display",
+        "Quilt for light-field displays", PICTURE, "quilt:write_quilt", ("focus", "aperture", "device", "show"),
+        optics="quilt:optics_of_quilt", path="quilt:quilt_path", purpose="display",
     ),
-    "rgbd": ExportKind("Picture with depth at the right", PICTURE, "rgbd:write_beside", purpose="display"),
-    "rgbd-left": ExportKind("Picture with depth at the left", PICTURE, "rgbd:write_before", purpose="display"),
-    "rgbd-below": ExportKind("Picture with depth below", PICTURE, "rgbd:write_below", purpose="display"),
-    "sbs": ExportKind(
-        "Side by side", PICTURE, "stereo_export:write_side_by_side", EYES, "stereo_export:full_path",
-        optics=OF_EYES, purpose="display",
-    ),
-    "half-sbs": ExportKind(
-        "Side by side, half width", PICTURE, "stereo_export:write_half_side_by_side",
-        EYES, "stereo_export:half_path", optics=OF_EYES, purpose="display",
-    ),
-    "over-under": ExportKind(
-        "Left eye over right", PICTURE, "stereo_export:write_over_under",
-        EYES, "stereo_export:over_path", optics=OF_EYES, purpose="display",
-    ),
-    "cross-eyed": ExportKind(
-        "Side by side, crossed", PICTURE, "stereo_export:write_cross_eyed", EYES, optics=OF_EYES, purpose="display",
-    ),
-    "anaglyph": ExportKind(
-        "Anaglyph, red-cyan", PICTURE, "stereo_export:write_anaglyph", EYES, optics=OF_EYES, purpose="display",
-    ),
+    "rgbd": ExportKind("Picture with depth", PICTURE, "maps:write_rgbd", ("layout",), purpose="display"),
+    "sbs": _stereo("Side by side", "sbs"),
+    "half-sbs": _stereo("Side by side, half width", "half-sbs"),
+    "over-under": _stereo("Left eye over right", "over-under"),
+    "cross-eyed": _stereo("Side by side, crossed", "cross-eyed", path=""),
+    "anaglyph": _stereo("Anaglyph, red-cyan", "anaglyph", path=""),
     "spatial-photo": ExportKind(
-        "Spatial photo, HEIC", (".heic",), "spatial_photo_export:write_spatial", EYES,
-        optics=OF_EYES, purpose="display",
+        "Spatial photo, HEIC", (".heic",), "stereo:write_spatial", EYES,
+        optics="stereo:optics_of_eyes", purpose="display",
     ),
     "web": ExportKind(
-        "Web page, one file", (".html",), "web:write_page",
-        ("budget", "credit", "stills"), gallery="web_gallery:write_gallery",
+        "Web page, one file", (".html",), "web:write_page", ("budget", "credit", "stills"),
+        gallery="web_gallery:write_gallery",
     ),
-    "mp4": ExportKind(
-        "Video, MP4", (".mp4",), "animation:write_motion", MOVING, optics=ON_PATH, needs=("av",), rate=30,
-    ),
-    "webm": ExportKind(
-        "Video, WebM", (".webm",), "animation:write_motion", MOVING, optics=ON_PATH, needs=("av",), rate=30,
-    ),
-    "gif": ExportKind(
-        "Animation, GIF", (".gif",), "animation:write_motion", MOVING, optics=ON_PATH, rate=15, most_width_px=480,
-    ),
-    "webp": ExportKind(
-        "Animation, WebP", (".webp",), "animation:write_motion", MOVING, optics=ON_PATH, rate=25, most_width_px=960,
-    ),
-    "apng": ExportKind(
-        "Animation, PNG", (".png",), "animation:write_motion", MOVING, optics=ON_PATH, rate=15, most_width_px=480,
-    ),
+    "mp4": _animation("Video, MP4", ".mp4", 30, needs=("av",)),
+    "webm": _animation("Video, WebM", ".webm", 30, needs=("av",)),
+    "gif": _animation("Animation, GIF", ".gif", 15, 480),
+    "webp": _animation("Animation, WebP", ".webp", 25, 960),
     "focal-stack": ExportKind(
-        "Focal stack, PNGs", (), "stack:write_focal_stack", STACK,
-        optics=OF_STACK, own_files=STACK_FILES, frames=16, purpose="software",
+        "Focal stack, PNGs", (), "stack:write_focal_stack", ("view", "focus", "aperture", "size", "frames", "bits"),
+        optics="stack:optics_of_stack", own_files=STACK_FILES, frames=16, purpose="software",
     ),
-    "focal-stack-tiff": ExportKind(
-        "Focal stack, 16-bit TIFFs", (), "stack:write_focal_tiffs",
-        STACK, optics=OF_STACK, own_files=STACK_FILES, frames=16, purpose="software",
-    ),
-    "focal-stack-exr": ExportKind(
-        "Focal stack, OpenEXR", (".exr",), "stack:write_focal_stack", STACK,
-        optics=OF_STACK, frames=16, purpose="software",
-    ),
-    "aperture-sweep": ExportKind(
-        "Aperture sweep, PNGs", (), "stack:write_aperture_sweep",
-        STACK, optics=OF_SWEEP, own_files=STACK_FILES, frames=9, purpose="software",
-    ),
-    "aperture-sweep-tiff": ExportKind(
-        "Aperture sweep, 16-bit TIFFs", (), "stack:write_aperture_tiffs",
-        STACK, optics=OF_SWEEP, own_files=STACK_FILES, frames=9, purpose="software",
-    ),
-    "aperture-sweep-exr": ExportKind(
-        "Aperture sweep, OpenEXR", (".exr",), "stack:write_aperture_sweep", STACK,
-        optics=OF_SWEEP, frames=9, purpose="software",
-    ),
-    "epi": ExportKind("Epipolar plane image", DATA, "maps:write_epi", ("row",), purpose="software"),
+    "epi": ExportKind("Epipolar plane image", (".png",), "maps:write_epi", ("row",), purpose="software"),
     "disparity": ExportKind("Disparity map", MAP, "maps:write_disparity", has_colors=False, purpose="software"),
     "depth": ExportKind(
-        "Depth map", MAP, "maps:write_depth", path="maps:depth_path", has_colors=False, purpose="software",
+        "Depth map", MAP, "maps:write_depth", path="maps:depth_path", has_colors=False, purpose="software"
     ),
     "splats": ExportKind("Gaussian splats, PLY", (".ply",), "points:write_gaussians", purpose="software"),
     "point-cloud": ExportKind("Point cloud, PLY", (".ply",), "points:write_point_cloud", purpose="software"),
-    "llff": ExportKind(
-        "Cameras, LLFF", (), "camera_export:write_llff_folder", own_files=CAMERA_FILES, purpose="software",
-    ),
-    "nerfstudio": ExportKind(
-        "Cameras, nerfstudio", (), "camera_export:write_nerfstudio_folder", own_files=CAMERA_FILES, purpose="software",
-    ),
-    "colmap": ExportKind(
-        "Cameras, COLMAP", (), "camera_export:write_colmap_folder", own_files=CAMERA_FILES, purpose="software",
-    ),
-    "hci": ExportKind("Light field, HCI folder", (), *LIGHT_FIELD, layout="hci", purpose="software"),
-    "numbered-grid": ExportKind(
-        "Light field, numbered views", (), *LIGHT_FIELD, layout="numbered-grid", purpose="software",
-    ),
-    "stanford": ExportKind("Light field, Stanford archive", (), *LIGHT_FIELD, layout="stanford", purpose="software"),
-    "eslf": ExportKind("Light field, lenslet image", ("_eslf.png",), *LIGHT_FIELD, layout="eslf", purpose="software"),
-    "exr": ExportKind("Light field, one OpenEXR file", (".exr",), *LIGHT_FIELD, layout="exr", purpose="software"),
+    "llff": _cameras("Cameras, LLFF", "llff"),
+    "nerfstudio": _cameras("Cameras, nerfstudio", "nerfstudio"),
+    "colmap": _cameras("Cameras, COLMAP", "colmap"),
+    "hci": _light_field("Light field, HCI folder", "hci"),
+    "eslf": _light_field("Light field, lenslet image", "eslf", ("_eslf.png",)),
 }  # fmt: skip
-"""By the name that people type."""
+"""The kinds by the name that the user types."""
 
 
 def export_kind(name: str) -> ExportKind:
-    """Raises InputError for a kind that nobody knows."""
+    """Return the kind of this name. Raises InputError for an unknown name."""
     if name not in EXPORTS:
         raise InputError(f"{name!r} is not a known kind of export: give {', '.join(EXPORTS)}")
     return EXPORTS[name]
 
 
+def with_defaults(kind: ExportKind, options: ExportOptions, scene: Scene, optics: Optics) -> ExportOptions:
+    """Return the options with the default of the kind for every choice that is open."""
+    rate = options.rate or kind.rate
+    eyes = options.eyes if options.eyes >= 0 else float(scene.grid.columns - 1)
+    aspect = picture_aspect(kind, eyes, scene, optics)
+    width = round(aspect * scene.height)
+    return replace(
+        options,
+        size=options.size if any(options.size) else size_of_width(kind, aspect, min(width, kind.max_width_px or width)),
+        eyes=eyes,
+        frames=options.frames or kind.frames or max(round(DEFAULT_SECONDS * rate), 2),
+        rate=rate,
+        row=options.row if options.row >= 0 else scene.height // 2,
+    )
+
+
+def picture_aspect(kind: ExportKind, eyes: float, scene: Scene, optics: Optics) -> float:
+    """Return width / height of the part of the scene that each picture shows; pictures for eyes are cropped."""
+    crop = 2 * shear_margin(scene, optics, eyes) if "eyes" in kind.supports else 0.0
+    return max(round(scene.width * (1 - crop)), 1) / scene.height
+
+
+def shear_margin(scene: Scene, optics: Optics, span_views: float) -> float:
+    """Return the share of the width that is cropped at each side of pictures which hold the focused surface still.
+
+    span_views: view steps from the first viewpoint to the last, about the middle of the grid.
+    """
+    middle = (scene.grid.columns - 1) / 2 - scene.grid.centre[1]
+    return abs(optics.focus_disparity) * (abs(middle) + span_views / 2) / scene.width
+
+
+def size_of_width(kind: ExportKind, aspect: float, width: int) -> ScreenSize:
+    """Return the size of this width (pixels) and about this aspect that the kind can have."""
+    size = ImageSize(max(round(width / aspect), 1), width)
+    height, width = even_size(size) if kind.is_video else size
+    return ScreenSize(width, height)
+
+
 def require_ending(kind: ExportKind, path: Path) -> None:
-    """Raise InputError where a file's name does not say that it is of this kind."""
+    """Raise InputError if a file's name does not end as this kind must."""
     if kind.endings and not path.name.lower().endswith(kind.endings):
         raise InputError(f"{path}: must end in {' or '.join(kind.endings)}")
+
+
+def export_path(kind: ExportKind, path: Path, scene: Scene, options: ExportOptions) -> Path:
+    """Return the path that is written: some kinds add a tag to the name. Raises InputError for an unknown display."""
+    tagged_path: Path = kind.function(kind.path)(path, scene, options) if kind.path else path
+    return tagged_path
+
+
+def require_export_place(kind: ExportKind, path: Path, inputs: Sequence[Path], may_replace: bool) -> None:
+    """Raise InputError if the path cannot be written, AlreadyThereError if it exists and may not be replaced.
+
+    inputs: the files that the export reads.
+    """
+    require_ending(kind, path)
+    if kind.is_light_field:
+        check_light_field(path, kind.variant, inputs, may_replace)
+    elif kind.endings:
+        check_output(path, inputs, may_replace)
+    else:
+        check_output_folder(path, inputs, may_replace, kind.own_files)
+
+
+def optics_of(kind: ExportKind, options: ExportOptions, scene: Scene, optics: Optics) -> Sequence[Optics]:
+    """Return the optics of the pictures that are drawn of a scene shown with these optics; none if nothing is drawn.
+
+    Raises InputError if they cannot be drawn.
+    """
+    if not kind.is_drawn:
+        return ()
+    find = resolve_name(f"{__package__}.{kind.optics}")
+    pictures: Sequence[Optics] = find(scene, optics, with_defaults(kind, options, scene, optics))
+    return pictures
+
+
+def gallery_of(kind: ExportKind) -> Callable[[Path, Iterable[str]], Path] | None:
+    """Return the function that writes a page about a batch, given its folder and the names of the exports in it; None
+    if the kind has no such page. It returns the path of the page and raises InputError if it cannot be written.
+    """
+    return kind.function(kind.gallery) if kind.gallery else None

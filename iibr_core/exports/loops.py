@@ -7,12 +7,14 @@ from typing import Literal
 
 from iibr_core.types import GridShape, ViewOffset
 
+LoopKind = Literal["circle", "eight", "swing"]
+LOOPS: tuple[LoopKind, ...] = ("circle", "eight", "swing")
 LOOP_REACH = 0.8
-"""Of the grid's radius: the loops stay within what is stored."""
+"""Radius of the loops as a share of the grid's, so that they stay within the stored views."""
 
 
 def point_on_loop(kind: LoopKind | None, turns: float, grid: GridShape) -> ViewOffset:
-    """The viewpoint on a loop after so many turns, in view steps from the middle of the grid's views."""
+    """Return the viewpoint on a loop about the middle of the grid after this number of turns; None swings."""
     angle = 2 * math.pi * turns
     match kind:
         case "circle":
@@ -24,9 +26,3 @@ def point_on_loop(kind: LoopKind | None, turns: float, grid: GridShape) -> ViewO
     (rows, columns), (v, u) = grid, grid.centre
     radius_t, radius_s = LOOP_REACH * (rows - 1) / 2, LOOP_REACH * (columns - 1) / 2
     return ViewOffset((rows - 1) / 2 - v + down * radius_t, (columns - 1) / 2 - u + right * radius_s)
-
-
-LoopKind = Literal["circle", "eight", "swing"]
-
-
-LOOPS: tuple[LoopKind, ...] = ("circle", "eight", "swing")

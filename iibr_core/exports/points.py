@@ -1,4 +1,4 @@
-"""The scene in three dimensions: the photo's surfaces, and the inpainted ones behind them."""
+"""The scene in three dimensions: the surfaces of the photo, and the inpainted surfaces behind them."""
 
 from __future__ import annotations
 
@@ -7,39 +7,39 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.exports.camera_export import cameras_of, colors_of, nearest_metres
-from iibr_core.exports.settings import ExportSettings
+from iibr_core.exports.cameras import cameras_of, colors_of, nearest_metres
+from iibr_core.exports.kinds import ExportOptions
 from iibr_core.exports.source import ExportSource
 from iibr_core.formats.cameras import FieldCameras
 from iibr_core.formats.ply import write_points, write_splats
 from iibr_core.types import FloatImage, InputError, ViewUpdate
 
 SAME_DISPARITY_PX = 0.1
-"""Made-up pixels of several views are one where they agree so well, per view step, and look at one pixel."""
+"""Largest disparity difference, in pixels per view step, of inpainted pixels of several views that become one point."""
 
 Points = tuple[FloatImage, NDArray[np.uint8], FloatImage]
-"""Places (N, 3), x right, y down, z forward; colours (N, 3); how wide a pixel is there (N,)."""
+"""Places (N, 3), x right, y down, z forward; colours (N, 3); widths of a pixel at these places (N,)."""
 
 
-def write_point_cloud(path: Path, source: ExportSource, settings: ExportSettings) -> None:
-    """As a PLY, y up and z backwards, as most viewers of points look."""
+def write_point_cloud(path: Path, source: ExportSource, options: ExportOptions) -> None:
+    """Write a PLY file of points, y up and z backwards, as most viewers of point clouds expect. Raises InputError."""
     places, colors, _ = scene_points(source)
     write_points(path, places * np.array([1, -1, -1], np.float32), colors)
 
 
-def write_gaussians(path: Path, source: ExportSource, settings: ExportSettings) -> None:
-    """As a PLY of 3DGS, y down and z forward, as its training leaves them."""
+def write_gaussians(path: Path, source: ExportSource, options: ExportOptions) -> None:
+    """Write a PLY file of Gaussian splats, y down and z forward, as 3DGS leaves them. Raises InputError."""
     write_splats(path, *scene_points(source))
 
 
 def scene_points(source: ExportSource) -> Points:
-    """The centre view's pixels, and what was inpainted in the corner views; in metres where distances are known in
-    them, else in distances of the nearest.
+    """Return the pixels of the centre view and the inpainted pixels of the corner views as points.
 
-    Raises InputError without depth, Cancelled once the export should stop.
+    They are in metres if distances are known in metres, otherwise in distances of the nearest point. Raises InputError
+    without depth, Cancelled once the export should stop.
     """
     cameras = cameras_of(source)
-    found: list[Points] = []
+    parts: list[Points] = []
     seen: set[tuple[int, int, int]] = set()
     rows, columns = cameras.grid
     corners = {(row, column) for row in (0, rows - 1) for column in (0, columns - 1)}
@@ -49,16 +49,16 @@ def scene_points(source: ExportSource) -> Points:
             continue
         mask = np.ones(view.disparity.shape, bool) if at == cameras.grid.centre else _new(view, cameras, seen)
         places = cameras.points(view.disparity, cameras.grid.offset(*at))[mask]
-        found.append((places, colors_of(view)[mask], places[:, 2] / np.float32(cameras.focal_px)))
-    if not found:
+        parts.append((places, colors_of(view)[mask], places[:, 2] / np.float32(cameras.focal_px)))
+    if not parts:
         raise InputError(f"{source.scene.name}: no depth is known; open it with a disparity map")
-    places, colors, pixel = (np.concatenate(arrays) for arrays in zip(*found))
+    places, colors, pixel = (np.concatenate(arrays) for arrays in zip(*parts))
     unit = np.float32(nearest_metres(source) or 1.0)
     return places * unit, colors, pixel * unit
 
 
 def _new(view: ViewUpdate, cameras: FieldCameras, seen: set[tuple[int, int, int]]) -> NDArray[np.bool_]:
-    """Which made-up pixels (H, W) no view before showed; they are taken note of."""
+    """Return a mask (H, W) of the inpainted pixels whose points are not in `seen`, and add them to it."""
     assert view.disparity is not None
     assert view.inpainted is not None
     offset = cameras.grid.offset(view.row, view.column)

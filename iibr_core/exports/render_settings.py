@@ -1,4 +1,4 @@
-"""What a finished picture is asked for with."""
+"""The settings of a finished picture."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import SRGB, ColorSpace, GridShape, InputError, ViewUpdate
 
 MAX_PIXELS = 100_000_000
-"""Of a picture: as float light it then takes 1.2 GB."""
+"""Largest number of pixels of a picture; as linear light it takes 1.2 GB."""
 
 
 @dataclass(frozen=True, eq=False)
 class LensTile:
-    """Views around the eye that show a part of a large photo: a tile of it is drawn from them.
+    """Views around the eye, from which a tile of a large photo is drawn.
 
-    window: the part, as a share of the photo. grid, views: in view steps of their own. highlight_gain: what clipped
-    light counts for beyond white.
+    window: the part of the photo that the views show, as a share of it. grid, views: in their own view steps.
+    highlight_gain: weight of clipped light beyond white.
     """
 
     window: Rect
@@ -29,11 +29,11 @@ class LensTile:
 
 @dataclass(frozen=True)
 class RenderSettings:
-    """A picture with every sample it will get, (height, width, 3).
+    """Settings of a picture (height, width, 3) that is drawn with all its samples.
 
-    size_px: (width, height), any. part: what is drawn, as a share of the picture, stretched to size_px. is_linear:
-    float32 linear light with 1 = white, not cut off at white or 0; else uint8, encoded by sRGB's curve. color_space: of
-    the result. tile: what it is drawn from, None for the views that are open.
+    part: the drawn part as a share of the picture, stretched to size_px. is_linear: whether the result is unclipped
+    float32 light with 1 = white; otherwise it is uint8, encoded by sRGB's curve. color_space: of the result. tile:
+    views to draw from, None for the views of the open scene.
     """
 
     optics: Optics
@@ -45,7 +45,7 @@ class RenderSettings:
 
 
 def require_size(size_px: ScreenSize) -> None:
-    """Raise InputError for a picture (width, height) of no pixel or more than MAX_PIXELS."""
+    """Raise InputError if a picture has no pixels or more than MAX_PIXELS."""
     width, height = size_px
     if min(size_px) < 1 or width * height > MAX_PIXELS:
         raise InputError(f"{width}x{height} px: a picture may have 1 to {MAX_PIXELS // 10**6} million pixels")

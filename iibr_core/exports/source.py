@@ -1,46 +1,54 @@
-"""What an export is made of: the scene as it is open, pictures that are drawn of it, views that are made of it again.
+"""The source of an export: an open scene, pictures drawn of it, and its views.
 
-A kind of export is a function that writes one file or folder of this, in whatever thread; drawing is handed over.
+A kind of export is a function that writes one file or folder from an `ExportSource`, in any thread; the source draws
+pictures wherever the graphics card may be used.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Generator, Iterable, Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, Protocol, TypeVar
 
 from numpy.typing import NDArray
 
+from iibr_core.exports.kinds import ExportKind, ExportOptions, optics_of, with_defaults
 from iibr_core.exports.render_settings import RenderSettings
+from iibr_core.formats.images.write import AS_USUAL, PictureFormat
 from iibr_core.generation.outer_views import WantedViews
 from iibr_core.generation.plan import ScenePlan
 from iibr_core.rendering.optics import CENTRE, Optics
-from iibr_core.runtime.tiling import ShouldStop, raise_if_stopped
+from iibr_core.runtime.tiling import ShouldStop, never, raise_if_stopped
+from iibr_core.scenes.lens_limits import LensChoice
 from iibr_core.scenes.loaded_photo import LoadedPhoto
 from iibr_core.scenes.making import views_of_photo
-from iibr_core.scenes.scene import Progress, Scene
+from iibr_core.scenes.opening import SceneReady, SceneRequest, results_of
+from iibr_core.scenes.scene import Scene, Source
 from iibr_core.scenes.scene_gloss import add_gloss
-from iibr_core.types import FloatImage, ReportProgress, ViewOffset, ViewUpdate
+from iibr_core.types import (
+    SRGB,
+    ColorSpace,
+    ReportProgress,
+    ViewOffset,
+    ViewUpdate,
+    ignore_progress,
+)
 
 Item = TypeVar("Item")
-
-
 Draw = Callable[[RenderSettings], NDArray[Any]]
-"""Draws a picture. Raises Cancelled once the export should stop, InputError where there is no room."""
-
-
-def undrawn(settings: RenderSettings) -> NDArray[Any]:
-    """For kinds that draw nothing."""
-    raise AssertionError("this kind of export is said to draw nothing")
+"""Function that draws a picture. Raises Cancelled once the export should stop, InputError if there is no memory."""
+OpticsOf = Callable[[Scene, Optics], Iterable[Optics]]
+"""Function from a scene and the optics it is shown with to the optics of the pictures that are drawn of it."""
 
 
 @dataclass(frozen=True, eq=False)
 class ExportSource:
-    """scene: that is open; loaded: its photo, None for a light field from disk. optics: as the window shows it.
+    """An open scene to be exported.
 
-    report_progress: heard in whatever thread exports. should_stop: asked often. centre: the centre view as it is shown,
-    None where that is not known.
+    loaded: its photo, None for a light field from disk. optics: the optics that the window shows. report_progress: is
+    called in the exporting thread. centre: the centre view as it is shown, None if it is not known.
     """
 
     scene: Scene
@@ -51,8 +59,18 @@ class ExportSource:
     should_stop: ShouldStop
     centre: ViewUpdate | None = None
 
+    @property
+    def color_space(self) -> ColorSpace:
+        """Colour space in which pictures of this scene are saved."""
+        return AS_USUAL.space_for(self.scene.color_space)
+
+    @property
+    def focal_px(self) -> float | None:
+        """Focal length of a view in pixels, None if it is not known."""
+        return self.scene.focal_px if self.loaded is None else self.loaded.photo.focal_px
+
     def watched(self, items: Iterable[Item], total: int, doing: str) -> Iterator[Item]:
-        """The items, telling how many were taken. Raises Cancelled once the export should stop."""
+        """Yield the items and report progress. Raises Cancelled once the export should stop."""
         for done, item in enumerate(items):
             raise_if_stopped(self.should_stop)
             self.report_progress(done, total, doing)
@@ -61,45 +79,45 @@ class ExportSource:
 
     def views(
         self,
-        zero: float | None = None,
+        static_disparity: float | None = None,
         with_disparity: bool = False,
         wanted: Collection[ViewOffset] | None = None,
         in_srgb: bool = True,
     ) -> Generator[ViewUpdate]:
-        """Every view of the scene's grid once, the centre first, none of them kept.
+        """Yield every view of the scene's grid once, the centre first; none is kept.
 
-        zero: the disparity (as given) that stays still, where it is to be another than the plan's; for photos only.
-        with_disparity: of light fields from disk too, each view of its own, as far as it can be found.
-        wanted: of a photo, only these and the centre; None: all. in_srgb: else in the scene's colour space. Raises
-        Cancelled once the export should stop.
+        static_disparity: the disparity (as given) that does not move, if it is not the plan's; for photos only.
+        with_disparity: whether light fields from disk yield the disparity of each view, as far as it can be found.
+        wanted: the views of a photo to make beside the centre, None for all. in_srgb: whether colours are converted to
+        sRGB; otherwise they stay in the scene's colour space. Raises Cancelled once the export should stop.
         """
         if self.loaded is None:
-            made = self._views_of_folder(with_disparity)
+            views = self._views_of_folder(with_disparity)
         else:
-            made = views_of_photo(
+            views = views_of_photo(
                 self.scene.source,
                 self.loaded,
-                self.plan(zero),
+                self.plan(static_disparity),
                 self.should_stop,
                 self.report_progress,
                 in_srgb=in_srgb,
                 wanted=lambda: WantedViews(wanted),
             )
-        scene = self.scene if zero is None else replace(self.scene, infinity_px=self._infinity_px(zero))
-        made = add_gloss(made, self.optics.gloss, scene, self.should_stop)
-        for view in made:
+        scene = self.scene
+        if static_disparity is not None:
+            scene = replace(scene, infinity_px=self._infinity_px(static_disparity))
+        for view in add_gloss(views, self.optics.gloss, scene, self.should_stop):
             raise_if_stopped(self.should_stop)
             self.report_progress(view.share, 1.0, "making views")
             yield view
         raise_if_stopped(self.should_stop)
 
-    def _infinity_px(self, zero: float) -> float:
-        """Of the scene's views where another disparity stays still."""
-        before, after = self.plan(), self.plan(zero)
+    def _infinity_px(self, static_disparity: float) -> float:
+        before, after = self.plan(), self.plan(static_disparity)
         return self.scene.infinity_px + (before.disparity_zero - after.disparity_zero) * after.disparity_scale
 
     def _views_of_folder(self, with_disparity: bool) -> Iterator[ViewUpdate]:
-        """As read; with disparity that was found, and with views between them, where the scene has such."""
+        """Return the views from disk, with found disparity and views between them if the scene has these."""
         from iibr_core.formats.light_fields.light_field_formats import open_light_field
         from iibr_core.formats.light_fields.views import read_views
         from iibr_core.scenes.light_fields import showings_of_light_field
@@ -107,40 +125,107 @@ class ExportSource:
         is_as_read = self.scene.grid == self.scene.given_grid and self.scene.depth_source in ("none", "light field")
         if is_as_read and not with_disparity:
             return read_views(open_light_field(Path(self.scene.source.path)))[1]
-        known = self._found_centre.disparity if self._found_centre is not None else None
+        centre = self._final_centre
         showings = showings_of_light_field(
-            self.scene.source, self.should_stop, self._tell, takes_drafts=False, known=known
+            self.scene.source,
+            self.should_stop,
+            lambda progress: self.report_progress(progress.share, 1.0, progress.doing),
+            takes_drafts=False,
+            known=None if centre is None else centre.disparity,
         )
         return next(showings).views
 
     @property
-    def _found_centre(self) -> ViewUpdate | None:
-        """The centre view of a light field from disk, whose disparity is known already and will stay."""
-        is_known = self.loaded is None and self.centre is not None and self.centre.is_final
-        return self.centre if is_known and self.centre is not None and self.centre.disparity is not None else None
+    def _final_centre(self) -> ViewUpdate | None:
+        """The centre view of a light field from disk, if its disparity is known and final."""
+        centre = self.centre if self.loaded is None else None
+        return centre if centre is not None and centre.is_final and centre.disparity is not None else None
 
-    def _tell(self, progress: Progress) -> None:
-        self.report_progress(progress.share, 1.0, progress.doing)
-
-    def plan(self, zero: float | None = None) -> ScenePlan:
-        """Of a photo's views; see `views`."""
+    def plan(self, static_disparity: float | None = None) -> ScenePlan:
+        """Return the plan of a photo's views, with another disparity that does not move if one is given."""
         plan = self.scene.plan
         assert plan is not None, "a light field from disk has no plan"
-        if zero is None:
+        if static_disparity is None:
             return plan
-        low, high = (value + (plan.disparity_zero - zero) * plan.disparity_scale for value in plan.disparity_range_px)
-        return replace(plan, disparity_zero=zero, disparity_range_px=(low, high))
+        shift = (plan.disparity_zero - static_disparity) * plan.disparity_scale
+        low, high = (value + shift for value in plan.disparity_range_px)
+        return replace(plan, disparity_zero=static_disparity, disparity_range_px=(low, high))
 
     def centre_view(self) -> ViewUpdate:
-        """The centre view with its disparity, px per view step."""
-        if self._found_centre is not None:
-            return self._found_centre
+        """Return the centre view with its disparity in pixels per view step."""
+        if self._final_centre is not None:
+            return self._final_centre
         views = self.views()
         try:
             return next(views)
         finally:
             views.close()
 
-    def disparity_seen(self) -> FloatImage | None:
-        """Disparity (H, W) of the centre view where that is the viewpoint; else None, as where there is none."""
-        return self.centre_view().disparity if self.optics.eye == CENTRE else None
+    def write_picture(
+        self, path: Path, pixels: NDArray[Any], form: PictureFormat = AS_USUAL, color_space: ColorSpace = SRGB
+    ) -> None:
+        """Write a picture (H, W, 3) of this colour space with the Exif and XMP of the photo, as `write_picture` does.
+
+        Raises InputError if it cannot be written.
+        """
+        from iibr_core.formats.images.metadata import PictureMetadata, read_metadata
+        from iibr_core.formats.images.write import write_picture
+
+        photo = PictureMetadata() if self.loaded is None else read_metadata(Path(self.scene.source.path))
+        write_picture(path, pixels, form, PictureMetadata(photo.exif, photo.xmp), color_space)
+
+
+class OpenDrawn(Protocol):
+    """Function that opens a scene whose pictures can be drawn."""
+
+    def __call__(
+        self,
+        source: Source,
+        depth_strength: float,
+        lens: LensChoice,
+        on_ready: Callable[[Scene], None],
+        report_progress: ReportProgress = ignore_progress,
+        optics_of: OpticsOf | None = None,
+    ) -> ExportSource:
+        """Open a scene through this lens and make the views that its pictures show; all views without `optics_of`.
+
+        on_ready is called with the scene before any view is made; its exceptions end the opening. Raises InputError.
+        """
+
+
+def open_for_export(
+    kind: ExportKind,
+    options: ExportOptions,
+    source: Source,
+    depth_strength: float,
+    lens: LensChoice,
+    on_ready: Callable[[Scene], None],
+    open_drawn: OpenDrawn | None,
+    report_progress: ReportProgress = ignore_progress,
+) -> ExportSource:
+    """Open a scene for an export of this kind, by `open_drawn` if the kind is drawn. Raises as `OpenDrawn` does."""
+    if kind.is_drawn:
+        assert open_drawn is not None
+        return open_drawn(source, depth_strength, lens, on_ready, report_progress, partial(optics_of, kind, options))
+    # A light field from disk is copied without waiting for its disparity.
+    request = SceneRequest(0, source, depth_strength, takes_drafts=kind.is_light_field)
+    results = results_of(request, never, lambda: CENTRE, lambda progress: progress.report_to(report_progress))
+    ready = next(results)
+    assert isinstance(ready, SceneReady)
+    on_ready(ready.scene)
+    optics = Optics(gloss=lens.gloss)
+    return ExportSource(ready.scene, ready.loaded, optics, _draw_nothing, ignore_progress, never, ready.centre)
+
+
+def write_export(kind: ExportKind, path: Path, source: ExportSource, options: ExportOptions) -> str | None:
+    """Write an export of this kind; return a sentence about it for the user, or None.
+
+    Raises InputError if it cannot be written, Cancelled once the source asks to stop.
+    """
+    filled = with_defaults(kind, options, source.scene, source.optics)
+    message: str | None = kind.function(kind.write)(path, source, filled)
+    return message
+
+
+def _draw_nothing(settings: RenderSettings) -> NDArray[Any]:
+    raise AssertionError("this kind of export draws nothing")

@@ -1,4 +1,4 @@
-"""A light field that anyone can open: one web page with its views and what draws them, for any browser, offline."""
+"""A light field as one web page with its views and the program that draws them, for any browser, offline."""
 
 from __future__ import annotations
 
@@ -6,41 +6,42 @@ import base64
 import hashlib
 import json
 import re
-from dataclasses import replace
 from html import escape
 from pathlib import Path
 from string import Template
 from typing import Any
 
-from iibr_core.exports.settings import ExportSettings
+from iibr_core.exports.kinds import ExportOptions
 from iibr_core.exports.source import ExportSource
-from iibr_core.exports.web_views import NO_VIEWS, ViewStore, WebViews, form_that_fits, places_of, require_avif
-from iibr_core.formats.images.caption import Caption, read_caption
+from iibr_core.exports.web_views import ViewStore, WebViews, form_that_fits
+from iibr_core.formats.images.metadata import Caption, read_caption
 from iibr_core.formats.outputs import write_file
 from iibr_core.runtime.resources import resource_folder
 from iibr_core.runtime.shader_sources import flatten
 from iibr_core.scenes.lens_limits import aperture_limit, eye_limits, first_aperture, focus_limits
 from iibr_core.scenes.scene import Scene
-from iibr_core.types import DISPLAY_P3, SRGB, ImageSize
+from iibr_core.types import SRGB, ImageSize
 
+AVIF = "image/avif"
 SHADERS = "fullscreen.vert", "lens.frag", "present.frag"
-"""Shaders that the page draws with; see `web/renderer.js`."""
+"""Shaders of the page, see `web/renderer.js`."""
 POLICY = (
     "default-src 'none'; script-src {script}; style-src {style}; img-src data: blob:; base-uri 'none';"
     " form-action 'none'"
 )
 SCRIPTS = "renderer.js", "viewer.js"
 LINK = re.compile(r"^import [^;]*;\n|^export (?=const|class|function)", re.MULTILINE)
-"""Between scripts: in a page they are one module."""
+"""Imports and exports of the scripts, which are one module in a page."""
 COMMENT = re.compile(r"[ \t]*//[^\n]*|\n(?=[ \t]*(?://[^\n]*)?\n)")
-"""Of a shader, and empty lines."""
+"""Comments and empty lines of a shader."""
 
 
-def write_page(path: Path, source: ExportSource, settings: ExportSettings) -> str:
-    """An .html file; returns what it carries, a sentence. Raises InputError where it cannot be written or the budget is
-    too small for any page, Cancelled once the export should stop.
+def write_page(path: Path, source: ExportSource, options: ExportOptions) -> str:
+    """Write an .html file; return a sentence about its views.
+
+    Raises InputError if it cannot be written or no page fits the budget, Cancelled once the export should stop.
     """
-    page, views = make_page(source, settings)
+    page, views = make_page(source, options)
     with write_file(path) as temporary:
         temporary.write_bytes(page)
     height, width = views.size
@@ -51,25 +52,22 @@ def write_page(path: Path, source: ExportSource, settings: ExportSettings) -> st
     )
 
 
-def make_page(source: ExportSource, settings: ExportSettings) -> tuple[bytes, WebViews]:
-    """The page and what it carries. Raises as `write_page` does."""
-    require_avif()
+def make_page(source: ExportSource, options: ExportOptions) -> tuple[bytes, WebViews]:
+    """Return the page and its views. Raises as `write_page` does."""
     scene = source.scene
-    form = form_that_fits(scene.grid, ImageSize(scene.height, scene.width), settings.stills)
-    store = ViewStore(scene.grid, form, scene.color_space, SRGB if scene.color_space == SRGB else DISPLAY_P3)
-    store.fill(source.views(with_disparity=True, in_srgb=False))
+    form = form_that_fits(scene.grid, ImageSize(scene.height, scene.width), options.stills)
+    store = ViewStore(source.views(with_disparity=True, in_srgb=False), scene.grid, form, scene.color_space)
     caption = read_caption(Path(scene.source.path)) if source.loaded is not None else Caption()
-    words = _words(scene, caption, settings.credit)
-    if settings.budget is None:
-        views = store.encode(store.fine_form())
+    words = _words(scene, caption, options.credit)
+    if options.budget is None:
+        views = store.encode(form)
     else:
-        beside = len(_page(source, words, replace(NO_VIEWS, places=places_of(scene.grid, form))))
-        views = store.encode_within(settings.budget - beside)
+        views = store.encode_within(options.budget, lambda views: len(_page(source, words, views)))
     return _page(source, words, views), views
 
 
 def _words(scene: Scene, caption: Caption, is_credited: bool) -> dict[str, str]:
-    """What people read of the page, escaped, by its place in it."""
+    """Return the escaped texts of the page by the name of their place."""
     title = (caption.title if is_credited else "") or scene.name
     credit = ", ".join(filter(None, (caption.author, caption.rights))) if is_credited else ""
     meta = (("author", caption.author), ("dcterms.rights", caption.rights)) if is_credited else ()
@@ -85,34 +83,34 @@ def _words(scene: Scene, caption: Caption, is_credited: bool) -> dict[str, str]:
 def _page(source: ExportSource, words: dict[str, str], views: WebViews) -> bytes:
     folder = resource_folder("web")
     script, style = page_script(), (folder / "page.css").read_text("utf-8")
-    filled = {
+    fields = {
         **words,
         "policy": POLICY.format(script=hash_of(script), style=hash_of(style)),
         "style": style,
         "script": script,
-        "first": f"data:{views.kind};base64,{_letters(views.first)}",
+        "first": f"data:{AVIF};base64,{_base64(views.first)}",
         "shaders": _json(_shaders(folder)),
         "field": _json(_field(source, views)),
-        "colors": "\n".join(map(_letters, views.colors)),
-        "depths": "\n".join(map(_letters, views.depths)),
+        "colors": "\n".join(map(_base64, views.colors)),
+        "depths": "\n".join(map(_base64, views.depths)),
     }
-    return Template((folder / "page.html").read_text("utf-8")).substitute(filled).encode("utf-8", "replace")
+    return Template((folder / "page.html").read_text("utf-8")).substitute(fields).encode("utf-8", "replace")
 
 
 def page_script() -> str:
-    """All of it, one module: there is nowhere to import from."""
+    """Return the page's scripts as one module, since a page cannot import files."""
     return LINK.sub("", "\n".join((resource_folder("web") / name).read_text("utf-8") for name in SCRIPTS))
 
 
 def _shaders(folder: Path) -> dict[str, str]:
-    """By name, without comments; their first lines, the version, left out: the preamble comes in its place."""
+    """Return the shaders by name, without comments and without the version line, which the preamble replaces."""
     sources = {name: flatten(resource_folder("shaders") / name).text for name in SHADERS}
     without = {name: COMMENT.sub("", text.partition("\n")[2]) for name, text in sources.items()}
     return {"preamble": (folder / "preamble.glsl").read_text("utf-8"), **without}
 
 
 def _field(source: ExportSource, views: WebViews) -> dict[str, Any]:
-    """What the script knows of the field; lengths in pixels are those of the views that the page carries."""
+    """Return the script's data about the field; lengths are in pixels of the page's views."""
     scene = source.scene
     scale = views.size.width / scene.width
     return {
@@ -122,7 +120,7 @@ def _field(source: ExportSource, views: WebViews) -> dict[str, Any]:
         "height": views.size.height,
         "step": views.form.every,
         "order": [{"t": place.t, "s": place.s} for place in views.places],
-        "type": views.kind,
+        "type": AVIF,
         "isMoving": len(views.colors) < len(views.places),
         "hasDisparity": bool(views.depths),
         "range": views.range_px,
@@ -137,14 +135,14 @@ def _field(source: ExportSource, views: WebViews) -> dict[str, Any]:
 
 
 def _json(value: Any) -> str:
-    """As it may stand in a page: no tag begins or ends in it."""
+    """Return JSON that contains no tag."""
     return json.dumps(value, allow_nan=False).replace("<", "\\u003c")
 
 
-def _letters(data: bytes) -> str:
+def _base64(data: bytes) -> str:
     return base64.b64encode(data).decode("ascii")
 
 
 def hash_of(text: str) -> str:
-    """Of a script or a style, as a content policy names it."""
-    return f"'sha256-{_letters(hashlib.sha256(text.encode()).digest())}'"
+    """Return the hash of a script or a style as a content policy names it."""
+    return f"'sha256-{_base64(hashlib.sha256(text.encode()).digest())}'"

@@ -1,8 +1,8 @@
-"""Where the views of a light field stand, as programs for reconstruction are told: LLFF, nerfstudio, COLMAP.
+"""Cameras of a light field's views, written for reconstruction programs: LLFF, nerfstudio, COLMAP.
 
-All cameras look the same way, from a plane. Disparity says depth up to its unit: lengths are in distances of the
-nearest. A plane that stands still in the field is one at a finite distance; cameras that look straight ahead see it
-move, so their principal points move instead.
+All cameras look the same way, from a plane. Lengths are in distances of the nearest point: disparity gives depth up to
+its unit. A plane that stands still in the field lies at a finite distance, but moves in cameras that look straight
+ahead; therefore their principal points move.
 """
 
 from __future__ import annotations
@@ -17,16 +17,16 @@ from numpy.typing import NDArray
 
 from iibr_core.types import FloatImage, GridShape, ImageSize, InputError, ViewOffset
 
-MOST_DEPTH_RATIO = 20.0
-"""From the nearest to the farthest, where disparity leaves open what is infinitely far."""
+MAX_DEPTH_RATIO = 20.0
+"""Ratio of the farthest depth to the nearest one where the disparity at infinity is unknown."""
 
 
 @dataclass(frozen=True)
 class FieldCameras:
-    """Cameras of a field: x to the right, y down, z forward, the centre view's in the origin.
+    """Cameras of a field: x to the right, y down, z forward, the centre view's camera in the origin.
 
-    size: of a view. focal_px: of it. range_px: least and greatest disparity (px per view step). at_infinity: the
-    disparity of what is infinitely far, less than the least. Raises InputError where nothing is as it must be.
+    size: size of a view. focal_px: its focal length in pixels. range_px: least and greatest disparity (px per view
+    step). at_infinity: disparity of infinitely far points, below the least. Raises InputError for other numbers.
     """
 
     grid: GridShape
@@ -39,38 +39,38 @@ class FieldCameras:
         low, high = self.range_px
         numbers = (self.focal_px, low, high, self.at_infinity)
         if not (np.isfinite(numbers).all() and self.focal_px > 0 and self.at_infinity < low <= high):
-            said = f"focal length {self.focal_px:g}, disparities {low:g} to {high:g}"
-            raise InputError(f"{said}: no cameras can be computed from these")
+            values = f"focal length {self.focal_px:g}, disparities {low:g} to {high:g}"
+            raise InputError(f"{values}: no cameras can be computed from these")
 
     @property
     def step(self) -> float:
-        """From view to view, as long as the nearest is 1 away."""
+        """Distance from view to view; the nearest point lies at distance 1."""
         return (self.range_px[1] - self.at_infinity) / self.focal_px
 
     @property
     def depth_range(self) -> tuple[float, float]:
-        """Of the nearest, 1, and the farthest."""
+        """Depths of the nearest point, 1, and of the farthest."""
         low, high = self.range_px
         return 1.0, (high - self.at_infinity) / (low - self.at_infinity)
 
     def place(self, offset: ViewOffset) -> tuple[float, float, float]:
-        """Of a view's camera."""
+        """Return the position (x, y, z) of a view's camera."""
         return self.step * offset.s, self.step * offset.t, 0.0
 
     def principal_point(self, offset: ViewOffset) -> tuple[float, float]:
-        """(x, y) in pixels from the picture's upper left corner, not from the middle of its first pixel."""
+        """Return (x, y) in pixels from the picture's upper left corner, not from the middle of its first pixel."""
         return (
             self.size.width / 2 - self.at_infinity * offset.s,
             self.size.height / 2 - self.at_infinity * offset.t,
         )
 
     def depth(self, disparity: FloatImage) -> FloatImage:
-        """Of disparities of any shape; beyond range_px the nearest or the farthest."""
+        """Return the depths of disparities, both of any shape; disparity is limited to range_px."""
         inside = np.clip(disparity, *self.range_px) - np.float32(self.at_infinity)
         return ((self.range_px[1] - self.at_infinity) / inside).astype(np.float32)
 
     def points(self, disparity: FloatImage, offset: ViewOffset) -> FloatImage:
-        """Where the pixels (H, W) of a view are, (H, W, 3)."""
+        """Return the points (H, W, 3) that the pixels of a view show. disparity: (H, W), px per view step."""
         depth = self.depth(disparity)
         rows, columns = np.indices(disparity.shape, np.float32) + np.float32(0.5)
         centre_x, centre_y = self.principal_point(offset)
@@ -80,23 +80,24 @@ class FieldCameras:
 
 
 def infinity_of(low: float, high: float) -> float:
-    """The disparity of what is infinitely far, where all others lie from low to high: 0 where that says sensible
-    depths, else so much less than the least that depths differ by MOST_DEPTH_RATIO.
+    """Return a disparity for infinitely far points of a scene with disparities from low to high.
+
+    It is 0 where that gives a ratio of depths up to MAX_DEPTH_RATIO, else so that they have this ratio.
     """
-    if low > 0 and high <= MOST_DEPTH_RATIO * low:
+    if low > 0 and high <= MAX_DEPTH_RATIO * low:
         return 0.0
-    return low - (high - low) / (MOST_DEPTH_RATIO - 1) if high > low else low - 1.0
+    return low - (high - low) / (MAX_DEPTH_RATIO - 1) if high > low else low - 1.0
 
 
 Views = Mapping[str, ViewOffset]
-"""Where each picture was taken, by its file's name."""
+"""Viewpoint of each picture by the name of its file."""
 
 
 def write_llff(folder: Path, cameras: FieldCameras, views: Views) -> None:
-    """poses_bounds.npy (Mildenhall et al. 2019): a row a picture in the order of the names; rotation (columns down,
-    right, backwards), place, height, width and focal length as 3x5, then nearest and farthest. y is up, z backwards.
+    """Write poses_bounds.npy (Mildenhall et al. 2019), y up and z backwards, one row a picture in the order of names.
 
-    Raises InputError where principal points move: the file has no place for them.
+    A row holds a 3x5 matrix (rotation with columns down, right, backwards; position; height, width and focal length),
+    then the nearest and farthest depth. Raises InputError if principal points move: the file has no place for them.
     """
     if cameras.at_infinity != 0:
         raise InputError(
@@ -114,53 +115,42 @@ def write_llff(folder: Path, cameras: FieldCameras, views: Views) -> None:
 
 
 def write_nerfstudio(folder: Path, cameras: FieldCameras, views: Views) -> None:
-    """transforms.json: camera to world by OpenGL's axes, y up and z backwards."""
+    """Write transforms.json: camera to world by OpenGL's axes, y up and z backwards."""
     frames = []
     for name in sorted(views):
         x, y, z = cameras.place(views[name])
         matrix = [[1.0, 0.0, 0.0, x], [0.0, 1.0, 0.0, -y], [0.0, 0.0, 1.0, -z], [0.0, 0.0, 0.0, 1.0]]
         centre_x, centre_y = cameras.principal_point(views[name])
         frames.append({"file_path": f"images/{name}", "cx": centre_x, "cy": centre_y, "transform_matrix": matrix})
-    whole = {
-        "camera_model": "OPENCV",
-        "w": cameras.size.width,
-        "h": cameras.size.height,
-        "fl_x": cameras.focal_px,
-        "fl_y": cameras.focal_px,
-        "frames": frames,
-    }
-    (folder / "transforms.json").write_text(json.dumps(whole, indent=1), encoding="utf-8")
+    height, width = cameras.size
+    lens = {"camera_model": "OPENCV", "w": width, "h": height, "fl_x": cameras.focal_px, "fl_y": cameras.focal_px}
+    (folder / "transforms.json").write_text(json.dumps({**lens, "frames": frames}, indent=1), encoding="utf-8")
 
 
 def write_colmap(
     folder: Path, cameras: FieldCameras, views: Views, points: FloatImage, colors: NDArray[np.uint8]
 ) -> None:
-    """COLMAP's text model in sparse/0: world to camera, y down and z forward.
+    """Write COLMAP's text model to sparse/0: world to camera, y down and z forward.
 
-    points, colors: (N, 3) each, what of the scene is known from the start.
+    points, colors: (N, 3), points of the scene to start from.
     """
     model = folder / "sparse" / "0"
     model.mkdir(parents=True)
-    names = sorted(views)
-    height, width = cameras.size
-    camera_lines = [
-        f"{i} PINHOLE {width} {height} {cameras.focal_px!r} {cameras.focal_px!r} {centre_x!r} {centre_y!r}"
-        for i, name in enumerate(names, 1)
-        for centre_x, centre_y in (cameras.principal_point(views[name]),)
-    ]
-    image_lines = [
-        f"{i} 1 0 0 0 {-x!r} {-y!r} {-z!r} {i} {name}\n"  # then a line of what was seen in it: nothing
-        for i, name in enumerate(names, 1)
-        for x, y, z in (cameras.place(views[name]),)
-    ]
-    point_lines = [
+    (height, width), focal_px = cameras.size, cameras.focal_px
+    lines: dict[str, list[str]] = {"cameras": [], "images": []}
+    for i, name in enumerate(sorted(views), 1):
+        (x, y, z), (centre_x, centre_y) = cameras.place(views[name]), cameras.principal_point(views[name])
+        lines["cameras"].append(f"{i} PINHOLE {width} {height} {focal_px!r} {focal_px!r} {centre_x!r} {centre_y!r}")
+        # The second line of a picture would list the points seen in it.
+        lines["images"] += [f"{i} 1 0 0 0 {-x!r} {-y!r} {-z!r} {i} {name}", ""]
+    lines["points3D"] = [
         f"{i} {x:.6g} {y:.6g} {z:.6g} {red} {green} {blue} 0"
         for i, ((x, y, z), (red, green, blue)) in enumerate(zip(points.tolist(), colors.tolist()), 1)
     ]
-    for name, lines in (("cameras", camera_lines), ("images", image_lines), ("points3D", point_lines)):
-        (model / f"{name}.txt").write_text("\n".join([*lines, ""]), encoding="utf-8")
+    for name, content in lines.items():
+        (model / f"{name}.txt").write_text("\n".join([*content, ""]), encoding="utf-8")
 
 
 def spread(count: int, most: int) -> Sequence[int]:
-    """At most so many of `count` things, evenly spread."""
+    """Return at most `most` indices of `count` things, evenly spread from the first to the last."""
     return [int(i) for i in np.linspace(0, count - 1, min(count, most)).astype(int)] if count else []

@@ -37,11 +37,6 @@ def reason_of(failure: Exception | str) -> str:
     return type(failure).__name__ if isinstance(failure, Exception) else "no reason given"
 
 
-def shown_name(name: str) -> str:
-    """Return a file's name for people and for files of UTF-8: bytes in it that are no text become the sign for that."""
-    return os.fsencode(name).decode("utf-8", "replace")
-
-
 def printable(text: str) -> str:
     """Return the start of a text from a file, for a message: one line, without control characters."""
     line = "".join(character if character.isprintable() else "?" for character in text)

@@ -1,4 +1,4 @@
-"""PLY files: points with colours, and Gaussian splats as 3DGS stores them (Kerbl et al. 2023)."""
+"""Write PLY files: points with colours, and Gaussian splats as 3DGS stores them (Kerbl et al. 2023)."""
 
 from __future__ import annotations
 
@@ -16,42 +16,38 @@ SH_BASIS_0 = 0.28209479177387814
 """The constant spherical harmonic: colour = 0.5 + SH_BASIS_0 * f_dc."""
 OPACITY = 0.98
 PIXELS_PER_SIGMA = 0.6
-"""Neighbouring splats of a surface then close it, and blur it hardly."""
+"""Radius of a splat in pixels: neighbours then close a surface, with little blur."""
 PLY_TYPES = {"f4": "float", "u1": "uchar"}
 
 
 def write_points(path: Path, points: FloatImage, colors: NDArray[np.uint8]) -> None:
-    """A point cloud: points and colours, (N, 3) each. Raises InputError where it cannot be written."""
-    columns: dict[str, NDArray[Any]] = dict(zip("xyz", points.T.astype("<f4")))
-    columns |= dict(zip(("red", "green", "blue"), colors.T))
-    write_ply(path, columns)
+    """Write a point cloud. points, colors: (N, 3)."""
+    _write_ply(path, dict(zip("xyz", points.T)) | dict(zip(("red", "green", "blue"), colors.T)))
 
 
 def write_splats(path: Path, points: FloatImage, colors: NDArray[np.uint8], pixel: FloatImage) -> None:
-    """Splats that look alike from everywhere. points: (N, 3). colors: (N, 3), sRGB-encoded. pixel: (N,), how wide a
-    pixel is there. Raises InputError where it cannot be written.
+    """Write splats whose colours depend on no direction.
+
+    points: (N, 3). colors: (N, 3), sRGB-encoded. pixel: (N,), width of a pixel at each point, in the unit of `points`.
     """
-    count = len(points)
+    zeros, ones = np.zeros(len(points), np.float32), np.ones(len(points), np.float32)
     shade = (colors.astype(np.float32) / 255 - 0.5) / SH_BASIS_0
     scale = np.log(np.maximum(PIXELS_PER_SIGMA * pixel, 1e-12))
-    zeros, ones = np.zeros(count, np.float32), np.ones(count, np.float32)
-    columns: dict[str, NDArray[Any]] = dict(zip("xyz", points.T))
-    columns |= dict.fromkeys(("nx", "ny", "nz"), zeros)
+    columns: dict[str, NDArray[Any]] = dict(zip("xyz", points.T)) | dict.fromkeys(("nx", "ny", "nz"), zeros)
     columns |= {f"f_dc_{i}": shade[:, i] for i in range(3)}
-    columns["opacity"] = np.full(count, np.log(OPACITY / (1 - OPACITY)), np.float32)
+    columns["opacity"] = ones * np.log(OPACITY / (1 - OPACITY))
     columns |= {f"scale_{i}": scale for i in range(3)}
     columns |= {"rot_0": ones, "rot_1": zeros, "rot_2": zeros, "rot_3": zeros}  # w first
-    write_ply(path, {name: column.astype("<f4") for name, column in columns.items()})
+    _write_ply(path, columns)
 
 
-def write_ply(path: Path, columns: Mapping[str, NDArray[Any]]) -> None:
-    """A PLY of vertices with these properties, each (N,), float32 or uint8; whole or not at all. Raises InputError."""
-    fields = [(name, column.dtype.newbyteorder("<")) for name, column in columns.items()]
+def _write_ply(path: Path, columns: Mapping[str, NDArray[Any]]) -> None:
+    """Write a PLY of vertices. columns: property names with arrays (N,), stored as bytes (uint8) or floats."""
+    fields = [(name, "<f4" if column.dtype.kind == "f" else "u1") for name, column in columns.items()]
     table = np.empty(len(next(iter(columns.values()))), fields)
     for name, column in columns.items():
         table[name] = column
     lines = ["ply", "format binary_little_endian 1.0", f"element vertex {len(table)}"]
-    lines += [f"property {PLY_TYPES[dtype.str[1:]]} {name}" for name, dtype in fields]
-    with write_file(path) as temporary, temporary.open("wb") as file:
-        file.write("\n".join([*lines, "end_header", ""]).encode("ascii"))
-        file.write(table.tobytes())
+    lines += [f"property {PLY_TYPES[kind[-2:]]} {name}" for name, kind in fields]
+    with write_file(path) as temporary:
+        temporary.write_bytes("\n".join([*lines, "end_header", ""]).encode("ascii") + table.tobytes())

@@ -1,43 +1,60 @@
-"""Cameras of any poses from files: LLFF's poses_bounds.npy, nerfstudio's and NeRF's transforms.json, COLMAP's text.
+"""Read cameras of any poses: LLFF's poses_bounds.npy, nerfstudio's and NeRF's transforms.json, COLMAP's text.
 
-What `cameras.py` writes is read here. Worlds have axes of their own: only how cameras stand to each other counts.
+Worlds may have any axes: only the poses of cameras relative to each other count. `cameras.py` writes these files.
 """
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from math import tan
 from pathlib import Path
-from typing import Any
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.formats.files import is_file, is_folder, printable, read_text, reason_of, stays_within
-from iibr_core.formats.images.oiio_reader import read_size
+from iibr_core.formats.images.decode import read_size
 from iibr_core.formats.maps.npy import read_array
 from iibr_core.types import Camera, ImageSize, InputError
 
-MOST_POSES = 10_000
-MOST_SIDE = 2**15
-MOST_BYTES = 64 * 2**20
+MAX_POSES = 10_000
+MAX_SIDE_PX = 2**15
+MAX_TEXT_BYTES = 64 * 2**20
 LLFF_FROM_CAMERA = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
 """Rows: LLFF's axes (down, right, backwards) by a camera's x right, y down, z forward; its own inverse."""
 OPENGL_FROM_CAMERA = np.diag([1.0, -1.0, -1.0])
-"""The same of OpenGL's: right, up, backwards."""
-FRAME_NAMES = ("transform_matrix", "file_path", "w", "h", "fl_x", "fl_y", "cx", "cy", "camera_angle_x")
-"""Of transforms.json, what counts here; a frame may name a thousand other things."""
+"""The same for OpenGL's axes: right, up, backwards."""
 COLMAP_FILES = ("cameras.txt", "images.txt")
 
 Doubles = NDArray[np.float64]
 
 
-def read_poses(path: Path) -> tuple[Camera, ...]:
-    """The cameras of a file in its order, one at least: *.npy as LLFF's poses_bounds.npy, *.json as transforms.json; of
-    a folder whichever of them lies in it, or COLMAP's cameras.txt and images.txt (by name of picture).
+class _Frame(msgspec.Struct):
+    """A frame of transforms.json; the file itself may give the same values for all frames. Lengths are in pixels."""
 
-    Raises InputError where there are none, or one is no camera.
+    transform_matrix: tuple[tuple[float, float, float, float], ...] = ()
+    file_path: str = ""
+    w: float | None = None
+    h: float | None = None
+    fl_x: float | None = None
+    fl_y: float | None = None
+    cx: float | None = None
+    cy: float | None = None
+    camera_angle_x: float | None = None
+
+
+class _Transforms(_Frame):
+    """A transforms.json of nerfstudio, or of NeRF (with `camera_angle_x`)."""
+
+    frames: tuple[_Frame, ...] = ()
+
+
+def read_poses(path: Path) -> tuple[Camera, ...]:
+    """Return the cameras of a file in its order: *.npy as poses_bounds.npy, *.json as transforms.json.
+
+    A folder is searched for either of them, else for COLMAP's cameras.txt and images.txt (sorted by picture). Raises
+    InputError if there are no cameras, or one of them is invalid.
     """
     if is_folder(path):
         return _read_folder(path)
@@ -49,7 +66,7 @@ def read_poses(path: Path) -> tuple[Camera, ...]:
 
 
 def central_camera(cameras: Sequence[Camera]) -> int:
-    """Index of the one nearest to the middle of all."""
+    """Return the index of the camera nearest to the mean position."""
     positions = np.array([camera.position for camera in cameras])
     return int(((positions - positions.mean(axis=0)) ** 2).sum(axis=1).argmin())
 
@@ -65,12 +82,12 @@ def _read_folder(folder: Path) -> tuple[Camera, ...]:
 
 
 def read_llff_poses(path: Path) -> tuple[Camera, ...]:
-    """Of poses_bounds.npy (Mildenhall et al. 2019): rows of a 3x5 matrix (camera-to-world rotation whose columns point
-    down, right and backwards; position; height, width, focal length), the least and the greatest depth.
+    """Return the cameras of poses_bounds.npy (Mildenhall et al. 2019) with their depth ranges.
 
-    Raises InputError as `read_poses` does.
+    A row holds a 3x5 matrix (camera-to-world rotation with columns down, right and backwards; position; height, width,
+    focal length), then the least and greatest depth. Raises InputError as `read_poses` does.
     """
-    stored = read_array(path, 17 * MOST_POSES)
+    stored = read_array(path, 17 * MAX_POSES)
     if stored.ndim != 2 or stored.shape[1] != 17 or stored.dtype.kind != "f":
         raise InputError(f"{path}: holds no poses; N rows of 17 numbers are expected")
     _require_count(path, len(stored))
@@ -81,84 +98,71 @@ def _llff_camera(row: Doubles, source: str) -> Camera:
     matrix, (near, far) = row[:15].reshape(3, 5), row[15:]
     height, width, focal = (float(value) for value in matrix[:, 4])
     size = _size(height, width, source)
-    turned = matrix[:, :3] @ LLFF_FROM_CAMERA
-    return Camera(turned, matrix[:, 3], size, (focal, focal), _middle(size), source, (float(near), float(far)))
+    rotation = matrix[:, :3] @ LLFF_FROM_CAMERA
+    return Camera(rotation, matrix[:, 3], size, (focal, focal), _middle(size), source, (float(near), float(far)))
 
 
 def _read_transforms(path: Path) -> tuple[Camera, ...]:
-    """nerfstudio's, or NeRF's first ones with camera_angle_x; what a frame says goes before what the file says."""
-    text = read_text(path, MOST_BYTES)
+    text = read_text(path, MAX_TEXT_BYTES)
     try:
-        whole = json.loads(text)
-        frames = whole["frames"]
-        _require_count(path, len(frames))
-        of_all = _known_names(whole)
-        return tuple(
-            _frame_camera(of_all | _known_names(frame), path, number) for number, frame in enumerate(frames, 1)
-        )
-    except (ValueError, TypeError, KeyError, IndexError, ArithmeticError, RecursionError) as error:
-        if isinstance(error, InputError):
-            raise
+        transforms = msgspec.json.decode(text, type=_Transforms)
+    except (msgspec.DecodeError, RecursionError) as error:
         raise InputError(
             f"{path}: is not a transforms.json with poses ({reason_of(error)}); get the file again"
         ) from error
+    _require_count(path, len(transforms.frames))
+    return tuple(_frame_camera(transforms, frame, path, number) for number, frame in enumerate(transforms.frames, 1))
 
 
-def _known_names(said: dict[str, Any]) -> dict[str, Any]:
-    return {name: said[name] for name in FRAME_NAMES if name in said}
+def _frame_camera(transforms: _Transforms, frame: _Frame, path: Path, number: int) -> Camera:
+    def value(name: str) -> float | None:
+        of_frame: float | None = getattr(frame, name)
+        return getattr(transforms, name) if of_frame is None else of_frame
 
-
-def _frame_camera(frame: dict[str, Any], path: Path, number: int) -> Camera:
     source = f"{path}, pose {number}"
-    matrix = np.array(frame["transform_matrix"], float)
-    if matrix.shape not in ((4, 4), (3, 4)):
-        raise InputError(f"{source}: a 4x4 matrix is expected, not {matrix.shape}")
-    size = _frame_size(frame, path, source)
-    if "fl_x" in frame:
-        focal_x = float(frame["fl_x"])
-        focal_px = focal_x, float(frame.get("fl_y", focal_x))
-    else:
-        focal_px = (0.5 * size.width / tan(0.5 * float(frame["camera_angle_x"])),) * 2
-    middle = _middle(size)
-    # Counted from the picture's corner there, from the middle of its first pixel here.
-    centre_px = tuple(float(frame[name]) - 0.5 if name in frame else at for name, at in zip(("cx", "cy"), middle))
-    return Camera(
-        matrix[:3, :3] @ OPENGL_FROM_CAMERA, matrix[:3, 3], size, focal_px, (centre_px[0], centre_px[1]), source
-    )
+    matrix = np.array(frame.transform_matrix)
+    if len(matrix) not in (3, 4):
+        raise InputError(f"{source}: its transform_matrix is not 4x4; get the file again")
+    width, height, focal_x, angle = (value(name) for name in ("w", "h", "fl_x", "camera_angle_x"))
+    has_size = width is not None and height is not None
+    size = _size(height or 0, width or 0, source) if has_size else _picture_size(frame.file_path, path, source)
+    focal_x = 0.5 * size.width / tan(0.5 * angle) if focal_x is None and angle else focal_x
+    if focal_x is None:
+        raise InputError(f"{source}: neither fl_x nor camera_angle_x gives a focal length; add one of them")
+    # Principal points count from the picture's corner there, from the middle of its first pixel here.
+    x, y = (middle if at is None else at - 0.5 for at, middle in zip((value("cx"), value("cy")), _middle(size)))
+    rotation = matrix[:3, :3] @ OPENGL_FROM_CAMERA
+    return Camera(rotation, matrix[:3, 3], size, (focal_x, value("fl_y") or focal_x), (x, y), source)
 
 
-def _frame_size(frame: dict[str, Any], path: Path, source: str) -> ImageSize:
-    """As stated, else of the frame's picture."""
-    if "w" in frame and "h" in frame:
-        return _size(float(frame["h"]), float(frame["w"]), source)
-    name = str(frame["file_path"])
+def _picture_size(name: str, path: Path, source: str) -> ImageSize:
+    """Return the size of a frame's picture, which is given relative to the file; without an ending it is a PNG."""
     if not stays_within(name):
         raise InputError(f"{source}: its picture {printable(name)} does not lie beside the file; state w and h")
     picture = path.parent / name
     try:
         return read_size(picture if picture.suffix else picture.with_suffix(".png"))
-    except InputError as error:
+    except (InputError, ValueError) as error:
         raise InputError(f"{source} states no size, and its picture has none: {error}") from error
 
 
 def _read_colmap(model: Path) -> tuple[Camera, ...]:
-    """Of COLMAP's text: a line a camera; two lines a picture, the second of which says what was seen in it."""
+    """Return the cameras of COLMAP's text: one line a camera; two a picture, the second of which lists points."""
     intrinsics, poses = (_lines(model / name) for name in COLMAP_FILES)
     try:
         kinds = {words[0]: words for words in (line.split() for line in intrinsics if line)}
-        named = [line for line in poses[::2] if line]
-        _require_count(model, len(named))
-        pictures = sorted((line.split(maxsplit=9) for line in named), key=lambda words: words[9])
+        pictures = sorted((line.split(maxsplit=9) for line in poses[::2] if line), key=lambda words: words[9])
+        _require_count(model, len(pictures))
         return tuple(_colmap_camera(kinds[words[8]], words, model) for words in pictures)
-    except (ValueError, KeyError, IndexError, ArithmeticError) as error:
-        if isinstance(error, InputError):
-            raise
+    except InputError:
+        raise
+    except (ValueError, KeyError, IndexError) as error:
         raise InputError(f"{model}: is not a text model of COLMAP ({reason_of(error)}); export it again") from error
 
 
 def _lines(path: Path) -> list[str]:
-    """Without comments; a picture's second line may be empty."""
-    return [line.strip() for line in read_text(path, MOST_BYTES).splitlines() if not line.startswith("#")]
+    """Return the lines of a file without comments; empty lines stay."""
+    return [line.strip() for line in read_text(path, MAX_TEXT_BYTES).splitlines() if not line.startswith("#")]
 
 
 def _colmap_camera(kind: list[str], picture: list[str], model: Path) -> Camera:
@@ -174,27 +178,22 @@ def _colmap_camera(kind: list[str], picture: list[str], model: Path) -> Camera:
 
 
 def _rotation(w: float, x: float, y: float, z: float) -> Doubles:
-    """Of a quaternion; NaN of one that is 0."""
+    """Return the rotation (3, 3) of a quaternion; NaN if its length is 0."""
     with np.errstate(invalid="ignore"):
         w, x, y, z = np.array([w, x, y, z]) / np.linalg.norm([w, x, y, z])
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-        ]
-    )
+    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    rotation: Doubles = np.eye(3) + 2 * w * cross + 2 * cross @ cross
+    return rotation
 
 
 def _require_count(path: Path, count: int) -> None:
-    if not 1 <= count <= MOST_POSES:
-        raise InputError(f"{path}: holds {count} poses; give 1 to {MOST_POSES}")
+    if not 1 <= count <= MAX_POSES:
+        raise InputError(f"{path}: holds {count} poses; give 1 to {MAX_POSES}")
 
 
 def _size(height: float, width: float, source: str) -> ImageSize:
-    """Raises InputError where these are no numbers of pixels."""
-    if not (1 <= height <= MOST_SIDE and 1 <= width <= MOST_SIDE):
-        raise InputError(f"{source}: pictures of {width:g}x{height:g} pixels; give 1 to {MOST_SIDE} each way")
+    if not (1 <= height <= MAX_SIDE_PX and 1 <= width <= MAX_SIDE_PX):
+        raise InputError(f"{source}: pictures of {width:g}x{height:g} pixels; give 1 to {MAX_SIDE_PX} each way")
     return ImageSize(round(height), round(width))
 
 

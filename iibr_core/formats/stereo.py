@@ -1,4 +1,4 @@
-"""Two pictures as one: anaglyphs for red-cyan glasses."""
+"""Anaglyphs of two pictures for red-cyan glasses."""
 
 from __future__ import annotations
 
@@ -10,20 +10,17 @@ from numpy.typing import NDArray
 from iibr_core.color import bytes_from_encoded, linear_from_srgb, srgb_from_linear
 from iibr_core.types import FloatImage
 
-# Dubois 2009, for red-cyan glasses and sRGB displays: rows are red, green and blue of what is shown.
+# Dubois 2009, for red-cyan glasses and sRGB displays: rows are red, green and blue of the display.
 LEFT = np.array([[0.437, 0.449, 0.164], [-0.062, -0.062, -0.024], [-0.048, -0.050, -0.017]], np.float32)
 RIGHT = np.array([[-0.011, -0.032, -0.007], [0.377, 0.761, 0.009], [-0.026, -0.093, 1.234]], np.float32)
 
 
 def anaglyph(left: NDArray[Any], right: NDArray[Any]) -> NDArray[np.uint8]:
-    """The anaglyph (H, W, 3) of two sRGB-encoded pictures (H, W, 3) uint8, by least squares (Dubois, "A projection
-    method to generate anaglyph stereo images", ICASSP 2001; matrices of 2009): in linear light, what of each eye lies
-    beyond what a display shows is cut off before they are added.
+    """Return the anaglyph (H, W, 3) of two sRGB-encoded pictures (H, W, 3) uint8, by least squares in linear light.
 
-    Raises ValueError where they differ in size.
+    Dubois, "A projection method to generate anaglyph stereo images", ICASSP 2001, with the matrices of 2009. Each eye's
+    light is clipped to the range of the display before the two are added.
     """
-    if left.shape != right.shape:
-        raise ValueError(f"the left picture is {left.shape}, the right one {right.shape}")
     return bytes_from_encoded(srgb_from_linear(_seen(left, LEFT) + _seen(right, RIGHT)))
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.color import encoded_from_stored, srgb_from_linear
-from iibr_core.formats.light_fields.light_field_formats import WRITERS, writer_for
+from iibr_core.formats.light_fields.write import WRITERS, check_light_field, write_light_field
 from iibr_core.rendering.aperture_sampling import aperture_points, grid_weights
 from iibr_core.rendering.lens import LensSum
 from iibr_core.rendering.optics import CENTRE, ApertureShape, Optics
@@ -22,7 +22,7 @@ CAMERAS_PER_PX = 4.0
 MIN_CAMERAS, MAX_CAMERAS = 16, 256
 """Least and greatest number of these views."""
 
-FORMATS = tuple(WRITERS)
+FORMATS = WRITERS
 """That `LightField.save` knows."""
 
 View = ViewUpdate
@@ -116,14 +116,13 @@ class LightField:
 
         Raises InputError where that is not possible, or something is there that may not be replaced.
         """
-        writer = writer_for(format)
-        writer.require_place(Path(path), (), may_replace)
-        with writer(Path(path), self.grid, self.focal_px, self.name, self.disparity is not None) as opened:
-            for at in np.ndindex(*self.grid):
-                row, column = at
-                opened.add(
-                    ViewUpdate(row, column, self.views[at], None if self.disparity is None else self.disparity[at])
-                )
+        check_light_field(Path(path), format, (), may_replace)
+        disparity = self.disparity
+        views = (
+            ViewUpdate(row, column, self.views[row, column], None if disparity is None else disparity[row, column])
+            for row, column in np.ndindex(*self.grid)
+        )
+        write_light_field(Path(path), format, self.grid, views, self.focal_px, self.name, disparity is not None)
 
 
 def gather(

@@ -76,7 +76,7 @@ def load_photo(
     Raises InputError, and Cancelled once should_stop is true.
     """
     from iibr_core.depth.search import open_with_depth
-    from iibr_core.formats.images.settings_text import settings_text_in
+    from iibr_core.formats.images.metadata import settings_text_in
 
     said_at: dict[str, float] = {}
 
@@ -125,8 +125,7 @@ def sketch_photo(source: Source, should_stop: ShouldStop = never) -> LoadedPhoto
     Raises InputError, and Cancelled once should_stop is true.
     """
     from iibr_core.depth.search import sketch_depth
-    from iibr_core.formats.images.photo import focal_px_from_fov
-    from iibr_core.formats.images.thumbnail import read_thumbnail
+    from iibr_core.formats.images.photo import focal_px_from_fov, read_thumbnail
 
     path = Path(source.path)
     max_pixels, stored = _pixels_to_read(source)
@@ -178,9 +177,9 @@ def _turned_like(size: ImageSize, upright: ImageSize) -> ImageSize:
 
 
 def _pixels_to_read(source: Source) -> tuple[int, ImageSize]:
-    """How large a photo is read, and how large it is stored. Raises InputError for files of views."""
-    from iibr_core.formats.images.header import read_photo_header
+    """Return how large a photo is read at most, and its stored size. Raises InputError for files of views."""
     from iibr_core.formats.images.photo import DEFAULT_MAX_PIXELS
+    from iibr_core.formats.images.side_by_side import photo_size
     from iibr_core.formats.light_fields.light_field_formats import is_view_file
 
     path = Path(source.path)
@@ -188,7 +187,7 @@ def _pixels_to_read(source: Source) -> tuple[int, ImageSize]:
         raise InputError(
             f"{path}: holds the views of a light field, not a photo; `iibr view`, export and depth read it"
         )
-    return source.max_pixels or DEFAULT_MAX_PIXELS, read_photo_header(path).size
+    return source.max_pixels or DEFAULT_MAX_PIXELS, photo_size(path)
 
 
 def prepare_brush() -> None:

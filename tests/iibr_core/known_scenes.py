@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from iibr_core.formats.images.photo import write_image
+from iibr_core.formats.images.write import write_image
 from iibr_core.formats.maps.pfm import write_pfm
 from iibr_core.types import ViewOffset
 from tests.iibr_core.scenes import smooth_texture

@@ -21,11 +21,12 @@ from iibr_core.depth.embedded.embedded_depth import read_embedded
 from iibr_core.depth.estimates import RelativeInverseDepth
 from iibr_core.depth.estimators import estimate_cache
 from iibr_core.formats import files
-from iibr_core.formats.images.oiio_reader import read_raster
-from iibr_core.formats.images.photo import read_photo, write_image
-from iibr_core.formats.light_fields.hci import HciWriter
+from iibr_core.formats.images.decode import decode
+from iibr_core.formats.images.photo import read_photo
+from iibr_core.formats.images.write import write_image
 from iibr_core.formats.light_fields.light_field_formats import open_light_field
 from iibr_core.formats.light_fields.views import read_views
+from iibr_core.formats.light_fields.write import write_light_field
 from iibr_core.formats.maps.disparity_file import read_disparity
 from iibr_core.formats.maps.pfm import write_pfm
 from iibr_core.formats.maps.writer import write_map
@@ -94,10 +95,8 @@ def test_a_disk_that_fills_up_leaves_no_half_light_field(tmp_path, room):
 
 
 def write_field(folder, grid):
-    with HciWriter(folder, grid, 100.0, "field", with_disparity=True) as writer:
-        for row in range(grid.rows):
-            for column in range(grid.columns):
-                writer.add(ViewUpdate(row, column, NOISE, NOISE[..., 0].astype(np.float32)))
+    views = (ViewUpdate(*at, NOISE, NOISE[..., 0].astype(np.float32)) for at in np.ndindex(*grid))
+    write_light_field(folder, "hci", grid, views, 100.0, "field", with_disparity=True)
 
 
 def generating(folder, *options):
@@ -225,7 +224,7 @@ def bomb_png(width, height, size=0):
 def test_decompression_bombs_are_refused_by_size_before_decoding(tmp_path, name, data, reason):
     (tmp_path / name).write_bytes(data)
     with pytest.raises(InputError, match=rf"{name}: .*{reason}"):
-        read_raster(tmp_path / name)
+        decode(tmp_path / name)
 
 
 def test_a_bomb_within_a_photo_is_refused_too(tmp_path):

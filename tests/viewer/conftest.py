@@ -39,7 +39,7 @@ DEADLINE_S = 120.0
 
 def write_scene(folder: Path, name: str = "scene", seed: int = 0) -> Path:
     """A photo with its sidecar: a near red square, in the middle, before a far grey wall. Returns the photo's path."""
-    from iibr_core.formats.images.photo import write_image
+    from iibr_core.formats.images.write import write_image
 
     rng = np.random.default_rng(seed)
     pixels = rng.integers(60, 200, (HEIGHT // 8, WIDTH // 8, 1)).repeat(8, 0).repeat(8, 1).repeat(3, 2).astype(np.uint8)

@@ -19,10 +19,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from iibr_core.formats.images.photo import write_image
-from iibr_core.formats.images.picture_kinds import PictureFormat, is_float
-from iibr_core.formats.images.settings_text import settings_text_in
-from iibr_core.formats.light_fields.hci import HciWriter
+from iibr_core.formats.images.metadata import settings_text_in
+from iibr_core.formats.images.write import PictureFormat, is_float, write_image
+from iibr_core.formats.light_fields.write import write_light_field
 from iibr_core.rendering.optics import CENTRE
 from iibr_core.scenes.opening import SceneReady, SceneRequest, ViewReady, results_of
 from iibr_core.scenes.scene import Source
@@ -135,10 +134,8 @@ def test_memory_that_runs_out_is_one_line_and_the_worker_goes_on(tmp_path: Path)
 
 def test_a_view_deleted_while_the_light_field_opens(desk: Desk, tmp_path: Path) -> None:
     """The views that were read stay; the one that is gone is named."""
-    with HciWriter(tmp_path / "field", GRID, 50.0, "field") as writer:
-        for row in range(3):
-            for column in range(3):
-                writer.add(ViewUpdate(row, column, np.full((8, 9, 3), 90, np.uint8), None))
+    views = (ViewUpdate(*at, np.full((8, 9, 3), 90, np.uint8), None) for at in np.ndindex(3, 3))
+    write_light_field(tmp_path / "field", "hci", GRID, views, 50.0, "field")
     results = results_of(SceneRequest(1, Source(str(tmp_path / "field"))), lambda: False, lambda: CENTRE)
     assert isinstance(next(results), SceneReady)
     (tmp_path / "field" / "input_Cam008.png").unlink()

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from iibr_core.formats.images.photo import write_image
+from iibr_core.formats.images.write import write_image
 from tests.viewer.conftest import write_scene
 
 ROOT = Path(__file__).parents[2]

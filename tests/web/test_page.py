@@ -196,7 +196,7 @@ def test_stills_show_the_same(tab: Tab, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("size", [(1, 1), (1, 7), (211, 97)])
 def test_odd_sizes_open(browser: Pipe, tab: Tab, tmp_path: Path, size: tuple[int, int]) -> None:
-    from iibr_core.formats.images.photo import write_image
+    from iibr_core.formats.images.write import write_image
 
     height, width = size
     write_image(tmp_path / "photo.png", np.random.default_rng(1).integers(0, 256, (height, width, 3), np.uint8))

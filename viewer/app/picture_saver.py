@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from iibr_core.exports.full_picture import FullPicture, encode_light, is_full
 from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.exports.source import ExportSource
-from iibr_core.formats.images.picture_kinds import AS_USUAL, PictureFormat, is_float
+from iibr_core.formats.images.write import AS_USUAL, PictureFormat, is_float
 from iibr_core.formats.outputs import AlreadyThereError, make_folder
 from iibr_core.rendering.optics import Optics
 from iibr_core.scenes.scene import Scene

@@ -54,11 +54,10 @@ class SharpeningWorker(JobThread[FullPicture, SharpResult]):
         def draw(settings: RenderSettings) -> NDArray[Any]:
             return self.window_work.run(self._draw_steps(settings), job.should_stop)
 
-        with suppress(Cancelled):
-            photo = kept[1] if kept is not None and kept[0] is request.loaded else request.load(job.should_stop)
+        def keep(photo: LargePhoto) -> None:
             self._photo = request.loaded, photo
-            if request.needs_fills and photo.fills is None:
-                photo = photo.with_fills(request.fill(job.should_stop))
-                self._photo = request.loaded, photo
-            light = request.make_from(photo, draw, job.should_stop)
+
+        photo = kept[1] if kept is not None and kept[0] is request.loaded else None
+        with suppress(Cancelled):
+            light = request.make(draw, job.should_stop, photo=photo, keep=keep)
             yield SharpPart(encode_light(light, False, SRGB, request.scene.color_space, job.should_stop))

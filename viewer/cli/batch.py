@@ -1,9 +1,9 @@
-"""`iibr batch`: every photo of an archive exported, by several processes, here or on other machines."""
+"""`iibr batch`: export every photo of some folders, with several processes, on this machine or others."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import partial
+import os
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -21,100 +21,80 @@ from viewer.cli.shared_options import Force, Grid, Literal, require_model
 from viewer.cli.terminal import show_progress
 
 if TYPE_CHECKING:
-    from iibr_core.exports.batch.workers import WorkerSource
-    from iibr_core.exports.export_opening import OpenDrawn
+    from iibr_core.exports.source import OpenDrawn
 
-MOST_WORKERS = 1024
-
-
-@dataclass(frozen=True)
-class WorkerOptions:
-    """Who does the work."""
-
-    workers: Annotated[
-        int | None, typer.Option(min=1, max=MOST_WORKERS, help="Processes here.", show_default="one a core")
-    ] = None
-    scheduler: Annotated[
-        str | None,
-        typer.Option(
-            metavar="ADDRESS",
-            help="Of a Dask scheduler, whose workers do it instead. [bold]Whoever can reach a scheduler can run code as"
-            " you[/bold], on its workers and here: outside a network that you trust, use TLS (tls://HOST:PORT).",
-        ),
-    ] = None
-    tls_ca: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Certificate of who signed the scheduler's, PEM.")
-    ] = None
-    tls_cert: Annotated[Path | None, typer.Option(metavar="FILE", help="Your certificate, PEM.")] = None
-    tls_key: Annotated[Path | None, typer.Option(metavar="FILE", help="Its private key, PEM.")] = None
-
-    def source(self) -> WorkerSource:
-        """Raises InputError where the options contradict each other."""
-        tls = [path for path in (self.tls_ca, self.tls_cert, self.tls_key) if path is not None]
-        if tls and (len(tls) < 3 or self.scheduler is None):
-            raise InputError("--tls-ca, --tls-cert, --tls-key: give all three, with --scheduler")
-        if self.scheduler is None:
-            from iibr_core.exports.batch.run import workers_here
-
-            return workers_here(self.workers)
-        if self.workers is not None:
-            raise InputError("--workers starts processes here, --scheduler uses those elsewhere: leave one out")
-        require_extra("batch", "distributed")
-        from iibr_core.exports.batch.scheduler import TlsFiles, remote_workers
-        from iibr_core.exports.batch.workers import WorkerSource
-
-        return WorkerSource(partial(remote_workers, self.scheduler, TlsFiles(*tls) if tls else None), None)
+MAX_WORKERS = 1024
 
 
 @with_option_records
 def batch(
     context: typer.Context,
-    folders: Annotated[list[Path], typer.Argument(help="Folders of photos, and of folders.", show_default=False)],
+    folders: Annotated[list[Path], typer.Argument(help="Folders of photos.", show_default=False)],
     to: To,
     output: Annotated[Path, typer.Option("--output", "-o", metavar="DIR", help="Folder of all exports.")],
     focus: Focus = None,
     aperture: Aperture = None,
     gloss: GlossFile = None,
     *,
-    workers: WorkerOptions,
-    told: KindOptions,
+    workers: Annotated[
+        int | None,
+        typer.Option(min=1, max=MAX_WORKERS, help="Number of processes on this machine.", show_default="one a core"),
+    ] = None,
+    dask: Annotated[
+        str,
+        typer.Option(
+            metavar="ADDRESS",
+            help="Dask scheduler (tcp://HOST:PORT or tls://HOST:PORT) whose workers are used instead. [bold]Whoever can"
+            " reach a scheduler can run code as you[/bold]: use TLS outside a network that you trust.",
+            show_default=False,
+        ),
+    ] = "",
+    kind_options: KindOptions,
     photo: PhotoOptions,
     literal: Literal = False,
     grid: Grid = None,
     force: Force = False,
 ) -> None:
-    """Export every photo of an archive. What is finished is not made again: give the same command to go on, or to add.
+    """Export every photo of some folders. The same command again makes only what is missing or older than its photo.
 
     Example: iibr batch photos --to depth -o depths
     """
     require_kind(context, to)
-    worker_source = workers.source()
+    if dask:
+        if workers is not None:
+            raise InputError("--workers starts processes here, --dask uses those elsewhere: leave one out")
+        require_extra("batch", "distributed")
     source = photo.source("", grid, is_literal=literal)
-    from iibr_core.exports.batch.archive import photos_in
-    from iibr_core.exports.batch.ledger import FAILURES, Ledger, require_batch_place
-    from iibr_core.exports.batch.run import run_batch
-    from iibr_core.exports.batch.task import BatchSettings
-
     require_model(source.depth)
-    if gloss is not None:
-        from iibr_core.scenes.scene_gloss import read_environment
+    from iibr_core.exports.batch import FAILURES, BatchSettings, check_batch_folder, photos_in, run_batch
+    from iibr_core.scenes.lens_limits import LensChoice
 
-        read_environment(gloss.gloss)
     name = next(name for name, kind in EXPORTS.items() if kind is to)
-    settings = BatchSettings(
-        name, source, photo.depth_strength, told.options(), focus, aperture, gloss.gloss if gloss else None
-    )
-    photos = photos_in(folders)
-    if not photos:
-        raise InputError(f"{' and '.join(map(str, folders))}: no photos in it")
-    require_batch_place(output, folders, force)
+    lens = LensChoice(None, focus, aperture, gloss.gloss if gloss else None)
     open_drawn: OpenDrawn | None = None
     if to.is_drawn:
         from viewer.display.scene_drawer import open_drawn
-    with Ledger(output, force) as ledger, show_progress("looking", counts=True) as show:
-        done = run_batch(ledger, settings, photos, worker_source, open_drawn, show)
-    print(f"{output}: {done.written} written, {done.there_before} there before, {done.failed} failed")
-    if done.guessed:
-        print(f"{done.guessed} of {done.exported} photos have guessed depth. {BETTER_WAYS}")
-    if done.failed:
-        raise InputError(f"{output / FAILURES}: tells what failed, and why")
+    settings = BatchSettings(name, source, photo.depth_strength, kind_options.options(), lens, open_drawn)
+    photos = photos_in(folders)
+    if not photos:
+        raise InputError(f"{' and '.join(map(str, folders))}: no photos in it")
+    check_batch_folder(output, folders, force)
+    if dask and not is_secure(dask):
+        print(f"warning: the connection to {dask} is not encrypted; use tls://HOST:PORT", file=sys.stderr)
+    # Processes write nothing to the terminal and import nothing from the working folder.
+    os.environ.update(PYTHONWARNINGS="ignore", PYTHONSAFEPATH="1")
+    with show_progress("looking", counts=True) as show:
+        count = run_batch(
+            photos, settings, output, folders, workers=workers, dask=dask, force=force, report_progress=show
+        )
+    print(f"{output}: {count.written} written, {count.there_before} there before, {count.failed} failed")
+    if count.guessed:
+        print(f"{count.guessed} of {count.written} written have guessed depth. {BETTER_WAYS}")
+    if count.failed:
+        raise InputError(f"{output / FAILURES}: lists what failed, and why")
+
+
+def is_secure(address: str) -> bool:
+    """Return whether a scheduler's address is encrypted (tls://) or on this machine."""
+    host = address.rpartition("://")[2].rpartition(":")[0].strip("[]")
+    return address.startswith("tls://") or host in ("localhost", "::1") or host.startswith("127.")

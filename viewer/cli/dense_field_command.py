@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contextlib import closing
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,28 +13,32 @@ from viewer.cli.terminal import MAKING, print_notes, show_progress
 from viewer.cli.view_writing import write_views
 
 if TYPE_CHECKING:
-    from iibr_core.formats.light_fields.light_field_formats import WriterFactory
     from iibr_core.scenes.scene import Source
 
 NOT_FOR_DENSE_FIELDS = NOT_FOR_LIGHT_FIELDS - {"grid", "inpaint"} | {"disparity", "disparity_scale", "literal", "gloss"}
 """Options that say nothing about views between those of a light field."""
 
 
-def write_dense_field(
-    source: Source, grid: GridShape, out: Path, new_writer: WriterFactory, with_disparity: bool
-) -> None:
-    """To a place that the writer admits. Raises InputError, also where the views find no places on the grid."""
+def write_dense_field(source: Source, grid: GridShape, out: Path, layout: str, with_disparity: bool) -> None:
+    """Write a light field's views and those between. Raises InputError if the views have no places on the grid."""
     from iibr_core.formats.light_fields.light_field_formats import open_light_field
+    from iibr_core.formats.light_fields.write import write_light_field
     from iibr_core.scenes.dense import read_dense
 
     field = open_light_field(Path(source.path))
     with show_progress("reading") as show:
         dense = read_dense(field, grid, source.inpaint, report_progress=show)
         size = image_size(dense.given[0].colors)
-        with (
-            new_writer(out, grid, field.focal_px or float(size.width), field.name, with_disparity) as writer,
-            closing(dense.views) as views,
-        ):
-            said = write_views(views, writer, grid, size, lambda share: show(*dense.work.making(share), MAKING))
-    print(f"{said}: {out}")
+        write = partial(
+            write_light_field,
+            out,
+            layout,
+            grid,
+            focal_px=field.focal_px or float(size.width),
+            name=field.name,
+            with_disparity=with_disparity,
+        )
+        with closing(dense.views) as views:
+            summary = write_views(views, write, size, lambda share: show(*dense.work.making(share), MAKING))
+    print(f"{summary}: {out}")
     print_notes(field.notes)

@@ -1,4 +1,4 @@
-"""`iibr export`: a photo or a light field as what others open: quilts, stereo, animations, stacks, light fields, ..."""
+"""`iibr export`: write a photo or a light field as quilts, stereo pictures, animations, light fields and more."""
 
 from __future__ import annotations
 
@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from iibr_core.exports.kinds import require_ending
-from iibr_core.exports.writers import export_path, require_export_place, writer_of
+from iibr_core.exports.kinds import export_path, require_ending, require_export_place
 from viewer.cli.export_options import KindOptions, To, require_kind
 from viewer.cli.lens_options import LensOptions
 from viewer.cli.option_records import with_option_records
@@ -30,10 +29,8 @@ from viewer.cli.shared_options import (
 from viewer.cli.terminal import print_depth, print_notes, show_progress, untimed
 
 if TYPE_CHECKING:
-    from iibr_core.exports.export_opening import OpenDrawn
-    from iibr_core.exports.kinds import ExportKind
-    from iibr_core.exports.options import ExportOptions
-    from iibr_core.exports.source import ExportSource
+    from iibr_core.exports.kinds import ExportKind, ExportOptions
+    from iibr_core.exports.source import ExportSource, OpenDrawn
     from iibr_core.scenes.scene import Scene, Source
 
 
@@ -44,20 +41,21 @@ def export(
     to: To,
     output: Annotated[Path, typer.Option("--output", "-o", metavar="PATH", help="File or folder to write.")],
     lens: LensOptions,
-    told: KindOptions,
+    kind_options: KindOptions,
     keys: Annotated[
         Path | None,
         typer.Option(
             "--path",
             metavar="FILE",
-            help="Keys of a path of your own, a line each: s t, s t focus, or s t focus aperture.",
+            help="File with a camera path, one key a line: s t, s t focus, or s t focus aperture.",
         ),
     ] = None,
     row: Annotated[
-        int | None, typer.Option(min=0, max=MOST, help="Row of the picture.", show_default="the middle")
+        int | None,
+        typer.Option(min=0, max=MOST, help="Row of an epipolar plane image.", show_default="the middle"),
     ] = None,
     show: Annotated[
-        bool, typer.Option("--show", help="On the Looking Glass display that is connected, by its Bridge.")
+        bool, typer.Option("--show", help="Show the quilt on the connected Looking Glass display, by its Bridge.")
     ] = False,
     *,
     scene: SceneOptions,
@@ -66,7 +64,7 @@ def export(
     grid: Grid = None,
     force: Force = False,
 ) -> None:
-    """Write a scene as what others open, as the window shows it.
+    """Write a scene, as the window shows it, in a format for displays, browsers or other programs.
 
     Example: iibr export photo.png --to quilt --device portrait -o photo.png
     """
@@ -83,20 +81,20 @@ def export(
     if not to.path:
         require_export_place(to, output, inputs, force)
     require_model(source.depth)
-    options = told.options(keys, row, show)
+    options = kind_options.options(keys, row, show)
     target = output
 
-    def require_place(made: Scene) -> None:
+    def require_place(ready: Scene) -> None:
         nonlocal target
         if to.is_drawn:
-            lens.require_within(made)
-        target = export_path(to, output, made, options)
+            lens.require_within(ready)
+        target = export_path(to, output, ready, options)
         require_export_place(to, target, inputs, force)
 
-    made, said = _carry_out(to, source, scene.depth_strength, lens, require_place, lambda: target, options)
+    opened, message = _carry_out(to, source, scene.depth_strength, lens, require_place, lambda: target, options)
     print(target)
-    print_depth(made.scene.depth_origin)
-    print_notes(made.scene.notes + lens.notes(made.optics) + ((said,) if said else ()))
+    print_depth(opened.scene.depth_origin)
+    print_notes(opened.scene.notes + lens.notes(opened.optics) + ((message,) if message else ()))
 
 
 def _carry_out(
@@ -108,18 +106,18 @@ def _carry_out(
     target: Callable[[], Path],
     options: ExportOptions,
 ) -> tuple[ExportSource, str | None]:
-    """Open the scene and write it; a graphics card is needed for what is drawn alone. target: known by `on_ready`."""
-    from iibr_core.exports.export_opening import open_for_export
+    """Open the scene and write the export. target: returns its path, which `on_ready` determines."""
+    from iibr_core.exports.source import open_for_export, write_export
 
     open_drawn: OpenDrawn | None = None
-    with ExitStack() as held:
+    with ExitStack() as stack:
         if kind.is_drawn:
             from viewer.display.scene_drawer import SceneDrawer
 
-            open_drawn = held.enter_context(SceneDrawer()).open
-        with show_progress("reading") as show:
-            made = open_for_export(
-                kind, options, source, depth_strength, lens.choice, on_ready, open_drawn, untimed(show)
+            open_drawn = stack.enter_context(SceneDrawer()).open
+        with show_progress("reading") as report:
+            opened = open_for_export(
+                kind, options, source, depth_strength, lens.choice, on_ready, open_drawn, untimed(report)
             )
-        with show_progress("exporting") as show:
-            return made, writer_of(kind)(target(), replace(made, report_progress=show), options)
+        with show_progress("exporting") as report:
+            return opened, write_export(kind, target(), replace(opened, report_progress=report), options)

@@ -95,7 +95,7 @@ def _written(
     all have been taken.
     """
     from iibr_core.color import photo_in_srgb
-    from iibr_core.formats.images.photo import write_image
+    from iibr_core.formats.images.write import write_image
     from iibr_core.generation.free_views import FreeViews, depths_of, reach_of
     from iibr_core.generation.memory import MAKING_BYTES, require_memory
     from iibr_core.generation.stored_views import encode_for_storage

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from contextlib import closing
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from iibr_core.formats.light_fields.light_field_formats import is_light_field, writer_for
+from iibr_core.formats.light_fields.light_field_formats import is_light_field
+from iibr_core.formats.light_fields.write import check_light_field, write_light_field
 from iibr_core.rendering.gloss.gloss_settings import Gloss
 from iibr_core.types import GridShape, InputError
 from viewer.cli.dense_field_command import NOT_FOR_DENSE_FIELDS, write_dense_field
@@ -36,7 +38,6 @@ from viewer.cli.terminal import MAKING, print_depth, print_notes, show_progress,
 from viewer.cli.view_writing import write_views
 
 if TYPE_CHECKING:
-    from iibr_core.formats.light_fields.light_field_formats import WriterFactory
     from iibr_core.scenes.scene import Source
 
 
@@ -90,13 +91,12 @@ def generate(
         require_heeded(context, path, NOT_FOR_DENSE_FIELDS)
     source = scene.source(path, grid, is_literal=scene.disparity is not None if literal is None else literal)
     require_existing(source)
-    new_writer = writer_for(format)
-    new_writer.require_place(out, inputs_of_command(context, source), force)
+    check_light_field(out, format, inputs_of_command(context, source), force)
     if is_dense:
-        write_dense_field(source, grid, out, new_writer, with_disparity)
+        write_dense_field(source, grid, out, format, with_disparity)
     else:
         _write_light_field(
-            source, grid, out, new_writer, scene.depth_strength, gloss.gloss if gloss else None, with_disparity
+            source, grid, out, format, scene.depth_strength, gloss.gloss if gloss else None, with_disparity
         )
 
 
@@ -119,7 +119,7 @@ def _write_light_field(
     source: Source,
     grid: GridShape,
     out: Path,
-    new_writer: WriterFactory,
+    layout: str,
     depth_strength: float,
     gloss: Gloss | None,
     with_disparity: bool,
@@ -135,12 +135,18 @@ def _write_light_field(
         tell = untimed(show)
         loaded = load_photo(source, report_progress=tell)
         plan = make_plan(source, loaded, depth_strength, keeps_views=False)
-        with (
-            new_writer(out, grid, loaded.photo.focal_px, loaded.photo.name, with_disparity) as writer,
-            closing(views_of_photo(source, loaded, plan, report_progress=tell)) as made,
-        ):
+        write = partial(
+            write_light_field,
+            out,
+            layout,
+            grid,
+            focal_px=loaded.photo.focal_px,
+            name=loaded.photo.name,
+            with_disparity=with_disparity,
+        )
+        with closing(views_of_photo(source, loaded, plan, report_progress=tell)) as made:
             views = add_gloss(made, gloss, scene_of_photo(source, loaded, plan))
-            said = write_views(views, writer, grid, loaded.photo.size, lambda share: show(share, 1.0, MAKING))
-    print(f"{said}: {out}")
+            summary = write_views(views, write, loaded.photo.size, lambda share: show(share, 1.0, MAKING))
+    print(f"{summary}: {out}")
     print_notes(loaded.photo.notes + loaded.disparity.notes + plan.notes)
     print_depth(loaded.origin)

@@ -11,7 +11,7 @@ import typer
 
 from iibr_core.depth.choice import DepthChoice, DepthStart
 from iibr_core.formats.files import status_of
-from iibr_core.formats.light_fields.light_field_formats import WRITERS
+from iibr_core.formats.light_fields.write import WRITERS
 from iibr_core.inpainting.registry import INPAINTER_FORMS, require_inpainter
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, InputError, Quality, ViewOffset
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 MAX_GRID = 99
 MOST = 2**62
 """Of bytes and pixels: what adds a few to it still fits into 64 bits."""
-_UNITS = {"": 1, "K": 2**10, "M": 2**20, "G": 2**30, "T": 2**40}
 
 OUTPUT_OPTIONS = ("out", "output")
 """Parameters that name what is written. All other paths are read."""

@@ -60,7 +60,6 @@ def train_weights(
     """
     import torch
 
-    from iibr_core.formats.files import shown_name
     from iibr_core.ray_transformer.model import RayTransformer
     from iibr_core.training import trainer
     from iibr_core.training.batches import training_batch
@@ -77,7 +76,7 @@ def train_weights(
         checkpoint_every=checkpoint_every,
     )
     command = shlex.join(["iibr", *sys.argv[1:]])
-    published = shown_name(command.replace(str(out), out.name))  # the folder is nobody's business
+    published = command.replace(str(out), out.name)  # the folder is nobody's business
     torch.set_num_threads(1)  # batches are small: more threads mostly wait for each other, and spin meanwhile
     torch.manual_seed(seed)
     model = RayTransformer()

@@ -1,33 +1,34 @@
-"""Views on their way from what makes them to a light field on disk."""
+"""Write views to a light field on disk and measure how long making them took."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING
 
-from iibr_core.types import GridShape, ImageSize, ViewUpdate
-
-if TYPE_CHECKING:
-    from iibr_core.formats.light_fields.light_field_formats import LightFieldWriter
+from iibr_core.types import ImageSize, ViewUpdate
 
 
 def write_views(
     views: Iterator[ViewUpdate],
-    writer: LightFieldWriter,
-    grid: GridShape,
+    write: Callable[[Iterator[ViewUpdate]], None],
     size: ImageSize,
     report_share: Callable[[float], None],
 ) -> str:
-    """Write all views of a grid, each of this (height, width); says, for people, how long making them took.
+    """Write views and return a sentence about their number, their size and the time that making them took.
 
-    report_share: is told the share of the work that is done.
+    write: writes all views. report_share: called with the share of the work that is done, 0 to 1.
     """
-    total, seconds = grid.rows * grid.columns, 0.0
-    for _ in range(total):
+    count, seconds = 0, 0.0
+
+    def timed() -> Iterator[ViewUpdate]:
+        nonlocal count, seconds
         start = time.perf_counter()
-        update = next(views)
-        seconds += time.perf_counter() - start
-        writer.add(update)
-        report_share(update.share)
-    return f"{total} views of {size} in {seconds:.2f} s ({1000 * seconds / total:.1f} ms per view)"
+        for view in views:
+            seconds += time.perf_counter() - start
+            count += 1
+            yield view
+            report_share(view.share)
+            start = time.perf_counter()
+
+    write(timed())
+    return f"{count} views of {size} in {seconds:.2f} s ({1000 * seconds / max(count, 1):.1f} ms per view)"

@@ -66,7 +66,7 @@ class FilmstripView:
 
 
 def _read(job: Job[tuple[str, ...], ThumbnailRead | Failed[None]]) -> Iterator[ThumbnailRead]:
-    from iibr_core.formats.images.thumbnail import read_thumbnail
+    from iibr_core.formats.images.photo import read_thumbnail
 
     for path in job.request:
         try:

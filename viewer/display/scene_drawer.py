@@ -1,4 +1,4 @@
-"""Scenes drawn without a window and its state: for exports, and for the workers of a batch."""
+"""Draw scenes without a window, for exports and for the workers of a batch."""
 
 from __future__ import annotations
 
@@ -10,9 +10,8 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from iibr_core.exports.export_opening import OpticsOf
 from iibr_core.exports.render_settings import RenderSettings, require_size
-from iibr_core.exports.source import ExportSource
+from iibr_core.exports.source import ExportSource, OpticsOf
 from iibr_core.generation.outer_views import ALL_VIEWS, WantedViews
 from iibr_core.rendering.gloss.gloss_settings import Gloss
 from iibr_core.rendering.optics import CENTRE
@@ -27,7 +26,7 @@ from viewer.gpu.headless_context import create_headless
 from viewer.gpu.refocus.views_seen import views_seen_by
 
 _own = threading.local()
-"""Of a thread: its drawer, kept from photo to photo. GL contexts belong to threads."""
+"""The drawer of each thread, kept from photo to photo, because GL contexts belong to threads."""
 
 
 def open_drawn(
@@ -38,7 +37,7 @@ def open_drawn(
     report_progress: ReportProgress = ignore_progress,
     optics_of: OpticsOf | None = None,
 ) -> ExportSource:
-    """See `OpenDrawn`; by the thread's own drawer, for as long as it opens nothing else."""
+    """Open a scene with the drawer of this thread, see `OpenDrawn`; the previous scene can no longer be drawn."""
     if not hasattr(_own, "drawer"):
         _own.drawer = SceneDrawer()
     drawer: SceneDrawer = _own.drawer
@@ -46,18 +45,18 @@ def open_drawn(
 
 
 class SceneDrawer:
-    """Shows one scene at a time, off screen; what it needs of GL is made with the first. Use as a context manager."""
+    """Draws one scene at a time off screen; the first scene creates the GL context. Use as a context manager."""
 
     def __init__(self) -> None:
         self._view: SceneView | None = None
         self._held = ExitStack()
 
     def __enter__(self) -> SceneDrawer:
-        """Nothing more to do."""
+        """Return the drawer."""
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
-        """Free everything."""
+        """Free the GL context."""
         self._held.close()
 
     def open(
@@ -69,7 +68,7 @@ class SceneDrawer:
         report_progress: ReportProgress = ignore_progress,
         optics_of: OpticsOf | None = None,
     ) -> ExportSource:
-        """See `OpenDrawn`; optics_of: None where any picture may be drawn. Raises InputError also without GL."""
+        """Open a scene, see `OpenDrawn`. Raises InputError without GL, too."""
         wanted = ALL_VIEWS
         view = self._view = self._view or self._make_view()
         request = SceneRequest(0, source, depth_strength, takes_drafts=False)
@@ -91,7 +90,7 @@ class SceneDrawer:
         return ExportSource(ready.scene, ready.loaded, optics, self.draw, ignore_progress, never, view.centre)
 
     def draw(self, settings: RenderSettings) -> NDArray[Any]:
-        """A picture of what is open, see `iibr_core.exports.source.Draw`."""
+        """Return a picture of the open scene, see `iibr_core.exports.source.Draw`."""
         assert self._view is not None
         require_size(settings.size_px)
         prepare_gloss(self._view, settings.optics.gloss)
@@ -106,7 +105,7 @@ class SceneDrawer:
 
 
 def prepare_gloss(view: SceneView, gloss: Gloss | None) -> None:
-    """Have at hand what this gloss means for the scene. Raises InputError where its surroundings cannot be read."""
+    """Compute the gloss maps if they are missing. Raises InputError if the surroundings cannot be read."""
     request = view.gloss_request(gloss)
     if request is not None:
         view.take_gloss(answer(request))

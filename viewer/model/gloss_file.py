@@ -41,9 +41,9 @@ def require_environment(path: Path, gloss: Gloss) -> None:
     """Raise InputError, naming the file that a gloss was read from too, where the environment is no picture."""
     if not gloss.environment:
         return
-    from iibr_core.formats.images.header import read_photo_header
+    from iibr_core.formats.images.side_by_side import photo_size
 
     try:
-        read_photo_header(Path(gloss.environment))
+        photo_size(Path(gloss.environment))
     except InputError as error:
         raise InputError(f"{path}: its environment cannot be read: {error}") from error

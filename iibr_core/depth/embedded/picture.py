@@ -8,8 +8,9 @@ from pathlib import Path
 from iibr_core.depth.embedded.embedded_depth import EmbeddedDepth
 from iibr_core.depth.embedded.images import picture_file
 from iibr_core.depth.estimates import Estimate, values_of
-from iibr_core.formats.images.oiio_reader import read_orientation, upright
+from iibr_core.formats.images.decode import read_orientation
 from iibr_core.formats.images.photo import read_photo
+from iibr_core.formats.images.picture import upright
 from iibr_core.formats.maps.disparity_file import MAX_ASPECT_DIFFERENCE
 from iibr_core.types import ImageSize, InputError, Photo
 

@@ -1,8 +1,8 @@
-"""Colours of photos that are not sRGB, as their files state them: by a colour profile (ICC), or by numbers (CICP).
+"""Colours of photos by the colour profile (ICC) or the numbers (CICP) in their files.
 
 Photos have profiles of one kind: a curve for each of red, green and blue, then a matrix (ICC.1:2022, annex F.3). They
-are computed here with all the bits that the photo has. The primaries stay the photo's own, so no colour is lost.
-Numbers are those of ITU-T H.273; PQ and HLG, the curves of HDR photos, are known by them.
+are computed here with all the bits of the photo. The primaries stay the photo's own, so no colour is lost. The numbers
+are those of ITU-T H.273; PQ and HLG, the curves of HDR photos, are known by them.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import re
 import struct
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cache, lru_cache
 from typing import Any, Literal
 
 import numpy as np
@@ -26,17 +26,18 @@ from iibr_core.formats.images.color_primaries import (
     space_of_number,
 )
 from iibr_core.formats.images.hdr import hlg_display_light, hlg_scene_light, pq_light
-from iibr_core.formats.images.oiio_reader import FLOATING_TYPES, text_attribute
-from iibr_core.types import SRGB, ColorSpace, FloatImage
+from iibr_core.formats.images.picture import Picture
+from iibr_core.runtime.resources import resource_folder
+from iibr_core.types import DISPLAY_P3, SRGB, ColorSpace, FloatImage
 
 KNOTS = 65536
-"""Of a curve: one for each value of 16 bits."""
+"""Number of values of a curve: one for each value of 16 bits."""
 SAME_CURVE = 1 / 255
-"""Of encoded values: a step of 8 bits, as much as sRGB's own curve is off in small profiles."""
+"""Largest difference of encoded values within one curve: a step of 8 bits, as small profiles of sRGB are off."""
 PARAMETRIC = {0: 1, 1: 3, 2: 4, 3: 5, 4: 7}
-"""Parameters of each kind of formula (ICC.1:2022, table 68)."""
-MOST_PROFILE_BYTES = 4 * 2**20
-"""Those with a table for every colour, for printers, take one or two megabytes."""
+"""Number of parameters of each kind of formula (ICC.1:2022, table 68)."""
+MAX_PROFILE_BYTES = 4 * 2**20
+"""Largest profile; those with a table for every colour, for printers, have one or two megabytes."""
 Curve = Callable[[NDArray[Any]], NDArray[Any]]
 Hdr = Literal["", "PQ", "HLG"]
 PQ, HLG = 16, 18
@@ -52,11 +53,13 @@ CURVES_OF_CODES: dict[int, Curve] = {
 curves (1, 6, 14, 15) as they show sRGB.
 """
 HDR_CODES: dict[int, Hdr] = {PQ: "PQ", HLG: "HLG"}
+PROFILE_FILES = {SRGB.name: "srgb.icc", DISPLAY_P3.name: "display-p3.icc"}
+"""Profiles of the spaces that pictures are saved in, by the name of the space; both have sRGB's curve."""
 
 
 @dataclass(frozen=True, eq=False)
 class ColorProfile:
-    """Meaning of a photo's numbers.
+    """The meaning of a photo's numbers.
 
     curves: (3, KNOTS), linear light of red, green and blue, 1 = white; HLG's before it is displayed. color_space: its
     primaries. hdr: the curve of an HDR photo, whose light may exceed white; "" for other photos.
@@ -67,21 +70,27 @@ class ColorProfile:
     hdr: Hdr = ""
 
     def linear(self, pixels: NDArray[Any]) -> FloatImage:
-        """Linear light of `color_space`, float32, of pixels (H, W, 3), uint8 or uint16."""
+        """Return linear light of `color_space`, float32, of pixels (H, W, 3), uint8 or uint16."""
         light = _look_up(self.curves, pixels)
         return hlg_display_light(light) if self.hdr == "HLG" else light
 
     def encoded(self, pixels: NDArray[Any]) -> FloatImage:
-        """The same, encoded by sRGB's curve; not for HDR."""
+        """Return the same light encoded by sRGB's curve; not for HDR."""
         return _look_up(srgb_from_linear(self.curves), pixels)
 
 
+@cache
+def icc_profile(space: ColorSpace) -> bytes:
+    """Return the colour profile (ICC.1:2022, version 4) of sRGB or Display P3, for saved pictures."""
+    return (resource_folder("assets") / "profiles" / PROFILE_FILES[space.name]).read_bytes()
+
+
 class UnusableProfileError(ValueError):
-    """Damaged, or not of the kind that photos have; the message says which."""
+    """A profile is damaged, or not of the kind that photos have; the message names the reason."""
 
 
 def _look_up(curves: FloatImage, pixels: NDArray[Any]) -> FloatImage:
-    """(H, W, 3) of curves (3, KNOTS) at pixels (H, W, 3)."""
+    """Return the values of curves (3, KNOTS) at pixels (H, W, 3)."""
     steps = (KNOTS - 1) // np.iinfo(pixels.dtype).max  # 257 or 1
     result = np.empty(pixels.shape, np.float32)
     for channel, curve in enumerate(curves):
@@ -89,32 +98,31 @@ def _look_up(curves: FloatImage, pixels: NDArray[Any]) -> FloatImage:
     return result
 
 
-def color_space_of(spec: Any) -> ColorSpace:
+def color_space_of(picture: Picture) -> ColorSpace:
     """Return the colour space of a picture: by its profile, or OpenEXR's chromaticities; sRGB where it states none."""
-    if str(spec.format) in FLOATING_TYPES:
-        return space_of_chromaticities(spec.getattribute("chromaticities"))
-    profile = color_profile_of(spec)[0]
+    if picture.is_float:
+        return space_of_chromaticities(picture.chromaticities)
+    profile = color_profile_of(picture)[0]
     return SRGB if profile is None else profile.color_space
 
 
-def color_profile_of(spec: Any) -> tuple[ColorProfile | None, str]:
-    """Return the profile in the header of a picture of whole numbers, and a note about it; None, "" for sRGB.
+def color_profile_of(picture: Picture) -> tuple[ColorProfile | None, str]:
+    """Return the profile of a picture of whole numbers, and a note about it; None, "" for sRGB.
 
     Numbers count more than a profile beside them (PNG, third edition, 11.3.2.6). A profile that cannot be used gives
     None and a note: the picture counts as sRGB. Grey has no primaries, so only its HDR curve matters.
     """
-    if str(spec.format) in FLOATING_TYPES:
+    if picture.is_float:
         return None, ""
-    value, codes = spec.getattribute("ICCProfile"), spec.getattribute("CICP")
-    name, complaint = text_attribute(spec, "ICCProfile:profile_description") or "without a name", ""
-    profile = profile_of_codes(codes[:2] if isinstance(codes, tuple) else codes_named(name))
+    name, complaint = picture.icc_name or "without a name", ""
+    profile = profile_of_codes(picture.codes[:2] or codes_named(name))
     if profile is not None:
         name = profile.color_space.name
-    elif value is not None:
-        profile, complaint = _read(bytes(value) if isinstance(value, np.ndarray) else b"")
+    elif picture.icc:
+        profile, complaint = _read(picture.icc)
     if profile is not None and profile.hdr:
         return profile, f"HDR photo ({profile.hdr}): its highlights are compressed to the range of ordinary photos."
-    if spec.nchannels < 3 or (profile is not None and _is_srgb(profile)):
+    if picture.pixels.shape[2] < 3 or (profile is not None and _is_srgb(profile)):
         return None, ""
     if profile is None:
         note = f"The colour profile '{name}' {complaint} and is ignored: colours are taken as sRGB."
@@ -176,8 +184,8 @@ def color_profile(data: bytes) -> ColorProfile:
 
 
 def _tags(data: bytes) -> dict[bytes, bytes]:
-    """What a profile holds, by signature (clause 7.3)."""
-    if len(data) > MOST_PROFILE_BYTES:
+    """Return the tags of a profile by signature (clause 7.3)."""
+    if len(data) > MAX_PROFILE_BYTES:
         raise UnusableProfileError("is too large")
     (count,) = struct.unpack_from(">I", data, 128)
     entries = (struct.unpack_from(">4sII", data, 132 + 12 * k) for k in range(min(count, 100)))
@@ -189,7 +197,7 @@ def _xyz(tag: bytes) -> NDArray[np.float64]:
 
 
 def _curve(tag: bytes) -> NDArray[np.float64]:
-    """(KNOTS,) linear light of evenly spaced values; of a table (clause 10.6) or a formula (10.18)."""
+    """Return linear light (KNOTS,) of evenly spaced values, from a table (clause 10.6) or a formula (10.18)."""
     x = np.linspace(0, 1, KNOTS)
     (count,) = struct.unpack_from(">I", tag, 8)
     if tag[:4] == b"para":
@@ -210,11 +218,11 @@ def _curve(tag: bytes) -> NDArray[np.float64]:
 
 
 def _formula(kind: int, x: NDArray[np.float64], parameters: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(a x + b)^g + e where x >= d, else c x + f."""
+    """Return (a x + b)^g + e where x >= d, else c x + f."""
     usual = (1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     g, a, b, c, d, e, f = (*map(float, parameters), *usual[len(parameters) :])
     if kind in (1, 2):
-        # Here the third one is a constant added to both parts, and the power begins where its base is 0.
+        # The third parameter of these kinds is added to both parts; the power begins where its base is 0.
         e = f = c
         c, d = 0.0, -b / a if a else 0.0
         if kind == 1:

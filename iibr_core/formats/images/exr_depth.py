@@ -1,4 +1,4 @@
-"""Depth that lies in an OpenEXR picture as a channel beside its colours, as renderers write it."""
+"""Depth in an OpenEXR picture: a channel beside its colours, as renderers write it."""
 
 from __future__ import annotations
 
@@ -9,19 +9,18 @@ import numpy as np
 import OpenImageIO as oiio
 
 from iibr_core.formats.files import MAX_FILE_PIXELS
-from iibr_core.formats.images.oiio_names import oiio_name
-from iibr_core.formats.images.oiio_reader import complaint_of
+from iibr_core.formats.images.decode import complaint_of, oiio_name
 from iibr_core.types import FloatImage, InputError
 
 DEPTH_CHANNEL = re.compile(r"(?:.*\.)?(?:Z|depth|depth\.[YVRXZ])", re.IGNORECASE)
-"""`Z` by the format's own convention, `ViewLayer.Depth.Z` by Blender."""
-MOST_PARTS = 64
+"""Names of the channel: `Z` by the format's convention, `ViewLayer.Depth.Z` by Blender."""
+MAX_PARTS = 64
 BACKGROUND = 1e9
-"""Renderers write such distances where nothing is hit."""
+"""Smallest distance that stands for no surface."""
 
 
 def read_depth_channel(path: Path) -> FloatImage | None:
-    """Distances (H, W) float32, infinite where nothing is; None where a file is no EXR, or has no such channel.
+    """Return distances (H, W) float32, infinite without a surface; None where a file is no EXR, or has no such channel.
 
     Raises InputError where the file is damaged.
     """
@@ -31,7 +30,7 @@ def read_depth_channel(path: Path) -> FloatImage | None:
     if source is None:
         complaint_of(oiio)
         return None
-    for part in range(MOST_PARTS):
+    for part in range(MAX_PARTS):
         if not source.seek_subimage(part, 0):
             complaint_of(source)
             return None

@@ -1,15 +1,15 @@
-"""Notes about a photo's file, for people: stereo pairs, panoramas, animations; of these one flat picture is shown."""
+"""Notes for people about stereo pairs, panoramas and animations, of which one flat picture is shown."""
 
 from __future__ import annotations
 
-import warnings
 from contextlib import suppress
 from pathlib import Path
 
-from iibr_core.formats.images.heic import DECODE_ERRORS
-from iibr_core.formats.images.metadata import read_metadata
+from PIL import Image
+
+from iibr_core.formats.images.metadata import parse_packet, read_metadata, value_in
+from iibr_core.formats.images.pillow_reader import DECODE_ERRORS
 from iibr_core.formats.images.side_by_side import stated_pair
-from iibr_core.formats.images.xmp_packet import parse_packet, value_in
 from iibr_core.types import InputError
 
 GPANO = "http://ns.google.com/photos/1.0/panorama/"
@@ -19,7 +19,7 @@ ANIMATED_FORMATS = ("GIF", "PNG", "WEBP", "AVIF")
 
 
 def file_notes(path: Path) -> tuple[str, ...]:
-    """Return a sentence for each thing in a photo's file that is shown in part or otherwise than it is meant.
+    """Return a sentence for each thing in a photo's file that is shown in part, or not as it was meant.
 
     Raises InputError as `stated_pair` does; a damaged header gives no notes.
     """
@@ -28,7 +28,7 @@ def file_notes(path: Path) -> tuple[str, ...]:
 
 
 def _panorama_notes(path: Path) -> tuple[str, ...]:
-    """Notes by the photo's XMP, as Google's cameras write it for panoramas and photos with a right eye's picture."""
+    """Return notes from XMP as Google's cameras write it for panoramas and photos with a right eye's picture."""
     xmp = read_metadata(path).xmp
     if GPANO.encode() not in xmp and GIMAGE.encode() not in xmp:
         return ()
@@ -48,11 +48,7 @@ def _panorama_notes(path: Path) -> tuple[str, ...]:
 
 
 def _animation_notes(path: Path) -> tuple[str, ...]:
-    from PIL import Image
-
     count = 1
-    with suppress(*DECODE_ERRORS, Image.DecompressionBombError), warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        with Image.open(path, formats=ANIMATED_FORMATS) as image:
-            count = getattr(image, "n_frames", 1)
+    with suppress(*DECODE_ERRORS), Image.open(path, formats=ANIMATED_FORMATS) as image:
+        count = getattr(image, "n_frames", 1)
     return (f"Animation: the first of its {count} pictures is used.",) if count > 1 else ()

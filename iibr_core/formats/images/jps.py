@@ -1,13 +1,14 @@
-"""Stereo JPEGs (JPS): how their two pictures lie, by the descriptor that VRex put into segment APP3."""
+"""Stereo JPEGs (JPS): the arrangement of their two pictures by VRex's descriptor in segment APP3."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Literal, NamedTuple
+from typing import BinaryIO, Literal, NamedTuple
 
 from iibr_core.formats.files import open_binary
-from iibr_core.formats.images.jpeg_segments import jpeg_segments
 
+JPEG_START, START_OF_SCAN = b"\xff\xd8", 0xDA
 APP3, IDENTIFIER = 0xE3, b"_JPSJPS_"
 DESCRIPTOR_AT = 10
 """First byte of the descriptor: separation, flags, layout, type, a byte each."""
@@ -34,7 +35,7 @@ def read_jps_descriptor(path: Path) -> JpsDescriptor | None:
     Raises InputError where the file cannot be read.
     """
     with open_binary(path) as file:
-        contents = (content for marker, content in jpeg_segments(file) if marker == APP3)
+        contents = (content for marker, content in _segments(file) if marker == APP3)
         found = next((content for content in contents if content.startswith(IDENTIFIER)), b"")
     _, flags, layout, kind = found[DESCRIPTOR_AT : DESCRIPTOR_AT + 4].ljust(4, b"\0")
     if kind != STEREO or layout not in LAYOUTS:
@@ -42,3 +43,11 @@ def read_jps_descriptor(path: Path) -> JpsDescriptor | None:
     arrangement = LAYOUTS[layout]
     is_half = bool(flags & (HALF_WIDTH if arrangement == "beside" else HALF_HEIGHT))
     return JpsDescriptor(arrangement, is_half, right_first=not flags & LEFT_FIRST)
+
+
+def _segments(file: BinaryIO) -> Iterator[tuple[int, bytes]]:
+    """Yield marker and content of each segment before the first scan; none where the file is no JPEG."""
+    if file.read(2) != JPEG_START:
+        return
+    while len(mark := file.read(4)) == 4 and mark[0] == 0xFF and mark[1] != START_OF_SCAN:
+        yield mark[1], file.read(max(int.from_bytes(mark[2:], "big") - 2, 0))

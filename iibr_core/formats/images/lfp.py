@@ -1,5 +1,5 @@
 """Processed files of Lytro's light-field cameras (`-stk.lfp`, and `.LFP` of the Illum): pictures of one scene focused
-at several depths, or seen from several places, with a map of depth.
+at several depths, or seen from several places, with a depth map.
 
 Lytro publishes no description; readers of others found that a file is a list of chunks, named by their hash, and a JSON
 that names them. Depth is "lambda", how far the focus is from the captured one: linear in disparity, small is near.
@@ -16,11 +16,11 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
-import OpenImageIO as oiio
 from numpy.typing import NDArray
+from PIL import Image
 
 from iibr_core.formats.files import MAX_FILE_PIXELS, open_binary, reason_of
-from iibr_core.formats.images.oiio_reader import Raster
+from iibr_core.formats.images.picture import Picture
 from iibr_core.formats.images.pillow_reader import open_with_pillow
 from iibr_core.types import FloatImage, ImageSize, InputError
 
@@ -35,7 +35,7 @@ DAMAGE = (KeyError, TypeError, ValueError, AttributeError, RecursionError, Overf
 
 @dataclass(frozen=True)
 class LfpPictures:
-    """Pictures of one size, and which of them each depth is sharp in.
+    """Pictures of one size, focused at several depths.
 
     chunks: the file of each picture; or one chunk, a film of H.264, for all. focus: lambda of each, ascending where
     there are several pictures. frames: the number of each picture in the film, () for pictures of their own.
@@ -49,7 +49,7 @@ class LfpPictures:
 
 @dataclass(frozen=True)
 class Lfp:
-    """What a processed file holds.
+    """Contents of a processed file.
 
     chunks: first byte and length of each by its name. pictures: None where it holds the map only. depth: the chunk and
     the size of the map, None without.
@@ -61,13 +61,13 @@ class Lfp:
 
 
 def is_lfp(path: Path) -> bool:
-    """Whether a file begins as Lytro's do, raw or processed. Raises InputError where it cannot be read."""
+    """Return whether a file begins as Lytro's do, raw or processed. Raises InputError where it cannot be read."""
     with open_binary(path) as file:
         return file.read(len(LFP_START)) == LFP_START
 
 
 def open_lfp(path: Path) -> Lfp | None:
-    """Return what a processed Lytro file holds; None for raw ones and other files.
+    """Return the contents of a processed Lytro file; None for raw ones and other files.
 
     Raises InputError where it is damaged.
     """
@@ -86,7 +86,7 @@ def lfp_size(path: Path) -> ImageSize:
     return _pictures(path)[1].size
 
 
-def read_lfp(path: Path) -> Raster:
+def read_lfp(path: Path) -> Picture:
     """Decode the picture that is sharp everywhere: each pixel from the picture focused at its depth.
 
     Raises InputError where the file is damaged, holds a map only, or a film while PyAV is not installed.
@@ -95,7 +95,7 @@ def read_lfp(path: Path) -> Raster:
     frames = _film(path, lfp, pictures) if pictures.frames else _decoded(path, lfp, pictures)
     depth = read_lfp_depth(path)
     pixels = next(frames) if depth is None or len(pictures.focus) < 2 else _in_focus(frames, pictures, depth)
-    return Raster(np.ascontiguousarray(pixels), None, oiio.ImageSpec(pixels.shape[1], pixels.shape[0], 3, "uint8"))
+    return Picture(np.ascontiguousarray(pixels))
 
 
 def read_lfp_depth(path: Path) -> FloatImage | None:
@@ -236,8 +236,6 @@ def _film(path: Path, lfp: Lfp, pictures: LfpPictures) -> Iterator[NDArray[np.ui
 
 def _in_focus(frames: Iterator[NDArray[np.uint8]], pictures: LfpPictures, depth: FloatImage) -> NDArray[np.uint8]:
     """Mix the pictures (H, W, 3) of a focal stack by the map (h, w): between two depths, both count."""
-    from PIL import Image
-
     height, width = pictures.size
     known = np.nan_to_num(np.clip(depth, pictures.focus[0], pictures.focus[-1]), nan=pictures.focus[0])
     whole = np.asarray(Image.fromarray(known).resize((width, height), Image.Resampling.BILINEAR))

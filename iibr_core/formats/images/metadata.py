@@ -1,8 +1,7 @@
-"""What a photo says beside its pixels, and what of it goes into pictures made of it: Exif, XMP, and texts of our own.
+"""What a photo's file states beside its pixels: Exif and XMP, captions, camera facts, and settings of this program.
 
-Kept is what describes the photo and its camera. Left out is what would be wrong in another picture (thumbnails, depth
-maps, what other programs did to it, makers' notes, which are bound to their place in the file), and where the photo was
-taken, unless that is asked for.
+Saved pictures keep what describes the photo and its camera. They do not keep what would be wrong in another picture:
+thumbnails, depth maps, edits by other programs, maker notes, and, unless asked for, the place of the photo.
 """
 
 from __future__ import annotations
@@ -10,7 +9,6 @@ from __future__ import annotations
 import base64
 import binascii
 import math
-import struct
 import warnings
 import zlib
 from collections.abc import Mapping
@@ -18,32 +16,39 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
-from xml.etree.ElementTree import Element, SubElement
+from xml.etree.ElementTree import Element, ParseError, SubElement, TreeBuilder
 
-from iibr_core.formats.images.heic import DECODE_ERRORS, is_heic
-from iibr_core.formats.images.xmp_packet import parse_packet
+from defusedxml.common import DTDForbidden
+from defusedxml.ElementTree import DefusedXMLParser
+from PIL import Image
+
+from iibr_core.formats.images.heic import heic_info, is_heic
+from iibr_core.formats.images.pillow_reader import EXIF_ERRORS, EXIF_FOLDER, ORIENTATION_TAG
 from iibr_core.types import SRGB, ColorSpace, ImageSize, InputError
 
-EXIF_ERRORS = (*DECODE_ERRORS, struct.error, TypeError, ZeroDivisionError, KeyError, AttributeError, OverflowError)
-EXIF_IFD, GPS_IFD = 0x8769, 0x8825
-ORIENTATION, MAKER_NOTE, INTEROPERABILITY, COLOR_SPACE = 0x0112, 0x927C, 0xA005, 0xA001
-WIDTH, HEIGHT = 0xA002, 0xA003
-PER_UNIT = (0xA20E, 0xA20F)
-"""FocalPlaneXResolution and Y: pixels a unit of length."""
-DESCRIBING = frozenset(
-    {0x010E, 0x010F, 0x0110, 0x011A, 0x011B, 0x0128, 0x0131, 0x0132, 0x013B, 0x013C, 0x4746, 0x4749, 0x8298}
+GPS_FOLDER = 0x8825
+MAKER_NOTE, INTEROPERABILITY, COLOR_SPACE, WIDTH, HEIGHT = 0x927C, 0xA005, 0xA001, 0xA002, 0xA003
+DESCRIPTION, MAKE, MODEL, ARTIST, COPYRIGHT = 0x010E, 0x010F, 0x0110, 0x013B, 0x8298
+RESOLUTION_TAGS = (0xA20E, 0xA20F)
+"""FocalPlaneXResolution and Y, in pixels for each unit of length."""
+DESCRIBING_TAGS = frozenset(
+    {DESCRIPTION, MAKE, MODEL, 0x011A, 0x011B, 0x0128, 0x0131, 0x0132, ARTIST, 0x013C, 0x4746, 0x4749, COPYRIGHT}
     | set(range(0x9C9B, 0x9CA0))
 )
-"""Tags of the first folder that are of the photo, not of how its file stores it: description, make, model, resolution,
-software, date, artist, computer, rating, copyright, and what Windows keeps.
+"""Tags of the first folder that describe the photo, not its file: description, make, model, resolution, software, date,
+artist, computer, rating, copyright, and Windows' own.
 """
-PLACES_IN_PIXELS = frozenset({0x9214, 0xA214})
+TAGS_IN_PIXELS = frozenset({0x9214, 0xA214})
+"""Tags that give places in the stored picture."""
 UNCALIBRATED = 0xFFFF
-MOST_EXIF_BYTES = 65_000
-"""A JPEG holds no more."""
-RDF = "http://www.w3.org/1999/02/22-rdf-syntax-ns#"
-XMP_META = "adobe:ns:meta/"
-OURS = "urn:iibr:1.0/"
+MAX_EXIF_BYTES = 65_000
+"""Largest Exif that a JPEG holds."""
+MAX_PACKET_BYTES = 64 * 2**20
+"""Largest XMP: twice the size of a 100 MP camera's sharp picture as base64."""
+MAX_ELEMENTS = 20_000
+"""Largest number of elements of an XMP packet; real ones have some hundreds."""
+MAX_CAPTION_CHARACTERS, MAX_FACT_CHARACTERS = 2000, 60
+RDF, XMP_META, OURS = "http://www.w3.org/1999/02/22-rdf-syntax-ns#", "adobe:ns:meta/", "urn:iibr:1.0/"
 NAMESPACES = {
     "x": XMP_META,
     "rdf": RDF,
@@ -58,121 +63,85 @@ NAMESPACES = {
     "MicrosoftPhoto": "http://ns.microsoft.com/photo/1.0/",
     "iibr": OURS,
 }
-"""Of what is kept: who made the picture, its title, words, rating and rights."""
 KEPT_NAMESPACES = frozenset(NAMESPACES.values()) - {XMP_META, RDF, OURS}
+"""Namespaces of properties that saved pictures keep: author, title, description, keywords, rating and rights."""
 DROPPED_NAMES = frozenset({"Thumbnails", "DocumentAncestors", "SidecarForExtension"})
-MOST_PLAIN_CHARACTERS = 20_000
-"""Of a text of ours in XMP: longer ones are packed, for a JPEG holds 64 KB."""
+SETTINGS_KEY = "iibr:settings"
+"""Name of the text that holds the settings of this program in a saved picture."""
+MAX_PLAIN_CHARACTERS = 20_000
+"""Longer texts are packed for XMP, as a JPEG holds 64 KB."""
 PACKED = "zlib,base64:"
-MOST_UNPACKED_BYTES = 4_000_000
-PACKET_START = b'<?xpacket begin="\xef\xbb\xbf" id="W5M0MpCehiHzreSzNTczkc9d"?>\n'
-PACKET_END = b'\n<?xpacket end="w"?>'
+MAX_UNPACKED_BYTES = 4_000_000
+PACKET_START, PACKET_END = b'<?xpacket begin="\xef\xbb\xbf" id="W5M0MpCehiHzreSzNTczkc9d"?>\n', b'\n<?xpacket end="w"?>'
 
 
 @dataclass(frozen=True, eq=False)
 class PictureMetadata:
-    """exif: as it stands in JPEG files, b"" without. xmp: a packet, b"" without. texts: of our own, by name."""
+    """Metadata of a picture.
+
+    exif: as it stands in JPEG files, b"" without. xmp: a packet, b"" without. texts: of this program, by name.
+    """
 
     exif: bytes = b""
     xmp: bytes = b""
     texts: Mapping[str, str] = field(default_factory=dict)
 
 
+@dataclass(frozen=True)
+class Caption:
+    """Texts about a photo, a line each, "" where the file has none."""
+
+    title: str = ""
+    description: str = ""
+    author: str = ""
+    rights: str = ""
+
+
 def read_metadata(path: Path) -> PictureMetadata:
-    """What a photo's file says of it; nothing where it says nothing, is damaged, or not there any more."""
+    """Return Exif and XMP of a photo's file; nothing where the file is damaged or missing."""
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            return _read_heic(path) if is_heic(path) else _read_others(path)
+            warnings.simplefilter("ignore")  # Pillow warns of damaged Exif
+            if is_heic(path):
+                info = heic_info(path)
+                return PictureMetadata(_bytes_of(info.get("exif")), _bytes_of(info.get("xmp")))
+            with Image.open(path) as image:
+                exif = _bytes_of(image.info.get("exif"))
+                if not exif and (folder := image.getexif()):  # a TIFF keeps it in its own folder
+                    exif = _describing(folder, keeps_position=True).tobytes()
+                return PictureMetadata(exif, _bytes_of(image.info.get("xmp")))
     except (InputError, *EXIF_ERRORS):
         return PictureMetadata()
 
 
-def _read_heic(path: Path) -> PictureMetadata:
-    import pillow_heif
-
-    info = pillow_heif.open_heif(path).info
-    return PictureMetadata(_bytes_of(info.get("exif")), _bytes_of(info.get("xmp")))
-
-
-def _read_others(path: Path) -> PictureMetadata:
-    from PIL import Image
-
-    try:
-        with Image.open(path) as image:
-            exif = _bytes_of(image.info.get("exif"))
-            if not exif:  # a TIFF's is all of its own folder
-                folder = image.getexif()
-                exif = _describing(folder).tobytes() if folder else b""
-            return PictureMetadata(exif, _bytes_of(image.info.get("xmp")))
-    except Image.DecompressionBombError:
-        return PictureMetadata()
-
-
-def _bytes_of(value: Any) -> bytes:
-    return value.encode() if isinstance(value, str) else bytes(value or b"")
-
-
-def _describing(exif: Any, folders: tuple[int, ...] = (EXIF_IFD, GPS_IFD)) -> Any:
-    """A copy with what describes the photo: of its own tags, and all of these folders."""
-    from PIL import Image
-
-    kept = Image.Exif()
-    for tag in sorted(DESCRIBING & set(exif)):
-        kept[tag] = exif[tag]
-    for folder in folders:
-        if found := dict(exif.get_ifd(folder)):
-            kept.get_ifd(folder).update(found)
-    return kept
-
-
-def exif_for(exif: bytes, size: ImageSize, color_space: ColorSpace, keeps_position: bool) -> Any:
-    """A photo's Exif for an upright picture of another size, as Pillow's record; an empty one where it is damaged."""
-    from PIL import Image
-
-    kept = Image.Exif()
+def exif_for(exif: bytes, size: ImageSize, color_space: ColorSpace, keeps_position: bool) -> Image.Exif:
+    """Return a photo's Exif, as Pillow's record, for an upright picture of another size; empty where it is damaged."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            whole = Image.Exif()
-            whole.load(exif)
-            has_camera = bool(whole.get_ifd(EXIF_IFD))
-            kept = _describing(whole, (EXIF_IFD,) if not keeps_position else (EXIF_IFD, GPS_IFD))
+            stored = Image.Exif()
+            stored.load(exif)
+            has_camera = bool(stored.get_ifd(EXIF_FOLDER))
+            kept = _describing(stored, keeps_position)
             if kept or has_camera:
-                kept[ORIENTATION] = 1
+                kept[ORIENTATION_TAG] = 1
             if has_camera:
-                _set_camera(kept.get_ifd(EXIF_IFD), size, color_space)
-            if len(kept.tobytes()) > MOST_EXIF_BYTES:
-                return Image.Exif()
+                _set_camera(kept.get_ifd(EXIF_FOLDER), size, color_space)
+            return kept if len(kept.tobytes()) <= MAX_EXIF_BYTES else Image.Exif()
     except EXIF_ERRORS:
         return Image.Exif()
-    return kept
-
-
-def _set_camera(camera: dict[int, Any], size: ImageSize, color_space: ColorSpace) -> None:
-    """Change what depends on the picture in the folder about the camera, and leave out what no longer fits."""
-    for tag in (MAKER_NOTE, INTEROPERABILITY, *PLACES_IN_PIXELS):
-        camera.pop(tag, None)
-    width_before = camera.get(WIDTH)
-    for tag in PER_UNIT:
-        if tag in camera and isinstance(width_before, int) and width_before > 0:
-            camera[tag] = float(camera[tag]) * max(size) / max(width_before, camera.get(HEIGHT) or 0)
-        else:
-            camera.pop(tag, None)
-    camera[WIDTH], camera[HEIGHT] = size.width, size.height
-    camera[COLOR_SPACE] = 1 if color_space == SRGB else UNCALIBRATED
 
 
 def xmp_for(xmp: bytes, texts: Mapping[str, str]) -> bytes:
-    """A packet with what is kept of a photo's, and texts of our own; b"" where that is nothing."""
+    """Return a packet with the kept properties of a photo's XMP, and with texts of ours; b"" where there are none."""
     described = Element(f"{{{RDF}}}Description", {f"{{{RDF}}}about": ""})
     for name, text in texts.items():
-        described.set(f"{{{OURS}}}{_local(name)}", _pack(text))
+        described.set(_key_of(name), _pack(text))
     try:
         for source in parse_packet(xmp).iter(f"{{{RDF}}}Description") if xmp else ():
             _copy_properties(source, described)
     except InputError:
-        pass  # a photo is one without its XMP too
+        pass  # a photo without XMP is a photo, too
     if len(described) == 0 and len(described.attrib) == 1:
         return b""
     for prefix, uri in NAMESPACES.items():
@@ -181,6 +150,146 @@ def xmp_for(xmp: bytes, texts: Mapping[str, str]) -> bytes:
     SubElement(root, f"{{{RDF}}}RDF").append(described)
     packet: bytes = ElementTree.tostring(root, encoding="utf-8")
     return PACKET_START + packet + PACKET_END
+
+
+def settings_text_in(path: Path) -> str:
+    """Return the text of the settings that a picture was saved with; "" without.
+
+    Raises InputError where the file is no picture, or its settings are damaged.
+    """
+    from iibr_core.formats.images.decode import read_size, read_text
+
+    read_size(path)
+    return _unpack(read_text(path, SETTINGS_KEY), path) or text_in_xmp(path, SETTINGS_KEY)
+
+
+def text_in_xmp(path: Path, name: str) -> str:
+    """Return a text that `xmp_for` put into a picture's XMP; "" without. Raises InputError where it is damaged."""
+    xmp = read_metadata(path).xmp
+    if OURS.encode() not in xmp:
+        return ""
+    key = _key_of(name)
+    texts = (element.attrib[key] for element in parse_packet(xmp).iter() if key in element.attrib)
+    return _unpack(next(texts, ""), path)
+
+
+def read_caption(path: Path) -> Caption:
+    """Return the texts about a photo, XMP before Exif; empty where the file is damaged or missing."""
+    metadata = read_metadata(path)
+    exif = Image.Exif()
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            exif.load(metadata.exif)
+            texts = {tag: _line(exif.get(tag), MAX_CAPTION_CHARACTERS) for tag in (DESCRIPTION, ARTIST, COPYRIGHT)}
+    except EXIF_ERRORS:
+        texts = {}
+    try:
+        tree = parse_packet(metadata.xmp) if metadata.xmp else None
+    except InputError:
+        tree = None
+    return Caption(
+        _dublin_core(tree, "title"),
+        _dublin_core(tree, "description") or texts.get(DESCRIPTION, ""),
+        _dublin_core(tree, "creator") or texts.get(ARTIST, ""),
+        _dublin_core(tree, "rights") or texts.get(COPYRIGHT, ""),
+    )
+
+
+def camera_facts(metadata: PictureMetadata) -> tuple[tuple[str, str], ...]:
+    """Return what Exif states about how a photo was taken, for people: (name, value) of each known fact."""
+    exif = Image.Exif()
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            exif.load(metadata.exif)
+            camera = exif.get_ifd(EXIF_FOLDER)
+    except EXIF_ERRORS:
+        return ()
+
+    def words(value: Any) -> str:
+        return _line(value, MAX_FACT_CHARACTERS)
+
+    facts = (
+        ("Camera", " ".join(dict.fromkeys(f"{words(exif.get(MAKE))} {words(exif.get(MODEL))}".split()))),
+        ("Lens", words(camera.get(0xA434))),
+        ("Exposure", ", ".join(filter(None, _exposure(camera)))),
+        ("Taken", words(camera.get(0x9003))[:16].replace(":", "-", 2)),
+    )
+    return tuple((name, value) for name, value in facts if value)
+
+
+class _LimitedTree(TreeBuilder):
+    """A tree of at most MAX_ELEMENTS elements."""
+
+    count = 0
+
+    def start(self, tag: str, attrs: dict[str, str]) -> Element:
+        self.count += 1
+        if self.count > MAX_ELEMENTS:
+            raise InputError(f"XMP holds more than {MAX_ELEMENTS:,} elements")
+        return super().start(tag, attrs)
+
+
+def parse_packet(packet: bytes) -> Element:
+    """Parse an XMP packet without expanding entities.
+
+    Raises InputError where it is no XML, declares a document type, or is too large.
+    """
+    if len(packet) > MAX_PACKET_BYTES:
+        raise InputError(f"XMP of {len(packet):,} bytes exceeds {MAX_PACKET_BYTES:,}")
+    parser = DefusedXMLParser(target=_LimitedTree(), forbid_dtd=True)
+    try:
+        parser.feed(packet.strip(b"\0 \t\r\n"))
+        tree: Element = parser.close()
+        return tree
+    except InputError:
+        raise
+    except DTDForbidden as error:
+        raise InputError("XMP declares a document type; entities are not expanded") from error
+    except (ParseError, AssertionError, ValueError, LookupError) as error:  # LookupError: of an encoding
+        raise InputError(f"XMP is damaged ({error})") from error
+
+
+def value_in(tree: Element, namespace: str, name: str) -> str | None:
+    """Return the first value of a property in a tree, its root included, as attribute or element; None without."""
+    key = f"{{{namespace}}}{name}"
+    for element in tree.iter():
+        if key in element.attrib:
+            return element.attrib[key]
+        if element.tag == key:
+            return "".join(element.itertext())
+    return None
+
+
+def _bytes_of(value: Any) -> bytes:
+    return value.encode() if isinstance(value, str) else bytes(value or b"")
+
+
+def _describing(exif: Image.Exif, keeps_position: bool) -> Image.Exif:
+    """Return a copy with the tags that describe the photo and its camera."""
+    kept = Image.Exif()
+    for tag in sorted(DESCRIBING_TAGS & set(exif)):
+        kept[tag] = exif[tag]
+    for folder in (EXIF_FOLDER, GPS_FOLDER) if keeps_position else (EXIF_FOLDER,):
+        if tags := dict(exif.get_ifd(folder)):
+            kept.get_ifd(folder).update(tags)
+    return kept
+
+
+def _set_camera(camera: dict[int, Any], size: ImageSize, color_space: ColorSpace) -> None:
+    """Change the camera's tags that depend on the picture's size and colours, and drop those that no longer fit."""
+    for tag in (MAKER_NOTE, INTEROPERABILITY, *TAGS_IN_PIXELS):
+        camera.pop(tag, None)
+    width_before = camera.get(WIDTH)
+    for tag in RESOLUTION_TAGS:
+        if tag in camera and isinstance(width_before, int) and width_before > 0:
+            # The longer sides are compared: a portrait picture was stored lying on its side.
+            camera[tag] = float(camera[tag]) * max(size) / max(width_before, camera.get(HEIGHT) or 0)
+        else:
+            camera.pop(tag, None)
+    camera[WIDTH], camera[HEIGHT] = size.width, size.height
+    camera[COLOR_SPACE] = 1 if color_space == SRGB else UNCALIBRATED
 
 
 def _copy_properties(source: Element, target: Element) -> None:
@@ -196,62 +305,45 @@ def _is_kept(name: str) -> bool:
     return name.startswith("{") and namespace in KEPT_NAMESPACES and local not in DROPPED_NAMES
 
 
-def text_in_xmp(path: Path, name: str) -> str:
-    """A text of ours in a picture's XMP, as it was written by `xmp_for`; "" without. Raises InputError where it is
-    damaged.
-    """
-    xmp = read_metadata(path).xmp
-    if OURS.encode() not in xmp:
-        return ""
-    key = f"{{{OURS}}}{_local(name)}"
-    texts = (element.attrib[key] for element in parse_packet(xmp).iter() if key in element.attrib)
-    return unpack_text(next(texts, ""), path)
-
-
-def _local(name: str) -> str:
-    return name.rpartition(":")[2]
+def _key_of(name: str) -> str:
+    """Return the XML name of a text of ours, as of "iibr:settings"."""
+    return f"{{{OURS}}}{name.rpartition(':')[2]}"
 
 
 def _pack(text: str) -> str:
-    if len(text) <= MOST_PLAIN_CHARACTERS:
+    if len(text) <= MAX_PLAIN_CHARACTERS:
         return text
     return PACKED + base64.b64encode(zlib.compress(text.encode(), 9)).decode("ascii")
 
 
-def unpack_text(text: str, path: Path) -> str:
-    """A text as it was before it was packed for XMP. Raises InputError where it is damaged."""
+def _unpack(text: str, path: Path) -> str:
     if not text.startswith(PACKED):
         return text
     try:
         packed = zlib.decompressobj()
-        return packed.decompress(base64.b64decode(text[len(PACKED) :]), MOST_UNPACKED_BYTES).decode()
+        return packed.decompress(base64.b64decode(text[len(PACKED) :]), MAX_UNPACKED_BYTES).decode()
     except (ValueError, binascii.Error, zlib.error) as error:
         raise InputError(f"{path}: its settings are damaged; set them by hand") from error
 
 
-def camera_facts(metadata: PictureMetadata) -> tuple[tuple[str, str], ...]:
-    """What a photo's Exif says about how it was taken, for people: (what, value); without what it does not say."""
-    from PIL import Image
+def _dublin_core(tree: Element | None, name: str) -> str:
+    """Return the first text of a property of Dublin Core, of a list its first entry."""
+    for element in () if tree is None else tree.iter(f"{{{NAMESPACES['dc']}}}{name}"):
+        texts = [entry.text for entry in element.iter(f"{{{RDF}}}li")] or [element.text]
+        if line := _line(next(filter(None, texts), ""), MAX_CAPTION_CHARACTERS):
+            return line
+    return ""
 
-    exif = Image.Exif()
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            exif.load(metadata.exif)
-            camera = exif.get_ifd(EXIF_IFD)
-    except EXIF_ERRORS:
-        return ()
-    facts = (
-        ("Camera", " ".join(dict.fromkeys(f"{_words(exif.get(0x010F))} {_words(exif.get(0x0110))}".split()))),
-        ("Lens", _words(camera.get(0xA434))),
-        ("Exposure", ", ".join(filter(None, _exposure(camera)))),
-        ("Taken", _words(camera.get(0x9003))[:16].replace(":", "-", 2)),
-    )
-    return tuple((what, value) for what, value in facts if value)
+
+def _line(text: Any, max_characters: int) -> str:
+    """Return a text as one line without control characters; "" for other values."""
+    if not isinstance(text, str):
+        return ""
+    return " ".join("".join(c if c.isprintable() else " " for c in text).split())[:max_characters]
 
 
 def _exposure(camera: Mapping[int, Any]) -> tuple[str, ...]:
-    """F-number, time, sensitivity and focal length, each "" where it is not known."""
+    """Return F-number, time, sensitivity and focal length, "" for unknown ones."""
     number, seconds, iso, focal_mm, equivalent_mm = (
         _positive(camera.get(tag)) for tag in (0x829D, 0x829A, 0x8827, 0x920A, 0xA405)
     )
@@ -265,16 +357,9 @@ def _exposure(camera: Mapping[int, Any]) -> tuple[str, ...]:
 
 
 def _positive(value: Any) -> float:
-    """A number of Exif; 0 where it is none, or means nothing."""
+    """Return a number of Exif; 0 where it is none, or makes no sense."""
     try:
         number = float(value[0] if isinstance(value, tuple) else value)
-    except (*EXIF_ERRORS,):
+    except EXIF_ERRORS:
         return 0.0
     return number if math.isfinite(number) and 0 < number < 1e9 else 0.0
-
-
-def _words(value: Any) -> str:
-    """A text of Exif in one short line."""
-    return (
-        " ".join("".join(c if c.isprintable() else " " for c in value).split())[:60] if isinstance(value, str) else ""
-    )

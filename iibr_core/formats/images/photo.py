@@ -1,37 +1,41 @@
-"""Photos in, pictures out. Integer files are encoded as they state; floating-point files hold linear light.
+"""Reads photos: linear light of floating-point files, colours of all others as their profiles state.
 
-Everything that changes the photo on the way in (alpha, size, odd values, colour profile, HDR) is said in its notes.
+The notes of a photo name all that reading changed: alpha, size, values that are not finite, colour profile, HDR.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from PIL import Image, ImageOps
 
-from iibr_core.color import ROWS_AT_ONCE, bytes_from_encoded, convert, linear_from_srgb, srgb_from_linear
-from iibr_core.formats.files import require_file, shown_name
+from iibr_core.color import ROWS_AT_ONCE, convert, linear_from_srgb, srgb_from_linear
+from iibr_core.formats.files import MAX_FILE_PIXELS, require_file
 from iibr_core.formats.images.color_profile import color_profile_of, color_space_of
-from iibr_core.formats.images.downsampling import OddValues, downsampled_linear, finite_pixels, linear_light
+from iibr_core.formats.images.decode import decode_bands
 from iibr_core.formats.images.file_notes import file_notes
 from iibr_core.formats.images.hdr import tone_map
-from iibr_core.formats.images.oiio_reader import PictureRows, Raster, text_attribute, upright
-from iibr_core.formats.images.oiio_writer import PNG_SETTINGS, write_image_file
-from iibr_core.formats.images.picture_source import PictureSource, is_read_whole, read_source
-from iibr_core.formats.images.side_by_side import own_picture
-from iibr_core.runtime.tiling import ShouldStop, never
+from iibr_core.formats.images.picture import Picture, full_scale, upright
+from iibr_core.formats.images.picture_source import PictureSource, read_source, source_size
+from iibr_core.formats.images.pillow_reader import DECODE_ERRORS
+from iibr_core.formats.images.side_by_side import own_picture, photo_size
+from iibr_core.runtime.kernels import kernel
+from iibr_core.runtime.tiling import ShouldStop, never, raise_if_stopped
 from iibr_core.types import SRGB, FloatImage, ImageSize, InputError, Photo
 
 DEFAULT_MAX_PIXELS = 2_000_000
 DEFAULT_FOV_DEG = 50.0
 MADE_SMALLER = "Made smaller by area averaging"
-FILM_DIAGONAL_MM = math.hypot(36.0, 24.0)  # "35 mm equivalent" compares diagonals (CIPA DCG-001)
-MM_PER_RESOLUTION_UNIT = {2: 25.4, 3: 10.0, 4: 1.0, 5: 0.001}  # Exif 2.3, FocalPlaneResolutionUnit
+JPEG_START = b"\xff\xd8"
+MAX_BAND_ROWS = 32
+MAX_BAND_PIXELS = 1 << 20
+"""Largest number of stored pixels that are averaged at a time: as floats they take 12 bytes each, or more."""
 
 
 def read_photo(
@@ -41,12 +45,12 @@ def read_photo(
     keeps_primaries: bool = False,
     should_stop: ShouldStop = never,
 ) -> Photo:
-    """Read a JPEG, PNG, TIFF, EXR, HDR, WebP, JPEG XL (whatever OpenImageIO reads), HEIC or AVIF as a photo, upright,
-    max_pixels large at most: of a stereo pair the left eye's picture, of an animation the first.
+    """Read a photo of any kind, upright, with at most `max_pixels`.
 
-    fov_deg: horizontal field of view where the file gives no focal length. keeps_primaries: the photo stays in the
-    colour space of its file, else it is converted to sRGB, which cuts off what that lacks. Raises InputError, naming
-    the file, if it is missing, no picture, cut off, or absurdly large; Cancelled once should_stop is true.
+    Of a stereo pair the left eye's picture is read, of an animation the first one. fov_deg: horizontal field of view
+    where the file states no focal length. keeps_primaries: whether the photo stays in the colour space of its file;
+    else it is converted to sRGB, which cuts off colours outside it. Raises InputError, naming the file, if it is
+    missing, no picture, cut off, or absurdly large; Cancelled once should_stop is true.
     """
     photo = read_picture(own_picture(Path(path)), max_pixels, fov_deg, keeps_primaries, should_stop)
     return replace(photo, notes=photo.notes + file_notes(Path(path)))
@@ -63,60 +67,62 @@ def read_picture(
     if max_pixels < 1:
         raise InputError(f"--max-pixels {max_pixels}: must be 1 or more")
     require_file(source.path)
-    rows = _open_rows(source)
-    stored_size, spec = rows.size, rows.spec
+    stored_size = source_size(source)
     size = size_within(stored_size, max_pixels)
-    if size == stored_size:
-        encoded, is_opaque, odd = _encode(rows.read(0, size.height))
+    is_smaller = size != stored_size
+    if is_smaller:
+        bands = decode_bands(source.path) if source == PictureSource(source.path) else iter([read_source(source)])
+        picture, finite_notes = _finite(next(bands))
+        encoded = _encode_light(_averaged(picture, bands, stored_size, size, should_stop), picture)
     else:
-        averaged = downsampled_linear(lambda: rows if rows.is_at_start else _open_rows(source), size, should_stop)
-        linear, is_opaque, odd = averaged
-        encoded = _encode_light(linear, spec)
-    space = color_space_of(spec)
+        picture, finite_notes = _finite(read_source(source))
+        encoded = _encode(picture)
+    space = color_space_of(picture)
     if not keeps_primaries:
         encoded, space = convert(encoded, SRGB, space), SRGB
-    notes = _color_notes(spec) + _alpha_notes(is_opaque)
-    if size != stored_size:
-        said = f"{stored_size} to {size}"
-        notes += (f"{MADE_SMALLER}, from {said} (--max-pixels {max_pixels}).",)
-    pixels = upright(encoded, spec.get_int_attribute("Orientation", 1))
-    focal_px = _exif_focal_px(spec)
-    if focal_px is None:
-        focal_px = focal_px_from_fov(pixels.shape[1], fov_deg)
-    else:
-        focal_px *= math.sqrt(size.height * size.width / (stored_size.height * stored_size.width))
-    name = shown_name(source.path.stem)
-    return Photo(pixels, focal_px, name, bool(pixels.max() > 1), notes + _odd_notes(odd), space)
+    notes = _color_notes(picture)
+    if picture.alpha is not None:
+        notes += ("Transparency was dropped: the photo is laid over black.",)
+    if is_smaller:
+        notes += (f"{MADE_SMALLER}, from {stored_size} to {size} (--max-pixels {max_pixels}).",)
+    pixels = upright(encoded, picture.orientation)
+    focal_px = focal_px_from_fov(pixels.shape[1], fov_deg)
+    if picture.focal_px > 0:
+        focal_px = picture.focal_px * math.sqrt(math.prod(size) / math.prod(stored_size))
+    return Photo(pixels, focal_px, source.path.stem, bool(pixels.max() > 1), notes + finite_notes, space)
 
 
-def encoded_colors(raster: Raster) -> FloatImage:
-    """A decoded picture as a view's colours, upright: (H, W, 3), sRGB-encoded, of sRGB."""
-    encoded = convert(_encode(raster)[0], SRGB, color_space_of(raster.spec))
-    return upright(encoded, raster.spec.get_int_attribute("Orientation", 1))
+def encoded_colors(picture: Picture) -> FloatImage:
+    """Return a decoded picture as a view's colours, upright: (H, W, 3), sRGB-encoded, of sRGB."""
+    encoded = convert(_encode(_finite(picture)[0]), SRGB, color_space_of(picture))
+    return upright(encoded, picture.orientation)
 
 
-def write_image(path: Path, pixels: NDArray[Any], metadata: Mapping[str, str | int | float] | None = None) -> None:
-    """Write sRGB-encoded pixels, (H, W) or (H, W, C): uint8 as it is, floats with 1 = white. Whole or not at all. For
-    views and data; pictures that people keep are written by `picture_writers`.
+def read_thumbnail(path: Path, within: ImageSize, should_stop: ShouldStop = never) -> NDArray[np.uint8]:
+    """Read a photo, upright, as large as fits within (height, width): (h, w, 3), sRGB bytes.
 
-    `.png` gets 8 bits, `.exr` linear light: half floats for uint8 and float16, else float32. Raises InputError for
-    other extensions and where the file cannot be written.
+    The colours of JPEGs are not exact: their decoder skips most of the work. Raises InputError where the file is no
+    photo, or has more pixels than any file may; Cancelled once should_stop is true.
     """
-    path = Path(path)
-    kind = path.suffix.lower()
-    if kind not in (".png", ".exr"):
-        raise InputError(f"{path}: can be written as .png or .exr only")
-    stored, dtype = _png_values(pixels) if kind == ".png" else _exr_values(pixels)
-    write_image_file(path, stored, dtype, {**PNG_SETTINGS, **(metadata or {})})
+    pixels = _jpeg_thumbnail(path, within) if own_picture(path).part is None else None
+    if pixels is not None:
+        return pixels
+    size = photo_size(path)
+    scale = min(within.height / size.height, within.width / size.width, 1.0)
+    max_pixels = max(math.floor(math.prod(size) * scale**2), 1)
+    colors = read_picture(own_picture(path), max_pixels, should_stop=should_stop).pixels
+    # A turned photo may still be too large, as may a very narrow one.
+    step = max(math.ceil(colors.shape[0] / within.height), math.ceil(colors.shape[1] / within.width), 1)
+    return np.round(np.nan_to_num(colors[::step, ::step]).clip(0.0, 1.0) * 255).astype(np.uint8)
 
 
 def focal_px_from_fov(width: int, fov_deg: float = DEFAULT_FOV_DEG) -> float:
-    """Focal length in pixels of a picture `width` pixels wide that shows `fov_deg` degrees horizontally."""
+    """Return the focal length in pixels of a picture `width` pixels wide that shows `fov_deg` degrees horizontally."""
     return width / 2 / math.tan(math.radians(fov_deg) / 2)
 
 
 def size_within(size: ImageSize, max_pixels: int) -> ImageSize:
-    """The (height, width) of the same shape that holds at most max_pixels; `size` itself where that is small enough."""
+    """Return the (height, width) of the same shape with at most `max_pixels`; `size` where it is small enough."""
     height, width = size
     if height * width <= max_pixels:
         return size
@@ -125,36 +131,56 @@ def size_within(size: ImageSize, max_pixels: int) -> ImageSize:
     return ImageSize(new_height, min(max(1, math.floor(width * factor)), max_pixels // new_height))
 
 
-def _open_rows(source: PictureSource) -> PictureRows | Raster:
-    path = source.path
-    is_read_by_rows = source == PictureSource(path) and not is_read_whole(path)
-    return PictureRows(path) if is_read_by_rows else read_source(source)
+def linear_light(picture: Picture) -> FloatImage:
+    """Return linear light over black, (H, W, 3), of finite pixels, in the picture's colour space.
 
-
-def _encode(raster: Raster) -> tuple[FloatImage, bool, OddValues]:
-    """sRGB-encoded (H, W, 3) at the stored size, whether it is opaque, and what of it was not finite.
-
-    Opaque integer files without a profile pass untouched: they are encoded already.
+    HDR photos exceed white, 1, as floating-point files do.
     """
-    profile = color_profile_of(raster.spec)[0]
-    if raster.pixels.dtype.kind == "u" and raster.alpha is None and not (profile and profile.hdr):
-        if profile is not None and raster.pixels.shape[2] == 3:
-            return profile.encoded(raster.pixels), True, OddValues(0, 0.0)
-        encoded = raster.pixels.astype(np.float32) * np.float32(1 / np.iinfo(raster.pixels.dtype).max)
-        # Writable, as all other photos are: kernels are compiled once more for arrays that are not.
-        whole = np.repeat(encoded, 3, axis=2) if encoded.shape[2] == 1 else encoded
-        return np.ascontiguousarray(whole), True, OddValues(0, 0.0)
-    pixels, odd = finite_pixels(raster.pixels)
-    linear = linear_light(Raster(pixels, raster.alpha, raster.spec))
-    return _encode_light(linear, raster.spec), raster.alpha is None, odd
+    pixels, profile = picture.pixels, color_profile_of(picture)[0]
+    if profile is not None:
+        linear: NDArray[Any] = profile.linear(np.repeat(pixels, 3, axis=2) if pixels.shape[2] == 1 else pixels)
+    elif not picture.is_float:
+        steps = full_scale(pixels.dtype)
+        linear = linear_from_srgb(np.arange(steps + 1, dtype=np.float32) / steps)[pixels]
+    else:
+        linear = np.maximum(pixels, 0)
+    if picture.alpha is not None and not picture.is_premultiplied:
+        alpha = np.nan_to_num(picture.alpha.astype(np.float32) / full_scale(picture.alpha.dtype))
+        linear = linear * np.clip(alpha, 0, 1)[..., None]
+    return np.ascontiguousarray(np.repeat(linear, 3, axis=2) if linear.shape[2] == 1 else linear, np.float32)
 
 
-def _encode_light(linear: FloatImage, spec: Any) -> FloatImage:
-    """The same array, tone-mapped where the photo is HDR by its profile, then sRGB-encoded.
+def _finite(picture: Picture) -> tuple[Picture, tuple[str, ...]]:
+    """Return a picture with NaN as black and infinity as its largest finite value, and a note where it had any."""
+    pixels = picture.pixels
+    if not picture.is_float:
+        return picture, ()
+    is_finite = np.isfinite(pixels)
+    if is_finite.all():
+        return picture, ()
+    largest = float(pixels.max(initial=-np.inf, where=is_finite))
+    largest = largest if math.isfinite(largest) else 1.0
+    cleaned = np.nan_to_num(pixels, nan=0.0, posinf=max(largest, 0.0), neginf=0.0)
+    count = int((~is_finite).any(axis=2).sum())
+    replaced = f"NaN became black, infinity the largest value there is ({largest:g})"
+    return replace(picture, pixels=cleaned), (f"{count} pixels held NaN or infinity: {replaced}.",)
 
-    A few rows at a time, as that takes some times their memory.
-    """
-    profile = color_profile_of(spec)[0]
+
+def _encode(picture: Picture) -> FloatImage:
+    """Return a picture of finite pixels over black, sRGB-encoded (H, W, 3), at its stored size."""
+    profile = color_profile_of(picture)[0]
+    if picture.is_float or picture.alpha is not None or (profile is not None and profile.hdr):
+        return _encode_light(linear_light(picture), picture)
+    if profile is not None:
+        return profile.encoded(picture.pixels)
+    # Such files are encoded already. The copy can be written to: kernels are compiled once more for other arrays.
+    encoded = picture.pixels.astype(np.float32) * np.float32(1 / full_scale(picture.pixels.dtype))
+    return np.repeat(encoded, 3, axis=2) if encoded.shape[2] == 1 else encoded
+
+
+def _encode_light(linear: FloatImage, picture: Picture) -> FloatImage:
+    """Encode linear light (H, W, 3) by sRGB's curve in place, after tone mapping where the profile is of HDR."""
+    profile = color_profile_of(picture)[0]
     if profile is not None and profile.hdr:
         tone_map(linear)
     for first in range(0, len(linear), ROWS_AT_ONCE):
@@ -163,63 +189,81 @@ def _encode_light(linear: FloatImage, spec: Any) -> FloatImage:
     return linear
 
 
-def _odd_notes(odd: OddValues) -> tuple[str, ...]:
-    if not odd.pixels:
-        return ()
-    largest = odd.largest if math.isfinite(odd.largest) else 1.0
-    said = f"NaN became black, infinity the largest value there is ({largest:g})"
-    return (f"{odd.pixels} pixels held NaN or infinity: {said}.",)
+def _averaged(
+    first_band: Picture, bands: Iterator[Picture], stored_size: ImageSize, size: ImageSize, should_stop: ShouldStop
+) -> FloatImage:
+    """Return the mean linear light (H, W, 3) of a picture at a smaller size.
+
+    first_band, bands: the rows of the picture from top to bottom; few of them are floats at a time.
+    """
+    result, kept, kept_from = np.empty((*size, 3), np.float32), first_band, 0
+    row_step = stored_size.height / size.height
+    band_rows = min(max(int(MAX_BAND_PIXELS / stored_size.width / row_step), 1), MAX_BAND_ROWS)
+    for top in range(0, size.height, band_rows):
+        raise_if_stopped(should_stop)
+        bottom = min(top + band_rows, size.height)
+        first, last = top * stored_size.height // size.height, -(-bottom * stored_size.height // size.height)
+        while kept_from + kept.size.height < last:
+            pixels = np.concatenate([kept.pixels[max(first - kept_from, 0) :], next(bands).pixels])
+            kept, kept_from = replace(kept, pixels=pixels), max(first, kept_from)
+        rows = slice(first - kept_from, last - kept_from)
+        alpha = None if kept.alpha is None else kept.alpha[rows]
+        light = linear_light(replace(kept, pixels=kept.pixels[rows], alpha=alpha))
+        _average_areas(light, row_step, top, first, result[top:bottom])
+    return result
 
 
-def _alpha_notes(is_opaque: bool) -> tuple[str, ...]:
-    return () if is_opaque else ("Transparency was dropped: the photo is laid over black.",)
+@kernel
+def _average_areas(light, row_step, top, first_row, result):
+    """Average light (h, W, 3) over the area of each pixel of result (m, w, 3).
+
+    Row i of the whole result covers rows i * row_step to (i + 1) * row_step of the whole picture. top: first row of
+    `result` within the whole. first_row: first row of `light` within the whole.
+    """
+    column_step = light.shape[1] / result.shape[1]
+    for y in range(result.shape[0]):
+        # Areas are exact: border rows and columns count by the share that lies inside.
+        y0 = (top + y) * row_step - first_row
+        y1 = min(y0 + row_step, float(light.shape[0]))
+        for x in range(result.shape[1]):
+            x0 = x * column_step
+            x1 = min(x0 + column_step, float(light.shape[1]))
+            red, green, blue, area = 0.0, 0.0, 0.0, 0.0
+            for row in range(max(int(y0), 0), min(math.ceil(y1), light.shape[0])):
+                covered_rows = min(y1, row + 1.0) - max(y0, float(row))
+                for column in range(int(x0), min(math.ceil(x1), light.shape[1])):
+                    weight = covered_rows * (min(x1, column + 1.0) - max(x0, float(column)))
+                    red += weight * light[row, column, 0]
+                    green += weight * light[row, column, 1]
+                    blue += weight * light[row, column, 2]
+                    area += weight
+            result[y, x, 0] = red / area
+            result[y, x, 1] = green / area
+            result[y, x, 2] = blue / area
 
 
-def _color_notes(spec: Any) -> tuple[str, ...]:
-    stored_as = text_attribute(spec, "jpeg:ColorSpace") or text_attribute(spec, "tiff:ColorSpace")
-    if "CMYK" in stored_as or "YCCK" in stored_as:
+def _color_notes(picture: Picture) -> tuple[str, ...]:
+    if picture.color_model == "CMYK":
         return ("CMYK was converted to RGB without its colour profile.",)
-    if "LAB" in stored_as:
+    if picture.color_model == "LAB":
         return ("Lab was converted to RGB with a tint: save the photo as RGB for its true colours.",)
-    note = color_profile_of(spec)[1]
+    note = color_profile_of(picture)[1]
     return (note,) if note else ()
 
 
-def _exif_focal_px(spec: Any) -> float | None:
-    """Focal length in pixels of the stored picture, or None where Exif does not tell or tells nonsense."""
-    equivalent_mm = _number(spec, "Exif:FocalLengthIn35mmFilm")
-    focal_mm = _number(spec, "Exif:FocalLength")
-    resolution = _number(spec, "Exif:FocalPlaneXResolution")
-    diagonal_px = math.hypot(spec.width, spec.height)
-    if equivalent_mm > 0:
-        focal_px = equivalent_mm / FILM_DIAGONAL_MM * diagonal_px
-    else:
-        unit_mm = MM_PER_RESOLUTION_UNIT.get(int(_number(spec, "Exif:FocalPlaneResolutionUnit") or 2), 25.4)
-        # The resolution counts pixels of the picture as the camera took it.
-        taken_width = _number(spec, "Exif:PixelXDimension") or spec.width
-        focal_px = focal_mm * resolution / unit_mm * (spec.width / taken_width)
-    return focal_px if 0.05 * diagonal_px < focal_px < 200 * diagonal_px else None
-
-
-def _number(spec: Any, name: str) -> float:
+def _jpeg_thumbnail(path: Path, within: ImageSize) -> NDArray[np.uint8] | None:
+    """Read a JPEG by its decoder's own reduction to an eighth or so; None for other and damaged files."""
+    require_file(path)
     try:
-        value = spec.getattribute(name)
-    except UnicodeDecodeError:  # a text where a number belongs
-        return 0.0
-    return float(value) if isinstance(value, int | float) and math.isfinite(value) else 0.0
-
-
-def _png_values(pixels: NDArray[Any]) -> tuple[NDArray[Any], str]:
-    stored = np.atleast_3d(pixels)
-    if stored.dtype != np.uint8:
-        stored = bytes_from_encoded(np.nan_to_num(stored))
-    return np.ascontiguousarray(stored), "uint8"
-
-
-def _exr_values(pixels: NDArray[Any]) -> tuple[NDArray[Any], str]:
-    stored = np.atleast_3d(pixels)
-    as_half = stored.dtype in (np.uint8, np.float16)
-    linear = linear_from_srgb(stored / np.float32(255) if stored.dtype == np.uint8 else stored)
-    if as_half:
-        linear = np.minimum(linear, np.finfo(np.float16).max).astype(np.float16)
-    return np.ascontiguousarray(linear), "half" if as_half else "float"
+        with path.open("rb") as file:
+            if file.read(2) != JPEG_START:
+                return None
+        with Image.open(path) as image:
+            if image.width * image.height > MAX_FILE_PIXELS:
+                return None
+            image.draft("RGB", (max(within), max(within)))
+            picture = ImageOps.exif_transpose(image).convert("RGB")
+            picture.thumbnail((within.width, within.height), Image.Resampling.BOX)
+            return np.asarray(picture)
+    except (*DECODE_ERRORS, TypeError):
+        return None

@@ -1,4 +1,4 @@
-"""Where the pixels of a view are: a file of its own, one of several pictures in a file, or a part of a picture."""
+"""Places of a view's pixels: a file of its own, one of several pictures in a file, or a part of a picture."""
 
 from __future__ import annotations
 
@@ -9,17 +9,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.formats.images.avif import avif_size, is_avif, read_avif
-from iibr_core.formats.images.heic import heic_size, is_heic, read_heic
-from iibr_core.formats.images.lfp import is_lfp, lfp_size, read_lfp
-from iibr_core.formats.images.lif import lif_picture_size, open_lif, read_lif_picture
-from iibr_core.formats.images.mpo import mpo_picture_size, read_mpo_picture
-from iibr_core.formats.images.oiio_reader import Raster, read_raster, read_size, upright
+from iibr_core.formats.images.decode import decode, read_size
+from iibr_core.formats.images.picture import Picture, upright
 from iibr_core.types import ImageSize, InputError, image_size
 
 
 class PicturePart(NamedTuple):
-    """Of each axis, (y, x), every `step`-th pixel from `first` on; size: how many."""
+    """Every `step`-th pixel of a picture along each axis (y, x), from `first` on; `size` pixels in all."""
 
     first: tuple[int, int]
     size: ImageSize
@@ -28,9 +24,10 @@ class PicturePart(NamedTuple):
 
 @dataclass(frozen=True)
 class PictureSource:
-    """number: of the picture in its file; 0 is the one that every program shows, the others are as its format has it.
+    """A picture within a file.
 
-    part: of the upright picture, None for all. shown_size: what it is stretched to, None for its own.
+    number: of the picture in its file; 0 is the one that every program shows, the order of the others depends on the
+    format. part: part of the upright picture, None for all. shown_size: size that it is stretched to, None for its own.
     """
 
     path: Path
@@ -40,73 +37,42 @@ class PictureSource:
 
     @property
     def whole(self) -> PictureSource:
-        """The picture that it is a part of."""
+        """The picture that this is a part of."""
         return PictureSource(self.path, self.number)
 
 
 def source_size(source: PictureSource) -> ImageSize:
-    """From the file's header: of a part as it is shown, of a whole picture as it is stored, before it is upright.
+    """Return the size from the file's header: of a part as shown, of a whole picture as stored, before it is upright.
 
     Raises InputError as `read_source` does.
     """
     if source.shown_size is not None:
         return source.shown_size
-    if source.part is not None:
-        return source.part.size
-    path, number = source.path, source.number
-    if is_avif(path):
-        return avif_size(path)
-    if is_heic(path):
-        return heic_size(path, number)
-    if is_lfp(path):
-        return lfp_size(path)
-    if number == 0:
-        return read_size(path)
-    return lif_picture_size(path, number) if open_lif(path) is not None else mpo_picture_size(path, number)
+    return read_size(source.path, source.number) if source.part is None else source.part.size
 
 
-def is_read_whole(path: Path) -> bool:
-    """Whether a file is decoded by another library than OpenImageIO, all at once."""
-    return is_avif(path) or is_heic(path) or is_lfp(path)
+def read_source(source: PictureSource) -> Picture:
+    """Decode a picture: a part of it upright, a whole one as stored.
 
-
-def read_source(source: PictureSource) -> Raster:
-    """Decode a picture, and take what is wanted of it. Parts are of the upright picture; a whole one stays as it is
-    stored. Raises InputError where it is missing, no picture, cut off, or absurdly large; or lacks the part.
+    Raises InputError where it is missing, no picture, cut off or absurdly large, or lacks the part.
     """
-    raster = _read_whole(source.path, source.number)
-    return raster if source == source.whole else part_of(raster, source)
+    picture = decode(source.path, source.number)
+    return picture if source == source.whole else part_of(picture, source)
 
 
-def part_of(raster: Raster, source: PictureSource) -> Raster:
-    """What a source takes of the whole picture, decoded. Raises InputError where it lacks the part."""
-    turns = raster.spec.get_int_attribute("Orientation", 1)
-    spec = raster.spec.copy()
-    spec.attribute("Orientation", 1)
+def part_of(picture: Picture, source: PictureSource) -> Picture:
+    """Return the part of a decoded picture that a source names. Raises InputError where the picture lacks it."""
 
-    def taken(values: NDArray[Any]) -> NDArray[Any]:
-        values = upright(values, turns) if turns != 1 else values
+    def cut(values: NDArray[Any]) -> NDArray[Any]:
+        values = upright(values, picture.orientation) if picture.orientation != 1 else values
         if source.part is not None:
             values = _cut(values, source.part, source.path)
         if source.shown_size is not None:
             values = _stretch(values, source.shown_size)
         return np.ascontiguousarray(values)
 
-    return replace(
-        raster, pixels=taken(raster.pixels), alpha=None if raster.alpha is None else taken(raster.alpha), spec=spec
-    )
-
-
-def _read_whole(path: Path, number: int) -> Raster:
-    if is_avif(path):
-        return read_avif(path)
-    if is_heic(path):
-        return read_heic(path, number)
-    if is_lfp(path):
-        return read_lfp(path)
-    if number == 0:
-        return read_raster(path)
-    return read_lif_picture(path, number) if open_lif(path) is not None else read_mpo_picture(path, number)
+    alpha = None if picture.alpha is None else cut(picture.alpha)
+    return replace(picture, pixels=cut(picture.pixels), alpha=alpha, orientation=1)
 
 
 def _cut(values: NDArray[Any], part: PicturePart, path: Path) -> NDArray[Any]:
@@ -118,14 +84,14 @@ def _cut(values: NDArray[Any], part: PicturePart, path: Path) -> NDArray[Any]:
 
 
 def _stretch(values: NDArray[Any], size: ImageSize) -> NDArray[Any]:
-    """Linear along each axis."""
+    """Return values (H, W, ...) at another size, interpolated linearly along each axis."""
     for axis, length in enumerate(size):
-        own = values.shape[axis]
-        if own != length:
-            at = np.clip((np.arange(length) + 0.5) * own / length - 0.5, 0, own - 1)
-            low = np.minimum(at.astype(int), max(own - 2, 0))
+        stored = values.shape[axis]
+        if stored != length:
+            at = np.clip((np.arange(length) + 0.5) * stored / length - 0.5, 0, stored - 1)
+            low = np.minimum(at.astype(int), max(stored - 2, 0))
             share = (at - low).reshape([-1 if k == axis else 1 for k in range(values.ndim)]).astype(np.float32)
-            first, second = values.take(low, axis), values.take(np.minimum(low + 1, own - 1), axis)
+            first, second = values.take(low, axis), values.take(np.minimum(low + 1, stored - 1), axis)
             mixed = first + share * (second.astype(np.float32) - first)
             values = (np.rint(mixed) if values.dtype.kind == "u" else mixed).astype(values.dtype)
     return values

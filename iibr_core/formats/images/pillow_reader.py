@@ -1,66 +1,114 @@
-"""Decodes with Pillow what OpenImageIO's wheel does not read; it comes out as rasters like all others."""
+"""Decodes with Pillow the kinds of pictures that OpenImageIO's wheel does not read."""
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Iterator
-from contextlib import contextmanager
+import struct
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
 from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
-import OpenImageIO as oiio
+from PIL import Image
 
-from iibr_core.formats.files import MAX_FILE_PIXELS, reason_of, refuse_bomb
-from iibr_core.formats.images.heic import DECODE_ERRORS, describe
-from iibr_core.formats.images.oiio_reader import Raster
-from iibr_core.types import InputError
+from iibr_core.formats.files import MAX_FILE_PIXELS, reason_of
+from iibr_core.formats.images.picture import (
+    EXIF_NUMBERS,
+    Picture,
+    exif_focal_px,
+    opaque_as_none,
+    require_sound_size,
+)
+from iibr_core.types import ImageSize, InputError
 
-if TYPE_CHECKING:
-    from PIL.Image import Image
+# Pillow's own limit is lower than ours: Exif of larger photos would be lost.
+Image.MAX_IMAGE_PIXELS = MAX_FILE_PIXELS
 
-ORIENTATION_TAG = 0x0112
+EXIF_FOLDER, ORIENTATION_TAG = 0x8769, 0x0112
+COLOR_CODES = "color_primaries", "transfer_characteristics", "matrix_coefficients", "full_range_flag"
+"""Keys of Pillow's `nclx_profile`, in the order of `Picture.codes`."""
+HDR_TRANSFERS = (16, 18)
+"""PQ and HLG by the numbers of ITU-T H.273."""
+DECODE_ERRORS = (
+    ValueError,
+    OSError,
+    RuntimeError,
+    EOFError,
+    SyntaxError,
+    MemoryError,
+    IndexError,
+    struct.error,
+    Image.DecompressionBombError,
+)
+"""Errors that Pillow and pillow-heif raise for damaged files."""
+EXIF_ERRORS = (*DECODE_ERRORS, TypeError, ZeroDivisionError, KeyError, AttributeError, OverflowError)
+"""Errors that Pillow raises for damaged Exif."""
 
 
 @contextmanager
-def open_with_pillow(path: Path, formats: tuple[str, ...], what: str, data: bytes | None = None) -> Iterator[Image]:
-    """A picture of one of these formats, its header read. what: it should be, for people. data: of a picture within the
-    file, None for the file itself.
+def open_with_pillow(
+    path: Path, formats: tuple[str, ...], what: str, data: bytes | None = None
+) -> Iterator[Image.Image]:
+    """Open a picture of one of these formats and read its header.
 
+    what: what the picture should be, for messages. data: bytes of a picture within the file, None for the file itself.
     Raises InputError where it is none, or claims an absurd size; also for what goes wrong in the block.
     """
-    from PIL import Image
-
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # Pillow's bomb limit is lower than ours
-            image = Image.open(path if data is None else BytesIO(data), formats=formats)
-    except (*DECODE_ERRORS, Image.DecompressionBombError) as error:
-        raise InputError(f"{path}: cannot be read as {what} ({reason_of(error)})") from error
+        image = Image.open(path if data is None else BytesIO(data), formats=formats)
+    except DECODE_ERRORS as error:
+        reason = reason_of(error).replace(f" {str(path)!r}", "")
+        raise InputError(f"{path}: cannot be read as {what} ({reason})") from error
     with image:
-        if min(image.size) < 1 or image.width * image.height > MAX_FILE_PIXELS:
-            raise InputError(f"{path}: {image.width}x{image.height} exceed {MAX_FILE_PIXELS:,} pixels; make it smaller")
-        refuse_bomb(path, image.width * image.height * 4)
+        require_sound_size(path, image.width, image.height, image.width * image.height * 4)
         try:
             yield image
+        except InputError:
+            raise
         except DECODE_ERRORS as error:
-            if isinstance(error, InputError):
-                raise
             raise InputError(f"{path}: damaged or cut off ({reason_of(error)}); get the whole file again") from error
 
 
-def raster_of(image: Image) -> Raster:
-    """An opened picture, decoded in 8 bits as it is stored. Raises what Pillow raises for damaged ones."""
+def picture_of(image: Image.Image) -> Picture:
+    """Decode an opened picture in 8 bits, as stored. Raises Pillow's errors for damaged ones."""
     has_alpha = image.mode in ("RGBA", "LA", "PA")
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        pixels = np.asarray(image.convert("RGBA" if has_alpha else "RGB"))
-    spec = oiio.ImageSpec(image.width, image.height, 3, "uint8")
-    describe(spec, image.info)
+    pixels = np.asarray(image.convert("RGBA" if has_alpha else "RGB"))
+    alpha = opaque_as_none(pixels[..., 3]) if has_alpha else None
+    facts = facts_of(image.info, ImageSize(image.height, image.width))
+    return Picture(pixels[..., :3], alpha, orientation=orientation_of(image), **facts)
+
+
+def orientation_of(image: Image.Image) -> int:
+    """Return Exif's Orientation, 1 to 8, of an opened picture."""
     orientation = image.getexif().get(ORIENTATION_TAG, 1)
-    spec.attribute("Orientation", orientation if orientation in range(1, 9) else 1)
-    spec.attribute("oiio:UnassociatedAlpha", 1)
-    alpha = np.ascontiguousarray(pixels[..., 3]) if has_alpha else None
-    is_opaque = alpha is None or bool((alpha == np.iinfo(alpha.dtype).max).all())
-    return Raster(pixels[..., :3], None if is_opaque else alpha, spec)
+    return int(orientation) if orientation in range(1, 9) else 1
+
+
+def facts_of(info: Mapping[Any, Any], size: ImageSize) -> dict[str, Any]:
+    """Return focal length and colours for `Picture`, from what Pillow and pillow-heif call info.
+
+    A profile counts more than colours in numbers, except for the curves of HDR.
+    """
+    exif, numbers = Image.Exif(), {}
+    with suppress(*EXIF_ERRORS):  # a photo without Exif is a photo, too
+        exif.load(info.get("exif") or b"")
+        tags = exif.get_ifd(EXIF_FOLDER)
+        for tag, name in EXIF_NUMBERS.items():
+            if tag in tags:
+                numbers[name] = float(tags[tag])
+    facts: dict[str, Any] = {"focal_px": exif_focal_px(numbers, size)}
+    stated, profile = info.get("nclx_profile") or {}, info.get("icc_profile")
+    codes = tuple(int(stated.get(name, 0)) for name in COLOR_CODES)
+    if stated and (not profile or codes[1] in HDR_TRANSFERS):
+        return facts | {"codes": codes}
+    return facts | ({"icc": bytes(profile), "icc_name": _profile_name(profile)} if profile else {})
+
+
+def _profile_name(profile: bytes) -> str:
+    from PIL import ImageCms
+
+    try:
+        return ImageCms.getProfileDescription(ImageCms.ImageCmsProfile(BytesIO(profile))).strip()
+    except (ImageCms.PyCMSError, *DECODE_ERRORS):
+        return ""

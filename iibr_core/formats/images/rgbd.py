@@ -1,4 +1,4 @@
-"""Pictures with their depth map beside or below them in one file, as light-field displays and depth tools take them."""
+"""Pictures with their depth map beside or below them in one file, for light-field displays and depth tools."""
 
 from __future__ import annotations
 
@@ -11,29 +11,30 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.formats.files import status_of
-from iibr_core.formats.images.oiio_reader import read_orientation
+from iibr_core.formats.images.decode import read_orientation
 from iibr_core.formats.images.picture_source import PicturePart, PictureSource, source_size
 from iibr_core.formats.images.small_picture import small_picture
 from iibr_core.types import ImageSize
 
 TAG = re.compile(r"(?:[_.-]|^)rgbd$", re.IGNORECASE)
-"""At the end of a file's name: it holds both, in whatever order."""
-LEAST_ASPECT = 1.9
-"""Pictures whose sides differ by less hold no two that are looked for without such a name."""
-LOOKED_AT_PX = 192
-GREY_TOLERANCE, MOST_COLORED = 12, 0.01
-"""A map's channels differ by no more than this of 255, but for this share of its pixels."""
-LEAST_COLORED = 0.15
-"""At least this share of a photo's pixels is coloured, where its map lies beside it."""
+"""Ending of a file's name that states a picture and its map, in any order."""
+MIN_ASPECT = 1.9
+"""Smallest ratio of the sides of a picture that holds two without stating it in its name."""
+COMPARED_PX = 192
+"""Longest side of the picture whose halves are compared."""
+GREY_TOLERANCE, MAX_COLORED_SHARE = 12, 0.01
+"""Largest difference of a map's channels, of 255, and the largest share of its pixels that exceed it."""
+MIN_COLORED_SHARE = 0.15
+"""Smallest share of coloured pixels in a photo whose map lies beside it."""
 
 Half = Literal["first", "second"]
 
 
 def rgbd_parts(path: Path) -> tuple[PictureSource, PictureSource] | None:
-    """The picture and its map, which are halves of one file; None where a file is no such pair.
+    """Return the picture and its map, which are halves of one file; None for other files.
 
-    A file is one if its name says so or its sides differ by a factor of 2 or so, one half is grey and the other is not.
-    Raises InputError where it cannot be read.
+    One half must be grey and the other one coloured. The file's name must state the pair, or its sides differ by a
+    factor of about 2. Raises InputError where the file cannot be read.
     """
     status = status_of(path)
     return None if status is None else _parts(path, status.st_mtime_ns, status.st_size)
@@ -44,26 +45,26 @@ def _parts(path: Path, modified_ns: int, size_bytes: int) -> tuple[PictureSource
     size = source_size(PictureSource(path))
     size = ImageSize(size.width, size.height) if read_orientation(path) >= 5 else size
     is_named = TAG.search(path.stem) is not None
-    if min(size) < 2 or not (is_named or max(size) >= LEAST_ASPECT * min(size)):
+    if min(size) < 2 or not (is_named or max(size) >= MIN_ASPECT * min(size)):
         return None
-    pixels = small_picture(path, LOOKED_AT_PX)
-    # A named one may have any shape: the longer side is tried first.
+    pixels = small_picture(path, COMPARED_PX)
+    # A pair with such a name may have any shape: the longer side is tried first.
     axes = (0, 1) if size.height > size.width else (1, 0)
     for axis in axes if is_named else axes[:1]:
-        grey = None if pixels is None else _grey_half(pixels, axis, 0.0 if is_named else LEAST_COLORED)
+        grey = None if pixels is None else _grey_half(pixels, axis, 0.0 if is_named else MIN_COLORED_SHARE)
         if grey is not None:
             return _halves(path, size, axis, grey)
     return None
 
 
-def _grey_half(pixels: NDArray[np.uint8], axis: int, least_colored: float) -> Half | None:
-    """The half along an axis that is a map; None unless one is grey and of the other at least this share coloured."""
+def _grey_half(pixels: NDArray[np.uint8], axis: int, min_colored: float) -> Half | None:
+    """Return the grey half along an axis; None unless at least `min_colored` of the other half is coloured."""
     middle = pixels.shape[axis] // 2
     apart = np.ptp(pixels.astype(np.int16), axis=2) > GREY_TOLERANCE
     first, second = (float(part.mean()) for part in np.split(apart, (middle,), axis=axis))
-    if second <= MOST_COLORED and first >= least_colored:
+    if second <= MAX_COLORED_SHARE and first >= min_colored:
         return "second"
-    return "first" if first <= MOST_COLORED and second >= least_colored else None
+    return "first" if first <= MAX_COLORED_SHARE and second >= min_colored else None
 
 
 def _halves(path: Path, size: ImageSize, axis: int, grey: Half) -> tuple[PictureSource, PictureSource]:

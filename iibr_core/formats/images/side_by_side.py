@@ -1,6 +1,6 @@
 """Two pictures, for the left and the right eye, in one: cut apart where the file's name or header states it.
 
-Names may be wrong, so the halves are compared, unless the name leaves no doubt.
+Names may be wrong, so the halves are compared.
 """
 
 from __future__ import annotations
@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 
 from iibr_core.formats.files import status_of
 from iibr_core.formats.images.alike_halves import is_one_scene
+from iibr_core.formats.images.decode import read_orientation
 from iibr_core.formats.images.file_kinds import raw_kind
 from iibr_core.formats.images.jps import Arrangement, read_jps_descriptor
 from iibr_core.formats.images.lfp import open_lfp
-from iibr_core.formats.images.oiio_reader import read_orientation
 from iibr_core.formats.images.picture_source import PicturePart, PictureSource, source_size
 from iibr_core.formats.images.rgbd import rgbd_parts
 from iibr_core.formats.images.small_picture import small_decoded_picture
@@ -197,3 +197,11 @@ def require_developed(path: Path) -> None:
             f"{path}: is a raw light field (Lytro), which must be decoded first: PlenoptiCam or the Light Field Toolbox"
             " make views of it, and their folder opens here"
         )
+
+
+def photo_size(path: Path) -> ImageSize:
+    """Return the size of a file's photo from its header, as stored, before it is upright.
+
+    Raises InputError as `own_picture` does.
+    """
+    return source_size(own_picture(path))

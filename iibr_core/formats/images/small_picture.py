@@ -1,4 +1,4 @@
-"""Small copies of pictures, to see what is in them before they are read."""
+"""Small copies of pictures, for decisions about their content before they are read."""
 
 from __future__ import annotations
 
@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from iibr_core.color import bytes_from_encoded
-from iibr_core.formats.images.oiio_reader import full_scale, read_orientation, upright
-from iibr_core.formats.images.picture_source import PictureSource, read_source
+from iibr_core.formats.images.decode import decode, read_orientation
+from iibr_core.formats.images.picture import full_scale, upright
+from iibr_core.formats.images.pillow_reader import DECODE_ERRORS
 
 DEEP_MODES = ("I", "F")
 """Modes of Pillow whose values it does not bring to 8 bits."""
@@ -22,7 +23,7 @@ def small_picture(path: Path, longest_px: int, is_smoothed: bool = False) -> NDA
 
     is_smoothed: each pixel is the mean of those it covers, else one of them.
     """
-    with suppress(OSError, ValueError, SyntaxError, Image.DecompressionBombError), Image.open(path) as picture:
+    with suppress(*DECODE_ERRORS), Image.open(path) as picture:
         picture.draft("RGB", (2 * longest_px, 2 * longest_px))
         if picture.mode.startswith(DEEP_MODES):
             return None
@@ -36,17 +37,17 @@ def small_picture(path: Path, longest_px: int, is_smoothed: bool = False) -> NDA
 def small_decoded_picture(path: Path, longest_px: int) -> NDArray[np.uint8]:
     """Return the same, smoothed, of any picture that can be read, which may take as long as that.
 
-    Raises InputError as `read_source` does.
+    Raises InputError as `decode` does.
     """
     if (found := small_picture(path, longest_px, is_smoothed=True)) is not None:
         return found
-    raster = read_source(PictureSource(path))
-    step = max(max(raster.size) // (4 * longest_px), 1)
-    colors = raster.pixels[::step, ::step].astype(np.float32) / np.float32(full_scale(raster.pixels.dtype))
+    whole = decode(path)
+    step = max(max(whole.size) // (4 * longest_px), 1)
+    colors = whole.pixels[::step, ::step].astype(np.float32) / np.float32(full_scale(whole.pixels.dtype))
     encoded = bytes_from_encoded(np.nan_to_num(colors))
     picture = Image.fromarray(np.broadcast_to(encoded, (*encoded.shape[:2], 3)).copy())
     small = np.asarray(_resize(picture, longest_px, is_smoothed=True))
-    return upright(small, raster.spec.get_int_attribute("Orientation", 1))
+    return upright(small, whole.orientation)
 
 
 def _resize(picture: Image.Image, longest_px: int, is_smoothed: bool) -> Image.Image:

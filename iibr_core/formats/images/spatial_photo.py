@@ -1,7 +1,7 @@
-"""Spatial photos: HEIC files of two pictures, for the left and the right eye, as headsets show them in depth.
+"""Writes spatial photos: HEIC files of a left and a right picture, which headsets show in depth.
 
-pillow-heif encodes the pictures; what makes two of them a pair, a `ster` group and the cameras of both (ISO/IEC
-23008-12, amendment 2 of 2024), is put into the file's boxes here.
+pillow-heif encodes the pictures. This module adds the boxes that make them a pair: a `ster` group and the cameras of
+both (ISO/IEC 23008-12, amendment 2 of 2024).
 """
 
 from __future__ import annotations
@@ -24,20 +24,26 @@ INTRINSICS = UUID("22cc04c7-d6d9-4e07-9d90-4eb6ecbaf3a3").bytes
 EXTRINSICS = UUID("4363e914-5b7d-4aab-97ae-bea69803b434").bytes
 ADJUSTMENT = UUID("de225085-36cb-4365-8743-2f875e7c788a").bytes
 SHIFT = 30
-"""Intrinsics are integers of so many binary places."""
+"""Number of binary places of the intrinsics, which are integers."""
 DISPARITY_ADJUSTMENT = 293
-"""By so many ten-thousandths of the width the eyes' pictures are moved apart where they are shown."""
+"""Distance by which the pictures are moved apart where they are shown, in ten-thousandths of the width."""
 EYES_APART_UM = 63_000
 
 
 def write_spatial_photo(path: Path, left: NDArray[np.uint8], right: NDArray[np.uint8], focal_px: float) -> None:
-    """Write two pictures (H, W, 3), sRGB-encoded, whole or not at all. focal_px: of both.
+    """Write two sRGB-encoded pictures (H, W, 3), whole or not at all. focal_px: focal length of both, in pixels.
 
-    Raises InputError where it cannot be written, ValueError where they differ in size.
+    Raises InputError where the pictures differ in size, or the file cannot be written.
     """
     if left.shape != right.shape:
-        raise ValueError(f"the left picture is {left.shape}, the right one {right.shape}")
-    stored = _with_pair(_encode(path, left, right), focal_px / left.shape[1])
+        raise InputError(f"{path}: the left picture is {left.shape}, the right one {right.shape}; give one size")
+    try:
+        stored = _with_pair(_encode(path, left, right), focal_px / left.shape[1])
+    except (ValueError, KeyError, IndexError, struct.error) as error:
+        if isinstance(error, InputError):
+            raise
+        reason = reason_of(error)
+        raise InputError(f"{path}: cannot be written as a spatial photo ({reason}); update pillow-heif") from error
     with write_file(path) as temporary:
         temporary.write_bytes(stored)
 
@@ -57,7 +63,7 @@ def _encode(path: Path, left: NDArray[np.uint8], right: NDArray[np.uint8]) -> by
 
 
 def _with_pair(file: bytes, focal: float) -> bytes:
-    """With the pair's boxes. focal: focal length as a share of the width."""
+    """Return a HEIC file with the boxes of a pair. focal: focal length as a share of the width."""
     top = dict(boxes(file))
     meta = dict(boxes(top[b"meta"][4:]))
     iprp = dict(boxes(meta[b"iprp"]))
@@ -70,8 +76,8 @@ def _with_pair(file: bytes, focal: float) -> bytes:
         _extrinsics(EYES_APART_UM),
         _uuid(ADJUSTMENT, 0, DISPARITY_ADJUSTMENT),
     ]
-    own = {left: (1, 2, 4), right: (1, 3, 4)}
-    entries = [(item, [*held, *(known + i for i in own[item])]) for item, held in _associations(iprp[b"ipma"])]
+    added = {left: (1, 2, 4), right: (1, 3, 4)}
+    entries = [(item, [*held, *(known + i for i in added[item])]) for item, held in _associations(iprp[b"ipma"])]
     iprp[b"ipco"] += b"".join(new)
     iprp[b"ipma"] = _ipma(entries)
     meta[b"iprp"] = b"".join(box(kind, content) for kind, content in iprp.items())
@@ -92,21 +98,21 @@ def _uuid(kind: bytes, flags: int, *numbers: int) -> bytes:
 
 
 def _intrinsics(focal: float) -> bytes:
-    """Focal length and principal point as shares of the picture, its middle."""
+    """Return a box of focal length and principal point, the middle, as shares of the picture."""
     most = (1 << 31) - 1
     return _uuid(INTRINSICS, SHIFT << 8, min(round(focal * (1 << SHIFT)), most), 1 << (SHIFT - 1), 1 << (SHIFT - 1))
 
 
 def _extrinsics(x_um: int | None) -> bytes:
-    """The left camera is where it is; the right one stands beside it."""
+    """Return a box of a camera's place: the left one is the origin, None, the right one stands beside it."""
     return _uuid(EXTRINSICS, 0) if x_um is None else _uuid(EXTRINSICS, 1, x_um)
 
 
 def _associations(ipma: bytes) -> list[tuple[int, list[int]]]:
-    """The properties of each item, as pillow-heif writes them: version 0, a byte each."""
+    """Return the properties of each item, as pillow-heif writes them: version 0, a byte each."""
     flags, count = struct.unpack_from(">II", ipma)
     if flags:
-        raise ValueError(f"ipma of version and flags {flags:#x} is not what libheif wrote so far")
+        raise ValueError(f"ipma of version and flags {flags:#x} is unknown")
     entries, at = [], 8
     for _ in range(count):
         item, held = struct.unpack_from(">HB", ipma, at)
@@ -121,10 +127,13 @@ def _ipma(entries: list[tuple[int, list[int]]]) -> bytes:
 
 
 def _moved_iloc(iloc: bytes, moved: int) -> bytes:
-    """Where items lie in the file, as pillow-heif writes it: version 0, sizes of 4 bytes, absolute base offsets."""
+    """Return the places of items in the file moved by `moved` bytes.
+
+    pillow-heif writes version 0, sizes of 4 bytes, absolute base offsets.
+    """
     flags, sizes, count = struct.unpack_from(">IHH", iloc)
     if (flags, sizes) != (0, 0x4440):
-        raise ValueError(f"iloc of version {flags >> 24} with sizes {sizes:#x} is not what libheif wrote so far")
+        raise ValueError(f"iloc of version {flags >> 24} with sizes {sizes:#x} is unknown")
     stored, at = bytearray(iloc), 8
     for _ in range(count):
         base, extents = struct.unpack_from(">IH", stored, at + 4)

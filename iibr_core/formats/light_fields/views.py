@@ -1,4 +1,4 @@
-"""The pixels of a light field on disk whose views fill a grid, in the order in which they are looked at."""
+"""Read the views of a light field on disk whose views fill a grid, the centre first."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ import math
 from collections.abc import Iterator
 
 from iibr_core.color import stored_from_encoded
-from iibr_core.formats.images.oiio_reader import Raster
 from iibr_core.formats.images.photo import encoded_colors
+from iibr_core.formats.images.picture import Picture
 from iibr_core.formats.images.picture_source import PictureSource, part_of, read_source
 from iibr_core.formats.light_fields.multi_view_scene import GridIndex, MultiView, common_size
 from iibr_core.formats.maps.disparity_file import read_disparity
@@ -15,7 +15,7 @@ from iibr_core.types import FloatImage, GridShape, ImageSize, InputError, Stored
 
 
 def grid_of(scene: MultiView) -> GridShape:
-    """The grid that the views fill. Raises InputError where they fill none, telling what reads such a scene."""
+    """Return the grid that the views fill. Raises InputError if they fill none."""
     if scene.grid is None:
         raise InputError(
             f"{scene.place}: the views ({scene.layout}) fill no regular grid,"
@@ -25,28 +25,25 @@ def grid_of(scene: MultiView) -> GridShape:
 
 
 def read_views(scene: MultiView) -> tuple[ImageSize, Iterator[ViewUpdate]]:
-    """The size of the views, and the views: the centre first, then the nearest to it.
+    """Return the size of the views, and an iterator that reads them: the centre first, then the nearest to it.
 
-    Raises InputError, naming the file, where a view is unreadable or of another size (sizes are checked before
-    anything is yielded), and as `grid_of` does.
+    Raises InputError, with the file's name, for an unreadable view; for views of several sizes before any is read.
     """
     grid, size = grid_of(scene), common_size(scene.views)
     return size, _iterate_views(scene, grid, size)
 
 
 def read_stored_view(scene: MultiView, row: int, column: int) -> StoredColors:
-    """Colours (H, W, 3) of one view, read alone. Raises InputError as `read_views` does, or for a bad row or column."""
+    """Return the colours (H, W, 3) of one view. Raises InputError for a bad row or column."""
     grid = grid_of(scene)
     if not (0 <= row < grid.rows and 0 <= column < grid.columns):
         raise InputError(f"{scene.place}: has {grid.rows}x{grid.columns} views, none in row {row}, column {column}")
-    index = _indices(scene)[row, column]
-    return next(_read_colors(scene, [index]))
+    return next(_read_colors(scene, [_indices(scene)[row, column]]))
 
 
 def disparity_range(scene: MultiView) -> tuple[float, float] | None:
-    """Least and greatest disparity (px per step of the grid): stated, else of the map nearest to the centre view.
-
-    None where nothing is known. Raises InputError where the map cannot be read.
+    """Return the least and greatest disparity (px per step of the grid), as stated or of the map nearest to the centre;
+    None if neither is known.
     """
     grid, indices = grid_of(scene), _indices(scene)
     if scene.range_px is not None:
@@ -60,7 +57,10 @@ def disparity_range(scene: MultiView) -> tuple[float, float] | None:
 
 
 def step_length(scene: MultiView) -> float:
-    """View steps of the scene from one column of its grid to the next; from row to row where it has one column."""
+    """Return the view steps of the scene between neighbouring columns of its grid; between rows if it has one column.
+
+    It exceeds 1 where views were left out, as every second column.
+    """
     grid = grid_of(scene)
     last = (0, grid.columns - 1) if grid.columns > 1 else (grid.rows - 1, 0)
     if last == (0, 0):
@@ -75,7 +75,6 @@ def _nearest_to_centre(grid: GridShape) -> list[GridIndex]:
 
 
 def _indices(scene: MultiView) -> dict[GridIndex, int]:
-    """Where the view of each place is among the scene's views."""
     return {view.place: index for index, view in enumerate(scene.views) if view.place is not None}
 
 
@@ -91,18 +90,18 @@ def _iterate_views(scene: MultiView, grid: GridShape, size: ImageSize) -> Iterat
 
 
 def _read_colors(scene: MultiView, indices: list[int]) -> Iterator[StoredColors]:
-    """Colours (H, W, 3) of views. A picture that several of them are parts of is decoded once and kept meanwhile."""
-    decoded: tuple[PictureSource, Raster] | None = None
+    """Yield the colours (H, W, 3) of views; a picture that holds several of them is decoded once."""
+    decoded: tuple[PictureSource, Picture] | None = None
     for index in indices:
         source = scene.views[index].picture
         if decoded is None or decoded[0] != source.whole:
-            decoded = None  # two may be large
+            decoded = None  # frees the last picture before the next is decoded
             decoded = source.whole, read_source(source.whole)
-        raster = decoded[1] if source == source.whole else part_of(decoded[1], source)
-        yield stored_from_encoded(encoded_colors(raster), scene.is_hdr)
+        picture = decoded[1] if source == source.whole else part_of(decoded[1], source)
+        yield stored_from_encoded(encoded_colors(picture), scene.is_hdr)
 
 
 def _read_map(scene: MultiView, index: int, size: ImageSize) -> FloatImage:
-    """Disparity (H, W) of a view, px per step of the grid."""
+    """Return the disparity (H, W) of a view in px per step of the grid."""
     known = scene.disparity[index]
     return read_disparity(known.path, size, known.scale * step_length(scene)).values

@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.formats.files import MAX_FILE_PIXELS, require_file
-from iibr_core.formats.images.oiio_reader import Raster, full_scale, text_attribute, upright
+from iibr_core.formats.images.decode import read_text
+from iibr_core.formats.images.picture import Picture, full_scale, upright
 from iibr_core.formats.images.picture_source import PictureSource, read_source, source_size
 from iibr_core.formats.maps.color_maps import values_of_colors
 from iibr_core.formats.maps.map_text import KEY, MapText, text_from
@@ -57,7 +58,7 @@ def read_map(path: Path) -> FloatImage:
 
     Floating-point files are taken as they are; in files of integers the value is the stored integer and 0 is unknown,
     as in KITTI and Middlebury, unless the file was written with its own scale. Where a picture has alpha, 0 means
-    unknown too. Raises InputError for colour pictures and as `read_raster` and `read_pfm` do.
+    unknown too. Raises InputError for colour pictures and as `decode` and `read_pfm` do.
     """
     found = read_map_file(path)
     if found.is_zero is None or found.text is not None:
@@ -79,8 +80,8 @@ def read_map_file(path: Path) -> MapFile:
 
 def read_map_picture(source: PictureSource) -> MapFile:
     """A map that is a picture of a file, or a part of one. Raises InputError as `read_map` does."""
-    raster = read_source(source)
-    return _in_its_own_units(_of_picture(source.path, raster), text_from(text_attribute(raster.spec, KEY)))
+    found = _of_picture(source.path, read_source(source))
+    return _in_its_own_units(found, text_from(read_text(source.path, KEY)))
 
 
 def read_map_header(path: Path) -> MapHeader:
@@ -96,11 +97,11 @@ def read_map_header(path: Path) -> MapHeader:
     return MapHeader(source_size(source), 0)
 
 
-def _of_picture(path: Path, raster: Raster) -> MapFile:
-    turns = raster.spec.get_int_attribute("Orientation", 1)
+def _of_picture(path: Path, picture: Picture) -> MapFile:
+    turns = picture.orientation
     notes = (f"{path.name} was turned upright, as its Exif says.",) if turns > 1 else ()
-    pixels = upright(raster.pixels, turns)
-    unknown = None if raster.alpha is None else upright(raster.alpha, turns) == 0
+    pixels = upright(picture.pixels, turns)
+    unknown = None if picture.alpha is None else upright(picture.alpha, turns) == 0
     grey = _grey(pixels)
     if grey is None:
         return _of_colors(path, pixels, unknown, notes)

@@ -7,7 +7,7 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
-from iibr_core.formats.images.oiio_writer import write_image_file
+from iibr_core.formats.images.write import write_image_file
 from iibr_core.formats.maps.map_text import KEY, MapText, text_of
 from iibr_core.formats.maps.pfm import write_pfm
 from iibr_core.formats.outputs import write_file

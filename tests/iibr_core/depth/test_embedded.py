@@ -16,8 +16,8 @@ from iibr_core.depth.embedded.images import MAX_MAP_PIXELS, decode_map
 from iibr_core.depth.embedded.xmp import jpeg_layout
 from iibr_core.depth.estimates import MetricDepth, RelativeInverseDepth
 from iibr_core.depth.search import open_with_depth
+from iibr_core.formats.images.metadata import MAX_ELEMENTS, parse_packet
 from iibr_core.formats.images.photo import read_photo
-from iibr_core.formats.images.xmp_packet import MAX_ELEMENTS, parse_packet
 from iibr_core.types import ImageSize, InputError
 from tests.iibr_core import embedded_files as files
 

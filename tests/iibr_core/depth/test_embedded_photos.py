@@ -13,9 +13,9 @@ from PIL.PngImagePlugin import PngInfo
 from iibr_core.depth.embedded.embedded_depth import embedded_in_jpeg, read_embedded
 from iibr_core.depth.embedded.unread import unread_parts
 from iibr_core.depth.search import PhotoWithDepth, open_with_depth
-from iibr_core.formats.images.header import read_photo_header
 from iibr_core.formats.images.lfp import open_lfp, read_lfp
 from iibr_core.formats.images.photo import read_photo
+from iibr_core.formats.images.side_by_side import photo_size
 from iibr_core.types import InputError
 from tests.iibr_core import embedded_files as files
 
@@ -186,7 +186,7 @@ def test_a_processed_lytro_file_opens_with_its_depth(tmp_path: Path, name: str, 
     found = opened(tmp_path, name, stack(is_illum))
     assert found.origin.line == "Depth: the photo itself (Lytro)."
     assert found.disparity.values[60, 60] > found.disparity.values[4, 10]
-    assert read_photo_header(tmp_path / name).size == (96, 128)
+    assert photo_size(tmp_path / name) == (96, 128)
     np.testing.assert_allclose(read_photo(tmp_path / name).pixels * 255, PIXELS, atol=1)
 
 

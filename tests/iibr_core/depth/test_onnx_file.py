@@ -19,7 +19,7 @@ from iibr_core.depth.estimators.estimate_depth import estimate_with
 from iibr_core.depth.estimators.onnx_file import depth_output
 from iibr_core.depth.estimators.onnx_models import USUAL_PREPARATION
 from iibr_core.depth.search import open_with_depth
-from iibr_core.formats.images.photo import write_image
+from iibr_core.formats.images.write import write_image
 from iibr_core.types import FloatImage, ImageSize, InputError, Photo
 from tests.iibr_core.depth.onnx_graphs import of_channels, weighing
 

@@ -28,7 +28,7 @@ from iibr_core.depth.estimators.estimate_depth import estimate_with
 from iibr_core.depth.estimators.onnx_models import USUAL_PREPARATION, OnnxInput, run_onnx
 from iibr_core.depth.estimators.preparation import network_input
 from iibr_core.depth.search import open_with_depth
-from iibr_core.formats.images.photo import write_image
+from iibr_core.formats.images.write import write_image
 from iibr_core.runtime.tiling import Cancelled, never
 from iibr_core.types import FloatImage, ImageSize, InputError, Photo, ignore_progress
 from tests.iibr_core.depth.onnx_graphs import of_channels, published, weighing

@@ -192,7 +192,7 @@ def test_a_model_is_used_and_named(tmp_path: Path) -> None:
 )
 def test_depth_is_turned_with_the_photo(orientation: int, is_turned_already: bool, tmp_path: Path) -> None:
     """Some writers turn the map already; that shows in its shape only where the sides are swapped."""
-    from iibr_core.formats.images.oiio_reader import upright
+    from iibr_core.formats.images.picture import upright
 
     depth = np.full(SIZE, 200, np.uint8)
     depth[:10, :14] = 20

@@ -27,7 +27,7 @@ from iibr_core.depth.estimators.known_models import FAMILIES
 from iibr_core.depth.estimators.preparation import Preparation, input_size
 from iibr_core.depth.estimators.transformers_models import FAMILY, KINDS
 from iibr_core.depth.search import estimator_of, open_with_depth
-from iibr_core.formats.images.photo import write_image
+from iibr_core.formats.images.write import write_image
 from iibr_core.runtime.tiling import Cancelled
 from iibr_core.types import ImageSize, InputError, Photo
 from tests.iibr_core.depth.random_networks import depth_anything_network, with_random_weights

@@ -15,8 +15,8 @@ from iibr_core.evaluation.datasets import (
     undo_rotation,
 )
 from iibr_core.evaluation.evaluate_scene import Options, evaluate
-from iibr_core.formats.images.photo import write_image
 from iibr_core.formats.images.picture_source import PictureSource
+from iibr_core.formats.images.write import write_image
 from iibr_core.formats.light_fields.multi_view_scene import KnownView, MultiView, nearest_view
 from iibr_core.types import InputError, ViewOffset
 from tests.iibr_core.known_scenes import (
@@ -171,7 +171,7 @@ def spoil(folder: Path, row: int, column: int, value: float) -> None:
 
 
 GRID_DAMAGE: list[tuple[Damage, str]] = [
-    (lambda f: (f / "views/v01_u02.png").unlink(), "row 1, column 2"),
+    (lambda f: (f / "views/v01_u02.png").unlink(), r"v01_u02\.png: this view is missing"),
     (lambda f: (f / "views/v01_u02.png").rename(f / "views/v01_u03.png"), "missing"),
     (lambda f: write_image(f / "views/v02_u02.png", np.zeros((5, 5, 3), np.float32)), "v02_u02.png"),
     (lambda f: (f / "views/v02_u02.png").write_bytes(b"\x89PNG\r\n\x1a\n"), "v02_u02.png"),

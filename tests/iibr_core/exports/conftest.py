@@ -1,4 +1,4 @@
-"""A small scene that is open, and every kind of export of it."""
+"""A small open scene, and a function that exports it."""
 
 from __future__ import annotations
 
@@ -9,10 +9,8 @@ from typing import Any
 
 import pytest
 
-from iibr_core.exports.kinds import export_kind
-from iibr_core.exports.options import ExportOptions
-from iibr_core.exports.source import ExportSource
-from iibr_core.exports.writers import export_path, writer_of
+from iibr_core.exports.kinds import ExportOptions, export_kind, export_path
+from iibr_core.exports.source import ExportSource, write_export
 from iibr_core.scenes.lens_limits import LensChoice
 from iibr_core.scenes.scene import Source
 from iibr_core.types import GridShape, InputError
@@ -33,14 +31,14 @@ def opened(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ExportSource]:
 
 @pytest.fixture
 def source(opened: ExportSource) -> ExportSource:
-    """The scene as it was opened: 3x3 views of 96x64, a near square before a far wall."""
+    """The opened scene: 3x3 views of 96x64, a near square before a far wall."""
     return replace(opened, centre=None)
 
 
 def exported(source: ExportSource, kind: str, path: Path, optics: dict[str, Any] | None = None, **options: Any) -> Path:
-    """Where it was written to."""
+    """Write an export; return its path."""
     source = replace(source, optics=replace(source.optics, **optics or {}))
-    asked = ExportOptions(**options)
-    target = export_path(export_kind(kind), path, source.scene, asked)
-    writer_of(export_kind(kind))(target, source, asked)
+    chosen = ExportOptions(**options)
+    target = export_path(export_kind(kind), path, source.scene, chosen)
+    write_export(export_kind(kind), target, source, chosen)
     return target

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import resource
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -13,10 +12,8 @@ import pytest
 from PIL import Image, ImageSequence
 
 from iibr_core.exports.animation import optics_on_path
-from iibr_core.exports.kinds import EXPORTS
-from iibr_core.exports.options import ANIMATIONS, ExportOptions
+from iibr_core.exports.kinds import ANIMATIONS, EXPORTS, ExportOptions, with_defaults
 from iibr_core.exports.render_settings import RenderSettings
-from iibr_core.exports.settings import resolve_settings
 from iibr_core.exports.source import ExportSource
 from iibr_core.formats.animations import write_animation
 from iibr_core.rendering.optics import Optics
@@ -30,7 +27,7 @@ COUNT = 6
 
 
 def path_of(source: ExportSource, **options: Any) -> list[Optics]:
-    settings = resolve_settings(EXPORTS["gif"], ExportOptions(**options), source.scene, source.optics)
+    settings = with_defaults(EXPORTS["gif"], ExportOptions(**options), source.scene, source.optics)
     return optics_on_path(source.scene, source.optics, settings)
 
 
@@ -61,13 +58,11 @@ def test_videos_show_what_the_renderer_shows(source: ExportSource, tmp_path: Pat
         assert np.abs(means[0] - means[1]).mean() < 4
 
 
-@pytest.mark.parametrize(
-    ("kind", "ending", "tolerance"), [("gif", "gif", 12), ("webp", "webp", 10), ("apng", "png", 0)]
-)
+@pytest.mark.parametrize(("kind", "tolerance"), [("gif", 12), ("webp", 10)])
 def test_animated_images_show_what_the_renderer_shows(
-    source: ExportSource, tmp_path: Path, kind: str, ending: str, tolerance: float
+    source: ExportSource, tmp_path: Path, kind: str, tolerance: float
 ) -> None:
-    out = exported(source, kind, tmp_path / f"a.{ending}", frames=COUNT, rate=8.0)
+    out = exported(source, kind, tmp_path / f"a.{kind}", frames=COUNT, rate=8.0)
     with Image.open(out) as image:
         assert image.info["loop"] == 0
         frames = [(np.asarray(frame.convert("RGB")).astype(int), frame.info["duration"]) for frame in _frames(image)]
@@ -79,7 +74,7 @@ def test_animated_images_show_what_the_renderer_shows(
 
 def _frames(image: Image.Image) -> Iterator[Image.Image]:
     for frame in ImageSequence.Iterator(image):
-        frame.load()  # tells its duration
+        frame.load()  # reads its duration
         yield frame
 
 
@@ -93,7 +88,7 @@ def test_paths_are_closed_and_move(source: ExportSource, motion: str) -> None:
     assert all(0 <= optics.aperture_diameter <= aperture_limit(source.scene.grid) for optics in path)
 
 
-def test_a_path_of_ones_own_goes_through_its_keys(source: ExportSource, tmp_path: Path) -> None:
+def test_a_path_goes_through_its_keys(source: ExportSource, tmp_path: Path) -> None:
     keys = tmp_path / "keys.txt"
     keys.write_text("\ufeff# s t focus aperture\n-1 0 0.5 1\n1, 0.5, -0.1, 2\n\n0 -1\n", "utf-8")
     path = path_of(replace(source, optics=replace(source.optics, aperture_diameter=1.5)), keys=keys, frames=6)
@@ -107,11 +102,11 @@ def test_between_keys_the_path_is_the_spline_of_catmull_and_rom(source: ExportSo
     keys = np.array([(-0.5, 0, 0.5, 1), (0.3, 0.5, -0.1, 2), (0.6, -0.4, 0.2, 1.5), (-0.2, -0.6, 0, 1)])
     (tmp_path / "keys.txt").write_text("\n".join(" ".join(map(str, key)) for key in keys))
     path = path_of(source, keys=tmp_path / "keys.txt", frames=400)
-    found = np.array([(o.eye.s, o.eye.t, o.focus_disparity, o.aperture_diameter) for o in path])
+    drawn = np.array([(o.eye.s, o.eye.t, o.focus_disparity, o.aperture_diameter) for o in path])
     for k in range(4):
         before, here, after, last = (keys[(k + i) % 4] for i in (-1, 0, 1, 2))
-        np.testing.assert_allclose(found[100 * k + 50], (-before + 9 * here + 9 * after - last) / 16, atol=1e-9)
-        slope = 100 * (found[100 * k + 1] - found[100 * k - 1]) / 2
+        np.testing.assert_allclose(drawn[100 * k + 50], (-before + 9 * here + 9 * after - last) / 16, atol=1e-9)
+        slope = 100 * (drawn[100 * k + 1] - drawn[100 * k - 1]) / 2
         np.testing.assert_allclose(slope, (after - before) / 2, rtol=0.02)
 
 
@@ -135,7 +130,7 @@ def test_what_ends_early_leaves_nothing(tmp_path: Path) -> None:
         yield np.zeros((4, 6, 3), np.uint8)
         raise InputError("enough")
 
-    for name in ("a.mp4", "a.gif", "a.webp", "a.png"):
+    for name in ("a.mp4", "a.gif", "a.webp"):
         with pytest.raises(InputError, match="enough"):
             write_animation(tmp_path / name, frames(), ImageSize(4, 6), 10.0)
     with pytest.raises(InputError, match="no frames"):
@@ -152,19 +147,3 @@ def test_a_rate_is_kept_on_the_whole_where_no_frame_can_last_so_long(tmp_path: P
         durations = [frame.info["duration"] for frame in ImageSequence.Iterator(image)]
     assert sum(durations) == 1000
     assert set(durations) == {30, 40}
-
-
-@pytest.mark.parametrize("kind", ["mp4", "webm", "gif", "apng"])
-def test_a_disk_that_is_full_leaves_nothing(kind: str, tmp_path: Path) -> None:
-    """Room for 4 kB: it is full while frames are still written, or at the end."""
-    noise = np.random.default_rng(0).integers(0, 256, (12, 96, 128, 3), np.uint8)
-    path = tmp_path / f"new.{'png' if kind == 'apng' else kind}"
-    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (4096, hard))
-    try:
-        with pytest.raises(InputError, match="File too large") as refused:
-            write_animation(path, noise, ImageSize(96, 128), 30.0)
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
-    assert ".iibr" not in str(refused.value)
-    assert list(tmp_path.iterdir()) == []

@@ -3,21 +3,17 @@
 from __future__ import annotations
 
 import json
-import socketserver
 import threading
 from collections.abc import Iterator
-from contextlib import suppress
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from iibr_core.exports import looking_glass
-from iibr_core.exports.kinds import EXPORTS
-from iibr_core.exports.options import ExportOptions
-from iibr_core.exports.source import ExportSource
-from iibr_core.exports.writers import writer_of
+from iibr_core.exports import quilt
+from iibr_core.exports.kinds import EXPORTS, ExportOptions
+from iibr_core.exports.source import ExportSource, write_export
 from iibr_core.types import InputError
 from tests.iibr_core.exports.conftest import exported
 
@@ -27,16 +23,16 @@ SHOWING = ["show_window", "delete_playlist", "instance_playlist", "insert_playli
 
 
 class FakeBridge(ThreadingHTTPServer):
-    """displays: that are connected. unknown: endpoints answered with nothing, failing: with a failure."""
+    """A Bridge with connected displays. failing: endpoints that fail; raw: answers in bytes by endpoint."""
 
     daemon_threads = True
 
     def __init__(self) -> None:
         super().__init__(("localhost", 0), Handler)
         self.displays: list[dict[str, Any]] = [MONITOR, PORTRAIT]
-        self.unknown: set[str] = set()
+        self.raw: dict[str, bytes] = {}
         self.failing: set[str] = {"delete_playlist"}  # there is none at first
-        self.asked: list[tuple[str, dict[str, Any]]] = []
+        self.requests: list[tuple[str, dict[str, Any]]] = []
 
 
 class Handler(BaseHTTPRequestHandler):
@@ -46,7 +42,7 @@ class Handler(BaseHTTPRequestHandler):
         assert self.headers["Content-Type"] == "application/json"
         endpoint = self.path.removeprefix("/")
         body = json.loads(self.rfile.read(int(self.headers["Content-Length"])))
-        self.server.asked.append((endpoint, body))
+        self.server.requests.append((endpoint, body))
         payload: Any = {"value": TOKEN}
         if endpoint == "available_output_devices":
             payload = {"value": {str(i): {"value": display} for i, display in enumerate(self.server.displays)}}
@@ -54,19 +50,19 @@ class Handler(BaseHTTPRequestHandler):
         answer = json.dumps({"name": endpoint, "payload": payload, "status": {"value": status}}).encode()
         self.send_response(200)
         self.end_headers()
-        self.wfile.write(b"" if endpoint in self.server.unknown else answer)
+        self.wfile.write(self.server.raw.get(endpoint, answer))
 
     def log_message(self, *_: Any) -> None:
-        """Say nothing."""
+        """Print nothing."""
 
 
 @pytest.fixture
 def bridge(monkeypatch: pytest.MonkeyPatch) -> Iterator[FakeBridge]:
-    monkeypatch.setenv("http_proxy", "http://localhost:1")  # what runs here is not asked through others
+    monkeypatch.setenv("http_proxy", "http://localhost:1")  # must not be used for this machine
     with FakeBridge() as server:
         thread = threading.Thread(target=server.serve_forever)
         thread.start()
-        monkeypatch.setattr(looking_glass, "ADDRESS", f"localhost:{server.server_port}")
+        monkeypatch.setattr(quilt, "ADDRESS", f"localhost:{server.server_port}")
         yield server
         server.shutdown()
         thread.join()
@@ -77,126 +73,66 @@ def test_a_quilt_is_shown(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     options = ExportOptions(show=True)
-    assert writer_of(EXPORTS["quilt"])(Path("a_qs8x6a1.5.png"), source, options) == "It is shown on the display."
+    assert write_export(EXPORTS["quilt"], Path("a_qs8x6a1.5.png"), source, options) == "It is shown on the display."
     (out,) = tmp_path.glob("a_qs8x6a*.png")
-    assert [endpoint for endpoint, _ in bridge.asked] == ["enter_orchestration", "available_output_devices", *SHOWING]
-    assert all(body["orchestration"] == TOKEN for _, body in bridge.asked[1:])
-    entry = dict(bridge.asked)["insert_playlist_entry"]
-    assert entry["uri"] == str(out), "its whole path: Bridge works elsewhere"
+    assert [endpoint for endpoint, _ in bridge.requests] == [
+        "enter_orchestration",
+        "available_output_devices",
+        *SHOWING,
+    ]
+    assert all(body["orchestration"] == TOKEN for _, body in bridge.requests[1:])
+    entry = dict(bridge.requests)["insert_playlist_entry"]
+    assert entry["uri"] == str(out), "an absolute path: Bridge has another working folder"
     assert (entry["cols"], entry["rows"], entry["view_count"], entry["aspect"]) == (8, 6, 48, 1.5)
-    assert dict(bridge.asked)["play_playlist"]["head_index"] == -1
+    assert dict(bridge.requests)["play_playlist"]["head_index"] == -1
 
 
 @pytest.mark.parametrize(
-    ("trouble", "says"),
+    ("trouble", "message"),
     [
-        ("nobody", "Looking Glass Bridge does not answer"),
+        ("nothing", "Looking Glass Bridge does not answer"),
         ("no display", "sees no display"),
         ("old", "enter_orchestration .no answer"),
         ("failing", "play_playlist .Failure"),
     ],
 )
-def test_what_goes_wrong_is_one_line(
-    bridge: FakeBridge, source: ExportSource, tmp_path: Path, trouble: str, says: str, monkeypatch: pytest.MonkeyPatch
+def test_failures_are_one_line(
+    bridge: FakeBridge,
+    source: ExportSource,
+    tmp_path: Path,
+    trouble: str,
+    message: str,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     match trouble:
-        case "nobody":
-            monkeypatch.setattr(looking_glass, "ADDRESS", "localhost:1")
+        case "nothing":
+            monkeypatch.setattr(quilt, "ADDRESS", "localhost:1")
         case "no display":
             bridge.displays = [MONITOR]
         case "old":
-            bridge.unknown = {"enter_orchestration"}
+            bridge.raw = {"enter_orchestration": b""}
         case "failing":
             bridge.failing = {"play_playlist"}
-    with pytest.raises(InputError, match=says) as error:
+    with pytest.raises(InputError, match=message) as error:
         exported(source, "quilt", tmp_path / "a.png", show=True)
     assert "\n" not in str(error.value)
-    assert bool(list(tmp_path.iterdir())) == (trouble == "failing"), "asked before anything is drawn"
-
-
-def _answer(body: bytes, status: bytes = b"200 OK") -> bytes:
-    return b"HTTP/1.1 " + status + b"\r\nContent-Length: %d\r\n\r\n" % len(body) + body
-
-
-def _said(payload: Any, status: Any = "Completion") -> bytes:
-    return _answer(json.dumps({"payload": {"value": payload}, "status": {"value": status}}).encode())
-
-
-DRIPS = b"drips"
-
-
-class RawServer(socketserver.ThreadingTCPServer):
-    """Answers every connection with the next of these bytes, the last one again and again."""
-
-    daemon_threads = allow_reuse_address = True
-    block_on_close = False
-
-    def __init__(self, answers: list[bytes]) -> None:
-        super().__init__(("localhost", 0), RawHandler)
-        self.answers, self.count = answers, 0
-        self.is_over = threading.Event()
-
-
-class RawHandler(socketserver.BaseRequestHandler):
-    server: RawServer
-
-    def handle(self) -> None:
-        answer = self.server.answers[min(self.server.count, len(self.server.answers) - 1)]
-        self.server.count += 1
-        with suppress(OSError):
-            asked = b""
-            while not asked.endswith(b"}"):  # what is left unread resets the connection
-                asked += self.request.recv(1 << 16)
-            if answer.startswith(DRIPS):
-                self.request.sendall(answer.removeprefix(DRIPS))
-                while not self.server.is_over.wait(0.01):
-                    self.request.sendall(b"x")
-            else:
-                self.request.sendall(answer)
+    assert bool(list(tmp_path.iterdir())) == (trouble == "failing"), "Bridge answers before anything is drawn"
 
 
 @pytest.mark.parametrize(
-    ("answers", "says"),
+    ("answer", "message"),
     [
-        pytest.param([b""], "Looking Glass Bridge does not answer", id="closed at once"),
-        pytest.param([b"\x00\xff garbage\r\n\r\n"], "Looking Glass Bridge does not answer", id="no HTTP"),
-        pytest.param([_answer(b"oh no", b"500 Oh no")], "HTTP status 500", id="500"),
-        pytest.param([_answer(b"<html>")], "Looking Glass Bridge does not answer", id="no JSON"),
-        pytest.param([_answer(b" " * (2 << 20))], "more than 1,048,576 bytes", id="huge"),
-        pytest.param([_answer(b"[" * 100_000)], "Looking Glass Bridge does not answer", id="deep"),
-        pytest.param([_answer(b"\xff\xfe\xfd")], "Looking Glass Bridge does not answer", id="no text"),
-        pytest.param([b"HTTP/1.1 200 OK\r\nContent-Length: 99\r\n\r\n{}"], "97 bytes are missing", id="cut off"),
-        pytest.param([DRIPS], "no whole answer within", id="drips"),
-        pytest.param([DRIPS + b"HTTP/1.1 200 OK\r\nA: "], "no whole answer within", id="drips a header"),
-        pytest.param([DRIPS + b"HTTP/1.1 200 OK\r\n\r\n"], "no whole answer within", id="drips a body"),
-        *(
-            pytest.param([_answer(body)], "refused enter_orchestration", id=f"answers {body.decode()}")
-            for body in (b"null", b"[1]", b"7", b'"x"', b'{"status": []}', b'{"status": {"value": [1]}}')
-        ),
-        *(
-            pytest.param([_said(session)], "names no session", id=f"session {session}")
-            for session in (None, 7, [], {"a": 1}, "")
-        ),
-        *(
-            pytest.param([_said("a"), _said(displays)], "sees no display", id=f"displays {displays}")
-            for displays in (None, 7, "x", [1, [2]], {"0": 7}, {"0": {"value": None}})
-        ),
+        (b"<html>", "does not answer"),
+        (b"[" * 100_000, "does not answer"),
+        (b"\xff\xfe\xfd", "does not answer"),
+        (b"[1]", "refused enter_orchestration"),
+        (b'{"status": {"value": [1]}}', "refused enter_orchestration"),
+        (b'{"status": {"value": "Completion"}, "payload": {"value": 7}}', "names no session"),
     ],
 )
-def test_whatever_answers_there_ends_in_one_line(
-    answers: list[bytes], says: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(looking_glass, "ANSWER_S", 0.3 if answers[0].startswith(DRIPS) else 10.0)
-    with RawServer(answers) as server:
-        thread = threading.Thread(target=server.serve_forever, daemon=True)
-        thread.start()
-        monkeypatch.setattr(looking_glass, "ADDRESS", f"localhost:{server.server_address[1]}")
-        try:
-            with pytest.raises(InputError, match=says) as error:
-                looking_glass.Bridge()
-        finally:
-            server.is_over.set()
-            server.shutdown()
-            thread.join()
+def test_another_program_at_the_port_is_one_line(bridge: FakeBridge, answer: bytes, message: str) -> None:
+    bridge.raw = {"enter_orchestration": answer}
+    with pytest.raises(InputError, match=message) as error:
+        quilt.Bridge()
     assert "\n" not in str(error.value)
     assert len(str(error.value)) < 400

@@ -9,7 +9,7 @@ import pytest
 from PIL import Image
 
 from iibr_core.exports.photo_folder import first_photo, list_photos
-from iibr_core.formats.images.photo import write_image
+from iibr_core.formats.images.write import write_image
 
 GREY = np.full((4, 6, 3), 100, np.uint8)
 
@@ -23,7 +23,7 @@ def test_maps_hidden_files_and_others_are_no_photos(tmp_path: Path) -> None:
 
 
 def test_what_was_saved_or_exported_of_a_photo_is_none_of_its_folder(tmp_path: Path) -> None:
-    made = ("a-iibr.png", "a-quilt_qs8x6a1.482.png", "a-sbs_2x1.png", "a-focal-stack-exr.exr", "a-b-anaglyph.jpg")
+    made = ("a-iibr.png", "a-quilt_qs8x6a1.482.png", "a-sbs_2x1.png", "a-rgbd.jpg", "a-b-anaglyph.jpg")
     kept = ("a.jpg", "a-b.png", "gone-iibr.png", "a-iibre.png", "a-quilted.png", "iibr-quilt.png", "-iibr.png")
     for name in (*made, *kept):
         (tmp_path / name).write_bytes(b"-")

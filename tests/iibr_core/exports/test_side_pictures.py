@@ -1,23 +1,23 @@
-"""Quilts and stereo pictures, read by Pillow: which view lies where, what is held still, how the anaglyph is mixed."""
+"""Quilts and stereo pictures, read by Pillow: places of the views, the focused surface, colours of the anaglyph."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from PIL import Image
 
-from iibr_core.exports.framing import fitted, size_in_frame
-from iibr_core.exports.parallax import side_pictures
+from iibr_core.exports.framing import fitted, side_pictures, size_in_frame
 from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.exports.source import ExportSource
 from iibr_core.formats.images.photo import read_photo
 from iibr_core.formats.quilts import DEVICES
 from iibr_core.rendering.optics import Optics
 from iibr_core.scenes.screen_size import ScreenSize
-from iibr_core.types import ImageSize, InputError, ViewOffset
+from iibr_core.types import GridShape, ImageSize, InputError, ViewOffset
 from tests.iibr_core.exports.conftest import exported
 
 
@@ -26,7 +26,7 @@ def pixels(path: Path) -> np.ndarray:
 
 
 def left_edge_of_square(picture: np.ndarray) -> float:
-    """Where the near square begins in the picture's middle row, to a part of a pixel: half of its light is there."""
+    """Column where the near square begins in the middle row, where its red is half of the maximum."""
     redness = (picture[..., 0] - picture[..., 2])[picture.shape[0] // 2].astype(float)
     start = int(np.argmax(redness > redness.max() / 2))
     before, after = redness[start - 1], redness[start]
@@ -46,7 +46,28 @@ def test_quilt_has_its_first_view_at_the_bottom_left(source: ExportSource, tmp_p
     assert np.abs(quilt[-height:, width : 2 * width] - second.astype(int)).max() <= 1
 
 
-def test_what_is_in_focus_stays_where_it_is(source: ExportSource) -> None:
+@pytest.mark.parametrize(
+    ("kind", "options", "first", "last"),
+    [("quilt", {}, -2.0, 1.0), ("sbs", {}, -2.0, 1.0), ("anaglyph", {"eyes": 2.0}, -1.5, 0.5)],
+)
+def test_viewpoints_lie_about_the_middle_of_an_even_grid(
+    source: ExportSource, tmp_path: Path, kind: str, options: dict[str, Any], first: float, last: float
+) -> None:
+    """Views of 4 columns lie from 2 steps left to 1 step right of the photo: their middle is half a step beside it."""
+    drawn: list[RenderSettings] = []
+
+    def draw(settings: RenderSettings) -> np.ndarray:
+        drawn.append(settings)
+        return np.zeros((settings.size_px.height, settings.size_px.width, 3), np.uint8)
+
+    even = replace(source, scene=replace(source.scene, grid=GridShape(4, 4)), draw=draw)
+    exported(even, kind, tmp_path / "a.png", {"focus_disparity": 3.0}, **options)
+    assert (drawn[0].optics.eye.s, drawn[-1].optics.eye.s) == pytest.approx((first, last))
+    shift_px = [96 * (settings.part.x + settings.part.width / 2 - 0.5) for settings in (drawn[0], drawn[-1])]
+    assert shift_px == pytest.approx([-3.0 * first, -3.0 * last]), "the focused surface stays in place"
+
+
+def test_the_focused_surface_stays_in_place(source: ExportSource) -> None:
     near = source.scene.disparity_range_px[1]
     places = {}
     for focus in (0.0, near):
@@ -55,7 +76,7 @@ def test_what_is_in_focus_stays_where_it_is(source: ExportSource) -> None:
         left, right = map(left_edge_of_square, drawn)
         places[focus] = left - right
     assert places[near] == pytest.approx(0, abs=0.4)
-    assert places[0.0] == pytest.approx(2 * near * 3, abs=0.8), "else it moves by its disparity, times the scale"
+    assert places[0.0] == pytest.approx(2 * near * 3, abs=0.8), "it moves by its disparity times the scale otherwise"
 
 
 def test_parts_that_are_held_still_are_as_wide_as_may_be(source: ExportSource) -> None:

@@ -1,4 +1,4 @@
-"""Only those views of a photo are made that an export shows, and the file is that of all views."""
+"""Exports make only the views that they show, and write the same file as with all views."""
 
 from __future__ import annotations
 
@@ -11,11 +11,8 @@ from typing import Any
 import pytest
 
 from iibr_core.exports import source as export_source
-from iibr_core.exports.export_opening import open_for_export
-from iibr_core.exports.kinds import EXPORTS
-from iibr_core.exports.options import ExportOptions
-from iibr_core.exports.source import ExportSource
-from iibr_core.exports.writers import export_path, writer_of
+from iibr_core.exports.kinds import EXPORTS, ExportOptions, export_path
+from iibr_core.exports.source import ExportSource, open_for_export, write_export
 from iibr_core.rendering.optics import Optics
 from iibr_core.scenes import making, opening
 from iibr_core.scenes.lens_limits import LensChoice
@@ -34,23 +31,21 @@ CASES: list[tuple[str, dict[str, Any], float, int]] = [
     ("anaglyph", {"eyes": 1.0}, 0.0, 2),
     ("anaglyph", {}, 1.5, 14),
     ("quilt", {}, 0.0, OF_A_ROW),
-    *((kind, {"motion": "swing", **FEW}, 0.0, OF_A_ROW) for kind in ("gif", "webp", "apng", "mp4")),
+    *((kind, {"motion": "swing", **FEW}, 0.0, OF_A_ROW) for kind in ("gif", "webp", "mp4")),
     ("gif", {"motion": "focus", **FEW}, 2.5, OF_A_LENS),
     ("gif", {"motion": "aperture", **FEW}, 2.5, OF_A_LENS),
     ("focal-stack", FEW, 2.5, OF_A_LENS),
-    ("focal-stack-exr", FEW, 2.5, OF_A_LENS),
-    ("aperture-sweep", FEW, 0.0, 24),
     ("epi", {}, 0.0, OF_A_ROW),
     ("point-cloud", {}, 0.0, 4),
     ("splats", {}, 0.0, 4),
     ("disparity", {}, 0.0, 0),
-    ("numbered-grid", {}, 0.0, 24),
+    ("hci", {}, 0.0, 24),
 ]
 
 
 @pytest.fixture
-def made(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[ViewUpdate]]:
-    """The views beside the photo's own that are made of it."""
+def new_views(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[ViewUpdate]]:
+    """The views other than the photo that were made."""
     views: list[ViewUpdate] = []
 
     def counted(*arguments: Any, **named: Any) -> Iterator[ViewUpdate]:
@@ -64,7 +59,7 @@ def made(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[ViewUpdate]]:
 
 
 def written(path: Path) -> dict[str, str]:
-    """Hashes of all that the file or folder holds, but for the second in which OpenEXR files are written."""
+    """Hashes of the files, without the second in which OpenEXR files are written."""
     files = sorted(path.rglob("*")) if path.is_dir() else [path]
     return {
         str(file.relative_to(path)): hashlib.sha256(WRITTEN_AT.sub(b"", file.read_bytes())).hexdigest()
@@ -73,49 +68,49 @@ def written(path: Path) -> dict[str, str]:
     }
 
 
-@pytest.mark.parametrize(("kind", "options", "aperture", "most"), CASES)
+@pytest.mark.parametrize(("kind", "options", "aperture", "max_views"), CASES)
 def test_an_export_makes_only_the_views_that_it_shows(
     tmp_path: Path,
-    made: list[ViewUpdate],
+    new_views: list[ViewUpdate],
     monkeypatch: pytest.MonkeyPatch,
     kind: str,
     options: dict[str, Any],
     aperture: float,
-    most: int,
+    max_views: int,
 ) -> None:
     if EXPORTS[kind].needs:
         pytest.importorskip("av")
-    source, asked = Source(str(write_scene(tmp_path)), grid=GridShape(5, 5)), ExportOptions(**options)
+    source, chosen = Source(str(write_scene(tmp_path)), grid=GridShape(5, 5)), ExportOptions(**options)
     lens = LensChoice(aperture=aperture)
 
     def export(name: str, drawer: SceneDrawer) -> dict[str, str]:
-        made.clear()
+        new_views.clear()
         try:
-            opened = open_for_export(EXPORTS[kind], asked, source, 1.0, lens, lambda scene: None, drawer.open)
+            opened = open_for_export(EXPORTS[kind], chosen, source, 1.0, lens, lambda scene: None, drawer.open)
         except InputError as error:
             pytest.skip(str(error))
-        target = export_path(EXPORTS[kind], tmp_path / f"{name}{(*EXPORTS[kind].endings, '')[0]}", opened.scene, asked)
-        writer_of(EXPORTS[kind])(target, opened, asked)
+        target = export_path(EXPORTS[kind], tmp_path / f"{name}{(*EXPORTS[kind].endings, '')[0]}", opened.scene, chosen)
+        write_export(EXPORTS[kind], target, opened, chosen)
         return written(target)
 
     with SceneDrawer() as drawer:
         few = export("few", drawer)
-        assert len(made) <= most
+        assert len(new_views) <= max_views
         make_all(monkeypatch)
         every = export("all", drawer)
-        assert len(made) == 24 or kind == "disparity"
+        assert len(new_views) == 24 or kind == "disparity"
     assert few == every
 
 
 def make_all(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Have all views made from now on, whatever is shown."""
+    """Make all views from now on."""
     monkeypatch.setattr("viewer.display.scene_drawer.views_seen_by", lambda pictures, grid: None)
     views = ExportSource.views
     monkeypatch.setattr(ExportSource, "views", lambda self, *given, wanted=None, **named: views(self, *given, **named))
 
 
-def test_what_is_drawn_says_with_what() -> None:
-    assert all(bool(kind.optics) == kind.is_drawn for kind in EXPORTS.values())
+def test_drawn_kinds_support_the_lens() -> None:
+    assert all(("aperture" in kind.supports) == kind.is_drawn for kind in EXPORTS.values())
 
 
 @pytest.mark.parametrize(

@@ -14,15 +14,13 @@ import pytest
 from PIL import Image
 
 from iibr_core.depth.choice import DepthChoice
-from iibr_core.exports.export_opening import open_for_export
-from iibr_core.exports.kinds import EXPORTS
-from iibr_core.exports.options import ExportOptions
-from iibr_core.exports.settings import resolve_settings
+from iibr_core.exports.kinds import EXPORTS, ExportOptions
+from iibr_core.exports.source import open_for_export
 from iibr_core.exports.web import make_page
 from iibr_core.exports.web_gallery import write_gallery
-from iibr_core.exports.web_views import MOST_TEXELS, WebForm, form_that_fits
-from iibr_core.formats.images.caption import read_caption
-from iibr_core.formats.images.icc_profile import icc_profile
+from iibr_core.exports.web_views import MAX_TEXELS, WebForm, form_that_fits
+from iibr_core.formats.images.color_profile import icc_profile
+from iibr_core.formats.images.metadata import read_caption
 from iibr_core.scenes.lens_limits import LensChoice
 from iibr_core.scenes.scene import Source
 from iibr_core.types import DISPLAY_P3, GridShape, ImageSize, InputError
@@ -42,7 +40,7 @@ def opened(tmp_path_factory: pytest.TempPathFactory):
 
 
 def page_of(opened, **options) -> tuple[str, dict]:
-    page, _ = make_page(opened, resolve_settings(KIND, ExportOptions(**options), opened.scene, opened.optics))
+    page, _ = make_page(opened, ExportOptions(**options))
     text = page.decode()
     return text, json.loads(text.partition('id="field">')[2].partition("</script>")[0])
 
@@ -55,12 +53,16 @@ def test_views_come_from_the_middle_outwards(opened) -> None:
     assert text.index('id="first"') < text.index('type="module"') < text.index('id="colors"'), "shown before all runs"
 
 
-def test_a_budget_is_kept_and_the_most_is_made_of_it(opened) -> None:
-    whole = len(page_of(opened)[0].encode())
-    for share in (0.98, 0.9):
-        text, field = page_of(opened, budget=int(share * whole))
-        assert len(text.encode()) <= share * whole
-        assert len(field["order"]) in (1, 9, 25)
+def test_a_budget_takes_quality_then_views_then_size(opened) -> None:
+    """Each budget is a little less than the page before."""
+    budget, forms = None, []
+    for _ in range(6):
+        page, views = make_page(opened, ExportOptions(budget=budget))
+        assert budget is None or len(page) <= budget
+        forms.append((-views.form.scale, views.form.every, -views.form.quality))
+        budget = len(page) - 1
+    assert forms[:3] == [(-1.0, 1, -82), (-1.0, 1, -65), (-1.0, 1, -48)]
+    assert forms == sorted(forms)
 
 
 def test_a_budget_that_holds_no_page_is_refused(opened) -> None:
@@ -74,7 +76,7 @@ def test_fields_that_browsers_cannot_hold_lose_views_then_size() -> None:
         form = form_that_fits(grid, size, False)
         height, width = form.size_of(size)
         count = len(range(0, grid.rows, form.every)) * len(range(0, grid.columns, form.every))
-        assert count * height * width <= MOST_TEXELS
+        assert count * height * width <= MAX_TEXELS
         assert count <= 300
     assert form == WebForm()
 
@@ -100,7 +102,7 @@ def test_files_without_words_have_no_caption(tmp_path: Path) -> None:
     assert read_caption(tmp_path / "photo.jpg") == read_caption(tmp_path / "nowhere.jpg")
 
 
-def test_the_index_lists_pages_and_is_made_anew(opened, tmp_path: Path) -> None:
+def test_the_gallery_lists_pages_and_is_replaced(opened, tmp_path: Path) -> None:
     text, _ = page_of(opened)
     for name in ("a#1.html", "<b>.html", "index.html"):
         (tmp_path / name).write_text(text.replace("<title>scene", f"<title>{name.replace('<', '&lt;')}"), "utf-8")
@@ -120,13 +122,13 @@ def test_the_index_lists_pages_and_is_made_anew(opened, tmp_path: Path) -> None:
 
 
 def test_moving_pictures_are_of_limited_range(opened) -> None:
-    """Browsers read them so without asking: Chromium 156 ignores what tracks say of their range."""
+    """Browsers assume limited range: Chromium 156 ignores the range that the tracks state."""
     text, _ = page_of(opened)
     for name in ("colors", "depths"):
         data = base64.b64decode(text.partition(f'id="{name}">')[2].partition("</script>")[0].split("\n")[0] or b"")
-        said = re.findall(rb"colrnclx.{6}(.)", data, re.DOTALL)
-        assert len(said) == 2, "of the item and of the track"
-        assert set(said) == {b"\0"}
+        ranges = re.findall(rb"colrnclx.{6}(.)", data, re.DOTALL)
+        assert len(ranges) == 2, "of the item and of the track"
+        assert set(ranges) == {b"\0"}
 
 
 def test_the_first_picture_is_the_middle_view(opened) -> None:

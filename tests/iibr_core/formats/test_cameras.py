@@ -1,21 +1,20 @@
-"""Cameras of a field: where points lie, what is infinitely far, and what makes no cameras."""
+"""Cameras of a field: where points lie, what is infinitely far, and numbers that make no cameras."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from iibr_core.formats.cameras import MOST_DEPTH_RATIO, FieldCameras, infinity_of, spread
+from iibr_core.formats.cameras import MAX_DEPTH_RATIO, FieldCameras, infinity_of, spread
 from iibr_core.types import GridShape, ImageSize, InputError, ViewOffset
 
 GRID, SIZE = GridShape(3, 3), ImageSize(64, 96)
 
 
-def test_points_of_a_view_land_where_they_are_seen() -> None:
-    """For a field whose still plane is at a finite distance, as they mostly are."""
+def test_points_of_a_view_are_projected_to_where_other_views_see_them() -> None:
+    """For a field whose still plane is at a finite distance, as most are."""
     cameras = FieldCameras(GRID, SIZE, 80.0, (-1.5, 2.5), -2.0)
-    rng = np.random.default_rng(0)
-    disparity = rng.uniform(-1.5, 2.5, SIZE).astype(np.float32)
+    disparity = np.random.default_rng(0).uniform(-1.5, 2.5, SIZE).astype(np.float32)
     points = cameras.points(disparity, ViewOffset(0, 0)).astype(float)
     y, x = np.indices(SIZE)
     for offset in (ViewOffset(1, -2), ViewOffset(0.5, 3)):
@@ -30,29 +29,25 @@ def test_points_of_a_view_land_where_they_are_seen() -> None:
 @pytest.mark.parametrize(
     ("low", "high"), [(1.0, 5.0), (1.0, 20.0), (-3.0, 3.0), (0.001, 9.0), (2.0, 2.0), (0.0, 0.0), (-2.0, -2.0)]
 )
-def test_infinity_lies_beyond_all(low: float, high: float) -> None:
+def test_infinity_lies_beyond_all_at_a_sensible_ratio_of_depths(low: float, high: float) -> None:
     infinity = infinity_of(low, high)
     assert infinity < low
-    assert (high - infinity) / (low - infinity) <= 1.00005 * MOST_DEPTH_RATIO
+    assert (high - infinity) / (low - infinity) <= 1.00005 * MAX_DEPTH_RATIO
     assert (infinity == 0) == (low in (1.0, 2.0))
 
 
+def test_depths_are_limited_to_the_range() -> None:
+    cameras = FieldCameras(GRID, SIZE, 80.0, (-3.0, 3.0), infinity_of(-3.0, 3.0))
+    depth = cameras.depth(np.float32([-9.0, -3.0, 0.0, 3.0, 9.0]))
+    np.testing.assert_allclose(1 / depth, [1 / 20, 1 / 20, 0.525, 1, 1], rtol=1e-5)
+
+
 @pytest.mark.parametrize("numbers", [(np.nan, 0, 1, -1), (0.0, 0, 1, -1), (80.0, 0, 1, 0), (80.0, 2, 1, 0)])
-def test_cameras_that_make_no_sense_are_refused(numbers: tuple[float, ...]) -> None:
+def test_numbers_that_make_no_cameras_are_refused(numbers: tuple[float, ...]) -> None:
     focal_px, low, high, infinity = numbers
     with pytest.raises(InputError, match="no cameras can be computed"):
         FieldCameras(GRID, SIZE, focal_px, (low, high), infinity)
 
 
-def test_depths_reach_as_far_as_may_be_where_disparity_leaves_it_open() -> None:
-    """From the nearest to the farthest by the greatest ratio; nearness is even between them."""
-    cameras = FieldCameras(GRID, SIZE, 80.0, (-3.0, 3.0), infinity_of(-3.0, 3.0))
-    assert cameras.depth_range == (1.0, pytest.approx(MOST_DEPTH_RATIO))
-    depth = cameras.depth(np.float32([-9.0, -3.0, 0.0, 3.0, 9.0]))
-    np.testing.assert_allclose(1 / depth, [1 / 20, 1 / 20, 0.525, 1, 1], rtol=1e-5)
-
-
-def test_few_of_many_are_spread_from_the_first_to_the_last() -> None:
-    assert spread(0, 5) == []
-    assert spread(3, 5) == [0, 1, 2]
-    assert spread(101, 5) == [0, 25, 50, 75, 100]
+def test_spread_goes_from_the_first_to_the_last() -> None:
+    assert (spread(0, 5), spread(3, 5), spread(101, 5)) == ([], [0, 1, 2], [0, 25, 50, 75, 100])

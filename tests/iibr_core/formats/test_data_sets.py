@@ -1,4 +1,4 @@
-"""Layouts of data sets on small folders: which views stand where, which maps are theirs, and in what units."""
+"""Stanford archive, Middlebury and LLFF on small folders: viewpoints, maps, units, and honest notes."""
 
 from __future__ import annotations
 
@@ -8,96 +8,96 @@ import numpy as np
 import pytest
 
 from iibr_core.evaluation.datasets import read_known_disparity
-from iibr_core.formats.light_fields.stanford import StanfordWriter
+from iibr_core.formats.light_fields.light_field_formats import open_light_field
+from iibr_core.formats.light_fields.multi_view_scene import MultiView
+from iibr_core.formats.light_fields.views import read_stored_view, step_length
 from iibr_core.formats.maps.pfm import write_pfm
 from iibr_core.types import GridShape, ImageSize, ViewOffset
 from tests.iibr_core.evaluation.test_datasets import offset_by_file, scene_of, write_picture
-from tests.iibr_core.known_scenes import (
-    HEIGHT,
-    WIDTH,
-    disparity_of_square,
-    offsets_of,
-    write_grid,
-    write_hci,
-    write_numbered,
-)
+from tests.iibr_core.known_scenes import HEIGHT, WIDTH, write_numbered, write_stanford
 
 
-@pytest.mark.parametrize(("rows", "columns"), [(3, 3), (1, 3), (3, 5)])
-def test_hci_names_count_row_by_row(tmp_path: Path, rows: int, columns: int) -> None:
-    folder = write_hci(tmp_path / "dino", rows, columns)
-    write_picture(folder / "objectids_highres.png", np.zeros((9, 9, 3), np.uint8))  # comes with the data set
-    scene = scene_of(folder)
-    assert scene.name == "dino"
-    assert scene.layout == f"HCI 4D light field, {columns}x{rows}"
-    wanted = {f"input_Cam{v * columns + u:03d}": at for (v, u), at in offsets_of(rows, columns).items()}
-    assert offset_by_file(scene) == wanted
-    assert list(scene.disparity) == [scene.centre]
-    known = scene.disparity[scene.centre]
-    assert known.is_truth
-    np.testing.assert_array_equal(read_known_disparity(known, ImageSize(HEIGHT, WIDTH)).values, disparity_of_square())
-
-
-def test_views_in_a_subfolder_with_truth_and_estimates(tmp_path: Path) -> None:
-    folder = write_grid(tmp_path / "scene")
-    np.save(folder / "disp_est_u02_v00.npy", disparity_of_square())
-    scene = scene_of(folder)
-    assert scene.layout == "grid folder, 3x3"
-    assert offset_by_file(scene) == {f"v{v:02d}_u{u:02d}": at for (v, u), at in offsets_of(3, 3).items()}
-    names = {scene.views[index].name: known.is_truth for index, known in scene.disparity.items()}
-    assert names == {"v01 u01": True, "v00 u02": False}
-
-
-@pytest.mark.parametrize("name", ["lf_{v:02d}_{u:02d}.png", "scene7_{v1}_{u1}.png", "{k:03d}.png", "img-{k1}.png"])
-def test_hebers_grid_under_any_numbering(tmp_path: Path, name: str) -> None:
-    """By row and column or row by row, counted from 0 or from 1; the map without a number is the centre view's."""
-    offsets = offsets_of(11, 11)
+def write_archive(folder: Path, positions: dict[tuple[int, int], tuple[float, float]]) -> MultiView:
+    """Write and read a Stanford folder. positions: (y, x) by (row, column)."""
     names = {
-        name.format(v=v, u=u, v1=v + 1, u1=u + 1, k=v * 11 + u, k1=v * 11 + u + 1): at for (v, u), at in offsets.items()
+        f"out_{row:02d}_{column:02d}_{y:.6f}_{x:.6f}_.png": ViewOffset(0, 0)
+        for (row, column), (y, x) in positions.items()
     }
-    folder = write_numbered(tmp_path / "pov", names)
-    write_pfm(folder / "disparity.pfm", np.ones((8, 8), np.float32))
-    scene = scene_of(folder)
-    assert scene.layout == "Pov-ray (Heber), 11x11"
-    assert offset_by_file(scene) == {Path(name).stem: at for name, at in names.items()}
-    assert list(scene.disparity) == [scene.centre]
+    write_numbered(folder, names)
+    return scene_of(folder)
 
 
-def stanford_names(jitter: float = 0.0) -> dict[str, ViewOffset]:
-    """5 rows counted upwards, 4 columns to the left; positions in millimetres, up to `jitter` steps off."""
-    rng, found = np.random.default_rng(3), {}
-    for row in range(5):
-        for column in range(4):
-            t, s = -row + rng.uniform(-jitter, jitter), -column + rng.uniform(-jitter, jitter)
-            found[f"out_{row:02d}_{column:02d}_{100 + 30 * t:.6f}_{30 * s:.6f}_.png"] = ViewOffset(t, s)
-    return found
+def offsets_by_index(scene: MultiView) -> dict[tuple[int, int], np.ndarray]:
+    """Viewpoints (t, s) from that of row 0 and column 0, by row and column in the names."""
+    by_index = {tuple(map(int, view.path.stem.split("_")[1:3])): np.array(view.offset) for view in scene.views}
+    return {index: offset - by_index[0, 0] for index, offset in by_index.items()}
 
 
-@pytest.mark.parametrize("inside", ["", "rectified"])
 @pytest.mark.parametrize("jitter", [0.0, 0.1])
-def test_stanford_viewpoints_are_the_cameras_positions(tmp_path: Path, inside: str, jitter: float) -> None:
-    names = stanford_names(jitter)
-    write_numbered(tmp_path / "lego" / inside, names)
-    scene = scene_of(tmp_path / "lego")
-    assert scene.layout == "Stanford archive, 4x5"
-    found = np.array([view.offset for view in scene.views])
-    wanted = np.array([names[view.path.name] for view in scene.views])
-    np.testing.assert_allclose(found - found[0], wanted - wanted[0], atol=0.1 * jitter * 20 + 1e-6)
-    by_index = {view.name: view.offset for view in scene.views}
-    assert by_index["row 4 column 0"].t < by_index["row 0 column 0"].t  # rows are counted upwards
-    assert by_index["row 0 column 3"].s < by_index["row 0 column 0"].s
+def test_stanford_viewpoints_are_the_cameras_positions(tmp_path: Path, jitter: float) -> None:
+    """Rows are counted upwards and columns leftwards; positions are in millimetres, slightly off the grid."""
+    rng = np.random.default_rng(3)
+    steps = {at: -np.array(at) + rng.uniform(-jitter, jitter, 2) for at in np.ndindex(5, 4)}
+    scene = write_archive(tmp_path / "rectified", {at: (100 + 30 * t, 30 * s) for at, (t, s) in steps.items()})
+    scene = scene_of(tmp_path)
+    assert (scene.layout, scene.grid) == ("Stanford archive, 4x5", (5, 4))
+    for at, offset in offsets_by_index(scene).items():
+        np.testing.assert_allclose(offset, steps[at] - steps[0, 0], atol=2 * jitter + 1e-6)
+    assert {view.path.stem[:9]: view.place for view in scene.views}["out_04_03"] == (0, 0)
+    assert ("stand up to" in scene.notes[0]) == (jitter > 0)
 
 
-def test_stanford_positions_that_make_no_grid_are_told(tmp_path: Path) -> None:
+@pytest.mark.parametrize(("rows", "columns", "step"), [(3, 3, 20.0), (3, 1, 45.0), (1, 3, 20.0)])
+def test_a_step_of_stanford_is_the_spacing_of_columns_else_of_rows(
+    tmp_path: Path, rows: int, columns: int, step: float
+) -> None:
+    """Rows may stand farther apart."""
+    positions = {at: (300 + 45.0 * at[0], -700 + 20.0 * at[1]) for at in np.ndindex(rows, columns)}
+    scene = write_archive(tmp_path, positions)
+    assert scene.grid == GridShape(rows, columns)
+    for at, offset in offsets_by_index(scene).items():
+        np.testing.assert_allclose(offset, np.subtract(positions[at], positions[0, 0]) / step)
+    assert scene.notes == ("Viewpoints from the names.",)
+
+
+@pytest.mark.parametrize(("scale", "note"), [(0, "positions are unknown"), (1, "off the grid: a regular grid")])
+def test_stanford_positions_that_form_no_grid_are_noted_and_rows_go_upwards(
+    tmp_path: Path, scale: float, note: str
+) -> None:
     rng = np.random.default_rng(0)
-    names = {
-        f"out_{v:02d}_{u:02d}_{rng.uniform():.5f}_{rng.uniform():.5f}.png": ViewOffset(0.0, 0.0)
-        for v in range(3)
-        for u in range(3)
-    }
-    scene = scene_of(write_numbered(tmp_path / "odd", names))
-    assert "regular" in scene.notes[0]
-    assert {tuple(view.offset) for view in scene.views} == {(-float(v), float(u)) for v in range(3) for u in range(3)}
+    scene = write_archive(tmp_path, {at: tuple(scale * rng.uniform(size=2)) for at in np.ndindex(3, 3)})
+    assert note in scene.notes[0]
+    for (row, column), offset in offsets_by_index(scene).items():
+        np.testing.assert_array_equal(offset, (-row, column))
+
+
+def test_rows_of_stanford_count_upwards_on_disk_and_downwards_here(tmp_path: Path) -> None:
+    scene = open_light_field(write_stanford(tmp_path / "lego", 3, 4))
+    places = {view.path.stem[:9]: view.place for view in scene.views}
+    assert (places["out_02_00"], places["out_00_03"]) == ((0, 0), (2, 3))
+    assert step_length(scene) == pytest.approx(1)
+    assert (
+        read_stored_view(scene, 2, 0).mean()
+        < read_stored_view(scene, 2, 1).mean()
+        < read_stored_view(scene, 0, 0).mean()
+    )
+
+
+@pytest.mark.parametrize(
+    ("kept", "grid"),
+    [
+        ([(0, 0), (0, 2), (2, 0), (2, 2)], GridShape(2, 2)),  # every second view
+        ([(3, 7), (3, 8)], GridShape(1, 2)),
+        ([(0, 0), (0, 1), (1, 0)], None),  # a gap
+        ([(0, 0), (0, 1), (0, 5)], None),  # uneven
+    ],
+)
+def test_stanford_names_that_fill_a_grid_and_that_do_not(
+    tmp_path: Path, kept: list[tuple[int, int]], grid: GridShape | None
+) -> None:
+    scene = write_archive(tmp_path, {(row, column): (row, column) for row, column in kept})
+    assert scene.grid == grid
+    assert (scene.views[0].place is None) == (grid is None)
 
 
 def test_middlebury_pair_from_the_left(tmp_path: Path) -> None:
@@ -106,8 +106,7 @@ def test_middlebury_pair_from_the_left(tmp_path: Path) -> None:
     disparity[0, 0] = np.inf
     write_pfm(folder / "disp0.pfm", disparity)
     scene = scene_of(folder)
-    assert scene.layout == "Middlebury pair"
-    assert scene.centre == 0
+    assert (scene.layout, scene.centre) == ("Middlebury pair", 0)
     assert offset_by_file(scene) == {"im0": (0, 0), "im1": (0, 1)}
     known = read_known_disparity(scene.disparity[0], ImageSize(HEIGHT, WIDTH))
     assert known.values[1, 1] == 7.5
@@ -125,9 +124,8 @@ def test_middlebury_pair_from_the_left(tmp_path: Path) -> None:
 def test_middlebury_rows_store_four_steps_times_a_factor(
     tmp_path: Path, kind: str, count: int, truths: tuple[int, int], extension: str, width: int, factor: float
 ) -> None:
-    pixels = np.zeros((4, width, 3), np.uint8)
     for n in range(count):
-        write_picture(tmp_path / f"{kind}{n}{extension}", pixels)
+        write_picture(tmp_path / f"{kind}{n}{extension}", np.zeros((4, width, 3), np.uint8))
     for n in truths:
         stored = np.full((4, width), 120, np.uint8)
         stored[0, 0] = 0  # unknown
@@ -140,8 +138,15 @@ def test_middlebury_rows_store_four_steps_times_a_factor(
         np.testing.assert_allclose(values, 120 / factor / 4, rtol=1e-5)
 
 
-def test_stanford_rows_are_named_upwards(tmp_path: Path) -> None:
-    names = [
-        StanfordWriter(tmp_path, GridShape(3, 1), 50.0, "scene", False).view_name(row, 0, "png") for row in range(3)
-    ]
-    assert [name.split("_")[1] for name in names] == ["02", "01", "00"]
+def test_llff_counts_in_steps_between_neighbours_across_the_viewing_direction(tmp_path: Path) -> None:
+    """Cameras are half a unit apart and some nearer; bounds are depths, so disparity is focal length x step / depth."""
+    write_numbered(tmp_path / "images", {f"IMG_{n}.png": ViewOffset(0, n) for n in range(3)}, (HEIGHT, WIDTH))
+    down, right, back = np.eye(3)[[1, 0, 2]] * [[1], [1], [-1]]
+    places = [(-0.5, 0.0, 0.3), (0.0, 0.0, 0.0), (0.0, 0.5, 0.1)]
+    poses = [np.column_stack([down, right, back, place, [HEIGHT, WIDTH, 50]]).ravel() for place in places]
+    np.save(tmp_path / "poses_bounds.npy", np.array([[*pose, 5.0, 40.0] for pose in poses]))
+    scene = open_light_field(tmp_path)
+    np.testing.assert_allclose([view.offset for view in scene.views], [(0, -1), (0, 0), (1, 0)], atol=1e-12)
+    assert scene.range_px == pytest.approx((50 * 0.5 / 40, 50 * 0.5 / 5))
+    assert scene.focal_px == 50
+    assert "up to 0.6 view steps before or behind" in scene.notes[0]

@@ -1,8 +1,11 @@
-"""Light fields as others lay them out: read again by our readers, and by OpenImageIO and Pillow."""
+"""Light fields are written whole or not at all, and read again."""
 
 from __future__ import annotations
 
+import configparser
+from collections.abc import Iterable, Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import OpenImageIO as oiio
@@ -10,95 +13,145 @@ import pytest
 from PIL import Image
 
 from iibr_core.color import linear_from_srgb
-from iibr_core.formats.light_fields.light_field_formats import WRITERS, open_light_field, writer_for
+from iibr_core.formats.light_fields.light_field_formats import open_light_field
 from iibr_core.formats.light_fields.views import read_views
+from iibr_core.formats.light_fields.write import WRITERS, check_light_field, write_light_field
+from iibr_core.formats.maps.pfm import read_pfm
 from iibr_core.types import GridShape, InputError, ViewUpdate
 
-GRID = GridShape(3, 4)
-HEIGHT, WIDTH = 5, 7
-ENDINGS = {"eslf": "_eslf.png", "exr": ".exr"}
+GRID = GridShape(3, 5)
+HEIGHT, WIDTH = 6, 9
+NAMES = {"hci": "field", "eslf": "field_eslf.png"}
 
 
-def made_views() -> list[ViewUpdate]:
-    rng = np.random.default_rng(0)
-    views = [
-        ViewUpdate(
-            row,
-            column,
-            rng.integers(0, 256, (HEIGHT, WIDTH, 3), np.uint8),
-            rng.normal(size=(HEIGHT, WIDTH)).astype(np.float32),
-        )
-        for row in range(GRID.rows)
-        for column in range(GRID.columns)
-    ]
+def make_views(grid: GridShape = GRID, dtype: Any = np.uint8) -> list[ViewUpdate]:
+    """Views of noise in any order."""
+    rng = np.random.default_rng(5)
+    views = []
+    for row, column in np.ndindex(*grid):
+        colors = rng.integers(0, 256, (HEIGHT, WIDTH, 3), np.uint8)
+        colors = (colors / 64).astype(dtype) if dtype == np.float16 else colors
+        views.append(ViewUpdate(row, column, colors, rng.uniform(-2, 3, (HEIGHT, WIDTH)).astype(np.float32)))
     return [views[i] for i in rng.permutation(len(views))]
 
 
-def written(tmp_path: Path, layout: str, views: list[ViewUpdate]) -> Path:
-    path = tmp_path / f"field{ENDINGS.get(layout, '')}"
-    with writer_for(layout)(path, GRID, 100.0, "field", True) as writer:
-        for view in views:
-            writer.add(view)
+def write(
+    folder: Path, views: Iterable[ViewUpdate], layout: str = "hci", grid: GridShape = GRID, with_disparity: bool = True
+) -> Path:
+    path = folder / NAMES[layout]
+    write_light_field(path, layout, grid, views, 12.5, "a\n scene", with_disparity)
     return path
 
 
-@pytest.mark.parametrize("layout", ["hci", "numbered-grid", "stanford"])
-def test_folders_are_read_again(tmp_path: Path, layout: str) -> None:
-    views = {(view.row, view.column): view for view in made_views()}
-    folder = written(tmp_path, layout, list(views.values()))
-    scene = open_light_field(folder)
-    assert scene.grid == GRID
-    for view in read_views(scene)[1]:
-        made = views[view.row, view.column]
-        assert np.array_equal(view.colors, made.colors)
-        if layout != "stanford":  # has no place for it
-            assert view.disparity is not None
-            assert made.disparity is not None
-            np.testing.assert_array_equal(view.disparity, made.disparity)
+@pytest.mark.parametrize("grid", [GRID, GridShape(1, 1), GridShape(1, 7)])
+@pytest.mark.parametrize("dtype", [np.uint8, np.float16])
+def test_hci_round_trip(tmp_path: Path, grid: GridShape, dtype: Any) -> None:
+    views = make_views(grid, dtype)
+    scene = open_light_field(write(tmp_path, views, grid=grid))
+    assert (scene.grid, read_views(scene)[0], scene.name) == (grid, (HEIGHT, WIDTH), "field")
+    assert scene.focal_px == pytest.approx(12.5)
+    assert scene.is_hdr == (dtype == np.float16)
+    assert scene.range_px == (
+        min(view.disparity.min() for view in views if view.disparity is not None),
+        max(view.disparity.max() for view in views if view.disparity is not None),
+    )
+    by_place = {(view.row, view.column): view for view in read_views(scene)[1]}
+    assert len(by_place) == len(views)
+    for view in views:
+        read = by_place[view.row, view.column]
+        assert read.colors.dtype == dtype
+        tolerance = {"rtol": 4e-3, "atol": 1e-3} if dtype == np.float16 else {"atol": 0}
+        np.testing.assert_allclose(read.colors.astype(float), view.colors.astype(float), **tolerance)
+        assert read.disparity is not None
+        np.testing.assert_array_equal(read.disparity, view.disparity)
 
 
-def test_lenslet_image_has_the_views_of_a_place_together(tmp_path: Path) -> None:
-    pixels = np.asarray(Image.open(written(tmp_path, "eslf", made_views())))
+def test_hci_files_and_parameters_are_those_of_the_benchmark(tmp_path: Path) -> None:
+    views = make_views()
+    folder = write(tmp_path, views)
+    assert {path.name for path in folder.iterdir()} == {
+        *(f"input_Cam{i:03d}.png" for i in range(15)),
+        *(f"disp_Cam{i:03d}.pfm" for i in range(15)),
+        "gt_disp_lowres.pfm",
+        "parameters.cfg",
+    }
+    centre = next(view for view in views if (view.row, view.column) == (1, 2))
+    np.testing.assert_array_equal(read_pfm(folder / "gt_disp_lowres.pfm"), centre.disparity)
+    parser = configparser.ConfigParser()
+    parser.read(folder / "parameters.cfg")
+    assert (parser["extrinsics"]["num_cams_x"], parser["extrinsics"]["num_cams_y"]) == ("5", "3")
+    assert parser["intrinsics"]["image_resolution_x_px"] == "9"
+    assert parser["meta"]["scene"] == "a scene"
+    # Disparity 0 lies at the focus distance, the least disparity at infinity: d = f * b * (1 / z - 1 / focus).
+    focus_mm = 1000 * float(parser["extrinsics"]["focus_distance_m"])
+    assert 12.5 * 1.0 * -1 / focus_mm == pytest.approx(float(parser["meta"]["disp_min"]))
+
+
+def test_without_disparity_only_the_centre_has_a_map(tmp_path: Path) -> None:
+    scene = open_light_field(write(tmp_path, make_views(), with_disparity=False))
+    assert [scene.views[index].place for index in scene.disparity] == [(1, 2)]
+
+
+def test_hdr_views_are_stored_as_linear_light(tmp_path: Path) -> None:
+    (view,) = make_views(GridShape(1, 1), np.float16)
+    folder = write(tmp_path, [view], grid=GridShape(1, 1))
+    stored = oiio.ImageInput.open(str(folder / "input_Cam000.exr")).read_image()
+    np.testing.assert_allclose(stored, linear_from_srgb(view.colors), rtol=1e-3, atol=1e-5)
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.float16])
+def test_a_lenslet_image_has_the_views_of_a_place_together(tmp_path: Path, dtype: Any) -> None:
+    views = make_views(dtype=dtype)
+    path = write(tmp_path, views, "eslf")
+    pixels = np.asarray(Image.open(path))
     assert pixels.shape == (HEIGHT * GRID.rows, WIDTH * GRID.columns, 3)
-    for view in made_views():
-        assert np.array_equal(pixels[view.row :: GRID.rows, view.column :: GRID.columns], view.colors)
-
-
-def test_exr_has_a_part_a_view(tmp_path: Path) -> None:
-    path = written(tmp_path, "exr", made_views())
-    views = {f"v{view.row:02d}_u{view.column:02d}": view for view in made_views()}
-    names = []
-    for index in range(len(views)):
-        part = oiio.ImageBuf(str(path), index, 0)
-        names.append(part.spec().get_string_attribute("oiio:subimagename"))
-        view, pixels = views[names[-1]], part.get_pixels(oiio.FLOAT)
-        assert part.spec().channelnames == ("R", "G", "B", "disparity")
-        np.testing.assert_allclose(pixels[..., :3], linear_from_srgb(view.colors / 255), rtol=1e-3, atol=1e-6)
-        np.testing.assert_array_equal(pixels[..., 3], view.disparity)
-    assert sorted(names) == names == sorted(views)
-    oiio.geterror()
+    by_place = {(view.row, view.column): view.colors for view in read_views(open_light_field(path))[1]}
+    for view in views:
+        expected = view.colors if dtype == np.uint8 else np.rint(view.colors.astype(float).clip(0, 1) * 255)
+        np.testing.assert_allclose(pixels[view.row :: GRID.rows, view.column :: GRID.columns], expected, atol=1)
+        np.testing.assert_allclose(by_place[view.row, view.column].astype(int), expected, atol=1)
 
 
 @pytest.mark.parametrize("layout", WRITERS)
-def test_a_field_with_a_gap_is_not_written(tmp_path: Path, layout: str) -> None:
-    with pytest.raises(InputError, match="11 of 12 views"):
-        written(tmp_path, layout, made_views()[:-1])
-    assert list(tmp_path.iterdir()) == []
+def test_an_incomplete_or_interrupted_field_leaves_nothing_and_keeps_the_older_one(tmp_path: Path, layout: str) -> None:
+    def interrupted() -> Iterator[ViewUpdate]:
+        yield from make_views()[:7]
+        raise KeyboardInterrupt
+
+    for has_older in (False, True):
+        with pytest.raises(InputError, match="only 14 of 15 views"):
+            write(tmp_path, make_views()[:-1], layout)
+        with pytest.raises(KeyboardInterrupt):
+            write(tmp_path, interrupted(), layout)
+        assert list(tmp_path.iterdir()) == ([tmp_path / NAMES[layout]] if has_older else [])
+        write(tmp_path, make_views(), layout)
+        assert open_light_field(tmp_path / NAMES[layout]).grid == GRID
 
 
-@pytest.mark.parametrize("layout", ENDINGS)
-def test_files_have_their_endings_and_replace_nothing_unasked(tmp_path: Path, layout: str) -> None:
-    with pytest.raises(InputError, match="must end in"):
-        writer_for(layout).require_place(tmp_path / "a.gif", (), False)
-    there = tmp_path / f"a{ENDINGS[layout]}"
-    there.touch()
+def test_an_older_light_field_is_replaced_whole(tmp_path: Path) -> None:
+    write(tmp_path, make_views())
+    folder = write(tmp_path, make_views(GridShape(1, 1)), grid=GridShape(1, 1))
+    assert len(list(folder.glob("input_Cam*"))) == 1
+    assert list(tmp_path.iterdir()) == [folder]
+
+
+def test_foreign_folders_are_left_alone(tmp_path: Path) -> None:
+    (tmp_path / "field").mkdir()
+    (tmp_path / "field" / "beach.jpg").touch()
+    for attempt in (write, lambda folder, views: check_light_field(folder / "field", "hci", (), True)):
+        with pytest.raises(InputError, match=r"field: holds other files \(beach.jpg\)"):
+            attempt(tmp_path, make_views())
+    assert [path.name for path in tmp_path.rglob("*.*")] == ["beach.jpg"]
+
+
+def test_what_cannot_be_written_is_refused_before(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"'mp4' is not a layout that can be written: give hci or eslf"):
+        check_light_field(tmp_path / "a", "mp4")
+    with pytest.raises(InputError, match=r"must end in _eslf\.png"):
+        check_light_field(tmp_path / "a.gif", "eslf")
+    (tmp_path / "a_eslf.png").touch()
     with pytest.raises(InputError, match="--force"):
-        writer_for(layout).require_place(there, (), False)
-    writer_for(layout).require_place(there, (), True)
-
-
-def test_views_of_two_sizes_are_a_mistake_of_the_caller(tmp_path: Path) -> None:
-    small = ViewUpdate(0, 0, np.zeros((2, 2, 3), np.uint8), None)
-    for layout in WRITERS:
-        with pytest.raises(ValueError, match="2x2"):
-            written(tmp_path, layout, [made_views()[0], small])
+        check_light_field(tmp_path / "a_eslf.png", "eslf")
+    check_light_field(tmp_path / "a_eslf.png", "eslf", force=True)
+    with pytest.raises(InputError, match="is a file"):
+        check_light_field(tmp_path / "a_eslf.png", "hci")

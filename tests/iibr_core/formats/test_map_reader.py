@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from iibr_core.formats.images.oiio_writer import write_image_file
+from iibr_core.formats.images.write import write_image_file
 from iibr_core.formats.maps import resample
 from iibr_core.formats.maps.pfm import write_pfm
 from iibr_core.formats.maps.reader import read_map, read_map_header

@@ -15,8 +15,9 @@ from PIL import Image
 
 from iibr_core.formats.images.alike_halves import is_one_scene
 from iibr_core.formats.images.jps import read_jps_descriptor
-from iibr_core.formats.images.photo import read_photo, write_image
+from iibr_core.formats.images.photo import read_photo
 from iibr_core.formats.images.side_by_side import own_picture, side_by_side_pair, stated_layout, stated_pair
+from iibr_core.formats.images.write import write_image
 from iibr_core.formats.light_fields.light_field_formats import open_light_field
 from iibr_core.formats.light_fields.views import read_views
 from iibr_core.types import ImageSize, InputError

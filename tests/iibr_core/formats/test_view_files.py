@@ -1,4 +1,4 @@
-"""Light fields and stereo photos in one file: tiles, lenses, pictures for two eyes."""
+"""Light fields in one file: quilts, lenslet images, and all kinds of stereo photos."""
 
 from __future__ import annotations
 
@@ -9,27 +9,20 @@ from io import BytesIO
 from pathlib import Path
 
 import numpy as np
-import OpenImageIO as oiio
 import pytest
 from PIL import Image
 
 from iibr_core.depth.embedded.embedded_depth import read_embedded
 from iibr_core.depth.estimates import RelativeInverseDepth
 from iibr_core.formats.images.lif import open_lif
-from iibr_core.formats.images.oiio_reader import Raster
 from iibr_core.formats.images.photo import read_photo
-from iibr_core.formats.images.picture_source import PicturePart, PictureSource, part_of, read_source, source_size
+from iibr_core.formats.images.picture_source import PicturePart, PictureSource, read_source, source_size
 from iibr_core.formats.images.spatial_photo import write_spatial_photo
 from iibr_core.formats.light_fields import views as views_module
-from iibr_core.formats.light_fields.light_field_formats import (
-    find_light_field,
-    is_light_field,
-    open_light_field,
-    writer_for,
-)
+from iibr_core.formats.light_fields.light_field_formats import find_light_field, is_light_field, open_light_field
 from iibr_core.formats.light_fields.views import read_views
-from iibr_core.formats.quilts import Quilt, lay_out, quilt_named
-from iibr_core.types import GridShape, ImageSize, InputError, ViewUpdate
+from iibr_core.formats.quilts import Quilt, lay_out
+from iibr_core.types import GridShape, ImageSize, InputError
 
 HEIGHT, WIDTH = 6, 9
 RNG = np.random.default_rng(0)
@@ -41,34 +34,28 @@ def pictures(count: int, height: int = HEIGHT, width: int = WIDTH) -> list[np.nd
 
 def read_back(path: Path) -> dict[tuple[int, int], np.ndarray]:
     size, views = read_views(open_light_field(path))
-    found = {(view.row, view.column): view.colors for view in views}
-    assert all(colors.shape == (*size, 3) for colors in found.values())
-    return found
+    by_place = {(view.row, view.column): view.colors for view in views}
+    assert all(colors.shape == (*size, 3) for colors in by_place.values())
+    return by_place
 
 
-def write_quilt(folder: Path, quilt: Quilt, tiles: list[np.ndarray], more: str = "") -> Path:
-    path = folder / f"scene{quilt.tag}{more}.png"
+def write_quilt(folder: Path, quilt: Quilt, tiles: list[np.ndarray]) -> Path:
+    path = folder / f"scene{quilt.tag}.png"
     Image.fromarray(lay_out(quilt, tiles)).save(path)
     return path
 
 
-@pytest.mark.parametrize("more", ["", "z1.2f0.0"])
-def test_quilts_are_read_as_they_are_written(tmp_path: Path, more: str) -> None:
+def test_quilts_are_read_as_they_are_written_and_decoded_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     quilt, tiles = Quilt(3, 2, ImageSize(2 * HEIGHT + 1, 3 * WIDTH + 2), WIDTH / HEIGHT), pictures(6)
-    path = write_quilt(tmp_path, quilt, tiles, more)
+    path = write_quilt(tmp_path, quilt, tiles)
     assert is_light_field(path)
     scene = open_light_field(path)
     assert (scene.name, scene.grid) == ("scene", GridShape(1, 6))
-    found = read_back(path)
-    for k, tile in enumerate(tiles):
-        np.testing.assert_array_equal(found[0, k], tile)
-
-
-def test_a_quilt_is_decoded_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    path = write_quilt(tmp_path, Quilt(3, 2, ImageSize(2 * HEIGHT, 3 * WIDTH), WIDTH / HEIGHT), pictures(6))
     decoded = []
     monkeypatch.setattr(views_module, "read_source", lambda source: decoded.append(source) or read_source(source))
-    read_back(path)
+    views = read_back(path)
+    for k, tile in enumerate(tiles):
+        np.testing.assert_array_equal(views[0, k], tile)
     assert decoded == [PictureSource(path)]
 
 
@@ -76,41 +63,26 @@ def test_a_quilt_is_decoded_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 def test_tiles_are_stretched_to_the_shape_they_are_displayed_in(tmp_path: Path, aspect: float, size: ImageSize) -> None:
     level = [np.full((HEIGHT, WIDTH, 3), 40 * k, np.uint8) for k in range(4)]
     path = write_quilt(tmp_path, Quilt(2, 2, ImageSize(2 * HEIGHT, 2 * WIDTH), aspect), level)
-    found = read_back(path)
-    assert found[0, 0].shape == (*size, 3)
-    assert [int(found[0, k].mean()) for k in range(4)] == [0, 40, 80, 120]
+    views = read_back(path)
+    assert views[0, 0].shape == (*size, 3)
+    assert [int(views[0, k].mean()) for k in range(4)] == [0, 40, 80, 120]
 
 
-@pytest.mark.parametrize(
-    ("tag", "problem"),
-    [("_qs0x6a1", "0x6"), ("_qs99999x1a1", "99999x1"), ("_qs2x2a0", "aspect"), ("_qs32x32a1", "too few")],
-)
-def test_names_that_no_quilt_can_have(tmp_path: Path, tag: str, problem: str) -> None:
+@pytest.mark.parametrize(("tag", "problem"), [("_qs0x6a1", "0x6"), ("_qs2x2a0", "aspect"), ("_qs32x32a1", "too few")])
+def test_impossible_names_of_quilts_are_refused(tmp_path: Path, tag: str, problem: str) -> None:
     path = tmp_path / f"scene{tag}.png"
     Image.fromarray(pictures(1)[0]).save(path)
     with pytest.raises(InputError, match=rf"scene{tag}\.png: .*{problem}"):
         open_light_field(path)
-    assert quilt_named(tmp_path / "scene.png", ImageSize(8, 8)) is None
 
 
-def test_lenslet_images_of_ours_are_read_whole(tmp_path: Path) -> None:
-    grid, path = GridShape(3, 4), tmp_path / "field_eslf.png"
-    tiles = dict(zip(np.ndindex(*grid), pictures(12)))
-    with writer_for("eslf")(path, grid, 40.0, "field", False) as writer:
-        for (row, column), tile in tiles.items():
-            writer.add(ViewUpdate(row, column, tile, None))
-    assert open_light_field(path).grid == grid
-    for at, colors in read_back(path).items():
-        np.testing.assert_array_equal(colors, tiles[at[0], at[1]])
-
-
-def test_of_a_lytros_lenslet_image_the_middle_views_are_taken(tmp_path: Path) -> None:
+def test_the_inner_views_of_a_lytros_lenslet_image_are_read(tmp_path: Path) -> None:
     whole = RNG.integers(0, 256, (14 * 3, 14 * 5, 3), np.uint8)
     Image.fromarray(whole).save(tmp_path / "img_1_eslf.png")
-    found = read_back(tmp_path / "img_1_eslf.png")
-    assert max(found) == (7, 7)
-    np.testing.assert_array_equal(found[0, 0], whole[3::14, 3::14])
-    np.testing.assert_array_equal(found[4, 6], whole[7::14, 9::14])
+    views = read_back(tmp_path / "img_1_eslf.png")
+    assert max(views) == (7, 7)
+    np.testing.assert_array_equal(views[0, 0], whole[3::14, 3::14])
+    np.testing.assert_array_equal(views[4, 6], whole[7::14, 9::14])
 
 
 def test_a_lenslet_image_of_no_whole_lenses(tmp_path: Path) -> None:
@@ -120,7 +92,7 @@ def test_a_lenslet_image_of_no_whole_lenses(tmp_path: Path) -> None:
 
 
 def smooth(height: int = 48, width: int = 64, shift: int = 0) -> np.ndarray:
-    """What lossy formats keep."""
+    """Return a picture that lossy formats keep."""
     y, x = np.mgrid[0:height, 0:width]
     return np.stack([127 + 100 * np.sin((x + shift) / 9), 2.0 * y, x + 0.0 * y], -1).astype(np.uint8)
 
@@ -134,7 +106,7 @@ def write_mpo(path: Path, left: np.ndarray, right: np.ndarray) -> None:
 
 
 def write_stereo_jpeg(path: Path, left: np.ndarray, right: np.ndarray) -> None:
-    """As cameras do: both pictures are said to be for the eyes."""
+    """Write what cameras write: both pictures are marked as an eye's."""
     write_mpo(path, left, right)
     stored = path.read_bytes()
     entries = stored.index(struct.pack("<I", 0x030000), stored.index(b"MPF") + 20)
@@ -150,10 +122,10 @@ def jpeg(pixels: np.ndarray) -> bytes:
     return stored.getvalue()
 
 
-def leia_image(left: np.ndarray, right: np.ndarray, *more: tuple[int, bytes], **own: object) -> bytes:
+def leia_image(left: np.ndarray, right: np.ndarray, *more: tuple[int, bytes], **inner: object) -> bytes:
     views = [
         {"image": {"blob_id": 10}, "position": {"x": 0.03, "y": 0, "z": 0}},
-        {"image": {"blob_id": -1}, "position": {"x": -0.03, "y": 0, "z": 0}, **own},
+        {"image": {"blob_id": -1}, "position": {"x": -0.03, "y": 0, "z": 0}, **inner},
     ]
     fields = [(8, json.dumps({"views": views}).encode()), (10, jpeg(right)), *more]
     body = b"".join(struct.pack(">II", number, len(data)) + data for number, data in fields)
@@ -169,10 +141,6 @@ def write_full(path: Path, left: np.ndarray, right: np.ndarray) -> None:
     Image.fromarray(np.hstack([left, right])).save(path)
 
 
-def write_half(path: Path, left: np.ndarray, right: np.ndarray) -> None:
-    Image.fromarray(np.hstack([left[:, ::2], right[:, ::2]])).save(path)
-
-
 def write_over(path: Path, left: np.ndarray, right: np.ndarray) -> None:
     Image.fromarray(np.vstack([left, right])).save(path)
 
@@ -184,9 +152,6 @@ STEREO: dict[str, tuple[str, Callable[[Path, np.ndarray, np.ndarray], None], str
     "leia": ("a.jpg", write_leia, "Leia stereo"),
     "lif": ("a.lif", write_leia, "Leia stereo"),
     "full": ("a_LRF_Full_SBS.png", write_full, "side-by-side stereo"),
-    "sbs": ("a_sbs.png", write_full, "side-by-side stereo"),
-    "half": ("a_LRF_Half_SBS.png", write_half, "side-by-side stereo"),
-    "leia half": ("a_half_2x1.png", write_half, "side-by-side stereo"),
     "over": ("a_TB.png", write_over, "side-by-side stereo"),
 }
 
@@ -200,28 +165,28 @@ def test_stereo_photos_have_two_views_and_show_the_left_one(tmp_path: Path, kind
     scene = open_light_field(path)
     assert (scene.layout, scene.grid, scene.place) == (layout, GridShape(1, 2), path)
     assert not is_light_field(path)  # it opens as a photo with depth
-    found = read_back(path)
+    views = read_back(path)
     for at, expected in (((0, 0), left), ((0, 1), right)):
-        assert found[at].shape == expected.shape
-        assert np.abs(found[at].astype(int) - expected).mean() < 3
+        assert views[at].shape == expected.shape
+        assert np.abs(views[at].astype(int) - expected).mean() < 3
     photo = read_photo(path)
-    np.testing.assert_allclose(photo.pixels * 255, found[0, 0], atol=0.51)
+    np.testing.assert_allclose(photo.pixels * 255, views[0, 0], atol=0.51)
 
 
 @pytest.mark.parametrize("kind", ["spatial", "mpo", "stereo jpeg", "lif", "full"])
-@pytest.mark.parametrize("share", [0.97, 0.6, 0.1])
+@pytest.mark.parametrize("share", [0.9, 0.6, 0.1])
 def test_cut_stereo_photos_are_refused_in_a_line_or_read_as_photos(tmp_path: Path, kind: str, share: float) -> None:
     name, write, _ = STEREO[kind]
     path = tmp_path / name
     write(path, smooth(), smooth(shift=4))
     path.write_bytes(path.read_bytes()[: int(share * path.stat().st_size)])
     if kind == "stereo jpeg" and find_light_field(path) is None:
-        return  # nothing says any more that it held two
+        return  # no longer marked as stereo
     with pytest.raises(InputError, match=rf"^{path}: [^\n]*$"):
         read_back(path)
 
 
-def test_pictures_of_two_sizes_are_no_pair(tmp_path: Path) -> None:
+def test_a_pair_of_two_sizes_is_refused(tmp_path: Path) -> None:
     write_mpo(tmp_path / "a.mpo", smooth(), smooth(40, 60))
     with pytest.raises(InputError, match=r"a\.mpo, picture 1: is 60x40, but a\.mpo is 64x48"):
         read_views(open_light_field(tmp_path / "a.mpo"))
@@ -241,26 +206,19 @@ def test_jpegs_with_other_pictures_are_no_stereo(tmp_path: Path) -> None:
     [
         (lambda data: data.replace(b'"blob_id": 10', b'"blob_id": 11'), "lack a picture"),
         (lambda data: data.replace(b'{"views"', b'["views"'), "cannot be read"),
-        (lambda data: data.replace(b'"views"', b'"sight"'), "cannot be read|beyond"),
-        (lambda data: data.replace(b'"blob_id": 10', b'"blob_id":1e9'), "lack a picture|cannot be read"),
-        (lambda data: leia_image(smooth(), smooth(), image={"blob_id": float("inf")}), "cannot be read"),
-        (lambda data: data.replace(struct.pack(">I", 8) + b"\0", struct.pack(">I", 9) + b"\0"), "nothing of views"),
         (lambda data: data[:-6] + struct.pack(">I", 20) + data[-2:], "fields|beyond"),
     ],
 )
 def test_damaged_leia_images_are_refused_in_a_line(
     tmp_path: Path, change: Callable[[bytes], bytes], problem: str
 ) -> None:
-    whole = leia_image(smooth(), smooth(shift=4))
-    assert change(whole) != whole
-    (tmp_path / "a.lif").write_bytes(change(whole))
+    (tmp_path / "a.lif").write_bytes(change(leia_image(smooth(), smooth(shift=4))))
     with pytest.raises(InputError, match=rf"a\.lif: .*({problem})"):
         open_lif(tmp_path / "a.lif")
 
 
-@pytest.mark.parametrize("ending", ["lfp", "lfr", "lfx", "raw", "LFP"])
-def test_raw_light_fields_are_refused_by_saying_what_decodes_them(tmp_path: Path, ending: str) -> None:
-    path = tmp_path / f"IMG_0001.{ending}"
+def test_raw_light_fields_are_refused_with_programs_that_decode_them(tmp_path: Path) -> None:
+    path = tmp_path / "IMG_0001.lfr"
     path.write_bytes(b"\x89LFP\r\n\x1a\n" + bytes(100))
     for read in (open_light_field, read_photo):
         with pytest.raises(InputError, match=r"raw light field .* decoded first: PlenoptiCam"):
@@ -278,7 +236,6 @@ def test_parts_are_of_the_upright_picture(tmp_path: Path) -> None:
     beyond = PictureSource(tmp_path / "a.tif", part=PicturePart((0, 3), ImageSize(6, 3)))
     with pytest.raises(InputError, match="smaller than it should be"):
         read_source(beyond)
-    oiio.geterror()
 
 
 def test_files_that_hold_no_light_field(tmp_path: Path) -> None:
@@ -290,28 +247,16 @@ def test_files_that_hold_no_light_field(tmp_path: Path) -> None:
         open_light_field(tmp_path / "missing_qs2x2a1.png")
 
 
-def test_a_leia_image_brings_its_own_inverse_depth(tmp_path: Path) -> None:
+def test_a_leia_image_contains_inverse_depth(tmp_path: Path) -> None:
     """White is near; a single view is a photo with depth."""
     grey = np.tile(np.arange(64, dtype=np.uint8) * 3, (48, 1))
     inner = {"inv_z_map": {"blob_id": 11, "min": 0.4, "max": 0.01}}
     path = tmp_path / "a.jpg"
     path.write_bytes(leia_image(smooth(), smooth(shift=4), (11, jpeg(grey)), **inner))
-    found = read_embedded(path)
-    assert found is not None
-    assert found.format == "Leia"
-    assert isinstance(found.estimate, RelativeInverseDepth)
-    np.testing.assert_allclose(found.estimate.values, grey / 255, atol=0.02)
+    depth = read_embedded(path)
+    assert depth is not None
+    assert depth.format == "Leia"
+    assert isinstance(depth.estimate, RelativeInverseDepth)
+    np.testing.assert_allclose(depth.estimate.values, grey / 255, atol=0.02)
     path.write_bytes(leia_image(smooth(), smooth(shift=4)))
     assert read_embedded(path) is None
-
-
-@pytest.mark.parametrize(("orientation", "turned"), [(None, np.s_[:, :]), (1, np.s_[:, :]), (2, np.s_[:, ::-1])])
-def test_what_is_taken_of_a_picture_is_upright_and_says_so(
-    tmp_path: Path, orientation: int | None, turned: tuple[slice, slice]
-) -> None:
-    pixels, spec = np.arange(24, dtype=np.uint8).reshape(2, 4, 3), oiio.ImageSpec(4, 2, 3, "uint8")
-    if orientation is not None:
-        spec.attribute("Orientation", orientation)
-    part = part_of(Raster(pixels, None, spec), PictureSource(tmp_path / "a.png", shown_size=ImageSize(2, 4)))
-    assert np.array_equal(part.pixels, pixels[turned])
-    assert part.spec.get_int_attribute("Orientation", 0) == 1

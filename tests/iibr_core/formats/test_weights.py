@@ -1,5 +1,7 @@
-import json
+"""Weights on disk: the round trip, and files that are damaged or belong to another model."""
+
 import re
+from contextlib import suppress
 
 import numpy as np
 import pytest
@@ -24,9 +26,9 @@ def same(one, other):
     return one.keys() == other.keys() and all(np.array_equal(one[name], other[name]) for name in one)
 
 
-def refused(path, match, model=None):
-    """Loading fails with one line that names the file, and the model stays as it was."""
-    model = model or small_model(seed=9)
+def require_refusal(path, match):
+    """Loading fails with one line that names the file, and the model stays unchanged."""
+    model = small_model(seed=9)
     before = values(model)
     with pytest.raises(InputError, match=match) as caught:
         load_weights(path, model)
@@ -39,29 +41,20 @@ def refused(path, match, model=None):
 def test_round_trip_with_metadata(tmp_path):
     path = tmp_path / "weights.safetensors"
     saved, loaded = small_model(0), small_model(1)
-    save_weights(saved, path, {"command": "iibr train --seed 3", "commit": "abc"})
+    stated = {"command": 'iibr train --out "ä b.safetensors"\n', "commit": "abc"}
+    save_weights(saved, path, stated)
     metadata = load_weights(path, loaded)
     assert same(values(saved), values(loaded))
-    assert metadata == {
-        "command": "iibr train --seed 3",
-        "commit": "abc",
-        "content": "iibr-weights",
-        "version": VERSION,
-    }
-    tensors, metadata_again = read_weights(path)
-    assert same(tensors, values(saved))
-    assert metadata_again == metadata
+    assert metadata == {**stated, "content": "iibr-weights", "version": VERSION}
     assert list(tmp_path.iterdir()) == [path]
 
 
-def test_the_file_may_be_replaced_or_removed_while_its_weights_are_in_use(tmp_path):
+def test_the_file_may_be_replaced_while_its_weights_are_in_use(tmp_path):
     path = tmp_path / "weights.safetensors"
-    model = small_model()
-    save_weights(model, path)
+    save_weights(small_model(), path)
     tensors, _ = read_weights(path)
     before = {name: array.copy() for name, array in tensors.items()}
     path.write_bytes(b"\0" * path.stat().st_size)
-    path.unlink()
     assert same(tensors, before)
 
 
@@ -75,94 +68,54 @@ def test_tied_and_transposed_weights(tmp_path):
     assert same(values(model), values(other))
 
 
-def test_missing_empty_and_foreign_files(tmp_path):
-    refused(tmp_path / "none.safetensors", "no such file")
-    refused(tmp_path, "is a folder")
-    for name, content, match in [
-        ("empty", b"", "empty"),
-        ("text", b"not weights at all, but long enough to hold a header length", "not a safetensors file"),
-        ("pickle", b"\x80\x02}q\x00.", "not a safetensors file"),
-        ("huge header", b"\xff" * 64, "not a safetensors file"),
-    ]:
-        path = tmp_path / f"{name}.safetensors"
+@pytest.mark.parametrize(
+    ("content", "match"),
+    [
+        (None, "no such file"),
+        (b"", "empty"),
+        (b"not weights at all, but long enough to hold a header length", "not a safetensors file"),
+        (b"\x80\x02}q\x00.", "not a safetensors file"),
+        (b"\xff" * 64, "not a safetensors file"),
+    ],
+)
+def test_foreign_files(tmp_path, content, match):
+    path = tmp_path / "a.safetensors"
+    if content is not None:
         path.write_bytes(content)
-        refused(path, match)
+    require_refusal(path, match)
 
 
-def test_every_truncation_is_refused(tmp_path):
-    whole = tmp_path / "weights.safetensors"
-    save_weights(small_model(), whole, {"command": "iibr train"})
-    data = whole.read_bytes()
-    cut = tmp_path / "cut.safetensors"
-    for length in range(1, len(data)):
-        cut.write_bytes(data[:length])
-        refused(cut, "not a safetensors file, or is damaged")
-
-
-def test_a_damaged_header_is_refused_or_harmless(tmp_path):
-    """A flipped bit either makes the file unreadable or changes numbers only: nothing but InputError comes out."""
-    whole = tmp_path / "weights.safetensors"
-    save_weights(small_model(), whole)
-    data = whole.read_bytes()
-    header = 8 + int.from_bytes(data[:8], "little")
-    damaged, refusals = tmp_path / "damaged.safetensors", 0
-    for position in range(header):
+def test_truncated_files_are_refused_and_flipped_bits_are_harmless(tmp_path):
+    path = tmp_path / "weights.safetensors"
+    save_weights(small_model(), path, {"command": "iibr train"})
+    data = path.read_bytes()
+    for length in range(1, len(data), 7):
+        path.write_bytes(data[:length])
+        require_refusal(path, "not a safetensors file, or is damaged")
+    for position in range(8 + int.from_bytes(data[:8], "little")):
         broken = bytearray(data)
         broken[position] ^= 1 << position % 8
-        damaged.write_bytes(broken)
-        try:
-            load_weights(damaged, small_model())
-        except InputError:
-            refusals += 1
-    assert refusals > header // 2
+        path.write_bytes(broken)
+        with suppress(InputError):
+            load_weights(path, small_model())
 
 
 def test_other_versions_and_contents(tmp_path):
     path = tmp_path / "weights.safetensors"
     tensors = values(small_model())
     path.write_bytes(save(tensors, {"content": "iibr-weights", "version": "999"}))
-    refused(path, f"version 999 of iibr-weights, this program reads version {VERSION}")
-    path.write_bytes(save(tensors, {"content": "iibr-weights"}))
-    refused(path, "version None")
+    require_refusal(path, f"version 999 of iibr-weights, this program reads version {VERSION}")
     path.write_bytes(save(tensors))
-    refused(path, "tensors of unknown origin")
+    require_refusal(path, "tensors of unknown origin")
     write_tensors(path, "iibr-checkpoint", tensors, {})
-    refused(path, "holds iibr-checkpoint, not iibr-weights")
+    require_refusal(path, "holds iibr-checkpoint, not iibr-weights")
 
 
 def test_weights_of_another_model(tmp_path):
     path = tmp_path / "weights.safetensors"
     save_weights(small_model(width=5), path)
-    refused(path, re.escape("0.bias is (5,), this model needs (4,)"))
+    require_refusal(path, re.escape("0.bias is (5,), this model needs (4,)"))
     save_weights(nn.Linear(3, 4), path)
-    refused(path, "lacks 0.bias")
+    require_refusal(path, "lacks 0.bias")
     save_weights(nn.Sequential(*small_model(), nn.Linear(1, 1)), path)
-    refused(path, "holds 3.bias, which this model lacks")
-
-
-@pytest.mark.parametrize("bad", [float("nan"), float("inf")])
-def test_numbers_that_are_not_finite(tmp_path, bad):
-    path = tmp_path / "weights.safetensors"
-    model = small_model()
-    with torch.no_grad():
-        model[0].weight[1, 2] = bad
-    save_weights(model, path)
-    refused(path, "0.weight holds values that are not finite")
-
-
-def test_a_write_that_fails_keeps_the_file_that_was_there(tmp_path):
-    path = tmp_path / "weights.safetensors"
-    save_weights(small_model(), path)
-    before = path.read_bytes()
-    with pytest.raises(ValueError, match='"version" is set by'):
-        save_weights(small_model(1), path, {"version": "7"})
-    assert path.read_bytes() == before
-    with pytest.raises(InputError, match=r"folder .* does not exist"):
-        save_weights(small_model(), tmp_path / "nowhere" / "weights.safetensors")
-
-
-def test_metadata_keeps_any_text(tmp_path):
-    path = tmp_path / "weights.safetensors"
-    text = json.dumps({"command": 'iibr train --out "ä b.safetensors"\n', "empty": ""}, ensure_ascii=False)
-    save_weights(small_model(), path, {"training": text})
-    assert read_weights(path)[1]["training"] == text
+    require_refusal(path, "holds 3.bias, which this model lacks")

@@ -14,7 +14,7 @@ from scipy.ndimage import shift
 
 import iibr_core as iibr
 from iibr_core.color import linear_from_srgb, srgb_from_linear
-from iibr_core.formats.images.photo import write_image
+from iibr_core.formats.images.write import write_image
 from iibr_core.formats.maps.pfm import write_pfm
 from iibr_core.generation.light_field import generate
 from iibr_core.generation.plan import plan_literal

@@ -11,7 +11,7 @@ import pytest
 
 from iibr_core.color import bytes_from_encoded
 from iibr_core.depth.choice import DepthChoice
-from iibr_core.formats.images.oiio_writer import write_image_file
+from iibr_core.formats.images.write import write_image_file
 from iibr_core.rendering.optics import CENTRE
 from iibr_core.runtime.tiling import Cancelled
 from iibr_core.scenes.lens_limits import focus_limits

@@ -80,7 +80,8 @@ def test_views_come_twice_where_they_may_and_progress_counts_them_once(photo_pat
 
 
 def test_a_photo_tells_its_focal_length_only_where_it_knows_it(photo_path: Path, tmp_path: Path) -> None:
-    from iibr_core.formats.images.photo import read_photo, write_image
+    from iibr_core.formats.images.photo import read_photo
+    from iibr_core.formats.images.write import write_image
 
     known = tmp_path / "known.png"
     write_image(known, np.zeros((20, 30, 3), np.uint8), {"Exif:FocalLengthIn35mmFilm": 50})
@@ -112,15 +113,13 @@ def test_a_loaded_photo_is_not_read_again(photo_path: Path) -> None:
 
 @pytest.mark.parametrize("with_disparity", [True, False])
 def test_a_light_field_folder_goes_the_same_way(tmp_path: Path, photo_path: Path, with_disparity: bool) -> None:
-    from iibr_core.formats.light_fields.hci import HciWriter
+    from iibr_core.formats.light_fields.write import write_light_field
 
     request = SceneRequest(1, Source(str(photo_path), grid=GridShape(3, 3)), takes_drafts=False)
     made = list(results_of(request, lambda: False, lambda: CENTRE))
     folder = tmp_path / "field"
-    with HciWriter(folder, GridShape(3, 3), 100.0, "field", with_disparity) as writer:
-        for result in made:
-            if isinstance(result, ViewReady):
-                writer.add(result.view)
+    views = (result.view for result in made if isinstance(result, ViewReady))
+    write_light_field(folder, "hci", GridShape(3, 3), views, 100.0, "field", with_disparity)
     results = results_of(SceneRequest(2, Source(str(folder))), lambda: False, lambda: CENTRE)
     ready, views = next(showings(results))
     assert (ready.scene.grid, ready.scene.plan, ready.loaded) == ((3, 3), None, None)

@@ -13,7 +13,7 @@ from imgui_bundle import imgui
 from PIL import Image, ImageSequence
 
 from iibr_core.depth.editing.edits import DepthEdits
-from iibr_core.exports.options import ExportOptions
+from iibr_core.exports.kinds import ExportOptions
 from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.exports.source import ExportSource
 from iibr_core.formats.images.photo import read_photo
@@ -88,13 +88,13 @@ def test_the_window_lives_on_while_it_exports(viewer: Driver, tmp_path: Path) ->
 
 
 def test_a_light_field_is_made_anew_beside_the_window(viewer: Driver, tmp_path: Path) -> None:
-    viewer.app.do(DoTask(ExportTask("numbered-grid", str(tmp_path / "field"))))
+    viewer.app.do(DoTask(ExportTask("hci", str(tmp_path / "field"))))
     viewer.until(lambda app: bool(texts(app)))
     assert texts(viewer.app) == [f"Exported {tmp_path / 'field'}"]
     shown = viewer.app.scene_view.renderer.converged_picture(
         RenderSettings(viewer.app.state.optics, ScreenSize(96, 64))
     ).astype(int)
-    view = np.asarray(Image.open(tmp_path / "field" / "v01_u01.png")).astype(int)
+    view = np.asarray(Image.open(tmp_path / "field" / "input_Cam004.png")).astype(int)
     assert np.abs(view - shown).max() <= 2
 
 
@@ -161,7 +161,7 @@ def slow(monkeypatch: pytest.MonkeyPatch) -> None:
     "task",
     [
         ExportTask("gif", "a.gif", SMALL),
-        ExportTask("numbered-grid", "a"),
+        ExportTask("hci", "a"),
         SaveTask("a.png", ScreenSize(900, 600)),
         SaveTask("a.exr", ScreenSize(900, 600)),
     ],
@@ -195,7 +195,7 @@ def test_what_is_under_way_stays_as_it_was_asked_for_whatever_is_changed(
     assert alone == disturbed
 
 
-@pytest.mark.parametrize("kind", ["gif", "numbered-grid"])
+@pytest.mark.parametrize("kind", ["gif", "hci"])
 def test_what_is_asked_for_before_all_views_are_there_is_not_lost_with_its_photo(
     open_window: Opener, photo_path: Path, tmp_path: Path, kind: str
 ) -> None:
@@ -219,7 +219,7 @@ def test_what_is_asked_for_before_all_views_are_there_is_not_lost_with_its_photo
     assert list(early.values()) == list(late.values())
 
 
-@pytest.mark.parametrize(("kind", "most"), [("anaglyph", 2), ("numbered-grid", 0)])
+@pytest.mark.parametrize(("kind", "most"), [("anaglyph", 2), ("hci", 0)])
 def test_of_a_scene_that_was_left_only_the_views_are_made_that_are_shown(
     open_window: Opener, photo_path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: str, most: int
 ) -> None:
@@ -336,7 +336,7 @@ def test_it_is_asked_for_by_key_and_says_what_is_wrong(viewer: Driver, tmp_path:
         assert isinstance(asked, ExportPrompt)
         assert (asked.already_there, bool(asked.problem)) == (kind == "sbs", kind != "sbs")
     assert there.read_text() == "mine"
-    app.do(DoTask(ExportTask("sbs", str(tmp_path / "there.png"), replace(SMALL, frames=None), may_replace=True)))
+    app.do(DoTask(ExportTask("sbs", str(tmp_path / "there.png"), replace(SMALL, frames=0), may_replace=True)))
     viewer.until(lambda app: bool(texts(app)))
     assert texts(app) == [f"Exported {there}"]
     assert app.state.prompt is None

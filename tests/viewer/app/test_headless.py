@@ -92,7 +92,7 @@ def test_the_contact_sheet_shows_six_different_pictures(viewer: HeadlessViewer) 
 
 @pytest.mark.parametrize("pixels", [np.zeros((1, 1, 3)), np.full((7, 1, 3), 128), np.full((1, 5, 3), 255)])
 def test_tiny_photos_open(tmp_path: Path, viewer: HeadlessViewer, pixels: np.ndarray) -> None:
-    from iibr_core.formats.images.photo import write_image
+    from iibr_core.formats.images.write import write_image
 
     write_image(tmp_path / "tiny.png", pixels.astype(np.uint8))
     viewer.open(Source(str(tmp_path / "tiny.png")), 1.0, lambda progress: None)

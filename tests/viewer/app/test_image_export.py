@@ -12,7 +12,7 @@ import pytest
 
 from iibr_core.color import srgb_from_linear
 from iibr_core.exports.render_settings import RenderSettings
-from iibr_core.formats.images.picture_kinds import KINDS, PictureFormat, is_float
+from iibr_core.formats.images.write import KINDS, PictureFormat, is_float
 from iibr_core.scenes.scene import Source
 from iibr_core.types import GridShape, InputError, ViewOffset
 from tests.viewer.conftest import HEIGHT, WIDTH, headless_with_scene
@@ -30,7 +30,7 @@ from viewer.model.state.tasks import SaveTask
 
 @pytest.fixture(scope="module")
 def photo(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    from iibr_core.formats.images.photo import write_image
+    from iibr_core.formats.images.write import write_image
 
     folder = tmp_path_factory.mktemp("saving")
     y, x = np.indices((HEIGHT, WIDTH))

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from iibr_core.formats.images.photo import write_image
-from iibr_core.formats.light_fields.hci import HciWriter
+from iibr_core.formats.images.write import write_image
+from iibr_core.formats.light_fields.write import write_light_field
 from iibr_core.generation.light_field import generate
 from iibr_core.generation.plan import plan_literal
 from iibr_core.rendering.optics import Optics
@@ -46,9 +46,11 @@ def write_truth(photo: Path, folder: Path, shift: int = 0) -> Path:
     """The light field that the photo gives at its disparity as it is, brighter by `shift` steps of 255."""
     loaded = load_photo(Source(str(photo)))
     plan = plan_literal(loaded.photo, loaded.disparity, GRID)
-    with HciWriter(folder, GRID, 100.0, folder.name) as writer:
-        for view in generate(loaded.photo, plan.field_disparity(loaded.disparity), plan):
-            writer.add(replace(view, colors=np.minimum(view.colors, 255 - shift) + np.uint8(shift)))
+    views = (
+        replace(view, colors=np.minimum(view.colors, 255 - shift) + np.uint8(shift))
+        for view in generate(loaded.photo, plan.field_disparity(loaded.disparity), plan)
+    )
+    write_light_field(folder, "hci", GRID, views, 100.0, folder.name)
     return folder
 
 

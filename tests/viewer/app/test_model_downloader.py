@@ -13,7 +13,7 @@ import pytest
 from iibr_core.depth.estimators import estimate_cache
 from iibr_core.depth.estimators.catalog import fetch, known_model, model_here
 from iibr_core.depth.estimators.download import VERIFIED
-from iibr_core.formats.images.photo import write_image
+from iibr_core.formats.images.write import write_image
 from iibr_core.runtime.tiling import Cancelled, ShouldStop
 from iibr_core.scenes.scene import Source, source_beside
 from iibr_core.types import GridShape, ViewOffset, ignore_progress

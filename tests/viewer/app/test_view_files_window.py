@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from iibr_core.formats.light_fields.light_field_formats import writer_for
+from iibr_core.formats.light_fields.write import write_light_field
 from iibr_core.formats.quilts import Quilt, lay_out
 from iibr_core.generation import dense_field
 from iibr_core.runtime.tiling import ShouldStop, raise_if_stopped
@@ -42,9 +42,8 @@ def write_quilt(folder: Path) -> Path:
 
 def write_lenslet_image(folder: Path) -> Path:
     grid = GridShape(3, 3)
-    with writer_for("eslf")(folder / "wall_eslf.png", grid, 60.0, "wall", False) as writer:
-        for row, column in np.ndindex(*grid):
-            writer.add(ViewUpdate(row, column, wall(*grid.offset(row, column)), None))
+    views = (ViewUpdate(*at, wall(*grid.offset(*at)), None) for at in np.ndindex(*grid))
+    write_light_field(folder / "wall_eslf.png", "eslf", grid, views, 60.0, "wall")
     return folder / "wall_eslf.png"
 
 

@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 from imgui_bundle import imgui
 
-from iibr_core.formats.images.photo import read_photo, write_image
-from iibr_core.formats.images.settings_text import ATTRIBUTE
+from iibr_core.formats.images.metadata import SETTINGS_KEY
+from iibr_core.formats.images.photo import read_photo
+from iibr_core.formats.images.write import write_image
 from iibr_core.rendering.optics import Optics
 from iibr_core.scenes.scene import Source
 from iibr_core.types import GridShape, ViewOffset
@@ -100,7 +101,7 @@ def test_a_dropped_saved_picture_offers_its_settings(viewer: Driver, tmp_path: P
 
 def test_a_picture_with_damaged_settings_opens_as_a_photo_with_a_notice(viewer: Driver, tmp_path: Path) -> None:
     out = tmp_path / "damaged.png"
-    write_image(out, np.full((64, 96, 3), 100, np.uint8), {ATTRIBUTE: '{"format": 1, "optics": {}}'})
+    write_image(out, np.full((64, 96, 3), 100, np.uint8), {SETTINGS_KEY: '{"format": 1, "optics": {}}'})
     viewer.app.window.on_drop(None, [str(out)])
     viewer.until(lambda app: app.state.scene is not None and app.state.scene.name == "damaged")
     assert viewer.app.state.optics == Optics()

@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 
 from iibr_core.evaluation.metrics import flip, psnr
-from iibr_core.formats.images.photo import write_image
-from iibr_core.formats.light_fields.hci import HciWriter
+from iibr_core.formats.images.write import write_image
 from iibr_core.formats.light_fields.light_field_formats import open_light_field
 from iibr_core.formats.light_fields.views import read_stored_view, read_views
+from iibr_core.formats.light_fields.write import write_light_field
 from iibr_core.generation.light_field import generate, ray_set
 from iibr_core.generation.plan import plan_for_viewing, plan_literal
 from iibr_core.inpainting.registry import INPAINTERS
@@ -55,9 +55,8 @@ def truth(inputs: ComparisonInputs, tmp_path: Path) -> GroundTruth:
     loaded = inputs.loaded
     assert loaded is not None
     plan = plan_literal(loaded.photo, loaded.disparity, GRID)
-    with HciWriter(tmp_path / "truth", GRID, 100.0, "truth") as writer:
-        for view in generate(loaded.photo, plan.field_disparity(loaded.disparity), plan, quality=inputs.quality):
-            writer.add(view)
+    views = generate(loaded.photo, plan.field_disparity(loaded.disparity), plan, quality=inputs.quality)
+    write_light_field(tmp_path / "truth", "hci", GRID, views, 100.0, "truth")
     height, width = loaded.photo.size
     return GroundTruth(str(tmp_path / "truth"), "truth", GRID, width, height)
 

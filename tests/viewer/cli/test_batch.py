@@ -1,4 +1,4 @@
-"""`iibr batch` with real worker processes, and what is left when they, or photos, go wrong."""
+"""`iibr batch` with real processes: killed workers, Ctrl-C, and a Dask cluster on this machine."""
 
 from __future__ import annotations
 
@@ -10,237 +10,191 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
 import psutil
 import pytest
+from PIL import Image
 
 from iibr_core.depth.choice import BETTER_WAYS
-from iibr_core.formats.images.photo import write_image
+from iibr_core.types import InputError
+from viewer.cli.batch import is_secure
+from viewer.cli.main import app
+
+needs_process_groups = pytest.mark.skipif(os.name != "posix", reason="process groups")
 
 
 @pytest.fixture
 def archive(tmp_path: Path) -> Path:
-    """Three photos, and a damaged one."""
+    """A folder of many photos: a batch can be interrupted before its end."""
     folder = tmp_path / "photos"
-    (folder / "sub").mkdir(parents=True)
-    for number, name in enumerate(("a.png", "b.png", "sub/a.png")):
-        texture = np.random.default_rng(number).integers(0, 255, (24, 32, 3))
-        write_image(folder / name, texture.astype(np.uint8))
-    (folder / "torn.png").write_bytes((folder / "a.png").read_bytes()[:200])
+    folder.mkdir()
+    for number in range(12):
+        pixels = np.random.default_rng(number).integers(0, 255, (24, 32, 3)).astype(np.uint8)
+        Image.fromarray(pixels).save(folder / f"{number:02}.png")
     return folder
 
 
-def iibr(*words: object) -> list[str]:
-    return [sys.executable, "-P", "-m", "viewer", *map(str, words)]
+def command(archive: Path, *words: object, to: str = "hci") -> list[str]:
+    options = ("--to", to, "--grid", "3", "-o", archive.with_name("out"))
+    return [sys.executable, "-P", "-m", "viewer", "batch", str(archive), *map(str, (*options, *words))]
 
 
-def run_batch(*words: object) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(iibr("batch", *words), capture_output=True, text=True, timeout=300)
+def run_batch(archive: Path, *words: object, to: str = "hci") -> subprocess.CompletedProcess[str]:
+    return subprocess.run(command(archive, *words, to=to), capture_output=True, text=True, timeout=300)
 
 
-def summary_of(out: Path, written: int, there_before: int, failed: int) -> list[str]:
-    """What a batch says of photos that have no depth of their own."""
-    exported = written + there_before
-    return [
-        f"{out}: {written} written, {there_before} there before, {failed} failed",
-        f"{exported} of {exported} photos have guessed depth. {BETTER_WAYS}",
-    ]
+def start_batch(archive: Path, *words: object) -> subprocess.Popen[str]:
+    """Start a batch in a process group of its own."""
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    return subprocess.Popen(command(archive, *words), text=True, start_new_session=True, **pipes)  # type: ignore[call-overload,no-any-return]
+
+
+def wait_until(run: subprocess.Popen[str], is_reached: Callable[[], object]) -> None:
+    while not is_reached():
+        assert run.poll() is None, run.communicate()
+        time.sleep(0.01)
+
+
+def exports_in(out: Path) -> list[Path]:
+    return sorted(path for path in out.glob("*") if path.name.isdecimal())
 
 
 def workers_of(run: subprocess.Popen[str]) -> list[psutil.Process]:
     children = psutil.Process(run.pid).children()
-    return [process for process in children if "spawn_main" in " ".join(process.cmdline())]
+    return [child for child in children if "spawn_main" in " ".join(child.cmdline())]
 
 
-def test_an_archive_is_exported_once(archive: Path, tmp_path: Path) -> None:
-    out = tmp_path / "out"
-    words = (archive, "--to", "depth", "-o", out, "--workers", 2)
-    done = run_batch(*words)
-    assert (done.returncode, done.stdout.splitlines()) == (2, summary_of(out, 3, 0, 1)), done.stderr
-    assert done.stderr.splitlines() == [f"iibr: {out / 'failures.csv'}: tells what failed, and why"]
-    written = {"a_depth.pfm", "b_depth.pfm", "sub/a_depth.pfm"}
-    files = {path.relative_to(out).as_posix() for path in out.rglob("*") if path.is_file()}
-    assert files == written | {"manifest.jsonl", "failures.csv"}
-    lines = [json.loads(line) for line in (out / "manifest.jsonl").read_text().splitlines()]
-    assert {line["output"] for line in lines} == written
+def test_an_archive_is_exported_once(archive: Path) -> None:
+    out = archive.with_name("out")
+    for path in sorted(archive.iterdir())[3:]:
+        path.unlink()
+    (archive / "torn.png").write_bytes((archive / "00.png").read_bytes()[:200])
+    done = run_batch(archive, "--workers", 2, to="depth")
+    guesses = f"3 of 3 written have guessed depth. {BETTER_WAYS}"
+    assert done.stdout.splitlines() == [f"{out}: 3 written, 0 there before, 1 failed", guesses]
+    assert done.returncode == 2
+    assert done.stderr.splitlines()[-1] == f"iibr: {out / 'failures.csv'}: lists what failed, and why"
+    assert {path.name for path in out.iterdir()} == {"failures.csv", *(f"0{n}_depth.pfm" for n in range(3))}
     (failure,) = csv.DictReader((out / "failures.csv").read_text().splitlines())
     assert failure["photo"] == str(archive / "torn.png")
-    assert "torn.png" in failure["reason"]
-
     (archive / "torn.png").unlink()
-    before = {name: (out / name).stat().st_mtime_ns for name in written}
-    again = run_batch(*words)
-    assert (again.returncode, again.stdout.splitlines()) == (0, summary_of(out, 0, 3, 0)), again.stderr
-    assert before == {name: (out / name).stat().st_mtime_ns for name in written}
+    again = run_batch(archive, to="depth")
+    assert (again.returncode, again.stdout, again.stderr) == (0, f"{out}: 0 written, 3 there before, 0 failed\n", "")
 
 
-@pytest.fixture
-def long_archive(archive: Path) -> Path:
-    """So many photos that a batch can be ended in their midst."""
-    photo = (archive / "a.png").read_bytes()
-    shutil.rmtree(archive)
-    archive.mkdir()
-    for number in range(60):
-        (archive / f"{number}.png").write_bytes(photo)
-    return archive
-
-
-def started_batch(*words: object, until: Path) -> subprocess.Popen[str]:
-    """One that runs, in a process group of its own, and has finished something."""
-    run = subprocess.Popen(iibr("batch", *words), stderr=subprocess.PIPE, text=True, start_new_session=True)
-    while run.poll() is None and not (until.is_file() and until.stat().st_size):
-        time.sleep(0.01)
-    return run
-
-
-def goes_on(archive: Path, out: Path, *words: object) -> None:
-    """What was finished is not made again, and of the rest one photo is, by one worker."""
-    lines = [json.loads(line) for line in (out / "manifest.jsonl").read_text().splitlines()]
-    finished = {line["name"] for line in lines if line["key"]} - {line["name"] for line in lines if not line["key"]}
-    left = [path for path in sorted(archive.iterdir()) if path.stem not in finished]
-    assert finished
-    assert left
-    for path in left[1:]:
+@needs_process_groups
+@pytest.mark.parametrize("moment", ["start", "middle"])
+def test_ctrl_c_ends_all_processes_with_one_line(archive: Path, moment: str) -> None:
+    out = archive.with_name("out")
+    with start_batch(archive, "--workers", 2) as run:
+        wait_until(run, lambda: workers_of(run) if moment == "start" else len(exports_in(out)) > 2)
+        workers = workers_of(run)
+        os.killpg(run.pid, signal.SIGINT)  # a terminal sends it to the workers too
+        output = run.communicate(timeout=60)
+    assert (run.returncode, output) == (130, ("", "iibr: interrupted\n"))
+    assert not psutil.wait_procs(workers, timeout=1)[1]
+    assert not list(out.glob(".*"))
+    finished = len(exports_in(out))
+    for path in sorted(archive.iterdir())[finished + 2 :]:
         path.unlink()
-    again = run_batch(*words, "--workers", 1)
-    assert again.stdout.splitlines() == summary_of(out, 1, len(finished), 0), again.stderr
+    again = run_batch(archive, "--workers", 1).stdout.splitlines()
+    assert again[0].endswith(f"{len(exports_in(out)) - finished} written, {finished} there before, 0 failed")
 
 
-@pytest.mark.skipif(os.name != "posix", reason="process groups")
-def test_an_interruption_is_one_line_and_the_next_run_goes_on(long_archive: Path, tmp_path: Path) -> None:
-    out = tmp_path / "out"
-    words = (long_archive, "--to", "hci", "--grid", 3, "-o", out)
-    with started_batch(*words, "--workers", 2, until=out / "manifest.jsonl") as run:
-        os.killpg(run.pid, signal.SIGINT)  # as a terminal does, to the workers too
-        _, said = run.communicate(timeout=120)
-    assert (run.returncode, said) == (130, "iibr: interrupted\n")
-    assert not list(out.rglob(".*"))
-    goes_on(long_archive, out, *words)
+def test_a_killed_worker_costs_no_photo(archive: Path) -> None:
+    out = archive.with_name("out")
+    with start_batch(archive, "--workers", 2) as run:
+        wait_until(run, lambda: len(exports_in(out)) > 2)
+        workers_of(run)[0].kill()
+        output, errors = run.communicate(timeout=300)
+    assert (run.returncode, errors) == (0, "")
+    assert output.startswith(f"{out}: 12 written, 0 there before, 0 failed")
+    assert len(exports_in(out)) == 12
 
 
-@pytest.mark.skipif(os.name != "posix", reason="process groups")
-def test_an_interruption_while_workers_start_is_one_line(long_archive: Path, tmp_path: Path) -> None:
-    command = ("batch", long_archive, "--to", "depth", "-o", tmp_path / "out", "--workers", 2)
-    with subprocess.Popen(iibr(*command), stderr=subprocess.PIPE, text=True, start_new_session=True) as run:
-        while run.poll() is None and not workers_of(run):
-            time.sleep(0.001)
-        os.killpg(run.pid, signal.SIGINT)
-        _, said = run.communicate(timeout=120)
-    assert (run.returncode, said) == (130, "iibr: interrupted\n")
-
-
-@pytest.mark.skipif(os.name != "posix", reason="process groups")
-def test_workers_end_with_who_started_them(long_archive: Path, tmp_path: Path) -> None:
-    out = tmp_path / "out"
-    words = (long_archive, "--to", "hci", "--grid", 3, "-o", out)
-    with started_batch(*words, "--workers", 2, until=out / "manifest.jsonl") as run:
-        workers = workers_of(run)
-        run.kill()
-        run.communicate(timeout=120)
-    assert workers
-    assert not psutil.wait_procs(workers, timeout=60)[1]
-    goes_on(long_archive, out, *words)
-
-
-def test_a_worker_that_is_killed_costs_no_photo_and_nothing_listens(long_archive: Path, tmp_path: Path) -> None:
-    """Neither on a port nor on a socket of the system's."""
-    out = tmp_path / "out"
-    with started_batch(long_archive, "--to", "depth", "-o", out, "--workers", 2, until=out / "manifest.jsonl") as run:
-        workers = workers_of(run)
-        sockets = [process.net_connections(kind="all") for process in (psutil.Process(run.pid), *workers)]
-        workers[0].kill()
-        _, said = run.communicate(timeout=300)
-    assert (run.returncode, said) == (0, "")
-    assert len(workers) == 2
-    assert sockets == [[], [], []]
-    assert len(list(out.glob("*_depth.pfm"))) == 60
-
-
-@pytest.mark.skipif(os.name != "posix", reason="process groups")
-def test_when_all_is_killed_nothing_finished_is_lost(long_archive: Path, tmp_path: Path) -> None:
-    """As by a power cut, to what the disk holds of it."""
-    out = tmp_path / "out"
-    words = (long_archive, "--to", "hci", "--grid", 3, "-o", out)
-    with started_batch(*words, "--workers", 2, until=out / "manifest.jsonl") as run:
-        for process in (*psutil.Process(run.pid).children(recursive=True), psutil.Process(run.pid)):
+@pytest.fixture
+def cluster(tmp_path: Path) -> Iterator[tuple[str, list[subprocess.Popen[bytes]]]]:
+    """A Dask scheduler on a free port and two workers: the address, and the three processes."""
+    pytest.importorskip("distributed")
+    file = tmp_path / "scheduler.json"
+    dask, pipes = [sys.executable, "-P", "-m", "dask"], {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    scheduler = [*dask, "scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard", "--scheduler-file", file]
+    processes = [subprocess.Popen(scheduler, **pipes)]  # type: ignore[call-overload]
+    try:
+        while not (file.is_file() and file.stat().st_size):
+            assert processes[0].poll() is None
+            time.sleep(0.01)
+        address = json.loads(file.read_text())["address"]
+        worker = [*dask, "worker", address, "--nthreads", "1", "--no-nanny", "--no-dashboard"]
+        processes += [subprocess.Popen(worker, **pipes) for _ in range(2)]  # type: ignore[call-overload]
+        yield address, processes
+    finally:
+        for process in processes:
             process.kill()
-        run.communicate(timeout=120)
-    whole = [json.loads(line)["output"] for line in (out / "manifest.jsonl").read_text().splitlines()]
-    assert all(len(list((out / name).glob("input_Cam*.png"))) == 9 for name in whole)
-    goes_on(long_archive, out, *words)
+        for process in processes:
+            process.wait()
 
 
-@pytest.fixture
-def tls_files(tmp_path: Path) -> list[Path]:
-    """A certificate that signed itself, which both sides show: --tls-ca, --tls-cert, --tls-key."""
-    openssl = shutil.which("openssl")
-    if openssl is None:
-        pytest.skip("certificates are made by openssl, which is not installed")
-    cert, key = tmp_path / "cert.pem", tmp_path / "key.pem"
-    words = ["req", "-x509", "-newkey", "rsa:2048", "-nodes", "-subj", "/CN=iibr", "-days", "2"]
-    subprocess.run([openssl, *words, "-out", cert, "-keyout", key], check=True, capture_output=True)
-    return [cert, cert, key]
-
-
-@pytest.fixture
-def tls_options(request: pytest.FixtureRequest) -> list[str]:
-    """None, but for tests that ask for TLS."""
-    if getattr(request, "param", "") != "tls":
-        return []
-    names = ("--tls-ca", "--tls-cert", "--tls-key")
-    return [str(word) for pair in zip(names, request.getfixturevalue("tls_files")) for word in pair]
-
-
-@pytest.fixture
-def cluster_elsewhere(tmp_path: Path, tls_options: Sequence[str]) -> Iterator[tuple[subprocess.Popen[bytes], str]]:
-    """A scheduler with a worker, as users start them: its process and address."""
-    told = tmp_path / "scheduler.json"
-    dask = [sys.executable, "-P", "-m", "dask"]
-    tls = [word.replace("--tls-ca", "--tls-ca-file") for word in tls_options]
-    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
-    where = ["--host", "tls://127.0.0.1" if tls else "127.0.0.1", "--port", "0", "--no-dashboard"]
-    scheduler = subprocess.Popen([*dask, "scheduler", *where, *tls, "--scheduler-file", str(told)], **quiet)  # type: ignore[call-overload]
-    while scheduler.poll() is None and not (told.is_file() and told.stat().st_size):
-        time.sleep(0.01)
-    address = json.loads(told.read_text())["address"]
-    worker = subprocess.Popen(
-        [*dask, "worker", address, "--nthreads", "1", "--no-nanny", "--no-dashboard", *tls], **quiet
-    )  # type: ignore[call-overload]
-    yield scheduler, address
-    for process in (*psutil.Process(worker.pid).children(recursive=True), worker, scheduler):
-        process.kill()
-    worker.wait()
-    scheduler.wait()
-
-
-def test_when_the_scheduler_is_killed_it_is_one_line_and_nothing_finished_is_lost(
-    long_archive: Path, tmp_path: Path, cluster_elsewhere: tuple[subprocess.Popen[bytes], str]
+def test_a_dask_cluster_exports_all_photos_although_a_worker_is_killed_and_its_end_is_one_line(
+    archive: Path, cluster: tuple[str, list[subprocess.Popen[bytes]]]
 ) -> None:
-    scheduler, address = cluster_elsewhere
-    out = tmp_path / "out"
-    words = (long_archive, "--to", "hci", "--grid", 3, "-o", out)
-    with started_batch(*words, "--scheduler", address, until=out / "manifest.jsonl") as run:
+    address, (scheduler, worker, _) = cluster
+    out = archive.with_name("out")
+    with start_batch(archive, "--dask", address) as run:
+        wait_until(run, lambda: len(exports_in(out)) > 2)
+        worker.kill()
+        output, errors = run.communicate(timeout=300)
+    assert (run.returncode, errors) == (0, "")
+    assert output.startswith(f"{out}: 12 written, 0 there before, 0 failed")
+    shutil.rmtree(out)
+    with start_batch(archive, "--dask", address) as run:
+        wait_until(run, lambda: len(exports_in(out)) > 2)
         scheduler.kill()
-        _, said = run.communicate(timeout=120)
-    (line,) = said.splitlines()
-    assert run.returncode == 2
-    assert line.startswith("iibr: the workers were lost"), said
-    goes_on(long_archive, out, *words)
+        output, errors = run.communicate(timeout=120)
+    assert (run.returncode, output) == (2, "")
+    assert errors.startswith("iibr: the workers were lost")
+    assert len(errors.splitlines()) == 1
 
 
-@pytest.mark.parametrize("tls_options", ["tls"], indirect=True)
-def test_a_scheduler_with_tls_lends_its_workers_to_who_has_a_certificate(
-    archive: Path, tmp_path: Path, tls_options: list[str], cluster_elsewhere: tuple[subprocess.Popen[bytes], str]
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("empty", "--to", "depth", "-o", "out"), "no photos"),
+        (("missing", "--to", "depth", "-o", "out"), "missing: no such folder"),
+        (("photos/00.png", "--to", "depth", "-o", "out"), "00.png: no such folder"),
+        (("photos", "--to", "depth", "-o", "photos/out"), "is read"),
+        (("photos", "--to", "depth", "-o", "."), "is read"),
+        (("photos", "--to", "depth", "-o", "file.txt"), "file.txt: is a file"),
+        (("photos", "--to", "depth", "-o", "mine"), "mine: already exists"),
+        (("photos", "--to", "depth", "-o", "out", "--frames", "3"), "--frames"),
+        (("photos", "--to", "depth", "-o", "out", "--literal"), "--grid"),
+        (("photos", "--to", "depth", "-o", "out", "--workers", "2", "--dask", "tcp://127.0.0.1:1"), "leave one out"),
+        (("photos", "--to", "depth", "-o", "out", "--dask", "nonsense://127.0.0.1:1"), "unknown address scheme"),
+    ],
+)
+def test_wrong_input_is_one_error(
+    monkeypatch: pytest.MonkeyPatch, archive: Path, words: tuple[str, ...], message: str
 ) -> None:
-    (archive / "torn.png").unlink()
-    _, address = cluster_elsewhere
-    words = (archive, "--to", "depth", "-o", tmp_path / "out", "--scheduler", address)
-    refused = run_batch(*words)
-    (line,) = refused.stderr.splitlines()
-    assert refused.returncode == 2
-    assert "--tls-ca" in line
-    done = run_batch(*words, *tls_options)
-    assert (done.returncode, done.stdout.splitlines()) == (0, summary_of(tmp_path / "out", 3, 0, 0)), done.stderr
+    monkeypatch.chdir(archive.parent)
+    for variable in ("PYTHONWARNINGS", "PYTHONSAFEPATH"):
+        monkeypatch.setenv(variable, os.environ.get(variable, ""))
+    for folder in ("empty", "mine"):
+        Path(folder).mkdir()
+    for file in ("file.txt", "mine/file.txt"):
+        Path(file).touch()
+    with pytest.raises(InputError, match=message):
+        app(["batch", *words], standalone_mode=False)
+
+
+@pytest.mark.parametrize(
+    ("address", "expected"),
+    [
+        ("tls://cluster:8786", True), ("tcp://127.0.0.1:8786", True), ("localhost:8786", True), ("[::1]:8786", True),
+        ("tcp://cluster:8786", False), ("cluster:8786", False),
+    ],
+)  # fmt: skip
+def test_a_connection_is_secure_by_tls_or_on_this_machine(address: str, expected: bool) -> None:
+    assert is_secure(address) is expected

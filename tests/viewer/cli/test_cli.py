@@ -275,7 +275,8 @@ def test_a_picture_at_the_photos_own_size_equals_the_usual_one_made_smaller(
 def test_full_gives_the_photo_back_where_the_views_shape_is_rounded(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    from iibr_core.formats.images.photo import read_photo, write_image
+    from iibr_core.formats.images.photo import read_photo
+    from iibr_core.formats.images.write import write_image
 
     photo, out = tmp_path / "photo.png", tmp_path / "out.png"
     write_image(photo, np.random.default_rng(1).integers(0, 256, (200, 300, 3), np.uint8))
@@ -287,7 +288,7 @@ def test_full_gives_the_photo_back_where_the_views_shape_is_rounded(
 def test_full_gives_the_size_and_needs_memory(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], photo_path: Path, tmp_path: Path
 ) -> None:
-    from iibr_core.formats.images.photo import write_image
+    from iibr_core.formats.images.write import write_image
 
     out = tmp_path / "o.png"
     assert run(monkeypatch, "screenshot", photo_path, "--full", "--size", "8x8", "-o", out) == 2
@@ -319,8 +320,8 @@ def test_like_repeats_a_saved_picture_exactly_but_for_what_is_given(
 def test_like_opens_no_file_that_the_picture_names(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], photo_path: Path, tmp_path: Path
 ) -> None:
-    from iibr_core.formats.images.photo import write_image
-    from iibr_core.formats.images.settings_text import ATTRIBUTE
+    from iibr_core.formats.images.metadata import SETTINGS_KEY
+    from iibr_core.formats.images.write import write_image
     from viewer.model.saved_settings import settings_text
 
     (tmp_path / "elsewhere").mkdir()
@@ -329,7 +330,7 @@ def test_like_opens_no_file_that_the_picture_names(
     text = settings_text(saved).replace('"environment":""', f'"environment":"{secret}"')
     assert str(secret) in text
     like = tmp_path / "like.png"
-    write_image(like, np.zeros((4, 4, 3), np.uint8), {ATTRIBUTE: text})
+    write_image(like, np.zeros((4, 4, 3), np.uint8), {SETTINGS_KEY: text})
     with watch(secret) as watched:
         assert run(monkeypatch, "screenshot", photo_path, "--grid", 1, "--like", like, "-o", tmp_path / "a.png") == 0
         assert not watched.was_opened()

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from iibr_core.formats.images.photo import write_image
+from iibr_core.formats.images.write import write_image
 from tests.iibr_core.depth.onnx_graphs import of_channels
 from tests.iibr_core.known_scenes import WALL, disparity_of_square
 from tests.viewer.cli.test_cli import run

@@ -16,7 +16,7 @@ import typer
 
 from iibr_core.depth.estimators.catalog import KNOWN_MODELS, known_model
 from iibr_core.depth.estimators.download import VERIFIED, require_unchanged
-from iibr_core.formats.images.photo import write_image
+from iibr_core.formats.images.write import write_image
 from iibr_core.rendering.optics import CENTRE
 from iibr_core.scenes.opening import SceneReady, SceneRequest, results_of
 from iibr_core.scenes.scene import Progress, Source

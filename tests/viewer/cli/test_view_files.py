@@ -33,9 +33,9 @@ def test_a_quilt_of_ours_is_a_light_field_again(
     quilt = Path(capsys.readouterr().out.strip())
     assert open_light_field(quilt).grid == GridShape(1, 48)
     out = tmp_path / "views"
-    assert run(monkeypatch, "export", quilt, "--to", "numbered-grid", "-o", out) == 0
-    assert len(list(out.glob("v00_u*.png"))) == 48
-    whole, first = np.asarray(Image.open(quilt).convert("RGB")), np.asarray(Image.open(out / "v00_u00.png"))
+    assert run(monkeypatch, "export", quilt, "--to", "hci", "-o", out) == 0
+    assert len(list(out.glob("input_Cam*.png"))) == 48
+    whole, first = np.asarray(Image.open(quilt).convert("RGB")), np.asarray(Image.open(out / "input_Cam000.png"))
     height, width = first.shape[:2]
     assert np.array_equal(whole[-height:, :width], first)
 
@@ -52,7 +52,7 @@ def test_options_about_photos_are_refused_for_a_quilt(
 ) -> None:
     quilt = tmp_path / "a_qs2x2a1.png"
     quilt.write_bytes(photo_path.read_bytes())
-    words = ("export", quilt, "--to", "numbered-grid", "-o", tmp_path / "new", "--grid", 3)
+    words = ("export", quilt, "--to", "hci", "-o", tmp_path / "new", "--grid", 3)
     assert run(monkeypatch, *words) == 2
     assert "--grid: " in capsys.readouterr().err
 
@@ -105,13 +105,13 @@ def test_depth_asks_for_memory_before_it_takes_it(monkeypatch: Monkey, capsys: C
     assert not (tmp_path / "a.pfm").exists()
 
 
-@pytest.mark.parametrize("kind", ["point-cloud", "disparity", "numbered-grid"])
+@pytest.mark.parametrize("kind", ["point-cloud", "disparity", "hci"])
 def test_disparity_is_found_once_for_an_export(monkeypatch: Monkey, tmp_path: Path, kind: str) -> None:
     field = write_grid(tmp_path / "field")
     next(field.glob("gt_disp*")).unlink()
     calls, found = [], estimate_disparity.estimate_disparity
     monkeypatch.setattr(estimate_disparity, "estimate_disparity", lambda *given: calls.append(given) or found(*given))
-    out = tmp_path / {"point-cloud": "a.ply", "disparity": "a.pfm", "numbered-grid": "new"}[kind]
+    out = tmp_path / {"point-cloud": "a.ply", "disparity": "a.pfm", "hci": "new"}[kind]
     assert run(monkeypatch, "export", field, "--to", kind, "-o", out) == 0
-    assert len(calls) == (kind != "numbered-grid")
+    assert len(calls) == (kind != "hci")
     assert out.exists()

@@ -12,7 +12,7 @@ import pytest
 from scipy.ndimage import gaussian_filter
 
 from iibr_core.evaluation.metrics import bounded_psnr
-from iibr_core.formats.images.photo import write_image
+from iibr_core.formats.images.write import write_image
 from iibr_core.rendering.optics import ApertureShape, Optics
 from iibr_core.scenes.scene import Source
 from iibr_core.scenes.screen_size import ScreenSize

@@ -7,8 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from iibr_core.exports.kinds import EXPORTS, PURPOSES, Purpose
-from iibr_core.exports.options import ExportOptions
+from iibr_core.exports.kinds import EXPORTS, PURPOSES, ExportOptions, Purpose
 from iibr_core.generation.plan import ScenePlan
 from iibr_core.scenes.scene import Source
 from iibr_core.types import InputError

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from iibr_core.formats.images.photo import write_image
+from iibr_core.formats.images.write import write_image
 from iibr_core.rendering.gloss.gloss_settings import Gloss, GlossLight, GlossStroke, GlossSurface
 from iibr_core.types import InputError
 from viewer.model.gloss_file import read_gloss, require_environment

@@ -15,8 +15,8 @@ from hypothesis import strategies as st
 
 from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.editing.edits import BRUSH_TOOLS, DepthEdits, Stroke
-from iibr_core.formats.images.photo import write_image
-from iibr_core.formats.images.settings_text import ATTRIBUTE, settings_text_in
+from iibr_core.formats.images.metadata import SETTINGS_KEY, settings_text_in
+from iibr_core.formats.images.write import write_image
 from iibr_core.rendering.gloss.gloss_settings import Gloss, GlossLight, GlossSurface
 from iibr_core.rendering.optics import APERTURE_KINDS, ApertureMask, ApertureShape, Optics
 from iibr_core.scenes.scene import Source
@@ -77,7 +77,7 @@ def test_a_picture_carries_its_settings(tmp_path: Path, suffix: str) -> None:
     path = tmp_path / f"a{suffix}"
     mask = ApertureMask("stär.png", 64, 64, bytes(range(256)) * 16)
     saved = SavedSettings(Optics(aperture_shape=ApertureShape("mask", mask=mask)), 1.0, Source(""), (8, 6))
-    write_image(path, np.zeros((6, 8, 3), np.uint8), {ATTRIBUTE: settings_text(saved)})
+    write_image(path, np.zeros((6, 8, 3), np.uint8), {SETTINGS_KEY: settings_text(saved)})
     assert read_settings(path) == saved
 
 

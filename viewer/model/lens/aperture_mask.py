@@ -22,15 +22,15 @@ def read_mask(path: Path) -> ApertureMask:
 
     Raises InputError, naming the file, if it is no picture, far too large, or black all over.
     """
-    from iibr_core.formats.images.oiio_reader import read_raster, read_size
+    from iibr_core.formats.images.decode import decode, read_size
 
     height, width = read_size(path)
     if height * width > MOST_FILE_PIXELS:
         raise InputError(f"{path}: {width}x{height} is far too large for an aperture; make it small, 64x64 is plenty")
-    raster = read_raster(path)
-    grey = _as_share(raster.pixels).mean(axis=2)
-    if raster.alpha is not None:
-        grey = grey * _as_share(raster.alpha)
+    picture = decode(path)
+    grey = _as_share(picture.pixels).mean(axis=2)
+    if picture.alpha is not None:
+        grey = grey * _as_share(picture.alpha)
     cells = _downsample(grey)
     brightest = float(cells.max())
     values = np.round(255 * cells / brightest).astype(np.uint8) if brightest > 0 else None

@@ -1,13 +1,11 @@
-"""Exports and saves: what is asked for, and where it goes unless the user says otherwise."""
+"""Prompts and default paths of exports and saved pictures."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path, PurePath
 
-from iibr_core.exports.kinds import EXPORTS, ExportKind, Purpose
-from iibr_core.exports.options import ExportOptions
-from iibr_core.exports.writers import export_path
+from iibr_core.exports.kinds import EXPORTS, ExportKind, ExportOptions, Purpose, export_path
 from iibr_core.scenes.scene import Scene
 from iibr_core.types import InputError
 from viewer.model.state.app_state import AppState
@@ -17,17 +15,17 @@ from viewer.model.state.saving import path_beside
 
 
 def kinds_for(purpose: Purpose) -> dict[str, ExportKind]:
-    """Those of the registry, in its order."""
+    """Return the kinds of the table for a purpose, in its order."""
     return {name: kind for name, kind in EXPORTS.items() if kind.purpose == purpose}
 
 
 def first_kind(purpose: Purpose) -> str:
-    """What is offered first: it needs nothing that may not be installed."""
+    """Return the first kind for a purpose that needs no optional package."""
     return next(name for name, kind in kinds_for(purpose).items() if not kind.needs)
 
 
 def ask_to_export(state: AppState) -> AppState:
-    """With the question; as it is where nothing is open."""
+    """Show the prompt of an export if a scene is open."""
     if state.scene is None:
         return state
     kind = first_kind("share")
@@ -35,29 +33,28 @@ def ask_to_export(state: AppState) -> AppState:
 
 
 def usual_export_path(state: AppState, name: str) -> str:
-    """Where this kind goes unless the user says otherwise."""
+    """Return the default path of an export of this kind."""
     assert state.scene is not None
     kind = EXPORTS[name]
     ending = kind.endings[0] if kind.endings else ""
-    is_plain = ending == f".{name}"  # the ending says which kind it is
+    is_plain = ending == f".{name}"  # the ending names the kind
     return _place_of(state, f"{state.scene.name}-{'iibr' if is_plain else name}{ending}")
 
 
 def as_other_kind(state: AppState, prompt: ExportPrompt, name: str) -> ExportPrompt:
-    """The question for another kind: a name that was typed stays, with that kind's ending."""
+    """Return the prompt for another kind: a typed name stays, with the ending of that kind."""
     before, kind = EXPORTS[prompt.kind], EXPORTS[name]
     path = PurePath(prompt.path.strip())
     if not path.name or prompt.path == usual_export_path(state, prompt.kind):
         return ExportPrompt(name, usual_export_path(state, name))
-    ending = next((each for each in before.endings if path.name.lower().endswith(each)), "")
+    ending = next((ending for ending in before.endings if path.name.lower().endswith(ending)), "")
     stem = path.name[: len(path.name) - len(ending)]
     return ExportPrompt(name, str(path.with_name(f"{stem}{kind.endings[0] if kind.endings else ''}")))
 
 
 def written_path(kind: ExportKind, typed: str, scene: Scene, options: ExportOptions) -> Path:
-    """The file or folder that becomes of what was typed: as it is, with an ending where it has none, and with what
-    players read from the name where the format says it nowhere else. Raises InputError without a name, and as
-    `export_path` does.
+    """Return the path that is written for a typed path: with an ending if it has none, and with the tag that players
+    read from the name. Raises InputError without a name, and as `export_path` does.
     """
     path = Path(typed.strip())
     if not path.name:
@@ -68,14 +65,14 @@ def written_path(kind: ExportKind, typed: str, scene: Scene, options: ExportOpti
 
 
 def _place_of(state: AppState, name: str) -> str:
-    """In the folder that was used last; beside the photo before."""
+    """Return a path in the folder that was used last, or beside the photo."""
     assert state.source is not None
     folder = state.preferences.last_folder
     return str(PurePath(folder) / name) if folder else path_beside(state.source.path, name)
 
 
 def ask_to_save(state: AppState, what: Saved) -> AppState:
-    """Ask where to save the picture, at the photo's own size where it can be drawn so, or the map of a photo."""
+    """Show the prompt to save the picture, at the photo's own size if that can be drawn, or the map of a photo."""
     scene = state.scene
     if scene is None or (what == "map" and scene.plan is None):
         return state
@@ -85,8 +82,8 @@ def ask_to_save(state: AppState, what: Saved) -> AppState:
 
 
 def _usual_path(state: AppState, what: Saved) -> str:
-    """Where it is saved unless the user says otherwise. A map goes beside the photo: it is found there the next time,
-    unless one was given for it.
+    """Return the default path. A map goes beside the photo, where it is found when the photo is opened again, unless
+    the user gave a map.
     """
     assert state.source is not None
     assert state.scene is not None

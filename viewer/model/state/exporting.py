@@ -1,35 +1,36 @@
-"""Exports: what the user says about one, what the window says of it, and the actions that change that."""
+"""State and actions of exports."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-from iibr_core.exports.options import USUAL_OPTIONS, ExportOptions
+from iibr_core.exports.kinds import DEFAULT_OPTIONS, ExportOptions
 
 
 @dataclass(frozen=True)
 class ExportPrompt:
-    """The question what to export, by the name of its kind, and where to. already_there: there is something. problem:
-    why it cannot be exported so.
+    """The prompt of an export.
+
+    kind: name of its kind. already_there: whether the file exists. problem: reason why it cannot be exported.
     """
 
     kind: str
     path: str
-    options: ExportOptions = USUAL_OPTIONS
+    options: ExportOptions = DEFAULT_OPTIONS
     already_there: bool = False
     problem: str = ""
 
 
 @dataclass(frozen=True)
 class ExportTask:
-    """Export the scene as this kind."""
+    """A request to export the scene as this kind."""
 
     kind: str
     path: str
-    options: ExportOptions = USUAL_OPTIONS
+    options: ExportOptions = DEFAULT_OPTIONS
     may_replace: bool = False
 
 
 @dataclass(frozen=True)
 class AskToExport:
-    """Ask what to export, and where to."""
+    """A request to show the prompt of an export."""

@@ -1,1 +1,0 @@
-"""Whole archives: every photo of some folders, exported by worker processes on this machine or others."""

@@ -1,0 +1,108 @@
+"""Views with their cameras, for programs that reconstruct scenes: LLFF, nerfstudio, COLMAP."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iibr_core.color import bytes_from_encoded, encoded_from_stored
+from iibr_core.exports.kinds import ExportOptions
+from iibr_core.exports.source import ExportSource
+from iibr_core.formats.cameras import FieldCameras, infinity_of, spread, write_colmap, write_llff, write_nerfstudio
+from iibr_core.formats.outputs import write_folder
+from iibr_core.types import ImageSize, InputError, ViewOffset, ViewUpdate
+
+MAX_POINTS = 20_000
+"""Largest number of points for COLMAP, about as many as a reconstruction finds."""
+MAX_DEPTH_RATIO = 1000.0
+"""Ratio of the farthest distance to the nearest one; anything farther, such as the sky, is put there."""
+
+
+def cameras_of(source: ExportSource) -> FieldCameras:
+    """Return the cameras of the scene's views. Raises InputError if no depth is known."""
+    scene = source.scene
+    size = ImageSize(scene.height, scene.width)
+    if source.loaded is None:
+        low, high = scene.disparity_range_px
+        if scene.depth_source == "none":
+            raise InputError(f"{scene.name}: no depth is known; open a photo with a disparity map")
+        return FieldCameras(scene.grid, size, scene.focal_px or float(scene.width), (low, high), infinity_of(low, high))
+    plan = source.plan()
+    at_infinity = (_given_infinity(source) - plan.disparity_zero) * plan.disparity_scale
+    low, high = plan.disparity_range_px
+    low = max(low, at_infinity + (high - at_infinity) / MAX_DEPTH_RATIO)
+    return FieldCameras(scene.grid, size, source.loaded.photo.focal_px, (low, high), at_infinity)
+
+
+def _given_infinity(source: ExportSource) -> float:
+    """Return the disparity (as given) of a point at infinity, which is known if distances are known in metres."""
+    plan = source.plan()
+    if plan.disparity_scale <= 0:
+        raise InputError(f"{source.scene.name}: is flat or inverted; give it depth")
+    known = source.scene.inverse_metres
+    low, high = (value / plan.disparity_scale + plan.disparity_zero for value in plan.disparity_range_px)
+    if known is not None and -known[1] / known[0] < high:
+        return -known[1] / known[0]
+    return infinity_of(low, high)
+
+
+def nearest_metres(source: ExportSource) -> float | None:
+    """Return the distance of the scene's nearest point in metres, None if metres are not known."""
+    known, plan = source.scene.inverse_metres, source.scene.plan
+    if known is None or plan is None or plan.disparity_scale <= 0:
+        return None
+    inverse = known[0] * (plan.disparity_range_px[1] / plan.disparity_scale + plan.disparity_zero) + known[1]
+    return 1 / inverse if inverse > 0 else None
+
+
+def _straight_cameras(source: ExportSource) -> tuple[FieldCameras, float | None]:
+    """Return cameras that look straight ahead, as LLFF requires, and the disparity (as given) that does not move in
+    their views, see `ExportSource.views`; the cameras of a light field from disk and None.
+    """
+    cameras = cameras_of(source)
+    if source.loaded is None:
+        return cameras, None
+    low, high = (value - cameras.at_infinity for value in cameras.range_px)
+    return replace(cameras, range_px=(low, high), at_infinity=0.0), _given_infinity(source)
+
+
+def write_cameras(path: Path, source: ExportSource, options: ExportOptions, variant: str) -> None:
+    """Write all views as images/v00_u00.png ... and their cameras as "llff", "nerfstudio" or "colmap".
+
+    Raises InputError if the folder cannot be written, Cancelled once the export should stop.
+    """
+    from iibr_core.formats.images.write import write_image
+
+    cameras, static_disparity = _straight_cameras(source)
+    places: dict[str, ViewOffset] = {}
+    centre: ViewUpdate | None = None
+    with write_folder(path) as folder:
+        (folder / "images").mkdir()
+        for view in source.views(static_disparity):
+            name = f"v{view.row:02d}_u{view.column:02d}.png"
+            write_image(folder / "images" / name, colors_of(view))
+            places[name] = cameras.grid.offset(view.row, view.column)
+            centre = view if centre is None else centre
+        assert centre is not None
+        if variant == "colmap":
+            write_colmap(folder, cameras, places, *_points_of(centre, cameras))
+        else:
+            (write_llff if variant == "llff" else write_nerfstudio)(folder, cameras, places)
+
+
+def _points_of(centre: ViewUpdate, cameras: FieldCameras) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:
+    """Return places and colours (N, 3) of at most MAX_POINTS pixels of the centre view."""
+    disparity = centre.disparity if centre.disparity is not None else np.empty((0, 0), np.float32)
+    points = cameras.points(disparity, ViewOffset(0.0, 0.0)).reshape(-1, 3)
+    chosen = spread(len(points), MAX_POINTS)
+    return points[chosen], colors_of(centre).reshape(-1, 3)[chosen]
+
+
+def colors_of(view: ViewUpdate) -> NDArray[np.uint8]:
+    """Return the colours of a view, (H, W, 3), sRGB-encoded."""
+    if view.colors.dtype == np.uint8:
+        return view.colors.view(np.uint8)
+    return bytes_from_encoded(encoded_from_stored(view.colors))

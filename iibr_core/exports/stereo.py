@@ -1,0 +1,91 @@
+"""Pictures for the left and the right eye in one file: side by side, above each other, crossed, anaglyph, spatial."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iibr_core.exports.framing import draw_framed, side_pictures
+from iibr_core.exports.kinds import ExportOptions
+from iibr_core.exports.render_settings import RenderSettings
+from iibr_core.exports.source import ExportSource
+from iibr_core.formats.images.side_by_side import FULL_TAG, HALF_TAG, OVER_TAG, TAG
+from iibr_core.formats.images.write import AS_USUAL, BEST_QUALITY, PictureFormat
+from iibr_core.formats.quilts import tagged
+from iibr_core.rendering.optics import Optics
+from iibr_core.scenes.scene import Scene
+from iibr_core.scenes.screen_size import ScreenSize
+from iibr_core.types import SRGB, ColorSpace
+
+Eyes = tuple[NDArray[Any], NDArray[Any]]
+
+
+def _anaglyph(eyes: Eyes) -> NDArray[Any]:
+    from iibr_core.formats.stereo import anaglyph
+
+    return anaglyph(*eyes)
+
+
+class _Arrangement(NamedTuple):
+    """How two pictures become one file. squeeze: divisor of their widths. tag: end of the file's name, "" for none."""
+
+    join: Callable[[Eyes], NDArray[Any]]
+    tag: str = ""
+    squeeze: int = 1
+
+
+ARRANGEMENTS = {
+    "sbs": _Arrangement(np.hstack, FULL_TAG),
+    "half-sbs": _Arrangement(np.hstack, HALF_TAG, squeeze=2),
+    "over-under": _Arrangement(np.vstack, OVER_TAG),
+    "cross-eyed": _Arrangement(lambda eyes: np.hstack(eyes[::-1])),
+    "anaglyph": _Arrangement(_anaglyph),
+}
+
+
+def stereo_path(path: Path, scene: Scene, options: ExportOptions, variant: str) -> Path:
+    """Return the path with the tag of its arrangement, unless the name contains an equivalent tag."""
+    tag, match = ARRANGEMENTS[variant].tag, TAG.search(path.stem)
+    known = match and (OVER_TAG if match[3] else HALF_TAG if match[1] or match[2] else FULL_TAG)
+    return path if known == tag else tagged(path, tag)
+
+
+def optics_of_eyes(scene: Scene, optics: Optics, options: ExportOptions) -> list[Optics]:
+    """Return the optics of the left and the right picture. Raises InputError as `draw_eyes` does."""
+    return [eye.optics for eye in side_pictures(scene, RenderSettings(optics, options.size), 2, options.eyes)]
+
+
+def draw_eyes(source: ExportSource, options: ExportOptions, squeeze: int = 1, color_space: ColorSpace = SRGB) -> Eyes:
+    """Return the left and the right picture, (H, W, 3) uint8, their width divided by `squeeze`.
+
+    Raises InputError if the focus leaves no common frame, Cancelled once the export should stop.
+    """
+    width, height = options.size
+    settings = RenderSettings(source.optics, ScreenSize(max(width // squeeze, 1), height), color_space=color_space)
+    eyes = side_pictures(source.scene, settings, 2, options.eyes)
+    left, right = source.watched((draw_framed(source, eye, width / height) for eye in eyes), 2, "drawing")
+    return left, right
+
+
+def write_stereo(path: Path, source: ExportSource, options: ExportOptions, variant: str) -> None:
+    """Write both pictures in one of the ARRANGEMENTS. Raises as `draw_eyes` does.
+
+    Anaglyphs are written in sRGB, for which their matrices hold, and at the best quality: coarse colour mixes the eyes.
+    """
+    arrangement, is_anaglyph = ARRANGEMENTS[variant], variant == "anaglyph"
+    space = SRGB if is_anaglyph else source.color_space
+    pixels = arrangement.join(draw_eyes(source, options, arrangement.squeeze, space))
+    source.write_picture(path, pixels, PictureFormat(quality=BEST_QUALITY) if is_anaglyph else AS_USUAL, space)
+
+
+def write_spatial(path: Path, source: ExportSource, options: ExportOptions) -> None:
+    """Write a spatial photo for headsets. Raises as `draw_eyes` does."""
+    from iibr_core.formats.images.spatial_photo import write_spatial_photo
+
+    left, right = draw_eyes(source, options)
+    scale = left.shape[0] / source.scene.height
+    write_spatial_photo(path, left, right, scale * (source.focal_px or source.scene.width))

@@ -1,0 +1,282 @@
+"""Decodes picture files of every kind. Headers are checked before memory is spent; a file is read whole, or refused."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import OpenImageIO as oiio
+from numpy.typing import NDArray
+from PIL.Image import Image
+
+from iibr_core.color import ROWS_AT_ONCE
+from iibr_core.formats.files import reason_of, require_file
+from iibr_core.formats.images.avif import is_avif, open_avif, read_avif
+from iibr_core.formats.images.file_kinds import raw_kind, unreadable_kind
+from iibr_core.formats.images.heic import heic_size, is_heic, read_heic
+from iibr_core.formats.images.lfp import is_lfp, lfp_size, read_lfp
+from iibr_core.formats.images.lif import PICTURE, lif_bytes, open_lif
+from iibr_core.formats.images.mpo import MPO
+from iibr_core.formats.images.picture import (
+    EXIF_NUMBERS,
+    Picture,
+    exif_focal_px,
+    opaque_as_none,
+    require_sound_size,
+)
+from iibr_core.formats.images.pillow_reader import open_with_pillow, picture_of
+from iibr_core.types import ImageSize, InputError
+
+HARMLESS_MESSAGE = "extraneous bytes"
+"""Complaint of the JPEG decoder about padding, which some cameras write; nothing is lost."""
+NO_READER = "could not find a format reader"
+"""Complaint of OpenImageIO about a file of unknown kind."""
+FLOATING_TYPES = ("half", "float", "double")
+LINEAR_TRANSFERS = (2, 8)
+"""Transfer curves of ITU-T H.273 that leave light unchanged: "unspecified" and "linear"."""
+MAX_ICON_PICTURES = 100
+READABLE_FORMATS = str(oiio.get_string_attribute("input_format_list")).split(",")
+COLOR_MODELS = {"CMYK": "CMYK", "YCCK": "CMYK", "LAB": "LAB"}
+"""Colour models by parts of the names that OpenImageIO gives to them."""
+
+
+class _Stored(NamedTuple):
+    """Channels of a picture.
+
+    colors: number of colour channels. alpha_at: index of alpha, -1 without. dtype: NumPy's name of the type to read.
+    """
+
+    colors: int
+    alpha_at: int
+    dtype: str
+
+    @property
+    def channels(self) -> int:
+        """Number of channels that are read."""
+        return max(self.colors, self.alpha_at + 1)
+
+    @property
+    def is_float(self) -> bool:
+        """True for linear light."""
+        return self.dtype == "float32"
+
+
+def decode(path: Path, number: int = 0) -> Picture:
+    """Read a picture as its file stores it: without conversion of its colours, and not turned by its orientation.
+
+    Palettes and CMYK become RGB. number: the picture within the file; 0 is the one that every program shows. Raises
+    InputError if the file is missing, no picture, cut off, or larger than MAX_FILE_PIXELS.
+    """
+    if is_avif(path):
+        return read_avif(path)
+    if is_heic(path):
+        return read_heic(path, number)
+    if is_lfp(path):
+        return read_lfp(path)
+    if number == 0:
+        return _decode_with_oiio(path)
+    with _open_numbered(path, number) as image:
+        return picture_of(image)
+
+
+def decode_bands(path: Path) -> Iterator[Picture]:
+    """Yield the first picture of a file from top to bottom, some rows at a time where that saves memory.
+
+    Files with alpha or linear light, and those that OpenImageIO does not read, come as one. Raises InputError as
+    `decode` does.
+    """
+    if not (is_avif(path) or is_heic(path) or is_lfp(path)):
+        source = _open(path)
+        spec, stored = source.spec(), _stored(path, source.spec())
+        if stored.alpha_at < 0 and not stored.is_float:
+            facts = _facts(spec)
+            yield from (Picture(rows, **facts) for rows in _read_rows(path, source, stored))
+            return
+    yield decode(path)
+
+
+def read_size(path: Path, number: int = 0) -> ImageSize:
+    """Return the size of a picture as stored, from the file's header. Raises InputError as `decode` does."""
+    if is_heic(path):
+        return heic_size(path, number)
+    if is_lfp(path):
+        return lfp_size(path)
+    if number == 0 and not is_avif(path):
+        spec = _open(path).spec()
+        return ImageSize(spec.height, spec.width)
+    with open_avif(path) if is_avif(path) else _open_numbered(path, number) as image:
+        return ImageSize(image.height, image.width)
+
+
+def read_orientation(path: Path) -> int:
+    """Return Exif's Orientation, 1 to 8; 1 for files that OpenImageIO does not read, as HEIC and AVIF."""
+    spec = _header_of(path)
+    return 1 if spec is None else int(spec.get_int_attribute("Orientation", 1))
+
+
+def read_text(path: Path, name: str) -> str:
+    """Return a text of a picture's header; "" where it is missing or damaged, and for files OpenImageIO cannot read."""
+    spec = _header_of(path)
+    return "" if spec is None else text_attribute(spec, name)
+
+
+def _header_of(path: Path) -> Any | None:
+    """Return OpenImageIO's header of a file's first picture; None where it cannot be read."""
+    source = oiio.ImageInput.open(oiio_name(path))
+    if source is None:
+        complaint_of(oiio)
+        return None
+    return source.spec()
+
+
+def oiio_name(path: Path) -> str:
+    """Return a file's name for OpenImageIO. Raises InputError where it is not UTF-8."""
+    try:
+        str(path).encode()
+    except UnicodeEncodeError as error:
+        raise InputError(f"{path}: its name is not UTF-8; rename it") from error
+    return str(path)
+
+
+def text_attribute(spec: Any, name: str) -> str:
+    """Return a text of OpenImageIO's header; "" where there is none, or it is damaged."""
+    try:
+        return str(spec.get_string_attribute(name))
+    except UnicodeDecodeError:
+        return ""
+
+
+def complaint_of(source: Any) -> str:
+    """Return and clear the error of OpenImageIO or of one of its files, "" without; it may quote bytes of the file."""
+    try:
+        return str(source.geterror())
+    except UnicodeDecodeError:
+        return "a name in it is no text"
+
+
+@contextmanager
+def _open_numbered(path: Path, number: int) -> Iterator[Image]:
+    """Open a further picture of a Leia image or a multi-picture JPEG."""
+    if open_lif(path) is not None:
+        with open_with_pillow(path, *PICTURE, lif_bytes(path, number)) as image:
+            yield image
+    else:
+        with open_with_pillow(path, *MPO) as image:
+            image.seek(number)
+            yield image
+
+
+def _decode_with_oiio(path: Path) -> Picture:
+    source = _open(path)
+    spec, stored = source.spec(), _stored(path, source.spec())
+    values: NDArray[Any] = np.empty((spec.height, spec.width, stored.channels), stored.dtype)
+    first = 0
+    for rows in _read_rows(path, source, stored):  # all at once would take the memory twice
+        values[first : first + len(rows)] = rows
+        first += len(rows)
+    alpha = opaque_as_none(values[..., stored.alpha_at]) if stored.alpha_at >= 0 else None
+    return Picture(values[..., : stored.colors], alpha, **_facts(spec))
+
+
+def _read_rows(path: Path, source: Any, stored: _Stored) -> Iterator[NDArray[Any]]:
+    """Yield the rows of a picture from top to bottom, (h, W, channels). Raises InputError where it is damaged."""
+    spec, oiio_type = source.spec(), "float" if stored.is_float else stored.dtype
+    step = spec.tile_height or ROWS_AT_ONCE
+    for first in range(0, spec.height, step):
+        # A header may place its picture anywhere; rows are counted from there.
+        top, bottom = spec.y + first, spec.y + min(first + step, spec.height)
+        if spec.tile_width:
+            place = spec.x, spec.x + spec.width, top, bottom, spec.z, spec.z + 1
+            rows = source.read_tiles(*place, 0, stored.channels, oiio_type)
+        else:
+            rows = source.read_scanlines(top, bottom, spec.z, 0, stored.channels, oiio_type)
+        message = complaint_of(source)
+        if rows is None or (message and HARMLESS_MESSAGE not in message):
+            raise InputError(f"{path}: damaged or cut off ({_reason(message, path)}); get the whole file again")
+        yield np.asarray(rows).reshape(bottom - top, spec.width, stored.channels)
+
+
+def _facts(spec: Any) -> dict[str, Any]:
+    """Return what `Picture` holds beside pixels."""
+    icc, chromaticities, codes = (spec.getattribute(name) for name in ("ICCProfile", "chromaticities", "CICP"))
+    model = text_attribute(spec, "jpeg:ColorSpace") or text_attribute(spec, "tiff:ColorSpace")
+    return {
+        "is_premultiplied": not spec.get_int_attribute("oiio:UnassociatedAlpha"),
+        "orientation": int(spec.get_int_attribute("Orientation", 1)),
+        "focal_px": exif_focal_px(_exif_numbers(spec), ImageSize(spec.height, spec.width)),
+        "icc": bytes(icc) if isinstance(icc, np.ndarray) else b"",
+        "icc_name": text_attribute(spec, "ICCProfile:profile_description"),
+        "codes": codes if isinstance(codes, tuple) else (),
+        "chromaticities": chromaticities if isinstance(chromaticities, tuple) else (),
+        "color_model": next((name for part, name in COLOR_MODELS.items() if part in model), ""),
+    }
+
+
+def _open(path: Path) -> Any:
+    """Open a picture and check its header. Raises InputError."""
+    require_file(path)
+    if "raw" not in READABLE_FORMATS and (raw := raw_kind(path)) is not None:
+        raise InputError(f"{path}: is {raw.name}; {raw.way_out}")
+    hints = oiio.ImageSpec()
+    hints.attribute("oiio:UnassociatedAlpha", 1)
+    source = oiio.ImageInput.open(oiio_name(path), hints)
+    if source is None:
+        complaint = complaint_of(oiio)
+        if (kind := unreadable_kind(path)) is not None:
+            raise InputError(f"{path}: is {kind.name}; {kind.way_out}")
+        if NO_READER in complaint:
+            raise InputError(f"{path}: cannot be read as a picture (of no known kind); save it as JPEG, PNG or TIFF")
+        raise InputError(f"{path}: cannot be read as a picture ({_reason(complaint, path)})")
+    if source.format_name() == "ico":
+        _seek_largest(source)
+    spec = source.spec()
+    if spec.depth > 1 or spec.deep:
+        raise InputError(f"{path}: {spec.width}x{spec.height}x{spec.depth} is no flat picture")
+    require_sound_size(path, spec.width, spec.height, spec.image_bytes())
+    return source
+
+
+def _seek_largest(source: Any) -> None:
+    """Choose the largest picture of an icon."""
+    sizes: list[int] = []
+    while len(sizes) < MAX_ICON_PICTURES and source.seek_subimage(len(sizes), 0):
+        sizes.append(source.spec().width * source.spec().height)
+    complaint_of(source)
+    source.seek_subimage(sizes.index(max(sizes)), 0)
+
+
+def _stored(path: Path, spec: Any) -> _Stored:
+    try:
+        names = [name.upper() for name in spec.channelnames]
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path}: damaged (its channels have no readable names); get the whole file again") from error
+    alpha_at = names.index("A") if "A" in names else -1
+    colors = 3 if spec.nchannels - (alpha_at >= 0) >= 3 else 1
+    if 0 <= alpha_at < colors:
+        raise InputError(f"{path}: channels {spec.channelnames} are neither grey nor RGB; convert it to RGB")
+    if str(spec.format) not in FLOATING_TYPES:
+        return _Stored(colors, alpha_at, "uint8" if spec.format.size() == 1 else "uint16")
+    codes = spec.getattribute("CICP")
+    is_encoded = isinstance(codes, tuple) and codes[1] not in LINEAR_TRANSFERS  # JPEG XL, no light
+    return _Stored(colors, alpha_at, "uint16" if is_encoded else "float32")
+
+
+def _exif_numbers(spec: Any) -> dict[str, float]:
+    numbers = {}
+    for name in EXIF_NUMBERS.values():
+        try:
+            value = spec.getattribute(f"Exif:{name}")
+        except UnicodeDecodeError:  # a text in place of a number
+            continue
+        if isinstance(value, int | float):
+            numbers[name] = float(value)
+    return numbers
+
+
+def _reason(complaint: str, path: Path) -> str:
+    """Return a complaint for a message; some of OpenImageIO's readers repeat the file's name."""
+    return reason_of(re.sub(rf' \("?{re.escape(str(path))}"?\)', "", complaint))

@@ -1,0 +1,175 @@
+"""Write light fields: a folder laid out as in the HCI 4D Light Field Benchmark, or one lenslet image (ESLF)."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections import deque
+from collections.abc import Iterable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+
+from iibr_core.color import bytes_from_encoded, encoded_from_stored
+from iibr_core.formats.light_fields.parameters import FILE_NAME
+from iibr_core.formats.outputs import check_output, check_output_folder, write_folder
+from iibr_core.types import GridShape, ImageSize, InputError, ViewUpdate, image_size
+
+WRITERS = ("hci", "eslf")
+"""Layouts that can be written, by the names that people type."""
+LENSLET_TAG = re.compile(r"_eslf$", re.IGNORECASE)
+"""End of the stem of a lenslet image's name."""
+LENSLET_KEY = "iibr:Lenslet"
+"""Key in the header of our lenslet images: columns and rows of the pixels under each lens."""
+
+HCI_FILES = r"input_Cam\d+\.(png|exr)|disp_Cam\d+\.pfm|gt_disp_lowres\.pfm|parameters\.cfg"
+ESLF_ENDING = "_eslf.png"
+WRITING_THREADS = 2
+MAX_PENDING_VIEWS = 4
+SENSOR_SIZE_MM = 36.0
+PARAMETERS = """[intrinsics]
+focal_length_mm = {focal_mm}
+image_resolution_x_px = {size.width}
+image_resolution_y_px = {size.height}
+sensor_size_mm = {sensor_mm}
+fstop = 100.0
+
+[extrinsics]
+num_cams_x = {grid.columns}
+num_cams_y = {grid.rows}
+baseline_mm = 1.0
+focus_distance_m = {focus_m}
+center_cam_x_m = 0.0
+center_cam_y_m = 0.0
+center_cam_z_m = 0.0
+center_cam_rx_rad = 0.0
+center_cam_ry_rad = 0.0
+center_cam_rz_rad = 0.0
+offset = 0
+
+[meta]
+scene = {name}
+category = iibr
+disp_min = {low}
+disp_max = {high}
+depth_map_scale = 1.0
+"""
+
+
+def check_light_field(path: Path, layout: str, inputs: Iterable[Path] = (), force: bool = False) -> None:
+    """Raise InputError if a light field of this layout cannot be written to `path`.
+
+    inputs: files and folders that are read. force: whether an existing output may be replaced. A folder that holds
+    anything but a light field is never replaced.
+    """
+    if layout not in WRITERS:
+        raise InputError(f"{layout!r} is not a layout that can be written: give {' or '.join(WRITERS)}")
+    if layout == "hci":
+        check_output_folder(path, inputs, force, HCI_FILES)
+        return
+    if not path.name.lower().endswith(ESLF_ENDING):
+        raise InputError(f"{path}: a light field in one file must end in {ESLF_ENDING}")
+    check_output(path, inputs, force)
+
+
+def write_light_field(
+    path: Path,
+    layout: str,
+    grid: GridShape,
+    views: Iterable[ViewUpdate],
+    focal_px: float,
+    name: str,
+    with_disparity: bool = False,
+) -> None:
+    """Write a light field, whole or not at all, to a path that `check_light_field` admits; an older one is replaced.
+
+    layout: one of WRITERS. views: each view of the grid in any order, all of one size. focal_px: focal length in pixels
+    of a view. with_disparity: whether HCI folders hold the disparity of every view, not of the centre view only. Raises
+    InputError if views are missing or cannot be written; exceptions of the iterator `views` pass through.
+    """
+    views = _require_all(path, grid, views)
+    if layout == "eslf":
+        _write_eslf(path, grid, views)
+    else:
+        _write_hci(path, grid, views, focal_px, name, with_disparity)
+
+
+def _require_all(path: Path, grid: GridShape, views: Iterable[ViewUpdate]) -> Iterator[ViewUpdate]:
+    """Yield the views. Raises InputError at the end if some are missing."""
+    places = set()
+    for view in views:
+        places.add((view.row, view.column))
+        yield view
+    if len(places) < grid.rows * grid.columns:
+        raise InputError(
+            f"{path}: only {len(places)} of {grid.rows * grid.columns} views were made; nothing was written"
+        )
+
+
+def _write_hci(
+    folder: Path, grid: GridShape, views: Iterable[ViewUpdate], focal_px: float, name: str, with_disparity: bool
+) -> None:
+    size, low, high = ImageSize(1, 1), math.inf, -math.inf
+    pending: deque[Future[None]] = deque()
+    with write_folder(folder) as unfinished:
+        with ThreadPoolExecutor(WRITING_THREADS) as pool:
+            for view in views:
+                pending.append(pool.submit(_write_view, unfinished, grid, view, with_disparity))
+                size = image_size(view.colors)
+                if view.disparity is not None:
+                    low, high = min(low, float(view.disparity.min())), max(high, float(view.disparity.max()))
+                if len(pending) > MAX_PENDING_VIEWS:
+                    pending.popleft().result()
+            for future in pending:
+                future.result()
+        parameters = _parameters(name, grid, size, focal_px, low, high)
+        (unfinished / FILE_NAME).write_text(parameters, encoding="utf-8")
+
+
+def _write_view(folder: Path, grid: GridShape, view: ViewUpdate, with_disparity: bool) -> None:
+    from iibr_core.formats.images.write import write_image  # brings numba, which errors should not wait for
+    from iibr_core.formats.maps.pfm import write_pfm
+
+    number = view.row * grid.columns + view.column
+    write_image(folder / f"input_Cam{number:03d}{'.png' if view.colors.dtype == np.uint8 else '.exr'}", view.colors)
+    if view.disparity is not None and with_disparity:
+        write_pfm(folder / f"disp_Cam{number:03d}.pfm", view.disparity)
+    if view.disparity is not None and (view.row, view.column) == grid.centre:
+        write_pfm(folder / "gt_disp_lowres.pfm", view.disparity)
+
+
+def _parameters(name: str, grid: GridShape, size: ImageSize, focal_px: float, low: float, high: float) -> str:
+    """Return the text of the benchmark's parameters.cfg. The baseline is unknown: 1 mm fixes the scale of depths.
+
+    The focus distance puts the farthest point at infinity; 0 stands for cameras that are focused at infinity.
+    """
+    low, high = (low, high) if math.isfinite(low) else (0.0, 0.0)
+    return PARAMETERS.format(
+        focal_mm=focal_px * SENSOR_SIZE_MM / max(size),
+        sensor_mm=SENSOR_SIZE_MM,
+        focus_m=focal_px / -low / 1000 if low < 0 else 0.0,
+        size=size,
+        grid=grid,
+        name=" ".join(name.split()),
+        low=low,
+        high=high,
+    )
+
+
+def _write_eslf(path: Path, grid: GridShape, views: Iterable[ViewUpdate]) -> None:
+    """Write a lenslet image: the pixels that show one place of the scene, one of each view, form a rectangle."""
+    from iibr_core.formats.images.write import write_image
+
+    height, width = 0, 0
+    pixels = np.empty((0, grid.rows, 0, grid.columns, 3), np.uint8)
+    for view in views:
+        if not pixels.size:
+            height, width = image_size(view.colors)
+            pixels = np.empty((height, grid.rows, width, grid.columns, 3), np.uint8)
+        colors = view.colors
+        pixels[:, view.row, :, view.column] = (
+            colors if colors.dtype == np.uint8 else bytes_from_encoded(encoded_from_stored(colors))
+        )
+    lenslets = pixels.reshape(height * grid.rows, width * grid.columns, 3)
+    write_image(path, lenslets, {LENSLET_KEY: f"{grid.columns}x{grid.rows}"})
