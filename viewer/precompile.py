@@ -28,9 +28,9 @@ if TYPE_CHECKING:
     from iibr_core.scenes.scene import Source
 
 PART = (slice(150, 310), slice(200, 400))
-"""Of the demo photo: so small that compiling is nearly all the work, with edges, wires and slopes of every kind."""
+"""Part of the demo photo: so small that compiling is nearly all the work, with edges, wires and slopes of every kind."""
 GLOSSY_PIXELS = 250_000
-"""So many that normals are smoothed, as those of large photos are."""
+"""Size of a photo whose normals are smoothed, as those of large photos are."""
 KERNEL_FILES = (".nbi", ".nbc")
 
 
@@ -131,14 +131,14 @@ def _open_hdr(scratch: Path) -> None:
 
 
 def _paint(scratch: Path) -> None:
-    """What the first stroke of the depth brush needs."""
+    """Prepare the first stroke of the depth brush."""
     from iibr_core.scenes.loaded_photo import prepare_brush
 
     prepare_brush()
 
 
 def _look_around(scratch: Path) -> None:
-    """What a camera needs that leaves the plane of the views."""
+    """Make a view of a camera outside the plane of the views."""
     import numpy as np
 
     from iibr_core.generation.free_views import FreeViews, inverse_depth_of, steered
@@ -153,7 +153,7 @@ def _look_around(scratch: Path) -> None:
 
 
 def _find_gloss(scratch: Path) -> None:
-    """What the window waits for when a surface becomes glossy, with a light that is to be found in the photo, too."""
+    """Make a surface glossy, with a light that is estimated from the photo."""
     from iibr_core.rendering.gloss.gloss_settings import Gloss, GlossLight
     from iibr_core.rendering.optics import CENTRE
     from iibr_core.scenes.opening import SceneReady, SceneRequest, results_of
@@ -169,7 +169,7 @@ def _find_gloss(scratch: Path) -> None:
 
 
 def _draw_at_own_size(scratch: Path) -> None:
-    """What a picture at the photo's own size needs, with all that the photo hides, through a lens."""
+    """Draw a picture at the photo's own size, with inpainted background, through a lens."""
     import numpy as np
 
     from iibr_core.exports.full_picture import FullPicture

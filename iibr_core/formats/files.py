@@ -19,7 +19,7 @@ MOST_INFLATION = 500
 HARMLESS_BYTES = 256 * 2**20
 """Whatever the file's size, so much may be decoded from it."""
 MOST_TEXT_BYTES = 1 << 20
-"""Of settings and lists: no such file is larger."""
+"""Largest text file that is read: settings and lists are smaller."""
 
 NOTHING_THERE = (errno.ENOENT, errno.ENOTDIR, errno.ELOOP, errno.ENAMETOOLONG)
 MOST_REASON_CHARACTERS = 200
@@ -44,9 +44,9 @@ def printable(text: str) -> str:
 
 
 def status_of(path: Path) -> os.stat_result | None:
-    """Return the status of what is at `path`, links followed; None where nothing is.
+    """Return the status of a file or folder, links followed; None where there is nothing.
 
-    Raises InputError where that may not be known, as below a folder without search permission.
+    Raises InputError where permissions hide it, as below a folder without search permission.
     """
     try:
         return os.stat(path)

@@ -111,7 +111,7 @@ def write_folder(folder: Path) -> Iterator[Path]:
 
 
 def _exchange(new: Path, place: Path, old: Path) -> None:
-    """Rename what is at `place` to `old`, and `new` to `place`; what was there comes back where that fails."""
+    """Rename `place` to `old`, and `new` to `place`; where that fails, the old folder comes back."""
     if place.exists():
         place.rename(old)
     try:

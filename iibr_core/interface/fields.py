@@ -23,7 +23,7 @@ MIN_CAMERAS, MAX_CAMERAS = 16, 256
 """Least and greatest number of these views."""
 
 FORMATS = WRITERS
-"""That `LightField.save` knows."""
+"""Formats of `LightField.save`."""
 
 View = ViewUpdate
 """One view of a light field: row, column, colors (H, W, 3), disparity (H, W) and inpainted (H, W)."""
@@ -112,7 +112,7 @@ class LightField:
         return math.ceil(min(max(CAMERAS_PER_PX * blur_px, MIN_CAMERAS), MAX_CAMERAS))
 
     def save(self, path: str | Path, format: str = "hci", may_replace: bool = False) -> None:
-        """Write the field: a folder, or one file, as the format says; one of FORMATS.
+        """Write the field as a folder or one file, in one of FORMATS.
 
         Raises InputError where that is not possible, or something is there that may not be replaced.
         """

@@ -48,7 +48,7 @@ Grid = int | tuple[int, int] | None
 
 
 class ViewOptions(TypedDict, total=False):
-    """How views are made; what is left out is the usual.
+    """Options of making views; options that are left out have their usual values.
 
     parallax: see `Parallax`; "viewing" if left out. depth_strength: times the viewing parallax. quality: "fast"
     or "balanced"; else the plan chooses. inpaint: what fills holes, as `iibr generate --inpaint` takes it.
@@ -83,7 +83,7 @@ class Scene(ABC):
         """All views, in memory.
 
         grid: None for the plan's; of a light field from disk its own. options: see `ViewOptions`; a light field
-        from disk takes inpaint, for views between its own. report_progress: told the share that is
+        from disk takes inpaint, for views between its own. report_progress: gets the share that is
         done. Raises InputError where an option means nothing or memory does not suffice, Cancelled once should_stop is
         true.
         """
@@ -97,7 +97,7 @@ class Scene(ABC):
         report_progress: ReportProgress = ignore_progress,
         **options: Unpack[ViewOptions],
     ) -> Iterator[View]:
-        """Every view once, as it is ready, the middle one first; none is kept. Arguments of `light_field`."""
+        """Yield every view once, the middle one first; none is kept. Arguments of `light_field`."""
         return _told(self._make(grid, options, should_stop), should_stop, report_progress)
 
     @abstractmethod
@@ -136,11 +136,11 @@ class PhotoScene(Scene):
 
     @property
     def disparity(self) -> FloatImage:
-        """As it was given or found, (H, W) float32, larger is closer."""
+        """Disparity as given or found, (H, W) float32, larger is closer."""
         return self._loaded.disparity.values
 
     def plan(self, grid: Grid = None, **options: Unpack[ViewOptions]) -> ScenePlan:
-        """What will be made, and what that takes. Arguments of `light_field`. Raises InputError."""
+        """Return the plan of the views, with their cost. Arguments of `light_field`. Raises InputError."""
         return make_plan(self._source_for(grid, options), self._loaded, options.get("depth_strength", 1.0))
 
     def _source_for(self, grid: Grid, options: ViewOptions) -> Source:

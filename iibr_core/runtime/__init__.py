@@ -1,1 +1,1 @@
-"""What the hot loops run on: compilation, row bands that hear a stop, files that come along."""
+"""Base of the hot loops: compiled kernels, bands of rows that can be cancelled, the machine, installed files."""

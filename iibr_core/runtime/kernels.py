@@ -75,7 +75,7 @@ side. A kernel that calls another with arrays pays for counting references, per 
 
 
 class KernelLocator:
-    """Where Numba keeps a kernel of this package, and the stamp by which it is good; the public hook of Numba 0.68."""
+    """Place of a compiled kernel, and its stamp: the public hook of Numba 0.68."""
 
     def __init__(self, function: Callable[..., Any]) -> None:
         self._file = Path(inspect.getfile(function)).resolve()
@@ -99,7 +99,7 @@ class KernelLocator:
         return sources_hash(self._file)
 
     def get_disambiguator(self) -> str:
-        """Return what tells functions of one name apart: nothing, no two kernels of a file share one."""
+        """Return an addition to the file's name: none, because no two kernels of a file share a name."""
         return ""
 
 

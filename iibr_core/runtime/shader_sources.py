@@ -25,7 +25,7 @@ class FlatSource:
     origins: tuple[tuple[str, int], ...]
 
     def locate(self, line: int) -> str:
-        """Where line (from 1) of the flattened text really is, as "file:line"."""
+        """Return the origin of a line (from 1) of the flattened text, as "file:line"."""
         name, original = self.origins[min(max(line, 1), len(self.origins)) - 1]
         return f"{name}:{original}"
 

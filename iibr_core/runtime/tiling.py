@@ -15,7 +15,7 @@ from iibr_core.types import ImageSize
 ShouldStop = Callable[[], bool]
 
 MOST_BAND_PIXELS = 1 << 17
-"""Of a band: small enough that a cancelled job stops within some 30 ms."""
+"""Largest number of pixels in a band: a cancelled job stops within some 30 ms."""
 THREADS = core_count()
 
 Item = TypeVar("Item")
@@ -27,7 +27,7 @@ class Cancelled(Exception):
 
 
 def never() -> bool:
-    """The should_stop of work that nobody cancels."""
+    """Return False: the should_stop of work that is never cancelled."""
     return False
 
 

@@ -1,1 +1,1 @@
-"""What is open: a photo or a light field from its file to its last view, without window and threads."""
+"""Opening of photos and light fields, from the file to the last view, without window and threads."""

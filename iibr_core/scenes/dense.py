@@ -35,7 +35,7 @@ def read_dense(
     report_progress: ReportProgress = ignore_progress,
     nearest_to: Callable[[], ViewOffset] = lambda: ViewOffset(0.0, 0.0),
 ) -> DenseField:
-    """Read its views, and get ready to make those between. report_progress: is told the share of all the work.
+    """Read the views of a light field, and begin to make views between them. report_progress: gets the work's share.
 
     Raises InputError where the views find no places on the grid, Cancelled once should_stop is true.
     """

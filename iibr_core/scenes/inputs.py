@@ -1,4 +1,4 @@
-"""What is read to open a scene."""
+"""Files and folders that opening a scene reads."""
 
 from __future__ import annotations
 
@@ -10,8 +10,9 @@ from iibr_core.scenes.scene import Source
 
 
 def inputs_of(source: Source) -> tuple[Path, ...]:
-    """What is read to open it, the map beside it and folders of models included: nothing may be written there. See
-    `check_output`.
+    """Return the files and folders that opening a source reads, with the map beside a photo and folders of models.
+
+    Outputs must not replace them, see `check_output`.
     """
     named, found = named_by(source), map_to_read(Path(source.path), source.depth)
     return named if found is None or found in named else (*named, found)

@@ -59,7 +59,7 @@ def complete_fills(
 
 
 def _disparity(source: Source, loaded: LoadedPhoto, photo: Photo, should_stop: ShouldStop) -> FloatImage:
-    """Of the larger photo, px of it; what was made of it in the smaller one is made of it too."""
+    """Return the disparity of the larger photo, in its pixels, with the edits that were made to the smaller one."""
     from iibr_core.depth.edges.refine import refine
     from iibr_core.depth.editing.canvas import apply_edits
     from iibr_core.depth.search import disparity_of_file

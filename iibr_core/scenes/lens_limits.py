@@ -1,4 +1,4 @@
-"""How far each quantity may go, for what is open. Sliders and clamps take their ends from here."""
+"""Limits of the lens for a scene; sliders and clamps take their ends from here."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from iibr_core.types import GridShape, InputError, ViewOffset
 Record = TypeVar("Record", Optics, ApertureShape)
 
 LONE_VIEW_MARGIN = 0.5
-"""So far, in view steps, the viewpoint may leave a row of one view."""
+"""Largest distance of the viewpoint from a single row of views, in view steps."""
 
 FIRST_APERTURE = 0.3
-"""Of the widest: enough to see what focusing does."""
+"""Share of the widest aperture that is opened by focusing: enough to see its effect."""
 BLADES_LIMITS = (3, 11)
 STEEPEST_TILT = 4.0
 """In spans of the focus from the picture's middle to its border: for tilt handles that are close together."""
@@ -65,7 +65,7 @@ def focus_limits(scene: Scene) -> tuple[float, float]:
 
 
 def focus_span(scene: Scene) -> float:
-    """From the least focus disparity to the greatest: the most that focus range and tilt can use."""
+    """Return the range from the least focus disparity to the greatest: the limit of focus range and tilt."""
     low, high = focus_limits(scene)
     return high - low
 
@@ -135,7 +135,7 @@ def first_aperture(scene: Scene) -> float:
 
 @dataclass(frozen=True)
 class LensChoice:
-    """What is said of the lens before a scene is open, as `Optics` has it; None where nothing is."""
+    """Choices about the lens before a scene is open, as in `Optics`; None where nothing was chosen."""
 
     eye: ViewOffset | None = None
     focus: float | None = None
@@ -143,7 +143,7 @@ class LensChoice:
     gloss: Gloss | None = None
 
     def optics_on(self, scene: Scene) -> Optics:
-        """As near to it as the scene allows. A pinhole shows everything sharp: focusing opens one a little."""
+        """Return the optics as near to the choices as the scene allows; a focus opens a pinhole a little."""
         usual = 0.0 if self.focus is None else first_aperture(scene)
         optics = Optics(
             eye=self.eye or CENTRE,

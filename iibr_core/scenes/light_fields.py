@@ -1,4 +1,4 @@
-"""A light field from disk, as it is shown: as read, and once more with disparity where its views bring none, so that
+"""A light field from disk for display: as read, and once more with disparity if its views have none, so that
 focusing, wide apertures and viewpoints between the views work as with a photo; or with views made between its own.
 """
 
@@ -36,15 +36,13 @@ if TYPE_CHECKING:
     from iibr_core.formats.light_fields.multi_view_scene import MultiView
 
 UNKNOWN_DISPARITY_RANGE_PX = (-4.0, 4.0)
-"""Where to look for the focus in a light field that says nothing about disparity."""
+"""Range of the focus, in px per view step, in a light field without disparity."""
 FROM_VIEWS = "the views themselves"
 
 
 @dataclass(frozen=True, eq=False)
 class Showing:
-    """A light field with what is known of it so far. views: all of them, the centre first. measure: how far opening it
-    is with some of them.
-    """
+    """A light field for display. views: all views, the centre first. measure: returns the progress after some views."""
 
     scene: Scene
     views: Iterator[ViewUpdate]

@@ -28,7 +28,7 @@ SKETCH = ImageSize(height=480, width=480)
 SKETCH_WORTH_PIXELS = 1_500_000
 """Smaller photos are read in no time."""
 NOT_YET = 0.0
-"""Disparity is read as it is, and refined afterwards: so often as the user wants to."""
+"""Strength of refinement while a photo is read: none, it follows afterwards, each time the user changes it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,8 +37,8 @@ class LoadedPhoto:
 
     disparity: what `depth_settings` made of what was `found`, by way of what was `refined`. origin: where it was found.
     settings: text of the settings the photo was saved with by this program, "" without. model: name or path of the
-    depth model that its depth is from, None where it is from elsewhere. levels: of what was refined. canvas: what the
-    worker edits on; nobody else touches it. own_size: of the photo as its file has it, upright. stamp: of that file,
+    depth model that its depth is from, None where it is from elsewhere. levels: of what was refined. canvas: of the
+    worker's edits, used by the worker alone. own_size: of the photo as its file has it, upright. stamp: of that file,
     see `stamp_of`.
     """
 
@@ -57,7 +57,7 @@ class LoadedPhoto:
 
 
 def stamp_of(path: Path) -> tuple[int, ...]:
-    """What tells a file from one that came in its place. Raises InputError where there is none."""
+    """Return a stamp that changes when another file takes the place of this one. Raises InputError without a file."""
     require_file(path)
     status = path.stat()
     return status.st_ino, status.st_size, status.st_mtime_ns
@@ -70,7 +70,7 @@ def load_photo(
     depth_settings: DepthSettings | None = None,
     asks_model: bool = True,
 ) -> LoadedPhoto:
-    """Read a photo and find its disparity, telling what is going on, not more often than people can see.
+    """Read a photo and find its disparity; progress is reported ten times a second at most.
 
     depth_settings: what to make of the disparity, None for what the source says. asks_model: see `open_with_depth`.
     Raises InputError, and Cancelled once should_stop is true.
@@ -171,7 +171,7 @@ def without_history(loaded: LoadedPhoto) -> LoadedPhoto:
 
 
 def _turned_like(size: ImageSize, upright: ImageSize) -> ImageSize:
-    """The size of a stored picture as it is upright."""
+    """Return the size of a stored picture after it was turned upright."""
     is_turned = (size.height < size.width) != (upright.height < upright.width) and size.height != size.width
     return ImageSize(size.width, size.height) if is_turned else size
 

@@ -1,4 +1,4 @@
-"""What is made of a photo that was read: its plan, and every view of it."""
+"""The plan of a photo, and all its views."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from iibr_core.types import FloatImage, InputError, ReportProgress, ViewOffset, 
 def inpainting_aids(
     source: Source, loaded: LoadedPhoto, report_progress: ReportProgress = ignore_progress
 ) -> InpaintingAids:
-    """What inpainting this photo may ask: what gave its depth, where that was a model."""
+    """Return the aids for inpainting this photo: the estimator of its depth, if that was a model."""
     from iibr_core.depth.search import PhotoWithDepth, estimator_of
 
     found = PhotoWithDepth(loaded.photo, loaded.found, loaded.origin)
@@ -29,8 +29,7 @@ def inpainting_aids(
 
 
 def make_plan(source: Source, loaded: LoadedPhoto, depth_strength: float, keeps_views: bool = True) -> ScenePlan:
-    """The plan for viewing, or for disparity as it is given. What was not edited keeps its parallax: clips and strokes
-    must not move all the rest.
+    """Return the plan for viewing, or for literal disparity. Places without edits keep their parallax.
 
     keeps_views: else each is written and forgotten. Raises InputError where an override is out of range.
     """
@@ -66,9 +65,7 @@ def views_of_photo(
     in_srgb: bool = True,
     wanted: Callable[[], WantedViews] = lambda: ALL_VIEWS,
 ) -> Generator[ViewUpdate]:
-    """As `generate` yields them. report_progress: hears of inpainting that takes long. in_srgb: else in the photo's
-    colour space. Raises InputError as `generate` does.
-    """
+    """Yield the views as `generate` does, in sRGB or in the photo's colour space. Raises InputError as `generate` does."""
     from iibr_core.generation.light_field import generate
 
     photo, disparity = loaded.photo, plan.field_disparity(loaded.disparity)

@@ -1,4 +1,4 @@
-"""A scene from its file to its last view: read, planned, its views made, each result as soon as it is there."""
+"""Opening of a scene: read the file, plan, make the views; each result is yielded at once."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from iibr_core.types import InputError, Photo, ViewOffset, ViewUpdate
 
 @dataclass(frozen=True, eq=False)
 class SceneRequest:
-    """One job with all its inputs. depth_settings: what is made of the photo's depth, None for what the source says.
+    """One job with all its inputs. depth_settings: refinement and edits of the photo's depth, None for those of the source.
 
     plan: of what is loaded, where it is made already. takes_drafts: views may come twice, so that there is something
     to look at soon; else each comes once, final. filled: the same light field, where all its views are made already.
@@ -75,9 +75,9 @@ def results_of(
     report_progress: Callable[[Progress], None] = lambda progress: None,
     wanted: Callable[[], WantedViews] = lambda: ALL_VIEWS,
 ) -> Generator[SceneReady | ViewReady]:
-    """Everything a job has to say, in order: the scene, then each of its views; a light field perhaps more than once.
+    """Yield all results of a job in order: the scene, then each of its views; a light field perhaps more than once.
 
-    report_progress: is told what it does while there is nothing new to show. wanted: asked once the scene is there,
+    report_progress: gets what it does while there is nothing new to show. wanted: asked once the scene is there,
     which views of a photo's grid are to be made beside its own. Raises InputError for a file that cannot
     be opened, Cancelled where should_stop says so while it is read.
     """
@@ -93,7 +93,7 @@ def results_of(
 
 
 def sketch_of(wanted: WantedPhoto, should_stop: ShouldStop = never) -> SceneReady | None:
-    """A large photo in small, of generation 0; None where it cannot be read so: reading all of it will tell why.
+    """Return a large photo at a small size, as generation 0; None where it cannot be read: reading it whole gives the error.
 
     Raises Cancelled once should_stop is true.
     """
@@ -109,7 +109,7 @@ def sketch_of(wanted: WantedPhoto, should_stop: ShouldStop = never) -> SceneRead
 
 
 def scene_of_photo(source: Source, loaded: LoadedPhoto, plan: ScenePlan) -> Scene:
-    """What is known of a photo and its plan."""
+    """Return the scene of a photo and its plan."""
     from iibr_core.rendering.gloss.geometry import infinity_of
 
     height, width = loaded.photo.size
@@ -140,7 +140,7 @@ def scene_of_photo(source: Source, loaded: LoadedPhoto, plan: ScenePlan) -> Scen
 
 
 def _found_span_px(loaded: LoadedPhoto, plan: ScenePlan) -> float:
-    """Of the field disparity before edits, which make_plan keeps at its scale."""
+    """Return the range of the field disparity before edits, which make_plan keeps at its scale."""
     if loaded.depth_settings.edits == UNEDITED:
         far, near = plan.disparity_range_px
         return near - far
@@ -150,7 +150,7 @@ def _found_span_px(loaded: LoadedPhoto, plan: ScenePlan) -> float:
 
 
 def _known_focal_px(photo: Photo) -> float | None:
-    """None where the photo did not tell, and a usual field of view stands in."""
+    """Return the focal length; None if the photo has none and a usual field of view is assumed."""
     from iibr_core.formats.images.photo import focal_px_from_fov
 
     return None if photo.focal_px == focal_px_from_fov(photo.size.width) else photo.focal_px

@@ -12,8 +12,8 @@ from iibr_core.scenes.scene import Progress
 Stage = Literal["reading", "searching", "drafting", "matching", "carrying"]
 FINDING = "finding disparity"
 READ_WORK, SEARCH_WORK, MATCH_WORK = 0.2, 3.0, 30.0
-"""Of reading a view, of the small map and of the whole one, against carrying disparity to a view, as long as this run
-has not measured them.
+"""Cost of reading a view, of the small map and of the whole map, relative to carrying disparity to a view, until this run
+has measured them.
 """
 LEAST_CARRIED = 3
 
@@ -22,7 +22,7 @@ MeasureViews = Callable[[int, int, float], Progress]
 
 
 class ViewsWork:
-    """Where views are made. views: how many there will be."""
+    """Progress of making views. views: their number."""
 
     def __init__(self, views: int, clock: Callable[[], float] = time.perf_counter) -> None:
         self._views, self._clock, self._time_left = views, clock, TimeLeft(clock)
@@ -36,9 +36,7 @@ class ViewsWork:
 
 
 class OpeningWork:
-    """Counts work in views that disparity is carried to. Time is told from the first of them on: what they cost depends
-    on what they show.
-    """
+    """Counts work in views that disparity is carried to. The time left is known from the first of them on."""
 
     def __init__(
         self,
@@ -74,7 +72,7 @@ class OpeningWork:
         return lambda there, drafts, share: self.advance(stage, share)
 
     def advance(self, stage: Stage, share: float) -> Progress:
-        """So much of a stage is done, 0..1; those before it are."""
+        """Return the progress after this share of a stage, 0..1, and all stages before it."""
         if stage != self._stage:
             if stage == "drafting" or (stage == "carrying" and "drafting" not in self._work):
                 self._time_left.restart()

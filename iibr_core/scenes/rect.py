@@ -18,7 +18,7 @@ class Rect(NamedTuple):
         return self.x <= x < self.x + self.width and self.y <= y < self.y + self.height
 
     def within(self, other: Rect) -> Rect:
-        """What of it lies in another one."""
+        """Return the part that lies in another rectangle."""
         x, y = max(self.x, other.x), max(self.y, other.y)
         far_x, far_y = (
             min(self.x + self.width, other.x + other.width),

@@ -1,4 +1,4 @@
-"""What to open, and what is open: a photo or a light field, and how far the work on it is."""
+"""Records of what to open, of an open photo or light field, and of the progress of opening it."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ AS_USUAL = DepthChoice()
 
 @dataclass(frozen=True)
 class Source:
-    """What to open and what the user decided about it; None leaves the choice to the program.
+    """Path to open, and the user's decisions about it; None leaves a choice to the program.
 
     path: a photo or a light-field folder. focus_disparity: in the units of the given disparity. quality: where the ray
     transformer runs. inpaint: what fills the places that the photo never saw, see `load_inpainter`. is_literal:
@@ -37,8 +37,8 @@ class Source:
 
 
 def source_beside(source: Source | None, path: str) -> Source:
-    """To open another file: what was decided about the one before counts, but for what belongs to its depth map, or
-    to the views on disk.
+    """Return the source of another file, with the decisions about this one, except those about its depth map or its
+    views on disk.
     """
     return _with_depth(replace(source or Source(""), path=path, filled_grid=None), file=None)
 
@@ -54,14 +54,14 @@ def source_with_depth(source: Source, start: DepthStart, model: str | None = Non
 
 
 def _with_depth(source: Source, **changes: Any) -> Source:
-    """What was said of the map before, and the focus in its units, counts no longer."""
+    """Return the source with another map; decisions about the map before, and the focus in its units, are dropped."""
     forgotten = {"file_scale": None, "inverts": False, "is_metric": False, "stretches": False}
     return replace(source, depth=replace(source.depth, **(forgotten | changes)), focus_disparity=None)
 
 
 @dataclass(frozen=True)
 class Scene:
-    """What is open: a photo with its plan, or a light field from disk (plan None).
+    """An open photo with its plan, or a light field from disk (plan None).
 
     depth_origin: where a photo's depth came from, None for light fields; depth_source: the same in a few words.
     has_view_disparity: whether every view comes with its own disparity. notes: what was done to what the files hold, a
@@ -115,19 +115,19 @@ class Scene:
 
     @property
     def size(self) -> ScreenSize:
-        """Of a view, as it is drawn."""
+        """Return the size of a view on the screen."""
         return ScreenSize(self.width, self.height)
 
     @property
     def further_notes(self) -> tuple[str, ...]:
-        """The notes without what the panel's line about depth says."""
+        """Return the notes without the panel's line about depth."""
         said = self.depth_origin.advising_line if self.depth_origin is not None else ""
         return tuple(note for note in self.notes if note != said)
 
 
 @dataclass(frozen=True)
 class Progress:
-    """How far the worker is: views done of total, in seconds; doing says what in words where that is not making views.
+    """Progress of the worker: views done of total, in seconds; doing: the work in words, if it is not making views.
 
     drafts: of those done, so many will come again, with sharper edges. share: of all the work, what is done, 0..1.
     left_s: seconds that it still takes, about; None where that is not known.
@@ -147,13 +147,13 @@ class Progress:
         return 0 < self.total == self.done and not self.drafts
 
     def report_to(self, report_progress: ReportProgress) -> None:
-        """As a share of all the work, as far as that is known."""
+        """Share of all work that is done, as far as that is known."""
         report_progress(self.share, float(self.total > 0), self.doing)
 
 
 @dataclass(frozen=True)
 class DepthSettings:
-    """What disparity is made of what was found: refined this far (see `DepthChoice.refine`), then edited."""
+    """Changes to the disparity that was found: the strength of refinement (see `DepthChoice.refine`), then edits."""
 
     refine: float = 1.0
     edits: DepthEdits = UNEDITED

@@ -1,4 +1,4 @@
-"""A gloss on the scene that is open: where the scene's surfaces lie, what is reflected, and its views with it."""
+"""Gloss on an open scene: its surfaces, the reflected light, and the views with it."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ MOST_ENVIRONMENT_PIXELS = 2_000_000
 
 
 def geometry_of(scene: Scene, disparity: FloatImage) -> SceneGeometry:
-    """Where the points of a scene lie; a usual field of view stands in where none is known. disparity: (H, W), of its
+    """Return the positions of a scene's points; a usual field of view is assumed where none is known. disparity: (H, W), of its
     centre view: that of a light field from disk says what may be infinitely far.
     """
     from iibr_core.formats.images.photo import focal_px_from_fov
@@ -44,7 +44,7 @@ def read_environment(gloss: Gloss) -> FloatImage | None:
 
 @dataclass(frozen=True, eq=False)
 class GlossRequest:
-    """What a gloss means for a scene is to be found out. centre: its centre view; normals: of that, where known."""
+    """A request for the effect of a gloss on a scene. centre: its centre view; normals: of that, where known."""
 
     gloss: Gloss
     scene: Scene
@@ -77,7 +77,7 @@ def maps_of_scene(
     should_stop: ShouldStop = never,
     normals: FloatImage | None = None,
 ) -> GlossMaps | None:
-    """What the gloss means for a scene with this centre view, None where that has no disparity. normals: of its
+    """Return the effect of the gloss on a scene with this centre view, None if that has no disparity. normals: of its
     disparity, where they are known.
 
     Raises InputError where the gloss is not sound or its surroundings cannot be read, Cancelled once should_stop is

@@ -31,7 +31,7 @@ OpenCV have them.
 """
 STEPS = 1024
 USUAL_DISTANCE, MOST_DISTANCE = 8.0, 40.0
-"""From a scale's colours, in 255ths: half of a map's pixels lie nearer than the first, 19 of 20 than the second."""
+"""Distances from a scale in 255ths: half of a map's pixels are below the first, 19 of 20 below the second."""
 LEAST_RANGE = 0.25
 """A map takes at least this share of its scale."""
 AT_ONCE = 4096

@@ -1,4 +1,4 @@
-"""What a map's file says of its values: text in the header of a PNG, TIFF or EXR, so that it comes back as it was."""
+"""The meaning of a map's values, as text in the header of a PNG, TIFF or EXR: reading gives back the map as written."""
 
 from __future__ import annotations
 

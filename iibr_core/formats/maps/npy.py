@@ -34,7 +34,7 @@ MISREADINGS = (
     RuntimeError,
 )
 USUAL_NAMES = ("depth", "disparity", "disp", "arr_0", "predicted_depth")
-"""Of the array that is taken from an archive with several."""
+"""Names of the array that is read from an archive of several arrays, the best first."""
 
 
 def read_array(path: Path, most_values: int, member: str = "") -> NDArray[Any]:

@@ -43,7 +43,7 @@ def read_pfm(path: Path) -> FloatImage:
 
 
 def read_pfm_size(path: Path) -> ImageSize:
-    """From the header. Raises InputError as `read_pfm` does."""
+    """Return (height, width) from the header. Raises InputError as `read_pfm` does."""
     with open_binary(path) as file:
         return _header(path, file)[0]
 

@@ -37,9 +37,9 @@ class MapHeader(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class MapFile:
-    """A map as its file holds it, upright.
+    """A map from a file, upright.
 
-    values: (H, W) float32, NaN where the file says that nothing is known, `text.scale` and `text.offset` applied.
+    values: (H, W) float32, NaN where the file marks values as unknown, `text.scale` and `text.offset` applied.
     numbers: how they are stored; "colours" is a map drawn in colours, its place in them, 0..1. largest: the greatest
     integer that could be stored; 1 for others. is_zero: (H, W), where an integer is 0, which may mean unknown; None
     where none is. text: what the program that wrote it says of it, None without. notes: what reading changed.
@@ -54,7 +54,7 @@ class MapFile:
 
 
 def read_map(path: Path) -> FloatImage:
-    """One value per pixel as (H, W) float32, upright, NaN where the file says that it is unknown.
+    """Return one value per pixel as (H, W) float32, upright, NaN where the file marks it as unknown.
 
     Floating-point files are taken as they are; in files of integers the value is the stored integer and 0 is unknown,
     as in KITTI and Middlebury, unless the file was written with its own scale. Where a picture has alpha, 0 means
@@ -67,7 +67,7 @@ def read_map(path: Path) -> FloatImage:
 
 
 def read_map_file(path: Path) -> MapFile:
-    """A map, and what its file tells of it. Raises InputError as `read_map` does."""
+    """Read a map with the meaning of its values. Raises InputError as `read_map` does."""
     path = Path(path)
     require_file(path)
     kind = path.suffix.lower()
@@ -85,7 +85,7 @@ def read_map_picture(source: PictureSource) -> MapFile:
 
 
 def read_map_header(path: Path) -> MapHeader:
-    """Of a map that `read_map` reads. Raises InputError as that does for its header."""
+    """Return the header of a map that `read_map` reads. Raises InputError as that does."""
     kind = path.suffix.lower()
     if kind == ".pfm":
         return MapHeader(read_pfm_size(path), 0)

@@ -16,7 +16,7 @@ SURFACE_SHARE = 0.02
 
 
 STRONG_SHARE = 0.1
-"""Steps of at least this share of the range, over four pixels, tell how soft a map is."""
+"""Smallest step, as a share of the range over four pixels, that counts for the softness of a map."""
 REPEATS = (2, 3)
 """How often pixels may be repeated along each axis, and multiples of these."""
 LEAST_SIDE = 32

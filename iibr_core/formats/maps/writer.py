@@ -1,4 +1,4 @@
-"""Writes maps with one value per pixel, so that reading them again gives the same: their files say what they hold."""
+"""Write maps with one value per pixel; a text in the file keeps the meaning of its values for reading."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ DISPARITY = MapText("disparity")
 
 
 def write_map(path: Path, values: FloatImage, text: MapText = DISPARITY) -> str:
-    """Write an (H, W) map of finite values, whole or not at all; returns what is to be known of the file, or "".
+    """Write an (H, W) map of finite values, whole or not at all; return a note about the file, or "".
 
-    text: what they mean; PNG, TIFF and EXR keep it. A PNG holds the values from 1 to 65535, and says how they were
+    text: their meaning; PNG, TIFF and EXR keep it. A PNG holds the values from 1 to 65535, and says how they were
     multiplied and moved; all others hold them as they are (float32). Raises InputError for other endings, for
     disparity whose name ends in `_depth`, and where the file cannot be written.
     """
