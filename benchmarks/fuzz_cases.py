@@ -14,7 +14,23 @@ import numpy as np
 
 from benchmarks import fuzz_seeds as seeds
 from benchmarks.fuzz_damage import Seed, damage, repair_png
+from iibr_core.depth.estimators import estimate_cache
+from iibr_core.depth.estimators.config import read_preparation
+from iibr_core.depth.estimators.transformers_models import KINDS
+from iibr_core.depth.search import open_with_depth
+from iibr_core.evaluation.lens_picture import read_lens_picture
+from iibr_core.formats.images.photo import read_photo
+from iibr_core.formats.light_fields.grids import read_grid
+from iibr_core.formats.light_fields.light_field_formats import find_light_field, open_light_field
+from iibr_core.formats.light_fields.llff import read_llff
+from iibr_core.formats.light_fields.views import read_views
+from iibr_core.formats.maps.disparity_file import read_disparity
+from iibr_core.ray_transformer.inference import TrainedWeights
 from iibr_core.types import ImageSize, InputError
+from viewer.app.preferences_store import load_preferences
+from viewer.model.lens.aperture_mask import read_mask
+from viewer.model.saved_settings import read_settings
+from viewer.model.state.app_state import AppState
 
 MAX_PIXELS = 100_000
 
@@ -34,8 +50,6 @@ def case(name: str, seed: int, number: int) -> tuple[str, bytes]:
 
 
 def _read_photo(path: Path) -> None:
-    from iibr_core.formats.images.photo import read_photo
-
     pixels = read_photo(path, MAX_PIXELS).pixels
     assert pixels.ndim == 3
     assert pixels.shape[0] * pixels.shape[1] <= MAX_PIXELS
@@ -44,32 +58,22 @@ def _read_photo(path: Path) -> None:
 
 
 def _read_map(path: Path) -> None:
-    from iibr_core.formats.maps.disparity_file import read_disparity
-
     assert np.isfinite(read_disparity(path, ImageSize(*seeds.SIZE)).values).all()
 
 
 def _open_with_depth(path: Path) -> None:
-    from iibr_core.depth.search import open_with_depth
-
     found = open_with_depth(path, max_pixels=MAX_PIXELS)
     assert found.disparity.values.shape == found.photo.size
     assert np.isfinite(found.disparity.values).all()
 
 
 def _read_field(path: Path) -> None:
-    from iibr_core.formats.light_fields.light_field_formats import open_light_field
-    from iibr_core.formats.light_fields.views import read_views
-
     scene = open_light_field(path.parent)
     assert scene.focal_px is None or 0 < scene.focal_px < np.inf
     assert len(list(read_views(scene)[1])) == 4
 
 
 def _read_view_file(path: Path) -> None:
-    from iibr_core.formats.light_fields.light_field_formats import find_light_field
-    from iibr_core.formats.light_fields.views import read_views
-
     scene = find_light_field(path)
     if scene is not None:
         size, views = read_views(scene)
@@ -82,20 +86,14 @@ def _four_views(folder: Path) -> None:
 
 
 def _read_settings(path: Path) -> None:
-    from viewer.model.saved_settings import read_settings
-
     read_settings(path)
 
 
 def _read_mask(path: Path) -> None:
-    from viewer.model.lens.aperture_mask import read_mask
-
     read_mask(path)
 
 
 def _read_poses(path: Path) -> None:
-    from iibr_core.formats.light_fields.llff import read_llff
-
     scene = read_llff(path.parent)
     assert scene is None or all(np.isfinite(view.offset).all() for view in scene.views)
 
@@ -107,9 +105,6 @@ def _view_and_lens(folder: Path) -> None:
 
 
 def _read_lens_picture(path: Path) -> None:
-    from iibr_core.evaluation.lens_picture import read_lens_picture
-    from iibr_core.formats.light_fields.grids import read_grid
-
     scene = read_grid(path.parent)
     assert scene is not None
     found = read_lens_picture(scene, MAX_PIXELS)
@@ -118,31 +113,21 @@ def _read_lens_picture(path: Path) -> None:
 
 
 def _read_preferences(path: Path) -> None:
-    from viewer.app.preferences_store import load_preferences
-    from viewer.model.state.app_state import AppState
-
     if load_preferences(AppState(), path.parent).notices:
         raise InputError("a notice says why")
 
 
 def _read_estimate(path: Path) -> None:
-    from iibr_core.depth.estimators import estimate_cache
-
     estimate_cache.cache_folder = lambda: path.parent
     if estimate_cache.load(path.stem) is None:
         raise InputError("as if there were none")
 
 
 def _read_model_config(path: Path) -> None:
-    from iibr_core.depth.estimators.config import read_preparation
-    from iibr_core.depth.estimators.transformers_models import KINDS
-
     read_preparation(path.parent, KINDS["depth_anything"])
 
 
 def _read_weights(path: Path) -> None:
-    from iibr_core.ray_transformer.inference import TrainedWeights
-
     TrainedWeights(path)
 
 

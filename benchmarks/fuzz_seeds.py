@@ -14,8 +14,13 @@ from PIL import Image, PngImagePlugin
 
 from benchmarks.fuzz_damage import Seed, repair_png
 from iibr_core.formats.images.spatial_photo import write_spatial_photo
+from iibr_core.rendering.optics import ApertureMask, ApertureShape, Optics
+from iibr_core.runtime.resources import resource_folder
+from iibr_core.scenes.scene import Source
 from iibr_core.types import ImageSize
 from tests.iibr_core import embedded_files as embedded
+from viewer.model.saved_settings import settings_text
+from viewer.model.state.saving import SavedSettings
 
 SIZE = ImageSize(17, 23)
 
@@ -187,11 +192,6 @@ def cfgs() -> list[Seed]:
 
 
 def saved_settings() -> list[Seed]:
-    from iibr_core.rendering.optics import ApertureMask, ApertureShape, Optics
-    from iibr_core.scenes.scene import Source
-    from viewer.model.saved_settings import settings_text
-    from viewer.model.state.saving import SavedSettings
-
     mask = ApertureShape("mask", mask=ApertureMask("m", 2, 2, b"\x01\xff\x00\x10"))
     text = settings_text(SavedSettings(Optics(aperture_shape=mask), 1.0, Source(""), (64, 48))).encode()
 
@@ -210,8 +210,6 @@ def saved_settings() -> list[Seed]:
 
 
 def weights() -> list[Seed]:
-    from iibr_core.runtime.resources import resource_folder
-
     data = (resource_folder("assets") / "weights" / "ray_transformer.safetensors").read_bytes()
     split = 8 + int.from_bytes(data[:8], "little")
 

@@ -22,10 +22,11 @@ from concurrent.futures import ThreadPoolExecutor
 from itertools import product
 from pathlib import Path
 
-from benchmarks.harness.reports import parser_of, start
 from tests.hostile.case import Case, Ended, run_case
 from tests.hostile.forks import KILLED
 from tests.hostile.sandbox import make_template
+
+from benchmarks.harness.reports import parser_of, start
 
 OPENING: dict[str, tuple[str, ...]] = {
     "plan": (),

@@ -8,6 +8,8 @@ import signal
 import sys
 import warnings
 
+from iibr_core.types import InputError
+
 EXIT_UNEXPECTED, EXIT_BAD_INPUT, EXIT_INTERRUPTED = 1, 2, 130
 COLLECT_AFTER = 100_000, 20, 100
 """Thresholds of Python's garbage collector. Its own, from 700 objects on, cost 0.3 s while modules are imported."""
@@ -46,8 +48,6 @@ def run() -> int:
 
 def _end_by(error: Exception) -> int:
     import typer
-
-    from iibr_core.types import InputError
 
     if isinstance(error, InputError):
         return _end(str(error), EXIT_BAD_INPUT)

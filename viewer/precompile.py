@@ -20,9 +20,27 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import TYPE_CHECKING, get_args
 
+import numpy as np
+
+from iibr_core.depth.choice import DepthChoice
+from iibr_core.exports.full_picture import FullPicture
+from iibr_core.formats.images.photo import read_photo
+from iibr_core.formats.images.write import write_image
+from iibr_core.formats.maps.reader import read_map
+from iibr_core.formats.maps.writer import write_map
+from iibr_core.generation.free_views import FreeViews, inverse_depth_of, steered
+from iibr_core.rendering.gloss.gloss_settings import Gloss, GlossLight
+from iibr_core.rendering.optics import CENTRE, Optics
 from iibr_core.runtime.compiling import COMPILING, FOLDER_VARIABLE
 from iibr_core.runtime.machine import core_count
-from iibr_core.types import InputError, Quality
+from iibr_core.scenes.loaded_photo import load_photo, prepare_brush
+from iibr_core.scenes.making import make_plan
+from iibr_core.scenes.opening import SceneReady, SceneRequest, results_of
+from iibr_core.scenes.scene import Source
+from iibr_core.scenes.scene_gloss import GlossRequest, answer
+from iibr_core.scenes.screen_size import ScreenSize
+from iibr_core.types import Camera, InputError, Quality
+from viewer.model.demo_photo import demo_photo
 
 if TYPE_CHECKING:
     from iibr_core.scenes.scene import Source
@@ -69,15 +87,6 @@ def _take(step: Callable[[Path], None]) -> None:
 
 def _photo(scratch: Path, is_mapped: bool = True, is_hdr: bool = False) -> Source:
     """A part of the demo photo as a file."""
-    import numpy as np
-
-    from iibr_core.formats.images.photo import read_photo
-    from iibr_core.formats.images.write import write_image
-    from iibr_core.formats.maps.reader import read_map
-    from iibr_core.formats.maps.writer import write_map
-    from iibr_core.scenes.scene import Source
-    from viewer.model.demo_photo import demo_photo
-
     photo = scratch / ("photo.exr" if is_hdr else "photo.png")
     colors = read_photo(demo_photo()).pixels[PART]
     write_image(photo, 4 * colors if is_hdr else np.round(255 * colors).astype(np.uint8))
@@ -91,24 +100,16 @@ def _photo(scratch: Path, is_mapped: bool = True, is_hdr: bool = False) -> Sourc
 
 def _open(source: Source) -> None:
     """All that the window's worker does with a photo."""
-    from iibr_core.rendering.optics import CENTRE
-    from iibr_core.scenes.opening import SceneRequest, results_of
-
     for _ in results_of(SceneRequest(0, source), lambda: False, lambda: CENTRE):
         pass
 
 
 def _show_first_picture(scratch: Path) -> None:
-    from iibr_core.rendering.optics import CENTRE
-    from iibr_core.scenes.opening import SceneRequest, results_of
-
     next(results_of(SceneRequest(0, _photo(scratch)), lambda: False, lambda: CENTRE))
 
 
 def _make_views(scratch: Path) -> None:
     """Without what comes before the first picture."""
-    from iibr_core.depth.choice import DepthChoice
-
     _open(replace(_photo(scratch), depth=DepthChoice(refine=0.0)))
 
 
@@ -121,8 +122,6 @@ def _open_smaller(scratch: Path) -> None:
 
 
 def _open_guessed(scratch: Path) -> None:
-    from iibr_core.depth.choice import DepthChoice
-
     _open(replace(_photo(scratch, is_mapped=False), depth=DepthChoice(start="rough")))
 
 
@@ -132,19 +131,11 @@ def _open_hdr(scratch: Path) -> None:
 
 def _paint(scratch: Path) -> None:
     """Prepare the first stroke of the depth brush."""
-    from iibr_core.scenes.loaded_photo import prepare_brush
-
     prepare_brush()
 
 
 def _look_around(scratch: Path) -> None:
     """Make a view of a camera outside the plane of the views."""
-    import numpy as np
-
-    from iibr_core.generation.free_views import FreeViews, inverse_depth_of, steered
-    from iibr_core.scenes.loaded_photo import load_photo
-    from iibr_core.types import Camera
-
     loaded = load_photo(_photo(scratch))
     size = loaded.photo.size
     camera = Camera(np.eye(3), np.zeros(3), size, (float(size.width),) * 2, (size.width / 2, size.height / 2), "")
@@ -154,13 +145,6 @@ def _look_around(scratch: Path) -> None:
 
 def _find_gloss(scratch: Path) -> None:
     """Make a surface glossy, with a light that is estimated from the photo."""
-    from iibr_core.rendering.gloss.gloss_settings import Gloss, GlossLight
-    from iibr_core.rendering.optics import CENTRE
-    from iibr_core.scenes.opening import SceneReady, SceneRequest, results_of
-    from iibr_core.scenes.scene import Source
-    from iibr_core.scenes.scene_gloss import GlossRequest, answer
-    from viewer.model.demo_photo import demo_photo
-
     large = Source(str(demo_photo()), max_pixels=GLOSSY_PIXELS)
     ready = next(results_of(SceneRequest(0, large), lambda: False, lambda: CENTRE))
     assert isinstance(ready, SceneReady)
@@ -170,15 +154,6 @@ def _find_gloss(scratch: Path) -> None:
 
 def _draw_at_own_size(scratch: Path) -> None:
     """Draw a picture at the photo's own size, with inpainted background, through a lens."""
-    import numpy as np
-
-    from iibr_core.exports.full_picture import FullPicture
-    from iibr_core.rendering.optics import CENTRE, Optics
-    from iibr_core.scenes.loaded_photo import load_photo
-    from iibr_core.scenes.making import make_plan
-    from iibr_core.scenes.opening import SceneReady, SceneRequest, results_of
-    from iibr_core.scenes.screen_size import ScreenSize
-
     small = replace(_photo(scratch), max_pixels=16_000)
     loaded = load_photo(small)
     plan = make_plan(small, loaded, 1.0)
@@ -191,11 +166,6 @@ def _draw_at_own_size(scratch: Path) -> None:
 
 def _search_views(scratch: Path) -> None:
     """A light field without disparity: `iibr depth` looks for it in the same way."""
-    import numpy as np
-
-    from iibr_core.formats.images.write import write_image
-    from iibr_core.scenes.scene import Source
-
     folder = scratch / "field"
     folder.mkdir()
     texture = np.random.default_rng(0).integers(0, 255, (96, 96, 3), np.uint8)

@@ -19,6 +19,8 @@ from iibr_core.depth.embedded.embedded_depth import read_embedded
 from iibr_core.depth.embedded.picture import photo_in_focus, rotate_estimate
 from iibr_core.depth.embedded.unread import unread_parts
 from iibr_core.depth.estimates import Estimate, inverted, values_of
+from iibr_core.depth.estimators.catalog import is_meaning_known, model_to_use
+from iibr_core.depth.estimators.estimate_depth import estimate_with
 from iibr_core.depth.map_file import (
     depth_beside_picture,
     depth_from_channel,
@@ -30,6 +32,7 @@ from iibr_core.depth.map_file import (
 from iibr_core.depth.pictorial_cues import estimate_from_cues
 from iibr_core.depth.scaling import disparity_from, inverse_metres_over
 from iibr_core.depth.sidecar import find_sidecar, flat_disparity, sidecars_of
+from iibr_core.depth.stereo_pair import estimate_from_pair
 from iibr_core.formats.images.decode import read_orientation
 from iibr_core.formats.images.photo import DEFAULT_MAX_PIXELS, read_photo
 from iibr_core.formats.maps.disparity_file import filling_note, map_at_size
@@ -169,9 +172,6 @@ def estimator_of(found: PhotoWithDepth, choice: DepthChoice) -> EstimateDepth | 
         return None
 
     def estimate(colors: FloatImage, should_stop: ShouldStop) -> FloatImage:
-        from iibr_core.depth.estimators.catalog import model_to_use
-        from iibr_core.depth.estimators.estimate_depth import estimate_with
-
         model = model_to_use(choice)
         if model is None:
             raise InputError(f"{found.origin.words}: the model no longer exists")
@@ -255,8 +255,6 @@ class _DepthSearch:
         return _FoundDepth(photo, replace(origin, near=told.near), told.estimate, embedded.notes + told.notes)
 
     def of_pair(self) -> _FoundDepth | None:
-        from iibr_core.depth.stereo_pair import estimate_from_pair
-
         found = estimate_from_pair(self.path, self.should_stop, self.report_progress)
         if found is None:
             return None
@@ -264,13 +262,9 @@ class _DepthSearch:
         return _FoundDepth(self.photo, DepthOrigin("embedded", f"the photo's two views ({layout})"), estimate)
 
     def model(self) -> _FoundDepth | None:
-        from iibr_core.depth.estimators.catalog import is_meaning_known, model_to_use
-
         model = model_to_use(self.choice)
         if model is None:
             return None
-        from iibr_core.depth.estimators.estimate_depth import estimate_with
-
         raise_if_stopped(self.should_stop)
         estimate = estimate_with(model, self.photo, self.should_stop, self.report_progress)
         told = depth_of_model(model.title, estimate, is_meaning_known(model), self.photo, self.choice)

@@ -23,6 +23,7 @@ from iibr_core.depth.edges.refine import refine
 from iibr_core.evaluation.consistency import Consistency, LineView, consistency, line_straightness
 from iibr_core.evaluation.focal_stacks import FocalStack, RefocusResult, foci_of, lens_focus, score_methods
 from iibr_core.evaluation.lens_picture import LensPicture, read_lens_picture
+from iibr_core.evaluation.lpips import Lpips  # brings torch
 from iibr_core.evaluation.metrics import Mask, bounded_psnr, flip, ssim
 from iibr_core.evaluation.reference_warp import WarpedView
 from iibr_core.evaluation.results import (
@@ -109,8 +110,6 @@ def _part_of(report_progress: ReportProgress, before: float, work: float, total:
 
 
 def _lpips(folder: Path) -> Lpips:
-    from iibr_core.evaluation.lpips import Lpips  # brings torch
-
     return Lpips(folder)
 
 

@@ -6,6 +6,7 @@ A photo is skipped where its output exists and is newer than the photo and the m
 from __future__ import annotations
 
 import csv
+import logging
 import os
 import shutil
 import signal
@@ -306,8 +307,6 @@ def _interruption_blocked() -> Iterator[None]:
 
 def _run_on_dask(address: str, waiting: deque[PhotoTask], take: Take) -> None:
     """Export photos with the workers of a Dask scheduler. Raises InputError where it cannot be reached or is lost."""
-    import logging
-
     from distributed import Client
     from distributed.scheduler import KilledWorker
 

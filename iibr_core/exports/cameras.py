@@ -12,6 +12,7 @@ from iibr_core.color import bytes_from_encoded, encoded_from_stored
 from iibr_core.exports.kinds import ExportOptions
 from iibr_core.exports.source import ExportSource
 from iibr_core.formats.cameras import FieldCameras, infinity_of, spread, write_colmap, write_llff, write_nerfstudio
+from iibr_core.formats.images.write import write_image
 from iibr_core.formats.outputs import write_folder
 from iibr_core.types import ImageSize, InputError, ViewOffset, ViewUpdate
 
@@ -74,8 +75,6 @@ def write_cameras(path: Path, source: ExportSource, options: ExportOptions, vari
 
     Raises InputError if the folder cannot be written, Cancelled once the export should stop.
     """
-    from iibr_core.formats.images.write import write_image
-
     cameras, static_disparity = _straight_cameras(source)
     places: dict[str, ViewOffset] = {}
     centre: ViewUpdate | None = None

@@ -11,6 +11,7 @@ from iibr_core.color import bytes_from_encoded
 from iibr_core.exports.cameras import cameras_of, colors_of, nearest_metres
 from iibr_core.exports.kinds import ExportOptions
 from iibr_core.exports.source import ExportSource
+from iibr_core.formats.images.write import write_image
 from iibr_core.formats.maps.map_text import MapText
 from iibr_core.formats.maps.writer import write_map
 from iibr_core.formats.quilts import tagged
@@ -54,8 +55,6 @@ def write_rgbd(path: Path, source: ExportSource, options: ExportOptions) -> None
 
 def write_epi(path: Path, source: ExportSource, options: ExportOptions) -> None:
     """Write one row of each view in the centre row of views as a picture, the leftmost view on top."""
-    from iibr_core.formats.images.write import write_image
-
     scene = source.scene
     if options.row >= scene.height:
         raise InputError(f"row {options.row}: {scene.name} has rows 0 to {scene.height - 1}")

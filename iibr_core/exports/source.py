@@ -16,12 +16,14 @@ from numpy.typing import NDArray
 
 from iibr_core.exports.kinds import ExportKind, ExportOptions, optics_of, with_defaults
 from iibr_core.exports.render_settings import RenderSettings
-from iibr_core.formats.images.write import AS_USUAL, PictureFormat
+from iibr_core.formats.images.write import AS_USUAL, PictureFormat, write_picture
+from iibr_core.formats.light_fields.light_field_formats import open_light_field
 from iibr_core.generation.outer_views import WantedViews
 from iibr_core.generation.plan import ScenePlan
 from iibr_core.rendering.optics import CENTRE, Optics
 from iibr_core.runtime.tiling import ShouldStop, never, raise_if_stopped
 from iibr_core.scenes.lens_limits import LensChoice
+from iibr_core.scenes.light_fields import showings_of_light_field
 from iibr_core.scenes.loaded_photo import LoadedPhoto
 from iibr_core.scenes.making import views_of_photo
 from iibr_core.scenes.opening import SceneReady, SceneRequest, results_of
@@ -118,9 +120,7 @@ class ExportSource:
 
     def _views_of_folder(self, with_disparity: bool) -> Iterator[ViewUpdate]:
         """Return the views from disk, with found disparity and views between them if the scene has these."""
-        from iibr_core.formats.light_fields.light_field_formats import open_light_field
         from iibr_core.formats.light_fields.views import read_views
-        from iibr_core.scenes.light_fields import showings_of_light_field
 
         is_as_read = self.scene.grid == self.scene.given_grid and self.scene.depth_source in ("none", "light field")
         if is_as_read and not with_disparity:
@@ -169,7 +169,6 @@ class ExportSource:
         Raises InputError if it cannot be written.
         """
         from iibr_core.formats.images.metadata import PictureMetadata, read_metadata
-        from iibr_core.formats.images.write import write_picture
 
         photo = PictureMetadata() if self.loaded is None else read_metadata(Path(self.scene.source.path))
         write_picture(path, pixels, form, PictureMetadata(photo.exif, photo.xmp), color_space)

@@ -14,8 +14,10 @@ from iibr_core.exports.kinds import ExportOptions
 from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.exports.source import ExportSource
 from iibr_core.formats.images.side_by_side import FULL_TAG, HALF_TAG, OVER_TAG, TAG
+from iibr_core.formats.images.spatial_photo import write_spatial_photo
 from iibr_core.formats.images.write import AS_USUAL, BEST_QUALITY, PictureFormat
 from iibr_core.formats.quilts import tagged
+from iibr_core.formats.stereo import anaglyph
 from iibr_core.rendering.optics import Optics
 from iibr_core.scenes.scene import Scene
 from iibr_core.scenes.screen_size import ScreenSize
@@ -25,8 +27,6 @@ Eyes = tuple[NDArray[Any], NDArray[Any]]
 
 
 def _anaglyph(eyes: Eyes) -> NDArray[Any]:
-    from iibr_core.formats.stereo import anaglyph
-
     return anaglyph(*eyes)
 
 
@@ -84,8 +84,6 @@ def write_stereo(path: Path, source: ExportSource, options: ExportOptions, varia
 
 def write_spatial(path: Path, source: ExportSource, options: ExportOptions) -> None:
     """Write a spatial photo for headsets. Raises as `draw_eyes` does."""
-    from iibr_core.formats.images.spatial_photo import write_spatial_photo
-
     left, right = draw_eyes(source, options)
     scale = left.shape[0] / source.scene.height
     write_spatial_photo(path, left, right, scale * (source.focal_px or source.scene.width))

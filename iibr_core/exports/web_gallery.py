@@ -12,6 +12,8 @@ from pathlib import Path
 from string import Template
 from urllib.parse import quote
 
+from PIL import Image
+
 from iibr_core.exports.web import POLICY, hash_of
 from iibr_core.formats.files import is_file, read_text
 from iibr_core.formats.outputs import write_file
@@ -74,8 +76,6 @@ def _entry(folder: Path, page: str) -> str:
 
 
 def _thumbnail(encoded: bytes) -> str:
-    from PIL import Image
-
     with Image.open(BytesIO(base64.b64decode(encoded))) as image:
         image.thumbnail((SIDE_PX, SIDE_PX))
         packed = BytesIO()

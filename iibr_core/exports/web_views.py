@@ -13,8 +13,10 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from PIL import Image
 
 from iibr_core.color import bytes_from_encoded, convert, encoded_from_stored, linear_from_srgb, srgb_from_linear
+from iibr_core.formats.images.color_profile import icc_profile
 from iibr_core.rendering.resized_light import mean_of_areas
 from iibr_core.types import (
     DISPLAY_P3,
@@ -198,24 +200,18 @@ def _smaller_depth(levels: Bytes, size: ImageSize) -> Bytes:
 
 def encode_first(colors: Bytes, space: ColorSpace) -> bytes:
     """Return the still picture (AVIF) that a page shows before its script runs, or if nothing can draw."""
-    from PIL import Image
-
     image = Image.fromarray(colors)
     image.thumbnail((FIRST_SIDE_PX, FIRST_SIDE_PX), Image.Resampling.BOX)
     return _avif([image], FIRST_QUALITY, space, "4:2:0")
 
 
 def _files(pictures: Sequence[Bytes], form: WebForm, quality: int, space: ColorSpace) -> Iterator[bytes]:
-    from PIL import Image
-
     images = [Image.fromarray(picture) for picture in pictures]
     for group in [[image] for image in images] if form.is_single else [images] if images else []:
         yield _avif(group, quality, space, "4:4:4" if group[0].mode == "RGB" else "4:0:0")
 
 
 def _avif(images: list[Any], quality: int, space: ColorSpace, subsampling: str) -> bytes:
-    from iibr_core.formats.images.color_profile import icc_profile
-
     options: dict[str, Any] = {} if space == SRGB else {"icc_profile": icc_profile(space)}
     if len(images) > 1:
         options |= {"save_all": True, "append_images": images[1:], "duration": FRAME_MS, "range": MOVING_RANGE}

@@ -27,6 +27,7 @@ from iibr_core.generation.update_loop import render_outer_views
 from iibr_core.inpainting.background import fill_background
 from iibr_core.inpainting.inpainter import Inpainter, InpaintingAids
 from iibr_core.inpainting.registry import DEFAULT_INPAINTER, INPAINTERS, load_inpainter, require_inpainter
+from iibr_core.ray_transformer.inference import TrainedWeights
 from iibr_core.rendering.hypotheses import AmbiguousRays
 from iibr_core.rendering.photo_rays import rays_of_photo
 from iibr_core.rendering.ray_set import RaySet
@@ -183,8 +184,6 @@ def transformer_for(quality: Quality) -> Callable[[AmbiguousRays], FloatImage] |
     """
     if quality == "fast":
         return None
-    from iibr_core.ray_transformer.inference import TrainedWeights
-
     try:
         return TrainedWeights(resource_folder("assets") / "weights" / "ray_transformer.safetensors")
     except InputError as error:

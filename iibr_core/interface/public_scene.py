@@ -14,10 +14,14 @@ from numpy.typing import NDArray
 
 from iibr_core.color import encoded_from_stored, photo_in_srgb
 from iibr_core.depth.choice import DepthChoice, DepthStart
+from iibr_core.depth.estimates import MetricDepth, values_of
+from iibr_core.depth.estimators.catalog import model_to_use
+from iibr_core.depth.estimators.estimate_depth import estimate_with
 from iibr_core.formats.images.photo import DEFAULT_MAX_PIXELS, read_photo
 from iibr_core.formats.light_fields.light_field_formats import is_light_field, open_light_field
 from iibr_core.formats.light_fields.multi_view_scene import MultiView
 from iibr_core.formats.light_fields.views import grid_of, read_stored_view, read_views
+from iibr_core.formats.maps.disparity_file import map_at_size
 from iibr_core.generation.plan import ScenePlan
 from iibr_core.generation.view_maker import ViewMaker
 from iibr_core.inpainting.registry import DEFAULT_INPAINTER
@@ -237,11 +241,6 @@ def estimate_depth(
         from iibr_core.depth.pictorial_cues import estimate_from_cues
 
         return estimate_from_cues(given, should_stop).values
-    from iibr_core.depth.estimates import MetricDepth, values_of
-    from iibr_core.depth.estimators.catalog import model_to_use
-    from iibr_core.depth.estimators.estimate_depth import estimate_with
-    from iibr_core.formats.maps.disparity_file import map_at_size
-
     local = model_to_use(DepthChoice("model", model=None if model is None else str(model)))
     assert local is not None, "what was asked for is there, or was refused"
     estimate = estimate_with(local, given, should_stop, report_progress)

@@ -6,6 +6,7 @@ from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from iibr_core.inpainting.registry import load_inpainter
 from iibr_core.runtime.tiling import ShouldStop, never
 from iibr_core.types import GridShape, ReportProgress, ViewOffset, ViewUpdate, ignore_progress
 
@@ -42,7 +43,6 @@ def read_dense(
     from iibr_core.formats.light_fields.views import grid_of
     from iibr_core.generation.dense_field import densify, require_steps
     from iibr_core.generation.given_views import DenseFieldWork, read_given_views
-    from iibr_core.inpainting.registry import load_inpainter
 
     own = grid_of(field)
     steps, inpainter, work = require_steps(own, grid, field.name), load_inpainter(inpaint), DenseFieldWork(own, grid)

@@ -7,8 +7,15 @@ from pathlib import Path
 
 import numpy as np
 
+from iibr_core.depth.edges.refine import refine
+from iibr_core.depth.editing.canvas import apply_edits
 from iibr_core.depth.editing.edits import UNEDITED
+from iibr_core.depth.search import disparity_of_file, read_shown_photo
+from iibr_core.formats.maps.reader import read_map_header
+from iibr_core.formats.maps.resample import resample_surfaces
+from iibr_core.generation.light_field import ray_set
 from iibr_core.generation.plan import ScenePlan
+from iibr_core.inpainting.registry import load_inpainter
 from iibr_core.rendering.large_views import LargePhoto
 from iibr_core.rendering.ray_set import RaySet
 from iibr_core.runtime.tiling import ShouldStop, never, raise_if_stopped
@@ -25,8 +32,6 @@ def load_large(
 
     Raises InputError where the file is another one by now, Cancelled once should_stop is true.
     """
-    from iibr_core.depth.search import read_shown_photo
-
     path = Path(source.path)
     if stamp_of(path) != loaded.stamp:
         raise InputError(f"{path}: was changed since it was opened; open it again")
@@ -46,9 +51,6 @@ def complete_fills(
 
     Raises InputError where the inpainter cannot be had, Cancelled once should_stop is true.
     """
-    from iibr_core.generation.light_field import ray_set
-    from iibr_core.inpainting.registry import load_inpainter
-
     if not plan.has_disocclusion:
         return None
     disparity = plan.field_disparity(loaded.disparity)
@@ -60,11 +62,6 @@ def complete_fills(
 
 def _disparity(source: Source, loaded: LoadedPhoto, photo: Photo, should_stop: ShouldStop) -> FloatImage:
     """Return the disparity of the larger photo, in its pixels, with the edits that were made to the smaller one."""
-    from iibr_core.depth.edges.refine import refine
-    from iibr_core.depth.editing.canvas import apply_edits
-    from iibr_core.depth.search import disparity_of_file
-    from iibr_core.formats.maps.resample import resample_surfaces
-
     settings, enlarged = loaded.depth_settings, np.float32(photo.size.width / loaded.photo.size.width)
     if enlarged == 1:
         return loaded.disparity.values
@@ -85,8 +82,6 @@ def _disparity(source: Source, loaded: LoadedPhoto, photo: Photo, should_stop: S
 
 def _larger_map(loaded: LoadedPhoto) -> Path | None:
     """The map's file where it holds more than the disparity that was made of it."""
-    from iibr_core.formats.maps.reader import read_map_header
-
     if loaded.origin.file is None:
         return None
     file = Path(loaded.origin.file)

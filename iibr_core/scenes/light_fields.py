@@ -15,6 +15,7 @@ import numpy as np
 
 from iibr_core.color import encoded_from_stored
 from iibr_core.depth.subject import subject_disparity
+from iibr_core.formats.light_fields.light_field_formats import open_light_field
 from iibr_core.generation.memory import require_memory, view_bytes
 from iibr_core.runtime.tiling import ShouldStop
 from iibr_core.scenes.dense import read_dense
@@ -65,7 +66,6 @@ def showings_of_light_field(
     showing must be taken before the next is asked for. Raises InputError for a field or a map that cannot be read,
     Cancelled once should_stop is true.
     """
-    from iibr_core.formats.light_fields.light_field_formats import open_light_field
     from iibr_core.formats.light_fields.views import disparity_range, grid_of, read_views
 
     field = open_light_field(Path(source.path))

@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from iibr_core.depth.choice import DepthOrigin
-from iibr_core.depth.editing.edits import Levels, levels_of
+from iibr_core.depth.editing.edits import BRUSH_TOOLS, DepthEdits, Levels, Stroke, levels_of
 from iibr_core.formats.files import require_file
+from iibr_core.formats.light_fields.light_field_formats import is_view_file
 from iibr_core.runtime.machine import give_back_memory
 from iibr_core.runtime.tiling import ShouldStop, never
 from iibr_core.scenes.scene import DepthSettings, Source
@@ -180,7 +181,6 @@ def _pixels_to_read(source: Source) -> tuple[int, ImageSize]:
     """Return how large a photo is read at most, and its stored size. Raises InputError for files of views."""
     from iibr_core.formats.images.photo import DEFAULT_MAX_PIXELS
     from iibr_core.formats.images.side_by_side import photo_size
-    from iibr_core.formats.light_fields.light_field_formats import is_view_file
 
     path = Path(source.path)
     if is_view_file(path):
@@ -193,7 +193,6 @@ def _pixels_to_read(source: Source) -> tuple[int, ImageSize]:
 def prepare_brush() -> None:
     """Have the brush's kernels loaded, or compiled, so that the first stroke does not wait for them."""
     from iibr_core.depth.editing.canvas import DepthCanvas
-    from iibr_core.depth.editing.edits import BRUSH_TOOLS, DepthEdits, Stroke
 
     strokes = tuple(Stroke(tool, ((0.5, 0.5),), 0.1, 0.5) for tool in BRUSH_TOOLS)
     DepthCanvas(np.zeros((4, 4, 3), np.float32), np.zeros((4, 4), np.float32)).apply(DepthEdits(strokes=strokes))

@@ -12,6 +12,9 @@ from datetime import datetime
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
+from PIL import Image, ImageGrab, UnidentifiedImageError
+from platformdirs import user_cache_path
+
 from iibr_core.formats.outputs import write_file
 from iibr_core.types import InputError
 from viewer.model.state.saving import PASTED_FOLDER
@@ -59,8 +62,6 @@ def paste_picture(text: str) -> Pasted:
 
 
 def _paste_pixels(folder: Path) -> Pasted:
-    from PIL import Image, ImageGrab, UnidentifiedImageError
-
     try:
         held = ImageGrab.grabclipboard()
     except NotImplementedError as error:
@@ -110,6 +111,4 @@ def _copying_command(path: Path) -> Sequence[str]:
 
 
 def _cache_folder() -> Path:
-    from platformdirs import user_cache_path
-
     return user_cache_path("iibr", appauthor=False) / "clipboard"

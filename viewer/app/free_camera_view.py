@@ -15,6 +15,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from iibr_core.color import photo_in_srgb
+from iibr_core.generation.disparity_range import measure_disparity_range
 from iibr_core.runtime.tiling import Cancelled, never
 from iibr_core.scenes.loaded_photo import LoadedPhoto
 from iibr_core.scenes.screen_size import ScreenSize
@@ -143,8 +145,6 @@ class FreeCameraView:
 
 def _make_ready(job: Job[FreeRequest, FreeResult], is_draft: bool) -> _Ready:
     """Raises InputError for poses that see nothing of the photo, Cancelled once the job should stop."""
-    from iibr_core.color import photo_in_srgb
-    from iibr_core.generation.disparity_range import measure_disparity_range
     from iibr_core.generation.free_views import FreeViews, depths_of, fitted_cameras, inverse_depth_of, steered
     from iibr_core.inpainting.background import fill_background
 

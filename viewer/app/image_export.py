@@ -9,7 +9,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 from iibr_core.formats.files import is_folder
-from iibr_core.formats.images.write import PictureFormat
+from iibr_core.formats.images.write import PictureFormat, write_picture
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import SRGB, ColorSpace, FloatImage
 from viewer.model.state.app_state import AppState
@@ -28,8 +28,6 @@ class SavedShot:
 
 def export_image(path: Path, pixels: NDArray[Any]) -> None:
     """Write sRGB bytes (H, W, 3), whole or not at all. Raises InputError where that cannot be."""
-    from iibr_core.formats.images.write import write_picture
-
     write_picture(path, pixels)
 
 
@@ -39,7 +37,6 @@ def export_picture(path: Path, drawn: NDArray[Any], shot: SavedShot) -> Path:
     What it takes to take it again is put inside, and what the photo's file says of the photo. Raises InputError.
     """
     from iibr_core.formats.images.metadata import SETTINGS_KEY, PictureMetadata, read_metadata
-    from iibr_core.formats.images.write import write_picture
     from viewer.model.saved_settings import settings_text
 
     of_photo = PictureMetadata() if shot.photo is None else read_metadata(shot.photo)

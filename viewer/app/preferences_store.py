@@ -14,6 +14,8 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+from platformdirs import user_config_path
+
 from iibr_core.exports.photo_folder import FolderOrder
 from iibr_core.formats.files import read_text, status_of
 from iibr_core.formats.outputs import write_file
@@ -36,8 +38,6 @@ LEFT_OUT_TOLD = 4
 
 def user_folder() -> Path:
     """The user's folder for this program's settings; it may not exist yet."""
-    from platformdirs import user_config_path
-
     return user_config_path("iibr", appauthor=False)
 
 

@@ -15,14 +15,13 @@ from iibr_core.formats.outputs import check_output
 from iibr_core.scenes.inputs import inputs_of, named_by
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import ImageSize, InputError
+from viewer.app.session_store import sidecar_of
 from viewer.model.state.app_state import AppState
 from viewer.model.state.tasks import SaveTask
 
 
 def inputs_of_scene(state: AppState) -> tuple[Path, ...]:
     """What is read for what is open, for what is being opened, and to compare with."""
-    from viewer.app.session_store import sidecar_of
-
     sources = [about.source for about in (state, state.scene) if about is not None and about.source is not None]
     is_open = state.scene is not None and state.scene.source == state.source  # then its map is known
     origin = state.scene.depth_origin if state.scene is not None else None

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from iibr_core.exports.photo_folder import list_photos
+from iibr_core.formats.light_fields.light_field_formats import open_light_field
 from iibr_core.rendering.optics import ApertureMask
 from iibr_core.scenes.scene import Source, source_beside
 from viewer.app.clipboard import Pasted, paste_picture
@@ -258,7 +259,6 @@ def _actions_from_download(result: DownloadResult) -> list[Action]:
 
 def read_truth(path: str) -> GroundTruth:
     """The light field of a folder to compare with, as far as its size. Raises InputError where it is none."""
-    from iibr_core.formats.light_fields.light_field_formats import open_light_field
     from iibr_core.formats.light_fields.multi_view_scene import common_size
     from iibr_core.formats.light_fields.views import grid_of
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from iibr_core.formats.outputs import check_output_folder, make_folder
 from iibr_core.scenes.inputs import inputs_of
+from iibr_core.scenes.scene import Source
 from iibr_core.types import InputError
 from viewer.cli.shared_options import SCREEN_SIZE
 from viewer.cli.terminal import show_progress
@@ -23,7 +24,6 @@ def demo() -> None:
 
     Example: iibr demo
     """
-    from iibr_core.scenes.scene import Source
     from viewer.app.main_loop import App, initial_state
     from viewer.app.preferences_store import user_folder
     from viewer.model.actions import OpenPath

@@ -7,6 +7,8 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from iibr_core.formats.light_fields.light_field_formats import open_light_field
+from iibr_core.formats.light_fields.write import write_light_field
 from iibr_core.types import GridShape, image_size
 from viewer.cli.scene_options import NOT_FOR_LIGHT_FIELDS
 from viewer.cli.terminal import MAKING, print_notes, show_progress
@@ -21,8 +23,6 @@ NOT_FOR_DENSE_FIELDS = NOT_FOR_LIGHT_FIELDS - {"grid", "inpaint"} | {"disparity"
 
 def write_dense_field(source: Source, grid: GridShape, out: Path, layout: str, with_disparity: bool) -> None:
     """Write a light field's views and those between. Raises InputError if the views have no places on the grid."""
-    from iibr_core.formats.light_fields.light_field_formats import open_light_field
-    from iibr_core.formats.light_fields.write import write_light_field
     from iibr_core.scenes.dense import read_dense
 
     field = open_light_field(Path(source.path))

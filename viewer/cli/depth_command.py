@@ -7,6 +7,9 @@ from typing import Annotated
 
 import typer
 
+from iibr_core.formats.files import is_file
+from iibr_core.formats.light_fields.light_field_formats import find_light_field, open_light_field
+from iibr_core.formats.outputs import check_output
 from viewer.cli.scene_options import PhotoOptions, require_heeded
 from viewer.cli.shared_options import (
     DepthFrom,
@@ -42,10 +45,7 @@ def depth(
     options = PhotoOptions(depth_from, depth_model, refine, invert_depth=invert_depth, metric=metric)
     source = options.source(path, grid=None)
     require_heeded(context, path)
-    from iibr_core.formats.files import is_file
-    from iibr_core.formats.light_fields.light_field_formats import find_light_field, open_light_field
     from iibr_core.formats.maps.writer import write_map
-    from iibr_core.formats.outputs import check_output
     from iibr_core.scenes.light_fields import find_disparity
     from iibr_core.scenes.loaded_photo import load_photo
 

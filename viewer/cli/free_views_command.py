@@ -11,7 +11,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 import typer
 
+from iibr_core.color import photo_in_srgb
+from iibr_core.formats.images.write import write_image
 from iibr_core.formats.outputs import check_output_folder, write_folder
+from iibr_core.generation.memory import MAKING_BYTES, require_memory
+from iibr_core.inpainting.registry import load_inpainter
+from iibr_core.runtime.tiling import never
 from iibr_core.types import Camera, FloatImage, InputError
 from viewer.cli.shared_options import given_options, require_model
 from viewer.cli.terminal import print_depth, print_notes, show_progress, untimed
@@ -94,13 +99,8 @@ def _written(
     """Write the views, one after the other; of each the share that the photo does not show. The folder is there when
     all have been taken.
     """
-    from iibr_core.color import photo_in_srgb
-    from iibr_core.formats.images.write import write_image
     from iibr_core.generation.free_views import FreeViews, depths_of, reach_of
-    from iibr_core.generation.memory import MAKING_BYTES, require_memory
     from iibr_core.generation.stored_views import encode_for_storage
-    from iibr_core.inpainting.registry import load_inpainter
-    from iibr_core.runtime.tiling import never
     from iibr_core.scenes.making import inpainting_aids
 
     photo, inverse_depth = photo_in_srgb(loaded.photo), _inverse_depth(loaded, is_literal, cameras[given])

@@ -12,6 +12,7 @@ import typer
 from iibr_core.depth.choice import DepthChoice
 from iibr_core.formats.light_fields.light_field_formats import is_light_field
 from iibr_core.inpainting.registry import DEFAULT_INPAINTER
+from iibr_core.scenes.scene import Source
 from iibr_core.types import GridShape, InputError
 from viewer.cli.shared_options import (
     DepthFrom,
@@ -73,8 +74,6 @@ class PhotoOptions:
             raise InputError(
                 "--depth-strength, --focus-disparity: mean nothing to disparity that counts as it is given"
             )
-        from iibr_core.scenes.scene import Source
-
         choice, quality = self.depth_choice, self.quality
         return Source(str(path), choice, grid, focus_disparity, self.max_pixels, quality, self.inpaint, is_literal)
 

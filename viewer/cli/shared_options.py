@@ -13,6 +13,7 @@ from iibr_core.depth.choice import DepthChoice, DepthStart
 from iibr_core.formats.files import status_of
 from iibr_core.formats.light_fields.write import WRITERS
 from iibr_core.inpainting.registry import INPAINTER_FORMS, require_inpainter
+from iibr_core.scenes.inputs import inputs_of
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, InputError, Quality, ViewOffset
 
@@ -120,8 +121,6 @@ def inputs_of_command(context: typer.Context, source: Source | None = None) -> t
     """What a command reads, and nothing may be written onto: every path that it was given but the one that it writes
     to, what those files name (`reads` of an option's value says it), and what is read to open a source.
     """
-    from iibr_core.scenes.inputs import inputs_of
-
     given = [value for name, value in context.params.items() if name not in OUTPUT_OPTIONS]
     named = [path for value in given for path in _paths_in(value)]
     return (*named, *(() if source is None else inputs_of(source)))

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from iibr_core.formats.light_fields.light_field_formats import is_light_field
+from iibr_core.scenes.scene import Source
 from iibr_core.types import InputError
 from viewer.cli.free_views_command import poses_of, require_poses_for
 from viewer.cli.option_records import with_option_records
@@ -27,7 +28,6 @@ from viewer.model.demo_photo import demo_photo
 
 def open_window() -> None:
     """The window with what was open last, if that is still there. Raises InputError where no window can be opened."""
-    from iibr_core.scenes.scene import Source
     from viewer.app.main_loop import initial_state, run
     from viewer.app.preferences_store import last_opened, user_folder
     from viewer.model.actions import OpenPath

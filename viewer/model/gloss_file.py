@@ -12,6 +12,7 @@ from pathlib import Path
 import msgspec
 
 from iibr_core.formats.files import read_text
+from iibr_core.formats.images.side_by_side import photo_size
 from iibr_core.rendering.gloss.gloss_settings import Gloss, require_sound
 from iibr_core.types import InputError
 from viewer.model.saved_settings import unknown_fields
@@ -41,8 +42,6 @@ def require_environment(path: Path, gloss: Gloss) -> None:
     """Raise InputError, naming the file that a gloss was read from too, where the environment is no picture."""
     if not gloss.environment:
         return
-    from iibr_core.formats.images.side_by_side import photo_size
-
     try:
         photo_size(Path(gloss.environment))
     except InputError as error:

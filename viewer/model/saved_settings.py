@@ -18,6 +18,7 @@ import msgspec
 
 from iibr_core.depth.editing.edits import UNEDITED, DepthEdits, require_sound
 from iibr_core.formats.files import is_file, printable
+from iibr_core.formats.images.metadata import settings_text_in
 from iibr_core.rendering.gloss.gloss_settings import require_sound as require_sound_gloss
 from iibr_core.rendering.optics import ApertureShape, Optics
 from iibr_core.scenes.lens_limits import BLADES_LIMITS
@@ -132,8 +133,6 @@ def settings_from_text(text: str, name: str, folder: Path | None = None, is_own:
 
 def read_settings(path: Path) -> SavedSettings:
     """The settings a picture was saved with. Raises InputError where there are none, or damaged ones."""
-    from iibr_core.formats.images.metadata import settings_text_in
-
     text = settings_text_in(path)
     if not text:
         raise InputError(f"{path}: holds no settings of iibr; give a picture saved with Ctrl+S or `iibr screenshot`")

@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from platformdirs import user_cache_path
 
 from iibr_core.depth.estimates import DisparityMap, Estimate, MetricDepth, RelativeInverseDepth
 from iibr_core.formats.files import read_text
@@ -43,8 +44,6 @@ MISREADINGS = (*npy.MISREADINGS, OSError, KeyError, RuntimeError, zipfile.BadZip
 
 def cache_folder() -> Path:
     """The user's folder for estimates; it may not exist yet."""
-    from platformdirs import user_cache_path
-
     return user_cache_path("iibr", appauthor=False) / "depth"
 
 

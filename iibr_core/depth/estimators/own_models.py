@@ -6,6 +6,8 @@ import filecmp
 import shutil
 from pathlib import Path
 
+from platformdirs import user_data_path
+
 from iibr_core.depth.estimators.config import CONFIG, PREPROCESSOR, folder_of
 from iibr_core.depth.estimators.onnx_file import open_session, picture_input
 from iibr_core.depth.estimators.onnx_models import weights_in
@@ -19,8 +21,6 @@ UNSPECIFIC_NAMES = ("model", "onnx")
 
 def own_models_folder() -> Path:
     """The folder with one folder for each copied model; it may not exist yet."""
-    from platformdirs import user_data_path
-
     return user_data_path("iibr", appauthor=False) / "models"
 
 

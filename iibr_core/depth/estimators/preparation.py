@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from PIL import Image
 
 from iibr_core.types import FloatImage, ImageSize, InputError
 
@@ -69,8 +70,6 @@ def input_size(preparation: Preparation, size: ImageSize, max_pixels: float) -> 
 
 def network_input(pixels: FloatImage, preparation: Preparation, size: ImageSize) -> FloatImage:
     """(1, 3, height, width) float32: resized by an antialiased cubic kernel, then normalised channel by channel."""
-    from PIL import Image
-
     planes = np.empty((1, 3, *size), np.float32)
     for c, (mean, deviation) in enumerate(zip(preparation.mean, preparation.std)):
         plane = Image.fromarray(np.clip(pixels[..., c], 0, 1).astype(np.float32))

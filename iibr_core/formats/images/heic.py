@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from PIL import Image
 
 from iibr_core.formats.files import MAX_FILE_PIXELS, open_binary, reason_of, require_file
 from iibr_core.formats.images.picture import Picture, opaque_as_none, require_sound_size
@@ -92,8 +93,6 @@ def read_heic_depth(path: Path) -> HeicDepth | None:
 
 def heic_orientation(path: Path) -> int:
     """Return Exif's Orientation, 1..8, of a HEIC; its photo is read upright. Raises InputError as `read_heic` does."""
-    from PIL import Image
-
     exif = Image.Exif()
     with suppress(*EXIF_ERRORS):
         exif.load(_open(path).info.get("exif") or b"")

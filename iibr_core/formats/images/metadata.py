@@ -22,6 +22,7 @@ from defusedxml.common import DTDForbidden
 from defusedxml.ElementTree import DefusedXMLParser
 from PIL import Image
 
+from iibr_core.formats.images.decode import read_size, read_text
 from iibr_core.formats.images.heic import heic_info, is_heic
 from iibr_core.formats.images.pillow_reader import EXIF_ERRORS, EXIF_FOLDER, ORIENTATION_TAG
 from iibr_core.types import SRGB, ColorSpace, ImageSize, InputError
@@ -157,8 +158,6 @@ def settings_text_in(path: Path) -> str:
 
     Raises InputError where the file is no picture, or its settings are damaged.
     """
-    from iibr_core.formats.images.decode import read_size, read_text
-
     read_size(path)
     return _unpack(read_text(path, SETTINGS_KEY), path) or text_in_xmp(path, SETTINGS_KEY)
 

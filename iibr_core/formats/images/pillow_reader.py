@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from PIL import Image
+from PIL import Image, ImageCms
 
 from iibr_core.formats.files import MAX_FILE_PIXELS, reason_of
 from iibr_core.formats.images.picture import (
@@ -106,8 +106,6 @@ def facts_of(info: Mapping[Any, Any], size: ImageSize) -> dict[str, Any]:
 
 
 def _profile_name(profile: bytes) -> str:
-    from PIL import ImageCms
-
     try:
         return ImageCms.getProfileDescription(ImageCms.ImageCmsProfile(BytesIO(profile))).strip()
     except (ImageCms.PyCMSError, *DECODE_ERRORS):

@@ -13,6 +13,7 @@ from uuid import UUID
 
 import numpy as np
 from numpy.typing import NDArray
+from PIL import Image
 
 from iibr_core.formats.files import reason_of
 from iibr_core.formats.images.iso_boxes import box, boxes
@@ -50,7 +51,6 @@ def write_spatial_photo(path: Path, left: NDArray[np.uint8], right: NDArray[np.u
 
 def _encode(path: Path, left: NDArray[np.uint8], right: NDArray[np.uint8]) -> bytes:
     import pillow_heif
-    from PIL import Image
 
     try:
         file = pillow_heif.from_pillow(Image.fromarray(np.ascontiguousarray(left)))

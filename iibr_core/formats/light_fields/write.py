@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from iibr_core.color import bytes_from_encoded, encoded_from_stored
+from iibr_core.formats.images.write import write_image  # brings numba, which errors should not wait for
 from iibr_core.formats.light_fields.parameters import FILE_NAME
 from iibr_core.formats.outputs import check_output, check_output_folder, write_folder
 from iibr_core.types import GridShape, ImageSize, InputError, ViewUpdate, image_size
@@ -128,7 +129,6 @@ def _write_hci(
 
 
 def _write_view(folder: Path, grid: GridShape, view: ViewUpdate, with_disparity: bool) -> None:
-    from iibr_core.formats.images.write import write_image  # brings numba, which errors should not wait for
     from iibr_core.formats.maps.pfm import write_pfm
 
     number = view.row * grid.columns + view.column
@@ -159,8 +159,6 @@ def _parameters(name: str, grid: GridShape, size: ImageSize, focal_px: float, lo
 
 def _write_eslf(path: Path, grid: GridShape, views: Iterable[ViewUpdate]) -> None:
     """Write a lenslet image: the pixels that show one place of the scene, one of each view, form a rectangle."""
-    from iibr_core.formats.images.write import write_image
-
     height, width = 0, 0
     pixels = np.empty((0, grid.rows, 0, grid.columns, 3), np.uint8)
     for view in views:

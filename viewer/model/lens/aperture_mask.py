@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from iibr_core.formats.images.decode import decode, read_size
 from iibr_core.rendering.optics import ApertureMask
 from iibr_core.types import InputError
 
@@ -22,8 +23,6 @@ def read_mask(path: Path) -> ApertureMask:
 
     Raises InputError, naming the file, if it is no picture, far too large, or black all over.
     """
-    from iibr_core.formats.images.decode import decode, read_size
-
     height, width = read_size(path)
     if height * width > MOST_FILE_PIXELS:
         raise InputError(f"{path}: {width}x{height} is far too large for an aperture; make it small, 64x64 is plenty")
