@@ -46,7 +46,7 @@ if TYPE_CHECKING:
     from iibr_core.scenes.scene import Source
 
 PART = (slice(150, 310), slice(200, 400))
-"""Part of the demo photo: so small that compiling is nearly all the work, with edges, wires and slopes of every kind."""
+"""Part of the demo photo with edges, wires and slopes of every kind; small: nearly all the work is compiling."""
 GLOSSY_PIXELS = 250_000
 """Size of a photo whose normals are smoothed, as those of large photos are."""
 KERNEL_FILES = (".nbi", ".nbc")

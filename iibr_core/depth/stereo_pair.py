@@ -10,7 +10,7 @@ from iibr_core.color import stored_from_encoded
 from iibr_core.depth.estimates import DisparityMap
 from iibr_core.depth.multi_view.estimate_disparity import estimate_coarse, estimate_disparity, sweep_bytes
 from iibr_core.formats.images.photo import read_picture
-from iibr_core.formats.images.side_by_side import own_picture
+from iibr_core.formats.images.side_by_side import left_picture
 from iibr_core.formats.light_fields.view_files import read_stereo_file
 from iibr_core.runtime.machine import free_memory_bytes
 from iibr_core.runtime.tiling import ShouldStop, never
@@ -33,7 +33,7 @@ def estimate_from_pair(
     """
     scene = read_stereo_file(path)
     held = [view.picture for view in scene.views] if scene is not None else []
-    if scene is None or own_picture(path) not in held:
+    if scene is None or left_picture(path) not in held:
         return None
     report_progress(0, 0, "finding disparity")
     pictures = [read_picture(picture, MATCHED_PIXELS).pixels for picture in held]
@@ -42,7 +42,7 @@ def estimate_from_pair(
         raise InputError(f"{path}: its two views differ in shape ({sizes} after reading)")
     views = [stored_from_encoded(pixels, is_hdr=False) for pixels in pictures]
     offsets = [view.offset for view in scene.views]
-    reference = held.index(own_picture(path))
+    reference = held.index(left_picture(path))
     coarse = estimate_coarse(views, offsets, reference, should_stop)
     if sweep_bytes(coarse.values.shape, coarse.range_px, 1.0) > free_memory_bytes():
         raise InputError(f"{path}: matching its two views takes more memory than there is")

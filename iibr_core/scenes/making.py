@@ -65,7 +65,7 @@ def views_of_photo(
     in_srgb: bool = True,
     wanted: Callable[[], WantedViews] = lambda: ALL_VIEWS,
 ) -> Generator[ViewUpdate]:
-    """Yield the views as `generate` does, in sRGB or in the photo's colour space. Raises InputError as `generate` does."""
+    """Yield the views as `generate` does, in sRGB or in the photo's colour space. Raises InputError as that does."""
     from iibr_core.generation.light_field import generate
 
     photo, disparity = loaded.photo, plan.field_disparity(loaded.disparity)

@@ -31,7 +31,7 @@ from iibr_core.types import InputError, Photo, ViewOffset, ViewUpdate
 
 @dataclass(frozen=True, eq=False)
 class SceneRequest:
-    """One job with all its inputs. depth_settings: refinement and edits of the photo's depth, None for those of the source.
+    """One job with all its inputs. depth_settings: refinement and edits of depth, None for those of the source.
 
     plan: of what is loaded, where it is made already. takes_drafts: views may come twice, so that there is something
     to look at soon; else each comes once, final. filled: the same light field, where all its views are made already.
@@ -93,7 +93,7 @@ def results_of(
 
 
 def sketch_of(wanted: WantedPhoto, should_stop: ShouldStop = never) -> SceneReady | None:
-    """Return a large photo at a small size, as generation 0; None where it cannot be read: reading it whole gives the error.
+    """Return a large photo at a small size, as generation 0; None where it cannot be read so.
 
     Raises Cancelled once should_stop is true.
     """

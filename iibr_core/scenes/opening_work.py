@@ -12,8 +12,8 @@ from iibr_core.scenes.scene import Progress
 Stage = Literal["reading", "searching", "drafting", "matching", "carrying"]
 FINDING = "finding disparity"
 READ_WORK, SEARCH_WORK, MATCH_WORK = 0.2, 3.0, 30.0
-"""Cost of reading a view, of the small map and of the whole map, relative to carrying disparity to a view, until this run
-has measured them.
+"""Costs of reading a view, of the small map and of the whole map, relative to carrying disparity to a view, until this
+run has measured them.
 """
 LEAST_CARRIED = 3
 

@@ -23,8 +23,9 @@ MOST_ENVIRONMENT_PIXELS = 2_000_000
 
 
 def geometry_of(scene: Scene, disparity: FloatImage) -> SceneGeometry:
-    """Return the positions of a scene's points; a usual field of view is assumed where none is known. disparity: (H, W), of its
-    centre view: that of a light field from disk says what may be infinitely far.
+    """Return the positions of a scene's points; a usual field of view is assumed where none is known.
+
+    disparity: (H, W), of its centre view; that of a light field from disk gives the points that may be infinitely far.
     """
     from iibr_core.formats.images.photo import focal_px_from_fov
     from iibr_core.rendering.gloss.geometry import SceneGeometry, infinity_of

@@ -1,4 +1,4 @@
-"""Comparison of two pictures: whether they show one scene, as a stereo pair does, however bright each of them is."""
+"""Decides whether two pictures show one scene, as a stereo pair does. Their exposures may differ."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from PIL import Image
 WIDTH_PX, MAX_HEIGHT_PX = 96, 192
 """Size at which pictures are compared."""
 BLOCK_PX = 11
-"""Side of the square around each pixel that is looked for in the other picture."""
+"""Side of the square around a pixel that is searched in the other picture."""
 MAX_SHIFT_PX, MAX_RISE_PX = 14, 1
-"""Largest distance at which it is looked for, across and up or down: 15 % and 1 % of the width."""
+"""Largest distance of the search, across and up or down: 15 % and 1 % of the width."""
 MIN_CORRELATION = 0.8
 """Normalised correlation from which a square counts as found."""
 MIN_FOUND_SHARE = 0.6
@@ -30,7 +30,7 @@ MAX_PLAIN_DIFFERENCE = 12.0
 
 
 def is_one_scene(first: NDArray[np.uint8], second: NDArray[np.uint8]) -> bool:
-    """Return whether two pictures (h, w, 3), each 1 px or more, show one scene from two places side by side."""
+    """Return whether two pictures (h, w, 3) of at least one pixel show one scene from two places side by side."""
     a, b = _colors(first, first.shape), _colors(second, first.shape)
     mean_a, variance_a = _mean_and_variance(a)
     is_textured = np.maximum(variance_a, _mean_and_variance(b)[1]) > MIN_VARIANCE

@@ -17,7 +17,7 @@ MIN_DETERMINANT = 1e-4
 BRADFORD = np.array([[0.8951, 0.2664, -0.1614], [-0.7502, 1.7135, 0.0367], [0.0389, -0.0685, 1.0296]])
 """Cones from XYZ (ICC.1:2022, annex E.3)."""
 D50 = np.array([0.9642, 1.0, 0.8249])
-OWN_NAME = "its own"
+UNNAMED = "its own"
 """Name of a colour space that a file describes and does not name."""
 D65_XY = (0.3127, 0.3290)
 C_XY = (0.310, 0.316)
@@ -45,7 +45,7 @@ def space_of_number(number: int) -> ColorSpace | None:
     return space_of_chromaticities(xy, name)
 
 
-def space_of_chromaticities(xy: Any, name: str = OWN_NAME) -> ColorSpace:
+def space_of_chromaticities(xy: Any, name: str = UNNAMED) -> ColorSpace:
     """Return the colour space of these primaries, adapted to D50 (Bradford).
 
     xy: x and y of red, green, blue and white, 8 numbers; what cannot be primaries gives sRGB. name: of the space, where
@@ -67,7 +67,7 @@ def space_of_chromaticities(xy: Any, name: str = OWN_NAME) -> ColorSpace:
     return space_of_matrix(adapted @ (xyz[:, :3] * np.linalg.solve(xyz[:, :3], xyz[:, 3])), name)
 
 
-def space_of_matrix(matrix: NDArray[np.float64], name: str = OWN_NAME) -> ColorSpace:
+def space_of_matrix(matrix: NDArray[np.float64], name: str = UNNAMED) -> ColorSpace:
     """Return the colour space of a matrix (3, 3) to XYZ under D50: sRGB or Display P3 where it hardly differs."""
     for known in (SRGB, DISPLAY_P3):
         if np.abs(matrix - np.array(known.xyz_from_linear)).max() < MAX_XYZ_DIFFERENCE:

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from iibr_core.color import linear_from_srgb, srgb_from_linear
 from iibr_core.formats.images.color_primaries import (
     MIN_DETERMINANT,
-    OWN_NAME,
+    UNNAMED,
     space_of_chromaticities,
     space_of_matrix,
     space_of_number,
@@ -127,7 +127,7 @@ def color_profile_of(picture: Picture) -> tuple[ColorProfile | None, str]:
     if profile is None:
         note = f"The colour profile '{name}' {complaint} and is ignored: colours are taken as sRGB."
         return None, note if complaint and "sRGB" not in name else ""
-    if profile.color_space.name == OWN_NAME:
+    if profile.color_space.name == UNNAMED:
         profile = replace(profile, color_space=replace(profile.color_space, name=name))
     return profile, f"Colours are those of the photo's profile, '{name}'."
 

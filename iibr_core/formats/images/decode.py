@@ -39,7 +39,6 @@ FLOATING_TYPES = ("half", "float", "double")
 LINEAR_TRANSFERS = (2, 8)
 """Transfer curves of ITU-T H.273 that leave light unchanged: "unspecified" and "linear"."""
 MAX_ICON_PICTURES = 100
-READABLE_FORMATS = str(oiio.get_string_attribute("input_format_list")).split(",")
 COLOR_MODELS = {"CMYK": "CMYK", "YCCK": "CMYK", "LAB": "LAB"}
 """Colour models by parts of the names that OpenImageIO gives to them."""
 
@@ -47,22 +46,14 @@ COLOR_MODELS = {"CMYK": "CMYK", "YCCK": "CMYK", "LAB": "LAB"}
 class _Stored(NamedTuple):
     """Channels of a picture.
 
-    colors: number of colour channels. alpha_at: index of alpha, -1 without. dtype: NumPy's name of the type to read.
+    colors: number of colour channels. alpha_at: index of alpha, -1 without. channels: number of those that are read.
+    dtype: NumPy's name of the type to read, "float32" for linear light.
     """
 
     colors: int
     alpha_at: int
+    channels: int
     dtype: str
-
-    @property
-    def channels(self) -> int:
-        """Number of channels that are read."""
-        return max(self.colors, self.alpha_at + 1)
-
-    @property
-    def is_float(self) -> bool:
-        """True for linear light."""
-        return self.dtype == "float32"
 
 
 def decode(path: Path, number: int = 0) -> Picture:
@@ -92,7 +83,7 @@ def decode_bands(path: Path) -> Iterator[Picture]:
     if not (is_avif(path) or is_heic(path) or is_lfp(path)):
         source = _open(path)
         spec, stored = source.spec(), _stored(path, source.spec())
-        if stored.alpha_at < 0 and not stored.is_float:
+        if stored.alpha_at < 0 and stored.dtype != "float32":
             facts = _facts(spec)
             yield from (Picture(rows, **facts) for rows in _read_rows(path, source, stored))
             return
@@ -184,7 +175,7 @@ def _decode_with_oiio(path: Path) -> Picture:
 
 def _read_rows(path: Path, source: Any, stored: _Stored) -> Iterator[NDArray[Any]]:
     """Yield the rows of a picture from top to bottom, (h, W, channels). Raises InputError where it is damaged."""
-    spec, oiio_type = source.spec(), "float" if stored.is_float else stored.dtype
+    spec, oiio_type = source.spec(), stored.dtype.removesuffix("32")
     step = spec.tile_height or ROWS_AT_ONCE
     for first in range(0, spec.height, step):
         # A header may place its picture anywhere; rows are counted from there.
@@ -219,7 +210,7 @@ def _facts(spec: Any) -> dict[str, Any]:
 def _open(path: Path) -> Any:
     """Open a picture and check its header. Raises InputError."""
     require_file(path)
-    if "raw" not in READABLE_FORMATS and (raw := raw_kind(path)) is not None:
+    if (raw := raw_kind(path)) is not None:
         raise InputError(f"{path}: is {raw.name}; {raw.way_out}")
     hints = oiio.ImageSpec()
     hints.attribute("oiio:UnassociatedAlpha", 1)
@@ -258,11 +249,11 @@ def _stored(path: Path, spec: Any) -> _Stored:
     colors = 3 if spec.nchannels - (alpha_at >= 0) >= 3 else 1
     if 0 <= alpha_at < colors:
         raise InputError(f"{path}: channels {spec.channelnames} are neither grey nor RGB; convert it to RGB")
-    if str(spec.format) not in FLOATING_TYPES:
-        return _Stored(colors, alpha_at, "uint8" if spec.format.size() == 1 else "uint16")
-    codes = spec.getattribute("CICP")
-    is_encoded = isinstance(codes, tuple) and codes[1] not in LINEAR_TRANSFERS  # JPEG XL, no light
-    return _Stored(colors, alpha_at, "uint16" if is_encoded else "float32")
+    dtype, codes = "uint8" if spec.format.size() == 1 else "uint16", spec.getattribute("CICP")
+    is_encoded = isinstance(codes, tuple) and codes[1] not in LINEAR_TRANSFERS  # in JPEG XL, floats may be no light
+    if str(spec.format) in FLOATING_TYPES:
+        dtype = "uint16" if is_encoded else "float32"
+    return _Stored(colors, alpha_at, max(colors, alpha_at + 1), dtype)
 
 
 def _exif_numbers(spec: Any) -> dict[str, float]:

@@ -1,4 +1,4 @@
-"""Kinds of files that people take for pictures and that are not read here, with what to do instead."""
+"""Kinds of files that are mistaken for pictures, with advice on what to do instead."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ TIFF_STARTS = (b"II*\0", b"MM\0*")
 
 
 class FileKind(NamedTuple):
-    """name: of the kind, with its article. way_out: what to do to get a picture."""
+    """A kind of files. name: with its article. way_out: advice for getting a picture."""
 
     name: str
     way_out: str
@@ -48,7 +48,7 @@ KINDS: tuple[tuple[bytes, FileKind], ...] = (
     (rb"\x1aE\xdf\xa3|RIFF.{4}AVI |\x30\x26\xb2\x75|FLV\x01|\0\0\x01[\xb3\xba]", VIDEO),
     (rb"[\0-\x08].{3}(moov|mdat|wide|free|skip|ftyp(?!mif|msf|miaf|hei|hev|avi|jp|tmap))", VIDEO),
 )
-"""Starts of files, as regular expressions, and what kind each begins."""
+"""Kinds of files by their starts, as regular expressions."""
 TEXT = FileKind("a text file, not a picture", "get the picture itself")
 
 

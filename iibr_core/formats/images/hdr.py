@@ -1,4 +1,4 @@
-"""HDR photos: light of the curves PQ and HLG (ITU-R BT.2100), and how it is brought into the range of ordinary photos.
+"""HDR photos: light of the curves PQ and HLG (ITU-R BT.2100), and its compression to the range of ordinary photos.
 
 Light is relative to the white of ordinary photos, which HDR pictures show at 203 cd/m2 (ITU-R BT.2408).
 """
@@ -47,7 +47,7 @@ def hlg_display_light(scene: FloatImage) -> FloatImage:
 
 
 def tone_map(light: FloatImage) -> None:
-    """Compress light (H, W, 3) to 0..1 in place; light up to `KNEE` stays as it is, as does a picture up to white.
+    """Compress light (H, W, 3) to 0..1 in place; light up to `KNEE` does not change, nor does a picture up to white.
 
     The largest channel of each pixel follows Reinhard's extended curve from the knee on, so that the brightest pixel
     of the picture becomes white; the other channels keep their ratio to it ("Photographic tone reproduction", 2002).

@@ -11,7 +11,7 @@ COLOR_CODES_BYTES = 11
 
 
 def boxes(content: bytes) -> Iterator[tuple[bytes, bytes]]:
-    """Yield the kind and content of each box in `content`; a box that is cut off ends them."""
+    """Yield the kind and content of each box in `content`; a truncated box ends them."""
     at = 0
     while at + 8 <= len(content):
         size, kind = struct.unpack_from(">I4s", content, at)

@@ -11,7 +11,7 @@ from iibr_core.formats.files import open_binary
 JPEG_START, START_OF_SCAN = b"\xff\xd8", 0xDA
 APP3, IDENTIFIER = 0xE3, b"_JPSJPS_"
 DESCRIPTOR_AT = 10
-"""First byte of the descriptor: separation, flags, layout, type, a byte each."""
+"""First byte of the descriptor: one byte each for separation, flags, layout and type."""
 STEREO = 1
 HALF_HEIGHT, HALF_WIDTH, LEFT_FIRST = 1, 2, 4
 Arrangement = Literal["rows", "beside", "over"]
@@ -21,7 +21,7 @@ LAYOUTS: dict[int, Arrangement] = {1: "rows", 2: "beside", 3: "over"}
 class JpsDescriptor(NamedTuple):
     """Arrangement of two pictures: in every other row, side by side, or one over the other.
 
-    is_half: each is squeezed to half its size. right_first: the right eye's is at the left or at the top.
+    is_half: both are squeezed to half their size. right_first: the right eye's is at the left or at the top.
     """
 
     arrangement: Arrangement

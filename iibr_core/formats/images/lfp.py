@@ -38,7 +38,7 @@ class LfpPictures:
     """Pictures of one size, focused at several depths.
 
     chunks: the file of each picture; or one chunk, a film of H.264, for all. focus: lambda of each, ascending where
-    there are several pictures. frames: the number of each picture in the film, () for pictures of their own.
+    there are several pictures. frames: number of each picture in the film, () where there is no film.
     """
 
     chunks: tuple[str, ...]
@@ -111,7 +111,7 @@ def read_lfp_depth(path: Path) -> FloatImage | None:
 
 
 def _sections(file: BinaryIO) -> tuple[bytes, dict[str, tuple[int, int]]]:
-    """Return the first JSON, b"" without, and where each named chunk lies."""
+    """Return the first JSON, b"" without, and the place of each named chunk."""
     text, at = b"", 0
     chunks: dict[str, tuple[int, int]] = {}
     for _ in range(MAX_SECTIONS):
@@ -170,7 +170,7 @@ def _pictures_of(entry: Mapping[str, Any], chunks: Mapping[str, Any]) -> LfpPict
 
 
 def _order_of(listed: Sequence[Mapping[str, Any]]) -> tuple[tuple[int, ...], tuple[float, ...]]:
-    """Return the numbers of the pictures that are used, and lambda of each: of views, the middle one alone."""
+    """Return the numbers of the used pictures, and their lambda; of views, only the middle one is used."""
     if any("coord" in picture for picture in listed):
         places = [abs(picture["coord"]["x"]) + abs(picture["coord"]["y"]) for picture in listed]
         return (int(np.argmin(places)),), (0.0,)
@@ -246,5 +246,5 @@ def _in_focus(frames: Iterator[NDArray[np.uint8]], pictures: LfpPictures, depth:
 
 
 def _weight(depth: FloatImage, focus: Sequence[float], number: int) -> FloatImage:
-    """Return how much a picture counts at each depth: linear from 1 at its own to 0 at its neighbours'."""
+    """Return how much a picture counts at each depth: linear from 1 at its focus to 0 at its neighbours'."""
     return np.asarray(np.interp(depth, focus, np.eye(len(focus))[number]), np.float32)

@@ -1,4 +1,4 @@
-"""What a photo's file states beside its pixels: Exif and XMP, captions, camera facts, and settings of this program.
+"""Metadata of picture files: Exif and XMP, captions, camera facts, and settings of this program.
 
 Saved pictures keep what describes the photo and its camera. They do not keep what would be wrong in another picture:
 thumbnails, depth maps, edits by other programs, maker notes, and, unless asked for, the place of the photo.
@@ -12,6 +12,7 @@ import math
 import warnings
 import zlib
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -37,7 +38,7 @@ DESCRIBING_TAGS = frozenset(
     | set(range(0x9C9B, 0x9CA0))
 )
 """Tags of the first folder that describe the photo, not its file: description, make, model, resolution, software, date,
-artist, computer, rating, copyright, and Windows' own.
+artist, computer, rating, copyright, and tags of Windows.
 """
 TAGS_IN_PIXELS = frozenset({0x9214, 0xA214})
 """Tags that give places in the stored picture."""
@@ -75,6 +76,9 @@ PACKED = "zlib,base64:"
 MAX_UNPACKED_BYTES = 4_000_000
 PACKET_START, PACKET_END = b'<?xpacket begin="\xef\xbb\xbf" id="W5M0MpCehiHzreSzNTczkc9d"?>\n', b'\n<?xpacket end="w"?>'
 
+Tags = dict[int, Any]
+"""Values of Exif by their tags."""
+
 
 @dataclass(frozen=True, eq=False)
 class PictureMetadata:
@@ -90,7 +94,7 @@ class PictureMetadata:
 
 @dataclass(frozen=True)
 class Caption:
-    """Texts about a photo, a line each, "" where the file has none."""
+    """Texts of one line about a photo, "" where the file has none."""
 
     title: str = ""
     description: str = ""
@@ -108,8 +112,8 @@ def read_metadata(path: Path) -> PictureMetadata:
                 return PictureMetadata(_bytes_of(info.get("exif")), _bytes_of(info.get("xmp")))
             with Image.open(path) as image:
                 exif = _bytes_of(image.info.get("exif"))
-                if not exif and (folder := image.getexif()):  # a TIFF keeps it in its own folder
-                    exif = _describing(folder, keeps_position=True).tobytes()
+                if not exif and (stored := image.getexif()):  # a TIFF keeps it in its first folder
+                    exif = _exif_of(*_folders_of(stored)).tobytes()
                 return PictureMetadata(exif, _bytes_of(image.info.get("xmp")))
     except (InputError, *EXIF_ERRORS):
         return PictureMetadata()
@@ -117,18 +121,14 @@ def read_metadata(path: Path) -> PictureMetadata:
 
 def exif_for(exif: bytes, size: ImageSize, color_space: ColorSpace, keeps_position: bool) -> Image.Exif:
     """Return a photo's Exif, as Pillow's record, for an upright picture of another size; empty where it is damaged."""
+    photo, camera, position = _folders_in(exif)
+    if photo or camera:
+        photo[ORIENTATION_TAG] = 1
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            stored = Image.Exif()
-            stored.load(exif)
-            has_camera = bool(stored.get_ifd(EXIF_FOLDER))
-            kept = _describing(stored, keeps_position)
-            if kept or has_camera:
-                kept[ORIENTATION_TAG] = 1
-            if has_camera:
-                _set_camera(kept.get_ifd(EXIF_FOLDER), size, color_space)
-            return kept if len(kept.tobytes()) <= MAX_EXIF_BYTES else Image.Exif()
+        if camera:
+            _set_camera(camera, size, color_space)
+        kept = _exif_of(photo, camera, position if keeps_position else {})
+        return kept if len(kept.tobytes()) <= MAX_EXIF_BYTES else Image.Exif()
     except EXIF_ERRORS:
         return Image.Exif()
 
@@ -138,11 +138,9 @@ def xmp_for(xmp: bytes, texts: Mapping[str, str]) -> bytes:
     described = Element(f"{{{RDF}}}Description", {f"{{{RDF}}}about": ""})
     for name, text in texts.items():
         described.set(_key_of(name), _pack(text))
-    try:
+    with suppress(InputError):  # a photo without XMP is a photo, too
         for source in parse_packet(xmp).iter(f"{{{RDF}}}Description") if xmp else ():
             _copy_properties(source, described)
-    except InputError:
-        pass  # a photo without XMP is a photo, too
     if len(described) == 0 and len(described.attrib) == 1:
         return b""
     for prefix, uri in NAMESPACES.items():
@@ -159,61 +157,41 @@ def settings_text_in(path: Path) -> str:
     Raises InputError where the file is no picture, or its settings are damaged.
     """
     read_size(path)
-    return _unpack(read_text(path, SETTINGS_KEY), path) or text_in_xmp(path, SETTINGS_KEY)
-
-
-def text_in_xmp(path: Path, name: str) -> str:
-    """Return a text that `xmp_for` put into a picture's XMP; "" without. Raises InputError where it is damaged."""
-    xmp = read_metadata(path).xmp
-    if OURS.encode() not in xmp:
-        return ""
-    key = _key_of(name)
-    texts = (element.attrib[key] for element in parse_packet(xmp).iter() if key in element.attrib)
-    return _unpack(next(texts, ""), path)
+    text, xmp = read_text(path, SETTINGS_KEY), read_metadata(path).xmp
+    if not text and OURS.encode() in xmp:
+        key = _key_of(SETTINGS_KEY)
+        texts = (element.attrib[key] for element in parse_packet(xmp).iter() if key in element.attrib)
+        text = next(texts, "")
+    return _unpack(text, path)
 
 
 def read_caption(path: Path) -> Caption:
     """Return the texts about a photo, XMP before Exif; empty where the file is damaged or missing."""
-    metadata = read_metadata(path)
-    exif = Image.Exif()
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            exif.load(metadata.exif)
-            texts = {tag: _line(exif.get(tag), MAX_CAPTION_CHARACTERS) for tag in (DESCRIPTION, ARTIST, COPYRIGHT)}
-    except EXIF_ERRORS:
-        texts = {}
-    try:
+    metadata, tree = read_metadata(path), None
+    photo = _folders_in(metadata.exif)[0]
+    with suppress(InputError):
         tree = parse_packet(metadata.xmp) if metadata.xmp else None
-    except InputError:
-        tree = None
-    return Caption(
-        _dublin_core(tree, "title"),
-        _dublin_core(tree, "description") or texts.get(DESCRIPTION, ""),
-        _dublin_core(tree, "creator") or texts.get(ARTIST, ""),
-        _dublin_core(tree, "rights") or texts.get(COPYRIGHT, ""),
-    )
+
+    def text(name: str, tag: int) -> str:
+        texts = (_line(value, MAX_CAPTION_CHARACTERS) for value in (_dublin_core(tree, name), photo.get(tag)))
+        return next(filter(None, texts), "")
+
+    tags = {"title": 0, "description": DESCRIPTION, "creator": ARTIST, "rights": COPYRIGHT}
+    return Caption(*(text(name, tag) for name, tag in tags.items()))
 
 
 def camera_facts(metadata: PictureMetadata) -> tuple[tuple[str, str], ...]:
     """Return what Exif states about how a photo was taken, for people: (name, value) of each known fact."""
-    exif = Image.Exif()
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            exif.load(metadata.exif)
-            camera = exif.get_ifd(EXIF_FOLDER)
-    except EXIF_ERRORS:
-        return ()
-
-    def words(value: Any) -> str:
-        return _line(value, MAX_FACT_CHARACTERS)
-
+    photo, camera, _ = _folders_in(metadata.exif)
+    maker, model, lens, taken = (
+        _line(value, MAX_FACT_CHARACTERS)
+        for value in (photo.get(MAKE), photo.get(MODEL), camera.get(0xA434), camera.get(0x9003))
+    )
     facts = (
-        ("Camera", " ".join(dict.fromkeys(f"{words(exif.get(MAKE))} {words(exif.get(MODEL))}".split()))),
-        ("Lens", words(camera.get(0xA434))),
+        ("Camera", " ".join(dict.fromkeys(f"{maker} {model}".split()))),
+        ("Lens", lens),
         ("Exposure", ", ".join(filter(None, _exposure(camera)))),
-        ("Taken", words(camera.get(0x9003))[:16].replace(":", "-", 2)),
+        ("Taken", taken[:16].replace(":", "-", 2)),
     )
     return tuple((name, value) for name, value in facts if value)
 
@@ -265,18 +243,31 @@ def _bytes_of(value: Any) -> bytes:
     return value.encode() if isinstance(value, str) else bytes(value or b"")
 
 
-def _describing(exif: Image.Exif, keeps_position: bool) -> Image.Exif:
-    """Return a copy with the tags that describe the photo and its camera."""
-    kept = Image.Exif()
-    for tag in sorted(DESCRIBING_TAGS & set(exif)):
-        kept[tag] = exif[tag]
-    for folder in (EXIF_FOLDER, GPS_FOLDER) if keeps_position else (EXIF_FOLDER,):
-        if tags := dict(exif.get_ifd(folder)):
-            kept.get_ifd(folder).update(tags)
-    return kept
+def _folders_in(exif: bytes) -> tuple[Tags, Tags, Tags]:
+    """Return what describes the photo, its camera and its place, from Exif as JPEGs have it; empty where damaged."""
+    stored = Image.Exif()
+    with suppress(*EXIF_ERRORS), warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        stored.load(exif)
+        return _folders_of(stored)
+    return {}, {}, {}
 
 
-def _set_camera(camera: dict[int, Any], size: ImageSize, color_space: ColorSpace) -> None:
+def _folders_of(exif: Image.Exif) -> tuple[Tags, Tags, Tags]:
+    photo = {tag: exif[tag] for tag in sorted(DESCRIBING_TAGS & set(exif))}
+    return photo, dict(exif.get_ifd(EXIF_FOLDER)), dict(exif.get_ifd(GPS_FOLDER))
+
+
+def _exif_of(photo: Tags, camera: Tags, position: Tags) -> Image.Exif:
+    exif = Image.Exif()
+    exif.update(photo)
+    for number, folder in ((EXIF_FOLDER, camera), (GPS_FOLDER, position)):
+        if folder:
+            exif.get_ifd(number).update(folder)
+    return exif
+
+
+def _set_camera(camera: Tags, size: ImageSize, color_space: ColorSpace) -> None:
     """Change the camera's tags that depend on the picture's size and colours, and drop those that no longer fit."""
     for tag in (MAKER_NOTE, INTEROPERABILITY, *TAGS_IN_PIXELS):
         camera.pop(tag, None)
@@ -329,8 +320,8 @@ def _dublin_core(tree: Element | None, name: str) -> str:
     """Return the first text of a property of Dublin Core, of a list its first entry."""
     for element in () if tree is None else tree.iter(f"{{{NAMESPACES['dc']}}}{name}"):
         texts = [entry.text for entry in element.iter(f"{{{RDF}}}li")] or [element.text]
-        if line := _line(next(filter(None, texts), ""), MAX_CAPTION_CHARACTERS):
-            return line
+        if text := next(filter(None, texts), "").strip():
+            return text
     return ""
 
 

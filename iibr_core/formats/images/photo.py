@@ -24,7 +24,7 @@ from iibr_core.formats.images.hdr import tone_map
 from iibr_core.formats.images.picture import Picture, full_scale, upright
 from iibr_core.formats.images.picture_source import PictureSource, read_source, source_size
 from iibr_core.formats.images.pillow_reader import DECODE_ERRORS
-from iibr_core.formats.images.side_by_side import own_picture, photo_size
+from iibr_core.formats.images.side_by_side import left_picture, photo_size
 from iibr_core.runtime.kernels import kernel
 from iibr_core.runtime.tiling import ShouldStop, never, raise_if_stopped
 from iibr_core.types import SRGB, FloatImage, ImageSize, InputError, Photo
@@ -52,7 +52,7 @@ def read_photo(
     else it is converted to sRGB, which cuts off colours outside it. Raises InputError, naming the file, if it is
     missing, no picture, cut off, or absurdly large; Cancelled once should_stop is true.
     """
-    photo = read_picture(own_picture(Path(path)), max_pixels, fov_deg, keeps_primaries, should_stop)
+    photo = read_picture(left_picture(Path(path)), max_pixels, fov_deg, keeps_primaries, should_stop)
     return replace(photo, notes=photo.notes + file_notes(Path(path)))
 
 
@@ -73,7 +73,10 @@ def read_picture(
     if is_smaller:
         bands = decode_bands(source.path) if source == PictureSource(source.path) else iter([read_source(source)])
         picture, finite_notes = _finite(next(bands))
-        encoded = _encode_light(_averaged(picture, bands, stored_size, size, should_stop), picture)
+        try:
+            encoded = _encode_light(_averaged(picture, bands, stored_size, size, should_stop), picture)
+        except StopIteration as error:  # the header states another size than the picture has
+            raise InputError(f"{source.path}: damaged (rows are missing); get the whole file again") from error
     else:
         picture, finite_notes = _finite(read_source(source))
         encoded = _encode(picture)
@@ -104,13 +107,13 @@ def read_thumbnail(path: Path, within: ImageSize, should_stop: ShouldStop = neve
     The colours of JPEGs are not exact: their decoder skips most of the work. Raises InputError where the file is no
     photo, or has more pixels than any file may; Cancelled once should_stop is true.
     """
-    pixels = _jpeg_thumbnail(path, within) if own_picture(path).part is None else None
+    pixels = _jpeg_thumbnail(path, within) if left_picture(path).part is None else None
     if pixels is not None:
         return pixels
     size = photo_size(path)
     scale = min(within.height / size.height, within.width / size.width, 1.0)
     max_pixels = max(math.floor(math.prod(size) * scale**2), 1)
-    colors = read_picture(own_picture(path), max_pixels, should_stop=should_stop).pixels
+    colors = read_picture(left_picture(path), max_pixels, should_stop=should_stop).pixels
     # A turned photo may still be too large, as may a very narrow one.
     step = max(math.ceil(colors.shape[0] / within.height), math.ceil(colors.shape[1] / within.width), 1)
     return np.round(np.nan_to_num(colors[::step, ::step]).clip(0.0, 1.0) * 255).astype(np.uint8)

@@ -55,7 +55,7 @@ PLAIN_ENDING = {"beside": ".left-right", "over": ".top-bottom", "rows": ".jps"}
 class PairLayout:
     """Arrangement of two pictures in one.
 
-    arrangement: side by side, one over the other, or in every other row. is_half: each is squeezed to half its size.
+    arrangement: side by side, one over the other, or in every other row. is_half: both are squeezed to half their size.
     right_first: the right eye's is at the left or at the top. stated_by: what states this, for notes. is_plain: whether
     it is stated so plainly that unlike halves are a pair, too.
     """
@@ -179,19 +179,18 @@ def _note(layout: PairLayout, is_pair: bool, is_alike: bool) -> str:
     )
 
 
-def own_picture(path: Path) -> PictureSource:
-    """Return what a file shows as a photo: the left eye's picture where it holds two, the picture where it holds one
-    and its map, else all of it.
+def left_picture(path: Path) -> PictureSource:
+    """Return the picture that a file shows as a photo: the left eye's of two, the one beside a depth map, else all.
 
     Raises InputError as `side_by_side_pair` does, and for raw files of light-field cameras.
     """
-    require_developed(path)
+    refuse_raw_light_field(path)
     parts = side_by_side_pair(path) or rgbd_parts(path)
     return PictureSource(path) if parts is None else parts[0]
 
 
-def require_developed(path: Path) -> None:
-    """Raise InputError for raw files of light-field cameras: a mosaic of what lies under each microlens."""
+def refuse_raw_light_field(path: Path) -> None:
+    """Raise InputError for raw files of light-field cameras, which are mosaics of microlens images."""
     if path.suffix.lower() in LIGHT_FIELD_ENDINGS and raw_kind(path) is None and open_lfp(path) is None:
         raise InputError(
             f"{path}: is a raw light field (Lytro), which must be decoded first: PlenoptiCam or the Light Field Toolbox"
@@ -202,6 +201,6 @@ def require_developed(path: Path) -> None:
 def photo_size(path: Path) -> ImageSize:
     """Return the size of a file's photo from its header, as stored, before it is upright.
 
-    Raises InputError as `own_picture` does.
+    Raises InputError as `left_picture` does.
     """
-    return source_size(own_picture(path))
+    return source_size(left_picture(path))

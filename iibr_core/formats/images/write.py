@@ -8,8 +8,9 @@ from __future__ import annotations
 import math
 import struct
 import zlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
 from io import BytesIO
 from itertools import accumulate
 from pathlib import Path
@@ -298,30 +299,15 @@ def _write_exr(path: Path, picture: _Encoded) -> None:
     _write_by_oiio(path, picture.pixels, "half" if picture.pixels.dtype == np.float16 else "float", values)
 
 
-def _write_jpeg(path: Path, picture: _Encoded) -> None:
-    _write_by_pillow(path, picture, "JPEG", optimize=True, subsampling=_subsampling(picture))
-
-
-def _write_webp(path: Path, picture: _Encoded) -> None:
-    _write_by_pillow(path, picture, "WEBP", lossless=picture.quality == BEST_QUALITY, method=4)
-
-
-def _write_avif(path: Path, picture: _Encoded) -> None:
-    _write_by_pillow(path, picture, "AVIF", subsampling=_subsampling(picture))
-
-
-def _subsampling(picture: _Encoded) -> str:
-    return "4:4:4" if picture.quality >= FINE_COLOR_QUALITY else "4:2:0"
-
-
-def _write_by_pillow(path: Path, picture: _Encoded, name: str, **options: Any) -> None:
+def _write_by_pillow(path: Path, picture: _Encoded, name: str) -> None:
     from PIL import Image
 
-    if picture.exif_bytes:
-        options["exif"] = picture.exif_bytes
-    if picture.xmp:
-        options["xmp"] = picture.xmp
-    profile = icc_profile(picture.color_space)
+    is_fine, profile = picture.quality >= FINE_COLOR_QUALITY, icc_profile(picture.color_space)
+    options: dict[str, Any] = {"subsampling": "4:4:4" if is_fine else "4:2:0", "optimize": name == "JPEG"}
+    if name == "WEBP":
+        options = {"lossless": picture.quality == BEST_QUALITY, "method": 4}
+    described = {"exif": picture.exif_bytes, "xmp": picture.xmp}
+    options |= {key: value for key, value in described.items() if value}
     # Python's own files report a full disk; encoders do not.
     packed = BytesIO()
     Image.fromarray(picture.pixels).save(packed, name, quality=picture.quality, icc_profile=profile, **options)
@@ -359,13 +345,13 @@ def _tiff_strips(pixels: NDArray[Any]) -> Iterator[bytes]:
         yield zlib.compress(differences.astype(differences.dtype.newbyteorder(">")).tobytes(), TIFF_LEVEL)
 
 
-_WRITERS = {
+_WRITERS: dict[str, Callable[[Path, _Encoded], None]] = {
     "PNG": _write_png,
-    "JPEG": _write_jpeg,
     "TIFF": _write_tiff,
     "OpenEXR": _write_exr,
-    "WebP": _write_webp,
-    "AVIF": _write_avif,
+    "JPEG": partial(_write_by_pillow, name="JPEG"),
+    "WebP": partial(_write_by_pillow, name="WEBP"),
+    "AVIF": partial(_write_by_pillow, name="AVIF"),
 }
 
 
@@ -377,17 +363,17 @@ def _stored(pixels: NDArray[Any], bits: int, is_linear: bool) -> NDArray[Any]:
     result: NDArray[Any] = np.empty(pixels.shape, kinds.get((bits, is_linear), np.uint8))
     for first in range(0, len(pixels), ROWS_AT_ONCE):
         rows = slice(first, first + ROWS_AT_ONCE)
-        result[rows] = (_light if is_linear else _encoded)(pixels[rows], result.dtype)
+        result[rows] = (_light_of if is_linear else _codes_of)(pixels[rows], result.dtype)
     return result
 
 
-def _light(pixels: NDArray[Any], dtype: np.dtype[Any]) -> NDArray[Any]:
+def _light_of(pixels: NDArray[Any], dtype: np.dtype[Any]) -> NDArray[Any]:
     light = linear_from_srgb(pixels / np.float32(255)) if pixels.dtype == np.uint8 else np.nan_to_num(pixels)
     most = float(np.finfo(dtype).max)
     return np.asarray(np.clip(light, -most, most))
 
 
-def _encoded(pixels: NDArray[Any], dtype: np.dtype[Any]) -> NDArray[Any]:
+def _codes_of(pixels: NDArray[Any], dtype: np.dtype[Any]) -> NDArray[Any]:
     if pixels.dtype == np.uint8:
         return pixels.astype(np.uint16) * np.uint16(257)
     encoded = srgb_from_linear(np.clip(np.nan_to_num(pixels), 0, 1))

@@ -10,7 +10,7 @@ from iibr_core.formats.images.heic import heic_pair, is_heic
 from iibr_core.formats.images.lif import SOURCE_IMAGE, open_lif
 from iibr_core.formats.images.mpo import is_jpeg, is_stereo_mpo
 from iibr_core.formats.images.picture_source import PicturePart, PictureSource, source_size
-from iibr_core.formats.images.side_by_side import require_developed, side_by_side_pair
+from iibr_core.formats.images.side_by_side import refuse_raw_light_field, side_by_side_pair
 from iibr_core.formats.light_fields.multi_view_scene import GridIndex, KnownView, MultiView
 from iibr_core.formats.light_fields.write import LENSLET_KEY, LENSLET_TAG
 from iibr_core.formats.quilts import TAG, Quilt, quilt_named
@@ -78,7 +78,7 @@ def read_lenslet_image(path: Path) -> MultiView | None:
 
 def read_stereo_file(path: Path) -> MultiView | None:
     """Return the two views of a stereo photo, None for other files. Raises InputError for raw light fields."""
-    require_developed(path)
+    refuse_raw_light_field(path)
     stereo = _stereo_pictures(path)
     if stereo is None:
         return None

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gzip
 import shutil
 import struct
 from pathlib import Path
@@ -30,33 +29,24 @@ TEXT = "a text file, not a picture; get the picture itself"
 FTYP = b"\0\0\0\x20ftyp"
 REFUSED: dict[str, tuple[bytes, str]] = {
     "a.dng": (b"II*\0\x08\0\0\0" + bytes(60), RAW),
-    "upper.DNG": (b"MM\0*\0\0\0\x08" + bytes(60), RAW),
     "a.nef": (b"MM\0*\0\0\0\x08" + bytes(60), RAW),
-    "a.arw": (b"II*\0\x08\0\0\0" + bytes(60), RAW),
     "a.cr2": (b"II*\0\x10\0\0\0CR\x02\0" + bytes(60), RAW),
     "canon.tif": (b"II*\0\x10\0\0\0CR\x02\0" + bytes(60), RAW),
     "a.cr3": (b"\0\0\0\x18ftypcrx \0\0\0\1crx isom" + bytes(60), RAW),
     "a.raf": (b"FUJIFILMCCD-RAW 0201" + bytes(60), RAW),
     "a.rw2": (b"IIU\0" + bytes(60), RAW),
-    "panasonic.raw": (b"IIU\0" + bytes(60), RAW),
-    "a.orf": (b"IIRO\x08\0\0\0" + bytes(60), RAW),
     "unknown.3fr": (b"\x80\x81" * 50, RAW),
     "a.mp4": (FTYP + b"isom" + bytes(60), VIDEO),
-    "video.jpg": (FTYP + b"mp42" + bytes(60), VIDEO),
     "a.mov": (b"\0\0\0\x14ftypqt  " + bytes(60), VIDEO),
-    "old.mov": (b"\0\0\0\x08wide\0\0\0\0mdat" + bytes(60), VIDEO),
     "a.mkv": (b"\x1aE\xdf\xa3" + bytes(60), VIDEO),
     "a.avi": (b"RIFF\0\0\0\0AVI LIST" + bytes(60), VIDEO),
     "page.jpg": (b"<!DOCTYPE html><html>404</html>", PAGE),
-    "page.png": (b"\n <HTML lang=en>\n<head>", PAGE),
     "page.heic": (b"\xef\xbb\xbf<!doctype html>", PAGE),
-    "comment.webp": (b"<!-- served -->\n<html>", PAGE),
     "a.svg": (b"<svg xmlns='http://www.w3.org/2000/svg'/>", SVG),
     "svg.png": (b'<?xml version="1.0"?>\n<!DOCTYPE svg PUBLIC "-//W3C//DTD SVG 1.1//EN" "x">\n<svg>', SVG),
     "a.pdf": (b"%PDF-1.7\n%\xe2\xe3\xcf\xd3" + bytes(60), "a PDF document; save the page or its picture as PNG"),
     "a.eps": (b"%!PS-Adobe-3.0 EPSF-3.0\n", "a PostScript drawing; save it as PNG"),
     "a.jxl": (b"\xff\x0a" + bytes(60), JPEG_XL),
-    "box.jxl": (b"\0\0\0\x0cJXL \r\n\x87\n" + bytes(60), JPEG_XL),
     "a.xcf": (b"gimp xcf v011" + bytes(60), r"a GIMP image \(XCF\); export it as PNG"),
     "a.npy": (b"\x93NUMPY\1\0" + bytes(60), r"an array of numbers \(NumPy\); give it as a map with --disparity"),
     "a.ply": (b"ply\nformat ascii 1.0\n", "a 3D model; save a view of it as PNG"),
@@ -65,16 +55,13 @@ REFUSED: dict[str, tuple[bytes, str]] = {
         "a pointer of Git LFS; ",
     ),
     "photos.zip": (b"PK\x03\x04" + bytes(60), ARCHIVE),
-    "a.svgz": (gzip.compress(b"<svg/>"), ARCHIVE),
     "error.jpg": (b'<?xml version="1.0"?><Error><Code>AccessDenied</Code></Error>', TEXT),
-    "words.txt": (b"The free software foundation", TEXT),
-    "json.png": (b'{"error": "not found"}', TEXT),
     "long.txt": (("ü" * 600).encode(), TEXT),
 }
 
 
 @pytest.mark.parametrize("name", REFUSED)
-def test_what_is_no_picture_is_named_with_the_way_out(tmp_path: Path, name: str) -> None:
+def test_other_kinds_of_files_are_named_with_the_way_out(tmp_path: Path, name: str) -> None:
     content, expected = REFUSED[name]
     path = tmp_path / name
     path.write_bytes(content)
@@ -89,7 +76,7 @@ def test_what_is_no_picture_is_named_with_the_way_out(tmp_path: Path, name: str)
         (bytes(range(128, 256)), "cannot be read .* save it as JPEG, PNG or TIFF"),
     ],
 )
-def test_what_nobody_knows_is_said_to_be_unknown(tmp_path: Path, content: bytes, expected: str) -> None:
+def test_unknown_kinds_are_refused(tmp_path: Path, content: bytes, expected: str) -> None:
     (tmp_path / "a.bin").write_bytes(content)
     with pytest.raises(InputError, match=expected):
         read_photo(tmp_path / "a.bin")
@@ -109,15 +96,9 @@ def test_a_raw_file_is_refused_though_its_preview_can_be_read(tmp_path: Path) ->
 
 WRONG_ENDINGS = {
     "png.jpg": "PNG",
-    "webp.jpg": "WEBP",
     "avif.jpg": "AVIF",
     "jpeg.heic": "JPEG",
-    "jpeg.png": "JPEG",
-    "UP.JPG": "JPEG",
     "noending": "JPEG",
-    "tif.jpg": "TIFF",
-    "png.svg": "PNG",
-    "bmp.jxl": "BMP",
     "jpeg.txt": "JPEG",
 }
 
@@ -172,13 +153,8 @@ def test_pictures_of_other_colours_open(tmp_path: Path, name: str, mode: str, no
     assert np.abs(255 * photo.pixels - expected).mean() < 6
 
 
-def test_lab_opens_and_says_that_its_colours_are_not_exact(tmp_path: Path) -> None:
+def test_lab_opens_with_a_note_that_its_colours_are_not_exact(tmp_path: Path) -> None:
     PICTURE.convert("RGB").convert("LAB").save(tmp_path / "a.tif")
     photo = read_photo(tmp_path / "a.tif")
     assert photo.notes == ("Lab was converted to RGB with a tint: save the photo as RGB for its true colours.",)
     assert np.abs(255 * photo.pixels - PIXELS).mean() < 15
-
-
-def test_a_palette_with_a_transparent_colour_is_laid_over_black(tmp_path: Path) -> None:
-    PICTURE.quantize(16).save(tmp_path / "a.png", transparency=3)
-    assert read_photo(tmp_path / "a.png").notes == ("Transparency was dropped: the photo is laid over black.",)

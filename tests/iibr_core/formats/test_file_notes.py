@@ -47,7 +47,7 @@ def save(path: Path, packet: str) -> Path:
 
 
 @pytest.mark.parametrize("name", ["a.jpg", "a.png", "a.tif", "a.webp", "a.avif", "a.heic"])
-def test_panoramas_are_shown_flat_and_say_so(tmp_path: Path, name: str) -> None:
+def test_panoramas_are_shown_flat_with_a_note(tmp_path: Path, name: str) -> None:
     photo = read_photo(save(tmp_path / name, xmp('GPano:ProjectionType="equirectangular"')))
     assert photo.size == (48, 64)
     note = "Panorama (equirectangular): shown flat, as if it were an ordinary photo, so straight lines look bent."
@@ -68,7 +68,7 @@ def test_panoramas_as_other_programs_write_them(tmp_path: Path, attributes: str,
 
 
 @pytest.mark.parametrize("packet", [xmp(), xmp('GPano:SourcePhotosCount="1"'), f"<broken {GPANO}", ""])
-def test_other_photos_say_nothing_of_panoramas(tmp_path: Path, packet: str) -> None:
+def test_other_photos_have_no_notes(tmp_path: Path, packet: str) -> None:
     assert file_notes(save(tmp_path / "a.jpg", packet)) == ()
 
 
@@ -85,7 +85,7 @@ def test_the_sharp_picture_beside_a_depth_map_is_no_right_eye(tmp_path: Path) ->
 
 
 @pytest.mark.parametrize("name", ["a.gif", "a.webp", "a.png", "a.avif", "webp.jpg"])
-def test_of_animations_the_first_picture_is_used(tmp_path: Path, name: str) -> None:
+def test_the_first_picture_of_an_animation_is_used(tmp_path: Path, name: str) -> None:
     others = [PICTURE.rotate(90), PICTURE.rotate(180)]
     kind = {"webp.jpg": "WEBP"}.get(name)
     options = {"lossless": True} if "webp" in name else {}

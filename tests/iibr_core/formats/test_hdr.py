@@ -14,11 +14,10 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from iibr_core.color import linear_from_srgb, srgb_from_linear
-from iibr_core.formats.images.color_primaries import space_of_chromaticities, space_of_number
 from iibr_core.formats.images.color_profile import codes_named, color_profile, profile_of_codes
 from iibr_core.formats.images.hdr import KNEE, hlg_display_light, hlg_scene_light, pq_light, tone_map
 from iibr_core.formats.images.photo import read_photo, read_thumbnail
-from iibr_core.types import DISPLAY_P3, SRGB, ImageSize
+from iibr_core.types import ImageSize
 from tests.iibr_core.formats.test_color_profile import profile_bytes
 
 PQ, HLG = (9, 16, 0, 1), (9, 18, 0, 1)
@@ -166,7 +165,7 @@ def test_profiles_of_hdr_are_known_by_their_names(name: str, codes: tuple[int, .
 
 @pytest.mark.parametrize("kind", ["jpg", "tif", "png"])
 def test_numbers_in_a_profile_state_pq(tmp_path: Path, kind: str) -> None:
-    """As profiles of version 4.4 do: ICC.1:2022, clause 9.2.17."""
+    """Profiles of version 4.4 have such a tag: ICC.1:2022, clause 9.2.17."""
     profile = bytearray(profile_bytes())
     count = int.from_bytes(profile[128:132], "big")
     at = 132 + 12 * (count - 1)
@@ -225,11 +224,3 @@ def test_other_numbers_are_colours_of_their_spaces(tmp_path: Path, codes: tuple[
 @pytest.mark.parametrize("codes", [(2, 2), (9, 2), (2, 16), (9,), (), (77, 16), (9, 99), (9, 16, 0)])
 def test_unknown_numbers_are_ignored(codes: tuple[int, ...]) -> None:
     assert profile_of_codes(codes) is None
-
-
-def test_known_primaries_are_recognised() -> None:
-    assert space_of_number(1) == SRGB
-    assert space_of_number(12) == DISPLAY_P3
-    assert space_of_number(3) is None
-    assert space_of_chromaticities((0.64, 0.33, 0.3, 0.6, 0.15, 0.06, 0.3127, 0.329)) == SRGB
-    assert space_of_chromaticities("no numbers") == SRGB

@@ -18,7 +18,7 @@ from iibr_core.formats.images import photo as photo_module
 from iibr_core.formats.images import picture as picture_module
 from iibr_core.formats.images.decode import decode, decode_bands
 from iibr_core.formats.images.photo import read_photo, read_thumbnail, size_within
-from iibr_core.formats.images.picture import FILM_DIAGONAL_MM, exif_focal_px, upright
+from iibr_core.formats.images.picture import FILM_DIAGONAL_MM, exif_focal_px
 from iibr_core.formats.images.side_by_side import photo_size
 from iibr_core.formats.images.write import write_image
 from iibr_core.runtime.tiling import Cancelled
@@ -152,11 +152,6 @@ def test_exif_orientation(tmp_path, orientation):
     row, column = edges[row_side], edges[column_side]
     assert np.array_equal(row if column_side in ("left", "top") else row[::-1], RGB[0])
     assert np.array_equal(column if row_side in ("left", "top") else column[::-1], RGB[:, 0])
-
-
-def test_orientation_out_of_range_is_ignored():
-    assert np.array_equal(upright(RGB, 0), RGB)
-    assert np.array_equal(upright(RGB, 99), RGB)
 
 
 def test_focal_length_without_exif_is_50_degrees(tmp_path):

@@ -14,6 +14,7 @@ import pytest
 from PIL import Image, ImageCms, PngImagePlugin
 
 from iibr_core.color import convert, linear_from_srgb
+from iibr_core.formats.images import spatial_photo
 from iibr_core.formats.images.metadata import (
     SETTINGS_KEY,
     Caption,
@@ -253,7 +254,7 @@ def test_a_full_disk_is_an_error_and_leaves_the_old_file(tmp_path, ending, monke
     assert [item.name for item in tmp_path.iterdir()] == [path.name]
 
 
-@pytest.mark.parametrize("seed", range(40))
+@pytest.mark.parametrize("seed", range(30))
 def test_damaged_metadata_costs_no_picture(tmp_path, seed):
     rng = np.random.default_rng(seed)
     exif = bytearray(camera_exif().tobytes())
@@ -263,6 +264,7 @@ def test_damaged_metadata_costs_no_picture(tmp_path, seed):
     xmp[rng.integers(0, len(xmp))] = 0x3C
     kept = exif_for(bytes(exif), ImageSize(4, 4), SRGB, keeps_position=True)
     assert len(kept.tobytes()) < 65_000
+    assert all("\n" not in name + fact for name, fact in camera_facts(PictureMetadata(bytes(exif))))
     write_picture(tmp_path / "a.jpg", patches(), PictureFormat(), PictureMetadata(bytes(exif), bytes(xmp)))
     write_picture(tmp_path / "a.tif", patches(), PictureFormat(), PictureMetadata(bytes(exif), bytes(xmp)))
     assert read_photo(tmp_path / "a.tif").size == (SIDE, SIDE * len(PATCHES))
@@ -327,17 +329,6 @@ def test_camera_facts_are_short_texts_for_people(tmp_path):
     assert camera_facts(PictureMetadata()) == ()
 
 
-@pytest.mark.parametrize("seed", range(30))
-def test_facts_of_damaged_exif_are_few_words(seed):
-    rng = np.random.default_rng(seed)
-    exif = bytearray(camera_exif().tobytes())
-    for at in rng.integers(6, len(exif), 8):
-        exif[at] = rng.integers(0, 256)
-    for what, value in camera_facts(PictureMetadata(bytes(exif))):
-        assert "\n" not in what + value
-        assert len(value) < 130
-
-
 def test_the_rating_of_a_photo_is_kept_and_places_in_its_file_are_not(tmp_path):
     """Windows writes ratings in two tags; 0x0111 holds the places of the file's strips."""
     exif = Image.Exif()
@@ -382,3 +373,15 @@ def test_nothing_is_left_where_writing_fails(tmp_path):
         with pytest.raises(InputError, match=path.name):
             write_image(path, patches())
     assert [path.name for path in tmp_path.iterdir()] == ["taken.png"]
+
+
+def test_spatial_photos_of_unknown_form_are_refused(tmp_path, monkeypatch):
+    """A newer libheif may write other versions of the boxes that are changed."""
+    path, encode = tmp_path / "a.heic", spatial_photo._encode
+    with pytest.raises(InputError, match=r"a\.heic: the left picture is"):
+        spatial_photo.write_spatial_photo(path, patches(), patches()[1:], 100.0)
+    for kind in (b"iloc", b"ipma"):
+        monkeypatch.setattr(spatial_photo, "_encode", lambda *a, kind=kind: encode(*a).replace(kind, kind + b"\1")[:-1])
+        with pytest.raises(InputError, match=r"a\.heic: cannot be written as a spatial photo"):
+            spatial_photo.write_spatial_photo(path, patches(), patches(), 100.0)
+    assert not list(tmp_path.iterdir())

@@ -251,7 +251,7 @@ def test_pictures_without_settings_and_other_files(tmp_path: Path) -> None:
     write_image(tmp_path / "plain.png", np.zeros((4, 4, 3), np.uint8))
     (tmp_path / "text.png").write_text("this is no picture")
     assert settings_text_in(tmp_path / "plain.png") == ""
-    for name, reason in (("plain.png", "no settings"), ("text.png", "no picture"), ("gone.png", "no such file")):
+    for name, reason in (("plain.png", "no settings"), ("text.png", "not a picture"), ("gone.png", "no such file")):
         with pytest.raises(InputError, match=reason) as error:
             read_settings(tmp_path / name)
         assert "\n" not in str(error.value)
