@@ -102,7 +102,7 @@ def evaluate(
         list[Path],
         typer.Argument(
             metavar="DATASET...",
-            help="Folders: HCI, Stanford archive, Heber, LLFF, Middlebury, views/v00_u00.png ..., or of such folders.",
+            help="Folders: HCI, Stanford archive, LLFF, Middlebury, views/v00_u00.png ..., or of such folders.",
             show_default=False,
         ),
     ],

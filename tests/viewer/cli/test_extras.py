@@ -63,7 +63,7 @@ def test_viewing_needs_no_extra(tmp_path: Path, words: tuple[object, ...]) -> No
         (("train", "--steps", 1, "--out", "{dir}/w.safetensors"), "torch; install with: pip install 'iibr[train]'"),
         (("evaluate", "{dir}", "--out", "{dir}/report"), "flip_evaluator; install with: pip install 'iibr[evaluate]'"),
         (
-            ("batch", "{dir}", "--to", "depth", "-o", "{dir}/out", "--scheduler", "tcp://127.0.0.1:1"),
+            ("batch", "{dir}", "--to", "depth", "-o", "{dir}/out", "--dask", "tcp://127.0.0.1:1"),
             "pip install 'iibr[batch]'",
         ),
         (("plan", "{photo}", "--depth-model", "depth-pro"), "pip install 'iibr[depth]'"),
