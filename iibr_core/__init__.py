@@ -13,7 +13,7 @@ __getattr__, __dir__, __all__ = lazy_loader.attach(
         "interface.fields": ["FORMATS", "LightField", "View"],
         "interface.judging": ["Comparison", "compare", "evaluate"],
         "interface.public_scene": ["Scene", "estimate_depth", "from_arrays", "open"],
-        "runtime.tiling": ["Cancelled"],
+        "runtime.work": ["Cancelled"],
         "stages": ["Stages"],
         "types": ["InputError"],
     },

@@ -100,12 +100,12 @@ def _photo(scratch: Path, is_mapped: bool = True, is_hdr: bool = False) -> Sourc
 
 def _open(source: Source) -> None:
     """All that the window's worker does with a photo."""
-    for _ in results_of(SceneRequest(0, source), lambda: False, lambda: CENTRE):
+    for _ in results_of(SceneRequest(0, source), lambda: CENTRE):
         pass
 
 
 def _show_first_picture(scratch: Path) -> None:
-    next(results_of(SceneRequest(0, _photo(scratch)), lambda: False, lambda: CENTRE))
+    next(results_of(SceneRequest(0, _photo(scratch)), lambda: CENTRE))
 
 
 def _make_views(scratch: Path) -> None:
@@ -146,7 +146,7 @@ def _look_around(scratch: Path) -> None:
 def _find_gloss(scratch: Path) -> None:
     """Make a surface glossy, with a light that is estimated from the photo."""
     large = Source(str(demo_photo()), max_pixels=GLOSSY_PIXELS)
-    ready = next(results_of(SceneRequest(0, large), lambda: False, lambda: CENTRE))
+    ready = next(results_of(SceneRequest(0, large), lambda: CENTRE))
     assert isinstance(ready, SceneReady)
     gloss = Gloss(light=GlossLight(color=(0.0, 0.0, 0.0)), photo_shines=True)
     answer(GlossRequest(gloss, ready.scene, ready.centre))
@@ -157,7 +157,7 @@ def _draw_at_own_size(scratch: Path) -> None:
     small = replace(_photo(scratch), max_pixels=16_000)
     loaded = load_photo(small)
     plan = make_plan(small, loaded, 1.0)
-    ready = next(results_of(SceneRequest(0, small, loaded=loaded, plan=plan), lambda: False, lambda: CENTRE))
+    ready = next(results_of(SceneRequest(0, small, loaded=loaded, plan=plan), lambda: CENTRE))
     assert isinstance(ready, SceneReady)
     height, width = loaded.photo.size
     full = FullPicture(ready.scene, plan, loaded, Optics(aperture_diameter=3.0), ScreenSize(width, height))

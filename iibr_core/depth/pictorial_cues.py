@@ -16,7 +16,8 @@ import OpenImageIO as oiio
 from iibr_core.depth.estimates import RelativeInverseDepth
 from iibr_core.runtime import tiling
 from iibr_core.runtime.kernels import kernel
-from iibr_core.runtime.tiling import ShouldStop, in_bands, never, raise_if_stopped
+from iibr_core.runtime.tiling import in_bands
+from iibr_core.runtime.work import raise_if_stopped
 from iibr_core.types import FloatImage, ImageSize, Photo, image_size
 
 LONGEST_PX = 400
@@ -33,24 +34,23 @@ GUIDE_CONTRAST = 0.03
 """Brightness that varies by less than this (standard deviation) draws no edge of depth."""
 
 
-def estimate_from_cues(photo: Photo, should_stop: ShouldStop = never) -> RelativeInverseDepth:
+def estimate_from_cues(photo: Photo) -> RelativeInverseDepth:
     """Rough inverse depth (H, W) of a photo, finite; 0 everywhere where the picture gives no hint (one row of pixels).
 
-    Of pairs of points that differ in depth it orders 86 % rightly, the height alone 82 % (docs/depth.md). Raises
-    Cancelled once should_stop is true.
+    Of pairs of points that differ in depth it orders 86 % rightly, the height alone 82 % (docs/depth.md). Raises.
     """
     pixels = np.clip(photo.pixels, 0, 1)
-    small = resize_picture(pixels, _small_size(photo.size), "box", should_stop)
+    small = resize_picture(pixels, _small_size(photo.size), "box")
     smooth = small
     for _ in range(3):
         smooth = box_filter(smooth, DETAIL_PX)
-    raise_if_stopped(should_stop)
+    raise_if_stopped()
     way = _way_from_top(smooth)
-    raise_if_stopped(should_stop)
+    raise_if_stopped()
     # Longer than usual tells little more: what stands upright before a plain sky then hardly leans.
     edges_crossed = way / np.maximum(way + np.median(way), STEP_COST)
     depth = _standardise(np.indices(way.shape, np.float32)[0]) + _standardise(edges_crossed)
-    return RelativeInverseDepth(_guided_upsample(depth, small.mean(axis=2), pixels, should_stop))
+    return RelativeInverseDepth(_guided_upsample(depth, small.mean(axis=2), pixels))
 
 
 def _small_size(size: ImageSize) -> ImageSize:
@@ -58,9 +58,7 @@ def _small_size(size: ImageSize) -> ImageSize:
     return ImageSize(max(round(size.height * ratio), 1), max(round(size.width * ratio), 1))
 
 
-def resize_picture(
-    image: FloatImage, size: ImageSize, filter_name: str = "box", should_stop: ShouldStop = never
-) -> FloatImage:
+def resize_picture(image: FloatImage, size: ImageSize, filter_name: str = "box") -> FloatImage:
     """A picture (H, W, C) at another (height, width), by one of OpenImageIO's filters: the box averages areas."""
     if image.shape[:2] == size:
         return image
@@ -76,9 +74,9 @@ def resize_picture(
         oiio.ImageBufAlgo.resize(resized, source, filtername=filter_name, roi=rows)
 
     # OpenImageIO has threads of its own. A pixel of a smaller picture takes as long as all that it is the mean of.
-    in_bands(put, image_size(image), should_stop, threads=1)
+    in_bands(put, image_size(image), threads=1)
     shrinkage = max(image.shape[0] * image.shape[1] / (size.height * size.width), 1.0)
-    in_bands(resize, size, should_stop, threads=1, most_pixels=int(tiling.MOST_BAND_PIXELS / shrinkage))
+    in_bands(resize, size, threads=1, most_pixels=int(tiling.MOST_BAND_PIXELS / shrinkage))
     return np.asarray(resized.get_pixels(oiio.FLOAT), np.float32).reshape(*size, channels)
 
 
@@ -111,9 +109,7 @@ def _standardise(values: FloatImage) -> FloatImage:
     return (values - values.mean()) / np.float32(spread) if spread > 1e-9 else np.zeros_like(values)
 
 
-def _guided_upsample(
-    values: FloatImage, guide: FloatImage, pixels: FloatImage, should_stop: ShouldStop = never
-) -> FloatImage:
+def _guided_upsample(values: FloatImage, guide: FloatImage, pixels: FloatImage) -> FloatImage:
     """The map (h, w), guided by a picture (h, w), at the size of the photo (H, W, 3), which guides it there.
 
     He et al., Guided Image Filtering, PAMI 2013, in its fast form: the linear model is enlarged, not the map.
@@ -124,14 +120,14 @@ def _guided_upsample(
     gain = (product - guide_mean * mean) / (square - guide_mean**2 + GUIDE_CONTRAST**2)
     # Every pixel lies in many squares: it takes the mean of their models.
     model = box_filter(np.stack([gain, mean - gain * guide_mean], axis=2), GUIDE_PX)
-    model = resize_picture(model, image_size(pixels), "triangle", should_stop)
+    model = resize_picture(model, image_size(pixels), "triangle")
     guided = np.empty(pixels.shape[:2], np.float32)
 
     def band(first: int, last: int) -> None:
         rows = slice(first, last)
         guided[rows] = model[rows, :, 0] * pixels[rows].mean(axis=2) + model[rows, :, 1]
 
-    in_bands(band, image_size(pixels), should_stop)
+    in_bands(band, image_size(pixels))
     return guided
 
 

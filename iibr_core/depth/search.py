@@ -39,7 +39,7 @@ from iibr_core.formats.maps.disparity_file import filling_note, map_at_size
 from iibr_core.formats.maps.resample import is_enlarged_smoothly, without_repeats
 from iibr_core.inpainting.disparity_by_color import fill_disparity_by_color
 from iibr_core.inpainting.inpainter import EstimateDepth
-from iibr_core.runtime.tiling import ShouldStop, never, raise_if_stopped
+from iibr_core.runtime.work import raise_if_stopped
 from iibr_core.types import (
     Disparity,
     FloatImage,
@@ -86,7 +86,6 @@ def open_with_depth(
     choice: DepthChoice | None = None,
     max_pixels: int = DEFAULT_MAX_PIXELS,
     grid: GridShape | None = None,
-    should_stop: ShouldStop = never,
     report_progress: ReportProgress = ignore_progress,
     asks_model: bool = True,
 ) -> PhotoWithDepth:
@@ -95,13 +94,13 @@ def open_with_depth(
 
     A photo that the camera blurred is replaced by the sharp picture beside it, where its own depth comes with one.
     Raises InputError for a bad photo, for a bad file or model that `choice` names, and where it asks for a model and
-    there is none; Cancelled where should_stop says so.
+    there is none; Cancelled.
     """
     choice, path = choice or DepthChoice(), Path(path)
-    photo = read_photo(path, max_pixels, keeps_primaries=True, should_stop=should_stop)
-    search = _DepthSearch(path, photo, choice, max_pixels, should_stop, report_progress)
+    photo = read_photo(path, max_pixels, keeps_primaries=True)
+    search = _DepthSearch(path, photo, choice, max_pixels, report_progress)
     if choice.file is not None:
-        return _finish(search.of_file(Path(choice.file)), choice, grid, should_stop)
+        return _finish(search.of_file(Path(choice.file)), choice, grid)
     failures: tuple[str, ...] = ()
     for kind, find in search.sources():
         if kind == "model" and not asks_model:
@@ -109,7 +108,7 @@ def open_with_depth(
         try:
             if (found := find()) is not None:
                 found = replace(found, origin=replace(found.origin, failures=failures))
-                return _finish(found, choice, grid, should_stop)
+                return _finish(found, choice, grid)
         except InputError as error:
             if kind == "model" and choice.asks_for_model:
                 raise
@@ -122,38 +121,37 @@ def ask_model(
     photo: Photo,
     choice: DepthChoice,
     grid: GridShape | None = None,
-    should_stop: ShouldStop = never,
 ) -> PhotoWithDepth:
     """A photo that was read from `path`, its disparity estimated by the model that `choice` names, or the usual one.
 
-    Raises InputError where there is none or it cannot be used, Cancelled where should_stop says so.
+    Raises InputError where there is none or it cannot be used.
     """
     choice = replace(choice, start="model")
-    search = _DepthSearch(path, photo, choice, math.prod(photo.size), should_stop, ignore_progress)
+    search = _DepthSearch(path, photo, choice, math.prod(photo.size), ignore_progress)
     found = search.model()
     assert found is not None
-    return _finish(found, choice, grid, should_stop)
+    return _finish(found, choice, grid)
 
 
-def sketch_depth(path: Path, photo: Photo, choice: DepthChoice, should_stop: ShouldStop = never) -> PhotoWithDepth:
+def sketch_depth(path: Path, photo: Photo, choice: DepthChoice) -> PhotoWithDepth:
     """What `open_with_depth` will find, as far as that is quick: of a small picture of the photo, edges as they come,
     and a guess where that will ask a model or compare two views.
 
     Raises InputError, Cancelled as that does.
     """
     height, width = photo.size
-    search = _DepthSearch(path, photo, choice, height * width, should_stop, ignore_progress)
+    search = _DepthSearch(path, photo, choice, height * width, ignore_progress)
     choice = replace(choice, refine=0.0)
     if choice.file is not None:
-        return _finish(search.of_file(Path(choice.file)), choice, None, should_stop)
+        return _finish(search.of_file(Path(choice.file)), choice, None)
     if choice.start == "flat":
         return _flat(photo, ())
     ways = (search.sidecar, search.embedded_map) if choice.start == "auto" else (search.embedded_map,)
     for find in ways if choice.start in ("auto", "embedded") else ():
         with suppress(InputError):  # it is told when all is read
             if (found := find()) is not None:
-                return _finish(found, choice, None, should_stop)
-    return _finish(search.rough(), choice, None, should_stop)
+                return _finish(found, choice, None)
+    return _finish(search.rough(), choice, None)
 
 
 def read_shown_photo(path: Path, max_pixels: int, kind: DepthKind) -> Photo:
@@ -171,11 +169,11 @@ def estimator_of(found: PhotoWithDepth, choice: DepthChoice) -> EstimateDepth | 
     if found.origin.kind != "model":
         return None
 
-    def estimate(colors: FloatImage, should_stop: ShouldStop) -> FloatImage:
+    def estimate(colors: FloatImage) -> FloatImage:
         model = model_to_use(choice)
         if model is None:
             raise InputError(f"{found.origin.words}: the model no longer exists")
-        depth = estimate_with(model, replace(found.photo, pixels=colors), should_stop)
+        depth = estimate_with(model, replace(found.photo, pixels=colors))
         if found.origin.near:  # the first estimate decided, for all
             depth = turned_estimate(depth, (found.origin.near == "the high end") != choice.inverts, choice)
         return _at_size(disparity_from(_as_chosen(depth, choice), USUAL_GRID), found.photo)
@@ -191,7 +189,7 @@ def disparity_of_file(
     photo_path: where the photo is, see `depth_from_file`. Raises InputError where the map cannot be used.
     """
     found = depth_from_file(file, photo, choice, photo_path)
-    return _disparity_at(photo, found.estimate, file.name, choice, grid, never)
+    return _disparity_at(photo, found.estimate, file.name, choice, grid)
 
 
 @dataclass(frozen=True, eq=False)
@@ -202,7 +200,6 @@ class _DepthSearch:
     photo: Photo
     choice: DepthChoice
     max_pixels: int
-    should_stop: ShouldStop
     report_progress: ReportProgress
 
     def sources(self) -> Iterator[tuple[DepthKind, Callable[[], _FoundDepth | None]]]:
@@ -255,7 +252,7 @@ class _DepthSearch:
         return _FoundDepth(photo, replace(origin, near=told.near), told.estimate, embedded.notes + told.notes)
 
     def of_pair(self) -> _FoundDepth | None:
-        found = estimate_from_pair(self.path, self.should_stop, self.report_progress)
+        found = estimate_from_pair(self.path, self.report_progress)
         if found is None:
             return None
         estimate, layout = found
@@ -265,28 +262,28 @@ class _DepthSearch:
         model = model_to_use(self.choice)
         if model is None:
             return None
-        raise_if_stopped(self.should_stop)
-        estimate = estimate_with(model, self.photo, self.should_stop, self.report_progress)
+        raise_if_stopped()
+        estimate = estimate_with(model, self.photo, self.report_progress)
         told = depth_of_model(model.title, estimate, is_meaning_known(model), self.photo, self.choice)
         origin = DepthOrigin("model", f"estimated by {model.title}", near=told.near)
         return _FoundDepth(self.photo, origin, told.estimate, told.notes)
 
     def rough(self) -> _FoundDepth:
-        raise_if_stopped(self.should_stop)
+        raise_if_stopped()
         self.report_progress(0, 0, "guessing depth")
-        estimate = estimate_from_cues(self.photo, self.should_stop)
+        estimate = estimate_from_cues(self.photo)
         origin = DepthOrigin("rough", "rough, guessed without a model", (), BETTER_WAYS)
         return _FoundDepth(self.photo, origin, estimate, unread_parts(self.path))
 
 
-def _finish(found: _FoundDepth, choice: DepthChoice, grid: GridShape | None, should_stop: ShouldStop) -> PhotoWithDepth:
+def _finish(found: _FoundDepth, choice: DepthChoice, grid: GridShape | None) -> PhotoWithDepth:
     """Disparity at the photo's size, whole, its edges drawn to the photo's. Raises InputError where none is known."""
     photo, origin = found.photo, found.origin
     name = origin.words if origin.kind == "file" else "its depth"
-    disparity = _disparity_at(photo, found.depth, name, choice, grid, should_stop)
+    disparity = _disparity_at(photo, found.depth, name, choice, grid)
     values, holes = disparity.values, disparity.unknown
     if choice.refine > 0:
-        values = refine(photo.pixels, values, choice.refine, holes, should_stop, is_enlarged=disparity.is_enlarged)
+        values = refine(photo.pixels, values, choice.refine, holes, is_enlarged=disparity.is_enlarged)
     share = GUESS_SHARE if origin.kind == "rough" else 1.0
     notes = found.notes + origin.failures + ((origin.advising_line,) if origin.advice else ())
     disparity = replace(
@@ -301,7 +298,6 @@ def _disparity_at(
     name: str,
     choice: DepthChoice,
     grid: GridShape | None,
-    should_stop: ShouldStop,
 ) -> Disparity:
     """An estimate's disparity at the photo's size, what is unknown filled by what looks like it.
 
@@ -319,7 +315,7 @@ def _disparity_at(
     if holes.all():
         raise InputError(f"{name}: too few known values survive at the photo's size; give a denser map")
     if holes.any():
-        values = fill_disparity_by_color(photo.pixels, values, should_stop)
+        values = fill_disparity_by_color(photo.pixels, values)
     return Disparity(values, name, notes, inverse_metres, holes if holes.any() else None, is_enlarged=is_enlarged)
 
 

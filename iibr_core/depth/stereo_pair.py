@@ -13,7 +13,6 @@ from iibr_core.formats.images.photo import read_picture
 from iibr_core.formats.images.side_by_side import left_picture
 from iibr_core.formats.light_fields.view_files import read_stereo_file
 from iibr_core.runtime.machine import free_memory_bytes
-from iibr_core.runtime.tiling import ShouldStop, never
 from iibr_core.types import InputError, ReportProgress, ignore_progress, image_size
 
 MATCHED_PIXELS = 400_000
@@ -22,14 +21,12 @@ MATCHED_PIXELS = 400_000
 
 def estimate_from_pair(
     path: Path,
-    should_stop: ShouldStop = never,
     report_progress: ReportProgress = ignore_progress,
 ) -> tuple[DisparityMap, str] | None:
     """Of the picture that a stereo photo's file shows, px from eye to eye, and what kind of file it is; None where a
     file is no stereo photo, or shows another picture than these two.
 
-    Raises InputError where it is damaged, its views differ in size, are too small, or memory does not do; Cancelled
-    once should_stop is true.
+    Raises InputError where it is damaged, its views differ in size, are too small, or memory does not do.
     """
     scene = read_stereo_file(path)
     held = [view.picture for view in scene.views] if scene is not None else []
@@ -43,8 +40,8 @@ def estimate_from_pair(
     views = [stored_from_encoded(pixels, is_hdr=False) for pixels in pictures]
     offsets = [view.offset for view in scene.views]
     reference = held.index(left_picture(path))
-    coarse = estimate_coarse(views, offsets, reference, should_stop)
+    coarse = estimate_coarse(views, offsets, reference)
     if sweep_bytes(coarse.values.shape, coarse.range_px, 1.0) > free_memory_bytes():
         raise InputError(f"{path}: matching its two views takes more memory than there is")
-    values = estimate_disparity(views, offsets, reference, coarse.range_px, should_stop)
+    values = estimate_disparity(views, offsets, reference, coarse.range_px)
     return DisparityMap(values.astype(np.float32)), scene.layout

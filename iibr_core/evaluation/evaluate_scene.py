@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from functools import partial
@@ -84,11 +84,10 @@ def evaluate(
     scene: MultiView,
     options: Options | None = None,
     report_progress: ReportProgress = ignore_progress,
-    should_stop: Callable[[], bool] = lambda: False,
 ) -> list[EvaluationResult]:
     """Evaluate a scene by the paper's trials: one result for each trial and disparity map.
 
-    Raises InputError where the scene or an option is bad, Cancelled once should_stop is true.
+    Raises InputError where the scene or an option is bad.
     """
     options = options or Options()
     lpips = None if options.lpips is None else _lpips(options.lpips)
@@ -97,10 +96,10 @@ def evaluate(
     trials = list(trials_of(scene, source, options.most_views))
     for number, trial in enumerate(trials):
         report_progress(number, len(trials), f"{scene.name}: disparity")
-        given = trial_input(trial, options.source, options.choice, options.max_pixels, should_stop)
+        given = trial_input(trial, options.source, options.choice, options.max_pixels)
         for which, disparity in enumerate(given.maps):
             report = _part_of(report_progress, number + which / len(given.maps), 1 / len(given.maps), len(trials))
-            results.append(_Evaluator(trial, given, disparity, options, lpips, report, should_stop).evaluate())
+            results.append(_Evaluator(trial, given, disparity, options, lpips, report).evaluate())
     return results
 
 
@@ -124,15 +123,14 @@ class _Evaluator:
         options: Options,
         lpips: Lpips | None,
         report_progress: ReportProgress,
-        should_stop: Callable[[], bool],
     ) -> None:
         self.trial, self.given, self.disparity, self.options = trial, given, disparity, options
-        self.lpips, self.report_progress, self.should_stop = lpips, report_progress, should_stop
+        self.lpips, self.report_progress = lpips, report_progress
         self.refined = disparity.values
         if options.choice.refine > 0:
             strength, unknown = options.choice.refine, disparity.unknown
             self.refined = refine(
-                given.photo, disparity.values, strength, unknown, should_stop, options.stages, disparity.is_enlarged
+                given.photo, disparity.values, strength, unknown, options.stages, disparity.is_enlarged
             )
         self.figures: dict[str, dict[str, Figures]] = {}
         self.hole_shares: list[float] = []
@@ -155,7 +153,6 @@ class _Evaluator:
                 self.refined,
                 options.qualities,
                 options.max_pixels,
-                self.should_stop,
                 options.stages,
             ) as views,
             ThreadPoolExecutor(2, thread_name_prefix="iibr-metrics") as pool,

@@ -5,7 +5,7 @@ a plane and look the same way, or freely.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
 from types import TracebackType
 from typing import Protocol, Self
@@ -31,7 +31,7 @@ LEAST_STATED_SHARE = 0.1
 class TrialViews(Protocol):
     """Makes the judged views of a trial, by their index in the scene; a context manager.
 
-    qualities: that it makes. Raises Cancelled once should_stop is true.
+    qualities: that it makes.
     """
 
     qualities: tuple[Quality, ...]
@@ -64,12 +64,11 @@ class PlaneViews:
         disparity: FloatImage,
         qualities: tuple[Quality, ...],
         max_pixels: int,
-        should_stop: Callable[[], bool],
         stages: Stages,
     ) -> None:
         self.qualities, self._trial, self._photo, self._max_pixels = qualities, trial, photo, max_pixels
         self.offsets = [trial.offset(index) for index in trial.judged]
-        self.maker = ViewMaker(photo, disparity, self.offsets, qualities, should_stop, stages=stages)
+        self.maker = ViewMaker(photo, disparity, self.offsets, qualities, stages=stages)
 
     def __enter__(self) -> Self:
         """Complete the ray set."""
@@ -105,7 +104,6 @@ class FreeCameraViews:
         photo: FloatImage,
         disparity: FloatImage,
         max_pixels: int,
-        should_stop: Callable[[], bool],
         stages: Stages,
     ) -> None:
         self._trial, self._photo, self._max_pixels = trial, photo, max_pixels
@@ -120,7 +118,6 @@ class FreeCameraViews:
             inverse_depth.astype(np.float32),
             self._given,
             cameras,
-            should_stop,
             partial(fill_background, stages=stages),
             stages=stages,
         )
@@ -167,10 +164,9 @@ def trial_views(
     disparity: FloatImage,
     qualities: Sequence[Quality],
     max_pixels: int,
-    should_stop: Callable[[], bool],
     stages: Stages = ALL_STAGES,
 ) -> TrialViews:
     """Of the trial's scene. photo: (H, W, 3), the given view; disparity: (H, W), px per view step. stages: on."""
     if trial.scene.views[trial.given].camera is None:
-        return PlaneViews(trial, photo, disparity, tuple(qualities), max_pixels, should_stop, stages)
-    return FreeCameraViews(trial, photo, disparity, max_pixels, should_stop, stages)
+        return PlaneViews(trial, photo, disparity, tuple(qualities), max_pixels, stages)
+    return FreeCameraViews(trial, photo, disparity, max_pixels, stages)

@@ -5,7 +5,7 @@ From the centre view to all others, and on grids from the bottom left to the top
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
@@ -105,7 +105,6 @@ def trial_input(
     source: DisparityFrom | Path,
     choice: DepthChoice,
     max_pixels: int,
-    should_stop: Callable[[], bool] = lambda: False,
 ) -> TrialInput:
     """The given view of a trial and its disparity. source: a file is the centre view's. choice: how one is estimated.
 
@@ -126,7 +125,7 @@ def trial_input(
         given = truth or _map_of(trial, scene.disparity, max_pixels)
     if given is not None:
         return TrialInput(photo, (given,), truth or given, given.notes)
-    estimate = _estimate_disparity(trial, choice, max_pixels, should_stop)
+    estimate = _estimate_disparity(trial, choice, max_pixels)
     aligned = _align_to_views(trial, photo, estimate, max_pixels)
     return TrialInput(photo, (estimate, aligned), truth or aligned, estimate.notes)
 
@@ -154,9 +153,7 @@ def warp_disparity(disparity: FloatImage, offset: ViewOffset) -> FloatImage:
     return disparity if np.isnan(values).all() else fill_disparity_holes(values)
 
 
-def _estimate_disparity(
-    trial: Trial, choice: DepthChoice, max_pixels: int, should_stop: Callable[[], bool]
-) -> Disparity:
+def _estimate_disparity(trial: Trial, choice: DepthChoice, max_pixels: int) -> Disparity:
     """As the program estimates it from the given view alone; in the range that the cameras' poses state, where they do.
 
     A grid's stated range belongs to its truth, which an estimate does not know.
@@ -165,7 +162,7 @@ def _estimate_disparity(
     path = trial.scene.views[trial.given].path
     start = "model" if choice.asks_for_model else "embedded" if choice.start == "auto" else choice.start
     unrefined = replace(choice, start=start, file=None, refine=0.0)
-    found = open_with_depth(path, unrefined, max_pixels, GridShape(*reach), should_stop)
+    found = open_with_depth(path, unrefined, max_pixels, GridShape(*reach))
     values, words = found.disparity.values, f"estimate ({found.origin.words})"
     if trial.scene.grid is None and trial.scene.range_px is not None:
         values = _within(values, trial.scene.range_px)

@@ -19,7 +19,8 @@ from iibr_core.exports.source import Draw
 from iibr_core.generation.memory import require_memory
 from iibr_core.generation.plan import ScenePlan
 from iibr_core.rendering.optics import CENTRE, Optics
-from iibr_core.runtime.tiling import ShouldStop, in_bands, never, raise_if_stopped
+from iibr_core.runtime.tiling import in_bands
+from iibr_core.runtime.work import raise_if_stopped
 from iibr_core.scenes.loaded_photo import LoadedPhoto
 from iibr_core.scenes.rect import WHOLE, Rect
 from iibr_core.scenes.scene import Scene
@@ -71,7 +72,6 @@ class FullPicture:
     def make(
         self,
         draw: Draw,
-        should_stop: ShouldStop = never,
         report_progress: ReportProgress = ignore_progress,
         photo: LargePhoto | None = None,
         keep: Callable[[LargePhoto], None] = lambda photo: None,
@@ -80,7 +80,7 @@ class FullPicture:
 
         draw: draws a tile. photo: the photo as it was kept for an earlier picture. keep: is called with the photo once
         it is read, and again once its hidden surfaces are inpainted. Raises InputError if the file is missing or has
-        changed, Cancelled once should_stop is true.
+        changed.
         """
         from iibr_core.rendering.renderer import open_renderer
         from iibr_core.scenes.large_photo import complete_fills, load_large
@@ -88,20 +88,19 @@ class FullPicture:
         source = self.scene.source
         report_progress(0, 0, "reading the photo at its own size")
         if photo is None:
-            photo = load_large(source, self.loaded, self.plan, MAX_PIXELS, should_stop)
+            photo = load_large(source, self.loaded, self.plan, MAX_PIXELS)
             keep(photo)
         if _shows_hidden(self.optics) and photo.fills is None:
-            photo = photo.with_fills(complete_fills(source, self.loaded, self.plan, should_stop))
+            photo = photo.with_fills(complete_fills(source, self.loaded, self.plan))
             keep(photo)
-        with open_renderer(should_stop) as renderer:
-            return self._draw_tiles(photo, renderer, draw, should_stop, report_progress)
+        with open_renderer() as renderer:
+            return self._draw_tiles(photo, renderer, draw, report_progress)
 
     def _draw_tiles(
         self,
         photo: LargePhoto,
         renderer: Renderer,
         draw: Draw,
-        should_stop: ShouldStop,
         report_progress: ReportProgress,
     ) -> FloatImage:
         from iibr_core.rendering.large_views import Part, tiles_of, whole
@@ -116,15 +115,13 @@ class FullPicture:
         tiles = tiles_of(pixels, TILE_PX)
         for done, tile in enumerate(tiles):
             report_progress(done, len(tiles), DRAWING)
-            light[tile.inside(pixels).slices] = draw(self._tile_settings(photo, tile, renderer, should_stop))
-            raise_if_stopped(should_stop)
+            light[tile.inside(pixels).slices] = draw(self._tile_settings(photo, tile, renderer))
+            raise_if_stopped()
         report_progress(len(tiles), len(tiles), DRAWING)
         size = ImageSize(self.size.height, self.size.width)
-        return mean_of_areas(light, size, should_stop, (top - pixels.top, left - pixels.left, down, across))
+        return mean_of_areas(light, size, (top - pixels.top, left - pixels.left, down, across))
 
-    def _tile_settings(
-        self, photo: LargePhoto, tile: Part, renderer: Renderer, should_stop: ShouldStop
-    ) -> RenderSettings:
+    def _tile_settings(self, photo: LargePhoto, tile: Part, renderer: Renderer) -> RenderSettings:
         """Return the settings of a tile, with the views around the eye that its lens needs."""
         from iibr_core.rendering.large_views import views_of_tile, whole
 
@@ -136,7 +133,7 @@ class FullPicture:
         grid = GridShape(2 * rings + 1, 2 * rings + 1)
         places = [(row, column) for row in range(grid.rows) for column in range(grid.columns)]
         offsets = [ViewOffset(eye.t + step * (row - rings), eye.s + step * (column - rings)) for row, column in places]
-        rendered = views_of_tile(photo, around, offsets, renderer, should_stop)
+        rendered = views_of_tile(photo, around, offsets, renderer)
         views = tuple(
             ViewUpdate(*place, stored_from_encoded(view.colors, True), view.disparity * np.float32(step))
             for place, view in zip(places, rendered)
@@ -174,13 +171,8 @@ def _share_of(part: Part, size: ImageSize) -> Rect:
     return Rect(part.left / width, part.top / height, columns / width, rows / height)
 
 
-def encode_light(
-    light: FloatImage, is_linear: bool, target: ColorSpace, source: ColorSpace, should_stop: ShouldStop = never
-) -> NDArray[Any]:
-    """Convert linear light (H, W, 3) from one colour space to another; return light, or bytes encoded by sRGB's curve.
-
-    Raises Cancelled once should_stop is true.
-    """
+def encode_light(light: FloatImage, is_linear: bool, target: ColorSpace, source: ColorSpace) -> NDArray[Any]:
+    """Convert linear light (H, W, 3) from one colour space to another; return light, or bytes encoded by sRGB's curve."""
     encoded = np.empty(light.shape, np.float32 if is_linear else np.uint8)
     matrix = primaries_matrix(target, source)
 
@@ -189,7 +181,7 @@ def encode_light(
         converted = rows if target == source else rows @ matrix.T
         encoded[first:last] = converted if is_linear else bytes_from_encoded(srgb_from_linear(converted))
 
-    in_bands(band, image_size(light), should_stop)
+    in_bands(band, image_size(light))
     return encoded
 
 

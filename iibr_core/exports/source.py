@@ -21,7 +21,7 @@ from iibr_core.formats.light_fields.light_field_formats import open_light_field
 from iibr_core.generation.outer_views import WantedViews
 from iibr_core.generation.plan import ScenePlan
 from iibr_core.rendering.optics import CENTRE, Optics
-from iibr_core.runtime.tiling import ShouldStop, never, raise_if_stopped
+from iibr_core.runtime.work import raise_if_stopped
 from iibr_core.scenes.lens_limits import LensChoice
 from iibr_core.scenes.light_fields import showings_of_light_field
 from iibr_core.scenes.loaded_photo import LoadedPhoto
@@ -58,7 +58,6 @@ class ExportSource:
     optics: Optics
     draw: Draw
     report_progress: ReportProgress
-    should_stop: ShouldStop
     centre: ViewUpdate | None = None
 
     @property
@@ -74,7 +73,7 @@ class ExportSource:
     def watched(self, items: Iterable[Item], total: int, doing: str) -> Iterator[Item]:
         """Yield the items and report progress. Raises Cancelled once the export should stop."""
         for done, item in enumerate(items):
-            raise_if_stopped(self.should_stop)
+            raise_if_stopped()
             self.report_progress(done, total, doing)
             yield item
         self.report_progress(total, total, doing)
@@ -100,7 +99,6 @@ class ExportSource:
                 self.scene.source,
                 self.loaded,
                 self.plan(static_disparity),
-                self.should_stop,
                 self.report_progress,
                 in_srgb=in_srgb,
                 wanted=lambda: WantedViews(wanted),
@@ -108,11 +106,11 @@ class ExportSource:
         scene = self.scene
         if static_disparity is not None:
             scene = replace(scene, infinity_px=self._infinity_px(static_disparity))
-        for view in add_gloss(views, self.optics.gloss, scene, self.should_stop):
-            raise_if_stopped(self.should_stop)
+        for view in add_gloss(views, self.optics.gloss, scene):
+            raise_if_stopped()
             self.report_progress(view.share, 1.0, "making views")
             yield view
-        raise_if_stopped(self.should_stop)
+        raise_if_stopped()
 
     def _infinity_px(self, static_disparity: float) -> float:
         before, after = self.plan(), self.plan(static_disparity)
@@ -128,7 +126,6 @@ class ExportSource:
         centre = self._final_centre
         showings = showings_of_light_field(
             self.scene.source,
-            self.should_stop,
             lambda progress: self.report_progress(progress.share, 1.0, progress.doing),
             takes_drafts=False,
             known=None if centre is None else centre.disparity,
@@ -208,12 +205,12 @@ def open_for_export(
         return open_drawn(source, depth_strength, lens, on_ready, report_progress, partial(optics_of, kind, options))
     # A light field from disk is copied without waiting for its disparity.
     request = SceneRequest(0, source, depth_strength, takes_drafts=kind.is_light_field)
-    results = results_of(request, never, lambda: CENTRE, lambda progress: progress.report_to(report_progress))
+    results = results_of(request, lambda: CENTRE, lambda progress: progress.report_to(report_progress))
     ready = next(results)
     assert isinstance(ready, SceneReady)
     on_ready(ready.scene)
     optics = Optics(gloss=lens.gloss)
-    return ExportSource(ready.scene, ready.loaded, optics, _draw_nothing, ignore_progress, never, ready.centre)
+    return ExportSource(ready.scene, ready.loaded, optics, _draw_nothing, ignore_progress, ready.centre)
 
 
 def write_export(kind: ExportKind, path: Path, source: ExportSource, options: ExportOptions) -> str | None:

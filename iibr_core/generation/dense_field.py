@@ -26,7 +26,7 @@ from iibr_core.inpainting.inpainter import Inpainter
 from iibr_core.rendering.photo_rays import rays_of_photo
 from iibr_core.rendering.ray_set import RaySet
 from iibr_core.rendering.renderer import Renderer, open_renderer
-from iibr_core.runtime.tiling import Cancelled, ShouldStop, never
+from iibr_core.runtime.work import Cancelled
 from iibr_core.surfaces import SAME_SURFACE_PX, step_of
 from iibr_core.types import (
     FloatImage,
@@ -92,22 +92,20 @@ def densify(
     given: Sequence[GivenView],
     sparse: GridShape,
     dense: GridShape,
-    should_stop: ShouldStop = never,
     inpainter: Inpainter = fill_background,
     nearest_to: Callable[[], ViewOffset] = lambda: ViewOffset(0.0, 0.0),
 ) -> Generator[ViewUpdate, None, None]:
     """Every view of the dense grid once: the centre, those given as they are, then those between them, the nearest to
     `nearest_to()` first.
 
-    given: all views of the sparse grid, of equal size. Disparity is per step of the dense grid. Once should_stop is
-    true it ends. Raises InputError as `require_steps` does, ValueError where views differ in size or are missing.
+    given: all views of the sparse grid, of equal size. Disparity is per step of the dense grid. Raises InputError as `require_steps` does, ValueError where views differ in size or are missing.
     """
     steps = require_steps(sparse, dense)
     places = {(view.row, view.column) for view in given}
     if places != set(np.ndindex(*sparse)) or len({view.disparity.shape for view in given}) != 1:
         raise ValueError(f"{len(given)} views do not fill a grid of {sparse} or differ in size")
     with suppress(Cancelled):
-        yield from _generate_views(given, steps, sparse, dense, should_stop, inpainter, nearest_to)
+        yield from _generate_views(given, steps, sparse, dense, inpainter, nearest_to)
 
 
 def _generate_views(
@@ -115,7 +113,6 @@ def _generate_views(
     steps: int,
     sparse: GridShape,
     dense: GridShape,
-    should_stop: ShouldStop,
     inpainter: Inpainter,
     nearest_to: Callable[[], ViewOffset],
 ) -> Iterator[ViewUpdate]:
@@ -123,11 +120,11 @@ def _generate_views(
     places = {(view.row * steps, view.column * steps): view for view in given}
     remaining = [dense.offset(*at) for at in np.ndindex(*dense) if at not in places]
     completing = [offset for offset in _completing_views(sparse, dense, steps) if offset in remaining]
-    with open_renderer(should_stop) as renderer:
-        views = _ViewsBetween(renderer, given, steps, dense, should_stop, inpainter)
+    with open_renderer() as renderer:
+        views = _ViewsBetween(renderer, given, steps, dense, inpainter)
 
         def update(offset: ViewOffset, view: _Merged) -> ViewUpdate:
-            (v, u), colors = dense.centre, encode_for_storage(view.colors, is_hdr, should_stop, 1)
+            (v, u), colors = dense.centre, encode_for_storage(view.colors, is_hdr, 1)
             return ViewUpdate(v + round(offset.t), u + round(offset.s), colors, view.disparity, view.inpainted)
 
         done, total = 0.0, len(completing) * OUTER_WORK + len(remaining) - len(completing)
@@ -169,16 +166,13 @@ class _ViewsBetween:
         given: Sequence[GivenView],
         steps: int,
         dense: GridShape,
-        should_stop: ShouldStop,
         inpainter: Inpainter,
     ) -> None:
-        self._renderer, self._steps, self._inpainter, self._should_stop = renderer, steps, inpainter, should_stop
+        self._renderer, self._steps, self._inpainter = renderer, steps, inpainter
         self._sources: list[tuple[ViewOffset, RaySet]] = [
             (
                 dense.offset(view.row * steps, view.column * steps),
-                rays_of_photo(
-                    encoded_from_stored(view.colors), view.disparity / np.float32(steps), steps, 0, should_stop
-                ),
+                rays_of_photo(encoded_from_stored(view.colors), view.disparity / np.float32(steps), steps, 0),
             )
             for view in given
         ]
@@ -195,7 +189,7 @@ class _ViewsBetween:
                 self._inpainted = offset, rays
             origin, rays = self._inpainted
             disparity = np.where(view.hole, view.disparity, np.float32(np.nan))
-            rays.add(_between(origin, offset), view.colors, disparity, view.hole, self._should_stop)
+            rays.add(_between(origin, offset), view.colors, disparity, view.hole)
         return view
 
     def make(self, offset: ViewOffset) -> _Merged:
@@ -211,7 +205,7 @@ class _ViewsBetween:
         if hole.any():
             at, nearest = min(self._sources, key=lambda source: np.hypot(*_between(source[0], offset)))
             photo_disparity = nearest.photo_disparity
-            self._inpainter(colors, disparity, hole, photo_disparity, _between(at, offset), self._should_stop)
+            self._inpainter(colors, disparity, hole, photo_disparity, _between(at, offset))
         return _Merged(colors, disparity, hole, inpainted)
 
     def _merge(self, offset: ViewOffset) -> tuple[FloatImage, FloatImage, NDArray[np.bool_]]:

@@ -24,7 +24,6 @@ from iibr_core.rendering.free_view import render_free_view, target_from_photo
 from iibr_core.rendering.photo_rays import rays_of_photo
 from iibr_core.rendering.ray_set import NO_MARGINS
 from iibr_core.rendering.rendered_view import RenderedView
-from iibr_core.runtime.tiling import ShouldStop, never
 from iibr_core.stages import ALL_STAGES, Stages
 from iibr_core.types import (
     Camera,
@@ -115,7 +114,6 @@ class FreeViews:
         inverse_depth: FloatImage,
         camera: Camera,
         cameras: Sequence[Camera],
-        should_stop: ShouldStop = never,
         inpainter: Inpainter | None = fill_background,
         report_progress: ReportProgress = ignore_progress,
         stages: Stages = ALL_STAGES,
@@ -124,33 +122,29 @@ class FreeViews:
         distance from the camera's plane. cameras: all that will be asked for. inpainter: fills what they disocclude,
         for all views alike; None leaves that to each view, which is a draft then. stages: that are on.
 
-        Raises InputError for a camera that sees nothing of the photo, Cancelled once should_stop is true.
+        Raises InputError for a camera that sees nothing of the photo.
         """
         reach = reach_of(camera, cameras, depths_of(inverse_depth))
         margins = reach.margins if stages.outpainting else NO_MARGINS
-        self._should_stop, self._margins = should_stop, margins
+        self._margins = margins
         self.scale_px = camera.focal_px[0] * reach.step
         disparity = inverse_depth * np.float32(self.scale_px)
         self._step = rounding_step(disparity)
         farthest = farthest_views(reach.outer)
-        colors, disparity = outpaint(photo, disparity, margins, should_stop, stages)
+        colors, disparity = outpaint(photo, disparity, margins, stages)
         x, y = camera.centre_px
         centre_px = x + margins.left, y + margins.top
         self._camera = replace(camera, size=image_size(disparity), centre_px=centre_px)
         outer = reach.outer if inpainter is not None and stages.share_inpainted else ()
-        self._rays = rays_of_photo(colors, disparity, farthest, len(outer), should_stop, stages=stages)
-        completing = render_outer_views(self._rays, outer, should_stop, inpainter or fill_background)
+        self._rays = rays_of_photo(colors, disparity, farthest, len(outer), stages=stages)
+        completing = render_outer_views(self._rays, outer, inpainter or fill_background)
         for done, _ in enumerate(completing, 1):
             report_progress(done, len(outer), "what cameras may see beside the photo's surfaces")
 
-    def view(self, camera: Camera, should_stop: ShouldStop | None = None) -> RenderedView:
-        """What a camera sees; see `scale_px` for its disparity.
-
-        should_stop: None for that of the ray set.
-        """
+    def view(self, camera: Camera) -> RenderedView:
+        """Return the view of a camera; see `scale_px` for its disparity."""
         matrix = target_from_photo(self._camera, camera, self.scale_px)
-        should_stop = should_stop or self._should_stop
-        return render_free_view(self._rays, matrix, camera.size, self._margins, self._step, should_stop)
+        return render_free_view(self._rays, matrix, camera.size, self._margins, self._step)
 
 
 def depths_of(inverse_depth: FloatImage) -> tuple[float, float]:

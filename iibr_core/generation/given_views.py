@@ -11,7 +11,7 @@ from iibr_core.formats.light_fields.multi_view_scene import MultiView
 from iibr_core.formats.light_fields.views import grid_of, read_views
 from iibr_core.generation.dense_field import GivenView
 from iibr_core.generation.memory import require_memory
-from iibr_core.runtime.tiling import ShouldStop, never, raise_if_stopped
+from iibr_core.runtime.work import raise_if_stopped
 from iibr_core.types import GridShape, ReportProgress, ViewUpdate, ignore_progress
 
 VIEW_BYTES = 60
@@ -39,33 +39,31 @@ class DenseFieldWork:
 
 def read_given_views(
     scene: MultiView,
-    should_stop: ShouldStop = never,
     report_progress: ReportProgress = ignore_progress,
 ) -> list[GivenView]:
     """All views of a light field whose views fill a grid. report_progress: of work, see `NEW_VIEW_WORK`.
 
-    Raises InputError where a file cannot be read, no disparity can be found or memory does not suffice, Cancelled once
-    should_stop is true.
+    Raises InputError where a file cannot be read, no disparity can be found or memory does not suffice.
     """
     grid, (size, views) = grid_of(scene), read_views(scene)
     what = f"making views between {grid.columns} x {grid.rows} of {scene.name} ({size})"
     require_memory(math.prod(size) * math.prod(grid) * VIEW_BYTES, what)
     read: list[ViewUpdate] = []
     for view in views:
-        raise_if_stopped(should_stop)
+        raise_if_stopped()
         read.append(view)
         report_progress(READ_WORK * len(read), 0, "reading")
     if any(view.disparity is None for view in read):
         colors, offsets = [view.colors for view in read], [grid.offset(view.row, view.column) for view in read]
         # The centre comes first.
-        range_px = estimate_coarse(colors, offsets, 0, should_stop).range_px
+        range_px = estimate_coarse(colors, offsets, 0).range_px
         require_memory(sweep_bytes(size, range_px, float(max(grid) - 1)), f"{scene.name}: finding its disparity")
         before = READ_WORK * len(read)
 
         def report(done: float, total: float, doing: str) -> None:
             report_progress(before + done, before + total, doing)
 
-        maps = estimate_all(colors, offsets, range_px, should_stop, report)
+        maps = estimate_all(colors, offsets, range_px, report)
         read = [replace(view, disparity=values) for view, values in zip(read, maps)]
     return [
         GivenView(view.row, view.column, view.colors, view.disparity) for view in read if view.disparity is not None

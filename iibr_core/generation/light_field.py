@@ -34,7 +34,7 @@ from iibr_core.rendering.ray_set import RaySet
 from iibr_core.rendering.rendered_view import RenderedView
 from iibr_core.rendering.renderer import open_renderer
 from iibr_core.runtime.resources import resource_folder
-from iibr_core.runtime.tiling import Cancelled, ShouldStop, never
+from iibr_core.runtime.work import Cancelled
 from iibr_core.types import (
     Disparity,
     FloatImage,
@@ -51,7 +51,6 @@ def generate(
     photo: Photo,
     disparity: Disparity,
     plan: ScenePlan,
-    should_stop: ShouldStop = never,
     nearest_to: Callable[[], ViewOffset] = lambda: ViewOffset(0.0, 0.0),
     quality: Quality | None = None,
     inpaint: str = DEFAULT_INPAINTER,
@@ -62,8 +61,8 @@ def generate(
     """Yield every view of `plan.grid` once: the photo's own first, then the outer ones, then those nearest to
     `nearest_to()`.
 
-    disparity is the field's (`plan.field_disparity(given)`). should_stop is asked every few milliseconds; once it
-    is true the generator returns. Pixels do not depend on the order of the views. quality: None for the plan's; "fast"
+    disparity is the field's (`plan.field_disparity(given)`). Once the job is stopped
+    the generator returns. Pixels do not depend on the order of the views. quality: None for the plan's; "fast"
     weighs by the closed form, "balanced" asks the trained transformer where surfaces contest a ray. inpaint: as
     `load_inpainter` takes it. aids: what it may ask. wanted: asked once, after the photo's own view, which views of the
     grid are to follow, and what for: a sum is of fast quality where nobody asked for another.
@@ -83,7 +82,7 @@ def generate(
         require_inpainter(inpaint)
         # A model is not loaded for nothing.
         load = partial(load_inpainter, inpaint if plan.has_disocclusion else DEFAULT_INPAINTER, aids)
-        colors = encode_for_storage(photo.pixels, photo.is_hdr, should_stop)
+        colors = encode_for_storage(photo.pixels, photo.is_hdr)
         views = [plan.grid.offset(v, u) for v in range(plan.grid.rows) for u in range(plan.grid.columns)]
         nothing = np.zeros(photo.size, np.bool_)
         yield ViewUpdate(*plan.grid.centre, colors, disparity.values, nothing, share=float(len(views) == 1))
@@ -96,16 +95,13 @@ def generate(
         wanted_outer = len(set(outer).intersection(views))
         counts = len(outer), wanted_outer, len(views) - wanted_outer
         work = FieldWork(plan.costs, quality, counts, inpaint not in INPAINTERS)
-        yield from _generate_views(
-            photo, disparity, plan, should_stop, nearest_to, load, draft_bytes, work, views, outer
-        )
+        yield from _generate_views(photo, disparity, plan, nearest_to, load, draft_bytes, work, views, outer)
 
 
 def _generate_views(
     photo: Photo,
     disparity: Disparity,
     plan: ScenePlan,
-    should_stop: ShouldStop,
     nearest_to: Callable[[], ViewOffset],
     load: Callable[[], Inpainter],
     draft_bytes: int | None,
@@ -116,9 +112,9 @@ def _generate_views(
     """The views that follow the photo's own. inner: all that are wanted; it is used up. outer: see `ray_set`."""
     grid = plan.grid
     transformer, inpainter = transformer_for(work.quality), load()
-    rays, outer_views = ray_set(photo, disparity, plan, should_stop, inpainter, outer)
-    with open_renderer(should_stop, transformer, inpainter=inpainter) as renderer:
-        views = StoredViews(renderer, rays, grid, photo.is_hdr, should_stop)
+    rays, outer_views = ray_set(photo, disparity, plan, inpainter, outer)
+    with open_renderer(transformer, inpainter=inpainter) as renderer:
+        views = StoredViews(renderer, rays, grid, photo.is_hdr)
         # What is left to be done for views that are there, or in the ray set.
         unfinished: dict[ViewOffset, Callable[[], ViewUpdate]] = {}
         outer_offsets = set[ViewOffset]()
@@ -157,15 +153,13 @@ def ray_set(
     photo: Photo,
     disparity: Disparity,
     plan: ScenePlan,
-    should_stop: ShouldStop = never,
     inpainter: Inpainter = fill_background,
     outer: list[ViewOffset] | None = None,
 ) -> tuple[RaySet, Iterator[tuple[ViewOffset, RenderedView]]]:
     """The rays that every view of `plan.grid` is made of, and the outer views by their offsets. outer: which of those
     are made; None: all.
 
-    The set is final once the outer views have been taken: each adds what it disoccluded. Taking one raises Cancelled
-    once should_stop is true.
+    The set is final once the outer views have been taken: each adds what it disoccluded. Taking one raises.
     """
     every = outer_views_of_grid(plan.grid)
     farthest = farthest_views(every)
@@ -173,8 +167,8 @@ def ray_set(
         every = []
     margins = outpainting_margins(disparity.values, every)
     outer = every if outer is None else outer
-    rays = rays_of_photo(photo.pixels, disparity.values, farthest, len(outer), should_stop, margins)
-    return rays, render_outer_views(rays, outer, should_stop, inpainter)
+    rays = rays_of_photo(photo.pixels, disparity.values, farthest, len(outer), margins)
+    return rays, render_outer_views(rays, outer, inpainter)
 
 
 def transformer_for(quality: Quality) -> Callable[[AmbiguousRays], FloatImage] | None:

@@ -17,7 +17,7 @@ from iibr_core.rendering.flying_pixels import without_flying_pixels
 from iibr_core.rendering.ray_set import RaySet
 from iibr_core.rendering.rendered_view import RenderedView
 from iibr_core.rendering.renderer import Renderer
-from iibr_core.runtime.tiling import ShouldStop, in_bands
+from iibr_core.runtime.tiling import in_bands
 from iibr_core.types import FloatImage, GridShape, StoredColors, ViewOffset, ViewUpdate, image_size
 
 
@@ -42,12 +42,9 @@ class Draft:
 class StoredViews:
     """Makes views of one ray set as they are handed over, each in the thread that asks."""
 
-    def __init__(
-        self, renderer: Renderer, rays: RaySet, grid: GridShape, is_hdr: bool, should_stop: ShouldStop
-    ) -> None:
-        """should_stop: once it is true, all raise Cancelled."""
+    def __init__(self, renderer: Renderer, rays: RaySet, grid: GridShape, is_hdr: bool) -> None:
         self._renderer, self._rays, self._grid = renderer, rays, grid
-        self._is_hdr, self._should_stop = is_hdr, should_stop
+        self._is_hdr = is_hdr
 
     def make(self, offset: ViewOffset) -> ViewUpdate:
         """A final view."""
@@ -56,7 +53,7 @@ class StoredViews:
     def draft(self, offset: ViewOffset) -> Draft:
         """A view in closed form, final where nothing is left to be decided."""
         view, undecided = self._renderer.draft(self._rays, offset)
-        stored = encode_for_storage(view.colors, self._is_hdr, self._should_stop, 1)
+        stored = encode_for_storage(view.colors, self._is_hdr, 1)
         colors = self._without_flying_pixels(offset, stored, view.disparity, view.inpainted)
         update = self._update(offset, colors, view.disparity, view.inpainted, not undecided)
         return Draft(update, stored, undecided)
@@ -78,13 +75,13 @@ class StoredViews:
 
     def update(self, offset: ViewOffset, view: RenderedView, is_final: bool = True) -> ViewUpdate:
         """A rendered view as it is stored."""
-        colors = stored_colors(self._rays, offset, view, self._is_hdr, self._should_stop)
+        colors = stored_colors(self._rays, offset, view, self._is_hdr)
         return self._update(offset, colors, view.disparity, view.inpainted, is_final)
 
     def _without_flying_pixels(
         self, offset: ViewOffset, stored: StoredColors, disparity: FloatImage, inpainted: NDArray[np.bool_]
     ) -> StoredColors:
-        return without_flying_pixels(self._rays, offset, stored, disparity, inpainted, self._should_stop, 1)
+        return without_flying_pixels(self._rays, offset, stored, disparity, inpainted, 1)
 
     def _update(
         self,
@@ -98,26 +95,21 @@ class StoredViews:
         return ViewUpdate(v + round(t), u + round(s), colors, disparity, inpainted, is_final)
 
 
-def stored_colors(
-    rays: RaySet, offset: ViewOffset, view: RenderedView, is_hdr: bool, should_stop: ShouldStop
-) -> StoredColors:
+def stored_colors(rays: RaySet, offset: ViewOffset, view: RenderedView, is_hdr: bool) -> StoredColors:
     """The colours (H, W, 3) of a view made of the rays of a photo, as they are stored, without flying pixels.
 
-    Specks are told from what is stored: so a draft that was finished is what was made at once. Raises Cancelled once
-    should_stop is true.
+    Specks are told from what is stored: so a draft that was finished is what was made at once.
     """
-    stored = encode_for_storage(view.colors, is_hdr, should_stop, 1)
-    return without_flying_pixels(rays, offset, stored, view.disparity, view.inpainted, should_stop, 1)
+    stored = encode_for_storage(view.colors, is_hdr, 1)
+    return without_flying_pixels(rays, offset, stored, view.disparity, view.inpainted, 1)
 
 
-def encode_for_storage(
-    encoded: FloatImage, is_hdr: bool, should_stop: ShouldStop, threads: int | None = None
-) -> StoredColors:
+def encode_for_storage(encoded: FloatImage, is_hdr: bool, threads: int | None = None) -> StoredColors:
     """`stored_from_encoded`, in bands."""
     stored = np.empty(encoded.shape, np.float16 if is_hdr else np.uint8)
 
     def band(first: int, last: int) -> None:
         stored[first:last] = stored_from_encoded(encoded[first:last], is_hdr)
 
-    in_bands(band, image_size(encoded), should_stop, threads)
+    in_bands(band, image_size(encoded), threads)
     return stored

@@ -13,30 +13,28 @@ from iibr_core.inpainting.inpainter import Inpainter
 from iibr_core.rendering.ray_set import RaySet
 from iibr_core.rendering.rendered_view import RenderedView
 from iibr_core.rendering.renderer import open_renderer
-from iibr_core.runtime.tiling import ShouldStop, never
 from iibr_core.types import ViewOffset
 
 
 def render_outer_views(
     rays: RaySet,
     outer: Iterable[ViewOffset],
-    should_stop: ShouldStop = never,
     inpainter: Inpainter = fill_background,
     slots: int = 5,
 ) -> Iterator[tuple[ViewOffset, RenderedView]]:
     """Each of these views with its offset, in order; when it is yielded, what it disoccluded has joined the ray set.
 
     Weights are the closed form's in every quality: its disparity is smoother, and so is what is inpainted.
-    inpainter, slots: see `ViewSynthesis`. Taking a view raises Cancelled once should_stop is true.
+    inpainter, slots: see `ViewSynthesis`.
     """
-    with open_renderer(should_stop, slots=slots, inpainter=inpainter, reopens_holes=True) as renderer:
+    with open_renderer(slots=slots, inpainter=inpainter, reopens_holes=True) as renderer:
         for offset in outer:
             view = renderer.render(rays, offset)
             renderer.add_rays(rays, offset, view)
             yield offset, view
 
 
-def complete_ray_set(rays: RaySet, outer: Iterable[ViewOffset], should_stop: ShouldStop = never) -> None:
-    """`render_outer_views` for those who want the rays only. Raises Cancelled once should_stop is true."""
-    for _ in render_outer_views(rays, outer, should_stop):
+def complete_ray_set(rays: RaySet, outer: Iterable[ViewOffset]) -> None:
+    """`render_outer_views` for those who want the rays only."""
+    for _ in render_outer_views(rays, outer):
         pass

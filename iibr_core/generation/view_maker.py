@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from functools import partial
 from types import TracebackType
 
@@ -25,7 +25,7 @@ from iibr_core.types import FloatImage, Quality, ViewOffset
 class ViewMaker:
     """Makes views of one photo with one disparity map, in several qualities from one ray set; a context manager.
 
-    Raises Cancelled once should_stop is true, InputError where the trained weights cannot be read.
+    Raises InputError where the trained weights cannot be read.
     """
 
     def __init__(
@@ -34,7 +34,6 @@ class ViewMaker:
         disparity: FloatImage,
         offsets: Iterable[ViewOffset],
         qualities: Iterable[Quality],
-        should_stop: Callable[[], bool] = lambda: False,
         slots: int = 5,
         hypotheses: int = HYPOTHESES,
         every: bool = False,
@@ -44,16 +43,15 @@ class ViewMaker:
 
         slots, hypotheses, every: see ViewSynthesis. stages: that are on.
         """
-        self._should_stop, self._slots = should_stop, slots
+        self._slots = slots
         self.outer = outer_views(offsets)
         margins = outpainting_margins(disparity, self.outer) if stages.outpainting else NO_MARGINS
         farthest = farthest_views(self.outer)
-        self._rays = rays_of_photo(photo, disparity, farthest, len(self.outer), should_stop, margins, stages)
+        self._rays = rays_of_photo(photo, disparity, farthest, len(self.outer), margins, stages)
         self._inpainter = partial(fill_background, stages=stages)
         self._first: dict[ViewOffset, tuple[RenderedView, float]] = {}
         self._renderers: dict[Quality, Renderer] = {
             quality: open_renderer(
-                should_stop,
                 transformer_for(quality) if stages.ray_transformer else None,
                 every,
                 slots,
@@ -68,7 +66,7 @@ class ViewMaker:
         try:
             start = time.perf_counter()
             shared = self.outer if self._rays.stages.share_inpainted else ()
-            for offset, view in render_outer_views(self._rays, shared, self._should_stop, self._inpainter, self._slots):
+            for offset, view in render_outer_views(self._rays, shared, self._inpainter, self._slots):
                 self._first[offset] = self._postprocessed(offset, view), 1e3 * (time.perf_counter() - start)
                 start = time.perf_counter()
         except BaseException:
@@ -102,7 +100,7 @@ class ViewMaker:
         )
 
     def _postprocessed(self, offset: ViewOffset, view: RenderedView, threads: int | None = None) -> RenderedView:
-        return postprocessed_view(self._rays, offset, view, self._should_stop, threads)
+        return postprocessed_view(self._rays, offset, view, threads)
 
 
 def quantise_as_stored(colors: FloatImage) -> FloatImage:

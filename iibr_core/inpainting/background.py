@@ -17,7 +17,7 @@ from iibr_core.inpainting.nearest_known import MOST_PIECE_PIXELS, nearest_known
 from iibr_core.inpainting.patch_synthesis import copy_patches
 from iibr_core.runtime.kernels import kernel
 from iibr_core.runtime.scalars import nearest_pixel
-from iibr_core.runtime.tiling import ShouldStop, in_pieces, never, pieces_of
+from iibr_core.runtime.tiling import in_pieces, pieces_of
 from iibr_core.stages import ALL_STAGES, Stages
 from iibr_core.surfaces import EDGE_PX, SAME_SURFACE_PX, is_in_front, same_surface, step_of
 from iibr_core.types import FloatImage, ViewOffset
@@ -34,7 +34,6 @@ def fill_background(
     hole: NDArray[np.bool_],
     photo_disparity: FloatImage,
     offset: ViewOffset,
-    should_stop: ShouldStop = never,
     threads: int = 1,
     stages: Stages = ALL_STAGES,
 ) -> None:
@@ -43,9 +42,9 @@ def fill_background(
     photo_disparity: the centre view's. Of the nearest known pixels in sixteen directions those count that are possible
     there, weighted by 1 / distance. The colour is their mean, smoother the farther away they are, and gets their
     surface's fine texture. The disparity is that of one surface, the one with the most weight: a mean of several would
-    lie on none. A view that is all hole stays as it is. stages: that are on. Raises Cancelled once should_stop is true.
+    lie on none. A view that is all hole stays as it is. stages: that are on.
     """
-    _fill_view(colors, disparity, hole, photo_disparity, offset, max(map(abs, offset)), should_stop, threads, stages)
+    _fill_view(colors, disparity, hole, photo_disparity, offset, max(map(abs, offset)), threads, stages)
 
 
 def continue_farthest(
@@ -53,7 +52,6 @@ def continue_farthest(
     disparity: FloatImage,
     hole: NDArray[np.bool_],
     farthest_views: float,
-    should_stop: ShouldStop = never,
     stages: Stages = ALL_STAGES,
 ) -> None:
     """The same in a picture of which nobody knows what the photo hides there: the farthest surface around goes on.
@@ -61,7 +59,7 @@ def continue_farthest(
     farthest_views: surfaces are one that part by less than EDGE_PX so many view steps away. stages: that are on.
     """
     nothing_hides = np.full(disparity.shape, -np.inf, np.float32)
-    _fill_view(colors, disparity, hole, nothing_hides, ViewOffset(0.0, 0.0), farthest_views, should_stop, 1, stages)
+    _fill_view(colors, disparity, hole, nothing_hides, ViewOffset(0.0, 0.0), farthest_views, 1, stages)
 
 
 def goes_on_in_front(
@@ -69,19 +67,18 @@ def goes_on_in_front(
     hole: NDArray[np.bool_],
     photo_disparity: FloatImage,
     offset: ViewOffset,
-    should_stop: ShouldStop = never,
     threads: int = 1,
 ) -> NDArray[np.bool_]:
     """(H, W): where in a hole (H, W) of a view most of what may continue there from around it is in front of the view's
-    disparity (H, W) there. Raises Cancelled once should_stop is true.
+    disparity (H, W) there.
     """
-    pixels, _, known = nearest_known(hole, should_stop, threads)
+    pixels, _, known = nearest_known(hole, threads)
     in_front, one_surface = np.zeros_like(hole), step_of(EDGE_PX, max(map(abs, offset)))
     in_pieces(
         lambda part: _weigh_in_front(
             disparity, pixels[part], known[part], photo_disparity, offset.s, offset.t, one_surface, in_front
         ),
-        pieces_of(len(pixels), MOST_PIECE_PIXELS), should_stop, threads,
+        pieces_of(len(pixels), MOST_PIECE_PIXELS), threads,
     )  # fmt: skip
     return in_front
 
@@ -93,17 +90,16 @@ def _fill_view(
     photo_disparity: FloatImage,
     offset: ViewOffset,
     parallax: float,
-    should_stop: ShouldStop,
     threads: int,
     stages: Stages,
 ) -> None:
     """See `fill_background`. parallax: px that surfaces part by for each px of disparity."""
     one_surface = step_of(EDGE_PX, parallax)
-    pixels, number, known = nearest_known(hole, should_stop, threads)
+    pixels, number, known = nearest_known(hole, threads)
     reach, changed = np.empty(len(pixels), np.float32), np.empty((len(pixels), 3), np.float32)
 
     def run(step: Callable[[slice], None]) -> None:
-        in_pieces(step, pieces_of(len(pixels), MOST_PIECE_PIXELS), should_stop, threads)
+        in_pieces(step, pieces_of(len(pixels), MOST_PIECE_PIXELS), threads)
 
     def smooth(step_px: int) -> None:
         run(lambda part: _smooth(colors, hole, pixels[part], reach[part], step_px, changed[part]))
@@ -121,7 +117,7 @@ def _fill_view(
     for step_px in SMOOTH_STEPS_PX if stages.smooth_gaps else ():
         smooth(step_px)
     if stages.synthesise_patches:
-        copy_patches(colors, disparity, hole, pixels, number, one_surface, should_stop, threads)
+        copy_patches(colors, disparity, hole, pixels, number, one_surface, threads)
 
 
 def background_inpainter() -> Inpainter:

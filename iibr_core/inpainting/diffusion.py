@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from iibr_core.inpainting.background import fill_background
 from iibr_core.inpainting.inpainter import Inpainter, InpaintingAids
 from iibr_core.runtime.extras import require_extra
-from iibr_core.runtime.tiling import Cancelled, ShouldStop, never, raise_if_stopped
+from iibr_core.runtime.work import Cancelled, raise_if_stopped
 from iibr_core.types import FloatImage, ImageSize, InputError, ViewOffset, image_size
 
 LARGE_PX = 8
@@ -49,28 +49,27 @@ class DiffusionInpainter:
         hole: NDArray[np.bool_],
         photo_disparity: FloatImage,
         offset: ViewOffset,
-        should_stop: ShouldStop = never,
         threads: int = 1,
     ) -> None:
         """As `Inpainter` says; the model is asked only where a gap is large. Raises InputError where it fails."""
-        fill_background(colors, disparity, hole, photo_disparity, offset, should_stop, threads)
+        fill_background(colors, disparity, hole, photo_disparity, offset, threads)
         large = large_gaps(hole)
         if not large.any():
             return
         with self._turn:
-            colors[large] = self._paint(colors, large, should_stop)[large]
+            colors[large] = self._paint(colors, large)[large]
             if self._aids.estimate_depth is not None:
-                estimate = self._aids.estimate_depth(colors, should_stop)
+                estimate = self._aids.estimate_depth(colors)
                 align_in_gaps(estimate, disparity, hole, large)
 
-    def _paint(self, colors: FloatImage, large: NDArray[np.bool_], should_stop: ShouldStop) -> FloatImage:
+    def _paint(self, colors: FloatImage, large: NDArray[np.bool_]) -> FloatImage:
         """The view (H, W, 3) as the model paints it, at its size and back."""
         import torch
 
         size = self._size_for(image_size(colors))
         shown = _resized(torch.from_numpy(np.clip(colors, 0, 1)).permute(2, 0, 1)[None], size)
         mask = (_resized(torch.from_numpy(large.astype(np.float32))[None, None], size) > 0).float()
-        stop = partial(_before_layer, should_stop)
+        stop = partial(_before_layer)
         parts = (part for part in self._pipeline.components.values() if isinstance(part, torch.nn.Module))
         hooks = [layer.register_forward_pre_hook(stop) for part in parts for layer in part.modules()]
         try:
@@ -88,7 +87,7 @@ class DiffusionInpainter:
         finally:
             for hook in hooks:
                 hook.remove()
-        raise_if_stopped(should_stop)
+        raise_if_stopped()
         back = _resized(painted.float().cpu(), image_size(colors))[0].permute(1, 2, 0)
         return np.asarray(np.nan_to_num(back.numpy()).clip(0, 1), np.float32)
 
@@ -173,5 +172,5 @@ def _resized(image: Any, size: ImageSize) -> Any:
     return torch.nn.functional.interpolate(image, tuple(size), mode="bilinear", antialias=True)
 
 
-def _before_layer(should_stop: ShouldStop, *_: object) -> None:
-    raise_if_stopped(should_stop)
+def _before_layer(*_: object) -> None:
+    raise_if_stopped()

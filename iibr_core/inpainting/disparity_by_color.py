@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from iibr_core.inpainting.disparity_holes import fill_disparity_holes
 from iibr_core.runtime import tiling
 from iibr_core.runtime.kernels import kernel
-from iibr_core.runtime.tiling import ShouldStop, in_pieces, never, pieces_of
+from iibr_core.runtime.tiling import in_pieces, pieces_of
 from iibr_core.types import FloatImage
 
 
@@ -44,13 +44,12 @@ MOST_VOTE_ROUNDS = 64
 MOST_PIECE_PIXELS = 1 << 12
 
 
-def fill_disparity_by_color(photo: FloatImage, values: FloatImage, should_stop: ShouldStop = never) -> FloatImage:
+def fill_disparity_by_color(photo: FloatImage, values: FloatImage) -> FloatImage:
     """Replace the NaN of a disparity map (H, W) by the photo (H, W, 3), sRGB-encoded; known values stay as they are.
 
     From what is known inwards: each pixel takes the disparity for which most pixels around it vote, weighted by how
     near they are and how alike they look (a bilateral mode filter); what was filled votes in the next round. All
-    results lie within the known values. Raises ValueError if the sizes differ or nothing is known, Cancelled once
-    should_stop is true.
+    results lie within the known values. Raises ValueError if the sizes differ or nothing is known.
     """
     if photo.shape != (*values.shape, 3):
         raise ValueError(f"the photo is {photo.shape}, the disparity {values.shape}")
@@ -64,10 +63,10 @@ def fill_disparity_by_color(photo: FloatImage, values: FloatImage, should_stop: 
         if not len(pixels):
             return filled
         parts = [pixels[part] for part in pieces_of(len(pixels), MOST_PIECE_PIXELS)]
-        votes = in_pieces(lambda part: _vote(colors, filled, part), parts, should_stop, tiling.THREADS)
+        votes = in_pieces(lambda part: _vote(colors, filled, part), parts, tiling.THREADS)
         filled.reshape(-1)[pixels] = np.concatenate(votes)
         pixels = _unknown_around(filled, pixels, queued)
-    return fill_disparity_holes(filled, should_stop)
+    return fill_disparity_holes(filled)
 
 
 @kernel

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from iibr_core.runtime.kernels import kernel
-from iibr_core.runtime.tiling import ShouldStop, never, raise_if_stopped
+from iibr_core.runtime.work import raise_if_stopped
 from iibr_core.types import FloatImage
 
 # Lines through a pixel: falling diagonal, vertical, rising diagonal, horizontal; the length of one step along each. The
@@ -19,13 +19,13 @@ OPEN_LINE = 12
 SHORTNESS = 8
 
 
-def fill_disparity_holes(values: FloatImage, should_stop: ShouldStop = never) -> FloatImage:
+def fill_disparity_holes(values: FloatImage) -> FloatImage:
     """Replace the NaN of an (H, W) disparity map; known values stay as they are.
 
     On each of four lines through an unknown pixel, the farther (smaller) of the two nearest known values counts; the
     lines are averaged by 1 / span**8, span being the way across the hole. Lines on which the hole reaches the frame
     have one end only and count little. All results lie within the known values.
-    Raises ValueError if nothing is known, Cancelled once should_stop is true.
+    Raises ValueError if nothing is known.
     """
     filled = np.array(values, np.float32, order="C")
     unknown = np.isnan(filled)
@@ -34,12 +34,12 @@ def fill_disparity_holes(values: FloatImage, should_stop: ShouldStop = never) ->
     while (count := int(unknown.sum())) > 0:
         near = np.empty((2, count, 4), np.float32)
         steps = np.empty((2, count, 4), np.int32)
-        raise_if_stopped(should_stop)
+        raise_if_stopped()
         _nearest_before(filled, near[0], steps[0])
-        raise_if_stopped(should_stop)
+        raise_if_stopped()
         # The same, seen from the last pixel: everything that comes after.
         _nearest_before(filled[::-1, ::-1], near[1, ::-1], steps[1, ::-1])
-        raise_if_stopped(should_stop)
+        raise_if_stopped()
         filled[unknown] = _farther_side(near, steps, np.array(STEP_LENGTHS))
         unknown = np.isnan(filled)  # pixels with no known value on any line; the second round reaches them
     return filled

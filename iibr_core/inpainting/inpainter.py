@@ -9,12 +9,11 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.runtime.tiling import ShouldStop, never
 from iibr_core.types import FloatImage, ReportProgress, ViewOffset, ignore_progress
 
-EstimateDepth = Callable[[FloatImage, ShouldStop], FloatImage]
+EstimateDepth = Callable[[FloatImage], FloatImage]
 """Of colours (H, W, 3), sRGB-encoded: inverse depth (H, W), any scale and offset, larger is nearer. Raises InputError
-where it cannot, Cancelled once should_stop is true.
+where it cannot.
 """
 
 
@@ -36,13 +35,11 @@ class Inpainter(Protocol):
         hole: NDArray[np.bool_],
         photo_disparity: FloatImage,
         offset: ViewOffset,
-        should_stop: ShouldStop = never,
         threads: int = 1,
     ) -> None:
         """Write colors (H, W, 3), sRGB-encoded, and disparity (H, W), px per view step, where hole (H, W) is True.
 
         Nothing else of the view may change; what stands in its holes before means nothing. All that is written is
         finite. photo_disparity (H, W): the centre view's, which tells what could be hidden there. offset: of this view.
-        threads: run so many at most; the result is the same for any number. Raises Cancelled once should_stop is true,
-        which is asked every few milliseconds.
+        threads: run so many at most; the result is the same for any number. Raises which is asked every few milliseconds.
         """

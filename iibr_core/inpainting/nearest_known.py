@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.runtime.kernels import kernel
-from iibr_core.runtime.tiling import ShouldStop, in_bands, in_pieces
+from iibr_core.runtime.tiling import in_bands, in_pieces
 from iibr_core.types import image_size
 
 DIRECTIONS = np.array(
@@ -31,21 +31,21 @@ class AroundHoles(NamedTuple):
     known: NDArray[np.int32]
 
 
-def nearest_known(hole: NDArray[np.bool_], should_stop: ShouldStop, threads: int) -> AroundHoles:
-    """What is around holes (H, W). Raises Cancelled once should_stop is true."""
+def nearest_known(hole: NDArray[np.bool_], threads: int) -> AroundHoles:
+    """What is around holes (H, W)."""
     size = image_size(hole)
 
     def band(first: int, last: int) -> NDArray[np.int64]:
         return first * size.width + np.flatnonzero(hole[first:last])
 
-    pixels, number = np.concatenate(in_bands(band, size, should_stop, threads)), np.empty(size, np.int32)
+    pixels, number = np.concatenate(in_bands(band, size, threads)), np.empty(size, np.int32)
     number_pixels(pixels, number)
     known = np.empty((len(pixels), len(DIRECTIONS)), np.int32)
 
     def look(k: int) -> None:
         _nearest_known_towards(hole, pixels, number, *DIRECTIONS[k], known, k)
 
-    in_pieces(look, range(len(DIRECTIONS)), should_stop, threads)
+    in_pieces(look, range(len(DIRECTIONS)), threads)
     return AroundHoles(pixels, number, known)
 
 

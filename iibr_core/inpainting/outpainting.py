@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from iibr_core.runtime.kernels import kernel
 from iibr_core.runtime.scalars import nearest_pixel
-from iibr_core.runtime.tiling import ShouldStop, in_bands, never
+from iibr_core.runtime.tiling import in_bands
 from iibr_core.stages import ALL_STAGES, Stages
 from iibr_core.types import FloatImage, ImageSize, Margins, image_size
 
@@ -40,12 +40,11 @@ def outpaint(
     colors: FloatImage,
     disparity: FloatImage,
     margins: Margins,
-    should_stop: ShouldStop = never,
     stages: Stages = ALL_STAGES,
 ) -> tuple[FloatImage, FloatImage]:
     """The photo's colors (H, W, 3) and disparity (H, W) in the middle of larger ones, which are filled around it.
 
-    margins: so many pixels on each side. stages: that are on. Raises Cancelled once should_stop is true.
+    margins: so many pixels on each side. stages: that are on.
     """
     size = image_size(disparity)
     if not any(margins):
@@ -62,7 +61,7 @@ def outpaint(
         if stages.outpainted_lines:
             _follow_lines(size.height, size.width, frame, means, lines, margins.top, margins.left, first, last, grown)
 
-    in_bands(band, larger, should_stop)
+    in_bands(band, larger)
     return grown, surfaces
 
 

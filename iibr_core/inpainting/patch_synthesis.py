@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.runtime.kernels import kernel
-from iibr_core.runtime.tiling import ShouldStop, in_pieces, pieces_of
+from iibr_core.runtime.tiling import in_pieces, pieces_of
 from iibr_core.surfaces import same_surface
 from iibr_core.types import FloatImage, ImageSize, image_size
 
@@ -45,12 +45,11 @@ def copy_patches(
     pixels: NDArray[np.int64],
     number: NDArray[np.int32],
     one_surface: float,
-    should_stop: ShouldStop,
     threads: int,
 ) -> None:
     """Give the pixels of holes (H, W), flat indices (N,), which colors (H, W, 3) hold as smoothly filled, the looks of
     their surface. number: see `number_pixels`. Surfaces are one whose disparities (H, W) differ by one_surface at most.
-    Raises Cancelled once should_stop is true.
+
     """
     smooth = np.take(colors.reshape(-1, 3), pixels, axis=0)
     trust = np.zeros(len(pixels), np.float32)
@@ -58,13 +57,13 @@ def copy_patches(
     for blocks in _blocks_apart(pixels, image_size(hole)):
         in_pieces(
             lambda block: _copy_block(colors, disparity, hole, number, *block, np.float32(one_surface), trust, shown),
-            blocks, should_stop, threads,
+            blocks, threads,
         )  # fmt: skip
     counts = shown[:, 3:]
     change = np.where(counts > 0, shown[:, :3] / np.maximum(counts, 1) - smooth, np.float32(0.0))
     in_pieces(
         lambda part: _blend(hole, number, pixels, part.start, smooth, change, trust, colors),
-        pieces_of(len(pixels), PATCH_BLOCK_PX**2), should_stop, threads,
+        pieces_of(len(pixels), PATCH_BLOCK_PX**2), threads,
     )  # fmt: skip
 
 

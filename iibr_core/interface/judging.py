@@ -14,7 +14,7 @@ from iibr_core.evaluation.metrics import flip, psnr, ssim
 from iibr_core.evaluation.results import EvaluationResult
 from iibr_core.interface.encoded_pictures import encoded
 from iibr_core.runtime.extras import require_extra
-from iibr_core.runtime.tiling import ShouldStop, never
+from iibr_core.runtime.work import ShouldStop, never, stoppable
 from iibr_core.stages import ALL_STAGES, Stages
 from iibr_core.types import InputError, ReportProgress, ignore_progress
 
@@ -54,4 +54,5 @@ def evaluate(
     """
     wanted = evaluate_scene.Options(stages=stages, **options)
     scenes = find_scenes(Path(folder))
-    return [one for scene in scenes for one in evaluate_scene.evaluate(scene, wanted, report_progress, should_stop)]
+    with stoppable(should_stop):
+        return [one for scene in scenes for one in evaluate_scene.evaluate(scene, wanted, report_progress)]

@@ -27,7 +27,7 @@ from iibr_core.generation.view_maker import ViewMaker
 from iibr_core.inpainting.registry import DEFAULT_INPAINTER
 from iibr_core.interface.encoded_pictures import photo_of
 from iibr_core.interface.fields import LightField, MakeView, View, gather
-from iibr_core.runtime.tiling import ShouldStop, never, raise_if_stopped
+from iibr_core.runtime.work import ShouldStop, never, raise_if_stopped, stoppable
 from iibr_core.scenes.dense import read_dense
 from iibr_core.scenes.loaded_photo import LoadedPhoto, load_photo, photo_of_arrays
 from iibr_core.scenes.making import make_plan, views_of_photo
@@ -91,8 +91,11 @@ class Scene(ABC):
         done. Raises InputError where an option means nothing or memory does not suffice, Cancelled once should_stop is
         true.
         """
-        made = self._make(grid, options, should_stop)
-        return gather(_told(made, should_stop, report_progress), made.grid, self.focal_px, self.name, made.view_between)
+        with stoppable(should_stop):
+            made = self._make(grid, options)
+        return gather(
+            _watched(made, should_stop, report_progress), made.grid, self.focal_px, self.name, made.view_between
+        )
 
     def views(
         self,
@@ -102,10 +105,12 @@ class Scene(ABC):
         **options: Unpack[ViewOptions],
     ) -> Iterator[View]:
         """Yield every view once, the middle one first; none is kept. Arguments of `light_field`."""
-        return _told(self._make(grid, options, should_stop), should_stop, report_progress)
+        with stoppable(should_stop):
+            made = self._make(grid, options)
+        return _watched(made, should_stop, report_progress)
 
     @abstractmethod
-    def _make(self, grid: Grid, options: ViewOptions, should_stop: ShouldStop) -> _Making:
+    def _make(self, grid: Grid, options: ViewOptions) -> _Making:
         """Begin to make views. Raises InputError."""
 
 
@@ -119,13 +124,16 @@ class _Making:
     doing: str
 
 
-def _told(made: _Making, should_stop: ShouldStop, report_progress: ReportProgress) -> Iterator[View]:
-    """The views, telling how far they are. Raises Cancelled once should_stop is true: what makes them ends then."""
-    for view in made.views:
-        raise_if_stopped(should_stop)
+def _watched(made: _Making, should_stop: ShouldStop, report_progress: ReportProgress) -> Iterator[View]:
+    """Yield the views and report progress. Raises Cancelled once should_stop is true."""
+    while True:
+        with stoppable(should_stop):
+            view = next(made.views, None)
+            raise_if_stopped()
+        if view is None:
+            return
         report_progress(view.share, 1.0, made.doing)
         yield view
-    raise_if_stopped(should_stop)
 
 
 class PhotoScene(Scene):
@@ -160,9 +168,9 @@ class PhotoScene(Scene):
         inpaint, is_literal = _inpainting(options), parallax == "literal"
         return replace(self._source, grid=shape, quality=quality, inpaint=inpaint, is_literal=is_literal)
 
-    def _make(self, grid: Grid, options: ViewOptions, should_stop: ShouldStop) -> _Making:
+    def _make(self, grid: Grid, options: ViewOptions) -> _Making:
         plan = self.plan(grid, **options)
-        views = views_of_photo(self._source_for(grid, options), self._loaded, plan, should_stop)
+        views = views_of_photo(self._source_for(grid, options), self._loaded, plan)
         values = plan.field_disparity(self._loaded.disparity).values
         return _Making(plan.grid, views, _ViewsBetween(self.photo, values, plan), "making views")
 
@@ -176,12 +184,12 @@ class FieldScene(Scene):
         self.name, self.notes, self.focal_px = found.name, found.notes, found.focal_px or float(self.photo.shape[1])
         self.depth_source = "the light field" if found.disparity else "none"
 
-    def _make(self, grid: Grid, options: ViewOptions, should_stop: ShouldStop) -> _Making:
+    def _make(self, grid: Grid, options: ViewOptions) -> _Making:
         _require_known(options, ("inpaint",))
         wanted = _grid_shape(grid) or self._grid
         if wanted == self._grid:
             return _Making(wanted, read_views(self._field)[1], None, "reading views")
-        dense = read_dense(self._field, wanted, _inpainting(options), should_stop)
+        dense = read_dense(self._field, wanted, _inpainting(options))
         return _Making(wanted, dense.views, None, "making views")
 
 
@@ -203,7 +211,8 @@ def open(
     if is_light_field(path):
         return FieldScene(open_light_field(path))
     source = Source(str(path), _choice_of(depth, refine), max_pixels=max_pixels)
-    return PhotoScene(load_photo(source, should_stop, report_progress), source)
+    with stoppable(should_stop):
+        return PhotoScene(load_photo(source, report_progress), source)
 
 
 def from_arrays(
@@ -240,10 +249,12 @@ def estimate_depth(
     if model == "guess":
         from iibr_core.depth.pictorial_cues import estimate_from_cues
 
-        return estimate_from_cues(given, should_stop).values
+        with stoppable(should_stop):
+            return estimate_from_cues(given).values
     local = model_to_use(DepthChoice("model", model=None if model is None else str(model)))
     assert local is not None, "what was asked for is there, or was refused"
-    estimate = estimate_with(local, given, should_stop, report_progress)
+    with stoppable(should_stop):
+        estimate = estimate_with(local, given, report_progress)
     values = values_of(estimate)
     return map_at_size(np.reciprocal(values) if isinstance(estimate, MetricDepth) else values, given.size)
 

@@ -18,7 +18,7 @@ from iibr_core.rendering.ray_set import HIGHEST_LEVEL, RaySet
 from iibr_core.rendering.rendered_view import RenderedView
 from iibr_core.runtime.kernels import kernel
 from iibr_core.runtime.scalars import nearest_pixel
-from iibr_core.runtime.tiling import ShouldStop, in_bands, never
+from iibr_core.runtime.tiling import in_bands
 from iibr_core.surfaces import SAME_SURFACE_PX
 from iibr_core.types import FloatImage, ViewOffset, image_size
 
@@ -33,14 +33,11 @@ TEARING_GAP_PX = 2.0
 """Rays are torn off by so wide a step of the photo. With surfaces.EDGE_PX exact maps lose 0.04 dB: thin things go."""
 
 
-def measure_detail(photo: FloatImage, should_stop: ShouldStop = never) -> FloatImage:
-    """(H, W): how far each pixel of a photo (H, W, 3) is, in any channel, from the median of its 3x3 pixels.
-
-    Raises Cancelled once should_stop is true.
-    """
+def measure_detail(photo: FloatImage) -> FloatImage:
+    """(H, W): how far each pixel of a photo (H, W, 3) is, in any channel, from the median of its 3x3 pixels."""
     detail = np.empty(photo.shape[:2], np.float32)
     rows = np.pad(photo, ((1, 1), (1, 1), (0, 0)), "edge").reshape(len(photo) + 2, -1)
-    in_bands(lambda first, last: _measure(rows, first, last, detail), image_size(detail), should_stop)
+    in_bands(lambda first, last: _measure(rows, first, last, detail), image_size(detail))
     return detail
 
 
@@ -50,13 +47,12 @@ def without_flying_pixels(
     colors: Colors,
     disparity: FloatImage,
     inpainted: NDArray[np.bool_],
-    should_stop: ShouldStop = never,
     threads: int | None = None,
 ) -> Colors:
     """The colours (H, W, 3), sRGB-encoded, as floats or as they are stored, of a view made of the rays of a photo,
     without its flying pixels.
 
-    disparity, inpainted (H, W): as in `RenderedView`. threads: None for all. Raises Cancelled once should_stop is true.
+    disparity, inpainted (H, W): as in `RenderedView`. threads: None for all.
     """
     if not rays.stages.remove_flying_pixels:
         return colors
@@ -70,7 +66,7 @@ def without_flying_pixels(
             shown, white, disparity, inpainted, detail, edge_level, limit,
             rays.margins.top, rays.margins.left, *offset, first, last, replaced,
         ),
-        image_size(disparity), should_stop, threads,
+        image_size(disparity), threads,
     )  # fmt: skip
     return cast(Colors, replaced.astype(colors.dtype, copy=False))
 
@@ -79,11 +75,10 @@ def postprocessed_view(
     rays: RaySet,
     offset: ViewOffset,
     view: RenderedView,
-    should_stop: ShouldStop = never,
     threads: int | None = None,
 ) -> RenderedView:
     """A view made of the rays of a photo, without its flying pixels. Arguments as of `without_flying_pixels`."""
-    colors = without_flying_pixels(rays, offset, view.colors, view.disparity, view.inpainted, should_stop, threads)
+    colors = without_flying_pixels(rays, offset, view.colors, view.disparity, view.inpainted, threads)
     return replace(view, colors=colors)
 
 

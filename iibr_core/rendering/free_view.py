@@ -20,7 +20,7 @@ from iibr_core.rendering.rendered_view import RenderedView
 from iibr_core.rendering.resampling import SOLE, cubic, resample, resample_inpainted
 from iibr_core.runtime.kernels import kernel
 from iibr_core.runtime.scalars import linear_scalar, srgb_scalar
-from iibr_core.runtime.tiling import MOST_BAND_PIXELS, ShouldStop, in_bands, never
+from iibr_core.runtime.tiling import MOST_BAND_PIXELS, in_bands
 from iibr_core.surfaces import SAME_SURFACE_PX, same_surface, step_of
 from iibr_core.types import Camera, ImageSize, Margins
 
@@ -57,12 +57,11 @@ def render_free_view(
     size: ImageSize,
     frame: Margins,
     rounding_step: float = 0.0,
-    should_stop: ShouldStop = never,
 ) -> RenderedView:
     """The view of a camera with pictures of a size, its holes filled.
 
     target_from_rays: see `target_from_photo`. frame: so far within the ray set's images the photo's own frame lies: all
-    beyond counts as inpainted. rounding_step: what disparity is rounded to. Raises Cancelled once should_stop is true.
+    beyond counts as inpainted. rounding_step: what disparity is rounded to.
     """
     view = RenderedView(
         np.zeros((*size, 3), np.float32), np.zeros(size, np.float32), np.zeros(size, np.bool_), np.zeros(size, np.bool_)
@@ -70,7 +69,7 @@ def render_free_view(
     matrices = [target_from_rays @ _photo_from_source(offset) for offset in rays.arrays.offsets]
     drawing = [tuple(map(float, matrix.ravel())) for matrix in matrices]
     looking_up = np.stack([np.linalg.inv(matrix).ravel() for matrix in matrices])
-    landing = [rows_landed_on(rays, k, matrix, should_stop) for k, matrix in enumerate(drawing)]
+    landing = [rows_landed_on(rays, k, matrix) for k, matrix in enumerate(drawing)]
     surface, sealed_step = step_of(SAME_SURFACE_PX, rays.farthest_views), SEALED_STEPS * rounding_step
 
     def band(first: int, last: int) -> None:
@@ -80,9 +79,9 @@ def render_free_view(
             view.colors, view.disparity, view.occluded, view.inpainted,
         )  # fmt: skip
 
-    in_bands(band, size, should_stop, most_pixels=MOST_BAND_PIXELS // SAMPLES**2)
+    in_bands(band, size, most_pixels=MOST_BAND_PIXELS // SAMPLES**2)
     if view.occluded.any():
-        continue_farthest(view.colors, view.disparity, view.occluded, rays.farthest_views, should_stop, rays.stages)
+        continue_farthest(view.colors, view.disparity, view.occluded, rays.farthest_views, rays.stages)
     return view
 
 

@@ -15,7 +15,7 @@ from iibr_core.rendering.ray_cells import CELL_PX
 from iibr_core.rendering.ray_set import RaySet
 from iibr_core.rendering.slope_connectivity import BELOW, RIGHT
 from iibr_core.runtime.kernels import kernel
-from iibr_core.runtime.tiling import ShouldStop, in_bands
+from iibr_core.runtime.tiling import in_bands
 from iibr_core.surfaces import same_surface
 from iibr_core.types import FloatImage, ImageSize
 
@@ -33,16 +33,14 @@ CORNERS = np.array([(-1, -1), (-1, 1), (1, 1), (1, -1)])
 """(y, x) of a pixel's corners, clockwise."""
 
 
-def rows_landed_on(rays: RaySet, k: int, matrix: tuple[float, ...], should_stop: ShouldStop) -> FloatImage:
+def rows_landed_on(rays: RaySet, k: int, matrix: tuple[float, ...]) -> FloatImage:
     """(M, N, 2): the first and last target row that the rays in each cell of image k may land on, (inf, -inf) without
     rays.
     """
     cells = rays.cells
     landing = np.empty((*cells.low.shape[1:], 2), np.float32)
     size = ImageSize(*cells.low.shape[1:])
-    in_bands(
-        lambda first, last: _land_cells(cells.low[k], cells.high[k], matrix, first, last, landing), size, should_stop
-    )
+    in_bands(lambda first, last: _land_cells(cells.low[k], cells.high[k], matrix, first, last, landing), size)
     return landing
 
 

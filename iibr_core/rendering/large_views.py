@@ -20,7 +20,6 @@ from iibr_core.rendering.ray_set import RaySet
 from iibr_core.rendering.rendered_view import RenderedView
 from iibr_core.rendering.renderer import Renderer
 from iibr_core.runtime.kernels import kernel
-from iibr_core.runtime.tiling import ShouldStop, never
 from iibr_core.surfaces import SAME_SURFACE_PX, same_surface
 from iibr_core.types import FloatImage, ImageSize, ViewOffset, image_size
 
@@ -101,14 +100,14 @@ class LargePhoto:
         """The same with what was inpainted."""
         return replace(self, fills=fills)
 
-    def rays(self, part: Part, offsets: Sequence[ViewOffset], should_stop: ShouldStop = never) -> RaySet:
-        """The rays of a part of it that may show from these offsets. Raises Cancelled once should_stop is true."""
+    def rays(self, part: Part, offsets: Sequence[ViewOffset]) -> RaySet:
+        """The rays of a part of it that may show from these offsets."""
         farthest_views = max([1.0, *(abs(axis) for offset in offsets for axis in offset)])
         fills = [] if self.fills is None else _fills_in(self.fills, self.size, part, offsets)
-        rays = rays_of_photo(*self._rays_of_frame(part), farthest_views, len(fills), should_stop)
+        rays = rays_of_photo(*self._rays_of_frame(part), farthest_views, len(fills))
         for k in fills:
             assert self.fills is not None
-            rays.add(ViewOffset(*self.fills.arrays.offsets[k]), *_enlarge(self.fills, k, self.size, part), should_stop)
+            rays.add(ViewOffset(*self.fills.arrays.offsets[k]), *_enlarge(self.fills, k, self.size, part))
         return rays
 
     @property
@@ -134,18 +133,18 @@ class LargePhoto:
 
 
 def views_of_tile(
-    photo: LargePhoto, tile: Part, offsets: list[ViewOffset], renderer: Renderer, should_stop: ShouldStop = never
+    photo: LargePhoto, tile: Part, offsets: list[ViewOffset], renderer: Renderer
 ) -> Iterator[RenderedView]:
     """What a tile of the photo shows from these offsets, one view after the other.
 
-    Raises Cancelled once should_stop is true, ValueError for offsets that are not finite.
+    Raises ValueError for offsets that are not finite.
     """
     farthest = max([1.0, *(abs(axis) for offset in offsets for axis in offset)])
     parallax_px = farthest * photo.greatest_disparity
     around = tile.grown(TILE_MARGIN_PX + math.ceil(min(parallax_px, max(photo.size))), photo.bounds)
-    rays, shown = photo.rays(around, offsets, should_stop), tile.inside(around).slices
+    rays, shown = photo.rays(around, offsets), tile.inside(around).slices
     for offset in offsets:
-        view = postprocessed_view(rays, offset, renderer.render(rays, offset), should_stop)
+        view = postprocessed_view(rays, offset, renderer.render(rays, offset))
         # Copies: a part is laid out like a whole view, and kernels need no second kind.
         yield RenderedView(
             view.colors[shown].copy(),

@@ -15,7 +15,7 @@ from iibr_core.rendering.optics import Optics
 from iibr_core.rendering.resampling import KEYS_A, keys_weights
 from iibr_core.runtime.kernels import kernel
 from iibr_core.runtime.scalars import linear_scalar
-from iibr_core.runtime.tiling import ShouldStop, in_bands, never
+from iibr_core.runtime.tiling import in_bands
 from iibr_core.types import FloatImage, ImageSize, ViewOffset
 
 ON_SURFACE_ROUNDS = 5
@@ -41,16 +41,14 @@ class LensSum:
         colors: FloatImage,
         weight: float = 1.0,
         disparity: FloatImage | None = None,
-        should_stop: ShouldStop = never,
     ) -> None:
         """Add the view (H, W, 3), sRGB-encoded, of a camera at an offset in view steps from the centre view.
 
-        disparity: of the view (H, W), px per view step; needed where the optics have a focus range. Raises Cancelled
-        once should_stop is true.
+        disparity: of the view (H, W), px per view step; needed where the optics have a focus range. Raises.
         """
         optics = self._optics
         light = np.empty(colors.shape, np.float32)
-        in_bands(lambda first, last: _linear_rows(colors, self._gain, first, last, light), self._size, should_stop)
+        in_bands(lambda first, last: _linear_rows(colors, self._gain, first, last, light), self._size)
         camera = offset.t - optics.eye.t, offset.s - optics.eye.s
         focus_range = 0.0 if disparity is None else max(optics.focus_range, 0.0)
         surface = np.zeros((1, 1), np.float32) if disparity is None else disparity
@@ -58,7 +56,7 @@ class LensSum:
         shear = partial(
             _add_sheared, light, surface, camera, weight, optics.focus_disparity, optics.focus_tilt, focus_range, barrel
         )
-        in_bands(lambda first, last: shear(first, last, self._sum, self._weights), self._size, should_stop)
+        in_bands(lambda first, last: shear(first, last, self._sum, self._weights), self._size)
 
     def light(self) -> FloatImage:
         """Linear light (H, W, 3) of the views added so far, exposed; not cut off at white."""

@@ -14,7 +14,7 @@ import numpy as np
 from iibr_core.inpainting.disparity_by_color import nearness
 from iibr_core.runtime.kernels import kernel
 from iibr_core.runtime.scalars import linear_scalar, srgb_scalar
-from iibr_core.runtime.tiling import ShouldStop, in_bands, never
+from iibr_core.runtime.tiling import in_bands
 from iibr_core.surfaces import SLOPE_SHARE, is_in_front, same_surface
 from iibr_core.types import FloatImage, image_size
 
@@ -37,13 +37,13 @@ STRAIGHT = np.array([(-1, 0), (0, -1), (0, 1), (1, 0)])
 
 
 def split_mixed_pixels(
-    colors: FloatImage, disparity: FloatImage, edge_step: float, should_stop: ShouldStop = never
+    colors: FloatImage, disparity: FloatImage, edge_step: float
 ) -> tuple[FloatImage, FloatImage, FloatImage, FloatImage]:
     """The photo's own rays and its fringe, for a photo (H, W, 3), its disparity (H, W) and the step that counts as a
     depth edge.
 
     Returns (own colours (H, W, 3), fringe colours (H, W, 3), fringe disparity (H, W), fringe coverage (H, W)); where
-    there is no fringe its coverage is 0 and its disparity NaN. Raises Cancelled once should_stop is true.
+    there is no fringe its coverage is 0 and its disparity NaN.
     """
     own, fringe = np.empty_like(colors, order="C"), np.empty_like(colors, order="C")
     fringe_disparity, coverage = np.empty_like(disparity, order="C"), np.empty_like(disparity, order="C")
@@ -54,22 +54,20 @@ def split_mixed_pixels(
         fringe_disparity[first:last], coverage[first:last] = np.nan, 0.0
         _split_rows(colors, disparity, is_edge_band, edge_step, first, last, own, fringe, fringe_disparity, coverage)
 
-    in_bands(lambda first, last: _mark_edge_bands(disparity, edge_step, first, last, is_edge_band), size, should_stop)
-    in_bands(band, size, should_stop)
+    in_bands(lambda first, last: _mark_edge_bands(disparity, edge_step, first, last, is_edge_band), size)
+    in_bands(band, size)
     return own, fringe, fringe_disparity, coverage
 
 
-def move_with_foreground(
-    disparity: FloatImage, steps: tuple[float, float], should_stop: ShouldStop = never
-) -> FloatImage:
+def move_with_foreground(disparity: FloatImage, steps: tuple[float, float]) -> FloatImage:
     """Disparity (H, W) with that of the foreground where pixels lie just behind a small step of it: above the first of
     steps, up to the second.
 
     Such pixels show both surfaces, too. Moved with the foreground, their light stays as it is beside it; surfaces that
-    small steps part are hardly moved against each other. Raises Cancelled once should_stop is true.
+    small steps part are hardly moved against each other.
     """
     moved = np.empty_like(disparity, order="C")
-    in_bands(lambda first, last: _move(disparity, *steps, first, last, moved), image_size(disparity), should_stop)
+    in_bands(lambda first, last: _move(disparity, *steps, first, last, moved), image_size(disparity))
     return moved
 
 

@@ -17,7 +17,7 @@ from iibr_core.rendering.rendered_view import RaysBehind
 from iibr_core.rendering.slope_connectivity import BELOW, RIGHT, connect_rays, connected_either_way
 from iibr_core.runtime.kernels import kernel
 from iibr_core.runtime.scalars import nearest_pixel
-from iibr_core.runtime.tiling import ShouldStop, in_bands, never
+from iibr_core.runtime.tiling import in_bands
 from iibr_core.stages import ALL_STAGES, Stages
 from iibr_core.surfaces import EDGE_PX, SMOOTH_SHARE, is_in_front, step_of
 from iibr_core.types import FloatImage, ImageSize, Margins, ViewOffset, image_size
@@ -93,12 +93,11 @@ class RaySet:
         colors: FloatImage,
         disparity: FloatImage,
         coverage: FloatImage | NDArray[np.bool_],
-        should_stop: ShouldStop = never,
         behind: RaysBehind | None = None,
     ) -> None:
         """Add the rays of one image (H, W), or of one view. All but the photo's, which come first, are inpainted: those
         in front of what the photo shows are left out, as it would show them, and those beside them. behind: of a view,
-        what counts instead at some pixels. Raises Cancelled once should_stop is true; then nothing is added.
+        what counts instead at some pixels. Raises; then nothing is added.
         """
         k, connected, cells = self._count, np.zeros(self.size, np.uint8), self._cells_room
         self._write(k, colors, disparity, coverage, behind)
@@ -106,7 +105,7 @@ class RaySet:
         if k == 0:
             self.photo_disparity = np.ascontiguousarray(self.in_view(disparity))
         if k == 0 and self.stages.connect_slopes:
-            self.connected = connected = connect_rays(disparity, self._surface_step, should_stop)
+            self.connected = connected = connect_rays(disparity, self._surface_step)
             if connected.any():
                 self._steep = over_cells(np.logical_or, connected_either_way(connected))
         if k > 0 and any(offset) and self.stages.leave_out_in_front:
@@ -119,7 +118,7 @@ class RaySet:
             if k == 0:
                 largest_steps(disparity, first, last, cells.step)
 
-        in_bands(band, self.size, should_stop)
+        in_bands(band, self.size)
         cells.row_ranges[k, :, 0], cells.row_ranges[k, :, 1] = cells.low[k].min(axis=1), cells.high[k].max(axis=1)
         self._room.offsets[k] = offset
         self._count += 1

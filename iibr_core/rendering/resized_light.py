@@ -7,19 +7,17 @@ import math
 import numpy as np
 
 from iibr_core.runtime.kernels import kernel
-from iibr_core.runtime.tiling import ShouldStop, in_bands, never
+from iibr_core.runtime.tiling import in_bands
 from iibr_core.types import FloatImage, ImageSize, image_size
 
 
 def mean_of_areas(
     light: FloatImage,
     size: ImageSize,
-    should_stop: ShouldStop = never,
     area: tuple[float, float, float, float] | None = None,
 ) -> FloatImage:
     """Light (h, w, 3) at another (height, width): the mean over each pixel's area; the same array where it has that
-    size. area: what of the light it shows, top, left, height and width in pixels of it; None: all. Raises Cancelled
-    once should_stop is true.
+    size. area: what of the light it shows, top, left, height and width in pixels of it; None: all. Raises.
     """
     everything = 0.0, 0.0, float(light.shape[0]), float(light.shape[1])
     top, left, height, width = area or everything
@@ -30,7 +28,6 @@ def mean_of_areas(
     in_bands(
         lambda first, last: _mean_of_areas(light, -top, -left, step_y, step_x, 0, 0, first, last, means),
         size,
-        should_stop,
     )
     return means
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.runtime.kernels import kernel
-from iibr_core.runtime.tiling import ShouldStop, in_bands, never
+from iibr_core.runtime.tiling import in_bands
 from iibr_core.surfaces import SLOPE_SHARE
 from iibr_core.types import FloatImage, image_size
 
@@ -24,16 +24,12 @@ MINIMUM_RUN = 3
 """So many steps beyond it, on one side, must follow the step between two rays, each about as large as the last."""
 
 
-def connect_rays(disparity: FloatImage, surface_step: float, should_stop: ShouldStop = never) -> NDArray[np.uint8]:
-    """(H, W): bits RIGHT and BELOW, of steps larger than STEEP_SHARE of surface_step only: others need no proof.
-
-    Raises Cancelled once should_stop is true.
-    """
+def connect_rays(disparity: FloatImage, surface_step: float) -> NDArray[np.uint8]:
+    """(H, W): bits RIGHT and BELOW, of steps larger than STEEP_SHARE of surface_step only: others need no proof."""
     connected = np.zeros(disparity.shape, np.uint8)
     in_bands(
         lambda first, last: _connect(disparity, STEEP_SHARE * surface_step, first, last, connected),
         image_size(disparity),
-        should_stop,
     )
     return connected
 

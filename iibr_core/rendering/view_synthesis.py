@@ -31,7 +31,8 @@ from iibr_core.rendering.visibility_weights import (
 )
 from iibr_core.runtime import tiling
 from iibr_core.runtime.kernels import kernel
-from iibr_core.runtime.tiling import ShouldStop, in_bands, never, raise_if_stopped
+from iibr_core.runtime.tiling import in_bands
+from iibr_core.runtime.work import in_this_job, raise_if_stopped
 from iibr_core.types import FloatImage, ViewOffset
 
 EVERY_COST = 8
@@ -46,7 +47,6 @@ class ViewSynthesis:
 
     def __init__(
         self,
-        should_stop: ShouldStop = never,
         transformer: Callable[[AmbiguousRays], FloatImage] | None = None,
         every: bool = False,
         slots: int = 5,
@@ -61,7 +61,7 @@ class ViewSynthesis:
         transformer's K. inpainter: fills what no source shows. reopens_holes: and where only what was inpainted behind
         one of the photo's surfaces shows through a hole in that surface.
         """
-        self._asked_to_stop, self._is_over = should_stop, False
+        self._is_over = False
         self._transformer, self._every = transformer, every
         self._slots, self._hypotheses, self._keeps_entropy = slots, hypotheses, keeps_entropy
         self._inpainter, self._reopens_holes = inpainter, reopens_holes
@@ -80,7 +80,7 @@ class ViewSynthesis:
     def add_rays(self, rays: RaySet, offset: ViewOffset, view: RenderedView) -> None:
         """See `Renderer`, as for all that follow."""
         if view.has_filled_rays:
-            rays.add(offset, view.colors, view.disparity, view.occluded, self._should_stop, view.behind)
+            rays.add(offset, view.colors, view.disparity, view.occluded, view.behind)
 
     def render(self, rays: RaySet, offset: ViewOffset, alone: bool = False) -> RenderedView:
         """Row bands run side by side; alone, one after the other: the way for many views."""
@@ -108,11 +108,11 @@ class ViewSynthesis:
     def decide(self, rays: RaySet, undecided: UndecidedRays) -> DecidedRays:
         """By the transformer's weights alone."""
         assert self._transformer is not None
-        raise_if_stopped(self._should_stop)
+        raise_if_stopped()
         ambiguous = describe_rays(rays, undecided)
-        raise_if_stopped(self._should_stop)
+        raise_if_stopped()
         chosen = self._transformer(ambiguous)
-        raise_if_stopped(self._should_stop)
+        raise_if_stopped()
         colors, disparity, source = blend_hypotheses(rays, ambiguous, chosen)
         y, x = np.divmod(undecided.pixel, rays.size.width)
         pixel = (y - rays.margins.top) * rays.view_size.width + x - rays.margins.left
@@ -123,15 +123,13 @@ class ViewSynthesis:
     def side_by_side(self, work: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Result]:
         """As many at a time as there are threads."""
         items, running = iter(items), deque[Future[Result]]()
+        work = in_this_job(work, or_when=lambda: self._is_over)
         while True:
             running.extend(self._threads.submit(work, item) for item in islice(items, tiling.THREADS - len(running)))
             if not running:
                 return
-            raise_if_stopped(self._should_stop)
+            raise_if_stopped()
             yield running.popleft().result()
-
-    def _should_stop(self) -> bool:
-        return self._is_over or self._asked_to_stop()
 
     def _closed_form(
         self,
@@ -151,7 +149,7 @@ class ViewSynthesis:
             undecided = self._render_rows(rays, offset, (first, last), view, covered)
             return [use(undecided)] if undecided is not None else []
 
-        made = in_bands(band, rays.view_size, self._should_stop, threads, self._most_band_pixels)
+        made = in_bands(band, rays.view_size, threads, self._most_band_pixels)
         return view, covered, [part for parts in made for part in parts]
 
     def _fill(
@@ -170,7 +168,7 @@ class ViewSynthesis:
         if not hole.any():
             return view
         foreground, foreground_disparity = colors[part], disparity[part]
-        self._inpainter(view.colors, view.disparity, hole, rays.photo_disparity, offset, self._should_stop, threads)
+        self._inpainter(view.colors, view.disparity, hole, rays.photo_disparity, offset, threads)
         if not len(part):
             return view
         behind, share = RaysBehind(part, colors[part], disparity[part]), covered.reshape(-1)[part]
@@ -188,9 +186,7 @@ class ViewSynthesis:
         disparity = view.disparity.reshape(-1)[pixel]
         filled.reshape(-1)[pixel] = ~_outside_frame(pixel, disparity, *offset, *rays.view_size)
         if filled.any():
-            filled &= goes_on_in_front(
-                view.disparity, hole | filled, rays.photo_disparity, offset, self._should_stop, threads
-            )
+            filled &= goes_on_in_front(view.disparity, hole | filled, rays.photo_disparity, offset, threads)
             view.occluded[filled] = True
         return filled
 
@@ -217,16 +213,16 @@ class ViewSynthesis:
         seen = first - above, min(last + around, rays.size.height)
         columns = max(left - around, 0), min(right + around, rays.size.width)
         candidates = find_candidates(rays, offset, seen, self._slots, columns)
-        raise_if_stopped(self._should_stop)
+        raise_if_stopped()
         weights, share = weights_and_coverage(candidates)
         occluded = share < LEAST_COVERED
         inner = slice(above, above + last - first), slice(left, right)
-        raise_if_stopped(self._should_stop)
+        raise_if_stopped()
         shown = slice(*rows)
         wanted = np.zeros(occluded.shape, np.bool_)
         wanted[inner] = True
         found = resample_colors(rays, candidates, weights, wanted, (view.colors[shown], above, left))
-        raise_if_stopped(self._should_stop)
+        raise_if_stopped()
         undecided = None
         if self._transformer:
             decided = share < _whole(rays)

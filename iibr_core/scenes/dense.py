@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from iibr_core.inpainting.registry import load_inpainter
-from iibr_core.runtime.tiling import ShouldStop, never
 from iibr_core.types import GridShape, ReportProgress, ViewOffset, ViewUpdate, ignore_progress
 
 if TYPE_CHECKING:
@@ -32,13 +31,12 @@ def read_dense(
     field: MultiView,
     grid: GridShape,
     inpaint: str,
-    should_stop: ShouldStop = never,
     report_progress: ReportProgress = ignore_progress,
     nearest_to: Callable[[], ViewOffset] = lambda: ViewOffset(0.0, 0.0),
 ) -> DenseField:
     """Read the views of a light field, and begin to make views between them. report_progress: gets the work's share.
 
-    Raises InputError where the views find no places on the grid, Cancelled once should_stop is true.
+    Raises InputError where the views find no places on the grid.
     """
     from iibr_core.formats.light_fields.views import grid_of
     from iibr_core.generation.dense_field import densify, require_steps
@@ -50,5 +48,5 @@ def read_dense(
     def report(done: float, total: float, doing: str) -> None:
         report_progress(*work.reading(done, total), doing)
 
-    given = read_given_views(field, should_stop, report)
-    return DenseField(given, steps, densify(given, own, grid, should_stop, inpainter, nearest_to), work)
+    given = read_given_views(field, report)
+    return DenseField(given, steps, densify(given, own, grid, inpainter, nearest_to), work)

@@ -18,49 +18,45 @@ from iibr_core.generation.plan import ScenePlan
 from iibr_core.inpainting.registry import load_inpainter
 from iibr_core.rendering.large_views import LargePhoto
 from iibr_core.rendering.ray_set import RaySet
-from iibr_core.runtime.tiling import ShouldStop, never, raise_if_stopped
+from iibr_core.runtime.work import raise_if_stopped
 from iibr_core.scenes.loaded_photo import LoadedPhoto, stamp_of
 from iibr_core.scenes.scene import Source
 from iibr_core.types import Disparity, FloatImage, InputError, Photo
 
 
-def load_large(
-    source: Source, loaded: LoadedPhoto, plan: ScenePlan, max_pixels: int, should_stop: ShouldStop = never
-) -> LargePhoto:
+def load_large(source: Source, loaded: LoadedPhoto, plan: ScenePlan, max_pixels: int) -> LargePhoto:
     """The photo of `source`, which was `loaded` smaller, at max_pixels at most, with the same disparity, its edges
     drawn to the larger photo's. Without `fills`.
 
-    Raises InputError where the file is another one by now, Cancelled once should_stop is true.
+    Raises InputError where the file is another one by now.
     """
     path = Path(source.path)
     if stamp_of(path) != loaded.stamp:
         raise InputError(f"{path}: was changed since it was opened; open it again")
     photo = read_shown_photo(path, max_pixels, loaded.origin.kind)
-    raise_if_stopped(should_stop)
+    raise_if_stopped()
     enlarged = photo.size.width / loaded.photo.size.width
-    values = _disparity(source, loaded, photo, should_stop)
-    raise_if_stopped(should_stop)
+    values = _disparity(source, loaded, photo)
+    raise_if_stopped()
     field = plan.field_disparity(Disparity(values / np.float32(enlarged), loaded.disparity.source))
     return LargePhoto(photo.pixels, field.values * np.float32(enlarged))
 
 
-def complete_fills(
-    source: Source, loaded: LoadedPhoto, plan: ScenePlan, should_stop: ShouldStop = never
-) -> RaySet | None:
+def complete_fills(source: Source, loaded: LoadedPhoto, plan: ScenePlan) -> RaySet | None:
     """The complete ray set of the light field, None where nothing is disoccluded.
 
-    Raises InputError where the inpainter cannot be had, Cancelled once should_stop is true.
+    Raises InputError where the inpainter cannot be had.
     """
     if not plan.has_disocclusion:
         return None
     disparity = plan.field_disparity(loaded.disparity)
-    rays, outer = ray_set(loaded.photo, disparity, plan, should_stop, load_inpainter(source.inpaint))
+    rays, outer = ray_set(loaded.photo, disparity, plan, load_inpainter(source.inpaint))
     for _ in outer:
         pass
     return rays
 
 
-def _disparity(source: Source, loaded: LoadedPhoto, photo: Photo, should_stop: ShouldStop) -> FloatImage:
+def _disparity(source: Source, loaded: LoadedPhoto, photo: Photo) -> FloatImage:
     """Return the disparity of the larger photo, in its pixels, with the edits that were made to the smaller one."""
     settings, enlarged = loaded.depth_settings, np.float32(photo.size.width / loaded.photo.size.width)
     if enlarged == 1:
@@ -72,12 +68,12 @@ def _disparity(source: Source, loaded: LoadedPhoto, photo: Photo, should_stop: S
     else:
         values, unknown = resample_surfaces(loaded.disparity.values, photo.size) * enlarged, None
         is_enlarged = False
-    raise_if_stopped(should_stop)
+    raise_if_stopped()
     if settings.refine > 0:
-        values = refine(photo.pixels, values, settings.refine, unknown, should_stop, is_enlarged=is_enlarged)
+        values = refine(photo.pixels, values, settings.refine, unknown, is_enlarged=is_enlarged)
     if file is None or settings.edits == UNEDITED:
         return values
-    return apply_edits(photo.pixels, values / enlarged, settings.edits, should_stop) * enlarged
+    return apply_edits(photo.pixels, values / enlarged, settings.edits) * enlarged
 
 
 def _larger_map(loaded: LoadedPhoto) -> Path | None:

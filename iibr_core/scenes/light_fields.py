@@ -17,7 +17,6 @@ from iibr_core.color import encoded_from_stored
 from iibr_core.depth.subject import subject_disparity
 from iibr_core.formats.light_fields.light_field_formats import open_light_field
 from iibr_core.generation.memory import require_memory, view_bytes
-from iibr_core.runtime.tiling import ShouldStop
 from iibr_core.scenes.dense import read_dense
 from iibr_core.scenes.opening_work import MeasureViews, OpeningWork, ViewsWork
 from iibr_core.scenes.scene import Progress, Scene, Source
@@ -52,7 +51,6 @@ class Showing:
 
 def showings_of_light_field(
     source: Source,
-    should_stop: ShouldStop,
     report_progress: Callable[[Progress], None],
     takes_drafts: bool,
     known: FloatImage | None = None,
@@ -63,8 +61,7 @@ def showings_of_light_field(
 
     takes_drafts: views without disparity are shown as read, then with a coarse one, then with the final one; else the
     field is shown once, when all is known. known: disparity of the centre view that was found before. The views of a
-    showing must be taken before the next is asked for. Raises InputError for a field or a map that cannot be read,
-    Cancelled once should_stop is true.
+    showing must be taken before the next is asked for. Raises InputError for a field or a map that cannot be read.
     """
     from iibr_core.formats.light_fields.views import disparity_range, grid_of, read_views
 
@@ -72,7 +69,7 @@ def showings_of_light_field(
     grid, (size, views) = grid_of(field), read_views(field)
     _require_field(field.name, size, source.filled_grid or grid)
     if source.filled_grid is not None and source.filled_grid != grid:
-        yield _filled_between(source, field, should_stop, report_progress, nearest_to)
+        yield _filled_between(source, field, report_progress, nearest_to)
         return
     given = known if source.depth.file is None else _read_map(source, size)
     read: list[ViewUpdate] = [next(views)]
@@ -90,13 +87,12 @@ def showings_of_light_field(
             read.append(view)
             report_progress(work.advance("reading", view.share))
     found = _Field(scene, grid, read, work)
-    yield from _with_disparity(found, given, should_stop, report_progress, takes_drafts)
+    yield from _with_disparity(found, given, report_progress, takes_drafts)
 
 
 def _filled_between(
     source: Source,
     field: MultiView,
-    should_stop: ShouldStop,
     report_progress: Callable[[Progress], None],
     nearest_to: Callable[[], ViewOffset],
 ) -> Showing:
@@ -115,7 +111,7 @@ def _filled_between(
     def report(done: float, total: float, doing: str) -> None:
         report_progress(opening.advance((done, total), doing=doing))
 
-    dense = read_dense(field, wanted, source.inpaint, should_stop, report, nearest_to)
+    dense = read_dense(field, wanted, source.inpaint, report, nearest_to)
     low, high = min(view.disparity.min() for view in dense.given), max(view.disparity.max() for view in dense.given)
     middle, steps = dense.given[0], dense.steps
     centre = ViewUpdate(middle.row, middle.column, middle.colors, middle.disparity / np.float32(steps))
@@ -172,9 +168,7 @@ class _Field:
     views: list[ViewUpdate]
     work: OpeningWork
 
-    def showing(
-        self, values: FloatImage, origin: str, is_final: bool, should_stop: ShouldStop, range_px: tuple[float, float]
-    ) -> Showing:
+    def showing(self, values: FloatImage, origin: str, is_final: bool, range_px: tuple[float, float]) -> Showing:
         """The same with the disparity of its centre view, carried to the others."""
         scene = replace(
             self.scene,
@@ -183,22 +177,21 @@ class _Field:
             has_view_disparity=True,
             subject_disparity_px=subject_disparity(values),
         )
-        views = self._views_with(values, is_final, should_stop)
+        views = self._views_with(values, is_final)
         return Showing(scene, views, self.work.measuring("carrying" if is_final else "drafting"))
 
-    def _views_with(self, values: FloatImage, is_final: bool, should_stop: ShouldStop) -> Iterator[ViewUpdate]:
+    def _views_with(self, values: FloatImage, is_final: bool) -> Iterator[ViewUpdate]:
         from iibr_core.generation.carried_disparity import carry_disparity
 
         colors = {(view.row, view.column): view.colors for view in self.views}
         centre = encoded_from_stored(self.views[0].colors)
-        for made in carry_disparity(centre, values, self.grid, should_stop):
+        for made in carry_disparity(centre, values, self.grid):
             yield replace(made, colors=colors[made.row, made.column], inpainted=None, is_final=is_final)
 
 
 def _with_disparity(
     field: _Field,
     given: FloatImage | None,
-    should_stop: ShouldStop,
     report_progress: Callable[[Progress], None],
     takes_drafts: bool,
 ) -> Iterator[Showing]:
@@ -207,17 +200,17 @@ def _with_disparity(
 
     if given is not None:
         file = field.scene.source.depth.file
-        yield field.showing(given, Path(file).name if file else FROM_VIEWS, True, should_stop, _range_of(given))
+        yield field.showing(given, Path(file).name if file else FROM_VIEWS, True, _range_of(given))
         return
     own = field.views[0].disparity
     if own is not None:
-        yield field.showing(own, field.scene.depth_source, True, should_stop, _range_of(own))
+        yield field.showing(own, field.scene.depth_source, True, _range_of(own))
         return
     colors = [view.colors for view in field.views]
     offsets = [field.grid.offset(view.row, view.column) for view in field.views]
     report_progress(field.work.advance("searching", 0.0))
     try:
-        coarse = estimate_coarse(colors, offsets, 0, should_stop)
+        coarse = estimate_coarse(colors, offsets, 0)
         _require_matching(field.scene.name, image_size(coarse.values), coarse.range_px, offsets)
     except InputError as error:
         # The views can be looked at without.
@@ -226,14 +219,14 @@ def _with_disparity(
         return
     field.work.knows_search(coarse.times_dearer)
     if takes_drafts:
-        yield field.showing(coarse.values, FROM_VIEWS, False, should_stop, _range_of(coarse.values))
+        yield field.showing(coarse.values, FROM_VIEWS, False, _range_of(coarse.values))
 
     def report(done: float, total: float, doing: str) -> None:
         report_progress(field.work.advance("matching", done / total))
 
     report(0.0, 1.0, "")
-    values = estimate_disparity(colors, offsets, 0, coarse.range_px, should_stop, report)
-    yield field.showing(values, FROM_VIEWS, True, should_stop, _range_of(values))
+    values = estimate_disparity(colors, offsets, 0, coarse.range_px, report)
+    yield field.showing(values, FROM_VIEWS, True, _range_of(values))
 
 
 def _scene_as_read(

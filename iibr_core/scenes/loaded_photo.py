@@ -15,7 +15,6 @@ from iibr_core.depth.editing.edits import BRUSH_TOOLS, DepthEdits, Levels, Strok
 from iibr_core.formats.files import require_file
 from iibr_core.formats.light_fields.light_field_formats import is_view_file
 from iibr_core.runtime.machine import give_back_memory
-from iibr_core.runtime.tiling import ShouldStop, never
 from iibr_core.scenes.scene import DepthSettings, Source
 from iibr_core.types import Disparity, ImageSize, InputError, Photo, ReportProgress, ignore_progress
 
@@ -66,7 +65,6 @@ def stamp_of(path: Path) -> tuple[int, ...]:
 
 def load_photo(
     source: Source,
-    should_stop: ShouldStop = never,
     report_progress: ReportProgress = ignore_progress,
     depth_settings: DepthSettings | None = None,
     asks_model: bool = True,
@@ -74,7 +72,7 @@ def load_photo(
     """Read a photo and find its disparity; progress is reported ten times a second at most.
 
     depth_settings: what to make of the disparity, None for what the source says. asks_model: see `open_with_depth`.
-    Raises InputError, and Cancelled once should_stop is true.
+    Raises InputError.
     """
     from iibr_core.depth.search import open_with_depth
     from iibr_core.formats.images.metadata import settings_text_in
@@ -95,7 +93,6 @@ def load_photo(
         replace(source.depth, refine=NOT_YET),
         max_pixels,
         source.grid,
-        should_stop,
         report_at_times,
         asks_model,
     )
@@ -103,27 +100,27 @@ def load_photo(
     settings = settings_text_in(path)
     settings_wanted = depth_settings or DepthSettings(source.depth.refine)
     own_size = _turned_like(stored_size, found.photo.size)
-    return _prepare(found, settings, source, settings_wanted, (own_size, stamp), should_stop)
+    return _prepare(found, settings, source, settings_wanted, (own_size, stamp))
 
 
-def deepen(source: Source, loaded: LoadedPhoto, refine: float, should_stop: ShouldStop = never) -> LoadedPhoto:
+def deepen(source: Source, loaded: LoadedPhoto, refine: float) -> LoadedPhoto:
     """The same photo with what a depth model makes of it, refined so far and not edited.
 
-    Raises InputError, and Cancelled once should_stop is true.
+    Raises InputError.
     """
     from iibr_core.depth.search import ask_model
 
     choice = replace(source.depth, refine=NOT_YET)
-    found = ask_model(Path(source.path), loaded.photo, choice, source.grid, should_stop)
+    found = ask_model(Path(source.path), loaded.photo, choice, source.grid)
     file = loaded.own_size, loaded.stamp
-    return _prepare(found, loaded.settings, source, DepthSettings(refine), file, should_stop)
+    return _prepare(found, loaded.settings, source, DepthSettings(refine), file)
 
 
-def sketch_photo(source: Source, should_stop: ShouldStop = never) -> LoadedPhoto | None:
+def sketch_photo(source: Source) -> LoadedPhoto | None:
     """A large photo in small, with depth that is found quickly: something to look at while it is read. None where that
     is no use.
 
-    Raises InputError, and Cancelled once should_stop is true.
+    Raises InputError.
     """
     from iibr_core.depth.search import sketch_depth
     from iibr_core.formats.images.photo import focal_px_from_fov, read_thumbnail
@@ -133,12 +130,12 @@ def sketch_photo(source: Source, should_stop: ShouldStop = never) -> LoadedPhoto
     stamp = stamp_of(path)
     if source.is_literal or min(math.prod(stored), max_pixels) < SKETCH_WORTH_PIXELS:
         return None
-    pixels = read_thumbnail(path, SKETCH, should_stop)
+    pixels = read_thumbnail(path, SKETCH)
     encoded = pixels.astype(np.float32) / np.float32(255)
     photo = Photo(encoded, focal_px_from_fov(encoded.shape[1]), path.stem, is_hdr=False)
-    found = sketch_depth(path, photo, source.depth, should_stop)
+    found = sketch_depth(path, photo, source.depth)
     own_size = _turned_like(stored, photo.size)
-    return _prepare(found, "", source, DepthSettings(NOT_YET), (own_size, stamp), should_stop)
+    return _prepare(found, "", source, DepthSettings(NOT_YET), (own_size, stamp))
 
 
 def photo_of_arrays(photo: Photo, disparity: Disparity) -> LoadedPhoto:
@@ -146,21 +143,19 @@ def photo_of_arrays(photo: Photo, disparity: Disparity) -> LoadedPhoto:
     from iibr_core.depth.search import PhotoWithDepth
 
     found = PhotoWithDepth(photo, disparity, DepthOrigin("file", disparity.source))
-    return _prepare(found, "", Source(""), DepthSettings(NOT_YET), (photo.size, ()), never)
+    return _prepare(found, "", Source(""), DepthSettings(NOT_YET), (photo.size, ()))
 
 
-def apply_depth_settings(
-    loaded: LoadedPhoto, depth_settings: DepthSettings, should_stop: ShouldStop = never
-) -> LoadedPhoto:
+def apply_depth_settings(loaded: LoadedPhoto, depth_settings: DepthSettings) -> LoadedPhoto:
     """The same with something else made of its disparity; only what changed is worked out.
 
-    Raises InputError, and Cancelled once should_stop is true.
+    Raises InputError.
     """
     if loaded.depth_settings == depth_settings:
         return loaded
     if loaded.depth_settings.refine != depth_settings.refine:
-        loaded = _refine(loaded, depth_settings.refine, should_stop)
-    values = loaded.canvas.apply(depth_settings.edits, should_stop)
+        loaded = _refine(loaded, depth_settings.refine)
+    values = loaded.canvas.apply(depth_settings.edits)
     return replace(loaded, depth_settings=depth_settings, disparity=replace(loaded.refined, values=values))
 
 
@@ -204,7 +199,6 @@ def _prepare(
     source: Source,
     depth_settings: DepthSettings,
     file: tuple[ImageSize, tuple[int, ...]],
-    should_stop: ShouldStop,
 ) -> LoadedPhoto:
     from iibr_core.depth.editing.canvas import DepthCanvas
     from iibr_core.depth.estimators.catalog import USUAL_MODEL
@@ -217,18 +211,16 @@ def _prepare(
     loaded = LoadedPhoto(
         found.photo, values, found.origin, settings, model, as_found, values, values, levels, canvas, *file
     )
-    return apply_depth_settings(loaded, depth_settings, should_stop)
+    return apply_depth_settings(loaded, depth_settings)
 
 
-def _refine(loaded: LoadedPhoto, strength: float, should_stop: ShouldStop) -> LoadedPhoto:
+def _refine(loaded: LoadedPhoto, strength: float) -> LoadedPhoto:
     from iibr_core.depth.edges.refine import refine
     from iibr_core.depth.editing.canvas import DepthCanvas
 
     values = loaded.found.values
     if strength > 0:
         found = loaded.found
-        values = refine(
-            loaded.photo.pixels, values, strength, found.unknown, should_stop, is_enlarged=found.is_enlarged
-        )
+        values = refine(loaded.photo.pixels, values, strength, found.unknown, is_enlarged=found.is_enlarged)
     canvas = DepthCanvas(loaded.photo.pixels, values)
     return replace(loaded, refined=replace(loaded.found, values=values), levels=levels_of(values), canvas=canvas)

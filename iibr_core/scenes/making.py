@@ -12,7 +12,6 @@ from iibr_core.generation.disparity_range import measure_disparity_range
 from iibr_core.generation.outer_views import ALL_VIEWS, WantedViews
 from iibr_core.generation.plan import MOST_STRENGTH, PlanOverrides, ScenePlan, plan_for_viewing, plan_literal
 from iibr_core.inpainting.inpainter import InpaintingAids
-from iibr_core.runtime.tiling import ShouldStop, never
 from iibr_core.scenes.loaded_photo import LoadedPhoto
 from iibr_core.scenes.scene import Source
 from iibr_core.types import FloatImage, InputError, ReportProgress, ViewOffset, ViewUpdate, ignore_progress
@@ -58,7 +57,6 @@ def views_of_photo(
     source: Source,
     loaded: LoadedPhoto,
     plan: ScenePlan,
-    should_stop: ShouldStop = never,
     report_progress: ReportProgress = ignore_progress,
     nearest_to: Callable[[], ViewOffset] = lambda: ViewOffset(0.0, 0.0),
     draft_bytes: int | None = None,
@@ -74,7 +72,6 @@ def views_of_photo(
         photo_in_srgb(photo) if in_srgb else photo,
         disparity,
         plan,
-        should_stop,
         nearest_to,
         source.quality,
         source.inpaint,

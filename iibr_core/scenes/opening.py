@@ -19,7 +19,7 @@ from iibr_core.generation.disparity_range import measure_disparity_range
 from iibr_core.generation.outer_views import ALL_VIEWS, WantedViews
 from iibr_core.generation.plan import ScenePlan
 from iibr_core.runtime.machine import give_back_memory
-from iibr_core.runtime.tiling import ShouldStop, never
+from iibr_core.runtime.work import is_stopped
 from iibr_core.scenes.light_fields import showings_of_light_field
 from iibr_core.scenes.loaded_photo import LoadedPhoto, apply_depth_settings, load_photo, sketch_photo
 from iibr_core.scenes.making import make_plan, views_of_photo
@@ -70,7 +70,6 @@ class ViewReady:
 
 def results_of(
     request: SceneRequest,
-    should_stop: Callable[[], bool],
     nearest_to: Callable[[], ViewOffset],
     report_progress: Callable[[Progress], None] = lambda progress: None,
     wanted: Callable[[], WantedViews] = lambda: ALL_VIEWS,
@@ -79,27 +78,24 @@ def results_of(
 
     report_progress: gets what it does while there is nothing new to show. wanted: asked once the scene is there,
     which views of a photo's grid are to be made beside its own. Raises InputError for a file that cannot
-    be opened, Cancelled where should_stop says so while it is read.
+    be opened while it is read.
     """
     try:
         if request.filled is not None:
             yield from _results_of_filled(request, request.filled)
         elif is_light_field(Path(request.source.path)):
-            yield from _results_of_light_field(request, should_stop, nearest_to, report_progress)
+            yield from _results_of_light_field(request, nearest_to, report_progress)
         else:
-            yield from _results_of_photo(request, should_stop, nearest_to, report_progress, wanted)
+            yield from _results_of_photo(request, nearest_to, report_progress, wanted)
     finally:
         give_back_memory()
 
 
-def sketch_of(wanted: WantedPhoto, should_stop: ShouldStop = never) -> SceneReady | None:
-    """Return a large photo at a small size, as generation 0; None where it cannot be read so.
-
-    Raises Cancelled once should_stop is true.
-    """
+def sketch_of(wanted: WantedPhoto) -> SceneReady | None:
+    """Return a large photo at a small size, as generation 0; None where it cannot be read so."""
     source = wanted.source
     with suppress(InputError):
-        loaded = None if is_light_field(Path(source.path)) else sketch_photo(source, should_stop)
+        loaded = None if is_light_field(Path(source.path)) else sketch_photo(source)
         if loaded is not None:
             plan = make_plan(source, loaded, wanted.depth_strength)
             scene = scene_of_photo(source, loaded, plan)
@@ -158,7 +154,6 @@ def _known_focal_px(photo: Photo) -> float | None:
 
 def _results_of_photo(
     request: SceneRequest,
-    should_stop: Callable[[], bool],
     nearest_to: Callable[[], ViewOffset],
     report_progress: Callable[[Progress], None],
     wanted: Callable[[], WantedViews],
@@ -170,15 +165,15 @@ def _results_of_photo(
         report_progress(Progress(doing=f"{doing}, {done / total:.0%}" if done and total else doing))
 
     loaded = (
-        load_photo(source, should_stop, tell, depth_settings, asks_model=request.asks_model)
+        load_photo(source, tell, depth_settings, asks_model=request.asks_model)
         if request.loaded is None
-        else apply_depth_settings(request.loaded, depth_settings, should_stop)
+        else apply_depth_settings(request.loaded, depth_settings)
     )
     plan = request.plan or make_plan(source, loaded, request.depth_strength)
     yield SceneReady(request.generation, scene_of_photo(source, loaded, plan), loaded, _centre_view(loaded, plan))
 
     draft_bytes = plan.draft_bytes if request.takes_drafts else None
-    views = views_of_photo(source, loaded, plan, should_stop, tell, nearest_to, draft_bytes, False, wanted)
+    views = views_of_photo(source, loaded, plan, tell, nearest_to, draft_bytes, False, wanted)
     work = ViewsWork(plan.grid.rows * plan.grid.columns)
     yield from _count_views(
         request.generation, views, lambda there, drafts, share: work.advance((share, 1.0), there, drafts)
@@ -201,19 +196,18 @@ def _results_of_filled(request: SceneRequest, filled: FilledField) -> Iterator[S
 
 def _results_of_light_field(
     request: SceneRequest,
-    should_stop: Callable[[], bool],
     nearest_to: Callable[[], ViewOffset],
     report_progress: Callable[[Progress], None],
 ) -> Iterator[SceneReady | ViewReady]:
     """The light field of a folder or file, once more each time that more is known of it."""
     for showing in showings_of_light_field(
-        request.source, should_stop, report_progress, request.takes_drafts, nearest_to=nearest_to
+        request.source, report_progress, request.takes_drafts, nearest_to=nearest_to
     ):
         scene, centre = showing.scene, next(showing.views)
         yield SceneReady(request.generation, scene, None, centre)
-        rest = itertools.takewhile(lambda _: not should_stop(), itertools.chain((centre,), showing.views))
+        rest = itertools.takewhile(lambda _: not is_stopped(), itertools.chain((centre,), showing.views))
         yield from _count_views(request.generation, rest, showing.measure)
-        if should_stop():
+        if is_stopped():
             return
 
 

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 
 from iibr_core.color import encoded_from_stored, linear_from_srgb
 from iibr_core.rendering.gloss.gloss_settings import Gloss, of_maps
-from iibr_core.runtime.tiling import ShouldStop, never
 from iibr_core.scenes.scene import Scene
 from iibr_core.types import Disparity, FloatImage, ViewUpdate
 
@@ -65,9 +64,9 @@ class GlossFound:
     maps: GlossMaps | None
 
 
-def answer(request: GlossRequest, should_stop: ShouldStop = never) -> GlossFound:
+def answer(request: GlossRequest) -> GlossFound:
     """Raises as `maps_of_scene`."""
-    maps = maps_of_scene(request.gloss, request.scene, request.centre, should_stop, request.normals)
+    maps = maps_of_scene(request.gloss, request.scene, request.centre, request.normals)
     return GlossFound(request, maps)
 
 
@@ -75,14 +74,12 @@ def maps_of_scene(
     gloss: Gloss,
     scene: Scene,
     centre: ViewUpdate,
-    should_stop: ShouldStop = never,
     normals: FloatImage | None = None,
 ) -> GlossMaps | None:
     """Return the effect of the gloss on a scene with this centre view, None if that has no disparity. normals: of its
     disparity, where they are known.
 
-    Raises InputError where the gloss is not sound or its surroundings cannot be read, Cancelled once should_stop is
-    true.
+    Raises InputError where the gloss is not sound or its surroundings cannot be read.
     """
     if centre.disparity is None:
         return None
@@ -90,25 +87,21 @@ def maps_of_scene(
 
     photo = encoded_from_stored(centre.colors)
     around = read_environment(gloss)
-    return make_gloss_maps(
-        gloss, photo, centre.disparity, geometry_of(scene, centre.disparity), around, normals, should_stop
-    )
+    return make_gloss_maps(gloss, photo, centre.disparity, geometry_of(scene, centre.disparity), around, normals)
 
 
-def add_gloss(
-    views: Iterator[ViewUpdate], gloss: Gloss | None, scene: Scene, should_stop: ShouldStop = never
-) -> Iterator[ViewUpdate]:
+def add_gloss(views: Iterator[ViewUpdate], gloss: Gloss | None, scene: Scene) -> Iterator[ViewUpdate]:
     """The views of a scene, the centre first, with its gloss; the same iterator where there is none.
 
     Raises as `maps_of_scene`.
     """
-    return views if gloss is None else _shaded(views, gloss, scene, should_stop)
+    return views if gloss is None else _shaded(views, gloss, scene)
 
 
-def _shaded(views: Iterator[ViewUpdate], gloss: Gloss, scene: Scene, should_stop: ShouldStop) -> Iterator[ViewUpdate]:
+def _shaded(views: Iterator[ViewUpdate], gloss: Gloss, scene: Scene) -> Iterator[ViewUpdate]:
     from iibr_core.rendering.gloss.shading import shade_views
 
     centre = next(views)
-    maps = maps_of_scene(gloss, scene, centre, should_stop)
+    maps = maps_of_scene(gloss, scene, centre)
     whole = chain((centre,), views)
-    return whole if maps is None else shade_views(whole, maps, scene.grid, should_stop)
+    return whole if maps is None else shade_views(whole, maps, scene.grid)

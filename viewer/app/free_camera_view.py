@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from iibr_core.color import photo_in_srgb
 from iibr_core.generation.disparity_range import measure_disparity_range
-from iibr_core.runtime.tiling import Cancelled, never
+from iibr_core.runtime.work import Cancelled
 from iibr_core.scenes.loaded_photo import LoadedPhoto
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import Camera, ImageSize, ViewUpdate, image_size
@@ -172,7 +172,6 @@ def _make_ready(job: Job[FreeRequest, FreeResult], is_draft: bool) -> _Ready:
         inverse_depth,
         camera,
         cameras,
-        job.should_stop,
         None if is_draft else fill_background,
         lambda done, total, doing: job.post(CameraProgress(done / total)),
     )
@@ -188,7 +187,7 @@ def _view(job: Job[FreeRequest, FreeResult], ready: _Ready) -> ViewUpdate:
     free, centre = job.request.camera, job.request.centre
     camera = ready.camera if free.pose is None else ready.others[free.pose].resized(ready.camera.size)
     camera = steered(camera, free.right, free.down, free.forward * ready.nearest)
-    seen = ready.views.view(camera, job.should_stop)
+    seen = ready.views.view(camera)
     far, near = ready.inverse_depths
     low, high = ready.disparities
     px = (high - low) / (near - far) if near > far else 0.0
@@ -196,7 +195,7 @@ def _view(job: Job[FreeRequest, FreeResult], ready: _Ready) -> ViewUpdate:
     disparity = longer * (low + px * (seen.disparity / ready.views.scale_px - far))
     size = ImageSize(*centre.colors.shape[:2])
     is_hdr = job.request.loaded.photo.is_hdr
-    colors = encode_for_storage(seen.colors, is_hdr, never)
+    colors = encode_for_storage(seen.colors, is_hdr)
     if camera.size != size:
         shown_px = ScreenSize(size.width, size.height)
         colors = _sampled(colors, size) if is_hdr else stretch_image(colors.astype(np.uint8, copy=False), shown_px)

@@ -106,7 +106,7 @@ class HeadlessViewer:
             self.state.generation, source, depth_strength, depth_settings=depth_settings, takes_drafts=False
         )
         self._wanted = ALL_VIEWS
-        self._results = results_of(request, lambda: False, lambda: CENTRE, on_progress, lambda: self._wanted)
+        self._results = results_of(request, lambda: CENTRE, on_progress, lambda: self._wanted)
         ready = next(self._results)
         assert isinstance(ready, SceneReady)
         on_ready(ready.scene)
@@ -229,7 +229,7 @@ class HeadlessViewer:
         request = make_inspection_request(self.state, is_moving=False, before=None)
         inputs = self._inspection_view.inputs(request, self.state)
         if request is not None and inputs is not None:
-            for result in self._comparison_job.results_of(request, inputs, lambda: False):
+            for result in self._comparison_job.results_of(request, inputs):
                 self.do(*self._inspection_view.take(result))
         self.do(SetInspection("probe", self._inspection_view.probe(self.state)))
         return self._inspection_view.draw(self.state, layout)

@@ -12,7 +12,7 @@ from functools import partial
 from itertools import count
 from pathlib import Path
 
-from iibr_core.runtime.tiling import Cancelled, raise_if_stopped
+from iibr_core.runtime.work import Cancelled, raise_if_stopped, stoppable
 from iibr_core.scenes.opening import SceneRequest
 from iibr_core.scenes.scene import Source, is_same_field
 from viewer.app.job import Job, Lane
@@ -192,7 +192,8 @@ class JobQueue:
 def _carry_out(job: Job, scenes: JobScenes) -> list[Action]:
     """In the thread: what comes of it; nothing where it was given up."""
     try:
-        raise_if_stopped(job.should_stop)
-        return [ViewsFilled(scenes.fill(job))] if job.work is None else job.work(scenes.source_of(job))
+        with stoppable(job.should_stop):
+            raise_if_stopped()
+            return [ViewsFilled(scenes.fill(job))] if job.work is None else job.work(scenes.source_of(job))
     except Cancelled:
         return []

@@ -16,7 +16,7 @@ from iibr_core.exports.render_settings import RenderSettings, require_size
 from iibr_core.exports.source import ExportSource
 from iibr_core.generation.outer_views import ALL_VIEWS, WantedViews
 from iibr_core.rendering.optics import CENTRE
-from iibr_core.runtime.tiling import raise_if_stopped
+from iibr_core.runtime.work import raise_if_stopped
 from iibr_core.scenes.opening import SceneReady, ViewReady, results_of
 from iibr_core.scenes.scene import FilledField, Progress
 from iibr_core.scenes.scene_gloss import GlossRequest, answer
@@ -55,7 +55,7 @@ class JobScenes:
             return self._run(job, self._draw(job, snapshot, settings))
 
         scene, report = snapshot.scene, partial(self._report, job)
-        return ExportSource(scene, snapshot.loaded, optics, draw, report, job.should_stop, snapshot.centre)
+        return ExportSource(scene, snapshot.loaded, optics, draw, report, snapshot.centre)
 
     def fill(self, job: Job) -> FilledField:
         """Its light field with all the views between. Raises InputError where it has none, Cancelled once given up."""
@@ -65,14 +65,14 @@ class JobScenes:
 
         assert job.request is not None
         views = []
-        with closing(results_of(job.request, job.should_stop, lambda: CENTRE, report)) as results:
+        with closing(results_of(job.request, lambda: CENTRE, report)) as results:
             ready = next(results)
             assert isinstance(ready, SceneReady)
             for made in results:
                 assert isinstance(made, ViewReady)
                 views.append(made.view)
                 report(made.progress)
-        raise_if_stopped(job.should_stop)
+        raise_if_stopped()
         return FilledField(ready.scene, tuple(views))
 
     def _report(self, job: Job, done: float, total: float, doing: str) -> None:
@@ -90,7 +90,7 @@ class JobScenes:
 
         assert job.request is not None
         wanted = ALL_VIEWS
-        results = results_of(job.request, job.should_stop, lambda: CENTRE, report, lambda: wanted)
+        results = results_of(job.request, lambda: CENTRE, report, lambda: wanted)
         with closing(results):
             ready = next(results)
             assert isinstance(ready, SceneReady)
@@ -125,7 +125,7 @@ class JobScenes:
             return
         if known is not None and known.request.is_for(gloss, snapshot.centre):
             return
-        found = answer(GlossRequest(gloss, snapshot.scene, snapshot.centre), job.should_stop)
+        found = answer(GlossRequest(gloss, snapshot.scene, snapshot.centre))
         self._run(job, _in_one_step(lambda: snapshot.take_gloss(found)))
 
     def _draw(self, job: Job, snapshot: SceneSnapshot, settings: RenderSettings) -> Steps[NDArray[Any]]:
@@ -143,7 +143,7 @@ class JobScenes:
             drawing.stop()
 
     def _run(self, job: Job, steps: Steps[Result]) -> Result:
-        return self._window_work.run(steps, job.should_stop, is_urgent=job.kind != "export")
+        return self._window_work.run(steps, is_urgent=job.kind != "export")
 
 
 def _store(snapshot: SceneSnapshot, view: ViewUpdate) -> Steps[None]:

@@ -148,5 +148,5 @@ def _drawn_full(shot: _Shot, source: ExportSource, is_linear: bool, saved: Saved
     assert scene.plan is not None
     assert source.loaded is not None
     full = FullPicture(scene, scene.plan, source.loaded, source.optics, shot.size)
-    light = full.make(source.draw, source.should_stop, source.report_progress)
-    return encode_light(light, is_linear, saved.color_space, scene.color_space, source.should_stop)
+    light = full.make(source.draw, source.report_progress)
+    return encode_light(light, is_linear, saved.color_space, scene.color_space)

@@ -19,6 +19,7 @@ from iibr_core.evaluation.metrics import flip, psnr
 from iibr_core.generation.plan import ScenePlan, plan_literal
 from iibr_core.inpainting.registry import DEFAULT_INPAINTER, load_inpainter
 from iibr_core.runtime.extras import is_installed
+from iibr_core.runtime.work import is_stopped
 from iibr_core.scenes.loaded_photo import LoadedPhoto
 from iibr_core.types import SRGB, ColorSpace, FloatImage, GridShape, InputError, Quality, StoredColors, ViewOffset
 from viewer.background.job_threads import Failed, Job, JobThread
@@ -105,28 +106,24 @@ class ComparisonJob:
         self._rays = self._rays_of = self._pair = None
         self._outer = {}
 
-    def results_of(
-        self, request: InspectionRequest, inputs: ComparisonInputs, should_stop: Callable[[], bool]
-    ) -> Iterator[ComparisonFinding]:
+    def results_of(self, request: InspectionRequest, inputs: ComparisonInputs) -> Iterator[ComparisonFinding]:
         """What comes of a request, in order. Raises InputError, or Cancelled once should_stop is true.
 
         A pair that is kept comes again: who asked for it first may not have waited.
         """
         if request.kind == "entropy":
-            yield EntropyReady(request, np.rint(self._entropy(request, inputs, should_stop) * 255).astype(np.uint8))
+            yield EntropyReady(request, np.rint(self._entropy(request, inputs) * 255).astype(np.uint8))
             return
         unscored = replace(request, is_scored=False)
         if self._pair is None or self._pair.request != unscored:
-            self._pair = PairReady(unscored, *self._make_pair(request, inputs, should_stop))
+            self._pair = PairReady(unscored, *self._make_pair(request, inputs))
         yield self._pair
-        if request.is_scored and not should_stop():
+        if request.is_scored and not is_stopped():
             left, right = self._pair.left, self._pair.right
             flip_mean = flip(left, right) if is_installed("flip_evaluator") else None
             yield PairScored(request, psnr(left, right), flip_mean)
 
-    def _make_pair(
-        self, request: InspectionRequest, inputs: ComparisonInputs, should_stop: Callable[[], bool]
-    ) -> tuple[Bytes, Bytes]:
+    def _make_pair(self, request: InspectionRequest, inputs: ComparisonInputs) -> tuple[Bytes, Bytes]:
         if request.truth is not None:
             from iibr_core.formats.light_fields.light_field_formats import open_light_field
             from iibr_core.formats.light_fields.views import read_stored_view
@@ -134,16 +131,14 @@ class ComparisonJob:
             truth = read_stored_view(open_light_field(Path(os.path.expanduser(request.truth.path))), *request.view)
             made = inputs.stored
             if made is None:
-                made = self._stored_view(request, inputs, inputs.quality, should_stop)
+                made = self._stored_view(request, inputs, inputs.quality)
             if truth.shape != made.shape:
                 raise InputError(f"{request.truth.path}: its views have changed; choose the folder again")
             return _bytes_of(made, inputs.color_space), _bytes_of(truth)
-        fast, balanced = (self._stored_view(request, inputs, quality, should_stop) for quality in get_args(Quality))
+        fast, balanced = (self._stored_view(request, inputs, quality) for quality in get_args(Quality))
         return _bytes_of(fast, inputs.color_space), _bytes_of(balanced, inputs.color_space)
 
-    def _stored_view(
-        self, request: InspectionRequest, inputs: ComparisonInputs, quality: Quality, should_stop: Callable[[], bool]
-    ) -> StoredColors:
+    def _stored_view(self, request: InspectionRequest, inputs: ComparisonInputs, quality: Quality) -> StoredColors:
         """The view as the light field stores it; the middle one is the photo."""
         from iibr_core.generation.light_field import transformer_for
         from iibr_core.generation.stored_views import encode_for_storage, stored_colors
@@ -151,18 +146,16 @@ class ComparisonJob:
 
         loaded, plan = _given(request, inputs)
         if request.view == plan.grid.centre:
-            return encode_for_storage(loaded.photo.pixels, loaded.photo.is_hdr, should_stop)
+            return encode_for_storage(loaded.photo.pixels, loaded.photo.is_hdr)
         inpainter, offset = load_inpainter(inputs.inpaint), plan.grid.offset(*request.view)
-        rays = self._kept_rays(request, inputs, inpainter, should_stop)
+        rays = self._kept_rays(request, inputs, inpainter)
         if quality == "fast" and offset in self._outer:
             return self._outer[offset]
         transformer = transformer_for(quality)
-        with open_renderer(should_stop, transformer, inpainter=inpainter) as renderer:
-            return stored_colors(rays, offset, renderer.render(rays, offset), loaded.photo.is_hdr, should_stop)
+        with open_renderer(transformer, inpainter=inpainter) as renderer:
+            return stored_colors(rays, offset, renderer.render(rays, offset), loaded.photo.is_hdr)
 
-    def _entropy(
-        self, request: InspectionRequest, inputs: ComparisonInputs, should_stop: Callable[[], bool]
-    ) -> FloatImage:
+    def _entropy(self, request: InspectionRequest, inputs: ComparisonInputs) -> FloatImage:
         """Of the weights of the view (H, W), in [0, 1]; in the middle every ray is the photo's own."""
         from iibr_core.rendering.renderer import open_renderer
 
@@ -170,8 +163,8 @@ class ComparisonJob:
         if request.view == plan.grid.centre:
             return np.zeros(loaded.photo.size, np.float32)
         inpainter = load_inpainter(inputs.inpaint)
-        rays = self._kept_rays(request, inputs, inpainter, should_stop)
-        with open_renderer(should_stop, keeps_entropy=True, inpainter=inpainter) as renderer:
+        rays = self._kept_rays(request, inputs, inpainter)
+        with open_renderer(keeps_entropy=True, inpainter=inpainter) as renderer:
             entropy = renderer.render(rays, plan.grid.offset(*request.view)).entropy
         assert entropy is not None
         return np.clip(entropy, 0, 1)
@@ -181,7 +174,6 @@ class ComparisonJob:
         request: InspectionRequest,
         inputs: ComparisonInputs,
         inpainter: Inpainter,
-        should_stop: Callable[[], bool],
     ) -> RaySet:
         """The ray set of the scene's plan, or of the ground truth's places."""
         from iibr_core.generation.light_field import ray_set
@@ -192,9 +184,9 @@ class ComparisonJob:
         if self._rays is None or self._rays_of != rays_of:
             self._rays, self._outer = None, {}  # two sets would be large
             disparity = plan.field_disparity(loaded.disparity)
-            rays, outer_views = ray_set(loaded.photo, disparity, plan, should_stop, inpainter)
+            rays, outer_views = ray_set(loaded.photo, disparity, plan, inpainter)
             is_hdr = loaded.photo.is_hdr
-            self._outer = {at: stored_colors(rays, at, view, is_hdr, should_stop) for at, view in outer_views}
+            self._outer = {at: stored_colors(rays, at, view, is_hdr) for at, view in outer_views}
             self._rays, self._rays_of = rays, rays_of
         return self._rays
 
@@ -230,7 +222,7 @@ class ComparisonWorker(JobThread[ComparisonRequest, ComparisonResult]):
         if request is None or inputs is None:
             self._comparison_job.forget()
         else:
-            yield from self._comparison_job.results_of(request, inputs, job.should_stop)
+            yield from self._comparison_job.results_of(request, inputs)
 
 
 def _bytes_of(stored: StoredColors, color_space: ColorSpace = SRGB) -> Bytes:

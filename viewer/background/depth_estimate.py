@@ -100,7 +100,7 @@ class DepthFinder(JobThread[EstimateRequest, EstimateResult]):
 def _results_of(job: Job[EstimateRequest, EstimateResult]) -> Iterator[EstimateResult]:
     asked = job.request
     source = replace(asked.source, depth=replace(asked.source.depth, file=None, start="model", model=asked.model))
-    yield Estimated(asked, deepen(source, asked.loaded, asked.refine, job.should_stop))
+    yield Estimated(asked, deepen(source, asked.loaded, asked.refine))
 
 
 def same_places(before: FloatImage, now: FloatImage, focused_at: tuple[float, float] | None) -> SamePlaces:

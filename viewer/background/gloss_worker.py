@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from contextlib import suppress
 
 from iibr_core.rendering.gloss.gloss_settings import Gloss
-from iibr_core.runtime.tiling import Cancelled
+from iibr_core.runtime.work import Cancelled
 from iibr_core.scenes.scene_gloss import GlossFound, GlossRequest, answer
 from viewer.background.job_threads import Failed, Job, JobThread
 from viewer.model.actions import Action, Notify
@@ -48,4 +48,4 @@ class GlossFinder(JobThread[GlossRequest, GlossResult]):
 
 def _results_of(job: Job[GlossRequest, GlossResult]) -> Iterator[GlossResult]:
     with suppress(Cancelled):
-        yield answer(job.request, job.should_stop)
+        yield answer(job.request)

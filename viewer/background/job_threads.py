@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from typing import Generic, TypeVar
 
 from iibr_core.runtime.machine import give_back_memory
+from iibr_core.runtime.work import stoppable
 from iibr_core.scenes.scene import Progress
 from iibr_core.types import InputError
 
@@ -153,10 +154,11 @@ class JobThread(Generic[Request, Result]):
         if job is None or job.should_stop():
             return job is not None
         try:
-            for result in self._work(job):
-                job.post(result)
-                if job.should_stop():
-                    break
+            with stoppable(job.should_stop):
+                for result in self._work(job):
+                    job.post(result)
+                    if job.should_stop():
+                        break
         except Exception as error:  # the one place where a job's error can still be shown to the user
             job.post(self._failure(job.request, message_of(error)))
         finally:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
 
-from iibr_core.runtime.tiling import Cancelled
+from iibr_core.runtime.work import Cancelled
 from viewer.background.job_threads import Failed, Job, JobThread
 from viewer.model.state.model_download import Downloading, ModelOffer, ModelsListed
 
@@ -60,7 +60,7 @@ def _results_of(job: Job[ModelRequest, DownloadResult]) -> Iterator[DownloadResu
             job.post(latest)
 
     with suppress(Cancelled):
-        fetch(model, report, job.should_stop)
+        fetch(model, report)
         listed = list_models()
         yield Downloaded(next(offer for offer in listed.known if offer.name == model.name), listed)
 

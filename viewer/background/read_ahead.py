@@ -9,7 +9,6 @@ from typing import Generic, TypeVar
 
 from iibr_core.generation.memory import PHOTO_BYTES, budget_bytes
 from iibr_core.generation.plan import ScenePlan
-from iibr_core.runtime.tiling import ShouldStop
 from iibr_core.scenes.loaded_photo import LoadedPhoto, load_photo
 from iibr_core.scenes.making import make_plan
 from iibr_core.scenes.opening import WantedPhoto
@@ -30,9 +29,9 @@ class PhotoAhead:
     plan: ScenePlan
 
 
-def read_whole_photo(wanted: WantedPhoto, should_stop: ShouldStop) -> PhotoAhead:
-    """All of a photo, asking no depth model. Raises InputError, and Cancelled once should_stop is true."""
-    loaded = load_photo(wanted.source, should_stop, asks_model=False)
+def read_whole_photo(wanted: WantedPhoto) -> PhotoAhead:
+    """All of a photo, asking no depth model. Raises InputError."""
+    loaded = load_photo(wanted.source, asks_model=False)
     plan = make_plan(wanted.source, loaded, wanted.depth_strength)
     return PhotoAhead(loaded, plan)
 
@@ -48,15 +47,13 @@ def photos_within_budget(scene: Scene) -> int:
 class ReadAhead(Generic[Read]):
     """Reads what it is told to want, one after the other, and keeps that as long as it is wanted."""
 
-    def __init__(
-        self, name: str, wake: Callable[[], None], read: Callable[[WantedPhoto, ShouldStop], Read | None]
-    ) -> None:
+    def __init__(self, name: str, wake: Callable[[], None], read: Callable[[WantedPhoto], Read | None]) -> None:
         """name: of the thread that reads. wake: called there when a photo was read. read: gives None where there is
         nothing to be had; errors mean the same: opening the photo will say why.
         """
 
         def read_one(job: _Job[Read]) -> Iterator[tuple[WantedPhoto, Read | None]]:
-            yield job.request, read(job.request, job.should_stop)
+            yield job.request, read(job.request)
 
         self._thread = JobThread(name, wake, read_one, lambda wanted, message: (wanted, None))
         self._known: dict[WantedPhoto, Read | None] = {}

@@ -28,8 +28,8 @@ class PhotosFound:
 
 
 SceneResult = SceneReady | ViewReady | PhotosFound | ProgressReport[int] | Failed[int]
-SceneWork = Callable[[SceneRequest, Callable[[], bool], Callable[[], ViewOffset]], Iterator[SceneReady | ViewReady]]
-"""What a job does: (request, should_stop, where the user looks) -> its results, in order. See `results_of`."""
+SceneWork = Callable[[SceneRequest, Callable[[], ViewOffset]], Iterator[SceneReady | ViewReady]]
+"""What a job does: (request, where the user looks) -> its results, in order. See `results_of`."""
 
 
 class SceneWorker(JobThread[SceneRequest, SceneResult]):
@@ -52,8 +52,8 @@ class SceneWorker(JobThread[SceneRequest, SceneResult]):
         if is_folder(source) and (photo := first_photo(source)) is not None:
             return iter((PhotosFound(job.request.generation, str(photo)),))
         if self._scene_work is not None:
-            return iter(self._scene_work(job.request, job.should_stop, lambda: self.eye))
-        results = results_of(job.request, job.should_stop, lambda: self.eye, report_progress)
+            return iter(self._scene_work(job.request, lambda: self.eye))
+        results = results_of(job.request, lambda: self.eye, report_progress)
         return _telling_compiling(results, report_progress)
 
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from iibr_core.exports.full_picture import FullPicture, encode_light
 from iibr_core.exports.render_settings import RenderSettings
-from iibr_core.runtime.tiling import Cancelled
+from iibr_core.runtime.work import Cancelled
 from iibr_core.scenes.loaded_photo import LoadedPhoto
 from iibr_core.types import SRGB
 from viewer.background.job_threads import Failed, Job, JobThread
@@ -52,12 +52,12 @@ class SharpeningWorker(JobThread[FullPicture, SharpResult]):
         request, kept = job.request, self._photo
 
         def draw(settings: RenderSettings) -> NDArray[Any]:
-            return self.window_work.run(self._draw_steps(settings), job.should_stop)
+            return self.window_work.run(self._draw_steps(settings))
 
         def keep(photo: LargePhoto) -> None:
             self._photo = request.loaded, photo
 
         photo = kept[1] if kept is not None and kept[0] is request.loaded else None
         with suppress(Cancelled):
-            light = request.make(draw, job.should_stop, photo=photo, keep=keep)
-            yield SharpPart(encode_light(light, False, SRGB, request.scene.color_space, job.should_stop))
+            light = request.make(draw, photo=photo, keep=keep)
+            yield SharpPart(encode_light(light, False, SRGB, request.scene.color_space))

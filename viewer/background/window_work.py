@@ -9,7 +9,7 @@ from collections.abc import Callable, Generator
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
-from iibr_core.runtime.tiling import ShouldStop, raise_if_stopped
+from iibr_core.runtime.work import ShouldStop, in_this_job, is_stopped, raise_if_stopped
 
 LOOK_S = 0.05
 """How often a thread that waits looks whether its job is still wanted."""
@@ -45,15 +45,15 @@ class WindowWork:
         """Whether `advance` has something to do."""
         return bool(self._asked) or not self._new.empty()
 
-    def run(self, steps: Steps[Result], should_stop: ShouldStop, is_urgent: bool = False) -> Result:
-        """Have this done, and wait. is_urgent: before what is not. Raises what the steps raise, and Cancelled once
-        should_stop is true.
+    def run(self, steps: Steps[Result], is_urgent: bool = False) -> Result:
+        """Have this done, and wait. is_urgent: before what is not. Raises what the steps raise, and Cancelled once the
+        job is stopped.
         """
-        asked = _Asked(steps, should_stop, is_urgent)
+        asked = _Asked(steps, in_this_job(is_stopped), is_urgent)
         self._new.put(asked)
         self._wake()
         while not asked.is_done.wait(LOOK_S):
-            raise_if_stopped(should_stop)
+            raise_if_stopped()
         if asked.error is not None:
             raise asked.error
         result: Result = asked.result

@@ -16,7 +16,6 @@ from iibr_core.formats.images.write import write_image
 from iibr_core.formats.outputs import check_output_folder, write_folder
 from iibr_core.generation.memory import MAKING_BYTES, require_memory
 from iibr_core.inpainting.registry import load_inpainter
-from iibr_core.runtime.tiling import never
 from iibr_core.types import Camera, FloatImage, InputError
 from viewer.cli.shared_options import given_options, require_model
 from viewer.cli.terminal import print_depth, print_notes, show_progress, untimed
@@ -113,7 +112,7 @@ def _written(
         for number, camera in enumerate(cameras, 1):
             view = views.view(camera)
             name = f"view_{number:04d}{'.exr' if photo.is_hdr else '.png'}"
-            write_image(unfinished / name, encode_for_storage(view.colors, photo.is_hdr, never))
+            write_image(unfinished / name, encode_for_storage(view.colors, photo.is_hdr))
             yield float(view.inpainted.mean())
 
 

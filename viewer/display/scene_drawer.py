@@ -15,7 +15,6 @@ from iibr_core.exports.source import ExportSource, OpticsOf
 from iibr_core.generation.outer_views import ALL_VIEWS, WantedViews
 from iibr_core.rendering.gloss.gloss_settings import Gloss
 from iibr_core.rendering.optics import CENTRE
-from iibr_core.runtime.tiling import never
 from iibr_core.scenes.lens_limits import LensChoice
 from iibr_core.scenes.opening import SceneReady, SceneRequest, ViewReady, results_of
 from iibr_core.scenes.scene import Scene, Source
@@ -72,9 +71,7 @@ class SceneDrawer:
         wanted = ALL_VIEWS
         view = self._view = self._view or self._make_view()
         request = SceneRequest(0, source, depth_strength, takes_drafts=False)
-        results = results_of(
-            request, never, lambda: CENTRE, lambda made: made.report_to(report_progress), lambda: wanted
-        )
+        results = results_of(request, lambda: CENTRE, lambda made: made.report_to(report_progress), lambda: wanted)
         ready = next(results)
         assert isinstance(ready, SceneReady)
         on_ready(ready.scene)
@@ -87,7 +84,7 @@ class SceneDrawer:
             view.add(made.view)
             view.upload_all()
             made.progress.report_to(report_progress)
-        return ExportSource(ready.scene, ready.loaded, optics, self.draw, ignore_progress, never, view.centre)
+        return ExportSource(ready.scene, ready.loaded, optics, self.draw, ignore_progress, view.centre)
 
     def draw(self, settings: RenderSettings) -> NDArray[Any]:
         """Return a picture of the open scene, see `iibr_core.exports.source.Draw`."""

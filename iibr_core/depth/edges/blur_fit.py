@@ -11,7 +11,7 @@ import numpy as np
 
 from iibr_core.depth.edges.edge_profiles import COLOR_NOISE, GAUSSIAN_SIGMAS
 from iibr_core.runtime.kernels import kernel
-from iibr_core.runtime.tiling import ShouldStop, in_bands, never
+from iibr_core.runtime.tiling import in_bands
 from iibr_core.surfaces import same_surface
 from iibr_core.types import FloatImage, image_size
 
@@ -43,12 +43,11 @@ def fit_to_blur(
     sharp: FloatImage,
     sigma: float,
     least_edge: float,
-    should_stop: ShouldStop = never,
 ) -> FloatImage:
     """The map `sharp` (H, W) with its edges moved so that, blurred by sigma (px), it gives `values` (H, W).
 
     photo: (H, W, 3), sRGB-encoded; it counts, too, in where an edge lies. least_edge: the step that counts as one.
-    Edges move where `sharp` differs from `values`, and from there on. Raises Cancelled once should_stop is true.
+    Edges move where `sharp` differs from `values`, and from there on.
     """
     if sigma > WIDEST_FITTED_SIGMA_PX:
         return sharp
@@ -61,10 +60,10 @@ def fit_to_blur(
     def move(first: int, last: int) -> None:
         _move_edges(photo, fitted, missing, taps, weight, MOVED_EDGES * least_edge, first, last, settled)
 
-    in_bands(find_missing, image_size(values), should_stop)
+    in_bands(find_missing, image_size(values))
     for _ in range(DESCENT_SWEEPS):
         # One band after the other: each move sees what those before it left missing.
-        in_bands(move, image_size(values), should_stop, threads=1)
+        in_bands(move, image_size(values), threads=1)
     return fitted
 
 

@@ -13,7 +13,7 @@ from iibr_core.depth.edges.edge_labels import label_edges, step_distance
 from iibr_core.depth.edges.edge_profiles import FLAT_SHARE
 from iibr_core.inpainting.disparity_by_color import fill_disparity_by_color
 from iibr_core.runtime.kernels import kernel
-from iibr_core.runtime.tiling import ShouldStop, in_bands, never
+from iibr_core.runtime.tiling import in_bands
 from iibr_core.stages import ALL_STAGES, Stages
 from iibr_core.surfaces import is_in_front, same_surface
 from iibr_core.types import FloatImage, image_size
@@ -37,7 +37,6 @@ def resolve_edge_band(
     values: FloatImage,
     least_edge: float,
     unknown: NDArray[np.bool_],
-    should_stop: ShouldStop = never,
     stages: Stages = ALL_STAGES,
 ) -> FloatImage:
     """The map (H, W) with every pixel beside a depth edge on one of its two sides, by the photo (H, W, 3).
@@ -46,27 +45,26 @@ def resolve_edge_band(
     stages: that are on.
     Lone disparities between two surfaces, which maps have that were measured or resampled, are taken for unknown, and
     all that is unknown is filled again: mixed pixels, which look like one another, had passed them on. Then pixels
-    change sides where the colours say so (`label_edges`). Raises Cancelled once should_stop is true.
+    change sides where the colours say so (`label_edges`).
     """
     colors = np.ascontiguousarray(photo, np.float32)
     is_band = step_distance(values, least_edge, BAND_PX, counts_slopes=True) < BAND_PX
-    between, clear = _find_between(values, least_edge, should_stop)
+    between, clear = _find_between(values, least_edge)
     is_measured = clear > LEAST_MEASURED * np.count_nonzero(is_band)
     unsure, filled = unknown, values
     if is_measured and stages.refill_between_surfaces:
-        between |= _find_between(np.where(unknown, np.float32(np.nan), values), least_edge, should_stop)[0]
+        between |= _find_between(np.where(unknown, np.float32(np.nan), values), least_edge)[0]
         unsure = between | unknown
-        filled = fill_disparity_by_color(colors, np.where(unsure, np.float32(np.nan), values), should_stop)
-    return label_edges(colors, filled, unsure, least_edge, should_stop) if stages.label_edge_bands else filled
+        filled = fill_disparity_by_color(colors, np.where(unsure, np.float32(np.nan), values))
+    return label_edges(colors, filled, unsure, least_edge) if stages.label_edge_bands else filled
 
 
-def _find_between(values: FloatImage, least_edge: float, should_stop: ShouldStop) -> tuple[NDArray[np.bool_], int]:
+def _find_between(values: FloatImage, least_edge: float) -> tuple[NDArray[np.bool_], int]:
     """(H, W): lone pixels of no surface, between two, NaN being none; how many lie clearly between plateaus."""
     between = np.zeros(values.shape, np.bool_)
     clear = in_bands(
         lambda first, last: _find_between_rows(values, least_edge, first, last, between),
         image_size(values),
-        should_stop,
     )
     return between, sum(clear)
 

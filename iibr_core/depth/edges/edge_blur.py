@@ -24,7 +24,7 @@ from iibr_core.depth.edges.edge_profiles import (
     walk,
 )
 from iibr_core.runtime.kernels import kernel
-from iibr_core.runtime.tiling import ShouldStop, in_bands, never
+from iibr_core.runtime.tiling import in_bands
 from iibr_core.types import FloatImage, ImageSize
 
 SHARP_PX = 0.8
@@ -51,14 +51,12 @@ MOST_ENLARGED_SPREAD = 0.7
 """The same for a map that was enlarged: networks are surer of some edges than of others, but all are ramps."""
 
 
-def measure_edge_blur(
-    photo: FloatImage, disparity: FloatImage, should_stop: ShouldStop = never, most_spread: float = MOST_SPREAD
-) -> float:
+def measure_edge_blur(photo: FloatImage, disparity: FloatImage, most_spread: float = MOST_SPREAD) -> float:
     """The blur (standard deviation, px) of the depth edges of a (H, W) map; 0 where they are exact or nothing is sure.
 
-    photo: (H, W, 3), sRGB-encoded. most_spread: see MOST_SPREAD. Raises Cancelled once should_stop is true.
+    photo: (H, W, 3), sRGB-encoded. most_spread: see MOST_SPREAD.
     """
-    steps = _steps(photo, disparity, should_stop)
+    steps = _steps(photo, disparity)
     soft = steps[:, steps[2] >= SHARP_PX]
     agree = soft[3, soft[4] > 0].sum()
     if not (agree > 0 and agree >= LEAST_SOFT * steps[3].sum() and _photo_is_sure(soft)):
@@ -87,7 +85,7 @@ def _photo_is_sure(edges: NDArray[np.float32]) -> bool:
     return bool(edges[4].mean() >= 0.5 + CERTAINTY * sqrt(1 / 6 / places))
 
 
-def _steps(photo: FloatImage, disparity: FloatImage, should_stop: ShouldStop) -> NDArray[np.float32]:
+def _steps(photo: FloatImage, disparity: FloatImage) -> NDArray[np.float32]:
     """(5, N): x, y, blur (sigma), height, how far the photo agrees (0..1), of steps; px of the map.
 
     Soft ones are measured on smaller maps, where they are as short as the others.
@@ -96,7 +94,7 @@ def _steps(photo: FloatImage, disparity: FloatImage, should_stop: ShouldStop) ->
     found: list[NDArray[np.float32]] = [np.empty((5, 0), np.float32)]
     scale, least_sigma = 1, 0.0
     while least_edge > 0 and min(disparity.shape) >= (2 if scale == 1 else 4 * SEARCHED_PX):
-        edges = _steps_of_level(photo, disparity, least_edge, least_sigma, MOST_BLUR_PIXELS // scale, should_stop)
+        edges = _steps_of_level(photo, disparity, least_edge, least_sigma, MOST_BLUR_PIXELS // scale)
         edges[:3] *= scale
         found.append(edges)
         if 2 * scale * MEASURED_SIGMA_PX > WIDEST_MEASURED_SIGMA_PX:
@@ -112,7 +110,6 @@ def _steps_of_level(
     least_edge: float,
     least_sigma: float,
     pixels: int,
-    should_stop: ShouldStop,
 ) -> NDArray[np.float32]:
     """(5, N), see `_steps`; looks at as many rows as hold so many pixels."""
     step = max(1, ceil(disparity.size / pixels))
@@ -123,7 +120,7 @@ def _steps_of_level(
         count = _measure_edges(disparity, photo, least_edge, least_sigma, SEARCHED_PX, step, first, last, found)
         return found[:, :count].copy()
 
-    return np.concatenate(in_bands(band, ImageSize(height, width), should_stop), axis=1)
+    return np.concatenate(in_bands(band, ImageSize(height, width)), axis=1)
 
 
 def _weighted_median(values: FloatImage, weights: FloatImage) -> float:

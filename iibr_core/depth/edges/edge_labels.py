@@ -20,7 +20,7 @@ from iibr_core.inpainting.disparity_by_color import nearness
 from iibr_core.inpainting.nearest_known import number_pixels
 from iibr_core.runtime import tiling
 from iibr_core.runtime.kernels import kernel
-from iibr_core.runtime.tiling import ShouldStop, in_pieces, pieces_of
+from iibr_core.runtime.tiling import in_pieces, pieces_of
 from iibr_core.surfaces import SLOPE_SHARE, same_surface
 from iibr_core.types import FloatImage
 
@@ -69,13 +69,11 @@ NEIGHBOURS = AROUND[:8]
 """The eight that touch it."""
 
 
-def label_edges(
-    colors: FloatImage, values: FloatImage, unknown: NDArray[np.bool_], least_edge: float, should_stop: ShouldStop
-) -> FloatImage:
+def label_edges(colors: FloatImage, values: FloatImage, unknown: NDArray[np.bool_], least_edge: float) -> FloatImage:
     """The map (H, W), every pixel beside a step (larger than least_edge) on the side that the photo (H, W, 3) shows.
 
     unknown: (H, W), where the map says nothing by itself. Outside the band its bits stay, and everywhere where colours
-    contradict the map beside steps no more often than an exact one. Raises Cancelled once should_stop is true.
+    contradict the map beside steps no more often than an exact one.
     """
     distance = step_distance(values, least_edge)
     pixels = np.flatnonzero(distance <= LABELLED_PX)
@@ -85,16 +83,16 @@ def label_edges(
     weigh = partial(_weigh_colors, colors, values, TRUST[distance], least_edge, alike)
     away, own, known = distance.reshape(-1), values.reshape(-1), ~unknown.reshape(-1)
     few = pixels[:: ceil(len(pixels) / MOST_MEASURED_PIXELS)]
-    weighed = _in_parts(weigh, few, should_stop)
+    weighed = _in_parts(weigh, few)
     wrong = _measure_errors(weighed, own[few], away[few], known[few])
     if wrong.max() <= EXACT:
         return values
-    other, evidence = weighed if len(few) == len(pixels) else _in_parts(weigh, pixels, should_stop)
+    other, evidence = weighed if len(few) == len(pixels) else _in_parts(weigh, pixels)
     away, own, known = away[pixels], own[pixels], known[pixels]
     odds = np.float32(PRIOR_WEIGHT) * np.log((1 - wrong) / wrong)
     prior = np.where(known, odds[(own > other).astype(np.intp), away], np.float32(0))
     drive = np.where(other == own, np.float32(np.inf), evidence + prior)
-    belief = _mean_field(colors, values, pixels, other, drive, alike, should_stop)
+    belief = _mean_field(colors, values, pixels, other, drive, alike)
     labelled = values.copy()
     labelled.reshape(-1)[pixels] = np.where(belief < 0.5, other, own)
     return labelled
@@ -124,11 +122,10 @@ def _mean_color_step(colors: FloatImage, pixels: NDArray[np.int64]) -> float:
 def _in_parts(
     weigh: Callable[[NDArray[np.int64]], tuple[FloatImage, FloatImage]],
     pixels: NDArray[np.int64],
-    should_stop: ShouldStop,
 ) -> tuple[FloatImage, FloatImage]:
     """What `_weigh_colors` says of pixels (N, flat indices)."""
     parts = [pixels[part] for part in pieces_of(len(pixels), MOST_PIECE_PIXELS)]
-    weighed = in_pieces(weigh, parts, should_stop, tiling.THREADS)
+    weighed = in_pieces(weigh, parts, tiling.THREADS)
     return np.concatenate([pair[0] for pair in weighed]), np.concatenate([pair[1] for pair in weighed])
 
 
@@ -165,7 +162,6 @@ def _mean_field(
     other: FloatImage,
     drive: FloatImage,
     alike: float,
-    should_stop: ShouldStop,
 ) -> FloatImage:
     """(N): how likely each pixel (flat index) is on its own surface rather than on the other."""
     number = np.full(values.shape, -1, np.int32)
@@ -174,11 +170,11 @@ def _mean_field(
     belief = np.ones(len(pixels), np.float32)
     firsts = range(0, len(pixels), MOST_PIECE_PIXELS)
     count = partial(_count_votes, colors, values, pixels, number, other, alike, drive, votes)
-    in_pieces(count, firsts, should_stop, tiling.THREADS)
+    in_pieces(count, firsts, tiling.THREADS)
     for _ in range(PASSES):
         believed, belief = belief, np.empty_like(belief)
         work = partial(_believe, pixels, number, drive, votes, believed, belief)
-        in_pieces(work, firsts, should_stop, tiling.THREADS)
+        in_pieces(work, firsts, tiling.THREADS)
     return belief
 
 

@@ -37,7 +37,7 @@ from iibr_core.depth.pictorial_cues import resize_picture
 from iibr_core.formats.maps.resample import resample_surfaces
 from iibr_core.inpainting.disparity_by_color import fill_disparity_by_color
 from iibr_core.runtime.kernels import kernel
-from iibr_core.runtime.tiling import ShouldStop, in_bands, never
+from iibr_core.runtime.tiling import in_bands
 from iibr_core.stages import ALL_STAGES, Stages
 from iibr_core.surfaces import EDGE_SHARE
 from iibr_core.types import FloatImage, ImageSize, InputError, image_size
@@ -63,7 +63,6 @@ def refine(
     disparity: FloatImage,
     strength: float = 1.0,
     unknown: NDArray[np.bool_] | None = None,
-    should_stop: ShouldStop = never,
     stages: Stages = ALL_STAGES,
     is_enlarged: bool = False,
 ) -> FloatImage:
@@ -76,31 +75,30 @@ def refine(
     Returns (H, W) float32, within the range of what was given but for a slope's continuation and for what is thin: that
     gets the height back which the blur took. Where nothing says that the map is blurred, its bits are those given, but
     in the edge bands of depth edges (`resolve_edge_band`).
-    Raises ValueError if the sizes differ, InputError if strength is not within 0..1 or no disparity is known, Cancelled
-    once should_stop is true.
+    Raises ValueError if the sizes differ, InputError if strength is not within 0..1 or no disparity is known,.
     """
     if photo.shape != (*disparity.shape, 3):
         raise ValueError(f"the photo is {photo.shape}, the disparity {disparity.shape}")
     if not 0 <= strength <= 1:
         raise InputError(f"refinement strength {strength}: give a number from 0 (off) to 1")
     colors = np.ascontiguousarray(photo, np.float32)
-    values = _fill_unknown(colors, disparity, should_stop)
+    values = _fill_unknown(colors, disparity)
     least_edge = EDGE_SHARE * extent(values)
     if strength == 0 or not least_edge > 0:
         return values
     filled = ~np.isfinite(disparity) if unknown is None else unknown | ~np.isfinite(disparity)
     most_spread = MOST_ENLARGED_SPREAD if is_enlarged else MOST_SPREAD
-    sigma = measure_edge_blur(colors, values, should_stop, most_spread) if stages.sharpen_soft_edges else 0.0
+    sigma = measure_edge_blur(colors, values, most_spread) if stages.sharpen_soft_edges else 0.0
     if sigma > WIDE_SIGMA_PX and min(values.shape) > LEAST_SMALL_SIDE_PX * sigma / WORK_SIGMA_PX:
-        sharp = _sharpen_small(colors, values, sigma / WORK_SIGMA_PX, least_edge, should_stop, stages)
+        sharp = _sharpen_small(colors, values, sigma / WORK_SIGMA_PX, least_edge, stages)
     else:
-        sharp = _sharpen(colors, values, sigma, least_edge, should_stop, stages)
-    refined = resolve_edge_band(colors, sharp, least_edge, filled, should_stop, stages)
+        sharp = _sharpen(colors, values, sigma, least_edge, stages)
+    refined = resolve_edge_band(colors, sharp, least_edge, filled, stages)
     return refined if strength == 1 else values + np.float32(strength) * (refined - values)
 
 
 def _sharpen_small(
-    colors: FloatImage, values: FloatImage, times: float, least_edge: float, should_stop: ShouldStop, stages: Stages
+    colors: FloatImage, values: FloatImage, times: float, least_edge: float, stages: Stages
 ) -> FloatImage:
     """A widely blurred map, sharpened at a size at which its blur is narrow, and enlarged again in steps, in each of
     which its edges follow the photo's. times: how much smaller.
@@ -108,20 +106,18 @@ def _sharpen_small(
     height, width = values.shape
     size = ImageSize(round(height / times), round(width / times))
     photo, small = resize_picture(colors, size), resize_picture(values[..., None], size)[..., 0]
-    sigma = measure_edge_blur(photo, small, should_stop, MOST_ENLARGED_SPREAD)
-    sharp = _sharpen(photo, small, sigma, least_edge, should_stop, stages)
+    sigma = measure_edge_blur(photo, small, MOST_ENLARGED_SPREAD)
+    sharp = _sharpen(photo, small, sigma, least_edge, stages)
     while size != values.shape:
         nothing = np.zeros(size, np.bool_)
-        sharp = resolve_edge_band(photo, sharp, least_edge, nothing, should_stop, stages)
+        sharp = resolve_edge_band(photo, sharp, least_edge, nothing, stages)
         is_last = 2 * min(size) >= min(height, width)
         size = ImageSize(height, width) if is_last else ImageSize(2 * size.height, 2 * size.width)
         photo, sharp = resize_picture(colors, size), resample_surfaces(sharp, size)
     return sharp
 
 
-def _sharpen(
-    colors: FloatImage, values: FloatImage, sigma: float, least_edge: float, should_stop: ShouldStop, stages: Stages
-) -> FloatImage:
+def _sharpen(colors: FloatImage, values: FloatImage, sigma: float, least_edge: float, stages: Stages) -> FloatImage:
     """The map with its soft edges snapped to the photo's; its bits where nothing says that it is blurred."""
     if sigma == 0:
         return values
@@ -132,16 +128,15 @@ def _sharpen(
     in_bands(
         lambda first, last: _refine(values, colors, is_near, least_edge, sigma, first, last, refined),
         image_size(values),
-        should_stop,
     )
-    return fit_to_blur(colors, values, refined, sigma, least_edge, should_stop) if stages.fit_to_blur else refined
+    return fit_to_blur(colors, values, refined, sigma, least_edge) if stages.fit_to_blur else refined
 
 
-def _fill_unknown(colors: FloatImage, disparity: FloatImage, should_stop: ShouldStop) -> FloatImage:
+def _fill_unknown(colors: FloatImage, disparity: FloatImage) -> FloatImage:
     known = np.where(np.isfinite(disparity), disparity, np.nan).astype(np.float32)
     if known.size and np.isnan(known).all():
         raise InputError("refining depth edges: no disparity is known; give another map")
-    return fill_disparity_by_color(colors, known, should_stop) if np.isnan(known).any() else known
+    return fill_disparity_by_color(colors, known) if np.isnan(known).any() else known
 
 
 @kernel

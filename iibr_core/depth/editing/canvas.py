@@ -21,7 +21,7 @@ from iibr_core.depth.editing.stroke_distance import Window, falloff, measure_fro
 from iibr_core.depth.editing.surface import surface_at
 from iibr_core.depth.editing.touched_colors import Guide, guide_of
 from iibr_core.runtime.kernels import kernel
-from iibr_core.runtime.tiling import ShouldStop, never, raise_if_stopped
+from iibr_core.runtime.work import raise_if_stopped
 from iibr_core.types import FloatImage
 
 MAPS_KEPT = 8
@@ -30,16 +30,13 @@ SIGNS: dict[BrushTool, float] = {"nearer": 1.0, "farther": -1.0}
 MOST = float(np.finfo(np.float32).max)
 
 
-def apply_edits(
-    photo: FloatImage, disparity: FloatImage, edits: DepthEdits, should_stop: ShouldStop = never
-) -> FloatImage:
+def apply_edits(photo: FloatImage, disparity: FloatImage, edits: DepthEdits) -> FloatImage:
     """The map with all its edits: (H, W) float32, finite; the map itself where nothing is edited.
 
     photo: (H, W, 3), sRGB-encoded, guides the strokes. disparity: (H, W), any unit in which larger is closer.
-    Raises InputError where the edits are not sound (see `require_sound`) or no disparity is known, Cancelled once
-    should_stop is true.
+    Raises InputError where the edits are not sound (see `require_sound`) or no disparity is known.
     """
-    return DepthCanvas(photo, disparity).apply(edits, should_stop)
+    return DepthCanvas(photo, disparity).apply(edits)
 
 
 class DepthCanvas:
@@ -63,7 +60,7 @@ class DepthCanvas:
         self._open: _OpenStroke | None = None
         self._trail: list[tuple[int, FloatImage]] = []  # (strokes, map) before the last ones, to go back to
 
-    def apply(self, edits: DepthEdits, should_stop: ShouldStop = never) -> FloatImage:
+    def apply(self, edits: DepthEdits) -> FloatImage:
         """The map with these edits, (H, W) float32; not to be written to. Raises as `apply_edits` does; what was
         painted until then is kept.
         """
@@ -75,9 +72,9 @@ class DepthCanvas:
             self._toned = apply_tone(self._given, edits, self._extent)
             self._forget(edits)
         self._return_to(edits)
-        self._paint_through(edits.strokes[len(self._edits.strokes) : -MAPS_KEPT], should_stop)
+        self._paint_through(edits.strokes[len(self._edits.strokes) : -MAPS_KEPT])
         for stroke in edits.strokes[len(self._edits.strokes) :]:
-            raise_if_stopped(should_stop)
+            raise_if_stopped()
             self._begin(stroke)
         return self._values
 
@@ -130,7 +127,7 @@ class DepthCanvas:
         count, self._values = self._trail.pop()
         self._open, self._edits = None, replace(self._edits, strokes=done[:count])
 
-    def _paint_through(self, strokes: tuple[Stroke, ...], should_stop: ShouldStop) -> None:
+    def _paint_through(self, strokes: tuple[Stroke, ...]) -> None:
         """Paint strokes of which none is taken back by itself: no map between them is kept, so only what they cover is
         worked on.
         """
@@ -139,7 +136,7 @@ class DepthCanvas:
         self._open, self._values = None, self._values.copy()
         under, distance = self._values.copy(), np.ones(self._values.shape, np.float32)
         for stroke in strokes:
-            raise_if_stopped(should_stop)
+            raise_if_stopped()
             covered = self._lay(self._values, stroke, 0, _OpenStroke(under, distance, self._target(stroke, under)))
             for window in covered:
                 under[window], distance[window] = self._values[window], 1

@@ -8,7 +8,6 @@ from pathlib import Path
 
 from iibr_core.depth.estimates import Estimate
 from iibr_core.runtime.extras import is_installed
-from iibr_core.runtime.tiling import ShouldStop
 from iibr_core.types import ImageSize, Photo, ReportProgress
 
 
@@ -43,7 +42,7 @@ class LocalModel:
         return sum(path.stat().st_size for path in self.weights)
 
 
-Run = Callable[[Photo, ShouldStop, ReportProgress], Estimate]
+Run = Callable[[Photo, ReportProgress], Estimate]
 
 
 @dataclass(frozen=True)

@@ -27,7 +27,6 @@ from iibr_core.depth.estimators.hub import (
 )
 from iibr_core.formats.files import is_file, printable, read_text, reason_of, stays_within
 from iibr_core.formats.outputs import write_file
-from iibr_core.runtime.tiling import ShouldStop, never
 from iibr_core.types import InputError, ReportProgress, ignore_progress
 
 VERIFIED = "iibr-verified.json"
@@ -60,17 +59,16 @@ def download(
     commit: str,
     patterns: Sequence[str],
     report_progress: ReportProgress = ignore_progress,
-    should_stop: ShouldStop = never,
 ) -> Path:
     """Bring those files of a commit that match a pattern into the hub's cache; returns their folder.
 
     A file grows elsewhere in the cache and comes into the folder once it is what the hub states. report_progress: told
-    bytes that are here and bytes in all. Raises InputError where it fails, Cancelled once should_stop is true. The next
+    bytes that are here and bytes in all. Raises InputError where it fails. The next
     call goes on from there.
     """
-    with failures_told(repository, hub_cache(), should_stop):
-        stated = _stated_files(repository, commit, patterns, should_stop)
-        folder = _fetch(repository, commit, stated, report_progress, should_stop)
+    with failures_told(repository, hub_cache()):
+        stated = _stated_files(repository, commit, patterns)
+        folder = _fetch(repository, commit, stated, report_progress)
         digests = {name: file.digest for name, file in stated.items()}
         for name in _unlike(folder, digests):
             _remove(folder / name)
@@ -101,11 +99,9 @@ def _model_cache(repository: str) -> Path:
     return hub_cache() / f"models--{repository.replace('/', '--')}"
 
 
-def _stated_files(
-    repository: str, commit: str, patterns: Sequence[str], should_stop: ShouldStop
-) -> dict[str, _StatedFile]:
+def _stated_files(repository: str, commit: str, patterns: Sequence[str]) -> dict[str, _StatedFile]:
     """What the hub states for the files that are wanted, by name. Raises InputError where it states none."""
-    about = read_json(f"api/models/{repository}/revision/{commit}?blobs=true", should_stop)
+    about = read_json(f"api/models/{repository}/revision/{commit}?blobs=true")
     try:
         told, files = str(about["sha"]), [(str(file["rfilename"]), file) for file in about["siblings"]]
         wanted = {name: file for name, file in files if any(fnmatch(name, pattern) for pattern in patterns)}
@@ -131,7 +127,6 @@ def _fetch(
     commit: str,
     stated: Mapping[str, _StatedFile],
     report_progress: ReportProgress,
-    should_stop: ShouldStop,
 ) -> Path:
     """Files that are there stay as they are."""
     cache = _model_cache(repository)
@@ -144,7 +139,7 @@ def _fetch(
 
         if not is_file(folder / name):
             (growing / name).parent.mkdir(parents=True, exist_ok=True)
-            _grow(growing / name, f"{repository}/resolve/{commit}/{quote(name)}", file.size, report, should_stop)
+            _grow(growing / name, f"{repository}/resolve/{commit}/{quote(name)}", file.size, report)
             if _digest_of(growing / name, file.digest) != file.digest:
                 _remove(growing / name)
                 raise InputError(_unlike_words(repository, commit, name))
@@ -155,16 +150,16 @@ def _fetch(
     return folder
 
 
-def _grow(path: Path, url: str, size: int, report: Callable[[int], None], should_stop: ShouldStop) -> None:
+def _grow(path: Path, url: str, size: int, report: Callable[[int], None]) -> None:
     """Bring the rest of a file, which has this size in the end."""
     with path.open("ab") as file:
         done = file.tell() if file.tell() <= size else file.truncate(0)
         if done == size:
             return
-        with hub_answer(url, should_stop, done) as answer:
+        with hub_answer(url, done) as answer:
             if answer.status_code != PARTIAL:
                 done = file.truncate(0)
-            for chunk in chunks_of(answer, should_stop, size - done):
+            for chunk in chunks_of(answer, size - done):
                 file.write(chunk)
                 done += len(chunk)
                 report(done)

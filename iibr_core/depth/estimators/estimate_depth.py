@@ -15,20 +15,18 @@ from iibr_core.depth.estimators.config import CONFIG, PREPROCESSOR
 from iibr_core.depth.estimators.depth_estimator import LocalModel
 from iibr_core.depth.estimators.download import require_unchanged
 from iibr_core.runtime.machine import free_memory_bytes
-from iibr_core.runtime.tiling import ShouldStop, never
 from iibr_core.types import InputError, Photo, ReportProgress, ignore_progress
 
 
 def estimate_with(
     model: LocalModel,
     photo: Photo,
-    should_stop: ShouldStop = never,
     report_progress: ReportProgress = ignore_progress,
 ) -> Estimate:
     """What a model makes of a photo, at a size of the model's choosing; from the cache where it is there.
 
     Its input is made smaller where memory is scarce. Raises InputError where the model cannot
-    be used or its result is of no use, Cancelled where should_stop says so.
+    be used or its result is of no use.
     """
     require_unchanged(model.folder)
     photo = photo_in_srgb(photo)
@@ -39,7 +37,7 @@ def estimate_with(
     found = estimate_cache.load(key)
     if found is None:
         begun_s = time.monotonic()
-        found = run(photo, should_stop, report_progress)
+        found = run(photo, report_progress)
         _require_use(model, found)
         estimate_cache.store(key, found)
         estimate_cache.store_seconds(model.title, time.monotonic() - begun_s)

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from iibr_core.formats.files import reason_of
-from iibr_core.runtime.tiling import Cancelled, ShouldStop, raise_if_stopped
+from iibr_core.runtime.work import Cancelled, in_this_job, is_stopped, raise_if_stopped
 from iibr_core.types import InputError
 
 TIMEOUT_S = 10
@@ -37,10 +37,10 @@ def hub_cache() -> Path:
     return Path(constants.HF_HUB_CACHE)
 
 
-def read_json(path: str, should_stop: ShouldStop) -> Any:
+def read_json(path: str) -> Any:
     """What the hub's interface answers. Raises as `hub_answer` does, HubRefusal for what is no JSON."""
-    with hub_answer(path, should_stop) as answer:
-        text = b"".join(chunks_of(answer, should_stop, MOST_ANSWER_BYTES))
+    with hub_answer(path) as answer:
+        text = b"".join(chunks_of(answer, MOST_ANSWER_BYTES))
     try:
         return json.loads(text)
     except (ValueError, RecursionError) as error:
@@ -48,11 +48,11 @@ def read_json(path: str, should_stop: ShouldStop) -> Any:
 
 
 @contextmanager
-def hub_answer(path: str, should_stop: ShouldStop, begin: int = 0) -> Iterator[Any]:
+def hub_answer(path: str, begin: int = 0) -> Iterator[Any]:
     """The answer to a request for a path, from byte begin on if the hub can: its status is PARTIAL then.
 
     Raises HubRefusal for an answer of another status, and what the library's client raises for networks that fail.
-    While the block runs, the connection ends once should_stop is true.
+    While the block runs, the connection ends once the job is stopped.
     """
     from huggingface_hub import constants, get_session
     from huggingface_hub.utils import build_hf_headers  # type: ignore[attr-defined]
@@ -66,15 +66,15 @@ def hub_answer(path: str, should_stop: ShouldStop, begin: int = 0) -> Iterator[A
     with get_session().stream("GET", url, headers=headers, timeout=TIMEOUT_S, follow_redirects=True) as answer:
         if not answer.is_success:
             raise HubRefusal(_refusal(answer.status_code, answer.headers.get("Retry-After", "")))
-        with _ending(answer, should_stop):
+        with _ending(answer):
             yield answer
 
 
-def chunks_of(answer: Any, should_stop: ShouldStop, most_bytes: int) -> Iterator[bytes]:
-    """What comes, as it comes. Raises Cancelled once should_stop is true, HubRefusal for more bytes than most_bytes."""
+def chunks_of(answer: Any, most_bytes: int) -> Iterator[bytes]:
+    """What comes, as it comes. Raises HubRefusal for more bytes than most_bytes."""
     count = 0
     for chunk in answer.iter_raw():
-        raise_if_stopped(should_stop)
+        raise_if_stopped()
         count += len(chunk)
         if count > most_bytes:
             raise HubRefusal("it sends more than it states; check HF_ENDPOINT")
@@ -82,14 +82,14 @@ def chunks_of(answer: Any, should_stop: ShouldStop, most_bytes: int) -> Iterator
 
 
 @contextmanager
-def failures_told(repository: str, cache: Path, should_stop: ShouldStop) -> Iterator[None]:
+def failures_told(repository: str, cache: Path) -> Iterator[None]:
     """Whatever a download raises becomes InputError, in one line that says what to do, or Cancelled."""
     try:
         yield
     except (Cancelled, InputError):
         raise
     except Exception as error:  # whatever the library's ways to the network raise: they change with its versions
-        if should_stop():
+        if is_stopped():
             raise Cancelled from error
         raise InputError(f"{repository} cannot be downloaded: {_advice(error, cache)}") from error
 
@@ -121,19 +121,19 @@ def _refusal(status: int, retry_after: str) -> str:
 
 
 @contextmanager
-def _ending(answer: Any, should_stop: ShouldStop) -> Iterator[None]:
-    """While it is entered, the connection is cut once should_stop is true: reading from it ends."""
+def _ending(answer: Any) -> Iterator[None]:
+    """While it is entered, the connection is cut once the job is stopped: reading from it ends."""
     is_over = threading.Event()
     connection = answer.extensions["network_stream"].get_extra_info("socket")
 
     def look() -> None:
         while not is_over.wait(LOOK_S):
-            if should_stop():
+            if is_stopped():
                 with suppress(OSError):  # it is over already
                     socket.socket.shutdown(connection, socket.SHUT_RDWR)
                 return
 
-    looking = threading.Thread(target=look, name="iibr-hub", daemon=True)
+    looking = threading.Thread(target=in_this_job(look), name="iibr-hub", daemon=True)
     looking.start()
     try:
         yield

@@ -19,7 +19,7 @@ from iibr_core.depth.estimators.depth_estimator import Family, KnownModel, Local
 from iibr_core.depth.estimators.onnx_file import depth_output, external_files, open_session, picture_input
 from iibr_core.depth.estimators.preparation import Preparation, affordable_pixels, input_size, network_input
 from iibr_core.formats.files import is_file, reason_of
-from iibr_core.runtime.tiling import Cancelled, ShouldStop
+from iibr_core.runtime.work import Cancelled, is_stopped
 from iibr_core.types import ImageSize, InputError, Photo, ReportProgress
 
 USUAL_PREPARATION = Preparation(ImageSize(518, 518), True, 14, False, (0.485, 0.456, 0.406), (0.229, 0.224, 0.225))
@@ -59,12 +59,10 @@ def input_for(model: LocalModel, size: ImageSize, memory_bytes: int) -> OnnxInpu
     return OnnxInput(preparation, input_size(preparation, size, pixels), is_metric)
 
 
-def run_onnx(
-    model: LocalModel, wanted: OnnxInput, photo: Photo, should_stop: ShouldStop, report_progress: ReportProgress
-) -> Estimate:
+def run_onnx(model: LocalModel, wanted: OnnxInput, photo: Photo, report_progress: ReportProgress) -> Estimate:
     """Depth of a photo in sRGB, at the size of the model's output; non-finite values as they come.
 
-    Raises InputError where the file is no depth model, Cancelled once should_stop is true.
+    Raises InputError where the file is no depth model.
     """
     file = model.weights[0]
     report_progress(0, 0, f"loading {model.title}")
@@ -75,7 +73,7 @@ def run_onnx(
 
     def outputs_at(size: ImageSize) -> dict[str, Any]:
         values = taken.arranged(network_input(photo.pixels, preparation, size))
-        return _run(session, file, {taken.name: values}, should_stop)
+        return _run(session, file, {taken.name: values})
 
     size = taken.size_for(wanted.size)
     try:
@@ -96,7 +94,7 @@ def _size_for_any(preparation: Preparation, size: ImageSize, wanted: ImageSize) 
     return input_size(replace(preparation, multiple=COMMON_MULTIPLE), size, math.prod(wanted))
 
 
-def _run(session: Any, file: Path, values: dict[str, Any], should_stop: ShouldStop) -> dict[str, Any]:
+def _run(session: Any, file: Path, values: dict[str, Any]) -> dict[str, Any]:
     """All outputs by name. The session runs in a thread of its own, so that it can be stopped."""
     import onnxruntime
 
@@ -104,7 +102,7 @@ def _run(session: Any, file: Path, values: dict[str, Any], should_stop: ShouldSt
     with ThreadPoolExecutor(1, "iibr-onnx") as thread:
         running = thread.submit(session.run, None, values, options)
         while not wait([running], LOOK_S).done:
-            options.terminate = options.terminate or should_stop()
+            options.terminate = options.terminate or is_stopped()
     if options.terminate:
         raise Cancelled
     try:

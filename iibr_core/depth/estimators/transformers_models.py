@@ -20,7 +20,7 @@ from iibr_core.depth.estimators.preparation import Preparation, affordable_pixel
 from iibr_core.formats.files import is_folder, reason_of
 from iibr_core.formats.maps.resample import resample_surfaces
 from iibr_core.runtime.machine import core_count
-from iibr_core.runtime.tiling import ShouldStop, raise_if_stopped
+from iibr_core.runtime.work import raise_if_stopped
 from iibr_core.types import FloatImage, ImageSize, InputError, Photo, ReportProgress, image_size
 
 if TYPE_CHECKING:
@@ -83,11 +83,11 @@ def _width_of(config: dict[str, Any]) -> int:
 
 
 def run_transformers(
-    model: LocalModel, wanted: TransformersInput, photo: Photo, should_stop: ShouldStop, report_progress: ReportProgress
+    model: LocalModel, wanted: TransformersInput, photo: Photo, report_progress: ReportProgress
 ) -> Estimate:
     """Depth of a photo in sRGB, at the size of the model's output; non-finite values as they come.
 
-    Raises InputError where the folder holds something else than a depth model, Cancelled once should_stop is true.
+    Raises InputError where the folder holds something else than a depth model.
     """
     report_progress(0, 0, f"loading {model.title}")
     import torch
@@ -98,7 +98,7 @@ def run_transformers(
     pixels = _network_tensor(photo.pixels, wanted).to(device)
     doing = f"estimating depth with {model.title}"
     try:
-        with torch.inference_mode(), _LayerProgress(network, doing, should_stop, report_progress):
+        with torch.inference_mode(), _LayerProgress(network, doing, report_progress):
             output = network.to(device)(pixel_values=pixels)
     except (RuntimeError, ValueError, IndexError, TypeError) as error:
         raise InputError(f"{model.title} failed on this photo ({reason_of(error)})") from error
@@ -128,11 +128,9 @@ def _load_network(model: LocalModel) -> Any:
 class _LayerProgress:
     """While it is entered, a network asks before each of its layers whether to go on, and tells how far it is."""
 
-    def __init__(
-        self, network: torch.nn.Module, doing: str, should_stop: ShouldStop, report_progress: ReportProgress
-    ) -> None:
+    def __init__(self, network: torch.nn.Module, doing: str, report_progress: ReportProgress) -> None:
         self._layers = [layer for layer in network.modules() if not any(layer.children())]
-        self._doing, self._should_stop, self._report_progress = doing, should_stop, report_progress
+        self._doing, self._report_progress = doing, report_progress
         self._seen = 0
 
     def __enter__(self) -> None:
@@ -143,7 +141,7 @@ class _LayerProgress:
             hook.remove()
 
     def _before(self, *_: object) -> None:
-        raise_if_stopped(self._should_stop)
+        raise_if_stopped()
         self._seen += 1
         # A layer that runs twice must not make it more than all.
         self._report_progress(min(self._seen, len(self._layers)), len(self._layers), self._doing)

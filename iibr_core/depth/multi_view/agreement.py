@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from iibr_core.color import encoded_from_stored
 from iibr_core.inpainting.disparity_by_color import fill_disparity_by_color
-from iibr_core.runtime.tiling import ShouldStop, never, raise_if_stopped
+from iibr_core.runtime.work import raise_if_stopped
 from iibr_core.types import FloatImage, ReportProgress, StoredColors, ViewOffset, ignore_progress
 
 AGREE_PX = 1.0
@@ -24,28 +24,25 @@ def reconcile(
     views: Sequence[StoredColors],
     maps: Sequence[FloatImage],
     offsets: Sequence[ViewOffset],
-    should_stop: ShouldStop = never,
     report_progress: ReportProgress = ignore_progress,
 ) -> list[FloatImage]:
     """The maps, (H, W) each, with what the others do not bear out filled by what looks like it around; a map that
-    nothing bears out stays as it is. views: (H, W, 3) each. Raises Cancelled once should_stop is true.
+    nothing bears out stays as it is. views: (H, W, 3) each.
     """
     reconciled = []
     for index, (colors, values) in enumerate(zip(views, maps)):
-        is_confirmed = find_confirmed(maps, offsets, index, should_stop)
+        is_confirmed = find_confirmed(maps, offsets, index)
         if is_confirmed.any() and not is_confirmed.all():
             known = np.where(is_confirmed, values, np.float32(np.nan))
-            values = fill_disparity_by_color(encoded_from_stored(colors), known, should_stop)
+            values = fill_disparity_by_color(encoded_from_stored(colors), known)
         reconciled.append(values)
         report_progress(len(reconciled), len(maps), "finding disparity")
     return reconciled
 
 
-def find_confirmed(
-    maps: Sequence[FloatImage], offsets: Sequence[ViewOffset], index: int, should_stop: ShouldStop = never
-) -> NDArray[np.bool_]:
+def find_confirmed(maps: Sequence[FloatImage], offsets: Sequence[ViewOffset], index: int) -> NDArray[np.bool_]:
     """Where one of the maps (H, W) is borne out: another one has the same point, and no more look through it, to what
-    lies behind, than have it. What stands before it there says nothing. Raises Cancelled once should_stop is true.
+    lies behind, than have it. What stands before it there says nothing.
     """
     values = maps[index]
     rows, columns = np.indices(values.shape, np.float32)
@@ -54,7 +51,7 @@ def find_confirmed(
         t, s = at.t - offsets[index].t, at.s - offsets[index].s
         if other == index or t == s == 0:
             continue
-        raise_if_stopped(should_stop)
+        raise_if_stopped()
         nearer = _sample(there, rows - values * np.float32(t), columns - values * np.float32(s)) - values
         most = np.float32(AGREE_PX / max(abs(t), abs(s)))
         having += np.abs(nearer) <= most

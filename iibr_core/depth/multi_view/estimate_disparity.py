@@ -18,7 +18,7 @@ from iibr_core.depth.multi_view.semi_global import choose_disparity
 from iibr_core.formats.maps.resample import resample_surfaces
 from iibr_core.inpainting.disparity_by_color import fill_disparity_by_color
 from iibr_core.runtime.kernels import kernel
-from iibr_core.runtime.tiling import ShouldStop, in_bands, never
+from iibr_core.runtime.tiling import in_bands
 from iibr_core.types import (
     FloatImage,
     InputError,
@@ -61,28 +61,25 @@ class CoarseDisparity:
     times_dearer: float
 
 
-def estimate_coarse(
-    views: Sequence[StoredColors], offsets: Sequence[ViewOffset], reference: int, should_stop: ShouldStop = never
-) -> CoarseDisparity:
+def estimate_coarse(views: Sequence[StoredColors], offsets: Sequence[ViewOffset], reference: int) -> CoarseDisparity:
     """A first map, and which disparities there are: all that shift no view by more than MOST_SHIFT_SHARE are tried.
 
     views: (H, W, 3) each, of equal size. offsets: their viewpoints, from any origin. reference: index of the view that
-    the map is for. Raises InputError where there are fewer than two viewpoints or the views are too small, Cancelled
-    once should_stop is true.
+    the map is for. Raises InputError where there are fewer than two viewpoints or the views are too small,.
     """
     size = image_size(views[reference])
     shrink = -(-max(size) // SMALL_SIDE_PX)
     if min(size) // shrink < LEAST_SIDE_PX:
         raise InputError(f"views of {size} are too small or too narrow to find their disparity: 8 px at least")
-    small = _matching_views(views, offsets, reference, shrink, should_stop)
+    small = _matching_views(views, offsets, reference, shrink)
     step = STEP_PX / small.reach
     most = MOST_SHIFT_SHARE * max(small.luma.shape) / small.reach
     disparities = np.arange(-most, most + step, step, dtype=np.float32)
-    values, sureness = choose_disparity(sweep(small, disparities, should_stop), small.luma, disparities, should_stop)
-    values = _median(values, should_stop)
+    values, sureness = choose_disparity(sweep(small, disparities), small.luma, disparities)
+    values = _median(values)
     is_sure = sureness >= SURE_MATCH
     if len(small.textures) <= FEW_VIEWS:
-        is_sure &= _agrees(small, values, disparities, should_stop)
+        is_sure &= _agrees(small, values, disparities)
     low, high = np.quantile(values[is_sure] if is_sure.any() else values, [RARE, 1 - RARE])
     margin = MARGIN_STEPS * step
     whole = resample_surfaces(np.clip(values, low, high) * np.float32(shrink), size)
@@ -97,14 +94,13 @@ def estimate_disparity(
     offsets: Sequence[ViewOffset],
     reference: int,
     range_px: tuple[float, float],
-    should_stop: ShouldStop = never,
     report_progress: ReportProgress = ignore_progress,
 ) -> FloatImage:
     """The disparity (H, W) of the reference view, px per view step, within a range (px per view step).
 
     As `estimate_coarse` otherwise, which finds the range. A range of more than MOST_STEPS steps is swept more coarsely.
     """
-    matched = _matching_views(views, offsets, reference, 1, should_stop)
+    matched = _matching_views(views, offsets, reference, 1)
     disparities = np.linspace(*range_px, sweep_steps(range_px, matched.reach) + 1, dtype=np.float32)
     done, total = 0.0, map_work(len(disparities), len(matched.textures))
 
@@ -113,16 +109,14 @@ def estimate_disparity(
         done += work
         report_progress(done, total, FINDING)
 
-    values, _ = choose_disparity(
-        sweep(matched, disparities, should_stop, advance), matched.luma, disparities, should_stop
-    )
+    values, _ = choose_disparity(sweep(matched, disparities, advance), matched.luma, disparities)
     advance(CHOOSING_WORK * len(disparities))
-    values = _median(values, should_stop)
+    values = _median(values)
     if len(matched.textures) <= FEW_VIEWS:
-        is_seen = _agrees(matched, values, disparities, should_stop, advance)
-        values = _fill_unseen(views[reference], values, is_seen, should_stop)
+        is_seen = _agrees(matched, values, disparities, advance)
+        values = _fill_unseen(views[reference], values, is_seen)
         advance(CHOOSING_WORK * len(disparities))
-    return _refine(matched, values, range_px, should_stop)
+    return _refine(matched, values, range_px)
 
 
 def refine_disparity(
@@ -131,10 +125,9 @@ def refine_disparity(
     reference: int,
     values: FloatImage,
     range_px: tuple[float, float],
-    should_stop: ShouldStop = never,
 ) -> FloatImage:
     """The same from disparity (H, W) that is off by less than a pixel already: nothing is swept."""
-    return _refine(_matching_views(views, offsets, reference, 1, should_stop), values, range_px, should_stop)
+    return _refine(_matching_views(views, offsets, reference, 1), values, range_px)
 
 
 def map_work(steps: int, views: int) -> float:
@@ -159,19 +152,16 @@ def _matching_views(
     offsets: Sequence[ViewOffset],
     reference: int,
     shrink: int,
-    should_stop: ShouldStop,
 ) -> MatchingViews:
     if len({(offset.t, offset.s) for offset in offsets}) < 2:
         raise InputError("all views have the same viewpoint, so no depth can be found")
     chosen = choose_views(list(offsets), reference)
     lumas = [luma_of(views[index], shrink) for index in chosen]
-    return matching_views(lumas, [offsets[index] for index in chosen], should_stop)
+    return matching_views(lumas, [offsets[index] for index in chosen])
 
 
-def _refine(
-    matched: MatchingViews, values: FloatImage, range_px: tuple[float, float], should_stop: ShouldStop
-) -> FloatImage:
-    refined: FloatImage = np.clip(refine_by_gradients(matched, values, should_stop), *range_px).astype(np.float32)
+def _refine(matched: MatchingViews, values: FloatImage, range_px: tuple[float, float]) -> FloatImage:
+    refined: FloatImage = np.clip(refine_by_gradients(matched, values), *range_px).astype(np.float32)
     return refined
 
 
@@ -179,35 +169,30 @@ def _agrees(
     views: MatchingViews,
     values: FloatImage,
     disparities: NDArray[np.float32],
-    should_stop: ShouldStop,
     report_step: Callable[[], None] = lambda: None,
 ) -> NDArray[np.bool_]:
     """Where the farthest view, matched in its turn, gives a place the same disparity (H, W): what both of them see."""
     other = len(views.textures) - 1
     order = [other, *(index for index in range(other))]
     turned = MatchingViews(views.textures[order], views.offsets[order] - views.offsets[other], views.textures[other])
-    seen, _ = choose_disparity(
-        sweep(turned, disparities, should_stop, report_step), turned.luma, disparities, should_stop
-    )
-    seen = _median(seen, should_stop)
+    seen, _ = choose_disparity(sweep(turned, disparities, report_step), turned.luma, disparities)
+    seen = _median(seen)
     offsets = [ViewOffset(float(t), float(s)) for t, s in views.offsets[[0, other]]]
-    return find_confirmed([values, seen], offsets, 0, should_stop)
+    return find_confirmed([values, seen], offsets, 0)
 
 
-def _fill_unseen(
-    colors: StoredColors, values: FloatImage, is_seen: NDArray[np.bool_], should_stop: ShouldStop
-) -> FloatImage:
+def _fill_unseen(colors: StoredColors, values: FloatImage, is_seen: NDArray[np.bool_]) -> FloatImage:
     """What one view alone sees takes the disparity of what looks like it around."""
     if not is_seen.any():
         return values
     known = np.where(is_seen, values, np.float32(np.nan))
-    return fill_disparity_by_color(encoded_from_stored(colors), known, should_stop)
+    return fill_disparity_by_color(encoded_from_stored(colors), known)
 
 
-def _median(values: FloatImage, should_stop: ShouldStop) -> FloatImage:
+def _median(values: FloatImage) -> FloatImage:
     """Of 5x5 pixels around each, so that no lone pixel stands out; cut at the borders."""
     result = np.empty_like(values)
-    in_bands(lambda first, last: _medians(values, first, last, result), image_size(values), should_stop)
+    in_bands(lambda first, last: _medians(values, first, last, result), image_size(values))
     return result
 
 

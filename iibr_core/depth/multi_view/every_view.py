@@ -24,7 +24,6 @@ from iibr_core.depth.multi_view.estimate_disparity import (
 from iibr_core.inpainting.disparity_by_color import fill_disparity_by_color
 from iibr_core.rendering.photo_rays import rays_of_photo
 from iibr_core.rendering.renderer import open_renderer
-from iibr_core.runtime.tiling import ShouldStop, never
 from iibr_core.types import FloatImage, ReportProgress, StoredColors, ViewOffset, ignore_progress, image_size
 
 CARRIED_FROM = 4
@@ -37,14 +36,12 @@ def estimate_all(
     views: Sequence[StoredColors],
     offsets: Sequence[ViewOffset],
     range_px: tuple[float, float],
-    should_stop: ShouldStop = never,
     report_progress: ReportProgress = ignore_progress,
 ) -> list[FloatImage]:
     """The disparity (H, W) of each view, px per view step, within a range (`estimate_coarse` finds it), in agreement
     with the others.
 
-    views: (H, W, 3) each, of equal size. offsets: their viewpoints. Raises InputError where these are all one,
-    Cancelled once should_stop is true.
+    views: (H, W, 3) each, of equal size. offsets: their viewpoints. Raises InputError where these are all one.
     """
     maps: dict[int, FloatImage] = {}
     matching = {index: _matching_work(offsets, index, range_px) for index in matched_views(offsets)}
@@ -56,16 +53,16 @@ def estimate_all(
         return lambda part, whole, doing: report_progress(before + work * part / whole, total, doing)
 
     for index, work in matching.items():
-        maps[index] = estimate_disparity(views, offsets, index, range_px, should_stop, stage(done, work))
+        maps[index] = estimate_disparity(views, offsets, index, range_px, stage(done, work))
         done += work
     matched = dict(maps)
     for index in sorted(between):
-        values = _carry(matched, views, offsets, index, should_stop)
-        maps[index] = refine_disparity(views, offsets, index, values, range_px, should_stop)
+        values = _carry(matched, views, offsets, index)
+        maps[index] = refine_disparity(views, offsets, index, values, range_px)
         done += 1
         report_progress(done, total, FINDING)
     ordered = [maps[index] for index in range(len(views))]
-    return reconcile(views, ordered, offsets, should_stop, stage(done, reconciling))
+    return reconcile(views, ordered, offsets, stage(done, reconciling))
 
 
 def _matching_work(offsets: Sequence[ViewOffset], index: int, range_px: tuple[float, float]) -> float:
@@ -91,7 +88,6 @@ def _carry(
     views: Sequence[StoredColors],
     offsets: Sequence[ViewOffset],
     index: int,
-    should_stop: ShouldStop,
 ) -> FloatImage:
     """The disparity (H, W) that maps of other views show in this one; what none of them shows takes what looks like
     it around. Where they show nothing at all, the nearest map.
@@ -102,13 +98,11 @@ def _carry(
         return ViewOffset(at.t - offsets[other].t, at.s - offsets[other].s)
 
     nearest = sorted(maps, key=lambda other: hypot(*away(other)))[:CARRIED_FROM]
-    with open_renderer(should_stop) as renderer:
+    with open_renderer() as renderer:
         for other in nearest:
-            rays = rays_of_photo(
-                encoded_from_stored(views[other]), maps[other], max(map(abs, away(other))), 0, should_stop
-            )
+            rays = rays_of_photo(encoded_from_stored(views[other]), maps[other], max(map(abs, away(other))), 0)
             seen, _ = renderer.seen(rays, away(other))
             np.copyto(carried, seen.disparity, where=np.isnan(carried) & ~seen.occluded)
     if np.isnan(carried).all():
         return maps[nearest[0]]
-    return fill_disparity_by_color(encoded_from_stored(views[index]), carried, should_stop)
+    return fill_disparity_by_color(encoded_from_stored(views[index]), carried)

@@ -8,7 +8,8 @@ import numpy as np
 
 from iibr_core.depth.multi_view.matching import STEP_PX, MatchingViews
 from iibr_core.runtime.kernels import kernel
-from iibr_core.runtime.tiling import ShouldStop, in_bands, never, raise_if_stopped
+from iibr_core.runtime.tiling import in_bands
+from iibr_core.runtime.work import raise_if_stopped
 from iibr_core.types import FloatImage, image_size
 
 REFINEMENT_ROUNDS = 2
@@ -23,31 +24,26 @@ SOLVER_STEPS = 40
 LITTLE = np.float32(1e-7)
 
 
-def refine_by_gradients(views: MatchingViews, disparity: FloatImage, should_stop: ShouldStop = never) -> FloatImage:
-    """The disparity (H, W) of the reference, moved between the steps of a sweep, never far.
-
-    Raises Cancelled once should_stop is true.
-    """
+def refine_by_gradients(views: MatchingViews, disparity: FloatImage) -> FloatImage:
+    """The disparity (H, W) of the reference, moved between the steps of a sweep, never far."""
     size = image_size(disparity)
     longest = np.float32(STEP_PX / max(views.reach, 1e-6))
     curvature, pull = np.empty(size, np.float32), np.empty(size, np.float32)
     for _ in range(REFINEMENT_ROUNDS):
-        _measure_all(views, disparity, curvature, pull, should_stop)
+        _measure_all(views, disparity, curvature, pull)
         target = disparity + np.clip(-pull / (curvature + LITTLE), -longest, longest)
         across, down = np.zeros(size, np.float32), np.zeros(size, np.float32)
         _weigh_bends(views.luma, disparity, across, down)
-        raise_if_stopped(should_stop)
-        disparity = _smooth(disparity, target, curvature, across, down, should_stop)
+        raise_if_stopped()
+        disparity = _smooth(disparity, target, curvature, across, down)
     return disparity
 
 
-def _measure_all(
-    views: MatchingViews, disparity: FloatImage, curvature: FloatImage, pull: FloatImage, should_stop: ShouldStop
-) -> None:
+def _measure_all(views: MatchingViews, disparity: FloatImage, curvature: FloatImage, pull: FloatImage) -> None:
     def measure(first: int, last: int) -> None:
         _measure(views.textures, views.offsets, disparity, first, last, curvature, pull)
 
-    in_bands(measure, image_size(disparity), should_stop)
+    in_bands(measure, image_size(disparity))
 
 
 def _smooth(
@@ -56,7 +52,6 @@ def _smooth(
     curvature: FloatImage,
     across: FloatImage,
     down: FloatImage,
-    should_stop: ShouldStop,
 ) -> FloatImage:
     """The map that is near its target where that is sure, and bends little where it may: conjugate gradients."""
     values, product = start.copy(), np.empty_like(start)
@@ -66,7 +61,7 @@ def _smooth(
     step = inverse_diagonal * rest
     weight = float(np.vdot(rest, step))
     for _ in range(SOLVER_STEPS):
-        raise_if_stopped(should_stop)
+        raise_if_stopped()
         _apply(step, curvature, across, down, product)
         length = np.float32(weight / max(float(np.vdot(step, product)), 1e-30))
         values += length * step

@@ -19,7 +19,7 @@ from iibr_core.color import encoded_from_stored
 from iibr_core.depth.multi_view.guided_filter import GuidedFilter
 from iibr_core.runtime import tiling
 from iibr_core.runtime.kernels import kernel
-from iibr_core.runtime.tiling import ShouldStop, in_pieces, never
+from iibr_core.runtime.tiling import in_pieces
 from iibr_core.types import FloatImage, StoredColors, ViewOffset
 
 STEP_PX = 0.5
@@ -83,16 +83,14 @@ def luma_of(colors: StoredColors, shrink: int = 1) -> FloatImage:
     return np.ascontiguousarray(squares.mean(axis=(1, 3)), np.float32)
 
 
-def matching_views(
-    lumas: list[FloatImage], offsets: list[ViewOffset], should_stop: ShouldStop = never
-) -> MatchingViews:
+def matching_views(lumas: list[FloatImage], offsets: list[ViewOffset]) -> MatchingViews:
     """Views ready for matching. lumas: (H, W) each, the reference first. offsets: from any origin.
 
-    Raises ValueError where sizes differ or there are fewer than two, Cancelled once should_stop is true.
+    Raises ValueError where sizes differ or there are fewer than two.
     """
     if len(lumas) < 2 or len({luma.shape for luma in lumas}) != 1 or len(lumas) != len(offsets):
         raise ValueError(f"{len(lumas)} pictures of {len({luma.shape for luma in lumas})} sizes cannot be matched")
-    textures = in_pieces(_texture, lumas, should_stop, tiling.THREADS)
+    textures = in_pieces(_texture, lumas, tiling.THREADS)
     relative = np.array(offsets, np.float32) - np.array(offsets[0], np.float32)
     return MatchingViews(np.stack(textures), relative, lumas[0])
 
@@ -100,13 +98,12 @@ def matching_views(
 def sweep(
     views: MatchingViews,
     disparities: NDArray[np.float32],
-    should_stop: ShouldStop = never,
     report_step: Callable[[], None] = lambda: None,
 ) -> NDArray[np.uint8]:
     """(H, W, D): how badly the views match each pixel of the reference at each of D disparities; 255: not at all.
 
     A pixel that some views do not see matches in one half of them: left, right, upper or lower. report_step: called
-    after each disparity, by one thread at a time. Raises Cancelled once should_stop is true.
+    after each disparity, by one thread at a time.
     """
     reporting = threading.Lock()
     height, width = views.luma.shape
@@ -123,7 +120,7 @@ def sweep(
         with reporting:
             report_step()
 
-    in_pieces(sweep_one, range(len(disparities)), should_stop, tiling.THREADS)
+    in_pieces(sweep_one, range(len(disparities)), tiling.THREADS)
     return costs
 
 

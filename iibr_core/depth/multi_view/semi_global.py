@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from iibr_core.runtime import tiling
 from iibr_core.runtime.kernels import kernel
-from iibr_core.runtime.tiling import ShouldStop, in_pieces, never
+from iibr_core.runtime.tiling import in_pieces
+from iibr_core.runtime.work import is_stopped, raise_if_stopped
 from iibr_core.types import FloatImage
 
 SMALL_STEP_COST = 8
@@ -23,24 +24,24 @@ PATHS = [at for at in product((-1, 0, 1), repeat=2) if any(at)]
 
 
 def choose_disparity(
-    costs: NDArray[np.uint8], luma: FloatImage, disparities: NDArray[np.float32], should_stop: ShouldStop = never
+    costs: NDArray[np.uint8], luma: FloatImage, disparities: NDArray[np.float32]
 ) -> tuple[FloatImage, FloatImage]:
     """The disparity (H, W) that suits each pixel and its neighbours, and how surely, 0 .. 1.
 
     costs: (H, W, D), 0 .. 255, of D >= 1 evenly spaced disparities. luma: (H, W) of the picture, 0 .. 1: jumps cost
     less at its edges. Between two disparities a parabola through the sums decides. Sure is what matches far better
-    than it does on average. Raises Cancelled once should_stop is true.
+    than it does on average.
     """
     halves = np.zeros((2, *costs.shape), np.uint16)
 
     def sum_paths(half: int) -> None:
         for down, across in PATHS[half::2]:
-            if should_stop():
+            if is_stopped():
                 return
             _add_path(costs, luma, down, across, halves[half])
 
-    in_pieces(sum_paths, range(2), should_stop, tiling.THREADS)
-    tiling.raise_if_stopped(should_stop)
+    in_pieces(sum_paths, range(2), tiling.THREADS)
+    raise_if_stopped()
     values, sureness = np.empty(luma.shape, np.float32), np.empty(luma.shape, np.float32)
     _choose(halves[0], halves[1], costs, disparities, values, sureness)
     return values, sureness

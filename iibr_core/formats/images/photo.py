@@ -26,7 +26,7 @@ from iibr_core.formats.images.picture_source import PictureSource, read_source, 
 from iibr_core.formats.images.pillow_reader import DECODE_ERRORS
 from iibr_core.formats.images.side_by_side import left_picture, photo_size
 from iibr_core.runtime.kernels import kernel
-from iibr_core.runtime.tiling import ShouldStop, never, raise_if_stopped
+from iibr_core.runtime.work import raise_if_stopped
 from iibr_core.types import SRGB, FloatImage, ImageSize, InputError, Photo
 
 DEFAULT_MAX_PIXELS = 2_000_000
@@ -43,16 +43,15 @@ def read_photo(
     max_pixels: int = DEFAULT_MAX_PIXELS,
     fov_deg: float = DEFAULT_FOV_DEG,
     keeps_primaries: bool = False,
-    should_stop: ShouldStop = never,
 ) -> Photo:
     """Read a photo of any kind, upright, with at most `max_pixels`.
 
     Of a stereo pair the left eye's picture is read, of an animation the first one. fov_deg: horizontal field of view
     where the file states no focal length. keeps_primaries: whether the photo stays in the colour space of its file;
     else it is converted to sRGB, which cuts off colours outside it. Raises InputError, naming the file, if it is
-    missing, no picture, cut off, or absurdly large; Cancelled once should_stop is true.
+    missing, no picture, cut off, or absurdly large.
     """
-    photo = read_picture(left_picture(Path(path)), max_pixels, fov_deg, keeps_primaries, should_stop)
+    photo = read_picture(left_picture(Path(path)), max_pixels, fov_deg, keeps_primaries)
     return replace(photo, notes=photo.notes + file_notes(Path(path)))
 
 
@@ -61,7 +60,6 @@ def read_picture(
     max_pixels: int = DEFAULT_MAX_PIXELS,
     fov_deg: float = DEFAULT_FOV_DEG,
     keeps_primaries: bool = False,
-    should_stop: ShouldStop = never,
 ) -> Photo:
     """Read any picture of a file, as `read_photo` does."""
     if max_pixels < 1:
@@ -74,7 +72,7 @@ def read_picture(
         bands = decode_bands(source.path) if source == PictureSource(source.path) else iter([read_source(source)])
         picture, finite_notes = _finite(next(bands))
         try:
-            encoded = _encode_light(_averaged(picture, bands, stored_size, size, should_stop), picture)
+            encoded = _encode_light(_averaged(picture, bands, stored_size, size), picture)
         except StopIteration as error:  # the header states another size than the picture has
             raise InputError(f"{source.path}: damaged (rows are missing); get the whole file again") from error
     else:
@@ -101,11 +99,11 @@ def encoded_colors(picture: Picture) -> FloatImage:
     return upright(encoded, picture.orientation)
 
 
-def read_thumbnail(path: Path, within: ImageSize, should_stop: ShouldStop = never) -> NDArray[np.uint8]:
+def read_thumbnail(path: Path, within: ImageSize) -> NDArray[np.uint8]:
     """Read a photo, upright, as large as fits within (height, width): (h, w, 3), sRGB bytes.
 
     The colours of JPEGs are not exact: their decoder skips most of the work. Raises InputError where the file is no
-    photo, or has more pixels than any file may; Cancelled once should_stop is true.
+    photo, or has more pixels than any file may.
     """
     pixels = _jpeg_thumbnail(path, within) if left_picture(path).part is None else None
     if pixels is not None:
@@ -113,7 +111,7 @@ def read_thumbnail(path: Path, within: ImageSize, should_stop: ShouldStop = neve
     size = photo_size(path)
     scale = min(within.height / size.height, within.width / size.width, 1.0)
     max_pixels = max(math.floor(math.prod(size) * scale**2), 1)
-    colors = read_picture(left_picture(path), max_pixels, should_stop=should_stop).pixels
+    colors = read_picture(left_picture(path), max_pixels).pixels
     # A turned photo may still be too large, as may a very narrow one.
     step = max(math.ceil(colors.shape[0] / within.height), math.ceil(colors.shape[1] / within.width), 1)
     return np.round(np.nan_to_num(colors[::step, ::step]).clip(0.0, 1.0) * 255).astype(np.uint8)
@@ -192,9 +190,7 @@ def _encode_light(linear: FloatImage, picture: Picture) -> FloatImage:
     return linear
 
 
-def _averaged(
-    first_band: Picture, bands: Iterator[Picture], stored_size: ImageSize, size: ImageSize, should_stop: ShouldStop
-) -> FloatImage:
+def _averaged(first_band: Picture, bands: Iterator[Picture], stored_size: ImageSize, size: ImageSize) -> FloatImage:
     """Return the mean linear light (H, W, 3) of a picture at a smaller size.
 
     first_band, bands: the rows of the picture from top to bottom; few of them are floats at a time.
@@ -203,7 +199,7 @@ def _averaged(
     row_step = stored_size.height / size.height
     band_rows = min(max(int(MAX_BAND_PIXELS / stored_size.width / row_step), 1), MAX_BAND_ROWS)
     for top in range(0, size.height, band_rows):
-        raise_if_stopped(should_stop)
+        raise_if_stopped()
         bottom = min(top + band_rows, size.height)
         first, last = top * stored_size.height // size.height, -(-bottom * stored_size.height // size.height)
         while kept_from + kept.size.height < last:

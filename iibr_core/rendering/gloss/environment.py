@@ -8,7 +8,7 @@ import numpy as np
 
 from iibr_core.rendering.resized_light import mean_of_areas
 from iibr_core.runtime.kernels import kernel
-from iibr_core.runtime.tiling import ShouldStop, in_bands, never
+from iibr_core.runtime.tiling import in_bands
 from iibr_core.types import FloatImage, ImageSize, image_size
 
 TEXELS_A_WIDTH = 2.0
@@ -19,10 +19,10 @@ REACH_WIDTHS = 3.0
 """Farther than so many widths from its middle a lobe counts as empty."""
 
 
-def prefilter_environment(light: FloatImage, roughness: float, should_stop: ShouldStop = never) -> FloatImage:
+def prefilter_environment(light: FloatImage, roughness: float) -> FloatImage:
     """An equirectangular picture (H, W, 3) of linear light as a surface of that roughness reflects it: (h, 2 h, 3).
 
-    Values that are not finite count as black. Raises Cancelled once should_stop is true.
+    Values that are not finite count as black.
     """
     alpha = roughness**2
     wanted = round(pi * TEXELS_A_WIDTH / max(alpha, 1e-3))
@@ -30,11 +30,11 @@ def prefilter_environment(light: FloatImage, roughness: float, should_stop: Shou
     finite = np.where(np.isfinite(light), np.maximum(light, 0), 0).astype(np.float32)
     is_sharp = alpha * height < 0.5 * pi
     height = height if is_sharp else min(height, MOST_SMOOTHED)
-    small = mean_of_areas(finite, ImageSize(height, 2 * height), should_stop)
+    small = mean_of_areas(finite, ImageSize(height, 2 * height))
     if is_sharp:
         return small
     smooth = np.empty_like(small)
-    in_bands(lambda first, last: _smooth_rows(small, alpha, first, last, smooth), image_size(small), should_stop)
+    in_bands(lambda first, last: _smooth_rows(small, alpha, first, last, smooth), image_size(small))
     return smooth
 
 

@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 from iibr_core.rendering.gloss.geometry import SceneGeometry
 from iibr_core.rendering.gloss.gloss_settings import GlossStroke, GlossSurface
 from iibr_core.runtime.kernels import kernel
-from iibr_core.runtime.tiling import ShouldStop, in_bands, never, raise_if_stopped
+from iibr_core.runtime.tiling import in_bands
+from iibr_core.runtime.work import raise_if_stopped
 from iibr_core.types import FloatImage, image_size
 
 NORMAL_TAPS = 4
@@ -23,37 +24,30 @@ SOFT_DEPTH, SOFT_COLOR = 0.02, 0.05
 """Over so much beyond its limits, of the range of depth and of colour, a surface fades."""
 
 
-def fit_normals(disparity: FloatImage, geometry: SceneGeometry, should_stop: ShouldStop = never) -> FloatImage:
+def fit_normals(disparity: FloatImage, geometry: SceneGeometry) -> FloatImage:
     """Normals (H, W, 3) of a disparity map (H, W), towards the camera, of length 1.
 
     The plane a X + b Y + c Z = 1 is linear in disparity, as 1 / Z = a X / Z + b Y / Z + c. So the slopes of disparity
     are fitted, by quadratic least squares over the taps of the same surface, weighed by a Gaussian (Savitzky and Golay
     1964; where depth edges take taps away, by solving for all six terms).
-    Raises Cancelled once should_stop is true.
+
     """
     near = geometry.nearness(disparity)
     spacing = max(round(REACH * max(disparity.shape) / NORMAL_TAPS), 1)
     step = STEP_SHARE * np.float32(near.max() - near.min())
     focal, size = np.float32(geometry.focal_px), image_size(disparity)
     fitted = np.empty((*disparity.shape, 3), np.float32)
-    in_bands(lambda first, last: _fit_rows(near, focal, spacing, step, first, last, fitted), size, should_stop)
+    in_bands(lambda first, last: _fit_rows(near, focal, spacing, step, first, last, fitted), size)
     if spacing == 1:
         return fitted
     # taps that lie apart leave out the pixels between: those of the neighbours make up for it
     normals = np.empty_like(fitted)
-    in_bands(
-        lambda first, last: _mean_rows(fitted, near, focal, spacing, step, first, last, normals), size, should_stop
-    )
+    in_bands(lambda first, last: _mean_rows(fitted, near, focal, spacing, step, first, last, normals), size)
     return normals
 
 
-def surface_mask(
-    surface: GlossSurface, photo: FloatImage, disparity: FloatImage, should_stop: ShouldStop = never
-) -> FloatImage:
-    """How far each pixel (H, W) belongs to the surface, 0..1. photo: (H, W, 3) sRGB-encoded; disparity: (H, W).
-
-    Raises Cancelled once should_stop is true.
-    """
+def surface_mask(surface: GlossSurface, photo: FloatImage, disparity: FloatImage) -> FloatImage:
+    """How far each pixel (H, W) belongs to the surface, 0..1. photo: (H, W, 3) sRGB-encoded; disparity: (H, W)."""
     if surface.strokes_only:
         mask = np.zeros(disparity.shape, np.float32)
     else:
@@ -62,7 +56,7 @@ def surface_mask(
             apart = np.linalg.norm(photo - np.array(surface.color, np.float32), axis=2)
             mask *= np.clip(1 + (np.float32(surface.tolerance) - apart) / np.float32(SOFT_COLOR), 0, 1)
     for stroke in surface.strokes:
-        raise_if_stopped(should_stop)
+        raise_if_stopped()
         np.putmask(mask, _touched(stroke, mask), np.float32(not stroke.erases))
     return mask
 

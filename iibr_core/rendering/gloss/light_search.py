@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from iibr_core.rendering.gloss.gloss_settings import Gloss, Triple
 from iibr_core.rendering.gloss.microfacet import lobe_shares
 from iibr_core.rendering.gloss.separation import CLIPPED, eroded, harmonics
-from iibr_core.runtime.tiling import Cancelled, ShouldStop, never
+from iibr_core.runtime.work import Cancelled, is_stopped
 from iibr_core.types import FloatImage
 
 MOST_HIGHLIGHT_PIXELS = 4000
@@ -35,14 +35,13 @@ def find_light(
     points: FloatImage,
     normals: FloatImage,
     mask: FloatImage,
-    should_stop: ShouldStop = never,
 ) -> Triple | None:
     """Towards the light, of length 1, that the gloss reflects in a photo; None where none is clearly seen.
 
     linear: (H, W, 3). points: (H, W, 3) from the eye; normals: (H, W, 3); mask: (H, W), 0..1. For a light from anywhere
     the best share of matt part and lobe is known at once (linear least squares): lights are tried that pixels mirror to
     the eye, then it is climbed from the best. The light is white, so that differences between channels are paint's.
-    Raises Cancelled once should_stop is true.
+
     """
     inside = np.flatnonzero(eroded(mask > 0.5))
     colors, facing = linear.reshape(-1, 3), normals.reshape(-1, 3)
@@ -60,7 +59,7 @@ def find_light(
 
     def explained(light: FloatImage) -> float:
         """The share of what the matt part leaves that a light explains."""
-        if should_stop():
+        if is_stopped():
             raise Cancelled
         lobe = lobe_shares(facing[fitted], to_eye, light, width2, disc, gloss.reflectance)
         own = lobe - basis @ (basis.T @ lobe)

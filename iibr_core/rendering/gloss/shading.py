@@ -22,7 +22,7 @@ from iibr_core.rendering.gloss.reflection import reflection_disparity
 from iibr_core.rendering.gloss.separation import reflected_light, separate_light
 from iibr_core.runtime.kernels import kernel
 from iibr_core.runtime.scalars import linear_scalar, srgb_scalar
-from iibr_core.runtime.tiling import ShouldStop, in_bands, never
+from iibr_core.runtime.tiling import in_bands
 from iibr_core.surfaces import EDGE_PX
 from iibr_core.types import FloatImage, GridShape, ViewOffset, ViewUpdate, image_size
 
@@ -56,25 +56,24 @@ def make_gloss_maps(
     geometry: SceneGeometry,
     environment: FloatImage | None = None,
     normals: FloatImage | None = None,
-    should_stop: ShouldStop = never,
 ) -> GlossMaps:
     """photo: (H, W, 3) sRGB-encoded. disparity: (H, W), the field's. environment: (h, w, 3) linear light of the gloss's
     picture. normals: of `fit_normals`, where they are known already.
 
-    Raises InputError where the gloss is not sound, Cancelled once should_stop is true.
+    Raises InputError where the gloss is not sound.
     """
     require_sound(gloss)
     if normals is None:
-        normals = fit_normals(disparity, geometry, should_stop)
-    mask = surface_mask(gloss.surface, photo, disparity, should_stop)
-    around = None if environment is None else prefilter_environment(environment, gloss.roughness, should_stop)
+        normals = fit_normals(disparity, geometry)
+    mask = surface_mask(gloss.surface, photo, disparity)
+    around = None if environment is None else prefilter_environment(environment, gloss.roughness)
     maps = GlossMaps(gloss, geometry, normals, disparity, mask, None, None, around)
     if not gloss.photo_shines:
         return maps
     linear, points = linear_from_srgb(photo), geometry.points(disparity)
     direction: Triple | None = gloss.light.direction
     if not any(gloss.light.color):
-        direction = find_light(gloss, linear, points, normals, mask, should_stop)
+        direction = find_light(gloss, linear, points, normals, mask)
     if direction is None:
         virtual = reflection_disparity(disparity, normals, geometry)
         return replace(maps, reflected=reflected_light(linear, normals, mask), reflected_disparity=virtual)
@@ -94,27 +93,20 @@ def _lobe_of(gloss: Gloss, points: FloatImage, normals: FloatImage) -> FloatImag
     return np.asarray(shares.reshape(points.shape[:2]) * np.float32(gloss.light.radiance[0]))
 
 
-def shade_views(
-    views: Iterator[ViewUpdate], maps: GlossMaps, grid: GridShape, should_stop: ShouldStop = never
-) -> Iterator[ViewUpdate]:
+def shade_views(views: Iterator[ViewUpdate], maps: GlossMaps, grid: GridShape) -> Iterator[ViewUpdate]:
     """The views of a grid with their gloss, drafts too. Views without disparity stay as they are."""
     for view in views:
         if view.disparity is None or not maps.mask.any():
             yield view
             continue
         colors = encoded_from_stored(view.colors)
-        shade(colors, view.disparity, grid.offset(view.row, view.column), maps, should_stop)
+        shade(colors, view.disparity, grid.offset(view.row, view.column), maps)
         is_hdr = view.colors.dtype != np.uint8
         yield replace(view, colors=stored_from_encoded(colors, is_hdr))
 
 
-def shade(
-    colors: FloatImage, disparity: FloatImage, offset: ViewOffset, maps: GlossMaps, should_stop: ShouldStop = never
-) -> None:
-    """Write gloss into the sRGB-encoded colours (H, W, 3) of the view at an offset. disparity: (H, W), of that view.
-
-    Raises Cancelled once should_stop is true.
-    """
+def shade(colors: FloatImage, disparity: FloatImage, offset: ViewOffset, maps: GlossMaps) -> None:
+    """Write gloss into the sRGB-encoded colours (H, W, 3) of the view at an offset. disparity: (H, W), of that view."""
     gloss, size = maps.gloss, image_size(colors)
     t, s = map(float, offset)
     near = maps.geometry.nearness(disparity)
@@ -126,8 +118,7 @@ def shade(
             lambda first, last: _move_reflections(
                 colors, disparity, maps.disparity, reflected, moves, virtual, t, s, first, last
             ),
-            size, should_stop,
-        )  # fmt: skip
+            size, )  # fmt: skip
     if environment is not None or any(gloss.light.color):
         width2, disc = gloss.lobe_widths
         light = np.array((gloss.light.unit_direction, gloss.light.radiance), np.float32)
@@ -138,8 +129,7 @@ def shade(
                 maps.geometry.focal_px, light, width2, disc, gloss.reflectance, environment is not None, around,
                 first, last,
             ),
-            size, should_stop,
-        )  # fmt: skip
+            size, )  # fmt: skip
 
 
 @kernel
