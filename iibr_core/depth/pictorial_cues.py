@@ -37,7 +37,7 @@ GUIDE_CONTRAST = 0.03
 def estimate_from_cues(photo: Photo) -> RelativeInverseDepth:
     """Rough inverse depth (H, W) of a photo, finite; 0 everywhere where the picture gives no hint (one row of pixels).
 
-    Of pairs of points that differ in depth it orders 86 % rightly, the height alone 82 % (docs/depth.md). Raises.
+    Of pairs of points that differ in depth it orders 86 % rightly, the height alone 82 % (docs/depth.md).
     """
     pixels = np.clip(photo.pixels, 0, 1)
     small = resize_picture(pixels, _small_size(photo.size), "box")

@@ -172,7 +172,7 @@ def _share_of(part: Part, size: ImageSize) -> Rect:
 
 
 def encode_light(light: FloatImage, is_linear: bool, target: ColorSpace, source: ColorSpace) -> NDArray[Any]:
-    """Convert linear light (H, W, 3) from one colour space to another; return light, or bytes encoded by sRGB's curve."""
+    """Convert linear light (H, W, 3) to another colour space; return light, or bytes encoded by sRGB's curve."""
     encoded = np.empty(light.shape, np.float32 if is_linear else np.uint8)
     matrix = primaries_matrix(target, source)
 

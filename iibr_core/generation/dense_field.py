@@ -98,7 +98,8 @@ def densify(
     """Every view of the dense grid once: the centre, those given as they are, then those between them, the nearest to
     `nearest_to()` first.
 
-    given: all views of the sparse grid, of equal size. Disparity is per step of the dense grid. Raises InputError as `require_steps` does, ValueError where views differ in size or are missing.
+    given: all views of the sparse grid, of equal size. Disparity is per step of the dense grid. Raises InputError as
+    `require_steps` does, ValueError where views differ in size or are missing.
     """
     steps = require_steps(sparse, dense)
     places = {(view.row, view.column) for view in given}

@@ -41,5 +41,5 @@ class Inpainter(Protocol):
 
         Nothing else of the view may change; what stands in its holes before means nothing. All that is written is
         finite. photo_disparity (H, W): the centre view's, which tells what could be hidden there. offset: of this view.
-        threads: run so many at most; the result is the same for any number. Raises which is asked every few milliseconds.
+        threads: run so many at most; the result is the same for any number.
         """

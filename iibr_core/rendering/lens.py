@@ -44,7 +44,7 @@ class LensSum:
     ) -> None:
         """Add the view (H, W, 3), sRGB-encoded, of a camera at an offset in view steps from the centre view.
 
-        disparity: of the view (H, W), px per view step; needed where the optics have a focus range. Raises.
+        disparity: of the view (H, W), px per view step; needed where the optics have a focus range.
         """
         optics = self._optics
         light = np.empty(colors.shape, np.float32)

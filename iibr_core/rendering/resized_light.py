@@ -17,7 +17,7 @@ def mean_of_areas(
     area: tuple[float, float, float, float] | None = None,
 ) -> FloatImage:
     """Light (h, w, 3) at another (height, width): the mean over each pixel's area; the same array where it has that
-    size. area: what of the light it shows, top, left, height and width in pixels of it; None: all. Raises.
+    size. area: what of the light it shows, top, left, height and width in pixels of it; None: all.
     """
     everything = 0.0, 0.0, float(light.shape[0]), float(light.shape[1])
     top, left, height, width = area or everything

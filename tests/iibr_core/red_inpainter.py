@@ -8,6 +8,6 @@ def red_inpainter():
     return paint_red
 
 
-def paint_red(colors, disparity, hole, photo_disparity, offset, should_stop, threads):
+def paint_red(colors, disparity, hole, photo_disparity, offset, threads):
     """Everything red, far behind."""
     colors[hole], disparity[hole] = (1.0, 0.0, 0.0), -9.0

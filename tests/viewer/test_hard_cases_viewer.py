@@ -112,10 +112,8 @@ def test_too_little_memory_is_one_line_and_the_worker_goes_on(
 def test_memory_that_runs_out_is_one_line_and_the_worker_goes_on(tmp_path: Path) -> None:
     """Truly, not by a budget: an array that no machine has room for, in the midst of the views."""
 
-    def work(
-        request: SceneRequest, should_stop: Callable[[], bool], eye: Callable[[], ViewOffset]
-    ) -> Iterator[ViewReady]:
-        for result in results_of(request, should_stop, eye):
+    def work(request: SceneRequest, eye: Callable[[], ViewOffset]) -> Iterator[ViewReady]:
+        for result in results_of(request, eye):
             yield result  # type: ignore[misc]
             if request.generation == 1 and isinstance(result, ViewReady):
                 np.zeros(1 << 56, np.uint8)
@@ -136,7 +134,7 @@ def test_a_view_deleted_while_the_light_field_opens(desk: Desk, tmp_path: Path) 
     """The views that were read stay; the one that is gone is named."""
     views = (ViewUpdate(*at, np.full((8, 9, 3), 90, np.uint8), None) for at in np.ndindex(3, 3))
     write_light_field(tmp_path / "field", "hci", GRID, views, 50.0, "field")
-    results = results_of(SceneRequest(1, Source(str(tmp_path / "field"))), lambda: False, lambda: CENTRE)
+    results = results_of(SceneRequest(1, Source(str(tmp_path / "field"))), lambda: CENTRE)
     assert isinstance(next(results), SceneReady)
     (tmp_path / "field" / "input_Cam008.png").unlink()
     seen = []
@@ -155,9 +153,7 @@ def test_photos_of_any_size_and_depth_become_scenes(tmp_path: Path, size: tuple[
     values = random.uniform(-3, 3, size).astype(np.float32)
     values.flat[: min(values.size - 1, 4)] = [np.nan, np.inf, 1e6, -np.inf][: values.size - 1]
     np.save(tmp_path / "a_disparity.npy", values)
-    results = list(
-        results_of(SceneRequest(1, Source(str(tmp_path / "a.png"), grid=GRID)), lambda: False, lambda: CENTRE)
-    )
+    results = list(results_of(SceneRequest(1, Source(str(tmp_path / "a.png"), grid=GRID)), lambda: CENTRE))
     assert isinstance(results[0], SceneReady)
     views = [result.view for result in results if isinstance(result, ViewReady)]
     assert sum(view.is_final for view in views) == 9

@@ -75,7 +75,7 @@ def refine(
     Returns (H, W) float32, within the range of what was given but for a slope's continuation and for what is thin: that
     gets the height back which the blur took. Where nothing says that the map is blurred, its bits are those given, but
     in the edge bands of depth edges (`resolve_edge_band`).
-    Raises ValueError if the sizes differ, InputError if strength is not within 0..1 or no disparity is known,.
+    Raises ValueError if the sizes differ, InputError if strength is not within 0..1 or no disparity is known.
     """
     if photo.shape != (*disparity.shape, 3):
         raise ValueError(f"the photo is {photo.shape}, the disparity {disparity.shape}")

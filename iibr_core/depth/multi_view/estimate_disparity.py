@@ -65,7 +65,7 @@ def estimate_coarse(views: Sequence[StoredColors], offsets: Sequence[ViewOffset]
     """A first map, and which disparities there are: all that shift no view by more than MOST_SHIFT_SHARE are tried.
 
     views: (H, W, 3) each, of equal size. offsets: their viewpoints, from any origin. reference: index of the view that
-    the map is for. Raises InputError where there are fewer than two viewpoints or the views are too small,.
+    the map is for. Raises InputError where there are fewer than two viewpoints or the views are too small.
     """
     size = image_size(views[reference])
     shrink = -(-max(size) // SMALL_SIDE_PX)

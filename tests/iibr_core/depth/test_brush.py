@@ -33,7 +33,7 @@ from iibr_core.depth.editing.touched_colors import (
     stroke_colours,
     unlikeness,
 )
-from iibr_core.runtime.tiling import Cancelled
+from iibr_core.runtime.work import Cancelled, stoppable
 from iibr_core.types import InputError
 
 HEIGHT, WIDTH = 30, 40
@@ -102,8 +102,8 @@ def test_painting_stops_between_strokes_and_goes_on_there() -> None:
     strokes = tuple(replace(dab(), points=((0.05 * k, 0.5),)) for k in range(20))
     edits, asked = DepthEdits(strokes=strokes), iter([False] * 3 + [True])
     canvas = DepthCanvas(photo, disparity)
-    with pytest.raises(Cancelled):
-        canvas.apply(edits, lambda: next(asked))
+    with pytest.raises(Cancelled), stoppable(lambda: next(asked)):
+        canvas.apply(edits)
     assert canvas.strokes_ahead(edits) == 17
     assert np.array_equal(canvas.apply(edits), apply_edits(photo, disparity, edits))
     assert canvas.strokes_ahead(edits) == 0

@@ -15,7 +15,7 @@ import pytest
 
 from iibr_core.depth.estimators.catalog import USUAL_MODEL, fetch, known_model, model_here
 from iibr_core.depth.estimators.download import VERIFIED
-from iibr_core.runtime.tiling import Cancelled
+from iibr_core.runtime.work import Cancelled, stoppable
 from iibr_core.types import InputError
 from tests.local_hub import Hub, local_hub
 
@@ -169,8 +169,8 @@ def test_a_slow_download_is_given_up_at_once(hub: Hub, monkeypatch: pytest.Monke
         if done == begun + HALF:
             waits.set()
 
-    with pytest.raises(Cancelled):
-        fetch(MODEL, report, waits.is_set)
+    with pytest.raises(Cancelled), stoppable(waits.is_set):
+        fetch(MODEL, report)
     assert not hub.lost_patience
     assert model_here(MODEL) is None
     hub.may_finish.set()

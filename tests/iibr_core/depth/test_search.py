@@ -13,7 +13,7 @@ from iibr_core.depth.estimators.catalog import USUAL_MODEL, known_model
 from iibr_core.depth.estimators.download import VERIFIED
 from iibr_core.depth.search import PhotoWithDepth, open_with_depth, sketch_depth
 from iibr_core.formats.images.photo import read_photo
-from iibr_core.runtime.tiling import Cancelled
+from iibr_core.runtime.work import Cancelled, stoppable
 from iibr_core.types import ImageSize, InputError
 from tests.iibr_core import embedded_files as files
 from tests.iibr_core.depth.onnx_graphs import published
@@ -254,8 +254,8 @@ def test_a_heic_portrait(tmp_path: Path) -> None:
 
 
 def test_it_stops_before_what_takes_long(tmp_path: Path) -> None:
-    with pytest.raises(Cancelled):
-        open_with_depth(photo_file(tmp_path, None), should_stop=lambda: True)
+    with pytest.raises(Cancelled), stoppable(lambda: True):
+        open_with_depth(photo_file(tmp_path, None))
 
 
 def test_a_bad_photo_is_an_error(tmp_path: Path) -> None:

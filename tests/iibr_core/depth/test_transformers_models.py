@@ -28,7 +28,7 @@ from iibr_core.depth.estimators.preparation import Preparation, input_size
 from iibr_core.depth.estimators.transformers_models import FAMILY, KINDS
 from iibr_core.depth.search import estimator_of, open_with_depth
 from iibr_core.formats.images.write import write_image
-from iibr_core.runtime.tiling import Cancelled
+from iibr_core.runtime.work import Cancelled, stoppable
 from iibr_core.types import ImageSize, InputError, Photo
 from tests.iibr_core.depth.random_networks import depth_anything_network, with_random_weights
 
@@ -205,8 +205,8 @@ def test_what_was_painted_is_seen_by_the_network_that_saw_the_photo(tmp_path: Pa
     found = open_with_depth(tmp_path / "photo.png", choice)
     estimate = estimator_of(found, choice)
     assert estimate is not None
-    np.testing.assert_array_equal(estimate(found.photo.pixels, lambda: False), found.disparity.values)
-    assert (estimate(1 - found.photo.pixels, lambda: False) != found.disparity.values).any()
+    np.testing.assert_array_equal(estimate(found.photo.pixels), found.disparity.values)
+    assert (estimate(1 - found.photo.pixels) != found.disparity.values).any()
     rough = DepthChoice(start="rough")
     assert estimator_of(open_with_depth(tmp_path / "photo.png", rough), rough) is None
 
@@ -349,8 +349,8 @@ def test_it_stops_between_layers_and_tells_how_far_it_is(tmp_path: Path, own_cac
     for path in own_cache.glob("*"):
         path.unlink()
     told: list[float] = []
-    with pytest.raises(Cancelled):
-        estimate_with(model, PHOTO, None, lambda: len(told) >= 20, lambda done, total, doing: told.append(done))
+    with pytest.raises(Cancelled), stoppable(lambda: len(told) >= 20):
+        estimate_with(model, PHOTO, lambda done, total, doing: told.append(done))
     assert len(told) == 20
     assert not list(own_cache.glob("*"))
 

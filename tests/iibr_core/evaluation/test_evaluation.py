@@ -30,7 +30,7 @@ from iibr_core.formats.light_fields.multi_view_scene import MultiView
 from iibr_core.generation.light_field import generate
 from iibr_core.generation.view_maker import ViewMaker, quantise_as_stored
 from iibr_core.runtime import tiling
-from iibr_core.runtime.tiling import Cancelled
+from iibr_core.runtime.work import Cancelled, stoppable
 from iibr_core.types import FloatImage, GridShape, InputError, Quality, ViewOffset
 from tests.iibr_core.known_scenes import HEIGHT, WIDTH, disparity_of_square, view_of_square, write_grid, write_numbered
 from tests.iibr_core.scenes import disparity_of, literal_plan, photo_of
@@ -211,8 +211,8 @@ def test_smaller_pictures_with_disparity_to_match(folder: Path) -> None:
 
 
 def test_stopping_ends_it(folder: Path) -> None:
-    with pytest.raises(Cancelled):
-        evaluate(scene_of(folder), Options(choice=UNREFINED), should_stop=lambda: True)
+    with pytest.raises(Cancelled), stoppable(lambda: True):
+        evaluate(scene_of(folder), Options(choice=UNREFINED))
 
 
 def test_the_json_holds_every_figure(results: list[EvaluationResult]) -> None:

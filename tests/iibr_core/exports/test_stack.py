@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +15,7 @@ from iibr_core.exports.source import ExportSource
 from iibr_core.exports.stack import focal_stack
 from iibr_core.formats.maps.pfm import read_pfm
 from iibr_core.rendering.optics import Optics
-from iibr_core.runtime.tiling import Cancelled
+from iibr_core.runtime.work import Cancelled, stoppable
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import InputError
 from tests.iibr_core.exports.conftest import exported
@@ -61,7 +60,6 @@ def test_a_focal_stack_goes_from_far_to_near_with_an_open_aperture(source: Expor
 )
 def test_what_is_stopped_leaves_nothing(source: ExportSource, tmp_path: Path, kind: str, name: str) -> None:
     steps = iter(range(1000))
-    stopped = replace(source, should_stop=lambda: next(steps) > 2)
-    with pytest.raises(Cancelled):
-        exported(stopped, kind, tmp_path / name)
+    with pytest.raises(Cancelled), stoppable(lambda: next(steps) > 2):
+        exported(source, kind, tmp_path / name)
     assert list(tmp_path.iterdir()) == []

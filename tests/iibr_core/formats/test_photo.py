@@ -21,7 +21,7 @@ from iibr_core.formats.images.photo import read_photo, read_thumbnail, size_with
 from iibr_core.formats.images.picture import FILM_DIAGONAL_MM, exif_focal_px
 from iibr_core.formats.images.side_by_side import photo_size
 from iibr_core.formats.images.write import write_image
-from iibr_core.runtime.tiling import Cancelled
+from iibr_core.runtime.work import Cancelled, stoppable
 from iibr_core.types import ImageSize, InputError
 from tests.iibr_core.formats.test_color_profile import profile_bytes
 
@@ -226,8 +226,8 @@ def test_a_cancelled_photo_is_not_read_to_its_end(tmp_path, monkeypatch):
     path = save(tmp_path / "a.jpg", np.zeros((333, 287, 3), np.uint8))
     monkeypatch.setattr(photo_module, "MAX_BAND_PIXELS", 1000)
     calls = itertools.count()
-    with pytest.raises(Cancelled):
-        read_photo(path, 1000, should_stop=lambda: next(calls) == 3)
+    with pytest.raises(Cancelled), stoppable(lambda: next(calls) == 3):
+        read_photo(path, 1000)
     assert next(calls) == 4
 
 

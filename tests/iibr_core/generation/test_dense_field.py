@@ -9,6 +9,7 @@ from iibr_core.generation.dense_field import BESIDE_WEIGHT, GivenView, densify, 
 from iibr_core.generation.light_field import generate
 from iibr_core.rendering.photo_rays import rays_of_photo
 from iibr_core.rendering.view_synthesis import ViewSynthesis
+from iibr_core.runtime.work import stoppable
 from iibr_core.training.scenes.random_scene import random_scene
 from iibr_core.training.scenes.raycast import render
 from iibr_core.types import GridShape, ImageSize, InputError, ViewOffset
@@ -177,8 +178,9 @@ def test_hdr_views_stay_hdr():
 def test_it_ends_when_it_should_stop():
     given = [flat_view(row, column, 90) for row, column in np.ndindex(2, 2)]
     taken = []
-    for view in densify(given, GridShape(2, 2), GridShape(5, 5), should_stop=lambda: bool(taken)):
-        taken.append(view)
+    with stoppable(lambda: bool(taken)):
+        for view in densify(given, GridShape(2, 2), GridShape(5, 5)):
+            taken.append(view)
     assert len(taken) == 5  # the centre, and those that are there anyway
 
 

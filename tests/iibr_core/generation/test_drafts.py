@@ -10,6 +10,7 @@ from iibr_core.generation.light_field import generate, ray_set, transformer_for
 from iibr_core.generation.stored_views import StoredViews
 from iibr_core.rendering.view_synthesis import ViewSynthesis
 from iibr_core.runtime import tiling
+from iibr_core.runtime.work import stoppable
 from iibr_core.training.degradation import blur
 from iibr_core.types import GridShape, ViewOffset
 from tests.iibr_core.scenes import by_index, disparity_of, literal_plan, photo_of, smooth_texture, square_before_wall
@@ -73,7 +74,7 @@ def test_in_the_end_every_view_is_what_the_final_ray_set_shows(scene):
     rays, outer = ray_set(photo, disparity, plan)
     assert {tuple(offset) for offset, _ in outer} == {tuple(plan.grid.offset(*index)) for index in OUTER}
     with ViewSynthesis(transformer=transformer_for("balanced")) as synthesis:
-        views = StoredViews(synthesis, rays, plan.grid, photo.is_hdr, tiling.never)
+        views = StoredViews(synthesis, rays, plan.grid, photo.is_hdr)
         for index in set(final) - {plan.grid.centre}:
             assert same(final[index], views.make(plan.grid.offset(*index)))
 
@@ -200,7 +201,7 @@ def test_outer_views_that_disclose_nothing_are_finished_too():
     assert len(without) > 1
     final = by_index(made(photo, disparity, draft_bytes=PLENTY))
     with ViewSynthesis(transformer=transformer_for("balanced")) as synthesis:
-        views = StoredViews(synthesis, rays, plan.grid, photo.is_hdr, tiling.never)
+        views = StoredViews(synthesis, rays, plan.grid, photo.is_hdr)
         assert all(same(final[index], views.make(plan.grid.offset(*index))) for index in without - {plan.grid.centre})
 
 
@@ -213,9 +214,11 @@ def test_a_stop_ends_either_pass(share):
         asked[0] += 1
         return False
 
-    in_all = len(made(photo, disparity, should_stop=count, draft_bytes=PLENTY))
+    with stoppable(count):
+        in_all = len(made(photo, disparity, draft_bytes=PLENTY))
     most, asked[0] = share * asked[0], 0
-    assert len(made(photo, disparity, should_stop=lambda: count() or asked[0] >= most, draft_bytes=PLENTY)) < in_all
+    with stoppable(lambda: count() or asked[0] >= most):
+        assert len(made(photo, disparity, draft_bytes=PLENTY)) < in_all
 
 
 def test_a_draft_takes_about_what_the_plan_says():
@@ -224,7 +227,7 @@ def test_a_draft_takes_about_what_the_plan_says():
     rays, outer = ray_set(photo, disparity, literal_plan(photo, disparity, 5))
     assert len(list(outer)) == len(OUTER)
     with ViewSynthesis(transformer=transformer_for("balanced")) as synthesis:
-        draft = StoredViews(synthesis, rays, GridShape(5, 5), False, tiling.never).draft(ViewOffset(1.0, 1.0))
+        draft = StoredViews(synthesis, rays, GridShape(5, 5), False).draft(ViewOffset(1.0, 1.0))
     undecided = sum(len(part.pixel) for part in draft.undecided)
     counted = 60 * 80 * DRAFT_BYTES + undecided * undecided_bytes()
     assert 0.8 * counted < draft.nbytes <= counted

@@ -12,6 +12,7 @@ from iibr_core.inpainting.registry import INPAINTERS
 from iibr_core.rendering.photo_rays import rays_of_photo
 from iibr_core.rendering.view_synthesis import ViewSynthesis
 from iibr_core.runtime import tiling
+from iibr_core.runtime.work import stoppable
 from iibr_core.types import GridShape, InputError, ViewOffset, ViewUpdate
 from tests.iibr_core import red_inpainter
 from tests.iibr_core.scenes import by_index, disparity_of, literal_plan, photo_of, smooth_texture, square_before_wall
@@ -150,7 +151,8 @@ def test_stopping_ends_the_generator():
     photo, disparity = square_before_wall()
     produced: list[ViewUpdate] = []
     plan = literal_plan(photo, disparity, 9)
-    produced.extend(generate(photo, disparity, plan, should_stop=lambda: len(produced) == 4))
+    with stoppable(lambda: len(produced) == 4):
+        produced.extend(generate(photo, disparity, plan))
     assert len(produced) == 4
 
 

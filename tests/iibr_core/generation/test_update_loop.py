@@ -9,7 +9,7 @@ from iibr_core.generation.outer_views import farthest_views, outer_views, outer_
 from iibr_core.generation.update_loop import complete_ray_set, render_outer_views
 from iibr_core.rendering.photo_rays import rays_of_photo
 from iibr_core.rendering.view_synthesis import ViewSynthesis
-from iibr_core.runtime.tiling import Cancelled
+from iibr_core.runtime.work import Cancelled, stoppable
 from iibr_core.types import GridShape, ViewOffset
 from tests.iibr_core.filled_rays import filled_rays
 from tests.iibr_core.red_inpainter import paint_red
@@ -90,8 +90,8 @@ def test_the_inpainter_decides_what_joins():
 def test_a_stop_is_heard_and_adds_nothing():
     seen = rays()
     before = len(seen)
-    with pytest.raises(Cancelled):
-        complete_ray_set(seen, [LEFT], should_stop=lambda: True)
+    with pytest.raises(Cancelled), stoppable(lambda: True):
+        complete_ray_set(seen, [LEFT])
     assert len(seen) == before
 
 

@@ -12,7 +12,7 @@ from iibr_core.inpainting.background import fill_background
 from iibr_core.inpainting.diffusion import LARGE_PX, align_in_gaps, large_gaps
 from iibr_core.inpainting.inpainter import InpaintingAids
 from iibr_core.inpainting.registry import load_inpainter
-from iibr_core.runtime.tiling import Cancelled
+from iibr_core.runtime.work import Cancelled, stoppable
 from iibr_core.types import InputError, ViewOffset
 from tests.iibr_core.scenes import smooth_texture
 
@@ -100,8 +100,8 @@ def test_a_stop_is_heard_between_layers(folder):
         asked.append(None)
         return len(asked) > 300
 
-    with pytest.raises(Cancelled):
-        load_inpainter(f"diffusion:{folder}")(*view_with_holes(), OFFSET, should_stop)
+    with pytest.raises(Cancelled), stoppable(should_stop):
+        load_inpainter(f"diffusion:{folder}")(*view_with_holes(), OFFSET)
     assert len(asked) == 301
 
 
@@ -109,7 +109,7 @@ def test_what_was_painted_gets_the_depth_that_the_estimator_sees(folder):
     colors, disparity, hole, photo_disparity = view_with_holes()
     # Twice the disparity and one more, and in the gap something half-way between wall and strip.
     estimate = 2 * np.where(hole, 6.0, disparity) + 1
-    aids = InpaintingAids(lambda colors, should_stop: estimate.astype(np.float32))
+    aids = InpaintingAids(lambda colors: estimate.astype(np.float32))
     load_inpainter(f"diffusion:{folder}", aids)(colors, disparity, hole, photo_disparity, OFFSET)
     np.testing.assert_allclose(disparity[:, 30:42], 6.0, atol=1e-4)
     np.testing.assert_array_equal(disparity[:, 50:52], 0.0)

@@ -6,7 +6,7 @@ import pytest
 from iibr_core.inpainting import disparity_by_color
 from iibr_core.inpainting.disparity_by_color import fill_disparity_by_color
 from iibr_core.runtime import tiling
-from iibr_core.runtime.tiling import Cancelled
+from iibr_core.runtime.work import Cancelled, stoppable
 
 RED, BLUE = np.float32([0.8, 0.1, 0.1]), np.float32([0.1, 0.2, 0.8])
 
@@ -97,5 +97,5 @@ def test_bad_arguments_and_a_stop_are_told():
         fill_disparity_by_color(photo, np.full_like(truth, np.nan))
     values = truth.copy()
     values[3, 3] = np.nan
-    with pytest.raises(Cancelled):
-        fill_disparity_by_color(photo, values, lambda: True)
+    with pytest.raises(Cancelled), stoppable(lambda: True):
+        fill_disparity_by_color(photo, values)

@@ -19,7 +19,7 @@ from iibr_core.inpainting.outpainting import (
 )
 from iibr_core.rendering.photo_rays import rays_of_photo
 from iibr_core.rendering.view_synthesis import ViewSynthesis
-from iibr_core.runtime.tiling import Cancelled
+from iibr_core.runtime.work import Cancelled, stoppable
 from iibr_core.types import GridShape, ImageSize, Margins, ViewOffset
 from tests.iibr_core.scenes import smooth_texture
 
@@ -130,8 +130,8 @@ def test_means_widen_with_the_distance():
 
 
 def test_a_stop_is_heard():
-    with pytest.raises(Cancelled):
-        outpaint(noise(*SIZE), noise(*SIZE)[..., 0], MARGINS, lambda: True)
+    with pytest.raises(Cancelled), stoppable(lambda: True):
+        outpaint(noise(*SIZE), noise(*SIZE)[..., 0], MARGINS)
 
 
 def test_margins_are_what_the_outer_views_see_on_each_side():

@@ -18,7 +18,7 @@ from iibr_core.inpainting.patch_synthesis import (
     STEP_PX,
     copy_patches,
 )
-from iibr_core.runtime.tiling import Cancelled, never
+from iibr_core.runtime.work import Cancelled, stoppable
 
 ONE_SURFACE = 0.5
 
@@ -106,11 +106,11 @@ def copy_slowly(smooth, disparity, hole, one_surface):
     return blended
 
 
-def copied(smooth, disparity, hole, should_stop=never, threads=2):
+def copied(smooth, disparity, hole, threads=2):
     colors, number = smooth.copy(), np.empty(hole.shape, np.int32)
     pixels = np.flatnonzero(hole)
     number_pixels(pixels, number)
-    copy_patches(colors, disparity, hole, pixels, number, ONE_SURFACE, should_stop, threads)
+    copy_patches(colors, disparity, hole, pixels, number, ONE_SURFACE, threads)
     return colors
 
 
@@ -149,5 +149,5 @@ def test_stays_as_it_is_where_nothing_is_known_and_can_be_cancelled():
     colors, disparity = np.full((20, 30, 3), 0.3, np.float32), np.zeros((20, 30), np.float32)
     everywhere = np.ones((20, 30), np.bool_)
     np.testing.assert_array_equal(copied(colors, disparity, everywhere), colors)
-    with pytest.raises(Cancelled):
-        copied(colors, disparity, everywhere, should_stop=lambda: True)
+    with pytest.raises(Cancelled), stoppable(lambda: True):
+        copied(colors, disparity, everywhere)

@@ -9,7 +9,7 @@ import pytest
 from iibr_core.inpainting.registry import DEFAULT_INPAINTER, INPAINTERS, MODEL_INPAINTERS, load_inpainter
 from iibr_core.rendering.photo_rays import rays_of_photo
 from iibr_core.rendering.view_synthesis import ViewSynthesis
-from iibr_core.runtime.tiling import Cancelled
+from iibr_core.runtime.work import Cancelled, stoppable
 from iibr_core.types import InputError, ViewOffset
 from tests.iibr_core.scenes import square_before_wall
 
@@ -77,5 +77,5 @@ def test_threads_change_nothing(name):
 @pytest.mark.parametrize("name", INPAINTERS)
 def test_a_stop_is_heard(name):
     colors, disparity, hole, photo_disparity = view_with_holes()
-    with pytest.raises(Cancelled):
-        load_inpainter(name)(colors, disparity, hole, photo_disparity, OFFSET, should_stop=lambda: True)
+    with pytest.raises(Cancelled), stoppable(lambda: True):
+        load_inpainter(name)(colors, disparity, hole, photo_disparity, OFFSET)

@@ -14,7 +14,7 @@ from iibr_core.rendering.landed_squares import CORNERS, SAMPLES
 from iibr_core.rendering.photo_rays import rays_of_photo
 from iibr_core.rendering.ray_set import NO_MARGINS
 from iibr_core.rendering.view_synthesis import ViewSynthesis
-from iibr_core.runtime.tiling import Cancelled
+from iibr_core.runtime.work import Cancelled, stoppable
 from iibr_core.types import Camera, ImageSize, ViewOffset
 from tests.iibr_core.scenes import smooth_texture, square_before_wall
 
@@ -102,7 +102,7 @@ def test_samples_see_what_a_slow_twin_sees(turn, rounding):
     matrix = target_from_photo(photo, target, 8.0)
     rays = rays_of_photo(np.zeros((6, 7, 3), np.float32), disparity.astype(np.float32), 1.0, 0)
     flat = tuple(map(float, matrix.ravel()))
-    landing = [landed_squares.rows_landed_on(rays, 0, flat, lambda: False)]
+    landing = [landed_squares.rows_landed_on(rays, 0, flat)]
     nearest, source = landed_squares.draw_rays(rays, [flat], landing, 0.5, rounding, (0, 4), 5)
     slow = drawn_slowly(rays.arrays.disparity[0], matrix, target.size, rounding)
     # Samples on the very side of a triangle belong to either.
@@ -253,8 +253,8 @@ def test_it_can_be_cancelled():
     pixels, inverse_depth = square_scene()
     here = camera(40, 48)
     answers = iter([False] * 60)
-    views = FreeViews(pixels, inverse_depth, here, [here], lambda: next(answers, True))
-    with pytest.raises(Cancelled):
+    views = FreeViews(pixels, inverse_depth, here, [here])
+    with pytest.raises(Cancelled), stoppable(lambda: next(answers, True)):
         [views.view(here) for _ in range(60)]
 
 

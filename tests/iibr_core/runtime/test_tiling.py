@@ -19,7 +19,8 @@ from iibr_core.rendering.photo_rays import rays_of_photo
 from iibr_core.rendering.ray_set import RaySet
 from iibr_core.rendering.view_synthesis import ViewSynthesis
 from iibr_core.runtime import tiling
-from iibr_core.runtime.tiling import Cancelled, in_bands, in_pieces
+from iibr_core.runtime.tiling import in_bands, in_pieces
+from iibr_core.runtime.work import Cancelled, stoppable
 from iibr_core.types import ImageSize, Photo, ViewOffset
 from tests.iibr_core.scenes import literal_plan, square_before_wall
 
@@ -34,34 +35,34 @@ HOLES = RANDOM.random(SIZE) < 0.3
 FULL = np.ones(SIZE, np.float32)
 
 
-def filled(should_stop):
+def filled():
     colors, disparity = COLORS.copy(), LAYERS.copy()
-    fill_background(colors, disparity, HOLES, LAYERS, ViewOffset(1.0, -2.0), should_stop, threads=2)
+    fill_background(colors, disparity, HOLES, LAYERS, ViewOffset(1.0, -2.0), threads=2)
     return colors, disparity
 
 
-def added(should_stop):
+def added():
     rays = RaySet(2, SIZE, 0.1)
-    rays.add(ViewOffset(0.0, 1.0), COLORS, np.where(HOLES, np.nan, LAYERS), FULL - HOLES, should_stop)
+    rays.add(ViewOffset(0.0, 1.0), COLORS, np.where(HOLES, np.nan, LAYERS), FULL - HOLES)
     return rays.arrays
 
 
-def rendered(should_stop):
-    with ViewSynthesis(should_stop, keeps_entropy=True) as synthesis:
+def rendered():
+    with ViewSynthesis(keeps_entropy=True) as synthesis:
         view = synthesis.render(rays_of_photo(COLORS, LAYERS, 2.0, 0), ViewOffset(2.0, 1.5))
     return view.colors, view.disparity, view.occluded, view.inpainted, view.entropy
 
 
 STAGES = {
-    "rays of a photo": lambda stop: rays_of_photo(COLORS, LAYERS, 2.0, 1, stop).arrays,
-    "split": lambda stop: split_mixed_pixels(COLORS, LAYERS, 0.5, stop),
+    "rays of a photo": lambda: rays_of_photo(COLORS, LAYERS, 2.0, 1).arrays,
+    "split": lambda: split_mixed_pixels(COLORS, LAYERS, 0.5),
     "add": added,
     "render": rendered,
     "fill": filled,
-    "refine": lambda stop: [refine(COLORS, np.where(HOLES, np.nan, SOFT), 1.0, None, stop)],
-    "blur": lambda stop: [np.float64(measure_edge_blur(COLORS, SOFT, stop))],
-    "offline": lambda stop: [estimate_from_cues(Photo(COLORS, 100.0, "test"), stop).values],
-    "unknown depth": lambda stop: [fill_disparity_holes(np.where(HOLES, np.nan, LAYERS), stop)],
+    "refine": lambda: [refine(COLORS, np.where(HOLES, np.nan, SOFT), 1.0, None)],
+    "blur": lambda: [np.float64(measure_edge_blur(COLORS, SOFT))],
+    "offline": lambda: [estimate_from_cues(Photo(COLORS, 100.0, "test")).values],
+    "unknown depth": lambda: [fill_disparity_holes(np.where(HOLES, np.nan, LAYERS))],
 }
 
 
@@ -75,9 +76,9 @@ def narrow(monkeypatch):
 
 @pytest.mark.parametrize("name", STAGES)
 def test_the_number_of_bands_changes_no_bit(name, request):
-    whole = [np.array(part) for part in STAGES[name](tiling.never)]
+    whole = [np.array(part) for part in STAGES[name]()]
     request.getfixturevalue("narrow")
-    for part, expected in zip(STAGES[name](tiling.never), whole, strict=True):
+    for part, expected in zip(STAGES[name](), whole, strict=True):
         np.testing.assert_array_equal(part, expected)
 
 
@@ -96,11 +97,12 @@ class Telling:
 @pytest.mark.parametrize("name", STAGES)
 def test_a_stage_asks_for_every_band_and_ends_wherever_it_is_told_to(name):
     watch = Telling()
-    STAGES[name](watch)
+    with stoppable(watch):
+        STAGES[name]()
     assert watch.asked >= (3 if name == "unknown depth" else SIZE[0] // 7)
     for n in (1, watch.asked // 2, watch.asked):
-        with pytest.raises(Cancelled):
-            STAGES[name](Telling(n))
+        with pytest.raises(Cancelled), stoppable(Telling(n)):
+            STAGES[name]()
 
 
 @pytest.mark.usefixtures("narrow")
@@ -113,11 +115,13 @@ def test_a_field_ends_wherever_it_is_told_to(quality, draft_bytes, updates):
     photo, disparity = square_before_wall()
     plan, watch = literal_plan(photo, disparity, 3), Telling()
     options = {"quality": quality, "draft_bytes": draft_bytes}
-    assert len(list(generate(photo, disparity, plan, watch, **options))) == updates
-    counts = [
-        len(list(generate(photo, disparity, plan, Telling(n), **options)))
-        for n in np.linspace(1, watch.asked, 7).astype(int)
-    ]
+
+    def count(stop):
+        with stoppable(stop):
+            return len(list(generate(photo, disparity, plan, **options)))
+
+    assert count(watch) == updates
+    counts = [count(Telling(n)) for n in np.linspace(1, watch.asked, 7).astype(int)]
     assert counts[0] == 0
     assert counts[-1] < updates
 
@@ -132,8 +136,8 @@ def test_nothing_is_begun_after_the_word(threads):
             stop.set()
         assert n <= 5 or stop.wait(60)
 
-    with pytest.raises(Cancelled):
-        in_pieces(work, range(1000), stop.is_set, threads)
+    with pytest.raises(Cancelled), stoppable(stop.is_set):
+        in_pieces(work, range(1000), threads)
     assert sorted(began)[:6] == list(range(6))
     assert len(began) < 6 + threads
 
@@ -141,8 +145,8 @@ def test_nothing_is_begun_after_the_word(threads):
 def test_a_ray_set_that_was_told_to_stop_is_as_before():
     rays = rays_of_photo(COLORS, LAYERS, 2.0, 1)
     count = len(rays)
-    with pytest.raises(Cancelled):
-        rays.add(ViewOffset(0.0, 1.0), COLORS, LAYERS, FULL, lambda: True)
+    with pytest.raises(Cancelled), stoppable(lambda: True):
+        rays.add(ViewOffset(0.0, 1.0), COLORS, LAYERS, FULL)
     assert len(rays) == count
 
 
@@ -164,7 +168,7 @@ def test_results_come_in_order_and_errors_come_through(threads):
 
 
 def test_views_under_way_end_with_their_synthesis():
-    """Ctrl-C, say: nobody's should_stop is true, and yet nothing goes on."""
+    """After Ctrl-C, though should_stop is false."""
     began, ended = threading.Event(), []
 
     def view(synthesis):
@@ -178,7 +182,8 @@ def test_views_under_way_end_with_their_synthesis():
 
     def interrupted():
         with ViewSynthesis() as synthesis:
-            synthesis._threads.submit(view, synthesis)
+            views = synthesis.side_by_side(view, [synthesis])
+            threading.Thread(target=lambda: next(views), daemon=True).start()
             assert began.wait(60)
             raise KeyboardInterrupt
 

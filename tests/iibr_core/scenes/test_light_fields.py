@@ -13,7 +13,7 @@ from iibr_core.color import bytes_from_encoded
 from iibr_core.depth.choice import DepthChoice
 from iibr_core.formats.images.write import write_image_file
 from iibr_core.rendering.optics import CENTRE
-from iibr_core.runtime.tiling import Cancelled
+from iibr_core.runtime.work import Cancelled, stoppable
 from iibr_core.scenes.lens_limits import focus_limits
 from iibr_core.scenes.light_fields import FROM_VIEWS
 from iibr_core.scenes.opening import SceneReady, SceneRequest, ViewReady, results_of
@@ -31,7 +31,7 @@ WALL_PX, SQUARE_PX = -0.5, 1.25
 def test_a_light_field_without_disparity_finds_its_own(tmp_path: Path) -> None:
     """Shown as read, then with a coarse map, then with the final one, which knows how far both surfaces are."""
     folder = write_two_planes(tmp_path / "field")
-    as_read, coarse, final = showings(results_of(SceneRequest(1, Source(str(folder))), lambda: False, lambda: CENTRE))
+    as_read, coarse, final = showings(results_of(SceneRequest(1, Source(str(folder))), lambda: CENTRE))
     assert [ready.scene.has_view_disparity for ready, _ in (as_read, coarse, final)] == [False, True, True]
     assert [{view.view.is_final for view in views} for _, views in (coarse, final)] == [{False}, {True}]
     assert final[0].scene.depth_source == FROM_VIEWS
@@ -44,7 +44,7 @@ def test_a_light_field_without_disparity_finds_its_own(tmp_path: Path) -> None:
 
 def test_without_a_window_it_is_shown_once_when_all_is_known(tmp_path: Path) -> None:
     request = SceneRequest(1, Source(str(write_two_planes(tmp_path / "field"))), takes_drafts=False)
-    ((ready, views),) = showings(results_of(request, lambda: False, lambda: CENTRE))
+    ((ready, views),) = showings(results_of(request, lambda: CENTRE))
     assert ready.scene.has_view_disparity
     assert {view.view.is_final for view in views} == {True}
 
@@ -53,7 +53,7 @@ def test_the_centre_views_disparity_may_be_given(tmp_path: Path) -> None:
     folder, given = write_two_planes(tmp_path / "field"), tmp_path / "given.npy"
     np.save(given, np.full((96, 96), 0.25, np.float32))
     request = SceneRequest(1, Source(str(folder), DepthChoice(file=str(given), file_scale=2.0)), takes_drafts=False)
-    ((ready, views),) = showings(results_of(request, lambda: False, lambda: CENTRE))
+    ((ready, views),) = showings(results_of(request, lambda: CENTRE))
     assert (ready.scene.depth_source, ready.scene.disparity_range_px) == ("given.npy", (0.5, 0.5))
     assert all(view.view.disparity is not None and (view.view.disparity == 0.5).all() for view in views)
 
@@ -64,7 +64,7 @@ def test_views_that_tell_nothing_are_shown_as_they_are(tmp_path: Path) -> None:
     (folder / "views").mkdir(parents=True)
     for row, column in np.ndindex(2, 3):
         write_image_file(folder / "views" / f"v{row}_u{column}.png", np.zeros((6, 40, 3), np.uint8), "uint8")
-    last, views = list(showings(results_of(SceneRequest(1, Source(str(folder))), lambda: False, lambda: CENTRE)))[-1]
+    last, views = list(showings(results_of(SceneRequest(1, Source(str(folder))), lambda: CENTRE)))[-1]
     assert not last.scene.has_view_disparity
     assert any("too small" in note for note in last.scene.problems)
     assert len(views) == 6
@@ -75,7 +75,7 @@ def test_one_bar_grows_from_reading_to_the_last_view(tmp_path: Path, filled_grid
     """Through all showings, as the window's state has it; complete once, with the last view."""
     source = Source(str(write_two_planes(tmp_path / "field")), filled_grid=filled_grid)
     state, heard = reduce(AppState(), OpenPath(source)), list[Progress]()
-    results = results_of(SceneRequest(1, source), lambda: False, lambda: CENTRE, heard.append)
+    results = results_of(SceneRequest(1, source), lambda: CENTRE, heard.append)
     shown = [state.progress]
     for result in results:
         while heard:
@@ -96,7 +96,7 @@ def test_one_bar_grows_from_reading_to_the_last_view(tmp_path: Path, filled_grid
 def test_focus_that_is_set_while_it_loads_stays(tmp_path: Path) -> None:
     source = Source(str(write_two_planes(tmp_path / "field")))
     state = reduce(AppState(), OpenPath(source))
-    results = results_of(SceneRequest(1, source), lambda: False, lambda: CENTRE)
+    results = results_of(SceneRequest(1, source), lambda: CENTRE)
     state = reduce(state, SceneOpened(1, first_scene(results)))
     state = reduce(reduce(state, SetAperture(2.0)), SetFocus(3.5))
     for result in results:
@@ -156,15 +156,15 @@ def test_finding_disparity_can_be_stopped(tmp_path: Path) -> None:
     """Asked to stop once it has begun."""
     said: list[str] = []
     request = SceneRequest(1, Source(str(write_two_planes(tmp_path / "field"))))
-    results = results_of(request, lambda: FINDING in said, lambda: CENTRE, lambda progress: said.append(progress.doing))
-    with pytest.raises(Cancelled):
+    results = results_of(request, lambda: CENTRE, lambda progress: said.append(progress.doing))
+    with pytest.raises(Cancelled), stoppable(lambda: FINDING in said):
         list(results)
 
 
 def test_views_between_are_made_of_all_views_on_disk(tmp_path: Path) -> None:
     request = SceneRequest(1, Source(str(write_two_planes(tmp_path / "field")), filled_grid=GridShape(9, 9)))
     said: list[str] = []
-    results = results_of(request, lambda: False, lambda: CENTRE, lambda progress: said.append(progress.doing))
+    results = results_of(request, lambda: CENTRE, lambda progress: said.append(progress.doing))
     ((ready, views),) = showings(results)
     assert (ready.scene.grid, ready.scene.given_grid, ready.scene.depth_source) == ((9, 9), (5, 5), FROM_VIEWS)
     assert ready.scene.disparity_range_px == pytest.approx((WALL_PX / 2, SQUARE_PX / 2), abs=0.15)
@@ -180,8 +180,8 @@ def test_views_between_are_made_of_all_views_on_disk(tmp_path: Path) -> None:
 def test_making_views_between_can_be_stopped_while_disparity_is_found(tmp_path: Path) -> None:
     said: list[str] = []
     request = SceneRequest(1, Source(str(write_two_planes(tmp_path / "field")), filled_grid=GridShape(9, 9)))
-    results = results_of(request, lambda: FINDING in said, lambda: CENTRE, lambda now: said.append(now.doing))
-    with pytest.raises(Cancelled):
+    results = results_of(request, lambda: CENTRE, lambda now: said.append(now.doing))
+    with pytest.raises(Cancelled), stoppable(lambda: FINDING in said):
         list(results)
 
 
@@ -199,4 +199,4 @@ def test_views_between_that_cannot_be_made_are_told_in_a_line(tmp_path: Path, so
     depth = replace(source.depth, file=file)
     source = replace(source, path=str(write_two_planes(tmp_path / "field")), depth=depth)
     with pytest.raises(InputError, match=message):
-        list(results_of(SceneRequest(1, source), lambda: False, lambda: CENTRE))
+        list(results_of(SceneRequest(1, source), lambda: CENTRE))

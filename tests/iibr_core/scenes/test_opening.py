@@ -12,7 +12,7 @@ from PIL import Image
 
 from iibr_core.depth.editing.edits import DepthEdits, Stroke
 from iibr_core.rendering.optics import CENTRE
-from iibr_core.runtime.tiling import Cancelled
+from iibr_core.runtime.work import Cancelled, stoppable
 from iibr_core.scenes.light_fields import UNKNOWN_DISPARITY_RANGE_PX
 from iibr_core.scenes.loaded_photo import load_photo, sketch_photo, without_history
 from iibr_core.scenes.opening import SceneReady, SceneRequest, ViewReady, WantedPhoto, results_of, sketch_of
@@ -35,7 +35,7 @@ def write_large_photo(folder: Path, name: str = "large", ending: str = "jpg") ->
 def test_a_large_photo_has_a_sketch(tmp_path: Path, ending: str) -> None:
     source = Source(str(write_large_photo(tmp_path, ending=ending)), grid=GridShape(3, 3))
     sketch = sketch_of(WantedPhoto(source, 1.0))
-    whole = next(results_of(SceneRequest(1, source), lambda: False, lambda: CENTRE))
+    whole = next(results_of(SceneRequest(1, source), lambda: CENTRE))
     assert isinstance(whole, SceneReady)
     assert sketch is not None
     assert (sketch.scene.size, sketch.scene.own_size) == ((480, 360), (1600, 1200))
@@ -58,7 +58,7 @@ def test_a_cut_jpeg_has_no_sketch_and_fails_as_it_did_without(tmp_path: Path) ->
     path.write_bytes(path.read_bytes()[:20_000])
     assert sketch_of(WantedPhoto(Source(str(path)), 1.0)) is None
     with pytest.raises(InputError, match=r"large\.jpg"):
-        list(results_of(SceneRequest(1, Source(str(path))), lambda: False, lambda: CENTRE))
+        list(results_of(SceneRequest(1, Source(str(path))), lambda: CENTRE))
 
 
 @pytest.mark.parametrize("takes_drafts", [True, False])
@@ -69,7 +69,7 @@ def test_views_come_twice_where_they_may_and_progress_counts_them_once(photo_pat
     np.save(photo_path.with_name("scene_disparity.npy"), depths)
     source = Source(str(photo_path), grid=GridShape(3, 3))
     request = SceneRequest(1, source, takes_drafts=takes_drafts)
-    ready, *results = results_of(request, lambda: False, lambda: CENTRE)
+    ready, *results = results_of(request, lambda: CENTRE)
     views = [result for result in results if isinstance(result, ViewReady)]
     assert isinstance(ready, SceneReady)
     assert [view.view.is_final for view in views] == [True] + [False] * 8 * takes_drafts + [True] * 8
@@ -86,24 +86,24 @@ def test_a_photo_tells_its_focal_length_only_where_it_knows_it(photo_path: Path,
     known = tmp_path / "known.png"
     write_image(known, np.zeros((20, 30, 3), np.uint8), {"Exif:FocalLengthIn35mmFilm": 50})
     for path, expected in ((photo_path, None), (known, read_photo(known).focal_px)):
-        ready = next(results_of(SceneRequest(1, Source(str(path))), lambda: False, lambda: CENTRE))
+        ready = next(results_of(SceneRequest(1, Source(str(path))), lambda: CENTRE))
         assert isinstance(ready, SceneReady)
         assert ready.scene.focal_px == expected
     assert read_photo(known).focal_px == pytest.approx(50 / np.hypot(36, 24) * np.hypot(20, 30))
 
 
 def test_the_subject_is_what_fills_the_middle(photo_path: Path) -> None:
-    ready = next(results_of(SceneRequest(1, Source(str(photo_path))), lambda: False, lambda: CENTRE))
+    ready = next(results_of(SceneRequest(1, Source(str(photo_path))), lambda: CENTRE))
     assert isinstance(ready, SceneReady)
     assert ready.scene.subject_disparity_px == ready.scene.disparity_range_px[1], "the near square"
 
 
 def test_a_loaded_photo_is_not_read_again(photo_path: Path) -> None:
     source = Source(str(photo_path), grid=GridShape(1, 1))
-    first = next(results_of(SceneRequest(1, source), lambda: False, lambda: CENTRE))
+    first = next(results_of(SceneRequest(1, source), lambda: CENTRE))
     assert isinstance(first, SceneReady)
     photo_path.unlink()
-    again = next(results_of(SceneRequest(2, source, 2.0, first.loaded), lambda: False, lambda: CENTRE))
+    again = next(results_of(SceneRequest(2, source, 2.0, first.loaded), lambda: CENTRE))
     assert isinstance(again, SceneReady)
     assert again.loaded is first.loaded
     assert again.scene.plan is not None
@@ -116,11 +116,11 @@ def test_a_light_field_folder_goes_the_same_way(tmp_path: Path, photo_path: Path
     from iibr_core.formats.light_fields.write import write_light_field
 
     request = SceneRequest(1, Source(str(photo_path), grid=GridShape(3, 3)), takes_drafts=False)
-    made = list(results_of(request, lambda: False, lambda: CENTRE))
+    made = list(results_of(request, lambda: CENTRE))
     folder = tmp_path / "field"
     views = (result.view for result in made if isinstance(result, ViewReady))
     write_light_field(folder, "hci", GridShape(3, 3), views, 100.0, "field", with_disparity)
-    results = results_of(SceneRequest(2, Source(str(folder))), lambda: False, lambda: CENTRE)
+    results = results_of(SceneRequest(2, Source(str(folder))), lambda: CENTRE)
     ready, views = next(showings(results))
     assert (ready.scene.grid, ready.scene.plan, ready.loaded) == ((3, 3), None, None)
     assert ready.scene.has_view_disparity == with_disparity
@@ -144,7 +144,7 @@ def test_what_evaluation_reads_opens_here(
     depth_source: str,
 ) -> None:
     source = Source(str(write(tmp_path / "field")))
-    ready, views = next(showings(results_of(SceneRequest(1, source), lambda: False, lambda: CENTRE)))
+    ready, views = next(showings(results_of(SceneRequest(1, source), lambda: CENTRE)))
     scene = ready.scene
     assert (scene.name, scene.grid, scene.disparity_range_px) == ("field", grid, range_px)
     assert (scene.depth_source, scene.has_view_disparity) == (depth_source, False)
@@ -154,15 +154,15 @@ def test_what_evaluation_reads_opens_here(
 def test_views_that_stand_on_no_grid_are_refused_in_one_line(tmp_path: Path) -> None:
     source = Source(str(write_llff_row(tmp_path / "fern")))
     with pytest.raises(InputError, match=r"fern.*no regular grid.*`iibr evaluate` reads them"):
-        next(results_of(SceneRequest(1, source), lambda: False, lambda: CENTRE))
+        next(results_of(SceneRequest(1, source), lambda: CENTRE))
 
 
 def test_a_folder_without_views_is_told_what_would_be_some(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="no photos in it"):
-        next(results_of(SceneRequest(1, Source(str(tmp_path))), lambda: False, lambda: CENTRE))
+        next(results_of(SceneRequest(1, Source(str(tmp_path))), lambda: CENTRE))
     (tmp_path / "notes.txt").touch()
     with pytest.raises(InputError, match="holds no light field; laid out as HCI, Stanford"):
-        next(results_of(SceneRequest(1, Source(str(tmp_path))), lambda: False, lambda: CENTRE))
+        next(results_of(SceneRequest(1, Source(str(tmp_path))), lambda: CENTRE))
 
 
 def test_generating_stops_between_row_bands(photo_path: Path) -> None:
@@ -174,10 +174,9 @@ def test_generating_stops_between_row_bands(photo_path: Path) -> None:
         asked.append(len(kinds))
         return bool(kinds)
 
-    for result in results_of(
-        SceneRequest(1, Source(str(photo_path), grid=GridShape(3, 3))), should_stop, lambda: CENTRE
-    ):
-        kinds.append(type(result))
+    with stoppable(should_stop):
+        for result in results_of(SceneRequest(1, Source(str(photo_path), grid=GridShape(3, 3))), lambda: CENTRE):
+            kinds.append(type(result))
     assert asked[-1] > 0
     assert kinds[0] is SceneReady
     assert kinds.count(ViewReady) <= 1  # the photo's own view costs nothing
@@ -186,8 +185,8 @@ def test_generating_stops_between_row_bands(photo_path: Path) -> None:
 def test_reading_stops_too(photo_path: Path) -> None:
     """Asked to stop while it refines depth."""
     request = SceneRequest(1, Source(str(photo_path), grid=GridShape(3, 3)))
-    with pytest.raises(Cancelled):
-        next(results_of(request, lambda: True, lambda: CENTRE))
+    with pytest.raises(Cancelled), stoppable(lambda: True):
+        next(results_of(request, lambda: CENTRE))
 
 
 def test_an_avif_photo_opens(tmp_path: Path) -> None:

@@ -18,7 +18,7 @@ from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.exports.source import ExportSource
 from iibr_core.formats.images.photo import read_photo
 from iibr_core.rendering.gloss.gloss_settings import Gloss
-from iibr_core.runtime.tiling import raise_if_stopped
+from iibr_core.runtime.work import raise_if_stopped
 from iibr_core.scenes.scene import Source
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, ViewOffset, ViewUpdate
@@ -139,7 +139,7 @@ def gate(monkeypatch: pytest.MonkeyPatch) -> Iterator[threading.Event]:
             for number, item in enumerate(counted(self, *arguments)):
                 if number == 1:
                     while not gate.wait(0.01):
-                        raise_if_stopped(self.should_stop)
+                        raise_if_stopped()
                 yield item
 
         return held

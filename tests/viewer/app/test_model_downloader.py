@@ -14,7 +14,7 @@ from iibr_core.depth.estimators import estimate_cache
 from iibr_core.depth.estimators.catalog import fetch, known_model, model_here
 from iibr_core.depth.estimators.download import VERIFIED
 from iibr_core.formats.images.write import write_image
-from iibr_core.runtime.tiling import Cancelled, ShouldStop
+from iibr_core.runtime.work import Cancelled, is_stopped
 from iibr_core.scenes.scene import Source, source_beside
 from iibr_core.types import GridShape, ViewOffset, ignore_progress
 from tests.iibr_core.depth.onnx_graphs import published, weighing
@@ -223,8 +223,8 @@ def test_the_button_is_in_reach_where_the_panel_leaves_no_room(viewer: Driver) -
 def test_a_running_estimate_is_given_up_by_one_click(
     downloaded: Hub, viewer: Driver, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def wait_to_be_stopped(source: Source, loaded: object, refine: float, should_stop: ShouldStop) -> None:
-        while not should_stop():
+    def wait_to_be_stopped(source: Source, loaded: object, refine: float) -> None:
+        while not is_stopped():
             is_running.set()
         raise Cancelled
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import shutil
 import threading
 import time
-from collections.abc import Callable
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -18,7 +17,7 @@ from iibr_core.exports.full_picture import FullPicture
 from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.formats.images.photo import read_photo
 from iibr_core.rendering.resized_light import mean_of_areas
-from iibr_core.runtime.tiling import Cancelled
+from iibr_core.runtime.work import Cancelled, is_stopped
 from iibr_core.types import GridShape, InputError, ViewOffset, ViewUpdate, image_size
 from tests.viewer.conftest import HEIGHT, WIDTH, Driver, Opener, write_scene
 from viewer.app.image_export import export_picture
@@ -269,9 +268,9 @@ def test_a_picture_at_the_photos_own_size_can_be_given_up(
 ) -> None:
     begun, before = threading.Event(), set(tmp_path.iterdir())
 
-    def make(self: FullPicture, draw: object, should_stop: Callable[[], bool], _: object) -> None:
+    def make(self: FullPicture, draw: object, _: object) -> None:
         begun.set()
-        while not should_stop():
+        while not is_stopped():
             time.sleep(0.001)
         raise Cancelled
 

@@ -13,7 +13,7 @@ from PIL import Image
 from iibr_core.formats.light_fields.write import write_light_field
 from iibr_core.formats.quilts import Quilt, lay_out
 from iibr_core.generation import dense_field
-from iibr_core.runtime.tiling import ShouldStop, raise_if_stopped
+from iibr_core.runtime.work import raise_if_stopped
 from iibr_core.scenes.scene import Scene
 from iibr_core.types import GridShape, ImageSize, ViewOffset, ViewUpdate
 from tests.iibr_core.known_scenes import view_of_wall
@@ -91,10 +91,10 @@ def gate(monkeypatch: pytest.MonkeyPatch) -> Iterator[threading.Event]:
     """No view between others is made while this is not set."""
     gate, made = threading.Event(), dense_field.densify
 
-    def held(given: object, sparse: object, dense: object, should_stop: ShouldStop, *rest: object) -> object:
+    def held(given: object, sparse: object, dense: object, *rest: object) -> object:
         while not gate.wait(0.01):
-            raise_if_stopped(should_stop)
-        return made(given, sparse, dense, should_stop, *rest)  # type: ignore[arg-type]
+            raise_if_stopped()
+        return made(given, sparse, dense, *rest)  # type: ignore[arg-type]
 
     monkeypatch.setattr(dense_field, "densify", held)
     gate.set()

@@ -20,7 +20,7 @@ from iibr_core.generation.light_field import generate, ray_set
 from iibr_core.generation.plan import plan_for_viewing, plan_literal
 from iibr_core.inpainting.registry import INPAINTERS
 from iibr_core.rendering.view_synthesis import ViewSynthesis
-from iibr_core.runtime.tiling import Cancelled
+from iibr_core.runtime.work import Cancelled, stoppable
 from iibr_core.scenes.loaded_photo import load_photo
 from iibr_core.scenes.scene import Source
 from iibr_core.types import GridShape, InputError
@@ -67,7 +67,7 @@ def never() -> bool:
 
 def test_entropy_is_that_of_the_weights_and_is_only_made_on_request(inputs: ComparisonInputs) -> None:
     request = InspectionRequest(1, "entropy", (0, 0))
-    (seen,) = ComparisonJob().results_of(request, inputs, never)
+    (seen,) = ComparisonJob().results_of(request, inputs)
     assert isinstance(seen, EntropyReady)
     loaded, plan = inputs.loaded, inputs.plan
     assert loaded is not None
@@ -85,7 +85,7 @@ def test_entropy_is_that_of_the_weights_and_is_only_made_on_request(inputs: Comp
     np.testing.assert_array_equal(with_entropy.colors, without.colors)
     assert 0 <= with_entropy.entropy.min() <= with_entropy.entropy.max() <= 1
     np.testing.assert_allclose(seen.entropy, with_entropy.entropy * 255, atol=0.5)
-    middle = next(ComparisonJob().results_of(replace(request, view=plan.grid.centre), inputs, never))
+    middle = next(ComparisonJob().results_of(replace(request, view=plan.grid.centre), inputs))
     assert isinstance(middle, EntropyReady)
     assert not middle.entropy.any(), "every ray of the middle view is the photo's own"
 
@@ -95,7 +95,7 @@ def test_fast_and_balanced_are_the_views_generate_makes(inputs: ComparisonInputs
     assert loaded is not None
     assert plan is not None
     view = (0, 1)
-    pair, scored = ComparisonJob().results_of(InspectionRequest(1, "quality", view, is_scored=True), inputs, never)
+    pair, scored = ComparisonJob().results_of(InspectionRequest(1, "quality", view, is_scored=True), inputs)
     assert isinstance(pair, PairReady)
     disparity = plan.field_disparity(loaded.disparity)
     for image, quality in ((pair.left, "fast"), (pair.right, "balanced")):
@@ -115,8 +115,8 @@ def test_holes_are_filled_as_in_the_scene_s_own_views(
     assert loaded is not None
     assert plan is not None
     request = InspectionRequest(1, "quality", view)
-    (pair,) = ComparisonJob().results_of(request, replace(inputs, inpaint="red"), never)
-    (usual,) = ComparisonJob().results_of(request, inputs, never)
+    (pair,) = ComparisonJob().results_of(request, replace(inputs, inpaint="red"))
+    (usual,) = ComparisonJob().results_of(request, inputs)
     assert isinstance(pair, PairReady)
     assert isinstance(usual, PairReady)
     views = generate(loaded.photo, plan.field_disparity(loaded.disparity), plan, quality="fast", inpaint="red")
@@ -130,9 +130,7 @@ def test_what_is_made_at_the_places_of_the_truth_is_the_truth_itself(
 ) -> None:
     """The plan for viewing has its own scale and focus; views beside ground truth are made at the truth's."""
     for view in ((0, 0), (1, 2), (1, 1)):
-        pair, scored = ComparisonJob().results_of(
-            InspectionRequest(1, "truth", view, truth, is_scored=True), inputs, never
-        )
+        pair, scored = ComparisonJob().results_of(InspectionRequest(1, "truth", view, truth, is_scored=True), inputs)
         assert isinstance(pair, PairReady)
         np.testing.assert_array_equal(pair.right, read_stored_view(open_light_field(Path(truth.path)), *view))
         assert isinstance(scored, PairScored)
@@ -142,7 +140,7 @@ def test_what_is_made_at_the_places_of_the_truth_is_the_truth_itself(
 def test_a_stored_view_is_held_against_the_truth_as_it_is(truth: GroundTruth) -> None:
     stored = np.full((truth.height, truth.width, 3), 100, np.uint8)
     request = InspectionRequest(1, "truth", (2, 0), truth, is_scored=True)
-    pair, scored = ComparisonJob().results_of(request, ComparisonInputs("fast", stored=stored), never)
+    pair, scored = ComparisonJob().results_of(request, ComparisonInputs("fast", stored=stored))
     assert isinstance(pair, PairReady)
     assert isinstance(scored, PairScored)
     np.testing.assert_array_equal(pair.left, stored)
@@ -151,20 +149,20 @@ def test_a_stored_view_is_held_against_the_truth_as_it_is(truth: GroundTruth) ->
 
 def test_a_pair_is_made_once_and_scored_when_asked(inputs: ComparisonInputs, truth: GroundTruth) -> None:
     job, request = ComparisonJob(), InspectionRequest(1, "truth", (0, 0), truth)
-    (pair,) = job.results_of(request, inputs, never)
+    (pair,) = job.results_of(request, inputs)
     assert isinstance(pair, PairReady)
-    again, scored = job.results_of(replace(request, is_scored=True), inputs, never)
+    again, scored = job.results_of(replace(request, is_scored=True), inputs)
     assert again is pair, "told again, for the first may have been dropped, but not made again"
     assert isinstance(scored, PairScored)
     job.forget()
-    (again,) = job.results_of(request, inputs, never)
+    (again,) = job.results_of(request, inputs)
     assert isinstance(again, PairReady)
     assert again is not pair
 
 
 def test_a_look_that_is_not_wanted_any_more_stops(inputs: ComparisonInputs) -> None:
-    with pytest.raises(Cancelled):
-        list(ComparisonJob().results_of(InspectionRequest(1, "quality", (0, 0)), inputs, lambda: True))
+    with pytest.raises(Cancelled), stoppable(lambda: True):
+        list(ComparisonJob().results_of(InspectionRequest(1, "quality", (0, 0)), inputs))
 
 
 def test_truth_that_changed_on_disk_is_an_input_error(inputs: ComparisonInputs, truth: GroundTruth) -> None:
@@ -172,10 +170,10 @@ def test_truth_that_changed_on_disk_is_an_input_error(inputs: ComparisonInputs, 
     for path in Path(truth.path).glob("input_Cam*.png"):
         write_image(path, np.zeros((4, 4, 3), np.uint8))
     with pytest.raises(InputError, match="changed"):
-        list(ComparisonJob().results_of(request, inputs, never))
+        list(ComparisonJob().results_of(request, inputs))
     next(Path(truth.path).glob("input_Cam000.png")).unlink()
     with pytest.raises(InputError, match="input_Cam000"):
-        list(ComparisonJob().results_of(request, inputs, never))
+        list(ComparisonJob().results_of(request, inputs))
 
 
 def test_one_view_of_a_folder_is_the_one_read_with_all_others(truth: GroundTruth) -> None:
@@ -238,7 +236,7 @@ def test_a_field_of_one_view_can_be_compared(inputs: ComparisonInputs) -> None:
     loaded = inputs.loaded
     assert loaded is not None
     plan = plan_literal(loaded.photo, loaded.disparity, GridShape(1, 1))
-    pair = next(ComparisonJob().results_of(InspectionRequest(1, "quality", (0, 0)), replace(inputs, plan=plan), never))
+    pair = next(ComparisonJob().results_of(InspectionRequest(1, "quality", (0, 0)), replace(inputs, plan=plan)))
     assert isinstance(pair, PairReady)
     np.testing.assert_array_equal(pair.left, np.rint(loaded.photo.pixels * 255))
 
@@ -251,7 +249,7 @@ def test_the_middle_view_is_the_photo_whatever_its_disparity(inputs: ComparisonI
     loaded = replace(loaded, disparity=replace(loaded.disparity, values=torn))
     plan = plan_literal(loaded.photo, loaded.disparity, GRID)
     pair, scored = ComparisonJob().results_of(
-        InspectionRequest(1, "quality", GRID.centre, is_scored=True), replace(inputs, loaded=loaded, plan=plan), never
+        InspectionRequest(1, "quality", GRID.centre, is_scored=True), replace(inputs, loaded=loaded, plan=plan)
     )
     assert isinstance(pair, PairReady)
     assert isinstance(scored, PairScored)

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from iibr_core.runtime.tiling import ShouldStop, raise_if_stopped
+from iibr_core.runtime.work import raise_if_stopped
 from iibr_core.scenes.opening import WantedPhoto
 from iibr_core.scenes.scene import Source
 from iibr_core.types import InputError
@@ -32,7 +32,7 @@ class Shelf:
         self.held = ""
         self.ahead = ReadAhead("test", self._woken.release, self._read)
 
-    def _read(self, wanted: WantedPhoto, should_stop: ShouldStop) -> str:
+    def _read(self, wanted: WantedPhoto) -> str:
         name = wanted.source.path
         self.begun.append(name)
         self._woken.release()
@@ -40,7 +40,7 @@ class Shelf:
             raise InputError("bad: no photo")
         if name == self.held:
             assert self._may_go_on.wait(DEADLINE_S)
-            raise_if_stopped(should_stop)
+            raise_if_stopped()
         return f"{name} {wanted.depth_strength:g}"
 
     def let_go(self) -> None:

@@ -13,6 +13,7 @@ import pytest
 from iibr_core.depth.editing.edits import DepthEdits, Stroke
 from iibr_core.rendering.optics import CENTRE
 from iibr_core.runtime import compiling
+from iibr_core.runtime.work import is_stopped
 from iibr_core.scenes.opening import SceneReady, SceneRequest, ViewReady, results_of
 from iibr_core.scenes.scene import DepthSettings, Progress, Source
 from iibr_core.types import GridShape, InputError, ViewUpdate
@@ -110,7 +111,7 @@ def test_depth_painted_beyond_its_range_is_no_other_lens(photo_path: Path) -> No
         strokes = tuple(Stroke("nearer", ((0.5, 0.5), (0.6, 0.5)), 0.1, 1.0) for _ in range(count))
         state = replace(state, generation=count + 1, depth=DepthSettings(1.0, DepthEdits(strokes=strokes)))
         request = SceneRequest(count + 1, source, loaded=loaded, depth_settings=state.depth)
-        ready = next(results_of(request, lambda: False, lambda: CENTRE))
+        ready = next(results_of(request, lambda: CENTRE))
         assert isinstance(ready, SceneReady)
         state, loaded = reduce(state, SceneOpened(count + 1, replace(ready.scene, source=source))), ready.loaded
         state = state if count else reduce(state, SetAperture(1.0))
@@ -123,10 +124,10 @@ def test_a_new_request_cancels_the_one_before(desk_for: Callable[..., Desk]) -> 
     cancelled = threading.Event()
     started = threading.Event()
 
-    def work(job: SceneRequest, should_stop: Callable[[], bool], _: object) -> Iterator[ViewReady]:
+    def work(job: SceneRequest, _: object) -> Iterator[ViewReady]:
         if job.generation == 1:
             started.set()
-            while not should_stop():
+            while not is_stopped():
                 threading.Event().wait(0.001)
             cancelled.set()
         yield view(job.generation)
@@ -143,7 +144,7 @@ def test_a_new_request_cancels_the_one_before(desk_for: Callable[..., Desk]) -> 
 def test_results_already_queued_for_an_earlier_request_are_dropped(desk_for: Callable[..., Desk]) -> None:
     posted = threading.Event()
 
-    def work(job: SceneRequest, should_stop: object, _: object) -> Iterator[ViewReady]:
+    def work(job: SceneRequest, _: object) -> Iterator[ViewReady]:
         yield view(job.generation)
         yield view(job.generation)
         if job.generation == 1:
@@ -161,7 +162,7 @@ def test_the_queue_is_bounded_and_a_full_one_can_be_cancelled(desk_for: Callable
     made: list[int] = []
     is_full = threading.Event()
 
-    def work(job: SceneRequest, should_stop: object, _: object) -> Iterator[ViewReady]:
+    def work(job: SceneRequest, _: object) -> Iterator[ViewReady]:
         if job.generation == 2:
             yield view(2)
             return
@@ -190,7 +191,7 @@ def test_the_queue_is_bounded_and_a_full_one_can_be_cancelled(desk_for: Callable
 def test_an_exception_is_posted_and_the_worker_lives_on(
     desk_for: Callable[..., Desk], error: Exception, message: str
 ) -> None:
-    def work(job: SceneRequest, should_stop: object, _: object) -> Iterator[ViewReady]:
+    def work(job: SceneRequest, _: object) -> Iterator[ViewReady]:
         yield view(job.generation)
         if job.generation == 1:
             raise error
@@ -208,10 +209,10 @@ def test_an_exception_is_posted_and_the_worker_lives_on(
 def test_after_cancel_nothing_is_heard_and_the_next_request_works(desk_for: Callable[..., Desk]) -> None:
     ended = threading.Event()
 
-    def work(job: SceneRequest, should_stop: Callable[[], bool], _: object) -> Iterator[ViewReady]:
+    def work(job: SceneRequest, _: object) -> Iterator[ViewReady]:
         yield view(job.generation)
         if job.generation == 1:
-            while not should_stop():
+            while not is_stopped():
                 threading.Event().wait(0.001)
             ended.set()
 
@@ -255,7 +256,7 @@ def test_where_the_user_looks_reaches_the_job(desk_for: Callable[..., Desk]) -> 
 
     seen = []
 
-    def work(job: SceneRequest, should_stop: object, nearest_to: Callable[[], ViewOffset]) -> Iterator[ViewReady]:
+    def work(job: SceneRequest, nearest_to: Callable[[], ViewOffset]) -> Iterator[ViewReady]:
         seen.append(nearest_to())
         yield view(job.generation)
 

@@ -8,7 +8,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 
 import pytest
 
-from iibr_core.runtime.tiling import Cancelled, never
+from iibr_core.runtime.work import Cancelled, in_this_job, never, stoppable
 from iibr_core.types import InputError
 from viewer.background.window_work import Steps, WindowWork
 
@@ -23,7 +23,8 @@ class Desk:
 
     def ask(self, steps: Steps[str], should_stop: Callable[[], bool] = never, is_urgent: bool = False) -> Future[str]:
         """Hand it over; it waits there when this returns."""
-        future = self.pool.submit(self.work.run, steps, should_stop, is_urgent)
+        with stoppable(should_stop):
+            future = self.pool.submit(in_this_job(self.work.run), steps, is_urgent)
         assert self.asked.acquire(timeout=60)
         return future
 

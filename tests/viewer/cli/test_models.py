@@ -239,7 +239,7 @@ def without_sidecar(folder: Path) -> Path:
 def test_the_scene_tells_where_its_depth_came_from(tmp_path: Path) -> None:
     told: list[Progress] = []
     source = Source(str(without_sidecar(tmp_path)), grid=GridShape(1, 1))
-    ready = next(results_of(SceneRequest(1, source), lambda: False, lambda: CENTRE, told.append))
+    ready = next(results_of(SceneRequest(1, source), lambda: CENTRE, told.append))
     assert isinstance(ready, SceneReady)
     origin = ready.scene.depth_origin
     assert origin is not None

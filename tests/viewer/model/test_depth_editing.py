@@ -312,16 +312,14 @@ def test_damaged_edits_in_settings_are_told(damage: str) -> None:
 
 def test_the_worker_edits_what_it_read_once(photo_path: Path) -> None:
     source = Source(str(photo_path), grid=GRID)
-    first = next(results_of(SceneRequest(1, source), lambda: False, lambda: GRID.offset(1, 1)))
+    first = next(results_of(SceneRequest(1, source), lambda: GRID.offset(1, 1)))
     photo_path.unlink()
     depth_settings = DepthSettings(edits=DepthEdits(strokes=(Stroke("nearer", ((0.5, 0.5),), 0.1, 0.5),)))
-    second = next(
-        results_of(SceneRequest(2, source, 1.0, first.loaded, depth_settings), lambda: False, lambda: GRID.offset(1, 1))
-    )
+    second = next(results_of(SceneRequest(2, source, 1.0, first.loaded, depth_settings), lambda: GRID.offset(1, 1)))
     assert second.loaded.disparity.values.max() == pytest.approx(NEAR + 0.5 * (NEAR - FAR), abs=0.03)
     assert second.scene.plan.disparity_scale == pytest.approx(first.scene.plan.disparity_scale, rel=1e-3)
     assert second.scene.plan.disparity_zero == first.scene.plan.disparity_zero
-    back = next(results_of(SceneRequest(3, source, 1.0, second.loaded), lambda: False, lambda: GRID.offset(1, 1)))
+    back = next(results_of(SceneRequest(3, source, 1.0, second.loaded), lambda: GRID.offset(1, 1)))
     np.testing.assert_array_equal(back.centre.disparity, first.centre.disparity)
 
 
@@ -377,7 +375,7 @@ def test_a_saved_map_is_the_same_scene_when_it_is_opened_again(photo_path: Path,
 
 def test_the_histogram_turns_with_the_map_and_the_focus_stays_on_its_surface(photo_path: Path) -> None:
     source = Source(str(photo_path), grid=GRID)
-    ready = next(results_of(SceneRequest(1, source), lambda: False, lambda: GRID.offset(1, 1)))
+    ready = next(results_of(SceneRequest(1, source), lambda: GRID.offset(1, 1)))
     levels, scene = ready.scene.levels, ready.scene
     heights = bar_heights(levels, False)
     assert bar_heights(levels, True) == heights[::-1]

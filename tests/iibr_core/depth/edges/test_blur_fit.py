@@ -8,7 +8,7 @@ import pytest
 from iibr_core.depth.edges import blur_fit
 from iibr_core.depth.edges.blur_fit import fit_to_blur
 from iibr_core.runtime import tiling
-from iibr_core.runtime.tiling import Cancelled
+from iibr_core.runtime.work import Cancelled, stoppable
 from iibr_core.training.degradation import blur
 from tests.iibr_core.scenes import smooth_texture
 
@@ -91,8 +91,8 @@ def test_bands_and_threads_do_not_matter(monkeypatch: pytest.MonkeyPatch) -> Non
 def test_it_can_be_cancelled() -> None:
     photo, exact = disc()
     answers = iter([False] * 3)
-    with pytest.raises(Cancelled):
-        fit_to_blur(photo, blur(exact, SIGMA), ragged(exact), SIGMA, LEAST_EDGE, lambda: next(answers, True))
+    with pytest.raises(Cancelled), stoppable(lambda: next(answers, True)):
+        fit_to_blur(photo, blur(exact, SIGMA), ragged(exact), SIGMA, LEAST_EDGE)
 
 
 def full_taps() -> np.ndarray:

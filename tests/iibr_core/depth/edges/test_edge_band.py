@@ -5,7 +5,7 @@ import pytest
 
 from iibr_core.depth.edges.edge_band import _find_between, resolve_edge_band
 from iibr_core.runtime import tiling
-from iibr_core.runtime.tiling import Cancelled
+from iibr_core.runtime.work import Cancelled, stoppable
 from tests.iibr_core.scenes import smooth_texture, square_before_wall
 
 RED, BLUE = np.float32([0.8, 0.1, 0.1]), np.float32([0.1, 0.2, 0.8])
@@ -20,9 +20,9 @@ def disc(size=64):
     return photo.astype(np.float32), np.where(inside, NEAR, FAR).astype(np.float32)
 
 
-def resolve(photo, values, unknown=None, should_stop=tiling.never):
+def resolve(photo, values, unknown=None):
     unknown = np.zeros(values.shape, np.bool_) if unknown is None else unknown
-    return resolve_edge_band(photo, values, EDGE, unknown, should_stop=should_stop)
+    return resolve_edge_band(photo, values, EDGE, unknown)
 
 
 def resampled(truth):
@@ -87,9 +87,9 @@ def test_a_lone_pixel_between_two_surfaces_is_none_of_them_but_a_thing_is_one(he
     values = np.full((40, 40), FAR, np.float32)
     values[:, 21:] = NEAR
     values[10, 20] = height
-    assert np.argwhere(_find_between(values, EDGE, tiling.never)[0]).tolist() == [[10, 20]]
+    assert np.argwhere(_find_between(values, EDGE)[0]).tolist() == [[10, 20]]
     values[11, 20:22] = values[12, 19:22] = values[13:, 19:22] = height
-    found, clear = _find_between(values, EDGE, tiling.never)
+    found, clear = _find_between(values, EDGE)
     assert not found.any()
     assert (clear > 0) == (height == 5.0)
 
@@ -99,7 +99,7 @@ def test_beside_the_border_nothing_is_clearly_between():
     values = np.full((40, 40), FAR, np.float32)
     values[:, :6], values[:, -1], values[10, -2] = NEAR, NEAR, 5.0
     for turn in range(4):
-        found, clear = _find_between(np.ascontiguousarray(np.rot90(values, turn)), EDGE, tiling.never)
+        found, clear = _find_between(np.ascontiguousarray(np.rot90(values, turn)), EDGE)
         assert (found.sum(), clear) == (1, 0)
 
 
@@ -133,5 +133,5 @@ def test_tiny_maps(size):
 
 def test_a_stop_is_heard():
     photo, truth = disc()
-    with pytest.raises(Cancelled):
-        resolve(photo, resampled(truth), should_stop=lambda: True)
+    with pytest.raises(Cancelled), stoppable(lambda: True):
+        resolve(photo, resampled(truth))

@@ -6,7 +6,7 @@ from scipy import ndimage
 
 from iibr_core.depth.edges import edge_labels
 from iibr_core.depth.edges.edge_labels import label_edges
-from iibr_core.runtime.tiling import Cancelled, never
+from iibr_core.runtime.work import Cancelled, stoppable
 from tests.iibr_core.scenes import smooth_texture
 
 EDGE, NEAR, FAR = 0.3, 5.0, 1.0
@@ -139,7 +139,7 @@ def slow_labels(colors, values, unknown):
 
 def test_labels_are_those_of_the_slow_field_and_of_the_truth():
     photo, given, unknown, truth = dilated_square()
-    labelled = label_edges(photo, given, unknown, EDGE, never)
+    labelled = label_edges(photo, given, unknown, EDGE)
     np.testing.assert_allclose(labelled, slow_labels(photo, given, unknown), atol=1e-4)
     assert (np.abs(given - truth) > 1).sum() == 44
     assert (np.abs(labelled - truth) > 1).sum() <= 4
@@ -154,7 +154,7 @@ def test_labels_of_any_outline_are_those_of_the_slow_field(seed, contrast, noise
     light = np.where(truth == NEAR, 0.35, 0.2)[..., None] + rng.normal(0, noise, (40, 30, 3))
     photo = (contrast * smooth_texture(40, 30) + light).astype(np.float32)
     unknown = rng.random((40, 30)) < 0.05
-    labelled = label_edges(photo, given, unknown, EDGE, never)
+    labelled = label_edges(photo, given, unknown, EDGE)
     np.testing.assert_allclose(labelled, slow_labels(photo, given, unknown), atol=1e-4)
     assert (labelled != given).sum() > 100
 
@@ -206,7 +206,7 @@ def square(kind, size=60):
 @pytest.mark.parametrize("kind", ["dilated", "eroded", "coarse"])
 def test_maps_that_are_wrong_beside_their_edges_get_those_of_the_photo(kind):
     photo, truth, given = square(kind)
-    labelled = label_edges(photo, given, np.zeros(given.shape, np.bool_), EDGE, never)
+    labelled = label_edges(photo, given, np.zeros(given.shape, np.bool_), EDGE)
     assert (np.abs(labelled - truth) > 1).sum() <= 0.1 * (np.abs(given - truth) > 1).sum()
 
 
@@ -214,16 +214,16 @@ def test_exact_maps_keep_their_bits():
     """Its edges mixed, as a lens and a sensor mix them, or not."""
     photo, truth, _ = square("exact")
     nothing = np.zeros(truth.shape, np.bool_)
-    assert label_edges(photo, truth, nothing, EDGE, never) is truth
+    assert label_edges(photo, truth, nothing, EDGE) is truth
     mixed = ndimage.uniform_filter(photo, (2, 2, 1))
-    assert label_edges(mixed, truth, nothing, EDGE, never) is truth
+    assert label_edges(mixed, truth, nothing, EDGE) is truth
 
 
 def test_a_wire_of_a_dilated_map_stays():
     photo, truth, _ = square("exact")
     truth[:, 50], photo[:, 50] = NEAR, (0.1, 0.6, 0.1)
     given = ndimage.maximum_filter(truth, 3)
-    labelled = label_edges(photo, given, np.zeros(given.shape, np.bool_), EDGE, never)
+    labelled = label_edges(photo, given, np.zeros(given.shape, np.bool_), EDGE)
     assert (labelled[:, 50] == NEAR).all()
 
 
@@ -231,7 +231,7 @@ def test_a_wire_beside_its_place_is_not_lost():
     photo, truth, _ = square("exact")
     given = ndimage.maximum_filter(truth, 3)
     photo[:, 51], given[:, 50] = (0.1, 0.6, 0.1), NEAR
-    labelled = label_edges(photo, given, np.zeros(given.shape, np.bool_), EDGE, never)
+    labelled = label_edges(photo, given, np.zeros(given.shape, np.bool_), EDGE)
     assert (labelled[:, 50] == NEAR).all()
 
 
@@ -241,8 +241,8 @@ def test_what_is_unknown_goes_where_its_colours_are_as_far_as_the_band_reaches(a
     photo, _, given = square("dilated")
     unknown = np.zeros(given.shape, np.bool_)
     unknown[at], photo[at] = True, photo[30, 30]
-    assert label_edges(photo, given, unknown, EDGE, never)[at] == NEAR
-    assert label_edges(photo, given, np.zeros_like(unknown), EDGE, never)[at] == FAR
+    assert label_edges(photo, given, unknown, EDGE)[at] == NEAR
+    assert label_edges(photo, given, np.zeros_like(unknown), EDGE)[at] == FAR
 
 
 def test_what_is_mixed_is_the_foregrounds_several_pixels_wide():
@@ -271,7 +271,7 @@ def test_a_dilated_map_of_a_front_out_of_focus_keeps_what_is_mixed():
     photo = share * np.array([0.2, 0.15, 0.1]) + (1 - share) * np.array([0.7, 0.75, 0.8])
     photo = (photo + np.random.default_rng(0).normal(0, 0.005, photo.shape)).astype(np.float32)
     values = np.where(x < 34, NEAR, FAR).astype(np.float32)
-    labelled = label_edges(photo, values, np.zeros(values.shape, np.bool_), EDGE, never)
+    labelled = label_edges(photo, values, np.zeros(values.shape, np.bool_), EDGE)
     assert (labelled[2:-2, :31] == NEAR).all()
     assert (labelled[2:-2, 32:] == FAR).all()
 
@@ -279,14 +279,14 @@ def test_a_dilated_map_of_a_front_out_of_focus_keeps_what_is_mixed():
 def test_colours_that_are_not_finite_tell_nothing():
     photo, truth, _ = square("exact")
     photo[30, 10:50] = np.nan
-    labelled = label_edges(photo, truth, np.zeros(truth.shape, np.bool_), EDGE, never)
+    labelled = label_edges(photo, truth, np.zeros(truth.shape, np.bool_), EDGE)
     np.testing.assert_array_equal(labelled, truth)
 
 
 def test_outside_the_band_bits_stay():
     photo, _, given = square("dilated")
     given += np.random.default_rng(1).normal(0, 0.01, given.shape).astype(np.float32)
-    labelled = label_edges(photo, given, np.zeros(given.shape, np.bool_), EDGE, never)
+    labelled = label_edges(photo, given, np.zeros(given.shape, np.bool_), EDGE)
     outside = edge_labels.step_distance(given, EDGE) > edge_labels.LABELLED_PX
     np.testing.assert_array_equal(labelled[outside], given[outside])
 
@@ -294,16 +294,16 @@ def test_outside_the_band_bits_stay():
 def test_shades_that_are_elsewhere_change_hardly_anything():
     photo, _, unknown, truth = dilated_square()
     shaded = np.roll(np.roll(photo, 3, axis=1), 3, axis=0)
-    assert (np.abs(label_edges(shaded, truth, unknown, EDGE, never) - truth) > 1).sum() <= 4
+    assert (np.abs(label_edges(shaded, truth, unknown, EDGE) - truth) > 1).sum() <= 4
 
 
 def test_a_map_without_steps_stays_as_it_is():
     photo, given, unknown, _ = dilated_square()
     flat = np.ones_like(given)
-    assert label_edges(photo, flat, unknown, EDGE, never) is flat
+    assert label_edges(photo, flat, unknown, EDGE) is flat
 
 
 def test_a_stop_is_heard():
     photo, given, unknown, _ = dilated_square()
-    with pytest.raises(Cancelled):
-        label_edges(photo, given, unknown, EDGE, lambda: True)
+    with pytest.raises(Cancelled), stoppable(lambda: True):
+        label_edges(photo, given, unknown, EDGE)

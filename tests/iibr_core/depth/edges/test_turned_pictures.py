@@ -11,7 +11,6 @@ from iibr_core.depth.edges.edge_band import _find_between
 from iibr_core.depth.edges.refine import refine as refine_map
 from iibr_core.rendering.flying_pixels import measure_detail
 from iibr_core.rendering.mixed_pixels import split_mixed_pixels
-from iibr_core.runtime.tiling import never
 from iibr_core.stages import stages_without
 from tests.iibr_core.scenes import smooth_texture
 
@@ -149,8 +148,8 @@ def test_what_lies_between_surfaces_does_so_however_they_are_turned(turn):
     values = np.float32([0, 9, 4])[things() % 3]
     between = rng.random(values.shape) < 0.1
     values[between] = rng.uniform(0, 9, between.sum())
-    found, clear = _find_between(values, EDGE, never)
-    again, clear_again = _find_between(np.ascontiguousarray(turn(values)), EDGE, never)
+    found, clear = _find_between(values, EDGE)
+    again, clear_again = _find_between(np.ascontiguousarray(turn(values)), EDGE)
     np.testing.assert_array_equal(again, turn(found))
     assert clear == clear_again > 5
 
@@ -162,8 +161,8 @@ def test_a_raised_map_is_as_before(height):
     between = rng.random(values.shape) < 0.1
     values[between] = rng.integers(0, 48, between.sum()) / 16
     raised = values + np.float32(height)
-    found, clear = _find_between(values, EDGE, never)
-    again, clear_again = _find_between(raised, EDGE, never)
+    found, clear = _find_between(values, EDGE)
+    again, clear_again = _find_between(raised, EDGE)
     np.testing.assert_array_equal(again, found)
     assert clear == clear_again > 5
     np.testing.assert_array_equal(edge_labels.step_distance(raised, EDGE), edge_labels.step_distance(values, EDGE))

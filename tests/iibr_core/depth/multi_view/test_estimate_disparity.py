@@ -26,7 +26,7 @@ from iibr_core.depth.multi_view.matching import (
     sweep,
 )
 from iibr_core.depth.multi_view.semi_global import choose_disparity
-from iibr_core.runtime.tiling import Cancelled
+from iibr_core.runtime.work import Cancelled, stoppable
 from iibr_core.training.scenes.random_scene import random_scene
 from iibr_core.training.scenes.raycast import render
 from iibr_core.types import GridShape, ImageSize, InputError, ViewOffset
@@ -130,8 +130,8 @@ def test_what_cannot_be_matched_is_refused_in_words():
 
 
 def test_it_stops_when_asked():
-    with pytest.raises(Cancelled):
-        estimate_coarse(slanted_views(0.0)[0], OFFSETS, CENTRE, lambda: True)
+    with pytest.raises(Cancelled), stoppable(lambda: True):
+        estimate_coarse(slanted_views(0.0)[0], OFFSETS, CENTRE)
 
 
 def test_a_sweep_is_least_where_the_surface_is():

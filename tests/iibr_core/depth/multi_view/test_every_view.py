@@ -5,7 +5,7 @@ import pytest
 
 from iibr_core.depth.multi_view.estimate_disparity import estimate_coarse
 from iibr_core.depth.multi_view.every_view import _carry, estimate_all, matched_views
-from iibr_core.runtime.tiling import Cancelled, never
+from iibr_core.runtime.work import Cancelled, stoppable
 from iibr_core.training.scenes.random_scene import random_scene
 from iibr_core.training.scenes.raycast import render
 from iibr_core.types import GridShape, ImageSize, ViewOffset
@@ -55,7 +55,7 @@ def test_what_the_nearest_views_do_not_see_is_carried_from_the_next():
         maps[index] = np.where(is_panel, 4.0, 0.0).astype(np.float32)
     views = [np.full((48, 64, 3), 90, np.uint8)] * 5
     del maps[0]
-    carried = _carry(maps, views, offsets, 0, never)
+    carried = _carry(maps, views, offsets, 0)
     np.testing.assert_allclose(carried[16:32, 31:33], 0.0, atol=0.01)
     np.testing.assert_allclose(carried[16:32, [28, 35]], 4.0, atol=0.01)
 
@@ -71,8 +71,8 @@ def test_it_ends_when_it_should_stop_while_maps_are_carried():
     views, told = [textured()] * 3, []
     estimate_all(views, LINE, (-1.0, 1.0), report_progress=lambda *progress: told.append(progress))
     last, seen = told[-2], []
-    with pytest.raises(Cancelled):
-        estimate_all(views, LINE, (-1.0, 1.0), lambda: last in seen, lambda *progress: seen.append(progress))
+    with pytest.raises(Cancelled), stoppable(lambda: last in seen):
+        estimate_all(views, LINE, (-1.0, 1.0), lambda *progress: seen.append(progress))
     assert told[-1] not in seen
 
 

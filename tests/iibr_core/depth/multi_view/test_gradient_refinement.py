@@ -4,7 +4,6 @@ import numpy as np
 
 from iibr_core.depth.multi_view import gradient_refinement
 from iibr_core.depth.multi_view.gradient_refinement import _apply, _diagonal, _measure, _smooth, _weigh_bends
-from iibr_core.runtime.tiling import never
 
 SIZE = 6, 7
 
@@ -39,7 +38,7 @@ def test_the_matrix_is_curvature_and_squares_of_bends():
 
 def test_smoothing_solves_the_equations():
     parts, target = weights(2), np.random.default_rng(3).normal(0, 1, SIZE).astype(np.float32)
-    found = _smooth(np.zeros(SIZE, np.float32), target, *parts, never)
+    found = _smooth(np.zeros(SIZE, np.float32), target, *parts)
     expected = np.linalg.solve(dense(*parts), (parts[0] * target).ravel())
     np.testing.assert_allclose(found.ravel(), expected, atol=2e-3)
 

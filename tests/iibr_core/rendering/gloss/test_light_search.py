@@ -8,7 +8,7 @@ import pytest
 from iibr_core.rendering.gloss.gloss_settings import Gloss, GlossLight
 from iibr_core.rendering.gloss.light_search import find_light
 from iibr_core.rendering.gloss.microfacet import lobe_shares, reflected_share
-from iibr_core.runtime.tiling import Cancelled
+from iibr_core.runtime.work import Cancelled, stoppable
 from tests.iibr_core.rendering.gloss.scenes import GEOMETRY, SIZE, plane, sphere
 
 GLOSS = Gloss(roughness=0.35)
@@ -102,8 +102,8 @@ def test_a_photo_of_one_colour_or_a_surface_of_a_few_pixels_has_none(value):
 
 def test_a_search_that_is_not_wanted_any_more_ends():
     photo = lit(round_thing(), FROM_SIDE, 0.5, painted(np.random.default_rng(0)))
-    with pytest.raises(Cancelled):
-        find_light(GLOSS, *photo, should_stop=lambda: True)
+    with pytest.raises(Cancelled), stoppable(lambda: True):
+        find_light(GLOSS, *photo)
 
 
 def test_shares_of_many_places_are_those_of_each():
