@@ -30,6 +30,7 @@ from iibr_core.generation.cost_model import (
     largest_offset,
     measure_parallax,
 )
+from iibr_core.generation.memory import scene_bytes
 from iibr_core.generation.plan import plan_literal
 from iibr_core.types import GridShape, ImageSize, Quality
 
@@ -150,7 +151,7 @@ def predict(scene: BenchScene, qualities: Sequence[Quality], repeats: int) -> It
         measured_s, memory = costs[quality].cpu_s / CORES, peak_bytes(make_field, scene, quality)
         need, parallax = plan.costs.of(quality), measure_parallax(scene.disparity, largest_offset(scene.grid))
         work = estimate_workload(parallax, scene.grid, quality)
-        predicted_bytes = plan.field_bytes + need.peak_bytes
+        predicted_bytes = scene_bytes(math.prod(scene.given[0].size), plan.field_bytes)
         yield Prediction(scene.name, quality, need.seconds, measured_s, predicted_bytes, memory, work)
 
 

@@ -55,7 +55,8 @@ def check_output_folder(
     real = _resolve(folder)
     above = next(place for place in (real, *real.parents) if place.exists())
     if not above.is_dir():
-        raise InputError(f"{folder}: {above} is a file, not a folder; choose another place")
+        named = "is" if above == real else f"{above} is"
+        raise InputError(f"{folder}: {named} a file, not a folder; choose another place")
     _require_writable(folder, above)
     inputs = tuple(inputs)
     _require_outside(folder, real, inputs)
@@ -83,13 +84,12 @@ def write_file(path: Path) -> Iterator[Path]:
     Raises InputError where that fails.
     """
     real = _resolve(path)
-    try:
-        with TemporaryDirectory(dir=real.parent, prefix=TEMPORARY, ignore_cleanup_errors=True) as scratch:
-            unfinished = Path(scratch) / real.name
-            yield unfinished
-            unfinished.replace(real)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written ({reason_of(error)}); choose another place") from error
+    if not real.parent.is_dir():
+        raise InputError(f"{path}: the folder {path.parent} does not exist; create it or choose another")
+    with _beside(path, real) as scratch:
+        unfinished = scratch / real.name
+        yield unfinished
+        unfinished.replace(real)
 
 
 @contextmanager
@@ -100,14 +100,26 @@ def write_folder(folder: Path) -> Iterator[Path]:
     """
     real = _resolve(folder)
     make_folder(real.parent)
+    with _beside(folder, real) as scratch:
+        unfinished = scratch / "new" / real.name
+        unfinished.mkdir(parents=True)
+        yield unfinished
+        _exchange(unfinished, real, scratch / "old")
+
+
+@contextmanager
+def _beside(path: Path, real: Path) -> Iterator[Path]:
+    """Yield a hidden temporary folder beside an output. Errors that name files in it name the output instead."""
     try:
         with TemporaryDirectory(dir=real.parent, prefix=TEMPORARY, ignore_cleanup_errors=True) as scratch:
-            unfinished = Path(scratch) / "new" / real.name
-            unfinished.mkdir(parents=True)
-            yield unfinished
-            _exchange(unfinished, real, Path(scratch) / "old")
+            yield Path(scratch)
+    except InputError as error:
+        message = str(error)
+        if TEMPORARY not in message:
+            raise
+        raise InputError(f"{path}: {message.partition(': ')[2]}") from error
     except OSError as error:
-        raise InputError(f"{folder}: cannot be written ({reason_of(error)}); choose another place") from error
+        raise InputError(f"{path}: cannot be written ({reason_of(error)}); choose another place") from error
 
 
 def _exchange(new: Path, place: Path, old: Path) -> None:

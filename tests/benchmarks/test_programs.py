@@ -33,7 +33,7 @@ def test_the_list_of_programs_is_whole() -> None:
     assert sorted(named) == sorted(".".join(path.with_suffix("").parts).removesuffix(".__main__") for path in programs)
 
 
-@pytest.mark.parametrize("name", ["speed", "fuzz", "memory"])
+@pytest.mark.parametrize("name", ["speed", "fuzz"])
 def test_it_says_how_it_is_called(name: str) -> None:
     run = subprocess.run(
         [sys.executable, "-m", f"benchmarks.{name}", "--help"], capture_output=True, text=True, check=True

@@ -88,9 +88,3 @@ command()
         (log,) = tmp_path.rglob("traceback.log")
         assert "in load_photo" in log.read_text()
         assert "in load_photo" in run(start=start, IIBR_TRACEBACK="1", **state).stderr
-
-
-def test_names_that_the_terminal_cannot_show_are_printed_with_escapes(tmp_path: Path) -> None:
-    write_scene(tmp_path).rename(tmp_path / "ü€.png")
-    done = run("plan", tmp_path / "ü€.png", LC_ALL="C", PYTHONUTF8="0", PYTHONCOERCECLOCALE="0")
-    assert done.returncode == 0, done.stderr

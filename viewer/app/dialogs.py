@@ -8,8 +8,6 @@ import sys
 from itertools import islice
 from typing import Any
 
-from imgui_bundle import portable_file_dialogs as dialogs
-
 from iibr_core.exports.kinds import export_kind
 from viewer.model.state.exporting import ExportPrompt
 from viewer.model.state.prompts import FOLDER_CHOICES, ChoiceOf, FolderContents, SavePrompt
@@ -56,6 +54,8 @@ class Dialog:
 
     def __init__(self, what: ChoiceOf, beside: str = "") -> None:
         """beside: the file or folder that is open; the dialog begins in the folder that holds it."""
+        from imgui_bundle import portable_file_dialogs as dialogs
+
         self.what = what
         self._dialog: Any
         start = os.path.join(os.path.dirname(os.path.abspath(beside)), "") if beside else ""
@@ -79,6 +79,8 @@ class SaveDialog:
     """
 
     def __init__(self, prompt: SavePrompt | ExportPrompt) -> None:
+        from imgui_bundle import portable_file_dialogs as dialogs
+
         self.prompt, path = prompt, os.path.abspath(os.path.expanduser(prompt.path))
         self._dialog: Any
         self._name = os.path.basename(path) if _is_folder_export(prompt) else ""

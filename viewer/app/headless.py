@@ -38,9 +38,6 @@ from viewer.model.layout import BACKGROUND, Layout, is_narrow, layout_of
 from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState
 from viewer.model.state.inspection import SetInspection
-from viewer.ui.host import UiHost  # pictures alone need no ImGui
-from viewer.ui.screen import build_screen
-from viewer.ui.style import Look
 
 LAYOUT_FRAMES = 3
 """ImGui knows the size of a text only after it was built once."""
@@ -192,6 +189,10 @@ class HeadlessViewer:
 
     def screen(self, size: ScreenSize) -> NDArray[np.uint8]:
         """The whole window as it would look at (width, height): (height, width, 3). Needs `has_panels`."""
+        from viewer.ui.host import UiHost  # pictures alone need no ImGui
+        from viewer.ui.screen import build_screen
+        from viewer.ui.style import Look
+
         scene, preferences = self.state.scene, self.state.preferences
         self.do(SetState("is_narrow", is_narrow(size, 1.0)))
         look = Look(preferences.font_scale, preferences.theme)

@@ -7,8 +7,6 @@ from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
 
-from imgui_bundle import imgui
-
 from iibr_core.rendering.optics import CENTRE
 from iibr_core.types import ViewOffset
 from viewer.app.pointer import is_marking_gloss
@@ -83,6 +81,8 @@ def read_keys(used_space: bool, struck: Mapping[str, tuple[bool, bool]]) -> Keys
     """The keys of this ImGui frame; none while a text field has them. used_space: the mouse was dragged with Space
     held: no more comes of it. That is known only when Space is let go. struck: what was held, see `Window`.
     """
+    from imgui_bundle import imgui
+
     io = imgui.get_io()
     if io.want_text_input:
         return Keys()
@@ -120,10 +120,14 @@ def read_keys(used_space: bool, struck: Mapping[str, tuple[bool, bool]]) -> Keys
 
 def is_touched() -> bool:
     """Whether any key or mouse button was pressed or the wheel turned in this frame; to move the mouse is none."""
+    from imgui_bundle import imgui
+
     return any(imgui.is_key_pressed(key, False) for key in _named_keys())
 
 
 @cache
 def _named_keys() -> tuple[Any, ...]:
+    from imgui_bundle import imgui
+
     first, end = imgui.Key.named_key_begin, imgui.Key.named_key_end
     return tuple(key for key in imgui.Key if first <= key.value < end)

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 
-from imgui_bundle import imgui
-
 from viewer.app.pointer import DRAG_THRESHOLD, NO_POINTER, Pointer
 
 
 def read_pointer(before: Pointer = NO_POINTER) -> Pointer:
     """The mouse of this ImGui frame; before: of the one before."""
+    from imgui_bundle import imgui
+
     io = imgui.get_io()
     moved = imgui.get_mouse_drag_delta(imgui.MouseButton_.left, 0.0)
     # ImGui leaves out the frame of the release, in which a quick drag may have gone all its way.

@@ -176,8 +176,9 @@ def _with_own_files(optics: Optics, folder: Path | None) -> tuple[Optics, str]:
     if gloss is None or not gloss.environment:
         return optics, ""
     is_plain = gloss.environment == Path(gloss.environment).name and "\\" not in gloss.environment
-    is_there = folder is not None and is_plain and is_file(folder / gloss.environment)
-    environment, refused = (str(folder / gloss.environment), "") if folder and is_there else ("", gloss.environment)
+    file = folder / gloss.environment if folder is not None and is_plain else None
+    is_there = file is not None and is_file(file) and not file.is_symlink()
+    environment, refused = (str(file), "") if is_there else ("", gloss.environment)
     return dataclasses.replace(optics, gloss=dataclasses.replace(gloss, environment=environment)), refused
 
 

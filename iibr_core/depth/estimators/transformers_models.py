@@ -18,7 +18,6 @@ from iibr_core.depth.estimators.config import read_config, read_preparation, saf
 from iibr_core.depth.estimators.depth_estimator import Family, KnownModel, LocalModel, Run
 from iibr_core.depth.estimators.preparation import Preparation, affordable_pixels, input_size, network_input
 from iibr_core.formats.files import is_folder, reason_of
-from iibr_core.formats.maps.resample import resample_surfaces
 from iibr_core.runtime.machine import core_count
 from iibr_core.runtime.work import raise_if_stopped
 from iibr_core.types import FloatImage, ImageSize, InputError, Photo, ReportProgress, image_size
@@ -177,6 +176,8 @@ def _estimate_of(config: Any, output: Any, size: ImageSize, preparation: Prepara
 
 
 def _remove_padding(values: FloatImage, size: ImageSize) -> FloatImage:
+    from iibr_core.formats.maps.resample import resample_surfaces
+
     pad_y, pad_x = _padding(size)
     whole = resample_surfaces(values, ImageSize(size.height + 2 * pad_y, size.width + 2 * pad_x))
     return whole[pad_y : pad_y + size.height, pad_x : pad_x + size.width]

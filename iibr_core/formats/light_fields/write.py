@@ -113,6 +113,7 @@ def _write_hci(
 ) -> None:
     size, low, high = ImageSize(1, 1), math.inf, -math.inf
     pending: deque[Future[None]] = deque()
+    check_output_folder(folder, may_replace=True, own_files=HCI_FILES)
     with write_folder(folder) as unfinished:
         with ThreadPoolExecutor(WRITING_THREADS) as pool:
             for view in views:

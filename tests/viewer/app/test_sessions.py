@@ -173,20 +173,16 @@ def test_a_picture_beside_the_photo_goes_with_its_sidecar(
     assert second.app.state.optics.gloss == Gloss(reflectance=0.5, environment=str(room))
 
 
-@pytest.mark.parametrize("kind", ["fifo", "folder", "link", "device", "huge"])
+@pytest.mark.parametrize("kind", ["link", "huge"])
 def test_a_sidecar_that_is_no_file_is_not_read(
     open_window: Opener, photo_path: Path, tmp_path: Path, kind: str
 ) -> None:
     path = sidecar_of(photo_path)
-    if kind == "fifo":
-        os.mkfifo(path)
-    elif kind == "folder":
-        path.mkdir()
-    elif kind == "huge":
+    if kind == "huge":
         path.touch()
         os.truncate(path, 2**40)
     else:
-        path.symlink_to({"link": photo_path, "device": "/dev/zero"}[kind])
+        path.symlink_to(photo_path)
     driver = open_window(photo_path, kept_in=tmp_path / "kept", grid=ONE)
     driver.until(lambda app: any(path.name in notice.text for notice in app.state.notices))
     driver.until_idle()

@@ -267,15 +267,14 @@ def test_where_the_user_looks_reaches_the_job(desk_for: Callable[..., Desk]) -> 
     assert seen == [ViewOffset(1, 2)]
 
 
-def test_kernels_that_are_compiled_are_told_beside_the_views_that_are_there(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_kernels_that_are_compiled_are_told_beside_the_views_that_are_there() -> None:
     """So that the views go on being counted, and can be stopped."""
-    monkeypatch.setattr(compiling, "_first_run", compiling._FirstRun())
     told: list[Progress] = []
 
     def results() -> Iterator[ViewReady]:
-        compiling.note_kernel(came_along=False)
+        compiling.report_compiling()
         yield ViewReady(0, VIEW, Progress(3, 9, left_s=7.0))
-        compiling.note_kernel(came_along=False)
+        compiling.report_compiling()
 
     assert len(list(_telling_compiling(results(), told.append))) == 1
     assert [(progress.done, progress.total) for progress in told] == [(0, 0), (3, 9)]

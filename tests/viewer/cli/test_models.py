@@ -24,6 +24,7 @@ from iibr_core.types import GridShape, InputError
 from tests.iibr_core.depth.onnx_graphs import of_channels
 from tests.local_hub import Hub, local_hub
 from tests.viewer.conftest import write_scene
+from viewer import entry
 from viewer.background.job_threads import ProgressReport
 from viewer.background.scene_worker import SceneWorker
 from viewer.cli.shared_options import depth_start_from_text, refine_from_text
@@ -264,12 +265,8 @@ def test_the_worker_tells_what_it_is_busy_with_before_the_scene(tmp_path: Path) 
 
 
 def run_command(monkeypatch: pytest.MonkeyPatch, *words: object) -> int:
-    from viewer.cli import main
-
     monkeypatch.setattr(sys, "argv", ["iibr", *map(str, words)])
-    with pytest.raises(SystemExit) as ended:
-        main.main()
-    return int(ended.value.code or 0)
+    return entry.run()
 
 
 def test_generate_says_where_depth_came_from(

@@ -149,7 +149,7 @@ def test_an_empty_folder_and_links_are_written_to(
         (("screenshot", "-o", "{long}.png"), "File name too long"),
         (("generate", "--grid", "3", "--out", "{long}"), "File name too long"),
         (("generate", "--grid", "3", "--out", "file/field"), "file is a file"),
-        (("generate", "--grid", "3", "--out", "."), "holds other files"),
+        (("generate", "--grid", "3", "--out", "."), "holds photo.png"),
     ],
 )
 def test_what_can_be_refused_is_refused_before_the_photo_is_read(
