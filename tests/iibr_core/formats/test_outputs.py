@@ -137,6 +137,6 @@ def test_links_are_followed_and_stay(tmp_path: Path) -> None:
     assert (tmp_path / "disk" / "b.txt").read_text() == "text"
 
 
-def test_a_failing_disk_is_an_input_error(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="cannot be written"), write_file(tmp_path / "gone" / "a.txt"):
+def test_a_missing_folder_is_named(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="gone does not exist"), write_file(tmp_path / "gone" / "a.txt"):
         pass
