@@ -42,12 +42,6 @@ def test_nothing_is_written_into_a_folder_that_is_read(photo: Path, tmp_path: Pa
         check_output_folder(tmp_path / name, [photo.parent])
 
 
-@pytest.mark.parametrize("name", [".", "in", "folder"])
-def test_no_folder_that_holds_an_input_is_replaced(photo: Path, tmp_path: Path, name: str) -> None:
-    with pytest.raises(InputError, match="is read"):
-        check_output_folder(tmp_path / name, [photo], may_replace=True)
-
-
 def test_what_exists_is_replaced_only_where_that_is_allowed(photo: Path, tmp_path: Path) -> None:
     with pytest.raises(AlreadyThereError, match="--force"):
         check_output(photo)
@@ -72,12 +66,6 @@ def test_a_folder_of_other_files_is_not_replaced(photo: Path) -> None:
 def test_places_where_no_file_can_be(photo: Path, tmp_path: Path, name: str, reason: str) -> None:
     with pytest.raises(InputError, match=reason):
         check_output(tmp_path / name, may_replace=True)
-
-
-def test_places_where_no_folder_can_be(photo: Path) -> None:
-    for place in (photo, photo / "field"):
-        with pytest.raises(InputError, match="is a file, not a folder"):
-            check_output_folder(place, may_replace=True)
 
 
 def test_read_only_folders_are_named_before_any_work(tmp_path: Path) -> None:
@@ -125,18 +113,3 @@ def test_a_folder_is_replaced_whole_or_not_at_all(tmp_path: Path) -> None:
         _ = 1 / 0
     assert [path.name for path in folder.iterdir()] == ["second.txt"]
     assert list(folder.parent.iterdir()) == [folder]
-
-
-def test_links_are_followed_and_stay(tmp_path: Path) -> None:
-    (tmp_path / "disk").mkdir()
-    (tmp_path / "a.txt").symlink_to(tmp_path / "disk" / "b.txt")
-    check_output(tmp_path / "a.txt")
-    with write_file(tmp_path / "a.txt") as unfinished:
-        unfinished.write_text("text")
-    assert (tmp_path / "a.txt").is_symlink()
-    assert (tmp_path / "disk" / "b.txt").read_text() == "text"
-
-
-def test_a_failing_disk_is_an_input_error(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="cannot be written"), write_file(tmp_path / "gone" / "a.txt"):
-        pass
