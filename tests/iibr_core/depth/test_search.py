@@ -13,7 +13,6 @@ from iibr_core.depth.estimators.catalog import USUAL_MODEL, known_model
 from iibr_core.depth.estimators.download import VERIFIED
 from iibr_core.depth.search import PhotoWithDepth, open_with_depth, sketch_depth
 from iibr_core.formats.images.photo import read_photo
-from iibr_core.runtime.tiling import Cancelled
 from iibr_core.types import ImageSize, InputError
 from tests.iibr_core import embedded_files as files
 from tests.iibr_core.depth.onnx_graphs import published
@@ -93,13 +92,6 @@ def test_a_sketch_finds_what_is_quick_in_the_same_order(tmp_path: Path) -> None:
     assert sketch_depth(path, photo, start_from("auto")).origin.kind == "embedded"
     with pytest.raises(InputError):
         sketch_depth(path, photo, start_from("auto", file=str(sidecar)))
-
-
-def test_every_photo_moves(tmp_path: Path) -> None:
-    found = open_with_depth(photo_file(tmp_path, None))
-    assert found.origin.kind == "rough"
-    assert np.isfinite(found.disparity.values).all()
-    assert np.ptp(found.disparity.values) > 0
 
 
 def test_a_bad_map_beside_the_photo_is_followed_by_the_next(tmp_path: Path) -> None:
@@ -238,32 +230,6 @@ def test_a_sharp_picture_that_is_none_leaves_the_photo(sharp: bytes, tmp_path: P
     assert any("blurred" in note for note in found.photo.notes)
 
 
-def test_metric_depth_gives_the_same_order(tmp_path: Path) -> None:
-    assert is_nearer_inside(open_with_depth(photo_file(tmp_path, units="m"), start_from("auto")))
-
-
-def test_a_heic_portrait(tmp_path: Path) -> None:
-    pixels, depth = np.full((96, 144, 3), 60, np.uint8), np.zeros((48, 72), np.uint8)
-    depth[NEAR] = 250  # bright is near
-    (tmp_path / "a.heic").write_bytes(files.heic(pixels, depth))
-    found = open_with_depth(tmp_path / "a.heic", start_from("auto"))
-    assert found.origin.words == "the photo itself (Apple portrait)"
-    assert found.disparity.values[30:66, 54:90].min() > found.disparity.values[:10].max()
-    (tmp_path / "b.heic").write_bytes(files.heic(pixels))
-    assert open_with_depth(tmp_path / "b.heic").origin.kind == "rough"
-
-
-def test_it_stops_before_what_takes_long(tmp_path: Path) -> None:
-    with pytest.raises(Cancelled):
-        open_with_depth(photo_file(tmp_path, None), should_stop=lambda: True)
-
-
-def test_a_bad_photo_is_an_error(tmp_path: Path) -> None:
-    (tmp_path / "a.jpg").write_bytes(b"\xff\xd8\xff nothing")
-    with pytest.raises(InputError, match=r"a\.jpg"):
-        open_with_depth(tmp_path / "a.jpg")
-
-
 def test_other_maps_of_the_photo_are_named_once(tmp_path: Path) -> None:
     """Whatever they say: here the contrary."""
     path = photo_file(tmp_path)
@@ -288,12 +254,6 @@ def _square(folder: Path) -> Path:
     values[NEAR] = 3
     np.save(folder / "square.npy", values)
     return folder / "square.npy"
-
-
-def test_one_map_alone_is_not_spoken_of(tmp_path: Path) -> None:
-    path = photo_file(tmp_path, None)
-    np.save(tmp_path / "scene_disparity.npy", np.load(_square(tmp_path)))
-    assert not open_with_depth(path).disparity.notes
 
 
 def test_what_is_unknown_of_the_photos_own_depth_is_said(tmp_path: Path) -> None:
