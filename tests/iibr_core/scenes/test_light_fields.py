@@ -42,13 +42,6 @@ def test_a_light_field_without_disparity_finds_its_own(tmp_path: Path) -> None:
         assert view.disparity[8, 8] == pytest.approx(WALL_PX, abs=0.1)
 
 
-def test_without_a_window_it_is_shown_once_when_all_is_known(tmp_path: Path) -> None:
-    request = SceneRequest(1, Source(str(write_two_planes(tmp_path / "field"))), takes_drafts=False)
-    ((ready, views),) = showings(results_of(request, lambda: False, lambda: CENTRE))
-    assert ready.scene.has_view_disparity
-    assert {view.view.is_final for view in views} == {True}
-
-
 def test_the_centre_views_disparity_may_be_given(tmp_path: Path) -> None:
     folder, given = write_two_planes(tmp_path / "field"), tmp_path / "given.npy"
     np.save(given, np.full((96, 96), 0.25, np.float32))
@@ -56,18 +49,6 @@ def test_the_centre_views_disparity_may_be_given(tmp_path: Path) -> None:
     ((ready, views),) = showings(results_of(request, lambda: False, lambda: CENTRE))
     assert (ready.scene.depth_source, ready.scene.disparity_range_px) == ("given.npy", (0.5, 0.5))
     assert all(view.view.disparity is not None and (view.view.disparity == 0.5).all() for view in views)
-
-
-def test_views_that_tell_nothing_are_shown_as_they_are(tmp_path: Path) -> None:
-    """Too small to be matched: a note says so, and they stay."""
-    folder = tmp_path / "field"
-    (folder / "views").mkdir(parents=True)
-    for row, column in np.ndindex(2, 3):
-        write_image_file(folder / "views" / f"v{row}_u{column}.png", np.zeros((6, 40, 3), np.uint8), "uint8")
-    last, views = list(showings(results_of(SceneRequest(1, Source(str(folder))), lambda: False, lambda: CENTRE)))[-1]
-    assert not last.scene.has_view_disparity
-    assert any("too small" in note for note in last.scene.problems)
-    assert len(views) == 6
 
 
 @pytest.mark.parametrize("filled_grid", [None, GridShape(9, 9)])
@@ -150,15 +131,6 @@ def bilinear(image: np.ndarray, y: np.ndarray, x: np.ndarray) -> np.ndarray:
     top = image[y0, x0] * (1 - x + x0) + image[y0, x0 + 1] * (x - x0)
     bottom = image[y0 + 1, x0] * (1 - x + x0) + image[y0 + 1, x0 + 1] * (x - x0)
     return top * (1 - y + y0) + bottom * (y - y0)
-
-
-def test_finding_disparity_can_be_stopped(tmp_path: Path) -> None:
-    """Asked to stop once it has begun."""
-    said: list[str] = []
-    request = SceneRequest(1, Source(str(write_two_planes(tmp_path / "field"))))
-    results = results_of(request, lambda: FINDING in said, lambda: CENTRE, lambda progress: said.append(progress.doing))
-    with pytest.raises(Cancelled):
-        list(results)
 
 
 def test_views_between_are_made_of_all_views_on_disk(tmp_path: Path) -> None:

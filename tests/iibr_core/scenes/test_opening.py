@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,15 +9,11 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from iibr_core.depth.editing.edits import DepthEdits, Stroke
 from iibr_core.rendering.optics import CENTRE
-from iibr_core.runtime.tiling import Cancelled
-from iibr_core.scenes.light_fields import UNKNOWN_DISPARITY_RANGE_PX
-from iibr_core.scenes.loaded_photo import load_photo, sketch_photo, without_history
+from iibr_core.scenes.loaded_photo import sketch_photo
 from iibr_core.scenes.opening import SceneReady, SceneRequest, ViewReady, WantedPhoto, results_of, sketch_of
 from iibr_core.scenes.scene import Source
 from iibr_core.types import GridShape, InputError
-from tests.iibr_core.known_scenes import write_grid, write_llff_row, write_stanford, write_stereo_pair
 from tests.iibr_core.scenes.test_light_fields import showings
 
 
@@ -31,7 +26,7 @@ def write_large_photo(folder: Path, name: str = "large", ending: str = "jpg") ->
     return path
 
 
-@pytest.mark.parametrize("ending", ["jpg", "png", "webp"])
+@pytest.mark.parametrize("ending", ["jpg", "png"])
 def test_a_large_photo_has_a_sketch(tmp_path: Path, ending: str) -> None:
     source = Source(str(write_large_photo(tmp_path, ending=ending)), grid=GridShape(3, 3))
     sketch = sketch_of(WantedPhoto(source, 1.0))
@@ -51,14 +46,6 @@ def test_a_large_photo_has_a_sketch(tmp_path: Path, ending: str) -> None:
 def test_what_is_read_in_no_time_or_taken_literally_has_no_sketch(tmp_path: Path, changes: dict[str, object]) -> None:
     source = replace(Source(str(write_large_photo(tmp_path)), grid=GridShape(3, 3)), **changes)  # type: ignore[arg-type]
     assert sketch_photo(source) is None
-
-
-def test_a_cut_jpeg_has_no_sketch_and_fails_as_it_did_without(tmp_path: Path) -> None:
-    path = write_large_photo(tmp_path)
-    path.write_bytes(path.read_bytes()[:20_000])
-    assert sketch_of(WantedPhoto(Source(str(path)), 1.0)) is None
-    with pytest.raises(InputError, match=r"large\.jpg"):
-        list(results_of(SceneRequest(1, Source(str(path))), lambda: False, lambda: CENTRE))
 
 
 @pytest.mark.parametrize("takes_drafts", [True, False])
@@ -92,12 +79,6 @@ def test_a_photo_tells_its_focal_length_only_where_it_knows_it(photo_path: Path,
     assert read_photo(known).focal_px == pytest.approx(50 / np.hypot(36, 24) * np.hypot(20, 30))
 
 
-def test_the_subject_is_what_fills_the_middle(photo_path: Path) -> None:
-    ready = next(results_of(SceneRequest(1, Source(str(photo_path))), lambda: False, lambda: CENTRE))
-    assert isinstance(ready, SceneReady)
-    assert ready.scene.subject_disparity_px == ready.scene.disparity_range_px[1], "the near square"
-
-
 def test_a_loaded_photo_is_not_read_again(photo_path: Path) -> None:
     source = Source(str(photo_path), grid=GridShape(1, 1))
     first = next(results_of(SceneRequest(1, source), lambda: False, lambda: CENTRE))
@@ -128,35 +109,6 @@ def test_a_light_field_folder_goes_the_same_way(tmp_path: Path, photo_path: Path
     assert len(views) == 9
 
 
-@pytest.mark.parametrize(
-    ("write", "grid", "range_px", "depth_source"),
-    [
-        (lambda to: write_stanford(to, 2, 3), (2, 3), UNKNOWN_DISPARITY_RANGE_PX, "none"),
-        (write_stereo_pair, (1, 2), (7.5, 7.5), "none"),  # the map is the left view's, the middle is the right one
-        (write_grid, (3, 3), (0.5, 2.0), "light field"),
-    ],
-)
-def test_what_evaluation_reads_opens_here(
-    tmp_path: Path,
-    write: Callable[[Path], Path],
-    grid: tuple[int, int],
-    range_px: tuple[float, float],
-    depth_source: str,
-) -> None:
-    source = Source(str(write(tmp_path / "field")))
-    ready, views = next(showings(results_of(SceneRequest(1, source), lambda: False, lambda: CENTRE)))
-    scene = ready.scene
-    assert (scene.name, scene.grid, scene.disparity_range_px) == ("field", grid, range_px)
-    assert (scene.depth_source, scene.has_view_disparity) == (depth_source, False)
-    assert len(views) == grid[0] * grid[1]
-
-
-def test_views_that_stand_on_no_grid_are_refused_in_one_line(tmp_path: Path) -> None:
-    source = Source(str(write_llff_row(tmp_path / "fern")))
-    with pytest.raises(InputError, match=r"fern.*no regular grid.*`iibr evaluate` reads them"):
-        next(results_of(SceneRequest(1, source), lambda: False, lambda: CENTRE))
-
-
 def test_a_folder_without_views_is_told_what_would_be_some(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="no photos in it"):
         next(results_of(SceneRequest(1, Source(str(tmp_path))), lambda: False, lambda: CENTRE))
@@ -181,31 +133,3 @@ def test_generating_stops_between_row_bands(photo_path: Path) -> None:
     assert asked[-1] > 0
     assert kinds[0] is SceneReady
     assert kinds.count(ViewReady) <= 1  # the photo's own view costs nothing
-
-
-def test_reading_stops_too(photo_path: Path) -> None:
-    """Asked to stop while it refines depth."""
-    request = SceneRequest(1, Source(str(photo_path), grid=GridShape(3, 3)))
-    with pytest.raises(Cancelled):
-        next(results_of(request, lambda: True, lambda: CENTRE))
-
-
-def test_an_avif_photo_opens(tmp_path: Path) -> None:
-    """It is read by another library than the settings in saved pictures."""
-    from PIL import Image
-
-    from iibr_core.scenes.loaded_photo import load_photo
-
-    Image.new("RGB", (48, 32), (200, 80, 60)).save(tmp_path / "a.avif")
-    loaded = load_photo(Source(str(tmp_path / "a.avif")))
-    assert (loaded.photo.size, loaded.settings) == ((32, 48), "")
-
-
-def test_a_photo_that_is_left_keeps_its_map_and_nothing_of_its_strokes(photo_path: Path) -> None:
-    loaded = load_photo(Source(str(photo_path)))
-    edits = DepthEdits(strokes=(Stroke("nearer", ((0.5, 0.5),), 0.1, 0.5),))
-    painted = loaded.canvas.apply(edits)
-    left = without_history(loaded)
-    assert left.canvas is not loaded.canvas
-    np.testing.assert_array_equal(left.disparity.values, loaded.disparity.values)
-    np.testing.assert_array_equal(left.canvas.apply(edits), painted)
