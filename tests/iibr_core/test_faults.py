@@ -15,11 +15,8 @@ from iibr_core.depth.embedded.embedded_depth import read_embedded
 from iibr_core.depth.estimates import RelativeInverseDepth
 from iibr_core.depth.estimators import estimate_cache
 from iibr_core.formats.images.write import write_image
-from iibr_core.formats.light_fields.light_field_formats import open_light_field
-from iibr_core.formats.light_fields.views import read_views
-from iibr_core.formats.light_fields.write import write_light_field
 from iibr_core.formats.maps.disparity_file import read_disparity
-from iibr_core.types import GridShape, ImageSize, InputError, ViewUpdate
+from iibr_core.types import ImageSize, InputError
 from tests.iibr_core import embedded_files as embedded
 
 NOISE = np.random.default_rng(0).integers(0, 256, (120, 160, 3), dtype=np.uint8)
@@ -47,11 +44,6 @@ def test_a_disk_that_is_full_at_the_last_byte_is_noticed(tmp_path, name):
     assert (tmp_path / name).stat().st_size == size
     with full_disk(size + 4096):
         write_image(tmp_path / name, NOISE)
-
-
-def write_field(folder, grid):
-    views = (ViewUpdate(*at, NOISE, NOISE[..., 0].astype(np.float32)) for at in np.ndindex(*grid))
-    write_light_field(folder, "hci", grid, views, 100.0, "field", with_disparity=True)
 
 
 def test_a_cache_that_cannot_be_written_or_is_full_costs_nothing_but_time(tmp_path, monkeypatch):
@@ -84,15 +76,6 @@ def test_a_damaged_cache_is_an_empty_one(tmp_path, monkeypatch):
     for damage in (b"", b"PK\x03\x04", b"\x93NUMPY\x01\x00", whole[:-100], whole[100:]):
         (tmp_path / "key.npz").write_bytes(damage)
         assert estimate_cache.load("key") is None
-
-
-def test_a_view_deleted_while_the_light_field_is_read(tmp_path):
-    write_field(tmp_path / "field", GridShape(2, 2))
-    _, views = read_views(open_light_field(tmp_path / "field"))
-    next(views)
-    (tmp_path / "field" / "input_Cam000.png").unlink()
-    with pytest.raises(InputError, match=r"input_Cam000\.png: no such file"):
-        list(views)
 
 
 def chunk(kind, data):

@@ -153,13 +153,6 @@ def test_an_unexpected_error_fails_its_photo_and_leaves_a_traceback(
     assert not (tmp_path / "out" / "failures.log").exists()
 
 
-def test_a_photo_that_kills_its_worker_fails_alone(archive: Path, tmp_path: Path) -> None:
-    write_photos(archive, "killer.png", "z.png")
-    assert export(archive).failed == 1
-    assert "killed" in failures(tmp_path / "out")["killer.png"]
-    assert files(tmp_path / "out") == {"a_depth.pfm", "z_depth.pfm", "sub/b_depth.pfm", "failures.csv"}
-
-
 @pytest.mark.parametrize("force", [False, True])
 def test_photos_are_not_overwritten_through_links(archive: Path, tmp_path: Path, force: bool) -> None:
     before = {name: (archive / name).read_bytes() for name in files(archive)}

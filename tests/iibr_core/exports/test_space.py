@@ -16,8 +16,6 @@ from plyfile import PlyData
 from iibr_core.exports.cameras import cameras_of
 from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.exports.source import ExportSource
-from iibr_core.formats.light_fields.light_field_formats import open_light_field
-from iibr_core.formats.light_fields.llff import read_llff
 from iibr_core.formats.maps.pfm import read_pfm
 from iibr_core.rendering.optics import Optics
 from iibr_core.scenes.screen_size import ScreenSize
@@ -78,18 +76,6 @@ def test_the_three_layouts_say_the_same(source: ExportSource, tmp_path: Path) ->
         np.testing.assert_allclose(matrix[:, 3], colmap[name] * [1, -1, -1], atol=1e-12)
         np.testing.assert_allclose(matrix[:, 4], [64, 96, whole["fl_x"]])
         np.testing.assert_array_equal(matrix[:, 0], [0, -1, 0], "down, where y is up")
-
-
-def test_our_own_reader_finds_the_grid_in_llff(source: ExportSource, tmp_path: Path) -> None:
-    scene = read_llff(exported(source, "llff", tmp_path / "scene"))
-    assert scene is not None
-    offsets = {view.name: (view.offset.t, view.offset.s) for view in scene.views}
-    for row in range(3):
-        for column in range(3):
-            assert offsets[f"v{row:02d}_u{column:02d}"] == pytest.approx((row - 1, column - 1), abs=1e-6)
-    assert scene.range_px is not None
-    low, high = source.scene.disparity_range_px
-    assert scene.range_px[1] - scene.range_px[0] == pytest.approx(high - low, rel=1e-4)
 
 
 def test_splats_are_the_photo_with_something_behind_it(source: ExportSource, tmp_path: Path) -> None:
@@ -180,14 +166,6 @@ def test_a_picture_with_its_depth_beside_it(
     low, high = source.scene.disparity_range_px
     expected = 255 * (source.centre_view().disparity - low) / (high - low)
     assert np.abs(pixels[depth] - expected[..., None]).max() <= 0.51
-
-
-def test_a_light_field_is_written_with_its_focal_length(source: ExportSource, tmp_path: Path) -> None:
-    scene = open_light_field(exported(source, "hci", tmp_path / "field"))
-    assert source.loaded is not None
-    assert scene.focal_px == pytest.approx(source.loaded.photo.focal_px)
-    assert scene.range_px is not None
-    assert scene.range_px == pytest.approx(source.scene.disparity_range_px, abs=0.2)
 
 
 def test_epi_has_a_line_a_view(source: ExportSource, tmp_path: Path) -> None:

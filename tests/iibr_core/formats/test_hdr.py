@@ -134,14 +134,6 @@ def test_highlights_are_compressed_and_keep_their_order_and_hue(tmp_path: Path, 
     np.testing.assert_allclose(kept[5, :, 1] / kept[5, :, 0], kept[5, 0, 1] / kept[5, 0, 0], rtol=0.01)
 
 
-def test_transparent_photos_are_laid_over_black_in_light(tmp_path: Path) -> None:
-    pixels = encoded(linear_from_srgb(scene() / 255), PQ)
-    rgba = np.dstack([pixels, np.full(pixels.shape[:2], 32768, np.uint16)])
-    write_png(tmp_path / "a.png", rgba, PQ)
-    found = linear_from_srgb(read_photo(tmp_path / "a.png").pixels)
-    assert np.abs(found - linear_from_srgb(scene() / 255) / 2).max() < 2e-3
-
-
 @pytest.mark.parametrize(
     ("name", "codes"),
     [

@@ -1,7 +1,6 @@
 """Photos: every kind of file is made here, read, and compared with its colours, or refused in one line."""
 
 import io
-import itertools
 import math
 import os
 from pathlib import Path
@@ -16,9 +15,7 @@ from iibr_core.formats.images import photo as photo_module
 from iibr_core.formats.images.decode import decode, decode_bands
 from iibr_core.formats.images.photo import read_photo, read_thumbnail
 from iibr_core.formats.images.picture import FILM_DIAGONAL_MM
-from iibr_core.formats.images.side_by_side import photo_size
 from iibr_core.formats.images.write import write_image
-from iibr_core.runtime.tiling import Cancelled
 from iibr_core.types import ImageSize, InputError
 from tests.iibr_core.formats.test_color_profile import profile_bytes
 
@@ -62,14 +59,6 @@ def test_8_bit_values_pass_untouched(tmp_path, name):
     assert photo.pixels.dtype == np.float32
     assert np.array_equal(np.round(photo.pixels * 255), RGB)
     assert (photo.name, photo.is_hdr, photo.notes) == ("a", False, ())
-
-
-@pytest.mark.parametrize("name", ["a.png", "a.tif", "a.exr"])
-def test_grey_becomes_rgb(tmp_path, name):
-    grey = RNG.random((5, 7)).astype(np.float32)
-    pixels = read_photo(save(tmp_path / name, grey, "float" if name.endswith("exr") else "uint8")).pixels
-    assert pixels.shape == (5, 7, 3)
-    assert np.ptp(pixels, axis=2).max() == 0
 
 
 @pytest.mark.parametrize("name", ["a.png", "a.tif", "a.webp"])
@@ -131,12 +120,6 @@ def test_exif_orientation(tmp_path, orientation):
     assert np.array_equal(column if row_side in ("left", "top") else column[::-1], RGB[:, 0])
 
 
-def test_focal_length_without_exif_is_50_degrees(tmp_path):
-    photo = read_photo(save(tmp_path / "a.png", RGB))
-    assert math.degrees(2 * math.atan(17 / 2 / photo.focal_px)) == pytest.approx(50)
-    assert read_photo(tmp_path / "a.png", fov_deg=90).focal_px == pytest.approx(8.5)
-
-
 def test_focal_length_from_35_mm_equivalent(tmp_path):
     path = save(tmp_path / "a.jpg", np.zeros((200, 300, 3), np.uint8), Exif__FocalLengthIn35mmFilm=50)
     assert read_photo(path).focal_px == pytest.approx(50 / FILM_DIAGONAL_MM * math.hypot(200, 300), rel=1e-5)
@@ -192,24 +175,6 @@ def test_large_pictures_are_made_smaller_band_by_band(tmp_path, monkeypatch, nam
         photo = read_photo(path, math.prod(size))
         light = area_average(photo_module.linear_light(whole), photo.size)
         assert np.allclose(linear_from_srgb(photo.pixels), light, atol=2e-5)
-
-
-def test_a_cancelled_photo_is_not_read_to_its_end(tmp_path, monkeypatch):
-    path = save(tmp_path / "a.jpg", np.zeros((333, 287, 3), np.uint8))
-    monkeypatch.setattr(photo_module, "MAX_BAND_PIXELS", 1000)
-    calls = itertools.count()
-    with pytest.raises(Cancelled):
-        read_photo(path, 1000, should_stop=lambda: next(calls) == 3)
-    assert next(calls) == 4
-
-
-@pytest.mark.parametrize("size", [(1, 1), (1, 31)])
-@pytest.mark.parametrize("name", ["a.png", "a.exr", "a.jpg"])
-def test_odd_sizes(tmp_path, size, name):
-    pixels = np.full((*size, 3), 0.5, np.float32)
-    photo = read_photo(save(tmp_path / name, pixels, "float" if name == "a.exr" else "uint8"))
-    assert photo.size == photo_size(tmp_path / name) == size
-    assert np.ptp(photo.pixels) < 0.01
 
 
 def test_files_that_are_no_pictures_are_refused_in_one_line(tmp_path):
@@ -304,15 +269,6 @@ def test_thumbnails_of_stereo_pairs_show_the_left_picture(tmp_path: Path, ending
     small = read_thumbnail(tmp_path / f"a_SBS.{ending}", WITHIN)
     assert small.shape[:2] == (22, 36)
     assert small[11, 2, 0] > 150 > 60 > small[11, -3, 0]
-
-
-def test_thumbnails_are_upright(tmp_path: Path) -> None:
-    exif = Image.Exif()
-    exif[ORIENTATION] = 6  # to be turned clockwise: left goes up
-    Image.fromarray(halves(40, 80)).save(tmp_path / "a.jpg", exif=exif)
-    small = read_thumbnail(tmp_path / "a.jpg", WITHIN)
-    assert small.shape[0] > small.shape[1]
-    assert small[2, 5, 0] > 150 > 60 > small[-3, 5, 0]
 
 
 def test_thumbnails_of_hdr_light_are_bytes(tmp_path: Path) -> None:

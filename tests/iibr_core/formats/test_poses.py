@@ -123,19 +123,3 @@ def test_a_picture_elsewhere_is_never_opened(tmp_path, name):
 )  # fmt: skip
 def test_invalid_llff_poses_are_refused(tmp_path, changes):
     require_refusal(r"poses_bounds\.npy", read_llff, tmp_path, **changes)
-
-
-@pytest.mark.parametrize(
-    ("name", "old", "new", "message"),
-    [
-        ("cameras.txt", "PINHOLE", "OPENCV", "undistort"),
-        ("cameras.txt", "PINHOLE 48", "PINHOLE x", "COLMAP"),
-        ("images.txt", "1 0 0 0", "0 0 0 0", "NaN"),
-        ("images.txt", " 0 0 0 ", " ", "COLMAP"),
-    ],
-)
-def test_damaged_colmap_text_is_refused(tmp_path, name, old, new, message):
-    write_field(tmp_path, "colmap")
-    path = tmp_path / "sparse/0" / name
-    path.write_text(path.read_text().replace(old, new))
-    require_refusal(message, read_poses, tmp_path)

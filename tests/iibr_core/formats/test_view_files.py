@@ -14,7 +14,6 @@ from PIL import Image
 
 from iibr_core.depth.embedded.embedded_depth import read_embedded
 from iibr_core.depth.estimates import RelativeInverseDepth
-from iibr_core.formats.images.lif import open_lif
 from iibr_core.formats.images.photo import read_photo
 from iibr_core.formats.images.picture_source import PictureSource, read_source
 from iibr_core.formats.images.spatial_photo import write_spatial_photo
@@ -57,15 +56,6 @@ def test_quilts_are_read_as_they_are_written_and_decoded_once(tmp_path: Path, mo
     for k, tile in enumerate(tiles):
         np.testing.assert_array_equal(views[0, k], tile)
     assert decoded == [PictureSource(path)]
-
-
-@pytest.mark.parametrize(("aspect", "size"), [(3.0, ImageSize(HEIGHT, 18)), (0.75, ImageSize(12, WIDTH))])
-def test_tiles_are_stretched_to_the_shape_they_are_displayed_in(tmp_path: Path, aspect: float, size: ImageSize) -> None:
-    level = [np.full((HEIGHT, WIDTH, 3), 40 * k, np.uint8) for k in range(4)]
-    path = write_quilt(tmp_path, Quilt(2, 2, ImageSize(2 * HEIGHT, 2 * WIDTH), aspect), level)
-    views = read_back(path)
-    assert views[0, 0].shape == (*size, 3)
-    assert [int(views[0, k].mean()) for k in range(4)] == [0, 40, 80, 120]
 
 
 def test_the_inner_views_of_a_lytros_lenslet_image_are_read(tmp_path: Path) -> None:
@@ -179,22 +169,6 @@ def test_jpegs_with_other_pictures_are_no_stereo(tmp_path: Path) -> None:
     Image.fromarray(smooth()).save(tmp_path / "single.mpo", "JPEG")
     with pytest.raises(InputError, match="holds one picture only"):
         find_light_field(tmp_path / "single.mpo")
-
-
-@pytest.mark.parametrize(
-    ("change", "problem"),
-    [
-        (lambda data: data.replace(b'"blob_id": 10', b'"blob_id": 11'), "lack a picture"),
-        (lambda data: data.replace(b'{"views"', b'["views"'), "cannot be read"),
-        (lambda data: data[:-6] + struct.pack(">I", 20) + data[-2:], "fields|beyond"),
-    ],
-)
-def test_damaged_leia_images_are_refused_in_a_line(
-    tmp_path: Path, change: Callable[[bytes], bytes], problem: str
-) -> None:
-    (tmp_path / "a.lif").write_bytes(change(leia_image(smooth(), smooth(shift=4))))
-    with pytest.raises(InputError, match=rf"a\.lif: .*({problem})"):
-        open_lif(tmp_path / "a.lif")
 
 
 def test_raw_light_fields_are_refused_with_programs_that_decode_them(tmp_path: Path) -> None:

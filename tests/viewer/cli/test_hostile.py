@@ -162,7 +162,9 @@ OPTIONS = {
     "screenshot scene.png -o empty": "empty",
     "export scene.png --to nothing -o o.png": "nothing",
     "depth scene.png -o o.txt": "o.txt: ",
+    "screenshot scene.png --like whole.jpg -o o.png": "whole.jpg: ",
     "view gone.png": "gone.png: no such file",
+    "view scene.png --disparity gone.pfm": "gone.pfm: no such file",
     "plan scene.png --fly": "--fly",
     "fly": "fly",
 }
