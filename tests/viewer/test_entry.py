@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import os
-import signal
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
-
-from tests.viewer.conftest import write_scene
 
 ROOT = Path(__file__).parents[2]
 START = (sys.executable, "-P", "-m", "viewer")
@@ -33,26 +30,6 @@ def in_shell(line: str) -> subprocess.CompletedProcess[str]:
     """`line` in bash; in it, "iibr" runs the program. Exit code: of the first program of a pipe."""
     script = f'iibr() {{ "{sys.executable}" -P -m viewer "$@"; }}; {line}; exit ${{PIPESTATUS[0]}}'
     return run(start=("bash", "-c", script))
-
-
-def test_bad_input_and_bad_words_are_one_line_each(tmp_path: Path) -> None:
-    assert "nothing.png: no such file" in error_of(run("plan", tmp_path / "nothing.png"))
-    assert "--help tells more" in error_of(run("plan", "--nonsense"))
-    assert error_of(run("export", "photo.png", "--to", "cake")).startswith("iibr: ")
-
-
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
-def test_interruption_is_one_line(tmp_path: Path, number: signal.Signals) -> None:
-    write_scene(tmp_path)
-    code = f"""
-import os, signal, sys
-import iibr_core.scenes.loaded_photo as loaded
-loaded.load_photo = lambda *_, **__: os.kill(os.getpid(), {int(number)}) or signal.pause()
-sys.argv = ["iibr", "plan", {str(tmp_path / "scene.png")!r}]
-from viewer.entry import command
-command()
-"""
-    assert error_of(run(start=(sys.executable, "-P", "-c", code)), 130) == "iibr: interrupted"
 
 
 def test_a_program_started_by_nohup_ignores_the_end_of_its_terminal() -> None:

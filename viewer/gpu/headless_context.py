@@ -8,7 +8,6 @@ import moderngl
 
 from iibr_core.types import InputError
 from viewer.gpu.context import GLContext
-from viewer.gpu.glfw_context import create_osmesa  # GLFW takes its time, and the usual way needs none of it
 
 Backend = Literal["auto", "egl", "osmesa"]
 
@@ -39,4 +38,6 @@ def _create_egl() -> GLContext:
 
 
 def _create_osmesa() -> GLContext:
+    from viewer.gpu.glfw_context import create_osmesa  # GLFW takes its time, and the usual way needs none of it
+
     return create_osmesa()

@@ -92,18 +92,13 @@ def test_redirected_files_come_whole(hub: Hub, tmp_path: Path) -> None:
     ("fault", "says"),
     [
         (refuse(401), ("(401)", "licence", "HF_TOKEN")),
-        (refuse(403), ("(403)", "licence", "HF_TOKEN")),
         (refuse(404), ("(404)", "HF_ENDPOINT", "--depth-model")),
-        (refuse(429), ("(429)", "try again later")),
         (refuse(429, Retry_After="17"), ("(429)", "try again in 17 s")),
         (refuse(500), ("(500)", "try again later", "HF_ENDPOINT")),
-        (refuse(503, Retry_After="Fri, 31 Dec 2027 23:59:59 GMT"), ("(503)", "try again later")),
         (cut, ("network", "what has come is kept", "try again", "HF_ENDPOINT", "--depth-model FILE.onnx")),
         (alter(WEIGHTS), (f"{WEIGHTS} is not what the hub states", "get it again")),
         (alter("config.json"), ("config.json is not what the hub states", "get it again")),
         (answer(b"<html>Log in to this network</html>"), ("is no hub", "HF_ENDPOINT")),
-        (answer(b"[1, 2"), ("is no hub", "HF_ENDPOINT")),
-        (answer(b"[" * 100_000), ("is no hub", "HF_ENDPOINT")),
         (answer(b'{"sha": 3, "siblings": [{"rfilename": "config.json"}]}'), ("is no hub", "HF_ENDPOINT")),
         (answer(b'{"siblings": null}'), ("is no hub", "HF_ENDPOINT")),
         (answer(b"[" + b" " * (1 << 25)), ("more than it states", "HF_ENDPOINT")),
@@ -136,17 +131,6 @@ def test_a_cut_download_goes_on(hub: Hub, tmp_path: Path, knows_ranges: bool) ->
     assert hub.begins == [0, HALF]
 
 
-def test_a_part_that_is_too_long_is_not_used(hub: Hub, tmp_path: Path) -> None:
-    hub.cuts = True
-    with pytest.raises(InputError, match="network"):
-        fetch(MODEL)
-    mend(hub)
-    (part,) = tmp_path.rglob("iibr-growing/*/onnx/model.onnx")
-    part.write_bytes(PUBLISHED[WEIGHTS] + b"x")
-    require_whole()
-    assert hub.begins == [0, 0]
-
-
 def test_a_damaged_part_is_known_by_the_hash(hub: Hub, tmp_path: Path) -> None:
     hub.cuts = True
     with pytest.raises(InputError, match="network"):
@@ -176,17 +160,6 @@ def test_a_slow_download_is_given_up_at_once(hub: Hub, monkeypatch: pytest.Monke
     hub.may_finish.set()
     require_whole()
     assert len(hub.begins) == 2
-
-
-def test_a_silent_hub_is_told(hub: Hub, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr("iibr_core.depth.estimators.hub.TIMEOUT_S", 0.2)
-    hub.may_finish.clear()
-    with pytest.raises(InputError, match="network fails"):
-        fetch(MODEL)
-    assert model_here(MODEL) is None
-    hub.may_finish.set()
-    require_whole()
-    assert hub.begins == [0, HALF]
 
 
 FETCH = (
@@ -223,16 +196,10 @@ def test_a_full_disk_is_told(hub: Hub, monkeypatch: pytest.MonkeyPatch, tmp_path
     assert hub.begins[1] > 0
 
 
-@pytest.mark.parametrize("address", ["http://127.0.0.1:9", "http://no.such.name.invalid", "nonsense"])
+@pytest.mark.parametrize("address", ["http://127.0.0.1:9"])
 def test_no_network_names_the_ways_without_it(tmp_path: Path, address: str) -> None:
     line = fetch_elsewhere(tmp_path, 1 << 30, HF_ENDPOINT=address)
     assert line.startswith(f"{MODEL.repository} cannot be downloaded: the network fails")
     assert "HF_ENDPOINT" in line
     assert "--depth-model FILE.onnx" in line
     assert "\n" not in line
-
-
-def test_offline_mode_is_kept(hub: Hub, tmp_path: Path) -> None:
-    line = fetch_elsewhere(tmp_path, 1 << 30, HF_ENDPOINT=hub.address, HF_HUB_OFFLINE="1")
-    assert "HF_HUB_OFFLINE is set" in line
-    assert not hub.asked

@@ -10,7 +10,7 @@ import pytest
 from PIL import Image
 from PIL.PngImagePlugin import PngInfo
 
-from iibr_core.depth.embedded.embedded_depth import embedded_in_jpeg, read_embedded
+from iibr_core.depth.embedded.embedded_depth import read_embedded
 from iibr_core.depth.embedded.unread import unread_parts
 from iibr_core.depth.search import PhotoWithDepth, open_with_depth
 from iibr_core.formats.images.lfp import open_lfp, read_lfp
@@ -46,12 +46,6 @@ def test_a_senseless_range_is_told_and_dark_is_near(tmp_path: Path, kind: str, n
     assert any("makes no sense: only the order" in note for note in found.disparity.notes) is (near != "")
 
 
-def test_a_map_of_another_shape_is_stretched(tmp_path: Path) -> None:
-    square = np.asarray(Image.fromarray(255 - DEPTH).resize((72, 64)))
-    segments = files.gdepth_segments(files.picture(square, "PNG"))
-    assert_disc_is_nearest(opened(tmp_path, "a.jpg", files.with_segments(PHOTO, segments)))
-
-
 @pytest.mark.parametrize("kind", ["PNG", "WEBP", "AVIF"])
 def test_gdepth_in_other_kinds_of_files(tmp_path: Path, kind: str) -> None:
     xmp = files.gdepth_segments(files.picture(255 - SMALL, "PNG"))[0].removeprefix(files.STANDARD)
@@ -84,12 +78,6 @@ def test_huawei_maps_lie_as_the_phone_was_held(
     assert any("counts as near" in note for note in found.disparity.notes)
 
 
-def test_huawei_maps_that_are_cut_off_are_told() -> None:
-    data = files.huawei_jpeg(PHOTO, SMALL)
-    with pytest.raises(InputError, match="64x48 pixels is cut off after"):
-        embedded_in_jpeg(data[:-100])
-
-
 def test_a_mask_behind_a_photo_is_no_map(tmp_path: Path) -> None:
     mask = files.picture(np.where(SMALL > 200, 255, 0).astype(np.uint8))
     found = opened(tmp_path, "a.jpg", PHOTO + mask)
@@ -109,20 +97,6 @@ def test_the_depth_of_an_avif(tmp_path: Path, orientation: int, white_is_near: b
     found = opened(tmp_path, "a.avif", data)
     assert found.photo.size == (96, 128)
     assert_disc_is_nearest(found)
-
-
-def test_alpha_of_an_avif_is_no_depth(tmp_path: Path) -> None:
-    data = files.avif(PIXELS, DEPTH).replace(b":auxiliary:depth\0", b":auxiliary:alpha\0")
-    (tmp_path / "a.avif").write_bytes(data)
-    assert read_embedded(tmp_path / "a.avif") is None
-
-
-def test_a_damaged_depth_of_an_avif_is_told(tmp_path: Path) -> None:
-    data = files.avif(PIXELS, DEPTH)
-    start = data.index(b"mdat") + 4  # the auxiliary picture comes first
-    found = opened(tmp_path, "a.avif", data[:start] + bytes(60) + data[start + 60 :])
-    assert found.origin.kind == "rough"
-    assert any("own depth was not used" in note and "damaged" in note for note in found.disparity.notes)
 
 
 def test_a_samsung_heic(tmp_path: Path) -> None:
@@ -167,8 +141,6 @@ def test_gain_maps_previews_and_plain_photos_need_no_words(tmp_path: Path) -> No
 
 # ---- Lytro
 
-BLURRED = files.picture(np.full((96, 128, 3), 200, np.uint8))
-
 
 def stack(is_illum: bool, depth: np.ndarray | None = None) -> bytes:
     """The disc is sharp at lambda -4, all else at 6."""
@@ -188,14 +160,6 @@ def test_a_processed_lytro_file_opens_with_its_depth(tmp_path: Path, name: str, 
     assert found.disparity.values[60, 60] > found.disparity.values[4, 10]
     assert photo_size(tmp_path / name) == (96, 128)
     np.testing.assert_allclose(read_photo(tmp_path / name).pixels * 255, PIXELS, atol=1)
-
-
-def test_between_two_depths_both_pictures_count(tmp_path: Path) -> None:
-    pictures = {k: files.picture(np.full((8, 12, 3), v, np.uint8), "PNG") for k, v in ((0.0, 40), (2.0, 80))}
-    depth = np.tile(np.array([-3.0, 0.0, 0.5, 2.0, 9.0, np.nan]), (4, 1)).repeat(2, axis=1).repeat(2, axis=0)
-    (tmp_path / "a.lfp").write_bytes(files.lytro_stack(pictures, depth, (8, 12), True))
-    row = read_lfp(tmp_path / "a.lfp").pixels[4, ::2, 0]
-    np.testing.assert_array_equal(row, [40, 40, 50, 80, 80, 40])
 
 
 def test_the_middle_view_of_a_film(tmp_path: Path) -> None:
@@ -224,14 +188,6 @@ def test_the_middle_view_of_a_film(tmp_path: Path) -> None:
         read_lfp(path)
 
 
-def test_a_map_without_its_picture_says_where_that_is(tmp_path: Path) -> None:
-    entry = {"width": 4, "height": 3, "depthMap": {"imageRef": "sha1-map"}}
-    path = tmp_path / "a-dm.lfp"
-    path.write_bytes(files.lytro_file({"x": [entry]}, {"sha1-map": bytes(48)}))
-    with pytest.raises(InputError, match=r"without its picture; open the file that ends in -stk\.lfp"):
-        read_photo(path)
-
-
 @pytest.mark.parametrize("cut", [0.1, 0.5, 0.95])
 def test_damaged_lytro_files_are_refused_in_a_line(tmp_path: Path, cut: float) -> None:
     data = stack(True)
@@ -240,16 +196,6 @@ def test_damaged_lytro_files_are_refused_in_a_line(tmp_path: Path, cut: float) -
     with pytest.raises(InputError, match=r"a\.lfp: ") as told:
         read_photo(path)
     assert "\n" not in str(told.value)
-
-
-@pytest.mark.parametrize(
-    "change", [(b'"width": 128', b'"width": -28'), (b'"focus": 6.0', b'"focus": NaN'), (b"{", b"[")]
-)
-def test_absurd_lytro_files_are_refused_in_a_line(tmp_path: Path, change: tuple[bytes, bytes]) -> None:
-    path = tmp_path / "a.lfp"
-    path.write_bytes(stack(True).replace(*change))
-    with pytest.raises(InputError, match=r"a\.lfp: damaged or too new"):
-        open_lfp(path)
 
 
 def test_raw_lytro_files_are_no_pictures(tmp_path: Path) -> None:

@@ -11,40 +11,18 @@ import numpy as np
 import pytest
 
 from iibr_core.depth.choice import DepthChoice
-from iibr_core.depth.estimators import catalog, estimate_cache
+from iibr_core.depth.estimators import estimate_cache
 from iibr_core.depth.estimators.catalog import KNOWN_MODELS, USUAL_MODEL, known_model, model_to_use, state_of
 from iibr_core.depth.estimators.estimate_depth import estimate_with
 from iibr_core.depth.estimators.words import ModelState, words_about
 from iibr_core.types import Photo
 from tests.iibr_core.depth.onnx_graphs import weighing
 
-SOURCES = Path(catalog.__file__).parents[3]
-
 
 def test_one_model_is_recommended_and_each_is_good_for_something() -> None:
     assert [model.name for model in KNOWN_MODELS if model.is_recommended] == [USUAL_MODEL]
     assert len({model.name for model in KNOWN_MODELS}) == len(KNOWN_MODELS)
     assert all(model.good_for and not model.good_for.endswith(".") for model in KNOWN_MODELS)
-
-
-def test_each_model_stands_in_one_file() -> None:
-    texts = [path.read_text("utf-8") for room in ("iibr_core", "viewer") for path in (SOURCES / room).rglob("*.py")]
-    for model in KNOWN_MODELS:
-        assert sum(model.repository in text for text in texts) == 1
-        assert sum(model.commit in text for text in texts) == 1
-
-
-def test_a_model_is_added_in_its_familys_file() -> None:
-    """One more entry there is all that the catalogue needs: it is listed, described and looked for."""
-    code = (
-        "from dataclasses import replace; from iibr_core.depth.estimators import onnx_models as family; "
-        "new = replace(family.MODELS[0], name='new', repository='a/b', is_recommended=False); "
-        "family.FAMILY = replace(family.FAMILY, models=(*family.MODELS, new)); "
-        "from iibr_core.depth.estimators.catalog import family_of, known_model, state_of; "
-        "print(family_of(known_model('new')).packages, state_of(new).is_here)"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
-    assert (done.stdout.strip(), done.stderr) == ("('onnxruntime',) False", "")
 
 
 def test_the_catalogue_loads_nothing_that_runs_models() -> None:

@@ -63,7 +63,7 @@ def integers(near: FloatImage, dtype: type, black_is_near: bool = False) -> Imag
 
 @pytest.mark.parametrize("black_is_near", [False, True])
 @pytest.mark.parametrize("dtype", [np.uint8, np.uint16])
-@pytest.mark.parametrize("name", ["map.png", "photo_depth.png", "photo_disparity.png"])
+@pytest.mark.parametrize("name", ["map.png", "photo_depth.png"])
 def test_integers_are_relative_and_the_photo_tells_which_end_is_near(
     tmp_path: Path, name: str, dtype: type, black_is_near: bool
 ) -> None:
@@ -75,15 +75,6 @@ def test_integers_are_relative_and_the_photo_tells_which_end_is_near(
     assert any(f"{found.origin.near} counts as near" in note for note in found.disparity.notes)
 
 
-def test_white_is_near_where_the_photo_says_nothing(tmp_path: Path) -> None:
-    flat = Image.new("RGB", (WIDTH, HEIGHT), (90, 90, 90))
-    half = np.full((HEIGHT, WIDTH), 60, np.uint8)
-    half[:, WIDTH // 2 :] = 200
-    Image.fromarray(half).save(tmp_path / "map.png")
-    values = opened(tmp_path, "map.png", flat).disparity.values
-    assert values[0, -1] > values[0, 0]
-
-
 def test_near_and_far_can_be_turned(tmp_path: Path) -> None:
     integers(scene()[1], np.uint8).save(tmp_path / "map.png")
     plain = opened(tmp_path, "map.png").disparity.values
@@ -93,12 +84,6 @@ def test_near_and_far_can_be_turned(tmp_path: Path) -> None:
     assert np.allclose(turned.disparity.values, -plain, atol=1e-4)
     integers(scene()[1], np.uint8, black_is_near=True).save(tmp_path / "map.png")
     assert_true_to_scene(opened(tmp_path, "map.png", file_scale=-1.0))
-
-
-def test_a_scale_makes_integers_disparity(tmp_path: Path) -> None:
-    integers(scene()[1], np.uint8).save(tmp_path / "map.png")
-    values = opened(tmp_path, "map.png", file_scale=1 / 50).disparity.values
-    assert values[DISC] == pytest.approx(5.1, abs=0.02)
 
 
 def test_float_maps_are_disparity_and_warn_where_they_look_swapped(tmp_path: Path) -> None:
@@ -150,13 +135,6 @@ def test_a_sky_of_zeros_is_far_away(tmp_path: Path) -> None:
     assert values[TOP] == pytest.approx(values[5, 200])
 
 
-def test_zeros_that_go_on_from_the_other_values_are_depth(tmp_path: Path) -> None:
-    Image.fromarray((unit(scene()[1]) * 65535).astype(np.uint16)).save(tmp_path / "map.png")
-    found = opened(tmp_path, "map.png")
-    assert_true_to_scene(found)
-    assert found.disparity.unknown is None
-
-
 def test_scattered_zeros_are_unknown(tmp_path: Path) -> None:
     stored = np.array(integers(scene()[1] + 1, np.uint8))
     stored[::3, ::5] = 0
@@ -166,7 +144,7 @@ def test_scattered_zeros_are_unknown(tmp_path: Path) -> None:
     assert found.disparity.unknown[::3, ::5].all()
 
 
-@pytest.mark.parametrize("name", ["map.jpg", "map.webp", "RGB.png", "RGBA.png", "LA.png", "P.png", "almost.png"])
+@pytest.mark.parametrize("name", ["map.jpg", "map.webp", "RGBA.png", "P.png", "almost.png"])
 def test_pictures_of_all_kinds_are_read_alike(tmp_path: Path, name: str) -> None:
     grey = integers(scene()[1], np.uint8)
     picture = grey.convert(Path(name).stem if Path(name).stem.isupper() else "RGB")
@@ -178,7 +156,7 @@ def test_pictures_of_all_kinds_are_read_alike(tmp_path: Path, name: str) -> None
     assert_true_to_scene(opened(tmp_path, name))
 
 
-@pytest.mark.parametrize("scale", ["TURBO", "INFERNO", "MAGMA", "VIRIDIS", "JET", "PLASMA", "CIVIDIS"])
+@pytest.mark.parametrize("scale", ["TURBO", "INFERNO", "JET"])
 def test_maps_drawn_in_colours_are_read_back(tmp_path: Path, scale: str) -> None:
     grey = np.array(integers(scene()[1], np.uint8))
     cv2.imwrite(str(tmp_path / "map.jpg"), cv2.applyColorMap(grey, getattr(cv2, f"COLORMAP_{scale}")))
@@ -191,12 +169,6 @@ def test_a_photo_is_no_map(tmp_path: Path) -> None:
     scene()[0].save(tmp_path / "map.jpg")
     with pytest.raises(InputError, match=r"map\.jpg: is a colour picture; .*save it as grey"):
         opened(tmp_path, "map.jpg")
-
-
-@pytest.mark.parametrize("shape", [(1, HEIGHT, WIDTH), (HEIGHT, WIDTH, 1), (1, HEIGHT, WIDTH, 1)])
-def test_arrays_with_idle_axes(tmp_path: Path, shape: tuple[int, ...]) -> None:
-    np.save(tmp_path / "map.npy", scene()[1].reshape(shape).astype(np.float16))
-    assert_true_to_scene(opened(tmp_path, "map.npy"))
 
 
 def test_a_squashed_map_is_refused_with_the_way_out(tmp_path: Path) -> None:

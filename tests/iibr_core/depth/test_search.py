@@ -95,13 +95,6 @@ def test_a_sketch_finds_what_is_quick_in_the_same_order(tmp_path: Path) -> None:
         sketch_depth(path, photo, start_from("auto", file=str(sidecar)))
 
 
-def test_every_photo_moves(tmp_path: Path) -> None:
-    found = open_with_depth(photo_file(tmp_path, None))
-    assert found.origin.kind == "rough"
-    assert np.isfinite(found.disparity.values).all()
-    assert np.ptp(found.disparity.values) > 0
-
-
 def test_a_bad_map_beside_the_photo_is_followed_by_the_next(tmp_path: Path) -> None:
     path = photo_file(tmp_path)
     np.save(tmp_path / "scene_disparity.npy", np.full(SIZE, np.nan))
@@ -288,12 +281,6 @@ def _square(folder: Path) -> Path:
     values[NEAR] = 3
     np.save(folder / "square.npy", values)
     return folder / "square.npy"
-
-
-def test_one_map_alone_is_not_spoken_of(tmp_path: Path) -> None:
-    path = photo_file(tmp_path, None)
-    np.save(tmp_path / "scene_disparity.npy", np.load(_square(tmp_path)))
-    assert not open_with_depth(path).disparity.notes
 
 
 def test_what_is_unknown_of_the_photos_own_depth_is_said(tmp_path: Path) -> None:

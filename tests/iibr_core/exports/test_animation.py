@@ -15,11 +15,10 @@ from iibr_core.exports.animation import optics_on_path
 from iibr_core.exports.kinds import ANIMATIONS, EXPORTS, ExportOptions, with_defaults
 from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.exports.source import ExportSource
-from iibr_core.formats.animations import write_animation
 from iibr_core.rendering.optics import Optics
 from iibr_core.scenes.lens_limits import aperture_limit
 from iibr_core.scenes.screen_size import ScreenSize
-from iibr_core.types import ImageSize, InputError, ViewOffset
+from iibr_core.types import InputError, ViewOffset
 from tests.iibr_core.exports.conftest import exported
 
 SIZE = ScreenSize(96, 64)
@@ -97,19 +96,6 @@ def test_a_path_goes_through_its_keys(source: ExportSource, tmp_path: Path) -> N
     assert (path[4].eye, path[4].focus_disparity, path[4].aperture_diameter) == (ViewOffset(-1, 0), 0.0, 1.5)
 
 
-def test_between_keys_the_path_is_the_spline_of_catmull_and_rom(source: ExportSource, tmp_path: Path) -> None:
-    """Half-way by its textbook's weights (-1, 9, 9, -1) / 16 of four keys; at a key it goes along its neighbours."""
-    keys = np.array([(-0.5, 0, 0.5, 1), (0.3, 0.5, -0.1, 2), (0.6, -0.4, 0.2, 1.5), (-0.2, -0.6, 0, 1)])
-    (tmp_path / "keys.txt").write_text("\n".join(" ".join(map(str, key)) for key in keys))
-    path = path_of(source, keys=tmp_path / "keys.txt", frames=400)
-    drawn = np.array([(o.eye.s, o.eye.t, o.focus_disparity, o.aperture_diameter) for o in path])
-    for k in range(4):
-        before, here, after, last = (keys[(k + i) % 4] for i in (-1, 0, 1, 2))
-        np.testing.assert_allclose(drawn[100 * k + 50], (-before + 9 * here + 9 * after - last) / 16, atol=1e-9)
-        slope = 100 * (drawn[100 * k + 1] - drawn[100 * k - 1]) / 2
-        np.testing.assert_allclose(slope, (after - before) / 2, rtol=0.02)
-
-
 @pytest.mark.parametrize("text", ["", "1", "1 2 3 4 5", "a b", "nan 0", "900 0", "0 0 500"])
 def test_keys_that_mean_nothing_are_refused(source: ExportSource, tmp_path: Path, text: str) -> None:
     keys = tmp_path / "keys.txt"
@@ -123,27 +109,3 @@ def test_videos_have_even_sizes(source: ExportSource, tmp_path: Path, name: str)
     with pytest.raises(InputError, match="give 96x64"):
         exported(source, name[2:], tmp_path / name, size=ScreenSize(97, 65))
     assert list(tmp_path.iterdir()) == []
-
-
-def test_what_ends_early_leaves_nothing(tmp_path: Path) -> None:
-    def frames() -> Iterator[np.ndarray]:
-        yield np.zeros((4, 6, 3), np.uint8)
-        raise InputError("enough")
-
-    for name in ("a.mp4", "a.gif", "a.webp"):
-        with pytest.raises(InputError, match="enough"):
-            write_animation(tmp_path / name, frames(), ImageSize(4, 6), 10.0)
-    with pytest.raises(InputError, match="no frames"):
-        write_animation(tmp_path / "a.webm", iter(()), ImageSize(4, 6), 10.0)
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_a_rate_is_kept_on_the_whole_where_no_frame_can_last_so_long(tmp_path: Path) -> None:
-    """GIFs count hundredths of a second: 30 frames a second are frames of 30 and 40 ms."""
-    rng = np.random.default_rng(0)
-    frames = [rng.integers(0, 256, (8, 8, 3), np.uint8) for _ in range(30)]
-    write_animation(tmp_path / "a.gif", frames, ImageSize(8, 8), 30.0)
-    with Image.open(tmp_path / "a.gif") as image:
-        durations = [frame.info["duration"] for frame in ImageSequence.Iterator(image)]
-    assert sum(durations) == 1000
-    assert set(durations) == {30, 40}

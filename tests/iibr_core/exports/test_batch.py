@@ -17,18 +17,14 @@ from iibr_core.exports import batch
 from iibr_core.exports.batch import (
     BatchCount,
     BatchSettings,
-    PhotoTask,
     check_batch_folder,
-    finished_output,
     photos_in,
     run_batch,
-    shares_of_machine,
 )
 from iibr_core.scenes.scene import Source
 from iibr_core.types import InputError
 
 DEPTH, RGBD = BatchSettings("depth", Source("")), BatchSettings("rgbd", Source(""))
-GIB = 2**30
 
 
 class OneThread(ThreadPoolExecutor):
@@ -137,14 +133,6 @@ def test_names_of_outputs_repeat_subfolders_and_differ(tmp_path: Path) -> None:
         photos_in([tmp_path / "missing"])
 
 
-def test_the_name_of_a_quilt_is_found_whatever_its_tag(tmp_path: Path) -> None:
-    touch(tmp_path / "a.jpg", tmp_path / "out" / "a_b_qs8x6a0.75.png")
-    task = PhotoTask(tmp_path / "a.jpg", tmp_path / "out" / "a.png", BatchSettings("quilt", Source("")))
-    assert finished_output(task) is None
-    touch(tmp_path / "out" / "a_qs8x6a0.75.png")
-    assert finished_output(task) == tmp_path / "out" / "a_qs8x6a0.75.png"
-
-
 def test_an_unexpected_error_fails_its_photo_and_leaves_a_traceback(
     monkeypatch: pytest.MonkeyPatch, archive: Path, tmp_path: Path
 ) -> None:
@@ -165,13 +153,6 @@ def test_an_unexpected_error_fails_its_photo_and_leaves_a_traceback(
     assert not (tmp_path / "out" / "failures.log").exists()
 
 
-def test_a_photo_that_kills_its_worker_fails_alone(archive: Path, tmp_path: Path) -> None:
-    write_photos(archive, "killer.png", "z.png")
-    assert export(archive).failed == 1
-    assert "killed" in failures(tmp_path / "out")["killer.png"]
-    assert files(tmp_path / "out") == {"a_depth.pfm", "z_depth.pfm", "sub/b_depth.pfm", "failures.csv"}
-
-
 @pytest.mark.parametrize("force", [False, True])
 def test_photos_are_not_overwritten_through_links(archive: Path, tmp_path: Path, force: bool) -> None:
     before = {name: (archive / name).read_bytes() for name in files(archive)}
@@ -190,24 +171,3 @@ def test_outputs_go_into_an_empty_folder_or_one_of_a_batch_unless_forced(archive
     with pytest.raises(InputError, match="is read"):
         check_batch_folder(archive / "out", [archive], force=True)
     assert export(archive, force=True).written == 2
-
-
-def test_pages_are_listed(monkeypatch: pytest.MonkeyPatch, archive: Path) -> None:
-    """The list contains the pages of earlier runs."""
-    listed: list[str] = []
-    monkeypatch.setattr(batch, "gallery_of", lambda _: lambda _, outputs: listed.extend(outputs))
-    export(archive)
-    export(archive)
-    assert sorted(listed) == sorted(2 * ["a_depth.pfm", os.path.join("sub", "b_depth.pfm")])
-
-
-@pytest.mark.parametrize(
-    ("cores", "memory_gib", "workers", "shares"),
-    [(64, 64, 4, (4, 16)), (2, 1, 8, (8, 1)), (2, 64, None, (2, 1)), (16, 8, None, (5, 3)), (4, 1, None, (1, 4))],
-)
-def test_workers_share_the_cores_as_far_as_memory_goes(
-    monkeypatch: pytest.MonkeyPatch, cores: int, memory_gib: int, workers: int | None, shares: tuple[int, int]
-) -> None:
-    monkeypatch.setattr("iibr_core.runtime.machine.core_count", lambda: cores)
-    monkeypatch.setattr("iibr_core.runtime.machine.free_memory_bytes", lambda: memory_gib * GIB)
-    assert shares_of_machine(workers) == shares

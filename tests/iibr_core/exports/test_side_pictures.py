@@ -10,14 +10,12 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from iibr_core.exports.framing import fitted, side_pictures, size_in_frame
+from iibr_core.exports.framing import side_pictures
 from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.exports.source import ExportSource
-from iibr_core.formats.images.photo import read_photo
-from iibr_core.formats.quilts import DEVICES
 from iibr_core.rendering.optics import Optics
 from iibr_core.scenes.screen_size import ScreenSize
-from iibr_core.types import GridShape, ImageSize, InputError, ViewOffset
+from iibr_core.types import GridShape, InputError, ViewOffset
 from tests.iibr_core.exports.conftest import exported
 
 
@@ -79,47 +77,9 @@ def test_the_focused_surface_stays_in_place(source: ExportSource) -> None:
     assert places[0.0] == pytest.approx(2 * near * 3, abs=0.8), "it moves by its disparity times the scale otherwise"
 
 
-def test_parts_that_are_held_still_are_as_wide_as_may_be(source: ExportSource) -> None:
-    """The first and the last reach the picture's two borders."""
-    both = RenderSettings(Optics(focus_disparity=1.5), ScreenSize(96, 64))
-    parts = [eye.part for eye in side_pictures(source.scene, both, 3, 2.0)]
-    assert max(part.x + part.width for part in parts) == pytest.approx(1)
-    assert min(part.x for part in parts) == pytest.approx(0)
-    assert all((part.y, part.height) == (0, 1) for part in parts)
-
-
 def test_a_focus_too_far_off_is_refused(source: ExportSource) -> None:
     with pytest.raises(InputError, match="too much for a common frame"):
         side_pictures(source.scene, RenderSettings(Optics(focus_disparity=30.0), ScreenSize(96, 64)), 2, 2.0)
-
-
-@pytest.mark.parametrize("name", DEVICES)
-def test_every_display_gets_what_it_asks_for(name: str) -> None:
-    quilt = DEVICES[name]
-    places = [quilt.place(view) for view in range(quilt.views)]
-    assert places[0][0].stop == quilt.size.height
-    assert places[0][1].start == 0
-    assert places[-1][0].start == quilt.size.height - quilt.rows * quilt.tile.height
-    assert places[-1][1].stop == quilt.columns * quilt.tile.width
-    assert len({(rows.start, columns.start) for rows, columns in places}) == quilt.views
-
-
-def test_a_small_photo_keeps_its_shape_however_much_it_is_enlarged(source: ExportSource) -> None:
-    width, height = source.scene.size
-    frame = ScreenSize(40 * width, 40 * height + 30)
-    assert size_in_frame(source.scene, frame) == (40 * width, 40 * height)
-    smaller = replace(source.scene, own_size=ScreenSize(40 * width, 40 * height + 30))
-    assert size_in_frame(smaller, frame) == frame, "a whole number of pixels is all that is known of its shape"
-
-
-def test_tiles_of_a_display_are_stretched_to_its_shape(source: ExportSource, tmp_path: Path) -> None:
-    """The 16" display's tiles are square and shown 1.777 wide: a 3:2 picture, shown whole, is narrower than that."""
-    assert DEVICES["16-landscape"].tile == ImageSize(857, 857)
-    assert fitted(1.5, ScreenSize(857, 857), 1.777) == (round(857 * 1.5 / 1.777), 857)
-    assert fitted(2.5, ScreenSize(857, 857), 1.777) == (857, round(857 * 1.777 / 2.5))
-    assert fitted(741 / 500, ScreenSize(740, 500), 740 / 500) == (740, 500), "no bar of a single row"
-    assert fitted(1732 / 1154, ScreenSize(6000, 4000), 1.5, 6000 / 1732) == (6000, 4000), "views of 2 MP are rounded"
-    assert fitted(1732 / 1154, ScreenSize(6000, 4100), 6000 / 4100, 6000 / 1732) == (6000, 3998)
 
 
 def test_a_size_of_another_shape_shows_the_whole_picture_undistorted(source: ExportSource, tmp_path: Path) -> None:
@@ -149,28 +109,12 @@ def test_stereo_pictures(source: ExportSource, tmp_path: Path) -> None:
     assert np.abs(pixels(half)[:, :48] - left).max() <= 1
 
 
-def test_half_of_a_picture_of_one_column_is_one(source: ExportSource, tmp_path: Path) -> None:
-    assert pixels(exported(source, "half-sbs", tmp_path / "a.png", size=ScreenSize(1, 8))).shape == (8, 2, 3)
-
-
 def test_colour_of_an_anaglyph_is_not_coarser_than_its_light(source: ExportSource, tmp_path: Path) -> None:
     """Or the eyes would mix: WebP has it so without loss only."""
     png, webp, jpeg = (exported(source, "anaglyph", tmp_path / f"a{ending}") for ending in (".png", ".webp", ".jpg"))
     assert np.array_equal(pixels(webp), pixels(png))
     with Image.open(jpeg) as image:
         assert [layer[1:3] for layer in image.layer] == 3 * [(1, 1)]  # type: ignore[attr-defined]
-
-
-@pytest.mark.parametrize("ending", [".jpg", ".webp", ".tif"])
-def test_pictures_are_of_the_kind_that_their_name_says(source: ExportSource, tmp_path: Path, ending: str) -> None:
-    png, other = (exported(source, "anaglyph", tmp_path / f"a{name}") for name in (".png", ending))
-    assert other.suffix == ending
-    assert np.abs(read_photo(png).pixels - read_photo(other).pixels).mean() < 0.02
-
-
-def test_eyes_stand_as_far_apart_as_asked(source: ExportSource, tmp_path: Path) -> None:
-    out = pixels(exported(source, "cross-eyed", tmp_path / "a.png", eyes=0.0))
-    assert np.array_equal(out[:, :96], out[:, 96:])
 
 
 def test_anaglyph_is_mixed_in_linear_light(source: ExportSource, tmp_path: Path) -> None:

@@ -14,19 +14,13 @@ from PIL import Image
 from plyfile import PlyData
 
 from iibr_core.exports.cameras import cameras_of
-from iibr_core.exports.points import SAME_DISPARITY_PX, _new, scene_points
 from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.exports.source import ExportSource
-from iibr_core.formats.cameras import FieldCameras
-from iibr_core.formats.light_fields.light_field_formats import open_light_field
-from iibr_core.formats.light_fields.llff import read_llff
 from iibr_core.formats.maps.pfm import read_pfm
 from iibr_core.rendering.optics import Optics
 from iibr_core.scenes.screen_size import ScreenSize
-from iibr_core.types import GridShape, ImageSize, InputError, ViewOffset, ViewUpdate
+from iibr_core.types import InputError, ViewOffset, ViewUpdate
 from tests.iibr_core.exports.conftest import exported
-
-GRID, SIZE = GridShape(3, 3), ImageSize(64, 96)
 
 
 def colmap_model(folder: Path) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray], np.ndarray]:
@@ -84,18 +78,6 @@ def test_the_three_layouts_say_the_same(source: ExportSource, tmp_path: Path) ->
         np.testing.assert_array_equal(matrix[:, 0], [0, -1, 0], "down, where y is up")
 
 
-def test_our_own_reader_finds_the_grid_in_llff(source: ExportSource, tmp_path: Path) -> None:
-    scene = read_llff(exported(source, "llff", tmp_path / "scene"))
-    assert scene is not None
-    offsets = {view.name: (view.offset.t, view.offset.s) for view in scene.views}
-    for row in range(3):
-        for column in range(3):
-            assert offsets[f"v{row:02d}_u{column:02d}"] == pytest.approx((row - 1, column - 1), abs=1e-6)
-    assert scene.range_px is not None
-    low, high = source.scene.disparity_range_px
-    assert scene.range_px[1] - scene.range_px[0] == pytest.approx(high - low, rel=1e-4)
-
-
 def test_splats_are_the_photo_with_something_behind_it(source: ExportSource, tmp_path: Path) -> None:
     vertex = PlyData.read(str(exported(source, "splats", tmp_path / "a.ply")))["vertex"]
     count = 96 * 64
@@ -113,17 +95,6 @@ def test_splats_are_the_photo_with_something_behind_it(source: ExportSource, tmp
     assert depth.min() == pytest.approx(1, rel=1e-4)
     square = (colors[:, 0] - colors[:, 2]) > 0.3
     assert np.median(depth[count:]) > 1.1 * np.median(depth[:count][square[:count]]), "behind the square"
-
-
-def test_the_static_disparity_changes_neither_distances_nor_places(source: ExportSource) -> None:
-    straight = cameras_of(source)
-    for zero in (-0.7, 0.0, 0.4):
-        cameras = cameras_of(replace(source, scene=replace(source.scene, plan=source.plan(zero))))
-        assert cameras.at_infinity - straight.at_infinity == pytest.approx(
-            (source.plan().disparity_zero - zero) * source.plan().disparity_scale
-        )
-        assert cameras.depth_range == pytest.approx(straight.depth_range)
-        assert cameras.step == pytest.approx(straight.step)
 
 
 def with_metres(source: ExportSource, nearest: float, farthest: float) -> ExportSource:
@@ -150,45 +121,6 @@ def test_distances_known_in_metres_are_written_in_metres(
 def test_a_sky_at_infinity_is_far_but_not_infinitely(source: ExportSource, farthest: float) -> None:
     """Also where the map's edges were drawn a little beyond infinity."""
     assert cameras_of(with_metres(source, 2.0, farthest)).depth_range == pytest.approx((1, 1000), rel=1e-3)
-
-
-@pytest.mark.parametrize("scale", [0.0, -0.5])
-def test_a_photo_that_is_flat_or_inside_out_has_no_cameras(source: ExportSource, scale: float) -> None:
-    plan = replace(source.plan(), disparity_scale=scale)
-    with pytest.raises(InputError, match="is flat or inverted"):
-        cameras_of(replace(source, scene=replace(source.scene, plan=plan)))
-
-
-def test_points_that_several_views_inpainted_are_taken_once() -> None:
-    cameras, seen = FieldCameras(GRID, SIZE, 80.0, (0.0, 6.0), -1.0), set()
-
-    def made_up(row: int, column: int, disparity: float) -> np.ndarray:
-        """New pixels of a block of the centre view, 6 x 10, seen from another view."""
-        t, s = GRID.offset(row, column)
-        top, left = 20 - round(disparity * t), 30 - round(disparity * s)
-        inpainted = np.zeros(SIZE, np.bool_)
-        inpainted[top : top + 6, left : left + 10] = True
-        view = ViewUpdate(row, column, np.zeros((*SIZE, 3), np.uint8), np.full(SIZE, disparity, np.float32), inpainted)
-        return _new(view, cameras, seen)
-
-    assert made_up(0, 0, 3.0).sum() == 60
-    assert made_up(2, 2, 3.0).sum() == made_up(0, 2, 3.0).sum() == 0
-    assert made_up(2, 0, 4.0).sum() == 60, "another surface"
-
-
-def test_points_are_those_of_the_centre_view_and_inpainted_ones_of_the_corner_views(source: ExportSource) -> None:
-    """Every inpainted place is taken once: seen from where the photo was taken, and as far away."""
-    found, places = 0, set()
-    for view in source.views():
-        if view.row == view.column == 1:
-            found += view.disparity.size
-        elif (view.row, view.column) in ((0, 0), (0, 2), (2, 0), (2, 2)):
-            t, s = GRID.offset(view.row, view.column)
-            for y, x in np.argwhere(view.inpainted):
-                d = view.disparity[y, x]
-                places.add((np.rint(x + d * s), np.rint(y + d * t), np.rint(d / np.float32(SAME_DISPARITY_PX))))
-    assert len(places) > 100
-    assert len(scene_points(source)[0]) == found + len(places)
 
 
 def test_point_cloud(source: ExportSource, tmp_path: Path) -> None:
@@ -236,26 +168,6 @@ def test_a_picture_with_its_depth_beside_it(
     assert np.abs(pixels[depth] - expected[..., None]).max() <= 0.51
 
 
-@pytest.mark.parametrize("span", [4.0, 0.25, 0.0])
-def test_depth_beside_a_picture_is_even_from_the_farthest_to_the_nearest(
-    source: ExportSource, tmp_path: Path, span: float
-) -> None:
-    disparity = np.tile(np.linspace(-1, span - 1, 96, dtype=np.float32), (64, 1))
-    centre = ViewUpdate(1, 1, np.zeros((64, 96, 3), np.uint8), disparity)
-    out = exported(replace(source, loaded=None, centre=centre), "rgbd", tmp_path / "a.png")
-    depth = np.asarray(Image.open(out))[:, 96:, 0]
-    expected = np.linspace(0, 255, 96) if span else np.zeros(96)
-    assert np.abs(depth - expected).max() <= 0.51
-
-
-def test_a_light_field_is_written_with_its_focal_length(source: ExportSource, tmp_path: Path) -> None:
-    scene = open_light_field(exported(source, "hci", tmp_path / "field"))
-    assert source.loaded is not None
-    assert scene.focal_px == pytest.approx(source.loaded.photo.focal_px)
-    assert scene.range_px is not None
-    assert scene.range_px == pytest.approx(source.scene.disparity_range_px, abs=0.2)
-
-
 def test_epi_has_a_line_a_view(source: ExportSource, tmp_path: Path) -> None:
     epi = np.asarray(Image.open(exported(source, "epi", tmp_path / "a.png", row=32))).astype(int)
     assert epi.shape == (3, 96, 3)
@@ -266,3 +178,26 @@ def test_epi_has_a_line_a_view(source: ExportSource, tmp_path: Path) -> None:
         assert exported(source, "epi", tmp_path / "b.png", row=row).is_file()
     with pytest.raises(InputError, match="rows 0 to 63"):
         exported(source, "epi", tmp_path / "c.png", row=64)
+
+
+def test_the_static_disparity_changes_neither_distances_nor_places(source: ExportSource) -> None:
+    straight = cameras_of(source)
+    for zero in (-0.7, 0.0, 0.4):
+        cameras = cameras_of(replace(source, scene=replace(source.scene, plan=source.plan(zero))))
+        assert cameras.at_infinity - straight.at_infinity == pytest.approx(
+            (source.plan().disparity_zero - zero) * source.plan().disparity_scale
+        )
+        assert cameras.depth_range == pytest.approx(straight.depth_range)
+        assert cameras.step == pytest.approx(straight.step)
+
+
+@pytest.mark.parametrize("span", [4.0, 0.25, 0.0])
+def test_depth_beside_a_picture_is_even_from_the_farthest_to_the_nearest(
+    source: ExportSource, tmp_path: Path, span: float
+) -> None:
+    disparity = np.tile(np.linspace(-1, span - 1, 96, dtype=np.float32), (64, 1))
+    centre = ViewUpdate(1, 1, np.zeros((64, 96, 3), np.uint8), disparity)
+    out = exported(replace(source, loaded=None, centre=centre), "rgbd", tmp_path / "a.png")
+    depth = np.asarray(Image.open(out))[:, 96:, 0]
+    expected = np.linspace(0, 255, 96) if span else np.zeros(96)
+    assert np.abs(depth - expected).max() <= 0.51

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import struct
 from pathlib import Path
 
 import numpy as np
@@ -27,25 +26,6 @@ def test_both_pictures_are_what_the_renderer_shows(source: ExportSource, tmp_pat
         expected = source.draw(RenderSettings(Optics(eye=ViewOffset(0.0, s)), ScreenSize(96, 64))).astype(int)
         assert np.abs(np.asarray(picture).astype(int) - expected).mean() < 3
     assert read_photo(path).size == (64, 96), "as an ordinary photo it is the left picture"
-
-
-@pytest.mark.parametrize("size", [(64, 96), (37, 51), (3, 5)])
-def test_the_boxes_of_the_pair(tmp_path: Path, size: tuple[int, int]) -> None:
-    rng = np.random.default_rng(0)
-    left, right = (np.full((*size, 3), shade, np.uint8) for shade in rng.integers(0, 256, 2))
-    write_spatial_photo(tmp_path / "a.heic", left, right, focal_px=0.75 * size[1])
-    stored = (tmp_path / "a.heic").read_bytes()
-    group = stored.index(b"ster")
-    assert struct.unpack_from(">IIIII", stored, group + 4)[2:] == (2, 1, 2)
-    cmin = stored.index(bytes.fromhex("22cc04c7d6d94e079d904eb6ecbaf3a3")) + 16
-    flags, *numbers = struct.unpack_from(">I3i", stored, cmin)
-    assert (flags, [number / 2**30 for number in numbers]) == (0x1E00, [0.75, 0.5, 0.5])
-    cmex = stored.rindex(bytes.fromhex("4363e9145b7d4aab97aebea69803b434")) + 16
-    assert struct.unpack_from(">Ii", stored, cmex) == (1, 63_000)
-    pictures = [np.asarray(picture) for picture in pillow_heif.open_heif(tmp_path / "a.heic")]
-    for picture, given in zip(pictures, (left, right)):
-        assert picture.shape == given.shape
-        assert np.abs(picture.astype(int) - given).max() <= 4
 
 
 def test_libheif_knows_the_pair_and_its_cameras(tmp_path: Path) -> None:

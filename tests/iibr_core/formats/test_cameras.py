@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from iibr_core.formats.cameras import MAX_DEPTH_RATIO, FieldCameras, infinity_of, spread
-from iibr_core.types import GridShape, ImageSize, InputError, ViewOffset
+from iibr_core.formats.cameras import MAX_DEPTH_RATIO, FieldCameras, infinity_of
+from iibr_core.types import GridShape, ImageSize, ViewOffset
 
 GRID, SIZE = GridShape(3, 3), ImageSize(64, 96)
 
@@ -40,14 +40,3 @@ def test_depths_are_limited_to_the_range() -> None:
     cameras = FieldCameras(GRID, SIZE, 80.0, (-3.0, 3.0), infinity_of(-3.0, 3.0))
     depth = cameras.depth(np.float32([-9.0, -3.0, 0.0, 3.0, 9.0]))
     np.testing.assert_allclose(1 / depth, [1 / 20, 1 / 20, 0.525, 1, 1], rtol=1e-5)
-
-
-@pytest.mark.parametrize("numbers", [(np.nan, 0, 1, -1), (0.0, 0, 1, -1), (80.0, 0, 1, 0), (80.0, 2, 1, 0)])
-def test_numbers_that_make_no_cameras_are_refused(numbers: tuple[float, ...]) -> None:
-    focal_px, low, high, infinity = numbers
-    with pytest.raises(InputError, match="no cameras can be computed"):
-        FieldCameras(GRID, SIZE, focal_px, (low, high), infinity)
-
-
-def test_spread_goes_from_the_first_to_the_last() -> None:
-    assert (spread(0, 5), spread(3, 5), spread(101, 5)) == ([], [0, 1, 2], [0, 25, 50, 75, 100])

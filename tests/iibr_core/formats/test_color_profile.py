@@ -7,21 +7,17 @@ import zlib
 from io import BytesIO
 
 import numpy as np
-import OpenImageIO as oiio
 import pillow_heif
 import pytest
 from PIL import Image, ImageCms
 
-from iibr_core.color import linear_from_srgb, photo_in_srgb
 from iibr_core.formats.images.color_profile import (
     ColorProfile,
     UnusableProfileError,
     color_profile,
-    color_space_of,
     icc_profile,
 )
-from iibr_core.formats.images.photo import linear_light, read_photo
-from iibr_core.formats.images.picture import Picture
+from iibr_core.formats.images.photo import read_photo
 from iibr_core.types import DISPLAY_P3, SRGB
 
 P3 = ((0.51512, 0.24120, -0.00105), (0.29198, 0.69225, 0.04189), (0.15710, 0.06657, 0.78407))
@@ -81,9 +77,8 @@ CURVES = {
 
 
 @pytest.mark.parametrize("curve", CURVES.values(), ids=CURVES)
-@pytest.mark.parametrize("primaries", [P3, ADOBE], ids=["P3", "Adobe"])
-def test_photos_are_converted_as_littlecms_does(tmp_path, primaries, curve):
-    data = profile_bytes(primaries, curve)
+def test_photos_are_converted_as_littlecms_does(tmp_path, curve):
+    data = profile_bytes(P3 if curve == SRGB_CURVE else ADOBE, curve)
     Image.fromarray(COLORS).save(tmp_path / "a.png", icc_profile=data)
     photo = read_photo(tmp_path / "a.png")
     difference = np.abs(255 * photo.pixels - converted(COLORS, data).astype(float))
@@ -91,27 +86,6 @@ def test_photos_are_converted_as_littlecms_does(tmp_path, primaries, curve):
     assert photo.notes == ("Colours are those of the photo's profile, 'made here'.",)
     assert photo.color_space == SRGB
     assert not photo.is_hdr
-
-
-def test_photos_may_keep_their_own_primaries(tmp_path):
-    """Display P3 has sRGB's curve: its numbers then stay as they are, those that sRGB lacks too."""
-    for primaries, name in ((P3, DISPLAY_P3.name), (ADOBE, "made here"), (SRGB_PRIMARIES, SRGB.name)):
-        Image.fromarray(COLORS).save(tmp_path / "a.png", icc_profile=profile_bytes(primaries))
-        photo = read_photo(tmp_path / "a.png", keeps_primaries=True)
-        assert np.abs(255 * photo.pixels - COLORS).max() < 0.1
-        assert photo.color_space.name == name
-        small = read_photo(tmp_path / "a.png", 600, keeps_primaries=True)
-        assert (small.color_space, small.size) == (photo.color_space, (20, 30))
-        expected = converted(COLORS, profile_bytes(primaries))
-        assert np.abs(255 * photo_in_srgb(photo).pixels - expected).max() < 1.6
-
-
-def test_an_exr_has_the_colours_of_its_chromaticities():
-    pixels = np.zeros((1, 1, 3), np.float32)
-    p3_xy = (0.68, 0.32, 0.265, 0.69, 0.15, 0.06, 0.3127, 0.329)
-    assert color_space_of(Picture(pixels, chromaticities=p3_xy)) == DISPLAY_P3
-    for bad in ((0.0,) * 8, (float("nan"),) * 8, (1e30,) * 8, (0.3, 0.3) * 4, (*p3_xy[:6], -1.0, 0.1), ()):
-        assert color_space_of(Picture(pixels, chromaticities=bad)) == SRGB
 
 
 @pytest.mark.parametrize("name", ["a.jpg", "a.png", "a.tif", "a.webp", "a.heic"])
@@ -125,19 +99,6 @@ def test_every_format_with_profiles_is_converted(tmp_path, name):
     for max_pixels in (2000, 100):
         photo = read_photo(tmp_path / name, max_pixels)
         assert np.abs(255 * photo.pixels - (216, 69, 50)).max() < 2.5, "P3's (200, 80, 60)"
-
-
-def test_sixteen_bits_stay_so(tmp_path):
-    """The ramp is so fine that 8 bits would hold four of its steps."""
-    ramp = np.repeat(np.arange(30000, 31024, dtype=np.uint16)[None, :, None], 3, axis=2)
-    spec, data = oiio.ImageSpec(1024, 1, 3, "uint16"), np.frombuffer(profile_bytes(), np.uint8)
-    spec.attribute("ICCProfile", oiio.TypeDesc(f"uint8[{len(data)}]"), data)
-    target = oiio.ImageOutput.create(str(tmp_path / "a.png"))
-    assert target.open(str(tmp_path / "a.png"), spec)
-    assert target.write_image(ramp)
-    assert target.close()
-    green = read_photo(tmp_path / "a.png").pixels[0, :, 1]
-    assert np.all(np.diff(green) > 0)
 
 
 def test_numbers_of_a_heic_count_without_a_profile(tmp_path):
@@ -184,28 +145,16 @@ def test_srgb_passes_untouched(tmp_path, data):
     assert photo.notes == ()
 
 
-def test_a_linear_profile_is_recognised_by_its_curve_not_its_name(tmp_path):
-    data = profile_bytes(SRGB_PRIMARIES, CURVES["linear"], name="GIMP built-in Linear sRGB")
-    Image.fromarray(COLORS).save(tmp_path / "a.png", icc_profile=data)
-    photo = read_photo(tmp_path / "a.png")
-    assert np.abs(255 * photo.pixels - converted(COLORS, data).astype(float)).max() < 1.6
-    assert photo.notes == ("Colours are those of the photo's profile, 'GIMP built-in Linear sRGB'.",)
-
-
 BAD = {
     "empty": b"",
-    "cut off in its header": profile_bytes()[:100],
     "cut off in its table": profile_bytes()[:170],
     "cut off in its curves": profile_bytes()[:-60],
     "garbage": bytes(RNG.integers(0, 256, 3000, np.uint8)),
     "CMYK": profile_bytes(space=b"CMYK"),
-    "grey": profile_bytes(space=b"GRAY"),
     "tables only": profile_bytes(leave_out=(b"rXYZ",)),
     "no curve": profile_bytes(leave_out=(b"gTRC",)),
     "primaries on a line": profile_bytes((P3[0], P3[0], P3[1])),
-    "no primaries": profile_bytes(((0, 0, 0),) * 3),
     "absurd table": profile_bytes(curve=("curv", 2**31, (1, 2))),
-    "another curve": profile_bytes(curve=("para", 9, (1.0,))),
     "absurd power": profile_bytes(curve=("para", 0, (-2.0,))),
     "larger than any": profile_bytes() + bytes(5 * 2**20),
 }
@@ -226,7 +175,7 @@ def test_a_photo_with_an_unusable_profile_counts_as_srgb(tmp_path):
     )
 
 
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", range(6))
 def test_flipped_bytes_give_colours_or_a_refusal(seed):
     rng = np.random.default_rng(seed)
     data = np.frombuffer(profile_bytes(curve=CURVES["raised"]), np.uint8).copy()
@@ -239,13 +188,6 @@ def test_flipped_bytes_give_colours_or_a_refusal(seed):
     linear = profile.linear(COLORS)
     assert np.isfinite(linear).all()
     assert 0 <= linear.min() <= linear.max() <= 1
-
-
-def test_linear_light_follows_the_profile_of_the_picture():
-    gamma = profile_bytes(curve=("curv", 1, (round(256 * 1.8),)))
-    linear = color_profile(gamma).linear(COLORS)
-    assert np.array_equal(linear_light(Picture(COLORS, icc=gamma)), linear)
-    assert np.abs(linear - linear_from_srgb(COLORS / np.float32(255))).max() > 0.01
 
 
 @pytest.mark.parametrize("space", [SRGB, DISPLAY_P3], ids=lambda space: space.name)

@@ -10,11 +10,10 @@ import pytest
 from iibr_core.evaluation.datasets import read_known_disparity
 from iibr_core.formats.light_fields.light_field_formats import open_light_field
 from iibr_core.formats.light_fields.multi_view_scene import MultiView
-from iibr_core.formats.light_fields.views import read_stored_view, step_length
 from iibr_core.formats.maps.pfm import write_pfm
 from iibr_core.types import GridShape, ImageSize, ViewOffset
 from tests.iibr_core.evaluation.test_datasets import offset_by_file, scene_of, write_picture
-from tests.iibr_core.known_scenes import HEIGHT, WIDTH, write_numbered, write_stanford
+from tests.iibr_core.known_scenes import HEIGHT, WIDTH, write_numbered
 
 
 def write_archive(folder: Path, positions: dict[tuple[int, int], tuple[float, float]]) -> MultiView:
@@ -58,46 +57,6 @@ def test_a_step_of_stanford_is_the_spacing_of_columns_else_of_rows(
     for at, offset in offsets_by_index(scene).items():
         np.testing.assert_allclose(offset, np.subtract(positions[at], positions[0, 0]) / step)
     assert scene.notes == ("Viewpoints from the names.",)
-
-
-@pytest.mark.parametrize(("scale", "note"), [(0, "positions are unknown"), (1, "off the grid: a regular grid")])
-def test_stanford_positions_that_form_no_grid_are_noted_and_rows_go_upwards(
-    tmp_path: Path, scale: float, note: str
-) -> None:
-    rng = np.random.default_rng(0)
-    scene = write_archive(tmp_path, {at: tuple(scale * rng.uniform(size=2)) for at in np.ndindex(3, 3)})
-    assert note in scene.notes[0]
-    for (row, column), offset in offsets_by_index(scene).items():
-        np.testing.assert_array_equal(offset, (-row, column))
-
-
-def test_rows_of_stanford_count_upwards_on_disk_and_downwards_here(tmp_path: Path) -> None:
-    scene = open_light_field(write_stanford(tmp_path / "lego", 3, 4))
-    places = {view.path.stem[:9]: view.place for view in scene.views}
-    assert (places["out_02_00"], places["out_00_03"]) == ((0, 0), (2, 3))
-    assert step_length(scene) == pytest.approx(1)
-    assert (
-        read_stored_view(scene, 2, 0).mean()
-        < read_stored_view(scene, 2, 1).mean()
-        < read_stored_view(scene, 0, 0).mean()
-    )
-
-
-@pytest.mark.parametrize(
-    ("kept", "grid"),
-    [
-        ([(0, 0), (0, 2), (2, 0), (2, 2)], GridShape(2, 2)),  # every second view
-        ([(3, 7), (3, 8)], GridShape(1, 2)),
-        ([(0, 0), (0, 1), (1, 0)], None),  # a gap
-        ([(0, 0), (0, 1), (0, 5)], None),  # uneven
-    ],
-)
-def test_stanford_names_that_fill_a_grid_and_that_do_not(
-    tmp_path: Path, kept: list[tuple[int, int]], grid: GridShape | None
-) -> None:
-    scene = write_archive(tmp_path, {(row, column): (row, column) for row, column in kept})
-    assert scene.grid == grid
-    assert (scene.views[0].place is None) == (grid is None)
 
 
 def test_middlebury_pair_from_the_left(tmp_path: Path) -> None:

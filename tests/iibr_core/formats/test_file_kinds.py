@@ -29,27 +29,20 @@ TEXT = "a text file, not a picture; get the picture itself"
 FTYP = b"\0\0\0\x20ftyp"
 REFUSED: dict[str, tuple[bytes, str]] = {
     "a.dng": (b"II*\0\x08\0\0\0" + bytes(60), RAW),
-    "a.nef": (b"MM\0*\0\0\0\x08" + bytes(60), RAW),
     "a.cr2": (b"II*\0\x10\0\0\0CR\x02\0" + bytes(60), RAW),
     "canon.tif": (b"II*\0\x10\0\0\0CR\x02\0" + bytes(60), RAW),
     "a.cr3": (b"\0\0\0\x18ftypcrx \0\0\0\1crx isom" + bytes(60), RAW),
     "a.raf": (b"FUJIFILMCCD-RAW 0201" + bytes(60), RAW),
-    "a.rw2": (b"IIU\0" + bytes(60), RAW),
     "unknown.3fr": (b"\x80\x81" * 50, RAW),
     "a.mp4": (FTYP + b"isom" + bytes(60), VIDEO),
-    "a.mov": (b"\0\0\0\x14ftypqt  " + bytes(60), VIDEO),
     "a.mkv": (b"\x1aE\xdf\xa3" + bytes(60), VIDEO),
     "a.avi": (b"RIFF\0\0\0\0AVI LIST" + bytes(60), VIDEO),
     "page.jpg": (b"<!DOCTYPE html><html>404</html>", PAGE),
-    "page.heic": (b"\xef\xbb\xbf<!doctype html>", PAGE),
     "a.svg": (b"<svg xmlns='http://www.w3.org/2000/svg'/>", SVG),
     "svg.png": (b'<?xml version="1.0"?>\n<!DOCTYPE svg PUBLIC "-//W3C//DTD SVG 1.1//EN" "x">\n<svg>', SVG),
     "a.pdf": (b"%PDF-1.7\n%\xe2\xe3\xcf\xd3" + bytes(60), "a PDF document; save the page or its picture as PNG"),
-    "a.eps": (b"%!PS-Adobe-3.0 EPSF-3.0\n", "a PostScript drawing; save it as PNG"),
     "a.jxl": (b"\xff\x0a" + bytes(60), JPEG_XL),
-    "a.xcf": (b"gimp xcf v011" + bytes(60), r"a GIMP image \(XCF\); export it as PNG"),
     "a.npy": (b"\x93NUMPY\1\0" + bytes(60), r"an array of numbers \(NumPy\); give it as a map with --disparity"),
-    "a.ply": (b"ply\nformat ascii 1.0\n", "a 3D model; save a view of it as PNG"),
     "pointer.png": (
         b"version https://git-lfs.github.com/spec/v1\noid sha256:0\n",
         "a pointer of Git LFS; ",
@@ -114,7 +107,7 @@ def test_pictures_open_whatever_their_ending(tmp_path: Path, name: str) -> None:
     assert photo.notes == ()
 
 
-@pytest.mark.parametrize("ending", ["bmp", "tga", "ppm", "jp2", "gif", "ico", "jxl", "psd", "dds", "sgi"])
+@pytest.mark.parametrize("ending", ["bmp", "tga", "jp2", "gif", "ico", "jxl", "psd"])
 def test_other_kinds_of_pictures_open(tmp_path: Path, ending: str) -> None:
     path = tmp_path / f"a.{ending}"
     if ending == "jxl":
@@ -151,10 +144,3 @@ def test_pictures_of_other_colours_open(tmp_path: Path, name: str, mode: str, no
     assert photo.notes == ((note,) if note else ())
     expected = np.asarray(PICTURE.convert(mode).convert("RGB"))
     assert np.abs(255 * photo.pixels - expected).mean() < 6
-
-
-def test_lab_opens_with_a_note_that_its_colours_are_not_exact(tmp_path: Path) -> None:
-    PICTURE.convert("RGB").convert("LAB").save(tmp_path / "a.tif")
-    photo = read_photo(tmp_path / "a.tif")
-    assert photo.notes == ("Lab was converted to RGB with a tint: save the photo as RGB for its true colours.",)
-    assert np.abs(255 * photo.pixels - PIXELS).mean() < 15

@@ -19,7 +19,6 @@ PICTURE = Image.fromarray(
 XMP_TAG = 700
 GPANO = "http://ns.google.com/photos/1.0/panorama/"
 GIMAGE = "http://ns.google.com/photos/1.0/image/"
-GDEPTH = "http://ns.google.com/photos/1.0/depthmap/"
 
 
 def xmp(attributes: str = "", elements: str = "") -> str:
@@ -54,19 +53,6 @@ def test_panoramas_are_shown_flat_with_a_note(tmp_path: Path, name: str) -> None
     assert photo.notes == (note,)
 
 
-@pytest.mark.parametrize(
-    ("attributes", "elements", "start"),
-    [
-        ("", "<GPano:ProjectionType>cylindrical</GPano:ProjectionType>", "Panorama (cylindrical): "),
-        ('GPano:FullPanoWidthPixels="8192"', "", "Panorama: "),
-        ('GPano:ProjectionType="&lt;b&gt;\n"', "", "Panorama: "),
-    ],
-)
-def test_panoramas_as_other_programs_write_them(tmp_path: Path, attributes: str, elements: str, start: str) -> None:
-    (note,) = file_notes(save(tmp_path / "a.jpg", xmp(attributes, elements)))
-    assert note.startswith(start + "shown flat")
-
-
 @pytest.mark.parametrize("packet", [xmp(), xmp('GPano:SourcePhotosCount="1"'), f"<broken {GPANO}", ""])
 def test_other_photos_have_no_notes(tmp_path: Path, packet: str) -> None:
     assert file_notes(save(tmp_path / "a.jpg", packet)) == ()
@@ -79,11 +65,6 @@ def test_a_right_eye_that_is_not_used_is_named(tmp_path: Path) -> None:
     assert right_eye == "The right eye's picture in it (Cardboard Camera, VR180) is not used."
 
 
-def test_the_sharp_picture_beside_a_depth_map_is_no_right_eye(tmp_path: Path) -> None:
-    packet = xmp(f'GImage:Mime="image/jpeg" xmlns:GDepth="{GDEPTH}" GDepth:Format="RangeInverse"')
-    assert file_notes(save(tmp_path / "a.jpg", packet)) == ()
-
-
 @pytest.mark.parametrize("name", ["a.gif", "a.webp", "a.png", "a.avif", "webp.jpg"])
 def test_the_first_picture_of_an_animation_is_used(tmp_path: Path, name: str) -> None:
     others = [PICTURE.rotate(90), PICTURE.rotate(180)]
@@ -93,9 +74,3 @@ def test_the_first_picture_of_an_animation_is_used(tmp_path: Path, name: str) ->
     photo = read_photo(tmp_path / name)
     assert photo.notes == ("Animation: the first of its 3 pictures is used.",)
     assert np.abs(255 * photo.pixels - np.asarray(PICTURE)).mean() < 8
-
-
-@pytest.mark.parametrize("name", ["a.gif", "a.webp", "a.png", "a.avif", "a.tif"])
-def test_still_pictures_are_no_animations(tmp_path: Path, name: str) -> None:
-    PICTURE.save(tmp_path / name)
-    assert read_photo(tmp_path / name).notes == ()

@@ -37,14 +37,6 @@ def test_hci_names_count_row_by_row(tmp_path: Path, rows: int, columns: int) -> 
     assert scene.disparity[scene.centre].is_truth
 
 
-@pytest.mark.parametrize(("first", "step"), [(0, 1), (1, 1), (0, 10)])
-def test_hci_names_without_parameters_form_a_square_in_a_subfolder_too(tmp_path: Path, first: int, step: int) -> None:
-    names = [f"input_Cam{first + step * k:03d}.png" for k in range(4)]
-    scene = open_light_field(write_flat(tmp_path / "views", names).parent)
-    assert (scene.grid, scene.range_px, scene.focal_px) == ((2, 2), None, None)
-    assert [view.path.name for view in scene.views] == names
-
-
 @pytest.mark.parametrize(
     "name", ["v{v:02d}_u{u:02d}.png", "scene7_{v1}_{u1}.png", "{k:03d}.png", "img-{k1}.png", "lf_{v}_{u}.jpg"]
 )
@@ -88,13 +80,6 @@ def test_photos_numbered_by_date_and_time_are_no_light_field(tmp_path: Path) -> 
     assert find_light_field(tmp_path) is None
 
 
-def test_photos_of_two_names_are_no_light_field_but_a_single_view_is(tmp_path: Path) -> None:
-    write_flat(tmp_path, [f"a_{k}.png" for k in range(90)] + [f"b_{k}_{k}.png" for k in range(3)])
-    assert find_light_field(tmp_path) is None
-    write_flat(tmp_path, ["v00_u00.png"])
-    assert open_light_field(tmp_path).grid == (1, 1)
-
-
 def test_maps_of_places_and_truth_before_estimates(tmp_path: Path) -> None:
     grid = write_grid(tmp_path / "grid")
     np.save(grid / "disp_est_u02_v00.npy", disparity_of_square())
@@ -106,17 +91,6 @@ def test_maps_of_places_and_truth_before_estimates(tmp_path: Path) -> None:
     assert [known.is_truth for _, known in sorted(open_light_field(hci).disparity.items())] == [False, True]
     write_pfm(hci / "gt_disp_lowres_Cam002.pfm", disparity_of_square())
     assert open_light_field(hci).disparity[2].is_truth
-
-
-def test_of_a_view_in_two_kinds_one_is_taken_and_of_two_grids_hci(tmp_path: Path) -> None:
-    folder = write_hci(tmp_path / "field")
-    write_image(folder / "input_Cam003.exr", np.ones((5, 5, 3), np.float32))
-    write_flat(folder, ["v00_u00.png", "v00_u01.png"])
-    scene = open_light_field(folder)
-    assert (scene.grid, scene.is_hdr) == ((3, 3), False)
-    write_image(folder / "input_Cam03.png", np.ones((5, 5, 3), np.float32))
-    with pytest.raises(InputError, match=r"shows the same view as input_Cam0"):
-        open_light_field(folder)
 
 
 def test_missing_odd_and_damaged_views_are_named(tmp_path: Path) -> None:
@@ -141,31 +115,9 @@ def test_missing_odd_and_damaged_views_are_named(tmp_path: Path) -> None:
         open_light_field(places)
 
 
-@pytest.mark.parametrize(
-    ("numbers", "problem"),
-    [((0, 1, 3, 4), r"input_Cam002\.png: this view is missing \(1 of 5"), (range(8), "8 views do not form a square")],
-)
-def test_gaps_without_parameters(tmp_path: Path, numbers: tuple[int, ...], problem: str) -> None:
-    write_flat(tmp_path, [f"input_Cam{number:03d}.png" for number in numbers])
-    with pytest.raises(InputError, match=problem):
-        open_light_field(tmp_path)
-
-
 @pytest.mark.parametrize("count", ["0", "-3", "1000000000", "2"])
 def test_parameters_that_do_not_fit(tmp_path: Path, count: str) -> None:
     folder = write_hci(tmp_path / "lf")
     (folder / "parameters.cfg").write_text(f"[extrinsics]\nnum_cams_x = {count}\nnum_cams_y = 3\n")
     with pytest.raises(InputError, match="9 views do not fit"):
-        open_light_field(folder)
-
-
-@pytest.mark.parametrize(
-    "text", ["disp_min = 1", "disp_min = low\ndisp_max = nan", "disp_min = 2\ndisp_max = 1", "a=%(x)s"]
-)
-def test_parameters_without_a_range(tmp_path: Path, text: str) -> None:
-    folder = write_hci(tmp_path / "lf")
-    (folder / "parameters.cfg").write_text(f"[meta]\n{text}\n")
-    assert open_light_field(folder).range_px is None
-    (folder / "parameters.cfg").write_bytes(b"\xff\xfe no sections")
-    with pytest.raises(InputError, match=r"parameters\.cfg: is not a valid parameter file"):
         open_light_field(folder)

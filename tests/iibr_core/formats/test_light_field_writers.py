@@ -8,14 +8,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import OpenImageIO as oiio
 import pytest
 from PIL import Image
 
-from iibr_core.color import linear_from_srgb
 from iibr_core.formats.light_fields.light_field_formats import open_light_field
 from iibr_core.formats.light_fields.views import read_views
-from iibr_core.formats.light_fields.write import WRITERS, check_light_field, write_light_field
+from iibr_core.formats.light_fields.write import WRITERS, write_light_field
 from iibr_core.formats.maps.pfm import read_pfm
 from iibr_core.types import GridShape, InputError, ViewUpdate
 
@@ -87,18 +85,6 @@ def test_hci_files_and_parameters_are_those_of_the_benchmark(tmp_path: Path) -> 
     assert 12.5 * 1.0 * -1 / focus_mm == pytest.approx(float(parser["meta"]["disp_min"]))
 
 
-def test_without_disparity_only_the_centre_has_a_map(tmp_path: Path) -> None:
-    scene = open_light_field(write(tmp_path, make_views(), with_disparity=False))
-    assert [scene.views[index].place for index in scene.disparity] == [(1, 2)]
-
-
-def test_hdr_views_are_stored_as_linear_light(tmp_path: Path) -> None:
-    (view,) = make_views(GridShape(1, 1), np.float16)
-    folder = write(tmp_path, [view], grid=GridShape(1, 1))
-    stored = oiio.ImageInput.open(str(folder / "input_Cam000.exr")).read_image()
-    np.testing.assert_allclose(stored, linear_from_srgb(view.colors), rtol=1e-3, atol=1e-5)
-
-
 @pytest.mark.parametrize("dtype", [np.uint8, np.float16])
 def test_a_lenslet_image_has_the_views_of_a_place_together(tmp_path: Path, dtype: Any) -> None:
     views = make_views(dtype=dtype)
@@ -126,32 +112,3 @@ def test_an_incomplete_or_interrupted_field_leaves_nothing_and_keeps_the_older_o
         assert list(tmp_path.iterdir()) == ([tmp_path / NAMES[layout]] if has_older else [])
         write(tmp_path, make_views(), layout)
         assert open_light_field(tmp_path / NAMES[layout]).grid == GRID
-
-
-def test_an_older_light_field_is_replaced_whole(tmp_path: Path) -> None:
-    write(tmp_path, make_views())
-    folder = write(tmp_path, make_views(GridShape(1, 1)), grid=GridShape(1, 1))
-    assert len(list(folder.glob("input_Cam*"))) == 1
-    assert list(tmp_path.iterdir()) == [folder]
-
-
-def test_foreign_folders_are_left_alone(tmp_path: Path) -> None:
-    (tmp_path / "field").mkdir()
-    (tmp_path / "field" / "beach.jpg").touch()
-    for attempt in (write, lambda folder, views: check_light_field(folder / "field", "hci", (), True)):
-        with pytest.raises(InputError, match=r"field: holds other files \(beach.jpg\)"):
-            attempt(tmp_path, make_views())
-    assert [path.name for path in tmp_path.rglob("*.*")] == ["beach.jpg"]
-
-
-def test_what_cannot_be_written_is_refused_before(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"'mp4' is not a layout that can be written: give hci or eslf"):
-        check_light_field(tmp_path / "a", "mp4")
-    with pytest.raises(InputError, match=r"must end in _eslf\.png"):
-        check_light_field(tmp_path / "a.gif", "eslf")
-    (tmp_path / "a_eslf.png").touch()
-    with pytest.raises(InputError, match="--force"):
-        check_light_field(tmp_path / "a_eslf.png", "eslf")
-    check_light_field(tmp_path / "a_eslf.png", "eslf", force=True)
-    with pytest.raises(InputError, match="is a file"):
-        check_light_field(tmp_path / "a_eslf.png", "hci")

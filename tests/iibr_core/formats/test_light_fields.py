@@ -10,9 +10,9 @@ import pytest
 
 from iibr_core.evaluation.datasets import read_known_disparity, read_scene
 from iibr_core.formats.images.write import write_image
-from iibr_core.formats.light_fields.light_field_formats import find_light_field, open_light_field
-from iibr_core.formats.light_fields.views import disparity_range, grid_of, read_stored_view, read_views, step_length
-from iibr_core.types import GridShape, ImageSize, InputError
+from iibr_core.formats.light_fields.light_field_formats import open_light_field
+from iibr_core.formats.light_fields.views import disparity_range, read_stored_view, read_views, step_length
+from iibr_core.types import GridShape, ImageSize
 from tests.iibr_core.known_scenes import (
     disparity_of_square,
     write_grid,
@@ -49,27 +49,6 @@ def test_the_viewer_and_the_evaluation_open_every_layout(tmp_path: Path, name: s
             assert view.colors.shape == (*size, 3)
             np.testing.assert_array_equal(view.colors, read_stored_view(scene, row, column))
         assert sum(view.disparity is not None for view in by_place.values()) == len(scene.disparity)
-
-
-def test_views_without_a_grid_are_refused_with_a_hint(tmp_path: Path) -> None:
-    scene = open_light_field(write_llff_row(tmp_path / "fern"))
-    for refused in (grid_of, read_views, disparity_range, lambda scene: read_stored_view(scene, 0, 0)):
-        with pytest.raises(InputError, match=r"fern.*no regular grid.*`iibr evaluate` reads them") as caught:
-            refused(scene)
-        assert "\n" not in str(caught.value)
-
-
-def test_a_folder_that_no_reader_knows(tmp_path: Path) -> None:
-    assert find_light_field(tmp_path) is None
-    with pytest.raises(InputError, match="no photos in it"):
-        open_light_field(tmp_path)
-    with pytest.raises(InputError, match="no such file"):
-        open_light_field(tmp_path / "none")
-    (tmp_path / "photo.png").touch()
-    with pytest.raises(InputError, match=r"holds no light field; laid out as HCI, Stanford"):
-        open_light_field(tmp_path)
-    with pytest.raises(InputError, match="is empty"):
-        open_light_field(tmp_path / "photo.png")
 
 
 def test_the_steps_of_the_grid_count_where_views_were_left_out(tmp_path: Path) -> None:

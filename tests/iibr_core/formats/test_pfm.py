@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from iibr_core.formats.maps.pfm import read_pfm, read_pfm_size, write_pfm
+from iibr_core.formats.maps.pfm import read_pfm, write_pfm
 from iibr_core.types import InputError
 
 SHAPES = hnp.array_shapes(min_dims=2, max_dims=2, max_side=9)
@@ -36,12 +36,6 @@ def test_white_space_in_the_header(tmp_path, header):
     assert read_pfm(tmp_path / "a.pfm").tolist() == [[10, 2]]
 
 
-def test_data_that_begins_like_white_space(tmp_path):
-    values = np.frombuffer(b"\n \r\n\t\n\n ", "<f4").reshape(1, 2)
-    write_pfm(tmp_path / "a.pfm", values)
-    assert np.array_equal(read_pfm(tmp_path / "a.pfm"), values)
-
-
 @pytest.mark.parametrize(
     ("content", "reason"),
     [
@@ -50,12 +44,8 @@ def test_data_that_begins_like_white_space(tmp_path):
         (b"PF 1 1 -1\n" + b"\0" * 12, "colour"),
         (b"Pf 2 2 -1\n" + b"\0" * 15, "1 bytes are missing"),
         (b"Pf 999999999 999999999 -1\n" + b"\0" * 15, "999999999x999999999"),
-        (b"Pf 99999 9999999999999999 -1\n", "not a PFM"),
         (b"Pf 0 5 -1\n", "0x5"),
-        (b"Pf -3 5 -1\n", "not a PFM"),
         (b"Pf 1 1 0\n" + b"\0" * 4, "scale '0'"),
-        (b"Pf 1 1 -\n" + b"\0" * 4, "scale '-'"),
-        (b"Pf 1 1 1e999\n" + b"\0" * 4, "scale"),
         (b"Pf" + b" " * 5000 + b"1 1 -1\n" + b"\0" * 4, "not a PFM"),
     ],
 )
@@ -65,19 +55,3 @@ def test_bad_files(tmp_path, content, reason):
     with pytest.raises(InputError, match=reason) as caught:
         read_pfm(path)
     assert str(path) in str(caught.value)
-
-
-def test_missing_file_and_folder(tmp_path):
-    with pytest.raises(InputError, match="no such file"):
-        read_pfm(tmp_path / "none.pfm")
-    with pytest.raises(InputError, match="does not exist"):
-        write_pfm(tmp_path / "none" / "a.pfm", np.zeros((2, 2), np.float32))
-    assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.parametrize("height", [1, 63, 64, 65, 200])
-def test_rows_keep_their_order_however_many_there_are(tmp_path, height):
-    values = np.arange(height * 3, dtype=np.float32).reshape(height, 3)
-    write_pfm(tmp_path / "a.pfm", values)
-    assert np.array_equal(read_pfm(tmp_path / "a.pfm"), values)
-    assert read_pfm_size(tmp_path / "a.pfm") == (height, 3)

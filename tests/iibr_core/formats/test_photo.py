@@ -4,8 +4,6 @@ import io
 import itertools
 import math
 import os
-import struct
-import zlib
 from pathlib import Path
 
 import numpy as np
@@ -15,11 +13,9 @@ from PIL import Image
 
 from iibr_core.color import linear_from_srgb, srgb_from_linear
 from iibr_core.formats.images import photo as photo_module
-from iibr_core.formats.images import picture as picture_module
 from iibr_core.formats.images.decode import decode, decode_bands
-from iibr_core.formats.images.photo import read_photo, read_thumbnail, size_within
-from iibr_core.formats.images.picture import FILM_DIAGONAL_MM, exif_focal_px
-from iibr_core.formats.images.side_by_side import photo_size
+from iibr_core.formats.images.photo import read_photo, read_thumbnail
+from iibr_core.formats.images.picture import FILM_DIAGONAL_MM
 from iibr_core.formats.images.write import write_image
 from iibr_core.runtime.work import Cancelled, stoppable
 from iibr_core.types import ImageSize, InputError
@@ -67,20 +63,6 @@ def test_8_bit_values_pass_untouched(tmp_path, name):
     assert (photo.name, photo.is_hdr, photo.notes) == ("a", False, ())
 
 
-def test_16_bit_keeps_its_precision(tmp_path):
-    pixels = RNG.integers(0, 65536, (5, 7, 3), dtype=np.uint16)
-    photo = read_photo(save(tmp_path / "a.png", pixels))
-    assert np.abs(photo.pixels - pixels / 65535.0).max() < 1e-6
-
-
-@pytest.mark.parametrize("name", ["a.png", "a.tif", "a.exr"])
-def test_grey_becomes_rgb(tmp_path, name):
-    grey = RNG.random((5, 7)).astype(np.float32)
-    pixels = read_photo(save(tmp_path / name, grey, "float" if name.endswith("exr") else "uint8")).pixels
-    assert pixels.shape == (5, 7, 3)
-    assert np.ptp(pixels, axis=2).max() == 0
-
-
 @pytest.mark.parametrize("name", ["a.png", "a.tif", "a.webp"])
 def test_alpha_is_dropped_over_black_in_linear_light(tmp_path, name):
     rgba = RGBA.copy()
@@ -91,12 +73,6 @@ def test_alpha_is_dropped_over_black_in_linear_light(tmp_path, name):
     expected = srgb_from_linear(linear_from_srgb(rgba[..., :3] / 255) * (rgba[..., 3:] / 255))
     assert np.abs(photo.pixels - expected).max() < 1e-5
     assert photo.notes == ("Transparency was dropped: the photo is laid over black.",)
-
-
-def test_opaque_alpha_changes_nothing_and_gives_no_note(tmp_path):
-    photo = read_photo(save(tmp_path / "a.png", RGBA))
-    assert np.abs(photo.pixels * 255 - RGB).max() < 1e-3
-    assert photo.notes == ()
 
 
 @pytest.mark.parametrize("name", ["a.exr", "a.tif", "a.hdr"])
@@ -123,14 +99,6 @@ def test_nan_is_black_and_infinity_the_largest_value_even_of_later_rows(tmp_path
     assert np.allclose(nothing.pixels, 1)
 
 
-def test_nan_in_alpha_is_transparent(tmp_path):
-    rgba = np.full((3, 4, 4), 0.5, np.float32)
-    rgba[1, 2, 3] = np.nan
-    found = read_photo(save(tmp_path / "a.tif", rgba, oiio__UnassociatedAlpha=1)).pixels
-    assert np.allclose(found[0], srgb_from_linear(np.float32(0.25)))
-    assert not found[1, 2].any()
-
-
 # Exif 2.3: sides of the upright picture at which the stored row 0 and column 0 lie.
 SIDES = {
     1: ("top", "left"),
@@ -154,12 +122,6 @@ def test_exif_orientation(tmp_path, orientation):
     assert np.array_equal(column if row_side in ("left", "top") else column[::-1], RGB[:, 0])
 
 
-def test_focal_length_without_exif_is_50_degrees(tmp_path):
-    photo = read_photo(save(tmp_path / "a.png", RGB))
-    assert math.degrees(2 * math.atan(17 / 2 / photo.focal_px)) == pytest.approx(50)
-    assert read_photo(tmp_path / "a.png", fov_deg=90).focal_px == pytest.approx(8.5)
-
-
 def test_focal_length_from_35_mm_equivalent(tmp_path):
     path = save(tmp_path / "a.jpg", np.zeros((200, 300, 3), np.uint8), Exif__FocalLengthIn35mmFilm=50)
     assert read_photo(path).focal_px == pytest.approx(50 / FILM_DIAGONAL_MM * math.hypot(200, 300), rel=1e-5)
@@ -168,9 +130,10 @@ def test_focal_length_from_35_mm_equivalent(tmp_path):
     assert smaller.focal_px == pytest.approx(read_photo(path).focal_px / 2, rel=1e-5)
 
 
-@pytest.mark.parametrize(("unit", "unit_mm"), [(2, 25.4), (3, 10.0)])
-@pytest.mark.parametrize("orientation", [1, 6])
-@pytest.mark.parametrize("shape", [(200, 300), (300, 200)], ids=["landscape", "portrait"])
+@pytest.mark.parametrize(
+    ("shape", "orientation", "unit", "unit_mm"),
+    [((200, 300), 1, 2, 25.4), ((300, 200), 1, 3, 10), ((200, 300), 6, 3, 10)],
+)
 def test_focal_length_from_focal_plane(tmp_path, shape, orientation, unit, unit_mm):
     """The camera took twice as many pixels as are stored, 1000 of them in an inch or centimetre."""
     attributes = {
@@ -183,12 +146,7 @@ def test_focal_length_from_focal_plane(tmp_path, shape, orientation, unit, unit_
     assert read_photo(path).focal_px == pytest.approx(20 * 1000 / unit_mm / 2, rel=1e-4)
 
 
-@pytest.mark.parametrize("exif", [{}, {"FocalLength": math.nan}, {"FocalLength": 0.0}, {"FocalLength": 1e9}])
-def test_nonsense_focal_length_is_ignored(exif):
-    assert exif_focal_px({"FocalPlaneXResolution": 1000.0, **exif}, ImageSize(20, 30)) == 0
-
-
-@pytest.mark.parametrize("max_pixels", [1, 5, 40, 100, 220])
+@pytest.mark.parametrize("max_pixels", [1, 40, 220])
 def test_downsampling_averages_linear_light_by_area(tmp_path, max_pixels):
     photo = read_photo(save(tmp_path / "a.png", RGB), max_pixels=max_pixels)
     assert photo.pixels.shape[0] * photo.pixels.shape[1] <= max_pixels
@@ -198,7 +156,6 @@ def test_downsampling_averages_linear_light_by_area(tmp_path, max_pixels):
 
 
 KINDS = {
-    "strips.png": {"kind": "uint8"},
     "deep.png": {"kind": "uint16"},
     "strips.tif": {"kind": "uint8", "tiff__RowsPerStrip": 7},
     "tiles.tif": {"kind": "uint16", "tile": 64},
@@ -231,33 +188,11 @@ def test_a_cancelled_photo_is_not_read_to_its_end(tmp_path, monkeypatch):
     assert next(calls) == 4
 
 
-@pytest.mark.parametrize("size", [(1, 1), (1, 31), (31, 1), (127, 3)])
-@pytest.mark.parametrize("name", ["a.png", "a.exr", "a.jpg"])
-def test_odd_sizes(tmp_path, size, name):
-    pixels = np.full((*size, 3), 0.5, np.float32)
-    photo = read_photo(save(tmp_path / name, pixels, "float" if name == "a.exr" else "uint8"))
-    assert photo.size == photo_size(tmp_path / name) == size
-    assert np.ptp(photo.pixels) < 0.01
-
-
-@pytest.mark.parametrize(("size", "most"), [((13, 17), 220), ((1, 10_000), 7), ((10_000, 1), 7), ((3, 3), 9)])
-def test_size_within_keeps_the_shape(size, most):
-    height, width = size_within(ImageSize(*size), most)
-    assert 1 <= height * width <= most
-    assert abs(height / size[0] - width / size[1]) * min(size) <= 1
-
-
 def test_files_that_are_no_pictures_are_refused_in_one_line(tmp_path):
-    (tmp_path / "empty.png").touch()
-    (tmp_path / "text.jpg").write_text("this is no picture")
-    (tmp_path / "folder.png").mkdir()
     unnamed = tmp_path / os.fsdecode(b"\xff.png")
     unnamed.write_bytes(save(tmp_path / "a.png", RGB).read_bytes())
     for path, reason in [
         (tmp_path / "none.png", "no such file"),
-        (tmp_path / "empty.png", "empty"),
-        (tmp_path / "text.jpg", "is a text file, not a picture"),
-        (tmp_path / "folder.png", "is a folder"),
         (unnamed, "its name is not UTF-8; rename it"),
     ]:
         with pytest.raises(InputError, match=reason) as caught:
@@ -268,8 +203,7 @@ def test_files_that_are_no_pictures_are_refused_in_one_line(tmp_path):
         read_photo(tmp_path / "a.png", max_pixels=0)
 
 
-@pytest.mark.parametrize("max_pixels", [2_000_000, 1000])
-@pytest.mark.parametrize("share", [0.01, 0.3, 0.6, 0.95])
+@pytest.mark.parametrize(("share", "max_pixels"), [(0.01, 1000), (0.6, 2_000_000), (0.95, 1000)])
 @pytest.mark.parametrize("name", ["a.png", "a.jpg", "a.tif", "a.exr", "a.webp", "a.avif"])
 def test_truncated_files(tmp_path, name, share, max_pixels):
     path = tmp_path / name
@@ -290,45 +224,9 @@ def test_padded_jpeg_is_read(tmp_path):
     assert read_photo(tmp_path / "a.jpg").size == (13, 17)
 
 
-@pytest.mark.parametrize(("side", "reason"), [(60_000, "cannot be read"), (16_000, "MiB")])
-def test_hostile_sizes_are_refused_by_header(tmp_path, side, reason):
-    def chunk(kind, data):
-        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
-
-    header = chunk(b"IHDR", struct.pack(">IIBBBBB", side, side, 8, 2, 0, 0, 0))
-    png = b"\x89PNG\r\n\x1a\n" + header + chunk(b"IDAT", zlib.compress(b"\0" * 9)) + chunk(b"IEND", b"")
-    (tmp_path / "a.png").write_bytes(png)
-    with pytest.raises(InputError, match=rf"a\.png: .*{reason}"):
-        read_photo(tmp_path / "a.png")
-
-
-def test_too_many_pixels_are_refused_before_decoding(tmp_path, monkeypatch):
-    path = save(tmp_path / "a.ppm", RGB)
-    path.write_bytes(path.read_bytes()[:30])  # decoding would fail
-    monkeypatch.setattr(picture_module, "MAX_FILE_PIXELS", 13 * 17 - 1)
-    with pytest.raises(InputError, match="17x13 exceed 220 pixels"):
-        read_photo(path)
-
-
 EXACT = {"quality": 100, "subsampling": "4:4:4"}
 ACROSS = np.zeros((48, 64, 3), np.uint8)
 ACROSS[:, :32] = (220, 30, 40)
-
-
-def test_an_avif_has_the_colours_and_the_size_of_its_photo(tmp_path):
-    Image.fromarray(ACROSS).save(tmp_path / "a.avif", **EXACT)
-    photo = read_photo(tmp_path / "a.avif")
-    assert np.abs(255 * photo.pixels - ACROSS).max() < 4
-    assert (photo.notes, photo.is_hdr, photo_size(tmp_path / "a.avif")) == ((), False, (48, 64))
-    assert read_photo(tmp_path / "a.avif", max_pixels=200).size == (12, 16)
-
-
-def test_an_avif_is_laid_over_black(tmp_path):
-    white = np.dstack([np.full((48, 64, 3), 255, np.uint8), ACROSS[..., 0]])
-    Image.fromarray(white).save(tmp_path / "a.avif", **EXACT)
-    photo = read_photo(tmp_path / "a.avif")
-    assert photo.notes == ("Transparency was dropped: the photo is laid over black.",)
-    assert photo.pixels[:, 40:].max() < 0.02
 
 
 def test_an_avif_is_turned_and_has_focal_length_and_profile(tmp_path):
@@ -344,7 +242,7 @@ def test_an_avif_is_turned_and_has_focal_length_and_profile(tmp_path):
     assert photo.notes[0] == "Colours are those of the photo's profile, 'made here'."
 
 
-@pytest.mark.parametrize("seed", range(40))
+@pytest.mark.parametrize("seed", range(8))
 def test_flipped_bytes_of_an_avif_are_read_or_refused(tmp_path, seed):
     rng = np.random.default_rng(seed)
     Image.fromarray(ACROSS).save(tmp_path / "a.avif", icc_profile=profile_bytes(), **EXACT)
@@ -365,8 +263,7 @@ def halves(height: int, width: int) -> np.ndarray:
     return pixels
 
 
-@pytest.mark.parametrize("name", ["a.jpg", "a.png", "a.webp"])
-@pytest.mark.parametrize("size", [(48, 80), (90, 30), (1, 1), (1, 400)])
+@pytest.mark.parametrize(("name", "size"), [("a.jpg", (48, 80)), ("a.png", (90, 30)), ("a.webp", (1, 400))])
 def test_thumbnails_fit_and_show_the_photo(tmp_path: Path, name: str, size: tuple[int, int]) -> None:
     Image.fromarray(halves(*size)).save(tmp_path / name)
     small = read_thumbnail(tmp_path / name, WITHIN)
@@ -383,23 +280,6 @@ def test_thumbnails_of_stereo_pairs_show_the_left_picture(tmp_path: Path, ending
     small = read_thumbnail(tmp_path / f"a_SBS.{ending}", WITHIN)
     assert small.shape[:2] == (22, 36)
     assert small[11, 2, 0] > 150 > 60 > small[11, -3, 0]
-
-
-def test_thumbnails_are_upright(tmp_path: Path) -> None:
-    exif = Image.Exif()
-    exif[ORIENTATION] = 6  # to be turned clockwise: left goes up
-    Image.fromarray(halves(40, 80)).save(tmp_path / "a.jpg", exif=exif)
-    small = read_thumbnail(tmp_path / "a.jpg", WITHIN)
-    assert small.shape[0] > small.shape[1]
-    assert small[2, 5, 0] > 150 > 60 > small[-3, 5, 0]
-
-
-@pytest.mark.parametrize("contents", [b"", b"\xff\xd8\xff\xe0" + b"x" * 50, None])
-def test_thumbnails_of_files_that_are_no_photos_are_refused(tmp_path: Path, contents: bytes | None) -> None:
-    if contents is not None:
-        (tmp_path / "a.jpg").write_bytes(contents)
-    with pytest.raises(InputError, match=r"a\.jpg"):
-        read_thumbnail(tmp_path / "a.jpg", WITHIN)
 
 
 def test_thumbnails_of_hdr_light_are_bytes(tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from iibr_core.formats.cameras import FieldCameras, write_colmap, write_llff, write_nerfstudio
-from iibr_core.formats.poses import central_camera, read_poses
+from iibr_core.formats.poses import read_poses
 from iibr_core.types import GridShape, ImageSize, InputError
 
 GRID, SIZE = GridShape(2, 3), ImageSize(40, 48)
@@ -66,10 +66,6 @@ def test_round_trip(tmp_path, kind, at_infinity):
         assert camera.depth_range == (pytest.approx(written.depth_range) if kind == "llff" else None)
 
 
-def test_the_central_camera_is_nearest_to_the_mean_position(tmp_path):
-    assert central_camera(read_llff(tmp_path, places=[(x, 0, 0) for x in (0, 1, 2, 6)])) == 2
-
-
 def test_opengls_axes_are_turned(tmp_path):
     (camera,) = read_transforms(tmp_path)
     np.testing.assert_array_equal(camera.world_from_camera @ (0.0, 1.0, 1.0), (0.0, -1.0, -1.0))
@@ -98,14 +94,10 @@ def test_colmaps_quaternion_is_from_the_world(tmp_path):
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"fl_x": 1e9}, "focal"),
         ({"fl_x": float("nan")}, "transforms.json"),
         ({"fl_x": None}, "focal length"),
-        ({"fl_x": "wide"}, "transforms.json"),
         ({"w": 0}, "pixels"),
-        ({"h": 10**30}, "pixels"),
         ({"frames": []}, "0 poses"),
-        ({"frames": [1]}, "transforms.json"),
         ({"frames": [{"transform_matrix": np.zeros((4, 4)).tolist()}]}, "rotation"),
         ({"frames": [{"transform_matrix": np.diag([1.0, 1.0, -1.0, 1.0]).tolist()}]}, "rotation"),
         ({"frames": [{"transform_matrix": [[1], [1, 2]]}]}, "transforms.json"),
@@ -125,36 +117,9 @@ def test_a_picture_elsewhere_is_never_opened(tmp_path, name):
     )
 
 
-@pytest.mark.parametrize("text", ["", "[]", "[" * 100_000, '{"frames": 3}', "\xff"])
-def test_text_without_poses_is_refused(tmp_path, text):
-    (tmp_path / "transforms.json").write_text(text, "latin-1")
-    require_refusal(r"transforms\.json", read_poses, tmp_path)
-
-
 @pytest.mark.parametrize(
     "changes", [{"hwf": (40, 48, 0.0)}, {"hwf": (40, 48, np.nan)}, {"hwf": (0, 48, 50)}, {"bounds": (5.0, 1.0)},
                 {"places": [(np.inf, 0, 0)]}, {"places": np.empty((0, 3))}, {"rotation": np.zeros((3, 3))}],
 )  # fmt: skip
 def test_invalid_llff_poses_are_refused(tmp_path, changes):
     require_refusal(r"poses_bounds\.npy", read_llff, tmp_path, **changes)
-
-
-def test_other_files_are_refused(tmp_path):
-    require_refusal("no known poses", read_poses, tmp_path / "poses.txt")
-    require_refusal("holds neither", read_poses, tmp_path)
-
-
-@pytest.mark.parametrize(
-    ("name", "old", "new", "message"),
-    [
-        ("cameras.txt", "PINHOLE", "OPENCV", "undistort"),
-        ("cameras.txt", "PINHOLE 48", "PINHOLE x", "COLMAP"),
-        ("images.txt", "1 0 0 0", "0 0 0 0", "NaN"),
-        ("images.txt", " 0 0 0 ", " ", "COLMAP"),
-    ],
-)
-def test_damaged_colmap_text_is_refused(tmp_path, name, old, new, message):
-    write_field(tmp_path, "colmap")
-    path = tmp_path / "sparse/0" / name
-    path.write_text(path.read_text().replace(old, new))
-    require_refusal(message, read_poses, tmp_path)

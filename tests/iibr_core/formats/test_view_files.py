@@ -14,9 +14,8 @@ from PIL import Image
 
 from iibr_core.depth.embedded.embedded_depth import read_embedded
 from iibr_core.depth.estimates import RelativeInverseDepth
-from iibr_core.formats.images.lif import open_lif
 from iibr_core.formats.images.photo import read_photo
-from iibr_core.formats.images.picture_source import PicturePart, PictureSource, read_source, source_size
+from iibr_core.formats.images.picture_source import PictureSource, read_source
 from iibr_core.formats.images.spatial_photo import write_spatial_photo
 from iibr_core.formats.light_fields import views as views_module
 from iibr_core.formats.light_fields.light_field_formats import find_light_field, is_light_field, open_light_field
@@ -59,23 +58,6 @@ def test_quilts_are_read_as_they_are_written_and_decoded_once(tmp_path: Path, mo
     assert decoded == [PictureSource(path)]
 
 
-@pytest.mark.parametrize(("aspect", "size"), [(3.0, ImageSize(HEIGHT, 18)), (0.75, ImageSize(12, WIDTH))])
-def test_tiles_are_stretched_to_the_shape_they_are_displayed_in(tmp_path: Path, aspect: float, size: ImageSize) -> None:
-    level = [np.full((HEIGHT, WIDTH, 3), 40 * k, np.uint8) for k in range(4)]
-    path = write_quilt(tmp_path, Quilt(2, 2, ImageSize(2 * HEIGHT, 2 * WIDTH), aspect), level)
-    views = read_back(path)
-    assert views[0, 0].shape == (*size, 3)
-    assert [int(views[0, k].mean()) for k in range(4)] == [0, 40, 80, 120]
-
-
-@pytest.mark.parametrize(("tag", "problem"), [("_qs0x6a1", "0x6"), ("_qs2x2a0", "aspect"), ("_qs32x32a1", "too few")])
-def test_impossible_names_of_quilts_are_refused(tmp_path: Path, tag: str, problem: str) -> None:
-    path = tmp_path / f"scene{tag}.png"
-    Image.fromarray(pictures(1)[0]).save(path)
-    with pytest.raises(InputError, match=rf"scene{tag}\.png: .*{problem}"):
-        open_light_field(path)
-
-
 def test_the_inner_views_of_a_lytros_lenslet_image_are_read(tmp_path: Path) -> None:
     whole = RNG.integers(0, 256, (14 * 3, 14 * 5, 3), np.uint8)
     Image.fromarray(whole).save(tmp_path / "img_1_eslf.png")
@@ -83,12 +65,6 @@ def test_the_inner_views_of_a_lytros_lenslet_image_are_read(tmp_path: Path) -> N
     assert max(views) == (7, 7)
     np.testing.assert_array_equal(views[0, 0], whole[3::14, 3::14])
     np.testing.assert_array_equal(views[4, 6], whole[7::14, 9::14])
-
-
-def test_a_lenslet_image_of_no_whole_lenses(tmp_path: Path) -> None:
-    Image.fromarray(pictures(1, 29, 28)[0]).save(tmp_path / "a_eslf.png")
-    with pytest.raises(InputError, match=r"a_eslf\.png: 28x29 pixels are not a whole number of lenses of 14x14"):
-        open_light_field(tmp_path / "a_eslf.png")
 
 
 def smooth(height: int = 48, width: int = 64, shift: int = 0) -> np.ndarray:
@@ -174,7 +150,7 @@ def test_stereo_photos_have_two_views_and_show_the_left_one(tmp_path: Path, kind
 
 
 @pytest.mark.parametrize("kind", ["spatial", "mpo", "stereo jpeg", "lif", "full"])
-@pytest.mark.parametrize("share", [0.9, 0.6, 0.1])
+@pytest.mark.parametrize("share", [0.9, 0.3])
 def test_cut_stereo_photos_are_refused_in_a_line_or_read_as_photos(tmp_path: Path, kind: str, share: float) -> None:
     name, write, _ = STEREO[kind]
     path = tmp_path / name
@@ -186,12 +162,6 @@ def test_cut_stereo_photos_are_refused_in_a_line_or_read_as_photos(tmp_path: Pat
         read_back(path)
 
 
-def test_a_pair_of_two_sizes_is_refused(tmp_path: Path) -> None:
-    write_mpo(tmp_path / "a.mpo", smooth(), smooth(40, 60))
-    with pytest.raises(InputError, match=r"a\.mpo, picture 1: is 60x40, but a\.mpo is 64x48"):
-        read_views(open_light_field(tmp_path / "a.mpo"))
-
-
 def test_jpegs_with_other_pictures_are_no_stereo(tmp_path: Path) -> None:
     """Gain maps and previews are stored the same way."""
     write_mpo(tmp_path / "phone.jpg", smooth(), smooth(24, 32))
@@ -201,50 +171,12 @@ def test_jpegs_with_other_pictures_are_no_stereo(tmp_path: Path) -> None:
         find_light_field(tmp_path / "single.mpo")
 
 
-@pytest.mark.parametrize(
-    ("change", "problem"),
-    [
-        (lambda data: data.replace(b'"blob_id": 10', b'"blob_id": 11'), "lack a picture"),
-        (lambda data: data.replace(b'{"views"', b'["views"'), "cannot be read"),
-        (lambda data: data[:-6] + struct.pack(">I", 20) + data[-2:], "fields|beyond"),
-    ],
-)
-def test_damaged_leia_images_are_refused_in_a_line(
-    tmp_path: Path, change: Callable[[bytes], bytes], problem: str
-) -> None:
-    (tmp_path / "a.lif").write_bytes(change(leia_image(smooth(), smooth(shift=4))))
-    with pytest.raises(InputError, match=rf"a\.lif: .*({problem})"):
-        open_lif(tmp_path / "a.lif")
-
-
 def test_raw_light_fields_are_refused_with_programs_that_decode_them(tmp_path: Path) -> None:
     path = tmp_path / "IMG_0001.lfr"
     path.write_bytes(b"\x89LFP\r\n\x1a\n" + bytes(100))
     for read in (open_light_field, read_photo):
         with pytest.raises(InputError, match=r"raw light field .* decoded first: PlenoptiCam"):
             read(path)
-
-
-def test_parts_are_of_the_upright_picture(tmp_path: Path) -> None:
-    stored, exif = pictures(1, 4, 6)[0], Image.Exif()
-    exif[0x0112] = 6  # a quarter turn clockwise
-    Image.fromarray(stored).save(tmp_path / "a.tif", exif=exif)
-    upright = np.rot90(stored, -1)
-    source = PictureSource(tmp_path / "a.tif", part=PicturePart((1, 0), ImageSize(3, 2), (2, 2)))
-    np.testing.assert_array_equal(read_source(source).pixels, upright[1:6:2, 0:4:2])
-    assert source_size(source) == (3, 2)
-    beyond = PictureSource(tmp_path / "a.tif", part=PicturePart((0, 3), ImageSize(6, 3)))
-    with pytest.raises(InputError, match="smaller than it should be"):
-        read_source(beyond)
-
-
-def test_files_that_hold_no_light_field(tmp_path: Path) -> None:
-    Image.fromarray(smooth()).save(tmp_path / "photo.png")
-    assert find_light_field(tmp_path / "photo.png") is None
-    with pytest.raises(InputError, match=r"photo\.png: holds no light field; give a quilt"):
-        open_light_field(tmp_path / "photo.png")
-    with pytest.raises(InputError, match="no such file"):
-        open_light_field(tmp_path / "missing_qs2x2a1.png")
 
 
 def test_a_leia_image_contains_inverse_depth(tmp_path: Path) -> None:

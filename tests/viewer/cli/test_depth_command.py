@@ -10,7 +10,7 @@ from PIL import Image
 
 from iibr_core.formats.images.write import write_image
 from tests.iibr_core.depth.onnx_graphs import of_channels
-from tests.iibr_core.known_scenes import WALL, disparity_of_square
+from tests.iibr_core.known_scenes import WALL
 from tests.viewer.cli.test_cli import run
 from tests.viewer.cli.test_view_files import write_pair
 
@@ -60,16 +60,6 @@ def test_a_map_written_as_a_picture_comes_back_as_it_was(monkeypatch: Monkey, tm
     np.testing.assert_allclose(np.load(tmp_path / "c.npy"), relief, atol=1e-3)
 
 
-def test_the_map_that_is_read_is_never_overwritten(monkeypatch: Monkey, capsys: Capture, tmp_path: Path) -> None:
-    Image.new("RGB", (48, 40), "gray").save(tmp_path / "a.png")
-    map_path = tmp_path / "a_disparity.npy"
-    np.save(map_path, disparity_of_square())
-    before = map_path.read_bytes()
-    assert run(monkeypatch, "depth", tmp_path / "a.png", "--force", "-o", map_path) == 2
-    assert "no input is overwritten" in capsys.readouterr().err
-    assert map_path.read_bytes() == before
-
-
 def test_of_a_pair_a_model_is_asked_where_one_is_named(monkeypatch: Monkey, red_below: Path, capsys: Capture) -> None:
     pair, out = write_pair(red_below.parent / "a_2x1.png"), red_below.parent / "map.npy"
     assert run(monkeypatch, "depth", pair, "-o", out) == 0
@@ -77,9 +67,3 @@ def test_of_a_pair_a_model_is_asked_where_one_is_named(monkeypatch: Monkey, red_
     file = of_channels(red_below.parent / "red.onnx")
     assert run(monkeypatch, "depth", pair, "--depth-model", file, "--force", "-o", out) == 0
     assert "estimated by the model red.onnx" in capsys.readouterr().err
-
-
-def test_what_is_not_there_is_told(monkeypatch: Monkey, capsys: Capture, tmp_path: Path) -> None:
-    assert run(monkeypatch, "depth", tmp_path / "gone.jpg", "-o", tmp_path / "map.png") == 2
-    assert "gone.jpg: no such file" in capsys.readouterr().err
-    assert not (tmp_path / "map.png").exists()

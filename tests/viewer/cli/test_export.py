@@ -40,17 +40,6 @@ def test_the_name_that_is_written_is_the_one_that_must_not_be_there(
     assert [(path.name, path.read_bytes()) for path in out.iterdir()] == [("a_LRF_Half_SBS.png", before)]
 
 
-def test_what_is_read_as_keys_is_not_written_onto(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], photo_path: Path, tmp_path: Path
-) -> None:
-    keys = tmp_path / "keys.gif"
-    keys.write_text("0 0\n0 1\n")
-    words = ("export", photo_path, "--to", "gif", "-o", keys, "--path", keys, "--force")
-    assert run(monkeypatch, *words) == 2
-    assert "keys.gif" in capsys.readouterr().err
-    assert keys.read_text() == "0 0\n0 1\n"
-
-
 def test_a_light_field_of_disparity_as_given(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], photo_path: Path, tmp_path: Path
 ) -> None:

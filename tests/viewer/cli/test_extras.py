@@ -11,7 +11,6 @@ from pathlib import Path
 import pytest
 
 from tests.viewer.conftest import write_scene
-from viewer import entry
 
 ROOT = Path(__file__).parents[3]
 EXTRAS = (
@@ -77,15 +76,6 @@ def test_what_needs_one_names_it_in_one_line(tmp_path: Path, words: tuple[object
     (line,) = done.stderr.splitlines()
     assert (done.returncode, line.startswith("iibr: "), said in line) == (2, True, True), line
     assert sorted(tmp_path.iterdir()) == before
-
-
-def test_lpips_asks_for_torch(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
-    monkeypatch.setitem(sys.modules, "torch", None)
-    monkeypatch.setattr(sys, "argv", ["iibr", "evaluate", str(tmp_path), "--out", str(tmp_path / "r"), "--lpips", "x"])
-    assert entry.run() == 2
-    assert "torch; install with: pip install 'iibr[train]'" in capsys.readouterr().err
 
 
 def test_the_extras_are_no_dependencies() -> None:

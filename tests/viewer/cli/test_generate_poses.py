@@ -46,12 +46,6 @@ def test_a_step_forward_makes_the_photo_larger(monkeypatch: pytest.MonkeyPatch, 
     assert red[1] / red[0] == pytest.approx(1 / 0.75**2, rel=0.1)
 
 
-def test_pictures_are_as_much_smaller_as_the_photo_is(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    poses = write_poses(tmp_path / "poses.json", [(0, 0, 0), (0.1, 0, 0)], (4 * WIDTH, 4 * HEIGHT))
-    assert run(monkeypatch, "generate", write_scene(tmp_path), "--poses", poses, "-o", tmp_path / "new") == 0
-    assert pixels_of(tmp_path / "new/view_0002.png").shape == (HEIGHT, WIDTH, 3)
-
-
 def test_what_is_mostly_made_up_is_told(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

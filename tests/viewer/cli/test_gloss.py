@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from tests.viewer.cli.test_cli import run, run_apart
+from tests.viewer.cli.test_cli import run
 
 GLOSS = """
 roughness = 0.5
@@ -67,15 +67,6 @@ def test_an_environment_that_is_not_there_is_one_line(
     assert not (photo_path.parent / "new").exists()
 
 
-def test_the_photos_own_size_is_not_drawn_with_gloss(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], photo_path: Path, gloss_path: Path
-) -> None:
-    out = photo_path.parent / "new.png"
-    assert run(monkeypatch, "screenshot", photo_path, "--full", "--gloss", gloss_path, "-o", out) == 2
-    assert "--full" in capsys.readouterr().err
-    assert not out.exists()
-
-
 def test_views_from_disk_take_gloss_where_their_disparity_goes_below_zero(
     monkeypatch: pytest.MonkeyPatch, photo_path: Path, gloss_path: Path, tmp_path: Path
 ) -> None:
@@ -87,24 +78,3 @@ def test_views_from_disk_take_gloss_where_their_disparity_goes_below_zero(
     gained = np.asarray(Image.open(shiny)).astype(int) - np.asarray(Image.open(plain))
     assert gained.min() >= -2
     assert gained.mean() > 5
-
-
-def test_maps_take_no_gloss(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], photo_path: Path, gloss_path: Path
-) -> None:
-    words = ("export", photo_path, "--to", "depth", "-o", photo_path.parent / "new.png", "--gloss", gloss_path)
-    assert run(monkeypatch, *words) == 2
-    assert "--gloss" in capsys.readouterr().err
-
-
-def test_without_gloss_none_of_it_is_even_imported(photo_path: Path, tmp_path: Path) -> None:
-    code = """
-import sys
-from viewer.entry import run
-print(run(), [name for name in sys.modules if name.startswith("iibr_core.rendering.gloss.")])
-"""
-    ended = run_apart(code, "generate", photo_path, "--grid", 3, "--out", tmp_path / "new")
-    assert (
-        ended.stdout.splitlines()[-1]
-        == "0 ['iibr_core.rendering.gloss.gloss_settings', 'iibr_core.rendering.gloss.geometry']"
-    ), ended.stderr

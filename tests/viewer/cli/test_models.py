@@ -3,31 +3,22 @@
 from __future__ import annotations
 
 import os
-import re
 import subprocess
 import sys
-import threading
 from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
-import typer
 
 from iibr_core.depth.estimators.catalog import KNOWN_MODELS, known_model
 from iibr_core.depth.estimators.download import VERIFIED, require_unchanged
 from iibr_core.formats.images.write import write_image
-from iibr_core.rendering.optics import CENTRE
-from iibr_core.scenes.opening import SceneReady, SceneRequest, results_of
-from iibr_core.scenes.scene import Progress, Source
-from iibr_core.types import GridShape, InputError
+from iibr_core.types import InputError
 from tests.iibr_core.depth.onnx_graphs import of_channels
 from tests.local_hub import Hub, local_hub
+from tests.viewer.cli.test_cli import run
 from tests.viewer.conftest import write_scene
-from viewer import entry
-from viewer.background.job_threads import ProgressReport
-from viewer.background.scene_worker import SceneWorker
-from viewer.cli.shared_options import depth_start_from_text, refine_from_text
 
 
 def run_models(
@@ -86,13 +77,6 @@ def test_a_file_of_ones_own_is_copied_listed_and_found_by_name(tmp_path: Path) -
     assert disparity[-9].mean() > disparity[9].mean(), "300 less red are the metres"
 
 
-def test_a_file_that_is_not_there_is_told(tmp_path: Path) -> None:
-    write_image(tmp_path / "photo.png", np.zeros((20, 30, 3), np.float32))
-    words = ("export", tmp_path / "photo.png", "--to", "depth", "--depth-model", "gone.onnx", "-o", tmp_path / "d.npy")
-    for done in (run_models(tmp_path, "get", "gone.onnx"), run_iibr(tmp_path, *words)):
-        assert (done.returncode, done.stderr) == (2, "iibr: gone.onnx: no such file or folder\n")
-
-
 def test_without_a_network_get_is_one_line(tmp_path: Path) -> None:
     done = run_models(tmp_path, "get", "depth-anything-v2-small", "--yes")
     assert done.returncode == 2
@@ -110,13 +94,6 @@ def test_nothing_is_fetched_unless_the_user_says_yes(tmp_path: Path, typed: str)
     assert done.returncode == 1
     assert "Nothing was downloaded" in done.stderr
     assert "cannot be downloaded" not in done.stderr
-
-
-def test_where_nobody_answers_get_names_the_option(tmp_path: Path) -> None:
-    done = run_models(tmp_path, "get", "depth-pro")
-    assert done.returncode == 2
-    (line,) = done.stderr.splitlines()
-    assert "--yes" in line
 
 
 MODEL = known_model("depth-pro")
@@ -195,18 +172,6 @@ def test_a_hub_that_lies_gets_nothing_done(
     assert (tmp_path / "mine.json").read_text() == "mine"
 
 
-def test_models_are_pinned_to_whole_commits() -> None:
-    assert all(re.fullmatch("[0-9a-f]{40}", model.commit) for model in KNOWN_MODELS)
-    assert len({model.commit for model in KNOWN_MODELS}) == len(KNOWN_MODELS)
-
-
-@pytest.mark.parametrize("text", ["", "[", "[]", '{"a": 3}', '{"a": []}', '{"a": "sha256:0"}', "\xff", "[" * 100_000])
-def test_a_damaged_list_of_verified_files_is_one_line(tmp_path: Path, text: str) -> None:
-    (tmp_path / VERIFIED).write_text(text, "latin-1")
-    with pytest.raises(InputError, match=VERIFIED):
-        require_unchanged(tmp_path)
-
-
 def test_an_unknown_model_is_one_line_with_those_known(tmp_path: Path) -> None:
     done = run_models(tmp_path, "get", "depth-nothing")
     assert done.returncode == 2
@@ -214,75 +179,20 @@ def test_an_unknown_model_is_one_line_with_those_known(tmp_path: Path) -> None:
     assert all(model.name in line for model in KNOWN_MODELS)
 
 
-@pytest.mark.parametrize(("text", "value"), [("on", 1.0), ("off", 0.0), ("0.25", 0.25), ("0", 0.0), ("1", 1.0)])
-def test_refine(text: str, value: float) -> None:
-    assert refine_from_text(text) == value
-
-
-@pytest.mark.parametrize("text", ["", "maybe", "-0.1", "1.1", "nan"])
-def test_refine_that_is_none(text: str) -> None:
-    with pytest.raises(typer.BadParameter):
-        refine_from_text(text)
-
-
-def test_where_the_search_begins() -> None:
-    assert depth_start_from_text("embedded") == "embedded"
-    with pytest.raises(typer.BadParameter, match="auto, embedded, model, rough or flat"):
-        depth_start_from_text("file")
-
-
-def without_sidecar(folder: Path) -> Path:
-    path = write_scene(folder)
-    path.with_name("scene_disparity.npy").unlink()
-    return path
-
-
-def test_the_scene_tells_where_its_depth_came_from(tmp_path: Path) -> None:
-    told: list[Progress] = []
-    source = Source(str(without_sidecar(tmp_path)), grid=GridShape(1, 1))
-    ready = next(results_of(SceneRequest(1, source), lambda: CENTRE, told.append))
-    assert isinstance(ready, SceneReady)
-    origin = ready.scene.depth_origin
-    assert origin is not None
-    assert (origin.kind, origin.words) == ("rough", ready.scene.depth_source)
-    assert any("--depth-model" in note for note in ready.scene.notes)
-    assert any("guessing" in progress.doing for progress in told)
-
-
-def test_the_worker_tells_what_it_is_busy_with_before_the_scene(tmp_path: Path) -> None:
-    woken = threading.Semaphore(0)
-    worker = SceneWorker(woken.release)
-    worker.submit(SceneRequest(1, Source(str(without_sidecar(tmp_path)), grid=GridShape(1, 1))))
-    results = []
-    while not any(isinstance(result, SceneReady) for result in results):
-        assert woken.acquire(timeout=120)
-        while (result := worker.next_result()) is not None:
-            results.append(result)
-    worker.close()
-    assert isinstance(results[0], ProgressReport)
-    assert results[0].progress.doing
-    assert results[0].id == 1
-
-
-def run_command(monkeypatch: pytest.MonkeyPatch, *words: object) -> int:
-    monkeypatch.setattr(sys, "argv", ["iibr", *map(str, words)])
-    return entry.run()
-
-
 def test_generate_says_where_depth_came_from(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     photo = write_scene(tmp_path)
     words = ("generate", photo, "--grid", 1, "--out")
-    assert run_command(monkeypatch, *words, tmp_path / "a") == 0
+    assert run(monkeypatch, *words, tmp_path / "a") == 0
     assert "note: Depth: scene_disparity.npy." in capsys.readouterr().err
-    assert run_command(monkeypatch, *words, tmp_path / "b", "--depth", "rough", "--refine", "off") == 0
+    assert run(monkeypatch, *words, tmp_path / "b", "--depth", "rough", "--refine", "off") == 0
     said = capsys.readouterr().err
     assert said.count("Depth: rough") == 1
     assert "iibr models" in said
     # A bad model that was asked for is an error, and nothing is made.
     (model := tmp_path / "model").mkdir()
-    assert run_command(monkeypatch, *words, tmp_path / "c", "--depth", "model", "--depth-model", model) == 2
+    assert run(monkeypatch, *words, tmp_path / "c", "--depth", "model", "--depth-model", model) == 2
     (line,) = filter(None, capsys.readouterr().err.splitlines())
     assert "config.json" in line
     assert not (tmp_path / "c").exists()
@@ -293,5 +203,5 @@ def test_a_bad_map_beside_the_photo_is_told_and_done_without(
 ) -> None:
     photo = write_scene(tmp_path)
     np.save(tmp_path / "scene_disparity.npy", np.full((5, 5), np.nan))
-    assert run_command(monkeypatch, "generate", photo, "--grid", 1, "--out", tmp_path / "a") == 0
+    assert run(monkeypatch, "generate", photo, "--grid", 1, "--out", tmp_path / "a") == 0
     assert "The map beside the photo was not used" in capsys.readouterr().err

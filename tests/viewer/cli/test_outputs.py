@@ -4,21 +4,13 @@ from __future__ import annotations
 
 import json
 import re
-from inspect import signature
 from pathlib import Path
-from typing import get_args
 
 import numpy as np
 import pytest
-import typer
 
-from iibr_core.rendering.gloss.gloss_settings import Gloss
-from iibr_core.types import GridShape
 from tests.forked_iibr import run_forked
 from tests.viewer.cli.test_cli import run
-from viewer.cli.lens_options import GlossOption
-from viewer.cli.main import app
-from viewer.cli.shared_options import OUTPUT_OPTIONS, inputs_of_command
 
 INPUTS = (
     "{dir}/field/input_Cam000.png",
@@ -104,24 +96,6 @@ def test_the_map_beside_the_photo_is_read_too(
     assert "is read here" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("words", [("screenshot", "-o", "{dir}/saved.png"), ("generate", "--out", "{dir}/field")])
-def test_what_is_there_is_replaced_only_by_force(
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-    photo_path: Path,
-    folder: Path,
-    words: tuple[str, ...],
-) -> None:
-    command, *options = (word.format(dir=folder) for word in words)
-    before = {path: path.is_file() and path.stat().st_mtime_ns for path in folder.rglob("*")}
-    capsys.readouterr()
-    assert run(monkeypatch, command, photo_path, "--grid", 1, *options) == 2
-    (line,) = capsys.readouterr().err.splitlines()
-    assert line.startswith(f"iibr: {options[-1]}: already exists; give --force")
-    assert {path: path.is_file() and path.stat().st_mtime_ns for path in folder.rglob("*")} == before
-    assert run(monkeypatch, command, photo_path, "--grid", 1, *options, "--force") == 0
-
-
 def test_an_empty_folder_and_links_are_written_to(
     monkeypatch: pytest.MonkeyPatch, photo_path: Path, tmp_path: Path
 ) -> None:
@@ -191,30 +165,3 @@ def test_notes_come_after_the_result_or_not_at_all(
     assert "lower --grid" in line
     assert run(monkeypatch, "generate", photo_path, *words, "--out", tmp_path / "f") == 0
     assert all(line.startswith("note: ") for line in capsys.readouterr().err.splitlines())
-
-
-EVALUATED = ("evaluate", "disparity")
-NAMED_OTHERWISE = {"depth_model", "inpaint"}
-"""Options whose text may name a folder: `inputs_of` finds it. `evaluate` asks for its `--disparity` itself."""
-
-
-def test_every_option_that_names_a_file_is_an_input(tmp_path: Path) -> None:
-    """Whatever the command: only what it writes is none. Other types than Path say what they read."""
-    found = set()
-    for command in app.registered_commands:
-        assert command.callback is not None
-        for name, parameter in signature(command.callback, eval_str=True).parameters.items():
-            kinds = [kind for kind in get_args(parameter.annotation) if not isinstance(kind, type)]
-            metavars = [getattr(kind, "metavar", None) or "" for kind in kinds]
-            if not re.search(r"\b(FILE|FOLDER|DIR|PATH|DATASET)\b|Path", f"{metavars} {parameter.annotation}"):
-                continue
-            if name not in {*OUTPUT_OPTIONS, *NAMED_OTHERWISE} and (command.callback.__name__, name) != EVALUATED:
-                assert re.search("Path|GlossOption", str(get_args(parameter.annotation)[0])), name
-                found.add(name)
-    assert found >= {"path", "disparity", "gloss", "like", "keys", "poses", "ground_truth", "lpips", "datasets"}
-    gloss = GlossOption(tmp_path / "g.toml", Gloss(environment=str(tmp_path / "e.png")))
-    given = {"path": tmp_path, "datasets": [tmp_path / "a"], "gloss": gloss, "grid": GridShape(3, 3), "out": tmp_path}
-    context = typer.Context(typer.main.get_command(app))
-    context.params = given
-    assert inputs_of_command(context) == (tmp_path, tmp_path / "a", *gloss.reads)
-    assert gloss.reads == (tmp_path / "g.toml", tmp_path / "e.png")

@@ -40,13 +40,6 @@ def test_a_quilt_of_ours_is_a_light_field_again(
     assert np.array_equal(whole[-height:, :width], first)
 
 
-def test_a_quilt_is_no_photo(monkeypatch: Monkey, capsys: Capture, photo_path: Path, tmp_path: Path) -> None:
-    quilt = tmp_path / "a_qs2x2a1.png"
-    quilt.write_bytes(photo_path.read_bytes())
-    assert run(monkeypatch, "plan", quilt) == 2
-    assert "a_qs2x2a1.png: holds the views of a light field" in capsys.readouterr().err
-
-
 def test_options_about_photos_are_refused_for_a_quilt(
     monkeypatch: Monkey, capsys: Capture, photo_path: Path, tmp_path: Path
 ) -> None:
@@ -76,16 +69,6 @@ def test_depth_of_a_pair_is_the_left_views(monkeypatch: Monkey, capsys: Capture,
     assert np.mean(error < 0.2 * (FOREGROUND - WALL)) > 0.7
 
 
-def test_depth_of_a_photo_is_what_it_opens_with(monkeypatch: Monkey, capsys: Capture, tmp_path: Path) -> None:
-    pixels = np.rint(view_of_square(ViewOffset(0, 0)) * 255).astype(np.uint8)
-    Image.fromarray(pixels).save(tmp_path / "square.png")
-    np.save(tmp_path / "square_disparity.npy", disparity_of_square())
-    assert run(monkeypatch, "depth", tmp_path / "square.png", "-o", tmp_path / "a.pfm") == 0
-    assert "square_disparity.npy" in capsys.readouterr().err
-    error = np.abs(read_pfm(tmp_path / "a.pfm") - disparity_of_square())
-    assert np.mean(error < 0.1) > 0.9
-
-
 def test_metres_reach_exports(monkeypatch: Monkey, tmp_path: Path) -> None:
     pixels = np.rint(view_of_square(ViewOffset(0, 0)) * 255).astype(np.uint8)
     Image.fromarray(pixels).save(tmp_path / "square.png")
@@ -103,15 +86,3 @@ def test_depth_asks_for_memory_before_it_takes_it(monkeypatch: Monkey, capsys: C
     assert run(monkeypatch, "depth", field, "-o", tmp_path / "a.pfm") == 2
     assert "finding its disparity takes" in capsys.readouterr().err
     assert not (tmp_path / "a.pfm").exists()
-
-
-@pytest.mark.parametrize("kind", ["point-cloud", "disparity", "hci"])
-def test_disparity_is_found_once_for_an_export(monkeypatch: Monkey, tmp_path: Path, kind: str) -> None:
-    field = write_grid(tmp_path / "field")
-    next(field.glob("gt_disp*")).unlink()
-    calls, found = [], estimate_disparity.estimate_disparity
-    monkeypatch.setattr(estimate_disparity, "estimate_disparity", lambda *given: calls.append(given) or found(*given))
-    out = tmp_path / {"point-cloud": "a.ply", "disparity": "a.pfm", "hci": "new"}[kind]
-    assert run(monkeypatch, "export", field, "--to", kind, "-o", out) == 0
-    assert len(calls) == (kind != "hci")
-    assert out.exists()
