@@ -135,19 +135,6 @@ def test_saved_fields_open_again(format: str, tmp_path: Path) -> None:
         np.testing.assert_array_equal(read.views, field.views)
 
 
-def test_stopping_while_views_between_are_made_raises_cancelled(tmp_path: Path) -> None:
-    pixels, values = square_scene()
-    iibr.from_arrays(pixels, values).light_field(3).save(tmp_path / "field")
-    scene, made = iibr.open(tmp_path / "field"), 0
-
-    def count(*_: object) -> None:
-        nonlocal made
-        made += 1
-
-    with pytest.raises(iibr.Cancelled):
-        scene.light_field(5, report_progress=count)
-
-
 BAD = {
     "a disparity of another size": lambda p, d: iibr.from_arrays(p, d[1:]),
     "a grey photo": lambda p, d: iibr.from_arrays(p[..., 0], d),
@@ -182,3 +169,22 @@ def test_the_smallest_photos(size: tuple[int, int]) -> None:
     field = iibr.from_arrays(np.full((*size, 3), 0.5), np.zeros(size)).light_field(3)
     assert field.views.shape == (3, 3, *size, 3)
     assert np.isfinite(field.refocus(3.0, 2.0)).all()
+
+
+def test_stopping_raises_cancelled() -> None:
+    pixels, values = square_scene()
+    with pytest.raises(iibr.Cancelled):
+        iibr.from_arrays(pixels, values).light_field(3, should_stop=lambda: True)
+
+
+def test_stopping_while_views_between_are_made_raises_cancelled(tmp_path: Path) -> None:
+    pixels, values = square_scene()
+    iibr.from_arrays(pixels, values).light_field(3).save(tmp_path / "field")
+    scene, made = iibr.open(tmp_path / "field"), 0
+
+    def count(*_: object) -> None:
+        nonlocal made
+        made += 1
+
+    with pytest.raises(iibr.Cancelled):
+        scene.light_field(5, should_stop=lambda: made > 3, report_progress=count)
