@@ -24,7 +24,7 @@ from iibr_core.formats.images.metadata import (
 )
 from iibr_core.formats.images.photo import read_photo
 from iibr_core.formats.images.write import KINDS, PictureFormat, write_image, write_picture
-from iibr_core.types import DISPLAY_P3, SRGB, ImageSize, InputError
+from iibr_core.types import DISPLAY_P3, SRGB, ImageSize
 from tests.iibr_core.formats.test_color_profile import profile_bytes
 
 PATCHES = ((200, 80, 60), (255, 0, 0), (0, 255, 0), (20, 30, 250), (128, 128, 128), (255, 255, 255), (3, 2, 1))
@@ -173,25 +173,6 @@ def test_long_texts_are_packed(tmp_path, ending):
     assert len(text) > 100_000
     write_picture(tmp_path / f"a{ending}", patches(), metadata=PictureMetadata(texts={SETTINGS_KEY: text}))
     assert settings_text_in(tmp_path / f"a{ending}") == text
-
-
-BAD = {
-    "a.gif": PictureFormat(),
-    "a": PictureFormat(),
-    "a.jpg": PictureFormat(bits=16),
-    "a.tif": PictureFormat(bits=32),
-    "a.png": PictureFormat(bits=0),
-    "b.jpg": PictureFormat(quality=0),
-    "b.webp": PictureFormat(quality=101),
-}
-
-
-@pytest.mark.parametrize("name", BAD)
-def test_formats_that_a_kind_lacks_are_refused(tmp_path, name):
-    with pytest.raises(InputError) as error:
-        write_picture(tmp_path / name, patches(), BAD[name])
-    assert "\n" not in str(error.value)
-    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize("seed", range(6))
