@@ -13,7 +13,7 @@ from PIL.PngImagePlugin import PngInfo
 from iibr_core.depth.embedded.embedded_depth import read_embedded
 from iibr_core.depth.embedded.unread import unread_parts
 from iibr_core.depth.search import PhotoWithDepth, open_with_depth
-from iibr_core.formats.images.lfp import open_lfp, read_lfp
+from iibr_core.formats.images.lfp import read_lfp
 from iibr_core.formats.images.photo import read_photo
 from iibr_core.formats.images.side_by_side import photo_size
 from iibr_core.types import InputError
@@ -196,13 +196,3 @@ def test_damaged_lytro_files_are_refused_in_a_line(tmp_path: Path, cut: float) -
     with pytest.raises(InputError, match=r"a\.lfp: ") as told:
         read_photo(path)
     assert "\n" not in str(told.value)
-
-
-def test_raw_lytro_files_are_no_pictures(tmp_path: Path) -> None:
-    path = tmp_path / "a.lfp"
-    path.write_bytes(
-        files.lytro_file({"picture": {"frameArray": [{"frame": {"imageRef": "sha1-raw"}}]}}, {"sha1-raw": b"0"})
-    )
-    assert open_lfp(path) is None
-    with pytest.raises(InputError, match="raw light field"):
-        read_photo(path)

@@ -69,19 +69,6 @@ def test_a_name_that_is_taken_stays_with_its_model(tmp_path: Path) -> None:
     assert list(list_own_models()) == ["a"]
 
 
-def test_what_is_no_model_is_not_copied(tmp_path: Path) -> None:
-    (tmp_path / "text.onnx").write_text("no model")
-    (tmp_path / "photo.jpg").write_text("no model")
-    for name, says in (
-        ("text.onnx", "is not an ONNX model"),
-        ("photo.jpg", "is not an ONNX file"),
-        ("gone.onnx", "no such file"),
-    ):
-        with pytest.raises(InputError, match=rf"{name}: {says}"):
-            register(tmp_path / name)
-    assert not own_models_folder().exists()
-
-
 def test_unknown_names_are_answered_with_those_that_there_are(tmp_path: Path) -> None:
     register(weighing(tmp_path / "mine.onnx", (1, 0, 0)))
     with pytest.raises(InputError, match=r"min: no depth model of this name is known; there are .*zoedepth.*mine"):

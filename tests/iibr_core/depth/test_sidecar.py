@@ -1,28 +1,17 @@
-"""Disparity from files: what is found, how its gaps are filled, how it changes size, and what is refused."""
-
-import math
+"""Disparity from files: what is found, how it changes size, and what is refused."""
 
 import numpy as np
 import OpenImageIO as oiio
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
-from hypothesis.extra import numpy as hnp
 
 from iibr_core.depth.sidecar import SIDECAR_EXTENSIONS, find_sidecar
 from iibr_core.formats.maps.disparity_file import read_disparity
 from iibr_core.formats.maps.pfm import write_pfm
 from iibr_core.formats.maps.resample import SURFACE_SHARE, resample_surfaces
-from iibr_core.inpainting.disparity_holes import OPEN_LINE, SHORTNESS, STEP_LENGTHS, fill_disparity_holes
 from iibr_core.types import ImageSize, InputError
 
 RNG = np.random.default_rng(3)
 NAN = np.float32(np.nan)
-MAPS = hnp.arrays(
-    np.float32,
-    hnp.array_shapes(min_dims=2, max_dims=2, max_side=8),
-    elements=st.one_of(st.just(NAN), st.floats(-50, 50, width=32)),
-)
 
 
 def save(path, pixels, channels=None):
@@ -43,67 +32,6 @@ def save(path, pixels, channels=None):
 def pfm(path, values):
     write_pfm(path, np.asarray(values, np.float32))
     return path
-
-
-# ---- filling
-
-
-def fill_slowly(values):
-    """Twin: from every unknown pixel, walk along each line both ways."""
-    values = values.astype(np.float64)
-    while np.isnan(values).any():
-        result = values.copy()
-        for y, x in zip(*np.nonzero(np.isnan(values))):
-            weights, total = [], []
-            for (dy, dx), length in zip([(-1, -1), (-1, 0), (-1, 1), (0, -1)], STEP_LENGTHS):
-                ends = [walk(values, y, x, dy, dx), walk(values, y, x, -dy, -dx)]
-                known = [end for end in ends if end is not None]
-                if not known:
-                    continue
-                span = length * (sum(steps for steps, _ in known) if len(known) == 2 else OPEN_LINE * known[0][0])
-                weights.append(span**-SHORTNESS)
-                total.append(min(value for _, value in known))
-            if weights:
-                result[y, x] = np.average(total, weights=weights)
-        values = result
-    return values
-
-
-def walk(values, y, x, dy, dx):
-    for steps in range(1, max(values.shape)):
-        row, column = y + steps * dy, x + steps * dx
-        if not (0 <= row < values.shape[0] and 0 <= column < values.shape[1]):
-            return None
-        if not math.isnan(values[row, column]):
-            return steps, values[row, column]
-    return None
-
-
-@given(MAPS)
-def test_fill_agrees_with_its_slow_twin(values):
-    if np.isnan(values).all():
-        with pytest.raises(ValueError, match="no known value"):
-            fill_disparity_holes(values)
-        return
-    filled = fill_disparity_holes(values)
-    assert np.allclose(filled, fill_slowly(values), atol=1e-3)
-    known = ~np.isnan(values)
-    assert np.array_equal(filled[known], values[known])
-    assert filled.min() >= values[known].min() - 1e-4
-    assert filled.max() <= values[known].max() + 1e-4
-
-
-@pytest.mark.parametrize("turn", [0, 1, 2, 3])
-def test_hole_beside_a_foreground_object_gets_the_background(turn):
-    scene = np.full((40, 50), 1.0, np.float32)
-    scene[:, 20:30] = 9.0
-    holes = scene.copy()
-    holes[:, 14:20] = NAN  # where the other camera saw the object instead
-    expected = scene.copy()
-    expected[:, 14:20] = 1.0
-    wrong = np.abs(np.rot90(fill_disparity_holes(np.rot90(holes, turn)), -turn) - expected)
-    assert wrong[5:-5].max() < 0.05
-    assert wrong.max() < 0.3  # the frame hides the background from the object's side
 
 
 # ---- resampling
@@ -203,16 +131,6 @@ def test_nan_inf_and_masked_values_are_filled(tmp_path):
     masked = np.dstack([np.full((5, 6), 3.0), np.ones((5, 6))]).astype(np.float32)
     masked[2, 2] = (77.0, 0.0)
     assert (read_disparity(save(tmp_path / "a.exr", masked, ("Y", "A")), ImageSize(5, 6)).values == 3).all()
-
-
-@pytest.mark.parametrize("wild", [1e6, -1e6, 3e38])
-def test_one_outlier_counts_as_unknown(tmp_path, wild):
-    values = RNG.uniform(1, 3, (9, 11)).astype(np.float32)
-    values[4, 5] = wild
-    for size in [(9, 11), (18, 22)]:
-        found = read_disparity(pfm(tmp_path / "a.pfm", values), ImageSize(*size))
-        assert 1 <= found.values.min() <= found.values.max() <= 6
-        assert any(note.startswith("1 values") for note in found.notes)
 
 
 def test_another_size_scales_the_values_by_the_width(tmp_path):

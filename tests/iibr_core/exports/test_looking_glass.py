@@ -117,21 +117,3 @@ def test_failures_are_one_line(
         exported(source, "quilt", tmp_path / "a.png", show=True)
     assert "\n" not in str(error.value)
     assert bool(list(tmp_path.iterdir())) == (trouble == "failing"), "Bridge answers before anything is drawn"
-
-
-@pytest.mark.parametrize(
-    ("answer", "message"),
-    [
-        (b"<html>", "does not answer"),
-        (b"\xff\xfe\xfd", "does not answer"),
-        (b"[1]", "refused enter_orchestration"),
-        (b'{"status": {"value": [1]}}', "refused enter_orchestration"),
-        (b'{"status": {"value": "Completion"}, "payload": {"value": 7}}', "names no session"),
-    ],
-)
-def test_another_program_at_the_port_is_one_line(bridge: FakeBridge, answer: bytes, message: str) -> None:
-    bridge.raw = {"enter_orchestration": answer}
-    with pytest.raises(InputError, match=message) as error:
-        quilt.Bridge()
-    assert "\n" not in str(error.value)
-    assert len(str(error.value)) < 400

@@ -62,19 +62,6 @@ def test_other_kinds_of_files_are_named_with_the_way_out(tmp_path: Path, name: s
         read_photo(path)
 
 
-@pytest.mark.parametrize(
-    ("content", "expected"),
-    [
-        (b"", r"the file is empty \(0 bytes\)"),
-        (bytes(range(128, 256)), "cannot be read .* save it as JPEG, PNG or TIFF"),
-    ],
-)
-def test_unknown_kinds_are_refused(tmp_path: Path, content: bytes, expected: str) -> None:
-    (tmp_path / "a.bin").write_bytes(content)
-    with pytest.raises(InputError, match=expected):
-        read_photo(tmp_path / "a.bin")
-
-
 def test_a_raw_file_is_refused_though_its_preview_can_be_read(tmp_path: Path) -> None:
     """Most are TIFF files whose first picture is a thumbnail."""
     PICTURE.resize((16, 12)).save(tmp_path / "a.tif")

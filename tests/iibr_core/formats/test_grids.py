@@ -113,11 +113,3 @@ def test_missing_odd_and_damaged_views_are_named(tmp_path: Path) -> None:
     write_flat(places, ["v9999_u9999.png"])
     with pytest.raises(InputError, match="10000x10000"):
         open_light_field(places)
-
-
-@pytest.mark.parametrize("count", ["0", "-3", "1000000000", "2"])
-def test_parameters_that_do_not_fit(tmp_path: Path, count: str) -> None:
-    folder = write_hci(tmp_path / "lf")
-    (folder / "parameters.cfg").write_text(f"[extrinsics]\nnum_cams_x = {count}\nnum_cams_y = 3\n")
-    with pytest.raises(InputError, match="9 views do not fit"):
-        open_light_field(folder)

@@ -8,11 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from iibr_core.evaluation.datasets import read_known_disparity, read_scene
-from iibr_core.formats.images.write import write_image
+from iibr_core.evaluation.datasets import read_scene
 from iibr_core.formats.light_fields.light_field_formats import open_light_field
-from iibr_core.formats.light_fields.views import disparity_range, read_stored_view, read_views, step_length
-from iibr_core.types import GridShape, ImageSize
+from iibr_core.formats.light_fields.views import disparity_range, read_stored_view, read_views
+from iibr_core.types import GridShape
 from tests.iibr_core.known_scenes import (
     disparity_of_square,
     write_grid,
@@ -49,20 +48,6 @@ def test_the_viewer_and_the_evaluation_open_every_layout(tmp_path: Path, name: s
             assert view.colors.shape == (*size, 3)
             np.testing.assert_array_equal(view.colors, read_stored_view(scene, row, column))
         assert sum(view.disparity is not None for view in by_place.values()) == len(scene.disparity)
-
-
-def test_the_steps_of_the_grid_count_where_views_were_left_out(tmp_path: Path) -> None:
-    """Two views of seven: their maps hold px from one to the next, as many as four times a step of the data set."""
-    for n in (1, 5):
-        write_image(tmp_path / f"view{n}.png", np.full((4, 463, 3), n / 9, np.float32))
-        write_image(tmp_path / f"disp{n}.png", np.full((4, 463), 120, np.uint8))
-    scene = open_light_field(tmp_path)
-    assert (scene.grid, step_length(scene)) == ((1, 2), 4)
-    assert read_known_disparity(scene.disparity[0], ImageSize(4, 463)).values.max() == pytest.approx(10)
-    for view in read_views(scene)[1]:
-        assert view.disparity is not None
-        np.testing.assert_allclose(view.disparity, 40, rtol=1e-5)
-    assert disparity_range(scene) == pytest.approx((40, 40))
 
 
 def test_the_range_is_stated_or_that_of_the_map_nearest_to_the_centre(tmp_path: Path) -> None:

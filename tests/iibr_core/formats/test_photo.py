@@ -1,6 +1,5 @@
 """Photos: every kind of file is made here, read, and compared with its colours, or refused in one line."""
 
-import io
 import itertools
 import math
 import os
@@ -214,14 +213,6 @@ def test_truncated_files(tmp_path, name, share, max_pixels):
     with pytest.raises(InputError, match=rf"{name}: (damaged|cannot be read)") as caught:
         read_photo(path, max_pixels)
     assert str(caught.value).count(name) == 1
-
-
-def test_padded_jpeg_is_read(tmp_path):
-    buffer = io.BytesIO()
-    Image.fromarray(RGB).save(buffer, "jpeg")
-    content = buffer.getvalue()
-    (tmp_path / "a.jpg").write_bytes(content[:-2] + b"\0" * 40 + content[-2:])
-    assert read_photo(tmp_path / "a.jpg").size == (13, 17)
 
 
 EXACT = {"quality": 100, "subsampling": "4:4:4"}

@@ -42,11 +42,7 @@ def run_plain(*words: object) -> subprocess.CompletedProcess[str]:
     [
         ("generate", "{photo}", "--grid", 3, "--quality", "balanced", "--out", "{dir}/field"),
         ("screenshot", "{photo}", "--view", "1,0", "--size", "96x64", "-o", "{dir}/picture.png"),
-        ("plan", "{photo}"),
-        ("models",),
         ("batch", "{dir}", "--to", "depth", "-o", "{dir}/../depths"),
-        ("train", "--help"),
-        ("evaluate", "--help"),
     ],
     ids=lambda words: words[0],
 )

@@ -199,6 +199,10 @@ def test_a_full_disk_and_what_is_there_already(folder: Path, words: tuple[object
     assert contents(folder) == before
 
 
+def test_a_full_disk_is_told_of_the_folder_that_was_asked_for(folder: Path) -> None:
+    assert_refused(run_forked(*WRITERS["generate"], cwd=folder, most_bytes=2000), "iibr: o")
+
+
 @pytest.mark.parametrize("name", ["screenshot", "generate", "depth"])
 def test_the_photo_is_never_written_onto(folder: Path, name: str) -> None:
     before = contents(folder)

@@ -46,13 +46,14 @@ def folder(photo_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 @pytest.mark.parametrize(
     "words",
     [
-        *(("screenshot", read, "-o", target) for read in INPUTS for target in INPUTS),
+        *(("screenshot", INPUTS[0], "-o", target) for target in INPUTS),
+        ("screenshot", INPUTS[1], "-o", INPUTS[2]),
         ("screenshot", "{dir}/field", "-o", "{dir}/field/new.png"),
         ("screenshot", "{dir}/linked-field", "-o", "{dir}/field/input_Cam000.png"),
         ("screenshot", "{photo}", "--like", "{dir}/saved.png", "-o", "{dir}/saved.png"),
         ("screenshot", "{photo}", "--disparity", "{dir}/map.png", "-o", "{dir}/map.png"),
         ("screenshot", "{photo}", "--depth-model", "{dir}/model", "-o", "{dir}/model/new.png"),
-        *(("generate", read, "--grid", "1", "--out", "{dir}/field") for read in INPUTS if "hard" not in read),
+        ("generate", INPUTS[1], "--grid", "1", "--out", "{dir}/field"),
         ("generate", "{photo}", "--disparity", "{dir}/field/gt_disp_lowres.pfm", "--grid", "1", "--out", "{dir}/field"),
         ("generate", "{dir}/link.png", "--grid", "1", "--out", "{dir}/linked-field"),
         ("screenshot", "{photo}", "--gloss", "{dir}/gloss.toml", "-o", "{dir}/env.png"),
