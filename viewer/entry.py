@@ -7,8 +7,7 @@ import os
 import signal
 import sys
 import warnings
-
-from iibr_core.types import InputError
+from contextlib import suppress
 
 EXIT_UNEXPECTED, EXIT_BAD_INPUT, EXIT_INTERRUPTED = 1, 2, 130
 COLLECT_AFTER = 100_000, 20, 100
@@ -20,7 +19,9 @@ TRACEBACK_VARIABLE = "IIBR_TRACEBACK"
 def command() -> None:
     """Run the command line, and end the process at once: freeing half a million objects takes 0.2 s."""
     code = run()
-    sys.stderr.flush()
+    for stream in (sys.stdout, sys.stderr):
+        with suppress(OSError, ValueError):  # it is closed or full, which was reported
+            stream.flush()
     os._exit(code)
 
 
@@ -48,6 +49,8 @@ def run() -> int:
 
 def _end_by(error: Exception) -> int:
     import typer
+
+    from iibr_core.types import InputError
 
     if isinstance(error, InputError):
         return _end(str(error), EXIT_BAD_INPUT)

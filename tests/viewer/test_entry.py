@@ -42,6 +42,14 @@ def test_a_full_disk_behind_standard_output_is_one_line() -> None:
     assert "No space left" in error_of(in_shell("iibr --version > /dev/full"))
 
 
+def test_output_before_an_error_is_not_lost(tmp_path: Path) -> None:
+    (tmp_path / "in").mkdir()
+    (tmp_path / "in" / "a.jpg").write_text("no photo")
+    done = run("batch", tmp_path / "in", "--to", "depth", "-o", tmp_path / "out")
+    assert "0 written, 0 there before, 1 failed" in done.stdout
+    assert "lists what failed" in error_of(done)
+
+
 def test_a_reader_that_stops_reading_is_no_error_to_report() -> None:
     assert "Traceback" not in in_shell("iibr models | head -0").stderr
 
