@@ -374,7 +374,7 @@ def test_bad_paths_are_known_before_the_first_step(tmp_path):
         if match == "is a folder":
             path.mkdir()
         with pytest.raises(InputError, match=match):
-            train(Scorer(), CONFIG, path)
+            train(Scorer(), never, CONFIG, path)
 
 
 def test_a_model_that_gives_weights_of_another_shape_is_refused(out):
