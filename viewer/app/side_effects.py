@@ -29,7 +29,6 @@ from viewer.background.model_downloader import Downloaded, DownloadResult, Model
 from viewer.display.scene_view import SceneView
 from viewer.model.actions import Action, Notify, OpenPath, ShowPrompt, TaskTaken
 from viewer.model.commands import action_for_path
-from viewer.model.lens.aperture_mask import read_mask
 from viewer.model.state.app_state import AppState
 from viewer.model.state.exporting import ExportTask
 from viewer.model.state.filling import FillTask
@@ -277,6 +276,8 @@ def _read_facts(path: str) -> FactsRead:
 
 def _read_mask(path: Path) -> ApertureMask:
     """Raises InputError where it is no mask."""
+    from viewer.model.lens.aperture_mask import read_mask
+
     return read_mask(path)
 
 
