@@ -28,10 +28,10 @@ from benchmarks.harness.timing import Cost, cost_of, in_turns, make_field, media
 from benchmarks.peers import warp
 from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.edges.refine import refine
-from iibr_core.generation.outer_views import farthest_views, outer_views
-from iibr_core.generation.plan import plan_literal
-from iibr_core.rendering.mixed_pixels import split_mixed_pixels
-from iibr_core.rendering.resampling import cubic
+from iibr_core.method.farthest_views import farthest_views, outer_views
+from iibr_core.method.look_up import cubic
+from iibr_core.method.mixed_pixels import split_mixed_pixels
+from iibr_core.method.plan import plan_literal
 from iibr_core.runtime.kernels import kernel
 from iibr_core.surfaces import EDGE_PX, step_of
 from iibr_core.types import FloatImage, Quality

@@ -16,9 +16,14 @@ from typing import get_args
 import numpy as np
 
 from benchmarks.harness.reports import emit, head, parser_of, row, start
-from iibr_core.generation.light_field import generate
-from iibr_core.generation.plan import plan_literal
-from iibr_core.types import Disparity, GridShape, Photo, Quality
+from iibr_core.method.light_field import generate
+from iibr_core.method.plan import plan_literal
+from iibr_core.types import (
+    Disparity,
+    GridShape,
+    Photo,
+    Quality,
+)
 
 GRID = GridShape(9, 9)
 MOST_MS = 100

@@ -14,6 +14,7 @@ from typing import Any
 
 import cv2
 import numpy as np
+from iibr_core.generation.view_maker import ViewMaker, quantise_as_stored
 from numpy.typing import NDArray
 
 from benchmarks.harness.bench_scenes import FIELD, BenchScene, data_scenes, drawn_scene, photo_scene
@@ -25,8 +26,7 @@ from iibr_core.depth.pictorial_cues import estimate_from_cues
 from iibr_core.depth.search import open_with_depth
 from iibr_core.evaluation.metrics import bounded_psnr
 from iibr_core.evaluation.reference_warp import reference_warp
-from iibr_core.generation.plan import plan_literal
-from iibr_core.generation.view_maker import ViewMaker, quantise_as_stored
+from iibr_core.method.plan import plan_literal
 from iibr_core.training.degradation import blur
 from iibr_core.types import FloatImage, ImageSize, ViewOffset
 

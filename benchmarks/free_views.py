@@ -20,13 +20,18 @@ from numpy.typing import NDArray
 
 from benchmarks.harness.reports import emit, head, parser_of, row, start
 from benchmarks.harness.timing import cost_of
+from iibr_core.beyond.free_cameras import FreeViews
+from iibr_core.beyond.free_view import target_from_photo
 from iibr_core.evaluation.metrics import bounded_psnr
 from iibr_core.evaluation.reference_warp import reference_warp_to
-from iibr_core.generation.free_views import FreeViews
-from iibr_core.rendering.free_view import target_from_photo
 from iibr_core.training.scenes.random_scene import random_scene
 from iibr_core.training.scenes.raycast import RaycastScene, render
-from iibr_core.types import Camera, FloatImage, ImageSize, ViewOffset
+from iibr_core.types import (
+    Camera,
+    FloatImage,
+    ImageSize,
+    ViewOffset,
+)
 
 BOUNDLESS = 1e8
 POSES = {

@@ -25,7 +25,7 @@ from iibr_core.formats.light_fields.light_field_formats import find_light_field,
 from iibr_core.formats.light_fields.llff import read_llff
 from iibr_core.formats.light_fields.views import read_views
 from iibr_core.formats.maps.disparity_file import read_disparity
-from iibr_core.ray_transformer.inference import TrainedWeights
+from iibr_core.method.ray_transformer import TrainedWeights
 from iibr_core.types import ImageSize, InputError
 from viewer.app.preferences_store import load_preferences
 from viewer.model.lens.aperture_mask import read_mask

@@ -13,8 +13,8 @@ import OpenImageIO as oiio
 from PIL import Image, PngImagePlugin
 
 from benchmarks.fuzz_damage import Seed, repair_png
+from iibr_core.beyond.optics import ApertureMask, ApertureShape, Optics
 from iibr_core.formats.images.spatial_photo import write_spatial_photo
-from iibr_core.rendering.optics import ApertureMask, ApertureShape, Optics
 from iibr_core.runtime.resources import resource_folder
 from iibr_core.scenes.scene import Source
 from iibr_core.types import ImageSize

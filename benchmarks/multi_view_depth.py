@@ -74,7 +74,7 @@ def judge_views(views: NDArray[np.uint8]) -> list[str]:
         for v, u in np.ndindex(*kept.shape[:2]):
             write_image(Path(folder, "views", f"v{v:02}_u{u:02}.png"), kept[v, u])
         with HeadlessViewer() as viewer:
-            viewer.open(Source(folder), 1.0, lambda progress: None)
+            viewer.open(Source(folder))
             for v, u in np.ndindex(*(2 * length - 1 for length in kept.shape[:2])):
                 if v % 2 or u % 2:
                     eye = ViewOffset(v / 2 - kept.shape[0] // 2, u / 2 - kept.shape[1] // 2)

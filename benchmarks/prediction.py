@@ -17,11 +17,6 @@ from pathlib import Path
 from typing import get_args
 
 import numpy as np
-
-from benchmarks.harness.bench_scenes import DEMO, BenchScene, data_scenes, drawn_scene, photo_scene, squares_scene
-from benchmarks.harness.reports import emit, head, holds, is_wanted, parser_of, row, start, title
-from benchmarks.harness.timing import field_costs, make_field, peak_bytes
-from iibr_core.evaluation.tables import number
 from iibr_core.generation.cost_model import (
     CORES,
     NANOSECONDS,
@@ -30,8 +25,13 @@ from iibr_core.generation.cost_model import (
     largest_offset,
     measure_parallax,
 )
-from iibr_core.generation.memory import scene_bytes
-from iibr_core.generation.plan import plan_literal
+
+from benchmarks.harness.bench_scenes import DEMO, BenchScene, data_scenes, drawn_scene, photo_scene, squares_scene
+from benchmarks.harness.reports import emit, head, holds, is_wanted, parser_of, row, start, title
+from benchmarks.harness.timing import field_costs, make_field, peak_bytes
+from iibr_core.evaluation.tables import number
+from iibr_core.method.memory import scene_bytes
+from iibr_core.method.plan import plan_literal
 from iibr_core.types import GridShape, ImageSize, Quality
 
 WITHIN = 0.25

@@ -23,21 +23,26 @@ from numpy.typing import NDArray
 from benchmarks.harness.bench_scenes import DEMO, BenchScene, data_scenes, drawn_scene, offsets_of
 from benchmarks.harness.reports import emit, is_wanted, markdown, parser_of, start
 from benchmarks.harness.timing import cost_of, in_turns, median_cost
+from iibr_core.beyond.aperture_sampling import aperture_points
+from iibr_core.beyond.lens import LensSum
+from iibr_core.beyond.optics import CENTRE, ApertureShape, Optics
 from iibr_core.color import encoded_from_stored, srgb_from_linear
 from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.search import open_with_depth
 from iibr_core.evaluation.metrics import bounded_psnr
 from iibr_core.exports.render_settings import RenderSettings
-from iibr_core.generation.light_field import generate, ray_set
-from iibr_core.generation.plan import plan_for_viewing, plan_literal
 from iibr_core.interface.public_scene import from_arrays
-from iibr_core.rendering.aperture_sampling import aperture_points
-from iibr_core.rendering.flying_pixels import postprocessed_view
-from iibr_core.rendering.lens import LensSum
-from iibr_core.rendering.optics import CENTRE, ApertureShape, Optics
-from iibr_core.rendering.renderer import open_renderer
+from iibr_core.method.light_field import generate, rays_of_grid
+from iibr_core.method.plan import plan_for_viewing, plan_literal
+from iibr_core.method.view import finish, open_renderer
 from iibr_core.scenes.screen_size import ScreenSize
-from iibr_core.types import FloatImage, GridShape, ImageSize, ViewOffset, image_size
+from iibr_core.types import (
+    FloatImage,
+    GridShape,
+    ImageSize,
+    ViewOffset,
+    image_size,
+)
 from viewer.gpu.context import GLContext
 from viewer.gpu.headless_context import create_headless
 from viewer.gpu.refocus.picture_renderer import Renderer
@@ -141,7 +146,7 @@ class Reference:
     def __init__(self, scene: BenchScene) -> None:
         photo, disparity = scene.given
         self._size, self._widest = image_size(disparity.values), float(max(scene.grid))
-        self._rays, outer = ray_set(photo, disparity, plan_literal(photo, disparity, scene.grid))
+        self._rays, outer = rays_of_grid(photo, disparity, plan_literal(photo, disparity, scene.grid))
         for _ in outer:  # completes the ray set
             pass
 
@@ -151,7 +156,7 @@ class Reference:
         with open_renderer() as renderer:
             for t, s in aperture_points(ApertureShape(), diameter, self._widest, CAMERAS, 0).tolist():
                 at = ViewOffset(eye.t + t, eye.s + s)
-                view = postprocessed_view(self._rays, at, renderer.render(self._rays, at))
+                view = finish(self._rays, at, renderer.render(self._rays, at))
                 for total in sums:
                     total.add(at, view.colors)
         return [srgb_from_linear(total.light()) for total in sums]

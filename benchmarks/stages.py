@@ -23,6 +23,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+from iibr_core.generation.view_maker import ViewMaker, quantise_as_stored
 from numpy.typing import NDArray
 
 from benchmarks.harness.bench_scenes import FIELD
@@ -37,8 +38,7 @@ from iibr_core.evaluation.metrics import bounded_psnr
 from iibr_core.evaluation.reference_warp import reference_warp
 from iibr_core.evaluation.trials import trial_input, trials_of
 from iibr_core.formats.maps.resample import resample_map
-from iibr_core.generation.view_maker import ViewMaker, quantise_as_stored
-from iibr_core.rendering.ambiguous_rays import HYPOTHESES
+from iibr_core.method.ambiguous_rays import HYPOTHESES
 from iibr_core.stages import ALL_STAGES, STAGE_NAMES, Stages, stages_without
 from iibr_core.training.degradation import blur, quantise
 from iibr_core.training.scenes.random_scene import random_scene, render

@@ -24,25 +24,26 @@ from benchmarks import plucker
 from benchmarks.harness.reports import emit, parser_of, start
 from benchmarks.stages import Views, judge, make_views, report
 from iibr_core.formats.weights import save_weights
-from iibr_core.ray_transformer.inference import TrainedWeights
-from iibr_core.ray_transformer.model import RayTransformer
-from iibr_core.rendering.ambiguous_rays import PLAIN_SOURCE, UndecidedRays
-from iibr_core.rendering.hypotheses import (
+from iibr_core.method.ambiguous_rays import (
     COVERAGE,
     FEATURES,
     INPAINTED,
     LANDS,
     PARALLAX,
     PLAIN,
+    PLAIN_SOURCE,
     SHARE,
     UNCOVERED,
     AmbiguousRays,
+    UndecidedRays,
     describe_rays,
 )
-from iibr_core.rendering.ray_set import RaySet
+from iibr_core.method.ray_transformer import TrainedWeights
+from iibr_core.method.rays import RaySet
 from iibr_core.stages import Stages
 from iibr_core.training.batches import AS_RENDERED, RayChoice, training_batch
 from iibr_core.training.losses import LossWeights
+from iibr_core.training.model import RayTransformer
 from iibr_core.training.run_files import checkpoint_path
 from iibr_core.training.trainer import TrainConfig, TrainingRun
 from viewer.cli.train import ENTROPY_WEIGHT

@@ -120,7 +120,7 @@ def nearness(tab: Tab, source: Source) -> tuple[str, str]:
     """The least PSNR against the desktop's pictures of the same settings: pinholes, and open apertures."""
     found: dict[bool, list[float]] = {False: [], True: []}
     with HeadlessViewer() as viewer:
-        viewer.open(source, 1.0, lambda made: None)
+        viewer.open(source)
         far, near = viewer.scene.disparity_range_px
         widest, reach = max(viewer.scene.grid), (max(viewer.scene.grid) - 1) / 2
         aside = round(2.8 * reach) / 4

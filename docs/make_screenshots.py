@@ -33,7 +33,7 @@ def main() -> None:
     """Write the pictures beside this script, or into the folder named."""
     folder = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent
     with HeadlessViewer() as viewer:
-        viewer.open(Source(str(resource_folder("assets") / "motorcycle" / "motorcycle.png")), 1.0, lambda _: None)
+        viewer.open(Source(str(resource_folder("assets") / "motorcycle" / "motorcycle.png")))
         write(folder / "screenshot.png", whole_window(viewer))
         write(folder / "inspection.png", inspection(viewer))
 

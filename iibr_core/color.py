@@ -11,7 +11,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.types import SRGB, ColorSpace, FloatImage, Photo, StoredColors
+from iibr_core.types import (
+    SRGB,
+    ColorSpace,
+    FloatImage,
+    Photo,
+    StoredColors,
+)
 
 MOST_LIGHT = 1e37
 """Sums of three stay finite."""
@@ -47,6 +53,11 @@ def encoded_from_stored(stored: StoredColors) -> FloatImage:
     """Encoded float colours (1 = white) of stored ones."""
     encoded: FloatImage = stored.astype(np.float32)
     return encoded / np.float32(255) if stored.dtype == np.uint8 else encoded
+
+
+def quantise_as_stored(colors: FloatImage) -> FloatImage:
+    """Return encoded colours rounded to bytes as a light field stores them, 1 = white."""
+    return encoded_from_stored(stored_from_encoded(colors, False))
 
 
 @lru_cache(maxsize=16)

@@ -13,7 +13,6 @@ Colour          encoded by sRGB's curve, 1 = white, as photos are; HDR values ex
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, Literal, NamedTuple
 
@@ -31,12 +30,6 @@ Quality = Literal["fast", "balanced"]
 """Where the ray transformer runs: nowhere, on ambiguous rays, everywhere."""
 
 DEFAULT_QUALITY: Quality = "balanced"
-
-ReportProgress = Callable[[float, float, str], None]
-"""Called with (done, total, doing): how much is done, of how much, and what is being done, in words for people.
-total 0: how much there is to do is not known. Called in whatever thread works.
-"""
-
 
 TOTAL_PARALLAX = 0.04
 """For viewing: how far the nearest moves against the farthest across the grid, as a share of the photo's width."""
@@ -242,10 +235,6 @@ class ViewUpdate:
     inpainted: NDArray[np.bool_] | None = None
     is_final: bool = True
     share: float = 0.0
-
-
-def ignore_progress(done: float, total: float, doing: str) -> None:
-    """For work that nobody watches: a ReportProgress that does nothing."""
 
 
 class InputError(ValueError):

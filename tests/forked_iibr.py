@@ -14,7 +14,7 @@ PRELOADED = (
     "viewer.cli.main",
     "viewer.app.headless",
     "iibr_core.depth.search",
-    "iibr_core.generation.light_field",
+    "iibr_core.method.light_field",
     "iibr_core.evaluation.evaluate_scene",
 )
 DEADLINE_S = 120.0

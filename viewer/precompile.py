@@ -15,31 +15,29 @@ import tempfile
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
-from functools import partial
 from multiprocessing import get_context
 from pathlib import Path
-from typing import TYPE_CHECKING, get_args
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from iibr_core.beyond.free_cameras import FreeViews, inverse_depth_of, steered
+from iibr_core.beyond.optics import CENTRE, Optics
 from iibr_core.depth.choice import DepthChoice
 from iibr_core.exports.full_picture import FullPicture
 from iibr_core.formats.images.photo import read_photo
 from iibr_core.formats.images.write import write_image
 from iibr_core.formats.maps.reader import read_map
 from iibr_core.formats.maps.writer import write_map
-from iibr_core.generation.free_views import FreeViews, inverse_depth_of, steered
 from iibr_core.rendering.gloss.gloss_settings import Gloss, GlossLight
-from iibr_core.rendering.optics import CENTRE, Optics
 from iibr_core.runtime.compiling import COMPILING, FOLDER_VARIABLE
 from iibr_core.runtime.machine import core_count
-from iibr_core.scenes.loaded_photo import load_photo, prepare_brush
-from iibr_core.scenes.making import make_plan
-from iibr_core.scenes.opening import SceneReady, SceneRequest, results_of
-from iibr_core.scenes.scene import Source
+from iibr_core.scenes.opening import results_of
+from iibr_core.scenes.photo import load_photo, make_plan, prepare_brush
+from iibr_core.scenes.scene import SceneReady, SceneRequest, Source
 from iibr_core.scenes.scene_gloss import GlossRequest, answer
 from iibr_core.scenes.screen_size import ScreenSize
-from iibr_core.types import Camera, InputError, Quality
+from iibr_core.types import Camera, InputError
 from viewer.model.demo_photo import demo_photo
 
 if TYPE_CHECKING:
@@ -109,12 +107,8 @@ def _show_first_picture(scratch: Path) -> None:
 
 
 def _make_views(scratch: Path) -> None:
-    """Without what comes before the first picture."""
+    """Make the views, without what comes before the first picture."""
     _open(replace(_photo(scratch), depth=DepthChoice(refine=0.0)))
-
-
-def _open_in(scratch: Path, quality: Quality) -> None:
-    _open(replace(_photo(scratch), quality=quality))
 
 
 def _open_smaller(scratch: Path) -> None:
@@ -182,7 +176,6 @@ STEPS: tuple[Callable[[Path], None], ...] = (
     _look_around,
     _find_gloss,
     _open_guessed,
-    *(partial(_open_in, quality=quality) for quality in get_args(Quality)),
     _open_smaller,
     _open_hdr,
     _draw_at_own_size,

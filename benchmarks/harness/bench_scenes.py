@@ -19,11 +19,19 @@ from iibr_core.formats.light_fields.light_field_formats import open_light_field
 from iibr_core.formats.light_fields.multi_view_scene import MultiView
 from iibr_core.formats.light_fields.views import grid_of, read_stored_view
 from iibr_core.formats.maps.writer import write_map
-from iibr_core.generation.plan import plan_for_viewing
+from iibr_core.method.plan import plan_for_viewing
 from iibr_core.runtime.resources import resource_folder
 from iibr_core.training.degradation import blur
 from iibr_core.training.scenes.random_scene import random_scene, render
-from iibr_core.types import Disparity, FloatImage, GridShape, ImageSize, InputError, Photo, ViewOffset
+from iibr_core.types import (
+    Disparity,
+    FloatImage,
+    GridShape,
+    ImageSize,
+    InputError,
+    Photo,
+    ViewOffset,
+)
 
 DEMO = resource_folder("assets") / "motorcycle" / "motorcycle.png"
 FIELD = GridShape(9, 9)

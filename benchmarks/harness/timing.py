@@ -24,9 +24,10 @@ import psutil
 
 from benchmarks.harness.bench_scenes import BenchScene
 from benchmarks.harness.environment import set_environment, thread_variables
-from iibr_core.generation.light_field import generate
-from iibr_core.generation.plan import plan_literal
-from iibr_core.types import FloatImage, Quality, ReportProgress, StoredColors, ignore_progress
+from iibr_core.method.light_field import generate
+from iibr_core.method.plan import plan_literal
+from iibr_core.runtime.work import report_progress
+from iibr_core.types import FloatImage, Quality, StoredColors
 
 COMMAND_LINE = (sys.executable, "-P", "-m", "viewer")
 Result = TypeVar("Result")
@@ -64,9 +65,7 @@ def cost_of(work: Callable[[], object]) -> Cost:
     return Cost(time.perf_counter() - wall, time.process_time() - cpu)
 
 
-def in_turns(
-    ways: Mapping[str, Callable[[], Cost]], repeats: int, report_progress: ReportProgress = ignore_progress
-) -> dict[str, list[Cost]]:
+def in_turns(ways: Mapping[str, Callable[[], Cost]], repeats: int) -> dict[str, list[Cost]]:
     """The costs that each way gives, one a round; every round goes through all ways."""
     found: dict[str, list[Cost]] = {name: [] for name in ways}
     for round_ in range(repeats):
@@ -94,14 +93,12 @@ def make_field(scene: BenchScene, quality: Quality) -> list[tuple[StoredColors, 
     return [(update.colors, update.disparity) for update in updates]
 
 
-def field_costs(
-    scenes: Mapping[str, tuple[BenchScene, Quality]], repeats: int, report_progress: ReportProgress = ignore_progress
-) -> dict[str, Cost]:
+def field_costs(scenes: Mapping[str, tuple[BenchScene, Quality]], repeats: int) -> dict[str, Cost]:
     """Medians of whole fields, made in turns, by name; compiling is not counted."""
     for scene, quality in scenes.values():
         make_field(scene, quality)
     ways = {name: partial(cost_of, partial(make_field, *each)) for name, each in scenes.items()}
-    return {name: median_cost(found) for name, found in in_turns(ways, repeats, report_progress).items()}
+    return {name: median_cost(found) for name, found in in_turns(ways, repeats).items()}
 
 
 def in_own_process(work: Callable[..., Result], *args: object) -> Result:

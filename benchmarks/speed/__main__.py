@@ -14,6 +14,7 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
+from iibr_core.generation.cost_model import CORES
 
 from benchmarks.harness.bench_scenes import (
     FIELD,
@@ -36,10 +37,14 @@ from benchmarks.harness.timing import (
 from benchmarks.speed.speed_report import Bench, Figures, Measured, SpeedTarget, write_bench
 from benchmarks.speed.variants import REFERENCE, VARIANTS, Variant, evaluated_views, field_cost
 from iibr_core.evaluation.metrics import bounded_psnr, flip
-from iibr_core.generation.cost_model import CORES
-from iibr_core.generation.light_field import generate
-from iibr_core.generation.plan import plan_for_viewing, plan_literal
-from iibr_core.types import ImageSize, InputError, Quality, ReportProgress, image_size
+from iibr_core.method.light_field import generate
+from iibr_core.method.plan import plan_for_viewing, plan_literal
+from iibr_core.types import (
+    ImageSize,
+    InputError,
+    Quality,
+    image_size,
+)
 from viewer.cli.terminal import show_progress
 
 DRAWN_SIZE, DRAWN_PX = ImageSize(256, 256), 2.0

@@ -7,15 +7,21 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
+from iibr_core.generation.view_maker import ViewMaker
 
 from benchmarks.harness.bench_scenes import CENTRE, MOST_JUDGED, BenchScene
 from benchmarks.harness.timing import Cost, cost_of
 from iibr_core.color import encoded_from_stored, stored_from_encoded
 from iibr_core.depth.edges.refine import refine
 from iibr_core.formats.maps.resample import resample_surfaces
-from iibr_core.generation.view_maker import ViewMaker
-from iibr_core.rendering.ambiguous_rays import HYPOTHESES
-from iibr_core.types import FloatImage, ImageSize, Quality, StoredColors, ViewOffset
+from iibr_core.method.ambiguous_rays import HYPOTHESES
+from iibr_core.types import (
+    FloatImage,
+    ImageSize,
+    Quality,
+    StoredColors,
+    ViewOffset,
+)
 
 
 @dataclass(frozen=True)

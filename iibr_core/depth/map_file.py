@@ -17,7 +17,12 @@ from iibr_core.formats.images.rgbd import rgbd_parts
 from iibr_core.formats.maps.disparity_file import has_shape_of, require_scale, resampling_note, scaled_disparity
 from iibr_core.formats.maps.map_text import MapText
 from iibr_core.formats.maps.reader import MapFile, read_map_file, read_map_picture
-from iibr_core.types import FloatImage, InputError, Photo, image_size
+from iibr_core.types import (
+    FloatImage,
+    InputError,
+    Photo,
+    image_size,
+)
 
 DISTANCE_SHARE = 0.5
 """Integers beyond this share of the greatest one are no distances: cameras see less than 32 m, in millimetres."""

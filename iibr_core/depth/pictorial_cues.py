@@ -18,7 +18,12 @@ from iibr_core.runtime import tiling
 from iibr_core.runtime.kernels import kernel
 from iibr_core.runtime.tiling import in_bands
 from iibr_core.runtime.work import raise_if_stopped
-from iibr_core.types import FloatImage, ImageSize, Photo, image_size
+from iibr_core.types import (
+    FloatImage,
+    ImageSize,
+    Photo,
+    image_size,
+)
 
 LONGEST_PX = 400
 """Depth is guessed on a picture so large."""

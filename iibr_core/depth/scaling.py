@@ -12,7 +12,12 @@ from numpy.typing import NDArray
 
 from iibr_core.depth.estimates import DisparityMap, Estimate, MetricDepth, RelativeInverseDepth
 from iibr_core.formats.maps.disparity_file import MAX_DISPARITY_WIDTHS
-from iibr_core.types import TOTAL_PARALLAX, FloatImage, GridShape, InputError
+from iibr_core.types import (
+    TOTAL_PARALLAX,
+    FloatImage,
+    GridShape,
+    InputError,
+)
 
 PERCENTILES = ((1.0, 99.0), (0.1, 99.9), (0.0, 100.0))
 """The near and the far end, without a few wild values; wider ones where nearly all is one plane."""

@@ -39,15 +39,13 @@ from iibr_core.formats.maps.disparity_file import filling_note, map_at_size
 from iibr_core.formats.maps.resample import is_enlarged_smoothly, without_repeats
 from iibr_core.inpainting.disparity_by_color import fill_disparity_by_color
 from iibr_core.inpainting.inpainter import EstimateDepth
-from iibr_core.runtime.work import raise_if_stopped
+from iibr_core.runtime.work import raise_if_stopped, report_progress
 from iibr_core.types import (
     Disparity,
     FloatImage,
     GridShape,
     InputError,
     Photo,
-    ReportProgress,
-    ignore_progress,
 )
 
 USUAL_GRID = GridShape(9, 9)
@@ -86,7 +84,6 @@ def open_with_depth(
     choice: DepthChoice | None = None,
     max_pixels: int = DEFAULT_MAX_PIXELS,
     grid: GridShape | None = None,
-    report_progress: ReportProgress = ignore_progress,
     asks_model: bool = True,
 ) -> PhotoWithDepth:
     """Read a photo and find its disparity; every photo gets one. asks_model: else a guess takes a model's place, which
@@ -98,7 +95,7 @@ def open_with_depth(
     """
     choice, path = choice or DepthChoice(), Path(path)
     photo = read_photo(path, max_pixels, keeps_primaries=True)
-    search = _DepthSearch(path, photo, choice, max_pixels, report_progress)
+    search = _DepthSearch(path, photo, choice, max_pixels)
     if choice.file is not None:
         return _finish(search.of_file(Path(choice.file)), choice, grid)
     failures: tuple[str, ...] = ()
@@ -127,7 +124,7 @@ def ask_model(
     Raises InputError where there is none or it cannot be used.
     """
     choice = replace(choice, start="model")
-    search = _DepthSearch(path, photo, choice, math.prod(photo.size), ignore_progress)
+    search = _DepthSearch(path, photo, choice, math.prod(photo.size))
     found = search.model()
     assert found is not None
     return _finish(found, choice, grid)
@@ -140,7 +137,7 @@ def sketch_depth(path: Path, photo: Photo, choice: DepthChoice) -> PhotoWithDept
     Raises InputError, Cancelled as that does.
     """
     height, width = photo.size
-    search = _DepthSearch(path, photo, choice, height * width, ignore_progress)
+    search = _DepthSearch(path, photo, choice, height * width)
     choice = replace(choice, refine=0.0)
     if choice.file is not None:
         return _finish(search.of_file(Path(choice.file)), choice, None)
@@ -200,7 +197,6 @@ class _DepthSearch:
     photo: Photo
     choice: DepthChoice
     max_pixels: int
-    report_progress: ReportProgress
 
     def sources(self) -> Iterator[tuple[DepthKind, Callable[[], _FoundDepth | None]]]:
         ways: dict[DepthKind, Callable[[], _FoundDepth | None]] = {
@@ -252,7 +248,7 @@ class _DepthSearch:
         return _FoundDepth(photo, replace(origin, near=told.near), told.estimate, embedded.notes + told.notes)
 
     def of_pair(self) -> _FoundDepth | None:
-        found = estimate_from_pair(self.path, self.report_progress)
+        found = estimate_from_pair(self.path)
         if found is None:
             return None
         estimate, layout = found
@@ -263,14 +259,14 @@ class _DepthSearch:
         if model is None:
             return None
         raise_if_stopped()
-        estimate = estimate_with(model, self.photo, self.report_progress)
+        estimate = estimate_with(model, self.photo)
         told = depth_of_model(model.title, estimate, is_meaning_known(model), self.photo, self.choice)
         origin = DepthOrigin("model", f"estimated by {model.title}", near=told.near)
         return _FoundDepth(self.photo, origin, told.estimate, told.notes)
 
     def rough(self) -> _FoundDepth:
         raise_if_stopped()
-        self.report_progress(0, 0, "guessing depth")
+        report_progress(0, 0, "guessing depth")
         estimate = estimate_from_cues(self.photo)
         origin = DepthOrigin("rough", "rough, guessed without a model", (), BETTER_WAYS)
         return _FoundDepth(self.photo, origin, estimate, unread_parts(self.path))

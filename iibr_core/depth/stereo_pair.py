@@ -13,7 +13,8 @@ from iibr_core.formats.images.photo import read_picture
 from iibr_core.formats.images.side_by_side import left_picture
 from iibr_core.formats.light_fields.view_files import read_stereo_file
 from iibr_core.runtime.machine import free_memory_bytes
-from iibr_core.types import InputError, ReportProgress, ignore_progress, image_size
+from iibr_core.runtime.work import report_progress
+from iibr_core.types import InputError, image_size
 
 MATCHED_PIXELS = 400_000
 """Of each view; edges are drawn to the photo's afterwards."""
@@ -21,7 +22,6 @@ MATCHED_PIXELS = 400_000
 
 def estimate_from_pair(
     path: Path,
-    report_progress: ReportProgress = ignore_progress,
 ) -> tuple[DisparityMap, str] | None:
     """Of the picture that a stereo photo's file shows, px from eye to eye, and what kind of file it is; None where a
     file is no stereo photo, or shows another picture than these two.

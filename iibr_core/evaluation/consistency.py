@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter, map_coordinates, maximum_filter, minimum_filter
 
-from iibr_core.generation.outer_views import outer_views
-from iibr_core.rendering.rendered_view import RenderedView
+from iibr_core.method.farthest_views import outer_views
+from iibr_core.method.view import View
 from iibr_core.surfaces import SAME_SURFACE_PX, step_of
 from iibr_core.types import FloatImage, ViewOffset
 
@@ -49,7 +49,7 @@ class LineView:
 
 
 def consistency(
-    make: Callable[[ViewOffset], RenderedView],
+    make: Callable[[ViewOffset], View],
     offsets: Iterable[ViewOffset],
     photo: FloatImage,
     disparity: FloatImage,
@@ -76,7 +76,7 @@ def consistency(
 
 
 def disagreement(
-    one: RenderedView, other: RenderedView, at: ViewOffset, other_at: ViewOffset
+    one: View, other: View, at: ViewOffset, other_at: ViewOffset
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
     """Differences (N, 3) in 1/255 of all pixels whose surface both views show, and which of them (N,) are inpainted
     in both. Pixels near edges, and those inpainted in one view only, are left out.

@@ -14,7 +14,13 @@ from iibr_core.formats.images.photo import read_picture
 from iibr_core.formats.light_fields.light_field_formats import LAYOUTS, find_light_field
 from iibr_core.formats.light_fields.multi_view_scene import KnownDisparity, KnownView, MultiView, common_size
 from iibr_core.formats.maps.disparity_file import read_disparity
-from iibr_core.types import Disparity, FloatImage, ImageSize, InputError, image_size
+from iibr_core.types import (
+    Disparity,
+    FloatImage,
+    ImageSize,
+    InputError,
+    image_size,
+)
 
 
 def read_scene(folder: Path) -> MultiView | None:

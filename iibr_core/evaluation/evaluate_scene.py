@@ -1,4 +1,4 @@
-"""Compares every way of making views on one trial: identity, reference warp, and the qualities asked for.
+"""Compare every way of making views on one trial: identity, reference warp, and this program.
 
 Each judged view is read once and made by every method; figures are of the whole frame, of what the given view sees,
 and of holes.
@@ -11,13 +11,12 @@ import time
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
-from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, get_args
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from iibr_core.color import bytes_from_encoded
+from iibr_core.color import bytes_from_encoded, quantise_as_stored
 from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.edges.refine import refine
 from iibr_core.evaluation.consistency import Consistency, LineView, consistency, line_straightness
@@ -28,6 +27,7 @@ from iibr_core.evaluation.metrics import Mask, bounded_psnr, flip, ssim
 from iibr_core.evaluation.reference_warp import WarpedView
 from iibr_core.evaluation.results import (
     IDENTITY,
+    OURS,
     REFERENCE,
     TRUTH,
     Bytes,
@@ -40,23 +40,18 @@ from iibr_core.evaluation.trial_views import PlaneViews, TrialViews, trial_views
 from iibr_core.evaluation.trials import CENTRE_TRIAL, DisparityFrom, Trial, TrialInput, trial_input, trials_of
 from iibr_core.formats.images.photo import DEFAULT_MAX_PIXELS
 from iibr_core.formats.light_fields.multi_view_scene import MultiView
-from iibr_core.generation.view_maker import quantise_as_stored
+from iibr_core.runtime.work import part_of_job, report_progress
 from iibr_core.stages import ALL_STAGES, Stages
 from iibr_core.types import (
-    DEFAULT_QUALITY,
     Disparity,
     FloatImage,
-    Quality,
-    ReportProgress,
     ViewOffset,
-    ignore_progress,
     image_size,
 )
 
 if TYPE_CHECKING:
     from iibr_core.evaluation.lpips import Lpips
 
-QUALITIES: tuple[Quality, ...] = get_args(Quality)
 SAME_ROW = 0.05
 """Views whose rows differ by less, in view steps, make an EPI together."""
 LEAST_EPI_VIEWS = 3
@@ -71,7 +66,6 @@ class Options:
 
     source: DisparityFrom | Path = "auto"
     choice: DepthChoice = field(default_factory=DepthChoice)
-    qualities: tuple[Quality, ...] = QUALITIES
     max_pixels: int = DEFAULT_MAX_PIXELS
     most_views: int | None = None
     lpips: Path | None = None
@@ -83,7 +77,6 @@ class Options:
 def evaluate(
     scene: MultiView,
     options: Options | None = None,
-    report_progress: ReportProgress = ignore_progress,
 ) -> list[EvaluationResult]:
     """Evaluate a scene by the paper's trials: one result for each trial and disparity map.
 
@@ -98,14 +91,9 @@ def evaluate(
         report_progress(number, len(trials), f"{scene.name}: disparity")
         given = trial_input(trial, options.source, options.choice, options.max_pixels)
         for which, disparity in enumerate(given.maps):
-            report = _part_of(report_progress, number + which / len(given.maps), 1 / len(given.maps), len(trials))
-            results.append(_Evaluator(trial, given, disparity, options, lpips, report).evaluate())
+            with part_of_job(number + which / len(given.maps), 1 / len(given.maps), len(trials)):
+                results.append(_Evaluator(trial, given, disparity, options, lpips).evaluate())
     return results
-
-
-def _part_of(report_progress: ReportProgress, before: float, work: float, total: float) -> ReportProgress:
-    """Reports a part of the work as what it is of the whole."""
-    return lambda done, of_part, doing: report_progress(before + work * done / of_part, total, doing)
 
 
 def _lpips(folder: Path) -> Lpips:
@@ -122,10 +110,9 @@ class _Evaluator:
         disparity: Disparity,
         options: Options,
         lpips: Lpips | None,
-        report_progress: ReportProgress,
     ) -> None:
         self.trial, self.given, self.disparity, self.options = trial, given, disparity, options
-        self.lpips, self.report_progress = lpips, report_progress
+        self.lpips = lpips
         self.refined = disparity.values
         if options.choice.refine > 0:
             strength, unknown = options.choice.refine, disparity.unknown
@@ -146,19 +133,10 @@ class _Evaluator:
     def evaluate(self) -> EvaluationResult:
         trial, scene, start = self.trial, self.trial.scene, time.perf_counter()
         options = self.options
-        with (
-            trial_views(
-                trial,
-                self.given.photo,
-                self.refined,
-                options.qualities,
-                options.max_pixels,
-                options.stages,
-            ) as views,
-            ThreadPoolExecutor(2, thread_name_prefix="iibr-metrics") as pool,
-        ):
+        views = trial_views(trial, self.given.photo, self.refined, options.max_pixels, options.stages)
+        with ThreadPoolExecutor(2, thread_name_prefix="iibr-metrics") as pool:
             for done, index in enumerate(trial.judged):
-                self.report_progress(done, len(trial.judged), f"{scene.name}: {scene.views[index].name}")
+                report_progress(done, len(trial.judged), f"{scene.name}: {scene.views[index].name}")
                 self._judge_view(index, views, pool)
             agreement = {}
             if options.with_consistency and isinstance(views, PlaneViews):
@@ -185,9 +163,9 @@ class _Evaluator:
         truth, known = views.truth(index)
         judge = views.warp(self.given.judge.values, index)
         made = {IDENTITY: (self.given.photo, 0.0), **self._reference_view(views, index)}
-        for quality in views.qualities:
-            made_view, ms = views.timed_view(quality, index)
-            made[quality] = quantise_as_stored(made_view.colors), ms
+        start = time.perf_counter()
+        colors = quantise_as_stored(views.view(index).colors)
+        made[OURS] = colors, 1e3 * (time.perf_counter() - start)
         hole, visible = judge.hole & known, judge.visible & known
         self.hole_shares.append(float(hole.mean()))
 
@@ -217,7 +195,7 @@ class _Evaluator:
             foci += [through] if through else []
             if self.lens and not through:
                 self.notes += ("The lens's picture is left out: it needs every view of its aperture.",)
-        stacks = {method: FocalStack(foci) for method in (TRUTH, IDENTITY, REFERENCE, *self.options.qualities) if foci}
+        stacks = {method: FocalStack(foci) for method in (TRUTH, IDENTITY, REFERENCE, OURS) if foci}
         for stack in stacks.values():
             stack.add(ViewOffset(0.0, 0.0), photo)
         return stacks
@@ -225,9 +203,7 @@ class _Evaluator:
     def _score_refocus(self) -> tuple[RefocusResult, ...]:
         if not self.stacks:
             return ()
-        qualities = self.options.qualities
-        shown = DEFAULT_QUALITY if DEFAULT_QUALITY in qualities else (*qualities, REFERENCE)[0]
-        return score_methods(self.stacks, TRUTH, shown, self.lens)
+        return score_methods(self.stacks, TRUTH, OURS, self.lens)
 
     def _reference_view(self, views: TrialViews, index: int) -> dict[str, tuple[FloatImage, float]]:
         start = time.perf_counter()
@@ -266,10 +242,8 @@ class _Evaluator:
 
     def _consistency(self, views: PlaneViews) -> dict[str, Consistency]:
         found: dict[str, Consistency] = {}
-        for quality in views.qualities:
-            self.report_progress(1, 1, f"{self.trial.scene.name}: consistency, {quality}")
-            make = partial(views.maker.view, quality)
-            found[quality] = consistency(make, views.offsets, self.given.photo, self.refined)
+        report_progress(1, 1, f"{self.trial.scene.name}: consistency")
+        found[OURS] = consistency(views.made.view, views.offsets, self.given.photo, self.refined)
         if len(self.lines) + 1 >= LEAST_EPI_VIEWS:
             rms, off_px = line_straightness(self.given.photo, self.given.judge.values, self.lines)
             found[TRUTH] = Consistency(math.nan, math.nan, rms, off_px, 0)

@@ -9,11 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from iibr_core.beyond.lens import LensSum
+from iibr_core.beyond.optics import Optics
 from iibr_core.color import srgb_from_linear, stored_from_encoded
 from iibr_core.evaluation.lens_picture import LensPicture
 from iibr_core.evaluation.metrics import bounded_psnr, flip
-from iibr_core.rendering.lens import LensSum
-from iibr_core.rendering.optics import Optics
 from iibr_core.types import FloatImage, ViewOffset, image_size
 
 NEAR, MIDDLE, FAR, LENS = "near", "middle", "far", "path-traced lens"

@@ -15,7 +15,12 @@ from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation
 
 from iibr_core.runtime.kernels import kernel
-from iibr_core.types import FloatImage, ImageSize, ViewOffset, image_size
+from iibr_core.types import (
+    FloatImage,
+    ImageSize,
+    ViewOffset,
+    image_size,
+)
 
 SAMPLES = 3
 """Every pixel lands as SAMPLES x SAMPLES points, so that stretched surfaces stay closed."""

@@ -12,7 +12,8 @@ from iibr_core.evaluation.consistency import Consistency
 from iibr_core.evaluation.focal_stacks import RefocusResult
 from iibr_core.types import ImageSize
 
-IDENTITY, REFERENCE, TRUTH = "identity", "reference warp", "truth"
+IDENTITY, REFERENCE, OURS, TRUTH = "identity", "reference warp", "iibr", "truth"
+"""Ways of making a view, and the true view."""
 Bytes = NDArray[np.uint8]
 """(H, W, 3), sRGB-encoded."""
 
@@ -53,9 +54,10 @@ class Pictures:
 
 @dataclass(frozen=True, eq=False)
 class EvaluationResult:
-    """One trial with one disparity map. consistency: by quality, and of the truth's EPIs where it has a row of views.
+    """One trial with one disparity map.
 
-    refocus: of grids, from the centre view. hole_share: of the pixels, mean over views. seconds: for everything.
+    consistency: of this program's views, and of the truth's EPIs where it has a row of views. refocus: of grids, from
+    the centre view. hole_share: of the pixels, mean over views. seconds: for everything.
     """
 
     scene: str

@@ -19,7 +19,14 @@ from iibr_core.evaluation.datasets import read_known_disparity, read_straight_vi
 from iibr_core.evaluation.reference_warp import reference_warp
 from iibr_core.formats.light_fields.multi_view_scene import KnownDisparity, MultiView
 from iibr_core.inpainting.disparity_holes import fill_disparity_holes
-from iibr_core.types import Disparity, FloatImage, GridShape, InputError, ViewOffset, image_size
+from iibr_core.types import (
+    Disparity,
+    FloatImage,
+    GridShape,
+    InputError,
+    ViewOffset,
+    image_size,
+)
 
 DisparityFrom = Literal["auto", "gt", "estimate"]
 """Where the given view's disparity comes from; auto: ground truth, else a map in the folder, else estimated."""

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
+from iibr_core.beyond.optics import Optics
 from iibr_core.exports.framing import draw_framed
 from iibr_core.exports.kinds import AnimationKind, ExportOptions
 from iibr_core.exports.loops import point_on_loop
@@ -20,7 +21,6 @@ from iibr_core.exports.source import ExportSource
 from iibr_core.exports.stack import open_diameter
 from iibr_core.formats.animations import require_video_size, write_animation
 from iibr_core.formats.files import read_text
-from iibr_core.rendering.optics import Optics
 from iibr_core.scenes.lens_limits import clamp_optics
 from iibr_core.scenes.scene import Scene
 from iibr_core.types import ImageSize, InputError, ViewOffset

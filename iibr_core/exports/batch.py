@@ -39,10 +39,11 @@ from iibr_core.formats.outputs import check_output_folder
 from iibr_core.formats.quilts import TAG
 from iibr_core.runtime import machine
 from iibr_core.runtime.machine import limit_arenas
+from iibr_core.runtime.work import report_progress
 from iibr_core.scenes.inputs import inputs_of
 from iibr_core.scenes.lens_limits import LensChoice
 from iibr_core.scenes.scene import Scene, Source
-from iibr_core.types import InputError, ReportProgress, ignore_progress
+from iibr_core.types import InputError
 
 NO_CHOICE = LensChoice()
 FAILURES, LOG = "failures.csv", "failures.log"
@@ -152,7 +153,6 @@ def run_batch(
     workers: int | None = None,
     dask: str = "",
     force: bool = False,
-    report_progress: ReportProgress = ignore_progress,
 ) -> BatchCount:
     """Export photos, as `photos_in` returns them, into `folder`; write the list of failures there. Return the numbers.
 

@@ -14,7 +14,12 @@ from iibr_core.exports.source import ExportSource
 from iibr_core.formats.cameras import FieldCameras, infinity_of, spread, write_colmap, write_llff, write_nerfstudio
 from iibr_core.formats.images.write import write_image
 from iibr_core.formats.outputs import write_folder
-from iibr_core.types import ImageSize, InputError, ViewOffset, ViewUpdate
+from iibr_core.types import (
+    ImageSize,
+    InputError,
+    ViewOffset,
+    ViewUpdate,
+)
 
 MAX_POINTS = 20_000
 """Largest number of points for COLMAP, about as many as a reconstruction finds."""

@@ -13,17 +13,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from iibr_core.beyond.optics import CENTRE, Optics
 from iibr_core.color import bytes_from_encoded, primaries_matrix, srgb_from_linear, stored_from_encoded
 from iibr_core.exports.render_settings import LensTile, RenderSettings
 from iibr_core.exports.source import Draw
-from iibr_core.generation.memory import require_memory
-from iibr_core.generation.plan import ScenePlan
-from iibr_core.rendering.optics import CENTRE, Optics
+from iibr_core.method.memory import require_memory
+from iibr_core.method.plan import ScenePlan
 from iibr_core.runtime.tiling import in_bands
-from iibr_core.runtime.work import raise_if_stopped
-from iibr_core.scenes.loaded_photo import LoadedPhoto
+from iibr_core.runtime.work import raise_if_stopped, report_progress
 from iibr_core.scenes.rect import WHOLE, Rect
-from iibr_core.scenes.scene import Scene
+from iibr_core.scenes.scene import LoadedPhoto, Scene
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import (
     ColorSpace,
@@ -31,17 +30,15 @@ from iibr_core.types import (
     GridShape,
     ImageSize,
     InputError,
-    ReportProgress,
     ViewOffset,
     ViewUpdate,
-    ignore_progress,
     image_size,
 )
 
 if TYPE_CHECKING:
     # The renderer is imported by the thread that draws, so that the window opens first.
-    from iibr_core.rendering.large_views import LargePhoto, Part
-    from iibr_core.rendering.renderer import Renderer
+    from iibr_core.beyond.full_size import LargePhoto, Part
+    from iibr_core.method.view import Renderer
 
 MAX_PIXELS = 100_000_000
 """Largest number of pixels of the photo; a larger photo is read at this size."""
@@ -72,7 +69,6 @@ class FullPicture:
     def make(
         self,
         draw: Draw,
-        report_progress: ReportProgress = ignore_progress,
         photo: LargePhoto | None = None,
         keep: Callable[[LargePhoto], None] = lambda photo: None,
     ) -> FloatImage:
@@ -82,7 +78,7 @@ class FullPicture:
         it is read, and again once its hidden surfaces are inpainted. Raises InputError if the file is missing or has
         changed.
         """
-        from iibr_core.rendering.renderer import open_renderer
+        from iibr_core.method.view import Renderer
         from iibr_core.scenes.large_photo import complete_fills, load_large
 
         source = self.scene.source
@@ -93,18 +89,16 @@ class FullPicture:
         if _shows_hidden(self.optics) and photo.fills is None:
             photo = photo.with_fills(complete_fills(source, self.loaded, self.plan))
             keep(photo)
-        with open_renderer() as renderer:
-            return self._draw_tiles(photo, renderer, draw, report_progress)
+        return self._draw_tiles(photo, Renderer(), draw)
 
     def _draw_tiles(
         self,
         photo: LargePhoto,
         renderer: Renderer,
         draw: Draw,
-        report_progress: ReportProgress,
     ) -> FloatImage:
-        from iibr_core.rendering.large_views import Part, tiles_of, whole
-        from iibr_core.rendering.resized_light import mean_of_areas
+        from iibr_core.beyond.full_size import Part, tiles_of, whole
+        from iibr_core.beyond.resized_light import mean_of_areas
 
         height, width = photo.size
         top, left = self.part.y * height, self.part.x * width
@@ -123,7 +117,7 @@ class FullPicture:
 
     def _tile_settings(self, photo: LargePhoto, tile: Part, renderer: Renderer) -> RenderSettings:
         """Return the settings of a tile, with the views around the eye that its lens needs."""
-        from iibr_core.rendering.large_views import views_of_tile, whole
+        from iibr_core.beyond.full_size import views_of_tile, whole
 
         optics, eye = self.optics.with_focus_scaled(photo.size.width / self.scene.width), self.optics.eye
         diameter = min(max(optics.aperture_diameter, 0.0), float(max(self.scene.grid)))
@@ -151,7 +145,7 @@ class FullPicture:
 
 def _rings_of(photo: LargePhoto, tile: Part, optics: Optics, radius: float) -> tuple[int, int]:
     """Return the rings of views around the eye for a lens of this radius (view steps), and their margin in pixels."""
-    from iibr_core.rendering.large_views import whole
+    from iibr_core.beyond.full_size import whole
 
     farthest = photo.greatest_disparity
     steepest = abs(optics.focus_disparity) + sum(map(abs, optics.focus_tilt)) + max(optics.focus_range, 0.0)

@@ -13,10 +13,10 @@ from pathlib import Path
 from pkgutil import resolve_name
 from typing import Any, Literal
 
+from iibr_core.beyond.optics import Optics
 from iibr_core.formats.animations import VIDEOS, even_size
 from iibr_core.formats.light_fields.write import check_light_field
 from iibr_core.formats.outputs import check_output, check_output_folder
-from iibr_core.rendering.optics import Optics
 from iibr_core.scenes.scene import Scene
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import ImageSize, InputError

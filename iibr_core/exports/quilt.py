@@ -11,13 +11,13 @@ from pathlib import Path
 from typing import Any
 from urllib.request import ProxyHandler, Request, build_opener
 
+from iibr_core.beyond.optics import Optics
 from iibr_core.exports.framing import draw_framed, side_pictures
 from iibr_core.exports.kinds import ExportOptions
 from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.exports.source import ExportSource
 from iibr_core.formats.files import reason_of
 from iibr_core.formats.quilts import Quilt, lay_out, quilt_for, tagged
-from iibr_core.rendering.optics import Optics
 from iibr_core.scenes.scene import Scene
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import ImageSize, InputError

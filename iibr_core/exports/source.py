@@ -6,6 +6,7 @@ pictures wherever the graphics card may be used.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Collection, Generator, Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
@@ -14,28 +15,21 @@ from typing import Any, Protocol, TypeVar
 
 from numpy.typing import NDArray
 
+from iibr_core.beyond.optics import CENTRE, Optics
 from iibr_core.exports.kinds import ExportKind, ExportOptions, optics_of, with_defaults
 from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.formats.images.write import AS_USUAL, PictureFormat, write_picture
 from iibr_core.formats.light_fields.light_field_formats import open_light_field
-from iibr_core.generation.outer_views import WantedViews
-from iibr_core.generation.plan import ScenePlan
-from iibr_core.rendering.optics import CENTRE, Optics
-from iibr_core.runtime.work import raise_if_stopped
+from iibr_core.method.plan import ScenePlan
+from iibr_core.runtime.work import raise_if_stopped, report_progress
 from iibr_core.scenes.lens_limits import LensChoice
-from iibr_core.scenes.light_fields import showings_of_light_field
-from iibr_core.scenes.loaded_photo import LoadedPhoto
-from iibr_core.scenes.making import views_of_photo
-from iibr_core.scenes.opening import SceneReady, SceneRequest, results_of
-from iibr_core.scenes.scene import Scene, Source
+from iibr_core.scenes.scene import MAKING, LoadedPhoto, Scene, SceneReady, SceneRequest, Source
 from iibr_core.scenes.scene_gloss import add_gloss
 from iibr_core.types import (
     SRGB,
     ColorSpace,
-    ReportProgress,
     ViewOffset,
     ViewUpdate,
-    ignore_progress,
 )
 
 Item = TypeVar("Item")
@@ -49,15 +43,14 @@ OpticsOf = Callable[[Scene, Optics], Iterable[Optics]]
 class ExportSource:
     """An open scene to be exported.
 
-    loaded: its photo, None for a light field from disk. optics: the optics that the window shows. report_progress: is
-    called in the exporting thread. centre: the centre view as it is shown, None if it is not known.
+    loaded: its photo, None for a light field from disk. optics: the optics that the window shows. centre: the centre
+    view as it is shown, None if it is not known.
     """
 
     scene: Scene
     loaded: LoadedPhoto | None
     optics: Optics
     draw: Draw
-    report_progress: ReportProgress
     centre: ViewUpdate | None = None
 
     @property
@@ -74,9 +67,9 @@ class ExportSource:
         """Yield the items and report progress. Raises Cancelled once the export should stop."""
         for done, item in enumerate(items):
             raise_if_stopped()
-            self.report_progress(done, total, doing)
+            report_progress(done, total, doing)
             yield item
-        self.report_progress(total, total, doing)
+        report_progress(total, total, doing)
 
     def views(
         self,
@@ -95,20 +88,17 @@ class ExportSource:
         if self.loaded is None:
             views = self._views_of_folder(with_disparity)
         else:
-            views = views_of_photo(
-                self.scene.source,
-                self.loaded,
-                self.plan(static_disparity),
-                self.report_progress,
-                in_srgb=in_srgb,
-                wanted=lambda: WantedViews(wanted),
-            )
+            from iibr_core.scenes.photo import views_of_photo
+
+            plan = self.plan(static_disparity)
+            views = views_of_photo(self.scene.source, self.loaded, plan, in_srgb=in_srgb, wanted=lambda: wanted)
         scene = self.scene
         if static_disparity is not None:
             scene = replace(scene, infinity_px=self._infinity_px(static_disparity))
-        for view in add_gloss(views, self.optics.gloss, scene):
+        total = math.prod(scene.grid) if wanted is None else len({*wanted, CENTRE})
+        for done, view in enumerate(add_gloss(views, self.optics.gloss, scene), 1):
             raise_if_stopped()
-            self.report_progress(view.share, 1.0, "making views")
+            report_progress(done, total, MAKING)
             yield view
         raise_if_stopped()
 
@@ -119,18 +109,14 @@ class ExportSource:
     def _views_of_folder(self, with_disparity: bool) -> Iterator[ViewUpdate]:
         """Return the views from disk, with found disparity and views between them if the scene has these."""
         from iibr_core.formats.light_fields.views import read_views
+        from iibr_core.scenes.light_fields import load_light_field
 
         is_as_read = self.scene.grid == self.scene.given_grid and self.scene.depth_source in ("none", "light field")
         if is_as_read and not with_disparity:
             return read_views(open_light_field(Path(self.scene.source.path)))[1]
         centre = self._final_centre
-        showings = showings_of_light_field(
-            self.scene.source,
-            lambda progress: self.report_progress(progress.share, 1.0, progress.doing),
-            takes_drafts=False,
-            known=None if centre is None else centre.disparity,
-        )
-        return next(showings).views
+        known = None if centre is None else centre.disparity
+        return next(load_light_field(self.scene.source, takes_drafts=False, known=known)).views
 
     @property
     def _final_centre(self) -> ViewUpdate | None:
@@ -180,7 +166,6 @@ class OpenDrawn(Protocol):
         depth_strength: float,
         lens: LensChoice,
         on_ready: Callable[[Scene], None],
-        report_progress: ReportProgress = ignore_progress,
         optics_of: OpticsOf | None = None,
     ) -> ExportSource:
         """Open a scene through this lens and make the views that its pictures show; all views without `optics_of`.
@@ -197,20 +182,20 @@ def open_for_export(
     lens: LensChoice,
     on_ready: Callable[[Scene], None],
     open_drawn: OpenDrawn | None,
-    report_progress: ReportProgress = ignore_progress,
 ) -> ExportSource:
     """Open a scene for an export of this kind, by `open_drawn` if the kind is drawn. Raises as `OpenDrawn` does."""
     if kind.is_drawn:
         assert open_drawn is not None
-        return open_drawn(source, depth_strength, lens, on_ready, report_progress, partial(optics_of, kind, options))
+        return open_drawn(source, depth_strength, lens, on_ready, partial(optics_of, kind, options))
+    from iibr_core.scenes.opening import results_of
+
     # A light field from disk is copied without waiting for its disparity.
     request = SceneRequest(0, source, depth_strength, takes_drafts=kind.is_light_field)
-    results = results_of(request, lambda: CENTRE, lambda progress: progress.report_to(report_progress))
-    ready = next(results)
+    ready = next(results_of(request, lambda: CENTRE))
     assert isinstance(ready, SceneReady)
     on_ready(ready.scene)
     optics = Optics(gloss=lens.gloss)
-    return ExportSource(ready.scene, ready.loaded, optics, _draw_nothing, ignore_progress, ready.centre)
+    return ExportSource(ready.scene, ready.loaded, optics, _draw_nothing, ready.centre)
 
 
 def write_export(kind: ExportKind, path: Path, source: ExportSource, options: ExportOptions) -> str | None:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from iibr_core.beyond.optics import CENTRE, Optics
 from iibr_core.exports.framing import draw_framed
 from iibr_core.exports.kinds import STACK_BITS, ExportOptions
 from iibr_core.exports.render_settings import RenderSettings
@@ -14,7 +15,6 @@ from iibr_core.exports.source import ExportSource
 from iibr_core.formats.images.write import PictureFormat
 from iibr_core.formats.maps.pfm import write_pfm
 from iibr_core.formats.outputs import write_folder
-from iibr_core.rendering.optics import CENTRE, Optics
 from iibr_core.scenes.lens_limits import aperture_limit
 from iibr_core.scenes.scene import Scene
 from iibr_core.types import InputError

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from iibr_core.beyond.optics import Optics
 from iibr_core.exports.framing import draw_framed, side_pictures
 from iibr_core.exports.kinds import ExportOptions
 from iibr_core.exports.render_settings import RenderSettings
@@ -18,7 +19,6 @@ from iibr_core.formats.images.spatial_photo import write_spatial_photo
 from iibr_core.formats.images.write import AS_USUAL, BEST_QUALITY, PictureFormat
 from iibr_core.formats.quilts import tagged
 from iibr_core.formats.stereo import anaglyph
-from iibr_core.rendering.optics import Optics
 from iibr_core.scenes.scene import Scene
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import SRGB, ColorSpace

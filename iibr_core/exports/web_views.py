@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from iibr_core.beyond.resized_light import mean_of_areas
 from iibr_core.color import bytes_from_encoded, convert, encoded_from_stored, linear_from_srgb, srgb_from_linear
 from iibr_core.formats.images.color_profile import icc_profile
-from iibr_core.rendering.resized_light import mean_of_areas
 from iibr_core.types import (
     DISPLAY_P3,
     SRGB,

@@ -62,27 +62,6 @@ def continue_farthest(
     _fill_view(colors, disparity, hole, nothing_hides, ViewOffset(0.0, 0.0), farthest_views, 1, stages)
 
 
-def goes_on_in_front(
-    disparity: FloatImage,
-    hole: NDArray[np.bool_],
-    photo_disparity: FloatImage,
-    offset: ViewOffset,
-    threads: int = 1,
-) -> NDArray[np.bool_]:
-    """(H, W): where in a hole (H, W) of a view most of what may continue there from around it is in front of the view's
-    disparity (H, W) there.
-    """
-    pixels, _, known = nearest_known(hole, threads)
-    in_front, one_surface = np.zeros_like(hole), step_of(EDGE_PX, max(map(abs, offset)))
-    in_pieces(
-        lambda part: _weigh_in_front(
-            disparity, pixels[part], known[part], photo_disparity, offset.s, offset.t, one_surface, in_front
-        ),
-        pieces_of(len(pixels), MOST_PIECE_PIXELS), threads,
-    )  # fmt: skip
-    return in_front
-
-
 def _fill_view(
     colors: FloatImage,
     disparity: FloatImage,
@@ -199,27 +178,6 @@ def _place_in_photo(y, x, height, width):
     """
     row, column = nearest_pixel(y), nearest_pixel(x)
     return row * width + column if 0 <= column < width and 0 <= row < height else -1
-
-
-@kernel
-def _weigh_in_front(disparity, pixels, known, photo_disparity, s, t, one_surface, in_front):
-    """Write `goes_on_in_front` for these pixels."""
-    height, width = disparity.shape
-    photo, hidden = photo_disparity.ravel(), one_surface * (SAME_SURFACE_PX / EDGE_PX)
-    for i in range(len(pixels)):
-        y, x = pixels[i] // width, pixels[i] % width
-        balance = 0.0
-        for k in range(known.shape[1]):
-            if known[i, k] < 0:
-                continue
-            # As in `_fill`.
-            known_y, known_x = known[i, k] // width, known[i, k] % width
-            d = disparity[known_y, known_x]
-            place = _place_in_photo(y + d * t, x + d * s, height, width)
-            if place < 0 or is_in_front(photo[place], d, hidden):
-                likely = 1.0 / np.sqrt((known_x - x) ** 2 + (known_y - y) ** 2)
-                balance += likely if is_in_front(d, disparity[y, x], one_surface) else -likely
-        in_front[y, x] = balance > 0.0
 
 
 @kernel

@@ -18,8 +18,14 @@ from numpy.typing import NDArray
 from iibr_core.inpainting.background import fill_background
 from iibr_core.inpainting.inpainter import Inpainter, InpaintingAids
 from iibr_core.runtime.extras import require_extra
-from iibr_core.runtime.work import Cancelled, raise_if_stopped
-from iibr_core.types import FloatImage, ImageSize, InputError, ViewOffset, image_size
+from iibr_core.runtime.work import Cancelled, raise_if_stopped, report_progress
+from iibr_core.types import (
+    FloatImage,
+    ImageSize,
+    InputError,
+    ViewOffset,
+    image_size,
+)
 
 LARGE_PX = 8
 """Gaps are large where a square of so many pixels a side lies in them: a smaller one is a few latents."""
@@ -101,7 +107,7 @@ class DiffusionInpainter:
         return ImageSize(*(max(round(length * shrink / multiple), 1) * multiple for length in size))
 
     def _report_step(self, pipeline: Any, step: int, timestep: Any, tensors: dict[str, Any]) -> dict[str, Any]:
-        self._aids.report_progress(step + 1, STEPS, "painting what no view of the photo shows")
+        report_progress(step + 1, STEPS, "painting what no view of the photo shows")
         return tensors
 
 

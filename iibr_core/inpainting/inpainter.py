@@ -9,7 +9,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.types import FloatImage, ReportProgress, ViewOffset, ignore_progress
+from iibr_core.types import FloatImage, ViewOffset
 
 EstimateDepth = Callable[[FloatImage], FloatImage]
 """Of colours (H, W, 3), sRGB-encoded: inverse depth (H, W), any scale and offset, larger is nearer. Raises InputError
@@ -22,7 +22,6 @@ class InpaintingAids:
     """What inpainters may ask. estimate_depth: what gave the photo's depth, None where that was no model."""
 
     estimate_depth: EstimateDepth | None = None
-    report_progress: ReportProgress = ignore_progress
 
 
 class Inpainter(Protocol):

@@ -16,7 +16,12 @@ from iibr_core.runtime.kernels import kernel
 from iibr_core.runtime.scalars import nearest_pixel
 from iibr_core.runtime.tiling import in_bands
 from iibr_core.stages import ALL_STAGES, Stages
-from iibr_core.types import FloatImage, ImageSize, Margins, image_size
+from iibr_core.types import (
+    FloatImage,
+    ImageSize,
+    Margins,
+    image_size,
+)
 
 BINOMIAL = np.array([1, 4, 6, 4, 1], np.float32) / 16
 """Texture is what differs from a mean with these weights, each way."""

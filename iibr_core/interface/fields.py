@@ -10,12 +10,20 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from iibr_core.beyond.aperture_sampling import aperture_points, grid_weights
+from iibr_core.beyond.lens import LensSum
+from iibr_core.beyond.optics import CENTRE, ApertureShape, Optics
 from iibr_core.color import encoded_from_stored, srgb_from_linear
 from iibr_core.formats.light_fields.write import WRITERS, check_light_field, write_light_field
-from iibr_core.rendering.aperture_sampling import aperture_points, grid_weights
-from iibr_core.rendering.lens import LensSum
-from iibr_core.rendering.optics import CENTRE, ApertureShape, Optics
-from iibr_core.types import FloatImage, GridShape, InputError, StoredColors, ViewOffset, ViewUpdate, image_size
+from iibr_core.types import (
+    FloatImage,
+    GridShape,
+    InputError,
+    StoredColors,
+    ViewOffset,
+    ViewUpdate,
+    image_size,
+)
 
 CAMERAS_PER_PX = 4.0
 """Views that `LightField.refocus` makes for each pixel of its widest blur."""

@@ -14,9 +14,9 @@ from iibr_core.evaluation.metrics import flip, psnr, ssim
 from iibr_core.evaluation.results import EvaluationResult
 from iibr_core.interface.encoded_pictures import encoded
 from iibr_core.runtime.extras import require_extra
-from iibr_core.runtime.work import ShouldStop, never, stoppable
+from iibr_core.runtime.work import ReportProgress, ShouldStop, ignore_progress, never, stoppable, watched
 from iibr_core.stages import ALL_STAGES, Stages
-from iibr_core.types import InputError, ReportProgress, ignore_progress
+from iibr_core.types import InputError
 
 
 @dataclass(frozen=True)
@@ -54,5 +54,5 @@ def evaluate(
     """
     wanted = evaluate_scene.Options(stages=stages, **options)
     scenes = find_scenes(Path(folder))
-    with stoppable(should_stop):
-        return [one for scene in scenes for one in evaluate_scene.evaluate(scene, wanted, report_progress)]
+    with stoppable(should_stop), watched(report_progress):
+        return [one for scene in scenes for one in evaluate_scene.evaluate(scene, wanted)]

@@ -22,25 +22,30 @@ from iibr_core.formats.light_fields.light_field_formats import is_light_field, o
 from iibr_core.formats.light_fields.multi_view_scene import MultiView
 from iibr_core.formats.light_fields.views import grid_of, read_stored_view, read_views
 from iibr_core.formats.maps.disparity_file import map_at_size
-from iibr_core.generation.plan import ScenePlan
-from iibr_core.generation.view_maker import ViewMaker
 from iibr_core.inpainting.registry import DEFAULT_INPAINTER
 from iibr_core.interface.encoded_pictures import photo_of
 from iibr_core.interface.fields import LightField, MakeView, View, gather
-from iibr_core.runtime.work import ShouldStop, never, raise_if_stopped, stoppable
+from iibr_core.method.farthest_views import outer_views_of_grid
+from iibr_core.method.photo_views import PhotoViews
+from iibr_core.method.plan import ScenePlan
+from iibr_core.runtime.work import (
+    ReportProgress,
+    ShouldStop,
+    ignore_progress,
+    never,
+    raise_if_stopped,
+    stoppable,
+    watched,
+)
 from iibr_core.scenes.dense import read_dense
-from iibr_core.scenes.loaded_photo import LoadedPhoto, load_photo, photo_of_arrays
-from iibr_core.scenes.making import make_plan, views_of_photo
-from iibr_core.scenes.scene import Source
+from iibr_core.scenes.photo import load_photo, make_plan, photo_of_arrays, views_of_photo
+from iibr_core.scenes.scene import LoadedPhoto, Source
 from iibr_core.types import (
     Disparity,
     FloatImage,
     GridShape,
     InputError,
-    Quality,
-    ReportProgress,
     ViewOffset,
-    ignore_progress,
 )
 
 Parallax = Literal["viewing", "literal"]
@@ -54,13 +59,12 @@ Grid = int | tuple[int, int] | None
 class ViewOptions(TypedDict, total=False):
     """Options of making views; options that are left out have their usual values.
 
-    parallax: see `Parallax`; "viewing" if left out. depth_strength: times the viewing parallax. quality: "fast"
-    or "balanced"; else the plan chooses. inpaint: what fills holes, as `iibr generate --inpaint` takes it.
+    parallax: see `Parallax`; "viewing" if left out. depth_strength: times the viewing parallax. inpaint: way of filling
+    holes, as `iibr generate --inpaint` takes it.
     """
 
     parallax: Parallax
     depth_strength: float
-    quality: Quality
     inpaint: str
 
 
@@ -91,11 +95,10 @@ class Scene(ABC):
         done. Raises InputError where an option means nothing or memory does not suffice, Cancelled once should_stop is
         true.
         """
-        with stoppable(should_stop):
+        with stoppable(should_stop), watched(report_progress):
             made = self._make(grid, options)
-        return gather(
-            _watched(made, should_stop, report_progress), made.grid, self.focal_px, self.name, made.view_between
-        )
+        views = _told(made, should_stop, report_progress)
+        return gather(views, made.grid, self.focal_px, self.name, made.view_between)
 
     def views(
         self,
@@ -105,9 +108,9 @@ class Scene(ABC):
         **options: Unpack[ViewOptions],
     ) -> Iterator[View]:
         """Yield every view once, the middle one first; none is kept. Arguments of `light_field`."""
-        with stoppable(should_stop):
+        with stoppable(should_stop), watched(report_progress):
             made = self._make(grid, options)
-        return _watched(made, should_stop, report_progress)
+        return _told(made, should_stop, report_progress)
 
     @abstractmethod
     def _make(self, grid: Grid, options: ViewOptions) -> _Making:
@@ -124,15 +127,17 @@ class _Making:
     doing: str
 
 
-def _watched(made: _Making, should_stop: ShouldStop, report_progress: ReportProgress) -> Iterator[View]:
+def _told(made: _Making, should_stop: ShouldStop, report_progress: ReportProgress) -> Iterator[View]:
     """Yield the views and report progress. Raises Cancelled once should_stop is true."""
+    done, total = 0, made.grid.rows * made.grid.columns
     while True:
-        with stoppable(should_stop):
+        with stoppable(should_stop), watched(report_progress):
             view = next(made.views, None)
             raise_if_stopped()
         if view is None:
             return
-        report_progress(view.share, 1.0, made.doing)
+        done += 1
+        report_progress(done, total, made.doing)
         yield view
 
 
@@ -158,15 +163,13 @@ class PhotoScene(Scene):
     def _source_for(self, grid: Grid, options: ViewOptions) -> Source:
         """Raises InputError for options that mean nothing."""
         _require_known(options, ViewOptions.__annotations__)
-        shape, parallax, quality = _grid_shape(grid), options.get("parallax", "viewing"), options.get("quality")
-        if quality not in (None, *get_args(Quality)):
-            raise InputError(f"quality {quality!r}: give {' or '.join(map(repr, get_args(Quality)))}")
+        shape, parallax = _grid_shape(grid), options.get("parallax", "viewing")
         if parallax not in get_args(Parallax):
             raise InputError(f"parallax {parallax!r}: give 'viewing' or 'literal'")
         if parallax == "literal" and (shape is None or options.get("depth_strength", 1) != 1):
             raise InputError("parallax 'literal' takes disparity as it is: give a grid, and no depth_strength")
         inpaint, is_literal = _inpainting(options), parallax == "literal"
-        return replace(self._source, grid=shape, quality=quality, inpaint=inpaint, is_literal=is_literal)
+        return replace(self._source, grid=shape, inpaint=inpaint, is_literal=is_literal)
 
     def _make(self, grid: Grid, options: ViewOptions) -> _Making:
         plan = self.plan(grid, **options)
@@ -211,8 +214,8 @@ def open(
     if is_light_field(path):
         return FieldScene(open_light_field(path))
     source = Source(str(path), _choice_of(depth, refine), max_pixels=max_pixels)
-    with stoppable(should_stop):
-        return PhotoScene(load_photo(source, report_progress), source)
+    with stoppable(should_stop), watched(report_progress):
+        return PhotoScene(load_photo(source), source)
 
 
 def from_arrays(
@@ -253,8 +256,8 @@ def estimate_depth(
             return estimate_from_cues(given).values
     local = model_to_use(DepthChoice("model", model=None if model is None else str(model)))
     assert local is not None, "what was asked for is there, or was refused"
-    with stoppable(should_stop):
-        estimate = estimate_with(local, given, report_progress)
+    with stoppable(should_stop), watched(report_progress):
+        estimate = estimate_with(local, given)
     values = values_of(estimate)
     return map_at_size(np.reciprocal(values) if isinstance(estimate, MetricDepth) else values, given.size)
 
@@ -266,13 +269,11 @@ class _ViewsBetween:
         self._photo, self._disparity, self._plan = photo, disparity, plan
 
     def __call__(self, offset: ViewOffset) -> FloatImage:
-        return self._maker.view(self._plan.quality, offset).colors
+        return self._views.view(offset).colors
 
     @cached_property
-    def _maker(self) -> ViewMaker:
-        grid = self._plan.grid
-        corners = [grid.offset(0, 0), grid.offset(grid.rows - 1, grid.columns - 1)]
-        return ViewMaker(self._photo, self._disparity, corners, (self._plan.quality,)).__enter__()
+    def _views(self) -> PhotoViews:
+        return PhotoViews(self._photo, self._disparity, outer_views_of_grid(self._plan.grid))
 
 
 def _grid_shape(grid: Grid) -> GridShape | None:

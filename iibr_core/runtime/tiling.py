@@ -1,12 +1,14 @@
-"""Run a function on bands of rows, one after the other or in threads; between two bands it can be cancelled.
+"""Run a function on bands of rows, or on items, one after the other or in threads; the job can be cancelled between.
 
 Results do not depend on the number of bands.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from itertools import islice
 from typing import TypeVar
 
 from iibr_core.runtime.machine import core_count
@@ -22,7 +24,7 @@ Result = TypeVar("Result")
 
 
 def pieces_of(count: int, most: int) -> list[slice]:
-    """Slices that part so many things into pieces of `most`, the last of which may be shorter."""
+    """Return slices that part so many things into pieces of `most`, the last of which may be shorter."""
     return [slice(first, first + most) for first in range(0, count, most)]
 
 
@@ -60,3 +62,23 @@ def in_bands(
     rows = max(min((most_pixels or MOST_BAND_PIXELS) // max(width, 1), -(-height // threads)), 1)
     firsts = range(0, height, rows)
     return in_pieces(lambda first: work(first, min(first + rows, height)), firsts, threads)
+
+
+def side_by_side(work: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Result]:
+    """Yield the results of work on all items, in their order; each item is taken once a thread is free for it.
+
+    Closing the generator stops what is running. Raises Cancelled once the job is stopped.
+    """
+    is_closed = False
+    run, items, running = in_this_job(work, or_when=lambda: is_closed), iter(items), deque[Future[Result]]()
+    pool = ThreadPoolExecutor(THREADS, thread_name_prefix="iibr-views")
+    try:
+        while True:
+            running.extend(pool.submit(run, item) for item in islice(items, THREADS - len(running)))
+            if not running:
+                return
+            raise_if_stopped()
+            yield running.popleft().result()
+    finally:
+        is_closed = True
+        pool.shutdown(cancel_futures=True)

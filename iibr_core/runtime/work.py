@@ -1,4 +1,4 @@
-"""Cancellation of a job: set where the job begins, asked wherever it works, handed on to its threads."""
+"""Cancellation and progress of a job: set where the job begins, used wherever it works, handed on to its threads."""
 
 from __future__ import annotations
 
@@ -8,6 +8,8 @@ from contextvars import ContextVar
 from typing import ParamSpec, TypeVar
 
 ShouldStop = Callable[[], bool]
+ReportProgress = Callable[[float, float, str], None]
+"""Function of (done, total, doing): amounts of work, the total 0 where it is unknown; and what is done, in words."""
 Parameters = ParamSpec("Parameters")
 Result = TypeVar("Result")
 
@@ -21,7 +23,12 @@ def never() -> bool:
     return False
 
 
+def ignore_progress(done: float, total: float, doing: str) -> None:
+    """Do nothing: nobody watches the job."""
+
+
 _should_stop: ContextVar[ShouldStop] = ContextVar("should_stop", default=never)
+_report: ContextVar[ReportProgress] = ContextVar("report_progress", default=ignore_progress)
 
 
 @contextmanager
@@ -32,6 +39,24 @@ def stoppable(should_stop: ShouldStop) -> Iterator[None]:
         yield
     finally:
         _should_stop.reset(token)
+
+
+@contextmanager
+def watched(report: ReportProgress) -> Iterator[None]:
+    """Run the block as a job whose progress goes to `report`, in whatever thread works."""
+    token = _report.set(report)
+    try:
+        yield
+    finally:
+        _report.reset(token)
+
+
+@contextmanager
+def part_of_job(before: float, work: float, total: float) -> Iterator[None]:
+    """Count the progress of the block as `work` of the job's `total`, after `before`."""
+    report = _report.get()
+    with watched(lambda done, of_part, doing: report(before + work * done / of_part, total, doing)):
+        yield
 
 
 def is_stopped() -> bool:
@@ -45,15 +70,20 @@ def raise_if_stopped() -> None:
         raise Cancelled
 
 
+def report_progress(done: float, total: float, doing: str) -> None:
+    """Tell whoever watches the present job how far it is, see `ReportProgress`."""
+    _report.get()(done, total, doing)
+
+
 def in_this_job(function: Callable[Parameters, Result], or_when: ShouldStop = never) -> Callable[Parameters, Result]:
     """Return a function that does the same in another thread, as part of the present job.
 
     or_when: stops it, too.
     """
-    should_stop = _should_stop.get()
+    should_stop, report = _should_stop.get(), _report.get()
 
     def run(*arguments: Parameters.args, **named: Parameters.kwargs) -> Result:
-        with stoppable(lambda: or_when() or should_stop()):
+        with stoppable(lambda: or_when() or should_stop()), watched(report):
             return function(*arguments, **named)
 
     return run

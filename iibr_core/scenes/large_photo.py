@@ -7,21 +7,28 @@ from pathlib import Path
 
 import numpy as np
 
+from iibr_core.beyond.full_size import LargePhoto
 from iibr_core.depth.edges.refine import refine
 from iibr_core.depth.editing.canvas import apply_edits
 from iibr_core.depth.editing.edits import UNEDITED
 from iibr_core.depth.search import disparity_of_file, read_shown_photo
 from iibr_core.formats.maps.reader import read_map_header
 from iibr_core.formats.maps.resample import resample_surfaces
-from iibr_core.generation.light_field import ray_set
-from iibr_core.generation.plan import ScenePlan
 from iibr_core.inpainting.registry import load_inpainter
-from iibr_core.rendering.large_views import LargePhoto
-from iibr_core.rendering.ray_set import RaySet
+from iibr_core.method.light_field import complete_rays
+from iibr_core.method.plan import ScenePlan
+from iibr_core.method.ray_transformer import shipped_transformer
+from iibr_core.method.rays import RaySet
+from iibr_core.method.view import Renderer
 from iibr_core.runtime.work import raise_if_stopped
-from iibr_core.scenes.loaded_photo import LoadedPhoto, stamp_of
-from iibr_core.scenes.scene import Source
-from iibr_core.types import Disparity, FloatImage, InputError, Photo
+from iibr_core.scenes.photo import stamp_of
+from iibr_core.scenes.scene import LoadedPhoto, Source
+from iibr_core.types import (
+    Disparity,
+    FloatImage,
+    InputError,
+    Photo,
+)
 
 
 def load_large(source: Source, loaded: LoadedPhoto, plan: ScenePlan, max_pixels: int) -> LargePhoto:
@@ -49,11 +56,8 @@ def complete_fills(source: Source, loaded: LoadedPhoto, plan: ScenePlan) -> RayS
     """
     if not plan.has_disocclusion:
         return None
-    disparity = plan.field_disparity(loaded.disparity)
-    rays, outer = ray_set(loaded.photo, disparity, plan, load_inpainter(source.inpaint))
-    for _ in outer:
-        pass
-    return rays
+    renderer = Renderer(shipped_transformer(), load_inpainter(source.inpaint))
+    return complete_rays(loaded.photo, plan.field_disparity(loaded.disparity), plan, renderer)
 
 
 def _disparity(source: Source, loaded: LoadedPhoto, photo: Photo) -> FloatImage:

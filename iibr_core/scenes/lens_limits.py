@@ -6,8 +6,13 @@ import math
 from dataclasses import dataclass, fields, replace
 from typing import Any, TypeVar
 
+from iibr_core.beyond.optics import (
+    CENTRE,
+    LIMITS,
+    ApertureShape,
+    Optics,
+)
 from iibr_core.rendering.gloss.gloss_settings import Gloss, require_sound
-from iibr_core.rendering.optics import CENTRE, LIMITS, ApertureShape, Optics
 from iibr_core.scenes.scene import Scene
 from iibr_core.types import GridShape, InputError, ViewOffset
 

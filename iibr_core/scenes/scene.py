@@ -3,26 +3,42 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
 
 from iibr_core.depth.choice import DepthChoice, DepthOrigin, DepthStart
 from iibr_core.depth.editing.edits import UNEDITED, DepthEdits, Levels
-from iibr_core.generation.plan import ScenePlan
 from iibr_core.inpainting.registry import DEFAULT_INPAINTER
+from iibr_core.method.plan import ScenePlan
 from iibr_core.scenes.screen_size import ScreenSize
-from iibr_core.types import SRGB, ColorSpace, GridShape, Quality, ReportProgress, ViewUpdate
+from iibr_core.types import (
+    SRGB,
+    ColorSpace,
+    Disparity,
+    FloatImage,
+    GridShape,
+    ImageSize,
+    Photo,
+    ViewUpdate,
+)
+
+if TYPE_CHECKING:
+    from iibr_core.depth.editing.canvas import DepthCanvas
 
 AS_USUAL = DepthChoice()
+MAKING = "making views"
+"""The work on views, in words."""
 
 
 @dataclass(frozen=True)
 class Source:
     """Path to open, and the user's decisions about it; None leaves a choice to the program.
 
-    path: a photo or a light-field folder. focus_disparity: in the units of the given disparity. quality: where the ray
-    transformer runs. inpaint: what fills the places that the photo never saw, see `load_inpainter`. is_literal:
-    disparity counts as it is given, in px per step of the grid, instead of the plan's parallax. grid: of a photo's
-    views. filled_grid: of a light field with views made between those on disk.
+    path: a photo or a light-field folder. focus_disparity: plane that stays still, in the units of the given disparity.
+    inpaint: way of filling what the photo never saw, see `load_inpainter`. is_literal: disparity counts as it is given,
+    in px per step of the grid, instead of the plan's parallax. grid: views of a photo. filled_grid: grid of a light
+    field with views made between those on disk.
     """
 
     path: str
@@ -30,7 +46,6 @@ class Source:
     grid: GridShape | None = None
     focus_disparity: float | None = None
     max_pixels: int | None = None
-    quality: Quality | None = None
     inpaint: str = DEFAULT_INPAINTER
     is_literal: bool = False
     filled_grid: GridShape | None = None
@@ -127,28 +142,24 @@ class Scene:
 
 @dataclass(frozen=True)
 class Progress:
-    """Progress of the worker: views done of total, in seconds; doing: the work in words, if it is not making views.
+    """Progress of opening a scene.
 
-    drafts: of those done, so many will come again, with sharper edges. share: of all the work, what is done, 0..1.
-    left_s: seconds that it still takes, about; None where that is not known.
+    done: number of views that are there as they will stay, of `total`. seconds: time that making them has taken. doing:
+    the present work in words, "" while views are made. share: share of the present work that is done, 0..1. left_s:
+    prediction of the seconds that it still takes, None if there is none.
     """
 
     done: int = 0
     total: int = 0
     seconds: float = 0.0
     doing: str = ""
-    drafts: int = 0
     share: float = 0.0
     left_s: float | None = None
 
     @property
     def is_complete(self) -> bool:
         """Whether every view is there as it will stay."""
-        return 0 < self.total == self.done and not self.drafts
-
-    def report_to(self, report_progress: ReportProgress) -> None:
-        """Share of all work that is done, as far as that is known."""
-        report_progress(self.share, float(self.total > 0), self.doing)
+        return 0 < self.total == self.done
 
 
 @dataclass(frozen=True)
@@ -178,3 +189,83 @@ def is_same_field(one: Source, other: Source) -> bool:
     """Whether the views of both are the same, but for those between: a map of its own gives them another disparity."""
     same_map = one.depth.file == other.depth.file
     return one.path == other.path and same_map and one.inpaint == other.inpaint
+
+
+@dataclass(frozen=True, eq=False)
+class LoadedPhoto:
+    """A photo as read and its disparity, kept so that another plan does not read them again.
+
+    disparity: result of `depth_settings`: `found` is refined to `refined`, which is edited. origin: source of `found`.
+    settings: text of the settings that this program saved in the photo, "" without. model: name or path of the depth
+    model that estimated its depth, None without. levels: distribution of `refined`. canvas: the worker's edits; only
+    the worker uses it. own_size: size of the photo in its file, upright. stamp: see `stamp_of`.
+    """
+
+    photo: Photo
+    disparity: Disparity
+    origin: DepthOrigin
+    settings: str
+    model: str | None
+    depth_settings: DepthSettings
+    found: Disparity
+    refined: Disparity
+    levels: Levels
+    canvas: DepthCanvas
+    own_size: ImageSize
+    stamp: tuple[int, ...]
+
+    def without_history(self) -> LoadedPhoto:
+        """Return the same photo with a new canvas: a canvas that was painted on keeps maps for undo."""
+        return replace(self, canvas=self.canvas.renewed())
+
+
+class WantedPhoto(NamedTuple):
+    """A photo whose views are planned with this depth strength."""
+
+    source: Source
+    depth_strength: float
+
+
+@dataclass(frozen=True, eq=False)
+class SceneRequest:
+    """A scene to be opened, with all inputs.
+
+    loaded: the photo, if it was read before. depth_settings: refinement and edits of depth, None for those of the
+    source. takes_drafts: a light field without disparity comes as read, too, before its disparity is known. plan: the
+    plan of what is loaded, if it was made before. filled: the same light field, if all its views were made before.
+    asks_model: whether depth is asked of a model where there is one; otherwise it is guessed.
+    """
+
+    generation: int
+    source: Source
+    depth_strength: float = 1.0
+    loaded: LoadedPhoto | None = None
+    depth_settings: DepthSettings | None = None
+    takes_drafts: bool = True
+    plan: ScenePlan | None = None
+    filled: FilledField | None = None
+    asks_model: bool = True
+
+
+@dataclass(frozen=True, eq=False)
+class SceneReady:
+    """A scene that was read and planned. centre: its centre view, which is there before any other."""
+
+    generation: int
+    scene: Scene
+    loaded: LoadedPhoto | None
+    centre: ViewUpdate
+
+
+@dataclass(frozen=True, eq=False)
+class ViewReady:
+    """One more view of a scene, and the progress of opening it."""
+
+    generation: int
+    view: ViewUpdate
+    progress: Progress
+
+
+def still_disparity(source: Source, before_strokes: FloatImage) -> float:
+    """Return the disparity (as given) of the plane that does not move, whatever is painted."""
+    return float(np.median(before_strokes)) if source.focus_disparity is None else source.focus_disparity

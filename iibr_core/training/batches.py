@@ -6,7 +6,7 @@ Step n of a seed always gives the same batch. Ambiguous rays of a few views come
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -16,14 +16,20 @@ from torch import Tensor
 
 from iibr_core.color import linear_from_srgb
 from iibr_core.depth.edges.refine import refine
-from iibr_core.generation.update_loop import complete_ray_set
-from iibr_core.rendering.ambiguous_rays import HYPOTHESES, SEARCH_PX
-from iibr_core.rendering.candidates import find_candidates
-from iibr_core.rendering.hypotheses import SHARE, AmbiguousRays, find_ambiguous_rays, hypothesis_colors
-from iibr_core.rendering.photo_rays import rays_of_photo
-from iibr_core.rendering.ray_set import RaySet
-from iibr_core.rendering.resampling import heaviest_candidate
-from iibr_core.rendering.visibility_weights import visibility_weights
+from iibr_core.method.ambiguous_rays import (
+    HYPOTHESES,
+    SEARCH_PX,
+    SHARE,
+    AmbiguousRays,
+    find_ambiguous_rays,
+    hypothesis_colors,
+)
+from iibr_core.method.candidates import find_candidates
+from iibr_core.method.closed_form import closed_form
+from iibr_core.method.look_up import heaviest_candidates
+from iibr_core.method.rays import RaySet, rays_of_photo
+from iibr_core.method.update_loop import update
+from iibr_core.method.view import Renderer
 from iibr_core.training.degradation import degrade
 from iibr_core.training.losses import EpiShape, color_loss, to_perceptual
 from iibr_core.training.scenes.random_scene import RaycastScene, cast, random_scene, render
@@ -104,7 +110,8 @@ def _ray_set(colors: FloatImage, disparity: FloatImage, radius: int, inpainted: 
     corners = [ViewOffset(float(t), float(s)) for t, s in ((-radius, -radius), (radius, radius))]
     rays = rays_of_photo(colors, disparity, radius, len(corners))
     if inpainted:
-        complete_ray_set(rays, corners)
+        for _ in update(rays, corners, Renderer()):
+            pass
     return rays
 
 
@@ -120,22 +127,19 @@ def _sample_ambiguous(
     scene: RaycastScene, rays: RaySet, offset: ViewOffset, rng: np.random.Generator, choice: RayChoice
 ) -> LabelledRays:
     """Ambiguous rays of a view, also those whose true surface the photo does not show: background is right there."""
-    ambiguous = ambiguous_rays_of_view(rays, offset, (0, SIZE[0]), False, choice.hypotheses)
+    ambiguous = ambiguous_rays_of_view(rays, offset, (0, SIZE[0]), False)
     ambiguous = _subset(ambiguous, rng.permutation(len(ambiguous.pixel))[:RAYS_A_VIEW])
     return _label(scene, rays, ambiguous, choice)
 
 
-def ambiguous_rays_of_view(
-    rays: RaySet, offset: ViewOffset, rows: tuple[int, int], every: bool, hypotheses: int = HYPOTHESES
-) -> AmbiguousRays:
-    """Those of rows [first, last) of the view at an offset, as `ViewSynthesis` finds them."""
+def ambiguous_rays_of_view(rays: RaySet, offset: ViewOffset, rows: tuple[int, int], every: bool) -> AmbiguousRays:
+    """Return the ambiguous rays of rows [first, last) of the view at an offset. every: see `find_ambiguous_rays`."""
     above = min(rows[0], SEARCH_PX)
     candidates = find_candidates(rays, offset, (rows[0] - above, min(rows[1] + SEARCH_PX, rays.size.height)))
-    weights = visibility_weights(candidates)
+    weights, _ = closed_form(candidates)
     inner = above, above + rows[1] - rows[0]
-    return find_ambiguous_rays(
-        rays, candidates, weights, heaviest_candidate(rays, candidates, weights), inner, every, hypotheses
-    )
+    shown = heaviest_candidates(rays, candidates, weights)
+    return find_ambiguous_rays(rays, candidates, weights, shown, inner, every=every)
 
 
 def _label(scene: RaycastScene, rays: RaySet, ambiguous: AmbiguousRays, choice: RayChoice) -> LabelledRays:
@@ -154,7 +158,7 @@ def _epi(
     columns = np.arange(first, first + EPI_WIDTH)
     parts = []
     for s in np.linspace(-radius, radius, EPI_VIEWS):
-        ambiguous = ambiguous_rays_of_view(rays, ViewOffset(0.0, float(s)), (row, row + 1), True, choice.hypotheses)
+        ambiguous = ambiguous_rays_of_view(rays, ViewOffset(0.0, float(s)), (row, row + 1), True)
         chosen = np.flatnonzero(np.isin(ambiguous.pixel[:, 1], columns))
         if len(chosen) < EPI_WIDTH:
             return None
@@ -163,8 +167,7 @@ def _epi(
 
 
 def _subset(ambiguous: AmbiguousRays, chosen: NDArray[np.intp]) -> AmbiguousRays:
-    names = ("pixel", "mask", "disparity", "source", "features")
-    return replace(ambiguous, **{name: getattr(ambiguous, name)[chosen] for name in names})
+    return ambiguous.chosen(chosen)
 
 
 def _batch(parts: list[LabelledRays], epi_shape: EpiShape | None) -> Batch:

@@ -21,9 +21,10 @@ import torch
 from torch import Tensor, nn
 
 from iibr_core.formats.weights import read_tensors, require_shapes, save_weights, write_tensors
+from iibr_core.runtime.work import report_progress
 from iibr_core.training.losses import EpiShape, LossWeights, to_perceptual, total_loss
 from iibr_core.training.run_files import LogRow, checkpoint_path, log_path, require_run_files, training_log
-from iibr_core.types import InputError, ReportProgress, ignore_progress
+from iibr_core.types import InputError
 
 CHECKPOINT = "iibr-checkpoint"
 ADAM_STATE = ("step", "exp_avg", "exp_avg_sq")
@@ -95,12 +96,11 @@ def train(
     resume: bool = False,
     may_replace: bool = True,
     metadata: Mapping[str, str] | None = None,
-    report_progress: ReportProgress = ignore_progress,
 ) -> None:
     """Train the model in place and write its weights to `out` (.safetensors) with metadata and the configuration.
 
     model(features, mask) gives weights (N, K): >= 0, 0 where there is no candidate, rows with sum 1. batches(step)
-    must depend on nothing but the step, which counts from 1. report_progress hears of each step, with its total loss.
+    must depend on nothing but the step, which counts from 1.
     Beside `out` lie a log (`log_path`) and the newest checkpoint (`checkpoint_path`); resume goes on from there.
     may_replace: whether files that are there already are replaced, else AlreadyThereError is raised.
     The same start gives the same weights, to the bit on one CPU, interrupted or not. Seeds torch's global generator.

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from iibr_core.generation.cost_model import CORES, NANOSECONDS, Workload
 from PIL import Image
 
 from benchmarks.harness.bench_scenes import (
@@ -43,9 +44,14 @@ from benchmarks.speed.speed_report import table as report_table
 from benchmarks.speed.variants import REFERENCE, VARIANTS, Variant, evaluated_views, field_cost
 from iibr_core.evaluation.datasets import read_scene
 from iibr_core.evaluation.metrics import psnr
-from iibr_core.generation.cost_model import CORES, NANOSECONDS, Workload
-from iibr_core.generation.plan import ScenePlan, plan_literal
-from iibr_core.types import GridShape, ImageSize, Quality, ViewOffset, image_size
+from iibr_core.method.plan import ScenePlan, plan_literal
+from iibr_core.types import (
+    GridShape,
+    ImageSize,
+    Quality,
+    ViewOffset,
+    image_size,
+)
 from tests.iibr_core.known_scenes import HEIGHT, WIDTH, view_of_square, write_grid
 
 SMALL = (

@@ -23,9 +23,8 @@ from benchmarks.trained_variants import (
     without_disparity,
 )
 from iibr_core.formats.weights import read_weights
-from iibr_core.rendering.ambiguous_rays import PLAIN_SOURCE
-from iibr_core.rendering.hypotheses import FEATURES, SHARE
-from iibr_core.rendering.photo_rays import rays_of_photo
+from iibr_core.method.ambiguous_rays import FEATURES, PLAIN_SOURCE, SHARE
+from iibr_core.method.rays import rays_of_photo
 from iibr_core.training.batches import ambiguous_rays_of_view, training_batch
 from iibr_core.training.degradation import blur
 from iibr_core.training.scenes.random_scene import random_scene, render

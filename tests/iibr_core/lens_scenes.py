@@ -11,7 +11,12 @@ from iibr_core.evaluation.datasets import read_scene
 from iibr_core.evaluation.lens_picture import LensPicture, read_lens_picture
 from iibr_core.formats.images.photo import read_photo
 from iibr_core.formats.light_fields.multi_view_scene import MultiView
-from iibr_core.types import Disparity, FloatImage, GridShape, Photo
+from iibr_core.types import (
+    Disparity,
+    FloatImage,
+    GridShape,
+    Photo,
+)
 
 FOLDER = Path(__file__).parents[1] / "data" / "thin_lens"
 NAMES = ("shelf", "fence")

@@ -18,17 +18,22 @@ from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.search import disparity_of_file
 from iibr_core.formats.images.photo import read_photo
 from iibr_core.formats.maps.disparity_file import read_disparity
-from iibr_core.generation.light_field import generate
-from iibr_core.generation.plan import plan_for_viewing, plan_literal
 from iibr_core.inpainting.background import fill_background
 from iibr_core.inpainting.patch_synthesis import MOST_FINE
-from iibr_core.ray_transformer.inference import SHAPES, TrainedWeights
-from iibr_core.rendering.candidates import find_candidates
-from iibr_core.rendering.hypotheses import FEATURES, SHARE, AmbiguousRays
-from iibr_core.rendering.photo_rays import rays_of_photo
-from iibr_core.rendering.view_synthesis import ViewSynthesis
-from iibr_core.rendering.visibility_weights import visibility_weights
-from iibr_core.types import Disparity, GridShape, InputError, ViewOffset
+from iibr_core.method.ambiguous_rays import FEATURES, SHARE, AmbiguousRays
+from iibr_core.method.candidates import find_candidates
+from iibr_core.method.closed_form import closed_form
+from iibr_core.method.light_field import generate
+from iibr_core.method.plan import plan_for_viewing, plan_literal
+from iibr_core.method.ray_transformer import SHAPES, TrainedWeights
+from iibr_core.method.rays import rays_of_photo
+from iibr_core.method.view import Renderer
+from iibr_core.types import (
+    Disparity,
+    GridShape,
+    InputError,
+    ViewOffset,
+)
 from tests.iibr_core.scenes import by_index, disparity_of, photo_of, smooth_texture, square_before_wall
 
 HEIGHT, WIDTH = 20, 26
@@ -223,10 +228,10 @@ def test_k_larger_than_the_number_of_rays(size):
     offset = ViewOffset(0.5, -1.0)
     found = find_candidates(rays, offset, (0, size[0]), most=40)
     assert found.number.max() <= size[0] * size[1]
-    assert (visibility_weights(found)[found.number.max() :] == 0).all()
+    assert (closed_form(found)[found.number.max() :] == 0).all()
     shown = []
     for slots in (5, 40):
-        with ViewSynthesis(slots=slots, keeps_entropy=True) as synthesis:
+        with Renderer(slots=slots, keeps_entropy=True) as synthesis:
             shown.append(synthesis.render(rays, offset))
     assert (shown[0].colors == shown[1].colors).all()
     assert np.isfinite(shown[1].entropy).all()
@@ -263,7 +268,7 @@ def test_softmax_of_huge_logits(factor):
 def test_entropy_of_one_hot_and_uniform_weights():
     """A pixel that one surface covers has entropy 0; one that nothing covers could show anything: 1."""
     photo = plain_photo()
-    with ViewSynthesis(keeps_entropy=True) as synthesis:
+    with Renderer(keeps_entropy=True) as synthesis:
         view = synthesis.render(rays_of_photo(photo.pixels, even(3.0).values, 1.0, 0), ViewOffset(0.0, 1.0))
     assert view.entropy[:, : WIDTH - 3] == pytest.approx(0, abs=1e-5)
     assert view.entropy[:, WIDTH - 3 :] == pytest.approx(1, abs=1e-5)
@@ -287,7 +292,7 @@ def test_view_offset_far_outside_the_grid(far):
     rays = rays_of_photo(photo.pixels, disparity.values, 1.0, 0)
     square = disparity.values > 0
     for offset in (ViewOffset(far, -far), ViewOffset(0.0, far)):
-        with ViewSynthesis() as synthesis:
+        with Renderer() as synthesis:
             view = synthesis.render(rays, offset)
         assert np.isfinite(view.colors).all()
         assert np.isfinite(view.disparity).all()

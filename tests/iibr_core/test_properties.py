@@ -7,14 +7,15 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as stn
 
 from iibr_core.color import linear_from_srgb, srgb_from_linear
-from iibr_core.generation.light_field import transformer_for
-from iibr_core.rendering.candidates import find_candidates
-from iibr_core.rendering.hypotheses import find_ambiguous_rays
-from iibr_core.rendering.mixed_pixels import move_with_foreground, split_mixed_pixels
-from iibr_core.rendering.photo_rays import LEAST_STEP_PX, rays_of_photo
-from iibr_core.rendering.resampling import KEYS_A, resample_colors
-from iibr_core.rendering.view_synthesis import ViewSynthesis
-from iibr_core.rendering.visibility_weights import entropy, visibility_weights
+from iibr_core.method.ambiguous_rays import find_ambiguous_rays
+from iibr_core.method.candidates import find_candidates
+from iibr_core.method.closed_form import closed_form
+from iibr_core.method.look_up import KEYS_A, look_up
+from iibr_core.method.mixed_pixels import move_with_foreground, split_mixed_pixels
+from iibr_core.method.occlusion import entropy
+from iibr_core.method.ray_transformer import shipped_transformer
+from iibr_core.method.rays import LEAST_STEP_PX, rays_of_photo
+from iibr_core.method.view import Renderer
 from iibr_core.surfaces import EDGE_PX
 from iibr_core.types import ViewOffset
 from tests.iibr_core.filled_rays import filled_rays
@@ -36,7 +37,7 @@ def scene(seed, height=HEIGHT, width=WIDTH):
 
 
 def rendered(pixels, disparity, offset, farthest=2.0, transformer=None):
-    with ViewSynthesis(transformer=transformer, every=transformer is not None) as synthesis:
+    with Renderer(transformer=transformer, every=transformer is not None) as synthesis:
         return synthesis.render(rays_of_photo(np.ascontiguousarray(pixels), disparity, farthest, 0), offset)
 
 
@@ -89,7 +90,7 @@ def test_a_view_offset_of_zero_gives_the_photo_back(seed):
 def test_at_a_view_offset_of_zero_the_transformer_errs_at_split_pixels_only(seed):
     """No field is made of such a view, for the photo itself stands there; half a share of a pixel is what it costs."""
     pixels, disparity = scene(seed)
-    view = rendered(pixels, disparity, ViewOffset(0.0, 0.0), transformer=transformer_for("balanced"))
+    view = rendered(pixels, disparity, ViewOffset(0.0, 0.0), transformer=shipped_transformer("balanced"))
     coverage = split_mixed_pixels(pixels, disparity, EDGE_PX / 2.0)[3]
     error = np.abs(view.colors - pixels).max(axis=2)
     assert error[coverage == 0].max() <= 1e-4
@@ -132,14 +133,14 @@ def test_weights_sum_to_one(seed, offset):
     pixels, disparity = scene(seed)
     rays = rays_of_photo(pixels, disparity, 2.0, 0)
     found = find_candidates(rays, offset, (0, HEIGHT))
-    weights = visibility_weights(found)
+    weights = closed_form(found)
     used = np.arange(5)[:, None, None] < found.number
     covered = np.minimum(np.where(used, found.coverage, 0).sum(axis=0, dtype=np.float64), 1)
     assert np.abs(weights.sum(axis=0) - covered).max() <= 1e-5
     assert weights.min() >= 0
-    shown = resample_colors(rays, found, weights)
+    shown = look_up(rays, found, weights)
     ambiguous = find_ambiguous_rays(rays, found, weights, shown, (0, HEIGHT), every=True)
-    decided = transformer_for("balanced")(ambiguous)
+    decided = shipped_transformer("balanced")(ambiguous)
     assert np.abs(decided.sum(axis=1) - 1).max(initial=0) <= 1e-5
     assert decided.min(initial=0) >= 0
 
@@ -210,7 +211,7 @@ def test_error_falls_with_the_noise_of_the_disparity(quality):
     """Before a depth edge too, where the photo shows. What is inpainted is chosen among patches: it stays near, and
     without noise nothing differs.
     """
-    transformer = transformer_for(quality)
+    transformer = shipped_transformer(quality)
     pixels, truth = smooth_texture(32, 40), np.where(np.arange(40) < 20, 2.0, 0.0) * np.ones((32, 1), np.float32)
     noise = np.random.default_rng(0).normal(0, 1, truth.shape)
     offset = ViewOffset(0.5, 1.0)

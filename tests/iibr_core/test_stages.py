@@ -8,14 +8,19 @@ from functools import cache
 import cv2
 import numpy as np
 import pytest
+from iibr_core.generation.view_maker import ViewMaker
 
 from iibr_core.depth.edges.refine import refine
 from iibr_core.evaluation.evaluate_scene import Options
-from iibr_core.generation.view_maker import ViewMaker
 from iibr_core.stages import ALL_STAGES, STAGE_NAMES, Stages, stages_without
 from iibr_core.training.degradation import blur
 from iibr_core.training.scenes.random_scene import random_scene, render
-from iibr_core.types import FloatImage, ImageSize, InputError, ViewOffset
+from iibr_core.types import (
+    FloatImage,
+    ImageSize,
+    InputError,
+    ViewOffset,
+)
 from tests.iibr_core.scenes import smooth_texture
 
 SIZE = ImageSize(96, 128)

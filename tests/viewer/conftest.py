@@ -67,7 +67,7 @@ def headless_with_scene(folder: Path, *open_sections: Section) -> Iterator[Headl
     except InputError as error:
         pytest.skip(str(error))
     with viewer:
-        viewer.open(Source(str(write_scene(folder)), grid=GridShape(3, 3)), 1.0, lambda _: None)
+        viewer.open(Source(str(write_scene(folder)), grid=GridShape(3, 3)))
         viewer.do(*(DismissNotice(notice) for notice in viewer.state.notices))
         sections = with_sections((), *(open_sections or ("view", "focus", "aperture", "light")))
         preferences = replace(viewer.state.preferences, open_sections=sections)

@@ -58,9 +58,9 @@ def test_a_reader_that_stops_reading_is_no_error_to_report() -> None:
 def test_unexpected_errors_are_one_line_with_a_traceback_in_the_log(tmp_path: Path, failure: str) -> None:
     code = f"""
 import sys
-import iibr_core.scenes.loaded_photo
+import iibr_core.scenes.photo
 def load_photo(*_): raise {failure}
-iibr_core.scenes.loaded_photo.load_photo = load_photo
+iibr_core.scenes.photo.load_photo = load_photo
 sys.argv = ["iibr", "plan", "photo.png"]
 from viewer.entry import command
 command()

@@ -19,13 +19,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from iibr_core.beyond.optics import CENTRE
 from iibr_core.formats.images.metadata import settings_text_in
 from iibr_core.formats.images.write import PictureFormat, is_float, write_image
 from iibr_core.formats.light_fields.write import write_light_field
-from iibr_core.rendering.optics import CENTRE
-from iibr_core.scenes.opening import SceneReady, SceneRequest, ViewReady, results_of
-from iibr_core.scenes.scene import Source
-from iibr_core.types import GridShape, InputError, ViewOffset, ViewUpdate
+from iibr_core.scenes.opening import results_of
+from iibr_core.scenes.scene import SceneReady, SceneRequest, Source, ViewReady
+from iibr_core.types import (
+    GridShape,
+    InputError,
+    ViewOffset,
+    ViewUpdate,
+)
 from tests.viewer.background.test_scene_worker import Desk
 from tests.viewer.conftest import write_scene
 from viewer.app.headless import HeadlessViewer
@@ -103,7 +108,7 @@ def test_too_little_memory_is_one_line_and_the_worker_goes_on(
     desk: Desk, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with monkeypatch.context() as small:
-        small.setattr("iibr_core.generation.memory.free_memory_bytes", lambda: 20_000)
+        small.setattr("iibr_core.method.memory.free_memory_bytes", lambda: 20_000)
         message = failure(desk, SceneRequest(1, Source(str(write_scene(tmp_path)))))
     assert re.search(r"takes \d+ MiB, half of the free memory is 1 MiB", message)
     goes_on(desk, tmp_path, 2)
@@ -194,7 +199,7 @@ def test_the_photo_may_go_once_it_is_open(viewer: HeadlessViewer, tmp_path: Path
     viewer.do(MoveEye(ViewOffset(0.5, 0.5)), SetAperture(2.0))
     assert (viewer.picture() != before).any()
     with pytest.raises(InputError, match=r"scene\.png: no such file"):
-        viewer.open(Source(str(tmp_path / "scene.png")), 1.0, lambda progress: None)
+        viewer.open(Source(str(tmp_path / "scene.png")))
 
 
 def test_preferences_on_a_full_disk_keep_the_old_ones(tmp_path: Path) -> None:

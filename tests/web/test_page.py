@@ -57,7 +57,7 @@ def psnr(one: np.ndarray, other: np.ndarray) -> float:
 
 def test_the_canvas_is_the_desktops_picture(shown: Tab, scene: Path) -> None:
     with HeadlessViewer("egl") as viewer:
-        viewer.open(Source(str(scene), grid=GridShape(3, 3)), 1.0, lambda made: None)
+        viewer.open(Source(str(scene), grid=GridShape(3, 3)))
         for s, t, focus, aperture in SETTINGS:
             viewer.do(MoveEye(ViewOffset(t, s)), SetFocus(focus), SetAperture(aperture))
             set_lens(shown, s, t, focus, aperture)
@@ -70,7 +70,7 @@ def test_the_canvas_is_the_desktops_picture(shown: Tab, scene: Path) -> None:
 
 def test_between_views_there_is_no_seam_that_the_desktop_has_not(shown: Tab, scene: Path) -> None:
     with HeadlessViewer("egl") as viewer:
-        viewer.open(Source(str(scene), grid=GridShape(3, 3)), 1.0, lambda made: None)
+        viewer.open(Source(str(scene), grid=GridShape(3, 3)))
         for s in np.linspace(0, 1, 9):
             viewer.do(MoveEye(ViewOffset(0.5 * s, s)), SetAperture(0.0))
             set_lens(shown, s, 0.5 * s, 0.0, 0.0)

@@ -13,10 +13,10 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-import iibr_core.rendering.aperture_sampling as points_module
+import iibr_core.beyond.aperture_sampling as points_module
+from iibr_core.beyond.aperture_sampling import aperture_points
+from iibr_core.beyond.optics import ApertureShape, Optics
 from iibr_core.exports.web import page_script
-from iibr_core.rendering.aperture_sampling import aperture_points
-from iibr_core.rendering.optics import ApertureShape, Optics
 from iibr_core.runtime.resources import resource_folder
 from iibr_core.types import SRGB, GridShape, ViewOffset
 from viewer.gpu.light_field_texture import LightFieldTexture

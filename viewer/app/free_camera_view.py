@@ -16,11 +16,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.color import photo_in_srgb
-from iibr_core.generation.disparity_range import measure_disparity_range
-from iibr_core.runtime.work import Cancelled
-from iibr_core.scenes.loaded_photo import LoadedPhoto
+from iibr_core.method.disparity_range import measure_disparity_range
+from iibr_core.runtime.work import Cancelled, watched
+from iibr_core.scenes.scene import LoadedPhoto
 from iibr_core.scenes.screen_size import ScreenSize
-from iibr_core.types import Camera, ImageSize, ViewUpdate, image_size
+from iibr_core.types import (
+    Camera,
+    ImageSize,
+    ViewUpdate,
+    image_size,
+)
 from viewer.background.job_threads import Failed, Job, JobThread
 from viewer.display.scene_view import SceneView
 from viewer.gpu.refocus.frame_budget import stretch_image
@@ -30,7 +35,7 @@ from viewer.model.state.app_state import AppState
 from viewer.model.state.notices import Notice
 
 if TYPE_CHECKING:
-    from iibr_core.generation.free_views import FreeViews
+    from iibr_core.beyond.free_cameras import FreeViews
 
 DRAFT_PIXELS = 40_000
 """Of the photo's copy that drafts are made of: they are there within a tenth of a second."""
@@ -145,7 +150,13 @@ class FreeCameraView:
 
 def _make_ready(job: Job[FreeRequest, FreeResult], is_draft: bool) -> _Ready:
     """Raises InputError for poses that see nothing of the photo, Cancelled once the job should stop."""
-    from iibr_core.generation.free_views import FreeViews, depths_of, fitted_cameras, inverse_depth_of, steered
+    from iibr_core.beyond.free_cameras import (
+        FreeViews,
+        depths_of,
+        fitted_cameras,
+        inverse_depth_of,
+        steered,
+    )
     from iibr_core.inpainting.background import fill_background
 
     request = job.request
@@ -167,22 +178,16 @@ def _make_ready(job: Job[FreeRequest, FreeResult], is_draft: bool) -> _Ready:
     asides = (-MOST_ASIDE, MOST_ASIDE)
     ways = [(right, down, forward * nearest) for right in asides for down in asides for forward in FORWARD_LIMITS]
     cameras = (*others, *(steered(camera, *way) for way in ways))
-    views = FreeViews(
-        colors,
-        inverse_depth,
-        camera,
-        cameras,
-        None if is_draft else fill_background,
-        lambda done, total, doing: job.post(CameraProgress(done / total)),
-    )
+    with watched(lambda done, total, doing: job.post(CameraProgress(done / total))):
+        views = FreeViews(colors, inverse_depth, camera, cameras, None if is_draft else fill_background)
     inverse_depths, disparities = (1 / farthest, 1 / nearest), (span.low, span.high)
     return _Ready(request, views, camera, others, nearest, inverse_depths, disparities)
 
 
 def _view(job: Job[FreeRequest, FreeResult], ready: _Ready) -> ViewUpdate:
     """What the camera sees, with the size and the disparities of the scene's views."""
-    from iibr_core.generation.free_views import steered
-    from iibr_core.generation.stored_views import encode_for_storage
+    from iibr_core.beyond.free_cameras import steered
+    from iibr_core.method.light_field import encode_for_storage
 
     free, centre = job.request.camera, job.request.centre
     camera = ready.camera if free.pose is None else ready.others[free.pose].resized(ready.camera.size)

@@ -10,23 +10,23 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from iibr_core.beyond.optics import CENTRE
 from iibr_core.color import linear_from_srgb
 from iibr_core.depth.editing.edits import UNEDITED, DepthEdits
 from iibr_core.exports.framing import centred, size_in_frame
 from iibr_core.exports.full_picture import FullPicture, encode_light, is_full
 from iibr_core.exports.render_settings import RenderSettings, require_size
-from iibr_core.generation.outer_views import ALL_VIEWS
-from iibr_core.rendering.optics import CENTRE
-from iibr_core.scenes.opening import SceneReady, SceneRequest, ViewReady, results_of
-from iibr_core.scenes.scene import DepthSettings, Progress, Scene, Source
+from iibr_core.runtime.work import report_progress
+from iibr_core.scenes.opening import results_of
+from iibr_core.scenes.scene import MAKING, DepthSettings, Scene, SceneReady, SceneRequest, Source, ViewReady
 from iibr_core.scenes.screen_size import ScreenSize
-from iibr_core.types import SRGB, ColorSpace, FloatImage, ReportProgress, ignore_progress
-from viewer.background.comparison_worker import ComparisonJob
+from iibr_core.types import SRGB, ColorSpace, FloatImage, ViewOffset
+from viewer.background.comparison_job import ComparisonJob
 from viewer.display.inspection_view import InspectionView
 from viewer.display.scene_drawer import prepare_gloss
 from viewer.display.scene_view import SceneView
 from viewer.gpu.headless_context import Backend, create_headless
-from viewer.gpu.refocus.views_seen import wanted_for
+from viewer.gpu.refocus.views_seen import views_seen
 from viewer.model.actions import Action, OpenPath, ProgressMade, SceneOpened, SetState
 from viewer.model.inspection_request import (
     NO_INSPECTION_TEXTURES,
@@ -54,7 +54,7 @@ class HeadlessViewer:
         self._inspection_view = InspectionView(self._gl, self._scene_view)
         self._comparison_job = ComparisonJob()
         self._results: Iterator[SceneReady | ViewReady] = iter(())
-        self._wanted = ALL_VIEWS
+        self._wanted: set[ViewOffset] | None = None
 
     def __enter__(self) -> HeadlessViewer:
         """Nothing more to do."""
@@ -71,39 +71,30 @@ class HeadlessViewer:
         """Whether `screen` works here: ImGui's own OpenGL loader finds no functions in OSMesa."""
         return self._gl.backend != "osmesa"
 
-    def open(
-        self,
-        source: Source,
-        depth_strength: float,
-        on_progress: Callable[[Progress], None],
-        edits: DepthEdits = UNEDITED,
-        on_ready: Callable[[Scene], None] = lambda scene: None,
-    ) -> None:
-        """Read and plan the scene, its depth edited so, and make all its views, telling how far it is.
-
-        on_ready: is told the scene before any of its views is made; what it raises ends the opening. Raises InputError.
-        """
-        self.open_scene(source, depth_strength, on_progress, edits, on_ready)
-        self.make_views(on_progress)
+    def open(self, source: Source, depth_strength: float = 1.0) -> None:
+        """Read and plan the scene and make all its views. Raises InputError."""
+        self.open_scene(source, depth_strength)
+        self.make_views()
 
     def open_scene(
         self,
         source: Source,
         depth_strength: float,
-        on_progress: Callable[[Progress], None],
         edits: DepthEdits = UNEDITED,
         on_ready: Callable[[Scene], None] = lambda scene: None,
     ) -> None:
-        """The first part of `open`: there is one view, the photo."""
+        """Read and plan the scene, its depth edited like this: there is one view, the photo.
+
+        on_ready: called with the scene; its exceptions end the opening. Raises InputError.
+        """
         self.state = AppState(depth_strength=depth_strength)
         self.do(OpenPath(source))
-        on_progress(self.state.progress)
         depth_settings = DepthSettings(source.depth.refine, edits)
         request = SceneRequest(
             self.state.generation, source, depth_strength, depth_settings=depth_settings, takes_drafts=False
         )
-        self._wanted = ALL_VIEWS
-        self._results = results_of(request, lambda: CENTRE, on_progress, lambda: self._wanted)
+        self._wanted = None
+        self._results = results_of(request, lambda: CENTRE, lambda: self._wanted)
         ready = next(self._results)
         assert isinstance(ready, SceneReady)
         on_ready(ready.scene)
@@ -113,16 +104,16 @@ class HeadlessViewer:
         self.state = replace(self.state, depth=depth_settings)
         self._scene_view.upload_all()
 
-    def make_views(self, on_progress: Callable[[Progress], None], only_seen: bool = False) -> None:
-        """The second part of `open`. only_seen: only the views of a photo's grid that its `picture` is made of."""
+    def make_views(self, only_seen: bool = False) -> None:
+        """Make the views. only_seen: only those of a photo's grid that its `picture` is made of."""
         if only_seen:
-            self._wanted = wanted_for(self.state.optics, self.scene.grid)
+            self._wanted = views_seen(self.state.optics, self.scene.grid)
         for result in self._results:
             assert isinstance(result, ViewReady)
             self._scene_view.add(result.view)
             self._inspection_view.add(result.view)
             self.do(ProgressMade(result.generation, result.progress, (result.view.row, result.view.column)))
-            on_progress(result.progress)
+            report_progress(result.progress.done, result.progress.total, MAKING)
             self._scene_view.upload_all()
 
     def pick(self, x_px: float, y_px: float) -> float | None:
@@ -139,7 +130,6 @@ class HeadlessViewer:
         size: ScreenSize | None = None,
         is_linear: bool = False,
         color_space: ColorSpace = SRGB,
-        report_progress: ReportProgress = ignore_progress,
     ) -> NDArray[Any]:
         """The picture alone, letterboxed into (width, height), the scene's own size by default: (height, width, 3).
 
@@ -153,7 +143,7 @@ class HeadlessViewer:
         require_size(box_size)
         prepare_gloss(self._scene_view, self.state.optics.gloss)
         if is_full(scene, self.state.optics, box_size):
-            light = self._full_picture(scene, box_size, report_progress)
+            light = self._full_picture(scene, box_size)
             pixels = encode_light(light, is_linear, color_space, scene.color_space)
         else:
             settings = RenderSettings(self.state.optics, box_size, is_linear=is_linear, color_space=color_space)
@@ -161,12 +151,12 @@ class HeadlessViewer:
         background = np.array(BACKGROUND[:3])
         return centred(pixels, frame, linear_from_srgb(background) if is_linear else np.round(background * 255))
 
-    def _full_picture(self, scene: Scene, size: ScreenSize, report_progress: ReportProgress) -> FloatImage:
+    def _full_picture(self, scene: Scene, size: ScreenSize) -> FloatImage:
         loaded, optics = self._scene_view.loaded, self.state.optics
         assert loaded is not None
         assert scene.plan is not None
         full = FullPicture(scene, scene.plan, loaded, optics, size)
-        return full.make(self._scene_view.renderer.converged_picture, report_progress=report_progress)
+        return full.make(self._scene_view.renderer.converged_picture)
 
     @property
     def scene(self) -> Scene:

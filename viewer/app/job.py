@@ -8,11 +8,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
+from iibr_core.beyond.optics import Optics
 from iibr_core.exports.source import ExportSource
-from iibr_core.rendering.optics import Optics
 from iibr_core.runtime.time_left import TimeLeft
-from iibr_core.scenes.opening import SceneRequest
-from iibr_core.scenes.scene import Scene, Source
+from iibr_core.scenes.scene import Scene, SceneRequest, Source
 from viewer.display.snapshot import SceneSnapshot
 from viewer.model.actions import Action
 from viewer.model.reducers.lens_reducer import carry_optics
@@ -52,7 +51,6 @@ class Job:
     is_running: bool = False
     is_given_up: threading.Event = field(default_factory=threading.Event)
     _reported: tuple[float, float, str] = (0.0, 0.0, "")
-    _stage: str = ""
     _time_left: TimeLeft = field(default_factory=TimeLeft)
 
     @property
@@ -87,9 +85,7 @@ class Job:
             doing = "" if self.snapshot or self.is_left else WAITING_FOR_VIEWS
             return JobProgress(self.id, self.kind, name, doing, fills=self.fills)
         done, total, doing = self._reported
-        if doing != self._stage:
-            self._stage, self._time_left = doing, TimeLeft()
-        left_s = self._time_left.update(done, total)
+        left_s = self._time_left.update(done, total, doing)
         share = int(100 * done / total) / 100 if total else 0.0
         left_s = None if left_s is None else float(round(left_s))
         return JobProgress(self.id, self.kind, name, doing, share, left_s, self.fills)

@@ -12,9 +12,8 @@ from functools import partial
 from itertools import count
 from pathlib import Path
 
-from iibr_core.runtime.work import Cancelled, raise_if_stopped, stoppable
-from iibr_core.scenes.opening import SceneRequest
-from iibr_core.scenes.scene import Source, is_same_field
+from iibr_core.runtime.work import Cancelled, raise_if_stopped, stoppable, watched
+from iibr_core.scenes.scene import SceneRequest, Source, is_same_field
 from viewer.app.job import Job, Lane
 from viewer.app.job_scene import JobScenes
 from viewer.app.save_places import inputs_of_scene
@@ -192,7 +191,7 @@ class JobQueue:
 def _carry_out(job: Job, scenes: JobScenes) -> list[Action]:
     """In the thread: what comes of it; nothing where it was given up."""
     try:
-        with stoppable(job.should_stop):
+        with stoppable(job.should_stop), watched(partial(scenes.report, job)):
             raise_if_stopped()
             return [ViewsFilled(scenes.fill(job))] if job.work is None else job.work(scenes.source_of(job))
     except Cancelled:

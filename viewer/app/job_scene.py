@@ -5,29 +5,25 @@ where the window left it before all was there.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import closing
-from functools import partial
 from typing import Any
 
 from numpy.typing import NDArray
 
+from iibr_core.beyond.optics import CENTRE
 from iibr_core.exports.render_settings import RenderSettings, require_size
 from iibr_core.exports.source import ExportSource
-from iibr_core.generation.outer_views import ALL_VIEWS, WantedViews
-from iibr_core.rendering.optics import CENTRE
-from iibr_core.runtime.work import raise_if_stopped
-from iibr_core.scenes.opening import SceneReady, ViewReady, results_of
-from iibr_core.scenes.scene import FilledField, Progress
+from iibr_core.runtime.work import raise_if_stopped, report_progress
+from iibr_core.scenes.scene import MAKING, FilledField, SceneReady, ViewReady
 from iibr_core.scenes.scene_gloss import GlossRequest, answer
-from iibr_core.types import ViewUpdate
+from iibr_core.types import ViewOffset, ViewUpdate
 from viewer.app.job import Job
 from viewer.background.window_work import Result, Steps, WindowWork
 from viewer.display.scene_view import SceneView
 from viewer.display.snapshot import SceneSnapshot, snapshot_of
 from viewer.gpu.refocus.views_seen import views_seen_by
 
-MAKING_VIEWS = "making views"
 DRAWING = "drawing"
 WAKE_EVERY_S = 0.1
 """Progress wakes the window no more often: each time it draws a frame."""
@@ -42,7 +38,7 @@ class JobScenes:
         self._woken_s = 0.0
 
     def source_of(self, job: Job) -> ExportSource:
-        """What it is made of. Raises InputError where its scene cannot be opened again, Cancelled once given up."""
+        """Return the source of its export. Raises InputError if its scene cannot be opened, Cancelled once given up."""
         if job.snapshot is None:
             self._make_scene(job)
         snapshot = job.snapshot
@@ -54,28 +50,26 @@ class JobScenes:
             self._find_gloss(job, snapshot, settings)
             return self._run(job, self._draw(job, snapshot, settings))
 
-        scene, report = snapshot.scene, partial(self._report, job)
-        return ExportSource(scene, snapshot.loaded, optics, draw, report, snapshot.centre)
+        return ExportSource(snapshot.scene, snapshot.loaded, optics, draw, snapshot.centre)
 
     def fill(self, job: Job) -> FilledField:
-        """Its light field with all the views between. Raises InputError where it has none, Cancelled once given up."""
-
-        def report(progress: Progress) -> None:
-            self._report(job, progress.share, 1.0, MAKING_VIEWS)
+        """Return its light field with all views between. Raises InputError if it has none, Cancelled once given up."""
+        from iibr_core.scenes.opening import results_of
 
         assert job.request is not None
         views = []
-        with closing(results_of(job.request, lambda: CENTRE, report)) as results:
+        with closing(results_of(job.request, lambda: CENTRE)) as results:
             ready = next(results)
             assert isinstance(ready, SceneReady)
             for made in results:
                 assert isinstance(made, ViewReady)
                 views.append(made.view)
-                report(made.progress)
+                report_progress(made.progress.done, made.progress.total, MAKING)
         raise_if_stopped()
         return FilledField(ready.scene, tuple(views))
 
-    def _report(self, job: Job, done: float, total: float, doing: str) -> None:
+    def report(self, job: Job, done: float, total: float, doing: str) -> None:
+        """Note how far a job is, and wake the window now and then."""
         job.report(done, total, doing)
         now_s = time.perf_counter()
         if now_s - self._woken_s >= WAKE_EVERY_S:
@@ -84,39 +78,28 @@ class JobScenes:
 
     def _make_scene(self, job: Job) -> None:
         """Read it and make its views, as far as they are needed."""
-
-        def report(progress: Progress) -> None:
-            self._report(job, progress.done, progress.total, progress.doing or MAKING_VIEWS)
+        from iibr_core.scenes.opening import results_of
 
         assert job.request is not None
-        wanted = ALL_VIEWS
-        results = results_of(job.request, lambda: CENTRE, report, lambda: wanted)
-        with closing(results):
+        wanted: set[ViewOffset] | None = None
+        with closing(results_of(job.request, lambda: CENTRE, lambda: wanted)) as results:
             ready = next(results)
             assert isinstance(ready, SceneReady)
             snapshot = self._run(job, _in_one_step(lambda: self._open(job, ready)))
             scene, optics = ready.scene, job.optics_on(ready.scene)
-            if job.needs(scene, optics) != "scene":
-                wanted = WantedViews(views_seen_by(job.pictures(scene, optics), scene.grid))
-                self._make_views(job, snapshot, results, report)
+            if job.needs(scene, optics) == "scene":
+                return
+            wanted = views_seen_by(job.pictures(scene, optics), scene.grid)
+            for made in results:
+                assert isinstance(made, ViewReady)
+                if (made.view.row, made.view.column) != scene.grid.centre:
+                    self._run(job, _store(snapshot, made.view))
+                report_progress(made.progress.done, made.progress.total, MAKING)
 
     def _open(self, job: Job, ready: SceneReady) -> SceneSnapshot:
         """In the window's thread, which also releases it."""
         job.snapshot = snapshot_of(self._scene_view.renderer.gl, ready)
         return job.snapshot
-
-    def _make_views(
-        self,
-        job: Job,
-        snapshot: SceneSnapshot,
-        results: Iterator[SceneReady | ViewReady],
-        report: Callable[[Progress], None],
-    ) -> None:
-        for made in results:
-            assert isinstance(made, ViewReady)
-            if (made.view.row, made.view.column) != snapshot.scene.grid.centre:
-                self._run(job, _store(snapshot, made.view))
-            report(made.progress)
 
     def _find_gloss(self, job: Job, snapshot: SceneSnapshot, settings: RenderSettings) -> None:
         """Have at hand what the optics' gloss means for the scene, unless it is."""

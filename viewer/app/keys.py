@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
 
-from iibr_core.rendering.optics import CENTRE
+from iibr_core.beyond.optics import CENTRE
 from iibr_core.types import ViewOffset
 from viewer.app.pointer import is_marking_gloss
 from viewer.model.actions import Action, SetState, ShowBefore, ShowPrompt

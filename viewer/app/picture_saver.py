@@ -11,12 +11,13 @@ from typing import Any
 
 from numpy.typing import NDArray
 
+from iibr_core.beyond.optics import Optics
 from iibr_core.exports.full_picture import FullPicture, encode_light, is_full
 from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.exports.source import ExportSource
 from iibr_core.formats.images.write import AS_USUAL, PictureFormat, is_float
 from iibr_core.formats.outputs import AlreadyThereError, make_folder
-from iibr_core.rendering.optics import Optics
+from iibr_core.runtime.work import report_progress
 from iibr_core.scenes.scene import Scene
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import InputError
@@ -110,7 +111,7 @@ def _refusal(task: SaveTask, state: AppState, error: InputError) -> Action:
 def _save(shot: _Shot, source: ExportSource) -> list[Action]:
     saved = shot.saved_of(source.optics)
     pixels = _drawn(shot, saved, source)
-    source.report_progress(1, 1, WRITING)
+    report_progress(1, 1, WRITING)
     path = export_picture(shot.path, pixels, saved)
     return [Notify(Notice(f"Saved {path}", stays=True)), EditsSaved(saved.settings.depth_edits)]
 
@@ -127,7 +128,7 @@ def _save_map(path: Path, state: AppState, source: ExportSource) -> list[Action]
     """The disparity map, edits included, in px per view step as given."""
     if source.loaded is None:
         raise InputError(f"{path}: {NO_MAP}")
-    source.report_progress(1, 1, WRITING)
+    report_progress(1, 1, WRITING)
     return [Notify(Notice(export_map(path, source.loaded.disparity.values))), EditsSaved(state.depth.edits)]
 
 
@@ -148,5 +149,5 @@ def _drawn_full(shot: _Shot, source: ExportSource, is_linear: bool, saved: Saved
     assert scene.plan is not None
     assert source.loaded is not None
     full = FullPicture(scene, scene.plan, source.loaded, source.optics, shot.size)
-    light = full.make(source.draw, source.report_progress)
+    light = full.make(source.draw)
     return encode_light(light, is_linear, saved.color_space, scene.color_space)

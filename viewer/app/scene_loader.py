@@ -6,14 +6,22 @@ import time
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 
-from iibr_core.scenes.loaded_photo import LoadedPhoto, prepare_brush, without_history
-from iibr_core.scenes.opening import SceneReady, SceneRequest, ViewReady, WantedPhoto, sketch_of
-from iibr_core.scenes.scene import DepthSettings, Scene, Source, source_beside
+from iibr_core.scenes.scene import (
+    DepthSettings,
+    LoadedPhoto,
+    Scene,
+    SceneReady,
+    SceneRequest,
+    Source,
+    ViewReady,
+    WantedPhoto,
+    source_beside,
+)
 from iibr_core.types import InputError, ViewOffset
 from viewer.background.depth_estimate import DepthFinder, same_places
 from viewer.background.file_worker import FileRequest, FileWorker
 from viewer.background.job_threads import Failed, ProgressReport
-from viewer.background.read_ahead import PhotoAhead, ReadAhead, photos_within_budget, read_whole_photo
+from viewer.background.read_ahead import PhotoAhead, ReadAhead, photos_within_budget, read_sketch, read_whole_photo
 from viewer.background.scene_worker import PhotosFound, SceneResult, SceneWorker
 from viewer.display.depth_preview import DepthPreview
 from viewer.display.inspection_view import InspectionView
@@ -51,7 +59,7 @@ class SceneLoader:
     ) -> None:
         """set_title: of the window that shows the scene. wake: called, in another thread, when there is a result."""
         self.ahead = ReadAhead("iibr-ahead", wake, read_whole_photo)
-        self.sketches = ReadAhead("iibr-sketches", wake, sketch_of)
+        self.sketches = ReadAhead("iibr-sketches", wake, read_sketch)
         self._scene_view = scene_view
         self._inspection_view = inspection_view
         self._set_title = set_title
@@ -178,7 +186,7 @@ class SceneLoader:
         """Beside the first photo's views, so that the first stroke does not wait."""
         if not self._has_brush and ready.loaded is not None:
             self._has_brush = True
-            self._brush_loader.submit(FileRequest(0, prepare_brush))
+            self._brush_loader.submit(FileRequest(0, _prepare_brush))
 
     def _cancel(self, state: AppState) -> None:
         """What the user stopped, and what is wanted no more."""
@@ -226,7 +234,7 @@ class SceneLoader:
         if scene is None or scene.plan is None or loaded is None:
             return
         if loaded.depth_settings == DepthSettings(scene.source.depth.refine):
-            left = PhotoAhead(without_history(loaded), scene.plan)
+            left = PhotoAhead(loaded.without_history(), scene.plan)
             self.ahead.keep(WantedPhoto(scene.source, state.depth_strength), left)
 
     def _read_sketches(self, state: AppState) -> None:
@@ -260,6 +268,12 @@ class SceneLoader:
 def _has_other_depth(before: LoadedPhoto, now: LoadedPhoto | None) -> bool:
     """Whether the same photo's depth was found again."""
     return now is not None and now.photo is before.photo and now.found is not before.found
+
+
+def _prepare_brush() -> None:
+    from iibr_core.scenes.photo import prepare_brush
+
+    prepare_brush()
 
 
 def _is_whole(state: AppState) -> bool:

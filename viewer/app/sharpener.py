@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from iibr_core.exports.full_picture import FullPicture, is_full
 from iibr_core.exports.render_settings import RenderSettings
-from iibr_core.scenes.loaded_photo import LoadedPhoto
+from iibr_core.scenes.scene import LoadedPhoto
 from iibr_core.scenes.screen_size import ScreenSize
 from viewer.background.job_threads import Failed
 from viewer.background.sharpening import SharpeningWorker, SharpPart

@@ -10,9 +10,9 @@ from itertools import count
 from pathlib import Path
 from typing import Any
 
+from iibr_core.beyond.optics import ApertureMask
 from iibr_core.exports.photo_folder import list_photos
 from iibr_core.formats.light_fields.light_field_formats import open_light_field
-from iibr_core.rendering.optics import ApertureMask
 from iibr_core.scenes.scene import Source, source_beside
 from viewer.app.clipboard import Pasted, paste_picture
 from viewer.app.dialogs import Dialog, SaveDialog, contents_of, has_dialogs

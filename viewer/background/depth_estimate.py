@@ -7,8 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from iibr_core.scenes.loaded_photo import LoadedPhoto, deepen
-from iibr_core.scenes.scene import Source
+from iibr_core.scenes.scene import LoadedPhoto, Source
 from iibr_core.types import FloatImage
 from viewer.background.job_threads import Failed, Job, JobThread
 from viewer.model.actions import Action, Notify, SamePlaces
@@ -98,6 +97,8 @@ class DepthFinder(JobThread[EstimateRequest, EstimateResult]):
 
 
 def _results_of(job: Job[EstimateRequest, EstimateResult]) -> Iterator[EstimateResult]:
+    from iibr_core.scenes.photo import deepen
+
     asked = job.request
     source = replace(asked.source, depth=replace(asked.source.depth, file=None, start="model", model=asked.model))
     yield Estimated(asked, deepen(source, asked.loaded, asked.refine))

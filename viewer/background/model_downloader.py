@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
 
-from iibr_core.runtime.work import Cancelled
+from iibr_core.runtime.work import Cancelled, watched
 from viewer.background.job_threads import Failed, Job, JobThread
 from viewer.model.state.model_download import Downloading, ModelOffer, ModelsListed
 
@@ -59,8 +59,8 @@ def _results_of(job: Job[ModelRequest, DownloadResult]) -> Iterator[DownloadResu
             told = latest
             job.post(latest)
 
-    with suppress(Cancelled):
-        fetch(model, report)
+    with suppress(Cancelled), watched(report):
+        fetch(model)
         listed = list_models()
         yield Downloaded(next(offer for offer in listed.known if offer.name == model.name), listed)
 

@@ -7,12 +7,9 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
-from iibr_core.generation.memory import PHOTO_BYTES, budget_bytes
-from iibr_core.generation.plan import ScenePlan
-from iibr_core.scenes.loaded_photo import LoadedPhoto, load_photo
-from iibr_core.scenes.making import make_plan
-from iibr_core.scenes.opening import WantedPhoto
-from iibr_core.scenes.scene import Scene
+from iibr_core.method.memory import PHOTO_BYTES, budget_bytes
+from iibr_core.method.plan import ScenePlan
+from iibr_core.scenes.scene import LoadedPhoto, Scene, SceneReady, WantedPhoto
 from viewer.background.job_threads import Job, JobThread
 
 Read = TypeVar("Read")
@@ -30,10 +27,19 @@ class PhotoAhead:
 
 
 def read_whole_photo(wanted: WantedPhoto) -> PhotoAhead:
-    """All of a photo, asking no depth model. Raises InputError."""
+    """Read all of a photo, asking no depth model. Raises InputError."""
+    from iibr_core.scenes.photo import load_photo, make_plan
+
     loaded = load_photo(wanted.source, asks_model=False)
     plan = make_plan(wanted.source, loaded, wanted.depth_strength)
     return PhotoAhead(loaded, plan)
+
+
+def read_sketch(wanted: WantedPhoto) -> SceneReady | None:
+    """Return a large photo at a small size, see `sketch_of`."""
+    from iibr_core.scenes.opening import sketch_of
+
+    return sketch_of(wanted)
 
 
 def photos_within_budget(scene: Scene) -> int:

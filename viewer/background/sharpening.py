@@ -13,13 +13,13 @@ from numpy.typing import NDArray
 from iibr_core.exports.full_picture import FullPicture, encode_light
 from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.runtime.work import Cancelled
-from iibr_core.scenes.loaded_photo import LoadedPhoto
+from iibr_core.scenes.scene import LoadedPhoto
 from iibr_core.types import SRGB
 from viewer.background.job_threads import Failed, Job, JobThread
 from viewer.background.window_work import WindowWork
 
 if TYPE_CHECKING:
-    from iibr_core.rendering.large_views import LargePhoto
+    from iibr_core.beyond.full_size import LargePhoto
 
 
 @dataclass(frozen=True, eq=False)

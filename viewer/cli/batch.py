@@ -83,10 +83,8 @@ def batch(
         print(f"warning: the connection to {dask} is not encrypted; use tls://HOST:PORT", file=sys.stderr)
     # Processes write nothing to the terminal and import nothing from the working folder.
     os.environ.update(PYTHONWARNINGS="ignore", PYTHONSAFEPATH="1")
-    with show_progress("looking", counts=True) as show:
-        count = run_batch(
-            photos, settings, output, folders, workers=workers, dask=dask, force=force, report_progress=show
-        )
+    with show_progress("looking", counts=True):
+        count = run_batch(photos, settings, output, folders, workers=workers, dask=dask, force=force)
     print(f"{output}: {count.written} written, {count.there_before} there before, {count.failed} failed")
     if count.guessed:
         print(f"{count.guessed} of {count.written} written have guessed depth. {BETTER_WAYS}")

@@ -51,8 +51,8 @@ def _demo_pictures(source: Source, why: str) -> None:
     make_folder(DEMO_FOLDER)
     print(f"{why}. Rendering without one.")
     with HeadlessViewer() as viewer:
-        with show_progress("reading") as show:
-            viewer.open(source, 1.0, lambda made: show(made.share, float(made.total > 0), made.doing))
+        with show_progress("reading"):
+            viewer.open(source)
         export_image(window, viewer.screen(SCREEN_SIZE) if viewer.has_panels else viewer.picture())
         export_image(views, contact_sheet(viewer))
     print(f"{window}: the viewer's window")

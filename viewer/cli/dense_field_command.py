@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from contextlib import closing
 from functools import partial
 from pathlib import Path
@@ -11,7 +12,7 @@ from iibr_core.formats.light_fields.light_field_formats import open_light_field
 from iibr_core.formats.light_fields.write import write_light_field
 from iibr_core.types import GridShape, image_size
 from viewer.cli.scene_options import NOT_FOR_LIGHT_FIELDS
-from viewer.cli.terminal import MAKING, print_notes, show_progress
+from viewer.cli.terminal import print_notes, show_progress
 from viewer.cli.view_writing import write_views
 
 if TYPE_CHECKING:
@@ -26,8 +27,8 @@ def write_dense_field(source: Source, grid: GridShape, out: Path, layout: str, w
     from iibr_core.scenes.dense import read_dense
 
     field = open_light_field(Path(source.path))
-    with show_progress("reading") as show:
-        dense = read_dense(field, grid, source.inpaint, report_progress=show)
+    with show_progress("reading"):
+        dense = read_dense(field, grid, source.inpaint)
         size = image_size(dense.given[0].colors)
         write = partial(
             write_light_field,
@@ -39,6 +40,6 @@ def write_dense_field(source: Source, grid: GridShape, out: Path, layout: str, w
             with_disparity=with_disparity,
         )
         with closing(dense.views) as views:
-            summary = write_views(views, write, size, lambda share: show(*dense.work.making(share), MAKING))
+            summary = write_views(views, write, size, math.prod(grid))
     print(f"{summary}: {out}")
     print_notes(field.notes)

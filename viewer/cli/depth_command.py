@@ -47,7 +47,7 @@ def depth(
     require_heeded(context, path)
     from iibr_core.formats.maps.writer import write_map
     from iibr_core.scenes.light_fields import find_disparity
-    from iibr_core.scenes.loaded_photo import load_photo
+    from iibr_core.scenes.photo import load_photo
 
     check_output(out, inputs_of_command(context, source), force)
     require_model(source.depth)
@@ -57,8 +57,8 @@ def depth(
         origin = loaded.origin
     else:
         scene = open_light_field(path)
-        with show_progress("reading") as show:
-            name, values, notes = scene.name, find_disparity(scene, show), ()
+        with show_progress("reading"):
+            name, values, notes = scene.name, find_disparity(scene), ()
         origin = None
     note = write_map(out, values)
     print(f"{name}: disparity {values.min():.2f} to {values.max():.2f} px per view step: {out}")

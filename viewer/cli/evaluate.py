@@ -7,15 +7,16 @@ import shlex
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, get_args
+from typing import TYPE_CHECKING, Annotated, get_args
 
 import typer
 
 from iibr_core.depth.choice import DepthChoice
 from iibr_core.formats.files import is_file
 from iibr_core.runtime.extras import require_extra
+from iibr_core.runtime.work import part_of_job
 from iibr_core.stages import STAGE_NAMES, stages_without
-from iibr_core.types import InputError, Quality, ReportProgress
+from iibr_core.types import InputError
 from viewer.cli.option_records import with_option_records
 from viewer.cli.shared_options import (
     DepthModel,
@@ -23,7 +24,6 @@ from viewer.cli.shared_options import (
     MaxPixels,
     Refine,
     inputs_of_command,
-    quality_from_text,
     require_model,
 )
 from viewer.cli.terminal import print_notes, show_progress
@@ -46,16 +46,6 @@ class _Judging:
             " mean distance of neighbours); auto: gt if there is one.",
         ),
     ] = "auto"
-    quality: Annotated[
-        list[Any] | None,
-        typer.Option(
-            "--quality",
-            parser=quality_from_text,
-            metavar="|".join(get_args(Quality)),
-            help="Judge this one; may be given several times.",
-            show_default="both",
-        ),
-    ] = None
     depth_model: DepthModel = None
     refine: Refine = 1.0
     views: Annotated[
@@ -84,15 +74,14 @@ class _Judging:
 
     def options(self, stages: Stages) -> Options:
         """The same as a record of the core. Raises InputError for a model or a map that is not there."""
-        from iibr_core.evaluation.evaluate_scene import QUALITIES, Options
+        from iibr_core.evaluation.evaluate_scene import Options
         from iibr_core.formats.images.photo import DEFAULT_MAX_PIXELS
 
-        chosen: tuple[Quality, ...] = tuple(dict.fromkeys(self.quality)) if self.quality else QUALITIES
         choice = DepthChoice(model=self.depth_model, refine=self.refine)
         require_model(choice)
         max_pixels = self.max_pixels or DEFAULT_MAX_PIXELS
         source = _disparity_source(self.disparity)
-        return Options(source, choice, chosen, max_pixels, self.views, self.lpips, stages=stages)
+        return Options(source, choice, max_pixels, self.views, self.lpips, stages=stages)
 
 
 @with_option_records
@@ -133,20 +122,16 @@ def evaluate(
     options = judging.options(stages)
     scenes = [scene for folder in datasets for scene in find_scenes(folder)]
     results = []
-    with show_progress("reading") as show:
+    with show_progress("reading"):
         for number, scene in enumerate(scenes):
-            results += evaluate_scene(scene, options, _part_of(show, number, len(scenes)))
+            with part_of_job(number, 1, len(scenes)):
+                results += evaluate_scene(scene, options)
     write_report(out, results, shlex.join(["iibr", *sys.argv[1:]]))
     for result in results:
         print(summary_line(result))
     notes = dict.fromkeys(f"{result.scene}: {note}" for result in results for note in result.notes)
     print(out / "index.html")
     print_notes(tuple(notes))
-
-
-def _part_of(show: ReportProgress, before: int, total: int) -> ReportProgress:
-    """Reports the work on a scene as what it is of that on all."""
-    return lambda done, of_scene, doing: show(before + done / of_scene, total, doing)
 
 
 def _stages_without(names: list[str]) -> Stages:

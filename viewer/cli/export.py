@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import ExitStack
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -26,7 +25,7 @@ from viewer.cli.shared_options import (
     require_existing,
     require_model,
 )
-from viewer.cli.terminal import print_depth, print_notes, show_progress, untimed
+from viewer.cli.terminal import print_depth, print_notes, show_progress
 
 if TYPE_CHECKING:
     from iibr_core.exports.kinds import ExportKind, ExportOptions
@@ -115,9 +114,7 @@ def _carry_out(
             from viewer.display.scene_drawer import SceneDrawer
 
             open_drawn = stack.enter_context(SceneDrawer()).open
-        with show_progress("reading") as report:
-            opened = open_for_export(
-                kind, options, source, depth_strength, lens.choice, on_ready, open_drawn, untimed(report)
-            )
-        with show_progress("exporting") as report:
-            return opened, write_export(kind, target(), replace(opened, report_progress=report), options)
+        with show_progress("reading"):
+            opened = open_for_export(kind, options, source, depth_strength, lens.choice, on_ready, open_drawn)
+        with show_progress("exporting"):
+            return opened, write_export(kind, target(), opened, options)

@@ -14,20 +14,21 @@ import typer
 from iibr_core.color import photo_in_srgb
 from iibr_core.formats.images.write import write_image
 from iibr_core.formats.outputs import check_output_folder, write_folder
-from iibr_core.generation.memory import MAKING_BYTES, require_memory
 from iibr_core.inpainting.registry import load_inpainter
+from iibr_core.method.memory import MAKING_BYTES, require_memory
+from iibr_core.runtime.work import report_progress
+from iibr_core.scenes.scene import MAKING
 from iibr_core.types import Camera, FloatImage, InputError
 from viewer.cli.shared_options import given_options, require_model
-from viewer.cli.terminal import print_depth, print_notes, show_progress, untimed
+from viewer.cli.terminal import print_depth, print_notes, show_progress
 from viewer.model.free_camera import Poses
 
 if TYPE_CHECKING:
-    from iibr_core.scenes.loaded_photo import LoadedPhoto
-    from iibr_core.scenes.scene import Source
+    from iibr_core.scenes.scene import LoadedPhoto, Source
 
 OWN_FILES = r"view_\d{4,5}\.(png|exr)"
 NOT_WITH_POSES = {"format": "--format", "depth_strength": "--depth-strength", "with_disparity": "--with-disparity",
-                  "quality": "--quality", "gloss": "--gloss"}  # fmt: skip
+                  "gloss": "--gloss"}  # fmt: skip
 """Parameters of light fields alone. Weights are the closed form's."""
 MOSTLY, MOST_NAMED = 0.5, 5
 """Poses whose inpainted share exceeds this are named, so many at most."""
@@ -72,19 +73,19 @@ def write_free_views(source: Source, poses: Path, photo_pose: int | None, is_lit
     """
     require_model(source.depth)
     known = poses_of(poses, photo_pose)
-    with show_progress("reading") as show:
-        from iibr_core.scenes.loaded_photo import load_photo
+    with show_progress("reading"):
+        from iibr_core.scenes.photo import load_photo
 
-        loaded = load_photo(source, report_progress=untimed(show))
-    from iibr_core.generation.free_views import fitted_cameras
+        loaded = load_photo(source)
+    from iibr_core.beyond.free_cameras import fitted_cameras
 
     given = known.given
     pictures = fitted_cameras(known.cameras, given, loaded.photo.size)
     start, unseen = time.perf_counter(), []
-    with show_progress("making views") as show:
+    with show_progress(MAKING):
         for done, share in enumerate(_written(out, source, loaded, is_literal, pictures, given), 1):
             unseen.append(share)
-            show(done, len(pictures))
+            report_progress(done, len(pictures), MAKING)
     seconds = time.perf_counter() - start
     print(f"{len(pictures)} views in {seconds:.2f} s ({1000 * seconds / len(pictures):.1f} ms per view): {out}")
     notes = (*loaded.photo.notes, *loaded.disparity.notes, f"The photo was taken at {pictures[given].source}.")
@@ -98,9 +99,9 @@ def _written(
     """Write the views, one after the other; of each the share that the photo does not show. The folder is there when
     all have been taken.
     """
-    from iibr_core.generation.free_views import FreeViews, depths_of, reach_of
-    from iibr_core.generation.stored_views import encode_for_storage
-    from iibr_core.scenes.making import inpainting_aids
+    from iibr_core.beyond.free_cameras import FreeViews, depths_of, reach_of
+    from iibr_core.method.light_field import encode_for_storage
+    from iibr_core.scenes.photo import inpainting_aids
 
     photo, inverse_depth = photo_in_srgb(loaded.photo), _inverse_depth(loaded, is_literal, cameras[given])
     canvas = reach_of(cameras[given], cameras, depths_of(inverse_depth)).margins.around(photo.size)
@@ -118,7 +119,7 @@ def _written(
 
 def _inverse_depth(loaded: LoadedPhoto, is_literal: bool, camera: Camera) -> FloatImage:
     """1 / depth (H, W) of the photo in the unit of the poses. Raises InputError where disparity does not say it."""
-    from iibr_core.generation.free_views import inverse_depth_of
+    from iibr_core.beyond.free_cameras import inverse_depth_of
 
     values = loaded.disparity.values
     if not is_literal:

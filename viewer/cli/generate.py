@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from contextlib import closing
 from functools import partial
 from pathlib import Path
@@ -34,7 +35,7 @@ from viewer.cli.shared_options import (
     require_existing,
     require_model,
 )
-from viewer.cli.terminal import MAKING, print_depth, print_notes, show_progress, untimed
+from viewer.cli.terminal import print_depth, print_notes, show_progress
 from viewer.cli.view_writing import write_views
 
 if TYPE_CHECKING:
@@ -126,14 +127,12 @@ def _write_light_field(
 ) -> None:
     require_model(source.depth)
 
-    from iibr_core.scenes.loaded_photo import load_photo
-    from iibr_core.scenes.making import make_plan, views_of_photo
     from iibr_core.scenes.opening import scene_of_photo
+    from iibr_core.scenes.photo import load_photo, make_plan, views_of_photo
     from iibr_core.scenes.scene_gloss import add_gloss
 
-    with show_progress("reading") as show:
-        tell = untimed(show)
-        loaded = load_photo(source, report_progress=tell)
+    with show_progress("reading"):
+        loaded = load_photo(source)
         plan = make_plan(source, loaded, depth_strength, keeps_views=False)
         write = partial(
             write_light_field,
@@ -144,9 +143,9 @@ def _write_light_field(
             name=loaded.photo.name,
             with_disparity=with_disparity,
         )
-        with closing(views_of_photo(source, loaded, plan, report_progress=tell)) as made:
+        with closing(views_of_photo(source, loaded, plan)) as made:
             views = add_gloss(made, gloss, scene_of_photo(source, loaded, plan))
-            summary = write_views(views, write, loaded.photo.size, lambda share: show(share, 1.0, MAKING))
+            summary = write_views(views, write, loaded.photo.size, math.prod(grid))
     print(f"{summary}: {out}")
     print_notes(loaded.photo.notes + loaded.disparity.notes + plan.notes)
     print_depth(loaded.origin)

@@ -13,7 +13,7 @@ from iibr_core.types import InputError, ViewOffset
 from viewer.cli.shared_options import not_negative_from_text, number_option, view_from_text
 
 if TYPE_CHECKING:
-    from iibr_core.rendering.optics import Optics
+    from iibr_core.beyond.optics import Optics
     from iibr_core.scenes.lens_limits import LensChoice
     from iibr_core.scenes.scene import Scene
     from viewer.model.actions import Action

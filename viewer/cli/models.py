@@ -71,8 +71,8 @@ def get(
     if not yes and not _agrees():
         print("Nothing was downloaded.", file=sys.stderr)
         raise typer.Exit(EXIT_DECLINED)
-    with show_progress("downloading") as show:
-        fetched = fetch(model, show)
+    with show_progress("downloading"):
+        fetched = fetch(model)
     print(f"{fetched.folder} ({fetched.weight_bytes / 1e6:,.0f} MB, commit {model.commit})")
     print(f"Use it: iibr view PHOTO --depth-model {model.name}")
 

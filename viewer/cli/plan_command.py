@@ -13,8 +13,7 @@ def plan(photo: PhotoPath, scene: SceneOptions, focus_disparity: FocusDisparity 
 
     Example: iibr plan photo.png --disparity photo.pfm
     """
-    from iibr_core.scenes.loaded_photo import load_photo
-    from iibr_core.scenes.making import make_plan
+    from iibr_core.scenes.photo import load_photo, make_plan
 
     source = scene.source(photo, grid, focus_disparity)
     loaded = load_photo(source)

@@ -24,7 +24,6 @@ from viewer.cli.shared_options import (
     InvertDepth,
     MaxPixels,
     Metric,
-    QualityChoice,
     Refine,
     Stretch,
     given_options,
@@ -46,7 +45,6 @@ class PhotoOptions:
     metric: Metric = False
     stretch: Stretch = False
     max_pixels: MaxPixels = None
-    quality: QualityChoice = None
     inpaint: Inpaint = DEFAULT_INPAINTER
 
     @property
@@ -74,8 +72,7 @@ class PhotoOptions:
             raise InputError(
                 "--depth-strength, --focus-disparity: mean nothing to disparity that counts as it is given"
             )
-        choice, quality = self.depth_choice, self.quality
-        return Source(str(path), choice, grid, focus_disparity, self.max_pixels, quality, self.inpaint, is_literal)
+        return Source(str(path), self.depth_choice, grid, focus_disparity, self.max_pixels, self.inpaint, is_literal)
 
 
 @dataclass(frozen=True)

@@ -30,7 +30,7 @@ from viewer.cli.shared_options import (
     require_utf8,
     size_from_text,
 )
-from viewer.cli.terminal import print_depth, print_notes, show_progress, untimed
+from viewer.cli.terminal import print_depth, print_notes, show_progress
 
 if TYPE_CHECKING:
     from iibr_core.depth.choice import DepthOrigin
@@ -193,33 +193,30 @@ def _write(shot: _Shot, output: Path, ui: bool, backend: Backend) -> tuple[tuple
     with HeadlessViewer(backend.value) as viewer:
         if ui and not viewer.has_panels:
             raise InputError("--ui: the panels cannot be drawn through OSMesa; use EGL (install libegl1), or no --ui")
-        with show_progress("reading") as show:
-            tell = untimed(show)  # until it is known how much there is to draw
+        with show_progress("reading"):
             viewer.open_scene(
                 shot.source,
                 shot.depth_strength,
-                lambda made: tell(made.share, float(made.total > 0), made.doing),
                 shot.edits,
                 on_ready=shot.lens.require_within,
             )
             viewer.do(*shot.actions, *shot.lens.actions())
             size = _size_of(shot, viewer)
-            draws_long = not ui and viewer.draws_own_pixels(size)
             if ui or viewer.needs_views(size):
-                told = tell if draws_long else show
-                viewer.make_views(lambda made: told(made.share, 1.0, made.doing), only_seen=not ui)
+                viewer.make_views(only_seen=not ui)
             scene = viewer.scene
             saved = shot_of(viewer.state, size or scene.size, shot.form)
-        with show_progress("drawing") as show:
+        with show_progress("drawing"):
             if ui:
                 pixels = viewer.screen(shot.size or SCREEN_SIZE)
             else:
-                pixels = viewer.picture(size, is_float(output, shot.form), saved.color_space, show)
+                pixels = viewer.picture(size, is_float(output, shot.form), saved.color_space)
     if ui:
         export_image(output, pixels)
     else:
         export_picture(output, pixels, saved)
     clamped = shot.lens.notes(viewer.state.optics)
     # Where all of the photo's pixels are drawn, the size of the views does not matter.
-    notes = tuple(note for note in scene.notes if not (draws_long and note.startswith(MADE_SMALLER)))
+    draws_own = not ui and viewer.draws_own_pixels(size)
+    notes = tuple(note for note in scene.notes if not (draws_own and note.startswith(MADE_SMALLER)))
     return notes + clamped, scene.depth_origin

@@ -15,7 +15,11 @@ from iibr_core.formats.light_fields.write import WRITERS
 from iibr_core.inpainting.registry import INPAINTER_FORMS, require_inpainter
 from iibr_core.scenes.inputs import inputs_of
 from iibr_core.scenes.screen_size import ScreenSize
-from iibr_core.types import GridShape, InputError, Quality, ViewOffset
+from iibr_core.types import (
+    GridShape,
+    InputError,
+    ViewOffset,
+)
 
 if TYPE_CHECKING:
     from iibr_core.scenes.scene import Source
@@ -56,15 +60,6 @@ def view_from_text(text: str) -> ViewOffset:
     except (ValueError, typer.BadParameter):
         raise typer.BadParameter(f"{text!r} is no viewpoint: give S,T in view steps, as 2,-1.5") from None
     return ViewOffset(t, s)
-
-
-def quality_from_text(text: str) -> Quality:
-    """Where the ray transformer runs, by name. Raises BadParameter."""
-    qualities: tuple[Quality, ...] = get_args(Quality)
-    for quality in qualities:
-        if text == quality:
-            return quality
-    raise typer.BadParameter(f"{text!r} is no quality: give {' or '.join(qualities)}")
 
 
 def inpainter_from_text(text: str) -> str:
@@ -250,17 +245,6 @@ PhotoPose = Annotated[
 
 LightFieldFormat = Annotated[
     str, typer.Option("--format", parser=format_from_text, metavar="|".join(WRITERS), help="Layout of the folder.")
-]
-
-QualityChoice = Annotated[
-    Quality | None,
-    typer.Option(
-        "--quality",
-        parser=quality_from_text,
-        metavar="|".join(get_args(Quality)),
-        help="Where the trained ray transformer weighs the rays: nowhere, at depth edges.",
-        show_default="the plan's",
-    ),
 ]
 
 Inpaint = Annotated[

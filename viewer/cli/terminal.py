@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -17,11 +17,12 @@ from typer.core import TyperGroup
 from iibr_core.depth.choice import DepthOrigin
 from iibr_core.runtime.compiling import watch_compiling
 from iibr_core.runtime.time_left import TimeLeft, about_left
-from iibr_core.types import ReportProgress
+from iibr_core.runtime.work import watched
 
-MAKING = "making views"
 FORMER_NAMES = {"--out": "--output"}
-"""Of options: they are understood still, and no help speaks of them."""
+"""Former names of options, which are still understood."""
+FORMER_OPTIONS = ("--quality", "--memory")
+"""Options of earlier versions, each with a value, which are ignored."""
 RARELY_USED = ("evaluate", "train")
 
 
@@ -36,9 +37,7 @@ class Commands(TyperGroup):
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """The command's name, the command and its arguments. Raises UsageError where there is none of that name."""
-        args = [
-            FORMER_NAMES.get(name, name) + equals + value for name, equals, value in (a.partition("=") for a in args)
-        ]
+        args = _as_named_now(args)
         is_viewed = args[0] not in self.commands and _is_path(args[0])
         return super().resolve_command(ctx, ["view", *args] if is_viewed else args)
 
@@ -53,9 +52,16 @@ class Commands(TyperGroup):
             return super().invoke(ctx)
 
 
-def _as_named_now(word: str) -> str:
-    name, equals, value = word.partition("=")
-    return FORMER_NAMES.get(name, name) + equals + value
+def _as_named_now(words: list[str]) -> list[str]:
+    """Return the words of a command line without former options and with the present names of the others."""
+    found, rest = [], iter(words)
+    for word in rest:
+        name, equals, value = word.partition("=")
+        if name not in FORMER_OPTIONS:
+            found.append(FORMER_NAMES.get(name, name) + equals + value)
+        elif not equals:
+            next(rest, None)
+    return found
 
 
 def _is_path(word: str) -> bool:
@@ -87,17 +93,15 @@ def print_depth(origin: DepthOrigin | None) -> None:
 
 
 @contextmanager
-def show_progress(doing: str, counts: bool = False) -> Iterator[Callable[..., None]]:
-    """A bar on stderr while the block runs; call what is yielded with (done, total, what is being done): work, see
-    `TimeLeft`; a total of 0 is not known yet. counts: shows the numbers too.
-    """
+def show_progress(doing: str, counts: bool = False) -> Iterator[None]:
+    """Show what the block reports, see `report_progress`, as a bar on stderr. counts: with numbers."""
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
 
     console = Console(stderr=True)
     if not console.is_terminal:
         # A bar leaves empty lines there, and an error is to be the only line.
-        yield lambda *_: None
+        yield
         return
     time_left = TimeLeft()
     told = TextColumn("{task.fields[told]}")
@@ -107,22 +111,13 @@ def show_progress(doing: str, counts: bool = False) -> Iterator[Callable[..., No
         task = bar.add_task(doing, total=None, told="")
 
         def show(done: float, total: float, now: str = "") -> None:
-            left_s = time_left.update(done, total)
+            left_s = time_left.update(done, total, now)
             told = [f"{done:.0f} of {total:.0f}"] if counts and total else []
             told += [about_left(left_s)] if left_s else []
-            said = now or (MAKING if total else doing)
+            total_share = 1.0 if total else None
             bar.update(
-                task,
-                completed=time_left.share,
-                total=1.0 if total else None,
-                description=said,
-                told=", ".join(told),
+                task, completed=time_left.share, total=total_share, description=now or doing, told=", ".join(told)
             )
 
-        with watch_compiling(lambda words: show(0, 0, words)):
-            yield show
-
-
-def untimed(show: Callable[..., None]) -> ReportProgress:
-    """The share in words, without time: what follows takes longer or shorter."""
-    return lambda done, total, doing: show(0, 0, f"{doing or MAKING}, {done / total:.0%}" if total else doing)
+        with watch_compiling(lambda words: show(0, 0, words)), watched(show):
+            yield

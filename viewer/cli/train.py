@@ -60,10 +60,10 @@ def train_weights(
     """
     import torch
 
-    from iibr_core.ray_transformer.model import RayTransformer
     from iibr_core.training import trainer
     from iibr_core.training.batches import training_batch
     from iibr_core.training.losses import LossWeights
+    from iibr_core.training.model import RayTransformer
     from iibr_core.training.run_files import checkpoint_path
 
     config = trainer.TrainConfig(
@@ -85,7 +85,7 @@ def train_weights(
         return training_batch(step, seed)
 
     try:
-        with show_progress("training", counts=True) as show:
+        with show_progress("training", counts=True):
             about = {"command": published}
             trainer.train(
                 model,
@@ -95,7 +95,6 @@ def train_weights(
                 resume=resume,
                 may_replace=may_replace,
                 metadata=about,
-                report_progress=show,
             )
     except KeyboardInterrupt:
         if not is_file(checkpoint_path(out)):

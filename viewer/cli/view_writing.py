@@ -5,18 +5,17 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 
+from iibr_core.runtime.work import report_progress
+from iibr_core.scenes.scene import MAKING
 from iibr_core.types import ImageSize, ViewUpdate
 
 
 def write_views(
-    views: Iterator[ViewUpdate],
-    write: Callable[[Iterator[ViewUpdate]], None],
-    size: ImageSize,
-    report_share: Callable[[float], None],
+    views: Iterator[ViewUpdate], write: Callable[[Iterator[ViewUpdate]], None], size: ImageSize, total: int
 ) -> str:
     """Write views and return a sentence about their number, their size and the time that making them took.
 
-    write: writes all views. report_share: called with the share of the work that is done, 0 to 1.
+    write: writes all views. total: their number.
     """
     count, seconds = 0, 0.0
 
@@ -27,7 +26,7 @@ def write_views(
             seconds += time.perf_counter() - start
             count += 1
             yield view
-            report_share(view.share)
+            report_progress(count, total, MAKING)
             start = time.perf_counter()
 
     write(timed())

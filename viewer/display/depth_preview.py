@@ -10,9 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from iibr_core.depth.editing.edits import DepthEdits
-from iibr_core.scenes.loaded_photo import LoadedPhoto
-from iibr_core.scenes.making import still_disparity
-from iibr_core.scenes.scene import Scene
+from iibr_core.scenes.scene import LoadedPhoto, Scene, still_disparity
 from viewer.display.scene_view import SceneView
 from viewer.model.reducers.depth_editing_reducer import current_depth_settings
 from viewer.model.state.app_state import AppState

@@ -16,7 +16,7 @@ from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.scenes.rect import WHOLE, Rect
 from iibr_core.scenes.scene import Scene
 from iibr_core.scenes.screen_size import ScreenSize
-from iibr_core.types import DEFAULT_QUALITY, ViewUpdate
+from iibr_core.types import ViewUpdate
 from viewer.background.comparison_worker import ComparisonInputs, ComparisonResult, EntropyReady, PairReady, PairScored
 from viewer.background.job_threads import Failed
 from viewer.display.scene_view import SceneView
@@ -115,11 +115,11 @@ class InspectionView:
         if request is None or scene is None or field is None or view.generation != request.generation:
             return None
         if view.loaded is not None and scene.plan is not None:
-            return ComparisonInputs(scene.plan.quality, view.loaded, scene.plan, inpaint=scene.source.inpaint)
+            return ComparisonInputs(view.loaded, scene.plan, inpaint=scene.source.inpaint)
         if field.grid != scene.grid:
             return None
         stored = self._passes.read_view(field, *request.view)
-        return None if stored is None else ComparisonInputs(DEFAULT_QUALITY, stored=stored)
+        return None if stored is None else ComparisonInputs(stored=stored)
 
     def take(self, result: ComparisonResult) -> list[Action]:
         """Show what was found; what is to be known of it comes back as actions."""

@@ -4,7 +4,7 @@ program for the first time waits for its driver.
 
 from __future__ import annotations
 
-from iibr_core.rendering.optics import Optics
+from iibr_core.beyond.optics import Optics
 from iibr_core.types import ViewOffset
 from viewer.gpu.refocus.picture_drawing import PictureDrawing
 from viewer.gpu.refocus.picture_renderer import PREPARED_SIZE, Renderer

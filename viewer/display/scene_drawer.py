@@ -10,16 +10,16 @@ from typing import Any
 
 from numpy.typing import NDArray
 
+from iibr_core.beyond.optics import CENTRE
 from iibr_core.exports.render_settings import RenderSettings, require_size
 from iibr_core.exports.source import ExportSource, OpticsOf
-from iibr_core.generation.outer_views import ALL_VIEWS, WantedViews
 from iibr_core.rendering.gloss.gloss_settings import Gloss
-from iibr_core.rendering.optics import CENTRE
+from iibr_core.runtime.work import report_progress
 from iibr_core.scenes.lens_limits import LensChoice
-from iibr_core.scenes.opening import SceneReady, SceneRequest, ViewReady, results_of
-from iibr_core.scenes.scene import Scene, Source
+from iibr_core.scenes.opening import results_of
+from iibr_core.scenes.scene import MAKING, Scene, SceneReady, SceneRequest, Source, ViewReady
 from iibr_core.scenes.scene_gloss import answer
-from iibr_core.types import ReportProgress, ignore_progress
+from iibr_core.types import ViewOffset
 from viewer.display.scene_view import SceneView
 from viewer.gpu.headless_context import create_headless
 from viewer.gpu.refocus.views_seen import views_seen_by
@@ -33,14 +33,13 @@ def open_drawn(
     depth_strength: float,
     lens: LensChoice,
     on_ready: Callable[[Scene], None],
-    report_progress: ReportProgress = ignore_progress,
     optics_of: OpticsOf | None = None,
 ) -> ExportSource:
     """Open a scene with the drawer of this thread, see `OpenDrawn`; the previous scene can no longer be drawn."""
     if not hasattr(_own, "drawer"):
         _own.drawer = SceneDrawer()
     drawer: SceneDrawer = _own.drawer
-    return drawer.open(source, depth_strength, lens, on_ready, report_progress, optics_of)
+    return drawer.open(source, depth_strength, lens, on_ready, optics_of)
 
 
 class SceneDrawer:
@@ -64,27 +63,26 @@ class SceneDrawer:
         depth_strength: float,
         lens: LensChoice,
         on_ready: Callable[[Scene], None],
-        report_progress: ReportProgress = ignore_progress,
         optics_of: OpticsOf | None = None,
     ) -> ExportSource:
         """Open a scene, see `OpenDrawn`. Raises InputError without GL, too."""
-        wanted = ALL_VIEWS
+        wanted: set[ViewOffset] | None = None
         view = self._view = self._view or self._make_view()
         request = SceneRequest(0, source, depth_strength, takes_drafts=False)
-        results = results_of(request, lambda: CENTRE, lambda made: made.report_to(report_progress), lambda: wanted)
+        results = results_of(request, lambda: CENTRE, lambda: wanted)
         ready = next(results)
         assert isinstance(ready, SceneReady)
         on_ready(ready.scene)
         optics = lens.optics_on(ready.scene)
         if optics_of is not None:
-            wanted = WantedViews(views_seen_by(optics_of(ready.scene, optics), ready.scene.grid))
+            wanted = views_seen_by(optics_of(ready.scene, optics), ready.scene.grid)
         view.open(ready)
         for made in results:
             assert isinstance(made, ViewReady)
             view.add(made.view)
             view.upload_all()
-            made.progress.report_to(report_progress)
-        return ExportSource(ready.scene, ready.loaded, optics, self.draw, ignore_progress, view.centre)
+            report_progress(made.progress.done, made.progress.total, MAKING)
+        return ExportSource(ready.scene, ready.loaded, optics, self.draw, view.centre)
 
     def draw(self, settings: RenderSettings) -> NDArray[Any]:
         """Return a picture of the open scene, see `iibr_core.exports.source.Draw`."""

@@ -10,15 +10,19 @@ import time
 from collections import deque
 from dataclasses import replace
 
+from iibr_core.beyond.optics import CENTRE, Optics
 from iibr_core.rendering.gloss.gloss_settings import Gloss
-from iibr_core.rendering.optics import CENTRE, Optics
-from iibr_core.scenes.loaded_photo import LoadedPhoto
-from iibr_core.scenes.opening import SceneReady
 from iibr_core.scenes.rect import WHOLE, Rect
-from iibr_core.scenes.scene import Scene
+from iibr_core.scenes.scene import LoadedPhoto, Scene, SceneReady
 from iibr_core.scenes.scene_gloss import GlossFound, GlossRequest
 from iibr_core.scenes.screen_size import ScreenSize
-from iibr_core.types import FloatImage, GridShape, InputError, ViewOffset, ViewUpdate
+from iibr_core.types import (
+    FloatImage,
+    GridShape,
+    InputError,
+    ViewOffset,
+    ViewUpdate,
+)
 from viewer.display.picking import is_kept_for_picking, pick_disparity
 from viewer.display.snapshot import SceneSnapshot
 from viewer.gpu.context import GLContext

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from iibr_core.scenes.loaded_photo import LoadedPhoto
-from iibr_core.scenes.opening import SceneReady
-from iibr_core.scenes.scene import Scene
+from iibr_core.scenes.scene import LoadedPhoto, Scene, SceneReady
 from iibr_core.scenes.scene_gloss import GlossFound
 from iibr_core.types import ViewUpdate
 from viewer.gpu.context import GLContext

@@ -14,7 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.color import encoded_from_stored, linear_from_srgb
-from iibr_core.types import SRGB, FloatImage, GridShape, InputError, StoredColors
+from iibr_core.types import (
+    SRGB,
+    FloatImage,
+    GridShape,
+    InputError,
+    StoredColors,
+)
 from viewer.gpu.gloss_textures import GlossTextures
 from viewer.gpu.shared import Holders
 

@@ -75,7 +75,6 @@ KEY_WORDS = {
 """Of ImGui's names for keys, those that people write otherwise."""
 COMPARE_WORDS: dict[Comparison, str] = {
     "photo": "Compare photo and picture",
-    "quality": "Compare fast and balanced",
     "truth": "Compare with ground truth",
     "kept": "Compare with the snapshot",
     "difference": "Difference from the snapshot",

@@ -25,7 +25,7 @@ class InspectionRequest:
     """
 
     generation: int
-    kind: Literal["quality", "truth", "entropy"]
+    kind: Literal["truth", "entropy"]
     view: ViewIndex
     truth: GroundTruth | None = None
     is_scored: bool = False
@@ -82,7 +82,7 @@ def view_to_compare(scene: Scene, eye: ViewOffset, kind: Comparison, truth: Grou
     """Which view is compared from this viewpoint. The ground truth's own grid may have another size."""
     if kind == "photo":
         return scene.grid.centre
-    if kind == "quality" or truth is None:
+    if truth is None:
         return view_near(eye, scene.grid)
     reach = ((own - 1) / 2 for own in scene.grid)
     t, s = (at / r * ((n - 1) / 2) if r else 0.0 for at, r, n in zip(eye, reach, truth.grid))
@@ -104,14 +104,10 @@ def make_inspection_request(
     kind = inspection.comparison
     if inspection.overlay == "entropy":
         return InspectionRequest(state.generation, "entropy", view_near(state.optics.eye, scene.grid))
-    if kind is None or kind == "photo" or kind == "kept" or kind == "difference":
+    if kind != "truth":
         return None
     view = view_to_compare(scene, state.optics.eye, kind, inspection.truth)
-    wanted = InspectionRequest(
-        state.generation, kind, view, inspection.truth if kind == "truth" else None, not is_moving
-    )
-    if is_moving and kind == "quality":
-        return before if before is not None and (before.generation, before.kind) == (state.generation, kind) else None
+    wanted = InspectionRequest(state.generation, kind, view, inspection.truth, not is_moving)
     return before if is_moving and before == replace(wanted, is_scored=True) else wanted
 
 

@@ -12,19 +12,19 @@ import dataclasses
 import json
 from collections.abc import Collection, Iterator
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 import msgspec
 
+from iibr_core.beyond.optics import ApertureShape, Optics
 from iibr_core.depth.editing.edits import UNEDITED, DepthEdits, require_sound
 from iibr_core.formats.files import is_file, printable
 from iibr_core.formats.images.metadata import settings_text_in
 from iibr_core.rendering.gloss.gloss_settings import require_sound as require_sound_gloss
-from iibr_core.rendering.optics import ApertureShape, Optics
 from iibr_core.scenes.lens_limits import BLADES_LIMITS
 from iibr_core.scenes.scene import Source
 from iibr_core.scenes.screen_size import ScreenSize
-from iibr_core.types import GridShape, InputError, Quality
+from iibr_core.types import GridShape, InputError
 from viewer.model.painting_work import require_bounded
 from viewer.model.state.saving import SavedSettings
 
@@ -32,8 +32,8 @@ FORMAT = 1
 MOST_CHARACTERS = 16_000_000
 """A thousand strokes take 1.3 million."""
 MASK_LIMITS = (1, 4096)
-OF_THE_MACHINE = ("source.max_pixels", "source.memory_bytes")
-"""Written by earlier programs; a picture does not decide them."""
+FORMER_SETTINGS = ("source.max_pixels", "source.memory_bytes", "source.quality")
+"""Settings that earlier versions wrote; they are ignored."""
 UNKNOWN_TOLD = 3
 
 MOST_SIDE_PX, MOST_PIXELS = 16_384, 100_000_000
@@ -44,10 +44,7 @@ Views = Annotated[int, msgspec.Meta(ge=1, le=99)]
 
 
 class SourceText(msgspec.Struct, frozen=True, kw_only=True):
-    """What a picture keeps of a `Source`, by the names in its text: neither paths nor what is on one machine only.
-
-    quality: "exact" was written by earlier programs and counts as "balanced".
-    """
+    """What a picture keeps of a `Source`, by the names in its text: neither paths nor what is on one machine only."""
 
     disparity_scale: float | None = None
     invert_depth: bool = False
@@ -55,7 +52,6 @@ class SourceText(msgspec.Struct, frozen=True, kw_only=True):
     stretch: bool = False
     grid: tuple[Views, Views] | None = None
     focus_disparity: float | None = None
-    quality: Quality | Literal["exact"] | None
     refine: float = 1.0
 
 
@@ -123,7 +119,7 @@ def settings_from_text(text: str, name: str, folder: Path | None = None, is_own:
             f"{name}: its settings are damaged or of another program ({reason}); set them by hand"
         ) from error
     named = dict.fromkeys(unknown_fields(whole, msgspec.to_builtins(read)))
-    unknown = tuple(field for field in named if field not in OF_THE_MACHINE)
+    unknown = tuple(field for field in named if field not in FORMER_SETTINGS)
     optics, refused = _with_own_files(read.optics, folder)
     source = _source_from_text(Source(""), read.source)
     size = ScreenSize(*read.size_px)
@@ -207,7 +203,6 @@ def _text_of_source(source: Source) -> SourceText:
         stretch=source.depth.stretches,
         grid=source.grid,
         focus_disparity=source.focus_disparity,
-        quality=source.quality,
         refine=source.depth.refine,
     )
 
@@ -226,7 +221,6 @@ def _source_from_text(source: Source, text: SourceText) -> Source:
         ),
         grid=None if text.grid is None else GridShape(*text.grid),
         focus_disparity=text.focus_disparity,
-        quality="balanced" if text.quality == "exact" else text.quality,
     )
 
 

@@ -21,7 +21,6 @@ _WORDS = (
     (r"add --stretch if it shows the whole photo", "open it as a depth map if it shows the whole photo"),
     (r" \(--max-pixels \d+\)", ""),
     (r"`iibr models get ([\w.-]+)`|iibr models get ([\w.-]+)", r"the button below"),
-    (r"use --quality fast, or train them again with `iibr train`", "install the program again"),
     (r"give --force to replace it, or choose", "choose"),
     (r"--([a-z]+)-([a-z]+)", r"\1 \2"),
     (r"--([a-z]+)", r"\1"),

@@ -12,7 +12,6 @@ from imgui_bundle import imgui
 from iibr_core.runtime.time_left import about_left
 from iibr_core.scenes.lens_limits import aperture_limit
 from iibr_core.scenes.scene import Progress, Scene, Source, source_beside
-from iibr_core.types import DEFAULT_QUALITY
 from viewer.model.actions import Action, OpenPath, ResumeWork, StopWork
 from viewer.model.commands import BY_NAME
 from viewer.model.layout import Layout
@@ -95,12 +94,11 @@ def _picture(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
 
 
 def progress_text(progress: Progress) -> str:
-    """The progress in one short line: "23 of 81 views, about 3 s left", "sharpening edges" once all are there and some
-    are drafts, "81 of 81 views, 5 s" at the end; empty where nothing was asked for.
+    """Return the progress in one short line: "23 of 81 views, about 3 s left", "81 of 81 views, 5 s" at the end; empty
+    if nothing was asked for.
     """
-    is_sharpening = progress.drafts and progress.done == progress.total
-    counted = "sharpening edges" if is_sharpening else f"{progress.done} of {view_count_text(progress.total)}"
-    words = progress.doing or (counted if progress.total else "")
+    counted = f"{progress.done} of {view_count_text(progress.total)}" if progress.total else ""
+    words = progress.doing or counted
     if progress.is_complete:
         return f"{words}, {time_text(progress.seconds)}"
     return f"{words}, {about_left(progress.left_s)}" if progress.left_s is not None else words
@@ -134,10 +132,8 @@ def state_text(progress: Progress) -> str:
 
 
 def size_text(scene: Scene) -> str:
-    """Size, views, and how they are made where that is not the plain way: "600 × 400 px, 9 × 9 views, fast"."""
-    words = f"{scene.width} × {scene.height} px, {scene.grid.rows} × {scene.grid.columns} views"
-    is_plain = scene.plan is None or scene.source.quality in (None, DEFAULT_QUALITY)
-    return words if is_plain else f"{words}, {scene.source.quality}"
+    """Return size and views in words: "600 × 400 px, 9 × 9 views"."""
+    return f"{scene.width} × {scene.height} px, {scene.grid.rows} × {scene.grid.columns} views"
 
 
 def _tools(state: AppState, layout: Layout) -> list[Action]:

@@ -40,7 +40,12 @@ from iibr_core.runtime.kernels import kernel
 from iibr_core.runtime.tiling import in_bands
 from iibr_core.stages import ALL_STAGES, Stages
 from iibr_core.surfaces import EDGE_SHARE
-from iibr_core.types import FloatImage, ImageSize, InputError, image_size
+from iibr_core.types import (
+    FloatImage,
+    ImageSize,
+    InputError,
+    image_size,
+)
 
 WIDE_SIGMA_PX, WORK_SIGMA_PX = 4.5, 2.0
 """A map that is blurred by more than the first is sharpened at a size at which it is blurred by the second."""

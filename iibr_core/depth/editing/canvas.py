@@ -85,6 +85,10 @@ class DepthCanvas:
         self._edits, self._values, self._open = edits, values, None
         self._trail = [(len(edits.strokes), values)]
 
+    def renewed(self) -> DepthCanvas:
+        """Return a canvas of the same map without any edits."""
+        return DepthCanvas(self._photo, self._given)
+
     def strokes_ahead(self, edits: DepthEdits) -> int:
         """How many strokes `apply` would paint."""
         done, wanted = self._edits.strokes, edits.strokes

@@ -16,7 +16,7 @@ from iibr_core.depth.estimators.known_models import FAMILIES
 from iibr_core.depth.estimators.own_models import copy_own_model, list_own_models, own_name
 from iibr_core.depth.estimators.words import ModelState
 from iibr_core.formats.files import is_file, is_folder
-from iibr_core.types import InputError, ReportProgress, ignore_progress
+from iibr_core.types import InputError
 
 KNOWN_MODELS = tuple(model for family in FAMILIES for model in family.models)
 """Sizes and licences as published; the repository itself has the last word."""
@@ -107,13 +107,13 @@ def state_of(model: KnownModel) -> ModelState:
     return ModelState(model_here(model) is not None, needs, seconds_of(model.title))
 
 
-def fetch(model: KnownModel, report_progress: ReportProgress = ignore_progress) -> LocalModel:
+def fetch(model: KnownModel) -> LocalModel:
     """Download a model into the local Hugging Face cache.
 
     Raises as `download` does, and InputError where it has no weights that may be read.
     """
     family = family_of(model)
-    folder = download(model.repository, model.commit, family.fetched, report_progress)
+    folder = download(model.repository, model.commit, family.fetched)
     return LocalModel(model.title, folder, family, family.weights_in(folder))
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from iibr_core.depth.estimates import Estimate
 from iibr_core.runtime.extras import is_installed
-from iibr_core.types import ImageSize, Photo, ReportProgress
+from iibr_core.types import ImageSize, Photo
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ class LocalModel:
         return sum(path.stat().st_size for path in self.weights)
 
 
-Run = Callable[[Photo, ReportProgress], Estimate]
+Run = Callable[[Photo], Estimate]
 
 
 @dataclass(frozen=True)

@@ -27,7 +27,8 @@ from iibr_core.depth.estimators.hub import (
 )
 from iibr_core.formats.files import is_file, printable, read_text, reason_of, stays_within
 from iibr_core.formats.outputs import write_file
-from iibr_core.types import InputError, ReportProgress, ignore_progress
+from iibr_core.runtime.work import report_progress
+from iibr_core.types import InputError
 
 VERIFIED = "iibr-verified.json"
 """Beside downloaded files: the digest of each, by its name, as the hub states them."""
@@ -58,17 +59,15 @@ def download(
     repository: str,
     commit: str,
     patterns: Sequence[str],
-    report_progress: ReportProgress = ignore_progress,
 ) -> Path:
     """Bring those files of a commit that match a pattern into the hub's cache; returns their folder.
 
-    A file grows elsewhere in the cache and comes into the folder once it is what the hub states. report_progress: told
-    bytes that are here and bytes in all. Raises InputError where it fails. The next
-    call goes on from there.
+    A file grows elsewhere in the cache and comes into the folder once it is what the hub states. Raises
+    InputError where it fails. The next call goes on from there.
     """
     with failures_told(repository, hub_cache()):
         stated = _stated_files(repository, commit, patterns)
-        folder = _fetch(repository, commit, stated, report_progress)
+        folder = _fetch(repository, commit, stated)
         digests = {name: file.digest for name, file in stated.items()}
         for name in _unlike(folder, digests):
             _remove(folder / name)
@@ -126,7 +125,6 @@ def _fetch(
     repository: str,
     commit: str,
     stated: Mapping[str, _StatedFile],
-    report_progress: ReportProgress,
 ) -> Path:
     """Files that are there stay as they are."""
     cache = _model_cache(repository)

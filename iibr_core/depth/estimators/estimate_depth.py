@@ -15,13 +15,13 @@ from iibr_core.depth.estimators.config import CONFIG, PREPROCESSOR
 from iibr_core.depth.estimators.depth_estimator import LocalModel
 from iibr_core.depth.estimators.download import require_unchanged
 from iibr_core.runtime.machine import free_memory_bytes
-from iibr_core.types import InputError, Photo, ReportProgress, ignore_progress
+from iibr_core.runtime.work import report_progress
+from iibr_core.types import InputError, Photo
 
 
 def estimate_with(
     model: LocalModel,
     photo: Photo,
-    report_progress: ReportProgress = ignore_progress,
 ) -> Estimate:
     """What a model makes of a photo, at a size of the model's choosing; from the cache where it is there.
 
@@ -37,7 +37,7 @@ def estimate_with(
     found = estimate_cache.load(key)
     if found is None:
         begun_s = time.monotonic()
-        found = run(photo, report_progress)
+        found = run(photo)
         _require_use(model, found)
         estimate_cache.store(key, found)
         estimate_cache.store_seconds(model.title, time.monotonic() - begun_s)

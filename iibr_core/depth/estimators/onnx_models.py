@@ -19,8 +19,8 @@ from iibr_core.depth.estimators.depth_estimator import Family, KnownModel, Local
 from iibr_core.depth.estimators.onnx_file import depth_output, external_files, open_session, picture_input
 from iibr_core.depth.estimators.preparation import Preparation, affordable_pixels, input_size, network_input
 from iibr_core.formats.files import is_file, reason_of
-from iibr_core.runtime.work import Cancelled, is_stopped
-from iibr_core.types import ImageSize, InputError, Photo, ReportProgress
+from iibr_core.runtime.work import Cancelled, is_stopped, report_progress
+from iibr_core.types import ImageSize, InputError, Photo
 
 USUAL_PREPARATION = Preparation(ImageSize(518, 518), True, 14, False, (0.485, 0.456, 0.406), (0.229, 0.224, 0.225))
 """As Depth Anything V2 publishes it: for files without a preprocessor_config.json."""
@@ -59,7 +59,7 @@ def input_for(model: LocalModel, size: ImageSize, memory_bytes: int) -> OnnxInpu
     return OnnxInput(preparation, input_size(preparation, size, pixels), is_metric)
 
 
-def run_onnx(model: LocalModel, wanted: OnnxInput, photo: Photo, report_progress: ReportProgress) -> Estimate:
+def run_onnx(model: LocalModel, wanted: OnnxInput, photo: Photo) -> Estimate:
     """Depth of a photo in sRGB, at the size of the model's output; non-finite values as they come.
 
     Raises InputError where the file is no depth model.

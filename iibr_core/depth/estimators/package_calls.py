@@ -13,7 +13,12 @@ import numpy as np
 from iibr_core.depth.estimates import Estimate
 from iibr_core.depth.estimators.depth_estimator import LocalModel, Run
 from iibr_core.formats.files import reason_of
-from iibr_core.types import FloatImage, ImageSize, InputError, Photo, ReportProgress
+from iibr_core.types import (
+    FloatImage,
+    ImageSize,
+    InputError,
+    Photo,
+)
 
 # What foreign packages raise for weights or photos that do not suit them.
 FAILURES = (OSError, ValueError, RuntimeError, KeyError, TypeError, ImportError, AttributeError, AssertionError)
@@ -23,7 +28,7 @@ def prepare_by(call: Callable[[LocalModel, Photo], Estimate]) -> Callable[..., t
     """A family's `prepare`, of one call that makes everything; what the package raises becomes InputError."""
 
     def prepare(model: LocalModel, size: ImageSize, memory_bytes: int) -> tuple[object, Run]:
-        def run(photo: Photo, report_progress: ReportProgress) -> Estimate:
+        def run(photo: Photo) -> Estimate:
             try:
                 return call(model, photo)
             except FAILURES as error:

@@ -19,8 +19,14 @@ from iibr_core.depth.estimators.depth_estimator import Family, KnownModel, Local
 from iibr_core.depth.estimators.preparation import Preparation, affordable_pixels, input_size, network_input
 from iibr_core.formats.files import is_folder, reason_of
 from iibr_core.runtime.machine import core_count
-from iibr_core.runtime.work import raise_if_stopped
-from iibr_core.types import FloatImage, ImageSize, InputError, Photo, ReportProgress, image_size
+from iibr_core.runtime.work import raise_if_stopped, report_progress
+from iibr_core.types import (
+    FloatImage,
+    ImageSize,
+    InputError,
+    Photo,
+    image_size,
+)
 
 if TYPE_CHECKING:
     import torch
@@ -81,9 +87,7 @@ def _width_of(config: dict[str, Any]) -> int:
     return width if isinstance(width, int) and width > 0 else 1024
 
 
-def run_transformers(
-    model: LocalModel, wanted: TransformersInput, photo: Photo, report_progress: ReportProgress
-) -> Estimate:
+def run_transformers(model: LocalModel, wanted: TransformersInput, photo: Photo) -> Estimate:
     """Depth of a photo in sRGB, at the size of the model's output; non-finite values as they come.
 
     Raises InputError where the folder holds something else than a depth model.
@@ -97,7 +101,7 @@ def run_transformers(
     pixels = _network_tensor(photo.pixels, wanted).to(device)
     doing = f"estimating depth with {model.title}"
     try:
-        with torch.inference_mode(), _LayerProgress(network, doing, report_progress):
+        with torch.inference_mode(), _LayerProgress(network, doing):
             output = network.to(device)(pixel_values=pixels)
     except (RuntimeError, ValueError, IndexError, TypeError) as error:
         raise InputError(f"{model.title} failed on this photo ({reason_of(error)})") from error
@@ -127,9 +131,9 @@ def _load_network(model: LocalModel) -> Any:
 class _LayerProgress:
     """While it is entered, a network asks before each of its layers whether to go on, and tells how far it is."""
 
-    def __init__(self, network: torch.nn.Module, doing: str, report_progress: ReportProgress) -> None:
+    def __init__(self, network: torch.nn.Module, doing: str) -> None:
         self._layers = [layer for layer in network.modules() if not any(layer.children())]
-        self._doing, self._report_progress = doing, report_progress
+        self._doing = doing
         self._seen = 0
 
     def __enter__(self) -> None:
@@ -143,7 +147,7 @@ class _LayerProgress:
         raise_if_stopped()
         self._seen += 1
         # A layer that runs twice must not make it more than all.
-        self._report_progress(min(self._seen, len(self._layers)), len(self._layers), self._doing)
+        report_progress(min(self._seen, len(self._layers)), len(self._layers), self._doing)
 
 
 def _network_tensor(pixels: FloatImage, wanted: TransformersInput) -> torch.Tensor:

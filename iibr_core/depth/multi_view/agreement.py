@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from iibr_core.color import encoded_from_stored
 from iibr_core.inpainting.disparity_by_color import fill_disparity_by_color
-from iibr_core.runtime.work import raise_if_stopped
-from iibr_core.types import FloatImage, ReportProgress, StoredColors, ViewOffset, ignore_progress
+from iibr_core.runtime.work import raise_if_stopped, report_progress
+from iibr_core.types import FloatImage, StoredColors, ViewOffset
 
 AGREE_PX = 1.0
 """Two maps that place a point within so many pixels, seen from each other's view, agree."""
@@ -24,7 +24,6 @@ def reconcile(
     views: Sequence[StoredColors],
     maps: Sequence[FloatImage],
     offsets: Sequence[ViewOffset],
-    report_progress: ReportProgress = ignore_progress,
 ) -> list[FloatImage]:
     """The maps, (H, W) each, with what the others do not bear out filled by what looks like it around; a map that
     nothing bears out stays as it is. views: (H, W, 3) each.

@@ -19,13 +19,12 @@ from iibr_core.formats.maps.resample import resample_surfaces
 from iibr_core.inpainting.disparity_by_color import fill_disparity_by_color
 from iibr_core.runtime.kernels import kernel
 from iibr_core.runtime.tiling import in_bands
+from iibr_core.runtime.work import report_progress
 from iibr_core.types import (
     FloatImage,
     InputError,
-    ReportProgress,
     StoredColors,
     ViewOffset,
-    ignore_progress,
     image_size,
 )
 
@@ -52,13 +51,10 @@ FEW_VIEWS = 4
 
 @dataclass(frozen=True, eq=False)
 class CoarseDisparity:
-    """values: (H, W) at the size of the views, from a small map. range_px: least and greatest that the whole map may
-    have, px per view step. times_dearer: the whole map takes about so many times as long as the small one took.
-    """
+    """A first map. values: (H, W) at the size of the views. range_px: limits of the final map, in px per view step."""
 
     values: FloatImage
     range_px: tuple[float, float]
-    times_dearer: float
 
 
 def estimate_coarse(views: Sequence[StoredColors], offsets: Sequence[ViewOffset], reference: int) -> CoarseDisparity:
@@ -83,10 +79,7 @@ def estimate_coarse(views: Sequence[StoredColors], offsets: Sequence[ViewOffset]
     low, high = np.quantile(values[is_sure] if is_sure.any() else values, [RARE, 1 - RARE])
     margin = MARGIN_STEPS * step
     whole = resample_surfaces(np.clip(values, low, high) * np.float32(shrink), size)
-    range_px = float(low - margin) * shrink, float(high + margin) * shrink
-    took = (map_work(len(disparities), len(small.textures)) - REFINING_WORK) * small.luma.size
-    takes = map_work(sweep_steps(range_px, small.reach) + 1, len(small.textures)) * views[reference].size / 3
-    return CoarseDisparity(whole, range_px, takes / took)
+    return CoarseDisparity(whole, (float(low - margin) * shrink, float(high + margin) * shrink))
 
 
 def estimate_disparity(
@@ -94,7 +87,6 @@ def estimate_disparity(
     offsets: Sequence[ViewOffset],
     reference: int,
     range_px: tuple[float, float],
-    report_progress: ReportProgress = ignore_progress,
 ) -> FloatImage:
     """The disparity (H, W) of the reference view, px per view step, within a range (px per view step).
 

@@ -22,9 +22,15 @@ from iibr_core.depth.multi_view.estimate_disparity import (
     sweep_steps,
 )
 from iibr_core.inpainting.disparity_by_color import fill_disparity_by_color
-from iibr_core.rendering.photo_rays import rays_of_photo
-from iibr_core.rendering.renderer import open_renderer
-from iibr_core.types import FloatImage, ReportProgress, StoredColors, ViewOffset, ignore_progress, image_size
+from iibr_core.method.rays import rays_of_photo
+from iibr_core.method.view import Renderer
+from iibr_core.runtime.work import part_of_job, report_progress
+from iibr_core.types import (
+    FloatImage,
+    StoredColors,
+    ViewOffset,
+    image_size,
+)
 
 CARRIED_FROM = 4
 """So many maps at most, the nearest first, are carried to a view."""
@@ -36,7 +42,6 @@ def estimate_all(
     views: Sequence[StoredColors],
     offsets: Sequence[ViewOffset],
     range_px: tuple[float, float],
-    report_progress: ReportProgress = ignore_progress,
 ) -> list[FloatImage]:
     """The disparity (H, W) of each view, px per view step, within a range (`estimate_coarse` finds it), in agreement
     with the others.
@@ -49,11 +54,9 @@ def estimate_all(
     done, reconciling = 0.0, RECONCILE_WORK * len(views) ** 2
     total = sum(matching.values()) + len(between) + reconciling
 
-    def stage(before: float, work: float) -> ReportProgress:
-        return lambda part, whole, doing: report_progress(before + work * part / whole, total, doing)
-
     for index, work in matching.items():
-        maps[index] = estimate_disparity(views, offsets, index, range_px, stage(done, work))
+        with part_of_job(done, work, total):
+            maps[index] = estimate_disparity(views, offsets, index, range_px)
         done += work
     matched = dict(maps)
     for index in sorted(between):
@@ -62,7 +65,8 @@ def estimate_all(
         done += 1
         report_progress(done, total, FINDING)
     ordered = [maps[index] for index in range(len(views))]
-    return reconcile(views, ordered, offsets, stage(done, reconciling))
+    with part_of_job(done, reconciling, total):
+        return reconcile(views, ordered, offsets)
 
 
 def _matching_work(offsets: Sequence[ViewOffset], index: int, range_px: tuple[float, float]) -> float:
@@ -98,11 +102,10 @@ def _carry(
         return ViewOffset(at.t - offsets[other].t, at.s - offsets[other].s)
 
     nearest = sorted(maps, key=lambda other: hypot(*away(other)))[:CARRIED_FROM]
-    with open_renderer() as renderer:
-        for other in nearest:
-            rays = rays_of_photo(encoded_from_stored(views[other]), maps[other], max(map(abs, away(other))), 0)
-            seen, _ = renderer.seen(rays, away(other))
-            np.copyto(carried, seen.disparity, where=np.isnan(carried) & ~seen.occluded)
+    for other in nearest:
+        rays = rays_of_photo(encoded_from_stored(views[other]), maps[other], max(map(abs, away(other))), 0)
+        seen, _ = Renderer().visible(rays, away(other))
+        np.copyto(carried, seen.disparity, where=np.isnan(carried) & ~seen.occluded)
     if np.isnan(carried).all():
         return maps[nearest[0]]
     return fill_disparity_by_color(encoded_from_stored(views[index]), carried)

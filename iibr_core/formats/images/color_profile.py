@@ -28,7 +28,12 @@ from iibr_core.formats.images.color_primaries import (
 from iibr_core.formats.images.hdr import hlg_display_light, hlg_scene_light, pq_light
 from iibr_core.formats.images.picture import Picture
 from iibr_core.runtime.resources import resource_folder
-from iibr_core.types import DISPLAY_P3, SRGB, ColorSpace, FloatImage
+from iibr_core.types import (
+    DISPLAY_P3,
+    SRGB,
+    ColorSpace,
+    FloatImage,
+)
 
 KNOTS = 65536
 """Number of values of a curve: one for each value of 16 bits."""

@@ -26,7 +26,12 @@ from PIL import Image
 from iibr_core.formats.images.decode import read_size, read_text
 from iibr_core.formats.images.heic import heic_info, is_heic
 from iibr_core.formats.images.pillow_reader import EXIF_ERRORS, EXIF_FOLDER, ORIENTATION_TAG
-from iibr_core.types import SRGB, ColorSpace, ImageSize, InputError
+from iibr_core.types import (
+    SRGB,
+    ColorSpace,
+    ImageSize,
+    InputError,
+)
 
 GPS_FOLDER = 0x8825
 MAKER_NOTE, INTEROPERABILITY, COLOR_SPACE, WIDTH, HEIGHT = 0x927C, 0xA005, 0xA001, 0xA002, 0xA003

@@ -27,7 +27,13 @@ from iibr_core.formats.images.pillow_reader import DECODE_ERRORS
 from iibr_core.formats.images.side_by_side import left_picture, photo_size
 from iibr_core.runtime.kernels import kernel
 from iibr_core.runtime.work import raise_if_stopped
-from iibr_core.types import SRGB, FloatImage, ImageSize, InputError, Photo
+from iibr_core.types import (
+    SRGB,
+    FloatImage,
+    ImageSize,
+    InputError,
+    Photo,
+)
 
 DEFAULT_MAX_PIXELS = 2_000_000
 DEFAULT_FOV_DEG = 50.0

@@ -12,7 +12,13 @@ from pathlib import Path
 
 from iibr_core.formats.files import entries_of, is_file
 from iibr_core.formats.images.picture_source import PictureSource, source_size
-from iibr_core.types import Camera, GridShape, ImageSize, InputError, ViewOffset
+from iibr_core.types import (
+    Camera,
+    GridShape,
+    ImageSize,
+    InputError,
+    ViewOffset,
+)
 
 PICTURE_EXTENSIONS = (".png", ".jpg", ".jpeg", ".ppm", ".exr", ".tif", ".tiff", ".bmp", ".webp")
 """Endings of views; the first one counts where a view exists in several kinds."""

@@ -14,7 +14,12 @@ from iibr_core.formats.images.side_by_side import refuse_raw_light_field, side_b
 from iibr_core.formats.light_fields.multi_view_scene import GridIndex, KnownView, MultiView
 from iibr_core.formats.light_fields.write import LENSLET_KEY, LENSLET_TAG
 from iibr_core.formats.quilts import TAG, Quilt, quilt_named
-from iibr_core.types import GridShape, ImageSize, InputError, ViewOffset
+from iibr_core.types import (
+    GridShape,
+    ImageSize,
+    InputError,
+    ViewOffset,
+)
 
 MAX_ASPECT_ERROR = 0.02
 """Share by which the shape of a tile may differ from the displayed shape without stretching: sides are whole pixels."""

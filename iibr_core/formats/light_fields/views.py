@@ -11,7 +11,15 @@ from iibr_core.formats.images.picture import Picture
 from iibr_core.formats.images.picture_source import PictureSource, part_of, read_source
 from iibr_core.formats.light_fields.multi_view_scene import GridIndex, MultiView, common_size
 from iibr_core.formats.maps.disparity_file import read_disparity
-from iibr_core.types import FloatImage, GridShape, ImageSize, InputError, StoredColors, ViewUpdate, image_size
+from iibr_core.types import (
+    FloatImage,
+    GridShape,
+    ImageSize,
+    InputError,
+    StoredColors,
+    ViewUpdate,
+    image_size,
+)
 
 
 def grid_of(scene: MultiView) -> GridShape:

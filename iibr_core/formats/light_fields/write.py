@@ -15,7 +15,13 @@ from iibr_core.color import bytes_from_encoded, encoded_from_stored
 from iibr_core.formats.images.write import write_image  # brings numba, which errors should not wait for
 from iibr_core.formats.light_fields.parameters import FILE_NAME
 from iibr_core.formats.outputs import check_output, check_output_folder, write_folder
-from iibr_core.types import GridShape, ImageSize, InputError, ViewUpdate, image_size
+from iibr_core.types import (
+    GridShape,
+    ImageSize,
+    InputError,
+    ViewUpdate,
+    image_size,
+)
 
 WRITERS = ("hci", "eslf")
 """Layouts that can be written, by the names that people type."""

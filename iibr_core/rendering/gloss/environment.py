@@ -6,7 +6,7 @@ from math import pi
 
 import numpy as np
 
-from iibr_core.rendering.resized_light import mean_of_areas
+from iibr_core.beyond.resized_light import mean_of_areas
 from iibr_core.runtime.kernels import kernel
 from iibr_core.runtime.tiling import in_bands
 from iibr_core.types import FloatImage, ImageSize, image_size

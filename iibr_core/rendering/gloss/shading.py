@@ -24,7 +24,13 @@ from iibr_core.runtime.kernels import kernel
 from iibr_core.runtime.scalars import linear_scalar, srgb_scalar
 from iibr_core.runtime.tiling import in_bands
 from iibr_core.surfaces import EDGE_PX
-from iibr_core.types import FloatImage, GridShape, ViewOffset, ViewUpdate, image_size
+from iibr_core.types import (
+    FloatImage,
+    GridShape,
+    ViewOffset,
+    ViewUpdate,
+    image_size,
+)
 
 FIXED_POINT_STEPS = 4
 NO_ENVIRONMENT = np.zeros((1, 2, 3), np.float32)

@@ -20,7 +20,12 @@ from iibr_core.depth.estimators.onnx_file import depth_output
 from iibr_core.depth.estimators.onnx_models import USUAL_PREPARATION
 from iibr_core.depth.search import open_with_depth
 from iibr_core.formats.images.write import write_image
-from iibr_core.types import FloatImage, ImageSize, InputError, Photo
+from iibr_core.types import (
+    FloatImage,
+    ImageSize,
+    InputError,
+    Photo,
+)
 from tests.iibr_core.depth.onnx_graphs import of_channels, weighing
 
 SIZE = ImageSize(56, 84)

@@ -28,8 +28,13 @@ from iibr_core.depth.estimators.onnx_models import USUAL_PREPARATION, OnnxInput,
 from iibr_core.depth.estimators.preparation import network_input
 from iibr_core.depth.search import open_with_depth
 from iibr_core.formats.images.write import write_image
-from iibr_core.runtime.work import Cancelled, stoppable
-from iibr_core.types import FloatImage, ImageSize, InputError, Photo, ignore_progress
+from iibr_core.runtime.work import Cancelled, ignore_progress, stoppable
+from iibr_core.types import (
+    FloatImage,
+    ImageSize,
+    InputError,
+    Photo,
+)
 from tests.iibr_core.depth.onnx_graphs import of_channels, weighing
 from tests.iibr_core.depth.random_networks import export_depth_anything
 from tests.iibr_core.depth.test_transformers_models import depth_anything as depth_anything_folder

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from iibr_core.generation.view_maker import ViewMaker, quantise_as_stored
 from PIL import Image
 
 from iibr_core.depth.choice import DepthChoice
@@ -27,11 +28,16 @@ from iibr_core.evaluation.tables import ABOUT_CONSISTENCY
 from iibr_core.evaluation.trials import CENTRE_TRIAL, CORNER_TRIAL, trial_input, trials_of
 from iibr_core.formats.images.photo import read_photo
 from iibr_core.formats.light_fields.multi_view_scene import MultiView
-from iibr_core.generation.light_field import generate
-from iibr_core.generation.view_maker import ViewMaker, quantise_as_stored
+from iibr_core.method.light_field import generate
 from iibr_core.runtime import tiling
 from iibr_core.runtime.work import Cancelled, stoppable
-from iibr_core.types import FloatImage, GridShape, InputError, Quality, ViewOffset
+from iibr_core.types import (
+    FloatImage,
+    GridShape,
+    InputError,
+    Quality,
+    ViewOffset,
+)
 from tests.iibr_core.known_scenes import HEIGHT, WIDTH, disparity_of_square, view_of_square, write_grid, write_numbered
 from tests.iibr_core.scenes import disparity_of, literal_plan, photo_of
 

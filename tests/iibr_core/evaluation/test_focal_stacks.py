@@ -24,8 +24,13 @@ from iibr_core.evaluation.lens_picture import read_lens_picture
 from iibr_core.evaluation.metrics import psnr
 from iibr_core.evaluation.reference_warp import reference_warp
 from iibr_core.evaluation.results import EvaluationResult
-from iibr_core.generation.light_field import generate
-from iibr_core.types import Disparity, FloatImage, InputError, ViewOffset
+from iibr_core.method.light_field import generate
+from iibr_core.types import (
+    Disparity,
+    FloatImage,
+    InputError,
+    ViewOffset,
+)
 from tests.iibr_core.evaluation.test_metrics import networks  # noqa: F401
 from tests.iibr_core.known_scenes import WALL, disparity_of_square, offsets_of, view_of_wall, write_grid
 from tests.iibr_core.lens_scenes import FOLDER, GRID, MOST_PIXELS, NAMES, LensScene, lens_scene

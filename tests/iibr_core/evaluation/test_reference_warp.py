@@ -13,7 +13,7 @@ from iibr_core.evaluation.consistency import LineView, consistency, disagreement
 from iibr_core.evaluation.metrics import psnr
 from iibr_core.evaluation.reference_warp import LOBES, SAMPLES, reference_warp, reference_warp_to
 from iibr_core.evaluation.trials import warp_disparity
-from iibr_core.rendering.rendered_view import RenderedView
+from iibr_core.method.view import View
 from iibr_core.types import ImageSize, ViewOffset
 from tests.iibr_core.known_scenes import (
     FOREGROUND,
@@ -156,12 +156,12 @@ def test_a_fit_never_takes_views_farther_from_the_true_ones(blur: float) -> None
     assert after >= before
 
 
-def rendered(offset: ViewOffset, shift_px: float = 0.0, inpainted: bool = False) -> RenderedView:
+def rendered(offset: ViewOffset, shift_px: float = 0.0, inpainted: bool = False) -> View:
     """The wall, perfectly seen; shift_px: moved to the right by mistake."""
     colors = view_of_wall(ViewOffset(offset.t, offset.s - shift_px / WALL))
     disparity = np.full((HEIGHT, WIDTH), WALL, np.float32)
     everywhere = np.full((HEIGHT, WIDTH), inpainted)
-    return RenderedView(colors, disparity, everywhere, everywhere)
+    return View(colors, disparity, everywhere, everywhere)
 
 
 def test_views_of_one_wall_agree() -> None:
@@ -181,7 +181,7 @@ def test_views_of_one_wall_agree() -> None:
 
 def test_content_that_differs_between_views_is_found() -> None:
     one, other = rendered(CENTRE), rendered(ViewOffset(0.0, 2.0))
-    darker = RenderedView(other.colors - np.float32(10 / 255), other.disparity, other.occluded, other.inpainted)
+    darker = View(other.colors - np.float32(10 / 255), other.disparity, other.occluded, other.inpainted)
     differences, in_hole = disagreement(one, darker, CENTRE, ViewOffset(0.0, 2.0))
     assert not in_hole.any()
     assert differences.mean() == pytest.approx(-10, abs=0.1)

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 from PIL import Image, ImageSequence
 
+from iibr_core.beyond.optics import Optics
 from iibr_core.exports.animation import optics_on_path
 from iibr_core.exports.kinds import ANIMATIONS, EXPORTS, ExportOptions, with_defaults
 from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.exports.source import ExportSource
-from iibr_core.rendering.optics import Optics
 from iibr_core.scenes.lens_limits import aperture_limit
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import InputError, ViewOffset

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from iibr_core.beyond.optics import Optics
 from iibr_core.exports.kinds import (
     EXPORTS,
     ExportOptions,
@@ -14,7 +15,6 @@ from iibr_core.exports.kinds import (
 )
 from iibr_core.exports.source import ExportSource
 from iibr_core.formats.outputs import AlreadyThereError
-from iibr_core.rendering.optics import Optics
 from iibr_core.scenes.scene import Scene, Source
 from iibr_core.types import GridShape, InputError
 from tests.iibr_core.exports.conftest import exported

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from iibr_core.beyond.optics import Optics
 from iibr_core.exports.framing import side_pictures
 from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.exports.source import ExportSource
-from iibr_core.rendering.optics import Optics
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, InputError, ViewOffset
 from tests.iibr_core.exports.conftest import exported

@@ -13,11 +13,11 @@ import pytest
 from PIL import Image
 from plyfile import PlyData
 
+from iibr_core.beyond.optics import Optics
 from iibr_core.exports.cameras import cameras_of
 from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.exports.source import ExportSource
 from iibr_core.formats.maps.pfm import read_pfm
-from iibr_core.rendering.optics import Optics
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import InputError, ViewOffset, ViewUpdate
 from tests.iibr_core.exports.conftest import exported

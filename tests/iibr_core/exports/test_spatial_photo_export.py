@@ -8,11 +8,11 @@ import numpy as np
 import pillow_heif
 import pytest
 
+from iibr_core.beyond.optics import Optics
 from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.exports.source import ExportSource
 from iibr_core.formats.images.photo import read_photo
 from iibr_core.formats.images.spatial_photo import write_spatial_photo
-from iibr_core.rendering.optics import Optics
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import ViewOffset
 from tests.iibr_core.exports.conftest import exported

@@ -9,12 +9,12 @@ import OpenImageIO as oiio
 import pytest
 from PIL import Image
 
+from iibr_core.beyond.optics import Optics
 from iibr_core.color import srgb_from_linear
 from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.exports.source import ExportSource
 from iibr_core.exports.stack import focal_stack
 from iibr_core.formats.maps.pfm import read_pfm
-from iibr_core.rendering.optics import Optics
 from iibr_core.runtime.work import Cancelled, stoppable
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import InputError

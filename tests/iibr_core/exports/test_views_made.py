@@ -13,7 +13,7 @@ import pytest
 from iibr_core.exports import source as export_source
 from iibr_core.exports.kinds import EXPORTS, ExportOptions, export_path
 from iibr_core.exports.source import ExportSource, open_for_export, write_export
-from iibr_core.scenes import making, opening
+from iibr_core.scenes import opening, photo
 from iibr_core.scenes.lens_limits import LensChoice
 from iibr_core.scenes.scene import Source
 from iibr_core.types import GridShape, InputError, ViewUpdate
@@ -44,7 +44,7 @@ def new_views(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[ViewUpdate]]:
     views: list[ViewUpdate] = []
 
     def counted(*arguments: Any, **named: Any) -> Iterator[ViewUpdate]:
-        for view in making.views_of_photo(*arguments, **named):
+        for view in photo.views_of_photo(*arguments, **named):
             views.extend([view] if (view.row, view.column) != (2, 2) else [])
             yield view
 

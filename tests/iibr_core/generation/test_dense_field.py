@@ -3,16 +3,26 @@
 import numpy as np
 import pytest
 
+from iibr_core.beyond.between_views import (
+    BESIDE_WEIGHT,
+    GivenView,
+    densify,
+    require_steps,
+)
 from iibr_core.color import bytes_from_encoded, encoded_from_stored
 from iibr_core.evaluation.metrics import bounded_psnr
-from iibr_core.generation.dense_field import BESIDE_WEIGHT, GivenView, densify, require_steps
-from iibr_core.generation.light_field import generate
-from iibr_core.rendering.photo_rays import rays_of_photo
-from iibr_core.rendering.view_synthesis import ViewSynthesis
+from iibr_core.method.light_field import generate
+from iibr_core.method.rays import rays_of_photo
+from iibr_core.method.view import Renderer
 from iibr_core.runtime.work import stoppable
 from iibr_core.training.scenes.random_scene import random_scene
 from iibr_core.training.scenes.raycast import render
-from iibr_core.types import GridShape, ImageSize, InputError, ViewOffset
+from iibr_core.types import (
+    GridShape,
+    ImageSize,
+    InputError,
+    ViewOffset,
+)
 from tests.iibr_core.scenes import by_index, disparity_of, literal_plan, photo_of, smooth_texture
 
 SPARSE, DENSE = GridShape(3, 3), GridShape(5, 5)
@@ -62,7 +72,7 @@ def test_a_view_is_the_mean_of_what_the_views_around_show_by_nearness_and_covera
     made = by_index(list(densify(given, SPARSE, GridShape(7, 7))))[1, 4]
     total, weights = np.zeros((*SIZE, 3)), np.zeros(SIZE)
     heaviest, shown = np.zeros(SIZE), np.zeros(SIZE)
-    with ViewSynthesis() as synthesis:
+    with Renderer() as synthesis:
         for (row, column), (colors, disparity) in sparse.items():
             away = ViewOffset(1.0 - 3 * row, 4.0 - 3 * column)
             if max(abs(away.t), abs(away.s)) > 3:

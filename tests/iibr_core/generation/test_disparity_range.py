@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from iibr_core.generation.disparity_range import DisparityRange, measure_disparity_range, rounding_step
-from iibr_core.generation.plan import PlanOverrides, plan_for_viewing
+from iibr_core.method.disparity_range import DisparityRange, measure_disparity_range, rounding_step
+from iibr_core.method.plan import PlanOverrides, plan_for_viewing
 from iibr_core.types import TOTAL_PARALLAX, GridShape
 from tests.iibr_core.scenes import disparity_of, photo_of, smooth_texture
 

@@ -4,11 +4,11 @@ from collections import Counter
 
 import numpy as np
 import pytest
-
 from iibr_core.generation.cost_model import DRAFT_BYTES, undecided_bytes
-from iibr_core.generation.light_field import generate, ray_set, transformer_for
-from iibr_core.generation.stored_views import StoredViews
-from iibr_core.rendering.view_synthesis import ViewSynthesis
+
+from iibr_core.method.light_field import StoredViews, generate, rays_of_grid
+from iibr_core.method.ray_transformer import shipped_transformer
+from iibr_core.method.view import Renderer
 from iibr_core.runtime import tiling
 from iibr_core.runtime.work import stoppable
 from iibr_core.training.degradation import blur
@@ -71,9 +71,9 @@ def test_in_the_end_every_view_is_what_the_final_ray_set_shows(scene):
     photo, disparity = SCENES[scene]()
     plan = literal_plan(photo, disparity, 5)
     final = by_index(made(photo, disparity, quality="balanced", draft_bytes=PLENTY))
-    rays, outer = ray_set(photo, disparity, plan)
+    rays, outer = rays_of_grid(photo, disparity, plan)
     assert {tuple(offset) for offset, _ in outer} == {tuple(plan.grid.offset(*index)) for index in OUTER}
-    with ViewSynthesis(transformer=transformer_for("balanced")) as synthesis:
+    with Renderer(transformer=shipped_transformer("balanced")) as synthesis:
         views = StoredViews(synthesis, rays, plan.grid, photo.is_hdr)
         for index in set(final) - {plan.grid.centre}:
             assert same(final[index], views.make(plan.grid.offset(*index)))
@@ -95,13 +95,13 @@ def test_only_outer_views_are_made_twice(monkeypatch):
     """Rows rendered of each view: outer ones for the ray set, and again when it is complete."""
     photo, disparity = blurred_square()
     counted = []  # appending is safe in threads
-    render_rows = ViewSynthesis._render_rows
+    render_rows = Renderer._render_rows
 
     def counting_rows(self, rays, offset, span, *rest):
         counted.append((offset, span[1] - span[0]))
         return render_rows(self, rays, offset, span, *rest)
 
-    monkeypatch.setattr(ViewSynthesis, "_render_rows", counting_rows)
+    monkeypatch.setattr(Renderer, "_render_rows", counting_rows)
     for draft_bytes in (PLENTY, 0, None):
         counted.clear()
         made(photo, disparity, draft_bytes=draft_bytes)
@@ -196,11 +196,11 @@ def test_outer_views_that_disclose_nothing_are_finished_too():
     photo = square_before_wall(60, 80, 3.0)[0]
     disparity = disparity_of(np.where(np.arange(80) < 40, 3.0, 0.0) * np.ones((60, 1)))
     plan = literal_plan(photo, disparity, 5)
-    rays, outer = ray_set(photo, disparity, plan)
+    rays, outer = rays_of_grid(photo, disparity, plan)
     without = {plan.grid.centre} ^ {(2 + int(at.t), 2 + int(at.s)) for at, view in outer if not view.occluded.any()}
     assert len(without) > 1
     final = by_index(made(photo, disparity, draft_bytes=PLENTY))
-    with ViewSynthesis(transformer=transformer_for("balanced")) as synthesis:
+    with Renderer(transformer=shipped_transformer("balanced")) as synthesis:
         views = StoredViews(synthesis, rays, plan.grid, photo.is_hdr)
         assert all(same(final[index], views.make(plan.grid.offset(*index))) for index in without - {plan.grid.centre})
 
@@ -224,9 +224,9 @@ def test_a_stop_ends_either_pass(share):
 def test_a_draft_takes_about_what_the_plan_says():
     """Of each ray that is undecided; how many those are is another question."""
     photo, disparity = blurred_square()
-    rays, outer = ray_set(photo, disparity, literal_plan(photo, disparity, 5))
+    rays, outer = rays_of_grid(photo, disparity, literal_plan(photo, disparity, 5))
     assert len(list(outer)) == len(OUTER)
-    with ViewSynthesis(transformer=transformer_for("balanced")) as synthesis:
+    with Renderer(transformer=shipped_transformer("balanced")) as synthesis:
         draft = StoredViews(synthesis, rays, GridShape(5, 5), False).draft(ViewOffset(1.0, 1.0))
     undecided = sum(len(part.pixel) for part in draft.undecided)
     counted = 60 * 80 * DRAFT_BYTES + undecided * undecided_bytes()

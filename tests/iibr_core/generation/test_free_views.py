@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from iibr_core.generation.free_views import (
+from iibr_core.beyond.free_cameras import (
     FARTHEST_STEPS,
     MOST_BEYOND,
     MOST_PARALLAX,

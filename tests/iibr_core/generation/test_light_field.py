@@ -6,14 +6,19 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from iibr_core.generation.light_field import generate
-from iibr_core.generation.outer_views import WantedViews
 from iibr_core.inpainting.registry import INPAINTERS
-from iibr_core.rendering.photo_rays import rays_of_photo
-from iibr_core.rendering.view_synthesis import ViewSynthesis
+from iibr_core.method.farthest_views import WantedViews
+from iibr_core.method.light_field import generate
+from iibr_core.method.rays import rays_of_photo
+from iibr_core.method.view import Renderer
 from iibr_core.runtime import tiling
 from iibr_core.runtime.work import stoppable
-from iibr_core.types import GridShape, InputError, ViewOffset, ViewUpdate
+from iibr_core.types import (
+    GridShape,
+    InputError,
+    ViewOffset,
+    ViewUpdate,
+)
 from tests.iibr_core import red_inpainter
 from tests.iibr_core.scenes import by_index, disparity_of, literal_plan, photo_of, smooth_texture, square_before_wall
 
@@ -35,7 +40,7 @@ def test_the_centre_view_is_the_photo_exactly():
 
 def test_rendering_at_offset_zero_gives_the_photo_back():
     photo, disparity = square_before_wall()
-    with ViewSynthesis() as synthesise:
+    with Renderer() as synthesise:
         view = synthesise.render(rays_of_photo(photo.pixels, disparity.values, 2.0, 0), ViewOffset(0.0, 0.0))
     assert view.colors == pytest.approx(photo.pixels, abs=1e-4)
     assert not view.inpainted.any()
@@ -78,7 +83,7 @@ def test_a_square_before_a_wall_against_the_true_view():
 def test_views_of_a_sum_are_fast_where_nobody_asked_for_more(monkeypatch, seen, asked, made):
     photo, disparity = square_before_wall()
     plan, qualities = replace(literal_plan(photo, disparity, 5), quality="balanced"), []
-    monkeypatch.setattr("iibr_core.generation.light_field.transformer_for", qualities.append)
+    monkeypatch.setattr("iibr_core.method.ray_transformer.shipped_transformer", qualities.append)
     at = ViewOffset(1.0, -1.0)
     views = list(generate(photo, disparity, plan, quality=asked, wanted=lambda: WantedViews([at], seen)))
     assert [plan.grid.offset(view.row, view.column) for view in views] == [(0, 0), at]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from iibr_core.generation.outer_views import (
+from iibr_core.method.farthest_views import (
     ALL_VIEWS,
     LOOKUP_MARGIN_PX,
     MOST_MARGIN,

@@ -6,23 +6,29 @@ from itertools import product
 
 import numpy as np
 import pytest
-
-from iibr_core.generation import memory
 from iibr_core.generation.cost_model import estimate_workload, largest_offset, measure_parallax
-from iibr_core.generation.light_field import generate, ray_set
-from iibr_core.generation.memory import scene_bytes
-from iibr_core.generation.plan import (
+
+from iibr_core.method import memory
+from iibr_core.method.light_field import generate, rays_of_grid
+from iibr_core.method.memory import scene_bytes
+from iibr_core.method.plan import (
     MOST_VIEWS_A_SIDE,
     STEP_PX,
     PlanOverrides,
     plan_for_viewing,
     plan_literal,
 )
-from iibr_core.rendering.ray_cells import CELL_PX
+from iibr_core.method.rays import CELL_PX
 from iibr_core.training.batches import ambiguous_rays_of_view
 from iibr_core.training.degradation import blur
 from iibr_core.training.scenes.random_scene import random_scene, render
-from iibr_core.types import TOTAL_PARALLAX, GridShape, ImageSize, InputError, ViewOffset
+from iibr_core.types import (
+    TOTAL_PARALLAX,
+    GridShape,
+    ImageSize,
+    InputError,
+    ViewOffset,
+)
 from tests.iibr_core.scenes import disparity_of, photo_of, smooth_texture, square_before_wall
 
 
@@ -99,7 +105,7 @@ def test_the_rays_foretold_are_those_really_ambiguous(blur_px):
         scene = random_scene(np.random.default_rng(seed), ImageSize(*size), 2.0)
         colors, values = render(scene, ImageSize(*size), ViewOffset(0.0, 0.0))
         photo, disparity = photo_of(colors), disparity_of(blur(values, blur_px))
-        rays, completing = ray_set(photo, disparity, plan_literal(photo, disparity, grid))
+        rays, completing = rays_of_grid(photo, disparity, plan_literal(photo, disparity, grid))
         assert len(list(completing)) == 4
         statistics = measure_parallax(disparity.values, largest_offset(grid))
         for reach in (1.0, 2.0, 4.0):
@@ -111,14 +117,14 @@ def test_the_rays_foretold_are_those_really_ambiguous(blur_px):
 @pytest.mark.parametrize("grid", [GridShape(1, 7), GridShape(2, 9), GridShape(2, 2), GridShape(5, 5)], ids=str)
 def test_as_many_views_are_counted_again_as_complete_the_ray_set(grid):
     photo, disparity = square_before_wall(60, 80, 3.0)
-    again = len(list(ray_set(photo, disparity, plan_literal(photo, disparity, grid))[1]))
+    again = len(list(rays_of_grid(photo, disparity, plan_literal(photo, disparity, grid))[1]))
     statistics = measure_parallax(disparity.values, largest_offset(grid))
     fast, balanced = (estimate_workload(statistics, grid, quality) for quality in ("fast", "balanced"))
     assert balanced.pixels - fast.pixels == again * disparity.values.size
 
 
 def test_plans_load_no_kernels_until_one_is_made():
-    code = "import sys, iibr_core.generation.plan; print('numba' in sys.modules)"
+    code = "import sys, iibr_core.method.plan; print('numba' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "False\n"
 
 

@@ -5,10 +5,10 @@ import itertools
 import numpy as np
 import pytest
 
-from iibr_core.generation.outer_views import farthest_views, outer_views, outer_views_of_grid
-from iibr_core.generation.update_loop import complete_ray_set, render_outer_views
-from iibr_core.rendering.photo_rays import rays_of_photo
-from iibr_core.rendering.view_synthesis import ViewSynthesis
+from iibr_core.method.farthest_views import farthest_views, outer_views, outer_views_of_grid
+from iibr_core.method.rays import rays_of_photo
+from iibr_core.method.update_loop import complete_ray_set, update
+from iibr_core.method.view import Renderer
 from iibr_core.runtime.work import Cancelled, stoppable
 from iibr_core.types import GridShape, ViewOffset
 from tests.iibr_core.filled_rays import filled_rays
@@ -43,9 +43,9 @@ def test_those_of_a_grid_are_views_of_it_in_the_order_of_its_indices(grid):
 def test_what_a_view_disocclused_has_joined_the_rays_when_it_is_yielded():
     seen = rays()
     photo_images = len(seen)
-    with ViewSynthesis() as synthesis:
+    with Renderer() as synthesis:
         expected = synthesis.render(rays(), LEFT)
-    for count, (offset, view) in enumerate(render_outer_views(seen, [LEFT, RIGHT]), 1):
+    for count, (offset, view) in enumerate(update(seen, [LEFT, RIGHT]), 1):
         assert len(seen) == photo_images + count
         if offset == LEFT:
             np.testing.assert_array_equal(view.colors, expected.colors)
@@ -53,7 +53,7 @@ def test_what_a_view_disocclused_has_joined_the_rays_when_it_is_yielded():
             for added, filled in zip((colors[-1], disparity[-1], coverage[-1]), filled_rays(view)):
                 np.testing.assert_array_equal(added, filled)
             assert (coverage[-1] > 0)[view.occluded].all()
-    with ViewSynthesis() as synthesis:
+    with Renderer() as synthesis:
         again = synthesis.render(seen, LEFT)
     assert expected.occluded.any()
     assert not again.occluded.any(), "a hole that was inpainted is none any more"
@@ -63,7 +63,7 @@ def test_what_a_view_disocclused_has_joined_the_rays_when_it_is_yielded():
 def test_views_that_disocclude_nothing_add_nothing():
     seen = rays()
     before = len(seen)
-    (view,) = (view for _, view in render_outer_views(seen, [ViewOffset(0.0, 0.0)]))
+    (view,) = (view for _, view in update(seen, [ViewOffset(0.0, 0.0)]))
     assert not view.occluded.any()
     assert len(seen) == before
 
@@ -71,14 +71,14 @@ def test_views_that_disocclude_nothing_add_nothing():
 def test_completing_is_taking_all_views():
     completed, taken = rays(), rays()
     complete_ray_set(completed, [LEFT, RIGHT])
-    assert len(list(render_outer_views(taken, [LEFT, RIGHT]))) == 2
+    assert len(list(update(taken, [LEFT, RIGHT]))) == 2
     for one, other in zip(completed.arrays, taken.arrays):
         np.testing.assert_array_equal(one, other)
 
 
 def test_the_inpainter_decides_what_joins():
     seen = rays()
-    for _, view in render_outer_views(seen, [LEFT], inpainter=paint_red):
+    for _, view in update(seen, [LEFT], inpainter=paint_red):
         colors, disparity, filled = filled_rays(view)
         assert view.occluded.any()
         assert (filled[view.occluded] == 1).all()
@@ -103,10 +103,10 @@ def test_what_was_inpainted_farther_back_does_not_show_through_a_hole_in_the_pho
     seen = rays_of_photo(colors, disparity, 2.0, 2)
     everywhere = np.ones_like(disparity)
     seen.add(LEFT, everywhere[..., None] * np.float32(wall), 0 * everywhere, everywhere)
-    with ViewSynthesis() as synthesis:
+    with Renderer() as synthesis:
         assert (synthesis.render(seen, RIGHT).colors[15, 15:19] == wall).all()
-    ((_, view),) = render_outer_views(seen, [RIGHT])
+    ((_, view),) = update(seen, [RIGHT])
     assert (view.occluded & view.inpainted)[15, 15:19].all()
     np.testing.assert_allclose(view.colors[15, 15:19], np.tile(np.float32(card), (4, 1)), atol=1e-5)
-    with ViewSynthesis() as synthesis:
+    with Renderer() as synthesis:
         np.testing.assert_array_equal(synthesis.render(seen, RIGHT).colors[15, 15:19], view.colors[15, 15:19])

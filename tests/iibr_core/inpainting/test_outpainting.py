@@ -3,8 +3,6 @@
 import numpy as np
 import pytest
 
-from iibr_core.generation.outer_views import outer_views_of_grid, outpainting_margins
-from iibr_core.generation.update_loop import complete_ray_set
 from iibr_core.inpainting.outpainting import (
     ANGLE_POWER,
     LINE_NOISE,
@@ -17,10 +15,17 @@ from iibr_core.inpainting.outpainting import (
     _level,
     outpaint,
 )
-from iibr_core.rendering.photo_rays import rays_of_photo
-from iibr_core.rendering.view_synthesis import ViewSynthesis
+from iibr_core.method.farthest_views import outer_views_of_grid, outpainting_margins
+from iibr_core.method.rays import rays_of_photo
+from iibr_core.method.update_loop import complete_ray_set
+from iibr_core.method.view import Renderer
 from iibr_core.runtime.work import Cancelled, stoppable
-from iibr_core.types import GridShape, ImageSize, Margins, ViewOffset
+from iibr_core.types import (
+    GridShape,
+    ImageSize,
+    Margins,
+    ViewOffset,
+)
 from tests.iibr_core.scenes import smooth_texture
 
 SIZE = ImageSize(24, 36)
@@ -161,7 +166,7 @@ def test_views_agree_beyond_the_frame_and_say_that_it_is_inpainted():
     rays = textured_wall(3.0)
     assert rays.view_size == (40, 44)
     assert rays.size == (56, 60)
-    with ViewSynthesis() as synthesis:
+    with Renderer() as synthesis:
         corner, half = (synthesis.render(rays, ViewOffset(t, s)) for t, s in ((2.0, 2.0), (1.0, 1.0)))
         photo = synthesis.render(rays, ViewOffset(0.0, 0.0))
     np.testing.assert_array_equal(photo.colors, smooth_texture(40, 44))
@@ -181,7 +186,7 @@ def test_nothing_joins_the_rays_where_the_canvas_shows_all():
 def test_what_moves_farther_than_the_canvas_reaches_is_filled_by_the_views():
     rays = textured_wall(20.0)
     assert rays.margins == (10, 10, 11, 11)
-    with ViewSynthesis() as synthesis:
+    with Renderer() as synthesis:
         view = synthesis.render(rays, ViewOffset(2.0, 2.0))
     assert np.isfinite(view.colors).all()
     assert view.inpainted.all()

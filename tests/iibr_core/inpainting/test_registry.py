@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from iibr_core.inpainting.registry import DEFAULT_INPAINTER, INPAINTERS, MODEL_INPAINTERS, load_inpainter
-from iibr_core.rendering.photo_rays import rays_of_photo
-from iibr_core.rendering.view_synthesis import ViewSynthesis
+from iibr_core.method.rays import rays_of_photo
+from iibr_core.method.view import Renderer
 from iibr_core.runtime.work import Cancelled, stoppable
 from iibr_core.types import InputError, ViewOffset
 from tests.iibr_core.scenes import square_before_wall
@@ -20,7 +20,7 @@ FORE_PX = 3.0
 def view_with_holes():
     """(colors, disparity, hole, photo_disparity): what the renderer gives an inpainter, nonsense in the holes."""
     photo, disparity = square_before_wall(60, 80, FORE_PX)
-    with ViewSynthesis() as synthesis:
+    with Renderer() as synthesis:
         view = synthesis.render(rays_of_photo(photo.pixels, disparity.values, 2.0, 0), OFFSET)
     view.colors[view.occluded], view.disparity[view.occluded] = np.nan, np.nan
     return view.colors, view.disparity, view.occluded, disparity.values

@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 
 from iibr_core.depth.edges.refine import refine
-from iibr_core.generation.light_field import transformer_for
-from iibr_core.generation.outer_views import outer_views
-from iibr_core.generation.update_loop import complete_ray_set
-from iibr_core.rendering.ambiguous_rays import FAINT_WEIGHT
-from iibr_core.rendering.candidates import find_candidates
-from iibr_core.rendering.hypotheses import blend_hypotheses, find_ambiguous_rays
-from iibr_core.rendering.photo_rays import rays_of_photo
-from iibr_core.rendering.resampling import resample_colors
-from iibr_core.rendering.visibility_weights import WHOLLY_COVERED, weights_and_coverage
+from iibr_core.method.ambiguous_rays import FAINT_WEIGHT, blend, find_ambiguous_rays
+from iibr_core.method.candidates import find_candidates
+from iibr_core.method.closed_form import closed_form
+from iibr_core.method.farthest_views import outer_views
+from iibr_core.method.look_up import look_up
+from iibr_core.method.occlusion import FULLY_COVERED
+from iibr_core.method.ray_transformer import shipped_transformer
+from iibr_core.method.rays import rays_of_photo
+from iibr_core.method.update_loop import complete_ray_set
 from iibr_core.training.degradation import blur, degrade
 from iibr_core.training.scenes.random_scene import cast, random_scene, render
 from iibr_core.types import ImageSize, ViewOffset
@@ -57,18 +57,18 @@ def squared_errors(seed, spoil):
     colors, disparity = render(scene, SIZE, ViewOffset(0.0, 0.0))
     rays = rays_of_photo(colors, spoil(colors, disparity, rng), RADIUS, 8)
     complete_ray_set(rays, outer_views(CORNERS))
-    transformer, found = transformer_for("balanced"), []
+    transformer, found = shipped_transformer("balanced"), []
     for offset in OFFSETS:
         candidates = find_candidates(rays, offset, (0, SIZE.height))
-        weights, share = weights_and_coverage(candidates)
-        shown = resample_colors(rays, candidates, weights)
+        weights, share = closed_form(candidates)
+        shown = look_up(rays, candidates, weights)
         ambiguous = find_ambiguous_rays(rays, candidates, weights, shown, (0, SIZE.height))
         # Where less is covered, T is not asked: what was filled behind shows there, too.
-        asked = share[tuple(ambiguous.pixel.T)] >= WHOLLY_COVERED
+        asked = share[tuple(ambiguous.pixel.T)] >= FULLY_COVERED
         ambiguous = replace(ambiguous, **{name: getattr(ambiguous, name)[asked] for name in ARRAYS})
         y, x = ambiguous.pixel.T
         truth = cast(scene, x, y, offset)[0]
-        chosen = blend_hypotheses(rays, ambiguous, transformer(ambiguous))[0]
+        chosen = blend(rays, ambiguous, transformer(ambiguous))[0]
         heavy = weights > FAINT_WEIGHT
         inpainted = (heavy & (candidates.source >= rays.photo_images)).any(axis=0)[y, x]
         covered = weights.sum(axis=0)[y, x] >= 1 - FAINT_WEIGHT

@@ -6,26 +6,28 @@ import torch
 
 from iibr_core.color import linear_from_srgb, srgb_from_linear
 from iibr_core.formats.weights import save_weights
-from iibr_core.ray_transformer.inference import TrainedWeights
-from iibr_core.ray_transformer.model import RayTransformer
-from iibr_core.rendering.ambiguous_rays import FAINT_WEIGHT, HYPOTHESES, LEAST_STAKE, PLAIN_SOURCE
-from iibr_core.rendering.candidates import find_candidates
-from iibr_core.rendering.hypotheses import (
+from iibr_core.method.ambiguous_rays import (
+    FAINT_WEIGHT,
     FEATURES,
+    HYPOTHESES,
+    LEAST_STAKE,
     LEAST_VOTE,
+    PLAIN_SOURCE,
     PROFILE_PX,
     SHARE,
     AmbiguousRays,
-    blend_hypotheses,
+    blend,
     find_ambiguous_rays,
     hypothesis_colors,
 )
-from iibr_core.rendering.photo_rays import rays_of_photo
-from iibr_core.rendering.ray_set import RaySet
-from iibr_core.rendering.resampling import resample_colors
-from iibr_core.rendering.view_synthesis import ViewSynthesis
-from iibr_core.rendering.visibility_weights import visibility_weights
+from iibr_core.method.candidates import find_candidates
+from iibr_core.method.closed_form import closed_form
+from iibr_core.method.look_up import look_up
+from iibr_core.method.ray_transformer import TrainedWeights
+from iibr_core.method.rays import RaySet, rays_of_photo
+from iibr_core.method.view import Renderer
 from iibr_core.training.degradation import blur
+from iibr_core.training.model import RayTransformer
 from iibr_core.types import ViewOffset
 from tests.iibr_core.scenes import photo_of, smooth_texture, square_before_wall
 
@@ -41,8 +43,8 @@ def ambiguous_of(photo, disparity, every=False, offset=OFFSET, fringe=True):
         rays.add(ViewOffset(0.0, 0.0), photo.pixels, disparity, np.ones_like(disparity))
     height = photo.size[0]
     candidates = find_candidates(rays, offset, (0, height))
-    weights = visibility_weights(candidates)
-    shown = resample_colors(rays, candidates, weights)
+    weights = closed_form(candidates)
+    shown = look_up(rays, candidates, weights)
     return find_ambiguous_rays(rays, candidates, weights, shown, (0, height), every), weights, rays
 
 
@@ -75,7 +77,7 @@ def test_rays_that_the_closed_form_leaves_open_are_ambiguous_and_no_others():
     rays = rays_of_photo(photo.pixels, values, 2.0, 0)
     assert len(rays) == 2
     candidates = find_candidates(rays, OFFSET, (0, photo.size.height))
-    weights = visibility_weights(candidates)
+    weights = closed_form(candidates)
     ambiguous, _, _ = ambiguous_of(photo, disparity.values)
     heavy = weights > FAINT_WEIGHT
     fringed = (heavy & (candidates.source == 1)).any(axis=0)
@@ -250,7 +252,7 @@ def test_decisions_blend_in_linear_light_and_follow_the_heaviest():
     random = np.random.default_rng(0)
     weights = random.uniform(0.01, 1, ambiguous.mask.shape).astype(np.float32) * ambiguous.mask
     weights /= weights.sum(axis=1, keepdims=True)
-    colors, disparities, source = blend_hypotheses(rays, ambiguous, weights)
+    colors, disparities, source = blend(rays, ambiguous, weights)
     kept = np.where(weights > LEAST_VOTE, weights, 0)
     linear = (kept[..., None] * linear_from_srgb(hypothesis_colors(rays, ambiguous))).sum(axis=1) / kept.sum(axis=1)[
         :, None
@@ -269,7 +271,7 @@ def test_a_transformer_that_repeats_the_closed_form_changes_nothing():
         share = np.where(ambiguous.mask, ambiguous.features[..., SHARE], 0) + 1e-9 * ambiguous.mask
         return (share / share.sum(axis=1, keepdims=True)).astype(np.float32)
 
-    with ViewSynthesis() as plain, ViewSynthesis(transformer=closed_form) as asked:
+    with Renderer() as plain, Renderer(transformer=closed_form) as asked:
         one, two = plain.render(rays, OFFSET), asked.render(rays, OFFSET)
     assert two.colors == pytest.approx(one.colors, abs=0.02)
     assert np.mean(np.abs(two.colors - one.colors) > 1e-3) < 0.01
@@ -280,7 +282,7 @@ def test_one_hypothesis_leaves_no_room_for_the_plain_one_and_is_refused():
     photo, disparity = square_before_wall()
     rays = rays_of_photo(photo.pixels, disparity.values, 2.0, 0)
     with (
-        ViewSynthesis(transformer=lambda ambiguous: ambiguous.features[..., SHARE], hypotheses=1) as synthesis,
+        Renderer(transformer=lambda ambiguous: ambiguous.features[..., SHARE], hypotheses=1) as synthesis,
         pytest.raises(ValueError, match="1 hypotheses a ray"),
     ):
         synthesis.render(rays, OFFSET)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from iibr_core.rendering.aperture_sampling import aperture_points, fractions, open_area
-from iibr_core.rendering.optics import ApertureMask, ApertureShape
+from iibr_core.beyond.aperture_sampling import aperture_points, fractions, open_area
+from iibr_core.beyond.optics import ApertureMask, ApertureShape
 
 CROSS = ApertureShape("mask", mask=ApertureMask("cross", 3, 3, bytes([0, 255, 0, 255, 255, 255, 0, 255, 0])))
 CORNER = ApertureShape("mask", mask=ApertureMask("corner", 2, 2, bytes([255, 255, 255, 0])))

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from iibr_core.rendering.candidates import CLOSED_GAP_PX, SEALED_GAP_PX, find_candidates
-from iibr_core.rendering.ray_set import RaySet
+from iibr_core.method.candidates import CLOSED_GAP_PX, SEALED_GAP_PX, find_candidates
+from iibr_core.method.rays import RaySet
 from iibr_core.surfaces import SAME_SURFACE_PX
 from iibr_core.types import ViewOffset, image_size
 

@@ -1,13 +1,12 @@
 import numpy as np
 import pytest
 
-from iibr_core.rendering import candidates as candidates_module
-from iibr_core.rendering.candidates import find_candidates
-from iibr_core.rendering.coherent_cells import find_coherent_cells
-from iibr_core.rendering.ray_cells import CELL_PX
-from iibr_core.rendering.ray_set import RaySet
-from iibr_core.rendering.resampling import resample_colors
-from iibr_core.rendering.visibility_weights import visibility_weights
+from iibr_core.method import candidates as candidates_module
+from iibr_core.method.candidates import find_candidates
+from iibr_core.method.closed_form import closed_form
+from iibr_core.method.look_up import look_up
+from iibr_core.method.rays import CELL_PX, RaySet
+from iibr_core.method.smooth_cells import find_smooth_cells
 from iibr_core.types import ImageSize, ViewOffset, image_size
 from tests.iibr_core.scenes import smooth_texture
 
@@ -35,7 +34,7 @@ def by_pixel(cells, rows):
 
 
 def nowhere_smooth(rays, offset, rows, columns):
-    smooth, about = find_coherent_cells(rays, offset, rows, columns)
+    smooth, about = find_smooth_cells(rays, offset, rows, columns)
     return np.zeros_like(smooth), about
 
 
@@ -46,7 +45,7 @@ def both_ways(monkeypatch, rays, offset):
         if patch:
             monkeypatch.setattr(candidates_module, "find_coherent_cells", nowhere_smooth)
         candidates = find_candidates(rays, offset, (0, SIZE[0]))
-        found.append((candidates, resample_colors(rays, candidates, visibility_weights(candidates))[0]))
+        found.append((candidates, look_up(rays, candidates, closed_form(candidates))[0]))
     return found
 
 
@@ -95,7 +94,7 @@ def test_inpainted_rays_matter_only_in_front(disparity, is_smooth):
     filled = np.zeros(SIZE, np.float32)
     filled[20:24, 20:24] = 1
     rays.add(at, np.zeros((*SIZE, 3), np.float32), np.full(SIZE, disparity, np.float32), filled)
-    smooth, _ = find_coherent_cells(rays, at, (0, SIZE[0]))
+    smooth, _ = find_smooth_cells(rays, at, (0, SIZE[0]))
     assert by_pixel(smooth, (0, SIZE[0]))[20:24, 20:24].all() == is_smooth
     assert by_pixel(smooth, (0, SIZE[0]))[8:12, 48:52].all()
 
@@ -123,6 +122,6 @@ def test_unknown_disparity_is_never_smooth():
     rays = ray_set(disparity)
     assert rays.cells.step[2, 3] == np.inf
     assert rays.cells.step[4, 8] < np.inf
-    smooth, _ = find_coherent_cells(rays, ViewOffset(0.0, 0.01), (0, SIZE[0]))
+    smooth, _ = find_smooth_cells(rays, ViewOffset(0.0, 0.01), (0, SIZE[0]))
     assert not smooth[2, 3]
     assert smooth[4, 8]

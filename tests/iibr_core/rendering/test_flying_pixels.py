@@ -7,7 +7,7 @@ import pytest
 from scipy import ndimage
 
 from iibr_core.color import encoded_from_stored, stored_from_encoded
-from iibr_core.rendering.flying_pixels import (
+from iibr_core.method.flying_pixels import (
     STANDS_OUT,
     STANDS_OUT_TIMES,
     TEARING_GAP_PX,
@@ -15,9 +15,8 @@ from iibr_core.rendering.flying_pixels import (
     measure_detail,
     without_flying_pixels,
 )
-from iibr_core.rendering.photo_rays import rays_of_photo
-from iibr_core.rendering.ray_set import RaySet
-from iibr_core.rendering.view_synthesis import ViewSynthesis
+from iibr_core.method.rays import RaySet, rays_of_photo
+from iibr_core.method.view import Renderer
 from iibr_core.surfaces import SAME_SURFACE_PX
 from iibr_core.types import ImageSize, ViewOffset
 from tests.iibr_core.scenes import smooth_texture, square_before_wall
@@ -54,7 +53,7 @@ def test_the_kernel_is_its_slow_twin() -> None:
     rays = rays_of_photo(photo, values, 1.5, 0)
     detail = measure_detail(photo)
     np.testing.assert_allclose(detail, np.abs(photo - median(photo)).max(-1), atol=1e-6)
-    with ViewSynthesis() as synthesis:
+    with Renderer() as synthesis:
         view = synthesis.render(rays, OFFSET)
     colors = np.where(rng.random((30, 40, 1)) < 0.1, rng.random((30, 40, 3)), view.colors).astype(np.float32)
     replaced = without_flying_pixels(rays, OFFSET, colors, view.disparity, view.inpainted)
@@ -78,7 +77,7 @@ def test_pixels_whose_disparity_is_the_other_surfaces_are_flying() -> None:
 
     def with_and_without(values: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         rays = rays_of_photo(photo.pixels, values, 1.5, 0)
-        with ViewSynthesis() as synthesis:
+        with Renderer() as synthesis:
             view = synthesis.render(rays, OFFSET)
         return (
             view.colors,
@@ -117,7 +116,7 @@ def test_a_thin_wire_stays() -> None:
     rows, columns = np.arange(40), np.arange(40) // 2 + 15
     photo[rows, columns], values[rows, columns] = 0.1, 3.0
     rays = rays_of_photo(photo, values, 1.5, 0)
-    with ViewSynthesis() as synthesis:
+    with Renderer() as synthesis:
         view = synthesis.render(rays, ViewOffset(0.0, 1.0))
     replaced = without_flying_pixels(rays, ViewOffset(0.0, 1.0), view.colors, view.disparity, view.inpainted)
     wire = view.disparity > 2.5

@@ -7,13 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from iibr_core.generation.free_views import FreeViews
-from iibr_core.rendering import free_view, landed_squares
-from iibr_core.rendering.free_view import render_free_view, target_from_photo
-from iibr_core.rendering.landed_squares import CORNERS, SAMPLES
-from iibr_core.rendering.photo_rays import rays_of_photo
-from iibr_core.rendering.ray_set import NO_MARGINS
-from iibr_core.rendering.view_synthesis import ViewSynthesis
+from iibr_core.beyond import free_view, landed_squares
+from iibr_core.beyond.free_cameras import FreeViews
+from iibr_core.beyond.free_view import render_free_view, target_from_photo
+from iibr_core.beyond.landed_squares import CORNERS, SAMPLES
+from iibr_core.method.rays import NO_MARGINS, rays_of_photo
+from iibr_core.method.view import Renderer
 from iibr_core.runtime.work import Cancelled, stoppable
 from iibr_core.types import Camera, ImageSize, ViewOffset
 from tests.iibr_core.scenes import smooth_texture, square_before_wall
@@ -123,7 +122,7 @@ def test_a_camera_beside_sees_the_fields_view():
     photo, disparity = square_before_wall(60, 80, foreground=2.0, background=1.0)
     offset = ViewOffset(-1.5, 2.25)
     rays = rays_of_photo(photo.pixels, disparity.values, 4.0, 0)
-    with ViewSynthesis() as synthesis:
+    with Renderer() as synthesis:
         known = synthesis.render(rays, offset)
     beside = camera(60, 80, place=(offset.s, offset.t, 0.0))
     view = render_free_view(rays, target_from_photo(camera(60, 80), beside, 60.0), beside.size, NO_MARGINS)

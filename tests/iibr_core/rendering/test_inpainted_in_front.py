@@ -5,10 +5,10 @@ import pytest
 from scipy.ndimage import maximum_filter
 
 from iibr_core.evaluation.reference_warp import reference_warp
-from iibr_core.generation.outer_views import outer_views_of_grid, outpainting_margins
-from iibr_core.generation.update_loop import complete_ray_set
-from iibr_core.rendering.photo_rays import rays_of_photo
-from iibr_core.rendering.view_synthesis import ViewSynthesis
+from iibr_core.method.farthest_views import outer_views_of_grid, outpainting_margins
+from iibr_core.method.rays import rays_of_photo
+from iibr_core.method.update_loop import complete_ray_set
+from iibr_core.method.view import Renderer
 from iibr_core.surfaces import EDGE_PX
 from iibr_core.types import GridShape
 from tests.iibr_core.scenes import smooth_texture
@@ -37,7 +37,7 @@ def test_no_view_shows_anything_inpainted_in_front_of_the_photo_and_its_continua
     rays = rays_of_photo(colors, disparity, FARTHEST, len(outer), margins=margins)
     complete_ray_set(rays, outer)
     continued = rays.arrays.disparity[0]
-    with ViewSynthesis() as synthesis:
+    with Renderer() as synthesis:
         for row, column in np.ndindex(*GRID):
             offset = GRID.offset(row, column)
             view = synthesis.render(rays, offset)

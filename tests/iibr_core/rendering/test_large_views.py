@@ -6,13 +6,24 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from iibr_core.generation.light_field import ray_set
-from iibr_core.rendering.flying_pixels import without_flying_pixels
-from iibr_core.rendering.large_views import LargePhoto, Part, tiles_of, views_of_tile, whole
-from iibr_core.rendering.photo_rays import rays_of_photo
-from iibr_core.rendering.resized_light import mean_of_areas
-from iibr_core.rendering.view_synthesis import ViewSynthesis
-from iibr_core.types import ImageSize, Photo, ViewOffset, image_size
+from iibr_core.beyond.full_size import (
+    LargePhoto,
+    Part,
+    tiles_of,
+    views_of_tile,
+    whole,
+)
+from iibr_core.beyond.resized_light import mean_of_areas
+from iibr_core.method.flying_pixels import without_flying_pixels
+from iibr_core.method.light_field import rays_of_grid
+from iibr_core.method.rays import rays_of_photo
+from iibr_core.method.view import Renderer
+from iibr_core.types import (
+    ImageSize,
+    Photo,
+    ViewOffset,
+    image_size,
+)
 from tests.iibr_core.scenes import literal_plan, square_before_wall
 
 OFFSET = ViewOffset(0.6, -1.5)
@@ -34,7 +45,7 @@ def test_tiles_cover_a_part_once() -> None:
 @pytest.mark.parametrize("side", [24, 40])
 def test_a_view_in_tiles_is_the_view_made_at_once(side: int) -> None:
     photo = large()
-    with ViewSynthesis() as synthesis:
+    with Renderer() as synthesis:
         rays = rays_of_photo(photo.pixels, photo.disparity, 1.5, 0)
         expected = synthesis.render(rays, OFFSET)
         seen = np.empty_like(photo.pixels)
@@ -52,13 +63,13 @@ def test_holes_show_what_the_smaller_light_field_shows() -> None:
     photo, disparity = square_before_wall(48, 60, foreground=1.5)
     red = Photo(np.tile(np.float32([0.9, 0.1, 0.1]), (48, 60, 1)), 50.0, "red")
     plan = literal_plan(photo, disparity, 3)
-    rays, outer = ray_set(photo, disparity, plan)
+    rays, outer = rays_of_grid(photo, disparity, plan)
     views = dict(outer)
     # Every inpainted ray is made red: so the larger photo's holes are.
     rays.arrays.colors[rays.photo_images : len(rays)] = red.pixels
     large_photo = LargePhoto(*(np.repeat(np.repeat(a, 2, 0), 2, 1) for a in (photo.pixels, 2 * disparity.values)), rays)
     offset = ViewOffset(-1.0, -1.0)
-    with ViewSynthesis() as synthesis:
+    with Renderer() as synthesis:
         (view,) = views_of_tile(large_photo, whole(large_photo.size), [offset], synthesis)
     hole = views[offset].occluded
     assert hole.sum() > 20

@@ -8,11 +8,21 @@ import numpy as np
 import pytest
 from scipy.ndimage import map_coordinates
 
+from iibr_core.beyond.aperture_sampling import aperture_points, grid_weights
+from iibr_core.beyond.lens import LensSum
+from iibr_core.beyond.optics import (
+    CENTRE,
+    HIGHLIGHT_GAIN,
+    ApertureShape,
+    Optics,
+)
 from iibr_core.color import linear_from_srgb
-from iibr_core.rendering.aperture_sampling import aperture_points, grid_weights
-from iibr_core.rendering.lens import LensSum
-from iibr_core.rendering.optics import CENTRE, HIGHLIGHT_GAIN, ApertureShape, Optics
-from iibr_core.types import FloatImage, GridShape, ImageSize, ViewOffset
+from iibr_core.types import (
+    FloatImage,
+    GridShape,
+    ImageSize,
+    ViewOffset,
+)
 from tests.iibr_core.scenes import smooth_texture
 
 SIZE = ImageSize(40, 56)

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 from iibr_core.color import linear_from_srgb, srgb_from_linear
-from iibr_core.rendering import mixed_pixels
-from iibr_core.rendering.mixed_pixels import split_mixed_pixels
+from iibr_core.method import mixed_pixels
+from iibr_core.method.mixed_pixels import split_mixed_pixels
 
 FOREGROUND, BACK = np.float32([0.9, 0.6, 0.3]), np.float32([0.1, 0.2, 0.5])
 

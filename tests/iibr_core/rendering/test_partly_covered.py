@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from iibr_core.color import linear_from_srgb, srgb_from_linear
-from iibr_core.generation.update_loop import render_outer_views
-from iibr_core.rendering.photo_rays import rays_of_photo
-from iibr_core.rendering.view_synthesis import ViewSynthesis
+from iibr_core.method.rays import rays_of_photo
+from iibr_core.method.update_loop import update
+from iibr_core.method.view import Renderer
 from iibr_core.types import ViewOffset
 from tests.iibr_core.filled_rays import filled_rays
 from tests.iibr_core.red_inpainter import paint_red
@@ -34,7 +34,7 @@ def bar(share):
 @pytest.mark.parametrize("share", [0.15, 0.3, 0.45, 0.55])
 @pytest.mark.parametrize("offset", [LEFT, RIGHT], ids=["left", "right"])
 def test_a_rim_beside_a_gap_is_the_front_over_what_was_filled(share, offset):
-    with ViewSynthesis() as synthesis:
+    with Renderer() as synthesis:
         view = synthesis.render(bar(share), offset)
     moved = round(-6 * offset.s)
     row = view.colors[HEIGHT // 2]
@@ -47,13 +47,13 @@ def test_a_rim_beside_a_gap_is_the_front_over_what_was_filled(share, offset):
 
 def test_rays_join_without_what_comes_over_them():
     rays = bar(0.3)
-    list(render_outer_views(rays, [RIGHT], inpainter=paint_red))
+    list(update(rays, [RIGHT], inpainter=paint_red))
     _, colors, _, coverage, *_ = rays.arrays
     assert (colors[-1][coverage[-1] > 0] == (1, 0, 0)).all()
 
 
 def test_what_is_filled_shows_beside_the_edge():
-    with ViewSynthesis(inpainter=paint_red) as synthesis:
+    with Renderer(inpainter=paint_red) as synthesis:
         view = synthesis.render(bar(0.3), RIGHT)
     edge = view.colors[HEIGHT // 2, LAST - 6]
     light = 0.3 * linear_from_srgb(FOREGROUND) + 0.7 * linear_from_srgb(np.float32([1, 0, 0]))
@@ -61,7 +61,7 @@ def test_what_is_filled_shows_beside_the_edge():
 
 
 def test_where_nothing_lies_open_nothing_is_behind():
-    with ViewSynthesis() as synthesis:
+    with Renderer() as synthesis:
         view = synthesis.render(bar(0.0), ViewOffset(0.0, 0.0))
     assert view.behind is None
     assert filled_rays(view)[2].max() == 0

@@ -3,9 +3,7 @@
 import numpy as np
 import pytest
 
-from iibr_core.rendering.ray_cells import CELL_PX
-from iibr_core.rendering.ray_set import GUARD_BAND_PX, HIGHEST_LEVEL, RaySet
-from iibr_core.rendering.rendered_view import RaysBehind
+from iibr_core.method.rays import CELL_PX, GUARD_BAND_PX, HIGHEST_LEVEL, RaysBehind, RaySet
 from iibr_core.surfaces import EDGE_PX, SMOOTH_SHARE
 from iibr_core.types import ImageSize, Margins, ViewOffset
 

@@ -2,10 +2,10 @@ import numpy as np
 import pytest
 
 from iibr_core.color import linear_from_srgb, srgb_from_linear
-from iibr_core.rendering.candidates import Candidates, find_candidates
-from iibr_core.rendering.ray_set import RaySet
-from iibr_core.rendering.resampling import KEYS_A, resample_colors
-from iibr_core.rendering.visibility_weights import visibility_weights
+from iibr_core.method.candidates import Candidates, find_candidates
+from iibr_core.method.closed_form import closed_form
+from iibr_core.method.look_up import KEYS_A, look_up
+from iibr_core.method.rays import RaySet
 from iibr_core.types import ImageSize, ViewOffset, image_size
 from tests.iibr_core.scenes import smooth_texture
 
@@ -38,7 +38,7 @@ def test_one_surface_is_looked_up_by_keys_cubic(offset):
     image = np.random.default_rng(5).uniform(0.3, 0.7, (12, 14, 3)).astype(np.float32)
     rays = rays_of(image, np.full((12, 14), 0.9))
     candidates = find_candidates(rays, offset, (0, 12))
-    colors, disparity, _ = resample_colors(rays, candidates, visibility_weights(candidates))
+    colors, disparity, _ = look_up(rays, candidates, closed_form(candidates))
     for y, x in ((4, 4), (6, 7), (8, 9)):
         expected = cubic_slowly(image, x + 0.9 * offset.s, y + 0.9 * offset.t)
         assert colors[y, x] == pytest.approx(expected, abs=1e-5)
@@ -66,7 +66,7 @@ def test_surfaces_that_share_a_pixel_blend_in_linear_light():
         slots,
         np.zeros((1, 1), np.bool_),
     )
-    colors, _, _ = resample_colors(rays, candidates, half)
+    colors, _, _ = look_up(rays, candidates, half)
     assert colors[0, 1] == pytest.approx(
         srgb_from_linear((linear_from_srgb(red) + linear_from_srgb(blue)) / 2), abs=1e-5
     )
@@ -78,8 +78,8 @@ def test_no_colour_crosses_a_depth_edge():
     disparity = np.where(np.arange(12) < 6, 0.0, 3.0) * np.ones((8, 1))
     rays = rays_of(image, disparity)
     candidates = find_candidates(rays, ViewOffset(0.0, 0.5), (0, 8))
-    colors, found, _ = resample_colors(rays, candidates, visibility_weights(candidates))
-    sole = visibility_weights(candidates).max(axis=0) > 0.999
+    colors, found, _ = look_up(rays, candidates, closed_form(candidates))
+    sole = closed_form(candidates).max(axis=0) > 0.999
     assert colors[sole & (found == 0)].max() == 0
     assert colors[sole & (found == 3)].min() == 1
 
@@ -87,7 +87,7 @@ def test_no_colour_crosses_a_depth_edge():
 def test_no_candidates_are_black():
     rays = rays_of(smooth_texture(5, 5), np.full((5, 5), 100.0))
     candidates = find_candidates(rays, ViewOffset(0.0, 1.0), (0, 5))
-    colors, disparity, _ = resample_colors(rays, candidates, visibility_weights(candidates))
+    colors, disparity, _ = look_up(rays, candidates, closed_form(candidates))
     assert colors.max() == 0
     assert disparity.max() == 0
 
@@ -98,9 +98,9 @@ def test_colours_go_into_a_part_of_a_picture_where_they_are_wanted():
     disparity = random.uniform(-1, 1, (9, 14)).round().astype(np.float32)
     rays.add(ViewOffset(0, 0), random.random((9, 14, 3)).astype(np.float32), disparity, np.ones_like(disparity))
     candidates = find_candidates(rays, ViewOffset(0.4, 1.3), (0, 9))
-    weights, wanted = visibility_weights(candidates), np.zeros((9, 14), np.bool_)
+    weights, wanted = closed_form(candidates), np.zeros((9, 14), np.bool_)
     wanted[2:7, 3:12] = random.random((5, 9)) < 0.7
-    whole = resample_colors(rays, candidates, weights).colors
+    whole = look_up(rays, candidates, weights).colors
     part = np.full((5, 9, 3), 0.25, np.float32)
-    assert resample_colors(rays, candidates, weights, wanted, (part, 2, 3)).colors is part
+    assert look_up(rays, candidates, weights, wanted, (part, 2, 3)).colors is part
     assert (part == np.where(wanted[2:7, 3:12, None], whole[2:7, 3:12], np.float32(0.25))).all()

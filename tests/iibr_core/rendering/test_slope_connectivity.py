@@ -1,8 +1,5 @@
 import numpy as np
 import pytest
-
-from iibr_core.rendering.candidates import find_candidates
-from iibr_core.rendering.ray_set import RaySet
 from iibr_core.rendering.slope_connectivity import (
     BELOW,
     MINIMUM_RUN,
@@ -11,7 +8,10 @@ from iibr_core.rendering.slope_connectivity import (
     connect_rays,
     connected_either_way,
 )
-from iibr_core.rendering.visibility_weights import visibility_weights
+
+from iibr_core.method.candidates import find_candidates
+from iibr_core.method.closed_form import closed_form
+from iibr_core.method.rays import RaySet
 from iibr_core.surfaces import SLOPE_SHARE
 from iibr_core.training.degradation import blur
 from iibr_core.types import ViewOffset, image_size
@@ -79,7 +79,7 @@ def test_a_steep_plane_is_one_closed_surface_of_exact_disparity(slope, along):
     inside = (source > 4) & (source < 55) & (x > 2) & (x < 57)
     assert inside.sum() > 8
     count, disparities = turn(found.number), turn(found.disparity[0])
-    weights = turn(visibility_weights(found).sum(axis=0))
+    weights = turn(closed_form(found).sum(axis=0))
     assert (count[20:40, inside] == 1).all()
     assert weights[20:40, inside] == pytest.approx(1, abs=1e-3)
     assert disparities[20:40, inside] == pytest.approx(np.broadcast_to(exact[inside], (20, inside.sum())), abs=0.02)
@@ -90,7 +90,7 @@ def test_a_steep_surface_is_torn_where_it_ends():
     x = np.arange(80, dtype=np.float32)
     disparity = np.tile(np.where(x < 40, 0.8 * (40 - x), -9.0), (12, 1)).astype(np.float32)
     found = find_candidates(ray_set(disparity), ViewOffset(0.0, 1.0), (0, 12))
-    shown = visibility_weights(found).sum(axis=0)[6]
+    shown = closed_form(found).sum(axis=0)[6]
     # The slope's last ray, 39, lands on 38.2; the wall's first on 49.
     assert shown[41:48] == pytest.approx(0)
     assert shown[20:38] == pytest.approx(1, abs=1e-3)

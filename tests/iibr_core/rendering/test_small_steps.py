@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from iibr_core.generation.view_maker import ViewMaker
 
 from iibr_core.evaluation.metrics import bounded_psnr
 from iibr_core.evaluation.reference_warp import reference_warp
-from iibr_core.generation.view_maker import ViewMaker
-from iibr_core.rendering.mixed_pixels import move_with_foreground
+from iibr_core.method.mixed_pixels import move_with_foreground
 from iibr_core.surfaces import SLOPE_SHARE
 from iibr_core.types import ViewOffset
 

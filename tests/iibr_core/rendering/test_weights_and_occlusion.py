@@ -3,8 +3,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from iibr_core.rendering.candidates import Candidates
-from iibr_core.rendering.visibility_weights import entropy, visibility_weights, weights_and_coverage
+from iibr_core.method.candidates import Candidates
+from iibr_core.method.closed_form import closed_form
+from iibr_core.method.occlusion import entropy
 from iibr_core.types import ViewOffset
 
 
@@ -41,31 +42,31 @@ pairs_of_floats = st.lists(
 
 @given(pairs_of_floats)
 def test_weights_agree_with_a_slow_twin(pairs):
-    weights = visibility_weights(one_ray(pairs))[:, 0, 0]
+    weights = closed_form(one_ray(pairs))[:, 0, 0]
     assert weights[: len(pairs)] == pytest.approx(weights_slowly(pairs), abs=1e-5)
     assert weights.min() >= 0
     assert weights.sum() <= 1 + 1e-5
 
 
 def test_the_front_surface_wins_and_coverage_blends():
-    assert visibility_weights(one_ray([(1.0, 0.0), (1.0, 5.0)]))[:2, 0, 0] == pytest.approx([0, 1])
-    assert visibility_weights(one_ray([(1.0, 0.0), (0.3, 5.0)]))[:2, 0, 0] == pytest.approx([0.7, 0.3])
+    assert closed_form(one_ray([(1.0, 0.0), (1.0, 5.0)]))[:2, 0, 0] == pytest.approx([0, 1])
+    assert closed_form(one_ray([(1.0, 0.0), (0.3, 5.0)]))[:2, 0, 0] == pytest.approx([0.7, 0.3])
 
 
 @given(pairs_of_floats)
 def test_the_covered_share_is_what_the_weights_sum_to(pairs):
-    weights, covered = weights_and_coverage(one_ray(pairs))
+    weights, covered = closed_form(one_ray(pairs))
     assert covered[0, 0] == pytest.approx(min(weights.sum(), 1), abs=1e-5)
 
 
 def test_no_candidates_have_no_weight():
-    weights, covered = weights_and_coverage(one_ray([]))
+    weights, covered = closed_form(one_ray([]))
     assert weights.sum() == covered.sum() == 0
 
 
 @given(pairs_of_floats)
 def test_entropy_is_normalised(pairs):
-    value = entropy(visibility_weights(one_ray(pairs)))[0, 0]
+    value = entropy(closed_form(one_ray(pairs)))[0, 0]
     assert 0 <= value <= 1
 
 

@@ -10,14 +10,13 @@ import pytest
 from iibr_core.depth.edges.edge_blur import measure_edge_blur
 from iibr_core.depth.edges.refine import refine
 from iibr_core.depth.pictorial_cues import estimate_from_cues
-from iibr_core.generation.light_field import generate
 from iibr_core.inpainting import background
 from iibr_core.inpainting.background import fill_background
 from iibr_core.inpainting.disparity_holes import fill_disparity_holes
-from iibr_core.rendering.mixed_pixels import split_mixed_pixels
-from iibr_core.rendering.photo_rays import rays_of_photo
-from iibr_core.rendering.ray_set import RaySet
-from iibr_core.rendering.view_synthesis import ViewSynthesis
+from iibr_core.method.light_field import generate
+from iibr_core.method.mixed_pixels import split_mixed_pixels
+from iibr_core.method.rays import RaySet, rays_of_photo
+from iibr_core.method.view import Renderer
 from iibr_core.runtime import tiling
 from iibr_core.runtime.tiling import in_bands, in_pieces
 from iibr_core.runtime.work import Cancelled, stoppable
@@ -48,7 +47,7 @@ def added():
 
 
 def rendered():
-    with ViewSynthesis(keeps_entropy=True) as synthesis:
+    with Renderer(keeps_entropy=True) as synthesis:
         view = synthesis.render(rays_of_photo(COLORS, LAYERS, 2.0, 0), ViewOffset(2.0, 1.5))
     return view.colors, view.disparity, view.occluded, view.inpainted, view.entropy
 
@@ -181,7 +180,7 @@ def test_views_under_way_end_with_their_synthesis():
                 return
 
     def interrupted():
-        with ViewSynthesis() as synthesis:
+        with Renderer() as synthesis:
             views = synthesis.side_by_side(view, [synthesis])
             threading.Thread(target=lambda: next(views), daemon=True).start()
             assert began.wait(60)

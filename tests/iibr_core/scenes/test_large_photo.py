@@ -11,8 +11,7 @@ from PIL import Image
 from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.editing.edits import DepthEdits, Stroke
 from iibr_core.scenes.large_photo import load_large
-from iibr_core.scenes.loaded_photo import load_photo
-from iibr_core.scenes.making import make_plan
+from iibr_core.scenes.photo import load_photo, make_plan
 from iibr_core.scenes.scene import DepthSettings, Source
 from iibr_core.types import GridShape, InputError
 from tests.viewer.conftest import HEIGHT, WIDTH

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from iibr_core.rendering.optics import CENTRE, Optics
+from iibr_core.beyond.optics import CENTRE, Optics
 from iibr_core.scenes.lens_limits import LensChoice, clamp_optics, focus_limits
-from iibr_core.scenes.opening import SceneReady, SceneRequest, results_of
-from iibr_core.scenes.scene import Scene, Source
+from iibr_core.scenes.opening import results_of
+from iibr_core.scenes.scene import Scene, SceneReady, SceneRequest, Source
 from iibr_core.types import GridShape
 
 RANGES = [(-1.0, 2.0), (1.0, 4.0), (-3.0, -1.0), (2.0, -1.0), (-1.0, -3.0), (0.0, 2.0), (-2.0, 0.0), (0.0, 0.0)]

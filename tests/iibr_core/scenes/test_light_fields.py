@@ -8,17 +8,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from iibr_core.scenes.opening_work import FINDING
 
+from iibr_core.beyond.optics import CENTRE
 from iibr_core.color import bytes_from_encoded
 from iibr_core.depth.choice import DepthChoice
 from iibr_core.formats.images.write import write_image_file
-from iibr_core.rendering.optics import CENTRE
 from iibr_core.runtime.work import Cancelled, stoppable
 from iibr_core.scenes.lens_limits import focus_limits
 from iibr_core.scenes.light_fields import FROM_VIEWS
-from iibr_core.scenes.opening import SceneReady, SceneRequest, ViewReady, results_of
-from iibr_core.scenes.opening_work import FINDING
-from iibr_core.scenes.scene import Progress, Scene, Source
+from iibr_core.scenes.opening import results_of
+from iibr_core.scenes.scene import Progress, Scene, SceneReady, SceneRequest, Source, ViewReady
 from iibr_core.types import GridShape, InputError
 from viewer.model.actions import OpenPath, ProgressMade, SceneOpened
 from viewer.model.reducers.root import reduce

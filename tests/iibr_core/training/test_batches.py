@@ -2,13 +2,12 @@ import numpy as np
 import pytest
 import torch
 
-from iibr_core.ray_transformer.inference import TrainedWeights
-from iibr_core.ray_transformer.model import RayTransformer
-from iibr_core.rendering.ambiguous_rays import HYPOTHESES
-from iibr_core.rendering.hypotheses import FEATURES, INPAINTED
+from iibr_core.method.ambiguous_rays import FEATURES, HYPOTHESES, INPAINTED
+from iibr_core.method.ray_transformer import TrainedWeights
 from iibr_core.training import batches
 from iibr_core.training.batches import RayChoice, training_batch
 from iibr_core.training.losses import LossWeights, color_loss, to_perceptual
+from iibr_core.training.model import RayTransformer
 from iibr_core.training.trainer import TrainConfig, train
 from iibr_core.types import ImageSize
 

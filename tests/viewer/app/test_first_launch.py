@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from iibr_core.rendering.optics import CENTRE
+from iibr_core.beyond.optics import CENTRE
 from iibr_core.scenes.scene import Source
 from iibr_core.types import GridShape
 from tests.viewer.conftest import DEADLINE_S, Driver, Opener

@@ -12,8 +12,7 @@ import pytest
 from imgui_bundle import imgui
 from PIL import ImageGrab
 
-from iibr_core.scenes.opening import ViewReady, WantedPhoto
-from iibr_core.scenes.scene import Progress, Source
+from iibr_core.scenes.scene import Progress, Source, ViewReady, WantedPhoto
 from iibr_core.types import GridShape, ViewUpdate
 from tests.iibr_core.scenes.test_opening import write_large_photo
 from tests.viewer.conftest import Driver, Opener, write_scene

@@ -27,7 +27,7 @@ def viewer(photo_path: Path) -> Iterator[HeadlessViewer]:
     except InputError as error:
         pytest.skip(str(error))
     with viewer:
-        viewer.open(Source(str(photo_path), grid=GridShape(3, 3)), 1.0, lambda progress: None)
+        viewer.open(Source(str(photo_path), grid=GridShape(3, 3)))
         yield viewer
 
 
@@ -95,7 +95,7 @@ def test_tiny_photos_open(tmp_path: Path, viewer: HeadlessViewer, pixels: np.nda
     from iibr_core.formats.images.write import write_image
 
     write_image(tmp_path / "tiny.png", pixels.astype(np.uint8))
-    viewer.open(Source(str(tmp_path / "tiny.png")), 1.0, lambda progress: None)
+    viewer.open(Source(str(tmp_path / "tiny.png")))
     np.testing.assert_array_equal(viewer.picture(), pixels)
     assert viewer.screen((800, 600)).shape == (600, 800, 3)
 
@@ -105,11 +105,11 @@ def test_light_fields_of_other_layouts_open(tmp_path: Path, viewer: HeadlessView
     from iibr_core.formats.images.photo import read_photo
 
     stanford = write_stanford(tmp_path / "stanford", 3, 3)
-    viewer.open(Source(str(stanford)), 1.0, lambda progress: None)
+    viewer.open(Source(str(stanford)))
     for eye, name in ((ViewOffset(0, 0), "out_01_01_-1.0_1.0"), (ViewOffset(-1, 1), "out_02_02_-2.0_2.0")):
         viewer.do(MoveEye(eye))
         assert np.abs(viewer.picture() / 255 - read_photo(stanford / f"{name}.png").pixels).max() < 1.5 / 255
-    viewer.open(Source(str(write_stereo_pair(tmp_path / "pair"))), 1.0, lambda progress: None)
+    viewer.open(Source(str(write_stereo_pair(tmp_path / "pair"))))
     assert viewer.state.scene is not None
     assert viewer.state.scene.grid == (1, 2)
     right = read_photo(tmp_path / "pair" / "im1.png").pixels
@@ -142,10 +142,10 @@ def test_only_the_views_that_a_picture_shows_are_made(
     ones.
     """
     source, made = Source(str(photo_path), grid=GridShape(5, 5)), list[float]()
-    viewer.open(source, 1.0, lambda progress: None)
+    viewer.open(source)
     viewer.do(*actions)
     expected = viewer.picture()
-    viewer.open_scene(source, 1.0, lambda progress: None)
+    viewer.open_scene(source, 1.0)
     viewer.do(*actions)
     viewer.make_views(lambda progress: made.append(progress.share), only_seen=True)
     difference = viewer.picture().astype(float) - expected

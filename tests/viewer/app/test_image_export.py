@@ -47,7 +47,7 @@ def opened(photo: Path) -> Iterator[HeadlessViewer]:
     except InputError as error:
         pytest.skip(str(error))
     with viewer:
-        viewer.open(Source(str(photo), grid=GridShape(3, 3)), 1.0, lambda progress: None)
+        viewer.open(Source(str(photo), grid=GridShape(3, 3)))
         viewer.do(MoveEye(ViewOffset(0.3, -0.4)), SetAperture(2.0), SetFocus(0.2))
         yield viewer
 

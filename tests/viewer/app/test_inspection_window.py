@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from iibr_core.beyond.optics import Optics
 from iibr_core.formats.images.write import write_image
 from iibr_core.formats.light_fields.write import write_light_field
-from iibr_core.generation.light_field import generate
-from iibr_core.generation.plan import plan_literal
-from iibr_core.rendering.optics import Optics
-from iibr_core.scenes.loaded_photo import load_photo
+from iibr_core.method.light_field import generate
+from iibr_core.method.plan import plan_literal
+from iibr_core.scenes.photo import load_photo
 from iibr_core.scenes.scene import Source
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import Driver, Opener, write_scene

@@ -14,9 +14,9 @@ from iibr_core.depth.estimators import estimate_cache
 from iibr_core.depth.estimators.catalog import fetch, known_model, model_here
 from iibr_core.depth.estimators.download import VERIFIED
 from iibr_core.formats.images.write import write_image
-from iibr_core.runtime.work import Cancelled, is_stopped
+from iibr_core.runtime.work import Cancelled, ignore_progress, is_stopped
 from iibr_core.scenes.scene import Source, source_beside
-from iibr_core.types import GridShape, ViewOffset, ignore_progress
+from iibr_core.types import GridShape, ViewOffset
 from tests.iibr_core.depth.onnx_graphs import published, weighing
 from tests.local_hub import Hub, local_hub
 from tests.viewer.conftest import Driver, Opener

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from iibr_core.rendering.optics import Optics
+from iibr_core.beyond.optics import Optics
 from iibr_core.scenes.rect import Rect as R
 from iibr_core.scenes.scene import Scene, Source
 from iibr_core.types import GridShape, ViewOffset

@@ -12,13 +12,19 @@ from typing import Any
 import numpy as np
 import pytest
 
+from iibr_core.beyond.resized_light import mean_of_areas
 from iibr_core.color import linear_from_srgb, srgb_from_linear
 from iibr_core.exports.full_picture import FullPicture
 from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.formats.images.photo import read_photo
-from iibr_core.rendering.resized_light import mean_of_areas
 from iibr_core.runtime.work import Cancelled, is_stopped
-from iibr_core.types import GridShape, InputError, ViewOffset, ViewUpdate, image_size
+from iibr_core.types import (
+    GridShape,
+    InputError,
+    ViewOffset,
+    ViewUpdate,
+    image_size,
+)
 from tests.viewer.conftest import HEIGHT, WIDTH, Driver, Opener, write_scene
 from viewer.app.image_export import export_picture
 from viewer.app.job_queue import JobQueue

@@ -12,10 +12,10 @@ from threading import current_thread, main_thread
 import numpy as np
 import pytest
 
+from iibr_core.beyond.optics import Optics
 from iibr_core.depth.editing.canvas import DepthCanvas, apply_edits
 from iibr_core.depth.editing.edits import UNEDITED, DepthEdits, Stroke
 from iibr_core.rendering.gloss.gloss_settings import Gloss
-from iibr_core.rendering.optics import Optics
 from iibr_core.scenes.scene import Source
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, ViewOffset

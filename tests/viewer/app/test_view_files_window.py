@@ -10,12 +10,17 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from iibr_core.beyond import between_views
 from iibr_core.formats.light_fields.write import write_light_field
 from iibr_core.formats.quilts import Quilt, lay_out
-from iibr_core.generation import dense_field
 from iibr_core.runtime.work import raise_if_stopped
 from iibr_core.scenes.scene import Scene
-from iibr_core.types import GridShape, ImageSize, ViewOffset, ViewUpdate
+from iibr_core.types import (
+    GridShape,
+    ImageSize,
+    ViewOffset,
+    ViewUpdate,
+)
 from tests.iibr_core.known_scenes import view_of_wall
 from tests.viewer.conftest import Driver
 from viewer.model.actions import DismissNotice, DoTask, OpenPath, SetDepthStrength, StopWork, Undo
@@ -89,14 +94,14 @@ def test_a_bad_one_leaves_the_scene_with_a_notice(viewer: Driver, tmp_path: Path
 @pytest.fixture
 def gate(monkeypatch: pytest.MonkeyPatch) -> Iterator[threading.Event]:
     """No view between others is made while this is not set."""
-    gate, made = threading.Event(), dense_field.densify
+    gate, made = threading.Event(), between_views.densify
 
     def held(given: object, sparse: object, dense: object, *rest: object) -> object:
         while not gate.wait(0.01):
             raise_if_stopped()
         return made(given, sparse, dense, *rest)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(dense_field, "densify", held)
+    monkeypatch.setattr(between_views, "densify", held)
     gate.set()
     yield gate
     gate.set()

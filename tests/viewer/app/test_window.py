@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from imgui_bundle import imgui
 
-from iibr_core.rendering.optics import Optics
+from iibr_core.beyond.optics import Optics
 from iibr_core.scenes.scene import Source
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import FAR, NEAR, Driver, Opener, rests, write_scene

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from imgui_bundle import imgui
 
+from iibr_core.beyond.optics import Optics
 from iibr_core.formats.images.metadata import SETTINGS_KEY
 from iibr_core.formats.images.photo import read_photo
 from iibr_core.formats.images.write import write_image
-from iibr_core.rendering.optics import Optics
 from iibr_core.scenes.scene import Source
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import Driver, Opener, rests, write_scene

@@ -16,12 +16,12 @@ from iibr_core.formats.images.write import write_image
 from iibr_core.formats.light_fields.light_field_formats import open_light_field
 from iibr_core.formats.light_fields.views import read_stored_view, read_views
 from iibr_core.formats.light_fields.write import write_light_field
-from iibr_core.generation.light_field import generate, ray_set
-from iibr_core.generation.plan import plan_for_viewing, plan_literal
 from iibr_core.inpainting.registry import INPAINTERS
-from iibr_core.rendering.view_synthesis import ViewSynthesis
+from iibr_core.method.light_field import generate, rays_of_grid
+from iibr_core.method.plan import plan_for_viewing, plan_literal
+from iibr_core.method.view import Renderer
 from iibr_core.runtime.work import Cancelled, stoppable
-from iibr_core.scenes.loaded_photo import load_photo
+from iibr_core.scenes.photo import load_photo
 from iibr_core.scenes.scene import Source
 from iibr_core.types import GridShape, InputError
 from tests.iibr_core import red_inpainter
@@ -72,13 +72,13 @@ def test_entropy_is_that_of_the_weights_and_is_only_made_on_request(inputs: Comp
     loaded, plan = inputs.loaded, inputs.plan
     assert loaded is not None
     assert plan is not None
-    rays, farthest_views = ray_set(loaded.photo, plan.field_disparity(loaded.disparity), plan)
+    rays, farthest_views = rays_of_grid(loaded.photo, plan.field_disparity(loaded.disparity), plan)
     for _ in farthest_views:
         pass
     offset = plan.grid.offset(0, 0)
-    with ViewSynthesis(keeps_entropy=True) as synthesis:
+    with Renderer(keeps_entropy=True) as synthesis:
         with_entropy = synthesis.render(rays, offset)
-    with ViewSynthesis() as synthesis:
+    with Renderer() as synthesis:
         without = synthesis.render(rays, offset)
     assert without.entropy is None
     assert with_entropy.entropy is not None

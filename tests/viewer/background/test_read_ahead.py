@@ -8,8 +8,7 @@ from collections.abc import Iterator
 import pytest
 
 from iibr_core.runtime.work import raise_if_stopped
-from iibr_core.scenes.opening import WantedPhoto
-from iibr_core.scenes.scene import Source
+from iibr_core.scenes.scene import Source, WantedPhoto
 from iibr_core.types import InputError
 from viewer.background.read_ahead import ReadAhead
 

@@ -10,12 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from iibr_core.beyond.optics import CENTRE
 from iibr_core.depth.editing.edits import DepthEdits, Stroke
-from iibr_core.rendering.optics import CENTRE
 from iibr_core.runtime import compiling
 from iibr_core.runtime.work import is_stopped
-from iibr_core.scenes.opening import SceneReady, SceneRequest, ViewReady, results_of
-from iibr_core.scenes.scene import DepthSettings, Progress, Source
+from iibr_core.scenes.opening import results_of
+from iibr_core.scenes.scene import DepthSettings, Progress, SceneReady, SceneRequest, Source, ViewReady
 from iibr_core.types import GridShape, InputError, ViewUpdate
 from viewer.background.job_threads import QUEUED_RESULTS, Failed
 from viewer.background.scene_worker import SceneResult, SceneWork, SceneWorker, _telling_compiling
@@ -237,7 +237,7 @@ def test_a_missing_file_is_a_failure_with_its_name(desk_for: Callable[..., Desk]
 def test_weights_that_are_missing_are_a_failure_and_fast_still_works(
     monkeypatch: pytest.MonkeyPatch, desk_for: Callable[..., Desk], photo_path: Path, tmp_path: Path
 ) -> None:
-    monkeypatch.setattr("iibr_core.generation.light_field.resource_folder", lambda name: tmp_path / name)
+    monkeypatch.setattr("iibr_core.method.light_field.resource_folder", lambda name: tmp_path / name)
     desk = desk_for()
     source = Source(str(photo_path), grid=GridShape(3, 3), quality="balanced")
     desk.worker.submit(SceneRequest(1, source))

@@ -11,10 +11,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from iibr_core.beyond.optics import Optics
 from iibr_core.formats.maps.pfm import read_pfm
 from iibr_core.inpainting.registry import INPAINTERS
 from iibr_core.rendering.gloss.gloss_settings import Gloss
-from iibr_core.rendering.optics import Optics
 from iibr_core.scenes.scene import Source
 from iibr_core.types import TOTAL_PARALLAX
 from tests.forked_iibr import run_forked
@@ -133,7 +133,7 @@ def trained(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
     import torch
 
     from iibr_core.formats.weights import save_weights
-    from iibr_core.ray_transformer.model import RayTransformer
+    from iibr_core.training.model import RayTransformer
 
     torch.manual_seed(1)
     model = RayTransformer()
@@ -143,7 +143,7 @@ def trained(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
     path = tmp_path / "assets" / "weights" / "ray_transformer.safetensors"
     path.parent.mkdir(parents=True)
     save_weights(model, path)
-    monkeypatch.setattr("iibr_core.generation.light_field.resource_folder", lambda name: tmp_path / name)
+    monkeypatch.setattr("iibr_core.method.light_field.resource_folder", lambda name: tmp_path / name)
     return path
 
 
@@ -208,9 +208,9 @@ def test_a_picture_at_the_photos_own_size_equals_the_usual_one_made_smaller(
     tmp_path: Path,
     options: tuple[object, ...],
 ) -> None:
+    from iibr_core.beyond.resized_light import mean_of_areas
     from iibr_core.color import linear_from_srgb, srgb_from_linear
     from iibr_core.formats.images.photo import read_photo
-    from iibr_core.rendering.resized_light import mean_of_areas
     from iibr_core.types import ImageSize
 
     full, usual, half = (tmp_path / f"{name}.png" for name in ("full", "usual", "half"))

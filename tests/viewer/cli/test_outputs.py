@@ -160,7 +160,7 @@ def test_notes_come_after_the_result_or_not_at_all(
 ) -> None:
     words = ("--grid", 3, "--depth", "rough", "--refine", "off")
     with monkeypatch.context() as small:
-        small.setattr("iibr_core.generation.memory.free_memory_bytes", lambda: 10**5)
+        small.setattr("iibr_core.method.memory.free_memory_bytes", lambda: 10**5)
         assert run(monkeypatch, "generate", photo_path, *words, "--out", tmp_path / "f") == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert "lower --grid" in line

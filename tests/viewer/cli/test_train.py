@@ -37,7 +37,7 @@ def test_three_steps_write_weights_that_say_where_they_come_from(
     import torch
 
     from iibr_core.formats.weights import load_weights
-    from iibr_core.ray_transformer.model import RayTransformer
+    from iibr_core.training.model import RayTransformer
 
     torch.set_num_threads(2)
     out = tmp_path / "w.safetensors"

@@ -39,7 +39,7 @@ def middles(picture):
 @pytest.mark.parametrize("eye", [ViewOffset(0.0, 0.0), ViewOffset(0.5, 0.25)], ids=str)
 def test_wide_colours_keep_their_numbers_and_are_shown_as_srgb(tmp_path, eye):
     with HeadlessViewer() as viewer:
-        viewer.open(photo_of_patches(tmp_path / "p3.png", icc_profile=profile_bytes()), 1.0, lambda made: None)
+        viewer.open(photo_of_patches(tmp_path / "p3.png", icc_profile=profile_bytes()))
         viewer.do(MoveEye(eye), SetAperture(2.0))
         assert viewer.state.scene.color_space == DISPLAY_P3
         assert np.abs(middles(viewer.picture()) - IN_SRGB).max() <= 2
@@ -59,14 +59,14 @@ def test_wide_colours_keep_their_numbers_and_are_shown_as_srgb(tmp_path, eye):
 def test_wide_colours_keep_their_numbers_at_the_photos_own_size(tmp_path):
     photo = photo_of_patches(tmp_path / "p3.png", icc_profile=profile_bytes())
     with HeadlessViewer() as viewer:
-        viewer.open(replace(photo, max_pixels=SIDE * SIDE), 1.0, lambda made: None)
+        viewer.open(replace(photo, max_pixels=SIDE * SIDE))
         assert viewer.draws_own_pixels(viewer.own_size)
         assert np.abs(middles(viewer.picture(viewer.own_size, color_space=DISPLAY_P3)) - PATCHES).max() <= 1
 
 
 def test_srgb_photos_are_not_touched(tmp_path):
     with HeadlessViewer() as viewer:
-        viewer.open(photo_of_patches(tmp_path / "plain.png"), 1.0, lambda made: None)
+        viewer.open(photo_of_patches(tmp_path / "plain.png"))
         assert viewer.state.scene.color_space == SRGB
         assert np.array_equal(middles(viewer.picture()), PATCHES)
 
@@ -79,7 +79,7 @@ def test_saved_colours_are_those_of_the_photo(tmp_path, name, is_wide):
     source, out = photo_of_patches(tmp_path / "in.png", **options), tmp_path / name
     form = PictureFormat(bits=8, quality=100)
     with HeadlessViewer() as viewer:
-        viewer.open(source, 1.0, lambda made: None)
+        viewer.open(source)
         shot = shot_of(viewer.state, viewer.state.scene.size, form)
         export_picture(out, viewer.picture(color_space=shot.color_space), shot)
     assert shot.color_space == (DISPLAY_P3 if is_wide else SRGB)

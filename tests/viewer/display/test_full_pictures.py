@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter
 
+from iibr_core.beyond.optics import ApertureShape, Optics
 from iibr_core.evaluation.metrics import bounded_psnr
 from iibr_core.formats.images.write import write_image
-from iibr_core.rendering.optics import ApertureShape, Optics
 from iibr_core.scenes.scene import Source
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import FloatImage, GridShape, ViewOffset
@@ -58,7 +58,7 @@ def viewers(photo: Path) -> Iterator[tuple[HeadlessViewer, HeadlessViewer]]:
     """The photo opened smaller, and at its own size."""
     with HeadlessViewer("egl") as smaller, HeadlessViewer("egl") as own:
         for viewer, max_pixels in ((smaller, SMALLER), (own, 10**6)):
-            viewer.open(Source(str(photo), grid=GridShape(5, 5), max_pixels=max_pixels), 1.0, lambda made: None)
+            viewer.open(Source(str(photo), grid=GridShape(5, 5), max_pixels=max_pixels))
         yield smaller, own
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from iibr_core.exports.render_settings import RenderSettings
-from iibr_core.scenes.opening import SceneReady
+from iibr_core.scenes.scene import SceneReady
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import ViewOffset
 from tests.viewer.conftest import headless_with_scene

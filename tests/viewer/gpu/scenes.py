@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from iibr_core.beyond.aperture_shape import openness
+from iibr_core.beyond.optics import Optics
 from iibr_core.color import linear_from_srgb, srgb_from_linear
 from iibr_core.exports.render_settings import RenderSettings
-from iibr_core.rendering.aperture_shape import openness
-from iibr_core.rendering.optics import Optics
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, ViewOffset
 from viewer.gpu.refocus.picture_renderer import Renderer

@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from iibr_core.rendering.aperture_shape import opening
-from iibr_core.rendering.optics import ApertureMask, ApertureShape
+from iibr_core.beyond.aperture_shape import opening
+from iibr_core.beyond.optics import ApertureMask, ApertureShape
 
 DIAMETER = 8.0
 WIDTH = 0.5

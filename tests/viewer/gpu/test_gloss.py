@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from iibr_core.beyond.optics import Optics
 from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.rendering.gloss.geometry import SceneGeometry
 from iibr_core.rendering.gloss.gloss_settings import Gloss, GlossLight, GlossSurface
 from iibr_core.rendering.gloss.shading import GlossMaps, make_gloss_maps, shade
-from iibr_core.rendering.optics import Optics
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.gpu.scenes import rms

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from iibr_core.rendering.optics import Optics
+from iibr_core.beyond.optics import Optics
 from iibr_core.types import GridShape, ViewOffset
 from tests.image_compare import SAME_RASTERISER, assert_close, read_png, write_png
 from tests.viewer.gpu.scenes import TwoPlanes

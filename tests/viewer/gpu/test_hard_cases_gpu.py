@@ -14,9 +14,9 @@ import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
+from iibr_core.beyond.optics import Optics
 from iibr_core.color import linear_from_srgb, srgb_from_linear
 from iibr_core.exports.render_settings import RenderSettings
-from iibr_core.rendering.optics import Optics
 from iibr_core.scenes.lens_limits import eye_limits
 from iibr_core.types import GridShape, ViewOffset
 from tests.image_compare import ROUNDING, assert_close

@@ -7,8 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
+from iibr_core.beyond.optics import Optics
 from iibr_core.color import linear_from_srgb, srgb_from_linear
-from iibr_core.rendering.optics import Optics
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.gpu.scenes import TwoPlanes
 from viewer.gpu.context import GLContext

@@ -7,9 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from iibr_core.beyond.optics import (
+    CENTRE,
+    HIGHLIGHT_GAIN,
+    ApertureMask,
+    ApertureShape,
+    Optics,
+)
 from iibr_core.color import linear_from_srgb
 from iibr_core.exports.render_settings import RenderSettings
-from iibr_core.rendering.optics import CENTRE, HIGHLIGHT_GAIN, ApertureMask, ApertureShape, Optics
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.gpu.scenes import TwoPlanes, eyes_of_pixels, first_frame, rms, settled, through_lens
 from viewer.gpu.refocus.picture_renderer import Renderer

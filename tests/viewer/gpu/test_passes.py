@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from iibr_core.rendering.optics import CENTRE, Optics
+from iibr_core.beyond.optics import CENTRE, Optics
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.gpu.scenes import TwoPlanes, rms, settled
 from viewer.gpu.refocus import accumulation, passes

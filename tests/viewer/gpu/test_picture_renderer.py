@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from iibr_core.beyond.optics import Optics
 from iibr_core.color import linear_from_srgb, srgb_from_linear
-from iibr_core.rendering.optics import Optics
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, ViewOffset
 from tests.image_compare import FILTERING, ROUNDING, assert_close

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from iibr_core.beyond.optics import ApertureShape, Optics
 from iibr_core.color import srgb_from_linear
 from iibr_core.exports.render_settings import RenderSettings
-from iibr_core.rendering.optics import ApertureShape, Optics
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.gpu.scenes import TwoPlanes
 from viewer.gpu.context import GLContext

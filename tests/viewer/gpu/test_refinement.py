@@ -9,7 +9,7 @@ import moderngl
 import numpy as np
 import pytest
 
-from iibr_core.rendering.optics import CENTRE, Optics
+from iibr_core.beyond.optics import CENTRE, Optics
 from iibr_core.types import GridShape, InputError, ViewOffset
 from tests.viewer.gpu.scenes import TwoPlanes, psnr, rms, through_lens
 from viewer.gpu.context import GLContext

@@ -12,13 +12,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from iibr_core.beyond.optics import Optics
 from iibr_core.color import stored_from_encoded
 from iibr_core.evaluation.focal_stacks import LENS, Focus, within
 from iibr_core.evaluation.metrics import psnr
 from iibr_core.exports.render_settings import RenderSettings
-from iibr_core.generation.light_field import generate
-from iibr_core.rendering.optics import Optics
-from iibr_core.types import Disparity, FloatImage, Quality, ViewUpdate
+from iibr_core.method.light_field import generate
+from iibr_core.types import (
+    Disparity,
+    FloatImage,
+    Quality,
+    ViewUpdate,
+)
 from tests.iibr_core.lens_scenes import GRID, NAMES, LensScene, lens_scene
 from tests.iibr_core.scenes import by_index, literal_plan
 from viewer.gpu.refocus.picture_renderer import Renderer

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
-from iibr_core.rendering.optics import ApertureMask, ApertureShape, Optics
+from iibr_core.beyond.optics import ApertureMask, ApertureShape, Optics
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.gpu.scenes import TwoPlanes
 from viewer.gpu.refocus.picture_lens import lens_of

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import pytest
 
+from iibr_core.beyond.between_views import require_steps
+from iibr_core.beyond.optics import Optics
 from iibr_core.depth.choice import DepthChoice
-from iibr_core.generation.dense_field import require_steps
-from iibr_core.rendering.optics import Optics
 from iibr_core.scenes.scene import FilledField, Scene, Source, source_beside
 from iibr_core.types import GridShape, ViewOffset
 from viewer.model.actions import DoTask, OpenPath

@@ -19,10 +19,9 @@ from iibr_core.depth.editing.edits import (
     Stroke,
 )
 from iibr_core.formats.maps.disparity_file import read_disparity
-from iibr_core.scenes.loaded_photo import apply_depth_settings, load_photo
-from iibr_core.scenes.making import make_plan
-from iibr_core.scenes.opening import SceneRequest, results_of
-from iibr_core.scenes.scene import DepthSettings, Source
+from iibr_core.scenes.opening import results_of
+from iibr_core.scenes.photo import apply_depth_settings, load_photo, make_plan
+from iibr_core.scenes.scene import DepthSettings, SceneRequest, Source
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, ImageSize, InputError
 from tests.viewer.conftest import FAR, HEIGHT, NEAR, WIDTH, write_scene

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from iibr_core.exports.kinds import EXPORTS, PURPOSES, ExportOptions, Purpose
-from iibr_core.generation.plan import ScenePlan
+from iibr_core.method.plan import ScenePlan
 from iibr_core.scenes.scene import Source
 from iibr_core.types import InputError
 from tests.viewer.model.test_reducers import scene_of, state_with

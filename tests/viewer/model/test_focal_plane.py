@@ -8,7 +8,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from iibr_core.rendering.optics import Optics
+from iibr_core.beyond.optics import Optics
 from iibr_core.scenes.rect import Rect
 from iibr_core.types import GridShape
 from tests.viewer.model.test_reducers import scene_of, state_with

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from iibr_core.rendering.optics import CENTRE
+from iibr_core.beyond.optics import CENTRE
 from iibr_core.scenes.scene import Source
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import Camera, ImageSize

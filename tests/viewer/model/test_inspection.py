@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from iibr_core.generation.plan import ScenePlan
+from iibr_core.method.plan import ScenePlan
 from iibr_core.scenes.rect import Rect
 from iibr_core.scenes.scene import Scene, Source
 from iibr_core.types import GridShape, ViewOffset

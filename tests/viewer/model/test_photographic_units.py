@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from iibr_core.rendering.optics import Optics
+from iibr_core.beyond.optics import Optics
 from iibr_core.scenes.lens_limits import focus_limits
 from iibr_core.scenes.scene import Scene
 from iibr_core.types import GridShape

@@ -9,9 +9,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from iibr_core.beyond.optics import (
+    APERTURE_KINDS,
+    EXPOSURE_LIMIT_STOPS,
+    ApertureMask,
+    ApertureShape,
+    Optics,
+)
 from iibr_core.depth.editing.edits import UNEDITED
-from iibr_core.generation.plan import ScenePlan
-from iibr_core.rendering.optics import APERTURE_KINDS, EXPOSURE_LIMIT_STOPS, ApertureMask, ApertureShape, Optics
+from iibr_core.method.plan import ScenePlan
 from iibr_core.scenes.lens_limits import (
     STEEPEST_TILT,
     aperture_limit,

@@ -13,12 +13,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from iibr_core.beyond.optics import (
+    APERTURE_KINDS,
+    ApertureMask,
+    ApertureShape,
+    Optics,
+)
 from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.editing.edits import BRUSH_TOOLS, DepthEdits, Stroke
 from iibr_core.formats.images.metadata import SETTINGS_KEY, settings_text_in
 from iibr_core.formats.images.write import write_image
 from iibr_core.rendering.gloss.gloss_settings import Gloss, GlossLight, GlossSurface
-from iibr_core.rendering.optics import APERTURE_KINDS, ApertureMask, ApertureShape, Optics
 from iibr_core.scenes.scene import Source
 from iibr_core.types import GridShape, InputError, ViewOffset
 from tests.viewer.model.test_reducers import scene_of, state_with

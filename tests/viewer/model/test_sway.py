@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from iibr_core.rendering.optics import CENTRE, Optics
+from iibr_core.beyond.optics import CENTRE, Optics
 from iibr_core.scenes.lens_limits import FIRST_APERTURE
 from iibr_core.scenes.scene import Progress, Source
 from iibr_core.types import GridShape, ViewOffset

@@ -10,7 +10,7 @@ import pytest
 import iibr_core
 from iibr_core.depth.choice import BETTER_WAYS
 from iibr_core.depth.sidecar import flat_disparity
-from iibr_core.generation.memory import require_memory
+from iibr_core.method.memory import require_memory
 from iibr_core.types import ImageSize, InputError
 from viewer.model.commands import BY_NAME
 from viewer.model.reducers.notices_reducer import add_notice

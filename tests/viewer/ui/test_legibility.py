@@ -11,9 +11,9 @@ from typing import Any
 import pytest
 from imgui_bundle import imgui
 
+from iibr_core.beyond.optics import APERTURE_KINDS, ApertureShape
 from iibr_core.depth.editing.edits import DepthEdits
 from iibr_core.exports.kinds import ANIMATIONS
-from iibr_core.rendering.optics import APERTURE_KINDS, ApertureShape
 from iibr_core.scenes.scene import DepthSettings
 from iibr_core.scenes.screen_size import ScreenSize
 from tests.viewer.conftest import headless_with_scene

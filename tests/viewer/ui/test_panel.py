@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from iibr_core.generation.plan import ScenePlan
+from iibr_core.method.plan import ScenePlan
 from iibr_core.scenes.scene import Progress, Scene, Source
 from iibr_core.types import GridShape, Quality
 from viewer.model.state.app_state import DrawReport

@@ -9,7 +9,12 @@ import numpy as np
 import pytest
 from imgui_bundle import imgui
 
-from iibr_core.rendering.optics import APERTURE_KINDS, ApertureKind, ApertureMask, ApertureShape
+from iibr_core.beyond.optics import (
+    APERTURE_KINDS,
+    ApertureKind,
+    ApertureMask,
+    ApertureShape,
+)
 from iibr_core.scenes.scene import Progress, Source
 from tests.viewer.conftest import headless_with_scene
 from viewer.app.headless import HeadlessViewer

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from imgui_bundle import imgui
 
-from iibr_core.rendering.optics import APERTURE_KINDS, ApertureMask, ApertureShape
+from iibr_core.beyond.optics import APERTURE_KINDS, ApertureMask, ApertureShape
 from iibr_core.scenes.screen_size import ScreenSize
 from tests.viewer.conftest import headless_with_scene
 from viewer.app.headless import HeadlessViewer

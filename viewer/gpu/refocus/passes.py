@@ -10,7 +10,7 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.rendering.aperture_sampling import SQRT_STEPS, fractions
+from iibr_core.beyond.aperture_sampling import SQRT_STEPS, fractions
 from iibr_core.types import SRGB, ColorSpace
 from viewer.gpu.light_field_texture import LightFieldTexture
 from viewer.gpu.programs import Program, ProgramCache, set_primaries

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from iibr_core.rendering.aperture_sampling import aperture_points, open_area
-from iibr_core.rendering.optics import Optics
+from iibr_core.beyond.aperture_sampling import aperture_points, open_area
+from iibr_core.beyond.optics import Optics
 from iibr_core.scenes.rect import WHOLE, Rect
 from iibr_core.types import SRGB, ColorSpace, ViewOffset
 from viewer.gpu.light_field_texture import LightFieldTexture

@@ -14,11 +14,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from iibr_core.beyond.optics import Optics
 from iibr_core.exports.render_settings import LensTile, RenderSettings
-from iibr_core.rendering.optics import Optics
 from iibr_core.scenes.rect import WHOLE, Rect
 from iibr_core.scenes.screen_size import ScreenSize
-from iibr_core.types import SRGB, ColorSpace, FloatImage, GridShape, StoredColors, ViewUpdate
+from iibr_core.types import (
+    SRGB,
+    ColorSpace,
+    FloatImage,
+    GridShape,
+    StoredColors,
+    ViewUpdate,
+)
 from viewer.gpu.context import GLContext
 from viewer.gpu.light_field_texture import Box, LightFieldTexture, field_that_fits
 from viewer.gpu.programs import ProgramCache

@@ -13,7 +13,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.rendering.aperture_sampling import SQRT_STEPS, Points, fractions, grid_weights
+from iibr_core.beyond.aperture_sampling import (
+    SQRT_STEPS,
+    Points,
+    fractions,
+    grid_weights,
+)
 from iibr_core.scenes.lens_limits import clamp_to_grid
 from iibr_core.types import GridShape, ViewOffset
 

@@ -7,16 +7,9 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from iibr_core.generation.outer_views import WantedViews
-from iibr_core.rendering.optics import Optics
+from iibr_core.beyond.optics import Optics
 from iibr_core.scenes.lens_limits import clamp_to_grid
 from iibr_core.types import GridShape, ViewOffset
-
-
-def wanted_for(optics: Optics, grid: GridShape) -> WantedViews:
-    """What a picture through these optics is made of, once it has converged, and how that is seen in it."""
-    is_sum = optics.aperture_diameter >= 2 and optics.dolly == 0
-    return WantedViews(views_seen(optics, grid), "sum" if is_sum else "one")
 
 
 def views_seen(optics: Optics, grid: GridShape) -> set[ViewOffset] | None:

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from iibr_core.beyond.optics import ApertureMask
 from iibr_core.formats.images.decode import decode, read_size
-from iibr_core.rendering.optics import ApertureMask
 from iibr_core.types import InputError
 
 LARGEST_SIDE = 64

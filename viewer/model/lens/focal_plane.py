@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from iibr_core.rendering.optics import Optics
+from iibr_core.beyond.optics import Optics
 from iibr_core.scenes.rect import Rect
 from iibr_core.scenes.scene import Scene
 from viewer.model.state.app_state import TiltHandles

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from iibr_core.rendering.optics import ApertureShape, Optics
+from iibr_core.beyond.optics import ApertureShape, Optics
 from iibr_core.scenes.lens_limits import aperture_limit, focus_span
 from iibr_core.scenes.scene import Scene
 from viewer.model.state.optics_actions import PresetName

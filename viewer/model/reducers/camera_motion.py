@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+from iibr_core.beyond.optics import CENTRE, Optics
 from iibr_core.exports.loops import point_on_loop
-from iibr_core.rendering.optics import CENTRE, Optics
 from iibr_core.types import GridShape, ViewOffset
 from viewer.model.state.motion import Motion, MotionKind
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-from iibr_core.rendering.optics import Optics
+from iibr_core.beyond.optics import Optics
 from viewer.model.state.app_state import AppState
 from viewer.model.state.history import Edit, History
 from viewer.model.state.motion import Motion

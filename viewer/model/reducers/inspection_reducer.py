@@ -77,11 +77,6 @@ def obstacle_to_overlay(scene: Scene, kind: OverlayKind) -> str:
     return "" if scene.has_view_disparity else NO_DISPARITY
 
 
-def obstacle_to_comparison(scene: Scene, kind: Comparison) -> str:
-    """Why this cannot be compared; empty where it can."""
-    return NOT_MADE_HERE if kind == "quality" and scene.plan is None else ""
-
-
 def lacks_kept_state(state: AppState, kind: Comparison) -> bool:
     """Whether a state must be kept before this can be compared."""
     return kind in ("kept", "difference") and state.inspection.kept is None
@@ -117,9 +112,8 @@ def _set_comparison(state: AppState, kind: Comparison | None) -> AppState:
         return _with(state, comparison=None, pair=None, divider_taken=False)
     if kind == "truth" and state.inspection.truth is None:
         return replace(state, tasks=(*state.tasks, ChooseTask("truth")))
-    obstacle = NOTHING_KEPT if lacks_kept_state(state, kind) else obstacle_to_comparison(state.scene, kind)
-    if obstacle:
-        return add_notice(state, Notice(obstacle))
+    if lacks_kept_state(state, kind):
+        return add_notice(state, Notice(NOTHING_KEPT))
     advised = tuple(notice for notice in state.notices if notice.text != KEPT)  # is done now
     return _with(replace(state, notices=advised), comparison=kind, overlay=None, pair=None)
 

@@ -7,8 +7,8 @@ from itertools import pairwise
 from math import hypot
 from typing import Any
 
+from iibr_core.beyond.optics import Optics
 from iibr_core.rendering.gloss.gloss_settings import MOST_POINTS, Gloss, GlossStroke
-from iibr_core.rendering.optics import Optics
 from iibr_core.scenes.lens_limits import (
     aperture_limit,
     clamp,

@@ -7,8 +7,8 @@ from dataclasses import replace
 from pathlib import PurePath
 from typing import Any
 
+from iibr_core.beyond.optics import Optics
 from iibr_core.rendering.gloss.gloss_settings import STROKE_RADIUS_LIMITS
-from iibr_core.rendering.optics import Optics
 from iibr_core.scenes.lens_limits import clamp, clamp_optics, is_finite
 from iibr_core.scenes.scene import DepthSettings, Progress, Source, is_same_field
 from viewer.model.actions import (

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import PurePath
 
+from iibr_core.beyond.optics import Optics
 from iibr_core.depth.editing.edits import UNEDITED
-from iibr_core.rendering.optics import Optics
 from iibr_core.scenes.lens_limits import clamp_optics, first_aperture, focus_limits
 from iibr_core.scenes.scene import DepthSettings, Progress, Scene
 from iibr_core.types import InputError
@@ -61,8 +61,6 @@ def stop_work(state: AppState) -> AppState:
     doing = f"stopped at {progress.done} of {progress.total} views"
     if progress.doing:
         doing = f"stopped {progress.doing}"
-    elif progress.drafts:
-        doing += f", edges still soft in {progress.drafts}"
     return replace(state, stopped=state.generation, progress=Progress(doing=doing))
 
 

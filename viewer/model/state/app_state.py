@@ -7,8 +7,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
+from iibr_core.beyond.optics import Optics
 from iibr_core.depth.editing.edits import UNEDITED, DepthEdits, Stroke
-from iibr_core.rendering.optics import Optics
 from iibr_core.scenes.rect import WHOLE, Rect
 from iibr_core.scenes.scene import AS_FOUND, DepthSettings, FilledField, Progress, Scene, Source
 from iibr_core.scenes.screen_size import ScreenSize

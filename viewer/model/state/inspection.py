@@ -8,13 +8,13 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from iibr_core.rendering.optics import Optics
+from iibr_core.beyond.optics import Optics
 from iibr_core.types import GridShape
 
 OverlayKind = Literal["disparity", "entropy", "inpainted"]
 OVERLAYS: tuple[OverlayKind, ...] = ("disparity", "entropy", "inpainted")
-Comparison = Literal["photo", "quality", "truth", "kept", "difference"]
-COMPARISONS: tuple[Comparison, ...] = ("photo", "quality", "truth", "kept", "difference")
+Comparison = Literal["photo", "truth", "kept", "difference"]
+COMPARISONS: tuple[Comparison, ...] = ("photo", "truth", "kept", "difference")
 ViewIndex = tuple[int, int]
 """(row, column) in a grid of views."""
 
@@ -143,6 +143,6 @@ InspectionAction = SetInspection | SetOverlay | Compare | KeepState | MoveDivide
 
 def of_next_scene(inspection: Inspection) -> Inspection:
     """What stays when another scene is opened: what is looked at, not what was found."""
-    comparison = inspection.comparison if inspection.comparison in ("photo", "quality") else None
+    comparison: Comparison | None = "photo" if inspection.comparison == "photo" else None
     stays = replace(inspection, comparison=comparison, divider_taken=False)
     return replace(stays, truth=None, pair=None, place=None, probe=None, kept=None)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from iibr_core.beyond.optics import CENTRE
 from iibr_core.exports.loops import LoopKind
-from iibr_core.rendering.optics import CENTRE
 from iibr_core.types import ViewOffset
 
 MotionKind = LoopKind | Literal["home", "sway"]

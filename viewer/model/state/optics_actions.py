@@ -8,8 +8,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from iibr_core.beyond.optics import ApertureShape
 from iibr_core.rendering.gloss.gloss_settings import Gloss, GlossSurface
-from iibr_core.rendering.optics import ApertureShape
 from iibr_core.types import ViewOffset
 
 PresetName = Literal["portrait", "macro", "everything sharp"]

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import PurePath
 
+from iibr_core.beyond.optics import Optics
 from iibr_core.depth.editing.edits import UNEDITED, DepthEdits
-from iibr_core.rendering.optics import Optics
 from iibr_core.runtime.resources import resource_folder
 from iibr_core.scenes.scene import Source
 from iibr_core.scenes.screen_size import ScreenSize

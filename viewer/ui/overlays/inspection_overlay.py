@@ -26,7 +26,6 @@ from viewer.ui.style import DARK, Color, corners, pack_color, palette_of
 LEGEND_WIDTH, LEGEND_HEIGHT = 150.0, 10.0
 SIDES: dict[Comparison, tuple[str, str]] = {
     "photo": ("photo", "result"),
-    "quality": ("fast", "balanced"),
     "truth": ("result", "truth"),
     "kept": ("snapshot", "now"),
 }

@@ -6,8 +6,8 @@ import math
 
 from imgui_bundle import imgui
 
+from iibr_core.beyond.optics import Optics
 from iibr_core.depth.editing.edits import DEPTH_TOOLS, BrushTool
-from iibr_core.rendering.optics import Optics
 from iibr_core.scenes.lens_limits import aperture_limit
 from iibr_core.scenes.rect import Rect
 from iibr_core.scenes.scene import Scene

@@ -7,7 +7,7 @@ from typing import Any
 
 from imgui_bundle import imgui
 
-from iibr_core.rendering.optics import ApertureShape
+from iibr_core.beyond.optics import ApertureShape
 from viewer.ui.style import Palette, pack_color
 
 SEGMENTS = 32

@@ -15,7 +15,6 @@ from viewer.model.layout import Layout
 from viewer.model.reducers.inspection_reducer import (
     NOTHING_KEPT,
     lacks_kept_state,
-    obstacle_to_comparison,
     obstacle_to_overlay,
 )
 from viewer.model.state.app_state import AppState
@@ -45,14 +44,12 @@ OPACITY_TIP = "How much of the picture the colours cover."
 TRUTH_TIP = "A light field on disk to compare with."
 COMPARISON_WORDS: dict[Comparison, str] = {
     "photo": "Photo",
-    "quality": "Balanced",
     "truth": "Truth",
     "kept": "Snapshot",
     "difference": "Difference",
 }
 COMPARISON_TIPS: dict[Comparison, str] = {
     "photo": "The photo beside the picture.",
-    "quality": "The view nearest to the viewpoint, made in fast and in balanced quality.",
     "truth": "The view nearest to the viewpoint beside the same one of a light field on disk. Drop its folder on the "
     "panel, or press again to choose another one.",
     "kept": "The picture as it was at the snapshot (K), beside the present one.",
@@ -124,13 +121,11 @@ def _comparisons(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
             COMPARISON_WORDS[k],
             chosen == k,
             COMPARISON_TIPS[k],
-            NOTHING_KEPT if lacks_kept_state(state, k) else obstacle_to_comparison(scene, k),
+            NOTHING_KEPT if lacks_kept_state(state, k) else "",
         )
         for k in COMPARISONS
     ]
-    pressed = _choices(row[:3], layout)
-    kept = _choices(row[3:], layout)
-    pressed = pressed if kept is None else 3 + kept
+    pressed = _choices(row, layout)
     actions: list[Action] = []
     if pressed is not None:
         actions.append(Compare(None if chosen == COMPARISONS[pressed] else COMPARISONS[pressed]))
@@ -141,7 +136,7 @@ def _comparisons(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
         imgui.same_line()
         imgui.align_text_to_frame_padding()
         quiet(truth.name)
-    quiet(pair_text(state, scene, chosen) if chosen in ("quality", "truth") else " ")
+    quiet(pair_text(state, scene, chosen) if chosen == "truth" else " ")
     return actions
 
 

@@ -9,7 +9,7 @@ from typing import cast
 
 from imgui_bundle import imgui
 
-from iibr_core.rendering.optics import (
+from iibr_core.beyond.optics import (
     APERTURE_KINDS,
     EXPOSURE_LIMIT_STOPS,
     RING_INNER_LIMIT,

@@ -9,8 +9,8 @@ from scipy.ndimage import gaussian_filter, maximum_filter
 from iibr_core.depth.edges import edge_blur, edge_labels, edge_profiles, refine
 from iibr_core.depth.edges.edge_band import _find_between
 from iibr_core.depth.edges.refine import refine as refine_map
-from iibr_core.rendering.flying_pixels import measure_detail
-from iibr_core.rendering.mixed_pixels import split_mixed_pixels
+from iibr_core.method.flying_pixels import measure_detail
+from iibr_core.method.mixed_pixels import split_mixed_pixels
 from iibr_core.stages import stages_without
 from tests.iibr_core.scenes import smooth_texture
 

@@ -29,7 +29,12 @@ from iibr_core.depth.multi_view.semi_global import choose_disparity
 from iibr_core.runtime.work import Cancelled, stoppable
 from iibr_core.training.scenes.random_scene import random_scene
 from iibr_core.training.scenes.raycast import render
-from iibr_core.types import GridShape, ImageSize, InputError, ViewOffset
+from iibr_core.types import (
+    GridShape,
+    ImageSize,
+    InputError,
+    ViewOffset,
+)
 from tests.iibr_core.scenes import smooth_texture
 
 GRID = GridShape(5, 5)

@@ -8,7 +8,12 @@ from iibr_core.rendering.gloss.geometry import SceneGeometry
 from iibr_core.rendering.gloss.gloss_settings import Gloss, GlossLight, GlossSurface
 from iibr_core.rendering.gloss.microfacet import reflected_share
 from iibr_core.rendering.gloss.shading import make_gloss_maps, shade, shade_views
-from iibr_core.types import GridShape, InputError, ViewOffset, ViewUpdate
+from iibr_core.types import (
+    GridShape,
+    InputError,
+    ViewOffset,
+    ViewUpdate,
+)
 from tests.iibr_core.rendering.gloss.scenes import GEOMETRY, SIZE, plane, sphere
 
 GREY = np.full((*SIZE, 3), 0.4, np.float32)

@@ -1,0 +1,1 @@
+"""What the paper does not have: views between views, free cameras, pictures at full size, lenses."""

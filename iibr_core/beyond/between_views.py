@@ -1,0 +1,254 @@
+"""The views between a few given views of a light field: the paper's loop with rays that begin with several photos.
+
+Every given view brings its own rays. What a new view shows is what the given views around it show there, each in its
+own closed form, so occlusion is resolved where it is known best; they are averaged by how near they stand and by how
+much of a ray theirs cover. What none of them shows is inpainted once, and joins the rays.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Generator, Iterator, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from itertools import product
+from math import hypot
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iibr_core.color import encoded_from_stored
+from iibr_core.depth.multi_view.estimate_disparity import estimate_coarse, sweep_bytes
+from iibr_core.depth.multi_view.every_view import estimate_all
+from iibr_core.formats.light_fields.multi_view_scene import MultiView
+from iibr_core.formats.light_fields.views import grid_of, read_views
+from iibr_core.inpainting.background import fill_background
+from iibr_core.inpainting.inpainter import Inpainter
+from iibr_core.method.light_field import encode_for_storage, nearest_first
+from iibr_core.method.memory import require_memory
+from iibr_core.method.rays import RaySet, rays_of_photo
+from iibr_core.method.view import Renderer
+from iibr_core.runtime.tiling import side_by_side
+from iibr_core.runtime.work import Cancelled, raise_if_stopped, report_progress
+from iibr_core.types import (
+    FloatImage,
+    GridShape,
+    InputError,
+    StoredColors,
+    ViewOffset,
+    ViewUpdate,
+    image_size,
+)
+
+VIEW_BYTES = 60
+"""Memory for a pixel of each given view: its colours, its disparity, and two images of rays."""
+MAX_COMPLETING = 10
+"""Largest number of views that complete the rays of several photos: three rows of three, and the centre."""
+FAR_WEIGHT = 0.02
+"""Weight of a given view a whole step away, against 1 for one in the very place: it counts where nearer ones see
+nothing.
+"""
+COVERED_POWER = 2
+"""Exponent of the share of a ray that a view's own rays cover, in the view's weight."""
+
+
+@dataclass(frozen=True, eq=False)
+class GivenView:
+    """A view of a sparse grid, at row and column. colors (H, W, 3): see StoredColors. disparity (H, W): in px per step
+    of the sparse grid.
+    """
+
+    row: int
+    column: int
+    colors: StoredColors
+    disparity: FloatImage
+
+
+def read_given_views(scene: MultiView) -> list[GivenView]:
+    """Return all views of a light field whose views fill a grid, with their disparity, found if the files have none.
+
+    Raises InputError if a file cannot be read, no disparity can be found, or memory does not suffice.
+    """
+    grid, (size, views) = grid_of(scene), read_views(scene)
+    what = f"making views between {grid.columns} x {grid.rows} of {scene.name} ({size})"
+    require_memory(math.prod(size) * math.prod(grid) * VIEW_BYTES, what)
+    read: list[ViewUpdate] = []
+    for view in views:
+        raise_if_stopped()
+        read.append(view)
+        report_progress(len(read), math.prod(grid), "reading views")
+    if any(view.disparity is None for view in read):
+        colors, offsets = [view.colors for view in read], [grid.offset(view.row, view.column) for view in read]
+        # The centre comes first.
+        range_px = estimate_coarse(colors, offsets, 0).range_px
+        require_memory(sweep_bytes(size, range_px, float(max(grid) - 1)), f"{scene.name}: finding its disparity")
+        maps = estimate_all(colors, offsets, range_px)
+        read = [replace(view, disparity=values) for view, values in zip(read, maps)]
+    return [
+        GivenView(view.row, view.column, view.colors, view.disparity) for view in read if view.disparity is not None
+    ]
+
+
+def require_steps(sparse: GridShape, dense: GridShape, name: str = "the light field") -> int:
+    """Return how many steps of the dense grid one step of the sparse grid is.
+
+    Raises InputError, which names the light field, if its views find no places.
+    """
+    steps = {
+        (new - 1) // (old - 1) if new > old and (new - 1) % (old - 1) == 0 else 0
+        for new, old in zip(dense, sparse)
+        if old > 1
+    }
+    fits = len(steps) == 1 and 0 not in steps and all(new == 1 for new, old in zip(dense, sparse) if old == 1)
+    if not fits:
+        raise InputError(f"{name}: its {sparse.rows}x{sparse.columns} views {_advice(sparse, dense)}")
+    return steps.pop()
+
+
+def _advice(sparse: GridShape, dense: GridShape) -> str:
+    if max(sparse) == 1:
+        return "have none beside them to go between: give the picture itself to `iibr generate`"
+    wider = [GridShape(*(1 + (old - 1) * steps for old in sparse)) for steps in (2, 3, 4)]
+    fitting = ", ".join(f"{grid.rows}x{grid.columns}" for grid in wider)
+    return f"have no places on a grid of {dense.rows}x{dense.columns} (rows x columns): give {fitting} and so on"
+
+
+def densify(
+    given: Sequence[GivenView],
+    sparse: GridShape,
+    dense: GridShape,
+    inpainter: Inpainter = fill_background,
+    nearest_to: Callable[[], ViewOffset] = lambda: ViewOffset(0.0, 0.0),
+) -> Generator[ViewUpdate]:
+    """Yield every view of the dense grid once: the centre, the given ones as they are, then those between them, the
+    nearest to `nearest_to()` first.
+
+    given: all views of the sparse grid, of equal size. Disparity is per step of the dense grid. Raises InputError as
+    `require_steps` does.
+    """
+    with suppress(Cancelled):
+        yield from _generate_views(given, require_steps(sparse, dense), sparse, dense, inpainter, nearest_to)
+
+
+def _generate_views(
+    given: Sequence[GivenView],
+    steps: int,
+    sparse: GridShape,
+    dense: GridShape,
+    inpainter: Inpainter,
+    nearest_to: Callable[[], ViewOffset],
+) -> Iterator[ViewUpdate]:
+    is_hdr = given[0].colors.dtype != np.uint8
+    places = {(view.row * steps, view.column * steps): view for view in given}
+    remaining = [dense.offset(*at) for at in np.ndindex(*dense) if at not in places]
+    completing = [offset for offset in _completing_views(sparse, dense, steps) if offset in remaining]
+    views = _ViewsBetween(given, steps, dense, inpainter)
+
+    def stored(offset: ViewOffset, view: _Merged) -> ViewUpdate:
+        (v, u), colors = dense.centre, encode_for_storage(view.colors, is_hdr, 1)
+        return ViewUpdate(v + round(offset.t), u + round(offset.s), colors, view.disparity, view.inpainted)
+
+    # The centre comes first, given or not.
+    early = 0 if dense.centre in places else 1
+    for offset in completing[:early]:
+        yield stored(offset, views.complete(offset))
+    for (row, column), view in sorted(places.items(), key=lambda item: hypot(*dense.offset(*item[0]))):
+        shown = np.zeros(view.disparity.shape, np.bool_)
+        yield ViewUpdate(row, column, view.colors, view.disparity / np.float32(steps), shown)
+    for offset in completing[early:]:
+        yield stored(offset, views.complete(offset))
+    remaining = [offset for offset in remaining if offset not in completing]
+    yield from side_by_side(lambda offset: stored(offset, views.make(offset)), nearest_first(remaining, nearest_to))
+
+
+@dataclass(frozen=True, eq=False)
+class _Merged:
+    """A view that several given views show. colors (H, W, 3): sRGB-encoded. disparity (H, W). hole (H, W): True where
+    none of all rays showed anything. inpainted (H, W): True where no given view did.
+    """
+
+    colors: FloatImage
+    disparity: FloatImage
+    hole: NDArray[np.bool_]
+    inpainted: NDArray[np.bool_]
+
+
+class _ViewsBetween:
+    """Makes views between given ones, in several threads once the rays are complete."""
+
+    def __init__(self, given: Sequence[GivenView], steps: int, dense: GridShape, inpainter: Inpainter) -> None:
+        self._renderer, self._steps, self._inpainter = Renderer(), steps, inpainter
+        self._sources: list[tuple[ViewOffset, RaySet]] = [
+            (
+                dense.offset(view.row * steps, view.column * steps),
+                rays_of_photo(encoded_from_stored(view.colors), view.disparity / np.float32(steps), steps, 0),
+            )
+            for view in given
+        ]
+        self._farthest = float(max(dense))
+        self._inpainted: tuple[ViewOffset, RaySet] | None = None
+
+    def complete(self, offset: ViewOffset) -> _Merged:
+        """Return the view at an offset after what had to be inpainted there has joined the rays."""
+        view = self.make(offset)
+        if view.hole.any():
+            if self._inpainted is None:
+                self._inpainted = offset, RaySet(MAX_COMPLETING, image_size(view.disparity), self._farthest)
+            origin, rays = self._inpainted
+            disparity = np.where(view.hole, view.disparity, np.float32(np.nan))
+            rays.add(_between(origin, offset), view.colors, disparity, view.hole)
+        return view
+
+    def make(self, offset: ViewOffset) -> _Merged:
+        """Return the view at an offset, without holes."""
+        colors, disparity, hole = self._merge(offset)
+        inpainted = hole.copy()
+        if hole.any() and self._inpainted is not None:
+            origin, rays = self._inpainted
+            filled, _ = self._renderer.visible(rays, _between(origin, offset))
+            np.copyto(colors, filled.colors, where=(hole & ~filled.occluded)[..., None])
+            np.copyto(disparity, filled.disparity, where=hole & ~filled.occluded)
+            hole &= filled.occluded
+        if hole.any():
+            at, nearest = min(self._sources, key=lambda source: np.hypot(*_between(source[0], offset)))
+            self._inpainter(colors, disparity, hole, nearest.photo_disparity, _between(at, offset))
+        return _Merged(colors, disparity, hole, inpainted)
+
+    def _merge(self, offset: ViewOffset) -> tuple[FloatImage, FloatImage, NDArray[np.bool_]]:
+        """Return colours (H, W, 3) and disparity (H, W) that the given views around show, and where none shows any."""
+        size = self._sources[0][1].view_size
+        colors, disparity = np.zeros((*size, 3), np.float32), np.zeros(size, np.float32)
+        total, heaviest = np.zeros(size, np.float32), np.zeros(size, np.float32)
+        for at, rays in self._sources:
+            away = _between(at, offset)
+            if max(map(abs, away)) > self._steps:
+                continue
+            view, covered = self._renderer.visible(rays, away)
+            near = (1 - abs(away.t) / self._steps) * (1 - abs(away.s) / self._steps) + FAR_WEIGHT
+            weight = np.where(view.occluded, np.float32(0), np.float32(near) * covered**COVERED_POWER)
+            # Encoded, as one surface's colours are interpolated: these are several looks at the same light.
+            colors += weight[..., None] * np.where(weight[..., None] > 0, view.colors, 0)
+            np.copyto(disparity, view.disparity, where=weight > heaviest)
+            np.maximum(heaviest, weight, out=heaviest)
+            total += weight
+        hole = ~(total > 0)
+        colors /= np.where(hole, np.float32(1), total)[..., None]
+        return colors, disparity, hole
+
+
+def _completing_views(sparse: GridShape, dense: GridShape, steps: int) -> list[ViewOffset]:
+    """Return views amid given ones, so as far from them as can be: at the corners and the middle of the grid.
+
+    Together they see nearly all that none of the given views does. The centre comes first, given or not.
+    """
+    rows, columns = (
+        {first * steps + ((steps + 1) // 2 if views > 1 else 0) for first in (0, (views - 1) // 2, max(views - 2, 0))}
+        for views in sparse
+    )
+    places = sorted({*product(rows, columns), dense.centre})
+    return sorted((dense.offset(*at) for at in places), key=lambda offset: hypot(*offset))
+
+
+def _between(origin: ViewOffset, offset: ViewOffset) -> ViewOffset:
+    """Return the offset from one viewpoint to another."""
+    return ViewOffset(offset.t - origin.t, offset.s - origin.s)

@@ -1,1 +1,0 @@
-"""All views of a light field, and what making them takes."""

@@ -1,1 +1,0 @@
-"""The network that weighs rays which several surfaces may explain."""

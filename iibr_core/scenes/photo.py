@@ -1,0 +1,212 @@
+"""A photo and its disparity as the worker holds them: read once, then refined and edited as often as the user likes;
+its plan, and its views.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Collection, Generator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from iibr_core.color import photo_in_srgb
+from iibr_core.depth.choice import DepthOrigin
+from iibr_core.depth.edges.refine import refine
+from iibr_core.depth.editing.canvas import DepthCanvas
+from iibr_core.depth.editing.edits import BRUSH_TOOLS, UNEDITED, DepthEdits, Stroke, levels_of
+from iibr_core.depth.estimators.catalog import USUAL_MODEL
+from iibr_core.depth.search import PhotoWithDepth, ask_model, estimator_of, open_with_depth, sketch_depth
+from iibr_core.formats.files import require_file
+from iibr_core.formats.images.metadata import settings_text_in
+from iibr_core.formats.images.photo import DEFAULT_MAX_PIXELS, focal_px_from_fov, read_thumbnail
+from iibr_core.formats.images.side_by_side import photo_size
+from iibr_core.formats.light_fields.light_field_formats import is_view_file
+from iibr_core.inpainting.inpainter import InpaintingAids
+from iibr_core.method.disparity_range import measure_disparity_range
+from iibr_core.method.light_field import generate
+from iibr_core.method.plan import (
+    MOST_STRENGTH,
+    PlanOverrides,
+    ScenePlan,
+    plan_for_viewing,
+    plan_literal,
+)
+from iibr_core.runtime.machine import give_back_memory
+from iibr_core.scenes.scene import DepthSettings, LoadedPhoto, Source, still_disparity
+from iibr_core.types import (
+    Disparity,
+    ImageSize,
+    InputError,
+    Photo,
+    ViewOffset,
+    ViewUpdate,
+)
+
+SKETCH = ImageSize(height=480, width=480)
+"""Largest size of a sketch."""
+SKETCH_WORTH_PIXELS = 1_500_000
+"""Number of pixels from which on a photo gets a sketch: smaller ones are read quickly."""
+NOT_YET = 0.0
+"""Strength of refinement while a photo is read: it is refined afterwards, again each time the user changes it."""
+
+
+def stamp_of(path: Path) -> tuple[int, ...]:
+    """Return a stamp that changes when another file takes the place of this one. Raises InputError without a file."""
+    require_file(path)
+    status = path.stat()
+    return status.st_ino, status.st_size, status.st_mtime_ns
+
+
+def load_photo(source: Source, depth_settings: DepthSettings | None = None, asks_model: bool = True) -> LoadedPhoto:
+    """Read a photo and find its disparity.
+
+    depth_settings: refinement and edits of the disparity, None for those of the source. asks_model: see
+    `open_with_depth`. Raises InputError.
+    """
+    path = Path(source.path)
+    max_pixels, stored_size = _pixels_to_read(source)
+    stamp = stamp_of(path)
+    found = open_with_depth(path, replace(source.depth, refine=NOT_YET), max_pixels, source.grid, asks_model)
+    give_back_memory()
+    own_size = _turned_like(stored_size, found.photo.size)
+    loaded = _loaded(found, settings_text_in(path), source, own_size, stamp)
+    return apply_depth_settings(loaded, depth_settings or DepthSettings(source.depth.refine))
+
+
+def deepen(source: Source, loaded: LoadedPhoto, strength: float) -> LoadedPhoto:
+    """Return the same photo with the depth that a model estimates, refined with this strength and not edited.
+
+    Raises InputError.
+    """
+    found = ask_model(Path(source.path), loaded.photo, replace(source.depth, refine=NOT_YET), source.grid)
+    deepened = _loaded(found, loaded.settings, source, loaded.own_size, loaded.stamp)
+    return apply_depth_settings(deepened, DepthSettings(strength))
+
+
+def sketch_photo(source: Source) -> LoadedPhoto | None:
+    """Return a large photo at a small size with depth that is found quickly, to be shown while it is read.
+
+    None if it is not worth while. Raises InputError.
+    """
+    path = Path(source.path)
+    max_pixels, stored_size = _pixels_to_read(source)
+    stamp = stamp_of(path)
+    if source.is_literal or min(math.prod(stored_size), max_pixels) < SKETCH_WORTH_PIXELS:
+        return None
+    pixels = read_thumbnail(path, SKETCH).astype(np.float32) / np.float32(255)
+    photo = Photo(pixels, focal_px_from_fov(pixels.shape[1]), path.stem, is_hdr=False)
+    found = sketch_depth(path, photo, source.depth)
+    return _loaded(found, "", source, _turned_like(stored_size, photo.size), stamp)
+
+
+def photo_of_arrays(photo: Photo, disparity: Disparity) -> LoadedPhoto:
+    """Return a photo and its disparity as they were given, from no file: nothing is refined."""
+    found = PhotoWithDepth(photo, disparity, DepthOrigin("file", disparity.source))
+    return _loaded(found, "", Source(""), photo.size, ())
+
+
+def apply_depth_settings(loaded: LoadedPhoto, depth_settings: DepthSettings) -> LoadedPhoto:
+    """Return the same photo with other refinement and edits; only what changed is computed. Raises InputError."""
+    if loaded.depth_settings == depth_settings:
+        return loaded
+    if loaded.depth_settings.refine != depth_settings.refine:
+        loaded = _refine(loaded, depth_settings.refine)
+    values = loaded.canvas.apply(depth_settings.edits)
+    return replace(loaded, depth_settings=depth_settings, disparity=replace(loaded.refined, values=values))
+
+
+def prepare_brush() -> None:
+    """Load or compile the brush's kernels, so that the first stroke does not wait for them."""
+    strokes = tuple(Stroke(tool, ((0.5, 0.5),), 0.1, 0.5) for tool in BRUSH_TOOLS)
+    DepthCanvas(np.zeros((4, 4, 3), np.float32), np.zeros((4, 4), np.float32)).apply(DepthEdits(strokes=strokes))
+
+
+def inpainting_aids(source: Source, loaded: LoadedPhoto) -> InpaintingAids:
+    """Return the aids for inpainting this photo: the estimator of its depth, if that was a model."""
+    found = PhotoWithDepth(loaded.photo, loaded.found, loaded.origin)
+    return InpaintingAids(estimator_of(found, source.depth))
+
+
+def make_plan(source: Source, loaded: LoadedPhoto, depth_strength: float, keeps_views: bool = True) -> ScenePlan:
+    """Return the plan for viewing, or for literal disparity. Places without edits keep their parallax.
+
+    keeps_views: False if each view is written and forgotten. Raises InputError if an override is out of range.
+    """
+    if source.is_literal:
+        if source.grid is None:
+            raise InputError("--literal counts disparity in px from view to view: say how many with --grid")
+        return plan_literal(loaded.photo, loaded.disparity, source.grid, keeps_views, source.inpaint)
+    zero = source.focus_disparity
+    if loaded.depth_settings.edits != UNEDITED:
+        zero = still_disparity(source, loaded.canvas.before_strokes(loaded.depth_settings.edits))
+        range_px, edited_px = (
+            measure_disparity_range(map_.values).range for map_ in (loaded.refined, loaded.disparity)
+        )
+        wanted = depth_strength * (edited_px / range_px if range_px else 1.0)
+        depth_strength = min(max(wanted, -MOST_STRENGTH), MOST_STRENGTH)
+    overrides = PlanOverrides(source.grid, depth_strength, zero, source.inpaint)
+    return plan_for_viewing(loaded.photo, loaded.disparity, overrides, keeps_views)
+
+
+def views_of_photo(
+    source: Source,
+    loaded: LoadedPhoto,
+    plan: ScenePlan,
+    nearest_to: Callable[[], ViewOffset] = lambda: ViewOffset(0.0, 0.0),
+    in_srgb: bool = True,
+    wanted: Callable[[], Collection[ViewOffset] | None] = lambda: None,
+) -> Generator[ViewUpdate]:
+    """Yield the views as `generate` does, in sRGB or in the photo's colour space. Raises InputError as that does."""
+    photo, disparity = loaded.photo, plan.field_disparity(loaded.disparity)
+    aids = inpainting_aids(source, loaded)
+    return generate(
+        photo_in_srgb(photo) if in_srgb else photo, disparity, plan, nearest_to, source.inpaint, aids, wanted
+    )
+
+
+def _turned_like(size: ImageSize, upright: ImageSize) -> ImageSize:
+    """Return the size of a stored picture after it was turned upright."""
+    is_turned = (size.height < size.width) != (upright.height < upright.width) and size.height != size.width
+    return ImageSize(size.width, size.height) if is_turned else size
+
+
+def _pixels_to_read(source: Source) -> tuple[int, ImageSize]:
+    """Return the largest number of pixels to read, and the stored size. Raises InputError for files of views."""
+    path = Path(source.path)
+    if is_view_file(path):
+        raise InputError(
+            f"{path}: holds the views of a light field, not a photo; `iibr view`, export and depth read it"
+        )
+    return source.max_pixels or DEFAULT_MAX_PIXELS, photo_size(path)
+
+
+def _loaded(
+    found: PhotoWithDepth, settings: str, source: Source, own_size: ImageSize, stamp: tuple[int, ...]
+) -> LoadedPhoto:
+    """Return the record of a photo whose disparity is neither refined nor edited."""
+    photo, disparity = found.photo, found.disparity
+    return LoadedPhoto(
+        photo,
+        disparity,
+        found.origin,
+        settings,
+        (source.depth.model or USUAL_MODEL) if found.origin.kind == "model" else None,
+        DepthSettings(NOT_YET),
+        disparity,
+        disparity,
+        levels_of(disparity.values),
+        DepthCanvas(photo.pixels, disparity.values),
+        own_size,
+        stamp,
+    )
+
+
+def _refine(loaded: LoadedPhoto, strength: float) -> LoadedPhoto:
+    found = loaded.found
+    values = found.values
+    if strength > 0:
+        values = refine(loaded.photo.pixels, values, strength, found.unknown, is_enlarged=found.is_enlarged)
+    canvas = DepthCanvas(loaded.photo.pixels, values)
+    return replace(loaded, refined=replace(found, values=values), levels=levels_of(values), canvas=canvas)
