@@ -16,7 +16,7 @@ from iibr_core.beyond.free_cameras import (
     steered,
 )
 from iibr_core.types import ImageSize, InputError
-from tests.iibr_core.rendering.test_free_view import about, camera, square_scene
+from tests.iibr_core.beyond.test_free_view import about, camera, square_scene
 
 
 def test_depths_that_are_known_are_those_of_the_range():

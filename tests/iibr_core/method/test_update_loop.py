@@ -11,7 +11,7 @@ from iibr_core.method.update_loop import complete_ray_set, update
 from iibr_core.method.view import Renderer
 from iibr_core.runtime.work import Cancelled, stoppable
 from iibr_core.types import GridShape, ViewOffset
-from tests.iibr_core.filled_rays import filled_rays
+from tests.iibr_core.method.filled_rays import filled_rays
 from tests.iibr_core.red_inpainter import paint_red
 from tests.iibr_core.scenes import square_before_wall
 

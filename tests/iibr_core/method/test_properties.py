@@ -18,7 +18,7 @@ from iibr_core.method.rays import LEAST_STEP_PX, rays_of_photo
 from iibr_core.method.view import Renderer
 from iibr_core.surfaces import EDGE_PX
 from iibr_core.types import ViewOffset
-from tests.iibr_core.filled_rays import filled_rays
+from tests.iibr_core.method.filled_rays import filled_rays
 from tests.iibr_core.scenes import smooth_texture
 
 HEIGHT, WIDTH = 18, 22

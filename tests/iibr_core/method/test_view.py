@@ -8,7 +8,7 @@ from iibr_core.method.rays import rays_of_photo
 from iibr_core.method.update_loop import update
 from iibr_core.method.view import Renderer
 from iibr_core.types import ViewOffset
-from tests.iibr_core.filled_rays import filled_rays
+from tests.iibr_core.method.filled_rays import filled_rays
 from tests.iibr_core.red_inpainter import paint_red
 
 FOREGROUND, WALL = np.float32([0.9, 0.6, 0.3]), np.float32([0.1, 0.2, 0.5])
