@@ -1,29 +1,27 @@
+"""Weights of candidates, the covered share and the entropy that follow from them."""
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from hypothesis.extra import numpy as stn
 
-from iibr_core.method.candidates import Candidates
+from iibr_core.method.candidates import SLOTS, Candidates
 from iibr_core.method.closed_form import closed_form
-from iibr_core.method.occlusion import entropy
+from iibr_core.method.occlusion import entropy, view_entropy
+from iibr_core.method.rays import rays_of_photo
 from iibr_core.types import ViewOffset
+from tests.iibr_core.scenes import smooth_texture
 
 
-def one_ray(pairs, slots=5):
-    """Candidates of a single target ray from (coverage, disparity) pairs."""
-    shape = (slots, 1, 1)
+def one_ray(pairs):
+    """Return the candidates of a single target ray from (coverage, disparity) pairs."""
+    shape = (SLOTS, 1, 1)
     coverage, disparity = np.zeros(shape, np.float32), np.zeros(shape, np.float32)
     for k, (c, d) in enumerate(pairs):
         coverage[k], disparity[k] = c, d
-    return Candidates(
-        ViewOffset(0.0, 1.0),
-        0,
-        np.full((1, 1), len(pairs), np.uint8),
-        coverage,
-        disparity,
-        np.zeros(shape, np.uint8),
-        np.zeros((1, 1), np.bool_),
-    )
+    number, source = np.full((1, 1), len(pairs), np.uint8), np.zeros(shape, np.uint8)
+    return Candidates(ViewOffset(0.0, 1.0), 0, number, coverage, disparity, source, np.zeros((1, 1), np.bool_))
 
 
 def weights_slowly(pairs):
@@ -35,46 +33,46 @@ def weights_slowly(pairs):
     return weights
 
 
-pairs_of_floats = st.lists(
-    st.tuples(st.floats(2**-10, 3, width=32), st.floats(-100, 100, width=32)), min_size=1, max_size=5
-)
-
-
-@given(pairs_of_floats)
-def test_weights_agree_with_a_slow_twin(pairs):
-    weights = closed_form(one_ray(pairs))[:, 0, 0]
-    assert weights[: len(pairs)] == pytest.approx(weights_slowly(pairs), abs=1e-5)
-    assert weights.min() >= 0
-    assert weights.sum() <= 1 + 1e-5
-
-
-def test_the_front_surface_wins_and_coverage_blends():
-    assert closed_form(one_ray([(1.0, 0.0), (1.0, 5.0)]))[:2, 0, 0] == pytest.approx([0, 1])
-    assert closed_form(one_ray([(1.0, 0.0), (0.3, 5.0)]))[:2, 0, 0] == pytest.approx([0.7, 0.3])
-
-
-@given(pairs_of_floats)
-def test_the_covered_share_is_what_the_weights_sum_to(pairs):
+@given(st.lists(st.tuples(st.floats(2**-10, 3, width=32), st.floats(-100, 100, width=32)), min_size=0, max_size=SLOTS))
+def test_weights_and_their_sum_agree_with_a_slow_twin(pairs):
     weights, covered = closed_form(one_ray(pairs))
+    assert weights[: len(pairs), 0, 0] == pytest.approx(weights_slowly(pairs), abs=1e-5)
+    assert weights.min() >= 0
     assert covered[0, 0] == pytest.approx(min(weights.sum(), 1), abs=1e-5)
 
 
-def test_no_candidates_have_no_weight():
-    weights, covered = closed_form(one_ray([]))
-    assert weights.sum() == covered.sum() == 0
+def test_the_front_surface_wins_and_coverage_blends():
+    assert closed_form(one_ray([(1.0, 0.0), (1.0, 5.0)]))[0][:2, 0, 0] == pytest.approx([0, 1])
+    assert closed_form(one_ray([(1.0, 0.0), (0.3, 5.0)]))[0][:2, 0, 0] == pytest.approx([0.7, 0.3])
 
 
-@given(pairs_of_floats)
-def test_entropy_is_normalised(pairs):
-    value = entropy(closed_form(one_ray(pairs)))[0, 0]
-    assert 0 <= value <= 1
+def entropy_in_doubles(weights):
+    weights = weights.astype(np.float64)
+    shares = weights + (1 - np.minimum(weights.sum(axis=0), 1)) / len(weights)
+    return -np.where(shares > 0, shares * np.log(np.maximum(shares, 1e-300)), 0).sum(axis=0) / np.log(len(weights))
 
 
-@pytest.mark.parametrize("slots", [1, 2, 5, 9])
-def test_entropy_of_one_hot_uniform_and_nothing(slots):
-    one_hot = np.zeros((slots, 1, 1), np.float32)
+@given(stn.arrays(np.float32, st.tuples(st.integers(2, 9), st.just(2), st.just(3)), elements=st.floats(0, 1, width=32)))
+def test_entropy_is_from_0_to_1_and_that_of_doubles(weights):
+    """Also of denormal weights, and of sums that rounding carries beyond one."""
+    weights = weights / np.maximum(weights.sum(axis=0, dtype=np.float64), 1).astype(np.float32)
+    assert np.abs(entropy(weights) - entropy_in_doubles(weights)).max() <= 1e-6
+    for factor in (1 + 1e-6, 1e-42):
+        values = entropy(weights * np.float32(factor))
+        assert (values >= 0).all()
+        assert (values <= 1).all()
+
+
+def test_entropy_of_one_hot_uniform_and_nothing():
+    one_hot, nothing = np.zeros((SLOTS, 1, 1), np.float32), np.zeros((SLOTS, 1, 1), np.float32)
     one_hot[0] = 1
     assert entropy(one_hot)[0, 0] == pytest.approx(0, abs=1e-6)
-    assert entropy(np.zeros((slots, 1, 1), np.float32))[0, 0] == pytest.approx(1, abs=1e-6)
-    if slots > 1:
-        assert entropy(np.full((slots, 1, 1), 1 / slots, np.float32))[0, 0] == pytest.approx(1, abs=1e-5)
+    assert entropy(nothing)[0, 0] == pytest.approx(1, abs=1e-6)
+    assert entropy(nothing + 1 / SLOTS)[0, 0] == pytest.approx(1, abs=1e-5)
+
+
+def test_what_no_surface_covers_could_show_anything():
+    rays = rays_of_photo(smooth_texture(9, 20), np.full((9, 20), 3, np.float32), 1.0, 0)
+    found = view_entropy(rays, ViewOffset(0.0, 1.0))
+    assert found[:, :17] == pytest.approx(0, abs=1e-5)
+    assert found[:, 17:] == pytest.approx(1, abs=1e-5)

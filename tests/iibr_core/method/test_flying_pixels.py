@@ -1,4 +1,4 @@
-"""Specks are found and taken out; what stands out in the photo, too, stays."""
+"""Flying pixels are found and taken out; what stands out in the photo, too, stays."""
 
 from __future__ import annotations
 
@@ -8,17 +8,16 @@ from scipy import ndimage
 
 from iibr_core.color import encoded_from_stored, stored_from_encoded
 from iibr_core.method.flying_pixels import (
+    CALM,
     STANDS_OUT,
-    STANDS_OUT_TIMES,
-    TEARING_GAP_PX,
+    STANDS_OUT_FACTOR,
     _interpolated,
     measure_detail,
     without_flying_pixels,
 )
-from iibr_core.method.rays import RaySet, rays_of_photo
-from iibr_core.method.view import Renderer
-from iibr_core.surfaces import SAME_SURFACE_PX
-from iibr_core.types import ImageSize, ViewOffset
+from iibr_core.method.rays import rays_of_photo
+from iibr_core.method.view import Renderer, View
+from iibr_core.types import ViewOffset
 from tests.iibr_core.scenes import smooth_texture, square_before_wall
 
 OFFSET = ViewOffset(-0.5, 1.5)
@@ -28,20 +27,20 @@ def median(colors: np.ndarray) -> np.ndarray:
     return ndimage.median_filter(colors, (3, 3, 1), mode="nearest")
 
 
-def slowly(
-    rays: RaySet, colors: np.ndarray, disparity: np.ndarray, inpainted: np.ndarray, detail: np.ndarray
-) -> np.ndarray:
-    """The same, pixel by pixel; views of a photo without margins."""
+def without(colors, view, rays, offset=OFFSET, threads=1):
+    detail = rays.photo_detail
+    return without_flying_pixels(colors, view.disparity, view.inpainted, detail, offset, rays.margins, threads)
+
+
+def slowly(colors: np.ndarray, view: View, detail: np.ndarray) -> np.ndarray:
+    """Do the same pixel by pixel, to views of a photo without margins."""
     replaced, medians = colors.copy(), median(colors)
-    height, width = disparity.shape
-    for y, x in np.ndindex(height, width):
-        v, u = np.clip(np.array([y, x]) + disparity[y, x] * np.array(OFFSET), 0, [height - 1, width - 1])
-        level = rays.arrays.edge_level[0][int(v + 0.5), int(u + 0.5)]
-        is_torn = level * SAME_SURFACE_PX > TEARING_GAP_PX * rays.edge_limits(OFFSET)[0]
+    last = np.subtract(detail.shape, 1)
+    for y, x in np.argwhere(~view.inpainted):
+        v, u = np.clip(np.array([y, x]) + view.disparity[y, x] * np.array(OFFSET), 0, last)
         own = ndimage.map_coordinates(detail.astype(float), [[v], [u]], order=1, mode="nearest")[0]
-        stands_out = np.abs(colors[y, x] - medians[y, x]).max()
-        is_flying = is_torn and not inpainted[y, x] and stands_out > STANDS_OUT + STANDS_OUT_TIMES * own
-        if is_flying:
+        is_torn = detail[int(v + 0.5), int(u + 0.5)] < CALM
+        if is_torn and np.abs(colors[y, x] - medians[y, x]).max() > STANDS_OUT + STANDS_OUT_FACTOR * own:
             replaced[y, x] = medians[y, x]
     return replaced
 
@@ -49,22 +48,18 @@ def slowly(
 def test_the_kernel_is_its_slow_twin() -> None:
     rng = np.random.default_rng(5)
     photo = np.clip(smooth_texture(30, 40) + rng.normal(0, 0.01, (30, 40, 3)), 0, 1).astype(np.float32)
+    np.testing.assert_allclose(measure_detail(photo), np.abs(photo - median(photo)).max(-1), atol=1e-6)
     values = np.where((np.indices((30, 40)) // 9).sum(0) % 2, 2.0, 0.5).astype(np.float32)
     rays = rays_of_photo(photo, values, 1.5, 0)
-    detail = measure_detail(photo)
-    np.testing.assert_allclose(detail, np.abs(photo - median(photo)).max(-1), atol=1e-6)
-    with Renderer() as synthesis:
-        view = synthesis.render(rays, OFFSET)
+    view = Renderer().render(rays, OFFSET)
     colors = np.where(rng.random((30, 40, 1)) < 0.1, rng.random((30, 40, 3)), view.colors).astype(np.float32)
-    replaced = without_flying_pixels(rays, OFFSET, colors, view.disparity, view.inpainted)
-    np.testing.assert_allclose(replaced, slowly(rays, colors, view.disparity, view.inpainted, detail), atol=1e-5)
-    changed = (replaced != colors).any(-1)
-    assert changed.any()
-    assert not changed[view.inpainted].any()
+    replaced = without(colors, view, rays)
+    np.testing.assert_allclose(replaced, slowly(colors, view, rays.photo_detail), atol=1e-5)
+    assert (replaced != colors).any()
     for is_hdr in (False, True):
         stored = stored_from_encoded(colors, is_hdr)
-        expected = slowly(rays, encoded_from_stored(stored), view.disparity, view.inpainted, detail)
-        replaced = without_flying_pixels(rays, OFFSET, stored, view.disparity, view.inpainted)
+        expected = slowly(encoded_from_stored(stored), view, rays.photo_detail)
+        replaced = without(stored, view, rays, threads=2)
         assert replaced.dtype == stored.dtype
         np.testing.assert_array_equal(replaced, stored_from_encoded(expected, is_hdr))
 
@@ -77,13 +72,8 @@ def test_pixels_whose_disparity_is_the_other_surfaces_are_flying() -> None:
 
     def with_and_without(values: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         rays = rays_of_photo(photo.pixels, values, 1.5, 0)
-        with Renderer() as synthesis:
-            view = synthesis.render(rays, OFFSET)
-        return (
-            view.colors,
-            without_flying_pixels(rays, OFFSET, view.colors, view.disparity, view.inpainted),
-            view.inpainted,
-        )
+        view = Renderer().render(rays, OFFSET)
+        return view.colors, without(view.colors, view, rays), view.inpainted
 
     truth, replaced, inpainted = with_and_without(disparity.values)
     errors = []
@@ -92,8 +82,8 @@ def test_pixels_whose_disparity_is_the_other_surfaces_are_flying() -> None:
         *views, also = with_and_without(np.where(swapped, 4.0 - disparity.values, disparity.values).astype(np.float32))
         # What is inpainted is made of other patches.
         errors.append([((colors - truth) ** 2)[~(inpainted | also)].mean() for colors in views])
-    with_flying_pixels, without = np.mean(errors, axis=0)
-    assert without < 0.75 * with_flying_pixels
+    with_flying_pixels, cleaned = np.mean(errors, axis=0)
+    assert cleaned < 0.75 * with_flying_pixels
     assert ((replaced - truth) ** 2).mean() < 0.01 * with_flying_pixels
 
 
@@ -102,12 +92,11 @@ def test_only_steps_that_open_a_gap_tear_rays_off(gap_px: float, is_torn: bool) 
     """A lone odd pixel of a view beside a step that is so wide there; or far from it, where it never goes."""
     photo = np.full((20, 30, 3), 0.5, np.float32)
     values = np.where(np.arange(30) < 15, 0.0, gap_px).astype(np.float32) * np.ones((20, 1), np.float32)
-    rays = rays_of_photo(photo, values, 1.0, 0)
-    view, disparity = photo.copy(), np.zeros((20, 30), np.float32)
-    view[10, 14], view[10, 6] = 0.9, 0.9
-    made = without_flying_pixels(rays, ViewOffset(0.0, 1.0), view, disparity, np.zeros((20, 30), np.bool_))
+    colors, still, shown = photo.copy(), np.zeros((20, 30), np.float32), np.zeros((20, 30), np.bool_)
+    colors[10, 14], colors[10, 6] = 0.9, 0.9
+    made = without(colors, View(colors, still, shown, shown), rays_of_photo(photo, values, 1.0, 0), ViewOffset(0, 1.0))
     assert (made[10, 14] == 0.5).all() == is_torn
-    assert (made[10, 6] == view[10, 6]).all()
+    assert (made[10, 6] == colors[10, 6]).all()
 
 
 def test_a_thin_wire_stays() -> None:
@@ -115,22 +104,21 @@ def test_a_thin_wire_stays() -> None:
     values = np.zeros((40, 60), np.float32)
     rows, columns = np.arange(40), np.arange(40) // 2 + 15
     photo[rows, columns], values[rows, columns] = 0.1, 3.0
-    rays = rays_of_photo(photo, values, 1.5, 0)
-    with Renderer() as synthesis:
-        view = synthesis.render(rays, ViewOffset(0.0, 1.0))
-    replaced = without_flying_pixels(rays, ViewOffset(0.0, 1.0), view.colors, view.disparity, view.inpainted)
+    rays, offset = rays_of_photo(photo, values, 1.5, 0), ViewOffset(0.0, 1.0)
+    view = Renderer().render(rays, offset)
+    replaced = without(view.colors, view, rays, offset)
     wire = view.disparity > 2.5
     assert wire.sum() >= 38
     assert (replaced[wire] == view.colors[wire]).all()
 
 
-def test_the_photos_own_view_stays() -> None:
+@pytest.mark.parametrize("size", [(20, 30), (1, 1), (1, 7), (2, 2)])
+def test_the_photos_own_view_stays(size: tuple[int, int]) -> None:
     rng = np.random.default_rng(3)
-    photo = rng.random((20, 30, 3)).astype(np.float32)
-    values = rng.integers(0, 3, (20, 30)).astype(np.float32)
-    rays = rays_of_photo(photo, values, 1.0, 0)
-    nothing = np.zeros((20, 30), np.bool_)
-    assert (without_flying_pixels(rays, ViewOffset(0.0, 0.0), photo, values, nothing) == photo).all()
+    photo, values = rng.random((*size, 3)).astype(np.float32), rng.integers(0, 3, size).astype(np.float32)
+    nothing = np.zeros(size, np.bool_)
+    view = View(photo, values, nothing, nothing)
+    assert (without(photo, view, rays_of_photo(photo, values, 1.0, 0), ViewOffset(0.0, 0.0)) == photo).all()
 
 
 def test_detail_between_pixels_is_bilinear() -> None:
@@ -149,18 +137,3 @@ def test_detail_at_the_border_takes_nothing_from_beyond_it(shape: tuple[int, int
     image[:] = np.random.default_rng(4).random(shape)
     for y, x in np.ndindex(shape):
         assert _interpolated(image, float(y), float(x)) == image[y, x]
-
-
-@pytest.mark.parametrize("size", [(1, 1), (1, 7), (2, 2)])
-def test_tiny_photos(size: tuple[int, int]) -> None:
-    photo, values = np.ones((*size, 3), np.float32), np.ones(size, np.float32)
-    rays = rays_of_photo(photo, values, 1.0, 0)
-    view = without_flying_pixels(rays, ViewOffset(0.0, 1.0), photo, values, np.zeros(size, np.bool_))
-    assert (view == 1).all()
-
-
-def test_rays_of_no_photo_say_so() -> None:
-    rays = RaySet(1, ImageSize(4, 5), 0.5)
-    rays.add(ViewOffset(0.0, 0.0), *(np.ones((4, 5, *more), np.float32) for more in ((3,), (), ())))
-    with pytest.raises(ValueError, match="rays_of_photo"):
-        _ = rays.photo_detail

@@ -1,15 +1,23 @@
+"""Pixels that show two surfaces: split at depth edges, moved with the foreground at steps too small to open a gap."""
+
 import numpy as np
 import pytest
 
 from iibr_core.color import linear_from_srgb, srgb_from_linear
+from iibr_core.evaluation.metrics import bounded_psnr
+from iibr_core.evaluation.reference_warp import reference_warp
 from iibr_core.method import mixed_pixels
-from iibr_core.method.mixed_pixels import split_mixed_pixels
+from iibr_core.method.mixed_pixels import move_with_foreground, split_mixed_pixels
+from iibr_core.method.photo_views import PhotoViews
+from iibr_core.stages import Stages
+from iibr_core.surfaces import SLOPE_SHARE
+from iibr_core.types import ViewOffset
 
 FOREGROUND, BACK = np.float32([0.9, 0.6, 0.3]), np.float32([0.1, 0.2, 0.5])
 
 
 def edge_photo(share):
-    """Background left, foreground right, and one mixed column labelled as background at x = 5."""
+    """Return background left, foreground right, and one mixed column labelled as background at x = 5."""
     colors = np.tile(BACK, (9, 12, 1))
     colors[:, 6:] = FOREGROUND
     colors[:, 5] = srgb_from_linear(share * linear_from_srgb(FOREGROUND) + (1 - share) * linear_from_srgb(BACK))
@@ -26,30 +34,24 @@ def test_a_mixed_pixel_splits_into_its_surfaces(share):
     assert fringe_disparity[4, 5] == 2.0
 
 
+def shares_of(scale, turn=0):
+    """Return the shares of a photo of greys, times a scale for each channel, which are turned round."""
+    colors, disparity = edge_photo(0.35)
+    light = linear_from_srgb(colors) * np.random.default_rng(0).uniform(0.5, 1.5, (9, 12, 1)).astype(np.float32)
+    bright = np.roll(srgb_from_linear(light * np.float32(scale)), turn, axis=2)
+    return split_mixed_pixels(bright, disparity, edge_step=0.5)[3]
+
+
 def test_shares_are_those_of_a_darker_photo_however_bright_an_hdr_one_is():
-    """Of greys, whose channels spread alike: what is left of their covariances after rounding is no colour."""
-    colors, disparity = edge_photo(0.35)
-    light = linear_from_srgb(colors) * np.random.default_rng(0).uniform(0.5, 1.5, (9, 12, 1)).astype(np.float32)
-    usual, bright = (
-        split_mixed_pixels(srgb_from_linear(light * np.float32(scale)), disparity, edge_step=0.5)[3]
-        for scale in (1.0, 1e7)
-    )
-    np.testing.assert_allclose(bright, usual, atol=3e-3)
-
-
-@pytest.mark.parametrize("turn", [1, 2])
-def test_shares_of_a_bright_photo_do_not_depend_on_which_channel_is_brightest(turn):
-    colors, disparity = edge_photo(0.35)
-    light = linear_from_srgb(colors) * np.random.default_rng(0).uniform(0.5, 1.5, (9, 12, 1)).astype(np.float32)
-    bright = srgb_from_linear(light * np.float32([1e7, 1e5, 1e4]))
-    expected = split_mixed_pixels(bright, disparity, edge_step=0.5)[3]
-    found = split_mixed_pixels(np.roll(bright, turn, axis=2), disparity, edge_step=0.5)[3]
-    np.testing.assert_allclose(found, expected, atol=3e-3)
+    """Channels spread alike: what is left of their covariances after rounding is no colour."""
+    np.testing.assert_allclose(shares_of(1e7), shares_of(1.0), atol=3e-3)
+    for turn in (1, 2):
+        np.testing.assert_allclose(shares_of([1e7, 1e5, 1e4], turn), shares_of([1e7, 1e5, 1e4]), atol=3e-3)
 
 
 def test_a_pixel_that_is_all_foreground_goes_with_it():
     _, fringe, _, coverage = split_mixed_pixels(*edge_photo(1.0), edge_step=0.5)
-    assert coverage[4, 5] == pytest.approx(1 - mixed_pixels.LEAST_MATTE)
+    assert coverage[4, 5] == pytest.approx(1 - mixed_pixels.MIN_MATTE)
     assert fringe[4, 5] == pytest.approx(FOREGROUND, abs=1e-2)
 
 
@@ -85,7 +87,7 @@ def test_splits_are_the_most_likely_ones():
 
 
 def obvious_split(colors, disparity, y, x):
-    """Share, own and fringe colour of a pixel, None where it is not split; surfaces are 2 apart."""
+    """Return share, own and fringe colour of a pixel, None where it is not split; surfaces are 2 apart."""
     v, u = np.mgrid[: len(disparity), : disparity.shape[1]]
     beside = (abs(v - y) <= 1) & (abs(u - x) <= 1)
     window = (abs(v - y) <= mixed_pixels.MATTING_PX) & (abs(u - x) <= mixed_pixels.MATTING_PX) & ((v != y) | (u != x))
@@ -113,8 +115,8 @@ def obvious_split(colors, disparity, y, x):
         precision = np.linalg.inv((1 - share) ** 2 * spreads[0] + share**2 * spreads[1])
         fits = 1 / mixed_pixels.SHARE_DEVIATION**2 + contrast @ precision @ contrast
         expected = outline / mixed_pixels.SHARE_DEVIATION**2 + contrast @ precision @ (light[y, x] - means[0])
-        share = np.clip(expected / fits, 0, 1 - mixed_pixels.LEAST_MATTE)
-    if share < mixed_pixels.LEAST_MATTE:
+        share = np.clip(expected / fits, 0, 1 - mixed_pixels.MIN_MATTE)
+    if share < mixed_pixels.MIN_MATTE:
         return None
     precision = np.linalg.inv((1 - share) ** 2 * spreads[0] + share**2 * spreads[1])
     off = precision @ (light[y, x] - means[0] - share * contrast)
@@ -170,8 +172,6 @@ def test_an_edge_that_resampling_has_made_a_ramp_is_not_split():
     colors, disparity = edge_photo(0.5)
     disparity[:, 4:8] = 0.0, 0.5, 1.5, 2.0
     assert split_mixed_pixels(colors, disparity, edge_step=0.3)[3][4, 5] == 0
-    assert mixed_pixels._foreground_beside(disparity, 4, 5, 0.3) == (0.5, 0.0)
-    assert mixed_pixels._foreground_beside(disparity, 4, 4, 0.3)[0] == 0.5, "before a ramp it is flat"
 
 
 @pytest.mark.parametrize("size", [(1, 1), (1, 7), (2, 2), (4, 4)])
@@ -179,3 +179,99 @@ def test_tiny_photos(size):
     own, *_, coverage = split_mixed_pixels(np.ones((*size, 3), np.float32), np.ones(size, np.float32), 0.5)
     assert own.min() == 1
     assert coverage.max() == 0
+
+
+STEPS = (0.1, 1.0)
+
+
+def moved(row, steps=STEPS):
+    """Return what becomes of a row of a picture, and ask for the same of a column."""
+    values = np.tile(np.float32(row), (3, 1))
+    found = move_with_foreground(values, steps)
+    np.testing.assert_array_equal(move_with_foreground(np.ascontiguousarray(values.T), steps), found.T)
+    return found[1].tolist()
+
+
+@pytest.mark.parametrize("step", [0.125, 0.5, 1.0])
+def test_the_pixel_behind_a_step_moves_with_what_is_in_front(step):
+    assert moved([0, 0, 0, step, step, step]) == [0, 0, step, step, step, step]
+    assert moved([step, step, step, 0, 0, 0]) == [step, step, step, step, 0, 0]
+
+
+@pytest.mark.parametrize("step", [0.0625, 1.25, np.inf, np.nan])
+def test_smaller_and_larger_steps_stay(step):
+    np.testing.assert_array_equal(moved([0, 0, 0, step, step, step]), np.float32([0, 0, 0, step, step, step]))
+
+
+@pytest.mark.parametrize(
+    "row",
+    [
+        np.linspace(0, 3, 10),
+        np.linspace(3, 0, 10),
+        [0, 0, 0, 0.5, 1.0, 1.0, 1.0],  # a ramp of two steps
+        [0, 0, 0.25, 0.5, 0.75, 1.0, 1.0],
+        0.4 * np.sin(np.arange(60) / 3),
+    ],
+)
+def test_slopes_keep_their_bits(row):
+    np.testing.assert_array_equal(moved(row), np.float32(row))
+
+
+def test_pixels_move_as_the_slow_way_says():
+    rng = np.random.default_rng(5)
+    disparity = rng.choice(
+        np.float32([0, 0.03, 0.3, 0.5, 0.9, 2, np.nan]), (23, 31), p=[0.5, 0.1, 0.1, 0.1, 0.1, 0.05, 0.05]
+    )
+    found, count = move_with_foreground(disparity, STEPS), 0
+    for y, x in np.ndindex(disparity.shape):
+        expected = slowly(disparity, y, x)
+        np.testing.assert_equal(found[y, x], expected)
+        count += expected > disparity[y, x]
+    assert count > 50
+
+
+def slowly(disparity, y, x):
+    def at(v, u):
+        return disparity[np.clip(v, 0, disparity.shape[0] - 1), np.clip(u, 0, disparity.shape[1] - 1)]
+
+    ways = [(-1, 0), (0, -1), (0, 1), (1, 0)]
+    beside = [(at(y + v, x + u), at(y + 2 * v, x + 2 * u)) for v, u in ways]
+    known = [pair for pair in beside if not np.isnan(pair[0])]
+    here = disparity[y, x]
+    if not known or np.isnan(here):
+        return here
+    foreground = max(near for near, _ in known)
+    beyond = next(far for near, far in known if near == foreground)
+    step = foreground - here
+    if not STEPS[0] < step <= STEPS[1]:
+        return here
+    falls_away = here - min(near for near, _ in known) > SLOPE_SHARE * step
+    goes_on = beyond - foreground > SLOPE_SHARE * step
+    return here if falls_away or goes_on else foreground
+
+
+@pytest.mark.parametrize("parallax_px", [0.15, 0.3, 0.6, 0.9])
+def test_views_of_small_steps_are_hardly_worse_than_a_plain_warp(parallax_px):
+    """A disc before a wall, each pixel the mean of 8x8 points, seen from the four corners."""
+    photo, disparity = disc(parallax_px, ViewOffset(0, 0))
+    corners = [ViewOffset(t, s) for t in (-1, 1) for s in (-1, 1)]
+    gains = []
+    views = PhotoViews(photo, disparity, corners, Stages(ray_transformer=False))
+    for offset in corners:
+        truth, plain = disc(parallax_px, offset)[0], reference_warp(photo, disparity, offset)
+        made = views.view(offset).colors
+        gains.append(bounded_psnr(made, truth, plain.visible) - bounded_psnr(plain.colors, truth, plain.visible))
+    assert np.mean(gains) > -0.3
+
+
+def disc(parallax_px, offset, size=48, points=8):
+    """Return its picture (H, W, 3) and disparity (H, W) from a viewpoint."""
+    y, x = (np.mgrid[: size * points, : size * points] + 0.5) / points - 0.5
+    own_y, own_x = y + parallax_px * offset.t, x + parallax_px * offset.s
+    is_disc = (own_y - size / 2) ** 2 + (own_x - size / 2) ** 2 < (size / 3.3) ** 2
+    wall = 0.75 + 0.05 * np.sin(x / 3) * np.sin(y / 4)
+    shown = np.where(is_disc, 0.25 + 0.05 * np.sin(own_x / 4) * np.sin(own_y / 3), wall)
+    picture = shown.reshape(size, points, size, points).mean((1, 3))
+    centre = points // 2
+    disparity = np.where(is_disc, parallax_px, 0.0)[centre::points, centre::points]
+    return np.repeat(picture[..., None], 3, 2).astype(np.float32), disparity.astype(np.float32)
