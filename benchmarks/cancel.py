@@ -1,6 +1,6 @@
 """How long a cancelled field goes on: from the word to the end of the generator, at 4 MP.
 
-    python -m benchmarks.cancel [--pixels 4000000] [--times 20] [--quality fast balanced]
+    python -m benchmarks.cancel [--pixels 4000000] [--times 20]
 
 The word comes at random moments of generating. The viewer's worker then drops the job. Target: 100 ms, which other
 programs lengthen.
@@ -10,46 +10,40 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Iterator, Sequence
-from typing import get_args
+from collections.abc import Iterator
 
 import numpy as np
 
 from benchmarks.harness.reports import emit, head, parser_of, row, start
 from iibr_core.method.light_field import generate
 from iibr_core.method.plan import plan_literal
+from iibr_core.runtime.work import stoppable
 from iibr_core.types import (
     Disparity,
     GridShape,
     Photo,
-    Quality,
 )
 
 GRID = GridShape(9, 9)
 MOST_MS = 100
 LAST_S = 4.0
 """The word comes within so many seconds."""
-DRAFT_BYTES = 1 << 40
-"""Drafts first, as the window has them made."""
 
 
 def main() -> None:
     parser = parser_of(__doc__)
     parser.add_argument("--pixels", type=int, default=4_000_000)
     parser.add_argument("--times", type=int, default=20)
-    parser.add_argument("--quality", nargs="+", default=get_args(Quality), choices=get_args(Quality))
     given = parser.parse_args()
-    emit(report(given.pixels, given.times, given.quality))
+    emit(report(given.pixels, given.times))
 
 
-def report(pixels: int, times: int, qualities: Sequence[Quality]) -> Iterator[str]:
-    yield head("cancelled", "after, ms (median)", f"longest of {times}", f"over {MOST_MS} ms")
+def report(pixels: int, times: int) -> Iterator[str]:
+    yield head("pixels", "after, ms (median)", f"longest of {times}", f"over {MOST_MS} ms")
     photo, disparity = scene(pixels)
-    for quality in qualities:
-        wait_ms(*scene(5_000), quality, 1.0)  # compiles
-        waits = np.sort([wait_ms(photo, disparity, quality, k / times) for k in range(times)])
-        size = f"{photo.size[1]}x{photo.size[0]}"
-        yield row(f"{quality}, {size}", f"{np.median(waits):.0f}", f"{waits[-1]:.0f}", (waits > MOST_MS).sum())
+    wait_ms(*scene(5_000), 1.0)  # compiles
+    waits = np.sort([wait_ms(photo, disparity, k / times) for k in range(times)])
+    yield row(photo.size, f"{np.median(waits):.0f}", f"{waits[-1]:.0f}", (waits > MOST_MS).sum())
 
 
 def scene(pixels: int) -> tuple[Photo, Disparity]:
@@ -61,7 +55,7 @@ def scene(pixels: int) -> tuple[Photo, Disparity]:
     return Photo(colors, 1000.0, "blocks"), Disparity(blocks[:height, :width].astype(np.float32), "blocks")
 
 
-def wait_ms(photo: Photo, disparity: Disparity, quality: Quality, share: float) -> float:
+def wait_ms(photo: Photo, disparity: Disparity, share: float) -> float:
     """Cancel at some moment of the first seconds; how long until the generator ends."""
     stop, cancelled_at = threading.Event(), []
 
@@ -70,11 +64,11 @@ def wait_ms(photo: Photo, disparity: Disparity, quality: Quality, share: float) 
         stop.set()
 
     plan = plan_literal(photo, disparity, GRID)
-    views = generate(photo, disparity, plan, stop.is_set, quality=quality, draft_bytes=DRAFT_BYTES)
     timer = threading.Timer(0.05 + LAST_S * share, cancel)
     timer.start()
-    for _ in views:
-        pass
+    with stoppable(stop.is_set):
+        for _ in generate(photo, disparity, plan):
+            pass
     end = time.perf_counter()
     timer.join()
     return 1e3 * (end - cancelled_at[0]) if cancelled_at and end > cancelled_at[0] else 0.0

@@ -8,25 +8,24 @@ DATA holds hci_antinous, the Middlebury pairs, and photos that hold depth of the
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import cv2
 import numpy as np
-from iibr_core.generation.view_maker import ViewMaker, quantise_as_stored
 from numpy.typing import NDArray
 
 from benchmarks.harness.bench_scenes import FIELD, BenchScene, data_scenes, drawn_scene, photo_scene
 from benchmarks.harness.reports import emit, head, holds, parser_of, row, start, title
 from benchmarks.harness.timing import cost_of
+from iibr_core.color import quantise_as_stored
 from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.edges.refine import refine
 from iibr_core.depth.pictorial_cues import estimate_from_cues
 from iibr_core.depth.search import open_with_depth
 from iibr_core.evaluation.metrics import bounded_psnr
 from iibr_core.evaluation.reference_warp import reference_warp
-from iibr_core.method.plan import plan_literal
+from iibr_core.method.photo_views import PhotoViews
 from iibr_core.training.degradation import blur
 from iibr_core.types import FloatImage, ImageSize, ViewOffset
 
@@ -89,10 +88,10 @@ def in_three_ways(scene: BenchScene, soft: FloatImage) -> tuple[float, float, fl
 
 def views_psnr(scene: BenchScene, disparity: FloatImage) -> float:
     """Mean PSNR (dB) of a scene's judged views, made with another disparity."""
-    quality = plan_literal(*replace(scene, disparity=disparity).given, scene.grid).quality
-    with ViewMaker(scene.photo, disparity, scene.field, (quality,)) as maker:
-        made = {at: maker.view(quality, at).colors for at in scene.truth}
-    return float(np.mean([bounded_psnr(quantise_as_stored(made[at]), scene.truth[at]) for at in made]))
+    views = PhotoViews(scene.photo, disparity, scene.field)
+    return float(
+        np.mean([bounded_psnr(quantise_as_stored(views.view(at).colors), true) for at, true in scene.truth.items()])
+    )
 
 
 def resize(values: FloatImage, factor: float) -> FloatImage:

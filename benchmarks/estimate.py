@@ -28,6 +28,7 @@ from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.estimators.catalog import model_to_use
 from iibr_core.depth.estimators.onnx_models import USUAL_PREPARATION, OnnxInput, run_onnx
 from iibr_core.formats.images.photo import read_photo
+from iibr_core.runtime.work import watched
 from iibr_core.scenes.scene import Source
 from iibr_core.types import ImageSize, InputError
 from viewer.model.state.model_download import UseModel
@@ -95,7 +96,8 @@ def estimate(file: Path, photo: Path) -> tuple[Cost, Cost, float]:
         """Progress is told when loading begins, and when running does."""
         marks.append(Cost(time.perf_counter(), time.process_time()))
 
-    added = added_bytes(lambda: run_onnx(model, wanted, pixels, mark))
+    with watched(mark):
+        added = added_bytes(lambda: run_onnx(model, wanted, pixels))
     mark()
     begun, loaded, done = marks
     return loaded + begun.times(-1), done + loaded.times(-1), added

@@ -56,7 +56,6 @@ class Figure:
 
 NEEDS = {
     "DATA": "scenes as `iibr evaluate` takes them: DATA=DIR",
-    "Linux": "Linux, which tells the most memory that a process filled",
     "X": "Linux with Xvfb and xdotool",
     "chromium": "Linux with Chromium",
     "torch": "torch: pip install '.[train]'",
@@ -85,7 +84,6 @@ FIGURES = (
     Figure(("figures.md#cancelled",), "benchmarks.cancel --times 10", 2),
     Figure(("figures.md#field-disparity",), "benchmarks.multi_view_depth --data DATA", 2, ("DATA",)),
     Figure(("refocus.md#pictures",), "benchmarks.refocus --data DATA --apertures 6 --max-pixels 150000", 40, ("DATA",)),
-    Figure(("plan.md",), "benchmarks.prediction --data DATA --photos DATA", 6, ("DATA", "Linux")),
     Figure(("web.md#pages",), "benchmarks.web --data DATA", 15, ("DATA", "chromium")),
     Figure(("edges_fork.png", "edges_handlebar.png"), "docs/make_edges.py OUT", 0.5),
     Figure(tuple(f"gallery/{name}" for name in GALLERY), "docs/make_gallery.py OUT", 3),
@@ -133,7 +131,6 @@ def has(need: str, data: Path | None) -> bool:
     """Whether it is here."""
     return {
         "DATA": data is not None,
-        "Linux": sys.platform == "linux",
         "X": shutil.which("Xvfb") is not None and shutil.which("xdotool") is not None,
         "chromium": sys.platform == "linux" and shutil.which("chromium") is not None,
         "torch": find_spec("torch") is not None,

@@ -27,17 +27,16 @@ from iibr_core.types import InputError
 ROOT = DOCS.parent
 ROOMS = (
     "iibr_core/depth/edges/*.py",
-    "iibr_core/rendering/mixed_pixels.py",
-    "iibr_core/rendering/flying_pixels.py",
+    "iibr_core/method/mixed_pixels.py",
+    "iibr_core/method/flying_pixels.py",
     "iibr_core/surfaces.py",
 )
 TESTS = (
     "tests/iibr_core/depth/edges/test_*.py",
-    "tests/iibr_core/rendering/test_mixed_pixels.py",
-    "tests/iibr_core/rendering/test_flying_pixels.py",
-    "tests/iibr_core/test_edge_cases.py",
-    "tests/iibr_core/test_hard_cases.py",
-    "tests/iibr_core/rendering/test_small_steps.py",
+    "tests/iibr_core/**/test_mixed_pixels.py",
+    "tests/iibr_core/**/test_flying_pixels.py",
+    "tests/iibr_core/test_*cases.py",
+    "tests/iibr_core/**/test_small_steps.py",
 )
 """Of those rooms; the ones named after the file at fault are run first."""
 TIME_LIMIT_S = 1200.0

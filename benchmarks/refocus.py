@@ -32,9 +32,9 @@ from iibr_core.depth.search import open_with_depth
 from iibr_core.evaluation.metrics import bounded_psnr
 from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.interface.public_scene import from_arrays
-from iibr_core.method.light_field import generate, rays_of_grid
+from iibr_core.method.light_field import generate
+from iibr_core.method.photo_views import PhotoViews
 from iibr_core.method.plan import plan_for_viewing, plan_literal
-from iibr_core.method.view import finish, open_renderer
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import (
     FloatImage,
@@ -141,24 +141,20 @@ def photo_field(name: str, path: Path, choice: DepthChoice, max_pixels: int) -> 
 
 
 class Reference:
-    """The definition: views made at the cameras' places, summed by the core's lens."""
+    """The definition of the lens: views at the cameras' own places, summed by the core."""
 
     def __init__(self, scene: BenchScene) -> None:
-        photo, disparity = scene.given
-        self._size, self._widest = image_size(disparity.values), float(max(scene.grid))
-        self._rays, outer = rays_of_grid(photo, disparity, plan_literal(photo, disparity, scene.grid))
-        for _ in outer:  # completes the ray set
-            pass
+        self._size, self._widest = image_size(scene.disparity), float(max(scene.grid))
+        self._views = PhotoViews(scene.photo, scene.disparity, scene.field)
 
     def pictures(self, eye: ViewOffset, diameter: float, foci: list[float]) -> list[FloatImage]:
         """Encoded pictures (H, W, 3), one a focus."""
         sums = [LensSum(Optics(eye, focus_disparity=focus), self._size) for focus in foci]
-        with open_renderer() as renderer:
-            for t, s in aperture_points(ApertureShape(), diameter, self._widest, CAMERAS, 0).tolist():
-                at = ViewOffset(eye.t + t, eye.s + s)
-                view = finish(self._rays, at, renderer.render(self._rays, at))
-                for total in sums:
-                    total.add(at, view.colors)
+        points = aperture_points(ApertureShape(), diameter, self._widest, CAMERAS, 0).tolist()
+        cameras = [ViewOffset(eye.t + t, eye.s + s) for t, s in points]
+        for at, view in zip(cameras, self._views.views(cameras)):
+            for total in sums:
+                total.add(at, view.colors)
         return [srgb_from_linear(total.light()) for total in sums]
 
 

@@ -23,12 +23,11 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from iibr_core.generation.view_maker import ViewMaker, quantise_as_stored
 from numpy.typing import NDArray
 
 from benchmarks.harness.bench_scenes import FIELD
 from benchmarks.harness.reports import emit, head, holds, is_wanted, parser_of, row, start, title
-from iibr_core.color import stored_from_encoded
+from iibr_core.color import quantise_as_stored, stored_from_encoded
 from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.edges.map_alignment import lies_at_corners
 from iibr_core.depth.edges.refine import refine
@@ -38,7 +37,7 @@ from iibr_core.evaluation.metrics import bounded_psnr
 from iibr_core.evaluation.reference_warp import reference_warp
 from iibr_core.evaluation.trials import trial_input, trials_of
 from iibr_core.formats.maps.resample import resample_map
-from iibr_core.method.ambiguous_rays import HYPOTHESES
+from iibr_core.method.photo_views import PhotoViews
 from iibr_core.stages import ALL_STAGES, STAGE_NAMES, Stages, stages_without
 from iibr_core.training.degradation import blur, quantise
 from iibr_core.training.scenes.random_scene import random_scene, render
@@ -68,7 +67,7 @@ def main() -> None:
     options = parser.parse_args()
     names = [name for name in STAGE_NAMES if is_wanted(name, options.only)]
     ways = {name: functools.partial(make_views, stages=stages_without([name])) for name in names}
-    emit(report("What each stage is worth", "benchmarks.stages", judge(options.data, options.drawn, ways)), options.out)
+    emit(report(judge(options.data, options.drawn, ways)), options.out)
 
 
 def judge(data: Path, drawn_scenes: int, ways: Mapping[str, Way]) -> list[Judged]:
@@ -80,20 +79,19 @@ def judge(data: Path, drawn_scenes: int, ways: Mapping[str, Way]) -> list[Judged
         return [of_map for of_scene in pool.map(_call, jobs) for of_map in of_scene]
 
 
-def report(words: str, module: str, found: Sequence[Judged], has_verdict: bool = True) -> Iterator[str]:
-    """One row a way of making views: what changes against the default, the mean of each kind."""
+def report(found: Sequence[Judged]) -> Iterator[str]:
+    """Yield one row for each stage: what changes without it, the mean of each kind."""
     counts = {kind: sum(one[0] == kind for one in found) for kind in KINDS}
     maps = ", ".join(f"{count} {kind}" for kind, count in counts.items())
-    yield title(words, module, f"Maps: {maps}.")
+    yield title("What each stage is worth", "benchmarks.stages", f"Maps: {maps}.")
     yield (__doc__ or "").split("\n\n")[2]
     yield "Each cell: whole views, edges, gaps (dB); flying pixels; texture; processor time, as a share. Negative"
     yield "decibels: what is left out gains so much. The first row holds the figures themselves, seconds last.\n"
-    verdict = ("earns its place",) if has_verdict else ()
-    yield head("left out", *(kind for kind in KINDS if counts[kind]), *verdict)
+    yield head("left out", *(kind for kind in KINDS if counts[kind]), "earns its place")
     for name in found[0][1]:
         means = {kind: _mean_change(found, kind, name) for kind in KINDS if counts[kind]}
         stays = "" if name == "nothing" else holds(earns(means.values()))
-        yield row(name, *map(_cell, means.values()), *([stays] if has_verdict else []))
+        yield row(name, *map(_cell, means.values()), stays)
 
 
 def earns(means: Iterable[NDArray[np.float64]]) -> bool:
@@ -247,14 +245,15 @@ def make_views(
     truth: Views,
     field: Sequence[ViewOffset],
     stages: Stages = ALL_STAGES,
-    hypotheses: int = HYPOTHESES,
     is_enlarged: bool = False,
 ) -> Views:
-    """Those that are judged, at balanced quality, as they are stored. field: all views of it. is_enlarged: the map."""
+    """Return the judged views as a field stores them.
+
+    field: offsets of all its views. is_enlarged: whether the map was smaller than the photo.
+    """
     disparity = refine(photo, given, 1.0, unknown, stages=stages, is_enlarged=is_enlarged)
-    with ViewMaker(photo, disparity, field, ("balanced",), hypotheses=hypotheses, stages=stages) as maker:
-        colors = {offset: maker.view("balanced", offset).colors for offset in truth}
-        return {offset: quantise_as_stored(made) for offset, made in colors.items()}
+    views = PhotoViews(photo, disparity, field, stages)
+    return {offset: quantise_as_stored(views.view(offset).colors) for offset in truth}
 
 
 def judge_view(made: FloatImage, truth: FloatImage, hole: Mask) -> list[float]:

@@ -158,7 +158,7 @@ ASKED: dict[str, Callable[[User], Sequence[Action]]] = {
     "overlay": lambda u: [SetOverlay(u.random.choice((None, *OVERLAYS)))],
     "epis": lambda u: [SetInspection("shows_epis", not u.app.state.inspection.shows_epis)],
     "all views": lambda u: [SetInspection("shows_grid", not u.app.state.inspection.shows_grid)],
-    "compare": lambda u: (KeepState(), Compare(u.random.choice((None, "photo", "quality", "kept", "difference")))),
+    "compare": lambda u: (KeepState(), Compare(u.random.choice((None, "photo", "kept", "difference")))),
     "gloss": lambda u: [SetOptics("gloss", u.random.choice((None, Gloss(roughness=u.between(0.1, 0.6)))))],
 }
 """What is one frame."""

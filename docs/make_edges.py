@@ -15,7 +15,7 @@ import OpenImageIO as oiio
 from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.search import open_with_depth
 from iibr_core.evaluation.reference_warp import reference_warp
-from iibr_core.generation.view_maker import ViewMaker
+from iibr_core.method.photo_views import PhotoViews
 from iibr_core.runtime.resources import resource_folder
 from iibr_core.types import FloatImage, ViewOffset
 
@@ -43,9 +43,7 @@ def main() -> None:
 
 def _view(photo: FloatImage, disparity: FloatImage) -> FloatImage:
     """The outermost view of a light field, as `generate` makes it."""
-    outer = [offset for offset in STEPS if offset != (0, 0)]
-    with ViewMaker(photo, disparity, outer, ["balanced"]) as maker:
-        return maker.view("balanced", OUTERMOST).colors
+    return PhotoViews(photo, disparity, STEPS).view(OUTERMOST).colors
 
 
 def _write(path: Path, colors: FloatImage) -> None:

@@ -44,8 +44,6 @@ SOFT_PX = 2.0
 TEXTURE_PX = 1.5
 SQUARE_SHARE = 0.09
 """Side of a square, as a share of the picture's."""
-MEGAPIXELS = {12: (3000, 4000), 24: (4000, 6000), 48: (6000, 8000), 100: (8660, 11547)}
-"""(height, width) of photos."""
 BAND = 256
 """Rows of a photo that are written at once."""
 
@@ -192,14 +190,6 @@ def write_photo(path: Path, size: tuple[int, int], seed: int = 0, with_map: bool
         disparity[top // 4 : (top + height // 2) // 4, left // 4 : (left + width // 2) // 4] = 2.0
         write_map(path.with_name(f"{path.stem}_disparity.pfm"), disparity)
     return path
-
-
-def write_photos(folder: Path, count: int, megapixels: float) -> None:
-    """Photos of 3 by 4, all different, with their maps."""
-    folder.mkdir(parents=True)
-    height = round((megapixels * 1e6 * 3 / 4) ** 0.5)
-    for number in range(count):
-        write_photo(folder / f"{number:05}.png", (height, height * 4 // 3), number)
 
 
 def require_scenes(data: Path, scenes: list[BenchScene]) -> list[BenchScene]:

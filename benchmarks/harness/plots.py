@@ -29,7 +29,7 @@ class Panel:
 
     title: str
     points: dict[str, tuple[float, float]]
-    reference: str = "fast"
+    reference: str = "iibr"
 
 
 def on_the_front(points: Mapping[str, tuple[float, float]]) -> set[str]:

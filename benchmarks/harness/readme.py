@@ -36,7 +36,7 @@ def views(docs: Path) -> str:
         full, seen, holes = (cell(page, f"{scene}: {CENTRE}", method, f"{part} dB") for part in PARTS)
         return f"{full} dB ({seen}, {holes})"
 
-    rows = ((name, words(scene, "balanced"), words(scene, "reference warp")) for name, scene in SCENES.items())
+    rows = ((name, words(scene, "iibr"), words(scene, "reference warp")) for name, scene in SCENES.items())
     names = "from the centre view and its map: full frame (visible, holes)", "iibr", "resampling warp, filled holes"
     return markdown(names, rows)
 
@@ -52,15 +52,14 @@ def figures(docs: Path) -> str:
     """One line each."""
     free, speed = docs / "free_views.md", docs / "speed.md"
     field = partial(cell, docs / "figures.md", "field-disparity")
-    stop = partial(cell, docs / "figures.md", "cancelled", "fast")
-    lens = partial(cell, row="balanced", column="path-traced lens")
+    stop = partial(cell, docs / "figures.md", "cancelled", "")
+    lens = partial(cell, row="iibr", column="path-traced lens")
     warm = partial(cell, speed, "Targets", column="measured")
     ours, warp = (cell(free, "poses", f"all | {way}", "frame dB") for way in ("ours", "resampled"))
     rows = {
         "[free cameras](free_views.md), eight poses of eight scenes": f"{ours} dB; a resampling warp {warp} dB",
         "a flat photo": "one view: nothing is made",
-        "81 views of 512x512, warm, *fast*": warm(row="9x9 of 512x512, hci_antinous, fast"),
-        "the same, *balanced*": warm(row="9x9 of 512x512, hci_antinous, balanced"),
+        "81 views of 512x512, warm": warm(row="9x9 of 512x512, hci_antinous"),
         "a cancelled job at 4 MP": f"ends after {stop('after, ms')} ms (median), {stop('longest')} ms at the longest",
         "two fields refocused, against a path-traced thin lens": " and ".join(
             f"{lens(docs / 'evaluation' / f'{scene}.md', f'{scene}: {CENTRE}')} dB" for scene in ("shelf", "fence")

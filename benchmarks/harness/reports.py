@@ -13,8 +13,10 @@ from pathlib import Path
 from typing import Any
 
 from iibr_core.formats.outputs import write_file
-from iibr_core.generation.cost_model import CORES
+from iibr_core.runtime.machine import core_count
 from iibr_core.types import InputError
+
+CORES = core_count()
 
 WITH_CHANGES = " (with changes)"
 """After a commit's name: the files were not what that commit has."""

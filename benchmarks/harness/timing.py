@@ -7,14 +7,11 @@ from __future__ import annotations
 
 import gc
 import math
-import os
-import subprocess
-import sys
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
-from functools import cache, partial
+from functools import partial
 from multiprocessing import get_context
 from pathlib import Path
 from typing import TypeVar
@@ -27,9 +24,8 @@ from benchmarks.harness.environment import set_environment, thread_variables
 from iibr_core.method.light_field import generate
 from iibr_core.method.plan import plan_literal
 from iibr_core.runtime.work import report_progress
-from iibr_core.types import FloatImage, Quality, StoredColors
+from iibr_core.types import FloatImage, StoredColors
 
-COMMAND_LINE = (sys.executable, "-P", "-m", "viewer")
 Result = TypeVar("Result")
 PEAK_RESET, STATUS = Path("/proc/self/clear_refs"), Path("/proc/self/status")
 
@@ -47,15 +43,6 @@ class Cost:
     def times(self, factor: float) -> Cost:
         """That many times as much."""
         return Cost(factor * self.wall_s, factor * self.cpu_s)
-
-
-@dataclass(frozen=True)
-class Run:
-    """How a process ended: exit code, cost, and the most memory that it filled (this one's counts too, but is less)."""
-
-    code: int
-    cost: Cost
-    peak_mib: float
 
 
 def cost_of(work: Callable[[], object]) -> Cost:
@@ -86,18 +73,18 @@ def median_cost(costs: list[Cost]) -> Cost:
     return Cost(float(np.median([c.wall_s for c in costs])), float(np.median([c.cpu_s for c in costs])))
 
 
-def make_field(scene: BenchScene, quality: Quality) -> list[tuple[StoredColors, FloatImage | None]]:
-    """All views of a scene as they are kept: colours and disparity."""
+def make_field(scene: BenchScene) -> list[tuple[StoredColors, FloatImage | None]]:
+    """Return the colours and disparity of all views of a scene."""
     photo, disparity = scene.given
-    updates = generate(photo, disparity, plan_literal(photo, disparity, scene.grid), quality=quality)
+    updates = generate(photo, disparity, plan_literal(photo, disparity, scene.grid))
     return [(update.colors, update.disparity) for update in updates]
 
 
-def field_costs(scenes: Mapping[str, tuple[BenchScene, Quality]], repeats: int) -> dict[str, Cost]:
-    """Medians of whole fields, made in turns, by name; compiling is not counted."""
-    for scene, quality in scenes.values():
-        make_field(scene, quality)
-    ways = {name: partial(cost_of, partial(make_field, *each)) for name, each in scenes.items()}
+def field_costs(scenes: Mapping[str, BenchScene], repeats: int) -> dict[str, Cost]:
+    """Return the medians of whole fields, made in turns, by name; compiling is not counted."""
+    for scene in scenes.values():
+        make_field(scene)
+    ways = {name: partial(cost_of, partial(make_field, scene)) for name, scene in scenes.items()}
     return {name: median_cost(found) for name, found in in_turns(ways, repeats).items()}
 
 
@@ -108,42 +95,16 @@ def in_own_process(work: Callable[..., Result], *args: object) -> Result:
 
 
 def process_of(threads: int) -> ProcessPoolExecutor:
-    """A process that uses so many threads; a context manager."""
-    return _process_in(thread_variables(threads))
-
-
-def peak_bytes(work: Callable[..., object], *args: object) -> float:
-    """The most memory that work(*args) takes beyond what was there before, what it returns held until then; the second
-    of two runs counts, in a process of its own. NaN where the system does not tell (all but Linux).
-
-    work: a function of a module; it and args are pickled.
-    """
-    return _gauge().submit(_peak_of, work, args).result() if PEAK_RESET.exists() else math.nan
-
-
-@cache
-def _gauge() -> ProcessPoolExecutor:
-    """A process that gives freed arrays back to the system at once: kept ones would hide what is taken again."""
-    return _process_in({"MALLOC_MMAP_THRESHOLD_": str(1 << 17)})
-
-
-def _process_in(environment: Mapping[str, str]) -> ProcessPoolExecutor:
-    """A process that was started in such an environment."""
+    """Return a process that uses so many threads; a context manager."""
     process = ProcessPoolExecutor(1, get_context("spawn"))
-    with set_environment(environment):
+    with set_environment(thread_variables(threads)):
         process.submit(gc.collect).result()  # it starts with its first work
     return process
 
 
-def _peak_of(work: Callable[..., object], args: tuple[object, ...]) -> float:
-    work(*args)
-    gc.collect()
-    return added_bytes(partial(work, *args))
-
-
 def added_bytes(work: Callable[[], object]) -> float:
-    """The most memory that one run takes in this process beyond what was there before, what it returns held until then.
-    NaN as above.
+    """Return the most memory that the work takes in this process beyond what was there before, its result included;
+    NaN where the system does not tell (all but Linux).
     """
     if not PEAK_RESET.exists():
         work()
@@ -159,13 +120,3 @@ def added_bytes(work: Callable[[], object]) -> float:
 def _peak_rss() -> int:
     line = next(line for line in STATUS.read_text().splitlines() if line.startswith("VmHWM"))
     return 1024 * int(line.split()[1])
-
-
-def run(command: Sequence[object], environment: Mapping[str, str] | None = None) -> Run:
-    """A process from its start to its end; silent."""
-    silent, start = subprocess.DEVNULL, time.perf_counter()
-    child = subprocess.Popen(list(map(str, command)), stdout=silent, stderr=silent, env=environment)
-    _, status, used = os.wait4(child.pid, 0)
-    child.returncode = os.waitstatus_to_exitcode(status)
-    cost = Cost(time.perf_counter() - start, used.ru_utime + used.ru_stime)
-    return Run(child.returncode, cost, used.ru_maxrss / 1024)

@@ -26,6 +26,8 @@ from benchmarks.stages import judge_view
 from iibr_core.evaluation.metrics import flip, ssim
 from iibr_core.evaluation.reference_warp import reference_warp
 from iibr_core.formats.outputs import write_file
+from iibr_core.runtime.work import report_progress
+from iibr_core.stages import stages_without
 from iibr_core.types import FloatImage, ViewOffset
 from viewer.cli.terminal import show_progress
 
@@ -44,10 +46,10 @@ PEERS: Mapping[str, Prepare] = {
     "32 planes (MPI)": planes.prepare,
 }
 OURS = {
-    "iibr fast": Variant("fast"),
-    "iibr balanced": Variant("balanced", "balanced"),
-    "iibr fast, half width": Variant("half width", shrink=2),
-    "iibr fast, quarter width": Variant("quarter width", shrink=4),
+    "iibr": Variant("iibr"),
+    "iibr, no ray transformer": Variant("no ray transformer", stages=stages_without(["ray-transformer"])),
+    "iibr, half width": Variant("half width", shrink=2),
+    "iibr, quarter width": Variant("quarter width", shrink=4),
 }
 
 
@@ -71,12 +73,12 @@ def main() -> None:
     options = parser.parse_args()
     scenes = require_scenes(options.data, list(data_scenes(options.data, with_soft=False)))
     scenes = [scene for scene in scenes if is_wanted(scene.name, options.only)]
-    with show_progress("measuring") as show:
+    with show_progress("measuring"):
         found = {}
         for k, scene in enumerate(scenes):
-            show(k, len(scenes), scene.name)
+            report_progress(k, len(scenes), scene.name)
             found[scene.name] = measure(scene, options.repeats)
-        show(len(scenes), len(scenes), "threads and pixels")
+        report_progress(len(scenes), len(scenes), "threads and pixels")
         scaling = [] if options.quick else [*thread_lines(options.repeats), *pixel_lines(options.repeats)]
     lines = [*report(found), *scaling]
     _write(options.out / "peers.md", ("\n".join(lines) + "\n").encode())

@@ -1,4 +1,4 @@
-"""How the time of a field grows with threads and with pixels, on a drawn scene in fast quality."""
+"""How the time of a field grows with threads and with pixels, on a drawn scene."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from benchmarks.harness.bench_scenes import BenchScene, squares_scene
 from benchmarks.harness.environment import set_environment, thread_variables
 from benchmarks.harness.reports import head, row
 from benchmarks.harness.timing import cost_of, in_own_process, make_field
-from iibr_core.generation.cost_model import CORES
+from iibr_core.runtime.machine import core_count
 from iibr_core.types import GridShape
 
 THREADS = (1, 2, 4, 8, 16)
@@ -24,7 +24,7 @@ def thread_lines(repeats: int) -> Iterator[str]:
     """A drawn field made by 1 to 16 threads, as far as the machine goes, each in a process of its own."""
     yield f"\n## Threads\n\n{head('threads', 'seconds', 'times as fast as one')}"
     alone = 0.0
-    for threads in (count for count in THREADS if count <= CORES):
+    for threads in (count for count in THREADS if count <= core_count()):
         with set_environment(thread_variables(threads)):
             seconds = in_own_process(field_seconds, 1024, repeats)
         alone = alone or seconds
@@ -46,11 +46,11 @@ def pixel_lines(repeats: int) -> Iterator[str]:
 
 
 def field_seconds(side: int, repeats: int) -> float:
-    """Seconds by the clock for a field of a drawn scene in fast quality; the best of a few rounds."""
+    """Return the seconds by the clock for a field of a drawn scene, the best of a few rounds."""
     scene = squares_scene(side, 2.0, 16)
-    make_field(scene, "fast")
-    return min(cost_of(partial(make_field, scene, "fast")).wall_s for _ in range(repeats))
+    make_field(scene)
+    return min(cost_of(partial(make_field, scene)).wall_s for _ in range(repeats))
 
 
 def _field_cpu(scene: BenchScene, repeats: int) -> float:
-    return min(cost_of(partial(make_field, scene, "fast")).cpu_s for _ in range(repeats))
+    return min(cost_of(partial(make_field, scene)).cpu_s for _ in range(repeats))

@@ -32,7 +32,7 @@ def test_it_writes_tables_and_plots(
     assert capsys.readouterr().out.splitlines() == [str(out / f"speed.{kind}") for kind in ("md", "svg")]
     text = (out / "speed.md").read_text()
     assert "| half width |" in text
-    assert "## Targets" in text
+    assert "## Mean over scenes, maps as they are" in text
 
 
 @pytest.mark.parametrize(
