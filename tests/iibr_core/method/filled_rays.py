@@ -1,10 +1,10 @@
-"""What was filled in a view, for tests: as it joins the ray set."""
+"""What was inpainted in a view, for tests: as it joins the ray set."""
 
 import numpy as np
 
 
 def filled_rays(view):
-    """Colours (H, W, 3), disparity and coverage (H, W) of a `RenderedView`: what lies behind counts at its pixels."""
+    """Return colours (H, W, 3), disparity and coverage (H, W) of a view: what lies behind counts at its pixels."""
     colors, disparity, coverage = view.colors.copy(), view.disparity.copy(), view.occluded.astype(np.float32)
     if view.behind is not None:
         colors.reshape(-1, 3)[view.behind.pixel] = view.behind.colors

@@ -8,10 +8,8 @@ from hypothesis.extra import numpy as stn
 
 from iibr_core.method.candidates import SLOTS, Candidates
 from iibr_core.method.closed_form import closed_form
-from iibr_core.method.occlusion import entropy, view_entropy
-from iibr_core.method.rays import rays_of_photo
+from iibr_core.method.occlusion import entropy
 from iibr_core.types import ViewOffset
-from tests.iibr_core.scenes import smooth_texture
 
 
 def one_ray(pairs):
@@ -69,10 +67,3 @@ def test_entropy_of_one_hot_uniform_and_nothing():
     assert entropy(one_hot)[0, 0] == pytest.approx(0, abs=1e-6)
     assert entropy(nothing)[0, 0] == pytest.approx(1, abs=1e-6)
     assert entropy(nothing + 1 / SLOTS)[0, 0] == pytest.approx(1, abs=1e-5)
-
-
-def test_what_no_surface_covers_could_show_anything():
-    rays = rays_of_photo(smooth_texture(9, 20), np.full((9, 20), 3, np.float32), 1.0, 0)
-    found = view_entropy(rays, ViewOffset(0.0, 1.0))
-    assert found[:, :17] == pytest.approx(0, abs=1e-5)
-    assert found[:, 17:] == pytest.approx(1, abs=1e-5)

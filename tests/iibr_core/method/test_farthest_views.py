@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
+from itertools import product
+
 import numpy as np
 import pytest
 
 from iibr_core.method.farthest_views import (
-    ALL_VIEWS,
     LOOKUP_MARGIN_PX,
-    MOST_MARGIN,
-    WantedViews,
+    MAX_MARGIN,
     farthest_views,
     outer_views,
-    outer_views_for,
     outer_views_of_grid,
     outpainting_margins,
 )
@@ -25,32 +24,19 @@ def test_they_are_the_corners_around_all_viewpoints_opposite_ones_in_pairs():
     found = outer_views([ViewOffset(0.5, -1.0), UPPER_LEFT, ViewOffset(0.0, 2.0), LOWER_RIGHT])
     assert found == [(-2, -1), (1, 3), (-2, 3), (1, -1)]
     assert farthest_views(found) == 3
+    assert outer_views([]) == []
+    assert outer_views([ViewOffset(0.0, 2.0)]) == [(0, 2)]
     assert farthest_views([]) == farthest_views([ViewOffset(0.0, -0.5)]) == 1
 
 
-def test_the_photo_s_own_view_is_none_and_none_comes_twice():
-    assert outer_views([ViewOffset(0.0, 2.0)]) == [(0, 2)]
-    assert outer_views([]) == []
-    assert outer_views_of_grid(GridShape(1, 5)) == [(0, -2), (0, 2)]
-    assert outer_views_of_grid(GridShape(3, 5)) == outer_views(GridShape(3, 5).offset(*at) for at in np.ndindex(3, 5))
-
-
-@pytest.mark.parametrize(
-    ("wanted", "expected"),
-    [
-        ([], [(-2, -2), (2, 2)]),
-        ([(0, 1)], [(-2, -2), (2, 2), (-2, 2)]),
-        ([(1, 0.5)], [(-2, -2), (2, 2)]),
-        ([(0, 1), (0, -1)], [(-2, -2), (2, 2), (-2, 2), (2, -2)]),
-        ([(1, -1)], [(-2, -2), (2, 2), (2, -2)]),
-    ],
-)
-def test_one_picture_needs_the_first_two_outer_views_and_those_on_its_side(wanted, expected):
-    outer, at = outer_views_of_grid(GridShape(5, 5)), [ViewOffset(*offset) for offset in wanted]
-    assert outer_views_for(outer, WantedViews(at, "one")) == expected
-    assert outer_views_for(outer, WantedViews(at, "sum")) == expected[:2]
-    assert outer_views_for(outer, WantedViews(at)) == outer
-    assert outer_views_for(outer, WantedViews(None, "sum")) == outer_views_for(outer, ALL_VIEWS) == outer
+@pytest.mark.parametrize("grid", [GridShape(*at) for at in product((1, 2, 3, 4, 9), repeat=2)], ids=str)
+def test_those_of_a_grid_are_views_of_it_each_once_and_never_the_photo_s(grid):
+    bottom, right = grid.rows - 1, grid.columns - 1
+    indices = dict.fromkeys([(0, 0), (bottom, right), (0, right), (bottom, 0)])
+    expected = [grid.offset(*index) for index in indices if index != grid.centre]
+    every = [grid.offset(*index) for index in np.ndindex(*grid)]
+    assert outer_views_of_grid(grid) == outer_views(every) == expected
+    assert farthest_views(expected) == max(1.0, *(abs(part) for offset in every for part in offset))
 
 
 @pytest.mark.parametrize("disparity", [1.5, -1.5])
@@ -72,7 +58,7 @@ def test_each_side_s_own_disparity_counts_and_nothing_where_no_view_looks_out():
 
 def test_margins_are_bounded_and_wild_pixels_do_not_count():
     wide = outpainting_margins(np.full((80, 120), 50.0, np.float32), [UPPER_LEFT, LOWER_RIGHT])
-    assert wide == (MOST_MARGIN * 80, MOST_MARGIN * 80, MOST_MARGIN * 120, MOST_MARGIN * 120)
+    assert wide == (MAX_MARGIN * 80, MAX_MARGIN * 80, MAX_MARGIN * 120, MAX_MARGIN * 120)
     disparity = np.zeros((400, 400), np.float32)
     disparity[0, :3] = 9.0
     assert outpainting_margins(disparity, [UPPER_LEFT, LOWER_RIGHT]).top == 0

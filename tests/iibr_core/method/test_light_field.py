@@ -1,5 +1,6 @@
+"""All views of a light field: true to what is known of them, in agreement with each other, in the order asked for."""
+
 import itertools
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -7,10 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from iibr_core.inpainting.registry import INPAINTERS
-from iibr_core.method.farthest_views import WantedViews
 from iibr_core.method.light_field import generate
-from iibr_core.method.rays import rays_of_photo
-from iibr_core.method.view import Renderer
 from iibr_core.runtime import tiling
 from iibr_core.runtime.work import stoppable
 from iibr_core.types import (
@@ -38,25 +36,6 @@ def test_the_centre_view_is_the_photo_exactly():
     assert len(views) == 9
 
 
-def test_rendering_at_offset_zero_gives_the_photo_back():
-    photo, disparity = square_before_wall()
-    with Renderer() as synthesise:
-        view = synthesise.render(rays_of_photo(photo.pixels, disparity.values, 2.0, 0), ViewOffset(0.0, 0.0))
-    assert view.colors == pytest.approx(photo.pixels, abs=1e-4)
-    assert not view.inpainted.any()
-
-
-@pytest.mark.parametrize(("row", "column"), [(0, 1), (1, 0), (2, 2)])
-def test_a_constant_disparity_shifts_the_photo(row, column):
-    """Content at (x, y) moves to (x - d*s, y - d*t): the sign convention itself."""
-    photo, d = photo_of(smooth_texture(40, 50)), 3
-    view = views_of(photo, disparity_of(np.full((40, 50), d)), 3)[row, column]
-    t, s = row - 1, column - 1
-    moved = np.roll(photo.pixels, (-d * t, -d * s), axis=(0, 1))[6:-6, 6:-6]
-    assert np.abs(view.colors[6:-6, 6:-6] - moved * 255).max() <= 1
-    assert view.disparity == pytest.approx(d)
-
-
 def test_a_square_before_a_wall_against_the_true_view():
     """The true view is known: both textures are smooth functions of position."""
     height, width, foreground = 60, 80, 2.0
@@ -73,21 +52,6 @@ def test_a_square_before_a_wall_against_the_true_view():
     assert psnr(view.colors, truth * 255) > 34
     assert view.disparity[square] == pytest.approx(foreground)
     assert view.disparity[uncovered] == pytest.approx(0, abs=0.01)
-
-
-@pytest.mark.parametrize(
-    ("seen", "asked", "made"),
-    [("one", None, "balanced"), ("sum", None, "fast")]
-    + [("sum", quality, quality) for quality in ("fast", "balanced")],
-)
-def test_views_of_a_sum_are_fast_where_nobody_asked_for_more(monkeypatch, seen, asked, made):
-    photo, disparity = square_before_wall()
-    plan, qualities = replace(literal_plan(photo, disparity, 5), quality="balanced"), []
-    monkeypatch.setattr("iibr_core.method.ray_transformer.shipped_transformer", qualities.append)
-    at = ViewOffset(1.0, -1.0)
-    views = list(generate(photo, disparity, plan, quality=asked, wanted=lambda: WantedViews([at], seen)))
-    assert [plan.grid.offset(view.row, view.column) for view in views] == [(0, 0), at]
-    assert qualities == [made]
 
 
 def test_order_and_bands_do_not_change_a_pixel(monkeypatch):
@@ -107,7 +71,7 @@ def test_order_and_bands_do_not_change_a_pixel(monkeypatch):
 def test_views_arrive_photo_first_then_farthest_then_nearest_to_the_eye():
     photo, disparity = square_before_wall()
     plan = literal_plan(photo, disparity, 5)
-    made = generate(photo, disparity, plan, nearest_to=lambda: ViewOffset(0.0, 1.0), quality="fast")
+    made = generate(photo, disparity, plan, nearest_to=lambda: ViewOffset(0.0, 1.0))
     order = [(v.row, v.column) for v in made]
     assert order[0] == (2, 2)
     assert set(order[1:5]) == {(0, 0), (0, 4), (4, 0), (4, 4)}
@@ -115,11 +79,10 @@ def test_views_arrive_photo_first_then_farthest_then_nearest_to_the_eye():
     assert len(set(order)) == 25
 
 
-@pytest.mark.parametrize("quality", ["fast", "balanced"])
-def test_the_inpainter_of_that_name_fills_all_that_is_inpainted(monkeypatch, quality):
+def test_the_inpainter_of_that_name_fills_all_that_is_inpainted(monkeypatch):
     monkeypatch.setitem(INPAINTERS, "red", red_inpainter.ENTRY)
     photo, disparity = square_before_wall(60, 80, 3.0)
-    red = views_of(photo, disparity, 5, quality=quality, inpaint="red")
+    red = views_of(photo, disparity, 5, inpaint="red")
     for view in red.values():
         inner = view.colors[view.inpainted & ~beside(~view.inpainted)]  # what lies beside is mixed in at edges
         assert (inner[:, :1] > 2.0 * inner[:, 1:]).all(), "the wall behind is blue"
@@ -133,7 +96,7 @@ def test_an_unknown_inpainter_is_refused():
 
 
 def beside(mask):
-    """The mask grown by one pixel each way."""
+    """Return the mask grown by one pixel each way."""
     return sum(np.roll(mask, (j, i), axis=(0, 1)) for j in (-1, 0, 1) for i in (-1, 0, 1)) > 0
 
 
@@ -152,6 +115,20 @@ def test_all_views_show_the_same_content_in_a_hole():
     assert compared > 500
 
 
+def test_wanted_views_alone_are_made():
+    photo, disparity = square_before_wall()
+    every, at = views_of(photo, disparity, 5), [ViewOffset(1.0, -1.0), ViewOffset(2.0, 2.0)]
+    some = views_of(photo, disparity, 5, wanted=lambda: at)
+    assert set(some) == {(2, 2), (3, 1), (4, 4)}
+    assert all((view.colors == every[index].colors).all() for index, view in some.items())
+    assert set(views_of(photo, disparity, 5, wanted=lambda: [])) == {(2, 2)}
+
+
+@pytest.mark.parametrize("grid", [GridShape(1, 6), GridShape(2, 2), GridShape(17, 1)], ids=str)
+def test_unusual_grids(grid):
+    assert set(views_of(*square_before_wall(12, 14), *grid)) == set(np.ndindex(*grid))
+
+
 def test_stopping_ends_the_generator():
     photo, disparity = square_before_wall()
     produced: list[ViewUpdate] = []
@@ -161,73 +138,12 @@ def test_stopping_ends_the_generator():
     assert len(produced) == 4
 
 
-def test_flat_scene_needs_no_holes_filled():
-    photo = photo_of(smooth_texture(20, 24))
-    views = views_of(photo, disparity_of(np.zeros((20, 24))), 3)
-    for view in views.values():
-        assert (view.colors == views[1, 1].colors).all()
-        assert not view.inpainted.any()
-
-
 def test_hdr_stays_hdr():
     pixels = smooth_texture(20, 24)
     pixels[5:9, 5:9] = 6.0
     views = views_of(photo_of(pixels, is_hdr=True), disparity_of(np.full((20, 24), 0.4)), 3)
     assert views[0, 0].colors.dtype == np.float16
     assert views[0, 0].colors.max() > 4
-
-
-def test_sizes_must_agree():
-    photo, _ = square_before_wall()
-    flat = disparity_of(np.zeros((3, 3)))
-    with pytest.raises(ValueError, match=r"3x3.*80x60"):
-        next(generate(photo, flat, literal_plan(photo, disparity_of(np.zeros(photo.size)), 3)))
-
-
-def checked(views, photo):
-    for view in views.values():
-        assert view.colors.shape == (*photo.size, 3)
-        assert np.isfinite(view.disparity).all()
-    return views
-
-
-@pytest.mark.parametrize("size", [(1, 1), (1, 13), (11, 1), (2, 2), (7, 13)])
-def test_tiny_and_prime_sizes(size):
-    photo = photo_of(np.random.default_rng(0).uniform(0, 1, (*size, 3)))
-    disparity = disparity_of(np.random.default_rng(1).uniform(-2, 2, size))
-    assert len(checked(views_of(photo, disparity, 3), photo)) == 9
-
-
-@pytest.mark.parametrize("grid", [GridShape(1, 1), GridShape(1, 6), GridShape(2, 2), GridShape(17, 1)])
-def test_unusual_grids(grid):
-    photo, disparity = square_before_wall(12, 14)
-    assert len(checked(views_of(photo, disparity, *grid), photo)) == grid.rows * grid.columns
-
-
-@pytest.mark.parametrize(
-    "values",
-    [
-        np.full((16, 18), -2.5),
-        np.full((16, 18), 500.0),
-        np.where(np.arange(18) == 9, 1e6, 0.0) * np.ones((16, 1)),
-        np.where(np.arange(18) == 9, 3.0, 0.0) * np.ones((16, 1)),
-        np.random.default_rng(0).uniform(-40, 40, (16, 18)),
-        np.where(np.arange(18) < 9, 1.0, 1.0001) * np.ones((16, 1)),
-    ],
-    ids=["negative", "larger than the photo", "outlier 1e6", "one-pixel wire", "noise", "surfaces 1e-4 apart"],
-)
-def test_hard_disparities(values):
-    photo = photo_of(smooth_texture(16, 18))
-    checked(views_of(photo, disparity_of(values), 5), photo)
-
-
-def test_a_wire_keeps_its_width():
-    values = np.where(np.arange(30) == 15, 3.0, 0.0) * np.ones((20, 1))
-    pixels = np.full((20, 30, 3), 0.1)
-    pixels[:, 15] = 0.9
-    view = views_of(photo_of(pixels), disparity_of(values), 3)[1, 2]
-    assert (view.colors[5:-5, 12] > 200).all()
-    assert (view.colors[5:-5, [10, 11, 13, 14]] < 60).all()
 
 
 @settings(max_examples=15)

@@ -1,23 +1,35 @@
-"""What the shipped weights are worth on scenes that training never drew, for each kind of edge that T decides on."""
+"""The transformer: its arithmetic against torch, and what the shipped weights are worth for each kind of edge."""
 
 from collections import defaultdict
-from dataclasses import replace
 
 import numpy as np
 import pytest
+import torch
 
 from iibr_core.depth.edges.refine import refine
-from iibr_core.method.ambiguous_rays import FAINT_WEIGHT, blend, find_ambiguous_rays
+from iibr_core.formats.weights import save_weights
+from iibr_core.method.ambiguous_rays import (
+    FAINT_WEIGHT,
+    FEATURES,
+    HYPOTHESES,
+    SHARE,
+    AmbiguousRays,
+    blend,
+    find_ambiguous_rays,
+)
 from iibr_core.method.candidates import find_candidates
 from iibr_core.method.closed_form import closed_form
 from iibr_core.method.farthest_views import outer_views
 from iibr_core.method.look_up import look_up
 from iibr_core.method.occlusion import FULLY_COVERED
-from iibr_core.method.ray_transformer import shipped_transformer
+from iibr_core.method.ray_transformer import TrainedWeights, shipped_transformer
 from iibr_core.method.rays import rays_of_photo
-from iibr_core.method.update_loop import complete_ray_set
+from iibr_core.method.update_loop import update
+from iibr_core.method.view import Renderer
 from iibr_core.training.degradation import blur, degrade
-from iibr_core.training.scenes.random_scene import cast, random_scene, render
+from iibr_core.training.model import RayTransformer
+from iibr_core.training.scenes.random_scene import random_scene
+from iibr_core.training.scenes.raycast import cast, render
 from iibr_core.types import ImageSize, ViewOffset
 
 SIZE, RADIUS = ImageSize(96, 128), 4
@@ -25,7 +37,6 @@ SEEDS = range(1_000_003, 1_000_011)
 """Training counts its steps from 0."""
 OFFSETS = [ViewOffset(0.0, 4.0), ViewOffset(-3.0, -2.0)]
 CORNERS = [ViewOffset(-4.0, -4.0), ViewOffset(4.0, 4.0)]
-ARRAYS = ("pixel", "mask", "disparity", "source", "features")
 MAPS = {
     "exact": lambda photo, d, rng: d,
     "blurred": lambda photo, d, rng: refine(photo, blur(d, 2.0)),
@@ -51,13 +62,13 @@ LEAST_GAIN = {
 
 
 def squared_errors(seed, spoil):
-    """Of each kind of ambiguous ray: the closed form's errors, and T's."""
+    """Return the kind of each ambiguous ray, the closed form's errors and T's."""
     rng = np.random.default_rng(seed)
     scene = random_scene(rng, SIZE, float(rng.uniform(6, 30)) / RADIUS)
     colors, disparity = render(scene, SIZE, ViewOffset(0.0, 0.0))
     rays = rays_of_photo(colors, spoil(colors, disparity, rng), RADIUS, 8)
-    complete_ray_set(rays, outer_views(CORNERS))
-    transformer, found = shipped_transformer("balanced"), []
+    list(update(rays, outer_views(CORNERS), Renderer()))
+    transformer, found = shipped_transformer(), []
     for offset in OFFSETS:
         candidates = find_candidates(rays, offset, (0, SIZE.height))
         weights, share = closed_form(candidates)
@@ -65,7 +76,7 @@ def squared_errors(seed, spoil):
         ambiguous = find_ambiguous_rays(rays, candidates, weights, shown, (0, SIZE.height))
         # Where less is covered, T is not asked: what was filled behind shows there, too.
         asked = share[tuple(ambiguous.pixel.T)] >= FULLY_COVERED
-        ambiguous = replace(ambiguous, **{name: getattr(ambiguous, name)[asked] for name in ARRAYS})
+        ambiguous = ambiguous.chosen(asked)
         y, x = ambiguous.pixel.T
         truth = cast(scene, x, y, offset)[0]
         chosen = blend(rays, ambiguous, transformer(ambiguous))[0]
@@ -80,7 +91,7 @@ def squared_errors(seed, spoil):
 
 @pytest.fixture(scope="module")
 def gains():
-    """dB that T gains over the closed form, by map and kind of ray."""
+    """Return the dB that T gains over the closed form, by map and kind of ray."""
     gains = {}
     for name, spoil in MAPS.items():
         sums = defaultdict(lambda: np.zeros(2))
@@ -97,3 +108,65 @@ def gains():
 @pytest.mark.parametrize("case", LEAST_GAIN, ids=", ".join)
 def test_the_transformer_gains_on_held_out_scenes(gains, case):
     assert gains[case] > LEAST_GAIN[case]
+
+
+def random_ambiguous(rays=200, seed=0):
+    """Return ambiguous rays of which the transformer asks features and number alone."""
+    random = np.random.default_rng(seed)
+    number = random.integers(1, HYPOTHESES + 1, rays).astype(np.uint8)
+    features = random.uniform(-3, 3, (rays, HYPOTHESES, FEATURES)).astype(np.float32)
+    pixel, nothing = np.zeros((rays, 2), np.int64), np.zeros((rays, HYPOTHESES), np.float32)
+    source = nothing.astype(np.uint8)
+    return AmbiguousRays(OFFSETS[0], pixel, number, nothing[:, 0], nothing, source, nothing, nothing, features)
+
+
+@pytest.fixture
+def model():
+    """Return T with random weights all through, as if trained."""
+    torch.manual_seed(0)
+    model = RayTransformer().eval()
+    for parameter in model.parameters():
+        torch.nn.init.normal_(parameter, std=0.3)
+    return model
+
+
+@pytest.fixture
+def compiled(model, tmp_path):
+    save_weights(model, tmp_path / "weights.safetensors")
+    return TrainedWeights(tmp_path / "weights.safetensors")
+
+
+def weights_of(model, ambiguous, order=slice(None)):
+    with torch.no_grad():
+        return model(torch.from_numpy(ambiguous.features[:, order]), torch.from_numpy(ambiguous.mask[:, order])).numpy()
+
+
+@pytest.mark.parametrize("rays", [1, 63, 64, 200])
+def test_compiled_weights_are_those_of_the_model_and_sum_to_one(model, compiled, rays):
+    """For numbers of rays that fill blocks and do not."""
+    ambiguous = random_ambiguous(rays)
+    weights = compiled(ambiguous)
+    assert weights == pytest.approx(weights_of(model, ambiguous), abs=1e-5)
+    assert weights.sum(axis=1) == pytest.approx(1, abs=1e-5)
+    assert (weights[~ambiguous.mask] == 0).all()
+    assert weights.min() >= 0
+
+
+def test_weights_of_a_ray_do_not_depend_on_the_others_nor_on_the_order_of_hypotheses(model, compiled):
+    ambiguous, order = random_ambiguous(), np.array([3, 0, 4, 1, 5, 2])
+    assert (compiled(ambiguous)[37:] == compiled(ambiguous.chosen(np.arange(37, 200)))).all()
+    assert weights_of(model, ambiguous, order) == pytest.approx(weights_of(model, ambiguous)[:, order], abs=1e-5)
+
+
+def test_untrained_it_is_the_closed_form():
+    ambiguous = random_ambiguous()
+    ambiguous.features[..., SHARE] = np.eye(HYPOTHESES)[0]
+    assert weights_of(RayTransformer(), ambiguous)[:, 0].min() > 0.9
+
+
+def test_bfloat16_agrees_within_its_precision(model):
+    ambiguous = random_ambiguous()
+    exact = weights_of(model, ambiguous)
+    features = torch.from_numpy(ambiguous.features).to(torch.bfloat16)
+    rounded = model.to(torch.bfloat16)(features, torch.from_numpy(ambiguous.mask))
+    assert np.abs(rounded.detach().float().numpy() - exact).mean() < 0.02

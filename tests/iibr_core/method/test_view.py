@@ -1,15 +1,25 @@
-"""What covers a pixel in part comes over what was filled behind it: edge bands beside gaps are soft, not jagged."""
+"""One view: what covers a pixel in part, what is inpainted, and properties that hold for every photo and disparity."""
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.ndimage import maximum_filter
 
 from iibr_core.color import linear_from_srgb, srgb_from_linear
-from iibr_core.method.rays import rays_of_photo
+from iibr_core.evaluation.reference_warp import reference_warp
+from iibr_core.method.farthest_views import outer_views_of_grid, outpainting_margins
+from iibr_core.method.look_up import KEYS_A
+from iibr_core.method.mixed_pixels import move_with_foreground, split_mixed_pixels
+from iibr_core.method.ray_transformer import shipped_transformer
+from iibr_core.method.rays import MIN_STEP_PX, rays_of_photo
 from iibr_core.method.update_loop import update
 from iibr_core.method.view import Renderer
-from iibr_core.types import ViewOffset
+from iibr_core.surfaces import EDGE_PX
+from iibr_core.types import GridShape, ImageSize, ViewOffset
 from tests.iibr_core.method.filled_rays import filled_rays
 from tests.iibr_core.red_inpainter import paint_red
+from tests.iibr_core.scenes import smooth_texture
 
 FOREGROUND, WALL = np.float32([0.9, 0.6, 0.3]), np.float32([0.1, 0.2, 0.5])
 HEIGHT, WIDTH, FIRST, LAST = 40, 48, 16, 30
@@ -22,7 +32,7 @@ def mixed(share):
 
 
 def bar(share):
-    """A photo of a plain bar before a plain wall; the bar covers `share` of the column beside it on either side."""
+    """Return the rays of a plain bar before a plain wall; it covers `share` of the column beside it on either side."""
     colors = np.tile(WALL, (HEIGHT, WIDTH, 1))
     colors[:, FIRST:LAST] = FOREGROUND
     colors[:, [FIRST - 1, LAST]] = mixed(share)
@@ -33,9 +43,8 @@ def bar(share):
 
 @pytest.mark.parametrize("share", [0.15, 0.3, 0.45, 0.55])
 @pytest.mark.parametrize("offset", [LEFT, RIGHT], ids=["left", "right"])
-def test_a_rim_beside_a_gap_is_the_front_over_what_was_filled(share, offset):
-    with Renderer() as synthesis:
-        view = synthesis.render(bar(share), offset)
+def test_an_edge_beside_a_gap_is_the_front_over_what_was_inpainted(share, offset):
+    view = Renderer().render(bar(share), offset)
     moved = round(-6 * offset.s)
     row = view.colors[HEIGHT // 2]
     assert row[FIRST + moved : LAST + moved] == pytest.approx(np.tile(FOREGROUND, (LAST - FIRST, 1)), abs=2e-3)
@@ -45,24 +54,183 @@ def test_a_rim_beside_a_gap_is_the_front_over_what_was_filled(share, offset):
     assert row[rest] == pytest.approx(np.tile(WALL, (len(rest), 1)), abs=5e-3), "nothing of the foreground stays behind"
 
 
-def test_rays_join_without_what_comes_over_them():
+def test_what_is_inpainted_shows_beside_the_edge_and_joins_without_what_comes_over_it():
     rays = bar(0.3)
-    list(update(rays, [RIGHT], inpainter=paint_red))
-    _, colors, _, coverage, *_ = rays.arrays
-    assert (colors[-1][coverage[-1] > 0] == (1, 0, 0)).all()
-
-
-def test_what_is_filled_shows_beside_the_edge():
-    with Renderer(inpainter=paint_red) as synthesis:
-        view = synthesis.render(bar(0.3), RIGHT)
-    edge = view.colors[HEIGHT // 2, LAST - 6]
+    ((_, view),) = update(rays, [RIGHT], Renderer(inpaint=paint_red))
     light = 0.3 * linear_from_srgb(FOREGROUND) + 0.7 * linear_from_srgb(np.float32([1, 0, 0]))
-    assert edge == pytest.approx(srgb_from_linear(light), abs=5e-3)
+    assert view.colors[HEIGHT // 2, LAST - 6] == pytest.approx(srgb_from_linear(light), abs=5e-3)
+    assert (rays.arrays.colors[-1][rays.arrays.coverage[-1] > 0] == (1, 0, 0)).all()
 
 
 def test_where_nothing_lies_open_nothing_is_behind():
-    with Renderer() as synthesis:
-        view = synthesis.render(bar(0.0), ViewOffset(0.0, 0.0))
+    view = Renderer().render(bar(0.0), ViewOffset(0.0, 0.0))
     assert view.behind is None
-    assert filled_rays(view)[2].max() == 0
-    assert not view.has_filled_rays
+    assert not view.has_new_rays
+
+
+GRID, FARTHEST = GridShape(5, 5), 2.0
+BACK, CORK, BOARD = -0.5, 1.5, 5.0
+
+
+def board_cut_by_the_frame(slant):
+    """Return colours and disparity of a slanted board and cork behind it that run out of the right frame."""
+    y, x = np.indices((96, 128))
+    disparity = np.full(y.shape, BACK, np.float32)
+    disparity[(abs(y - 48) < 36) & (x > 60)] = CORK
+    disparity[(abs(y - 48 - slant * (x - 127)) < 14) & (x > 90)] = BOARD
+    texture = smooth_texture(96, 128)
+    tint = np.where(disparity[..., None] == BOARD, np.float32([1.0, 0.3, 0.2]), np.float32([0.3, 0.6, 1.0]))
+    return texture * tint, disparity
+
+
+@pytest.mark.parametrize("slant", [-0.5, -0.3, 0.0, 0.5])
+def test_no_view_shows_anything_inpainted_in_front_of_the_photo_and_its_continuation(slant):
+    colors, disparity = board_cut_by_the_frame(slant)
+    outer = outer_views_of_grid(GRID)
+    margins = outpainting_margins(disparity, outer)
+    assert margins.right > 0
+    rays = rays_of_photo(colors, disparity, FARTHEST, len(outer), margins=margins)
+    list(update(rays, outer, Renderer()))
+    continued = rays.arrays.disparity[0]
+    for row, column in np.ndindex(*GRID):
+        offset = GRID.offset(row, column)
+        view = Renderer().render(rays, offset)
+        known = reference_warp(colors, disparity, offset).visible
+        shown = reference_warp(np.zeros((*continued.shape, 3), np.float32), continued, offset)
+        # Landings are rounded: what lies within a pixel counts.
+        nearest = rays.in_view(maximum_filter(np.where(shown.hole, -np.inf, shown.disparity), 3))
+        in_front = view.inpainted & known & (view.disparity > nearest + EDGE_PX / FARTHEST)
+        assert not in_front.any()
+
+
+SMALL = ImageSize(18, 22)
+few = settings(max_examples=20)
+seeds = st.integers(0, 10_000)
+steps = st.integers(-8, 8).map(lambda quarter: quarter / 4)
+offsets = st.builds(ViewOffset, steps, steps)
+
+
+def scene(seed, height=SMALL.height, width=SMALL.width):
+    """Return a photo of waves and noise and its disparity, blocks of whole quarters, which scaling keeps exact."""
+    random = np.random.default_rng(seed)
+    pixels = (0.6 * smooth_texture(height, width, seed) + random.uniform(0, 0.3, (height, width, 3))).astype(np.float32)
+    blocks = np.kron(random.integers(-4, 5, (5, 5)) / 4, np.ones((-(-height // 5), -(-width // 5))))
+    return pixels, np.ascontiguousarray(blocks[:height, :width], np.float32)
+
+
+def rendered(pixels, disparity, offset, farthest=2.0, transformer=None):
+    return Renderer(transformer).render(rays_of_photo(np.ascontiguousarray(pixels), disparity, farthest, 0), offset)
+
+
+TURNS = {
+    "left and right": (lambda image: np.flip(image, 1), lambda t, s: ViewOffset(t, -s)),
+    "up and down": (lambda image: np.flip(image, 0), lambda t, s: ViewOffset(-t, s)),
+    "rows and columns": (lambda image: image.swapaxes(0, 1), lambda t, s: ViewOffset(s, t)),
+}
+
+
+@few
+@given(seeds, offsets, st.sampled_from(sorted(TURNS)), st.booleans())
+def test_flipping_the_photo_flips_the_views(seed, offset, turn, has_mixed_pixels):
+    """Where the photo is seen, but for ties: of what lies equally near the first counts, so few rays may differ.
+
+    A mixed pixel at a corner takes the colour of its foreground from one of two neighbours, so there it is some more.
+    """
+    pixels, disparity = scene(seed)
+    pixels = pixels if has_mixed_pixels else 0.5 + 0.04 * (pixels - 0.5)
+    disparity = np.round(2 * disparity) + np.float32(0.3)
+    offset = ViewOffset(offset.t + 0.137, offset.s - 0.361)
+    turned, turned_offset = TURNS[turn]
+    one = rendered(pixels, disparity, offset)
+    other = rendered(turned(pixels), np.ascontiguousarray(turned(disparity)), turned_offset(*offset))
+    assert (turned(other.occluded) != one.occluded).mean() <= 0.02
+    differs = (np.abs(turned(other.colors) - one.colors) > 1e-5).any(axis=2) & (filled_rays(one)[2] == 0)
+    assert differs.mean() <= (0.1 if has_mixed_pixels else 0.03)
+
+
+@few
+@given(seeds)
+def test_a_view_offset_of_zero_gives_the_photo_back(seed):
+    """Exactly, but where a pixel was split in two, of which one would be darker than black. (A field has the photo
+    itself there.)
+    """
+    pixels, disparity = scene(seed)
+    view = rendered(pixels, disparity, ViewOffset(0.0, 0.0))
+    is_split = split_mixed_pixels(pixels, disparity, EDGE_PX / 2.0)[3] > 0
+    assert (view.colors == pixels)[~is_split].all()
+    error = np.abs(view.colors - pixels).max(axis=2)
+    assert (error > 1e-3).mean() <= 0.01
+    assert error.max() <= 0.1
+    moved = move_with_foreground(disparity, (MIN_STEP_PX / 2.0, EDGE_PX / 2.0))
+    assert (view.disparity == moved).mean() > 0.95, "all but split pixels, whose foreground may weigh more"
+    assert not view.inpainted.any()
+
+
+@few
+@given(seeds, offsets)
+def test_an_offset_towards_zero_comes_to_the_photo(seed, offset):
+    """Its error against the photo vanishes with it, but for pixels that were split in two, see above."""
+    pixels, disparity = scene(seed)
+    errors = [
+        float(np.abs(rendered(pixels, disparity, ViewOffset(offset.t * f, offset.s * f)).colors - pixels).mean())
+        for f in (1e-2, 1e-4, 1e-8)
+    ]
+    assert errors[1] <= errors[0] / 10 + 1e-4
+    assert errors[2] <= 1e-4
+
+
+@few
+@given(seeds, offsets, st.sampled_from([0.25, 0.5, 2.0, 8.0, -1.0, -2.0]))
+def test_disparity_times_a_and_offset_over_a_is_the_same_view(seed, offset, a):
+    """Exactly, for powers of two; a sign turns the grid round."""
+    pixels, disparity = scene(seed)
+    one = rendered(pixels, disparity, offset)
+    scaled = ViewOffset(offset.t / a, offset.s / a)
+    if a < 0:  # near and far change places, so only surfaces that hide nothing look the same
+        disparity = np.full_like(disparity, disparity[0, 0])
+        one = rendered(pixels, disparity, offset)
+    other = rendered(pixels, disparity * np.float32(a), scaled, farthest=2.0 / abs(a))
+    assert (other.occluded == one.occluded).all()
+    assert np.abs(other.colors - one.colors).max() <= 1e-5
+    assert np.abs(other.disparity - one.disparity * a).max() <= 1e-5
+
+
+def keys_in_doubles(f):
+    at = np.abs(np.array([f + 1, f, 1 - f, 2 - f]))
+    near = (KEYS_A + 2) * at**3 - (KEYS_A + 3) * at**2 + 1
+    return np.where(at <= 1, near, KEYS_A * (at**3 - 5 * at**2 + 8 * at - 4))
+
+
+@few
+@given(seeds, st.floats(-1.9, 1.9), st.floats(-1.9, 1.9))
+def test_a_moved_photo_against_its_twin_in_doubles(seed, down, right):
+    """Keys' cubic convolution of the whole photo, moved by parts of a pixel; within 4 parts in a million of white."""
+    pixels, _ = scene(seed)
+    view = rendered(pixels, np.ones(SMALL, np.float32), ViewOffset(down, right))
+    exact = pixels.astype(np.float64)
+    for axis, by in ((0, down), (1, right)):
+        whole = int(np.floor(by))
+        weights = keys_in_doubles(by - whole)
+        exact = sum(w * np.roll(exact, 1 - k - whole, axis) for k, w in enumerate(weights))
+    inner = np.s_[4:-4, 4:-4]
+    assert np.abs(view.colors - np.maximum(exact, 0))[inner].max() <= 4e-6
+
+
+@pytest.mark.parametrize("transformer", [None, shipped_transformer()], ids=["closed form", "transformer"])
+def test_error_falls_with_the_noise_of_the_disparity(transformer):
+    """Before a depth edge too, where the photo shows. What is inpainted is chosen among patches: it stays near, and
+    without noise nothing differs.
+    """
+    pixels, truth = smooth_texture(32, 40), np.where(np.arange(40) < 20, 2.0, 0.0) * np.ones((32, 1), np.float32)
+    noise = np.random.default_rng(0).normal(0, 1, truth.shape)
+    offset = ViewOffset(0.5, 1.0)
+    exact = rendered(pixels, truth.astype(np.float32), offset, transformer=transformer)
+    errors = []
+    for s in (0.4, 0.2, 0.1, 0.05, 0.01, 0.0):
+        view = rendered(pixels, (truth + s * noise).astype(np.float32), offset, 2.0, transformer)
+        seen = ~(exact.inpainted | view.inpainted)
+        errors.append(float(np.sum(((view.colors - exact.colors) ** 2)[seen])))
+        assert seen.mean() > 0.9
+        assert np.mean(((view.colors - exact.colors) ** 2)[~seen]) < 0.03**2
+    assert errors == sorted(errors, reverse=True)
+    np.testing.assert_array_equal(view.colors, exact.colors)
