@@ -14,10 +14,10 @@ from iibr_core.beyond.full_size import (
     whole,
 )
 from iibr_core.beyond.resized_light import mean_of_areas
-from iibr_core.method.flying_pixels import without_flying_pixels
 from iibr_core.method.light_field import rays_of_grid
 from iibr_core.method.rays import rays_of_photo
-from iibr_core.method.view import Renderer
+from iibr_core.method.update_loop import update
+from iibr_core.method.view import Renderer, finish
 from iibr_core.types import (
     ImageSize,
     Photo,
@@ -45,18 +45,16 @@ def test_tiles_cover_a_part_once() -> None:
 @pytest.mark.parametrize("side", [24, 40])
 def test_a_view_in_tiles_is_the_view_made_at_once(side: int) -> None:
     photo = large()
-    with Renderer() as synthesis:
-        rays = rays_of_photo(photo.pixels, photo.disparity, 1.5, 0)
-        expected = synthesis.render(rays, OFFSET)
-        seen = np.empty_like(photo.pixels)
-        for tile in tiles_of(whole(photo.size), side):
-            (view,) = views_of_tile(photo, tile, [OFFSET], synthesis)
-            seen[tile.slices] = view.colors
-    colors = without_flying_pixels(rays, OFFSET, expected.colors, expected.disparity, expected.inpainted)
+    renderer, rays = Renderer(), rays_of_photo(photo.pixels, photo.disparity, 1.5, 0)
+    expected = finish(rays, OFFSET, renderer.render(rays, OFFSET))
+    seen = np.empty_like(photo.pixels)
+    for tile in tiles_of(whole(photo.size), side):
+        (view,) = views_of_tile(photo, tile, [OFFSET], renderer)
+        seen[tile.slices] = view.colors
     # Holes are filled tile by tile; flying pixels beside them depend on that.
     known = ~ndimage.binary_dilation(expected.occluded, np.ones((3, 3)))
     assert known.mean() > 0.85
-    assert np.abs(seen - colors)[known].max() < 0.02
+    assert np.abs(seen - expected.colors)[known].max() < 0.02
 
 
 def test_holes_show_what_the_smaller_light_field_shows() -> None:
@@ -64,13 +62,13 @@ def test_holes_show_what_the_smaller_light_field_shows() -> None:
     red = Photo(np.tile(np.float32([0.9, 0.1, 0.1]), (48, 60, 1)), 50.0, "red")
     plan = literal_plan(photo, disparity, 3)
     rays, outer = rays_of_grid(photo, disparity, plan)
-    views = dict(outer)
+    renderer = Renderer()
+    views = dict(update(rays, outer, renderer))
     # Every inpainted ray is made red: so the larger photo's holes are.
     rays.arrays.colors[rays.photo_images : len(rays)] = red.pixels
     large_photo = LargePhoto(*(np.repeat(np.repeat(a, 2, 0), 2, 1) for a in (photo.pixels, 2 * disparity.values)), rays)
     offset = ViewOffset(-1.0, -1.0)
-    with Renderer() as synthesis:
-        (view,) = views_of_tile(large_photo, whole(large_photo.size), [offset], synthesis)
+    (view,) = views_of_tile(large_photo, whole(large_photo.size), [offset], renderer)
     hole = views[offset].occluded
     assert hole.sum() > 20
     shown = view.colors[::2, ::2][hole]
