@@ -172,7 +172,7 @@ def viewer(tmp_path: Path) -> Iterator[HeadlessViewer]:
     except InputError as error:
         pytest.skip(str(error))
     with made:
-        made.open(Source(str(write_scene(tmp_path)), grid=GRID), 1.0, lambda progress: None)
+        made.open(Source(str(write_scene(tmp_path)), grid=GRID))
         yield made
 
 

@@ -53,13 +53,12 @@ DEMO = ROOT / "assets" / "motorcycle" / "motorcycle.png"
     [
         ("screenshot", DEMO, "--max-pixels", 60000, "--aperture", 4, "--size", "160x100", "-o", "picture.png"),
         ("generate", DEMO, "--max-pixels", 60000, "--grid", 3, "--out", "field", "--with-disparity"),
-        ("generate", "scene.png", "--grid", 3, "--out", "field", "--quality", "balanced"),
         ("screenshot", "unmapped.png", "--view", "1,1", "-o", "picture.png"),
         ("screenshot", DEMO, "--max-pixels", 250000, "--gloss", "gloss.toml", "-o", "picture.png"),
         ("screenshot", "scene.png", "--max-pixels", 3000, "--full", "--aperture", 3, "-o", "picture.png"),
         ("depth", "views", "-o", "map.pfm"),
     ],
-    ids=["screenshot", "generate", "balanced", "guessed", "gloss", "full", "depth"],
+    ids=["screenshot", "generate", "guessed", "gloss", "full", "depth"],
 )
 def test_the_first_run_compiles_nothing(tmp_path: Path, words: tuple[object, ...]) -> None:
     write_scene(tmp_path)

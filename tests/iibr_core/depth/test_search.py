@@ -13,7 +13,7 @@ from iibr_core.depth.estimators.catalog import USUAL_MODEL, known_model
 from iibr_core.depth.estimators.download import VERIFIED
 from iibr_core.depth.search import PhotoWithDepth, open_with_depth, sketch_depth
 from iibr_core.formats.images.photo import read_photo
-from iibr_core.runtime.work import Cancelled, stoppable
+from iibr_core.runtime.work import Cancelled, stoppable, watched
 from iibr_core.types import ImageSize, InputError
 from tests.iibr_core import embedded_files as files
 from tests.iibr_core.depth.onnx_graphs import published
@@ -168,11 +168,12 @@ def test_a_model_is_used_and_named(tmp_path: Path) -> None:
     told: list[str] = []
     choice = DepthChoice(model=str(folder))
 
-    def report_progress(done: float, total: float, doing: str) -> None:
+    def report(done: float, total: float, doing: str) -> None:
         assert 0 <= done <= total
         told.append(doing)
 
-    found = open_with_depth(photo_file(tmp_path, None), choice, report_progress=report_progress)
+    with watched(report):
+        found = open_with_depth(photo_file(tmp_path, None), choice)
     assert (found.origin.kind, found.origin.words) == ("model", "estimated by the model in tiny")
     assert found.origin.failures == ()
     assert any("estimating depth" in doing for doing in told)

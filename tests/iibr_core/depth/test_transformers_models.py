@@ -27,7 +27,7 @@ from iibr_core.depth.estimators.preparation import Preparation, input_size
 from iibr_core.depth.estimators.transformers_models import FAMILY
 from iibr_core.depth.search import estimator_of, open_with_depth
 from iibr_core.formats.images.write import write_image
-from iibr_core.runtime.work import Cancelled, stoppable
+from iibr_core.runtime.work import Cancelled, stoppable, watched
 from iibr_core.types import ImageSize, InputError, Photo
 from tests.iibr_core.depth.random_networks import depth_anything_network, with_random_weights
 
@@ -343,14 +343,15 @@ def test_nan_in_the_weights_is_told_and_not_kept(tmp_path: Path, own_cache: Path
 def test_it_stops_between_layers_and_tells_how_far_it_is(tmp_path: Path, own_cache: Path) -> None:
     model = depth_anything(tmp_path / "model")
     shares: list[float] = []
-    estimate_with(model, PHOTO, report_progress=lambda done, total, _: shares.append(done / total if total else 0.0))
+    with watched(lambda done, total, _: shares.append(done / total if total else 0.0)):
+        estimate_with(model, PHOTO)
     assert shares == sorted(shares)
     assert len(shares) > 50
     for path in own_cache.glob("*"):
         path.unlink()
     told: list[float] = []
-    with pytest.raises(Cancelled), stoppable(lambda: len(told) >= 20):
-        estimate_with(model, PHOTO, lambda done, total, doing: told.append(done))
+    with pytest.raises(Cancelled), stoppable(lambda: len(told) >= 20), watched(lambda done, *_: told.append(done)):
+        estimate_with(model, PHOTO)
     assert len(told) == 20
     assert not list(own_cache.glob("*"))
 
@@ -359,7 +360,8 @@ def test_a_kept_estimate_needs_no_network(tmp_path: Path, own_cache: Path) -> No
     model = depth_anything(tmp_path / "model")
     first = estimate_with(model, PHOTO)
     doings: set[str] = set()
-    again = estimate_with(model, PHOTO, report_progress=lambda done, total, doing: doings.add(doing))
+    with watched(lambda done, total, doing: doings.add(doing)):
+        again = estimate_with(model, PHOTO)
     np.testing.assert_array_equal(values_of(first), values_of(again))
     assert not any("loading" in doing for doing in doings)
     assert len(list(own_cache.glob("*.npz"))) == 1

@@ -121,8 +121,8 @@ def test_llff_views_are_made_for_their_cameras_as_they_are(tmp_path: Path) -> No
     np.save(tmp_path / "wall.npy", np.full((HEIGHT, WIDTH), focal / 10.0, np.float32))
     (result,) = evaluate(scene_of(folder), Options(tmp_path / "wall.npy"))
     rows = {row.method: row.mean for row in result.rows}
-    assert list(rows) == ["identity", "reference warp", "fast"]
-    assert rows["identity"].full_db < 25 < 35 < rows["fast"].visible_db
+    assert list(rows) == ["identity", "reference warp", "iibr"]
+    assert rows["identity"].full_db < 25 < 35 < rows["iibr"].visible_db
     assert result.consistency == {}
 
 

@@ -12,9 +12,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from iibr_core.generation.view_maker import ViewMaker, quantise_as_stored
 from PIL import Image
 
+from iibr_core.color import quantise_as_stored
 from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.search import open_with_depth
 from iibr_core.evaluation import evaluation_report
@@ -29,19 +29,17 @@ from iibr_core.evaluation.trials import CENTRE_TRIAL, CORNER_TRIAL, trial_input,
 from iibr_core.formats.images.photo import read_photo
 from iibr_core.formats.light_fields.multi_view_scene import MultiView
 from iibr_core.method.light_field import generate
-from iibr_core.runtime import tiling
+from iibr_core.method.photo_views import PhotoViews
 from iibr_core.runtime.work import Cancelled, stoppable
 from iibr_core.types import (
-    FloatImage,
     GridShape,
     InputError,
-    Quality,
     ViewOffset,
 )
 from tests.iibr_core.known_scenes import HEIGHT, WIDTH, disparity_of_square, view_of_square, write_grid, write_numbered
-from tests.iibr_core.scenes import disparity_of, literal_plan, photo_of
+from tests.iibr_core.scenes import by_index, disparity_of, literal_plan, photo_of
 
-ALWAYS = ["identity", "reference warp", "fast", "balanced"]
+ALWAYS = ["identity", "reference warp", "iibr"]
 UNREFINED = DepthChoice(refine=0.0)
 
 
@@ -61,33 +59,15 @@ def results(folder: Path) -> list[EvaluationResult]:
     return evaluate(scene_of(folder), Options(choice=UNREFINED))
 
 
-@pytest.mark.parametrize("quality", ["fast", "balanced"])
-def test_views_are_those_that_generate_makes(quality: Quality) -> None:
+def test_views_are_those_that_generate_makes() -> None:
     photo, disparity = photo_of(view_of_square(ViewOffset(0.0, 0.0))), disparity_of(disparity_of_square())
     grid = GridShape(5, 5)
-    made = {
-        (u.row, u.column): u for u in generate(photo, disparity, literal_plan(photo, disparity, 5), quality=quality)
-    }
+    made = by_index(list(generate(photo, disparity, literal_plan(photo, disparity, 5))))
     offsets = {(v, u): grid.offset(v, u) for v, u in made if (v, u) != grid.centre}
-    with ViewMaker(photo.pixels, disparity.values, offsets.values(), (quality,)) as maker:
-        for index, offset in offsets.items():
-            shown = np.rint(255 * quantise_as_stored(maker.view(quality, offset).colors)).astype(np.uint8)
-            np.testing.assert_array_equal(shown, made[index].colors, err_msg=str(index))
-
-
-def test_every_ray_may_be_asked_for_whatever_the_bands(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Then the transformer changes more of a view."""
-    photo, disparity, at = view_of_square(ViewOffset(0.0, 0.0)), disparity_of_square(), ViewOffset(1.0, 1.0)
-
-    def colors(quality: Quality, every: bool = False) -> FloatImage:
-        with ViewMaker(photo, disparity, (at,), (quality,), every=every) as maker:
-            return maker.view(quality, at).colors
-
-    fast, balanced, asked = colors("fast"), colors("balanced"), colors("balanced", every=True)
-    changed, more = ((one != fast).any(axis=2).mean() for one in (balanced, asked))
-    assert changed < more
-    monkeypatch.setattr(tiling, "MOST_BAND_PIXELS", 7 * WIDTH)
-    np.testing.assert_array_equal(colors("balanced", every=True), asked)
+    views = PhotoViews(photo.pixels, disparity.values, offsets.values())
+    for index, offset in offsets.items():
+        shown = np.rint(255 * quantise_as_stored(views.view(offset).colors)).astype(np.uint8)
+        np.testing.assert_array_equal(shown, made[index].colors, err_msg=str(index))
 
 
 def test_both_trials_show_every_row(results: list[EvaluationResult]) -> None:
@@ -132,8 +112,8 @@ def test_means_and_the_worst_view(results: list[EvaluationResult]) -> None:
 def test_every_way_beats_doing_nothing(results: list[EvaluationResult]) -> None:
     for result in results:
         full = {row.method: row.mean.full_db for row in result.rows}
-        assert full["identity"] + 10 < min(full["reference warp"], full["fast"])
-        assert set(result.consistency) >= {"fast", "balanced"}
+        assert full["identity"] + 10 < min(full["reference warp"], full["iibr"])
+        assert "iibr" in result.consistency
     assert results[0].consistency["truth"].line_off_px < 0.1
 
 
@@ -155,7 +135,7 @@ def test_only_so_many_views_the_farthest_among_them(folder: Path) -> None:
 
 def test_an_estimate_is_judged_as_it_is_and_aligned(folder: Path) -> None:
     choice = DepthChoice(start="rough", refine=0.0)
-    options = Options("estimate", choice, ("fast",), most_views=2, with_consistency=False)
+    options = Options("estimate", choice, most_views=2, with_consistency=False)
     plain, aligned = evaluate(scene_of(folder), options)[:2]
     assert "estimate" in plain.disparity
     assert aligned.disparity.endswith("scale and shift fitted to true views")
@@ -208,12 +188,10 @@ def test_an_estimate_in_the_folder_is_used_where_there_is_no_truth(tmp_path: Pat
 
 
 def test_smaller_pictures_with_disparity_to_match(folder: Path) -> None:
-    (result, *_) = evaluate(
-        scene_of(folder), Options(choice=UNREFINED, qualities=("fast",), max_pixels=HEIGHT * WIDTH // 4)
-    )
+    (result, *_) = evaluate(scene_of(folder), Options(choice=UNREFINED, max_pixels=HEIGHT * WIDTH // 4))
     assert result.size == (HEIGHT // 2, WIDTH // 2)
     full = {row.method: row.mean.full_db for row in result.rows}
-    assert full["fast"] > full["identity"] + 5
+    assert full["iibr"] > full["identity"] + 5
 
 
 def test_stopping_ends_it(folder: Path) -> None:
@@ -243,7 +221,7 @@ def test_the_markdown_has_a_table_for_each_result(results: list[EvaluationResult
         assert "nan" not in line
     assert text.count(ABOUT_CONSISTENCY) == 1
     assert ABOUT_CONSISTENCY not in evaluation_report.markdown_of([replace(results[0], consistency={})], "x")
-    assert f"| fast | – | {results[0].consistency['fast'].hole_pixels} |" in text
+    assert f"| iibr | – | {results[0].consistency['iibr'].hole_pixels} |" in text
     blocks = re.findall(r"(?m)(?:^\|.*\n?)+", text)
     assert len(blocks) == 1 + sum(2 + bool(result.refocus) for result in results)
     for block in blocks:

@@ -23,7 +23,7 @@ from iibr_core.evaluation.focal_stacks import LENS, FocalStack, Focus, foci_of, 
 from iibr_core.evaluation.lens_picture import read_lens_picture
 from iibr_core.evaluation.metrics import psnr
 from iibr_core.evaluation.reference_warp import reference_warp
-from iibr_core.evaluation.results import EvaluationResult
+from iibr_core.evaluation.results import OURS, EvaluationResult
 from iibr_core.method.light_field import generate
 from iibr_core.types import (
     Disparity,
@@ -40,7 +40,7 @@ CENTRE = ViewOffset(0.0, 0.0)
 MADE_DB = {"shelf": 44.0, "fence": 39.0}
 TRUE_DB = {"shelf": 47.0, "fence": 42.0}
 """Measured: made 45.0 and 40.0, true 48.1 and 42.7, the photo as it is 30.4 and 24.3."""
-QUICK = Options(choice=DepthChoice(refine=0.0), qualities=("fast",), with_consistency=False)
+QUICK = Options(choice=DepthChoice(refine=0.0), with_consistency=False)
 
 
 def stack_of(views: Mapping[ViewOffset, FloatImage], *foci: Focus) -> list[FloatImage]:
@@ -118,7 +118,7 @@ def through_lens(name: str, sign: float = 1.0) -> float:
     """The made field's plain sum against the lens, dB; sign: of the disparity."""
     scene = scene_of(name)
     disparity = Disparity(np.float32(sign) * scene.disparity.values, "exact")
-    updates = generate(scene.photo, disparity, literal_plan(scene.photo, disparity, *GRID), quality="balanced")
+    updates = generate(scene.photo, disparity, literal_plan(scene.photo, disparity, *GRID))
     views = {GRID.offset(update.row, update.column): encoded_from_stored(update.colors) for update in updates}
     return lens_db(scene, stack_of(views, focus_of(scene))[0])
 
@@ -167,47 +167,47 @@ def result(networks: Path) -> EvaluationResult:  # noqa: F811
     """Of the fence, by all that there is to judge by; the networks are random ones."""
     scene = read_scene(FOLDER / "fence")
     assert scene is not None
-    return evaluate(scene, Options(choice=QUICK.choice, qualities=("fast",), lpips=networks))[0]
+    return evaluate(scene, Options(choice=QUICK.choice, lpips=networks))[0]
 
 
 def test_evaluation_judges_every_focus_and_the_lens(result: EvaluationResult) -> None:
     assert [found.focus.name for found in result.refocus] == ["near", "middle", "far", LENS]
     for found in result.refocus:
         db = {method: figures.db for method, figures in found.figures.items()}
-        assert db["fast"] > db["identity"] + 3
-        assert found.figures["fast"].flip < found.figures["identity"].flip
+        assert db[OURS] > db["identity"] + 3
+        assert found.figures[OURS].flip < found.figures["identity"].flip
         assert found.views == 21  # the corners lie outside the aperture
         assert found.made.shape == found.expected.shape
     *grid, lens = result.refocus
-    assert set(lens.figures) == {"truth", "identity", "reference warp", "fast"}
+    assert set(lens.figures) == {"truth", "identity", "reference warp", OURS}
     assert all("truth" not in found.figures for found in grid)
     assert lens.figures["truth"].db == pytest.approx(true_db(scene_of("fence")))
-    assert MADE_DB["fence"] < lens.figures["fast"].db + 1 < lens.figures["truth"].db + 1
+    assert MADE_DB["fence"] < lens.figures[OURS].db + 1 < lens.figures["truth"].db + 1
 
 
 def test_reports_hold_the_refocus(result: EvaluationResult) -> None:
     read = json.loads(evaluation_report.json_of([result], "x"))["judgements"][0]
     for found, stored in zip(result.refocus, read["refocus"], strict=True):
         assert (stored["name"], stored["disparity"]) == (found.focus.name, found.focus.disparity)
-        assert stored["methods"]["fast"] == {"db": found.figures["fast"].db, "flip": found.figures["fast"].flip}
+        assert stored["methods"][OURS] == {"db": found.figures[OURS].db, "flip": found.figures[OURS].flip}
     text = evaluation_report.markdown_of([result], "x")
     assert "| refocused views of | near (" in text
     page = evaluation_report.page_of([result], "x")
     for name in ("near", "middle", "far"):
-        assert all(f'alt="{name}, {kind}"' in page for kind in ("fast", "truth", "error"))
-    assert all(f'alt="{name}"' in page for name in (LENS, f"{LENS}, fast", f"{LENS}, error"))
+        assert all(f'alt="{name}, {kind}"' in page for kind in (OURS, "truth", "error"))
+    assert all(f'alt="{name}"' in page for name in (LENS, f"{LENS}, {OURS}", f"{LENS}, error"))
 
 
 def test_lpips_of_local_networks_is_reported(result: EvaluationResult) -> None:
     lpips = {row.method: row.mean.lpips for row in result.rows}
-    assert 0 < lpips["fast"] < lpips["identity"]
+    assert 0 < lpips[OURS] < lpips["identity"]
     assert "| LPIPS |" in evaluation_report.markdown_of([result], "x")
 
 
 def test_a_lens_without_all_its_views_is_left_out_and_told() -> None:
     scene = read_scene(FOLDER / "shelf")
     assert scene is not None
-    options = Options(choice=QUICK.choice, qualities=("fast",), most_views=12, with_consistency=False)
+    options = Options(choice=QUICK.choice, most_views=12, with_consistency=False)
     (found, *_) = evaluate(scene, options)
     assert [focus.focus.name for focus in found.refocus] == ["near", "middle", "far"]
     assert any("lens" in note for note in found.notes)
@@ -222,7 +222,7 @@ def test_without_a_lens_or_refocus_nothing_is_missed(tmp_path: Path) -> None:
     scene = read_scene(write_grid(tmp_path / "square"))
     assert scene is not None
     assert read_lens_picture(scene, MOST_PIXELS) is None
-    options = Options(choice=QUICK.choice, qualities=("fast",), with_consistency=False, with_refocus=False)
+    options = Options(choice=QUICK.choice, with_consistency=False, with_refocus=False)
     assert evaluate(scene, options)[0].refocus == ()
 
 

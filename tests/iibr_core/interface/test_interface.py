@@ -149,7 +149,6 @@ BAD = {
     "half a view": lambda p, d: iibr.from_arrays(p, d).light_field((2.5, 1)),
     "literal without a grid": lambda p, d: iibr.from_arrays(p, d).light_field(parallax="literal"),
     "another parallax": lambda p, d: iibr.from_arrays(p, d).light_field(3, parallax="wide"),
-    "a quality that is none": lambda p, d: iibr.from_arrays(p, d).light_field(3, quality="exact"),
     "an option that is none": lambda p, d: iibr.from_arrays(p, d).light_field(3, paralax="literal"),
     "a view outside": lambda p, d: iibr.from_arrays(p, d).light_field(3).view(1.5, 0),
     "a negative aperture": lambda p, d: iibr.from_arrays(p, d).light_field(3).refocus(0, -1),

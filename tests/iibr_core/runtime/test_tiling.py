@@ -15,11 +15,13 @@ from iibr_core.inpainting.background import fill_background
 from iibr_core.inpainting.disparity_holes import fill_disparity_holes
 from iibr_core.method.light_field import generate
 from iibr_core.method.mixed_pixels import split_mixed_pixels
-from iibr_core.method.rays import RaySet, rays_of_photo
+from iibr_core.method.occlusion import view_entropy
+from iibr_core.method.ray_transformer import shipped_transformer
+from iibr_core.method.rays import rays_of_photo
 from iibr_core.method.view import Renderer
 from iibr_core.runtime import tiling
-from iibr_core.runtime.tiling import in_bands, in_pieces
-from iibr_core.runtime.work import Cancelled, stoppable
+from iibr_core.runtime.tiling import in_bands, in_pieces, side_by_side
+from iibr_core.runtime.work import Cancelled, raise_if_stopped, stoppable
 from iibr_core.types import ImageSize, Photo, ViewOffset
 from tests.iibr_core.scenes import literal_plan, square_before_wall
 
@@ -31,7 +33,6 @@ LAYERS = np.repeat(np.repeat(RANDOM.integers(-3, 4, (6, 5)), 14, axis=0), 14, ax
 LAYERS = np.ascontiguousarray(LAYERS, np.float32)
 SOFT = sum(np.roll(LAYERS, k, axis=1) for k in range(-4, 5)).astype(np.float32) / 9
 HOLES = RANDOM.random(SIZE) < 0.3
-FULL = np.ones(SIZE, np.float32)
 
 
 def filled():
@@ -40,22 +41,15 @@ def filled():
     return colors, disparity
 
 
-def added():
-    rays = RaySet(2, SIZE, 0.1)
-    rays.add(ViewOffset(0.0, 1.0), COLORS, np.where(HOLES, np.nan, LAYERS), FULL - HOLES)
-    return rays.arrays
-
-
 def rendered():
-    with Renderer(keeps_entropy=True) as synthesis:
-        view = synthesis.render(rays_of_photo(COLORS, LAYERS, 2.0, 0), ViewOffset(2.0, 1.5))
-    return view.colors, view.disparity, view.occluded, view.inpainted, view.entropy
+    rays, offset = rays_of_photo(COLORS, LAYERS, 2.0, 0), ViewOffset(2.0, 1.5)
+    view = Renderer(shipped_transformer()).render(rays, offset)
+    return view.colors, view.disparity, view.occluded, view.inpainted, view_entropy(rays, offset)
 
 
 STAGES = {
     "rays of a photo": lambda: rays_of_photo(COLORS, LAYERS, 2.0, 1).arrays,
     "split": lambda: split_mixed_pixels(COLORS, LAYERS, 0.5),
-    "add": added,
     "render": rendered,
     "fill": filled,
     "refine": lambda: [refine(COLORS, np.where(HOLES, np.nan, SOFT), 1.0, None)],
@@ -105,24 +99,18 @@ def test_a_stage_asks_for_every_band_and_ends_wherever_it_is_told_to(name):
 
 
 @pytest.mark.usefixtures("narrow")
-@pytest.mark.parametrize(
-    ("quality", "draft_bytes", "updates"),
-    [("fast", None, 9), ("balanced", None, 9), ("balanced", 1 << 40, 13)],
-)
-def test_a_field_ends_wherever_it_is_told_to(quality, draft_bytes, updates):
-    """As drafts and again come the four corners; in the views between them nothing is left to be decided."""
+def test_a_field_ends_wherever_it_is_told_to():
     photo, disparity = square_before_wall()
     plan, watch = literal_plan(photo, disparity, 3), Telling()
-    options = {"quality": quality, "draft_bytes": draft_bytes}
 
     def count(stop):
         with stoppable(stop):
-            return len(list(generate(photo, disparity, plan, **options)))
+            return len(list(generate(photo, disparity, plan)))
 
-    assert count(watch) == updates
+    assert count(watch) == 9
     counts = [count(Telling(n)) for n in np.linspace(1, watch.asked, 7).astype(int)]
     assert counts[0] == 0
-    assert counts[-1] < updates
+    assert counts[-1] < 9
 
 
 @pytest.mark.parametrize("threads", [1, 3])
@@ -139,14 +127,6 @@ def test_nothing_is_begun_after_the_word(threads):
         in_pieces(work, range(1000), threads)
     assert sorted(began)[:6] == list(range(6))
     assert len(began) < 6 + threads
-
-
-def test_a_ray_set_that_was_told_to_stop_is_as_before():
-    rays = rays_of_photo(COLORS, LAYERS, 2.0, 1)
-    count = len(rays)
-    with pytest.raises(Cancelled), stoppable(lambda: True):
-        rays.add(ViewOffset(0.0, 1.0), COLORS, LAYERS, FULL)
-    assert len(rays) == count
 
 
 @pytest.mark.parametrize("size", [(1, 1), (5, 1), (1, 5), (17, 4), (100, 3), (0, 4), (4, 0), (0, 0)])
@@ -166,26 +146,21 @@ def test_results_come_in_order_and_errors_come_through(threads):
         in_pieces(lambda n: 1 // (n - 7), range(20), threads=threads)
 
 
-def test_views_under_way_end_with_their_synthesis():
-    """After Ctrl-C, though should_stop is false."""
+@pytest.mark.usefixtures("narrow")
+def test_views_under_way_end_with_those_who_take_them():
+    """As after Ctrl-C, though nobody said stop."""
     began, ended = threading.Event(), []
 
-    def view(synthesis):
-        began.set()
-        while True:
-            try:
-                synthesis.render(rays_of_photo(COLORS, LAYERS, 2.0, 0), ViewOffset(2.0, 1.5), alone=True)
-            except Cancelled:
-                ended.append(True)
-                return
+    def view(number):
+        try:
+            while number:
+                began.set()
+                raise_if_stopped()
+        except Cancelled:
+            ended.append(number)
 
-    def interrupted():
-        with Renderer() as synthesis:
-            views = synthesis.side_by_side(view, [synthesis])
-            threading.Thread(target=lambda: next(views), daemon=True).start()
-            assert began.wait(60)
-            raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        interrupted()
-    assert ended == [True]
+    views = side_by_side(view, [0, 1])
+    next(views)
+    assert began.wait(60)
+    views.close()
+    assert ended == [1]

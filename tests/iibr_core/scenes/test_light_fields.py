@@ -8,19 +8,19 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from iibr_core.scenes.opening_work import FINDING
 
 from iibr_core.beyond.optics import CENTRE
 from iibr_core.color import bytes_from_encoded
 from iibr_core.depth.choice import DepthChoice
+from iibr_core.depth.multi_view.estimate_disparity import FINDING
 from iibr_core.formats.images.write import write_image_file
-from iibr_core.runtime.work import Cancelled, stoppable
+from iibr_core.runtime.work import Cancelled, stoppable, watched
 from iibr_core.scenes.lens_limits import focus_limits
 from iibr_core.scenes.light_fields import FROM_VIEWS
 from iibr_core.scenes.opening import results_of
-from iibr_core.scenes.scene import Progress, Scene, SceneReady, SceneRequest, Source, ViewReady
+from iibr_core.scenes.scene import Scene, SceneReady, SceneRequest, Source, ViewReady
 from iibr_core.types import GridShape, InputError
-from viewer.model.actions import OpenPath, ProgressMade, SceneOpened
+from viewer.model.actions import OpenPath, SceneOpened
 from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState
 from viewer.model.state.optics_actions import SetAperture, SetFocus
@@ -68,29 +68,6 @@ def test_views_that_tell_nothing_are_shown_as_they_are(tmp_path: Path) -> None:
     assert not last.scene.has_view_disparity
     assert any("too small" in note for note in last.scene.problems)
     assert len(views) == 6
-
-
-@pytest.mark.parametrize("filled_grid", [None, GridShape(9, 9)])
-def test_one_bar_grows_from_reading_to_the_last_view(tmp_path: Path, filled_grid: GridShape | None) -> None:
-    """Through all showings, as the window's state has it; complete once, with the last view."""
-    source = Source(str(write_two_planes(tmp_path / "field")), filled_grid=filled_grid)
-    state, heard = reduce(AppState(), OpenPath(source)), list[Progress]()
-    results = results_of(SceneRequest(1, source), lambda: CENTRE, heard.append)
-    shown = [state.progress]
-    for result in results:
-        while heard:
-            state = reduce(state, ProgressMade(1, heard.pop(0)))
-            shown.append(state.progress)
-        if isinstance(result, SceneReady):
-            state = reduce(state, SceneOpened(1, result.scene))
-        else:
-            state = reduce(state, ProgressMade(1, result.progress, (result.view.row, result.view.column)))
-        shown.append(state.progress)
-    shares = [progress.share for progress in shown]
-    assert shares == sorted(shares)
-    assert shares[-1] == pytest.approx(1.0)
-    assert [progress.is_complete for progress in shown[-2:]] == [False, True]
-    assert not any(progress.is_complete for progress in shown[:-1])
 
 
 def test_focus_that_is_set_while_it_loads_stays(tmp_path: Path) -> None:
@@ -152,37 +129,29 @@ def bilinear(image: np.ndarray, y: np.ndarray, x: np.ndarray) -> np.ndarray:
     return top * (1 - y + y0) + bottom * (y - y0)
 
 
-def test_finding_disparity_can_be_stopped(tmp_path: Path) -> None:
+@pytest.mark.parametrize("filled_grid", [None, GridShape(9, 9)])
+def test_finding_disparity_can_be_stopped(tmp_path: Path, filled_grid: GridShape | None) -> None:
     """Asked to stop once it has begun."""
     said: list[str] = []
-    request = SceneRequest(1, Source(str(write_two_planes(tmp_path / "field"))))
-    results = results_of(request, lambda: CENTRE, lambda progress: said.append(progress.doing))
-    with pytest.raises(Cancelled), stoppable(lambda: FINDING in said):
-        list(results)
+    request = SceneRequest(1, Source(str(write_two_planes(tmp_path / "field")), filled_grid=filled_grid))
+    with pytest.raises(Cancelled), stoppable(lambda: FINDING in said), watched(lambda *now: said.append(now[2])):
+        list(results_of(request, lambda: CENTRE))
 
 
 def test_views_between_are_made_of_all_views_on_disk(tmp_path: Path) -> None:
     request = SceneRequest(1, Source(str(write_two_planes(tmp_path / "field")), filled_grid=GridShape(9, 9)))
     said: list[str] = []
-    results = results_of(request, lambda: CENTRE, lambda progress: said.append(progress.doing))
-    ((ready, views),) = showings(results)
+    with watched(lambda done, total, doing: said.append(doing)):
+        ((ready, views),) = showings(results_of(request, lambda: CENTRE))
     assert (ready.scene.grid, ready.scene.given_grid, ready.scene.depth_source) == ((9, 9), (5, 5), FROM_VIEWS)
     assert ready.scene.disparity_range_px == pytest.approx((WALL_PX / 2, SQUARE_PX / 2), abs=0.15)
     assert (ready.centre.row, ready.centre.column) == (4, 4)
     assert {(view.view.row, view.view.column) for view in views} == set(np.ndindex(9, 9))
     assert {view.view.is_final for view in views} == {True}
-    assert {"reading", "finding disparity"} <= set(said)
+    assert FINDING in said
     between = next(view.view for view in views if (view.view.row, view.view.column) == (3, 5))
     assert between.disparity is not None
     assert between.disparity[48, 48] == pytest.approx(SQUARE_PX / 2, abs=0.05)
-
-
-def test_making_views_between_can_be_stopped_while_disparity_is_found(tmp_path: Path) -> None:
-    said: list[str] = []
-    request = SceneRequest(1, Source(str(write_two_planes(tmp_path / "field")), filled_grid=GridShape(9, 9)))
-    results = results_of(request, lambda: CENTRE, lambda now: said.append(now.doing))
-    with pytest.raises(Cancelled), stoppable(lambda: FINDING in said):
-        list(results)
 
 
 @pytest.mark.parametrize(

@@ -63,22 +63,14 @@ def test_a_cut_jpeg_has_no_sketch_and_fails_as_it_did_without(tmp_path: Path) ->
         list(results_of(SceneRequest(1, Source(str(path))), lambda: CENTRE))
 
 
-@pytest.mark.parametrize("takes_drafts", [True, False])
-def test_views_come_twice_where_they_may_and_progress_counts_them_once(photo_path: Path, takes_drafts: bool) -> None:
-    random = np.random.default_rng(0)  # every view has undecided rays
-    Image.fromarray(random.integers(0, 256, (64, 96, 3), np.uint8)).save(photo_path)
-    depths = random.uniform(0, 20, (8, 12)).astype(np.float32).repeat(8, 0).repeat(8, 1)
-    np.save(photo_path.with_name("scene_disparity.npy"), depths)
-    source = Source(str(photo_path), grid=GridShape(3, 3))
-    request = SceneRequest(1, source, takes_drafts=takes_drafts)
+def test_progress_counts_every_view_once(photo_path: Path) -> None:
+    request = SceneRequest(1, Source(str(photo_path), grid=GridShape(3, 3)))
     ready, *results = results_of(request, lambda: CENTRE)
     views = [result for result in results if isinstance(result, ViewReady)]
     assert isinstance(ready, SceneReady)
-    assert [view.view.is_final for view in views] == [True] + [False] * 8 * takes_drafts + [True] * 8
-    expected = [(done, max(done - 1, 0) if takes_drafts else 0) for done in range(1, 10)]
-    expected += [(9, drafts) for drafts in range(7, -1, -1)] if takes_drafts else []
-    assert [(view.progress.done, view.progress.drafts) for view in views] == expected
-    assert [view.progress.is_complete for view in views] == [False] * (len(views) - 1) + [True]
+    assert [view.progress.done for view in views] == list(range(1, 10))
+    assert [view.progress.is_complete for view in views] == [False] * 8 + [True]
+    assert all(view.view.is_final for view in views)
 
 
 def test_a_photo_tells_its_focal_length_only_where_it_knows_it(photo_path: Path, tmp_path: Path) -> None:
@@ -117,7 +109,7 @@ def test_a_loaded_photo_is_not_read_again(photo_path: Path) -> None:
 def test_a_light_field_folder_goes_the_same_way(tmp_path: Path, photo_path: Path, with_disparity: bool) -> None:
     from iibr_core.formats.light_fields.write import write_light_field
 
-    request = SceneRequest(1, Source(str(photo_path), grid=GridShape(3, 3)), takes_drafts=False)
+    request = SceneRequest(1, Source(str(photo_path), grid=GridShape(3, 3)))
     made = list(results_of(request, lambda: CENTRE))
     folder = tmp_path / "field"
     views = (result.view for result in made if isinstance(result, ViewReady))

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from iibr_core.runtime.work import watched
 from iibr_core.scenes.scene import Source
 from iibr_core.types import GridShape, InputError, ViewOffset
 from tests.iibr_core.known_scenes import write_llff_row, write_stanford, write_stereo_pair
@@ -147,7 +148,8 @@ def test_only_the_views_that_a_picture_shows_are_made(
     expected = viewer.picture()
     viewer.open_scene(source, 1.0)
     viewer.do(*actions)
-    viewer.make_views(lambda progress: made.append(progress.share), only_seen=True)
+    with watched(lambda done, total, _: made.append(done / total)):
+        viewer.make_views(only_seen=True)
     difference = viewer.picture().astype(float) - expected
     assert np.sqrt((difference**2).mean()) <= off
     assert len(made) - 1 <= views

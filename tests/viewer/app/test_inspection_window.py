@@ -24,7 +24,6 @@ from viewer.model.actions import OpenPath
 from viewer.model.inspection_request import sheet_cells
 from viewer.model.state.app_state import AppState
 from viewer.model.state.inspection import Compare, KeepState, SetInspection, SetOverlay
-from viewer.model.state.motion import SetLoop
 from viewer.model.state.optics_actions import MoveEye
 from viewer.model.state.preferences import ToggleSection
 from viewer.model.state.tasks import ReadTruthTask
@@ -136,33 +135,6 @@ def test_buttons_of_the_section_and_the_values_under_the_pointer(viewer: Driver)
     assert (probe.of, probe.seen_in, probe.origin) == (25, 25, "photo")
     viewer.send("mousemove", round(viewer.app.layout().panel.x + 30), 500)
     viewer.until(lambda app: app.state.inspection.probe is None)
-
-
-def test_fast_and_exact_are_scored_when_all_is_still_and_never_while_dragging(viewer: Driver) -> None:
-    app = viewer.app
-    app.do(Compare("quality"))
-    viewer.until(is_scored)
-    before = app.state.inspection.pair
-    assert before is not None
-    assert before.view == (2, 2)
-    x, y = viewer.position(0.8, 0.8)
-    viewer.send("mousemove", x, y, "mousedown", 1)
-    app.step()
-    for step in (20, 60, 100):
-        viewer.send("mousemove", x - step, y)
-        viewer.app.step()
-    viewer.until(lambda app: app.state.optics.eye.s > 0.5)
-    for _ in range(5):
-        app.step()
-    assert app.state.inspection.pair == before
-    viewer.send("mouseup", 1)
-    viewer.until(lambda app: is_scored(app) and app.state.inspection.pair.view != (2, 2))  # type: ignore[union-attr]
-    app.do(SetLoop("circle"))
-    for _ in range(5):
-        app.step()
-    at_rest = app.state.inspection.pair
-    viewer.until(lambda app: app.state.motion.turns > 0.3)
-    assert app.state.inspection.pair == at_rest
 
 
 def test_a_folder_dropped_on_the_panel_is_ground_truth(viewer: Driver, photo_path: Path, tmp_path: Path) -> None:

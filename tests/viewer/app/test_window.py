@@ -269,50 +269,6 @@ def test_views_come_nearest_first_to_where_the_user_looks(open_window: Opener, p
     assert sum(first) < 0.7 * sum(last)
 
 
-def test_edges_are_sharpened_nearest_first_to_where_the_user_looks_then(open_window: Opener, photo_path: Path) -> None:
-    """The eye moves to the opposite corner once every view is there as a draft."""
-    driver = open_window(photo_path, grid=GridShape(9, 9))
-    driver.app.do(MoveEye(ViewOffset(-4.0, -4.0)))
-    driver.until(has_every_view)
-    assert not driver.app.state.progress.is_complete
-    field = driver.app.scene_view.renderer.field
-    assert field is not None
-    driver.app.do(MoveEye(ViewOffset(4.0, 4.0)))
-    sharpened: list[tuple[int, int]] = []
-
-    def is_done(app: App) -> bool:
-        twice = {(int(row), int(column)) for row, column in np.argwhere(field.uploads == 2)}
-        sharpened.extend(sorted(twice.difference(sharpened)))
-        return app.state.progress.is_complete and rests(app)
-
-    driver.until(is_done)
-    assert field.uploads.max() == 2
-    # First what was on its way when the eye moved: some in the worker, some in the queue, some at the window.
-    distances = [16 - row - column for row, column in sharpened[20:]]
-    assert len(distances) > 30
-    assert np.mean(distances[:15]) < 0.7 * np.mean(distances[15:])
-
-
-def has_every_view(app: App) -> bool:
-    """Whether all 81 are there, as drafts or final."""
-    field = app.scene_view.renderer.field
-    return field is not None and field.present.sum() == 81
-
-
-def test_a_drafted_picture_is_not_called_final_and_changes_when_it_is(open_window: Opener, photo_path: Path) -> None:
-    driver = open_window(photo_path, grid=GridShape(9, 9))
-    driver.until(lambda app: app.state.scene is not None)
-    driver.app.do(MoveEye(ViewOffset(2.5, -3.0)))
-    driver.until(has_every_view)
-    uploaded = driver.app.scene_view.views_uploaded
-    driver.until_idle()
-    assert driver.app.scene_view.views_uploaded > uploaded
-    assert driver.app.scene_view.shows_all_views()
-    assert driver.app.scene_view.picture_drawn is not None
-    assert driver.app.scene_view.picture_drawn.views_uploaded == driver.app.scene_view.views_uploaded
-    assert driver.app.scene_view.renderer.field.present.sum() == 81
-
-
 def test_views_that_come_are_counted_now_and_then_not_each(
     open_window: Opener, photo_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -327,6 +283,5 @@ def test_views_that_come_are_counted_now_and_then_not_each(
 
     driver.until(is_done)
     assert len(driver.app.state.views_there) == 81
-    assert driver.app.scene_view.views_uploaded > 81, "drafts, too"
     assert len(counted) == 2, "the photo, and all"
     assert driver.app.frames_shown - frames < 20

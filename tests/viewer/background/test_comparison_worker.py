@@ -11,14 +11,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from iibr_core.evaluation.metrics import flip, psnr
+from iibr_core.evaluation.metrics import psnr
 from iibr_core.formats.images.write import write_image
 from iibr_core.formats.light_fields.light_field_formats import open_light_field
 from iibr_core.formats.light_fields.views import read_stored_view, read_views
 from iibr_core.formats.light_fields.write import write_light_field
 from iibr_core.inpainting.registry import INPAINTERS
-from iibr_core.method.light_field import generate, rays_of_grid
+from iibr_core.method.light_field import complete_rays, generate
+from iibr_core.method.occlusion import view_entropy
 from iibr_core.method.plan import plan_for_viewing, plan_literal
+from iibr_core.method.ray_transformer import shipped_transformer
 from iibr_core.method.view import Renderer
 from iibr_core.runtime.work import Cancelled, stoppable
 from iibr_core.scenes.photo import load_photo
@@ -26,9 +28,9 @@ from iibr_core.scenes.scene import Source
 from iibr_core.types import GridShape, InputError
 from tests.iibr_core import red_inpainter
 from tests.viewer.conftest import write_scene
+from viewer.background.comparison_job import ComparisonJob
 from viewer.background.comparison_worker import (
     ComparisonInputs,
-    ComparisonJob,
     ComparisonResult,
     ComparisonWorker,
     EntropyReady,
@@ -46,7 +48,7 @@ DEADLINE_S = 60.0
 @pytest.fixture(scope="module")
 def inputs(tmp_path_factory: pytest.TempPathFactory) -> ComparisonInputs:
     loaded = load_photo(Source(str(write_scene(tmp_path_factory.mktemp("request")))))
-    return ComparisonInputs("fast", loaded, plan_for_viewing(loaded.photo, loaded.disparity))
+    return ComparisonInputs(loaded, plan_for_viewing(loaded.photo, loaded.disparity))
 
 
 @pytest.fixture
@@ -55,7 +57,7 @@ def truth(inputs: ComparisonInputs, tmp_path: Path) -> GroundTruth:
     loaded = inputs.loaded
     assert loaded is not None
     plan = plan_literal(loaded.photo, loaded.disparity, GRID)
-    views = generate(loaded.photo, plan.field_disparity(loaded.disparity), plan, quality=inputs.quality)
+    views = generate(loaded.photo, plan.field_disparity(loaded.disparity), plan)
     write_light_field(tmp_path / "truth", "hci", GRID, views, 100.0, "truth")
     height, width = loaded.photo.size
     return GroundTruth(str(tmp_path / "truth"), "truth", GRID, width, height)
@@ -72,54 +74,28 @@ def test_entropy_is_that_of_the_weights_and_is_only_made_on_request(inputs: Comp
     loaded, plan = inputs.loaded, inputs.plan
     assert loaded is not None
     assert plan is not None
-    rays, farthest_views = rays_of_grid(loaded.photo, plan.field_disparity(loaded.disparity), plan)
-    for _ in farthest_views:
-        pass
-    offset = plan.grid.offset(0, 0)
-    with Renderer(keeps_entropy=True) as synthesis:
-        with_entropy = synthesis.render(rays, offset)
-    with Renderer() as synthesis:
-        without = synthesis.render(rays, offset)
-    assert without.entropy is None
-    assert with_entropy.entropy is not None
-    np.testing.assert_array_equal(with_entropy.colors, without.colors)
-    assert 0 <= with_entropy.entropy.min() <= with_entropy.entropy.max() <= 1
-    np.testing.assert_allclose(seen.entropy, with_entropy.entropy * 255, atol=0.5)
+    rays = complete_rays(loaded.photo, plan.field_disparity(loaded.disparity), plan, Renderer(shipped_transformer()))
+    expected = view_entropy(rays, plan.grid.offset(0, 0))
+    assert 0 <= expected.min() < expected.max() <= 1
+    np.testing.assert_allclose(seen.entropy, expected * 255, atol=0.5)
     middle = next(ComparisonJob().results_of(replace(request, view=plan.grid.centre), inputs))
     assert isinstance(middle, EntropyReady)
     assert not middle.entropy.any(), "every ray of the middle view is the photo's own"
 
 
-def test_fast_and_balanced_are_the_views_generate_makes(inputs: ComparisonInputs) -> None:
-    loaded, plan = inputs.loaded, inputs.plan
-    assert loaded is not None
-    assert plan is not None
-    view = (0, 1)
-    pair, scored = ComparisonJob().results_of(InspectionRequest(1, "quality", view, is_scored=True), inputs)
-    assert isinstance(pair, PairReady)
-    disparity = plan.field_disparity(loaded.disparity)
-    for image, quality in ((pair.left, "fast"), (pair.right, "balanced")):
-        views = generate(loaded.photo, disparity, plan, quality=quality)  # type: ignore[arg-type]
-        expected = next(update.colors for update in views if (update.row, update.column) == view)
-        np.testing.assert_array_equal(image, expected)
-    assert isinstance(scored, PairScored)
-    assert scored.psnr_db == psnr(pair.left, pair.right)
-    assert scored.flip == flip(pair.left, pair.right)
-
-
 def test_holes_are_filled_as_in_the_scene_s_own_views(
-    monkeypatch: pytest.MonkeyPatch, inputs: ComparisonInputs
+    monkeypatch: pytest.MonkeyPatch, inputs: ComparisonInputs, truth: GroundTruth
 ) -> None:
     monkeypatch.setitem(INPAINTERS, "red", red_inpainter.ENTRY)
-    loaded, plan, view = inputs.loaded, inputs.plan, (0, 1)
+    loaded, view = inputs.loaded, (0, 1)
     assert loaded is not None
-    assert plan is not None
-    request = InspectionRequest(1, "quality", view)
+    plan = plan_literal(loaded.photo, loaded.disparity, GRID)
+    request = InspectionRequest(1, "truth", view, truth)
     (pair,) = ComparisonJob().results_of(request, replace(inputs, inpaint="red"))
     (usual,) = ComparisonJob().results_of(request, inputs)
     assert isinstance(pair, PairReady)
     assert isinstance(usual, PairReady)
-    views = generate(loaded.photo, plan.field_disparity(loaded.disparity), plan, quality="fast", inpaint="red")
+    views = generate(loaded.photo, plan.field_disparity(loaded.disparity), plan, inpaint="red")
     expected = next(update.colors for update in views if (update.row, update.column) == view)
     np.testing.assert_array_equal(pair.left, expected)
     assert (pair.left != usual.left).any()
@@ -140,7 +116,7 @@ def test_what_is_made_at_the_places_of_the_truth_is_the_truth_itself(
 def test_a_stored_view_is_held_against_the_truth_as_it_is(truth: GroundTruth) -> None:
     stored = np.full((truth.height, truth.width, 3), 100, np.uint8)
     request = InspectionRequest(1, "truth", (2, 0), truth, is_scored=True)
-    pair, scored = ComparisonJob().results_of(request, ComparisonInputs("fast", stored=stored))
+    pair, scored = ComparisonJob().results_of(request, ComparisonInputs(stored=stored))
     assert isinstance(pair, PairReady)
     assert isinstance(scored, PairScored)
     np.testing.assert_array_equal(pair.left, stored)
@@ -154,15 +130,11 @@ def test_a_pair_is_made_once_and_scored_when_asked(inputs: ComparisonInputs, tru
     again, scored = job.results_of(replace(request, is_scored=True), inputs)
     assert again is pair, "told again, for the first may have been dropped, but not made again"
     assert isinstance(scored, PairScored)
-    job.forget()
-    (again,) = job.results_of(request, inputs)
-    assert isinstance(again, PairReady)
-    assert again is not pair
 
 
-def test_a_look_that_is_not_wanted_any_more_stops(inputs: ComparisonInputs) -> None:
+def test_a_look_that_is_not_wanted_any_more_stops(inputs: ComparisonInputs, truth: GroundTruth) -> None:
     with pytest.raises(Cancelled), stoppable(lambda: True):
-        list(ComparisonJob().results_of(InspectionRequest(1, "quality", (0, 0)), inputs))
+        list(ComparisonJob().results_of(InspectionRequest(1, "truth", (0, 0), truth), inputs))
 
 
 def test_truth_that_changed_on_disk_is_an_input_error(inputs: ComparisonInputs, truth: GroundTruth) -> None:
@@ -231,26 +203,14 @@ def test_what_fails_is_told_in_one_line(
     assert "\n" not in failed.message
 
 
-def test_a_field_of_one_view_can_be_compared(inputs: ComparisonInputs) -> None:
-    """No view beside the middle: the ray set has no farthest view to take in."""
-    loaded = inputs.loaded
-    assert loaded is not None
-    plan = plan_literal(loaded.photo, loaded.disparity, GridShape(1, 1))
-    pair = next(ComparisonJob().results_of(InspectionRequest(1, "quality", (0, 0)), replace(inputs, plan=plan)))
-    assert isinstance(pair, PairReady)
-    np.testing.assert_array_equal(pair.left, np.rint(loaded.photo.pixels * 255))
-
-
-def test_the_middle_view_is_the_photo_whatever_its_disparity(inputs: ComparisonInputs) -> None:
+def test_the_middle_view_is_the_photo_whatever_its_disparity(inputs: ComparisonInputs, truth: GroundTruth) -> None:
     """Rays of torn disparity cover each other even where nothing moves; yet nothing is to be found out there."""
     loaded = inputs.loaded
     assert loaded is not None
     torn = np.random.default_rng(5).uniform(-30, 30, loaded.photo.size).astype(np.float32)
     loaded = replace(loaded, disparity=replace(loaded.disparity, values=torn))
-    plan = plan_literal(loaded.photo, loaded.disparity, GRID)
-    pair, scored = ComparisonJob().results_of(
-        InspectionRequest(1, "quality", GRID.centre, is_scored=True), replace(inputs, loaded=loaded, plan=plan)
-    )
+    request = InspectionRequest(1, "truth", GRID.centre, truth, is_scored=True)
+    pair, scored = ComparisonJob().results_of(request, replace(inputs, loaded=loaded))
     assert isinstance(pair, PairReady)
     assert isinstance(scored, PairScored)
     np.testing.assert_array_equal(pair.left, np.rint(loaded.photo.pixels * 255))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -12,14 +13,16 @@ import pytest
 
 from iibr_core.beyond.optics import CENTRE
 from iibr_core.depth.editing.edits import DepthEdits, Stroke
+from iibr_core.method import ray_transformer
 from iibr_core.runtime import compiling
 from iibr_core.runtime.work import is_stopped
 from iibr_core.scenes.opening import results_of
 from iibr_core.scenes.scene import DepthSettings, Progress, SceneReady, SceneRequest, Source, ViewReady
 from iibr_core.types import GridShape, InputError, ViewUpdate
-from viewer.background.job_threads import QUEUED_RESULTS, Failed
-from viewer.background.scene_worker import SceneResult, SceneWork, SceneWorker, _telling_compiling
-from viewer.model.actions import OpenPath, SceneOpened
+from tests.iibr_core.scenes.test_light_fields import write_two_planes
+from viewer.background.job_threads import QUEUED_RESULTS, Failed, ProgressReport
+from viewer.background.scene_worker import PhotosFound, SceneResult, SceneWork, SceneWorker
+from viewer.model.actions import OpenPath, ProgressMade, SceneOpened
 from viewer.model.lens.photographic_units import equivalent_f_number
 from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState
@@ -40,11 +43,13 @@ class Desk:
         """Wait to be woken."""
         return self._woken.acquire(timeout=DEADLINE_S)
 
-    def next(self) -> SceneResult:
-        """The next result that is not late, waiting for it."""
+    def next(self, with_progress: bool = False) -> SceneResult:
+        """The next result that is not late, waiting for it; reports of progress are left out, unless asked for."""
         while True:
             if (result := self.worker.next_result()) is not None:
-                return result
+                if with_progress or not isinstance(result, ProgressReport):
+                    return result
+                continue
             assert self._woken.acquire(timeout=DEADLINE_S), "the worker went silent"
 
 
@@ -234,23 +239,6 @@ def test_a_missing_file_is_a_failure_with_its_name(desk_for: Callable[..., Desk]
     assert "gone.png" in failure.message
 
 
-def test_weights_that_are_missing_are_a_failure_and_fast_still_works(
-    monkeypatch: pytest.MonkeyPatch, desk_for: Callable[..., Desk], photo_path: Path, tmp_path: Path
-) -> None:
-    monkeypatch.setattr("iibr_core.method.light_field.resource_folder", lambda name: tmp_path / name)
-    desk = desk_for()
-    source = Source(str(photo_path), grid=GridShape(3, 3), quality="balanced")
-    desk.worker.submit(SceneRequest(1, source))
-    assert [type(desk.next()) for _ in range(2)] == [SceneReady, ViewReady]
-    failure = desk.next()
-    assert isinstance(failure, Failed)
-    assert failure.message.startswith(
-        f"{tmp_path / 'assets' / 'weights' / 'ray_transformer.safetensors'}: no such file"
-    )
-    desk.worker.submit(SceneRequest(2, replace(source, quality="fast")))
-    assert [type(desk.next()) for _ in range(10)] == [SceneReady, *[ViewReady] * 9]
-
-
 def test_where_the_user_looks_reaches_the_job(desk_for: Callable[..., Desk]) -> None:
     from iibr_core.types import ViewOffset
 
@@ -267,16 +255,61 @@ def test_where_the_user_looks_reaches_the_job(desk_for: Callable[..., Desk]) -> 
     assert seen == [ViewOffset(1, 2)]
 
 
-def test_kernels_that_are_compiled_are_told_beside_the_views_that_are_there() -> None:
+def test_weights_that_are_missing_are_a_failure(
+    monkeypatch: pytest.MonkeyPatch, desk_for: Callable[..., Desk], photo_path: Path, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(ray_transformer, "resource_folder", lambda name: tmp_path / name)
+    ray_transformer.shipped_transformer.cache_clear()
+    desk = desk_for()
+    desk.worker.submit(SceneRequest(1, Source(str(photo_path), grid=GridShape(3, 3))))
+    assert [type(desk.next()) for _ in range(2)] == [SceneReady, ViewReady]
+    failure = desk.next()
+    assert isinstance(failure, Failed)
+    weights = tmp_path / "assets" / "weights" / "ray_transformer.safetensors"
+    assert failure.message.startswith(f"{weights}: no such file")
+
+
+def test_kernels_that_are_compiled_are_told_beside_the_views_that_are_there(
+    monkeypatch: pytest.MonkeyPatch, desk_for: Callable[..., Desk]
+) -> None:
     """So that the views go on being counted, and can be stopped."""
-    told: list[Progress] = []
 
-    def results() -> Iterator[ViewReady]:
+    def results_of(*_: object) -> Iterator[ViewReady]:
         compiling.report_compiling()
-        yield ViewReady(0, VIEW, Progress(3, 9, left_s=7.0))
+        yield ViewReady(1, VIEW, Progress(3, 9, left_s=7.0))
         compiling.report_compiling()
 
-    assert len(list(_telling_compiling(results(), told.append))) == 1
+    monkeypatch.setattr("iibr_core.scenes.opening.results_of", results_of)
+    monkeypatch.setattr("viewer.background.scene_worker.REPORT_EVERY_S", 0.0)
+    desk = desk_for()
+    desk.worker.submit(request(1))
+    results = [desk.next(with_progress=True) for _ in range(3)]
+    told = [result.progress for result in results if isinstance(result, ProgressReport)]
     assert [(progress.done, progress.total) for progress in told] == [(0, 0), (3, 9)]
     assert all(progress.doing.startswith(compiling.COMPILING) for progress in told)
     assert all(progress.left_s is None for progress in told), "of two times left, one is wrong"
+
+
+@pytest.mark.parametrize("filled_grid", [None, GridShape(9, 9)])
+def test_the_bar_of_each_work_grows_and_the_last_view_completes_it(
+    desk_for: Callable[..., Desk], tmp_path: Path, filled_grid: GridShape | None
+) -> None:
+    """Through all showings of a light field, as the window's state has it."""
+    source = Source(str(write_two_planes(tmp_path / "field")), filled_grid=filled_grid)
+    desk, state = desk_for(), reduce(AppState(), OpenPath(source))
+    desk.worker.submit(SceneRequest(1, source))
+    shown = [state.progress]
+    while not state.progress.is_complete:
+        result = desk.next(with_progress=True)
+        assert not isinstance(result, Failed | PhotosFound)
+        if isinstance(result, SceneReady):
+            state = reduce(state, SceneOpened(1, result.scene))
+        else:
+            view = (result.view.row, result.view.column) if isinstance(result, ViewReady) else None
+            state = reduce(state, ProgressMade(1, result.progress, view))
+        shown.append(state.progress)
+    for before, now in pairwise(shown):
+        same_work = before.doing.partition(",")[0] == now.doing.partition(",")[0]
+        assert 0 <= (before.share if same_work else 0) <= now.share <= 1
+    assert shown[-1].share == pytest.approx(1.0)
+    assert desk.worker.next_result() is None

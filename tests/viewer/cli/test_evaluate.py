@@ -26,11 +26,11 @@ def test_evaluate_judges_all_scenes_of_a_folder(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], data: Path, tmp_path: Path
 ) -> None:
     out = tmp_path / "report"
-    assert run(monkeypatch, "evaluate", data, "--out", out, "--views", 2, "--quality", "fast", "--refine", "off") == 0
+    assert run(monkeypatch, "evaluate", data, "--out", out, "--views", 2, "--refine", "off") == 0
     *lines, last = capsys.readouterr().out.splitlines()
     assert last == str(out / "index.html")
     assert [line.split(":")[0] for line in lines] == ["row", "square", "square"]
-    assert all(re.search(r"identity [\d.]+, reference warp [\d.]+, fast [\d.]+ dB$", line) for line in lines)
+    assert all(re.search(r"identity [\d.]+, reference warp [\d.]+, iibr [\d.]+ dB$", line) for line in lines)
     assert sorted(path.name for path in out.iterdir()) == REPORT
     assert f"iibr evaluate {data}" in (out / "report.md").read_text()
 
@@ -38,12 +38,12 @@ def test_evaluate_judges_all_scenes_of_a_folder(
 def test_stages_are_left_out(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], data: Path, tmp_path: Path
 ) -> None:
-    words = ("evaluate", data / "square", "--views", 1, "--quality", "fast", "--refine", "off", "--out")
+    words = ("evaluate", data / "square", "--views", 1, "--refine", "off", "--out")
     without = ("--without", "smooth-gaps", "--without", "synthesise-patches", "--without", "split-mixed-pixels")
     told = []
     for number, more in enumerate(((), without)):
         assert run(monkeypatch, *words, tmp_path / str(number), *more) == 0
-        told.append(re.search(r"fast ([\d.]+) dB", capsys.readouterr().out))
+        told.append(re.search(r"iibr ([\d.]+) dB", capsys.readouterr().out))
     assert all(told)
     assert (tmp_path / "0" / "report.json").read_text() != (tmp_path / "1" / "report.json").read_text()
     assert "--without smooth-gaps" in (tmp_path / "1" / "report.md").read_text()
@@ -54,23 +54,23 @@ def test_a_report_that_is_there_is_replaced_only_by_force(
 ) -> None:
     (out := tmp_path / "report").mkdir()
     (out / "notes.txt").write_text("mine")
-    words = ("evaluate", data / "row", "--out", out, "--views", 1, "--quality", "fast", "--refine", "off")
+    words = ("evaluate", data / "row", "--out", out, "--views", 1, "--refine", "off")
     assert run(monkeypatch, *words) == 2
     assert "already exists; give --force" in capsys.readouterr().err
     assert run(monkeypatch, *words, "--force") == 0
     assert sorted(path.name for path in out.iterdir()) == sorted([*REPORT, "notes.txt"])
 
 
-def test_several_qualities_and_a_disparity_of_ones_own(
+def test_a_disparity_of_ones_own(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], data: Path, tmp_path: Path
 ) -> None:
     flat = tmp_path / "flat.npy"
     np.save(flat, np.zeros((HEIGHT, WIDTH), np.float32))
-    words = ("--views", 1, "--disparity", flat, "--quality", "fast", "--quality", "balanced")
+    words = ("--views", 1, "--disparity", flat)
     assert run(monkeypatch, "evaluate", data / "square", "--out", tmp_path / "report", *words) == 0
     line = capsys.readouterr().out.splitlines()[0]
-    values = dict(re.findall(r"(identity|reference warp|fast|balanced) ([\d.]+)", line.partition("flat.npy")[2]))
-    assert values.keys() == {"identity", "reference warp", "fast", "balanced"}
+    values = dict(re.findall(r"(identity|reference warp|iibr) ([\d.]+)", line.partition("flat.npy")[2]))
+    assert values.keys() == {"identity", "reference warp", "iibr"}
     # flat disparity shows the photo everywhere
     assert len(set(values.values())) == 1
 

@@ -40,7 +40,7 @@ def run_plain(*words: object) -> subprocess.CompletedProcess[str]:
 @pytest.mark.parametrize(
     "words",
     [
-        ("generate", "{photo}", "--grid", 3, "--quality", "balanced", "--out", "{dir}/field"),
+        ("generate", "{photo}", "--grid", 3, "--out", "{dir}/field"),
         ("screenshot", "{photo}", "--view", "1,0", "--size", "96x64", "-o", "{dir}/picture.png"),
         ("batch", "{dir}", "--to", "depth", "-o", "{dir}/../depths"),
     ],

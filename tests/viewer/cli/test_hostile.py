@@ -141,7 +141,6 @@ OPTIONS = {
     "generate scene.png --out o --max-pixels 0": "--max-pixels",
     "generate scene.png --out o --disparity-scale nan": "--disparity-scale",
     "generate scene.png --out o --depth-strength inf": "--depth-strength",
-    "generate scene.png --out o --quality best": "--quality",
     "generate scene.png --out o --format mp4": "'mp4' is not a layout that can be written: give hci",
     "generate scene.png --grid 3": "--out",
     "generate scene.png --grid 3 --out file": "file: ",

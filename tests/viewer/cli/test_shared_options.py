@@ -11,7 +11,6 @@ from viewer.cli.shared_options import (
     finite_from_text,
     grid_from_text,
     inpainter_from_text,
-    quality_from_text,
     size_from_text,
     view_from_text,
 )
@@ -26,7 +25,6 @@ from viewer.cli.shared_options import (
         (view_from_text, "2,-1.5", ViewOffset(t=-1.5, s=2.0)),
         (view_from_text, "-0, 1e1", ViewOffset(t=10.0, s=0.0)),
         (finite_from_text, "-1e-3", -0.001),
-        (quality_from_text, "balanced", "balanced"),
         (inpainter_from_text, "background", "background"),
     ],
 )

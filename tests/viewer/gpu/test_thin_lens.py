@@ -21,7 +21,6 @@ from iibr_core.method.light_field import generate
 from iibr_core.types import (
     Disparity,
     FloatImage,
-    Quality,
     ViewUpdate,
 )
 from tests.iibr_core.lens_scenes import GRID, NAMES, LensScene, lens_scene
@@ -42,9 +41,9 @@ def field(scene: LensScene) -> Field:
     return made_of(scene, scene.disparity)
 
 
-def made_of(scene: LensScene, disparity: Disparity, quality: Quality = "balanced") -> Field:
+def made_of(scene: LensScene, disparity: Disparity) -> Field:
     plan = literal_plan(scene.photo, disparity, *GRID)
-    return by_index(list(generate(scene.photo, disparity, plan, quality=quality)))
+    return by_index(list(generate(scene.photo, disparity, plan)))
 
 
 def optics_of(scene: LensScene) -> Optics:
@@ -94,5 +93,5 @@ def test_another_focus_or_aperture_is_another_picture(renderer: Renderer, scene:
 
 
 def test_disparity_of_the_wrong_sign_is_worse(renderer: Renderer, scene: LensScene, field: Field) -> None:
-    turned = made_of(scene, Disparity(-scene.disparity.values, "turned"), "fast")
+    turned = made_of(scene, Disparity(-scene.disparity.values, "turned"))
     assert drawn_db(renderer, scene, turned, optics_of(scene)) < LEAST_DB[scene.scene.name] - 5

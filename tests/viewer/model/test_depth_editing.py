@@ -362,7 +362,8 @@ def test_a_saved_map_is_the_same_scene_when_it_is_opened_again(photo_path: Path,
     edits = DepthEdits(gamma=0.5, strokes=(replace(STROKE, tool="farther"),))
     out = tmp_path / "edited.pfm"
     with HeadlessViewer("egl") as viewer:
-        viewer.open(source, 1.0, lambda progress: None, edits)
+        viewer.open_scene(source, 1.0, edits)
+        viewer.make_views()
         loaded = viewer._scene_view.loaded
         assert loaded is not None
         wanted = loaded.disparity.values

@@ -312,14 +312,6 @@ def test_stopping_while_another_file_is_read_returns_to_the_scene_that_is_open()
     assert (first.source, first.stopped, first.progress) == (None, 1, Progress())
 
 
-def test_sharpening_edges_can_be_stopped() -> None:
-    state = reduce(state_with(scene_of()), ProgressMade(1, Progress(81, 81, 0.1, drafts=20), (0, 0)))
-    stopped = reduce(state, StopWork())
-    assert stopped.stopped == 1
-    assert stopped.progress.doing == "stopped at 81 of 81 views, edges still soft in 20"
-    assert not stopped.progress.is_complete
-
-
 def test_a_finished_field_cannot_be_stopped() -> None:
     state = reduce(state_with(scene_of()), ProgressMade(1, Progress(81, 81, 0.1), (0, 0)))
     assert reduce(state, StopWork()) == state

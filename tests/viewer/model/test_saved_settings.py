@@ -65,7 +65,6 @@ sources = st.builds(
     ),
     st.none() | st.builds(GridShape, st.integers(1, 99), st.integers(1, 99)),
     st.none() | numbers,
-    quality=st.sampled_from(("fast", "balanced")),
 )
 pixels = st.integers(1, 9999)
 settings = st.builds(SavedSettings, optics, numbers, sources, st.tuples(pixels, pixels), view_width=st.none() | pixels)
@@ -104,10 +103,6 @@ def changed(**changes: Any) -> str:
     return json.dumps(whole)
 
 
-def test_the_quality_that_was_dropped_is_read_as_balanced() -> None:
-    assert settings_from_text(changed(source__quality="exact"), "a.png").source.quality == "balanced"
-
-
 SMOOTH = {"tool": "smooth", "points": [[0.5, 0.5]], "radius": 0.25, "strength": 1.0}
 
 
@@ -141,10 +136,9 @@ SMOOTH = {"tool": "smooth", "points": [[0.5, 0.5]], "radius": 0.25, "strength": 
         changed(optics__aperture_shape__mask={"name": "a", "rows": 1, "columns": 3, "values": "AAAA"}),
         changed(optics__aperture_shape__mask={"name": "a", "rows": 10**9, "columns": 1, "values": ""}),
         changed(source__grid=[0, 3]),
-        changed(source__quality="best"),
         changed(size_px=[0, 10]),
     ],
-    ids=range(29),
+    ids=range(28),
 )
 def test_damaged_settings_are_one_line_and_change_nothing(text: str) -> None:
     with pytest.raises(InputError, match=r"a\.png") as error:
@@ -164,7 +158,7 @@ FIRST_TEXT = (
     '"exposure_stops":-1.0},"depth_strength":1.5,"source":{"disparity_scale":2.0,"grid":[3,5],"focus_disparity":null,'
     '"max_pixels":400000,"memory_bytes":1073741824,"quality":"balanced"},"size_px":[741,500]}'
 )
-"""As the first version wrote it: `refine` and depth edits came later, and the machine's two limits went."""
+"""As the first version wrote it: `refine` and depth edits came later; quality and the machine's two limits went."""
 
 LATER_TEXT = FIRST_TEXT.replace('"balanced"}', '"balanced","refine":0.5}')[:-1].replace(
     '"max_pixels":400000,"memory_bytes":1073741824,', ""
@@ -184,7 +178,7 @@ SAVED = SavedSettings(
         exposure_stops=-1.0,
     ),
     1.5,
-    Source("", DepthChoice(file_scale=2.0), GridShape(3, 5), quality="balanced"),
+    Source("", DepthChoice(file_scale=2.0), GridShape(3, 5)),
     (741, 500),
 )
 STROKE = Stroke("nearer", ((0.5, 0.25), (0.75, 0.25)), 0.03, 0.25)
@@ -196,11 +190,6 @@ def test_texts_written_before_are_read() -> None:
     edits = DepthEdits(is_inverted=True, far_clip=0.125, gamma=2.0, strokes=(STROKE,))
     later = replace(SAVED, source=replace(SAVED.source, depth=depth), depth_edits=edits)
     assert settings_from_text(LATER_TEXT, "a.png") == later
-
-
-def test_a_quality_left_to_the_plan_stays_so() -> None:
-    saved = replace(SAVED, source=replace(SAVED.source, quality=None))
-    assert settings_from_text(settings_text(saved), "a.png") == saved
 
 
 def test_numbers_of_numpy_are_written_like_any() -> None:
@@ -220,7 +209,6 @@ def test_numbers_of_numpy_are_written_like_any() -> None:
         (changed(optics__aperture_shape__blades=2), "optics.aperture_shape.blades"),
         (changed(optics__aperture_shape__mask={"name": "a", "rows": 2, "columns": 2, "values": "AAAA"}), "shape.mask"),
         (changed(source__grid=[0, 3]), "source.grid"),
-        (changed(source__quality="best"), "source.quality"),
         (changed(depth_edits={"gamma": 0.0}), "gamma"),
         (changed(size_px=[0, 10]), "size_px"),
     ],

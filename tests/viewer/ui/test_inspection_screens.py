@@ -130,17 +130,6 @@ def test_photo_and_result_on_the_two_sides_of_the_divider(viewer: HeadlessViewer
     assert np.abs(compared[left] - result[left]).mean() > 2 * np.abs(compared[left] - photo[left]).mean()
 
 
-def test_fast_and_exact_are_compared_with_their_scores(viewer: HeadlessViewer) -> None:
-    viewer.do(MoveEye(ViewOffset(1, 1)))
-    changed = changed_after(viewer, Compare("quality"))
-    pair = viewer.state.inspection.pair
-    assert pair is not None
-    assert pair.view == (2, 2)
-    assert pair.psnr_db is not None
-    assert pair.psnr_db > 20
-    assert changed[:, -int(PANEL_WIDTH) :].sum() > ENOUGH_PIXELS
-
-
 def test_the_sheet_shows_every_view_and_marks_the_present_one(viewer: HeadlessViewer) -> None:
     viewer.do(SetInspection("shows_grid", True))
     screen, layout = viewer.screen(SIZE).astype(int), layout_now(viewer)

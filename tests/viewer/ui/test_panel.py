@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from iibr_core.method.plan import ScenePlan
 from iibr_core.scenes.scene import Progress, Scene, Source
-from iibr_core.types import GridShape, Quality
+from iibr_core.types import GridShape
 from viewer.model.state.app_state import DrawReport
 from viewer.ui.panel import progress_text, report_text, size_text
 
@@ -22,20 +21,15 @@ from viewer.ui.panel import progress_text, report_text, size_text
         (Progress(81, 81, 31.0, share=1.0), "81 of 81 views, 31 s"),
         (Progress(0, 81, 31.0), "0 of 81 views"),
         (Progress(1, 1, 0.0, share=1.0), "1 of 1 view, 0.0 s"),
-        (Progress(41, 81, 4.0, drafts=40, left_s=11.0), "41 of 81 views, about 10 s left"),
-        (Progress(81, 81, 9.0, drafts=54, left_s=4.2), "sharpening edges, about 4 s left"),
-        (Progress(81, 81, 9.0, drafts=1), "sharpening edges"),
-        (Progress(81, 81, 2.0, "finding disparity", 81, left_s=70.0), "finding disparity, about 70 s left"),
+        (Progress(0, 81, 2.0, "finding disparity", 0.3, left_s=70.0), "finding disparity, about 70 s left"),
     ],
 )
 def test_progress_in_words(progress: Progress, words: str) -> None:
     assert progress_text(progress) == words
 
 
-def test_it_is_complete_once_every_view_is_there_as_it_stays() -> None:
-    passes = [Progress(done, 9, drafts=done - 1) for done in range(1, 10)]
-    passes += [Progress(9, 9, drafts=drafts) for drafts in range(7, -1, -1)]
-    assert [progress.is_complete for progress in passes] == [False] * 16 + [True]
+def test_it_is_complete_once_every_view_is_there() -> None:
+    assert [Progress(done, 9).is_complete for done in (0, 8, 9)] == [False, False, True]
     assert not Progress(0, 0).is_complete
 
 
@@ -46,16 +40,7 @@ def test_a_picture_is_final_only_with_all_views_as_they_stay() -> None:
     assert report_text(DrawReport(1, 4, 12.0), has_all_views=True) == "Drawn in 12 ms, refining"
 
 
-@pytest.mark.parametrize(
-    ("quality", "is_made", "words"),
-    [
-        ("fast", True, "60 × 40 px, 3 × 9 views, fast"),
-        ("balanced", True, "60 × 40 px, 3 × 9 views"),
-        ("fast", False, "60 × 40 px, 3 × 9 views"),
-    ],
-)
-def test_quality_is_told_where_views_are_made_and_not_plain(quality: Quality, is_made: bool, words: str) -> None:
-    grid = GridShape(3, 9)
-    plan = ScenePlan(grid, 1.0, 0.0, (-2.0, 3.0), 0.1, True, 0, 0, ()) if is_made else None
-    scene = Scene(Source("a.png", quality=quality), "a", 60, 40, grid, (-2.0, 3.0), "a.pfm", plan=plan)
-    assert size_text(scene) == words
+def test_the_size_in_words() -> None:
+    assert size_text(Scene(Source("a.png"), "a", 60, 40, GridShape(3, 9), (-2.0, 3.0), "a.pfm")) == (
+        "60 × 40 px, 3 × 9 views"
+    )

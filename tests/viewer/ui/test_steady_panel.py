@@ -41,7 +41,6 @@ SWITCHES: dict[str, tuple[Action, ...]] = {
     "overlay": (SetOverlay("disparity"),),
     "photo": (Compare("photo"),),
     "kept": (KeepState(), Compare("kept")),
-    "quality": (Compare("quality"),),
 }
 
 

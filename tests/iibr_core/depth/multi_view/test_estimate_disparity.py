@@ -26,7 +26,7 @@ from iibr_core.depth.multi_view.matching import (
     sweep,
 )
 from iibr_core.depth.multi_view.semi_global import choose_disparity
-from iibr_core.runtime.work import Cancelled, stoppable
+from iibr_core.runtime.work import Cancelled, stoppable, watched
 from iibr_core.training.scenes.random_scene import random_scene
 from iibr_core.training.scenes.raycast import render
 from iibr_core.types import (
@@ -238,7 +238,8 @@ def test_progress_counts_the_sweep_and_what_follows_it(offsets, sweeps):
     views, _ = slanted_views(0.01, offsets)
     range_px, told = (-1.0, 1.0), []
     reference = len(offsets) // 2 if sweeps == 1 else 0
-    estimate_disparity(views, offsets, reference, range_px, report_progress=lambda *now: told.append(now))
+    with watched(lambda *now: told.append(now)):
+        estimate_disparity(views, offsets, reference, range_px)
     steps = sweep_steps(range_px, 2.0 if sweeps == 1 else 1.0) + 1
     done, totals, _ = zip(*told)
     assert set(totals) == {map_work(steps, len(offsets))}

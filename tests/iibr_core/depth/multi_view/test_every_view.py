@@ -5,7 +5,7 @@ import pytest
 
 from iibr_core.depth.multi_view.estimate_disparity import estimate_coarse
 from iibr_core.depth.multi_view.every_view import _carry, estimate_all, matched_views
-from iibr_core.runtime.work import Cancelled, stoppable
+from iibr_core.runtime.work import Cancelled, stoppable, watched
 from iibr_core.training.scenes.random_scene import random_scene
 from iibr_core.training.scenes.raycast import render
 from iibr_core.types import GridShape, ImageSize, ViewOffset
@@ -69,10 +69,11 @@ def test_maps_that_show_nothing_of_a_view_between_are_taken_as_they_are():
 
 def test_it_ends_when_it_should_stop_while_maps_are_carried():
     views, told = [textured()] * 3, []
-    estimate_all(views, LINE, (-1.0, 1.0), report_progress=lambda *progress: told.append(progress))
+    with watched(lambda *progress: told.append(progress)):
+        estimate_all(views, LINE, (-1.0, 1.0))
     last, seen = told[-2], []
-    with pytest.raises(Cancelled), stoppable(lambda: last in seen):
-        estimate_all(views, LINE, (-1.0, 1.0), lambda *progress: seen.append(progress))
+    with pytest.raises(Cancelled), stoppable(lambda: last in seen), watched(lambda *progress: seen.append(progress)):
+        estimate_all(views, LINE, (-1.0, 1.0))
     assert told[-1] not in seen
 
 
@@ -102,9 +103,8 @@ def test_agreement_brings_estimated_maps_nearer_to_the_truth():
     drawn = [render(scene, size, offset, samples=2) for offset in offsets]
     views = [(255 * colors + 0.5).astype(np.uint8) for colors, _ in drawn]
     told = []
-    maps = estimate_all(
-        views, offsets, estimate_coarse(views, offsets, 4).range_px, report_progress=lambda *now: told.append(now)
-    )
+    with watched(lambda *now: told.append(now)):
+        maps = estimate_all(views, offsets, estimate_coarse(views, offsets, 4).range_px)
     done, total = [now[0] for now in told], {now[1] for now in told}
     assert done == sorted(done)
     assert len(total) == 1
