@@ -8,20 +8,20 @@ from functools import cache
 import cv2
 import numpy as np
 import pytest
-from iibr_core.generation.view_maker import ViewMaker
 
 from iibr_core.depth.edges.refine import refine
 from iibr_core.evaluation.evaluate_scene import Options
+from iibr_core.method.photo_views import PhotoViews
 from iibr_core.stages import ALL_STAGES, STAGE_NAMES, Stages, stages_without
 from iibr_core.training.degradation import blur
-from iibr_core.training.scenes.random_scene import random_scene, render
+from iibr_core.training.scenes.random_scene import random_scene
+from iibr_core.training.scenes.raycast import render
 from iibr_core.types import (
     FloatImage,
     ImageSize,
     InputError,
     ViewOffset,
 )
-from tests.iibr_core.scenes import smooth_texture
 
 SIZE = ImageSize(96, 128)
 CASES = {
@@ -29,16 +29,13 @@ CASES = {
     "fit_to_blur": "soft",
     "refill_between_surfaces": "resampled",
     "label_edge_bands": "dilated",
-    "connect_slopes": "slope",
 }
 """Of those that an exact map of a drawn scene does not need."""
 
 
 @cache
 def scene(case: str) -> tuple[FloatImage, FloatImage]:
-    """A photo (H, W, 3) and its map (H, W)."""
-    if case == "slope":
-        return smooth_texture(*SIZE), np.tile(0.4 * np.arange(SIZE.width, dtype=np.float32), (SIZE.height, 1))
+    """Return a photo (H, W, 3) and its map (H, W)."""
     photo, exact = render(random_scene(np.random.default_rng(3), SIZE, 4.0), SIZE, ViewOffset(0, 0))
     if case == "soft":
         return photo, blur(exact, 2.0)
@@ -50,20 +47,20 @@ def scene(case: str) -> tuple[FloatImage, FloatImage]:
 
 
 def resampled(exact: FloatImage) -> FloatImage:
-    """From half the size: with disparities between surfaces."""
+    """Return a map enlarged from half the size: with disparities between surfaces."""
     small = cv2.resize(exact, (SIZE.width // 2, SIZE.height // 2), interpolation=cv2.INTER_AREA)
     return np.asarray(cv2.resize(small, (SIZE.width, SIZE.height), interpolation=cv2.INTER_LINEAR), np.float32)
 
 
 @cache
 def views(case: str, stages: Stages) -> FloatImage:
-    """Some views of a case (N, H, W, 3)."""
+    """Return some views of a case (N, H, W, 3)."""
     photo, values = scene(case)
     judged = [ViewOffset(2, 2), ViewOffset(-2, 1), ViewOffset(1, -1)]
     field = [ViewOffset(t, s) for t in (-2, 2) for s in (-2, 2)]
     disparity = refine(photo, values, stages=stages)
-    with ViewMaker(photo, disparity, field, ("balanced",), stages=stages) as maker:
-        return np.stack([maker.view("balanced", at).colors for at in judged])
+    made = PhotoViews(photo, disparity, field, stages)
+    return np.stack([made.view(at).colors for at in judged])
 
 
 @pytest.mark.parametrize("stage", [stage.name for stage in fields(Stages)])
@@ -80,7 +77,8 @@ def test_all_stages_are_on_by_default() -> None:
 
 
 def test_stages_are_left_out_by_name() -> None:
-    assert stages_without(["smooth-gaps", "fit-to-blur"]) == Stages(smooth_gaps=False, fit_to_blur=False)
+    without = Stages(share_inpainted=False, fit_to_blur=False)
+    assert stages_without(["share-inpainted", "fit-to-blur"]) == without
     assert all(stages_without([name]) != ALL_STAGES for name in STAGE_NAMES)
-    with pytest.raises(InputError, match=r"'smooth' is no stage; give one of .*smooth-gaps.*"):
-        stages_without(["smooth"])
+    with pytest.raises(InputError, match=r"'share' is no stage; give one of .*share-inpainted.*"):
+        stages_without(["share"])

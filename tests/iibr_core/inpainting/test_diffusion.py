@@ -12,7 +12,7 @@ from iibr_core.inpainting.background import fill_background
 from iibr_core.inpainting.diffusion import LARGE_PX, align_in_gaps, large_gaps
 from iibr_core.inpainting.inpainter import InpaintingAids
 from iibr_core.inpainting.registry import load_inpainter
-from iibr_core.runtime.work import Cancelled, stoppable
+from iibr_core.runtime.work import Cancelled, stoppable, watched
 from iibr_core.types import InputError, ViewOffset
 from tests.iibr_core.scenes import smooth_texture
 
@@ -57,7 +57,7 @@ def folder(tmp_path_factory) -> Path:
 
 
 def view_with_holes():
-    """(colors, disparity, hole, photo_disparity): a strip in front has left a large gap, and a crack beside it."""
+    """Return what an inpainter is given: a strip in front has left a large gap, and there is a crack beside it."""
     disparity, photo_disparity = np.zeros((40, 60), np.float32), np.zeros((40, 60), np.float32)
     disparity[:, 18:30], photo_disparity[:, 30:42] = 12.0, 12.0
     hole = np.zeros((40, 60), np.bool_)
@@ -75,10 +75,10 @@ def filled_by_background():
 
 def test_large_gaps_are_painted_and_all_else_is_background(folder):
     said = []
-    aids = InpaintingAids(report_progress=lambda *progress: said.append(progress))
-    inpaint = load_inpainter(f"diffusion:{folder}", aids)
+    inpaint = load_inpainter(f"diffusion:{folder}")
     colors, disparity, hole, photo_disparity = view_with_holes()
-    inpaint(colors, disparity, hole, photo_disparity, OFFSET)
+    with watched(lambda *progress: said.append(progress)):
+        inpaint(colors, disparity, hole, photo_disparity, OFFSET)
     expected, continued = filled_by_background()
     gap = np.zeros_like(hole)
     gap[:, 30:42] = True
@@ -119,11 +119,12 @@ def test_views_without_large_gaps_do_not_ask_the_model(folder):
     def fail(*_):
         raise AssertionError
 
-    inpaint = load_inpainter(f"diffusion:{folder}", InpaintingAids(fail, fail))
+    inpaint = load_inpainter(f"diffusion:{folder}", InpaintingAids(fail))
     colors, disparity, hole, photo_disparity = view_with_holes()
     hole[:, 30:42] = False
     colors[:, 30:42] = disparity[:, 30:42] = 0
-    inpaint(colors, disparity, hole, photo_disparity, OFFSET)
+    with watched(fail):
+        inpaint(colors, disparity, hole, photo_disparity, OFFSET)
 
 
 def test_large_is_where_a_square_fits():

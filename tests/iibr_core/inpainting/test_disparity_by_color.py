@@ -20,7 +20,7 @@ def cable_before_wall():
 
 
 def slow_vote(photo, values, y, x):
-    """The mean of who voted for the mode of a histogram, votes by nearness and likeness."""
+    """Return the mean of who voted for the mode of a histogram, votes by nearness and likeness."""
     reach = disparity_by_color.VOTE_REACH_PX
     near = [(v, u) for v, u in np.argwhere(~np.isnan(values)) if max(abs(v - y), abs(u - x)) <= reach]
     d = np.array([values[p] for p in near], np.float64)

@@ -17,7 +17,7 @@ from iibr_core.inpainting.outpainting import (
 )
 from iibr_core.method.farthest_views import outer_views_of_grid, outpainting_margins
 from iibr_core.method.rays import rays_of_photo
-from iibr_core.method.update_loop import complete_ray_set
+from iibr_core.method.update_loop import update
 from iibr_core.method.view import Renderer
 from iibr_core.runtime.work import Cancelled, stoppable
 from iibr_core.types import (
@@ -42,7 +42,7 @@ def mean_at(means, level, place):
 
 
 def line_slowly(colors, pixel):
-    """(cos 2a, sin 2a) of the way a line runs at a pixel, of length 1 if nothing else does."""
+    """Return (cos 2a, sin 2a) of the way a line runs at a pixel, of length 1 if nothing else does."""
     tensor = np.zeros((2, 2))
     for v, u in np.ndindex(colors.shape[0] - 1, colors.shape[1] - 1):
         if max(abs(v - pixel[0]), abs(u - pixel[1])) <= LINE_REACH_PX:
@@ -56,13 +56,13 @@ def line_slowly(colors, pixel):
 
 
 def along_line(line, way):
-    """How well a way (x, y) runs along it."""
+    """Return how well a way (x, y) runs along it."""
     angle = np.arctan2(way[1], way[0]) - np.arctan2(line[1], line[0]) / 2
     return np.hypot(*line) ** STRENGTH_POWER * np.cos(angle) ** ANGLE_POWER
 
 
 def extend_slowly(colors, disparity, margins):
-    """The same, pixel by pixel, from the definitions."""
+    """Do the same pixel by pixel, from the definitions."""
     height, width = disparity.shape
     places = [(0, x) for x in range(width)] + [(y, width - 1) for y in range(1, height)]
     places += [(height - 1, x) for x in range(width - 2, -1, -1)] + [(y, 0) for y in range(height - 2, 0, -1)]
@@ -129,46 +129,23 @@ def test_a_line_that_leaves_the_frame_goes_on_straight():
         assert grown[row, :, 0].max() > 0.35
 
 
-def test_means_widen_with_the_distance():
-    assert _level(0.01) == 0
-    assert _level(1.0) < _level(2.0) < _level(64.0)
-
-
 def test_a_stop_is_heard():
     with pytest.raises(Cancelled), stoppable(lambda: True):
         outpaint(noise(*SIZE), noise(*SIZE)[..., 0], MARGINS)
 
 
-def test_margins_are_what_the_outer_views_see_on_each_side():
-    disparity = np.zeros((160, 240), np.float32)
-    outer = outer_views_of_grid(GridShape(3, 5))
-    assert outpainting_margins(disparity, outer) == (0, 0, 0, 0)
-    disparity[:, -1] = 3.0
-    assert outpainting_margins(disparity, outer) == (0, 0, 0, 8)
-    # To the left and right alike, whatever the sign; rows move half as far; a lone pixel does not count.
-    disparity[:] = -2.0
-    disparity[0, 7] = 1e6
-    assert outpainting_margins(disparity, outer) == (4, 4, 6, 6)
-    disparity[:] = 1e6
-    assert outpainting_margins(disparity, outer) == (40, 40, 60, 60)
-
-
 def textured_wall(disparity):
-    """The ray set of a wall that moves as a whole, complete, and its size; grid 5 x 5."""
+    """Return the complete ray set of a wall that moves as a whole, for a grid of 5 x 5 views."""
     values = np.full((40, 44), disparity, np.float32)
     outer = outer_views_of_grid(GridShape(5, 5))
     rays = rays_of_photo(smooth_texture(40, 44), values, 2.0, 8, margins=outpainting_margins(values, outer))
-    complete_ray_set(rays, outer)
+    list(update(rays, outer, Renderer()))
     return rays
 
 
 def test_views_agree_beyond_the_frame_and_say_that_it_is_inpainted():
     rays = textured_wall(3.0)
-    assert rays.view_size == (40, 44)
-    assert rays.size == (56, 60)
-    with Renderer() as synthesis:
-        corner, half = (synthesis.render(rays, ViewOffset(t, s)) for t, s in ((2.0, 2.0), (1.0, 1.0)))
-        photo = synthesis.render(rays, ViewOffset(0.0, 0.0))
+    corner, half, photo = (Renderer().render(rays, ViewOffset(at, at)) for at in (2.0, 1.0, 0.0))
     np.testing.assert_array_equal(photo.colors, smooth_texture(40, 44))
     assert not photo.inpainted.any()
     assert not corner.occluded.any()
@@ -179,14 +156,13 @@ def test_views_agree_beyond_the_frame_and_say_that_it_is_inpainted():
     np.testing.assert_allclose(corner.colors[:-3, :-3], half.colors[3:, 3:], atol=1e-5)
 
 
-def test_nothing_joins_the_rays_where_the_canvas_shows_all():
+def test_nothing_joins_the_rays_where_the_margins_show_all():
     assert len(textured_wall(2.5)) == 1
 
 
-def test_what_moves_farther_than_the_canvas_reaches_is_filled_by_the_views():
+def test_what_moves_farther_than_the_margins_reach_is_filled_by_the_views():
     rays = textured_wall(20.0)
     assert rays.margins == (10, 10, 11, 11)
-    with Renderer() as synthesis:
-        view = synthesis.render(rays, ViewOffset(2.0, 2.0))
+    view = Renderer().render(rays, ViewOffset(2.0, 2.0))
     assert np.isfinite(view.colors).all()
     assert view.inpainted.all()

@@ -24,7 +24,7 @@ ONE_SURFACE = 0.5
 
 
 def window(size, y, x, radius):
-    """The pixels so far around one, within an image."""
+    """Return the pixels so far around one, within an image."""
     rows = range(max(y - radius, 0), min(y + radius + 1, size[0]))
     return list(product(rows, range(max(x - radius, 0), min(x + radius + 1, size[1]))))
 
@@ -35,7 +35,7 @@ def steps_beside(size, y, x):
 
 
 def copy_slowly(smooth, disparity, hole, one_surface):
-    """What `copy_patches` makes of a smoothly filled image, which stays as it is."""
+    """Return what `copy_patches` makes of a smoothly filled image, which stays as it is."""
     size, colors, trust = hole.shape, smooth.astype(np.float64), np.where(hole, 0.0, 1.0)
     shown = {at: [] for at in map(tuple, np.argwhere(hole))}
 
@@ -43,7 +43,7 @@ def copy_slowly(smooth, disparity, hole, one_surface):
         return abs(disparity[one] - disparity[other]) <= one_surface
 
     def unlike(patch, middle, place):
-        """For each of its pixels, from those around another place."""
+        """Return for each of its pixels, from those around another place."""
         there = [(v - middle[0] + place[0], u - middle[1] + place[1]) for v, u in patch]
         return np.array(
             [

@@ -18,10 +18,9 @@ FORE_PX = 3.0
 
 
 def view_with_holes():
-    """(colors, disparity, hole, photo_disparity): what the renderer gives an inpainter, nonsense in the holes."""
+    """Return what the renderer gives an inpainter, nonsense in the holes."""
     photo, disparity = square_before_wall(60, 80, FORE_PX)
-    with Renderer() as synthesis:
-        view = synthesis.render(rays_of_photo(photo.pixels, disparity.values, 2.0, 0), OFFSET)
+    view = Renderer().render(rays_of_photo(photo.pixels, disparity.values, 2.0, 0), OFFSET)
     view.colors[view.occluded], view.disparity[view.occluded] = np.nan, np.nan
     return view.colors, view.disparity, view.occluded, disparity.values
 

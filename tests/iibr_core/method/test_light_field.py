@@ -4,8 +4,6 @@ import itertools
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from iibr_core.inpainting.registry import INPAINTERS
 from iibr_core.method.light_field import generate
@@ -144,32 +142,3 @@ def test_hdr_stays_hdr():
     views = views_of(photo_of(pixels, is_hdr=True), disparity_of(np.full((20, 24), 0.4)), 3)
     assert views[0, 0].colors.dtype == np.float16
     assert views[0, 0].colors.max() > 4
-
-
-@settings(max_examples=15)
-@given(st.integers(-3, 3), st.integers(-3, 3), st.integers(0, 3))
-def test_shifting_the_photo_shifts_the_views(down, right, seed):
-    random = np.random.default_rng(seed)
-    height, width, margin = 44, 50, 16  # farther in than a ray looks around
-    pixels = random.uniform(0, 1, (height, width, 3))
-    values = np.zeros((height, width))  # around what moves, so that no edge wraps and the map stays as soft as it is
-    values[4:-4, 4:-4] = np.kron(random.integers(0, 3, (6, 6)), np.ones((6, 7)))
-    one = views_of(photo_of(pixels), disparity_of(values), 3)[0, 2]
-    shifted = np.roll(pixels, (down, right), axis=(0, 1)), np.roll(values, (down, right), axis=(0, 1))
-    two = views_of(photo_of(shifted[0]), disparity_of(shifted[1]), 3)[0, 2]
-    inner = np.s_[margin:-margin, margin:-margin]
-    seen = ~(one.inpainted | np.roll(two.inpainted, (-down, -right), axis=(0, 1)))[inner]
-    difference = one.colors.astype(int) - np.roll(two.colors, (-down, -right), axis=(0, 1)).astype(int)
-    assert np.abs(difference[inner][seen]).max(initial=0) <= 1
-
-
-def test_disparity_error_towards_zero_lowers_the_error():
-    photo = photo_of(smooth_texture(40, 48))
-    noise = np.random.default_rng(0).normal(0, 1, (40, 48))
-    truth = views_of(photo, disparity_of(np.full((40, 48), 1.0)), 3)[1, 2].colors
-    errors = [
-        np.mean((views_of(photo, disparity_of(1.0 + sigma * noise), 3)[1, 2].colors.astype(float) - truth) ** 2)
-        for sigma in (0.8, 0.4, 0.2, 0.1, 0.0)
-    ]
-    assert errors == sorted(errors, reverse=True)
-    assert errors[-1] == 0

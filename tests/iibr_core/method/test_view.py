@@ -149,6 +149,26 @@ def test_flipping_the_photo_flips_the_views(seed, offset, turn, has_mixed_pixels
 
 
 @few
+@given(seeds, st.integers(-3, 3), st.integers(-3, 3))
+def test_shifting_the_photo_shifts_the_views(seed, down, right):
+    """Where the photo is seen, farther from the border than a ray looks around."""
+    pixels, disparity = scene(seed, 44, 50)
+    disparity = np.pad(np.round(disparity)[4:-4, 4:-4], 4)
+    one, other = (
+        rendered(
+            *(np.roll(part, by, axis=(0, 1)) for part in (pixels, disparity)),
+            ViewOffset(-1.0, 1.0),
+            1.0,
+            shipped_transformer(),
+        )
+        for by in ((0, 0), (down, right))
+    )
+    back = [np.roll(part, (-down, -right), axis=(0, 1)) for part in (other.colors, filled_rays(other)[2])]
+    seen = (filled_rays(one)[2] == 0) & (back[1] == 0)
+    assert np.abs(back[0] - one.colors)[16:-16, 16:-16][seen[16:-16, 16:-16]].max() <= 1 / 255
+
+
+@few
 @given(seeds)
 def test_a_view_offset_of_zero_gives_the_photo_back(seed):
     """Exactly, but where a pixel was split in two, of which one would be darker than black. (A field has the photo
