@@ -26,8 +26,6 @@ class Stages:
     """There lines go straight on."""
     split_mixed_pixels: bool = True
     """Pixels that show two surfaces become a ray of each."""
-    connect_slopes: bool = True
-    """Rays of one steep surface stay connected, however far apart they land."""
     leave_out_in_front: bool = True
     """What was inpainted in front of the photo's surfaces joins no rays."""
     share_inpainted: bool = True
@@ -35,13 +33,9 @@ class Stages:
     composite_partial_coverage: bool = True
     """What covers a pixel in part is laid over what was inpainted behind it."""
     ray_transformer: bool = True
-    """Where several surfaces contest a ray, the ray transformer decides; else closed form. Quality "fast" has none."""
+    """Where several surfaces contest a ray, the ray transformer decides; else the closed form."""
     reopen_holes: bool = True
     """What was inpainted behind one of the photo's surfaces does not show through a hole in that surface."""
-    median_in_gaps: bool = True
-    """Inpainted disparities are the median of those around them."""
-    smooth_gaps: bool = True
-    """Inpainted colours get smoother the farther they are from what is known."""
     synthesise_patches: bool = True
     """Inpainted pixels get the texture of their surface, by patches of it."""
     remove_flying_pixels: bool = True

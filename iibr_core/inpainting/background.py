@@ -8,6 +8,7 @@ frame's border it picks the surface that really leaves the frame, without any th
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,10 +23,10 @@ from iibr_core.stages import ALL_STAGES, Stages
 from iibr_core.surfaces import EDGE_PX, SAME_SURFACE_PX, is_in_front, same_surface, step_of
 from iibr_core.types import FloatImage, ViewOffset
 
+MEDIAN_PX = 2
+"""Disparities are the median of those filled so near: a single other one would fly off in the next view."""
 SMOOTH_STEPS_PX = (1, 2, 4, 8, 16, 32)
 """Colours are averaged over ever wider surroundings, as far as what is known is farther away."""
-MEDIAN_PX = 2
-"""Disparities follow the most of their surroundings, so far each way: a lone one would fly off in the next view."""
 
 
 def fill_background(
@@ -40,11 +41,12 @@ def fill_background(
     """Fill the holes of a view in place: colors (H, W, 3), disparity (H, W) where hole (H, W) is True.
 
     photo_disparity: the centre view's. Of the nearest known pixels in sixteen directions those count that are possible
-    there, weighted by 1 / distance. The colour is their mean, smoother the farther away they are, and gets their
-    surface's fine texture. The disparity is that of one surface, the one with the most weight: a mean of several would
-    lie on none. A view that is all hole stays as it is. stages: that are on.
+    there, weighted by 1 / distance. The colour is their mean and gets their surface's fine texture. The disparity is
+    that of one surface, the one with the most weight: a mean of several would lie on none. A view that is all hole
+    stays as it is. stages: that are on.
     """
-    _fill_view(colors, disparity, hole, photo_disparity, offset, max(map(abs, offset)), threads, stages)
+    one_surface = step_of(EDGE_PX, max(map(abs, offset)))
+    _fill_view(colors, disparity, hole, photo_disparity, offset, one_surface, threads, stages)
 
 
 def continue_farthest(
@@ -54,12 +56,33 @@ def continue_farthest(
     farthest_views: float,
     stages: Stages = ALL_STAGES,
 ) -> None:
-    """The same in a picture of which nobody knows what the photo hides there: the farthest surface around goes on.
+    """Fill the same in a picture of which nobody knows what the photo hides: continue the farthest surface around.
 
     farthest_views: surfaces are one that part by less than EDGE_PX so many view steps away. stages: that are on.
     """
     nothing_hides = np.full(disparity.shape, -np.inf, np.float32)
-    _fill_view(colors, disparity, hole, nothing_hides, ViewOffset(0.0, 0.0), farthest_views, 1, stages)
+    one_surface = step_of(EDGE_PX, farthest_views)
+    _fill_view(colors, disparity, hole, nothing_hides, ViewOffset(0.0, 0.0), one_surface, 1, stages)
+
+
+def continues_in_front(
+    disparity: FloatImage,
+    hole: NDArray[np.bool_],
+    photo_disparity: FloatImage,
+    offset: ViewOffset,
+    threads: int = 1,
+) -> NDArray[np.bool_]:
+    """Return where in a hole (H, W) of a view most of what may continue there is in front of its disparity (H, W)."""
+    pixels, _, known = nearest_known(hole, threads)
+    in_front, one_surface = np.zeros_like(hole), step_of(EDGE_PX, max(map(abs, offset)))
+
+    def weigh(part: slice) -> None:
+        _weigh_in_front(
+            disparity, pixels[part], known[part], photo_disparity, offset.s, offset.t, one_surface, in_front
+        )
+
+    in_pieces(weigh, pieces_of(len(pixels), MOST_PIECE_PIXELS), threads)
+    return in_front
 
 
 def _fill_view(
@@ -68,54 +91,51 @@ def _fill_view(
     hole: NDArray[np.bool_],
     photo_disparity: FloatImage,
     offset: ViewOffset,
-    parallax: float,
+    one_surface: float,
     threads: int,
     stages: Stages,
 ) -> None:
-    """See `fill_background`. parallax: px that surfaces part by for each px of disparity."""
-    one_surface = step_of(EDGE_PX, parallax)
+    """Fill as `fill_background` says. one_surface: surfaces are one whose disparities differ by less."""
     pixels, number, known = nearest_known(hole, threads)
+
     reach, changed = np.empty(len(pixels), np.float32), np.empty((len(pixels), 3), np.float32)
 
     def run(step: Callable[[slice], None]) -> None:
         in_pieces(step, pieces_of(len(pixels), MOST_PIECE_PIXELS), threads)
 
-    def smooth(step_px: int) -> None:
-        run(lambda part: _smooth(colors, hole, pixels[part], reach[part], step_px, changed[part]))
-        # Only when all is computed: neighbours are taken as they were before a step, not after it.
-        run(lambda part: _write_colors(changed[part], pixels[part], colors))
+    def fill(part: slice) -> None:
+        _fill(colors, disparity, pixels[part], known[part], photo_disparity, offset.s, offset.t, one_surface)
+        _reach(pixels[part], known[part], disparity.shape[1], reach[part])
 
-    run(
-        lambda part: _fill(
-            colors, disparity, pixels[part], known[part], photo_disparity, offset.s, offset.t, one_surface, reach[part],
-        ),
-    )  # fmt: skip
-    if stages.median_in_gaps:
-        run(lambda part: _agree(disparity, hole, pixels[part], changed[part]))
-        np.put(disparity, pixels, changed[:, 0])
-    for step_px in SMOOTH_STEPS_PX if stages.smooth_gaps else ():
-        smooth(step_px)
+    def smooth(step_px: int, part: slice) -> None:
+        _smooth(colors, hole, pixels[part], reach[part], step_px, changed[part])
+
+    run(fill)
+    run(lambda part: _medians(disparity, hole, pixels[part], changed[part, 0]))
+    np.put(disparity, pixels, changed[:, 0])
+    for step_px in SMOOTH_STEPS_PX:
+        run(partial(smooth, step_px))
+        # Only when all is computed: neighbours are taken as they were before a step, not after it.
+        colors.reshape(-1, 3)[pixels] = changed
     if stages.synthesise_patches:
         copy_patches(colors, disparity, hole, pixels, number, one_surface, threads)
 
 
 def background_inpainter() -> Inpainter:
-    """For the registry: nothing to load."""
+    """Return `fill_background`, which needs nothing to be loaded."""
     return fill_background
 
 
 @kernel
-def _fill(
-    colors, disparity, pixels, known, photo_disparity, s, t, one_surface, reach,
-):  # fmt: skip
-    """What `fill_background` says; and how far away the nearest known pixel is, reach (N,)."""
+def _fill(colors, disparity, pixels, known, photo_disparity, s, t, one_surface):
+    """Fill pixels (N,), indices of the view, from the known ones (N, 16) around each, as `fill_background` says."""
     height, width = disparity.shape
     photo, directions = photo_disparity.ravel(), known.shape[1]
     surface, weight = np.zeros(directions), np.zeros(directions)
     hidden = one_surface * (SAME_SURFACE_PX / EDGE_PX)
     for i in range(len(pixels)):
         y, x = pixels[i] // width, pixels[i] % width
-        nearest, farthest, any_possible = np.inf, np.inf, False
+        farthest, any_possible = np.inf, False
         # Which of the surfaces around may continue to here, and how likely.
         for k in range(directions):
             weight[k] = 0.0
@@ -123,7 +143,6 @@ def _fill(
                 continue
             known_y, known_x = known[i, k] // width, known[i, k] % width
             distance = np.sqrt((known_x - x) ** 2 + (known_y - y) ** 2)
-            nearest = min(nearest, distance)
             surface[k] = d = disparity[known_y, known_x]
             farthest = min(farthest, d)
             place = _place_in_photo(y + d * t, x + d * s, height, width)
@@ -132,7 +151,6 @@ def _fill(
                 any_possible = True
             else:
                 weight[k] = -1.0 / distance
-        reach[i] = nearest
         # Where nothing is possible (the disparity contradicts itself), the farthest is the likeliest.
         for k in range(directions):
             is_farthest = not any_possible and surface[k] <= farthest
@@ -158,7 +176,7 @@ def _fill(
 
 @kernel
 def _heaviest(surface, weight, one_surface):
-    """Index of the surface with the most weight, the farther of equals, and that weight; -1 where none has any."""
+    """Return the index of the surface with the most weight (the farther of equals, -1 if none), and that weight."""
     chosen, most = -1, 0.0
     for k in range(len(surface)):
         votes = 0.0
@@ -172,17 +190,38 @@ def _heaviest(surface, weight, one_surface):
 
 
 @kernel
+def _weigh_in_front(disparity, pixels, known, photo_disparity, s, t, one_surface, in_front):
+    """Write to in_front (H, W) what `continues_in_front` says, for pixels (N,) with known ones (N, 16) around each."""
+    height, width = disparity.shape
+    photo, hidden = photo_disparity.ravel(), one_surface * (SAME_SURFACE_PX / EDGE_PX)
+    for i in range(len(pixels)):
+        y, x = pixels[i] // width, pixels[i] % width
+        balance = 0.0
+        for k in range(known.shape[1]):
+            if known[i, k] < 0:
+                continue
+            known_y, known_x = known[i, k] // width, known[i, k] % width
+            d = disparity[known_y, known_x]
+            place = _place_in_photo(y + d * t, x + d * s, height, width)
+            if place < 0 or is_in_front(photo[place], d, hidden):
+                likely = 1.0 / np.sqrt((known_x - x) ** 2 + (known_y - y) ** 2)
+                balance += likely if is_in_front(d, disparity[y, x], one_surface) else -likely
+        in_front[y, x] = balance > 0.0
+
+
+@kernel
 def _place_in_photo(y, x, height, width):
-    """Index among the photo's pixels, -1 off its frame: a surface that lies there may go on unseen only where something
-    nearer hides it, or off the frame.
+    """Return the index of the photo's pixel, -1 off its frame.
+
+    A surface that lies there may go on unseen only where something nearer hides it, or off the frame.
     """
     row, column = nearest_pixel(y), nearest_pixel(x)
     return row * width + column if 0 <= column < width and 0 <= row < height else -1
 
 
 @kernel
-def _agree(disparity, hole, pixels, agreed):
-    """The median of what was filled within MEDIAN_PX each way, as agreed[:, 0]."""
+def _medians(disparity, hole, pixels, medians):
+    """Write the medians (N,) of what was filled within MEDIAN_PX each way of pixels (N,)."""
     height, width = disparity.shape
     around = np.empty((2 * MEDIAN_PX + 1) ** 2, np.float32)
     for i in range(len(pixels)):
@@ -193,37 +232,41 @@ def _agree(disparity, hole, pixels, agreed):
                 if hole[v, u]:
                     around[count] = disparity[v, u]
                     count += 1
-        agreed[i, 0] = np.sort(around[:count])[(count - 1) // 2]
+        medians[i] = np.sort(around[:count])[(count - 1) // 2]
+
+
+@kernel
+def _reach(pixels, known, width, reach):
+    """Write how far away the nearest known pixel is, in px, inf where there is none."""
+    for i in range(len(pixels)):
+        y, x = pixels[i] // width, pixels[i] % width
+        nearest = np.inf
+        for k in range(known.shape[1]):
+            if known[i, k] >= 0:
+                nearest = min(nearest, np.sqrt((known[i, k] // width - y) ** 2 + (known[i, k] % width - x) ** 2))
+        reach[i] = nearest
 
 
 @kernel
 def _smooth(colors, hole, pixels, reach, step, smoothed):
-    """A mean over hole pixels `step` apart, where what is known lies at least as far away: so known pixels stay sharp,
-    and no streaks lead from them into wide holes.
+    """Write the means (N, 3) over hole pixels `step` apart, where what is known lies at least as far away.
+
+    So pixels beside what is known stay sharp, and no streaks lead from it into wide holes.
     """
     height, width = hole.shape
     for i in range(len(pixels)):
         y, x = pixels[i] // width, pixels[i] % width
-        smoothed[i, 0], smoothed[i, 1], smoothed[i, 2] = colors[y, x, 0], colors[y, x, 1], colors[y, x, 2]
+        smoothed[i] = colors[y, x]
         if reach[i] < step:
             continue
         # Weights 1 2 1 along each axis (the a-trous scheme: the next step doubles the distances).
         total = r = g = b = 0.0
-        for j in range(-1, 2):
-            for k in range(-1, 2):
-                v, u = y + j * step, x + k * step
+        for v in range(y - step, y + step + 1, step):
+            for u in range(x - step, x + step + 1, step):
                 if 0 <= v < height and 0 <= u < width and hole[v, u]:
-                    w = (2.0 - abs(j)) * (2.0 - abs(k))
+                    w = (1.0 + (v == y)) * (1.0 + (u == x))
                     total += w
                     r += w * colors[v, u, 0]
                     g += w * colors[v, u, 1]
                     b += w * colors[v, u, 2]
         smoothed[i, 0], smoothed[i, 1], smoothed[i, 2] = r / total, g / total, b / total
-
-
-@kernel
-def _write_colors(smoothed, pixels, colors):
-    width = colors.shape[1]
-    for i in range(len(pixels)):
-        y, x = pixels[i] // width, pixels[i] % width
-        colors[y, x, 0], colors[y, x, 1], colors[y, x, 2] = smoothed[i, 0], smoothed[i, 1], smoothed[i, 2]

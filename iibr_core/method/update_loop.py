@@ -16,6 +16,6 @@ from iibr_core.types import ViewOffset
 def update(rays: RaySet, farthest: Iterable[ViewOffset], renderer: Renderer) -> Iterator[tuple[ViewOffset, View]]:
     """Yield each of these views with its offset, in order, after what was inpainted there has joined the rays."""
     for offset in farthest:
-        view = renderer.render(rays, offset, THREADS)
+        view = renderer.render(rays, offset, THREADS, reopens=True)
         add_new_rays(rays, offset, view)
         yield offset, view

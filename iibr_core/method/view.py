@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.color import linear_from_srgb, srgb_from_linear
-from iibr_core.inpainting.background import fill_background
+from iibr_core.inpainting.background import continues_in_front, fill_background
 from iibr_core.inpainting.inpainter import Inpainter
 from iibr_core.method.ambiguous_rays import SEARCH_PX, AmbiguousRays, blend, find_ambiguous_rays
 from iibr_core.method.candidates import find_candidates
@@ -18,11 +18,11 @@ from iibr_core.method.closed_form import closed_form
 from iibr_core.method.flying_pixels import without_flying_pixels
 from iibr_core.method.look_up import look_up
 from iibr_core.method.occlusion import FULLY_COVERED, MIN_COVERED, MOSTLY_COVERED
-from iibr_core.method.rays import RaysBehind, RaySet
+from iibr_core.method.rays import NO_MARGINS, RaysBehind, RaySet
 from iibr_core.runtime.kernels import kernel
 from iibr_core.runtime.tiling import in_bands
 from iibr_core.runtime.work import raise_if_stopped
-from iibr_core.types import FloatImage, StoredColors, ViewOffset
+from iibr_core.types import FloatImage, Margins, StoredColors, ViewOffset
 
 Transformer = Callable[[AmbiguousRays], FloatImage]
 """Function that returns the weights (N, K) of ambiguous rays; rows sum to 1."""
@@ -56,13 +56,28 @@ class Renderer:
     transformer: Transformer | None = None
     inpaint: Inpainter = fill_background
 
-    def render(self, rays: RaySet, offset: ViewOffset, threads: int = 1) -> View:
-        """Return the view at `offset`. threads: number of row bands side by side; it does not change the result."""
-        view, covered = self.visible(rays, offset, threads)
-        return self._fill(rays, offset, view, covered, threads)
+    def render(self, rays: RaySet, offset: ViewOffset, threads: int = 1, reopens: bool = False) -> View:
+        """Return the view at `offset`.
+
+        threads: number of row bands side by side; it does not change the result. reopens: whether what other views
+        inpainted is inpainted again here where it shows through a hole in one of the photo's surfaces.
+        """
+        view, covered, decided = self._closed_form(rays, offset, threads)
+        # Filled before the transformer's choice is written: the closed form's disparity is smoother, so are the holes.
+        view = self._fill(rays, offset, view, covered, threads, reopens)
+        _write(decided, view)
+        if any(rays.margins):
+            _mark_outside_frame(view.disparity, *map(float, offset), view.inpainted)
+        return view
 
     def visible(self, rays: RaySet, offset: ViewOffset, threads: int = 1) -> tuple[View, FloatImage]:
         """Return the view at `offset` with open holes, and how much of each ray is covered (H, W)."""
+        view, covered, decided = self._closed_form(rays, offset, threads)
+        _write(decided, view)
+        return view, covered
+
+    def _closed_form(self, rays: RaySet, offset: ViewOffset, threads: int) -> tuple[View, FloatImage, list[_Decided]]:
+        """Return the view with open holes, how much of each ray is covered, and the choices of the transformer."""
         size = rays.view_size
         view = View(
             np.empty((*size, 3), np.float32),
@@ -71,12 +86,15 @@ class Renderer:
             np.empty(size, np.bool_),
         )
         covered = np.empty(size, np.float32)
-        in_bands(lambda first, last: self._render_rows(rays, offset, (first, last), view, covered), size, threads)
-        return view, covered
+
+        def band(first: int, last: int) -> _Decided | None:
+            return self._render_rows(rays, offset, (first, last), view, covered)
+
+        return view, covered, [decided for decided in in_bands(band, size, threads) if decided is not None]
 
     def _render_rows(
         self, rays: RaySet, offset: ViewOffset, rows: tuple[int, int], view: View, covered: FloatImage
-    ) -> None:
+    ) -> _Decided | None:
         """Write rows [first, last) of the view, holes open, and of how much of each ray is covered."""
         around = SEARCH_PX if self.transformer else 0
         # The images are larger than the view: their rows and columns count here.
@@ -95,24 +113,19 @@ class Renderer:
         view.disparity[shown], covered[shown] = found.disparity[inner], share[inner]
         view.occluded[shown] = share[inner] < MIN_COVERED
         view.inpainted[shown] = view.occluded[shown] | (found.source[inner] >= rays.photo_images)
-        if self.transformer:
-            # What lies behind rays that are covered in part is composited, not decided.
-            decided = ~wanted | (share < max(_min_coverage(rays), MIN_COVERED))
-            ambiguous = find_ambiguous_rays(rays, candidates, weights, found, (above, above + last - first), decided)
-            self._decide(rays, ambiguous, view)
-        if any(rays.margins):
-            height = rays.view_size.height
-            _mark_outside_frame(view.disparity[shown], rows[0], *map(float, offset), height, view.inpainted[shown])
-
-    def _decide(self, rays: RaySet, ambiguous: AmbiguousRays, view: View) -> None:
-        """Write what the transformer decides."""
-        assert self.transformer is not None
+        if not self.transformer:
+            return None
+        # What lies behind rays that are covered in part is composited, not decided.
+        settled = ~wanted | (share < max(_min_coverage(rays), MIN_COVERED))
+        ambiguous = find_ambiguous_rays(rays, candidates, weights, found, (above, above + last - first), settled)
         raise_if_stopped()
         colors, disparity, source = blend(rays, ambiguous, self.transformer(ambiguous))
-        at = ambiguous.pixel[:, 0] - rays.margins.top, ambiguous.pixel[:, 1] - rays.margins.left
-        view.colors[at], view.disparity[at], view.inpainted[at] = colors, disparity, source >= rays.photo_images
+        y, x = ambiguous.pixel[:, 0] - rays.margins.top, ambiguous.pixel[:, 1] - left
+        return _Decided(y, x, colors, disparity, source >= rays.photo_images)
 
-    def _fill(self, rays: RaySet, offset: ViewOffset, view: View, covered: FloatImage, threads: int) -> View:
+    def _fill(
+        self, rays: RaySet, offset: ViewOffset, view: View, covered: FloatImage, threads: int, reopens: bool
+    ) -> View:
         """Return the view with its holes filled.
 
         covered (H, W): what covers a ray in part is composited over what is inpainted there. So no pixel that two
@@ -120,9 +133,11 @@ class Renderer:
         """
         colors, disparity = view.colors.reshape(-1, 3), view.disparity.reshape(-1)
         part = np.flatnonzero((covered < _min_coverage(rays)) & (covered > 0))
-        part = part[_is_within_margins(rays, part, disparity[part], offset) | view.occluded.reshape(-1)[part]]
+        part = part[_is_within(rays, rays.margins, part, disparity[part], offset) | view.occluded.reshape(-1)[part]]
         hole = view.occluded.copy()
         hole.reshape(-1)[part] = True
+        if reopens and rays.stages.reopen_holes:
+            hole |= _reopened(rays, offset, view, hole, threads)
         if not hole.any():
             return view
         foreground, foreground_disparity = colors[part], disparity[part]
@@ -133,6 +148,36 @@ class Renderer:
         colors[part] = _composite(foreground, behind.colors, share)
         disparity[part] = np.where(share > MOSTLY_COVERED, foreground_disparity, behind.disparity)
         return replace(view, behind=behind)
+
+
+class _Decided(NamedTuple):
+    """What the transformer chose for pixels y, x (N,). colors (N, 3), disparity (N,), inpainted (N,): see `View`."""
+
+    y: NDArray[np.int64]
+    x: NDArray[np.int64]
+    colors: FloatImage
+    disparity: FloatImage
+    inpainted: NDArray[np.bool_]
+
+
+def _write(decided: list[_Decided], view: View) -> None:
+    for part in decided:
+        at = part.y, part.x
+        view.colors[at], view.disparity[at], view.inpainted[at] = part.colors, part.disparity, part.inpainted
+
+
+def _reopened(rays: RaySet, offset: ViewOffset, view: View, hole: NDArray[np.bool_], threads: int) -> NDArray[np.bool_]:
+    """Return where inpainted rays of another view show although the photo's surfaces go on in front of them (H, W).
+
+    They lie farther back, behind another part of the surface. These pixels count as occluded from now on.
+    """
+    pixel, reopened = np.flatnonzero(view.inpainted & ~hole), np.zeros_like(hole)
+    within = _is_within(rays, NO_MARGINS, pixel, view.disparity.reshape(-1)[pixel], offset)
+    reopened.reshape(-1)[pixel[within]] = True
+    if reopened.any():
+        reopened &= continues_in_front(view.disparity, hole | reopened, rays.photo_disparity, offset, threads)
+        view.occluded[reopened] = True
+    return reopened
 
 
 def add_new_rays(rays: RaySet, offset: ViewOffset, view: View) -> None:
@@ -161,24 +206,26 @@ def _min_coverage(rays: RaySet) -> float:
     return FULLY_COVERED if rays.stages.composite_partial_coverage else 0.0
 
 
-def _is_within_margins(
-    rays: RaySet, pixel: NDArray[np.int64], disparity: FloatImage, offset: ViewOffset
+def _is_within(
+    rays: RaySet, margins: Margins, pixel: NDArray[np.int64], disparity: FloatImage, offset: ViewOffset
 ) -> NDArray[np.bool_]:
-    """Return which of these pixels (N) of a view look between the centres of the outermost rays."""
-    y, x = np.divmod(pixel, rays.view_size.width)
-    y, x = y + rays.margins.top + disparity * offset.t, x + rays.margins.left + disparity * offset.s
-    return np.asarray((y >= 0) & (y <= rays.size.height - 1) & (x >= 0) & (x <= rays.size.width - 1))
+    """Return which of these pixels (N) of a view look between the outermost rays of the photo with such margins."""
+    height, width = rays.view_size
+    y, x = np.divmod(pixel, width)
+    y, x = y + disparity * offset.t, x + disparity * offset.s
+    inside = (y >= -margins.top) & (y <= height - 1 + margins.bottom)
+    return np.asarray(inside & (x >= -margins.left) & (x <= width - 1 + margins.right))
 
 
 @kernel
-def _mark_outside_frame(disparity, first_row, t, s, height, inpainted):
-    """Mark rays of rows of a view, from first_row on, that look beyond the photo's frame in inpainted (N, W)."""
-    rows, width = disparity.shape
-    for row in range(rows):
+def _mark_outside_frame(disparity, t, s, inpainted):
+    """Mark the pixels of a view that look beyond the photo's frame in inpainted (H, W)."""
+    height, width = disparity.shape
+    for y in range(height):
         for x in range(width):
-            v, u = first_row + row + disparity[row, x] * t, x + disparity[row, x] * s
+            v, u = y + disparity[y, x] * t, x + disparity[y, x] * s
             # Without branches: rows are compared many at a time.
-            inpainted[row, x] |= (v < -0.5) | (v > height - 0.5) | (u < -0.5) | (u > width - 0.5)
+            inpainted[y, x] |= (v < -0.5) | (v > height - 0.5) | (u < -0.5) | (u > width - 0.5)
 
 
 def _composite(foreground: FloatImage, background: FloatImage, share: FloatImage) -> FloatImage:
