@@ -149,9 +149,11 @@ def squares_scene(side: int, range_px: float, squares: int, grid: GridShape = FI
     return BenchScene(name, pixels, disparity, {}, offsets_of(grid))
 
 
-def photo_scene(path: Path = DEMO, choice: DepthChoice | None = None) -> BenchScene | None:
-    """A photo with the field that its plan gives it; None where its depth is no own one but estimated."""
-    found = open_with_depth(path, choice or DepthChoice(), DEFAULT_MAX_PIXELS)
+def photo_scene(
+    path: Path = DEMO, choice: DepthChoice | None = None, max_pixels: int = DEFAULT_MAX_PIXELS
+) -> BenchScene | None:
+    """Return a photo with the field that its plan gives it; None if its depth is no measured one but estimated."""
+    found = open_with_depth(path, choice or DepthChoice(), max_pixels)
     if found.origin.kind not in ("file", "embedded"):
         return None
     plan = plan_for_viewing(found.photo, found.disparity)
