@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from iibr_core.inpainting.background import MEDIAN_PX, fill_background
+from iibr_core.inpainting.background import MEDIAN_PX, SMOOTH_STEPS_PX, continues_in_front, fill_background
 from iibr_core.inpainting.nearest_known import DIRECTIONS
 from iibr_core.surfaces import EDGE_PX, SAME_SURFACE_PX
 from iibr_core.types import ViewOffset
@@ -17,6 +17,16 @@ def agree_slowly(disparity, hole):
         around = np.sort(disparity[block][hole[block]])
         agreed[y, x] = around[(len(around) - 1) // 2]
     return agreed
+
+
+def smooth_slowly(colors, hole, reach, step):
+    smoothed = colors.copy()
+    for y, x in np.argwhere(hole):
+        if reach[y, x] >= step:
+            at = [(y + j * step, x + k * step, (2 - abs(j)) * (2 - abs(k))) for j in (-1, 0, 1) for k in (-1, 0, 1)]
+            inside = [a for a in at if 0 <= a[0] < hole.shape[0] and 0 <= a[1] < hole.shape[1] and hole[a[:2]]]
+            smoothed[y, x] = np.average([colors[a[:2]] for a in inside], axis=0, weights=[a[2] for a in inside])
+    return smoothed
 
 
 def around_slowly(hole, y, x):
@@ -40,19 +50,22 @@ def is_possible(d, photo_disparity, offset, y, x):
 def fill_slowly(colors, disparity, hole, photo_disparity, offset):
     parallax = max(map(abs, offset))
     one_surface = EDGE_PX / parallax
-    filled_colors, filled_disparity = colors.copy(), disparity.copy()
+    filled_colors, filled_disparity, reach = colors.copy(), disparity.copy(), np.full(hole.shape, np.inf)
     for y, x in np.argwhere(hole):
         seen = around_slowly(hole, y, x)
         possible = [(u, v) for u, v in seen if is_possible(float(disparity[v, u]), photo_disparity, offset, y, x)]
         farthest = min((disparity[v, u] for u, v in seen), default=0)
         chosen = possible or [(u, v) for u, v in seen if disparity[v, u] <= farthest]
         if chosen:
+            reach[y, x] = min(np.hypot(u - x, v - y) for u, v in seen)
             w = np.array([1 / np.hypot(u - x, v - y) for u, v in chosen])
             d = np.array([disparity[v, u] for u, v in chosen])
             filled_colors[y, x] = sum(k * colors[v, u] for k, (u, v) in zip(w, chosen)) / w.sum()
             alike = np.abs(d[:, None] - d) <= one_surface
             mine = alike[max(range(len(d)), key=lambda k: (round((alike[k] * w).sum(), 9), -d[k]))]
             filled_disparity[y, x] = (w * d)[mine].sum() / w[mine].sum()
+    for step in SMOOTH_STEPS_PX:
+        filled_colors = smooth_slowly(filled_colors, hole, reach, step)
     agreed = agree_slowly(filled_disparity, hole)
     return copy_slowly(filled_colors, agreed, hole, one_surface), agreed
 
@@ -71,6 +84,26 @@ def test_agrees_with_a_slow_twin(contrast):
     fill_background(colors, disparity, hole, photo_disparity, offset)
     assert colors == pytest.approx(expected_colors, abs=1e-5)
     assert disparity == pytest.approx(expected_disparity, abs=1e-5)
+
+
+def test_what_goes_on_in_front_is_weighed_like_a_slow_twin():
+    random = np.random.default_rng(4)
+    size = (27, 31)
+    disparity = random.choice([0.0, 2.0, 3.0], size).astype(np.float32)
+    photo_disparity = random.choice([0.0, 2.5, 4.0], size).astype(np.float32)
+    hole = random.random(size) < 0.1
+    hole[5:12, 12:] = True
+    offset = ViewOffset(1.0, -2.0)
+    expected = np.zeros(size, bool)
+    for y, x in np.argwhere(hole):
+        balance = 0.0
+        for u, v in around_slowly(hole, y, x):
+            if is_possible(float(disparity[v, u]), photo_disparity, offset, y, x):
+                in_front = disparity[v, u] > disparity[y, x] + EDGE_PX / 2
+                balance += (1 if in_front else -1) / np.hypot(u - x, v - y)
+        expected[y, x] = balance > 0
+    assert expected.any()
+    np.testing.assert_array_equal(continues_in_front(disparity, hole, photo_disparity, offset), expected)
 
 
 def test_a_disocclusion_takes_the_background_not_what_hid_it():

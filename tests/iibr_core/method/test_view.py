@@ -154,15 +154,9 @@ def test_shifting_the_photo_shifts_the_views(seed, down, right):
     """Where the photo is seen, farther from the border than a ray looks around."""
     pixels, disparity = scene(seed, 44, 50)
     disparity = np.pad(np.round(disparity)[4:-4, 4:-4], 4)
-    one, other = (
-        rendered(
-            *(np.roll(part, by, axis=(0, 1)) for part in (pixels, disparity)),
-            ViewOffset(-1.0, 1.0),
-            1.0,
-            shipped_transformer(),
-        )
-        for by in ((0, 0), (down, right))
-    )
+    shifted = [np.roll(part, (down, right), axis=(0, 1)) for part in (pixels, disparity)]
+    offset, shipped = ViewOffset(-1.0, 1.0), shipped_transformer()
+    one, other = (rendered(*parts, offset, 1.0, shipped) for parts in ((pixels, disparity), shifted))
     back = [np.roll(part, (-down, -right), axis=(0, 1)) for part in (other.colors, filled_rays(other)[2])]
     seen = (filled_rays(one)[2] == 0) & (back[1] == 0)
     assert np.abs(back[0] - one.colors)[16:-16, 16:-16][seen[16:-16, 16:-16]].max() <= 1 / 255
