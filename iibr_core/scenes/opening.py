@@ -14,6 +14,7 @@ import numpy as np
 from iibr_core.color import stored_from_encoded
 from iibr_core.depth.editing.edits import UNEDITED
 from iibr_core.depth.subject import subject_disparity
+from iibr_core.formats.cameras import infinity_of
 from iibr_core.formats.light_fields.light_field_formats import is_light_field
 from iibr_core.generation.disparity_range import measure_disparity_range
 from iibr_core.generation.outer_views import ALL_VIEWS, WantedViews
@@ -26,7 +27,7 @@ from iibr_core.scenes.making import make_plan, views_of_photo
 from iibr_core.scenes.opening_work import MeasureViews, ViewsWork
 from iibr_core.scenes.scene import DepthSettings, FilledField, Progress, Scene, Source
 from iibr_core.scenes.screen_size import ScreenSize
-from iibr_core.types import InputError, Photo, ViewOffset, ViewUpdate
+from iibr_core.types import Disparity, InputError, Photo, ViewOffset, ViewUpdate
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,8 +107,6 @@ def sketch_of(wanted: WantedPhoto) -> SceneReady | None:
 
 def scene_of_photo(source: Source, loaded: LoadedPhoto, plan: ScenePlan) -> Scene:
     """Return the scene of a photo and its plan."""
-    from iibr_core.rendering.gloss.geometry import infinity_of
-
     height, width = loaded.photo.size
     return Scene(
         source=source,
@@ -130,9 +129,14 @@ def scene_of_photo(source: Source, loaded: LoadedPhoto, plan: ScenePlan) -> Scen
         inverse_metres=loaded.disparity.inverse_metres if loaded.depth_settings.edits == UNEDITED else None,
         color_space=loaded.photo.color_space,
         own_size=ScreenSize(loaded.own_size.width, loaded.own_size.height),
-        infinity_px=(infinity_of(loaded.disparity) - plan.disparity_zero) * plan.disparity_scale,
+        infinity_px=(_given_infinity(loaded.disparity) - plan.disparity_zero) * plan.disparity_scale,
         found_span_px=_found_span_px(loaded, plan),
     )
+
+
+def _given_infinity(disparity: Disparity) -> float:
+    """Return the disparity, as given, of infinitely far points."""
+    return infinity_of(float(disparity.values.min()), float(disparity.values.max()), disparity.inverse_metres)
 
 
 def _found_span_px(loaded: LoadedPhoto, plan: ScenePlan) -> float:

@@ -19,7 +19,7 @@ from iibr_core.rendering.optics import CENTRE
 from iibr_core.runtime.work import raise_if_stopped
 from iibr_core.scenes.opening import SceneReady, ViewReady, results_of
 from iibr_core.scenes.scene import FilledField, Progress
-from iibr_core.scenes.scene_gloss import GlossRequest, answer
+from iibr_core.scenes.scene_gloss import gloss_request, make_maps
 from iibr_core.types import ViewUpdate
 from viewer.app.job import Job
 from viewer.background.window_work import Result, Steps, WindowWork
@@ -119,14 +119,12 @@ class JobScenes:
             report(made.progress)
 
     def _find_gloss(self, job: Job, snapshot: SceneSnapshot, settings: RenderSettings) -> None:
-        """Have at hand what the optics' gloss means for the scene, unless it is."""
-        gloss, known = settings.optics.gloss, snapshot.gloss
-        if gloss is None or snapshot.is_free_view:
+        """Compute the gloss maps if they are missing."""
+        request = gloss_request(settings.optics.gloss, snapshot.scene, snapshot.centre, snapshot.gloss)
+        if request is None or snapshot.is_free_view:
             return
-        if known is not None and known.request.is_for(gloss, snapshot.centre):
-            return
-        found = answer(GlossRequest(gloss, snapshot.scene, snapshot.centre))
-        self._run(job, _in_one_step(lambda: snapshot.take_gloss(found)))
+        maps = make_maps(request)
+        self._run(job, _in_one_step(lambda: snapshot.take_gloss(maps)))
 
     def _draw(self, job: Job, snapshot: SceneSnapshot, settings: RenderSettings) -> Steps[NDArray[Any]]:
         """In the window's thread. Exports count their pictures themselves."""

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from iibr_core.rendering.gloss.gloss_settings import Gloss
+from iibr_core.gloss.settings import Gloss
 from iibr_core.types import InputError, ViewOffset
 from viewer.cli.shared_options import not_negative_from_text, number_option, view_from_text
 
@@ -35,25 +35,23 @@ Aperture = Annotated[
 
 @dataclass(frozen=True)
 class GlossOption:
-    """A gloss, and the file that describes it."""
+    """A gloss and its file."""
 
     file: Path
     gloss: Gloss
 
     @property
     def reads(self) -> tuple[Path, ...]:
-        """What is read for it: the file, and the environment that it names."""
-        return (self.file, Path(self.gloss.environment)) if self.gloss.environment else (self.file,)
+        """Files that must not be written onto."""
+        return (self.file,)
 
 
 def gloss_from_text(text: str) -> GlossOption:
-    """The gloss that a file describes. Raises BadParameter."""
-    from viewer.model.gloss_file import read_gloss, require_environment
+    """Return the gloss that a file describes. Raises BadParameter."""
+    from viewer.model.gloss_file import read_gloss
 
     try:
-        gloss = read_gloss(Path(text))
-        require_environment(Path(text), gloss)
-        return GlossOption(Path(text), gloss)
+        return GlossOption(Path(text), read_gloss(Path(text)))
     except InputError as error:
         raise typer.BadParameter(str(error)) from None
 

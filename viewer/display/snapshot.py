@@ -3,33 +3,36 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from iibr_core.scenes.loaded_photo import LoadedPhoto
 from iibr_core.scenes.opening import SceneReady
 from iibr_core.scenes.scene import Scene
-from iibr_core.scenes.scene_gloss import GlossFound
 from iibr_core.types import ViewUpdate
 from viewer.gpu.context import GLContext
 from viewer.gpu.light_field_texture import LightFieldTexture, field_that_fits
 
+if TYPE_CHECKING:
+    from iibr_core.gloss.shading import GlossMaps
+
 
 @dataclass(eq=False)
 class SceneSnapshot:
-    """loaded: None for a light field from disk. field: its views, held until `release`. gloss: of the field, None
-    where none is known. is_free_view: the field is the view of a free camera.
+    """loaded: None for a light field from disk. field: its views, held until `release`. gloss: maps of its
+    glossy surface, None if not known. is_free_view: the field is the view of a free camera.
     """
 
     scene: Scene
     loaded: LoadedPhoto | None
     centre: ViewUpdate
     field: LightFieldTexture
-    gloss: GlossFound | None = None
+    gloss: GlossMaps | None = None
     is_free_view: bool = False
 
-    def take_gloss(self, found: GlossFound) -> None:
-        """Have it drawn with this gloss from now on."""
-        self.field.set_gloss(found.maps)
-        self.gloss = found
+    def take_gloss(self, maps: GlossMaps) -> None:
+        """Draw gloss with these maps from now on."""
+        self.field.set_gloss(maps)
+        self.gloss = maps
 
     def release(self) -> None:
         """Let the views go. Only in the thread of the window."""

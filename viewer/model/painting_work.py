@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from iibr_core.depth.editing.edits import Stroke
-from iibr_core.rendering.gloss.gloss_settings import GlossStroke
+from iibr_core.gloss.settings import GlossStroke
 from iibr_core.types import InputError
 
 MOST_WORK = 30_000.0
