@@ -49,8 +49,8 @@ def _normals_of(slopes: FloatImage, near: FloatImage, focal_px: float) -> FloatI
     y = np.arange(height, dtype=np.float32)[:, None] - np.float32((height - 1) / 2)
     right, down = slopes[..., 0], slopes[..., 1]
     away = (near - x * right - y * down) / np.float32(focal_px)
-    length = np.sqrt(right**2 + down**2 + away**2)
-    return -np.dstack([right, down, away]) / length[..., None]
+    length = np.hypot(np.hypot(right, down), away)
+    return np.asarray(-np.dstack([right, down, away]) / length[..., None], np.float32)
 
 
 @kernel
