@@ -33,12 +33,11 @@ def fit_normals(disparity: FloatImage, geometry: SceneGeometry) -> FloatImage:
     spacing = max(round(REACH * max(disparity.shape) / TAPS), 1)
     rounding = ROUNDING * np.float32(near.max() - near.min())
     max_slope = MAX_SLANT * near / np.float32(geometry.focal_px)
-    size, smooth = image_size(disparity), near
-    if spacing > 1:  # taps that lie apart stand for the pixels between them
-        smooth = np.empty_like(near)
-        in_bands(lambda first, last: _mean_rows(near, max_slope, spacing, rounding, first, last, smooth), size)
-    slopes = np.empty((*disparity.shape, 2), np.float32)
-    in_bands(lambda first, last: _fit_rows(smooth, max_slope, spacing, rounding, first, last, slopes), size)
+    size, slopes = image_size(disparity), np.empty((*disparity.shape, 2), np.float32)
+    in_bands(lambda first, last: _fit_rows(near, max_slope, spacing, rounding, first, last, slopes), size)
+    if spacing > 1:  # taps that lie apart skip pixels: the neighbours' slopes make up for them
+        fitted, slopes = slopes, np.empty_like(slopes)
+        in_bands(lambda first, last: _mean_rows(fitted, near, max_slope, spacing, rounding, first, last, slopes), size)
     return _normals_of(slopes, near, geometry.focal_px)
 
 
@@ -54,20 +53,19 @@ def _normals_of(slopes: FloatImage, near: FloatImage, focal_px: float) -> FloatI
 
 
 @kernel
-def _mean_rows(near, max_slope, side, rounding, first, last, smooth):
-    """Fill rows [first, last) with means over `side` x `side` pixels of the same surface."""
+def _mean_rows(fitted, near, max_slope, side, rounding, first, last, slopes):
+    """Fill rows [first, last) with the mean slopes of `side` x `side` pixels of the same surface."""
     height, width = near.shape
     before, after = side // 2, (side - 1) // 2
     for y in range(first, last):
         for x in range(width):
             limit = rounding + max_slope[y, x] * side
-            total, count = np.float32(0), 0
+            right, down, count = np.float32(0), np.float32(0), 0
             for v in range(max(y - before, 0), min(y + after, height - 1) + 1):
                 for u in range(max(x - before, 0), min(x + after, width - 1) + 1):
                     if abs(near[v, u] - near[y, x]) <= limit:
-                        total += near[v, u]
-                        count += 1
-            smooth[y, x] = total / count
+                        right, down, count = right + fitted[v, u, 0], down + fitted[v, u, 1], count + 1
+            slopes[y, x, 0], slopes[y, x, 1] = right / count, down / count
 
 
 @kernel
