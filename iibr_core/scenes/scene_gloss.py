@@ -18,18 +18,6 @@ if TYPE_CHECKING:
     from iibr_core.gloss.shading import GlossMaps
 
 
-def geometry_of(scene: Scene, disparity: FloatImage) -> SceneGeometry:
-    """Return the geometry of a scene; a usual field of view is assumed where none is known.
-
-    disparity: (H, W), of its centre view; the disparity at infinity of a light field from disk is guessed from it.
-    """
-    from iibr_core.formats.images.photo import focal_px_from_fov
-
-    is_photo = scene.plan is not None
-    infinity = scene.infinity_px if is_photo else infinity_of(float(disparity.min()), float(disparity.max()))
-    return SceneGeometry(scene.focal_px or focal_px_from_fov(scene.width), infinity)
-
-
 @dataclass(frozen=True, eq=False)
 class GlossRequest:
     """A request for the maps of a glossy surface. centre: has a disparity. normals: of the centre view, if known."""
@@ -59,12 +47,21 @@ def gloss_request(
 
 
 def make_maps(request: GlossRequest) -> GlossMaps:
-    """Return the maps of a glossy surface."""
+    """Return the maps of a glossy surface.
+
+    A usual field of view is assumed where none is known. For a light field from disk, the disparity at infinity is
+    guessed from the centre view.
+    """
+    from iibr_core.formats.images.photo import focal_px_from_fov
     from iibr_core.gloss.shading import make_gloss_maps
 
-    photo, disparity = encoded_from_stored(request.centre.colors), request.centre.disparity
+    scene, disparity = request.scene, request.centre.disparity
     assert disparity is not None
-    return make_gloss_maps(request.surface, photo, disparity, geometry_of(request.scene, disparity), request.normals)
+    is_photo = scene.plan is not None
+    infinity = scene.infinity_px if is_photo else infinity_of(float(disparity.min()), float(disparity.max()))
+    geometry = SceneGeometry(scene.focal_px or focal_px_from_fov(scene.width), infinity)
+    photo = encoded_from_stored(request.centre.colors)
+    return make_gloss_maps(request.surface, photo, disparity, geometry, request.normals)
 
 
 def add_gloss(views: Iterator[ViewUpdate], gloss: Gloss | None, scene: Scene) -> Iterator[ViewUpdate]:

@@ -1,4 +1,4 @@
-"""What a command's options say about the lens."""
+"""Options of commands for the lens."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ GlossFile = Annotated[
 
 @dataclass(frozen=True)
 class LensOptions:
-    """What the options say about the lens, None where they say nothing."""
+    """Values of the options for the lens, None where an option is not given."""
 
     view: View = None
     focus: Focus = None
@@ -79,13 +79,13 @@ class LensOptions:
 
     @property
     def choice(self) -> LensChoice:
-        """For what knows no window."""
+        """The same values for code without a window."""
         from iibr_core.scenes.lens_limits import LensChoice
 
         return LensChoice(self.view, self.focus, self.aperture, self.gloss.gloss if self.gloss else None)
 
     def actions(self) -> list[Action]:
-        """What sets the lens so."""
+        """Return the actions that set the lens."""
         from viewer.model.state.optics_actions import MoveEye, SetAperture, SetFocus, SetOptics
 
         actions: list[Action] = [] if self.view is None else [MoveEye(self.view)]
@@ -94,9 +94,7 @@ class LensOptions:
         return actions + ([] if self.gloss is None else [SetOptics("gloss", self.gloss.gloss)])
 
     def require_within(self, scene: Scene) -> None:
-        """Raise InputError for a viewpoint that this scene does not reach, rather than show the nearest that it does.
-        Where there is a single view, it is what every viewpoint shows.
-        """
+        """Raise InputError for a viewpoint outside the scene's views; a single view shows every viewpoint."""
         from iibr_core.scenes.lens_limits import eye_limits
 
         if self.view is None or scene.grid == (1, 1):
@@ -107,7 +105,7 @@ class LensOptions:
                 raise InputError(f"--view: {axis} is {value:g}, for {scene.name} it goes from {low:g} to {high:g}")
 
     def notes(self, optics: Optics) -> tuple[str, ...]:
-        """What was asked for beyond what the scene has, and what was taken instead."""
+        """Return a note for each value that the scene limits."""
         asked = (
             ("--focus", self.focus, optics.focus_disparity),
             ("--aperture", self.aperture, optics.aperture_diameter),

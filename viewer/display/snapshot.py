@@ -1,4 +1,4 @@
-"""What is open at one moment, held for work that goes on after it: the window may show another scene by then."""
+"""A scene as it was at one moment, kept for jobs that outlive it: the window may show another scene by then."""
 
 from __future__ import annotations
 
@@ -35,14 +35,14 @@ class SceneSnapshot:
         self.gloss = maps
 
     def release(self) -> None:
-        """Let the views go. Only in the thread of the window."""
+        """Release the views. Only in the thread of the window."""
         self.field.release()
 
 
 def snapshot_of(gl: GLContext, ready: SceneReady) -> SceneSnapshot:
-    """A scene that is not shown, with its centre view; the others are to be stored in its field.
+    """Return a snapshot of a scene that is not shown, with its centre view; the caller stores the other views.
 
-    Raises InputError where it does not fit the graphics card.
+    Raises InputError if it does not fit the graphics card.
     """
     scene, centre = ready.scene, ready.centre
     size = scene.width, scene.height, scene.is_hdr, scene.has_view_disparity

@@ -1,10 +1,12 @@
-"""Bounds of the numbers of a gloss in files. msgspec costs the window time, so import this module late."""
+"""Bounds of the numbers of a gloss in files, for `msgspec.convert`.
+
+Import this module late, as `saved_settings`: msgspec costs the window time before its first frame.
+"""
 
 from __future__ import annotations
 
-from typing import Annotated, Any, TypedDict
+from typing import Annotated, TypedDict
 
-import msgspec
 from msgspec import Meta
 
 from iibr_core.gloss.settings import LIGHT_RADIUS_LIMITS_DEG, MAX_STROKE_POINTS, MAX_TOLERANCE, STROKE_RADIUS_LIMITS
@@ -51,11 +53,3 @@ class GlossBounds(TypedDict, total=False):
     roughness: Share
     reflectance: Share
     light: LightBounds
-
-
-def require_bounds(gloss: Any) -> None:
-    """Raise msgspec.ValidationError, naming the field, if a number of a gloss lies out of bounds.
-
-    gloss: as decoded from JSON or TOML.
-    """
-    msgspec.convert(gloss, GlossBounds)

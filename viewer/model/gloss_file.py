@@ -13,7 +13,7 @@ import msgspec
 from iibr_core.formats.files import read_text
 from iibr_core.gloss.settings import Gloss
 from iibr_core.types import InputError
-from viewer.model.gloss_bounds import require_bounds
+from viewer.model.gloss_bounds import GlossBounds
 from viewer.model.saved_settings import unknown_fields
 
 MAX_BYTES = 1_000_000
@@ -26,7 +26,7 @@ def read_gloss(path: Path) -> Gloss:
         whole = tomllib.loads(text)
         for unknown in unknown_fields(whole, msgspec.to_builtins(Gloss())):
             raise ValueError(f"there is no setting {unknown}")
-        require_bounds(whole)
+        msgspec.convert(whole, GlossBounds)
         return msgspec.convert(whole, Gloss)
     except (ValueError, RecursionError) as error:
         reason = " ".join(str(error).replace("- at `$.", "at `").split())[:120]

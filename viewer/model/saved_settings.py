@@ -24,7 +24,7 @@ from iibr_core.scenes.lens_limits import BLADES_LIMITS
 from iibr_core.scenes.scene import Source
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, InputError, Quality
-from viewer.model.gloss_bounds import require_bounds
+from viewer.model.gloss_bounds import GlossBounds
 from viewer.model.painting_work import require_bounded
 from viewer.model.state.saving import SavedSettings
 
@@ -38,14 +38,14 @@ NAMED_FIELDS = 3
 """Unknown fields that a message names."""
 
 MOST_SIDE_PX, MOST_PIXELS = 16_384, 100_000_000
-"""Of a picture that is asked for by a file."""
+"""Largest picture that a file may ask for."""
 
 SidePx = Annotated[int, msgspec.Meta(ge=1, le=1_000_000)]
 Views = Annotated[int, msgspec.Meta(ge=1, le=99)]
 
 
 class SourceText(msgspec.Struct, frozen=True, kw_only=True):
-    """What a picture keeps of a `Source`, by the names in its text: neither paths nor what is on one machine only.
+    """The fields of a `Source` that a picture keeps: no paths, nothing that belongs to one machine.
 
     quality: "exact" was written by earlier programs and counts as "balanced".
     """
@@ -61,7 +61,7 @@ class SourceText(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class FormatText(msgspec.Struct, frozen=True, kw_only=True):
-    """What says whether the rest can be read."""
+    """The number of the format, which tells this program if it can read the rest."""
 
     format: int
 
@@ -114,7 +114,7 @@ def settings_from_text(text: str, name: str, is_own: bool = False) -> SavedSetti
         require_sound(read.depth_edits)
         gloss = read.optics.gloss
         if gloss is not None:
-            require_bounds(whole["optics"]["gloss"])
+            msgspec.convert(whole["optics"]["gloss"], GlossBounds)
         if not is_own:
             require_bounded(read.depth_edits.strokes, gloss.surface.strokes if gloss else ())
     except (ValueError, RecursionError) as error:
