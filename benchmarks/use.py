@@ -25,7 +25,7 @@ from benchmarks.harness.reports import emit, head, parser_of, row, start
 from benchmarks.harness.timing import in_own_process
 from benchmarks.harness.turn_times import Turn, Turns, watched_turns
 from iibr_core.exports.kinds import ExportOptions
-from iibr_core.rendering.gloss.gloss_settings import Gloss
+from iibr_core.gloss.settings import Gloss
 from iibr_core.runtime.machine import limit_arenas
 from iibr_core.scenes.scene import Source
 from iibr_core.scenes.screen_size import ScreenSize

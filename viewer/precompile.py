@@ -29,13 +29,13 @@ from iibr_core.formats.images.photo import read_photo
 from iibr_core.formats.images.write import write_image
 from iibr_core.formats.maps.reader import read_map
 from iibr_core.formats.maps.writer import write_map
-from iibr_core.rendering.gloss.gloss_settings import Gloss, GlossLight
+from iibr_core.gloss.settings import GlossSurface
 from iibr_core.runtime.compiling import COMPILING, FOLDER_VARIABLE
 from iibr_core.runtime.machine import core_count
 from iibr_core.scenes.opening import results_of
 from iibr_core.scenes.photo import load_photo, make_plan, prepare_brush
 from iibr_core.scenes.scene import SceneReady, SceneRequest, Source
-from iibr_core.scenes.scene_gloss import GlossRequest, answer
+from iibr_core.scenes.scene_gloss import GlossRequest, make_maps
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import Camera, InputError
 from viewer.model.demo_photo import demo_photo
@@ -46,7 +46,7 @@ if TYPE_CHECKING:
 PART = (slice(150, 310), slice(200, 400))
 """Part of the demo photo with edges, wires and slopes of every kind; small: nearly all the work is compiling."""
 GLOSSY_PIXELS = 250_000
-"""Size of a photo whose normals are smoothed, as those of large photos are."""
+"""Pixels of a photo whose disparity is smoothed for its normals, as in large photos."""
 KERNEL_FILES = (".nbi", ".nbc")
 
 
@@ -138,12 +138,11 @@ def _look_around(scratch: Path) -> None:
 
 
 def _find_gloss(scratch: Path) -> None:
-    """Make a surface glossy, with a light that is estimated from the photo."""
+    """Find the normals of a glossy surface."""
     large = Source(str(demo_photo()), max_pixels=GLOSSY_PIXELS)
     ready = next(results_of(SceneRequest(0, large), lambda: CENTRE))
     assert isinstance(ready, SceneReady)
-    gloss = Gloss(light=GlossLight(color=(0.0, 0.0, 0.0)), photo_shines=True)
-    answer(GlossRequest(gloss, ready.scene, ready.centre))
+    make_maps(GlossRequest(GlossSurface(), ready.scene, ready.centre))
 
 
 def _draw_at_own_size(scratch: Path) -> None:

@@ -48,11 +48,8 @@ def _given_infinity(source: ExportSource) -> float:
     plan = source.plan()
     if plan.disparity_scale <= 0:
         raise InputError(f"{source.scene.name}: is flat or inverted; give it depth")
-    known = source.scene.inverse_metres
     low, high = (value / plan.disparity_scale + plan.disparity_zero for value in plan.disparity_range_px)
-    if known is not None and -known[1] / known[0] < high:
-        return -known[1] / known[0]
-    return infinity_of(low, high)
+    return infinity_of(low, high, source.scene.inverse_metres)
 
 
 def nearest_metres(source: ExportSource) -> float | None:

@@ -85,11 +85,16 @@ class FieldCameras:
         return np.stack([x, y, depth], axis=-1) + np.array(self.place(offset), np.float32)
 
 
-def infinity_of(low: float, high: float) -> float:
+def infinity_of(low: float, high: float, inverse_metres: tuple[float, float] | None = None) -> float:
     """Return a disparity for infinitely far points of a scene with disparities from low to high.
 
-    It is 0 where that gives a ratio of depths up to MAX_DEPTH_RATIO, else so that they have this ratio.
+    It is known if 1 / distance in metres is: inverse_metres[0] * disparity + inverse_metres[1]. Else it is 0 where that
+    gives a ratio of depths up to MAX_DEPTH_RATIO, else so that they have this ratio.
     """
+    if inverse_metres is not None and inverse_metres[0] != 0:
+        known = -inverse_metres[1] / inverse_metres[0]
+        if known < high:
+            return known
     if low > 0 and high <= MAX_DEPTH_RATIO * low:
         return 0.0
     return low - (high - low) / (MAX_DEPTH_RATIO - 1) if high > low else low - 1.0

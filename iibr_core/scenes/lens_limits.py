@@ -12,9 +12,9 @@ from iibr_core.beyond.optics import (
     ApertureShape,
     Optics,
 )
-from iibr_core.rendering.gloss.gloss_settings import Gloss, require_sound
+from iibr_core.gloss.settings import Gloss
 from iibr_core.scenes.scene import Scene
-from iibr_core.types import GridShape, InputError, ViewOffset
+from iibr_core.types import GridShape, ViewOffset
 
 Record = TypeVar("Record", Optics, ApertureShape)
 
@@ -83,16 +83,6 @@ def aperture_limit(grid: GridShape) -> float:
 def is_finite(optics: Optics) -> bool:
     """Whether every number of the optics is."""
     return all(map(math.isfinite, (*_numbers_of(optics), *_numbers_of(optics.aperture_shape))))
-
-
-def has_sound_gloss(optics: Optics) -> bool:
-    """Whether its gloss, if there is any, makes sense."""
-    try:
-        if optics.gloss is not None:
-            require_sound(optics.gloss)
-    except InputError:
-        return False
-    return True
 
 
 def _numbers_of(record: Optics | ApertureShape) -> list[float]:

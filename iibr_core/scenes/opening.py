@@ -14,11 +14,11 @@ import numpy as np
 from iibr_core.color import stored_from_encoded
 from iibr_core.depth.editing.edits import UNEDITED
 from iibr_core.depth.subject import subject_disparity
+from iibr_core.formats.cameras import infinity_of
 from iibr_core.formats.images.photo import focal_px_from_fov
 from iibr_core.formats.light_fields.light_field_formats import is_light_field
 from iibr_core.method.disparity_range import measure_disparity_range
 from iibr_core.method.plan import ScenePlan
-from iibr_core.rendering.gloss.geometry import infinity_of
 from iibr_core.runtime.machine import give_back_memory
 from iibr_core.runtime.time_left import TimeLeft
 from iibr_core.runtime.work import is_stopped
@@ -38,6 +38,7 @@ from iibr_core.scenes.scene import (
 )
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import (
+    Disparity,
     InputError,
     Photo,
     ViewOffset,
@@ -104,9 +105,14 @@ def scene_of_photo(source: Source, loaded: LoadedPhoto, plan: ScenePlan) -> Scen
         inverse_metres=loaded.disparity.inverse_metres if loaded.depth_settings.edits == UNEDITED else None,
         color_space=loaded.photo.color_space,
         own_size=ScreenSize(loaded.own_size.width, loaded.own_size.height),
-        infinity_px=(infinity_of(loaded.disparity) - plan.disparity_zero) * plan.disparity_scale,
+        infinity_px=(_given_infinity(loaded.disparity) - plan.disparity_zero) * plan.disparity_scale,
         found_span_px=_found_span_px(loaded, plan),
     )
+
+
+def _given_infinity(disparity: Disparity) -> float:
+    """Return the disparity, as given, of infinitely far points."""
+    return infinity_of(float(disparity.values.min()), float(disparity.values.max()), disparity.inverse_metres)
 
 
 def _found_span_px(loaded: LoadedPhoto, plan: ScenePlan) -> float:

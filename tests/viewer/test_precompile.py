@@ -64,7 +64,7 @@ def test_the_first_run_compiles_nothing(tmp_path: Path, words: tuple[object, ...
     write_scene(tmp_path)
     random = np.random.default_rng(0)
     write_image(tmp_path / "unmapped.png", random.integers(0, 255, (90, 120, 3), np.uint8))
-    (tmp_path / "gloss.toml").write_text("photo_shines = true\nlight.color = [0, 0, 0]")
+    (tmp_path / "gloss.toml").write_text("roughness = 0.5")
     views = random.integers(0, 255, (3, 3, 90, 120, 3), np.uint8)
     (tmp_path / "views").mkdir()
     for row, column in np.ndindex(3, 3):

@@ -37,7 +37,7 @@ def texts() -> list[Text]:
 def test_there_are_texts_of_every_kind(texts: list[Text]) -> None:
     words = {text.words for text in texts}
     assert len(texts) > 400
-    assert {"Open a photo…", "Depth strength", "Recenter", "Reset text size", "Environment map…", "Snapshot"} <= words
+    assert {"Open a photo…", "Depth strength", "Recenter", "Reset text size", "Glossy surface", "Snapshot"} <= words
     assert {"Automatic", "Get true depth"} <= words
 
 

@@ -18,7 +18,6 @@ UNIX_HELPERS = ("zenity", "kdialog", "matedialog", "qarma")
 FILE_KINDS: dict[ChoiceOf, str] = {
     "photo": "jpg jpeg png tif tiff exr hdr webp bmp heic heif hif avif mpo lif",
     "mask": "png jpg jpeg tif tiff bmp exr",
-    "surroundings": "exr hdr png jpg jpeg tif tiff",
     "map": "pfm exr npy png tif tiff",
     "model": "onnx",
 }
@@ -30,7 +29,6 @@ DIALOG_TITLES: dict[ChoiceOf, str] = {
     "photo": "Open a photo, a stereo photo or a quilt",
     "folder": "Open a folder of photos or views",
     "mask": "Picture as the shape of the aperture",
-    "surroundings": "Environment map: a picture all around, equirectangular",
     "truth": "Ground truth: a folder of views",
     "map": "Open a disparity map for this photo",
     "model": "Open a depth model: an ONNX file",

@@ -16,7 +16,7 @@ from iibr_core.exports.render_settings import RenderSettings, require_size
 from iibr_core.exports.source import ExportSource
 from iibr_core.runtime.work import raise_if_stopped, report_progress
 from iibr_core.scenes.scene import MAKING, FilledField, SceneReady, ViewReady
-from iibr_core.scenes.scene_gloss import GlossRequest, answer
+from iibr_core.scenes.scene_gloss import gloss_request, make_maps
 from iibr_core.types import ViewOffset, ViewUpdate
 from viewer.app.job import Job
 from viewer.background.window_work import Result, Steps, WindowWork
@@ -102,14 +102,12 @@ class JobScenes:
         return job.snapshot
 
     def _find_gloss(self, job: Job, snapshot: SceneSnapshot, settings: RenderSettings) -> None:
-        """Have at hand what the optics' gloss means for the scene, unless it is."""
-        gloss, known = settings.optics.gloss, snapshot.gloss
-        if gloss is None or snapshot.is_free_view:
+        """Compute the gloss maps if they are missing."""
+        request = gloss_request(settings.optics.gloss, snapshot.scene, snapshot.centre, snapshot.gloss)
+        if request is None or snapshot.is_free_view:
             return
-        if known is not None and known.request.is_for(gloss, snapshot.centre):
-            return
-        found = answer(GlossRequest(gloss, snapshot.scene, snapshot.centre))
-        self._run(job, _in_one_step(lambda: snapshot.take_gloss(found)))
+        maps = make_maps(request)
+        self._run(job, _in_one_step(lambda: snapshot.take_gloss(maps)))
 
     def _draw(self, job: Job, snapshot: SceneSnapshot, settings: RenderSettings) -> Steps[NDArray[Any]]:
         """In the window's thread. Exports count their pictures themselves."""

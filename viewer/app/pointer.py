@@ -142,7 +142,7 @@ def is_brushing(state: AppState) -> bool:
 
 
 def is_marking_gloss(state: AppState) -> bool:
-    """Whether dragging over the picture marks what is glossy."""
+    """Return whether dragging over the picture marks the glossy surface."""
     return state.gloss_brush.is_on and state.optics.gloss is not None and state.scene is not None
 
 
@@ -183,28 +183,32 @@ def _paint_actions(
     begins = pointer.is_pressed and frame.contains(pointer.pressed_x, pointer.pressed_y)
     if not pointer.is_down or not (begins or state.stroke is not None):
         return []
-    x_px, y_px = pixel_at(picture, scene.size, pointer.x, pointer.y)
-    disparity, eye = pick(x_px, y_px) or 0.0, state.optics.eye
-    x_px, y_px = x_px + disparity * eye.s, y_px + disparity * eye.t
-    place = (x_px + 0.5) / scene.width, (y_px + 0.5) / scene.height
+    place, disparity = _place_in_photo(pointer, state, scene, picture, pick)
     if state.stroke is None and pointer.holds_ctrl:
         return [PickDepth(DepthSample(place, disparity))]
     return [Paint(place)]
 
 
+def _place_in_photo(
+    pointer: Pointer, state: AppState, scene: Scene, picture: Rect, pick: Pick
+) -> tuple[tuple[float, float], float]:
+    """Return where the photo shows the surface under the pointer, in shares of its size, and its disparity."""
+    x_px, y_px = pixel_at(picture, scene.size, pointer.x, pointer.y)
+    disparity, eye = pick(x_px, y_px) or 0.0, state.optics.eye
+    x_px, y_px = x_px + disparity * eye.s, y_px + disparity * eye.t
+    return ((x_px + 0.5) / scene.width, (y_px + 0.5) / scene.height), disparity
+
+
 def _gloss_actions(
     pointer: Pointer, layout: Layout, state: AppState, scene: Scene, picture: Rect, pick: Pick
 ) -> list[Action]:
-    """Mark the surface under the pointer, wherever it lies in the photo; the wheel makes the brush larger."""
+    """Mark the surface under the pointer; the wheel makes the brush larger."""
     frame, brush = layout.frame or picture, state.gloss_brush
     if pointer.wheel and frame.contains(pointer.x, pointer.y):
         return [SetGlossBrush(replace(brush, radius=brush.radius * BRUSH_NOTCH**pointer.wheel))]
     if not pointer.is_down or not frame.contains(pointer.pressed_x, pointer.pressed_y):
         return []
-    x_px, y_px = pixel_at(picture, scene.size, pointer.x, pointer.y)
-    disparity, eye = pick(x_px, y_px) or 0.0, state.optics.eye
-    x_px, y_px = x_px + disparity * eye.s, y_px + disparity * eye.t
-    place = (x_px + 0.5) / scene.width, (y_px + 0.5) / scene.height
+    place, _ = _place_in_photo(pointer, state, scene, picture, pick)
     return [PaintGloss(place, brush, begins=pointer.is_pressed)]
 
 

@@ -147,7 +147,7 @@ def sidecar_of(path: Path) -> Path:
 
 def write_sidecar(path: Path, settings: SavedSettings) -> Path:
     """Write them beside a photo; where that is. Raises InputError."""
-    _write(sidecar_of(path), settings, path.parent)
+    _write(sidecar_of(path), settings)
     return sidecar_of(path)
 
 
@@ -161,7 +161,7 @@ def _find(folder: Path, scene: Scene) -> SessionFound:
         if is_file(kept):
             return SessionFound(scene, settings_from_text(read_text(kept, MOST_BYTES), str(kept), is_own=True))
         if is_file(sidecar):
-            return SessionFound(scene, settings_from_text(read_text(sidecar, MOST_BYTES), str(sidecar), sidecar.parent))
+            return SessionFound(scene, settings_from_text(read_text(sidecar, MOST_BYTES), str(sidecar)))
     except InputError as error:
         return SessionFound(scene, None, str(error))
     return SessionFound(scene, None)
@@ -182,11 +182,11 @@ def _keep(folder: Path, source: Source, settings: SavedSettings) -> None:
     _forget_oldest(folder)
 
 
-def _write(path: Path, settings: SavedSettings, names_files_in: Path | None = None) -> None:
+def _write(path: Path, settings: SavedSettings) -> None:
     from viewer.model.saved_settings import settings_text
 
     with write_file(path) as temporary:
-        temporary.write_text(settings_text(settings, names_files_in), "utf-8")
+        temporary.write_text(settings_text(settings), "utf-8")
 
 
 def _forget_oldest(folder: Path) -> None:

@@ -12,7 +12,7 @@ import typer
 
 from iibr_core.formats.light_fields.light_field_formats import is_light_field
 from iibr_core.formats.light_fields.write import check_light_field, write_light_field
-from iibr_core.rendering.gloss.gloss_settings import Gloss
+from iibr_core.gloss.settings import Gloss
 from iibr_core.types import GridShape, InputError
 from viewer.cli.dense_field_command import NOT_FOR_DENSE_FIELDS, write_dense_field
 from viewer.cli.free_views_command import (

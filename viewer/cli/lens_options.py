@@ -1,4 +1,4 @@
-"""What a command's options say about the lens."""
+"""Options of commands for the lens."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from iibr_core.rendering.gloss.gloss_settings import Gloss
+from iibr_core.gloss.settings import Gloss
 from iibr_core.types import InputError, ViewOffset
 from viewer.cli.shared_options import not_negative_from_text, number_option, view_from_text
 
@@ -35,25 +35,23 @@ Aperture = Annotated[
 
 @dataclass(frozen=True)
 class GlossOption:
-    """A gloss, and the file that describes it."""
+    """A gloss and its file."""
 
     file: Path
     gloss: Gloss
 
     @property
     def reads(self) -> tuple[Path, ...]:
-        """What is read for it: the file, and the environment that it names."""
-        return (self.file, Path(self.gloss.environment)) if self.gloss.environment else (self.file,)
+        """Files that must not be written onto."""
+        return (self.file,)
 
 
 def gloss_from_text(text: str) -> GlossOption:
-    """The gloss that a file describes. Raises BadParameter."""
-    from viewer.model.gloss_file import read_gloss, require_environment
+    """Return the gloss that a file describes. Raises BadParameter."""
+    from viewer.model.gloss_file import read_gloss
 
     try:
-        gloss = read_gloss(Path(text))
-        require_environment(Path(text), gloss)
-        return GlossOption(Path(text), gloss)
+        return GlossOption(Path(text), read_gloss(Path(text)))
     except InputError as error:
         raise typer.BadParameter(str(error)) from None
 
@@ -72,7 +70,7 @@ GlossFile = Annotated[
 
 @dataclass(frozen=True)
 class LensOptions:
-    """What the options say about the lens, None where they say nothing."""
+    """Values of the options for the lens, None where an option is not given."""
 
     view: View = None
     focus: Focus = None
@@ -81,13 +79,13 @@ class LensOptions:
 
     @property
     def choice(self) -> LensChoice:
-        """For what knows no window."""
+        """The same values for code without a window."""
         from iibr_core.scenes.lens_limits import LensChoice
 
         return LensChoice(self.view, self.focus, self.aperture, self.gloss.gloss if self.gloss else None)
 
     def actions(self) -> list[Action]:
-        """What sets the lens so."""
+        """Return the actions that set the lens."""
         from viewer.model.state.optics_actions import MoveEye, SetAperture, SetFocus, SetOptics
 
         actions: list[Action] = [] if self.view is None else [MoveEye(self.view)]
@@ -96,9 +94,7 @@ class LensOptions:
         return actions + ([] if self.gloss is None else [SetOptics("gloss", self.gloss.gloss)])
 
     def require_within(self, scene: Scene) -> None:
-        """Raise InputError for a viewpoint that this scene does not reach, rather than show the nearest that it does.
-        Where there is a single view, it is what every viewpoint shows.
-        """
+        """Raise InputError for a viewpoint outside the scene's views; a single view shows every viewpoint."""
         from iibr_core.scenes.lens_limits import eye_limits
 
         if self.view is None or scene.grid == (1, 1):
@@ -109,7 +105,7 @@ class LensOptions:
                 raise InputError(f"--view: {axis} is {value:g}, for {scene.name} it goes from {low:g} to {high:g}")
 
     def notes(self, optics: Optics) -> tuple[str, ...]:
-        """What was asked for beyond what the scene has, and what was taken instead."""
+        """Return a note for each value that the scene limits."""
         asked = (
             ("--focus", self.focus, optics.focus_disparity),
             ("--aperture", self.aperture, optics.aperture_diameter),

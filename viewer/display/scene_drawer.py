@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 from iibr_core.beyond.optics import CENTRE
 from iibr_core.exports.render_settings import RenderSettings, require_size
 from iibr_core.exports.source import ExportSource, OpticsOf
-from iibr_core.rendering.gloss.gloss_settings import Gloss
+from iibr_core.gloss.settings import Gloss
 from iibr_core.runtime.work import report_progress
 from iibr_core.scenes.lens_limits import LensChoice
 from iibr_core.scenes.opening import results_of
 from iibr_core.scenes.scene import MAKING, Scene, SceneReady, SceneRequest, Source, ViewReady
-from iibr_core.scenes.scene_gloss import answer
+from iibr_core.scenes.scene_gloss import make_maps
 from iibr_core.types import ViewOffset
 from viewer.display.scene_view import SceneView
 from viewer.gpu.headless_context import create_headless
@@ -100,7 +100,7 @@ class SceneDrawer:
 
 
 def prepare_gloss(view: SceneView, gloss: Gloss | None) -> None:
-    """Compute the gloss maps if they are missing. Raises InputError if the surroundings cannot be read."""
+    """Compute the gloss maps if they are missing."""
     request = view.gloss_request(gloss)
     if request is not None:
-        view.take_gloss(answer(request))
+        view.take_gloss(make_maps(request))

@@ -9,12 +9,13 @@ import math
 import time
 from collections import deque
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from iibr_core.beyond.optics import CENTRE, Optics
-from iibr_core.rendering.gloss.gloss_settings import Gloss
+from iibr_core.gloss.settings import Gloss
 from iibr_core.scenes.rect import WHOLE, Rect
 from iibr_core.scenes.scene import LoadedPhoto, Scene, SceneReady
-from iibr_core.scenes.scene_gloss import GlossFound, GlossRequest
+from iibr_core.scenes.scene_gloss import GlossRequest, gloss_request
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import (
     FloatImage,
@@ -29,6 +30,9 @@ from viewer.gpu.context import GLContext
 from viewer.gpu.light_field_texture import box_around
 from viewer.gpu.refocus.picture_renderer import Renderer
 from viewer.model.state.app_state import AppState, Picture
+
+if TYPE_CHECKING:
+    from iibr_core.gloss.shading import GlossMaps
 
 VIEW_REFRESH_S = 0.25
 """While nothing else changes, new views are shown this often: drawing each as it comes would slow the hand."""
@@ -62,7 +66,7 @@ class SceneView:
         self._scene: Scene | None = None
         self.centre: ViewUpdate | None = None
         self._fallback_view: ViewUpdate | None = None
-        self._gloss: GlossFound | None = None
+        self._gloss: GlossMaps | None = None
         self._is_preview = self._is_edited = False
         self._waiting: deque[ViewUpdate] = deque()
         self._is_final: dict[tuple[int, int], bool] = {}
@@ -124,20 +128,16 @@ class SceneView:
             self.previews += 1
 
     def gloss_request(self, gloss: Gloss | None) -> GlossRequest | None:
-        """What is to be found out before this gloss can be shown on the scene; None where nothing is."""
-        if gloss is None or self._scene is None or self.centre is None:
+        """Return the request for the maps that this gloss needs, None if they are known."""
+        if self._scene is None or self.centre is None:
             return None
-        known = self._gloss
-        if known is not None and known.request.is_for(gloss, self.centre):
-            return None
-        normals = known.maps.normals if known is not None and known.maps is not None else None
-        return GlossRequest(gloss, self._scene, self.centre, normals)
+        return gloss_request(gloss, self._scene, self.centre, self._gloss)
 
-    def take_gloss(self, found: GlossFound) -> None:
+    def take_gloss(self, maps: GlossMaps) -> None:
         """Show gloss with these maps from now on, unless they are of another scene."""
-        if found.request.centre is self.centre:
-            self._gloss = found
-            self.renderer.set_gloss(found.maps)
+        if self.centre is not None and maps.disparity is self.centre.disparity:
+            self._gloss = maps
+            self.renderer.set_gloss(maps)
             self.previews += 1
 
     def add(self, view: ViewUpdate) -> None:
@@ -251,7 +251,7 @@ class SceneView:
             grid, scene.width, scene.height, scene.is_hdr, scene.has_view_disparity, scene.color_space
         )
         if self._gloss is not None:
-            self.renderer.set_gloss(self._gloss.maps)
+            self.renderer.set_gloss(self._gloss)
 
     def _keep_for_picking(self, scene: Scene, view: ViewUpdate) -> None:
         if view.disparity is not None and is_kept_for_picking(scene.grid, view.row, view.column):

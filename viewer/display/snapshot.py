@@ -1,43 +1,46 @@
-"""What is open at one moment, held for work that goes on after it: the window may show another scene by then."""
+"""A scene as it was at one moment, kept for jobs that outlive it: the window may show another scene by then."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from iibr_core.scenes.scene import LoadedPhoto, Scene, SceneReady
-from iibr_core.scenes.scene_gloss import GlossFound
 from iibr_core.types import ViewUpdate
 from viewer.gpu.context import GLContext
 from viewer.gpu.light_field_texture import LightFieldTexture, field_that_fits
 
+if TYPE_CHECKING:
+    from iibr_core.gloss.shading import GlossMaps
+
 
 @dataclass(eq=False)
 class SceneSnapshot:
-    """loaded: None for a light field from disk. field: its views, held until `release`. gloss: of the field, None
-    where none is known. is_free_view: the field is the view of a free camera.
+    """loaded: None for a light field from disk. field: its views, held until `release`. gloss: maps of its
+    glossy surface, None if not known. is_free_view: the field is the view of a free camera.
     """
 
     scene: Scene
     loaded: LoadedPhoto | None
     centre: ViewUpdate
     field: LightFieldTexture
-    gloss: GlossFound | None = None
+    gloss: GlossMaps | None = None
     is_free_view: bool = False
 
-    def take_gloss(self, found: GlossFound) -> None:
-        """Have it drawn with this gloss from now on."""
-        self.field.set_gloss(found.maps)
-        self.gloss = found
+    def take_gloss(self, maps: GlossMaps) -> None:
+        """Draw gloss with these maps from now on."""
+        self.field.set_gloss(maps)
+        self.gloss = maps
 
     def release(self) -> None:
-        """Let the views go. Only in the thread of the window."""
+        """Release the views. Only in the thread of the window."""
         self.field.release()
 
 
 def snapshot_of(gl: GLContext, ready: SceneReady) -> SceneSnapshot:
-    """A scene that is not shown, with its centre view; the others are to be stored in its field.
+    """Return a snapshot of a scene that is not shown, with its centre view; the caller stores the other views.
 
-    Raises InputError where it does not fit the graphics card.
+    Raises InputError if it does not fit the graphics card.
     """
     scene, centre = ready.scene, ready.centre
     size = scene.width, scene.height, scene.is_hdr, scene.has_view_disparity

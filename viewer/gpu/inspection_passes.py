@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from iibr_core.beyond.optics import Optics
 from iibr_core.color import bytes_from_encoded, convert, encoded_from_stored, srgb_from_linear
-from iibr_core.rendering.gloss.gloss_settings import Gloss
+from iibr_core.gloss.settings import Gloss
 from iibr_core.scenes.rect import WHOLE, Rect
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import SRGB, ViewOffset

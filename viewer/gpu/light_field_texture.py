@@ -21,11 +21,11 @@ from iibr_core.types import (
     InputError,
     StoredColors,
 )
-from viewer.gpu.gloss_textures import GlossTextures
+from viewer.gpu.gloss_texture import GlossTexture
 from viewer.gpu.shared import Holders
 
 if TYPE_CHECKING:
-    from iibr_core.rendering.gloss.shading import GlossMaps
+    from iibr_core.gloss.shading import GlossMaps
 
 _ROOT_FROM_SRGB = np.round(np.sqrt(linear_from_srgb(np.arange(256) / 255)) * 255).astype(np.uint8)
 
@@ -44,7 +44,7 @@ class LightFieldTexture:
     colors: RGBA8, or RGBA16F for HDR; alpha is the disparity scaled to 0..1 over `range_px`. disparities: R16F, px per
     view step. present, has_disparity: (V, U) bool.
     uploads: (V, U), how often each was stored.
-    color_space: of the light; sRGB until something else is said. gloss: what gloss means for the field, None without.
+    color_space: of the light; sRGB until something else is said. gloss: maps of a glossy surface, None without.
     range_px: (farthest, nearest) disparity, known from the first view that has any.
     """
 
@@ -73,7 +73,7 @@ class LightFieldTexture:
         self.uploads = np.zeros(grid, int)
         self.range_px = (0.0, 0.0)
         self.color_space = SRGB
-        self.gloss: GlossTextures | None = None
+        self.gloss: GlossTexture | None = None
         self._dtype = np.float16 if hdr else np.uint8
         layers = self._kept.rows * self._kept.columns
         self.colors = _allocate(ctx, (width, height, layers), 4, "f2" if hdr else "f1")
@@ -130,10 +130,10 @@ class LightFieldTexture:
         np.copyto(self._texels[(*box, 3)], depth if self.hdr else np.rint(depth), casting="unsafe")
 
     def set_gloss(self, maps: GlossMaps | None) -> None:
-        """What gloss means for the field, for optics that have one; None where it means nothing."""
+        """Use these maps for optics with gloss; None if there are none."""
         if self.gloss is not None:
             self.gloss.release()
-        self.gloss = None if maps is None else GlossTextures(self._ctx, maps)
+        self.gloss = None if maps is None else GlossTexture(self._ctx, maps)
 
     def share(self) -> LightFieldTexture:
         """The same arrays, with the views and the gloss that are there now: what comes later is not seen in it.

@@ -50,7 +50,7 @@ from viewer.model.state.inspection import (
 from viewer.model.state.model_download import GetDepth, ModelsPrompt, UseModel
 from viewer.model.state.motion import PauseMotion, ReturnHome, SetLoop
 from viewer.model.state.notices import Notice
-from viewer.model.state.optics_actions import FIRST_GLOSS, ApplyPreset, ResetOptics, SetOptics
+from viewer.model.state.optics_actions import ApplyPreset, ResetOptics
 from viewer.model.state.preferences import SECTIONS, SetPreference, ToggleSection
 from viewer.model.state.prompts import ChoiceOf, PalettePrompt
 from viewer.model.state.saving import CopyTask, PasteTask, WriteSidecarTask
@@ -285,8 +285,6 @@ def action_for_path(what: ChoiceOf, path: str, state: AppState) -> Action:
     match what:
         case "mask":
             return DoTask(ReadMaskTask(path))
-        case "surroundings":
-            return SetOptics("gloss", replace(state.optics.gloss or FIRST_GLOSS, environment=path))
         case "truth":
             return DoTask(ReadTruthTask(path))
         case "map" if state.source is not None:

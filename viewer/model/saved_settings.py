@@ -1,6 +1,6 @@
 """Settings inside a saved picture, as JSON in its metadata: enough to take the same picture of the same photo again.
 
-A stranger may have written such a text: no path in it is opened, except a plain name that lies beside a sidecar.
+A stranger may have written such a text: it names no file.
 
 Whoever needs this module imports it late: msgspec would cost the window 10 to 40 ms before its first frame.
 """
@@ -18,13 +18,13 @@ import msgspec
 
 from iibr_core.beyond.optics import ApertureShape, Optics
 from iibr_core.depth.editing.edits import UNEDITED, DepthEdits, require_sound
-from iibr_core.formats.files import is_file, printable
+from iibr_core.formats.files import printable
 from iibr_core.formats.images.metadata import settings_text_in
-from iibr_core.rendering.gloss.gloss_settings import require_sound as require_sound_gloss
 from iibr_core.scenes.lens_limits import BLADES_LIMITS
 from iibr_core.scenes.scene import Source
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, InputError
+from viewer.model.gloss_bounds import GlossBounds
 from viewer.model.painting_work import require_bounded
 from viewer.model.state.saving import SavedSettings
 
@@ -34,17 +34,18 @@ MOST_CHARACTERS = 16_000_000
 MASK_LIMITS = (1, 4096)
 FORMER_SETTINGS = ("source.max_pixels", "source.memory_bytes", "source.quality")
 """Settings that earlier versions wrote; they are ignored."""
-UNKNOWN_TOLD = 3
+NAMED_FIELDS = 3
+"""Unknown fields that a message names."""
 
 MOST_SIDE_PX, MOST_PIXELS = 16_384, 100_000_000
-"""Of a picture that is asked for by a file."""
+"""Largest picture that a file may ask for."""
 
 SidePx = Annotated[int, msgspec.Meta(ge=1, le=1_000_000)]
 Views = Annotated[int, msgspec.Meta(ge=1, le=99)]
 
 
 class SourceText(msgspec.Struct, frozen=True, kw_only=True):
-    """What a picture keeps of a `Source`, by the names in its text: neither paths nor what is on one machine only."""
+    """The fields of a `Source` that a picture keeps: no paths, nothing that belongs to one machine."""
 
     disparity_scale: float | None = None
     invert_depth: bool = False
@@ -56,7 +57,7 @@ class SourceText(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class FormatText(msgspec.Struct, frozen=True, kw_only=True):
-    """What says whether the rest can be read."""
+    """The number of the format, which tells this program if it can read the rest."""
 
     format: int
 
@@ -73,11 +74,11 @@ class SettingsText(FormatText, frozen=True, kw_only=True):
     view_width: SidePx | None = None
 
 
-def settings_text(settings: SavedSettings, folder: Path | None = None) -> str:
-    """The settings as JSON. folder: of a sidecar, which may name a file that lies in it; None: no file is named."""
+def settings_text(settings: SavedSettings) -> str:
+    """Return the settings as JSON."""
     whole = {
         "format": FORMAT,
-        "optics": _text_of_optics(settings.optics, folder),
+        "optics": _text_of_optics(settings.optics),
         "depth_strength": settings.depth_strength,
         "source": _text_of_source(settings.source),
         "size_px": settings.size_px,
@@ -92,14 +93,12 @@ def settings_text(settings: SavedSettings, folder: Path | None = None) -> str:
     return json.dumps(whole, separators=(",", ":"), allow_nan=False, default=_json_value)
 
 
-def settings_from_text(text: str, name: str, folder: Path | None = None, is_own: bool = False) -> SavedSettings:
-    """The inverse of `settings_text`. name: of the picture, for the message.
+def settings_from_text(text: str, name: str, is_own: bool = False) -> SavedSettings:
+    """Return the settings of a text, the inverse of `settings_text`.
 
-    folder: of a sidecar, which may name a file that lies in it; None: no file is taken. is_own: kept by this program
-    for its user, who may have painted for as long as they liked. What this program does not know
-    is left out and named in the result, as is a file that may not be opened. Raises InputError, which names the field,
-    where the text is damaged, of a newer program, or means nothing: a picture like another but for one value is not
-    like it.
+    name: of the picture, for the message. is_own: kept by this program for its user, who may have painted as long as
+    they liked. Unknown fields are left out and named in the result. Raises InputError, which names the field, if the
+    text is damaged or of a newer program.
     """
     try:
         whole = msgspec.json.decode(text if len(text) <= MOST_CHARACTERS else "")
@@ -109,10 +108,11 @@ def settings_from_text(text: str, name: str, folder: Path | None = None, is_own:
         read = msgspec.convert(whole, SettingsText)
         _require_sound_shape(read.optics.aperture_shape)
         require_sound(read.depth_edits)
-        if read.optics.gloss is not None:
-            require_sound_gloss(read.optics.gloss)
+        gloss = read.optics.gloss
+        if gloss is not None:
+            msgspec.convert(whole["optics"]["gloss"], GlossBounds)
         if not is_own:
-            require_bounded(read.depth_edits.strokes, read.optics.gloss.surface.strokes if read.optics.gloss else ())
+            require_bounded(read.depth_edits.strokes, gloss.surface.strokes if gloss else ())
     except (ValueError, RecursionError) as error:
         reason = " ".join(str(error).replace("- at `$.", "at `").split())[:120]
         raise InputError(
@@ -120,11 +120,10 @@ def settings_from_text(text: str, name: str, folder: Path | None = None, is_own:
         ) from error
     named = dict.fromkeys(unknown_fields(whole, msgspec.to_builtins(read)))
     unknown = tuple(field for field in named if field not in FORMER_SETTINGS)
-    optics, refused = _with_own_files(read.optics, folder)
     source = _source_from_text(Source(""), read.source)
     size = ScreenSize(*read.size_px)
     edits, has_model = read.depth_edits, read.has_model_depth
-    return SavedSettings(optics, read.depth_strength, source, size, edits, unknown, refused, has_model, read.view_width)
+    return SavedSettings(read.optics, read.depth_strength, source, size, edits, unknown, has_model, read.view_width)
 
 
 def read_settings(path: Path) -> SavedSettings:
@@ -152,41 +151,18 @@ def source_like(source: Source, saved: SavedSettings, given: Collection[str]) ->
 
 
 def left_out_note(settings: SavedSettings) -> str:
-    """What of the settings was left out, for people; empty where all was taken."""
-    names, sentences = settings.unknown_fields, []
-    if names:
-        more = f" and {len(names) - UNKNOWN_TOLD} more" if len(names) > UNKNOWN_TOLD else ""
-        told = ", ".join(names[:UNKNOWN_TOLD])
-        sentences.append(f"Its settings hold what this program does not know and leaves out: {told}{more}.")
-    if settings.refused_file:
-        sentences.append(
-            f"Its settings name a file, {printable(settings.refused_file)}, which was not opened:"
-            " choose the environment map yourself."
-        )
-    return " ".join(sentences)
+    """Return a message that names the fields that were left out, "" if there are none."""
+    names = settings.unknown_fields
+    if not names:
+        return ""
+    more = f" and {len(names) - NAMED_FIELDS} more" if len(names) > NAMED_FIELDS else ""
+    return f"Its settings hold what this program does not know and leaves out: {', '.join(names[:NAMED_FIELDS])}{more}."
 
 
-def _with_own_files(optics: Optics, folder: Path | None) -> tuple[Optics, str]:
-    """The optics with the path of a file in the folder, else without; the name that was refused, "" where none was."""
-    gloss = optics.gloss
-    if gloss is None or not gloss.environment:
-        return optics, ""
-    is_plain = gloss.environment == Path(gloss.environment).name and "\\" not in gloss.environment
-    file = folder / gloss.environment if folder is not None and is_plain else None
-    is_there = file is not None and is_file(file) and not file.is_symlink()
-    environment, refused = (str(file), "") if is_there else ("", gloss.environment)
-    return dataclasses.replace(optics, gloss=dataclasses.replace(gloss, environment=environment)), refused
-
-
-def _text_of_optics(optics: Optics, folder: Path | None) -> dict[str, Any]:
-    """By field; a gloss only where there is one. Its environment map only by name, and where it lies in the folder."""
+def _text_of_optics(optics: Optics) -> dict[str, Any]:
+    """Return the optics by field; a gloss only if there is one."""
     fields = {field.name: getattr(optics, field.name) for field in dataclasses.fields(optics)}
-    gloss = fields.pop("gloss")
-    if gloss is None:
-        return fields
-    environment = Path(gloss.environment)
-    name = environment.name if folder is not None and environment.parent.absolute() == folder.absolute() else ""
-    return {**fields, "gloss": dataclasses.replace(gloss, environment=name)}
+    return {name: value for name, value in fields.items() if name != "gloss" or value is not None}
 
 
 def _json_value(value: Any) -> Any:
@@ -243,12 +219,15 @@ def _require_within(name: str, value: int, limits: tuple[int, int]) -> None:
 
 
 def unknown_fields(raw: Any, known: Any, within: str = "") -> Iterator[str]:
-    """Names, with dots, of what stands in the text but not in what was read from it."""
+    """Yield the names, with dots, of fields that are in the text but not in what was read from it.
+
+    Fields that are false or "" are left out: earlier programs wrote them for what a picture does not have.
+    """
     if isinstance(raw, dict) and isinstance(known, dict):
         for name, value in raw.items():
             if name in known:
                 yield from unknown_fields(value, known[name], f"{within}{name}.")
-            else:
+            elif value is not False and value != "":
                 yield within + printable(" ".join(name.split())[:40])
     elif isinstance(raw, list) and isinstance(known, list | tuple):
         for value, known_value in zip(raw, known):

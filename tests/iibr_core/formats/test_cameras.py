@@ -34,3 +34,10 @@ def test_infinity_lies_beyond_all_at_a_sensible_ratio_of_depths(low: float, high
     assert infinity < low
     assert (high - infinity) / (low - infinity) <= 1.00005 * MAX_DEPTH_RATIO
     assert (infinity == 0) == (low in (1.0, 2.0))
+
+
+@pytest.mark.parametrize(("inverse_metres", "infinity"), [((0.5, -1.0), 2.0), ((0.0, 1.0), 0.0), ((0.5, -5.0), 0.0)])
+def test_infinity_is_known_with_metres_unless_everything_would_lie_beyond(
+    inverse_metres: tuple[float, float], infinity: float
+) -> None:
+    assert infinity_of(1.0, 9.0, inverse_metres) == infinity

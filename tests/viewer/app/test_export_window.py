@@ -17,7 +17,7 @@ from iibr_core.exports.kinds import ExportOptions
 from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.exports.source import ExportSource
 from iibr_core.formats.images.photo import read_photo
-from iibr_core.rendering.gloss.gloss_settings import Gloss
+from iibr_core.gloss.settings import Gloss
 from iibr_core.runtime.work import raise_if_stopped
 from iibr_core.scenes.scene import Source
 from iibr_core.scenes.screen_size import ScreenSize

@@ -8,15 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from iibr_core.rendering.gloss.gloss_settings import Gloss
+from iibr_core.gloss.settings import Gloss
 from iibr_core.types import GridShape
 from tests.viewer.conftest import Driver, Opener
-from viewer.app.save_places import inputs_of_scene
-from viewer.model.actions import ShowPrompt
-from viewer.model.commands import action_for_path
 from viewer.model.state.optics_actions import SetOptics
 from viewer.model.state.preferences import with_sections
-from viewer.model.state.prompts import PathPrompt
 
 
 @pytest.fixture
@@ -90,28 +86,3 @@ def test_the_brush_marks_what_it_runs_over_and_esc_puts_it_away(viewer: Driver) 
     assert viewer.app.state.optics.eye == eye
     viewer.send("key", "Escape")
     viewer.until(lambda app: not app.state.gloss_brush.is_on)
-
-
-def test_surroundings_that_are_not_there_are_told_and_nothing_is_lost(viewer: Driver) -> None:
-    viewer.app.do(SetOptics("gloss", Gloss(environment="/nowhere/room.exr")))
-    viewer.until(lambda app: any("room.exr" in notice.text for notice in app.state.notices))
-    viewer.app.do(SetOptics("gloss", None))
-    viewer.until_idle()
-
-
-def test_surroundings_are_chosen_in_the_panel_and_taken_away_again(viewer: Driver, photo_path: Path) -> None:
-    make_glossy(viewer)
-    viewer.app.state = replace(viewer.app.state, has_dialogs=False)
-    shiny = viewer.image()
-    viewer.press("Environment map…")
-    viewer.until(lambda app: isinstance(app.state.prompt, PathPrompt) and app.state.prompt.what == "surroundings")
-    viewer.app.do(ShowPrompt(None), action_for_path("surroundings", str(photo_path), viewer.app.state))
-    viewer.until(lambda app: app.scene_view.gloss_request(app.state.optics.gloss) is None)
-    viewer.until_idle()
-    assert not np.array_equal(viewer.image(), shiny)
-    assert photo_path in inputs_of_scene(viewer.app.state)
-    viewer.press("None")
-    viewer.until(lambda app: not app.state.optics.gloss.environment)  # type: ignore[union-attr]
-    viewer.until(lambda app: app.scene_view.gloss_request(app.state.optics.gloss) is None)
-    viewer.until_idle()
-    assert np.array_equal(viewer.image(), shiny)

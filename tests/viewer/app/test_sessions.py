@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import shutil
 from dataclasses import replace
@@ -15,17 +14,15 @@ import pytest
 from iibr_core.beyond.optics import Optics
 from iibr_core.depth.editing.canvas import DepthCanvas, apply_edits
 from iibr_core.depth.editing.edits import UNEDITED, DepthEdits, Stroke
-from iibr_core.rendering.gloss.gloss_settings import Gloss
 from iibr_core.scenes.scene import Source
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, ViewOffset
-from tests.opened_files import watch
-from tests.viewer.conftest import Driver, Opener, rests, write_scene
+from tests.viewer.conftest import Driver, Opener, rests
 from viewer.app.session_store import EDITS_KEPT, sidecar_of
 from viewer.model.actions import DoTask, Quit, ShowPrompt, Undo
 from viewer.model.saved_settings import settings_text
 from viewer.model.state.depth_editing import Paint, SetBrush, SetTone
-from viewer.model.state.optics_actions import MoveEye, SetAperture, SetFocus, SetOptics
+from viewer.model.state.optics_actions import MoveEye, SetAperture, SetFocus
 from viewer.model.state.saving import SavedSettings, WriteSidecarTask
 
 ONE = GridShape(1, 1)
@@ -132,45 +129,6 @@ def test_damaged_ones_are_told(open_window: Opener, photo_path: Path, tmp_path: 
     driver.until_idle()
     change(driver)
     driver.until(lambda app: bool(kept_files(tmp_path / "kept")))
-
-
-def hostile_text(environment: str) -> str:
-    settings = SavedSettings(Optics(gloss=Gloss(reflectance=0.5)), 1.0, Source(""), ScreenSize(96, 64))
-    whole = json.loads(settings_text(settings))
-    whole["optics"]["gloss"]["environment"] = environment
-    return json.dumps(whole)
-
-
-@pytest.mark.parametrize("name", ["{secret}", "../elsewhere/secret.png", "link"])
-def test_a_sidecar_makes_no_file_be_opened(open_window: Opener, photo_path: Path, tmp_path: Path, name: str) -> None:
-    elsewhere = photo_path.parent.parent / "elsewhere"
-    elsewhere.mkdir(exist_ok=True)
-    secret = write_scene(elsewhere, "secret")
-    photo_path.with_name("link").symlink_to(secret)  # no picture's name: the filmstrip leaves it alone
-    sidecar_of(photo_path).write_text(hostile_text(name.format(secret=secret)))
-    with watch(secret) as watched:
-        driver = open_window(photo_path, kept_in=tmp_path / "kept", grid=ONE)
-        driver.until(lambda app: told(driver))
-        driver.until_idle()
-        assert not watched.was_opened()
-    assert driver.app.state.optics.gloss is not None
-    assert any("was not opened" in notice.text for notice in driver.app.state.notices)
-
-
-def test_a_picture_beside_the_photo_goes_with_its_sidecar(
-    open_window: Opener, photo_path: Path, tmp_path: Path
-) -> None:
-    room = write_scene(photo_path.parent, "room")
-    first = open_window(photo_path, kept_in=tmp_path / "kept", grid=ONE)
-    first.until_idle()
-    first.app.do(SetOptics("gloss", Gloss(reflectance=0.5, environment=str(room))))
-    first.app.do(DoTask(WriteSidecarTask()))
-    first.until(lambda app: sidecar_of(photo_path).is_file())
-    first.app.close()
-    assert str(room) not in sidecar_of(photo_path).read_text()
-    second = open_window(photo_path, kept_in=tmp_path / "another machine", grid=ONE)
-    second.until(lambda app: told(second))
-    assert second.app.state.optics.gloss == Gloss(reflectance=0.5, environment=str(room))
 
 
 @pytest.mark.parametrize("kind", ["link", "huge"])

@@ -7,7 +7,7 @@ import dataclasses
 import pytest
 
 from iibr_core.beyond.optics import ApertureShape, Optics
-from iibr_core.rendering.gloss.gloss_settings import Gloss
+from iibr_core.gloss.settings import Gloss
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import FAR, NEAR, Driver
 from viewer.model.actions import Action, Notify, SetDepthStrength, ShowPrompt, ShowTiltHandles

@@ -11,18 +11,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from iibr_core.beyond.optics import Optics
 from iibr_core.formats.maps.pfm import read_pfm
 from iibr_core.inpainting.registry import INPAINTERS
-from iibr_core.rendering.gloss.gloss_settings import Gloss
-from iibr_core.scenes.scene import Source
 from iibr_core.types import TOTAL_PARALLAX
 from tests.forked_iibr import run_forked
 from tests.iibr_core import red_inpainter
-from tests.opened_files import watch
-from tests.viewer.conftest import HEIGHT, WIDTH, write_scene
+from tests.viewer.conftest import HEIGHT, WIDTH
 from viewer import entry
-from viewer.model.state.saving import SavedSettings
 
 ROOT = Path(__file__).parents[3]
 
@@ -231,26 +226,6 @@ def test_like_repeats_a_saved_picture_exactly_but_for_what_is_given(
     assert run(monkeypatch, "screenshot", photo_path, "--like", first, "--aperture", 0, "-o", other) == 0
     assert read_photo(other).size == (100, 150)
     assert (read_photo(other).pixels != read_photo(first).pixels).any()
-
-
-def test_like_opens_no_file_that_the_picture_names(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], photo_path: Path, tmp_path: Path
-) -> None:
-    from iibr_core.formats.images.metadata import SETTINGS_KEY
-    from iibr_core.formats.images.write import write_image
-    from viewer.model.saved_settings import settings_text
-
-    (tmp_path / "elsewhere").mkdir()
-    secret = write_scene(tmp_path / "elsewhere", "secret")
-    saved = SavedSettings(Optics(gloss=Gloss(reflectance=0.5)), 1.0, Source(""), (60, 40))
-    text = settings_text(saved).replace('"environment":""', f'"environment":"{secret}"')
-    assert str(secret) in text
-    like = tmp_path / "like.png"
-    write_image(like, np.zeros((4, 4, 3), np.uint8), {SETTINGS_KEY: text})
-    with watch(secret) as watched:
-        assert run(monkeypatch, "screenshot", photo_path, "--grid", 1, "--like", like, "-o", tmp_path / "a.png") == 0
-        assert not watched.was_opened()
-    assert "which was not opened" in capsys.readouterr().err
 
 
 def test_plan_says_what_and_why(

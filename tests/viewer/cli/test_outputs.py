@@ -33,8 +33,6 @@ def folder(photo_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     (folder / "map.png").write_bytes(view.read_bytes())
     (folder / "scene_depth.png").write_bytes(view.read_bytes())
     (folder / "model").mkdir()
-    (folder / "env.png").write_bytes(view.read_bytes())
-    (folder / "gloss.toml").write_text('environment = "env.png"')
     (folder / "gloss.png").write_text("roughness = 0.3")
     (folder / "keys.gif").write_text("0 0\n1 0\n")
     frame = {"transform_matrix": np.eye(4).tolist(), "w": 32, "h": 24, "fl_x": 50.0}
@@ -56,10 +54,9 @@ def folder(photo_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         ("generate", INPUTS[1], "--grid", "1", "--out", "{dir}/field"),
         ("generate", "{photo}", "--disparity", "{dir}/field/gt_disp_lowres.pfm", "--grid", "1", "--out", "{dir}/field"),
         ("generate", "{dir}/link.png", "--grid", "1", "--out", "{dir}/linked-field"),
-        ("screenshot", "{photo}", "--gloss", "{dir}/gloss.toml", "-o", "{dir}/env.png"),
         ("screenshot", "{photo}", "--gloss", "{dir}/gloss.png", "-o", "{dir}/gloss.png"),
         ("screenshot", "{photo}", "--inpaint", "diffusion:{dir}/model", "-o", "{dir}/model/new.png"),
-        ("export", "{photo}", "--to", "anaglyph", "--gloss", "{dir}/gloss.toml", "-o", "{dir}/env.png"),
+        ("export", "{photo}", "--to", "anaglyph", "--gloss", "{dir}/gloss.png", "-o", "{dir}/gloss.png"),
         ("export", "{photo}", "--to", "gif", "--path", "{dir}/keys.gif", "-o", "{dir}/keys.gif"),
         ("generate", "{photo}", "--grid", "1", "--gloss", "{dir}/field/gloss.toml", "--out", "{dir}/field"),
         ("generate", "{photo}", "--poses", "{dir}/cameras/transforms.json", "--out", "{dir}/cameras"),

@@ -9,9 +9,9 @@ import pytest
 
 from iibr_core.beyond.optics import Optics
 from iibr_core.exports.render_settings import RenderSettings
-from iibr_core.rendering.gloss.geometry import SceneGeometry
-from iibr_core.rendering.gloss.gloss_settings import Gloss, GlossLight, GlossSurface
-from iibr_core.rendering.gloss.shading import GlossMaps, make_gloss_maps, shade
+from iibr_core.gloss.geometry import SceneGeometry
+from iibr_core.gloss.settings import Gloss, GlossLight, GlossSurface
+from iibr_core.gloss.shading import GlossMaps, make_gloss_maps, shade
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.gpu.scenes import rms
@@ -21,9 +21,7 @@ from viewer.gpu.refocus.picture_renderer import Renderer
 GRID = GridShape(3, 3)
 WIDTH, HEIGHT = 96, 72
 LIT = Gloss(roughness=0.4, reflectance=0.3, light=GlossLight((0.1, -0.1, -1), (0.5, 0.4, 0.3)))
-MIRROR = Gloss(GlossSurface(), 0.2, 0.6, GlossLight(color=(0, 0, 0)), photo_shines=False)
-SHINING = replace(LIT, photo_shines=True)
-MOVING = replace(SHINING, light=GlossLight(color=(0, 0, 0)))
+METAL = Gloss(GlossSurface(), 0.2, 0.6, GlossLight((0.3, -0.2, -1)))
 
 
 def bump() -> np.ndarray:
@@ -32,16 +30,8 @@ def bump() -> np.ndarray:
     return (1 + 1.5 * np.exp(-(((x - 48) / 30) ** 2) - ((y - 36) / 25) ** 2)).astype(np.float32)
 
 
-def photo_with(spot: bool) -> np.ndarray:
-    photo = np.full((HEIGHT, WIDTH, 3), 100, np.uint8)
-    if spot:
-        y, x = np.mgrid[:HEIGHT, :WIDTH]
-        photo += (150 * np.exp(-((x - 52) ** 2 + (y - 34) ** 2) / 30)).astype(np.uint8)[..., None]
-    return photo
-
-
-def surroundings() -> np.ndarray:
-    return np.random.default_rng(0).uniform(0, 1, (16, 32, 3)).astype(np.float32)
+def grey_photo() -> np.ndarray:
+    return np.full((HEIGHT, WIDTH, 3), 100, np.uint8)
 
 
 def open_flat(renderer: Renderer, photo: np.ndarray, disparity: np.ndarray) -> None:
@@ -54,61 +44,57 @@ def open_flat(renderer: Renderer, photo: np.ndarray, disparity: np.ndarray) -> N
 
 
 def maps_of(gloss: Gloss, photo: np.ndarray, disparity: np.ndarray) -> GlossMaps:
-    geometry = SceneGeometry(100.0, -1.0)
-    around = surroundings() if gloss is MIRROR else None
-    return make_gloss_maps(gloss, (photo / 255).astype(np.float32), disparity, geometry, around)
+    return make_gloss_maps(gloss.surface, (photo / 255).astype(np.float32), disparity, SceneGeometry(100.0, -1.0))
 
 
-def shaded(maps: GlossMaps, photo: np.ndarray, eye: ViewOffset) -> np.ndarray:
+def shaded(gloss: Gloss, maps: GlossMaps, photo: np.ndarray, eye: ViewOffset) -> np.ndarray:
     colors = (photo / 255).astype(np.float32)
-    shade(colors, maps.disparity, eye, maps)
+    shade(colors, maps.disparity, eye, gloss, maps)
     return np.rint(np.clip(colors, 0, 1) * 255).astype(np.uint8)
 
 
-@pytest.mark.parametrize("gloss", [LIT, MIRROR, SHINING, MOVING], ids=["lit", "mirror", "shining", "moving"])
+@pytest.mark.parametrize("gloss", [LIT, METAL], ids=["lit", "metal"])
 def test_the_photo_with_gloss_is_the_cores(renderer: Renderer, gloss: Gloss) -> None:
-    photo, disparity = photo_with(spot=gloss.photo_shines), bump()
+    photo, disparity = grey_photo(), bump()
     maps = maps_of(gloss, photo, disparity)
     renderer.open_field(GRID, WIDTH, HEIGHT, hdr=False, with_disparity=True)
     renderer.upload_view(1, 1, photo, disparity)
     renderer.set_gloss(maps)
     renderer.render(Optics(gloss=gloss), (WIDTH, HEIGHT))
-    expected = shaded(maps, photo, ViewOffset(0.0, 0.0))
-    if not gloss.photo_shines:
-        assert rms(expected, photo) > 0.02
+    expected = shaded(gloss, maps, photo, ViewOffset(0.0, 0.0))
+    assert rms(expected, photo) > 0.02
     assert rms(renderer.read_image(), expected) < 0.004
 
 
-@pytest.mark.parametrize("gloss", [LIT, MIRROR, MOVING], ids=["lit", "mirror", "moving"])
+@pytest.mark.parametrize("gloss", [LIT, METAL], ids=["lit", "metal"])
 @pytest.mark.parametrize("eye", [ViewOffset(0.0, 1.0), ViewOffset(-1.0, 0.0), ViewOffset(0.5, -0.5)])
 def test_other_viewpoints_are_the_cores_too(renderer: Renderer, gloss: Gloss, eye: ViewOffset) -> None:
-    flat = np.full((HEIGHT, WIDTH), 2.0, np.float32)
-    photo = photo_with(spot=gloss.photo_shines)
+    flat, photo = np.full((HEIGHT, WIDTH), 2.0, np.float32), grey_photo()
     maps = maps_of(gloss, photo, flat)
     open_flat(renderer, photo, flat)
     renderer.set_gloss(maps)
     renderer.render(Optics(eye=eye, gloss=gloss), (WIDTH, HEIGHT))
     seen = np.roll(photo, (-round(2 * eye.t), -round(2 * eye.s)), (0, 1))
-    assert rms(renderer.read_image(), shaded(maps, seen, eye)) < 0.006
+    assert rms(renderer.read_image(), shaded(gloss, maps, seen, eye)) < 0.006
 
 
 def test_through_an_aperture_each_point_of_the_lens_sees_its_own_highlight(renderer: Renderer) -> None:
     """On the plane in focus, the picture is the mean of the views' gloss, in linear light."""
-    flat, photo = np.full((HEIGHT, WIDTH), 2.0, np.float32), photo_with(spot=False)
+    flat, photo = np.full((HEIGHT, WIDTH), 2.0, np.float32), grey_photo()
     dim = replace(LIT, roughness=0.1, light=GlossLight((0.1, -0.1, -1), (0.003, 0.003, 0.003), radius_deg=1.0))
     maps = maps_of(dim, photo, flat)
     open_flat(renderer, photo, flat)
     renderer.set_gloss(maps)
     optics = Optics(focus_disparity=2.0, aperture_diameter=3.0, gloss=dim)
     drawn = renderer.converged_picture(RenderSettings(optics, (WIDTH, HEIGHT)))
-    narrow = shaded(maps, photo, ViewOffset(0.0, 0.0))
+    narrow = shaded(dim, maps, photo, ViewOffset(0.0, 0.0))
     assert rms(drawn, narrow) < 0.05
     assert drawn.max() < narrow.max(), "the lobe is seen from several directions"
     assert drawn.astype(int).sum() == pytest.approx(narrow.astype(int).sum(), rel=0.03)
 
 
 def test_without_gloss_the_maps_change_nothing(renderer: Renderer) -> None:
-    photo, disparity = photo_with(spot=False), bump()
+    photo, disparity = grey_photo(), bump()
     renderer.open_field(GRID, WIDTH, HEIGHT, hdr=False, with_disparity=True)
     renderer.upload_view(1, 1, photo, disparity)
     renderer.render(Optics(), (WIDTH, HEIGHT))
@@ -120,9 +106,9 @@ def test_without_gloss_the_maps_change_nothing(renderer: Renderer) -> None:
 
 
 @pytest.mark.parametrize("is_upright", [False, True])
-@pytest.mark.parametrize("gloss", [LIT, MIRROR, MOVING], ids=["lit", "mirror", "moving"])
+@pytest.mark.parametrize("gloss", [LIT, METAL], ids=["lit", "metal"])
 def test_an_epi_shows_every_views_gloss(renderer: Renderer, gloss: Gloss, is_upright: bool) -> None:
-    flat, photo = np.full((HEIGHT, WIDTH), 2.0, np.float32), photo_with(spot=gloss.photo_shines)
+    flat, photo = np.full((HEIGHT, WIDTH), 2.0, np.float32), grey_photo()
     maps = maps_of(gloss, photo, flat)
     open_flat(renderer, photo, flat)
     renderer.set_gloss(maps)
@@ -135,13 +121,13 @@ def test_an_epi_shows_every_views_gloss(renderer: Renderer, gloss: Gloss, is_upr
     passes.release()
     for index in range(count):
         offset = GRID.offset(*((index, 1) if is_upright else (1, index)))
-        view = shaded(maps, np.roll(photo, (-round(2 * offset.t), -round(2 * offset.s)), (0, 1)), offset)
+        view = shaded(gloss, maps, np.roll(photo, (-round(2 * offset.t), -round(2 * offset.s)), (0, 1)), offset)
         seen, expected = (drawn[:, index], view[:, place]) if is_upright else (drawn[index], view[place])
         assert np.abs(seen.astype(int) - expected)[4:-4].max() <= 3
 
 
 def test_nothing_marked_is_nothing_drawn(renderer: Renderer) -> None:
-    photo, disparity = photo_with(spot=False), bump()
+    photo, disparity = grey_photo(), bump()
     nothing = replace(LIT, surface=GlossSurface(strokes_only=True))
     renderer.open_field(GRID, WIDTH, HEIGHT, hdr=False, with_disparity=True)
     renderer.upload_view(1, 1, photo, disparity)

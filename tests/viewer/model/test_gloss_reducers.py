@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 
-from iibr_core.rendering.gloss.gloss_settings import Gloss, GlossLight
 from iibr_core.types import GridShape
 from tests.viewer.model.test_reducers import plan_of, scene_of, state_with
 from viewer.model.actions import EndGesture, Undo
@@ -28,12 +26,10 @@ def test_gloss_comes_and_goes_and_outlasts_a_reset_of_the_lens() -> None:
     assert reduce(glossy(), Undo()).optics.gloss is None
 
 
-def test_what_makes_no_sense_changes_nothing() -> None:
-    state = glossy()
-    for gloss in (Gloss(roughness=math.nan), Gloss(light=GlossLight((0, 0, 0))), Gloss(reflectance=7)):
-        assert reduce(state, SetOptics("gloss", gloss)) is state
-    assert reduce(state, PaintGloss((math.nan, 0.5), BRUSH, True)).optics == state.optics
-    assert reduce(state, SetGlossBrush(GlossBrush(radius=math.inf))) is state
+def test_a_stroke_far_beside_the_picture_ends_where_files_allow() -> None:
+    state = reduce(glossy(), PaintGloss((-7.0, 3.5), BRUSH, True))
+    assert state.optics.gloss is not None
+    assert state.optics.gloss.surface.strokes[0].points == ((-1.0, 2.0),)
 
 
 def test_a_stroke_is_one_edit_and_skips_places_that_are_close() -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -23,7 +22,7 @@ from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.editing.edits import BRUSH_TOOLS, DepthEdits, Stroke
 from iibr_core.formats.images.metadata import SETTINGS_KEY, settings_text_in
 from iibr_core.formats.images.write import write_image
-from iibr_core.rendering.gloss.gloss_settings import Gloss, GlossLight, GlossSurface
+from iibr_core.gloss.settings import Gloss, GlossLight, GlossSurface
 from iibr_core.scenes.scene import Source
 from iibr_core.types import GridShape, InputError, ViewOffset
 from tests.viewer.model.test_reducers import scene_of, state_with
@@ -274,59 +273,12 @@ def test_limits_of_the_machine_in_old_texts_are_left_out_without_a_word(value: o
     assert taken.max_pixels == 10_000
 
 
-OUTSIDE = (
-    "../secret.png",
-    "/etc/passwd",
-    "//host/share/a.png",
-    "\\\\host\\share\\a.png",
-    "C:\\a.png",
-    "C:a.png",
-    "sub/a.png",
-    "sub\\a.png",
-    "..",
-    ".",
-    "link.png",
-    "folder",
-    "fifo.png",
-    "gone.png",
-    "a\0.png",
-    "n" * 300,
-)
-
-
-@pytest.fixture
-def beside(tmp_path: Path) -> Path:
-    """A folder with a picture, and things that are none."""
-    (tmp_path / "secret.png").touch()
-    folder = tmp_path / "photos"
-    (folder / "sub").mkdir(parents=True)
-    (folder / "folder").mkdir()
-    for name in ("a.png", "sub/a.png"):
-        (folder / name).touch()
-    (folder / "link.png").symlink_to(tmp_path / "secret.png")
-    os.mkfifo(folder / "fifo.png")
-    return folder
-
-
-@pytest.mark.parametrize("name", OUTSIDE)
-def test_a_path_in_settings_is_never_taken(beside: Path, name: str) -> None:
-    text = changed(optics__gloss={"environment": name})
-    for folder in (None, beside):
-        saved = settings_from_text(text, "a.png", folder)
-        assert saved.optics.gloss == Gloss()
-        assert "was not opened" in left_out_note(saved)
-        assert left_out_note(saved).isprintable()
-
-
-def test_a_sidecar_may_name_a_picture_beside_it(beside: Path) -> None:
-    text = changed(optics__gloss={"environment": "a.png"})
-    assert settings_from_text(text, "a.png").refused_file == "a.png"
-    saved = settings_from_text(text, "a.png", beside)
-    assert saved.optics.gloss == Gloss(environment=str(beside / "a.png"))
-    assert left_out_note(saved) == ""
-    assert settings_from_text(settings_text(saved, beside), "a.png", beside) == saved
-    for folder in (None, beside.parent):
-        assert settings_from_text(settings_text(saved, folder), "a.png").optics.gloss == Gloss()
+def test_what_gloss_no_longer_has_is_named_only_where_it_was_used() -> None:
+    used = settings_from_text(changed(optics__gloss={"environment": "/etc/passwd", "photo_shines": True}), "a.png")
+    assert used.optics.gloss == Gloss()
+    assert "optics.gloss.environment, optics.gloss.photo_shines" in left_out_note(used)
+    unused = settings_from_text(changed(optics__gloss={"environment": "", "photo_shines": False}), "a.png")
+    assert left_out_note(unused) == ""
 
 
 def test_options_given_beat_the_saved_ones() -> None:

@@ -34,7 +34,7 @@ SWITCHES: dict[str, tuple[Action, ...]] = {
     "gloss of a colour": (
         SetOptics("gloss", replace(FIRST_GLOSS, surface=replace(FIRST_GLOSS.surface, color=(1, 0, 0)))),
     ),
-    "surroundings": (SetOptics("gloss", replace(FIRST_GLOSS, environment="")), SetGlossBrush(GlossBrush(is_on=True))),
+    "gloss brush": (GLOSSY, SetGlossBrush(GlossBrush(is_on=True))),
     "brush": (SetBrush(Brush("nearer", is_on=True)),),
     "bucket": (SetBrush(Brush("fill", is_on=True)), PickDepth(DepthSample((0.5, 0.5), 1.0))),
     "EPIs": (SetInspection("shows_epis", True),),

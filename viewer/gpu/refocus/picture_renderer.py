@@ -46,7 +46,7 @@ from viewer.gpu.refocus.screen_image import ScreenImage
 from viewer.model.state.app_state import DrawReport
 
 if TYPE_CHECKING:
-    from iibr_core.rendering.gloss.shading import GlossMaps
+    from iibr_core.gloss.shading import GlossMaps
 
 PREPARED_SIZE = ScreenSize(48, 48)
 """Size of what is drawn to compile programs; not a power of two, for which software GL compiles them again."""
@@ -139,7 +139,7 @@ class Renderer:
         self._accumulation = None
 
     def set_gloss(self, maps: GlossMaps | None) -> None:
-        """What gloss means for the field, for optics that have one; None where it means nothing."""
+        """Use these maps for optics with gloss; None if there are none."""
         self._loaded.set_gloss(maps)
         self._accumulation = None
 

@@ -8,14 +8,13 @@ from math import hypot
 from typing import Any
 
 from iibr_core.beyond.optics import Optics
-from iibr_core.rendering.gloss.gloss_settings import MOST_POINTS, Gloss, GlossStroke
+from iibr_core.gloss.settings import MAX_STROKE_POINTS, Gloss, GlossStroke
 from iibr_core.scenes.lens_limits import (
     aperture_limit,
     clamp,
     clamp_eye,
     clamp_optics,
     first_aperture,
-    has_sound_gloss,
     is_finite,
 )
 from iibr_core.scenes.scene import Scene, Source
@@ -41,7 +40,7 @@ from viewer.model.state.optics_actions import (
 )
 
 POINT_SPACING = 1 / 6
-"""Of the radius: a stroke of the gloss brush is remembered by places this far apart."""
+"""Distance between the points of a gloss stroke, as a share of its radius."""
 SHARP_SHARE = 0.05
 """Of the range of disparity: a place as near to the focus was made sharp by the click on it."""
 APERTURE_OPENED = "Focusing opened the aperture a little: what is nearer or farther blurs. Its slider sets how much."
@@ -55,7 +54,7 @@ def reduce_lens(state: AppState, action: LensAction) -> AppState:
     if isinstance(action, MoveTiltHandle):
         return _move_handle(state, scene, action)
     optics = _edit_optics(state, scene, action)
-    if not is_finite(optics) or not has_sound_gloss(optics):
+    if not is_finite(optics):
         return state
     edited = replace(_note_choice(state, action), optics=clamp_optics(optics, scene))
     return _open_for_focus(edited, scene) if isinstance(action, FocusOn | SetFocus) else edited
@@ -128,13 +127,14 @@ def _edit_optics(state: AppState, scene: Scene, action: LensAction) -> Optics:
 
 
 def _painted(gloss: Gloss, place: tuple[float, float], brush: GlossBrush, begins: bool, scene: Scene) -> Gloss:
-    """With one more stroke, or with one more point of the last."""
+    """Return the gloss with a new stroke, or with a new point of the last stroke."""
     strokes = gloss.surface.strokes
+    place = clamp(place[0], -1.0, 2.0), clamp(place[1], -1.0, 2.0)
     stroke = GlossStroke((place,), brush.radius, brush.erases)
     if strokes and not begins:
         last = strokes[-1]
         step = hypot(place[0] - last.points[-1][0], (place[1] - last.points[-1][1]) * scene.height / scene.width)
-        if step < POINT_SPACING * last.radius or len(last.points) >= MOST_POINTS:
+        if step < POINT_SPACING * last.radius or len(last.points) >= MAX_STROKE_POINTS:
             return gloss
         strokes, stroke = strokes[:-1], replace(last, points=(*last.points, place))
     return replace(gloss, surface=replace(gloss.surface, strokes=(*strokes, stroke)))

@@ -8,7 +8,7 @@ from pathlib import PurePath
 from typing import Any
 
 from iibr_core.beyond.optics import Optics
-from iibr_core.rendering.gloss.gloss_settings import STROKE_RADIUS_LIMITS
+from iibr_core.gloss.settings import STROKE_RADIUS_LIMITS
 from iibr_core.scenes.lens_limits import clamp, clamp_optics, is_finite
 from iibr_core.scenes.scene import DepthSettings, Progress, Source, is_same_field
 from viewer.model.actions import (
@@ -210,9 +210,7 @@ def _quit(state: AppState, is_sure: bool) -> AppState:
 
 
 def _take_gloss_brush(state: AppState, brush: GlossBrush) -> AppState:
-    """There is one brush in hand at most."""
-    if not math.isfinite(brush.radius):
-        return state
+    """Take the gloss brush and put the depth brush away: at most one is in hand."""
     depth_brush = replace(state.brush, is_on=state.brush.is_on and not brush.is_on)
     taken = replace(brush, radius=clamp(brush.radius, *STROKE_RADIUS_LIMITS))
     return replace(state, gloss_brush=taken, brush=depth_brush)

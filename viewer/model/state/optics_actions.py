@@ -9,19 +9,19 @@ from dataclasses import dataclass
 from typing import Literal
 
 from iibr_core.beyond.optics import ApertureShape
-from iibr_core.rendering.gloss.gloss_settings import Gloss, GlossSurface
+from iibr_core.gloss.settings import Gloss, GlossSurface
 from iibr_core.types import ViewOffset
 
 PresetName = Literal["portrait", "macro", "everything sharp"]
 
 
 FIRST_GLOSS = Gloss(GlossSurface(farthest=0.5))
-"""Of whoever tries what it is."""
+"""Gloss that the switch in the panel begins with: the nearer half of the scene."""
 
 
 @dataclass(frozen=True)
 class GlossBrush:
-    """What dragging over the picture marks as glossy, or takes out, while it is on. radius: see `GlossStroke`."""
+    """The brush that marks the glossy surface, or erases a part of it, while it is on. radius: see `GlossStroke`."""
 
     radius: float = 0.04
     erases: bool = False
@@ -85,9 +85,7 @@ class SetAperture:
 
 @dataclass(frozen=True)
 class PaintGloss:
-    """Begin a stroke that marks the glossy surface, or go on with the last one: (x, y) as shares of the photo's width
-    and height.
-    """
+    """Begin a stroke of the gloss brush, or continue the last one. place: (x, y), shares of the photo's size."""
 
     place: tuple[float, float]
     brush: GlossBrush

@@ -29,8 +29,8 @@ class SavedSettings:
     """What a saved picture was taken with. source: what was decided, without paths. size_px: (width, height).
 
     depth_edits: of the photo's disparity. unknown_fields: names of what was saved too, but is not known here.
-    refused_file: a file that they named and that is not opened, "" without. has_model_depth: whether a model estimated
-    the depth that the focus is of. view_width: of the views, in whose pixels the optics are; None in older pictures.
+    has_model_depth: whether a model estimated the depth that the focus is of. view_width: of the views, in whose pixels
+    the optics are; None in older pictures.
     """
 
     optics: Optics
@@ -39,7 +39,6 @@ class SavedSettings:
     size_px: ScreenSize
     depth_edits: DepthEdits = UNEDITED
     unknown_fields: tuple[str, ...] = ()
-    refused_file: str = ""
     has_model_depth: bool = False
     view_width: int | None = None
 

@@ -1,16 +1,15 @@
-"""The panel's section for gloss: which surface, how it reflects, and the light, dragged about on a ball."""
+"""The panel's section for gloss: the surface, its reflection, and the light, which is dragged on a ball."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import replace
-from pathlib import PurePath
 
 from imgui_bundle import imgui
 
-from iibr_core.rendering.gloss.gloss_settings import (
+from iibr_core.gloss.settings import (
     LIGHT_RADIUS_LIMITS_DEG,
-    MOST_TOLERANCE,
+    MAX_TOLERANCE,
     STROKE_RADIUS_LIMITS,
     Gloss,
     GlossLight,
@@ -18,46 +17,40 @@ from iibr_core.rendering.gloss.gloss_settings import (
     Triple,
 )
 from iibr_core.scenes.scene import Scene
-from viewer.model.actions import Action, DoTask
+from viewer.model.actions import Action
 from viewer.model.layout import Layout
 from viewer.model.state.app_state import AppState
 from viewer.model.state.optics_actions import FIRST_GLOSS, GlossBrush, SetGlossBrush, SetOptics
-from viewer.model.state.tasks import ChooseTask
 from viewer.ui.style import Palette, pack_color, palette_of
-from viewer.ui.widgets import button, checkbox, choice, gap, percent_slider, quiet, slider, tooltip
+from viewer.ui.widgets import button, checkbox, choice, gap, percent_slider, slider, tooltip
 
 BALL_SIDE = 96.0
 FIRST_COLOR: Triple = (0.5, 0.5, 0.5)
 BALL_RINGS = 24
-LEAST_TOWARDS = 0.05
-"""How far the light stays before the ball's edge."""
-BRIGHTEST = 10.0
+MIN_TOWARDS = 0.05
+"""Smallest z of the light's direction towards the viewer, so that it stays on the ball's near side."""
+MAX_BRIGHTNESS = 10.0
 GLOSS_TIP = "Makes a surface glossy: highlights run over it as the viewpoint moves."
-FAR_TIP = "What is farther stays as it is."
-NEAR_TIP = "What is nearer stays as it is."
+FAR_TIP = "Farther surfaces stay matt."
+NEAR_TIP = "Nearer surfaces stay matt."
 ROUGH_TIP = "From a mirror to a dull sheen."
 REFLECTS_TIP = "How much of the light is reflected: 4 % for plastics and varnish, 50 % and more for metals."
 BALL_TIP = "Drag to move the light about the scene."
 BRIGHT_TIP = "× 1 makes white paper that faces the light as bright as the photo's white."
-SHOWN_TIP = (
-    "The photo shows the highlight already: that one runs over the surface. At brightness 0, the light is found."
-)
-AROUND_TIP = "Choose a picture taken all around (equirectangular): the surface reflects it."
 MARK_TIP = "Drag over the picture to make more of it glossy (Esc puts the brush away)."
-ERASE_TIP = "Drag over the picture to leave parts of it as they are (Esc puts the brush away)."
-ONLY_TIP = "Nothing is glossy but what the brush marks."
+ERASE_TIP = "Drag over the picture to keep parts of it matt (Esc puts the brush away)."
+ONLY_TIP = "Only the strokes of the brush are glossy."
 
 
 def gloss_section(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
-    """Build the section: every row always, grey where it means nothing, so that none moves another under a click."""
+    """Build the section. All rows are always there, greyed if unused, so that no row moves under a click."""
     is_glossy, gloss = state.optics.gloss is not None, state.optics.gloss or FIRST_GLOSS
     is_on = checkbox("Glossy surface", is_glossy, layout, GLOSS_TIP)
     imgui.begin_disabled(not is_glossy)
     light = _light(gloss.light, layout, palette_of(state.preferences.theme))
     edited = _reflection(replace(gloss, light=light), layout)
-    actions = _environment(gloss, layout)
     edited = replace(edited, surface=_surface(gloss.surface, layout))
-    actions += [] if edited == gloss else [SetOptics("gloss", edited)]
+    actions: list[Action] = [] if edited == gloss else [SetOptics("gloss", edited)]
     actions += _brush(state.gloss_brush, gloss, layout)
     imgui.end_disabled()
     if is_on is not None:
@@ -66,12 +59,12 @@ def gloss_section(state: AppState, scene: Scene, layout: Layout) -> list[Action]
 
 
 def _light(light: GlossLight, layout: Layout, palette: Palette) -> GlossLight:
-    """The ball, and how bright and large the light is."""
+    """Build the ball and the sliders of the light; return the edited light."""
     direction = _ball(light, layout, palette)
     if direction is not None:
         light = replace(light, direction=direction)
     level = max(light.color)
-    new = slider("Brightness", level, (0.0, BRIGHTEST), "× %.2f", layout, BRIGHT_TIP)
+    new = slider("Brightness", level, (0.0, MAX_BRIGHTNESS), "× %.2f", layout, BRIGHT_TIP)
     if new is not None:
         red, green, blue = (value / level * new if level > 0 else new for value in light.color)
         light = replace(light, color=(red, green, blue))
@@ -80,7 +73,7 @@ def _light(light: GlossLight, layout: Layout, palette: Palette) -> GlossLight:
 
 
 def _ball(light: GlossLight, layout: Layout, palette: Palette) -> Triple | None:
-    """A ball lit as the scene is; the new direction where it was dragged."""
+    """Draw a ball lit as the scene is; return the new direction if it is dragged."""
     side = BALL_SIDE * layout.ui_scale
     corner = imgui.get_cursor_screen_pos()
     imgui.invisible_button("light ball", imgui.ImVec2(side, side))
@@ -96,16 +89,16 @@ def _ball(light: GlossLight, layout: Layout, palette: Palette) -> Triple | None:
 
 
 def _direction_at(x: float, y: float) -> Triple:
-    """Towards the light over this place of a ball of radius 1, on its near side."""
+    """Return the direction of the light above a place (x, y) of a ball of radius 1, on its near side."""
     away = math.hypot(x, y)
-    most = math.sqrt(1 - LEAST_TOWARDS**2)
+    most = math.sqrt(1 - MIN_TOWARDS**2)
     if away > most:
         x, y = x / away * most, y / away * most
     return x, y, -math.sqrt(max(1 - x * x - y * y, 0.0))
 
 
 def _draw_ball(middle: tuple[float, float], radius: float, lit: tuple[float, float], palette: Palette) -> None:
-    """Discs that shrink towards where the light stands, ever brighter."""
+    """Draw discs that shrink and brighten towards the light."""
     draw = imgui.get_window_draw_list()
     for ring in range(BALL_RINGS):
         share = ring / BALL_RINGS
@@ -121,24 +114,11 @@ def _reflection(gloss: Gloss, layout: Layout) -> Gloss:
     roughness = percent_slider("Roughness", gloss.roughness, layout, ROUGH_TIP)
     gloss = gloss if roughness is None else replace(gloss, roughness=roughness)
     share = percent_slider("Reflects", gloss.reflectance, layout, REFLECTS_TIP)
-    gloss = gloss if share is None else replace(gloss, reflectance=share)
-    shines = checkbox("The photo shows it already", gloss.photo_shines, layout, SHOWN_TIP)
-    return gloss if shines is None else replace(gloss, photo_shines=shines)
-
-
-def _environment(gloss: Gloss, layout: Layout) -> list[Action]:
-    """What is reflected beside the light: the way to a picture or to none, and its name."""
-    is_asked = button("Environment map…", layout, AROUND_TIP)
-    imgui.same_line()
-    is_dropped = button("None", layout, "Reflect nothing but the light.", bool(gloss.environment))
-    quiet(PurePath(gloss.environment).name or "No environment map")
-    if is_asked:
-        return [DoTask(ChooseTask("surroundings"))]
-    return [SetOptics("gloss", replace(gloss, environment=""))] if is_dropped else []
+    return gloss if share is None else replace(gloss, reflectance=share)
 
 
 def _surface(surface: GlossSurface, layout: Layout) -> GlossSurface:
-    """The range of depth and the colour that belong to it."""
+    """Build the controls for depth and colour; return the edited surface."""
     gap(layout, 2)
     only = checkbox("Only what is painted", surface.strokes_only, layout, ONLY_TIP)
     imgui.begin_disabled(surface.strokes_only)
@@ -154,11 +134,11 @@ def _surface(surface: GlossSurface, layout: Layout) -> GlossSurface:
 
 
 def _color(surface: GlossSurface, layout: Layout) -> GlossSurface:
-    is_one, color = surface.color is not None, surface.color or FIRST_COLOR
-    has_color = checkbox("Only one colour", is_one, layout, "And what is like it.")
-    imgui.begin_disabled(not is_one)
+    has_one, color = surface.color is not None, surface.color or FIRST_COLOR
+    has_color = checkbox("Only one colour", has_one, layout, "Only pixels near this colour are glossy.")
+    imgui.begin_disabled(not has_one)
     changed, values = imgui.color_edit3("##gloss colour", list(color))
-    new = slider("Tolerance", surface.tolerance, (0.0, MOST_TOLERANCE), "%.2f", layout)
+    new = slider("Tolerance", surface.tolerance, (0.0, MAX_TOLERANCE), "%.2f", layout)
     imgui.end_disabled()
     if changed:
         red, green, blue = (min(max(float(value), 0.0), 1.0) for value in values)
@@ -168,13 +148,13 @@ def _color(surface: GlossSurface, layout: Layout) -> GlossSurface:
 
 
 def _brush(brush: GlossBrush, gloss: Gloss, layout: Layout) -> list[Action]:
-    """Two tools; the one in hand is lit, and pressing it again puts the brush away."""
+    """Build the brush tools; the active tool is lit, and pressing it again puts the brush away."""
     actions: list[Action] = []
     spacing = 4 * layout.ui_scale
     width = (imgui.get_content_region_avail().x - 2 * spacing) / 3
-    for words, erases, tip in (("Mark", False, MARK_TIP), ("Erase", True, ERASE_TIP)):
+    for label, erases, tip in (("Mark", False, MARK_TIP), ("Erase", True, ERASE_TIP)):
         is_in_hand = brush.is_on and brush.erases == erases
-        if choice(words, is_in_hand, layout, (width, 0), tip):
+        if choice(label, is_in_hand, layout, (width, 0), tip):
             actions.append(SetGlossBrush(replace(brush, erases=erases, is_on=not is_in_hand)))
         imgui.same_line(0, spacing)
     if button("Wipe", layout, "Take all strokes away.", bool(gloss.surface.strokes), width):

@@ -5,8 +5,8 @@ from math import cos, pi, radians, sin, sqrt
 import numpy as np
 import pytest
 
-from iibr_core.rendering.gloss.gloss_settings import Gloss, GlossLight
-from iibr_core.rendering.gloss.microfacet import reflected_share
+from iibr_core.gloss.microfacet import reflected_share
+from iibr_core.gloss.settings import Gloss, GlossLight
 
 UP = np.array([0.0, 0.0, 1.0])
 
@@ -17,12 +17,12 @@ def direction(polar_deg, azimuth_deg=0.0):
 
 
 def share(gloss, n, v, light):
-    return reflected_share(*map(float, (*n, *v, *light)), *gloss.lobe_widths, gloss.reflectance)
+    return reflected_share(tuple(n), tuple(v), tuple(light), gloss.lobe)
 
 
 def textbook(gloss, n, v, light):
     """D G F / (4 n.l n.v) times the irradiance of a disc of radiance 1; Walter et al. 2007, Heitz 2014."""
-    width2, disc = gloss.lobe_widths
+    width2, disc, _ = gloss.lobe
     h = (v + light) / np.linalg.norm(v + light)
     n_l, n_v, n_h, v_h = n @ light, n @ v, n @ h, v @ h
     d = width2 / (pi * (n_h**2 * (width2 - 1) + 1) ** 2)
@@ -56,7 +56,7 @@ def test_a_mirror_shows_the_light_itself_and_nothing_beside_it():
 def test_no_more_light_leaves_than_came(roughness, polar_deg):
     """Over all directions of the eye, a light of irradiance 1 gives at most 1, whatever the surface."""
     gloss = Gloss(roughness=roughness, reflectance=1.0, light=GlossLight(radius_deg=1.0))
-    disc, light, count = gloss.lobe_widths[1], direction(polar_deg), 300
+    disc, light, count = gloss.lobe[1], direction(polar_deg), 300
     polar = (np.arange(count) + 0.5) / count * pi / 2
     azimuth = (np.arange(count) + 0.5) / count * pi
     total = 0.0

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from iibr_core.rendering.gloss.geometry import SceneGeometry
+from iibr_core.gloss.geometry import SceneGeometry
 
 SIZE = 60, 80
 GEOMETRY = SceneGeometry(focal_px=90.0, infinity=-1.5)

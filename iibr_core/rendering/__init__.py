@@ -1,1 +1,0 @@
-"""One view from the ray set."""

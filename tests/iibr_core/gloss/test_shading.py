@@ -1,0 +1,145 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from iibr_core.color import linear_from_srgb, srgb_from_linear
+from iibr_core.gloss.geometry import SceneGeometry
+from iibr_core.gloss.microfacet import reflected_share
+from iibr_core.gloss.settings import Gloss, GlossLight, GlossSurface
+from iibr_core.gloss.shading import make_gloss_maps, shade, shade_views
+from iibr_core.types import GridShape, ViewOffset, ViewUpdate
+from tests.iibr_core.gloss.scenes import GEOMETRY, SIZE, plane, sphere
+
+GREY = np.full((*SIZE, 3), 0.4, np.float32)
+GLOSS = Gloss(roughness=0.35, light=GlossLight((-0.3, -0.3, -1)))
+
+
+def maps_of(gloss, disparity, geometry=GEOMETRY, normals=None, photo=GREY):
+    return make_gloss_maps(gloss.surface, photo, disparity, geometry, normals)
+
+
+def shaded(gloss, maps, offset, disparity=None, photo=GREY):
+    colors = photo.copy()
+    shade(colors, maps.disparity if disparity is None else disparity, ViewOffset(*offset), gloss, maps)
+    return colors
+
+
+def plainly_shaded(gloss, maps, offset, photo):
+    """The same of a flat map, whose disparity is known at every place: pixel by pixel, by the docstrings' formulas."""
+    height, width = maps.mask.shape
+    result = linear_from_srgb(photo)
+    light, focal = gloss.light.unit_direction, maps.geometry.focal_px
+    for y, x in np.ndindex(height, width):
+        d = maps.disparity[y, x]
+        v, u = y + d * offset[0], x + d * offset[1]
+        if not (0 <= v <= height - 1 and 0 <= u <= width - 1):
+            continue
+        near = d - maps.geometry.infinity
+        point = np.array([(u - (width - 1) / 2) / near, (v - (height - 1) / 2) / near, focal / near])
+        eye = np.array([offset[1], offset[0], 0]) - point
+        eye /= np.linalg.norm(eye)
+        normal = maps.normals[round(v), round(u)]
+        share = reflected_share(tuple(normal), tuple(eye), light, gloss.lobe)
+        for c in range(3):
+            result[y, x, c] += share * (gloss.light.radiance[c] - result[y, x, c])
+    return srgb_from_linear(result)
+
+
+@pytest.mark.parametrize("offset", [(0, 0), (1, -2)])
+def test_it_is_the_lobe_at_every_pixel(offset):
+    flat = np.full(SIZE, 0.75, np.float32)
+    maps = maps_of(GLOSS, flat)
+    inner = slice(4, -4), slice(4, -4)
+    assert np.allclose(shaded(GLOSS, maps, offset)[inner], plainly_shaded(GLOSS, maps, offset, GREY)[inner], atol=1e-4)
+
+
+def brightest(colors):
+    return np.unravel_index(colors.sum(-1).argmax(), colors.shape[:2])
+
+
+def test_on_a_plane_the_highlight_of_a_far_light_stays_in_the_frame_of_what_is_far():
+    """Its virtual image is infinitely far: it moves by the disparity of infinity, not by the surface's."""
+    disparity, _ = plane((0, 0, -1))
+    gloss = replace(GLOSS, light=GlossLight((0.05, 0, -1)))
+    maps = maps_of(gloss, disparity)
+    places = [brightest(shaded(gloss, maps, (0, s)))[1] for s in (-2, 0, 2)]
+    assert places[0] - places[1] == pytest.approx(2 * GEOMETRY.infinity, abs=1)
+    assert places[1] - places[2] == pytest.approx(2 * GEOMETRY.infinity, abs=1)
+
+
+def test_colours_stay_between_the_matt_ones_and_the_light():
+    disparity, _, _ = sphere()
+    gloss = replace(GLOSS, reflectance=1.0, light=GlossLight((0, 0, -1), (0.001, 0.002, 0.004)))
+    maps = maps_of(gloss, disparity)
+    linear, white = linear_from_srgb(shaded(gloss, maps, (0, 1))), np.array(gloss.light.radiance)
+    matt = linear_from_srgb(GREY[0, 0])
+    assert (linear >= np.minimum(matt, white) - 1e-4).all()
+    assert (linear <= np.maximum(matt, white) + 1e-4).all()
+
+
+@pytest.mark.parametrize("direction", [(0, 0, 1), (0, 0.2, 1)])
+def test_light_from_behind_changes_nothing(direction):
+    disparity, _, _ = sphere()
+    gloss = replace(GLOSS, light=GlossLight(direction))
+    maps = maps_of(gloss, disparity)
+    facing = maps.normals[..., 2] < -0.5
+    assert np.allclose(shaded(gloss, maps, (0, 0))[facing], GREY[facing], atol=1e-6)
+
+
+@pytest.mark.parametrize("roughness", [0.0, 1.0])
+@pytest.mark.parametrize("shape", [(1, 1), (1, 9), (9, 1), (6, 7)])
+def test_mirrors_and_dull_surfaces_of_any_size_are_finite(roughness, shape):
+    photo = np.random.default_rng(0).uniform(0, 1, (*shape, 3)).astype(np.float32)
+    disparity = np.random.default_rng(1).uniform(-1, 3, shape).astype(np.float32)
+    gloss = Gloss(roughness=roughness)
+    maps = maps_of(gloss, disparity, SceneGeometry(8.0, 0.0), photo=photo)
+    assert np.isfinite(shaded(gloss, maps, (1.5, -100.0), photo=photo)).all()
+
+
+@pytest.mark.parametrize("roughness", [0.0, 0.2, 1.0])
+def test_a_plane_seen_edge_on_is_no_brighter_than_the_light(roughness):
+    """Grazing, everything is a mirror: what is reflected replaces the paint."""
+    grazing = 1.45
+    disparity, normal = plane((0, -np.sin(grazing), -np.cos(grazing)))
+    towards = np.array([0, -np.sin(0.2), np.cos(0.2)])
+    gloss = Gloss(roughness=roughness, light=GlossLight(tuple(towards), (0.002, 0.002, 0.002), radius_deg=3.0))
+    maps = maps_of(gloss, disparity, normals=np.broadcast_to(normal, (*SIZE, 3)).copy())
+    light = linear_from_srgb(shaded(gloss, maps, (0, 1)))
+    assert light.min() >= linear_from_srgb(GREY).min() - 1e-4
+    assert light.max() <= max(gloss.light.radiance) + 1e-3
+
+
+def test_without_parallax_nothing_depends_on_the_viewpoint():
+    flat = np.zeros(SIZE, np.float32)
+    maps = maps_of(GLOSS, flat, SceneGeometry(90.0, 0.0))
+    assert np.allclose(shaded(GLOSS, maps, (0, 0)), shaded(GLOSS, maps, (3, 4)), atol=1e-4)
+
+
+def test_what_shows_beside_a_surface_in_other_views_gets_none_of_its_gloss():
+    disparity, _, hit = sphere()
+    gloss = replace(GLOSS, surface=GlossSurface(farthest=0.1), reflectance=1.0)
+    maps = maps_of(gloss, disparity)
+    wall = np.full(SIZE, disparity[~hit].max(), np.float32)
+    assert np.array_equal(shaded(gloss, maps, (0, 3), disparity=wall), GREY)
+
+
+def updates():
+    yield ViewUpdate(1, 1, (GREY * 255).astype(np.uint8), np.full(SIZE, 0.75, np.float32))
+    yield ViewUpdate(1, 0, GREY.astype(np.float16), None)
+
+
+def test_views_keep_their_kind_and_those_without_disparity_stay():
+    maps = maps_of(GLOSS, np.full(SIZE, 0.75, np.float32))
+    given = list(updates())
+    first, second = shade_views(iter(given), GLOSS, maps, GridShape(3, 3))
+    assert first.colors.dtype == np.uint8
+    assert first.colors.max() > given[0].colors.max()
+    assert second is given[1]
+
+
+def test_with_nothing_marked_every_view_is_handed_on_untouched():
+    nothing = replace(GLOSS, surface=GlossSurface(strokes_only=True))
+    maps = maps_of(nothing, np.full(SIZE, 0.75, np.float32))
+    given = list(updates())
+    assert all(made is view for made, view in zip(shade_views(iter(given), nothing, maps, GridShape(3, 3)), given))
