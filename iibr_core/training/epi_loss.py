@@ -15,7 +15,7 @@ DERIVATIVE_SIGMA = 0.8
 """Gaussian of the derivatives: the narrowest that skips no pixel."""
 WINDOW_SIGMA = 2.0
 """Gaussian over products of derivatives: the neighbourhood whose slope is compared, of about 9 views."""
-TRUNCATE_SIGMAS = 4.0
+TRUNCATE_SIGMAS = 3.5
 
 
 def epi_loss(rendered: Tensor, truth: Tensor) -> Tensor:

@@ -1,4 +1,4 @@
-"""What scenes are put together of: shapes that rays meet, in a frame of their own, and the colours on them."""
+"""Shapes that scenes are made of, and their intersections with rays, in the frame of each shape."""
 
 from __future__ import annotations
 
@@ -7,99 +7,71 @@ from math import inf, sqrt
 import numpy as np
 
 from iibr_core.runtime.kernels import kernel
-from iibr_core.training.scenes.textures import inside_pattern, noise, pattern, rough_noise
 
-PLANE, BOX, BALL, WIRE = range(4)
-"""A rectangle, a box, an ellipsoid, the side of a cylinder along its third axis."""
+PLANE, ELLIPSOID, WIRE = range(3)
+"""A rectangle, an ellipsoid, and the side of a cylinder along its third axis."""
+WHOLE, DISC, MESH, LACE = range(4)
+"""Cuts of a plane: none, an ellipse, wires in both directions, ragged noise."""
 
 PRIMITIVE = np.dtype(
     [
         ("shape", "i8"),
         ("centre", "f8", 3),
-        ("axes", "f8", (3, 3)),  # rows: the primitive's own axes in the world, orthonormal
-        ("half", "f8", 3),  # half extents along them
-        ("nearest_z", "f8"),
-        ("cut", "i8"),  # of planes: textures.WHOLE, ...
-        ("cut_period", "f8"),
-        ("cut_width", "f8"),
-        ("pattern", "i8"),
-        ("period", "f8"),
-        ("roughness", "f8"),  # share of rough noise against the pattern
-        ("wavelength", "f8"),  # of the coarsest rough noise
-        ("gain", "f8"),  # strength of each octave of rough noise against the coarser
-        ("tint", "f8"),  # share of the third colour
-        ("phase", "f8", 3),
-        ("palette", "f8", (3, 3)),  # three colours in linear light, 0 .. 1
+        ("axes", "f8", (3, 3)),  # rows: orthonormal axes of the primitive's frame
+        ("half", "f8", 3),  # half extents along the axes
+        ("cut", "i8"),
+        ("cut_period", "f8"),  # distance of the holes
+        ("cut_width", "f8"),  # width of a mesh's wires
+        ("wavelength", "f8"),  # of the coarsest noise
+        ("gain", "f8"),  # strength of each octave of noise against the coarser one
+        ("stripes", "f8"),  # share of stripes against noise
+        ("period", "f8"),  # of the stripes
+        ("palette", "f8", (2, 3)),  # two colours in linear light
         ("seed", "i8"),
+        ("origin", "f8", 3),  # the camera of the current view, in the primitive's frame
+        ("bounds", "f8", 4),  # first and last x, first and last y in the current view, in pixels
     ],
     align=True,
 )
 
 
 @kernel
-def distance_along(shape, ox, oy, oz, ex, ey, ez, hx, hy, hz):
-    """How far along a ray it meets a primitive, both in the primitive's own frame; infinite where it does not."""
-    if shape == PLANE:
-        # The plane z = 0 of its own frame, within its rectangle.
-        z = -oz / ez if ez != 0.0 else inf
-        return z if abs(ox + z * ex) <= hx and abs(oy + z * ey) <= hy else inf
-    if shape == BOX:
-        # Slab test: inside between the last of the near faces and the first of the far ones. Along a face the quotients
-        # are infinite, which compares as it should.
-        ax, bx = (-hx - ox) / ex, (hx - ox) / ex
-        ay, by = (-hy - oy) / ey, (hy - oy) / ey
-        az, bz = (-hz - oz) / ez, (hz - oz) / ez
-        enter = max(min(ax, bx), min(ay, by), min(az, bz))
-        leave = min(max(ax, bx), max(ay, by), max(az, bz))
-        return enter if enter <= leave else inf
-    if shape == BALL:
-        # Scaled to the unit ball: a t^2 + 2 b t + c = 0.
-        ox, oy, oz, ex, ey, ez = ox / hx, oy / hy, oz / hz, ex / hx, ey / hy, ez / hz
-        a, b, c = ex * ex + ey * ey + ez * ez, ox * ex + oy * ey + oz * ez, ox * ox + oy * oy + oz * oz - 1
-    else:
-        # The cylinder about the third axis: the same without z.
-        a, b, c = ex * ex + ey * ey, ox * ex + oy * ey, ox * ox + oy * oy - hx * hx
-    # Missed, or moving away from its middle.
-    inside = b * b - a * c
-    if not inside > 0.0 or b >= 0.0:
+def to_own_frame(p, x, y, z):
+    """Return a direction of the world in the frame of a primitive."""
+    return (
+        p.axes[0, 0] * x + p.axes[0, 1] * y + p.axes[0, 2] * z,
+        p.axes[1, 0] * x + p.axes[1, 1] * y + p.axes[1, 2] * z,
+        p.axes[2, 0] * x + p.axes[2, 1] * y + p.axes[2, 2] * z,
+    )
+
+
+@kernel
+def distance_along(p, ex, ey, ez):
+    """Return the distance to a hit, in lengths of the ray's direction e in the primitive's frame, or infinity."""
+    ox, oy, oz = p.origin[0], p.origin[1], p.origin[2]
+    hx, hy, hz = p.half[0], p.half[1], p.half[2]
+    if p.shape == PLANE:
+        distance = -oz / ez
+        return distance if abs(ox + distance * ex) <= hx and abs(oy + distance * ey) <= hy else inf
+    # Scaled to the unit sphere, or to the cylinder of radius 1: a t^2 + 2 b t + c = 0.
+    ux, uy, vx, vy = ox / hx, oy / hy, ex / hx, ey / hy
+    a, b, c = vx * vx + vy * vy, ux * vx + uy * vy, ux * ux + uy * uy - 1
+    if p.shape == ELLIPSOID:
+        a, b, c = a + (ez / hz) ** 2, b + oz * ez / (hz * hz), c + (oz / hz) ** 2
+    root = b * b - a * c
+    if not root > 0.0 or b >= 0.0:
         return inf
     # The nearer root, in the form that does not cancel digits.
-    z = c / (sqrt(inside) - b)
-    return z if shape == BALL or abs(oz + z * ez) <= hz else inf
+    distance = c / (sqrt(root) - b)
+    return distance if p.shape == ELLIPSOID or abs(oz + distance * ez) <= hz else inf
 
 
 @kernel
-def normal_at(shape, x, y, z, hx, hy, hz):
-    """The unit normal at a point of a primitive, in its own frame."""
-    if shape == PLANE:
+def normal_at(p, x, y, z):
+    """Return the unit normal at a point of a primitive, in its frame."""
+    if p.shape == PLANE:
         return 0.0, 0.0, 1.0
-    if shape == BOX:
-        # The face that the point lies on: its largest coordinate, relative to the box.
-        ax, ay, az = abs(x) / hx, abs(y) / hy, abs(z) / hz
-        if ax >= ay and ax >= az:
-            return 1.0 if x > 0 else -1.0, 0.0, 0.0
-        return (0.0, 1.0 if y > 0 else -1.0, 0.0) if ay >= az else (0.0, 0.0, 1.0 if z > 0 else -1.0)
-    # Along the gradient of (x / hx)^2 + (y / hy)^2 + (z / hz)^2; that of a cylinder has no z.
-    nx, ny, nz = x / (hx * hx), y / (hy * hy), z / (hz * hz) if shape == BALL else 0.0
-    length = max(sqrt(nx * nx + ny * ny + nz * nz), 1e-300)
+    # The gradient of (x / hx)^2 + (y / hy)^2 + (z / hz)^2; a cylinder has no part along z.
+    nx, ny, nz = x / p.half[0] ** 2, y / p.half[1] ** 2, z / p.half[2] ** 2 if p.shape == ELLIPSOID else 0.0
+    length = sqrt(nx * nx + ny * ny + nz * nz)
     return nx / length, ny / length, nz / length
-
-
-@kernel
-def albedo_at(p, x, y, z, pixel):
-    """Colour of a primitive at a point of its own frame, linear light; see textures for `pixel`."""
-    x, y, z = inside_pattern(x) + p.phase[0], inside_pattern(y) + p.phase[1], inside_pattern(z) + p.phase[2]
-    # Mix of pattern and rough noise between two colours of the palette; coarse noise tints it with the third.
-    rough = rough_noise(x, y, z, p.wavelength, p.gain, pixel, p.seed)
-    share = pattern(p.pattern, x, y, z, p.period, pixel, p.seed + 11)
-    share += (rough - share) * p.roughness
-    coarse = 1.7 * p.wavelength
-    tint = p.tint * noise(x / coarse, y / coarse, z / coarse, p.seed + 12)
-    r = p.palette[0, 0] + (p.palette[1, 0] - p.palette[0, 0]) * share
-    g = p.palette[0, 1] + (p.palette[1, 1] - p.palette[0, 1]) * share
-    b = p.palette[0, 2] + (p.palette[1, 2] - p.palette[0, 2]) * share
-    return (
-        r + (p.palette[2, 0] - r) * tint,
-        g + (p.palette[2, 1] - g) * tint,
-        b + (p.palette[2, 2] - b) * tint,
-    )

@@ -1,14 +1,12 @@
-"""Casts rays into procedural scenes: exact disparities, and colours with mixed pixels at edges, of any view.
+"""Cast rays into procedural scenes: colours with mixed pixels at edges, and exact disparities, of any view.
 
-World: the camera of view offset (t, s) stands at (s, t, 0) and looks along z; x is right, y down, one unit is one view
-step. All pictures are sheared to the zero plane, so that a point at depth z has disparity focal / z - infinity_px.
+World: the camera of view offset (t, s) stands at (s, t, 0) and looks along z; x is right, y is down; one unit is one
+view step. Pictures are sheared to the zero plane: a point at depth z has disparity focal / z - infinity_px.
 """
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import lru_cache
 from math import inf, sqrt
 from typing import Any
 
@@ -17,29 +15,21 @@ from numpy.typing import ArrayLike, NDArray
 
 from iibr_core.runtime.kernels import kernel
 from iibr_core.runtime.scalars import srgb_scalar
-from iibr_core.runtime.tiling import THREADS
-from iibr_core.training.scenes.primitives import PLANE, albedo_at, distance_along, normal_at
-from iibr_core.training.scenes.textures import is_cut
+from iibr_core.runtime.tiling import THREADS, in_pieces, pieces_of
+from iibr_core.training.scenes.primitives import PLANE, distance_along, normal_at, to_own_frame
+from iibr_core.training.scenes.textures import albedo_at, is_cut
 from iibr_core.types import FloatImage, ImageSize, ViewOffset
 
 CHUNK_PIXELS = 4096
-FARTHEST = 1e7
-"""Positions (px) and view offsets are cast no farther out than this."""
-SAME_POINT_PX = 1e-3
-"""Disparities that differ by no more are of one point."""
-COARSE_PATTERN_COSINE = 0.5
-"""A surface seen at a smaller cosine than this gets a coarser pattern; above, the samples of a pixel average it."""
-TENT_STEPS = sqrt(6.0)
 
 
 @dataclass(frozen=True, eq=False)
 class RaycastScene:
-    """What can be seen, and the cameras that see it.
+    """Objects, their light, and the cameras that see them.
 
-    primitives: (N,) PRIMITIVE, nearest first; the last is a plane without bounds at the greatest depth, seen wherever
-    nothing else is. centre_px: (x, y) of the centre view's axis. infinity_px: minus the disparity of infinity.
-    depths: least and greatest z; nothing is seen outside. light: unit vector towards it; ambient: share of light from
-    everywhere, 1 = no shading.
+    primitives: (N,) PRIMITIVE; the last is an endless plane at the greatest depth. centre_px: (x, y) of the centre
+    view's axis. infinity_px: minus the disparity of infinity. depths: least and greatest z that are seen. light: unit
+    vector towards it. ambient: share of light from everywhere; 1: no shading.
     """
 
     primitives: NDArray[Any]
@@ -51,194 +41,109 @@ class RaycastScene:
     ambient: float
 
 
-def render(
-    scene: RaycastScene, size: ImageSize, offset: ViewOffset, samples: int = 3, blur_px: float = 0.0
-) -> tuple[FloatImage, FloatImage]:
-    """The view at an offset: colours (H, W, 3), sRGB-encoded, and disparity (H, W), exact at pixel centres.
-
-    size: (height, width). See `cast`.
-    """
+def render(scene: RaycastScene, size: ImageSize, offset: ViewOffset, samples: int = 3) -> tuple[FloatImage, FloatImage]:
+    """Return colours (H, W, 3), sRGB-encoded, and disparity (H, W) of the view at an offset. See `cast`."""
     y, x = np.indices(size)
-    colors, disparity = cast(scene, x.ravel(), y.ravel(), offset, samples, blur_px)
+    colors, disparity = cast(scene, x.ravel(), y.ravel(), offset, samples)
     return colors.reshape(*size, 3), disparity.reshape(size)
 
 
 def cast(
-    scene: RaycastScene, x: ArrayLike, y: ArrayLike, offset: ViewOffset, samples: int = 3, blur_px: float = 0.0
+    scene: RaycastScene, x: ArrayLike, y: ArrayLike, offset: ViewOffset, samples: int = 3
 ) -> tuple[FloatImage, FloatImage]:
-    """Colours (N, 3), sRGB-encoded, and disparities (N,) of the pixels centred at (x, y), px, of the view at an offset.
+    """Return colours (N, 3), sRGB-encoded, and disparities (N,) of the pixels at (x, y) of the view at an offset.
 
-    x, y: (N,), any real positions. samples: squared, the rays of a pixel, averaged in linear light over its square.
-    blur_px: how much wider the lens spreads a pixel (standard deviation, px). The disparity is that of the pixel's
-    centre. Finite whatever the input. Raises ValueError if x and y differ in shape or there is no sample.
+    samples: square root of the number of rays that are averaged over a pixel, in linear light. The disparity is that of
+    the pixel's centre.
     """
-    x, y = np.atleast_1d(_clamp_finite(x)), np.atleast_1d(_clamp_finite(y))
-    if x.shape != y.shape or x.ndim != 1 or samples < 1:
-        raise ValueError(f"x is {x.shape}, y {y.shape}, samples {samples}: give equal (N,) and at least one sample")
+    x, y = np.asarray(x, np.float64), np.asarray(y, np.float64)
     colors, disparity = np.empty((len(x), 3), np.float32), np.empty(len(x), np.float32)
-    places, weights = sample_places(samples, blur_px)
-    margin = float(np.abs(places).max())
-    view = _view_of(scene, offset)
+    places, primitives, lens = sample_places(samples), _primitives_in_view(scene, offset), _lens(scene, offset)
+    light = *scene.light, scene.ambient
 
-    def chunk(first: int) -> None:
-        part = slice(first, first + CHUNK_PIXELS)
-        _cast(x[part], y[part], places, weights, margin, *view, colors[part], disparity[part])
+    def cast_piece(part: slice) -> None:
+        _cast(x[part], y[part], places, primitives, lens, light, colors[part], disparity[part])
 
-    if len(x) <= CHUNK_PIXELS:
-        chunk(0)
-    else:
-        list(_threads().map(chunk, range(0, len(x), CHUNK_PIXELS)))
+    in_pieces(cast_piece, pieces_of(len(x), CHUNK_PIXELS), THREADS)
     return colors, disparity
 
 
-def disparity_at(scene: RaycastScene, x: ArrayLike, y: ArrayLike, offset: ViewOffset) -> FloatImage:
-    """Disparities (N,) seen at the positions (x, y), (N,), px, of the view at an offset."""
-    return cast(scene, x, y, offset, samples=1)[1]
+def sample_places(samples: int) -> NDArray[np.float64]:
+    """Return the offsets (S, 2) of a pixel's rays in (x, y), in pixels.
 
-
-def is_visible_from(
-    scene: RaycastScene,
-    x: ArrayLike,
-    y: ArrayLike,
-    disparity: ArrayLike,
-    offset: ViewOffset,
-    other: ViewOffset = ViewOffset(0.0, 0.0),  # noqa: B008 (immutable)
-) -> NDArray[np.bool_]:
-    """(N,): whether the points at (x, y) with this disparity in one view are seen from another, in frame or not.
-
-    True disocclusion is its negation.
-    """
-    x, y, d = (np.asarray(a, np.float64) for a in (x, y, disparity))
-    across, down = offset.s - other.s, offset.t - other.t
-    there = disparity_at(scene, x + d * across, y + d * down, other)
-    return np.abs(there - d) <= SAME_POINT_PX
-
-
-def _clamp_finite(values: ArrayLike) -> NDArray[np.float64]:
-    """float64; what is not finite or lies too far off counts as 0 or as far off as possible."""
-    return np.clip(np.nan_to_num(np.asarray(values, np.float64)), -FARTHEST, FARTHEST)
-
-
-@lru_cache(maxsize=1)
-def _threads() -> ThreadPoolExecutor:
-    return ThreadPoolExecutor(THREADS, thread_name_prefix="iibr-rays")
-
-
-def sample_places(samples: int, blur_px: float = 0.0) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Where a pixel's rays go: offsets (S, 2) in (x, y), px, the centre first; and their weights (S,), sum 1.
-
-    All rays differ in x and in y, so that edges in rows and columns are mixed in samples**2 steps.
+    All differ in x and in y, so that edges along rows and columns are mixed in samples**2 steps.
     """
     i, j = (a.ravel() for a in np.indices((samples, samples)))
-    q = np.stack([(i + (j + 0.5) / samples) / samples, (j + (i + 0.5) / samples) / samples], axis=-1)
-    tent = np.where(q < 0.5, np.sqrt(2 * q) - 1, 1 - np.sqrt(2 * (1 - q)))
-    places = q - 0.5 + max(blur_px, 0.0) * TENT_STEPS * tent
-    weights = np.full(len(q), 1 / len(q))
-    centre = len(q) // 2
-    if samples % 2:
-        order = np.r_[centre, np.delete(np.arange(len(q)), centre)]
-        places[centre] = 0.0
-        return places[order], weights
-    return np.concatenate([np.zeros((1, 2)), places]), np.r_[0.0, weights]
+    return np.stack([(i + (j + 0.5) / samples) / samples, (j + (i + 0.5) / samples) / samples], axis=-1) - 0.5
 
 
-def _view_of(scene: RaycastScene, offset: ViewOffset) -> tuple[Any, ...]:
-    """What the kernel needs to know of a view."""
-    primitives = scene.primitives
-    camera = _clamp_finite([offset.s, offset.t, 0.0])
-    axes = np.ascontiguousarray(primitives["axes"])
-    origins = np.einsum("nij,nj->ni", axes, camera - primitives["centre"])
-    lens = np.array([*scene.centre_px, scene.focal_px, scene.infinity_px, *scene.depths])
-    light = np.array([*scene.light, scene.ambient])
-    return primitives, axes, origins, _bounds(scene, camera), camera, lens, light
+def _lens(scene: RaycastScene, offset: ViewOffset) -> tuple[float, ...]:
+    """Return the axis (x, y) in pixels, focal length, disparity of infinity, and least and greatest depth of a view."""
+    x, y = scene.centre_px
+    sheared = float(x + scene.infinity_px * offset.s), float(y + scene.infinity_px * offset.t)
+    return *sheared, float(scene.focal_px), float(scene.infinity_px), *map(float, scene.depths)
 
 
-def _bounds(scene: RaycastScene, camera: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(N, 4): each primitive lies within these x and y (first x, last x, first y, last y) of the view, px."""
-    primitives = scene.primitives
+def _primitives_in_view(scene: RaycastScene, offset: ViewOffset) -> NDArray[Any]:
+    """Return the primitives with `origin` and `bounds` of the view at an offset."""
+    primitives, camera = scene.primitives.copy(), np.array([offset.s, offset.t, 0.0])
+    primitives["origin"] = np.einsum("nij,nj->ni", primitives["axes"], camera - primitives["centre"])
     signs = np.stack(np.meshgrid(*[[-1.0, 1.0]] * 3), axis=-1).reshape(8, 1, 3)
-    corners = primitives["centre"] + np.einsum("cnj,njk->cnk", signs * primitives["half"], primitives["axes"])
+    corners = primitives["centre"] + np.einsum("cnj,njk->cnk", signs * primitives["half"], primitives["axes"]) - camera
     in_front = corners[..., 2:] > 1e-9
-    scale = scene.focal_px / np.where(in_front, corners[..., 2:], 1.0)
-    xy = np.array(scene.centre_px) + scene.infinity_px * camera[:2] + scale * (corners[..., :2] - camera[:2])
+    axis, focal = np.array(_lens(scene, offset)[:2]), scene.focal_px
+    xy = axis + focal * corners[..., :2] / np.where(in_front, corners[..., 2:], 1.0)
     low, high = np.where(in_front, xy, -inf).min(axis=0) - 1e-6, np.where(in_front, xy, inf).max(axis=0) + 1e-6
-    return np.stack([low[:, 0], high[:, 0], low[:, 1], high[:, 1]], axis=-1)
+    primitives["bounds"] = np.stack([low[:, 0], high[:, 0], low[:, 1], high[:, 1]], axis=-1)
+    return primitives
 
 
 @kernel
-def _find_met(bounds, x, y, margin, met):
-    """Broad phase: the primitives but the backdrop whose bounds a pixel's rays may meet, in order; returns how many."""
-    count = 0
-    for k in range(len(bounds) - 1):
-        if not (
-            x + margin < bounds[k, 0]
-            or x - margin > bounds[k, 1]
-            or y + margin < bounds[k, 2]
-            or y - margin > bounds[k, 3]
-        ):
-            met[count] = k
-            count += 1
-    return count
+def _nearest_hit(primitives, x, y, dx, dy, least_z, greatest_z):
+    """Return depth and index of the nearest primitive at (x, y), along direction (dx, dy, 1)."""
+    depth, nearest = greatest_z, len(primitives) - 1
+    for k in range(len(primitives) - 1):
+        p = primitives[k]
+        if p.bounds[0] <= x <= p.bounds[1] and p.bounds[2] <= y <= p.bounds[3]:
+            ex, ey, ez = to_own_frame(p, dx, dy, 1.0)
+            z = distance_along(p, ex, ey, ez)
+            if least_z <= z < depth and not is_cut(p, p.origin[0] + z * ex, p.origin[1] + z * ey):
+                depth, nearest = z, k
+    return depth, nearest
 
 
 @kernel
-def _cast(xs, ys, places, weights, margin, primitives, axes, origins, bounds, camera, lens, light, colors, disparity):
-    """See `cast`. places, weights: `sample_places`; lens: centre x, y, focal, infinity, least and greatest z."""
-    focal, infinity, least_z, greatest_z = lens[2], lens[3], lens[4], lens[5]
-    backdrop = len(primitives) - 1
-    met = np.empty(len(primitives), np.int64)
+def _shade(p, x, y, z, depth, focal, light):
+    """Return the light (linear) from a point of a primitive, in its frame."""
+    nx, ny, nz = normal_at(p, x, y, z)
+    # The size of a pixel is that of the centre view, so that all views see the same pattern.
+    cx, cy, cz = to_own_frame(p, p.centre[0], p.centre[1], p.centre[2])
+    cosine = nx * (x + cx) + ny * (y + cy) + nz * (z + cz)
+    cosine /= sqrt((x + cx) ** 2 + (y + cy) ** 2 + (z + cz) ** 2)
+    r, g, b = albedo_at(p, x, y, z, depth / focal / max(abs(cosine), 0.05))
+    # Lambert's law. Both sides of a plane get the same light, because views may see both.
+    lx, ly, lz = to_own_frame(p, light[0], light[1], light[2])
+    towards = nx * lx + ny * ly + nz * lz
+    lit = light[3] + (1 - light[3]) * (abs(towards) if p.shape == PLANE else max(towards, 0.0))
+    return lit * r, lit * g, lit * b
+
+
+@kernel
+def _cast(xs, ys, places, primitives, lens, light, colors, disparity):
+    axis_x, axis_y, focal, infinity, least_z, greatest_z = lens
     for n in range(len(xs)):
-        count = _find_met(bounds, xs[n], ys[n], margin, met)
+        dx, dy = (xs[n] - axis_x) / focal, (ys[n] - axis_y) / focal
+        disparity[n] = focal / _nearest_hit(primitives, xs[n], ys[n], dx, dy, least_z, greatest_z)[0] - infinity
         red, green, blue = 0.0, 0.0, 0.0
-        # A ray a sample. Its direction (wx, wy, 1): distance along it is depth z.
-        for sample in range(len(places)):
-            wx = (xs[n] + places[sample, 0] - lens[0] - infinity * camera[0]) / focal
-            wy = (ys[n] + places[sample, 1] - lens[1] - infinity * camera[1]) / focal
-            # Nearest hit. Primitives come nearest first, so the search ends where none can be nearer.
-            depth, hit = greatest_z, backdrop
-            for m in range(count):
-                k = met[m]
-                p = primitives[k]
-                if p.nearest_z >= depth:
-                    break
-                # The ray in the primitive's own frame; origins are there already.
-                ex = axes[k, 0, 0] * wx + axes[k, 0, 1] * wy + axes[k, 0, 2]
-                ey = axes[k, 1, 0] * wx + axes[k, 1, 1] * wy + axes[k, 1, 2]
-                ez = axes[k, 2, 0] * wx + axes[k, 2, 1] * wy + axes[k, 2, 2]
-                hx, hy, hz = p.half[0], p.half[1], p.half[2]
-                z = distance_along(p.shape, origins[k, 0], origins[k, 1], origins[k, 2], ex, ey, ez, hx, hy, hz)
-                # In the range of depths, nearer than all before, and not through a hole cut into it.
-                if least_z <= z < depth:
-                    u, v = origins[k, 0] + z * ex, origins[k, 1] + z * ey
-                    if p.cut == 0 or not is_cut(p.cut, u, v, hx, hy, p.cut_period, p.cut_width, p.seed):
-                        depth, hit = z, k
-            # The first sample is the pixel's centre: exact disparity, even where it adds no colour (weight 0).
-            if sample == 0:
-                disparity[n] = focal / depth - infinity
-            if weights[sample] == 0.0:
-                continue
-            # Shading: the point in its primitive's frame, the normal there, turned back into the world.
-            p = primitives[hit]
-            ex = axes[hit, 0, 0] * wx + axes[hit, 0, 1] * wy + axes[hit, 0, 2]
-            ey = axes[hit, 1, 0] * wx + axes[hit, 1, 1] * wy + axes[hit, 1, 2]
-            ez = axes[hit, 2, 0] * wx + axes[hit, 2, 1] * wy + axes[hit, 2, 2]
-            u, v, w = origins[hit, 0] + depth * ex, origins[hit, 1] + depth * ey, origins[hit, 2] + depth * ez
-            a, b, c = normal_at(p.shape, u, v, w, p.half[0], p.half[1], p.half[2])
-            nx = axes[hit, 0, 0] * a + axes[hit, 1, 0] * b + axes[hit, 2, 0] * c
-            ny = axes[hit, 0, 1] * a + axes[hit, 1, 1] * b + axes[hit, 2, 1] * c
-            nz = axes[hit, 0, 2] * a + axes[hit, 1, 2] * b + axes[hit, 2, 2] * c
-
-            # Size of a pixel on the surface, from the centre camera, so that all views see the same pattern.
-            px, py = camera[0] + depth * wx, camera[1] + depth * wy
-            towards = nx * px + ny * py + nz * depth
-            cosine = abs(towards) / sqrt(px * px + py * py + depth * depth)
-            pixel = depth / focal * min(max(COARSE_PATTERN_COSINE / max(cosine, 1e-6), 1.0), 20.0)
-            r, g, b = albedo_at(p, u, v, w, pixel)
-
-            # Planes have the same light on both sides, or a view from the other side would change their colour.
-            facing = -1.0 if p.shape == PLANE and towards > 0 else 1.0
-            lit = max(facing * (nx * light[0] + ny * light[1] + nz * light[2]), 0.0)
-            # Lambert's law and ambient light; samples are summed in linear light.
-            lit = weights[sample] * (light[3] + (1 - light[3]) * lit)
-            red, green, blue = red + lit * r, green + lit * g, blue + lit * b
-        colors[n, 0], colors[n, 1], colors[n, 2] = srgb_scalar(red), srgb_scalar(green), srgb_scalar(blue)
+        for i in range(len(places)):
+            x, y = xs[n] + places[i, 0], ys[n] + places[i, 1]
+            dx, dy = (x - axis_x) / focal, (y - axis_y) / focal
+            depth, nearest = _nearest_hit(primitives, x, y, dx, dy, least_z, greatest_z)
+            p = primitives[nearest]
+            ex, ey, ez = to_own_frame(p, dx, dy, 1.0)
+            u, v, w = p.origin[0] + depth * ex, p.origin[1] + depth * ey, p.origin[2] + depth * ez
+            r, g, b = _shade(p, u, v, w, depth, focal, light)
+            red, green, blue = red + r, green + g, blue + b
+        colors[n, 0] = srgb_scalar(red / len(places))
+        colors[n, 1] = srgb_scalar(green / len(places))
+        colors[n, 2] = srgb_scalar(blue / len(places))
