@@ -8,5 +8,5 @@ import numpy as np
 
 
 def log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
-    """Between two positive numbers, each factor as likely as any other."""
+    """Return a random number between two positive numbers, whose logarithm is uniform."""
     return exp(rng.uniform(log(low), log(high)))
