@@ -19,8 +19,9 @@ from iibr_core.formats.images.avif import avif_depth_file, avif_orientation, is_
 from iibr_core.formats.images.heic import heic_orientation, is_heic, read_heic_depth
 from iibr_core.formats.images.lfp import is_lfp, read_lfp_depth
 from iibr_core.formats.images.lif import SOURCE_IMAGE, read_lif
-from iibr_core.formats.images.metadata import parse_packet, read_metadata
+from iibr_core.formats.images.metadata import read_metadata
 from iibr_core.formats.images.picture import upright
+from iibr_core.formats.images.xmp import parse_packet
 from iibr_core.types import InputError
 
 MAX_FILE_BYTES = 512 * 2**20
