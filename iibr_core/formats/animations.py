@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image
 
 from iibr_core.formats.files import reason_of
 from iibr_core.formats.outputs import write_file
@@ -87,6 +86,8 @@ def _write_pictures(
     path: Path, temporary: Path, frames: Iterable[NDArray[np.uint8]], size: ImageSize, rate: float
 ) -> int:
     """Write an animated GIF or WebP; return the number of frames."""
+    from PIL import Image
+
     pictures = [np.ascontiguousarray(pixels) for pixels in frames]
     if not pictures:
         return 0
@@ -103,6 +104,8 @@ def _write_pictures(
 
 def _quantized(frames: Sequence[NDArray[np.uint8]]) -> list[Any]:
     """Return GIF frames with one dithered palette; flat parts would flicker with several."""
+    from PIL import Image
+
     chosen = [frames[i] for i in np.unique(np.linspace(0, len(frames) - 1, PALETTE_SAMPLES).astype(int))]
     step = max(max(chosen[0].shape[:2]) // PALETTE_SIDE_PX, 1)
     sheet = np.concatenate([pixels[::step, ::step] for pixels in chosen], axis=1)

@@ -51,7 +51,7 @@ Tags = dict[int, Any]
 class PictureMetadata:
     """Metadata of a picture.
 
-    exif: as it stands in JPEG files, b"" without. xmp: a packet, b"" without. texts: of this program, by name.
+    exif: in the form of JPEG files, b"" without. xmp: a packet, b"" without. texts: of this program, by name.
     """
 
     exif: bytes = b""

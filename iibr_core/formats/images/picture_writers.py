@@ -67,7 +67,7 @@ class _Content:
 
     @property
     def exif_bytes(self) -> bytes:
-        """Exif as it stands in JPEG files, b"" without."""
+        """Exif in the form of JPEG files, b"" without."""
         return bytes(self.exif.tobytes()) if len(self.exif) else b""
 
 
