@@ -10,9 +10,8 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
-from io import SEEK_END
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 from iibr_core.formats.files import open_binary
 from iibr_core.types import InputError
@@ -20,7 +19,7 @@ from iibr_core.types import InputError
 END_MARK = b"\x1e\x1a"
 TRAILER_BYTES = 6
 JSON_FIELDS = (8, 7)
-MAX_FIELDS, MAX_JSON_BYTES = 1000, 1 << 24
+MAX_FILE_BYTES, MAX_FIELDS, MAX_JSON_BYTES = 1 << 30, 1000, 1 << 24
 SOURCE_IMAGE = -1
 """Number that stands for the file's first JPEG among the fields."""
 LIF_ENDING = ".lif"
@@ -42,36 +41,31 @@ class LifView:
     x: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Lif:
-    """Contents of a Leia image. fields: first byte and length by number. views: from left to right."""
+    """Contents of a Leia image. fields: contents by number. views: from left to right."""
 
-    fields: Mapping[int, tuple[int, int]]
+    fields: Mapping[int, bytes]
     views: tuple[LifView, ...]
 
 
-def read_lif(file: BinaryIO) -> Lif | None:
-    """Return the contents of an open file; None where it is no Leia image."""
-    end = file.seek(0, SEEK_END)
-    file.seek(max(end - TRAILER_BYTES, 0))
-    trailer = file.read(TRAILER_BYTES)
-    region = int.from_bytes(trailer[:4], "big")
-    if not (trailer.endswith(END_MARK) and TRAILER_BYTES < region <= end):
+def read_lif(data: bytes) -> Lif | None:
+    """Return the contents of a file's bytes; None where they are no Leia image."""
+    region, end = int.from_bytes(data[-TRAILER_BYTES:-2], "big"), len(data) - TRAILER_BYTES
+    if not (data.endswith(END_MARK) and TRAILER_BYTES < region <= len(data)):
         return None  # a JPEG may end in any two bytes
-    fields = _fields(file, end - region, end - TRAILER_BYTES)
+    fields = _fields(data[len(data) - region : end])
     described = next((fields[number] for number in JSON_FIELDS if number in fields), None)
     if described is None:
         raise InputError("its Leia fields describe no views; get the whole file again")
-    first, length = described
-    file.seek(first)
-    return Lif(fields, _views(file.read(min(length, MAX_JSON_BYTES)), fields))
+    return Lif(fields, _views(described[:MAX_JSON_BYTES], fields))
 
 
 def open_lif(path: Path) -> Lif | None:
     """Return the contents of a Leia image, None for other files, whose names must not end in .lif."""
     with open_binary(path) as file:
         try:
-            lif = read_lif(file)
+            lif = read_lif(file.read(MAX_FILE_BYTES))
         except InputError as error:
             raise InputError(f"{path}: {error}") from error
     if lif is None and path.suffix.lower() == LIF_ENDING:
@@ -84,25 +78,19 @@ def lif_bytes(path: Path, number: int) -> bytes:
     lif = open_lif(path)
     if lif is None or number not in lif.fields:
         raise InputError(f"{path}: has no picture {number}; get the whole file again")
-    first, length = lif.fields[number]
-    with open_binary(path) as file:
-        file.seek(first)
-        return file.read(length)
+    return lif.fields[number]
 
 
-def _fields(file: BinaryIO, first: int, end: int) -> dict[int, tuple[int, int]]:
+def _fields(region: bytes) -> dict[int, bytes]:
     """Return the fields by number; of several with one number the first counts."""
-    fields: dict[int, tuple[int, int]] = {}
-    file.seek(first)
-    count, at = int.from_bytes(file.read(4), "big"), first + 4
+    fields: dict[int, bytes] = {}
+    count, at = int.from_bytes(region[:4], "big"), 4
     for _ in range(min(count, MAX_FIELDS)):
-        file.seek(at)
-        header = file.read(8)
-        number, length = int.from_bytes(header[:4], "big"), int.from_bytes(header[4:], "big")
+        number, length = (int.from_bytes(region[k : k + 4], "big") for k in (at, at + 4))
         at += 8
-        if at + length > end:
+        if at + length > len(region):
             raise InputError("damaged or cut off (a Leia field goes beyond its end); get the whole file again")
-        fields.setdefault(number, (at, length))
+        fields.setdefault(number, region[at : at + length])
         at += length
     return fields
 
