@@ -42,8 +42,7 @@ def require_video_size(path: Path, size: ImageSize) -> None:
 def write_animation(path: Path, frames: Iterable[NDArray[np.uint8]], size: ImageSize, rate: float) -> None:
     """Write an animation of the kind that the ending states, one of SUFFIXES; whole or not at all.
 
-    frames: (H, W, 3), sRGB-encoded, all of this size. rate: frames a second. Raises InputError for other endings, odd
-    sizes of videos and no frames. Exceptions of the iterator `frames` pass through.
+    frames: (H, W, 3), sRGB-encoded, all of this size. rate: frames a second.
     """
     kind = path.suffix.lower()
     if kind not in SUFFIXES:

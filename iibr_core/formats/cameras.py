@@ -32,7 +32,7 @@ class FieldCameras:
     """Cameras of a field: x to the right, y down, z forward, the centre view's camera in the origin.
 
     size: size of a view. focal_px: its focal length in pixels. range_px: least and greatest disparity (px per view
-    step). at_infinity: disparity of infinitely far points, below the least. Raises InputError for other numbers.
+    step). at_infinity: disparity of infinitely far points, below the least.
     """
 
     grid: GridShape

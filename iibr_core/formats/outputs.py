@@ -16,7 +16,7 @@ from iibr_core.formats.files import reason_of
 from iibr_core.types import InputError
 
 TEMPORARY = ".iibr-"
-"""How the names of unfinished outputs begin."""
+"""Start of the names of unfinished outputs."""
 
 
 class AlreadyThereError(InputError):
@@ -24,10 +24,9 @@ class AlreadyThereError(InputError):
 
 
 def check_output(path: Path, inputs: Iterable[Path] = (), may_replace: bool = False) -> None:
-    """Check that a file may be written to `path`. inputs: files and folders that are read.
+    """Raise InputError unless a file may be written to `path`. inputs: files and folders that are read.
 
-    Raises InputError where its folder is missing or read-only, where it is a folder or a device, and where it is an
-    input or lies in one; AlreadyThereError where it exists and may_replace is false.
+    Raises AlreadyThereError where it exists and may_replace is false.
     """
     real = _resolve(path)
     if real.is_dir():
@@ -45,18 +44,16 @@ def check_output(path: Path, inputs: Iterable[Path] = (), may_replace: bool = Fa
 def check_output_folder(
     folder: Path, inputs: Iterable[Path] = (), may_replace: bool = False, own_files: str | None = None
 ) -> None:
-    """Check that a folder may be made or written to. inputs: files and folders that are read.
+    """Raise InputError unless a folder may be made or written to. inputs: files and folders that are read.
 
-    own_files: a regular expression of the paths in it that this program writes; a folder with others is refused, also
-    with may_replace: it would be replaced as a whole. None: files are added to it.
-    Raises InputError as `check_output` does, and where an input lies in the folder; AlreadyThereError where it is not
-    empty and may_replace is false.
+    own_files: regular expression of the paths in it that this program writes; a folder with others is refused, also
+    with may_replace, because it would be replaced as a whole. None: files are added to the folder. Raises
+    AlreadyThereError where it is not empty and may_replace is false.
     """
     real = _resolve(folder)
     above = next(place for place in (real, *real.parents) if place.exists())
     if not above.is_dir():
-        named = "is" if above == real else f"{above} is"
-        raise InputError(f"{folder}: {named} a file, not a folder; choose another place")
+        raise InputError(f"{folder}: {above} is a file, not a folder; choose another place")
     _require_writable(folder, above)
     inputs = tuple(inputs)
     _require_outside(folder, real, inputs)
@@ -70,7 +67,7 @@ def check_output_folder(
 
 
 def make_folder(folder: Path) -> None:
-    """Make a folder, and those above it, where there is none. Raises InputError."""
+    """Make a folder, and those above it, where there is none."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -79,10 +76,7 @@ def make_folder(folder: Path) -> None:
 
 @contextmanager
 def write_file(path: Path) -> Iterator[Path]:
-    """Yield the name of a file to write, in a hidden folder beside `path`; it goes to `path` when the block ends well.
-
-    Raises InputError where that fails.
-    """
+    """Yield the name of a file to write, in a hidden folder beside `path`; it is renamed when the block ends well."""
     real = _resolve(path)
     if not real.parent.is_dir():
         raise InputError(f"{path}: the folder {path.parent} does not exist; create it or choose another")
@@ -94,10 +88,7 @@ def write_file(path: Path) -> Iterator[Path]:
 
 @contextmanager
 def write_folder(folder: Path) -> Iterator[Path]:
-    """Yield an empty folder to fill, of the same name, beside `folder`; it replaces that when the block ends well.
-
-    Folders above it are made. Raises InputError where that fails.
-    """
+    """Yield an empty folder to fill; it replaces `folder` when the block ends well. Folders above it are made."""
     real = _resolve(folder)
     make_folder(real.parent)
     with _beside(folder, real) as scratch:

@@ -13,7 +13,7 @@ from iibr_core.formats.outputs import write_file
 from iibr_core.types import FloatImage
 
 SH_BASIS_0 = 0.28209479177387814
-"""The constant spherical harmonic: colour = 0.5 + SH_BASIS_0 * f_dc."""
+"""Constant spherical harmonic: colour = 0.5 + SH_BASIS_0 * f_dc."""
 OPACITY = 0.98
 PIXELS_PER_SIGMA = 0.6
 """Radius of a splat in pixels: neighbours then close a surface, with little blur."""

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import tan
 from pathlib import Path
+from typing import Any
 
 import msgspec
 import numpy as np
@@ -31,7 +32,7 @@ Doubles = NDArray[np.float64]
 
 
 class _Frame(msgspec.Struct):
-    """A frame of transforms.json; the file itself may give the same values for all frames. Lengths are in pixels."""
+    """A frame of transforms.json with the values that the file gives for all frames. Lengths are in pixels."""
 
     transform_matrix: tuple[tuple[float, float, float, float], ...] = ()
     file_path: str = ""
@@ -44,17 +45,10 @@ class _Frame(msgspec.Struct):
     camera_angle_x: float | None = None
 
 
-class _Transforms(_Frame):
-    """A transforms.json of nerfstudio, or of NeRF (with `camera_angle_x`)."""
-
-    frames: tuple[_Frame, ...] = ()
-
-
 def read_poses(path: Path) -> tuple[Camera, ...]:
     """Return the cameras of a file in its order: *.npy as poses_bounds.npy, *.json as transforms.json.
 
-    A folder is searched for either of them, else for COLMAP's cameras.txt and images.txt (sorted by picture). Raises
-    InputError if there are no cameras, or one of them is invalid.
+    A folder is searched for either of them, else for COLMAP's cameras.txt and images.txt (sorted by picture).
     """
     if is_folder(path):
         return _read_folder(path)
@@ -85,7 +79,7 @@ def read_llff_poses(path: Path) -> tuple[Camera, ...]:
     """Return the cameras of poses_bounds.npy (Mildenhall et al. 2019) with their depth ranges.
 
     A row holds a 3x5 matrix (camera-to-world rotation with columns down, right and backwards; position; height, width,
-    focal length), then the least and greatest depth. Raises InputError as `read_poses` does.
+    focal length), then the least and greatest depth.
     """
     stored = read_array(path, 17 * MAX_POSES)
     if stored.ndim != 2 or stored.shape[1] != 17 or stored.dtype.kind != "f":
@@ -105,34 +99,31 @@ def _llff_camera(row: Doubles, source: str) -> Camera:
 def _read_transforms(path: Path) -> tuple[Camera, ...]:
     text = read_text(path, MAX_TEXT_BYTES)
     try:
-        transforms = msgspec.json.decode(text, type=_Transforms)
-    except (msgspec.DecodeError, RecursionError) as error:
-        raise InputError(
-            f"{path}: is not a transforms.json with poses ({reason_of(error)}); get the file again"
-        ) from error
-    _require_count(path, len(transforms.frames))
-    return tuple(_frame_camera(transforms, frame, path, number) for number, frame in enumerate(transforms.frames, 1))
+        content = msgspec.json.decode(text, type=dict[str, Any])
+        frames = [msgspec.convert({**content, **frame}, _Frame) for frame in content["frames"]]
+    except (msgspec.MsgspecError, KeyError, TypeError, RecursionError) as error:
+        reason = reason_of(error)
+        raise InputError(f"{path}: is not a transforms.json with poses ({reason}); get the file again") from error
+    _require_count(path, len(frames))
+    return tuple(_frame_camera(frame, path, f"{path}, pose {number}") for number, frame in enumerate(frames, 1))
 
 
-def _frame_camera(transforms: _Transforms, frame: _Frame, path: Path, number: int) -> Camera:
-    def value(name: str) -> float | None:
-        of_frame: float | None = getattr(frame, name)
-        return getattr(transforms, name) if of_frame is None else of_frame
-
-    source = f"{path}, pose {number}"
+def _frame_camera(frame: _Frame, path: Path, source: str) -> Camera:
     matrix = np.array(frame.transform_matrix)
     if len(matrix) not in (3, 4):
         raise InputError(f"{source}: its transform_matrix is not 4x4; get the file again")
-    width, height, focal_x, angle = (value(name) for name in ("w", "h", "fl_x", "camera_angle_x"))
-    has_size = width is not None and height is not None
-    size = _size(height or 0, width or 0, source) if has_size else _picture_size(frame.file_path, path, source)
+    if frame.w is None or frame.h is None:
+        size = _picture_size(frame.file_path, path, source)
+    else:
+        size = _size(frame.h, frame.w, source)
+    focal_x, angle = frame.fl_x, frame.camera_angle_x
     focal_x = 0.5 * size.width / tan(0.5 * angle) if focal_x is None and angle else focal_x
     if focal_x is None:
         raise InputError(f"{source}: neither fl_x nor camera_angle_x gives a focal length; add one of them")
     # Principal points count from the picture's corner there, from the middle of its first pixel here.
-    x, y = (middle if at is None else at - 0.5 for at, middle in zip((value("cx"), value("cy")), _middle(size)))
+    x, y = (middle if at is None else at - 0.5 for at, middle in zip((frame.cx, frame.cy), _middle(size)))
     rotation = matrix[:3, :3] @ OPENGL_FROM_CAMERA
-    return Camera(rotation, matrix[:3, 3], size, (focal_x, value("fl_y") or focal_x), (x, y), source)
+    return Camera(rotation, matrix[:3, 3], size, (focal_x, frame.fl_y or focal_x), (x, y), source)
 
 
 def _picture_size(name: str, path: Path, source: str) -> ImageSize:

@@ -21,6 +21,7 @@ USUAL_VIEWS = 8, 6
 """Columns and rows of a quilt for any display."""
 MAX_USUAL_SIDE_PX = 4096
 MAX_VIEWS_A_SIDE = 32
+MIN_ASPECT = 0.01
 TAG = re.compile(r"_qs(\d{1,6})x(\d{1,6})a(\d{1,6}(?:\.\d{0,9})?)$", re.IGNORECASE)
 """End of the stem of a quilt's name: columns, rows and aspect."""
 
@@ -36,12 +37,6 @@ class Quilt:
     rows: int
     size: ImageSize
     aspect: float
-
-    def __post_init__(self) -> None:
-        if not (1 <= self.columns <= MAX_VIEWS_A_SIDE and 1 <= self.rows <= MAX_VIEWS_A_SIDE):
-            raise InputError(f"a quilt of {self.columns}x{self.rows}: give 1 to {MAX_VIEWS_A_SIDE} views a side")
-        if not 0.01 <= self.aspect <= 100:
-            raise InputError(f"a quilt of aspect {self.aspect:g}: give width / height of a view, 0.01 to 100")
 
     @property
     def views(self) -> int:
@@ -78,22 +73,16 @@ DEVICES = {
 
 
 def quilt_named(path: Path, size: ImageSize) -> Quilt | None:
-    """Return the quilt that a file's name states, None if it states none. size: size of the picture.
-
-    Raises InputError for impossible numbers of views, or more views than the picture has pixels.
-    """
+    """Return the quilt that a file's name states, None if it states none. size: size of the picture."""
     match = TAG.search(path.stem)
     if match is None:
         return None
-    try:
-        quilt = Quilt(int(match[1]), int(match[2]), size, float(match[3]))
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from error
-    if min(quilt.tile) < 1:
-        raise InputError(
-            f"{path}: {size} pixels are too few for {quilt.columns}x{quilt.rows} views; is its name right?"
-        )
-    return quilt
+    columns, rows, aspect = int(match[1]), int(match[2]), float(match[3])
+    if not (1 <= columns <= min(MAX_VIEWS_A_SIDE, size.width) and 1 <= rows <= min(MAX_VIEWS_A_SIDE, size.height)):
+        raise InputError(f"{path}: {size} pixels are too few for {columns}x{rows} views; is its name right?")
+    if not MIN_ASPECT <= aspect <= 1 / MIN_ASPECT:
+        raise InputError(f"{path}: a view has no width / height of {aspect:g}; is its name right?")
+    return Quilt(columns, rows, size, aspect)
 
 
 def quilt_for(device: str | None, view: ImageSize) -> Quilt:

@@ -32,10 +32,7 @@ def save_weights(model: nn.Module, path: Path, metadata: Mapping[str, str] | Non
 
 
 def load_weights(path: Path, model: nn.Module) -> dict[str, str]:
-    """Put the weights of a file into the model and return their metadata.
-
-    Raises InputError, and leaves the model unchanged, for a damaged file, another version or another shape.
-    """
+    """Put the weights of a file into the model, which stays unchanged on errors, and return their metadata."""
     tensors, metadata = read_tensors(path, WEIGHTS)
     require_shapes(path, tensors, {name: tensor.shape for name, tensor in model.state_dict().items()})
     model.load_state_dict(tensors)
@@ -62,16 +59,20 @@ def read_tensors(path: Path, content: str) -> tuple[dict[str, Tensor], dict[str,
 
 
 def read_weights(path: Path, content: str = WEIGHTS) -> tuple[dict[str, NDArray[Any]], dict[str, str]]:
-    """Return arrays by name and the metadata. Raises InputError for damaged files, other content and versions."""
+    """Return arrays by name and the metadata of a file of this content and VERSION."""
     require_file(path)
     try:
         with safe_open(path, framework="np") as file:
             metadata = dict(file.metadata() or {})
-            _require_content(path, metadata, content)
             # Copied, because these may lie in the mapped file, which must be free to be replaced.
             arrays = {name: np.array(file.get_tensor(name)) for name in file.keys()}  # noqa: SIM118
     except (SafetensorError, OSError) as error:
         raise InputError(f"{path}: is not a safetensors file, or is damaged ({reason_of(error)})") from error
+    stored, version = metadata.get("content"), metadata.get("version")
+    if stored != content:
+        raise InputError(f"{path}: holds {stored or 'tensors of unknown origin'}, not {content}; choose another file")
+    if version != VERSION:
+        raise InputError(f"{path}: is version {version} of {content}, this program reads version {VERSION}")
     return arrays, metadata
 
 
@@ -79,19 +80,11 @@ def require_shapes(
     path: Path, tensors: Mapping[str, Tensor | NDArray[Any]], expected: Mapping[str, tuple[int, ...]]
 ) -> None:
     """Raise InputError, with the first difference, unless the names and shapes are the expected ones."""
-    for name in sorted(tensors.keys() | expected.keys()):
-        if name not in tensors:
+    stored = {name: tuple(tensor.shape) for name, tensor in tensors.items()}
+    for name in sorted(stored.keys() | expected.keys()):
+        if name not in stored:
             raise InputError(f"{path}: lacks {name}; it was made for another model")
         if name not in expected:
             raise InputError(f"{path}: holds {name}, which this model lacks; it was made for another model")
-        stored, wanted = tuple(tensors[name].shape), tuple(expected[name])
-        if stored != wanted:
-            raise InputError(f"{path}: {name} is {stored}, this model needs {wanted}; it was made for another model")
-
-
-def _require_content(path: Path, metadata: Mapping[str, str], content: str) -> None:
-    stored, version = metadata.get("content"), metadata.get("version")
-    if stored != content:
-        raise InputError(f"{path}: holds {stored or 'tensors of unknown origin'}, not {content}; choose another file")
-    if version != VERSION:
-        raise InputError(f"{path}: is version {version} of {content}, this program reads version {VERSION}")
+        if stored[name] != (wanted := tuple(expected[name])):
+            raise InputError(f"{path}: {name} is {stored[name]}, this model needs {wanted}; choose another file")

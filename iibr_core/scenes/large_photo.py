@@ -12,7 +12,7 @@ from iibr_core.depth.edges.refine import refine
 from iibr_core.depth.editing.canvas import apply_edits
 from iibr_core.depth.editing.edits import UNEDITED
 from iibr_core.depth.search import disparity_of_file, read_shown_photo
-from iibr_core.formats.maps.reader import read_map_header
+from iibr_core.formats.maps.reader import read_map_size
 from iibr_core.formats.maps.resample import resample_surfaces
 from iibr_core.inpainting.registry import load_inpainter
 from iibr_core.method.light_field import complete_rays
@@ -85,4 +85,4 @@ def _larger_map(loaded: LoadedPhoto) -> Path | None:
     if loaded.origin.file is None:
         return None
     file = Path(loaded.origin.file)
-    return file if math.prod(read_map_header(file).size) > math.prod(loaded.photo.size) else None
+    return file if math.prod(read_map_size(file)) > math.prod(loaded.photo.size) else None

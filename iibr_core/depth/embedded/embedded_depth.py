@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from io import BytesIO
 from pathlib import Path
 
 from iibr_core.depth.embedded.apple import appended_estimate, heic_estimate
@@ -19,8 +18,9 @@ from iibr_core.formats.images.avif import avif_depth_file, avif_orientation, is_
 from iibr_core.formats.images.heic import heic_orientation, is_heic, read_heic_depth
 from iibr_core.formats.images.lfp import is_lfp, read_lfp_depth
 from iibr_core.formats.images.lif import SOURCE_IMAGE, read_lif
-from iibr_core.formats.images.metadata import parse_packet, read_metadata
+from iibr_core.formats.images.metadata import read_metadata
 from iibr_core.formats.images.picture import upright
+from iibr_core.formats.images.xmp import parse_packet
 from iibr_core.types import InputError
 
 MAX_FILE_BYTES = 512 * 2**20
@@ -146,9 +146,8 @@ def leia_estimate(data: bytes) -> RelativeInverseDepth | None:
 
     Raises InputError where it is damaged.
     """
-    leia = read_lif(BytesIO(data))
+    leia = read_lif(data)
     view = next((view for view in leia.views if view.image == SOURCE_IMAGE), None) if leia is not None else None
     if leia is None or view is None or view.inverse_depth is None:
         return None
-    first, length = leia.fields[view.inverse_depth]
-    return RelativeInverseDepth(decode_map(data[first : first + length], "Leia's map of inverse depth"))
+    return RelativeInverseDepth(decode_map(leia.fields[view.inverse_depth], "Leia's map of inverse depth"))

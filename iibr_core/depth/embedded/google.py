@@ -18,7 +18,7 @@ from iibr_core.depth.embedded.images import JPEG_START, PNG_START, decode_map
 from iibr_core.depth.embedded.xmp import JpegLayout, Xmp, number_in
 from iibr_core.depth.estimates import Estimate, MetricDepth, RelativeInverseDepth
 from iibr_core.formats.files import printable
-from iibr_core.formats.images.metadata import value_in
+from iibr_core.formats.images.xmp import value_in
 from iibr_core.types import FloatImage, InputError
 
 GDEPTH = "http://ns.google.com/photos/1.0/depthmap/"

@@ -12,7 +12,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from xml.etree.ElementTree import Element
 
-from iibr_core.formats.images.metadata import MAX_PACKET_BYTES, parse_packet, value_in
+from iibr_core.formats.images.xmp import MAX_PACKET_BYTES, parse_packet, value_in
 from iibr_core.types import InputError
 
 STANDARD_HEADER = b"http://ns.adobe.com/xap/1.0/\0"

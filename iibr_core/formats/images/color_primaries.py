@@ -72,5 +72,5 @@ def space_of_matrix(matrix: NDArray[np.float64], name: str = UNNAMED) -> ColorSp
     for known in (SRGB, DISPLAY_P3):
         if np.abs(matrix - np.array(known.xyz_from_linear)).max() < MAX_XYZ_DIFFERENCE:
             return known
-    red, green, blue = (tuple(map(float, row)) for row in matrix)
-    return ColorSpace(name, (red, green, blue))  # type: ignore[arg-type]  # three numbers each
+    red, green, blue = ((float(x), float(y), float(z)) for x, y, z in matrix)
+    return ColorSpace(name, (red, green, blue))

@@ -1,8 +1,7 @@
 """Colours of photos by the colour profile (ICC) or the numbers (CICP) in their files.
 
 Photos have profiles of one kind: a curve for each of red, green and blue, then a matrix (ICC.1:2022, annex F.3). They
-are computed here with all the bits of the photo. The primaries stay the photo's own, so no colour is lost. The numbers
-are those of ITU-T H.273; PQ and HLG, the curves of HDR photos, are known by them.
+are computed here with all the bits of the photo, whose primaries stay. The numbers are those of ITU-T H.273.
 """
 
 from __future__ import annotations
@@ -39,7 +38,7 @@ KNOTS = 65536
 """Number of values of a curve: one for each value of 16 bits."""
 SAME_CURVE = 1 / 255
 """Largest difference of encoded values within one curve: a step of 8 bits, as small profiles of sRGB are off."""
-PARAMETRIC = {0: 1, 1: 3, 2: 4, 3: 5, 4: 7}
+PARAMETRIC = (1, 3, 4, 5, 7)
 """Number of parameters of each kind of formula (ICC.1:2022, table 68)."""
 MAX_PROFILE_BYTES = 4 * 2**20
 """Largest profile; those with a table for every colour, for printers, have one or two megabytes."""
@@ -177,12 +176,13 @@ def color_profile(data: bytes) -> ColorProfile:
         tags = _tags(data)
         if (coded := profile_of_codes(tuple(tags.get(b"cicp", b"")[8:10]))) is not None and coded.hdr:
             return coded
-        matrix = np.stack([_xyz(tags[name]) for name in (b"rXYZ", b"gXYZ", b"bXYZ")], axis=1)
+        colors = [struct.unpack_from(">3i", tags[name], 8) for name in (b"rXYZ", b"gXYZ", b"bXYZ")]
         curves = np.stack([_curve(tags[name]) for name in (b"rTRC", b"gTRC", b"bTRC")])
     except KeyError as error:
         raise UnusableProfileError("has no curves with a matrix") from error
     except (struct.error, IndexError) as error:
         raise UnusableProfileError("is damaged") from error
+    matrix = np.array(colors).T / 65536
     if not (np.isfinite(curves).all() and abs(np.linalg.det(matrix)) > MIN_DETERMINANT):
         raise UnusableProfileError("is damaged")
     return ColorProfile(np.clip(curves, 0, 1).astype(np.float32), space_of_matrix(matrix))
@@ -197,18 +197,12 @@ def _tags(data: bytes) -> dict[bytes, bytes]:
     return {name: data[start : start + size] for name, start, size in entries}
 
 
-def _xyz(tag: bytes) -> NDArray[np.float64]:
-    return np.array(struct.unpack_from(">3i", tag, 8)) / 65536
-
-
 def _curve(tag: bytes) -> NDArray[np.float64]:
     """Return linear light (KNOTS,) of evenly spaced values, from a table (clause 10.6) or a formula (10.18)."""
     x = np.linspace(0, 1, KNOTS)
     (count,) = struct.unpack_from(">I", tag, 8)
     if tag[:4] == b"para":
         kind = count >> 16
-        if kind not in PARAMETRIC:
-            raise UnusableProfileError("is damaged")
         return _formula(kind, x, np.array(struct.unpack_from(f">{PARAMETRIC[kind]}i", tag, 12)) / 65536)
     if tag[:4] != b"curv":
         raise UnusableProfileError("has no curves with a matrix")
@@ -217,21 +211,17 @@ def _curve(tag: bytes) -> NDArray[np.float64]:
     if count > KNOTS:
         raise UnusableProfileError("is damaged")
     table = np.array(struct.unpack_from(f">{count}H", tag, 12))
-    if count == 1:
-        return x ** float(table[0] / 256)
-    return np.interp(x, np.linspace(0, 1, count), table / 65535)
+    return x ** float(table[0] / 256) if count == 1 else np.interp(x, np.linspace(0, 1, count), table / 65535)
 
 
 def _formula(kind: int, x: NDArray[np.float64], parameters: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return (a x + b)^g + e where x >= d, else c x + f."""
-    usual = (1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    g, a, b, c, d, e, f = (*map(float, parameters), *usual[len(parameters) :])
+    defaults = (1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    g, a, b, c, d, e, f = (*map(float, parameters), *defaults[len(parameters) :])
     if kind in (1, 2):
         # The third parameter of these kinds is added to both parts; the power begins where its base is 0.
-        e = f = c
+        e = f = c if kind == 2 else 0.0
         c, d = 0.0, -b / a if a else 0.0
-        if kind == 1:
-            e = f = 0.0
     with np.errstate(all="ignore"):
         power = np.maximum(a * x + b, 0) ** g + e
     return np.asarray(np.where(x >= d, power, c * x + f))

@@ -15,7 +15,7 @@ from PIL.Image import Image
 
 from iibr_core.color import ROWS_AT_ONCE
 from iibr_core.formats.files import reason_of, require_file
-from iibr_core.formats.images.avif import is_avif, open_avif, read_avif
+from iibr_core.formats.images.avif import is_avif, open_avif
 from iibr_core.formats.images.file_kinds import raw_kind, unreadable_kind
 from iibr_core.formats.images.heic import heic_size, is_heic, read_heic
 from iibr_core.formats.images.lfp import is_lfp, lfp_size, read_lfp
@@ -38,7 +38,6 @@ NO_READER = "could not find a format reader"
 FLOATING_TYPES = ("half", "float", "double")
 LINEAR_TRANSFERS = (2, 8)
 """Transfer curves of ITU-T H.273 that leave light unchanged: "unspecified" and "linear"."""
-MAX_ICON_PICTURES = 100
 COLOR_MODELS = {"CMYK": "CMYK", "YCCK": "CMYK", "LAB": "LAB"}
 """Colour models by parts of the names that OpenImageIO gives to them."""
 
@@ -59,26 +58,22 @@ class _Stored(NamedTuple):
 def decode(path: Path, number: int = 0) -> Picture:
     """Read a picture as its file stores it: without conversion of its colours, and not turned by its orientation.
 
-    Palettes and CMYK become RGB. number: the picture within the file; 0 is the one that every program shows. Raises
-    InputError if the file is missing, no picture, cut off, or larger than MAX_FILE_PIXELS.
+    Palettes and CMYK become RGB. number: the picture within the file; 0 is the one that every program shows.
     """
-    if is_avif(path):
-        return read_avif(path)
     if is_heic(path):
         return read_heic(path, number)
     if is_lfp(path):
         return read_lfp(path)
-    if number == 0:
-        return _decode_with_oiio(path)
-    with _open_numbered(path, number) as image:
-        return picture_of(image)
+    if number or is_avif(path):
+        with _open_with_pillow(path, number) as image:
+            return picture_of(image)
+    return _decode_with_oiio(path)
 
 
 def decode_bands(path: Path) -> Iterator[Picture]:
     """Yield the first picture of a file from top to bottom, some rows at a time where that saves memory.
 
-    Files with alpha or linear light, and those that OpenImageIO does not read, come as one. Raises InputError as
-    `decode` does.
+    Files with alpha or linear light, and those that OpenImageIO does not read, come as one.
     """
     if not (is_avif(path) or is_heic(path) or is_lfp(path)):
         source = _open(path)
@@ -91,16 +86,16 @@ def decode_bands(path: Path) -> Iterator[Picture]:
 
 
 def read_size(path: Path, number: int = 0) -> ImageSize:
-    """Return the size of a picture as stored, from the file's header. Raises InputError as `decode` does."""
+    """Return the size of a picture as stored, from the file's header."""
     if is_heic(path):
         return heic_size(path, number)
     if is_lfp(path):
         return lfp_size(path)
-    if number == 0 and not is_avif(path):
-        spec = _open(path).spec()
-        return ImageSize(spec.height, spec.width)
-    with open_avif(path) if is_avif(path) else _open_numbered(path, number) as image:
-        return ImageSize(image.height, image.width)
+    if number or is_avif(path):
+        with _open_with_pillow(path, number) as image:
+            return ImageSize(image.height, image.width)
+    spec = _open(path).spec()
+    return ImageSize(spec.height, spec.width)
 
 
 def read_orientation(path: Path) -> int:
@@ -150,9 +145,12 @@ def complaint_of(source: Any) -> str:
 
 
 @contextmanager
-def _open_numbered(path: Path, number: int) -> Iterator[Image]:
-    """Open a further picture of a Leia image or a multi-picture JPEG."""
-    if open_lif(path) is not None:
+def _open_with_pillow(path: Path, number: int) -> Iterator[Image]:
+    """Open an AVIF, or a further picture of a Leia image or a multi-picture JPEG."""
+    if number == 0:
+        with open_avif(path) as image:
+            yield image
+    elif open_lif(path) is not None:
         with open_with_pillow(path, *PICTURE, lif_bytes(path, number)) as image:
             yield image
     else:
@@ -174,7 +172,7 @@ def _decode_with_oiio(path: Path) -> Picture:
 
 
 def _read_rows(path: Path, source: Any, stored: _Stored) -> Iterator[NDArray[Any]]:
-    """Yield the rows of a picture from top to bottom, (h, W, channels). Raises InputError where it is damaged."""
+    """Yield the rows of a picture from top to bottom, (h, W, channels)."""
     spec, oiio_type = source.spec(), stored.dtype.removesuffix("32")
     step = spec.tile_height or ROWS_AT_ONCE
     for first in range(0, spec.height, step):
@@ -208,7 +206,7 @@ def _facts(spec: Any) -> dict[str, Any]:
 
 
 def _open(path: Path) -> Any:
-    """Open a picture and check its header. Raises InputError."""
+    """Open a picture and check its header."""
     require_file(path)
     if (raw := raw_kind(path)) is not None:
         raise InputError(f"{path}: is {raw.name}; {raw.way_out}")
@@ -234,7 +232,7 @@ def _open(path: Path) -> Any:
 def _seek_largest(source: Any) -> None:
     """Choose the largest picture of an icon."""
     sizes: list[int] = []
-    while len(sizes) < MAX_ICON_PICTURES and source.seek_subimage(len(sizes), 0):
+    while source.seek_subimage(len(sizes), 0):
         sizes.append(source.spec().width * source.spec().height)
     complaint_of(source)
     source.seek_subimage(sizes.index(max(sizes)), 0)

@@ -7,9 +7,10 @@ from pathlib import Path
 
 from PIL import Image
 
-from iibr_core.formats.images.metadata import parse_packet, read_metadata, value_in
+from iibr_core.formats.images.metadata import read_metadata
 from iibr_core.formats.images.pillow_reader import DECODE_ERRORS
 from iibr_core.formats.images.side_by_side import stated_pair
+from iibr_core.formats.images.xmp import parse_packet, value_in
 from iibr_core.types import InputError
 
 GPANO = "http://ns.google.com/photos/1.0/panorama/"
@@ -21,7 +22,7 @@ ANIMATED_FORMATS = ("GIF", "PNG", "WEBP", "AVIF")
 def file_notes(path: Path) -> tuple[str, ...]:
     """Return a sentence for each thing in a photo's file that is shown in part, or not as it was meant.
 
-    Raises InputError as `stated_pair` does; a damaged header gives no notes.
+    A damaged header gives no notes.
     """
     pair = stated_pair(path)
     return (*(() if pair is None else (pair.note,)), *_panorama_notes(path), *_animation_notes(path))

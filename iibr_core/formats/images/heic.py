@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image
 
 from iibr_core.formats.files import MAX_FILE_PIXELS, open_binary, reason_of, require_file
 from iibr_core.formats.images.picture import Picture, opaque_as_none, require_sound_size
-from iibr_core.formats.images.pillow_reader import DECODE_ERRORS, EXIF_ERRORS, ORIENTATION_TAG, facts_of
+from iibr_core.formats.images.pillow_reader import DECODE_ERRORS, exif_of, facts_of, sound_orientation
 from iibr_core.types import FloatImage, ImageSize, InputError
 
 BRANDS = frozenset({b"heic", b"heix", b"heim", b"heis", b"hevc", b"hevx", b"mif1", b"msf1"})
@@ -28,27 +28,24 @@ class HeicDepth:
 
 
 def is_heic(path: Path) -> bool:
-    """Return whether a file begins as HEIF files do, whatever its name. Raises InputError where it cannot be read."""
+    """Return whether a file begins as HEIF files do, whatever its name."""
     with open_binary(path) as file:
         start = file.read(12)
     return start[4:8] == b"ftyp" and start[8:12] in BRANDS
 
 
 def read_heic(path: Path, number: int = 0) -> Picture:
-    """Decode a HEIC's photo, which libheif turns upright, or the picture of another number, see `heic_pair`.
-
-    Raises InputError where it is missing, damaged or too large.
-    """
-    file = _open(path, number)
-    pixels = _pixels(path, file)
+    """Decode a HEIC's photo, which libheif turns upright, or the picture of another number, see `heic_pair`."""
+    picture = _open(path, number)
+    pixels = _pixels(path, picture)
     alpha = opaque_as_none(pixels[..., 3]) if pixels.shape[2] == 4 else None
-    is_premultiplied = bool(getattr(file, "premultiplied_alpha", False))
+    is_premultiplied = bool(getattr(picture, "premultiplied_alpha", False))
     colors = pixels[..., : 3 if pixels.shape[2] >= 3 else 1]
-    return Picture(colors, alpha, is_premultiplied, **facts_of(file.info, ImageSize(file.size[1], file.size[0])))
+    return Picture(colors, alpha, is_premultiplied, **facts_of(picture.info, heic_size(path, number)))
 
 
 def heic_size(path: Path, number: int = 0) -> ImageSize:
-    """Return the size of a HEIC's picture from its header. Raises InputError as `read_heic` does."""
+    """Return the size of a HEIC's picture from its header."""
     width, height = _open(path, number).size
     return ImageSize(height, width)
 
@@ -56,14 +53,11 @@ def heic_size(path: Path, number: int = 0) -> ImageSize:
 def heic_pair(path: Path) -> tuple[int, int] | None:
     """Return the numbers of the left and the right eye's picture (ISO/IEC 23008-12, `ster`); None without such a group.
 
-    A picture's number is its place in the file, except that the photo itself and the first picture are swapped. Raises
-    InputError as `read_heic` does, and for a group of other than two pictures.
+    A picture's number is its place in the file, except that the photo itself and the first picture are swapped.
     """
     file = _open_file(path)
-    try:
+    with _damage_named(path):
         groups = [group for group in file.info.get("entity_groups") or () if group.get("type") == "ster"]
-    except DECODE_ERRORS as error:
-        raise InputError(f"{path}: damaged or cut off ({reason_of(error)}); get the whole file again") from error
     if not groups:
         return None
     places = [place for place in groups[0].get("images") or () if isinstance(place, int)]
@@ -79,7 +73,7 @@ def _swapped(number: int, primary: int) -> int:
 
 
 def read_heic_depth(path: Path) -> HeicDepth | None:
-    """Return the depth map of a portrait photo, None without. Raises InputError where it is damaged."""
+    """Return the depth map of a portrait photo, None without."""
     maps = _open(path).info.get("depth_images") or []
     if not maps:
         return None
@@ -91,52 +85,48 @@ def read_heic_depth(path: Path) -> HeicDepth | None:
     return HeicDepth(np.ascontiguousarray(pixels[..., 0]) * scale, dict(maps[0].info.get("metadata") or {}))
 
 
-def heic_orientation(path: Path) -> int:
-    """Return Exif's Orientation, 1..8, of a HEIC; its photo is read upright. Raises InputError as `read_heic` does."""
-    exif = Image.Exif()
-    with suppress(*EXIF_ERRORS):
-        exif.load(_open(path).info.get("exif") or b"")
-    orientation = exif.get(ORIENTATION_TAG, 1)
-    return int(orientation) if orientation in range(1, 9) else 1
-
-
 def heic_info(path: Path) -> dict[str, Any]:
-    """Return pillow-heif's description of a HEIC's photo. Raises InputError as `read_heic` does."""
+    """Return pillow-heif's description of a HEIC's photo."""
     return dict(_open(path).info)
 
 
-def heic_auxiliaries(path: Path) -> tuple[str, ...]:
-    """Return the types of the auxiliary pictures of a HEIC, but depth and alpha.
+def heic_orientation(path: Path) -> int:
+    """Return Exif's Orientation, 1..8, of a HEIC; its photo is read upright."""
+    return sound_orientation(exif_of(heic_info(path)))
 
-    Raises InputError as `read_heic` does.
-    """
-    return tuple(str(kind) for kind in _open(path).info.get("aux") or {})
+
+def heic_auxiliaries(path: Path) -> tuple[str, ...]:
+    """Return the types of the auxiliary pictures of a HEIC, but depth and alpha."""
+    return tuple(str(kind) for kind in heic_info(path).get("aux") or {})
 
 
 def _open_file(path: Path) -> Any:
     import pillow_heif
 
     require_file(path)
-    try:
+    with _damage_named(path):
         return pillow_heif.open_heif(path, convert_hdr_to_8bit=False)
-    except DECODE_ERRORS as error:
-        raise InputError(f"{path}: cannot be read as a HEIC picture ({reason_of(error)})") from error
 
 
 def _open(path: Path, number: int = 0) -> Any:
     file = _open_file(path)
-    try:
+    with _damage_named(path):
         picture = file[_swapped(number, file.primary_index)] if number else file
         width, height = picture.size
-    except DECODE_ERRORS as error:
-        raise InputError(f"{path}: cannot be read as a HEIC picture ({reason_of(error)})") from error
     require_sound_size(path, width, height, width * height * 4)
     return picture
 
 
 def _pixels(path: Path, picture: Any) -> NDArray[Any]:
-    try:
+    with _damage_named(path):
         pixels = np.array(picture)  # a copy: pillow-heif 1.0's own array does not outlive the file
+    return pixels.reshape(*pixels.shape[:2], -1)
+
+
+@contextmanager
+def _damage_named(path: Path) -> Iterator[None]:
+    """Raise InputError for libheif's errors."""
+    try:
+        yield
     except DECODE_ERRORS as error:
         raise InputError(f"{path}: damaged or cut off ({reason_of(error)}); get the whole file again") from error
-    return pixels.reshape(*pixels.shape[:2], -1)

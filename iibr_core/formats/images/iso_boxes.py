@@ -30,6 +30,11 @@ def box(kind: bytes, content: bytes) -> bytes:
     return struct.pack(">I4s", 8 + len(content), kind) + content
 
 
+def joined(contents: dict[bytes, bytes]) -> bytes:
+    """Return boxes by their kinds in a row."""
+    return b"".join(box(kind, content) for kind, content in contents.items())
+
+
 def color_codes_of(file: bytes) -> tuple[int, int, int, int] | None:
     """Return a picture's colours in numbers (ITU-T H.273): primaries, transfer curve, matrix, full range; None without.
 
@@ -37,10 +42,11 @@ def color_codes_of(file: bytes) -> tuple[int, int, int, int] | None:
     """
     try:
         meta = dict(boxes(dict(boxes(file))[b"meta"][4:]))
-        held = _item_properties(meta)[_primary_item(meta[b"pitm"])]
+        (item,) = struct.unpack_from(">I" if meta[b"pitm"][0] else ">H", meta[b"pitm"], 4)
+        properties = _item_properties(meta)[item]
     except DAMAGE:
         return None
-    for kind, content in held:
+    for kind, content in properties:
         if kind == b"colr" and content[:4] == b"nclx" and len(content) >= COLOR_CODES_BYTES:
             primaries, transfer, matrix = struct.unpack_from(">HHH", content, 4)
             return primaries, transfer, matrix, content[10] >> 7
@@ -54,16 +60,29 @@ def with_auxiliary_shown(file: bytes, types: tuple[bytes, ...]) -> bytes | None:
     """
     try:
         meta = dict(boxes(dict(boxes(file))[b"meta"][4:]))
-        held, pitm = _item_properties(meta), meta[b"pitm"]
+        pitm = meta[b"pitm"]
         form = ">I" if pitm[0] else ">H"
-        for item, properties in held.items():
-            kinds = [content[4:].split(b"\0")[0] for kind, content in properties if kind == b"auxC"]
-            if any(kind in types for kind in kinds):
+        for item, properties in _item_properties(meta).items():
+            if any(kind == b"auxC" and content[4:].split(b"\0")[0] in types for kind, content in properties):
                 shown = pitm[:4] + struct.pack(form, item) + pitm[4 + struct.calcsize(form) :]
                 return file.replace(box(b"pitm", pitm), box(b"pitm", shown), 1)
     except DAMAGE:
         pass
     return None
+
+
+def _associations(ipma: bytes) -> dict[int, list[int]]:
+    """Return the numbers of each item's properties, counted from 1 (ISO/IEC 23008-12, `ipma`)."""
+    item_form, item_bytes = (">H", 2) if ipma[0] < 1 else (">I", 4)
+    size, mask = (2, 0x7FFF) if ipma[3] & 1 else (1, 0x7F)
+    (count,), at = struct.unpack_from(">I", ipma, 4), 8
+    numbers = {}
+    for _ in range(count):
+        (item,), held = struct.unpack_from(item_form, ipma, at), ipma[at + item_bytes]
+        at += item_bytes + 1
+        numbers[item] = [int.from_bytes(ipma[k : k + size], "big") & mask for k in range(at, at + size * held, size)]
+        at += size * held
+    return numbers
 
 
 def _item_properties(meta: dict[bytes, bytes]) -> dict[int, list[tuple[bytes, bytes]]]:
@@ -74,24 +93,3 @@ def _item_properties(meta: dict[bytes, bytes]) -> dict[int, list[tuple[bytes, by
         item: [properties[number - 1] for number in numbers if 1 <= number <= len(properties)]
         for item, numbers in _associations(iprp[b"ipma"]).items()
     }
-
-
-def _primary_item(pitm: bytes) -> int:
-    item: int = struct.unpack_from(">I" if pitm[0] else ">H", pitm, 4)[0]
-    return item
-
-
-def _associations(ipma: bytes) -> dict[int, list[int]]:
-    """Return the numbers of each item's properties, counted from 1 (ISO/IEC 23008-12, `ipma`)."""
-    version, has_wide_numbers = ipma[0], ipma[3] & 1
-    (count,), at = struct.unpack_from(">I", ipma, 4), 8
-    item_form, item_bytes = (">H", 2) if version < 1 else (">I", 4)
-    size = 2 if has_wide_numbers else 1
-    found = {}
-    for _ in range(count):
-        (item,), held = struct.unpack_from(item_form, ipma, at), ipma[at + item_bytes]
-        at += item_bytes + 1
-        entries = (int.from_bytes(ipma[at + size * k : at + size * (k + 1)], "big") for k in range(held))
-        found[item] = [entry & (0x7FFF if has_wide_numbers else 0x7F) for entry in entries]
-        at += size * held
-    return found

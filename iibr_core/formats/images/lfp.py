@@ -8,12 +8,11 @@ that names them. Depth is "lambda", how far the focus is from the captured one: 
 from __future__ import annotations
 
 import json
-import struct
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,104 +27,96 @@ LFP_START = b"\x89LFP\r\n\x1a\n"
 SECTION_START = b"\x89LF"
 JSON_KIND = b"M"
 HEADER_BYTES, NAME_BYTES, ALIGNMENT = 16, 80, 16
-MAX_SECTIONS, MAX_JSON_BYTES, MAX_PICTURES = 10_000, 1 << 24, 64
+MAX_FILE_BYTES, MAX_JSON_BYTES, MAX_PICTURES = 1 << 30, 1 << 24, 64
 PICTURE = ("JPEG", "PNG"), "a picture in a Lytro file"
-DAMAGE = (KeyError, TypeError, ValueError, AttributeError, RecursionError, OverflowError, struct.error)
+DAMAGE = (KeyError, TypeError, ValueError, AttributeError, RecursionError, OverflowError)
+
+Chunks = Mapping[str, bytes]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class LfpPictures:
     """Pictures of one size, focused at several depths.
 
-    chunks: the file of each picture; or one chunk, a film of H.264, for all. focus: lambda of each, ascending where
-    there are several pictures. frames: number of each picture in the film, () where there is no film.
+    files: the file of each picture; or one film of H.264 for all. focus: lambda of each, ascending where there are
+    several pictures. frames: number of each picture in the film, () where there is no film.
     """
 
-    chunks: tuple[str, ...]
+    files: tuple[bytes, ...]
     focus: tuple[float, ...]
     frames: tuple[int, ...]
     size: ImageSize
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Lfp:
-    """Contents of a processed file.
+    """Contents of a processed file. pictures: None where it holds the map only. depth: (h, w), None without a map."""
 
-    chunks: first byte and length of each by its name. pictures: None where it holds the map only. depth: the chunk and
-    the size of the map, None without.
-    """
-
-    chunks: Mapping[str, tuple[int, int]]
     pictures: LfpPictures | None
-    depth: tuple[str, ImageSize] | None
+    depth: FloatImage | None
 
 
 def is_lfp(path: Path) -> bool:
-    """Return whether a file begins as Lytro's do, raw or processed. Raises InputError where it cannot be read."""
+    """Return whether a file begins as Lytro's do, raw or processed."""
     with open_binary(path) as file:
         return file.read(len(LFP_START)) == LFP_START
 
 
 def open_lfp(path: Path) -> Lfp | None:
-    """Return the contents of a processed Lytro file; None for raw ones and other files.
-
-    Raises InputError where it is damaged.
-    """
+    """Return the contents of a processed Lytro file; None for raw ones and other files."""
     if not is_lfp(path):
         return None
+    with open_binary(path) as file:
+        text, chunks = _sections(file.read(MAX_FILE_BYTES))
     try:
-        with open_binary(path) as file:
-            text, chunks = _sections(file)
         return _processed(list(_objects(json.loads(text))), chunks) if text else None
     except DAMAGE as error:
         raise InputError(f"{path}: damaged or too new ({reason_of(error)}); get the whole file again") from error
 
 
 def lfp_size(path: Path) -> ImageSize:
-    """Return the size of the picture. Raises InputError as `read_lfp` does."""
-    return _pictures(path)[1].size
+    """Return the size of the picture."""
+    return _pictures_and_depth(path)[0].size
 
 
 def read_lfp(path: Path) -> Picture:
     """Decode the picture that is sharp everywhere: each pixel from the picture focused at its depth.
 
-    Raises InputError where the file is damaged, holds a map only, or a film while PyAV is not installed.
+    Raises InputError also where the file holds a film and PyAV is not installed.
     """
-    lfp, pictures = _pictures(path)
-    frames = _film(path, lfp, pictures) if pictures.frames else _decoded(path, lfp, pictures)
-    depth = read_lfp_depth(path)
+    pictures, depth = _pictures_and_depth(path)
+    frames = _film(path, pictures) if pictures.frames else _decoded(path, pictures)
     pixels = next(frames) if depth is None or len(pictures.focus) < 2 else _in_focus(frames, pictures, depth)
     return Picture(np.ascontiguousarray(pixels))
 
 
 def read_lfp_depth(path: Path) -> FloatImage | None:
-    """Return the map (h, w) of lambda, small is near; None without. Raises InputError as `open_lfp` does."""
+    """Return the map (h, w) of lambda, small is near; None without."""
     lfp = open_lfp(path)
-    if lfp is None or lfp.depth is None:
-        return None
-    name, size = lfp.depth
-    content = _content(path, lfp, name)
-    if len(content) != 4 * size.height * size.width:
-        raise InputError(f"{path}: its depth map of {size} holds {len(content):,} bytes; get the whole file again")
-    return np.frombuffer(content, "<f4").reshape(size).astype(np.float32)
+    return None if lfp is None else lfp.depth
 
 
-def _sections(file: BinaryIO) -> tuple[bytes, dict[str, tuple[int, int]]]:
-    """Return the first JSON, b"" without, and the place of each named chunk."""
+def _pictures_and_depth(path: Path) -> tuple[LfpPictures, FloatImage | None]:
+    lfp = open_lfp(path)
+    if lfp is None or lfp.pictures is None:
+        raise InputError(f"{path}: holds a map of depth without its picture; open the file that ends in -stk.lfp")
+    return lfp.pictures, lfp.depth
+
+
+def _sections(data: bytes) -> tuple[bytes, dict[str, bytes]]:
+    """Return the first JSON, b"" without, and the named chunks."""
     text, at = b"", 0
-    chunks: dict[str, tuple[int, int]] = {}
-    for _ in range(MAX_SECTIONS):
-        file.seek(at)
-        header = file.read(HEADER_BYTES)
-        if len(header) < HEADER_BYTES or not header.startswith(SECTION_START):
-            break
-        length = int.from_bytes(header[12:], "big")
-        name = file.read(NAME_BYTES).rstrip(b"\0").decode("latin-1") if length else ""
-        first = at + HEADER_BYTES + (NAME_BYTES if length else 0)
-        if length and header[3:4] == JSON_KIND:
-            text = text or file.read(min(length, MAX_JSON_BYTES))
-        elif length:
-            chunks.setdefault(name, (first, length))
+    chunks: dict[str, bytes] = {}
+    while data.startswith(SECTION_START, at):
+        first = at + HEADER_BYTES
+        length = int.from_bytes(data[at + 12 : first], "big")
+        if length:
+            name = data[first : first + NAME_BYTES].rstrip(b"\0").decode("latin-1")
+            first += NAME_BYTES
+            if data[at + 3 : at + 4] == JSON_KIND:
+                text = text or data[first : first + min(length, MAX_JSON_BYTES)]
+            else:
+                chunks.setdefault(name, data[first : first + length])
         at = first + length + -(first + length) % ALIGNMENT
     return text, chunks
 
@@ -138,35 +129,39 @@ def _objects(value: Any) -> Iterator[dict[str, Any]]:
         yield from _objects(inner)
 
 
-def _processed(entries: list[dict[str, Any]], chunks: Mapping[str, tuple[int, int]]) -> Lfp | None:
-    found = [pictures for entry in entries if (pictures := _pictures_of(entry, chunks)) is not None]
-    maps = [described for entry in entries if (described := _map_of(entry, chunks)) is not None]
+def _processed(entries: list[dict[str, Any]], chunks: Chunks) -> Lfp | None:
+    stacks = [pictures for entry in entries if (pictures := _pictures_of(entry, chunks)) is not None]
+    depth = next((depth for entry in entries if (depth := _depth_of(entry, chunks)) is not None), None)
+    if not stacks and depth is None:
+        return None
     # Views come before a focal stack: each of them is sharp everywhere.
-    pictures = min(found, key=lambda pictures: len(pictures.focus), default=None)
-    return Lfp(chunks, pictures, maps[0] if maps else None) if found or maps else None
+    return Lfp(min(stacks, key=lambda pictures: len(pictures.focus), default=None), depth)
 
 
-def _map_of(entry: Mapping[str, Any], chunks: Mapping[str, Any]) -> tuple[str, ImageSize] | None:
-    """Return the chunk and the size of the map that an object of the JSON describes; None for other objects."""
+def _depth_of(entry: Mapping[str, Any], chunks: Chunks) -> FloatImage | None:
+    """Return the map that an object of the JSON describes; None for other objects."""
     described = entry.get("depthMap", entry.get("depthLut"))
     if not isinstance(described, dict) or described.get("imageRef") not in chunks:
         return None
-    return described["imageRef"], _size_in({**entry, **described})
+    stored = np.frombuffer(chunks[described["imageRef"]], "<f4")
+    return stored.reshape(_size_in({**entry, **described})).astype(np.float32)
 
 
-def _pictures_of(entry: Mapping[str, Any], chunks: Mapping[str, Any]) -> LfpPictures | None:
+def _pictures_of(entry: Mapping[str, Any], chunks: Chunks) -> LfpPictures | None:
     """Return the pictures that an object of the JSON lists, files or a film; None for other objects."""
     listed, film = entry.get("imageArray", entry.get("perImage")), entry.get("blockOfImages")
     if film is not None and film["blockOfImagesRef"] in chunks:
-        names, listed = [film["blockOfImagesRef"]], film["metadataArray"]
+        listed = film["metadataArray"]
     elif listed and all(picture.get("imageRef") in chunks for picture in listed):
-        names, film = [picture["imageRef"] for picture in listed], None
+        film = None
     else:
         return None
     if not 0 < len(listed) <= MAX_PICTURES:
         raise ValueError(f"{len(listed)} pictures")
     size, (order, focus) = _size_in({**entry, **listed[0]}), _order_of(listed)
-    return LfpPictures(tuple(names if film else (names[k] for k in order)), focus, order if film else (), size)
+    if film:
+        return LfpPictures((chunks[film["blockOfImagesRef"]],), focus, order, size)
+    return LfpPictures(tuple(chunks[listed[k]["imageRef"]] for k in order), focus, (), size)
 
 
 def _order_of(listed: Sequence[Mapping[str, Any]]) -> tuple[tuple[int, ...], tuple[float, ...]]:
@@ -188,31 +183,17 @@ def _size_in(entry: Mapping[str, Any]) -> ImageSize:
     return size
 
 
-def _pictures(path: Path) -> tuple[Lfp, LfpPictures]:
-    lfp = open_lfp(path)
-    if lfp is None or lfp.pictures is None:
-        raise InputError(f"{path}: holds a map of depth without its picture; open the file that ends in -stk.lfp")
-    return lfp, lfp.pictures
-
-
-def _content(path: Path, lfp: Lfp, name: str) -> bytes:
-    first, length = lfp.chunks[name]
-    with open_binary(path) as file:
-        file.seek(first)
-        return file.read(length)
-
-
-def _decoded(path: Path, lfp: Lfp, pictures: LfpPictures) -> Iterator[NDArray[np.uint8]]:
-    """Yield the pictures, (H, W, 3). Raises InputError where one is damaged or of another size."""
-    for name in pictures.chunks:
-        with open_with_pillow(path, *PICTURE, _content(path, lfp, name)) as image:
+def _decoded(path: Path, pictures: LfpPictures) -> Iterator[NDArray[np.uint8]]:
+    """Yield the pictures, (H, W, 3)."""
+    for data in pictures.files:
+        with open_with_pillow(path, *PICTURE, data) as image:
             pixels = np.asarray(image.convert("RGB"))
         if pixels.shape[:2] != pictures.size:
             raise InputError(f"{path}: its pictures differ in size; get the whole file again")
         yield pixels
 
 
-def _film(path: Path, lfp: Lfp, pictures: LfpPictures) -> Iterator[NDArray[np.uint8]]:
+def _film(path: Path, pictures: LfpPictures) -> Iterator[NDArray[np.uint8]]:
     """Yield the pictures of a film, (H, W, 3), in the order of their focus."""
     try:
         import av
@@ -220,7 +201,7 @@ def _film(path: Path, lfp: Lfp, pictures: LfpPictures) -> Iterator[NDArray[np.ui
         raise InputError(f"{path}: its pictures are H.264; install PyAV with `pip install 'iibr[export]'`") from error
     frames: dict[int, NDArray[np.uint8]] = {}
     try:
-        with av.open(BytesIO(_content(path, lfp, pictures.chunks[0])), mode="r", format="h264") as film:
+        with av.open(BytesIO(pictures.files[0]), mode="r", format="h264") as film:
             for number, frame in enumerate(film.decode(video=0)):
                 if number in pictures.frames:
                     frames[number] = np.asarray(frame.to_ndarray(format="rgb24"), np.uint8)
@@ -235,16 +216,14 @@ def _film(path: Path, lfp: Lfp, pictures: LfpPictures) -> Iterator[NDArray[np.ui
 
 
 def _in_focus(frames: Iterator[NDArray[np.uint8]], pictures: LfpPictures, depth: FloatImage) -> NDArray[np.uint8]:
-    """Mix the pictures (H, W, 3) of a focal stack by the map (h, w): between two depths, both count."""
+    """Mix the pictures (H, W, 3) of a focal stack by the map (h, w).
+
+    A picture counts 1 at its focus, linearly less on both sides, and 0 from its neighbours' on.
+    """
     height, width = pictures.size
     known = np.nan_to_num(np.clip(depth, pictures.focus[0], pictures.focus[-1]), nan=pictures.focus[0])
     whole = np.asarray(Image.fromarray(known).resize((width, height), Image.Resampling.BILINEAR))
     mixed = np.zeros((height, width, 3), np.float32)
-    for number, pixels in enumerate(frames):
-        mixed += _weight(whole, pictures.focus, number)[..., None] * pixels
+    for weights, pixels in zip(np.eye(len(pictures.focus)), frames, strict=True):
+        mixed += np.interp(whole, pictures.focus, weights).astype(np.float32)[..., None] * pixels
     return np.rint(mixed).astype(np.uint8)
-
-
-def _weight(depth: FloatImage, focus: Sequence[float], number: int) -> FloatImage:
-    """Return how much a picture counts at each depth: linear from 1 at its focus to 0 at its neighbours'."""
-    return np.asarray(np.interp(depth, focus, np.eye(len(focus))[number]), np.float32)

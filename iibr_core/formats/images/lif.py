@@ -8,12 +8,10 @@ size of the region. All numbers are big-endian.
 from __future__ import annotations
 
 import json
-import struct
 from collections.abc import Mapping
 from dataclasses import dataclass
-from io import SEEK_END
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 from iibr_core.formats.files import open_binary
 from iibr_core.types import InputError
@@ -21,7 +19,7 @@ from iibr_core.types import InputError
 END_MARK = b"\x1e\x1a"
 TRAILER_BYTES = 6
 JSON_FIELDS = (8, 7)
-MAX_FIELDS, MAX_JSON_BYTES = 1000, 1 << 24
+MAX_FILE_BYTES, MAX_FIELDS, MAX_JSON_BYTES = 1 << 30, 1000, 1 << 24
 SOURCE_IMAGE = -1
 """Number that stands for the file's first JPEG among the fields."""
 LIF_ENDING = ".lif"
@@ -43,77 +41,57 @@ class LifView:
     x: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Lif:
-    """Contents of a Leia image.
+    """Contents of a Leia image. fields: contents by number. views: from left to right."""
 
-    fields: first byte and length by number. views: from left to right.
-    """
-
-    fields: Mapping[int, tuple[int, int]]
+    fields: Mapping[int, bytes]
     views: tuple[LifView, ...]
 
 
-def read_lif(file: BinaryIO) -> Lif | None:
-    """Return the contents of an open file; None where it is no Leia image. Raises InputError where it is damaged."""
-    end = file.seek(0, SEEK_END)
-    file.seek(max(end - TRAILER_BYTES, 0))
-    trailer = file.read(TRAILER_BYTES)
-    if len(trailer) < TRAILER_BYTES or not trailer.endswith(END_MARK):
-        return None
-    region = int.from_bytes(trailer[:4], "big")
-    if not TRAILER_BYTES < region <= end:
+def read_lif(data: bytes) -> Lif | None:
+    """Return the contents of a file's bytes; None where they are no Leia image."""
+    region, end = int.from_bytes(data[-TRAILER_BYTES:-2], "big"), len(data) - TRAILER_BYTES
+    if not (data.endswith(END_MARK) and TRAILER_BYTES < region <= len(data)):
         return None  # a JPEG may end in any two bytes
-    fields = _fields(file, end - region, end - TRAILER_BYTES)
+    fields = _fields(data[len(data) - region : end])
     described = next((fields[number] for number in JSON_FIELDS if number in fields), None)
     if described is None:
         raise InputError("its Leia fields describe no views; get the whole file again")
-    first, length = described
-    file.seek(first)
-    return Lif(fields, _views(file.read(min(length, MAX_JSON_BYTES)), fields))
+    return Lif(fields, _views(described[:MAX_JSON_BYTES], fields))
 
 
 def open_lif(path: Path) -> Lif | None:
-    """Return the contents of a Leia image, None for other files.
-
-    Raises InputError as `read_lif` does, and for a file that ends in .lif and is none.
-    """
+    """Return the contents of a Leia image, None for other files, whose names must not end in .lif."""
     with open_binary(path) as file:
         try:
-            found = read_lif(file)
+            lif = read_lif(file.read(MAX_FILE_BYTES))
         except InputError as error:
             raise InputError(f"{path}: {error}") from error
-    if found is None and path.suffix.lower() == LIF_ENDING:
+    if lif is None and path.suffix.lower() == LIF_ENDING:
         raise InputError(f"{path}: damaged or cut off (no Leia fields at its end); get the whole file again")
-    return found
+    return lif
 
 
 def lif_bytes(path: Path, number: int) -> bytes:
     """Return the content of a field. Raises InputError where there is no such field."""
-    found = open_lif(path)
-    if found is None or number not in found.fields:
+    lif = open_lif(path)
+    if lif is None or number not in lif.fields:
         raise InputError(f"{path}: has no picture {number}; get the whole file again")
-    first, length = found.fields[number]
-    with open_binary(path) as file:
-        file.seek(first)
-        return file.read(length)
+    return lif.fields[number]
 
 
-def _fields(file: BinaryIO, first: int, end: int) -> dict[int, tuple[int, int]]:
+def _fields(region: bytes) -> dict[int, bytes]:
     """Return the fields by number; of several with one number the first counts."""
-    fields: dict[int, tuple[int, int]] = {}
-    file.seek(first)
-    count, at = int.from_bytes(file.read(4), "big"), first + 4
-    if count > MAX_FIELDS:
-        raise InputError(f"claims {count:,} Leia fields; get the whole file again")
-    for _ in range(count):
-        file.seek(at)
-        header = file.read(8)
-        number, length = struct.unpack(">II", header) if len(header) == 8 else (0, end)
-        if at + 8 + length > end:
+    fields: dict[int, bytes] = {}
+    count, at = int.from_bytes(region[:4], "big"), 4
+    for _ in range(min(count, MAX_FIELDS)):
+        number, length = (int.from_bytes(region[k : k + 4], "big") for k in (at, at + 4))
+        at += 8
+        if at + length > len(region):
             raise InputError("damaged or cut off (a Leia field goes beyond its end); get the whole file again")
-        fields.setdefault(number, (at + 8, length))
-        at += 8 + length
+        fields.setdefault(number, region[at : at + length])
+        at += length
     return fields
 
 
@@ -122,9 +100,8 @@ def _views(text: bytes, fields: Mapping[int, Any]) -> tuple[LifView, ...]:
         entries = json.loads(text)["views"]
         views = [_view({NAMES.get(key, key): value for key, value in entry.items()}) for entry in entries]
     except (ValueError, KeyError, TypeError, AttributeError, IndexError, OverflowError, RecursionError) as error:
-        raise InputError(
-            f"its Leia fields cannot be read ({type(error).__name__}); get the whole file again"
-        ) from error
+        reason = type(error).__name__
+        raise InputError(f"its Leia fields cannot be read ({reason}); get the whole file again") from error
     wanted = {number for view in views for number in (view.image, view.inverse_depth) if number is not None}
     if not views or not wanted <= {SOURCE_IMAGE, *fields}:
         raise InputError("its Leia fields lack a picture that they name; get the whole file again")

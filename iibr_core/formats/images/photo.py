@@ -13,18 +13,18 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image, ImageOps
 
 from iibr_core.color import ROWS_AT_ONCE, convert, linear_from_srgb, srgb_from_linear
-from iibr_core.formats.files import MAX_FILE_PIXELS, require_file
+from iibr_core.formats.files import require_file
 from iibr_core.formats.images.color_profile import color_profile_of, color_space_of
 from iibr_core.formats.images.decode import decode_bands
 from iibr_core.formats.images.file_notes import file_notes
 from iibr_core.formats.images.hdr import tone_map
+from iibr_core.formats.images.mpo import is_jpeg
 from iibr_core.formats.images.picture import Picture, full_scale, upright
 from iibr_core.formats.images.picture_source import PictureSource, read_source, source_size
-from iibr_core.formats.images.pillow_reader import DECODE_ERRORS
-from iibr_core.formats.images.side_by_side import left_picture, photo_size
+from iibr_core.formats.images.side_by_side import left_picture
+from iibr_core.formats.images.small_picture import small_picture
 from iibr_core.runtime.kernels import kernel
 from iibr_core.runtime.work import raise_if_stopped
 from iibr_core.types import (
@@ -38,7 +38,6 @@ from iibr_core.types import (
 DEFAULT_MAX_PIXELS = 2_000_000
 DEFAULT_FOV_DEG = 50.0
 MADE_SMALLER = "Made smaller by area averaging"
-JPEG_START = b"\xff\xd8"
 MAX_BAND_ROWS = 32
 MAX_BAND_PIXELS = 1 << 20
 """Largest number of stored pixels that are averaged at a time: as floats they take 12 bytes each, or more."""
@@ -108,16 +107,15 @@ def encoded_colors(picture: Picture) -> FloatImage:
 def read_thumbnail(path: Path, within: ImageSize) -> NDArray[np.uint8]:
     """Read a photo, upright, as large as fits within (height, width): (h, w, 3), sRGB bytes.
 
-    The colours of JPEGs are not exact: their decoder skips most of the work. Raises InputError where the file is no
-    photo, or has more pixels than any file may.
+    The colours of JPEGs are not exact: their decoder skips most of the work.
     """
-    pixels = _jpeg_thumbnail(path, within) if left_picture(path).part is None else None
-    if pixels is not None:
-        return pixels
-    size = photo_size(path)
+    source = left_picture(path)
+    small = small_picture(path, within, is_smoothed=True) if source.part is None and is_jpeg(path) else None
+    if small is not None:
+        return small
+    size = source_size(source)
     scale = min(within.height / size.height, within.width / size.width, 1.0)
-    max_pixels = max(math.floor(math.prod(size) * scale**2), 1)
-    colors = read_picture(left_picture(path), max_pixels).pixels
+    colors = read_picture(source, max(math.floor(math.prod(size) * scale**2), 1)).pixels
     # A turned photo may still be too large, as may a very narrow one.
     step = max(math.ceil(colors.shape[0] / within.height), math.ceil(colors.shape[1] / within.width), 1)
     return np.round(np.nan_to_num(colors[::step, ::step]).clip(0.0, 1.0) * 255).astype(np.uint8)
@@ -254,21 +252,3 @@ def _color_notes(picture: Picture) -> tuple[str, ...]:
         return ("Lab was converted to RGB with a tint: save the photo as RGB for its true colours.",)
     note = color_profile_of(picture)[1]
     return (note,) if note else ()
-
-
-def _jpeg_thumbnail(path: Path, within: ImageSize) -> NDArray[np.uint8] | None:
-    """Read a JPEG by its decoder's own reduction to an eighth or so; None for other and damaged files."""
-    require_file(path)
-    try:
-        with path.open("rb") as file:
-            if file.read(2) != JPEG_START:
-                return None
-        with Image.open(path) as image:
-            if image.width * image.height > MAX_FILE_PIXELS:
-                return None
-            image.draft("RGB", (max(within), max(within)))
-            picture = ImageOps.exif_transpose(image).convert("RGB")
-            picture.thumbnail((within.width, within.height), Image.Resampling.BOX)
-            return np.asarray(picture)
-    except (*DECODE_ERRORS, TypeError):
-        return None

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.formats.images.decode import decode, read_size
+from iibr_core.formats.images.decode import decode, read_orientation, read_size
 from iibr_core.formats.images.picture import Picture, upright
 from iibr_core.types import ImageSize, InputError, image_size
 
@@ -42,20 +42,20 @@ class PictureSource:
 
 
 def source_size(source: PictureSource) -> ImageSize:
-    """Return the size from the file's header: of a part as shown, of a whole picture as stored, before it is upright.
-
-    Raises InputError as `read_source` does.
-    """
+    """Return the size from the file's header: of a part as shown, of a whole picture as stored, not upright."""
     if source.shown_size is not None:
         return source.shown_size
     return read_size(source.path, source.number) if source.part is None else source.part.size
 
 
-def read_source(source: PictureSource) -> Picture:
-    """Decode a picture: a part of it upright, a whole one as stored.
+def upright_size(path: Path) -> ImageSize:
+    """Return the size of a file's picture from its header, turned by its orientation."""
+    size = read_size(path)
+    return ImageSize(size.width, size.height) if read_orientation(path) >= 5 else size
 
-    Raises InputError where it is missing, no picture, cut off or absurdly large, or lacks the part.
-    """
+
+def read_source(source: PictureSource) -> Picture:
+    """Decode a picture: a part of it upright, a whole one as stored."""
     picture = decode(source.path, source.number)
     return picture if source == source.whole else part_of(picture, source)
 
@@ -64,23 +64,21 @@ def part_of(picture: Picture, source: PictureSource) -> Picture:
     """Return the part of a decoded picture that a source names. Raises InputError where the picture lacks it."""
 
     def cut(values: NDArray[Any]) -> NDArray[Any]:
-        values = upright(values, picture.orientation) if picture.orientation != 1 else values
+        values = upright(values, picture.orientation)
         if source.part is not None:
-            values = _cut(values, source.part, source.path)
-        if source.shown_size is not None:
-            values = _stretch(values, source.shown_size)
-        return np.ascontiguousarray(values)
+            values = cut_part(values, source.part)
+            if image_size(values) != source.part.size:
+                raise InputError(f"{source.path}: is smaller than it should be; get the whole file again")
+        return np.ascontiguousarray(values if source.shown_size is None else _stretch(values, source.shown_size))
 
     alpha = None if picture.alpha is None else cut(picture.alpha)
     return replace(picture, pixels=cut(picture.pixels), alpha=alpha, orientation=1)
 
 
-def _cut(values: NDArray[Any], part: PicturePart, path: Path) -> NDArray[Any]:
+def cut_part(values: NDArray[Any], part: PicturePart) -> NDArray[Any]:
+    """Return a part of a picture (H, W, ...), less where the picture is smaller."""
     (top, left), (height, width), (down, across) = part
-    cut = values[top : top + height * down : down, left : left + width * across : across]
-    if image_size(cut) != part.size:
-        raise InputError(f"{path}: is smaller than it should be; get the whole file again")
-    return cut
+    return values[top : top + height * down : down, left : left + width * across : across]
 
 
 def _stretch(values: NDArray[Any], size: ImageSize) -> NDArray[Any]:

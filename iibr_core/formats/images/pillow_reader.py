@@ -52,8 +52,8 @@ def open_with_pillow(
 ) -> Iterator[Image.Image]:
     """Open a picture of one of these formats and read its header.
 
-    what: what the picture should be, for messages. data: bytes of a picture within the file, None for the file itself.
-    Raises InputError where it is none, or claims an absurd size; also for what goes wrong in the block.
+    what: kind of picture, for messages. data: bytes of a picture within the file, None for the file itself. Raises
+    InputError where it is none, or claims an absurd size; also for Pillow's errors in the block.
     """
     try:
         image = Image.open(path if data is None else BytesIO(data), formats=formats)
@@ -81,8 +81,21 @@ def picture_of(image: Image.Image) -> Picture:
 
 def orientation_of(image: Image.Image) -> int:
     """Return Exif's Orientation, 1 to 8, of an opened picture."""
-    orientation = image.getexif().get(ORIENTATION_TAG, 1)
+    return sound_orientation(image.getexif())
+
+
+def sound_orientation(exif: Image.Exif) -> int:
+    """Return the Orientation in Exif, 1 to 8."""
+    orientation = exif.get(ORIENTATION_TAG, 1)
     return int(orientation) if orientation in range(1, 9) else 1
+
+
+def exif_of(info: Mapping[Any, Any]) -> Image.Exif:
+    """Return the Exif in what Pillow and pillow-heif call info; empty where it is missing or damaged."""
+    exif = Image.Exif()
+    with suppress(*EXIF_ERRORS):
+        exif.load(info.get("exif") or b"")
+    return exif
 
 
 def facts_of(info: Mapping[Any, Any], size: ImageSize) -> dict[str, Any]:
@@ -90,13 +103,10 @@ def facts_of(info: Mapping[Any, Any], size: ImageSize) -> dict[str, Any]:
 
     A profile counts more than colours in numbers, except for the curves of HDR.
     """
-    exif, numbers = Image.Exif(), {}
+    numbers = {}
     with suppress(*EXIF_ERRORS):  # a photo without Exif is a photo, too
-        exif.load(info.get("exif") or b"")
-        tags = exif.get_ifd(EXIF_FOLDER)
-        for tag, name in EXIF_NUMBERS.items():
-            if tag in tags:
-                numbers[name] = float(tags[tag])
+        tags = exif_of(info).get_ifd(EXIF_FOLDER)
+        numbers = {name: float(tags[tag]) for tag, name in EXIF_NUMBERS.items() if tag in tags}
     facts: dict[str, Any] = {"focal_px": exif_focal_px(numbers, size)}
     stated, profile = info.get("nclx_profile") or {}, info.get("icc_profile")
     codes = tuple(int(stated.get(name, 0)) for name in COLOR_CODES)

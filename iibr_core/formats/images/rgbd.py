@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.formats.files import status_of
-from iibr_core.formats.images.decode import read_orientation
-from iibr_core.formats.images.picture_source import PicturePart, PictureSource, source_size
+from iibr_core.formats.images.picture_source import PicturePart, PictureSource, upright_size
 from iibr_core.formats.images.small_picture import small_picture
 from iibr_core.types import ImageSize
 
@@ -20,8 +19,8 @@ TAG = re.compile(r"(?:[_.-]|^)rgbd$", re.IGNORECASE)
 """Ending of a file's name that states a picture and its map, in any order."""
 MIN_ASPECT = 1.9
 """Smallest ratio of the sides of a picture that holds two without stating it in its name."""
-COMPARED_PX = 192
-"""Longest side of the picture whose halves are compared."""
+COMPARED = ImageSize(192, 192)
+"""Largest size of the picture whose halves are compared."""
 GREY_TOLERANCE, MAX_COLORED_SHARE = 12, 0.01
 """Largest difference of a map's channels, of 255, and the largest share of its pixels that exceed it."""
 MIN_COLORED_SHARE = 0.15
@@ -34,7 +33,7 @@ def rgbd_parts(path: Path) -> tuple[PictureSource, PictureSource] | None:
     """Return the picture and its map, which are halves of one file; None for other files.
 
     One half must be grey and the other one coloured. The file's name must state the pair, or its sides differ by a
-    factor of about 2. Raises InputError where the file cannot be read.
+    factor of about 2.
     """
     status = status_of(path)
     return None if status is None else _parts(path, status.st_mtime_ns, status.st_size)
@@ -42,12 +41,10 @@ def rgbd_parts(path: Path) -> tuple[PictureSource, PictureSource] | None:
 
 @lru_cache(maxsize=64)
 def _parts(path: Path, modified_ns: int, size_bytes: int) -> tuple[PictureSource, PictureSource] | None:
-    size = source_size(PictureSource(path))
-    size = ImageSize(size.width, size.height) if read_orientation(path) >= 5 else size
-    is_named = TAG.search(path.stem) is not None
+    size, is_named = upright_size(path), TAG.search(path.stem) is not None
     if min(size) < 2 or not (is_named or max(size) >= MIN_ASPECT * min(size)):
         return None
-    pixels = small_picture(path, COMPARED_PX)
+    pixels = small_picture(path, COMPARED)
     # A pair with such a name may have any shape: the longer side is tried first.
     axes = (0, 1) if size.height > size.width else (1, 0)
     for axis in axes if is_named else axes[:1]:
@@ -59,9 +56,8 @@ def _parts(path: Path, modified_ns: int, size_bytes: int) -> tuple[PictureSource
 
 def _grey_half(pixels: NDArray[np.uint8], axis: int, min_colored: float) -> Half | None:
     """Return the grey half along an axis; None unless at least `min_colored` of the other half is coloured."""
-    middle = pixels.shape[axis] // 2
-    apart = np.ptp(pixels.astype(np.int16), axis=2) > GREY_TOLERANCE
-    first, second = (float(part.mean()) for part in np.split(apart, (middle,), axis=axis))
+    is_colored = np.ptp(pixels.astype(np.int16), axis=2) > GREY_TOLERANCE
+    first, second = (float(part.mean()) for part in np.split(is_colored, (pixels.shape[axis] // 2,), axis=axis))
     if second <= MAX_COLORED_SHARE and first >= min_colored:
         return "second"
     return "first" if first <= MAX_COLORED_SHARE and second >= min_colored else None
@@ -70,5 +66,5 @@ def _grey_half(pixels: NDArray[np.uint8], axis: int, min_colored: float) -> Half
 def _halves(path: Path, size: ImageSize, axis: int, grey: Half) -> tuple[PictureSource, PictureSource]:
     part = ImageSize(size.height // 2, size.width) if axis == 0 else ImageSize(size.height, size.width // 2)
     starts = ((0, 0), (size.height - part.height, size.width - part.width))
-    picture, depth = (PictureSource(path, part=PicturePart(start, part)) for start in starts)
-    return (depth, picture) if grey == "first" else (picture, depth)
+    first, second = (PictureSource(path, part=PicturePart(start, part)) for start in starts)
+    return (second, first) if grey == "first" else (first, second)

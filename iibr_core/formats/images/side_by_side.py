@@ -5,103 +5,25 @@ Names may be wrong, so the halves are compared.
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
-
-from numpy.typing import NDArray
 
 from iibr_core.formats.files import status_of
 from iibr_core.formats.images.alike_halves import is_one_scene
-from iibr_core.formats.images.decode import read_orientation
 from iibr_core.formats.images.file_kinds import raw_kind
-from iibr_core.formats.images.jps import Arrangement, read_jps_descriptor
 from iibr_core.formats.images.lfp import open_lfp
-from iibr_core.formats.images.picture_source import PicturePart, PictureSource, source_size
+from iibr_core.formats.images.pair_layout import PairLayout, stated_layout
+from iibr_core.formats.images.picture_source import PictureSource, cut_part, source_size, upright_size
 from iibr_core.formats.images.rgbd import rgbd_parts
 from iibr_core.formats.images.small_picture import small_decoded_picture
 from iibr_core.types import ImageSize, InputError, image_size
 
-FULL_TAG, HALF_TAG, OVER_TAG = "_LRF_Full_SBS", "_LRF_Half_SBS", "_TB"
-"""Endings of names that players know: left first, side by side, the second at half width; top and bottom."""
-TAG = re.compile(
-    r"[-_. (\[](?:(half)[-_. ]?|(h)[-_]?(?=sbs|t|ou)|full[-_. ]?|f(?=sbs|t|ou))?"
-    r"(?:sbs|2x1|lr[bpq]?|rl[bpq]?|left-?right|right-?left|side-?by-?side|cross(?:ed)?(?:-?eyed?)?|3dh"
-    r"|(tb|bt|tab|ou|abq?|top-?bottom|bottom-?top|top-?and-?bottom|over-?under|above-?below|3dv))"
-    r"[)\]]?(?: ?\(\d+\)| - copy)?$",
-    re.IGNORECASE,
-)
-"""Ending of a file's name, without extension, that states a pair. Groups 1 and 2: half size; group 3: one over the
-other. Names as Looking Glass, Leia, video players, StereoPhoto Maker and web viewers write them.
-"""
-PLAIN_TAG = re.compile(
-    r"half|full|h[-_]?sbs|h[-_]?t|h[-_]?ou|fsbs|left-?right|right-?left|top-?bottom|bottom-?top|eye", re.IGNORECASE
-)
-"""Part of a tag that no other picture has in its name; "_tb" may be initials, "_2x1" and "side by side" a collage."""
-RIGHT_FIRST = re.compile(r"rl[bpq]?\b|right-?left|cross|bt\b|bottom-?top", re.IGNORECASE)
-SQUASHED = re.compile(r"(lrq|rlq|abq)\b", re.IGNORECASE)
-STEREO_ENDINGS = (".jps", ".pns")
-"""Endings of JPEG and PNG files of two pictures side by side, the right eye's first."""
 COMPARED_PX = 512
 """Longest side of the picture whose halves are compared."""
 LIGHT_FIELD_ENDINGS = (".lfp", ".lfr", ".lfx", ".raw")
 PLACES = {"beside": "side by side", "over": "one over the other", "rows": "in every other row"}
 PLAIN_ENDING = {"beside": ".left-right", "over": ".top-bottom", "rows": ".jps"}
-
-
-@dataclass(frozen=True)
-class PairLayout:
-    """Arrangement of two pictures in one.
-
-    arrangement: side by side, one over the other, or in every other row. is_half: both are squeezed to half their size.
-    right_first: the right eye's is at the left or at the top. stated_by: what states this, for notes. is_plain: whether
-    it is stated so plainly that unlike halves are a pair, too.
-    """
-
-    arrangement: Arrangement
-    is_half: bool = False
-    right_first: bool = False
-    stated_by: str = ""
-    is_plain: bool = False
-
-    def eyes(self, size: ImageSize) -> tuple[tuple[PicturePart, PicturePart], ImageSize | None]:
-        """Return the left eye's part of a picture (height, width) and the right eye's, and what size they are shown at.
-
-        The size is None for that of the parts. Parts are empty where the picture is too small.
-        """
-        height, width = size
-        eye = ImageSize(height, width // 2) if self.arrangement == "beside" else ImageSize(height // 2, width)
-        second = {"beside": (0, eye.width), "over": (eye.height, 0), "rows": (1, 0)}[self.arrangement]
-        step = (2, 1) if self.arrangement == "rows" else (1, 1)
-        parts = PicturePart((0, 0), eye, step), PicturePart(second, eye, step)
-        shown = ImageSize(eye.height, 2 * eye.width) if self.arrangement == "beside" else ImageSize(height, width)
-        is_stretched = self.is_half or self.arrangement == "rows"
-        return (parts[1], parts[0]) if self.right_first else parts, shown if is_stretched else None
-
-
-def stated_layout(path: Path) -> PairLayout | None:
-    """Return the arrangement of a file's two pictures by its JPS descriptor, else by its name; None for most files.
-
-    Raises InputError where the file cannot be read.
-    """
-    is_stereo_file = path.suffix.lower() in STEREO_ENDINGS
-    found = read_jps_descriptor(path)
-    if found is not None:
-        return PairLayout(found.arrangement, found.is_half, found.right_first, "its JPS descriptor", is_stereo_file)
-    match = TAG.search(path.stem)
-    if match is None:
-        stated_by = f"its ending ('{path.suffix}')"
-        return PairLayout("beside", False, True, stated_by, is_plain=True) if is_stereo_file else None
-    tag = match[0]
-    return PairLayout(
-        arrangement="beside" if match[3] is None else "over",
-        is_half=bool(match[1] or match[2] or SQUASHED.search(tag)),
-        right_first=RIGHT_FIRST.search(tag) is not None,
-        stated_by=f"its name ('{tag}')",
-        is_plain=PLAIN_TAG.search(tag) is not None or is_stereo_file,
-    )
 
 
 @dataclass(frozen=True)
@@ -117,19 +39,13 @@ class StatedPair:
 
 
 def side_by_side_pair(path: Path) -> tuple[PictureSource, PictureSource] | None:
-    """Return the left eye's picture and the right one's; None for a file that holds one picture.
-
-    Raises InputError where it cannot be read, or is too small for two.
-    """
+    """Return the left eye's picture and the right one's; None for a file that holds one picture."""
     pair = stated_pair(path)
     return None if pair is None else pair.eyes
 
 
 def stated_pair(path: Path) -> StatedPair | None:
-    """Return the pair that a file's name or header states; None where neither does.
-
-    Raises InputError as `side_by_side_pair` does.
-    """
+    """Return the pair that a file's name or header states; None where neither does."""
     status = status_of(path)
     return None if status is None else _stated_pair(path, status.st_mtime_ns, status.st_size)
 
@@ -139,8 +55,7 @@ def _stated_pair(path: Path, modified_ns: int, size_bytes: int) -> StatedPair | 
     layout = stated_layout(path)
     if layout is None:
         return None
-    size = source_size(PictureSource(path))
-    size = ImageSize(size.width, size.height) if read_orientation(path) >= 5 else size
+    size = upright_size(path)
     parts, shown = layout.eyes(size)
     if min(parts[0].size) < 1 and layout.is_plain:
         raise InputError(f"{path}: of {size} pixels there are none for each eye; is its name right?")
@@ -155,34 +70,27 @@ def _is_one_scene(path: Path, layout: PairLayout) -> bool:
     if layout.arrangement == "rows":
         return True  # a small copy mixes the rows
     pixels = small_decoded_picture(path, COMPARED_PX)
-    parts, _ = layout.eyes(image_size(pixels))
-    first, second = (_cut(pixels, part) for part in parts)
-    return is_one_scene(first, second)
-
-
-def _cut(pixels: NDArray[Any], part: PicturePart) -> NDArray[Any]:
-    (top, left), (height, width) = part.first, part.size
-    return pixels[top : top + height, left : left + width]
+    (first, second), _ = layout.eyes(image_size(pixels))
+    return is_one_scene(cut_part(pixels, first), cut_part(pixels, second))
 
 
 def _note(layout: PairLayout, is_pair: bool, is_alike: bool) -> str:
     name = layout.stated_by
-    taken = f"Taken for a stereo pair, {PLACES[layout.arrangement]}, because of {name}"
-    if is_pair and is_alike:
-        return f"{taken}: the left eye's picture is shown. Rename the file if it is one photo."
-    if is_pair:
-        return f"{taken}, though its halves differ. Rename the file if it is one photo."
-    ending = PLAIN_ENDING[layout.arrangement]
-    return (
-        f"Shown whole: {name} is that of a stereo pair, but its halves differ. If it is a pair, let the name end in"
-        f" '{ending}'."
-    )
+    if not is_pair:
+        ending = PLAIN_ENDING[layout.arrangement]
+        return (
+            f"Shown whole: {name} is that of a stereo pair, but its halves differ. If it is a pair, let the name end in"
+            f" '{ending}'."
+        )
+    result = ": the left eye's picture is shown" if is_alike else ", though its halves differ"
+    place = PLACES[layout.arrangement]
+    return f"Taken for a stereo pair, {place}, because of {name}{result}. Rename the file if it is one photo."
 
 
 def left_picture(path: Path) -> PictureSource:
     """Return the picture that a file shows as a photo: the left eye's of two, the one beside a depth map, else all.
 
-    Raises InputError as `side_by_side_pair` does, and for raw files of light-field cameras.
+    Raises InputError also for raw files of light-field cameras.
     """
     refuse_raw_light_field(path)
     parts = side_by_side_pair(path) or rgbd_parts(path)
@@ -199,8 +107,5 @@ def refuse_raw_light_field(path: Path) -> None:
 
 
 def photo_size(path: Path) -> ImageSize:
-    """Return the size of a file's photo from its header, as stored, before it is upright.
-
-    Raises InputError as `left_picture` does.
-    """
+    """Return the size of a file's photo from its header, as stored, before it is upright."""
     return source_size(left_picture(path))

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from iibr_core.formats.files import reason_of
-from iibr_core.formats.images.iso_boxes import box, boxes
+from iibr_core.formats.images.iso_boxes import box, boxes, joined
 from iibr_core.formats.outputs import write_file
 from iibr_core.types import InputError
 
@@ -32,98 +32,66 @@ EYES_APART_UM = 63_000
 
 
 def write_spatial_photo(path: Path, left: NDArray[np.uint8], right: NDArray[np.uint8], focal_px: float) -> None:
-    """Write two sRGB-encoded pictures (H, W, 3), whole or not at all. focal_px: focal length of both, in pixels.
+    """Write two sRGB-encoded pictures (H, W, 3), whole or not at all. focal_px: focal length of both, in pixels."""
+    import pillow_heif
 
-    Raises InputError where the pictures differ in size, or the file cannot be written.
-    """
     if left.shape != right.shape:
         raise InputError(f"{path}: the left picture is {left.shape}, the right one {right.shape}; give one size")
     try:
-        stored = _with_pair(_encode(path, left, right), focal_px / left.shape[1])
-    except (ValueError, KeyError, IndexError, struct.error) as error:
-        if isinstance(error, InputError):
-            raise
-        reason = reason_of(error)
-        raise InputError(f"{path}: cannot be written as a spatial photo ({reason}); update pillow-heif") from error
-    with write_file(path) as temporary:
-        temporary.write_bytes(stored)
-
-
-def _encode(path: Path, left: NDArray[np.uint8], right: NDArray[np.uint8]) -> bytes:
-    import pillow_heif
-
-    try:
         file = pillow_heif.from_pillow(Image.fromarray(np.ascontiguousarray(left)))
         file.add_from_pillow(Image.fromarray(np.ascontiguousarray(right)))
-        stored = BytesIO()
-        file.save(stored, quality=QUALITY, chroma=444, primary_index=0)
-    except (ValueError, OSError, RuntimeError, MemoryError) as error:
-        raise InputError(f"{path}: cannot be encoded as HEIC ({reason_of(error)}); try another size") from error
-    return stored.getvalue()
+        encoded = BytesIO()
+        file.save(encoded, quality=QUALITY, chroma=444, primary_index=0)
+        stored = _with_pair(encoded.getvalue(), focal_px / left.shape[1])
+    except (ValueError, OSError, RuntimeError, MemoryError, KeyError, IndexError, struct.error) as error:
+        raise InputError(f"{path}: cannot be encoded as a spatial photo ({reason_of(error)})") from error
+    with write_file(path) as temporary:
+        temporary.write_bytes(stored)
 
 
 def _with_pair(file: bytes, focal: float) -> bytes:
     """Return a HEIC file with the boxes of a pair. focal: focal length as a share of the width."""
     top = dict(boxes(file))
-    meta = dict(boxes(top[b"meta"][4:]))
+    head, meta = top[b"meta"][:4], dict(boxes(top[b"meta"][4:]))
     iprp = dict(boxes(meta[b"iprp"]))
-    left, right = (item for item, _ in _associations(iprp[b"ipma"]))
-    known = sum(1 for _ in boxes(iprp[b"ipco"]))
-    # Properties are counted from 1, in their order.
-    new = [
-        _intrinsics(focal),
-        _extrinsics(None),
-        _extrinsics(EYES_APART_UM),
-        _uuid(ADJUSTMENT, 0, DISPARITY_ADJUSTMENT),
-    ]
-    added = {left: (1, 2, 4), right: (1, 3, 4)}
-    entries = [(item, [*held, *(known + i for i in added[item])]) for item, held in _associations(iprp[b"ipma"])]
-    iprp[b"ipco"] += b"".join(new)
-    iprp[b"ipma"] = _ipma(entries)
-    meta[b"iprp"] = b"".join(box(kind, content) for kind, content in iprp.items())
-    group = struct.pack(">IIIII", 0, max(left, right) + 1, 2, left, right)
-    meta[b"grpl"] = box(b"ster", group)
-    moved = len(_meta(top[b"meta"], meta)) - len(top[b"meta"])
-    meta[b"iloc"] = _moved_iloc(meta[b"iloc"], moved)
-    top[b"meta"] = _meta(top[b"meta"], meta)
-    return b"".join(box(kind, content) for kind, content in top.items())
-
-
-def _meta(before: bytes, contents: dict[bytes, bytes]) -> bytes:
-    return before[:4] + b"".join(box(kind, content) for kind, content in contents.items())
+    entries = _associations(iprp[b"ipma"])
+    left, right = entries
+    first = sum(1 for _ in boxes(iprp[b"ipco"])) + 1  # properties are counted from 1, in their order
+    entries[left] += bytes([first, first + 1, first + 3])
+    entries[right] += bytes([first, first + 2, first + 3])
+    middle = 1 << (SHIFT - 1)
+    iprp[b"ipco"] += b"".join(
+        (
+            _uuid(INTRINSICS, SHIFT << 8, min(round(focal * (1 << SHIFT)), (1 << 31) - 1), middle, middle),
+            _uuid(EXTRINSICS, 0),  # the left camera is the origin
+            _uuid(EXTRINSICS, 1, EYES_APART_UM),
+            _uuid(ADJUSTMENT, 0, DISPARITY_ADJUSTMENT),
+        )
+    )
+    items = [struct.pack(">HB", item, len(numbers)) + numbers for item, numbers in entries.items()]
+    iprp[b"ipma"] = struct.pack(">II", 0, len(items)) + b"".join(items)
+    meta[b"iprp"] = joined(iprp)
+    meta[b"grpl"] = box(b"ster", struct.pack(">IIIII", 0, max(left, right) + 1, 2, left, right))
+    meta[b"iloc"] = _moved_iloc(meta[b"iloc"], 4 + len(joined(meta)) - len(top[b"meta"]))
+    top[b"meta"] = head + joined(meta)
+    return joined(top)
 
 
 def _uuid(kind: bytes, flags: int, *numbers: int) -> bytes:
     return box(b"uuid", kind + struct.pack(f">I{len(numbers)}i", flags, *numbers))
 
 
-def _intrinsics(focal: float) -> bytes:
-    """Return a box of focal length and principal point, the middle, as shares of the picture."""
-    most = (1 << 31) - 1
-    return _uuid(INTRINSICS, SHIFT << 8, min(round(focal * (1 << SHIFT)), most), 1 << (SHIFT - 1), 1 << (SHIFT - 1))
-
-
-def _extrinsics(x_um: int | None) -> bytes:
-    """Return a box of a camera's place: the left one is the origin, None, the right one stands beside it."""
-    return _uuid(EXTRINSICS, 0) if x_um is None else _uuid(EXTRINSICS, 1, x_um)
-
-
-def _associations(ipma: bytes) -> list[tuple[int, list[int]]]:
-    """Return the properties of each item, as pillow-heif writes them: version 0, a byte each."""
+def _associations(ipma: bytes) -> dict[int, bytes]:
+    """Return the properties of each item with their flags, as pillow-heif writes them: version 0, a byte each."""
     flags, count = struct.unpack_from(">II", ipma)
     if flags:
         raise ValueError(f"ipma of version and flags {flags:#x} is unknown")
-    entries, at = [], 8
+    entries, at = {}, 8
     for _ in range(count):
         item, held = struct.unpack_from(">HB", ipma, at)
-        entries.append((item, list(ipma[at + 3 : at + 3 + held])))
+        entries[item] = ipma[at + 3 : at + 3 + held]
         at += 3 + held
     return entries
-
-
-def _ipma(entries: list[tuple[int, list[int]]]) -> bytes:
-    items = [struct.pack(">HB", item, len(held)) + bytes(held) for item, held in entries]
-    return struct.pack(">II", 0, len(entries)) + b"".join(items)
 
 
 def _moved_iloc(iloc: bytes, moved: int) -> bytes:

@@ -1,4 +1,4 @@
-"""Depth maps that were drawn in colours, as depth models show them: the colours are looked up in their scale."""
+"""Depth maps drawn in colours, as depth models show them: the colours are looked up in their scale."""
 
 from __future__ import annotations
 
@@ -26,54 +26,49 @@ SCALES = {
     " ddc858 efd748 fee838",
     "Spectral": "5e4fa2 3288bd 66c2a5 abdda4 e6f598 ffffbf fee08b fdae61 f46d43 d53e4f 9e0142",
 }
-"""Colours at equal steps, from the low end to the high one, which is near where the other is far: as matplotlib and
-OpenCV have them.
-"""
+"""Colours at equal steps, from the low end to the high one, by the names of matplotlib and OpenCV."""
 STEPS = 1024
-USUAL_DISTANCE, MOST_DISTANCE = 8.0, 40.0
-"""Distances from a scale in 255ths: half of a map's pixels are below the first, 19 of 20 below the second."""
-LEAST_RANGE = 0.25
-"""A map takes at least this share of its scale."""
-AT_ONCE = 4096
+MAX_MEDIAN_DISTANCE, MAX_DISTANCE = 8.0, 40.0
+"""Largest distances from a scale, of 0..255, of half of a map's pixels and of 19 of 20."""
+MIN_RANGE = 0.25
+"""Smallest share of its scale that a map takes."""
+COLORS_AT_ONCE = 4096
 
 
 def values_of_colors(pixels: NDArray[Any]) -> tuple[FloatImage, str] | None:
-    """Places in a scale of colours (H, W), 0..1, and its name; None where a picture's colours are of no scale.
+    """Return places in a scale of colours (H, W), 0..1, and its name; None for pictures in other colours.
 
     pixels: (H, W, 3) uint8 or uint16.
     """
     shift = 8 * (pixels.dtype.itemsize - 1)
-    bytes_ = (pixels[..., :3] >> shift).astype(np.uint32)
-    packed = bytes_[..., 0] << 16 | bytes_[..., 1] << 8 | bytes_[..., 2]
+    red, green, blue = np.moveaxis((pixels[..., :3] >> shift).astype(np.uint32), 2, 0)
+    packed = red << 16 | green << 8 | blue
     colors, where, counts = np.unique(packed.ravel(), return_inverse=True, return_counts=True)
-    found = [(name, *_nearest(colors, _scale(text))) for name, text in SCALES.items()]
-    name, places, distances = min(found, key=lambda each: float((np.minimum(each[2], MOST_DISTANCE) * counts).sum()))
+    candidates = [(name, *_nearest(colors, _scale(text))) for name, text in SCALES.items()]
+    name, places, distances = min(candidates, key=lambda scale: (np.minimum(scale[2], MAX_DISTANCE) * counts).sum())
     order = np.argsort(distances)
     share = np.cumsum(counts[order]) / packed.size
-    usual, most = (distances[order][np.searchsorted(share, at)] for at in (0.5, 0.95))
+    median, large = (distances[order][np.searchsorted(share, quantile)] for quantile in (0.5, 0.95))
     values = places[where].reshape(packed.shape)
-    if usual > USUAL_DISTANCE or most > MOST_DISTANCE or np.ptp(np.percentile(values, (2, 98))) < LEAST_RANGE:
+    if median > MAX_MEDIAN_DISTANCE or large > MAX_DISTANCE or np.ptp(np.percentile(values, (2, 98))) < MIN_RANGE:
         return None
     return values, name
 
 
 def _scale(text: str) -> FloatImage:
-    """(STEPS, 3), 0..255."""
+    """Return the colours (STEPS, 3), 0..255, of a scale."""
     stops = np.array([list(bytes.fromhex(color)) for color in text.split()], np.float32)
     at = np.linspace(0, len(stops) - 1, STEPS)
     return np.stack([np.interp(at, np.arange(len(stops)), stops[:, c]) for c in range(3)], axis=1).astype(np.float32)
 
 
 def _nearest(colors: NDArray[np.uint32], scale: FloatImage) -> tuple[FloatImage, FloatImage]:
-    """For packed colours (N,): the place of the nearest colour of a scale, 0..1, and how far away it is."""
+    """Return the place of the nearest colour of a scale, 0..1, and its distance, for packed colours (N,)."""
     rgb = np.stack([colors >> 16, colors >> 8 & 255, colors & 255], axis=1).astype(np.float32)
     places, distances = np.empty(len(rgb), np.float32), np.empty(len(rgb), np.float32)
-    squares = (scale**2).sum(axis=1)
-    for first in range(0, len(rgb), AT_ONCE):
-        part = rgb[first : first + AT_ONCE]
-        apart = squares - 2 * part @ scale.T
-        best = apart.argmin(axis=1)
-        places[first : first + AT_ONCE] = best / np.float32(STEPS - 1)
-        left = np.take_along_axis(apart, best[:, None], axis=1)[:, 0] + (part**2).sum(axis=1)
-        distances[first : first + AT_ONCE] = np.sqrt(np.maximum(left, 0))
+    for first in range(0, len(rgb), COLORS_AT_ONCE):
+        part = rgb[first : first + COLORS_AT_ONCE]
+        squares = (scale**2).sum(axis=1) - 2 * part @ scale.T + (part**2).sum(axis=1)[:, None]
+        places[first : first + COLORS_AT_ONCE] = squares.argmin(axis=1) / np.float32(STEPS - 1)
+        distances[first : first + COLORS_AT_ONCE] = np.sqrt(np.maximum(squares.min(axis=1), 0))
     return places, distances

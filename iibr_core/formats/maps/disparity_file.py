@@ -21,26 +21,25 @@ from iibr_core.types import (
 
 MAX_ASPECT_DIFFERENCE = 0.03
 MAX_DISPARITY_WIDTHS = 4.0
-"""Disparities beyond this many photo widths per view step count as unknown."""
+"""Largest known disparity, in photo widths per view step."""
 MOSTLY_UNKNOWN = 0.9
-"""A map of which more is unknown is filled before it is resampled: its values would get lost."""
+"""Share of unknown values from which a map is filled before it is resampled: its values would get lost."""
 
 
 def read_disparity(path: Path, size: ImageSize, scale: float = 1.0, photo: FloatImage | None = None) -> Disparity:
     """Read a map of disparity for a view of (height, width); `scale` multiplies its values.
 
-    Unknown values (NaN, infinite, 0 in files of integers, alpha 0, absurdly large) are filled by what looks like
-    them in the view (height, width, 3), sRGB-encoded, or from their background side where that is not given. A map of
-    another size is resampled surface by surface, its values scaled by the ratio of widths.
-    Raises InputError if the file is bad, has another aspect ratio than the view, or knows no value at all.
+    Unknown values (NaN, infinite, 0 in files of integers, transparent, absurdly large) are filled from similar colours
+    of the view `photo` (height, width, 3), sRGB-encoded, or from their background side without it. A map of another
+    size is resampled, its values scaled by the ratio of widths. Another aspect ratio and empty maps are refused.
     """
     path = Path(path)
     if path.stem.endswith("_depth"):
         raise InputError(f"{path}: holds depth, by its name; views of a light field take disparity, px per view step")
     stored = read_map(path)
     if not has_shape_of(image_size(stored), size):
-        own, wanted = (f"{width}x{height}" for height, width in (stored.shape, size))
-        raise InputError(f"{path}: {own} differs in shape from the view, {wanted}; crop or rotate it to match")
+        found, wanted = (f"{width}x{height}" for height, width in (stored.shape, size))
+        raise InputError(f"{path}: {found} differs in shape from the view, {wanted}; crop or rotate it to match")
     values, notes = scaled_disparity(path, stored, require_scale(scale))
     notes += resampling_note(path.name, values, size) + filling_note(path.name, values)
     values = map_at_size(values, size) * np.float32(size.width / stored.shape[1])
@@ -53,10 +52,10 @@ def read_disparity(path: Path, size: ImageSize, scale: float = 1.0, photo: Float
     return Disparity(values, path.name, notes, unknown=holes if holes.any() else None)
 
 
-def has_shape_of(own: ImageSize, size: ImageSize) -> bool:
-    """Whether two (height, width) have nearly the same aspect ratio."""
-    ratio = own.width * size.height / (own.height * size.width)
-    return own == size or abs(ratio - 1) <= MAX_ASPECT_DIFFERENCE
+def has_shape_of(first: ImageSize, second: ImageSize) -> bool:
+    """Return whether two (height, width) have nearly the same aspect ratio."""
+    ratio = first.width * second.height / (first.height * second.width)
+    return first == second or abs(ratio - 1) <= MAX_ASPECT_DIFFERENCE
 
 
 def require_scale(scale: float | None) -> float:
@@ -67,7 +66,7 @@ def require_scale(scale: float | None) -> float:
 
 
 def scaled_disparity(path: Path, values: FloatImage, scale: float) -> tuple[FloatImage, tuple[str, ...]]:
-    """Values (H, W) times the scale, NaN where that is not finite or absurdly large; and a note of those.
+    """Return values (H, W) times the scale, NaN where that is unknown or absurdly large, and a note of these.
 
     Raises InputError if nothing is left.
     """
@@ -80,13 +79,12 @@ def scaled_disparity(path: Path, values: FloatImage, scale: float) -> tuple[Floa
         raise InputError(f"{path}: every value exceeds {limit_px:g} px per view step; give a smaller --disparity-scale")
     if np.isnan(known).all():
         raise InputError(f"{path}: no value is known (all are NaN, infinite, 0 or masked); give another map")
-    if not count:
-        return known, ()
-    return known, (f"{count} values of {path.name} beyond {limit_px:g} px per view step count as unknown.",)
+    note = f"{count} values of {path.name} beyond {limit_px:g} px per view step count as unknown."
+    return known, (note,) if count else ()
 
 
 def map_at_size(values: FloatImage, size: ImageSize, is_at_corners: bool = False) -> FloatImage:
-    """A map (h, w) at another (height, width), its values as they are, NaN where little is known.
+    """Return a map (h, w) at another (height, width), its values unchanged, NaN where little is known.
 
     is_at_corners: see `resample_map`.
     """
@@ -98,12 +96,12 @@ def map_at_size(values: FloatImage, size: ImageSize, is_at_corners: bool = False
 
 
 def filling_note(name: str, values: FloatImage) -> tuple[str, ...]:
-    """A sentence on a map of which something is unknown; none where all is known."""
+    """Return a sentence on a map with unknown values; none where all are known."""
     unknown = float(np.isnan(values).mean())
     return (say_filled(name, unknown),) if unknown else ()
 
 
 def resampling_note(name: str, values: FloatImage, size: ImageSize) -> tuple[str, ...]:
-    """A sentence on a map (h, w) that becomes another (height, width); none where it is that large."""
-    own = image_size(values)
-    return () if own == size else (f"{name} was resampled from {own} to {size}.",)
+    """Return a sentence on a map (h, w) that becomes another (height, width); none where the sizes agree."""
+    stored = image_size(values)
+    return () if stored == size else (f"{name} was resampled from {stored} to {size}.",)

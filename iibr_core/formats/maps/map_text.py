@@ -8,7 +8,7 @@ from typing import Literal
 import msgspec
 
 KEY = "ImageDescription"
-"""The header's field: PNG, TIFF and EXR all have it."""
+"""The header's field, which PNG, TIFF and EXR all have."""
 START = "iibr map "
 
 
@@ -27,17 +27,15 @@ class MapText(msgspec.Struct, frozen=True):
 
 
 def text_of(text: MapText) -> str:
-    """For the header."""
+    """Return the header's text."""
     return START + msgspec.json.encode(text).decode()
 
 
 def text_from(text: str) -> MapText | None:
-    """None where a header's text is not ours, or damaged."""
-    if not text.startswith(START):
-        return None
+    """Return the meaning that a header's text states; None where it is not ours, or damaged."""
     try:
-        found = msgspec.json.decode(text.removeprefix(START), type=MapText)
+        found = msgspec.json.decode(text.removeprefix(START), type=MapText) if text.startswith(START) else None
     except msgspec.DecodeError:
         return None
-    numbers = (found.scale, found.offset, *(found.inverse or ()))
-    return found if all(map(math.isfinite, numbers)) and found.scale != 0 else None
+    numbers = (found.scale, found.offset, *(found.inverse or ())) if found else ()
+    return found if found and found.scale != 0 and all(map(math.isfinite, numbers)) else None

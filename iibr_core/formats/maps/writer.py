@@ -1,4 +1,4 @@
-"""Write maps with one value per pixel; a text in the file keeps the meaning of its values for reading."""
+"""Writes maps with one value per pixel; a text in the file keeps the meaning of its values for reading."""
 
 from __future__ import annotations
 
@@ -14,17 +14,16 @@ from iibr_core.formats.outputs import write_file
 from iibr_core.types import FloatImage, InputError
 
 MAP_SUFFIXES = (".pfm", ".exr", ".npy", ".png", ".tif", ".tiff")
-PNG_MOST = 65535
-"""The largest value of a 16-bit picture; 0 means unknown there."""
+MAX_PNG_VALUE = 65535
+"""Largest value of a 16-bit picture, in which 0 means unknown."""
 DISPARITY = MapText("disparity")
 
 
 def write_map(path: Path, values: FloatImage, text: MapText = DISPARITY) -> str:
     """Write an (H, W) map of finite values, whole or not at all; return a note about the file, or "".
 
-    text: their meaning; PNG, TIFF and EXR keep it. A PNG holds the values from 1 to 65535, and says how they were
-    multiplied and moved; all others hold them as they are (float32). Raises InputError for other endings, for
-    disparity whose name ends in `_depth`, and where the file cannot be written.
+    text: meaning of the values; PNG, TIFF and EXR keep it. A PNG holds values from 1 to 65535, and its text states
+    their scale and offset; all others hold float32. A name that ends in `_depth` is refused for disparity.
     """
     path = Path(path)
     kind = path.suffix.lower()
@@ -46,7 +45,7 @@ def write_map(path: Path, values: FloatImage, text: MapText = DISPARITY) -> str:
 
 def _write_png(path: Path, values: FloatImage, text: MapText) -> str:
     low, high = float(values.min()), float(values.max())
-    step = (high - low) / (PNG_MOST - 1) or 1.0
+    step = (high - low) / (MAX_PNG_VALUE - 1) or 1.0
     stored = np.rint((values.astype(np.float64) - low) / step).astype(np.uint16) + np.uint16(1)
     _write_plane(path, stored, "uint16", msgspec.structs.replace(text, scale=step, offset=low - step))
     return f"{text.meaning.capitalize()} is {step:.6g} times the stored value, plus {low - step:.6g}; the file says so."

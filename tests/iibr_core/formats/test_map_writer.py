@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from iibr_core.formats.maps.reader import read_map
-from iibr_core.formats.maps.writer import PNG_MOST, write_map
+from iibr_core.formats.maps.writer import MAX_PNG_VALUE, write_map
 from iibr_core.types import InputError
 
 
@@ -33,7 +33,7 @@ def test_names_that_would_be_read_as_something_else_are_refused(tmp_path: Path, 
 
 def test_a_png_says_how_its_values_were_scaled(tmp_path: Path) -> None:
     path, wanted = tmp_path / "map.png", some_map()
-    step = (wanted.max() - wanted.min()) / (PNG_MOST - 1)
+    step = (wanted.max() - wanted.min()) / (MAX_PNG_VALUE - 1)
     assert f"{step:.6g}" in write_map(path, wanted)
     np.testing.assert_allclose(read_map(path), wanted, atol=step)
     write_map(path, np.full((4, 5), -3.0, np.float32))

@@ -21,10 +21,10 @@ from iibr_core.formats.images.metadata import (
     read_caption,
     read_metadata,
     settings_text_in,
-    xmp_for,
 )
 from iibr_core.formats.images.photo import read_photo
 from iibr_core.formats.images.write import KINDS, PictureFormat, write_image, write_picture
+from iibr_core.formats.images.xmp import xmp_for
 from iibr_core.types import DISPLAY_P3, SRGB, ImageSize
 from tests.iibr_core.formats.test_color_profile import profile_bytes
 
