@@ -48,7 +48,7 @@ def main() -> None:
 
 
 def row_of(name: str, source: Source) -> tuple[Any, ...]:
-    """Of the table."""
+    """Return a row of the table."""
     opened = open_for_export(KIND, ExportOptions(), source, 1.0, LensChoice(), lambda scene: None, None)
     views = list(opened.views(with_disparity=True))
     begun = time.perf_counter()

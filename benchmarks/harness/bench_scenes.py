@@ -38,9 +38,9 @@ FIELD = GridShape(9, 9)
 CENTRE = ViewOffset(0.0, 0.0)
 MOST_JUDGED = 12
 JUDGED_SHARES = ((1.0, 1.0), (0.75, 0.25), (0.25, 0.75))
-"""Of the way to the outermost row and column: the views judged, each in all four quarters of the field."""
+"""Places of the judged views, as shares of the way to the outermost row and column, in all four quarters."""
 SOFT_PX = 2.0
-"""Estimated maps are soft at edges; true ones blurred by this sigma stand in for them."""
+"""Sigma by which true maps are blurred to be as soft at edges as estimated ones, in pixels."""
 TEXTURE_PX = 1.5
 SQUARE_SHARE = 0.09
 """Side of a square, as a share of the picture's."""
@@ -74,12 +74,12 @@ class BenchScene:
 
     @property
     def given(self) -> tuple[Photo, Disparity]:
-        """As the core takes them."""
+        """Photo and disparity as the core takes them."""
         return Photo(self.photo, float(self.photo.shape[1]), self.name), Disparity(self.disparity, "bench")
 
 
 def offsets_of(grid: GridShape) -> tuple[ViewOffset, ...]:
-    """Of every view."""
+    """Return the offsets of every view."""
     return tuple(grid.offset(*at) for at in np.ndindex(*grid))
 
 
