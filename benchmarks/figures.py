@@ -3,9 +3,9 @@
     python -m benchmarks.figures [--data DATA] [--only WORDS] [--list] [--check]
 
 FIGURES lists which program makes what, what it needs and about how long it takes on two cores; figures that this
-machine cannot make are named and stay. A page is made whole, or between its marks, `<!-- NAME -->` and `<!-- /NAME -->`, and what
-people wrote around them stays. The tables of README and docs/accuracy.md are copied from the other pages. --list: shows
-FIGURES. --check: makes nothing, but names the pages that are older than what shapes their figures.
+machine cannot make are named and stay. A page is made whole, or between its marks, `<!-- NAME -->` and
+`<!-- /NAME -->`, and what people wrote around them stays. The tables of README and docs/accuracy.md are copied from the
+other pages. --list: shows FIGURES. --check: only names the pages that are older than what shapes their figures.
 """
 
 from __future__ import annotations
