@@ -1,1 +1,1 @@
-"""Figures, not tests: `make bench` writes those in docs/speed.md; every module says how it is called."""
+"""Measurements, not tests. `make bench` writes docs/speed.md; the text of every module begins with its command."""

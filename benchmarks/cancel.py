@@ -1,9 +1,8 @@
-"""How long a cancelled field goes on: from the word to the end of the generator, at 4 MP.
+"""Measures how long a cancelled field takes to end: from the request to the end of the generator, at 4 MP.
 
     python -m benchmarks.cancel [--pixels 4000000] [--times 20]
 
-The word comes at random moments of generating. The viewer's worker then drops the job. Target: 100 ms, which other
-programs lengthen.
+The request comes at evenly spaced moments of generating. Target: 100 ms, which other programs lengthen.
 """
 
 from __future__ import annotations
@@ -27,7 +26,7 @@ from iibr_core.types import (
 GRID = GridShape(9, 9)
 MOST_MS = 100
 LAST_S = 4.0
-"""The word comes within so many seconds."""
+"""Seconds within which the request comes."""
 
 
 def main() -> None:
@@ -56,7 +55,7 @@ def scene(pixels: int) -> tuple[Photo, Disparity]:
 
 
 def wait_ms(photo: Photo, disparity: Disparity, share: float) -> float:
-    """Cancel at some moment of the first seconds; how long until the generator ends."""
+    """Cancel at this share of the first seconds; return the milliseconds until the generator ends."""
     stop, cancelled_at = threading.Event(), []
 
     def cancel() -> None:

@@ -1,4 +1,4 @@
-"""What refinement of depth edges gains, what it costs, and how good the guess without a model is.
+"""Measures what refinement of depth edges gains and costs, and how good the guess without a model is.
 
     python -m benchmarks.depth --data DATA [--out docs/depth.md]
 
@@ -43,9 +43,9 @@ ONE_MEGAPIXEL, MOST_S, REPEATS = ImageSize(1000, 1000), 0.5, 5
 PAIRS = 400_000
 LEAST_APART, LEAST_ORDERED, MOST_BELOW_RAMP = 0.1, 0.84, 0.02
 SHIFT_PERCENTILES = (10, 30, 50, 70, 90)
-"""Of the known disparity, where a guess and a plane are tried to stay still."""
+"""Percentiles of the known disparity at which a guess and a plane are tried to stay still."""
 SCALE_SHARES = (0.25, 0.5, 1.0)
-"""Of the scale that fits the guess to the known disparity best."""
+"""Shares of the scale that fits the guess to the known disparity best."""
 MOST_GUESSED_PIXELS = 500_000
 
 
@@ -100,7 +100,7 @@ def resize(values: FloatImage, factor: float) -> FloatImage:
 
 
 def seconds() -> Iterator[str]:
-    """CPU seconds of all threads tell the same on a busy machine; the clock does not."""
+    """Yield times by the clock, and in CPU seconds of all threads, which other programs disturb less."""
     scene = drawn_scene(4, ONE_MEGAPIXEL, 2.5)
     colors, disparity = scene.photo, scene.disparity
     yield "Time for 1 MP, minimum of several runs; CPU seconds are the sum over threads:\n"
@@ -167,8 +167,8 @@ def known_depths(data: Path) -> Iterator[BenchScene]:
 
 
 def share_ordered(guess: NDArray[Any], known: FloatImage) -> float:
-    """Of random pairs of points that are far enough apart in depth, those that a guess (H, W) orders as known (H, W)
-    does; equal ones count half.
+    """Return the share of random pairs of points, far enough apart in depth, that a guess (H, W) orders as the known
+    map (H, W) does; equal ones count half.
     """
     places = np.random.default_rng(0).integers(0, known.size, (2, PAIRS))
     low, high = np.percentile(known, (1, 99))

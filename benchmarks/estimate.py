@@ -1,4 +1,4 @@
-"""What true depth costs beside the window: Depth Anything V2 Small as ONNX, its architecture with random weights.
+"""Measures what depth by a model costs beside the window: Depth Anything V2 Small as ONNX, with random weights.
 
 python -m benchmarks.estimate [--photo PHOTO] [--out FILE]
 
@@ -37,7 +37,7 @@ THREADS, SIDE = 2, 518
 LOAD_S, ESTIMATE_S, ADDED_MB, TURN_MS = 1.5, 1.2, 700, 50
 """Wanted: no more than that."""
 BACKBONE = {"image_size": SIDE, "hidden_size": 384, "num_attention_heads": 6, "out_indices": [3, 6, 9, 12]}
-"""Of Depth Anything V2 Small; all else is what the library takes unless told."""
+"""Settings of Depth Anything V2 Small that differ from the library's."""
 
 
 def main() -> None:
@@ -81,19 +81,19 @@ def save_model(file: Path) -> None:
 
     from tests.iibr_core.depth.random_networks import depth_anything_network, export_depth_anything, with_random_weights
 
-    warnings.simplefilter("ignore")  # tracing tells what it takes for constant
+    warnings.simplefilter("ignore")  # tracing warns of what it takes for constant
     torch.manual_seed(0)
     export_depth_anything(with_random_weights(depth_anything_network(BACKBONE)), file)
 
 
 def estimate(file: Path, photo: Path) -> tuple[Cost, Cost, float]:
-    """What loading and running cost in this process, and the most bytes that they add (NaN where it is not told)."""
+    """Return the costs of loading and of running in this process, and the most bytes that they add (NaN if unknown)."""
     model, pixels = model_to_use(DepthChoice(model=str(file))), read_photo(photo)
     assert model is not None
     wanted, marks = OnnxInput(USUAL_PREPARATION, ImageSize(SIDE, SIDE), is_metric=False), list[Cost]()
 
     def mark(*_: object) -> None:
-        """Progress is told when loading begins, and when running does."""
+        """Note when loading begins, and when running does."""
         marks.append(Cost(time.perf_counter(), time.process_time()))
 
     with watched(mark):

@@ -2,10 +2,10 @@
 
     python -m benchmarks.figures [--data DATA] [--only WORDS] [--list] [--check]
 
-FIGURES says which program makes what, what it needs and about how long it takes on two cores; what this machine lacks
-is said, and left as it is. A page is made whole, or between its marks, `<!-- NAME -->` and `<!-- /NAME -->`, and what
-people wrote around them stays. The tables of README and docs/accuracy.md are copied from the other pages. --list: says
-what there is. --check: says in a line each which pages are older than what shapes their figures; makes nothing.
+FIGURES lists which program makes what, what it needs and about how long it takes on two cores; figures that this
+machine cannot make are named and stay. A page is made whole, or between its marks, `<!-- NAME -->` and
+`<!-- /NAME -->`, and what people wrote around them stays. The tables of README and docs/accuracy.md are copied from the
+other pages. --list: shows FIGURES. --check: only names the pages that are older than what shapes their figures.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ SHAPING = ("iibr_core", "viewer", "shaders", "web", "assets", "benchmarks")
 COMMIT = re.compile(r"\bat commit ([0-9a-f]{7,40})\b")
 STAMP = re.compile(r"Made by `[^`]+`(?: at commit \w+(?: \(with changes\))?)?(?:, on \d+ cores)?")
 TIME_LIMIT_S = 7200.0
-"""One that hangs must not take hours of figures with it."""
+"""Longest time of one program: one that hangs must not stop the others."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class Figure:
 
     @property
     def words(self) -> list[str]:
-        """As a person would type it."""
+        """The command as a person would type it, in words."""
         words = shlex.split(self.command)
         return words if words[0] == "iibr" else ["python", *(["-m"] if words[0].startswith("bench") else []), *words]
 
@@ -64,7 +64,7 @@ EVALUATED = (
     "blender_shop_9x9", "hci_antinous", "mb2003_teddy_quarter", "mb2005_moebius_third", "mb2014_motorcycle_quarter",
     "fence", "shelf",
 )  # fmt: skip
-"""Of DATA and tests/data/thin_lens: each has a page of its own."""
+"""Scenes of DATA and tests/data/thin_lens with a page each."""
 GALLERY = "moving.gif", "near.jpg", "far.jpg", "rgbd.jpg", "anaglyph.jpg", "crossed.jpg", "epi.png"
 METHOD = "epi", "candidates", "weights", "occlusion", "inpainting", "ray_set"
 FIGURES = (
@@ -111,7 +111,7 @@ def main() -> None:
 
 
 def make_all(wanted: list[Figure], data: Path | None) -> bool:
-    """Make them one after the other and say how; whether one failed."""
+    """Make the figures one after the other, print how it went, and return whether one failed."""
     failed = False
     for figure in wanted:
         name, lacking = ", ".join(figure.places), [NEEDS[need] for need in figure.needs if not has(need, data)]
@@ -130,7 +130,7 @@ def make_all(wanted: list[Figure], data: Path | None) -> bool:
 
 
 def has(need: str, data: Path | None) -> bool:
-    """Whether it is here."""
+    """Return whether this machine has what a figure needs."""
     return {
         "DATA": data is not None,
         "X": shutil.which("Xvfb") is not None and shutil.which("xdotool") is not None,
@@ -140,7 +140,7 @@ def has(need: str, data: Path | None) -> bool:
 
 
 def make(figure: Figure, data: Path | None) -> str:
-    """Run the program and write what it makes; why that failed, "" where it did not."""
+    """Run the program and write its results; return why that failed, "" if it did not."""
     with tempfile.TemporaryDirectory() as out:
         folders = {"DATA": str(data), "OUT": out, "python": sys.executable, "iibr": f"{sys.executable}\0-m\0viewer"}
         filled = (re.sub(r"^(DATA|OUT|python$|iibr$)", lambda m: folders[m[0]], word) for word in figure.words)
@@ -164,7 +164,7 @@ def make(figure: Figure, data: Path | None) -> str:
 
 
 def write_page(place: str, figure: Figure, text: str) -> None:
-    """Write a page, or its part; it says the command, once."""
+    """Write a page, or its part, with the command that made it."""
     name, _, mark = place.partition("#")
     said = made_by(figure.words)
     stamped, count = STAMP.subn(said, text.strip(), count=1)
@@ -176,12 +176,12 @@ def write_page(place: str, figure: Figure, text: str) -> None:
 
 
 def pages() -> Iterator[str]:
-    """The pages that FIGURES makes, each once."""
+    """Yield the pages that FIGURES makes, each once."""
     yield from dict.fromkeys(place.partition("#")[0] for one in FIGURES for place in one.places if ".md" in place)
 
 
 def stale_pages() -> Iterator[str]:
-    """A line for each page that names no commit, or one since which something that shapes figures changed."""
+    """Yield a line for each page that names no commit, or one since which something that shapes figures changed."""
     for page in pages():
         for commit in dict.fromkeys(COMMIT.findall((DOCS / page).read_text("utf-8"))) or [""]:
             later = git("rev-list", "--count", f"{commit}..HEAD", "--", *(f":/{folder}" for folder in SHAPING))

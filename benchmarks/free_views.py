@@ -3,10 +3,10 @@
     python -m benchmarks.free_views [--scenes 12] [--size 480x320] [--seed 0]
 
 Scenes are drawn, seen from eight cameras each: beside the photo's, before and behind it, turned, and with another lens.
-"resampled" is the reference warp: nine points a pixel tell the disparity, colours are looked up by Lanczos' kernel,
-holes are filled from beside. Disparity is the truth. PSNR in dB (of the frame; of what the photo sees; of what it does
-not), the frame's gain over the warp of the same scene and pose, and the share of the frame's squared error that lies
-beyond the photo's frame; medians over scenes. Processor time a view.
+"resampled" is the reference warp: the disparity comes from nine points a pixel, colours by Lanczos' kernel, holes are
+filled from beside. Disparity is the truth. PSNR in dB (of the frame; of what the photo sees; of what it does not), the
+frame's gain over the warp of the same scene and pose, and the share of the frame's squared error that lies beyond the
+photo's frame; medians over scenes. Processor time a view.
 """
 
 from __future__ import annotations
@@ -49,8 +49,8 @@ photo's.
 """
 
 Row = tuple[float, float, float, float, float, float]
-"""PSNR of the frame, its gain over the warp's, of what is seen, of what is not; share of the error that lies beyond the
-photo's frame; milliseconds of processor time.
+"""PSNR of the frame, its gain over the warp's, PSNR of pixels that the photo sees and of the others; share of
+the error that lies beyond the photo's frame; milliseconds of processor time.
 """
 Table = dict[tuple[str, str], list[Row]]
 """Rows of all scenes, by pose and way."""
@@ -69,7 +69,7 @@ def rotation(degrees: tuple[float, float, float]) -> NDArray[np.float64]:
 
 
 def photo_camera(scene: RaycastScene, size: ImageSize) -> Camera:
-    """Of the centre view, in the scene's world."""
+    """Return the camera of the centre view, in the scene's world."""
     return Camera(np.eye(3), np.zeros(3), size, (scene.focal_px,) * 2, scene.centre_px, "photo")
 
 
@@ -89,7 +89,7 @@ def cameras_of(scene: RaycastScene, size: ImageSize, nearest: float) -> dict[str
 
 
 def truth(scene: RaycastScene, camera: Camera) -> tuple[FloatImage, FloatImage]:
-    """What a camera sees of a scene: colours (H, W, 3) and 1 / depth (H, W)."""
+    """Return the colours (H, W, 3) and 1 / depth (H, W) that a camera sees of a scene."""
     primitives, turned = scene.primitives.copy(), camera.world_from_camera
     primitives["centre"] = (primitives["centre"] - camera.position) @ turned
     primitives["axes"] = primitives["axes"] @ turned
@@ -142,7 +142,7 @@ def report(scenes: int, size: ImageSize, seed: int) -> Iterator[str]:
 
 
 def line(pose: str, way: str, rows: list[Row]) -> str:
-    """Of the table."""
+    """Return a line of the table: medians."""
     frame, gain, seen, unseen, beyond, ms = np.nanmedian(np.array(rows), axis=0)
     return row(pose, way, f"{frame:.2f}", f"{gain:+.2f}", f"{seen:.2f}", f"{unseen:.2f}", f"{beyond:.0%}", f"{ms:.0f}")
 

@@ -1,4 +1,4 @@
-"""Feeds every reader files damaged on purpose: each must give finite values or one line that says what is wrong.
+"""Feeds every reader files damaged on purpose: each must give finite values or an error of one line.
 
     python -m benchmarks.fuzz [--count 10000] [--reader NAME]... [--seed 0] [--out out/fuzz]
 
@@ -31,9 +31,9 @@ TIME_LIMIT_S = 20.0
 """For one case; generous, because other programs may load the machine."""
 START_LIMIT_S = 300.0
 ADDRESS_SPACE = 3 << 30
-"""What a worker may reserve beyond what it has after reading the valid files."""
+"""Bytes that a worker may reserve beyond those after reading the valid files."""
 RESIDENT_BUDGET = 300 << 20
-"""What a case may use of it."""
+"""Bytes of them that a case may use."""
 KEPT_EACH = 3
 
 
@@ -57,7 +57,7 @@ def main() -> None:
 
 
 def fuzz_reader(name: str, seed: int, count: int, out: Path) -> tuple[Counter[str], int]:
-    """What was found, by kind, and how many cases were read without complaint; a worker that ends is replaced."""
+    """Return the findings by kind, and how many cases were read without complaint; a worker that ends is replaced."""
     findings: Counter[str] = Counter()
     read = next_case = 0
     while next_case < count:

@@ -37,7 +37,7 @@ MAX_PIXELS = 100_000
 
 @dataclass(frozen=True)
 class Reader:
-    """Who reads the files: `read` gets the path of a damaged one; `prepare` puts beside it what it needs."""
+    """A reader of files: `read` gets the path of a damaged one; `prepare` puts beside it what it needs."""
 
     seeds: Callable[[], list[Seed]]
     read: Callable[[Path], object]

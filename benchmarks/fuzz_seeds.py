@@ -224,7 +224,7 @@ def weights() -> list[Seed]:
 
 
 def poses() -> list[Seed]:
-    """Of four cameras side by side."""
+    """Return the positions of four cameras side by side."""
     rotation = np.array([[0.0, 1, 0], [1, 0, 0], [0, 0, -1]]).T
     rows = []
     for k in range(4):
@@ -236,12 +236,12 @@ def poses() -> list[Seed]:
 
 
 def lens_pictures() -> list[Seed]:
-    """What a data set's lens.json holds."""
+    """Return the content of a data set's lens.json."""
     return [Seed("lens.json", b'{"focus_disparity": -0.5, "radius_views": 2.0}')]
 
 
 def preferences() -> list[Seed]:
-    """What the viewer keeps between two runs."""
+    """Return the files that the viewer keeps between two runs."""
     kept = {"theme": "light", "font_scale": 1.25, "open_sections": ["view"], "window": [0, 0, 800, 600]}
     return [
         Seed("preferences.json", json.dumps(kept).encode()),

@@ -2,8 +2,8 @@
 
     python -m benchmarks.multi_view_depth --data DATA
 
-Of light fields below DATA with 3x3 views and more. Where one has a true map of its centre view (gt_*.npy), bad pixels
-and the square error are told, 15 px of border left out, as the HCI benchmark does. Every second view is held back,
+Of light fields below DATA with 3x3 views and more. If one has a true map of its centre view (gt_*.npy), bad pixels
+and the square error are given, 15 px of border left out, as the HCI benchmark does. Every second view is held back,
 drawn from the others as the window does it, and compared with the plain blend of the four views around it.
 """
 

@@ -38,9 +38,9 @@ TESTS = (
     "tests/iibr_core/test_*cases.py",
     "tests/iibr_core/**/test_small_steps.py",
 )
-"""Of those rooms; the ones named after the file at fault are run first."""
+"""Tests of those rooms; the ones named after the file at fault are run first."""
 TIME_LIMIT_S = 1200.0
-"""What takes longer hangs, which is found."""
+"""Time in seconds after which a test counts as hanging, which is found."""
 
 
 def main() -> None:
@@ -71,12 +71,12 @@ def matching(tree: Path, patterns: Iterable[str]) -> list[str]:
 
 
 def choose(faults: Sequence[Fault], seed: int, count: int) -> list[Fault]:
-    """So many of them, at random."""
+    """Return so many of the faults, at random."""
     return random.Random(seed).sample(faults, min(count, len(faults)))
 
 
 def copy_tree(to: Path) -> Path:
-    """What git knows or would add, as it is now, with the kernels that are compiled."""
+    """Copy the files that git knows or would add, with the compiled kernels; return the copy."""
     names = git("ls-files", "--full-name", "-co", "--exclude-standard", ":/").splitlines()
     for name in (*names, *matching(ROOT, ["iibr_core/**/__pycache__/*.nb[ic]"])):
         if (ROOT / name).is_file():

@@ -1,4 +1,4 @@
-"""What `iibr evaluate` reports, with a page for each scene, as docs/evaluation has it.
+"""Writes the report of `iibr evaluate` with a page for each scene, as docs/evaluation has it.
 
     python -m benchmarks.scene_pages --data DATA --out OUT
 
@@ -43,7 +43,7 @@ def main() -> None:
 def pages_of(report: str, made: str) -> Iterator[tuple[str, str]]:
     """File name and text of each page. A section belongs to the scene that its heading names before the colon.
 
-    made: the sentence that says which command made them, without its full stop.
+    made: a sentence that names the command, without its full stop.
     """
     summary, *sections = re.split(r"^(?=## )", report, flags=re.MULTILINE)
     scenes: dict[str, list[str]] = {}

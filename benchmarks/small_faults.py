@@ -23,7 +23,7 @@ UNTOUCHED = (ast.AnnAssign, ast.JoinedStr, ast.arguments, ast.Import, ast.Import
 
 @dataclass(frozen=True)
 class Fault:
-    """Of a file: what is wrong, where, and the file's text with it."""
+    """A small fault: its file, its place in words, and the file's text with it."""
 
     path: str
     what: str
@@ -59,7 +59,7 @@ def _changes(tree: ast.AST) -> Iterator[tuple[ast.expr | ast.stmt, str]]:
 
 
 def _instead(node: ast.expr) -> Iterator[str]:
-    """What may stand for an expression."""
+    """Yield what may replace an expression."""
     match node:
         case ast.Compare(left, operators, others):
             for k, operator in enumerate(operators):

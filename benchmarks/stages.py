@@ -1,4 +1,4 @@
-"""What each stage between map and view is worth: left out alone, on six kinds of maps of drawn and real scenes.
+"""Measures what each stage between map and view is worth: left out alone, on six kinds of maps of many scenes.
 
     python -m benchmarks.stages --data DATA [--out docs/stages.md] [--drawn 10] [--only STAGE,...]
 
@@ -48,7 +48,7 @@ KINDS = ("exact", "measured", "soft", "resampled", "a phone's", NETWORK)
 SIZE, FIRST_SEED, DISPARITIES_PX = ImageSize(240, 320), 41_000, (0.5, 4.0)
 JUDGED = [ViewOffset(t * v, s * u) for v, u in ((4, 4), (3, 1)) for t in (-1, 1) for s in (-1, 1)]
 MOST_PIXELS, MOST_JUDGED = 180_000, 6
-"""Of real scenes."""
+"""Largest size of a real scene, and how many of its views are judged."""
 EDGE_PX, AROUND_PX, WIDE_PX = 3, 12, 50
 STANDS_OUT, CALM = 0.12, 0.06
 LEAST_WHOLE_DB, LEAST_EDGE_DB, MOST_LOST_DB = 0.05, 0.1, 0.05
@@ -56,7 +56,7 @@ LEAST_WHOLE_DB, LEAST_EDGE_DB, MOST_LOST_DB = 0.05, 0.1, 0.05
 Mask = NDArray[np.bool_]
 Views = dict[ViewOffset, FloatImage]
 Way = Callable[[FloatImage, FloatImage, Mask | None, Views, Sequence[ViewOffset]], Views]
-"""As `make_views`."""
+"""A function that makes views, see `make_views`."""
 Judged = tuple[str, dict[str, NDArray[np.float64]]]
 """A kind of map; by what was left out, the figures of a cell."""
 
@@ -157,7 +157,7 @@ def _judge_real(data: Path, place: int, ways: Mapping[str, Way]) -> list[Judged]
 
 
 def _worse(exact: FloatImage, seed: int) -> dict[str, FloatImage]:
-    """Of the kinds that are made of a better map; each scene has another fault of a kind."""
+    """Return maps of the kinds that are made of a better map, by kind; each scene has another fault of a kind."""
     step = float(np.ptp(exact)) / 255
     dilated = cv2.dilate(exact, np.ones((3, 3)))
     resampled = (
@@ -226,7 +226,7 @@ def _figures(
     field: Sequence[ViewOffset],
     ways: Mapping[str, Way],
 ) -> dict[str, NDArray[np.float64]]:
-    """By what is left out. better: the map that tells where gaps are, whatever was given."""
+    """Return the figures by the stage left out. better: the map that decides where gaps are, whatever was given."""
     holes = {offset: reference_warp(photo, better, offset).hole for offset in truth}
     make_views(photo, given, unknown, truth, field)  # compiles
     found = {}

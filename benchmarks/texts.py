@@ -34,13 +34,13 @@ class Text:
 
 
 def texts_in(folders: tuple[str, ...] = WINDOW) -> list[Text]:
-    """Of all files in these folders, in order."""
+    """Return the texts of all files in these folders, in order."""
     files = (path for folder in folders for path in sorted((ROOT / folder).rglob("*.py")))
     return [text for path in files for text in texts_of(path.read_text("utf-8"), str(path.relative_to(ROOT)))]
 
 
 def texts_of(source: str, name: str) -> Iterator[Text]:
-    """Of one file's source, in order."""
+    """Yield the texts of one file's source, in order."""
     tree = ast.parse(source)
     skipped = {id(part) for part in ast.walk(tree) if _is_for_code(part) for part in ast.walk(part)}
     for node in ast.walk(tree):

@@ -2,7 +2,7 @@
 
 python -m benchmarks.use [--steps 1000] [--seed 0]
 
-Says what memory the process fills after so many actions and once it rests, against a fresh window that rests with the
+Prints the memory of the process after so many actions and once it rests, against a fresh window that rests with the
 same photo and grid: photos differ in size, and grids in views; how threads and open files stand; and of which action
 the longest frame was, in processor time of the thread that draws.
 """
@@ -43,7 +43,7 @@ from viewer.model.state.tasks import SaveTask
 from viewer.model.zoom import SetZoom, Zoom
 
 SIZES = (600, 900), (700, 600), (480, 720), (640, 960), (512, 512), (560, 840)
-"""Of the photos in the folder: (height, width)."""
+"""Sizes (height, width) of the photos in the folder."""
 GRIDS = 5, 7, 9
 FRAMES_A_STEP = 3
 RESTS_AFTER, OPEN_S = 10, 60.0
@@ -63,7 +63,7 @@ class User:
         self.app, self.out, self.random = app, out, random.Random(seed)
 
     def step(self) -> str:
-        """Do something, often what is often done; what it was."""
+        """Do a random thing, frequent ones more often, and return its name."""
         thing = self.random.choice(2 * OFTEN + SELDOM)
         if thing in ASKED:
             self.do(*ASKED[thing](self))
@@ -131,7 +131,7 @@ def save(user: User) -> None:
 
 
 def export(user: User) -> None:
-    """What is asked for too early is refused."""
+    """Export the scene; the window refuses it before all views are there."""
     kind, ending, options = user.random.choice(EXPORTS)
     user.do(DoTask(ExportTask(kind, str(user.out / f"{kind}{ending}"), options, may_replace=True)))
     user.do(ShowPrompt(None))
@@ -161,7 +161,7 @@ ASKED: dict[str, Callable[[User], Sequence[Action]]] = {
     "compare": lambda u: (KeepState(), Compare(u.random.choice((None, "photo", "kept", "difference")))),
     "gloss": lambda u: [SetOptics("gloss", u.random.choice((None, Gloss(roughness=u.between(0.1, 0.6)))))],
 }
-"""What is one frame."""
+"""Actions of one frame."""
 DONE = {f.__name__: f for f in (drag, brush, turn_camera, save, export, switch, change_grid)}
 OFTEN = ("drag", "focus", "brush", "undo")
 SELDOM = tuple(sorted({*ASKED, *DONE} - {*OFTEN}))
@@ -221,7 +221,7 @@ def memory_of_fresh_window(path: str, grid: GridShape) -> float:
 
 
 def take_steps(user: User, steps: int, turns: Turns) -> Iterator[str]:
-    """What the process takes after some of them, and at the end; then the longest frame of each action."""
+    """Yield the memory of the process after some of the actions, and at the end; then the longest frame of each."""
     process = psutil.Process()
     longest: dict[str, Turn] = {}
 

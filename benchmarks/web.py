@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import tempfile
 import time
-from collections.abc import Iterator
-from dataclasses import replace
+from collections.abc import Generator, Iterator
+from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -27,7 +27,7 @@ from iibr_core.exports.source import ExportSource, open_for_export
 from iibr_core.exports.web import make_page
 from iibr_core.scenes.lens_limits import LensChoice
 from iibr_core.scenes.scene import Source
-from iibr_core.types import GridShape, ViewOffset
+from iibr_core.types import GridShape, ViewOffset, ViewUpdate
 from tests.browser import Pipe, Tab, open_browser
 from tests.web.conftest import canvas, set_lens, wait_until_still
 from viewer.app.headless import HeadlessViewer
@@ -48,11 +48,11 @@ def main() -> None:
 
 
 def row_of(name: str, source: Source) -> tuple[Any, ...]:
-    """Of the table."""
+    """Return a row of the table."""
     opened = open_for_export(KIND, ExportOptions(), source, 1.0, LensChoice(), lambda scene: None, None)
     views = list(opened.views(with_disparity=True))
     begun = time.perf_counter()
-    page, carried = make_page(Made(opened, views), ExportOptions())
+    page, carried = make_page(Made(**vars(opened), made=tuple(views)), ExportOptions())
     seconds = time.perf_counter() - begun
     originals = {opened.scene.grid.offset(view.row, view.column): view.colors for view in views}
     flips = [flip(originals[place], frame) for place, frame in zip(carried.places, frames(carried.colors))]
@@ -70,16 +70,15 @@ def row_of(name: str, source: Source) -> tuple[Any, ...]:
             f"{memory / 1e6:.0f}", requests)  # fmt: skip
 
 
+@dataclass(frozen=True, eq=False)
 class Made(ExportSource):
     """A source whose views are in memory, to measure the time of writing only."""
 
-    def __init__(self, source: ExportSource, views: list[Any]) -> None:
-        super().__init__(**vars(replace(source)))
-        object.__setattr__(self, "_made", views)
+    made: tuple[ViewUpdate, ...] = ()
 
-    def views(self, *_: Any, **__: Any) -> Iterator[Any]:  # type: ignore[override]
+    def views(self, *_: Any, **__: Any) -> Generator[ViewUpdate]:
         """Yield the views."""
-        yield from self._made  # type: ignore[attr-defined]
+        yield from self.made
 
 
 def frames(files: tuple[bytes, ...]) -> Iterator[np.ndarray]:

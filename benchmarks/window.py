@@ -36,7 +36,7 @@ EVERY_S = 1 / 60
 
 @dataclass(frozen=True)
 class Drag:
-    """What was seen of one drag.
+    """Measurements of one drag.
 
     latency_frames, latency_ms: of each viewpoint shown. draw_ms: of each picture. left_over: frames after the last move
     until the picture had caught up.

@@ -1,7 +1,7 @@
 """Makes the pictures of docs/edges.md from the demo photo, without a display: python docs/make_edges.py [FOLDER]
 
-edges_NAME.png, three rows of a place at twice its size in an outermost view: a plain warp of the map as it is given,
-the light field with its edges not refined, the light field as it comes.
+edges_NAME.png, three rows of a place at twice its size in an outermost view: a plain warp of the given map, the light
+field without refined edges, the light field as the program makes it.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from iibr_core.types import FloatImage, ViewOffset
 
 OUTERMOST, STEPS = ViewOffset(0.0, 1.0), [ViewOffset(t, s) for t in (-1.0, 0.0, 1.0) for s in (-1.0, 0.0, 1.0)]
 PLACES = {"fork": (430, 190, 140, 110), "handlebar": (340, 80, 160, 100)}
-"""Of the view: left, top, width and height, px."""
+"""Left, top, width and height of the close-ups in the view, in pixels."""
 
 
 def main() -> None:

@@ -1,4 +1,4 @@
-"""Makes the pictures of docs/gallery.md by the commands that stand in it: python docs/make_gallery.py [FOLDER]
+"""Makes the pictures of docs/gallery.md by its commands: python docs/make_gallery.py [FOLDER]
 
 Each line of the page that begins with `iibr` is run as it stands, from the root of the source.
 """
@@ -13,7 +13,7 @@ from pathlib import Path
 
 DOCS = Path(__file__).parent
 MOST_BYTES = 2_000_000
-"""Of a picture: the page is read over the network."""
+"""Largest size of a picture in bytes: the page is read over the network."""
 
 
 def main() -> None:

@@ -26,7 +26,7 @@ from viewer.model.state.preferences import Section, with_sections
 SIZE = 1200, 760
 MOST_BYTES = 700_000
 TANK = 0.57, 0.42
-"""Where the motorcycle's tank is, as shares of the picture."""
+"""Place of the motorcycle's tank, as shares of the picture."""
 
 
 def main() -> None:
@@ -39,7 +39,7 @@ def main() -> None:
 
 
 def whole_window(viewer: HeadlessViewer) -> NDArray[np.uint8]:
-    """From the left, focused on the tank, wide open with seven blades."""
+    """Return the window: seen from the left, focused on the tank, wide open with seven blades."""
     open_sections(viewer)
     viewer.do(MoveEye(ViewOffset(0.5, -1.5)))
     pointed = hover_at(viewer, *TANK)

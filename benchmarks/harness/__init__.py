@@ -1,1 +1,1 @@
-"""What benchmarks share: scenes, timing, reports and how they are called, plots; each once."""
+"""The shared parts of benchmarks: scenes, timing, reports and how they are called, plots; each once."""

@@ -33,8 +33,8 @@ def table(page: Path, heading: str, column: str = "") -> list[list[str]]:
 
 
 def cell(page: Path, heading: str, row: str, column: str) -> str:
-    """What stands in the row and the column that begin so; "a | b": a row whose first cells are a and b. Raises
-    InputError where nothing does.
+    """Return the cell of the row and the column that begin so; "a | b": a row whose first cells are a and b. Raises
+    InputError if there is none.
     """
     names, *rows = table(page, heading, column)
     place = next(k for k, name in enumerate(names) if name.startswith(column))

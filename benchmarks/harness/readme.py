@@ -29,7 +29,7 @@ def switches(docs: Path) -> str:
 
 
 def views(docs: Path) -> str:
-    """From the centre view and the map of the scene."""
+    """Return the accuracy of views made from the centre view and the map of the scene."""
 
     def words(scene: str, method: str) -> str:
         page = docs / "evaluation" / f"{scene}.md"
@@ -42,7 +42,7 @@ def views(docs: Path) -> str:
 
 
 def soft_maps(docs: Path) -> str:
-    """What maps that are not exact cost."""
+    """Return what maps that are not exact cost."""
     names, *rows = table(docs / "depth.md", "Refinement", SOFT)
     kept = [k for k, name in enumerate(names) if k == 0 or name.startswith(SOFT)]
     return markdown([names[k] for k in kept], ([cells[k] for k in kept] for cells in rows))
@@ -82,11 +82,11 @@ TABLES: Mapping[str, tuple[str, Callable[[Path], str]]] = {
     "figures": (ACCURACY, figures),
     "soft-maps": (ACCURACY, soft_maps),
 }
-"""By mark: the page that it stands in, and what makes the table."""
+"""Page and maker of each table, by its mark."""
 
 
 def write_readme(root: Path, only_check: bool = False) -> Iterator[str]:
-    """Copy the tables; say which could not be, or with only_check, which are not what the pages say."""
+    """Copy the tables and yield the faults: those that could not be, or with only_check, those that differ."""
     for mark, (page, make) in TABLES.items():
         path = root / page
         text = path.read_text("utf-8")

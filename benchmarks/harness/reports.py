@@ -1,4 +1,4 @@
-"""How a benchmark is called, and what it leaves: shared options, tables, reports that say what made them."""
+"""The command line and the reports of benchmarks: shared options, tables, the command that made a report."""
 
 from __future__ import annotations
 
@@ -57,23 +57,23 @@ def start(module: str, main: Callable[[], None]) -> None:
 
 
 def is_wanted(name: str, only: str) -> bool:
-    """Whether --only names it."""
+    """Return whether --only names it."""
     return any(word in name for word in only.split(","))
 
 
 def emit(lines: Iterable[str], out: Path | None = None) -> None:
-    """Print lines as they come, and write them whole or not at all."""
-    told = []
+    """Print lines as they come, and write all of them at the end."""
+    printed = []
     for line in lines:
-        told.append(line)
+        printed.append(line)
         print(line, flush=True)
     if out is not None:
         with write_file(out) as unfinished:
-            unfinished.write_text("\n".join(told).rstrip("\n") + "\n", "utf-8")
+            unfinished.write_text("\n".join(printed).rstrip("\n") + "\n", "utf-8")
 
 
 def title(words: str, module: str, more: str = "") -> str:
-    """What a report begins with: heading, command, commit, machine."""
+    """Return the beginning of a report: heading, command, commit, machine."""
     return f"# {words}\n\n{made_by(['python', '-m', module, *sys.argv[1:]])}.{more and ' ' + more}\n"
 
 
@@ -89,8 +89,8 @@ def made_by(command: Sequence[str]) -> str:
 
 @cache
 def current_commit() -> str:
-    """The commit checked out, short; "" outside a checkout. Changes that are not committed are said, but for those of
-    pages and pictures: they are what is being made.
+    """Return the short name of the commit checked out, "" outside a checkout. WITH_CHANGES follows it if files differ,
+    pages and pictures apart: those are being made.
     """
     name = git("rev-parse", "--short", "HEAD")
     changes = git("status", "--porcelain", "--untracked-files=no", "--", *NO_PAGES)
@@ -98,7 +98,7 @@ def current_commit() -> str:
 
 
 def git(*words: str) -> str:
-    """What git says, "" where it fails."""
+    """Return the output of git, "" if it fails."""
     try:
         run = subprocess.run(["git", *words], cwd=DOCS, capture_output=True, text=True, check=True)
     except (OSError, subprocess.CalledProcessError):
@@ -112,7 +112,7 @@ def row(*cells: object) -> str:
 
 
 def head(*names: str) -> str:
-    """What a table begins with: two lines."""
+    """Return the first two lines of a table."""
     return f"{row(*names)}\n{row(*['---'] * len(names))}"
 
 
@@ -122,5 +122,5 @@ def markdown(names: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
 
 
 def holds(is_so: bool | None) -> str:
-    """Whether a figure is as good as it is to be; None where this system cannot tell."""
+    """Return in a word whether a figure meets its target; None if this system cannot measure it."""
     return {True: "yes", False: "**no**", None: "not known here"}[is_so]

@@ -41,19 +41,19 @@ class Cost:
         return Cost(self.wall_s + other.wall_s, self.cpu_s + other.cpu_s)
 
     def times(self, factor: float) -> Cost:
-        """That many times as much."""
+        """Return the cost of so many times as much work."""
         return Cost(factor * self.wall_s, factor * self.cpu_s)
 
 
 def cost_of(work: Callable[[], object]) -> Cost:
-    """What one run of the work costs."""
+    """Return the cost of one run of the work."""
     wall, cpu = time.perf_counter(), time.process_time()
     work()
     return Cost(time.perf_counter() - wall, time.process_time() - cpu)
 
 
 def in_turns(ways: Mapping[str, Callable[[], Cost]], repeats: int) -> dict[str, list[Cost]]:
-    """The costs that each way gives, one a round; every round goes through all ways."""
+    """Return the costs of each way, one a round; every round goes through all ways."""
     found: dict[str, list[Cost]] = {name: [] for name in ways}
     for round_ in range(repeats):
         for k, (name, way) in enumerate(ways.items()):
@@ -63,13 +63,13 @@ def in_turns(ways: Mapping[str, Callable[[], Cost]], repeats: int) -> dict[str, 
 
 
 def median_ratio(costs: list[Cost], reference: list[Cost]) -> float:
-    """Of processor times, each against the reference of its own round."""
+    """Return the median ratio of processor times, each to the reference of the same round."""
     ratios = [one.cpu_s / other.cpu_s for one, other in zip(costs, reference) if other.cpu_s > 0]
     return float(np.median(ratios)) if ratios else math.nan
 
 
 def median_cost(costs: list[Cost]) -> Cost:
-    """Medians of both times."""
+    """Return the medians of both times."""
     return Cost(float(np.median([c.wall_s for c in costs])), float(np.median([c.cpu_s for c in costs])))
 
 
@@ -89,7 +89,7 @@ def field_costs(scenes: Mapping[str, BenchScene], repeats: int) -> dict[str, Cos
 
 
 def in_own_process(work: Callable[..., Result], *args: object) -> Result:
-    """What work(*args) gives, in a process that ends with it."""
+    """Return work(*args), done in a process that ends with it."""
     with ProcessPoolExecutor(1, get_context("spawn")) as process:
         return process.submit(work, *args).result()
 
@@ -104,7 +104,7 @@ def process_of(threads: int) -> ProcessPoolExecutor:
 
 def added_bytes(work: Callable[[], object]) -> float:
     """Return the most memory that the work takes in this process beyond what was there before, its result included;
-    NaN where the system does not tell (all but Linux).
+    NaN on systems other than Linux.
     """
     if not PEAK_RESET.exists():
         work()

@@ -27,13 +27,13 @@ class Turn:
 
 @dataclass
 class Turns:
-    """Those that were watched. longest: which of them took longest."""
+    """The turns that were watched. longest: the one that took longest."""
 
     longest: Turn = field(default_factory=Turn)
 
 
 def stages_of(app: App) -> dict[str, tuple[Any, str]]:
-    """What a turn consists of: whose method each stage is."""
+    """Return the stages of a turn: the object and the method of each."""
     return {
         "results taken in": (app.scene_loader, "take_results"),
         "views uploaded": (app.scene_view, "upload"),
@@ -49,7 +49,7 @@ def stages_of(app: App) -> dict[str, tuple[Any, str]]:
 
 @contextmanager
 def watched_turns(app: App) -> Iterator[Turns]:
-    """What turns of the loop take meanwhile, in the thread that calls this: drivers' threads are not counted."""
+    """Measure the turns of the loop in the block, in the thread that calls this: drivers' threads are not counted."""
     turns, spent = Turns(), dict[str, float]()
     stages = stages_of(app)
     for name, (owner, method) in stages.items():

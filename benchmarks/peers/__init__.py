@@ -1,1 +1,1 @@
-"""What people use instead, each in a file: `prepare(photo, disparity)` gives a function from a view's offset to it."""
+"""Other ways to make views, each in a file: `prepare(photo, disparity)` gives a function from a view's offset to it."""

@@ -112,7 +112,7 @@ def _views_of(prepare: Prepare, scene: BenchScene) -> dict[ViewOffset, FloatImag
 
 
 def _peer_cost(prepare: Prepare, scene: BenchScene) -> Cost:
-    """Of the whole field: setting up, and a few views, spread over it."""
+    """Return the cost of the whole field, from setting up and from a few views, spread over it."""
     kept: list[Callable[[ViewOffset], FloatImage]] = []
     setting_up = cost_of(lambda: kept.append(prepare(scene.photo, scene.disparity)))
     places = [scene.field[round(k)] for k in np.linspace(0, len(scene.field) - 1, TIMED_VIEWS)]

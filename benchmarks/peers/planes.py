@@ -16,11 +16,11 @@ from iibr_core.types import FloatImage, ViewOffset
 
 PLANES = 32
 BEHIND_PX = 24
-"""So far planes go on behind what is in front of them."""
+"""Distance over which planes continue behind nearer ones."""
 
 
 def prepare(photo: FloatImage, disparity: FloatImage) -> Callable[[ViewOffset], FloatImage]:
-    """Of a photo (H, W, 3), sRGB-encoded, and its disparity (H, W), px per view step: views (H, W, 3)."""
+    """Return a function that makes views (H, W, 3) of an sRGB-encoded photo and its disparity (px per view step)."""
     far, near = float(disparity.min()), float(disparity.max())
     levels = np.linspace(far, near, PLANES).astype(np.float32)
     place = (disparity - far) * ((PLANES - 1) / max(near - far, 1e-9))

@@ -15,12 +15,12 @@ from iibr_core.runtime.kernels import kernel
 from iibr_core.types import FloatImage, ViewOffset
 
 COARSE_PX = 1.0
-"""Of parallax, a step."""
+"""Parallax of a step, in pixels."""
 BISECTIONS = 4
 
 
 def prepare(photo: FloatImage, disparity: FloatImage) -> Callable[[ViewOffset], FloatImage]:
-    """Of a photo (H, W, 3), sRGB-encoded, and its disparity (H, W), px per view step: views (H, W, 3)."""
+    """Return a function that makes views (H, W, 3) of an sRGB-encoded photo and its disparity (px per view step)."""
     near, far = float(disparity.max()), float(disparity.min())
     colors, relief = np.ascontiguousarray(photo, np.float32), np.ascontiguousarray(disparity, np.float32)
 

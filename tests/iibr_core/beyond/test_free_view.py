@@ -107,17 +107,12 @@ def test_a_surface_of_a_rounded_map_stays_closed_before_a_camera_that_moves_far(
     assert view.inpainted[:55].any()
 
 
-def test_half_way_to_a_wall_it_is_twice_as_large():
+@pytest.mark.parametrize("target", [camera(49, 49, place=(0.0, 0.0, 2.0)), camera(49, 49, 120.0)])
+def test_half_way_to_a_wall_or_through_a_lens_twice_as_long_it_is_twice_as_large(target):
     texture = smooth_texture(49, 49)
-    view = view_of(texture, np.full((49, 49), 0.25), camera(49, 49, place=(0.0, 0.0, 2.0)))
+    view = view_of(texture, np.full((49, 49), 0.25), target)
     np.testing.assert_allclose(view.colors[::2, ::2], texture[12:37, 12:37], atol=2e-3)
     np.testing.assert_allclose(view.disparity, view.disparity[0, 0], rtol=1e-4)
-
-
-def test_a_longer_lens_shows_the_middle():
-    texture = smooth_texture(49, 49)
-    view = view_of(texture, np.full((49, 49), 0.25), camera(49, 49, 120.0))
-    np.testing.assert_allclose(view.colors[::2, ::2], texture[12:37, 12:37], atol=2e-3)
 
 
 def test_a_smaller_picture_is_a_mean():

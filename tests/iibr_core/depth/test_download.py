@@ -15,7 +15,7 @@ import pytest
 
 from iibr_core.depth.estimators.catalog import USUAL_MODEL, fetch, known_model, model_here
 from iibr_core.depth.estimators.download import VERIFIED
-from iibr_core.runtime.work import Cancelled, stoppable
+from iibr_core.runtime.work import Cancelled, stoppable, watched
 from iibr_core.types import InputError
 from tests.local_hub import Hub, local_hub
 
@@ -79,7 +79,8 @@ def mend(hub: Hub) -> None:
 
 def test_redirected_files_come_whole(hub: Hub, tmp_path: Path) -> None:
     told: list[tuple[float, float]] = []
-    fetch(MODEL, lambda done, total, doing: told.append((done, total)))
+    with watched(lambda done, total, doing: told.append((done, total))):
+        fetch(MODEL)
     total = sum(len(data) for name, data in PUBLISHED.items() if name != "README.md")
     assert told[-1] == (total, total)
     assert told == sorted(told)
@@ -153,8 +154,8 @@ def test_a_slow_download_is_given_up_at_once(hub: Hub, monkeypatch: pytest.Monke
         if done == begun + HALF:
             waits.set()
 
-    with pytest.raises(Cancelled), stoppable(waits.is_set):
-        fetch(MODEL, report)
+    with pytest.raises(Cancelled), stoppable(waits.is_set), watched(report):
+        fetch(MODEL)
     assert not hub.lost_patience
     assert model_here(MODEL) is None
     hub.may_finish.set()

@@ -28,7 +28,7 @@ from iibr_core.depth.estimators.onnx_models import USUAL_PREPARATION, OnnxInput,
 from iibr_core.depth.estimators.preparation import network_input
 from iibr_core.depth.search import open_with_depth
 from iibr_core.formats.images.write import write_image
-from iibr_core.runtime.work import Cancelled, ignore_progress, stoppable
+from iibr_core.runtime.work import Cancelled, stoppable
 from iibr_core.types import (
     FloatImage,
     ImageSize,
@@ -65,7 +65,7 @@ def photo_of(pixels: FloatImage) -> Photo:
 
 def estimate(file: Path, pixels: FloatImage) -> RelativeInverseDepth | MetricDepth:
     wanted = input_for(file, ImageSize(*pixels.shape[:2]), BUDGET)
-    found = run_onnx(model_of(file), wanted, photo_of(pixels), ignore_progress)
+    found = run_onnx(model_of(file), wanted, photo_of(pixels))
     assert isinstance(found, RelativeInverseDepth | MetricDepth)
     return found
 
@@ -177,7 +177,7 @@ def test_a_running_estimate_can_be_stopped(tmp_path: Path) -> None:
         return was_asked
 
     with pytest.raises(Cancelled), stoppable(should_stop):
-        run_onnx(model_of(file), input_for(file, ImageSize(30, 30), BUDGET), photo_of(pixels), ignore_progress)
+        run_onnx(model_of(file), input_for(file, ImageSize(30, 30), BUDGET), photo_of(pixels))
 
 
 @pytest.fixture(scope="module")
@@ -200,7 +200,7 @@ def test_the_architecture_gives_what_its_library_gives(
     with torch.inference_mode():
         values = torch.from_numpy(network_input(pixels, USUAL_PREPARATION, wanted.size))
         expected = network(pixel_values=values).predicted_depth[0].numpy()
-    found = run_onnx(model_of(file), wanted, photo_of(pixels), ignore_progress)
+    found = run_onnx(model_of(file), wanted, photo_of(pixels))
     assert isinstance(found, RelativeInverseDepth)
     np.testing.assert_allclose(found.values, expected, atol=1e-4 * np.ptp(expected))
 

@@ -10,7 +10,6 @@ from typing import Any
 
 import pytest
 
-from iibr_core.exports import source as export_source
 from iibr_core.exports.kinds import EXPORTS, ExportOptions, export_path
 from iibr_core.exports.source import ExportSource, open_for_export, write_export
 from iibr_core.scenes import opening, photo
@@ -42,13 +41,14 @@ CASES: list[tuple[str, dict[str, Any], float, int]] = [
 def new_views(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[ViewUpdate]]:
     """The views other than the photo that were made."""
     views: list[ViewUpdate] = []
+    views_of_photo = photo.views_of_photo
 
     def counted(*arguments: Any, **named: Any) -> Iterator[ViewUpdate]:
-        for view in photo.views_of_photo(*arguments, **named):
+        for view in views_of_photo(*arguments, **named):
             views.extend([view] if (view.row, view.column) != (2, 2) else [])
             yield view
 
-    for module in (opening, export_source):
+    for module in (opening, photo):
         monkeypatch.setattr(module, "views_of_photo", counted)
     return views
 

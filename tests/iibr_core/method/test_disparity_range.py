@@ -11,12 +11,12 @@ from tests.iibr_core.scenes import disparity_of, photo_of, smooth_texture
 HEIGHT, WIDTH = 240, 320
 
 
-def wall(noise=0.0, at=0.0, seed=0):
-    return at + noise * np.random.default_rng(seed).normal(size=(HEIGHT, WIDTH)).astype(np.float32)
+def wall(noise=0.0, at=0.0):
+    return at + noise * np.random.default_rng(0).normal(size=(HEIGHT, WIDTH)).astype(np.float32)
 
 
 def bird(noise, share=0.008):
-    """A wall with something 3 px in front of it that takes this share of the picture."""
+    """Return a wall with something 3 px in front of it that takes this share of the picture."""
     values = wall(noise)
     side = round((share * values.size) ** 0.5)
     values[50 : 50 + side, 200 : 200 + side] += 3.0
@@ -28,23 +28,22 @@ def planned(values, **overrides):
 
 
 def drawn_px(values, **overrides):
-    """How far the nearest moves against the farthest from the first view to the last, as the field has it."""
+    """Return how far the nearest moves against the farthest from the first view to the last, as the field has it."""
     plan = planned(values, **overrides)
     field = plan.field_disparity(disparity_of(values)).values
     return float(field.max() - field.min()) * (max(plan.grid) - 1)
 
 
-@pytest.mark.parametrize("noise", [0.0, 1e-6, 1e-4, 1e-2, 0.05])
+@pytest.mark.parametrize("noise", [0.0, 1e-4, 0.05])
 @pytest.mark.parametrize("share", [0.001, 0.008, 0.3])
 def test_a_bird_before_a_wall_moves_as_far_as_planned(noise, share):
     assert drawn_px(bird(noise, share)) == pytest.approx(TOTAL_PARALLAX * WIDTH, rel=1e-3)
 
 
-@pytest.mark.parametrize("noise", [0.0, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2])
+@pytest.mark.parametrize("noise", [0.0, 1e-6, 1e-4, 1e-2])
 @pytest.mark.parametrize("at", [0.0, 5.0, -300.0])
-@pytest.mark.parametrize("seed", range(3))
-def test_a_noisy_wall_is_one_view(noise, at, seed):
-    plan = planned(wall(noise, at, seed).astype(np.float32))
+def test_a_noisy_wall_is_one_view(noise, at):
+    plan = planned(wall(noise, at).astype(np.float32))
     assert plan.grid == (1, 1)
     assert plan.disparity_range_px == (0.0, 0.0)
 

@@ -12,12 +12,12 @@ import pytest
 from imgui_bundle import imgui
 from PIL import ImageGrab
 
-from iibr_core.scenes.scene import Progress, Source, ViewReady, WantedPhoto
+from iibr_core.scenes import opening
+from iibr_core.scenes.scene import Progress, SceneRequest, Source, ViewReady, WantedPhoto
 from iibr_core.types import GridShape, ViewUpdate
 from tests.iibr_core.scenes.test_opening import write_large_photo
 from tests.viewer.conftest import Driver, Opener, write_scene
 from viewer.app.main_loop import App
-from viewer.background import scene_worker
 from viewer.model.actions import OpenPath
 from viewer.model.state.folder import StepPhoto
 
@@ -94,14 +94,14 @@ def test_a_large_photo_is_there_in_small_before_it_is_read(open_window: Opener, 
 def test_the_next_photo_is_there_in_small_before_the_one_before_stops(
     open_window: Opener, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    may_stop, real = threading.Event(), scene_worker.results_of
+    may_stop, real = threading.Event(), opening.results_of
 
-    def stopping_late(request: scene_worker.SceneRequest, *others: object) -> Iterator[object]:
+    def stopping_late(request: SceneRequest, *others: object) -> Iterator[object]:
         yield from real(request, *others)  # type: ignore[arg-type]
         if request.generation == 1:
             may_stop.wait()
 
-    monkeypatch.setattr(scene_worker, "results_of", stopping_late)
+    monkeypatch.setattr(opening, "results_of", stopping_late)
     driver = open_window(write_scene(tmp_path, "before"), grid=GridShape(3, 3))
     driver.until(lambda app: app.state.progress.is_complete)
     driver.app.do(OpenPath(Source(str(write_large_photo(tmp_path)), grid=GridShape(3, 3))))

@@ -14,7 +14,7 @@ from iibr_core.depth.estimators import estimate_cache
 from iibr_core.depth.estimators.catalog import fetch, known_model, model_here
 from iibr_core.depth.estimators.download import VERIFIED
 from iibr_core.formats.images.write import write_image
-from iibr_core.runtime.work import Cancelled, ignore_progress, is_stopped
+from iibr_core.runtime.work import Cancelled, is_stopped
 from iibr_core.scenes.scene import Source, source_beside
 from iibr_core.types import GridShape, ViewOffset
 from tests.iibr_core.depth.onnx_graphs import published, weighing
@@ -58,7 +58,7 @@ def hub(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Hub]:
 def downloaded(hub: Hub) -> Hub:
     """The model is here already."""
     hub.may_finish.set()
-    fetch(MODEL, ignore_progress)
+    fetch(MODEL)
     hub.asked.clear()
     return hub
 
@@ -230,7 +230,7 @@ def test_a_running_estimate_is_given_up_by_one_click(
 
     is_running = Event()
     with monkeypatch.context() as patched:
-        patched.setattr("viewer.background.depth_estimate.deepen", wait_to_be_stopped)
+        patched.setattr("iibr_core.scenes.photo.deepen", wait_to_be_stopped)
         viewer.press(ESTIMATE, "notices")
         viewer.until(lambda app: is_running.is_set())
         viewer.press("Cancel##estimate", "notices")

@@ -39,14 +39,14 @@ def test_stages_are_left_out(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], data: Path, tmp_path: Path
 ) -> None:
     words = ("evaluate", data / "square", "--views", 1, "--refine", "off", "--out")
-    without = ("--without", "smooth-gaps", "--without", "synthesise-patches", "--without", "split-mixed-pixels")
+    without = ("--without", "outpainting", "--without", "synthesise-patches", "--without", "split-mixed-pixels")
     told = []
     for number, more in enumerate(((), without)):
         assert run(monkeypatch, *words, tmp_path / str(number), *more) == 0
         told.append(re.search(r"iibr ([\d.]+) dB", capsys.readouterr().out))
     assert all(told)
     assert (tmp_path / "0" / "report.json").read_text() != (tmp_path / "1" / "report.json").read_text()
-    assert "--without smooth-gaps" in (tmp_path / "1" / "report.md").read_text()
+    assert "--without outpainting" in (tmp_path / "1" / "report.md").read_text()
 
 
 def test_a_report_that_is_there_is_replaced_only_by_force(
@@ -84,7 +84,7 @@ def test_a_disparity_of_ones_own(
         (("evaluate", "{data}", "--out", "{dir}/o", "--disparity", "guess"), "--disparity guess"),
         (("evaluate", "{data}", "--out", "{dir}/o", "--disparity", "{dir}/file"), "file"),
         (("evaluate", "{data}", "--out", "{dir}/o", "--views", "0"), "--views"),
-        (("evaluate", "{data}", "--out", "{dir}/o", "--without", "gaps"), "smooth-gaps"),
+        (("evaluate", "{data}", "--out", "{dir}/o", "--without", "gaps"), "outpainting"),
         (("evaluate", "{data}", "--out", "{dir}/o", "--lpips", "{dir}/empty"), "alexnet"),
         (("evaluate", "{dir}/broken", "--out", "{dir}/o"), "v00_u01.png"),
         (("evaluate", "--out", "{dir}/o"), "DATASET"),

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from iibr_core.depth.multi_view import estimate_disparity
 from iibr_core.formats.light_fields.light_field_formats import open_light_field
 from iibr_core.formats.maps.pfm import read_pfm
+from iibr_core.scenes import light_fields
 from iibr_core.types import GridShape, ViewOffset
 from tests.iibr_core.known_scenes import FOREGROUND, WALL, disparity_of_square, view_of_square, view_of_wall, write_grid
 from tests.viewer.cli.test_cli import run
@@ -82,7 +82,7 @@ def test_metres_reach_exports(monkeypatch: Monkey, tmp_path: Path) -> None:
 
 def test_depth_asks_for_memory_before_it_takes_it(monkeypatch: Monkey, capsys: Capture, tmp_path: Path) -> None:
     field = write_grid(tmp_path / "field")
-    monkeypatch.setattr(estimate_disparity, "sweep_bytes", lambda *_: 2**40)
+    monkeypatch.setattr(light_fields, "sweep_bytes", lambda *_: 2**40)
     assert run(monkeypatch, "depth", field, "-o", tmp_path / "a.pfm") == 2
     assert "finding its disparity takes" in capsys.readouterr().err
     assert not (tmp_path / "a.pfm").exists()
