@@ -41,9 +41,9 @@ def fill_background(
     """Fill the holes of a view in place: colors (H, W, 3), disparity (H, W) where hole (H, W) is True.
 
     photo_disparity: the centre view's. Of the nearest known pixels in sixteen directions those count that are possible
-    there, weighted by 1 / distance. The colour is their mean and gets their surface's fine texture. The disparity is
-    that of one surface, the one with the most weight: a mean of several would lie on none. A view that is all hole
-    stays as it is. stages: that are on.
+    there, weighted by 1 / distance. The colour is their mean, smoother the farther away they are, and gets their
+    surface's fine texture. The disparity is that of one surface, the one with the most weight (a mean of several would
+    lie on none), and then the median of those around. A view that is all hole does not change. stages: that are on.
     """
     one_surface = step_of(EDGE_PX, max(map(abs, offset)))
     _fill_view(colors, disparity, hole, photo_disparity, offset, one_surface, threads, stages)

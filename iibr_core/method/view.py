@@ -147,6 +147,7 @@ class Renderer:
         behind, share = RaysBehind(part, colors[part], disparity[part]), covered.reshape(-1)[part]
         colors[part] = _composite(foreground, behind.colors, share)
         disparity[part] = np.where(share > MOSTLY_COVERED, foreground_disparity, behind.disparity)
+        view.inpainted.reshape(-1)[part] |= share <= MOSTLY_COVERED
         return replace(view, behind=behind)
 
 
