@@ -25,7 +25,7 @@ from iibr_core.runtime.tiling import THREADS
 from iibr_core.runtime.work import is_stopped
 from iibr_core.scenes.scene import LoadedPhoto
 from iibr_core.types import SRGB, ColorSpace, FloatImage, GridShape, InputError, StoredColors
-from viewer.background.comparison_worker import (
+from viewer.background.comparison import (
     Bytes,
     ComparisonFinding,
     ComparisonInputs,

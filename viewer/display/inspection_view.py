@@ -17,7 +17,8 @@ from iibr_core.scenes.rect import WHOLE, Rect
 from iibr_core.scenes.scene import Scene
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import ViewUpdate
-from viewer.background.comparison_worker import ComparisonInputs, ComparisonResult, EntropyReady, PairReady, PairScored
+from viewer.background.comparison import ComparisonInputs, EntropyReady, PairReady, PairScored
+from viewer.background.comparison_worker import ComparisonResult
 from viewer.background.job_threads import Failed
 from viewer.display.scene_view import SceneView
 from viewer.gpu.context import GLContext

@@ -28,15 +28,9 @@ from iibr_core.scenes.scene import Source
 from iibr_core.types import GridShape, InputError
 from tests.iibr_core import red_inpainter
 from tests.viewer.conftest import write_scene
+from viewer.background.comparison import ComparisonInputs, EntropyReady, PairReady, PairScored
 from viewer.background.comparison_job import ComparisonJob
-from viewer.background.comparison_worker import (
-    ComparisonInputs,
-    ComparisonResult,
-    ComparisonWorker,
-    EntropyReady,
-    PairReady,
-    PairScored,
-)
+from viewer.background.comparison_worker import ComparisonResult, ComparisonWorker
 from viewer.background.job_threads import Failed
 from viewer.model.inspection_request import InspectionRequest
 from viewer.model.state.inspection import GroundTruth
