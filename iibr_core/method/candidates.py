@@ -104,44 +104,16 @@ def _rearmost(coverage, disparity, row, column):
 
 
 @kernel
-def _splat(found, index, row, column, overlap, d, tolerance):
-    """Add an overlap, in pixels of area, to the candidate of its surface, or start one; if all slots are used, the
-    rearmost one gives way.
-    """
-    count, coverage, disparity, source = found.number, found.coverage, found.disparity, found.source
-    used = np.int64(count[row, column])
-    # The photo has landed: nobody sees what lies behind a surface of it that covers the pixel. `disparity` holds sums
-    # weighted by coverage, so disparities are compared times coverage.
-    if index > 0 and used > 0:
-        covered = coverage[0, row, column]
-        if covered >= COVERED and disparity[0, row, column] > (d + tolerance) * covered:
-            return
-    slot = 0
-    while slot < used:
-        c = coverage[slot, row, column]
-        if source[slot, row, column] == index and same_surface(disparity[slot, row, column], d * c, tolerance * c):
-            coverage[slot, row, column] += overlap
-            disparity[slot, row, column] += overlap * d
-            return
-        slot += 1
-    if used < len(coverage):
-        count[row, column] = used + 1
-    else:
-        slot = _rearmost(coverage, disparity, row, column)
-        if disparity[slot, row, column] >= d * coverage[slot, row, column]:
-            return
-    coverage[slot, row, column] = overlap
-    disparity[slot, row, column] = overlap * d
-    source[slot, row, column] = index
-
-
-@kernel
 def _land_rays(rays, index, needed, cells_across, columns, s, t, found):
-    """Let the rays in the needed cells (N) of one source land. Smooth cells are overwritten by `backward_warp`; until
-    `_mean_disparity`, found's disparity holds sums weighted by coverage.
+    """Let the rays in the needed cells (N) of one source land. Smooth cells are overwritten by `backward_warp`.
+
+    The overlap of a footprint and a pixel, as an area, is added to the candidate of its surface or starts one; if all
+    slots are used, the rearmost one gives way. Until `_mean_disparity`, found's disparity holds sums weighted by
+    coverage. All in one loop: a function for each overlap takes twice the time.
     """
     ray_disparity, ray_coverage, first_row = rays.disparity[index], rays.coverage[index], found.first_row
-    rows, width = found.number.shape
+    count, coverage, disparity, source = found.number, found.coverage, found.disparity, found.source
+    slots, rows, width = coverage.shape
     height = len(ray_disparity)
     tolerance = SAME_SURFACE_PX / max(abs(s), abs(t), 1e-9)
     for i in range(len(needed)):
@@ -166,10 +138,38 @@ def _land_rays(rays, index, needed, cells_across, columns, s, t, found):
                     overlap_y = filled * (min(bottom, target_y + 0.5) - max(top, target_y - 0.5))
                     for target_x in range(max(nearest_pixel(left), columns[0]), min(ceil(right - 0.5) + 1, columns[1])):
                         overlap = np.float32(overlap_y * (min(right, target_x + 0.5) - max(left, target_x - 0.5)))
-                        if overlap > 0.0:
-                            # Unsigned: never counted from the end.
-                            row, column = np.uint64(target_y - first_row), np.uint64(target_x)
-                            _splat(found, index, row, column, overlap, d, tolerance)
+                        if not overlap > 0.0:
+                            continue
+                        # Unsigned: never counted from the end.
+                        row, column = np.uint64(target_y - first_row), np.uint64(target_x)
+                        used = np.int64(count[row, column])
+                        # The photo has landed: nobody sees what lies behind a surface of it that covers the pixel.
+                        if index > 0 and used > 0:
+                            covered = coverage[0, row, column]
+                            if covered >= COVERED and disparity[0, row, column] > (d + tolerance) * covered:
+                                continue
+                        slot = 0
+                        while slot < used:
+                            # Disparity holds sums, so disparities are compared times coverage.
+                            c = coverage[slot, row, column]
+                            if source[slot, row, column] == index and same_surface(
+                                disparity[slot, row, column], d * c, tolerance * c
+                            ):
+                                break
+                            slot += 1
+                        if slot < used:
+                            coverage[slot, row, column] += overlap
+                            disparity[slot, row, column] += overlap * d
+                            continue
+                        if used < slots:
+                            count[row, column] = used + 1
+                        else:
+                            slot = _rearmost(coverage, disparity, row, column)
+                            if disparity[slot, row, column] >= d * coverage[slot, row, column]:
+                                continue
+                        coverage[slot, row, column] = overlap
+                        disparity[slot, row, column] = overlap * d
+                        source[slot, row, column] = index
 
 
 @kernel
