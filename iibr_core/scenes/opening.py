@@ -148,7 +148,7 @@ def _results_of_photo(
     scene = scene_of_photo(source, loaded, plan)
     yield SceneReady(request.generation, scene, loaded, _centre_view(loaded, plan))
     views = views_of_photo(source, loaded, plan, nearest_to, False, wanted)
-    yield from _count_views(request.generation, views, scene)
+    yield from _count_views(request.generation, views, scene, wanted)
 
 
 def _results_of_filled(request: SceneRequest, filled: FilledField) -> Iterator[SceneReady | ViewReady]:
@@ -169,10 +169,14 @@ def _results_of_light_field(
             return
 
 
-def _count_views(generation: int, views: Iterator[ViewUpdate], scene: Scene) -> Iterator[ViewReady]:
+def _count_views(
+    generation: int, views: Iterator[ViewUpdate], scene: Scene, wanted: Wanted = lambda: None
+) -> Iterator[ViewReady]:
     """Yield the views with the progress of making them."""
-    time_left, begun_s, total = TimeLeft(), time.perf_counter(), scene.grid.rows * scene.grid.columns
+    time_left, begun_s = TimeLeft(), time.perf_counter()
     for there, view in enumerate(views, 1):
+        chosen = wanted()
+        total = scene.grid.rows * scene.grid.columns if chosen is None else len({*chosen, ViewOffset(0.0, 0.0)})
         left_s, seconds = time_left.update(there, total), time.perf_counter() - begun_s
         if view.is_final:
             progress = Progress(there, total, seconds, share=there / total, left_s=left_s)

@@ -104,7 +104,10 @@ def _overlays(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
     row = [
         (OVERLAY_WORDS[k].capitalize(), chosen == k, OVERLAY_TIPS[k], obstacle_to_overlay(scene, k)) for k in OVERLAYS
     ]
-    pressed = _choices(row, layout)
+    # In two rows: four buttons in one are cut at small sizes.
+    half = len(row) // 2
+    upper, lower = _choices(row[:half], layout), _choices(row[half:], layout)
+    pressed = upper if lower is None else half + lower
     actions: list[Action] = []
     if pressed is not None:
         actions.append(SetOverlay(None if chosen == OVERLAYS[pressed] else OVERLAYS[pressed]))
@@ -125,7 +128,10 @@ def _comparisons(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
         )
         for k in COMPARISONS
     ]
-    pressed = _choices(row, layout)
+    # In two rows: four buttons in one are cut at small sizes.
+    half = len(row) // 2
+    upper, lower = _choices(row[:half], layout), _choices(row[half:], layout)
+    pressed = upper if lower is None else half + lower
     actions: list[Action] = []
     if pressed is not None:
         actions.append(Compare(None if chosen == COMPARISONS[pressed] else COMPARISONS[pressed]))
