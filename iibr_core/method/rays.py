@@ -12,6 +12,7 @@ from iibr_core.method.flying_pixels import CALM, TEARING_GAP_PX, measure_detail
 from iibr_core.method.mixed_pixels import move_with_foreground, split_mixed_pixels
 from iibr_core.runtime.kernels import kernel
 from iibr_core.runtime.scalars import nearest_pixel
+from iibr_core.runtime.work import raise_if_stopped
 from iibr_core.stages import ALL_STAGES, Stages
 from iibr_core.surfaces import EDGE_PX, SAME_SURFACE_PX, SMOOTH_SHARE, is_in_front, step_of
 from iibr_core.types import (
@@ -126,11 +127,14 @@ class RaySet:
         disparity, coverage = self._room.disparity[k], self._room.coverage[k]
         if k == 0:
             self.photo_disparity = np.ascontiguousarray(self.in_view(disparity))
+            raise_if_stopped()
             cells.step[:] = _block_reduce(np.maximum, _neighbour_steps(disparity))
         if k > 0 and any(offset) and self.stages.leave_out_in_front:
             edge_step = step_of(EDGE_PX, self.farthest_views)
             _leave_out_in_front(disparity, self._room.disparity[0], *offset, edge_step, coverage)
+        raise_if_stopped()
         self._room.near_edge[k] = near_steps(disparity, step_of(SAME_SURFACE_PX, self.farthest_views))
+        raise_if_stopped()
         known = (coverage > 0) & (disparity == disparity)
         cells.low[k] = _block_reduce(np.minimum, np.where(known, disparity, np.float32(np.inf)))
         cells.high[k] = _block_reduce(np.maximum, np.where(known, disparity, np.float32(-np.inf)))
@@ -244,6 +248,7 @@ def near_steps(disparity: FloatImage, step: float) -> NDArray[np.bool_]:
     is_step[:, :-1] |= ~(np.abs(disparity[:, 1:] - disparity[:, :-1]) <= step)
     is_step[:-1] |= ~(np.abs(disparity[1:] - disparity[:-1]) <= step)
     for axis in (0, 1):
+        raise_if_stopped()
         is_step, source = is_step.copy(), np.moveaxis(is_step, axis, 0)
         near = np.moveaxis(is_step, axis, 0)
         for px in (1, 2):
