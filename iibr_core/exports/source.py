@@ -44,7 +44,7 @@ class ExportSource:
     """An open scene to be exported.
 
     loaded: its photo, None for a light field from disk. optics: the optics that the window shows. centre: the centre
-    view as it is shown, None if it is not known.
+    view that is shown, None if it is not known.
     """
 
     scene: Scene
