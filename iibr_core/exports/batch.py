@@ -155,23 +155,17 @@ def run_batch(
 
     Raises InputError where the scheduler cannot be reached or is lost.
     """
-    kind, folder, read = EXPORTS[settings.kind], folder.absolute(), tuple(path.absolute() for path in inputs)
+    folder, read = folder.absolute(), tuple(path.absolute() for path in inputs)
     processes, threads = (0, 1) if dask else shares_of_machine(workers)
-    ending = (kind.endings or ("",))[0]
+    ending = (*EXPORTS[settings.kind].endings, "")[0]
     tasks = [PhotoTask(path.absolute(), folder / (name + ending), settings, read, threads) for path, name in photos]
     finished = {} if force else {task.photo: output for task in tasks if (output := finished_output(task))}
-    waiting, outputs = deque(task for task in tasks if task.photo not in finished), list(finished.values())
-    total, count = len(waiting), BatchCount(there_before=len(finished))
-
-    folder.mkdir(parents=True, exist_ok=True)
-    for name in (FAILURES, LOG):
-        (folder / name).unlink(missing_ok=True)
-    _write_failure(folder, "photo", "reason")
-    if waiting:
-        report_progress(0, 0, "starting workers")
-    outcomes = _run_on_dask(dask, waiting) if dask else _run_here(processes, waiting)
+    waiting = deque(task for task in tasks if task.photo not in finished)
+    _begin_failures(folder)
+    count, outputs = BatchCount(there_before=len(finished)), list(finished.values())
+    report_progress(0, 0, "starting workers")
     try:
-        with closing(outcomes):
+        with closing(_run_on_dask(dask, waiting) if dask and waiting else _run_here(processes, waiting)) as outcomes:
             for outcome in outcomes:
                 if outcome.output:
                     outputs.append(outcome.output)
@@ -179,11 +173,11 @@ def run_batch(
                     count.guessed += outcome.is_guess
                 else:
                     count.failed += 1
-                    _write_failure(folder, outcome.task.photo, outcome.reason, outcome.trace)
-                report_progress(count.written + count.failed, total, "exporting")
+                    _write_failure(folder, outcome)
+                report_progress(count.written + count.failed, len(tasks) - len(finished), "exporting")
     finally:
         _remove_unfinished({task.target.parent for task in tasks})
-    write_gallery = gallery_of(kind)
+    write_gallery = gallery_of(EXPORTS[settings.kind])
     if write_gallery:
         write_gallery(folder, [os.path.relpath(output, folder) for output in outputs])
     return count
@@ -311,12 +305,20 @@ def _run_on_dask(address: str, tasks: Sequence[PhotoTask]) -> Generator[Outcome]
             raise InputError(f"the workers were lost ({reason}); the same command makes what is missing") from error
 
 
-def _write_failure(folder: Path, photo: Path | str, reason: str, trace: str = "") -> None:
+def _begin_failures(folder: Path) -> None:
+    folder.mkdir(parents=True, exist_ok=True)
+    for name in (FAILURES, LOG):
+        (folder / name).unlink(missing_ok=True)
+    (folder / FAILURES).write_text("photo,reason\n", encoding="utf-8")
+
+
+def _write_failure(folder: Path, outcome: Outcome) -> None:
+    photo, reason = outcome.task.photo, " ".join(outcome.reason.split())
     with open(folder / FAILURES, "a", encoding="utf-8", errors="surrogateescape", newline="") as file:
-        csv.writer(file).writerow((photo, " ".join(reason.split())))
-    if trace:
+        csv.writer(file).writerow((photo, reason))
+    if outcome.trace:
         with open(folder / LOG, "a", encoding="utf-8", errors="surrogateescape") as file:
-            file.write(f"{photo}\n{trace}\n")
+            file.write(f"{photo}\n{outcome.trace}\n")
 
 
 def _remove_unfinished(folders: set[Path]) -> None:
