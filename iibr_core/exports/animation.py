@@ -19,7 +19,7 @@ from iibr_core.exports.loops import point_on_loop
 from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.exports.source import ExportSource
 from iibr_core.exports.stack import open_diameter
-from iibr_core.formats.animations import require_video_size, write_animation
+from iibr_core.formats.animations import write_animation
 from iibr_core.formats.files import read_text
 from iibr_core.scenes.lens_limits import clamp_optics
 from iibr_core.scenes.scene import Scene
@@ -32,7 +32,6 @@ MAX_KEYS = 1000
 def write_motion(path: Path, source: ExportSource, options: ExportOptions) -> None:
     """Write an animation. Raises InputError if it cannot be written, Cancelled once the export should stop."""
     size = ImageSize(options.size.height, options.size.width)
-    require_video_size(path, size)
     frames = optics_on_path(source.scene, source.optics, options)
     drawn = (draw_framed(source, RenderSettings(optics, options.size)) for optics in frames)
     write_animation(path, source.watched(drawn, options.frames, "drawing frames"), size, options.rate)

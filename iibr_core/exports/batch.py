@@ -12,12 +12,11 @@ import shutil
 import signal
 import traceback
 from collections import Counter, deque
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, ProcessPoolExecutor, wait
+from collections.abc import Generator, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ProcessPoolExecutor, as_completed, wait
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
+from contextlib import closing
 from dataclasses import dataclass, replace
-from functools import partial
 from glob import escape
 from multiprocessing import active_children, get_context
 from pathlib import Path
@@ -35,10 +34,9 @@ from iibr_core.exports.kinds import (
 from iibr_core.exports.photo_folder import list_photos
 from iibr_core.exports.source import OpenDrawn, open_for_export, write_export
 from iibr_core.formats.files import reason_of
-from iibr_core.formats.outputs import check_output_folder
+from iibr_core.formats.outputs import TEMPORARY, check_output_folder
 from iibr_core.formats.quilts import TAG
 from iibr_core.runtime import machine
-from iibr_core.runtime.machine import limit_arenas
 from iibr_core.runtime.work import report_progress
 from iibr_core.scenes.inputs import inputs_of
 from iibr_core.scenes.lens_limits import LensChoice
@@ -52,8 +50,6 @@ WORKER_BYTES = 3 * 2**29
 """Memory for one process."""
 CONNECT_S = 15
 """Longest wait for a Dask scheduler, and for its first worker, in seconds."""
-CHECK_S = 5
-"""Time between questions for the number of workers, in seconds: a scheduler that is lost does not answer."""
 
 
 @dataclass(frozen=True)
@@ -90,6 +86,7 @@ class PhotoTask:
 class Outcome(NamedTuple):
     """Result of a task: the output, or the reason of the failure, with the traceback of an unexpected error."""
 
+    task: PhotoTask
     output: Path | None = None
     is_guess: bool = False
     reason: str = ""
@@ -106,9 +103,6 @@ class BatchCount:
     guessed: int = 0
 
 
-Take = Callable[[PhotoTask, Outcome], None]
-
-
 def photos_in(folders: Sequence[Path]) -> list[tuple[Path, str]]:
     """Return all photos in these folders and their subfolders, without hidden ones and without maps of photos.
 
@@ -120,9 +114,9 @@ def photos_in(folders: Sequence[Path]) -> list[tuple[Path, str]]:
         if not folder.is_dir():
             raise InputError(f"{folder}: no such folder")
     tops = [folder.absolute().name if len(folders) > 1 else "" for folder in folders]
-    for top, count in Counter(tops).items():
-        if count > 1:
-            raise InputError(f"{top}: two folders of this name would become one; give them one after the other")
+    top, count = Counter(tops).most_common(1)[0]
+    if count > 1:
+        raise InputError(f"{top}: two folders of this name would become one; give them one after the other")
     return [photo for folder, top in zip(folders, tops) for photo in _photos_below(folder, top)]
 
 
@@ -161,43 +155,29 @@ def run_batch(
 
     Raises InputError where the scheduler cannot be reached or is lost.
     """
-    kind, folder, read = EXPORTS[settings.kind], folder.absolute(), tuple(path.absolute() for path in inputs)
+    folder, read = folder.absolute(), tuple(path.absolute() for path in inputs)
     processes, threads = (0, 1) if dask else shares_of_machine(workers)
-    run = partial(_run_on_dask, dask) if dask else partial(_run_here, processes)
-    ending = (kind.endings or ("",))[0]
+    ending = (*EXPORTS[settings.kind].endings, "")[0]
     tasks = [PhotoTask(path.absolute(), folder / (name + ending), settings, read, threads) for path, name in photos]
     finished = {} if force else {task.photo: output for task in tasks if (output := finished_output(task))}
-    waiting, outputs = deque(task for task in tasks if task.photo not in finished), list(finished.values())
-    total, count = len(waiting), BatchCount(there_before=len(finished))
-
-    folder.mkdir(parents=True, exist_ok=True)
-    for name in (FAILURES, LOG):
-        (folder / name).unlink(missing_ok=True)
-    with open(folder / FAILURES, "w", encoding="utf-8", errors="surrogateescape", newline="") as file:
-        failures = csv.writer(file)
-        failures.writerow(("photo", "reason"))
-
-        def take(task: PhotoTask, outcome: Outcome) -> None:
-            if outcome.output:
-                outputs.append(outcome.output)
-                count.written += 1
-                count.guessed += outcome.is_guess
-            else:
-                count.failed += 1
-                failures.writerow((task.photo, " ".join(outcome.reason.split())))
-                file.flush()
-            if outcome.trace:
-                with open(folder / LOG, "a", encoding="utf-8", errors="surrogateescape") as log:
-                    log.write(f"{task.photo}\n{outcome.trace}\n")
-            report_progress(count.written + count.failed, total, "exporting")
-
-        if waiting:
-            report_progress(0, 0, "starting workers")
-            try:
-                run(waiting, take)
-            finally:
-                _remove_unfinished({task.target.parent for task in tasks})
-    write_gallery = gallery_of(kind)
+    waiting = deque(task for task in tasks if task.photo not in finished)
+    _begin_failures(folder)
+    count, outputs = BatchCount(there_before=len(finished)), list(finished.values())
+    report_progress(0, 0, "starting workers")
+    try:
+        with closing(_run_on_dask(dask, waiting) if dask and waiting else _run_here(processes, waiting)) as outcomes:
+            for outcome in outcomes:
+                if outcome.output:
+                    outputs.append(outcome.output)
+                    count.written += 1
+                    count.guessed += outcome.is_guess
+                else:
+                    count.failed += 1
+                    _write_failure(folder, outcome)
+                report_progress(count.written + count.failed, len(tasks) - len(finished), "exporting")
+    finally:
+        _remove_unfinished({task.target.parent for task in tasks})
+    write_gallery = gallery_of(EXPORTS[settings.kind])
     if write_gallery:
         write_gallery(folder, [os.path.relpath(output, folder) for output in outputs])
     return count
@@ -233,12 +213,12 @@ def export_photo(task: PhotoTask) -> Outcome:
     try:
         return _export(task)
     except (InputError, OSError) as error:
-        return Outcome(reason=str(error))
+        return Outcome(task, reason=str(error))
     except MemoryError as error:
-        return Outcome(reason=f"out of memory ({error}): lower --max-pixels, or --workers")
+        return Outcome(task, reason=f"out of memory ({error}): lower --max-pixels, or --workers")
     except Exception as error:
         reason = f"unexpected {type(error).__name__}: {error} (please report it with {LOG})"
-        return Outcome(reason=reason, trace=traceback.format_exc())
+        return Outcome(task, reason=reason, trace=traceback.format_exc())
 
 
 def _export(task: PhotoTask) -> Outcome:
@@ -255,29 +235,35 @@ def _export(task: PhotoTask) -> Outcome:
         kind, settings.options, source, settings.depth_strength, settings.lens, check_place, settings.open_drawn
     )
     write_export(kind, target, opened, settings.options)
-    return Outcome(target, opened.scene.is_guessed)
+    return Outcome(task, target, opened.scene.is_guessed)
 
 
-def _run_here(processes: int, waiting: deque[PhotoTask], take: Take) -> None:
+def _run_here(processes: int, waiting: deque[PhotoTask]) -> Generator[Outcome]:
     """Export photos in processes of this machine.
 
     When a process is killed, the photos that were in work are tried again, one at a time, to find the cause; the other
     photos get new processes.
     """
     while waiting:
-        suspects = deque(_run_pool(processes, waiting, take))
+        suspects = deque((yield from _run_pool(processes, waiting)))
         while suspects:
-            for task in _run_pool(1, suspects, take):
-                take(task, Outcome(reason=KILLED))
+            for task in (yield from _run_pool(1, suspects)):
+                yield Outcome(task, reason=KILLED)
 
 
-def _run_pool(processes: int, waiting: deque[PhotoTask], take: Take) -> list[PhotoTask]:
+def _run_pool(processes: int, waiting: deque[PhotoTask]) -> Generator[Outcome, None, list[PhotoTask]]:
     """Export photos until none is left or a process is killed. Return the photos that were in work then."""
     running: dict[Future[Outcome], PhotoTask] = {}
     others = active_children()
-    executor = ProcessPoolExecutor(processes, get_context("spawn"), _start_process)
+    executor = ProcessPoolExecutor(processes, get_context("spawn"), machine.limit_arenas)
     try:
-        _run_all(executor, lambda: processes, waiting, running, take)
+        while waiting or running:
+            while waiting and len(running) < processes:
+                future = _submit(executor, waiting[0])
+                running[future] = waiting.popleft()
+            for future in wait(running, return_when=FIRST_COMPLETED).done:
+                yield future.result()
+                del running[future]
     except BrokenProcessPool:
         return list(running.values())
     finally:
@@ -287,25 +273,16 @@ def _run_pool(processes: int, waiting: deque[PhotoTask], take: Take) -> list[Pho
     return []
 
 
-def _start_process() -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    limit_arenas()
-
-
-@contextmanager
-def _interruption_blocked() -> Iterator[None]:
-    """Block Ctrl-C in processes that start in this block: it reaches the main process alone, which ends them."""
-    if not hasattr(signal, "pthread_sigmask"):  # on Windows
-        yield
-        return
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+def _submit(executor: ProcessPoolExecutor, task: PhotoTask) -> Future[Outcome]:
+    """Hand a photo to a process. A process that starts here ignores Ctrl-C, which reaches the main process alone."""
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
-        yield
+        return executor.submit(export_photo, task)
     finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        signal.signal(signal.SIGINT, before)
 
 
-def _run_on_dask(address: str, waiting: deque[PhotoTask], take: Take) -> None:
+def _run_on_dask(address: str, tasks: Sequence[PhotoTask]) -> Generator[Outcome]:
     """Export photos with the workers of a Dask scheduler. Raises InputError where it cannot be reached or is lost."""
     from distributed import Client
     from distributed.scheduler import KilledWorker
@@ -318,43 +295,34 @@ def _run_on_dask(address: str, waiting: deque[PhotoTask], take: Take) -> None:
         raise InputError(f"--dask {address}: no scheduler with workers answers ({reason_of(error)})") from error
     with client:
         executor = client.get_executor(pure=False)
+        running = {executor.submit(export_photo, task): task for task in tasks}
         try:
-            _run_all(executor, lambda: sum(client.nthreads().values()), waiting, {}, take, KilledWorker)
-        except (OSError, RuntimeError, CancelledError, AttributeError) as error:  # the last: Dask without scheduler
+            for future in as_completed(running):
+                killed = isinstance(future.exception(), KilledWorker)
+                yield Outcome(running[future], reason=KILLED) if killed else future.result()
+        except (OSError, RuntimeError, CancelledError) as error:
             reason = reason_of(error)
             raise InputError(f"the workers were lost ({reason}); the same command makes what is missing") from error
 
 
-def _run_all(
-    executor: Executor,
-    capacity: Callable[[], int],
-    waiting: deque[PhotoTask],
-    running: dict[Future[Outcome], PhotoTask],
-    take: Take,
-    killed: type[Exception] | tuple[()] = (),
-) -> None:
-    """Export photos, as many at a time as the executor has room for, and call `take` with each outcome.
+def _begin_failures(folder: Path) -> None:
+    folder.mkdir(parents=True, exist_ok=True)
+    for name in (FAILURES, LOG):
+        (folder / name).unlink(missing_ok=True)
+    (folder / FAILURES).write_text("photo,reason\n", encoding="utf-8")
 
-    waiting, running: emptied as photos are finished; where an error ends the work, they hold the rest. killed: error
-    of a photo whose workers were killed; only that photo fails.
-    """
-    while waiting or running:
-        for _ in range(min(max(capacity(), 1) - len(running), len(waiting))):
-            with _interruption_blocked():
-                running[executor.submit(export_photo, waiting[0])] = waiting[0]
-            waiting.popleft()
-        for future in wait(running, CHECK_S, FIRST_COMPLETED).done:
-            try:
-                outcome = future.result()
-            except killed:
-                outcome = Outcome(reason=KILLED)
-            take(running.pop(future), outcome)
+
+def _write_failure(folder: Path, outcome: Outcome) -> None:
+    photo, reason = outcome.task.photo, " ".join(outcome.reason.split())
+    with open(folder / FAILURES, "a", encoding="utf-8", errors="surrogateescape", newline="") as file:
+        csv.writer(file).writerow((photo, reason))
+    if outcome.trace:
+        with open(folder / LOG, "a", encoding="utf-8", errors="surrogateescape") as file:
+            file.write(f"{photo}\n{outcome.trace}\n")
 
 
 def _remove_unfinished(folders: set[Path]) -> None:
-    """Remove the temporary files that killed processes left."""
-    for path in [path for folder in folders for path in folder.glob(".iibr-*")]:
-        if path.is_dir():
+    """Remove the temporary folders that killed processes left."""
+    for folder in folders:
+        for path in folder.glob(f"{TEMPORARY}*"):
             shutil.rmtree(path, ignore_errors=True)
-        else:
-            path.unlink(missing_ok=True)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from iibr_core.color import bytes_from_encoded, encoded_from_stored
 from iibr_core.exports.kinds import ExportOptions
 from iibr_core.exports.source import ExportSource
-from iibr_core.formats.cameras import FieldCameras, infinity_of, spread, write_colmap, write_llff, write_nerfstudio
+from iibr_core.formats.cameras import FieldCameras, infinity_of, write_colmap, write_llff, write_nerfstudio
 from iibr_core.formats.images.write import write_image
 from iibr_core.formats.outputs import write_folder
 from iibr_core.types import (
@@ -98,7 +98,7 @@ def _points_of(centre: ViewUpdate, cameras: FieldCameras) -> tuple[NDArray[np.fl
     """Return places and colours (N, 3) of at most MAX_POINTS pixels of the centre view."""
     disparity = centre.disparity if centre.disparity is not None else np.empty((0, 0), np.float32)
     points = cameras.points(disparity, ViewOffset(0.0, 0.0)).reshape(-1, 3)
-    chosen = spread(len(points), MAX_POINTS)
+    chosen = np.linspace(0, len(points) - 1, min(len(points), MAX_POINTS)).astype(int)
     return points[chosen], colors_of(centre).reshape(-1, 3)[chosen]
 
 

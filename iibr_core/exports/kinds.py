@@ -113,11 +113,6 @@ class ExportKind:
         function: Callable[..., Any] = resolve_name(f"{__package__}.{entry}")
         return partial(function, variant=self.variant) if self.variant else function
 
-    @property
-    def is_video(self) -> bool:
-        """Whether its width and height must be even."""
-        return bool(set(self.endings) & set(VIDEOS))
-
 
 MAP = (".pfm", ".exr", ".npy", ".png", ".tif")
 PICTURE = (".png", ".jpg", ".jpeg", ".webp", ".avif", ".tif", ".tiff")
@@ -231,9 +226,9 @@ def shear_margin(scene: Scene, optics: Optics, span_views: float) -> float:
 
 
 def size_of_width(kind: ExportKind, aspect: float, width: int) -> ScreenSize:
-    """Return the size of this width (pixels) and about this aspect that the kind can have."""
+    """Return the size of this width (pixels) and about this aspect that the kind can have; sides of videos are even."""
     size = ImageSize(max(round(width / aspect), 1), width)
-    height, width = even_size(size) if kind.is_video else size
+    height, width = even_size(size) if VIDEOS.keys() & kind.endings else size
     return ScreenSize(width, height)
 
 
@@ -276,7 +271,5 @@ def optics_of(kind: ExportKind, options: ExportOptions, scene: Scene, optics: Op
 
 
 def gallery_of(kind: ExportKind) -> Callable[[Path, Iterable[str]], Path] | None:
-    """Return the function that writes a page about a batch, given its folder and the names of the exports in it; None
-    if the kind has no such page. It returns the path of the page and raises InputError if it cannot be written.
-    """
+    """Return the function that writes a page about a batch, see `web_gallery.write_gallery`; None if there is none."""
     return kind.function(kind.gallery) if kind.gallery else None

@@ -11,7 +11,7 @@ from collections.abc import Callable, Collection, Generator, Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any, Protocol, TypeVar
+from typing import Any, TypeVar
 
 from numpy.typing import NDArray
 
@@ -44,7 +44,7 @@ class ExportSource:
     """An open scene to be exported.
 
     loaded: its photo, None for a light field from disk. optics: the optics that the window shows. centre: the centre
-    view as it is shown, None if it is not known.
+    view that is shown, None if it is not known.
     """
 
     scene: Scene
@@ -157,21 +157,12 @@ class ExportSource:
         write_picture(path, pixels, form, PictureMetadata(photo.exif, photo.xmp), color_space)
 
 
-class OpenDrawn(Protocol):
-    """Function that opens a scene whose pictures can be drawn."""
+OpenDrawn = Callable[[Source, float, LensChoice, Callable[[Scene], None], OpticsOf | None], ExportSource]
+"""Function (source, depth_strength, lens, on_ready, optics_of) that opens a scene whose pictures can be drawn.
 
-    def __call__(
-        self,
-        source: Source,
-        depth_strength: float,
-        lens: LensChoice,
-        on_ready: Callable[[Scene], None],
-        optics_of: OpticsOf | None = None,
-    ) -> ExportSource:
-        """Open a scene through this lens and make the views that its pictures show; all views without `optics_of`.
-
-        on_ready is called with the scene before any view is made; its exceptions end the opening. Raises InputError.
-        """
+It makes the views that the pictures with these optics show; all views for None. on_ready is called with the scene
+before any view is made; its exceptions end the opening. Raises InputError.
+"""
 
 
 def open_for_export(

@@ -26,12 +26,8 @@ from iibr_core.types import SRGB, ColorSpace
 Eyes = tuple[NDArray[Any], NDArray[Any]]
 
 
-def _anaglyph(eyes: Eyes) -> NDArray[Any]:
-    return anaglyph(*eyes)
-
-
 class _Arrangement(NamedTuple):
-    """How two pictures become one file. squeeze: divisor of their widths. tag: end of the file's name, "" for none."""
+    """Arrangement of two pictures in a file. squeeze: divisor of their widths. tag: end of the file's name."""
 
     join: Callable[[Eyes], NDArray[Any]]
     tag: str = ""
@@ -43,7 +39,7 @@ ARRANGEMENTS = {
     "half-sbs": _Arrangement(np.hstack, HALF_TAG, squeeze=2),
     "over-under": _Arrangement(np.vstack, OVER_TAG),
     "cross-eyed": _Arrangement(lambda eyes: np.hstack(eyes[::-1])),
-    "anaglyph": _Arrangement(_anaglyph),
+    "anaglyph": _Arrangement(lambda eyes: anaglyph(*eyes)),
 }
 
 

@@ -19,7 +19,6 @@ from iibr_core.formats.outputs import write_file
 from iibr_core.runtime.resources import resource_folder
 from iibr_core.runtime.shader_sources import flatten
 from iibr_core.scenes.lens_limits import aperture_limit, eye_limits, first_aperture, focus_limits
-from iibr_core.scenes.scene import Scene
 from iibr_core.types import SRGB, ImageSize
 
 AVIF = "image/avif"
@@ -57,8 +56,7 @@ def make_page(source: ExportSource, options: ExportOptions) -> tuple[bytes, WebV
     scene = source.scene
     form = form_that_fits(scene.grid, ImageSize(scene.height, scene.width), options.stills)
     store = ViewStore(source.views(with_disparity=True, in_srgb=False), scene.grid, form, scene.color_space)
-    caption = read_caption(Path(scene.source.path)) if source.loaded is not None else Caption()
-    words = _words(scene, caption, options.credit)
+    words = _words(source, options.credit)
     if options.budget is None:
         views = store.encode(form)
     else:
@@ -66,11 +64,14 @@ def make_page(source: ExportSource, options: ExportOptions) -> tuple[bytes, WebV
     return _page(source, words, views), views
 
 
-def _words(scene: Scene, caption: Caption, is_credited: bool) -> dict[str, str]:
+def _words(source: ExportSource, is_credited: bool) -> dict[str, str]:
     """Return the escaped texts of the page by the name of their place."""
-    title = (caption.title if is_credited else "") or scene.name
-    credit = ", ".join(filter(None, (caption.author, caption.rights))) if is_credited else ""
-    meta = (("author", caption.author), ("dcterms.rights", caption.rights)) if is_credited else ()
+    caption = read_caption(Path(source.scene.source.path)) if source.loaded is not None else Caption()
+    if not is_credited:
+        caption = Caption(description=caption.description)
+    title = caption.title or source.scene.name
+    credit = ", ".join(filter(None, (caption.author, caption.rights)))
+    meta = (("author", caption.author), ("dcterms.rights", caption.rights))
     heading = f"<h1>{escape(title)}</h1>" if is_credited else ""
     return {
         "title": escape(title),

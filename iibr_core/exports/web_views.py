@@ -6,9 +6,11 @@ of single files or less (docs/web.md). Disparity is stored the same way, in 8 bi
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+import math
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from io import BytesIO
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -39,15 +41,17 @@ MAX_VIEWS = 256
 """Number of texture layers that every WebGL 2 has."""
 RANGE_MARGIN, OUTLIERS = 0.05, 0.0002
 """Margin and quantile of the disparity range, the same as in the desktop's texture (`light_field_texture.py`)."""
-QUALITY, DEPTH_QUALITY, FIRST_QUALITY = 82, 60, 50
-BUDGET_QUALITIES = QUALITY, 65, 48
-MIN_BUDGET_SCALE = 1 / 16
+DEPTH_QUALITY, FIRST_QUALITY = 60, 50
+QUALITIES = 82, 65, 48
+"""Qualities of colours; the lower ones are for budgets."""
+MAX_HALVINGS = 4
+"""Largest number of times that a budget halves the size of the views."""
 SPEED = 8
 """Speed of the AV1 encoder, 0 to 10: 6 takes four times as long for a third less."""
 FIRST_SIDE_PX = 1600
 FRAME_MS = 40
 MOVING_RANGE = "limited"
-"""Range of luma: Chromium 156 assumes it for moving pictures, whatever their `colr` boxes and sequence headers say."""
+"""Range of luma: Chromium 156 assumes it for moving pictures and ignores their `colr` boxes and sequence headers."""
 
 Bytes = NDArray[np.uint8]
 
@@ -62,7 +66,7 @@ class WebForm:
 
     every: int = 1
     scale: float = 1.0
-    quality: int = QUALITY
+    quality: int = QUALITIES[0]
     is_single: bool = False
 
     def size_of(self, size: ImageSize) -> ImageSize:
@@ -102,12 +106,8 @@ def form_that_fits(grid: GridShape, size: ImageSize, is_single: bool) -> WebForm
 
 def places_of(grid: GridShape, form: WebForm) -> tuple[ViewOffset, ...]:
     """Return the stored views ring by ring from the middle, so that neighbouring frames are neighbouring views."""
-    every = (grid.offset(row, column) for row in range(grid.rows) for column in range(grid.columns))
-
-    def key(place: ViewOffset) -> tuple[float, float]:
-        return max(abs(place.t), abs(place.s)), float(np.arctan2(place.t, place.s))
-
-    return tuple(sorted(filter(form.takes, every), key=key))
+    places = (grid.offset(row, column) for row in range(grid.rows) for column in range(grid.columns))
+    return tuple(sorted(filter(form.takes, places), key=lambda at: (max(map(abs, at)), math.atan2(*at))))
 
 
 class ViewStore:
@@ -135,7 +135,7 @@ class ViewStore:
         return bytes_from_encoded(convert(encoded_from_stored(view.colors), self._space, space))
 
     def _levels(self, disparity: FloatImage) -> Bytes:
-        if self._range_px == (0.0, 0.0):
+        if not self._disparities:
             far, near = np.quantile(disparity, [OUTLIERS, 1 - OUTLIERS])
             margin = RANGE_MARGIN * (near - far) + 1e-3
             self._range_px = float(far - margin), float(near + margin)
@@ -146,19 +146,19 @@ class ViewStore:
     def encode(self, form: WebForm) -> WebViews:
         """Return the views in the store's form or a smaller one."""
         places = [place for place in places_of(self._grid, form) if place in self._colors]
-        height, width = size = form.size_of(image_size(self._colors[places[0]]))
+        stored = image_size(self._colors[places[0]])
+        size = form.size_of(stored)
         colors = [_smaller_colors(self._colors[place], size) for place in places]
         depths = [_smaller_depth(self._disparities[place], size) for place in places if place in self._disparities]
-        depths = depths if len(depths) == len(colors) else []
-        scale = width / self._colors[places[0]].shape[1]
+        far, near = (size.width / stored.width * value for value in self._range_px)
         return WebViews(
             form,
-            ImageSize(height, width),
+            size,
             tuple(places),
-            (scale * self._range_px[0], scale * self._range_px[1]),
-            encode_first(colors[0], self._space),
-            tuple(_files(colors, form, form.quality, self._space)),
-            tuple(_files(depths, form, DEPTH_QUALITY, SRGB)),
+            (far, near),
+            _first_picture(colors[0], self._space),
+            _files(colors, form.is_single, form.quality, self._space),
+            _files(depths, form.is_single, DEPTH_QUALITY, SRGB) if len(depths) == len(colors) else (),
         )
 
     def encode_within(self, budget: int, page_bytes: Callable[[WebViews], int]) -> WebViews:
@@ -167,22 +167,15 @@ class ViewStore:
         Lower quality is tried first, then every second view, then half the size, and so on. Raises InputError if the
         smallest page is too large.
         """
-        for form in self._smaller_forms():
-            smallest = self.encode(replace(form, quality=BUDGET_QUALITIES[-1]))
+        for halvings, thinning in product(range(MAX_HALVINGS + 1), (1, 2)):
+            every, scale = self._form.every * 2**halvings * thinning, self._form.scale / 2**halvings
+            form = replace(self._form, every=every, scale=scale)
+            smallest = self.encode(replace(form, quality=QUALITIES[-1]))
             if page_bytes(smallest) <= budget:
-                better = (self.encode(replace(form, quality=quality)) for quality in BUDGET_QUALITIES[:-1])
+                better = (self.encode(replace(form, quality=quality)) for quality in QUALITIES[:-1])
                 return next((views for views in better if page_bytes(views) <= budget), smallest)
         missing = (page_bytes(smallest) - budget) / 1e6
         raise InputError(f"--budget: the smallest page is {missing:.2f} MB larger; give a larger budget")
-
-    def _smaller_forms(self) -> Iterator[WebForm]:
-        form = self._form
-        while form.scale >= self._form.scale * MIN_BUDGET_SCALE:
-            yield form
-            if form.every < max(self._grid):
-                form = replace(form, every=2 * form.every)
-                yield form
-            form = replace(form, scale=form.scale / 2)
 
 
 def _smaller_colors(colors: Bytes, size: ImageSize) -> Bytes:
@@ -198,17 +191,18 @@ def _smaller_depth(levels: Bytes, size: ImageSize) -> Bytes:
     return smaller
 
 
-def encode_first(colors: Bytes, space: ColorSpace) -> bytes:
+def _first_picture(colors: Bytes, space: ColorSpace) -> bytes:
     """Return the still picture (AVIF) that a page shows before its script runs, or if nothing can draw."""
     image = Image.fromarray(colors)
     image.thumbnail((FIRST_SIDE_PX, FIRST_SIDE_PX), Image.Resampling.BOX)
     return _avif([image], FIRST_QUALITY, space, "4:2:0")
 
 
-def _files(pictures: Sequence[Bytes], form: WebForm, quality: int, space: ColorSpace) -> Iterator[bytes]:
+def _files(pictures: Sequence[Bytes], is_single: bool, quality: int, space: ColorSpace) -> tuple[bytes, ...]:
+    """Return the pictures, colours (H, W, 3) or grey (H, W), as one moving picture or as single ones."""
     images = [Image.fromarray(picture) for picture in pictures]
-    for group in [[image] for image in images] if form.is_single else [images] if images else []:
-        yield _avif(group, quality, space, "4:4:4" if group[0].mode == "RGB" else "4:0:0")
+    groups = [[image] for image in images] if is_single else [images]
+    return tuple(_avif(group, quality, space, "4:4:4" if images[0].mode == "RGB" else "4:0:0") for group in groups)
 
 
 def _avif(images: list[Any], quality: int, space: ColorSpace, subsampling: str) -> bytes:

@@ -19,7 +19,6 @@ VIDEOS: dict[str, tuple[str, dict[str, str]]] = {
     ".webm": ("libvpx-vp9", {"crf": "28", "b": "0", "cpu-used": "4", "row-mt": "1"}),
 }
 """Codec and its options, by the ending of the file."""
-SUFFIXES = (*VIDEOS, ".gif", ".webp")
 BT709, MPEG_RANGE = 1, 1
 PALETTE_COLORS = 255
 PALETTE_SAMPLES = 8
@@ -33,34 +32,29 @@ def even_size(size: ImageSize) -> ImageSize:
     return ImageSize(*(max(side - side % 2, 2) for side in size))
 
 
-def require_video_size(path: Path, size: ImageSize) -> None:
-    """Raise InputError if `path` is a video that cannot have this size."""
-    if path.suffix.lower() in VIDEOS and size != even_size(size):
-        raise InputError(f"{path}: a video's width and height are even, not {size}; give {even_size(size)}")
-
-
 def write_animation(path: Path, frames: Iterable[NDArray[np.uint8]], size: ImageSize, rate: float) -> None:
-    """Write an animation of the kind that the ending states, one of SUFFIXES; whole or not at all.
+    """Write an animation of the kind that the ending states: one of VIDEOS, .gif or .webp; whole or not at all.
 
-    frames: (H, W, 3), sRGB-encoded, all of this size. rate: frames a second.
+    frames: (H, W, 3), sRGB-encoded, all of this size. rate: frames a second. Raises InputError for videos of odd sizes.
     """
-    kind = path.suffix.lower()
-    if kind not in SUFFIXES:
-        raise InputError(f"{path}: an animation can be written as {', '.join(SUFFIXES)}")
-    require_video_size(path, size)
+    is_video = path.suffix.lower() in VIDEOS
+    if is_video and size != even_size(size):
+        raise InputError(f"{path}: a video's width and height are even, not {size}; give {even_size(size)}")
     with write_file(path) as temporary:
-        write = _write_video if kind in VIDEOS else _write_pictures
-        if not write(path, temporary, frames, size, rate):
-            raise InputError(f"{path}: has no frames; an animation needs at least one")
+        if is_video:
+            _write_video(path, temporary, frames, size, rate)
+        else:
+            _write_pictures(path, temporary, frames, rate)
 
 
-def _write_video(path: Path, temporary: Path, frames: Iterable[NDArray[np.uint8]], size: ImageSize, rate: float) -> int:
-    """Write 4:2:0 of 8 bits, BT.709, which every player takes; return the number of frames."""
+def _write_video(
+    path: Path, temporary: Path, frames: Iterable[NDArray[np.uint8]], size: ImageSize, rate: float
+) -> None:
+    """Write 4:2:0 of 8 bits, BT.709, which every player takes."""
     import av
     from av.codec.codec import UnknownCodecError
 
     codec, options = VIDEOS[path.suffix.lower()]
-    count = 0
     try:
         with av.open(str(temporary), "w", format=path.suffix[1:].lower()) as container:
             stream: Any = container.add_stream(codec, rate=Fraction(rate).limit_denominator(1001), options=options)
@@ -69,7 +63,6 @@ def _write_video(path: Path, temporary: Path, frames: Iterable[NDArray[np.uint8]
             context.colorspace = context.color_primaries = context.color_trc = BT709
             context.color_range = MPEG_RANGE
             for pixels in frames:
-                count += 1
                 frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(pixels), format="rgb24")
                 yuv = frame.reformat(format="yuv420p", dst_colorspace="ITU709", dst_color_range="MPEG")
                 yuv.pts = None
@@ -79,18 +72,13 @@ def _write_video(path: Path, temporary: Path, frames: Iterable[NDArray[np.uint8]
         raise InputError(f"{path}: PyAV here has no encoder {codec}; write .gif or .webp") from error
     except av.error.FFmpegError as error:
         raise InputError(f"{path}: cannot be written ({reason_of(error)}); choose another place") from error
-    return count
 
 
-def _write_pictures(
-    path: Path, temporary: Path, frames: Iterable[NDArray[np.uint8]], size: ImageSize, rate: float
-) -> int:
-    """Write an animated GIF or WebP; return the number of frames."""
+def _write_pictures(path: Path, temporary: Path, frames: Iterable[NDArray[np.uint8]], rate: float) -> None:
+    """Write an animated GIF or WebP."""
     from PIL import Image
 
     pictures = [np.ascontiguousarray(pixels) for pixels in frames]
-    if not pictures:
-        return 0
     options: dict[str, Any]
     if path.suffix.lower() == ".gif":
         images, step_ms, options = _quantized(pictures), 10, {"format": "GIF", "disposal": 1, "optimize": False}
@@ -99,7 +87,6 @@ def _write_pictures(
         step_ms, options = 1, {"format": "WEBP", "quality": WEBP_QUALITY, "method": 4}
     durations = _durations_ms(len(images), rate, step_ms)
     images[0].save(temporary, save_all=True, append_images=images[1:], duration=durations, loop=0, **options)
-    return len(images)
 
 
 def _quantized(frames: Sequence[NDArray[np.uint8]]) -> list[Any]:

@@ -8,7 +8,7 @@ ahead; therefore their principal points move.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -160,8 +160,3 @@ def write_colmap(
     ]
     for name, content in lines.items():
         (model / f"{name}.txt").write_text("\n".join([*content, ""]), encoding="utf-8")
-
-
-def spread(count: int, most: int) -> Sequence[int]:
-    """Return at most `most` indices of `count` things, evenly spread from the first to the last."""
-    return [int(i) for i in np.linspace(0, count - 1, min(count, most)).astype(int)] if count else []

@@ -1,7 +1,6 @@
 """Trained weights on disk: safetensors, which hold numbers and text only, so a foreign file runs no code.
 
-A file states its content and version. A file that does not fit the model is refused before the model changes. Only
-functions that need torch import it.
+A file states its content and version. A file that does not fit the model is refused before the model changes.
 """
 
 from __future__ import annotations
@@ -13,53 +12,41 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 from safetensors import SafetensorError, safe_open
+from safetensors.numpy import save
 
 from iibr_core.formats.files import reason_of, require_file
 from iibr_core.formats.outputs import write_file
 from iibr_core.types import InputError
 
 if TYPE_CHECKING:
-    from torch import Tensor, nn
+    from torch import nn
 
 VERSION = "1"
 """Version of the meaning of the numbers."""
 WEIGHTS = "iibr-weights"
+"""Content of the files."""
 
 
 def save_weights(model: nn.Module, path: Path, metadata: Mapping[str, str] | None = None) -> None:
     """Write the model's state, whole or not at all. metadata: origin of the weights (command, seed, commit, sizes)."""
-    write_tensors(path, WEIGHTS, model.state_dict(), metadata or {})
-
-
-def load_weights(path: Path, model: nn.Module) -> dict[str, str]:
-    """Put the weights of a file into the model, which stays unchanged on errors, and return their metadata."""
-    tensors, metadata = read_tensors(path, WEIGHTS)
-    require_shapes(path, tensors, {name: tensor.shape for name, tensor in model.state_dict().items()})
-    model.load_state_dict(tensors)
-    return metadata
-
-
-def write_tensors(path: Path, content: str, tensors: Mapping[str, Tensor], metadata: Mapping[str, str]) -> None:
-    """Write tensors from any device, and text. content: kind of the file, which `read_tensors` requires."""
-    from safetensors.torch import save
-
-    # Cloned, because safetensors refuses tensors that share memory, as tied layers do.
-    copies = {name: tensor.detach().cpu().clone().contiguous() for name, tensor in tensors.items()}
-    data = save(copies, {**metadata, "content": content, "version": VERSION})
+    arrays = {name: np.ascontiguousarray(tensor.detach().cpu().numpy()) for name, tensor in model.state_dict().items()}
+    data = save(arrays, {**(metadata or {}), "content": WEIGHTS, "version": VERSION})
     with write_file(path) as temporary:
         temporary.write_bytes(data)
 
 
-def read_tensors(path: Path, content: str) -> tuple[dict[str, Tensor], dict[str, str]]:
-    """Return CPU tensors by name and the metadata of a file that `write_tensors` wrote."""
+def load_weights(path: Path, model: nn.Module) -> dict[str, str]:
+    """Put the weights of a file into the model, which stays unchanged on errors, and return their metadata."""
     import torch
 
-    arrays, metadata = read_weights(path, content)
-    return {name: torch.from_numpy(array) for name, array in arrays.items()}, metadata
+    arrays, metadata = read_weights(path)
+    require_shapes(path, arrays, {name: tensor.shape for name, tensor in model.state_dict().items()})
+    model.load_state_dict({name: torch.from_numpy(array) for name, array in arrays.items()})
+    return metadata
 
 
-def read_weights(path: Path, content: str = WEIGHTS) -> tuple[dict[str, NDArray[Any]], dict[str, str]]:
-    """Return arrays by name and the metadata of a file of this content and VERSION."""
+def read_weights(path: Path) -> tuple[dict[str, NDArray[Any]], dict[str, str]]:
+    """Return arrays by name and the metadata of a file of this VERSION."""
     require_file(path)
     try:
         with safe_open(path, framework="np") as file:
@@ -68,19 +55,17 @@ def read_weights(path: Path, content: str = WEIGHTS) -> tuple[dict[str, NDArray[
             arrays = {name: np.array(file.get_tensor(name)) for name in file.keys()}  # noqa: SIM118
     except (SafetensorError, OSError) as error:
         raise InputError(f"{path}: is not a safetensors file, or is damaged ({reason_of(error)})") from error
-    stored, version = metadata.get("content"), metadata.get("version")
-    if stored != content:
-        raise InputError(f"{path}: holds {stored or 'tensors of unknown origin'}, not {content}; choose another file")
+    content, version = metadata.get("content"), metadata.get("version")
+    if content != WEIGHTS:
+        raise InputError(f"{path}: holds {content or 'tensors of unknown origin'}, not {WEIGHTS}; choose another file")
     if version != VERSION:
-        raise InputError(f"{path}: is version {version} of {content}, this program reads version {VERSION}")
+        raise InputError(f"{path}: is version {version} of {WEIGHTS}, this program reads version {VERSION}")
     return arrays, metadata
 
 
-def require_shapes(
-    path: Path, tensors: Mapping[str, Tensor | NDArray[Any]], expected: Mapping[str, tuple[int, ...]]
-) -> None:
+def require_shapes(path: Path, arrays: Mapping[str, NDArray[Any]], expected: Mapping[str, tuple[int, ...]]) -> None:
     """Raise InputError, with the first difference, unless the names and shapes are the expected ones."""
-    stored = {name: tuple(tensor.shape) for name, tensor in tensors.items()}
+    stored = {name: array.shape for name, array in arrays.items()}
     for name in sorted(stored.keys() | expected.keys()):
         if name not in stored:
             raise InputError(f"{path}: lacks {name}; it was made for another model")

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,8 +45,8 @@ class LightField:
     """A light field in memory.
 
     views: (V, U, H, W, 3), uint8 (255 = white), float16 for HDR photos (1 = white). disparity: (V, U, H, W) float32, px
-    from view to view, None where no view has any. inpainted: (V, U, H, W) bool, True where the photo saw nothing; None
-    where nobody knows. focal_px: focal length in px of a view.
+    from view to view, None if no view has any. inpainted: (V, U, H, W) bool, True where the photo saw nothing; None if
+    it is unknown. focal_px: focal length in px of a view.
     """
 
     views: StoredColors
@@ -61,18 +62,16 @@ class LightField:
         return GridShape(*self.views.shape[:2])
 
     def view(self, s: float, t: float) -> FloatImage:
-        """The view s steps to the right of the middle one and t steps below it, (H, W, 3) float32, 1 = white.
+        """Return the view s steps to the right of the middle one and t steps below it, (H, W, 3) float32, 1 = white.
 
-        Between the views that are stored, a photo's light field makes it. Raises InputError outside the grid, and
-        between the views of a light field that came from disk.
+        A photo's light field makes views between the stored ones. Raises InputError outside the grid, and between the
+        views of a light field from disk.
         """
         (v, u), (rows, columns) = self.grid.centre, self.grid
         row, column = v + t, u + s
         if not (0 <= row <= rows - 1 and 0 <= column <= columns - 1):
-            raise InputError(
-                f"view {s:g},{t:g}: outside the field, where s goes from {-u} to {columns - 1 - u} and t from {-v} to"
-                f" {rows - 1 - v}"
-            )
+            limits = f"s from {-u} to {columns - 1 - u}, t from {-v} to {rows - 1 - v}"
+            raise InputError(f"view {s:g},{t:g}: lies outside the field; give {limits}")
         if row == round(row) and column == round(column):
             return encoded_from_stored(self.views[round(row), round(column)])
         if self._view_between is None:
@@ -80,11 +79,12 @@ class LightField:
         return self._view_between(ViewOffset(t, s))
 
     def refocus(self, disparity: float, aperture: float) -> FloatImage:
-        """A picture through a round lens in the middle of the field, (H, W, 3) float32, 1 = white: the mean, in linear
-        light, of the views inside it, moved so that what has this disparity (px from view to view) is sharp.
+        """Return a picture through a round lens in the middle of the field, (H, W, 3) float32, 1 = white.
 
-        aperture: diameter in view steps; 0 is the middle view. A photo's light field makes the views for it, up to 256;
-        of a light field from disk the stored ones count. Raises InputError where it is negative or not finite.
+        It is the mean, in linear light, of the views inside the lens, moved so that points of this disparity (px from
+        view to view) are sharp. aperture: diameter in view steps; 0 is the middle view. A photo's light field makes up
+        to 256 views for it; a light field from disk uses its stored ones. Raises InputError for a negative aperture and
+        numbers that are not finite.
         """
         if not (math.isfinite(disparity) and math.isfinite(aperture) and aperture >= 0):
             raise InputError(
@@ -98,7 +98,7 @@ class LightField:
         return srgb_from_linear(picture.light())
 
     def _views_through(self, focus: float, aperture: float) -> Iterator[tuple[ViewOffset, float, FloatImage]]:
-        """Views that a lens sums up: offset, weight and colours of each."""
+        """Yield offset, weight and colours of the views that a lens adds up."""
         widest = float(max(self.grid))
         if self._view_between is None:
             points = aperture_points(ApertureShape(), aperture, widest, MAX_CAMERAS, 0)
@@ -112,17 +112,16 @@ class LightField:
             yield ViewOffset(t, s), 1.0, self._view_between(ViewOffset(t, s))
 
     def _camera_count(self, focus: float, aperture: float) -> int:
-        """Number of views that turn the edge blurred most into a smooth ramp."""
+        """Return the number of views that turn the edge blurred most into a smooth ramp."""
         if self.disparity is None:
             return MAX_CAMERAS
-        middle = self.disparity[self.grid.centre]
-        blur_px = aperture * max(abs(float(middle.min()) - focus), abs(float(middle.max()) - focus))
+        blur_px = aperture * float(np.abs(self.disparity[self.grid.centre] - focus).max())
         return math.ceil(min(max(CAMERAS_PER_PX * blur_px, MIN_CAMERAS), MAX_CAMERAS))
 
     def save(self, path: str | Path, format: str = "hci", may_replace: bool = False) -> None:
         """Write the field as a folder or one file, in one of FORMATS.
 
-        Raises InputError where that is not possible, or something is there that may not be replaced.
+        Raises InputError if that is not possible, or if something is there that may not be replaced.
         """
         check_light_field(Path(path), format, (), may_replace)
         disparity = self.disparity
@@ -134,22 +133,19 @@ class LightField:
 
 
 def gather(
-    made: Iterator[View],
-    grid: GridShape,
-    focal_px: float,
-    name: str,
-    view_between: MakeView | None,
+    views: Iterator[View], grid: GridShape, focal_px: float, name: str, view_between: MakeView | None
 ) -> LightField:
-    """All views as arrays; of views that come twice the last counts."""
-    first = next(made)
-    size = first.colors.shape[:2]
-    views = np.empty((*grid, *first.colors.shape), first.colors.dtype)
-    disparity = None if first.disparity is None else np.empty((*grid, *size), np.float32)
-    inpainted = None if first.inpainted is None else np.empty((*grid, *size), np.bool_)
-    for view in (first, *made):
-        views[view.row, view.column] = view.colors
-        if disparity is not None:
-            disparity[view.row, view.column] = view.disparity
-        if inpainted is not None:
-            inpainted[view.row, view.column] = view.inpainted
-    return LightField(views, disparity, inpainted, focal_px, name, view_between)
+    """Return the light field of all views."""
+    first = next(views)
+    arrays = [_room_for(values, grid) for values in (first.colors, first.disparity, first.inpainted)]
+    for view in (first, *views):
+        for array, values in zip(arrays, (view.colors, view.disparity, view.inpainted)):
+            if array is not None:
+                array[view.row, view.column] = values
+    colors, disparity, inpainted = arrays
+    assert colors is not None
+    return LightField(colors, disparity, inpainted, focal_px, name, view_between)
+
+
+def _room_for(values: NDArray[Any] | None, grid: GridShape) -> NDArray[Any] | None:
+    return None if values is None else np.empty((*grid, *values.shape), values.dtype)

@@ -1,4 +1,4 @@
-"""How far pictures are from true ones, and views from those of data sets."""
+"""Comparison of pictures with true ones, and of views with those of data sets."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from typing import Any
 
 from numpy.typing import NDArray
 
+from iibr_core.color import encoded_from_stored
 from iibr_core.evaluation import evaluate_scene
 from iibr_core.evaluation.datasets import find_scenes
 from iibr_core.evaluation.metrics import flip, psnr, ssim
 from iibr_core.evaluation.results import EvaluationResult
-from iibr_core.interface.encoded_pictures import encoded
 from iibr_core.runtime.extras import require_extra
 from iibr_core.runtime.work import ReportProgress, ShouldStop, ignore_progress, never, stoppable, watched
 from iibr_core.stages import ALL_STAGES, Stages
@@ -21,7 +21,7 @@ from iibr_core.types import InputError
 
 @dataclass(frozen=True)
 class Comparison:
-    """How far a picture is from the true one: PSNR in dB, infinite for equal ones; SSIM, 1 for equal ones; FLIP, 0."""
+    """Distance of a picture from the true one: PSNR in dB, infinite for equal pictures; SSIM, then 1; FLIP, then 0."""
 
     psnr_db: float
     ssim: float
@@ -29,15 +29,15 @@ class Comparison:
 
 
 def compare(picture: NDArray[Any], truth: NDArray[Any]) -> Comparison:
-    """How far a picture (H, W, 3) is from the true one of the same shape; uint8, or float with 1 = white.
+    """Return how far a picture (H, W, 3) is from the true one of the same shape; uint8, or float with 1 = white.
 
-    Raises InputError where the shapes differ, or a package is missing: pip install 'iibr[evaluate]'.
+    Raises InputError if the shapes differ, or a package is missing: pip install 'iibr[evaluate]'.
     """
     if picture.shape != truth.shape or picture.ndim != 3:
         raise InputError(f"pictures of shapes {picture.shape} and {truth.shape} cannot be compared")
     require_extra("evaluate", "skimage", "flip_evaluator")
-    one, other = encoded(picture), encoded(truth)
-    return Comparison(psnr(one, other), ssim(one, other), flip(one, other))
+    pair = encoded_from_stored(picture), encoded_from_stored(truth)
+    return Comparison(psnr(*pair), ssim(*pair), flip(*pair))
 
 
 def evaluate(
@@ -49,10 +49,10 @@ def evaluate(
 ) -> list[EvaluationResult]:
     """Judge views against those of a data set: a folder of one scene, or of several, as `iibr evaluate` takes it.
 
-    stages: between map and view, that are on. options: other fields of `evaluate_scene.Options`. Raises InputError,
-    and Cancelled once should_stop is true.
+    stages: stages between map and view that are on. options: other fields of `evaluate_scene.Options`. Raises
+    InputError, and Cancelled once should_stop is true.
     """
-    wanted = evaluate_scene.Options(stages=stages, **options)
+    choices = evaluate_scene.Options(stages=stages, **options)
     scenes = find_scenes(Path(folder))
     with stoppable(should_stop), watched(report_progress):
-        return [one for scene in scenes for one in evaluate_scene.evaluate(scene, wanted)]
+        return [result for scene in scenes for result in evaluate_scene.evaluate(scene, choices)]

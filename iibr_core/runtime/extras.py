@@ -8,7 +8,7 @@ from iibr_core.types import InputError
 
 
 def is_installed(package: str) -> bool:
-    """Whether Python finds a package, without importing it."""
+    """Return whether Python finds a package, without importing it."""
     return find_spec(package) is not None
 
 

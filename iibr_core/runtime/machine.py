@@ -34,13 +34,14 @@ def free_memory_bytes() -> int:
 
 def cgroup_free_bytes(mount: Path = CGROUPS, own: Path = OWN_CGROUP) -> float:
     """Return the memory that this process's control groups (version 2) have left, infinite without limits."""
-    left = (_number(folder / "memory.max") - _used(folder / "memory.current") for folder in _folders(mount, own))
-    return min(left, default=math.inf)
+    groups = ((_numbers(folder / "memory.max"), _numbers(folder / "memory.current")) for folder in _folders(mount, own))
+    return min((limit[0] - sum(used) for limit, used in groups if limit), default=math.inf)
 
 
 def cgroup_cores(mount: Path = CGROUPS, own: Path = OWN_CGROUP) -> float:
     """Return how many cores' time the control groups of this process grant it, infinite without a limit."""
-    return min((_share(folder / "cpu.max") for folder in _folders(mount, own)), default=math.inf)
+    shares = (_numbers(folder / "cpu.max") for folder in _folders(mount, own))
+    return min((share[0] / share[1] for share in shares if share), default=math.inf)
 
 
 def limit_arenas() -> None:
@@ -60,32 +61,21 @@ def _call_c(name: str, *arguments: int) -> None:
 
 
 def _folders(mount: Path, own: Path) -> list[Path]:
-    """Return the folders of this process's control group and of those above it; none where there are no groups."""
+    """Return the folders of this process's control group and of those above it; the top one if it is unknown."""
     lines = [line for line in _text(own).splitlines() if line.startswith("0::")]
     # In a container, the group may be known by its path on the host, and mounted as the top.
     inner = Path(lines[0][3:].lstrip("/")) if lines else Path()
     return [mount / part for part in (inner, *inner.parents)]
 
 
+def _numbers(path: Path) -> list[int]:
+    """Return the numbers in a file of a control group; none for "max" and if it cannot be read."""
+    words = _text(path).split()
+    return [int(word) for word in words] if all(map(str.isdigit, words)) else []
+
+
 def _text(path: Path) -> str:
     try:
-        return path.read_text().strip()
+        return path.read_text()
     except (OSError, ValueError):
         return ""
-
-
-def _number(path: Path) -> float:
-    text = _text(path)
-    return float(text) if text.isdigit() else math.inf
-
-
-def _used(path: Path) -> float:
-    text = _text(path)
-    return float(text) if text.isdigit() else 0.0
-
-
-def _share(path: Path) -> float:
-    """Return the ratio of the two numbers of a `cpu.max`; infinite for "max" and where it cannot be read."""
-    quota, _, period = _text(path).partition(" ")
-    is_limit = quota.isdigit() and period.isdigit() and int(quota) > 0 and int(period) > 0
-    return int(quota) / int(period) if is_limit else math.inf

@@ -1,4 +1,4 @@
-"""Finds the shaders, assets and pages that come with the program, in a checkout and in an installed copy alike."""
+"""Find the shaders, assets and pages that come with the program, in a checkout and in an installed copy alike."""
 
 from __future__ import annotations
 
@@ -6,10 +6,7 @@ from pathlib import Path
 
 
 def resource_folder(name: str) -> Path:
-    """The folder "shaders", "assets" or "web".
-
-    Raises FileNotFoundError where the installation lacks it.
-    """
+    """Return the folder "shaders", "assets" or "web". Raises FileNotFoundError if the installation lacks it."""
     here = Path(__file__).resolve().parents[1]
     for folder in (here / "_resources" / name, here.parent / name):
         if folder.is_dir():

@@ -1,4 +1,4 @@
-"""Sources of shaders from files, for whatever compiles them: includes, defines.
+"""Sources of shaders from files, with their includes and defines.
 
 Drivers disagree about `#line`, so the flattened source keeps a table of its own: line n of it came from (file, line).
 """
@@ -6,7 +6,7 @@ Drivers disagree about `#line`, so the flattened source keeps a table of its own
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -31,30 +31,28 @@ class FlatSource:
 
 
 def flatten(path: Path, defines: Mapping[str, int] | None = None) -> FlatSource:
-    """Source of a shader with its includes (each once, from `include/` beside it) and `#define`s after line 1.
+    """Return a shader with its includes (each once, from `include/` beside it) and `#define`s after line 1.
 
     Raises ShaderError for an include that does not exist.
     """
-    lines = _included_lines(path, seen=set())
-    injected = [
-        (f"#define {name} {value}", "defines", i + 1) for i, (name, value) in enumerate((defines or {}).items())
+    lines = list(_included_lines(path, seen=set()))
+    # The first line, #version, must stay first.
+    lines[1:1] = [
+        (f"#define {name} {value}", "defines", i) for i, (name, value) in enumerate((defines or {}).items(), 1)
     ]
-    lines[1:1] = injected  # #version must stay first
     return FlatSource("\n".join(text for text, _, _ in lines) + "\n", tuple((name, n) for _, name, n in lines))
 
 
-def _included_lines(path: Path, seen: set[Path]) -> list[tuple[str, str, int]]:
-    lines: list[tuple[str, str, int]] = []
+def _included_lines(path: Path, seen: set[Path]) -> Iterator[tuple[str, str, int]]:
+    folder = path.parent if path.parent.name == "include" else path.parent / "include"
     for number, text in enumerate(path.read_text(encoding="utf-8").splitlines(), start=1):
         include = _INCLUDE.match(text)
         if include is None:
-            lines.append((text, path.name, number))
+            yield text, path.name, number
             continue
-        base = path.parent if path.parent.name == "include" else path.parent / "include"
-        target = base / include[1]
+        target = folder / include[1]
         if not target.is_file():
             raise ShaderError(f"{path.name}:{number}: no such include: {include[1]}")
         if target not in seen:
             seen.add(target)
-            lines += _included_lines(target, seen)
-    return lines
+            yield from _included_lines(target, seen)

@@ -24,7 +24,7 @@ Result = TypeVar("Result")
 
 
 def pieces_of(count: int, most: int) -> list[slice]:
-    """Return slices that part so many things into pieces of `most`, the last of which may be shorter."""
+    """Return slices that split `count` items into pieces of `most`; the last piece may be shorter."""
     return [slice(first, first + most) for first in range(0, count, most)]
 
 
@@ -67,7 +67,7 @@ def in_bands(
 def side_by_side(work: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Result]:
     """Yield the results of work on all items, in their order; each item is taken once a thread is free for it.
 
-    Closing the generator stops what is running. Raises Cancelled once the job is stopped.
+    Closing the generator stops the running calls. Raises Cancelled once the job is stopped.
     """
     is_closed = False
     run, items, running = in_this_job(work, or_when=lambda: is_closed), iter(items), deque[Future[Result]]()

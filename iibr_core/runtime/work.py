@@ -9,7 +9,7 @@ from typing import ParamSpec, TypeVar
 
 ShouldStop = Callable[[], bool]
 ReportProgress = Callable[[float, float, str], None]
-"""Function of (done, total, doing): amounts of work, the total 0 where it is unknown; and what is done, in words."""
+"""Function of (done, total, doing): amounts of work, the total 0 if it is unknown; and the work in words."""
 Parameters = ParamSpec("Parameters")
 Result = TypeVar("Result")
 
@@ -24,7 +24,7 @@ def never() -> bool:
 
 
 def ignore_progress(done: float, total: float, doing: str) -> None:
-    """Do nothing: nobody watches the job."""
+    """Do nothing with the progress of a job."""
 
 
 _should_stop: ContextVar[ShouldStop] = ContextVar("should_stop", default=never)
@@ -71,7 +71,7 @@ def raise_if_stopped() -> None:
 
 
 def report_progress(done: float, total: float, doing: str) -> None:
-    """Tell whoever watches the present job how far it is, see `ReportProgress`."""
+    """Report the progress of the present job, see `ReportProgress`."""
     _report.get()(done, total, doing)
 
 

@@ -19,7 +19,7 @@ def inputs_of(source: Source) -> tuple[Path, ...]:
 
 
 def named_by(source: Source) -> tuple[Path, ...]:
-    """Its photo or folder, its map and its folders of models, as far as they are named."""
+    """Return the photo or folder, the map and the folders of models that a source names."""
     models = (source.depth.model or "", source.inpaint.partition(":")[2])
     folders = [path for path in map(os.path.expanduser, models) if path and os.path.lexists(path)]  # else: names
     return tuple(Path(path) for path in (source.path, source.depth.file, *folders) if path)

@@ -1,4 +1,4 @@
-"""The photo that is open, at its own size: read again when a picture of that size is asked for, not kept meanwhile."""
+"""The open photo at its own size, which is read again when a picture of that size is needed."""
 
 from __future__ import annotations
 
@@ -23,19 +23,13 @@ from iibr_core.method.view import Renderer
 from iibr_core.runtime.work import raise_if_stopped
 from iibr_core.scenes.photo import stamp_of
 from iibr_core.scenes.scene import LoadedPhoto, Source
-from iibr_core.types import (
-    Disparity,
-    FloatImage,
-    InputError,
-    Photo,
-)
+from iibr_core.types import Disparity, FloatImage, InputError, Photo
 
 
 def load_large(source: Source, loaded: LoadedPhoto, plan: ScenePlan, max_pixels: int) -> LargePhoto:
-    """The photo of `source`, which was `loaded` smaller, at max_pixels at most, with the same disparity, its edges
-    drawn to the larger photo's. Without `fills`.
+    """Return the photo of `source`, which was `loaded` smaller, with at most max_pixels and without `fills`.
 
-    Raises InputError where the file is another one by now.
+    Its disparity is the same, with edges drawn to those of the larger photo. Raises InputError if the file has changed.
     """
     path = Path(source.path)
     if stamp_of(path) != loaded.stamp:
@@ -50,9 +44,9 @@ def load_large(source: Source, loaded: LoadedPhoto, plan: ScenePlan, max_pixels:
 
 
 def complete_fills(source: Source, loaded: LoadedPhoto, plan: ScenePlan) -> RaySet | None:
-    """The complete ray set of the light field, None where nothing is disoccluded.
+    """Return the complete ray set of the light field, None if nothing is disoccluded.
 
-    Raises InputError where the inpainter cannot be had.
+    Raises InputError if the inpainter is not available.
     """
     if not plan.has_disocclusion:
         return None
@@ -68,21 +62,18 @@ def _disparity(source: Source, loaded: LoadedPhoto, photo: Photo) -> FloatImage:
     file = _larger_map(loaded)
     if file is not None:
         given = disparity_of_file(file, photo, source.depth, source.grid, Path(source.path))
-        values, unknown, is_enlarged = given.values, given.unknown, given.is_enlarged
     else:
-        values, unknown = resample_surfaces(loaded.disparity.values, photo.size) * enlarged, None
-        is_enlarged = False
+        given = Disparity(resample_surfaces(loaded.disparity.values, photo.size) * enlarged, loaded.disparity.source)
     raise_if_stopped()
+    values = given.values
     if settings.refine > 0:
-        values = refine(photo.pixels, values, settings.refine, unknown, is_enlarged=is_enlarged)
+        values = refine(photo.pixels, values, settings.refine, given.unknown, is_enlarged=given.is_enlarged)
     if file is None or settings.edits == UNEDITED:
         return values
     return apply_edits(photo.pixels, values / enlarged, settings.edits) * enlarged
 
 
 def _larger_map(loaded: LoadedPhoto) -> Path | None:
-    """The map's file where it holds more than the disparity that was made of it."""
-    if loaded.origin.file is None:
-        return None
-    file = Path(loaded.origin.file)
-    return file if math.prod(read_map_size(file)) > math.prod(loaded.photo.size) else None
+    """Return the map's file if it holds more pixels than the disparity that was made of it."""
+    file = Path(loaded.origin.file) if loaded.origin.file is not None else None
+    return file if file and math.prod(read_map_size(file)) > math.prod(loaded.photo.size) else None

@@ -6,12 +6,7 @@ import math
 from dataclasses import dataclass, fields, replace
 from typing import Any, TypeVar
 
-from iibr_core.beyond.optics import (
-    CENTRE,
-    LIMITS,
-    ApertureShape,
-    Optics,
-)
+from iibr_core.beyond.optics import CENTRE, LIMITS, ApertureShape, Optics
 from iibr_core.gloss.settings import Gloss
 from iibr_core.scenes.scene import Scene
 from iibr_core.types import GridShape, ViewOffset
@@ -20,50 +15,50 @@ Record = TypeVar("Record", Optics, ApertureShape)
 
 LONE_VIEW_MARGIN = 0.5
 """Largest distance of the viewpoint from a single row of views, in view steps."""
-
 FIRST_APERTURE = 0.3
 """Share of the widest aperture that is opened by focusing: enough to see its effect."""
 BLADES_LIMITS = (3, 11)
 STEEPEST_TILT = 4.0
-"""In spans of the focus from the picture's middle to its border: for tilt handles that are close together."""
+"""Steepest tilt from the picture's middle to its border, in spans of the focus: for tilt handles close together."""
 
 
 def clamp(value: float, low: float, high: float) -> float:
-    """The nearest value from low to high."""
+    """Return the nearest value from low to high."""
     return float(min(max(value, low), high))
 
 
 def eye_margin(views: int) -> float:
-    """How far the viewpoint may leave a row of views on each side: only where it could not move else. Nothing is known
-    of what shows there: outlines are those of pixels, and what they uncover is stretched.
+    """Return how far the viewpoint may leave a row of views on each side: only if it could not move otherwise.
+
+    The views do not show the surfaces that become visible there; they are stretched.
     """
     return LONE_VIEW_MARGIN if views == 1 else 0.0
 
 
 def eye_limits(views: int) -> tuple[float, float]:
-    """Least and greatest view offset along a row of views."""
+    """Return the least and greatest view offset along a row of views."""
     first, last = -(views // 2), views - 1 - views // 2
     return first - eye_margin(views), last + eye_margin(views)
 
 
 def clamp_eye(eye: ViewOffset, grid: GridShape) -> ViewOffset:
-    """The nearest viewpoint within the limits."""
+    """Return the nearest viewpoint within the limits."""
     return ViewOffset(*(clamp(x, *eye_limits(views)) for x, views in zip(eye, grid)))
 
 
 def clamp_to_grid(eye: ViewOffset, grid: GridShape) -> ViewOffset:
-    """The point of the grid's rectangle nearest to the eye."""
+    """Return the point of the grid's rectangle nearest to the eye."""
     first, last = grid.offset(0, 0), grid.offset(grid.rows - 1, grid.columns - 1)
-    return ViewOffset(min(max(eye.t, first.t), last.t), min(max(eye.s, first.s), last.s))
+    return ViewOffset(*map(clamp, eye, first, last))
 
 
 def dolly_limit(grid: GridShape) -> float:
-    """How far forward or back the rays of the picture's borders still cross the stored views; 0 without any beside."""
+    """Return how far forward or back the rays of the picture's borders still cross the stored views."""
     return (grid.columns - 1) / 2
 
 
 def focus_limits(scene: Scene) -> tuple[float, float]:
-    """Least and greatest focus disparity worth setting: the scene's range and a tenth more on both sides."""
+    """Return the least and greatest focus disparity: the scene's range and a tenth more on both sides."""
     near_and_far = (*scene.disparity_range_px, 0.0)
     margin = 0.1 * (max(near_and_far) - min(near_and_far)) or 0.1
     return min(near_and_far) - margin, max(near_and_far) + margin
@@ -76,12 +71,12 @@ def focus_span(scene: Scene) -> float:
 
 
 def aperture_limit(grid: GridShape) -> float:
-    """The widest aperture in view steps: the whole grid; 0 where there is a single view."""
+    """Return the widest aperture in view steps: the whole grid; 0 for a single view."""
     return float(max(grid) if max(grid) > 1 else 0)
 
 
 def is_finite(optics: Optics) -> bool:
-    """Whether every number of the optics is."""
+    """Return whether every number of the optics is finite."""
     return all(map(math.isfinite, (*_numbers_of(optics), *_numbers_of(optics.aperture_shape))))
 
 
@@ -92,7 +87,7 @@ def _numbers_of(record: Optics | ApertureShape) -> list[float]:
 
 
 def clamp_optics(optics: Optics, scene: Scene) -> Optics:
-    """The nearest optics that this scene allows. All numbers must be finite."""
+    """Return the nearest optics that this scene allows. All numbers must be finite."""
     span = focus_span(scene)
     tilt_x, tilt_y = (clamp(tilt, -STEEPEST_TILT * span, STEEPEST_TILT * span) for tilt in optics.focus_tilt)
     return replace(
@@ -117,20 +112,20 @@ def _clamp_shape(shape: ApertureShape) -> ApertureShape:
 
 
 def _within_limits(record: Record) -> Record:
-    """With every number clamped that states its limits, see `optics.within`."""
+    """Clamp every number that states its limits, see `optics.within`."""
     limited = [(field.name, field.metadata[LIMITS]) for field in fields(record) if LIMITS in field.metadata]
     changes: dict[str, Any] = {name: clamp(getattr(record, name), *limits) for name, limits in limited}
     return replace(record, **changes)
 
 
 def first_aperture(scene: Scene) -> float:
-    """In view steps: what focusing opens a pinhole to; 0 where there is one view."""
+    """Return the aperture, in view steps, to which focusing opens a pinhole; 0 for a single view."""
     return FIRST_APERTURE * aperture_limit(scene.grid)
 
 
 @dataclass(frozen=True)
 class LensChoice:
-    """Choices about the lens before a scene is open, as in `Optics`; None where nothing was chosen."""
+    """Choices about the lens before a scene is open, as in `Optics`; None for the usual value."""
 
     eye: ViewOffset | None = None
     focus: float | None = None

@@ -74,7 +74,9 @@ def load_light_field(
     if source.filled_grid not in (None, grid):
         yield _filled_between(source, field, source.filled_grid, nearest_to)
         return
-    given = known if source.depth.file is None else _read_map(source.depth.file, source.depth.file_scale, size)
+    given, map_file = known, source.depth.file
+    if map_file is not None:
+        given = read_disparity(Path(map_file), size, source.depth.file_scale or 1.0).values
     centre = next(views)
     scene = _scene_as_read(source, field, centre, disparity_range(field))
     if (scene.has_view_disparity and given is None) or max(grid) == 1:
@@ -88,7 +90,7 @@ def load_light_field(
             read.append(view)
             report_progress(len(read), math.prod(grid), READING)
     if given is not None:
-        origin = Path(source.depth.file).name if source.depth.file else FROM_VIEWS
+        origin = Path(map_file).name if map_file else FROM_VIEWS
         yield _with_disparity(scene, read, given, origin)
     elif centre.disparity is not None:
         yield _with_disparity(scene, read, centre.disparity, scene.depth_source)
@@ -198,11 +200,6 @@ def _keep(views: Iterator[ViewUpdate], read: list[ViewUpdate]) -> Iterator[ViewU
     for view in views:
         read.append(view)
         yield replace(view, is_final=False)
-
-
-def _read_map(path: str, scale: float | None, size: ImageSize) -> FloatImage:
-    """Return the map that the user named, as the disparity of the centre view."""
-    return read_disparity(Path(path), size, scale or 1.0).values
 
 
 def _require_field(name: str, size: ImageSize, grid: GridShape) -> None:

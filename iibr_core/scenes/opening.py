@@ -37,13 +37,7 @@ from iibr_core.scenes.scene import (
     WantedPhoto,
 )
 from iibr_core.scenes.screen_size import ScreenSize
-from iibr_core.types import (
-    Disparity,
-    InputError,
-    Photo,
-    ViewOffset,
-    ViewUpdate,
-)
+from iibr_core.types import InputError, Photo, ViewOffset, ViewUpdate
 
 Wanted = Callable[[], Collection[ViewOffset] | None]
 """Function that returns the offsets of the views to make, None for all views of the grid."""
@@ -84,6 +78,8 @@ def sketch_of(photo: WantedPhoto) -> SceneReady | None:
 def scene_of_photo(source: Source, loaded: LoadedPhoto, plan: ScenePlan) -> Scene:
     """Return the scene of a photo and its plan."""
     height, width = loaded.photo.size
+    values = loaded.disparity.values
+    infinity = infinity_of(float(values.min()), float(values.max()), loaded.disparity.inverse_metres)
     return Scene(
         source=source,
         name=loaded.photo.name,
@@ -105,14 +101,9 @@ def scene_of_photo(source: Source, loaded: LoadedPhoto, plan: ScenePlan) -> Scen
         inverse_metres=loaded.disparity.inverse_metres if loaded.depth_settings.edits == UNEDITED else None,
         color_space=loaded.photo.color_space,
         own_size=ScreenSize(loaded.own_size.width, loaded.own_size.height),
-        infinity_px=(_given_infinity(loaded.disparity) - plan.disparity_zero) * plan.disparity_scale,
+        infinity_px=(infinity - plan.disparity_zero) * plan.disparity_scale,
         found_span_px=_found_span_px(loaded, plan),
     )
-
-
-def _given_infinity(disparity: Disparity) -> float:
-    """Return the disparity, as given, of infinitely far points."""
-    return infinity_of(float(disparity.values.min()), float(disparity.values.max()), disparity.inverse_metres)
 
 
 def _found_span_px(loaded: LoadedPhoto, plan: ScenePlan) -> float:

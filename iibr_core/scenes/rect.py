@@ -14,23 +14,21 @@ class Rect(NamedTuple):
     height: float
 
     def contains(self, x: float, y: float) -> bool:
-        """Whether the point lies inside."""
+        """Return whether the point lies inside."""
         return self.x <= x < self.x + self.width and self.y <= y < self.y + self.height
 
     def within(self, other: Rect) -> Rect:
         """Return the part that lies in another rectangle."""
         x, y = max(self.x, other.x), max(self.y, other.y)
-        far_x, far_y = (
-            min(self.x + self.width, other.x + other.width),
-            min(self.y + self.height, other.y + other.height),
-        )
-        return Rect(x, y, max(far_x - x, 0.0), max(far_y - y, 0.0))
+        width = min(self.x + self.width, other.x + other.width) - x
+        height = min(self.y + self.height, other.y + other.height) - y
+        return Rect(x, y, max(width, 0.0), max(height, 0.0))
 
     def part(self, inner: Rect) -> Rect:
-        """A part of it. inner: as shares of it."""
+        """Return a part. inner: the part, as shares of this rectangle."""
         left, top = self.x + inner.x * self.width, self.y + inner.y * self.height
         return Rect(left, top, inner.width * self.width, inner.height * self.height)
 
 
 WHOLE = Rect(0.0, 0.0, 1.0, 1.0)
-"""All of the picture, as a share of it."""
+"""The whole picture, as shares."""

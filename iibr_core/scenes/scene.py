@@ -28,16 +28,16 @@ if TYPE_CHECKING:
 
 AS_USUAL = DepthChoice()
 MAKING = "making views"
-"""The work on views, in words."""
+"""Words for the work on views."""
 
 
 @dataclass(frozen=True)
 class Source:
     """Path to open, and the user's decisions about it; None leaves a choice to the program.
 
-    path: a photo or a light-field folder. focus_disparity: plane that stays still, in the units of the given disparity.
-    inpaint: way of filling what the photo never saw, see `load_inpainter`. is_literal: disparity counts as it is given,
-    in px per step of the grid, instead of the plan's parallax. grid: views of a photo. filled_grid: grid of a light
+    path: a photo or a light-field folder. focus_disparity: plane that does not move, in the units of the given
+    disparity. inpaint: way of filling hidden surfaces, see `load_inpainter`. is_literal: whether the given disparity
+    is px per step of the grid, instead of the plan's parallax. grid: views of a photo. filled_grid: grid of a light
     field with views made between those on disk.
     """
 
@@ -52,19 +52,17 @@ class Source:
 
 
 def source_beside(source: Source | None, path: str) -> Source:
-    """Return the source of another file, with the decisions about this one, except those about its depth map or its
-    views on disk.
-    """
+    """Return the source of another file, with the decisions about this one but its depth map and filled grid."""
     return _with_depth(replace(source or Source(""), path=path, filled_grid=None), file=None)
 
 
 def source_with_map(source: Source, path: str) -> Source:
-    """The same photo with this map; one of another shape is stretched over it."""
+    """Return the same photo with this map, stretched if it has another shape."""
     return _with_depth(source, file=path, start="auto", stretches=True)
 
 
 def source_with_depth(source: Source, start: DepthStart, model: str | None = None) -> Source:
-    """The same photo, its depth looked for from here on; model: a name or a folder."""
+    """Return the same photo with another start of the search for depth. model: a name or a folder."""
     return _with_depth(source, file=None, start=start, model=model or source.depth.model)
 
 
@@ -78,18 +76,17 @@ def _with_depth(source: Source, **changes: Any) -> Source:
 class Scene:
     """An open photo with its plan, or a light field from disk (plan None).
 
-    depth_origin: where a photo's depth came from, None for light fields; depth_source: the same in a few words.
-    has_view_disparity: whether every view comes with its own disparity. notes: what was done to what the files hold, a
-    sentence each; problems: those of them that a notice tells. focal_px: in pixels of the picture, None where
-    not known. subject_disparity_px: of what fills the picture's middle, for presets. settings: text of the settings the
-    file was saved with by this program, "" without. levels: how the disparity is spread before it is edited, px per
-    view step as given. depth_model: name or path of the one that gave its depth, None where none did. inverse_metres:
-    (slope, offset) of 1 / distance over the disparity as given, None where distances are not known in metres.
-    color_space: of its views. own_size: of the photo in its file, which a view may be smaller than; None for light
-    fields. given_grid: of the views that are in a light field's files; None for photos. infinity_px: a photo's field
-    disparity of what is infinitely far, as far as it is known. is_sketch: it is shown in small while it is read.
-    found_span_px: from the farthest to the nearest field disparity before any of it was edited, None where it cannot be
-    edited.
+    depth_origin: origin of a photo's depth, None for light fields; depth_source: the same in a few words.
+    has_view_disparity: whether every view has a disparity. notes: changes that reading made, one sentence each;
+    problems: the notes for a notice. focal_px: focal length in pixels of the picture, None if it is not known.
+    subject_disparity_px: disparity of the subject in the picture's middle, for presets. settings: text of the settings
+    that this program saved in the file, "" without. levels: distribution of the disparity before edits, px per view
+    step as given. depth_model: name or path of the model that estimated the depth, None without. inverse_metres:
+    (slope, offset) of 1 / distance over the disparity as given, None if distances are not known in metres. color_space:
+    of its views. own_size: size of the photo in its file, which may exceed that of a view; None for light fields.
+    given_grid: grid of a light field's files; None for photos. infinity_px: field disparity of infinitely far points of
+    a photo. is_sketch: whether it is a small picture that is shown while the photo is read. found_span_px: range of the
+    field disparity before edits, None if it cannot be edited.
     """
 
     source: Source
@@ -120,7 +117,7 @@ class Scene:
 
     @property
     def is_guessed(self) -> bool:
-        """Whether its depth is a guess, and stays one."""
+        """Whether its depth is a guess and no model replaced it."""
         return self.depth_model is None and self.depth_origin is not None and self.depth_origin.kind == "rough"
 
     @property
@@ -136,17 +133,17 @@ class Scene:
     @property
     def further_notes(self) -> tuple[str, ...]:
         """Return the notes without the panel's line about depth."""
-        said = self.depth_origin.advising_line if self.depth_origin is not None else ""
-        return tuple(note for note in self.notes if note != said)
+        line = self.depth_origin.advising_line if self.depth_origin is not None else ""
+        return tuple(note for note in self.notes if note != line)
 
 
 @dataclass(frozen=True)
 class Progress:
     """Progress of opening a scene.
 
-    done: number of views that are there as they will stay, of `total`. seconds: time that making them has taken. doing:
-    the present work in words, "" while views are made. share: share of the present work that is done, 0..1. left_s:
-    prediction of the seconds that it still takes, None if there is none.
+    done: number of final views, of `total`. seconds: time that making them has taken. doing: the present work in words,
+    "" while views are made. share: share of the present work that is done, 0..1. left_s: prediction of the remaining
+    seconds, None if there is none.
     """
 
     done: int = 0
@@ -158,7 +155,7 @@ class Progress:
 
     @property
     def is_complete(self) -> bool:
-        """Whether every view is there as it will stay."""
+        """Whether every view is there and final."""
         return 0 < self.total == self.done
 
 
@@ -175,20 +172,19 @@ AS_FOUND = DepthSettings()
 
 @dataclass(frozen=True, eq=False)
 class FilledField:
-    """A light field with all views between those on disk. views: of all its places, the centre first."""
+    """A light field with all views between those on disk. views: views of all places, the centre first."""
 
     scene: Scene
     views: tuple[ViewUpdate, ...]
 
     def is_of(self, source: Source) -> bool:
-        """Whether opening this shows these views."""
+        """Return whether opening this source shows these views."""
         return is_same_field(self.scene.source, source) and self.scene.source.filled_grid == source.filled_grid
 
 
 def is_same_field(one: Source, other: Source) -> bool:
-    """Whether the views of both are the same, but for those between: a map of its own gives them another disparity."""
-    same_map = one.depth.file == other.depth.file
-    return one.path == other.path and same_map and one.inpaint == other.inpaint
+    """Return whether both have the same stored views and would fill the same views between them."""
+    return (one.path, one.depth.file, one.inpaint) == (other.path, other.depth.file, other.inpaint)
 
 
 @dataclass(frozen=True, eq=False)
@@ -231,9 +227,9 @@ class SceneRequest:
     """A scene to be opened, with all inputs.
 
     loaded: the photo, if it was read before. depth_settings: refinement and edits of depth, None for those of the
-    source. takes_drafts: a light field without disparity comes as read, too, before its disparity is known. plan: the
-    plan of what is loaded, if it was made before. filled: the same light field, if all its views were made before.
-    asks_model: whether depth is asked of a model where there is one; otherwise it is guessed.
+    source. takes_drafts: whether a light field without disparity comes before its disparity is known, too. plan: the
+    plan of the loaded photo, if it was made before. filled: the same light field, if all its views were made before.
+    asks_model: whether a model estimates depth if there is one; otherwise it is guessed.
     """
 
     generation: int
@@ -267,5 +263,5 @@ class ViewReady:
 
 
 def still_disparity(source: Source, before_strokes: FloatImage) -> float:
-    """Return the disparity (as given) of the plane that does not move, whatever is painted."""
+    """Return the disparity (as given) of the plane that does not move, which strokes do not change."""
     return float(np.median(before_strokes)) if source.focus_disparity is None else source.focus_disparity

@@ -6,9 +6,7 @@ from typing import NamedTuple
 
 
 class ScreenSize(NamedTuple):
-    """Width and height in pixels: the order of GL, GLFW and ImGui. Images have an `ImageSize`; no type checker lets
-    one pass for the other.
-    """
+    """Width and height in pixels: the order of GL, GLFW and ImGui. Images have an `ImageSize`."""
 
     width: int
     height: int

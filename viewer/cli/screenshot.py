@@ -180,7 +180,7 @@ def _size_of(shot: _Shot, viewer: HeadlessViewer) -> ScreenSize | None:
         return shot.size
     if viewer.state.optics.gloss is not None:
         raise InputError("--full: gloss is drawn from the views, which may be smaller; leave one of both out")
-    require_full(viewer.scene, viewer.state.optics)
+    require_full(viewer.scene)
     return viewer.own_size
 
 

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import math
 import re
-from collections import deque
 from collections.abc import Iterable, Iterator
-from concurrent.futures import Future, ThreadPoolExecutor
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +13,9 @@ import numpy as np
 from iibr_core.color import bytes_from_encoded, encoded_from_stored
 from iibr_core.formats.images.write import write_image  # brings numba, which errors should not wait for
 from iibr_core.formats.light_fields.parameters import FILE_NAME
+from iibr_core.formats.maps.pfm import write_pfm
 from iibr_core.formats.outputs import check_output, check_output_folder, write_folder
+from iibr_core.runtime.tiling import side_by_side
 from iibr_core.types import (
     GridShape,
     ImageSize,
@@ -32,8 +33,6 @@ LENSLET_KEY = "iibr:Lenslet"
 
 HCI_FILES = r"input_Cam\d+\.(png|exr)|disp_Cam\d+\.pfm|gt_disp_lowres\.pfm|parameters\.cfg"
 ESLF_ENDING = "_eslf.png"
-WRITING_THREADS = 2
-MAX_PENDING_VIEWS = 4
 SENSOR_SIZE_MM = 36.0
 PARAMETERS = """[intrinsics]
 focal_length_mm = {focal_mm}
@@ -118,32 +117,23 @@ def _write_hci(
     folder: Path, grid: GridShape, views: Iterable[ViewUpdate], focal_px: float, name: str, with_disparity: bool
 ) -> None:
     size, low, high = ImageSize(1, 1), math.inf, -math.inf
-    pending: deque[Future[None]] = deque()
-    check_output_folder(folder, may_replace=True, own_files=HCI_FILES)
     with write_folder(folder) as unfinished:
-        with ThreadPoolExecutor(WRITING_THREADS) as pool:
-            for view in views:
-                pending.append(pool.submit(_write_view, unfinished, grid, view, with_disparity))
-                size = image_size(view.colors)
-                if view.disparity is not None:
-                    low, high = min(low, float(view.disparity.min())), max(high, float(view.disparity.max()))
-                if len(pending) > MAX_PENDING_VIEWS:
-                    pending.popleft().result()
-            for future in pending:
-                future.result()
+        for view in side_by_side(partial(_write_view, unfinished, grid, with_disparity), views):
+            size = image_size(view.colors)
+            if view.disparity is not None:
+                low, high = min(low, float(view.disparity.min())), max(high, float(view.disparity.max()))
         parameters = _parameters(name, grid, size, focal_px, low, high)
         (unfinished / FILE_NAME).write_text(parameters, encoding="utf-8")
 
 
-def _write_view(folder: Path, grid: GridShape, view: ViewUpdate, with_disparity: bool) -> None:
-    from iibr_core.formats.maps.pfm import write_pfm
-
+def _write_view(folder: Path, grid: GridShape, with_disparity: bool, view: ViewUpdate) -> ViewUpdate:
     number = view.row * grid.columns + view.column
     write_image(folder / f"input_Cam{number:03d}{'.png' if view.colors.dtype == np.uint8 else '.exr'}", view.colors)
     if view.disparity is not None and with_disparity:
         write_pfm(folder / f"disp_Cam{number:03d}.pfm", view.disparity)
     if view.disparity is not None and (view.row, view.column) == grid.centre:
         write_pfm(folder / "gt_disp_lowres.pfm", view.disparity)
+    return view
 
 
 def _parameters(name: str, grid: GridShape, size: ImageSize, focal_px: float, low: float, high: float) -> str:
@@ -166,15 +156,12 @@ def _parameters(name: str, grid: GridShape, size: ImageSize, focal_px: float, lo
 
 def _write_eslf(path: Path, grid: GridShape, views: Iterable[ViewUpdate]) -> None:
     """Write a lenslet image: the pixels that show one place of the scene, one of each view, form a rectangle."""
-    height, width = 0, 0
     pixels = np.empty((0, grid.rows, 0, grid.columns, 3), np.uint8)
     for view in views:
+        colors = view.colors if view.colors.dtype == np.uint8 else bytes_from_encoded(encoded_from_stored(view.colors))
         if not pixels.size:
-            height, width = image_size(view.colors)
+            height, width = image_size(colors)
             pixels = np.empty((height, grid.rows, width, grid.columns, 3), np.uint8)
-        colors = view.colors
-        pixels[:, view.row, :, view.column] = (
-            colors if colors.dtype == np.uint8 else bytes_from_encoded(encoded_from_stored(colors))
-        )
-    lenslets = pixels.reshape(height * grid.rows, width * grid.columns, 3)
-    write_image(path, lenslets, {LENSLET_KEY: f"{grid.columns}x{grid.rows}"})
+        pixels[:, view.row, :, view.column] = colors
+    height, rows, width, columns, _ = pixels.shape
+    write_image(path, pixels.reshape(height * rows, width * columns, 3), {LENSLET_KEY: f"{columns}x{rows}"})

@@ -274,7 +274,7 @@ def test_a_picture_at_the_photos_own_size_can_be_given_up(
 ) -> None:
     begun, before = threading.Event(), set(tmp_path.iterdir())
 
-    def make(self: FullPicture, draw: object, _: object) -> None:
+    def make(self: FullPicture, draw: object) -> None:
         begun.set()
         while not is_stopped():
             time.sleep(0.001)

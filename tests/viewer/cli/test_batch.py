@@ -163,7 +163,7 @@ def test_a_dask_cluster_exports_all_photos_although_a_worker_is_killed_and_its_e
         (("empty", "--to", "depth", "-o", "out"), "no photos"),
         (("missing", "--to", "depth", "-o", "out"), "missing: no such folder"),
         (("photos", "--to", "depth", "-o", "photos/out"), "is read"),
-        (("photos", "--to", "depth", "-o", "file.txt"), "file.txt: is a file"),
+        (("photos", "--to", "depth", "-o", "file.txt"), "file.txt is a file"),
         (("photos", "--to", "depth", "-o", "mine"), "mine: already exists"),
         (("photos", "--to", "depth", "-o", "out", "--frames", "3"), "--frames"),
         (("photos", "--to", "depth", "-o", "out", "--literal"), "--grid"),

@@ -93,7 +93,7 @@ def test_tiles_are_as_sharp_as_the_whole(
 ) -> None:
     optics = LENSES[name]
     at_once = picture(viewers[0], optics)
-    monkeypatch.setattr("iibr_core.exports.full_picture.TILE_PX", 64)
+    monkeypatch.setattr("iibr_core.exports.full_drawing.TILE_PX", 64)
     tiled = picture(viewers[0], optics)
     assert bounded_psnr(tiled, at_once) > LEAST_DB
     steps = [np.abs(np.diff(image, axis=1)).mean(axis=(0, 2)) for image in (tiled, at_once)]
