@@ -87,7 +87,7 @@ class FullPicture:
             photo = load_large(source, self.loaded, self.plan, MAX_PIXELS)
             keep(photo)
         if _shows_hidden(self.optics) and photo.fills is None:
-            photo = photo.with_fills(complete_fills(source, self.loaded, self.plan))
+            photo = replace(photo, fills=complete_fills(source, self.loaded, self.plan))
             keep(photo)
         return self._draw_tiles(photo, Renderer(), draw)
 

@@ -127,7 +127,9 @@ def test_the_readme_says_what_the_reports_say() -> None:
     assert list(write_readme(ROOT, only_check=True)) == []
 
 
-@pytest.mark.parametrize(("page", "mark", "row"), [("README.md", "views", "HCI "), (ACCURACY, "switches", "half width ")])
+@pytest.mark.parametrize(
+    ("page", "mark", "row"), [("README.md", "views", "HCI "), (ACCURACY, "switches", "half width ")]
+)
 def test_a_changed_table_is_noticed(tmp_path: Path, page: str, mark: str, row: str) -> None:
     shutil.copytree(DOCS, tmp_path / "docs")
     shutil.copyfile(ROOT / "README.md", tmp_path / "README.md")
