@@ -13,11 +13,13 @@ from iibr_core.types import FloatImage, InputError, Photo
 
 
 def photo_of(pixels: NDArray[Any], focal_px: float | None = None, name: str = "photo") -> Photo:
-    """(H, W, 3), uint8 or float with 1 = white. Raises InputError for other shapes."""
+    """Return a photo of (H, W, 3), uint8 or float with 1 = white. Raises InputError for any other array."""
     pixels = np.asarray(pixels)
     if pixels.ndim != 3 or pixels.shape[2] != 3 or not pixels.size:
         raise InputError(f"a photo of shape {pixels.shape}: give (H, W, 3)")
     given = np.maximum(encoded(pixels), 0)
+    if not np.isfinite(given).all():
+        raise InputError(f"{name}: holds colours that are NaN or infinite; give finite ones")
     return Photo(given, focal_px or focal_px_from_fov(pixels.shape[1]), name, is_hdr=bool(given.max() > 1))
 
 

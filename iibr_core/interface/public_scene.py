@@ -233,6 +233,8 @@ def from_arrays(
         )
     with np.errstate(over="ignore"):
         values = disparity.astype(np.float32)
+    if not np.isfinite(values).all():
+        raise InputError("the given array: holds disparities that are NaN, infinite or too large; fill or scale them")
     return PhotoScene(photo_of_arrays(given, Disparity(values, "the given array")), Source(""))
 
 
