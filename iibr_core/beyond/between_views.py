@@ -8,7 +8,7 @@ is covered. Pixels that none of them shows are inpainted once and join the rays.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import product
@@ -115,39 +115,28 @@ def densify(
     given: all views of the sparse grid, of equal size. Disparity is per step of the dense grid. Raises InputError as
     `require_steps` does.
     """
-    with suppress(Cancelled):
-        yield from _generate_views(given, require_steps(sparse, dense), sparse, dense, inpainter, nearest_to)
-
-
-def _generate_views(
-    given: Sequence[GivenView],
-    steps: int,
-    sparse: GridShape,
-    dense: GridShape,
-    inpainter: Inpainter,
-    nearest_to: Callable[[], ViewOffset],
-) -> Iterator[ViewUpdate]:
-    is_hdr = given[0].colors.dtype != np.uint8
+    steps, is_hdr = require_steps(sparse, dense), given[0].colors.dtype != np.uint8
     places = {(view.row * steps, view.column * steps): view for view in given}
     remaining = [dense.offset(*at) for at in np.ndindex(*dense) if at not in places]
     completing = [offset for offset in _completing_views(sparse, dense, steps) if offset in remaining]
-    views = _ViewsBetween(given, steps, dense, inpainter)
+    remaining = [offset for offset in remaining if offset not in completing]
+    # The centre comes first, given or not.
+    early = 0 if dense.centre in places else 1
 
     def stored(offset: ViewOffset, view: View) -> ViewUpdate:
         (v, u), colors = dense.centre, encode_for_storage(view.colors, is_hdr, 1)
         return ViewUpdate(v + round(offset.t), u + round(offset.s), colors, view.disparity, view.inpainted)
 
-    # The centre comes first, given or not.
-    early = 0 if dense.centre in places else 1
-    for offset in completing[:early]:
-        yield stored(offset, views.complete(offset))
-    for (row, column), view in sorted(places.items(), key=lambda item: hypot(*dense.offset(*item[0]))):
-        inpainted = np.zeros(view.disparity.shape, np.bool_)
-        yield ViewUpdate(row, column, view.colors, view.disparity / np.float32(steps), inpainted)
-    for offset in completing[early:]:
-        yield stored(offset, views.complete(offset))
-    remaining = [offset for offset in remaining if offset not in completing]
-    yield from side_by_side(lambda offset: stored(offset, views.make(offset)), nearest_first(remaining, nearest_to))
+    with suppress(Cancelled):
+        views = _ViewsBetween(given, steps, dense, inpainter)
+        for offset in completing[:early]:
+            yield stored(offset, views.complete(offset))
+        for (row, column), view in sorted(places.items(), key=lambda item: hypot(*dense.offset(*item[0]))):
+            inpainted = np.zeros(view.disparity.shape, np.bool_)
+            yield ViewUpdate(row, column, view.colors, view.disparity / np.float32(steps), inpainted)
+        for offset in completing[early:]:
+            yield stored(offset, views.complete(offset))
+        yield from side_by_side(lambda offset: stored(offset, views.make(offset)), nearest_first(remaining, nearest_to))
 
 
 class _ViewsBetween:

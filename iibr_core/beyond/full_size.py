@@ -20,8 +20,6 @@ from iibr_core.runtime.tiling import THREADS
 from iibr_core.surfaces import SAME_SURFACE_PX
 from iibr_core.types import FloatImage, ImageSize, ViewOffset, image_size
 
-TILE_PX = 1024
-"""Side of a tile in pixels, without its margin."""
 TILE_MARGIN_PX = 8
 """Margin of a tile beside the parallax, in pixels, for filters and edges."""
 
@@ -63,7 +61,7 @@ def whole(size: ImageSize) -> Part:
     return Part(0, size.height, 0, size.width)
 
 
-def tiles_of(part: Part, side: int = TILE_PX) -> list[Part]:
+def tiles_of(part: Part, side: int) -> list[Part]:
     """Return a part of an image as tiles of at most side x side pixels, row by row."""
     return [
         Part(top, min(top + side, part.bottom), left, min(left + side, part.right))
@@ -134,9 +132,9 @@ def views_of_tile(photo: LargePhoto, tile: Part, offsets: list[ViewOffset], rend
     rays, shown = photo.rays(around, offsets, farthest), tile.inside(around).slices
     for offset in offsets:
         view = finish(rays, offset, renderer.render(rays, offset, THREADS), THREADS)
-        images = view.colors, view.disparity, view.occluded, view.inpainted
         # Copies: a part gets the memory layout of a whole view, so that kernels need not be compiled twice.
-        yield View(*(image[shown].copy() for image in images))
+        masks = view.occluded[shown].copy(), view.inpainted[shown].copy()
+        yield View(view.colors[shown].copy(), view.disparity[shown].copy(), *masks)
 
 
 def _images_in(fills: RaySet, size: ImageSize, part: Part, offsets: Sequence[ViewOffset]) -> list[int]:

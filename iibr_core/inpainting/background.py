@@ -77,9 +77,7 @@ def continues_in_front(
     in_front, one_surface = np.zeros_like(hole), step_of(EDGE_PX, max(map(abs, offset)))
 
     def weigh(part: slice) -> None:
-        _weigh_in_front(
-            disparity, pixels[part], known[part], photo_disparity, offset.s, offset.t, one_surface, in_front
-        )
+        _weigh_in_front(disparity, pixels[part], known[part], photo_disparity, offset, one_surface, in_front)
 
     in_pieces(weigh, pieces_of(len(pixels), MOST_PIECE_PIXELS), threads)
     return in_front
@@ -104,7 +102,7 @@ def _fill_view(
 
     def fill(part: slice) -> None:
         at = pixels[part], known[part], reach[part]
-        _fill(colors, disparity, *at, photo_disparity, offset.s, offset.t, one_surface)
+        _fill(colors, disparity, *at, photo_disparity, offset, one_surface)
 
     def smooth(step_px: int, part: slice) -> None:
         _smooth(colors, hole, pixels[part], reach[part], step_px, changed[part])
@@ -121,12 +119,12 @@ def _fill_view(
 
 
 @kernel
-def _fill(colors, disparity, pixels, known, reach, photo_disparity, s, t, one_surface):
+def _fill(colors, disparity, pixels, known, reach, photo_disparity, offset, one_surface):
     """Fill pixels (N,), flat indices, from the nearest known pixels (N, 16), see `fill_background`.
 
     reach (N,): gets the distance of the nearest of these, inf without any.
     """
-    height, width = disparity.shape
+    (height, width), (t, s) = disparity.shape, offset
     photo, directions = photo_disparity.ravel(), known.shape[1]
     surface, weight = np.zeros(directions), np.zeros(directions)
     hidden = one_surface * (SAME_SURFACE_PX / EDGE_PX)
@@ -186,9 +184,9 @@ def _heaviest(surface, weight, one_surface):
 
 
 @kernel
-def _weigh_in_front(disparity, pixels, known, photo_disparity, s, t, one_surface, in_front):
+def _weigh_in_front(disparity, pixels, known, photo_disparity, offset, one_surface, in_front):
     """Write `continues_in_front` to in_front (H, W) for pixels (N,) from the nearest known pixels (N, 16)."""
-    height, width = disparity.shape
+    (height, width), (t, s) = disparity.shape, offset
     photo, hidden = photo_disparity.ravel(), one_surface * (SAME_SURFACE_PX / EDGE_PX)
     for i in range(len(pixels)):
         y, x = pixels[i] // width, pixels[i] % width

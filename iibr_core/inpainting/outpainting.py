@@ -12,6 +12,7 @@ from math import hypot, log2, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
+from iibr_core.inpainting.nearest_known import number_pixels
 from iibr_core.runtime.kernels import kernel
 from iibr_core.runtime.scalars import nearest_pixel
 from iibr_core.runtime.tiling import in_bands
@@ -54,15 +55,16 @@ def outpaint(
         return colors, disparity
     larger = margins.around(size)
     grown, surfaces = np.empty((*larger, 3), np.float32), np.empty(larger, np.float32)
-    frame = _frame_pixels(size)
+    frame, number = _frame_pixels(size), np.empty(size, np.int32)
+    number_pixels(frame, number)
     means = _means_along_frame(colors.reshape(-1, 3)[frame], max(margins))
     lines = np.empty((len(frame), 2), np.float32)
     _find_lines(colors, frame, lines)
 
     def band(first: int, last: int) -> None:
-        _extend_rows(colors, disparity, means, margins.top, margins.left, first, last, grown, surfaces)
+        _extend_rows(colors, disparity, number, means, margins, (first, last), grown, surfaces)
         if stages.outpainted_lines:
-            _follow_lines(size.height, size.width, frame, means, lines, margins.top, margins.left, first, last, grown)
+            _follow_lines(number, frame, means, lines, margins, first, last, grown)
 
     in_bands(band, larger)
     return grown, surfaces
@@ -96,18 +98,6 @@ def _level(distance):
 
 
 @kernel
-def _place_on_frame(height, width, y, x):
-    """Return the index of a pixel of the frame among `_frame_pixels`."""
-    if y == 0:
-        return x
-    if x == width - 1:
-        return width - 1 + y
-    if y == height - 1:
-        return 2 * (width - 1) + height - 1 - x
-    return 2 * (width - 1) + 2 * (height - 1) - y
-
-
-@kernel
 def _texture(colors, y, x, c):
     """Return the difference of a pixel from the mean around it; the border is repeated."""
     height, width, _ = colors.shape
@@ -120,10 +110,10 @@ def _texture(colors, y, x, c):
 
 
 @kernel
-def _extend_rows(colors, disparity, means, top, left, first, last, grown, surfaces):
+def _extend_rows(colors, disparity, number, means, margins, rows, grown, surfaces):
     """Fill rows [first, last) of the larger image without following lines."""
-    height, width = disparity.shape
-    for row in range(first, last):
+    (height, width), (top, _, left, _) = disparity.shape, margins
+    for row in range(*rows):
         for column in range(grown.shape[1]):
             y, x = min(max(row - top, 0), height - 1), min(max(column - left, 0), width - 1)
             away = hypot(row - top - y, column - left - x)
@@ -132,7 +122,7 @@ def _extend_rows(colors, disparity, means, top, left, first, last, grown, surfac
                 for c in range(3):
                     grown[row, column, c] = colors[y, x, c]
                 continue
-            place, level = _place_on_frame(height, width, y, x), _level(away)
+            place, level = number[y, x], _level(away)
             surfaces[row, column] = disparity[y, x]
             k = min(int(level), len(means) - 2)
             part = np.float32(level - k)
@@ -185,15 +175,16 @@ def _line_weight(line_cos, line_sin, down, across):
 
 
 @kernel
-def _follow_lines(height, width, frame, means, lines, top, left, first, last, grown):
+def _follow_lines(number, frame, means, lines, margins, first, last, grown):
     """Blend the lines of the frame into rows [first, last), more where they lead there straighter."""
+    (height, width), (top, _, left, _) = number.shape, margins
     for row in range(first, last):
         for column in range(grown.shape[1]):
             y, x = min(max(row - top, 0), height - 1), min(max(column - left, 0), width - 1)
             away = hypot(row - top - y, column - left - x)
             if away == 0.0:
                 continue
-            place, step = _place_on_frame(height, width, y, x), SLANT * away / PLACES
+            place, step = number[y, x], SLANT * away / PLACES
             # A mean as wide as the distance between two places.
             level = _level(step)
             k = min(int(level), len(means) - 2)
