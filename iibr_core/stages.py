@@ -1,4 +1,4 @@
-"""The stages between map and view, each on or off: read by all of them, `iibr evaluate --without` and the ablation."""
+"""Switches of the stages between map and view, for `iibr evaluate --without` and the ablation."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from iibr_core.types import InputError
 
 @dataclass(frozen=True)
 class Stages:
-    """The stages that are on; all are by default. In the order in which they work."""
+    """The stages, in the order in which they run; True ones are on."""
 
     sharpen_soft_edges: bool = True
     """Depth edges that a blur made soft become steps at the photo's edges."""
@@ -23,32 +23,32 @@ class Stages:
     outpainting: bool = True
     """The photo is continued beyond its frame, once for all views."""
     outpainted_lines: bool = True
-    """There lines go straight on."""
+    """Lines continue straight beyond the frame."""
     split_mixed_pixels: bool = True
     """Pixels that show two surfaces become a ray of each."""
     leave_out_in_front: bool = True
-    """What was inpainted in front of the photo's surfaces joins no rays."""
+    """Pixels that were inpainted in front of the photo's surfaces are not added to the rays."""
     share_inpainted: bool = True
-    """What the outer views inpaint is seen by all views."""
+    """The inpainted pixels of the outer views are shown by all views."""
     composite_partial_coverage: bool = True
-    """What covers a pixel in part is laid over what was inpainted behind it."""
+    """Rays that cover a pixel in part are composited over the inpainted background."""
     ray_transformer: bool = True
-    """Where several surfaces contest a ray, the ray transformer decides; else the closed form."""
+    """The ray transformer decides rays with several candidate surfaces; without it, the closed form does."""
     reopen_holes: bool = True
-    """What was inpainted behind one of the photo's surfaces does not show through a hole in that surface."""
+    """A hole in one of the photo's surfaces does not show the inpainted background."""
     synthesise_patches: bool = True
-    """Inpainted pixels get the texture of their surface, by patches of it."""
+    """Inpainted pixels get the texture of their surface from patches."""
     remove_flying_pixels: bool = True
     """Pixels that appear detached from their surface are replaced."""
 
 
 ALL_STAGES = Stages()
 STAGE_NAMES = tuple(stage.name.replace("_", "-") for stage in fields(Stages))
-"""As the command line spells them."""
+"""Names of the stages on the command line."""
 
 
 def stages_without(names: Iterable[str]) -> Stages:
-    """All stages but these (STAGE_NAMES). Raises InputError, which lists them, for a name that is none."""
+    """Return all stages but these. Raises InputError for a name that is not in STAGE_NAMES."""
     left_out = list(names)
     for name in left_out:
         if name not in STAGE_NAMES:

@@ -1,4 +1,4 @@
-"""The values that travel between modules, and the conventions all of them share. Everything else refers to this page.
+"""Types that modules exchange, and the conventions of all of them.
 
 Light field     L[v, u, y, x, c]: v down, u right. The centre view is (V // 2, U // 2).
 View offset     (t, s) = (v - v_centre, u - u_centre) in view steps: t down, s right; real-valued for virtual views.
@@ -7,14 +7,14 @@ Disparity d     pixels per view step, of the view it is given for. A point seen 
 Pixel centres   integers in arrays (the picture spans -0.5 .. width - 0.5); + 0.5 only in GL texture coordinates.
 Rows            row 0 is the top everywhere on the CPU.
 Colour          encoded by sRGB's curve, 1 = white, as photos are; HDR values exceed 1 on the same curve, continued.
-                Of the photo's own primaries (`ColorSpace`), so that none is cut off; sRGB where nothing else is said.
+                With the photo's own primaries (`ColorSpace`), so that no colour is clipped; sRGB unless stated.
                 Sums of light are taken in linear light (`iibr_core.color`).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,22 +26,17 @@ StoredColors = NDArray[np.uint8] | NDArray[np.float16]
 """(H, W, 3), encoded by sRGB's curve: uint8 for ordinary photos (255 = white), float16 for HDR ones (1 = white)."""
 
 
-Quality = Literal["fast", "balanced"]
-"""Where the ray transformer runs: nowhere, on ambiguous rays, everywhere."""
-
-DEFAULT_QUALITY: Quality = "balanced"
-
 TOTAL_PARALLAX = 0.04
-"""For viewing: how far the nearest moves against the farthest across the grid, as a share of the photo's width."""
+"""Parallax of the nearest against the farthest across the grid, for viewing, as a share of the photo's width."""
 
 LARGEST_LENGTH = 1e12
-"""Of a camera's place, in any unit: products of larger ones lose all digits."""
+"""Largest coordinate of a camera, in any unit: products of larger ones lose all digits."""
 MOST_FOCAL_WIDTHS = 100.0
-"""A telescope's; and as short is no lens's."""
+"""Longest focal length, that of a telescope, in widths of the picture; the shortest is its inverse."""
 
 
 class ViewOffset(NamedTuple):
-    """Where a view stands relative to the centre view, in view steps: t down, s right."""
+    """Position of a view relative to the centre view, in view steps: t down, s right."""
 
     t: float
     s: float
@@ -54,12 +49,12 @@ class ImageSize(NamedTuple):
     width: int
 
     def __str__(self) -> str:
-        """In the order people say it: "640x480" is 640 wide."""
+        """Return width and height, such as "640x480"."""
         return f"{self.width}x{self.height}"
 
 
 class Margins(NamedTuple):
-    """So many pixels beyond each side of an image."""
+    """Numbers of pixels beyond each side of an image."""
 
     top: int = 0
     bottom: int = 0
@@ -67,7 +62,7 @@ class Margins(NamedTuple):
     right: int = 0
 
     def around(self, size: ImageSize) -> ImageSize:
-        """Of an image with its margins."""
+        """Return the size of an image with its margins."""
         return ImageSize(size.height + self.top + self.bottom, size.width + self.left + self.right)
 
 
@@ -83,19 +78,19 @@ class GridShape(NamedTuple):
         return self.rows // 2, self.columns // 2
 
     def offset(self, row: int, column: int) -> ViewOffset:
-        """View offset of the view at index (row, column)."""
+        """Return the offset of the view at index (row, column)."""
         v, u = self.centre
         return ViewOffset(float(row - v), float(column - u))
 
 
 def image_size(pixels: NDArray[Any]) -> ImageSize:
-    """The size of an image (H, W, ...)."""
+    """Return the size of an image (H, W, ...)."""
     return ImageSize(pixels.shape[0], pixels.shape[1])
 
 
 @dataclass(frozen=True)
 class ColorSpace:
-    """Which red, green and blue the numbers of a picture mean; their curve is sRGB's in every space.
+    """Red, green and blue primaries of a picture; the curve is sRGB's in every space.
 
     xyz_from_linear: the rows of a matrix to XYZ under D50, the white of colour profiles (ICC.1:2022, annex E).
     """
@@ -113,16 +108,15 @@ DISPLAY_P3 = ColorSpace(
     "Display P3",
     ((0.5151187, 0.2919778, 0.1571035), (0.2411892, 0.6922441, 0.0665668), (-0.0010505, 0.0418791, 0.7840713)),
 )
-"""Of phones and screens of today: SMPTE EG 432-1's primaries under D65."""
+"""Colour space of current phones and screens: primaries of SMPTE EG 432-1 under D65."""
 
 
 @dataclass(frozen=True, eq=False)
 class Photo:
-    """A photo as the core sees it.
+    """A photo.
 
     pixels: (H, W, 3) float32, encoded by sRGB's curve, of `color_space`, finite, >= 0; `is_hdr` photos exceed 1.
-    focal_px: focal length in pixels of this size. notes: what reading it changed, one sentence each, for people.
-    Raises InputError for pixels that are not finite, so that no later step has to check.
+    focal_px: focal length in pixels of this size. notes: changes by reading it, one sentence each, for people.
     """
 
     pixels: FloatImage
@@ -132,13 +126,9 @@ class Photo:
     notes: tuple[str, ...] = ()
     color_space: ColorSpace = SRGB
 
-    def __post_init__(self) -> None:
-        if not np.isfinite(self.pixels).all():
-            raise InputError(f"{self.name}: holds colours that are NaN or infinite; give finite ones")
-
     @property
     def size(self) -> ImageSize:
-        """Of the pixels."""
+        """Height and width of `pixels`."""
         return image_size(self.pixels)
 
 
@@ -146,12 +136,10 @@ class Photo:
 class Disparity:
     """Disparity of a photo, at the photo's size.
 
-    values: (H, W) float32, finite, pixels per view step. source: where it came from, in words for people
-    ("scene.pfm", "none"). inverse_metres: (slope, offset) of 1 / distance in metres over the values, None where only
-    their order is known. unknown: (H, W) bool, where the source knew nothing and values were filled in; None: nowhere.
-    viewing_share: of TOTAL_PARALLAX that viewing plans for; a guess moves less. is_enlarged: values come from a smaller
-    map with soft edges. Raises InputError for values that are
-    not finite, so that no later step has to check.
+    values: (H, W) float32, finite, pixels per view step. source: its origin, in words for people ("scene.pfm", "none").
+    inverse_metres: (slope, offset) of 1 / distance in metres over the values, None if only their order is known.
+    unknown: (H, W) bool, True where values were filled in; None: nowhere. viewing_share: share of TOTAL_PARALLAX that
+    viewing plans for; a guess moves less. is_enlarged: values come from a smaller map with soft edges.
     """
 
     values: FloatImage
@@ -162,21 +150,15 @@ class Disparity:
     viewing_share: float = 1.0
     is_enlarged: bool = False
 
-    def __post_init__(self) -> None:
-        if not np.isfinite(self.values).all():
-            raise InputError(
-                f"{self.source}: holds disparities that are NaN, infinite or too large; fill or scale them"
-            )
-
 
 @dataclass(frozen=True, eq=False)
 class Camera:
-    """A pinhole camera anywhere: x to the right, y down, z forward, as the pictures it takes.
+    """A pinhole camera anywhere: x to the right, y down, z forward.
 
-    world_from_camera: (3, 3) rotation; position: (3,) in the world's units. size: of its pictures. focal_px, centre_px:
-    focal lengths and principal point (x, y), the latter counted as pixel centres are. source: where it was read, for
-    people ("transforms.json, pose 3"). depth_range: of the nearest and the farthest that it sees, None where not known.
-    Raises InputError where these make no camera.
+    world_from_camera: (3, 3) rotation; position: (3,) in the world's units. size: that of its pictures. focal_px,
+    centre_px: focal lengths and principal point (x, y), the latter counted as pixel centres are. source: its origin,
+    for people ("transforms.json, pose 3"). depth_range: least and greatest depth that it sees, None if unknown.
+    Raises InputError for values that make no camera.
     """
 
     world_from_camera: NDArray[np.float64]
@@ -188,12 +170,12 @@ class Camera:
     depth_range: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
-        turned = self.world_from_camera
+        rotation = self.world_from_camera
         near, far = self.depth_range or (1.0, 2.0)
-        numbers = (*turned.ravel(), *self.position, *self.focal_px, *self.centre_px, near, far)
+        numbers = (*rotation.ravel(), *self.position, *self.focal_px, *self.centre_px, near, far)
         if not np.abs(numbers).max() < LARGEST_LENGTH:
             raise InputError(f"{self.source}: holds numbers that are NaN, infinite or too large; give finite ones")
-        if not np.allclose(turned @ turned.T, np.eye(3), atol=1e-3) or np.linalg.det(turned) < 0:
+        if not np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-3) or np.linalg.det(rotation) < 0:
             raise InputError(f"{self.source}: its axes are no rotation; get the whole file again")
         widths = tuple(focal / max(self.size) for focal in self.focal_px)
         if min(self.size) < 1 or not all(1 / MOST_FOCAL_WIDTHS <= width <= MOST_FOCAL_WIDTHS for width in widths):
@@ -206,12 +188,12 @@ class Camera:
 
     @property
     def intrinsics(self) -> NDArray[np.float64]:
-        """(3, 3): pixels (x, y, 1) from directions (x / z, y / z, 1) by the camera's axes."""
+        """Matrix (3, 3) from directions (x / z, y / z, 1) in the camera's axes to pixels (x, y, 1)."""
         (focal_x, focal_y), (x, y) = self.focal_px, self.centre_px
         return np.array([[focal_x, 0.0, x], [0.0, focal_y, y], [0.0, 0.0, 1.0]])
 
     def resized(self, size: ImageSize) -> Camera:
-        """The same with larger or smaller pictures."""
+        """Return the camera with larger or smaller pictures."""
         (height, width), (focal_x, focal_y), (x, y) = self.size, self.focal_px, self.centre_px
         wider, higher = size.width / width, size.height / height
         centre_px = (x + 0.5) * wider - 0.5, (y + 0.5) * higher - 0.5
@@ -222,10 +204,9 @@ class Camera:
 class ViewUpdate:
     """One view of a light field.
 
-    row, column: its index (v, u). colors: (H, W, 3), see StoredColors. disparity: (H, W) float32 of this view, or
-    None where a light field read from disk has none. inpainted: (H, W) bool, True where the photo saw nothing, or
-    None where not known. is_final: whether it stays as it is; else it comes once more. share: of the work on all views,
-    what is done once this one is there, 0..1.
+    row, column: its index (v, u). colors: (H, W, 3), see StoredColors. disparity: (H, W) float32 of this view, None if
+    a light field on disk has none. inpainted: (H, W) bool, True where the photo saw nothing, None if unknown. is_final:
+    False for a view that will be replaced by a later one.
     """
 
     row: int
@@ -234,8 +215,7 @@ class ViewUpdate:
     disparity: FloatImage | None
     inpainted: NDArray[np.bool_] | None = None
     is_final: bool = True
-    share: float = 0.0
 
 
 class InputError(ValueError):
-    """Bad input from outside: a file, a value, an option. The message is one line that names it and says what to do."""
+    """Bad input from outside: a file, a value, an option. The message is one line that names it and the remedy."""

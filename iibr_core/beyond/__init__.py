@@ -1,1 +1,1 @@
-"""What the paper does not have: views between views, free cameras, pictures at full size, lenses."""
+"""Extensions of the paper: views between given views, free cameras, pictures at full size, a lens."""

@@ -1,9 +1,10 @@
-"""Places of a picture's pinhole cameras in the aperture.
+"""Positions of a picture's pinhole cameras in the aperture.
 
-Each pass has a spiral of cameras (Vogel's sunflower), turned and shifted from pass to pass: so its points are spread
-evenly, alone and with those of other passes, and lie in no lines. The first spiral, which may be all there is, is moved
+Each pass has a spiral of cameras (Vogel's sunflower), turned and shifted from pass to pass, so its points are evenly
+spread, alone and with those of other passes, and form no lines. The first spiral, which may be the only one, is moved
 and scaled until it has the centre and the width (second moment) of the opening: a picture of few cameras is coarser,
-never sharper or more blurred. If all were, few cameras a pass would leave the middle and the border empty.
+never sharper or more blurred. The others are not, because few cameras a pass would leave the middle and the border
+empty.
 """
 
 from __future__ import annotations
@@ -21,37 +22,35 @@ from iibr_core.types import GridShape, ViewOffset
 Points = NDArray[np.float64]
 
 GRID_SIDE = 64
-"""Places across the opening from which its area, centre and width are taken."""
+"""Number of samples across the opening from which its area, centre and width are computed."""
 
 EDGE = 1 / GRID_SIDE
 """Width of the opening's antialiased edge, as a share of the circle around it."""
 
 GOLDEN_ANGLE = math.pi * (3 - math.sqrt(5))
 TURN_STEP, SHIFT_STEP = 0.7548776662466927, 0.5698402909980532
-"""Steps from pass to pass (R2): turn, as a share of a whole one, and shift along the spiral, in points."""
+"""Steps from pass to pass (R2): turn, as a share of a full turn, and shift along the spiral, in points."""
 
 SQRT_STEPS = (0.41421356237309515, 0.7320508075688772, 0.23606797749978969, 0.6457513110645906, 0.3166247903553998)
 """Steps of independent sequences: fractions of the roots of 2, 3, 5, 7 and 11."""
 
 COARSENESS_VARIANCE = 1 / 12
-"""Second moment of a square with a side of 1, per axis: what a camera shows is blurred by its share of the aperture."""
+"""Second moment of a square with a side of 1, per axis: each camera is blurred by its share of the aperture."""
 
 
 def fractions(first: int, count: int, steps: tuple[float, ...]) -> NDArray[np.float64]:
-    """Return (count, len(steps)) values 0..1: number `first` and following of sequences with these steps. Number 0 is
-    0.5.
-    """
+    """Return values 0..1 (count, len(steps)) of sequences with these steps, from number `first` on; number 0 is 0.5."""
     return np.asarray((np.arange(first, first + count)[:, None] * np.array(steps) + 0.5) % 1.0)
 
 
 def aperture_points(
     shape: ApertureShape, diameter: float, widest: float, count: int, pass_index: int, cell: float = 0.0
 ) -> Points:
-    """About `count` points (N, 2) of the aperture, as (t, s) from its middle in view steps, for one pass.
+    """Return about `count` points (N, 2) of the aperture for one pass, as (t, s) from its middle, in view steps.
 
     diameter: view steps. widest: side of the square that cuts the opening off, view steps. cell: side of the square of
-    the aperture that a camera stands for, view steps; what it shows is blurred by as much. An opening in which no point
-    lies is a pinhole in its middle.
+    the aperture that a camera stands for, view steps; its picture is blurred by as much. An opening without points
+    counts as a pinhole in its middle.
     """
     cut = min(widest / diameter, 1.0)
     area, centre, moment = _measure(shape, cut)
@@ -59,10 +58,10 @@ def aperture_points(
     if len(points) == 0:
         return np.zeros((1, 2))
     points = points - (points.mean(axis=0) if pass_index == 0 else centre)
-    own = float(np.mean(points**2)) if pass_index == 0 else moment
-    if own > 0:
-        points *= math.sqrt(max(moment - COARSENESS_VARIANCE * (cell / diameter) ** 2, 0.0) / own)
-    # Scaled points stay in the circle around the opening: views beyond it may not be there.
+    spread = float(np.mean(points**2)) if pass_index == 0 else moment
+    if spread > 0:
+        points *= math.sqrt(max(moment - COARSENESS_VARIANCE * (cell / diameter) ** 2, 0.0) / spread)
+    # Scaled points stay in the circle around the opening: there may be no views outside it.
     beyond = np.hypot(*(points + centre).T) / (_reach(shape, cut) / 2)
     return np.asarray(diameter * (points + centre) / np.maximum(beyond, 1.0)[:, None])
 
@@ -74,9 +73,9 @@ def open_area(shape: ApertureShape, diameter: float, widest: float) -> float:
 
 
 def grid_weights(points: Points, eye: ViewOffset, grid: GridShape) -> NDArray[np.float64]:
-    """Weights (V, U) of a grid's views that stand in for cameras at these points (N, 2) of the lens; their sum is N.
+    """Return weights (V, U) of a grid's views that replace cameras at points (N, 2) of the lens; their sum is N.
 
-    Each camera is shared bilinearly by the views around it; beyond the grid, its border answers.
+    Each camera is shared bilinearly by the views around it; outside the grid, the views at its border count.
     """
     last = np.array(grid) - 1
     inside = np.clip(np.array(eye) + np.array(grid.centre) + points, 0, last)
@@ -90,7 +89,10 @@ def grid_weights(points: Points, eye: ViewOffset, grid: GridShape) -> NDArray[np
 
 
 def _open_spiral(shape: ApertureShape, cut: float, count: int, pass_index: int) -> Points:
-    """Points of a spiral of `count` that pass, for a diameter of 1; grey parts of a mask let some pass."""
+    """Return those points of a spiral of `count` that lie in the opening, for a diameter of 1.
+
+    Grey parts of a mask hold a share of their points.
+    """
     numbers, reach = np.arange(count), _reach(shape, cut)
     radius = reach / 2 * np.sqrt((numbers + (0.5 + pass_index * SHIFT_STEP) % 1.0) / max(count, 1))
     angle = GOLDEN_ANGLE * numbers + 2 * math.pi * TURN_STEP * pass_index
@@ -100,14 +102,15 @@ def _open_spiral(shape: ApertureShape, cut: float, count: int, pass_index: int) 
 
 
 def _reach(shape: ApertureShape, cut: float) -> float:
-    """Diameter of the circle around the opening, for a diameter of 1: a mask's corners lie beyond the opening's own."""
+    """Return the diameter of the circle around the opening, which includes a mask's corners, for a diameter of 1."""
     return math.sqrt(2) * min(cut, 1.0) if shape.kind == "mask" else min(math.sqrt(2) * cut, 1.0)
 
 
 @lru_cache(maxsize=32)
 def _measure(shape: ApertureShape, cut: float) -> tuple[float, Points, float]:
-    """Return the area, as a share of the circle around the opening, its centre (t, s), and its second moment about
-    that, per axis, for a diameter of 1.
+    """Return the opening's area, as a share of the circle around it, its centre (t, s) and its second moment.
+
+    The moment is about the centre and per axis, for a diameter of 1.
     """
     reach = _reach(shape, cut)
     places = reach * ((np.arange(GRID_SIDE) + 0.5) / GRID_SIDE - 0.5)

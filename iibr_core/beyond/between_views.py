@@ -1,21 +1,20 @@
-"""The views between a few given views of a light field: the paper's loop with rays that begin with several photos.
+"""Views between a few given views of a light field: the paper's loop with rays of several photos.
 
-Every given view brings its own rays. What a new view shows is what the given views around it show there, each in its
-own closed form, so occlusion is resolved where it is known best; they are averaged by how near they stand and by how
-much of a ray theirs cover. What none of them shows is inpainted once, and joins the rays.
+Every given view has its own rays. A new view is the mean of the views that the given views around it make in closed
+form, each of which resolves occlusion by its own disparity; it is weighted by nearness and by the share of a ray that
+is covered. Pixels that none of them shows are inpainted once and join the rays.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import product
 from math import hypot
 
 import numpy as np
-from numpy.typing import NDArray
 
 from iibr_core.color import encoded_from_stored
 from iibr_core.depth.multi_view.estimate_disparity import estimate_coarse, sweep_bytes
@@ -23,39 +22,30 @@ from iibr_core.depth.multi_view.every_view import estimate_all
 from iibr_core.formats.light_fields.multi_view_scene import MultiView
 from iibr_core.formats.light_fields.views import grid_of, read_views
 from iibr_core.inpainting.background import fill_background
-from iibr_core.inpainting.inpainter import Inpainter
+from iibr_core.inpainting.registry import Inpainter
 from iibr_core.method.light_field import encode_for_storage, nearest_first
 from iibr_core.method.memory import require_memory
 from iibr_core.method.rays import RaySet, rays_of_photo
-from iibr_core.method.view import Renderer
+from iibr_core.method.view import Renderer, View
 from iibr_core.runtime.tiling import side_by_side
 from iibr_core.runtime.work import Cancelled, raise_if_stopped, report_progress
-from iibr_core.types import (
-    FloatImage,
-    GridShape,
-    InputError,
-    StoredColors,
-    ViewOffset,
-    ViewUpdate,
-    image_size,
-)
+from iibr_core.types import FloatImage, GridShape, InputError, StoredColors, ViewOffset, ViewUpdate, image_size
 
 VIEW_BYTES = 60
-"""Memory for a pixel of each given view: its colours, its disparity, and two images of rays."""
+"""Bytes of a pixel of each given view: its colours, its disparity, and two images of rays."""
 MAX_COMPLETING = 10
-"""Largest number of views that complete the rays of several photos: three rows of three, and the centre."""
+"""Largest number of views that complete the rays: three rows of three, and the centre."""
 FAR_WEIGHT = 0.02
-"""Weight of a given view a whole step away, against 1 for one in the very place: it counts where nearer ones see
-nothing.
-"""
+"""Weight of a given view a whole step away, against 1 for one at the same place."""
 COVERED_POWER = 2
-"""Exponent of the share of a ray that a view's own rays cover, in the view's weight."""
+"""Exponent of the covered share of a ray in the weight of a given view."""
 
 
 @dataclass(frozen=True, eq=False)
 class GivenView:
-    """A view of a sparse grid, at row and column. colors (H, W, 3): see StoredColors. disparity (H, W): in px per step
-    of the sparse grid.
+    """A view of a sparse grid, at row and column.
+
+    colors (H, W, 3): see StoredColors. disparity (H, W): in px per step of the sparse grid.
     """
 
     row: int
@@ -65,7 +55,7 @@ class GivenView:
 
 
 def read_given_views(scene: MultiView) -> list[GivenView]:
-    """Return all views of a light field whose views fill a grid, with their disparity, found if the files have none.
+    """Return all views of a light field that fill a grid, with their disparity, estimated if the files have none.
 
     Raises InputError if a file cannot be read, no disparity can be found, or memory does not suffice.
     """
@@ -90,27 +80,26 @@ def read_given_views(scene: MultiView) -> list[GivenView]:
 
 
 def require_steps(sparse: GridShape, dense: GridShape, name: str = "the light field") -> int:
-    """Return how many steps of the dense grid one step of the sparse grid is.
+    """Return the number of steps of the dense grid in one step of the sparse grid.
 
-    Raises InputError, which names the light field, if its views find no places.
+    Raises InputError, which names the light field, if its views have no places on the dense grid.
     """
-    steps = {
-        (new - 1) // (old - 1) if new > old and (new - 1) % (old - 1) == 0 else 0
-        for new, old in zip(dense, sparse)
-        if old > 1
-    }
-    fits = len(steps) == 1 and 0 not in steps and all(new == 1 for new, old in zip(dense, sparse) if old == 1)
-    if not fits:
-        raise InputError(f"{name}: its {sparse.rows}x{sparse.columns} views {_advice(sparse, dense)}")
-    return steps.pop()
+    for steps in range(2, max(dense) + 1):
+        if max(sparse) > 1 and dense == _denser(sparse, steps):
+            return steps
+    raise InputError(f"{name}: its {sparse.rows}x{sparse.columns} views {_advice(sparse, dense)}")
+
+
+def _denser(sparse: GridShape, steps: int) -> GridShape:
+    """Return the grid with `steps` steps between views of a sparse grid."""
+    return GridShape(*(1 + (views - 1) * steps for views in sparse))
 
 
 def _advice(sparse: GridShape, dense: GridShape) -> str:
     if max(sparse) == 1:
         return "have none beside them to go between: give the picture itself to `iibr generate`"
-    wider = [GridShape(*(1 + (old - 1) * steps for old in sparse)) for steps in (2, 3, 4)]
-    fitting = ", ".join(f"{grid.rows}x{grid.columns}" for grid in wider)
-    return f"have no places on a grid of {dense.rows}x{dense.columns} (rows x columns): give {fitting} and so on"
+    grids = ", ".join(f"{grid.rows}x{grid.columns}" for grid in (_denser(sparse, steps) for steps in (2, 3, 4)))
+    return f"have no places on a grid of {dense.rows}x{dense.columns} (rows x columns): give {grids} and so on"
 
 
 def densify(
@@ -120,57 +109,34 @@ def densify(
     inpainter: Inpainter = fill_background,
     nearest_to: Callable[[], ViewOffset] = lambda: ViewOffset(0.0, 0.0),
 ) -> Generator[ViewUpdate]:
-    """Yield every view of the dense grid once: the centre, the given ones as they are, then those between them, the
-    nearest to `nearest_to()` first.
+    """Yield every view of the dense grid once: the centre, the given ones unchanged, then those nearest to
+    `nearest_to()`.
 
     given: all views of the sparse grid, of equal size. Disparity is per step of the dense grid. Raises InputError as
     `require_steps` does.
     """
-    with suppress(Cancelled):
-        yield from _generate_views(given, require_steps(sparse, dense), sparse, dense, inpainter, nearest_to)
-
-
-def _generate_views(
-    given: Sequence[GivenView],
-    steps: int,
-    sparse: GridShape,
-    dense: GridShape,
-    inpainter: Inpainter,
-    nearest_to: Callable[[], ViewOffset],
-) -> Iterator[ViewUpdate]:
-    is_hdr = given[0].colors.dtype != np.uint8
+    steps, is_hdr = require_steps(sparse, dense), given[0].colors.dtype != np.uint8
     places = {(view.row * steps, view.column * steps): view for view in given}
     remaining = [dense.offset(*at) for at in np.ndindex(*dense) if at not in places]
     completing = [offset for offset in _completing_views(sparse, dense, steps) if offset in remaining]
-    views = _ViewsBetween(given, steps, dense, inpainter)
+    remaining = [offset for offset in remaining if offset not in completing]
+    # The centre comes first, given or not.
+    early = 0 if dense.centre in places else 1
 
-    def stored(offset: ViewOffset, view: _Merged) -> ViewUpdate:
+    def stored(offset: ViewOffset, view: View) -> ViewUpdate:
         (v, u), colors = dense.centre, encode_for_storage(view.colors, is_hdr, 1)
         return ViewUpdate(v + round(offset.t), u + round(offset.s), colors, view.disparity, view.inpainted)
 
-    # The centre comes first, given or not.
-    early = 0 if dense.centre in places else 1
-    for offset in completing[:early]:
-        yield stored(offset, views.complete(offset))
-    for (row, column), view in sorted(places.items(), key=lambda item: hypot(*dense.offset(*item[0]))):
-        shown = np.zeros(view.disparity.shape, np.bool_)
-        yield ViewUpdate(row, column, view.colors, view.disparity / np.float32(steps), shown)
-    for offset in completing[early:]:
-        yield stored(offset, views.complete(offset))
-    remaining = [offset for offset in remaining if offset not in completing]
-    yield from side_by_side(lambda offset: stored(offset, views.make(offset)), nearest_first(remaining, nearest_to))
-
-
-@dataclass(frozen=True, eq=False)
-class _Merged:
-    """A view that several given views show. colors (H, W, 3): sRGB-encoded. disparity (H, W). hole (H, W): True where
-    none of all rays showed anything. inpainted (H, W): True where no given view did.
-    """
-
-    colors: FloatImage
-    disparity: FloatImage
-    hole: NDArray[np.bool_]
-    inpainted: NDArray[np.bool_]
+    with suppress(Cancelled):
+        views = _ViewsBetween(given, steps, dense, inpainter)
+        for offset in completing[:early]:
+            yield stored(offset, views.complete(offset))
+        for (row, column), view in sorted(places.items(), key=lambda item: hypot(*dense.offset(*item[0]))):
+            inpainted = np.zeros(view.disparity.shape, np.bool_)
+            yield ViewUpdate(row, column, view.colors, view.disparity / np.float32(steps), inpainted)
+        for offset in completing[early:]:
+            yield stored(offset, views.complete(offset))
+        yield from side_by_side(lambda offset: stored(offset, views.make(offset)), nearest_first(remaining, nearest_to))
 
 
 class _ViewsBetween:
@@ -188,34 +154,34 @@ class _ViewsBetween:
         self._farthest = float(max(dense))
         self._inpainted: tuple[ViewOffset, RaySet] | None = None
 
-    def complete(self, offset: ViewOffset) -> _Merged:
-        """Return the view at an offset after what had to be inpainted there has joined the rays."""
+    def complete(self, offset: ViewOffset) -> View:
+        """Return the view at an offset after its inpainted pixels have joined the rays."""
         view = self.make(offset)
-        if view.hole.any():
+        if view.occluded.any():
             if self._inpainted is None:
                 self._inpainted = offset, RaySet(MAX_COMPLETING, image_size(view.disparity), self._farthest)
             origin, rays = self._inpainted
-            disparity = np.where(view.hole, view.disparity, np.float32(np.nan))
-            rays.add(_between(origin, offset), view.colors, disparity, view.hole)
+            disparity = np.where(view.occluded, view.disparity, np.float32(np.nan))
+            rays.add(_between(origin, offset), view.colors, disparity, view.occluded)
         return view
 
-    def make(self, offset: ViewOffset) -> _Merged:
-        """Return the view at an offset, without holes."""
-        colors, disparity, hole = self._merge(offset)
-        inpainted = hole.copy()
+    def make(self, offset: ViewOffset) -> View:
+        """Return the view at an offset."""
+        view = self._merge(offset)
+        colors, disparity, hole = view.colors, view.disparity, view.occluded
         if hole.any() and self._inpainted is not None:
             origin, rays = self._inpainted
             filled, _ = self._renderer.visible(rays, _between(origin, offset))
-            np.copyto(colors, filled.colors, where=(hole & ~filled.occluded)[..., None])
-            np.copyto(disparity, filled.disparity, where=hole & ~filled.occluded)
+            is_filled = hole & ~filled.occluded
+            colors[is_filled], disparity[is_filled] = filled.colors[is_filled], filled.disparity[is_filled]
             hole &= filled.occluded
         if hole.any():
             at, nearest = min(self._sources, key=lambda source: np.hypot(*_between(source[0], offset)))
             self._inpainter(colors, disparity, hole, nearest.photo_disparity, _between(at, offset))
-        return _Merged(colors, disparity, hole, inpainted)
+        return view
 
-    def _merge(self, offset: ViewOffset) -> tuple[FloatImage, FloatImage, NDArray[np.bool_]]:
-        """Return colours (H, W, 3) and disparity (H, W) that the given views around show, and where none shows any."""
+    def _merge(self, offset: ViewOffset) -> View:
+        """Return the mean of the given views around, seen from an offset, with holes."""
         size = self._sources[0][1].view_size
         colors, disparity = np.zeros((*size, 3), np.float32), np.zeros(size, np.float32)
         total, heaviest = np.zeros(size, np.float32), np.zeros(size, np.float32)
@@ -226,20 +192,20 @@ class _ViewsBetween:
             view, covered = self._renderer.visible(rays, away)
             near = (1 - abs(away.t) / self._steps) * (1 - abs(away.s) / self._steps) + FAR_WEIGHT
             weight = np.where(view.occluded, np.float32(0), np.float32(near) * covered**COVERED_POWER)
-            # Encoded, as one surface's colours are interpolated: these are several looks at the same light.
+            # Encoded, as colours of one surface are interpolated: all views show the same light.
             colors += weight[..., None] * np.where(weight[..., None] > 0, view.colors, 0)
             np.copyto(disparity, view.disparity, where=weight > heaviest)
             np.maximum(heaviest, weight, out=heaviest)
             total += weight
         hole = ~(total > 0)
         colors /= np.where(hole, np.float32(1), total)[..., None]
-        return colors, disparity, hole
+        return View(colors, disparity, hole, hole.copy())
 
 
 def _completing_views(sparse: GridShape, dense: GridShape, steps: int) -> list[ViewOffset]:
-    """Return views amid given ones, so as far from them as can be: at the corners and the middle of the grid.
+    """Return views half-way between given ones, at the corners and in the middle of the grid, the centre first.
 
-    Together they see nearly all that none of the given views does. The centre comes first, given or not.
+    Together they see nearly everything that no given view sees.
     """
     rows, columns = (
         {first * steps + ((steps + 1) // 2 if views > 1 else 0) for first in (0, (views - 1) // 2, max(views - 2, 0))}

@@ -1,9 +1,9 @@
 """A view of any camera from the ray set: turned, moved along all axes, with a lens of its own.
 
-Dynamic reparameterisation (Isaksen et al. 2000) of two-plane rays, with a disparity for each ray in place of their one
-focal surface. A ray (x, y) with disparity d is a point (x, y, 1, d) of disparity space, in which every camera is a 4x4
-matrix. Forward, pixels land as squares that meet their neighbours on the same surface, and a z-test tells what each
-sample of a target pixel sees; backward, every surface looks up its colour in its own source.
+Dynamic reparameterisation (Isaksen et al. 2000) of two-plane rays, with a disparity for each ray instead of one focal
+surface. A ray (x, y) with disparity d is a point (x, y, 1, d) of disparity space, in which every camera is a 4x4
+matrix. Forward, pixels land as squares that meet their neighbours on the same surface, and a z-test decides which one
+each sample of a target pixel sees; backward, every surface looks up its colour in its own source.
 """
 
 from __future__ import annotations
@@ -13,18 +13,9 @@ from math import floor
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.beyond.landed_squares import (
-    SAMPLES,
-    draw_rays,
-    project,
-    rows_landed_on,
-)
+from iibr_core.beyond.landed_squares import SAMPLES, draw_rays, project, rows_landed_on
 from iibr_core.inpainting.background import continue_farthest
-from iibr_core.method.look_up import (
-    SOLE,
-    cubic,
-    cubic_on_surface,
-)
+from iibr_core.method.look_up import SOLE, cubic, cubic_on_surface
 from iibr_core.method.rays import RaySet
 from iibr_core.method.view import View
 from iibr_core.runtime.kernels import kernel
@@ -34,25 +25,26 @@ from iibr_core.surfaces import SAME_SURFACE_PX, same_surface, step_of
 from iibr_core.types import Camera, ImageSize, Margins
 
 COVERED_SAMPLES = 0.5
-"""A pixel less of whose samples see anything is a hole."""
+"""Share of a pixel's samples that see a surface below which the pixel is a hole."""
 WIDE_FOOTPRINT_PX = 1.25
-"""Where a target pixel spans more pixels of its source, every sample looks up its own colour: none may be skipped."""
+"""Number of source pixels across a target pixel above which every sample looks up a colour, so that none is skipped."""
 SEALED_STEPS = 1.5
-"""Surfaces of a rounded map are stairs; steps up to so many times its own are no depth edges."""
+"""Largest step between pixels of one surface of a rounded map, as a multiple of the step it is rounded to."""
 
 Matrix = NDArray[np.float64]
 
 
 def disparity_space(camera: Camera, scale_px: float) -> Matrix:
-    """(4, 4): from (x, y, 1, d) of a camera's picture to its (X, Y, Z, 1) / Z, for a disparity d of scale_px / Z."""
+    """Return the matrix from (x, y, 1, d) of a camera's picture to its (X, Y, Z, 1) / Z, where d is scale_px / Z."""
     space = np.diag([1.0, 1.0, 1.0, 1 / scale_px])
     space[:3, :3] = np.linalg.inv(camera.intrinsics)
     return space
 
 
 def target_from_photo(photo: Camera, target: Camera, scale_px: float) -> Matrix:
-    """(4, 4): from (x, y, 1, d) of the photo to a multiple of the same of the target, whose third part is positive for
-    what lies before the target's camera.
+    """Return the matrix from (x, y, 1, d) of the photo to a multiple of the same of the target.
+
+    The third component is positive in front of the target's camera.
     """
     moved = np.eye(4)
     moved[:3, :3] = target.world_from_camera.T @ photo.world_from_camera
@@ -67,24 +59,23 @@ def render_free_view(
     frame: Margins,
     rounding_step: float = 0.0,
 ) -> View:
-    """The view of a camera with pictures of a size, its holes filled.
+    """Return the view of a camera with pictures of this size, its holes filled.
 
-    target_from_rays: see `target_from_photo`. frame: so far within the ray set's images the photo's own frame lies: all
-    beyond counts as inpainted. rounding_step: what disparity is rounded to.
+    target_from_rays: see `target_from_photo`. frame: margins of the ray set's images around the photo's frame, which
+    count as inpainted. rounding_step: step that disparity is rounded to.
     """
-    view = View(
-        np.zeros((*size, 3), np.float32), np.zeros(size, np.float32), np.zeros(size, np.bool_), np.zeros(size, np.bool_)
-    )
+    hole, inpainted = np.zeros(size, np.bool_), np.zeros(size, np.bool_)
+    view = View(np.zeros((*size, 3), np.float32), np.zeros(size, np.float32), hole, inpainted)
     matrices = [target_from_rays @ _photo_from_source(offset) for offset in rays.arrays.offsets]
     drawing = [tuple(map(float, matrix.ravel())) for matrix in matrices]
-    looking_up = np.stack([np.linalg.inv(matrix).ravel() for matrix in matrices])
-    landing = [rows_landed_on(rays, k, matrix) for k, matrix in enumerate(drawing)]
+    inverses = np.stack([np.linalg.inv(matrix).ravel() for matrix in matrices])
+    landing = [rows_landed_on(rays, k, matrix) for k, matrix in enumerate(matrices)]
     surface, sealed_step = step_of(SAME_SURFACE_PX, rays.farthest_views), SEALED_STEPS * rounding_step
 
     def band(first: int, last: int) -> None:
         nearest, source = draw_rays(rays, drawing, landing, surface, sealed_step, (first, last), size.width)
         _resolve(
-            rays.arrays, looking_up, frame, first, nearest, source,
+            rays.arrays, inverses, frame, first, nearest, source,
             view.colors, view.disparity, view.occluded, view.inpainted,
         )  # fmt: skip
 
@@ -95,7 +86,7 @@ def render_free_view(
 
 
 def _photo_from_source(offset: NDArray[np.float64]) -> Matrix:
-    """(4, 4): the view at an offset (t, s) sees at (x, y) what the photo shows at (x + d s, y + d t)."""
+    """Return the matrix from the view at an offset (t, s) to the photo, which moves (x, y) to (x + d s, y + d t)."""
     matrix = np.eye(4)
     matrix[0, 3], matrix[1, 3] = offset[1], offset[0]
     return matrix
@@ -103,8 +94,10 @@ def _photo_from_source(offset: NDArray[np.float64]) -> Matrix:
 
 @kernel
 def _scales_at(m, x, y, d):
-    """Whether a target pixel spans many pixels of its source there; up to which step of disparity it sees one surface;
-    and by how many pixels disparity moves the look-up.
+    """Return scales of the look-up for a target pixel.
+
+    They are: whether it spans many source pixels, the largest step of disparity on one surface, and the number of
+    pixels by which disparity moves the look-up.
     """
     at_x, at_y, at_d, w = project(m, x, y, d)
     spans_x = max(abs(m[0] - at_x * m[8]), abs(m[1] - at_x * m[9])) / abs(w)
@@ -116,7 +109,7 @@ def _scales_at(m, x, y, d):
 
 @kernel
 def _resolve(rays, inverses, frame, first_row, nearest, seen, colors, disparity, occluded, inpainted):
-    """The target rows that the samples are of: colours, disparity, holes, and what the photo shows nothing of."""
+    """Write the target rows of these samples: colours, disparity, holes, and pixels that the photo does not show."""
     images, surfaces, near_edge, photo_images = rays.colors, rays.disparity, rays.near_edge, rays.photo_images
     _, height, width = surfaces.shape
     top, bottom, left, right = frame
@@ -141,7 +134,7 @@ def _resolve(rays, inverses, frame, first_row, nearest, seen, colors, disparity,
                 k, d = np.int64(seen[v, u]) - 1, np.float64(nearest[v, u])
                 m = inverses[k]
                 is_fine, one_surface, parallax = _scales_at(m, x, y, d)
-                # The samples of its surface: their mean place and disparity lie on it.
+                # The mean position and disparity of the samples of its surface lie on it.
                 count, total_d, total_x, total_y = 0, 0.0, 0.0, 0.0
                 for other in range(sample, SAMPLES**2):
                     j, i = other // SAMPLES, other % SAMPLES
@@ -153,9 +146,8 @@ def _resolve(rays, inverses, frame, first_row, nearest, seen, colors, disparity,
                     total_x, total_y = total_x + (i + 0.5) / SAMPLES - 0.5, total_y + (j + 0.5) / SAMPLES - 0.5
                     if is_fine:
                         break
-                # Backward warp.
-                mean_d, target_x, target_y = total_d / count, x + total_x / count, y + total_y / count
-                at_x, at_y, at_d, _ = project(m, target_x, target_y, mean_d)
+                mean_d = total_d / count
+                at_x, at_y, at_d, _ = project(m, x + total_x / count, y + total_y / count, mean_d)
                 at_x, at_y = min(max(at_x, -0.5), width - 0.5), min(max(at_y, -0.5), height - 0.5)
                 if not near_edge[k, max(floor(at_y), 0), max(floor(at_x), 0)]:
                     r, g, b = cubic(images, k, at_x, at_y)
@@ -165,7 +157,7 @@ def _resolve(rays, inverses, frame, first_row, nearest, seen, colors, disparity,
                     most, disparity[y, x] = count, mean_d
                     is_within = left - 0.5 <= at_x <= width - right - 0.5 and top - 0.5 <= at_y <= height - bottom - 0.5
                     inpainted[y, x] = k >= photo_images or not is_within
-                # A sole surface stays encoded; several are averaged in linear light, as their light adds up.
+                # A sole surface stays encoded; the linear light of several adds up.
                 if count >= SOLE * landed:
                     colors[y, x, 0], colors[y, x, 1], colors[y, x, 2] = max(r, 0.0), max(g, 0.0), max(b, 0.0)
                 else:

@@ -1,4 +1,4 @@
-"""The rays of a ray set, drawn as squares by a matrix of disparity space: what the samples of a target's pixels see.
+"""Draws the rays of a ray set as squares into the samples of a target's pixels, by a matrix of disparity space.
 
 Squares meet their neighbours on the same surface; a z-test keeps the nearest.
 """
@@ -13,33 +13,48 @@ from numpy.typing import NDArray
 from iibr_core.method.candidates import SEALED_GAP_PX
 from iibr_core.method.rays import CELL_PX, RaySet
 from iibr_core.runtime.kernels import kernel
-from iibr_core.runtime.tiling import in_bands
 from iibr_core.surfaces import same_surface
-from iibr_core.types import FloatImage, ImageSize
+from iibr_core.types import FloatImage
 
 SAMPLES = 3
-"""A target pixel has SAMPLES x SAMPLES of them; what lands on one covers it whole."""
+"""Number of samples across a target pixel and down; a square covers a sample entirely or not at all."""
 LEAST_DEPTH = 1e-3
-"""Nearer to the camera, as a share of its distance from the photo's, nothing is drawn."""
+"""Least depth of rays that are drawn, as a share of their depth in the photo."""
 MOST_MAGNIFIED_PX = 16.0
-"""A square that lands larger than this is left out: the photo knows nothing so small."""
-# The order in which a ray that fills its pixel in part covers samples: any share is spread over the pixel.
+"""Largest square that is drawn: the photo has no details for larger ones."""
 COVERING_ORDER = np.array([4, 0, 8, 2, 6, 1, 7, 3, 5]).argsort()
+"""Order in which a ray that covers its pixel in part takes samples, so that any share is spread over the pixel."""
 INSIDE = 1e-6
-"""Samples on a side shared by two triangles belong to both."""
+"""Tolerance of the test whether a sample is in a triangle: those on a shared side belong to both triangles."""
 CORNERS = np.array([(-1, -1), (-1, 1), (1, 1), (1, -1)])
-"""(y, x) of a pixel's corners, clockwise."""
+"""Directions (y, x) of a pixel's corners, clockwise."""
 
 
-def rows_landed_on(rays: RaySet, k: int, matrix: tuple[float, ...]) -> FloatImage:
-    """(M, N, 2): the first and last target row that the rays in each cell of image k may land on, (inf, -inf) without
-    rays.
+def rows_landed_on(rays: RaySet, k: int, matrix: NDArray[np.float64]) -> FloatImage:
+    """Return the first and last target row (M, N, 2) that rays in each cell of image k may land on.
+
+    It is (inf, -inf) for cells without rays. The boxes around the cells in disparity space stay convex.
     """
-    cells = rays.cells
-    landing = np.empty((*cells.low.shape[1:], 2), np.float32)
-    size = ImageSize(*cells.low.shape[1:])
-    in_bands(lambda first, last: _land_cells(cells.low[k], cells.high[k], matrix, first, last, landing), size)
-    return landing
+    low, high = rays.cells.low[k], rays.cells.high[k]
+    # Corners of pixels have disparities of the cells around.
+    bounds = [_combine_3x3(np.minimum, low)] * 4 + [_combine_3x3(np.maximum, high)] * 4
+    v, u = np.indices(low.shape)
+    corners = [(CELL_PX * (u + i) - 0.5, CELL_PX * (v + j) - 0.5) for j, i in np.ndindex(2, 2)] * 2
+    with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+        points = np.stack([(x, y, np.ones(low.shape), d) for (x, y), d in zip(corners, bounds)])
+        y, w = np.einsum("ij,cjvu->icvu", matrix[1:3], points)
+        rows, is_ahead = y / w, (w > LEAST_DEPTH).all(axis=0)
+    # Cells that reach behind the camera may land anywhere.
+    first, last = np.where(is_ahead, rows.min(axis=0), -np.inf), np.where(is_ahead, rows.max(axis=0), np.inf)
+    has_rays = low <= high
+    return np.stack([np.where(has_rays, first, np.inf), np.where(has_rays, last, -np.inf)], -1).astype(np.float32)
+
+
+def _combine_3x3(combine: np.ufunc, image: FloatImage) -> FloatImage:
+    """Return the values of 3x3 pixels around each, combined; the border is repeated."""
+    padded = np.pad(image, 1, mode="edge")
+    rows = combine(combine(padded[:-2], padded[1:-1]), padded[2:])
+    return np.asarray(combine(combine(rows[:, :-2], rows[:, 1:-1]), rows[:, 2:]))
 
 
 def draw_rays(
@@ -51,14 +66,16 @@ def draw_rays(
     rows: tuple[int, int],
     width: int,
 ) -> tuple[FloatImage, NDArray[np.uint8]]:
-    """What the samples of target rows [first, last) see, SAMPLES times as many rows and columns: the nearest disparity,
-    and 1 + the index of its source, 0 where nothing landed.
+    """Return the nearest disparity at each sample of target rows [first, last), and 1 + the index of its source.
+
+    The index is 0 where nothing landed. There are SAMPLES times as many rows and columns as in the target. surface:
+    difference of disparities on one surface. sealed_step: see `_land_squares`.
     """
     first, last = rows
     shape = SAMPLES * (last - first), SAMPLES * width
     nearest, source = np.full(shape, -np.inf, np.float32), np.zeros(shape, np.uint8)
     for k, matrix in enumerate(matrices):
-        # The photo's rays go before inpainted ones beside them.
+        # The photo's rays have precedence over inpainted ones beside them.
         ahead = surface if k >= rays.photo_images else 0.0
         _draw_rays(rays.arrays, k, landing[k], matrix, ahead, sealed_step, first, nearest, source)
     return nearest, source
@@ -66,7 +83,7 @@ def draw_rays(
 
 @kernel
 def project(m, x, y, d):
-    """(x, y, d) by a matrix of 16 numbers: its (X, Y, D) and the factor they were divided by."""
+    """Return (x, y, d) transformed by a matrix of 16 numbers, and the factor by which the result was divided."""
     w = m[8] * x + m[9] * y + m[10] + m[11] * d
     return (
         (m[0] * x + m[1] * y + m[2] + m[3] * d) / w,
@@ -77,41 +94,15 @@ def project(m, x, y, d):
 
 
 @kernel
-def _land_cells(low, high, m, first, last, landing):
-    """`rows_landed_on` of rows [first, last) of cells: their boxes in disparity space stay convex."""
-    rows, columns = low.shape
-    for v in range(first, last):
-        for u in range(columns):
-            landing[v, u, 0], landing[v, u, 1] = np.inf, -np.inf
-            if not low[v, u] <= high[v, u]:
-                continue
-            # Corners of pixels take part in the disparities of the cells around.
-            least, most = low[v, u], high[v, u]
-            for j in range(max(v - 1, 0), min(v + 2, rows)):
-                for i in range(max(u - 1, 0), min(u + 2, columns)):
-                    least, most = min(least, low[j, i]), max(most, high[j, i])
-            for corner in range(8):
-                x = CELL_PX * (u + (corner & 1)) - 0.5
-                y = CELL_PX * (v + (corner >> 1 & 1)) - 0.5
-                _, row, _, w = project(m, x, y, most if corner & 4 else least)
-                if not w > LEAST_DEPTH:  # it reaches behind the camera: anywhere
-                    landing[v, u, 0], landing[v, u, 1] = -np.inf, np.inf
-                    break
-                landing[v, u, 0], landing[v, u, 1] = min(landing[v, u, 0], row), max(landing[v, u, 1], row)
-
-
-@kernel
 def _draw_rays(rays, index, landing, m, ahead, sealed_step, first_row, nearest, source):
-    """Draw the rays of one image; see `draw_rays`. ahead: so much nearer than the photo's surface it must
-    be to hide it.
-    """
+    """Draw the rays of one image. ahead: least difference of disparities by which they hide the photo's rays."""
     disparity, coverage = rays.disparity[index], rays.coverage[index]
     height, width = disparity.shape
     last_row = first_row + len(nearest) // SAMPLES - 1
     corners, is_drawn = np.empty((width, 4, 3)), np.empty(width, np.bool_)
     is_near = np.empty(landing.shape[1], np.bool_)
     for y in range(height):
-        # Most cells land on other rows: they are looked at once, not pixel by pixel.
+        # Most cells land on other rows: they are tested once, not pixel by pixel.
         if y % CELL_PX == 0:
             for u in range(len(is_near)):
                 first_landed, last_landed = landing[y // CELL_PX, u]
@@ -129,16 +120,17 @@ def _draw_rays(rays, index, landing, m, ahead, sealed_step, first_row, nearest, 
 
 @kernel
 def _land_squares(disparity, m, y, sealed_step, corners, is_drawn):
-    """Where the corners of a row of pixels land: (X, Y, D) each; what reaches behind the camera is not drawn.
+    """Write where the corners of a row of pixels land, (X, Y, D); squares that reach behind the camera are not drawn.
 
     A corner's disparity is the mean of those around it on the pixel's surface: where these agree, there are no cracks.
+    sealed_step: largest difference of disparities on one surface however far apart they land.
     """
     height, width = disparity.shape
     for x in range(width):
         if not is_drawn[x]:
             continue
         here = disparity[y, x]
-        # Steps of disparity that open a gap as wide as may be sealed, or that rounding has left.
+        # The largest step whose gap is closed.
         at_x, at_y, _, _ = project(m, x, y, here)
         wide = max(abs(m[0] - at_x * m[8]), abs(m[5] - at_y * m[9]), abs(m[1] - at_x * m[9]), abs(m[4] - at_y * m[8]))
         one_surface = SEALED_GAP_PX * wide / max(abs(m[3] - at_x * m[11]), abs(m[7] - at_y * m[11]), 1e-9)
@@ -164,7 +156,7 @@ def _land_squares(disparity, m, y, sealed_step, corners, is_drawn):
 
 @kernel
 def _draw_squares(corners, is_drawn, coverage, index, photo_images, ahead, first_row, nearest, source):
-    """Draw pixels whose corners landed so, two triangles each: disparity is linear over planes."""
+    """Draw each pixel as two triangles from where its corners landed: disparity is linear over planes."""
     rows, columns = nearest.shape
     for x in range(len(corners)):
         if not is_drawn[x]:
@@ -177,7 +169,7 @@ def _draw_squares(corners, is_drawn, coverage, index, photo_images, ahead, first
             area = x1 * y2 - x2 * y1
             left, right = x0 + min(0.0, x1, x2), x0 + max(0.0, x1, x2)
             top, bottom = y0 + min(0.0, y1, y2) - first_row, y0 + max(0.0, y1, y2) - first_row
-            # Seen from behind, not finite, or too large.
+            # Skips triangles that are seen from behind, not finite or too large.
             if not (area > 1e-9 and right - left <= MOST_MAGNIFIED_PX and bottom - top <= MOST_MAGNIFIED_PX):
                 continue
             if not (right > -0.5 and left * SAMPLES < columns and bottom > -0.5 and top * SAMPLES < rows):
@@ -201,5 +193,5 @@ def _draw_squares(corners, is_drawn, coverage, index, photo_images, ahead, first
 
 @kernel
 def _sample_after(position):
-    """The first sample at a position of the target, or after it."""
+    """Return the index of the first sample at a position of the target or after it."""
     return ceil((position + 0.5) * SAMPLES - 0.5)

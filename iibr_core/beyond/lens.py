@@ -1,13 +1,12 @@
-"""The lens: a picture is the mean, in linear light, of what pinhole cameras spread over its aperture see, each sheared
-to the focus. This is the definition; every engine is measured by it, and shaders/lens.frag is the quick one.
+"""The lens: a picture is the mean, in linear light, of the views of pinhole cameras spread over its aperture, each
+sheared to the focus. This is the reference for all engines; shaders/lens.frag is the fast one.
 
-Nothing here knows where views come from: they are added one by one, and none is kept.
+Views are added one by one, and none is kept.
 """
 
 from __future__ import annotations
 
 import math
-from functools import partial
 
 import numpy as np
 
@@ -19,17 +18,17 @@ from iibr_core.runtime.tiling import in_bands
 from iibr_core.types import FloatImage, ImageSize, ViewOffset
 
 ON_SURFACE_ROUNDS = 5
-"""Steps of following a ray to what it shows, where a range of disparities is in focus."""
+"""Number of steps in which a ray is followed to its surface if a range of disparities is in focus."""
 
 BEYOND_BORDER = 1e-4
-"""Weight of what lies outside a view, which shows its mirror image there: other views know better."""
+"""Weight of mirrored pixels outside a view: real pixels of other views count more."""
 
 
 class LensSum:
-    """A picture through a lens, summed up view by view."""
+    """A picture through a lens, as a sum of views."""
 
     def __init__(self, optics: Optics, size: ImageSize, is_hdr: bool = False) -> None:
-        """Begin with nothing. size: (height, width) of the picture and of every view. Dolly and gloss are left out."""
+        """Start without views. size: that of the picture and of every view. Dolly and gloss are left out."""
         self._optics, self._size = optics, size
         self._gain = optics.highlight_gain(optics.aperture_diameter, is_hdr)
         self._sum = np.zeros((*size, 3), np.float32)
@@ -42,30 +41,31 @@ class LensSum:
         weight: float = 1.0,
         disparity: FloatImage | None = None,
     ) -> None:
-        """Add the view (H, W, 3), sRGB-encoded, of a camera at an offset in view steps from the centre view.
+        """Add the view (H, W, 3), sRGB-encoded, of a camera at an offset from the centre view in view steps.
 
-        disparity: of the view (H, W), px per view step; needed where the optics have a focus range.
+        disparity: that of the view (H, W), px per view step; needed if the optics have a focus range.
         """
-        optics = self._optics
-        light = np.empty(colors.shape, np.float32)
-        in_bands(lambda first, last: _linear_rows(colors, self._gain, first, last, light), self._size)
+        optics, light = self._optics, np.empty(colors.shape, np.float32)
         camera = offset.t - optics.eye.t, offset.s - optics.eye.s
         focus_range = 0.0 if disparity is None else max(optics.focus_range, 0.0)
         surface = np.zeros((1, 1), np.float32) if disparity is None else disparity
+        focus = optics.focus_disparity, optics.focus_tilt, focus_range
         barrel = _barrel(optics, self._size)
-        shear = partial(
-            _add_sheared, light, surface, camera, weight, optics.focus_disparity, optics.focus_tilt, focus_range, barrel
-        )
-        in_bands(lambda first, last: shear(first, last, self._sum, self._weights), self._size)
+
+        def shear(first: int, last: int) -> None:
+            _add_sheared(light, surface, camera, weight, focus, barrel, first, last, self._sum, self._weights)
+
+        in_bands(lambda first, last: _linear_rows(colors, self._gain, first, last, light), self._size)
+        in_bands(shear, self._size)
 
     def light(self) -> FloatImage:
-        """Linear light (H, W, 3) of the views added so far, exposed; not cut off at white."""
+        """Return the picture of the views added so far, linear light (H, W, 3), exposed; not cut off at white."""
         exposure = np.float32(2.0**self._optics.exposure_stops)
         return np.asarray(self._sum * (exposure / np.maximum(self._weights, np.float32(1e-9)))[..., None])
 
 
 def _barrel(optics: Optics, size: ImageSize) -> tuple[float, float, float]:
-    """Move of a cat's-eye's opening across the picture (t, s) and its radius, view steps; radius 0 without one."""
+    """Return the displacement (t, s) of a cat's-eye's barrel across the picture, and its radius, 0 without one."""
     if optics.aperture_shape.kind != "cat_eye":
         return 0.0, 0.0, 0.0
     radius, aspect = optics.aperture_diameter / 2, size.height / size.width
@@ -75,14 +75,11 @@ def _barrel(optics: Optics, size: ImageSize) -> tuple[float, float, float]:
 
 @kernel
 def _linear_rows(encoded, gain, first, last, light):
-    """Linear light of rows [first, last); pixels that clip in all channels count for 1 + gain times as much."""
+    """Write linear light of rows [first, last); pixels that clip in all channels are 1 + gain times as bright."""
     for y in range(first, last):
         for x in range(encoded.shape[1]):
-            red, green, blue = (
-                linear_scalar(encoded[y, x, 0]),
-                linear_scalar(encoded[y, x, 1]),
-                linear_scalar(encoded[y, x, 2]),
-            )
+            red, green = linear_scalar(encoded[y, x, 0]), linear_scalar(encoded[y, x, 1])
+            blue = linear_scalar(encoded[y, x, 2])
             clipped = min(max(20.0 * math.sqrt(max(min(red, green, blue), 0.0)) - 19.0, 0.0), 1.0)
             factor = 1.0 + gain * clipped * clipped
             light[y, x, 0], light[y, x, 1], light[y, x, 2] = factor * red, factor * green, factor * blue
@@ -90,7 +87,7 @@ def _linear_rows(encoded, gain, first, last, light):
 
 @kernel
 def _mirrored(index, size):
-    """The index of a pixel, or of its mirror image where it lies outside."""
+    """Return the index of a pixel, of its mirror image if it lies outside."""
     if index < 0:
         index = -index - 1
     if index >= size:
@@ -99,12 +96,13 @@ def _mirrored(index, size):
 
 
 @kernel
-def _add_sheared(
-    light, disparity, camera, weight, focus, tilt, focus_range, barrel, first, last, total, weights
-):  # fmt: skip
-    """Add rows [first, last) of a view, sheared to the focus: see `LensSum.add`. barrel: (t, s, radius)."""
+def _add_sheared(light, disparity, camera, weight, focus, barrel, first, last, total, weights):
+    """Add rows [first, last) of a view, sheared to the focus, see `LensSum.add`.
+
+    focus: disparity, tilt (right, down) and range. barrel: (t, s, radius).
+    """
     height, width = total.shape[:2]
-    (t, s), (tilt_x, tilt_y), (barrel_t, barrel_s, radius) = camera, tilt, barrel
+    (t, s), (middle, (tilt_x, tilt_y), focus_range), (barrel_t, barrel_s, radius) = camera, focus, barrel
     for y in range(first, last):
         v = (y + 0.5) / height - 0.5
         for x in range(width):
@@ -112,13 +110,13 @@ def _add_sheared(
             w = weight
             if radius > 0 and math.hypot(t - barrel_t * v, s - barrel_s * u) > radius:
                 w *= np.float32(1e-6)
-            here = focus + 2.0 * (tilt_x * u + tilt_y * v)
-            sharp = here
+            in_focus = middle + 2.0 * (tilt_x * u + tilt_y * v)
+            sharp = in_focus
             if focus_range > 0:
                 for _ in range(ON_SURFACE_ROUNDS):
                     row = _mirrored(math.floor(y - sharp * t + 0.5), height)
                     column = _mirrored(math.floor(x - sharp * s + 0.5), width)
-                    sharp = min(max(disparity[row, column], here - focus_range), here + focus_range)
+                    sharp = min(max(disparity[row, column], in_focus - focus_range), in_focus + focus_range)
             at_y, at_x = y - sharp * t, x - sharp * s
             if not (-0.5 <= at_y <= height - 0.5 and -0.5 <= at_x <= width - 0.5):
                 w *= np.float32(BEYOND_BORDER)

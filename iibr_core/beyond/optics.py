@@ -1,4 +1,4 @@
-"""What the virtual camera does: viewpoint, focus, opening, light."""
+"""Settings of the virtual camera: viewpoint, focus, opening, light."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ CENTRE = ViewOffset(0.0, 0.0)
 EXPOSURE_LIMIT_STOPS = 6.0
 RING_INNER_LIMIT = 0.95
 HIGHLIGHT_GAIN = 15.0
-"""Full highlight recovery lets clipped pixels count for four stops more."""
+"""Light that full highlight recovery adds to clipped pixels, where white is 1: four stops in all."""
 
 LIMITS = "limits"
-"""The key of a field's limits, where they are the same for every scene."""
+"""Key of a field's limits in its metadata, if they are the same for every scene."""
 
 
 def within(low: float, high: float, default: float) -> Any:
-    """A number that is clamped to these limits."""
+    """Return a dataclass field for a number that is clamped to these limits."""
     return field(default=default, metadata={LIMITS: (low, high)})
 
 
@@ -56,14 +56,14 @@ class ApertureShape:
 
 @dataclass(frozen=True)
 class Optics:
-    """What the virtual camera does.
+    """Settings of the virtual camera.
 
     eye: viewpoint in view steps (t down, s right). dolly: how far forward, as the view steps by which the rays at the
     left and right border of the picture then cross the grid farther out. focus_disparity: the field disparity that is
     sharp in the middle of the picture (px per view step). focus_range: everything within this much disparity around it
     is sharp. focus_tilt: change of the sharp disparity from the picture's middle to its right and to its lower border.
     aperture_diameter: in view steps, 0 = pinhole. highlight_recovery: 0..1, how much brighter than white clipped
-    pixels count. exposure_stops: brightness as a power of two. gloss: of a surface, None where all are as they are.
+    pixels count. exposure_stops: brightness as a power of two. gloss: added gloss of a surface, None without.
     """
 
     eye: ViewOffset = CENTRE
@@ -78,7 +78,7 @@ class Optics:
     gloss: Gloss | None = None
 
     def with_focus_scaled(self, ratio: float) -> Optics:
-        """The same plane of focus where disparities are so many times as large."""
+        """Return the same optics for disparities that are `ratio` times as large."""
         tilt_x, tilt_y = self.focus_tilt
         return replace(
             self,
@@ -88,5 +88,5 @@ class Optics:
         )
 
     def highlight_gain(self, diameter: float, is_hdr: bool) -> float:
-        """What clipped light counts for beyond white through an aperture so many view steps wide."""
+        """Return the light added to clipped pixels, where white is 1. diameter: the aperture's, in view steps."""
         return 0.0 if is_hdr else HIGHLIGHT_GAIN * self.highlight_recovery * min(diameter, 1.0)

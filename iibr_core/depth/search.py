@@ -38,7 +38,7 @@ from iibr_core.formats.images.photo import DEFAULT_MAX_PIXELS, read_photo
 from iibr_core.formats.maps.disparity_file import filling_note, map_at_size
 from iibr_core.formats.maps.resample import is_enlarged_smoothly, without_repeats
 from iibr_core.inpainting.disparity_by_color import fill_disparity_by_color
-from iibr_core.inpainting.inpainter import EstimateDepth
+from iibr_core.inpainting.registry import EstimateDepth
 from iibr_core.runtime.work import raise_if_stopped, report_progress
 from iibr_core.types import (
     Disparity,

@@ -44,7 +44,7 @@ def read_photo(picture: FullPicture, photo: LargePhoto | None, keep: Callable[[L
         photo = load_large(source, loaded, plan, MAX_PIXELS)
         keep(photo)
     if photo.fills is None and (optics.eye != CENTRE or optics.aperture_diameter > 0):
-        photo = photo.with_fills(complete_fills(source, loaded, plan))
+        photo = replace(photo, fills=complete_fills(source, loaded, plan))
         keep(photo)
     return photo
 

@@ -13,7 +13,6 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.inpainting.inpainter import Inpainter
 from iibr_core.inpainting.nearest_known import MOST_PIECE_PIXELS, nearest_known
 from iibr_core.inpainting.patch_synthesis import copy_patches
 from iibr_core.runtime.kernels import kernel
@@ -24,9 +23,9 @@ from iibr_core.surfaces import EDGE_PX, SAME_SURFACE_PX, is_in_front, same_surfa
 from iibr_core.types import FloatImage, ViewOffset
 
 MEDIAN_PX = 2
-"""Disparities are the median of those filled so near: a single other one would fly off in the next view."""
+"""Distance, in pixels, of the filled disparities whose median counts: outliers would be displaced in the next view."""
 SMOOTH_STEPS_PX = (1, 2, 4, 8, 16, 32)
-"""Colours are averaged over ever wider surroundings, as far as what is known is farther away."""
+"""Distances, in pixels, over which colours are averaged one after the other, up to that of the nearest known pixel."""
 
 
 def fill_background(
@@ -40,10 +39,11 @@ def fill_background(
 ) -> None:
     """Fill the holes of a view in place: colors (H, W, 3), disparity (H, W) where hole (H, W) is True.
 
-    photo_disparity: the centre view's. Of the nearest known pixels in sixteen directions those count that are possible
-    there, weighted by 1 / distance. The colour is their mean, smoother the farther away they are, and gets their
-    surface's fine texture. The disparity is that of one surface, the one with the most weight (a mean of several would
-    lie on none), and then the median of those around. A view that is all hole does not change. stages: that are on.
+    The nearest known pixels in sixteen directions are considered. Those whose surface may continue to the hole are
+    weighted by 1 / distance. The colour is their mean, smoother the farther away they are, plus their surface's fine
+    texture. The disparity is that of one surface, the one with the most weight (a mean of several would lie on none),
+    and then the median of the disparities around. A view that is all hole does not change.
+    photo_disparity: the centre view's. stages: the ones that are on.
     """
     one_surface = step_of(EDGE_PX, max(map(abs, offset)))
     _fill_view(colors, disparity, hole, photo_disparity, offset, one_surface, threads, stages)
@@ -56,9 +56,9 @@ def continue_farthest(
     farthest_views: float,
     stages: Stages = ALL_STAGES,
 ) -> None:
-    """Fill the same in a picture of which nobody knows what the photo hides: continue the farthest surface around.
+    """Fill the holes of any other picture by the farthest surface around them.
 
-    farthest_views: surfaces are one that part by less than EDGE_PX so many view steps away. stages: that are on.
+    farthest_views: distance in view steps at which surfaces that move apart by less than EDGE_PX are one surface.
     """
     nothing_hides = np.full(disparity.shape, -np.inf, np.float32)
     one_surface = step_of(EDGE_PX, farthest_views)
@@ -72,14 +72,12 @@ def continues_in_front(
     offset: ViewOffset,
     threads: int = 1,
 ) -> NDArray[np.bool_]:
-    """Return where in a hole (H, W) of a view most of what may continue there is in front of its disparity (H, W)."""
+    """Return where in a hole (H, W) most surfaces that may continue there are in front of its disparity (H, W)."""
     pixels, _, known = nearest_known(hole, threads)
     in_front, one_surface = np.zeros_like(hole), step_of(EDGE_PX, max(map(abs, offset)))
 
     def weigh(part: slice) -> None:
-        _weigh_in_front(
-            disparity, pixels[part], known[part], photo_disparity, offset.s, offset.t, one_surface, in_front
-        )
+        _weigh_in_front(disparity, pixels[part], known[part], photo_disparity, offset, one_surface, in_front)
 
     in_pieces(weigh, pieces_of(len(pixels), MOST_PIECE_PIXELS), threads)
     return in_front
@@ -95,17 +93,16 @@ def _fill_view(
     threads: int,
     stages: Stages,
 ) -> None:
-    """Fill as `fill_background` says. one_surface: surfaces are one whose disparities differ by less."""
+    """Fill holes, see `fill_background`. one_surface: largest difference of disparities on one surface."""
     pixels, number, known = nearest_known(hole, threads)
-
     reach, changed = np.empty(len(pixels), np.float32), np.empty((len(pixels), 3), np.float32)
 
     def run(step: Callable[[slice], None]) -> None:
         in_pieces(step, pieces_of(len(pixels), MOST_PIECE_PIXELS), threads)
 
     def fill(part: slice) -> None:
-        _fill(colors, disparity, pixels[part], known[part], photo_disparity, offset.s, offset.t, one_surface)
-        _reach(pixels[part], known[part], disparity.shape[1], reach[part])
+        at = pixels[part], known[part], reach[part]
+        _fill(colors, disparity, *at, photo_disparity, offset, one_surface)
 
     def smooth(step_px: int, part: slice) -> None:
         _smooth(colors, hole, pixels[part], reach[part], step_px, changed[part])
@@ -115,28 +112,26 @@ def _fill_view(
     np.put(disparity, pixels, changed[:, 0])
     for step_px in SMOOTH_STEPS_PX:
         run(partial(smooth, step_px))
-        # Only when all is computed: neighbours are taken as they were before a step, not after it.
+        # Written after the whole step, because the means take the neighbours' colours before it.
         colors.reshape(-1, 3)[pixels] = changed
     if stages.synthesise_patches:
         copy_patches(colors, disparity, hole, pixels, number, one_surface, threads)
 
 
-def background_inpainter() -> Inpainter:
-    """Return `fill_background`, which needs nothing to be loaded."""
-    return fill_background
-
-
 @kernel
-def _fill(colors, disparity, pixels, known, photo_disparity, s, t, one_surface):
-    """Fill pixels (N,), indices of the view, from the known ones (N, 16) around each, as `fill_background` says."""
-    height, width = disparity.shape
+def _fill(colors, disparity, pixels, known, reach, photo_disparity, offset, one_surface):
+    """Fill pixels (N,), flat indices, from the nearest known pixels (N, 16), see `fill_background`.
+
+    reach (N,): gets the distance of the nearest of these, inf without any.
+    """
+    (height, width), (t, s) = disparity.shape, offset
     photo, directions = photo_disparity.ravel(), known.shape[1]
     surface, weight = np.zeros(directions), np.zeros(directions)
     hidden = one_surface * (SAME_SURFACE_PX / EDGE_PX)
     for i in range(len(pixels)):
         y, x = pixels[i] // width, pixels[i] % width
-        farthest, any_possible = np.inf, False
-        # Which of the surfaces around may continue to here, and how likely.
+        farthest, nearest, any_possible = np.inf, np.inf, False
+        # Weights of the surfaces around; negative ones cannot continue to this pixel.
         for k in range(directions):
             weight[k] = 0.0
             if known[i, k] < 0:
@@ -144,14 +139,13 @@ def _fill(colors, disparity, pixels, known, photo_disparity, s, t, one_surface):
             known_y, known_x = known[i, k] // width, known[i, k] % width
             distance = np.sqrt((known_x - x) ** 2 + (known_y - y) ** 2)
             surface[k] = d = disparity[known_y, known_x]
-            farthest = min(farthest, d)
+            farthest, nearest = min(farthest, d), min(nearest, distance)
             place = _place_in_photo(y + d * t, x + d * s, height, width)
-            if place < 0 or is_in_front(photo[place], d, hidden):
-                weight[k] = 1.0 / distance
-                any_possible = True
-            else:
-                weight[k] = -1.0 / distance
-        # Where nothing is possible (the disparity contradicts itself), the farthest is the likeliest.
+            is_possible = place < 0 or is_in_front(photo[place], d, hidden)
+            weight[k] = 1.0 / distance if is_possible else -1.0 / distance
+            any_possible = any_possible or is_possible
+        reach[i] = nearest
+        # If no surface can (the disparity contradicts itself), the farthest is the likeliest.
         for k in range(directions):
             is_farthest = not any_possible and surface[k] <= farthest
             weight[k] = abs(weight[k]) if is_farthest else max(weight[k], 0.0)
@@ -176,7 +170,7 @@ def _fill(colors, disparity, pixels, known, photo_disparity, s, t, one_surface):
 
 @kernel
 def _heaviest(surface, weight, one_surface):
-    """Return the index of the surface with the most weight (the farther of equals, -1 if none), and that weight."""
+    """Return the index of the surface with the most weight (the farther of equals, -1 without any), and its weight."""
     chosen, most = -1, 0.0
     for k in range(len(surface)):
         votes = 0.0
@@ -190,9 +184,9 @@ def _heaviest(surface, weight, one_surface):
 
 
 @kernel
-def _weigh_in_front(disparity, pixels, known, photo_disparity, s, t, one_surface, in_front):
-    """Write to in_front (H, W) what `continues_in_front` says, for pixels (N,) with known ones (N, 16) around each."""
-    height, width = disparity.shape
+def _weigh_in_front(disparity, pixels, known, photo_disparity, offset, one_surface, in_front):
+    """Write `continues_in_front` to in_front (H, W) for pixels (N,) from the nearest known pixels (N, 16)."""
+    (height, width), (t, s) = disparity.shape, offset
     photo, hidden = photo_disparity.ravel(), one_surface * (SAME_SURFACE_PX / EDGE_PX)
     for i in range(len(pixels)):
         y, x = pixels[i] // width, pixels[i] % width
@@ -211,9 +205,9 @@ def _weigh_in_front(disparity, pixels, known, photo_disparity, s, t, one_surface
 
 @kernel
 def _place_in_photo(y, x, height, width):
-    """Return the index of the photo's pixel, -1 off its frame.
+    """Return the flat index of the photo's pixel at a position, -1 outside its frame.
 
-    A surface that lies there may go on unseen only where something nearer hides it, or off the frame.
+    A surface may continue there only if something nearer hides it from the photo, or outside the frame.
     """
     row, column = nearest_pixel(y), nearest_pixel(x)
     return row * width + column if 0 <= column < width and 0 <= row < height else -1
@@ -221,7 +215,7 @@ def _place_in_photo(y, x, height, width):
 
 @kernel
 def _medians(disparity, hole, pixels, medians):
-    """Write the medians (N,) of what was filled within MEDIAN_PX each way of pixels (N,)."""
+    """Write the medians (N,) of the filled disparities within MEDIAN_PX of pixels (N,)."""
     height, width = disparity.shape
     around = np.empty((2 * MEDIAN_PX + 1) ** 2, np.float32)
     for i in range(len(pixels)):
@@ -236,22 +230,10 @@ def _medians(disparity, hole, pixels, medians):
 
 
 @kernel
-def _reach(pixels, known, width, reach):
-    """Write how far away the nearest known pixel is, in px, inf where there is none."""
-    for i in range(len(pixels)):
-        y, x = pixels[i] // width, pixels[i] % width
-        nearest = np.inf
-        for k in range(known.shape[1]):
-            if known[i, k] >= 0:
-                nearest = min(nearest, np.sqrt((known[i, k] // width - y) ** 2 + (known[i, k] % width - x) ** 2))
-        reach[i] = nearest
-
-
-@kernel
 def _smooth(colors, hole, pixels, reach, step, smoothed):
-    """Write the means (N, 3) over hole pixels `step` apart, where what is known lies at least as far away.
+    """Write the means (N, 3) over hole pixels `step` apart, for pixels at least as far from known ones.
 
-    So pixels beside what is known stay sharp, and no streaks lead from it into wide holes.
+    Pixels beside known ones stay sharp, and no streaks lead from there into wide holes.
     """
     height, width = hole.shape
     for i in range(len(pixels)):

@@ -1,6 +1,6 @@
-"""Unknown disparity, filled by the photo: each pixel goes with those around it that look like it.
+"""Unknown disparity, filled by the photo: each pixel takes the disparity of similar pixels around it.
 
-The background side, which is the safe guess where nothing else is known, tears borders and wires off their surfaces.
+Filling from the background side, which is safe without a photo, would tear borders and wires off their surfaces.
 """
 
 from __future__ import annotations
@@ -18,93 +18,68 @@ from iibr_core.types import FloatImage
 
 
 def nearness(reach_px: int, spread_px: float) -> NDArray[np.float64]:
-    """(2 reach_px + 1, 2 reach_px + 1): weights of pixels by their distance from the one in the middle, 1 there, with a
-    standard deviation of spread_px.
-    """
+    """Return Gaussian weights (2 reach_px + 1, 2 reach_px + 1) by the distance from the middle, where it is 1."""
     steps = np.arange(-reach_px, reach_px + 1)
     return np.asarray(np.exp(-0.5 * (steps[:, None] ** 2 + steps**2) / spread_px**2))
 
 
 VOTE_REACH_PX = 4
-"""Pixels that vote lie within so many, each way."""
+"""Distance of voting pixels in each direction, in pixels."""
 SPREAD_PX = 2.0
-"""Standard deviation of their weights by distance."""
+"""Standard deviation of the weight by distance, in pixels."""
 VOTE_NEARNESS = nearness(VOTE_REACH_PX, SPREAD_PX)
-"""Those weights, (2 VOTE_REACH_PX + 1, 2 VOTE_REACH_PX + 1), the pixel itself in the middle."""
 COLOR_SIGMA = 0.04
-"""Standard deviation of their weights by colour (sRGB-encoded, all channels together)."""
+"""Standard deviation of the weight by colour (sRGB-encoded, all channels together)."""
 UNLIKE_WEIGHT = 1e-3
-"""Of a pixel that looks like another thing altogether: where nothing looks alike, the nearest decide."""
+"""Weight of a pixel of an entirely different colour: without similar pixels, the nearest decide."""
 VOTE_BINS = 24
-"""The range of the disparities around a pixel is cut into so many; the vote is for one of them and its neighbours."""
+"""Number of bins that the range of the disparities around a pixel is divided into."""
 SIDE_BINS = 0.7
-"""How much the neighbours of a bin count for it."""
+"""Weight of the two bins beside a bin in its sum of votes."""
 MOST_VOTE_ROUNDS = 64
-"""Pixels farther than this from all that is known are filled from the background side."""
+"""Distance from all known pixels, in pixels, beyond which pixels are filled from the background side."""
 MOST_PIECE_PIXELS = 1 << 12
 
 
 def fill_disparity_by_color(photo: FloatImage, values: FloatImage) -> FloatImage:
-    """Replace the NaN of a disparity map (H, W) by the photo (H, W, 3), sRGB-encoded; known values stay as they are.
+    """Replace the NaN of a disparity map (H, W) by means of the photo (H, W, 3), sRGB-encoded; known values stay.
 
-    From what is known inwards: each pixel takes the disparity for which most pixels around it vote, weighted by how
-    near they are and how alike they look (a bilateral mode filter); what was filled votes in the next round. All
-    results lie within the known values. Raises ValueError if the sizes differ or nothing is known.
+    From the known values inwards, each pixel takes the disparity with most votes of the pixels around it, weighted by
+    nearness and similarity (a bilateral mode filter); filled pixels vote in the next round. All results lie within the
+    known values. Raises ValueError if nothing is known.
     """
-    if photo.shape != (*values.shape, 3):
-        raise ValueError(f"the photo is {photo.shape}, the disparity {values.shape}")
-    filled = np.array(values, np.float32, order="C")
-    colors, queued = np.ascontiguousarray(photo, np.float32), np.zeros(filled.shape, np.bool_)
-    unknown = np.flatnonzero(np.isnan(filled))
-    if len(unknown) == filled.size:
-        raise ValueError("no known value to fill from")
-    pixels = _beside_known(filled, unknown, queued)
+    filled, colors = np.array(values, np.float32, order="C"), np.ascontiguousarray(photo, np.float32)
+    pixels = _beside_known(filled)
     for _ in range(MOST_VOTE_ROUNDS):
         if not len(pixels):
-            return filled
+            break
         parts = [pixels[part] for part in pieces_of(len(pixels), MOST_PIECE_PIXELS)]
         votes = in_pieces(lambda part: _vote(colors, filled, part), parts, tiling.THREADS)
         filled.reshape(-1)[pixels] = np.concatenate(votes)
-        pixels = _unknown_around(filled, pixels, queued)
+        pixels = _unknown_around(filled, pixels)
     return fill_disparity_holes(filled)
 
 
-@kernel
-def _beside_known(values, unknown, queued):
-    """Those of the unknown pixels (flat indices) that touch a known one; they are marked as queued."""
-    height, width = values.shape
-    found, count = np.empty(len(unknown), np.int64), 0
-    for n in range(len(unknown)):
-        y, x = unknown[n] // width, unknown[n] % width
-        for v in range(max(y - 1, 0), min(y + 2, height)):
-            for u in range(max(x - 1, 0), min(x + 2, width)):
-                # NaN differs from itself.
-                queued[y, x] |= values[v, u] == values[v, u]
-        if queued[y, x]:
-            found[count] = unknown[n]
-            count += 1
-    return found[:count]
+def _beside_known(values: FloatImage) -> NDArray[np.int64]:
+    """Return the unknown pixels (flat indices) with a known one among their eight neighbours."""
+    known = np.pad(~np.isnan(values), 1)
+    near = known[:-2] | known[1:-1] | known[2:]
+    near = near[:, :-2] | near[:, 1:-1] | near[:, 2:]
+    return np.flatnonzero(near & np.isnan(values))
 
 
-@kernel
-def _unknown_around(values, pixels, queued):
-    """The unknown pixels (flat indices) that touch these and are not queued yet; now they are."""
-    height, width = values.shape
-    found, count = np.empty(8 * len(pixels), np.int64), 0
-    for pixel in pixels:
-        y, x = pixel // width, pixel % width
-        for v in range(max(y - 1, 0), min(y + 2, height)):
-            for u in range(max(x - 1, 0), min(x + 2, width)):
-                if values[v, u] != values[v, u] and not queued[v, u]:
-                    queued[v, u] = True
-                    found[count] = v * width + u
-                    count += 1
-    return found[:count]
+def _unknown_around(values: FloatImage, pixels: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return the unknown pixels (flat indices) among the eight neighbours of these."""
+    (height, width), (y, x) = values.shape, np.divmod(pixels, values.shape[1])
+    rows = [np.clip(y + step, 0, height - 1) * width for step in (-1, 0, 1)]
+    columns = [np.clip(x + step, 0, width - 1) for step in (-1, 0, 1)]
+    around = np.concatenate([row + column for row in rows for column in columns])
+    return np.unique(around[np.isnan(np.take(values, around))])
 
 
 @kernel
 def _vote(colors, values, pixels):
-    """The disparities (N) that pixels (flat indices) get from what is known around them; each has something there."""
+    """Return the disparities (N) for pixels (flat indices) from the known ones around them; there is at least one."""
     height, width = values.shape
     result, bins, weight = np.empty(len(pixels), np.float32), np.empty(VOTE_BINS), np.empty(VOTE_NEARNESS.shape)
     for n in range(len(pixels)):
@@ -115,9 +90,9 @@ def _vote(colors, values, pixels):
         for v in range(top, bottom):
             for u in range(left, right):
                 d = np.float64(values[v, u])
-                if d == d:
+                if d == d:  # NaN differs from itself
                     low, high = min(low, d), max(high, d)
-        # A histogram of votes; all in one bin where there is one disparity only.
+        # A histogram of votes; all are in one bin if there is one disparity only.
         scale = (VOTE_BINS - 1) / (high - low) if high > low else 0.0
         bins[:] = 0.0
         for v in range(top, bottom):
@@ -128,12 +103,11 @@ def _vote(colors, values, pixels):
                 apart = 0.0
                 for c in range(3):
                     apart += (colors[v, u, c] - colors[y, x, c]) ** 2
-                # Colours that are not finite are like no other.
-                likeness = exp(-0.5 * apart / (COLOR_SIGMA * COLOR_SIGMA)) if apart < np.inf else 0.0
+                likeness = exp(-0.5 * apart / (COLOR_SIGMA * COLOR_SIGMA))
                 w = (likeness + UNLIKE_WEIGHT) * VOTE_NEARNESS[v - y + VOTE_REACH_PX, u - x + VOTE_REACH_PX]
                 weight[v - top, u - left] = w
                 bins[int((d - low) * scale)] += w
-        # Its mode: a surface that crosses the border of two bins keeps its votes together.
+        # Its mode; neighbouring bins count too, because a surface may lie across the border of two.
         elected, most = 0, -1.0
         for k in range(VOTE_BINS):
             votes = bins[k] + SIDE_BINS * (
@@ -141,7 +115,7 @@ def _vote(colors, values, pixels):
             )
             if votes > most:
                 elected, most = k, votes
-        # The mean of those who voted for it.
+        # The mean of those that voted for it.
         total = weights = 0.0
         for v in range(top, bottom):
             for u in range(left, right):

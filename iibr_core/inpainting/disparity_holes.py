@@ -1,122 +1,68 @@
-"""Unknown disparity, filled from its background side: what a camera could not see lies behind what it saw beside it."""
+"""Unknown disparity, filled from its background side: a camera's blind spot lies behind the surface beside it."""
 
 from __future__ import annotations
 
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
-from iibr_core.runtime.kernels import kernel
-from iibr_core.runtime.work import raise_if_stopped
+from iibr_core.inpainting.nearest_known import LINES, MOST_PIECE_PIXELS, nearest_known
+from iibr_core.runtime import tiling
+from iibr_core.runtime.tiling import in_pieces, pieces_of
 from iibr_core.types import FloatImage
 
-# Lines through a pixel: falling diagonal, vertical, rising diagonal, horizontal; the length of one step along each. The
-# horizontal counts half: cameras of a stereo rig stand side by side, so their blind spots end left and right.
-STEP_LENGTHS = (math.sqrt(2), 1.0, math.sqrt(2), 0.5)
-# A hole that is open on a line, up to the frame, counts as this many times as wide as what is known of it.
+STEP_LENGTHS = np.array([0.5, 1.0, math.sqrt(2), math.sqrt(2)])
+"""Length of a step along the horizontal, the vertical and the two diagonals.
+
+The horizontal counts half, because the cameras of a stereo rig stand side by side: blind spots end left and right.
+"""
 OPEN_LINE = 12
-# How strongly the line with the shortest way across the hole prevails. 8 was best of 2, 4, 8 on four scenes.
+"""Factor on the length of a line that reaches the frame before a known value."""
 SHORTNESS = 8
+"""Exponent of the inverse length in the weight of a line; 8 was best of 2, 4, 8 on four scenes."""
 
 
 def fill_disparity_holes(values: FloatImage) -> FloatImage:
-    """Replace the NaN of an (H, W) disparity map; known values stay as they are.
+    """Replace the NaN of a disparity map (H, W); known values stay.
 
     On each of four lines through an unknown pixel, the farther (smaller) of the two nearest known values counts; the
-    lines are averaged by 1 / span**8, span being the way across the hole. Lines on which the hole reaches the frame
-    have one end only and count little. All results lie within the known values.
+    lines are averaged by 1 / length**8, the length being that of the way across the hole. Lines on which the hole
+    reaches the frame have one end and count little. All results lie within the known values.
     Raises ValueError if nothing is known.
     """
     filled = np.array(values, np.float32, order="C")
     unknown = np.isnan(filled)
+    if not unknown.any():
+        return filled
     if unknown.all():
         raise ValueError("no known value to fill from")
-    while (count := int(unknown.sum())) > 0:
-        near = np.empty((2, count, 4), np.float32)
-        steps = np.empty((2, count, 4), np.int32)
-        raise_if_stopped()
-        _nearest_before(filled, near[0], steps[0])
-        raise_if_stopped()
-        # The same, seen from the last pixel: everything that comes after.
-        _nearest_before(filled[::-1, ::-1], near[1, ::-1], steps[1, ::-1])
-        raise_if_stopped()
-        filled[unknown] = _farther_side(near, steps, np.array(STEP_LENGTHS))
-        unknown = np.isnan(filled)  # pixels with no known value on any line; the second round reaches them
-    return filled
+    pixels, _, known = nearest_known(unknown, tiling.THREADS, 2 * LINES)
+    parts = pieces_of(len(pixels), MOST_PIECE_PIXELS)
+    means = in_pieces(lambda part: _farther_sides(filled, pixels[part], known[part]), parts, tiling.THREADS)
+    np.put(filled, pixels, np.concatenate(means))
+    # Pixels without a known value on any line are still unknown.
+    return fill_disparity_holes(filled)
+
+
+def _farther_sides(values: FloatImage, pixels: NDArray[np.int64], known: NDArray[np.int32]) -> FloatImage:
+    """Return disparities (N,) for pixels (N,) from the known pixels (N, 8) at the ends of their lines."""
+    is_known = known >= 0
+    (y, x), (known_y, known_x) = np.divmod(pixels[:, None], values.shape[1]), np.divmod(known, values.shape[1])
+    steps = np.where(is_known, np.maximum(abs(known_y - y), abs(known_x - x)), 0)
+    ends = np.where(is_known, np.take(values, known), np.float32(np.nan))
+    farther = np.fmin(ends[:, ::2], ends[:, 1::2])
+    is_open = ~(is_known[:, ::2] & is_known[:, 1::2])
+    lengths = STEP_LENGTHS * (steps[:, ::2] + steps[:, 1::2]) * np.where(is_open, OPEN_LINE, 1)
+    lengths[np.isnan(farther)] = np.inf
+    # Relative to the shortest, so that no power overflows; NaN without any line.
+    with np.errstate(invalid="ignore"):
+        weights = (lengths.min(axis=1, keepdims=True) / lengths) ** SHORTNESS
+        return np.asarray((weights * np.nan_to_num(farther)).sum(axis=1) / weights.sum(axis=1), np.float32)
 
 
 def say_filled(name: str, unknown: float) -> str:
-    """A sentence on a map of which this share, above 0, was filled."""
+    """Return a sentence about a map of which this share, above 0, was filled."""
     if unknown > 0.9:
         return f"Only {100 * (1 - unknown):.2g} % of {name} is known; what is unknown was filled from around it."
     return f"{100 * unknown:.2g} % of {name} is unknown and was filled from around it."
-
-
-@kernel
-def _nearest_before(values, near, steps):
-    """For the n-th NaN of values (H, W) in reading order: near[n, k], the nearest known value that precedes it on line
-    k, NaN if there is none, and steps[n, k], how many pixels away it is.
-    """
-    height, width = values.shape
-    # Per column, with a margin of one: what the row above saw last, looking up-left, up and up-right.
-    above = np.full((3, width + 2), np.nan, np.float32)
-    above_steps = np.zeros((3, width + 2), np.int32)
-    row = above.copy()
-    row_steps = above_steps.copy()
-    count = 0
-    for y in range(height):
-        left = np.float32(np.nan)
-        left_steps = 0
-        for x in range(width):
-            value = values[y, x]
-            # A known value is the nearest for whoever comes next, on all lines.
-            if not math.isnan(value):
-                left, left_steps = value, 0
-                for k in range(3):
-                    row[k, x + 1] = value
-                    row_steps[k, x + 1] = 0
-                continue
-            # Each unknown pixel inherits what its predecessor on the line saw, one step farther away.
-            left_steps += 1
-            for k in range(3):
-                row[k, x + 1] = above[k, x + k]
-                row_steps[k, x + 1] = above_steps[k, x + k] + 1
-                near[count, k] = row[k, x + 1]
-                steps[count, k] = row_steps[k, x + 1]
-            near[count, 3] = left
-            steps[count, 3] = left_steps
-            count += 1
-        # Swapped, not copied: the next row overwrites what was above.
-        above, row = row, above
-        above_steps, row_steps = row_steps, above_steps
-
-
-@kernel
-def _farther_side(near, steps, step_lengths):
-    """Fill values (N,) from the known ends (2, N, 4) of the lines; NaN where no line has a known end."""
-    filled = np.empty(near.shape[1], np.float32)
-    spans = np.empty(4)
-    farther = np.empty(4)
-    for n in range(near.shape[1]):
-        for k in range(4):
-            # A line with one end: the hole is open there, up to the frame. With none: nothing.
-            before, after = near[0, n, k], near[1, n, k]
-            if math.isnan(before) or math.isnan(after):
-                farther[k] = after if math.isnan(before) else before
-                spans[k] = OPEN_LINE * step_lengths[k] * (steps[1, n, k] if math.isnan(before) else steps[0, n, k])
-            else:
-                # Two ends: the background is the farther one; the way across the hole is the line's span.
-                farther[k] = min(before, after)
-                spans[k] = step_lengths[k] * (steps[0, n, k] + steps[1, n, k])
-            if math.isnan(farther[k]):
-                spans[k] = np.inf
-        shortest = spans.min()
-        total, weights = 0.0, 0.0
-        for k in range(4):
-            if spans[k] < np.inf:
-                # Relative to the shortest, so that no power overflows.
-                weight = (shortest / spans[k]) ** SHORTNESS
-                total += weight * farther[k]
-                weights += weight
-        filled[n] = total / weights if weights > 0 else np.nan
-    return filled

@@ -1,8 +1,8 @@
 """The photo continued beyond its frame, once, so that all views show the same there.
 
-The nearest surface of the frame goes on, and lines go straight on (coherence transport, Bornemann & Maerz, 2007). Other
-colours are those that a surface has there, averaged along the frame ever wider the farther out: who can tell which of
-them goes on. They get the fine texture of what lies as far inside.
+The surface nearest on the frame continues, and lines continue straight (coherence transport, Bornemann & Maerz, 2007).
+All other colours are averaged along the frame, wider the farther out, because the details that continue are unknown.
+They get the fine texture of the pixel as far inside the frame.
 """
 
 from __future__ import annotations
@@ -12,33 +12,32 @@ from math import hypot, log2, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
+from iibr_core.inpainting.nearest_known import number_pixels
 from iibr_core.runtime.kernels import kernel
 from iibr_core.runtime.scalars import nearest_pixel
 from iibr_core.runtime.tiling import in_bands
 from iibr_core.stages import ALL_STAGES, Stages
-from iibr_core.types import (
-    FloatImage,
-    ImageSize,
-    Margins,
-    image_size,
-)
+from iibr_core.types import FloatImage, ImageSize, Margins, image_size
 
 BINOMIAL = np.array([1, 4, 6, 4, 1], np.float32) / 16
-"""Texture is what differs from a mean with these weights, each way."""
+"""Weights, in each direction, of the mean from which texture differs."""
 SPREAD = 1.6
-"""Colours at distance r are a mean with a standard deviation of 0.41 px times 2 to the power of this, times r."""
+"""Binary logarithm of the standard deviation, in units of 0.41 px, of the mean that is taken 1 px from the frame."""
 TEXTURE_SHARE, TEXTURE_PX = 0.6, 16.0
-"""So much of the photo's texture is seen far beyond its frame, half of that at this distance: its place there is a
-guess, and close to the frame nobody misses it.
+"""Share of the photo's texture far beyond its frame, and the distance in pixels at which it is half of that.
+
+The place of the texture is a guess, and close to the frame it is not missed.
 """
 LINE_REACH_PX = 5
-"""Lines are found in 11 x 11 pixels."""
+"""Radius of the squares in which lines are found: 11 x 11 pixels."""
 STRENGTH_POWER, ANGLE_POWER = 2, 16
-"""Lines count by their strength, and by the cosine of the angle off them, to these powers."""
+"""Exponents of a line's strength and of the cosine of the angle to it, in its weight."""
 LINE_NOISE = 0.01
-"""Steps between neighbouring pixels, standard deviation, that make no line."""
+"""Standard deviation of steps between neighbouring pixels that are no line."""
 SLANT, PLACES = 2.0, 12
-"""Lines are followed from so many places each way on the frame, from up to SLANT times as far as the frame is."""
+"""Range along the frame of the lines that are followed, as a multiple of the distance from the frame; number of places
+in each direction within that range.
+"""
 
 
 def outpaint(
@@ -47,31 +46,32 @@ def outpaint(
     margins: Margins,
     stages: Stages = ALL_STAGES,
 ) -> tuple[FloatImage, FloatImage]:
-    """The photo's colors (H, W, 3) and disparity (H, W) in the middle of larger ones, which are filled around it.
+    """Return the photo's colors (H, W, 3) and disparity (H, W), continued beyond the frame.
 
-    margins: so many pixels on each side. stages: that are on.
+    margins: number of new pixels on each side. stages: the ones that are on.
     """
     size = image_size(disparity)
     if not any(margins):
         return colors, disparity
     larger = margins.around(size)
     grown, surfaces = np.empty((*larger, 3), np.float32), np.empty(larger, np.float32)
-    frame = _frame_pixels(size)
+    frame, number = _frame_pixels(size), np.empty(size, np.int32)
+    number_pixels(frame, number)
     means = _means_along_frame(colors.reshape(-1, 3)[frame], max(margins))
     lines = np.empty((len(frame), 2), np.float32)
     _find_lines(colors, frame, lines)
 
     def band(first: int, last: int) -> None:
-        _extend_rows(colors, disparity, means, margins.top, margins.left, first, last, grown, surfaces)
+        _extend_rows(colors, disparity, number, means, margins, (first, last), grown, surfaces)
         if stages.outpainted_lines:
-            _follow_lines(size.height, size.width, frame, means, lines, margins.top, margins.left, first, last, grown)
+            _follow_lines(number, frame, means, lines, margins, first, last, grown)
 
     in_bands(band, larger)
     return grown, surfaces
 
 
 def _frame_pixels(size: ImageSize) -> NDArray[np.int64]:
-    """Flat indices (N,) of the frame's pixels, clockwise from the upper left."""
+    """Return the flat indices (N,) of the frame's pixels, clockwise from the upper left."""
     height, width = size
     right, left = np.arange(1, height), np.arange(1, height - 1)[::-1]
     top, bottom = np.arange(width), np.arange(width - 1)[::-1]
@@ -79,7 +79,7 @@ def _frame_pixels(size: ImageSize) -> NDArray[np.int64]:
 
 
 def _means_along_frame(frame: FloatImage, farthest: int) -> FloatImage:
-    """(K, N, 3): the colours of the frame's N pixels, then ever wider means of them.
+    """Return the colours of the frame's N pixels, and wider and wider means of them (K, N, 3).
 
     The standard deviation of mean k is 0.41 sqrt(4**k - 1) px (weights 1 2 1; each step doubles the distances).
     """
@@ -93,25 +93,13 @@ def _means_along_frame(frame: FloatImage, farthest: int) -> FloatImage:
 
 @kernel
 def _level(distance):
-    """Which of `_means_along_frame` counts so far from the frame, a fraction between two."""
+    """Return the index of the mean of `_means_along_frame` for a distance from the frame; fractions blend two."""
     return max(SPREAD + log2(distance), 0.0)
 
 
 @kernel
-def _place_on_frame(height, width, y, x):
-    """The number of a pixel of the frame among `_means_along_frame`."""
-    if y == 0:
-        return x
-    if x == width - 1:
-        return width - 1 + y
-    if y == height - 1:
-        return 2 * (width - 1) + height - 1 - x
-    return 2 * (width - 1) + 2 * (height - 1) - y
-
-
-@kernel
 def _texture(colors, y, x, c):
-    """How a pixel differs from its surroundings; at the border its neighbours there count for those beyond."""
+    """Return the difference of a pixel from the mean around it; the border is repeated."""
     height, width, _ = colors.shape
     mean = np.float32(0.0)
     for j in range(-2, 3):
@@ -122,9 +110,10 @@ def _texture(colors, y, x, c):
 
 
 @kernel
-def _extend_rows(colors, disparity, means, top, left, first, last, grown, surfaces):
-    height, width = disparity.shape
-    for row in range(first, last):
+def _extend_rows(colors, disparity, number, means, margins, rows, grown, surfaces):
+    """Fill rows [first, last) of the larger image without following lines."""
+    (height, width), (top, _, left, _) = disparity.shape, margins
+    for row in range(*rows):
         for column in range(grown.shape[1]):
             y, x = min(max(row - top, 0), height - 1), min(max(column - left, 0), width - 1)
             away = hypot(row - top - y, column - left - x)
@@ -133,11 +122,11 @@ def _extend_rows(colors, disparity, means, top, left, first, last, grown, surfac
                 for c in range(3):
                     grown[row, column, c] = colors[y, x, c]
                 continue
-            place, level = _place_on_frame(height, width, y, x), _level(away)
+            place, level = number[y, x], _level(away)
             surfaces[row, column] = disparity[y, x]
             k = min(int(level), len(means) - 2)
             part = np.float32(level - k)
-            # What lies as far inside, on the other side of that place, gives the texture.
+            # The pixel as far inside, on the other side of that place, gives the texture.
             share = np.float32(TEXTURE_SHARE * away / (away + TEXTURE_PX))
             v = min(max(2 * y - row + top, 0), height - 1)
             u = min(max(2 * x - column + left, 0), width - 1)
@@ -148,19 +137,20 @@ def _extend_rows(colors, disparity, means, top, left, first, last, grown, surfac
 
 @kernel
 def _find_lines(colors, pixels, lines):
-    """Write lines (N, 2) at these pixels, flat indices (N,): (cos 2a, sin 2a), a the angle at which colours change the
-    least; as long as they change across that line only, 0 where no way differs from others.
+    """Write the lines (N, 2) through pixels (N,), flat indices: strength times (cos 2a, sin 2a).
+
+    a is the angle at which colours change least. The strength is 1 if they change across the line only, and 0 if they
+    change alike in all directions.
     """
     height, width, _ = colors.shape
     for i in range(len(pixels)):
         y, x = pixels[i] // width, pixels[i] % width
-        # The structure tensor, summed over colours, along the diagonals of 2 x 2 pixels: unlike steps to the right and
-        # down, those are of one place.
+        # The structure tensor, summed over channels, along the diagonals of 2 x 2 pixels: these have the same middle,
+        # unlike steps to the right and down.
         falls = both = rises = 0.0
         for v in range(max(y - LINE_REACH_PX, 0), min(y + LINE_REACH_PX + 1, height - 1)):
             for u in range(max(x - LINE_REACH_PX, 0), min(x + LINE_REACH_PX + 1, width - 1)):
                 for c in range(3):
-                    # Squares of huge colours are beyond single precision.
                     falling = np.float64(colors[v + 1, u + 1, c] - colors[v, u, c])
                     rising = np.float64(colors[v, u + 1, c] - colors[v + 1, u, c])
                     falls += falling * falling
@@ -174,27 +164,28 @@ def _find_lines(colors, pixels, lines):
 
 @kernel
 def _line_weight(line_cos, line_sin, down, across):
-    """How well the way (down, across) runs along one of those lines, 0 to 1."""
+    """Return the weight 0..1 of a line in the direction (down, across)."""
     strength = sqrt(line_cos * line_cos + line_sin * line_sin)
     if strength == 0.0:
         return 0.0
-    # cos(2 angle), the angle between the line and the way.
+    # Cosine of twice the angle between the line and the direction.
     squared = float(down * down + across * across)
     double = (line_cos * (across * across - down * down) + line_sin * 2.0 * across * down) / (strength * squared)
     return strength**STRENGTH_POWER * max(0.5 + 0.5 * double, 0.0) ** (ANGLE_POWER // 2)
 
 
 @kernel
-def _follow_lines(height, width, frame, means, lines, top, left, first, last, grown):
-    """Of rows [first, last): where lines of the frame lead, they show instead, the more so the straighter they do."""
+def _follow_lines(number, frame, means, lines, margins, first, last, grown):
+    """Blend the lines of the frame into rows [first, last), more where they lead there straighter."""
+    (height, width), (top, _, left, _) = number.shape, margins
     for row in range(first, last):
         for column in range(grown.shape[1]):
             y, x = min(max(row - top, 0), height - 1), min(max(column - left, 0), width - 1)
             away = hypot(row - top - y, column - left - x)
             if away == 0.0:
                 continue
-            place, step = _place_on_frame(height, width, y, x), SLANT * away / PLACES
-            # As wide as places lie apart.
+            place, step = number[y, x], SLANT * away / PLACES
+            # A mean as wide as the distance between two places.
             level = _level(step)
             k = min(int(level), len(means) - 2)
             part = np.float32(level - k)
@@ -207,7 +198,7 @@ def _follow_lines(height, width, frame, means, lines, top, left, first, last, gr
                 red += weight * (means[k, n, 0] + part * (means[k + 1, n, 0] - means[k, n, 0]))
                 green += weight * (means[k, n, 1] + part * (means[k + 1, n, 1] - means[k, n, 1]))
                 blue += weight * (means[k, n, 2] + part * (means[k + 1, n, 2] - means[k, n, 2]))
-            # All else counts 1 against them.
+            # The other colours have a weight of 1.
             rest = 1.0 / (1.0 + total)
             grown[row, column, 0] = rest * (grown[row, column, 0] + red)
             grown[row, column, 1] = rest * (grown[row, column, 1] + green)

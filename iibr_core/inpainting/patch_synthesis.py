@@ -1,9 +1,9 @@
-"""Patch synthesis: gives smoothly filled holes their surface's texture. From the border inwards, each patch is copied
-from the place around that looks most like what is there (Efros & Leung, 1999; Criminisi et al., 2004).
+"""Patch synthesis: gives smoothly filled holes the texture of their surface. From the border inwards, each patch is
+copied from the most similar place around it (Efros & Leung, 1999; Criminisi et al., 2004).
 
-Where a patch fits what is known it is taken as it is, so that lines go on; farther in, and where nothing fits, only its
-fine texture: nobody sees that the place of that is wrong. Content is only copied within one surface. Patches overlap; a
-pixel gets a mean of what all of them show there (Wexler et al., 2007), or seams between them would look like grain.
+A patch that fits the known pixels is copied unchanged, which continues lines; deeper in a hole, and where no patch
+fits, only its fine texture is copied, whose place does not matter. Patches are copied within one surface only. They
+overlap, and a pixel gets the mean of all patches over it (Wexler et al., 2007): seams would look like grain.
 """
 
 from __future__ import annotations
@@ -17,25 +17,25 @@ from iibr_core.surfaces import same_surface
 from iibr_core.types import FloatImage, ImageSize, image_size
 
 RADIUS_PX = 3
-"""Patches are 7 x 7 pixels."""
+"""Radius of a patch: patches are 7 x 7 pixels."""
 SEARCH_PX, STEP_PX = 32, 4
-"""Places are looked for so far away each way, so far apart; then around the best."""
+"""Distance and spacing, in pixels, of the places that are searched; then follows the surroundings of the best."""
 GUESS = np.float32(0.6)
-"""What a pixel that is only filled smoothly counts when patches are compared; known and copied ones count 1."""
+"""Weight of a smoothly filled pixel in the comparison of patches; known and copied pixels have 1."""
 MISSING = np.float32(0.1)
-"""Where a place does not show a pixel's surface, their colours count as this different, squared and summed."""
+"""Squared colour difference of a pixel whose surface is missing in the place it is compared with."""
 FIT = np.float32(0.1)
-"""Patches that differ by this from what is known, root mean square, are hardly trusted."""
-MOST_FINE = np.float32(0.05)
-"""Larger differences are no texture: of them so much is copied where patches are not trusted."""
-LEAST_TRUST = np.float32(1e-6)
-"""In what was copied."""
+"""Root mean square difference from the known pixels at which a patch is hardly trusted."""
+MAX_TEXTURE = np.float32(0.05)
+"""Largest texture, as a difference of colours, that is copied from a patch without trust."""
+MIN_TRUST = np.float32(1e-6)
+"""Least trust in a copied pixel."""
 FIRST_PATCH_WEIGHT = np.float32(3.0)
-"""What the first patch over a pixel counts in the mean; those that follow count 1."""
+"""Weight of the first patch over a pixel in the mean; the following ones have 1."""
 FINE_TEXTURE_PX = 5
-"""Texture is what differs from the mean so far around."""
+"""Radius in pixels of the mean from which texture differs."""
 PATCH_BLOCK_PX = 64
-"""Blocks of this side are filled side by side; no two that touch."""
+"""Side in pixels of the blocks that are filled in threads, never two that touch."""
 
 
 def copy_patches(
@@ -47,9 +47,10 @@ def copy_patches(
     one_surface: float,
     threads: int,
 ) -> None:
-    """Give the pixels of holes (H, W), flat indices (N,), which colors (H, W, 3) hold as smoothly filled, the looks of
-    their surface. number: see `number_pixels`. Surfaces are one whose disparities (H, W) differ by one_surface at most.
+    """Add texture to the smoothly filled pixels of holes (H, W), in place.
 
+    colors: (H, W, 3). disparity: (H, W). pixels, number: see `AroundHoles`. one_surface: largest difference of
+    disparities on one surface.
     """
     smooth = np.take(colors.reshape(-1, 3), pixels, axis=0)
     trust = np.zeros(len(pixels), np.float32)
@@ -68,7 +69,7 @@ def copy_patches(
 
 
 def _blocks_apart(pixels: NDArray[np.int64], size: ImageSize) -> list[list[tuple[int, int]]]:
-    """Row and column of the blocks in which these pixels lie, in four lists of blocks that do not touch."""
+    """Return row and column of all blocks with these pixels, in four lists of blocks that do not touch."""
     columns = -(-size.width // PATCH_BLOCK_PX)
     y, x = np.divmod(pixels, size.width)
     is_found = np.zeros((-(-size.height // PATCH_BLOCK_PX), columns), np.bool_)
@@ -81,18 +82,17 @@ def _blocks_apart(pixels: NDArray[np.int64], size: ImageSize) -> list[list[tuple
 
 @kernel
 def _copy_block(colors, disparity, hole, number, row, column, one_surface, trust, shown):
-    """Copy patches into the holes of a block. trust (N,): 0 of what is not copied yet. shown (N, 4): the sum of what
-    patches show, and what they count.
+    """Copy patches into the holes of a block.
+
+    trust (N,): trust in each hole pixel, 0 before it is copied. shown (N, 4): weighted sum of the patches over each
+    hole pixel, and the sum of their weights.
     """
     height, width = number.shape
     top, left = row * PATCH_BLOCK_PX, column * PATCH_BLOCK_PX
     bottom, right = min(top + PATCH_BLOCK_PX, height), min(left + PATCH_BLOCK_PX, width)
-    queue, is_queued, end = (
-        np.empty(PATCH_BLOCK_PX**2, np.int64),
-        np.zeros((PATCH_BLOCK_PX, PATCH_BLOCK_PX), np.bool_),
-        0,
-    )
-    # First those beside what is known of their surface, then what lies around each patch.
+    queue, end = np.empty(PATCH_BLOCK_PX**2, np.int64), 0
+    is_queued = np.zeros((PATCH_BLOCK_PX, PATCH_BLOCK_PX), np.bool_)
+    # First the pixels beside known ones of their surface, then those around each patch.
     for y in range(top, bottom):
         for x in range(left, right):
             if not hole[y, x]:
@@ -115,15 +115,15 @@ def _copy_block(colors, disparity, hole, number, row, column, one_surface, trust
         source_y, source_x, unlike = _find_place(colors, disparity, hole, y, x, one_surface, tap[:taps], patch[:taps])
         if source_y < 0:
             continue
-        # As much as what it goes on from, and less where it does not fit that.
-        patch_trust = max(np.float32(trusted * np.exp(-unlike / FIT**2)), LEAST_TRUST)
+        # The trust in the pixels that it continues, less where it does not fit them.
+        patch_trust = max(np.float32(trusted * np.exp(-unlike / FIT**2)), MIN_TRUST)
         for k in range(taps):
             v, u, a, b = y + tap[k, 0], x + tap[k, 1], source_y + tap[k, 0], source_x + tap[k, 1]
             if not hole[v, u] or hole[a, b] or not same_surface(disparity[a, b], patch[k, 3], one_surface):
                 continue
             i, count = number[v, u], np.float32(1.0)
             if trust[i] == 0:
-                # Those that follow are compared with this one.
+                # The following patches are compared with this one.
                 colors[v, u] = colors[a, b]
                 trust[i], count = patch_trust, FIRST_PATCH_WEIGHT
             for c in range(3):
@@ -140,11 +140,11 @@ def _copy_block(colors, disparity, hole, number, row, column, one_surface, trust
 
 @kernel
 def _take_patch(colors, disparity, hole, number, y, x, one_surface, trust, tap, patch):
-    """Write where a patch shows the surface of its middle, tap (M, 2), and what is there, patch (M, 5): colour,
-    disparity, what it counts. Returns M and the mean trust of what is there, which is 1 where it is known.
+    """Write the pixels of a patch on the surface of its middle: place, tap (M, 2); colour, disparity and weight, patch
+    (M, 5). Return M and the mean trust in those that are not smoothly filled, which is 1 for known pixels.
     """
     height, width = number.shape
-    taps, there, total = 0, 0, np.float32(0.0)
+    taps, counted, total = 0, 0, np.float32(0.0)
     for v in range(max(y - RADIUS_PX, 0), min(y + RADIUS_PX + 1, height)):
         for u in range(max(x - RADIUS_PX, 0), min(x + RADIUS_PX + 1, width)):
             if same_surface(disparity[v, u], disparity[y, x], one_surface):
@@ -152,14 +152,14 @@ def _take_patch(colors, disparity, hole, number, y, x, one_surface, trust, tap, 
                 tap[taps, 0], tap[taps, 1] = v - y, u - x
                 patch[taps, 0], patch[taps, 1], patch[taps, 2] = colors[v, u, 0], colors[v, u, 1], colors[v, u, 2]
                 patch[taps, 3], patch[taps, 4] = disparity[v, u], np.float32(1.0) if here > 0 else GUESS
-                taps, there, total = taps + 1, there + (1 if here > 0 else 0), total + here
-    return taps, total / max(there, 1)
+                taps, counted, total = taps + 1, counted + (1 if here > 0 else 0), total + here
+    return taps, total / max(counted, 1)
 
 
 @kernel
 def _find_place(colors, disparity, hole, y, x, one_surface, tap, patch):
-    """Where the surface looks most like a patch, row and column, -1 if it shows nowhere; and by how much that differs
-    from what is known, mean square.
+    """Return row and column of the most similar place of the surface, -1 without any, and the mean square of its
+    difference from the patch's known and copied pixels.
     """
     height, width = hole.shape
     side, around = 2 * (SEARCH_PX // STEP_PX) + 1, 2 * STEP_PX - 1
@@ -185,7 +185,7 @@ def _find_place(colors, disparity, hole, y, x, one_surface, tap, patch):
                 unlike += patch[m, 4] * (red * red + green * green + blue * blue)
             else:
                 unlike += patch[m, 4] * MISSING
-            # Given up once it is worse than the best.
+            # No better than the best so far.
             if unlike >= best:
                 break
         if unlike < best:
@@ -205,12 +205,14 @@ def _find_place(colors, disparity, hole, y, x, one_surface, tap, patch):
 
 @kernel
 def _blend(hole, number, pixels, first, smooth, change, trust, colors):
-    """Write up to PATCH_BLOCK_PX^2 hole pixels, from `first` on: what was filled smoothly (N, 3), changed (N, 3) as far
-    as it is trusted (N,).
+    """Write up to PATCH_BLOCK_PX^2 hole pixels from `first` on.
+
+    smooth (N, 3): their smooth colours. change (N, 3): difference of the patches from these. trust (N,): share of the
+    change that is taken; the rest is reduced to its fine texture.
     """
     height, width = number.shape
     mean, fine = np.empty(4, np.float32), np.empty(3, np.float32)
-    # Of each column around a pixel: the sum of its changes, and their number. The next pixel needs one column more.
+    # For each column around a pixel: the sum of its changes, and their number. The next pixel needs one more column.
     columns, before = np.empty((2 * FINE_TEXTURE_PX + 1, 4), np.float32), -2
     for i in range(first, min(first + PATCH_BLOCK_PX**2, len(pixels))):
         y, x = pixels[i] // width, pixels[i] % width
@@ -235,7 +237,7 @@ def _blend(hole, number, pixels, first, smooth, change, trust, colors):
         for c in range(3):
             fine[c] = change[i, c] - mean[c] / mean[3]
             most = max(most, abs(fine[c]))
-        scale, share = MOST_FINE / max(most, MOST_FINE), trust[i]
+        scale, share = MAX_TEXTURE / max(most, MAX_TEXTURE), trust[i]
         for c in range(3):
             changed = share * change[i, c] + (1 - share) * scale * fine[c]
             colors[y, x, c] = max(smooth[i, c] + changed, np.float32(0.0))

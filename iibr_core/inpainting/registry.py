@@ -1,44 +1,72 @@
-"""The ways of inpainting, by the names that people type. Each is loaded when it is asked for; this file is light."""
+"""The ways of inpainting, and the names by which people choose them. A way is imported when it is chosen."""
 
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from pkgutil import resolve_name
+from typing import Protocol
 
-from iibr_core.inpainting.inpainter import Inpainter, InpaintingAids
-from iibr_core.types import InputError
+import numpy as np
+from numpy.typing import NDArray
 
-INPAINTERS = {"background": "iibr_core.inpainting.background:background_inpainter"}
-"""Name -> "module:function" of a factory without arguments."""
+from iibr_core.types import FloatImage, InputError, ViewOffset
 
-MODEL_INPAINTERS = {"diffusion": "iibr_core.inpainting.diffusion:diffusion_inpainter"}
-"""Name -> "module:function" of a factory that is given a model's folder and `InpaintingAids`, and raises InputError
-where the folder is of no use. It is typed as NAME:FOLDER.
+EstimateDepth = Callable[[FloatImage], FloatImage]
+"""Function that returns inverse depth (H, W), up to scale and offset, of colours (H, W, 3). It may raise InputError."""
+
+
+class Inpainter(Protocol):
+    """Fills the holes of one view. Several threads may call the same inpainter for different views."""
+
+    def __call__(
+        self,
+        colors: FloatImage,
+        disparity: FloatImage,
+        hole: NDArray[np.bool_],
+        photo_disparity: FloatImage,
+        offset: ViewOffset,
+        threads: int = 1,
+    ) -> None:
+        """Write finite colors (H, W, 3), sRGB-encoded, and disparity (H, W), px per view step, where hole (H, W).
+
+        All other pixels stay; values that were in the holes before mean nothing. photo_disparity (H, W): the centre
+        view's, which shows what the photo could not see. offset: position of this view. threads: largest number of
+        threads; the result does not depend on it.
+        """
+
+
+INPAINTERS = {"background": "iibr_core.inpainting.background:fill_background"}
+"""Place of each inpainter, "module:name"."""
+
+MODEL_INPAINTERS = {"diffusion": "iibr_core.inpainting.diffusion:DiffusionInpainter"}
+"""Place of a function of a model's folder and `EstimateDepth`, None without it, that returns an inpainter.
+
+It raises InputError for a folder without a suitable model. People write NAME:FOLDER.
 """
 
 DEFAULT_INPAINTER = "background"
 INPAINTER_FORMS = (*INPAINTERS, *(f"{name}:FOLDER" for name in MODEL_INPAINTERS))
-"""How they are typed."""
+"""Forms in which people choose a way of inpainting."""
 
 
-def load_inpainter(typed: str, aids: InpaintingAids | None = None) -> Inpainter:
-    """The way of inpainting that was typed. Raises InputError where there is none, or where it lacks what it needs.
+def load_inpainter(choice: str, estimate_depth: EstimateDepth | None = None) -> Inpainter:
+    """Return the chosen inpainter. estimate_depth: the model that found the photo's depth.
 
-    It is asked for every light field and every comparison.
+    Raises InputError if there is no such inpainter, or its folder or a package is missing.
     """
-    require_inpainter(typed)
-    name, _, folder = typed.partition(":")
-    if name in MODEL_INPAINTERS:
-        loaded: Inpainter = resolve_name(MODEL_INPAINTERS[name])(folder, aids or InpaintingAids())
-    else:
-        loaded = resolve_name(INPAINTERS[name])()
-    return loaded
+    require_inpainter(choice)
+    name, _, folder = choice.partition(":")
+    inpainter: Inpainter = (
+        resolve_name(MODEL_INPAINTERS[name])(folder, estimate_depth) if folder else resolve_name(INPAINTERS[name])
+    )
+    return inpainter
 
 
-def require_inpainter(typed: str) -> None:
-    """Raise InputError where this is no way of inpainting, or its model's folder is not there; nothing is loaded."""
-    name, _, folder = typed.partition(":")
-    if typed not in INPAINTERS and not (name in MODEL_INPAINTERS and folder):
-        raise InputError(f"--inpaint {typed}: unknown inpainter; give {' or '.join(INPAINTER_FORMS)}")
-    if name in MODEL_INPAINTERS and not os.path.isdir(os.path.expanduser(folder)):
-        raise InputError(f"--inpaint {typed}: no such folder; give that of an inpainting pipeline")
+def require_inpainter(choice: str) -> None:
+    """Raise InputError if there is no such inpainter or no such folder. Nothing is loaded."""
+    name, _, folder = choice.partition(":")
+    if choice not in INPAINTERS and not (name in MODEL_INPAINTERS and folder):
+        raise InputError(f"--inpaint {choice}: unknown inpainter; give {' or '.join(INPAINTER_FORMS)}")
+    if folder and not os.path.isdir(os.path.expanduser(folder)):
+        raise InputError(f"--inpaint {choice}: no such folder; give that of an inpainting pipeline")

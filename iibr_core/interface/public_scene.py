@@ -233,6 +233,8 @@ def from_arrays(
         raise InputError(f"a disparity of shape {disparity.shape} for a photo of {tuple(given.size)}: give one (H, W)")
     with np.errstate(over="ignore"):
         values = disparity.astype(np.float32)
+    if not np.isfinite(values).all():
+        raise InputError("the given array: holds disparities that are NaN, infinite or too large; fill or scale them")
     return PhotoScene(photo_of_arrays(given, Disparity(values, "the given array")), Source(""))
 
 
@@ -260,12 +262,14 @@ def estimate_depth(
 
 
 def _photo_of(pixels: NDArray[Any], focal_px: float | None = None, name: str = "photo") -> Photo:
-    """Return the photo of an array. Raises InputError unless it is (H, W, 3)."""
+    """Return the photo of an array. Raises InputError unless it is (H, W, 3) and finite."""
     pixels = np.asarray(pixels)
     if pixels.ndim != 3 or pixels.shape[2] != 3 or not pixels.size:
         raise InputError(f"a photo of shape {pixels.shape}: give (H, W, 3)")
     with np.errstate(over="ignore"):
         given = np.maximum(encoded_from_stored(pixels), 0)
+    if not np.isfinite(given).all():
+        raise InputError(f"{name}: holds colours that are NaN or infinite; give finite ones")
     return Photo(given, focal_px or focal_px_from_fov(pixels.shape[1]), name, is_hdr=bool(given.max() > 1))
 
 

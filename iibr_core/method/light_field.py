@@ -12,8 +12,7 @@ from functools import partial
 import numpy as np
 
 from iibr_core.color import stored_from_encoded
-from iibr_core.inpainting.inpainter import Inpainter, InpaintingAids
-from iibr_core.inpainting.registry import DEFAULT_INPAINTER, load_inpainter, require_inpainter
+from iibr_core.inpainting.registry import DEFAULT_INPAINTER, EstimateDepth, Inpainter, load_inpainter, require_inpainter
 from iibr_core.method.farthest_views import farthest_views, outer_views_of_grid, outpainting_margins
 from iibr_core.method.plan import ScenePlan
 from iibr_core.method.ray_transformer import shipped_transformer
@@ -40,12 +39,12 @@ def generate(
     plan: ScenePlan,
     nearest_to: Callable[[], ViewOffset] = lambda: ViewOffset(0.0, 0.0),
     inpaint: str = DEFAULT_INPAINTER,
-    aids: InpaintingAids | None = None,
+    estimate_depth: EstimateDepth | None = None,
     wanted: Callable[[], Collection[ViewOffset] | None] = lambda: None,
 ) -> Generator[ViewUpdate]:
     """Yield every view of `plan.grid` once: the photo's, then the farthest ones, then those nearest to `nearest_to()`.
 
-    disparity: the field's (`plan.field_disparity(given)`). inpaint: as `load_inpainter` takes it. aids: for that.
+    disparity: the field's (`plan.field_disparity(given)`). inpaint, estimate_depth: see `load_inpainter`.
     wanted: called once, after the photo's view was taken; returns the offsets of the views to make, None for all.
     Pixels do not depend on the order of the views. The generator ends once the job is stopped. Raises InputError if the
     transformer's weights cannot be read or there is no such way of inpainting.
@@ -61,7 +60,7 @@ def generate(
         if not views:
             return
         # A model is not loaded for nothing.
-        inpainter = load_inpainter(inpaint if plan.has_disocclusion else DEFAULT_INPAINTER, aids)
+        inpainter = load_inpainter(inpaint if plan.has_disocclusion else DEFAULT_INPAINTER, estimate_depth)
         yield from _generate_views(photo, disparity, plan, nearest_to, inpainter, views)
 
 

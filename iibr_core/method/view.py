@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from iibr_core.color import linear_from_srgb, srgb_from_linear
 from iibr_core.inpainting.background import continues_in_front, fill_background
-from iibr_core.inpainting.inpainter import Inpainter
+from iibr_core.inpainting.registry import Inpainter
 from iibr_core.method.ambiguous_rays import SEARCH_PX, AmbiguousRays, blend, find_ambiguous_rays
 from iibr_core.method.candidates import find_candidates
 from iibr_core.method.closed_form import closed_form

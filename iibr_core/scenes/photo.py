@@ -23,7 +23,7 @@ from iibr_core.formats.images.metadata import settings_text_in
 from iibr_core.formats.images.photo import DEFAULT_MAX_PIXELS, focal_px_from_fov, read_thumbnail
 from iibr_core.formats.images.side_by_side import photo_size
 from iibr_core.formats.light_fields.light_field_formats import is_view_file
-from iibr_core.inpainting.inpainter import InpaintingAids
+from iibr_core.inpainting.registry import EstimateDepth
 from iibr_core.method.disparity_range import measure_disparity_range
 from iibr_core.method.light_field import generate
 from iibr_core.method.plan import (
@@ -123,10 +123,10 @@ def prepare_brush() -> None:
     DepthCanvas(np.zeros((4, 4, 3), np.float32), np.zeros((4, 4), np.float32)).apply(DepthEdits(strokes=strokes))
 
 
-def inpainting_aids(source: Source, loaded: LoadedPhoto) -> InpaintingAids:
-    """Return the aids for inpainting this photo: the estimator of its depth, if that was a model."""
+def depth_estimator(source: Source, loaded: LoadedPhoto) -> EstimateDepth | None:
+    """Return the model that found the depth of this photo, None if it was no model."""
     found = PhotoWithDepth(loaded.photo, loaded.found, loaded.origin)
-    return InpaintingAids(estimator_of(found, source.depth))
+    return estimator_of(found, source.depth)
 
 
 def make_plan(source: Source, loaded: LoadedPhoto, depth_strength: float, keeps_views: bool = True) -> ScenePlan:
@@ -160,9 +160,9 @@ def views_of_photo(
 ) -> Generator[ViewUpdate]:
     """Yield the views as `generate` does, in sRGB or in the photo's colour space. Raises InputError as that does."""
     photo, disparity = loaded.photo, plan.field_disparity(loaded.disparity)
-    aids = inpainting_aids(source, loaded)
+    estimate_depth = depth_estimator(source, loaded)
     return generate(
-        photo_in_srgb(photo) if in_srgb else photo, disparity, plan, nearest_to, source.inpaint, aids, wanted
+        photo_in_srgb(photo) if in_srgb else photo, disparity, plan, nearest_to, source.inpaint, estimate_depth, wanted
     )
 
 

@@ -1,11 +1,6 @@
 """A way of inpainting that cannot be overlooked: for tests of the way to it, which put its ENTRY into the registry."""
 
-ENTRY = f"{__name__}:red_inpainter"
-
-
-def red_inpainter():
-    """The factory that the registry asks for."""
-    return paint_red
+ENTRY = f"{__name__}:paint_red"
 
 
 def paint_red(colors, disparity, hole, photo_disparity, offset, threads):

@@ -19,7 +19,7 @@ from iibr_core.depth.search import disparity_of_file
 from iibr_core.formats.images.photo import read_photo
 from iibr_core.formats.maps.disparity_file import read_disparity
 from iibr_core.inpainting.background import fill_background
-from iibr_core.inpainting.patch_synthesis import MOST_FINE
+from iibr_core.inpainting.patch_synthesis import MAX_TEXTURE
 from iibr_core.method.ambiguous_rays import FEATURES, SHARE, AmbiguousRays
 from iibr_core.method.candidates import find_candidates
 from iibr_core.method.closed_form import closed_form
@@ -304,8 +304,8 @@ def test_a_hole_that_covers_the_whole_frame_border(tmp_path):
     colors, filled = np.where(hole[..., None], 0, photo.pixels), np.where(hole, 0, np.float32(1.0))
     fill_background(colors, filled, hole, np.ones_like(filled), ViewOffset(2.0, 2.0))
     inside = photo.pixels[~hole]
-    assert (colors >= inside.min(axis=0) - MOST_FINE - 1e-6).all()
-    assert (colors <= inside.max(axis=0) + MOST_FINE + 1e-6).all()
+    assert (colors >= inside.min(axis=0) - MAX_TEXTURE - 1e-6).all()
+    assert (colors <= inside.max(axis=0) + MAX_TEXTURE + 1e-6).all()
     assert filled == pytest.approx(1.0)
 
 

@@ -101,13 +101,13 @@ def _written(
     """
     from iibr_core.beyond.free_cameras import FreeViews, depths_of, reach_of
     from iibr_core.method.light_field import encode_for_storage
-    from iibr_core.scenes.photo import inpainting_aids
+    from iibr_core.scenes.photo import depth_estimator
 
     photo, inverse_depth = photo_in_srgb(loaded.photo), _inverse_depth(loaded, is_literal, cameras[given])
     canvas = reach_of(cameras[given], cameras, depths_of(inverse_depth)).margins.around(photo.size)
     largest = max((camera.size for camera in cameras), key=math.prod)
     require_memory(math.prod(canvas) * MAKING_BYTES, f"making views of {largest} from a canvas of {canvas}")
-    inpainter = load_inpainter(source.inpaint, inpainting_aids(source, loaded))
+    inpainter = load_inpainter(source.inpaint, depth_estimator(source, loaded))
     views = FreeViews(photo.pixels, inverse_depth, cameras[given], cameras, inpainter=inpainter)
     with write_folder(out) as unfinished:
         for number, camera in enumerate(cameras, 1):

@@ -88,13 +88,13 @@ def _indices(scene: MultiView) -> dict[GridIndex, int]:
 
 def _iterate_views(scene: MultiView, grid: GridShape, size: ImageSize) -> Iterator[ViewUpdate]:
     indices, order = _indices(scene), _nearest_to_centre(grid)
-    for done, (at, colors) in enumerate(zip(order, _read_colors(scene, [indices[at] for at in order])), 1):
+    for at, colors in zip(order, _read_colors(scene, [indices[at] for at in order])):
         index = indices[at]
         if image_size(colors) != size:
             path = scene.views[index].path
             raise InputError(f"{path}: is rotated by its Exif orientation; views must be stored upright")
         disparity = _read_map(scene, index, size) if index in scene.disparity else None
-        yield ViewUpdate(*at, colors, disparity, share=done / len(order))
+        yield ViewUpdate(*at, colors, disparity)
 
 
 def _read_colors(scene: MultiView, indices: list[int]) -> Iterator[StoredColors]:

@@ -3,17 +3,10 @@
 import numpy as np
 import pytest
 
-from iibr_core.beyond.between_views import (
-    FAR_WEIGHT,
-    GivenView,
-    densify,
-    require_steps,
-)
+from iibr_core.beyond.between_views import GivenView, densify, require_steps
 from iibr_core.color import bytes_from_encoded, encoded_from_stored
 from iibr_core.evaluation.metrics import bounded_psnr
 from iibr_core.method.light_field import generate
-from iibr_core.method.rays import rays_of_photo
-from iibr_core.method.view import Renderer
 from iibr_core.runtime.work import stoppable
 from iibr_core.training.scenes.random_scene import random_scene
 from iibr_core.training.scenes.raycast import render
@@ -63,34 +56,6 @@ def test_views_between_are_better_than_from_the_centre_alone_and_given_ones_come
         wrong = [np.abs(made[at].disparity - dense[at][1]) > 0.25 for at in new]
         assert np.mean(wrong) < 0.05
     assert np.mean(gains) > 3
-
-
-def test_a_view_is_the_mean_of_what_the_views_around_show_by_nearness_and_coverage():
-    scene = random_scene(np.random.default_rng(13), SIZE, 2.0)
-    sparse = drawn_views(SPARSE, scene)
-    given = [GivenView(*at, colors, 2 * disparity) for at, (colors, disparity) in sparse.items()]
-    made = by_index(list(densify(given, SPARSE, GridShape(7, 7))))[1, 4]
-    total, weights = np.zeros((*SIZE, 3)), np.zeros(SIZE)
-    heaviest, shown = np.zeros(SIZE), np.zeros(SIZE)
-    renderer = Renderer()
-    for (row, column), (colors, disparity) in sparse.items():
-        away = ViewOffset(1.0 - 3 * row, 4.0 - 3 * column)
-        if max(abs(away.t), abs(away.s)) > 3:
-            continue
-        rays = rays_of_photo(encoded_from_stored(colors), 2 * disparity / np.float32(3), 3, 0)
-        view, covered = renderer.visible(rays, away)
-        for y, x in np.ndindex(*SIZE):
-            if not view.occluded[y, x]:
-                near = (1 - abs(away.t) / 3) * (1 - abs(away.s) / 3) + FAR_WEIGHT
-                weight = near * covered[y, x] ** 2
-                total[y, x] += weight * view.colors[y, x]
-                weights[y, x] += weight
-                if weight > heaviest[y, x]:
-                    heaviest[y, x], shown[y, x] = weight, view.disparity[y, x]
-    seen = weights > 0
-    assert (seen == ~made.inpainted).all()
-    assert np.abs(made.colors[seen] / 255 - np.clip(total[seen] / weights[seen][:, None], 0, 1)).max() < 0.6 / 255
-    np.testing.assert_allclose(made.disparity[seen], shown[seen], atol=1e-5)
 
 
 def test_what_only_views_a_whole_step_away_see_is_not_inpainted():

@@ -7,8 +7,8 @@ import pytest
 
 from iibr_core.beyond.free_cameras import (
     FARTHEST_STEPS,
-    MOST_BEYOND,
-    MOST_PARALLAX,
+    MAX_BEYOND,
+    MAX_PARALLAX,
     FreeViews,
     fitted_cameras,
     inverse_depth_of,
@@ -54,7 +54,7 @@ def test_a_camera_far_beside_asks_for_half_a_picture_of_parallax_at_most():
     photo, beside = camera(40, 48), camera(40, 48, place=(0.9, 0.0, 0.0))
     reach = reach_of(photo, [photo, beside], (1.0, 3.0))
     # From 1 to 3 units away, a unit's move is 60 (1 - 1/3) px.
-    assert 40 * FARTHEST_STEPS * reach.step == pytest.approx(MOST_PARALLAX * 48)
+    assert 40 * FARTHEST_STEPS * reach.step == pytest.approx(MAX_PARALLAX * 48)
     assert max(at.s for at in reach.outer) == pytest.approx(FARTHEST_STEPS)
 
 
@@ -70,7 +70,7 @@ def test_a_turned_camera_asks_for_what_lies_beyond_the_frame():
     margins = reach_of(photo, [camera(40, 48, turned=about(1, 10.0))], (1.0, 3.0)).margins
     assert margins.right >= 60 * np.tan(np.radians(10.0)) > 0 == margins.left
     wide = reach_of(photo, [camera(40, 48, 2.0)], (1.0, 3.0)).margins
-    assert tuple(wide) == (MOST_BEYOND * 40,) * 2 + (MOST_BEYOND * 48,) * 2
+    assert tuple(wide) == (MAX_BEYOND * 40,) * 2 + (MAX_BEYOND * 48,) * 2
 
 
 def test_cameras_that_look_along_add_nothing():

@@ -65,7 +65,7 @@ def test_samples_see_what_a_slow_twin_sees(turn, rounding):
     matrix = target_from_photo(photo, target, 8.0)
     rays = rays_of_photo(np.zeros((6, 7, 3), np.float32), disparity.astype(np.float32), 1.0, 0)
     flat = tuple(map(float, matrix.ravel()))
-    landing = [rows_landed_on(rays, 0, flat)]
+    landing = [rows_landed_on(rays, 0, matrix)]
     nearest, source = draw_rays(rays, [flat], landing, 0.5, rounding, (0, 4), 5)
     slow = drawn_slowly(rays.arrays.disparity[0], matrix, target.size, rounding)
     # Samples on the very side of a triangle belong to either.

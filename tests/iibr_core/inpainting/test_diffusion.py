@@ -10,7 +10,6 @@ import pytest
 from iibr_core.inpainting import diffusion
 from iibr_core.inpainting.background import fill_background
 from iibr_core.inpainting.diffusion import LARGE_PX, align_in_gaps, large_gaps
-from iibr_core.inpainting.inpainter import InpaintingAids
 from iibr_core.inpainting.registry import load_inpainter
 from iibr_core.runtime.work import Cancelled, stoppable, watched
 from iibr_core.types import InputError, ViewOffset
@@ -93,24 +92,19 @@ def test_large_gaps_are_painted_and_all_else_is_background(folder):
     np.testing.assert_array_equal(again, colors)
 
 
-def test_a_stop_is_heard_between_layers(folder):
-    asked = []
-
-    def should_stop():
-        asked.append(None)
-        return len(asked) > 300
-
-    with pytest.raises(Cancelled), stoppable(should_stop):
+def test_a_stop_is_heard_between_steps(folder):
+    said = []
+    with pytest.raises(Cancelled), watched(lambda *progress: said.append(progress)), stoppable(lambda: len(said) > 1):
         load_inpainter(f"diffusion:{folder}")(*view_with_holes(), OFFSET)
-    assert len(asked) == 301
+    assert len(said) == 2 < STEPS
 
 
 def test_what_was_painted_gets_the_depth_that_the_estimator_sees(folder):
     colors, disparity, hole, photo_disparity = view_with_holes()
     # Twice the disparity and one more, and in the gap something half-way between wall and strip.
     estimate = 2 * np.where(hole, 6.0, disparity) + 1
-    aids = InpaintingAids(lambda colors: estimate.astype(np.float32))
-    load_inpainter(f"diffusion:{folder}", aids)(colors, disparity, hole, photo_disparity, OFFSET)
+    inpaint = load_inpainter(f"diffusion:{folder}", lambda colors: estimate.astype(np.float32))
+    inpaint(colors, disparity, hole, photo_disparity, OFFSET)
     np.testing.assert_allclose(disparity[:, 30:42], 6.0, atol=1e-4)
     np.testing.assert_array_equal(disparity[:, 50:52], 0.0)
 
@@ -119,7 +113,7 @@ def test_views_without_large_gaps_do_not_ask_the_model(folder):
     def fail(*_):
         raise AssertionError
 
-    inpaint = load_inpainter(f"diffusion:{folder}", InpaintingAids(fail))
+    inpaint = load_inpainter(f"diffusion:{folder}", fail)
     colors, disparity, hole, photo_disparity = view_with_holes()
     hole[:, 30:42] = False
     colors[:, 30:42] = disparity[:, 30:42] = 0

@@ -13,8 +13,8 @@ from iibr_core.inpainting.disparity_holes import (
     say_filled,
 )
 
-LINES = ((1, 1), (1, 0), (1, -1), (0, 1))
-"""Falling diagonal, vertical, rising diagonal, horizontal: (down, right)."""
+LINES = ((0, 1), (1, 0), (1, 1), (1, -1))
+"""Horizontal, vertical, falling diagonal, rising diagonal: (down, right)."""
 
 
 def slow_fill(values):

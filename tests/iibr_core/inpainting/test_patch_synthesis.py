@@ -9,9 +9,9 @@ from iibr_core.inpainting.patch_synthesis import (
     FIRST_PATCH_WEIGHT,
     FIT,
     GUESS,
-    LEAST_TRUST,
+    MAX_TEXTURE,
+    MIN_TRUST,
     MISSING,
-    MOST_FINE,
     PATCH_BLOCK_PX,
     RADIUS_PX,
     SEARCH_PX,
@@ -72,7 +72,7 @@ def copy_slowly(smooth, disparity, hole, one_surface):
         place = best_place(patch, middle, [coarse] + [(coarse[0] + j, coarse[1] + i) for j, i in product(fine, fine)])
         known = [trust[at] > 0 for at in patch]
         misfit = unlike(patch, middle, place)[known].mean()
-        trusted = max(np.mean([trust[at] for at in patch if trust[at] > 0]) * np.exp(-misfit / FIT**2), LEAST_TRUST)
+        trusted = max(np.mean([trust[at] for at in patch if trust[at] > 0]) * np.exp(-misfit / FIT**2), MIN_TRUST)
         for at in patch:
             source = at[0] - middle[0] + place[0], at[1] - middle[1] + place[1]
             if hole[at] and not hole[source] and is_one(at, source):
@@ -101,7 +101,7 @@ def copy_slowly(smooth, disparity, hole, one_surface):
         change[at] = np.mean(patches, axis=0) - smooth[at] if patches else 0
     for at in map(tuple, np.argwhere(hole)):
         fine = change[at] - np.mean([change[b] for b in window(size, *at, FINE_TEXTURE_PX) if hole[b]], axis=0)
-        fine *= MOST_FINE / max(np.abs(fine).max(), MOST_FINE)
+        fine *= MAX_TEXTURE / max(np.abs(fine).max(), MAX_TEXTURE)
         blended[at] = np.maximum(smooth[at] + trust[at] * change[at] + (1 - trust[at]) * fine, 0)
     return blended
 

@@ -25,10 +25,6 @@ def view_with_holes():
     return view.colors, view.disparity, view.occluded, disparity.values
 
 
-def test_the_default_is_one_of_them():
-    assert DEFAULT_INPAINTER in INPAINTERS
-
-
 def test_an_unknown_name_is_one_line_that_names_those_there_are():
     with pytest.raises(InputError, match=f"--inpaint magic: .*{DEFAULT_INPAINTER}"):
         load_inpainter("magic")
