@@ -6,10 +6,9 @@ import re
 from pathlib import Path
 
 import numpy as np
-import OpenImageIO as oiio
 
 from iibr_core.formats.files import MAX_FILE_PIXELS
-from iibr_core.formats.images.decode import complaint_of, oiio_name
+from iibr_core.formats.images.decode import complaint_of, open_header
 from iibr_core.types import FloatImage, InputError
 
 DEPTH_CHANNEL = re.compile(r"(?:.*\.)?(?:Z|depth|depth\.[YVRXZ])", re.IGNORECASE)
@@ -26,9 +25,8 @@ def read_depth_channel(path: Path) -> FloatImage | None:
     """
     if path.suffix.lower() != ".exr":
         return None
-    source = oiio.ImageInput.open(oiio_name(path))
+    source = open_header(path)
     if source is None:
-        complaint_of(oiio)
         return None
     for part in range(MAX_PARTS):
         if not source.seek_subimage(part, 0):

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from iibr_core.formats.files import MAX_FILE_PIXELS, open_binary, reason_of, require_file
 from iibr_core.formats.images.picture import Picture, opaque_as_none, require_sound_size
-from iibr_core.formats.images.pillow_reader import DECODE_ERRORS, exif_of, facts_of, sound_orientation
-from iibr_core.types import FloatImage, ImageSize, InputError
+from iibr_core.formats.images.pillow_reader import DECODE_ERRORS, exif_of, facts_of, orientation_in
+from iibr_core.types import FloatImage, ImageSize, InputError, image_size
 
 BRANDS = frozenset({b"heic", b"heix", b"heim", b"heis", b"hevc", b"hevx", b"mif1", b"msf1"})
 
@@ -41,7 +41,7 @@ def read_heic(path: Path, number: int = 0) -> Picture:
     alpha = opaque_as_none(pixels[..., 3]) if pixels.shape[2] == 4 else None
     is_premultiplied = bool(getattr(picture, "premultiplied_alpha", False))
     colors = pixels[..., : 3 if pixels.shape[2] >= 3 else 1]
-    return Picture(colors, alpha, is_premultiplied, **facts_of(picture.info, heic_size(path, number)))
+    return Picture(colors, alpha, is_premultiplied, **facts_of(picture.info, image_size(pixels)))
 
 
 def heic_size(path: Path, number: int = 0) -> ImageSize:
@@ -92,7 +92,7 @@ def heic_info(path: Path) -> dict[str, Any]:
 
 def heic_orientation(path: Path) -> int:
     """Return Exif's Orientation, 1..8, of a HEIC; its photo is read upright."""
-    return sound_orientation(exif_of(heic_info(path)))
+    return orientation_in(exif_of(heic_info(path)))
 
 
 def heic_auxiliaries(path: Path) -> tuple[str, ...]:

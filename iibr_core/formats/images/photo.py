@@ -20,11 +20,11 @@ from iibr_core.formats.images.color_profile import color_profile_of, color_space
 from iibr_core.formats.images.decode import decode_bands
 from iibr_core.formats.images.file_notes import file_notes
 from iibr_core.formats.images.hdr import tone_map
-from iibr_core.formats.images.mpo import is_jpeg
 from iibr_core.formats.images.picture import Picture, full_scale, upright
 from iibr_core.formats.images.picture_source import PictureSource, read_source, source_size
 from iibr_core.formats.images.side_by_side import left_picture
 from iibr_core.formats.images.small_picture import small_picture
+from iibr_core.formats.images.stereo_jpeg import is_jpeg
 from iibr_core.runtime.kernels import kernel
 from iibr_core.runtime.work import raise_if_stopped
 from iibr_core.types import (
@@ -86,7 +86,8 @@ def read_picture(
     space = color_space_of(picture)
     if not keeps_primaries:
         encoded, space = convert(encoded, SRGB, space), SRGB
-    notes = _color_notes(picture)
+    note = picture.note or color_profile_of(picture)[1]
+    notes = (note,) if note else ()
     if picture.alpha is not None:
         notes += ("Transparency was dropped: the photo is laid over black.",)
     if is_smaller:
@@ -243,12 +244,3 @@ def _average_areas(light, row_step, top, first_row, result):
             result[y, x, 0] = red / area
             result[y, x, 1] = green / area
             result[y, x, 2] = blue / area
-
-
-def _color_notes(picture: Picture) -> tuple[str, ...]:
-    if picture.color_model == "CMYK":
-        return ("CMYK was converted to RGB without its colour profile.",)
-    if picture.color_model == "LAB":
-        return ("Lab was converted to RGB with a tint: save the photo as RGB for its true colours.",)
-    note = color_profile_of(picture)[1]
-    return (note,) if note else ()

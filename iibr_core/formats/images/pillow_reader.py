@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from PIL import Image, ImageCms
+from PIL import Image
 
 from iibr_core.formats.files import MAX_FILE_PIXELS, reason_of
 from iibr_core.formats.images.picture import (
@@ -47,19 +47,17 @@ EXIF_ERRORS = (*DECODE_ERRORS, TypeError, ZeroDivisionError, KeyError, Attribute
 
 
 @contextmanager
-def open_with_pillow(
-    path: Path, formats: tuple[str, ...], what: str, data: bytes | None = None
-) -> Iterator[Image.Image]:
+def open_with_pillow(path: Path, formats: tuple[str, ...], data: bytes | None = None) -> Iterator[Image.Image]:
     """Open a picture of one of these formats and read its header.
 
-    what: kind of picture, for messages. data: bytes of a picture within the file, None for the file itself. Raises
-    InputError where it is none, or claims an absurd size; also for Pillow's errors in the block.
+    data: bytes of a picture within the file, None for the file itself. Raises InputError where it is none, or claims
+    an absurd size; also for Pillow's errors in the block.
     """
     try:
         image = Image.open(path if data is None else BytesIO(data), formats=formats)
     except DECODE_ERRORS as error:
         reason = reason_of(error).replace(f" {str(path)!r}", "")
-        raise InputError(f"{path}: cannot be read as {what} ({reason})") from error
+        raise InputError(f"{path}: cannot be read as a picture ({reason})") from error
     with image:
         require_sound_size(path, image.width, image.height, image.width * image.height * 4)
         try:
@@ -76,15 +74,10 @@ def picture_of(image: Image.Image) -> Picture:
     pixels = np.asarray(image.convert("RGBA" if has_alpha else "RGB"))
     alpha = opaque_as_none(pixels[..., 3]) if has_alpha else None
     facts = facts_of(image.info, ImageSize(image.height, image.width))
-    return Picture(pixels[..., :3], alpha, orientation=orientation_of(image), **facts)
+    return Picture(pixels[..., :3], alpha, orientation=orientation_in(image.getexif()), **facts)
 
 
-def orientation_of(image: Image.Image) -> int:
-    """Return Exif's Orientation, 1 to 8, of an opened picture."""
-    return sound_orientation(image.getexif())
-
-
-def sound_orientation(exif: Image.Exif) -> int:
+def orientation_in(exif: Image.Exif) -> int:
     """Return the Orientation in Exif, 1 to 8."""
     orientation = exif.get(ORIENTATION_TAG, 1)
     return int(orientation) if orientation in range(1, 9) else 1
@@ -112,11 +105,4 @@ def facts_of(info: Mapping[Any, Any], size: ImageSize) -> dict[str, Any]:
     codes = tuple(int(stated.get(name, 0)) for name in COLOR_CODES)
     if stated and (not profile or codes[1] in HDR_TRANSFERS):
         return facts | {"codes": codes}
-    return facts | ({"icc": bytes(profile), "icc_name": _profile_name(profile)} if profile else {})
-
-
-def _profile_name(profile: bytes) -> str:
-    try:
-        return ImageCms.getProfileDescription(ImageCms.ImageCmsProfile(BytesIO(profile))).strip()
-    except (ImageCms.PyCMSError, *DECODE_ERRORS):
-        return ""
+    return facts | {"icc": bytes(profile or b"")}
