@@ -82,7 +82,7 @@ def _in_avif(path: Path) -> EmbeddedDepth | None:
 def _in_heic(path: Path) -> EmbeddedDepth | None:
     depth = read_heic_depth(path)
     if depth is not None:
-        return EmbeddedDepth(heic_estimate(depth.values, depth.metadata), "Apple portrait")
+        return EmbeddedDepth(heic_estimate(*depth), "Apple portrait")
     with open_binary(path) as file:
         found = samsung_estimate(file.read(MAX_FILE_BYTES))
     if found is None:

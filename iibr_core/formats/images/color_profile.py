@@ -27,7 +27,7 @@ from iibr_core.formats.images.color_primaries import (
     space_of_matrix,
     space_of_number,
 )
-from iibr_core.formats.images.hdr import hlg_display_light, hlg_scene_light, pq_light
+from iibr_core.formats.images.hdr import HLG, PQ, hlg_display_light, hlg_scene_light, pq_light
 from iibr_core.formats.images.picture import Picture
 from iibr_core.formats.images.pillow_reader import DECODE_ERRORS
 from iibr_core.runtime.resources import resource_folder
@@ -49,7 +49,6 @@ MAX_PROFILE_BYTES = 4 * 2**20
 """Largest profile; those with a table for every colour, for printers, have one or two megabytes."""
 Curve = Callable[[NDArray[Any]], NDArray[Any]]
 Hdr = Literal["", "PQ", "HLG"]
-PQ, HLG = 16, 18
 CURVES_OF_CODES: dict[int, Curve] = {
     **dict.fromkeys((1, 6, 13, 14, 15), linear_from_srgb),
     4: lambda x: x**2.2,

@@ -72,22 +72,20 @@ def read_picture(
     require_file(source.path)
     stored_size = source_size(source)
     size = size_within(stored_size, max_pixels)
-    is_smaller = size != stored_size
-    if is_smaller:
-        bands = decode_bands(source.path) if source == PictureSource(source.path) else iter([read_source(source)])
-        picture, finite_notes = _finite(next(bands))
-        try:
-            encoded = _encode_light(_averaged(picture, bands, stored_size, size), picture)
-        except StopIteration as error:  # the header states another size than the picture has
-            raise InputError(f"{source.path}: damaged (rows are missing); get the whole file again") from error
-    else:
-        picture, finite_notes = _finite(read_source(source))
-        encoded = _encode(picture)
+    is_smaller, is_whole = size != stored_size, source == PictureSource(source.path)
+    bands = decode_bands(source.path) if is_smaller and is_whole else iter([read_source(source)])
+    picture, finite_notes = _finite(next(bands))
+    try:
+        encoded = (
+            _encode_light(_averaged(picture, bands, stored_size, size), picture) if is_smaller else _encode(picture)
+        )
+    except StopIteration as error:  # the header states another size than the picture has
+        raise InputError(f"{source.path}: damaged (rows are missing); get the whole file again") from error
     space = color_space_of(picture)
     if not keeps_primaries:
         encoded, space = convert(encoded, SRGB, space), SRGB
     note = picture.note or color_profile_of(picture)[1]
-    notes = (note,) if note else ()
+    notes: tuple[str, ...] = (note,) if note else ()
     if picture.alpha is not None:
         notes += ("Transparency was dropped: the photo is laid over black.",)
     if is_smaller:

@@ -14,9 +14,9 @@ from iibr_core.formats.images.decode import read_text
 from iibr_core.formats.images.picture import Picture, full_scale, upright
 from iibr_core.formats.images.picture_source import PictureSource, read_source, source_size
 from iibr_core.formats.maps.color_maps import values_of_colors
-from iibr_core.formats.maps.map_text import KEY, MapText, text_from
 from iibr_core.formats.maps.npy import read_array
 from iibr_core.formats.maps.pfm import read_pfm, read_pfm_size
+from iibr_core.formats.maps.writer import KEY, MapText, text_from
 from iibr_core.types import FloatImage, ImageSize, InputError, image_size
 
 GREY_TOLERANCE = 16 / 255
