@@ -31,12 +31,7 @@ from iibr_core.formats.images.hdr import HLG, PQ, hlg_display_light, hlg_scene_l
 from iibr_core.formats.images.picture import Picture
 from iibr_core.formats.images.pillow_reader import DECODE_ERRORS
 from iibr_core.runtime.resources import resource_folder
-from iibr_core.types import (
-    DISPLAY_P3,
-    SRGB,
-    ColorSpace,
-    FloatImage,
-)
+from iibr_core.types import DISPLAY_P3, SRGB, ColorSpace, FloatImage
 
 KNOTS = 65536
 """Number of values of a curve: one for each value of 16 bits."""

@@ -19,13 +19,7 @@ from iibr_core.formats.images.avif import is_avif, open_avif
 from iibr_core.formats.images.file_kinds import raw_kind, unreadable_kind
 from iibr_core.formats.images.heic import heic_size, is_heic, read_heic
 from iibr_core.formats.images.lfp import is_lfp, lfp_size, read_lfp
-from iibr_core.formats.images.picture import (
-    EXIF_NUMBERS,
-    Picture,
-    exif_focal_px,
-    opaque_as_none,
-    require_sound_size,
-)
+from iibr_core.formats.images.picture import EXIF_NUMBERS, Picture, exif_focal_px, opaque_as_none, require_sound_size
 from iibr_core.formats.images.pillow_reader import open_with_pillow, orientation_in, picture_of
 from iibr_core.formats.images.stereo_jpeg import lif_bytes, open_lif
 from iibr_core.types import ImageSize, InputError

@@ -111,17 +111,14 @@ def settings_text_in(path: Path) -> str:
 
 def read_caption(path: Path) -> Caption:
     """Return the texts about a photo, XMP before Exif; empty where the file is damaged or missing."""
-    metadata, tree = read_metadata(path), None
+    metadata = read_metadata(path)
     photo = _folders_in(metadata.exif)[0]
+    texts = [photo.get(tag) for tag in (0, DESCRIPTION, ARTIST, COPYRIGHT)]
     with suppress(InputError):
-        tree = parse_packet(metadata.xmp) if metadata.xmp else None
-
-    def text(name: str, tag: int) -> str:
-        described = "" if tree is None else _line(list_value_in(tree, NAMESPACES["dc"], name), MAX_CAPTION_CHARACTERS)
-        return described or _line(photo.get(tag), MAX_CAPTION_CHARACTERS)
-
-    tags = {"title": 0, "description": DESCRIPTION, "creator": ARTIST, "rights": COPYRIGHT}
-    return Caption(*(text(name, tag) for name, tag in tags.items()))
+        tree = parse_packet(metadata.xmp)
+        names = ("title", "description", "creator", "rights")
+        texts = [list_value_in(tree, NAMESPACES["dc"], name) or text for name, text in zip(names, texts)]
+    return Caption(*(_line(text, MAX_CAPTION_CHARACTERS) for text in texts))
 
 
 def camera_facts(metadata: PictureMetadata) -> tuple[tuple[str, str], ...]:

@@ -27,13 +27,7 @@ from iibr_core.formats.images.small_picture import small_picture
 from iibr_core.formats.images.stereo_jpeg import is_jpeg
 from iibr_core.runtime.kernels import kernel
 from iibr_core.runtime.work import raise_if_stopped
-from iibr_core.types import (
-    SRGB,
-    FloatImage,
-    ImageSize,
-    InputError,
-    Photo,
-)
+from iibr_core.types import SRGB, FloatImage, ImageSize, InputError, Photo
 
 DEFAULT_MAX_PIXELS = 2_000_000
 DEFAULT_FOV_DEG = 50.0
@@ -76,9 +70,10 @@ def read_picture(
     bands = decode_bands(source.path) if is_smaller and is_whole else iter([read_source(source)])
     picture, finite_notes = _finite(next(bands))
     try:
-        encoded = (
-            _encode_light(_averaged(picture, bands, stored_size, size), picture) if is_smaller else _encode(picture)
-        )
+        if is_smaller:
+            encoded = _encode_light(_averaged(picture, bands, stored_size, size), picture)
+        else:
+            encoded = _encode(picture)
     except StopIteration as error:  # the header states another size than the picture has
         raise InputError(f"{source.path}: damaged (rows are missing); get the whole file again") from error
     space = color_space_of(picture)

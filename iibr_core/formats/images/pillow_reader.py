@@ -14,13 +14,7 @@ from PIL import Image
 
 from iibr_core.formats.files import MAX_FILE_PIXELS, reason_of
 from iibr_core.formats.images.hdr import HLG, PQ
-from iibr_core.formats.images.picture import (
-    EXIF_NUMBERS,
-    Picture,
-    exif_focal_px,
-    opaque_as_none,
-    require_sound_size,
-)
+from iibr_core.formats.images.picture import EXIF_NUMBERS, Picture, exif_focal_px, opaque_as_none, require_sound_size
 from iibr_core.types import ImageSize, InputError
 
 # Pillow's own limit is lower than ours: Exif of larger photos would be lost.
