@@ -11,12 +11,11 @@ from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.estimates import DisparityMap, Estimate, MetricDepth, RelativeInverseDepth, values_of
 from iibr_core.depth.near_end import is_better_turned, near_evidence, zeros_are_depth
 from iibr_core.formats.images.decode import read_orientation
-from iibr_core.formats.images.exr_depth import read_depth_channel
 from iibr_core.formats.images.picture import upright
 from iibr_core.formats.images.rgbd import rgbd_parts
 from iibr_core.formats.maps.disparity_file import has_shape_of, require_scale, resampling_note, scaled_disparity
-from iibr_core.formats.maps.map_text import MapText
-from iibr_core.formats.maps.reader import MapFile, read_map_file, read_map_picture
+from iibr_core.formats.maps.reader import MapFile, read_depth_channel, read_map_file, read_map_picture
+from iibr_core.formats.maps.writer import MapText
 from iibr_core.types import (
     FloatImage,
     InputError,

@@ -12,8 +12,7 @@ from iibr_core.exports.cameras import cameras_of, colors_of, nearest_metres
 from iibr_core.exports.kinds import ExportOptions
 from iibr_core.exports.source import ExportSource
 from iibr_core.formats.images.write import write_image
-from iibr_core.formats.maps.map_text import MapText
-from iibr_core.formats.maps.writer import write_map
+from iibr_core.formats.maps.writer import MapText, write_map
 from iibr_core.formats.quilts import tagged
 from iibr_core.scenes.scene import Scene
 from iibr_core.types import FloatImage, InputError

@@ -14,12 +14,12 @@ from iibr_core.depth.embedded.trailers import huawei_estimate, second_picture_es
 from iibr_core.depth.embedded.xmp import Xmp, is_jpeg, jpeg_layout, xmp_of
 from iibr_core.depth.estimates import Estimate, RelativeInverseDepth
 from iibr_core.formats.files import open_binary
-from iibr_core.formats.images.avif import avif_depth_file, avif_orientation, is_avif
+from iibr_core.formats.images.avif import avif_depth_file, is_avif
 from iibr_core.formats.images.heic import heic_orientation, is_heic, read_heic_depth
 from iibr_core.formats.images.lfp import is_lfp, read_lfp_depth
-from iibr_core.formats.images.lif import SOURCE_IMAGE, read_lif
 from iibr_core.formats.images.metadata import read_metadata
 from iibr_core.formats.images.picture import upright
+from iibr_core.formats.images.stereo_jpeg import SOURCE_IMAGE, read_lif
 from iibr_core.formats.images.xmp import parse_packet
 from iibr_core.types import InputError
 
@@ -76,14 +76,13 @@ def _in_avif(path: Path) -> EmbeddedDepth | None:
     data = avif_depth_file(path)
     if data is None:
         return None
-    values = upright(decode_map(data, "the depth map of the AVIF", ("AVIF",)), avif_orientation(path))
-    return EmbeddedDepth(RelativeInverseDepth(values), "AVIF depth")
+    return EmbeddedDepth(RelativeInverseDepth(decode_map(data, "the depth map of the AVIF", ("AVIF",))), "AVIF depth")
 
 
 def _in_heic(path: Path) -> EmbeddedDepth | None:
     depth = read_heic_depth(path)
     if depth is not None:
-        return EmbeddedDepth(heic_estimate(depth.values, depth.metadata), "Apple portrait")
+        return EmbeddedDepth(heic_estimate(*depth), "Apple portrait")
     with open_binary(path) as file:
         found = samsung_estimate(file.read(MAX_FILE_BYTES))
     if found is None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -9,13 +10,14 @@ from pathlib import Path
 from PIL.Image import Image
 
 from iibr_core.formats.files import open_binary, require_file
-from iibr_core.formats.images.iso_boxes import color_codes_of, with_auxiliary_shown
-from iibr_core.formats.images.pillow_reader import COLOR_CODES, open_with_pillow, orientation_of
+from iibr_core.formats.images.iso_boxes import associations, box, boxes
+from iibr_core.formats.images.pillow_reader import COLOR_CODES, open_with_pillow
 
 BRANDS = frozenset({b"avif", b"avis"})
 MAX_BRANDS_BYTES = 256
 DEPTH_TYPES = (b"urn:mpeg:mpegB:cicp:systems:auxiliary:depth", b"urn:mpeg:hevc:2015:auxid:2")
 """Types of auxiliary pictures that are depth maps, as AVIF has them and as HEIC."""
+DAMAGE = (KeyError, IndexError, struct.error, OverflowError)
 
 
 def is_avif(path: Path) -> bool:
@@ -30,8 +32,8 @@ def is_avif(path: Path) -> bool:
 def open_avif(path: Path) -> Iterator[Image]:
     """Open an AVIF and read its header, with colours in numbers, which Pillow does not pass on."""
     require_file(path)
-    with open_with_pillow(path, ("AVIF",), "an AVIF picture") as image:
-        codes = color_codes_of(path.read_bytes())
+    with open_with_pillow(path, ("AVIF",)) as image:
+        codes = _color_codes(path.read_bytes())
         if codes is not None:
             image.info["nclx_profile"] = dict(zip(COLOR_CODES, codes))
         yield image
@@ -40,10 +42,37 @@ def open_avif(path: Path) -> Iterator[Image]:
 def avif_depth_file(path: Path) -> bytes | None:
     """Return an AVIF file that shows the depth map of this one, not turned by the orientation; None without."""
     with open_binary(path) as file:
-        return with_auxiliary_shown(file.read(), DEPTH_TYPES)
+        data = file.read()
+    try:
+        pitm, properties = _primary_and_properties(data)
+        for item, known in properties.items():
+            if any(kind == b"auxC" and content[4:].split(b"\0")[0] in DEPTH_TYPES for kind, content in known):
+                shown = pitm[:4] + item.to_bytes(len(pitm) - 4, "big")
+                return data.replace(box(b"pitm", pitm), box(b"pitm", shown), 1)
+    except DAMAGE:
+        pass
+    return None
 
 
-def avif_orientation(path: Path) -> int:
-    """Return Exif's Orientation, 1..8, of an AVIF's photo."""
-    with open_avif(path) as image:
-        return orientation_of(image)
+def _color_codes(data: bytes) -> tuple[int, int, int, int] | None:
+    """Return the photo's colours in numbers (ITU-T H.273): primaries, curve, matrix, full range; None without."""
+    try:
+        pitm, properties = _primary_and_properties(data)
+        for kind, content in properties[int.from_bytes(pitm[4:], "big")]:
+            if kind == b"colr" and content[:4] == b"nclx":
+                primaries, transfer, matrix, full_range = struct.unpack_from(">HHHB", content, 4)
+                return primaries, transfer, matrix, full_range >> 7
+    except DAMAGE:
+        pass
+    return None
+
+
+def _primary_and_properties(data: bytes) -> tuple[bytes, dict[int, list[tuple[bytes, bytes]]]]:
+    """Return the box that names the photo among the items, and the kind and content of each item's properties."""
+    meta = dict(boxes(dict(boxes(data))[b"meta"][4:]))
+    iprp = dict(boxes(meta[b"iprp"]))
+    properties = list(boxes(iprp[b"ipco"]))
+    items, essential = associations(iprp[b"ipma"])
+    places = {item: [number % essential for number in numbers] for item, numbers in items.items()}
+    known = {item: [properties[k - 1] for k in ks if 1 <= k <= len(properties)] for item, ks in places.items()}
+    return meta[b"pitm"], known

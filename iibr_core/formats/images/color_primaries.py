@@ -54,14 +54,12 @@ def space_of_chromaticities(xy: Any, name: str = UNNAMED) -> ColorSpace:
     if not isinstance(xy, tuple) or len(xy) != 8:
         return SRGB
     points = np.array(xy, np.float64).reshape(4, 2)
-    if not (np.isfinite(points).all() and np.abs(points).max() < 10 and np.abs(points[:, 1]).min() > 0):
+    if not (np.abs(points).max() < 10 and points[:, 1].all()):
         return SRGB
     x, y = points.T
     xyz = np.stack([x / y, np.ones(4), (1 - x - y) / y])
-    if abs(np.linalg.det(xyz[:, :3])) < MIN_DETERMINANT:
-        return SRGB
     cones = BRADFORD @ np.stack([D50, xyz[:, 3]], axis=1)
-    if not (cones > 0).all():
+    if abs(np.linalg.det(xyz[:, :3])) < MIN_DETERMINANT or not (cones > 0).all():
         return SRGB
     adapted = np.linalg.solve(BRADFORD, (cones[:, :1] / cones[:, 1:]) * BRADFORD)
     return space_of_matrix(adapted @ (xyz[:, :3] * np.linalg.solve(xyz[:, :3], xyz[:, 3])), name)

@@ -9,12 +9,15 @@ from __future__ import annotations
 import re
 import struct
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cache, lru_cache
+from io import BytesIO
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from PIL import ImageCms
 
 from iibr_core.color import linear_from_srgb, srgb_from_linear
 from iibr_core.formats.images.color_primaries import (
@@ -24,27 +27,23 @@ from iibr_core.formats.images.color_primaries import (
     space_of_matrix,
     space_of_number,
 )
-from iibr_core.formats.images.hdr import hlg_display_light, hlg_scene_light, pq_light
+from iibr_core.formats.images.hdr import HLG, PQ, hlg_display_light, hlg_scene_light, pq_light
 from iibr_core.formats.images.picture import Picture
+from iibr_core.formats.images.pillow_reader import DECODE_ERRORS
 from iibr_core.runtime.resources import resource_folder
-from iibr_core.types import (
-    DISPLAY_P3,
-    SRGB,
-    ColorSpace,
-    FloatImage,
-)
+from iibr_core.types import DISPLAY_P3, SRGB, ColorSpace, FloatImage
 
 KNOTS = 65536
 """Number of values of a curve: one for each value of 16 bits."""
 SAME_CURVE = 1 / 255
 """Largest difference of encoded values within one curve: a step of 8 bits, as small profiles of sRGB are off."""
+UNNAMED_PROFILE = "without a name"
 PARAMETRIC = (1, 3, 4, 5, 7)
 """Number of parameters of each kind of formula (ICC.1:2022, table 68)."""
 MAX_PROFILE_BYTES = 4 * 2**20
 """Largest profile; those with a table for every colour, for printers, have one or two megabytes."""
 Curve = Callable[[NDArray[Any]], NDArray[Any]]
 Hdr = Literal["", "PQ", "HLG"]
-PQ, HLG = 16, 18
 CURVES_OF_CODES: dict[int, Curve] = {
     **dict.fromkeys((1, 6, 13, 14, 15), linear_from_srgb),
     4: lambda x: x**2.2,
@@ -89,10 +88,6 @@ def icc_profile(space: ColorSpace) -> bytes:
     return (resource_folder("assets") / "profiles" / PROFILE_FILES[space.name]).read_bytes()
 
 
-class UnusableProfileError(ValueError):
-    """A profile is damaged, or not of the kind that photos have; the message names the reason."""
-
-
 def _look_up(curves: FloatImage, pixels: NDArray[Any]) -> FloatImage:
     """Return the values of curves (3, KNOTS) at pixels (H, W, 3)."""
     steps = (KNOTS - 1) // np.iinfo(pixels.dtype).max  # 257 or 1
@@ -118,12 +113,12 @@ def color_profile_of(picture: Picture) -> tuple[ColorProfile | None, str]:
     """
     if picture.is_float:
         return None, ""
-    name, complaint = picture.icc_name or "without a name", ""
+    name, complaint = _name_in(picture.icc), ""
     profile = profile_of_codes(picture.codes[:2] or codes_named(name))
     if profile is not None:
         name = profile.color_space.name
     elif picture.icc:
-        profile, complaint = _read(picture.icc)
+        profile, complaint = read_profile(picture.icc)
     if profile is not None and profile.hdr:
         return profile, f"HDR photo ({profile.hdr}): its highlights are compressed to the range of ordinary photos."
     if picture.pixels.shape[2] < 3 or (profile is not None and _is_srgb(profile)):
@@ -154,47 +149,48 @@ def codes_named(name: str) -> tuple[int, ...]:
     return () if curve is None else (12 if "P3" in name else 9, PQ if curve[0] == "PQ" else HLG)
 
 
-@lru_cache(maxsize=4)  # a photo is read in many parts
-def _read(data: bytes) -> tuple[ColorProfile | None, str]:
-    try:
-        return color_profile(data), ""
-    except UnusableProfileError as error:
-        return None, str(error)
-
-
 @lru_cache(maxsize=8)  # the profiles are kept, too
 def _is_srgb(profile: ColorProfile) -> bool:
     off = np.abs(srgb_from_linear(profile.curves) - np.linspace(0, 1, KNOTS, dtype=np.float32))
     return profile.color_space == SRGB and float(off.max()) < SAME_CURVE
 
 
-def color_profile(data: bytes) -> ColorProfile:
-    """Read a profile. Raises UnusableProfileError."""
+@lru_cache(maxsize=4)  # a photo is read in many parts
+def read_profile(data: bytes) -> tuple[ColorProfile | None, str]:
+    """Return the meaning of a profile; where it cannot be used, None and the reason."""
+    if data[16:24] != b"RGB XYZ ":
+        return None, "is not for red, green and blue"
+    if len(data) > MAX_PROFILE_BYTES:
+        return None, "is too large"
     try:
-        if data[16:24] != b"RGB XYZ ":
-            raise UnusableProfileError("is not for red, green and blue")
         tags = _tags(data)
         if (coded := profile_of_codes(tuple(tags.get(b"cicp", b"")[8:10]))) is not None and coded.hdr:
-            return coded
+            return coded, ""
         colors = [struct.unpack_from(">3i", tags[name], 8) for name in (b"rXYZ", b"gXYZ", b"bXYZ")]
         curves = np.stack([_curve(tags[name]) for name in (b"rTRC", b"gTRC", b"bTRC")])
-    except KeyError as error:
-        raise UnusableProfileError("has no curves with a matrix") from error
-    except (struct.error, IndexError) as error:
-        raise UnusableProfileError("is damaged") from error
+    except KeyError:
+        return None, "has no curves with a matrix"
+    except (struct.error, IndexError):
+        return None, "is damaged"
     matrix = np.array(colors).T / 65536
     if not (np.isfinite(curves).all() and abs(np.linalg.det(matrix)) > MIN_DETERMINANT):
-        raise UnusableProfileError("is damaged")
-    return ColorProfile(np.clip(curves, 0, 1).astype(np.float32), space_of_matrix(matrix))
+        return None, "is damaged"
+    return ColorProfile(np.clip(curves, 0, 1).astype(np.float32), space_of_matrix(matrix)), ""
 
 
 def _tags(data: bytes) -> dict[bytes, bytes]:
     """Return the tags of a profile by signature (clause 7.3)."""
-    if len(data) > MAX_PROFILE_BYTES:
-        raise UnusableProfileError("is too large")
     (count,) = struct.unpack_from(">I", data, 128)
     entries = (struct.unpack_from(">4sII", data, 132 + 12 * k) for k in range(min(count, 100)))
     return {name: data[start : start + size] for name, start, size in entries}
+
+
+@lru_cache(maxsize=4)
+def _name_in(data: bytes) -> str:
+    """Return the description of a profile."""
+    with suppress(ImageCms.PyCMSError, *DECODE_ERRORS):
+        return ImageCms.getProfileDescription(ImageCms.ImageCmsProfile(BytesIO(data))).strip() or UNNAMED_PROFILE
+    return UNNAMED_PROFILE
 
 
 def _curve(tag: bytes) -> NDArray[np.float64]:
@@ -205,11 +201,9 @@ def _curve(tag: bytes) -> NDArray[np.float64]:
         kind = count >> 16
         return _formula(kind, x, np.array(struct.unpack_from(f">{PARAMETRIC[kind]}i", tag, 12)) / 65536)
     if tag[:4] != b"curv":
-        raise UnusableProfileError("has no curves with a matrix")
+        raise KeyError(tag[:4])
     if count == 0:
         return x
-    if count > KNOTS:
-        raise UnusableProfileError("is damaged")
     table = np.array(struct.unpack_from(f">{count}H", tag, 12))
     return x ** float(table[0] / 256) if count == 1 else np.interp(x, np.linspace(0, 1, count), table / 65535)
 

@@ -14,21 +14,14 @@ from numpy.typing import NDArray
 from PIL.Image import Image
 
 from iibr_core.color import ROWS_AT_ONCE
-from iibr_core.formats.files import reason_of, require_file
+from iibr_core.formats.files import is_file, reason_of, require_file
 from iibr_core.formats.images.avif import is_avif, open_avif
 from iibr_core.formats.images.file_kinds import raw_kind, unreadable_kind
 from iibr_core.formats.images.heic import heic_size, is_heic, read_heic
 from iibr_core.formats.images.lfp import is_lfp, lfp_size, read_lfp
-from iibr_core.formats.images.lif import PICTURE, lif_bytes, open_lif
-from iibr_core.formats.images.mpo import MPO
-from iibr_core.formats.images.picture import (
-    EXIF_NUMBERS,
-    Picture,
-    exif_focal_px,
-    opaque_as_none,
-    require_sound_size,
-)
-from iibr_core.formats.images.pillow_reader import open_with_pillow, picture_of
+from iibr_core.formats.images.picture import EXIF_NUMBERS, Picture, exif_focal_px, opaque_as_none, require_sound_size
+from iibr_core.formats.images.pillow_reader import open_with_pillow, orientation_in, picture_of
+from iibr_core.formats.images.stereo_jpeg import lif_bytes, open_lif
 from iibr_core.types import ImageSize, InputError
 
 HARMLESS_MESSAGE = "extraneous bytes"
@@ -38,8 +31,13 @@ NO_READER = "could not find a format reader"
 FLOATING_TYPES = ("half", "float", "double")
 LINEAR_TRANSFERS = (2, 8)
 """Transfer curves of ITU-T H.273 that leave light unchanged: "unspecified" and "linear"."""
-COLOR_MODELS = {"CMYK": "CMYK", "YCCK": "CMYK", "LAB": "LAB"}
-"""Colour models by parts of the names that OpenImageIO gives to them."""
+CMYK_NOTE = "CMYK was converted to RGB without its colour profile."
+NOTES_OF_MODELS = {
+    "CMYK": CMYK_NOTE,
+    "YCCK": CMYK_NOTE,
+    "LAB": "Lab was converted to RGB with a tint: save the photo as RGB for its true colours.",
+}
+"""Notes on colour models by parts of the names that OpenImageIO gives to them."""
 
 
 class _Stored(NamedTuple):
@@ -99,24 +97,26 @@ def read_size(path: Path, number: int = 0) -> ImageSize:
 
 
 def read_orientation(path: Path) -> int:
-    """Return Exif's Orientation, 1 to 8; 1 for files that OpenImageIO does not read, as HEIC and AVIF."""
-    spec = _header_of(path)
-    return 1 if spec is None else int(spec.get_int_attribute("Orientation", 1))
+    """Return Exif's Orientation, 1 to 8; 1 for HEIC, which is decoded upright, and for files that cannot be read."""
+    if is_file(path) and is_avif(path):
+        with open_avif(path) as image:
+            return orientation_in(image.getexif())
+    header = open_header(path)
+    return 1 if header is None else int(header.spec().get_int_attribute("Orientation", 1))
 
 
 def read_text(path: Path, name: str) -> str:
     """Return a text of a picture's header; "" where it is missing or damaged, and for files OpenImageIO cannot read."""
-    spec = _header_of(path)
-    return "" if spec is None else text_attribute(spec, name)
+    header = open_header(path)
+    return "" if header is None else text_attribute(header.spec(), name)
 
 
-def _header_of(path: Path) -> Any | None:
-    """Return OpenImageIO's header of a file's first picture; None where it cannot be read."""
+def open_header(path: Path) -> Any | None:
+    """Open a file with OpenImageIO; None where it cannot be read."""
     source = oiio.ImageInput.open(oiio_name(path))
     if source is None:
         complaint_of(oiio)
-        return None
-    return source.spec()
+    return source
 
 
 def oiio_name(path: Path) -> str:
@@ -151,10 +151,10 @@ def _open_with_pillow(path: Path, number: int) -> Iterator[Image]:
         with open_avif(path) as image:
             yield image
     elif open_lif(path) is not None:
-        with open_with_pillow(path, *PICTURE, lif_bytes(path, number)) as image:
+        with open_with_pillow(path, ("JPEG", "PNG", "WEBP"), lif_bytes(path, number)) as image:
             yield image
     else:
-        with open_with_pillow(path, *MPO) as image:
+        with open_with_pillow(path, ("JPEG",)) as image:
             image.seek(number)
             yield image
 
@@ -193,15 +193,15 @@ def _facts(spec: Any) -> dict[str, Any]:
     """Return what `Picture` holds beside pixels."""
     icc, chromaticities, codes = (spec.getattribute(name) for name in ("ICCProfile", "chromaticities", "CICP"))
     model = text_attribute(spec, "jpeg:ColorSpace") or text_attribute(spec, "tiff:ColorSpace")
+    exif = {name: spec.get_float_attribute(f"Exif:{name}", 0.0) for name in EXIF_NUMBERS.values()}
     return {
         "is_premultiplied": not spec.get_int_attribute("oiio:UnassociatedAlpha"),
         "orientation": int(spec.get_int_attribute("Orientation", 1)),
-        "focal_px": exif_focal_px(_exif_numbers(spec), ImageSize(spec.height, spec.width)),
+        "focal_px": exif_focal_px(exif, ImageSize(spec.height, spec.width)),
         "icc": bytes(icc) if isinstance(icc, np.ndarray) else b"",
-        "icc_name": text_attribute(spec, "ICCProfile:profile_description"),
         "codes": codes if isinstance(codes, tuple) else (),
         "chromaticities": chromaticities if isinstance(chromaticities, tuple) else (),
-        "color_model": next((name for part, name in COLOR_MODELS.items() if part in model), ""),
+        "note": next((note for part, note in NOTES_OF_MODELS.items() if part in model), ""),
     }
 
 
@@ -252,18 +252,6 @@ def _stored(path: Path, spec: Any) -> _Stored:
     if str(spec.format) in FLOATING_TYPES:
         dtype = "uint16" if is_encoded else "float32"
     return _Stored(colors, alpha_at, max(colors, alpha_at + 1), dtype)
-
-
-def _exif_numbers(spec: Any) -> dict[str, float]:
-    numbers = {}
-    for name in EXIF_NUMBERS.values():
-        try:
-            value = spec.getattribute(f"Exif:{name}")
-        except UnicodeDecodeError:  # a text in place of a number
-            continue
-        if isinstance(value, int | float):
-            numbers[name] = float(value)
-    return numbers
 
 
 def _reason(complaint: str, path: Path) -> str:

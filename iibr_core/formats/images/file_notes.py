@@ -24,8 +24,8 @@ def file_notes(path: Path) -> tuple[str, ...]:
 
     A damaged header gives no notes.
     """
-    pair = stated_pair(path)
-    return (*(() if pair is None else (pair.note,)), *_panorama_notes(path), *_animation_notes(path))
+    _, note = stated_pair(path)
+    return (*((note,) if note else ()), *_panorama_notes(path), *_animation_notes(path))
 
 
 def _panorama_notes(path: Path) -> tuple[str, ...]:

@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 from iibr_core.color import ROWS_AT_ONCE
 from iibr_core.types import FloatImage
 
+PQ, HLG = 16, 18
+"""Numbers of the curves (ITU-T H.273, table 3)."""
 WHITE_CD_M2 = 203.0
 PQ_PEAK_CD_M2 = 10_000.0
 HLG_PEAK_CD_M2 = 1_000.0

@@ -2,29 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.formats.files import MAX_FILE_PIXELS, open_binary, reason_of, require_file
+from iibr_core.formats.files import MAX_FILE_PIXELS, open_binary, require_file
 from iibr_core.formats.images.picture import Picture, opaque_as_none, require_sound_size
-from iibr_core.formats.images.pillow_reader import DECODE_ERRORS, exif_of, facts_of, sound_orientation
-from iibr_core.types import FloatImage, ImageSize, InputError
+from iibr_core.formats.images.pillow_reader import damage_as_input_error, exif_of, facts_of, orientation_in
+from iibr_core.types import FloatImage, ImageSize, InputError, image_size
 
 BRANDS = frozenset({b"heic", b"heix", b"heim", b"heis", b"hevc", b"hevx", b"mif1", b"msf1"})
-
-
-@dataclass(frozen=True, eq=False)
-class HeicDepth:
-    """The depth map of a HEIC, upright: (H, W), 0..1, with libheif's description of its range."""
-
-    values: FloatImage
-    metadata: dict[str, Any]
 
 
 def is_heic(path: Path) -> bool:
@@ -41,7 +30,7 @@ def read_heic(path: Path, number: int = 0) -> Picture:
     alpha = opaque_as_none(pixels[..., 3]) if pixels.shape[2] == 4 else None
     is_premultiplied = bool(getattr(picture, "premultiplied_alpha", False))
     colors = pixels[..., : 3 if pixels.shape[2] >= 3 else 1]
-    return Picture(colors, alpha, is_premultiplied, **facts_of(picture.info, heic_size(path, number)))
+    return Picture(colors, alpha, is_premultiplied, **facts_of(picture.info, image_size(pixels)))
 
 
 def heic_size(path: Path, number: int = 0) -> ImageSize:
@@ -56,7 +45,7 @@ def heic_pair(path: Path) -> tuple[int, int] | None:
     A picture's number is its place in the file, except that the photo itself and the first picture are swapped.
     """
     file = _open_file(path)
-    with _damage_named(path):
+    with damage_as_input_error(path):
         groups = [group for group in file.info.get("entity_groups") or () if group.get("type") == "ster"]
     if not groups:
         return None
@@ -72,8 +61,11 @@ def _swapped(number: int, primary: int) -> int:
     return {0: primary, primary: 0}.get(number, number)
 
 
-def read_heic_depth(path: Path) -> HeicDepth | None:
-    """Return the depth map of a portrait photo, None without."""
+def read_heic_depth(path: Path) -> tuple[FloatImage, dict[str, Any]] | None:
+    """Return the depth map of a portrait photo, upright: (H, W), 0..1, and libheif's description of its range.
+
+    None for other photos.
+    """
     maps = _open(path).info.get("depth_images") or []
     if not maps:
         return None
@@ -82,7 +74,7 @@ def read_heic_depth(path: Path) -> HeicDepth | None:
         raise InputError(f"{path}: its depth map of {width}x{height} pixels is absurd")
     pixels = _pixels(path, maps[0])
     scale = np.float32(1 / np.iinfo(pixels.dtype).max)
-    return HeicDepth(np.ascontiguousarray(pixels[..., 0]) * scale, dict(maps[0].info.get("metadata") or {}))
+    return np.ascontiguousarray(pixels[..., 0]) * scale, dict(maps[0].info.get("metadata") or {})
 
 
 def heic_info(path: Path) -> dict[str, Any]:
@@ -92,7 +84,7 @@ def heic_info(path: Path) -> dict[str, Any]:
 
 def heic_orientation(path: Path) -> int:
     """Return Exif's Orientation, 1..8, of a HEIC; its photo is read upright."""
-    return sound_orientation(exif_of(heic_info(path)))
+    return orientation_in(exif_of(heic_info(path).get("exif")))
 
 
 def heic_auxiliaries(path: Path) -> tuple[str, ...]:
@@ -104,13 +96,13 @@ def _open_file(path: Path) -> Any:
     import pillow_heif
 
     require_file(path)
-    with _damage_named(path):
+    with damage_as_input_error(path):
         return pillow_heif.open_heif(path, convert_hdr_to_8bit=False)
 
 
 def _open(path: Path, number: int = 0) -> Any:
     file = _open_file(path)
-    with _damage_named(path):
+    with damage_as_input_error(path):
         picture = file[_swapped(number, file.primary_index)] if number else file
         width, height = picture.size
     require_sound_size(path, width, height, width * height * 4)
@@ -118,15 +110,6 @@ def _open(path: Path, number: int = 0) -> Any:
 
 
 def _pixels(path: Path, picture: Any) -> NDArray[Any]:
-    with _damage_named(path):
+    with damage_as_input_error(path):
         pixels = np.array(picture)  # a copy: pillow-heif 1.0's own array does not outlive the file
     return pixels.reshape(*pixels.shape[:2], -1)
-
-
-@contextmanager
-def _damage_named(path: Path) -> Iterator[None]:
-    """Raise InputError for libheif's errors."""
-    try:
-        yield
-    except DECODE_ERRORS as error:
-        raise InputError(f"{path}: damaged or cut off ({reason_of(error)}); get the whole file again") from error

@@ -28,7 +28,6 @@ SECTION_START = b"\x89LF"
 JSON_KIND = b"M"
 HEADER_BYTES, NAME_BYTES, ALIGNMENT = 16, 80, 16
 MAX_FILE_BYTES, MAX_JSON_BYTES, MAX_PICTURES = 1 << 30, 1 << 24, 64
-PICTURE = ("JPEG", "PNG"), "a picture in a Lytro file"
 DAMAGE = (KeyError, TypeError, ValueError, AttributeError, RecursionError, OverflowError)
 
 Chunks = Mapping[str, bytes]
@@ -186,7 +185,7 @@ def _size_in(entry: Mapping[str, Any]) -> ImageSize:
 def _decoded(path: Path, pictures: LfpPictures) -> Iterator[NDArray[np.uint8]]:
     """Yield the pictures, (H, W, 3)."""
     for data in pictures.files:
-        with open_with_pillow(path, *PICTURE, data) as image:
+        with open_with_pillow(path, ("JPEG", "PNG"), data) as image:
             pixels = np.asarray(image.convert("RGB"))
         if pixels.shape[:2] != pictures.size:
             raise InputError(f"{path}: its pictures differ in size; get the whole file again")

@@ -7,7 +7,6 @@ another picture: thumbnails, depth maps, edits by other programs, maker notes, a
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -18,7 +17,7 @@ from PIL import Image
 
 from iibr_core.formats.images.decode import read_size, read_text
 from iibr_core.formats.images.heic import heic_info, is_heic
-from iibr_core.formats.images.pillow_reader import EXIF_ERRORS, EXIF_FOLDER, ORIENTATION_TAG
+from iibr_core.formats.images.pillow_reader import EXIF_ERRORS, EXIF_FOLDER, ORIENTATION_TAG, exif_of
 from iibr_core.formats.images.xmp import NAMESPACES, list_value_in, parse_packet, text_in, unpack
 from iibr_core.types import SRGB, ColorSpace, ImageSize, InputError
 
@@ -72,16 +71,14 @@ class Caption:
 def read_metadata(path: Path) -> PictureMetadata:
     """Return Exif and XMP of a photo's file; nothing where the file is damaged or missing."""
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # Pillow warns of damaged Exif
-            if is_heic(path):
-                info = heic_info(path)
-                return PictureMetadata(_bytes_of(info.get("exif")), _bytes_of(info.get("xmp")))
-            with Image.open(path) as image:
-                exif = _bytes_of(image.info.get("exif"))
-                if not exif and (stored := image.getexif()):  # a TIFF keeps it in its first folder
-                    exif = _exif_of(*_folders_of(stored)).tobytes()
-                return PictureMetadata(exif, _bytes_of(image.info.get("xmp")))
+        if is_heic(path):
+            info = heic_info(path)
+            return PictureMetadata(_bytes_of(info.get("exif")), _bytes_of(info.get("xmp")))
+        with Image.open(path) as image:
+            exif = _bytes_of(image.info.get("exif"))
+            if not exif and (stored := image.getexif()):  # a TIFF keeps it in its first folder
+                exif = _exif_from(*_folders_of(stored)).tobytes()
+            return PictureMetadata(exif, _bytes_of(image.info.get("xmp")))
     except (InputError, *EXIF_ERRORS):
         return PictureMetadata()
 
@@ -94,7 +91,7 @@ def exif_for(exif: bytes, size: ImageSize, color_space: ColorSpace, keeps_positi
     try:
         if camera:
             _set_camera(camera, size, color_space)
-        kept = _exif_of(photo, camera, position if keeps_position else {})
+        kept = _exif_from(photo, camera, position if keeps_position else {})
         return kept if len(kept.tobytes()) <= MAX_EXIF_BYTES else Image.Exif()
     except EXIF_ERRORS:
         return Image.Exif()
@@ -114,17 +111,14 @@ def settings_text_in(path: Path) -> str:
 
 def read_caption(path: Path) -> Caption:
     """Return the texts about a photo, XMP before Exif; empty where the file is damaged or missing."""
-    metadata, tree = read_metadata(path), None
+    metadata = read_metadata(path)
     photo = _folders_in(metadata.exif)[0]
+    texts = [photo.get(tag) for tag in (0, DESCRIPTION, ARTIST, COPYRIGHT)]
     with suppress(InputError):
-        tree = parse_packet(metadata.xmp) if metadata.xmp else None
-
-    def text(name: str, tag: int) -> str:
-        described = "" if tree is None else _line(list_value_in(tree, NAMESPACES["dc"], name), MAX_CAPTION_CHARACTERS)
-        return described or _line(photo.get(tag), MAX_CAPTION_CHARACTERS)
-
-    tags = {"title": 0, "description": DESCRIPTION, "creator": ARTIST, "rights": COPYRIGHT}
-    return Caption(*(text(name, tag) for name, tag in tags.items()))
+        tree = parse_packet(metadata.xmp)
+        names = ("title", "description", "creator", "rights")
+        texts = [list_value_in(tree, NAMESPACES["dc"], name) or text for name, text in zip(names, texts)]
+    return Caption(*(_line(text, MAX_CAPTION_CHARACTERS) for text in texts))
 
 
 def camera_facts(metadata: PictureMetadata) -> tuple[tuple[str, str], ...]:
@@ -146,7 +140,7 @@ def camera_facts(metadata: PictureMetadata) -> tuple[tuple[str, str], ...]:
 def _exposure(camera: Mapping[int, Any]) -> tuple[str, ...]:
     """Return F-number, time, sensitivity and focal length, "" for unknown ones."""
     tags = (0x829D, 0x829A, 0x8827, 0x920A, 0xA405)
-    number, seconds, iso, focal_mm, equivalent_mm = (_positive(camera.get(tag)) for tag in tags)
+    number, seconds, iso, focal_mm, equivalent_mm = (number_of(camera.get(tag)) for tag in tags)
     time = f"1/{1 / seconds:.0f} s" if 0 < seconds < 0.4 else f"{seconds:g} s"
     return (
         f"f/{number:g}" if number else "",
@@ -156,8 +150,8 @@ def _exposure(camera: Mapping[int, Any]) -> tuple[str, ...]:
     )
 
 
-def _positive(value: Any) -> float:
-    """Return a number of Exif; 0 where it is none, or makes no sense."""
+def number_of(value: Any) -> float:
+    """Return a number of Exif; 0 where it is none, is not positive, or makes no sense."""
     try:
         number = float(value[0] if isinstance(value, tuple) else value)
     except EXIF_ERRORS:
@@ -178,11 +172,8 @@ def _bytes_of(value: Any) -> bytes:
 
 def _folders_in(exif: bytes) -> tuple[Tags, Tags, Tags]:
     """Return the tags of the photo, its camera and its position from Exif as JPEGs have it; empty where damaged."""
-    stored = Image.Exif()
-    with suppress(*EXIF_ERRORS), warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        stored.load(exif)
-        return _folders_of(stored)
+    with suppress(*EXIF_ERRORS):
+        return _folders_of(exif_of(exif))
     return {}, {}, {}
 
 
@@ -191,7 +182,7 @@ def _folders_of(exif: Image.Exif) -> tuple[Tags, Tags, Tags]:
     return photo, dict(exif.get_ifd(EXIF_FOLDER)), dict(exif.get_ifd(GPS_FOLDER))
 
 
-def _exif_of(photo: Tags, camera: Tags, position: Tags) -> Image.Exif:
+def _exif_from(photo: Tags, camera: Tags, position: Tags) -> Image.Exif:
     exif = Image.Exif()
     exif.update(photo)
     for number, folder in ((EXIF_FOLDER, camera), (GPS_FOLDER, position)):

@@ -20,20 +20,14 @@ from iibr_core.formats.images.color_profile import color_profile_of, color_space
 from iibr_core.formats.images.decode import decode_bands
 from iibr_core.formats.images.file_notes import file_notes
 from iibr_core.formats.images.hdr import tone_map
-from iibr_core.formats.images.mpo import is_jpeg
 from iibr_core.formats.images.picture import Picture, full_scale, upright
 from iibr_core.formats.images.picture_source import PictureSource, read_source, source_size
 from iibr_core.formats.images.side_by_side import left_picture
 from iibr_core.formats.images.small_picture import small_picture
+from iibr_core.formats.images.stereo_jpeg import is_jpeg
 from iibr_core.runtime.kernels import kernel
 from iibr_core.runtime.work import raise_if_stopped
-from iibr_core.types import (
-    SRGB,
-    FloatImage,
-    ImageSize,
-    InputError,
-    Photo,
-)
+from iibr_core.types import SRGB, FloatImage, ImageSize, InputError, Photo
 
 DEFAULT_MAX_PIXELS = 2_000_000
 DEFAULT_FOV_DEG = 50.0
@@ -72,21 +66,21 @@ def read_picture(
     require_file(source.path)
     stored_size = source_size(source)
     size = size_within(stored_size, max_pixels)
-    is_smaller = size != stored_size
-    if is_smaller:
-        bands = decode_bands(source.path) if source == PictureSource(source.path) else iter([read_source(source)])
-        picture, finite_notes = _finite(next(bands))
-        try:
+    is_smaller, is_whole = size != stored_size, source == PictureSource(source.path)
+    bands = decode_bands(source.path) if is_smaller and is_whole else iter([read_source(source)])
+    picture, finite_notes = _finite(next(bands))
+    try:
+        if is_smaller:
             encoded = _encode_light(_averaged(picture, bands, stored_size, size), picture)
-        except StopIteration as error:  # the header states another size than the picture has
-            raise InputError(f"{source.path}: damaged (rows are missing); get the whole file again") from error
-    else:
-        picture, finite_notes = _finite(read_source(source))
-        encoded = _encode(picture)
+        else:
+            encoded = _encode(picture)
+    except StopIteration as error:  # the header states another size than the picture has
+        raise InputError(f"{source.path}: damaged (rows are missing); get the whole file again") from error
     space = color_space_of(picture)
     if not keeps_primaries:
         encoded, space = convert(encoded, SRGB, space), SRGB
-    notes = _color_notes(picture)
+    note = picture.note or color_profile_of(picture)[1]
+    notes: tuple[str, ...] = (note,) if note else ()
     if picture.alpha is not None:
         notes += ("Transparency was dropped: the photo is laid over black.",)
     if is_smaller:
@@ -243,12 +237,3 @@ def _average_areas(light, row_step, top, first_row, result):
             result[y, x, 0] = red / area
             result[y, x, 1] = green / area
             result[y, x, 2] = blue / area
-
-
-def _color_notes(picture: Picture) -> tuple[str, ...]:
-    if picture.color_model == "CMYK":
-        return ("CMYK was converted to RGB without its colour profile.",)
-    if picture.color_model == "LAB":
-        return ("Lab was converted to RGB with a tint: save the photo as RGB for its true colours.",)
-    note = color_profile_of(picture)[1]
-    return (note,) if note else ()

@@ -37,9 +37,9 @@ class Picture:
     pixels: (H, W, C), C = 1 or 3; uint8 or uint16 as encoded, float32 linear light for every floating-point file.
     alpha: (H, W) of the same type, None where all is opaque. is_premultiplied: whether `pixels` are multiplied by it.
     orientation: Exif's, 1 to 8; other values count as 1. focal_px: focal length by Exif in stored pixels, 0 where it is
-    unknown. icc: colour profile, b"" without one; icc_name: its description. codes: colours in numbers (ITU-T H.273),
-    primaries and transfer curve first, () without them. chromaticities: x and y of red, green, blue and white as
-    OpenEXR has them, () without them. color_model: the name of the model that the decoder converted from, as CMYK.
+    unknown. icc: colour profile, b"" without one. codes: colours in numbers (ITU-T H.273), primaries and transfer
+    curve first, () without them. chromaticities: x and y of red, green, blue and white as OpenEXR has them, () without
+    them. note: for people, on colours that the decoder converted from CMYK or Lab; "" for other pictures.
     """
 
     pixels: NDArray[Any]
@@ -48,10 +48,9 @@ class Picture:
     orientation: int = 1
     focal_px: float = 0.0
     icc: bytes = b""
-    icc_name: str = ""
     codes: tuple[int, ...] = ()
     chromaticities: tuple[float, ...] = ()
-    color_model: str = ""
+    note: str = ""
 
     @property
     def size(self) -> ImageSize:

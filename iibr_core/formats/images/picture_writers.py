@@ -5,12 +5,10 @@ They write to a temporary name; their InputError states the reason without a nam
 
 from __future__ import annotations
 
-import math
 import struct
 import zlib
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from functools import partial
 from io import BytesIO
 from itertools import accumulate
 from pathlib import Path
@@ -26,7 +24,7 @@ from iibr_core.formats.files import reason_of
 from iibr_core.formats.images.color_primaries import PRIMARIES
 from iibr_core.formats.images.color_profile import icc_profile
 from iibr_core.formats.images.decode import complaint_of, oiio_name
-from iibr_core.formats.images.metadata import PictureMetadata, exif_for
+from iibr_core.formats.images.metadata import PictureMetadata, exif_for, number_of
 from iibr_core.formats.images.pillow_reader import EXIF_FOLDER
 from iibr_core.formats.images.write import BEST_QUALITY, PNG_SETTINGS, PictureFormat
 from iibr_core.formats.images.xmp import xmp_for
@@ -58,6 +56,7 @@ EXR_PHOTO = {0x010E: "ImageDescription", 0x010F: "Make", 0x0110: "Model", 0x013B
 class _Content:
     """Content of a picture file. pixels: as stored. exif: Pillow's record. texts: of this program, for EXR."""
 
+    kind: str
     pixels: NDArray[Any]
     color_space: ColorSpace
     quality: int
@@ -83,7 +82,8 @@ def write_content(
     metadata = metadata or PictureMetadata()
     exif = exif_for(metadata.exif, image_size(pixels), color_space, form.keeps_position)
     xmp = xmp_for(metadata.xmp, {} if kind == "OpenEXR" else metadata.texts)
-    _WRITERS[kind](path, _Content(pixels, color_space, form.quality, exif, xmp, metadata.texts))
+    write = {"PNG": _write_png, "TIFF": _write_tiff, "OpenEXR": _write_exr}.get(kind, _write_by_pillow)
+    write(path, _Content(kind, pixels, color_space, form.quality, exif, xmp, metadata.texts))
 
 
 def write_by_oiio(
@@ -149,24 +149,17 @@ def _write_exr(path: Path, picture: _Content) -> None:
     if (xy := dict(PRIMARIES.values()).get(picture.color_space.name)) is not None:
         values["chromaticities"] = xy
     for names, folder in ((EXR_PHOTO, picture.exif), (EXR_CAMERA, picture.exif.get_ifd(EXIF_FOLDER))):
-        values |= {name: value for tag, name in names.items() if (value := _exr_value(folder.get(tag))) is not None}
+        for tag, name in names.items():
+            value = folder.get(tag)
+            values[name] = value if isinstance(value, str) else number_of(value)
     if picture.xmp:
         values["xmp"] = picture.xmp.decode()
-    write_by_oiio(path, picture.pixels, "half" if picture.pixels.dtype == np.float16 else "float", values)
+    known = {name: value for name, value in values.items() if value}
+    write_by_oiio(path, picture.pixels, "half" if picture.pixels.dtype == np.float16 else "float", known)
 
 
-def _exr_value(value: Any) -> str | float | None:
-    """Return an Exif value for the header of an EXR; None where it can hold none."""
-    if isinstance(value, str):
-        return value
-    try:
-        number = float(value[0] if isinstance(value, tuple) else value)
-    except (TypeError, ValueError, ZeroDivisionError, IndexError):
-        return None
-    return number if math.isfinite(number) else None
-
-
-def _write_by_pillow(path: Path, picture: _Content, name: str) -> None:
+def _write_by_pillow(path: Path, picture: _Content) -> None:
+    name = picture.kind.upper()
     options: dict[str, Any] = {"exif": picture.exif_bytes} if picture.exif_bytes else {}
     if picture.xmp:
         options["xmp"] = picture.xmp
@@ -210,13 +203,3 @@ def _tiff_strips(pixels: NDArray[Any]) -> Iterator[bytes]:
         differences = rows.copy()
         differences[:, 1:] -= rows[:, :-1]
         yield zlib.compress(differences.astype(differences.dtype.newbyteorder(">")).tobytes(), TIFF_LEVEL)
-
-
-_WRITERS: dict[str, Callable[[Path, _Content], None]] = {
-    "PNG": _write_png,
-    "TIFF": _write_tiff,
-    "OpenEXR": _write_exr,
-    "JPEG": partial(_write_by_pillow, name="JPEG"),
-    "WebP": partial(_write_by_pillow, name="WEBP"),
-    "AVIF": partial(_write_by_pillow, name="AVIF"),
-}

@@ -10,16 +10,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from PIL import Image, ImageCms
+from PIL import Image
 
 from iibr_core.formats.files import MAX_FILE_PIXELS, reason_of
-from iibr_core.formats.images.picture import (
-    EXIF_NUMBERS,
-    Picture,
-    exif_focal_px,
-    opaque_as_none,
-    require_sound_size,
-)
+from iibr_core.formats.images.hdr import HLG, PQ
+from iibr_core.formats.images.picture import EXIF_NUMBERS, Picture, exif_focal_px, opaque_as_none, require_sound_size
 from iibr_core.types import ImageSize, InputError
 
 # Pillow's own limit is lower than ours: Exif of larger photos would be lost.
@@ -28,8 +23,6 @@ Image.MAX_IMAGE_PIXELS = MAX_FILE_PIXELS
 EXIF_FOLDER, ORIENTATION_TAG = 0x8769, 0x0112
 COLOR_CODES = "color_primaries", "transfer_characteristics", "matrix_coefficients", "full_range_flag"
 """Keys of Pillow's `nclx_profile`, in the order of `Picture.codes`."""
-HDR_TRANSFERS = (16, 18)
-"""PQ and HLG by the numbers of ITU-T H.273."""
 DECODE_ERRORS = (
     ValueError,
     OSError,
@@ -47,27 +40,31 @@ EXIF_ERRORS = (*DECODE_ERRORS, TypeError, ZeroDivisionError, KeyError, Attribute
 
 
 @contextmanager
-def open_with_pillow(
-    path: Path, formats: tuple[str, ...], what: str, data: bytes | None = None
-) -> Iterator[Image.Image]:
+def open_with_pillow(path: Path, formats: tuple[str, ...], data: bytes | None = None) -> Iterator[Image.Image]:
     """Open a picture of one of these formats and read its header.
 
-    what: kind of picture, for messages. data: bytes of a picture within the file, None for the file itself. Raises
-    InputError where it is none, or claims an absurd size; also for Pillow's errors in the block.
+    data: bytes of a picture within the file, None for the file itself. Raises InputError where it is none, or claims
+    an absurd size; also for Pillow's errors in the block.
     """
     try:
         image = Image.open(path if data is None else BytesIO(data), formats=formats)
     except DECODE_ERRORS as error:
         reason = reason_of(error).replace(f" {str(path)!r}", "")
-        raise InputError(f"{path}: cannot be read as {what} ({reason})") from error
-    with image:
+        raise InputError(f"{path}: cannot be read as a picture ({reason})") from error
+    with image, damage_as_input_error(path):
         require_sound_size(path, image.width, image.height, image.width * image.height * 4)
-        try:
-            yield image
-        except InputError:
-            raise
-        except DECODE_ERRORS as error:
-            raise InputError(f"{path}: damaged or cut off ({reason_of(error)}); get the whole file again") from error
+        yield image
+
+
+@contextmanager
+def damage_as_input_error(path: Path) -> Iterator[None]:
+    """Raise InputError for errors of Pillow and pillow-heif in the block."""
+    try:
+        yield
+    except InputError:
+        raise
+    except DECODE_ERRORS as error:
+        raise InputError(f"{path}: damaged or cut off ({reason_of(error)}); get the whole file again") from error
 
 
 def picture_of(image: Image.Image) -> Picture:
@@ -76,25 +73,20 @@ def picture_of(image: Image.Image) -> Picture:
     pixels = np.asarray(image.convert("RGBA" if has_alpha else "RGB"))
     alpha = opaque_as_none(pixels[..., 3]) if has_alpha else None
     facts = facts_of(image.info, ImageSize(image.height, image.width))
-    return Picture(pixels[..., :3], alpha, orientation=orientation_of(image), **facts)
+    return Picture(pixels[..., :3], alpha, orientation=orientation_in(image.getexif()), **facts)
 
 
-def orientation_of(image: Image.Image) -> int:
-    """Return Exif's Orientation, 1 to 8, of an opened picture."""
-    return sound_orientation(image.getexif())
-
-
-def sound_orientation(exif: Image.Exif) -> int:
+def orientation_in(exif: Image.Exif) -> int:
     """Return the Orientation in Exif, 1 to 8."""
     orientation = exif.get(ORIENTATION_TAG, 1)
     return int(orientation) if orientation in range(1, 9) else 1
 
 
-def exif_of(info: Mapping[Any, Any]) -> Image.Exif:
-    """Return the Exif in what Pillow and pillow-heif call info; empty where it is missing or damaged."""
+def exif_of(data: bytes | None) -> Image.Exif:
+    """Return Exif in the form of JPEG files as Pillow's record; empty where it is missing or damaged."""
     exif = Image.Exif()
     with suppress(*EXIF_ERRORS):
-        exif.load(info.get("exif") or b"")
+        exif.load(data or b"")
     return exif
 
 
@@ -105,18 +97,11 @@ def facts_of(info: Mapping[Any, Any], size: ImageSize) -> dict[str, Any]:
     """
     numbers = {}
     with suppress(*EXIF_ERRORS):  # a photo without Exif is a photo, too
-        tags = exif_of(info).get_ifd(EXIF_FOLDER)
+        tags = exif_of(info.get("exif")).get_ifd(EXIF_FOLDER)
         numbers = {name: float(tags[tag]) for tag, name in EXIF_NUMBERS.items() if tag in tags}
     facts: dict[str, Any] = {"focal_px": exif_focal_px(numbers, size)}
     stated, profile = info.get("nclx_profile") or {}, info.get("icc_profile")
     codes = tuple(int(stated.get(name, 0)) for name in COLOR_CODES)
-    if stated and (not profile or codes[1] in HDR_TRANSFERS):
+    if stated and (not profile or codes[1] in (PQ, HLG)):
         return facts | {"codes": codes}
-    return facts | ({"icc": bytes(profile), "icc_name": _profile_name(profile)} if profile else {})
-
-
-def _profile_name(profile: bytes) -> str:
-    try:
-        return ImageCms.getProfileDescription(ImageCms.ImageCmsProfile(BytesIO(profile))).strip()
-    except (ImageCms.PyCMSError, *DECODE_ERRORS):
-        return ""
+    return facts | {"icc": bytes(profile or b"")}

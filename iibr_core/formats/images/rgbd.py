@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from functools import lru_cache
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,8 +24,6 @@ GREY_TOLERANCE, MAX_COLORED_SHARE = 12, 0.01
 """Largest difference of a map's channels, of 255, and the largest share of its pixels that exceed it."""
 MIN_COLORED_SHARE = 0.15
 """Smallest share of coloured pixels in a photo whose map lies beside it."""
-
-Half = Literal["first", "second"]
 
 
 def rgbd_parts(path: Path) -> tuple[PictureSource, PictureSource] | None:
@@ -54,17 +51,17 @@ def _parts(path: Path, modified_ns: int, size_bytes: int) -> tuple[PictureSource
     return None
 
 
-def _grey_half(pixels: NDArray[np.uint8], axis: int, min_colored: float) -> Half | None:
-    """Return the grey half along an axis; None unless at least `min_colored` of the other half is coloured."""
+def _grey_half(pixels: NDArray[np.uint8], axis: int, min_colored: float) -> int | None:
+    """Return which half along an axis is grey, 0 or 1; None unless `min_colored` of the other half is coloured."""
     is_colored = np.ptp(pixels.astype(np.int16), axis=2) > GREY_TOLERANCE
     first, second = (float(part.mean()) for part in np.split(is_colored, (pixels.shape[axis] // 2,), axis=axis))
     if second <= MAX_COLORED_SHARE and first >= min_colored:
-        return "second"
-    return "first" if first <= MAX_COLORED_SHARE and second >= min_colored else None
+        return 1
+    return 0 if first <= MAX_COLORED_SHARE and second >= min_colored else None
 
 
-def _halves(path: Path, size: ImageSize, axis: int, grey: Half) -> tuple[PictureSource, PictureSource]:
+def _halves(path: Path, size: ImageSize, axis: int, grey: int) -> tuple[PictureSource, PictureSource]:
     part = ImageSize(size.height // 2, size.width) if axis == 0 else ImageSize(size.height, size.width // 2)
     starts = ((0, 0), (size.height - part.height, size.width - part.width))
-    first, second = (PictureSource(path, part=PicturePart(start, part)) for start in starts)
-    return (second, first) if grey == "first" else (first, second)
+    halves = [PictureSource(path, part=PicturePart(start, part)) for start in starts]
+    return halves[1 - grey], halves[grey]

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from iibr_core.formats.files import reason_of
-from iibr_core.formats.images.iso_boxes import box, boxes, joined
+from iibr_core.formats.images.iso_boxes import associations, box, boxes, joined
 from iibr_core.formats.outputs import write_file
 from iibr_core.types import InputError
 
@@ -54,11 +54,11 @@ def _with_pair(file: bytes, focal: float) -> bytes:
     top = dict(boxes(file))
     head, meta = top[b"meta"][:4], dict(boxes(top[b"meta"][4:]))
     iprp = dict(boxes(meta[b"iprp"]))
-    entries = _associations(iprp[b"ipma"])
+    entries, _ = associations(iprp[b"ipma"])
     left, right = entries
     first = sum(1 for _ in boxes(iprp[b"ipco"])) + 1  # properties are counted from 1, in their order
-    entries[left] += bytes([first, first + 1, first + 3])
-    entries[right] += bytes([first, first + 2, first + 3])
+    entries[left] += [first, first + 1, first + 3]
+    entries[right] += [first, first + 2, first + 3]
     middle = 1 << (SHIFT - 1)
     iprp[b"ipco"] += b"".join(
         (
@@ -68,7 +68,7 @@ def _with_pair(file: bytes, focal: float) -> bytes:
             _uuid(ADJUSTMENT, 0, DISPARITY_ADJUSTMENT),
         )
     )
-    items = [struct.pack(">HB", item, len(numbers)) + numbers for item, numbers in entries.items()]
+    items = [struct.pack(">HB", item, len(numbers)) + bytes(numbers) for item, numbers in entries.items()]
     iprp[b"ipma"] = struct.pack(">II", 0, len(items)) + b"".join(items)
     meta[b"iprp"] = joined(iprp)
     meta[b"grpl"] = box(b"ster", struct.pack(">IIIII", 0, max(left, right) + 1, 2, left, right))
@@ -79,19 +79,6 @@ def _with_pair(file: bytes, focal: float) -> bytes:
 
 def _uuid(kind: bytes, flags: int, *numbers: int) -> bytes:
     return box(b"uuid", kind + struct.pack(f">I{len(numbers)}i", flags, *numbers))
-
-
-def _associations(ipma: bytes) -> dict[int, bytes]:
-    """Return the properties of each item with their flags, as pillow-heif writes them: version 0, a byte each."""
-    flags, count = struct.unpack_from(">II", ipma)
-    if flags:
-        raise ValueError(f"ipma of version and flags {flags:#x} is unknown")
-    entries, at = {}, 8
-    for _ in range(count):
-        item, held = struct.unpack_from(">HB", ipma, at)
-        entries[item] = ipma[at + 3 : at + 3 + held]
-        at += 3 + held
-    return entries
 
 
 def _moved_iloc(iloc: bytes, moved: int) -> bytes:

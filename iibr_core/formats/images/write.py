@@ -18,14 +18,7 @@ from numpy.typing import NDArray
 from iibr_core.color import ROWS_AT_ONCE, bytes_from_encoded, linear_from_srgb, srgb_from_linear
 from iibr_core.formats.files import reason_of
 from iibr_core.formats.outputs import write_file
-from iibr_core.types import (
-    DISPLAY_P3,
-    SRGB,
-    ColorSpace,
-    ImageSize,
-    InputError,
-    image_size,
-)
+from iibr_core.types import DISPLAY_P3, SRGB, ColorSpace, ImageSize, InputError, image_size
 
 if TYPE_CHECKING:
     from iibr_core.formats.images.metadata import PictureMetadata

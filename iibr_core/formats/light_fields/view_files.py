@@ -7,10 +7,9 @@ from pathlib import Path
 
 from iibr_core.formats.images.decode import read_size, read_text
 from iibr_core.formats.images.heic import heic_pair, is_heic
-from iibr_core.formats.images.lif import SOURCE_IMAGE, open_lif
-from iibr_core.formats.images.mpo import is_jpeg, is_stereo_mpo
 from iibr_core.formats.images.picture_source import PicturePart, PictureSource, source_size
-from iibr_core.formats.images.side_by_side import refuse_raw_light_field, side_by_side_pair
+from iibr_core.formats.images.side_by_side import refuse_raw_light_field, stated_pair
+from iibr_core.formats.images.stereo_jpeg import SOURCE_IMAGE, is_jpeg, is_stereo_mpo, open_lif
 from iibr_core.formats.light_fields.multi_view_scene import GridIndex, KnownView, MultiView
 from iibr_core.formats.light_fields.write import LENSLET_KEY, LENSLET_TAG
 from iibr_core.formats.quilts import TAG, Quilt, quilt_named
@@ -96,7 +95,7 @@ def _stereo_pictures(path: Path) -> tuple[str, PictureSource, PictureSource] | N
     """Return the layout, the left eye's picture and the right eye's picture."""
     if is_heic(path) and (numbers := heic_pair(path)) is not None:
         return "spatial HEIC", PictureSource(path, numbers[0]), PictureSource(path, numbers[1])
-    if (halves := side_by_side_pair(path)) is not None:
+    if (halves := stated_pair(path)[0]) is not None:
         return "side-by-side stereo", *halves
     if not is_jpeg(path):
         return None

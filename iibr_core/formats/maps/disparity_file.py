@@ -11,13 +11,7 @@ from iibr_core.formats.maps.reader import read_map
 from iibr_core.formats.maps.resample import resample_map
 from iibr_core.inpainting.disparity_by_color import fill_disparity_by_color
 from iibr_core.inpainting.disparity_holes import fill_disparity_holes, say_filled
-from iibr_core.types import (
-    Disparity,
-    FloatImage,
-    ImageSize,
-    InputError,
-    image_size,
-)
+from iibr_core.types import Disparity, FloatImage, ImageSize, InputError, image_size
 
 MAX_ASPECT_DIFFERENCE = 0.03
 MAX_DISPARITY_WIDTHS = 4.0

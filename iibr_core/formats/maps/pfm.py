@@ -54,15 +54,4 @@ def _header(path: Path) -> tuple[ImageSize, np.dtype[Any], int]:
     width, height = int(match[2]), int(match[3])
     if not 0 < width * height <= MAX_FILE_PIXELS:
         raise InputError(f"{path}: {width}x{height} pixels; a map has 1 to {MAX_FILE_PIXELS:,}")
-    dtype = np.dtype("<f4") if _scale(path, match[4]) < 0 else np.dtype(">f4")
-    return ImageSize(height, width), dtype, match.end()
-
-
-def _scale(path: Path, text: bytes) -> float:
-    try:
-        scale = float(text)
-    except ValueError:
-        scale = 0.0
-    if scale == 0 or not np.isfinite(scale):
-        raise InputError(f"{path}: scale '{text.decode()}' in the header must be a number other than 0")
-    return scale
+    return ImageSize(height, width), np.dtype("<f4" if match[4].startswith(b"-") else ">f4"), match.end()

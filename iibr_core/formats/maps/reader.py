@@ -1,7 +1,11 @@
-"""Reads maps with one value per pixel: PFM, NPY, NPZ, and every kind of picture, also one that shows it in colours."""
+"""Reads maps with one value per pixel: PFM, NPY, NPZ, and every kind of picture, also one that shows it in colours.
+
+Renderers write depth as a channel of an OpenEXR picture, beside its colours; this is read, too.
+"""
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
@@ -10,13 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.formats.files import MAX_FILE_PIXELS, require_file
-from iibr_core.formats.images.decode import read_text
+from iibr_core.formats.images.decode import complaint_of, open_header, read_text
 from iibr_core.formats.images.picture import Picture, full_scale, upright
 from iibr_core.formats.images.picture_source import PictureSource, read_source, source_size
 from iibr_core.formats.maps.color_maps import values_of_colors
-from iibr_core.formats.maps.map_text import KEY, MapText, text_from
 from iibr_core.formats.maps.npy import read_array
 from iibr_core.formats.maps.pfm import read_pfm, read_pfm_size
+from iibr_core.formats.maps.writer import KEY, MapText, text_from
 from iibr_core.types import FloatImage, ImageSize, InputError, image_size
 
 GREY_TOLERANCE = 16 / 255
@@ -25,6 +29,11 @@ MAX_COLORED_SHARE = 0.01
 """Largest share of a grey picture's pixels whose channels differ by more."""
 LUMA = np.array([0.299, 0.587, 0.114], np.float32)
 """Weights of red, green and blue in grey (Rec. BT.601), as JPEG and WebP store it."""
+DEPTH_CHANNEL = re.compile(r"(?:.*\.)?(?:Z|depth|depth\.[YVRXZ])", re.IGNORECASE)
+"""Names of the channel: `Z` by the format's convention, `ViewLayer.Depth.Z` by Blender."""
+MAX_PARTS = 64
+BACKGROUND = 1e9
+"""Smallest distance that stands for no surface."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,6 +99,32 @@ def read_map_picture(source: PictureSource) -> MapFile:
     if found.is_zero is not None:
         values[found.is_zero] = np.nan
     return replace(found, values=values, is_zero=None, text=text)
+
+
+def read_depth_channel(path: Path) -> FloatImage | None:
+    """Return distances (H, W) float32, infinite without a surface; None where a file is no EXR, or has no such channel.
+
+    Raises InputError where the file is damaged.
+    """
+    if path.suffix.lower() != ".exr":
+        return None
+    source = open_header(path)
+    if source is None:
+        return None
+    for part in range(MAX_PARTS):
+        if not source.seek_subimage(part, 0):
+            complaint_of(source)
+            return None
+        spec = source.spec()
+        found = [k for k, name in enumerate(spec.channelnames) if DEPTH_CHANNEL.fullmatch(name)]
+        # A map that is all of its file is no picture with depth.
+        if found and (part > 0 or spec.nchannels > 2) and spec.width * spec.height <= MAX_FILE_PIXELS:
+            values = source.read_image(part, 0, found[0], found[0] + 1, "float")
+            if values is None:
+                raise InputError(f"{path}: its depth channel is damaged ({complaint_of(source)}); get the file again")
+            depth = np.asarray(values, np.float32).reshape(spec.height, spec.width)
+            return np.where(depth >= BACKGROUND, np.float32(np.inf), depth)
+    return None
 
 
 def _map_of_picture(path: Path, picture: Picture) -> MapFile:

@@ -1,22 +1,52 @@
-"""Writes maps with one value per pixel; a text in the file keeps the meaning of its values for reading."""
+"""Writes maps with one value per pixel; a text in the header of a PNG, TIFF or EXR keeps the meaning of their values.
+
+Reading gives back the map as it was written.
+"""
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Literal
 
 import msgspec
 import numpy as np
 
 from iibr_core.formats.images.write import write_image_file
-from iibr_core.formats.maps.map_text import KEY, MapText, text_of
 from iibr_core.formats.maps.pfm import write_pfm
 from iibr_core.formats.outputs import write_file
 from iibr_core.types import FloatImage, InputError
 
 MAP_SUFFIXES = (".pfm", ".exr", ".npy", ".png", ".tif", ".tiff")
+KEY = "ImageDescription"
+"""The header's field, which PNG, TIFF and EXR all have."""
+START = "iibr map "
 MAX_PNG_VALUE = 65535
 """Largest value of a 16-bit picture, in which 0 means unknown."""
+
+
+class MapText(msgspec.Struct, frozen=True):
+    """value = stored number * scale + offset; a stored 0 of a PNG is unknown.
+
+    meaning: "disparity", px per view step of a picture as wide as the map, larger is nearer; "depth", larger is
+    farther, in `unit`. inverse: (slope, offset) of disparity over 1 / depth, where depth was computed from it.
+    """
+
+    meaning: Literal["disparity", "depth"]
+    scale: float = 1.0
+    offset: float = 0.0
+    unit: str = "px per view step"
+    inverse: tuple[float, float] | None = None
+
+
 DISPARITY = MapText("disparity")
+
+
+def text_from(header: str) -> MapText | None:
+    """Return the meaning of a map's values that its header states; None where the text is not ours, or damaged."""
+    try:
+        return msgspec.json.decode(header.removeprefix(START), type=MapText)
+    except msgspec.DecodeError:
+        return None
 
 
 def write_map(path: Path, values: FloatImage, text: MapText = DISPARITY) -> str:
@@ -52,4 +82,4 @@ def _write_png(path: Path, values: FloatImage, text: MapText) -> str:
 
 
 def _write_plane(path: Path, values: np.ndarray, dtype: str, text: MapText) -> None:
-    write_image_file(path, values[..., None], dtype, {KEY: text_of(text)}, channels=("Y",))
+    write_image_file(path, values[..., None], dtype, {KEY: START + msgspec.json.encode(text).decode()}, channels=("Y",))

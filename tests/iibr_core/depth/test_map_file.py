@@ -16,8 +16,7 @@ from PIL import Image
 from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.search import PhotoWithDepth, open_with_depth
 from iibr_core.formats.images.write import write_image_file
-from iibr_core.formats.maps.map_text import MapText
-from iibr_core.formats.maps.writer import write_map
+from iibr_core.formats.maps.writer import MapText, write_map
 from iibr_core.types import FloatImage, InputError
 
 HEIGHT, WIDTH = 160, 240

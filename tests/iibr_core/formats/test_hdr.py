@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from iibr_core.color import linear_from_srgb, srgb_from_linear
-from iibr_core.formats.images.color_profile import codes_named, color_profile
+from iibr_core.formats.images.color_profile import codes_named, read_profile
 from iibr_core.formats.images.hdr import KNEE, hlg_display_light, hlg_scene_light, pq_light
 from iibr_core.formats.images.photo import read_photo, read_thumbnail
 from iibr_core.types import ImageSize
@@ -157,7 +157,9 @@ def test_numbers_in_a_profile_state_pq(tmp_path: Path, kind: str) -> None:
     profile[at : at + 12] = struct.pack(">4sII", b"cicp", len(profile), 12)
     profile += b"cicp\0\0\0\0" + bytes(PQ)
     profile[:4] = len(profile).to_bytes(4, "big")
-    assert color_profile(bytes(profile)).hdr == "PQ"
+    meaning, _ = read_profile(bytes(profile))
+    assert meaning is not None
+    assert meaning.hdr == "PQ"
     pixels = (encoded(linear_from_srgb(scene() / 255), PQ) / 257).round().astype(np.uint8)
     options = {"quality": 100, "subsampling": 0} if kind == "jpg" else {}
     Image.fromarray(pixels).save(tmp_path / f"a.{kind}", icc_profile=bytes(profile), **options)

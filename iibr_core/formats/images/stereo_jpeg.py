@@ -1,8 +1,8 @@
-"""Leia Image Format: a JPEG of the first view, followed by a region of numbered fields: the other views' pictures, maps
-of inverse depth, and JSON that describes them.
+"""Multi-picture JPEGs (CIPA DC-007), as stereo cameras write them, and Leia images: JPEGs with further pictures.
 
-Leia publishes readers, not a description; this follows them, versions 5.1 to 5.3. The last bytes of the file hold the
-size of the region. All numbers are big-endian.
+A Leia image is a JPEG of the first view, followed by a region of numbered fields: the other views' pictures, maps of
+inverse depth, and JSON that describes them. Leia publishes readers, not a description; this follows them, versions 5.1
+to 5.3. The last bytes of the file hold the size of the region. All numbers are big-endian.
 """
 
 from __future__ import annotations
@@ -14,8 +14,13 @@ from pathlib import Path
 from typing import Any
 
 from iibr_core.formats.files import open_binary
+from iibr_core.formats.images.pillow_reader import open_with_pillow
 from iibr_core.types import InputError
 
+JPEG_START = b"\xff\xd8\xff"
+ENTRIES_TAG = 0xB002
+MPO_ENDING = ".mpo"
+"""Ending of files whose pictures are for two eyes, even where the camera does not state their purpose."""
 END_MARK = b"\x1e\x1a"
 TRAILER_BYTES = 6
 JSON_FIELDS = (8, 7)
@@ -23,7 +28,6 @@ MAX_FILE_BYTES, MAX_FIELDS, MAX_JSON_BYTES = 1 << 30, 1000, 1 << 24
 SOURCE_IMAGE = -1
 """Number that stands for the file's first JPEG among the fields."""
 LIF_ENDING = ".lif"
-PICTURE = ("JPEG", "PNG", "WEBP"), "a picture in a Leia image"
 NAMES = {"albedo": "image", "disparity": "inv_z_map", "inv_z_dist": "inv_z_map"}
 """Today's names of properties by those of older versions."""
 
@@ -116,3 +120,29 @@ def _view(entry: Mapping[str, Any]) -> LifView:
     x = position[0] if isinstance(position, list) else position
     depth_field = None if inverse_depth is None else int(inverse_depth["blob_id"])
     return LifView(int(entry["image"]["blob_id"]), depth_field, float(x))
+
+
+def is_jpeg(path: Path) -> bool:
+    """Return whether a file begins as JPEGs do."""
+    with open_binary(path) as file:
+        return file.read(len(JPEG_START)) == JPEG_START
+
+
+def is_stereo_mpo(path: Path) -> bool:
+    """Return whether a JPEG holds pictures for several eyes, rather than its gain map or a larger preview.
+
+    Raises InputError only for one that ends in .mpo, and is damaged or holds a single picture.
+    """
+    is_named = path.suffix.lower() == MPO_ENDING
+    try:
+        with open_with_pillow(path, ("JPEG",)) as image:
+            count = getattr(image, "n_frames", 1)
+            entries = getattr(image, "mpinfo", {}).get(ENTRIES_TAG, ())
+            is_disparity = any("Disparity" in str(entry.get("Attribute", {}).get("MPType")) for entry in entries)
+    except InputError:
+        if is_named:
+            raise
+        return False
+    if is_named and count < 2:
+        raise InputError(f"{path}: holds one picture only, not one for each eye; get the whole file again")
+    return count >= 2 and (is_named or is_disparity)
