@@ -24,6 +24,7 @@ import numpy as np
 from iibr_core.beyond.free_cameras import FreeViews, inverse_depth_of, steered
 from iibr_core.beyond.optics import CENTRE, Optics
 from iibr_core.depth.choice import DepthChoice
+from iibr_core.exports.full_drawing import draw_full
 from iibr_core.exports.full_picture import FullPicture
 from iibr_core.formats.images.photo import read_photo
 from iibr_core.formats.images.write import write_image
@@ -154,7 +155,7 @@ def _draw_at_own_size(scratch: Path) -> None:
     assert isinstance(ready, SceneReady)
     height, width = loaded.photo.size
     full = FullPicture(ready.scene, plan, loaded, Optics(aperture_diameter=3.0), ScreenSize(width, height))
-    full.make(lambda settings: np.zeros((settings.size_px.height, settings.size_px.width, 3), np.float32))
+    draw_full(full, lambda settings: np.zeros((settings.size_px.height, settings.size_px.width, 3), np.float32))
 
 
 def _search_views(scratch: Path) -> None:

@@ -36,8 +36,22 @@ views at the border, and above which it needs views half-way, too.
 DRAWING = "drawing at the photo's own size"
 
 
-def read_photo(picture: FullPicture, photo: LargePhoto | None, keep: Callable[[LargePhoto], None]) -> LargePhoto:
-    """Return the photo of a picture, with the hidden surfaces that its lens shows. Arguments of `FullPicture.make`."""
+def draw_full(
+    picture: FullPicture,
+    draw: Draw,
+    photo: LargePhoto | None = None,
+    keep: Callable[[LargePhoto], None] = lambda photo: None,
+) -> FloatImage:
+    """Return the picture, linear light (height, width, 3).
+
+    draw: draws a tile. photo: the photo as it was kept for an earlier picture. keep: is called with the photo once it
+    is read, and again once its hidden surfaces are inpainted. Raises InputError if the file is missing or has changed.
+    """
+    return _draw_tiles(picture, _read_photo(picture, photo, keep), draw)
+
+
+def _read_photo(picture: FullPicture, photo: LargePhoto | None, keep: Callable[[LargePhoto], None]) -> LargePhoto:
+    """Return the photo of a picture, with the hidden surfaces that its lens shows. See `draw_full`."""
     source, loaded, plan, optics = picture.scene.source, picture.loaded, picture.plan, picture.optics
     report_progress(0, 0, "reading the photo at its own size")
     if photo is None:
@@ -49,7 +63,7 @@ def read_photo(picture: FullPicture, photo: LargePhoto | None, keep: Callable[[L
     return photo
 
 
-def draw_tiles(picture: FullPicture, photo: LargePhoto, draw: Draw) -> FloatImage:
+def _draw_tiles(picture: FullPicture, photo: LargePhoto, draw: Draw) -> FloatImage:
     """Return the picture, linear light (height, width, 3). draw: draws a tile."""
     height, width = photo.size
     top, left = picture.part.y * height, picture.part.x * width

@@ -1,21 +1,16 @@
-"""A picture of a photo at its own size or smaller, drawn tile by tile from views of the photo on disk.
-
-`full_drawing` draws it, in the thread that needs it: importing the renderer takes long.
-"""
+"""A picture of a photo at its own size or smaller; `full_drawing` draws it from views of the photo on disk."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.beyond.optics import Optics
 from iibr_core.color import bytes_from_encoded, primaries_matrix, srgb_from_linear
-from iibr_core.exports.source import Draw
 from iibr_core.method.memory import require_memory
 from iibr_core.method.plan import ScenePlan
 from iibr_core.runtime.tiling import in_bands
@@ -23,9 +18,6 @@ from iibr_core.scenes.rect import WHOLE, Rect
 from iibr_core.scenes.scene import LoadedPhoto, Scene
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import ColorSpace, FloatImage, InputError, image_size
-
-if TYPE_CHECKING:
-    from iibr_core.beyond.full_size import LargePhoto
 
 MAX_PIXELS = 100_000_000
 """Largest number of pixels of the photo; a larger photo is read at this size."""
@@ -43,22 +35,6 @@ class FullPicture:
     optics: Optics
     size: ScreenSize
     part: Rect = WHOLE
-
-    def make(
-        self,
-        draw: Draw,
-        photo: LargePhoto | None = None,
-        keep: Callable[[LargePhoto], None] = lambda photo: None,
-    ) -> FloatImage:
-        """Return the picture, linear light (height, width, 3).
-
-        draw: draws a tile. photo: the photo as it was kept for an earlier picture. keep: is called with the photo once
-        it is read, and again once its hidden surfaces are inpainted. Raises InputError if the file is missing or has
-        changed.
-        """
-        from iibr_core.exports.full_drawing import draw_tiles, read_photo
-
-        return draw_tiles(self, read_photo(self, photo, keep), draw)
 
 
 def encode_light(light: FloatImage, is_linear: bool, target: ColorSpace, source: ColorSpace) -> NDArray[Any]:

@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 from iibr_core.beyond.optics import CENTRE, Optics
 from iibr_core.exports.kinds import ExportKind, ExportOptions, optics_of, with_defaults
 from iibr_core.exports.render_settings import RenderSettings
-from iibr_core.formats.images.write import AS_USUAL, PictureFormat, write_picture
+from iibr_core.formats.images.picture_kinds import AS_USUAL, PictureFormat
+from iibr_core.formats.images.write import write_picture
 from iibr_core.formats.light_fields.light_field_formats import open_light_field
 from iibr_core.method.plan import ScenePlan
 from iibr_core.runtime.work import raise_if_stopped, report_progress

@@ -12,7 +12,7 @@ from iibr_core.exports.framing import draw_framed
 from iibr_core.exports.kinds import STACK_BITS, ExportOptions
 from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.exports.source import ExportSource
-from iibr_core.formats.images.write import PictureFormat
+from iibr_core.formats.images.picture_kinds import PictureFormat
 from iibr_core.formats.maps.pfm import write_pfm
 from iibr_core.formats.outputs import write_folder
 from iibr_core.scenes.lens_limits import aperture_limit

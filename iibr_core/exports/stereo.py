@@ -14,9 +14,9 @@ from iibr_core.exports.framing import draw_framed, side_pictures
 from iibr_core.exports.kinds import ExportOptions
 from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.exports.source import ExportSource
+from iibr_core.formats.images.picture_kinds import AS_USUAL, BEST_QUALITY, PictureFormat
 from iibr_core.formats.images.side_by_side import FULL_TAG, HALF_TAG, OVER_TAG, TAG
 from iibr_core.formats.images.spatial_photo import write_spatial_photo
-from iibr_core.formats.images.write import AS_USUAL, BEST_QUALITY, PictureFormat
 from iibr_core.formats.quilts import tagged
 from iibr_core.formats.stereo import anaglyph
 from iibr_core.scenes.scene import Scene

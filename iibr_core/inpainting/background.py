@@ -13,7 +13,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.inpainting.nearest_known import MOST_PIECE_PIXELS, nearest_known
+from iibr_core.inpainting.nearest_known import MOST_PIECE_PIXELS, nearest_known, number_pixels
 from iibr_core.inpainting.patch_synthesis import copy_patches
 from iibr_core.runtime.kernels import kernel
 from iibr_core.runtime.scalars import nearest_pixel
@@ -24,6 +24,8 @@ from iibr_core.types import FloatImage, ViewOffset
 
 MEDIAN_PX = 2
 """Distance, in pixels, of the filled disparities whose median counts: outliers would be displaced in the next view."""
+WIDE_PX = 2.0
+"""Patches fill hole pixels that lie so far from what is known, and those within 2 px of such pixels."""
 SMOOTH_STEPS_PX = (1, 2, 4, 8, 16, 32)
 """Distances, in pixels, over which colours are averaged one after the other, up to that of the nearest known pixel."""
 
@@ -115,7 +117,12 @@ def _fill_view(
         # Written after the whole step, because the means take the neighbours' colours before it.
         colors.reshape(-1, 3)[pixels] = changed
     if stages.synthesise_patches:
-        copy_patches(colors, disparity, hole, pixels, number, one_surface, threads)
+        # Slivers, as behind pixels that are covered in part, show no texture.
+        wide = np.zeros_like(hole)
+        _mark_wide(hole, pixels, reach, wide)
+        pixels = np.flatnonzero(wide)
+        number_pixels(pixels, number)
+        copy_patches(colors, disparity, wide, pixels, number, one_surface, threads)
 
 
 @kernel
@@ -252,3 +259,15 @@ def _smooth(colors, hole, pixels, reach, step, smoothed):
                     g += w * colors[v, u, 1]
                     b += w * colors[v, u, 2]
         smoothed[i, 0], smoothed[i, 1], smoothed[i, 2] = r / total, g / total, b / total
+
+
+@kernel
+def _mark_wide(hole, pixels, reach, wide):
+    """Mark in wide (H, W) the hole pixels near those that lie WIDE_PX or more from what is known."""
+    height, width = hole.shape
+    for i in range(len(pixels)):
+        if reach[i] >= WIDE_PX:
+            y, x = pixels[i] // width, pixels[i] % width
+            for v in range(max(y - 2, 0), min(y + 3, height)):
+                for u in range(max(x - 2, 0), min(x + 3, width)):
+                    wide[v, u] |= hole[v, u]

@@ -21,7 +21,8 @@ import pytest
 
 from iibr_core.beyond.optics import CENTRE
 from iibr_core.formats.images.metadata import settings_text_in
-from iibr_core.formats.images.write import PictureFormat, is_float, write_image
+from iibr_core.formats.images.picture_kinds import PictureFormat, is_float
+from iibr_core.formats.images.write import write_image
 from iibr_core.formats.light_fields.write import write_light_field
 from iibr_core.scenes.opening import results_of
 from iibr_core.scenes.scene import SceneReady, SceneRequest, Source, ViewReady

@@ -155,8 +155,10 @@ class HeadlessViewer:
         loaded, optics = self._scene_view.loaded, self.state.optics
         assert loaded is not None
         assert scene.plan is not None
+        from iibr_core.exports.full_drawing import draw_full
+
         full = FullPicture(scene, scene.plan, loaded, optics, size)
-        return full.make(self._scene_view.renderer.converged_picture)
+        return draw_full(full, self._scene_view.renderer.converged_picture)
 
     @property
     def scene(self) -> Scene:

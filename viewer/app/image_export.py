@@ -9,7 +9,8 @@ from typing import Any
 from numpy.typing import NDArray
 
 from iibr_core.formats.files import is_folder
-from iibr_core.formats.images.write import PictureFormat, write_picture
+from iibr_core.formats.images.picture_kinds import PictureFormat
+from iibr_core.formats.images.write import write_picture
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import SRGB, ColorSpace, FloatImage
 from viewer.model.state.app_state import AppState

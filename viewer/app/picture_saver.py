@@ -15,7 +15,7 @@ from iibr_core.beyond.optics import Optics
 from iibr_core.exports.full_picture import FullPicture, encode_light, is_full
 from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.exports.source import ExportSource
-from iibr_core.formats.images.write import AS_USUAL, PictureFormat, is_float
+from iibr_core.formats.images.picture_kinds import AS_USUAL, PictureFormat, is_float
 from iibr_core.formats.outputs import AlreadyThereError, make_folder
 from iibr_core.runtime.work import report_progress
 from iibr_core.scenes.scene import Scene
@@ -148,6 +148,8 @@ def _drawn_full(shot: _Shot, source: ExportSource, is_linear: bool, saved: Saved
     scene = source.scene
     assert scene.plan is not None
     assert source.loaded is not None
+    from iibr_core.exports.full_drawing import draw_full
+
     full = FullPicture(scene, scene.plan, source.loaded, source.optics, shot.size)
-    light = full.make(source.draw)
+    light = draw_full(full, source.draw)
     return encode_light(light, is_linear, saved.color_space, scene.color_space)

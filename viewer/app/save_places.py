@@ -10,7 +10,7 @@ from pathlib import Path
 
 from iibr_core.exports.render_settings import require_size
 from iibr_core.formats.files import is_file
-from iibr_core.formats.images.write import AS_USUAL, PictureFormat, require_picture_format
+from iibr_core.formats.images.picture_kinds import AS_USUAL, PictureFormat, require_picture_format
 from iibr_core.formats.outputs import check_output
 from iibr_core.scenes.inputs import inputs_of, named_by
 from iibr_core.scenes.screen_size import ScreenSize

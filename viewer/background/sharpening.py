@@ -58,6 +58,8 @@ class SharpeningWorker(JobThread[FullPicture, SharpResult]):
             self._photo = request.loaded, photo
 
         photo = kept[1] if kept is not None and kept[0] is request.loaded else None
+        from iibr_core.exports.full_drawing import draw_full
+
         with suppress(Cancelled):
-            light = request.make(draw, photo=photo, keep=keep)
+            light = draw_full(request, draw, photo, keep)
             yield SharpPart(encode_light(light, False, SRGB, request.scene.color_space))

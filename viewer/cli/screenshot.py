@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from iibr_core.depth.editing.edits import UNEDITED, DepthEdits
-from iibr_core.formats.images.write import AS_USUAL, BEST_QUALITY, KINDS, PROFILES, PictureFormat, is_float
+from iibr_core.formats.images.picture_kinds import AS_USUAL, BEST_QUALITY, KINDS, PROFILES, PictureFormat, is_float
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import ColorSpace, InputError
 from viewer.cli.lens_options import NO_LENS_OPTIONS, LensOptions

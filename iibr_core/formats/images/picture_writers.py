@@ -25,8 +25,8 @@ from iibr_core.formats.images.color_primaries import PRIMARIES
 from iibr_core.formats.images.color_profile import icc_profile
 from iibr_core.formats.images.decode import complaint_of, oiio_name
 from iibr_core.formats.images.metadata import PictureMetadata, exif_for, number_of
+from iibr_core.formats.images.picture_kinds import BEST_QUALITY, PNG_SETTINGS, PictureFormat
 from iibr_core.formats.images.pillow_reader import EXIF_FOLDER
-from iibr_core.formats.images.write import BEST_QUALITY, PNG_SETTINGS, PictureFormat
 from iibr_core.formats.images.xmp import xmp_for
 from iibr_core.types import ColorSpace, InputError, image_size
 

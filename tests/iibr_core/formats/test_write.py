@@ -23,7 +23,8 @@ from iibr_core.formats.images.metadata import (
     settings_text_in,
 )
 from iibr_core.formats.images.photo import read_photo
-from iibr_core.formats.images.write import KINDS, PictureFormat, write_image, write_picture
+from iibr_core.formats.images.picture_kinds import KINDS, PictureFormat
+from iibr_core.formats.images.write import write_image, write_picture
 from iibr_core.formats.images.xmp import xmp_for
 from iibr_core.types import DISPLAY_P3, SRGB, ImageSize
 from tests.iibr_core.formats.test_color_profile import profile_bytes

@@ -12,7 +12,7 @@ import pytest
 
 from iibr_core.color import srgb_from_linear
 from iibr_core.exports.render_settings import RenderSettings
-from iibr_core.formats.images.write import KINDS, PictureFormat, is_float
+from iibr_core.formats.images.picture_kinds import KINDS, PictureFormat, is_float
 from iibr_core.scenes.scene import Source
 from iibr_core.types import GridShape, InputError, ViewOffset
 from tests.viewer.conftest import HEIGHT, WIDTH, headless_with_scene

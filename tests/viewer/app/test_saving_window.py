@@ -274,14 +274,14 @@ def test_a_picture_at_the_photos_own_size_can_be_given_up(
 ) -> None:
     begun, before = threading.Event(), set(tmp_path.iterdir())
 
-    def make(self: FullPicture, draw: object) -> None:
+    def draw_full(picture: FullPicture, draw: object) -> None:
         begun.set()
         while not is_stopped():
             time.sleep(0.001)
         raise Cancelled
 
     with monkeypatch.context() as endless:
-        endless.setattr(FullPicture, "make", make)
+        endless.setattr("iibr_core.exports.full_drawing.draw_full", draw_full)
         large.app.do(DoTask(SaveTask(str(tmp_path / "out.png"), (WIDTH, HEIGHT))))
         large.until(lambda app: begun.is_set())
         large.app.do(DoTask(CancelJobTask(job_of(large).id)), DoTask(SaveTask(str(tmp_path / "next.png"), (16, 12))))

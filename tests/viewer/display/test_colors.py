@@ -10,7 +10,7 @@ import pytest
 from PIL import Image, ImageCms
 
 from iibr_core.exports.render_settings import RenderSettings
-from iibr_core.formats.images.write import PictureFormat
+from iibr_core.formats.images.picture_kinds import PictureFormat
 from iibr_core.scenes.scene import Source
 from iibr_core.types import DISPLAY_P3, SRGB, ViewOffset
 from tests.iibr_core.formats.test_color_profile import converted, profile_bytes

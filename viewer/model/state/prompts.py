@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from iibr_core.formats.images.write import AS_USUAL as USUAL_FORM
-from iibr_core.formats.images.write import PictureFormat
+from iibr_core.formats.images.picture_kinds import AS_USUAL as USUAL_FORM
+from iibr_core.formats.images.picture_kinds import PictureFormat
 from iibr_core.scenes.screen_size import ScreenSize
 from viewer.model.state.exporting import ExportPrompt
 from viewer.model.state.model_download import ModelsPrompt

@@ -9,7 +9,7 @@ from typing import TypeVar
 
 from imgui_bundle import imgui
 
-from iibr_core.formats.images.write import BEST_QUALITY, KINDS, PROFILES
+from iibr_core.formats.images.picture_kinds import BEST_QUALITY, KINDS, PROFILES
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import SRGB
 from viewer.model.actions import Action, AskToSave, DoTask, Quit, ShowPrompt
