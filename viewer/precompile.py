@@ -116,6 +116,13 @@ def _open_smaller(scratch: Path) -> None:
     _open(replace(_photo(scratch), max_pixels=160 * 200 // 2))
 
 
+def _open_with_small_map(scratch: Path) -> None:
+    source = _photo(scratch)
+    disparity = read_map(scratch / "photo_disparity.pfm")
+    write_map(scratch / "photo_disparity.pfm", np.nan_to_num(disparity, nan=0.0)[::4, ::4] / 4)
+    _open(source)
+
+
 def _open_guessed(scratch: Path) -> None:
     _open(replace(_photo(scratch, is_mapped=False), depth=DepthChoice(start="rough")))
 
@@ -177,6 +184,7 @@ STEPS: tuple[Callable[[Path], None], ...] = (
     _find_gloss,
     _open_guessed,
     _open_smaller,
+    _open_with_small_map,
     _open_hdr,
     _draw_at_own_size,
 )

@@ -97,7 +97,8 @@ def _fill_view(
 ) -> None:
     """Fill holes, see `fill_background`. one_surface: largest difference of disparities on one surface."""
     pixels, number, known = nearest_known(hole, threads)
-    reach, changed = np.empty(len(pixels), np.float32), np.empty((len(pixels), 3), np.float32)
+    reach, medians = (np.empty(len(pixels), np.float32) for _ in range(2))
+    changed = np.empty((len(pixels), 3), np.float32)
 
     def run(step: Callable[[slice], None]) -> None:
         in_pieces(step, pieces_of(len(pixels), MOST_PIECE_PIXELS), threads)
@@ -110,8 +111,8 @@ def _fill_view(
         _smooth(colors, hole, pixels[part], reach[part], step_px, changed[part])
 
     run(fill)
-    run(lambda part: _medians(disparity, hole, pixels[part], changed[part, 0]))
-    np.put(disparity, pixels, changed[:, 0])
+    run(lambda part: _medians(disparity, hole, pixels[part], medians[part]))
+    np.put(disparity, pixels, medians)
     for step_px in SMOOTH_STEPS_PX:
         run(partial(smooth, step_px))
         # Written after the whole step, because the means take the neighbours' colours before it.

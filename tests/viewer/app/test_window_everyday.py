@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +14,8 @@ from iibr_core.beyond.optics import Optics
 from iibr_core.formats.images.metadata import SETTINGS_KEY
 from iibr_core.formats.images.photo import read_photo
 from iibr_core.formats.images.write import write_image
-from iibr_core.scenes.scene import Source
+from iibr_core.scenes import opening
+from iibr_core.scenes.scene import SceneReady, SceneRequest, Source, ViewReady
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import Driver, Opener, rests, write_scene
 from viewer.app.headless import HeadlessViewer
@@ -48,7 +49,7 @@ def test_a_saved_picture_can_be_taken_again_without_the_window(
     assert settings.size_px == (96, 64)
     viewer.until_idle()
     with HeadlessViewer("egl") as again:
-        again.open(dataclasses.replace(settings.source, path=str(photo_path)), settings.depth_strength, lambda _: None)
+        again.open(dataclasses.replace(settings.source, path=str(photo_path)), settings.depth_strength)
         again.do(MoveEye(settings.optics.eye), SetAperture(settings.optics.aperture_diameter))
         difference = np.abs(again.picture(settings.size_px) / 255 - read_photo(out).pixels)
     assert difference.max() <= 1 / 255, "another GL context may round differently"
@@ -262,18 +263,14 @@ def test_stopping_keeps_the_views_that_are_there(open_window: Opener, photo_path
 def test_a_lost_worker_is_told_and_replaced(
     open_window: Opener, photo_path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from viewer.background import scene_worker
+    real = opening.results_of
 
-    real = scene_worker.results_of
-
-    def dying(
-        request: scene_worker.SceneRequest, *others: object
-    ) -> Iterator[scene_worker.SceneReady | scene_worker.ViewReady]:
+    def dying(request: SceneRequest, nearest_to: Callable[[], ViewOffset]) -> Iterator[SceneReady | ViewReady]:
         if request.generation == 1:
             raise SystemExit
-        yield from real(request, *others)  # type: ignore[arg-type]
+        yield from real(request, nearest_to)
 
-    monkeypatch.setattr(scene_worker, "results_of", dying)
+    monkeypatch.setattr(opening, "results_of", dying)
     driver = open_window(photo_path)
     driver.until(lambda app: bool(app.state.notices))
     assert "stopped unexpectedly" in driver.app.state.notices[0].text
