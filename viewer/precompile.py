@@ -119,7 +119,7 @@ def _open_smaller(scratch: Path) -> None:
 def _open_with_small_map(scratch: Path) -> None:
     source = _photo(scratch)
     disparity = read_map(scratch / "photo_disparity.pfm")
-    write_map(scratch / "photo_disparity.pfm", np.nan_to_num(disparity, nan=0.0)[::4, ::4] / 4)
+    write_map(scratch / "photo_disparity.pfm", np.nan_to_num(disparity, nan=0.0)[::4, ::4] / np.float32(4))
     _open(source)
 
 
