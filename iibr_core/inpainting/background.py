@@ -25,7 +25,7 @@ from iibr_core.types import FloatImage, ViewOffset
 MEDIAN_PX = 2
 """Distance, in pixels, of the filled disparities whose median counts: outliers would be displaced in the next view."""
 WIDE_PX = 2.0
-"""Patches fill hole pixels that lie so far from what is known, and those within 2 px of such pixels."""
+"""Distance from known pixels from which on, and within 2 px of which, holes get texture, in pixels."""
 SMOOTH_STEPS_PX = (1, 2, 4, 8, 16, 32)
 """Distances, in pixels, over which colours are averaged one after the other, up to that of the nearest known pixel."""
 
@@ -264,7 +264,7 @@ def _smooth(colors, hole, pixels, reach, step, smoothed):
 
 @kernel
 def _mark_wide(hole, pixels, reach, wide):
-    """Mark in wide (H, W) the hole pixels near those that lie WIDE_PX or more from what is known."""
+    """Mark in wide (H, W) the hole pixels near those that lie WIDE_PX or more from known ones."""
     height, width = hole.shape
     for i in range(len(pixels)):
         if reach[i] >= WIDE_PX:

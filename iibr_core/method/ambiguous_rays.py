@@ -1,10 +1,10 @@
 """Ambiguous rays: rays of which the closed form leaves open which surface they show. The transformer decides them.
 
-Either the closed form covers such a ray in part, or by several surfaces whose shares nothing tells. For each of them K
+Either the closed form covers such a ray in part, or by several surfaces whose shares are unknown. For each of them K
 hypotheses are laid out: the surfaces on it, then those that land within a few pixels, as different from each other as
 possible, last the plain look-up. A hypothesis says "this ray shows the source ray that disparity d leads to". Its
-features say how well it agrees with the disparity that its source ray really has; colours are never among them. All
-differences are pixels of parallax in the view, so nothing depends on the scene's scale.
+features measure how well it agrees with the disparity that its source ray really has; colours are never among them.
+All differences are pixels of parallax in the view, so nothing depends on the scene's scale.
 """
 
 from __future__ import annotations
@@ -91,7 +91,7 @@ class AmbiguousRays(NamedTuple):
 
 
 class _Landed(NamedTuple):
-    """What a view shows in some rows. to_view (S, 2): steps from each source to the view. parallax: largest of them."""
+    """Some rows of a view. to_view (S, 2): steps from each source to the view. parallax: largest of them."""
 
     rays: RayArrays
     to_view: NDArray[np.float64]
@@ -162,7 +162,7 @@ def blend(
 @kernel
 def _is_open(number, source, weights, photo_images, y, x):
     """Return whether the closed form leaves open what a ray shows: it covers the ray in part, or by several surfaces of
-    which none is a fringe, as a fringe tells the shares; and the heaviest leaves enough of the ray.
+    which none is a fringe, which states the shares; and the heaviest leaves enough of the ray.
     """
     heaviest, covered, fringed = 0.0, 0.0, False
     for k in range(np.int64(number[y, x])):

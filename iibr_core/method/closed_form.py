@@ -1,7 +1,7 @@
 """The weights w of the paper (section 3.2) in closed form: the limit that a trained transformer approaches.
 
 Alpha compositing front to back: each surface gets what those before it leave of the pixel's area. Weights of a ray sum
-to the covered share of its pixel, at most 1; what is missing is disoccluded.
+to the covered share of its pixel, at most 1; the rest is disoccluded.
 """
 
 from __future__ import annotations

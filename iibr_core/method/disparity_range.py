@@ -12,22 +12,23 @@ import numpy as np
 from iibr_core.types import FloatImage
 
 LEAST_SHARE_PERCENT = 0.02
-"""Of the picture: what is smaller and wild does not set the range."""
+"""Share of the picture, in percent, below which wild values do not set the range."""
 NOISE_OF_SECOND_DIFFERENCE = 1.652
 """Median of |a - 2b + c| over the deviation of independent Gaussian noise in a, b and c."""
 LEAST_OVER_NOISE = 4.0
-"""A range that is not this often the noise's deviation is noise itself."""
+"""A range of less than so many deviations of the noise is noise itself."""
 LEAST_OVER_VALUE = 1e-4
 """A range below this share of the disparities it is found at lies beyond what maps state."""
 
 MOST_STEP = 1 / 30
-"""Of the range: maps with larger steps than five bits have are made of edges."""
+"""Largest step of rounding as a share of the range, that of five bits: larger ones are edges."""
 
 
 @dataclass(frozen=True)
 class DisparityRange:
-    """low, high: the farthest and the nearest disparity that count, equal where the map is flat. noise: the deviation
-    of what differs from pixel to pixel alone. All in the map's units.
+    """The farthest (low) and the nearest (high) disparity that count, equal if the map is flat.
+
+    noise: standard deviation of the noise from pixel to pixel. All in the map's units.
     """
 
     low: float
@@ -36,13 +37,14 @@ class DisparityRange:
 
     @property
     def range(self) -> float:
-        """From the farthest to the nearest."""
+        """The difference of the nearest and the farthest disparity."""
         return self.high - self.low
 
 
 def measure_disparity_range(disparity: FloatImage) -> DisparityRange:
-    """Of a map (H, W); what is not finite counts as its middle. What counts fills a square of three pixels at least,
-    and a few of those.
+    """Return the range of a map (H, W); values that are not finite count as its median.
+
+    Values count if they fill a few squares of three by three pixels.
     """
     finite = np.isfinite(disparity)
     middle = float(np.median(disparity[finite])) if finite.any() else 0.0
@@ -57,8 +59,10 @@ def measure_disparity_range(disparity: FloatImage) -> DisparityRange:
 
 
 def rounding_step(disparity: FloatImage) -> float:
-    """What the values of a map (H, W) are rounded to, quarter pixels or 8 bits, say: the usual step between neighbours
-    that differ. 0 where such steps are edges; of maps that are not rounded it is their usual slope.
+    """Return the step to which the values of a map (H, W) are rounded, as quarter pixels or 8 bits.
+
+    It is the median step between neighbours that differ: 0 if such steps are edges; the usual slope of maps that are
+    not rounded.
     """
     steps = np.concatenate([np.abs(np.diff(disparity, axis=axis)).ravel() for axis in (0, 1)])
     range_ = measure_disparity_range(disparity).range
@@ -68,7 +72,7 @@ def rounding_step(disparity: FloatImage) -> float:
 
 
 def _of_squares(values: FloatImage, extreme: np.ufunc) -> FloatImage:
-    """The extreme of all three by three pixels; of fewer where the picture is smaller."""
+    """Return the extreme of each three by three pixels; of fewer where the picture is smaller."""
     for _ in range(2):
         values = extreme(values[1:], values[:-1]) if len(values) > 1 else values
         values = extreme(values[:, 1:], values[:, :-1]) if values.shape[1] > 1 else values
@@ -76,6 +80,6 @@ def _of_squares(values: FloatImage, extreme: np.ufunc) -> FloatImage:
 
 
 def _noise(values: FloatImage) -> float:
-    """The deviation of independent noise, of the lines of the map; planes have none."""
+    """Return the standard deviation of independent noise in the rows of the map; planes have none."""
     second = values[:, 2:] - 2 * values[:, 1:-1] + values[:, :-2]
     return float(np.median(np.abs(second))) / NOISE_OF_SECOND_DIFFERENCE if second.size else 0.0

@@ -246,7 +246,7 @@ def _look_up_run(flat, begin, pitch, across, down, first, end, colors, to):
 
 @kernel
 def _look_up_others(rays, offsets, candidates, weights, wanted, first_y, first_x, shown):
-    """What `look_up` returns. offsets (S, 2): from each source to the target view."""
+    """Look up the remaining rays, see `look_up`. offsets (S, 2): from each source to the target view."""
     images, surfaces, near_edge = rays.colors, rays.disparity, rays.near_edge
     first_row, count = candidates.first_row, candidates.number
     candidate_disparity, candidate_source = candidates.disparity, candidates.source

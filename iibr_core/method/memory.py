@@ -9,11 +9,11 @@ from iibr_core.types import InputError
 
 FREE_SHARE = 0.5
 PHOTO_BYTES = 90
-"""Measured, of a pixel: while a photo is read and its depth is looked for."""
+"""Bytes a pixel, measured, while a photo is read and its depth is looked for."""
 MAKING_BYTES = 300
-"""Of a pixel, while views are made: ten source images of 21 bytes, and views in the making."""
+"""Bytes a pixel while views are made: ten source images of 21 bytes, and views in the making."""
 STORED_BYTES, STORED_HDR_BYTES = 7, 10
-"""Of a pixel of a view: colours of 8 bits or half floats, and disparity."""
+"""Bytes a pixel of a view: colours of 8 bits or half floats, and disparity."""
 MIB = 2**20
 
 

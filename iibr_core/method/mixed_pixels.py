@@ -3,8 +3,8 @@ background.
 
 A pixel on the far side of a depth edge is split: the background keeps its own colour, and the foreground gets a fringe
 ray there that covers the pixel's share alpha. Both together are the pixel again. Share and colours are the most likely
-ones by how both surfaces' colours are spread around it (Bayesian matting: Chuang et al., CVPR 2001); where colours tell
-nothing, the outline tells the share.
+ones by how both surfaces' colours are spread around it (Bayesian matting: Chuang et al., CVPR 2001); where colours
+are alike, the outline gives the share.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ def split_mixed_pixels(
 def move_with_foreground(disparity: FloatImage, steps: tuple[float, float]) -> FloatImage:
     """Return disparity (H, W) that is the foreground's at pixels just behind a step from steps[0] to steps[1].
 
-    Such pixels show both surfaces, too. Moved with the foreground, their light stays as it is beside it; surfaces that
+    Such pixels show both surfaces, too. Moved with the foreground, their light stays the same beside it; surfaces that
     small steps separate are hardly moved against each other.
     """
     moved = np.empty_like(disparity, order="C")

@@ -1,6 +1,6 @@
 """The mask M of the paper (section 3.3): which rays no source ray shows.
 
-The paper takes rays of high entropy for occluded. Here the covered share tells them: what little covers such a ray is
+The paper takes rays of high entropy for occluded. Here the covered share decides: what little covers such a ray is
 composited over what is inpainted behind it, so no colour depends on where the line is drawn, and no logarithm is
 needed. Entropy is there to be looked at. The share of a pixel that no candidate covers could come from anywhere, so it
 counts as spread evenly over all K slots: a ray with one covering candidate has entropy 0, an uncovered one has 1.

@@ -127,7 +127,7 @@ def plan_literal(
     keeps_views: bool = False,
     inpaint: str = DEFAULT_INPAINTER,
 ) -> ScenePlan:
-    """Plan for `--literal`: the given disparity is taken as it is, views at integer steps.
+    """Plan for `--literal`: the given disparity counts in pixels, views are at integer steps.
 
     Arguments as of `plan_for_viewing`. Raises InputError if the grid has no view or does not fit into memory.
     """

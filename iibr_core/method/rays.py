@@ -277,7 +277,7 @@ def _block_reduce(combine: np.ufunc, pixels: NDArray[Any]) -> NDArray[Any]:
 def _leave_out_in_front(disparity, photo_disparity, t, s, step, coverage):
     """Set coverage to 0 for rays seen from (t, s) more than a step in front of the photo's, and beside such rays.
 
-    Beyond its frame the photo as it is continued counts: what one view inpaints there would cover what it shows.
+    Beyond its frame, the continued photo counts: what one view inpaints there would cover what it shows.
     """
     height, width = disparity.shape
     made_up = coverage > 0

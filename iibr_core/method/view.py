@@ -152,7 +152,7 @@ class Renderer:
 
 
 class _Decided(NamedTuple):
-    """What the transformer chose for pixels y, x (N,). colors (N, 3), disparity (N,), inpainted (N,): see `View`."""
+    """The transformer's choice for pixels y, x (N,). colors (N, 3), disparity (N,), inpainted (N,): see `View`."""
 
     y: NDArray[np.int64]
     x: NDArray[np.int64]

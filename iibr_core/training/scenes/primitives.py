@@ -1,4 +1,4 @@
-"""What scenes are put together of: shapes that rays meet, in a frame of their own, and the colours on them."""
+"""Shapes that scenes are made of, their intersections with rays in a frame of each shape, and their colours."""
 
 from __future__ import annotations
 

@@ -70,7 +70,7 @@ def random_scene(rng: np.random.Generator, size: ImageSize, largest_disparity: f
 
 @dataclass(frozen=True, eq=False)
 class _SceneBounds:
-    """Where things can stand: a picture, its lens, a range of disparities; and the colours they share."""
+    """The space for objects: a picture, its lens, a range of disparities; and the hues that they share."""
 
     rng: np.random.Generator
     size: ImageSize

@@ -34,7 +34,7 @@ TENT_STEPS = sqrt(6.0)
 
 @dataclass(frozen=True, eq=False)
 class RaycastScene:
-    """What can be seen, and the cameras that see it.
+    """Objects and the cameras that see them.
 
     primitives: (N,) PRIMITIVE, nearest first; the last is a plane without bounds at the greatest depth, seen wherever
     nothing else is. centre_px: (x, y) of the centre view's axis. infinity_px: minus the disparity of infinity.
@@ -115,7 +115,7 @@ def is_visible_from(
 
 
 def _clamp_finite(values: ArrayLike) -> NDArray[np.float64]:
-    """float64; what is not finite or lies too far off counts as 0 or as far off as possible."""
+    """Return values in double precision, NaN as 0, infinite and far ones within +-FARTHEST."""
     return np.clip(np.nan_to_num(np.asarray(values, np.float64)), -FARTHEST, FARTHEST)
 
 
@@ -125,7 +125,7 @@ def _threads() -> ThreadPoolExecutor:
 
 
 def sample_places(samples: int, blur_px: float = 0.0) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Where a pixel's rays go: offsets (S, 2) in (x, y), px, the centre first; and their weights (S,), sum 1.
+    """Return offsets (S, 2) of a pixel's rays in (x, y), px, the centre first; and their weights (S,), sum 1.
 
     All rays differ in x and in y, so that edges in rows and columns are mixed in samples**2 steps.
     """
@@ -143,7 +143,7 @@ def sample_places(samples: int, blur_px: float = 0.0) -> tuple[NDArray[np.float6
 
 
 def _view_of(scene: RaycastScene, offset: ViewOffset) -> tuple[Any, ...]:
-    """What the kernel needs to know of a view."""
+    """Return the arguments of the kernel that depend on the view."""
     primitives = scene.primitives
     camera = _clamp_finite([offset.s, offset.t, 0.0])
     axes = np.ascontiguousarray(primitives["axes"])
@@ -154,7 +154,7 @@ def _view_of(scene: RaycastScene, offset: ViewOffset) -> tuple[Any, ...]:
 
 
 def _bounds(scene: RaycastScene, camera: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(N, 4): each primitive lies within these x and y (first x, last x, first y, last y) of the view, px."""
+    """Return the bounds (N, 4) of each primitive in the view: first x, last x, first y, last y, px."""
     primitives = scene.primitives
     signs = np.stack(np.meshgrid(*[[-1.0, 1.0]] * 3), axis=-1).reshape(8, 1, 3)
     corners = primitives["centre"] + np.einsum("cnj,njk->cnk", signs * primitives["half"], primitives["axes"])

@@ -1,4 +1,4 @@
-"""What surfaces of procedural scenes look like: solid patterns, and holes cut into planes. Scalars only.
+"""Looks of surfaces of procedural scenes: solid patterns, and holes cut into planes. Scalars only.
 
 Patterns are continuous functions of a point in the surface's own frame, the same from every view. `pixel` is the size
 of a pixel of the centre view on the surface there: detail finer than it is left out, as it could only alias.
