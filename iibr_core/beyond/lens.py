@@ -53,7 +53,7 @@ class LensSum:
         barrel = _barrel(optics, self._size)
 
         def shear(first: int, last: int) -> None:
-            _add_sheared(light, surface, camera, weight, focus, barrel, first, last, self._sum, self._weights)
+            _add_sheared(light, surface, camera, weight, focus, barrel, (first, last), (self._sum, self._weights))
 
         in_bands(lambda first, last: _linear_rows(colors, self._gain, first, last, light), self._size)
         in_bands(shear, self._size)
@@ -96,14 +96,15 @@ def _mirrored(index, size):
 
 
 @kernel
-def _add_sheared(light, disparity, camera, weight, focus, barrel, first, last, total, weights):
+def _add_sheared(light, disparity, camera, weight, focus, barrel, rows, sums):
     """Add rows [first, last) of a view, sheared to the focus, see `LensSum.add`.
 
     focus: disparity, tilt (right, down) and range. barrel: (t, s, radius).
     """
+    total, weights = sums
     height, width = total.shape[:2]
     (t, s), (middle, (tilt_x, tilt_y), focus_range), (barrel_t, barrel_s, radius) = camera, focus, barrel
-    for y in range(first, last):
+    for y in range(*rows):
         v = (y + 0.5) / height - 0.5
         for x in range(width):
             u = (x + 0.5) / width - 0.5

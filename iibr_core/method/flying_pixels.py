@@ -63,13 +63,12 @@ def without_flying_pixels(
     # Kernels know no half precision.
     shown = colors.astype(np.float32) if colors.dtype == np.float16 else colors
     replaced, white = shown.copy(), 255.0 if colors.dtype == np.uint8 else 1.0
-    in_bands(
-        lambda first, last: _replace_flying(
-            shown, white, disparity, inpainted, detail, margins.top, margins.left, *offset, first, last, replaced
-        ),
-        image_size(disparity),
-        threads,
-    )
+    to_photo = (float(offset.t), float(offset.s)), (margins.top, margins.left)
+
+    def band(first: int, last: int) -> None:
+        _replace_flying(shown, white, disparity, inpainted, detail, to_photo, (first, last), replaced)
+
+    in_bands(band, image_size(disparity), threads)
     return cast(Colors, replaced.astype(colors.dtype, copy=False))
 
 
@@ -94,12 +93,14 @@ def _measure(rows, first, last, detail):
 
 
 @kernel
-def _replace_flying(
-    colors, white, disparity, inpainted, detail, top, left, t, s, first, last, replaced
-):  # fmt: skip
-    """Write flying pixels of rows [first, last) to replaced, which holds the colours."""
+def _replace_flying(colors, white, disparity, inpainted, detail, to_photo, rows, replaced):
+    """Write flying pixels of rows [first, last) to replaced, which holds the colours.
+
+    to_photo: view offset (t, s) and margins (top, left) of the photo.
+    """
+    (t, s), (top, left) = to_photo
     lowest, rightmost = detail.shape[0] - 1, detail.shape[1] - 1
-    for y in range(first, last):
+    for y in range(*rows):
         for x in range(disparity.shape[1]):
             v, u = y + disparity[y, x] * t + top, x + disparity[y, x] * s + left
             v, u = min(max(v, 0.0), lowest), min(max(u, 0.0), rightmost)

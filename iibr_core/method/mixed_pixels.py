@@ -51,7 +51,8 @@ def split_mixed_pixels(
     def band(first: int, last: int) -> None:
         own[first:last] = fringe[first:last] = colors[first:last]
         fringe_disparity[first:last], coverage[first:last] = np.nan, 0.0
-        _split_rows(colors, disparity, is_edge_band, edge_step, first, last, own, fringe, fringe_disparity, coverage)
+        split = own, fringe, fringe_disparity, coverage
+        _split_rows(colors, disparity, is_edge_band, edge_step, (first, last), split)
 
     in_bands(lambda first, last: _mark_edge_bands(disparity, edge_step, first, last, is_edge_band), size)
     in_bands(band, size)
@@ -136,11 +137,12 @@ def _foreground_beside(disparity, y, x, edge_step):
 
 
 @kernel
-def _color_statistics(colors, disparity, is_edge_band, y, x, foreground, edge_step, mean, spread, darkest, brightest):
+def _color_statistics(colors, disparity, is_edge_band, pixel, foreground, edge_step, statistics):
     """Write mean (2, 3) and covariance (2, 3, 3) of linear colours of the pixel's surface and the one in front;
     extend darkest and brightest (3) by the pixel's surface. Return whether there are pixels of both.
     """
-    height, width = disparity.shape
+    (height, width), (y, x) = disparity.shape, pixel
+    mean, spread, darkest, brightest = statistics
     weights, color = np.zeros(2), np.empty_like(darkest)
     mean[:], spread[:] = 0.0, 0.0
     for v in range(max(y - MATTING_PX, 0), min(y + MATTING_PX + 1, height)):
@@ -188,13 +190,13 @@ def _mixture_precision(spread, share, precision):
 
 
 @kernel
-def _split_rows(
-    colors, disparity, is_edge_band, edge_step, first, last, own, fringe, fringe_disparity, coverage,
-):  # fmt: skip
-    """Write rows [first, last) of what `split_mixed_pixels` returns; they hold the photo's colours before."""
+def _split_rows(colors, disparity, is_edge_band, edge_step, rows, split):
+    """Write rows [first, last) of the result of `split_mixed_pixels`, which hold the photo's colours before."""
+    own, fringe, fringe_disparity, coverage = split
     mean, spread, precision = np.empty((2, 3)), np.empty((2, 3, 3)), np.empty((3, 3))
     here, darkest, brightest = np.empty(3), np.empty(3), np.empty(3)
-    for y in range(first, last):
+    statistics = mean, spread, darkest, brightest
+    for y in range(*rows):
         for x in range(disparity.shape[1]):
             if not is_edge_band[y, x]:
                 continue
@@ -204,9 +206,7 @@ def _split_rows(
             # A pixel just behind an edge, and colours of both sides.
             if not (
                 is_in_front(foreground, disparity[y, x], edge_step)
-                and _color_statistics(
-                    colors, disparity, is_edge_band, y, x, foreground, edge_step, mean, spread, darkest, brightest
-                )
+                and _color_statistics(colors, disparity, is_edge_band, (y, x), foreground, edge_step, statistics)
             ):
                 continue
             # Colours of a mixture spread with both surfaces'. The share that fits best, by colours and outline, follows

@@ -46,7 +46,7 @@ class TrainedWeights:
     def __call__(self, ambiguous: AmbiguousRays) -> FloatImage:
         """Return weights (N, K), 0 for unused hypotheses; rows sum to 1."""
         weights = np.zeros(ambiguous.disparity.shape, np.float32)
-        _weigh(ambiguous.features, ambiguous.number, *self._layers, weights)
+        _weigh(ambiguous.features, ambiguous.number, self._layers, weights)
         return weights
 
 
@@ -89,8 +89,12 @@ def _add_prior(score, share, start, weights):
 
 
 @kernel
-def _weigh(features, number, w1, b1, w2, b2, w_key, b_key, w_query, w_score, weights):
-    """Arrays are (unit, lane). The hypotheses of a block's rays lie one after the other in lanes [start, end)."""
+def _weigh(features, number, layers, weights):
+    """Write the weights (N, K) of rays, see `TrainedWeights`. layers: transposed arrays in the order of SHAPES.
+
+    Arrays are (unit, lane). The hypotheses of a block's rays lie one after the other in lanes [start, end).
+    """
+    w1, b1, w2, b2, w_key, b_key, w_query, w_score = layers
     rays, most = weights.shape
     inputs = np.empty((features.shape[2], most * RAYS_A_BLOCK), np.float32)
     hidden = np.empty((WIDTH, most * RAYS_A_BLOCK), np.float32)

@@ -39,7 +39,7 @@ def find_smooth_cells(
     smooth = cells_in(columns or (0, rays.size.width), shape)
     parallax = max(*map(abs, offset), 1e-9)
     rough = ~(cells.step <= rays.smooth_step(offset))
-    _land_cells(cells, rough, rays.to_view(offset), first, rays.photo_images, parallax, far, near, smooth)
+    _land_cells(cells, rough, rays.to_view(offset), first, rays.photo_images, parallax, (far, near), smooth)
     # Something lands, and its parts stay together.
     smooth &= (near >= far) & ((near - far) * parallax <= EDGE_PX)
     return smooth, np.where(smooth, far, np.float32(0.0))
@@ -77,8 +77,9 @@ def _touches(least, most, t, row, rows):
 
 
 @kernel
-def _land_cells(cells, rough, offsets, first_cell, photo_images, parallax, far, near, smooth):
-    """Let the cells of all sources land, the photo's first. far, near: disparities of the smooth ones that land."""
+def _land_cells(cells, rough, offsets, first_cell, photo_images, parallax, ranges, smooth):
+    """Let the cells of all sources land, the photo's first. ranges: least and greatest disparity that land smoothly."""
+    far, near = ranges
     low, high, row_ranges = cells.low, cells.high, cells.row_ranges
     rows, columns = smooth.shape
     # The photo comes first: inpainted rays are compared with what it shows.

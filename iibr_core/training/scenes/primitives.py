@@ -37,8 +37,9 @@ PRIMITIVE = np.dtype(
 
 
 @kernel
-def distance_along(shape, ox, oy, oz, ex, ey, ez, hx, hy, hz):
-    """How far along a ray it meets a primitive, both in the primitive's own frame; infinite where it does not."""
+def distance_along(shape, origin, direction, half):
+    """Return the distance along a ray to a primitive, in the frame of the primitive, or infinity."""
+    (ox, oy, oz), (ex, ey, ez), (hx, hy, hz) = origin, direction, half
     if shape == PLANE:
         # The plane z = 0 of its own frame, within its rectangle.
         z = -oz / ez if ez != 0.0 else inf

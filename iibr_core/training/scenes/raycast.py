@@ -77,12 +77,12 @@ def cast(
         raise ValueError(f"x is {x.shape}, y {y.shape}, samples {samples}: give equal (N,) and at least one sample")
     colors, disparity = np.empty((len(x), 3), np.float32), np.empty(len(x), np.float32)
     places, weights = sample_places(samples, blur_px)
-    margin = float(np.abs(places).max())
+    rays = places, weights, float(np.abs(places).max())
     view = _view_of(scene, offset)
 
     def chunk(first: int) -> None:
         part = slice(first, first + CHUNK_PIXELS)
-        _cast(x[part], y[part], places, weights, margin, *view, colors[part], disparity[part])
+        _cast(x[part], y[part], rays, view, colors[part], disparity[part])
 
     if len(x) <= CHUNK_PIXELS:
         chunk(0)
@@ -143,7 +143,7 @@ def sample_places(samples: int, blur_px: float = 0.0) -> tuple[NDArray[np.float6
 
 
 def _view_of(scene: RaycastScene, offset: ViewOffset) -> tuple[Any, ...]:
-    """Return the arguments of the kernel that depend on the view."""
+    """Return primitives, axes, origins, bounds, camera, lens (centre x, y, focal, infinity, depths) and light."""
     primitives = scene.primitives
     camera = _clamp_finite([offset.s, offset.t, 0.0])
     axes = np.ascontiguousarray(primitives["axes"])
@@ -182,8 +182,10 @@ def _find_met(bounds, x, y, margin, met):
 
 
 @kernel
-def _cast(xs, ys, places, weights, margin, primitives, axes, origins, bounds, camera, lens, light, colors, disparity):
-    """See `cast`. places, weights: `sample_places`; lens: centre x, y, focal, infinity, least and greatest z."""
+def _cast(xs, ys, rays, view, colors, disparity):
+    """Write what `cast` returns. rays: `sample_places` and their largest distance. view: `_view_of`."""
+    places, weights, margin = rays
+    primitives, axes, origins, bounds, camera, lens, light = view
     focal, infinity, least_z, greatest_z = lens[2], lens[3], lens[4], lens[5]
     backdrop = len(primitives) - 1
     met = np.empty(len(primitives), np.int64)
@@ -206,7 +208,8 @@ def _cast(xs, ys, places, weights, margin, primitives, axes, origins, bounds, ca
                 ey = axes[k, 1, 0] * wx + axes[k, 1, 1] * wy + axes[k, 1, 2]
                 ez = axes[k, 2, 0] * wx + axes[k, 2, 1] * wy + axes[k, 2, 2]
                 hx, hy, hz = p.half[0], p.half[1], p.half[2]
-                z = distance_along(p.shape, origins[k, 0], origins[k, 1], origins[k, 2], ex, ey, ez, hx, hy, hz)
+                origin = origins[k, 0], origins[k, 1], origins[k, 2]
+                z = distance_along(p.shape, origin, (ex, ey, ez), (hx, hy, hz))
                 # In the range of depths, nearer than all before, and not through a hole cut into it.
                 if least_z <= z < depth:
                     u, v = origins[k, 0] + z * ex, origins[k, 1] + z * ey
