@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from iibr_core.inpainting.background import MEDIAN_PX, SMOOTH_STEPS_PX, continues_in_front, fill_background
+from iibr_core.inpainting.background import MEDIAN_PX, SMOOTH_STEPS_PX, WIDE_PX, continues_in_front, fill_background
 from iibr_core.inpainting.nearest_known import DIRECTIONS
 from iibr_core.surfaces import EDGE_PX, SAME_SURFACE_PX
 from iibr_core.types import ViewOffset
@@ -67,7 +67,10 @@ def fill_slowly(colors, disparity, hole, photo_disparity, offset):
     for step in SMOOTH_STEPS_PX:
         filled_colors = smooth_slowly(filled_colors, hole, reach, step)
     agreed = agree_slowly(filled_disparity, hole)
-    return copy_slowly(filled_colors, agreed, hole, one_surface), agreed
+    wide = np.zeros_like(hole)
+    for y, x in np.argwhere(hole & (reach >= WIDE_PX)):
+        wide[max(y - 2, 0) : y + 3, max(x - 2, 0) : x + 3] = True
+    return copy_slowly(filled_colors, agreed, wide & hole, one_surface), agreed
 
 
 @pytest.mark.parametrize("contrast", [1.0, 0.15])
