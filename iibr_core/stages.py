@@ -26,6 +26,8 @@ class Stages:
     """Lines continue straight beyond the frame."""
     split_mixed_pixels: bool = True
     """Pixels that show two surfaces become a ray of each."""
+    connect_slopes: bool = True
+    """Rays of one steep surface stay joined, however far apart they land."""
     leave_out_in_front: bool = True
     """Pixels that were inpainted in front of the photo's surfaces are not added to the rays."""
     share_inpainted: bool = True

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from iibr_core.inpainting.outpainting import outpaint
 from iibr_core.method.flying_pixels import CALM, TEARING_GAP_PX, measure_detail
 from iibr_core.method.mixed_pixels import move_with_foreground, split_mixed_pixels
+from iibr_core.method.steep_surfaces import BELOW, RIGHT, is_joined, join_steep_rays
 from iibr_core.runtime.kernels import kernel
 from iibr_core.runtime.scalars import nearest_pixel
 from iibr_core.runtime.work import raise_if_stopped
@@ -80,7 +81,8 @@ class RaySet:
     """Images of rays of one size (height, width), at most `capacity` of them.
 
     farthest_views: largest view offset that will be rendered; steps of disparity are judged there. margins: of the
-    images around every view. stages: that are on. photo_disparity: the photo's, at the size of views. photo_detail: see
+    images around every view. joined (H, W): rays of the photo on steep surfaces, see `join_steep_rays`. stages: that
+    are on. photo_disparity: the photo's, at the size of views. photo_detail: see
     `measure_detail`. photo_images: see `RayArrays`.
     """
 
@@ -108,6 +110,7 @@ class RaySet:
         low, high = (np.empty((capacity, *cells), np.float32) for _ in range(2))
         row_ranges = np.empty((capacity, cells[0], 2), np.float32)
         self._cells_room = Cells(low, high, row_ranges, np.empty(cells, np.float32))
+        self.joined, self._steep = np.zeros(size, np.uint8), np.zeros(cells, np.bool_)
 
     def add(
         self,
@@ -127,13 +130,15 @@ class RaySet:
         disparity, coverage = self._room.disparity[k], self._room.coverage[k]
         if k == 0:
             self.photo_disparity = np.ascontiguousarray(self.in_view(disparity))
+            self._join_steep_rays(disparity)
             raise_if_stopped()
             cells.step[:] = _block_reduce(np.maximum, _neighbour_steps(disparity))
         if k > 0 and any(offset) and self.stages.leave_out_in_front:
             edge_step = step_of(EDGE_PX, self.farthest_views)
             _leave_out_in_front(disparity, self._room.disparity[0], *offset, edge_step, coverage)
         raise_if_stopped()
-        self._room.near_edge[k] = near_steps(disparity, step_of(SAME_SURFACE_PX, self.farthest_views))
+        joined = self.joined if k == 0 else None
+        self._room.near_edge[k] = near_steps(disparity, step_of(SAME_SURFACE_PX, self.farthest_views), joined)
         raise_if_stopped()
         known = (coverage > 0) & (disparity == disparity)
         cells.low[k] = _block_reduce(np.minimum, np.where(known, disparity, np.float32(np.inf)))
@@ -184,10 +189,19 @@ class RaySet:
         """Return the steps (S, 2) from each image to the view at `offset`."""
         return np.array(offset) - self._room.offsets[: self._count]
 
+    def steep_cells(self, k: int) -> NDArray[np.bool_]:
+        """Return the cells (M, N) of image k with steep surfaces. Only the photo has any."""
+        return self._steep if k == 0 else np.zeros_like(self._steep)
+
     def smooth_step(self, offset: ViewOffset) -> float:
         """Return the largest step of the photo that belongs to a smooth surface in the view at `offset`."""
         nearness = self.farthest_views / max(*map(abs, offset), 1e-9)
         return SMOOTH_SHARE * step_of(SAME_SURFACE_PX, self.farthest_views) * max(nearness, 1.0)
+
+    def _join_steep_rays(self, disparity: FloatImage) -> None:
+        if self.stages.connect_slopes:
+            self.joined = join_steep_rays(disparity, step_of(SAME_SURFACE_PX, self.farthest_views))
+            self._steep = _block_reduce(np.logical_or, is_joined(self.joined))
 
     def _write(
         self,
@@ -241,12 +255,17 @@ def rays_of_photo(
     return rays
 
 
-def near_steps(disparity: FloatImage, step: float) -> NDArray[np.bool_]:
-    """Return where (H, W) a look-up of 4x4 pixels may meet neighbours that differ by more than a step, or are NaN."""
+def near_steps(disparity: FloatImage, step: float, joined: NDArray[np.uint8] | None = None) -> NDArray[np.bool_]:
+    """Return where (H, W) a look-up of 4x4 pixels may meet neighbours that differ by more than a step, or are NaN.
+
+    joined: neighbours that one steep surface joins, see `join_steep_rays`.
+    """
     is_step = ~np.isfinite(disparity)
+    joined = np.zeros(disparity.shape, np.uint8) if joined is None else joined
     # NaN fails the comparison, hence "not at most".
-    is_step[:, :-1] |= ~(np.abs(disparity[:, 1:] - disparity[:, :-1]) <= step)
-    is_step[:-1] |= ~(np.abs(disparity[1:] - disparity[:-1]) <= step)
+    across, down = np.abs(np.diff(disparity, axis=1)), np.abs(np.diff(disparity, axis=0))
+    is_step[:, :-1] |= ~(across <= step) & (joined[:, :-1] & RIGHT == 0)
+    is_step[:-1] |= ~(down <= step) & (joined[:-1] & BELOW == 0)
     for axis in (0, 1):
         raise_if_stopped()
         is_step, source = is_step.copy(), np.moveaxis(is_step, axis, 0)
