@@ -29,6 +29,7 @@ CASES = {
     "fit_to_blur": "soft",
     "refill_between_surfaces": "resampled",
     "label_edge_bands": "dilated",
+    "connect_slopes": "steep",
 }
 """Of those that an exact map of a drawn scene does not need."""
 
@@ -41,6 +42,8 @@ def scene(case: str) -> tuple[FloatImage, FloatImage]:
         return photo, blur(exact, 2.0)
     if case == "resampled":
         return photo, resampled(exact)
+    if case == "steep":
+        return photo, np.tile(np.linspace(-15, 15, SIZE.width, dtype=np.float32), (SIZE.height, 1))
     if case == "dilated":
         return photo, np.asarray(cv2.dilate(exact, np.ones((3, 3))), np.float32)
     return photo, exact
