@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
+import cv2
 import numpy as np
 import OpenImageIO as oiio
 from numpy.typing import NDArray
@@ -21,7 +23,6 @@ from iibr_core.formats.light_fields.views import grid_of, read_stored_view
 from iibr_core.formats.maps.writer import write_map
 from iibr_core.method.plan import plan_for_viewing
 from iibr_core.runtime.resources import resource_folder
-from iibr_core.training.degradation import blur
 from iibr_core.training.scenes.random_scene import random_scene, render
 from iibr_core.types import (
     Disparity,
@@ -103,7 +104,12 @@ def bench_scenes(scene: MultiView, max_pixels: int, with_soft: bool = True) -> l
 
 def soften(scene: BenchScene) -> BenchScene:
     """The scene with its disparity blurred."""
-    return replace(scene, name=f"{scene.name}, soft map", disparity=blur(scene.disparity, SOFT_PX), is_soft=True)
+    return replace(scene, name=f"{scene.name}, soft map", disparity=_blur(scene.disparity, SOFT_PX), is_soft=True)
+
+
+def _blur(image: NDArray[Any], sigma_px: float) -> FloatImage:
+    """Return an image (H, W), blurred by OpenCV: importing torch would count as time and memory of the program."""
+    return np.asarray(cv2.GaussianBlur(image.astype(np.float32), (0, 0), sigma_px), np.float32)
 
 
 def _evenly_spaced(trial: Trial) -> list[int]:
@@ -136,7 +142,7 @@ def drawn_scene(
 def squares_scene(side: int, range_px: float, squares: int, grid: GridShape = FIELD) -> BenchScene:
     """A textured wall of side x side px at 0, textured squares before it at range_px / 2 and more."""
     rng = np.random.default_rng(0)
-    pixels = np.stack([blur(rng.random((side, side)).astype(np.float32), TEXTURE_PX) for _ in range(3)], axis=-1)
+    pixels = np.stack([_blur(rng.random((side, side)), TEXTURE_PX) for _ in range(3)], axis=-1)
     pixels = np.clip(0.5 + 2 * (pixels - 0.5), 0, 1).astype(np.float32)
     disparity = np.zeros((side, side), np.float32)
     length = max(round(SQUARE_SHARE * side), 1)
