@@ -55,7 +55,11 @@ def watched(report: ReportProgress) -> Iterator[None]:
 def part_of_job(before: float, work: float, total: float) -> Iterator[None]:
     """Count the progress of the block as `work` of the job's `total`, after `before`."""
     report = _report.get()
-    with watched(lambda done, of_part, doing: report(before + work * done / of_part, total, doing)):
+
+    def report_part(done: float, of_part: float, doing: str) -> None:
+        report(before + (work * done / of_part if of_part else 0.0), total, doing)
+
+    with watched(report_part):
         yield
 
 
