@@ -261,11 +261,13 @@ def near_steps(disparity: FloatImage, step: float, joined: NDArray[np.uint8] | N
     joined: neighbours that one steep surface joins, see `join_steep_rays`.
     """
     is_step = ~np.isfinite(disparity)
-    joined = np.zeros(disparity.shape, np.uint8) if joined is None else joined
     # NaN fails the comparison, hence "not at most".
-    across, down = np.abs(np.diff(disparity, axis=1)), np.abs(np.diff(disparity, axis=0))
-    is_step[:, :-1] |= ~(across <= step) & (joined[:, :-1] & RIGHT == 0)
-    is_step[:-1] |= ~(down <= step) & (joined[:-1] & BELOW == 0)
+    across, down = ~(np.abs(np.diff(disparity, axis=1)) <= step), ~(np.abs(np.diff(disparity, axis=0)) <= step)
+    if joined is not None:
+        across &= joined[:, :-1] & RIGHT == 0
+        down &= joined[:-1] & BELOW == 0
+    is_step[:, :-1] |= across
+    is_step[:-1] |= down
     for axis in (0, 1):
         raise_if_stopped()
         is_step, source = is_step.copy(), np.moveaxis(is_step, axis, 0)

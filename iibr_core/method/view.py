@@ -162,9 +162,12 @@ class _Decided(NamedTuple):
 
 
 def _write(decided: list[_Decided], view: View) -> None:
+    """Write the transformer's choices where nothing was filled here: reopened holes were open only after it chose."""
     for part in decided:
-        at = part.y, part.x
-        view.colors[at], view.disparity[at], view.inpainted[at] = part.colors, part.disparity, part.inpainted
+        chosen = ~view.occluded[part.y, part.x]
+        at = part.y[chosen], part.x[chosen]
+        view.colors[at], view.disparity[at] = part.colors[chosen], part.disparity[chosen]
+        view.inpainted[at] = part.inpainted[chosen]
 
 
 def _reopened(rays: RaySet, offset: ViewOffset, view: View, hole: NDArray[np.bool_], threads: int) -> NDArray[np.bool_]:

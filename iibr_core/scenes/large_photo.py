@@ -17,7 +17,6 @@ from iibr_core.formats.maps.resample import resample_surfaces
 from iibr_core.inpainting.registry import load_inpainter
 from iibr_core.method.light_field import complete_rays
 from iibr_core.method.plan import ScenePlan
-from iibr_core.method.ray_transformer import shipped_transformer
 from iibr_core.method.rays import RaySet
 from iibr_core.method.view import Renderer
 from iibr_core.runtime.work import raise_if_stopped
@@ -50,7 +49,7 @@ def complete_fills(source: Source, loaded: LoadedPhoto, plan: ScenePlan) -> RayS
     """
     if not plan.has_disocclusion:
         return None
-    renderer = Renderer(shipped_transformer(), load_inpainter(source.inpaint))
+    renderer = Renderer(inpaint=load_inpainter(source.inpaint))
     return complete_rays(loaded.photo, plan.field_disparity(loaded.disparity), plan, renderer)
 
 
