@@ -1,4 +1,4 @@
-"""What the samples of a target's pixels see of rays that land as squares, against a slow twin."""
+"""Samples of a target's pixels and rays that land as squares, against a slow twin."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""What fills the holes of a view, against a slow twin and in scenes where the answer is known."""
+"""Filling of holes of a view, against a slow twin and in scenes where the answer is known."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""What was inpainted in a view, for tests: as it joins the ray set."""
+"""Inpainted rays of a view, for tests: as they join the ray set."""
 
 import numpy as np
 

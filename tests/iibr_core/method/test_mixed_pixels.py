@@ -148,7 +148,7 @@ def test_what_is_not_mixed_stays():
     ids=["an edge", "before a halo of the background", "on a slope", "resampled to a ramp"],
 )
 def test_pixels_behind_an_edge_are_split_but_not_on_a_slope(behind, beside, is_split):
-    """What falls away behind a pixel by much less than the step in front of it makes no slope."""
+    """A fall behind a pixel that is much less than the step in front of it makes no slope."""
     colors, disparity = edge_photo(0.5)
     disparity[:, :5], disparity[:, 5] = behind, beside
     disparity[:, 6] -= beside
