@@ -255,7 +255,7 @@ def _run_pool(processes: int, waiting: deque[PhotoTask]) -> Generator[Outcome, N
     """Export photos until none is left or a process is killed. Return the photos that were in work then."""
     running: dict[Future[Outcome], PhotoTask] = {}
     others = active_children()
-    executor = ProcessPoolExecutor(processes, get_context("spawn"), machine.limit_arenas)
+    executor = ProcessPoolExecutor(processes, get_context("spawn"), _prepare_worker)
     try:
         while waiting or running:
             while waiting and len(running) < processes:
@@ -274,12 +274,22 @@ def _run_pool(processes: int, waiting: deque[PhotoTask]) -> Generator[Outcome, N
 
 
 def _submit(executor: ProcessPoolExecutor, task: PhotoTask) -> Future[Outcome]:
-    """Hand a photo to a process. A process that starts here ignores Ctrl-C, which reaches the main process alone."""
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    """Hand a photo to a process. Ctrl-C in the meantime waits: a process that starts here takes none, not even early.
+
+    Windows cannot make it wait; there a process ignores Ctrl-C from `_prepare_worker` on.
+    """
+    if not hasattr(signal, "pthread_sigmask"):
+        return executor.submit(export_photo, task)
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         return executor.submit(export_photo, task)
     finally:
-        signal.signal(signal.SIGINT, before)
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def _prepare_worker() -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # a terminal's Ctrl-C also reaches the main process, which ends this
+    machine.limit_arenas()
 
 
 def _run_on_dask(address: str, tasks: Sequence[PhotoTask]) -> Generator[Outcome]:

@@ -87,6 +87,8 @@ def test_an_archive_is_exported_once(archive: Path) -> None:
 @needs_process_groups
 def test_ctrl_c_ends_all_processes_with_one_line(archive: Path) -> None:
     out = archive.with_name("out")
+    for number in range(8, 60):  # so many that it is far from its end when it is interrupted
+        shutil.copyfile(archive / "00.png", archive / f"{number:02}.png")
     with start_batch(archive, "--workers", 2) as run:
         wait_until(run, lambda: len(exports_in(out)) > 2)
         workers = workers_of(run)
