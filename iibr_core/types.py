@@ -28,6 +28,8 @@ StoredColors = NDArray[np.uint8] | NDArray[np.float16]
 
 TOTAL_PARALLAX = 0.04
 """Parallax of the nearest against the farthest across the grid, for viewing, as a share of the photo's width."""
+MAX_DISPARITY_WIDTHS = 4.0
+"""Largest known disparity, in photo widths per view step."""
 
 LARGEST_LENGTH = 1e12
 """Largest coordinate of a camera, in any unit: products of larger ones lose all digits."""

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from iibr_core.depth.choice import DepthChoice
-from iibr_core.depth.estimates import DisparityMap, Estimate, MetricDepth, RelativeInverseDepth, values_of
+from iibr_core.depth.estimate import DepthEstimate
 from iibr_core.depth.near_end import is_better_turned, near_evidence, zeros_are_depth
 from iibr_core.formats.images.decode import read_orientation
 from iibr_core.formats.images.picture import upright
@@ -43,7 +43,7 @@ class DepthFromFile:
     what was done to the map, and what to do if that was wrong.
     """
 
-    estimate: Estimate
+    estimate: DepthEstimate
     near: str
     notes: tuple[str, ...]
 
@@ -85,15 +85,15 @@ def depth_of_picture(path: Path, values: FloatImage, photo: Photo, choice: Depth
 
 
 def depth_of_model(
-    title: str, estimate: Estimate, is_meaning_known: bool, photo: Photo, choice: DepthChoice
+    title: str, estimate: DepthEstimate, is_meaning_known: bool, photo: Photo, choice: DepthChoice
 ) -> DepthFromFile:
     """Return what a model's estimate means; nothing is said (near is "") of published models and disparity.
 
     Files of one's own say it in a config.json or not at all: where the photo shows the contrary, it decides.
     """
-    if isinstance(estimate, DisparityMap) or is_meaning_known:
+    if estimate.meaning == "disparity" or is_meaning_known:
         return DepthFromFile(estimate, "", ())
-    evidence, says_metres = near_evidence(photo.pixels, values_of(estimate)), isinstance(estimate, MetricDepth)
+    evidence, says_metres = near_evidence(photo.pixels, estimate.values), estimate.is_metric
     if choice.is_metric:
         large_is_near, reason = False, "as said"
     elif says_metres:
@@ -110,16 +110,16 @@ def depth_of_model(
     return DepthFromFile(turned_estimate(estimate, large_is_near, choice), near, (note,))
 
 
-def turned_estimate(estimate: Estimate, large_is_near: bool, choice: DepthChoice) -> Estimate:
+def turned_estimate(estimate: DepthEstimate, large_is_near: bool, choice: DepthChoice) -> DepthEstimate:
     """Return a model's values with this end near. Those that are far where large count as distances where that was
     said, or all are above 0.
     """
-    values = values_of(estimate)
+    values = estimate.values
     if large_is_near:
-        return RelativeInverseDepth(values)
-    are_metres = choice.is_metric or isinstance(estimate, MetricDepth)
+        return DepthEstimate(values, "inverse depth")
+    are_metres = choice.is_metric or estimate.is_metric
     are_distances = are_metres or bool((values[np.isfinite(values)] > 0).all())
-    return MetricDepth(values) if are_distances else RelativeInverseDepth(-values)
+    return DepthEstimate(values, "metres") if are_distances else DepthEstimate(-values, "inverse depth")
 
 
 def _within(path: Path, found: MapFile, photo: Photo, choice: DepthChoice, are_distances: bool) -> DepthFromFile:
@@ -161,7 +161,9 @@ def _with_zeros_told(found: MapFile) -> MapFile:
     return replace(found, values=np.where(found.is_zero, np.float32(np.nan), found.values))
 
 
-def _meaning(path: Path, found: MapFile, photo: Photo, choice: DepthChoice) -> tuple[Estimate, str, tuple[str, ...]]:
+def _meaning(
+    path: Path, found: MapFile, photo: Photo, choice: DepthChoice
+) -> tuple[DepthEstimate, str, tuple[str, ...]]:
     """The estimate, which end of it is near, and what is to be said."""
     if found.text is not None:
         return _as_written(found.text, found.values, choice)
@@ -174,31 +176,31 @@ def _meaning(path: Path, found: MapFile, photo: Photo, choice: DepthChoice) -> t
     return _by_evidence(path, found, photo, choice, are_distances)
 
 
-def _as_written(text: MapText, values: FloatImage, choice: DepthChoice) -> tuple[Estimate, str, tuple[str, ...]]:
+def _as_written(text: MapText, values: FloatImage, choice: DepthChoice) -> tuple[DepthEstimate, str, tuple[str, ...]]:
     if text.meaning == "disparity":
-        return DisparityMap(values * np.float32(require_scale(choice.file_scale))), "the high end", ()
+        return DepthEstimate(values * np.float32(require_scale(choice.file_scale)), "disparity"), "the high end", ()
     with np.errstate(divide="ignore", invalid="ignore"):
         inverse = 1 / values
     if text.inverse is None:
-        return MetricDepth(values), "the low end", ()
+        return DepthEstimate(values, "metres"), "the low end", ()
     slope, offset = text.inverse
-    return DisparityMap((slope * inverse + offset).astype(np.float32)), "the low end", ()
+    return DepthEstimate((slope * inverse + offset).astype(np.float32), "disparity"), "the low end", ()
 
 
 def _disparity(
     path: Path, values: FloatImage, photo: Photo, choice: DepthChoice
-) -> tuple[Estimate, str, tuple[str, ...]]:
+) -> tuple[DepthEstimate, str, tuple[str, ...]]:
     """Disparity that counts as it is; a warning where the photo says that it is the wrong way round."""
     scale = require_scale(choice.file_scale)
     scaled, notes = scaled_disparity(path, values, scale)
     if near_evidence(photo.pixels, scaled) < -1 and not choice.inverts:
         notes += (f"In {path.name} near and far look swapped: turn them with --invert-depth.",)
-    return DisparityMap(scaled), "the high end" if scale > 0 else "the low end", notes
+    return DepthEstimate(scaled, "disparity"), "the high end" if scale > 0 else "the low end", notes
 
 
 def _by_evidence(
     path: Path, found: MapFile, photo: Photo, choice: DepthChoice, are_distances: bool
-) -> tuple[Estimate, str, tuple[str, ...]]:
+) -> tuple[DepthEstimate, str, tuple[str, ...]]:
     """Depth of unknown scale: the photo decides which end is near, and the usual way where it does not."""
     values = found.values
     evidence = near_evidence(photo.pixels, values)
@@ -207,12 +209,12 @@ def _by_evidence(
     else:
         large_is_near = not are_distances if choice.is_metric or abs(evidence) <= 1 else evidence > 0
     if large_is_near:
-        estimate: Estimate = RelativeInverseDepth(values)
+        estimate = DepthEstimate(values, "inverse depth")
     elif _is_spread(found) and not choice.is_metric:
-        estimate = RelativeInverseDepth(-values)
+        estimate = DepthEstimate(-values, "inverse depth")
     else:
         step = MILLIMETRES if found.numbers == "integers" else 1.0
-        estimate = MetricDepth(np.where(values > 0, values * np.float32(step), np.float32(np.nan)))
+        estimate = DepthEstimate(np.where(values > 0, values * np.float32(step), np.float32(np.nan)), "metres")
     near = _end(found, large_is_near != choice.inverts)
     return estimate, near, (_near_note(path, near, evidence, large_is_near, choice),)
 

@@ -13,7 +13,7 @@ from math import sqrt
 import numpy as np
 import OpenImageIO as oiio
 
-from iibr_core.depth.estimates import RelativeInverseDepth
+from iibr_core.depth.estimate import DepthEstimate
 from iibr_core.runtime import tiling
 from iibr_core.runtime.kernels import kernel
 from iibr_core.runtime.tiling import in_bands
@@ -39,7 +39,7 @@ GUIDE_CONTRAST = 0.03
 """Brightness that varies by less than this (standard deviation) draws no edge of depth."""
 
 
-def estimate_from_cues(photo: Photo) -> RelativeInverseDepth:
+def estimate_from_cues(photo: Photo) -> DepthEstimate:
     """Rough inverse depth (H, W) of a photo, finite; 0 everywhere where the picture gives no hint (one row of pixels).
 
     Of pairs of points that differ in depth it orders 86 % rightly, the height alone 82 % (docs/depth.md).
@@ -55,7 +55,7 @@ def estimate_from_cues(photo: Photo) -> RelativeInverseDepth:
     # Longer than usual tells little more: what stands upright before a plain sky then hardly leans.
     edges_crossed = way / np.maximum(way + np.median(way), STEP_COST)
     depth = _standardise(np.indices(way.shape, np.float32)[0]) + _standardise(edges_crossed)
-    return RelativeInverseDepth(_guided_upsample(depth, small.mean(axis=2), pixels))
+    return DepthEstimate(_guided_upsample(depth, small.mean(axis=2), pixels), "inverse depth")
 
 
 def _small_size(size: ImageSize) -> ImageSize:

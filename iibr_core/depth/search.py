@@ -18,7 +18,7 @@ from iibr_core.depth.edges.refine import refine
 from iibr_core.depth.embedded.embedded_depth import read_embedded
 from iibr_core.depth.embedded.picture import photo_in_focus, rotate_estimate
 from iibr_core.depth.embedded.unread import unread_parts
-from iibr_core.depth.estimates import Estimate, inverted, values_of
+from iibr_core.depth.estimate import DepthEstimate, disparity_from, inverse_metres_over
 from iibr_core.depth.estimators.catalog import is_meaning_known, model_to_use
 from iibr_core.depth.estimators.estimate_depth import estimate_with
 from iibr_core.depth.map_file import (
@@ -30,7 +30,6 @@ from iibr_core.depth.map_file import (
     turned_estimate,
 )
 from iibr_core.depth.pictorial_cues import estimate_from_cues
-from iibr_core.depth.scaling import disparity_from, inverse_metres_over
 from iibr_core.depth.sidecar import find_sidecar, flat_disparity, sidecars_of
 from iibr_core.depth.stereo_pair import estimate_from_pair
 from iibr_core.formats.images.decode import read_orientation
@@ -75,7 +74,7 @@ class _FoundDepth:
 
     photo: Photo
     origin: DepthOrigin
-    depth: Estimate
+    depth: DepthEstimate
     notes: tuple[str, ...] = ()
 
 
@@ -244,7 +243,7 @@ class _DepthSearch:
         estimate = rotate_estimate(embedded.estimate, photo.size, read_orientation(self.path))
         if embedded.says_near_end:
             return _FoundDepth(photo, origin, estimate, embedded.notes)
-        told = depth_of_picture(self.path, values_of(estimate), photo, self.choice)
+        told = depth_of_picture(self.path, estimate.values, photo, self.choice)
         return _FoundDepth(photo, replace(origin, near=told.near), told.estimate, embedded.notes + told.notes)
 
     def of_pair(self) -> _FoundDepth | None:
@@ -290,7 +289,7 @@ def _finish(found: _FoundDepth, choice: DepthChoice, grid: GridShape | None) -> 
 
 def _disparity_at(
     photo: Photo,
-    estimate: Estimate,
+    estimate: DepthEstimate,
     name: str,
     choice: DepthChoice,
     grid: GridShape | None,
@@ -315,8 +314,8 @@ def _disparity_at(
     return Disparity(values, name, notes, inverse_metres, holes if holes.any() else None, is_enlarged=is_enlarged)
 
 
-def _as_chosen(estimate: Estimate, choice: DepthChoice) -> Estimate:
-    return inverted(estimate) if choice.inverts else estimate
+def _as_chosen(estimate: DepthEstimate, choice: DepthChoice) -> DepthEstimate:
+    return estimate.inverted if choice.inverts else estimate
 
 
 def _at_size(disparity: FloatImage, photo: Photo) -> FloatImage:

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from iibr_core.color import stored_from_encoded
-from iibr_core.depth.estimates import DisparityMap
+from iibr_core.depth.estimate import DepthEstimate
 from iibr_core.depth.multi_view.estimate_disparity import estimate_coarse, estimate_disparity, sweep_bytes
 from iibr_core.formats.images.photo import read_picture
 from iibr_core.formats.images.side_by_side import left_picture
@@ -22,7 +22,7 @@ MATCHED_PIXELS = 400_000
 
 def estimate_from_pair(
     path: Path,
-) -> tuple[DisparityMap, str] | None:
+) -> tuple[DepthEstimate, str] | None:
     """Of the picture that a stereo photo's file shows, px from eye to eye, and what kind of file it is; None where a
     file is no stereo photo, or shows another picture than these two.
 
@@ -44,4 +44,4 @@ def estimate_from_pair(
     if sweep_bytes(coarse.values.shape, coarse.range_px, 1.0) > free_memory_bytes():
         raise InputError(f"{path}: matching its two views takes more memory than there is")
     values = estimate_disparity(views, offsets, reference, coarse.range_px)
-    return DisparityMap(values.astype(np.float32)), scene.layout
+    return DepthEstimate(values.astype(np.float32), "disparity"), scene.layout

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from iibr_core.color import encoded_from_stored, photo_in_srgb
 from iibr_core.depth.choice import DepthChoice, DepthStart
-from iibr_core.depth.estimates import MetricDepth, values_of
 from iibr_core.depth.estimators.catalog import model_to_use
 from iibr_core.depth.estimators.estimate_depth import estimate_with
 from iibr_core.depth.pictorial_cues import estimate_from_cues
@@ -257,8 +256,8 @@ def estimate_depth(
         local = model_to_use(DepthChoice("model", model=None if model is None else str(model)))
         assert local is not None, "what was asked for is there, or was refused"
         estimate = estimate_with(local, given)
-    values = values_of(estimate)
-    return map_at_size(np.reciprocal(values) if isinstance(estimate, MetricDepth) else values, given.size)
+    values = estimate.values
+    return map_at_size(np.reciprocal(values) if estimate.is_metric else values, given.size)
 
 
 def _photo_of(pixels: NDArray[Any], focal_px: float | None = None, name: str = "photo") -> Photo:

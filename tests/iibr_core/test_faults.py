@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from iibr_core.depth.embedded.embedded_depth import read_embedded
-from iibr_core.depth.estimates import RelativeInverseDepth
+from iibr_core.depth.estimate import DepthEstimate
 from iibr_core.depth.estimators import estimate_cache
 from iibr_core.formats.images.write import write_image
 from iibr_core.formats.maps.disparity_file import read_disparity
@@ -48,7 +48,7 @@ def test_a_disk_that_is_full_at_the_last_byte_is_noticed(tmp_path, name):
 
 def test_a_cache_that_cannot_be_written_or_is_full_costs_nothing_but_time(tmp_path, monkeypatch):
     (tmp_path / "file").write_text("no folder")
-    estimate = RelativeInverseDepth(NOISE[..., 0].astype(np.float32))
+    estimate = DepthEstimate(NOISE[..., 0].astype(np.float32), "inverse depth")
     monkeypatch.setattr(estimate_cache, "cache_folder", lambda: tmp_path / "file" / "depth")
     estimate_cache.store("key", estimate)
     assert estimate_cache.load("key") is None
@@ -65,7 +65,7 @@ def test_a_cache_that_cannot_be_written_or_is_full_costs_nothing_but_time(tmp_pa
 def test_a_damaged_cache_is_an_empty_one(tmp_path, monkeypatch):
     """Cut off, no archive, or (found by fuzzing) compressed in a way that zipfile does not know, or encrypted."""
     monkeypatch.setattr(estimate_cache, "cache_folder", lambda: tmp_path)
-    estimate_cache.store("key", RelativeInverseDepth(NOISE[..., 0].astype(np.float32)))
+    estimate_cache.store("key", DepthEstimate(NOISE[..., 0].astype(np.float32), "inverse depth"))
     whole = (tmp_path / "key.npz").read_bytes()
     entry = whole.index(b"PK\x01\x02")
     for at, byte in ((entry + 10, 99), (entry + 8, 1)):

@@ -13,7 +13,7 @@ import numpy as np
 
 from iibr_core.depth.embedded.images import decode_map
 from iibr_core.depth.embedded.xmp import jpeg_layout, number_in, xmp_of
-from iibr_core.depth.estimates import RelativeInverseDepth
+from iibr_core.depth.estimate import DepthEstimate
 from iibr_core.types import FloatImage, InputError
 
 PIXEL_DATA = "http://ns.apple.com/pixeldatainfo/1.0/"
@@ -25,7 +25,7 @@ INVERSE_DISTANCE_TYPES = (0, 1, 3)
 DISTANCE_TYPE = 2
 
 
-def heic_estimate(depth: FloatImage, metadata: dict[str, Any]) -> RelativeInverseDepth:
+def heic_estimate(depth: FloatImage, metadata: dict[str, Any]) -> DepthEstimate:
     """Return the depth of a HEIC's auxiliary picture: (H, W), 0..1, with what libheif tells of it.
 
     Raises InputError where the values mean something unknown.
@@ -40,7 +40,7 @@ def heic_estimate(depth: FloatImage, metadata: dict[str, Any]) -> RelativeInvers
     raise InputError(f"the depth map's representation {kind!r} is not known")
 
 
-def appended_estimate(data: bytes, end: int) -> RelativeInverseDepth | None:
+def appended_estimate(data: bytes, end: int) -> DepthEstimate | None:
     """Depth in a JPEG that follows the photo (which ends at `end`), as iPhones save portraits as JPEG; None without.
 
     Raises InputError where it is damaged.
@@ -61,18 +61,18 @@ def appended_estimate(data: bytes, end: int) -> RelativeInverseDepth | None:
     return None
 
 
-def _linear_in_inverse(stored: FloatImage, low: float, high: float) -> RelativeInverseDepth:
+def _linear_in_inverse(stored: FloatImage, low: float, high: float) -> DepthEstimate:
     """A range that makes no sense is left out: it changes nothing but the unknown scale."""
     if not (math.isfinite(low) and high > low and math.isfinite(high)):
-        return RelativeInverseDepth(stored)
-    return RelativeInverseDepth(np.float32(low) + stored * np.float32(high - low))
+        return DepthEstimate(stored, "inverse depth")
+    return DepthEstimate(np.float32(low) + stored * np.float32(high - low), "inverse depth")
 
 
-def _linear_in_distance(stored: FloatImage, near: float, far: float) -> RelativeInverseDepth:
+def _linear_in_distance(stored: FloatImage, near: float, far: float) -> DepthEstimate:
     """Of a range that makes no sense only the order of the values counts."""
     if not (0 < near < far < math.inf):
-        return RelativeInverseDepth(1 - stored)
-    return RelativeInverseDepth((1 / (near + stored.astype(np.float64) * (far - near))).astype(np.float32))
+        return DepthEstimate(1 - stored, "inverse depth")
+    return DepthEstimate((1 / (near + stored.astype(np.float64) * (far - near))).astype(np.float32), "inverse depth")
 
 
 def _pair(metadata: dict[str, Any], low: str, high: str) -> tuple[float, float] | None:

@@ -12,7 +12,7 @@ from iibr_core.depth.embedded.images import decode_map
 from iibr_core.depth.embedded.samsung import samsung_estimate
 from iibr_core.depth.embedded.trailers import huawei_estimate, second_picture_estimate
 from iibr_core.depth.embedded.xmp import Xmp, is_jpeg, jpeg_layout, xmp_of
-from iibr_core.depth.estimates import Estimate, RelativeInverseDepth
+from iibr_core.depth.estimate import DepthEstimate
 from iibr_core.formats.files import open_binary
 from iibr_core.formats.images.avif import avif_depth_file, is_avif
 from iibr_core.formats.images.heic import heic_orientation, is_heic, read_heic_depth
@@ -40,7 +40,7 @@ class EmbeddedDepth:
     blurred; None without. notes: sentences about what the file says of the map.
     """
 
-    estimate: Estimate
+    estimate: DepthEstimate
     format: str
     all_in_focus: bytes | None = None
     notes: tuple[str, ...] = ()
@@ -76,7 +76,9 @@ def _in_avif(path: Path) -> EmbeddedDepth | None:
     data = avif_depth_file(path)
     if data is None:
         return None
-    return EmbeddedDepth(RelativeInverseDepth(decode_map(data, "the depth map of the AVIF", ("AVIF",))), "AVIF depth")
+    return EmbeddedDepth(
+        DepthEstimate(decode_map(data, "the depth map of the AVIF", ("AVIF",)), "inverse depth"), "AVIF depth"
+    )
 
 
 def _in_heic(path: Path) -> EmbeddedDepth | None:
@@ -88,12 +90,12 @@ def _in_heic(path: Path) -> EmbeddedDepth | None:
     if found is None:
         return None
     # A HEIC's photo is always read upright.
-    return EmbeddedDepth(RelativeInverseDepth(upright(found.values, heic_orientation(path))), SAMSUNG)
+    return EmbeddedDepth(DepthEstimate(upright(found.values, heic_orientation(path)), "inverse depth"), SAMSUNG)
 
 
 def _in_lfp(path: Path) -> EmbeddedDepth | None:
     depth = read_lfp_depth(path)
-    return None if depth is None else EmbeddedDepth(RelativeInverseDepth(-depth), "Lytro")
+    return None if depth is None else EmbeddedDepth(DepthEstimate(-depth, "inverse depth"), "Lytro")
 
 
 def _in_packet(path: Path) -> EmbeddedDepth | None:
@@ -117,7 +119,7 @@ def embedded_in_jpeg(data: bytes) -> EmbeddedDepth | None:
         xmp = xmp_of(layout)
     except InputError as error:
         damaged = error
-    readers: tuple[tuple[str, Callable[[], Estimate | None]], ...] = (
+    readers: tuple[tuple[str, Callable[[], DepthEstimate | None]], ...] = (
         (DYNAMIC_DEPTH, lambda: dynamic_depth_estimate(xmp, data, layout)),
         (GDEPTH, lambda: gdepth_estimate(xmp)),
         ("Apple portrait", lambda: appended_estimate(data, layout.end)),
@@ -140,7 +142,7 @@ def embedded_in_jpeg(data: bytes) -> EmbeddedDepth | None:
     return None
 
 
-def leia_estimate(data: bytes) -> RelativeInverseDepth | None:
+def leia_estimate(data: bytes) -> DepthEstimate | None:
     """Return the map of a Leia image's own view, white near; None where a JPEG's bytes hold no such map.
 
     Raises InputError where it is damaged.
@@ -149,4 +151,4 @@ def leia_estimate(data: bytes) -> RelativeInverseDepth | None:
     view = next((view for view in leia.views if view.image == SOURCE_IMAGE), None) if leia is not None else None
     if leia is None or view is None or view.inverse_depth is None:
         return None
-    return RelativeInverseDepth(decode_map(leia.fields[view.inverse_depth], "Leia's map of inverse depth"))
+    return DepthEstimate(decode_map(leia.fields[view.inverse_depth], "Leia's map of inverse depth"), "inverse depth")

@@ -16,7 +16,7 @@ import numpy as np
 
 from iibr_core.depth.embedded.images import JPEG_START, PNG_START, decode_map
 from iibr_core.depth.embedded.xmp import JpegLayout, Xmp, number_in
-from iibr_core.depth.estimates import Estimate, MetricDepth, RelativeInverseDepth
+from iibr_core.depth.estimate import DepthEstimate
 from iibr_core.formats.files import printable
 from iibr_core.formats.images.xmp import value_in
 from iibr_core.types import FloatImage, InputError
@@ -49,7 +49,7 @@ class DepthRange:
     metres_per_unit: float | None
 
 
-def gdepth_estimate(xmp: Xmp) -> Estimate | None:
+def gdepth_estimate(xmp: Xmp) -> DepthEstimate | None:
     """The depth map in a photo's GDepth properties, None where there is none. Raises InputError where it is damaged."""
     encoded = xmp.value(GDEPTH, "Data")
     if encoded is None:
@@ -79,7 +79,7 @@ def all_in_focus(xmp: Xmp) -> bytes | None:
     return _from_base64(encoded, "GImage:Data") if encoded else None
 
 
-def dynamic_depth_estimate(xmp: Xmp, data: bytes, layout: JpegLayout) -> Estimate | None:
+def dynamic_depth_estimate(xmp: Xmp, data: bytes, layout: JpegLayout) -> DepthEstimate | None:
     """The depth map of a Dynamic Depth container, None where there is none. Raises InputError where it is damaged."""
     described = _depth_map_properties(xmp)
     if described is None:
@@ -168,8 +168,8 @@ def _depth_range(properties: dict[str, str | None]) -> DepthRange:
     return DepthRange(near, far, is_inverse, metres)
 
 
-def _estimate(stored: FloatImage, confidence: FloatImage | None, depth_range: DepthRange) -> Estimate:
-    """stored: (H, W), 0..1. The type tells whether distances are known in metres or only up to a scale."""
+def _estimate(stored: FloatImage, confidence: FloatImage | None, depth_range: DepthRange) -> DepthEstimate:
+    """stored: (H, W), 0..1. The meaning tells whether distances are known in metres or only up to a scale."""
     near, far = depth_range.near, depth_range.far
     values = stored.astype(np.float64)
     with np.errstate(divide="ignore"):
@@ -185,12 +185,9 @@ def _estimate(stored: FloatImage, confidence: FloatImage | None, depth_range: De
     if depth_range.metres_per_unit is None or math.isnan(near):
         with np.errstate(over="ignore"):
             relative = inverse.astype(np.float32)
-        return RelativeInverseDepth(np.where(np.isfinite(relative), relative, np.float32(np.nan)))
-    return MetricDepth(
-        np.divide(depth_range.metres_per_unit, np.maximum(inverse, depth_range.metres_per_unit / MAX_METRES)).astype(
-            np.float32
-        )
-    )
+        return DepthEstimate(np.where(np.isfinite(relative), relative, np.float32(np.nan)), "inverse depth")
+    scale = depth_range.metres_per_unit
+    return DepthEstimate((scale / np.maximum(inverse, scale / MAX_METRES)).astype(np.float32), "metres")
 
 
 def _from_base64(text: str, what: str) -> bytes:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from iibr_core.depth.embedded.embedded_depth import EmbeddedDepth
 from iibr_core.depth.embedded.images import picture_file
-from iibr_core.depth.estimates import Estimate, values_of
+from iibr_core.depth.estimate import DepthEstimate
 from iibr_core.formats.images.decode import read_orientation
 from iibr_core.formats.images.photo import read_photo
 from iibr_core.formats.images.picture import upright
@@ -35,19 +35,19 @@ def photo_in_focus(path: Path, photo: Photo, embedded: EmbeddedDepth, max_pixels
     return replace(photo, pixels=pixels, focal_px=focal_px, notes=(*photo.notes, note), color_space=sharp.color_space)
 
 
-def rotate_estimate(estimate: Estimate, size: ImageSize, orientation: int) -> Estimate:
+def rotate_estimate(estimate: DepthEstimate, size: ImageSize, orientation: int) -> DepthEstimate:
     """The estimate, turned upright as the photo was, unless its writer has turned it already. Maps of another shape
     show the whole photo, stretched, as GDepth's specification says; those that lie across it fit no way.
     """
-    values = values_of(estimate)
+    values = estimate.values
     turned = upright(values, orientation)
     for candidate in (turned, values):
         if _is_alike(candidate.shape, size):
-            return type(estimate)(candidate)
+            return DepthEstimate(candidate, estimate.meaning)
     is_high = size.height > size.width
     for candidate in (turned, values):
         if (candidate.shape[0] > candidate.shape[1]) == is_high or candidate.shape[0] == candidate.shape[1]:
-            return type(estimate)(candidate)
+            return DepthEstimate(candidate, estimate.meaning)
     shape, photo_shape = (f"{width}x{height}" for height, width in (values.shape, size))
     raise InputError(f"its {shape} pixels lie across the photo, {photo_shape}")
 

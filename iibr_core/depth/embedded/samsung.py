@@ -11,7 +11,7 @@ import struct
 
 import numpy as np
 
-from iibr_core.depth.estimates import RelativeInverseDepth
+from iibr_core.depth.estimate import DepthEstimate
 from iibr_core.types import ImageSize, InputError
 
 DIRECTORY_START, DIRECTORY_END, AUDIO_BLOCK_END = b"SEFH", b"SEFT", b"QDIOBS"
@@ -22,7 +22,7 @@ DEPTH_MAP_NAME = b"DualShot_DepthMap_1"
 SIZE_MARK = re.compile(rb"[\x01-\x09]\x00\xff\xff")
 
 
-def samsung_estimate(data: bytes) -> RelativeInverseDepth | None:
+def samsung_estimate(data: bytes) -> DepthEstimate | None:
     """The depth map of a photo taken with "Live focus", None where there is none or its layout is another one.
 
     Raises InputError where the trailer names a map that it does not hold.
@@ -38,7 +38,7 @@ def samsung_estimate(data: bytes) -> RelativeInverseDepth | None:
     if width < 1 or height < 1 or width * height != len(depth_map):
         raise InputError(f"Samsung's depth map of {width}x{height} pixels holds {len(depth_map):,} bytes")
     stored = np.frombuffer(depth_map, np.uint8).reshape(height, width)
-    return RelativeInverseDepth(np.float32(1) - stored.astype(np.float32) / np.float32(255))
+    return DepthEstimate(np.float32(1) - stored.astype(np.float32) / np.float32(255), "inverse depth")
 
 
 def _blocks(data: bytes) -> dict[tuple[int, bytes], bytes]:

@@ -16,7 +16,7 @@ from PIL import Image
 
 from iibr_core.depth.embedded.images import DECODE_ERRORS, decode_map
 from iibr_core.depth.embedded.xmp import jpeg_layout
-from iibr_core.depth.estimates import RelativeInverseDepth
+from iibr_core.depth.estimate import DepthEstimate
 from iibr_core.types import FloatImage, ImageSize, InputError
 
 HUAWEI_MARK = re.compile(b"edof")
@@ -42,7 +42,7 @@ GREY_TOLERANCE = 10
 MAX_ASPECT_DIFFERENCE = 0.03
 
 
-def huawei_estimate(data: bytes, end: int) -> RelativeInverseDepth | None:
+def huawei_estimate(data: bytes, end: int) -> DepthEstimate | None:
     """The map of a photo with "wide aperture"; None where a JPEG, which ends at `end`, is followed by none.
 
     Raises InputError where the map is cut off.
@@ -58,7 +58,7 @@ def huawei_estimate(data: bytes, end: int) -> RelativeInverseDepth | None:
         if width in HUAWEI_SIDES and height in HUAWEI_SIDES and len(content) == width * height:
             stored = np.frombuffer(content, np.uint8).reshape(height, width)
             turned = _as_held(stored, header[HUAWEI_ORIENTATION_AT])
-            return RelativeInverseDepth(turned.astype(np.float32) / np.float32(255))
+            return DepthEstimate(turned.astype(np.float32) / np.float32(255), "inverse depth")
         if width in HUAWEI_SIDES and height in HUAWEI_SIDES:
             cut_off = cut_off or f"{width}x{height} pixels is cut off after {len(content):,} bytes"
     if cut_off:
@@ -79,7 +79,7 @@ def _as_held(stored: NDArray[np.uint8], orientation: int) -> NDArray[np.uint8]:
             return stored[:, ::-1]
 
 
-def second_picture_estimate(data: bytes, end: int) -> RelativeInverseDepth | None:
+def second_picture_estimate(data: bytes, end: int) -> DepthEstimate | None:
     """A grey picture of the photo's shape in a JPEG that follows it (it ends at `end`), which is no small copy of it.
 
     None where there is none, or it cannot be read, or where the photo has a gain map.
@@ -91,7 +91,7 @@ def second_picture_estimate(data: bytes, end: int) -> RelativeInverseDepth | Non
         size = None if OTHER_USE.search(content[:HEADER_BYTES]) else grey_size(content)
         if size is not None and _fits(size, data) and not _is_copy(content, data):
             try:
-                return RelativeInverseDepth(decode_map(content, "the picture behind the photo"))
+                return DepthEstimate(decode_map(content, "the picture behind the photo"), "inverse depth")
             except InputError:
                 continue
     return None

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from iibr_core.color import bytes_from_encoded
-from iibr_core.depth.estimates import RelativeInverseDepth
+from iibr_core.depth.estimate import DepthEstimate
 from iibr_core.depth.estimators.config import mentions, safetensors_in
 from iibr_core.depth.estimators.depth_estimator import Family, KnownModel, LocalModel
 from iibr_core.depth.estimators.package_calls import positive, prepare_by
@@ -16,11 +16,11 @@ from iibr_core.formats.files import is_folder
 from iibr_core.types import Photo
 
 
-def _run(model: LocalModel, photo: Photo) -> RelativeInverseDepth:
+def _run(model: LocalModel, photo: Photo) -> DepthEstimate:
     network = importlib.import_module("depth_anything_3.api").DepthAnything3.from_pretrained(str(model.folder))
     said = network.inference([bytes_from_encoded(photo.pixels)])
     # Its distances have no scale of their own.
-    return RelativeInverseDepth(np.reciprocal(positive(said.depth)[0]))
+    return DepthEstimate(np.reciprocal(positive(said.depth)[0]), "inverse depth")
 
 
 def _accepts(path: Path) -> bool:

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from iibr_core.depth.estimates import Estimate
+from iibr_core.depth.estimate import DepthEstimate
 from iibr_core.runtime.extras import is_installed
 from iibr_core.types import ImageSize, Photo
 
@@ -42,7 +42,7 @@ class LocalModel:
         return sum(path.stat().st_size for path in self.weights)
 
 
-Run = Callable[[Photo], Estimate]
+Run = Callable[[Photo], DepthEstimate]
 
 
 @dataclass(frozen=True)

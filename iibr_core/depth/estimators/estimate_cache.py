@@ -15,12 +15,12 @@ import zipfile
 import zlib
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Any
+from typing import Any, cast, get_args
 
 import numpy as np
 from platformdirs import user_cache_path
 
-from iibr_core.depth.estimates import DisparityMap, Estimate, MetricDepth, RelativeInverseDepth
+from iibr_core.depth.estimate import DepthEstimate, Meaning
 from iibr_core.formats.files import read_text
 from iibr_core.formats.maps import npy
 from iibr_core.formats.outputs import write_file
@@ -33,11 +33,6 @@ FORMAT = "1"
 TIMES = "seconds.json"
 """Beside the estimates: how long models took."""
 
-KINDS: dict[str, type[RelativeInverseDepth | MetricDepth | DisparityMap]] = {
-    "relative": RelativeInverseDepth,
-    "metric": MetricDepth,
-    "disparity": DisparityMap,
-}
 # What numpy, zipfile and zlib raise for damaged files; RuntimeError: encrypted, or compressed in an unknown way.
 MISREADINGS = (*npy.MISREADINGS, OSError, KeyError, RuntimeError, zipfile.BadZipFile, zlib.error)
 
@@ -61,32 +56,29 @@ def key_of(pixels: FloatImage, files: Iterable[Path], options: str) -> str:
     return digest.hexdigest()
 
 
-def load(key: str) -> Estimate | None:
+def load(key: str) -> DepthEstimate | None:
     """What was kept under this key, None where nothing was or it is damaged."""
     path = cache_folder() / f"{key}.npz"
     try:
         with np.load(path, allow_pickle=False) as kept:
-            kind, values = str(kept["kind"]), np.array(kept["values"], np.float32)
-        if values.ndim != 2:
+            meaning, values = str(kept["meaning"]), np.array(kept["values"], np.float32)
+        if values.ndim != 2 or meaning not in get_args(Meaning):
             return None
         with contextlib.suppress(OSError):
             os.utime(path)  # the least recently used go first
-        return KINDS[kind](values)
+        return DepthEstimate(values, cast(Meaning, meaning))
     except MISREADINGS:
         return None
 
 
-def store(key: str, estimate: Estimate) -> None:
+def store(key: str, estimate: DepthEstimate) -> None:
     """Keep an estimate; the least recently used ones go where all exceed MAX_BYTES."""
     folder = cache_folder()
     # read-only or full: the estimate is made again the next time
     with contextlib.suppress(OSError, InputError):
         folder.mkdir(parents=True, exist_ok=True)
         with write_file(folder / f"{key}.npz") as temporary:
-            match estimate:
-                case RelativeInverseDepth(values) | MetricDepth(values) | DisparityMap(values):
-                    kind = next(name for name, record in KINDS.items() if isinstance(estimate, record))
-                    np.savez(temporary, kind=kind, values=values)
+            np.savez(temporary, meaning=estimate.meaning, values=estimate.values)
         _make_room(folder)
 
 

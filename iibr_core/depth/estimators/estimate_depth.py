@@ -9,7 +9,7 @@ import time
 import numpy as np
 
 from iibr_core.color import photo_in_srgb
-from iibr_core.depth.estimates import DisparityMap, Estimate, MetricDepth, RelativeInverseDepth
+from iibr_core.depth.estimate import DepthEstimate
 from iibr_core.depth.estimators import estimate_cache
 from iibr_core.depth.estimators.config import CONFIG, PREPROCESSOR
 from iibr_core.depth.estimators.depth_estimator import LocalModel
@@ -22,7 +22,7 @@ from iibr_core.types import InputError, Photo
 def estimate_with(
     model: LocalModel,
     photo: Photo,
-) -> Estimate:
+) -> DepthEstimate:
     """What a model makes of a photo, at a size of the model's choosing; from the cache where it is there.
 
     Its input is made smaller where memory is scarce. Raises InputError where the model cannot
@@ -44,14 +44,13 @@ def estimate_with(
     return found
 
 
-def _require_use(model: LocalModel, estimate: Estimate) -> None:
+def _require_use(model: LocalModel, estimate: DepthEstimate) -> None:
     """Raises InputError for results that say nothing about the photo."""
-    match estimate:
-        case RelativeInverseDepth(values) | MetricDepth(values) | DisparityMap(values):
-            known = values[~np.isnan(values)] if model.family.leaves_gaps else values
+    values = estimate.values
+    known = values[~np.isnan(values)] if model.family.leaves_gaps else values
     if not known.size or not np.isfinite(known).all():
         raise InputError(f"{model.title} gave NaN or infinity for this photo")
-    if isinstance(estimate, MetricDepth) and not (known > 0).any():
+    if estimate.is_metric and not (known > 0).any():
         raise InputError(f"{model.title} gave no distance above 0 for this photo")
     if known.max() == known.min():
         raise InputError(f"{model.title} gave the same depth everywhere")

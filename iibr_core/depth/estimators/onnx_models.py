@@ -13,7 +13,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from iibr_core.depth.estimates import Estimate, MetricDepth, RelativeInverseDepth
+from iibr_core.depth.estimate import DepthEstimate
 from iibr_core.depth.estimators.config import CONFIG, PREPROCESSOR, read_config, read_preparation
 from iibr_core.depth.estimators.depth_estimator import Family, KnownModel, LocalModel, Run
 from iibr_core.depth.estimators.onnx_file import depth_output, external_files, open_session, picture_input
@@ -59,7 +59,7 @@ def input_for(model: LocalModel, size: ImageSize, memory_bytes: int) -> OnnxInpu
     return OnnxInput(preparation, input_size(preparation, size, pixels), is_metric)
 
 
-def run_onnx(model: LocalModel, wanted: OnnxInput, photo: Photo) -> Estimate:
+def run_onnx(model: LocalModel, wanted: OnnxInput, photo: Photo) -> DepthEstimate:
     """Depth of a photo in sRGB, at the size of the model's output; non-finite values as they come.
 
     Raises InputError where the file is no depth model.
@@ -84,7 +84,7 @@ def run_onnx(model: LocalModel, wanted: OnnxInput, photo: Photo) -> Estimate:
             raise
         outputs = outputs_at(size)
     depth = depth_output(file, outputs, size)
-    return MetricDepth(depth) if wanted.is_metric else RelativeInverseDepth(depth)
+    return DepthEstimate(depth, "metres" if wanted.is_metric else "inverse depth")
 
 
 def _size_for_any(preparation: Preparation, size: ImageSize, wanted: ImageSize) -> ImageSize:

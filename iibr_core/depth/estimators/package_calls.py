@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from iibr_core.depth.estimates import Estimate
+from iibr_core.depth.estimate import DepthEstimate
 from iibr_core.depth.estimators.depth_estimator import LocalModel, Run
 from iibr_core.formats.files import reason_of
 from iibr_core.types import (
@@ -24,11 +24,11 @@ from iibr_core.types import (
 FAILURES = (OSError, ValueError, RuntimeError, KeyError, TypeError, ImportError, AttributeError, AssertionError)
 
 
-def prepare_by(call: Callable[[LocalModel, Photo], Estimate]) -> Callable[..., tuple[object, Run]]:
+def prepare_by(call: Callable[[LocalModel, Photo], DepthEstimate]) -> Callable[..., tuple[object, Run]]:
     """A family's `prepare`, of one call that makes everything; what the package raises becomes InputError."""
 
     def prepare(model: LocalModel, size: ImageSize, memory_bytes: int) -> tuple[object, Run]:
-        def run(photo: Photo) -> Estimate:
+        def run(photo: Photo) -> DepthEstimate:
             try:
                 return call(model, photo)
             except FAILURES as error:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from iibr_core.depth.estimates import Estimate, MetricDepth, RelativeInverseDepth
+from iibr_core.depth.estimate import DepthEstimate
 from iibr_core.depth.estimators.config import read_config, read_preparation, safetensors_in
 from iibr_core.depth.estimators.depth_estimator import Family, KnownModel, LocalModel, Run
 from iibr_core.depth.estimators.preparation import Preparation, affordable_pixels, input_size, network_input
@@ -87,7 +87,7 @@ def _width_of(config: dict[str, Any]) -> int:
     return width if isinstance(width, int) and width > 0 else 1024
 
 
-def run_transformers(model: LocalModel, wanted: TransformersInput, photo: Photo) -> Estimate:
+def run_transformers(model: LocalModel, wanted: TransformersInput, photo: Photo) -> DepthEstimate:
     """Depth of a photo in sRGB, at the size of the model's output; non-finite values as they come.
 
     Raises InputError where the folder holds something else than a depth model.
@@ -165,18 +165,18 @@ def _padding(size: ImageSize) -> tuple[int, int]:
     return int(math.sqrt(size.height / 2) * 3), int(math.sqrt(size.width / 2) * 3)
 
 
-def _estimate_of(config: Any, output: Any, size: ImageSize, preparation: Preparation) -> Estimate:
+def _estimate_of(config: Any, output: Any, size: ImageSize, preparation: Preparation) -> DepthEstimate:
     """The network's output as what it is; by the kind of network, never by its values. size: of the photo."""
     values = output.predicted_depth[0].float().cpu().numpy()
     match config.model_type:
         case "zoedepth":
-            return MetricDepth(_remove_padding(values, size) if preparation.pads else values)
+            return DepthEstimate(_remove_padding(values, size) if preparation.pads else values, "metres")
         case "depth_pro":
             return _depth_pro_estimate(values, output.field_of_view)
         case "depth_anything" if config.depth_estimation_type == "metric":
-            return MetricDepth(values)
+            return DepthEstimate(values, "metres")
         case _:
-            return RelativeInverseDepth(values)
+            return DepthEstimate(values, "inverse depth")
 
 
 def _remove_padding(values: FloatImage, size: ImageSize) -> FloatImage:
@@ -187,13 +187,13 @@ def _remove_padding(values: FloatImage, size: ImageSize) -> FloatImage:
     return whole[pad_y : pad_y + size.height, pad_x : pad_x + size.width]
 
 
-def _depth_pro_estimate(canonical: FloatImage, field_of_view: Any) -> Estimate:
+def _depth_pro_estimate(canonical: FloatImage, field_of_view: Any) -> DepthEstimate:
     """Depth Pro tells inverse distance for a camera as wide as its picture; its field of view turns that to metres."""
     if field_of_view is None:
-        return RelativeInverseDepth(canonical)
+        return DepthEstimate(canonical, "inverse depth")
     width = canonical.shape[1]
     focal_px = width / 2 / math.tan(math.radians(float(field_of_view[0])) / 2)
-    return MetricDepth(1 / np.clip(canonical * np.float32(width / focal_px), *INVERSE_LIMITS))
+    return DepthEstimate(1 / np.clip(canonical * np.float32(width / focal_px), *INVERSE_LIMITS), "metres")
 
 
 def _accepts(path: Path) -> bool:

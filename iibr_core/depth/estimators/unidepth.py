@@ -6,7 +6,7 @@ import importlib
 from pathlib import Path
 
 from iibr_core.color import bytes_from_encoded
-from iibr_core.depth.estimates import MetricDepth
+from iibr_core.depth.estimate import DepthEstimate
 from iibr_core.depth.estimators.config import mentions, safetensors_in
 from iibr_core.depth.estimators.depth_estimator import Family, LocalModel
 from iibr_core.depth.estimators.package_calls import positive, prepare_by
@@ -14,13 +14,13 @@ from iibr_core.formats.files import is_folder
 from iibr_core.types import Photo
 
 
-def _run(model: LocalModel, photo: Photo) -> MetricDepth:
+def _run(model: LocalModel, photo: Photo) -> DepthEstimate:
     import torch
 
     network = importlib.import_module("unidepth.models").UniDepthV2.from_pretrained(str(model.folder)).eval()
     with torch.inference_mode():
         said = network.infer(torch.from_numpy(bytes_from_encoded(photo.pixels)).permute(2, 0, 1))
-    return MetricDepth(positive(said["depth"]).squeeze())
+    return DepthEstimate(positive(said["depth"]).squeeze(), "metres")
 
 
 def _accepts(path: Path) -> bool:

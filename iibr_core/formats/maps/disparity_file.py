@@ -11,11 +11,9 @@ from iibr_core.formats.maps.reader import read_map
 from iibr_core.formats.maps.resample import resample_map
 from iibr_core.inpainting.disparity_by_color import fill_disparity_by_color
 from iibr_core.inpainting.disparity_holes import fill_disparity_holes, say_filled
-from iibr_core.types import Disparity, FloatImage, ImageSize, InputError, image_size
+from iibr_core.types import MAX_DISPARITY_WIDTHS, Disparity, FloatImage, ImageSize, InputError, image_size
 
 MAX_ASPECT_DIFFERENCE = 0.03
-MAX_DISPARITY_WIDTHS = 4.0
-"""Largest known disparity, in photo widths per view step."""
 MOSTLY_UNKNOWN = 0.9
 """Share of unknown values from which a map is filled before it is resampled: its values would get lost."""
 

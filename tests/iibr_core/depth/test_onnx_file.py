@@ -12,7 +12,6 @@ from onnx import TensorProto, helper, numpy_helper
 from onnx.external_data_helper import set_external_data
 
 from iibr_core.depth.choice import DepthChoice
-from iibr_core.depth.estimates import values_of
 from iibr_core.depth.estimators.catalog import model_to_use
 from iibr_core.depth.estimators.config import read_preparation
 from iibr_core.depth.estimators.estimate_depth import estimate_with
@@ -41,7 +40,7 @@ def photo_of(height: int, width: int) -> Photo:
 def estimate(file: Path, photo: Photo) -> FloatImage:
     model = model_to_use(DepthChoice(model=str(file)))
     assert model is not None
-    return values_of(estimate_with(model, photo))
+    return estimate_with(model, photo).values
 
 
 @pytest.fixture(autouse=True)

@@ -19,7 +19,7 @@ import transformers
 from onnx import TensorProto, helper, numpy_helper
 
 from iibr_core.depth.choice import DepthChoice
-from iibr_core.depth.estimates import MetricDepth, RelativeInverseDepth, values_of
+from iibr_core.depth.estimate import DepthEstimate
 from iibr_core.depth.estimators import estimate_cache, onnx_models
 from iibr_core.depth.estimators.catalog import model_to_use
 from iibr_core.depth.estimators.depth_estimator import LocalModel
@@ -63,11 +63,9 @@ def photo_of(pixels: FloatImage) -> Photo:
     return Photo(pixels, 50.0, "photo")
 
 
-def estimate(file: Path, pixels: FloatImage) -> RelativeInverseDepth | MetricDepth:
+def estimate(file: Path, pixels: FloatImage) -> DepthEstimate:
     wanted = input_for(file, ImageSize(*pixels.shape[:2]), BUDGET)
-    found = run_onnx(model_of(file), wanted, photo_of(pixels))
-    assert isinstance(found, RelativeInverseDepth | MetricDepth)
-    return found
+    return run_onnx(model_of(file), wanted, photo_of(pixels))
 
 
 @pytest.mark.parametrize("channel", [0, 2])
@@ -75,7 +73,7 @@ def test_orientation_colour_order_and_normalisation(tmp_path: Path, channel: int
     weights = tuple(float(c == channel) for c in range(3))
     pixels = smooth_photo(ImageSize(518, 518))  # the size of the input: nothing is resized
     found = estimate(weighing(tmp_path / "model.onnx", weights), pixels)
-    assert isinstance(found, RelativeInverseDepth)
+    assert found.meaning == "inverse depth"
     expected = (pixels[..., channel] - MEAN[channel]) / DEVIATION[channel]
     np.testing.assert_allclose(found.values, expected, atol=1e-4)
 
@@ -95,7 +93,7 @@ def test_a_resized_photo_keeps_its_places(tmp_path: Path) -> None:
     file = weighing(tmp_path / "model.onnx", (0, 1, 0))
     wanted = input_for(file, size, BUDGET).size
     found = estimate(file, pixels)
-    assert isinstance(found, RelativeInverseDepth)
+    assert found.meaning == "inverse depth"
     assert found.values.shape == wanted
     rows = ((np.arange(wanted.height) + 0.5) * size.height / wanted.height - 0.5) / size.height
     expected = (0.1 + 0.6 * rows - MEAN[1]) / DEVIATION[1]
@@ -111,8 +109,8 @@ def test_settings_beside_the_file_count(tmp_path: Path) -> None:
     (tmp_path / "config.json").write_text(json.dumps({"depth_estimation_type": "metric"}))
     pixels = smooth_photo(ImageSize(28, 28))
     found = estimate(file, pixels)
-    assert isinstance(found, MetricDepth)
-    np.testing.assert_allclose(found.metres, pixels[..., 0] / 0.5, atol=1e-4)
+    assert found.meaning == "metres"
+    np.testing.assert_allclose(found.values, pixels[..., 0] / 0.5, atol=1e-4)
 
 
 def test_the_input_fits_the_memory(tmp_path: Path) -> None:
@@ -201,7 +199,7 @@ def test_the_architecture_gives_what_its_library_gives(
         values = torch.from_numpy(network_input(pixels, USUAL_PREPARATION, wanted.size))
         expected = network(pixel_values=values).predicted_depth[0].numpy()
     found = run_onnx(model_of(file), wanted, photo_of(pixels))
-    assert isinstance(found, RelativeInverseDepth)
+    assert found.meaning == "inverse depth"
     np.testing.assert_allclose(found.values, expected, atol=1e-4 * np.ptp(expected))
 
 
@@ -233,8 +231,8 @@ def test_an_estimate_is_cached_by_the_file(monkeypatch: pytest.MonkeyPatch, tmp_
     assert len(list((tmp_path / "cache").glob("*.npz"))) == 1
     weighing(file, (0, 1, 0))
     second = estimate_with(model_of(file), photo)
-    assert isinstance(first, RelativeInverseDepth)
-    assert isinstance(second, RelativeInverseDepth)
+    assert first.meaning == "inverse depth"
+    assert second.meaning == "inverse depth"
     assert np.abs(first.values - second.values).max() > 0.1
     assert len(list((tmp_path / "cache").glob("*.npz"))) == 2
 
@@ -258,7 +256,7 @@ def test_neither_torch_nor_transformers_is_imported(tmp_path: Path) -> None:
 )
 def test_networks_of_other_layouts_are_read_alike(tmp_path: Path, told: dict[str, object]) -> None:
     pixels = smooth_photo(ImageSize(112, 112))
-    found = values_of(estimate(of_channels(tmp_path / "model.onnx", **told), pixels))  # type: ignore[arg-type]
+    found = estimate(of_channels(tmp_path / "model.onnx", **told), pixels).values  # type: ignore[arg-type]
     red = cv2.resize(pixels[..., 0], found.shape[::-1], interpolation=cv2.INTER_AREA)
     assert np.corrcoef(found.ravel(), red.ravel())[0, 1] > 0.999
 

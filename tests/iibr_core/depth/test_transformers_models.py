@@ -16,7 +16,7 @@ import torch
 import transformers
 
 from iibr_core.depth.choice import DepthChoice
-from iibr_core.depth.estimates import DisparityMap, Estimate, MetricDepth, RelativeInverseDepth
+from iibr_core.depth.estimate import DepthEstimate, Meaning
 from iibr_core.depth.estimators import estimate_cache
 from iibr_core.depth.estimators.catalog import known_model, model_here, model_to_use
 from iibr_core.depth.estimators.depth_estimator import LocalModel
@@ -151,33 +151,27 @@ def depth_pro(folder: Path, with_field_of_view: bool = True) -> LocalModel:
     return saved(network, folder, size={"height": 128, "width": 128})
 
 
-def values_of(estimate: Estimate) -> np.ndarray:
-    match estimate:
-        case RelativeInverseDepth(values) | MetricDepth(values) | DisparityMap(values):
-            return values
-
-
 @pytest.mark.parametrize(
-    ("make", "kind"),
+    ("make", "meaning"),
     [
-        (depth_anything, RelativeInverseDepth),
-        (lambda folder: depth_anything(folder, "metric"), MetricDepth),
-        (dpt, RelativeInverseDepth),
-        (zoedepth, MetricDepth),
-        (depth_pro, MetricDepth),
-        (lambda folder: depth_pro(folder, with_field_of_view=False), RelativeInverseDepth),
+        (depth_anything, "inverse depth"),
+        (lambda folder: depth_anything(folder, "metric"), "metres"),
+        (dpt, "inverse depth"),
+        (zoedepth, "metres"),
+        (depth_pro, "metres"),
+        (lambda folder: depth_pro(folder, with_field_of_view=False), "inverse depth"),
     ],
 )
 def test_each_kind_of_network_says_what_it_knows(
-    make: Callable[[Path], LocalModel], kind: type, tmp_path: Path
+    make: Callable[[Path], LocalModel], meaning: Meaning, tmp_path: Path
 ) -> None:
     found = estimate_with(make(tmp_path / "model"), PHOTO)
-    assert type(found) is kind
-    values = values_of(found)
+    assert found.meaning == meaning
+    values = found.values
     assert values.dtype == np.float32
     assert np.isfinite(values).all()
     assert np.ptp(values) > 0
-    if isinstance(found, MetricDepth):
+    if found.meaning == "metres":
         assert (values > 0).all()
 
 
@@ -193,7 +187,7 @@ def test_as_the_library_prepares_and_reads_it(tmp_path: Path) -> None:
     pixels = processor((smooth * 255).round().astype(np.uint8), return_tensors="pt")["pixel_values"]
     with torch.inference_mode():
         expected = network(pixel_values=pixels).predicted_depth[0].numpy()
-    found = values_of(estimate_with(model, dataclasses.replace(PHOTO, pixels=smooth)))
+    found = estimate_with(model, dataclasses.replace(PHOTO, pixels=smooth)).values
     assert found.shape == expected.shape
     np.testing.assert_allclose(found, expected, atol=0.02 * np.ptp(expected))
 
@@ -211,7 +205,7 @@ def test_what_was_painted_is_seen_by_the_network_that_saw_the_photo(tmp_path: Pa
 
 
 def test_zoedepth_loses_its_borders_again(tmp_path: Path) -> None:
-    assert values_of(estimate_with(zoedepth(tmp_path / "model"), PHOTO)).shape == PHOTO.size
+    assert estimate_with(zoedepth(tmp_path / "model"), PHOTO).values.shape == PHOTO.size
 
 
 def test_the_field_of_view_gives_metres_and_the_focal_length(tmp_path: Path) -> None:
@@ -219,14 +213,14 @@ def test_the_field_of_view_gives_metres_and_the_focal_length(tmp_path: Path) -> 
     model = depth_pro(tmp_path / "model")
     photo = dataclasses.replace(PHOTO, pixels=RNG.random((128, 128, 3)).astype(np.float32))
     found = estimate_with(model, photo)
-    assert isinstance(found, MetricDepth)
+    assert found.meaning == "metres"
     network = transformers.DepthProForDepthEstimation.from_pretrained(model.folder).eval()
     with torch.inference_mode():
         output = network(torch.from_numpy((photo.pixels - 0.5) / 0.5).permute(2, 0, 1)[None])
-    width = found.metres.shape[1]
+    width = found.values.shape[1]
     focal_px = 0.5 * width / np.tan(np.radians(float(output.field_of_view[0])) / 2)
     inverse = np.clip(output.predicted_depth[0].numpy() * width / focal_px, 1e-4, 1e4)
-    np.testing.assert_allclose(found.metres, 1 / inverse, rtol=1e-2)
+    np.testing.assert_allclose(found.values, 1 / inverse, rtol=1e-2)
 
 
 @pytest.mark.parametrize("size", [(1, 1), (3, 400)])
@@ -239,7 +233,7 @@ def test_photos_of_any_shape(make: Callable[[Path], LocalModel], size: tuple[int
         assert "everywhere" in str(error)  # noqa: PT017 - of one pixel there is nothing to tell
         assert max(size) == 1
         return
-    assert np.isfinite(values_of(found)).all()
+    assert np.isfinite(found.values).all()
 
 
 # ---- sizes
@@ -271,7 +265,7 @@ def test_less_memory_gives_a_smaller_input_and_none_gives_an_error(
     model, shapes = depth_anything(tmp_path / "model"), []
     for free in (2**31, 6 * 2**20):
         monkeypatch.setattr("iibr_core.depth.estimators.estimate_depth.free_memory_bytes", lambda: free)  # noqa: B023
-        shapes.append(values_of(estimate_with(model, PHOTO)).shape)
+        shapes.append(estimate_with(model, PHOTO).values.shape)
     assert shapes[1] < shapes[0]
     monkeypatch.setattr("iibr_core.depth.estimators.estimate_depth.free_memory_bytes", lambda: 2000)
     with pytest.raises(InputError, match="choose a smaller model"):
@@ -362,38 +356,38 @@ def test_a_kept_estimate_needs_no_network(tmp_path: Path, own_cache: Path) -> No
     doings: set[str] = set()
     with watched(lambda done, total, doing: doings.add(doing)):
         again = estimate_with(model, PHOTO)
-    np.testing.assert_array_equal(values_of(first), values_of(again))
+    np.testing.assert_array_equal(first.values, again.values)
     assert not any("loading" in doing for doing in doings)
     assert len(list(own_cache.glob("*.npz"))) == 1
     # Another photo, and other weights, are something else.
     other = dataclasses.replace(PHOTO, pixels=PHOTO.pixels[::-1])
-    assert not np.array_equal(values_of(estimate_with(model, other)), values_of(first))
-    assert not np.array_equal(values_of(estimate_with(depth_anything(tmp_path / "b", seed=1), PHOTO)), values_of(first))
+    assert not np.array_equal(estimate_with(model, other).values, first.values)
+    assert not np.array_equal(estimate_with(depth_anything(tmp_path / "b", seed=1), PHOTO).values, first.values)
     # The same contents elsewhere are the same.
     model.folder.rename(tmp_path / "moved")
-    np.testing.assert_array_equal(values_of(estimate_with(in_folder(tmp_path / "moved"), PHOTO)), values_of(first))
+    np.testing.assert_array_equal(estimate_with(in_folder(tmp_path / "moved"), PHOTO).values, first.values)
     assert len(list(own_cache.glob("*.npz"))) == 3
 
 
 @pytest.mark.parametrize(
     "estimate",
     [
-        RelativeInverseDepth(np.array([[1, np.nan]], np.float32)),
-        MetricDepth(np.array([[1, 2]], np.float32)),
-        DisparityMap(np.array([[1, -2]], np.float32)),
+        DepthEstimate(np.array([[1, np.nan]], np.float32), "inverse depth"),
+        DepthEstimate(np.array([[1, 2]], np.float32), "metres"),
+        DepthEstimate(np.array([[1, -2]], np.float32), "disparity"),
     ],
 )
-def test_every_estimate_comes_back_as_it_was(estimate: Estimate) -> None:
+def test_every_estimate_comes_back_as_it_was(estimate: DepthEstimate) -> None:
     estimate_cache.store("key", estimate)
     found = estimate_cache.load("key")
     assert found is not None
     assert type(found) is type(estimate)
-    np.testing.assert_array_equal(values_of(found), values_of(estimate))
+    np.testing.assert_array_equal(found.values, estimate.values)
 
 
 def test_the_cache_is_bounded_and_the_oldest_go(monkeypatch: pytest.MonkeyPatch, own_cache: Path) -> None:
     monkeypatch.setattr(estimate_cache, "MAX_BYTES", 10_000)
-    estimate = RelativeInverseDepth(np.zeros((20, 40), np.float32))  # 3,200 bytes, and some for the names
+    estimate = DepthEstimate(np.zeros((20, 40), np.float32), "inverse depth")  # 3,200 bytes, and some for the names
     for n, key in enumerate("abcd"):
         estimate_cache.store(key, estimate)
         os.utime(own_cache / f"{key}.npz", (n, n))
@@ -476,8 +470,8 @@ def test_a_package_is_called_as_it_documents(monkeypatch: pytest.MonkeyPatch, tm
     model = model_to_use(DepthChoice(model=str(folder)))
     assert model is not None
     found = estimate_with(model, PHOTO)
-    assert isinstance(found, MetricDepth)
-    assert np.isnan(found.metres[0, 0])
-    assert np.isnan(found.metres).sum() == 1
+    assert found.meaning == "metres"
+    assert np.isnan(found.values[0, 0])
+    assert np.isnan(found.values).sum() == 1
     for name in [name for name in sys.modules if name.startswith("unidepth")]:
         del sys.modules[name]
