@@ -26,8 +26,8 @@ def test_a_pair_side_by_side_tells_the_disparity_from_eye_to_eye(tmp_path: Path)
     found = estimate_from_pair(path)
     assert found is not None
     assert found[1] == "side-by-side stereo"
-    assert found[0].px_per_view.shape == (60, 80)
-    assert np.median(np.abs(found[0].px_per_view - DISPARITY)) < 0.25  # a smooth wall, half a pixel a step
+    assert found[0].values.shape == (60, 80)
+    assert np.median(np.abs(found[0].values - DISPARITY)) < 0.25  # a smooth wall, half a pixel a step
 
 
 def test_files_without_a_pair_or_that_show_another_picture_tell_nothing(tmp_path: Path) -> None:
