@@ -63,6 +63,10 @@ class Dialog:
             filters = ["Models" if what == "model" else "Images", file_patterns(what), "All files", "*"]
             self._dialog = dialogs.open_file(DIALOG_TITLES[what], start, filters)
 
+    def close(self) -> None:
+        """Close the dialog; without this, the bundle's destructor waits for the user."""
+        self._dialog.kill()
+
     def answer(self) -> str | None:
         """The path chosen, "" where the user chose none; None while it is open."""
         if not self._dialog.ready(0):
@@ -86,6 +90,10 @@ class SaveDialog:
             self._dialog = dialogs.select_folder(_title_of(prompt), os.path.dirname(path))
         else:
             self._dialog = dialogs.save_file(_title_of(prompt), path, ["All files", "*"])
+
+    def close(self) -> None:
+        """Close the dialog, as `Dialog.close` does."""
+        self._dialog.kill()
 
     def answer(self) -> str | None:
         """The path chosen, "" where the user chose none; None while it is open."""

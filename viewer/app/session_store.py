@@ -156,7 +156,7 @@ def _find(folder: Path, scene: Scene) -> SessionFound:
     from viewer.model.saved_settings import settings_from_text
 
     sidecar = sidecar_of(Path(scene.source.path))
-    kept = folder / f"{_key_of(scene.source)}.json"
+    kept = folder / f"{key_of(scene.source)}.json"
     try:
         if is_file(kept):
             return SessionFound(scene, settings_from_text(read_text(kept, MOST_BYTES), str(kept), is_own=True))
@@ -178,7 +178,7 @@ def _keep(folder: Path, source: Source, settings: SavedSettings) -> None:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(f"{folder}: cannot be made ({error.strerror or error}); what you do is not kept") from error
-    _write(folder / f"{_key_of(source)}.json", settings)
+    _write(folder / f"{key_of(source)}.json", settings)
     _forget_oldest(folder)
 
 
@@ -196,16 +196,17 @@ def _forget_oldest(folder: Path) -> None:
             path.unlink(missing_ok=True)
 
 
-def _key_of(source: Source) -> str:
-    """By what is in the photo's file, or the path of a folder; and by what was said about its depth, which is edited.
+def key_of(source: Source) -> str:
+    """Return the name under which a photo's session is kept.
 
-    Raises InputError where the file is gone.
+    It depends on the content of the photo's file, or the path of a folder, and on the map and how it is read: that is
+    what edits are made on. A model that was chosen since does not change it. Raises InputError where the file is gone.
     """
-    path = Path(source.path)
+    path, depth = Path(source.path), source.depth
     digest = hashlib.blake2b(digest_size=16)
-    said = source.depth
-    told = (said.file_scale, said.inverts, said.is_metric, said.stretches)
-    digest.update(repr((said.file and str(said.file), *told, said.start, said.model)).encode())
+    start = "auto" if depth.start == "model" else depth.start
+    reading = (depth.file_scale, depth.inverts, depth.is_metric, depth.stretches)
+    digest.update(repr((depth.file and str(depth.file), *reading, start)).encode())
     if is_folder(path):
         digest.update(str(path.absolute()).encode("utf-8", "surrogateescape"))
         return digest.hexdigest()

@@ -101,6 +101,8 @@ class SideEffects:
 
     def close(self) -> None:
         """Finish the files that are being written; give up everything else."""
+        if self._dialog is not None:
+            self._dialog.close()
         self._jobs.close()
         self._downloads.close()
         self._files.close(cancels=False)

@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.types import InputError
 from viewer.background.job_threads import Failed, Job, JobThread
 from viewer.gpu.context import GLContext
 from viewer.gpu.thumbnails import CELL, ThumbnailTexture
@@ -71,5 +70,5 @@ def _read(job: Job[tuple[str, ...], ThumbnailRead | Failed[None]]) -> Iterator[T
     for path in job.request:
         try:
             yield ThumbnailRead(path, read_thumbnail(Path(path), CELL))
-        except InputError:
+        except Exception:  # opening the photo says what is wrong with it
             yield ThumbnailRead(path, None)

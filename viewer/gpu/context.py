@@ -13,7 +13,7 @@ SOFTWARE_RENDERERS = ("llvmpipe", "softpipe", "swrast", "swiftshader", "swr", "s
 class GLContext:
     """A GL context and its limits.
 
-    ctx: the moderngl context. backend: "window", "egl" or "osmesa". close: frees what it lives in, after it.
+    ctx: the moderngl context. backend: "window", "egl", "osmesa" or "system". close: frees what it lives in, after it.
     renderer: the driver's name for itself.
     max_layers, max_texture_size: limits of texture arrays, in layers and pixels.
     """

@@ -15,8 +15,6 @@ from imgui_bundle import imgui
 from viewer.model.layout import Layout
 from viewer.ui.style import Look, apply_style, load_fonts
 
-VERTEX_BYTES = 20
-INDEX_BYTES = 2
 DOUBLE_CLICK_S, SINGLE_CLICK_AFTER_S = 0.3, 0.2
 """ImGui wants a single click to count as one only after a double click can come no more."""
 
@@ -60,8 +58,8 @@ class UiHost:
         imgui.render()
         digest = hashlib.blake2b(digest_size=16)
         for commands in imgui.get_draw_data().cmd_lists:
-            digest.update(_bytes_of(commands.vtx_buffer, VERTEX_BYTES))
-            digest.update(_bytes_of(commands.idx_buffer, INDEX_BYTES))
+            digest.update(_bytes_of(commands.vtx_buffer, imgui.VERTEX_SIZE))
+            digest.update(_bytes_of(commands.idx_buffer, imgui.INDEX_SIZE))
         return digest.digest()
 
     def draw(self) -> None:

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import os
+import subprocess
+import sys
+from pathlib import Path
 
 import pytest
 from imgui_bundle import portable_file_dialogs
@@ -32,3 +35,26 @@ def test_where_to_save_is_asked_with_what_was_typed(monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(portable_file_dialogs, "save_file", lambda *words: asked.append(words))
     SaveDialog(SavePrompt("photos/one-iibr.png", ScreenSize(3, 2)))
     assert asked[0][:2] == ("Save the picture", os.path.join(os.getcwd(), "photos", "one-iibr.png"))
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems show their dialog without a program")
+@pytest.mark.parametrize("dialog", ["Dialog('photo')", "SaveDialog(SavePrompt('a.png', ScreenSize(3, 2)))"])
+def test_an_open_dialog_ends_with_the_program(tmp_path: Path, dialog: str) -> None:
+    """The dialog's program waits for a person, longer than the test may take."""
+    program, started = tmp_path / "zenity", tmp_path / "started"
+    program.write_text(f"#!/bin/sh\ntouch {started}\nexec sleep 600\n")
+    program.chmod(0o755)
+    code = f"""
+import time
+from pathlib import Path
+from iibr_core.scenes.screen_size import ScreenSize
+from viewer.app.dialogs import Dialog, SaveDialog
+from viewer.model.state.prompts import SavePrompt
+dialog = {dialog}
+while not Path({str(started)!r}).exists():
+    time.sleep(0.01)
+assert dialog.answer() is None
+dialog.close()
+"""
+    environment = {**os.environ, "PATH": f"{tmp_path}{os.pathsep}{os.environ['PATH']}"}
+    subprocess.run([sys.executable, "-c", code], env=environment, check=True, timeout=60)

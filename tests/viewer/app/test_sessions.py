@@ -12,13 +12,14 @@ import numpy as np
 import pytest
 
 from iibr_core.beyond.optics import Optics
+from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.editing.canvas import DepthCanvas, apply_edits
 from iibr_core.depth.editing.edits import UNEDITED, DepthEdits, Stroke
 from iibr_core.scenes.scene import Source
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import Driver, Opener, rests
-from viewer.app.session_store import EDITS_KEPT, sidecar_of
+from viewer.app.session_store import EDITS_KEPT, key_of, sidecar_of
 from viewer.model.actions import DoTask, Quit, ShowPrompt, Undo
 from viewer.model.saved_settings import settings_text
 from viewer.model.state.depth_editing import Paint, SetBrush, SetTone
@@ -84,6 +85,17 @@ def test_a_photo_opens_as_it_was_left(open_window: Opener, photo_path: Path, tmp
     second.app.do(Undo())
     second.until_idle()
     assert second.app.state.depth.edits == UNEDITED
+
+
+def test_a_depth_model_chosen_since_does_not_hide_what_was_kept(
+    open_window: Opener, photo_path: Path, tmp_path: Path
+) -> None:
+    """Choosing a model in the window says that the search for depth begins with it."""
+    first = open_window(photo_path, kept_in=tmp_path / "kept", grid=ONE)
+    change(first)
+    first.app.close()
+    source = Source(str(photo_path), depth=DepthChoice(start="model", model="anything"), grid=ONE)
+    assert (tmp_path / "kept" / "sessions" / f"{key_of(source)}.json").is_file()
 
 
 def test_after_a_crash_too(open_window: Opener, photo_path: Path, tmp_path: Path) -> None:

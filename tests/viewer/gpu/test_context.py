@@ -11,7 +11,7 @@ import pytest
 from iibr_core.types import InputError
 from viewer.gpu import headless_context
 from viewer.gpu.context import GLContext
-from viewer.gpu.headless_context import Backend, create_headless
+from viewer.gpu.headless_context import Backend, create_headless, usual_makers
 
 
 def paints_red(gl: GLContext) -> bool:
@@ -32,6 +32,12 @@ def test_contexts_come_and_go_in_one_process() -> None:
         assert gl.max_layers >= 256
         gl.release()
         gl.release()
+
+
+def test_other_systems_have_one_backend() -> None:
+    """The library knows it: naming EGL there can only fail."""
+    assert usual_makers("linux") == ("egl", "osmesa")
+    assert usual_makers("darwin") == usual_makers("win32") == ("system",)
 
 
 def test_contexts_live_side_by_side() -> None:
