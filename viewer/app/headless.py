@@ -225,4 +225,7 @@ class HeadlessViewer:
             for result in self._comparison_job.results_of(request, inputs):
                 self.do(*self._inspection_view.take(result))
         self.do(SetInspection("probe", self._inspection_view.probe(self.state)))
-        return self._inspection_view.draw(self.state, layout)
+        textures = self._inspection_view.draw(self.state, layout)
+        while self._inspection_view.is_drawing:
+            textures = self._inspection_view.draw(self.state, layout)
+        return textures

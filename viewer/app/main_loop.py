@@ -159,6 +159,7 @@ class App:
         self.do(*self.sharpener.advance(picture, self.state, is_still and self._is_resting, SAVE_BUDGET_S))
         self.do(*self.free_camera_view.advance(self.state))
         self._pace.is_busy |= bool(actions) or self._side_effects.is_drawing or self.sharpener.is_drawing
+        self._pace.is_busy |= self.inspection_view.is_drawing
         if not self._pace.is_busy:
             self._pace.is_busy = self._preparation.advance(picture, is_still and self._is_resting)
         self.scene_loader.advance(self.state)

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +25,7 @@ from viewer.display.scene_view import SceneView
 from viewer.gpu.context import GLContext
 from viewer.gpu.inspection_passes import InspectionPasses, Line, OverlayStyle
 from viewer.gpu.light_field_texture import LightFieldTexture
+from viewer.gpu.refocus.picture_drawing import PictureDrawing
 from viewer.gpu.refocus.view_sampling import nearest_present
 from viewer.model.actions import Action, Notify
 from viewer.model.colormap import VIRIDIS
@@ -41,6 +43,8 @@ from viewer.model.state.inspection import Compare, Comparison, Origin, Pair, Pai
 from viewer.model.state.notices import Notice
 
 INPAINTED_RGB = (255, 184, 60)
+SNAPSHOT_BUDGET_S = 0.025
+"""Time a turn for drawing the snapshot's picture."""
 ROUNDING = 1
 """Of 255: by so much one picture differs that was summed up in other steps."""
 
@@ -68,14 +72,20 @@ class InspectionView:
         self._inpainted: dict[ViewIndex, NDArray[np.uint8]] = {}
         self._entropy: EntropyReady | None = None
         self._pair: PairReady | None = None
-        self._kept: tuple[object, NDArray[np.uint8]] | None = None
+        self._kept: tuple[object, PictureDrawing] | None = None
         self._probed: tuple[object, Probe | None] = (None, None)
 
     def open(self) -> None:
         """Another scene is on the screen."""
         self._inpainted.clear()
         self._drawn.clear()
-        self._entropy = self._pair = self._kept = None
+        self._entropy = self._pair = None
+        self._stop_snapshot()
+
+    @property
+    def is_drawing(self) -> bool:
+        """Whether the picture of the snapshot is being drawn."""
+        return self._kept is not None and not self._kept[1].is_done
 
     def add(self, view: ViewUpdate) -> None:
         """Keep what of a view was inpainted, eight pixels a byte."""
@@ -140,6 +150,7 @@ class InspectionView:
 
     def release(self) -> None:
         """Free the GL objects."""
+        self._stop_snapshot()
         self._passes.release()
 
     def _textures(self, names: dict[str, int | None]) -> InspectionTextures:
@@ -248,14 +259,15 @@ class InspectionView:
         return {"left": left, "right": right}
 
     def _kept_images(self, state: AppState, size_px: ScreenSize, part: Rect, base: _ViewImage) -> dict[str, int | None]:
-        """The picture as it was kept, or how far the present one is from it once that is finished."""
+        """The picture of the snapshot, or its difference from the present one once that is finished."""
         kind, optics = state.inspection.comparison, state.inspection.kept
         if optics is None or kind not in ("kept", "difference"):
+            self._stop_snapshot()
             return {}
         record = base.generation, base.views, base.previews, optics, size_px, part
-        if self._kept is None or self._kept[0] != record:
-            self._kept = record, self._scene_view.renderer.converged_picture(RenderSettings(optics, size_px, part))
-        kept = self._kept[1]
+        kept = self._snapshot(record, RenderSettings(optics, size_px, part))
+        if kept is None:
+            return {"left": None, "right": None}
         if kind == "kept":
             return {"left": self._once("left", record, lambda: self._passes.show("left", kept)), "right": None}
         renderer, drawn = self._scene_view.renderer, self._scene_view.picture_drawn
@@ -264,7 +276,24 @@ class InspectionView:
             return {"difference": before[1] if before else None}
         return {"difference": self._once("difference", (record, drawn), lambda: self._show_difference(kept))}
 
-    def _show_difference(self, kept: NDArray[np.uint8]) -> int:
+    def _snapshot(self, record: object, settings: RenderSettings) -> NDArray[Any] | None:
+        """Draw the snapshot's picture for about SNAPSHOT_BUDGET_S; None until it is finished."""
+        if self._kept is None or self._kept[0] != record:
+            self._stop_snapshot()
+            self._kept = record, self._scene_view.renderer.start_picture(settings)
+        drawing = self._kept[1]
+        if not drawing.is_done:
+            drawing.advance(SNAPSHOT_BUDGET_S)
+            if drawing.is_done:
+                drawing.stop()
+        return drawing.image if drawing.is_done else None
+
+    def _stop_snapshot(self) -> None:
+        if self._kept is not None:
+            self._kept[1].stop()
+            self._kept = None
+
+    def _show_difference(self, kept: NDArray[Any]) -> int:
         """Black where nothing differs but by rounding; amplified, for what differs little is what one looks for."""
         difference = np.abs(self._scene_view.renderer.read_image().astype(np.int16) - kept)
         difference[difference <= ROUNDING] = 0

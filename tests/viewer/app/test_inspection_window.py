@@ -24,7 +24,7 @@ from viewer.model.actions import OpenPath
 from viewer.model.inspection_request import sheet_cells
 from viewer.model.state.app_state import AppState
 from viewer.model.state.inspection import Compare, KeepState, SetInspection, SetOverlay
-from viewer.model.state.optics_actions import MoveEye
+from viewer.model.state.optics_actions import MoveEye, SetAperture
 from viewer.model.state.preferences import ToggleSection
 from viewer.model.state.tasks import ReadTruthTask
 
@@ -245,3 +245,13 @@ def test_a_picture_drawn_in_a_hurry_is_not_compared_before_it_is_whole(viewer: D
     renderer.upload_view(*GRID.centre, centre.colors, centre.disparity)
     app.scene_view.views_uploaded += 1
     app.inspection_view.draw(app.state, app.layout())
+
+
+def test_a_snapshot_is_drawn_over_several_turns(viewer: Driver) -> None:
+    """A turn draws for a short time only, so the window answers while a finished picture is drawn."""
+    app = viewer.app
+    app.do(MoveEye(ViewOffset(0.3, 0.4)), SetAperture(3.0), KeepState(), MoveEye(ViewOffset(0, 0)), Compare("kept"))
+    viewer.until(lambda app: app.inspection_view.is_drawing)
+    viewer.until_idle()
+    assert not app.inspection_view.is_drawing
+    assert app.inspection_view.draw(app.state, app.layout()).left is not None
