@@ -81,7 +81,7 @@ VARIANTS = (
 
 
 def main(words: Sequence[str] | None = None) -> None:
-    """Train what is missing and print the table."""
+    """Train the missing variants and print the table."""
     parser = command_line()
     parser.description = __doc__
     parser.add_argument("--steps", type=int, default=500, help="steps of each training; the shipped weights took 2500")

@@ -38,31 +38,28 @@ def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--scenes", type=int, default=4)
-    figures = np.array([judge(seed) for seed in range(parser.parse_args().scenes)])  # (scene, pose, way, part)
+    figures = np.array([judge(seed) for seed in range(parser.parse_args().scenes)])  # (scene, pose, way and part)
+    names = "pose", *(f"{maker}, {part}" for maker in ("iibr", "plain warp") for part in ("frame", "seen", "unseen"))
     means = [*np.nanmean(figures, axis=0), np.nanmean(figures, axis=(0, 1))]
-    names = "pose", *(f"{way}, {part}" for way in ("iibr", "plain warp") for part in ("frame", "seen", "unseen"))
-    print(
-        markdown(names, ([pose, *(f"{db:.2f}" for db in found.flat)] for pose, found in zip((*POSES, "mean"), means)))
-    )
+    print(markdown(names, ([pose, *(f"{db:.2f}" for db in found)] for pose, found in zip((*POSES, "mean"), means))))
 
 
-def judge(seed: int) -> list[list[list[float]]]:
-    """Return PSNR in dB by pose, way (ours, warp) and part (frame, seen, unseen) for a drawn scene."""
+def judge(seed: int) -> list[list[float]]:
+    """Return the PSNR in dB by pose: frame, seen and unseen of ours, then of the warp."""
     scene, size = random_scene(np.random.default_rng(seed), DRAWN_SIZE, 2.0), DRAWN_SIZE
     taken = Camera(np.eye(3), np.zeros(3), size, (scene.focal_px,) * 2, scene.centre_px, "photo")
     photo, inverse_depth = seen_by(scene, taken)
     nearest, cameras = 1 / float(inverse_depth.max()), []
     for place, degrees, lens in POSES.values():
-        turn, focal = cv2.Rodrigues(np.radians(degrees).astype(float))[0], (lens * scene.focal_px,) * 2
+        turn, focal = cv2.Rodrigues(np.radians(degrees))[0], (lens * scene.focal_px,) * 2
         cameras.append(replace(taken, world_from_camera=turn, position=nearest * np.array(place), focal_px=focal))
-    scale_px, views, found = scene.focal_px * 0.02 * nearest, FreeViews(photo, inverse_depth, taken, cameras), []
+    views, scale_px, found = FreeViews(photo, inverse_depth, taken, cameras), 0.02 * nearest * scene.focal_px, []
     for camera in cameras:
-        truth = seen_by(scene, camera)[0]
         matrix = target_from_photo(taken, camera, scale_px)
         warped = reference_warp_to(photo, inverse_depth * np.float32(scale_px), matrix, size)
+        pictures, truth = (np.clip(views.view(camera).colors, 0, 1), warped.colors), seen_by(scene, camera)[0]
         parts = None, warped.visible, warped.hole
-        pictures = np.clip(views.view(camera).colors, 0, 1), warped.colors
-        found.append([[bounded_psnr(picture, truth, part) for part in parts] for picture in pictures])
+        found.append([bounded_psnr(picture, truth, part) for picture in pictures for part in parts])
     return found
 
 

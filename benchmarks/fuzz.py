@@ -114,29 +114,15 @@ def samples(folder: Path) -> dict[Path, Read]:
     picture, depth = Image.fromarray(pixels), np.tile(np.linspace(20, 230, SIZE[1]).astype(np.uint8), (SIZE[0], 1))
     readers: dict[Path, Read] = {}
 
-    def add(name: str, read: Read, data: bytes | None = None) -> Path:
+    def add(name: str, read: Read, data: bytes = b"") -> Path:
         path = folder / name
-        path.parent.mkdir(exist_ok=True)
-        if data is not None:
-            path.write_bytes(data)
+        path.write_bytes(data)
         readers[path] = read
         return path
 
-    for kind, modes in {
-        "JPEG": ("RGB", "L", "CMYK"),
-        "PNG": ("RGBA", "P", "1"),
-        "TIFF": ("RGB",),
-        "WEBP": ("RGB",),
-    }.items():
-        for mode in modes:
-            add(f"{mode}.{kind.lower()}", _photo, _saved(picture.convert(mode), kind))
-    for name, dtype in {
-        "a.tif": "uint16",
-        "a.exr": "half",
-        "a.hdr": "float",
-        "a.ppm": "uint8",
-        "a.bmp": "uint8",
-    }.items():
+    for name, mode in (("a.jpeg", "RGB"), ("b.jpeg", "CMYK"), ("a.png", "P"), ("b.png", "1"), ("a.webp", "RGB")):
+        add(name, _photo, _saved(picture.convert(mode), name.split(".")[1].upper()))
+    for name, dtype in (("a.tif", "uint16"), ("a.exr", "half"), ("a.hdr", "float"), ("a.ppm", "uint8")):
         write_image_file(add(name, _photo), pixels / np.float32(255), dtype)
     photo, map_png = embedded_files.grey_photo(SIZE), embedded_files.picture(depth, "PNG")
     gdepth = embedded_files.gdepth_segments(map_png, units="m")
@@ -150,11 +136,10 @@ def samples(folder: Path) -> dict[Path, Read]:
     for name in ("a_qs2x2a1.png", "a_SBS.png", "a_eslf.png"):
         add(name, _views, _saved(picture, "PNG"))
     add("a.mpo", _views, _saved(picture, "MPO", save_all=True, append_images=[picture]))
-    for number in range(4):
-        for layout in ("hci", "llff"):
-            path = folder / layout / f"input_Cam{number:03d}.png"
-            path.parent.mkdir(exist_ok=True)
-            path.write_bytes(_saved(picture, "PNG"))
+    for layout in ("hci", "llff"):
+        (folder / layout).mkdir()
+        for number in range(4):
+            (folder / layout / f"input_Cam{number:03d}.png").write_bytes(_saved(picture, "PNG"))
     cameras = "[extrinsics]\nnum_cams_x = 2\nnum_cams_y = 2\nbaseline_mm = 1.0\nfocus_distance_m = 0.0\n"
     text = f"[intrinsics]\nfocal_length_mm = 100\nimage_resolution_x_px = 512\nsensor_size_mm = 35\n{cameras}"
     add("hci/parameters.cfg", lambda path: _views(path.parent), text.encode())

@@ -43,7 +43,7 @@ class Table:
 
     @property
     def needs(self) -> list[str]:
-        """What the command needs, of NEEDS."""
+        """Keys of NEEDS that the command needs."""
         special = {"window": ["X"], "ablation": ["torch"]}
         return [name for name in ("DATA", "MODEL") if name in self.command.split()] + special.get(self.name, [])
 

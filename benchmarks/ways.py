@@ -87,7 +87,7 @@ def ray_march(scene: Scene) -> ViewMaker:
     """Return views of a parallax shader, as of DepthFlow (Tremeschin): rays step through the map as through a relief.
 
     They march from the nearest plane backwards, first in coarse steps, then in fine ones; the relief has walls, so
-    what is disoccluded shows them stretched. https://github.com/BrokenSource/DepthFlow
+    disocclusions show them stretched. https://github.com/BrokenSource/DepthFlow
     """
     photo, relief = _arrays(scene)
     near, far = float(relief.max()), float(relief.min())
