@@ -31,7 +31,7 @@ bench: install
 	$(BIN)/python -m benchmarks compare $(if $(DATA),--data "$(DATA)") $(ARGS)
 
 # Makes every table and picture of README and docs/ again. DATA: as above. MODEL: a depth network as an ONNX file.
-# ONLY: words of names, by commas. ARGS: --list shows the tables and what they need; --check those older than the code.
+# ONLY: names, by commas. ARGS: --list shows the tables and what they need; --check those older than the code.
 figures: install
 	@.ci/system-libraries test
 	$(BIN)/python -m benchmarks tables $(if $(DATA),--data "$(DATA)") $(if $(MODEL),--model "$(MODEL)") \
