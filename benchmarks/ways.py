@@ -147,7 +147,7 @@ def planes(scene: Scene) -> ViewMaker:
 
 WAYS: dict[str, Way] = {
     "iibr": iibr,
-    "iibr, map not refined": without_refining,
+    "iibr map not refined": without_refining,
     "plain warp": warp,
     "ray march (DepthFlow)": ray_march,
     "dilated forward warp (iw3)": partial(splatting, dilated_px=2),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -9,8 +10,11 @@ from pathlib import Path
 import pytest
 
 from benchmarks import __main__ as dispatch
+from benchmarks.compare import command_line
 from benchmarks.report import ROOT, git
+from benchmarks.scenes import MAPS
 from benchmarks.tables import NEEDS, TABLES, Table, old_tables, put_between, write_table
+from benchmarks.ways import chosen_ways
 from iibr_core.types import InputError
 
 PAGE = (
@@ -64,6 +68,10 @@ def test_the_list_names_programs_that_are_there() -> None:
         assert set(table.needs) <= NEEDS.keys()
         program = table.command.split()[0].replace("-", "_")
         assert program.startswith("docs/") or program in {*dispatch.programs(), "disparity"}
+        if program == "compare":
+            options = command_line().parse_args(shlex.split(table.command)[1:])
+            assert chosen_ways(options.ways)
+            assert {*options.maps.split(",")} <= {*MAPS, "network"}
     assert sum(table.minutes for table in TABLES) <= 40
     page = (ROOT / "benchmarks" / "README.md").read_text("utf-8")
     assert all(f"| `{name.replace('_', '-')}" in page for name in {*dispatch.programs()} - {"multi_view_depth"})
