@@ -24,22 +24,22 @@ test: install kernels
 	$(BIN)/lint-imports
 	$(BIN)/pytest -n 2 --dist loadfile --no-loadscope-reorder --max-worker-restart 0
 
-# DATA: a folder of scenes as `iibr evaluate` takes them; without it, a drawn scene. OUT: for the report.
-OUT ?= out/bench
+# Compares our views with a plain warp's. DATA: a folder of scenes as `iibr evaluate` takes them; without it, drawn scenes.
+# ARGS: more words, see `python -m benchmarks compare --help`.
 bench: install
 	@.ci/system-libraries test
-	@mkdir -p "$(OUT)"
-	$(BIN)/python -m benchmarks.speed --out "$(OUT)" $(if $(DATA),--data "$(DATA)")
+	$(BIN)/python -m benchmarks compare $(if $(DATA),--data "$(DATA)") $(ARGS)
 
-# Makes every table and picture of README and docs/ again. DATA: as above. ONLY: words of pages or programs, by commas.
-# ARGS: --list says what each needs, and how long it takes; --check which pages are older than what they are about.
+# Makes every table and picture of README and docs/ again. DATA: as above. MODEL: a depth network as an ONNX file.
+# ONLY: names, by commas. ARGS: --list shows the tables and what they need; --check those older than the code.
 figures: install
 	@.ci/system-libraries test
-	$(BIN)/python -m benchmarks.figures $(if $(DATA),--data "$(DATA)") $(if $(ONLY),--only "$(ONLY)") $(ARGS)
+	$(BIN)/python -m benchmarks tables $(if $(DATA),--data "$(DATA)") $(if $(MODEL),--model "$(MODEL)") \
+		$(if $(ONLY),--only "$(ONLY)") $(ARGS)
 
 fuzz: install
 	@.ci/system-libraries test
-	$(BIN)/python -m benchmarks.fuzz
+	$(BIN)/python -m benchmarks fuzz
 
 # The pages of docs/ as a web site; warnings, broken links among them, are errors.
 site: $(READY)

@@ -1,169 +1,230 @@
-"""Feeds every reader files damaged on purpose: each must give finite values or an error of one line.
+"""Give every reader damaged copies of valid files: each must return finite values or raise an error of one line.
 
-    python -m benchmarks.fuzz [--count 10000] [--reader NAME]... [--seed 0] [--out out/fuzz]
+    python -m benchmarks fuzz [--count 1000] [--only jpg,pfm] [--seed 0] [--out out/fuzz]
 
-Cases run in a worker process with limits on time and memory, so a crash or a hang ends that worker only. Findings are
-written to the folder: the file, and beside it what happened. Exits with 1 if there are any.
+Files on which a reader fails stay in the folder, named by file and number. If a reader ends the whole process or takes
+longer than a minute, the file in question is the only one left in OUT/now. Exits with 1 if anything was found.
 """
 
 from __future__ import annotations
 
 import argparse
-import os
+import faulthandler
+import io
 import re
 import resource
-import selectors
-import subprocess
+import shutil
+import struct
 import sys
-import tempfile
 import traceback
-from collections import Counter
-from collections.abc import Iterator
+import zlib
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import psutil
+from PIL import Image, PngImagePlugin
 
-from benchmarks.fuzz_cases import READERS, case
-from benchmarks.harness.reports import parser_of, start
-from iibr_core.types import InputError
+from benchmarks.report import is_wanted
+from iibr_core.beyond.optics import Optics
+from iibr_core.depth.search import open_with_depth
+from iibr_core.formats.images.photo import read_photo
+from iibr_core.formats.images.write import write_image_file
+from iibr_core.formats.light_fields.light_field_formats import find_light_field
+from iibr_core.formats.light_fields.views import read_views
+from iibr_core.formats.maps.disparity_file import read_disparity
+from iibr_core.formats.maps.writer import write_map
+from iibr_core.method.ray_transformer import TrainedWeights
+from iibr_core.runtime.resources import resource_folder
+from iibr_core.scenes.scene import Source
+from iibr_core.types import ImageSize, InputError
+from tests.iibr_core import embedded_files
+from viewer.app.preferences_store import load_preferences
+from viewer.model.lens.aperture_mask import read_mask
+from viewer.model.saved_settings import read_settings, settings_text
+from viewer.model.state.app_state import AppState
+from viewer.model.state.saving import SavedSettings
 
-TIME_LIMIT_S = 20.0
-"""For one case; generous, because other programs may load the machine."""
-START_LIMIT_S = 300.0
-ADDRESS_SPACE = 3 << 30
-"""Bytes that a worker may reserve beyond those after reading the valid files."""
-RESIDENT_BUDGET = 300 << 20
-"""Bytes of them that a case may use."""
-KEPT_EACH = 3
+TIME_LIMIT_S = 60.0
+MEMORY_LIMIT = 3 << 30
+"""Bytes that the process may reserve beyond what it has at the start."""
+MAX_BYTES = 1 << 20
+SIZE = ImageSize(17, 23)
+MAX_PIXELS = 100_000
+NUMBERS = (b"-1", b"0", b"1e999", b"nan", b"-inf", b"99999999999999999999", b"4294967295", b"1e-320")
+EXTREMES = (b"\0", b"\x7f", b"\xff", b"\x80\0", b"\0\x80", b"\xff\xff", b"\x7f\xff\xff\xff", b"\xff\xff\xff\xff")
+
+Rng = np.random.Generator
+Read = Callable[[Path], Any]
 
 
 def main() -> None:
-    parser = parser_of(__doc__, "seed", out={"default": Path("out/fuzz"), "help": "folder for findings"})
-    parser.add_argument("--count", type=int, default=10_000, help="cases for each reader")
-    parser.add_argument("--reader", action="append", choices=READERS, help="one of them only; may be repeated")
-    parser.add_argument("--work", nargs=2, type=int, help=argparse.SUPPRESS)
-    given = parser.parse_args()
-    if given.work:
-        work(given.reader[0], given.seed, *given.work)
-        return
-    total = 0
-    for name in given.reader or READERS:
-        findings, read = fuzz_reader(name, given.seed, given.count, given.out)
-        total += sum(findings.values())
-        kinds = "".join(f"\n    {count} x {what}" for what, count in findings.most_common())
-        print(f"{name}: {given.count} cases, {read} read in spite of damage, {sum(findings.values())} findings{kinds}")
-        sys.stdout.flush()
-    sys.exit(1 if total else 0)
+    """Fuzz all readers and print what was found."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--count", type=int, default=1000, help="damaged copies of each file")
+    parser.add_argument("--only", default="", help="files whose names contain one of these words")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--out", type=Path, default=Path("out/fuzz"))
+    options = parser.parse_args()
+    folder = options.out / "now"
+    shutil.rmtree(folder, ignore_errors=True)
+    readers = {path: read for path, read in samples(folder).items() if is_wanted(path.name, options.only)}
+    limit = psutil.Process().memory_info().vms + MEMORY_LIMIT
+    resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
+    findings = list(fuzz(readers, options.count, options.seed, options.out))
+    print("\n".join(findings) or "nothing found")
+    shutil.rmtree(folder)
+    sys.exit(bool(findings))
 
 
-def fuzz_reader(name: str, seed: int, count: int, out: Path) -> tuple[Counter[str], int]:
-    """Return the findings by kind, and how many cases were read without complaint; a worker that ends is replaced."""
-    findings: Counter[str] = Counter()
-    read = next_case = 0
-    while next_case < count:
-        worker = subprocess.Popen(
-            [
-                *(sys.executable, "-m", "benchmarks.fuzz", "--reader", name, "--seed", str(seed)),
-                *("--work", str(next_case), str(count)),
-            ],
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
-        )
-        case_number = None
-        for line in _lines(worker):
-            number, outcome = line.split(" ", 1)
-            case_number = int(number)
-            if outcome == "begin":
-                continue
-            read += outcome == "read"
-            if outcome not in ("read", "refused"):
-                _keep(findings, outcome, name, seed, case_number, out)
-            next_case = case_number + 1
-        code = worker.wait()
-        if next_case < count:
-            if case_number is None:
-                raise SystemExit(f"{name}: the worker does not start (exit code {code}); run it with --work 0 1")
-            what = "hang" if code == -9 else f"crash: exit code {code}"
-            if case_number == next_case:
-                _keep(findings, what, name, seed, case_number, out)
-                next_case = case_number + 1
-    return findings, read
+def fuzz(readers: Mapping[Path, Read], count: int, seed: int, out: Path) -> Iterator[str]:
+    """Yield a line for each damaged copy that a reader neither reads nor refuses, and keep the copy."""
+    originals = {path: path.read_bytes() for path in readers}
+    for path, read in readers.items():
+        rng = np.random.default_rng([seed, *path.name.encode()])
+        for number in range(count):
+            path.write_bytes(damage(originals[path], list(originals.values()), rng))
+            faulthandler.dump_traceback_later(TIME_LIMIT_S, exit=True)
+            fault = fault_of(read, path)
+            faulthandler.cancel_dump_traceback_later()
+            if fault:
+                shutil.copy(path, out / f"{number}_{path.name}")
+                yield f"{number}_{path.name}: {fault}"
+        path.write_bytes(originals[path])
 
 
-def _lines(worker: subprocess.Popen[bytes]) -> Iterator[str]:
-    """The worker's lines as they come; it is killed where none comes in time."""
-    assert worker.stdout is not None
-    waiting = selectors.DefaultSelector()
-    waiting.register(worker.stdout, selectors.EVENT_READ)
-    rest, limit = b"", START_LIMIT_S
-    while True:
-        if not waiting.select(limit):
-            worker.kill()
-            return
-        chunk = os.read(worker.stdout.fileno(), 1 << 16)
-        if not chunk:
-            return
-        limit = TIME_LIMIT_S
-        *lines, rest = (rest + chunk).split(b"\n")
-        yield from (line.decode() for line in lines)
-
-
-def _keep(findings: Counter[str], what: str, name: str, seed: int, number: int, out: Path) -> None:
-    findings[what] += 1
-    if findings[what] > KEPT_EACH:
-        return
-    folder = out / name / f"{seed}-{number}"
-    folder.mkdir(parents=True, exist_ok=True)
-    file_name, data = case(name, seed, number)
-    (folder / file_name).write_bytes(data)
-    (folder / "what.txt").write_text(what + "\n", "utf-8")
-
-
-def work(name: str, seed: int, first: int, last: int) -> None:
-    """The worker: cases [first, last), two lines each on stdout: when it begins and how it ended."""
-    reader = READERS[name]
-    with tempfile.TemporaryDirectory(prefix="iibr-fuzz-") as folder:
-        reader.prepare(Path(folder))
-        for valid in reader.seeds():  # compiles and imports what is needed, outside the limits
-            _outcome(name, Path(folder) / valid.name, valid.file_of(valid.data))
-        limit = psutil.Process().memory_info().vms + ADDRESS_SPACE
-        resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
-        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-        for number in range(first, last):
-            file_name, data = case(name, seed, number)
-            print(number, "begin", flush=True)
-            print(number, _outcome(name, Path(folder) / file_name, data), flush=True)
-
-
-def _outcome(name: str, path: Path, data: bytes) -> str:
-    """How reading ended: "read", "refused", or what went wrong in one line."""
-    path.write_bytes(data)
-    before = _resident_peak(reset=True)
+def fault_of(read: Read, path: Path) -> str:
+    """Return what went wrong in reading, "" if the file was read or refused in one line."""
     try:
-        READERS[name].read(path)
-        outcome = "read"
+        result = read(path)
     except InputError as error:
-        outcome = "refused" if "\n" not in str(error) else "a message of several lines"
+        return "a message of several lines" if "\n" in str(error) else ""
     except Exception as error:
         frame = traceback.extract_tb(error.__traceback__)[-1]
-        text = re.sub(r"0x[0-9a-f]+|\d+", "#", " ".join(str(error).split()))[:80]
-        outcome = f"{type(error).__name__} in {Path(frame.filename).name}:{frame.name}: {text}"
-    finally:
-        path.unlink(missing_ok=True)
-    used = _resident_peak() - before
-    return outcome if used <= RESIDENT_BUDGET else f"took {used >> 20 >> 6 << 6} MiB or more"
+        return f"{type(error).__name__} in {Path(frame.filename).name}, {frame.name}: {str(error)[:80]!r}"
+    is_finite = result is None or all(np.isfinite(array).all() for array in result)
+    return "" if is_finite else "values that are not finite"
 
 
-def _resident_peak(reset: bool = False) -> int:
-    """Bytes; since the last reset. Linux only, 0 elsewhere."""
-    try:
-        if reset:
-            Path("/proc/self/clear_refs").write_text("5")
-        status = Path("/proc/self/status").read_text()
-    except OSError:
-        return 0
-    return int(status.split("VmHWM:")[1].split()[0]) << 10
+def samples(folder: Path) -> dict[Path, Read]:
+    """Write a small file of every kind below a folder; return the function that reads each as arrays."""
+    folder.mkdir(parents=True)
+    pixels = np.random.default_rng(0).integers(0, 256, (*SIZE, 3)).astype(np.uint8)
+    picture, depth = Image.fromarray(pixels), np.tile(np.linspace(20, 230, SIZE[1]).astype(np.uint8), (SIZE[0], 1))
+    readers: dict[Path, Read] = {}
+
+    def add(name: str, read: Read, data: bytes = b"") -> Path:
+        path = folder / name
+        path.write_bytes(data)
+        readers[path] = read
+        return path
+
+    for name, mode in (("a.jpeg", "RGB"), ("b.jpeg", "CMYK"), ("a.png", "P"), ("b.png", "1"), ("a.webp", "RGB")):
+        add(name, _photo, _saved(picture.convert(mode), name.split(".")[1].upper()))
+    for name, dtype in (("a.tif", "uint16"), ("a.exr", "half"), ("a.hdr", "float"), ("a.ppm", "uint8")):
+        write_image_file(add(name, _photo), pixels / np.float32(255), dtype)
+    photo, map_png = embedded_files.grey_photo(SIZE), embedded_files.picture(depth, "PNG")
+    gdepth = embedded_files.gdepth_segments(map_png, units="m")
+    add("gdepth.jpg", _with_depth, embedded_files.with_segments(photo, gdepth))
+    add("dynamic.jpg", _with_depth, embedded_files.dynamic_depth_jpeg(photo, map_png))
+    add("apple.jpg", _with_depth, embedded_files.apple_jpeg(photo, depth, 0.5, 2.0))
+    add("samsung.jpg", _with_depth, embedded_files.samsung_jpeg(photo, depth))
+    add("depth.heic", _with_depth, embedded_files.heic(np.resize(pixels, (64, 64, 3)), np.full((64, 64), 90, np.uint8)))
+    for name in ("map.pfm", "map.npy", "map.png"):
+        write_map(add(name, lambda path: [read_disparity(path, SIZE).values]), depth / np.float32(100))
+    for name in ("a_qs2x2a1.png", "a_SBS.png", "a_eslf.png"):
+        add(name, _views, _saved(picture, "PNG"))
+    add("a.mpo", _views, _saved(picture, "MPO", save_all=True, append_images=[picture]))
+    for layout in ("hci", "llff"):
+        (folder / layout).mkdir()
+        for number in range(4):
+            (folder / layout / f"input_Cam{number:03d}.png").write_bytes(_saved(picture, "PNG"))
+    cameras = "[extrinsics]\nnum_cams_x = 2\nnum_cams_y = 2\nbaseline_mm = 1.0\nfocus_distance_m = 0.0\n"
+    text = f"[intrinsics]\nfocal_length_mm = 100\nimage_resolution_x_px = 512\nsensor_size_mm = 35\n{cameras}"
+    add("hci/parameters.cfg", lambda path: _views(path.parent), text.encode())
+    pose = np.array([[0.0, 1, 0, 0, 17], [1, 0, 0, 0, 23], [0, 0, -1, 0, 30]])
+    rows = [[*(pose + np.outer([0, k, 0], [0, 0, 0, 1, 0])).ravel(), 1.0, 9.0] for k in range(4)]
+    np.save(add("llff/poses_bounds.npy", lambda path: _views(path.parent)), np.array(rows))
+    info = PngImagePlugin.PngInfo()
+    info.add_text("iibr:settings", settings_text(SavedSettings(Optics(), 1.0, Source(""), (64, 48))))
+    add("settings.png", lambda path: read_settings(path) and None, _saved(picture, "PNG", pnginfo=info))
+    add("mask.png", lambda path: read_mask(path) and None, _saved(picture, "PNG"))
+    kept = b'{"theme": "light", "font_scale": 1.25, "open_sections": ["view"], "window": [0, 0, 800, 600]}'
+    add("preferences.json", lambda path: load_preferences(AppState(), path.parent) and None, kept)
+    weights = resource_folder("assets") / "weights" / "ray_transformer.safetensors"
+    add("a.safetensors", lambda path: TrainedWeights(path) and None, weights.read_bytes())
+    return readers
+
+
+def _saved(picture: Image.Image, kind: str, **options: Any) -> bytes:
+    file = io.BytesIO()
+    picture.save(file, kind, **options)
+    return file.getvalue()
+
+
+def _photo(path: Path) -> list[np.ndarray]:
+    return [read_photo(path, MAX_PIXELS).pixels]
+
+
+def _with_depth(path: Path) -> list[np.ndarray]:
+    found = open_with_depth(path, max_pixels=MAX_PIXELS)
+    return [found.photo.pixels, found.disparity.values]
+
+
+def _views(path: Path) -> list[np.ndarray] | None:
+    scene = find_light_field(path)
+    return None if scene is None else [view.colors for view in read_views(scene)[1]]
+
+
+def damage(data: bytes, others: list[bytes], rng: Rng) -> bytes:
+    """Return data damaged in one of ten ways or in several. others: files of which parts may be copied into it."""
+    is_png = data.startswith(b"\x89PNG")
+    for _ in range(min(rng.geometric(0.5), 8)):
+        data = _damage_once(data, others, rng)[:MAX_BYTES]
+    return _repaired_png(data) if is_png and rng.random() < 0.5 else data
+
+
+def _damage_once(data: bytes, others: list[bytes], rng: Rng) -> bytes:
+    first = int(len(data) * rng.random() ** 2)  # rather near the beginning: headers come first
+    length, other = int(2 ** rng.uniform(0, 10)), others[rng.integers(len(others))]
+    head, middle, tail = data[:first], data[first : first + length], data[first + length :]
+    extreme, bit = EXTREMES[rng.integers(len(EXTREMES))], 1 << int(rng.integers(8))
+    at = int(rng.integers(len(other) + 1))
+    damages: tuple[Callable[[], bytes], ...] = (
+        lambda: head + bytes(byte ^ bit for byte in middle[:1]) + middle[1:] + tail,
+        lambda: head + extreme + data[first + len(extreme) :],
+        lambda: _with_other_number(data, rng),
+        lambda: head + other[at : at + length] + tail,
+        lambda: head,
+        lambda: head + tail,
+        lambda: head + bytes(len(middle)) + tail,
+        lambda: head + rng.bytes(length) + middle + tail,
+        lambda: head + middle * int(2 ** rng.uniform(1, 12)) + tail,
+        lambda: head + middle[::-1] + tail,
+    )
+    return damages[rng.integers(len(damages))]()
+
+
+def _with_other_number(data: bytes, rng: Rng) -> bytes:
+    """Replace a number that is written as text."""
+    places = [match.span() for match in re.finditer(rb"(?<![0-9A-Za-z+/])-?\d{1,12}(\.\d{1,12})?", data[:20_000])]
+    if not places:
+        return data
+    first, last = places[rng.integers(len(places))]
+    return data[:first] + NUMBERS[rng.integers(len(NUMBERS))] + data[last:]
+
+
+def _repaired_png(data: bytes) -> bytes:
+    """Return the chunks of a PNG with right lengths and checksums, so that damage gets past the first check."""
+    at, chunks = 8, [data[:8]]
+    while at + 8 <= len(data):
+        length, kind = int.from_bytes(data[at : at + 4], "big"), data[at + 4 : at + 8]
+        content = data[at + 8 : at + 8 + length]
+        chunks.append(struct.pack(">I", len(content)) + kind + content + struct.pack(">I", zlib.crc32(kind + content)))
+        at += 12 + length
+    return b"".join(chunks)
 
 
 if __name__ == "__main__":
-    start("benchmarks.fuzz", main)
+    main()

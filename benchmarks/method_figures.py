@@ -1,6 +1,6 @@
 """Makes the figures of docs/method.md from the demo photo, one for each step of the paper.
 
-    python -m benchmarks.method_figures --out DIR [--max-pixels N]
+    python -m benchmarks method-figures DIR [--max-pixels N]
 
 epi.png: an EPI of the light field. candidates.png: the source rays that land near one ray. weights.png: the weights of
 the ray transformer and of the closed form along a row. occlusion.png: covered share and entropy of a corner view.
@@ -9,7 +9,9 @@ inpainting.png: a hole before and after. ray_set.png: which views add rays.
 
 from __future__ import annotations
 
+import argparse
 import io
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -22,8 +24,8 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 from PIL import Image
 
-from benchmarks.harness.bench_scenes import BenchScene, photo_scene
-from benchmarks.harness.reports import parser_of, start
+from benchmarks.scenes import offsets_of
+from iibr_core.depth.search import PhotoWithDepth, open_with_depth
 from iibr_core.formats.images.photo import DEFAULT_MAX_PIXELS
 from iibr_core.formats.outputs import write_file
 from iibr_core.method.ambiguous_rays import find_ambiguous_rays
@@ -32,11 +34,13 @@ from iibr_core.method.closed_form import closed_form
 from iibr_core.method.look_up import look_up
 from iibr_core.method.occlusion import FULLY_COVERED, MIN_COVERED, view_entropy
 from iibr_core.method.photo_views import PhotoViews
+from iibr_core.method.plan import plan_for_viewing
 from iibr_core.method.ray_transformer import shipped_transformer
 from iibr_core.method.rays import RaySet
 from iibr_core.method.view import Renderer
+from iibr_core.runtime.resources import resource_folder
 from iibr_core.stages import stages_without
-from iibr_core.types import FloatImage, InputError, ViewOffset
+from iibr_core.types import FloatImage, ViewOffset
 
 PLACE = 0.58, 0.38, 0.20, 0.22
 """Left, top, width and height of the close-ups (the fork of the motorcycle), as shares of the picture."""
@@ -52,20 +56,20 @@ HOLE = 1.0, 0.0, 0.8
 NEAR_COLOR, FAR_COLOR, MARK = "#c2410c", "#1d4ed8", "#15803d"
 DPI = 110
 STYLE = {"font.size": 9, "axes.titlesize": 9, "axes.labelsize": 9, "xtick.labelsize": 8, "ytick.labelsize": 8}
-MAX_BYTES = 150_000
+DEMO = resource_folder("assets") / "motorcycle" / "motorcycle.png"
 
 
 class Steps:
     """The demo photo, the rays before anything was inpainted, and the views that complete them."""
 
-    def __init__(self, scene: BenchScene) -> None:
-        self.scene, self.corner = scene, ViewOffset(-scene.reach, -scene.reach)
-        self.beside = ViewOffset(0.0, float(scene.reach))
-        self.complete = PhotoViews(scene.photo, scene.disparity, scene.field)
-        self.photo_rays = PhotoViews(
-            scene.photo, scene.disparity, scene.field, stages_without(["share-inpainted"])
-        ).rays
-        self.height, self.width = scene.disparity.shape
+    def __init__(self, demo: PhotoWithDepth) -> None:
+        plan = plan_for_viewing(demo.photo, demo.disparity)
+        self.photo, self.disparity = demo.photo.pixels, plan.field_disparity(demo.disparity).values
+        field, self.reach = offsets_of(plan.grid), plan.grid.centre[0]
+        self.corner, self.beside = ViewOffset(-self.reach, -self.reach), ViewOffset(0.0, self.reach)
+        self.complete = PhotoViews(self.photo, self.disparity, field)
+        self.photo_rays = PhotoViews(self.photo, self.disparity, field, stages_without(["share-inpainted"])).rays
+        self.height, self.width = self.disparity.shape
 
     @property
     def place(self) -> tuple[slice, slice]:
@@ -74,35 +78,33 @@ class Steps:
         return slice(top, top + height), slice(left, left + width)
 
 
-def main() -> None:
-    parser = parser_of(__doc__, out={"required": True, "metavar": "DIR", "help": "folder to write to"})
-    parser.add_argument("--max-pixels", type=int, default=DEFAULT_MAX_PIXELS, help="of the photo")
-    options = parser.parse_args()
-    scene = photo_scene(max_pixels=options.max_pixels)
-    assert scene is not None
-    steps = Steps(scene)
+def main(words: Sequence[str] | None = None) -> None:
+    """Write all pictures into the folder."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--max-pixels", type=int, default=DEFAULT_MAX_PIXELS, help="size of the photo")
+    options = parser.parse_args(words)
+    steps = Steps(open_with_depth(DEMO, max_pixels=options.max_pixels))
     with rc_context(STYLE):
         for draw in (epi, candidates, weights, occlusion, inpainting, ray_set):
-            path = options.out / f"{draw.__name__}.png"
-            _write(path, draw(steps))
-            print(path)
+            _write(options.folder / f"{draw.__name__}.png", draw(steps))
 
 
 def epi(steps: Steps) -> Figure:
     """Draw a row of the photo and what it becomes in the views from left to right."""
     left, height, length = EPI_PLACE
     row, columns = int(height * steps.height), slice(int(left * steps.width), int((left + length) * steps.width))
-    reach = steps.scene.reach
+    reach = steps.reach
     offsets = [ViewOffset(0.0, float(s)) for s in np.linspace(-reach, reach, EPI_VIEWS)]
     lines = np.stack([view.colors[row, columns] for view in steps.complete.views(offsets)])
     figure, (photo, lower) = _figure(8.0, 4.6, 2, 1, height_ratios=(1.25, 1.0))
     around = slice(max(row - 60, 0), row + 61)
-    _show(photo, steps.scene.photo[around, columns], (columns.start, around.start))
+    _show(photo, steps.photo[around, columns], (columns.start, around.start))
     photo.axhline(row, color=MARK, linewidth=1.2)
     photo.set(title=f"The photo around row {row} (green)", ylabel="y, px")
     lower.imshow(np.clip(lines, 0, 1), extent=(columns.start - 0.5, columns.stop - 0.5, reach, -reach), aspect="auto")
     lower.set(title="EPI of that row: every ray of the photo draws a line", xlabel="x, px", ylabel="s, view steps")
-    shown = steps.scene.disparity[row, columns]
+    shown = steps.disparity[row, columns]
     for at, color in ((int(shown.argmax()), NEAR_COLOR), (int(shown.argmin()), FAR_COLOR)):
         x, d = columns.start + at, float(shown[at])
         lower.plot([x + d * reach, x - d * reach], [-reach, reach], "--", color=color, linewidth=1.4)
@@ -310,16 +312,13 @@ def _words(offset: ViewOffset) -> str:
 
 
 def _write(path: Path, figure: Figure) -> None:
-    """Write a PNG of at most 256 colours. Raises InputError if it is too large for a page."""
+    """Write a PNG of at most 256 colours."""
     buffer = io.BytesIO()
     figure.savefig(buffer, format="png", dpi=DPI)
-    small = io.BytesIO()
-    Image.open(buffer).convert("RGB").quantize(256).save(small, "png", optimize=True)
-    if small.tell() > MAX_BYTES:
-        raise InputError(f"{path}: {small.tell()} bytes, more than {MAX_BYTES}")
     with write_file(path) as unfinished:
-        unfinished.write_bytes(small.getvalue())
+        Image.open(buffer).convert("RGB").quantize(256).save(unfinished, "png", optimize=True)
+    print(path)
 
 
 if __name__ == "__main__":
-    start("benchmarks.method_figures", main)
+    main()

@@ -1,147 +1,131 @@
-"""The real window on a private X server: first picture, all views, dragging, idling.
+"""Time the real window on a private X server: first picture, all views, dragging, idling.
 
-python -m benchmarks.window [--apertures 0,4] [--idle 5] [--cold]
+    python -m benchmarks window [--idle 5] [--cold]
 
-A frame's time is that of the processor, in the thread that draws. --cold: as if the graphics driver had compiled no
-shader before.
-Dragged is with 60 pointer moves a second. Latency is counted from the turn of the loop that reads a pointer move to the
-frame that shows its viewpoint, both included.
+A frame's time is that of the processor, in the thread that draws. Drags make 60 pointer moves a second; latency is
+counted from the turn of the loop that reads a move to the frame that shows its viewpoint, both included. --cold: as if
+the graphics driver had compiled no shader before.
 """
 
 from __future__ import annotations
 
+import argparse
 import os
 import subprocess
-import sys
 import time
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
 
 import numpy as np
 import psutil
 
-from benchmarks.harness.bench_scenes import DEMO
-from benchmarks.harness.real_window import open_window, run_until_idle
-from benchmarks.harness.reports import emit, head, holds, parser_of, row, start
-from benchmarks.harness.turn_times import watched_turns
+from benchmarks.report import markdown
+from iibr_core.runtime.resources import resource_folder
 from iibr_core.scenes.scene import Source
 from iibr_core.types import ViewOffset
-from viewer.app.main_loop import App
+from tests.xvfb import private_display
+from viewer.app.main_loop import App, initial_state
+from viewer.model.actions import OpenPath
 from viewer.model.state.optics_actions import SetAperture
 
-MOVES = 150
-STEP_PX = 2
-EVERY_S = 1 / 60
-
-
-@dataclass(frozen=True)
-class Drag:
-    """Measurements of one drag.
-
-    latency_frames, latency_ms: of each viewpoint shown. draw_ms: of each picture. left_over: frames after the last move
-    until the picture had caught up.
-    """
-
-    latency_frames: list[int]
-    latency_ms: list[float]
-    draw_ms: list[float]
-    left_over: int
+DEMO = resource_folder("assets") / "motorcycle" / "motorcycle.png"
+APERTURES = (0, 4)
+MOVES, MOVE_S = 150, 1 / 60
+"""Number of pointer moves of a drag, and the time between two of them in seconds."""
 
 
 def main() -> None:
-    parser = parser_of(__doc__)
-    parser.add_argument("--apertures", default="0,4")
+    """Open the demo photo in a window and print the table."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--idle", type=float, default=5.0, help="seconds")
     parser.add_argument("--cold", action="store_true")
     options = parser.parse_args()
     if options.cold:
         os.environ["MESA_SHADER_CACHE_DISABLE"] = "true"
     began = time.perf_counter(), time.process_time()
-    with open_window(Source(str(DEMO))) as app:
-        emit(report(app, began, [float(aperture) for aperture in options.apertures.split(",")], options.idle))
+    with private_display():
+        app = App(initial_state(OpenPath(Source(str(DEMO)))))
+        try:
+            print(markdown(("what", "measured"), rows(app, began, options.idle)))
+        finally:
+            app.close()
 
 
-def report(app: App, began: tuple[float, float], apertures: list[float], idle_s: float) -> Iterator[str]:
-    """began: on the clock, and of processor time."""
-    view = app.scene_view
-    yield head("what", "figure", "measured", "holds")
-    with watched_turns(app) as turns:
-        while view.pictures_drawn == 0:
-            app.step()
-        first = time.perf_counter(), time.process_time()
-        torch = "torch" in sys.modules
-        yield row("first picture", "without torch", since(began), holds(not torch))
-        while view.views_uploaded < 2:
-            app.step()
-        yield row("second view, after it", "", since(first), "")
-        run_until_idle(app)
-    shown = f"{app.frames_shown} frames shown, {view.pictures_drawn} pictures drawn"
-    yield row(f"all {app.state.progress.total} views", "", f"{since(began)}, {shown}", "")
-    yield row("longest frame until then", "", f"{turns.longest}", "")
-    for aperture in apertures:
+def rows(app: App, began: tuple[float, float], idle_s: float) -> Iterator[tuple[str, str]]:
+    """Yield the rows of the table. began: times by the clock and of the processor."""
+    first = step_while(app, lambda: app.scene_view.pictures_drawn == 0)
+    yield "first picture", since(began)
+    rest = step_while(app, lambda: not is_idle(app))
+    pictures = f"{app.frames_shown} frames shown, {app.scene_view.pictures_drawn} pictures drawn"
+    yield f"all {app.state.progress.total} views", f"{since(began)}; {pictures}"
+    yield "longest frame until then", f"{1e3 * max(first, rest):.0f} ms of processor time"
+    for aperture in APERTURES:
         app.do(SetAperture(aperture))
-        run_until_idle(app)
-        yield drag_row(aperture, drag(app), app)
-        run_until_idle(app)
-    process, frames = psutil.Process(), app.frames_shown
-    before, rested = process.cpu_times(), time.perf_counter()
-    while time.perf_counter() - rested < idle_s:
-        app.step()
-    after, frames = process.cpu_times(), app.frames_shown - frames
+        step_while(app, lambda: not is_idle(app))
+        yield f"dragging, aperture of {aperture} view steps", drag(app)
+        step_while(app, lambda: not is_idle(app))
+    before, frames, rested = psutil.Process().cpu_times(), app.frames_shown, time.perf_counter()
+    step_while(app, lambda: time.perf_counter() - rested < idle_s)
+    after = psutil.Process().cpu_times()
     used = (after.user + after.system - before.user - before.system) / idle_s
-    yield row(f"idle for {idle_s:g} s", "no frames", f"{frames} frames, {used:.2%} of a core", holds(frames == 0))
+    yield f"idle for {idle_s:g} s", f"{app.frames_shown - frames} frames, {used:.2%} of a core"
+
+
+def step_while(app: App, is_wanted: Callable[[], bool]) -> float:
+    """Turn the loop while a condition holds; return the longest turn, in seconds of this thread's processor time."""
+    longest = 0.0
+    while is_wanted():
+        began = time.thread_time()
+        app.step()
+        longest = max(longest, time.thread_time() - began)
+    return longest
+
+
+def is_idle(app: App) -> bool:
+    """Return whether every view is on the screen and nothing is left to do."""
+    state = app.state
+    is_complete = state.progress.is_complete and state.shown_generation == state.generation
+    return is_complete and app.wait_s > 0 and app.scene_view.shows_all_views()
 
 
 def since(began: tuple[float, float]) -> str:
-    """began: on the clock, and of processor time."""
+    """Return the time since then in words. began: by the clock and of the processor."""
     return f"{time.perf_counter() - began[0]:.2f} s, {time.process_time() - began[1]:.2f} s of processor time"
 
 
-def drag(app: App) -> Drag:
-    """Drag to and fro over the picture and watch when what was read is shown."""
-    picture = app.layout().picture
-    assert picture is not None
-    x, y = round(picture.x + picture.width / 2), round(picture.y + picture.height / 2)
-    moves = [["mousemove", str(x), str(y), "mousedown", "1"]]
-    for k in range(MOVES):
-        to = x + STEP_PX * (abs((k + 30) % 120 - 60) - 30)
-        moves.append(["mousemove", str(to), str(y + k % 7), "sleep", f"{EVERY_S:.4f}"])
-    hand = subprocess.Popen(["xdotool", *(word for move in moves for word in move)])
+def drag(app: App) -> str:
+    """Drag to and fro over the picture; return latency and time of pictures in words."""
+    pointer = subprocess.Popen(["xdotool", *pointer_moves(app)])
     waiting: dict[ViewOffset, tuple[int, float]] = {}
-    frames, milliseconds, draws, turn = [], [], [], 0
-    while hand.poll() is None:
+    frames, latencies, pictures, turn = [], [], [], 0
+    while pointer.poll() is None:
         turn += 1
         eye, drawn, began = app.state.optics.eye, app.scene_view.pictures_drawn, time.perf_counter()
         app.step()
         shown = app.scene_view.picture_drawn
         if shown is not None and shown.optics.eye in waiting:
-            since, read_at = waiting[shown.optics.eye]
-            waiting = {other: read for other, read in waiting.items() if read[0] > since}
-            frames.append(turn - since + 1)
-            milliseconds.append((time.perf_counter() - read_at) * 1e3)
+            read_turn, read_at = waiting[shown.optics.eye]
+            waiting = {other: read for other, read in waiting.items() if read[0] > read_turn}
+            frames.append(turn - read_turn + 1)
+            latencies.append(1e3 * (time.perf_counter() - read_at))
         if app.scene_view.pictures_drawn > drawn:
-            draws.append(app.scene_view.renderer.report.draw_ms)
+            pictures.append(app.scene_view.renderer.report.draw_ms)
         if app.state.optics.eye != eye:
             waiting[app.state.optics.eye] = turn, began
-    left_over = 0
-    while app.scene_view.picture_drawn is None or app.scene_view.picture_drawn.optics.eye != app.state.optics.eye:
-        app.step()
-        left_over += 1
     subprocess.run(["xdotool", "mouseup", "1"], check=True)
-    return Drag(frames, milliseconds, draws, left_over)
+    times = (f"{np.median(ms):.0f} ms (90 %: {np.quantile(ms, 0.9):.0f})" for ms in (latencies, pictures))
+    return f"latency at most {max(frames)} frames, {', a picture '.join(times)}"
 
 
-def drag_row(aperture: float, seen: Drag, app: App) -> str:
+def pointer_moves(app: App) -> Iterator[str]:
+    """Yield the words of xdotool for a drag over the middle of the picture."""
     picture = app.layout().picture
     assert picture is not None
-    what = f"dragging, picture {picture.width:.0f}x{picture.height:.0f}, aperture {aperture:g}"
-    worst, latency, draws = max(seen.latency_frames), seen.latency_ms, seen.draw_ms
-    said = (
-        f"{worst} frames, {np.median(latency):.0f} ms (90 %: {np.quantile(latency, 0.9):.0f}); pictures"
-        f" {np.median(draws):.0f} ms (90 %: {np.quantile(draws, 0.9):.0f}); {seen.left_over} frames behind at the end"
-    )
-    return row(what, "latency <= 2 frames, no queue", said, holds(worst <= 2 and seen.left_over <= 2))
+    x, y = round(picture.x + picture.width / 2), round(picture.y + picture.height / 2)
+    yield from ("mousemove", str(x), str(y), "mousedown", "1")
+    for k in range(MOVES):
+        right = 2 * (abs((k + 30) % 120 - 60) - 30)
+        yield from ("mousemove", str(x + right), str(y + k % 7), "sleep", f"{MOVE_S:.4f}")
 
 
 if __name__ == "__main__":
-    start("benchmarks.window", main)
+    main()

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from benchmarks.stages import at_photo_size, network_map
+from benchmarks.scenes import network_like
 from iibr_core.depth.edges.map_alignment import lies_at_corners
 from iibr_core.depth.edges.refine import refine
 from iibr_core.formats.maps.resample import has_soft_edges, is_enlarged_smoothly, resample_map, without_repeats
@@ -83,13 +83,13 @@ def test_values_at_corners_come_out_where_they_were() -> None:
     np.testing.assert_allclose(found[:9, :12], plane[:9, :12], atol=1e-4)
 
 
-@pytest.mark.parametrize("make", [soft, lambda exact: network_map(exact, 1)])
+@pytest.mark.parametrize("make", [soft, lambda exact: network_like(exact, 1)])
 def test_refining_brings_small_maps_nearer_to_the_truth(make) -> None:
     """Over some scenes together: errors of more than a tenth of the range become much fewer."""
     before = after = 0.0
     for seed in range(4):
         photo, exact = drawn(seed)
-        values = at_photo_size(photo, make(exact))
+        values = resample_map(make(exact), SIZE)
         refined = refine(photo, values, is_enlarged=True)
         before += float((np.abs(values - exact) > 0.1 * np.ptp(exact)).mean())
         after += float((np.abs(refined - exact) > 0.1 * np.ptp(exact)).mean())

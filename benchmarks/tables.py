@@ -1,0 +1,179 @@
+"""Make the tables and pictures of README and docs/ again, each by one command: `make figures DATA=DIR MODEL=FILE`.
+
+    python -m benchmarks tables [--only NAME,...] [--data DATA] [--model FILE] [--list] [--check]
+
+TABLES lists them. What a program prints replaces the text between `<!-- NAME -->` and `<!-- /NAME -->` of the page,
+below a line with command and commit; the rest of the page stays. --check lists tables that are older than the code.
+"""
+
+from __future__ import annotations
+
+import argparse
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from importlib.util import find_spec
+from pathlib import Path
+
+from benchmarks.report import ROOT, git, markdown
+from iibr_core.types import InputError
+
+CODE = ("iibr_core", "viewer", "shaders")
+"""Folders whose changes make a table old."""
+COMMIT = re.compile(r"at commit (\w+)")
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table or a set of pictures.
+
+    page: file that holds the marks, "" for a program that writes files itself. command: words of a program, DATA and
+    MODEL for the folder of scenes and the network. minutes: on two slow cores.
+    """
+
+    name: str
+    page: str
+    command: str
+    minutes: float
+
+    @property
+    def needs(self) -> list[str]:
+        """Keys of NEEDS that the command needs."""
+        special = {"window": ["X"], "ablation": ["torch"]}
+        return [name for name in ("DATA", "MODEL") if name in self.command.split()] + special.get(self.name, [])
+
+
+NEEDS = {
+    "DATA": "scenes as `iibr evaluate` takes them: DATA=DIR",
+    "MODEL": "a depth network as an ONNX file: MODEL=FILE",
+    "X": "Xvfb and xdotool",
+    "torch": "torch: pip install '.[train]'",
+}
+ACCURACY = "docs/accuracy.md"
+EVERY_MAP = "exact,soft,resampled,phone"
+OTHERS = "'iibr,plain warp,ray march,dilated,softmax,32 planes'"
+TABLES = (
+    Table("views", "README.md", "compare --by scene --parts --data DATA", 1),
+    Table(
+        "photo-alone",
+        ACCURACY,
+        "compare --ways iibr,unchanged --maps exact,network,guess,plane --by scene --depth-model MODEL --data DATA",
+        3,
+    ),
+    Table("ways", ACCURACY, f"compare --ways {OTHERS} --data DATA --plot docs/ways.svg", 3),
+    Table("maps", ACCURACY, f"compare --ways 'iibr,iibr map,plain warp' --maps {EVERY_MAP} --drawn 4 --data DATA", 3),
+    Table("stages", ACCURACY, f"compare --ways 'iibr,iibr without' --against iibr --maps {EVERY_MAP} --data DATA", 6),
+    Table("disparity", ACCURACY, "disparity --data DATA", 3),
+    Table("guess", ACCURACY, "guess --data DATA", 1),
+    Table("window", ACCURACY, "window", 1),
+    Table("ablation", ACCURACY, "ablation --maps exact,soft --drawn 4 --data DATA", 6),
+    Table("free-views", ACCURACY, "free-views", 2),
+    Table("method", "", "method-figures docs/method", 1),
+    Table("pictures", "", "docs/make_pictures.py docs", 4),
+)
+
+
+def main() -> None:
+    """Make tables, or list them."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--only", default="", help="names of tables, by commas")
+    parser.add_argument("--data", type=Path, help=NEEDS["DATA"])
+    parser.add_argument("--model", type=Path, help=NEEDS["MODEL"])
+    parser.add_argument("--list", action="store_true", help="print the list and do nothing")
+    parser.add_argument("--check", action="store_true", help="print the tables that are older than the code")
+    options = parser.parse_args()
+    wanted = [table for table in TABLES if not options.only or table.name in options.only.split(",")]
+    if options.list:
+        rows = (
+            (table.name, table.page, f"`{table.command}`", ", ".join(table.needs), table.minutes) for table in wanted
+        )
+        print(markdown(("name", "page", "command", "needs", "minutes"), rows))
+    elif options.check:
+        print("\n".join(old_tables(wanted)) or "every table is as new as the code")
+    else:
+        given = {name: str(path.resolve()) for name, path in (("DATA", options.data), ("MODEL", options.model)) if path}
+        sys.exit(any([not write_table(table, given) for table in wanted]))
+
+
+def write_table(table: Table, given: Mapping[str, str], root: Path = ROOT) -> bool:
+    """Run the program and put its output into the page; print how it went, and return whether it did.
+
+    A table that this machine cannot make is named and stays. given: paths of DATA and MODEL.
+    """
+    missing = [NEEDS[need] for need in table.needs if not (need in given or _is_here(need))]
+    if missing:
+        print(f"{table.name}: not made; needs {', '.join(missing)}")
+        return True
+    began = time.monotonic()
+    try:
+        page = root / table.page
+        if table.page:
+            put_between(page.read_text("utf-8"), table.name, "")
+        text = _output(table, given)
+        if table.page:
+            line = f"Made by `{' '.join(_words(table))}` at commit {_commit()}."
+            page.write_text(put_between(page.read_text("utf-8"), table.name, f"{line}\n\n{text.strip()}"), "utf-8")
+    except InputError as error:
+        print(f"{table.name}: failed: {error}", flush=True)
+        return False
+    print(f"{table.name}: made in {(time.monotonic() - began) / 60:.1f} minutes", flush=True)
+    return True
+
+
+def _is_here(need: str) -> bool:
+    if need == "X":
+        return all(shutil.which(program) for program in ("Xvfb", "xdotool"))
+    return need == "torch" and find_spec("torch") is not None
+
+
+def _words(table: Table) -> list[str]:
+    """Return the command as a person would type it."""
+    return ["python", *(() if table.command.startswith("docs/") else ("-m", "benchmarks")), table.command]
+
+
+def _output(table: Table, given: Mapping[str, str]) -> str:
+    """Return what the program prints. Raises InputError if it fails."""
+    words = [given.get(word, word) for word in shlex.split(" ".join(_words(table)))]
+    run = subprocess.run([sys.executable, *words[1:]], cwd=ROOT, stdout=subprocess.PIPE, text=True, check=False)
+    if run.returncode:
+        raise InputError(f"the program ended with {run.returncode}")
+    return run.stdout
+
+
+def _commit() -> str:
+    """Return the short name of the present commit, and whether the code differs from it."""
+    is_changed = git("status", "--porcelain", "--untracked-files=no", "--", *CODE, "benchmarks")
+    return git("rev-parse", "--short", "HEAD") + (", with changes" if is_changed else "")
+
+
+def put_between(page: str, name: str, text: str) -> str:
+    """Return the page with a text between the marks of a name. Raises InputError unless it has both marks once."""
+    begin, end = f"<!-- {name} -->", f"<!-- /{name} -->"
+    if page.count(begin) != 1 or page.count(end) != 1:
+        raise InputError(f"the page does not hold {begin} and {end} once")
+    before, rest = page.split(begin)
+    return f"{before}{begin}\n{text}\n{end}{rest.split(end)[1]}"
+
+
+def old_tables(tables: list[Table], root: Path = ROOT) -> Iterator[str]:
+    """Yield a line for each table that names no commit, or one after which the code changed."""
+    for table in tables:
+        if not table.page:
+            continue
+        found = re.search(
+            f"<!-- {table.name} -->.*?<!-- /{table.name} -->", (root / table.page).read_text("utf-8"), re.DOTALL
+        )
+        commit = COMMIT.search(found[0]) if found else None
+        later = git("rev-list", "--count", f"{commit[1]}..HEAD", "--", *CODE) if commit else ""
+        if later != "0":
+            age = f"{later or 'an unknown number of'} commits behind" if commit else "names no commit"
+            yield f"{table.page}, {table.name}: {age}"
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,86 @@
+"""`make figures`: programs fill the marks of pages, and what people wrote around them stays."""
+
+from __future__ import annotations
+
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from benchmarks import __main__ as dispatch
+from benchmarks.compare import command_line
+from benchmarks.report import ROOT, git
+from benchmarks.scenes import MAPS
+from benchmarks.tables import NEEDS, TABLES, Table, old_tables, put_between, write_table
+from benchmarks.ways import chosen_ways
+from iibr_core.types import InputError
+
+PAGE = (
+    "# A page\n\nPeople wrote this.\n\n<!-- times -->\nMade by `x` at commit 0123456.\n<!-- /times -->\n\nAnd this.\n"
+)
+
+
+def test_a_table_is_put_between_its_marks(tmp_path: Path) -> None:
+    (tmp_path / "page.md").write_text(PAGE)
+    assert write_table(Table("times", "page.md", "tables --list --only window", 1), {}, tmp_path)
+    text = (tmp_path / "page.md").read_text()
+    commit = git("rev-parse", "--short", "HEAD")
+    assert f"<!-- times -->\nMade by `python -m benchmarks tables --list --only window` at commit {commit}" in text
+    assert "| window | docs/accuracy.md | `window` | X | 1 |\n<!-- /times -->\n\nAnd this.\n" in text
+    assert text.startswith("# A page\n\nPeople wrote this.\n")
+
+
+def test_a_program_that_fails_leaves_the_page(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "page.md").write_text(PAGE)
+    assert not write_table(Table("times", "page.md", "nothing", 1), {}, tmp_path)
+    assert not write_table(Table("absent", "page.md", "tables --list", 1), {}, tmp_path)
+    assert "<!-- absent -->" in capsys.readouterr().out
+    assert (tmp_path / "page.md").read_text() == PAGE
+
+
+def test_a_table_that_cannot_be_made_here_stays(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert write_table(Table("times", "page.md", "guess --data DATA", 1), {}, tmp_path)
+    assert NEEDS["DATA"] in capsys.readouterr().out
+
+
+def test_marks_stand_once() -> None:
+    assert "<!-- times -->\nnew\n<!-- /times -->" in put_between(PAGE, "times", "new")
+    for page, name in ((PAGE, "gone"), (PAGE + PAGE, "times")):
+        with pytest.raises(InputError, match=name):
+            put_between(page, name, "new")
+
+
+def test_old_tables_are_listed(tmp_path: Path) -> None:
+    table, page = Table("times", "page.md", "guess", 1), tmp_path / "page.md"
+    for commit, words in (("nothing", ["names no commit"]), ("0123456", ["an unknown number"]), ("HEAD", [])):
+        text = "" if commit == "nothing" else f"Made by `x` at commit {commit}."
+        page.write_text(put_between(PAGE, "times", text))
+        found = list(old_tables([table], tmp_path))
+        assert len(found) == len(words)
+        assert all(word in line for word, line in zip(words, found))
+
+
+def test_the_list_names_programs_that_are_there() -> None:
+    assert len({table.name for table in TABLES}) == len(TABLES)
+    for table in TABLES:
+        assert set(table.needs) <= NEEDS.keys()
+        program = table.command.split()[0].replace("-", "_")
+        assert program.startswith("docs/") or program in {*dispatch.programs(), "disparity"}
+        if program == "compare":
+            options = command_line().parse_args(shlex.split(table.command)[1:])
+            assert chosen_ways(options.ways)
+            assert {*options.maps.split(",")} <= {*MAPS, "network"}
+    assert sum(table.minutes for table in TABLES) <= 40
+    page = (ROOT / "benchmarks" / "README.md").read_text("utf-8")
+    assert all(f"| `{name.replace('_', '-')}" in page for name in {*dispatch.programs()} - {"multi_view_depth"})
+
+
+def test_programs_are_run_by_name() -> None:
+    words = [sys.executable, "-m", "benchmarks"]
+    run = subprocess.run([*words, "compare", "--help"], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert "--maps" in run.stdout
+    run = subprocess.run([*words, "nothing"], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert run.returncode == 2
+    assert "compare" in run.stderr
