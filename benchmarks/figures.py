@@ -65,7 +65,18 @@ EVALUATED = (
     "fence", "shelf",
 )  # fmt: skip
 """Scenes of DATA and tests/data/thin_lens with a page each."""
-GALLERY = "moving.gif", "near.jpg", "far.jpg", "rgbd.jpg", "anaglyph.jpg", "crossed.jpg", "epi.png"
+GALLERY = (
+    "moving.gif",
+    "near.jpg",
+    "far.jpg",
+    "rgbd.jpg",
+    "anaglyph.jpg",
+    "crossed.jpg",
+    "epi.png",
+    "edges.png",
+    "screenshot.png",
+    "inspection.png",
+)
 METHOD = "epi", "candidates", "weights", "occlusion", "inpainting", "ray_set"
 FIGURES = (
     Figure(
@@ -87,9 +98,7 @@ FIGURES = (
     Figure(("refocus.md#pictures",), "benchmarks.refocus --data DATA --apertures 6 --max-pixels 150000", 40, ("DATA",)),
     Figure(("web.md#pages",), "benchmarks.web --data DATA", 15, ("DATA", "chromium")),
     Figure(tuple(f"method/{name}.png" for name in METHOD), "benchmarks.method_figures --out OUT", 1),
-    Figure(("edges_fork.png", "edges_handlebar.png"), "docs/make_edges.py OUT", 0.5),
-    Figure(tuple(f"gallery/{name}" for name in GALLERY), "docs/make_gallery.py OUT", 3),
-    Figure(("screenshot.png", "inspection.png"), "docs/make_screenshots.py OUT", 0.5),
+    Figure(tuple(f"gallery/{name}" for name in GALLERY), "docs/make_pictures.py OUT", 4),
 )
 
 
