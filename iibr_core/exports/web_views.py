@@ -1,7 +1,7 @@
 """The views of a light field in a web page: their number, size, quality and container.
 
 Views differ little, so all lie in one moving picture (AVIF), one frame a view from the middle outwards: half the size
-of single files or less (docs/web.md). Disparity is stored the same way, in 8 bits.
+of single files or less. Disparity is stored the same way, in 8 bits.
 """
 
 from __future__ import annotations

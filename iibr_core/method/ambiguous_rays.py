@@ -24,7 +24,7 @@ from iibr_core.surfaces import SAME_SURFACE_PX
 from iibr_core.types import FloatImage, ViewOffset
 
 HYPOTHESES = 6
-"""K: the paper's 5 surfaces and the plain look-up. More take time and gain little (docs/speed.md)."""
+"""K: the paper's 5 surfaces and the plain look-up. More take time and gain little."""
 FAINT_WEIGHT = 0.02
 """Weight below which a surface on a ray is no hypothesis."""
 SEARCH_PX = 3

@@ -29,7 +29,7 @@ from iibr_core.types import (
 
 STEP_PX = 8.0
 """Largest parallax between neighbouring views for viewing, in pixels: the renderer interpolates along disparity. A
-quarter of the views costs a third of a decibel (docs/speed.md).
+quarter of the views costs a third of a decibel.
 """
 MAX_VIEWS_A_SIDE = 9
 STILL_PX = 0.5

@@ -1,0 +1,110 @@
+"""Make the pictures of docs/gallery from the demo photo, without a display: python docs/make_pictures.py OUT [NAMES]
+
+NAMES are file names of pictures; without them all are made. Commands of docs/gallery.md are run as they stand there.
+"""
+
+from __future__ import annotations
+
+import shlex
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import OpenImageIO as oiio
+
+from iibr_core.depth.choice import DepthChoice
+from iibr_core.depth.search import open_with_depth
+from iibr_core.evaluation.reference_warp import reference_warp
+from iibr_core.method.photo_views import PhotoViews
+from iibr_core.scenes.scene import Source
+from iibr_core.types import FloatImage, ViewOffset
+from viewer.app.headless import HeadlessViewer
+from viewer.model.actions import DismissNotice, SetHover
+from viewer.model.state.app_state import Hover
+from viewer.model.state.inspection import SetInspection, SetOverlay
+from viewer.model.state.optics_actions import ApertureShape, MoveEye, SetAperture, SetFocus, SetOptics
+from viewer.model.state.preferences import Section, with_sections
+
+ROOT = Path(__file__).parents[1]
+DEMO = ROOT / "assets" / "motorcycle" / "motorcycle.png"
+WINDOW = 1200, 760
+FORK, HANDLEBAR = np.s_[185:295, 430:590], np.s_[80:190, 340:500]
+"""Rows and columns of the close-ups in the outermost view."""
+
+
+def main() -> None:
+    """Make the pictures named on the command line."""
+    folder, names = Path(sys.argv[1]), sys.argv[2:]
+    makers = {"screenshot.png": screenshot, "inspection.png": inspection, "edges.png": edges}
+    lines = (ROOT / "docs" / "gallery.md").read_text("utf-8").splitlines()
+    commands = {Path(line).name: shlex.split(line) for line in lines if line.startswith("iibr ")}
+    for name in names or [*commands, *makers]:
+        if name in commands:
+            words = [*commands[name][1:-1], str(folder.resolve() / name), "--force"]
+            subprocess.run([sys.executable, "-P", "-m", "viewer", *words], cwd=ROOT, check=True)
+        else:
+            write(folder / name, makers[name]())
+        print(f"{folder / name}: {(folder / name).stat().st_size // 1000} kB", flush=True)
+
+
+def screenshot() -> FloatImage:
+    """Return the window: seen from the left, focused on the tank, wide open with seven blades."""
+    with HeadlessViewer() as viewer:
+        open_demo(viewer)
+        viewer.do(MoveEye(ViewOffset(0.5, -1.5)))
+        tank = pointer_on_tank(viewer)
+        blades = ApertureShape("polygon", blades=7)
+        viewer.do(SetFocus(tank.disparity), SetAperture(6.0), SetOptics("aperture_shape", blades))
+        viewer.do(DismissNotice(None), SetHover(tank))
+        return viewer.screen(WINDOW) / np.float32(255)
+
+
+def inspection() -> FloatImage:
+    """Return the window with disparity over the picture, EPIs through the pointer and values under it."""
+    with HeadlessViewer() as viewer:
+        open_demo(viewer, "inspect")
+        viewer.do(SetAperture(0.0), SetInspection("shows_epis", True), SetInspection("shows_values", True))
+        viewer.do(SetOverlay("disparity"), SetHover(pointer_on_tank(viewer)))
+        return viewer.screen(WINDOW) / np.float32(255)
+
+
+def open_demo(viewer: HeadlessViewer, *sections: Section) -> None:
+    """Open the demo photo with these sections of the panel open, and no others."""
+    viewer.open(Source(str(DEMO)))
+    preferences = replace(viewer.state.preferences, open_sections=with_sections((), *sections))
+    viewer.state = replace(viewer.state, preferences=preferences)
+
+
+def pointer_on_tank(viewer: HeadlessViewer) -> Hover:
+    """Return the pointer on the motorcycle's tank."""
+    scene = viewer.state.scene
+    assert scene is not None
+    x, y = 0.57 * scene.width, 0.42 * scene.height
+    return Hover(x, y, viewer.pick(x, y))
+
+
+def edges() -> FloatImage:
+    """Return two close-ups of an outermost view, side by side; from top to bottom: warp, unrefined map, refined map."""
+    outermost, steps = ViewOffset(0.0, 1.0), [ViewOffset(t, s) for t in (-1.0, 0.0, 1.0) for s in (-1.0, 0.0, 1.0)]
+    given, refined = open_with_depth(DEMO, DepthChoice(refine=False)), open_with_depth(DEMO)
+    photo, maps = given.photo.pixels, (given.disparity.values, refined.disparity.values)
+    views = [np.asarray(reference_warp(photo, maps[0], outermost).colors)]
+    views += [PhotoViews(photo, disparity, steps).view(outermost).colors for disparity in maps]
+    rows = [np.concatenate([view[FORK], view[HANDLEBAR]], axis=1) for view in views]
+    return np.concatenate(rows).repeat(2, axis=0).repeat(2, axis=1)
+
+
+def write(path: Path, colors: FloatImage) -> None:
+    """Write a PNG, compressed as far as possible."""
+    spec = oiio.ImageSpec(colors.shape[1], colors.shape[0], 3, "uint8")
+    spec.attribute("png:compressionLevel", 9)
+    picture = oiio.ImageBuf(spec)
+    picture.set_pixels(oiio.ROI(), np.ascontiguousarray(np.clip(colors, 0, 1), np.float32))
+    if not picture.write(str(path)):
+        raise SystemExit(f"{path}: {picture.geterror()}")
+
+
+if __name__ == "__main__":
+    main()
