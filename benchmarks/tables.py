@@ -58,7 +58,6 @@ ACCURACY = "docs/accuracy.md"
 EVERY_MAP = "exact,soft,resampled,phone"
 OTHERS = "'iibr,plain warp,ray march,dilated,softmax,32 planes'"
 TABLES = (
-    Table("views", "README.md", "compare --by scene --parts --data DATA", 1),
     Table(
         "photo-alone",
         ACCURACY,

@@ -66,6 +66,8 @@ def test_the_list_names_programs_that_are_there() -> None:
     assert len({table.name for table in TABLES}) == len(TABLES)
     for table in TABLES:
         assert set(table.needs) <= NEEDS.keys()
+        if table.page:
+            assert f"<!-- {table.name} -->" in (ROOT / table.page).read_text("utf-8")
         program = table.command.split()[0].replace("-", "_")
         assert program.startswith("docs/") or program in {*dispatch.programs(), "disparity"}
         if program == "compare":
