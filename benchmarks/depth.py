@@ -24,7 +24,7 @@ from iibr_core.depth.edges.refine import refine
 from iibr_core.depth.pictorial_cues import estimate_from_cues
 from iibr_core.depth.search import open_with_depth
 from iibr_core.evaluation.metrics import bounded_psnr
-from iibr_core.evaluation.reference_warp import reference_warp
+from iibr_core.evaluation.warp import reference_warp
 from iibr_core.method.photo_views import PhotoViews
 from iibr_core.training.degradation import blur
 from iibr_core.types import FloatImage, ImageSize, ViewOffset

@@ -11,6 +11,7 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
+from iibr_core.evaluation.lens_picture import read_lens_picture
 
 from benchmarks import fuzz_seeds as seeds
 from benchmarks.fuzz_damage import Seed, damage, repair_png
@@ -18,7 +19,6 @@ from iibr_core.depth.estimators import estimate_cache
 from iibr_core.depth.estimators.config import read_preparation
 from iibr_core.depth.estimators.transformers_models import KINDS
 from iibr_core.depth.search import open_with_depth
-from iibr_core.evaluation.lens_picture import read_lens_picture
 from iibr_core.formats.images.photo import read_photo
 from iibr_core.formats.light_fields.grids import read_grid
 from iibr_core.formats.light_fields.light_field_formats import find_light_field, open_light_field

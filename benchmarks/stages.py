@@ -32,10 +32,9 @@ from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.edges.map_alignment import lies_at_corners
 from iibr_core.depth.edges.refine import refine
 from iibr_core.depth.multi_view.estimate_disparity import estimate_disparity
-from iibr_core.evaluation.datasets import find_scenes, read_view
 from iibr_core.evaluation.metrics import bounded_psnr
-from iibr_core.evaluation.reference_warp import reference_warp
-from iibr_core.evaluation.trials import trial_input, trials_of
+from iibr_core.evaluation.scenes import find_scenes, read_view, trial_input, trials_of
+from iibr_core.evaluation.warp import reference_warp
 from iibr_core.formats.maps.resample import resample_map
 from iibr_core.method.photo_views import PhotoViews
 from iibr_core.stages import ALL_STAGES, STAGE_NAMES, Stages, stages_without

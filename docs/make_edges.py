@@ -14,7 +14,7 @@ import OpenImageIO as oiio
 
 from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.search import open_with_depth
-from iibr_core.evaluation.reference_warp import reference_warp
+from iibr_core.evaluation.warp import reference_warp
 from iibr_core.method.photo_views import PhotoViews
 from iibr_core.runtime.resources import resource_folder
 from iibr_core.types import FloatImage, ViewOffset

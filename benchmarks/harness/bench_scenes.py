@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 
 from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.search import open_with_depth
-from iibr_core.evaluation.datasets import find_scenes, read_view
-from iibr_core.evaluation.trials import Trial, trial_input, trials_of
+from iibr_core.evaluation.scenes import Trial, find_scenes, read_view, trial_input, trials_of
 from iibr_core.formats.images.photo import DEFAULT_MAX_PIXELS
 from iibr_core.formats.light_fields.light_field_formats import open_light_field
 from iibr_core.formats.light_fields.multi_view_scene import MultiView

@@ -24,7 +24,7 @@ from benchmarks.peers.scaling import pixel_lines, thread_lines
 from benchmarks.speed.variants import Variant, evaluated_views, field_cost
 from benchmarks.stages import judge_view
 from iibr_core.evaluation.metrics import flip, ssim
-from iibr_core.evaluation.reference_warp import reference_warp
+from iibr_core.evaluation.warp import reference_warp
 from iibr_core.formats.outputs import write_file
 from iibr_core.runtime.work import report_progress
 from iibr_core.stages import stages_without

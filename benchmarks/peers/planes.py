@@ -10,7 +10,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from iibr_core.evaluation.reference_warp import fill_holes
+from iibr_core.evaluation.warp import fill_holes
 from iibr_core.runtime.kernels import kernel
 from iibr_core.types import FloatImage, ViewOffset
 

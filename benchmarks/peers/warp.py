@@ -1,5 +1,5 @@
 """A plain warp: the nearest surface that lands on each pixel, its colour by OpenCV's bicubic look-up, holes filled from
-the nearest background. The steps of `iibr_core.evaluation.reference_warp`, which is written to be followed, and takes
+the nearest background. The steps of `iibr_core.evaluation.warp`, which is written to be followed, and takes
 three times as long: it looks up by a Lanczos kernel and warps to any camera.
 """
 
@@ -11,7 +11,7 @@ from math import floor
 import cv2
 import numpy as np
 
-from iibr_core.evaluation.reference_warp import NOWHERE, SAME_SURFACE, SAMPLES, fill_holes
+from iibr_core.evaluation.warp import NOWHERE, SAME_SURFACE, SAMPLES, fill_holes
 from iibr_core.runtime.kernels import kernel
 from iibr_core.types import FloatImage, ViewOffset, image_size
 

@@ -11,7 +11,7 @@ import numpy as np
 from benchmarks.harness.plots import Panel, on_the_front, plot_panels
 from benchmarks.harness.reports import holds, markdown, title
 from benchmarks.harness.timing import Cost
-from iibr_core.evaluation.tables import number
+from iibr_core.evaluation.report import number
 from iibr_core.formats.outputs import write_file
 
 FRONT_MARK = "●"

@@ -7,7 +7,7 @@ import pytest
 
 from benchmarks.peers import warp
 from benchmarks.peers.__main__ import PEERS
-from iibr_core.evaluation.reference_warp import NOWHERE, reference_warp
+from iibr_core.evaluation.warp import NOWHERE, reference_warp
 from iibr_core.training.degradation import blur
 from iibr_core.types import FloatImage, ViewOffset
 from tests.iibr_core.scenes import square_before_wall

@@ -27,8 +27,8 @@ from benchmarks.harness.timing import Cost, in_turns, make_field, median_cost, m
 from benchmarks.speed.__main__ import measure_scene
 from benchmarks.speed.speed_report import Bench, Figures, SpeedTarget, markdown_of, means, write_bench
 from benchmarks.speed.variants import VARIANTS
-from iibr_core.evaluation.datasets import read_scene
 from iibr_core.evaluation.metrics import psnr
+from iibr_core.evaluation.scenes import read_scene
 from iibr_core.runtime.work import watched
 from iibr_core.types import GridShape, ImageSize, ViewOffset, image_size
 from tests.iibr_core.known_scenes import HEIGHT, WIDTH, view_of_square, write_grid

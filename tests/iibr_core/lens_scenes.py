@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-
-from iibr_core.evaluation.datasets import read_scene
 from iibr_core.evaluation.lens_picture import LensPicture, read_lens_picture
+
+from iibr_core.evaluation.scenes import read_scene
 from iibr_core.formats.images.photo import read_photo
 from iibr_core.formats.light_fields.multi_view_scene import MultiView
 from iibr_core.types import (

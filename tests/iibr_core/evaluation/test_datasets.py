@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from iibr_core.evaluation.datasets import (
+from iibr_core.evaluation.evaluate import Options, evaluate
+from iibr_core.evaluation.scenes import (
     find_scenes,
     read_scene,
     read_straight_view,
     undo_rotation,
 )
-from iibr_core.evaluation.evaluate_scene import Options, evaluate
 from iibr_core.formats.images.picture_source import PictureSource
 from iibr_core.formats.images.write import write_image
 from iibr_core.formats.light_fields.multi_view_scene import KnownView, MultiView, nearest_view

@@ -12,20 +12,19 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from iibr_core.evaluation.report_folder import FILES, require_report_folder
+from iibr_core.evaluation.results import EvaluationResult
 from PIL import Image
 
 from iibr_core.color import quantise_as_stored
 from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.search import open_with_depth
 from iibr_core.evaluation import evaluation_report
-from iibr_core.evaluation.datasets import read_scene
-from iibr_core.evaluation.evaluate_scene import Options, evaluate
+from iibr_core.evaluation.evaluate import Options, evaluate
 from iibr_core.evaluation.metrics import flip, psnr, ssim
-from iibr_core.evaluation.reference_warp import reference_warp
-from iibr_core.evaluation.report_folder import FILES, require_report_folder
-from iibr_core.evaluation.results import EvaluationResult
-from iibr_core.evaluation.tables import ABOUT_CONSISTENCY
-from iibr_core.evaluation.trials import CENTRE_TRIAL, CORNER_TRIAL, trial_input, trials_of
+from iibr_core.evaluation.report import ABOUT_CONSISTENCY
+from iibr_core.evaluation.scenes import CENTRE_TRIAL, CORNER_TRIAL, read_scene, trial_input, trials_of
+from iibr_core.evaluation.warp import reference_warp
 from iibr_core.formats.images.photo import read_photo
 from iibr_core.formats.light_fields.multi_view_scene import MultiView
 from iibr_core.method.light_field import generate

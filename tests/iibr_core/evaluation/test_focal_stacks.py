@@ -12,18 +12,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from iibr_core.evaluation.focal_stacks import LENS, FocalStack, Focus, foci_of, lens_focus, weight_of, within
+from iibr_core.evaluation.lens_picture import read_lens_picture
+from iibr_core.evaluation.results import OURS, EvaluationResult
 from scipy.ndimage import map_coordinates
 
 from iibr_core.color import encoded_from_stored, linear_from_srgb, srgb_from_linear
 from iibr_core.depth.choice import DepthChoice
 from iibr_core.evaluation import evaluation_report
-from iibr_core.evaluation.datasets import read_scene
-from iibr_core.evaluation.evaluate_scene import Options, evaluate
-from iibr_core.evaluation.focal_stacks import LENS, FocalStack, Focus, foci_of, lens_focus, weight_of, within
-from iibr_core.evaluation.lens_picture import read_lens_picture
+from iibr_core.evaluation.evaluate import Options, evaluate
 from iibr_core.evaluation.metrics import psnr
-from iibr_core.evaluation.reference_warp import reference_warp
-from iibr_core.evaluation.results import OURS, EvaluationResult
+from iibr_core.evaluation.scenes import read_scene
+from iibr_core.evaluation.warp import reference_warp
 from iibr_core.method.light_field import generate
 from iibr_core.types import (
     Disparity,

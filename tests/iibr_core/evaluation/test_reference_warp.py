@@ -11,8 +11,8 @@ from scipy.ndimage import gaussian_filter
 from iibr_core.evaluation.alignment import fit_to_views
 from iibr_core.evaluation.consistency import LineView, consistency, disagreement, line_straightness
 from iibr_core.evaluation.metrics import psnr
-from iibr_core.evaluation.reference_warp import LOBES, SAMPLES, reference_warp, reference_warp_to
-from iibr_core.evaluation.trials import warp_disparity
+from iibr_core.evaluation.scenes import warp_disparity
+from iibr_core.evaluation.warp import LOBES, SAMPLES, reference_warp, reference_warp_to
 from iibr_core.method.view import View
 from iibr_core.types import ImageSize, ViewOffset
 from tests.iibr_core.known_scenes import (

@@ -11,10 +11,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from iibr_core.evaluation.focal_stacks import LENS, Focus, within
 
 from iibr_core.beyond.optics import Optics
 from iibr_core.color import stored_from_encoded
-from iibr_core.evaluation.focal_stacks import LENS, Focus, within
 from iibr_core.evaluation.metrics import psnr
 from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.method.light_field import generate
