@@ -11,7 +11,6 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
-from iibr_core.evaluation.lens_picture import read_lens_picture
 
 from benchmarks import fuzz_seeds as seeds
 from benchmarks.fuzz_damage import Seed, damage, repair_png
@@ -20,7 +19,6 @@ from iibr_core.depth.estimators.config import read_preparation
 from iibr_core.depth.estimators.transformers_models import KINDS
 from iibr_core.depth.search import open_with_depth
 from iibr_core.formats.images.photo import read_photo
-from iibr_core.formats.light_fields.grids import read_grid
 from iibr_core.formats.light_fields.light_field_formats import find_light_field, open_light_field
 from iibr_core.formats.light_fields.llff import read_llff
 from iibr_core.formats.light_fields.views import read_views
@@ -98,20 +96,6 @@ def _read_poses(path: Path) -> None:
     assert scene is None or all(np.isfinite(view.offset).all() for view in scene.views)
 
 
-def _view_and_lens(folder: Path) -> None:
-    (folder / "views").mkdir(exist_ok=True)
-    for path in (*(folder / "views" / f"v00_u0{u}.png" for u in range(2)), folder / "lens.png"):
-        path.write_bytes(seeds.by_pillow("PNG"))
-
-
-def _read_lens_picture(path: Path) -> None:
-    scene = read_grid(path.parent)
-    assert scene is not None
-    found = read_lens_picture(scene, MAX_PIXELS)
-    assert found is not None
-    assert np.isfinite([found.focus_disparity, found.radius_views]).all()
-
-
 def _read_preferences(path: Path) -> None:
     if load_preferences(AppState(), path.parent).notices:
         raise InputError("a notice says why")
@@ -148,7 +132,6 @@ READERS: dict[str, Reader] = {
     "cfg": Reader(seeds.cfgs, _read_field, _four_views),
     "view-files": Reader(seeds.view_files, _read_view_file),
     "poses": Reader(seeds.poses, _read_poses, _four_views),
-    "lens": Reader(seeds.lens_pictures, _read_lens_picture, _view_and_lens),
     "preferences": Reader(seeds.preferences, _read_preferences),
     "estimates": Reader(seeds.estimates, _read_estimate),
     "model-config": Reader(seeds.model_configs, _read_model_config),

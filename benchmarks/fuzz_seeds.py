@@ -235,11 +235,6 @@ def poses() -> list[Seed]:
     return [Seed("poses_bounds.npy", file.getvalue())]
 
 
-def lens_pictures() -> list[Seed]:
-    """Return the content of a data set's lens.json."""
-    return [Seed("lens.json", b'{"focus_disparity": -0.5, "radius_views": 2.0}')]
-
-
 def preferences() -> list[Seed]:
     """Return the files that the viewer keeps between two runs."""
     kept = {"theme": "light", "font_scale": 1.25, "open_sections": ["view"], "window": [0, 0, 800, 600]}

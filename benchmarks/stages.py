@@ -143,10 +143,11 @@ def _judge_drawn(seed: int, ways: Mapping[str, Way]) -> list[Judged]:
 
 def _judge_real(data: Path, place: int, ways: Mapping[str, Way]) -> list[Judged]:
     scene = list(find_scenes(data))[place]
-    trial = trials_of(scene, "auto", MOST_JUDGED)[0]
-    given = trial_input(trial, "auto", DepthChoice(), MOST_PIXELS)
+    trial = trials_of(scene, "given", MOST_JUDGED)[0]
+    given = trial_input(trial, "given", DepthChoice(), MOST_PIXELS)
     truth = {trial.offset(k): read_view(scene.views[k], MOST_PIXELS) for k in trial.judged}
-    own, known = given.maps[0], "exact" if given.maps[0].unknown is None else "measured"
+    own = next(iter(given.maps.values()))
+    known = "exact" if own.unknown is None else "measured"
     worse = {**_worse(own.values, place), NETWORK: at_photo_size(given.photo, network_map(own.values, place))}
     maps = {known: (own.values, own.unknown), **{kind: (v, None) for kind, v in worse.items()}}
     return [

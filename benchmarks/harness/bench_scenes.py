@@ -92,12 +92,14 @@ def data_scenes(data: Path | None, with_soft: bool = True) -> Iterator[BenchScen
 
 def bench_scenes(scene: MultiView, max_pixels: int, with_soft: bool = True) -> list[BenchScene]:
     """The scene with its own disparity, and with that made soft. Raises InputError where it has none or is no grid."""
-    trial = trials_of(scene, "auto", None)[0]
-    given = trial_input(trial, "auto", DepthChoice(), max_pixels)
+    trial = trials_of(scene, "given", None)[0]
+    given = trial_input(trial, "given", DepthChoice(), max_pixels)
     offsets = {index: trial.offset(index) for index in trial.judged}
     side = 2 * max(round(max(abs(part) for part in at)) for at in offsets.values()) + 1
     truth = {offsets[k]: read_view(scene.views[k], max_pixels) for k in _evenly_spaced(trial)}
-    own = BenchScene(scene.name, given.photo, given.maps[0].values, truth, offsets_of(GridShape(side, side)))
+    own = BenchScene(
+        scene.name, given.photo, next(iter(given.maps.values())).values, truth, offsets_of(GridShape(side, side))
+    )
     return [own, soften(own)] if with_soft else [own]
 
 

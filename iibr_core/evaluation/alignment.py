@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from functools import cached_property
 
 import numpy as np
 from scipy.optimize import minimize
@@ -35,7 +36,14 @@ class ViewFit:
         self._small_photo = _smaller(photo, self._step)
         self._small_truths = [(warp, _smaller(truth, self._step)) for warp, truth in truths]
         self._unit = self._small_photo.shape[1] / max(farthest, 1e-9)
-        self.plane = self._best_plane()
+
+    @cached_property
+    def plane(self) -> float:
+        """Disparity of the plane whose views are nearest to the true ones."""
+        flat = np.ones(self._small_photo.shape[:2])
+        best = min(PLANES, key=lambda shift: self._error(shift * flat))
+        found = minimize(lambda shift: self._error(shift * flat), [best], method="Nelder-Mead")
+        return float(found.x[0] * self._unit * self._step)
 
     def fitted(self, estimate: FloatImage) -> FloatImage:
         """Return the estimate (H, W) at its best scale and shift; unchanged where that is no nearer at full size."""
@@ -55,13 +63,6 @@ class ViewFit:
         ).x
         moved = np.asarray((far + (near - far) * share) * (self._unit * self._step), np.float32)
         return max((estimate, moved), key=self._psnr)
-
-    def _best_plane(self) -> float:
-        """Return the disparity of the plane whose views are nearest to the true ones."""
-        flat = np.ones(self._small_photo.shape[:2])
-        best = min(PLANES, key=lambda shift: self._error(shift * flat))
-        found = minimize(lambda shift: self._error(shift * flat), [best], method="Nelder-Mead")
-        return float(found.x[0] * self._unit * self._step)
 
     def _error(self, shift: FloatImage) -> float:
         """Return the mean difference of the small views, which holes mislead less than its square. shift: (h, w)."""

@@ -213,7 +213,7 @@ class _TrialRun:
 
     def _ways(self) -> Iterator[tuple[str, str, MakeView, float]]:
         """Yield all ways of making views: name, disparity, function, and consistency."""
-        photo, plane = self._given.photo, np.full_like(self._given.judge.values, self._given.plane)
+        photo, plane = self._given.photo, np.full_like(self._given.judge.values, self._given.fit.plane)
         yield PHOTO, "", lambda index: photo, math.nan
         yield PLANE, "", self._warp(plane), math.nan
         for kind, disparity in self._given.maps.items():

@@ -142,13 +142,13 @@ class TrialInput:
     """The start of a trial.
 
     photo: (H, W, 3), sRGB-encoded in 0..1. maps: disparities to make views with, by their kind. judge: (H, W), the
-    disparity that separates holes from what is visible. plane: disparity of the plane nearest to the true views.
+    disparity that separates holes from what is visible. fit: finds the plane, scale and shift nearest to true views.
     """
 
     photo: FloatImage
     maps: Mapping[str, Disparity]
     judge: Disparity
-    plane: float
+    fit: ViewFit
 
 
 def trial_input(trial: Trial, source: DisparityFrom | Path, choice: DepthChoice, max_pixels: int) -> TrialInput:
@@ -174,7 +174,7 @@ def trial_input(trial: Trial, source: DisparityFrom | Path, choice: DepthChoice,
             raise InputError(f"{view.path}: has no disparity map beside it; give --disparity estimate, or a file")
         maps = _with_fitted("given map", given, fit)
     judge = truth or next((found for kind, found in maps.items() if kind.endswith(FITTED)))
-    return TrialInput(photo, maps, judge, fit.plane)
+    return TrialInput(photo, maps, judge, fit)
 
 
 def _estimates(trial: Trial, choice: DepthChoice, max_pixels: int, fit: ViewFit) -> dict[str, Disparity]:
