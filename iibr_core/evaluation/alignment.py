@@ -35,7 +35,7 @@ class ViewFit:
         self._step = max(math.ceil(math.sqrt(photo[..., 0].size / FIT_PIXELS)), 1)
         self._small_photo = _smaller(photo, self._step)
         self._small_truths = [(warp, _smaller(truth, self._step)) for warp, truth in truths]
-        self._unit = self._small_photo.shape[1] / max(farthest, 1e-9)
+        self._unit = self._small_photo.shape[1] / farthest
 
     @cached_property
     def plane(self) -> float:
@@ -68,7 +68,7 @@ class ViewFit:
         """Return the mean difference of the small views, which holes mislead less than its square. shift: (h, w)."""
         disparity = np.asarray(shift * self._unit, np.float32)
         errors = [np.abs(warp(self._small_photo, disparity) - truth).mean() for warp, truth in self._small_truths]
-        return float(np.mean(errors)) if errors else 0.0
+        return float(np.mean(errors))
 
     def _psnr(self, disparity: FloatImage) -> float:
         return float(np.mean([bounded_psnr(warp(self._photo, disparity), truth) for warp, truth in self._truths]))

@@ -43,8 +43,6 @@ TRUTH, PHOTO, PLANE, WARP, OURS = "truth", "unchanged photo", "one plane", "plai
 """The true views, and ways of making views."""
 SAME_ROW = 0.05
 """Largest distance, in view steps, of the rows of views that make an EPI together."""
-EPI_LINE_PX = 8
-"""Height of each view's line in the picture of an EPI."""
 
 MakeView = Callable[[int], FloatImage]
 """Makes the view (H, W, 3) of an index of the scene."""
@@ -253,7 +251,7 @@ class _TrialRun:
         pictures = {f"The farthest view, {farthest.name}": shown}
         if len(lines) > 2:
             epi = np.stack([lines[s] for s in sorted(lines)])
-            pictures[f"EPI of pixel row {row}, leftmost view on top"] = np.repeat(epi, EPI_LINE_PX, axis=0)
+            pictures[f"EPI of pixel row {row}, leftmost view on top"] = np.repeat(epi, 8, axis=0)
         return _Look(figures, {**pictures, **stack.pictures()})
 
     def _timed(self, make: MakeView) -> Iterator[tuple[_View, FloatImage, float]]:

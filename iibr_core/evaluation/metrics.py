@@ -18,8 +18,6 @@ Image = FloatImage | NDArray[np.uint8]
 
 MAX_DB = 100.0
 """Largest PSNR in means and reports, that of equal pictures."""
-SSIM_WINDOW_PX = 11
-"""Width of SSIM's window; smaller pictures have no SSIM."""
 
 
 def psnr(image: Image, truth: Image, mask: Mask | None = None) -> float:
@@ -40,8 +38,8 @@ def bounded_psnr(image: Image, truth: Image, mask: Mask | None = None) -> float:
 
 
 def ssim(image: FloatImage, truth: FloatImage) -> float:
-    """Return the structural similarity (Wang et al. 2004) with a Gaussian window, mean over channels."""
-    if min(truth.shape[:2]) < SSIM_WINDOW_PX:
+    """Return the structural similarity (Wang et al. 2004), mean over channels; NaN for pictures below its window."""
+    if min(truth.shape[:2]) < 11:
         return math.nan
     from skimage.metrics import structural_similarity
 

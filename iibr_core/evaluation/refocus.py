@@ -37,9 +37,10 @@ class Focus:
         """Width of the picture's border that not all views show."""
         return math.ceil(abs(self.disparity) * (self.radius + 0.5)) + 2  # two for interpolation
 
-    def holds(self, offset: ViewOffset) -> bool:
-        """Return whether a view lies in the aperture; each view stands for a square of one view step."""
-        return math.hypot(*offset) <= self.radius + 0.5
+    def weight(self, offset: ViewOffset) -> float:
+        """Return the share of a view's square, one view step wide, that lies in the aperture."""
+        points = np.linspace(-0.5, 0.5, 17)
+        return float(np.mean(np.hypot.outer(offset.t + points, offset.s + points) <= self.radius))
 
 
 def foci_of(offsets: Sequence[ViewOffset], disparity: FloatImage) -> list[Focus]:
@@ -51,7 +52,7 @@ def foci_of(offsets: Sequence[ViewOffset], disparity: FloatImage) -> list[Focus]
     radius = float(min(-rows.min(), rows.max(), -columns.min(), columns.max()))
     percentiles = {"near": 95, "middle": 50, "far": 5}
     foci = [Focus(name, float(np.percentile(disparity, p)), radius) for name, p in percentiles.items()]
-    is_lens = radius >= 1 and sum(map(foci[0].holds, offsets)) >= MIN_VIEWS
+    is_lens = radius >= 1 and sum(foci[0].weight(offset) > 0 for offset in offsets) >= MIN_VIEWS
     return [focus for focus in foci if is_lens and min(disparity.shape) - 2 * focus.margin_px >= MIN_SIDE_PX]
 
 
@@ -67,8 +68,8 @@ class FocalStack:
     def add(self, offset: ViewOffset, view: FloatImage) -> None:
         """Add a view (H, W, 3), sRGB-encoded, if it lies in the aperture."""
         for focus, total in zip(self._foci, self._sums):
-            if focus.holds(offset):
-                total.add(offset, view)
+            if (weight := focus.weight(offset)) > 0:
+                total.add(offset, view, weight)
 
     def pictures(self) -> dict[str, FloatImage]:
         """Return the picture of each focus by its title, sRGB-encoded, cropped to what all views show."""

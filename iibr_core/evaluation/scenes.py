@@ -142,7 +142,7 @@ class TrialInput:
     """The start of a trial.
 
     photo: (H, W, 3), sRGB-encoded in 0..1. maps: disparities to make views with, by their kind. judge: (H, W), the
-    disparity that separates holes from what is visible. fit: finds the plane, scale and shift nearest to true views.
+    disparity that separates holes from visible parts. fit: finds the plane, scale and shift nearest to true views.
     """
 
     photo: FloatImage

@@ -23,6 +23,8 @@ SAME_SURFACE = 0.08
 """Largest difference of disparity (px per view step) between pixels of one surface, which is interpolated."""
 SIMILAR = 1.0
 """Largest difference of disparity (px per view step) from the farthest surface around a hole, which fills it."""
+MAX_REACH_PX = 120
+"""Largest distance of pixels that fill a hole."""
 NOWHERE = -1e30
 """Disparity of pixels on which nothing landed."""
 EIGHT = np.array([(1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (-1, 1), (1, -1), (-1, -1)])
@@ -126,9 +128,9 @@ def fill_holes(colors, hole, disparity):
             for k in range(8):
                 step_x, step_y = EIGHT[k]
                 u, v, length = x + step_x, y + step_y, 1
-                while 0 <= u < width and 0 <= v < height and hole[v, u]:
+                while length < MAX_REACH_PX and 0 <= u < width and 0 <= v < height and hole[v, u]:
                     u, v, length = u + step_x, v + step_y, length + 1
-                if not (0 <= u < width and 0 <= v < height):
+                if not (0 <= u < width and 0 <= v < height) or hole[v, u]:
                     continue
                 # The pixel at the very edge is mixed with the surface that hides the hole.
                 far_u, far_v = min(max(u + step_x, 0), width - 1), min(max(v + step_y, 0), height - 1)

@@ -7,7 +7,7 @@ import shlex
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, get_args
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -25,6 +25,9 @@ from viewer.cli.terminal import print_notes, show_progress
 if TYPE_CHECKING:
     from iibr_core.evaluation.evaluate import Options
     from iibr_core.evaluation.scenes import DisparityFrom
+
+WORDS: tuple[DisparityFrom, ...] = ("given", "estimate")
+"""Origins of disparity that are no file."""
 
 
 @dataclass(frozen=True)
@@ -129,13 +132,10 @@ def evaluate(
 
 def _disparity_source(text: str) -> DisparityFrom | Path:
     """Return the origin of disparity. Raises InputError if it is neither a word nor a file."""
-    from iibr_core.evaluation.scenes import DisparityFrom
-
-    words: tuple[DisparityFrom, ...] = get_args(DisparityFrom)
-    for word in words:
+    for word in WORDS:
         if text == word:
             return word
     path = Path(text)
     if not is_file(path):
-        raise InputError(f"--disparity {text}: is no file; give {', '.join(words)} or a disparity map")
+        raise InputError(f"--disparity {text}: is no file; give {', '.join(WORDS)} or a disparity map")
     return path

