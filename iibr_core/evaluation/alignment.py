@@ -35,7 +35,7 @@ class ViewFit:
         self._step = max(math.ceil(math.sqrt(photo[..., 0].size / FIT_PIXELS)), 1)
         self._small_photo = _smaller(photo, self._step)
         self._small_truths = [(warp, _smaller(truth, self._step)) for warp, truth in truths]
-        self._unit = self._small_photo.shape[1] / farthest
+        self._unit = self._small_photo.shape[1] / max(farthest, 1e-9)
 
     @cached_property
     def plane(self) -> float:

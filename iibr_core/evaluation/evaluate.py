@@ -6,7 +6,6 @@ Figures are those of the whole frame, of the part that the given view sees, and 
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import astuple, dataclass, field
 from pathlib import Path
@@ -68,7 +67,7 @@ class Options:
 
 @dataclass(frozen=True)
 class Figures:
-    """PSNR in dB of the frame, of what the given view sees, and of holes; SSIM, FLIP and LPIPS of the frame; time."""
+    """PSNR in dB of the frame, of what the given view sees, and of holes; SSIM, FLIP and LPIPS of the frame."""
 
     full_db: float
     visible_db: float
@@ -76,7 +75,6 @@ class Figures:
     ssim: float
     flip: float
     lpips: float
-    ms: float
 
 
 @dataclass(frozen=True)
@@ -242,7 +240,8 @@ class _TrialRun:
         farthest = max(self._views, key=lambda view: math.hypot(*view.offset))
         row = int(np.abs(np.diff(judge, axis=1)).sum(axis=1).argmax())  # its EPI crosses most depth edges
         figures, shown, lines, stack = {}, photo, {0.0: photo[row]}, FocalStack(self._foci, photo)
-        for view, image, distances in side_by_side(self._score, self._timed(make)):
+        made = ((view, quantise_as_stored(make(view.index))) for view in self._views)
+        for view, image, distances in side_by_side(self._score, made):
             figures[view.name] = distances
             stack.add(view.offset, image)
             shown = image if view is farthest else shown
@@ -254,19 +253,12 @@ class _TrialRun:
             pictures[f"EPI of pixel row {row}, leftmost view on top"] = np.repeat(epi, 8, axis=0)
         return _Look(figures, {**pictures, **stack.pictures()})
 
-    def _timed(self, make: MakeView) -> Iterator[tuple[_View, FloatImage, float]]:
-        """Yield the judged views with their made picture and its time in ms."""
-        for view in self._views:
-            start = time.perf_counter()
-            image = quantise_as_stored(make(view.index))
-            yield view, image, 1e3 * (time.perf_counter() - start)
-
-    def _score(self, made: tuple[_View, FloatImage, float]) -> tuple[_View, FloatImage, Figures]:
-        view, image, ms = made
+    def _score(self, made: tuple[_View, FloatImage]) -> tuple[_View, FloatImage, Figures]:
+        view, image = made
         truth = self._true_view(view.index)
         full, visible, hole = (bounded_psnr(image, truth, mask) for mask in (None, view.visible, view.hole))
         lpips = math.nan if self._lpips is None else self._lpips(image, truth)
-        return view, image, Figures(full, visible, hole, ssim(image, truth), flip(image, truth), lpips, ms)
+        return view, image, Figures(full, visible, hole, ssim(image, truth), flip(image, truth), lpips)
 
 
 def _mean(figures: Iterable[Figures]) -> Figures:

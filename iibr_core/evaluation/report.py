@@ -97,7 +97,6 @@ def figures_table(result: Result) -> Table:
         "LPIPS": [number(mean.lpips, 4) for mean in means],
         "consistency": [number(row.consistency, 2) for row in result.rows],
         **{f"{f.name} focus dB": [number(row.refocus_db[f.name], 2) for row in result.rows] for f in result.foci},
-        "ms a view": [number(mean.ms, 0) for mean in means],
     }
     known = {title: cells for title, cells in columns.items() if set(cells) != {"–"}}
     names = [row.name for row in result.rows]
