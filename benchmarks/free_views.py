@@ -18,7 +18,7 @@ from benchmarks.scenes import DRAWN_SIZE
 from iibr_core.beyond.free_cameras import FreeViews
 from iibr_core.beyond.free_view import target_from_photo
 from iibr_core.evaluation.metrics import bounded_psnr
-from iibr_core.evaluation.reference_warp import reference_warp_to
+from iibr_core.evaluation.warp import reference_warp_to
 from iibr_core.training.scenes.random_scene import random_scene
 from iibr_core.training.scenes.raycast import RaycastScene, render
 from iibr_core.types import Camera, FloatImage, ViewOffset

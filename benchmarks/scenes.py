@@ -5,6 +5,7 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import cv2
@@ -14,8 +15,8 @@ from benchmarks.report import is_wanted
 from iibr_core.color import stored_from_encoded
 from iibr_core.depth.choice import DepthChoice, DepthStart
 from iibr_core.depth.search import open_with_depth
-from iibr_core.evaluation.alignment import fit_to_views
-from iibr_core.evaluation.metrics import bounded_psnr
+from iibr_core.evaluation.alignment import ViewFit
+from iibr_core.evaluation.warp import reference_warp
 from iibr_core.formats.images.photo import read_picture
 from iibr_core.formats.images.write import write_image
 from iibr_core.formats.light_fields.light_field_formats import find_light_field
@@ -36,9 +37,7 @@ SOFT_PX = 2.0
 NETWORK_SIDE_PX = 224
 """Longer side of resampled maps: a small network's picture."""
 FITTED_VIEWS = 4
-"""Number of true views to which scale and shift of an estimate are fitted."""
-PLANE_PERCENTILES = (10, 30, 50, 70, 90)
-"""Percentiles of the exact disparity at which one plane is tried."""
+"""Number of true views to which a plane, and scale and shift of an estimate, are fitted."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,8 +156,7 @@ def at_photo_size(scene: Scene, small: FloatImage) -> Scene:
 def estimated_map(scene: Scene, start: DepthStart, model: Path | None = None) -> Scene:
     """Return the scene with a map estimated from the photo alone, at the best scale and shift for its true views."""
     estimate = estimate_disparity(scene.photo, start, model)
-    fitted = fit_to_views(scene.photo, estimate, list(scene.truth.items())[:FITTED_VIEWS])
-    return replace(scene, disparity=fitted, is_enlarged=start == "model")
+    return replace(scene, disparity=_fit_of(scene).fitted(estimate), is_enlarged=start == "model")
 
 
 def estimate_disparity(photo: FloatImage, start: DepthStart, model: Path | None = None) -> FloatImage:
@@ -172,19 +170,17 @@ def estimate_disparity(photo: FloatImage, start: DepthStart, model: Path | None 
 
 def plane_map(scene: Scene) -> Scene:
     """Return the scene with one plane, where it comes nearest to the true views."""
-    levels = [float(value) for value in np.percentile(scene.disparity, PLANE_PERCENTILES)]
-    best = max(levels, key=lambda level: _moved_psnr(scene, level))
-    return replace(scene, disparity=np.full_like(scene.disparity, best))
+    return replace(scene, disparity=np.full_like(scene.disparity, _fit_of(scene).plane))
 
 
-def _moved_psnr(scene: Scene, level: float) -> float:
-    """Return the mean PSNR (dB) of the photo moved as a plane at this disparity."""
-    errors = []
-    for at, truth in scene.truth.items():
-        move = np.float32([[1, 0, -level * at.s], [0, 1, -level * at.t]])
-        moved = cv2.warpAffine(scene.photo, move, truth.shape[1::-1], borderMode=cv2.BORDER_REPLICATE)
-        errors.append(bounded_psnr(moved, truth))
-    return float(np.mean(errors))
+def _fit_of(scene: Scene) -> ViewFit:
+    views = list(scene.truth.items())[:FITTED_VIEWS]
+    truths = [(partial(_warped, offset), truth) for offset, truth in views]
+    return ViewFit(scene.photo, truths, max(max(abs(offset.t), abs(offset.s)) for offset, _ in views))
+
+
+def _warped(offset: ViewOffset, photo: FloatImage, disparity: FloatImage) -> FloatImage:
+    return reference_warp(photo, disparity, offset).colors
 
 
 MAPS: dict[str, Callable[[Scene], Scene]] = {

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from benchmarks.scenes import Scene
 from iibr_core.depth.edges.refine import refine
-from iibr_core.evaluation.reference_warp import fill_holes
+from iibr_core.evaluation.warp import fill_holes
 from iibr_core.method.photo_views import PhotoViews
 from iibr_core.runtime.kernels import kernel
 from iibr_core.stages import ALL_STAGES, STAGE_NAMES, Stages, stages_without

@@ -16,7 +16,7 @@ import OpenImageIO as oiio
 
 from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.search import open_with_depth
-from iibr_core.evaluation.reference_warp import reference_warp
+from iibr_core.evaluation.warp import reference_warp
 from iibr_core.method.photo_views import PhotoViews
 from iibr_core.scenes.scene import Source
 from iibr_core.types import FloatImage, ViewOffset

@@ -15,7 +15,7 @@ PRELOADED = (
     "viewer.app.headless",
     "iibr_core.depth.search",
     "iibr_core.method.light_field",
-    "iibr_core.evaluation.evaluate_scene",
+    "iibr_core.evaluation.evaluate",
 )
 DEADLINE_S = 120.0
 NO_WINDOWS = ("DISPLAY", "WAYLAND_DISPLAY")

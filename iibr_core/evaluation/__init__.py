@@ -1,1 +1,1 @@
-"""How good and how fast: judged against light fields and stereo scenes whose views are known."""
+"""Comparison of generated views with the true views of light fields and stereo scenes."""

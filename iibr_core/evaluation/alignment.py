@@ -1,62 +1,82 @@
-"""Scale and shift that an estimated disparity leaves open, fitted to true views: what a better scale would be worth."""
+"""The plane, and the scale and shift of a map, that bring warped photos nearest to true views.
+
+Depth from one photo leaves scale and shift open; views compared at the best ones show how good its shape is.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import cached_property
 
 import numpy as np
 from scipy.optimize import minimize
 
-from iibr_core.evaluation.reference_warp import reference_warp
-from iibr_core.types import FloatImage, ViewOffset
+from iibr_core.evaluation.metrics import bounded_psnr
+from iibr_core.types import FloatImage
+
+Warp = Callable[[FloatImage, FloatImage], FloatImage]
+"""Makes one view (H, W, 3) of a photo (H, W, 3) with disparity (H, W)."""
 
 FIT_PIXELS = 12_000
-END_SHARES = (-0.08, -0.04, -0.02, -0.01, 0.0, 0.01, 0.02, 0.04, 0.08)
-"""How far the far and the near end move to the farthest view, in widths: what is tried first."""
-END_STEP = 0.005
-LEAST_ERROR = 1e-12
-"""Squared errors below count as this."""
+"""Size of the copies that are fitted, in pixels: a fit takes a hundred warps."""
+PLANES = np.linspace(-0.08, 0.08, 65)
+"""Shifts of the farthest view that are tried for the best plane, in picture widths."""
 
 
-def fit_to_views(
-    photo: FloatImage, estimate: FloatImage, truths: Sequence[tuple[ViewOffset, FloatImage]]
-) -> FloatImage:
-    """The estimate (H, W) scaled and shifted so that warping the photo (H, W, 3) comes nearest to true views
-    [(offset, (H, W, 3)), ...]. Found on small copies by the mean difference, which holes mislead less than its square;
-    the estimate stays as it is where its PSNR is higher at full size.
+class ViewFit:
+    """Fits disparity to true views [(warp, (H, W, 3)), ...] of a photo (H, W, 3), on small copies.
+
+    farthest: largest offset of the views, in view steps.
     """
-    low, high = (float(p) for p in np.percentile(estimate, (1, 99)))
-    farthest = max((max(abs(at.t), abs(at.s)) for at, _ in truths), default=0.0)
-    if not high > low or farthest == 0:
-        return estimate
-    share = (estimate - np.float32(low)) / np.float32(high - low)
-    step = max(math.ceil(math.sqrt(estimate.size / FIT_PIXELS)), 1)
-    small_photo, small_share = _smaller(photo, step), _smaller(share[..., None], step)[..., 0]
-    small_truths = [(at, _smaller(truth, step)) for at, truth in truths]
-    unit = small_photo.shape[1] / farthest
 
-    def error(ends: np.ndarray) -> float:
-        disparity = (ends[0] + (ends[1] - ends[0]) * small_share) * np.float32(unit)
-        warped = ((reference_warp(small_photo, disparity, at).colors, truth) for at, truth in small_truths)
-        return float(np.mean([np.abs(colors - truth).mean() for colors, truth in warped]))
+    def __init__(self, photo: FloatImage, truths: Sequence[tuple[Warp, FloatImage]], farthest: float) -> None:
+        self._photo, self._truths = photo, truths
+        self._step = max(math.ceil(math.sqrt(photo[..., 0].size / FIT_PIXELS)), 1)
+        self._small_photo = _smaller(photo, self._step)
+        self._small_truths = [(warp, _smaller(truth, self._step)) for warp, truth in truths]
+        self._unit = self._small_photo.shape[1] / max(farthest, 1e-9)
 
-    own = np.array([low, high]) / (unit * step)
-    start = min((own, *(np.array([far, near]) for far in END_SHARES for near in END_SHARES)), key=error)
-    around = start + np.array([[0, 0], [1, 0], [0, 1]]) * END_STEP
-    far, near = minimize(error, start, method="Nelder-Mead", options={"initial_simplex": around, "maxiter": 60}).x
-    fitted = np.asarray((far + (near - far) * share) * (unit * step), np.float32)
-    return min((estimate, fitted), key=lambda disparity: _error_db(photo, disparity, truths))
+    @cached_property
+    def plane(self) -> float:
+        """Disparity of the plane whose views are nearest to the true ones."""
+        flat = np.ones(self._small_photo.shape[:2])
+        best = min(PLANES, key=lambda shift: self._error(shift * flat))
+        found = minimize(lambda shift: self._error(shift * flat), [best], method="Nelder-Mead")
+        return float(found.x[0] * self._unit * self._step)
 
+    def fitted(self, estimate: FloatImage) -> FloatImage:
+        """Return the estimate (H, W) at its best scale and shift; unchanged where that is no nearer at full size."""
+        low, high = (float(p) for p in np.percentile(estimate, (1, 99)))
+        if not high > low:
+            return np.full_like(estimate, self.plane)
+        share = (estimate - np.float32(low)) / np.float32(high - low)
+        small = _smaller(share[..., None], self._step)[..., 0]
+        middle = self.plane / (self._unit * self._step)
+        # From the best plane the range opens to either side, whichever end is near.
+        simplex = middle + np.array([[0, 0], [-1, 1], [1, 1]]) * 0.01
+        far, near = minimize(
+            lambda ends: self._error(ends[0] + (ends[1] - ends[0]) * small),
+            simplex[0],
+            method="Nelder-Mead",
+            options={"initial_simplex": simplex, "maxiter": 100},
+        ).x
+        moved = np.asarray((far + (near - far) * share) * (self._unit * self._step), np.float32)
+        return max((estimate, moved), key=self._psnr)
 
-def _error_db(photo: FloatImage, disparity: FloatImage, truths: Sequence[tuple[ViewOffset, FloatImage]]) -> float:
-    """Mean over true views of the squared error of the warped photo, in decibels: what PSNR counts."""
-    errors = [((reference_warp(photo, disparity, at).colors - truth) ** 2).mean() for at, truth in truths]
-    return float(np.mean(10 * np.log10(np.maximum(errors, LEAST_ERROR))))
+    def _error(self, shift: FloatImage) -> float:
+        """Return the mean difference of the small views, which holes mislead less than its square. shift: (h, w)."""
+        disparity = np.asarray(shift * self._unit, np.float32)
+        errors = [np.abs(warp(self._small_photo, disparity) - truth).mean() for warp, truth in self._small_truths]
+        return float(np.mean(errors))
+
+    def _psnr(self, disparity: FloatImage) -> float:
+        return float(np.mean([bounded_psnr(warp(self._photo, disparity), truth) for warp, truth in self._truths]))
 
 
 def _smaller(image: FloatImage, step: int) -> FloatImage:
-    """Means (h, w, C) over blocks of step x step pixels of an image (H, W, C); what is left over is cut off."""
-    height, width = image.shape[0] // step * step, image.shape[1] // step * step
-    blocks = image[:height, :width].reshape(height // step, step, width // step, step, image.shape[2])
-    return np.asarray(blocks.mean(axis=(1, 3)), np.float32)
+    """Return means (h, w, C) over blocks of step x step pixels of an image (H, W, C), without the rest."""
+    height, width = max(image.shape[0] // step, 1), max(image.shape[1] // step, 1)
+    cut = image[: height * step, : width * step]
+    step_y, step_x = cut.shape[0] // height, cut.shape[1] // width
+    return np.asarray(cut.reshape(height, step_y, width, step_x, -1).mean(axis=(1, 3)), np.float32)

@@ -1,78 +1,66 @@
-"""LPIPS (Zhang et al. 2018) on AlexNet, from local files: the network of torchvision, the weights of its layers' errors
-of LPIPS 0.1. Ours: the lpips package (same figures, to the last digit) and torchmetrics both need torchvision.
+"""LPIPS (Zhang et al. 2018) on AlexNet, with weights from local files.
+
+The files are torchvision's AlexNet and the layer weights of LPIPS 0.1. The lpips package gives the same figures, but
+needs torchvision.
 """
 
 from __future__ import annotations
 
 import math
 import pickle
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import torch
-from torch import Tensor
-from torch.nn import functional
+from torch import Tensor, nn
 
-from iibr_core.formats.files import is_file, is_folder
+from iibr_core.formats.files import require_file
 from iibr_core.types import FloatImage, InputError
 
-LAYERS = (0, 3, 6, 8, 10)
-"""Numbers of AlexNet's convolutions in torchvision's file; a pooling before the second and the third."""
-POOLED = (3, 6)
-FIRST_STRIDE, MOST_PADDING = 4, 2
-"""The others go a pixel at a time; padding keeps the size, but for the first."""
-SHIFT, SCALE = (-0.030, -0.088, -0.188), (0.458, 0.448, 0.450)
-LEAST_PX = 64
-FILES = "torchvision's alexnet-owt-*.pth and LPIPS's alex.pth"
+FILES = "torchvision's alexnet-owt-7be5be79.pth and LPIPS's alex.pth"
+MIN_SIDE_PX = 64
+"""Smallest picture that the network takes."""
 
 
 class Lpips:
-    """Mean distance of two pictures, 0 = alike."""
+    """Mean distance of two pictures, 0 for equal ones."""
 
     def __init__(self, folder: Path) -> None:
-        """folder: holds FILES. Raises InputError, naming the file, where one is missing or something else."""
-        if not is_folder(folder):
-            raise InputError(f"{folder}: is not a folder; --lpips wants one with {FILES}")
-        backbone = next(iter(sorted(folder.glob("alexnet*.pth"))), folder / "alexnet-owt-7be5be79.pth")
-        kinds = ("weight", "bias")
-        names = [f"features.{number}.{kind}" for number in LAYERS for kind in kinds]
-        stored = _tensors(backbone, names)
-        self._convolutions = [(stored[2 * k], stored[2 * k + 1]) for k in range(len(LAYERS))]
-        self._shares = _tensors(folder / "alex.pth", [f"lin{k}.model.1.weight" for k in range(len(LAYERS))])
-        weights = stored[::2]
-        fits = all(tensor.ndim == 4 for tensor in (*weights, *self._shares))
-        if not fits or [weight.shape[0] for weight in weights] != [share.shape[1] for share in self._shares]:
-            both = f"{backbone.name} and alex.pth"
-            raise InputError(f"{folder}: {both} belong to different networks; --lpips wants a folder with {FILES}")
+        """Read the weights from a folder that holds FILES. Raises InputError."""
+        first, second = nn.Conv2d(3, 64, 11, 4, 2), nn.Conv2d(64, 192, 5, padding=2)
+        others = [nn.Conv2d(*channels, 3, padding=1) for channels in ((192, 384), (384, 256), (256, 256))]
+        layers: list[nn.Module] = [first, nn.ReLU(), nn.MaxPool2d(3, 2), second, nn.ReLU(), nn.MaxPool2d(3, 2)]
+        for convolution in others:
+            layers += [convolution, nn.ReLU()]
+        self._network = nn.Sequential(*layers)
+        self._shares = nn.ModuleList(nn.Conv2d(n, 1, 1, bias=False) for n in (64, 192, 384, 256, 256))
+        backbones = sorted(folder.glob("alexnet*.pth"))
+        _load(self._network, backbones[0] if backbones else folder / "alexnet-owt-7be5be79.pth", "features.{}".format)
+        _load(self._shares, folder / "alex.pth", lambda key: f"lin{key.replace('.', '.model.1.')}")
 
     def __call__(self, image: FloatImage, truth: FloatImage) -> float:
-        """Of (H, W, 3), sRGB-encoded in 0..1; NaN where they are too small for the network (below LEAST_PX)."""
-        if min(truth.shape[:2]) < LEAST_PX:
+        """Return the distance of pictures (H, W, 3), sRGB-encoded in 0..1; NaN below MIN_SIDE_PX."""
+        if min(truth.shape[:2]) < MIN_SIDE_PX:
             return math.nan
         with torch.no_grad():
-            pairs = zip(self._features(image), self._features(truth), self._shares)
-            return float(sum(functional.conv2d((one - two) ** 2, share).mean() for one, two, share in pairs))
-
-    def _features(self, image: FloatImage) -> list[Tensor]:
-        """What each layer sees, of unit length in every place."""
-        shift, scale = (torch.tensor(values).view(1, 3, 1, 1) for values in (SHIFT, SCALE))
-        x = (torch.from_numpy(np.ascontiguousarray(image.transpose(2, 0, 1)))[None] * 2 - 1 - shift) / scale
-        found = []
-        for number, (weight, bias) in zip(LAYERS, self._convolutions):
-            if number in POOLED:
-                x = functional.max_pool2d(x, 3, 2)
-            stride, padding = FIRST_STRIDE if number == 0 else 1, min(weight.shape[-1] // 2, MOST_PADDING)
-            x = functional.relu(functional.conv2d(x, weight, bias, stride, padding))
-            found.append(x / (x.square().sum(dim=1, keepdim=True).sqrt() + 1e-10))
-        return found
+            x = torch.from_numpy(np.stack([image, truth]).transpose(0, 3, 1, 2).astype(np.float32))
+            shift, scale = torch.tensor([[-0.030, -0.088, -0.188], [0.458, 0.448, 0.450]]).view(2, 1, 3, 1, 1)
+            x, distance, shares = (x * 2 - 1 - shift) / scale, 0.0, iter(self._shares)
+            for layer in self._network:
+                x = layer(x)
+                if isinstance(layer, nn.ReLU):
+                    one, two = x / (x.square().sum(dim=1, keepdim=True).sqrt() + 1e-10)
+                    distance += float(next(shares)((one - two) ** 2).mean())
+            return distance
 
 
-def _tensors(path: Path, names: list[str]) -> list[Tensor]:
-    if not is_file(path):
-        raise InputError(f"{path}: no such file; --lpips wants a folder with {FILES}")
+def _load(module: nn.Module, path: Path, stored_name: Callable[[str], str]) -> None:
+    """Load the weights of a module. stored_name: gives their names in the file."""
+    require_file(path)
     try:
-        stored = torch.load(path, map_location="cpu", weights_only=True)
-        return [stored[name].float() for name in names]
+        stored: dict[str, Tensor] = torch.load(path, map_location="cpu", weights_only=True)
+        module.load_state_dict({key: stored[stored_name(key)] for key in module.state_dict()})
     except (OSError, RuntimeError, KeyError, TypeError, AttributeError, EOFError, pickle.UnpicklingError) as error:
         reason = str(error).strip().partition("\n")[0][:100] or type(error).__name__
-        raise InputError(f"{path}: cannot be read ({reason}); --lpips wants a folder with {FILES}") from error
+        raise InputError(f"{path}: cannot be read ({reason}); --lpips needs a folder with {FILES}") from error

@@ -9,10 +9,10 @@ from typing import Any
 from numpy.typing import NDArray
 
 from iibr_core.color import encoded_from_stored
-from iibr_core.evaluation import evaluate_scene
-from iibr_core.evaluation.datasets import find_scenes
+from iibr_core.evaluation.evaluate import Options, Result
+from iibr_core.evaluation.evaluate import evaluate as evaluate_scene
 from iibr_core.evaluation.metrics import flip, psnr, ssim
-from iibr_core.evaluation.results import EvaluationResult
+from iibr_core.evaluation.scenes import find_scenes
 from iibr_core.runtime.extras import require_extra
 from iibr_core.runtime.work import ReportProgress, ShouldStop, ignore_progress, never, stoppable, watched
 from iibr_core.stages import ALL_STAGES, Stages
@@ -46,13 +46,12 @@ def evaluate(
     report_progress: ReportProgress = ignore_progress,
     stages: Stages = ALL_STAGES,
     **options: Any,
-) -> list[EvaluationResult]:
-    """Judge views against those of a data set: a folder of one scene, or of several, as `iibr evaluate` takes it.
+) -> list[Result]:
+    """Return the comparison of views with those of a data set: a folder of one scene, or of several.
 
-    stages: stages between map and view that are on. options: other fields of `evaluate_scene.Options`. Raises
-    InputError, and Cancelled once should_stop is true.
+    stages: stages between map and view that are on. options: other fields of `iibr_core.evaluation.evaluate.Options`.
+    Raises InputError, and Cancelled once should_stop is true.
     """
-    choices = evaluate_scene.Options(stages=stages, **options)
-    scenes = find_scenes(Path(folder))
+    choices = Options(stages=stages, **options)
     with stoppable(should_stop), watched(report_progress):
-        return [result for scene in scenes for result in evaluate_scene.evaluate(scene, choices)]
+        return [result for scene in find_scenes(Path(folder)) for result in evaluate_scene(scene, choices)]

@@ -7,7 +7,7 @@ import pytest
 
 from benchmarks.scenes import MAPS, Scene, drawn_scene, offsets_of, plane_map, with_map
 from benchmarks.ways import WAYS, chosen_ways, land
-from iibr_core.evaluation.reference_warp import reference_warp
+from iibr_core.evaluation.warp import reference_warp
 from iibr_core.training.degradation import blur
 from iibr_core.types import FloatImage, GridShape, ImageSize, InputError, ViewOffset
 from tests.iibr_core.scenes import square_before_wall

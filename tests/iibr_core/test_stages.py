@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from iibr_core.depth.edges.refine import refine
-from iibr_core.evaluation.evaluate_scene import Options
+from iibr_core.evaluation.evaluate import Options
 from iibr_core.method.photo_views import PhotoViews
 from iibr_core.stages import ALL_STAGES, STAGE_NAMES, Stages, stages_without
 from iibr_core.training.degradation import blur

@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from iibr_core.evaluation.datasets import read_known_disparity
 from iibr_core.formats.light_fields.light_field_formats import open_light_field
 from iibr_core.formats.light_fields.multi_view_scene import MultiView
+from iibr_core.formats.maps.disparity_file import read_disparity
 from iibr_core.formats.maps.pfm import write_pfm
 from iibr_core.types import GridShape, ImageSize, ViewOffset
-from tests.iibr_core.evaluation.test_datasets import offset_by_file, scene_of, write_picture
+from tests.iibr_core.evaluation.test_scenes import offset_by_file, scene_of, write_picture
 from tests.iibr_core.known_scenes import HEIGHT, WIDTH, write_numbered
 
 
@@ -67,7 +67,7 @@ def test_middlebury_pair_from_the_left(tmp_path: Path) -> None:
     scene = scene_of(folder)
     assert (scene.layout, scene.centre) == ("Middlebury pair", 0)
     assert offset_by_file(scene) == {"im0": (0, 0), "im1": (0, 1)}
-    known = read_known_disparity(scene.disparity[0], ImageSize(HEIGHT, WIDTH))
+    known = read_disparity(scene.disparity[0].path, ImageSize(HEIGHT, WIDTH), scene.disparity[0].scale)
     assert known.values[1, 1] == 7.5
     assert np.isfinite(known.values).all()
 
@@ -93,7 +93,7 @@ def test_middlebury_rows_store_four_steps_times_a_factor(
     assert [view.offset.s for view in scene.views] == list(range(count))
     assert list(scene.disparity) == list(truths)
     for known in scene.disparity.values():
-        values = read_known_disparity(known, ImageSize(4, width)).values
+        values = read_disparity(known.path, ImageSize(4, width), known.scale).values
         np.testing.assert_allclose(values, 120 / factor / 4, rtol=1e-5)
 
 

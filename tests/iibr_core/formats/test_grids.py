@@ -13,7 +13,7 @@ from iibr_core.formats.light_fields.light_field_formats import find_light_field,
 from iibr_core.formats.light_fields.views import read_views
 from iibr_core.formats.maps.pfm import write_pfm
 from iibr_core.types import GridShape, InputError
-from tests.iibr_core.evaluation.test_datasets import offset_by_file
+from tests.iibr_core.evaluation.test_scenes import offset_by_file
 from tests.iibr_core.known_scenes import disparity_of_square, offsets_of, write_grid, write_hci
 
 

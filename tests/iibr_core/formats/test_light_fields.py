@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from iibr_core.evaluation.datasets import read_scene
+from iibr_core.evaluation.scenes import read_scene
 from iibr_core.formats.light_fields.light_field_formats import open_light_field
 from iibr_core.formats.light_fields.views import disparity_range, read_stored_view, read_views
 from iibr_core.types import GridShape

@@ -5,7 +5,7 @@ import pytest
 
 from iibr_core.color import linear_from_srgb, srgb_from_linear
 from iibr_core.evaluation.metrics import bounded_psnr
-from iibr_core.evaluation.reference_warp import reference_warp
+from iibr_core.evaluation.warp import reference_warp
 from iibr_core.method import mixed_pixels
 from iibr_core.method.mixed_pixels import move_with_foreground, split_mixed_pixels
 from iibr_core.method.photo_views import PhotoViews

@@ -11,7 +11,7 @@ from scipy.ndimage import gaussian_filter, map_coordinates, zoom
 from iibr_core.color import linear_from_srgb, srgb_from_linear
 from iibr_core.depth.edges.refine import refine
 from iibr_core.evaluation.metrics import bounded_psnr
-from iibr_core.evaluation.reference_warp import reference_warp
+from iibr_core.evaluation.warp import reference_warp
 from iibr_core.method.photo_views import PhotoViews
 from iibr_core.stages import Stages
 from iibr_core.types import FloatImage, GridShape, ViewOffset

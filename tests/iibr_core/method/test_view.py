@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.ndimage import maximum_filter
 
 from iibr_core.color import linear_from_srgb, srgb_from_linear
-from iibr_core.evaluation.reference_warp import reference_warp
+from iibr_core.evaluation.warp import reference_warp
 from iibr_core.method.farthest_views import outer_views_of_grid, outpainting_margins
 from iibr_core.method.look_up import KEYS_A
 from iibr_core.method.mixed_pixels import move_with_foreground, split_mixed_pixels

@@ -14,13 +14,10 @@ import pytest
 
 from iibr_core.beyond.optics import Optics
 from iibr_core.color import stored_from_encoded
-from iibr_core.evaluation.focal_stacks import LENS, Focus, within
-from iibr_core.evaluation.metrics import psnr
 from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.method.light_field import generate
 from iibr_core.types import (
     Disparity,
-    FloatImage,
     ViewUpdate,
 )
 from tests.iibr_core.lens_scenes import GRID, NAMES, LensScene, lens_scene
@@ -57,19 +54,13 @@ def drawn_db(renderer: Renderer, scene: LensScene, field: Field, optics: Optics)
     for update in field.values():
         renderer.upload_view(update.row, update.column, update.colors, update.disparity)
     picture = renderer.converged_picture(RenderSettings(optics, (width, height)))
-    return db(picture.astype(np.float32) / np.float32(255), scene)
-
-
-def db(picture: FloatImage, scene: LensScene) -> float:
-    """Likeness of the part that all views see."""
-    focus = Focus(LENS, scene.lens.focus_disparity, scene.lens.radius_views)
-    return psnr(within(picture, focus), within(scene.lens.picture, focus))
+    return scene.lens_db(picture.astype(np.float32) / np.float32(255))
 
 
 def test_a_photo_refocuses_as_the_lens_does(renderer: Renderer, scene: LensScene, field: Field) -> None:
     made = drawn_db(renderer, scene, field, optics_of(scene))
     assert made > LEAST_DB[scene.scene.name]
-    assert made > db(scene.photo.pixels, scene) + 8
+    assert made > scene.lens_db(scene.photo.pixels) + 8
 
 
 def test_true_views_are_the_upper_reference(renderer: Renderer, scene: LensScene, field: Field) -> None:

@@ -1,0 +1,222 @@
+"""Whole evaluations of small scenes: figures, rows, hard cases, and reports that are complete."""
+
+from __future__ import annotations
+
+import base64
+import io
+import json
+import math
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from iibr_core.color import quantise_as_stored
+from iibr_core.depth.choice import DepthChoice
+from iibr_core.evaluation.evaluate import Options, Result, evaluate
+from iibr_core.evaluation.metrics import flip, psnr, ssim
+from iibr_core.evaluation.report import figures_table, json_of, render, summary_table, write_report
+from iibr_core.evaluation.scenes import CENTRE_TRIAL, CORNER_TRIAL, read_scene
+from iibr_core.evaluation.warp import reference_warp
+from iibr_core.formats.images.photo import read_photo
+from iibr_core.formats.images.write import write_image
+from iibr_core.formats.light_fields.multi_view_scene import MultiView
+from iibr_core.method.light_field import generate
+from iibr_core.method.photo_views import PhotoViews
+from iibr_core.runtime.work import Cancelled, stoppable
+from iibr_core.types import GridShape, ViewOffset
+from tests.iibr_core.evaluation.test_metrics import networks  # noqa: F401
+from tests.iibr_core.known_scenes import HEIGHT, WIDTH, disparity_of_square, view_of_square, write_grid
+from tests.iibr_core.lens_scenes import FOLDER
+from tests.iibr_core.scenes import by_index, disparity_of, literal_plan, photo_of
+
+WAYS = ["unchanged photo", "one plane", "plain warp, true map", "iibr, true map"]
+UNREFINED = DepthChoice(refine=False)
+
+
+def scene_of(folder: Path) -> MultiView:
+    scene = read_scene(folder)
+    assert scene is not None
+    return scene
+
+
+def full_db(result: Result) -> dict[str, float]:
+    return {row.name: row.mean.full_db for row in result.rows}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_grid(tmp_path_factory.mktemp("scenes") / "square")
+
+
+@pytest.fixture(scope="module")
+def results(folder: Path) -> list[Result]:
+    return evaluate(scene_of(folder), Options(choice=UNREFINED))
+
+
+def test_views_are_those_that_generate_makes() -> None:
+    photo, disparity = photo_of(view_of_square(ViewOffset(0.0, 0.0))), disparity_of(disparity_of_square())
+    grid = GridShape(5, 5)
+    made = by_index(list(generate(photo, disparity, literal_plan(photo, disparity, 5))))
+    offsets = {(v, u): grid.offset(v, u) for v, u in made if (v, u) != grid.centre}
+    views = PhotoViews(photo.pixels, disparity.values, offsets.values())
+    for index, offset in offsets.items():
+        shown = np.rint(255 * quantise_as_stored(views.view(offset).colors)).astype(np.uint8)
+        np.testing.assert_array_equal(shown, made[index].colors, err_msg=str(index))
+
+
+def test_both_trials_have_every_row(results: list[Result]) -> None:
+    centre, corner = results
+    assert [result.trial for result in results] == [CENTRE_TRIAL, CORNER_TRIAL]
+    for result in results:
+        assert [row.name for row in result.rows] == WAYS
+        assert result.size == (HEIGHT, WIDTH)
+    assert centre.given == "v01 u01"
+    assert set(centre.rows[0].views) == {f"v{v:02d} u{u:02d}" for v in range(3) for u in range(3)} - {"v01 u01"}
+    assert (corner.given, list(corner.rows[0].views)) == ("v02 u00", ["v00 u00"])
+    assert any("carried over" in note for note in corner.notes)
+
+
+def test_figures_are_those_of_the_files(folder: Path, results: list[Result]) -> None:
+    photo = read_photo(folder / "views/v01_u01.png").pixels
+    truth = read_photo(folder / "views/v00_u02.png").pixels
+    warped = reference_warp(photo, disparity_of_square(), ViewOffset(-1.0, 1.0))
+    rows = {row.name: row.views["v00 u02"] for row in results[0].rows}
+    for name, image in ((WAYS[0], photo), (WAYS[2], quantise_as_stored(warped.colors))):
+        figures = rows[name]
+        assert figures.full_db == pytest.approx(psnr(image, truth))
+        assert figures.visible_db == pytest.approx(psnr(image, truth, warped.visible))
+        assert figures.hole_db == pytest.approx(psnr(image, truth, warped.hole))
+        assert figures.ssim == pytest.approx(ssim(image, truth))
+        assert figures.flip == pytest.approx(flip(image, truth))
+        assert math.isnan(figures.lpips)
+
+
+def test_means_and_the_worst_view(results: list[Result]) -> None:
+    for row in results[0].rows:
+        full = {name: figures.full_db for name, figures in row.views.items()}
+        assert row.mean.full_db == pytest.approx(np.mean(list(full.values())))
+        assert row.worst_view == min(full, key=lambda name: full[name])
+        holes = [figures.hole_db for figures in row.views.values() if math.isfinite(figures.hole_db)]
+        assert row.mean.hole_db == pytest.approx(np.mean(holes))
+
+
+def test_depth_beats_one_plane_and_that_beats_nothing(results: list[Result]) -> None:
+    for result in results:
+        photo, plane, warp, ours = full_db(result).values()
+        assert photo < plane < min(warp, ours) - 5
+        assert math.isnan(result.rows[0].consistency)
+
+
+def test_an_estimate_is_compared_at_its_own_and_the_best_scale(folder: Path) -> None:
+    options = Options("estimate", DepthChoice(start="rough", refine=False), views=2)
+    found = full_db(evaluate(scene_of(folder), options)[0])
+    kinds = ("guess", "guess, fitted", "true map")
+    assert list(found) == WAYS[:2] + [f"{way}, {kind}" for kind in kinds for way in ("plain warp", "iibr")]
+    assert found["plain warp, guess"] <= found["plain warp, guess, fitted"] < found["plain warp, true map"]
+
+
+def test_smaller_pictures_have_disparity_to_match(folder: Path) -> None:
+    result = evaluate(scene_of(folder), Options(choice=UNREFINED, max_pixels=HEIGHT * WIDTH // 4, views=2))[0]
+    assert result.size == (HEIGHT // 2, WIDTH // 2)
+    assert full_db(result)["iibr, true map"] > full_db(result)["unchanged photo"] + 5
+
+
+def test_nan_in_a_true_view_and_in_the_map_give_finite_figures(tmp_path: Path) -> None:
+    folder = write_grid(tmp_path / "scene")
+    holed = view_of_square(ViewOffset(-1.0, -1.0)).copy()
+    holed[3:5, 7] = np.nan
+    (folder / "views/v00_u00.png").unlink()
+    write_image(folder / "views/v00_u00.exr", holed)
+    disparity = disparity_of_square()
+    disparity[::7] = np.nan
+    disparity[0, 0] = np.inf
+    np.save(folder / "gt_disp_u01_v01.npy", disparity)
+    result = evaluate(scene_of(folder), Options(choice=UNREFINED))[0]
+    for row in result.rows:
+        assert all(np.isfinite([of.full_db, of.ssim, of.flip]).all() for of in row.views.values())
+
+
+def test_views_of_one_pixel(tmp_path: Path) -> None:
+    (tmp_path / "dot" / "views").mkdir(parents=True)
+    for u, value in enumerate((0.2, 0.2, 0.7)):
+        write_image(tmp_path / "dot" / "views" / f"v00_u{u:02d}.png", np.full((1, 1, 3), value, np.float32))
+    np.save(tmp_path / "dot" / "gt_disp_u01_v00.npy", np.zeros((1, 1), np.float32))
+    (result,) = evaluate(scene_of(tmp_path / "dot"))
+    assert full_db(result)["unchanged photo"] == pytest.approx((100 + 20 * math.log10(255 / 128)) / 2, abs=0.2)
+    assert all(math.isnan(row.mean.ssim) for row in result.rows)
+    assert "nan" not in render("report.md", [result], "x")
+
+
+def test_stopping_ends_it(folder: Path) -> None:
+    with pytest.raises(Cancelled), stoppable(lambda: True):
+        evaluate(scene_of(folder), Options(choice=UNREFINED))
+
+
+def test_refocus_and_lpips_of_a_rendered_scene(networks: Path) -> None:  # noqa: F811
+    result = evaluate(scene_of(FOLDER / "fence"), Options(choice=UNREFINED, lpips=networks))[0]
+    photo, *_, ours = result.rows
+    assert list(ours.refocus_db) == ["near", "middle", "far"]
+    assert all(ours.refocus_db[name] > photo.refocus_db[name] + 3 for name in ours.refocus_db)
+    assert 0 < ours.mean.lpips < photo.mean.lpips
+    assert {"LPIPS", "near focus dB", "consistency"} <= set(figures_table(result).head)
+
+
+def test_the_json_holds_every_figure(results: list[Result]) -> None:
+    read = json.loads(json_of(results, "iibr evaluate x"), parse_constant=lambda name: pytest.fail(name))
+    assert read["command"] == "iibr evaluate x"
+    for result, stored in zip(results, read["results"], strict=True):
+        for row, stored_row in zip(result.rows, stored["rows"], strict=True):
+            assert stored_row["mean"]["full_db"] == row.mean.full_db
+            assert stored_row["mean"]["lpips"] is None
+            assert stored_row["views"].keys() == row.views.keys()
+
+
+def test_the_markdown_has_a_table_for_each_result(results: list[Result]) -> None:
+    text = render("report.md", results, "iibr evaluate x")
+    assert "nan" not in text
+    blocks = re.findall(r"(?m)(?:^\|.*\n)+", text)
+    assert len(blocks) == 1 + len(results)
+    for block in blocks:
+        assert len({line.count("|") for line in block.strip().splitlines()}) == 1
+    for way in WAYS:
+        assert len(re.findall(rf"(?m)^\| {way} \|", text)) == len(results)
+
+
+def test_the_page_needs_nothing_else(results: list[Result]) -> None:
+    text = render("page.html", results, "iibr <evaluate>")
+    assert "iibr &lt;evaluate&gt;" in text
+    assert not re.findall(r'(?:src|href)="(?!data:)|url\(|@import|<script|<link', text)
+    images = re.findall(r'alt="([^"]+)" src="data:image/\w+;base64,([^"]+)"', text)
+    titles = sum(len(result.pictures) for result in results)
+    assert titles == 5 + 1  # the farthest view of both trials; the EPI and three foci of the centre
+    assert len(images) == titles * (1 + 2 * len(WAYS))
+    for _, data in images:
+        Image.open(io.BytesIO(base64.b64decode(data))).load()
+
+
+def test_epis_of_the_truth_hold_the_rows_of_the_views(folder: Path, results: list[Result]) -> None:
+    (title,) = (title for title in results[0].pictures if title.startswith("EPI"))
+    row = int(re.findall(r"\d+", title)[0])
+    lines = [read_photo(folder / f"views/v01_u{u:02d}.png").pixels[row] for u in range(3)]
+    epi = results[0].pictures[title]["truth"]
+    np.testing.assert_array_equal(epi[:: len(epi) // 3], np.rint(255 * np.stack(lines)))
+
+
+def test_a_report_replaces_an_older_one(results: list[Result], tmp_path: Path) -> None:
+    out = tmp_path / "made" / "report"
+    write_report(out, results, "first")
+    write_report(out, results[:1], "second")
+    assert sorted(path.name for path in out.iterdir()) == ["index.html", "report.json", "report.md"]
+    assert "`second`" in (out / "report.md").read_text()
+
+
+def test_the_summary_takes_means_over_scenes(results: list[Result]) -> None:
+    other = replace(results[0], scene="other")
+    name, trial, _, *means = summary_table([*results, other]).rows[-1]
+    assert (name, trial) == ("mean of 2 scenes", CENTRE_TRIAL)
+    assert means == [f"{mean:.2f}" for mean in full_db(results[0]).values()]
+    assert len(summary_table(results).rows) == 2
