@@ -16,10 +16,10 @@ from iibr_core.formats.maps.disparity_file import has_shape_of, require_scale, r
 from iibr_core.formats.maps.reader import MapFile, read_map_file
 from iibr_core.types import InputError, Photo, image_size
 
-SPREAD_SHARE = 0.98
-"""Share of the greatest storable value that a map reaches if it was spread over a range: distances end lower.
+SPREAD_SHARES = {"floats": 0.98, "integers": 0.5, "colours": 0.0}
+"""Share of the greatest value, 1 for floats, that a map reaches if it was spread over a range: distances end lower.
 
-A 16-bit map of millimetres would reach 64 m.
+Depth cameras see less than 32 m, in millimetres of 16 bits.
 """
 
 
@@ -141,7 +141,7 @@ def _disparity(path: Path, found: MapFile, photo: Photo, choice: DepthChoice) ->
 
 def _is_spread(found: MapFile) -> bool:
     """Return whether the values were spread over a fixed range: 8 bits, a whole range of integers, 0..1, colours."""
-    if found.numbers != "floats" and found.largest <= 255:
+    if found.numbers == "integers" and found.largest <= 255:
         return True
-    known = found.values[np.isfinite(found.values)]
-    return bool(known.size and known.min() >= 0 and SPREAD_SHARE * found.largest <= known.max() <= found.largest)
+    known, least = found.values[np.isfinite(found.values)], SPREAD_SHARES[found.numbers] * found.largest
+    return bool(known.size and known.min() >= 0 and least <= known.max() <= found.largest)
