@@ -75,6 +75,8 @@ def orient_map(name: str, found: MapFile, photo: Photo, choice: DepthChoice, is_
         reason = "as asked"
     elif not reason.startswith("as said"):
         reason += "; --invert-depth turns it if that is wrong"
+        if found.numbers == "floats" and is_large_near:
+            reason += ", --metric if the values are distances"
     ends = ("black", "white") if found.numbers == "integers" else ("the low end", "the high end")
     near = ends[is_large_near != choice.inverts]
     note = f"In {name} {near} counts as near, {reason}."
