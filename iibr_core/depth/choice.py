@@ -1,4 +1,4 @@
-"""Where a photo's depth came from, in words for people, and where to begin looking for it. Light: no heavy imports."""
+"""The user's choices about depth, and the origin of a depth map in words. Imports nothing heavy."""
 
 from __future__ import annotations
 
@@ -6,12 +6,10 @@ from dataclasses import dataclass
 from typing import Literal
 
 DepthKind = Literal["file", "embedded", "model", "rough", "flat"]
-"""Where depth can come from, best first: a map beside the photo, the photo's own, a trained model, an estimate without
-one, none.
-"""
+"""Kinds of sources, best first: a map beside the photo, a map inside it, a trained model, a guess, no depth."""
 
 DepthStart = Literal["auto", "embedded", "model", "rough", "flat"]
-"""With what kind the search begins; "auto" is with a file. What fails is followed by the next, but for a model."""
+"""First kind of source that is tried; "auto" begins with a file."""
 
 BETTER_WAYS = (
     "Better: give a depth map with --disparity FILE, or a trained model with --depth-model "
@@ -21,40 +19,43 @@ BETTER_WAYS = (
 
 @dataclass(frozen=True)
 class DepthOrigin:
-    """Where the depth of a scene came from.
+    """Origin of the depth of a scene.
 
-    words: a name for it ("scene.pfm", "the photo itself (Google GDepth)"). failures: what was tried before and why it
-    was not used, a sentence each. advice: how to get better depth, "" where there is none to give. file: path of the
-    map, where it came from one. near: which end of its values was taken as near, "" where nothing says it.
+    words: name for people ("scene.pfm", "the photo itself (Google GDepth)"). failures: a sentence on each source that
+    was tried in vain. file: path of the map, None for other sources. near: end of the values that counts as near, ""
+    if the source defines it.
     """
 
     kind: DepthKind
     words: str
     failures: tuple[str, ...] = ()
-    advice: str = ""
     file: str | None = None
     near: str = ""
 
     @property
+    def advice(self) -> str:
+        """Return advice on better depth; "" if the depth is good."""
+        return BETTER_WAYS if self.kind in ("rough", "flat") else ""
+
+    @property
     def line(self) -> str:
-        """The same in one line."""
+        """Return the origin in one line."""
         return f"Depth: {self.words}."
 
     @property
     def advising_line(self) -> str:
-        """The same with the advice; "" where there is none to give."""
+        """Return the origin and the advice in one line; "" without advice."""
         return f"{self.line} {self.advice}" if self.advice else ""
 
 
 @dataclass(frozen=True)
 class DepthChoice:
-    """What the user decided about depth.
+    """The user's decisions about depth.
 
-    start: where the search begins. file: a map that must be used (a bad one is an error). file_scale: multiplies its
-    values, which are then px per view step; None: as the file has them. inverts: near and far change places, whatever
-    was found. is_metric: the map or the model gives distances. stretches: a map of another shape shows the whole photo.
-    model: a folder or a known model's name, None for the usual one if it is there. refine: how far disparity edges are
-    drawn to the photo's, 0 (not at all) to 1.
+    file: a map that must be used. file_scale: factor from its values to px per view step; None: not given. inverts:
+    near and far change places. is_metric: the map or the model gives distances. stretches: a map of another shape
+    shows the whole photo. model: a folder or a name, None for the usual one if it is there. refine: strength with
+    which disparity edges are drawn to the photo's, 0..1.
     """
 
     start: DepthStart = "auto"
@@ -68,5 +69,5 @@ class DepthChoice:
 
     @property
     def asks_for_model(self) -> bool:
-        """Whether nothing will do in its place where it cannot be used."""
+        """Return whether the user insists on a model."""
         return self.start == "model" or self.model is not None

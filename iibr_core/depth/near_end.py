@@ -1,7 +1,6 @@
-"""Evidence from the photo: which end of a map is near, whether the map is turned, whether its zeros are depth.
+"""Evidence from the photo on its map: which end is near, which way up the map lies, and whether zeros are depth.
 
-Files say this by conventions that contradict each other. A guess from the photo alone orders nearly all scenes rightly
-as a whole, however wrong it is in detail, and edges of depth lie on edges of the photo.
+Photo and map are compared at a small size. The picture's cues (`pictorial_cues`) order pixels by depth.
 """
 
 from __future__ import annotations
@@ -13,99 +12,81 @@ from iibr_core.depth.pictorial_cues import box_filter, estimate_from_cues, resiz
 from iibr_core.types import FloatImage, ImageSize, Photo
 
 COMPARED_PX = 160
-"""Photo and map are compared at this size."""
+"""Longer side of the compared pictures, in pixels."""
 SURE_CORRELATION = 0.25
 """Rank correlation of map and guess from which the photo decides: 0.44 was the least of 20 scenes with known depth."""
-LEAST_ALIGNED = 0.1
-"""By so much more have edges to correlate before a map counts as turned like the stored photo."""
-SMALLEST_ZERO_GAP = 0.03
-"""Zeros continue a map's values where the next ones lie nearer than this share of their range."""
-OPENING_SHARE = 0.02
-"""Radius in widths: what an opening by it leaves of the zeros is a large area."""
-LARGE_ZEROS, MOST_OF_ZEROS = 0.03, 0.5
-"""Large areas of zeros cover these shares of the picture, and of all zeros."""
+SMALL_SHARE = 0.03
+"""Share of the width, of the picture, or of the range of values below which a hole, an area or a gap is small."""
 
 
 def near_evidence(photo: FloatImage, values: FloatImage) -> float:
-    """How far the photo (H, W, 3), sRGB-encoded, says that larger values of its map (h, w) are nearer.
+    """Return how clearly the photo (H, W, 3), sRGB-encoded, shows that larger values of its map (h, w) are nearer.
 
-    Above 0: they look nearer; below: they look farther; beyond 1 and -1 it is sure. 0 where nothing can be said. Values
-    that are not finite are left out.
+    Above 0 they look nearer, below 0 farther; beyond 1 and -1 the answer is certain. Unknown values are left out.
     """
-    if not (photo.size and values.size):
-        return 0.0
-    size = _compared_size(photo)
-    small = resize_picture(np.clip(np.nan_to_num(photo), 0, 1), size)
-    guess = estimate_from_cues(Photo(small, float(size.width), "")).values
-    own = _sampled(values, size)
-    known = np.isfinite(own)
-    if known.sum() < 3:
-        return 0.0
-    ranks, guessed = _ranks(own[known]), _ranks(guess[known])
-    spread = float(ranks.std() * guessed.std())
-    if spread <= 0:
-        return 0.0
-    correlation = float(((ranks - ranks.mean()) * (guessed - guessed.mean())).mean()) / spread
-    return correlation / SURE_CORRELATION
+    small, sampled = _at_compared_size(photo, values)
+    guess = estimate_from_cues(Photo(small, float(small.shape[1]), "")).values
+    known = np.isfinite(sampled)
+    return _correlation(_ranks(sampled[known]), _ranks(guess[known])) / SURE_CORRELATION
 
 
 def is_better_turned(photo: FloatImage, values: FloatImage, turned: FloatImage) -> bool:
-    """Whether the edges of a map lie on those of the photo (H, W, 3) once it is turned, and not as it is."""
-    return _alignment(photo, turned) > _alignment(photo, values) + LEAST_ALIGNED
+    """Return whether the edges of a map fit those of the photo (H, W, 3) better once the map is turned."""
+    return _edge_correlation(photo, turned) > _edge_correlation(photo, values)
 
 
 def zeros_are_depth(values: FloatImage, is_zero: NDArray[np.bool_]) -> bool:
-    """Whether the zeros of a map of integers (h, w) are its farthest or nearest depth; else nothing is known there.
+    """Return whether the zeros of a map of integers (h, w) are its farthest or nearest depth, not unknown values.
 
-    They are depth where the other values go on to nearly 0, and where most of them form large areas, as sky does:
-    what sensors and matching leave out is scattered, or lies along edges. values: as stored.
+    They are depth if the other values reach down to nearly 0, and if most of them form large areas, such as sky:
+    sensors and matching leave out scattered pixels and lines along edges. values: as stored.
     """
     others = values[~is_zero & np.isfinite(values)]
     if not others.size:
         return False
     low, high = np.percentile(others, (0.5, 99.5))
-    if low <= SMALLEST_ZERO_GAP * high:
+    if low <= SMALL_SHARE * high:
         return True
-    radius = max(1, round(OPENING_SHARE * is_zero.shape[1]))
+    # Opening: only areas that hold a whole square survive.
+    radius = max(1, round(SMALL_SHARE * is_zero.shape[1] / 2))
     inner = box_filter(is_zero.astype(np.float32), radius) > 1 - 1e-4
     areas = is_zero & (box_filter(inner.astype(np.float32), radius) > 1e-6)
-    return bool(areas.mean() >= LARGE_ZEROS and areas.sum() >= MOST_OF_ZEROS * is_zero.sum())
+    return bool(areas.mean() >= SMALL_SHARE and 2 * areas.sum() >= is_zero.sum())
 
 
-def _compared_size(photo: FloatImage) -> ImageSize:
+def _at_compared_size(photo: FloatImage, values: FloatImage) -> tuple[FloatImage, FloatImage]:
+    """Return the photo made small, and the nearest values of the map."""
     height, width = photo.shape[:2]
     ratio = min(1.0, COMPARED_PX / max(height, width))
-    return ImageSize(max(round(height * ratio), 1), max(round(width * ratio), 1))
-
-
-def _sampled(values: FloatImage, size: ImageSize) -> FloatImage:
-    """The map's values nearest to the pixels of a picture of this size."""
-    rows, columns = (((np.arange(count) + 0.5) * own / count).astype(int) for count, own in zip(size, values.shape))
-    return np.asarray(values[rows[:, None], columns])
+    size = ImageSize(max(round(height * ratio), 1), max(round(width * ratio), 1))
+    rows, columns = (((np.arange(n) + 0.5) * side / n).astype(int) for n, side in zip(size, values.shape))
+    return resize_picture(np.clip(np.nan_to_num(photo), 0, 1), size), values[rows[:, None], columns]
 
 
 def _ranks(values: FloatImage) -> NDArray[np.float64]:
-    """Ranks of values (N,), equal ones sharing the middle of theirs."""
-    ordered = np.sort(values)
-    below, upto = np.searchsorted(ordered, values, "left"), np.searchsorted(ordered, values, "right")
-    return np.asarray((below + upto) / 2)
+    """Return the ranks of values (N,); equal values share the middle of theirs."""
+    _, places, counts = np.unique(values, return_inverse=True, return_counts=True)
+    return np.asarray((np.cumsum(counts) - counts / 2)[places])
 
 
-def _alignment(photo: FloatImage, values: FloatImage) -> float:
-    """Correlation of the strengths of edges of photo and map."""
-    if not (photo.size and values.size):
+def _correlation(first: NDArray[np.float64], second: NDArray[np.float64]) -> float:
+    """Return the correlation of values (N,); 0 if either is constant."""
+    if not first.size or not first.std() * second.std():
         return 0.0
-    size = _compared_size(photo)
-    small = resize_picture(np.clip(np.nan_to_num(photo), 0, 1), size)
-    own = _sampled(values, size)
-    own = np.where(np.isfinite(own), own, np.nanmedian(own) if np.isfinite(own).any() else 0)
-    pictured, mapped = (box_filter(_edge_strength(image), 1).ravel() for image in (small, own[..., None]))
-    spread = float(pictured.std() * mapped.std())
-    return float(((pictured - pictured.mean()) * (mapped - mapped.mean())).mean()) / spread if spread > 0 else 0.0
+    return float(np.corrcoef(first, second)[0, 1])
+
+
+def _edge_correlation(photo: FloatImage, values: FloatImage) -> float:
+    """Return the correlation of the edge strengths of photo and map."""
+    small, sampled = _at_compared_size(photo, values)
+    known = np.isfinite(sampled)
+    sampled = np.where(known, sampled, np.median(sampled[known]) if known.any() else 0)
+    first, second = (box_filter(_edge_strength(image), 1).ravel() for image in (small, sampled[..., None]))
+    return _correlation(first.astype(np.float64), second.astype(np.float64))
 
 
 def _edge_strength(image: FloatImage) -> FloatImage:
-    """(H, W): how much an image (H, W, C) without its finest texture changes from pixel to pixel, up to a limit."""
+    """Return the change from pixel to pixel (H, W) of an image (H, W, C) without its finest texture, up to a limit."""
     smooth = box_filter(box_filter(image, 1), 1)
     down, across = (np.diff(smooth, axis=axis, append=smooth.take([-1], axis)) for axis in (0, 1))
     strength = np.sqrt((down**2 + across**2).sum(axis=2))

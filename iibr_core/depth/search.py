@@ -1,81 +1,67 @@
-"""Decides where a photo's disparity comes from: a file, the photo itself, a trained model, a rough estimate; in this
-order, and says so. What fails is followed by the next; only a file or a model that the user asked for must be good.
+"""Find the disparity of a photo: in a file, in the photo itself, by a model, or by a guess; in this order.
+
+If a source fails, the next one is tried and a note names the failure. A file or a model that the user names must be
+good: otherwise InputError is raised.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
-from contextlib import suppress
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Literal, get_args
 
 import numpy as np
 
-from iibr_core.depth.choice import BETTER_WAYS, DepthChoice, DepthKind, DepthOrigin
+from iibr_core.depth.choice import DepthChoice, DepthKind, DepthOrigin
 from iibr_core.depth.edges.map_alignment import lies_at_corners
 from iibr_core.depth.edges.refine import refine
 from iibr_core.depth.embedded.embedded_depth import read_embedded
 from iibr_core.depth.embedded.picture import photo_in_focus, rotate_estimate
 from iibr_core.depth.embedded.unread import unread_parts
-from iibr_core.depth.estimate import DepthEstimate, disparity_from, inverse_metres_over
+from iibr_core.depth.estimate import DepthEstimate, disparity_from
 from iibr_core.depth.estimators.catalog import is_meaning_known, model_to_use
 from iibr_core.depth.estimators.estimate_depth import estimate_with
-from iibr_core.depth.map_file import (
-    depth_beside_picture,
-    depth_from_channel,
-    depth_from_file,
-    depth_of_model,
-    depth_of_picture,
-    turned_estimate,
-)
+from iibr_core.depth.map_file import as_estimate, depth_from_file, orient_map
 from iibr_core.depth.pictorial_cues import estimate_from_cues
-from iibr_core.depth.sidecar import find_sidecar, flat_disparity, sidecars_of
+from iibr_core.depth.sidecar import find_sidecars
 from iibr_core.depth.stereo_pair import estimate_from_pair
 from iibr_core.formats.images.decode import read_orientation
 from iibr_core.formats.images.photo import DEFAULT_MAX_PIXELS, read_photo
+from iibr_core.formats.images.rgbd import rgbd_parts
 from iibr_core.formats.maps.disparity_file import filling_note, map_at_size
+from iibr_core.formats.maps.reader import MapFile, read_depth_channel, read_map_picture
 from iibr_core.formats.maps.resample import is_enlarged_smoothly, without_repeats
 from iibr_core.inpainting.disparity_by_color import fill_disparity_by_color
 from iibr_core.inpainting.registry import EstimateDepth
 from iibr_core.runtime.work import raise_if_stopped, report_progress
-from iibr_core.types import (
-    Disparity,
-    FloatImage,
-    GridShape,
-    InputError,
-    Photo,
-)
+from iibr_core.types import Disparity, FloatImage, GridShape, InputError, Photo
 
 USUAL_GRID = GridShape(9, 9)
-"""What estimates without a scale are made to suit where the grid is not yet known."""
+"""Grid of views that depth without a scale is made for while the real one is unknown."""
 GUESS_SHARE = 0.6
-"""Of the usual parallax, for guessed depth: what is wrong moves less."""
-NOT_USED: dict[DepthKind, str] = {
-    "file": "The map beside the photo was not used",
-    "embedded": "The photo's own depth was not used",
-    "model": "The depth model was not used",
-    "rough": "Depth could not be guessed",
+"""Share of the usual parallax that guessed depth gets: errors then move less."""
+SUBJECTS: dict[DepthKind, str] = {
+    "file": "The map beside the photo",
+    "embedded": "The photo's own depth",
+    "model": "The depth model",
+    "rough": "The guess",
 }
+"""Subjects of the sentence about a source that fails."""
+
+SlowSource = Literal["pair", "model"]
+"""Sources that take long: matching two views, and a model."""
+Source = tuple[DepthKind, Callable[[], "PhotoWithDepth | None"]]
 
 
 @dataclass(frozen=True, eq=False)
 class PhotoWithDepth:
-    """A photo, its disparity at the same size, and where that came from."""
+    """A photo, its disparity at the same size, and the origin of the disparity."""
 
     photo: Photo
     disparity: Disparity
     origin: DepthOrigin
-
-
-@dataclass(frozen=True, eq=False)
-class _FoundDepth:
-    """What one source gave: an estimate of any kind and size. photo: the one to show with it."""
-
-    photo: Photo
-    origin: DepthOrigin
-    depth: DepthEstimate
-    notes: tuple[str, ...] = ()
 
 
 def open_with_depth(
@@ -83,85 +69,54 @@ def open_with_depth(
     choice: DepthChoice | None = None,
     max_pixels: int = DEFAULT_MAX_PIXELS,
     grid: GridShape | None = None,
-    asks_model: bool = True,
+    skipped: Collection[SlowSource] = (),
 ) -> PhotoWithDepth:
-    """Read a photo and find its disparity; every photo gets one. asks_model: else a guess takes a model's place, which
-    `ask_model` may replace later.
-
-    A photo that the camera blurred is replaced by the sharp picture beside it, where its own depth comes with one.
-    Raises InputError for a bad photo, for a bad file or model that `choice` names, and where it asks for a model and
-    there is none; Cancelled.
-    """
-    choice, path = choice or DepthChoice(), Path(path)
-    photo = read_photo(path, max_pixels, keeps_primaries=True)
-    search = _DepthSearch(path, photo, choice, max_pixels)
-    if choice.file is not None:
-        return _finish(search.of_file(Path(choice.file)), choice, grid)
-    failures: tuple[str, ...] = ()
-    for kind, find in search.sources():
-        if kind == "model" and not asks_model:
-            continue
-        try:
-            if (found := find()) is not None:
-                found = replace(found, origin=replace(found.origin, failures=failures))
-                return _finish(found, choice, grid)
-        except InputError as error:
-            if kind == "model" and choice.asks_for_model:
-                raise
-            failures += (f"{NOT_USED[kind]}: {error}",)
-    return _flat(photo, failures)
+    """Read a photo and find its disparity, see `find_depth`. Raises InputError for a bad photo."""
+    photo = read_photo(Path(path), max_pixels, keeps_primaries=True)
+    return find_depth(path, photo, choice or DepthChoice(), grid, skipped, max_pixels)
 
 
-def ask_model(
+def find_depth(
     path: Path,
     photo: Photo,
     choice: DepthChoice,
     grid: GridShape | None = None,
+    skipped: Collection[SlowSource] = (),
+    max_pixels: int | None = None,
 ) -> PhotoWithDepth:
-    """A photo that was read from `path`, its disparity estimated by the model that `choice` names, or the usual one.
+    """Find the disparity of a photo that was read from `path`; every photo gets one.
 
-    Raises InputError where there is none or it cannot be used.
+    grid: shape of the grid of views, None if it is not known yet. skipped: slow sources that are not tried. max_pixels:
+    limit for the sharp picture that replaces a photo which the camera blurred; None: the photo's size. Raises
+    InputError if a file or a model that `choice` names is bad, or it asks for a model and there is none.
     """
-    choice = replace(choice, start="model")
-    search = _DepthSearch(path, photo, choice, math.prod(photo.size))
-    found = search.model()
-    assert found is not None
-    return _finish(found, choice, grid)
-
-
-def sketch_depth(path: Path, photo: Photo, choice: DepthChoice) -> PhotoWithDepth:
-    """What `open_with_depth` will find, as far as that is quick: of a small picture of the photo, edges as they come,
-    and a guess where that will ask a model or compare two views.
-
-    Raises InputError, Cancelled as that does.
-    """
-    height, width = photo.size
-    search = _DepthSearch(path, photo, choice, height * width)
-    choice = replace(choice, refine=0.0)
+    search = _Search(Path(path), photo, choice, grid, max_pixels or math.prod(photo.size))
     if choice.file is not None:
-        return _finish(search.of_file(Path(choice.file)), choice, None)
-    if choice.start == "flat":
-        return _flat(photo, ())
-    ways = (search.sidecar, search.embedded_map) if choice.start == "auto" else (search.embedded_map,)
-    for find in ways if choice.start in ("auto", "embedded") else ():
-        with suppress(InputError):  # it is told when all is read
-            if (found := find()) is not None:
-                return _finish(found, choice, None)
-    return _finish(search.rough(), choice, None)
-
-
-def read_shown_photo(path: Path, max_pixels: int, kind: DepthKind) -> Photo:
-    """The photo that `open_with_depth` shows, max_pixels large at most; kind: where it found the depth.
-
-    Raises InputError as that does.
-    """
-    photo = read_photo(path, max_pixels, keeps_primaries=True)
-    embedded = read_embedded(path) if kind == "embedded" else None
-    return photo if embedded is None else photo_in_focus(path, photo, embedded, max_pixels)
+        return search.file(Path(choice.file))
+    kinds: tuple[DepthKind, ...] = get_args(DepthKind)
+    failures: tuple[str, ...] = ()
+    first = 0 if choice.start == "auto" else kinds.index(choice.start)
+    for kind, find in search.sources(skipped):
+        if kinds.index(kind) < first:
+            continue
+        try:
+            found = find()
+        except InputError as error:
+            if kind == "model" and choice.asks_for_model:
+                raise
+            failures += (f"{SUBJECTS[kind]} was not used: {error}",)
+            continue
+        if found is not None:
+            return _with_failures(found, failures)
+    flat = Disparity(np.zeros(photo.size, np.float32), "none")
+    return _with_failures(PhotoWithDepth(photo, flat, DepthOrigin("flat", "none")), failures)
 
 
 def estimator_of(found: PhotoWithDepth, choice: DepthChoice) -> EstimateDepth | None:
-    """What gave a photo's depth, for pictures of its size; None where that was no model."""
+    """Return the function by which a model estimated a photo's depth, for pictures of its size; None without a model.
+
+    The near end of the values stays the one that was found for the photo.
+    """
     if found.origin.kind != "model":
         return None
 
@@ -170,162 +125,128 @@ def estimator_of(found: PhotoWithDepth, choice: DepthChoice) -> EstimateDepth | 
         if model is None:
             raise InputError(f"{found.origin.words}: the model no longer exists")
         depth = estimate_with(model, replace(found.photo, pixels=colors))
-        if found.origin.near:  # the first estimate decided, for all
-            depth = turned_estimate(depth, (found.origin.near == "the high end") != choice.inverts, choice)
-        return _at_size(disparity_from(_as_chosen(depth, choice), USUAL_GRID), found.photo)
+        if found.origin.near:
+            is_large_near = (found.origin.near == "the high end") != choice.inverts
+            depth = as_estimate(MapFile(depth.values, "floats"), is_large_near, choice.is_metric or depth.is_metric)
+        values, _ = disparity_from(depth.inverted if choice.inverts else depth, USUAL_GRID)
+        return _at_size(without_repeats(values), values.shape[1], found.photo)
 
     return estimate
 
 
-def disparity_of_file(
-    file: Path, photo: Photo, choice: DepthChoice, grid: GridShape | None = None, photo_path: Path | None = None
-) -> Disparity:
-    """The disparity that a map's file gives a photo, px of the photo from view to view, unknown values filled.
-
-    photo_path: where the photo is, see `depth_from_file`. Raises InputError where the map cannot be used.
-    """
-    found = depth_from_file(file, photo, choice, photo_path)
-    return _disparity_at(photo, found.estimate, file.name, choice, grid)
-
-
 @dataclass(frozen=True, eq=False)
-class _DepthSearch:
-    """One photo on its way to its depth. The methods give None where there is nothing to read."""
+class _Search:
+    """Sources of one photo's depth. Each returns None if it holds nothing, and raises InputError if it is bad."""
 
     path: Path
     photo: Photo
     choice: DepthChoice
+    grid: GridShape | None
     max_pixels: int
 
-    def sources(self) -> Iterator[tuple[DepthKind, Callable[[], _FoundDepth | None]]]:
-        ways: dict[DepthKind, Callable[[], _FoundDepth | None]] = {
-            "file": self.sidecar,
-            "embedded": self.embedded,
-            "model": self.model,
-            "rough": self.rough,
-        }
-        kinds: list[DepthKind] = [*ways, "flat"]
-        start = 0 if self.choice.start == "auto" else kinds.index(self.choice.start)
-        for kind in kinds[start:-1]:
-            yield kind, ways[kind]
+    def sources(self, skipped: Collection[SlowSource]) -> Iterator[Source]:
+        """Yield the sources with their kinds, best first."""
+        yield "file", self.sidecar
+        yield "embedded", self.part_of_picture
+        yield "embedded", self.embedded
+        if "pair" not in skipped:
+            yield "embedded", self.pair
+        if "model" not in skipped:
+            yield "model", self.model
+        yield "rough", self.guess
 
-    def of_file(self, path: Path) -> _FoundDepth:
-        found = depth_from_file(path, self.photo, self.choice, self.path)
-        origin = DepthOrigin("file", path.name, file=str(path), near=found.near)
-        return _FoundDepth(self.photo, origin, found.estimate, found.notes + self._unused_maps(path))
+    def sidecar(self) -> PhotoWithDepth | None:
+        paths = find_sidecars(self.path)
+        return self.file(paths[0]) if paths else None
 
-    def _unused_maps(self, used: Path) -> tuple[str, ...]:
-        """A note where the photo has other maps, too: they may say something else."""
-        unused = [other.name for other in sidecars_of(self.path) if other.resolve() != used.resolve()]
-        with suppress(InputError):  # a damaged one would not be used either
-            embedded = read_embedded(self.path)
-            unused += [f"the photo's own ({embedded.format})"] if embedded is not None else []
-        return (f"Only {used.name} counts; not used: {', '.join(unused)}.",) if unused else ()
+    def file(self, path: Path) -> PhotoWithDepth:
+        depth = depth_from_file(path, self.path, self.photo, self.choice)
+        unused = ", ".join(other.name for other in find_sidecars(self.path) if other.resolve() != path.resolve())
+        notes = (f"Only {path.name} counts; not used: {unused}.",) if unused else ()
+        origin = DepthOrigin("file", path.name, file=str(path), near=depth.near)
+        return self.finish(origin, depth.estimate, depth.notes + notes)
 
-    def sidecar(self) -> _FoundDepth | None:
-        path = find_sidecar(self.path)
-        return self.of_file(path) if path is not None else None
+    def part_of_picture(self) -> PhotoWithDepth | None:
+        distances, parts = read_depth_channel(self.path), rgbd_parts(self.path)
+        if distances is not None:
+            return self.map_inside("depth channel", MapFile(distances, "floats"), is_distance=True)
+        return self.map_inside("its other half", read_map_picture(parts[1])) if parts is not None else None
 
-    def embedded(self) -> _FoundDepth | None:
-        return self.embedded_map() or self.of_pair()
-
-    def embedded_map(self) -> _FoundDepth | None:
-        for read, words in ((depth_from_channel, "depth channel"), (depth_beside_picture, "its other half")):
-            found = read(self.path, self.photo, self.choice)
-            if found is not None:
-                origin = DepthOrigin("embedded", f"the photo itself ({words})", near=found.near)
-                return _FoundDepth(self.photo, origin, found.estimate, found.notes)
+    def embedded(self) -> PhotoWithDepth | None:
         embedded = read_embedded(self.path)
         if embedded is None:
             return None
         photo = photo_in_focus(self.path, self.photo, embedded, self.max_pixels)
-        origin = DepthOrigin("embedded", f"the photo itself ({embedded.format})")
+        search = replace(self, photo=photo)
         estimate = rotate_estimate(embedded.estimate, photo.size, read_orientation(self.path))
         if embedded.says_near_end:
-            return _FoundDepth(photo, origin, estimate, embedded.notes)
-        told = depth_of_picture(self.path, estimate.values, photo, self.choice)
-        return _FoundDepth(photo, replace(origin, near=told.near), told.estimate, embedded.notes + told.notes)
+            origin = DepthOrigin("embedded", f"the photo itself ({embedded.format})")
+            return search.finish(origin, estimate, embedded.notes)
+        return search.map_inside(embedded.format, MapFile(estimate.values, "integers", notes=embedded.notes))
 
-    def of_pair(self) -> _FoundDepth | None:
+    def map_inside(self, name: str, found: MapFile, is_distance: bool = False) -> PhotoWithDepth:
+        """Return the depth of a map in the photo's file, after its near end was found."""
+        depth = orient_map(self.path.name, found, self.photo, self.choice, is_distance)
+        origin = DepthOrigin("embedded", f"the photo itself ({name})", near=depth.near)
+        return self.finish(origin, depth.estimate, found.notes + depth.notes)
+
+    def pair(self) -> PhotoWithDepth | None:
         found = estimate_from_pair(self.path)
         if found is None:
             return None
         estimate, layout = found
-        return _FoundDepth(self.photo, DepthOrigin("embedded", f"the photo's two views ({layout})"), estimate)
+        return self.finish(DepthOrigin("embedded", f"the photo's two views ({layout})"), estimate)
 
-    def model(self) -> _FoundDepth | None:
+    def model(self) -> PhotoWithDepth | None:
         model = model_to_use(self.choice)
         if model is None:
             return None
         raise_if_stopped()
-        estimate = estimate_with(model, self.photo)
-        told = depth_of_model(model.title, estimate, is_meaning_known(model), self.photo, self.choice)
-        origin = DepthOrigin("model", f"estimated by {model.title}", near=told.near)
-        return _FoundDepth(self.photo, origin, told.estimate, told.notes)
+        estimate, origin = estimate_with(model, self.photo), DepthOrigin("model", f"estimated by {model.title}")
+        if estimate.meaning == "disparity" or is_meaning_known(model):
+            return self.finish(origin, estimate)
+        values = MapFile(estimate.values, "floats")
+        depth = orient_map(model.title, values, self.photo, self.choice, estimate.is_metric)
+        return self.finish(replace(origin, near=depth.near), depth.estimate, depth.notes)
 
-    def rough(self) -> _FoundDepth:
+    def guess(self) -> PhotoWithDepth:
         raise_if_stopped()
         report_progress(0, 0, "guessing depth")
         estimate = estimate_from_cues(self.photo)
-        origin = DepthOrigin("rough", "rough, guessed without a model", (), BETTER_WAYS)
-        return _FoundDepth(self.photo, origin, estimate, unread_parts(self.path))
+        return self.finish(DepthOrigin("rough", "rough, guessed without a model"), estimate, unread_parts(self.path))
+
+    def finish(self, origin: DepthOrigin, estimate: DepthEstimate, notes: tuple[str, ...] = ()) -> PhotoWithDepth:
+        """Return the photo with the disparity of an estimate at its size, holes filled, edges drawn to the photo's."""
+        photo, name = self.photo, origin.words if origin.kind == "file" else "its depth"
+        values, metres = disparity_from(estimate.inverted if self.choice.inverts else estimate, self.grid or USUAL_GRID)
+        notes = filling_note(name, values) + notes
+        if metres is not None:
+            metres = metres[0] * values.shape[1] / photo.size.width, metres[1]
+        small = without_repeats(values)
+        is_enlarged = is_enlarged_smoothly(small, photo.size)
+        values = _at_size(small, values.shape[1], photo)
+        holes = np.isnan(values)
+        if holes.all():
+            raise InputError(f"{name}: too few known values survive at the photo's size; give a denser map")
+        unknown = holes if holes.any() else None
+        if unknown is not None:
+            values = fill_disparity_by_color(photo.pixels, values)
+        if self.choice.refine > 0:
+            values = refine(photo.pixels, values, self.choice.refine, unknown, is_enlarged=is_enlarged)
+        share = GUESS_SHARE if origin.kind == "rough" else 1.0
+        disparity = Disparity(values, origin.words, notes, metres, unknown, share, is_enlarged)
+        return PhotoWithDepth(photo, disparity, origin)
 
 
-def _finish(found: _FoundDepth, choice: DepthChoice, grid: GridShape | None) -> PhotoWithDepth:
-    """Disparity at the photo's size, whole, its edges drawn to the photo's. Raises InputError where none is known."""
-    photo, origin = found.photo, found.origin
-    name = origin.words if origin.kind == "file" else "its depth"
-    disparity = _disparity_at(photo, found.depth, name, choice, grid)
-    values, holes = disparity.values, disparity.unknown
-    if choice.refine > 0:
-        values = refine(photo.pixels, values, choice.refine, holes, is_enlarged=disparity.is_enlarged)
-    share = GUESS_SHARE if origin.kind == "rough" else 1.0
-    notes = found.notes + origin.failures + ((origin.advising_line,) if origin.advice else ())
-    disparity = replace(
-        disparity, values=values, source=origin.words, notes=disparity.notes + notes, viewing_share=share
-    )
-    return PhotoWithDepth(photo, disparity, origin)
-
-
-def _disparity_at(
-    photo: Photo,
-    estimate: DepthEstimate,
-    name: str,
-    choice: DepthChoice,
-    grid: GridShape | None,
-) -> Disparity:
-    """An estimate's disparity at the photo's size, what is unknown filled by what looks like it.
-
-    name: for the notes. Raises InputError where nothing is known.
-    """
-    estimate = _as_chosen(estimate, choice)
-    values = disparity_from(estimate, grid or USUAL_GRID)
-    inverse_metres = inverse_metres_over(estimate, values)
-    ratio, notes = photo.size.width / values.shape[1], filling_note(name, values)
-    is_enlarged = is_enlarged_smoothly(without_repeats(values), photo.size)
-    values = _at_size(values, photo)
-    if inverse_metres is not None:
-        inverse_metres = inverse_metres[0] / ratio, inverse_metres[1]
-    holes = np.isnan(values)
-    if holes.all():
-        raise InputError(f"{name}: too few known values survive at the photo's size; give a denser map")
-    if holes.any():
-        values = fill_disparity_by_color(photo.pixels, values)
-    return Disparity(values, name, notes, inverse_metres, holes if holes.any() else None, is_enlarged=is_enlarged)
-
-
-def _as_chosen(estimate: DepthEstimate, choice: DepthChoice) -> DepthEstimate:
-    return estimate.inverted if choice.inverts else estimate
-
-
-def _at_size(disparity: FloatImage, photo: Photo) -> FloatImage:
-    """Disparity (h, w) of a photo, px of the map, at the photo's size, px of that."""
-    small = without_repeats(disparity)
+def _at_size(small: FloatImage, width: int, photo: Photo) -> FloatImage:
+    """Return a map in px of a picture of this width, at the photo's size in its px."""
     values = map_at_size(small, photo.size, lies_at_corners(photo.pixels, small))
-    return values * np.float32(photo.size.width / disparity.shape[1])
+    return values * np.float32(photo.size.width / width)
 
 
-def _flat(photo: Photo, failures: tuple[str, ...]) -> PhotoWithDepth:
-    flat = flat_disparity(photo.size)
-    origin = DepthOrigin("flat", flat.source, failures, BETTER_WAYS)
-    return PhotoWithDepth(photo, replace(flat, notes=flat.notes + failures), origin)
+def _with_failures(found: PhotoWithDepth, failures: tuple[str, ...]) -> PhotoWithDepth:
+    """Return the photo with notes on the sources that failed before, and with advice on better depth."""
+    origin = replace(found.origin, failures=failures)
+    advice = (origin.advising_line,) if origin.advice else ()
+    notes = (*found.disparity.notes, *failures, *advice)
+    return replace(found, disparity=replace(found.disparity, notes=notes), origin=origin)

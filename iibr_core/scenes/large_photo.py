@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,10 @@ from iibr_core.beyond.full_size import LargePhoto
 from iibr_core.depth.edges.refine import refine
 from iibr_core.depth.editing.canvas import apply_edits
 from iibr_core.depth.editing.edits import UNEDITED
-from iibr_core.depth.search import disparity_of_file, read_shown_photo
+from iibr_core.depth.embedded.embedded_depth import read_embedded
+from iibr_core.depth.embedded.picture import photo_in_focus
+from iibr_core.depth.search import find_depth
+from iibr_core.formats.images.photo import read_photo
 from iibr_core.formats.maps.reader import read_map_size
 from iibr_core.formats.maps.resample import resample_surfaces
 from iibr_core.inpainting.registry import load_inpainter
@@ -33,7 +37,9 @@ def load_large(source: Source, loaded: LoadedPhoto, plan: ScenePlan, max_pixels:
     path = Path(source.path)
     if stamp_of(path) != loaded.stamp:
         raise InputError(f"{path}: was changed since it was opened; open it again")
-    photo = read_shown_photo(path, max_pixels, loaded.origin.kind)
+    photo = read_photo(path, max_pixels, keeps_primaries=True)
+    if loaded.origin.kind == "embedded" and (embedded := read_embedded(path)) is not None:
+        photo = photo_in_focus(path, photo, embedded, max_pixels)
     raise_if_stopped()
     enlarged = photo.size.width / loaded.photo.size.width
     values = _disparity(source, loaded, photo)
@@ -60,7 +66,8 @@ def _disparity(source: Source, loaded: LoadedPhoto, photo: Photo) -> FloatImage:
         return loaded.disparity.values
     file = _larger_map(loaded)
     if file is not None:
-        given = disparity_of_file(file, photo, source.depth, source.grid, Path(source.path))
+        choice = replace(source.depth, file=str(file), refine=0.0)
+        given = find_depth(Path(source.path), photo, choice, source.grid).disparity
     else:
         given = Disparity(resample_surfaces(loaded.disparity.values, photo.size) * enlarged, loaded.disparity.source)
     raise_if_stopped()

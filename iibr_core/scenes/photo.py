@@ -17,7 +17,7 @@ from iibr_core.depth.edges.refine import refine
 from iibr_core.depth.editing.canvas import DepthCanvas
 from iibr_core.depth.editing.edits import BRUSH_TOOLS, UNEDITED, DepthEdits, Stroke, levels_of
 from iibr_core.depth.estimators.catalog import USUAL_MODEL
-from iibr_core.depth.search import PhotoWithDepth, ask_model, estimator_of, open_with_depth, sketch_depth
+from iibr_core.depth.search import PhotoWithDepth, SlowSource, estimator_of, find_depth, open_with_depth
 from iibr_core.formats.files import require_file
 from iibr_core.formats.images.metadata import settings_text_in
 from iibr_core.formats.images.photo import DEFAULT_MAX_PIXELS, focal_px_from_fov, read_thumbnail
@@ -62,13 +62,14 @@ def stamp_of(path: Path) -> tuple[int, ...]:
 def load_photo(source: Source, depth_settings: DepthSettings | None = None, asks_model: bool = True) -> LoadedPhoto:
     """Read a photo and find its disparity.
 
-    depth_settings: refinement and edits of the disparity, None for those of the source. asks_model: see
-    `open_with_depth`. Raises InputError.
+    depth_settings: refinement and edits of the disparity, None for those of the source. asks_model: False to guess
+    depth where a model would estimate it. Raises InputError.
     """
     path = Path(source.path)
     max_pixels, stored_size = _pixels_to_read(source)
     stamp = stamp_of(path)
-    found = open_with_depth(path, replace(source.depth, refine=NOT_YET), max_pixels, source.grid, asks_model)
+    skipped: tuple[SlowSource, ...] = () if asks_model else ("model",)
+    found = open_with_depth(path, replace(source.depth, refine=NOT_YET), max_pixels, source.grid, skipped)
     give_back_memory()
     own_size = _turned_like(stored_size, found.photo.size)
     loaded = _loaded(found, settings_text_in(path), source, own_size, stamp)
@@ -80,7 +81,8 @@ def deepen(source: Source, loaded: LoadedPhoto, strength: float) -> LoadedPhoto:
 
     Raises InputError.
     """
-    found = ask_model(Path(source.path), loaded.photo, replace(source.depth, refine=NOT_YET), source.grid)
+    choice = replace(source.depth, start="model", file=None, refine=NOT_YET)
+    found = find_depth(Path(source.path), loaded.photo, choice, source.grid)
     deepened = _loaded(found, loaded.settings, source, loaded.own_size, loaded.stamp)
     return apply_depth_settings(deepened, DepthSettings(strength))
 
@@ -97,7 +99,7 @@ def sketch_photo(source: Source) -> LoadedPhoto | None:
         return None
     pixels = read_thumbnail(path, SKETCH).astype(np.float32) / np.float32(255)
     photo = Photo(pixels, focal_px_from_fov(pixels.shape[1]), path.stem, is_hdr=False)
-    found = sketch_depth(path, photo, source.depth)
+    found = find_depth(path, photo, replace(source.depth, refine=NOT_YET), skipped=("pair", "model"))
     return _loaded(found, "", source, _turned_like(stored_size, photo.size), stamp)
 
 

@@ -15,8 +15,9 @@ from PIL import Image
 
 from iibr_core.color import encoded_from_stored
 from iibr_core.depth.choice import DepthChoice
-from iibr_core.depth.search import disparity_of_file
+from iibr_core.depth.search import find_depth
 from iibr_core.formats.images.photo import read_photo
+from iibr_core.formats.images.write import write_image
 from iibr_core.formats.maps.disparity_file import read_disparity
 from iibr_core.inpainting.background import fill_background
 from iibr_core.inpainting.patch_synthesis import MAX_TEXTURE
@@ -153,13 +154,15 @@ def test_depth_of_0(tmp_path):
     depth = np.full((HEIGHT, WIDTH), 4.0, np.float32)
     depth[:, :9] = 1.0
     depth[6:9, 6:9] = 0.0
+    write_image(tmp_path / "photo.png", plain_photo().pixels)
     np.save(tmp_path / "a_depth.npy", depth)
-    read = disparity_of_file(tmp_path / "a_depth.npy", plain_photo(), DepthChoice())
+    choice = DepthChoice(file=str(tmp_path / "a_depth.npy"), refine=0.0)
+    read = find_depth(tmp_path / "photo.png", plain_photo(), choice).disparity
     assert (read.values[:, :6] > read.values[:, 12:].max()).all()
     field_of(plain_photo(), read)
-    np.save(tmp_path / "b_depth.npy", depth * 0)
+    np.save(tmp_path / "a_depth.npy", depth * 0)
     with pytest.raises(InputError, match=r"no known value"):
-        disparity_of_file(tmp_path / "b_depth.npy", plain_photo(), DepthChoice())
+        find_depth(tmp_path / "photo.png", plain_photo(), choice)
 
 
 @pytest.mark.parametrize("size", [(1, 1), (1, 13), (11, 1), (2, 2), (7, 13), (31, 3)])

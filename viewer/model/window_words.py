@@ -15,7 +15,6 @@ DEPTH_COMMANDS = ("Depth models…", "Open a depth map…")
 
 _WORDS = (
     (re.escape(BETTER_WAYS), "With a depth map or a depth model it is true to the scene."),
-    (r"Give a map with --disparity FILE, or put one", "Open a map, or put one"),
     (r"--invert-depth turns it if that is wrong", "Invert, under Depth, turns it if that is wrong"),
     (r"turn them with --invert-depth", "turn them with Invert, under Depth"),
     (r"add --stretch if it shows the whole photo", "open it as a depth map if it shows the whole photo"),

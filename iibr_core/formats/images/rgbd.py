@@ -20,8 +20,11 @@ MIN_ASPECT = 1.9
 """Smallest ratio of the sides of a picture that holds two without stating it in its name."""
 COMPARED = ImageSize(192, 192)
 """Largest size of the picture whose halves are compared."""
-GREY_TOLERANCE, MAX_COLORED_SHARE = 12, 0.01
-"""Largest difference of a map's channels, of 255, and the largest share of its pixels that exceed it."""
+GREY_TOLERANCE, MAX_COLORED_SHARE = 16 / 255, 0.01
+"""Largest difference of a map's channels, as a share of white, and the largest share of its pixels that exceed it.
+
+Lossy compression shifts channels.
+"""
 MIN_COLORED_SHARE = 0.15
 """Smallest share of coloured pixels in a photo whose map lies beside it."""
 
@@ -53,7 +56,7 @@ def _parts(path: Path, modified_ns: int, size_bytes: int) -> tuple[PictureSource
 
 def _grey_half(pixels: NDArray[np.uint8], axis: int, min_colored: float) -> int | None:
     """Return which half along an axis is grey, 0 or 1; None unless `min_colored` of the other half is coloured."""
-    is_colored = np.ptp(pixels.astype(np.int16), axis=2) > GREY_TOLERANCE
+    is_colored = np.ptp(pixels.astype(np.int16), axis=2) > GREY_TOLERANCE * 255
     first, second = (float(part.mean()) for part in np.split(is_colored, (pixels.shape[axis] // 2,), axis=axis))
     if second <= MAX_COLORED_SHARE and first >= min_colored:
         return 1

@@ -30,8 +30,9 @@ def read_disparity(path: Path, size: ImageSize, scale: float = 1.0, photo: Float
         raise InputError(f"{path}: holds depth, by its name; views of a light field take disparity, px per view step")
     stored = read_map(path)
     if not has_shape_of(image_size(stored), size):
-        found, wanted = (f"{width}x{height}" for height, width in (stored.shape, size))
-        raise InputError(f"{path}: {found} differs in shape from the view, {wanted}; crop or rotate it to match")
+        raise InputError(
+            f"{path}: {image_size(stored)} differs in shape from the view, {size}; crop or rotate it to match"
+        )
     values, notes = scaled_disparity(path, stored, require_scale(scale))
     notes += resampling_note(path.name, values, size) + filling_note(path.name, values)
     values = map_at_size(values, size) * np.float32(size.width / stored.shape[1])

@@ -5,6 +5,7 @@ Renderers write depth as a channel of an OpenEXR picture, beside its colours; th
 
 from __future__ import annotations
 
+import itertools
 import re
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -17,21 +18,17 @@ from iibr_core.formats.files import MAX_FILE_PIXELS, require_file
 from iibr_core.formats.images.decode import complaint_of, open_header, read_text
 from iibr_core.formats.images.picture import Picture, full_scale, upright
 from iibr_core.formats.images.picture_source import PictureSource, read_source, source_size
+from iibr_core.formats.images.rgbd import GREY_TOLERANCE, MAX_COLORED_SHARE
 from iibr_core.formats.maps.color_maps import values_of_colors
 from iibr_core.formats.maps.npy import read_array
 from iibr_core.formats.maps.pfm import read_pfm, read_pfm_size
 from iibr_core.formats.maps.writer import KEY, MapText, text_from
 from iibr_core.types import FloatImage, ImageSize, InputError, image_size
 
-GREY_TOLERANCE = 16 / 255
-"""Largest difference of a grey picture's channels, as a share of white: lossy compression shifts them."""
-MAX_COLORED_SHARE = 0.01
-"""Largest share of a grey picture's pixels whose channels differ by more."""
 LUMA = np.array([0.299, 0.587, 0.114], np.float32)
 """Weights of red, green and blue in grey (Rec. BT.601), as JPEG and WebP store it."""
 DEPTH_CHANNEL = re.compile(r"(?:.*\.)?(?:Z|depth|depth\.[YVRXZ])", re.IGNORECASE)
 """Names of the channel: `Z` by the format's convention, `ViewLayer.Depth.Z` by Blender."""
-MAX_PARTS = 64
 BACKGROUND = 1e9
 """Smallest distance that stands for no surface."""
 
@@ -111,10 +108,7 @@ def read_depth_channel(path: Path) -> FloatImage | None:
     source = open_header(path)
     if source is None:
         return None
-    for part in range(MAX_PARTS):
-        if not source.seek_subimage(part, 0):
-            complaint_of(source)
-            return None
+    for part in itertools.takewhile(lambda part: source.seek_subimage(part, 0), itertools.count()):
         spec = source.spec()
         found = [k for k, name in enumerate(spec.channelnames) if DEPTH_CHANNEL.fullmatch(name)]
         # A map that is all of its file is no picture with depth.
@@ -124,6 +118,7 @@ def read_depth_channel(path: Path) -> FloatImage | None:
                 raise InputError(f"{path}: its depth channel is damaged ({complaint_of(source)}); get the file again")
             depth = np.asarray(values, np.float32).reshape(spec.height, spec.width)
             return np.where(depth >= BACKGROUND, np.float32(np.inf), depth)
+    complaint_of(source)
     return None
 
 

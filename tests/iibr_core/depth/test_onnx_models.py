@@ -273,4 +273,4 @@ def test_the_photo_tells_which_way_round_a_file_of_ones_own_counts(tmp_path: Pat
     write_image(tmp_path / "photo.png", pixels)
     found = open_with_depth(tmp_path / "photo.png", DepthChoice(model=str(file), refine=0.0))
     assert found.disparity.values[-5].mean() > found.disparity.values[5].mean()
-    assert any(f"count as {'far' if farness else 'near'}, as" in note for note in found.disparity.notes)
+    assert any(f"the {'low' if farness else 'high'} end counts as near" in note for note in found.disparity.notes)

@@ -1,4 +1,4 @@
-"""`iibr depth` of photos: where the map comes from, how it is written, and what is never overwritten."""
+"""`iibr depth` of photos: sources of the map."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from PIL import Image
 
 from iibr_core.formats.images.write import write_image
 from tests.iibr_core.depth.onnx_graphs import of_channels
@@ -31,11 +30,9 @@ def red_below(tmp_path: Path, monkeypatch: Monkey) -> Path:
     ("options", "is_nearer_below"),
     [
         ([], True),
-        (["--depth", "rough"], True),
         (["--depth", "rough", "--invert-depth"], False),
         (["--depth-model", "red.onnx"], True),
         (["--depth-model", "red.onnx", "--metric"], False),
-        (["--depth-model", "red.onnx", "--metric", "--invert-depth"], True),
     ],
 )
 def test_a_photo_without_depth_gets_a_guess_or_a_models(
@@ -49,18 +46,7 @@ def test_a_photo_without_depth_gets_a_guess_or_a_models(
     assert (np.median(disparity[-12:]) > np.median(disparity[:12])) == is_nearer_below
 
 
-def test_a_map_written_as_a_picture_comes_back_as_it_was(monkeypatch: Monkey, tmp_path: Path) -> None:
-    Image.new("RGB", (80, 64), "gray").save(tmp_path / "a.png")
-    relief = np.hypot(*np.mgrid[-32:32, -40:40]).astype(np.float32) / 10
-    np.save(tmp_path / "a_disparity.npy", relief)
-    assert run(monkeypatch, "depth", tmp_path / "a.png", "--refine", "off", "-o", tmp_path / "b.png") == 0
-    (tmp_path / "a_disparity.npy").unlink()
-    (tmp_path / "b.png").rename(tmp_path / "a_disparity.png")
-    assert run(monkeypatch, "depth", tmp_path / "a.png", "--refine", "off", "-o", tmp_path / "c.npy") == 0
-    np.testing.assert_allclose(np.load(tmp_path / "c.npy"), relief, atol=1e-3)
-
-
-def test_of_a_pair_a_model_is_asked_where_one_is_named(monkeypatch: Monkey, red_below: Path, capsys: Capture) -> None:
+def test_a_pair_is_estimated_by_the_model_that_is_named(monkeypatch: Monkey, red_below: Path, capsys: Capture) -> None:
     pair, out = write_pair(red_below.parent / "a_2x1.png"), red_below.parent / "map.npy"
     assert run(monkeypatch, "depth", pair, "-o", out) == 0
     assert np.median(np.load(out)) == pytest.approx(3 * WALL, abs=0.5)

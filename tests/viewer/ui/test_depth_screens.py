@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from iibr_core.depth.choice import BETTER_WAYS, DepthOrigin
+from iibr_core.depth.choice import DepthOrigin
 from iibr_core.depth.editing.edits import BrushTool, DepthEdits, Stroke
 from tests.viewer.conftest import headless_with_scene
 from viewer.app.headless import HeadlessViewer
@@ -50,7 +50,7 @@ def test_poor_depth_is_told_with_advice_and_what_failed(viewer: HeadlessViewer) 
     before = viewer.screen(SIZE)
     scene = viewer.state.scene
     assert scene is not None
-    poor = DepthOrigin("rough", "rough, guessed without a model", ("The photo's own depth was not used.",), BETTER_WAYS)
+    poor = DepthOrigin("rough", "rough, guessed without a model", ("The photo's own depth was not used.",))
     viewer.state = replace(viewer.state, scene=replace(scene, depth_origin=poor))
     assert differs(before, viewer.screen(SIZE))[PANEL].sum() > 2000
 

@@ -1,0 +1,125 @@
+"""Disparity from files: kinds of files, unknown values, and other sizes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from iibr_core.formats.images.write import write_image_file
+from iibr_core.formats.maps.disparity_file import read_disparity
+from iibr_core.formats.maps.pfm import write_pfm
+from iibr_core.formats.maps.resample import SURFACE_SHARE, resample_surfaces
+from iibr_core.types import FloatImage, ImageSize, InputError
+
+RNG = np.random.default_rng(3)
+
+
+def resample_slowly(values: FloatImage, size: ImageSize) -> FloatImage:
+    """Twin: tent weights over the whole map, then the vote between the two surfaces."""
+    low, high = np.nanpercentile(values, [2, 98])
+    weights = []
+    for source, target in zip(values.shape, size):
+        step = source / target
+        centres = (np.arange(target) + 0.5) * step - 0.5
+        weights.append(np.maximum(0, 1 - np.abs(np.arange(source) - centres[:, None]) / max(1, step)))
+    result = np.full(size, np.nan)
+    for y, x in np.ndindex(size):
+        weight = np.outer(weights[0][y], weights[1][x])
+        inside, weight = values[weight > 0], weight[weight > 0]
+        known = ~np.isnan(inside)
+        if not known.any() or weight[~known].sum() > weight[known].sum():
+            continue
+        inside, weight = inside[known], weight[known]
+        chosen = np.ones(len(inside), bool)
+        if np.ptp(inside) > SURFACE_SHARE * (high - low):
+            near = inside > (inside.min() + inside.max()) / 2
+            chosen = near if weight[near].sum() >= weight[~near].sum() else ~near
+        result[y, x] = np.average(inside[chosen], weights=weight[chosen])
+    return result
+
+
+@pytest.mark.parametrize("size", [(29, 37), (7, 11), (13, 31), (40, 5), (1, 1), (1, 23)])
+def test_resampling_agrees_with_its_slow_twin(size: tuple[int, int]) -> None:
+    # Values and sizes where no vote is a tie, which rounding would decide.
+    rng = np.random.default_rng(3)
+    values = rng.uniform(0, 10, (13, 17)).astype(np.float32)
+    values[rng.random(values.shape) < 0.2] = np.nan
+    expected = resample_slowly(values, ImageSize(*size))
+    assert np.allclose(resample_surfaces(values, ImageSize(*size)), expected, 1e-5, equal_nan=True)
+
+
+@pytest.mark.parametrize("size", [(200, 300), (37, 61), (20, 30)])
+def test_no_pixel_flies_between_two_surfaces(size: tuple[int, int]) -> None:
+    scene = np.full((40, 60), 1.0, np.float32)
+    scene[10:30, 17:41] = 5.0
+    found = resample_surfaces(scene, ImageSize(*size))
+    assert set(np.unique(found)) == {1.0, 5.0}
+    assert abs((found == 5).mean() - (scene == 5).mean()) < 0.02
+
+
+@pytest.mark.parametrize("name", ["a.pfm", "a.npy", "a.npz", "a.exr", "a.tif", "a.png"])
+def test_every_kind_of_file_gives_the_same_values(tmp_path: Path, name: str) -> None:
+    whole, path = RNG.integers(1, 20, (6, 8)), tmp_path / name
+    if path.suffix == ".pfm":
+        write_pfm(path, whole.astype(np.float32))
+    elif path.suffix == ".npy":
+        np.save(path, whole)
+    elif path.suffix == ".npz":
+        np.savez_compressed(path, depth=whole, other=np.zeros(3))
+    else:
+        kind = "float" if path.suffix == ".exr" else "uint16"
+        write_image_file(path, whole[..., None].astype(kind.replace("float", "float32")), kind, channels=("Y",))
+    found = read_disparity(path, ImageSize(6, 8), scale=0.5)
+    assert found.values.dtype == np.float32
+    assert np.array_equal(found.values, whole / 2)
+    assert (found.source, found.notes) == (path.name, ())
+
+
+def test_unknown_values_are_filled(tmp_path: Path) -> None:
+    values = np.full((5, 6), 3.0, np.float32)
+    values[0, 0], values[1, 1], values[2, 2], values[3, 3] = np.nan, np.inf, -np.inf, 1e9
+    np.save(tmp_path / "a.npy", values)
+    assert (read_disparity(tmp_path / "a.npy", ImageSize(5, 6)).values == 3).all()
+    masked = np.dstack([np.full((5, 6), 3.0), np.ones((5, 6))]).astype(np.float32)
+    masked[2, 2] = (77.0, 0.0)
+    write_image_file(tmp_path / "a.exr", masked, "float", channels=("Y", "A"))
+    assert (read_disparity(tmp_path / "a.exr", ImageSize(5, 6)).values == 3).all()
+    stored = np.full((5, 6, 1), 200, np.uint16)
+    stored[2, 2] = 0
+    write_image_file(tmp_path / "a.png", stored, "uint16", channels=("Y",))
+    found = read_disparity(tmp_path / "a.png", ImageSize(5, 6), scale=0.01)
+    assert found.values == pytest.approx(2)
+    assert "filled" in found.notes[0]
+
+
+def test_another_size_scales_the_values_by_the_width(tmp_path: Path) -> None:
+    values = np.full((20, 30), 1.0, np.float32)
+    values[:, 15:] = 6.0
+    np.save(tmp_path / "a.npy", values)
+    found = read_disparity(tmp_path / "a.npy", ImageSize(40, 60))
+    assert set(np.unique(found.values)) == {2.0, 12.0}
+    assert "30x20 to 60x40" in found.notes[0]
+
+
+@pytest.mark.parametrize(
+    ("value", "message"), [(np.nan, "no value is known"), (np.inf, "no value is known"), (6e4, "--disparity-scale")]
+)
+def test_a_map_without_known_values_is_refused(tmp_path: Path, value: float, message: str) -> None:
+    np.save(tmp_path / "a.npy", np.full((3, 4), value))
+    with pytest.raises(InputError, match=message):
+        read_disparity(tmp_path / "a.npy", ImageSize(3, 4))
+
+
+@pytest.mark.parametrize("size", [(4, 6), (40, 60), (33, 50), (80, 120)])
+def test_every_known_value_of_a_sparse_map_counts(tmp_path: Path, size: tuple[int, int]) -> None:
+    values = np.full((40, 60), np.nan, np.float32)
+    values[::6, ::6] = 2.0
+    values[12:30:6, 18:42:6] = 5.0
+    np.save(tmp_path / "a.npy", values)
+    found = read_disparity(tmp_path / "a.npy", ImageSize(*size))
+    ratio = size[1] / 60
+    assert found.values.min() == pytest.approx(2 * ratio)
+    assert found.values.max() == pytest.approx(5 * ratio)
+    assert sum("was filled" in note for note in found.notes) == 1
