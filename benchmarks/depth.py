@@ -21,7 +21,7 @@ from benchmarks.harness.timing import cost_of
 from iibr_core.color import quantise_as_stored
 from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.edges.refine import refine
-from iibr_core.depth.pictorial_cues import estimate_from_cues
+from iibr_core.depth.guess import guess_depth
 from iibr_core.depth.search import open_with_depth
 from iibr_core.evaluation.metrics import bounded_psnr
 from iibr_core.evaluation.reference_warp import reference_warp
@@ -109,7 +109,7 @@ def seconds() -> Iterator[str]:
         yield refining_row(f"refining edges blurred by {sigma:g} px", colors, blur(disparity, sigma))
     demo, demo_map = one_megapixel_demo()
     yield refining_row("refining the demo photo's, blurred by 2 px", demo, blur(demo_map, 2.0))
-    wall, cpu = least_seconds(lambda: estimate_from_cues(scene.given[0]))
+    wall, cpu = least_seconds(lambda: guess_depth(scene.given[0]))
     yield row("the guess without a model", f"{wall:.2f}", f"{cpu:.2f}", "", "") + "\n"
 
 
@@ -145,7 +145,7 @@ guess and from one plane, each at its best scale (not 0) and shift.
     all_shares = []
     for scene in known_depths(data):
         photo, known = scene.photo, scene.disparity
-        guess = refine(photo, estimate_from_cues(scene.given[0]).values)
+        guess = refine(photo, guess_depth(scene.given[0]).values)
         shares = [share_ordered(values, known) for values in (guess, np.indices(known.shape)[0])]
         all_shares.append(shares)
         is_good, ratios = shares[0] >= shares[1] - MOST_BELOW_RAMP, ["", ""]

@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.depth.pictorial_cues import box_filter, estimate_from_cues, resize_picture
-from iibr_core.types import FloatImage, ImageSize, Photo
+from iibr_core.depth.guess import box_filter, guess_depth, resize_picture, size_within
+from iibr_core.types import FloatImage, ImageSize, Photo, image_size
 
 COMPARED_PX = 160
 """Photo and map are compared at this size."""
@@ -34,9 +34,9 @@ def near_evidence(photo: FloatImage, values: FloatImage) -> float:
     """
     if not (photo.size and values.size):
         return 0.0
-    size = _compared_size(photo)
+    size = size_within(image_size(photo), COMPARED_PX)
     small = resize_picture(np.clip(np.nan_to_num(photo), 0, 1), size)
-    guess = estimate_from_cues(Photo(small, float(size.width), "")).values
+    guess = guess_depth(Photo(small, float(size.width), "")).values
     own = _sampled(values, size)
     known = np.isfinite(own)
     if known.sum() < 3:
@@ -72,12 +72,6 @@ def zeros_are_depth(values: FloatImage, is_zero: NDArray[np.bool_]) -> bool:
     return bool(areas.mean() >= LARGE_ZEROS and areas.sum() >= MOST_OF_ZEROS * is_zero.sum())
 
 
-def _compared_size(photo: FloatImage) -> ImageSize:
-    height, width = photo.shape[:2]
-    ratio = min(1.0, COMPARED_PX / max(height, width))
-    return ImageSize(max(round(height * ratio), 1), max(round(width * ratio), 1))
-
-
 def _sampled(values: FloatImage, size: ImageSize) -> FloatImage:
     """The map's values nearest to the pixels of a picture of this size."""
     rows, columns = (((np.arange(count) + 0.5) * own / count).astype(int) for count, own in zip(size, values.shape))
@@ -95,7 +89,7 @@ def _alignment(photo: FloatImage, values: FloatImage) -> float:
     """Correlation of the strengths of edges of photo and map."""
     if not (photo.size and values.size):
         return 0.0
-    size = _compared_size(photo)
+    size = size_within(image_size(photo), COMPARED_PX)
     small = resize_picture(np.clip(np.nan_to_num(photo), 0, 1), size)
     own = _sampled(values, size)
     own = np.where(np.isfinite(own), own, np.nanmedian(own) if np.isfinite(own).any() else 0)

@@ -21,6 +21,7 @@ from iibr_core.depth.embedded.unread import unread_parts
 from iibr_core.depth.estimates import Estimate, inverted, values_of
 from iibr_core.depth.estimators.catalog import is_meaning_known, model_to_use
 from iibr_core.depth.estimators.estimate_depth import estimate_with
+from iibr_core.depth.guess import guess_depth
 from iibr_core.depth.map_file import (
     depth_beside_picture,
     depth_from_channel,
@@ -29,7 +30,6 @@ from iibr_core.depth.map_file import (
     depth_of_picture,
     turned_estimate,
 )
-from iibr_core.depth.pictorial_cues import estimate_from_cues
 from iibr_core.depth.scaling import disparity_from, inverse_metres_over
 from iibr_core.depth.sidecar import find_sidecar, flat_disparity, sidecars_of
 from iibr_core.depth.stereo_pair import estimate_from_pair
@@ -267,7 +267,7 @@ class _DepthSearch:
     def rough(self) -> _FoundDepth:
         raise_if_stopped()
         report_progress(0, 0, "guessing depth")
-        estimate = estimate_from_cues(self.photo)
+        estimate = guess_depth(self.photo)
         origin = DepthOrigin("rough", "rough, guessed without a model", (), BETTER_WAYS)
         return _FoundDepth(self.photo, origin, estimate, unread_parts(self.path))
 
