@@ -97,7 +97,7 @@ def smooth_within_contours(photo: FloatImage, disparity: FloatImage, radius: flo
         # Every round is half as wide as the previous one; their variances sum to radius^2.
         sigma = radius * sqrt(3) * 2 ** (SMOOTHING_ROUNDS - k - 1) / sqrt(4**SMOOTHING_ROUNDS - 1)
         for step in steps:
-            _smooth_rows(values, np.exp(-sqrt(2) / sigma * step))
+            _smooth_rows(values, np.ascontiguousarray(np.exp(-sqrt(2) / sigma * step)))
             values = np.ascontiguousarray(values.T)
     return values
 

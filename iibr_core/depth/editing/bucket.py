@@ -37,34 +37,32 @@ def surface_at(
         return surface
     colors = color_distance(photo.reshape(-1, 3), touched_colors(photo, stroke, index)).reshape(disparity.shape)
     colors = without_specks(colors)
-    images = photo, colors, disparity / np.float32(DEPTH_EDGE * (extent[1] - extent[0]))
-    is_edge = colors > OTHER_SURFACE
+    depth = disparity / np.float32(DEPTH_EDGE * (extent[1] - extent[0]))
+    is_edge, contrasts = colors > OTHER_SURFACE, []
     for axis in (0, 1):
-        steps = _find_steps(*images, axis, EDGE_PX)
-        near, far = _pair(is_edge, axis, EDGE_PX)
-        near |= steps
-        far |= steps
+        contrast = _contrast(*(image.swapaxes(0, axis) for image in (photo, colors, depth)))
+        turned = is_edge.swapaxes(0, axis)
+        turned[:-EDGE_PX] |= contrast > 1
+        turned[EDGE_PX:] |= contrast > 1
+        contrasts.append(contrast)
     queue = np.empty(surface.size, np.int32)
     row, column = _nearest_free(~is_edge, int(y * height), int(x * width))
     count = _flood(~is_edge, row * width + column, queue)
     surface.reshape(-1)[queue[:count]] = True
-    _grow(surface, is_edge, [_find_steps(*images, axis, 1) for axis in (0, 1)])
+    _grow(surface, is_edge, contrasts)
     _fill_holes(surface, queue, pi * stroke.radius_px(width) ** 2)
     return surface
 
 
-def _pair(image: np.ndarray, axis: int, px: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return two views of an image (H, W, ...) whose pixels lie px apart along an axis."""
-    return (image[:-px], image[px:]) if axis == 0 else (image[:, :-px], image[:, px:])
+def _contrast(photo: FloatImage, colors: FloatImage, depth: FloatImage) -> FloatImage:
+    """Return the contrast (H - EDGE_PX, W) between pixels in a column, above 1 between surfaces.
 
-
-def _find_steps(photo: FloatImage, colors: FloatImage, depth: FloatImage, axis: int, px: int) -> Mask:
-    """Return whether pixels px apart belong to two surfaces, by colour or by depth (in steps between surfaces)."""
-    difference = np.subtract(*_pair(photo, axis, px))
-    contrast = np.sqrt(np.einsum("yxc,yxc->yx", difference, difference))
-    contrast[np.maximum(*_pair(colors, axis, px)) <= 0] = 0  # texture
-    before, behind = _pair(depth, axis, px)
-    return np.asarray((contrast > CONTOUR_CONTRAST) | (np.abs(before - behind) > 1))
+    depth: in steps between surfaces.
+    """
+    difference = photo[EDGE_PX:] - photo[:-EDGE_PX]
+    contrast = np.sqrt(np.einsum("yxc,yxc->yx", difference, difference)) / np.float32(CONTOUR_CONTRAST)
+    contrast[np.maximum(colors[EDGE_PX:], colors[:-EDGE_PX]) <= 0] = 0  # texture
+    return np.maximum(contrast, np.abs(depth[EDGE_PX:] - depth[:-EDGE_PX]))
 
 
 def _nearest_free(is_free: Mask, row: int, column: int) -> tuple[int, int]:
@@ -77,14 +75,19 @@ def _nearest_free(is_free: Mask, row: int, column: int) -> tuple[int, int]:
     return int(nearest[0]), int(nearest[1])
 
 
-def _grow(surface: Mask, is_edge: Mask, steps: list[Mask]) -> None:
-    """Add the pixels of edges on the surface's side. steps: between neighbours, by axis."""
+def _grow(surface: Mask, is_edge: Mask, contrasts: list[FloatImage]) -> None:
+    """Add the pixels of edges that differ less from the surface than from the other side. contrasts: by axis."""
+    likes = []
+    for axis in (0, 1):
+        padded, height = np.pad(contrasts[axis], [(EDGE_PX, EDGE_PX), (0, 0)]), surface.shape[axis]
+        above, below = padded[:height], padded[EDGE_PX : height + EDGE_PX]
+        likes.append((above <= below, below <= above))
     for _ in range(EDGE_PX + 1):
         grown = surface.copy()
-        for axis in (0, 1):
-            (near, far), (to_near, to_far) = _pair(surface, axis, 1), _pair(grown, axis, 1)
-            to_near |= far & ~steps[axis]
-            to_far |= near & ~steps[axis]
+        for axis, (is_like_above, is_like_below) in enumerate(likes):
+            before, after = surface.swapaxes(0, axis), grown.swapaxes(0, axis)
+            after[1:] |= before[:-1] & is_like_above[1:]
+            after[:-1] |= before[1:] & is_like_below[:-1]
         surface |= grown & is_edge
 
 
