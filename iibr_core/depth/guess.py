@@ -1,5 +1,5 @@
-"""A rough guess at depth without any model, from two cues of equal weight: the lower something stands in the picture,
-and the more edges lie between it and the upper border, which shows what is far, the nearer it is.
+"""A rough guess at depth without any model, from two cues of equal weight: things are nearer if they are low in the
+picture, and if many edges lie between them and its upper border, which is mostly far away.
 
 Sharpness, haze, saturation, brightness, a prior for the middle, and paths from the other borders did not help on all
 photos with known depth.

@@ -62,7 +62,7 @@ def _contrast(photo: FloatImage, colors: FloatImage, depth: FloatImage) -> Float
     difference = photo[EDGE_PX:] - photo[:-EDGE_PX]
     contrast = np.sqrt(np.einsum("yxc,yxc->yx", difference, difference)) / np.float32(CONTOUR_CONTRAST)
     contrast[np.maximum(colors[EDGE_PX:], colors[:-EDGE_PX]) <= 0] = 0  # texture
-    return np.maximum(contrast, np.abs(depth[EDGE_PX:] - depth[:-EDGE_PX]))
+    return np.asarray(np.maximum(contrast, np.abs(depth[EDGE_PX:] - depth[:-EDGE_PX])))
 
 
 def _nearest_free(is_free: Mask, row: int, column: int) -> tuple[int, int]:

@@ -94,6 +94,7 @@ class DepthCanvas:
 
     def _change(self, stroke: Stroke, under: FloatImage) -> NDArray[np.float64]:
         """Return the change (H, W) that the middle of a stroke makes; float64, which does not overflow."""
+        target: FloatImage | np.float32
         if stroke.tool == "smooth":
             target = smooth_within_contours(self._photo, under, stroke.radius_px(under.shape[1]))
         elif stroke.tool in DEPTH_TOOLS:
