@@ -23,8 +23,8 @@ from iibr_core.depth.embedded.unread import unread_parts
 from iibr_core.depth.estimate import DepthEstimate, disparity_from
 from iibr_core.depth.estimators.catalog import is_meaning_known, model_to_use
 from iibr_core.depth.estimators.estimate_depth import estimate_with
+from iibr_core.depth.guess import guess_depth
 from iibr_core.depth.map_file import as_estimate, depth_from_file, orient_map
-from iibr_core.depth.pictorial_cues import estimate_from_cues
 from iibr_core.depth.sidecar import find_sidecars
 from iibr_core.depth.stereo_pair import estimate_from_pair
 from iibr_core.formats.images.decode import read_orientation
@@ -212,7 +212,7 @@ class _Search:
     def guess(self) -> PhotoWithDepth:
         raise_if_stopped()
         report_progress(0, 0, "guessing depth")
-        estimate = estimate_from_cues(self.photo)
+        estimate = guess_depth(self.photo)
         return self.finish(DepthOrigin("rough", "rough, guessed without a model"), estimate, unread_parts(self.path))
 
     def finish(self, origin: DepthOrigin, estimate: DepthEstimate, notes: tuple[str, ...] = ()) -> PhotoWithDepth:

@@ -142,7 +142,7 @@ def make_plan(source: Source, loaded: LoadedPhoto, depth_strength: float, keeps_
         return plan_literal(loaded.photo, loaded.disparity, source.grid, keeps_views, source.inpaint)
     zero = source.focus_disparity
     if loaded.depth_settings.edits != UNEDITED:
-        zero = still_disparity(source, loaded.canvas.before_strokes(loaded.depth_settings.edits))
+        zero = still_disparity(source, loaded.canvas.without_strokes(loaded.depth_settings.edits))
         range_px, edited_px = (
             measure_disparity_range(map_.values).range for map_ in (loaded.refined, loaded.disparity)
         )

@@ -67,6 +67,6 @@ class DepthPreview:
         assert scene.plan is not None
         values = self._canvas.apply(edits)
         if self._still is None or self._still[0] != edits.tone:
-            self._still = edits.tone, still_disparity(scene.source, self._canvas.before_strokes(edits))
+            self._still = edits.tone, still_disparity(scene.source, self._canvas.without_strokes(edits))
         scale = scene.plan.disparity_scale or 1.0  # a flat scene that is being painted on has none yet
         return (values - np.float32(self._still[1])) * np.float32(scale)

@@ -33,7 +33,7 @@ from iibr_core.depth.edges.edge_profiles import (
     structure_at,
     walk,
 )
-from iibr_core.depth.pictorial_cues import resize_picture
+from iibr_core.depth.guess import resize_picture
 from iibr_core.formats.maps.resample import resample_surfaces
 from iibr_core.inpainting.disparity_by_color import fill_disparity_by_color
 from iibr_core.runtime.kernels import kernel

@@ -1,1 +1,1 @@
-"""What a user does to a map: tone, clips, a brush."""
+"""A user's edits of a disparity map: tone, clips, a brush and a bucket."""

@@ -1,12 +1,12 @@
-"""What a user makes of a disparity map: inverted, bent by gamma, clipped, painted on. Frozen records, pure functions.
+"""A user's edits of a disparity map (inversion, clips, gamma, brush strokes) as frozen records; the tone curve.
 
-Strengths, clips and places are shares, of the map's range or of the photo's size, so that edits fit any scale.
+Strengths, clips and places are shares of the map's range or of the photo's size, so that edits fit any scale.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import inf, isfinite
+from math import inf, isclose, isfinite
 from typing import Literal
 
 import numpy as np
@@ -16,19 +16,14 @@ from iibr_core.types import FloatImage, InputError
 BrushTool = Literal["nearer", "farther", "smooth", "level", "fill"]
 BRUSH_TOOLS: tuple[BrushTool, ...] = ("nearer", "farther", "smooth", "level", "fill")
 DEPTH_TOOLS: tuple[BrushTool, ...] = ("level", "fill")
-"""Those that lead to one depth, taken from some place: along the stroke, or of the surface under it (the bucket)."""
+"""Tools that paint one depth: along the stroke, or on the surface under it (the bucket)."""
 
 GAMMA_LIMITS = (0.25, 4.0)
 RADIUS_LIMITS = (0.002, 0.25)
-MOST_POINTS = 10_000
-"""Of one stroke."""
-
+MAX_POINTS = 10_000
+"""Largest number of points of one stroke."""
 EXTENT_PERCENTILES = (0.1, 99.9)
-"""The far and the near end of a map's range, without a few wild values."""
-FLAT_RANGE_SHARE = 1e-6
-"""A range below this share of the values is rounding: the map is flat."""
-FLAT_SPAN_WIDTHS = 0.01
-"""What counts as the range of a flat map, in photo widths: so that it can be painted on."""
+"""Percentiles of a map that count as its far and near end: a few wild values do not."""
 HISTOGRAM_BINS = 64
 
 
@@ -36,10 +31,10 @@ HISTOGRAM_BINS = 64
 class Stroke:
     """One stroke of the brush.
 
-    points: its path, (x, y) as shares of the photo's width and height (0 = left or top border). radius: as a share of
-    the photo's width. strength: 0..1; of "nearer" and "farther" the share of the map's range that its middle is moved,
-    of "smooth" how far it goes to the smoothed map, of "level" and "fill" to the depth that was before the stroke at
-    the place `taken_from`, None: where the stroke begins.
+    points: its path, (x, y) as shares of the photo's width and height (0 = left or top border). radius: share of the
+    photo's width. strength: 0..1, the largest change: for "nearer" and "farther" as a share of the map's range, for
+    "smooth" of the way to the smoothed map, for "level" and "fill" of the way to the depth that the map had before the
+    stroke at the place `taken_from`, or if that is None at the first point.
     """
 
     tool: BrushTool
@@ -49,16 +44,16 @@ class Stroke:
     taken_from: tuple[float, float] | None = None
 
     def radius_px(self, width: int) -> float:
-        """The radius in pixels of a map so wide, at least one."""
+        """Return the radius in pixels of a map of this width, at least one."""
         return max(self.radius * width, 1.0)
 
 
 @dataclass(frozen=True)
 class DepthEdits:
-    """Everything done to a map, in this order: inverted, clipped, bent, painted on. The default changes nothing.
+    """All edits of a map, in this order: inversion, clips, gamma, strokes. The default changes nothing.
 
-    far_clip, near_clip: shares of the map's range, 0 = far end, 1 = near end; what is farther or nearer is put there, 0
-    and 1 clip nothing. gamma: above 1 the far part is spread less, below 1 more.
+    far_clip, near_clip: shares of the map's range, 0 = far end, 1 = near end; values beyond are moved there, 0 and 1
+    clip nothing. gamma: above 1 the far part is spread less, below 1 more.
     """
 
     is_inverted: bool = False
@@ -69,7 +64,7 @@ class DepthEdits:
 
     @property
     def tone(self) -> DepthEdits:
-        """The same without strokes."""
+        """The same edits without strokes."""
         return DepthEdits(self.is_inverted, self.far_clip, self.near_clip, self.gamma)
 
 
@@ -78,7 +73,7 @@ UNEDITED = DepthEdits()
 
 @dataclass(frozen=True)
 class Levels:
-    """How the values of a map are spread: from low to high (px per view step) counts of equally wide parts."""
+    """Histogram of a map from `low` to `high` (px per view step), in bins of equal width."""
 
     low: float
     high: float
@@ -86,14 +81,14 @@ class Levels:
 
 
 def require_sound(edits: DepthEdits) -> None:
-    """Raise InputError where a value of the edits makes no sense: not finite, out of its limits, too many points."""
+    """Raise InputError if edits from a file hold a value that is not finite or out of its limits."""
     checks = [
         ("gamma", edits.gamma, GAMMA_LIMITS),
         ("near clip", edits.near_clip, (edits.far_clip, 1.0)),
         ("far clip", edits.far_clip, (0.0, 1.0)),
     ]
     for stroke in edits.strokes:
-        if stroke.tool not in BRUSH_TOOLS or not 1 <= len(stroke.points) <= MOST_POINTS:
+        if stroke.tool not in BRUSH_TOOLS or not 1 <= len(stroke.points) <= MAX_POINTS:
             raise InputError(f"depth edits: a stroke {stroke.tool!r} with {len(stroke.points)} points; paint it again")
         checks += [("brush radius", stroke.radius, RADIUS_LIMITS), ("brush strength", stroke.strength, (0.0, 1.0))]
         places = (*stroke.points, *([stroke.taken_from] if stroke.taken_from else []))
@@ -104,9 +99,9 @@ def require_sound(edits: DepthEdits) -> None:
 
 
 def extent_of(disparity: FloatImage) -> tuple[float, float]:
-    """(far, near) end of a map (H, W) without a few wild values; of a flat one a span about its value.
+    """Return the (far, near) end of the finite values of a map (H, W); of a flat map, a span around its value.
 
-    What is not finite is left out. Raises InputError where nothing is finite.
+    Raises InputError if no value is finite.
     """
     step = max(1, disparity.size // 1_000_000)
     values = disparity.reshape(-1)[::step]
@@ -116,43 +111,41 @@ def extent_of(disparity: FloatImage) -> tuple[float, float]:
     if not known.size:
         raise InputError("editing depth: no disparity is known; give another map")
     low, high = (float(end) for end in np.percentile(known.astype(np.float64), EXTENT_PERCENTILES))
-    if high - low > FLAT_RANGE_SHARE * max(abs(low), abs(high)):
+    if not isclose(low, high, rel_tol=1e-6):
         return low, high
-    span = FLAT_SPAN_WIDTHS * disparity.shape[1]
-    return low - span / 2, low + span / 2
+    # A flat map can be painted on: a hundredth of its width counts as its range.
+    return low - 0.005 * disparity.shape[1], low + 0.005 * disparity.shape[1]
 
 
 def apply_tone(disparity: FloatImage, edits: DepthEdits, extent: tuple[float, float] | None = None) -> FloatImage:
-    """The map (H, W), inverted, clipped and bent; its strokes are left to `canvas.DepthCanvas`. Edits must be sound.
+    """Return the map (H, W) float32 after inversion, clips and gamma, without strokes; the map itself if none is set.
 
-    extent: see `extent_of`, of this map where None. What is not finite is the far end. Values keep their order
-    (inverted ones the opposite); those beyond the extent stay beyond it unless they are clipped. Without edits, finite
-    maps come back as they are. Returns (H, W) float32.
+    extent: `extent_of` the map, computed if None. Values that are not finite become the far end; values beyond the
+    extent stay beyond it unless they are clipped.
     """
+    if edits.tone == UNEDITED and np.isfinite(disparity).all():
+        return np.asarray(disparity, np.float32)
     low, high = extent or extent_of(disparity)
-    values = disparity if np.isfinite(disparity).all() else np.where(np.isfinite(disparity), disparity, low)
-    values = np.asarray(values, np.float32)
-    if edits.tone == UNEDITED:
-        return values
+    values = np.where(np.isfinite(disparity), disparity, low)
     share = (values.astype(np.float64) - low) / (high - low)
     limit = np.finfo(np.float32).max
     return np.clip(low + _bend_curve(share, edits) * (high - low), -limit, limit).astype(np.float32)
 
 
 def tone_curve(share: float, edits: DepthEdits) -> float:
-    """Where `apply_tone` puts one value, both as shares of the extent (0 = far end)."""
+    """Return the value to which `apply_tone` moves a value, both as shares of the extent (0 = far end)."""
     return float(_bend_curve(np.float64(share), edits))
 
 
 def invert_tone_curve(share: float, edits: DepthEdits) -> float:
-    """The inverse of `tone_curve`, inversion left as it is; exact for what was not clipped."""
+    """Return the inverse of `tone_curve` without inversion and clips."""
     return share ** (1 / edits.gamma) if 0 < share < 1 else share if share <= 0 else 1 + (share - 1) / edits.gamma
 
 
 def levels_of(disparity: FloatImage) -> Levels:
-    """How the values of a map (H, W) are spread over its extent; what is wild counts at the ends.
+    """Return the histogram of a map (H, W) over its extent; values beyond count at the ends.
 
-    Raises InputError where nothing is finite.
+    Raises InputError if no value is finite.
     """
     low, high = extent_of(disparity)
     known = disparity[np.isfinite(disparity)][:: max(1, disparity.size // 1_000_000)]
@@ -161,7 +154,7 @@ def levels_of(disparity: FloatImage) -> Levels:
 
 
 def _bend_curve(share: np.ndarray | np.float64, edits: DepthEdits) -> np.ndarray:
-    """Shares after inversion, clips and gamma; beyond 0 and 1 the curve goes on straight."""
+    """Return shares after inversion, clips and gamma; beyond 0 and 1 the curve continues straight."""
     share = 1 - share if edits.is_inverted else share
     low = -inf if edits.far_clip == 0 else edits.far_clip
     high = inf if edits.near_clip == 1 else edits.near_clip

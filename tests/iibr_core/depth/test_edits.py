@@ -55,25 +55,9 @@ def test_tone_is_its_slow_twin_at_every_pixel(edits: DepthEdits, seed: int) -> N
     np.testing.assert_allclose(apply_tone(disparity, edits).flat, wanted, rtol=1e-5, atol=1e-5)
 
 
-@given(tones)
-def test_tone_keeps_the_order_of_values_or_turns_all_of_it(edits: DepthEdits) -> None:
-    disparity = np.linspace(-5, 7, 300, dtype=np.float32)[None]
-    steps = np.diff(apply_tone(disparity, edits)[0])
-    assert (steps <= 0).all() if edits.is_inverted else (steps >= 0).all()
-
-
 def test_without_edits_the_map_comes_back_as_it_is() -> None:
     disparity = np.random.default_rng(0).normal(size=(5, 6)).astype(np.float32)
     assert apply_tone(disparity, UNEDITED) is disparity
-
-
-def test_inverting_twice_comes_back() -> None:
-    disparity = np.random.default_rng(0).normal(size=(50, 60)).astype(np.float32)
-    extent = extent_of(disparity)
-    inverted = DepthEdits(is_inverted=True)
-    np.testing.assert_allclose(
-        apply_tone(apply_tone(disparity, inverted, extent), inverted, extent), disparity, atol=1e-5
-    )
 
 
 @given(shares, tones)

@@ -9,7 +9,7 @@ import pytest
 
 from iibr_core.depth.edges.edge_blur import measure_edge_blur
 from iibr_core.depth.edges.refine import refine
-from iibr_core.depth.pictorial_cues import estimate_from_cues
+from iibr_core.depth.guess import guess_depth
 from iibr_core.inpainting import background
 from iibr_core.inpainting.background import fill_background
 from iibr_core.inpainting.disparity_holes import fill_disparity_holes
@@ -54,7 +54,7 @@ STAGES = {
     "fill": filled,
     "refine": lambda: [refine(COLORS, np.where(HOLES, np.nan, SOFT), 1.0, None)],
     "blur": lambda: [np.float64(measure_edge_blur(COLORS, SOFT))],
-    "offline": lambda: [estimate_from_cues(Photo(COLORS, 100.0, "test")).values],
+    "offline": lambda: [guess_depth(Photo(COLORS, 100.0, "test")).values],
     "unknown depth": lambda: [fill_disparity_holes(np.where(HOLES, np.nan, LAYERS))],
 }
 

@@ -8,7 +8,7 @@ from math import hypot, isfinite
 from iibr_core.depth.editing.edits import (
     DEPTH_TOOLS,
     GAMMA_LIMITS,
-    MOST_POINTS,
+    MAX_POINTS,
     RADIUS_LIMITS,
     UNEDITED,
     DepthEdits,
@@ -121,7 +121,7 @@ def _paint(state: AppState, place: tuple[float, float]) -> AppState:
         return replace(state, stroke=stroke)
     last = stroke.points[-1]
     step = hypot(place[0] - last[0], (place[1] - last[1]) * scene.height / scene.width)
-    if step < POINT_SPACING * stroke.radius or len(stroke.points) >= MOST_POINTS:
+    if step < POINT_SPACING * stroke.radius or len(stroke.points) >= MAX_POINTS:
         return state
     return replace(state, stroke=replace(stroke, points=(*stroke.points, place)))
 

@@ -9,12 +9,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from iibr_core.depth import pictorial_cues
-from iibr_core.depth.pictorial_cues import estimate_from_cues
+from iibr_core.depth.geodesic import spread_distances
+from iibr_core.depth.guess import PIXEL_COST, box_filter, guess_depth
 from tests.iibr_core.scenes import photo_of, smooth_texture, square_before_wall
 
 
-def slow_way(image: np.ndarray) -> np.ndarray:
+def slow_paths(image: np.ndarray) -> np.ndarray:
     """Dijkstra from the upper border."""
     height, width = image.shape[:2]
     way = np.full((height, width), np.inf)
@@ -26,52 +26,46 @@ def slow_way(image: np.ndarray) -> np.ndarray:
         way[y, x] = length
         for v in range(max(y - 1, 0), min(y + 2, height)):
             for u in range(max(x - 1, 0), min(x + 2, width)):
-                step = pictorial_cues.STEP_COST * np.hypot(v - y, u - x) + np.linalg.norm(image[v, u] - image[y, x])
+                step = PIXEL_COST * np.hypot(v - y, u - x) + np.linalg.norm(image[v, u] - image[y, x])
                 if length + step < way[v, u]:
                     heapq.heappush(queue, (length + step, v, u))
     return way
 
 
-def test_ways_are_the_shortest() -> None:
-    photo, _ = square_before_wall(30, 40)
-    np.testing.assert_allclose(pictorial_cues._way_from_top(photo.pixels), slow_way(photo.pixels), rtol=0.05, atol=1e-4)
+def test_paths_are_the_shortest() -> None:
+    pixels = np.random.default_rng(0).random((30, 40, 3), np.float32)
+    path = np.full((30, 40), np.inf, np.float32)
+    path[0] = 0
+    spread_distances(pixels, PIXEL_COST, path)
+    np.testing.assert_allclose(path, slow_paths(pixels), rtol=1e-4)
 
 
 def test_averages_are_those_of_what_lies_inside() -> None:
     image = np.random.default_rng(0).random((7, 9, 2), np.float32)
-    got = pictorial_cues.box_filter(image, 2)
+    got = box_filter(image, 2)
     for y, x in np.ndindex(7, 9):
         expected = image[max(y - 2, 0) : y + 3, max(x - 2, 0) : x + 3].mean(axis=(0, 1))
         np.testing.assert_allclose(got[y, x], expected, rtol=1e-5)
 
 
-def test_the_guided_map_takes_its_edges_from_the_photo() -> None:
-    pixels = np.full((60, 60, 3), 0.2, np.float32)
-    pixels[:, 30:] = 0.8
-    ramp = np.tile(np.clip((np.arange(60, dtype=np.float32) - 22) / 16, 0, 1), (60, 1))
-    steps = np.abs(np.diff(pictorial_cues._guided_upsample(ramp, pixels.mean(axis=2), pixels), axis=1))
-    assert (steps.argmax(axis=1) == 29).all()
-    assert (steps.max(axis=1) > 4 * np.diff(ramp, axis=1).max()).all()
-
-
 def test_what_stands_out_before_a_wall_is_closer_than_the_wall_beside_it() -> None:
     photo, truth = square_before_wall(120, 160)
-    values = estimate_from_cues(photo).values
+    values = guess_depth(photo).values
     rows = slice(50, 70)
     in_front = truth.values[rows] > 1
     assert np.percentile(values[rows][in_front], 10) > np.percentile(values[rows][~in_front], 95)
 
 
 def test_a_plain_photo_is_a_ground() -> None:
-    values = estimate_from_cues(photo_of(np.full((40, 60, 3), 0.5))).values
+    values = guess_depth(photo_of(np.full((40, 60, 3), 0.5))).values
     assert (np.diff(values.mean(axis=1)) > 0).all()
     np.testing.assert_allclose(values, np.tile(values[:, :1], (1, 60)), atol=1e-4)
 
 
 def test_larger_photos_give_the_same_map_larger() -> None:
     texture = smooth_texture(300, 400)
-    small = estimate_from_cues(photo_of(texture)).values
-    large = estimate_from_cues(photo_of(texture.repeat(3, axis=0).repeat(3, axis=1))).values
+    small = guess_depth(photo_of(texture)).values
+    large = guess_depth(photo_of(texture.repeat(3, axis=0).repeat(3, axis=1))).values
     assert large.shape == (900, 1200)
     np.testing.assert_allclose(large[1::3, 1::3], small, atol=0.1)
 
@@ -80,7 +74,7 @@ def test_larger_photos_give_the_same_map_larger() -> None:
 @given(st.integers(1, 30), st.integers(1, 30), st.sampled_from([0.0, 1.0, 60000.0]), st.integers(0, 9))
 def test_any_photo_gives_a_finite_map_of_its_size(height: int, width: int, brightest: float, seed: int) -> None:
     pixels = np.random.default_rng(seed).random((height, width, 3)) * brightest
-    values = estimate_from_cues(photo_of(pixels, is_hdr=brightest > 1)).values
+    values = guess_depth(photo_of(pixels, is_hdr=brightest > 1)).values
     assert values.shape == (height, width)
     assert values.dtype == np.float32
     assert np.isfinite(values).all()
@@ -88,7 +82,7 @@ def test_any_photo_gives_a_finite_map_of_its_size(height: int, width: int, brigh
 
 @pytest.mark.parametrize("size", [(1, 1), (1, 500), (500, 1), (2, 3), (3, 900)])
 def test_thin_photos(size: tuple[int, int]) -> None:
-    values = estimate_from_cues(photo_of(np.random.default_rng(0).random((*size, 3)))).values
+    values = guess_depth(photo_of(np.random.default_rng(0).random((*size, 3)))).values
     assert values.shape == size
     assert np.isfinite(values).all()
 
@@ -98,5 +92,5 @@ def test_many_strong_edges_below_do_not_flatten_what_stands_above_them() -> None
     pixels[30:80, 45:75] = 0.6
     for row in range(100, 240, 40):
         pixels[row : row + 20], pixels[row + 20 : row + 40] = 0.0, 1.0
-    values = estimate_from_cues(photo_of(pixels)).values
+    values = guess_depth(photo_of(pixels)).values
     assert values[55, 60] - values[55, 15] > 0.03 * np.ptp(values)

@@ -6,10 +6,8 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from iibr_core.depth.editing import surface
+from iibr_core.depth.editing.bucket import _fill_holes, _flood, surface_at
 from iibr_core.depth.editing.edits import Stroke
-from iibr_core.depth.editing.surface import EDGE, SPACE, SURFACE, surface_at
-from iibr_core.depth.editing.touched_colors import guide_of
 
 HEIGHT, WIDTH = 60, 80
 
@@ -22,7 +20,7 @@ def filled(
     photo: np.ndarray, disparity: np.ndarray | None = None, x: float = 0.1, y: float = 0.5, radius: float = 0.03
 ):
     disparity = np.zeros(photo.shape[:2], np.float32) if disparity is None else disparity
-    return surface_at(guide_of(photo), disparity, Stroke("fill", ((x, y),), radius, 1.0), 0, (0.0, 1.0))
+    return surface_at(photo, disparity, Stroke("fill", ((x, y),), radius, 1.0), 0, (0.0, 1.0))
 
 
 def test_a_photo_edge_ends_it_where_the_colours_change() -> None:
@@ -103,29 +101,20 @@ def test_outside_the_photo_there_is_none(place: tuple[float, float]) -> None:
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_clearance_is_the_chessboard_distance(seed: int) -> None:
-    edges = np.random.default_rng(seed).random((23, 31)) < 0.03
-    clearance = np.empty(edges.shape, np.int32)
-    surface._measure_clearance(np.where(edges, EDGE, SPACE).astype(np.uint8), clearance)
-    np.testing.assert_array_equal(clearance, ndimage.distance_transform_cdt(~edges, "chessboard"))
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_flooding_finds_what_hangs_together(seed: int) -> None:
+def test_flooding_finds_connected_pixels(seed: int) -> None:
     space = np.random.default_rng(seed).random((23, 31)) < 0.7
-    row, column = np.argwhere(space)[len(space) // 2]
-    parts = np.where(space, SPACE, EDGE).astype(np.uint8)
-    surface._flood(parts.copy(), parts, row, column)
+    start, queue = np.flatnonzero(space)[space.sum() // 2], np.empty(space.size, np.int32)
+    count = _flood(space.copy(), start, queue)
     labels, _ = ndimage.label(space)
-    np.testing.assert_array_equal(parts == SURFACE, labels == labels[row, column])
+    np.testing.assert_array_equal(np.sort(queue[:count]), np.flatnonzero(labels == labels.flat[start]))
 
 
 @pytest.mark.parametrize("seed", range(4))
 def test_enclosed_holes_up_to_a_size_are_filled(seed: int) -> None:
     whole = np.random.default_rng(seed).random((23, 31)) < 0.6
-    parts = np.where(whole, SURFACE, EDGE).astype(np.uint8)
-    surface._fill_holes(parts, 3.0)
+    filled = whole.copy()
+    _fill_holes(filled, np.empty(whole.size, np.int32), 3.0)
     labels, count = ndimage.label(~whole)
     border = np.concatenate([labels[0], labels[-1], labels[:, 0], labels[:, -1]])
     small = [i for i in range(1, count + 1) if (labels == i).sum() <= 3 and i not in border]
-    np.testing.assert_array_equal(parts == SURFACE, whole | np.isin(labels, small))
+    np.testing.assert_array_equal(filled, whole | np.isin(labels, small))
