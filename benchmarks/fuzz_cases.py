@@ -14,9 +14,8 @@ import numpy as np
 
 from benchmarks import fuzz_seeds as seeds
 from benchmarks.fuzz_damage import Seed, damage, repair_png
-from iibr_core.depth.estimators import estimate_cache
-from iibr_core.depth.estimators.config import read_preparation
-from iibr_core.depth.estimators.transformers_models import KINDS
+from iibr_core.depth.models import cache as estimate_cache
+from iibr_core.depth.models.preparation import USUAL_PREPARATION, read_preparation
 from iibr_core.depth.search import open_with_depth
 from iibr_core.evaluation.lens_picture import read_lens_picture
 from iibr_core.formats.images.photo import read_photo
@@ -124,7 +123,7 @@ def _read_estimate(path: Path) -> None:
 
 
 def _read_model_config(path: Path) -> None:
-    read_preparation(path.parent, KINDS["depth_anything"])
+    read_preparation(path.parent, USUAL_PREPARATION)
 
 
 def _read_weights(path: Path) -> None:

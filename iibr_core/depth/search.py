@@ -19,8 +19,6 @@ from iibr_core.depth.embedded.embedded_depth import read_embedded
 from iibr_core.depth.embedded.picture import photo_in_focus, rotate_estimate
 from iibr_core.depth.embedded.unread import unread_parts
 from iibr_core.depth.estimate import DepthEstimate, disparity_from, inverse_metres_over
-from iibr_core.depth.estimators.catalog import is_meaning_known, model_to_use
-from iibr_core.depth.estimators.estimate_depth import estimate_with
 from iibr_core.depth.map_file import (
     depth_beside_picture,
     depth_from_channel,
@@ -29,6 +27,7 @@ from iibr_core.depth.map_file import (
     depth_of_picture,
     turned_estimate,
 )
+from iibr_core.depth.models.catalog import model_to_use
 from iibr_core.depth.pictorial_cues import estimate_from_cues
 from iibr_core.depth.sidecar import find_sidecar, flat_disparity, sidecars_of
 from iibr_core.depth.stereo_pair import estimate_from_pair
@@ -169,7 +168,7 @@ def estimator_of(found: PhotoWithDepth, choice: DepthChoice) -> EstimateDepth | 
         model = model_to_use(choice)
         if model is None:
             raise InputError(f"{found.origin.words}: the model no longer exists")
-        depth = estimate_with(model, replace(found.photo, pixels=colors))
+        depth = model.estimate(replace(found.photo, pixels=colors))
         if found.origin.near:  # the first estimate decided, for all
             depth = turned_estimate(depth, (found.origin.near == "the high end") != choice.inverts, choice)
         return _at_size(disparity_from(_as_chosen(depth, choice), USUAL_GRID), found.photo)
@@ -258,8 +257,8 @@ class _DepthSearch:
         if model is None:
             return None
         raise_if_stopped()
-        estimate = estimate_with(model, self.photo)
-        told = depth_of_model(model.title, estimate, is_meaning_known(model), self.photo, self.choice)
+        estimate = model.estimate(self.photo)
+        told = depth_of_model(model.title, estimate, model.is_meaning_known, self.photo, self.choice)
         origin = DepthOrigin("model", f"estimated by {model.title}", near=told.near)
         return _FoundDepth(self.photo, origin, told.estimate, told.notes)
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from benchmarks.estimate import estimate, turns_while_estimating
-from iibr_core.depth.estimators import estimate_cache
+from iibr_core.depth.models import cache as estimate_cache
 from iibr_core.formats.images.write import write_image
 from iibr_core.types import InputError
 from tests.iibr_core.depth.onnx_graphs import weighing
