@@ -81,7 +81,6 @@ FIGURES = (
     Figure(("free_views.md#poses",), "benchmarks.free_views --scenes 8 --size 384x288 --seed 7", 2),
     Figure(("figures.md#against-warp",), "benchmarks.against_warp --data DATA --repeats 2", 4, ("DATA",)),
     Figure(("figures.md#window",), "benchmarks.window", 1, ("X",)),
-    Figure(("figures.md#estimate",), "benchmarks.estimate", 2, ("X", "torch")),
     Figure(("figures.md#cancelled",), "benchmarks.cancel --times 10", 2),
     Figure(("figures.md#field-disparity",), "benchmarks.multi_view_depth --data DATA", 2, ("DATA",)),
     Figure(("refocus.md#pictures",), "benchmarks.refocus --data DATA --apertures 6 --max-pixels 150000", 40, ("DATA",)),

@@ -7,7 +7,8 @@ from contextlib import suppress
 from dataclasses import dataclass
 from urllib.parse import urlsplit
 
-from iibr_core.depth.models.catalog import KNOWN_MODELS, KnownModel, fetch, known_model, model_here
+from iibr_core.depth.models.catalog import fetch, known_model, model_here
+from iibr_core.depth.models.known import KNOWN_MODELS, KnownModel
 from iibr_core.runtime.work import Cancelled, watched
 from viewer.background.job_threads import Failed, Job, JobThread
 from viewer.model.state.model_download import Downloading, ModelOffer, ModelsListed

@@ -8,7 +8,8 @@ from typing import Annotated, Any
 
 import typer
 
-from iibr_core.depth.models.catalog import KNOWN_MODELS, fetch, known_model, list_own_models, model_here, register
+from iibr_core.depth.models.catalog import fetch, known_model, list_own_models, model_here, register
+from iibr_core.depth.models.known import KNOWN_MODELS
 from iibr_core.types import InputError
 from viewer.cli.terminal import show_progress
 
@@ -50,7 +51,7 @@ def get(
     is_published = any(model.name == name for model in KNOWN_MODELS)
     if not is_published and (Path(name).suffix.lower() == ".onnx" or Path(name).exists()):
         copy = register(Path(name))
-        print(f"{copy.folder} ({copy.weight_bytes / 1e6:,.0f} MB)")
+        print(copy.folder)
         print(f"Use it: iibr view PHOTO --depth-model {copy.folder.name}")
         return
     model = known_model(name)
@@ -67,7 +68,7 @@ def get(
         raise typer.Exit(EXIT_DECLINED)
     with show_progress("downloading"):
         fetched = fetch(model)
-    print(f"{fetched.folder} ({fetched.weight_bytes / 1e6:,.0f} MB, commit {model.commit})")
+    print(f"{fetched.folder} (commit {model.commit})")
     print(f"Use it: iibr view PHOTO --depth-model {model.name}")
 
 

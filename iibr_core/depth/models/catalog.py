@@ -1,4 +1,4 @@
-"""Depth models by name: published ones, those on this machine, and how to get one. Loads no model."""
+"""Depth models on this machine by name, file or folder, and how to get one. Loads no model."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ import os
 import shutil
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 from platformdirs import user_data_path
@@ -17,26 +16,13 @@ from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.estimate import DepthEstimate
 from iibr_core.depth.models import cache, onnx, torch_models
 from iibr_core.depth.models.download import download, local_folder
+from iibr_core.depth.models.known import KNOWN_MODELS, USUAL_MODEL, KnownModel, Runner, missing_package
 from iibr_core.depth.models.preparation import CONFIG, PREPROCESSOR, read_object
 from iibr_core.formats.files import entries_of, is_file, is_folder
 from iibr_core.formats.outputs import write_folder
-from iibr_core.runtime.extras import is_installed
 from iibr_core.runtime.work import report_progress
 from iibr_core.types import InputError, Photo
 
-Runner = Literal["onnx", "transformers", "unidepth"]
-PACKAGES: dict[Runner, tuple[str, ...]] = {
-    "onnx": ("onnxruntime",),
-    "transformers": ("transformers", "torch"),
-    "unidepth": ("unidepth", "torch"),
-}
-INSTALLING: dict[Runner, str] = {
-    "onnx": "use Python 3.11 to 3.14, later ones have no package of it yet",
-    "transformers": "pip install 'iibr[depth]'",
-    "unidepth": "follow github.com/lpiccinelli-eth/UniDepth",
-}
-ONNX_FILES = (CONFIG, PREPROCESSOR, "onnx/model.onnx")
-TORCH_FILES = (CONFIG, PREPROCESSOR, "model.safetensors")
 ONNX_KINDS = (None, "depth_anything", "dpt")
 """Model types, of folders with both kinds of weights, whose ONNX file is taken."""
 UNSPECIFIC_NAMES = ("model", "onnx")
@@ -44,45 +30,10 @@ UNSPECIFIC_NAMES = ("model", "onnx")
 
 
 @dataclass(frozen=True)
-class KnownModel:
-    """A published model.
-
-    repository: on the Hugging Face hub; commit: of it, in full, the only one that is downloaded. megabytes: of the
-    weights, about. good_for: in a few words. is_recommended: true for one model.
-    """
-
-    name: str
-    title: str
-    repository: str
-    commit: str
-    files: tuple[str, ...]
-    megabytes: int
-    licence: str
-    good_for: str
-    is_recommended: bool = False
-
-    @property
-    def figures(self) -> str:
-        """Size and licence, for lists."""
-        return f"{self.megabytes:,} MB, {self.licence}"
-
-    @property
-    def advice(self) -> str:
-        """Purpose, and whether it is recommended, for lists."""
-        return f"Good for {self.good_for}." + (" Recommended." if self.is_recommended else "")
-
-    @property
-    def needs(self) -> str:
-        """A sentence about the package that must be installed first, "" if none must."""
-        package = _missing_package("onnx" if self.files == ONNX_FILES else "transformers")
-        return f"Needs the package {package}." if package else ""
-
-
-@dataclass(frozen=True)
 class LocalModel:
     """A model on this machine. weights: its file and the files beside it that hold its numbers, or those in a folder.
 
-    is_meaning_known: whether its output surely means what its estimates say.
+    is_meaning_known: whether the meaning of its estimates is certain.
     """
 
     title: str
@@ -91,15 +42,10 @@ class LocalModel:
     weights: tuple[Path, ...]
     is_meaning_known: bool = True
 
-    @property
-    def weight_bytes(self) -> int:
-        """Size of the weights on disk."""
-        return sum(path.stat().st_size for path in self.weights)
-
     def estimate(self, photo: Photo) -> DepthEstimate:
         """Return the depth of a photo at a size of the model's choice, from the cache if it is there.
 
-        Raises InputError if the model cannot be used, or its result says nothing about the photo.
+        Raises InputError if the model cannot be used, or its result is of no use.
         """
         photo = photo_in_srgb(photo)
         report_progress(0, 0, f"looking for an earlier estimate by {self.title}")
@@ -128,93 +74,6 @@ class LocalModel:
             raise InputError(f"{self.title} gave the same depth everywhere")
 
 
-KNOWN_MODELS = (
-    KnownModel(
-        "depth-anything-v2-small",
-        "Depth Anything V2 Small",
-        "onnx-community/depth-anything-v2-small",
-        "64fe43eba7f8a384b02fe3fadaa26cbba35548d8",
-        ONNX_FILES,
-        99,
-        "Apache-2.0",
-        "any photo; the fastest",
-        is_recommended=True,
-    ),
-    KnownModel(
-        "depth-anything-v2-base",
-        "Depth Anything V2 Base",
-        "onnx-community/depth-anything-v2-base",
-        "6db5e16b48d85e78c043e57f8411a23550edbbfc",
-        ONNX_FILES,
-        389,
-        "CC-BY-NC-4.0 (not for commercial use)",
-        "any photo; finer shapes than Small, slower",
-    ),
-    KnownModel(
-        "depth-anything-v2-large",
-        "Depth Anything V2 Large",
-        "onnx-community/depth-anything-v2-large",
-        "e5476ff1183c8cfb19fcf293a5904c7403e77695",
-        ONNX_FILES,
-        1340,
-        "CC-BY-NC-4.0 (not for commercial use)",
-        "any photo; the finest shapes of the three, the slowest",
-    ),
-    KnownModel(
-        "depth-anything-v2-metric-indoor",
-        "Depth Anything V2 Metric Indoor Small",
-        "depth-anything/Depth-Anything-V2-Metric-Indoor-Small-hf",
-        "8078d68a9c75a972131914f6afd0c1723be0da7f",
-        TORCH_FILES,
-        99,
-        "Apache-2.0",
-        "rooms, where distances in metres matter",
-    ),
-    KnownModel(
-        "depth-anything-v2-metric-outdoor",
-        "Depth Anything V2 Metric Outdoor Small",
-        "depth-anything/Depth-Anything-V2-Metric-Outdoor-Small-hf",
-        "fd2c22027eaf20374204f14099b8341e1925ad39",
-        TORCH_FILES,
-        99,
-        "Apache-2.0",
-        "streets and landscapes, where distances in metres matter",
-    ),
-    KnownModel(
-        "depth-pro",
-        "Depth Pro",
-        "apple/DepthPro-hf",
-        "de816c8ce7168afcb231f96d501d72b869d0beda",
-        TORCH_FILES,
-        1904,
-        "Apple's model licence (for research)",
-        "sharp outlines such as hair, and distances in metres; slow",
-    ),
-    KnownModel(
-        "zoedepth",
-        "ZoeDepth",
-        "Intel/zoedepth-nyu-kitti",
-        "f364d4c7936e91f465abba182208dd68142bf0ca",
-        TORCH_FILES,
-        1380,
-        "MIT",
-        "distances in metres, indoors and on streets, under a free licence",
-    ),
-    KnownModel(
-        "midas-dpt-large",
-        "MiDaS 3 (DPT large)",
-        "Intel/dpt-large",
-        "bc15f29aa3a80d532f2ed650b5e16ac48d8958f9",
-        TORCH_FILES,
-        1370,
-        "Apache-2.0",
-        "comparing with older work",
-    ),
-)
-"""Sizes and licences as published; the repository has the last word."""
-USUAL_MODEL = next(model.name for model in KNOWN_MODELS if model.is_recommended)
-
-
 def known_model(name: str) -> KnownModel:
     """Return the known model of a name. Raises InputError with all names there are."""
     for model in KNOWN_MODELS:
@@ -227,7 +86,7 @@ def known_model(name: str) -> KnownModel:
 def model_to_use(choice: DepthChoice) -> LocalModel | None:
     """Return the model that the user wants: a folder, an ONNX file, the name of a copied or a known one.
 
-    Without a wish, return the usual one if it is ready, else None. Raises InputError if what is wanted is not here, or
+    Without a wish, return the usual one if it is ready, else None. Raises InputError if the wanted one is not here, or
     lacks its package.
     """
     wanted = choice.model
@@ -257,8 +116,7 @@ def model_here(model: KnownModel) -> LocalModel | None:
     folder = local_folder(model.repository, model.commit)
     if not all(is_file(folder / name) for name in model.files):
         return None
-    runner: Runner = "onnx" if model.files == ONNX_FILES else "transformers"
-    return LocalModel(model.title, folder, runner, (folder / model.files[-1],))
+    return LocalModel(model.title, folder, model.runner, (folder / model.files[-1],))
 
 
 def fetch(model: KnownModel) -> LocalModel:
@@ -300,11 +158,9 @@ def register(path: Path) -> LocalModel:
         raise InputError(f"{path}: {name} is the name of a published model; rename the file")
     copy = own_models_folder() / name / f"{name}.onnx"
     if not copy.parent.exists():
-        files = {
-            file: copy.name,
-            **{weights: str(weights.relative_to(file.parent)) for weights in onnx.external_files(file)},
-        }
+        files = {weights: str(weights.relative_to(file.parent)) for weights in onnx.external_files(file)}
         files |= {model.folder / name: name for name in (CONFIG, PREPROCESSOR) if is_file(model.folder / name)}
+        files[file] = copy.name
         with write_folder(copy.parent) as unfinished:
             for source, target in files.items():
                 (unfinished / target).parent.mkdir(parents=True, exist_ok=True)
@@ -350,12 +206,6 @@ def _only_file(path: Path, files: list[Path]) -> Path:
     return (full or files)[0]
 
 
-def _missing_package(runner: Runner) -> str:
-    """Return the first package that is not installed and how to get it, "" if all are."""
-    missing = [package for package in PACKAGES[runner] if not is_installed(package)]
-    return f"{missing[0]} first: {INSTALLING[runner]}" if missing else ""
-
-
 def _require_installed(model: LocalModel) -> None:
-    if package := _missing_package(model.runner):
+    if package := missing_package(model.runner):
         raise InputError(f"{model.title} needs the package {package}")

@@ -1,6 +1,6 @@
 """Files of one commit of a repository on the Hugging Face hub, in the folder where its library keeps them.
 
-huggingface_hub fetches them: mirrors, proxies, tokens and offline mode are as its variables say. `hf_hub_download`
+huggingface_hub fetches them: its variables state mirrors, proxies, tokens and offline mode. `hf_hub_download`
 deletes what came of a file when it is stopped, so `http_get` is asked to resume files that grow beside their places.
 """
 
@@ -9,19 +9,18 @@ from __future__ import annotations
 import hashlib
 import threading
 from collections.abc import Sequence
-from concurrent.futures import Future, wait
+from concurrent.futures import Future
 from pathlib import Path
 from typing import Any, cast
 
 from iibr_core.formats.files import is_file, reason_of
-from iibr_core.runtime.work import Cancelled, in_this_job, raise_if_stopped, report_progress
+from iibr_core.runtime.work import Cancelled, in_this_job, raise_if_stopped, report_progress, wait_unless_stopped
 from iibr_core.types import InputError
 
-POLL_S = 0.05
-"""Seconds between two looks whether a download is still wanted."""
-SHA256_LENGTH = 64
-"""Number of digits of a SHA-256: the hub's tag of a large file is one."""
-ADVICE = "what has come is kept: try again, name a mirror with HF_ENDPOINT, or use a file with --depth-model FILE.onnx"
+ADVICE = (
+    "what has come is kept: check the network and try again, name a mirror with HF_ENDPOINT, or use a file with"
+    " --depth-model FILE.onnx"
+)
 
 
 def local_folder(repository: str, commit: str) -> Path:
@@ -48,10 +47,8 @@ def download(repository: str, commit: str, names: Sequence[str], total_bytes: fl
             done.set_exception(error)
 
     threading.Thread(target=in_this_job(work), name="iibr-download", daemon=True).start()
-    while not wait([done], POLL_S).done:
-        raise_if_stopped()
     try:
-        done.result()
+        wait_unless_stopped(done)
     except (Cancelled, InputError):
         raise
     except Exception as error:  # whatever the library's clients raise: they change with its versions
@@ -98,7 +95,8 @@ def _fetch(repository: str, commit: str, name: str, place: Path, total_bytes: fl
             tqdm_class=cast(Any, Bar),
         )
     with part.open("rb") as file:
-        if len(stated.etag or "") == SHA256_LENGTH and hashlib.file_digest(file, "sha256").hexdigest() != stated.etag:
-            part.unlink()
-            raise InputError(f"{repository}: {name} is not what the hub states for commit {commit[:7]}; get it again")
+        digest = hashlib.file_digest(file, "sha256").hexdigest()
+    if digest != stated.etag and len(stated.etag or "") == len(digest):  # tags of small files are no such hashes
+        part.unlink()
+        raise InputError(f"{repository}: {name} is not what the hub states for commit {commit[:7]}; get it again")
     part.replace(place)

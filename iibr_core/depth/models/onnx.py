@@ -1,6 +1,6 @@
 """Depth models as ONNX files, run by ONNX Runtime on whichever processor it finds: no torch.
 
-Layout and size of the picture are read from the file. The JSON files beside it say how the photo is prepared and
+Layout and size of the picture are read from the file. The JSON files beside it state how the photo is prepared and
 whether the output is distances; without them, the photo is prepared as for Depth Anything V2.
 """
 
@@ -9,7 +9,7 @@ from __future__ import annotations
 import mmap
 import re
 from collections.abc import Mapping
-from concurrent.futures import ThreadPoolExecutor, wait
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -19,7 +19,6 @@ import numpy as np
 
 from iibr_core.depth.estimate import DepthEstimate
 from iibr_core.depth.models.preparation import (
-    CHANNELS,
     CONFIG,
     PREPROCESSOR,
     Preparation,
@@ -29,7 +28,7 @@ from iibr_core.depth.models.preparation import (
 )
 from iibr_core.formats.files import is_file, printable, reason_of, stays_within
 from iibr_core.runtime.machine import core_count
-from iibr_core.runtime.work import Cancelled, is_stopped, report_progress
+from iibr_core.runtime.work import Cancelled, report_progress, wait_unless_stopped
 from iibr_core.types import FloatImage, ImageSize, InputError, Photo
 
 ACCELERATORS = ("CUDAExecutionProvider", "CoreMLExecutionProvider", "DmlExecutionProvider")
@@ -57,8 +56,6 @@ MAX_ASPECT_CHANGE = 1.25
 """Largest ratio between the aspects of a picture and its map: outputs of other shapes are lists of features."""
 OTHER_MULTIPLE = 32
 """Multiple of both sides for networks that refuse multiples of 14 px."""
-POLL_S = 0.05
-"""Seconds between two looks whether a running estimate is still wanted."""
 
 
 @dataclass(frozen=True)
@@ -79,9 +76,7 @@ class PictureInput:
     def prepare(self, pixels: FloatImage, preparation: Preparation, size: ImageSize) -> np.ndarray[Any, Any]:
         """Return a photo's pixels (H, W, 3), 0..1, as the model takes them."""
         if self.number_type == "uint8":
-            planes = network_input(
-                pixels, replace(preparation, mean=(0.0,) * CHANNELS, std=(1 / 255,) * CHANNELS), size
-            )
+            planes = network_input(pixels, replace(preparation, mean=(0.0,) * 3, std=(1 / 255,) * 3), size)
             planes = np.clip(np.rint(planes), 0, 255)
         else:
             planes = network_input(pixels, preparation, size)
@@ -95,9 +90,10 @@ def estimate_onnx(file: Path, settings: Path, title: str, photo: Photo) -> Depth
     settings: the folder of the JSON files. title: for progress. Raises InputError if the file is no depth model.
     """
     report_progress(0, 0, f"loading {title}")
-    available = _runtime(file).get_available_providers()
-    accelerators = [name for name in ACCELERATORS if name in available]
-    if accelerators:
+    import onnxruntime
+
+    available = onnxruntime.get_available_providers()
+    if accelerators := [name for name in ACCELERATORS if name in available]:
         with suppress(InputError):  # the driver is missing, or cannot run this network
             return _estimate(open_session(file, *accelerators), file, settings, title, photo)
     return _estimate(open_session(file), file, settings, title, photo)
@@ -125,15 +121,16 @@ def _estimate(session: Any, file: Path, settings: Path, title: str, photo: Photo
 
 
 def open_session(file: Path, *accelerators: str) -> Any:
-    """Return an ONNX Runtime session. Raises InputError if the file is no ONNX model, or ONNX Runtime is missing."""
-    runtime = _runtime(file)
-    options = runtime.SessionOptions()
+    """Return an ONNX Runtime session. Raises InputError if the file is no ONNX model."""
+    import onnxruntime
+
+    options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = core_count()
     # Threads that spin while they wait would take the cores from the window.
     options.add_session_config_entry("session.intra_op.allow_spinning", "0")
     options.log_severity_level = 4
     try:
-        return runtime.InferenceSession(str(file), options, providers=[*accelerators, CPU])
+        return onnxruntime.InferenceSession(str(file), options, providers=[*accelerators, CPU])
     except Exception as error:  # its errors share no class
         raise InputError(f"{file}: is not an ONNX model that can be run ({reason_of(error)}); get it again") from error
 
@@ -144,7 +141,7 @@ def picture_input(session: Any, file: Path) -> PictureInput:
     shape = inputs[0].shape if inputs else []
     first = len(shape) - 3
     is_picture = len(inputs) == 1 and first in (0, 1) and inputs[0].type in NUMBER_TYPES
-    axes = [axis for axis in (first, len(shape) - 1) if is_picture and shape[axis] == CHANNELS]
+    axes = [axis for axis in (first, len(shape) - 1) if is_picture and shape[axis] == 3]
     if is_picture and not axes and not isinstance(shape[first], int):
         axes = [first]
     if not axes:
@@ -186,31 +183,20 @@ def external_files(file: Path) -> tuple[Path, ...]:
     return tuple(file.parent / name for name in names)
 
 
-def _runtime(file: Path) -> Any:
-    try:
-        import onnxruntime
-    except ImportError as error:
-        raise InputError(
-            f"{file}: running it needs ONNX Runtime, which has no package for this Python yet; use Python 3.11 to 3.14"
-        ) from error
-    return onnxruntime
-
-
-def _run(session: Any, values: Mapping[str, Any]) -> dict[str, Any]:
+def _run(session: Any, pictures: Mapping[str, Any]) -> dict[str, Any]:
     """Return all outputs by name; the network runs in a thread, so that it can be stopped. Raises RuntimeError."""
     import onnxruntime
 
     options = onnxruntime.RunOptions()
     with ThreadPoolExecutor(1, "iibr-onnx") as thread:
-        running = thread.submit(session.run, None, values, options)
-        while not wait([running], POLL_S).done:
-            options.terminate = options.terminate or is_stopped()
-    if options.terminate:
-        raise Cancelled
-    try:
-        return dict(zip((output.name for output in session.get_outputs()), running.result()))
-    except Exception as error:  # its errors share no class
-        raise RuntimeError(reason_of(error)) from error
+        try:
+            values = wait_unless_stopped(thread.submit(session.run, None, pictures, options))
+        except Cancelled:
+            options.terminate = True
+            raise
+        except Exception as error:  # its errors share no class
+            raise RuntimeError(reason_of(error)) from error
+    return dict(zip((output.name for output in session.get_outputs()), values))
 
 
 def _is_map(name: str, values: Any, size: ImageSize) -> bool:

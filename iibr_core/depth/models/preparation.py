@@ -14,7 +14,6 @@ from iibr_core.formats.files import is_file, read_text, reason_of
 from iibr_core.types import FloatImage, ImageSize, InputError
 
 CONFIG, PREPROCESSOR = "config.json", "preprocessor_config.json"
-CHANNELS = 3
 MAX_SIDE = 4096
 MAX_AREA_GROWTH = 2.5
 """Largest area of a long photo's input, as a multiple of the area that the model was made for."""
@@ -50,7 +49,7 @@ USUAL_PREPARATION = Preparation(ImageSize(518, 518), True, 14, (0.485, 0.456, 0.
 
 def network_input(pixels: FloatImage, preparation: Preparation, size: ImageSize) -> FloatImage:
     """Return pixels (H, W, 3), 0..1, as (1, 3, height, width): resized by an antialiased cubic kernel, normalised."""
-    planes = np.empty((1, CHANNELS, *size), np.float32)
+    planes = np.empty((1, 3, *size), np.float32)
     for c, (mean, deviation) in enumerate(zip(preparation.mean, preparation.std)):
         plane = Image.fromarray(np.clip(pixels[..., c], 0, 1).astype(np.float32))
         resized = np.asarray(plane.resize((size.width, size.height), Image.Resampling.BICUBIC))
@@ -75,8 +74,8 @@ def read_preparation(folder: Path, usual: Preparation = USUAL_PREPARATION) -> Pr
             ImageSize(height, width),
             bool(settings.get("keep_aspect_ratio", usual.keeps_aspect)),
             max(int(settings.get("ensure_multiple_of", usual.multiple)), 1),
-            tuple(np.broadcast_to(np.asarray(mean, np.float32), CHANNELS) / white),
-            tuple(np.broadcast_to(np.asarray(std, np.float32), CHANNELS) / white),
+            tuple(np.broadcast_to(np.asarray(mean, np.float32), 3) / white),
+            tuple(np.broadcast_to(np.asarray(std, np.float32), 3) / white),
         )
     except (TypeError, ValueError, KeyError, ArithmeticError) as error:
         raise InputError(f"{path}: makes no sense ({reason_of(error)})") from error

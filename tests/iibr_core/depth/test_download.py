@@ -12,7 +12,8 @@ from pathlib import Path
 
 import pytest
 
-from iibr_core.depth.models.catalog import USUAL_MODEL, known_model
+from iibr_core.depth.models.catalog import known_model
+from iibr_core.depth.models.known import USUAL_MODEL
 from tests.local_hub import Hub, local_hub
 
 MODEL = known_model(USUAL_MODEL)

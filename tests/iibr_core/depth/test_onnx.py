@@ -150,23 +150,23 @@ def test_of_several_outputs_the_map_of_depth_is_chosen(others: dict[str, np.ndar
     depth = (MAP + 7).reshape(1, 56, 84)
     found = depth_output(Path("model.onnx"), {**others, name: depth}, ImageSize(56, 84))
     np.testing.assert_array_equal(found, depth[0])
+    for shape in ((1, 384, 4, 6), (1, 1370, 384), (1, 3, 56, 84), (0, 56, 84)):
+        with pytest.raises(InputError, match=r"model\.onnx: gives out .*choose a depth model"):
+            depth_output(Path("model.onnx"), {"out": np.zeros(shape, np.float32)}, ImageSize(56, 84))
 
 
-@pytest.mark.parametrize("shape", [(1, 384, 4, 6), (1, 1370, 384), (1, 3, 56, 84), (0, 56, 84)])
-def test_outputs_without_a_map_are_listed(shape: tuple[int, ...]) -> None:
-    with pytest.raises(InputError, match=r"model\.onnx: gives out .*choose a depth model"):
-        depth_output(Path("model.onnx"), {"out": np.zeros(shape, np.float32)}, ImageSize(56, 84))
+@pytest.mark.parametrize(("weights", "message"), [(np.nan, "gave NaN"), (0.0, "gave the same depth everywhere")])
+def test_results_that_say_nothing_are_refused_and_not_kept(tmp_path: Path, weights: float, message: str) -> None:
+    with pytest.raises(InputError, match=f"the model model.onnx {message}"):
+        values_of(weighing(tmp_path / "model.onnx", (weights, 0, 0)), photo_of(60, 90))
+    assert not (tmp_path / "cache").exists()
 
 
-@pytest.mark.parametrize("content", [b"", b"no model", b"\x08\x0a"])
-def test_what_is_no_model_is_one_line(tmp_path: Path, content: bytes) -> None:
-    (tmp_path / "model.onnx").write_bytes(content)
-    with pytest.raises(InputError, match=r"model\.onnx") as caught:
-        values_of(tmp_path / "model.onnx", photo_of(60, 90))
-    assert "\n" not in str(caught.value)
-
-
-def test_a_model_that_takes_no_picture_is_refused(tmp_path: Path) -> None:
+def test_what_is_no_model_of_a_picture_is_one_line(tmp_path: Path) -> None:
+    for content in (b"", b"no model", b"\x08\x0a"):
+        (tmp_path / "model.onnx").write_bytes(content)
+        with pytest.raises(InputError, match=r"model\.onnx: is not an ONNX model that can be run [^\n]*$"):
+            values_of(tmp_path / "model.onnx", photo_of(60, 90))
     takes = helper.make_tensor_value_info("v", TensorProto.FLOAT, [3])
     file = save_graph(tmp_path / "model.onnx", [helper.make_node("Identity", ["v"], ["o"])], {}, takes, "o")
     with pytest.raises(InputError, match=r"takes v \[3\] tensor\(float\), not one picture"):

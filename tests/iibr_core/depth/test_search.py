@@ -9,7 +9,8 @@ import pytest
 
 from iibr_core.depth.choice import DepthChoice, DepthStart
 from iibr_core.depth.models import cache as estimate_cache
-from iibr_core.depth.models.catalog import USUAL_MODEL, known_model
+from iibr_core.depth.models.catalog import known_model
+from iibr_core.depth.models.known import USUAL_MODEL
 from iibr_core.depth.search import PhotoWithDepth, open_with_depth, sketch_depth
 from iibr_core.formats.images.photo import read_photo
 from iibr_core.runtime.work import Cancelled, stoppable, watched

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from iibr_core.depth.models.catalog import KNOWN_MODELS
+from iibr_core.depth.models.known import KNOWN_MODELS
 from iibr_core.formats.images.write import write_image
 from tests.iibr_core.depth.onnx_graphs import of_channels
 from tests.viewer.cli.test_cli import run
