@@ -58,9 +58,8 @@ def download(repository: str, commit: str, names: Sequence[str], total_bytes: fl
 
 def _fetch(repository: str, commit: str, name: str, place: Path, total_bytes: float) -> None:
     """Download the rest of a file, compare it with the hub's hash, and put it in its place."""
-    from huggingface_hub import get_hf_file_metadata, hf_hub_url
+    from huggingface_hub import get_hf_file_metadata, get_token, hf_hub_url
     from huggingface_hub.file_download import http_get
-    from huggingface_hub.utils import build_hf_headers
 
     class Bar:
         """Progress of a file, in place of tqdm's. The library updates it before it writes a piece."""
@@ -81,6 +80,7 @@ def _fetch(repository: str, commit: str, name: str, place: Path, total_bytes: fl
 
     url = hf_hub_url(repository, name, revision=commit)
     stated = get_hf_file_metadata(url)
+    headers = {"Authorization": f"Bearer {get_token()}"} if get_token() else {}
     place.parent.mkdir(parents=True, exist_ok=True)
     part = place.with_name(f"{place.name}.part")
     part.touch()
@@ -90,12 +90,12 @@ def _fetch(repository: str, commit: str, name: str, place: Path, total_bytes: fl
             url,
             file,
             resume_size=came,
-            headers=build_hf_headers(),
+            headers=headers,
             expected_size=stated.size,
             tqdm_class=cast(Any, Bar),
         )
-    with part.open("rb") as file:
-        digest = hashlib.file_digest(file, "sha256").hexdigest()
+    with part.open("rb") as whole:
+        digest = hashlib.file_digest(whole, "sha256").hexdigest()
     if digest != stated.etag and len(stated.etag or "") == len(digest):  # tags of small files are no such hashes
         part.unlink()
         raise InputError(f"{repository}: {name} is not what the hub states for commit {commit[:7]}; get it again")
