@@ -21,10 +21,9 @@ from iibr_core.depth.embedded.embedded_depth import read_embedded
 from iibr_core.depth.embedded.picture import photo_in_focus, rotate_estimate
 from iibr_core.depth.embedded.unread import unread_parts
 from iibr_core.depth.estimate import DepthEstimate, disparity_from
-from iibr_core.depth.estimators.catalog import is_meaning_known, model_to_use
-from iibr_core.depth.estimators.estimate_depth import estimate_with
 from iibr_core.depth.guess import guess_depth
 from iibr_core.depth.map_file import as_estimate, depth_from_file, orient_map
+from iibr_core.depth.models.catalog import model_to_use
 from iibr_core.depth.sidecar import find_sidecars
 from iibr_core.depth.stereo_pair import estimate_from_pair
 from iibr_core.formats.images.decode import read_orientation
@@ -124,7 +123,7 @@ def estimator_of(found: PhotoWithDepth, choice: DepthChoice) -> EstimateDepth | 
         model = model_to_use(choice)
         if model is None:
             raise InputError(f"{found.origin.words}: the model no longer exists")
-        depth = estimate_with(model, replace(found.photo, pixels=colors))
+        depth = model.estimate(replace(found.photo, pixels=colors))
         if found.origin.near:
             is_large_near = (found.origin.near == "the high end") != choice.inverts
             depth = as_estimate(MapFile(depth.values, "floats"), is_large_near, choice.is_metric or depth.is_metric)
@@ -202,8 +201,8 @@ class _Search:
         if model is None:
             return None
         raise_if_stopped()
-        estimate, origin = estimate_with(model, self.photo), DepthOrigin("model", f"estimated by {model.title}")
-        if estimate.meaning == "disparity" or is_meaning_known(model):
+        estimate, origin = model.estimate(self.photo), DepthOrigin("model", f"estimated by {model.title}")
+        if estimate.meaning == "disparity" or model.is_meaning_known:
             return self.finish(origin, estimate)
         values = MapFile(estimate.values, "floats")
         depth = orient_map(model.title, values, self.photo, self.choice, estimate.is_metric)

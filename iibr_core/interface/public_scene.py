@@ -15,9 +15,8 @@ from numpy.typing import NDArray
 
 from iibr_core.color import encoded_from_stored, photo_in_srgb
 from iibr_core.depth.choice import DepthChoice, DepthStart
-from iibr_core.depth.estimators.catalog import model_to_use
-from iibr_core.depth.estimators.estimate_depth import estimate_with
 from iibr_core.depth.guess import guess_depth
+from iibr_core.depth.models.catalog import model_to_use
 from iibr_core.formats.images.photo import DEFAULT_MAX_PIXELS, focal_px_from_fov, read_photo
 from iibr_core.formats.light_fields.light_field_formats import is_light_field, open_light_field
 from iibr_core.formats.light_fields.multi_view_scene import MultiView
@@ -255,7 +254,7 @@ def estimate_depth(
             return guess_depth(given).values
         local = model_to_use(DepthChoice("model", model=None if model is None else str(model)))
         assert local is not None, "what was asked for is there, or was refused"
-        estimate = estimate_with(local, given)
+        estimate = local.estimate(given)
     values = estimate.values
     return map_at_size(np.reciprocal(values) if estimate.is_metric else values, given.size)
 

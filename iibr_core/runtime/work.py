@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from concurrent.futures import Future, wait
 from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import ParamSpec, TypeVar
@@ -10,6 +11,8 @@ from typing import ParamSpec, TypeVar
 ShouldStop = Callable[[], bool]
 ReportProgress = Callable[[float, float, str], None]
 """Function of (done, total, doing): amounts of work, the total 0 if it is unknown; and the work in words."""
+POLL_S = 0.05
+"""Seconds between two looks whether a job that waits for another thread is to stop."""
 Parameters = ParamSpec("Parameters")
 Result = TypeVar("Result")
 
@@ -72,6 +75,13 @@ def raise_if_stopped() -> None:
     """Raise Cancelled if the present job is to stop."""
     if is_stopped():
         raise Cancelled
+
+
+def wait_unless_stopped(running: Future[Result]) -> Result:
+    """Return the result of work in another thread. Raises Cancelled if the present job is to stop before."""
+    while not wait([running], POLL_S).done:
+        raise_if_stopped()
+    return running.result()
 
 
 def report_progress(done: float, total: float, doing: str) -> None:

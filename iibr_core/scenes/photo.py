@@ -16,7 +16,7 @@ from iibr_core.depth.choice import DepthOrigin
 from iibr_core.depth.edges.refine import refine
 from iibr_core.depth.editing.canvas import DepthCanvas
 from iibr_core.depth.editing.edits import BRUSH_TOOLS, UNEDITED, DepthEdits, Stroke, levels_of
-from iibr_core.depth.estimators.catalog import USUAL_MODEL
+from iibr_core.depth.models.known import USUAL_MODEL
 from iibr_core.depth.search import PhotoWithDepth, SlowSource, estimator_of, find_depth, open_with_depth
 from iibr_core.formats.files import require_file
 from iibr_core.formats.images.metadata import settings_text_in

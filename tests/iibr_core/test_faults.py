@@ -13,7 +13,7 @@ import pytest
 
 from iibr_core.depth.embedded.embedded_depth import read_embedded
 from iibr_core.depth.estimate import DepthEstimate
-from iibr_core.depth.estimators import estimate_cache
+from iibr_core.depth.models import cache as estimate_cache
 from iibr_core.formats.images.write import write_image
 from iibr_core.formats.maps.disparity_file import read_disparity
 from iibr_core.types import ImageSize, InputError

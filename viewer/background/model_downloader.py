@@ -5,17 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
 
+from iibr_core.depth.models.catalog import fetch, known_model, model_here
+from iibr_core.depth.models.known import KNOWN_MODELS, KnownModel
 from iibr_core.runtime.work import Cancelled, watched
 from viewer.background.job_threads import Failed, Job, JobThread
 from viewer.model.state.model_download import Downloading, ModelOffer, ModelsListed
 
-if TYPE_CHECKING:
-    from iibr_core.depth.estimators.depth_estimator import KnownModel
-
-BYTES_OF_MEGABYTE = 1e6
+MEGABYTE = 1e6
 
 
 @dataclass(frozen=True)
@@ -27,7 +25,7 @@ class ModelRequest:
 
 @dataclass(frozen=True)
 class Downloaded:
-    """What came, and what there is now."""
+    """A model that was downloaded, and the list of models since."""
 
     model: ModelOffer
     listed: ModelsListed
@@ -37,26 +35,23 @@ DownloadResult = Downloading | Downloaded | Failed[str]
 
 
 class ModelDownloads(JobThread[ModelRequest, DownloadResult]):
-    """A new request gives up the one before."""
+    """A thread of downloads; a new request cancels the previous one."""
 
     def __init__(self, wake: Callable[[], None]) -> None:
         """wake: called, in the thread, when a result was posted."""
-        super().__init__("iibr-models", wake, _results_of, lambda asked, message: Failed(asked.name, message))
+        super().__init__("iibr-models", wake, _results_of, lambda request, message: Failed(request.name, message))
 
 
 def _results_of(job: Job[ModelRequest, DownloadResult]) -> Iterator[DownloadResult]:
-    from iibr_core.depth.estimators.catalog import fetch, known_model
-
     model = known_model(job.request.name)
-    told = Downloading(model.title, 0, model.megabytes)
-    yield told
+    shown = Downloading(model.title, 0, model.megabytes)
+    yield shown
 
     def report(done_bytes: float, total_bytes: float, doing: str) -> None:
-        nonlocal told
-        done = int(done_bytes / BYTES_OF_MEGABYTE)
-        latest = Downloading(model.title, done, max(int(total_bytes / BYTES_OF_MEGABYTE), done, 1))
-        if latest != told:
-            told = latest
+        nonlocal shown
+        latest = Downloading(model.title, int(done_bytes / MEGABYTE), max(int(total_bytes / MEGABYTE), 1))
+        if latest != shown:
+            shown = latest
             job.post(latest)
 
     with suppress(Cancelled), watched(report):
@@ -66,29 +61,21 @@ def _results_of(job: Job[ModelRequest, DownloadResult]) -> Iterator[DownloadResu
 
 
 def list_models() -> ModelsListed:
-    """What can be had, and what is here. Takes half a second the first time."""
-    from iibr_core.depth.estimators.catalog import KNOWN_MODELS
-
+    """Return the known models and which of them are here. Takes half a second the first time."""
     return ModelsListed(tuple(map(_offer_of, KNOWN_MODELS)))
 
 
 def _offer_of(model: KnownModel) -> ModelOffer:
-    """What the window says of a model."""
     from huggingface_hub import constants
 
-    from iibr_core.depth.estimators.catalog import state_of
-    from iibr_core.depth.estimators.words import words_about
-
-    state = state_of(model)
-    words = words_about(model, state)
     return ModelOffer(
         model.name,
         model.title,
         model.megabytes,
         model.licence,
         host=urlsplit(constants.ENDPOINT).netloc,
-        words=" ".join(filter(None, (f"{words.figures}.", words.good_for, words.needs))),
-        is_here=state.is_here,
-        lacks=f"needs {state.needs}" if state.needs else "",
+        words=" ".join(filter(None, (f"{model.figures}.", model.advice, model.needs))),
+        is_here=model_here(model) is not None,
+        lacks=model.needs,
         is_recommended=model.is_recommended,
     )

@@ -107,7 +107,7 @@ def require_existing(source: Source) -> None:
 def require_model(choice: DepthChoice) -> None:
     """Raise InputError where a depth model is asked for that cannot be used."""
     if choice.asks_for_model:
-        from iibr_core.depth.estimators.catalog import model_to_use
+        from iibr_core.depth.models.catalog import model_to_use
 
         model_to_use(choice)
 

@@ -4,12 +4,25 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import onnx
 from onnx import TensorProto, helper, numpy_helper
 
 from iibr_core.types import ImageSize
+
+IR_VERSION, OPSET = 10, 17
+
+
+def save_graph(file: Path, nodes: list[Any], constants: dict[str, Any], takes: Any, *gives: str) -> Path:
+    """Save a graph from nodes and arrays by name. takes: the value info of its input; gives: names of its outputs."""
+    outputs = [helper.make_tensor_value_info(name, TensorProto.FLOAT, None) for name in gives]
+    arrays = [numpy_helper.from_array(np.asarray(value), name) for name, value in constants.items()]
+    graph = helper.make_graph(nodes, "graph", [takes], outputs, arrays)
+    opset = helper.make_opsetid("", OPSET)
+    onnx.save(helper.make_model(graph, opset_imports=[opset], ir_version=IR_VERSION), str(file))
+    return file
 
 
 def weighing(file: Path, weights: tuple[float, float, float], fixed: ImageSize | None = None) -> Path:
@@ -19,19 +32,9 @@ def weighing(file: Path, weights: tuple[float, float, float], fixed: ImageSize |
         helper.make_node("Conv", ["pixel_values", "weights"], ["sum"]),
         helper.make_node("Squeeze", ["sum", "axis"], ["predicted_depth"]),
     ]
-    constants = [
-        numpy_helper.from_array(np.array(weights, np.float32).reshape(1, 3, 1, 1), "weights"),
-        numpy_helper.from_array(np.array([1]), "axis"),
-    ]
-    graph = helper.make_graph(
-        nodes,
-        "weighing",
-        [helper.make_tensor_value_info("pixel_values", TensorProto.FLOAT, ["batch", 3, *sides])],
-        [helper.make_tensor_value_info("predicted_depth", TensorProto.FLOAT, ["batch", *sides])],
-        constants,
-    )
-    onnx.save(helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)], ir_version=10), file)
-    return file
+    constants = {"weights": np.array(weights, np.float32).reshape(1, 3, 1, 1), "axis": [1]}
+    takes = helper.make_tensor_value_info("pixel_values", TensorProto.FLOAT, ["batch", 3, *sides])
+    return save_graph(file, nodes, constants, takes, "predicted_depth")
 
 
 def published(folder: Path) -> dict[str, bytes]:
@@ -50,35 +53,24 @@ def of_channels(
     file: Path,
     last: bool = False,
     as_bytes: bool = False,
-    extra_first: bool = False,
+    extra: str = "",
     rank: int = 3,
     farness: bool = False,
     size: int = 112,
 ) -> Path:
-    """A network of one channel, red: its depth, or, with `farness`, 300 less it. last: channels; as_bytes: uint8 input;
-    extra_first: gives its input before the depth; rank: of the depth.
+    """A network that gives red, or, with `farness`, 300 less red. last: channels; as_bytes: uint8 input; rank: of the
+    depth; extra: name of an output before it that holds the input.
     """
     axis = 3 if last else 1
-    kind = TensorProto.UINT8 if as_bytes else TensorProto.FLOAT
-    shape = [1, size, size, 3] if last else [1, 3, "h", "w"]
     nodes = [
         helper.make_node("Cast", ["x"], ["floats"], to=TensorProto.FLOAT),
         helper.make_node("Gather", ["floats", "red"], ["picked"], axis=axis),
         helper.make_node("Sub", ["most", "picked"], ["far"]),
-        helper.make_node("Identity", ["far" if farness else "picked"], ["whole"]),
-        helper.make_node("Squeeze", ["whole", "axis"], ["depth"])
-        if rank == 3
-        else helper.make_node("Identity", ["whole"], ["depth"]),
+        helper.make_node("Identity", ["far" if farness else "picked"], ["whole" if rank == 3 else "depth"]),
     ]
-    constants = [
-        helper.make_tensor("red", TensorProto.INT64, [1], [0]),
-        helper.make_tensor("axis", TensorProto.INT64, [1], [axis]),
-        helper.make_tensor("most", TensorProto.FLOAT, [], [300.0]),
-    ]
-    outputs = [helper.make_tensor_value_info("depth", TensorProto.FLOAT, None)]
-    if extra_first:
-        nodes.append(helper.make_node("Identity", ["floats"], ["features"]))
-        outputs.insert(0, helper.make_tensor_value_info("features", TensorProto.FLOAT, None))
-    graph = helper.make_graph(nodes, "g", [helper.make_tensor_value_info("x", kind, shape)], outputs, constants)
-    onnx.save(helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)], ir_version=9), file)
-    return file
+    nodes += [helper.make_node("Squeeze", ["whole", "axis"], ["depth"])] if rank == 3 else []
+    nodes += [helper.make_node("Identity", ["floats"], [extra])] if extra else []
+    kind, shape = TensorProto.UINT8 if as_bytes else TensorProto.FLOAT, [1, size, size, 3] if last else [1, 3, "h", "w"]
+    constants = {"red": [0], "axis": [axis], "most": np.float32(300)}
+    takes = helper.make_tensor_value_info("x", kind, shape)
+    return save_graph(file, nodes, constants, takes, *([extra] if extra else []), "depth")

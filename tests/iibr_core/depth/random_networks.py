@@ -1,59 +1,94 @@
-"""Networks of depth models with random weights, as the library that publishes them builds them, and as ONNX files."""
+"""Networks of depth models with random weights, as transformers builds and saves them."""
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Any
 
 import torch
 import transformers
 
+from iibr_core.depth.choice import DepthChoice
+from iibr_core.depth.models.catalog import LocalModel, model_to_use
 
-def depth_anything_network(backbone: dict[str, Any], **config: Any) -> torch.nn.Module:
-    """Depth Anything V2. backbone, config: settings that differ from the library's."""
-    backbone = {"model_type": "dinov2", "reshape_hidden_states": False, **backbone}
-    network = transformers.DepthAnythingForDepthEstimation(
-        transformers.DepthAnythingConfig(backbone_config=backbone, **config)
-    )
-    with torch.no_grad():  # random weights rarely reach beyond the last rectifier
-        network.head.conv3.bias += 1
-    return network
+LAYERS = {"hidden_size": 32, "num_hidden_layers": 4, "num_attention_heads": 2, "intermediate_size": 32}
+HEAD = {"neck_hidden_sizes": [8, 8, 8, 8], "fusion_hidden_size": 8}
 
 
-def with_random_weights(network: Any) -> Any:
-    """Large enough that something of the photo reaches the output: they are meant to be trained."""
+def saved(network: Any, folder: Path, **preparation: object) -> LocalModel:
+    """Save a network with weights that let something of the photo reach the output; return it as users name it."""
+    torch.manual_seed(0)
     with torch.no_grad():
         for weights in network.parameters():
             if weights.ndim > 1:
                 weights.normal_(0, weights[0].numel() ** -0.5)
-    return network.eval()
+    network.eval().save_pretrained(folder)
+    (folder / "preprocessor_config.json").write_text(json.dumps(preparation))
+    model = model_to_use(DepthChoice(model=str(folder)))
+    assert model is not None
+    return model
 
 
-def export_depth_anything(network: torch.nn.Module, file: Path) -> None:
-    """As an ONNX file that takes inputs of any size."""
-    torch.onnx.export(
-        WithSymbolicSize(network).eval(),
-        (torch.zeros(1, 3, 56, 84),),
-        file,
-        dynamo=False,
-        input_names=["pixel_values"],
-        output_names=["predicted_depth"],
-        dynamic_axes={"pixel_values": {2: "rows", 3: "columns"}},
+def depth_anything(folder: Path, kind: str = "relative") -> LocalModel:
+    backbone = {**LAYERS, "model_type": "dinov2", "image_size": 56, "patch_size": 14, "reshape_hidden_states": False}
+    config = transformers.DepthAnythingConfig(
+        backbone_config={**backbone, "out_indices": [1, 2, 3, 4]},
+        reassemble_hidden_size=32,
+        head_hidden_size=8,
+        depth_estimation_type=kind,
+        max_depth=20,
+        **HEAD,
     )
+    network = transformers.DepthAnythingForDepthEstimation(config)
+    with torch.no_grad():  # random weights rarely reach beyond the last rectifier
+        network.head.conv3.bias += 1
+    return saved(network, folder, size={"height": 56, "width": 56}, keep_aspect_ratio=True, ensure_multiple_of=14)
 
 
-class WithSymbolicSize(torch.nn.Module):
-    """The network, its head's last steps repeated without `int()`, which would fix the exported size."""
+def metric_depth_anything(folder: Path) -> LocalModel:
+    return depth_anything(folder, "metric")
 
-    def __init__(self, network: torch.nn.Module) -> None:
-        super().__init__()
-        self.network = network
 
-    def forward(self, pixel_values: torch.Tensor) -> torch.Tensor:
-        network, (rows, columns) = self.network, (side // 14 for side in pixel_values.shape[2:])
-        features = network.backbone.forward_with_filtered_kwargs(pixel_values).feature_maps
-        head, hidden = network.head, network.neck(features, rows, columns)[network.head.head_in_index]
-        hidden = torch.nn.functional.interpolate(
-            head.conv1(hidden), (rows * 14, columns * 14), mode="bilinear", align_corners=True
-        )
-        return head.activation2(head.conv3(head.activation1(head.conv2(hidden)))).squeeze(1) * head.max_depth
+def dpt(folder: Path) -> LocalModel:
+    config = transformers.DPTConfig(
+        **LAYERS, **HEAD, image_size=64, patch_size=16, backbone_out_indices=[0, 1, 2, 3], is_hybrid=False
+    )
+    network = transformers.DPTForDepthEstimation(config)
+    with torch.no_grad():
+        network.head.head[4].bias += 1
+    return saved(network, folder, size={"height": 64, "width": 64}, image_mean=[0.5] * 3, image_std=[0.5] * 3)
+
+
+def zoedepth(folder: Path) -> LocalModel:
+    backbone = {**LAYERS, "model_type": "beit", "image_size": 64, "patch_size": 16, "reshape_hidden_states": False}
+    stages = [f"stage{n}" for n in range(1, 5)]
+    config = transformers.ZoeDepthConfig(
+        backbone_config={**backbone, "out_features": stages, "use_relative_position_bias": True},
+        bottleneck_features=8,
+        num_relative_features=8,
+        bin_embedding_dim=8,
+        num_attractors=[4, 2, 2, 1],
+        **HEAD,
+    )
+    network = transformers.ZoeDepthForDepthEstimation(config)
+    return saved(network, folder, size={"height": 64, "width": 64}, keep_aspect_ratio=True, ensure_multiple_of=32)
+
+
+def depth_pro(folder: Path) -> LocalModel:
+    part = {**LAYERS, "image_size": 32, "patch_size": 8, "model_type": "dinov2"}
+    config = transformers.DepthProConfig(
+        patch_size=32,
+        fusion_hidden_size=8,
+        intermediate_hook_ids=[2, 0],
+        intermediate_feature_dims=[8, 8],
+        scaled_images_feature_dims=[8, 8, 8],
+        image_model_config=part,
+        patch_model_config=part,
+        fov_model_config=part,
+        use_fov_model=True,
+    )
+    network = transformers.DepthProForDepthEstimation(config)
+    with torch.no_grad():
+        list(network.fov_model.parameters())[-1].fill_(60.0)
+    return saved(network, folder, size={"height": 128, "width": 128})

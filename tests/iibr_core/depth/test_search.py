@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from iibr_core.depth.choice import DepthChoice, DepthStart
-from iibr_core.depth.estimators import estimate_cache
-from iibr_core.depth.estimators.catalog import USUAL_MODEL, known_model
-from iibr_core.depth.estimators.download import VERIFIED
+from iibr_core.depth.models import cache as estimate_cache
+from iibr_core.depth.models.catalog import known_model
+from iibr_core.depth.models.known import USUAL_MODEL
 from iibr_core.depth.search import PhotoWithDepth, find_depth, open_with_depth
 from iibr_core.formats.images.photo import read_photo
 from iibr_core.runtime.work import Cancelled, stoppable, watched
@@ -131,9 +131,8 @@ def test_a_model_is_asked_for_where_there_is_none(tmp_path: Path) -> None:
 def test_a_damaged_usual_model_is_followed_by_the_next_with_a_note(tmp_path: Path) -> None:
     usual = known_model(USUAL_MODEL)
     snapshot = tmp_path / "hub" / f"models--{usual.repository.replace('/', '--')}" / "snapshots" / usual.commit
-    published(snapshot)
-    (snapshot / VERIFIED).write_text("{}")
-    (snapshot / "onnx" / "model.onnx").write_bytes(b"no model")
+    for name, data in (published(snapshot) | {"onnx/model.onnx": b"no model"}).items():
+        (snapshot / name).write_bytes(data)
     found = open_with_depth(photo_file(tmp_path, None))
     assert found.origin.kind == "rough"
     assert found.origin.failures[0].startswith("The depth model was not used: ")

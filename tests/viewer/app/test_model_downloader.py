@@ -10,9 +10,8 @@ from threading import Event
 import numpy as np
 import pytest
 
-from iibr_core.depth.estimators import estimate_cache
-from iibr_core.depth.estimators.catalog import fetch, known_model, model_here
-from iibr_core.depth.estimators.download import VERIFIED
+from iibr_core.depth.models import cache as estimate_cache
+from iibr_core.depth.models.catalog import fetch, known_model, model_here
 from iibr_core.formats.images.write import write_image
 from iibr_core.runtime.work import Cancelled, is_stopped
 from iibr_core.scenes.scene import Source, source_beside
@@ -49,6 +48,8 @@ def hub(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Hub]:
         server.may_finish.clear()
         # read once, at import: HF_ENDPOINT and HF_HOME come too late here
         monkeypatch.setattr("huggingface_hub.constants.ENDPOINT", server.address)
+        template = f"{server.address}/{{repo_id}}/resolve/{{revision}}/{{filename}}"
+        monkeypatch.setattr("huggingface_hub.constants.HUGGINGFACE_CO_URL_TEMPLATE", template)
         monkeypatch.setattr("huggingface_hub.constants.HF_HUB_CACHE", str(tmp_path / "hub"))
         monkeypatch.setattr(estimate_cache, "cache_folder", lambda: tmp_path / "estimates")
         yield server
@@ -112,7 +113,6 @@ def test_one_click_deepens_the_picture_as_it_is_seen_and_edited(viewer: Driver, 
     viewer.until_idle()
     state, found = viewer.app.state, model_here(MODEL)
     assert found is not None
-    assert (found.folder / VERIFIED).is_file()
     assert wall_slope(viewer) < 0.05, "all of the wall is as dark, and so as far away"
     square = viewer.app.scene_view.pick(ViewOffset(0, 0), 50, 20)
     assert square != pytest.approx(before, abs=0.05)

@@ -59,7 +59,7 @@ def _offer(model: ModelOffer) -> list[Action]:
     """How to get true depth in place of a guess; nothing more is asked."""
     words, button = f"{model.title}, on this machine, finds true depth.", "Estimate depth"
     if model.lacks:
-        words = f"{model.title} {model.lacks}"
+        words = f"{model.title}: {model.lacks}"
     elif not model.is_here:
         words = f"{model.title} finds true depth: {model.megabytes:,} MB, {model.licence}, from {model.host}."
         button = "Get true depth"

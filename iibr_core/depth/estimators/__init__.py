@@ -1,1 +1,0 @@
-"""Trained depth models: which there are, where they lie, how they run."""

@@ -1,0 +1,72 @@
+"""Estimates kept on disk by the photo's pixels and the model's files; the least recently used go.
+
+A cache that cannot be read or written counts as empty.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Iterable
+from contextlib import suppress
+from pathlib import Path
+from typing import cast, get_args
+
+import numpy as np
+from platformdirs import user_cache_path
+
+from iibr_core.depth.estimate import DepthEstimate, Meaning
+from iibr_core.formats.outputs import write_file
+from iibr_core.types import FloatImage, InputError
+
+MAX_BYTES = 512 * 2**20
+FORMAT = "2"
+"""Part of every key: raise it when estimates mean something else."""
+
+
+def cache_folder() -> Path:
+    """Return the user's folder for estimates; it may not exist yet."""
+    return user_cache_path("iibr", appauthor=False) / "depth"
+
+
+def key_of(pixels: FloatImage, files: Iterable[Path]) -> str:
+    """Return a name for a model's estimate of a picture (H, W, 3), by path, size and time of each of its files.
+
+    Nothing is read of the files: weights have gigabytes.
+    """
+    digest = hashlib.sha256(f"{FORMAT} {pixels.shape}".encode())
+    for file in files:
+        status = file.stat() if file.is_file() else None
+        digest.update(os.fsencode(file.resolve()))
+        digest.update(f"{status.st_size} {status.st_mtime_ns}".encode() if status else b"none")
+    digest.update(np.ascontiguousarray(pixels).data)
+    return digest.hexdigest()
+
+
+def load(key: str) -> DepthEstimate | None:
+    """Return the estimate of this key, None if there is none or it is damaged."""
+    path = cache_folder() / f"{key}.npz"
+    try:
+        with np.load(path, allow_pickle=False) as kept:
+            meaning, values = str(kept["meaning"]), np.array(kept["values"], np.float32)
+    except Exception:  # missing, or damaged in one of the many ways that numpy meets
+        return None
+    if values.ndim != 2 or meaning not in get_args(Meaning):
+        return None
+    with suppress(OSError):
+        os.utime(path)
+    return DepthEstimate(values, cast(Meaning, meaning))
+
+
+def store(key: str, estimate: DepthEstimate) -> None:
+    """Keep an estimate; the least recently used ones go if all exceed MAX_BYTES."""
+    folder = cache_folder()
+    with suppress(OSError, InputError):  # read-only or full: the estimate is made again the next time
+        folder.mkdir(parents=True, exist_ok=True)
+        with write_file(folder / f"{key}.npz") as temporary:
+            np.savez(temporary, meaning=estimate.meaning, values=estimate.values)
+        total = 0
+        for entry in sorted(folder.glob("*.npz"), key=lambda entry: entry.stat().st_mtime_ns, reverse=True):
+            total += entry.stat().st_size
+            if total > MAX_BYTES and entry.stem != key:
+                entry.unlink(missing_ok=True)

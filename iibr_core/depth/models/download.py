@@ -1,0 +1,102 @@
+"""Files of one commit of a repository on the Hugging Face hub, in the folder where its library keeps them.
+
+huggingface_hub fetches them: its variables state mirrors, proxies, tokens and offline mode. `hf_hub_download`
+deletes what came of a file when it is stopped, so `http_get` is asked to resume files that grow beside their places.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import threading
+from collections.abc import Sequence
+from concurrent.futures import Future
+from pathlib import Path
+from typing import Any, cast
+
+from iibr_core.formats.files import is_file, reason_of
+from iibr_core.runtime.work import Cancelled, in_this_job, raise_if_stopped, report_progress, wait_unless_stopped
+from iibr_core.types import InputError
+
+ADVICE = (
+    "what has come is kept: check the network and try again, name a mirror with HF_ENDPOINT, or use a file with"
+    " --depth-model FILE.onnx"
+)
+
+
+def local_folder(repository: str, commit: str) -> Path:
+    """Return the folder of a commit's files on this machine; it may not exist."""
+    from huggingface_hub import constants  # its function for this needs all of that library, half a second
+
+    return Path(constants.HF_HUB_CACHE) / f"models--{repository.replace('/', '--')}" / "snapshots" / commit
+
+
+def download(repository: str, commit: str, names: Sequence[str], total_bytes: float) -> Path:
+    """Bring files of a commit here, unless they are; returns their folder. total_bytes: of all, for progress.
+
+    Raises InputError if it fails, Cancelled once the job is stopped: the thread that waits for the hub ends later.
+    """
+    folder, done = local_folder(repository, commit), Future[None]()
+
+    def work() -> None:
+        try:
+            for name in names:
+                if not is_file(folder / name):
+                    _fetch(repository, commit, name, folder / name, total_bytes)
+            done.set_result(None)
+        except BaseException as error:
+            done.set_exception(error)
+
+    threading.Thread(target=in_this_job(work), name="iibr-download", daemon=True).start()
+    try:
+        wait_unless_stopped(done)
+    except (Cancelled, InputError):
+        raise
+    except Exception as error:  # whatever the library's clients raise: they change with its versions
+        raise InputError(f"{repository} cannot be downloaded ({reason_of(error)[:120]}); {ADVICE}") from error
+    return folder
+
+
+def _fetch(repository: str, commit: str, name: str, place: Path, total_bytes: float) -> None:
+    """Download the rest of a file, compare it with the hub's hash, and put it in its place."""
+    from huggingface_hub import get_hf_file_metadata, get_token, hf_hub_url
+    from huggingface_hub.file_download import http_get
+
+    class Bar:
+        """Progress of a file, in place of tqdm's. The library updates it before it writes a piece."""
+
+        def __init__(self, initial: int = 0, **options: object) -> None:
+            self.came = initial
+
+        def __enter__(self) -> Bar:
+            return self
+
+        def __exit__(self, *error: object) -> None:
+            """Show nothing more."""
+
+        def update(self, count: int) -> None:
+            raise_if_stopped()
+            self.came += count
+            report_progress(self.came, max(total_bytes, self.came), f"downloading {name}")
+
+    url = hf_hub_url(repository, name, revision=commit)
+    stated = get_hf_file_metadata(url)
+    headers = {"Authorization": f"Bearer {get_token()}"} if get_token() else {}
+    place.parent.mkdir(parents=True, exist_ok=True)
+    part = place.with_name(f"{place.name}.part")
+    part.touch()
+    with part.open("r+b") as file:  # two processes that fetch the same file write the same bytes to the same places
+        came = file.seek(0, 2)
+        http_get(
+            url,
+            file,
+            resume_size=came,
+            headers=headers,
+            expected_size=stated.size,
+            tqdm_class=cast(Any, Bar),
+        )
+    with part.open("rb") as whole:
+        digest = hashlib.file_digest(whole, "sha256").hexdigest()
+    if digest != stated.etag and len(stated.etag or "") == len(digest):  # tags of small files are no such hashes
+        part.unlink()
+        raise InputError(f"{repository}: {name} is not what the hub states for commit {commit[:7]}; get it again")
+    part.replace(place)

@@ -1,0 +1,214 @@
+"""Depth models as ONNX files, run by ONNX Runtime on whichever processor it finds: no torch.
+
+Layout and size of the picture are read from the file. The JSON files beside it state how the photo is prepared and
+whether the output is distances; without them, the photo is prepared as for Depth Anything V2.
+"""
+
+from __future__ import annotations
+
+import mmap
+import re
+from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from iibr_core.depth.estimate import DepthEstimate
+from iibr_core.depth.models.preparation import (
+    CONFIG,
+    PREPROCESSOR,
+    Preparation,
+    network_input,
+    read_object,
+    read_preparation,
+)
+from iibr_core.formats.files import is_file, printable, reason_of, stays_within
+from iibr_core.runtime.machine import core_count
+from iibr_core.runtime.work import Cancelled, report_progress, wait_unless_stopped
+from iibr_core.types import FloatImage, ImageSize, InputError, Photo
+
+ACCELERATORS = ("CUDAExecutionProvider", "CoreMLExecutionProvider", "DmlExecutionProvider")
+CPU = "CPUExecutionProvider"
+NUMBER_TYPES = {
+    "tensor(float)": "float32",
+    "tensor(float16)": "float16",
+    "tensor(double)": "float64",
+    "tensor(uint8)": "uint8",
+}
+"""Number types of pictures, by ONNX Runtime's names for them."""
+EXTERNAL_FILE = re.compile(rb"\n\x08location\x12(.)", re.DOTALL)
+"""Start of a tensor's entry about its file of numbers; the last byte is the length of the file's name (onnx.proto)."""
+MAX_GRAPH_BYTES = 64 * 2**20
+"""Larger ONNX files hold their weights themselves: they are not searched for names of other files."""
+DEPTH_WORDS = ("depth", "disp", "dist")
+"""Parts of the names of outputs that are depth."""
+OTHER_WORDS = ("conf", "feature", "mask", "normal", "prob", "seg", "sky", "std", "var", "uncert", "weight")
+"""Parts of the names of outputs that are no depth, whatever their shape."""
+METRIC_WORDS = ("metric", "focal", "normal", "intrinsic")
+"""Parts of the names of outputs of metric models: Depth Pro's focal length, Metric3D's normals, UniDepth's camera."""
+MIN_MAP_SIDE = 8
+"""Smallest height and width of a map in pixels: smaller outputs are matrices."""
+MAX_ASPECT_CHANGE = 1.25
+"""Largest ratio between the aspects of a picture and its map: outputs of other shapes are lists of features."""
+OTHER_MULTIPLE = 32
+"""Multiple of both sides for networks that refuse multiples of 14 px."""
+
+
+@dataclass(frozen=True)
+class PictureInput:
+    """The one input of an ONNX model: a picture.
+
+    name: in the file. height, width: in pixels, None if any will do. channel_axis: index of the 3 channels among `rank`
+    axes. number_type: numpy's name for it; bytes are 0..255 and not normalised.
+    """
+
+    name: str
+    height: int | None
+    width: int | None
+    channel_axis: int
+    rank: int
+    number_type: str
+
+    def prepare(self, pixels: FloatImage, preparation: Preparation, size: ImageSize) -> np.ndarray[Any, Any]:
+        """Return a photo's pixels (H, W, 3), 0..1, as the model takes them."""
+        if self.number_type == "uint8":
+            planes = network_input(pixels, replace(preparation, mean=(0.0,) * 3, std=(1 / 255,) * 3), size)
+            planes = np.clip(np.rint(planes), 0, 255)
+        else:
+            planes = network_input(pixels, preparation, size)
+        values = np.moveaxis(planes if self.rank == 4 else planes[0], self.rank - 3, self.channel_axis)
+        return np.ascontiguousarray(values, self.number_type)
+
+
+def estimate_onnx(file: Path, settings: Path, title: str, photo: Photo) -> DepthEstimate:
+    """Return the depth of a photo in sRGB at the size of the model's output; non-finite values as they come.
+
+    settings: the folder of the JSON files. title: for progress. Raises InputError if the file is no depth model.
+    """
+    report_progress(0, 0, f"loading {title}")
+    import onnxruntime
+
+    available = onnxruntime.get_available_providers()
+    if accelerators := [name for name in ACCELERATORS if name in available]:
+        with suppress(InputError):  # the driver is missing, or cannot run this network
+            return _estimate(open_session(file, *accelerators), file, settings, title, photo)
+    return _estimate(open_session(file), file, settings, title, photo)
+
+
+def _estimate(session: Any, file: Path, settings: Path, title: str, photo: Photo) -> DepthEstimate:
+    picture, preparation = picture_input(session, file), read_preparation(settings)
+    is_metric = read_object(settings / CONFIG).get("depth_estimation_type") == "metric"
+    report_progress(0, 0, f"estimating depth with {title}")
+    failures = []
+    for multiple in (preparation.multiple, OTHER_MULTIPLE):
+        wanted = replace(preparation, multiple=multiple).size_for(photo.size)
+        size = ImageSize(picture.height or wanted.height, picture.width or wanted.width)
+        try:
+            outputs = _run(session, {picture.name: picture.prepare(photo.pixels, preparation, size)})
+        except RuntimeError as error:
+            failures.append(error)
+            continue
+        is_metric |= any(_has_word(name, METRIC_WORDS) for name in outputs)
+        return DepthEstimate(depth_output(file, outputs, size), "metres" if is_metric else "inverse depth")
+    raise InputError(
+        f"{file}: failed on this photo ({reason_of(failures[0])}); if it needs pictures of other sizes, state size and"
+        f" ensure_multiple_of in a {PREPROCESSOR} beside it"
+    )
+
+
+def open_session(file: Path, *accelerators: str) -> Any:
+    """Return an ONNX Runtime session. Raises InputError if the file is no ONNX model."""
+    import onnxruntime
+
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads = core_count()
+    # Threads that spin while they wait would take the cores from the window.
+    options.add_session_config_entry("session.intra_op.allow_spinning", "0")
+    options.log_severity_level = 4
+    try:
+        return onnxruntime.InferenceSession(str(file), options, providers=[*accelerators, CPU])
+    except Exception as error:  # its errors share no class
+        raise InputError(f"{file}: is not an ONNX model that can be run ({reason_of(error)}); get it again") from error
+
+
+def picture_input(session: Any, file: Path) -> PictureInput:
+    """Return the input of a model that takes one picture. Raises InputError if it takes something else."""
+    inputs = session.get_inputs()
+    shape = inputs[0].shape if inputs else []
+    first = len(shape) - 3
+    is_picture = len(inputs) == 1 and first in (0, 1) and inputs[0].type in NUMBER_TYPES
+    axes = [axis for axis in (first, len(shape) - 1) if is_picture and shape[axis] == 3]
+    if is_picture and not axes and not isinstance(shape[first], int):
+        axes = [first]
+    if not axes:
+        listed = ", ".join(f"{value.name} {value.shape} {value.type}" for value in inputs)[:160]
+        raise InputError(
+            f"{file}: takes {listed}, not one picture (N, 3, H, W) or (N, H, W, 3) of floats or bytes;"
+            " export the model with such an input alone"
+        )
+    sides = [shape[axis] for axis in range(first, len(shape)) if axis != axes[0]]
+    height, width = (side if isinstance(side, int) and side > 0 else None for side in sides)
+    return PictureInput(inputs[0].name, height, width, axes[0], len(shape), NUMBER_TYPES[inputs[0].type])
+
+
+def depth_output(file: Path, outputs: Mapping[str, Any], size: ImageSize) -> FloatImage:
+    """Return the map (h, w) float32 among a model's outputs: by its name, else the largest, else the first.
+
+    outputs: arrays by name. size: of the picture that the model was given. Raises InputError if no output is a map.
+    """
+    maps = [(name, np.squeeze(values)) for name, values in outputs.items() if _is_map(name, values, size)]
+    if not maps:
+        shapes = ", ".join(f"{name} {getattr(values, 'shape', 'a list')}" for name, values in outputs.items())
+        raise InputError(f"{file}: gives {shapes[:160]}, not one map of depth (H, W); choose a depth model")
+    _, values = min(maps, key=lambda named: (not _has_word(named[0], DEPTH_WORDS), -named[1].size))
+    return np.asarray(values, np.float32)
+
+
+def external_files(file: Path) -> tuple[Path, ...]:
+    """Return the files beside an ONNX file that hold its weights. Raises InputError if one is missing or elsewhere."""
+    if not 0 < file.stat().st_size <= MAX_GRAPH_BYTES:
+        return ()
+    with file.open("rb") as opened, mmap.mmap(opened.fileno(), 0, access=mmap.ACCESS_READ) as content:
+        ends = [(match.end(), match[1][0]) for match in EXTERNAL_FILE.finditer(content)]
+        names = sorted({content[end : end + length].decode("utf-8", "replace") for end, length in ends})
+    for name in names:
+        if not stays_within(name) or not is_file(file.parent / name):
+            raise InputError(
+                f"{file}: its weights are in {printable(name)}, which does not lie beside it; get that file, too"
+            )
+    return tuple(file.parent / name for name in names)
+
+
+def _run(session: Any, pictures: Mapping[str, Any]) -> dict[str, Any]:
+    """Return all outputs by name; the network runs in a thread, so that it can be stopped. Raises RuntimeError."""
+    import onnxruntime
+
+    options = onnxruntime.RunOptions()
+    with ThreadPoolExecutor(1, "iibr-onnx") as thread:
+        try:
+            values = wait_unless_stopped(thread.submit(session.run, None, pictures, options))
+        except Cancelled:
+            options.terminate = True
+            raise
+        except Exception as error:  # its errors share no class
+            raise RuntimeError(reason_of(error)) from error
+    return dict(zip((output.name for output in session.get_outputs()), values))
+
+
+def _is_map(name: str, values: Any, size: ImageSize) -> bool:
+    """Return whether an output has the shape that a map of a picture of this size may have."""
+    if not isinstance(values, np.ndarray) or values.dtype.kind not in "fiu" or _has_word(name, OTHER_WORDS):
+        return False
+    sides = [side for side in values.shape if side != 1]
+    if len(sides) != 2 or min(sides) < MIN_MAP_SIDE:
+        return False
+    change: float = sides[1] / sides[0] * size.height / size.width
+    return 1 / MAX_ASPECT_CHANGE <= change <= MAX_ASPECT_CHANGE
+
+
+def _has_word(name: str, words: tuple[str, ...]) -> bool:
+    return any(word in name.lower() for word in words)

@@ -1,0 +1,262 @@
+"""Depth by ONNX Runtime: graphs whose output is a known function of the input, and files as people have them."""
+
+from __future__ import annotations
+
+import json
+import threading
+from pathlib import Path
+
+import numpy as np
+import onnx
+import pytest
+from onnx import TensorProto, helper
+from onnx.external_data_helper import set_external_data
+
+from iibr_core.depth.choice import DepthChoice
+from iibr_core.depth.models import cache
+from iibr_core.depth.models.catalog import LocalModel, model_to_use
+from iibr_core.depth.models.onnx import depth_output
+from iibr_core.depth.models.preparation import USUAL_PREPARATION, read_preparation
+from iibr_core.depth.search import open_with_depth
+from iibr_core.formats.images.write import write_image
+from iibr_core.runtime.work import Cancelled, stoppable
+from iibr_core.types import FloatImage, ImageSize, InputError, Photo
+from tests.iibr_core.depth.onnx_graphs import of_channels, save_graph, weighing
+
+MEAN, DEVIATION = (np.array(values, np.float32) for values in (USUAL_PREPARATION.mean, USUAL_PREPARATION.std))
+MAP = np.arange(56 * 84, dtype=np.float32)
+
+
+@pytest.fixture(autouse=True)
+def cache_here(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(cache, "cache_folder", lambda: tmp_path / "cache")
+
+
+def photo_of(height: int, width: int) -> Photo:
+    """Channels that tell top from bottom, left from right, and each other."""
+    y, x = np.indices((height, width), np.float32) / np.array((height, width), np.float32)[:, None, None]
+    pixels = np.stack([0.2 + 0.5 * x, 0.1 + 0.6 * y, 0.3 + 0.2 * x * y], axis=2).astype(np.float32)
+    return Photo(pixels, 50.0, "photo")
+
+
+def model_of(file: Path) -> LocalModel:
+    model = model_to_use(DepthChoice(model=str(file)))
+    assert model is not None
+    return model
+
+
+def values_of(file: Path, photo: Photo) -> FloatImage:
+    return model_of(file).estimate(photo).values
+
+
+@pytest.mark.parametrize("channel", [0, 2])
+def test_orientation_order_of_colours_and_normalisation(tmp_path: Path, channel: int) -> None:
+    weights = tuple(float(c == channel) for c in range(3))
+    photo = photo_of(518, 518)  # the size of the input: nothing is resized
+    found = model_of(weighing(tmp_path / "model.onnx", weights)).estimate(photo)
+    assert found.meaning == "inverse depth"
+    expected = (photo.pixels[..., channel] - MEAN[channel]) / DEVIATION[channel]
+    np.testing.assert_allclose(found.values, expected, atol=1e-4)
+
+
+@pytest.mark.parametrize(("height", "width"), [(700, 900), (900, 700), (90, 200), (1, 1), (518, 5000), (5000, 518)])
+def test_the_input_has_the_photos_aspect_in_multiples_of_14(height: int, width: int) -> None:
+    size = USUAL_PREPARATION.size_for(ImageSize(height, width))
+    assert all(side % 14 == 0 and side >= 28 for side in size)
+    assert size.height * size.width <= 2.5 * 518 * 518
+    if max(height, width) < 2.5 * min(height, width):
+        assert abs(size.width / size.height / (width / height) - 1) < 0.06
+
+
+@pytest.mark.parametrize(
+    "layout", [{"last": True}, {"as_bytes": True}, {"last": True, "as_bytes": True}, {"extra": "feature"}, {"rank": 4}]
+)
+def test_other_layouts_are_read_alike(tmp_path: Path, layout: dict[str, object]) -> None:
+    photo = photo_of(112, 112)
+    found = values_of(of_channels(tmp_path / "model.onnx", **layout), photo)  # type: ignore[arg-type]
+    columns = np.interp(np.linspace(0, 111, found.shape[1]), np.arange(112), photo.pixels[0, :, 0])
+    assert np.corrcoef(found.ravel(), np.tile(columns, found.shape[0]))[0, 1] > 0.999
+
+
+@pytest.mark.parametrize(
+    ("settings", "black", "white"),
+    [
+        ({}, -0.485 / 0.229, (1 - 0.485) / 0.229),
+        ({"do_normalize": False}, 0.0, 1.0),
+        ({"do_normalize": False, "do_rescale": False}, 0.0, 255.0),
+        ({"image_mean": 127.5, "image_std": 127.5, "do_rescale": False}, -1.0, 1.0),
+        ({"image_mean": 0, "image_std": [1, 1, 1], "rescale_factor": 2 / 255}, 0.0, 2.0),
+    ],
+)
+def test_settings_beside_a_file_state_the_colours(
+    tmp_path: Path, settings: dict[str, object], black: float, white: float
+) -> None:
+    (tmp_path / "preprocessor_config.json").write_text(json.dumps(settings))
+    prepared = read_preparation(tmp_path)
+    for value, expected in ((0.0, black), (1.0, white)):
+        assert (value - prepared.mean[0]) / prepared.std[0] == pytest.approx(expected, abs=1e-4)
+
+
+@pytest.mark.parametrize("text", ["{", "[]", '{"size": "big"}', '{"image_std": [0, 1, 1]}', '{"size": 1e9}'])
+def test_settings_that_make_no_sense_are_one_line(tmp_path: Path, text: str) -> None:
+    (tmp_path / "preprocessor_config.json").write_text(text)
+    with pytest.raises(InputError, match=r"preprocessor_config\.json") as caught:
+        values_of(weighing(tmp_path / "model.onnx", (1, 0, 0)), photo_of(60, 90))
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("extra", ["", "focallength_px", "predicted_normal"])
+def test_metric_files_are_known_by_their_settings_or_outputs(tmp_path: Path, extra: str) -> None:
+    """Taken for inverse depth, near and far would be swapped. What is 0 or less is unknown then."""
+    if not extra:
+        (tmp_path / "config.json").write_text('{"depth_estimation_type": "metric"}')
+    file = of_channels(tmp_path / "model.onnx", extra=extra)
+    assert model_of(file).estimate(photo_of(60, 90)).meaning == "metres"
+    write_image(tmp_path / "photo.png", photo_of(60, 90).pixels)
+    found = open_with_depth(tmp_path / "photo.png", DepthChoice(model=str(file), is_metric=True)).disparity
+    assert found.unknown is not None
+    assert found.unknown[:, :20].all()
+    assert not found.unknown[:, -20:].any()
+    with pytest.raises(InputError, match="gave no distance above 0"):
+        values_of(file, Photo(photo_of(60, 90).pixels / 4, 50.0, "dark"))
+
+
+@pytest.mark.parametrize(("farness", "config"), [(False, ""), (True, ""), (False, "metric"), (True, "metric")])
+def test_the_photo_shows_which_end_of_a_file_is_near(tmp_path: Path, farness: bool, config: str) -> None:
+    """Red grows downwards in this photo, where things are nearer; with or without a config, true or not."""
+    file = of_channels(tmp_path / "model.onnx", farness=farness)
+    if config:
+        (tmp_path / "config.json").write_text(f'{{"depth_estimation_type": "{config}"}}')
+    pixels = np.zeros((60, 80, 3), np.float32)
+    pixels[..., 0] = np.linspace(0.5, 0.9, 60)[:, None]
+    pixels[20:30, 30:50, 1] = 0.5
+    write_image(tmp_path / "photo.png", pixels)
+    found = open_with_depth(tmp_path / "photo.png", DepthChoice(model=str(file)))
+    assert found.disparity.values[-5].mean() > found.disparity.values[5].mean()
+    assert any(f"the {'low' if farness else 'high'} end counts as near" in note for note in found.disparity.notes)
+
+
+@pytest.mark.parametrize(
+    ("others", "name"),
+    [
+        ({"features": MAP.reshape(1, 1, 56, 84)}, "output_0"),
+        ({"sky_mask": MAP.reshape(56, 84), "normals": np.zeros((1, 3, 56, 84), np.float32)}, "output_0"),
+        ({"last_hidden_state": np.zeros((1, 1370, 384), np.float32)}, "predicted_depth"),
+        ({"disp_3": MAP.reshape(112, 42)[:7, :10]}, "disp_0"),
+        ({"other": MAP.reshape(1, 56, 84)}, "metric_depth"),
+    ],
+)
+def test_of_several_outputs_the_map_of_depth_is_chosen(others: dict[str, np.ndarray], name: str) -> None:
+    depth = (MAP + 7).reshape(1, 56, 84)
+    found = depth_output(Path("model.onnx"), {**others, name: depth}, ImageSize(56, 84))
+    np.testing.assert_array_equal(found, depth[0])
+    for shape in ((1, 384, 4, 6), (1, 1370, 384), (1, 3, 56, 84), (0, 56, 84)):
+        with pytest.raises(InputError, match=r"model\.onnx: gives out .*choose a depth model"):
+            depth_output(Path("model.onnx"), {"out": np.zeros(shape, np.float32)}, ImageSize(56, 84))
+
+
+@pytest.mark.parametrize(("weights", "message"), [(np.nan, "gave NaN"), (0.0, "gave the same depth everywhere")])
+def test_results_that_say_nothing_are_refused_and_not_kept(tmp_path: Path, weights: float, message: str) -> None:
+    with pytest.raises(InputError, match=f"the model model.onnx {message}"):
+        values_of(weighing(tmp_path / "model.onnx", (weights, 0, 0)), photo_of(60, 90))
+    assert not (tmp_path / "cache").exists()
+
+
+def test_what_is_no_model_of_a_picture_is_one_line(tmp_path: Path) -> None:
+    for content in (b"", b"no model", b"\x08\x0a"):
+        (tmp_path / "model.onnx").write_bytes(content)
+        with pytest.raises(InputError, match=r"model\.onnx: is not an ONNX model that can be run [^\n]*$"):
+            values_of(tmp_path / "model.onnx", photo_of(60, 90))
+    takes = helper.make_tensor_value_info("v", TensorProto.FLOAT, [3])
+    file = save_graph(tmp_path / "model.onnx", [helper.make_node("Identity", ["v"], ["o"])], {}, takes, "o")
+    with pytest.raises(InputError, match=r"takes v \[3\] tensor\(float\), not one picture"):
+        values_of(file, photo_of(60, 90))
+
+
+def with_external_weights(file: Path, weights: tuple[float, float, float] = (1.0, 0.0, 0.0)) -> Path:
+    """A model whose numbers are in FILE_data beside it."""
+    file.with_name(f"{file.name}_data").unlink(missing_ok=True)
+    model = onnx.load(str(weighing(file, weights)))
+    set_external_data(
+        next(tensor for tensor in model.graph.initializer if tensor.name == "weights"), f"{file.name}_data"
+    )
+    onnx.save(model, str(file))
+    return file
+
+
+def test_an_estimate_is_kept_until_the_photo_or_a_file_of_the_model_changes(tmp_path: Path) -> None:
+    file, photo = with_external_weights(tmp_path / "model.onnx"), photo_of(60, 90)
+    first = values_of(file, photo)
+    assert values_of(file, photo).tolist() == first.tolist()
+    assert len(list((tmp_path / "cache").iterdir())) == 1
+    before = file.read_bytes()
+    with_external_weights(file, (0.0, 1.0, 0.0))
+    assert file.read_bytes() == before, "only the file of numbers changed"
+    assert np.abs(values_of(file, photo) - first).max() > 0.1
+    values_of(file, photo_of(61, 90))
+    (tmp_path / "preprocessor_config.json").write_text('{"size": 28}')
+    assert values_of(file, photo).shape != first.shape
+    assert len(list((tmp_path / "cache").iterdir())) == 4
+    (tmp_path / "model.onnx_data").unlink()
+    with pytest.raises(InputError, match=r"its weights are in model\.onnx_data, which does not lie beside it"):
+        values_of(file, photo)
+
+
+def test_the_cache_is_bounded_and_the_oldest_go(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(cache, "MAX_BYTES", 500_000)
+    file = weighing(tmp_path / "model.onnx", (1, 0, 0), ImageSize(200, 250))
+    for height in range(60, 64):
+        values_of(file, photo_of(height, 90))
+    assert len(list((tmp_path / "cache").iterdir())) == 2
+
+
+def halving(file: Path, stride: int) -> Path:
+    """A network whose output is red plus its mean over blocks, as a U-Net's: sides must be multiples of a stride."""
+    nodes = [
+        helper.make_node("Gather", ["x", "red"], ["picked"], axis=1),
+        helper.make_node("AveragePool", ["picked"], ["small"], kernel_shape=[stride] * 2, strides=[stride] * 2),
+        helper.make_node("Resize", ["small", "", "scales"], ["large"], mode="nearest"),
+        helper.make_node("Add", ["picked", "large"], ["depth"]),
+    ]
+    takes = helper.make_tensor_value_info("x", TensorProto.FLOAT, [1, 3, "h", "w"])
+    return save_graph(file, nodes, {"red": [0], "scales": np.float32([1, 1, stride, stride])}, takes, "depth")
+
+
+def test_networks_of_other_strides_get_sides_that_suit_them(tmp_path: Path) -> None:
+    found = values_of(halving(tmp_path / "unet.onnx", 32), photo_of(480, 640))
+    assert found.shape[0] % 32 == found.shape[1] % 32 == 0
+    assert found[:, -1].mean() > found[:, 0].mean()
+    file = halving(tmp_path / "odd.onnx", 45)
+    with pytest.raises(InputError, match=r"failed on this photo .*ensure_multiple_of in a preprocessor_config\.json"):
+        values_of(file, photo_of(480, 640))
+    (tmp_path / "preprocessor_config.json").write_text(json.dumps({"ensure_multiple_of": 45}))
+    assert values_of(file, photo_of(480, 640)).shape[0] % 45 == 0
+
+
+def test_a_running_estimate_can_be_stopped(tmp_path: Path) -> None:
+    """The graph loops practically for ever: only stopping ends it."""
+    sides = ["batch", 3, "height", "width"]
+    inner = [
+        helper.make_tensor_value_info(name, kind, [] if kind != TensorProto.FLOAT else None)
+        for name, kind in (("i", TensorProto.INT64), ("go_in", TensorProto.BOOL), ("x_in", TensorProto.FLOAT))
+    ]
+    outer = [
+        helper.make_tensor_value_info("go_out", TensorProto.BOOL, []),
+        helper.make_tensor_value_info("x_out", TensorProto.FLOAT, None),
+    ]
+    steps = [helper.make_node("Identity", ["go_in"], ["go_out"]), helper.make_node("Relu", ["x_in"], ["x_out"])]
+    loop = helper.make_node(
+        "Loop", ["count", "go", "x"], ["depth"], body=helper.make_graph(steps, "body", inner, outer)
+    )
+    takes = helper.make_tensor_value_info("x", TensorProto.FLOAT, sides)
+    file = save_graph(tmp_path / "model.onnx", [loop], {"count": np.array(2**62), "go": np.array(True)}, takes, "depth")
+    asked = threading.Event()
+
+    def should_stop() -> bool:
+        """The second time it is asked, the graph runs."""
+        was_asked = asked.is_set()
+        asked.set()
+        return was_asked
+
+    with pytest.raises(Cancelled), stoppable(should_stop):
+        values_of(file, photo_of(60, 90))
