@@ -83,7 +83,7 @@ FIGURES = (
     Figure(("figures.md#window",), "benchmarks.window", 1, ("X",)),
     Figure(("figures.md#estimate",), "benchmarks.estimate", 2, ("X", "torch")),
     Figure(("figures.md#cancelled",), "benchmarks.cancel --times 10", 2),
-    Figure(("figures.md#field-disparity",), "benchmarks.multi_view_depth --data DATA", 2, ("DATA",)),
+    Figure(("figures.md#field-disparity",), "benchmarks.disparity --data DATA", 2, ("DATA",)),
     Figure(("refocus.md#pictures",), "benchmarks.refocus --data DATA --apertures 6 --max-pixels 150000", 40, ("DATA",)),
     Figure(("web.md#pages",), "benchmarks.web --data DATA", 15, ("DATA", "chromium")),
     Figure(tuple(f"method/{name}.png" for name in METHOD), "benchmarks.method_figures --out OUT", 1),

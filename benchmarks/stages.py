@@ -31,7 +31,7 @@ from iibr_core.color import quantise_as_stored, stored_from_encoded
 from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.edges.map_alignment import lies_at_corners
 from iibr_core.depth.edges.refine import refine
-from iibr_core.depth.multi_view.estimate_disparity import estimate_disparity
+from iibr_core.depth.multi_view.estimate import estimate_disparity
 from iibr_core.evaluation.datasets import find_scenes, read_view
 from iibr_core.evaluation.metrics import bounded_psnr
 from iibr_core.evaluation.reference_warp import reference_warp
