@@ -15,9 +15,7 @@ import numpy as np
 from iibr_core.depth.choice import BETTER_WAYS, DepthChoice, DepthKind, DepthOrigin
 from iibr_core.depth.edges.map_alignment import lies_at_corners
 from iibr_core.depth.edges.refine import refine
-from iibr_core.depth.embedded.embedded_depth import read_embedded
-from iibr_core.depth.embedded.picture import photo_in_focus, rotate_estimate
-from iibr_core.depth.embedded.unread import unread_parts
+from iibr_core.depth.embedded.embedded import photo_in_focus, read_embedded, rotate_estimate, unread_parts
 from iibr_core.depth.estimate import DepthEstimate, disparity_from, inverse_metres_over
 from iibr_core.depth.estimators.catalog import is_meaning_known, model_to_use
 from iibr_core.depth.estimators.estimate_depth import estimate_with

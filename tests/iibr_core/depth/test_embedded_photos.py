@@ -10,8 +10,7 @@ import pytest
 from PIL import Image
 from PIL.PngImagePlugin import PngInfo
 
-from iibr_core.depth.embedded.embedded_depth import read_embedded
-from iibr_core.depth.embedded.unread import unread_parts
+from iibr_core.depth.embedded.embedded import read_embedded, unread_parts
 from iibr_core.depth.search import PhotoWithDepth, open_with_depth
 from iibr_core.formats.images.lfp import read_lfp
 from iibr_core.formats.images.photo import read_photo
