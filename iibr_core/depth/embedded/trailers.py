@@ -20,7 +20,7 @@ from iibr_core.depth.estimate import DepthEstimate
 from iibr_core.formats.maps.disparity_file import has_shape_of
 from iibr_core.types import ImageSize, InputError
 
-HUAWEI_HEADER = re.compile(rb"(?s)edof(.{68})")
+HUAWEI_HEADER = re.compile(rb"(?s)edof(?=(.{68}))")
 HUAWEI_SIDES = range(16, 8193)
 """Plausible sides of a map in pixels; other data may hold the letters of the mark, too."""
 COMPARED, INSPECTED = (32, 24), (256, 192)
@@ -47,7 +47,7 @@ def huawei_estimate(data: bytes, end: int) -> DepthEstimate | None:
         width, height = struct.unpack_from("<HH", mark[1], 16)
         if width not in HUAWEI_SIDES or height not in HUAWEI_SIDES:
             continue
-        content = data[mark.end() : mark.end() + width * height]
+        content = data[mark.end(1) : mark.end(1) + width * height]
         if len(content) == width * height:
             stored = np.frombuffer(content, np.uint8).reshape(height, width)
             # The first phones wrote 0 and always mirrored the map.

@@ -77,6 +77,11 @@ def test_huawei_maps_lie_as_the_phone_was_held(
     assert any("counts as near" in note for note in found.disparity.notes)
 
 
+def test_a_chance_mark_before_huaweis_does_not_hide_it(tmp_path: Path) -> None:
+    data = files.huawei_jpeg(PHOTO + b"edof", SMALL[:, ::-1]).replace(b"\x56\xe9edof", b"edof\x56\xe9edof")
+    assert_disc_is_nearest(opened(tmp_path, "a.jpg", data))
+
+
 def test_a_mask_behind_a_photo_is_no_map(tmp_path: Path) -> None:
     mask = files.picture(np.where(SMALL > 200, 255, 0).astype(np.uint8))
     found = opened(tmp_path, "a.jpg", PHOTO + mask)
