@@ -17,8 +17,8 @@ from math import hypot
 import numpy as np
 
 from iibr_core.color import encoded_from_stored
-from iibr_core.depth.multi_view.estimate_disparity import estimate_coarse, sweep_bytes
-from iibr_core.depth.multi_view.every_view import estimate_all
+from iibr_core.depth.multi_view.all_views import estimate_all
+from iibr_core.depth.multi_view.estimate import estimate_coarse, sweep_bytes
 from iibr_core.formats.light_fields.multi_view_scene import MultiView
 from iibr_core.formats.light_fields.views import grid_of, read_views
 from iibr_core.inpainting.background import fill_background

@@ -17,9 +17,7 @@ import numpy as np
 from iibr_core.depth.choice import DepthChoice, DepthKind, DepthOrigin
 from iibr_core.depth.edges.map_alignment import lies_at_corners
 from iibr_core.depth.edges.refine import refine
-from iibr_core.depth.embedded.embedded_depth import read_embedded
-from iibr_core.depth.embedded.picture import photo_in_focus, rotate_estimate
-from iibr_core.depth.embedded.unread import unread_parts
+from iibr_core.depth.embedded.embedded import photo_in_focus, read_embedded, rotate_estimate, unread_parts
 from iibr_core.depth.estimate import DepthEstimate, disparity_from
 from iibr_core.depth.guess import guess_depth
 from iibr_core.depth.map_file import as_estimate, depth_from_file, orient_map

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import numpy as np
-
 from iibr_core.color import stored_from_encoded
 from iibr_core.depth.estimate import DepthEstimate
-from iibr_core.depth.multi_view.estimate_disparity import estimate_coarse, estimate_disparity, sweep_bytes
+from iibr_core.depth.multi_view.estimate import estimate_coarse, estimate_disparity, sweep_bytes
+from iibr_core.depth.multi_view.matching import FINDING
 from iibr_core.formats.images.photo import read_picture
 from iibr_core.formats.images.side_by_side import left_picture
 from iibr_core.formats.light_fields.view_files import read_stereo_file
@@ -17,31 +16,26 @@ from iibr_core.runtime.work import report_progress
 from iibr_core.types import InputError, image_size
 
 MATCHED_PIXELS = 400_000
-"""Of each view; edges are drawn to the photo's afterwards."""
+"""Largest number of pixels of each view; edges are refined by the photo later."""
 
 
-def estimate_from_pair(
-    path: Path,
-) -> tuple[DepthEstimate, str] | None:
-    """Of the picture that a stereo photo's file shows, px from eye to eye, and what kind of file it is; None where a
-    file is no stereo photo, or shows another picture than these two.
+def estimate_from_pair(path: Path) -> tuple[DepthEstimate, str] | None:
+    """Return the disparity of the picture that a stereo photo shows, in px from eye to eye, and the kind of file.
 
-    Raises InputError where it is damaged, its views differ in size, are too small, or memory does not do.
+    None if the file is no stereo photo or shows another picture than these two. Raises InputError if it is damaged,
+    its views differ in size or are too small, or memory does not suffice.
     """
-    scene = read_stereo_file(path)
-    held = [view.picture for view in scene.views] if scene is not None else []
-    if scene is None or left_picture(path) not in held:
+    scene, shown = read_stereo_file(path), left_picture(path)
+    pictures = [view.picture for view in scene.views] if scene is not None else []
+    if scene is None or shown not in pictures:
         return None
-    report_progress(0, 0, "finding disparity")
-    pictures = [read_picture(picture, MATCHED_PIXELS).pixels for picture in held]
-    if pictures[0].shape != pictures[1].shape:
-        sizes = " and ".join(str(image_size(pixels)) for pixels in pictures)
+    report_progress(0, 0, FINDING)
+    views = [stored_from_encoded(read_picture(picture, MATCHED_PIXELS).pixels, is_hdr=False) for picture in pictures]
+    if views[0].shape != views[1].shape:
+        sizes = " and ".join(str(image_size(view)) for view in views)
         raise InputError(f"{path}: its two views differ in shape ({sizes} after reading)")
-    views = [stored_from_encoded(pixels, is_hdr=False) for pixels in pictures]
-    offsets = [view.offset for view in scene.views]
-    reference = held.index(left_picture(path))
+    offsets, reference = [view.offset for view in scene.views], pictures.index(shown)
     coarse = estimate_coarse(views, offsets, reference)
-    if sweep_bytes(coarse.values.shape, coarse.range_px, 1.0) > free_memory_bytes():
+    if sweep_bytes(image_size(coarse.values), coarse.range_px, reach=1.0) > free_memory_bytes():
         raise InputError(f"{path}: matching its two views takes more memory than there is")
-    values = estimate_disparity(views, offsets, reference, coarse.range_px)
-    return DepthEstimate(values.astype(np.float32), "disparity"), scene.layout
+    return DepthEstimate(estimate_disparity(views, offsets, reference, coarse.range_px), "disparity"), scene.layout

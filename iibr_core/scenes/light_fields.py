@@ -13,7 +13,8 @@ from pathlib import Path
 import numpy as np
 
 from iibr_core.color import encoded_from_stored
-from iibr_core.depth.multi_view.estimate_disparity import FINDING, estimate_coarse, estimate_disparity, sweep_bytes
+from iibr_core.depth.multi_view.estimate import estimate_coarse, estimate_disparity, sweep_bytes
+from iibr_core.depth.multi_view.matching import FINDING
 from iibr_core.depth.subject import subject_disparity
 from iibr_core.formats.images.photo import focal_px_from_fov
 from iibr_core.formats.light_fields.light_field_formats import open_light_field

@@ -69,14 +69,14 @@ def test_the_list_names_programs_that_are_there() -> None:
         if table.page:
             assert f"<!-- {table.name} -->" in (ROOT / table.page).read_text("utf-8")
         program = table.command.split()[0].replace("-", "_")
-        assert program.startswith("docs/") or program in {*dispatch.programs(), "disparity"}
+        assert program.startswith("docs/") or program in dispatch.programs()
         if program == "compare":
             options = command_line().parse_args(shlex.split(table.command)[1:])
             assert chosen_ways(options.ways)
             assert {*options.maps.split(",")} <= {*MAPS, "network"}
     assert sum(table.minutes for table in TABLES) <= 40
     page = (ROOT / "benchmarks" / "README.md").read_text("utf-8")
-    assert all(f"| `{name.replace('_', '-')}" in page for name in {*dispatch.programs()} - {"multi_view_depth"})
+    assert all(f"| `{name.replace('_', '-')}" in page for name in dispatch.programs())
 
 
 def test_programs_are_run_by_name() -> None:

@@ -11,7 +11,7 @@ from contextlib import contextmanager
 import numpy as np
 import pytest
 
-from iibr_core.depth.embedded.embedded_depth import read_embedded
+from iibr_core.depth.embedded.embedded import read_embedded
 from iibr_core.depth.estimate import DepthEstimate
 from iibr_core.depth.models import cache as estimate_cache
 from iibr_core.formats.images.write import write_image

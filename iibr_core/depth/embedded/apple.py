@@ -1,4 +1,4 @@
-"""Depth that Apple's portrait photos carry: an auxiliary picture of a HEIC, or a second JPEG behind the photo.
+"""Depth of Apple's portrait photos: an auxiliary picture of a HEIC, or a second JPEG behind the photo.
 
 The stored 0..1 are linear in inverse distance ("disparity" in Apple's words) or, rarely, in distance. Apple calls most
 of these maps relative, so the units of their range are not relied on.
@@ -12,76 +12,59 @@ from typing import Any
 import numpy as np
 
 from iibr_core.depth.embedded.images import decode_map
-from iibr_core.depth.embedded.xmp import jpeg_layout, number_in, xmp_of
+from iibr_core.depth.embedded.jpeg import appended_pictures, number_in, xmp_of
 from iibr_core.depth.estimate import DepthEstimate
+from iibr_core.formats.images.xmp import value_in
 from iibr_core.types import FloatImage, InputError
 
 PIXEL_DATA = "http://ns.apple.com/pixeldatainfo/1.0/"
-MAX_APPENDED = 8
-"""Pictures that are looked at behind a photo: depth, mattes, gain map, and some to spare."""
-
-# HEVC's depth representation information: what the stored values are linear in.
-INVERSE_DISTANCE_TYPES = (0, 1, 3)
-DISTANCE_TYPE = 2
+INVERSE_TYPES, DISTANCE_TYPE = (0, 1, 3), 2
+"""Representation types of HEVC's depth information: linear in inverse distance, or in distance."""
 
 
 def heic_estimate(depth: FloatImage, metadata: dict[str, Any]) -> DepthEstimate:
-    """Return the depth of a HEIC's auxiliary picture: (H, W), 0..1, with what libheif tells of it.
+    """Return the depth of a HEIC's auxiliary picture: (H, W), 0..1, with libheif's description of it.
 
-    Raises InputError where the values mean something unknown.
+    Raises InputError if the meaning of the values is unknown.
     """
+    low, high, near, far = (float(metadata.get(name, math.nan)) for name in ("d_min", "d_max", "z_near", "z_far"))
     kind = metadata.get("representation_type", 1)
-    if kind in INVERSE_DISTANCE_TYPES:
-        low, high = _pair(metadata, "d_min", "d_max") or _inverse(_pair(metadata, "z_far", "z_near")) or (0.0, 1.0)
-        return _linear_in_inverse(depth, low, high)
     if kind == DISTANCE_TYPE:
-        near, far = _pair(metadata, "z_near", "z_far") or (math.nan, math.nan)
         return _linear_in_distance(depth, near, far)
-    raise InputError(f"the depth map's representation {kind!r} is not known")
+    if kind not in INVERSE_TYPES:
+        raise InputError(f"the depth map's representation {kind!r} is not known")
+    if math.isnan(low + high) and near > 0 and far > 0:
+        low, high = 1 / far, 1 / near
+    return _linear_in_inverse(depth, low, high)
 
 
 def appended_estimate(data: bytes, end: int) -> DepthEstimate | None:
-    """Depth in a JPEG that follows the photo (which ends at `end`), as iPhones save portraits as JPEG; None without.
+    """Return the depth in a JPEG that follows the photo, which ends at `end`; None without.
 
-    Raises InputError where it is damaged.
+    iPhones save portraits as JPEG like this. Raises InputError if it is damaged.
     """
-    for _ in range(MAX_APPENDED):
-        start = data.find(b"\xff\xd8\xff", end)
-        if start < 0:
-            return None
-        layout = jpeg_layout(data, start)
-        if PIXEL_DATA.encode() in layout.xmp:
-            xmp = xmp_of(layout)
-            kind = (xmp.value(PIXEL_DATA, "AuxiliaryImageType") or "").strip()
-            if kind in ("disparity", "depth"):
-                stored = decode_map(data[start : layout.end], "the depth map behind the photo")
-                low, high = (number_in(xmp.value(PIXEL_DATA, f"Float{side}Value")) for side in ("Min", "Max"))
-                return (_linear_in_inverse if kind == "disparity" else _linear_in_distance)(stored, low, high)
-        end = max(layout.end, start + 2)
+    for picture, layout in appended_pictures(data, end):
+        if PIXEL_DATA.encode() not in layout.xmp:
+            continue
+        xmp = xmp_of(layout)
+        kind = (value_in(xmp, PIXEL_DATA, "AuxiliaryImageType") or "").strip()
+        if kind in ("disparity", "depth"):
+            stored = decode_map(picture, "the depth map behind the photo")
+            low, high = (number_in(value_in(xmp, PIXEL_DATA, f"Float{side}Value")) for side in ("Min", "Max"))
+            return (_linear_in_inverse if kind == "disparity" else _linear_in_distance)(stored, low, high)
     return None
 
 
 def _linear_in_inverse(stored: FloatImage, low: float, high: float) -> DepthEstimate:
-    """A range that makes no sense is left out: it changes nothing but the unknown scale."""
-    if not (math.isfinite(low) and high > low and math.isfinite(high)):
-        return DepthEstimate(stored, "inverse depth")
-    return DepthEstimate(np.float32(low) + stored * np.float32(high - low), "inverse depth")
+    """Return inverse depth; a senseless range is ignored, because it changes only the unknown scale."""
+    if -math.inf < low < high < math.inf:
+        stored = np.float32(low) + stored * np.float32(high - low)
+    return DepthEstimate(stored, "inverse depth")
 
 
 def _linear_in_distance(stored: FloatImage, near: float, far: float) -> DepthEstimate:
-    """Of a range that makes no sense only the order of the values counts."""
-    if not (0 < near < far < math.inf):
-        return DepthEstimate(1 - stored, "inverse depth")
-    return DepthEstimate((1 / (near + stored.astype(np.float64) * (far - near))).astype(np.float32), "inverse depth")
-
-
-def _pair(metadata: dict[str, Any], low: str, high: str) -> tuple[float, float] | None:
-    if low not in metadata or high not in metadata:
-        return None
-    return float(metadata[low]), float(metadata[high])
-
-
-def _inverse(distances: tuple[float, float] | None) -> tuple[float, float] | None:
-    if distances is None or 0 in distances:
-        return None
-    return 1 / distances[0], 1 / distances[1]
+    """Return inverse depth; only the order of the values counts if the range makes no sense."""
+    inverse = 1 - stored
+    if 0 < near < far < math.inf:
+        inverse = (1 / (near + stored.astype(np.float64) * (far - near))).astype(np.float32)
+    return DepthEstimate(inverse, "inverse depth")

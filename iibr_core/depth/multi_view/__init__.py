@@ -1,1 +1,1 @@
-"""Disparity from several pictures of one scene: plane sweep, semi-global choice, refinement by gradients."""
+"""Disparity from several views of one scene: a plane sweep, semi-global matching, and refinement by gradients."""

@@ -10,100 +10,97 @@ from numpy.typing import NDArray
 from iibr_core.runtime import tiling
 from iibr_core.runtime.kernels import kernel
 from iibr_core.runtime.tiling import in_pieces
-from iibr_core.runtime.work import is_stopped, raise_if_stopped
+from iibr_core.runtime.work import raise_if_stopped
 from iibr_core.types import FloatImage
 
-SMALL_STEP_COST = 8
-"""Of going from one disparity to the next between neighbouring pixels; costs of matching end at 255."""
+STEP_COST = 8
+"""Cost of one step of disparity between neighbouring pixels, where costs of matching end at 255."""
 JUMP_COST = 240
-"""Of any greater step, where the picture shows no edge."""
+"""Cost of a larger step, where the picture has no edge."""
 EDGE_LUMA = 0.02
-"""An edge of this much (1 = white) brings the cost of a jump down to a third of it."""
-PATHS = [at for at in product((-1, 0, 1), repeat=2) if any(at)]
-"""The directions, (y, x), from which neighbours are heard."""
+"""Edge of the picture (1 = white) at which a jump costs a third."""
 
 
 def choose_disparity(
     costs: NDArray[np.uint8], luma: FloatImage, disparities: NDArray[np.float32]
 ) -> tuple[FloatImage, FloatImage]:
-    """The disparity (H, W) that suits each pixel and its neighbours, and how surely, 0 .. 1.
+    """Return the disparity (H, W) that suits each pixel and its neighbours, and its sureness (H, W), 0 .. 1.
 
-    costs: (H, W, D), 0 .. 255, of D >= 1 evenly spaced disparities. luma: (H, W) of the picture, 0 .. 1: jumps cost
-    less at its edges. Between two disparities a parabola through the sums decides. Sure is what matches far better
-    than it does on average.
+    costs: (H, W, D), 0 .. 255, of D >= 1 evenly spaced disparities. luma: (H, W) of the picture, 0 .. 1. The result
+    lies between two disparities, at the lowest point of a parabola. A pixel is sure if its disparity costs far less
+    than the mean of all.
     """
+    directions = [at for at in product((-1, 0, 1), repeat=2) if any(at)]
     halves = np.zeros((2, *costs.shape), np.uint16)
 
     def sum_paths(half: int) -> None:
-        for down, across in PATHS[half::2]:
-            if is_stopped():
-                return
+        for down, across in directions[half::2]:
+            raise_if_stopped()
             _add_path(costs, luma, down, across, halves[half])
 
     in_pieces(sum_paths, range(2), tiling.THREADS)
-    raise_if_stopped()
     values, sureness = np.empty(luma.shape, np.float32), np.empty(luma.shape, np.float32)
-    _choose(halves[0], halves[1], costs, disparities, values, sureness)
+    _choose(halves, costs, disparities, values, sureness)
     return values, sureness
 
 
 @kernel
 def _add_path(costs, luma, down, across, sums):
-    """Add the costs of the cheapest path that comes from one direction (equation 13 there)."""
+    """Add the costs of the cheapest path that comes from one direction (equation 13 of the paper)."""
     height, width, count = costs.shape
-    # Rows one after the other, or columns where the path runs along a row.
-    along_row = down == 0
-    lines, places = (width, height) if along_row else (height, width)
-    before, now = np.zeros((places, count), np.float32), np.zeros((places, count), np.float32)
-    least_before, least_now = np.zeros(places, np.float32), np.zeros(places, np.float32)
-    forward = across > 0 if along_row else down > 0
+    # Line by line: columns if the path runs along a row, else rows.
+    is_along_row = down == 0
+    lines, places = (width, height) if is_along_row else (height, width)
+    is_forward = across > 0 if is_along_row else down > 0
+    previous, current = np.zeros((places, count), np.float32), np.zeros((places, count), np.float32)
+    previous_min, current_min = np.zeros(places, np.float32), np.zeros(places, np.float32)
     for step in range(lines):
-        line = step if forward else lines - 1 - step
+        line = step if is_forward else lines - 1 - step
         for place in range(places):
-            y, x = (place, line) if along_row else (line, place)
+            y, x = (place, line) if is_along_row else (line, place)
             from_y, from_x = y - down, x - across
-            has_before = from_y >= 0 and from_y < height and from_x >= 0 and from_x < width
-            least = np.float32(np.inf)
-            if has_before:
-                source = from_y if along_row else from_x
+            has_previous = from_y >= 0 and from_y < height and from_x >= 0 and from_x < width
+            if has_previous:
+                source = from_y if is_along_row else from_x
                 edge = abs(luma[y, x] - luma[from_y, from_x])
-                jump = max(np.float32(SMALL_STEP_COST), np.float32(JUMP_COST) * np.exp(-edge / np.float32(EDGE_LUMA)))
-                lowest = least_before[source]
+                jump = max(np.float32(STEP_COST), np.float32(JUMP_COST) * np.exp(-edge / np.float32(EDGE_LUMA)))
+                lowest = previous_min[source]
+            least = np.float32(np.inf)
             for index in range(count):
                 cost = np.float32(costs[y, x, index])
-                if has_before:
-                    best = min(before[source, index], lowest + jump)
+                if has_previous:
+                    best = min(previous[source, index], lowest + jump)
                     if index > 0:
-                        best = min(best, before[source, index - 1] + SMALL_STEP_COST)
+                        best = min(best, previous[source, index - 1] + STEP_COST)
                     if index < count - 1:
-                        best = min(best, before[source, index + 1] + SMALL_STEP_COST)
+                        best = min(best, previous[source, index + 1] + STEP_COST)
                     cost += best - lowest
-                now[place, index] = cost
+                current[place, index] = cost
                 least = min(least, cost)
                 sums[y, x, index] += np.uint16(cost + np.float32(0.5))
-            least_now[place] = least
-        before, now = now, before
-        least_before, least_now = least_now, least_before
+            current_min[place] = least
+        previous, current = current, previous
+        previous_min, current_min = current_min, previous_min
 
 
 @kernel
-def _choose(first, second, costs, disparities, values, sureness):
-    height, width, count = first.shape
+def _choose(sums, costs, disparities, values, sureness):
+    """Take the disparity with the lowest sum of both halves, moved to the lowest point of the parabola there."""
+    height, width, count = costs.shape
+    totals = np.empty(count, np.float32)
     for y in range(height):
         for x in range(width):
-            best, least, mean = 0, np.float32(np.inf), np.float32(0)
+            best, mean = 0, np.float32(0)
             for index in range(count):
-                total = np.float32(first[y, x, index]) + np.float32(second[y, x, index])
+                totals[index] = np.float32(sums[0, y, x, index]) + np.float32(sums[1, y, x, index])
                 mean += costs[y, x, index]
-                if total < least:
-                    best, least = index, total
+                if totals[index] < totals[best]:
+                    best = index
             mean /= count
             sureness[y, x] = max(mean - costs[y, x, best], np.float32(0)) / max(mean, np.float32(1))
-            value = disparities[best]
+            values[y, x] = disparities[best]
             if best > 0 and best < count - 1:
-                below = np.float32(first[y, x, best - 1]) + np.float32(second[y, x, best - 1])
-                above = np.float32(first[y, x, best + 1]) + np.float32(second[y, x, best + 1])
-                bend = below - 2 * least + above
+                below, above = totals[best - 1], totals[best + 1]
+                bend = below - 2 * totals[best] + above
                 if bend > 0:
-                    value += (disparities[1] - disparities[0]) * np.float32(0.5) * (below - above) / bend
-            values[y, x] = value
+                    values[y, x] += (disparities[1] - disparities[0]) * np.float32(0.5) * (below - above) / bend

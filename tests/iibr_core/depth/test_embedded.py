@@ -11,7 +11,7 @@ import pytest
 from PIL import Image
 
 from iibr_core.depth.embedded.apple import heic_estimate
-from iibr_core.depth.embedded.embedded_depth import embedded_in_jpeg, read_embedded
+from iibr_core.depth.embedded.embedded import embedded_in_jpeg, read_embedded
 from iibr_core.depth.embedded.images import MAX_MAP_PIXELS, decode_map
 from iibr_core.depth.search import open_with_depth
 from iibr_core.formats.images.photo import read_photo
@@ -87,12 +87,12 @@ def test_unsure_depth_is_unknown() -> None:
     assert not np.isnan(relative(gdepth(confidence=files.picture(np.zeros(SIZE, np.uint8), "PNG")))).any()
 
 
-@pytest.mark.parametrize("lost", [0, 1, -1])
-def test_a_lost_part_is_told(lost: int) -> None:
-    standard, *parts = files.gdepth_segments(files.picture(STORED, "PNG"), part_bytes=150)
-    del parts[lost]
-    with pytest.raises(InputError, match="cut short"):
-        embedded_in_jpeg(files.with_segments(files.grey_photo(SIZE), [standard, *parts]))
+def test_a_lost_part_is_reported() -> None:
+    for lost in (0, 1, -1):
+        standard, *parts = files.gdepth_segments(files.picture(STORED, "PNG"), part_bytes=150)
+        del parts[lost]
+        with pytest.raises(InputError, match="cut short"):
+            embedded_in_jpeg(files.with_segments(files.grey_photo(SIZE), [standard, *parts]))
 
 
 @pytest.mark.parametrize("shared_container", [False, True])
@@ -157,7 +157,6 @@ def test_a_heic_opens_as_a_photo_with_its_focal_length(tmp_path: Path) -> None:
     np.testing.assert_allclose(photo.pixels * 255, pixels, atol=4)
     assert photo.focal_px == pytest.approx(26 / np.hypot(36, 24) * np.hypot(64, 96))
     assert read_embedded(path) is None
-    assert read_photo(path, max_pixels=1000).size == (25, 38)
 
 
 @pytest.mark.parametrize("audio", [False, True])
@@ -264,75 +263,45 @@ def test_one_damaged_format_does_not_hide_another() -> None:
     assert found.format == "Samsung Live focus"
 
 
-# ---- hostile files, by the hundred
+# ---- damaged files
 
 FUZZED = {
-    "gdepth": gdepth(part_bytes=None),
-    "extended": gdepth(part_bytes=200, confidence=PNG, sharp=files.grey_photo((3, 4))),
-    "dynamic": files.dynamic_depth_jpeg(files.grey_photo(SIZE), PNG),
-    "apple": files.apple_jpeg(files.grey_photo(SIZE), STORED, 0, 1),
-    "samsung": files.samsung_jpeg(files.grey_photo(SIZE), STORED, audio=True),
+    "gdepth.jpg": gdepth(part_bytes=None),
+    "extended.jpg": gdepth(part_bytes=200, confidence=PNG, sharp=files.grey_photo((3, 4))),
+    "dynamic.jpg": files.dynamic_depth_jpeg(files.grey_photo(SIZE), PNG),
+    "apple.jpg": files.apple_jpeg(files.grey_photo(SIZE), STORED, 0, 1),
+    "samsung.jpg": files.samsung_jpeg(files.grey_photo(SIZE), STORED, audio=True),
+    "a.heic": files.heic(np.full((48, 64, 3), 100, np.uint8), np.zeros((24, 32), np.uint8)),
 }
-MUTATIONS = 300
 
 
-def mutated(data: bytes, random_: random.Random) -> bytes:
-    """Bytes flipped, cut out, doubled, or the end lost."""
+def damage(data: bytes, rng: random.Random) -> bytes:
+    """Overwrite, cut out or double some bytes behind the file's mark, or lose the end."""
     result = bytearray(data)
-    for _ in range(random_.randint(1, 6)):
-        at = random_.randrange(len(result))
-        length = random_.choice((1, 1, 2, 4, 40, 400))
-        match random_.randrange(5):
-            case 0:
-                result[at] ^= 1 << random_.randrange(8)
-            case 1:
-                result[at : at + length] = bytes(random_.randrange(256) for _ in range(length))
-            case 2:
-                del result[at : at + length]
-            case 3:
-                result[at:at] = result[at : at + length]
-            case 4:
-                result[at : at + 4] = random_.choice((b"\xff\xff\xff\xff", b"\0\0\0\0", b"\x7f\xff\xff\xff"))
-        if len(result) < 8:
-            break
-    return bytes(result[: random_.randrange(len(result))] if random_.random() < 0.1 else result)
+    for _ in range(rng.randint(1, 6)):
+        at, length = rng.randrange(12, len(result)), rng.choice((1, 1, 2, 4, 40, 400))
+        part = bytes(result[at : at + length])
+        noise = bytes(rng.randrange(256) for _ in part)
+        result[at : at + length] = rng.choice((noise, b"", 2 * part, b"\xff" * len(part), bytes(len(part))))
+    return bytes(result[: rng.randrange(len(result))] if rng.random() < 0.1 else result)
 
 
 @pytest.mark.parametrize("name", FUZZED)
-def test_damaged_files_give_depth_or_one_line(name: str) -> None:
-    random_ = random.Random(name)
-    outcomes = {"depth": 0, "none": 0, "refused": 0}
-    lines: set[str] = set()
-    for _ in range(MUTATIONS):
+def test_damaged_files_give_depth_or_one_line(tmp_path: Path, name: str) -> None:
+    rng, path, outcomes, lines = random.Random(name), tmp_path / name, set(), []
+    for _ in range(200):
+        path.write_bytes(damage(FUZZED[name], rng))
         try:
-            found = embedded_in_jpeg(mutated(FUZZED[name], random_))
+            found = read_embedded(path)
         except InputError as error:
-            outcomes["refused"] += 1
-            lines.add(str(error))
+            outcomes.add("refused")
+            lines.append(str(error))
             continue
-        outcomes["none" if found is None else "depth"] += 1
+        outcomes.add("none" if found is None else "depth")
         if found is not None:
             values = found.estimate.values
             assert values.ndim == 2
             assert 0 < values.size < 1e6
             assert not np.isinf(values).any()
-    assert all(outcomes.values()), outcomes
-    assert not any("\n" in line for line in lines)
-
-
-def test_damaged_heics_give_depth_or_one_line(tmp_path: Path) -> None:
-    random_ = random.Random(1)
-    data = files.heic(np.full((48, 64, 3), 100, np.uint8), np.zeros((24, 32), np.uint8))
-    path, outcomes = tmp_path / "a.heic", {"read": 0, "refused": 0}
-    lines: set[str] = set()
-    for _ in range(MUTATIONS):
-        path.write_bytes(data[:12] + mutated(data[12:], random_))
-        for read in (read_embedded, read_photo):
-            try:
-                read(path)
-                outcomes["read"] += 1
-            except InputError as error:
-                outcomes["refused"] += 1
-                lines.add(str(error))
-    assert all(outcomes.values()), outcomes
+    assert {"refused", "depth"} <= outcomes
     assert not any("\n" in line for line in lines)

@@ -10,8 +10,7 @@ import pytest
 from PIL import Image
 from PIL.PngImagePlugin import PngInfo
 
-from iibr_core.depth.embedded.embedded_depth import read_embedded
-from iibr_core.depth.embedded.unread import unread_parts
+from iibr_core.depth.embedded.embedded import read_embedded, unread_parts
 from iibr_core.depth.search import PhotoWithDepth, open_with_depth
 from iibr_core.formats.images.lfp import read_lfp
 from iibr_core.formats.images.photo import read_photo
@@ -76,6 +75,11 @@ def test_huawei_maps_lie_as_the_phone_was_held(
     found = opened(tmp_path, "a.jpg", files.huawei_jpeg(PHOTO, stored, orientation))
     assert_disc_is_nearest(found)
     assert any("counts as near" in note for note in found.disparity.notes)
+
+
+def test_a_chance_mark_before_huaweis_does_not_hide_it(tmp_path: Path) -> None:
+    data = files.huawei_jpeg(PHOTO + b"edof", SMALL[:, ::-1]).replace(b"\x56\xe9edof", b"edof\x56\xe9edof")
+    assert_disc_is_nearest(opened(tmp_path, "a.jpg", data))
 
 
 def test_a_mask_behind_a_photo_is_no_map(tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from iibr_core.depth.embedded.embedded_depth import read_embedded
+from iibr_core.depth.embedded.embedded import read_embedded
 from iibr_core.formats.images.photo import read_photo
 from iibr_core.formats.images.picture_source import PictureSource, read_source
 from iibr_core.formats.images.spatial_photo import write_spatial_photo

@@ -12,7 +12,7 @@ import pytest
 from iibr_core.beyond.optics import CENTRE
 from iibr_core.color import bytes_from_encoded
 from iibr_core.depth.choice import DepthChoice
-from iibr_core.depth.multi_view.estimate_disparity import FINDING
+from iibr_core.depth.multi_view.matching import FINDING
 from iibr_core.formats.images.write import write_image_file
 from iibr_core.runtime.work import Cancelled, stoppable, watched
 from iibr_core.scenes.lens_limits import focus_limits

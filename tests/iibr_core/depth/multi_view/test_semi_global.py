@@ -1,15 +1,17 @@
 """Semi-global matching against its paper's equation, path by path."""
 
+from itertools import product
+
 import numpy as np
 
-from iibr_core.depth.multi_view.semi_global import EDGE_LUMA, JUMP_COST, PATHS, SMALL_STEP_COST, choose_disparity
+from iibr_core.depth.multi_view.semi_global import EDGE_LUMA, JUMP_COST, STEP_COST, choose_disparity
 
 
 def slow_sums(costs, luma):
-    """Of all paths, each pixel's cost by that of the pixel before it (equation 13), rounded as they are stored."""
+    """Return the sums of all paths (equation 13), rounded as they are stored."""
     height, width, count = costs.shape
     sums = np.zeros(costs.shape)
-    for down, across in PATHS:
+    for down, across in (at for at in product((-1, 0, 1), repeat=2) if any(at)):
         paths = np.zeros(costs.shape)
         rows = range(height) if down >= 0 else range(height - 1, -1, -1)
         columns = range(width) if across >= 0 else range(width - 1, -1, -1)
@@ -20,12 +22,17 @@ def slow_sums(costs, luma):
                 if not (0 <= v < height and 0 <= u < width):
                     continue
                 lowest = paths[v, u].min()
-                jump = max(SMALL_STEP_COST, JUMP_COST * np.exp(-abs(luma[y, x] - luma[v, u]) / EDGE_LUMA))
+                jump = max(STEP_COST, JUMP_COST * np.exp(-abs(luma[y, x] - luma[v, u]) / EDGE_LUMA))
                 for d in range(count):
-                    beside = [paths[v, u, e] + SMALL_STEP_COST for e in (d - 1, d + 1) if 0 <= e < count]
+                    beside = [paths[v, u, e] + STEP_COST for e in (d - 1, d + 1) if 0 <= e < count]
                     paths[y, x, d] += min(paths[v, u, d], *beside, lowest + jump) - lowest
         sums += np.floor(paths + 0.5)
     return sums
+
+
+def test_one_disparity_leaves_no_choice():
+    values, _ = choose_disparity(np.full((3, 4, 1), 7, np.uint8), np.zeros((3, 4), np.float32), np.float32([1.5]))
+    assert (values == 1.5).all()
 
 
 def test_disparities_are_the_cheapest_of_all_paths_and_lie_between_steps():

@@ -1,0 +1,246 @@
+"""The depth map within a photo's own file, in any known format; it is used before any estimate."""
+
+from __future__ import annotations
+
+import re
+import tempfile
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from xml.etree.ElementTree import Element
+
+from iibr_core.depth.embedded.apple import appended_estimate, heic_estimate
+from iibr_core.depth.embedded.google import all_in_focus, dynamic_depth_estimate, gdepth_estimate, range_notes
+from iibr_core.depth.embedded.images import PICTURE_STARTS, decode_map
+from iibr_core.depth.embedded.jpeg import JPEG_START, appended_pictures, jpeg_layout, xmp_of
+from iibr_core.depth.embedded.samsung import samsung_estimate
+from iibr_core.depth.embedded.trailers import HEADER_BYTES, huawei_estimate, second_picture_estimate, size_and_kind
+from iibr_core.depth.estimate import DepthEstimate
+from iibr_core.formats.files import open_binary
+from iibr_core.formats.images.avif import avif_depth_file, is_avif
+from iibr_core.formats.images.decode import read_orientation
+from iibr_core.formats.images.heic import heic_auxiliaries, heic_orientation, is_heic, read_heic_depth
+from iibr_core.formats.images.lfp import is_lfp, read_lfp_depth
+from iibr_core.formats.images.metadata import read_metadata
+from iibr_core.formats.images.photo import read_photo
+from iibr_core.formats.images.picture import upright
+from iibr_core.formats.images.stereo_jpeg import SOURCE_IMAGE, read_lif
+from iibr_core.formats.images.xmp import parse_packet
+from iibr_core.formats.maps.disparity_file import has_shape_of
+from iibr_core.types import ImageSize, InputError, Photo, image_size
+
+MAX_FILE_BYTES = 512 * 2**20
+GDEPTH, DYNAMIC_DEPTH = "Google GDepth", "Dynamic Depth"
+SAMSUNG, HUAWEI = "Samsung Live focus", "Huawei"
+SECOND_PICTURE = "a second, grey picture"
+NEAR_END_UNKNOWN = (HUAWEI, SECOND_PICTURE, "AVIF depth")
+"""Formats that do not state the near end of their values: the photo has to decide."""
+
+TRAILERS = (
+    (re.compile(rb"PMPD[\x01-\x09]\0"), "a depth map of Xiaomi's kind (PMPD)"),
+    (re.compile(rb"DualShot_DepthMap"), "a depth map of Samsung's of another layout than the known ones"),
+    (re.compile(rb"\0edof\0"), "a depth map of Huawei's of another layout than the known ones"),
+)
+"""Marks of depth maps behind a photo that are not read."""
+MATTE = re.compile(rb"urn:com:apple:photo:\d+:aux:(?:semantic)?(\w+?)matte")
+GAIN_MAP = re.compile(rb"hdrgm:|HDRGainMap|GainMap|urn:iso:std:iso:ts:21496|aux:hdrgainmap", re.IGNORECASE)
+CONTAINER = re.compile(rb"MPF\0|photos/1.0/container/|photos/dd/1.0/container/|GCamera:MicroVideo")
+"""Marks of lists of pictures behind a photo: previews, gain maps and films, never depth."""
+
+
+@dataclass(frozen=True, eq=False)
+class EmbeddedDepth:
+    """Depth that a photo's file holds beside the picture.
+
+    estimate: at the map's size, as stored (before Exif's orientation, if the photo has one). format: its name, for
+    people. all_in_focus: a picture file's bytes, to be shown instead of the photo that the camera blurred; None
+    without. notes: sentences about the map.
+    """
+
+    estimate: DepthEstimate
+    format: str
+    all_in_focus: bytes | None = None
+    notes: tuple[str, ...] = ()
+
+    @property
+    def says_near_end(self) -> bool:
+        """Return whether the near end of the values is known; else larger values count as nearer for now."""
+        return self.format not in NEAR_END_UNKNOWN
+
+
+def read_embedded(path: Path) -> EmbeddedDepth | None:
+    """Return the depth within a photo's file, None if it holds none. Raises InputError if it is damaged."""
+    try:
+        for is_kind, read in ((is_avif, _in_avif), (is_heic, _in_heic), (is_lfp, _in_lfp)):
+            if is_kind(path):
+                return read(path) or _in_packet(path)
+        data = _jpeg_bytes(path)
+        return embedded_in_jpeg(data) if data else _in_packet(path)
+    except InputError as error:
+        text = str(error)
+        raise InputError(text if text.startswith(str(path)) else f"{path}: {text}") from error
+
+
+def embedded_in_jpeg(data: bytes) -> EmbeddedDepth | None:
+    """Return the depth within a JPEG file's bytes, None if it holds none.
+
+    Formats are tried in turn. Raises InputError if a format is damaged and no other one is whole.
+    """
+    layout, xmp, damage = jpeg_layout(data), Element("xmp"), None
+    try:
+        xmp = xmp_of(layout)
+    except InputError as error:
+        damage = error
+    readers: dict[str, Callable[[], DepthEstimate | None]] = {
+        DYNAMIC_DEPTH: lambda: dynamic_depth_estimate(xmp, data, layout.end),
+        GDEPTH: lambda: gdepth_estimate(xmp),
+        "Apple portrait": lambda: appended_estimate(data, layout.end),
+        SAMSUNG: lambda: samsung_estimate(data),
+        "Leia": lambda: leia_estimate(data),
+        HUAWEI: lambda: huawei_estimate(data, layout.end),
+        SECOND_PICTURE: lambda: second_picture_estimate(data, layout.end),
+    }
+    for name, read in readers.items():
+        try:
+            estimate = read()
+        except InputError as error:
+            damage = damage or error
+            continue
+        if estimate is not None:
+            notes = range_notes(xmp) if name in (GDEPTH, DYNAMIC_DEPTH) else ()
+            return EmbeddedDepth(estimate, name, all_in_focus(xmp) if name == GDEPTH else None, notes)
+    if damage is not None:
+        raise damage
+    return None
+
+
+def leia_estimate(data: bytes) -> DepthEstimate | None:
+    """Return the map of a Leia image's first view, white near; None without. Raises InputError if it is damaged."""
+    leia = read_lif(data)
+    for view in leia.views if leia is not None else ():
+        if leia is not None and view.image == SOURCE_IMAGE and view.inverse_depth is not None:
+            stored = decode_map(leia.fields[view.inverse_depth], "Leia's map of inverse depth")
+            return DepthEstimate(stored, "inverse depth")
+    return None
+
+
+def photo_in_focus(path: Path, photo: Photo, embedded: EmbeddedDepth, max_pixels: int) -> Photo:
+    """Return the sharp picture of a file as the photo, turned like it.
+
+    The photo itself is returned if the file holds no sharp picture, or a damaged one, or one of another shape.
+    """
+    if embedded.all_in_focus is None:
+        return photo
+    try:
+        sharp = _read_sharp(embedded.all_in_focus, read_orientation(path), max_pixels)
+    except InputError as error:
+        return replace(photo, notes=(*photo.notes, f"The blurred picture is shown: {error}"))
+    if not has_shape_of(sharp.size, photo.size):
+        return replace(photo, notes=(*photo.notes, "The blurred picture is shown: the sharp one has another shape."))
+    focal_px = photo.focal_px * sharp.size.width / photo.size.width
+    note = "The sharp picture that the file holds is shown, not the blurred one."
+    notes = (*photo.notes, note)
+    return replace(photo, pixels=sharp.pixels, focal_px=focal_px, notes=notes, color_space=sharp.color_space)
+
+
+def _read_sharp(data: bytes, orientation: int, max_pixels: int) -> Photo:
+    """Return the picture of a file's bytes, turned by `orientation` if it states none itself."""
+    if not data.startswith(PICTURE_STARTS):
+        raise InputError(f"the all-in-focus picture is neither a PNG nor a JPEG picture ({len(data):,} bytes)")
+    with tempfile.TemporaryDirectory(prefix="iibr-") as folder:
+        path = Path(folder, "picture.jpg" if data.startswith(JPEG_START) else "picture.png")
+        path.write_bytes(data)
+        try:
+            sharp = read_photo(path, max_pixels, keeps_primaries=True)
+            is_turned = read_orientation(path) != 1
+        except InputError as error:
+            raise InputError(f"the all-in-focus picture: {str(error).removeprefix(f'{path}: ')}") from error
+    return sharp if is_turned else replace(sharp, pixels=upright(sharp.pixels, orientation))
+
+
+def rotate_estimate(estimate: DepthEstimate, size: ImageSize, orientation: int) -> DepthEstimate:
+    """Return the estimate, turned upright as the photo was, unless it was stored upright.
+
+    Maps of another shape show the whole photo, stretched, as GDepth's specification demands. Raises InputError if the
+    map lies across the photo however it is turned.
+    """
+    turned = upright(estimate.values, orientation)
+    for values in (turned, estimate.values):
+        if has_shape_of(image_size(values), size):
+            return DepthEstimate(values, estimate.meaning)
+    for values in (turned, estimate.values):
+        height, width = values.shape
+        if height == width or (height > width) == (size.height > size.width):
+            return DepthEstimate(values, estimate.meaning)
+    raise InputError(f"its {image_size(estimate.values)} pixels lie across the photo, {size}")
+
+
+def unread_parts(path: Path) -> tuple[str, ...]:
+    """Return a sentence for each part of a photo's file that looks like depth and is not read.
+
+    It is meant for photos without known depth, so that a guess is explained. Raises InputError if the file is missing.
+    """
+    in_heic = " ".join(heic_auxiliaries(path)).encode() if is_heic(path) else b""
+    parts = _mattes(in_heic) + _unread_in_jpeg(_jpeg_bytes(path))
+    return tuple(f"{path.name} holds {part}; this is not read." for part in parts)
+
+
+def _unread_in_jpeg(data: bytes) -> list[str]:
+    end = jpeg_layout(data).end
+    parts = [words for mark, words in TRAILERS if mark.search(data, end)] + _mattes(data[end:])
+    if CONTAINER.search(data, 0, min(end, HEADER_BYTES)):
+        return parts
+    for picture, _ in appended_pictures(data, end):
+        found = size_and_kind(picture)
+        if found and not any(mark.search(picture, 0, HEADER_BYTES) for mark in (GAIN_MAP, MATTE)):
+            parts.append(f"a second picture ({found[0]}, {'grey' if found[1] else 'colour'})")
+    return parts
+
+
+def _mattes(data: bytes) -> list[str]:
+    names = ", ".join(dict.fromkeys(found[1].decode() for found in MATTE.finditer(data)))
+    names = names.replace("portraiteffects", "portrait effects")
+    return [f"mattes ({names}), which are no depth maps"] if names else []
+
+
+def _jpeg_bytes(path: Path) -> bytes:
+    """Return a whole JPEG file, b"" for other and very large files. Raises InputError if it is missing."""
+    with open_binary(path) as file:
+        is_jpeg = file.read(3) == JPEG_START and path.stat().st_size <= MAX_FILE_BYTES
+        file.seek(0)
+        return file.read() if is_jpeg else b""
+
+
+def _in_avif(path: Path) -> EmbeddedDepth | None:
+    data = avif_depth_file(path)
+    if data is None:
+        return None
+    values = decode_map(data, "the depth map of the AVIF", ("AVIF",))
+    return EmbeddedDepth(DepthEstimate(values, "inverse depth"), "AVIF depth")
+
+
+def _in_heic(path: Path) -> EmbeddedDepth | None:
+    depth = read_heic_depth(path)
+    if depth is not None:
+        return EmbeddedDepth(heic_estimate(*depth), "Apple portrait")
+    with open_binary(path) as file:
+        found = samsung_estimate(file.read(MAX_FILE_BYTES))
+    if found is None:
+        return None
+    # A HEIC's photo is always read upright.
+    return EmbeddedDepth(DepthEstimate(upright(found.values, heic_orientation(path)), "inverse depth"), SAMSUNG)
+
+
+def _in_lfp(path: Path) -> EmbeddedDepth | None:
+    depth = read_lfp_depth(path)
+    return None if depth is None else EmbeddedDepth(DepthEstimate(-depth, "inverse depth"), "Lytro")
+
+
+def _in_packet(path: Path) -> EmbeddedDepth | None:
+    """Return the depth in the XMP of any other kind of picture, as GDepth."""
+    packet = read_metadata(path).xmp
+    if b"/1.0/depthmap/" not in packet:
+        return None
+    xmp = parse_packet(packet)
+    estimate = gdepth_estimate(xmp)
+    return None if estimate is None else EmbeddedDepth(estimate, GDEPTH, all_in_focus(xmp), range_notes(xmp))

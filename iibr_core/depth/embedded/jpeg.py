@@ -1,0 +1,129 @@
+"""JPEG files: where a picture ends, its XMP, and the pictures that follow it.
+
+Large values of XMP, such as a depth map in base64, do not fit a segment of 64 KB: an "extended" packet holds them,
+cut into parts (XMP specification part 3, section 1.1.3.1).
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from typing import NamedTuple
+from xml.etree.ElementTree import Element
+
+from iibr_core.formats.images.xmp import MAX_PACKET_BYTES, parse_packet, value_in
+from iibr_core.types import InputError
+
+JPEG_START = b"\xff\xd8\xff"
+STANDARD_HEADER = b"http://ns.adobe.com/xap/1.0/\0"
+EXTENDED_HEADER = b"http://ns.adobe.com/xmp/extension/\0"
+EXTENDED_PART = re.compile(rb"(.{32})(.{4})(.{4})(.*)", re.DOTALL)
+"""Name of the packet, its length, place of the part, and the part."""
+NOTE = "http://ns.adobe.com/xmp/note/"
+APP1, START_OF_SCAN, END_OF_IMAGE, PADDING = 0xE1, 0xDA, 0xD9, 0xFF
+STANDALONE = frozenset({0x01, *range(0xD0, 0xD9)})
+"""Markers without a length: TEM, restarts, start of image."""
+AFTER_SCAN = re.compile(rb"\xff+[^\x00\xff\xd0-\xd7]")
+"""End of a scan, in which a stuffed 0 or a restart marker follows 0xFF."""
+MAX_APPENDED = 8
+"""Largest number of pictures that are looked at behind a photo."""
+
+
+class JpegLayout(NamedTuple):
+    """Contents of a JPEG picture.
+
+    xmp: the standard packet, b"" without. extended: contents of the segments of extended packets. end: first byte after
+    the picture; what follows is a trailer.
+    """
+
+    xmp: bytes
+    extended: list[bytes]
+    end: int
+
+
+def jpeg_layout(data: bytes, start: int = 0) -> JpegLayout:
+    """Return the layout of the JPEG picture that begins at `start`. If it is cut off, `end` is the data's end."""
+    xmp, extended, end = b"", [], len(data)
+    for marker, first, last in _segments(data, start):
+        if marker == END_OF_IMAGE:
+            end = last
+        elif marker == APP1 and data.startswith(STANDARD_HEADER, first, last):
+            xmp = xmp or data[first + len(STANDARD_HEADER) : last]
+        elif marker == APP1 and data.startswith(EXTENDED_HEADER, first, last):
+            extended.append(data[first + len(EXTENDED_HEADER) : last])
+    return JpegLayout(xmp, extended, end)
+
+
+def appended_pictures(data: bytes, end: int) -> Iterator[tuple[bytes, JpegLayout]]:
+    """Yield the first JPEG pictures that follow a photo, which ends at `end`, and their layouts."""
+    for _ in range(MAX_APPENDED):
+        start = data.find(JPEG_START, end)
+        if start < 0:
+            return
+        layout = jpeg_layout(data, start)
+        yield data[start : layout.end], layout
+        end = max(layout.end, start + 2)
+
+
+def xmp_of(layout: JpegLayout) -> Element:
+    """Return the parsed XMP of a JPEG, the extended packet included, as children of one element.
+
+    Raises InputError if a packet is damaged, too large, declares entities, or lacks parts.
+    """
+    xmp = Element("xmp")
+    if layout.xmp:
+        xmp.append(parse_packet(layout.xmp))
+        name = value_in(xmp, NOTE, "HasExtendedXMP")
+        if name is not None:
+            xmp.append(parse_packet(_join_parts(layout.extended, name.strip().upper().encode("ascii", "replace"))))
+    return xmp
+
+
+def number_in(text: str | None) -> float:
+    """Return the number that a text states, NaN if it states none."""
+    try:
+        return float(text or "nan")
+    except ValueError:
+        return float("nan")
+
+
+def _segments(data: bytes, start: int) -> Iterator[tuple[int, int, int]]:
+    """Yield each segment's marker and the two ends of its content; the last segment is the end of the image."""
+    at = start + 2
+    while at + 2 <= len(data) and data[at] == PADDING:
+        marker = data[at + 1]
+        if marker == END_OF_IMAGE:
+            yield marker, at, at + 2
+            return
+        if marker == PADDING or marker in STANDALONE:
+            at += 1 if marker == PADDING else 2
+            continue
+        length = int.from_bytes(data[at + 2 : at + 4], "big")
+        first, at = at + 4, at + 2 + length
+        if length < 2 or at > len(data):
+            return
+        yield marker, first, at
+        if marker == START_OF_SCAN:
+            found = AFTER_SCAN.search(data, at)
+            if found is None:
+                return
+            at = found.end() - 2
+
+
+def _join_parts(segments: list[bytes], name: bytes) -> bytes:
+    """Return the extended packet of this name from its parts, whatever their order in the file."""
+    parts = [part.groups() for part in map(EXTENDED_PART.fullmatch, segments) if part and part[1].upper() == name]
+    if not parts:
+        raise InputError("extended XMP is missing")
+    whole = int.from_bytes(parts[0][1], "big")
+    if whole > MAX_PACKET_BYTES:
+        raise InputError(f"extended XMP of {whole:,} bytes exceeds {MAX_PACKET_BYTES:,}")
+    packet = bytearray()
+    for _, _, place, content in sorted(parts, key=lambda part: part[2]):
+        offset = int.from_bytes(place, "big")
+        if offset > len(packet):
+            break
+        packet[offset : offset + len(content)] = content
+    if len(packet) != whole:
+        raise InputError(f"extended XMP is cut short ({len(packet):,} of {whole:,} bytes)")
+    return bytes(packet)

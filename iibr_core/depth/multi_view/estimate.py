@@ -1,0 +1,152 @@
+"""Disparity of one view of a light field, or of a pair, from all views: first of a small copy, to find its range."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import OpenImageIO as oiio
+from numpy.typing import NDArray
+
+from iibr_core.color import encoded_from_stored
+from iibr_core.depth.multi_view.matching import FINDING, STEP_PX, MatchingViews, matching_views, sweep
+from iibr_core.depth.multi_view.refinement import refine_by_gradients
+from iibr_core.depth.multi_view.semi_global import choose_disparity
+from iibr_core.formats.maps.resample import resample_surfaces
+from iibr_core.inpainting.disparity_by_color import fill_disparity_by_color
+from iibr_core.runtime.work import ignore_progress, part_of_job, raise_if_stopped, report_progress, watched
+from iibr_core.types import FloatImage, ImageSize, InputError, StoredColors, ViewOffset, image_size
+
+SMALL_SIDE_PX = 160
+"""Longer side of the small copy."""
+MAX_STEPS = 512
+"""Largest number of disparities of a sweep; a wider range is swept more coarsely."""
+FEW_VIEWS = 4
+"""Number of views up to which many places match by chance, so that maps are checked against each other."""
+
+
+@dataclass(frozen=True, eq=False)
+class CoarseDisparity:
+    """A coarse map. values: (H, W) at the size of the views. range_px: limits of the final map, in px per view step."""
+
+    values: FloatImage
+    range_px: tuple[float, float]
+
+
+def estimate_coarse(views: Sequence[StoredColors], offsets: Sequence[ViewOffset], reference: int) -> CoarseDisparity:
+    """Return a coarse map of the reference view, and the range of its disparity.
+
+    views: (H, W, 3) each, of equal size. offsets: their viewpoints, from any origin. reference: an index. Reports no
+    progress. Raises InputError if all views have the same viewpoint or are too small.
+    """
+    size = image_size(views[reference])
+    shrink = -(-max(size) // SMALL_SIDE_PX)
+    if min(size) // shrink < 8:
+        raise InputError(f"views of {size} are too small or too narrow to find their disparity: 8 px at least")
+    small = matching_views(views, offsets, reference, shrink)
+    step = STEP_PX / small.reach
+    # The farthest view may be shifted by 0.4 of the longer side.
+    largest = 0.4 * max(small.luma.shape) / small.reach
+    disparities = np.arange(-largest, largest + step, step, dtype=np.float32)
+    with watched(ignore_progress):
+        values, sureness = _match(small, disparities)
+        is_sure = sureness >= 0.4
+        if len(views) <= FEW_VIEWS:
+            is_sure &= left_right_check(views, offsets, reference, values, disparities, shrink)
+    # A few sure pixels at either end may be mistaken, and a few steps beyond them may be needed.
+    low, high = np.quantile(values[is_sure] if is_sure.any() else values, [0.002, 0.998])
+    margin = 4 * step
+    whole = resample_surfaces(np.clip(values, low, high) * np.float32(shrink), size)
+    return CoarseDisparity(whole, (float(low - margin) * shrink, float(high + margin) * shrink))
+
+
+def estimate_disparity(
+    views: Sequence[StoredColors], offsets: Sequence[ViewOffset], reference: int, range_px: tuple[float, float]
+) -> FloatImage:
+    """Return the disparity (H, W) of the reference view in a range, both in px per view step.
+
+    Arguments and errors are those of `estimate_coarse`, which finds the range.
+    """
+    matched = matching_views(views, offsets, reference)
+    disparities = np.linspace(*range_px, _steps(range_px, matched.reach) + 1, dtype=np.float32)
+    is_checked = len(views) <= FEW_VIEWS
+    # The last part is refinement.
+    parts = 2 + is_checked
+    with part_of_job(0, 1, parts):
+        values, _ = _match(matched, disparities)
+    if is_checked:
+        with part_of_job(1, 1, parts):
+            is_seen = left_right_check(views, offsets, reference, values, disparities)
+        if is_seen.any():
+            known = np.where(is_seen, values, np.float32(np.nan))
+            values = fill_disparity_by_color(encoded_from_stored(views[reference]), known)
+    refined = np.clip(refine_by_gradients(matched, values), *range_px)
+    report_progress(parts, parts, FINDING)
+    return refined
+
+
+def left_right_check(
+    views: Sequence[StoredColors],
+    offsets: Sequence[ViewOffset],
+    reference: int,
+    values: FloatImage,
+    disparities: NDArray[np.float32],
+    shrink: int = 1,
+) -> NDArray[np.bool_]:
+    """Return which pixels (H, W) of the reference's map the map of the farthest view confirms: both views see them."""
+    at = offsets[reference]
+    farthest = max(range(len(views)), key=lambda index: np.hypot(offsets[index].t - at.t, offsets[index].s - at.s))
+    other, _ = _match(matching_views(views, offsets, farthest, shrink), disparities)
+    return find_confirmed([values, other], [at, offsets[farthest]], 0)
+
+
+def find_confirmed(maps: Sequence[FloatImage], offsets: Sequence[ViewOffset], index: int) -> NDArray[np.bool_]:
+    """Return which pixels (H, W) of one of the maps the other maps confirm.
+
+    At least one map must have the same point, to a pixel of its view, and no fewer maps than look through it, to
+    something behind. A map with something in front of the point does not count.
+    """
+    values = maps[index]
+    rows, columns = np.indices(values.shape, np.float32)
+    agreeing, behind = np.zeros(values.shape, np.int32), np.zeros(values.shape, np.int32)
+    for other, offset in zip(maps, offsets):
+        t, s = offset.t - offsets[index].t, offset.s - offsets[index].s
+        if t == s == 0:
+            continue
+        raise_if_stopped()
+        nearer = _sample(other, rows - values * np.float32(t), columns - values * np.float32(s)) - values
+        largest = np.float32(1 / max(abs(t), abs(s)))
+        agreeing += np.abs(nearer) <= largest
+        behind += nearer < -largest
+    confirmed: NDArray[np.bool_] = (agreeing > 0) & (agreeing >= behind)
+    return confirmed
+
+
+def sweep_bytes(size: ImageSize, range_px: tuple[float, float], reach: float) -> int:
+    """Return the memory that `estimate_disparity` takes beside the views. reach: view steps to the farthest view."""
+    costs_and_sums, textures_and_spare = 5 * (_steps(range_px, reach) + 1), 4 * (33 + 24)
+    return size.height * size.width * (costs_and_sums + textures_and_spare)
+
+
+def _steps(range_px: tuple[float, float], reach: float) -> int:
+    """Return the number of steps of a sweep of this range."""
+    return int(np.clip(np.ceil((range_px[1] - range_px[0]) * reach / STEP_PX), 2, MAX_STEPS))
+
+
+def _match(views: MatchingViews, disparities: NDArray[np.float32]) -> tuple[FloatImage, FloatImage]:
+    """Return disparity and sureness (H, W), single pixels smoothed away by a median."""
+    values, sureness = choose_disparity(sweep(views, disparities), views.luma, disparities)
+    image = oiio.ImageBuf(np.ascontiguousarray(values[..., None]))
+    median = oiio.ImageBufAlgo.median_filter(image, 5, 5).get_pixels(oiio.FLOAT)
+    return np.asarray(median, np.float32).reshape(values.shape), sureness
+
+
+def _sample(image: FloatImage, row: FloatImage, column: FloatImage) -> FloatImage:
+    """Return the nearest pixels of an image (H, W) at these positions, NaN outside."""
+    height, width = image.shape
+    y, x = np.rint(row), np.rint(column)
+    is_inside = (y >= 0) & (y < height) & (x >= 0) & (x < width)
+    y, x = (np.where(is_inside, at, 0).astype(np.int64) for at in (y, x))
+    sampled: FloatImage = np.where(is_inside, image[y, x], np.float32(np.nan))
+    return sampled
