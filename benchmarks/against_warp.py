@@ -49,7 +49,7 @@ def main() -> None:
 
 def scenes(data: Path | None) -> Iterator[tuple[BenchScene, FloatImage]]:
     """The demo photo, and those of a folder, with refined maps; the maps as they were."""
-    demo, given = photo_scene(), photo_scene(choice=DepthChoice(refine=0.0))
+    demo, given = photo_scene(), photo_scene(choice=DepthChoice(refine=False))
     assert demo is not None
     assert given is not None
     yield demo, given.disparity

@@ -121,7 +121,7 @@ def refining_row(what: str, colors: FloatImage, soft: FloatImage) -> str:
 
 def one_megapixel_demo() -> tuple[FloatImage, FloatImage]:
     """The demo photo and its map, enlarged."""
-    demo = photo_scene(choice=DepthChoice(refine=0.0))
+    demo = photo_scene(choice=DepthChoice(refine=False))
     assert demo is not None
     factor = (ONE_MEGAPIXEL.height * ONE_MEGAPIXEL.width / demo.disparity.size) ** 0.5
     return resize(demo.photo, factor), resize(demo.disparity, factor)
@@ -161,7 +161,7 @@ def known_depths(data: Path) -> Iterator[BenchScene]:
     """Scenes with true views, and photos that hold their own depth, without."""
     yield from data_scenes(data, with_soft=False)
     for path in sorted(path for path in data.glob("*/*") if path.suffix in (".jpg", ".heic")):
-        found = open_with_depth(path, DepthChoice(start="embedded", refine=0.0), MOST_GUESSED_PIXELS)
+        found = open_with_depth(path, DepthChoice(start="embedded", refine=False), MOST_GUESSED_PIXELS)
         if found.origin.kind == "embedded":
             yield BenchScene(path.parent.name, found.photo.pixels, found.disparity.values, {}, ())
 

@@ -251,7 +251,7 @@ def make_views(
 
     field: offsets of all its views. is_enlarged: whether the map was smaller than the photo.
     """
-    disparity = refine(photo, given, 1.0, unknown, stages=stages, is_enlarged=is_enlarged)
+    disparity = refine(photo, given, unknown, stages=stages, is_enlarged=is_enlarged)
     views = PhotoViews(photo, disparity, field, stages)
     return {offset: quantise_as_stored(views.view(offset).colors) for offset in truth}
 

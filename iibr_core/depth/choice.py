@@ -53,8 +53,8 @@ class DepthChoice:
     start: where the search begins. file: a map that must be used (a bad one is an error). file_scale: multiplies its
     values, which are then px per view step; None: as the file has them. inverts: near and far change places, whatever
     was found. is_metric: the map or the model gives distances. stretches: a map of another shape shows the whole photo.
-    model: a folder or a known model's name, None for the usual one if it is there. refine: how far disparity edges are
-    drawn to the photo's, 0 (not at all) to 1.
+    model: a folder or a known model's name, None for the usual one if it is there. refine: whether disparity edges
+    are drawn to the photo's.
     """
 
     start: DepthStart = "auto"
@@ -64,7 +64,7 @@ class DepthChoice:
     is_metric: bool = False
     stretches: bool = False
     model: str | None = None
-    refine: float = 1.0
+    refine: bool = True
 
     @property
     def asks_for_model(self) -> bool:

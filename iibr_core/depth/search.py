@@ -138,7 +138,7 @@ def sketch_depth(path: Path, photo: Photo, choice: DepthChoice) -> PhotoWithDept
     """
     height, width = photo.size
     search = _DepthSearch(path, photo, choice, height * width)
-    choice = replace(choice, refine=0.0)
+    choice = replace(choice, refine=False)
     if choice.file is not None:
         return _finish(search.of_file(Path(choice.file)), choice, None)
     if choice.start == "flat":
@@ -278,8 +278,8 @@ def _finish(found: _FoundDepth, choice: DepthChoice, grid: GridShape | None) -> 
     name = origin.words if origin.kind == "file" else "its depth"
     disparity = _disparity_at(photo, found.depth, name, choice, grid)
     values, holes = disparity.values, disparity.unknown
-    if choice.refine > 0:
-        values = refine(photo.pixels, values, choice.refine, holes, is_enlarged=disparity.is_enlarged)
+    if choice.refine:
+        values = refine(photo.pixels, values, holes, is_enlarged=disparity.is_enlarged)
     share = GUESS_SHARE if origin.kind == "rough" else 1.0
     notes = found.notes + origin.failures + ((origin.advising_line,) if origin.advice else ())
     disparity = replace(

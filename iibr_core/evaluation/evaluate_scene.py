@@ -114,10 +114,9 @@ class _Evaluator:
         self.trial, self.given, self.disparity, self.options = trial, given, disparity, options
         self.lpips = lpips
         self.refined = disparity.values
-        if options.choice.refine > 0:
-            strength, unknown = options.choice.refine, disparity.unknown
+        if options.choice.refine:
             self.refined = refine(
-                given.photo, disparity.values, strength, unknown, options.stages, disparity.is_enlarged
+                given.photo, disparity.values, disparity.unknown, options.stages, disparity.is_enlarged
             )
         self.figures: dict[str, dict[str, Figures]] = {}
         self.hole_shares: list[float] = []

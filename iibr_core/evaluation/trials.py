@@ -168,7 +168,7 @@ def _estimate_disparity(trial: Trial, choice: DepthChoice, max_pixels: int) -> D
     reach = [round(2 * max(abs(trial.offset(k)[axis]) for k in trial.judged)) + 1 for axis in (0, 1)]
     path = trial.scene.views[trial.given].path
     start = "model" if choice.asks_for_model else "embedded" if choice.start == "auto" else choice.start
-    unrefined = replace(choice, start=start, file=None, refine=0.0)
+    unrefined = replace(choice, start=start, file=None, refine=False)
     found = open_with_depth(path, unrefined, max_pixels, GridShape(*reach))
     values, words = found.disparity.values, f"estimate ({found.origin.words})"
     if trial.scene.grid is None and trial.scene.range_px is not None:

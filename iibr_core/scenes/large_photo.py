@@ -65,8 +65,8 @@ def _disparity(source: Source, loaded: LoadedPhoto, photo: Photo) -> FloatImage:
         given = Disparity(resample_surfaces(loaded.disparity.values, photo.size) * enlarged, loaded.disparity.source)
     raise_if_stopped()
     values = given.values
-    if settings.refine > 0:
-        values = refine(photo.pixels, values, settings.refine, given.unknown, is_enlarged=given.is_enlarged)
+    if settings.refine:
+        values = refine(photo.pixels, values, given.unknown, is_enlarged=given.is_enlarged)
     if file is None or settings.edits == UNEDITED:
         return values
     return apply_edits(photo.pixels, values / enlarged, settings.edits) * enlarged

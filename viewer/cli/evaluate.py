@@ -47,7 +47,7 @@ class _Judging:
         ),
     ] = "auto"
     depth_model: DepthModel = None
-    refine: Refine = 1.0
+    refine: Refine = True
     views: Annotated[
         int | None, typer.Option(min=1, help="Judge at most so many views of a scene.", show_default="all")
     ] = None

@@ -6,8 +6,8 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-
 from iibr_core.depth.edges.edge_blur import measure_edge_blur
+
 from iibr_core.depth.edges.refine import refine
 from iibr_core.depth.pictorial_cues import estimate_from_cues
 from iibr_core.inpainting import background

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from iibr_core.depth.edges.blur_fit import fit_to_blur
 
 from iibr_core.depth.edges import blur_fit
-from iibr_core.depth.edges.blur_fit import fit_to_blur
 from iibr_core.runtime import tiling
 from iibr_core.runtime.work import Cancelled, stoppable
 from iibr_core.training.degradation import blur

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-
 from iibr_core.depth.edges.edge_band import _find_between, resolve_edge_band
+
 from iibr_core.runtime import tiling
 from iibr_core.runtime.work import Cancelled, stoppable
 from tests.iibr_core.scenes import smooth_texture, square_before_wall

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
-from iibr_core.depth.edges import edge_blur
 from iibr_core.depth.edges.edge_blur import extent, measure_edge_blur
 from iibr_core.depth.edges.edge_profiles import FLAT_SHARE
+
+from iibr_core.depth.edges import edge_blur
 from iibr_core.training.degradation import blur
 from tests.iibr_core.scenes import smooth_texture
 

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+from iibr_core.depth.edges.edge_labels import label_edges
 from scipy import ndimage
 
 from iibr_core.depth.edges import edge_labels
-from iibr_core.depth.edges.edge_labels import label_edges
 from iibr_core.runtime.work import Cancelled, stoppable
 from tests.iibr_core.scenes import smooth_texture
 

@@ -2,9 +2,8 @@
 
 import numpy as np
 import pytest
-from scipy.ndimage import map_coordinates
-
 from iibr_core.depth.edges.edge_profiles import gradient, height_at, is_inside, strongest_change, walk
+from scipy.ndimage import map_coordinates
 
 
 def test_heights_are_bilinear_and_the_border_goes_on():

@@ -4,9 +4,9 @@ from math import erf, erfc, sqrt
 
 import numpy as np
 import pytest
+from iibr_core.depth.edges.edge_profiles import passes
 
 from iibr_core.depth.edges import refine
-from iibr_core.depth.edges.edge_profiles import passes
 
 Y, X = np.mgrid[:21, :61].astype(np.float32)
 GREY = np.full((21, 61, 3), 0.5, np.float32)

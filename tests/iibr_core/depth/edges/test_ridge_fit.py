@@ -4,9 +4,9 @@ from math import erf, sqrt
 
 import numpy as np
 import pytest
+from iibr_core.depth.edges.edge_profiles import SAMPLES_A_PX, SHARES
 
 from iibr_core.depth.edges import edge_profiles
-from iibr_core.depth.edges.edge_profiles import SAMPLES_A_PX, SHARES
 
 WALL, WIRE = np.float32([0.2, 0.3, 0.6]), np.float32([0.8, 0.4, 0.1])
 

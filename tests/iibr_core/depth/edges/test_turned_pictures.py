@@ -4,10 +4,10 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from iibr_core.depth.edges.edge_band import _find_between
 from scipy.ndimage import gaussian_filter, maximum_filter
 
 from iibr_core.depth.edges import edge_blur, edge_labels, edge_profiles, refine
-from iibr_core.depth.edges.edge_band import _find_between
 from iibr_core.depth.edges.refine import refine as refine_map
 from iibr_core.method.flying_pixels import measure_detail
 from iibr_core.method.mixed_pixels import split_mixed_pixels
