@@ -27,7 +27,7 @@ from iibr_core.inpainting.disparity_by_color import fill_disparity_by_color
 from iibr_core.runtime.kernels import kernel
 from iibr_core.runtime.tiling import in_bands
 from iibr_core.stages import ALL_STAGES, Stages
-from iibr_core.surfaces import EDGE_SHARE
+from iibr_core.surfaces import EDGE_SHARE, is_in_front, same_surface
 from iibr_core.types import FloatImage, ImageSize, InputError, image_size
 
 WIDE_SIGMA_PX, WORK_SIGMA_PX = 4.5, 2.0
@@ -40,6 +40,8 @@ EXTENSION = 0.7
 """Share of a plateau's slope that continues under the ramp."""
 MOST_EXTENSION = 0.05
 """Largest slope that continues under the ramp, as a share of the ramp's steepest slope."""
+MAX_LONE = 4
+"""Largest number of neighbours, within two pixels, on the surface of a lone pixel."""
 BEND = 2.0
 """Factor by which a surface bends away from the view faster at its edge than beyond the blur: round things do."""
 
@@ -62,14 +64,17 @@ def refine(
     if photo.shape != (*disparity.shape, 3):
         raise ValueError(f"the photo is {photo.shape}, the disparity {disparity.shape}")
     colors = np.ascontiguousarray(photo, np.float32)
-    values, holes = _fill_unknown(colors, disparity), ~np.isfinite(disparity)
+    holes = ~np.isfinite(disparity) if unknown is None else unknown | ~np.isfinite(disparity)
+    values = _fill_unknown(colors, disparity)
     min_edge = EDGE_SHARE * extent(values)
     if not min_edge > 0:
         return values
     sharp = _sharpen(colors, values, min_edge, is_enlarged) if stages.sharpen_soft_edges else values
     if not stages.label_edge_bands:
         return sharp
-    return label_edges(colors, sharp, holes if unknown is None else holes | unknown, min_edge)
+    if holes.any():
+        sharp, holes = _refill(colors, sharp, holes, min_edge)
+    return label_edges(colors, sharp, holes, min_edge)
 
 
 def _fill_unknown(colors: FloatImage, disparity: FloatImage) -> FloatImage:
@@ -116,6 +121,39 @@ def _with_steps(values: FloatImage, sigma: float, min_edge: float) -> FloatImage
         lambda first, last: _steps_in_rows(values, is_near, min_edge, sigma, (first, last), sharp), image_size(values)
     )
     return sharp
+
+
+def _refill(
+    colors: FloatImage, values: FloatImage, holes: NDArray[np.bool_], min_edge: float
+) -> tuple[FloatImage, NDArray[np.bool_]]:
+    """Return a measured map whose holes and lone disparities are filled by colour, and the pixels that were filled.
+
+    Mixed pixels get lone disparities between two surfaces when they are measured, and pass them on to holes.
+    """
+    known = np.where(holes, np.float32(np.nan), values)
+    filled = holes.copy()
+    in_bands(lambda first, last: _mark_lone(known, min_edge, (first, last), filled), image_size(values))
+    return fill_disparity_by_color(colors, np.where(filled, np.float32(np.nan), values)), filled
+
+
+@kernel
+def _mark_lone(values, min_edge, rows, lone):
+    """Mark pixels of rows [rows[0], rows[1]) between two surfaces, with at most MAX_LONE neighbours on their own."""
+    height, width = values.shape
+    for y in range(rows[0], rows[1]):
+        for x in range(width):
+            here, neighbours, is_higher, is_lower = values[y, x], -1, False, False
+            for v in range(max(y - 1, 0), min(y + 2, height)):
+                for u in range(max(x - 1, 0), min(x + 2, width)):
+                    is_higher |= is_in_front(here, values[v, u], min_edge)
+                    is_lower |= is_in_front(values[v, u], here, min_edge)
+            if not (is_higher and is_lower):
+                continue
+            # Things of two pixels and more have neighbours farther off.
+            for v in range(max(y - 2, 0), min(y + 3, height)):
+                for u in range(max(x - 2, 0), min(x + 3, width)):
+                    neighbours += same_surface(values[v, u], here, min_edge)
+            lone[y, x] |= neighbours <= MAX_LONE
 
 
 @kernel

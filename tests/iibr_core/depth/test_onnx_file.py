@@ -158,7 +158,7 @@ def test_distances_of_0_are_unknown(tmp_path: Path) -> None:
     (tmp_path / "config.json").write_text('{"depth_estimation_type": "metric"}')
     file = of_channels(tmp_path / "metres.onnx")
     write_image(tmp_path / "photo.png", photo_of(60, 90).pixels)
-    found = open_with_depth(tmp_path / "photo.png", DepthChoice(model=str(file), refine=0.0)).disparity
+    found = open_with_depth(tmp_path / "photo.png", DepthChoice(model=str(file), refine=False)).disparity
     assert found.unknown is not None
     assert found.unknown[:, :20].all()
     assert not found.unknown[:, -20:].any()

@@ -273,6 +273,6 @@ def test_the_photo_tells_which_way_round_a_file_of_ones_own_counts(tmp_path: Pat
     pixels[..., 0] = np.linspace(0.5, 0.9, 60)[:, None]
     pixels[20:30, 30:50, 1] = 0.5
     write_image(tmp_path / "photo.png", pixels)
-    found = open_with_depth(tmp_path / "photo.png", DepthChoice(model=str(file), refine=0.0))
+    found = open_with_depth(tmp_path / "photo.png", DepthChoice(model=str(file), refine=False))
     assert found.disparity.values[-5].mean() > found.disparity.values[5].mean()
     assert any(f"count as {'far' if farness else 'near'}, as" in note for note in found.disparity.notes)

@@ -44,7 +44,7 @@ def photo_file(folder: Path, depth: np.ndarray | bytes | None = DEPTH, orientati
 
 
 def start_from(start: DepthStart, **others: object) -> DepthChoice:
-    return DepthChoice(start, refine=0.0, **others)  # type: ignore[arg-type]
+    return DepthChoice(start, refine=False, **others)  # type: ignore[arg-type]
 
 
 def is_nearer_inside(found: PhotoWithDepth) -> bool:
@@ -265,8 +265,8 @@ def test_other_maps_of_the_photo_are_named_once(tmp_path: Path) -> None:
     np.save(tmp_path / "scene_disparity.npy", near_wall)
     np.save(tmp_path / "scene_depth.npy", np.full(SIZE, 2.0, np.float32))
     for choice, used, unused in (
-        (DepthChoice(refine=0.0), "scene_disparity.npy", "scene_depth.npy"),
-        (DepthChoice(file=str(tmp_path / "square.npy"), refine=0.0), "square.npy", "scene_disparity.npy"),
+        (DepthChoice(refine=False), "scene_disparity.npy", "scene_depth.npy"),
+        (DepthChoice(file=str(tmp_path / "square.npy"), refine=False), "square.npy", "scene_disparity.npy"),
     ):
         found = open_with_depth(path, choice)
         (note,) = [note for note in found.disparity.notes if "not used" in note]

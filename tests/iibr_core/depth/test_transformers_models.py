@@ -199,7 +199,7 @@ def test_as_the_library_prepares_and_reads_it(tmp_path: Path) -> None:
 
 
 def test_what_was_painted_is_seen_by_the_network_that_saw_the_photo(tmp_path: Path) -> None:
-    choice = DepthChoice(model=str(depth_anything(tmp_path / "model").folder), start="model", refine=0.0)
+    choice = DepthChoice(model=str(depth_anything(tmp_path / "model").folder), start="model", refine=False)
     write_image(tmp_path / "photo.png", (PHOTO.pixels * 255).round().astype(np.uint8))
     found = open_with_depth(tmp_path / "photo.png", choice)
     estimate = estimator_of(found, choice)

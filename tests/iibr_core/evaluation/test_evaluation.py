@@ -40,7 +40,7 @@ from tests.iibr_core.known_scenes import HEIGHT, WIDTH, disparity_of_square, vie
 from tests.iibr_core.scenes import by_index, disparity_of, literal_plan, photo_of
 
 ALWAYS = ["identity", "reference warp", "iibr"]
-UNREFINED = DepthChoice(refine=0.0)
+UNREFINED = DepthChoice(refine=False)
 
 
 def scene_of(folder: Path) -> MultiView:
@@ -134,7 +134,7 @@ def test_only_so_many_views_the_farthest_among_them(folder: Path) -> None:
 
 
 def test_an_estimate_is_judged_as_it_is_and_aligned(folder: Path) -> None:
-    choice = DepthChoice(start="rough", refine=0.0)
+    choice = DepthChoice(start="rough", refine=False)
     options = Options("estimate", choice, most_views=2, with_consistency=False)
     plain, aligned = evaluate(scene_of(folder), options)[:2]
     assert "estimate" in plain.disparity
