@@ -23,12 +23,9 @@ from iibr_core.surfaces import SLOPE_SHARE, same_surface
 from iibr_core.types import FloatImage
 
 BAND_PX = 4
-"""Largest number of pixels between a labelled pixel and a step; pixels at this distance tell how colours mislead."""
+"""Largest number of pixels between a labelled pixel and a step; at this distance, colours should agree with the map."""
 SAMPLED_PX, SAMPLE_STEP = 8, 2
 """Distance in which every second pixel, in both directions, is a sample of its surface's colours, in pixels."""
-NEARNESS = nearness(SAMPLED_PX, SAMPLED_PX / 2).astype(np.float32)
-NEARNESS[SAMPLED_PX, SAMPLED_PX] = 0
-"""Weights of samples by place, (2 SAMPLED_PX + 1, 2 SAMPLED_PX + 1); 0 for the pixel itself, in the middle."""
 TRUST = np.append(np.geomspace(0.1, 1.0, BAND_PX + 1), 1.0).astype(np.float32)
 """Weights of samples by the pixels between them and a step: near ones are mixed, or on the wrong side."""
 MIN_FOREGROUND = 0.7
@@ -45,7 +42,7 @@ MIXED_SHARES = (0.1, 0.25)
 """Shares of the pixels just behind and just in front of exact steps whose mixed colours contradict the map."""
 MIN_CLEAR_SHARE = 0.2
 """Least share of pixels with clear colours from which the map is judged, and largest share of contradictions inside
-surfaces over those beside steps: colours that exceed it tell light from shade.
+surfaces over those beside steps: colours that exceed it part light from shade.
 """
 MAX_EXACT_ERRORS = 0.1
 """Largest share of errors in a map that stays unchanged."""
@@ -53,8 +50,6 @@ PASSES = 8
 """Number of passes of mean field (Kraehenbuehl and Koltun 2011)."""
 PIECE_PIXELS = 1 << 12
 """Number of pixels that are labelled between two checks for cancellation."""
-MEASURED_PIECES = 4
-"""Largest number of pieces on which a map's errors are measured."""
 
 
 def _places_around(reach_px: int) -> NDArray[np.int64]:
@@ -63,8 +58,16 @@ def _places_around(reach_px: int) -> NDArray[np.int64]:
     return np.ascontiguousarray(places[np.argsort((places**2).sum(axis=1), kind="stable")][1:])
 
 
+def _sample_weights() -> FloatImage:
+    """Return the weights of samples by place, (2 SAMPLED_PX + 1, 2 SAMPLED_PX + 1); 0 for the pixel in the middle."""
+    weights = nearness(SAMPLED_PX, SAMPLED_PX / 2).astype(np.float32)
+    weights[SAMPLED_PX, SAMPLED_PX] = 0
+    return weights
+
+
 AROUND = _places_around(BAND_PX + 1)
 """Places in which a pixel's other surface is searched. The first eight touch the pixel."""
+NEARNESS = _sample_weights()
 
 
 def label_edges(colors: FloatImage, values: FloatImage, unknown: NDArray[np.bool_], min_edge: float) -> FloatImage:
@@ -80,7 +83,7 @@ def label_edges(colors: FloatImage, values: FloatImage, unknown: NDArray[np.bool
     alike = LIKENESS * _mean_color_step(colors, pixels)
     weigh = partial(_weigh_colors, colors, values, TRUST[distance], min_edge, alike)
     flat, away, known = values.reshape(-1), distance.reshape(-1), ~unknown.reshape(-1)
-    few = pixels[:: ceil(len(pixels) / (MEASURED_PIECES * PIECE_PIXELS))]
+    few = pixels[:: ceil(len(pixels) / (4 * PIECE_PIXELS))]
     other, evidence = _in_parts(weigh, few)
     errors = _measure_errors(evidence, flat[few] > other, away[few], known[few])
     if errors.max() <= MAX_EXACT_ERRORS:

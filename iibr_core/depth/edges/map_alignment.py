@@ -16,8 +16,6 @@ from iibr_core.types import FloatImage
 
 CERTAINTY = 3.0
 """Number of standard errors, above zero, of a mean vote that counts."""
-MIN_VOTE = 0.02
-"""Least mean vote that counts."""
 
 
 def lies_at_corners(photo: FloatImage, values: FloatImage) -> bool:
@@ -33,8 +31,8 @@ def lies_at_corners(photo: FloatImage, values: FloatImage) -> bool:
         return False
     # A step of this height, blurred by a pixel.
     min_slope = MEASURED_EDGE * (high - low) / EDGE_SIGMAS
-    vote, square, count = _vote(photo, np.ascontiguousarray(values, np.float32), *enlargement, min_slope)
-    return bool(vote > MIN_VOTE * count and vote > CERTAINTY * sqrt(square))
+    vote, square = _vote(photo, np.ascontiguousarray(values, np.float32), *enlargement, min_slope)
+    return bool(vote > CERTAINTY * sqrt(square))
 
 
 @kernel
@@ -55,12 +53,12 @@ def _slope(values, x, y):
 
 @kernel
 def _vote(photo, values, scale_y, scale_x, min_slope):
-    """Return the sum of votes of the steepest pixels of edges, that of their squares, and their number.
+    """Return the sum of the votes of the steepest pixels of edges, and that of their squares.
 
     A vote is how much more contrast the photo has at the corner than in the middle, -1..1.
     """
     height, width = values.shape
-    vote, square, count = 0.0, 0.0, 0
+    vote = square = 0.0
     for y in range(2, height - 2):
         for x in range(2, width - 2):
             across, down = gradient(values, x, y)
@@ -77,5 +75,5 @@ def _vote(photo, values, scale_y, scale_x, min_slope):
             corner = _contrast(photo, x * scale_x, y * scale_y, far_x, far_y)
             if middle + corner > 0:
                 share = (corner - middle) / (corner + middle)
-                vote, square, count = vote + share, square + share * share, count + 1
-    return vote, square, count
+                vote, square = vote + share, square + share * share
+    return vote, square

@@ -19,8 +19,9 @@ from iibr_core.depth.edges.blur import (
     extent,
     measure_edge_blur,
 )
+from iibr_core.depth.edges.fit import fit_to_blur
 from iibr_core.depth.edges.labels import label_edges, step_distance
-from iibr_core.depth.edges.line import GAUSSIAN_SIGMAS, PLATEAU_SIGMAS, gradient, height_at, passes, walk
+from iibr_core.depth.edges.line import FLAT_SHARE, GAUSSIAN_SIGMAS, PLATEAU_SIGMAS, gradient, height_at, passes, walk
 from iibr_core.depth.pictorial_cues import resize_picture
 from iibr_core.formats.maps.resample import resample_surfaces
 from iibr_core.inpainting.disparity_by_color import fill_disparity_by_color
@@ -34,14 +35,14 @@ WIDE_SIGMA_PX, WORK_SIGMA_PX = 4.5, 2.0
 """Blur from which a map is sharpened at a smaller size, and its blur at that size, in pixels."""
 RAMP_TOLERANCE = 2.0
 """Factor by which a ramp may be longer or shorter than the blur makes it: longer ones are surfaces, shorter exact."""
-STEEPEST_PLATEAU = 0.3
-"""Largest slope beside a blurred step, as a share of its steepest slope."""
 EXTENSION = 0.7
 """Share of a plateau's slope that continues under the ramp."""
-MOST_EXTENSION = 0.05
+MAX_EXTENSION = 0.05
 """Largest slope that continues under the ramp, as a share of the ramp's steepest slope."""
-MAX_LONE = 4
+MAX_LONE_NEIGHBOURS = 4
 """Largest number of neighbours, within two pixels, on the surface of a lone pixel."""
+MIN_LONE_SHARE = 0.2
+"""Least number of lone pixels in a resampled map, as a share of the pixels beside steps."""
 BEND = 2.0
 """Factor by which a surface bends away from the view faster at its edge than beyond the blur: round things do."""
 
@@ -72,8 +73,11 @@ def refine(
     sharp = _sharpen(colors, values, min_edge, is_enlarged) if stages.sharpen_soft_edges else values
     if not stages.label_edge_bands:
         return sharp
-    if holes.any():
-        sharp, holes = _refill(colors, sharp, holes, min_edge)
+    lone = _lone_pixels(np.where(holes, np.float32(np.nan), sharp), min_edge)
+    is_resampled = lone.sum() > MIN_LONE_SHARE * np.count_nonzero(step_distance(sharp, min_edge) == 0)
+    if holes.any() or is_resampled:
+        holes = holes | lone
+        sharp = fill_disparity_by_color(colors, np.where(holes, np.float32(np.nan), sharp))
     return label_edges(colors, sharp, holes, min_edge)
 
 
@@ -90,7 +94,7 @@ def _sharpen(colors: FloatImage, values: FloatImage, min_edge: float, is_enlarge
     times = sigma / WORK_SIGMA_PX
     if sigma > WIDE_SIGMA_PX and min(values.shape) > 2 * SEARCHED_PX * times:
         return _sharpen_small(colors, values, times, min_edge)
-    return _with_steps(values, sigma, min_edge) if sigma > 0 else values
+    return _with_steps(colors, values, sigma, min_edge) if sigma > 0 else values
 
 
 def _sharpen_small(colors: FloatImage, values: FloatImage, times: float, min_edge: float) -> FloatImage:
@@ -102,7 +106,7 @@ def _sharpen_small(colors: FloatImage, values: FloatImage, times: float, min_edg
     size = ImageSize(round(height / times), round(width / times))
     photo, small = resize_picture(colors, size), resize_picture(values[..., None], size)[..., 0]
     sigma = measure_edge_blur(photo, small, MAX_ENLARGED_SPREAD)
-    sharp = _with_steps(small, sigma, min_edge) if sigma > 0 else small
+    sharp = _with_steps(photo, small, sigma, min_edge) if sigma > 0 else small
     while size != values.shape:
         sharp = label_edges(photo, sharp, np.zeros(size, np.bool_), min_edge)
         is_last = 2 * min(size) >= min(height, width)
@@ -111,8 +115,8 @@ def _sharpen_small(colors: FloatImage, values: FloatImage, times: float, min_edg
     return sharp
 
 
-def _with_steps(values: FloatImage, sigma: float, min_edge: float) -> FloatImage:
-    """Return a map, blurred by sigma, with steps for its ramps."""
+def _with_steps(colors: FloatImage, values: FloatImage, sigma: float, min_edge: float) -> FloatImage:
+    """Return a map, blurred by sigma, with steps for its ramps that fit the blur."""
     # This blur makes no ramp that is flatter at its steepest, and none that is longer.
     slope, reach = min_edge / (RAMP_TOLERANCE * EDGE_SIGMAS * sigma), ceil(GAUSSIAN_SIGMAS * sigma)
     is_near = step_distance(values, slope / sqrt(2), reach, counts_slopes=True) <= reach
@@ -120,25 +124,22 @@ def _with_steps(values: FloatImage, sigma: float, min_edge: float) -> FloatImage
     in_bands(
         lambda first, last: _steps_in_rows(values, is_near, min_edge, sigma, (first, last), sharp), image_size(values)
     )
-    return sharp
+    return fit_to_blur(colors, values, sharp, sigma, min_edge)
 
 
-def _refill(
-    colors: FloatImage, values: FloatImage, holes: NDArray[np.bool_], min_edge: float
-) -> tuple[FloatImage, NDArray[np.bool_]]:
-    """Return a measured map whose holes and lone disparities are filled by colour, and the pixels that were filled.
+def _lone_pixels(values: FloatImage, min_edge: float) -> NDArray[np.bool_]:
+    """Return pixels (H, W) with a disparity of their own between two surfaces. NaN belongs to none.
 
-    Mixed pixels get lone disparities between two surfaces when they are measured, and pass them on to holes.
+    Mixed pixels get such disparities in maps that were measured or resampled, and pass them on to holes.
     """
-    known = np.where(holes, np.float32(np.nan), values)
-    filled = holes.copy()
-    in_bands(lambda first, last: _mark_lone(known, min_edge, (first, last), filled), image_size(values))
-    return fill_disparity_by_color(colors, np.where(filled, np.float32(np.nan), values)), filled
+    lone = np.zeros(values.shape, np.bool_)
+    in_bands(lambda first, last: _mark_lone(values, min_edge, (first, last), lone), image_size(values))
+    return lone
 
 
 @kernel
 def _mark_lone(values, min_edge, rows, lone):
-    """Mark pixels of rows [rows[0], rows[1]) between two surfaces, with at most MAX_LONE neighbours on their own."""
+    """Mark pixels of rows [rows[0], rows[1]) between two surfaces, with few neighbours on their own."""
     height, width = values.shape
     for y in range(rows[0], rows[1]):
         for x in range(width):
@@ -153,7 +154,7 @@ def _mark_lone(values, min_edge, rows, lone):
             for v in range(max(y - 2, 0), min(y + 3, height)):
                 for u in range(max(x - 2, 0), min(x + 3, width)):
                     neighbours += same_surface(values[v, u], here, min_edge)
-            lone[y, x] |= neighbours <= MAX_LONE
+            lone[y, x] = neighbours <= MAX_LONE_NEIGHBOURS
 
 
 @kernel
@@ -195,7 +196,7 @@ def _step_value(values, x, y, across, down, sigma, min_edge):
     # Surfaces continue to rise beyond the plateaus, or return to the middle on both sides.
     rise = height_at(values, x + across * (up + sigma), y + down * (up + sigma)) - top
     fall = bottom - height_at(values, x - across * (to_foot + sigma), y - down * (to_foot + sigma))
-    if max(rise, fall) > STEEPEST_PLATEAU * steepest * sigma:
+    if max(rise, fall) > 2 * FLAT_SHARE * steepest * sigma:
         return here
     middle, far = 0.5 * (top + bottom), 2 * GAUSSIAN_SIGMAS * sigma
     returns_up = passes(values, x, y, across, down, up, far + edge, -1.0, middle)
@@ -203,7 +204,7 @@ def _step_value(values, x, y, across, down, sigma, min_edge):
     if returns_up and returns_down:
         return here
     # Slopes of the plateaus continue part of the distance to the pixel, but not past its value.
-    limit = MOST_EXTENSION * steepest
+    limit = MAX_EXTENSION * steepest
     top = max(_continued(values, x, y, across, down, up, sigma, EXTENSION, limit), here)
     bottom = min(_continued(values, x, y, -across, -down, to_foot, sigma, EXTENSION, limit), here)
     if not top > bottom:
