@@ -41,8 +41,8 @@ MAX_EXTENSION = 0.05
 """Largest slope that continues under the ramp, as a share of the ramp's steepest slope."""
 MAX_LONE_NEIGHBOURS = 4
 """Largest number of neighbours, within two pixels, on the surface of a lone pixel."""
-MIN_LONE_SHARE = 0.2
-"""Least number of lone pixels in a resampled map, as a share of the pixels beside steps."""
+MIN_LONE_SHARE = 0.05
+"""Least number of lone pixels in a measured or resampled map, as a share of the pixels beside steps."""
 BEND = 2.0
 """Factor by which a surface bends away from the view faster at its edge than beyond the blur: round things do."""
 
@@ -74,8 +74,7 @@ def refine(
     if not stages.label_edge_bands:
         return sharp
     lone = _lone_pixels(np.where(holes, np.float32(np.nan), sharp), min_edge)
-    is_resampled = lone.sum() > MIN_LONE_SHARE * np.count_nonzero(step_distance(sharp, min_edge) == 0)
-    if holes.any() or is_resampled:
+    if lone.sum() > MIN_LONE_SHARE * np.count_nonzero(step_distance(sharp, min_edge) == 0):
         holes = holes | lone
         sharp = fill_disparity_by_color(colors, np.where(holes, np.float32(np.nan), sharp))
     return label_edges(colors, sharp, holes, min_edge)
@@ -94,7 +93,11 @@ def _sharpen(colors: FloatImage, values: FloatImage, min_edge: float, is_enlarge
     times = sigma / WORK_SIGMA_PX
     if sigma > WIDE_SIGMA_PX and min(values.shape) > 2 * SEARCHED_PX * times:
         return _sharpen_small(colors, values, times, min_edge)
-    return _with_steps(colors, values, sigma, min_edge) if sigma > 0 else values
+    if sigma == 0:
+        return values
+    sharp = _with_steps(values, sigma, min_edge)
+    # Outlines of enlarged maps are coarse; those of filtered maps are better without the fit.
+    return fit_to_blur(colors, values, sharp, sigma, min_edge) if is_enlarged else sharp
 
 
 def _sharpen_small(colors: FloatImage, values: FloatImage, times: float, min_edge: float) -> FloatImage:
@@ -106,7 +109,9 @@ def _sharpen_small(colors: FloatImage, values: FloatImage, times: float, min_edg
     size = ImageSize(round(height / times), round(width / times))
     photo, small = resize_picture(colors, size), resize_picture(values[..., None], size)[..., 0]
     sigma = measure_edge_blur(photo, small, MAX_ENLARGED_SPREAD)
-    sharp = _with_steps(photo, small, sigma, min_edge) if sigma > 0 else small
+    sharp = small
+    if sigma > 0:
+        sharp = fit_to_blur(photo, small, _with_steps(small, sigma, min_edge), sigma, min_edge)
     while size != values.shape:
         sharp = label_edges(photo, sharp, np.zeros(size, np.bool_), min_edge)
         is_last = 2 * min(size) >= min(height, width)
@@ -115,8 +120,8 @@ def _sharpen_small(colors: FloatImage, values: FloatImage, times: float, min_edg
     return sharp
 
 
-def _with_steps(colors: FloatImage, values: FloatImage, sigma: float, min_edge: float) -> FloatImage:
-    """Return a map, blurred by sigma, with steps for its ramps that fit the blur."""
+def _with_steps(values: FloatImage, sigma: float, min_edge: float) -> FloatImage:
+    """Return a map, blurred by sigma, with steps for its ramps."""
     # This blur makes no ramp that is flatter at its steepest, and none that is longer.
     slope, reach = min_edge / (RAMP_TOLERANCE * EDGE_SIGMAS * sigma), ceil(GAUSSIAN_SIGMAS * sigma)
     is_near = step_distance(values, slope / sqrt(2), reach, counts_slopes=True) <= reach
@@ -124,7 +129,7 @@ def _with_steps(colors: FloatImage, values: FloatImage, sigma: float, min_edge: 
     in_bands(
         lambda first, last: _steps_in_rows(values, is_near, min_edge, sigma, (first, last), sharp), image_size(values)
     )
-    return fit_to_blur(colors, values, sharp, sigma, min_edge)
+    return sharp
 
 
 def _lone_pixels(values: FloatImage, min_edge: float) -> NDArray[np.bool_]:
