@@ -49,7 +49,7 @@ def known_maps(data: Path, max_pixels: int) -> Iterator[tuple[str, FloatImage, F
     for scene in data_scenes(data, max_pixels=max_pixels):
         yield scene.name, scene.photo, scene.disparity
     for path in sorted(path for path in data.glob("*/*") if path.suffix in (".jpg", ".heic")):
-        found = open_with_depth(path, DepthChoice(start="embedded", refine=0.0), max_pixels)
+        found = open_with_depth(path, DepthChoice(start="embedded", refine=False), max_pixels)
         if found.origin.kind == "embedded":
             yield path.parent.name, found.photo.pixels, found.disparity.values
 

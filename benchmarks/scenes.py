@@ -164,7 +164,7 @@ def estimate_disparity(photo: FloatImage, start: DepthStart, model: Path | None 
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, "photo.png")
         write_image(path, stored_from_encoded(photo, False))
-        choice = DepthChoice(start=start, model=str(model) if model else None, refine=0.0)
+        choice = DepthChoice(start=start, model=str(model) if model else None, refine=False)
         return open_with_depth(path, choice, photo[..., 0].size).disparity.values
 
 

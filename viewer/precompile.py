@@ -109,7 +109,7 @@ def _show_first_picture(scratch: Path) -> None:
 
 def _make_views(scratch: Path) -> None:
     """Make the views, without what comes before the first picture."""
-    _open(replace(_photo(scratch), depth=DepthChoice(refine=0.0)))
+    _open(replace(_photo(scratch), depth=DepthChoice(refine=False)))
 
 
 def _open_smaller(scratch: Path) -> None:

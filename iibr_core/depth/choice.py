@@ -54,8 +54,8 @@ class DepthChoice:
 
     file: a map that must be used. file_scale: factor from its values to px per view step; None: not given. inverts:
     near and far change places. is_metric: the map or the model gives distances. stretches: a map of another shape
-    shows the whole photo. model: a folder or a name, None for the usual one if it is there. refine: strength with
-    which disparity edges are drawn to the photo's, 0..1.
+    shows the whole photo. model: a folder or a name, None for the usual one if it is there. refine: whether
+    disparity edges are drawn to the photo's.
     """
 
     start: DepthStart = "auto"
@@ -65,7 +65,7 @@ class DepthChoice:
     is_metric: bool = False
     stretches: bool = False
     model: str | None = None
-    refine: float = 1.0
+    refine: bool = True
 
     @property
     def asks_for_model(self) -> bool:

@@ -228,8 +228,8 @@ class _Search:
         unknown = holes if holes.any() else None
         if unknown is not None:
             values = fill_disparity_by_color(photo.pixels, values)
-        if self.choice.refine > 0:
-            values = refine(photo.pixels, values, self.choice.refine, unknown, is_enlarged=is_enlarged)
+        if self.choice.refine:
+            values = refine(photo.pixels, values, unknown, is_enlarged=is_enlarged)
         share = GUESS_SHARE if origin.kind == "rough" else 1.0
         disparity = Disparity(values, origin.words, notes, metres, unknown, share, is_enlarged)
         return PhotoWithDepth(photo, disparity, origin)

@@ -225,8 +225,8 @@ class _TrialRun:
     def _own(self, disparity: Disparity) -> tuple[MakeView, float]:
         """Return the function that makes the program's views, and their consistency."""
         trial, photo, options, values = self._trial, self._given.photo, self._options, disparity.values
-        if strength := options.choice.refine:
-            values = refine(photo, values, strength, disparity.unknown, options.stages, disparity.is_enlarged)
+        if options.choice.refine:
+            values = refine(photo, values, disparity.unknown, options.stages, disparity.is_enlarged)
         if trial.is_free:
             free = free_views(trial, photo, values, options.stages)
             return lambda index: free(index).colors, math.nan

@@ -199,7 +199,7 @@ class FieldScene(Scene):
 def open(
     path: str | Path,
     depth: DepthStart | str | Path = "auto",
-    refine: float = 1.0,
+    refine: bool = True,
     max_pixels: int = DEFAULT_MAX_PIXELS,
     should_stop: ShouldStop = never,
     report_progress: ReportProgress = ignore_progress,
@@ -207,8 +207,8 @@ def open(
     """Open a photo, or a light field: a folder of views, a quilt, a lenslet image.
 
     depth: source of a photo's depth: "auto" (a map beside it, the photo's own, a model that is here, a guess),
-    "embedded", "model", "rough", "flat", or the path of a map. refine: how far its edges are drawn to the photo's, 0 to
-    1. Raises InputError for files that cannot be read, Cancelled once should_stop is true.
+    "embedded", "model", "rough", "flat", or the path of a map. refine: whether its edges are drawn to the photo's.
+    Raises InputError for files that cannot be read, Cancelled once should_stop is true.
     """
     path = Path(path)
     if is_light_field(path):
@@ -281,7 +281,7 @@ def _grid_shape(grid: Grid) -> GridShape | None:
     return shape
 
 
-def _choice_of(depth: DepthStart | str | Path, refine: float) -> DepthChoice:
+def _choice_of(depth: DepthStart | str | Path, refine: bool) -> DepthChoice:
     match depth:
         case "auto" | "embedded" | "model" | "rough" | "flat":
             return DepthChoice(depth, refine=refine)

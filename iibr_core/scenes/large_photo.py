@@ -12,8 +12,7 @@ from iibr_core.beyond.full_size import LargePhoto
 from iibr_core.depth.edges.refine import refine
 from iibr_core.depth.editing.canvas import apply_edits
 from iibr_core.depth.editing.edits import UNEDITED
-from iibr_core.depth.embedded.embedded_depth import read_embedded
-from iibr_core.depth.embedded.picture import photo_in_focus
+from iibr_core.depth.embedded.embedded import photo_in_focus, read_embedded
 from iibr_core.depth.search import find_depth
 from iibr_core.formats.images.photo import read_photo
 from iibr_core.formats.maps.reader import read_map_size
@@ -66,14 +65,14 @@ def _disparity(source: Source, loaded: LoadedPhoto, photo: Photo) -> FloatImage:
         return loaded.disparity.values
     file = _larger_map(loaded)
     if file is not None:
-        choice = replace(source.depth, file=str(file), refine=0.0)
+        choice = replace(source.depth, file=str(file), refine=False)
         given = find_depth(Path(source.path), photo, choice, source.grid).disparity
     else:
         given = Disparity(resample_surfaces(loaded.disparity.values, photo.size) * enlarged, loaded.disparity.source)
     raise_if_stopped()
     values = given.values
-    if settings.refine > 0:
-        values = refine(photo.pixels, values, settings.refine, given.unknown, is_enlarged=given.is_enlarged)
+    if settings.refine:
+        values = refine(photo.pixels, values, given.unknown, is_enlarged=given.is_enlarged)
     if file is None or settings.edits == UNEDITED:
         return values
     return apply_edits(photo.pixels, values / enlarged, settings.edits) * enlarged

@@ -48,8 +48,6 @@ SKETCH = ImageSize(height=480, width=480)
 """Largest size of a sketch."""
 SKETCH_WORTH_PIXELS = 1_500_000
 """Number of pixels from which on a photo gets a sketch: smaller ones are read quickly."""
-NOT_YET = 0.0
-"""Strength of refinement while a photo is read: it is refined afterwards, again each time the user changes it."""
 
 
 def stamp_of(path: Path) -> tuple[int, ...]:
@@ -69,22 +67,22 @@ def load_photo(source: Source, depth_settings: DepthSettings | None = None, asks
     max_pixels, stored_size = _pixels_to_read(source)
     stamp = stamp_of(path)
     skipped: tuple[SlowSource, ...] = () if asks_model else ("model",)
-    found = open_with_depth(path, replace(source.depth, refine=NOT_YET), max_pixels, source.grid, skipped)
+    found = open_with_depth(path, replace(source.depth, refine=False), max_pixels, source.grid, skipped)
     give_back_memory()
     own_size = _turned_like(stored_size, found.photo.size)
     loaded = _loaded(found, settings_text_in(path), source, own_size, stamp)
     return apply_depth_settings(loaded, depth_settings or DepthSettings(source.depth.refine))
 
 
-def deepen(source: Source, loaded: LoadedPhoto, strength: float) -> LoadedPhoto:
-    """Return the same photo with the depth that a model estimates, refined with this strength and not edited.
+def deepen(source: Source, loaded: LoadedPhoto, refines: bool) -> LoadedPhoto:
+    """Return the same photo with the depth that a model estimates, refined or not, and not edited.
 
     Raises InputError.
     """
-    choice = replace(source.depth, start="model", file=None, refine=NOT_YET)
+    choice = replace(source.depth, start="model", file=None, refine=False)
     found = find_depth(Path(source.path), loaded.photo, choice, source.grid)
     deepened = _loaded(found, loaded.settings, source, loaded.own_size, loaded.stamp)
-    return apply_depth_settings(deepened, DepthSettings(strength))
+    return apply_depth_settings(deepened, DepthSettings(refines))
 
 
 def sketch_photo(source: Source) -> LoadedPhoto | None:
@@ -99,7 +97,7 @@ def sketch_photo(source: Source) -> LoadedPhoto | None:
         return None
     pixels = read_thumbnail(path, SKETCH).astype(np.float32) / np.float32(255)
     photo = Photo(pixels, focal_px_from_fov(pixels.shape[1]), path.stem, is_hdr=False)
-    found = find_depth(path, photo, replace(source.depth, refine=NOT_YET), skipped=("pair", "model"))
+    found = find_depth(path, photo, replace(source.depth, refine=False), skipped=("pair", "model"))
     return _loaded(found, "", source, _turned_like(stored_size, photo.size), stamp)
 
 
@@ -195,7 +193,7 @@ def _loaded(
         found.origin,
         settings,
         (source.depth.model or USUAL_MODEL) if found.origin.kind == "model" else None,
-        DepthSettings(NOT_YET),
+        DepthSettings(refine=False),
         disparity,
         disparity,
         levels_of(disparity.values),
@@ -205,10 +203,10 @@ def _loaded(
     )
 
 
-def _refine(loaded: LoadedPhoto, strength: float) -> LoadedPhoto:
+def _refine(loaded: LoadedPhoto, refines: bool) -> LoadedPhoto:
     found = loaded.found
     values = found.values
-    if strength > 0:
-        values = refine(loaded.photo.pixels, values, strength, found.unknown, is_enlarged=found.is_enlarged)
+    if refines:
+        values = refine(loaded.photo.pixels, values, found.unknown, is_enlarged=found.is_enlarged)
     canvas = DepthCanvas(loaded.photo.pixels, values)
     return replace(loaded, refined=replace(found, values=values), levels=levels_of(values), canvas=canvas)

@@ -161,9 +161,9 @@ class Progress:
 
 @dataclass(frozen=True)
 class DepthSettings:
-    """Changes to the disparity that was found: the strength of refinement (see `DepthChoice.refine`), then edits."""
+    """Changes to the disparity that was found: whether it is refined (see `DepthChoice.refine`), then edits."""
 
-    refine: float = 1.0
+    refine: bool = True
     edits: DepthEdits = UNEDITED
 
 

@@ -156,7 +156,7 @@ def test_depth_of_0(tmp_path):
     depth[6:9, 6:9] = 0.0
     write_image(tmp_path / "photo.png", plain_photo().pixels)
     np.save(tmp_path / "a_depth.npy", depth)
-    choice = DepthChoice(file=str(tmp_path / "a_depth.npy"), refine=0.0)
+    choice = DepthChoice(file=str(tmp_path / "a_depth.npy"), refine=False)
     read = find_depth(tmp_path / "photo.png", plain_photo(), choice).disparity
     assert (read.values[:, :6] > read.values[:, 12:].max()).all()
     field_of(plain_photo(), read)

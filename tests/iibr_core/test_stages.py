@@ -26,7 +26,6 @@ from iibr_core.types import (
 SIZE = ImageSize(96, 128)
 CASES = {
     "sharpen_soft_edges": "soft",
-    "fit_to_blur": "soft",
     "refill_between_surfaces": "resampled",
     "label_edge_bands": "dilated",
     "connect_slopes": "steep",
@@ -80,8 +79,8 @@ def test_all_stages_are_on_by_default() -> None:
 
 
 def test_stages_are_left_out_by_name() -> None:
-    without = Stages(share_inpainted=False, fit_to_blur=False)
-    assert stages_without(["share-inpainted", "fit-to-blur"]) == without
+    without = Stages(share_inpainted=False, label_edge_bands=False)
+    assert stages_without(["share-inpainted", "label-edge-bands"]) == without
     assert all(stages_without([name]) != ALL_STAGES for name in STAGE_NAMES)
     with pytest.raises(InputError, match=r"'share' is no stage; give one of .*share-inpainted.*"):
         stages_without(["share"])

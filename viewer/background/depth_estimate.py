@@ -24,12 +24,12 @@ STOPPED = "Estimating depth stopped unexpectedly; the photo keeps the depth that
 
 @dataclass(frozen=True, eq=False)
 class EstimateRequest:
-    """A photo as it is open, a model's name or path, and how far edges are refined."""
+    """A photo as it is open, a model's name or path, and whether edges are refined."""
 
     source: Source
     loaded: LoadedPhoto
     model: str
-    refine: float
+    refine: bool
 
     def is_for(self, loaded: LoadedPhoto, model: str) -> bool:
         """Whether it asks this model about this photo, whatever was edited in it."""

@@ -30,7 +30,7 @@ def depth(
     out: Annotated[Path, typer.Option("--output", "-o", metavar="FILE", help="Map to write: PFM, EXR, NPY or PNG.")],
     depth_from: DepthFrom = "auto",
     depth_model: DepthModel = None,
-    refine: Refine = 1.0,
+    refine: Refine = True,
     invert_depth: InvertDepth = False,
     metric: Metric = False,
     force: Force = False,

@@ -43,7 +43,7 @@ class _Comparison:
         ),
     ] = "given"
     depth_model: DepthModel = None
-    refine: Refine = 1.0
+    refine: Refine = True
     views: Annotated[
         int | None, typer.Option(min=1, help="Compare at most so many views of a scene.", show_default="all")
     ] = None

@@ -39,7 +39,7 @@ class PhotoOptions:
 
     depth: DepthFrom = "auto"
     depth_model: DepthModel = None
-    refine: Refine = 1.0
+    refine: Refine = True
     depth_strength: DepthStrength = 1.0
     invert_depth: InvertDepth = False
     metric: Metric = False

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, get_args
 
@@ -147,13 +148,14 @@ def depth_start_from_text(text: str) -> DepthStart:
     raise typer.BadParameter(f"{text!r} is no source of depth: give {', '.join(starts[:-1])} or {starts[-1]}")
 
 
-def refine_from_text(text: str) -> float:
-    """A strength from 0 (off) to 1 (on). Raises BadParameter."""
-    strength = {"on": 1.0, "off": 0.0}.get(str(text).lower())
-    strength = finite_from_text(text) if strength is None else strength
-    if not 0 <= strength <= 1:
-        raise typer.BadParameter(f"{text!r} is no strength: give on, off or a number from 0 to 1")
-    return strength
+def refine_from_text(text: str) -> bool:
+    """Return whether edges are refined: on, off, or a number, of which 0 is off. Raises BadParameter."""
+    word = str(text).lower()
+    if word in ("on", "off", "true"):
+        return word != "off"
+    with suppress(typer.BadParameter):
+        return finite_from_text(word) != 0
+    raise typer.BadParameter(f"{text!r} is no switch: give on or off")
 
 
 def format_from_text(text: str) -> str:
@@ -207,11 +209,11 @@ DepthModel = Annotated[
     ),
 ]
 Refine = Annotated[
-    float,
+    Any,  # typer makes a flag of a bool
     typer.Option(
         parser=refine_from_text,
-        metavar="on|off|0..1",
-        help="How far disparity edges are drawn to the photo's edges.",
+        metavar="on|off",
+        help="Draw disparity edges to the photo's edges.",
         show_default="on",
     ),
 ]

@@ -53,7 +53,8 @@ class SourceText(msgspec.Struct, frozen=True, kw_only=True):
     stretch: bool = False
     grid: tuple[Views, Views] | None = None
     focus_disparity: float | None = None
-    refine: float = 1.0
+    refine: bool | float = True
+    """Earlier programs wrote a strength, 0 to 1."""
 
 
 class FormatText(msgspec.Struct, frozen=True, kw_only=True):
@@ -193,7 +194,7 @@ def _source_from_text(source: Source, text: SourceText) -> Source:
             inverts=text.invert_depth,
             is_metric=text.metric,
             stretches=text.stretch,
-            refine=text.refine,
+            refine=bool(text.refine),
         ),
         grid=None if text.grid is None else GridShape(*text.grid),
         focus_disparity=text.focus_disparity,

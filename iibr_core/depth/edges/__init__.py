@@ -1,1 +1,1 @@
-"""Where a map's surfaces end: soft edges made sharp, edge bands moved to where the photo's colours end."""
+"""Sharp depth edges for any map: steps for soft edges, and edge bands on the side that the photo shows."""

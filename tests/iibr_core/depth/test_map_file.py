@@ -46,7 +46,7 @@ def unit(near: FloatImage) -> FloatImage:
 
 def opened(folder: Path, name: str, picture: Image.Image | None = None, **choice: object) -> PhotoWithDepth:
     (scene()[0] if picture is None else picture).save(folder / "photo.png")
-    wanted = replace(DepthChoice(file=str(folder / name), refine=0.0), **choice)  # type: ignore[arg-type]
+    wanted = replace(DepthChoice(file=str(folder / name), refine=False), **choice)  # type: ignore[arg-type]
     return open_with_depth(folder / "photo.png", wanted)
 
 
@@ -175,7 +175,7 @@ def test_a_map_lies_like_the_stored_photo_or_is_turned_itself(
     grey.transpose(back).save(tmp_path / "stored.png")
     grey.transpose(back).convert("RGB").save(tmp_path / "own_exif.jpg", quality=95, exif=exif)
     for name in ("upright.png", "stored.png", "own_exif.jpg"):
-        choice = DepthChoice(file=str(tmp_path / name), refine=0.0)
+        choice = DepthChoice(file=str(tmp_path / name), refine=False)
         assert_true_to_scene(open_with_depth(tmp_path / "turned.jpg", choice))
 
 
@@ -190,7 +190,7 @@ def test_maps_beside_a_photo_are_found_in_their_order(tmp_path: Path) -> None:
     photo, near = scene()
     photo.save(tmp_path / "photo.png")
     integers(near, np.uint8).save(tmp_path / names[-1])
-    found = open_with_depth(tmp_path / "photo.png", DepthChoice(refine=0.0))
+    found = open_with_depth(tmp_path / "photo.png", DepthChoice(refine=False))
     assert found.origin.file == str(tmp_path / names[-1])
     assert_true_to_scene(found)
 
@@ -214,7 +214,7 @@ def test_the_depth_channel_of_a_rendered_picture(tmp_path: Path, prefixes: tuple
     depth = np.where(near > 0, 1 / np.maximum(near, 0.05), 1e10)
     pixels = np.dstack([np.asarray(photo, np.float32) / 255, np.ones_like(near), depth]).astype(np.float32)
     write_image_file(tmp_path / "render.exr", pixels, "float", channels=names)
-    found = open_with_depth(tmp_path / "render.exr", DepthChoice(refine=0.0))
+    found = open_with_depth(tmp_path / "render.exr", DepthChoice(refine=False))
     assert found.origin.kind == "embedded"
     values = found.disparity.values
     assert values[TOP] < values[WALL] < values[BOX] < values[DISC]
@@ -230,7 +230,7 @@ def test_a_picture_with_its_map_beside_it_in_one_file(tmp_path: Path, name: str)
     if name.startswith("below"):
         both = both[:, :150]  # halves one over the other are looked for in high pictures
     Image.fromarray(both).save(tmp_path / name, quality=95)
-    found = open_with_depth(tmp_path / name, DepthChoice(refine=0.0))
+    found = open_with_depth(tmp_path / name, DepthChoice(refine=False))
     assert found.photo.size == (HEIGHT, 150 if name.startswith("below") else WIDTH)
     assert found.origin.kind == "embedded"
     values = found.disparity.values

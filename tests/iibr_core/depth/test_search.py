@@ -45,7 +45,7 @@ def photo_file(folder: Path, depth: np.ndarray | bytes | None = DEPTH, orientati
 
 
 def start_from(start: DepthStart, **others: object) -> DepthChoice:
-    return DepthChoice(start, refine=0.0, **others)  # type: ignore[arg-type]
+    return DepthChoice(start, refine=False, **others)  # type: ignore[arg-type]
 
 
 def is_nearer_inside(found: PhotoWithDepth) -> bool:

@@ -98,7 +98,7 @@ def test_views_of_hard_edges_stay_within_bounds(outline: str, given: str, least:
     disparity = np.asarray(MAPS[given](exact), np.float32)
     field = [GRID.offset(row, column) for row, column in np.ndindex(*GRID)]
     whole, visible, plain = [], [], []
-    views = PhotoViews(photo, refine(photo, disparity, 1.0), field, Stages(ray_transformer=False))
+    views = PhotoViews(photo, refine(photo, disparity), field, Stages(ray_transformer=False))
     for offset in CORNERS:
         made, truth = views.view(offset).colors, view_of(outline, offset)
         warped = reference_warp(photo, disparity, offset)

@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from iibr_core.depth.edges.edge_blur import measure_edge_blur
+from iibr_core.depth.edges.blur import measure_edge_blur
 from iibr_core.depth.edges.refine import refine
 from iibr_core.depth.guess import guess_depth
 from iibr_core.inpainting import background
@@ -52,7 +52,7 @@ STAGES = {
     "split": lambda: split_mixed_pixels(COLORS, LAYERS, 0.5),
     "render": rendered,
     "fill": filled,
-    "refine": lambda: [refine(COLORS, np.where(HOLES, np.nan, SOFT), 1.0, None)],
+    "refine": lambda: [refine(COLORS, np.where(HOLES, np.nan, SOFT))],
     "blur": lambda: [np.float64(measure_edge_blur(COLORS, SOFT))],
     "offline": lambda: [guess_depth(Photo(COLORS, 100.0, "test")).values],
     "unknown depth": lambda: [fill_disparity_holes(np.where(HOLES, np.nan, LAYERS))],

@@ -220,10 +220,10 @@ def test_sliders_and_handles_change_the_map_once_they_are_let_go(viewer: Driver)
 
 def test_refine_is_worked_out_anew_without_reading_the_photo(viewer: Driver, photo_path: Path) -> None:
     photo_path.unlink()
-    viewer.slide("##Refine", 0.3)
+    viewer.press("Refine edges")
     viewer.until(lambda app: app.state.generation == 2 and is_made(app))
     viewer.until_idle()
-    assert 0 < viewer.app.state.depth.refine < 1
+    assert not viewer.app.state.depth.refine
     assert viewer.app.scene_view.loaded is not None
     assert viewer.app.scene_view.loaded.depth_settings == viewer.app.state.depth
     viewer.app.do(SetDepthStrength(2.0, is_finished=True))

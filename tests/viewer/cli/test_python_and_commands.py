@@ -57,7 +57,7 @@ def test_a_light_field_is_the_one_that_generate_writes(monkeypatch: Monkey, phot
 @pytest.mark.parametrize("kind", ["disparity", "depth", "depth picture"])
 def test_disparity_is_the_one_that_depth_writes(monkeypatch: Monkey, photo: Path, kind: str) -> None:
     keep_map(photo, kind)
-    found = iibr.open(photo, refine=0.0).disparity
+    found = iibr.open(photo, refine=False).disparity
     assert run(monkeypatch, "depth", photo, "--refine", "off", "-o", "map.npy") == 0
     np.testing.assert_allclose(np.load("map.npy"), found, rtol=1e-5)
     near, far, between = (np.median(found[part]) for part in (SQUARE, WALL, FLOOR))

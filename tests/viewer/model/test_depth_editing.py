@@ -107,7 +107,6 @@ def test_clips_do_not_cross_and_values_are_clamped() -> None:
     "action",
     [
         SetTone(DepthEdits(gamma=float("nan")), True),
-        SetRefine(float("inf"), True),
         SetBrush(Brush(radius=float("nan"))),
         Paint((float("nan"), 0.0)),
         PickDepth(DepthSample((0.5, 0.5), float("inf"))),
@@ -186,14 +185,14 @@ def test_the_depth_of_a_light_field_is_left_alone() -> None:
 
 
 def test_another_photo_begins_with_its_own_depth_and_a_failed_one_gives_the_old_back() -> None:
-    edited = after(opened(), SetTone(TONE, True), SetRefine(0.25, True))
-    source = Source("b.png", DepthChoice(refine=0.5))
+    edited = after(opened(), SetTone(TONE, True), SetRefine(False))
+    source = Source("b.png", DepthChoice(refine=False))
     asked = reduce(edited, OpenPath(source))
-    assert depth_settings_for_worker(asked) == DepthSettings(0.5)
+    assert depth_settings_for_worker(asked) == DepthSettings(False)
     failed = reduce(asked, OpenFailed(asked.generation, "gone"))
     assert depth_settings_for_worker(failed) == edited.depth
     scene = scene_of(GRID, source=source, plan=plan_of(GRID))
-    assert reduce(asked, SceneOpened(asked.generation, scene)).depth == DepthSettings(0.5)
+    assert reduce(asked, SceneOpened(asked.generation, scene)).depth == DepthSettings(False)
 
 
 def test_the_same_scene_planned_anew_keeps_its_edits_and_its_history() -> None:
@@ -206,14 +205,14 @@ def test_the_same_scene_planned_anew_keeps_its_edits_and_its_history() -> None:
 
 def test_reset_takes_everything_back_at_once() -> None:
     state = after(
-        opened(Source("a.png", DepthChoice(refine=0.5))), SetTone(TONE, True), SetRefine(1.0, True), ResetDepth()
+        opened(Source("a.png", DepthChoice(refine=False))), SetTone(TONE, True), SetRefine(True), ResetDepth()
     )
-    assert state.depth == DepthSettings(0.5)
+    assert state.depth == DepthSettings(False)
 
 
 DECIDED = Source(
     "a.png",
-    DepthChoice("model", file="a.pfm", file_scale=2.0, model="midas", refine=0.25),
+    DepthChoice("model", file="a.pfm", file_scale=2.0, model="midas", refine=False),
     grid=GRID,
     focus_disparity=1.0,
 )
@@ -223,13 +222,13 @@ DECIDED = Source(
 def test_another_file_keeps_what_was_decided_about_depth(way: str) -> None:
     state = opened(DECIDED)
     action = action_for_path("photo", "b.png", state) if way == "dialog" else actions_from_drop(["b.png"], state)[0]
-    depth = DepthChoice("model", model="midas", refine=0.25)
+    depth = DepthChoice("model", model="midas", refine=False)
     wanted = replace(DECIDED, path="b.png", depth=depth, focus_disparity=None)
     assert action == OpenPath(wanted)
 
 
 def test_a_map_is_for_the_photo_that_is_open() -> None:
-    depth = DepthChoice("auto", file="b.pfm", model="midas", refine=0.25, stretches=True)
+    depth = DepthChoice("auto", file="b.pfm", model="midas", refine=False, stretches=True)
     wanted = replace(DECIDED, depth=depth, focus_disparity=None)
     assert action_for_path("map", "b.pfm", opened(DECIDED)) == OpenPath(wanted)
     assert actions_from_drop(["b.pfm"], opened(DECIDED)) == [OpenPath(wanted)]
@@ -288,11 +287,11 @@ def test_a_given_map_is_not_proposed_to_be_overwritten() -> None:
 
 
 def test_settings_bring_the_edits_along() -> None:
-    state = replace(opened(), depth=DepthSettings(0.5, replace(TONE, strokes=(STROKE,))))
+    state = replace(opened(), depth=DepthSettings(False, replace(TONE, strokes=(STROKE,))))
     settings = settings_of(state, (96, 64))
     again = settings_from_text(settings_text(settings), "a.png")
     assert again.depth_edits == state.depth.edits
-    assert again.source.depth.refine == 0.5
+    assert not again.source.depth.refine
     plain = settings_of(replace(state, depth=DepthSettings()), (96, 64))
     assert "depth_edits" not in settings_text(plain)
     assert settings_from_text(settings_text(plain), "a.png").depth_edits == UNEDITED
@@ -338,14 +337,14 @@ def test_refining_is_from_what_was_found_each_time(tmp_path: Path) -> None:
         soft[:, 1:-1] = (soft[:, :-2] + soft[:, 1:-1] + soft[:, 2:]) / 3
         soft[1:-1] = (soft[:-2] + soft[1:-1] + soft[2:]) / 3
     np.save(tmp_path / "scene_disparity.npy", soft)
-    loaded = load_photo(Source(str(path), DepthChoice(refine=0.0)))
+    loaded = load_photo(Source(str(path), DepthChoice(refine=False)))
     np.testing.assert_array_equal(loaded.disparity.values, soft)
-    full = apply_depth_settings(loaded, DepthSettings(1.0))
+    full = apply_depth_settings(loaded, DepthSettings(True))
     assert not np.array_equal(full.disparity.values, soft)
     np.testing.assert_array_equal(
-        full.disparity.values, load_photo(Source(str(path), DepthChoice(refine=1.0))).disparity.values
+        full.disparity.values, load_photo(Source(str(path), DepthChoice(refine=True))).disparity.values
     )
-    np.testing.assert_array_equal(apply_depth_settings(full, DepthSettings(0.0)).disparity.values, soft)
+    np.testing.assert_array_equal(apply_depth_settings(full, DepthSettings(False)).disparity.values, soft)
 
 
 def test_a_flat_photo_can_be_painted_on(tmp_path: Path) -> None:
@@ -369,7 +368,7 @@ def test_a_saved_map_is_the_same_scene_when_it_is_opened_again(photo_path: Path,
         wanted = loaded.disparity.values
         assert export_map(out, wanted) == f"Saved {out}."
     np.testing.assert_array_equal(read_disparity(out, ImageSize(HEIGHT, WIDTH)).values, wanted)
-    again = load_photo(replace(source, depth=DepthChoice(file=str(out), refine=0.0)))
+    again = load_photo(replace(source, depth=DepthChoice(file=str(out), refine=False)))
     np.testing.assert_array_equal(again.disparity.values, wanted)
 
 

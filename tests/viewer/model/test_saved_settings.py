@@ -59,9 +59,7 @@ optics = st.builds(
 sources = st.builds(
     Source,
     st.just(""),
-    st.builds(
-        DepthChoice, st.just("auto"), st.none(), st.none() | numbers, *[st.booleans()] * 3, refine=st.floats(0, 1)
-    ),
+    st.builds(DepthChoice, st.just("auto"), st.none(), st.none() | numbers, *[st.booleans()] * 3, refine=st.booleans()),
     st.none() | st.builds(GridShape, st.integers(1, 99), st.integers(1, 99)),
     st.none() | numbers,
 )
@@ -185,10 +183,15 @@ STROKE = Stroke("nearer", ((0.5, 0.25), (0.75, 0.25)), 0.03, 0.25)
 
 def test_texts_written_before_are_read() -> None:
     assert settings_from_text(FIRST_TEXT, "a.png") == SAVED
-    depth = replace(SAVED.source.depth, refine=0.5)
     edits = DepthEdits(is_inverted=True, far_clip=0.125, gamma=2.0, strokes=(STROKE,))
-    later = replace(SAVED, source=replace(SAVED.source, depth=depth), depth_edits=edits)
+    later = replace(SAVED, depth_edits=edits)
     assert settings_from_text(LATER_TEXT, "a.png") == later
+
+
+@pytest.mark.parametrize(("text", "is_on"), [("0", False), ("0.35", True), ("1.0", True), ("false", False)])
+def test_a_strength_of_refinement_is_read_as_a_switch(text: str, is_on: bool) -> None:
+    saved = settings_from_text(LATER_TEXT.replace('"refine":0.5', f'"refine":{text}'), "a.png")
+    assert saved.source.depth.refine is is_on
 
 
 def test_numbers_of_numpy_are_written_like_any() -> None:

@@ -48,9 +48,8 @@ def reduce_depth(state: AppState, action: DepthAction) -> AppState:
             add_notice(state, Notice(NO_DEPTH_HERE)) if isinstance(action, SetBrush) and action.brush.is_on else state
         )
     match action:
-        case SetRefine(strength, is_finished) if isfinite(strength):
-            depth_settings = replace(state.depth, refine=clamp(strength, 0.0, 1.0))
-            return _with_settings(state, depth_settings, "SetRefine", is_finished)
+        case SetRefine(is_on):
+            return _with_settings(state, replace(state.depth, refine=is_on), "SetRefine", is_finished=True)
         case SetTone(tone, is_finished) if all(map(isfinite, (tone.far_clip, tone.near_clip, tone.gamma))):
             edits = replace(_clamp_tone(tone, state.depth.edits), strokes=state.depth.edits.strokes)
             return _with_settings(state, replace(state.depth, edits=edits), "SetTone", is_finished)

@@ -34,10 +34,9 @@ class Brush:
 
 @dataclass(frozen=True)
 class SetRefine:
-    """Draw the edges of disparity to the photo's, 0..1; made again once the edit is finished."""
+    """Draw the edges of disparity to the photo's, or leave them."""
 
-    strength: float
-    is_finished: bool
+    is_on: bool
 
 
 @dataclass(frozen=True)

@@ -50,7 +50,7 @@ START_TIPS: dict[DepthStart, str] = {
     "flat": "Everything is equally far away, so nothing moves.",
 }
 FROM_TIP = "Where depth comes from. Another choice opens the photo again."
-REFINE_TIP = "How closely depth follows the photo's edges: more makes crisper outlines. Exact maps stay as they are."
+REFINE_TIP = "Draws depth to the photo's edges: crisper outlines. Exact maps stay as they are."
 FAR_TIP = "All that is farther comes as near as this. The left handle above does the same."
 NEAR_TIP = "All that is nearer goes as far as this. The right handle above does the same."
 GAMMA_TIP = "Above 1, near things stand out more; below 1, far ones do."
@@ -144,12 +144,8 @@ def _choice_text(start: DepthStart, model: str | None, path: str | None) -> str:
 
 
 def _refine(state: AppState, layout: Layout) -> list[Action]:
-    form = "off" if state.depth.refine == 0 else "%.0f %%"
-    percent = slider("Refine", 100 * state.depth.refine, (0.0, 100.0), form, layout, REFINE_TIP)
-    is_finished = imgui.is_item_deactivated_after_edit()
-    if percent is None and not is_finished:
-        return []
-    return [SetRefine(state.depth.refine if percent is None else percent / 100, is_finished)]
+    refines = checkbox("Refine edges", state.depth.refine, layout, REFINE_TIP)
+    return [] if refines is None else [SetRefine(refines)]
 
 
 def _tone(state: AppState, layout: Layout) -> list[Action]:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.ndimage import map_coordinates
 
-from iibr_core.depth.edges.edge_profiles import gradient, height_at, is_inside, strongest_change, walk
+from iibr_core.depth.edges.line import gradient, height_at, is_inside, walk
 
 
 def test_heights_are_bilinear_and_the_border_goes_on():
@@ -68,20 +68,3 @@ def test_a_walk_goes_no_farther_than_told_and_ends_where_it_falls():
     assert walk(rounded, 20.0, 4.0, 1.0, 0.0, 1, 30, 1.0, 6.0)[0] == 7
     peak = np.minimum(ramp(20.0, 30.0), ramp(40.0, 30.0))
     assert walk(peak, 26.0, 4.0, 1.0, 0.0, 1, 20, 1.0, 9.0)[:2] == (4.0, pytest.approx(1))
-
-
-def test_the_strongest_change_is_that_of_two_pixels_along_the_line():
-    photo = np.random.default_rng(3).uniform(0, 1, (20, 24, 3)).astype(np.float32)
-    for across, down, first, last in ((1.0, 0.0, -3.0, 4.0), (0.6, 0.8, -5.0, 5.0), (0.0, -1.0, 0.0, 30.0)):
-        changes = []
-        for far in np.arange(first, last + 1e-9):
-            ends = [
-                photo[
-                    np.clip(int(np.floor(9 + down * k + 0.5)), 0, 19),
-                    np.clip(int(np.floor(11 + across * k + 0.5)), 0, 23),
-                ]
-                for k in (far - 1, far + 1)
-            ]
-            changes.append(((ends[1] - ends[0]) ** 2).sum())
-        found = strongest_change(photo, 11.0, 9.0, across, down, first, last)
-        assert found == pytest.approx(max(changes), rel=1e-5)
