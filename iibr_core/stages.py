@@ -14,6 +14,10 @@ class Stages:
 
     sharpen_soft_edges: bool = True
     """Depth edges that a blur made soft become steps at the photo's edges."""
+    fit_to_blur: bool = True
+    """Sharpened edges of enlarged maps move until, blurred again, they give the map that they came from."""
+    refill_between_surfaces: bool = True
+    """Lone disparities between two surfaces are filled again by colour."""
     label_edge_bands: bool = True
     """Pixels beside a depth edge, or a defocused boundary, go to the side whose colours they have."""
     outpainting: bool = True

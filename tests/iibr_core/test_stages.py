@@ -26,6 +26,7 @@ from iibr_core.types import (
 SIZE = ImageSize(96, 128)
 CASES = {
     "sharpen_soft_edges": "soft",
+    "fit_to_blur": "enlarged",
     "refill_between_surfaces": "resampled",
     "label_edge_bands": "dilated",
     "connect_slopes": "steep",
@@ -37,7 +38,7 @@ CASES = {
 def scene(case: str) -> tuple[FloatImage, FloatImage]:
     """Return a photo (H, W, 3) and its map (H, W)."""
     photo, exact = render(random_scene(np.random.default_rng(3), SIZE, 4.0), SIZE, ViewOffset(0, 0))
-    if case == "soft":
+    if case in ("soft", "enlarged"):
         return photo, blur(exact, 2.0)
     if case == "resampled":
         return photo, resampled(exact)
@@ -60,7 +61,7 @@ def views(case: str, stages: Stages) -> FloatImage:
     photo, values = scene(case)
     judged = [ViewOffset(2, 2), ViewOffset(-2, 1), ViewOffset(1, -1)]
     field = [ViewOffset(t, s) for t in (-2, 2) for s in (-2, 2)]
-    disparity = refine(photo, values, stages=stages)
+    disparity = refine(photo, values, stages=stages, is_enlarged=case == "enlarged")
     made = PhotoViews(photo, disparity, field, stages)
     return np.stack([made.view(at).colors for at in judged])
 

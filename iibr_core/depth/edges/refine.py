@@ -22,13 +22,14 @@ from iibr_core.depth.edges.blur import (
 from iibr_core.depth.edges.fit import fit_to_blur
 from iibr_core.depth.edges.labels import label_edges, step_distance
 from iibr_core.depth.edges.line import FLAT_SHARE, GAUSSIAN_SIGMAS, PLATEAU_SIGMAS, gradient, height_at, passes, walk
+from iibr_core.depth.edges.lone import fill_lone
 from iibr_core.depth.guess import resize_picture
 from iibr_core.formats.maps.resample import resample_surfaces
 from iibr_core.inpainting.disparity_by_color import fill_disparity_by_color
 from iibr_core.runtime.kernels import kernel
 from iibr_core.runtime.tiling import in_bands
 from iibr_core.stages import ALL_STAGES, Stages
-from iibr_core.surfaces import EDGE_SHARE, is_in_front, same_surface
+from iibr_core.surfaces import EDGE_SHARE
 from iibr_core.types import FloatImage, ImageSize, InputError, image_size
 
 WIDE_SIGMA_PX, WORK_SIGMA_PX = 4.5, 2.0
@@ -39,10 +40,6 @@ EXTENSION = 0.7
 """Share of a plateau's slope that continues under the ramp."""
 MAX_EXTENSION = 0.05
 """Largest slope that continues under the ramp, as a share of the ramp's steepest slope."""
-MAX_LONE_NEIGHBOURS = 4
-"""Largest number of neighbours, within two pixels, on the surface of a lone pixel."""
-MIN_LONE_SHARE = 0.05
-"""Least number of lone pixels in a measured or resampled map, as a share of the pixels beside steps."""
 BEND = 2.0
 """Factor by which a surface bends away from the view faster at its edge than beyond the blur: round things do."""
 
@@ -70,14 +67,10 @@ def refine(
     min_edge = EDGE_SHARE * extent(values)
     if not min_edge > 0:
         return values
-    sharp = _sharpen(colors, values, min_edge, is_enlarged) if stages.sharpen_soft_edges else values
-    if not stages.label_edge_bands:
-        return sharp
-    lone = _lone_pixels(np.where(holes, np.float32(np.nan), sharp), min_edge)
-    if lone.sum() > MIN_LONE_SHARE * np.count_nonzero(step_distance(sharp, min_edge) == 0):
-        holes = holes | lone
-        sharp = fill_disparity_by_color(colors, np.where(holes, np.float32(np.nan), sharp))
-    return label_edges(colors, sharp, holes, min_edge)
+    sharp = _sharpen(colors, values, min_edge, is_enlarged, stages) if stages.sharpen_soft_edges else values
+    if stages.refill_between_surfaces:
+        sharp, holes = fill_lone(colors, sharp, holes, min_edge)
+    return label_edges(colors, sharp, holes, min_edge) if stages.label_edge_bands else sharp
 
 
 def _fill_unknown(colors: FloatImage, disparity: FloatImage) -> FloatImage:
@@ -87,20 +80,20 @@ def _fill_unknown(colors: FloatImage, disparity: FloatImage) -> FloatImage:
     return fill_disparity_by_color(colors, known) if np.isnan(known).any() else known
 
 
-def _sharpen(colors: FloatImage, values: FloatImage, min_edge: float, is_enlarged: bool) -> FloatImage:
+def _sharpen(colors: FloatImage, values: FloatImage, min_edge: float, is_enlarged: bool, stages: Stages) -> FloatImage:
     """Return the map with steps for soft edges; the map itself if it is not blurred."""
     sigma = measure_edge_blur(colors, values, MAX_ENLARGED_SPREAD if is_enlarged else MAX_SPREAD)
     times = sigma / WORK_SIGMA_PX
     if sigma > WIDE_SIGMA_PX and min(values.shape) > 2 * SEARCHED_PX * times:
-        return _sharpen_small(colors, values, times, min_edge)
+        return _sharpen_small(colors, values, times, min_edge, stages)
     if sigma == 0:
         return values
     sharp = _with_steps(values, sigma, min_edge)
     # Outlines of enlarged maps are coarse; those of filtered maps are better without the fit.
-    return fit_to_blur(colors, values, sharp, sigma, min_edge) if is_enlarged else sharp
+    return fit_to_blur(colors, values, sharp, sigma, min_edge) if is_enlarged and stages.fit_to_blur else sharp
 
 
-def _sharpen_small(colors: FloatImage, values: FloatImage, times: float, min_edge: float) -> FloatImage:
+def _sharpen_small(colors: FloatImage, values: FloatImage, times: float, min_edge: float, stages: Stages) -> FloatImage:
     """Return a widely blurred map, sharpened at a size that is so many times smaller and enlarged in steps of 2.
 
     After each step the edges follow the photo's colours.
@@ -111,7 +104,8 @@ def _sharpen_small(colors: FloatImage, values: FloatImage, times: float, min_edg
     sigma = measure_edge_blur(photo, small, MAX_ENLARGED_SPREAD)
     sharp = small
     if sigma > 0:
-        sharp = fit_to_blur(photo, small, _with_steps(small, sigma, min_edge), sigma, min_edge)
+        sharp = _with_steps(small, sigma, min_edge)
+        sharp = fit_to_blur(photo, small, sharp, sigma, min_edge) if stages.fit_to_blur else sharp
     while size != values.shape:
         sharp = label_edges(photo, sharp, np.zeros(size, np.bool_), min_edge)
         is_last = 2 * min(size) >= min(height, width)
@@ -130,36 +124,6 @@ def _with_steps(values: FloatImage, sigma: float, min_edge: float) -> FloatImage
         lambda first, last: _steps_in_rows(values, is_near, min_edge, sigma, (first, last), sharp), image_size(values)
     )
     return sharp
-
-
-def _lone_pixels(values: FloatImage, min_edge: float) -> NDArray[np.bool_]:
-    """Return pixels (H, W) with a disparity of their own between two surfaces. NaN belongs to none.
-
-    Mixed pixels get such disparities in maps that were measured or resampled, and pass them on to holes.
-    """
-    lone = np.zeros(values.shape, np.bool_)
-    in_bands(lambda first, last: _mark_lone(values, min_edge, (first, last), lone), image_size(values))
-    return lone
-
-
-@kernel
-def _mark_lone(values, min_edge, rows, lone):
-    """Mark pixels of rows [rows[0], rows[1]) between two surfaces, with few neighbours on their own."""
-    height, width = values.shape
-    for y in range(rows[0], rows[1]):
-        for x in range(width):
-            here, neighbours, is_higher, is_lower = values[y, x], -1, False, False
-            for v in range(max(y - 1, 0), min(y + 2, height)):
-                for u in range(max(x - 1, 0), min(x + 2, width)):
-                    is_higher |= is_in_front(here, values[v, u], min_edge)
-                    is_lower |= is_in_front(values[v, u], here, min_edge)
-            if not (is_higher and is_lower):
-                continue
-            # Things of two pixels and more have neighbours farther off.
-            for v in range(max(y - 2, 0), min(y + 3, height)):
-                for u in range(max(x - 2, 0), min(x + 3, width)):
-                    neighbours += same_surface(values[v, u], here, min_edge)
-            lone[y, x] = neighbours <= MAX_LONE_NEIGHBOURS
 
 
 @kernel

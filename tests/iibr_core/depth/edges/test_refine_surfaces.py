@@ -76,7 +76,7 @@ def rounded_step(length: float) -> np.ndarray:
 
 SURFACES = {
     **{f"plane {slope}": slope * (places()[0] - 80) for slope in (-0.9, -0.4, 0.05, 0.3, 0.6)},
-    **{f"relief {p} {slope}": relief(p, slope) for p in (12, 32, 96) for slope in (0.05, 0.5)},
+    **{f"relief {p} {slope}": relief(p, slope) for p in (12, 64) for slope in (0.05, 0.2, 0.5)},
     **{f"oblique {p}": oblique_relief(p) for p in (12, 24, 48)},
     **{f"bump {r}": bump(r) for r in (8, 15, 25)},
     **{f"cushion {size}": cushion(size) for size in (22, 38, 60)},
