@@ -71,10 +71,3 @@ def test_one_plane_lies_where_the_views_want_it() -> None:
     moved = np.roll(photo, -2, axis=1)
     scene = Scene("a", photo, disparity, {ViewOffset(0.0, 1.0): moved}, offsets_of(GridShape(3, 3)))
     np.testing.assert_allclose(plane_map(scene).disparity, 2.0, atol=0.1)
-
-
-def test_unknown_maps_are_refused() -> None:
-    scene = drawn_scene(0, ImageSize(16, 16), sides=[(0, 1)])
-    for kind in ("network", "none"):
-        with pytest.raises(InputError):
-            with_map(scene, kind, None)

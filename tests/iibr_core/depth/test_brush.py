@@ -11,13 +11,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from iibr_core.depth.editing import brush, bucket
 from iibr_core.depth.editing.brush import CONTOUR_CONTRAST, LIKENESS, falloff, lower_distances, touched_colors
 from iibr_core.depth.editing.canvas import DepthCanvas, apply_edits
 from iibr_core.depth.editing.edits import BRUSH_TOOLS, DEPTH_TOOLS, UNEDITED, BrushTool, DepthEdits, Stroke
-from iibr_core.depth.geodesic import spread_distances
 from iibr_core.runtime.work import Cancelled, stoppable
-from iibr_core.types import InputError
 
 HEIGHT, WIDTH = 30, 40
 
@@ -48,8 +45,7 @@ def dab(
 
 def stroke_distance(photo: np.ndarray, stroke: Stroke) -> np.ndarray:
     distance = np.ones(photo.shape[:2], np.float32)
-    for index in range(len(stroke.points)):
-        lower_distances(photo, stroke, index, distance)
+    lower_distances(photo, stroke, 0, distance)
     return distance
 
 
@@ -75,7 +71,7 @@ def slow_distance(photo: np.ndarray, stroke: Stroke) -> np.ndarray:
     return distance
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", range(4))
 def test_distances_are_shortest_paths(seed: int) -> None:
     rng, photo = np.random.default_rng(seed), tiled_photo(seed, 0.4)
     stroke = dab(x=rng.uniform(0.1, 0.9), y=rng.uniform(0.1, 0.9), radius=rng.uniform(0.05, 0.25))
@@ -97,20 +93,18 @@ def test_a_dab_moves_its_middle_by_its_strength_and_ends_at_its_radius(tool: Bru
 
 
 @pytest.mark.parametrize("tool", BRUSH_TOOLS)
-def test_a_stroke_does_not_cross_a_contour(tool: BrushTool) -> None:
+def test_a_stroke_does_not_cross_a_contour_and_changes_nothing_outside_the_photo(tool: BrushTool) -> None:
     photo, disparity = plain_photo(), plane()
     disparity[:, WIDTH // 2 :] += 3
     disparity[::2, : WIDTH // 2] += 0.5
-    change = apply_edits(photo, disparity, DepthEdits(strokes=(dab(tool, x=0.45),))) - disparity
-    assert np.abs(change[:, : WIDTH // 2]).max() > 0.1
+    painted = apply_edits(photo, disparity, DepthEdits(strokes=(dab(tool, x=0.45),)))
+    change = np.abs(painted - disparity)
+    assert change[:, : WIDTH // 2].max() > 0.1
     assert not change[:, WIDTH // 2 :].any()
-
-
-def test_noise_is_no_contour() -> None:
-    rng = np.random.default_rng(0)
-    photo = np.clip(0.5 + rng.normal(0, 0.005, (HEIGHT, WIDTH, 3)), 0, 1).astype(np.float32)
-    plain = stroke_distance(np.full_like(photo, 0.5), dab())
-    assert np.abs(falloff(stroke_distance(photo, dab())) - falloff(plain)).max() < 0.15
+    if tool == "smooth":
+        assert np.abs(np.diff(painted[10:20, 18], axis=0)).mean() < 0.4, "rows differ by 0.5"
+    outside = tuple(dab(tool, *place) for place in ((-5.0, 0.5), (1e30, -1e30), (0.5, 40.0)))
+    np.testing.assert_array_equal(apply_edits(photo, disparity, DepthEdits(strokes=outside)), disparity)
 
 
 def test_texture_that_the_stroke_runs_over_does_not_stop_it() -> None:
@@ -121,15 +115,6 @@ def test_texture_that_the_stroke_runs_over_does_not_stop_it() -> None:
     plain = falloff(stroke_distance(np.full_like(photo, 0.5), dab(x=0.25)))
     np.testing.assert_allclose(near[:, : WIDTH // 2], plain[:, : WIDTH // 2], atol=1e-5)
     assert not near[:, WIDTH // 2 :].any()
-
-
-def test_smoothing_averages_within_contours() -> None:
-    photo, values = plain_photo(), np.random.default_rng(1).normal(size=(HEIGHT, WIDTH)).astype(np.float32)
-    values[:, WIDTH // 2 :] += 5
-    smooth = brush.smooth_within_contours(photo, values, 5.0)
-    for part in (np.s_[:, : WIDTH // 2], np.s_[:, WIDTH // 2 :]):
-        assert smooth[part].std() < 0.3 * values[part].std()
-        assert smooth[part].mean() == pytest.approx(values[part].mean(), abs=0.1)
 
 
 @pytest.mark.parametrize("tool", DEPTH_TOOLS)
@@ -165,17 +150,14 @@ def test_a_canvas_shows_the_same_whatever_it_showed_before(wanted: list[DepthEdi
     photo, last = tiled_photo(0, 0.3), UNEDITED
     canvas = DepthCanvas(photo, plane())
     for edit in wanted:
-        drawn = [
-            replace(edit, strokes=(*edit.strokes[:-1], replace(edit.strokes[-1], points=edit.strokes[-1].points[:n])))
-            for n in (1, 2)
-            if edit.strokes
-        ]
-        for step in (*drawn, edit, replace(edit, strokes=edit.strokes[:-1]), last):
+        *before, newest = edit.strokes or (dab(),)
+        drawn = [replace(edit, strokes=(*before, replace(newest, points=newest.points[:n]))) for n in (1, 2)]
+        for step in (*drawn, edit, replace(edit, strokes=tuple(before)), last):
             shown = canvas.apply(step)
-            before = shown.copy()
+            kept = shown.copy()
             np.testing.assert_array_equal(shown, apply_edits(photo, plane(), step))
             canvas.apply(edit)
-            np.testing.assert_array_equal(shown, before, "maps handed out must not change")
+            np.testing.assert_array_equal(shown, kept, "maps handed out must not change")
         last = edit
 
 
@@ -218,26 +200,3 @@ def test_wild_values_stay_finite(wild: float, tool: BrushTool) -> None:
     disparity[10:20, 10:30] = wild
     stroke = Stroke(tool, ((0.1, 0.1), (0.9, 0.9)), 0.2, 1.0)
     assert np.isfinite(apply_edits(plain_photo(), disparity, DepthEdits(strokes=(stroke, stroke)))).all()
-
-
-@pytest.mark.parametrize("place", [(-5.0, 0.5), (1e30, -1e30), (0.5, 40.0)])
-def test_a_stroke_outside_the_photo_changes_nothing(place: tuple[float, float]) -> None:
-    result = apply_edits(plain_photo(), plane(), DepthEdits(strokes=(Stroke("nearer", (place,), 0.1, 1.0),)))
-    np.testing.assert_array_equal(result, plane())
-
-
-def test_sizes_must_agree_and_something_must_be_known() -> None:
-    with pytest.raises(ValueError, match="disparity"):
-        DepthCanvas(plain_photo(), np.zeros((3, 3), np.float32))
-    with pytest.raises(InputError, match="no disparity is known"):
-        apply_edits(plain_photo(), np.full((HEIGHT, WIDTH), np.nan, np.float32), DepthEdits(strokes=(dab(),)))
-
-
-def test_strokes_of_all_sizes_need_the_kernels_that_were_prepared() -> None:
-    for shape, radius in (((4, 4), 0.1), ((HEIGHT, WIDTH), 0.05), ((HEIGHT, 3), 0.25)):
-        photo, disparity = np.full((*shape, 3), 0.5, np.float32), np.zeros(shape, np.float32)
-        for tool in BRUSH_TOOLS:
-            apply_edits(photo, disparity, DepthEdits(strokes=(dab(tool, radius=radius),)))
-    kernels = spread_distances, brush._measure_colors, brush._remove_specks, brush._smooth_rows, bucket._fill_holes
-    for kernel in kernels:
-        assert len(kernel.signatures) == 1, kernel

@@ -16,7 +16,7 @@ from iibr_core.depth.models.catalog import (
     own_models_folder,
     register,
 )
-from iibr_core.depth.models.known import KNOWN_MODELS, USUAL_MODEL
+from iibr_core.depth.models.known import USUAL_MODEL
 from iibr_core.types import InputError
 from tests.iibr_core.depth.onnx_graphs import published, weighing
 from tests.iibr_core.depth.test_onnx import with_external_weights
@@ -30,11 +30,6 @@ def folders_here(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
 
 def files_below(folder: Path) -> set[str]:
     return {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
-
-
-def test_one_model_is_recommended_and_no_name_is_used_twice() -> None:
-    assert [model.name for model in KNOWN_MODELS if model.is_recommended] == [USUAL_MODEL]
-    assert len({model.name for model in KNOWN_MODELS}) == len(KNOWN_MODELS)
 
 
 @pytest.mark.parametrize("name", [USUAL_MODEL, "depth-pro"])

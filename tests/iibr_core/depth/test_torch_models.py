@@ -83,32 +83,20 @@ def test_the_field_of_view_gives_depth_pros_metres(tmp_path: Path) -> None:
     np.testing.assert_allclose(model.estimate(photo).values, 1 / inverse, rtol=1e-2)
 
 
-def cut(path: Path) -> None:
-    path.write_bytes(path.read_bytes()[:-100])
-
-
-def pickle(path: Path) -> None:
-    path.rename(path.with_name("pytorch_model.bin"))
-
-
-def of_another_kind(path: Path) -> None:
-    path.write_text(json.dumps(json.loads(path.read_text()) | {"model_type": "llama"}))
-
-
-def with_another_model(path: Path) -> None:
-    path.write_text(json.dumps(json.loads(path.read_text()) | {"backbone": "somebody/model"}))
+def with_settings(**settings: object) -> Callable[[Path], object]:
+    return lambda path: path.write_text(json.dumps(json.loads(path.read_text()) | settings))
 
 
 @pytest.mark.parametrize(
     ("name", "damage", "message"),
     [
-        ("config.json", cut, "config.json"),
+        ("config.json", lambda path: path.write_text("{"), "config.json"),
         ("config.json", Path.unlink, "holds no config.json"),
-        ("config.json", of_another_kind, "llama"),
-        ("config.json", with_another_model, "needs another model, somebody/model"),
-        ("preprocessor_config.json", lambda path: path.write_text('{"size": "big"}'), "preprocessor_config.json"),
-        ("model.safetensors", pickle, "holds no .safetensors"),
-        ("model.safetensors", cut, "cannot be used"),
+        ("config.json", with_settings(model_type="llama"), "llama"),
+        ("config.json", with_settings(backbone="somebody/model"), "needs another model, somebody/model"),
+        ("preprocessor_config.json", with_settings(size="big"), "preprocessor_config.json"),
+        ("model.safetensors", lambda path: path.rename(path.with_name("pytorch_model.bin")), "holds no .safetensors"),
+        ("model.safetensors", lambda path: path.write_bytes(path.read_bytes()[:-100]), "cannot be used"),
     ],
 )
 def test_damaged_folders_are_one_line(
@@ -116,9 +104,8 @@ def test_damaged_folders_are_one_line(
 ) -> None:
     folder = depth_anything(tmp_path / "model").folder
     damage(folder / name)
-    with pytest.raises(InputError, match=message) as caught:
+    with pytest.raises(InputError, match=rf"^[^\n]*{message}[^\n]*$"):
         model_to_use(DepthChoice(model=str(folder))).estimate(PHOTO)  # type: ignore[union-attr]
-    assert "\n" not in str(caught.value)
     assert not list((tmp_path / "cache").glob("*")), "nothing of that is kept"
 
 

@@ -17,11 +17,11 @@ from tests.viewer.conftest import FAR, NEAR, Driver, Opener
 from viewer.app.main_loop import App
 from viewer.model.actions import AskToSave, EndGesture, Notify, SetDepthStrength, ShowPrompt
 from viewer.model.state.depth_editing import Brush, SetBrush, SetTone
-from viewer.model.state.inspection import SetInspection, SetOverlay
+from viewer.model.state.inspection import SetInspection
 from viewer.model.state.notices import Notice
 from viewer.model.state.optics_actions import MoveEye
-from viewer.model.state.preferences import SECTIONS, SetPreference, ToggleSection, with_sections
-from viewer.model.state.prompts import PalettePrompt, PathPrompt, SavePrompt
+from viewer.model.state.preferences import SECTIONS, with_sections
+from viewer.model.state.prompts import PathPrompt, SavePrompt
 
 pytestmark = pytest.mark.usefixtures("no_dialogs")
 GRID = GridShape(3, 3)
@@ -50,6 +50,12 @@ def is_made(app: App) -> bool:
     return app.scene_view.generation == app.state.generation
 
 
+def until_made(viewer: Driver, generation: int) -> None:
+    """Draw until the screen shows this generation of the scene."""
+    viewer.until(lambda app: app.state.generation == generation and is_made(app))
+    viewer.until_idle()
+
+
 def press_at(viewer: Driver, x_share: float, y_share: float) -> None:
     """Put the pointer there and hold it down."""
     x, y = viewer.position(x_share, y_share)
@@ -71,20 +77,17 @@ def test_a_stroke_is_seen_while_it_is_drawn_and_made_when_it_ends(viewer: Driver
     assert viewer.app.state.generation == 1
     np.testing.assert_array_equal(disparity_of(viewer.app), given)
     viewer.send("mouseup", 1)
-    viewer.until(lambda app: app.state.stroke is None and is_made(app))
-    viewer.until_idle()
-    assert viewer.app.state.generation == 2
+    until_made(viewer, 2)
     assert viewer.app.scene_view.renderer.field.present.sum() == 9
     made = disparity_of(viewer.app)
     assert made.max() == pytest.approx(NEAR + (NEAR - FAR), abs=0.2)
     far = given == FAR
     np.testing.assert_array_equal(made[far], given[far], "the red square's contour holds the stroke")
     viewer.send("key", "ctrl+z")
-    viewer.until(lambda app: app.state.generation == 3 and is_made(app))
-    viewer.until_idle()
+    until_made(viewer, 3)
     np.testing.assert_array_equal(disparity_of(viewer.app), given)
     viewer.send("key", "ctrl+shift+z")
-    viewer.until(lambda app: app.state.generation == 4 and is_made(app))
+    until_made(viewer, 4)
     np.testing.assert_array_equal(disparity_of(viewer.app), made)
 
 
@@ -103,27 +106,13 @@ def test_the_bucket_fills_the_surface_that_is_clicked_with_the_depth_picked_else
     np.testing.assert_array_equal(disparity_of(viewer.app), given)
     press_at(viewer, 0.5, 0.5)
     viewer.send("mouseup", 1)
-    viewer.until(lambda app: app.state.stroke is None and is_made(app))
-    viewer.until_idle()
+    until_made(viewer, 2)
     is_far = np.isclose(disparity_of(viewer.app), FAR)
     assert is_far[given == FAR].all()
     assert is_far[given == NEAR].mean() > 0.7
     viewer.send("key", "ctrl+z")
-    viewer.until(lambda app: app.state.generation == 3 and is_made(app))
+    until_made(viewer, 3)
     np.testing.assert_array_equal(disparity_of(viewer.app), given)
-
-
-def test_the_disparity_as_colours_follows_the_brush(viewer: Driver) -> None:
-    viewer.app.do(
-        SetOverlay("disparity"), SetInspection("opacity", 1.0), SetBrush(Brush("farther", 0.1, 1.0, is_on=True))
-    )
-    viewer.until_idle()
-    shown = viewer.app.inspection_view._drawn["overlay"][0]
-    press_at(viewer, 0.5, 0.5)
-    viewer.until(lambda app: app.inspection_view._drawn["overlay"][0] != shown)
-    viewer.send("mouseup", 1)
-    viewer.until(lambda app: is_made(app) and app.state.stroke is None)
-    viewer.until_idle()
 
 
 def test_escape_in_the_middle_of_a_stroke_takes_it_back(viewer: Driver) -> None:
@@ -196,14 +185,11 @@ def test_the_key_that_takes_the_brush_brings_it_into_sight(viewer: Driver) -> No
 
 def test_sliders_and_handles_change_the_map_once_they_are_let_go(viewer: Driver) -> None:
     viewer.slide("##Far clip", 0.2)
-    viewer.until(is_made)
-    viewer.until_idle()
+    until_made(viewer, 2)
     assert 0 < viewer.app.state.depth.edits.far_clip < 0.5
-    assert viewer.app.state.generation == 2
     # where `find` looks
     viewer.app.do(SetTone(replace(viewer.app.state.depth.edits, near_clip=0.77), is_finished=True), EndGesture())
-    viewer.until(is_made)
-    viewer.until_idle()
+    until_made(viewer, 3)
     x, y = viewer.find("handle near_clip")
     viewer.send("mousedown", 1)
     viewer.app.step()
@@ -212,8 +198,7 @@ def test_sliders_and_handles_change_the_map_once_they_are_let_go(viewer: Driver)
     viewer.until(lambda app: app.state.depth.edits.near_clip < 0.7 and app.scene_view.previews > previews)
     assert viewer.app.state.generation == 3
     viewer.send("mouseup", 1)
-    viewer.until(lambda app: app.state.generation == 4 and is_made(app))
-    viewer.until_idle()
+    until_made(viewer, 4)
     assert disparity_of(viewer.app).max() < NEAR
     assert len(viewer.app.state.history.past) == 3
 
@@ -221,21 +206,18 @@ def test_sliders_and_handles_change_the_map_once_they_are_let_go(viewer: Driver)
 def test_refine_is_worked_out_anew_without_reading_the_photo(viewer: Driver, photo_path: Path) -> None:
     photo_path.unlink()
     viewer.press("Refine edges")
-    viewer.until(lambda app: app.state.generation == 2 and is_made(app))
-    viewer.until_idle()
+    until_made(viewer, 2)
     assert not viewer.app.state.depth.refine
     assert viewer.app.scene_view.loaded is not None
     assert viewer.app.scene_view.loaded.depth_settings == viewer.app.state.depth
     viewer.app.do(SetDepthStrength(2.0, is_finished=True))
-    viewer.until(lambda app: app.state.generation == 3 and is_made(app))
-    viewer.until_idle()
+    until_made(viewer, 3)
     assert not viewer.app.state.notices
 
 
 def test_a_map_is_saved_and_opened_again_by_its_path(viewer: Driver, photo_path: Path, tmp_path: Path) -> None:
     viewer.press("Invert")
-    viewer.until(lambda app: app.state.generation == 2 and is_made(app))
-    viewer.until_idle()
+    until_made(viewer, 2)
     wanted = disparity_of(viewer.app).copy()
     viewer.app.do(AskToSave("map"))
     viewer.until(lambda app: isinstance(app.state.prompt, SavePrompt))
@@ -263,7 +245,7 @@ def test_a_map_is_saved_and_opened_again_by_its_path(viewer: Driver, photo_path:
 
 def test_a_bad_map_leaves_the_scene_and_its_edits_with_a_notice(viewer: Driver, tmp_path: Path) -> None:
     viewer.press("Invert")
-    viewer.until(lambda app: app.state.generation == 2 and is_made(app))
+    until_made(viewer, 2)
     bad = tmp_path / "bad.pfm"
     bad.write_bytes(b"no map")
     viewer.app.window.on_drop(None, [str(bad)])
@@ -272,17 +254,6 @@ def test_a_bad_map_leaves_the_scene_and_its_edits_with_a_notice(viewer: Driver, 
     viewer.until_idle()
     assert viewer.app.state.depth.edits.is_inverted
     assert disparity_of(viewer.app)[0, 0] == NEAR
-
-
-def test_one_escape_closes_the_palette(viewer: Driver) -> None:
-    viewer.send("key", "ctrl+p")
-    viewer.until(lambda app: isinstance(app.state.prompt, PalettePrompt))
-    viewer.until_idle()
-    viewer.type("depth")
-    viewer.send("key", "Escape")
-    viewer.until(lambda app: app.state.prompt is None)
-    viewer.until_idle()
-    assert not viewer.app.state.should_quit
 
 
 def test_a_notice_in_a_low_window_leaves_the_strips_free(viewer: Driver) -> None:
@@ -294,10 +265,3 @@ def test_a_notice_in_a_low_window_leaves_the_strips_free(viewer: Driver) -> None
     assert frame.pos.y >= 0
     assert frame.pos.y + frame.size.y <= layout.strip_across.y
     assert frame.pos.x + frame.size.x <= layout.strip_down.x
-
-
-def test_no_dialog_means_a_prompt(viewer: Driver) -> None:
-    viewer.press("Open map…")
-    viewer.until(lambda app: isinstance(app.state.prompt, PathPrompt) and app.state.prompt.what == "map")
-    viewer.app.do(ShowPrompt(None), SetPreference("font_scale", 1.0), ToggleSection("depth"))
-    viewer.until_idle()
