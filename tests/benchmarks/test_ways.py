@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from benchmarks.scenes import MAPS, Scene, drawn_scene, offsets_of, plane_map, with_map
-from benchmarks.ways import WAYS, chosen_ways, land
+from benchmarks.ways import WAYS, land
 from iibr_core.evaluation.warp import reference_warp
 from iibr_core.training.degradation import blur
-from iibr_core.types import FloatImage, GridShape, ImageSize, InputError, ViewOffset
+from iibr_core.types import FloatImage, GridShape, ImageSize, ViewOffset
 from tests.iibr_core.scenes import square_before_wall
 
 OTHERS = pytest.mark.parametrize("name", [name for name in WAYS if not name.startswith(("iibr", "unchanged"))])
@@ -46,13 +46,6 @@ def test_the_plain_warp_lands_what_the_reference_does(offset: ViewOffset) -> Non
     np.testing.assert_array_equal(hole, expected.hole)
     np.testing.assert_allclose(nearest[~hole], expected.disparity[~hole], atol=1e-4)
     assert 0 < hole.mean() < 0.5
-
-
-def test_ways_are_named_by_how_they_begin() -> None:
-    assert list(chosen_ways("iibr,plain")) == ["iibr", "plain warp"]
-    assert len(chosen_ways("iibr without")) > 5
-    with pytest.raises(InputError, match="plain warp"):
-        chosen_ways("nothing")
 
 
 @pytest.mark.parametrize("kind", [kind for kind in MAPS if kind != "exact"])

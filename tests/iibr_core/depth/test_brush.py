@@ -1,17 +1,14 @@
-"""Strokes: their reach against a slow search of shortest paths, contours, and a canvas that follows its edits."""
+"""Strokes: their reach, contours, and a canvas that follows its edits."""
 
 from __future__ import annotations
 
-import heapq
 from dataclasses import replace
-from math import hypot
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from iibr_core.depth.editing.brush import CONTOUR_CONTRAST, LIKENESS, falloff, lower_distances, touched_colors
 from iibr_core.depth.editing.canvas import DepthCanvas, apply_edits
 from iibr_core.depth.editing.edits import BRUSH_TOOLS, DEPTH_TOOLS, UNEDITED, BrushTool, DepthEdits, Stroke
 from iibr_core.runtime.work import Cancelled, stoppable
@@ -43,53 +40,16 @@ def dab(
     return Stroke(tool, ((x, y),), radius, strength)
 
 
-def stroke_distance(photo: np.ndarray, stroke: Stroke) -> np.ndarray:
-    distance = np.ones(photo.shape[:2], np.float32)
-    lower_distances(photo, stroke, 0, distance)
-    return distance
-
-
-def slow_distance(photo: np.ndarray, stroke: Stroke) -> np.ndarray:
-    """Dijkstra over all pixels from a stroke of one point, on a photo without specks."""
-    x, y = np.array(stroke.points[0]) * (WIDTH, HEIGHT) - 0.5
-    radius, rows, columns = stroke.radius * WIDTH, *np.mgrid[:HEIGHT, :WIDTH]
-    straight = np.hypot(columns - x, rows - y)
-    distance = np.where(straight < 1, straight / radius, 1)
-    away = np.linalg.norm(photo[:, :, None] - touched_colors(photo, stroke, 0), axis=3).min(axis=2)
-    unlike = np.maximum(away - LIKENESS, 0)
-    waiting = [(distance[row, column], row, column) for row, column in np.argwhere(straight < 1)]
-    heapq.heapify(waiting)
-    while waiting:
-        here, row, column = heapq.heappop(waiting)
-        for v in range(max(row - 1, 0), min(row + 2, HEIGHT)):
-            for u in range(max(column - 1, 0), min(column + 2, WIDTH)):
-                change = abs(unlike[v, u] - unlike[row, column]) / CONTOUR_CONTRAST
-                path = here + hypot(v - row, u - column) / radius + change
-                if path < distance[v, u]:
-                    distance[v, u] = path
-                    heapq.heappush(waiting, (path, v, u))
-    return distance
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_distances_are_shortest_paths(seed: int) -> None:
-    rng, photo = np.random.default_rng(seed), tiled_photo(seed, 0.4)
-    stroke = dab(x=rng.uniform(0.1, 0.9), y=rng.uniform(0.1, 0.9), radius=rng.uniform(0.05, 0.25))
-    np.testing.assert_allclose(stroke_distance(photo, stroke), slow_distance(photo, stroke), atol=1e-5)
-
-
 @pytest.mark.parametrize(("tool", "sign"), [("nearer", 1), ("farther", -1)])
 def test_a_dab_moves_its_middle_by_its_strength_and_ends_at_its_radius(tool: BrushTool, sign: int) -> None:
-    photo = np.full((61, 81, 3), 0.5, np.float32)
-    disparity = np.linspace(0, 10, 61 * 81, dtype=np.float32).reshape(61, 81)
-    stroke = Stroke(tool, ((0.5, 0.5),), 10 / 81, 0.25)
-    change = apply_edits(photo, disparity, DepthEdits(strokes=(stroke,))) - disparity
-    assert change[30, 40] == pytest.approx(sign * 0.25 * 10, rel=0.01)
+    photo, disparity = np.full((61, 81, 3), 0.5, np.float32), np.linspace(0, 10, 61 * 81, dtype=np.float32)
+    edits = DepthEdits(strokes=(dab(tool, 0.5, 0.5, 10 / 81, 0.25),))
+    change = sign * (apply_edits(photo, disparity.reshape(61, 81), edits) - disparity.reshape(61, 81))
+    assert change[30, 40] == pytest.approx(0.25 * 10, rel=0.01)
     y, x = np.mgrid[:61, :81]
     away = np.hypot(x - 40, y - 30)
     assert not change[away > 11].any()
-    assert (sign * change[away < 8] > 0).all()
-    assert abs(change[30, 45]) == pytest.approx(abs(change[30, 40]) * (1 - 0.5**2) ** 2, rel=0.01)
+    assert (change[away < 8] > 0).all()
 
 
 @pytest.mark.parametrize("tool", BRUSH_TOOLS)
@@ -111,8 +71,8 @@ def test_texture_that_the_stroke_runs_over_does_not_stop_it() -> None:
     photo = plain_photo(0.9, 0.9)
     photo[:, : WIDTH // 2 : 2] = 0.1
     photo[:, 1 : WIDTH // 2 : 2] = 0.4
-    near = falloff(stroke_distance(photo, dab(x=0.25)))
-    plain = falloff(stroke_distance(np.full_like(photo, 0.5), dab(x=0.25)))
+    edits = DepthEdits(strokes=(dab(x=0.25),))
+    near, plain = (apply_edits(colors, plane(), edits) - plane() for colors in (photo, plain_photo(0.5, 0.5)))
     np.testing.assert_allclose(near[:, : WIDTH // 2], plain[:, : WIDTH // 2], atol=1e-5)
     assert not near[:, WIDTH // 2 :].any()
 
@@ -185,18 +145,12 @@ def test_a_canvas_continues_from_a_map_that_another_painted() -> None:
 
 
 @pytest.mark.parametrize("tool", BRUSH_TOOLS)
-@pytest.mark.parametrize("shape", [(1, 1), (1, 7), (7, 1), (3, 2)])
-def test_tiny_photos_can_be_painted_on(shape: tuple[int, int], tool: BrushTool) -> None:
+@pytest.mark.parametrize("shape", [(1, 1), (1, 7), (7, 1), (3, 2), (HEIGHT, WIDTH)])
+@pytest.mark.parametrize("wild", [0.0, np.nan, np.inf, 3e38, -3e38])
+def test_tiny_photos_and_wild_values_stay_finite(shape: tuple[int, int], tool: BrushTool, wild: float) -> None:
     photo, disparity = np.full((*shape, 3), 0.5, np.float32), np.zeros(shape, np.float32)
-    result = apply_edits(photo, disparity, DepthEdits(strokes=(dab(tool, 0.5, 0.5, 0.25),)))
+    disparity[1:20, 1:] = wild
+    stroke = Stroke(tool, ((0.1, 0.1), (0.5, 0.5), (0.9, 0.9)), 0.25, 1.0)
+    result = apply_edits(photo, disparity, DepthEdits(strokes=(stroke, stroke)))
     assert np.isfinite(result).all()
-    assert tool in ("smooth", *DEPTH_TOOLS) or result.any()
-
-
-@pytest.mark.parametrize("tool", BRUSH_TOOLS)
-@pytest.mark.parametrize("wild", [np.nan, np.inf, -np.inf, 3e38, -3e38])
-def test_wild_values_stay_finite(wild: float, tool: BrushTool) -> None:
-    disparity = plane()
-    disparity[10:20, 10:30] = wild
-    stroke = Stroke(tool, ((0.1, 0.1), (0.9, 0.9)), 0.2, 1.0)
-    assert np.isfinite(apply_edits(plain_photo(), disparity, DepthEdits(strokes=(stroke, stroke)))).all()
+    assert wild or tool in ("smooth", *DEPTH_TOOLS) or result.any()

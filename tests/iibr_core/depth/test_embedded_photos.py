@@ -10,7 +10,7 @@ import pytest
 from PIL import Image
 from PIL.PngImagePlugin import PngInfo
 
-from iibr_core.depth.embedded.embedded import unread_parts
+from iibr_core.depth.embedded.embedded import embedded_in_jpeg, unread_parts
 from iibr_core.depth.search import PhotoWithDepth, open_with_depth
 from iibr_core.formats.images.lfp import read_lfp
 from iibr_core.formats.images.photo import read_photo
@@ -86,9 +86,20 @@ def test_huawei_maps_lie_as_the_phone_was_held(
     assert any("counts as near" in note for note in found.disparity.notes)
 
 
-def test_a_chance_mark_before_huaweis_does_not_hide_it(tmp_path: Path) -> None:
-    data = files.huawei_jpeg(PHOTO + b"edof", SMALL[:, ::-1]).replace(b"\x56\xe9edof", b"edof\x56\xe9edof")
-    assert_disc_is_nearest(opened(tmp_path, "a.jpg", data))
+@pytest.mark.parametrize("white_is_near", [True, False])
+def test_a_grey_picture_behind_a_photo_is_its_map(tmp_path: Path, white_is_near: bool) -> None:
+    found = opened(tmp_path, "a.jpg", PHOTO + files.picture(SMALL if white_is_near else 255 - SMALL))
+    assert_disc_is_nearest(found)
+    assert any("counts as near" in note for note in found.disparity.notes)
+
+
+def test_copies_gain_maps_and_pictures_of_other_shapes_are_no_maps() -> None:
+    picture, gain = Image.fromarray(PIXELS).convert("L"), files.picture(DEPTH)
+    gain = gain[:2] + b"\xff\xe1\x00\x25http://ns.adobe.com/xap/1.0/\0<hdrgm>" + gain[2:]
+    grey, small, matte = np.asarray(picture), np.asarray(picture.resize((64, 48))), np.where(DEPTH > 200, 255, 0)
+    others = PIXELS, small, DEPTH[:40], np.roll(grey, 12, axis=1), 255 - grey, matte
+    for behind in (gain, *(files.picture(other.astype(np.uint8)) for other in others)):
+        assert embedded_in_jpeg(PHOTO + behind) is None
 
 
 # ---- AVIF and HEIC
@@ -103,6 +114,12 @@ def test_the_depth_of_an_avif(tmp_path: Path, orientation: int, white_is_near: b
     found = opened(tmp_path, "a.avif", data)
     assert found.photo.size == (96, 128)
     assert_disc_is_nearest(found)
+
+
+def test_an_apple_portrait_in_a_heic(tmp_path: Path) -> None:
+    found = opened(tmp_path, "a.heic", files.heic(PIXELS, SMALL))
+    assert_disc_is_nearest(found)
+    assert found.origin.words == "the photo itself (Apple portrait)"
 
 
 def test_a_samsung_heic(tmp_path: Path) -> None:

@@ -14,6 +14,7 @@ from iibr_core.depth.models.catalog import known_model
 from iibr_core.depth.models.known import USUAL_MODEL
 from iibr_core.depth.search import PhotoWithDepth, find_depth, open_with_depth
 from iibr_core.formats.images.photo import read_photo
+from iibr_core.formats.images.picture import upright
 from iibr_core.runtime.work import watched
 from iibr_core.types import ImageSize, InputError
 from tests.iibr_core import embedded_files as files
@@ -70,8 +71,6 @@ def test_the_order_file_embedded_rough(tmp_path: Path) -> None:
     found = open_with_depth(path, start_from("rough"))
     assert (found.origin.kind, found.origin.failures) == ("rough", ())
     assert found.disparity.viewing_share < 1
-    assert "--disparity" in found.origin.advice
-    assert "--depth-model" in found.origin.advice
     assert any("rough" in note for note in found.disparity.notes)
     found = open_with_depth(path, start_from("flat"))
     assert found.origin.kind == "flat"
@@ -83,16 +82,6 @@ def test_without_slow_sources_the_order_stays(tmp_path: Path, start: DepthStart)
     path = photo_file(tmp_path)
     found = find_depth(path, read_photo(path), start_from(start), skipped=("pair", "model"))
     assert found.origin.kind == {"auto": "embedded", "model": "rough"}.get(start, start)
-
-
-def test_a_bad_map_beside_the_photo_is_followed_by_the_next(tmp_path: Path) -> None:
-    path = photo_file(tmp_path)
-    np.save(tmp_path / "scene_disparity.npy", np.full(SIZE, np.nan))
-    found = open_with_depth(path)
-    assert found.origin.kind == "embedded"
-    (failure,) = found.origin.failures
-    assert "scene_disparity.npy" in failure
-    assert failure in found.disparity.notes
 
 
 @pytest.mark.parametrize("depth", [b"no picture", files.picture(DEPTH, "PNG")[:-30], DEPTH[:, :20]])
@@ -150,8 +139,6 @@ def test_a_model_is_used_and_named(tmp_path: Path) -> None:
 )
 def test_depth_is_turned_with_the_photo(orientation: int, is_turned_already: bool, tmp_path: Path) -> None:
     """Some writers turn the map already; that shows in its shape only where the sides are swapped."""
-    from iibr_core.formats.images.picture import upright
-
     depth = np.full(SIZE, 200, np.uint8)
     depth[:10, :14] = 20
     stored = upright(depth, orientation) if is_turned_already else depth

@@ -21,7 +21,7 @@ from iibr_core.depth.models.preparation import network_input, read_preparation
 from iibr_core.depth.models.torch_models import PREPARATIONS
 from iibr_core.runtime.work import Cancelled, stoppable, watched
 from iibr_core.types import InputError, Photo
-from tests.iibr_core.depth.random_networks import depth_anything, depth_pro, dpt, metric_depth_anything, zoedepth
+from tests.iibr_core.depth.random_networks import depth_anything, depth_pro, dpt, zoedepth
 
 RNG = np.random.default_rng(3)
 PHOTO = Photo(RNG.random((40, 60, 3)).astype(np.float32), 50.0, "photo")
@@ -36,7 +36,7 @@ def cache_here(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     ("make", "meaning"),
     [
         (depth_anything, "inverse depth"),
-        (metric_depth_anything, "metres"),
+        (lambda folder: depth_anything(folder, "metric"), "metres"),
         (dpt, "inverse depth"),
         (zoedepth, "metres"),
         (depth_pro, "metres"),
@@ -111,13 +111,10 @@ def test_damaged_folders_are_one_line(
 
 def test_an_estimate_stops_between_layers_and_reports_its_progress(tmp_path: Path) -> None:
     model = depth_anything(tmp_path / "model")
-    shares: list[float] = []
-
-    def report(done: float, total: float, doing: str) -> None:
-        shares.append(done / total if total else 0.0)
-
-    with pytest.raises(Cancelled), stoppable(lambda: len(shares) >= 20), watched(report):
+    reports: list[tuple[float, float, str]] = []
+    with pytest.raises(Cancelled), stoppable(lambda: len(reports) >= 20), watched(lambda *now: reports.append(now)):
         model.estimate(PHOTO)
+    shares = [done / total if total else 0.0 for done, total, _ in reports]
     assert shares == sorted(shares)
     assert 20 <= len(shares) <= 21
 

@@ -62,18 +62,11 @@ def test_foci_lie_where_the_scene_does() -> None:
 
 
 @pytest.mark.parametrize(("rows", "columns"), [(1, 1), (1, 9), (9, 1), (2, 2), (2, 9)])
-def test_few_views_are_no_lens(rows: int, columns: int) -> None:
+def test_few_views_and_one_pixel_are_no_lens(rows: int, columns: int) -> None:
     offsets = [at for at in offsets_of(rows, columns).values() if at != (0, 0)]
     assert foci_of(offsets, disparity_of_square()) == []
     assert foci_of([ViewOffset(t, s) for t in (-4.0, 4.0) for s in (-4.0, 4.0)], disparity_of_square()) == []
-
-
-def test_a_focus_that_shears_views_out_of_the_picture_is_left_out() -> None:
-    offsets = [at for at in offsets_of(3, 3).values() if at != (0, 0)]
-    disparity = disparity_of_square()
-    disparity[:12] = 1e6
-    assert "near" not in [focus.name for focus in foci_of(offsets, disparity)]
-    assert foci_of(offsets, np.zeros((1, 1), np.float32)) == []
+    assert foci_of([at for at in offsets_of(3, 3).values() if at != (0, 0)], np.zeros((1, 1), np.float32)) == []
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -129,19 +129,9 @@ def test_a_true_map_comes_alone_and_another_one_also_fitted(tmp_path: Path) -> N
     assert list(mine.maps) == ["given map", "given map, fitted"]
     assert mine.judge.source == "gt_disp_u01_v01.npy"
     assert np.abs(mine.maps["given map, fitted"].values - disparity_of_square()).max() < 0.2
-    (folder / "gt_disp_u01_v01.npy").rename(folder / "disp_est_u01_v01.npy")
-    given = trial_input(trials_of(scene_of(folder), "given")[0], "given", UNREFINED, 10**6)
-    assert given.maps["given map"].source == "disp_est_u01_v01.npy"
-    (folder / "disp_est_u01_v01.npy").unlink()
+    (folder / "gt_disp_u01_v01.npy").unlink()
     with pytest.raises(InputError, match="--disparity estimate"):
         trial_input(trials_of(scene_of(folder), "given")[0], "given", UNREFINED, 10**6)
-
-
-def test_an_estimate_comes_with_the_true_map(tmp_path: Path) -> None:
-    trial = trials_of(scene_of(write_grid(tmp_path / "square")), "estimate")[0]
-    found = trial_input(trial, "estimate", DepthChoice(start="rough"), 10**6)
-    assert list(found.maps) == ["guess", "guess, fitted", "true map"]
-    assert found.judge is found.maps["true map"]
 
 
 def test_a_map_is_carried_to_the_corner(tmp_path: Path) -> None:

@@ -87,17 +87,6 @@ def test_odd_disparities_give_finite_pictures(shape: tuple[int, int], value: flo
     assert np.isfinite(warped.colors).all()
 
 
-def test_a_hole_is_filled_by_all_surfaces_near_the_farthest() -> None:
-    """A wall of 0 and 0.5 px behind an object of 4: both parts of the wall fill the hole, the object does not."""
-    photo, disparity = np.zeros((9, 30, 3), np.float32), np.zeros((9, 30), np.float32)
-    photo[:, 18:], disparity[:, 18:] = 1.0, 0.5
-    photo[:, 10:18], disparity[:, 10:18] = 0.5, 4.0
-    warped = reference_warp(photo, disparity, ViewOffset(0.0, -1.0))
-    filled = warped.colors[4, 11:13, 0]
-    assert warped.hole[4, 11:13].all()
-    assert ((filled > 0) & (filled < 0.4)).all()
-
-
 def fit_of(photo: FloatImage, views: Sequence[tuple[ViewOffset, FloatImage]]) -> ViewFit:
     def warp_to(offset: ViewOffset) -> Warp:
         return lambda colors, disparity: reference_warp(colors, disparity, offset).colors

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -50,10 +50,15 @@ def is_made(app: App) -> bool:
     return app.scene_view.generation == app.state.generation
 
 
+def settle(viewer: Driver, condition: Callable[[App], bool]) -> None:
+    """Draw until a condition is true and nothing is left to do."""
+    viewer.until(condition)
+    viewer.until_idle()
+
+
 def until_made(viewer: Driver, generation: int) -> None:
     """Draw until the screen shows this generation of the scene."""
-    viewer.until(lambda app: app.state.generation == generation and is_made(app))
-    viewer.until_idle()
+    settle(viewer, lambda app: app.state.generation == generation and is_made(app))
 
 
 def press_at(viewer: Driver, x_share: float, y_share: float) -> None:
@@ -123,8 +128,7 @@ def test_escape_in_the_middle_of_a_stroke_takes_it_back(viewer: Driver) -> None:
     viewer.send("key", "Escape")
     viewer.until(lambda app: app.state.stroke is None)
     viewer.send("mouseup", 1)
-    viewer.until(lambda app: is_made(app))
-    viewer.until_idle()
+    settle(viewer, is_made)
     np.testing.assert_array_equal(disparity_of(viewer.app), given)
     assert not viewer.app.state.history.past
     viewer.send("key", "Escape")
@@ -134,25 +138,32 @@ def test_escape_in_the_middle_of_a_stroke_takes_it_back(viewer: Driver) -> None:
 
 def test_closing_the_window_asks_before_depth_edits_are_lost(viewer: Driver, tmp_path: Path) -> None:
     viewer.app.do(SetTone(replace(UNEDITED, gamma=1.5), is_finished=True))
-    viewer.until(lambda app: is_made(app))
-    viewer.until_idle()
+    settle(viewer, is_made)
     glfw.set_window_should_close(viewer.app.window.handle, True)
-    viewer.until(lambda app: app.state.prompt == "quit")
-    viewer.until_idle()
+    settle(viewer, lambda app: app.state.prompt == "quit")
     viewer.press("Save the depth map…", "prompt str")
-    viewer.until(lambda app: isinstance(app.state.prompt, SavePrompt))
-    viewer.until_idle()
+    settle(viewer, lambda app: isinstance(app.state.prompt, SavePrompt))
     viewer.send("key", "Return")
-    viewer.until(lambda app: not app.state.has_unsaved_edits)
-    viewer.until_idle()
+    settle(viewer, lambda app: not app.state.has_unsaved_edits)
     glfw.set_window_should_close(viewer.app.window.handle, True)
     viewer.until(lambda app: app.state.should_quit)
 
 
-def test_the_brush_is_taken_from_the_panel_and_by_key(viewer: Driver) -> None:
-    viewer.press("Smooth")
-    viewer.until(lambda app: app.state.brush == replace(app.state.brush, tool="smooth", is_on=True))
+def test_the_key_that_takes_the_brush_brings_it_into_sight_and_puts_it_away(viewer: Driver) -> None:
+    """Its section opens and the panel scrolls there: the slider comes under a pointer that only goes down the panel."""
+    sections = tuple(section for section in SECTIONS if section != "depth")
+    preferences = replace(viewer.app.state.preferences, open_sections=sections)
+    viewer.app.state = replace(viewer.app.state, preferences=preferences)
+    viewer.send("mousemove", *viewer.position(0.5, 0.5))
     viewer.until_idle()
+    panel = imgui.internal.find_window_by_name("panel")
+    assert panel.scroll.y == 0
+    viewer.send("key", "b")
+    settle(viewer, lambda app: app.state.brush.is_on)
+    assert set(viewer.app.state.preferences.open_sections) == set(SECTIONS)
+    assert panel.scroll.y > 0
+    viewer.press("Smooth")
+    settle(viewer, lambda app: app.state.brush == replace(app.state.brush, tool="smooth", is_on=True))
     viewer.slide("##Size", 0.9)
     assert viewer.app.state.brush.radius > 0.1
     viewer.send("key", "b")
@@ -163,24 +174,6 @@ def test_the_brush_is_taken_from_the_panel_and_by_key(viewer: Driver) -> None:
     viewer.until(lambda app: app.state.optics.eye.s != 0)
     viewer.send("mouseup", 1)
     assert viewer.app.state.depth.edits.strokes == ()
-
-
-def test_the_key_that_takes_the_brush_brings_it_into_sight(viewer: Driver) -> None:
-    """Its section opens and the panel scrolls there: the slider comes under a pointer that only goes down the panel."""
-    sections = tuple(section for section in SECTIONS if section != "depth")
-    preferences = replace(viewer.app.state.preferences, open_sections=sections)
-    viewer.app.state = replace(viewer.app.state, preferences=preferences)
-    viewer.send("mousemove", *viewer.position(0.5, 0.5))
-    viewer.until_idle()
-    panel = imgui.internal.find_window_by_name("panel")
-    assert panel.scroll.y == 0
-    viewer.send("key", "b")
-    viewer.until(lambda app: app.state.brush.is_on)
-    viewer.until_idle()
-    assert set(viewer.app.state.preferences.open_sections) == set(SECTIONS)
-    assert panel.scroll.y > 0
-    viewer.press("Smooth")
-    viewer.until(lambda app: app.state.brush.tool == "smooth")
 
 
 def test_sliders_and_handles_change_the_map_once_they_are_let_go(viewer: Driver) -> None:
@@ -220,13 +213,11 @@ def test_a_map_is_saved_and_opened_again_by_its_path(viewer: Driver, photo_path:
     until_made(viewer, 2)
     wanted = disparity_of(viewer.app).copy()
     viewer.app.do(AskToSave("map"))
-    viewer.until(lambda app: isinstance(app.state.prompt, SavePrompt))
-    viewer.until_idle()
+    settle(viewer, lambda app: isinstance(app.state.prompt, SavePrompt))
     out = tmp_path / "turned.npy"
     viewer.type(str(out))
     viewer.send("key", "Return")
-    viewer.until(lambda app: out.exists())
-    viewer.until_idle()
+    settle(viewer, lambda app: out.exists())
     np.testing.assert_array_equal(np.load(out), wanted)
     assert str(out) in viewer.app.state.notices[-1].text
     viewer.app.do(ShowPrompt(PathPrompt("map")))
@@ -234,8 +225,7 @@ def test_a_map_is_saved_and_opened_again_by_its_path(viewer: Driver, photo_path:
     viewer.type(str(out))
     viewer.send("key", "Return")
     viewer.until(lambda app: app.state.source is not None and app.state.source.depth.file == str(out))
-    viewer.until(is_made)
-    viewer.until_idle()
+    settle(viewer, is_made)
     assert viewer.app.state.depth.edits == DepthEdits()
     np.testing.assert_array_equal(disparity_of(viewer.app), wanted)
     assert viewer.app.state.scene is not None
@@ -250,8 +240,7 @@ def test_a_bad_map_leaves_the_scene_and_its_edits_with_a_notice(viewer: Driver, 
     bad.write_bytes(b"no map")
     viewer.app.window.on_drop(None, [str(bad)])
     viewer.until(lambda app: any("bad.pfm" in notice.text for notice in app.state.notices))
-    viewer.until(is_made)
-    viewer.until_idle()
+    settle(viewer, is_made)
     assert viewer.app.state.depth.edits.is_inverted
     assert disparity_of(viewer.app)[0, 0] == NEAR
 

@@ -7,17 +7,8 @@ import pytest
 
 from iibr_core.depth.edges.blur import extent, measure_edge_blur
 from iibr_core.training.degradation import blur
+from tests.iibr_core.depth.edges.test_refine import disc_before_slope
 from tests.iibr_core.scenes import smooth_texture
-
-
-def disc(size: int = 160) -> tuple[np.ndarray, np.ndarray]:
-    """Photo and exact disparity of a disc before a wall."""
-    y, x = np.mgrid[:size, :size]
-    foreground = (x - 0.47 * size) ** 2 + (y - 0.52 * size) ** 2 < (size / 4) ** 2
-    photo = np.where(
-        foreground[..., None], smooth_texture(size, size, 1) * [1, 0.6, 0.3], smooth_texture(size, size) * 0.4
-    )
-    return photo.astype(np.float32), np.where(foreground, 2.0, 0.5).astype(np.float32)
 
 
 @pytest.mark.parametrize(
@@ -25,14 +16,14 @@ def disc(size: int = 160) -> tuple[np.ndarray, np.ndarray]:
     [(1.0, 160, 1.0), (1.5, 160, 1.5), (4.0, 160, 4.0), (8.0, 180, 8.0), (8.0, 480, 8.0), (8.0, 140, 0), (0.0, 160, 0)],
 )
 def test_the_blur_of_a_map_is_measured_unless_it_is_exact_or_too_small(sigma, size, measured) -> None:
-    photo, disparity = disc(size)
+    photo, disparity, _ = disc_before_slope(size)
     soft = blur(disparity, sigma) if sigma else disparity
     np.testing.assert_allclose(measure_edge_blur(photo, soft), measured, rtol=0.15)
 
 
 def parts_blurred(*sigmas: float) -> float:
     """What is measured of a disc thrice side by side, its map blurred so in each part."""
-    photo, disparity = disc()
+    photo, disparity, _ = disc_before_slope(160)
     maps = [blur(np.tile(disparity, (1, 3)), sigma) if sigma else np.tile(disparity, (1, 3)) for sigma in sigmas]
     disparity = np.concatenate([values[:, k * 160 : (k + 1) * 160] for k, values in enumerate(maps)], 1)
     return measure_edge_blur(np.tile(photo, (1, 3, 1)), disparity)
@@ -48,7 +39,7 @@ def test_blurs_that_differ_much_are_no_filters() -> None:
 
 
 def test_an_edge_that_the_photo_does_not_share_proves_nothing() -> None:
-    photo, disparity = disc()
+    photo, disparity, _ = disc_before_slope(160)
     soft = blur(disparity, 2.0)
     assert measure_edge_blur(photo, soft) > 0
     for other in (np.full_like(photo, 0.5), smooth_texture(160, 160)):

@@ -206,13 +206,6 @@ def test_a_dilated_map_of_a_front_out_of_focus_keeps_what_is_mixed():
     assert (found[2:-2, 32:] == FAR).all()
 
 
-def test_outside_the_band_bits_stay():
-    photo, _, given = square("dilated")
-    given += np.random.default_rng(1).normal(0, 0.01, given.shape).astype(np.float32)
-    outside = slow_distance(given) > BAND_PX
-    np.testing.assert_array_equal(labelled(photo, given)[outside], given[outside])
-
-
 def test_it_stops_when_asked():
     photo, _, given = square("dilated")
     with pytest.raises(Cancelled), stoppable(lambda: True):

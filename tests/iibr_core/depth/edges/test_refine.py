@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from iibr_core.depth.edges.refine import refine
-from iibr_core.training.degradation import blur, coarsen
+from iibr_core.training.degradation import blur
 from iibr_core.training.scenes.random_scene import random_scene, render
 from iibr_core.types import ImageSize, InputError, ViewOffset
 from tests.iibr_core.scenes import smooth_texture
@@ -19,11 +19,10 @@ CENTRE = ViewOffset(0.0, 0.0)
 
 def disc_before_slope(size: int = 120) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Photo, exact disparity, foreground: a tilted disc before a tilted wall."""
-    y, x = np.mgrid[:size, :size]
+    y, x = np.mgrid[:size, :size] * (120 / size)
     foreground = (x - 55) ** 2 + (y - 62) ** 2 < 32**2
-    photo = np.where(
-        foreground[..., None], smooth_texture(size, size, 1) * [1, 0.6, 0.3], smooth_texture(size, size) * 0.4
-    )
+    front, wall = smooth_texture(size, size, 1) * [1, 0.6, 0.3], smooth_texture(size, size) * 0.4
+    photo = np.where(foreground[..., None], front, wall)
     disparity = np.where(foreground, 2.0 + 0.002 * x, 0.3 + 0.003 * y)
     return photo.astype(np.float32), disparity.astype(np.float32), foreground
 
@@ -39,14 +38,11 @@ def test_blurred_edges_become_steps_where_they_were(sigma: float, share: float) 
     sharp = refine(photo, soft)
     assert rms(sharp, disparity) < share * rms(soft, disparity)
     assert np.mean((sharp > 1.2) != foreground) < 0.01
+    y, x = np.mgrid[:120, :120]
+    far_from_edge = np.abs(np.hypot(x - 55, y - 62) - 32) > 7 * sigma
+    np.testing.assert_array_equal(sharp[far_from_edge], soft[far_from_edge], "slants stay")
     flying = (sharp > 0.9) & (sharp < 1.7)
     assert flying.mean() < 0.05 * ((soft > 0.9) & (soft < 1.7)).mean()
-
-
-def test_half_resolution_becomes_steps() -> None:
-    photo, disparity, _ = disc_before_slope()
-    soft = coarsen(disparity, 2)
-    assert rms(refine(photo, soft), disparity) < 0.7 * rms(soft, disparity)
 
 
 def test_the_edge_follows_the_photo_where_the_map_is_beside_it() -> None:
@@ -63,14 +59,6 @@ def test_exact_maps_stay_as_they_are(seed: int) -> None:
         random_scene(np.random.default_rng(seed), ImageSize(128, 160), 3.0), ImageSize(128, 160), CENTRE, 1
     )
     np.testing.assert_array_equal(refine(colors, disparity), disparity)
-
-
-def test_slanted_surfaces_stay_as_they_are_beside_soft_edges() -> None:
-    photo, disparity, _ = disc_before_slope()
-    soft = blur(disparity, 2.0)
-    y, x = np.mgrid[:120, :120]
-    far_from_edge = np.abs(np.hypot(x - 55, y - 62) - 32) > 14
-    np.testing.assert_array_equal(refine(photo, soft)[far_from_edge], soft[far_from_edge])
 
 
 def test_a_steep_slope_is_no_edge_beside_sharper_ones() -> None:
@@ -94,14 +82,6 @@ def test_thin_structures_are_kept() -> None:
     sharp = refine(photo, soft)
     assert sharp[:, 100:104].mean() >= soft[:, 100:104].mean()
     assert sharp[20:100, [97, 106]].mean() <= soft[20:100, [97, 106]].mean()
-
-
-def test_scale_and_offset_of_the_map_do_not_matter() -> None:
-    photo, disparity, _ = disc_before_slope()
-    soft = blur(disparity, 2.0)
-    other = refine(photo, soft * 8 - 16)
-    # At the threshold of a decision rounding may tip it.
-    assert np.mean(np.abs((other + 16) / 8 - refine(photo, soft)) > 1e-3) < 1e-3
 
 
 @pytest.mark.parametrize("size", [(1, 1), (1, 7), (7, 1), (2, 2), (3, 3), (31, 17)])

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from iibr_core.depth.multi_view.all_views import _warp, estimate_all, matched_views, reconcile
+from iibr_core.depth.multi_view.all_views import estimate_all, matched_views, reconcile
 from iibr_core.depth.multi_view.estimate import estimate_coarse
 from iibr_core.runtime.work import Cancelled, stoppable, watched
 from iibr_core.training.scenes.random_scene import random_scene
@@ -39,23 +39,6 @@ def test_a_view_between_shows_the_same_wall_even_with_wild_colours(value):
     error = np.abs(maps[1] - 1.0)
     error[6:18, 12:32] = 0
     assert error[4:-4, 8:-8].max() < 0.1
-
-
-def test_parts_that_the_nearest_views_do_not_see_come_from_the_next():
-    """A slit in a panel, as wide as the panel moves: the views beside see another part of the wall, those above and
-    below, which are farther, see the same. All colours are equal.
-    """
-    offsets = [ViewOffset(0, 0), ViewOffset(0, -1), ViewOffset(0, 1), ViewOffset(-1.5, 0), ViewOffset(1.5, 0)]
-    maps = {}
-    for index, at in enumerate(offsets):
-        y, x = np.mgrid[:48, :64]
-        column, row = x + 4 * at.s, y + 4 * at.t  # place of the panel's point in the first view
-        is_panel = (column >= 12) & (column < 52) & (row >= 8) & (row < 40) & ~((column >= 30) & (column < 34))
-        maps[index] = np.where(is_panel, 4.0, 0.0).astype(np.float32)
-    del maps[0]
-    warped = _warp(maps, [np.full((48, 64, 3), 90, np.uint8)] * 5, offsets, 0)
-    np.testing.assert_allclose(warped[16:32, 31:33], 0.0, atol=0.01)
-    np.testing.assert_allclose(warped[16:32, [28, 35]], 4.0, atol=0.01)
 
 
 def test_a_wrong_patch_takes_the_disparity_of_similar_colours():
