@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.compare import Figures, Result, changes_table, compare, judge_view, main, mean_table, plot, scene_table
+from benchmarks.compare import changes_table, compare, judge_view, main, mean_table, plot, scene_table
 from benchmarks.guess import ordered_share, table
 from benchmarks.scenes import data_scenes, drawn_scene
 from benchmarks.ways import chosen_ways
@@ -47,11 +47,6 @@ def test_every_table_is_made_of_a_small_scene() -> None:
     with pytest.raises(InputError):
         changes_table(results, "splatting")
     assert len(plot(results).axes[0].texts) == 2
-
-
-def test_means_leave_out_what_is_not_known() -> None:
-    results = [Result(name, "exact", "iibr", Figures(30, 30, 30, db, 0, 1)) for name, db in (("a", np.nan), ("b", 20))]
-    assert "| 30.00 | 30.00 | 30.00 | 20.00 |" in mean_table(results)
 
 
 def test_scenes_of_a_folder_are_judged_at_corners_and_sides(capsys: pytest.CaptureFixture[str]) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.fuzz import damage, fault_of, fuzz, samples
+from benchmarks.fuzz import fault_of, fuzz, samples
 from iibr_core.types import InputError
 
 
@@ -48,11 +48,3 @@ def test_faults_are_told_from_refusals(message: str, result: list[np.ndarray] | 
 
     assert fault in fault_of(read, Path("a"))
     assert bool(fault) == bool(fault_of(read, Path("a")))
-
-
-def test_damage_depends_on_the_seed_alone() -> None:
-    data = bytes(range(256)) * 4
-    copies = [damage(data, [data], np.random.default_rng(seed)) for seed in (*range(60), 0)]
-    assert copies[0] == copies[-1]
-    assert len({*copies}) > 40
-    assert damage(b"", [b""], np.random.default_rng(0)) is not None

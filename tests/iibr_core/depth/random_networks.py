@@ -46,10 +46,6 @@ def depth_anything(folder: Path, kind: str = "relative") -> LocalModel:
     return saved(network, folder, size={"height": 56, "width": 56}, keep_aspect_ratio=True, ensure_multiple_of=14)
 
 
-def metric_depth_anything(folder: Path) -> LocalModel:
-    return depth_anything(folder, "metric")
-
-
 def dpt(folder: Path) -> LocalModel:
     config = transformers.DPTConfig(
         **LAYERS, **HEAD, image_size=64, patch_size=16, backbone_out_indices=[0, 1, 2, 3], is_hybrid=False

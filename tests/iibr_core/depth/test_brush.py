@@ -1,23 +1,17 @@
-"""Strokes: their reach against a slow search of shortest paths, contours, and a canvas that follows its edits."""
+"""Strokes: their reach, contours, and a canvas that follows its edits."""
 
 from __future__ import annotations
 
-import heapq
 from dataclasses import replace
-from math import hypot
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from iibr_core.depth.editing import brush, bucket
-from iibr_core.depth.editing.brush import CONTOUR_CONTRAST, LIKENESS, falloff, lower_distances, touched_colors
 from iibr_core.depth.editing.canvas import DepthCanvas, apply_edits
 from iibr_core.depth.editing.edits import BRUSH_TOOLS, DEPTH_TOOLS, UNEDITED, BrushTool, DepthEdits, Stroke
-from iibr_core.depth.geodesic import spread_distances
 from iibr_core.runtime.work import Cancelled, stoppable
-from iibr_core.types import InputError
 
 HEIGHT, WIDTH = 30, 40
 
@@ -46,90 +40,41 @@ def dab(
     return Stroke(tool, ((x, y),), radius, strength)
 
 
-def stroke_distance(photo: np.ndarray, stroke: Stroke) -> np.ndarray:
-    distance = np.ones(photo.shape[:2], np.float32)
-    for index in range(len(stroke.points)):
-        lower_distances(photo, stroke, index, distance)
-    return distance
-
-
-def slow_distance(photo: np.ndarray, stroke: Stroke) -> np.ndarray:
-    """Dijkstra over all pixels from a stroke of one point, on a photo without specks."""
-    x, y = np.array(stroke.points[0]) * (WIDTH, HEIGHT) - 0.5
-    radius, rows, columns = stroke.radius * WIDTH, *np.mgrid[:HEIGHT, :WIDTH]
-    straight = np.hypot(columns - x, rows - y)
-    distance = np.where(straight < 1, straight / radius, 1)
-    away = np.linalg.norm(photo[:, :, None] - touched_colors(photo, stroke, 0), axis=3).min(axis=2)
-    unlike = np.maximum(away - LIKENESS, 0)
-    waiting = [(distance[row, column], row, column) for row, column in np.argwhere(straight < 1)]
-    heapq.heapify(waiting)
-    while waiting:
-        here, row, column = heapq.heappop(waiting)
-        for v in range(max(row - 1, 0), min(row + 2, HEIGHT)):
-            for u in range(max(column - 1, 0), min(column + 2, WIDTH)):
-                change = abs(unlike[v, u] - unlike[row, column]) / CONTOUR_CONTRAST
-                path = here + hypot(v - row, u - column) / radius + change
-                if path < distance[v, u]:
-                    distance[v, u] = path
-                    heapq.heappush(waiting, (path, v, u))
-    return distance
-
-
-@pytest.mark.parametrize("seed", range(8))
-def test_distances_are_shortest_paths(seed: int) -> None:
-    rng, photo = np.random.default_rng(seed), tiled_photo(seed, 0.4)
-    stroke = dab(x=rng.uniform(0.1, 0.9), y=rng.uniform(0.1, 0.9), radius=rng.uniform(0.05, 0.25))
-    np.testing.assert_allclose(stroke_distance(photo, stroke), slow_distance(photo, stroke), atol=1e-5)
-
-
 @pytest.mark.parametrize(("tool", "sign"), [("nearer", 1), ("farther", -1)])
 def test_a_dab_moves_its_middle_by_its_strength_and_ends_at_its_radius(tool: BrushTool, sign: int) -> None:
-    photo = np.full((61, 81, 3), 0.5, np.float32)
-    disparity = np.linspace(0, 10, 61 * 81, dtype=np.float32).reshape(61, 81)
-    stroke = Stroke(tool, ((0.5, 0.5),), 10 / 81, 0.25)
-    change = apply_edits(photo, disparity, DepthEdits(strokes=(stroke,))) - disparity
-    assert change[30, 40] == pytest.approx(sign * 0.25 * 10, rel=0.01)
+    photo, disparity = np.full((61, 81, 3), 0.5, np.float32), np.linspace(0, 10, 61 * 81, dtype=np.float32)
+    edits = DepthEdits(strokes=(dab(tool, 0.5, 0.5, 10 / 81, 0.25),))
+    change = sign * (apply_edits(photo, disparity.reshape(61, 81), edits) - disparity.reshape(61, 81))
+    assert change[30, 40] == pytest.approx(0.25 * 10, rel=0.01)
     y, x = np.mgrid[:61, :81]
     away = np.hypot(x - 40, y - 30)
     assert not change[away > 11].any()
-    assert (sign * change[away < 8] > 0).all()
-    assert abs(change[30, 45]) == pytest.approx(abs(change[30, 40]) * (1 - 0.5**2) ** 2, rel=0.01)
+    assert (change[away < 8] > 0).all()
 
 
 @pytest.mark.parametrize("tool", BRUSH_TOOLS)
-def test_a_stroke_does_not_cross_a_contour(tool: BrushTool) -> None:
+def test_a_stroke_does_not_cross_a_contour_and_changes_nothing_outside_the_photo(tool: BrushTool) -> None:
     photo, disparity = plain_photo(), plane()
     disparity[:, WIDTH // 2 :] += 3
     disparity[::2, : WIDTH // 2] += 0.5
-    change = apply_edits(photo, disparity, DepthEdits(strokes=(dab(tool, x=0.45),))) - disparity
-    assert np.abs(change[:, : WIDTH // 2]).max() > 0.1
+    painted = apply_edits(photo, disparity, DepthEdits(strokes=(dab(tool, x=0.45),)))
+    change = np.abs(painted - disparity)
+    assert change[:, : WIDTH // 2].max() > 0.1
     assert not change[:, WIDTH // 2 :].any()
-
-
-def test_noise_is_no_contour() -> None:
-    rng = np.random.default_rng(0)
-    photo = np.clip(0.5 + rng.normal(0, 0.005, (HEIGHT, WIDTH, 3)), 0, 1).astype(np.float32)
-    plain = stroke_distance(np.full_like(photo, 0.5), dab())
-    assert np.abs(falloff(stroke_distance(photo, dab())) - falloff(plain)).max() < 0.15
+    if tool == "smooth":
+        assert np.abs(np.diff(painted[10:20, 18], axis=0)).mean() < 0.4, "rows differ by 0.5"
+    outside = tuple(dab(tool, *place) for place in ((-5.0, 0.5), (1e30, -1e30), (0.5, 40.0)))
+    np.testing.assert_array_equal(apply_edits(photo, disparity, DepthEdits(strokes=outside)), disparity)
 
 
 def test_texture_that_the_stroke_runs_over_does_not_stop_it() -> None:
     photo = plain_photo(0.9, 0.9)
     photo[:, : WIDTH // 2 : 2] = 0.1
     photo[:, 1 : WIDTH // 2 : 2] = 0.4
-    near = falloff(stroke_distance(photo, dab(x=0.25)))
-    plain = falloff(stroke_distance(np.full_like(photo, 0.5), dab(x=0.25)))
+    edits = DepthEdits(strokes=(dab(x=0.25),))
+    near, plain = (apply_edits(colors, plane(), edits) - plane() for colors in (photo, plain_photo(0.5, 0.5)))
     np.testing.assert_allclose(near[:, : WIDTH // 2], plain[:, : WIDTH // 2], atol=1e-5)
     assert not near[:, WIDTH // 2 :].any()
-
-
-def test_smoothing_averages_within_contours() -> None:
-    photo, values = plain_photo(), np.random.default_rng(1).normal(size=(HEIGHT, WIDTH)).astype(np.float32)
-    values[:, WIDTH // 2 :] += 5
-    smooth = brush.smooth_within_contours(photo, values, 5.0)
-    for part in (np.s_[:, : WIDTH // 2], np.s_[:, WIDTH // 2 :]):
-        assert smooth[part].std() < 0.3 * values[part].std()
-        assert smooth[part].mean() == pytest.approx(values[part].mean(), abs=0.1)
 
 
 @pytest.mark.parametrize("tool", DEPTH_TOOLS)
@@ -165,17 +110,14 @@ def test_a_canvas_shows_the_same_whatever_it_showed_before(wanted: list[DepthEdi
     photo, last = tiled_photo(0, 0.3), UNEDITED
     canvas = DepthCanvas(photo, plane())
     for edit in wanted:
-        drawn = [
-            replace(edit, strokes=(*edit.strokes[:-1], replace(edit.strokes[-1], points=edit.strokes[-1].points[:n])))
-            for n in (1, 2)
-            if edit.strokes
-        ]
-        for step in (*drawn, edit, replace(edit, strokes=edit.strokes[:-1]), last):
+        *before, newest = edit.strokes or (dab(),)
+        drawn = [replace(edit, strokes=(*before, replace(newest, points=newest.points[:n]))) for n in (1, 2)]
+        for step in (*drawn, edit, replace(edit, strokes=tuple(before)), last):
             shown = canvas.apply(step)
-            before = shown.copy()
+            kept = shown.copy()
             np.testing.assert_array_equal(shown, apply_edits(photo, plane(), step))
             canvas.apply(edit)
-            np.testing.assert_array_equal(shown, before, "maps handed out must not change")
+            np.testing.assert_array_equal(shown, kept, "maps handed out must not change")
         last = edit
 
 
@@ -203,41 +145,12 @@ def test_a_canvas_continues_from_a_map_that_another_painted() -> None:
 
 
 @pytest.mark.parametrize("tool", BRUSH_TOOLS)
-@pytest.mark.parametrize("shape", [(1, 1), (1, 7), (7, 1), (3, 2)])
-def test_tiny_photos_can_be_painted_on(shape: tuple[int, int], tool: BrushTool) -> None:
+@pytest.mark.parametrize("shape", [(1, 1), (1, 7), (7, 1), (3, 2), (HEIGHT, WIDTH)])
+@pytest.mark.parametrize("wild", [0.0, np.nan, np.inf, 3e38, -3e38])
+def test_tiny_photos_and_wild_values_stay_finite(shape: tuple[int, int], tool: BrushTool, wild: float) -> None:
     photo, disparity = np.full((*shape, 3), 0.5, np.float32), np.zeros(shape, np.float32)
-    result = apply_edits(photo, disparity, DepthEdits(strokes=(dab(tool, 0.5, 0.5, 0.25),)))
+    disparity[1:20, 1:] = wild
+    stroke = Stroke(tool, ((0.1, 0.1), (0.5, 0.5), (0.9, 0.9)), 0.25, 1.0)
+    result = apply_edits(photo, disparity, DepthEdits(strokes=(stroke, stroke)))
     assert np.isfinite(result).all()
-    assert tool in ("smooth", *DEPTH_TOOLS) or result.any()
-
-
-@pytest.mark.parametrize("tool", BRUSH_TOOLS)
-@pytest.mark.parametrize("wild", [np.nan, np.inf, -np.inf, 3e38, -3e38])
-def test_wild_values_stay_finite(wild: float, tool: BrushTool) -> None:
-    disparity = plane()
-    disparity[10:20, 10:30] = wild
-    stroke = Stroke(tool, ((0.1, 0.1), (0.9, 0.9)), 0.2, 1.0)
-    assert np.isfinite(apply_edits(plain_photo(), disparity, DepthEdits(strokes=(stroke, stroke)))).all()
-
-
-@pytest.mark.parametrize("place", [(-5.0, 0.5), (1e30, -1e30), (0.5, 40.0)])
-def test_a_stroke_outside_the_photo_changes_nothing(place: tuple[float, float]) -> None:
-    result = apply_edits(plain_photo(), plane(), DepthEdits(strokes=(Stroke("nearer", (place,), 0.1, 1.0),)))
-    np.testing.assert_array_equal(result, plane())
-
-
-def test_sizes_must_agree_and_something_must_be_known() -> None:
-    with pytest.raises(ValueError, match="disparity"):
-        DepthCanvas(plain_photo(), np.zeros((3, 3), np.float32))
-    with pytest.raises(InputError, match="no disparity is known"):
-        apply_edits(plain_photo(), np.full((HEIGHT, WIDTH), np.nan, np.float32), DepthEdits(strokes=(dab(),)))
-
-
-def test_strokes_of_all_sizes_need_the_kernels_that_were_prepared() -> None:
-    for shape, radius in (((4, 4), 0.1), ((HEIGHT, WIDTH), 0.05), ((HEIGHT, 3), 0.25)):
-        photo, disparity = np.full((*shape, 3), 0.5, np.float32), np.zeros(shape, np.float32)
-        for tool in BRUSH_TOOLS:
-            apply_edits(photo, disparity, DepthEdits(strokes=(dab(tool, radius=radius),)))
-    kernels = spread_distances, brush._measure_colors, brush._remove_specks, brush._smooth_rows, bucket._fill_holes
-    for kernel in kernels:
-        assert len(kernel.signatures) == 1, kernel
+    assert wild or tool in ("smooth", *DEPTH_TOOLS) or result.any()

@@ -10,7 +10,7 @@ import pytest
 from PIL import Image
 from PIL.PngImagePlugin import PngInfo
 
-from iibr_core.depth.embedded.embedded import read_embedded, unread_parts
+from iibr_core.depth.embedded.embedded import embedded_in_jpeg, unread_parts
 from iibr_core.depth.search import PhotoWithDepth, open_with_depth
 from iibr_core.formats.images.lfp import read_lfp
 from iibr_core.formats.images.photo import read_photo
@@ -36,8 +36,17 @@ def assert_disc_is_nearest(found: PhotoWithDepth) -> None:
 # ---- Google
 
 
-@pytest.mark.parametrize("kind", ["", "RangeInverse"])
-@pytest.mark.parametrize(("near", "far"), [(5, 3), (0, 0), ("nan", "inf"), ("", "")])
+@pytest.mark.parametrize(
+    ("kind", "near", "far"),
+    [
+        ("", 5, 3),
+        ("RangeInverse", 0, 0),
+        ("RangeInverse", -1, 3),
+        ("RangeInverse", "nan", "inf"),
+        ("RangeLinear", 1, "inf"),
+        ("RangeInverse", "", ""),
+    ],
+)
 def test_a_senseless_range_is_told_and_dark_is_near(tmp_path: Path, kind: str, near: object, far: object) -> None:
     segments = files.gdepth_segments(files.picture(255 - SMALL, "PNG"), kind=kind, near=near, far=far)
     found = opened(tmp_path, "a.jpg", files.with_segments(PHOTO, segments))
@@ -77,16 +86,20 @@ def test_huawei_maps_lie_as_the_phone_was_held(
     assert any("counts as near" in note for note in found.disparity.notes)
 
 
-def test_a_chance_mark_before_huaweis_does_not_hide_it(tmp_path: Path) -> None:
-    data = files.huawei_jpeg(PHOTO + b"edof", SMALL[:, ::-1]).replace(b"\x56\xe9edof", b"edof\x56\xe9edof")
-    assert_disc_is_nearest(opened(tmp_path, "a.jpg", data))
+@pytest.mark.parametrize("white_is_near", [True, False])
+def test_a_grey_picture_behind_a_photo_is_its_map(tmp_path: Path, white_is_near: bool) -> None:
+    found = opened(tmp_path, "a.jpg", PHOTO + files.picture(SMALL if white_is_near else 255 - SMALL))
+    assert_disc_is_nearest(found)
+    assert any("counts as near" in note for note in found.disparity.notes)
 
 
-def test_a_mask_behind_a_photo_is_no_map(tmp_path: Path) -> None:
-    mask = files.picture(np.where(SMALL > 200, 255, 0).astype(np.uint8))
-    found = opened(tmp_path, "a.jpg", PHOTO + mask)
-    assert found.origin.kind == "rough"
-    assert "a.jpg holds a second picture (64x48, grey); this is not read." in found.disparity.notes
+def test_copies_gain_maps_and_pictures_of_other_shapes_are_no_maps() -> None:
+    picture, gain = Image.fromarray(PIXELS).convert("L"), files.picture(DEPTH)
+    gain = gain[:2] + b"\xff\xe1\x00\x25http://ns.adobe.com/xap/1.0/\0<hdrgm>" + gain[2:]
+    grey, small, matte = np.asarray(picture), np.asarray(picture.resize((64, 48))), np.where(DEPTH > 200, 255, 0)
+    others = PIXELS, small, DEPTH[:40], np.roll(grey, 12, axis=1), 255 - grey, matte
+    for behind in (gain, *(files.picture(other.astype(np.uint8)) for other in others)):
+        assert embedded_in_jpeg(PHOTO + behind) is None
 
 
 # ---- AVIF and HEIC
@@ -101,6 +114,12 @@ def test_the_depth_of_an_avif(tmp_path: Path, orientation: int, white_is_near: b
     found = opened(tmp_path, "a.avif", data)
     assert found.photo.size == (96, 128)
     assert_disc_is_nearest(found)
+
+
+def test_an_apple_portrait_in_a_heic(tmp_path: Path) -> None:
+    found = opened(tmp_path, "a.heic", files.heic(PIXELS, SMALL))
+    assert_disc_is_nearest(found)
+    assert found.origin.words == "the photo itself (Apple portrait)"
 
 
 def test_a_samsung_heic(tmp_path: Path) -> None:
@@ -122,10 +141,12 @@ def test_mattes_of_a_heic_are_named_and_not_taken_for_depth(tmp_path: Path) -> N
 def test_what_is_behind_a_photo_and_not_read_is_named(tmp_path: Path) -> None:
     grey = files.picture(np.asarray(Image.fromarray(PIXELS).convert("L").resize((64, 48))))
     matte = files.apple_jpeg(b"", SMALL, 0, 1, "urn:com:apple:photo:2019:aux:semanticskinmatte")
+    mask = files.picture(np.where(SMALL > 200, 255, 0).astype(np.uint8))
     xiaomi = b"PMPD\x02\0\x64\0\x01\0" + bytes(100)
     for behind, words in (
         (PHOTO, "a second picture (128x96, colour)"),
         (grey, "a second picture (64x48, grey)"),
+        (mask, "a second picture (64x48, grey)"),
         (matte, "mattes (skin), which are no depth maps"),
         (xiaomi, "a depth map of Xiaomi's kind (PMPD)"),
     ):
@@ -146,14 +167,14 @@ def test_gain_maps_previews_and_plain_photos_need_no_words(tmp_path: Path) -> No
 # ---- Lytro
 
 
-def stack(is_illum: bool, depth: np.ndarray | None = None) -> bytes:
+def stack(is_illum: bool) -> bytes:
     """The disc is sharp at lambda -4, all else at 6."""
     disc, wall = (PIXELS.copy() for _ in range(2))
     is_disc = DEPTH == 230
     disc[~is_disc], wall[is_disc] = 200, 200
     focus = np.where(is_disc, -4.0, 6.0)
     pictures = {6.0: files.picture(wall, "PNG"), -4.0: files.picture(disc, "PNG")}
-    return files.lytro_stack(pictures, focus if depth is None else depth, (96, 128), is_illum)
+    return files.lytro_stack(pictures, focus, (96, 128), is_illum)
 
 
 @pytest.mark.parametrize("is_illum", [True, False])
@@ -178,16 +199,11 @@ def test_the_middle_view_of_a_film(tmp_path: Path) -> None:
         film.mux(stream.encode(None))
     views = [{"width": 64, "height": 48, "coord": {"x": x, "y": 0.0}} for x in (-0.2, 0.0, 0.2)]
     block = {"representation": "h264", "blockOfImagesRef": "sha1-film", "metadataArray": views}
-    depth = {"width": 4, "height": 3, "depthMap": {"representation": "raw", "imageRef": "sha1-map"}}
-    entries = [{"vendorContent": {"blockOfImages": block}}, {"vendorContent": depth}]
-    chunks = {"sha1-film": file.getvalue(), "sha1-map": np.ones((3, 4), "<f4").tobytes()}
+    picture = {"picture": {"accelerationArray": [{"vendorContent": {"blockOfImages": block}}]}}
     path = tmp_path / "a-stk.lfp"
-    path.write_bytes(files.lytro_file({"picture": {"accelerationArray": entries}}, chunks))
+    path.write_bytes(files.lytro_file(picture, {"sha1-film": file.getvalue()}))
     assert abs(int(read_lfp(path).pixels[20, 30, 0]) - 120) < 6
-    found = read_embedded(path)
-    assert found is not None
-    assert found.estimate.values.shape == (3, 4)  # type: ignore[union-attr]
-    path.write_bytes(files.lytro_file({"picture": {"accelerationArray": entries}}, {**chunks, "sha1-film": b"none"}))
+    path.write_bytes(files.lytro_file(picture, {"sha1-film": b"none"}))
     with pytest.raises(InputError, match=r"a-stk\.lfp: damaged"):
         read_lfp(path)
 
@@ -195,8 +211,6 @@ def test_the_middle_view_of_a_film(tmp_path: Path) -> None:
 @pytest.mark.parametrize("cut", [0.1, 0.5, 0.95])
 def test_damaged_lytro_files_are_refused_in_a_line(tmp_path: Path, cut: float) -> None:
     data = stack(True)
-    path = tmp_path / "a.lfp"
-    path.write_bytes(data[: int(cut * len(data))])
-    with pytest.raises(InputError, match=r"a\.lfp: ") as told:
-        read_photo(path)
-    assert "\n" not in str(told.value)
+    (tmp_path / "a.lfp").write_bytes(data[: int(cut * len(data))])
+    with pytest.raises(InputError, match=r"^[^\n]*a\.lfp: [^\n]*$"):
+        read_photo(tmp_path / "a.lfp")

@@ -15,7 +15,7 @@ from PIL import Image
 
 from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.search import PhotoWithDepth, open_with_depth
-from iibr_core.depth.sidecar import SIDECAR_EXTENSIONS, SIDECAR_KINDS, find_sidecars
+from iibr_core.depth.sidecar import find_sidecars
 from iibr_core.formats.images.write import write_image_file
 from iibr_core.formats.maps.writer import MapText, write_map
 from iibr_core.types import FloatImage, InputError
@@ -73,15 +73,11 @@ def test_integers_are_relative_and_the_photo_tells_which_end_is_near(
     assert np.ptp(found.disparity.values) < 0.02 * WIDTH
     assert found.origin.near == ("black" if black_is_near else "white")
     assert any(f"{found.origin.near} counts as near" in note for note in found.disparity.notes)
-
-
-def test_near_and_far_can_be_turned(tmp_path: Path) -> None:
-    integers(scene()[1], np.uint8).save(tmp_path / "map.png")
-    turned = opened(tmp_path, "map.png", inverts=True)
-    assert turned.origin.near == "black"
-    assert np.allclose(turned.disparity.values, -opened(tmp_path, "map.png").disparity.values, atol=1e-4)
-    integers(scene()[1], np.uint8, black_is_near=True).save(tmp_path / "map.png")
-    assert_true_to_scene(opened(tmp_path, "map.png", file_scale=-1.0))
+    if black_is_near and name == "map.png":
+        assert_true_to_scene(opened(tmp_path, name, file_scale=-1.0))
+    turned = opened(tmp_path, name, inverts=True)
+    assert turned.origin.near == ("white" if black_is_near else "black")
+    assert np.allclose(turned.disparity.values, -found.disparity.values, atol=1e-4)
 
 
 def test_float_maps_are_disparity_and_warn_where_they_look_swapped(tmp_path: Path) -> None:
@@ -117,21 +113,18 @@ def test_inverse_depth_with_the_name_of_depth_is_recognised(tmp_path: Path) -> N
     assert_true_to_scene(opened(tmp_path, "photo_depth.npy"))
 
 
-def test_a_sky_of_zeros_is_far_away(tmp_path: Path) -> None:
+def test_a_sky_of_zeros_is_far_away_and_scattered_zeros_are_unknown(tmp_path: Path) -> None:
     photo, near = scene(has_sky=True)
     Image.fromarray((unit(near) * 255).astype(np.uint8)).save(tmp_path / "map.png")
     values = opened(tmp_path, "map.png", photo).disparity.values
     assert values[TOP] < values[WALL] < values[BOX] < values[DISC]
     assert values[TOP] == pytest.approx(values[5, 200])
-
-
-def test_scattered_zeros_are_unknown(tmp_path: Path) -> None:
-    stored = np.array(integers(scene()[1] + 1, np.uint8))
+    stored = np.maximum(np.array(integers(scene()[1] + 1, np.uint8)), 80)
     stored[::3, ::5] = 0
-    Image.fromarray(np.where(stored == 0, 0, np.maximum(stored, 80)).astype(np.uint8)).save(tmp_path / "map.png")
-    found = opened(tmp_path, "map.png")
-    assert found.disparity.unknown is not None
-    assert found.disparity.unknown[::3, ::5].all()
+    Image.fromarray(stored).save(tmp_path / "map.png")
+    unknown = opened(tmp_path, "map.png").disparity.unknown
+    assert unknown is not None
+    assert unknown[::3, ::5].all()
 
 
 @pytest.mark.parametrize("name", ["map.jpg", "map.webp", "RGBA.png", "P.png"])
@@ -180,17 +173,15 @@ def test_a_map_lies_like_the_stored_photo_or_is_turned_itself(
 
 
 def test_maps_beside_a_photo_are_found_in_their_order(tmp_path: Path) -> None:
-    assert find_sidecars(tmp_path / "photo.png") == []
-    names = [f"photo{kind}{extension}" for kind in SIDECAR_KINDS for extension in SIDECAR_EXTENSIONS]
+    """`_disparity` goes before `_depth`, floating point before pictures."""
+    names = ["photo_disparity.npy", "photo_disparity.png", "photo_depth.png"]
     for name in names:
         (tmp_path / name).touch()
     assert [path.name for path in find_sidecars(tmp_path / "photo.png")] == names
+    integers(scene()[1], np.uint8).save(tmp_path / names[-1])
     for name in names[:-1]:
         (tmp_path / name).unlink()
-    photo, near = scene()
-    photo.save(tmp_path / "photo.png")
-    integers(near, np.uint8).save(tmp_path / names[-1])
-    found = open_with_depth(tmp_path / "photo.png", DepthChoice(refine=False))
+    found = opened(tmp_path, "", file=None)
     assert found.origin.file == str(tmp_path / names[-1])
     assert_true_to_scene(found)
 

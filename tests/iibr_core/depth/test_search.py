@@ -14,7 +14,8 @@ from iibr_core.depth.models.catalog import known_model
 from iibr_core.depth.models.known import USUAL_MODEL
 from iibr_core.depth.search import PhotoWithDepth, find_depth, open_with_depth
 from iibr_core.formats.images.photo import read_photo
-from iibr_core.runtime.work import Cancelled, stoppable, watched
+from iibr_core.formats.images.picture import upright
+from iibr_core.runtime.work import watched
 from iibr_core.types import ImageSize, InputError
 from tests.iibr_core import embedded_files as files
 from tests.iibr_core.depth.onnx_graphs import of_channels, published
@@ -70,8 +71,6 @@ def test_the_order_file_embedded_rough(tmp_path: Path) -> None:
     found = open_with_depth(path, start_from("rough"))
     assert (found.origin.kind, found.origin.failures) == ("rough", ())
     assert found.disparity.viewing_share < 1
-    assert "--disparity" in found.origin.advice
-    assert "--depth-model" in found.origin.advice
     assert any("rough" in note for note in found.disparity.notes)
     found = open_with_depth(path, start_from("flat"))
     assert found.origin.kind == "flat"
@@ -85,24 +84,6 @@ def test_without_slow_sources_the_order_stays(tmp_path: Path, start: DepthStart)
     assert found.origin.kind == {"auto": "embedded", "model": "rough"}.get(start, start)
 
 
-def test_a_bad_map_beside_the_photo_is_followed_by_the_next(tmp_path: Path) -> None:
-    path = photo_file(tmp_path)
-    np.save(tmp_path / "scene_disparity.npy", np.full(SIZE, np.nan))
-    found = open_with_depth(path)
-    assert found.origin.kind == "embedded"
-    (failure,) = found.origin.failures
-    assert "scene_disparity.npy" in failure
-    assert failure in found.disparity.notes
-
-
-def test_a_bad_map_that_is_named_is_an_error(tmp_path: Path) -> None:
-    path = photo_file(tmp_path)
-    np.save(tmp_path / "bad.npy", np.full(SIZE, np.nan))
-    for name in ("bad.npy", "gone.npy"):
-        with pytest.raises(InputError, match=name):
-            open_with_depth(path, DepthChoice(file=str(tmp_path / name)))
-
-
 @pytest.mark.parametrize("depth", [b"no picture", files.picture(DEPTH, "PNG")[:-30], DEPTH[:, :20]])
 def test_damaged_depth_is_followed_by_the_next_with_a_note(depth: np.ndarray | bytes, tmp_path: Path) -> None:
     """The last map is high, the photo wide."""
@@ -114,18 +95,21 @@ def test_damaged_depth_is_followed_by_the_next_with_a_note(depth: np.ndarray | b
     assert failure in found.disparity.notes
 
 
-@pytest.mark.parametrize("names", [(), ("model.safetensors",), ("config.json", "pytorch_model.bin")])
-def test_a_model_that_was_asked_for_must_be_good(names: tuple[str, ...], tmp_path: Path) -> None:
-    (tmp_path / "model").mkdir()
-    for name in names:
-        (tmp_path / "model" / name).write_text('{"model_type": "depth_anything"}')
-    with pytest.raises(InputError, match="model"):
-        open_with_depth(photo_file(tmp_path, None), DepthChoice(model=str(tmp_path / "model")))
-
-
-def test_a_model_is_asked_for_where_there_is_none(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="--depth model: none is on this machine"):
-        open_with_depth(photo_file(tmp_path), start_from("model"))
+@pytest.mark.parametrize(
+    ("choice", "message"),
+    [
+        (start_from("model"), "--depth model: none is on this machine"),
+        (DepthChoice(model="{dir}/empty"), "empty"),
+        (DepthChoice(file="{dir}/bad.npy"), r"bad\.npy"),
+        (DepthChoice(file="{dir}/gone.npy"), r"gone\.npy"),
+    ],
+)
+def test_depth_that_was_asked_for_must_be_there_and_good(choice: DepthChoice, message: str, tmp_path: Path) -> None:
+    (tmp_path / "empty").mkdir()
+    np.save(tmp_path / "bad.npy", np.full(SIZE, np.nan))
+    file, model = (name and name.format(dir=tmp_path) for name in (choice.file, choice.model))
+    with pytest.raises(InputError, match=message):
+        open_with_depth(photo_file(tmp_path, None), replace(choice, file=file, model=model))
 
 
 def test_a_damaged_usual_model_is_followed_by_the_next_with_a_note(tmp_path: Path) -> None:
@@ -139,17 +123,13 @@ def test_a_damaged_usual_model_is_followed_by_the_next_with_a_note(tmp_path: Pat
 
 
 def test_a_model_is_used_and_named(tmp_path: Path) -> None:
-    choice, doings = DepthChoice(model=str(of_channels(tmp_path / "red.onnx"))), []
-
-    def report(done: float, total: float, doing: str) -> None:
-        assert 0 <= done <= total
-        doings.append(doing)
-
-    with watched(report):
+    choice, reports = DepthChoice(model=str(of_channels(tmp_path / "red.onnx"))), []
+    with watched(lambda *report: reports.append(report)):
         found = open_with_depth(photo_file(tmp_path, None), choice)
+    assert all(0 <= done <= total for done, total, _ in reports)
+    assert any("estimating depth" in doing for *_, doing in reports)
     assert (found.origin.kind, found.origin.words) == ("model", "estimated by the model red.onnx")
     assert found.origin.failures == ()
-    assert any("estimating depth" in doing for doing in doings)
     assert open_with_depth(photo_file(tmp_path), choice).origin.kind == "embedded"  # its own depth comes first
     assert open_with_depth(photo_file(tmp_path), replace(choice, start="model")).origin.kind == "model"
 
@@ -159,8 +139,6 @@ def test_a_model_is_used_and_named(tmp_path: Path) -> None:
 )
 def test_depth_is_turned_with_the_photo(orientation: int, is_turned_already: bool, tmp_path: Path) -> None:
     """Some writers turn the map already; that shows in its shape only where the sides are swapped."""
-    from iibr_core.formats.images.picture import upright
-
     depth = np.full(SIZE, 200, np.uint8)
     depth[:10, :14] = 20
     stored = upright(depth, orientation) if is_turned_already else depth
@@ -198,26 +176,6 @@ def test_a_bad_sharp_picture_leaves_the_photo(sharp: bytes, tmp_path: Path) -> N
     assert found.photo.size == SIZE
     assert found.origin.kind == "embedded"
     assert any("blurred" in note for note in found.photo.notes)
-
-
-def test_a_heic_portrait(tmp_path: Path) -> None:
-    pixels, depth = np.full((*SIZE, 3), 60, np.uint8), np.zeros(SIZE, np.uint8)
-    depth[NEAR] = 250  # bright is near
-    (tmp_path / "a.heic").write_bytes(files.heic(pixels, depth))
-    found = open_with_depth(tmp_path / "a.heic", start_from("auto"))
-    assert found.origin.words == "the photo itself (Apple portrait)"
-    assert is_nearer_inside(found)
-
-
-def test_it_stops_before_what_takes_long(tmp_path: Path) -> None:
-    with pytest.raises(Cancelled), stoppable(lambda: True):
-        open_with_depth(photo_file(tmp_path, None))
-
-
-def test_a_bad_photo_is_an_error(tmp_path: Path) -> None:
-    (tmp_path / "a.jpg").write_bytes(b"\xff\xd8\xff nothing")
-    with pytest.raises(InputError, match=r"a\.jpg"):
-        open_with_depth(tmp_path / "a.jpg")
 
 
 def test_other_maps_beside_the_photo_are_named(tmp_path: Path) -> None:

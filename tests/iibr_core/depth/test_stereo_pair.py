@@ -37,12 +37,8 @@ def test_files_without_a_pair_or_that_show_another_picture_tell_nothing(tmp_path
     assert estimate_from_pair(tmp_path / "a.lif") is None
 
 
-def test_views_of_two_shapes_and_too_little_memory_are_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_views_of_two_shapes_are_refused(tmp_path: Path) -> None:
     narrow = Image.fromarray(eye(1)[:, :50])
     Image.fromarray(eye(0)).save(tmp_path / "a.mpo", "MPO", save_all=True, append_images=[narrow])
-    with pytest.raises(InputError, match=r"a\.mpo: its two views differ in shape \(80x60 and 50x60"):
+    with pytest.raises(InputError, match=r"a\.mpo: .*80x60 and 50x60"):
         estimate_from_pair(tmp_path / "a.mpo")
-    Image.fromarray(np.hstack([eye(0), eye(1)])).save(tmp_path / "b_SBS.png")
-    monkeypatch.setattr("iibr_core.depth.stereo_pair.free_memory_bytes", lambda: 1000)
-    with pytest.raises(InputError, match="more memory"):
-        estimate_from_pair(tmp_path / "b_SBS.png")

@@ -21,7 +21,7 @@ from iibr_core.depth.models.preparation import network_input, read_preparation
 from iibr_core.depth.models.torch_models import PREPARATIONS
 from iibr_core.runtime.work import Cancelled, stoppable, watched
 from iibr_core.types import InputError, Photo
-from tests.iibr_core.depth.random_networks import depth_anything, depth_pro, dpt, metric_depth_anything, zoedepth
+from tests.iibr_core.depth.random_networks import depth_anything, depth_pro, dpt, zoedepth
 
 RNG = np.random.default_rng(3)
 PHOTO = Photo(RNG.random((40, 60, 3)).astype(np.float32), 50.0, "photo")
@@ -36,7 +36,7 @@ def cache_here(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     ("make", "meaning"),
     [
         (depth_anything, "inverse depth"),
-        (metric_depth_anything, "metres"),
+        (lambda folder: depth_anything(folder, "metric"), "metres"),
         (dpt, "inverse depth"),
         (zoedepth, "metres"),
         (depth_pro, "metres"),
@@ -83,32 +83,20 @@ def test_the_field_of_view_gives_depth_pros_metres(tmp_path: Path) -> None:
     np.testing.assert_allclose(model.estimate(photo).values, 1 / inverse, rtol=1e-2)
 
 
-def cut(path: Path) -> None:
-    path.write_bytes(path.read_bytes()[:-100])
-
-
-def pickle(path: Path) -> None:
-    path.rename(path.with_name("pytorch_model.bin"))
-
-
-def of_another_kind(path: Path) -> None:
-    path.write_text(json.dumps(json.loads(path.read_text()) | {"model_type": "llama"}))
-
-
-def with_another_model(path: Path) -> None:
-    path.write_text(json.dumps(json.loads(path.read_text()) | {"backbone": "somebody/model"}))
+def with_settings(**settings: object) -> Callable[[Path], object]:
+    return lambda path: path.write_text(json.dumps(json.loads(path.read_text()) | settings))
 
 
 @pytest.mark.parametrize(
     ("name", "damage", "message"),
     [
-        ("config.json", cut, "config.json"),
+        ("config.json", lambda path: path.write_text("{"), "config.json"),
         ("config.json", Path.unlink, "holds no config.json"),
-        ("config.json", of_another_kind, "llama"),
-        ("config.json", with_another_model, "needs another model, somebody/model"),
-        ("preprocessor_config.json", lambda path: path.write_text('{"size": "big"}'), "preprocessor_config.json"),
-        ("model.safetensors", pickle, "holds no .safetensors"),
-        ("model.safetensors", cut, "cannot be used"),
+        ("config.json", with_settings(model_type="llama"), "llama"),
+        ("config.json", with_settings(backbone="somebody/model"), "needs another model, somebody/model"),
+        ("preprocessor_config.json", with_settings(size="big"), "preprocessor_config.json"),
+        ("model.safetensors", lambda path: path.rename(path.with_name("pytorch_model.bin")), "holds no .safetensors"),
+        ("model.safetensors", lambda path: path.write_bytes(path.read_bytes()[:-100]), "cannot be used"),
     ],
 )
 def test_damaged_folders_are_one_line(
@@ -116,21 +104,17 @@ def test_damaged_folders_are_one_line(
 ) -> None:
     folder = depth_anything(tmp_path / "model").folder
     damage(folder / name)
-    with pytest.raises(InputError, match=message) as caught:
+    with pytest.raises(InputError, match=rf"^[^\n]*{message}[^\n]*$"):
         model_to_use(DepthChoice(model=str(folder))).estimate(PHOTO)  # type: ignore[union-attr]
-    assert "\n" not in str(caught.value)
     assert not list((tmp_path / "cache").glob("*")), "nothing of that is kept"
 
 
 def test_an_estimate_stops_between_layers_and_reports_its_progress(tmp_path: Path) -> None:
     model = depth_anything(tmp_path / "model")
-    shares: list[float] = []
-
-    def report(done: float, total: float, doing: str) -> None:
-        shares.append(done / total if total else 0.0)
-
-    with pytest.raises(Cancelled), stoppable(lambda: len(shares) >= 20), watched(report):
+    reports: list[tuple[float, float, str]] = []
+    with pytest.raises(Cancelled), stoppable(lambda: len(reports) >= 20), watched(lambda *now: reports.append(now)):
         model.estimate(PHOTO)
+    shares = [done / total if total else 0.0 for done, total, _ in reports]
     assert shares == sorted(shares)
     assert 20 <= len(shares) <= 21
 

@@ -23,23 +23,20 @@ def pair(seed: int = 0, size: tuple[int, int] = (24, 30)) -> tuple[np.ndarray, n
     return np.clip(truth + rng.normal(0, 0.05, truth.shape), 0, 1).astype(np.float32), truth
 
 
-def test_psnr_of_known_errors() -> None:
+def test_psnr_of_masks_and_of_what_is_not_known() -> None:
     truth = np.full((4, 5, 3), 0.5, np.float32)
-    assert psnr(truth + np.float32(0.1), truth) == pytest.approx(20, abs=1e-4)
-    assert psnr(truth, truth) == math.inf
-    mask = np.zeros((4, 5), bool)
+    worse, mask = truth.copy(), np.zeros((4, 5), bool)
     assert math.isnan(psnr(truth, truth, mask))
-    worse = truth.copy()
-    worse[0, 0] += 0.5
-    mask[0, 0] = True
+    worse[0, 0], mask[0, 0] = 1.0, True
     assert psnr(worse, truth, mask) == pytest.approx(10 * math.log10(1 / 0.25), abs=1e-4)
     assert psnr(worse, truth, ~mask) == math.inf
     assert math.isnan(psnr(np.full_like(truth, np.nan), truth))
 
 
-def test_psnr_of_bytes_is_that_of_floats() -> None:
-    left, right = (np.random.default_rng(seed).integers(0, 256, (5, 7, 3), np.uint8) for seed in range(2))
-    assert psnr(left, right) == pytest.approx(psnr(left / np.float32(255), right / np.float32(255)), abs=1e-5)
+def test_figures_of_bytes_are_those_of_floats() -> None:
+    left, right = (np.random.default_rng(seed).integers(0, 256, (32, 32, 3), np.uint8) for seed in range(2))
+    for figure in (psnr, flip):
+        assert figure(left, right) == pytest.approx(figure(left / np.float32(255), right / np.float32(255)), abs=1e-5)
     assert psnr(np.zeros((1, 1, 3), np.uint8), np.full((1, 1, 3), 255, np.uint8)) == 0
 
 
@@ -50,19 +47,12 @@ def test_equal_pictures_count_with_a_bound_where_means_are_taken() -> None:
     assert math.isnan(bounded_psnr(truth, truth, np.zeros(truth.shape[:2], bool)))
 
 
-def test_ssim_of_known_pairs_and_of_tiny_pictures() -> None:
-    image, truth = pair()
-    assert ssim(truth, truth) == pytest.approx(1)
-    assert math.isnan(ssim(image[:5], truth[:5]))
-    dark, light = np.full((20, 24, 3), 0.2, np.float32), np.full((20, 24, 3), 0.5, np.float32)
-    assert ssim(dark, light) == pytest.approx((2 * 0.1 + 1e-4) / (0.04 + 0.25 + 1e-4), abs=1e-4)
-
-
 def test_metrics_are_those_of_scikit_image() -> None:
     image, truth = pair(3, (40, 52))
     assert psnr(image, truth) == pytest.approx(skimage_psnr(truth.astype(float), image.astype(float), data_range=1))
     settings = {"gaussian_weights": True, "use_sample_covariance": False, "data_range": 1, "channel_axis": 2}
     assert ssim(image, truth) == pytest.approx(structural_similarity(truth, image, **settings))
+    assert math.isnan(ssim(image[:5], truth[:5]))
 
 
 def test_flip_of_known_pairs() -> None:
@@ -76,23 +66,15 @@ def test_flip_of_known_pairs() -> None:
     assert errors[0] > 0
 
 
-def test_flip_of_bytes_is_that_of_floats() -> None:
-    grey, lighter = np.full((32, 32, 3), 128, np.uint8), np.full((32, 32, 3), 160, np.uint8)
-    assert 0 < flip(lighter, grey) == flip(lighter / np.float32(255), grey / np.float32(255))
-
-
 def test_flip_masks_and_pictures() -> None:
     image, truth = pair()
     of_pixels = flip_map(image, truth)
-    assert of_pixels.shape == truth.shape[:2]
-    mask = np.zeros(of_pixels.shape, bool)
+    mask = np.zeros(truth.shape[:2], bool)
     mask[3:9, 4:20] = True
     assert flip(image, truth, mask) == pytest.approx(float(of_pixels[mask].mean()), rel=1e-5)
-    assert flip(image, truth) == pytest.approx(float(of_pixels.mean()), rel=1e-4)
     assert math.isnan(flip(image, truth, np.zeros_like(mask)))
-    shown = flip_picture(truth, truth)
-    assert shown.shape == truth.shape
-    assert shown.max() < 0.05
+    assert flip_picture(truth, truth).shape == truth.shape
+    assert flip_picture(truth, truth).max() < 0.05
 
 
 @pytest.fixture(scope="module")
@@ -132,17 +114,9 @@ def test_lpips_is_its_slow_twin(networks: Path, tmp_path: Path) -> None:
     torch.save(kept, tmp_path / "alex.pth")
     (tmp_path / "alexnet-owt-7be5be79.pth").symlink_to(networks / "alexnet-owt-7be5be79.pth")
     image, truth = pair(size=(70, 80))
+    assert Lpips(tmp_path)(truth, truth) == 0
+    assert math.isnan(Lpips(tmp_path)(truth[:30], truth[:30]))
     assert Lpips(tmp_path)(image, truth) == pytest.approx(slow_lpips(tmp_path, image, truth), rel=1e-4)
-
-
-def test_lpips_grows_with_the_noise(networks: Path) -> None:
-    lpips = Lpips(networks)
-    truth = smooth_texture(80, 96)
-    noise = np.random.default_rng(0).normal(0, 1, truth.shape).astype(np.float32)
-    distances = [lpips(np.clip(truth + strength * noise, 0, 1), truth) for strength in (0.0, 0.05, 0.3)]
-    assert distances[0] == 0
-    assert 0 < distances[1] < distances[2]
-    assert math.isnan(lpips(truth[:30], truth[:30]))
 
 
 @pytest.mark.parametrize("name", ["alexnet-owt-7be5be79.pth", "alex.pth"])

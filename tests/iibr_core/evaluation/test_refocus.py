@@ -9,7 +9,6 @@ from scipy.ndimage import map_coordinates
 from iibr_core.color import encoded_from_stored, linear_from_srgb, srgb_from_linear
 from iibr_core.evaluation.metrics import psnr
 from iibr_core.evaluation.refocus import FocalStack, Focus, foci_of
-from iibr_core.evaluation.warp import reference_warp
 from iibr_core.method.light_field import generate
 from iibr_core.types import ViewOffset
 from tests.iibr_core.known_scenes import WALL, disparity_of_square, offsets_of, view_of_wall
@@ -48,12 +47,6 @@ def test_sums_against_a_slow_twin(disparity: float) -> None:
     assert psnr(refocused(views, focus), expected) > (45 if disparity % 1 else 95)
 
 
-@pytest.mark.parametrize("radius", [0.5, 1.0, 3.3])
-def test_weights_are_the_area_of_the_disc(radius: float) -> None:
-    area = sum(Focus("x", 0.0, radius).weight(ViewOffset(t, s)) for t in range(-5, 6) for s in range(-5, 6))
-    assert area == pytest.approx(np.pi * radius**2, rel=0.15)
-
-
 def test_a_wall_is_sharp_in_focus_only() -> None:
     views = {at: view_of_wall(at, 2.5) for at in offsets_of(5, 5).values()}
     wall = view_of_wall(ViewOffset(0.0, 0.0), 2.5)
@@ -69,18 +62,11 @@ def test_foci_lie_where_the_scene_does() -> None:
 
 
 @pytest.mark.parametrize(("rows", "columns"), [(1, 1), (1, 9), (9, 1), (2, 2), (2, 9)])
-def test_few_views_are_no_lens(rows: int, columns: int) -> None:
+def test_few_views_and_one_pixel_are_no_lens(rows: int, columns: int) -> None:
     offsets = [at for at in offsets_of(rows, columns).values() if at != (0, 0)]
     assert foci_of(offsets, disparity_of_square()) == []
     assert foci_of([ViewOffset(t, s) for t in (-4.0, 4.0) for s in (-4.0, 4.0)], disparity_of_square()) == []
-
-
-def test_a_focus_that_shears_views_out_of_the_picture_is_left_out() -> None:
-    offsets = [at for at in offsets_of(3, 3).values() if at != (0, 0)]
-    disparity = disparity_of_square()
-    disparity[:12] = 1e6
-    assert "near" not in [focus.name for focus in foci_of(offsets, disparity)]
-    assert foci_of(offsets, np.zeros((1, 1), np.float32)) == []
+    assert foci_of([at for at in offsets_of(3, 3).values() if at != (0, 0)], np.zeros((1, 1), np.float32)) == []
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -94,11 +80,3 @@ def test_a_made_field_refocuses_as_the_lens_does(name: str) -> None:
     assert MADE_DB[name] < psnr(refocused(made, focus), lens) < psnr(refocused(true, focus), lens)
     turned = Focus("lens", -scene.lens.focus_disparity, scene.lens.radius_views)
     assert psnr(refocused(true, turned), lens) < MADE_DB[name] - 5
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_views_on_disk_follow_the_convention(name: str) -> None:
-    scene = lens_scene(name)
-    for sign, is_right in ((1, True), (-1, False)):
-        warped = reference_warp(scene.photo.pixels, np.float32(sign) * scene.disparity.values, GRID.offset(0, 4))
-        assert (psnr(warped.colors, scene.views[0, 4], warped.visible) > 33) == is_right

@@ -12,9 +12,8 @@ import pytest
 from iibr_core.depth.choice import DepthChoice
 from iibr_core.evaluation.evaluate import Options, evaluate
 from iibr_core.evaluation.scenes import find_scenes, read_scene, trial_input, trials_of, warp_disparity
-from iibr_core.formats.images.picture_source import PictureSource
 from iibr_core.formats.images.write import write_image
-from iibr_core.formats.light_fields.multi_view_scene import KnownView, MultiView, nearest_view
+from iibr_core.formats.light_fields.multi_view_scene import MultiView
 from iibr_core.types import InputError, ViewOffset
 from tests.iibr_core.known_scenes import (
     FOREGROUND,
@@ -80,15 +79,12 @@ def test_llff_in_a_turned_world_gives_the_same(tmp_path: Path) -> None:
     plain = scene_of(write_llff(tmp_path / "a", [(p, np.eye(3)) for p in places], 50.0))
     turned = [(tuple(world.T @ p), world) for p in np.array(places)]
     other = scene_of(write_llff(tmp_path / "b", turned, 50.0))
-    np.testing.assert_allclose(
-        np.array([v.offset for v in plain.views]), np.array([v.offset for v in other.views]), atol=1e-9
-    )
     for one, two in zip(plain.views, other.views):
+        np.testing.assert_allclose(one.offset, two.offset, atol=1e-9)
         assert one.camera is not None
         assert two.camera is not None
         np.testing.assert_allclose(one.camera.world_from_camera, two.camera.world_from_camera, atol=1e-6)
         np.testing.assert_allclose(one.camera.position, two.camera.position, atol=1e-6)
-    assert "0.2 view steps before or behind" in plain.notes[0]
 
 
 def test_views_of_turned_cameras_are_compared_as_they_are(tmp_path: Path) -> None:
@@ -107,20 +103,6 @@ def test_views_of_turned_cameras_are_compared_as_they_are(tmp_path: Path) -> Non
     assert rows["unchanged photo"].full_db < 25 < 35 < rows["iibr, given map"].visible_db
     assert rows["plain warp, given map"].visible_db > 35
     assert rows["one plane"].full_db > 30
-
-
-def test_folders_of_scenes_are_looked_through(tmp_path: Path) -> None:
-    write_grid(tmp_path / "b")
-    write_hci(tmp_path / "a")
-    (tmp_path / "other").mkdir()
-    assert [scene.name for scene in find_scenes(tmp_path)] == ["a", "b"]
-
-
-def test_the_centre_of_an_even_grid_is_farther_down_and_right() -> None:
-    views = tuple(
-        KnownView("", ViewOffset(t, s), PictureSource(Path())) for t in (0.0, 1.0) for s in (0.0, 1.0, 2.0, 3.0)
-    )
-    assert views[nearest_view(views, ViewOffset(0.5, 1.5))].offset == (1.0, 2.0)
 
 
 def test_a_pair_is_judged_from_the_left_without_a_corner_trial(tmp_path: Path) -> None:
@@ -147,19 +129,9 @@ def test_a_true_map_comes_alone_and_another_one_also_fitted(tmp_path: Path) -> N
     assert list(mine.maps) == ["given map", "given map, fitted"]
     assert mine.judge.source == "gt_disp_u01_v01.npy"
     assert np.abs(mine.maps["given map, fitted"].values - disparity_of_square()).max() < 0.2
-    (folder / "gt_disp_u01_v01.npy").rename(folder / "disp_est_u01_v01.npy")
-    given = trial_input(trials_of(scene_of(folder), "given")[0], "given", UNREFINED, 10**6)
-    assert given.maps["given map"].source == "disp_est_u01_v01.npy"
-    (folder / "disp_est_u01_v01.npy").unlink()
+    (folder / "gt_disp_u01_v01.npy").unlink()
     with pytest.raises(InputError, match="--disparity estimate"):
         trial_input(trials_of(scene_of(folder), "given")[0], "given", UNREFINED, 10**6)
-
-
-def test_an_estimate_comes_with_the_true_map(tmp_path: Path) -> None:
-    trial = trials_of(scene_of(write_grid(tmp_path / "square")), "estimate")[0]
-    found = trial_input(trial, "estimate", DepthChoice(start="rough"), 10**6)
-    assert list(found.maps) == ["guess", "guess, fitted", "true map"]
-    assert found.judge is found.maps["true map"]
 
 
 def test_a_map_is_carried_to_the_corner(tmp_path: Path) -> None:
@@ -171,58 +143,28 @@ def test_a_map_is_carried_to_the_corner(tmp_path: Path) -> None:
     np.testing.assert_allclose(warp_disparity(disparity_of_square(), ViewOffset(-1.0, 1.0)), wanted, atol=1e-5)
 
 
-Damage = Callable[[Path], object]
-
-
-def rows_of(folder: Path) -> np.ndarray:
-    return np.load(folder / "poses_bounds.npy")
-
-
-def spoil(folder: Path, row: int, column: int, value: float) -> None:
-    rows = rows_of(folder)
-    rows[row, column] = value
-    np.save(folder / "poses_bounds.npy", rows)
-
-
-GRID_DAMAGE: list[tuple[Damage, str]] = [
-    (lambda f: (f / "views/v01_u02.png").unlink(), r"v01_u02\.png: this view is missing"),
-    (lambda f: (f / "views/v01_u02.png").rename(f / "views/v01_u03.png"), "missing"),
-    (lambda f: write_image(f / "views/v02_u02.png", np.zeros((5, 5, 3), np.float32)), "v02_u02.png"),
-    (lambda f: (f / "views/v02_u02.png").write_bytes(b"\x89PNG\r\n\x1a\n"), "v02_u02.png"),
-    (lambda f: write_image(f / "views/v1_u1.exr", np.zeros((5, 5, 3), np.float32)), "same view"),
-]
-LLFF_DAMAGE: list[tuple[Damage, str]] = [
-    (lambda f: (f / "images/IMG_01.png").unlink(), "3 poses for 2 pictures"),
-    (lambda f: (f / "poses_bounds.npy").write_bytes(b"no array"), "poses_bounds.npy"),
-    (lambda f: np.save(f / "poses_bounds.npy", rows_of(f)[:, :16]), "17 numbers"),
-    (lambda f: np.save(f / "poses_bounds.npy", np.zeros((3, 17), object), allow_pickle=True), "poses_bounds.npy"),
-    (lambda f: spoil(f, 0, 0, np.nan), "NaN"),
-    (lambda f: spoil(f, 1, 0, 3.0), "rotation"),
-    (lambda f: spoil(f, 1, 4, 0.0), "pixels"),
-    (lambda f: spoil(f, 2, 15, -1.0), "depths"),
-]
-
-
-@pytest.mark.parametrize(("damage", "named"), [*GRID_DAMAGE, *LLFF_DAMAGE])
-def test_a_damaged_scene_is_one_clear_line(tmp_path: Path, damage: Damage, named: str) -> None:
-    if (damage, named) in GRID_DAMAGE:
-        folder = write_grid(tmp_path / "scene")
+@pytest.mark.parametrize(
+    ("damage", "named"),
+    [
+        (lambda f: write_image(f / "views/v1_u1.exr", np.zeros((5, 5, 3), np.float32)), "same view"),
+        (lambda f: (f / "images/IMG_01.png").unlink(), "3 poses for 2 pictures"),
+        (lambda f: np.save(f / "poses_bounds.npy", np.zeros((3, 16))), "17 numbers"),
+    ],
+)
+def test_a_damaged_scene_is_one_clear_line(tmp_path: Path, damage: Callable[[Path], object], named: str) -> None:
+    if named == "same view":
+        write_grid(tmp_path / "scene")
     else:
-        folder = write_llff(tmp_path / "fern", [((float(k), 0.0, 0.0), np.eye(3)) for k in range(3)], 50.0)
-    damage(folder)
-    with pytest.raises(InputError, match=named) as caught:
-        list(find_scenes(folder))
-    assert "\n" not in str(caught.value)
+        write_llff(tmp_path / "scene", [((float(k), 0.0, 0.0), np.eye(3)) for k in range(3)], 50.0)
+    damage(tmp_path / "scene")
+    with pytest.raises(InputError, match=rf"^[^\n]*{named}[^\n]*$"):
+        list(find_scenes(tmp_path / "scene"))
 
 
-def test_damaged_parameters_and_gaps_of_hci_are_named(tmp_path: Path) -> None:
+def test_parameters_that_do_not_fit_the_views_of_hci_are_named(tmp_path: Path) -> None:
     folder = write_hci(tmp_path / "dino")
     (folder / "parameters.cfg").write_text("[extrinsics]\nnum_cams_x = 4\nnum_cams_y = 2\n")
     with pytest.raises(InputError, match=r"9 views do not fit a grid of 2x4"):
-        read_scene(folder)
-    (folder / "parameters.cfg").unlink()
-    (folder / "input_Cam004.png").unlink()
-    with pytest.raises(InputError, match=r"input_Cam004\.png: this view is missing \(1 of 9"):
         read_scene(folder)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -17,11 +17,11 @@ from tests.viewer.conftest import FAR, NEAR, Driver, Opener
 from viewer.app.main_loop import App
 from viewer.model.actions import AskToSave, EndGesture, Notify, SetDepthStrength, ShowPrompt
 from viewer.model.state.depth_editing import Brush, SetBrush, SetTone
-from viewer.model.state.inspection import SetInspection, SetOverlay
+from viewer.model.state.inspection import SetInspection
 from viewer.model.state.notices import Notice
 from viewer.model.state.optics_actions import MoveEye
-from viewer.model.state.preferences import SECTIONS, SetPreference, ToggleSection, with_sections
-from viewer.model.state.prompts import PalettePrompt, PathPrompt, SavePrompt
+from viewer.model.state.preferences import SECTIONS, with_sections
+from viewer.model.state.prompts import PathPrompt, SavePrompt
 
 pytestmark = pytest.mark.usefixtures("no_dialogs")
 GRID = GridShape(3, 3)
@@ -50,6 +50,17 @@ def is_made(app: App) -> bool:
     return app.scene_view.generation == app.state.generation
 
 
+def settle(viewer: Driver, condition: Callable[[App], bool]) -> None:
+    """Draw until a condition is true and nothing is left to do."""
+    viewer.until(condition)
+    viewer.until_idle()
+
+
+def until_made(viewer: Driver, generation: int) -> None:
+    """Draw until the screen shows this generation of the scene."""
+    settle(viewer, lambda app: app.state.generation == generation and is_made(app))
+
+
 def press_at(viewer: Driver, x_share: float, y_share: float) -> None:
     """Put the pointer there and hold it down."""
     x, y = viewer.position(x_share, y_share)
@@ -71,20 +82,17 @@ def test_a_stroke_is_seen_while_it_is_drawn_and_made_when_it_ends(viewer: Driver
     assert viewer.app.state.generation == 1
     np.testing.assert_array_equal(disparity_of(viewer.app), given)
     viewer.send("mouseup", 1)
-    viewer.until(lambda app: app.state.stroke is None and is_made(app))
-    viewer.until_idle()
-    assert viewer.app.state.generation == 2
+    until_made(viewer, 2)
     assert viewer.app.scene_view.renderer.field.present.sum() == 9
     made = disparity_of(viewer.app)
     assert made.max() == pytest.approx(NEAR + (NEAR - FAR), abs=0.2)
     far = given == FAR
     np.testing.assert_array_equal(made[far], given[far], "the red square's contour holds the stroke")
     viewer.send("key", "ctrl+z")
-    viewer.until(lambda app: app.state.generation == 3 and is_made(app))
-    viewer.until_idle()
+    until_made(viewer, 3)
     np.testing.assert_array_equal(disparity_of(viewer.app), given)
     viewer.send("key", "ctrl+shift+z")
-    viewer.until(lambda app: app.state.generation == 4 and is_made(app))
+    until_made(viewer, 4)
     np.testing.assert_array_equal(disparity_of(viewer.app), made)
 
 
@@ -103,27 +111,13 @@ def test_the_bucket_fills_the_surface_that_is_clicked_with_the_depth_picked_else
     np.testing.assert_array_equal(disparity_of(viewer.app), given)
     press_at(viewer, 0.5, 0.5)
     viewer.send("mouseup", 1)
-    viewer.until(lambda app: app.state.stroke is None and is_made(app))
-    viewer.until_idle()
+    until_made(viewer, 2)
     is_far = np.isclose(disparity_of(viewer.app), FAR)
     assert is_far[given == FAR].all()
     assert is_far[given == NEAR].mean() > 0.7
     viewer.send("key", "ctrl+z")
-    viewer.until(lambda app: app.state.generation == 3 and is_made(app))
+    until_made(viewer, 3)
     np.testing.assert_array_equal(disparity_of(viewer.app), given)
-
-
-def test_the_disparity_as_colours_follows_the_brush(viewer: Driver) -> None:
-    viewer.app.do(
-        SetOverlay("disparity"), SetInspection("opacity", 1.0), SetBrush(Brush("farther", 0.1, 1.0, is_on=True))
-    )
-    viewer.until_idle()
-    shown = viewer.app.inspection_view._drawn["overlay"][0]
-    press_at(viewer, 0.5, 0.5)
-    viewer.until(lambda app: app.inspection_view._drawn["overlay"][0] != shown)
-    viewer.send("mouseup", 1)
-    viewer.until(lambda app: is_made(app) and app.state.stroke is None)
-    viewer.until_idle()
 
 
 def test_escape_in_the_middle_of_a_stroke_takes_it_back(viewer: Driver) -> None:
@@ -134,8 +128,7 @@ def test_escape_in_the_middle_of_a_stroke_takes_it_back(viewer: Driver) -> None:
     viewer.send("key", "Escape")
     viewer.until(lambda app: app.state.stroke is None)
     viewer.send("mouseup", 1)
-    viewer.until(lambda app: is_made(app))
-    viewer.until_idle()
+    settle(viewer, is_made)
     np.testing.assert_array_equal(disparity_of(viewer.app), given)
     assert not viewer.app.state.history.past
     viewer.send("key", "Escape")
@@ -145,25 +138,32 @@ def test_escape_in_the_middle_of_a_stroke_takes_it_back(viewer: Driver) -> None:
 
 def test_closing_the_window_asks_before_depth_edits_are_lost(viewer: Driver, tmp_path: Path) -> None:
     viewer.app.do(SetTone(replace(UNEDITED, gamma=1.5), is_finished=True))
-    viewer.until(lambda app: is_made(app))
-    viewer.until_idle()
+    settle(viewer, is_made)
     glfw.set_window_should_close(viewer.app.window.handle, True)
-    viewer.until(lambda app: app.state.prompt == "quit")
-    viewer.until_idle()
+    settle(viewer, lambda app: app.state.prompt == "quit")
     viewer.press("Save the depth map…", "prompt str")
-    viewer.until(lambda app: isinstance(app.state.prompt, SavePrompt))
-    viewer.until_idle()
+    settle(viewer, lambda app: isinstance(app.state.prompt, SavePrompt))
     viewer.send("key", "Return")
-    viewer.until(lambda app: not app.state.has_unsaved_edits)
-    viewer.until_idle()
+    settle(viewer, lambda app: not app.state.has_unsaved_edits)
     glfw.set_window_should_close(viewer.app.window.handle, True)
     viewer.until(lambda app: app.state.should_quit)
 
 
-def test_the_brush_is_taken_from_the_panel_and_by_key(viewer: Driver) -> None:
-    viewer.press("Smooth")
-    viewer.until(lambda app: app.state.brush == replace(app.state.brush, tool="smooth", is_on=True))
+def test_the_key_that_takes_the_brush_brings_it_into_sight_and_puts_it_away(viewer: Driver) -> None:
+    """Its section opens and the panel scrolls there: the slider comes under a pointer that only goes down the panel."""
+    sections = tuple(section for section in SECTIONS if section != "depth")
+    preferences = replace(viewer.app.state.preferences, open_sections=sections)
+    viewer.app.state = replace(viewer.app.state, preferences=preferences)
+    viewer.send("mousemove", *viewer.position(0.5, 0.5))
     viewer.until_idle()
+    panel = imgui.internal.find_window_by_name("panel")
+    assert panel.scroll.y == 0
+    viewer.send("key", "b")
+    settle(viewer, lambda app: app.state.brush.is_on)
+    assert set(viewer.app.state.preferences.open_sections) == set(SECTIONS)
+    assert panel.scroll.y > 0
+    viewer.press("Smooth")
+    settle(viewer, lambda app: app.state.brush == replace(app.state.brush, tool="smooth", is_on=True))
     viewer.slide("##Size", 0.9)
     assert viewer.app.state.brush.radius > 0.1
     viewer.send("key", "b")
@@ -176,34 +176,13 @@ def test_the_brush_is_taken_from_the_panel_and_by_key(viewer: Driver) -> None:
     assert viewer.app.state.depth.edits.strokes == ()
 
 
-def test_the_key_that_takes_the_brush_brings_it_into_sight(viewer: Driver) -> None:
-    """Its section opens and the panel scrolls there: the slider comes under a pointer that only goes down the panel."""
-    sections = tuple(section for section in SECTIONS if section != "depth")
-    preferences = replace(viewer.app.state.preferences, open_sections=sections)
-    viewer.app.state = replace(viewer.app.state, preferences=preferences)
-    viewer.send("mousemove", *viewer.position(0.5, 0.5))
-    viewer.until_idle()
-    panel = imgui.internal.find_window_by_name("panel")
-    assert panel.scroll.y == 0
-    viewer.send("key", "b")
-    viewer.until(lambda app: app.state.brush.is_on)
-    viewer.until_idle()
-    assert set(viewer.app.state.preferences.open_sections) == set(SECTIONS)
-    assert panel.scroll.y > 0
-    viewer.press("Smooth")
-    viewer.until(lambda app: app.state.brush.tool == "smooth")
-
-
 def test_sliders_and_handles_change_the_map_once_they_are_let_go(viewer: Driver) -> None:
     viewer.slide("##Far clip", 0.2)
-    viewer.until(is_made)
-    viewer.until_idle()
+    until_made(viewer, 2)
     assert 0 < viewer.app.state.depth.edits.far_clip < 0.5
-    assert viewer.app.state.generation == 2
     # where `find` looks
     viewer.app.do(SetTone(replace(viewer.app.state.depth.edits, near_clip=0.77), is_finished=True), EndGesture())
-    viewer.until(is_made)
-    viewer.until_idle()
+    until_made(viewer, 3)
     x, y = viewer.find("handle near_clip")
     viewer.send("mousedown", 1)
     viewer.app.step()
@@ -212,8 +191,7 @@ def test_sliders_and_handles_change_the_map_once_they_are_let_go(viewer: Driver)
     viewer.until(lambda app: app.state.depth.edits.near_clip < 0.7 and app.scene_view.previews > previews)
     assert viewer.app.state.generation == 3
     viewer.send("mouseup", 1)
-    viewer.until(lambda app: app.state.generation == 4 and is_made(app))
-    viewer.until_idle()
+    until_made(viewer, 4)
     assert disparity_of(viewer.app).max() < NEAR
     assert len(viewer.app.state.history.past) == 3
 
@@ -221,30 +199,25 @@ def test_sliders_and_handles_change_the_map_once_they_are_let_go(viewer: Driver)
 def test_refine_is_worked_out_anew_without_reading_the_photo(viewer: Driver, photo_path: Path) -> None:
     photo_path.unlink()
     viewer.press("Refine edges")
-    viewer.until(lambda app: app.state.generation == 2 and is_made(app))
-    viewer.until_idle()
+    until_made(viewer, 2)
     assert not viewer.app.state.depth.refine
     assert viewer.app.scene_view.loaded is not None
     assert viewer.app.scene_view.loaded.depth_settings == viewer.app.state.depth
     viewer.app.do(SetDepthStrength(2.0, is_finished=True))
-    viewer.until(lambda app: app.state.generation == 3 and is_made(app))
-    viewer.until_idle()
+    until_made(viewer, 3)
     assert not viewer.app.state.notices
 
 
 def test_a_map_is_saved_and_opened_again_by_its_path(viewer: Driver, photo_path: Path, tmp_path: Path) -> None:
     viewer.press("Invert")
-    viewer.until(lambda app: app.state.generation == 2 and is_made(app))
-    viewer.until_idle()
+    until_made(viewer, 2)
     wanted = disparity_of(viewer.app).copy()
     viewer.app.do(AskToSave("map"))
-    viewer.until(lambda app: isinstance(app.state.prompt, SavePrompt))
-    viewer.until_idle()
+    settle(viewer, lambda app: isinstance(app.state.prompt, SavePrompt))
     out = tmp_path / "turned.npy"
     viewer.type(str(out))
     viewer.send("key", "Return")
-    viewer.until(lambda app: out.exists())
-    viewer.until_idle()
+    settle(viewer, lambda app: out.exists())
     np.testing.assert_array_equal(np.load(out), wanted)
     assert str(out) in viewer.app.state.notices[-1].text
     viewer.app.do(ShowPrompt(PathPrompt("map")))
@@ -252,8 +225,7 @@ def test_a_map_is_saved_and_opened_again_by_its_path(viewer: Driver, photo_path:
     viewer.type(str(out))
     viewer.send("key", "Return")
     viewer.until(lambda app: app.state.source is not None and app.state.source.depth.file == str(out))
-    viewer.until(is_made)
-    viewer.until_idle()
+    settle(viewer, is_made)
     assert viewer.app.state.depth.edits == DepthEdits()
     np.testing.assert_array_equal(disparity_of(viewer.app), wanted)
     assert viewer.app.state.scene is not None
@@ -263,26 +235,14 @@ def test_a_map_is_saved_and_opened_again_by_its_path(viewer: Driver, photo_path:
 
 def test_a_bad_map_leaves_the_scene_and_its_edits_with_a_notice(viewer: Driver, tmp_path: Path) -> None:
     viewer.press("Invert")
-    viewer.until(lambda app: app.state.generation == 2 and is_made(app))
+    until_made(viewer, 2)
     bad = tmp_path / "bad.pfm"
     bad.write_bytes(b"no map")
     viewer.app.window.on_drop(None, [str(bad)])
     viewer.until(lambda app: any("bad.pfm" in notice.text for notice in app.state.notices))
-    viewer.until(is_made)
-    viewer.until_idle()
+    settle(viewer, is_made)
     assert viewer.app.state.depth.edits.is_inverted
     assert disparity_of(viewer.app)[0, 0] == NEAR
-
-
-def test_one_escape_closes_the_palette(viewer: Driver) -> None:
-    viewer.send("key", "ctrl+p")
-    viewer.until(lambda app: isinstance(app.state.prompt, PalettePrompt))
-    viewer.until_idle()
-    viewer.type("depth")
-    viewer.send("key", "Escape")
-    viewer.until(lambda app: app.state.prompt is None)
-    viewer.until_idle()
-    assert not viewer.app.state.should_quit
 
 
 def test_a_notice_in_a_low_window_leaves_the_strips_free(viewer: Driver) -> None:
@@ -294,10 +254,3 @@ def test_a_notice_in_a_low_window_leaves_the_strips_free(viewer: Driver) -> None
     assert frame.pos.y >= 0
     assert frame.pos.y + frame.size.y <= layout.strip_across.y
     assert frame.pos.x + frame.size.x <= layout.strip_down.x
-
-
-def test_no_dialog_means_a_prompt(viewer: Driver) -> None:
-    viewer.press("Open map…")
-    viewer.until(lambda app: isinstance(app.state.prompt, PathPrompt) and app.state.prompt.what == "map")
-    viewer.app.do(ShowPrompt(None), SetPreference("font_scale", 1.0), ToggleSection("depth"))
-    viewer.until_idle()

@@ -13,9 +13,9 @@ from iibr_core.depth.editing.edits import BrushTool, DepthEdits, Stroke
 from tests.viewer.conftest import headless_with_scene
 from viewer.app.headless import HeadlessViewer
 from viewer.display.depth_preview import DepthPreview
-from viewer.model.actions import AskToSave, SetHover
+from viewer.model.actions import SetHover
 from viewer.model.layout import PANEL_WIDTH
-from viewer.model.state.app_state import AppState, Hover
+from viewer.model.state.app_state import Hover
 from viewer.model.state.depth_editing import Brush, DepthSample, SetBrush, SetTone
 from viewer.model.state.inspection import SetInspection, SetOverlay
 from viewer.model.state.preferences import SetPreference, Theme
@@ -78,34 +78,10 @@ def test_the_panel_ends_at_its_border_at_any_size_of_text(
     assert (margin == margin[0, 0]).all(axis=2).mean() > 0.95, "nor over the right one"
 
 
-def test_the_prompt_for_a_map_has_no_size(viewer: HeadlessViewer) -> None:
-    viewer.do(AskToSave("picture"))
-    picture = viewer.screen(SIZE)
-    viewer.do(AskToSave("map"))
-    assert differs(picture, viewer.screen(SIZE))[PICTURE].sum() > 500
-
-
 def test_a_stroke_under_way_is_seen_in_colours(viewer: HeadlessViewer) -> None:
     viewer.do(SetOverlay("disparity"), SetInspection("opacity", 1.0))
-    scene_view, before = viewer._scene_view, viewer.screen(SIZE)
-    preview = DepthPreview(scene_view)
-    preview.update(viewer.state)
-    assert scene_view.previews == 0, "nothing is edited yet"
-    stroke = Stroke("farther", ((0.5, 0.5),), 0.1, 1.0)
-    viewer.state = replace(viewer.state, stroke=stroke)
-    preview.update(viewer.state)
-    preview.update(viewer.state)
-    assert scene_view.previews == 1
-    changed = differs(before, viewer.screen(SIZE))
-    assert changed[PICTURE].sum() > 200
-    viewer.state = replace(viewer.state, stroke=None)
-    preview.update(viewer.state)
-    assert scene_view.previews == 2
-    assert not differs(before, viewer.screen(SIZE))[PICTURE].any()
-
-
-def test_an_empty_window_has_no_depth(viewer: HeadlessViewer) -> None:
-    preview = DepthPreview(viewer._scene_view)
-    previews = viewer._scene_view.previews
-    preview.update(AppState())
-    assert viewer._scene_view.previews == previews
+    preview, before = DepthPreview(viewer._scene_view), viewer.screen(SIZE)
+    for stroke, is_seen in ((Stroke("farther", ((0.5, 0.5),), 0.1, 1.0), True), (None, False)):
+        viewer.state = replace(viewer.state, stroke=stroke)
+        preview.update(viewer.state)
+        assert (differs(before, viewer.screen(SIZE))[PICTURE].sum() > 200) == is_seen

@@ -8,27 +8,18 @@ import pytest
 from iibr_core.depth.edges.fit import _find_missing, fit_to_blur
 from iibr_core.runtime.work import Cancelled, stoppable
 from iibr_core.training.degradation import blur
-from tests.iibr_core.scenes import smooth_texture
+from tests.iibr_core.depth.edges.test_refine import disc_before_slope
 
-SIZE = (96, 128)
 SIGMA, EDGE = 2.0, 0.12
 
 
-def disc() -> tuple[np.ndarray, np.ndarray]:
-    """Return a photo and the exact disparity of a disc before a slanted wall, textured alike."""
-    y, x = np.mgrid[: SIZE[0], : SIZE[1]]
-    is_disc = np.hypot(x - 60, y - 45) < 24
-    photo = np.where(is_disc[..., None], smooth_texture(*SIZE, 3) * [1, 0.7, 0.5], smooth_texture(*SIZE, 4) * 0.6)
-    return photo.astype(np.float32), np.where(is_disc, 2.0, 0.2 + 0.002 * x).astype(np.float32)
-
-
-def ragged(exact: np.ndarray) -> np.ndarray:
-    """Return the map with an outline that is wrong by a pixel, here and there."""
-    rng = np.random.default_rng(5)
-    dy, dx = (np.rint(blur(rng.normal(size=SIZE).astype(np.float32), 1.0) * 4).clip(-1, 1).astype(int) for _ in "yx")
-    y, x = np.mgrid[: SIZE[0], : SIZE[1]]
-    is_disc = exact[np.clip(y + dy, 0, SIZE[0] - 1), np.clip(x + dx, 0, SIZE[1] - 1)] > 1.2
-    return np.where(is_disc, 2.0, 0.2 + 0.002 * x).astype(np.float32)
+def scene() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return a photo, its exact disparity and one with an outline that is wrong by a pixel, here and there."""
+    photo, exact, _ = disc_before_slope(120)
+    rng, places = np.random.default_rng(5), np.mgrid[:120, :120]
+    shifts = [np.rint(blur(rng.normal(size=(120, 120)).astype(np.float32), 1.0) * 4).clip(-1, 1) for _ in "yx"]
+    y, x = (places + shifts).clip(0, 119).astype(int)
+    return photo, exact, exact[y, x]
 
 
 def wrong_side(fitted: np.ndarray, exact: np.ndarray) -> int:
@@ -36,16 +27,15 @@ def wrong_side(fitted: np.ndarray, exact: np.ndarray) -> int:
 
 
 def test_ragged_outlines_become_whole() -> None:
-    photo, exact = disc()
-    start = ragged(exact)
+    photo, exact, start = scene()
     fitted = fit_to_blur(photo, blur(exact, SIGMA), start, SIGMA, EDGE)
     assert wrong_side(start, exact) > 80
     assert wrong_side(fitted, exact) < 0.1 * wrong_side(start, exact)
 
 
 def test_pixels_that_were_not_sharpened_stay_if_nothing_moves_beside_them() -> None:
-    photo, exact = disc()
-    soft, start = blur(exact, SIGMA), ragged(exact)
+    photo, exact, start = scene()
+    soft = blur(exact, SIGMA)
     soft[:, :60] = start[:, :60]
     fitted = fit_to_blur(photo, soft, start, SIGMA, EDGE)
     np.testing.assert_array_equal(fitted[:, :48], start[:, :48])
@@ -53,18 +43,18 @@ def test_pixels_that_were_not_sharpened_stay_if_nothing_moves_beside_them() -> N
 
 
 def test_the_missing_part_is_the_map_minus_the_blurred_one() -> None:
-    exact = ragged(disc()[1])
+    _, _, exact = scene()
     taps = np.exp(-0.5 * (np.arange(-6, 7) / SIGMA) ** 2)
     taps = (taps / taps.sum()).astype(np.float32)
     missing = np.empty_like(exact)
-    _find_missing(np.zeros_like(exact), exact, taps, 0, SIZE[0], missing)
+    _find_missing(np.zeros_like(exact), exact, taps, 0, 120, missing)
     padded = np.pad(exact, 6, mode="edge")
-    for y, x in ((0, 0), (50, 36), (95, 127)):
+    for y, x in ((0, 0), (50, 36), (119, 119)):
         assert -missing[y, x] == pytest.approx(taps @ padded[y : y + 13, x : x + 13] @ taps, abs=1e-5)
 
 
 def test_fitting_can_be_cancelled() -> None:
-    photo, exact = disc()
+    photo, exact, start = scene()
     answers = iter([False] * 3)
     with pytest.raises(Cancelled), stoppable(lambda: next(answers, True)):
-        fit_to_blur(photo, blur(exact, SIGMA), ragged(exact), SIGMA, EDGE)
+        fit_to_blur(photo, blur(exact, SIGMA), start, SIGMA, EDGE)

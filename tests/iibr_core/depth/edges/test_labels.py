@@ -5,22 +5,11 @@ import pytest
 from scipy import ndimage
 
 from iibr_core.depth.edges import labels
-from iibr_core.depth.edges.labels import BAND_PX, VOTE, label_edges, step_distance
+from iibr_core.depth.edges.labels import BAND_PX, VOTE, label_edges
 from iibr_core.runtime.work import Cancelled, stoppable
 from tests.iibr_core.scenes import smooth_texture
 
 EDGE, NEAR, FAR = 0.3, 5.0, 1.0
-
-
-def dilated_square(size=26):
-    """A square before a wall, textures of different brightness; its map, one pixel too large, with a few unknown."""
-    rng = np.random.default_rng(3)
-    truth = np.full((size, size), FAR, np.float32)
-    truth[8:18, 8:18] = NEAR
-    photo = 0.25 * smooth_texture(size, size) + np.where(truth == NEAR, 0.55, 0.1)[..., None].astype(np.float32)
-    given = ndimage.maximum_filter(truth, 3)
-    unknown = rng.random(truth.shape) < 0.03
-    return photo + rng.normal(0, 0.01, photo.shape).astype(np.float32), given, unknown, truth
 
 
 def around(values, y, x, reach):
@@ -137,14 +126,6 @@ def slow_labels(colors, values, unknown):
     return np.where(belief < 0.5, other, values).astype(np.float32)
 
 
-def test_labels_are_those_of_the_slow_field_and_of_the_truth():
-    photo, given, unknown, truth = dilated_square()
-    labelled = label_edges(photo, given, unknown, EDGE)
-    np.testing.assert_allclose(labelled, slow_labels(photo, given, unknown), atol=1e-4)
-    assert (np.abs(given - truth) > 1).sum() == 44
-    assert (np.abs(labelled - truth) > 1).sum() <= 4
-
-
 @pytest.mark.parametrize(("seed", "contrast", "noise"), [(2, 0.25, 0.03), (4, 0.4, 0.02)])
 def test_labels_of_any_outline_are_those_of_the_slow_field(seed, contrast, noise):
     """Outlines up to the frame, textures like their difference: every pixel that tells colours counts somewhere."""
@@ -154,65 +135,55 @@ def test_labels_of_any_outline_are_those_of_the_slow_field(seed, contrast, noise
     light = np.where(truth == NEAR, 0.35, 0.2)[..., None] + rng.normal(0, noise, (40, 30, 3))
     photo = (contrast * smooth_texture(40, 30) + light).astype(np.float32)
     unknown = rng.random((40, 30)) < 0.05
-    labelled = label_edges(photo, given, unknown, EDGE)
-    np.testing.assert_allclose(labelled, slow_labels(photo, given, unknown), atol=1e-4)
-    assert (labelled != given).sum() > 100
-
-
-def test_distances_are_those_to_the_nearest_step_up_to_the_frame():
-    """Single pixels and things of several, some of them in the outermost rows and columns."""
-    truth = np.random.default_rng(1).choice(np.float32([FAR, NEAR]), (18, 24), p=(0.97, 0.03))
-    truth[3:7, 9:14] = truth[17, 20:] = truth[12:16, 23] = NEAR
-    found = step_distance(truth, EDGE, counts_slopes=True)
-    np.testing.assert_array_equal(found, slow_distance(truth))
-    assert set(found.flat) == set(range(BAND_PX + 2))
+    found = label_edges(photo, given, unknown, EDGE)
+    np.testing.assert_allclose(found, slow_labels(photo, given, unknown), atol=1e-4)
+    assert (found != given).sum() > 100
 
 
 def square(kind, size=60):
-    """A square before a wall, its exact map and a worse one of this kind."""
-    photo, _, _, _ = dilated_square(size)
+    """A square before a wall, textures of different brightness; its exact map and a worse one of this kind."""
     truth = np.full((size, size), FAR, np.float32)
     truth[20:41, 20:41] = NEAR
-    photo = 0.25 * photo + np.where(truth == NEAR, 0.55, 0.1)[..., None].astype(np.float32)
+    noise = np.random.default_rng(3).normal(0, 0.01, (size, size, 3))
+    photo = 0.06 * smooth_texture(size, size) + np.where(truth == NEAR, 0.69, 0.125)[..., None] + 0.25 * noise
     given = {
         "dilated": lambda: ndimage.maximum_filter(truth, 5),
         "eroded": lambda: ndimage.minimum_filter(truth, 5),
         "coarse": lambda: truth[1::3, 1::3].repeat(3, 0).repeat(3, 1),
         "exact": lambda: truth,
     }[kind]()
-    return photo, truth, np.ascontiguousarray(given)
+    return photo.astype(np.float32), truth, np.ascontiguousarray(given)
+
+
+def labelled(photo, given):
+    return label_edges(photo, given, np.zeros(given.shape, np.bool_), EDGE)
 
 
 @pytest.mark.parametrize("kind", ["dilated", "eroded", "coarse"])
 def test_maps_that_are_wrong_beside_their_edges_get_those_of_the_photo(kind):
     photo, truth, given = square(kind)
-    labelled = label_edges(photo, given, np.zeros(given.shape, np.bool_), EDGE)
-    assert (np.abs(labelled - truth) > 1).sum() <= 0.1 * (np.abs(given - truth) > 1).sum()
+    assert (np.abs(labelled(photo, given) - truth) > 1).sum() <= 0.1 * (np.abs(given - truth) > 1).sum()
 
 
 def test_exact_maps_keep_their_bits():
-    """Its edges mixed, as a lens and a sensor mix them, or not."""
+    """Their edges mixed, as a lens and a sensor mix them, or not; or with a line of colours that are not finite."""
     photo, truth, _ = square("exact")
-    nothing = np.zeros(truth.shape, np.bool_)
-    assert label_edges(photo, truth, nothing, EDGE) is truth
-    mixed = ndimage.uniform_filter(photo, (2, 2, 1))
-    assert label_edges(mixed, truth, nothing, EDGE) is truth
+    wild = photo.copy()
+    wild[30, 10:50] = np.nan
+    for colors in (photo, ndimage.uniform_filter(photo, (2, 2, 1)), wild):
+        np.testing.assert_array_equal(labelled(colors, truth), truth)
+    flat = np.ones_like(truth)
+    assert labelled(photo, flat) is flat, "it has no step"
 
 
-def test_a_wire_of_a_dilated_map_stays():
+@pytest.mark.parametrize("column", [50, 51])
+def test_a_wire_of_a_dilated_map_stays_also_beside_its_place(column):
     photo, truth, _ = square("exact")
-    truth[:, 50], photo[:, 50] = NEAR, (0.1, 0.6, 0.1)
-    given = ndimage.maximum_filter(truth, 3)
-    labelled = label_edges(photo, given, np.zeros(given.shape, np.bool_), EDGE)
-    assert (labelled[:, 50] == NEAR).all()
-
-
-def test_a_wire_beside_its_place_is_not_lost():
-    photo, truth, _ = square("exact")
-    given = ndimage.maximum_filter(truth, 3)
-    photo[:, 51], given[:, 50] = (0.1, 0.6, 0.1), NEAR
-    labelled = label_edges(photo, given, np.zeros(given.shape, np.bool_), EDGE)
-    assert (labelled[:, 50] == NEAR).all()
+    photo[:, column] = 0.1, 0.6, 0.1
+    wire = truth.copy()
+    wire[:, 50] = NEAR
+    given = ndimage.maximum_filter(wire, 3) if column == 50 else np.maximum(ndimage.maximum_filter(truth, 3), wire)
+    assert (labelled(photo, given)[:, 50] == NEAR).all()
 
 
 @pytest.mark.parametrize("at", [(13, 30), (30, 13), (47, 30), (30, 47)])
@@ -222,7 +193,7 @@ def test_what_is_unknown_goes_where_its_colours_are_as_far_as_the_band_reaches(a
     unknown = np.zeros(given.shape, np.bool_)
     unknown[at], photo[at] = True, photo[30, 30]
     assert label_edges(photo, given, unknown, EDGE)[at] == NEAR
-    assert label_edges(photo, given, np.zeros_like(unknown), EDGE)[at] == FAR
+    assert labelled(photo, given)[at] == FAR
 
 
 def test_a_dilated_map_of_a_front_out_of_focus_keeps_what_is_mixed():
@@ -230,34 +201,12 @@ def test_a_dilated_map_of_a_front_out_of_focus_keeps_what_is_mixed():
     share = np.clip(0.5 - (x - 29.5) / 4, 0, 1)[..., None]
     photo = share * np.array([0.2, 0.15, 0.1]) + (1 - share) * np.array([0.7, 0.75, 0.8])
     photo = (photo + np.random.default_rng(0).normal(0, 0.005, photo.shape)).astype(np.float32)
-    values = np.where(x < 34, NEAR, FAR).astype(np.float32)
-    labelled = label_edges(photo, values, np.zeros(values.shape, np.bool_), EDGE)
-    assert (labelled[2:-2, :31] == NEAR).all()
-    assert (labelled[2:-2, 32:] == FAR).all()
+    found = labelled(photo, np.where(x < 34, NEAR, FAR).astype(np.float32))
+    assert (found[2:-2, :31] == NEAR).all()
+    assert (found[2:-2, 32:] == FAR).all()
 
 
-def test_colours_that_are_not_finite_tell_nothing():
-    photo, truth, _ = square("exact")
-    photo[30, 10:50] = np.nan
-    labelled = label_edges(photo, truth, np.zeros(truth.shape, np.bool_), EDGE)
-    np.testing.assert_array_equal(labelled, truth)
-
-
-def test_outside_the_band_bits_stay():
+def test_it_stops_when_asked():
     photo, _, given = square("dilated")
-    given += np.random.default_rng(1).normal(0, 0.01, given.shape).astype(np.float32)
-    labelled = label_edges(photo, given, np.zeros(given.shape, np.bool_), EDGE)
-    outside = step_distance(given, EDGE) > BAND_PX
-    np.testing.assert_array_equal(labelled[outside], given[outside])
-
-
-def test_a_map_without_steps_stays_as_it_is():
-    photo, given, unknown, _ = dilated_square()
-    flat = np.ones_like(given)
-    assert label_edges(photo, flat, unknown, EDGE) is flat
-
-
-def test_a_stop_is_heard():
-    photo, given, unknown, _ = dilated_square()
     with pytest.raises(Cancelled), stoppable(lambda: True):
-        label_edges(photo, given, unknown, EDGE)
+        labelled(photo, given)

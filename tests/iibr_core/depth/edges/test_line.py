@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.ndimage import map_coordinates
 
-from iibr_core.depth.edges.line import gradient, height_at, is_inside, walk
+from iibr_core.depth.edges.line import gradient, height_at
 
 
 def test_heights_are_bilinear_and_the_border_goes_on():
@@ -16,55 +16,9 @@ def test_heights_are_bilinear_and_the_border_goes_on():
     assert height_at(values, 6.0, 4.0) == values[4, 6]
 
 
-def test_the_inside_ends_at_the_centres_of_the_outermost_pixels():
-    values = np.zeros((4, 6), np.float32)
-    assert is_inside(values, 0.0, 0.0)
-    assert is_inside(values, 5.0, 3.0)
-    assert not any(is_inside(values, *at) for at in ((5.01, 1), (-0.01, 1), (1, 3.01), (1, -0.01)))
-
-
-def test_gradients_of_planes_are_exact_and_of_steps_along_them():
+def test_gradients_of_planes_are_exact():
     y, x = np.mgrid[:9, :11].astype(np.float32)
     np.testing.assert_allclose(gradient(0.5 * x - 0.25 * y, 5, 4), (0.5, -0.25), atol=1e-6)
-    across, down = gradient((x > 4.5).astype(np.float32), 5, 4)
-    assert across > 0.2
-    assert down == 0
     # Rows and columns are alike.
     bumpy = np.random.default_rng(2).normal(0, 1, (9, 9)).astype(np.float32)
     assert gradient(bumpy, 3, 6) == pytest.approx(gradient(bumpy.T.copy(), 6, 3)[::-1], abs=1e-6)
-
-
-def ramp(first, last, height=1.0, slant=0.0):
-    """A map that rises along x between two columns, on a slanted surface."""
-    x = np.arange(60, dtype=np.float32)
-    return np.tile(height * np.clip((x - first) / (last - first), 0, 1) + slant * x, (9, 1)).astype(np.float32)
-
-
-@pytest.mark.parametrize(("slant", "late"), [(0.0, 0), (0.005, 0), (0.03, 1)])
-def test_a_walk_ends_where_the_ramp_does(slant, late):
-    """On a steeper surface it takes one step more to see that it has levelled off."""
-    values = ramp(20.0, 30.0, slant=slant)
-    length, end, steepest, at = walk(values, 25.0, 4.0, 1.0, 0.0, 1, 20, 1.0, 9.0)
-    assert (length, end) == (5.0 + late, pytest.approx(1 + (30 + late) * slant))
-    assert steepest == pytest.approx(0.1 + slant, abs=1e-6)
-    assert 0 < at <= 5
-    down = walk(values, 25.0, 4.0, 1.0, 0.0, -1, 20, 1.0, 9.0)
-    assert down[:2] == (5.0 + late, pytest.approx((20 - late) * slant))
-
-
-def test_shorter_steps_end_at_the_same_place():
-    for pace in (0.5, 2.5):
-        found = walk(ramp(20.0, 30.0), 25.0, 4.0, 1.0, 0.0, 1, 20, pace, 9.0)
-        assert found[:2] == (5.0, pytest.approx(1))
-        assert found[2] == pytest.approx(0.1, abs=1e-6)
-
-
-def test_a_walk_goes_no_farther_than_told_and_ends_where_it_falls():
-    steady = ramp(0.0, 59.0)
-    assert walk(steady, 20.0, 4.0, 1.0, 0.0, 1, 7, 1.0, 99.0)[0] == 7
-    assert walk(steady, 20.0, 4.0, 1.0, 0.0, 1, 8, 0.5, 99.0)[0] == 4
-    # The steepest place is half-way along the first step.
-    rounded = np.tile(-(0.99 ** np.arange(60)), (9, 1)).astype(np.float32)
-    assert walk(rounded, 20.0, 4.0, 1.0, 0.0, 1, 30, 1.0, 6.0)[0] == 7
-    peak = np.minimum(ramp(20.0, 30.0), ramp(40.0, 30.0))
-    assert walk(peak, 26.0, 4.0, 1.0, 0.0, 1, 20, 1.0, 9.0)[:2] == (4.0, pytest.approx(1))

@@ -9,21 +9,20 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from iibr_core.depth.edges.refine import refine
-from iibr_core.training.degradation import blur, coarsen
+from iibr_core.training.degradation import blur
 from iibr_core.training.scenes.random_scene import random_scene, render
 from iibr_core.types import ImageSize, InputError, ViewOffset
-from tests.iibr_core.scenes import smooth_texture, square_before_wall
+from tests.iibr_core.scenes import smooth_texture
 
 CENTRE = ViewOffset(0.0, 0.0)
 
 
 def disc_before_slope(size: int = 120) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Photo, exact disparity, foreground: a tilted disc before a tilted wall."""
-    y, x = np.mgrid[:size, :size]
+    y, x = np.mgrid[:size, :size] * (120 / size)
     foreground = (x - 55) ** 2 + (y - 62) ** 2 < 32**2
-    photo = np.where(
-        foreground[..., None], smooth_texture(size, size, 1) * [1, 0.6, 0.3], smooth_texture(size, size) * 0.4
-    )
+    front, wall = smooth_texture(size, size, 1) * [1, 0.6, 0.3], smooth_texture(size, size) * 0.4
+    photo = np.where(foreground[..., None], front, wall)
     disparity = np.where(foreground, 2.0 + 0.002 * x, 0.3 + 0.003 * y)
     return photo.astype(np.float32), disparity.astype(np.float32), foreground
 
@@ -39,14 +38,11 @@ def test_blurred_edges_become_steps_where_they_were(sigma: float, share: float) 
     sharp = refine(photo, soft)
     assert rms(sharp, disparity) < share * rms(soft, disparity)
     assert np.mean((sharp > 1.2) != foreground) < 0.01
+    y, x = np.mgrid[:120, :120]
+    far_from_edge = np.abs(np.hypot(x - 55, y - 62) - 32) > 7 * sigma
+    np.testing.assert_array_equal(sharp[far_from_edge], soft[far_from_edge], "slants stay")
     flying = (sharp > 0.9) & (sharp < 1.7)
     assert flying.mean() < 0.05 * ((soft > 0.9) & (soft < 1.7)).mean()
-
-
-def test_half_resolution_becomes_steps() -> None:
-    photo, disparity, _ = disc_before_slope()
-    soft = coarsen(disparity, 2)
-    assert rms(refine(photo, soft), disparity) < 0.7 * rms(soft, disparity)
 
 
 def test_the_edge_follows_the_photo_where_the_map_is_beside_it() -> None:
@@ -63,14 +59,6 @@ def test_exact_maps_stay_as_they_are(seed: int) -> None:
         random_scene(np.random.default_rng(seed), ImageSize(128, 160), 3.0), ImageSize(128, 160), CENTRE, 1
     )
     np.testing.assert_array_equal(refine(colors, disparity), disparity)
-
-
-def test_slanted_surfaces_stay_as_they_are_beside_soft_edges() -> None:
-    photo, disparity, _ = disc_before_slope()
-    soft = blur(disparity, 2.0)
-    y, x = np.mgrid[:120, :120]
-    far_from_edge = np.abs(np.hypot(x - 55, y - 62) - 32) > 14
-    np.testing.assert_array_equal(refine(photo, soft)[far_from_edge], soft[far_from_edge])
 
 
 def test_a_steep_slope_is_no_edge_beside_sharper_ones() -> None:
@@ -96,42 +84,11 @@ def test_thin_structures_are_kept() -> None:
     assert sharp[20:100, [97, 106]].mean() <= soft[20:100, [97, 106]].mean()
 
 
-def test_scale_and_offset_of_the_map_do_not_matter() -> None:
-    photo, disparity, _ = disc_before_slope()
-    soft = blur(disparity, 2.0)
-    other = refine(photo, soft * 8 - 16)
-    # At the threshold of a decision rounding may tip it.
-    assert np.mean(np.abs((other + 16) / 8 - refine(photo, soft)) > 1e-3) < 1e-3
-
-
-def test_results_do_not_depend_on_the_number_of_threads(monkeypatch: pytest.MonkeyPatch) -> None:
-    photo, disparity, _ = disc_before_slope()
-    soft = blur(disparity, 2.0)
-    reference = refine(photo, soft)
-    monkeypatch.setattr("iibr_core.runtime.tiling.THREADS", 7)
-    np.testing.assert_array_equal(refine(photo, soft), reference)
-
-
-def test_the_input_is_left_alone() -> None:
-    photo, disparity, _ = disc_before_slope()
-    soft = blur(disparity, 2.0)
-    before = soft.copy()
-    refine(photo, soft)
-    np.testing.assert_array_equal(soft, before)
-
-
 @pytest.mark.parametrize("size", [(1, 1), (1, 7), (7, 1), (2, 2), (3, 3), (31, 17)])
 @pytest.mark.parametrize("value", [0.0, -3.0, 1e30])
 def test_constant_maps_of_any_size_stay_as_they_are(size: tuple[int, int], value: float) -> None:
     disparity = np.full(size, value, np.float32)
     np.testing.assert_array_equal(refine(np.zeros((*size, 3), np.float32), disparity), disparity)
-
-
-def test_unknown_disparity_is_filled() -> None:
-    photo, disparity = square_before_wall()
-    values = disparity.values.copy()
-    values[5:9, 5:9], values[30, 40] = np.nan, np.inf
-    assert np.isfinite(refine(photo.pixels, values)).all()
 
 
 @settings(max_examples=40)
@@ -151,31 +108,16 @@ def test_any_map_comes_back_finite(disparity: np.ndarray) -> None:
         assert np.isfinite(refine(photo, disparity)).all()
 
 
-def test_sizes_that_differ_are_an_error() -> None:
-    photo, disparity = np.zeros((4, 5, 3), np.float32), np.zeros((4, 5), np.float32)
-    with pytest.raises(ValueError, match=r"\(4, 5, 3\).*\(4, 4\)"):
-        refine(photo, disparity[:, :4])
-
-
-def test_what_the_blur_took_from_the_front_and_left_on_the_back_is_told_by_it() -> None:
-    """Both sides of a step are as high as they were, up to the edge."""
-    y, x = np.mgrid[:96, :128]
-    inside = np.hypot(x - 64, y - 48) < 30
-    photo = np.where(inside[..., None], [0.8, 0.3, 0.2], [0.2, 0.3, 0.7]).astype(np.float32)
-    flat = np.where(inside, 2.0, 0.0).astype(np.float32)
-    refined = refine(photo, blur(flat, 2.0))
-    assert np.mean((refined > 1) == inside) > 0.999
-    assert rms(refined, flat) < 0.02
-
-
-@pytest.mark.parametrize("sigma", [1.0, 1.5, 2.0])
-def test_round_fronts_stay_round(sigma: float) -> None:
+@pytest.mark.parametrize("sigma", [1.0, 2.0])
+def test_flat_fronts_stay_flat_and_round_ones_round(sigma: float) -> None:
     """A ball falls away from the view at its outline: that is not what the blur took."""
     y, x = np.mgrid[:96, :128]
     away = np.hypot(x - 64, y - 48)
     inside = away < 30
     photo = np.where(inside[..., None], [0.8, 0.3, 0.2], [0.2, 0.3, 0.7]).astype(np.float32)
-    ball = np.where(inside, 1.5 + np.sqrt(np.maximum(900 - away**2, 0)) / 60, 0.0).astype(np.float32)
-    off = refine(photo, blur(ball, sigma)) - ball
-    assert abs(off[inside & (away > 25)].mean()) < 0.02
-    assert rms(off[inside], np.zeros_like(off[inside])) < 0.03
+    for front, limit in ((np.full_like(away, 2.0), 0.05), (1.5 + np.sqrt(np.maximum(900 - away**2, 0)) / 60, 0.02)):
+        exact = np.where(inside, front, 0).astype(np.float32)
+        refined = refine(photo, blur(exact, sigma))
+        assert np.mean((refined > 1) == inside) > 0.999
+        assert rms(refined[inside], exact[inside]) < 0.03
+        assert abs((refined - exact)[inside & (away > 25)].mean()) < limit

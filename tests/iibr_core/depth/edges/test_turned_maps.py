@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter, maximum_filter
 
-from iibr_core.depth.edges import labels
 from iibr_core.depth.edges.refine import refine
 from iibr_core.method.flying_pixels import measure_detail
 from iibr_core.method.mixed_pixels import split_mixed_pixels
@@ -85,22 +84,3 @@ def test_all_channels_count_alike(channel):
     np.testing.assert_allclose(split[3], expected[3], atol=1e-5)
     np.testing.assert_allclose(split[0][..., channel], expected[0][..., 0], atol=1e-5)
     assert (expected[3] > 0).sum() > 50
-
-
-@pytest.mark.parametrize(
-    ("row", "is_step"),
-    [
-        ([0, 0, 1, 1], True),
-        ([0, 1, 2, 3], False),
-        ([0, 0.3, 1.3, 1.6], False),
-        ([0, 0.2, 1.2, 1.5], True),
-        ([1, 0, 1, 2], True),
-        ([1, 0, 1, 0], True),
-    ],
-)
-def test_a_step_that_continues_before_and_after_it_is_a_slope(row, is_step):
-    """The middle step of three, upwards and downwards, along rows and columns; 0.3 of it is enough, 0.2 is not."""
-    for values in (np.float32(row), -np.float32(row)):
-        rows = np.tile(values, (5, 1))
-        for turned, step in ((rows, (2, 1, 2, 2)), (np.ascontiguousarray(rows.T), (1, 2, 2, 2))):
-            assert labels._is_slope(turned, *step, values[2] - values[1]) != is_step

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from iibr_core.depth.multi_view.all_views import _warp, estimate_all, matched_views, reconcile
+from iibr_core.depth.multi_view.all_views import estimate_all, matched_views, reconcile
 from iibr_core.depth.multi_view.estimate import estimate_coarse
 from iibr_core.runtime.work import Cancelled, stoppable, watched
 from iibr_core.training.scenes.random_scene import random_scene
@@ -41,38 +41,10 @@ def test_a_view_between_shows_the_same_wall_even_with_wild_colours(value):
     assert error[4:-4, 8:-8].max() < 0.1
 
 
-def test_parts_that_the_nearest_views_do_not_see_come_from_the_next():
-    """A slit in a panel, as wide as the panel moves: the views beside see another part of the wall, those above and
-    below, which are farther, see the same. All colours are equal.
-    """
-    offsets = [ViewOffset(0, 0), ViewOffset(0, -1), ViewOffset(0, 1), ViewOffset(-1.5, 0), ViewOffset(1.5, 0)]
-    maps = {}
-    for index, at in enumerate(offsets):
-        y, x = np.mgrid[:48, :64]
-        column, row = x + 4 * at.s, y + 4 * at.t  # place of the panel's point in the first view
-        is_panel = (column >= 12) & (column < 52) & (row >= 8) & (row < 40) & ~((column >= 30) & (column < 34))
-        maps[index] = np.where(is_panel, 4.0, 0.0).astype(np.float32)
-    del maps[0]
-    warped = _warp(maps, [np.full((48, 64, 3), 90, np.uint8)] * 5, offsets, 0)
-    np.testing.assert_allclose(warped[16:32, 31:33], 0.0, atol=0.01)
-    np.testing.assert_allclose(warped[16:32, [28, 35]], 4.0, atol=0.01)
-
-
-def test_maps_that_show_nothing_of_a_view_between_give_something_in_the_range():
-    maps = estimate_all([textured((16, 24), seed) for seed in range(3)], LINE, (900.0, 901.0))
-    assert all(((values >= 900.0) & (values <= 901.0)).all() for values in maps)
-
-
 def test_a_wrong_patch_takes_the_disparity_of_similar_colours():
     maps = [np.full((30, 40), 1.0, np.float32) for _ in LINE]
     maps[1][10:14, 10:14] = 5.0
     assert all((values == 1.0).all() for values in reconcile([np.full((30, 40, 3), 90, np.uint8)] * 3, maps, LINE))
-
-
-def test_maps_that_share_nothing_stay_unchanged():
-    maps = [np.full((8, 8), value, np.float32) for value in (-900.0, 0.0, 900.0)]
-    kept = reconcile([np.zeros((8, 8, 3), np.uint8)] * 3, maps, LINE)
-    assert all((a == b).all() for a, b in zip(kept, maps))
 
 
 def test_it_stops_when_asked_while_maps_are_warped():

@@ -8,12 +8,9 @@ from iibr_core.depth.multi_view.estimate import (
     estimate_coarse,
     estimate_disparity,
     find_confirmed,
-    sweep_bytes,
 )
 from iibr_core.runtime.work import Cancelled, stoppable, watched
-from iibr_core.training.scenes.random_scene import random_scene
-from iibr_core.training.scenes.raycast import render
-from iibr_core.types import GridShape, ImageSize, InputError, ViewOffset
+from iibr_core.types import GridShape, InputError, ViewOffset
 
 GRID = GridShape(5, 5)
 OFFSETS = [GRID.offset(*at) for at in np.ndindex(*GRID)]
@@ -41,18 +38,14 @@ def slanted_views(slope, offsets=OFFSETS, size=(80, 96)):
     return [view(offset) for offset in offsets], slope * (x - size[1] / 2)
 
 
-@pytest.mark.parametrize("slope", [0.0, 0.02, -0.03])
-def test_a_slanted_plane_comes_back_to_a_fiftieth_of_a_pixel(slope):
-    views, truth = slanted_views(slope)
-    error = np.abs(find(views) - truth)[8:-8, 8:-8]
-    assert np.median(error) < 0.02
-    assert np.quantile(error, 0.95) < 0.07
-
-
-def test_two_views_are_enough():
-    views, truth = slanted_views(0.05, PAIR)
-    error = np.abs(find(views, PAIR) - truth)[8:-8, 8:-8]
-    assert np.quantile(error, 0.9) < 0.15
+@pytest.mark.parametrize(
+    ("slope", "offsets", "limit"), [(0.0, OFFSETS, 0.07), (-0.03, OFFSETS, 0.07), (0.05, PAIR, 0.2)]
+)
+def test_a_slanted_plane_comes_back_to_fractions_of_a_pixel(slope, offsets, limit):
+    views, truth = slanted_views(slope, offsets)
+    error = np.abs(find(views, offsets) - truth)[8:-8, 8:-8]
+    assert np.median(error) < 0.3 * limit
+    assert np.quantile(error, 0.95) < limit
 
 
 def test_parts_that_one_view_of_a_pair_hides_are_filled_by_similar_colours():
@@ -69,15 +62,6 @@ def test_parts_that_one_view_of_a_pair_hides_are_filled_by_similar_colours():
     assert np.abs(found[24:56, 44:66] - 8).max() < 1
 
 
-def test_procedural_scenes_with_hidden_parts_come_out_mostly_right():
-    size = ImageSize(120, 140)
-    scene = random_scene(np.random.default_rng(5), size, 2.5)
-    drawn = [render(scene, size, offset, samples=2) for offset in OFFSETS]
-    found = find([bytes_from_encoded(colors) for colors, _ in drawn])
-    error = np.abs(found - drawn[len(drawn) // 2][1])[8:-8, 8:-8]
-    assert np.mean(error > 0.2) < 0.12
-
-
 def test_light_that_grows_from_view_to_view_does_not_mislead():
     views, truth = slanted_views(0.02)
     waves = np.sin(np.mgrid[:80, :96][1] / 15)[..., None]
@@ -89,17 +73,13 @@ def test_light_that_grows_from_view_to_view_does_not_mislead():
     assert np.median(error) < 0.11  # 0.15 if the luma itself is matched
 
 
-@pytest.mark.parametrize("value", [0, 255])
-def test_views_without_any_texture_give_something_finite(value):
-    assert np.isfinite(find([np.full((40, 50, 3), value, np.uint8)] * 25)).all()
-
-
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, 6e4])
-def test_wild_colours_of_hdr_views_give_something_finite(value):
-    views = [(view / np.float16(255)).astype(np.float16) for view in slanted_views(0.02)[0]]
+def test_wild_colours_and_views_without_texture_give_something_finite(value):
+    views = [(view / np.float16(255)).astype(np.float16) for view in slanted_views(0.02, PAIR)[0]]
     for view in views:
         view[20:30, 40:50] = value
-    assert np.isfinite(find(views)).all()
+    assert np.isfinite(find(views, PAIR)).all()
+    assert np.isfinite(find([np.full((40, 50, 3), 255, np.uint8)] * 2, PAIR)).all()
 
 
 def test_small_views_and_equal_viewpoints_are_refused():
@@ -109,25 +89,15 @@ def test_small_views_and_equal_viewpoints_are_refused():
         estimate_coarse([np.zeros((20, 40, 3), np.uint8)] * 2, [ViewOffset(0.0, 0.0)] * 2, 0)
 
 
-def test_it_stops_when_asked():
-    with pytest.raises(Cancelled), stoppable(lambda: True):
-        estimate_coarse(slanted_views(0.0)[0], OFFSETS, 12)
-
-
-def test_memory_grows_with_pixels_and_disparities():
-    few, more = sweep_bytes(ImageSize(100, 100), (-1, 1), 4), sweep_bytes(ImageSize(100, 100), (-2, 2), 4)
-    assert few < more < sweep_bytes(ImageSize(200, 100), (-2, 2), 4)
-
-
-@pytest.mark.parametrize("offsets", [OFFSETS, PAIR])
-def test_progress_counts_disparities_up_to_the_whole(offsets):
+def test_it_reports_its_progress_and_stops_when_asked():
     reports = []
     with watched(lambda *now: reports.append(now)):
-        estimate_disparity(slanted_views(0.01, offsets)[0], offsets, 0, (-1.0, 1.0))
+        estimate_disparity(slanted_views(0.01, PAIR)[0], PAIR, 0, (-1.0, 1.0))
     done, totals, _ = zip(*reports)
     assert list(done) == sorted(done)
     assert set(totals) == {done[-1]}
-    assert len(done) > 4
+    with pytest.raises(Cancelled), stoppable(lambda: True):
+        estimate_coarse(slanted_views(0.0)[0], OFFSETS, 12)
 
 
 def slow_confirmed(maps, offsets, index):

@@ -11,11 +11,7 @@ from iibr_core.depth.multi_view.matching import (
     MIN_SEEN_SHARE,
     _match,
     _store_costs,
-    choose_views,
-    matching_views,
-    sweep,
 )
-from iibr_core.types import GridShape, ViewOffset
 from tests.iibr_core.scenes import smooth_texture
 
 
@@ -69,18 +65,3 @@ def test_views_are_hidden_where_the_other_half_matches_much_better():
     cost = np.minimum(parts[4], HIDDEN_FACTOR * parts[:4].min(axis=0))
     assert (cost < parts[4]).any()
     np.testing.assert_allclose(found, 255 * np.minimum(np.sqrt(cost) / MAX_DIFFERENCE, 1), atol=1.01)
-
-
-def test_equal_views_cost_nothing_and_unlike_views_everything():
-    one, other = (np.random.default_rng(seed).integers(0, 255, (24, 30, 1)).astype(np.uint8) for seed in (1, 2))
-    offsets = [ViewOffset(0.0, 0.0), ViewOffset(0.0, 1.0)]
-    alike, unlike = (sweep(matching_views([one, view], offsets, 0), np.float32([0.0])) for view in (one, other))
-    assert alike.max() == 0
-    assert np.median(unlike) > 200
-
-
-def test_views_on_eight_rays_are_matched_and_all_of_few_views():
-    chosen = choose_views([GridShape(9, 9).offset(*at) for at in np.ndindex(9, 9)], 40)
-    assert chosen[0] == 40
-    assert len(chosen) == len(set(chosen)) == 33
-    assert choose_views([ViewOffset(0.0, 0.0), ViewOffset(2.0, 1.0), ViewOffset(1.0, 2.0)], 1) == [1, 2, 0]
