@@ -11,16 +11,10 @@ import threading
 from collections.abc import Sequence
 from concurrent.futures import Future
 from pathlib import Path
-from typing import Any, cast
 
 from iibr_core.formats.files import is_file, reason_of
 from iibr_core.runtime.work import Cancelled, in_this_job, raise_if_stopped, report_progress, wait_unless_stopped
 from iibr_core.types import InputError
-
-ADVICE = (
-    "what has come is kept: check the network and try again, name a mirror with HF_ENDPOINT, or use a file with"
-    " --depth-model FILE.onnx"
-)
 
 
 def local_folder(repository: str, commit: str) -> Path:
@@ -30,8 +24,8 @@ def local_folder(repository: str, commit: str) -> Path:
     return Path(constants.HF_HUB_CACHE) / f"models--{repository.replace('/', '--')}" / "snapshots" / commit
 
 
-def download(repository: str, commit: str, names: Sequence[str], total_bytes: float) -> Path:
-    """Bring files of a commit here, unless they are; returns their folder. total_bytes: of all, for progress.
+def download(repository: str, commit: str, names: Sequence[str], total_bytes: float) -> None:
+    """Bring files of a commit here, unless they are. total_bytes: of all, for progress.
 
     Raises InputError if it fails, Cancelled once the job is stopped: the thread that waits for the hub ends later.
     """
@@ -52,31 +46,28 @@ def download(repository: str, commit: str, names: Sequence[str], total_bytes: fl
     except (Cancelled, InputError):
         raise
     except Exception as error:  # whatever the library's clients raise: they change with its versions
-        raise InputError(f"{repository} cannot be downloaded ({reason_of(error)[:120]}); {ADVICE}") from error
-    return folder
+        raise InputError(
+            f"{repository} cannot be downloaded ({reason_of(error)[:120]}); what has come is kept: check the network"
+            " and try again, name a mirror with HF_ENDPOINT, or use a file with --depth-model FILE.onnx"
+        ) from error
 
 
 def _fetch(repository: str, commit: str, name: str, place: Path, total_bytes: float) -> None:
     """Download the rest of a file, compare it with the hub's hash, and put it in its place."""
     from huggingface_hub import get_hf_file_metadata, get_token, hf_hub_url
     from huggingface_hub.file_download import http_get
+    from huggingface_hub.utils import tqdm
 
-    class Bar:
-        """Progress of a file, in place of tqdm's. The library updates it before it writes a piece."""
+    class Bar(tqdm):
+        """Progress of a file, reported before each piece is written."""
 
-        def __init__(self, initial: int = 0, **options: object) -> None:
-            self.came = initial
+        def __init__(self, **options: object) -> None:
+            super().__init__(**{**options, "disable": True})
 
-        def __enter__(self) -> Bar:
-            return self
-
-        def __exit__(self, *error: object) -> None:
-            """Show nothing more."""
-
-        def update(self, count: int) -> None:
+        def update(self, n: float | None = 1) -> None:
             raise_if_stopped()
-            self.came += count
-            report_progress(self.came, max(total_bytes, self.came), f"downloading {name}")
+            self.n += n or 0
+            report_progress(self.n, max(total_bytes, self.n), f"downloading {name}")
 
     url = hf_hub_url(repository, name, revision=commit)
     stated = get_hf_file_metadata(url)
@@ -86,14 +77,7 @@ def _fetch(repository: str, commit: str, name: str, place: Path, total_bytes: fl
     part.touch()
     with part.open("r+b") as file:  # two processes that fetch the same file write the same bytes to the same places
         came = file.seek(0, 2)
-        http_get(
-            url,
-            file,
-            resume_size=came,
-            headers=headers,
-            expected_size=stated.size,
-            tqdm_class=cast(Any, Bar),
-        )
+        http_get(url, file, resume_size=came, headers=headers, expected_size=stated.size, tqdm_class=Bar)
     with part.open("rb") as whole:
         digest = hashlib.file_digest(whole, "sha256").hexdigest()
     if digest != stated.etag and len(stated.etag or "") == len(digest):  # tags of small files are no such hashes
