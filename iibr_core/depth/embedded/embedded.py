@@ -35,8 +35,8 @@ SECOND_PICTURE, AVIF = "a second, grey picture", "AVIF depth"
 
 TRAILERS = (
     (re.compile(rb"PMPD[\x01-\x09]\0"), "a depth map of Xiaomi's kind (PMPD)"),
-    (re.compile(rb"DualShot_DepthMap"), "a depth map of Samsung's of another layout than the known ones"),
-    (re.compile(rb"\0edof\0"), "a depth map of Huawei's of another layout than the known ones"),
+    (re.compile(rb"DualShot_DepthMap"), "a depth map of Samsung's of an unknown layout"),
+    (re.compile(rb"\0edof\0"), "a depth map of Huawei's, cut off or of an unknown layout"),
 )
 """Marks of depth maps behind a photo that are not read."""
 MATTE = re.compile(rb"urn:com:apple:photo:\d+:aux:(?:semantic)?(\w+?)matte")
@@ -166,16 +166,13 @@ def rotate_estimate(estimate: DepthEstimate, size: ImageSize, orientation: int) 
     Maps of another shape show the whole photo, stretched, as GDepth's specification demands. Raises InputError if the
     map lies across the photo however it is turned.
     """
-    ways_up = (upright(estimate.values, orientation), estimate.values)
-    alike = [values for values in ways_up if has_shape_of(image_size(values), size)]
-    stretched = [
-        values
-        for values in ways_up
-        if values.shape[0] == values.shape[1] or (values.shape[0] > values.shape[1]) == (size.height > size.width)
-    ]
-    for values in alike + stretched:
-        return DepthEstimate(values, estimate.meaning)
-    raise InputError(f"its {image_size(estimate.values)} pixels lie across the photo, {size}")
+    turned = (upright(estimate.values, orientation), estimate.values)
+    alike = [values for values in turned if has_shape_of(image_size(values), size)]
+    # Both are wide, or both are high.
+    stretched = [values for values in turned if (values.shape[1] - values.shape[0]) * (size.width - size.height) >= 0]
+    if not alike + stretched:
+        raise InputError(f"its {image_size(estimate.values)} pixels lie across the photo, {size}")
+    return DepthEstimate((alike + stretched)[0], estimate.meaning)
 
 
 def unread_parts(path: Path) -> tuple[str, ...]:

@@ -22,7 +22,7 @@ EXTENDED_HEADER = b"http://ns.adobe.com/xmp/extension/\0"
 EXTENDED_PART = re.compile(rb"(.{32})(.{4})(.{4})(.*)", re.DOTALL)
 """Name of the packet, its length, place of the part, and the part."""
 NOTE = "http://ns.adobe.com/xmp/note/"
-MARKER = re.compile(rb"\xff+([^\x00\xff])")
+MARKER = re.compile(rb"\xff+([^\xff])")
 APP1, START_OF_SCAN, END_OF_IMAGE = b"\xe1", b"\xda", b"\xd9"
 STANDALONE = re.compile(rb"[\x01\xd0-\xd8]")
 """Markers without a length: TEM, restarts, start of image."""
@@ -44,7 +44,8 @@ class JpegLayout(NamedTuple):
 
 def jpeg_layout(data: bytes, start: int = 0) -> JpegLayout:
     """Return the layout of the JPEG picture that begins at `start`. If it is cut off, `end` is the data's end."""
-    xmp, extended, at = b"", [], start + 2
+    extended: list[bytes] = []
+    xmp, at = b"", start + 2
     while found := MARKER.match(data, at):
         marker, at = found[1], found.end()
         if marker == END_OF_IMAGE:

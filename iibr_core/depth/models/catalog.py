@@ -54,19 +54,9 @@ class LocalModel:
                     found = torch_models.estimate_transformers(self.folder, self.title, photo)
                 case "unidepth":
                     found = torch_models.estimate_unidepth(self.folder, self.title, photo)
-            self._require_use(found)
+            _require_use(found, self.title)
             cache.store(key, found)
         return found
-
-    def _require_use(self, found: DepthEstimate) -> None:
-        values = found.values
-        known = values[~np.isnan(values)] if self.runner == "unidepth" else values
-        if not known.size or not np.isfinite(known).all():
-            raise InputError(f"{self.title} gave NaN or infinity for this photo")
-        if found.is_metric and not (known > 0).any():
-            raise InputError(f"{self.title} gave no distance above 0 for this photo")
-        if known.max() == known.min():
-            raise InputError(f"{self.title} gave the same depth everywhere")
 
 
 def known_model(name: str) -> KnownModel:
@@ -188,6 +178,16 @@ def _model_in(folder: Path) -> LocalModel:
         raise InputError(f"{folder}: no known models are of its type, {kind!r}")
     runner: Runner = "transformers" if kind in torch_models.PREPARATIONS else "unidepth"
     return LocalModel(title, folder, runner, torch_models.safetensors_in(folder))
+
+
+def _require_use(found: DepthEstimate, title: str) -> None:
+    known = found.values[~np.isnan(found.values)]
+    if not known.size or not np.isfinite(known).all():
+        raise InputError(f"{title} gave NaN or infinity for this photo")
+    if found.is_metric and not (known > 0).any():
+        raise InputError(f"{title} gave no distance above 0 for this photo")
+    if known.max() == known.min():
+        raise InputError(f"{title} gave the same depth everywhere")
 
 
 def _onnx_model(file: Path, title: str) -> LocalModel:

@@ -10,7 +10,9 @@ import hashlib
 import threading
 from collections.abc import Sequence
 from concurrent.futures import Future
+from contextlib import nullcontext
 from pathlib import Path
+from typing import Any, cast
 
 from iibr_core.formats.files import is_file, reason_of
 from iibr_core.runtime.work import Cancelled, in_this_job, raise_if_stopped, report_progress, wait_unless_stopped
@@ -56,18 +58,18 @@ def _fetch(repository: str, commit: str, name: str, place: Path, total_bytes: fl
     """Download the rest of a file, compare it with the hub's hash, and put it in its place."""
     from huggingface_hub import get_hf_file_metadata, get_token, hf_hub_url
     from huggingface_hub.file_download import http_get
-    from huggingface_hub.utils import tqdm
 
-    class Bar(tqdm):
-        """Progress of a file, reported before each piece is written."""
+    class Bar(nullcontext[Any]):
+        """Progress of a file, in place of tqdm's. The library updates it before it writes a piece."""
 
-        def __init__(self, **options: object) -> None:
-            super().__init__(**{**options, "disable": True})
+        def __init__(self, initial: int = 0, **options: object) -> None:
+            super().__init__(self)
+            self.came = initial
 
-        def update(self, n: float | None = 1) -> None:
+        def update(self, count: int) -> None:
             raise_if_stopped()
-            self.n += n or 0
-            report_progress(self.n, max(total_bytes, self.n), f"downloading {name}")
+            self.came += count
+            report_progress(self.came, max(total_bytes, self.came), f"downloading {name}")
 
     url = hf_hub_url(repository, name, revision=commit)
     stated = get_hf_file_metadata(url)
@@ -77,7 +79,7 @@ def _fetch(repository: str, commit: str, name: str, place: Path, total_bytes: fl
     part.touch()
     with part.open("r+b") as file:  # two processes that fetch the same file write the same bytes to the same places
         came = file.seek(0, 2)
-        http_get(url, file, resume_size=came, headers=headers, expected_size=stated.size, tqdm_class=Bar)
+        http_get(url, file, resume_size=came, headers=headers, expected_size=stated.size, tqdm_class=cast(Any, Bar))
     with part.open("rb") as whole:
         digest = hashlib.file_digest(whole, "sha256").hexdigest()
     if digest != stated.etag and len(stated.etag or "") == len(digest):  # tags of small files are no such hashes

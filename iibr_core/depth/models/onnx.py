@@ -31,12 +31,7 @@ from iibr_core.runtime.work import Cancelled, report_progress, wait_unless_stopp
 from iibr_core.types import FloatImage, ImageSize, InputError, Photo
 
 ACCELERATORS = ("CUDAExecutionProvider", "CoreMLExecutionProvider", "DmlExecutionProvider")
-NUMBER_TYPES = {
-    "tensor(float)": "float32",
-    "tensor(float16)": "float16",
-    "tensor(double)": "float64",
-    "tensor(uint8)": "uint8",
-}
+NUMBER_TYPES = {"tensor(float)": "float32", "tensor(float16)": "float16", "tensor(uint8)": "uint8"}
 """Number types of pictures, by ONNX Runtime's names for them."""
 EXTERNAL_FILE = re.compile(rb"\n\x08location\x12(.)", re.DOTALL)
 """Start of a tensor's entry about its file of numbers; the last byte is the length of the file's name (onnx.proto)."""
@@ -166,9 +161,7 @@ def external_files(file: Path) -> tuple[Path, ...]:
     names = sorted({content[end : end + length].decode("utf-8", "replace") for end, length in ends})
     for name in names:
         if not stays_within(name) or not is_file(file.parent / name):
-            raise InputError(
-                f"{file}: its weights are in {printable(name)}, which does not lie beside it; get that file, too"
-            )
+            raise InputError(f"{file}: its weights are in {printable(name)}, which does not lie beside it; get it, too")
     return tuple(file.parent / name for name in names)
 
 
@@ -195,4 +188,4 @@ def _is_map(name: str, values: Any, size: ImageSize) -> bool:
     sides = [side for side in values.shape if side != 1]
     if len(sides) != 2 or min(sides) < 8:  # smaller outputs are matrices
         return False
-    return 0.8 <= sides[1] / sides[0] * size.height / size.width <= 1.25
+    return bool(0.8 <= sides[1] / sides[0] * size.height / size.width <= 1.25)

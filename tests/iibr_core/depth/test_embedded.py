@@ -263,6 +263,10 @@ def test_one_damaged_format_does_not_hide_another() -> None:
     assert found.format == "Samsung Live focus"
 
 
+def test_a_long_run_of_padding_in_a_scan_takes_no_time() -> None:
+    assert embedded_in_jpeg(b"\xff\xd8\xff\xda\0\2" + b"\xff" * 2_000_000 + b"\0") is None
+
+
 # ---- damaged files
 
 FUZZED = {
