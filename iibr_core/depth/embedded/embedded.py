@@ -135,14 +135,9 @@ def photo_in_focus(path: Path, photo: Photo, embedded: EmbeddedDepth, max_pixels
             raise InputError("the sharp one has another shape.")
     except InputError as error:
         return replace(photo, notes=(*photo.notes, f"The blurred picture is shown: {error}"))
-    note = "The sharp picture that the file holds is shown, not the blurred one."
-    return replace(
-        photo,
-        pixels=sharp.pixels,
-        focal_px=photo.focal_px * sharp.size.width / photo.size.width,
-        notes=(*photo.notes, note),
-        color_space=sharp.color_space,
-    )
+    notes = (*photo.notes, "The sharp picture that the file holds is shown, not the blurred one.")
+    focal_px = photo.focal_px * sharp.size.width / photo.size.width
+    return replace(photo, pixels=sharp.pixels, focal_px=focal_px, notes=notes, color_space=sharp.color_space)
 
 
 def _read_sharp(data: bytes, orientation: int, max_pixels: int) -> Photo:

@@ -84,7 +84,7 @@ def model_to_use(choice: DepthChoice) -> LocalModel | None:
 
 def model_here(model: KnownModel) -> LocalModel | None:
     """Return a known model if all of its files are in the Hugging Face cache, else None."""
-    folder = local_folder(model.repository, model.commit)
+    folder = local_folder(model)
     if not all(is_file(folder / name) for name in model.files):
         return None
     return LocalModel(model.title, folder, model.runner, (folder / model.files[-1],))
@@ -92,7 +92,7 @@ def model_here(model: KnownModel) -> LocalModel | None:
 
 def fetch(model: KnownModel) -> LocalModel:
     """Download a model into the Hugging Face cache. Raises as `download` does."""
-    download(model.repository, model.commit, model.files, model.megabytes * 1e6)
+    download(model)
     found = model_here(model)
     assert found is not None
     return found
@@ -142,7 +142,7 @@ def register(path: Path) -> LocalModel:
 
 def _wanted_model(wanted: str) -> LocalModel:
     """Return the model in a folder, of an ONNX file, or of the name of a copied or a known one."""
-    path, copied = Path(os.path.expanduser(wanted)), list_own_models()
+    path = Path(os.path.expanduser(wanted))
     if is_folder(path):
         found = _model_in(path)
     elif path.suffix.lower() == ".onnx" and is_file(path):
@@ -151,7 +151,7 @@ def _wanted_model(wanted: str) -> LocalModel:
         raise InputError(f"{path}: is not an ONNX file; --depth-model takes one, a folder, or a name of `iibr models`")
     elif "/" in wanted or "\\" in wanted or path.suffix.lower() == ".onnx":
         raise InputError(f"{wanted}: no such file or folder")
-    elif wanted in copied:
+    elif wanted in (copied := list_own_models()):
         found = _onnx_model(copied[wanted], f"the model {wanted}")
     elif (here := model_here(known_model(wanted))) is not None:
         found = here
