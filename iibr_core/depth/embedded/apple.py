@@ -15,24 +15,16 @@ from iibr_core.depth.embedded.images import decode_map
 from iibr_core.depth.embedded.jpeg import appended_pictures, number_in, xmp_of
 from iibr_core.depth.estimate import DepthEstimate
 from iibr_core.formats.images.xmp import value_in
-from iibr_core.types import FloatImage, InputError
+from iibr_core.types import FloatImage
 
 PIXEL_DATA = "http://ns.apple.com/pixeldatainfo/1.0/"
-INVERSE_TYPES, DISTANCE_TYPE = (0, 1, 3), 2
-"""Representation types of HEVC's depth information: linear in inverse distance, or in distance."""
 
 
 def heic_estimate(depth: FloatImage, metadata: dict[str, Any]) -> DepthEstimate:
-    """Return the depth of a HEIC's auxiliary picture: (H, W), 0..1, with libheif's description of it.
-
-    Raises InputError if the meaning of the values is unknown.
-    """
+    """Return the depth of a HEIC's auxiliary picture: (H, W), 0..1, with libheif's description of it."""
     low, high, near, far = (float(metadata.get(name, math.nan)) for name in ("d_min", "d_max", "z_near", "z_far"))
-    kind = metadata.get("representation_type", 1)
-    if kind == DISTANCE_TYPE:
+    if metadata.get("representation_type") == 2:  # HEVC's number for values linear in distance
         return _linear_in_distance(depth, near, far)
-    if kind not in INVERSE_TYPES:
-        raise InputError(f"the depth map's representation {kind!r} is not known")
     if math.isnan(low + high) and near > 0 and far > 0:
         low, high = 1 / far, 1 / near
     return _linear_in_inverse(depth, low, high)

@@ -12,9 +12,8 @@ from xml.etree.ElementTree import Element
 from iibr_core.depth.embedded.apple import appended_estimate, heic_estimate
 from iibr_core.depth.embedded.google import all_in_focus, dynamic_depth_estimate, gdepth_estimate, range_notes
 from iibr_core.depth.embedded.images import PICTURE_STARTS, decode_map
-from iibr_core.depth.embedded.jpeg import JPEG_START, appended_pictures, jpeg_layout, xmp_of
-from iibr_core.depth.embedded.samsung import samsung_estimate
-from iibr_core.depth.embedded.trailers import HEADER_BYTES, huawei_estimate, second_picture_estimate, size_and_kind
+from iibr_core.depth.embedded.jpeg import HEADER_BYTES, JPEG_START, appended_pictures, jpeg_layout, xmp_of
+from iibr_core.depth.embedded.trailers import huawei_estimate, samsung_estimate, second_picture_estimate, thumbnail_of
 from iibr_core.depth.estimate import DepthEstimate
 from iibr_core.formats.files import open_binary
 from iibr_core.formats.images.avif import avif_depth_file, is_avif
@@ -32,14 +31,12 @@ from iibr_core.types import ImageSize, InputError, Photo, image_size
 MAX_FILE_BYTES = 512 * 2**20
 GDEPTH, DYNAMIC_DEPTH = "Google GDepth", "Dynamic Depth"
 SAMSUNG, HUAWEI = "Samsung Live focus", "Huawei"
-SECOND_PICTURE = "a second, grey picture"
-NEAR_END_UNKNOWN = (HUAWEI, SECOND_PICTURE, "AVIF depth")
-"""Formats that do not state the near end of their values: the photo has to decide."""
+SECOND_PICTURE, AVIF = "a second, grey picture", "AVIF depth"
 
 TRAILERS = (
     (re.compile(rb"PMPD[\x01-\x09]\0"), "a depth map of Xiaomi's kind (PMPD)"),
-    (re.compile(rb"DualShot_DepthMap"), "a depth map of Samsung's of another layout than the known ones"),
-    (re.compile(rb"\0edof\0"), "a depth map of Huawei's of another layout than the known ones"),
+    (re.compile(rb"DualShot_DepthMap"), "a depth map of Samsung's of an unknown layout"),
+    (re.compile(rb"\0edof\0"), "a depth map of Huawei's, cut off or of an unknown layout"),
 )
 """Marks of depth maps behind a photo that are not read."""
 MATTE = re.compile(rb"urn:com:apple:photo:\d+:aux:(?:semantic)?(\w+?)matte")
@@ -64,8 +61,8 @@ class EmbeddedDepth:
 
     @property
     def says_near_end(self) -> bool:
-        """Return whether the near end of the values is known; else larger values count as nearer for now."""
-        return self.format not in NEAR_END_UNKNOWN
+        """Return whether the format states the near end of the values; else the photo has to decide."""
+        return self.format not in (HUAWEI, SECOND_PICTURE, AVIF)
 
 
 def read_embedded(path: Path) -> EmbeddedDepth | None:
@@ -77,8 +74,7 @@ def read_embedded(path: Path) -> EmbeddedDepth | None:
         data = _jpeg_bytes(path)
         return embedded_in_jpeg(data) if data else _in_packet(path)
     except InputError as error:
-        text = str(error)
-        raise InputError(text if text.startswith(str(path)) else f"{path}: {text}") from error
+        raise InputError(f"{path}: {str(error).removeprefix(f'{path}: ')}") from error
 
 
 def embedded_in_jpeg(data: bytes) -> EmbeddedDepth | None:
@@ -117,11 +113,13 @@ def embedded_in_jpeg(data: bytes) -> EmbeddedDepth | None:
 def leia_estimate(data: bytes) -> DepthEstimate | None:
     """Return the map of a Leia image's first view, white near; None without. Raises InputError if it is damaged."""
     leia = read_lif(data)
-    for view in leia.views if leia is not None else ():
-        if leia is not None and view.image == SOURCE_IMAGE and view.inverse_depth is not None:
-            stored = decode_map(leia.fields[view.inverse_depth], "Leia's map of inverse depth")
-            return DepthEstimate(stored, "inverse depth")
-    return None
+    if leia is None:
+        return None
+    fields = (view.inverse_depth for view in leia.views if view.image == SOURCE_IMAGE)
+    field = next((field for field in fields if field is not None), None)
+    if field is None:
+        return None
+    return DepthEstimate(decode_map(leia.fields[field], "Leia's map of inverse depth"), "inverse depth")
 
 
 def photo_in_focus(path: Path, photo: Photo, embedded: EmbeddedDepth, max_pixels: int) -> Photo:
@@ -133,13 +131,12 @@ def photo_in_focus(path: Path, photo: Photo, embedded: EmbeddedDepth, max_pixels
         return photo
     try:
         sharp = _read_sharp(embedded.all_in_focus, read_orientation(path), max_pixels)
+        if not has_shape_of(sharp.size, photo.size):
+            raise InputError("the sharp one has another shape.")
     except InputError as error:
         return replace(photo, notes=(*photo.notes, f"The blurred picture is shown: {error}"))
-    if not has_shape_of(sharp.size, photo.size):
-        return replace(photo, notes=(*photo.notes, "The blurred picture is shown: the sharp one has another shape."))
+    notes = (*photo.notes, "The sharp picture that the file holds is shown, not the blurred one.")
     focal_px = photo.focal_px * sharp.size.width / photo.size.width
-    note = "The sharp picture that the file holds is shown, not the blurred one."
-    notes = (*photo.notes, note)
     return replace(photo, pixels=sharp.pixels, focal_px=focal_px, notes=notes, color_space=sharp.color_space)
 
 
@@ -164,15 +161,13 @@ def rotate_estimate(estimate: DepthEstimate, size: ImageSize, orientation: int) 
     Maps of another shape show the whole photo, stretched, as GDepth's specification demands. Raises InputError if the
     map lies across the photo however it is turned.
     """
-    turned = upright(estimate.values, orientation)
-    for values in (turned, estimate.values):
-        if has_shape_of(image_size(values), size):
-            return DepthEstimate(values, estimate.meaning)
-    for values in (turned, estimate.values):
-        height, width = values.shape
-        if height == width or (height > width) == (size.height > size.width):
-            return DepthEstimate(values, estimate.meaning)
-    raise InputError(f"its {image_size(estimate.values)} pixels lie across the photo, {size}")
+    turned = (upright(estimate.values, orientation), estimate.values)
+    alike = [values for values in turned if has_shape_of(image_size(values), size)]
+    # Both are wide, or both are high.
+    stretched = [values for values in turned if (values.shape[1] - values.shape[0]) * (size.width - size.height) >= 0]
+    if not alike + stretched:
+        raise InputError(f"its {image_size(estimate.values)} pixels lie across the photo, {size}")
+    return DepthEstimate((alike + stretched)[0], estimate.meaning)
 
 
 def unread_parts(path: Path) -> tuple[str, ...]:
@@ -191,9 +186,9 @@ def _unread_in_jpeg(data: bytes) -> list[str]:
     if CONTAINER.search(data, 0, min(end, HEADER_BYTES)):
         return parts
     for picture, _ in appended_pictures(data, end):
-        found = size_and_kind(picture)
+        found = thumbnail_of(picture)
         if found and not any(mark.search(picture, 0, HEADER_BYTES) for mark in (GAIN_MAP, MATTE)):
-            parts.append(f"a second picture ({found[0]}, {'grey' if found[1] else 'colour'})")
+            parts.append(f"a second picture ({found.size}, {'grey' if found.is_grey else 'colour'})")
     return parts
 
 
@@ -215,8 +210,7 @@ def _in_avif(path: Path) -> EmbeddedDepth | None:
     data = avif_depth_file(path)
     if data is None:
         return None
-    values = decode_map(data, "the depth map of the AVIF", ("AVIF",))
-    return EmbeddedDepth(DepthEstimate(values, "inverse depth"), "AVIF depth")
+    return EmbeddedDepth(DepthEstimate(decode_map(data, "the depth map of the AVIF", ("AVIF",)), "inverse depth"), AVIF)
 
 
 def _in_heic(path: Path) -> EmbeddedDepth | None:

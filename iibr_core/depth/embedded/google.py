@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import base64
 import math
-from typing import NamedTuple
 from xml.etree.ElementTree import Element
 
 import numpy as np
@@ -26,16 +25,8 @@ DEPTH_MAP = "http://ns.google.com/photos/dd/1.0/depthmap/"
 # The specification of 2019 names the first of each pair, phones that share their container with HDR photos the second.
 ITEM_TAGS = tuple(f"{{http://ns.google.com/photos/{version}/container/}}Item" for version in ("dd/1.0", "1.0"))
 ITEMS = ("http://ns.google.com/photos/dd/1.0/item/", "http://ns.google.com/photos/1.0/container/item/")
-METRES = {name: 1.0 for name in ("m", "meter", "meters", "metre", "metres")} | {
-    name: 0.001 for name in ("mm", "millimeter", "millimeters", "millimetre", "millimetres")
-}
-"""Lengths of units in metres; other units are unknown."""
-MIN_CONFIDENCE = 0.05
-"""Confidence below which depth is unknown; the maps are JPEGs, so their zeros are not quite 0."""
-MAX_METRES = 1e6
-"""Distance that stands for infinity."""
 
-Properties = dict[str, str | None]
+Properties = dict[str, str]
 
 
 def gdepth_estimate(xmp: Element) -> DepthEstimate | None:
@@ -58,12 +49,11 @@ def dynamic_depth_estimate(xmp: Element, data: bytes, end: int) -> DepthEstimate
     described = _properties(xmp, DEPTH_MAP)
     if not (described["Format"] or described["DepthURI"]):
         return None
-    items = [_item(element) for element in xmp.iter() if element.tag in ITEM_TAGS]
-    content = _content(items, described["DepthURI"], "depth", data, end)
+    content = _content(xmp, described["DepthURI"], "depth", data, end)
     if content is None:
         raise InputError("Dynamic Depth names a depth map that its container does not list")
     stored = decode_map(content, "the depth map of Dynamic Depth")
-    sure = _content(items, described["ConfidenceURI"], "confidence", data, end)
+    sure = _content(xmp, described["ConfidenceURI"], "confidence", data, end)
     return _estimate(stored, None if sure is None else decode_map(sure, "its confidence"), described)
 
 
@@ -85,47 +75,34 @@ def all_in_focus(xmp: Element) -> bytes | None:
 
 def _properties(xmp: Element, namespace: str) -> Properties:
     names = ("Format", "Near", "Far", "Units", "DepthURI", "ConfidenceURI")
-    return {name: value_in(xmp, namespace, name) for name in names}
+    return {name: (value_in(xmp, namespace, name) or "").strip() for name in names}
 
 
-class _Item(NamedTuple):
-    """A picture of a container. length, padding: in bytes; padding follows the picture."""
-
-    uri: str
-    semantic: str
-    length: int
-    padding: int
-
-
-def _item(element: Element) -> _Item:
-    texts = [
-        next(filter(None, (value_in(element, namespace, name) for namespace in ITEMS)), "").strip()
-        for name in ("DataURI", "Semantic", "Length", "Padding")
-    ]
-    for text in texts[2:]:
-        if text and not text.isdecimal():
-            raise InputError(f"Dynamic Depth item of {text[:40]!r} bytes")
-    # Longer numbers than any file has are cut, because Python refuses to parse very long ones.
-    return _Item(texts[0], texts[1].lower(), int(texts[2][:20] or 0), int(texts[3][:20] or 0))
-
-
-def _content(items: list[_Item], uri: str | None, semantic: str, data: bytes, end: int) -> bytes | None:
-    """Return the bytes of the item with this URI, or else this meaning; None if the container lists none.
+def _content(xmp: Element, uri: str, semantic: str, data: bytes, end: int) -> bytes | None:
+    """Return the bytes of the container's item with this URI, or else this meaning; None without.
 
     Items lie one after the other behind the photo; if other trailers precede them, they end with the file. The first
     item is the photo itself, whose length a writer need not state.
     """
-    by_uri = [index for index, item in enumerate(items) if uri and item.uri == uri.strip()]
-    by_meaning = [index for index, item in enumerate(items) if item.semantic == semantic]
-    index = next(iter(by_uri + by_meaning), None)
-    if index is None:
+    names = ("DataURI", "Semantic", "Length", "Padding")
+    items = [
+        [next(filter(None, (value_in(item, namespace, name) for namespace in ITEMS)), "").strip() for name in names]
+        for item in xmp.iter()
+        if item.tag in ITEM_TAGS
+    ]
+    by_uri = [index for index, item in enumerate(items) if uri and item[0] == uri]
+    by_meaning = [index for index, item in enumerate(items) if item[1].lower() == semantic]
+    if not (by_uri or by_meaning):
         return None
-    before, behind = (sum(item.length + item.padding for item in part) for part in (items[1:index], items[index:]))
-    for start in (end + items[0].padding + before, len(data) - behind):
-        content = data[start : start + items[index].length] if start >= 0 else b""
+    index = (by_uri + by_meaning)[0]
+    # No file is as long as a number of more digits, which Python would refuse to parse.
+    sizes = [[int(text[:20]) if text.isdecimal() else 0 for text in item[2:]] for item in items]
+    before, behind = (sum(map(sum, part)) for part in (sizes[1:index], sizes[index:]))
+    for start in (end + sizes[0][1] + before, len(data) - behind):
+        content = data[start : start + sizes[index][0]] if start >= 0 else b""
         if content.startswith(PICTURE_STARTS):
             return content
-    raise InputError(f"Dynamic Depth names {items[index].length:,} bytes of a map that are not in the file")
+    raise InputError(f"Dynamic Depth names {sizes[index][0]:,} bytes of a map that are not in the file")
 
 
 def _range(properties: Properties) -> tuple[float, float] | None:
@@ -140,7 +117,7 @@ def _range(properties: Properties) -> tuple[float, float] | None:
 
 def _is_inverse(properties: Properties) -> bool:
     """Return whether values are linear in inverse distance, as they are without a known format."""
-    return (properties["Format"] or "").strip().lower() != "rangelinear"
+    return properties["Format"].lower() != "rangelinear"
 
 
 def _estimate(stored: FloatImage, confidence: FloatImage | None, properties: Properties) -> DepthEstimate:
@@ -154,11 +131,13 @@ def _estimate(stored: FloatImage, confidence: FloatImage | None, properties: Pro
         else:
             inverse = 1 / (ends[0] + values * (ends[1] - ends[0]))
     inverse[~np.isfinite(inverse)] = np.nan
-    if confidence is not None and confidence.shape == stored.shape and (confidence >= MIN_CONFIDENCE).any():
-        inverse[confidence < MIN_CONFIDENCE] = np.nan
-    metres = METRES.get((properties["Units"] or "").strip().lower())
-    if metres is not None and ends is not None:
-        return DepthEstimate((metres / np.maximum(inverse, metres / MAX_METRES)).astype(np.float32), "metres")
+    # Zeros of confidence are not quite 0 in JPEGs; a map that is sure of nothing says nothing.
+    if confidence is not None and confidence.shape == stored.shape and (confidence >= 0.05).any():
+        inverse[confidence < 0.05] = np.nan
+    units = {"m": 1.0, "meter": 1.0, "metre": 1.0, "mm": 0.001, "millimeter": 0.001, "millimetre": 0.001}
+    metres = units.get(properties["Units"].lower().rstrip("s"))
+    if metres is not None and ends is not None:  # a million metres stand for infinity
+        return DepthEstimate((metres / np.maximum(inverse, metres / 1e6)).astype(np.float32), "metres")
     with np.errstate(over="ignore"):
         relative = inverse.astype(np.float32)
     return DepthEstimate(np.where(np.isfinite(relative), relative, np.float32(np.nan)), "inverse depth")

@@ -6,11 +6,9 @@ import zlib
 from io import BytesIO
 
 import numpy as np
-from PIL import Image, UnidentifiedImageError
+from PIL import Image
 
-from iibr_core.color import ROWS_AT_ONCE
 from iibr_core.depth.embedded.jpeg import JPEG_START
-from iibr_core.formats.files import reason_of
 from iibr_core.formats.images import pillow_reader
 from iibr_core.types import FloatImage, InputError
 
@@ -35,29 +33,14 @@ def decode_map(data: bytes, what: str, formats: tuple[str, ...] = ("PNG", "JPEG"
         with Image.open(BytesIO(data), formats=formats) as picture:
             if not 0 < picture.width * picture.height <= MAX_MAP_PIXELS:
                 raise InputError(f"{what}: {picture.width}x{picture.height} pixels are not 1 to {MAX_MAP_PIXELS:,}")
-            values = _grey(picture)
-    except UnidentifiedImageError as error:
-        raise InputError(f"{what} is neither a PNG nor a JPEG picture ({len(data):,} bytes)") from error
+            if picture.mode in ("I;16", "I;16B", "I"):
+                return np.asarray(picture, np.float32) * np.float32(1 / 65535)
+            is_grey = picture.mode in ("1", "L", "LA", "P", "RGB", "RGBA")
+            colors = np.asarray(picture.convert("RGB"))
     except InputError:
         raise
     except DECODE_ERRORS as error:
-        raise InputError(f"{what}: damaged or cut off ({reason_of(error)})") from error
-    if values is None:
+        raise InputError(f"{what}: is no picture, damaged or cut off ({len(data):,} bytes)") from error
+    if not is_grey or (np.ptp(colors, axis=2) > GREY_TOLERANCE).any():
         raise InputError(f"{what}: is a colour picture; a depth map has one value per pixel")
-    return values
-
-
-def _grey(picture: Image.Image) -> FloatImage | None:
-    """Return the values (H, W), 0..1, of a grey picture, None for colours."""
-    if picture.mode in ("I;16", "I;16B", "I"):
-        return np.asarray(picture, np.float32) * np.float32(1 / 65535)
-    if picture.mode not in ("1", "L", "LA", "P", "RGB", "RGBA"):
-        return None
-    result = np.empty((picture.height, picture.width), np.float32)
-    for top in range(0, picture.height, ROWS_AT_ONCE):
-        rows = result[top : top + ROWS_AT_ONCE]
-        colors = np.asarray(picture.crop((0, top, picture.width, top + len(rows))).convert("RGB"))
-        if (np.ptp(colors, axis=2) > GREY_TOLERANCE).any():
-            return None
-        rows[:] = colors[..., 0].astype(np.float32) * np.float32(1 / 255)
-    return result
+    return colors[..., 0].astype(np.float32) * np.float32(1 / 255)

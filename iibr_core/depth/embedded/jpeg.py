@@ -15,18 +15,19 @@ from iibr_core.formats.images.xmp import MAX_PACKET_BYTES, parse_packet, value_i
 from iibr_core.types import InputError
 
 JPEG_START = b"\xff\xd8\xff"
+HEADER_BYTES = 0x10000
+"""Largest segment: marks of a picture's use are looked for in this much of its start."""
 STANDARD_HEADER = b"http://ns.adobe.com/xap/1.0/\0"
 EXTENDED_HEADER = b"http://ns.adobe.com/xmp/extension/\0"
 EXTENDED_PART = re.compile(rb"(.{32})(.{4})(.{4})(.*)", re.DOTALL)
 """Name of the packet, its length, place of the part, and the part."""
 NOTE = "http://ns.adobe.com/xmp/note/"
-APP1, START_OF_SCAN, END_OF_IMAGE, PADDING = 0xE1, 0xDA, 0xD9, 0xFF
-STANDALONE = frozenset({0x01, *range(0xD0, 0xD9)})
+MARKER = re.compile(rb"\xff+([^\xff])")
+APP1, START_OF_SCAN, END_OF_IMAGE = b"\xe1", b"\xda", b"\xd9"
+STANDALONE = re.compile(rb"[\x01\xd0-\xd8]")
 """Markers without a length: TEM, restarts, start of image."""
-AFTER_SCAN = re.compile(rb"\xff+[^\x00\xff\xd0-\xd7]")
+AFTER_SCAN = re.compile(rb"\xff[^\x00\xff\xd0-\xd7]")
 """End of a scan, in which a stuffed 0 or a restart marker follows 0xFF."""
-MAX_APPENDED = 8
-"""Largest number of pictures that are looked at behind a photo."""
 
 
 class JpegLayout(NamedTuple):
@@ -43,26 +44,37 @@ class JpegLayout(NamedTuple):
 
 def jpeg_layout(data: bytes, start: int = 0) -> JpegLayout:
     """Return the layout of the JPEG picture that begins at `start`. If it is cut off, `end` is the data's end."""
-    xmp, extended, end = b"", [], len(data)
-    for marker, first, last in _segments(data, start):
+    extended: list[bytes] = []
+    xmp, at = b"", start + 2
+    while found := MARKER.match(data, at):
+        marker, at = found[1], found.end()
         if marker == END_OF_IMAGE:
-            end = last
-        elif marker == APP1 and data.startswith(STANDARD_HEADER, first, last):
-            xmp = xmp or data[first + len(STANDARD_HEADER) : last]
-        elif marker == APP1 and data.startswith(EXTENDED_HEADER, first, last):
-            extended.append(data[first + len(EXTENDED_HEADER) : last])
-    return JpegLayout(xmp, extended, end)
+            return JpegLayout(xmp, extended, at)
+        if STANDALONE.match(marker):
+            continue
+        length = int.from_bytes(data[at : at + 2], "big")
+        content, at = data[at + 2 : at + length], at + length
+        if length < 2 or at > len(data):
+            break
+        if marker == APP1 and content.startswith(STANDARD_HEADER):
+            xmp = xmp or content.removeprefix(STANDARD_HEADER)
+        elif marker == APP1 and content.startswith(EXTENDED_HEADER):
+            extended.append(content.removeprefix(EXTENDED_HEADER))
+        elif marker == START_OF_SCAN:
+            after = AFTER_SCAN.search(data, at)
+            at = after.start() if after else len(data)
+    return JpegLayout(xmp, extended, len(data))
 
 
 def appended_pictures(data: bytes, end: int) -> Iterator[tuple[bytes, JpegLayout]]:
-    """Yield the first JPEG pictures that follow a photo, which ends at `end`, and their layouts."""
-    for _ in range(MAX_APPENDED):
+    """Yield the first eight JPEG pictures that follow a photo, which ends at `end`, and their layouts."""
+    for _ in range(8):
         start = data.find(JPEG_START, end)
         if start < 0:
             return
         layout = jpeg_layout(data, start)
         yield data[start : layout.end], layout
-        end = max(layout.end, start + 2)
+        end = layout.end
 
 
 def xmp_of(layout: JpegLayout) -> Element:
@@ -87,35 +99,10 @@ def number_in(text: str | None) -> float:
         return float("nan")
 
 
-def _segments(data: bytes, start: int) -> Iterator[tuple[int, int, int]]:
-    """Yield each segment's marker and the two ends of its content; the last segment is the end of the image."""
-    at = start + 2
-    while at + 2 <= len(data) and data[at] == PADDING:
-        marker = data[at + 1]
-        if marker == END_OF_IMAGE:
-            yield marker, at, at + 2
-            return
-        if marker == PADDING or marker in STANDALONE:
-            at += 1 if marker == PADDING else 2
-            continue
-        length = int.from_bytes(data[at + 2 : at + 4], "big")
-        first, at = at + 4, at + 2 + length
-        if length < 2 or at > len(data):
-            return
-        yield marker, first, at
-        if marker == START_OF_SCAN:
-            found = AFTER_SCAN.search(data, at)
-            if found is None:
-                return
-            at = found.end() - 2
-
-
 def _join_parts(segments: list[bytes], name: bytes) -> bytes:
     """Return the extended packet of this name from its parts, whatever their order in the file."""
     parts = [part.groups() for part in map(EXTENDED_PART.fullmatch, segments) if part and part[1].upper() == name]
-    if not parts:
-        raise InputError("extended XMP is missing")
-    whole = int.from_bytes(parts[0][1], "big")
+    whole = int.from_bytes(parts[0][1], "big") if parts else 1
     if whole > MAX_PACKET_BYTES:
         raise InputError(f"extended XMP of {whole:,} bytes exceeds {MAX_PACKET_BYTES:,}")
     packet = bytearray()
@@ -125,5 +112,5 @@ def _join_parts(segments: list[bytes], name: bytes) -> bytes:
             break
         packet[offset : offset + len(content)] = content
     if len(packet) != whole:
-        raise InputError(f"extended XMP is cut short ({len(packet):,} of {whole:,} bytes)")
+        raise InputError(f"extended XMP is missing or cut short ({len(packet):,} of {whole:,} bytes)")
     return bytes(packet)

@@ -1,7 +1,7 @@
-"""Depth maps behind JPEG photos that no XMP describes: Huawei's, and plain second JPEGs.
+"""Depth maps behind photos that no XMP describes: Samsung's, Huawei's, and plain second JPEGs.
 
-No maker publishes these layouts; they are as users of such files found them. The near end is not known for sure: white
-counts as near until the photo decides.
+No maker publishes these layouts; they are as ExifTool's authors and users of such files found them. Distances are
+unknown: the maps are relative.
 """
 
 from __future__ import annotations
@@ -9,53 +9,56 @@ from __future__ import annotations
 import re
 import struct
 from io import BytesIO
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
 from iibr_core.depth.embedded.images import DECODE_ERRORS, GREY_TOLERANCE, decode_map
-from iibr_core.depth.embedded.jpeg import appended_pictures
+from iibr_core.depth.embedded.jpeg import HEADER_BYTES, appended_pictures
 from iibr_core.depth.estimate import DepthEstimate
 from iibr_core.formats.maps.disparity_file import has_shape_of
-from iibr_core.types import ImageSize, InputError
+from iibr_core.types import FloatImage, ImageSize, InputError
 
+SAMSUNG_MAP, SAMSUNG_SIZE = b"DualShot_DepthMap_1", b"DualShot_Extra_Info"
+"""Names of the block with a map, and of the block with its size."""
+SIZE = re.compile(rb"(?s)(?:.{4}){8,23}?[\x01-\x09]\x00\xff\xff(.{4})(.{4})")
+"""Width and height, after a mark at a multiple of 4 in bytes 32 to 95."""
 HUAWEI_HEADER = re.compile(rb"(?s)edof(?=(.{68}))")
-HUAWEI_SIDES = range(16, 8193)
-"""Plausible sides of a map in pixels; other data may hold the letters of the mark, too."""
-COMPARED, INSPECTED = (32, 24), (256, 192)
-"""(width, height) at which a picture is compared with the photo, and at which its texture is measured."""
-MAX_CORRELATION = 0.97
-"""Correlation with the photo's brightness, or its negative, above which a grey picture is a copy of the photo."""
-MAX_TEXTURED = 0.35
-"""Largest share of pixels of a map whose neighbours differ by more than 3 of 255."""
-MIN_LEVELS = 8
-"""Smallest number of grey levels of a map that more than one of 200 pixels have; a matte has fewer."""
 OTHER_USE = re.compile(rb"http://ns.adobe.com/xap/|urn:iso:std:iso:ts:21496|hdrgm:|GainMap", re.IGNORECASE)
 """Marks of gain maps, mattes and other described pictures in their headers."""
-HEADER_BYTES = 0x10000
+
+
+def samsung_estimate(data: bytes) -> DepthEstimate | None:
+    """Return the map of a photo with "Live focus", dark near; None without, or if its layout is unknown.
+
+    Raises InputError if the trailer names a map that it does not hold.
+    """
+    blocks = _samsung_blocks(data)
+    depth_map, size = blocks.get(SAMSUNG_MAP), SIZE.match(blocks.get(SAMSUNG_SIZE, b""))
+    if depth_map is None or size is None:
+        return None
+    width, height = (int.from_bytes(side, "little") for side in size.groups())
+    if not depth_map or width * height != len(depth_map):
+        raise InputError(f"Samsung's depth map of {width}x{height} pixels holds {len(depth_map):,} bytes")
+    return DepthEstimate(1 - _map_of(depth_map, width), "inverse depth")
 
 
 def huawei_estimate(data: bytes, end: int) -> DepthEstimate | None:
     """Return the map of a photo with "wide aperture" behind a JPEG that ends at `end`, None without.
 
-    A header holds the phone's orientation, width and height; a byte for each pixel follows. Raises InputError if the
-    map is cut off.
+    A header holds the phone's orientation, width and height; a byte for each pixel follows.
     """
-    cut_off = ""
     for mark in HUAWEI_HEADER.finditer(data, end):
         width, height = struct.unpack_from("<HH", mark[1], 16)
-        if width not in HUAWEI_SIDES or height not in HUAWEI_SIDES:
-            continue
         content = data[mark.end(1) : mark.end(1) + width * height]
-        if len(content) == width * height:
-            stored = np.frombuffer(content, np.uint8).reshape(height, width)
+        # Other data may hold the mark's letters, too.
+        if min(width, height) >= 16 and len(content) == width * height:
+            stored = _map_of(content, width)
             # The first phones wrote 0 and always mirrored the map.
             turned = {0x10: stored[::-1], 0x11: stored[::-1, ::-1].T, 0x13: stored.T}.get(mark[1][7], stored[:, ::-1])
-            return DepthEstimate(turned.astype(np.float32) / np.float32(255), "inverse depth")
-        cut_off = cut_off or f"{width}x{height} pixels is cut off after {len(content):,} bytes"
-    if cut_off:
-        raise InputError(f"Huawei's depth map of {cut_off}; get the whole file again")
+            return DepthEstimate(turned, "inverse depth")
     return None
 
 
@@ -64,7 +67,7 @@ def second_picture_estimate(data: bytes, end: int) -> DepthEstimate | None:
 
     None without, if it cannot be read, or if the photo has a gain map.
     """
-    if OTHER_USE.search(data, 0, min(end, HEADER_BYTES)) and b"GainMap" in data[:end]:
+    if data.find(b"GainMap", 0, end) >= 0:
         return None
     for picture, _ in appended_pictures(data, end):
         if not OTHER_USE.search(picture[:HEADER_BYTES]) and _is_map(picture, data):
@@ -75,38 +78,78 @@ def second_picture_estimate(data: bytes, end: int) -> DepthEstimate | None:
     return None
 
 
-def size_and_kind(data: bytes) -> tuple[ImageSize, bool] | None:
-    """Return the size of a JPEG's bytes, and whether it is grey; None if it cannot be read."""
-    colors = _small(data, COMPARED)
-    if colors is None:
+class Thumbnail(NamedTuple):
+    """A small copy of a picture. size: of the picture itself; colors: (192, 256, 3), of 255."""
+
+    size: ImageSize
+    colors: NDArray[np.int16]
+
+    @property
+    def is_grey(self) -> bool:
+        """Return whether nearly all of the pixels are grey."""
+        return bool((np.ptp(self.colors, axis=2) > GREY_TOLERANCE).mean() <= 0.01)
+
+
+def thumbnail_of(data: bytes) -> Thumbnail | None:
+    """Return a small copy of a JPEG's bytes; None if they cannot be read."""
+    try:
+        with Image.open(BytesIO(data), formats=("JPEG",)) as picture:
+            size = ImageSize(picture.height, picture.width)
+            picture.draft("RGB", (512, 384))
+            small = picture.convert("RGB").resize((256, 192), Image.Resampling.BOX)
+            return Thumbnail(size, np.asarray(small, np.int16))
+    except DECODE_ERRORS:
         return None
-    with Image.open(BytesIO(data)) as picture:
-        is_grey = (np.ptp(colors, axis=2) > GREY_TOLERANCE).mean() <= 0.01
-        return ImageSize(picture.height, picture.width), bool(is_grey)
 
 
 def _is_map(picture: bytes, photo: bytes) -> bool:
     """Return whether a picture is grey, has the photo's shape, and is neither a copy of it nor textured nor a matte."""
-    (size, is_grey), (photo_size, _) = (size_and_kind(data) or (None, False) for data in (picture, photo))
-    if not is_grey or size is None or photo_size is None or not has_shape_of(size, photo_size):
+    small, photo_small = thumbnail_of(picture), thumbnail_of(photo)
+    if small is None or photo_small is None or not small.is_grey or not has_shape_of(small.size, photo_small.size):
         return False
-    small, photo_small, fine = _small(picture, COMPARED), _small(photo, COMPARED), _small(picture, INSPECTED)
-    if small is None or photo_small is None or fine is None or np.ptp(small) < 16:
-        return False
-    grey = fine[..., 0]
+    grey = small.colors[..., 0]
     steps = np.maximum(np.abs(np.diff(grey, axis=0))[:, 1:], np.abs(np.diff(grey, axis=1))[1:])
     levels = np.bincount(grey.ravel() // 4)
-    if (steps > 3).mean() > MAX_TEXTURED or (levels > grey.size / 200).sum() < MIN_LEVELS:
-        return False
-    first, second = (colors.mean(axis=2).ravel() for colors in (small, photo_small))
-    return bool(np.ptp(second) == 0 or abs(np.corrcoef(first, second)[0, 1]) <= MAX_CORRELATION)
+    is_textured, is_matte = (steps > 3).mean() > 0.35, (levels > grey.size / 200).sum() < 8
+    blocks = (
+        colors.mean(axis=2).reshape(24, 8, 32, 8).mean(axis=(1, 3)).ravel()
+        for colors in (small.colors, photo_small.colors)
+    )
+    with np.errstate(invalid="ignore"):  # a photo of one colour has no copy
+        likeness = np.nan_to_num(np.corrcoef(*blocks)[0, 1])
+    return not is_textured and not is_matte and bool(abs(likeness) <= 0.97)
 
 
-def _small(data: bytes, size: tuple[int, int]) -> NDArray[np.int16] | None:
-    """Return the colours of a JPEG's bytes at a (width, height); None if they cannot be read."""
-    try:
-        with Image.open(BytesIO(data), formats=("JPEG",)) as picture:
-            picture.draft("RGB", (2 * size[0], 2 * size[1]))
-            return np.asarray(picture.convert("RGB").resize(size, Image.Resampling.BOX), np.int16)
-    except DECODE_ERRORS:
-        return None
+def _map_of(content: bytes, width: int) -> FloatImage:
+    return np.frombuffer(content, np.uint8).reshape(-1, width).astype(np.float32) / np.float32(255)
+
+
+def _samsung_blocks(data: bytes) -> dict[bytes, bytes]:
+    """Return the blocks of Samsung's trailer ("SEFT") by name; none without."""
+    end = len(data) - 2 if data.endswith(b"QDIOBS") else len(data)
+    while end >= 8 and data[end - 4 : end].isalnum():  # blocks lie end to end, their lengths behind them
+        length = int.from_bytes(data[end - 8 : end - 4], "little")
+        if not 4 <= length < min(HEADER_BYTES, end - 8):
+            break
+        start = end - 8 - length
+        if data[end - 4 : end] == b"SEFT":
+            return _listed_blocks(data, start, length)
+        end = start
+    return {}
+
+
+def _listed_blocks(data: bytes, start: int, length: int) -> dict[bytes, bytes]:
+    """Return the blocks that the directory at `start` lists: distance from the directory, and size."""
+    directory = data[start : start + length]
+    if not directory.startswith(b"SEFH") or length < 12:
+        return {}
+    count = int.from_bytes(directory[8:12], "little")
+    blocks: dict[bytes, bytes] = {}
+    for at in range(12, min(12 + 12 * count, length - 11), 12):
+        back, size = struct.unpack("<4xII", directory[at : at + 12])
+        if back > start or not 8 <= size <= back:
+            break
+        block = data[start - back : start - back + size]
+        name_end = 8 + int.from_bytes(block[4:8], "little")
+        blocks.setdefault(block[8:name_end], block[name_end:])
+    return blocks

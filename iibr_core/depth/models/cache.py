@@ -10,7 +10,7 @@ import os
 from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path
-from typing import cast, get_args
+from typing import cast
 
 import numpy as np
 from platformdirs import user_cache_path
@@ -20,8 +20,6 @@ from iibr_core.formats.outputs import write_file
 from iibr_core.types import FloatImage, InputError
 
 MAX_BYTES = 512 * 2**20
-FORMAT = "2"
-"""Part of every key: raise it when estimates mean something else."""
 
 
 def cache_folder() -> Path:
@@ -30,11 +28,8 @@ def cache_folder() -> Path:
 
 
 def key_of(pixels: FloatImage, files: Iterable[Path]) -> str:
-    """Return a name for a model's estimate of a picture (H, W, 3), by path, size and time of each of its files.
-
-    Nothing is read of the files: weights have gigabytes.
-    """
-    digest = hashlib.sha256(f"{FORMAT} {pixels.shape}".encode())
+    """Return a name for a model's estimate of a picture (H, W, 3), by path, size and time of each of its files."""
+    digest = hashlib.sha256(f"2 {pixels.shape}".encode())  # raise the number when estimates mean something else
     for file in files:
         status = file.stat() if file.is_file() else None
         digest.update(os.fsencode(file.resolve()))
@@ -48,14 +43,11 @@ def load(key: str) -> DepthEstimate | None:
     path = cache_folder() / f"{key}.npz"
     try:
         with np.load(path, allow_pickle=False) as kept:
-            meaning, values = str(kept["meaning"]), np.array(kept["values"], np.float32)
+            estimate = DepthEstimate(np.array(kept["values"], np.float32), cast(Meaning, str(kept["meaning"])))
+        os.utime(path)
     except Exception:  # missing, or damaged in one of the many ways that numpy meets
         return None
-    if values.ndim != 2 or meaning not in get_args(Meaning):
-        return None
-    with suppress(OSError):
-        os.utime(path)
-    return DepthEstimate(values, cast(Meaning, meaning))
+    return estimate
 
 
 def store(key: str, estimate: DepthEstimate) -> None:

@@ -23,11 +23,6 @@ from iibr_core.formats.outputs import write_folder
 from iibr_core.runtime.work import report_progress
 from iibr_core.types import InputError, Photo
 
-ONNX_KINDS = (None, "depth_anything", "dpt")
-"""Model types, of folders with both kinds of weights, whose ONNX file is taken."""
-UNSPECIFIC_NAMES = ("model", "onnx")
-"""Stems of files that are named after their folders, as those from the Hugging Face hub are."""
-
 
 @dataclass(frozen=True)
 class LocalModel:
@@ -59,61 +54,37 @@ class LocalModel:
                     found = torch_models.estimate_transformers(self.folder, self.title, photo)
                 case "unidepth":
                     found = torch_models.estimate_unidepth(self.folder, self.title, photo)
-            self._require_use(found)
+            _require_use(found, self.title)
             cache.store(key, found)
         return found
-
-    def _require_use(self, found: DepthEstimate) -> None:
-        values = found.values
-        known = values[~np.isnan(values)] if self.runner == "unidepth" else values
-        if not known.size or not np.isfinite(known).all():
-            raise InputError(f"{self.title} gave NaN or infinity for this photo")
-        if found.is_metric and not (known > 0).any():
-            raise InputError(f"{self.title} gave no distance above 0 for this photo")
-        if known.max() == known.min():
-            raise InputError(f"{self.title} gave the same depth everywhere")
 
 
 def known_model(name: str) -> KnownModel:
     """Return the known model of a name. Raises InputError with all names there are."""
-    for model in KNOWN_MODELS:
-        if model.name == name:
-            return model
-    names = ", ".join([*(model.name for model in KNOWN_MODELS), *list_own_models()])
-    raise InputError(f"{name}: no depth model of this name is known; there are {names}")
+    known = {model.name: model for model in KNOWN_MODELS}
+    if name not in known:
+        names = ", ".join([*known, *list_own_models()])
+        raise InputError(f"{name}: no depth model of this name is known; there are {names}")
+    return known[name]
 
 
 def model_to_use(choice: DepthChoice) -> LocalModel | None:
-    """Return the model that the user wants: a folder, an ONNX file, the name of a copied or a known one.
+    """Return the model that the user wants; without a wish, the usual one if it is ready, else None.
 
-    Without a wish, return the usual one if it is ready, else None. Raises InputError if the wanted one is not here, or
-    lacks its package.
+    Raises InputError if the wanted one is not here, or lacks its package.
     """
-    wanted = choice.model
-    if wanted is None:
-        usual = known_model(USUAL_MODEL)
-        found = None if usual.needs else model_here(usual)
-        if found is None and choice.asks_for_model:
-            raise InputError(f"--depth model: none is on this machine; get one with: iibr models get {USUAL_MODEL}")
-        return found
-    path = Path(os.path.expanduser(wanted))
-    if is_folder(path) or is_file(path):
-        return _model_at(path)
-    if "/" in wanted or "\\" in wanted or path.suffix.lower() == ".onnx":
-        raise InputError(f"{wanted}: no such file or folder")
-    if wanted in list_own_models():
-        return _model_at(list_own_models()[wanted], wanted)
-    model = known_model(wanted)
-    found = model_here(model)
-    if found is None:
-        raise InputError(f"{wanted} is not on this machine; get it with: iibr models get {wanted}")
-    _require_installed(found)
+    if choice.model is not None:
+        return _wanted_model(choice.model)
+    usual = known_model(USUAL_MODEL)
+    found = None if usual.needs else model_here(usual)
+    if found is None and choice.asks_for_model:
+        raise InputError(f"--depth model: none is on this machine; get one with: iibr models get {USUAL_MODEL}")
     return found
 
 
 def model_here(model: KnownModel) -> LocalModel | None:
     """Return a known model if all of its files are in the Hugging Face cache, else None."""
-    folder = local_folder(model.repository, model.commit)
+    folder = local_folder(model)
     if not all(is_file(folder / name) for name in model.files):
         return None
     return LocalModel(model.title, folder, model.runner, (folder / model.files[-1],))
@@ -121,7 +92,7 @@ def model_here(model: KnownModel) -> LocalModel | None:
 
 def fetch(model: KnownModel) -> LocalModel:
     """Download a model into the Hugging Face cache. Raises as `download` does."""
-    download(model.repository, model.commit, model.files, model.megabytes * 1e6)
+    download(model)
     found = model_here(model)
     assert found is not None
     return found
@@ -146,14 +117,13 @@ def register(path: Path) -> LocalModel:
     Nothing happens if the same file is there already. Raises InputError if it is no model that takes one picture, its
     name is taken, or it cannot be written.
     """
-    if not (is_folder(path) or is_file(path)):
-        raise InputError(f"{path}: no such file or folder")
-    model = _model_at(path)
+    model = _wanted_model(str(path))
     if model.runner != "onnx":
         raise InputError(f"{path}: only ONNX files are copied; use this folder as it is with --depth-model {path}")
     file = model.weights[0].resolve()
     onnx.picture_input(onnx.open_session(file), file)
-    name = model.folder.resolve().name if file.stem in UNSPECIFIC_NAMES else file.stem
+    # Those from the Hugging Face hub are named after their folders.
+    name = model.folder.resolve().name if file.stem in ("model", "onnx") else file.stem
     if any(known.name == name for known in KNOWN_MODELS):
         raise InputError(f"{path}: {name} is the name of a published model; rename the file")
     copy = own_models_folder() / name / f"{name}.onnx"
@@ -167,45 +137,60 @@ def register(path: Path) -> LocalModel:
                 shutil.copyfile(source, unfinished / target)
     elif not is_file(copy) or not filecmp.cmp(file, copy, shallow=False):
         raise InputError(f"{copy.parent}: another model has this name; rename {file}, or delete that folder")
-    return _model_at(copy, name)
+    return _wanted_model(name)
 
 
-def _model_at(path: Path, name: str = "") -> LocalModel:
-    """Return the model in a user's folder, or of a user's file."""
-    title = f"the model {name or path.name}" if is_file(path) else f"the model in {path.name or path}"
-    if is_file(path) and path.suffix.lower() != ".onnx":
-        raise InputError(
-            f"{path}: is not an ONNX file; --depth-model takes one, a model's folder, or a name `iibr models` lists"
-        )
-    files = [path] if is_file(path) else sorted(path.glob("*.onnx")) + sorted(path.glob("onnx/*.onnx"))
-    config = {} if is_file(path) else read_object(path / CONFIG)
-    kind = config.get("model_type")
-    if files and kind in ONNX_KINDS:
-        file = _only_file(path, files)
-        # The hub lays files out in a folder "onnx" below their settings.
-        folder = file.parent.parent if file.parent.name == "onnx" else file.parent
-        model = LocalModel(title, folder, "onnx", (file, *onnx.external_files(file)), is_meaning_known=False)
-    elif not config:
-        raise InputError(f"{path}: holds no {CONFIG}; get the whole model folder")
-    elif kind in torch_models.PREPARATIONS:
-        model = LocalModel(title, path, "transformers", torch_models.safetensors_in(path))
-    elif "unidepth" in str(config).lower():
-        model = LocalModel(title, path, "unidepth", torch_models.safetensors_in(path))
+def _wanted_model(wanted: str) -> LocalModel:
+    """Return the model in a folder, of an ONNX file, or of the name of a copied or a known one."""
+    path = Path(os.path.expanduser(wanted))
+    if is_folder(path):
+        found = _model_in(path)
+    elif path.suffix.lower() == ".onnx" and is_file(path):
+        found = _onnx_model(path, f"the model {path.name}")
+    elif is_file(path):
+        raise InputError(f"{path}: is not an ONNX file; --depth-model takes one, a folder, or a name of `iibr models`")
+    elif "/" in wanted or "\\" in wanted or path.suffix.lower() == ".onnx":
+        raise InputError(f"{wanted}: no such file or folder")
+    elif wanted in (copied := list_own_models()):
+        found = _onnx_model(copied[wanted], f"the model {wanted}")
+    elif (here := model_here(known_model(wanted))) is not None:
+        found = here
     else:
-        raise InputError(f"{path}: no known models are of its type, {kind!r}")
-    _require_installed(model)
-    return model
+        raise InputError(f"{wanted} is not on this machine; get it with: iibr models get {wanted}")
+    if package := missing_package(found.runner):
+        raise InputError(f"{found.title} needs the package {package}")
+    return found
 
 
-def _only_file(path: Path, files: list[Path]) -> Path:
-    """Return the only ONNX file, or `model.onnx` of several. Raises InputError if that leaves a choice."""
-    full = [file for file in files if file.name == "model.onnx"]
-    if len(files) != 1 and len(full) != 1:
-        names = ", ".join(file.name for file in files[:3])
-        raise InputError(f"{path}: which ONNX file is meant ({names})? Name it with --depth-model {path}/FILE.onnx")
-    return (full or files)[0]
+def _model_in(folder: Path) -> LocalModel:
+    """Return the model in a user's folder."""
+    title, config = f"the model in {folder.name or folder}", read_object(folder / CONFIG)
+    kind, files = config.get("model_type"), sorted([*folder.glob("*.onnx"), *folder.glob("onnx/*.onnx")])
+    if files and kind in (None, "depth_anything", "dpt"):  # other kinds' ONNX files do not state that they give metres
+        full = [file for file in files if file.name == "model.onnx"]
+        if 1 not in (len(files), len(full)):
+            names = ", ".join(file.name for file in files[:3])
+            raise InputError(f"{folder}: which ONNX file is meant ({names})? Use --depth-model {folder}/FILE.onnx")
+        return _onnx_model((full or files)[0], title)
+    if not config:
+        raise InputError(f"{folder}: holds no {CONFIG}; get the whole model folder")
+    if kind not in torch_models.PREPARATIONS and "unidepth" not in str(config).lower():
+        raise InputError(f"{folder}: no known models are of its type, {kind!r}")
+    runner: Runner = "transformers" if kind in torch_models.PREPARATIONS else "unidepth"
+    return LocalModel(title, folder, runner, torch_models.safetensors_in(folder))
 
 
-def _require_installed(model: LocalModel) -> None:
-    if package := missing_package(model.runner):
-        raise InputError(f"{model.title} needs the package {package}")
+def _require_use(found: DepthEstimate, title: str) -> None:
+    known = found.values[~np.isnan(found.values)]
+    if not known.size or not np.isfinite(known).all():
+        raise InputError(f"{title} gave NaN or infinity for this photo")
+    if found.is_metric and not (known > 0).any():
+        raise InputError(f"{title} gave no distance above 0 for this photo")
+    if known.max() == known.min():
+        raise InputError(f"{title} gave the same depth everywhere")
+
+
+def _onnx_model(file: Path, title: str) -> LocalModel:
+    """Return the model of an ONNX file. The hub lays such files out in a folder "onnx" below their settings."""
+    folder = file.parent.parent if file.parent.name == "onnx" else file.parent
+    return LocalModel(title, folder, "onnx", (file, *onnx.external_files(file)), is_meaning_known=False)

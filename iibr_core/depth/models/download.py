@@ -1,4 +1,4 @@
-"""Files of one commit of a repository on the Hugging Face hub, in the folder where its library keeps them.
+"""Files of a model on the Hugging Face hub, of one commit, in the folder where its library keeps them.
 
 huggingface_hub fetches them: its variables state mirrors, proxies, tokens and offline mode. `hf_hub_download`
 deletes what came of a file when it is stopped, so `http_get` is asked to resume files that grow beside their places.
@@ -8,40 +8,37 @@ from __future__ import annotations
 
 import hashlib
 import threading
-from collections.abc import Sequence
 from concurrent.futures import Future
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any, cast
 
+from iibr_core.depth.models.known import KnownModel
 from iibr_core.formats.files import is_file, reason_of
 from iibr_core.runtime.work import Cancelled, in_this_job, raise_if_stopped, report_progress, wait_unless_stopped
 from iibr_core.types import InputError
 
-ADVICE = (
-    "what has come is kept: check the network and try again, name a mirror with HF_ENDPOINT, or use a file with"
-    " --depth-model FILE.onnx"
-)
 
-
-def local_folder(repository: str, commit: str) -> Path:
-    """Return the folder of a commit's files on this machine; it may not exist."""
+def local_folder(model: KnownModel) -> Path:
+    """Return the folder of a model's files on this machine; it may not exist."""
     from huggingface_hub import constants  # its function for this needs all of that library, half a second
 
-    return Path(constants.HF_HUB_CACHE) / f"models--{repository.replace('/', '--')}" / "snapshots" / commit
+    repository = model.repository.replace("/", "--")
+    return Path(constants.HF_HUB_CACHE) / f"models--{repository}" / "snapshots" / model.commit
 
 
-def download(repository: str, commit: str, names: Sequence[str], total_bytes: float) -> Path:
-    """Bring files of a commit here, unless they are; returns their folder. total_bytes: of all, for progress.
+def download(model: KnownModel) -> None:
+    """Bring the files of a model here, unless they are.
 
     Raises InputError if it fails, Cancelled once the job is stopped: the thread that waits for the hub ends later.
     """
-    folder, done = local_folder(repository, commit), Future[None]()
+    folder, done = local_folder(model), Future[None]()
 
     def work() -> None:
         try:
-            for name in names:
+            for name in model.files:
                 if not is_file(folder / name):
-                    _fetch(repository, commit, name, folder / name, total_bytes)
+                    _fetch(model, name, folder / name)
             done.set_result(None)
         except BaseException as error:
             done.set_exception(error)
@@ -52,33 +49,30 @@ def download(repository: str, commit: str, names: Sequence[str], total_bytes: fl
     except (Cancelled, InputError):
         raise
     except Exception as error:  # whatever the library's clients raise: they change with its versions
-        raise InputError(f"{repository} cannot be downloaded ({reason_of(error)[:120]}); {ADVICE}") from error
-    return folder
+        raise InputError(
+            f"{model.repository} cannot be downloaded ({reason_of(error)[:120]}); what has come is kept: check the"
+            " network and try again, name a mirror with HF_ENDPOINT, or use a file with --depth-model FILE.onnx"
+        ) from error
 
 
-def _fetch(repository: str, commit: str, name: str, place: Path, total_bytes: float) -> None:
+def _fetch(model: KnownModel, name: str, place: Path) -> None:
     """Download the rest of a file, compare it with the hub's hash, and put it in its place."""
     from huggingface_hub import get_hf_file_metadata, get_token, hf_hub_url
     from huggingface_hub.file_download import http_get
 
-    class Bar:
+    class Bar(nullcontext[Any]):
         """Progress of a file, in place of tqdm's. The library updates it before it writes a piece."""
 
         def __init__(self, initial: int = 0, **options: object) -> None:
+            super().__init__(self)
             self.came = initial
-
-        def __enter__(self) -> Bar:
-            return self
-
-        def __exit__(self, *error: object) -> None:
-            """Show nothing more."""
 
         def update(self, count: int) -> None:
             raise_if_stopped()
             self.came += count
-            report_progress(self.came, max(total_bytes, self.came), f"downloading {name}")
+            report_progress(self.came, max(model.megabytes * 1e6, self.came), f"downloading {name}")
 
-    url = hf_hub_url(repository, name, revision=commit)
+    url = hf_hub_url(model.repository, name, revision=model.commit)
     stated = get_hf_file_metadata(url)
     headers = {"Authorization": f"Bearer {get_token()}"} if get_token() else {}
     place.parent.mkdir(parents=True, exist_ok=True)
@@ -86,17 +80,10 @@ def _fetch(repository: str, commit: str, name: str, place: Path, total_bytes: fl
     part.touch()
     with part.open("r+b") as file:  # two processes that fetch the same file write the same bytes to the same places
         came = file.seek(0, 2)
-        http_get(
-            url,
-            file,
-            resume_size=came,
-            headers=headers,
-            expected_size=stated.size,
-            tqdm_class=cast(Any, Bar),
-        )
+        http_get(url, file, resume_size=came, headers=headers, expected_size=stated.size, tqdm_class=cast(Any, Bar))
     with part.open("rb") as whole:
         digest = hashlib.file_digest(whole, "sha256").hexdigest()
     if digest != stated.etag and len(stated.etag or "") == len(digest):  # tags of small files are no such hashes
         part.unlink()
-        raise InputError(f"{repository}: {name} is not what the hub states for commit {commit[:7]}; get it again")
+        raise InputError(f"{model.title}: {name} is not what the hub states for this commit; get it again")
     part.replace(place)

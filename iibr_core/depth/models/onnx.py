@@ -6,7 +6,6 @@ whether the output is distances; without them, the photo is prepared as for Dept
 
 from __future__ import annotations
 
-import mmap
 import re
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
@@ -32,30 +31,15 @@ from iibr_core.runtime.work import Cancelled, report_progress, wait_unless_stopp
 from iibr_core.types import FloatImage, ImageSize, InputError, Photo
 
 ACCELERATORS = ("CUDAExecutionProvider", "CoreMLExecutionProvider", "DmlExecutionProvider")
-CPU = "CPUExecutionProvider"
-NUMBER_TYPES = {
-    "tensor(float)": "float32",
-    "tensor(float16)": "float16",
-    "tensor(double)": "float64",
-    "tensor(uint8)": "uint8",
-}
+NUMBER_TYPES = {"tensor(float)": "float32", "tensor(float16)": "float16", "tensor(uint8)": "uint8"}
 """Number types of pictures, by ONNX Runtime's names for them."""
 EXTERNAL_FILE = re.compile(rb"\n\x08location\x12(.)", re.DOTALL)
 """Start of a tensor's entry about its file of numbers; the last byte is the length of the file's name (onnx.proto)."""
-MAX_GRAPH_BYTES = 64 * 2**20
-"""Larger ONNX files hold their weights themselves: they are not searched for names of other files."""
-DEPTH_WORDS = ("depth", "disp", "dist")
-"""Parts of the names of outputs that are depth."""
-OTHER_WORDS = ("conf", "feature", "mask", "normal", "prob", "seg", "sky", "std", "var", "uncert", "weight")
-"""Parts of the names of outputs that are no depth, whatever their shape."""
-METRIC_WORDS = ("metric", "focal", "normal", "intrinsic")
-"""Parts of the names of outputs of metric models: Depth Pro's focal length, Metric3D's normals, UniDepth's camera."""
-MIN_MAP_SIDE = 8
-"""Smallest height and width of a map in pixels: smaller outputs are matrices."""
-MAX_ASPECT_CHANGE = 1.25
-"""Largest ratio between the aspects of a picture and its map: outputs of other shapes are lists of features."""
-OTHER_MULTIPLE = 32
-"""Multiple of both sides for networks that refuse multiples of 14 px."""
+DEPTH_NAME = re.compile("depth|disp|dist", re.IGNORECASE)
+OTHER_NAME = re.compile("conf|feature|mask|normal|prob|seg|sky|std|var|uncert|weight", re.IGNORECASE)
+"""Names of outputs that are no depth, whatever their shape."""
+METRIC_NAME = re.compile("metric|focal|normal|intrinsic", re.IGNORECASE)
+"""Names of outputs of metric models: Depth Pro's focal length, Metric3D's normals, UniDepth's camera."""
 
 
 @dataclass(frozen=True)
@@ -76,10 +60,10 @@ class PictureInput:
     def prepare(self, pixels: FloatImage, preparation: Preparation, size: ImageSize) -> np.ndarray[Any, Any]:
         """Return a photo's pixels (H, W, 3), 0..1, as the model takes them."""
         if self.number_type == "uint8":
-            planes = network_input(pixels, replace(preparation, mean=(0.0,) * 3, std=(1 / 255,) * 3), size)
+            preparation = replace(preparation, mean=(0.0,) * 3, std=(1 / 255,) * 3)
+        planes = network_input(pixels, preparation, size)
+        if self.number_type == "uint8":
             planes = np.clip(np.rint(planes), 0, 255)
-        else:
-            planes = network_input(pixels, preparation, size)
         values = np.moveaxis(planes if self.rank == 4 else planes[0], self.rank - 3, self.channel_axis)
         return np.ascontiguousarray(values, self.number_type)
 
@@ -101,21 +85,21 @@ def estimate_onnx(file: Path, settings: Path, title: str, photo: Photo) -> Depth
 
 def _estimate(session: Any, file: Path, settings: Path, title: str, photo: Photo) -> DepthEstimate:
     picture, preparation = picture_input(session, file), read_preparation(settings)
-    is_metric = read_object(settings / CONFIG).get("depth_estimation_type") == "metric"
     report_progress(0, 0, f"estimating depth with {title}")
     failures = []
-    for multiple in (preparation.multiple, OTHER_MULTIPLE):
+    for multiple in (preparation.multiple, 32):  # some networks refuse multiples of 14
         wanted = replace(preparation, multiple=multiple).size_for(photo.size)
         size = ImageSize(picture.height or wanted.height, picture.width or wanted.width)
         try:
             outputs = _run(session, {picture.name: picture.prepare(photo.pixels, preparation, size)})
         except RuntimeError as error:
-            failures.append(error)
+            failures.append(reason_of(error))
             continue
-        is_metric |= any(_has_word(name, METRIC_WORDS) for name in outputs)
+        is_metric = read_object(settings / CONFIG).get("depth_estimation_type") == "metric"
+        is_metric |= any(map(METRIC_NAME.search, outputs))
         return DepthEstimate(depth_output(file, outputs, size), "metres" if is_metric else "inverse depth")
     raise InputError(
-        f"{file}: failed on this photo ({reason_of(failures[0])}); if it needs pictures of other sizes, state size and"
+        f"{file}: failed on this photo ({failures[0]}); if it needs pictures of other sizes, state size and"
         f" ensure_multiple_of in a {PREPROCESSOR} beside it"
     )
 
@@ -130,7 +114,7 @@ def open_session(file: Path, *accelerators: str) -> Any:
     options.add_session_config_entry("session.intra_op.allow_spinning", "0")
     options.log_severity_level = 4
     try:
-        return onnxruntime.InferenceSession(str(file), options, providers=[*accelerators, CPU])
+        return onnxruntime.InferenceSession(str(file), options, providers=[*accelerators, "CPUExecutionProvider"])
     except Exception as error:  # its errors share no class
         raise InputError(f"{file}: is not an ONNX model that can be run ({reason_of(error)}); get it again") from error
 
@@ -164,22 +148,20 @@ def depth_output(file: Path, outputs: Mapping[str, Any], size: ImageSize) -> Flo
     if not maps:
         shapes = ", ".join(f"{name} {getattr(values, 'shape', 'a list')}" for name, values in outputs.items())
         raise InputError(f"{file}: gives {shapes[:160]}, not one map of depth (H, W); choose a depth model")
-    _, values = min(maps, key=lambda named: (not _has_word(named[0], DEPTH_WORDS), -named[1].size))
+    _, values = min(maps, key=lambda named: (not DEPTH_NAME.search(named[0]), -named[1].size))
     return np.asarray(values, np.float32)
 
 
 def external_files(file: Path) -> tuple[Path, ...]:
     """Return the files beside an ONNX file that hold its weights. Raises InputError if one is missing or elsewhere."""
-    if not 0 < file.stat().st_size <= MAX_GRAPH_BYTES:
+    if file.stat().st_size > 64 * 2**20:  # it holds its weights itself
         return ()
-    with file.open("rb") as opened, mmap.mmap(opened.fileno(), 0, access=mmap.ACCESS_READ) as content:
-        ends = [(match.end(), match[1][0]) for match in EXTERNAL_FILE.finditer(content)]
-        names = sorted({content[end : end + length].decode("utf-8", "replace") for end, length in ends})
+    content = file.read_bytes()
+    ends = [(match.end(), match[1][0]) for match in EXTERNAL_FILE.finditer(content)]
+    names = sorted({content[end : end + length].decode("utf-8", "replace") for end, length in ends})
     for name in names:
         if not stays_within(name) or not is_file(file.parent / name):
-            raise InputError(
-                f"{file}: its weights are in {printable(name)}, which does not lie beside it; get that file, too"
-            )
+            raise InputError(f"{file}: its weights are in {printable(name)}, which does not lie beside it; get it, too")
     return tuple(file.parent / name for name in names)
 
 
@@ -200,15 +182,10 @@ def _run(session: Any, pictures: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _is_map(name: str, values: Any, size: ImageSize) -> bool:
-    """Return whether an output has the shape that a map of a picture of this size may have."""
-    if not isinstance(values, np.ndarray) or values.dtype.kind not in "fiu" or _has_word(name, OTHER_WORDS):
+    """Return whether an output has nearly the aspect of a picture of this size, as lists of features do not."""
+    if not isinstance(values, np.ndarray) or values.dtype.kind not in "fiu" or OTHER_NAME.search(name):
         return False
     sides = [side for side in values.shape if side != 1]
-    if len(sides) != 2 or min(sides) < MIN_MAP_SIDE:
+    if len(sides) != 2 or min(sides) < 8:  # smaller outputs are matrices
         return False
-    change: float = sides[1] / sides[0] * size.height / size.width
-    return 1 / MAX_ASPECT_CHANGE <= change <= MAX_ASPECT_CHANGE
-
-
-def _has_word(name: str, words: tuple[str, ...]) -> bool:
-    return any(word in name.lower() for word in words)
+    return bool(0.8 <= sides[1] / sides[0] * size.height / size.width <= 1.25)

@@ -21,16 +21,16 @@ from iibr_core.depth.models.preparation import CONFIG, Preparation, network_inpu
 from iibr_core.formats.files import printable, reason_of
 from iibr_core.runtime.machine import core_count
 from iibr_core.runtime.work import Cancelled, raise_if_stopped, report_progress
-from iibr_core.types import FloatImage, ImageSize, InputError, Photo, image_size
+from iibr_core.types import ImageSize, InputError, Photo, image_size
 
-INVERSE_LIMITS = (1e-4, 1e4)
-"""Depth Pro's inverse depth, as its authors clamp it, in 1 / metres."""
-HALF = (0.5, 0.5, 0.5)
 PREPARATIONS = {
-    "depth_anything": Preparation(ImageSize(518, 518), True, 14, HALF, HALF),
-    "depth_pro": Preparation(ImageSize(1536, 1536), False, 1, HALF, HALF),
-    "dpt": Preparation(ImageSize(384, 384), False, 1, HALF, HALF),
-    "zoedepth": Preparation(ImageSize(384, 512), True, 32, HALF, HALF),
+    kind: Preparation(ImageSize(*size), keeps_aspect, multiple, (0.5, 0.5, 0.5), (0.5, 0.5, 0.5))
+    for kind, size, keeps_aspect, multiple in (
+        ("depth_anything", (518, 518), True, 14),
+        ("depth_pro", (1536, 1536), False, 1),
+        ("dpt", (384, 384), False, 1),
+        ("zoedepth", (384, 512), True, 32),
+    )
 }
 """The preparations of transformers, by the config's model type, for what a folder leaves out."""
 
@@ -51,10 +51,14 @@ def estimate_transformers(folder: Path, title: str, photo: Photo) -> DepthEstima
     report_progress(0, 0, f"loading {title}")
     import torch
 
+    from iibr_core.formats.maps.resample import resample_surfaces
+
     config = read_object(folder / CONFIG)
-    preparation = read_preparation(folder, PREPARATIONS[config["model_type"]])
-    padding = _padding(photo.size) if config["model_type"] == "zoedepth" else (0, 0)
-    pixels = np.pad(photo.pixels, (*((pad, pad) for pad in padding), (0, 0)), "reflect")
+    kind, (height, width) = config["model_type"], photo.size
+    # ZoeDepth was trained with mirrored borders.
+    rows, columns = (int(math.sqrt(side / 2) * 3) if kind == "zoedepth" else 0 for side in photo.size)
+    pixels = np.pad(photo.pixels, ((rows, rows), (columns, columns), (0, 0)), "reflect")
+    preparation = read_preparation(folder, PREPARATIONS[kind])
     values = network_input(pixels, preparation, preparation.size_for(image_size(pixels)))
     with _as_input_errors(folder, title):
         network = _load_network(folder, config)
@@ -63,16 +67,15 @@ def estimate_transformers(folder: Path, title: str, photo: Photo) -> DepthEstima
         with torch.inference_mode(), _layers_watched(network, f"estimating depth with {title}"):
             output = network.to(device)(pixel_values=torch.from_numpy(values).to(device))
         depth = output.predicted_depth[0].float().cpu().numpy()
-    match config["model_type"]:
-        case "zoedepth":
-            return DepthEstimate(_without_padding(depth, photo.size), "metres")
-        case "depth_pro" if output.field_of_view is not None:
-            # It gives inverse distance for a camera whose focal length is the picture's width.
-            widths = 0.5 / math.tan(math.radians(float(output.field_of_view[0])) / 2)
-            return DepthEstimate(1 / np.clip(depth / np.float32(widths), *INVERSE_LIMITS), "metres")
-        case "depth_anything" if config.get("depth_estimation_type") == "metric":
-            return DepthEstimate(depth, "metres")
-    return DepthEstimate(depth, "inverse depth")
+    if kind == "zoedepth":
+        whole = resample_surfaces(depth, image_size(pixels))
+        return DepthEstimate(whole[rows : rows + height, columns : columns + width], "metres")
+    if kind == "depth_pro" and output.field_of_view is not None:
+        # It gives inverse distance for a camera whose focal length is the picture's width; its authors clamp it.
+        widths = 0.5 / math.tan(math.radians(float(output.field_of_view[0])) / 2)
+        return DepthEstimate(1 / np.clip(depth / np.float32(widths), 1e-4, 1e4), "metres")
+    is_metric = kind == "depth_anything" and config.get("depth_estimation_type") == "metric"
+    return DepthEstimate(depth, "metres" if is_metric else "inverse depth")
 
 
 def estimate_unidepth(folder: Path, title: str, photo: Photo) -> DepthEstimate:
@@ -95,10 +98,8 @@ def _load_network(folder: Path, config: dict[str, Any]) -> Any:
     from transformers.utils import logging
 
     for part in (config, config.get("backbone_config") or {}):
-        if part.get("backbone"):  # it would be downloaded
-            raise InputError(
-                f"{folder / CONFIG}: needs another model, {printable(part['backbone'])}; get a whole folder"
-            )
+        if backbone := part.get("backbone"):  # it would be downloaded
+            raise InputError(f"{folder / CONFIG}: needs another model, {printable(backbone)}; get a whole folder")
     logging.set_verbosity_error()
     logging.disable_progress_bar()
     network, report = AutoModelForDepthEstimation.from_pretrained(
@@ -138,16 +139,3 @@ def _layers_watched(network: Any, doing: str) -> Iterator[None]:
     finally:
         for hook in hooks:
             hook.remove()
-
-
-def _padding(size: ImageSize) -> tuple[int, int]:
-    """Return the rows and columns of the mirrored borders with which ZoeDepth was trained."""
-    return int(math.sqrt(size.height / 2) * 3), int(math.sqrt(size.width / 2) * 3)
-
-
-def _without_padding(depth: FloatImage, size: ImageSize) -> FloatImage:
-    from iibr_core.formats.maps.resample import resample_surfaces
-
-    rows, columns = _padding(size)
-    whole = resample_surfaces(depth, ImageSize(size.height + 2 * rows, size.width + 2 * columns))
-    return whole[rows : rows + size.height, columns : columns + size.width]

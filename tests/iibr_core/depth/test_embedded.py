@@ -165,6 +165,10 @@ def test_entities_are_never_expanded(prolog: str) -> None:
         embedded_in_jpeg(files.with_segments(files.grey_photo(SIZE), [xmp]))
 
 
+def test_a_long_run_of_padding_in_a_scan_takes_no_time() -> None:
+    assert embedded_in_jpeg(b"\xff\xd8\xff\xda\0\2" + b"\xff" * 2_000_000 + b"\0") is None
+
+
 # ---- damaged files
 
 FUZZED = {
