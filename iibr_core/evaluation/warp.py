@@ -78,7 +78,7 @@ def _splat(disparity, matrix, target_height, target_width):
             for k in range(SAMPLES * SAMPLES):
                 point_x = x + (k % SAMPLES + 0.5) / SAMPLES - 0.5
                 point_y = y + (k // SAMPLES + 0.5) / SAMPLES - 0.5
-                d = surface_at(disparity, x, y, point_x, point_y)
+                d = _surface_at(disparity, x, y, point_x, point_y)
                 w = matrix[2, 0] * point_x + matrix[2, 1] * point_y + matrix[2, 2] + matrix[2, 3] * d
                 if not w > 0:  # behind the camera
                     continue
@@ -92,7 +92,7 @@ def _splat(disparity, matrix, target_height, target_width):
 
 
 @kernel
-def surface_at(disparity, x, y, point_x, point_y):
+def _surface_at(disparity, x, y, point_x, point_y):
     """Return disparity at a point of pixel (x, y): interpolated if the four around it are one surface."""
     left, top = math.floor(point_x), math.floor(point_y)
     if left < 0 or top < 0 or left + 1 >= disparity.shape[1] or top + 1 >= disparity.shape[0]:
