@@ -45,11 +45,6 @@ COORDINATES_ONLY = [SHARE, LANDS, INPAINTED, PARALLAX, COVERAGE, UNCOVERED, PLAI
 """Indices of the features that do not depend on disparity."""
 
 
-def all_features(features: Any) -> Any:
-    """Return features (N, K, FEATURES), arrays or tensors, unchanged."""
-    return features
-
-
 def without_disparity(features: Any) -> Any:
     """Return features whose parts made of disparity are 0."""
     kept = features * 0
@@ -63,14 +58,14 @@ class Variant:
 
     name: str
     lambdas: LossWeights = LAMBDAS
-    select: Callable[[Any], Any] = all_features
+    select: Callable[[Any], Any] = lambda features: features
 
     def weights_in(self, folder: Path) -> Path:
         """Return the path of its weights."""
-        return folder / f"{re.sub(r'[^a-z0-9]+', '-', self.name.lower()).strip('-')}.safetensors"
+        return folder / f"{'-'.join(re.findall('[a-z0-9]+', self.name.lower()))}.safetensors"
 
 
-BASE, CLOSED_FORM, UNSHARED = "trained again", "closed form", "without inpainting shared by all views"
+BASE = "trained again"
 VARIANTS = (
     Variant(BASE),
     Variant("without disparity encoding", select=without_disparity),
@@ -92,12 +87,10 @@ def main(words: Sequence[str] | None = None) -> None:
         folder = options.folder or Path(temporary)
         with show_progress("training"):
             train_missing(folder, options.steps)
-        ways = {
-            variant.name: partial(views_by, variant, TrainedWeights(variant.weights_in(folder))) for variant in VARIANTS
-        }
-        ways |= {CLOSED_FORM: partial(views_by, None, None)}
-        ways |= {UNSHARED: partial(views_by, VARIANTS[0], TrainedWeights(VARIANTS[0].weights_in(folder)), shares=False)}
-        results = list(compare(scenes, ways, options.maps.split(","), options.depth_model, options.rounds))
+        ways = {v.name: partial(views_by, v, TrainedWeights(v.weights_in(folder))) for v in VARIANTS}
+        ways["closed form"] = partial(views_by, None, None)
+        ways["without inpainting shared by all views"] = partial(ways[BASE], shares=False)
+        results = list(compare(scenes, ways, options.maps.split(","), options.depth_model))
     print(
         f"{len(scenes)} scenes, {options.steps} steps of training: whole views, edges, holes (dB); time as a factor.\n"
     )

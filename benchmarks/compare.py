@@ -7,7 +7,7 @@ resampled (from 224 pixels); phone (a third of the size, 8 bits, soft); network-
 network (estimated by --depth-model), guess, plane: at the best scale and shift. PSNR is the mean over the views at the
 corners and sides of the light field: whole views; what the photo sees; within 3 px of holes; in holes, which are those
 of the exact map. Flying pixels stand out from their 5 x 5 median near holes, where the truth's do not, in 10,000.
-Seconds of processor time, of all threads, are those of 9 x 9 views, set-up included; all ways run in turns.
+Seconds of processor time, of all threads, are those of 9 x 9 views, set-up included.
 """
 
 from __future__ import annotations
@@ -32,12 +32,10 @@ from iibr_core.evaluation.metrics import bounded_psnr
 from iibr_core.formats.outputs import write_file
 from iibr_core.types import FloatImage, ImageSize, InputError, ViewOffset
 
-EDGE_PX, NEAR_PX = 3, 12
-"""Distances from holes within which pixels are at an edge, and within which flying pixels are counted."""
 FLYING, CALM = 0.12, 0.06
 """Least difference of a flying pixel from the median around it, and largest one of the truth's."""
-VIEWS, TIMED_VIEWS = 81, 4
-"""Number of views whose time is given, and of those that are timed: none is a corner, which set-up may have made."""
+TIMED_VIEWS = 4
+"""Number of views that are timed: none is a corner, which set-up may have made."""
 MAPLESS = "unchanged photo"
 """The way that does not look at the map."""
 
@@ -68,14 +66,12 @@ def main(words: Sequence[str] | None = None) -> None:
     """Run the program."""
     options = command_line().parse_args(words)
     scenes = list(chosen_scenes(options))
-    ways = chosen_ways(options.ways)
-    kinds = options.maps.split(",")
-    results = list(compare(scenes, ways, kinds, options.depth_model, options.rounds))
+    results = list(compare(scenes, chosen_ways(options.ways), options.maps.split(","), options.depth_model))
     print(f"{len(scenes)} scenes: {', '.join(scene.name for scene in scenes)}.\n")
     if options.against:
         print(changes_table(results, options.against))
     else:
-        print(scene_table(results, options.parts) if options.by == "scene" else mean_table(results))
+        print(scene_table(results) if options.by == "scene" else mean_table(results))
     if options.plot:
         with write_file(options.plot) as unfinished:
             plot(results).savefig(unfinished, format="svg", metadata={"Date": None})
@@ -90,10 +86,8 @@ def command_line() -> argparse.ArgumentParser:
     parser.add_argument("--only", default="", help="scenes of DATA whose names contain one of these words")
     parser.add_argument("--drawn", type=int, help="number of drawn scenes; 2 without DATA, else 0")
     parser.add_argument("--max-pixels", type=int, default=MAX_PIXELS, help="largest size of a photo of DATA")
-    parser.add_argument("--rounds", type=int, default=1, help="rounds of which the median time counts")
     parser.add_argument("--depth-model", type=Path, help="ONNX file of the network of `--maps network`")
     parser.add_argument("--by", choices=["mean", "scene"], default="mean", help="rows of the table")
-    parser.add_argument("--parts", action="store_true", help="with --by scene: also what the photo sees, and holes")
     parser.add_argument("--against", metavar="WAY", help="show the changes from this way instead")
     parser.add_argument("--plot", type=Path, metavar="SVG", help="also draw PSNR over time")
     return parser
@@ -102,16 +96,15 @@ def command_line() -> argparse.ArgumentParser:
 def chosen_scenes(options: argparse.Namespace) -> Iterator[Scene]:
     """Yield the scenes that the command line names. Raises InputError if there are none."""
     count = (0 if options.data else 2) if options.drawn is None else options.drawn
-    for seed in range(count):
-        yield drawn_scene(seed, largest_px=0.5 + seed % 4)
     scenes = list(data_scenes(options.data, options.only, options.max_pixels)) if options.data else []
     if not count and not scenes:
         raise InputError(f"{options.data}: no scene with views and a disparity map, such as gt_disp_u00_v00.npy")
+    yield from (drawn_scene(seed, largest_px=0.5 + seed % 4) for seed in range(count))
     yield from scenes
 
 
 def compare(
-    scenes: Iterable[Scene], ways: Mapping[str, Way], kinds: Sequence[str], model: Path | None = None, rounds: int = 1
+    scenes: Iterable[Scene], ways: Mapping[str, Way], kinds: Sequence[str], model: Path | None = None
 ) -> Iterator[Result]:
     """Yield the figures of every way on every kind of map of every scene. Raises InputError for an unknown kind."""
     for make in ways.values():
@@ -120,33 +113,33 @@ def compare(
         holes = {at: land(scene.disparity, at)[1] for at in scene.truth}
         for kind in kinds:
             given = with_map(scene, kind, model)
-            used = {name: make for name, make in ways.items() if name != MAPLESS or kind == kinds[0]}
-            rows: dict[str, list[tuple[float, ...]]] = {name: [] for name in used}
-            for _ in range(rounds):
-                for name, make in used.items():
+            for name, make in ways.items():
+                if name != MAPLESS or kind == kinds[0]:
                     views, seconds = _make_views(make, given)
                     judged = [judge_view(views[at], truth, holes[at]) for at, truth in scene.truth.items()]
-                    rows[name].append((*_known_means(judged), seconds))
-            for name, found in rows.items():
-                yield Result(scene.name, kind, name, Figures(*map(float, np.median(found, axis=0))))
+                    yield Result(scene.name, kind, name, Figures(*_known_means(judged), seconds))
 
 
 def _make_views(make: Way, scene: Scene) -> tuple[dict[ViewOffset, FloatImage], float]:
-    """Return the judged views as a light field stores them, and the seconds for VIEWS views."""
+    """Return the judged views as a light field stores them, and the seconds for 81 views."""
     began = time.process_time()
     view = make(scene)
     ready = time.process_time()
-    places = [scene.field[k * len(scene.field) // (2 * TIMED_VIEWS)] for k in range(1, 2 * TIMED_VIEWS, 2)]
-    stored = {at: quantise_as_stored(np.clip(view(at), 0, 1)) for at in places}
-    seconds = ready - began + (time.process_time() - ready) / len(stored) * VIEWS
-    return {at: stored.get(at, quantise_as_stored(np.clip(view(at), 0, 1))) for at in scene.truth}, seconds
+    for k in range(1, 2 * TIMED_VIEWS, 2):
+        _stored(view(scene.field[k * len(scene.field) // (2 * TIMED_VIEWS)]))
+    seconds = ready - began + (time.process_time() - ready) / TIMED_VIEWS * 81
+    return {at: _stored(view(at)) for at in scene.truth}, seconds
+
+
+def _stored(view: FloatImage) -> FloatImage:
+    return quantise_as_stored(np.clip(view, 0, 1))
 
 
 def judge_view(view: FloatImage, truth: FloatImage, hole: Mask) -> tuple[float, ...]:
     """Return the figures of a view (H, W, 3), seconds apart; NaN for a part without pixels."""
-    around = _grown(hole, NEAR_PX)
+    around = _grown(hole, 12)
     flying = around & (_off_median(view) > FLYING) & (_off_median(truth) < CALM)
-    parts = None, ~_grown(hole, 1), _grown(hole, EDGE_PX) & ~hole, hole
+    parts = None, ~_grown(hole, 1), _grown(hole, 3) & ~hole, hole
     share = 1e4 * flying.sum() / around.sum() if around.any() else np.nan
     return (*(bounded_psnr(view, truth, part) for part in parts), float(share))
 
@@ -162,8 +155,8 @@ def _off_median(picture: FloatImage) -> FloatImage:
 
 def _known_means(rows: Sequence[Sequence[float]]) -> list[float]:
     """Return the mean of each column over its finite values, NaN if there are none."""
-    values = np.array(rows, np.float64)
-    return [float(column[np.isfinite(column)].mean()) if np.isfinite(column).any() else np.nan for column in values.T]
+    means: list[float] = np.ma.masked_invalid(rows).mean(axis=0).filled(np.nan).tolist()
+    return means
 
 
 def means(results: Sequence[Result]) -> dict[tuple[str, str], Figures]:
@@ -184,19 +177,15 @@ def mean_table(results: Sequence[Result]) -> str:
     return markdown(names, rows)
 
 
-def scene_table(results: Sequence[Result], with_parts: bool = False) -> str:
-    """Return a table of PSNR with a row for each scene. with_parts: also of what the photo sees, and of holes."""
-    columns = dict.fromkeys((result.kind, result.way) for result in results)
-    cells = {(result.scene, result.kind, result.way): result.figures for result in results}
-    names = ["scene", *(way if way == MAPLESS else f"{way}: {kind}" for kind, way in columns)]
-
-    def words(figures: Figures) -> str:
-        parts = f" ({figures.visible:.2f}, {figures.holes:.2f})" if with_parts else ""
-        return f"{figures.whole:.2f}{parts}"
-
-    scenes = dict.fromkeys(result.scene for result in results)
-    rows = [[scene, *(words(cells[(scene, *column)]) for column in columns)] for scene in scenes]
-    return markdown(names, [*rows, ["mean", *(words(found) for found in means(results).values())]])
+def scene_table(results: Sequence[Result]) -> str:
+    """Return a table of the PSNR of whole views with a row for each scene, and one of means."""
+    columns = means(results)
+    names = ("scene", *(way if way == MAPLESS else f"{way}: {kind}" for kind, way in columns))
+    rows: dict[str, list[str]] = {}
+    for result in results:
+        rows.setdefault(result.scene, []).append(f"{result.figures.whole:.2f}")
+    rows["mean"] = [f"{figures.whole:.2f}" for figures in columns.values()]
+    return markdown(names, ((scene, *cells) for scene, cells in rows.items()))
 
 
 def changes_table(results: Sequence[Result], against: str) -> str:
@@ -208,21 +197,19 @@ def changes_table(results: Sequence[Result], against: str) -> str:
     kinds = list(dict.fromkeys(kind for kind, _ in found))
     if (kinds[0], against) not in found:
         raise InputError(f"--against {against}: is none of the ways that were measured")
-
-    def words(kind: str, way: str) -> str:
-        one, base = found[kind, way], found[kind, against]
-        changes = ", ".join(f"{one[k] - base[k]:+.2f}" for k in (0, 2, 3))
-        return f"{changes}; x {one.seconds / base.seconds:.2f}"
-
-    ways = dict.fromkeys(way for _, way in found if way not in (against, MAPLESS))
-    rows = ((way, *(words(kind, way) for kind in kinds)) for way in ways)
-    return markdown([f"against {against}", *kinds], rows)
+    rows: dict[str, list[str]] = {}
+    for (kind, way), figures in found.items():
+        if way not in (against, MAPLESS):
+            base = found[kind, against]
+            changes = ", ".join(f"{figures[k] - base[k]:+.2f}" for k in (0, 2, 3))
+            rows.setdefault(way, []).append(f"{changes}; x {figures.seconds / base.seconds:.2f}")
+    return markdown([f"against {against}", *kinds], ((way, *cells) for way, cells in rows.items()))
 
 
 def plot(results: Sequence[Result]) -> Figure:
     """Return a picture of PSNR over processor time, both as means over scenes, of the first kind of map."""
     with rc_context({"svg.hashsalt": "iibr", "font.size": 9}):
-        figure = Figure(figsize=(6.5, 4.0), layout="constrained", facecolor="white")
+        figure = Figure(figsize=(6.5, 4.0), layout="constrained")
         axes = figure.subplots()
         for (kind, way), found in means(results).items():
             if kind == results[0].kind and way != MAPLESS:

@@ -1,9 +1,9 @@
 """Give every reader damaged copies of valid files: each must return finite values or raise an error of one line.
 
-    python -m benchmarks fuzz [--count 1000] [--only jpg,pfm] [--seed 0] [--out out/fuzz]
+    python -m benchmarks fuzz [--count 1000] [--only jpg,pfm] [--seed 0]
 
-Files on which a reader fails stay in the folder, named by file and number. If a reader ends the whole process or takes
-longer than a minute, the file in question is the only one left in OUT/now. Exits with 1 if anything was found.
+Files on which a reader fails stay in out/fuzz, named by file and number. If a reader ends the whole process or takes
+longer than a minute, the file in question is the last one in out/fuzz/now. Exits with 1 if anything was found.
 """
 
 from __future__ import annotations
@@ -46,16 +46,17 @@ from viewer.model.saved_settings import read_settings, settings_text
 from viewer.model.state.app_state import AppState
 from viewer.model.state.saving import SavedSettings
 
+OUT = Path("out/fuzz")
 TIME_LIMIT_S = 60.0
 MEMORY_LIMIT = 3 << 30
-"""Bytes that the process may reserve beyond what it has at the start."""
-MAX_BYTES = 1 << 20
+"""Bytes that the process may reserve beyond those at the start."""
 SIZE = ImageSize(17, 23)
-MAX_PIXELS = 100_000
 NUMBERS = (b"-1", b"0", b"1e999", b"nan", b"-inf", b"99999999999999999999", b"4294967295", b"1e-320")
 EXTREMES = (b"\0", b"\x7f", b"\xff", b"\x80\0", b"\0\x80", b"\xff\xff", b"\x7f\xff\xff\xff", b"\xff\xff\xff\xff")
+CAMERAS = """[intrinsics]\nfocal_length_mm = 100\nimage_resolution_x_px = 512\nsensor_size_mm = 35
+[extrinsics]\nnum_cams_x = 2\nnum_cams_y = 2\nbaseline_mm = 1.0\nfocus_distance_m = 0.0\n"""
+PREFERENCES = '{"theme": "light", "font_scale": 1.25, "open_sections": ["view"], "window": [0, 0, 800, 600]}'
 
-Rng = np.random.Generator
 Read = Callable[[Path], Any]
 
 
@@ -65,16 +66,13 @@ def main() -> None:
     parser.add_argument("--count", type=int, default=1000, help="damaged copies of each file")
     parser.add_argument("--only", default="", help="files whose names contain one of these words")
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--out", type=Path, default=Path("out/fuzz"))
     options = parser.parse_args()
-    folder = options.out / "now"
-    shutil.rmtree(folder, ignore_errors=True)
-    readers = {path: read for path, read in samples(folder).items() if is_wanted(path.name, options.only)}
+    shutil.rmtree(OUT / "now", ignore_errors=True)
+    readers = {path: read for path, read in samples(OUT / "now").items() if is_wanted(path.name, options.only)}
     limit = psutil.Process().memory_info().vms + MEMORY_LIMIT
     resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
-    findings = list(fuzz(readers, options.count, options.seed, options.out))
+    findings = list(fuzz(readers, options.count, options.seed, OUT))
     print("\n".join(findings) or "nothing found")
-    shutil.rmtree(folder)
     sys.exit(bool(findings))
 
 
@@ -103,25 +101,29 @@ def fault_of(read: Read, path: Path) -> str:
     except Exception as error:
         frame = traceback.extract_tb(error.__traceback__)[-1]
         return f"{type(error).__name__} in {Path(frame.filename).name}, {frame.name}: {str(error)[:80]!r}"
-    is_finite = result is None or all(np.isfinite(array).all() for array in result)
+    is_finite = all(np.isfinite(array).all() for array in result or ())
     return "" if is_finite else "values that are not finite"
 
 
 def samples(folder: Path) -> dict[Path, Read]:
     """Write a small file of every kind below a folder; return the function that reads each as arrays."""
-    folder.mkdir(parents=True)
     pixels = np.random.default_rng(0).integers(0, 256, (*SIZE, 3)).astype(np.uint8)
     picture, depth = Image.fromarray(pixels), np.tile(np.linspace(20, 230, SIZE[1]).astype(np.uint8), (SIZE[0], 1))
     readers: dict[Path, Read] = {}
 
-    def add(name: str, read: Read, data: bytes = b"") -> Path:
+    def add(name: str, read: Read, data: bytes | str = b"") -> Path:
         path = folder / name
-        path.write_bytes(data)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(data.encode() if isinstance(data, str) else data)
         readers[path] = read
         return path
 
+    def saved(kind: str, mode: str = "RGB", **options: Any) -> bytes:
+        picture.convert(mode).save(file := io.BytesIO(), kind, **options)
+        return file.getvalue()
+
     for name, mode in (("a.jpeg", "RGB"), ("b.jpeg", "CMYK"), ("a.png", "P"), ("b.png", "1"), ("a.webp", "RGB")):
-        add(name, _photo, _saved(picture.convert(mode), name.split(".")[1].upper()))
+        add(name, _photo, saved(name[2:], mode))
     for name, dtype in (("a.tif", "uint16"), ("a.exr", "half"), ("a.hdr", "float"), ("a.ppm", "uint8")):
         write_image_file(add(name, _photo), pixels / np.float32(255), dtype)
     photo, map_png = embedded_files.grey_photo(SIZE), embedded_files.picture(depth, "PNG")
@@ -134,85 +136,66 @@ def samples(folder: Path) -> dict[Path, Read]:
     for name in ("map.pfm", "map.npy", "map.png"):
         write_map(add(name, lambda path: [read_disparity(path, SIZE).values]), depth / np.float32(100))
     for name in ("a_qs2x2a1.png", "a_SBS.png", "a_eslf.png"):
-        add(name, _views, _saved(picture, "PNG"))
-    add("a.mpo", _views, _saved(picture, "MPO", save_all=True, append_images=[picture]))
-    for layout in ("hci", "llff"):
-        (folder / layout).mkdir()
-        for number in range(4):
-            (folder / layout / f"input_Cam{number:03d}.png").write_bytes(_saved(picture, "PNG"))
-    cameras = "[extrinsics]\nnum_cams_x = 2\nnum_cams_y = 2\nbaseline_mm = 1.0\nfocus_distance_m = 0.0\n"
-    text = f"[intrinsics]\nfocal_length_mm = 100\nimage_resolution_x_px = 512\nsensor_size_mm = 35\n{cameras}"
-    add("hci/parameters.cfg", lambda path: _views(path.parent), text.encode())
+        add(name, _views, saved("png"))
+    add("a.mpo", _views, saved("mpo", save_all=True, append_images=[picture]))
+    add("hci/parameters.cfg", lambda path: _views(path.parent), CAMERAS)
     pose = np.array([[0.0, 1, 0, 0, 17], [1, 0, 0, 0, 23], [0, 0, -1, 0, 30]])
     rows = [[*(pose + np.outer([0, k, 0], [0, 0, 0, 1, 0])).ravel(), 1.0, 9.0] for k in range(4)]
     np.save(add("llff/poses_bounds.npy", lambda path: _views(path.parent)), np.array(rows))
+    for name in (f"{layout}/input_Cam{number:03d}.png" for layout in ("hci", "llff") for number in range(4)):
+        (folder / name).write_bytes(saved("png"))
     info = PngImagePlugin.PngInfo()
     info.add_text("iibr:settings", settings_text(SavedSettings(Optics(), 1.0, Source(""), (64, 48))))
-    add("settings.png", lambda path: read_settings(path) and None, _saved(picture, "PNG", pnginfo=info))
-    add("mask.png", lambda path: read_mask(path) and None, _saved(picture, "PNG"))
-    kept = b'{"theme": "light", "font_scale": 1.25, "open_sections": ["view"], "window": [0, 0, 800, 600]}'
-    add("preferences.json", lambda path: load_preferences(AppState(), path.parent) and None, kept)
+    add("settings.png", lambda path: read_settings(path) and None, saved("png", pnginfo=info))
+    add("mask.png", lambda path: read_mask(path) and None, saved("png"))
+    add("preferences.json", lambda path: load_preferences(AppState(), path.parent) and None, PREFERENCES)
     weights = resource_folder("assets") / "weights" / "ray_transformer.safetensors"
     add("a.safetensors", lambda path: TrainedWeights(path) and None, weights.read_bytes())
     return readers
 
 
-def _saved(picture: Image.Image, kind: str, **options: Any) -> bytes:
-    file = io.BytesIO()
-    picture.save(file, kind, **options)
-    return file.getvalue()
-
-
 def _photo(path: Path) -> list[np.ndarray]:
-    return [read_photo(path, MAX_PIXELS).pixels]
+    return [read_photo(path, 100_000).pixels]
 
 
 def _with_depth(path: Path) -> list[np.ndarray]:
-    found = open_with_depth(path, max_pixels=MAX_PIXELS)
+    found = open_with_depth(path, max_pixels=100_000)
     return [found.photo.pixels, found.disparity.values]
 
 
 def _views(path: Path) -> list[np.ndarray] | None:
     scene = find_light_field(path)
-    return None if scene is None else [view.colors for view in read_views(scene)[1]]
+    return scene and [view.colors for view in read_views(scene)[1]]
 
 
-def damage(data: bytes, others: list[bytes], rng: Rng) -> bytes:
+def damage(data: bytes, others: list[bytes], rng: np.random.Generator) -> bytes:
     """Return data damaged in one of ten ways or in several. others: files of which parts may be copied into it."""
     is_png = data.startswith(b"\x89PNG")
     for _ in range(min(rng.geometric(0.5), 8)):
-        data = _damage_once(data, others, rng)[:MAX_BYTES]
+        data = _damage_once(data, others, rng)[: 1 << 20]
     return _repaired_png(data) if is_png and rng.random() < 0.5 else data
 
 
-def _damage_once(data: bytes, others: list[bytes], rng: Rng) -> bytes:
+def _damage_once(data: bytes, others: list[bytes], rng: np.random.Generator) -> bytes:
     first = int(len(data) * rng.random() ** 2)  # rather near the beginning: headers come first
     length, other = int(2 ** rng.uniform(0, 10)), others[rng.integers(len(others))]
     head, middle, tail = data[:first], data[first : first + length], data[first + length :]
     extreme, bit = EXTREMES[rng.integers(len(EXTREMES))], 1 << int(rng.integers(8))
     at = int(rng.integers(len(other) + 1))
-    damages: tuple[Callable[[], bytes], ...] = (
-        lambda: head + bytes(byte ^ bit for byte in middle[:1]) + middle[1:] + tail,
-        lambda: head + extreme + data[first + len(extreme) :],
-        lambda: _with_other_number(data, rng),
-        lambda: head + other[at : at + length] + tail,
-        lambda: head,
-        lambda: head + tail,
-        lambda: head + bytes(len(middle)) + tail,
-        lambda: head + rng.bytes(length) + middle + tail,
-        lambda: head + middle * int(2 ** rng.uniform(1, 12)) + tail,
-        lambda: head + middle[::-1] + tail,
-    )
-    return damages[rng.integers(len(damages))]()
-
-
-def _with_other_number(data: bytes, rng: Rng) -> bytes:
-    """Replace a number that is written as text."""
-    places = [match.span() for match in re.finditer(rb"(?<![0-9A-Za-z+/])-?\d{1,12}(\.\d{1,12})?", data[:20_000])]
-    if not places:
-        return data
-    first, last = places[rng.integers(len(places))]
-    return data[:first] + NUMBERS[rng.integers(len(NUMBERS))] + data[last:]
+    number = re.search(rb"(?<![0-9A-Za-z+/])-?\d{1,12}(\.\d{1,12})?", data[first:20_000])  # written as text
+    begin, end = (first + place for place in (number.span() if number else (0, 0)))
+    return (
+        head + bytes(byte ^ bit for byte in middle[:1]) + middle[1:] + tail,
+        head + extreme + data[first + len(extreme) :],
+        data[:begin] + NUMBERS[rng.integers(len(NUMBERS))] + data[end:],
+        head + other[at : at + length] + tail,
+        head,
+        head + tail,
+        head + bytes(len(middle)) + tail,
+        head + rng.bytes(length) + middle + tail,
+        head + middle * int(2 ** rng.uniform(1, 12)) + tail,
+        head + middle[::-1] + tail,
+    )[rng.integers(10)]
 
 
 def _repaired_png(data: bytes) -> bytes:

@@ -20,10 +20,6 @@ from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.search import open_with_depth
 from iibr_core.types import FloatImage
 
-PAIRS = 400_000
-MIN_DIFFERENCE = 0.1
-"""Least difference of the disparities of a pair, as a share of the range."""
-
 
 def main() -> None:
     """Print the table."""
@@ -56,10 +52,10 @@ def known_maps(data: Path, max_pixels: int) -> Iterator[tuple[str, FloatImage, F
 
 def ordered_share(guess: np.ndarray, known: FloatImage) -> float:
     """Return the share of random pairs, far apart in depth, that two maps (H, W) order alike; ties count half."""
-    places = np.random.default_rng(0).integers(0, known.size, (2, PAIRS))
+    places = np.random.default_rng(0).integers(0, known.size, (2, 400_000))
     low, high = np.percentile(known, (1, 99))
     apart, guessed = (values.ravel()[places[0]] - values.ravel()[places[1]] for values in (known, guess))
-    counts = np.abs(apart) > MIN_DIFFERENCE * (high - low)
+    counts = np.abs(apart) > 0.1 * (high - low)
     return float(np.mean(0.5 + 0.5 * np.sign(apart[counts]) * np.sign(guessed[counts])))
 
 

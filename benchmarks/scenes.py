@@ -16,8 +16,8 @@ from iibr_core.color import stored_from_encoded
 from iibr_core.depth.choice import DepthChoice, DepthStart
 from iibr_core.depth.search import open_with_depth
 from iibr_core.evaluation.alignment import ViewFit
+from iibr_core.evaluation.scenes import FITTED_VIEWS, read_view
 from iibr_core.evaluation.warp import reference_warp
-from iibr_core.formats.images.photo import read_picture
 from iibr_core.formats.images.write import write_image
 from iibr_core.formats.light_fields.light_field_formats import find_light_field
 from iibr_core.formats.light_fields.multi_view_scene import MultiView
@@ -29,15 +29,8 @@ from iibr_core.types import FloatImage, GridShape, ImageSize, InputError, ViewOf
 MAX_PIXELS = 150_000
 """Largest size of a photo, in pixels."""
 DRAWN_SIZE = ImageSize(240, 320)
-FIELD = GridShape(9, 9)
 SIDES = [(t, s) for t in (-1, 0, 1) for s in (-1, 0, 1) if t or s]
 """Corners and middles of the sides, which are judged, in (down, right) from the centre."""
-SOFT_PX = 2.0
-"""Standard deviation of the blur of soft maps, in pixels."""
-NETWORK_SIDE_PX = 224
-"""Longer side of resampled maps: a small network's picture."""
-FITTED_VIEWS = 4
-"""Number of true views to which a plane, and scale and shift of an estimate, are fitted."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,11 +53,9 @@ def drawn_scene(
 ) -> Scene:
     """Return a scene as training draws them, with disparities of at most `largest_px`."""
     scene = random_scene(np.random.default_rng(seed), size, largest_px)
-    reach = FIELD.centre[0]
-    truth = {
-        ViewOffset(reach * t, reach * s): render(scene, size, ViewOffset(reach * t, reach * s))[0] for t, s in sides
-    }
-    return Scene(f"drawn {seed}", *render(scene, size, ViewOffset(0.0, 0.0)), truth, offsets_of(FIELD))
+    places = [ViewOffset(4.0 * t, 4.0 * s) for t, s in sides]
+    truth = {at: render(scene, size, at)[0] for at in places}
+    return Scene(f"drawn {seed}", *render(scene, size, ViewOffset(0.0, 0.0)), truth, offsets_of(GridShape(9, 9)))
 
 
 def offsets_of(grid: GridShape) -> tuple[ViewOffset, ...]:
@@ -90,25 +81,11 @@ def _read_scene(known: MultiView, max_pixels: int) -> Scene:
     wanted = [[(low, (low + high) / 2, high)[part + 1][axis] for axis, part in enumerate(side)] for side in SIDES]
     others = [k for k in range(len(places)) if k != given]
     judged = dict.fromkeys(min(others, key=lambda k: float(np.hypot(*(places[k] - at)))) for at in wanted)
-
-    def read(index: int) -> FloatImage:
-        return np.clip(read_picture(known.views[index].picture, max_pixels).pixels, 0, 1)
-
-    photo, map_file = read(given), known.disparity[given]
+    photo, map_file = read_view(known.views[given], max_pixels), known.disparity[given]
     disparity = read_disparity(map_file.path, ImageSize(*photo.shape[:2]), map_file.scale, photo).values
     side = 2 * round(np.abs(places[list(judged)]).max()) + 1
-    truth = {ViewOffset(*map(float, places[k])): read(k) for k in judged}
+    truth = {ViewOffset(*map(float, places[k])): read_view(known.views[k], max_pixels) for k in judged}
     return Scene(known.name, photo, disparity, truth, offsets_of(GridShape(side, side)))
-
-
-def soft_map(scene: Scene) -> Scene:
-    """Return the scene with a blurred map."""
-    return replace(scene, disparity=_blur(scene.disparity, SOFT_PX))
-
-
-def resampled_map(scene: Scene) -> Scene:
-    """Return the scene with a map that went through the size of a small network's picture."""
-    return at_photo_size(scene, _smaller(scene.disparity, NETWORK_SIDE_PX / max(scene.disparity.shape)))
 
 
 def phone_map(scene: Scene) -> Scene:
@@ -174,9 +151,9 @@ def plane_map(scene: Scene) -> Scene:
 
 
 def _fit_of(scene: Scene) -> ViewFit:
-    views = list(scene.truth.items())[:FITTED_VIEWS]
-    truths = [(partial(_warped, offset), truth) for offset, truth in views]
-    return ViewFit(scene.photo, truths, max(max(abs(offset.t), abs(offset.s)) for offset, _ in views))
+    offsets = list(scene.truth)[:FITTED_VIEWS]
+    truths = [(partial(_warped, offset), scene.truth[offset]) for offset in offsets]
+    return ViewFit(scene.photo, truths, max(max(abs(offset.t), abs(offset.s)) for offset in offsets))
 
 
 def _warped(offset: ViewOffset, photo: FloatImage, disparity: FloatImage) -> FloatImage:
@@ -185,8 +162,8 @@ def _warped(offset: ViewOffset, photo: FloatImage, disparity: FloatImage) -> Flo
 
 MAPS: dict[str, Callable[[Scene], Scene]] = {
     "exact": lambda scene: scene,
-    "soft": soft_map,
-    "resampled": resampled_map,
+    "soft": lambda scene: replace(scene, disparity=_blur(scene.disparity, 2.0)),
+    "resampled": lambda scene: at_photo_size(scene, _smaller(scene.disparity, 224 / max(scene.disparity.shape))),
     "phone": phone_map,
     "network-like": lambda scene: at_photo_size(scene, network_like(scene.disparity)),
     "guess": lambda scene: estimated_map(scene, "rough"),

@@ -25,7 +25,12 @@ from iibr_core.types import InputError
 
 CODE = ("iibr_core", "viewer", "shaders")
 """Folders whose changes make a table old."""
-COMMIT = re.compile(r"at commit (\w+)")
+NEEDS = {
+    "DATA": "scenes as `iibr evaluate` takes them: DATA=DIR",
+    "MODEL": "a depth network as an ONNX file: MODEL=FILE",
+    "X": "Xvfb and xdotool",
+    "torch": "torch: pip install '.[train]'",
+}
 
 
 @dataclass(frozen=True)
@@ -44,26 +49,21 @@ class Table:
     @property
     def needs(self) -> list[str]:
         """Keys of NEEDS that the command needs."""
-        special = {"window": ["X"], "ablation": ["torch"]}
-        return [name for name in ("DATA", "MODEL") if name in self.command.split()] + special.get(self.name, [])
+        special = {"window": "X", "ablation": "torch"}
+        return [need for need in NEEDS if need in self.command.split() or need == special.get(self.name)]
+
+    @property
+    def words(self) -> str:
+        """The command as a person would type it."""
+        return f"python {'' if self.command.startswith('docs/') else '-m benchmarks '}{self.command}"
 
 
-NEEDS = {
-    "DATA": "scenes as `iibr evaluate` takes them: DATA=DIR",
-    "MODEL": "a depth network as an ONNX file: MODEL=FILE",
-    "X": "Xvfb and xdotool",
-    "torch": "torch: pip install '.[train]'",
-}
 ACCURACY = "docs/accuracy.md"
 EVERY_MAP = "exact,soft,resampled,phone"
 OTHERS = "'iibr,plain warp,ray march,dilated,softmax,32 planes'"
+ALONE = "--ways iibr,unchanged --maps exact,network,guess,plane --by scene --depth-model MODEL"
 TABLES = (
-    Table(
-        "photo-alone",
-        ACCURACY,
-        "compare --ways iibr,unchanged --maps exact,network,guess,plane --by scene --depth-model MODEL --data DATA",
-        3,
-    ),
+    Table("photo-alone", ACCURACY, f"compare {ALONE} --data DATA", 3),
     Table("ways", ACCURACY, f"compare --ways {OTHERS} --data DATA --plot docs/ways.svg", 3),
     Table("maps", ACCURACY, f"compare --ways 'iibr,iibr map,plain warp' --maps {EVERY_MAP} --drawn 4 --data DATA", 3),
     Table("stages", ACCURACY, f"compare --ways 'iibr,iibr without' --against iibr --maps {EVERY_MAP} --data DATA", 6),
@@ -88,9 +88,7 @@ def main() -> None:
     options = parser.parse_args()
     wanted = [table for table in TABLES if not options.only or table.name in options.only.split(",")]
     if options.list:
-        rows = (
-            (table.name, table.page, f"`{table.command}`", ", ".join(table.needs), table.minutes) for table in wanted
-        )
+        rows = ((t.name, t.page, f"`{t.command}`", ", ".join(t.needs), t.minutes) for t in wanted)
         print(markdown(("name", "page", "command", "needs", "minutes"), rows))
     elif options.check:
         print("\n".join(old_tables(wanted)) or "every table is as new as the code")
@@ -104,50 +102,29 @@ def write_table(table: Table, given: Mapping[str, str], root: Path = ROOT) -> bo
 
     A table that this machine cannot make is named and stays. given: paths of DATA and MODEL.
     """
-    missing = [NEEDS[need] for need in table.needs if not (need in given or _is_here(need))]
+    here = {"X": all(map(shutil.which, ("Xvfb", "xdotool"))), "torch": find_spec("torch") is not None}
+    missing = [NEEDS[need] for need in table.needs if not (need in given or here.get(need))]
     if missing:
         print(f"{table.name}: not made; needs {', '.join(missing)}")
         return True
-    began = time.monotonic()
+    began, page = time.monotonic(), root / table.page
     try:
-        page = root / table.page
         if table.page:
             put_between(page.read_text("utf-8"), table.name, "")
-        text = _output(table, given)
+        words = [given.get(word, word) for word in shlex.split(table.words)]
+        run = subprocess.run([sys.executable, *words[1:]], cwd=ROOT, stdout=subprocess.PIPE, text=True, check=False)
+        if run.returncode:
+            raise InputError(f"the program ended with {run.returncode}")
         if table.page:
-            line = f"Made by `{' '.join(_words(table))}` at commit {_commit()}."
-            page.write_text(put_between(page.read_text("utf-8"), table.name, f"{line}\n\n{text.strip()}"), "utf-8")
+            is_changed = git("status", "--porcelain", "--untracked-files=no", "--", *CODE, "benchmarks")
+            commit = git("rev-parse", "--short", "HEAD") + (", with changes" if is_changed else "")
+            text = f"Made by `{table.words}` at commit {commit}.\n\n{run.stdout.strip()}"
+            page.write_text(put_between(page.read_text("utf-8"), table.name, text), "utf-8")
     except InputError as error:
         print(f"{table.name}: failed: {error}", flush=True)
         return False
     print(f"{table.name}: made in {(time.monotonic() - began) / 60:.1f} minutes", flush=True)
     return True
-
-
-def _is_here(need: str) -> bool:
-    if need == "X":
-        return all(shutil.which(program) for program in ("Xvfb", "xdotool"))
-    return need == "torch" and find_spec("torch") is not None
-
-
-def _words(table: Table) -> list[str]:
-    """Return the command as a person would type it."""
-    return ["python", *(() if table.command.startswith("docs/") else ("-m", "benchmarks")), table.command]
-
-
-def _output(table: Table, given: Mapping[str, str]) -> str:
-    """Return what the program prints. Raises InputError if it fails."""
-    words = [given.get(word, word) for word in shlex.split(" ".join(_words(table)))]
-    run = subprocess.run([sys.executable, *words[1:]], cwd=ROOT, stdout=subprocess.PIPE, text=True, check=False)
-    if run.returncode:
-        raise InputError(f"the program ended with {run.returncode}")
-    return run.stdout
-
-
-def _commit() -> str:
-    """Return the short name of the present commit, and whether the code differs from it."""
-    is_changed = git("status", "--porcelain", "--untracked-files=no", "--", *CODE, "benchmarks")
-    return git("rev-parse", "--short", "HEAD") + (", with changes" if is_changed else "")
 
 
 def put_between(page: str, name: str, text: str) -> str:
@@ -161,13 +138,9 @@ def put_between(page: str, name: str, text: str) -> str:
 
 def old_tables(tables: list[Table], root: Path = ROOT) -> Iterator[str]:
     """Yield a line for each table that names no commit, or one after which the code changed."""
-    for table in tables:
-        if not table.page:
-            continue
-        found = re.search(
-            f"<!-- {table.name} -->.*?<!-- /{table.name} -->", (root / table.page).read_text("utf-8"), re.DOTALL
-        )
-        commit = COMMIT.search(found[0]) if found else None
+    for table in (table for table in tables if table.page):
+        marked = (root / table.page).read_text("utf-8").partition(f"<!-- {table.name} -->")[2]
+        commit = re.search(r"at commit (\w+)", marked.partition(f"<!-- /{table.name} -->")[0])
         later = git("rev-list", "--count", f"{commit[1]}..HEAD", "--", *CODE) if commit else ""
         if later != "0":
             age = f"{later or 'an unknown number of'} commits behind" if commit else "names no commit"

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from benchmarks.scenes import Scene
 from iibr_core.depth.edges.refine import refine
-from iibr_core.evaluation.warp import fill_holes
+from iibr_core.evaluation.warp import SAME_SURFACE, SAMPLES, fill_holes
 from iibr_core.method.photo_views import PhotoViews
 from iibr_core.runtime.kernels import kernel
 from iibr_core.stages import ALL_STAGES, STAGE_NAMES, Stages, stages_without
@@ -24,31 +24,19 @@ from iibr_core.types import FloatImage, InputError, ViewOffset
 
 ViewMaker = Callable[[ViewOffset], FloatImage]
 Way = Callable[[Scene], ViewMaker]
-NOWHERE = -1e30
-"""Disparity of a pixel on which nothing lands."""
-SAME_SURFACE = 0.08
-"""Difference of disparity, in px per view step, below which neighbours are one surface."""
-SAMPLES = 3
-"""Points in each direction as which a pixel is warped, so that stretched surfaces stay closed."""
 PLANES = 32
 BEHIND_PX = 24
 """Distance over which planes continue behind nearer ones."""
 SHARPNESS = 20.0
 """Factor of the softmax's exponent, per pixel of parallax."""
-BISECTIONS = 4
-"""Number of fine steps of the ray march."""
 
 
-def iibr(scene: Scene, stages: Stages = ALL_STAGES) -> ViewMaker:
-    """Return our views, with all stages or some."""
-    disparity = refine(scene.photo, scene.disparity, stages=stages, is_enlarged=scene.is_enlarged)
+def iibr(scene: Scene, stages: Stages = ALL_STAGES, refines: bool = True) -> ViewMaker:
+    """Return our views, with all stages or some. refines: the map's edges are drawn to the photo's."""
+    disparity = scene.disparity
+    if refines:
+        disparity = refine(scene.photo, disparity, stages=stages, is_enlarged=scene.is_enlarged)
     views = PhotoViews(scene.photo, disparity, scene.field, stages)
-    return lambda at: views.view(at).colors
-
-
-def without_refining(scene: Scene) -> ViewMaker:
-    """Return our views of the map as given."""
-    views = PhotoViews(scene.photo, scene.disparity, scene.field)
     return lambda at: views.view(at).colors
 
 
@@ -59,14 +47,11 @@ def unchanged(scene: Scene) -> ViewMaker:
 
 def warp(scene: Scene) -> ViewMaker:
     """Return forward-warped views: the nearest surface that lands, OpenCV's bicubic colours, holes from behind."""
-    photo, disparity = _arrays(scene)
-    y, x = np.indices(disparity.shape, np.float32)
 
     def view(at: ViewOffset) -> FloatImage:
-        nearest, hole = land(disparity, at)
-        from_x, from_y = x + nearest * np.float32(at.s), y + nearest * np.float32(at.t)
-        colors = cv2.remap(photo, from_x, from_y, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)
-        return np.asarray(fill_holes(np.clip(colors, 0, 1), hole, nearest), np.float32)
+        nearest, hole = land(scene.disparity, at)
+        colors = np.clip(_looked_up(scene.photo, nearest, at, cv2.INTER_CUBIC), 0, 1)
+        return np.asarray(fill_holes(colors, hole, nearest), np.float32)
 
     return view
 
@@ -74,13 +59,20 @@ def warp(scene: Scene) -> ViewMaker:
 def land(disparity: FloatImage, at: ViewOffset) -> tuple[FloatImage, NDArray[np.bool_]]:
     """Return the disparity (H, W) that a view sees, 0 in holes, and the holes (H, W): what the photo does not show."""
     height, width = disparity.shape
-    nearest = _land(disparity, float(at.t), float(at.s))
-    hole = nearest == NOWHERE
+    nearest = _land(np.ascontiguousarray(disparity, np.float32), float(at.t), float(at.s))
+    hole = np.isneginf(nearest)
     nearest[hole] = 0
     y, x = np.indices(disparity.shape, np.float32)
     from_x, from_y = x + nearest * at.s, y + nearest * at.t
     hole |= (from_x < -0.5) | (from_y < -0.5) | (from_x > width - 0.5) | (from_y > height - 0.5)
     return nearest, hole
+
+
+def _looked_up(photo: FloatImage, disparity: FloatImage, at: ViewOffset, interpolation: int) -> FloatImage:
+    """Return the photo's colours (H, W, 3) at the places that a view with this disparity (H, W) sees."""
+    y, x = np.indices(disparity.shape, np.float32)
+    from_x, from_y = x + disparity * np.float32(at.s), y + disparity * np.float32(at.t)
+    return np.asarray(cv2.remap(photo, from_x, from_y, interpolation, borderMode=cv2.BORDER_REPLICATE))
 
 
 def ray_march(scene: Scene) -> ViewMaker:
@@ -89,14 +81,12 @@ def ray_march(scene: Scene) -> ViewMaker:
     They march from the nearest plane backwards, first in coarse steps, then in fine ones; the relief has walls, so
     disocclusions show them stretched. https://github.com/BrokenSource/DepthFlow
     """
-    photo, relief = _arrays(scene)
-    near, far = float(relief.max()), float(relief.min())
+    relief = np.ascontiguousarray(scene.disparity, np.float32)
 
     def view(at: ViewOffset) -> FloatImage:
-        result = np.empty_like(photo)
-        steps = max(int(np.ceil((near - far) * max(abs(at.t), abs(at.s)))), 1)
-        _march(photo, relief, float(at.t), float(at.s), near, far, steps, result)
-        return result
+        steps = max(int(np.ceil(np.ptp(relief) * max(abs(at.t), abs(at.s)))), 1)
+        met = _march(relief, float(at.t), float(at.s), float(relief.max()), float(relief.min()), steps)
+        return _looked_up(scene.photo, met, at, cv2.INTER_LINEAR)
 
     return view
 
@@ -107,14 +97,12 @@ def splatting(scene: Scene, dilated_px: int = 0) -> ViewMaker:
     dilated_px: growth of the foreground, as stereo converters (iw3, "forward fill") have it.
     https://github.com/sniklaus/softmax-splatting https://github.com/nagadomi/nunif
     """
-    photo, disparity = _arrays(scene)
-    disparity = np.asarray(cv2.dilate(disparity, np.ones((2 * dilated_px + 1,) * 2, np.uint8)), np.float32)
+    surface = np.asarray(cv2.dilate(scene.disparity, np.ones((2 * dilated_px + 1,) * 2, np.uint8)), np.float32)
+    values = np.dstack([scene.photo, surface, np.ones_like(surface)]).astype(np.float32)
 
     def view(at: ViewOffset) -> FloatImage:
-        front = np.full(disparity.shape, -np.inf, np.float32)
-        colors, weight, depth = np.zeros_like(photo), np.zeros_like(disparity), np.zeros_like(disparity)
-        _splat(photo, disparity, float(at.t), float(at.s), front, colors, weight, depth)
-        return np.asarray(fill_holes(colors, weight < 0.25, depth))
+        means, area = _splat(values, float(at.t), float(at.s))
+        return np.asarray(fill_holes(means[..., :3], area < 0.25, means[..., 3]))
 
     return view
 
@@ -125,29 +113,31 @@ def planes(scene: Scene) -> ViewMaker:
     Each pixel is shared by the two planes next to its disparity. Planes continue behind nearer ones with colours of
     the background; a view lays them over one another from back to front, each moved as a whole, bilinear.
     """
-    photo, disparity = _arrays(scene)
-    far, near = float(disparity.min()), float(disparity.max())
-    levels = np.linspace(far, near, PLANES).astype(np.float32)
-    place = (disparity - far) * np.float32((PLANES - 1) / max(near - far, 1e-9))
-    layers = np.zeros((PLANES, *disparity.shape, 4), np.float32)
+    far, near = float(scene.disparity.min()), float(scene.disparity.max())
+    place = ((scene.disparity - far) * ((PLANES - 1) / max(near - far, 1e-9))).astype(np.float32)
+    layers = np.zeros((PLANES, *place.shape, 4), np.float32)
+    layers[..., :3] = scene.photo
     for k in range(PLANES):
-        share = np.clip(1 - np.abs(place - k), 0, 1)
         # All of it if a nearer plane shares it: the nearer one, laid over it, then adds up to the pixel.
-        layers[k, ..., 3] = np.where(place > k, share > 0, share)
-        layers[k, ..., :3] = photo
+        layers[k, ..., 3] = np.where(place > k, place < k + 1, np.clip(1 - np.abs(place - k), 0, 1))
     _continue_behind(layers, place)
+    layers[..., :3] *= layers[..., 3:]
 
     def view(at: ViewOffset) -> FloatImage:
-        colors, alpha = np.zeros(photo.shape, np.float32), np.zeros(disparity.shape, np.float32)
-        _lay_over(layers, levels, float(at.t), float(at.s), colors, alpha)
-        return np.asarray(fill_holes(colors / np.maximum(alpha, 1e-6)[..., None], alpha < 0.5, np.zeros_like(alpha)))
+        sums = np.zeros(layers.shape[1:], np.float32)
+        for layer, level in zip(layers, np.linspace(far, near, PLANES)):
+            shift = np.array([[1, 0, -level * at.s], [0, 1, -level * at.t]])
+            moved = cv2.warpAffine(layer, shift, layer.shape[1::-1], flags=cv2.INTER_LINEAR)
+            _lay_over(moved, sums)
+        colors, alpha = sums[..., :3] / np.maximum(sums[..., 3:], 1e-6), sums[..., 3]
+        return np.asarray(fill_holes(colors, alpha < 0.5, np.zeros_like(alpha)))
 
     return view
 
 
 WAYS: dict[str, Way] = {
     "iibr": iibr,
-    "iibr map not refined": without_refining,
+    "iibr map not refined": partial(iibr, refines=False),
     "plain warp": warp,
     "ray march (DepthFlow)": ray_march,
     "dilated forward warp (iw3)": partial(splatting, dilated_px=2),
@@ -169,15 +159,11 @@ def chosen_ways(words: str) -> dict[str, Way]:
     return found
 
 
-def _arrays(scene: Scene) -> tuple[FloatImage, FloatImage]:
-    return np.ascontiguousarray(scene.photo, np.float32), np.ascontiguousarray(scene.disparity, np.float32)
-
-
 @kernel
 def _land(disparity, t, s):
-    """The largest disparity (H, W) that lands on each pixel of the view at (t, s), else NOWHERE."""
+    """Return the largest disparity (H, W) that lands on each pixel of the view at (t, s), else -inf."""
     height, width = disparity.shape
-    nearest = np.full((height, width), NOWHERE, np.float32)
+    nearest = np.full((height, width), -np.inf, np.float32)
     for y in range(height):
         for x in range(width):
             for j in range(SAMPLES):
@@ -198,51 +184,54 @@ def _land(disparity, t, s):
 
 
 @kernel
-def _between(relief, y, x):
-    """The relief at a place, bilinear, its border repeated; and the place, clamped to the relief."""
+def _height_at(relief, y, x):
+    """Return the relief at a place, bilinear, its border repeated."""
     height, width = relief.shape
     y, x = min(max(y, 0.0), height - 1.001), min(max(x, 0.0), width - 1.001)
     v, u = int(y), int(x)
     down, across = y - v, x - u
     upper = (1 - across) * relief[v, u] + across * relief[v, u + 1]
     lower = (1 - across) * relief[v + 1, u] + across * relief[v + 1, u + 1]
-    return (1 - down) * upper + down * lower, v, u, down, across
+    return (1 - down) * upper + down * lower
 
 
 @kernel
-def _march(photo, relief, t, s, near, far, steps, result):
+def _march(relief, t, s, near, far, steps):
+    """Return the disparity (H, W) at which each ray of a view meets the relief."""
+    met = np.empty(relief.shape, np.float32)
     for y in range(relief.shape[0]):
         for x in range(relief.shape[1]):
             before, after = near, far
             for k in range(1, steps + 1):
                 level = near + (far - near) * k / steps
-                if _between(relief, y + level * t, x + level * s)[0] >= level:
+                if _height_at(relief, y + level * t, x + level * s) >= level:
                     after = level
                     break
                 before = level
-            for _ in range(BISECTIONS):
+            for _ in range(4):
                 middle = 0.5 * (before + after)
-                if _between(relief, y + middle * t, x + middle * s)[0] >= middle:
+                if _height_at(relief, y + middle * t, x + middle * s) >= middle:
                     after = middle
                 else:
                     before = middle
-            _, v, u, down, across = _between(relief, y + after * t, x + after * s)
-            for c in range(3):
-                upper = (1 - across) * photo[v, u, c] + across * photo[v, u + 1, c]
-                lower = (1 - across) * photo[v + 1, u, c] + across * photo[v + 1, u + 1, c]
-                result[y, x, c] = (1 - down) * upper + down * lower
+            met[y, x] = after
+    return met
 
 
 @kernel
-def _splat(photo, surface, t, s, front, colors, weight, depth):
-    height, width = surface.shape
-    parallax = max(abs(t), abs(s))
-    solid = np.zeros(surface.shape, np.float32)
+def _splat(values, t, s):
+    """Return the means (H, W, 5) of values, weighed by nearness, that land on each pixel, and the area of what lands.
+
+    values: (H, W, 5), colours, disparity and 1.
+    """
+    height, width, _ = values.shape
+    front, parallax = np.full((height, width), -np.inf, np.float32), max(abs(t), abs(s))
+    sums, area = np.zeros(values.shape, np.float32), np.zeros((height, width), np.float32)
     # The first pass finds the front-most disparity of each pixel, which keeps the exponentials small.
     for is_second in range(2):
         for y in range(height):
             for x in range(width):
-                d = surface[y, x]
+                d = values[y, x, 3]
                 row, column = y - d * t, x - d * s
                 v, u = floor(row), floor(column)
                 for j in range(max(v, 0), min(v + 2, height)):
@@ -250,19 +239,15 @@ def _splat(photo, surface, t, s, front, colors, weight, depth):
                         if not is_second:
                             front[j, i] = max(front[j, i], d)
                             continue
-                        area = (1 - abs(row - j)) * (1 - abs(column - i))
-                        w = area * np.exp(SHARPNESS * parallax * (d - front[j, i]))
-                        solid[j, i] += w
-                        weight[j, i] += area
-                        depth[j, i] += w * d
-                        for c in range(3):
-                            colors[j, i, c] += w * photo[y, x, c]
+                        share = (1 - abs(row - j)) * (1 - abs(column - i))
+                        weight = share * np.exp(SHARPNESS * parallax * (d - front[j, i]))
+                        area[j, i] += share
+                        for c in range(5):
+                            sums[j, i, c] += weight * values[y, x, c]
     for y in range(height):
         for x in range(width):
-            whole = max(solid[y, x], np.float32(1e-6))
-            depth[y, x] /= whole
-            for c in range(3):
-                colors[y, x, c] /= whole
+            sums[y, x] /= max(sums[y, x, 4], np.float32(1e-6))
+    return sums, area
 
 
 @kernel
@@ -286,27 +271,10 @@ def _continue_behind(layers, place):
 
 
 @kernel
-def _lay_over(layers, levels, t, s, colors, alpha):
-    height, width = alpha.shape
-    for k in range(len(levels)):
-        for y in range(height):
-            row = y + levels[k] * t
-            v = floor(row)
-            if v < 0 or v + 1 >= height:
-                continue
-            fy = np.float32(row - v)
-            for x in range(width):
-                column = x + levels[k] * s
-                u = floor(column)
-                if u < 0 or u + 1 >= width:
-                    continue
-                fx = np.float32(column - u)
-                a, b = (1 - fy) * (1 - fx) * layers[k, v, u, 3], (1 - fy) * fx * layers[k, v, u + 1, 3]
-                c, d = fy * (1 - fx) * layers[k, v + 1, u, 3], fy * fx * layers[k, v + 1, u + 1, 3]
-                total = a + b + c + d
-                if total > 0:
-                    for i in range(3):
-                        color = a * layers[k, v, u, i] + b * layers[k, v, u + 1, i]
-                        color += c * layers[k, v + 1, u, i] + d * layers[k, v + 1, u + 1, i]
-                        colors[y, x, i] = color + (1 - total) * colors[y, x, i]
-                    alpha[y, x] = total + (1 - total) * alpha[y, x]
+def _lay_over(layer, sums):
+    """Lay a layer over sums (H, W, 4): colours times alpha, and alpha."""
+    for y in range(sums.shape[0]):
+        for x in range(sums.shape[1]):
+            seen = 1 - layer[y, x, 3]
+            for c in range(4):
+                sums[y, x, c] = layer[y, x, c] + seen * sums[y, x, c]

@@ -28,9 +28,6 @@ from viewer.model.actions import OpenPath
 from viewer.model.state.optics_actions import SetAperture
 
 DEMO = resource_folder("assets") / "motorcycle" / "motorcycle.png"
-APERTURES = (0, 4)
-MOVES, MOVE_S = 150, 1 / 60
-"""Number of pointer moves of a drag, and the time between two of them in seconds."""
 
 
 def main() -> None:
@@ -58,7 +55,7 @@ def rows(app: App, began: tuple[float, float], idle_s: float) -> Iterator[tuple[
     pictures = f"{app.frames_shown} frames shown, {app.scene_view.pictures_drawn} pictures drawn"
     yield f"all {app.state.progress.total} views", f"{since(began)}; {pictures}"
     yield "longest frame until then", f"{1e3 * max(first, rest):.0f} ms of processor time"
-    for aperture in APERTURES:
+    for aperture in (0, 4):
         app.do(SetAperture(aperture))
         step_while(app, lambda: not is_idle(app))
         yield f"dragging, aperture of {aperture} view steps", drag(app)
@@ -122,9 +119,9 @@ def pointer_moves(app: App) -> Iterator[str]:
     assert picture is not None
     x, y = round(picture.x + picture.width / 2), round(picture.y + picture.height / 2)
     yield from ("mousemove", str(x), str(y), "mousedown", "1")
-    for k in range(MOVES):
+    for k in range(150):
         right = 2 * (abs((k + 30) % 120 - 60) - 30)
-        yield from ("mousemove", str(x + right), str(y + k % 7), "sleep", f"{MOVE_S:.4f}")
+        yield from ("mousemove", str(x + right), str(y + k % 7), "sleep", f"{1 / 60:.4f}")
 
 
 if __name__ == "__main__":

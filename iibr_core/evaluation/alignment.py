@@ -20,19 +20,17 @@ Warp = Callable[[FloatImage, FloatImage], FloatImage]
 
 FIT_PIXELS = 12_000
 """Size of the copies that are fitted, in pixels: a fit takes a hundred warps."""
-PLANES = np.linspace(-0.08, 0.08, 65)
-"""Shifts of the farthest view that are tried for the best plane, in picture widths."""
 
 
 class ViewFit:
     """Fits disparity to true views [(warp, (H, W, 3)), ...] of a photo (H, W, 3), on small copies.
 
-    farthest: largest offset of the views, in view steps.
+    farthest: largest offset of the views, in view steps. Shifts are those of the farthest view, in picture widths.
     """
 
     def __init__(self, photo: FloatImage, truths: Sequence[tuple[Warp, FloatImage]], farthest: float) -> None:
         self._photo, self._truths = photo, truths
-        self._step = max(math.ceil(math.sqrt(photo[..., 0].size / FIT_PIXELS)), 1)
+        self._step = math.ceil(math.sqrt(photo[..., 0].size / FIT_PIXELS))
         self._small_photo = _smaller(photo, self._step)
         self._small_truths = [(warp, _smaller(truth, self._step)) for warp, truth in truths]
         self._unit = self._small_photo.shape[1] / max(farthest, 1e-9)
@@ -41,7 +39,7 @@ class ViewFit:
     def plane(self) -> float:
         """Disparity of the plane whose views are nearest to the true ones."""
         flat = np.ones(self._small_photo.shape[:2])
-        best = min(PLANES, key=lambda shift: self._error(shift * flat))
+        best = min(np.linspace(-0.08, 0.08, 65), key=lambda shift: self._error(shift * flat))
         found = minimize(lambda shift: self._error(shift * flat), [best], method="Nelder-Mead")
         return float(found.x[0] * self._unit * self._step)
 
@@ -52,8 +50,8 @@ class ViewFit:
             return np.full_like(estimate, self.plane)
         share = (estimate - np.float32(low)) / np.float32(high - low)
         small = _smaller(share[..., None], self._step)[..., 0]
-        middle = self.plane / (self._unit * self._step)
         # From the best plane the range opens to either side, whichever end is near.
+        middle = self.plane / (self._unit * self._step)
         simplex = middle + np.array([[0, 0], [-1, 1], [1, 1]]) * 0.01
         far, near = minimize(
             lambda ends: self._error(ends[0] + (ends[1] - ends[0]) * small),
@@ -76,7 +74,6 @@ class ViewFit:
 
 def _smaller(image: FloatImage, step: int) -> FloatImage:
     """Return means (h, w, C) over blocks of step x step pixels of an image (H, W, C), without the rest."""
-    height, width = max(image.shape[0] // step, 1), max(image.shape[1] // step, 1)
+    height, width = (max(length // step, 1) for length in image.shape[:2])
     cut = image[: height * step, : width * step]
-    step_y, step_x = cut.shape[0] // height, cut.shape[1] // width
-    return np.asarray(cut.reshape(height, step_y, width, step_x, -1).mean(axis=(1, 3)), np.float32)
+    return np.asarray(cut.reshape(height, cut.shape[0] // height, width, cut.shape[1] // width, -1).mean((1, 3)))

@@ -8,11 +8,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import astuple, dataclass, field
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from iibr_core.beyond.free_cameras import FreeViews
 from iibr_core.color import bytes_from_encoded, quantise_as_stored
 from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.edges.refine import refine
@@ -24,8 +26,8 @@ from iibr_core.evaluation.scenes import (
     FITTED,
     DisparityFrom,
     Trial,
-    free_views,
-    plane_views,
+    TrialInput,
+    in_front,
     read_view,
     trial_input,
     trials_of,
@@ -33,15 +35,15 @@ from iibr_core.evaluation.scenes import (
 )
 from iibr_core.formats.images.photo import DEFAULT_MAX_PIXELS
 from iibr_core.formats.light_fields.multi_view_scene import MultiView
+from iibr_core.inpainting.background import fill_background
+from iibr_core.method.photo_views import PhotoViews
 from iibr_core.runtime.tiling import side_by_side
 from iibr_core.runtime.work import part_of_job, report_progress
 from iibr_core.stages import ALL_STAGES, Stages
-from iibr_core.types import Disparity, FloatImage, ImageSize, ViewOffset, image_size
+from iibr_core.types import Disparity, FloatImage, ImageSize, image_size
 
 TRUTH, PHOTO, PLANE, WARP, OURS = "truth", "unchanged photo", "one plane", "plain warp", "iibr"
 """The true views, and ways of making views."""
-SAME_ROW = 0.05
-"""Largest distance, in view steps, of the rows of views that make an EPI together."""
 
 MakeView = Callable[[int], FloatImage]
 """Makes the view (H, W, 3) of an index of the scene."""
@@ -123,25 +125,6 @@ class Result:
     pictures: Mapping[str, Mapping[str, Bytes]]
 
 
-@dataclass(frozen=True, eq=False)
-class _View:
-    """A judged view. visible, hole: (H, W), the parts that the given view sees, and does not see."""
-
-    index: int
-    name: str
-    offset: ViewOffset
-    visible: Mask
-    hole: Mask
-
-
-@dataclass(frozen=True, eq=False)
-class _Look:
-    """All that is kept of the views of one way: figures by view, and pictures (H, W, 3) by title."""
-
-    figures: Mapping[str, Figures]
-    pictures: Mapping[str, FloatImage]
-
-
 def evaluate(scene: MultiView, options: Options | None = None) -> list[Result]:
     """Evaluate a scene by the paper's trials, with a result for each.
 
@@ -155,7 +138,7 @@ def evaluate(scene: MultiView, options: Options | None = None) -> list[Result]:
     for number, trial in enumerate(trials):
         report_progress(number, len(trials), f"{scene.name}: disparity")
         with part_of_job(number, 1, len(trials)):
-            results.append(_TrialRun(trial, options, lpips).result())
+            results.append(_result(trial, options, lpips))
     return results
 
 
@@ -165,108 +148,110 @@ def _lpips(folder: Path) -> Distance:
     return Lpips(folder)
 
 
-class _TrialRun:
-    """One trial, way by way."""
+def _result(trial: Trial, options: Options, lpips: Distance | None) -> Result:
+    """Return the figures of all ways in a trial."""
+    scene, given = trial.scene, trial_input(trial, options.disparity, options.choice, options.max_pixels)
+    judge = _Judge(trial, given, options.max_pixels, lpips)
+    _, true_pictures = judge.look(judge.true_view)
+    pictures = {title: {TRUTH: bytes_from_encoded(picture)} for title, picture in true_pictures.items()}
+    rows = []
+    for number, (way, disparity, make, agreement) in enumerate(_ways(trial, given, options)):
+        report_progress(number, 3 + 2 * len(given.maps), f"{scene.name}: {way}")
+        figures, shown = judge.look(make)
+        refocus = {focus.name: bounded_psnr(shown[focus.title], true_pictures[focus.title]) for focus in judge.foci}
+        rows.append(Row(way, disparity, _mean(figures.values()), agreement, refocus, figures))
+        for title, picture in shown.items():
+            pictures[title][rows[-1].name] = bytes_from_encoded(picture)
+    return Result(
+        scene.name,
+        scene.layout,
+        trial.name,
+        scene.views[trial.given].name,
+        image_size(given.photo),
+        float(np.mean([hole.mean() for _, hole in judge.parts.values()])),
+        tuple(rows),
+        tuple(judge.foci),
+        (*scene.notes, *dict.fromkeys(note for kind in given.maps for note in _notes(kind, given.maps[kind]))),
+        pictures,
+    )
 
-    def __init__(self, trial: Trial, options: Options, lpips: Distance | None) -> None:
-        self._trial, self._options, self._lpips = trial, options, lpips
-        self._given = trial_input(trial, options.disparity, options.choice, options.max_pixels)
-        self._views = [self._judged(index) for index in trial.judged]
+
+def _ways(trial: Trial, given: TrialInput, options: Options) -> Iterator[tuple[str, str, MakeView, float]]:
+    """Yield all ways of making views: name, disparity, function, and consistency."""
+
+    def warp(disparity: FloatImage) -> MakeView:
+        return lambda index: warp_view(trial, given.photo, disparity, index).colors
+
+    yield PHOTO, "", lambda index: given.photo, math.nan
+    yield PLANE, "", warp(np.full_like(given.judge.values, given.fit.plane)), math.nan
+    for kind, disparity in given.maps.items():
+        yield WARP, kind, warp(disparity.values), math.nan
+        yield OURS, kind, *_own_views(trial, given.photo, disparity, options)
+
+
+def _own_views(trial: Trial, photo: FloatImage, disparity: Disparity, options: Options) -> tuple[MakeView, float]:
+    """Return the function that makes the program's views, and their consistency."""
+    values, stages = disparity.values, options.stages
+    if options.choice.refine:
+        values = refine(photo, values, disparity.unknown, stages, disparity.is_enlarged)
+    if not trial.is_free:
+        offsets = [trial.offset(index) for index in trial.judged]
+        make = PhotoViews(photo, values, offsets, stages).view
+        return lambda index: make(trial.offset(index)).colors, consistency(make, offsets)
+    given, *others = (trial.camera(index, image_size(photo)) for index in (trial.given, *trial.judged))
+    inverse_depth = (in_front(given, values) / np.float32(given.focal_px[0])).astype(np.float32)
+    free = FreeViews(photo, inverse_depth, given, others, partial(fill_background, stages=stages), stages=stages)
+    cameras = dict(zip(trial.judged, others))
+    return lambda index: free.view(cameras[index]).colors, math.nan
+
+
+class _Judge:
+    """Compares views of a trial with the true ones. parts: visible part and holes (H, W) by the view's index."""
+
+    def __init__(self, trial: Trial, given: TrialInput, max_pixels: int, lpips: Distance | None) -> None:
+        self._trial, self._given, self._max_pixels, self._lpips = trial, given, max_pixels, lpips
+        self.parts: dict[int, tuple[Mask, Mask]] = {}
+        for index in trial.judged:
+            warped = warp_view(trial, given.photo, given.judge.values, index)
+            self.parts[index] = warped.visible, warped.hole
         is_lens = trial.name == CENTRE_TRIAL and not trial.is_free
-        offsets = [view.offset for view in self._views]
-        self._foci = foci_of(offsets, self._given.judge.values) if is_lens else []
+        self.foci = foci_of(list(map(trial.offset, trial.judged)), given.judge.values) if is_lens else []
 
-    def _judged(self, index: int) -> _View:
-        warped = warp_view(self._trial, self._given.photo, self._given.judge.values, index)
-        name = self._trial.scene.views[index].name
-        return _View(index, name, self._trial.offset(index), warped.visible, warped.hole)
+    def true_view(self, index: int) -> FloatImage:
+        """Return the true view (H, W, 3) of an index."""
+        return read_view(self._trial.scene.views[index], self._max_pixels)
 
-    def result(self) -> Result:
-        """Return the figures of all ways."""
-        scene, given = self._trial.scene, self._given
-        truth = self._look(self._true_view)
-        pictures = {title: {TRUTH: bytes_from_encoded(picture)} for title, picture in truth.pictures.items()}
-        rows = []
-        for number, (way, disparity, make, agreement) in enumerate(self._ways()):
-            report_progress(number, 3 + 2 * len(given.maps), f"{scene.name}: {way}")
-            look = self._look(make)
-            refocus = {f.name: bounded_psnr(look.pictures[f.title], truth.pictures[f.title]) for f in self._foci}
-            rows.append(Row(way, disparity, _mean(look.figures.values()), agreement, refocus, look.figures))
-            for title, picture in look.pictures.items():
-                pictures[title][rows[-1].name] = bytes_from_encoded(picture)
-        return Result(
-            scene.name,
-            scene.layout,
-            self._trial.name,
-            scene.views[self._trial.given].name,
-            image_size(given.photo),
-            float(np.mean([view.hole.mean() for view in self._views])),
-            tuple(rows),
-            tuple(self._foci),
-            (*scene.notes, *dict.fromkeys(note for kind in given.maps for note in _notes(kind, given.maps[kind]))),
-            pictures,
-        )
-
-    def _ways(self) -> Iterator[tuple[str, str, MakeView, float]]:
-        """Yield all ways of making views: name, disparity, function, and consistency."""
-        photo, plane = self._given.photo, np.full_like(self._given.judge.values, self._given.fit.plane)
-        yield PHOTO, "", lambda index: photo, math.nan
-        yield PLANE, "", self._warp(plane), math.nan
-        for kind, disparity in self._given.maps.items():
-            yield WARP, kind, self._warp(disparity.values), math.nan
-            yield OURS, kind, *self._own(disparity)
-
-    def _true_view(self, index: int) -> FloatImage:
-        return read_view(self._trial.scene.views[index], self._options.max_pixels)
-
-    def _warp(self, disparity: FloatImage) -> MakeView:
-        return lambda index: warp_view(self._trial, self._given.photo, disparity, index).colors
-
-    def _own(self, disparity: Disparity) -> tuple[MakeView, float]:
-        """Return the function that makes the program's views, and their consistency."""
-        trial, photo, options, values = self._trial, self._given.photo, self._options, disparity.values
-        if options.choice.refine:
-            values = refine(photo, values, disparity.unknown, options.stages, disparity.is_enlarged)
-        if trial.is_free:
-            free = free_views(trial, photo, values, options.stages)
-            return lambda index: free(index).colors, math.nan
-        make = plane_views(trial, photo, values, options.stages)
-        agreement = consistency(make, [view.offset for view in self._views])
-        return lambda index: make(trial.offset(index)).colors, agreement
-
-    def _look(self, make: MakeView) -> _Look:
-        """Return the figures of a way's views, and its pictures: the farthest view, an EPI, refocused ones."""
-        photo, judge = self._given.photo, self._given.judge.values
-        farthest = max(self._views, key=lambda view: math.hypot(*view.offset))
-        row = int(np.abs(np.diff(judge, axis=1)).sum(axis=1).argmax())  # its EPI crosses most depth edges
-        figures, shown, lines, stack = {}, photo, {0.0: photo[row]}, FocalStack(self._foci, photo)
-        made = ((view, quantise_as_stored(make(view.index))) for view in self._views)
-        for view, image, distances in side_by_side(self._score, made):
-            figures[view.name] = distances
-            stack.add(view.offset, image)
-            shown = image if view is farthest else shown
-            if abs(view.offset.t) <= SAME_ROW:
-                lines[view.offset.s] = image[row]
-        pictures = {f"The farthest view, {farthest.name}": shown}
+    def look(self, make: MakeView) -> tuple[dict[str, Figures], dict[str, FloatImage]]:
+        """Return the figures of a way's views by name, and pictures: the farthest view, an EPI, refocused ones."""
+        trial, photo, names = self._trial, self._given.photo, [view.name for view in self._trial.scene.views]
+        farthest = max(trial.judged, key=lambda index: math.hypot(*trial.offset(index)))
+        row = int(np.abs(np.diff(self._given.judge.values, axis=1)).sum(axis=1).argmax())  # crosses most depth edges
+        figures, shown, lines, stack = {}, photo, {0.0: photo[row]}, FocalStack(self.foci, photo)
+        made = ((index, quantise_as_stored(make(index))) for index in trial.judged)
+        for index, image, distances in side_by_side(self._score, made):
+            figures[names[index]], offset = distances, trial.offset(index)
+            stack.add(offset, image)
+            shown = image if index == farthest else shown
+            if round(offset.t, 1) == 0:
+                lines[offset.s] = image[row]
+        pictures = {f"The farthest view, {names[farthest]}": shown}
         if len(lines) > 2:
             epi = np.stack([lines[s] for s in sorted(lines)])
             pictures[f"EPI of pixel row {row}, leftmost view on top"] = np.repeat(epi, 8, axis=0)
-        return _Look(figures, {**pictures, **stack.pictures()})
+        return figures, pictures | stack.pictures()
 
-    def _score(self, made: tuple[_View, FloatImage]) -> tuple[_View, FloatImage, Figures]:
-        view, image = made
-        truth = self._true_view(view.index)
-        full, visible, hole = (bounded_psnr(image, truth, mask) for mask in (None, view.visible, view.hole))
+    def _score(self, made: tuple[int, FloatImage]) -> tuple[int, FloatImage, Figures]:
+        index, image = made
+        truth = self.true_view(index)
+        full, visible, hole = (bounded_psnr(image, truth, mask) for mask in (None, *self.parts[index]))
         lpips = math.nan if self._lpips is None else self._lpips(image, truth)
-        return view, image, Figures(full, visible, hole, ssim(image, truth), flip(image, truth), lpips)
+        return index, image, Figures(full, visible, hole, ssim(image, truth), flip(image, truth), lpips)
 
 
 def _mean(figures: Iterable[Figures]) -> Figures:
     """Return the means over views, of each figure over the views that have it."""
-    table = np.array([astuple(of_view) for of_view in figures])
-    known = np.isfinite(table)
-    means = np.where(known, table, 0).sum(axis=0) / np.where(known.any(axis=0), known.sum(axis=0), np.nan)
-    return Figures(*means.tolist())
+    table = np.ma.masked_invalid([astuple(of_view) for of_view in figures])
+    return Figures(*table.mean(axis=0).filled(np.nan).tolist())
 
 
 def _notes(kind: str, disparity: Disparity) -> tuple[str, ...]:

@@ -19,8 +19,6 @@ from iibr_core.formats.files import require_file
 from iibr_core.types import FloatImage, InputError
 
 FILES = "torchvision's alexnet-owt-7be5be79.pth and LPIPS's alex.pth"
-MIN_SIDE_PX = 64
-"""Smallest picture that the network takes."""
 
 
 class Lpips:
@@ -40,8 +38,8 @@ class Lpips:
         _load(self._shares, folder / "alex.pth", lambda key: f"lin{key.replace('.', '.model.1.')}")
 
     def __call__(self, image: FloatImage, truth: FloatImage) -> float:
-        """Return the distance of pictures (H, W, 3), sRGB-encoded in 0..1; NaN below MIN_SIDE_PX."""
-        if min(truth.shape[:2]) < MIN_SIDE_PX:
+        """Return the distance of pictures (H, W, 3), sRGB-encoded in 0..1; NaN for those too small for the network."""
+        if min(truth.shape[:2]) < 64:
             return math.nan
         with torch.no_grad():
             x = torch.from_numpy(np.stack([image, truth]).transpose(0, 3, 1, 2).astype(np.float32))

@@ -33,8 +33,7 @@ def psnr(image: Image, truth: Image, mask: Mask | None = None) -> float:
 
 def bounded_psnr(image: Image, truth: Image, mask: Mask | None = None) -> float:
     """Return `psnr`, at most MAX_DB: one pair of equal pictures must not make a mean infinite."""
-    ratio = psnr(image, truth, mask)
-    return ratio if math.isnan(ratio) else min(ratio, MAX_DB)
+    return min(psnr(image, truth, mask), MAX_DB)
 
 
 def ssim(image: FloatImage, truth: FloatImage) -> float:

@@ -13,11 +13,6 @@ from iibr_core.beyond.optics import Optics
 from iibr_core.color import srgb_from_linear
 from iibr_core.types import FloatImage, ViewOffset, image_size
 
-MIN_SIDE_PX = 16
-"""Smallest part within all views that is compared."""
-MIN_VIEWS = 8
-"""Fewest views in the aperture, beside the given one, that make a lens."""
-
 
 @dataclass(frozen=True)
 class Focus:
@@ -52,8 +47,8 @@ def foci_of(offsets: Sequence[ViewOffset], disparity: FloatImage) -> list[Focus]
     radius = float(min(-rows.min(), rows.max(), -columns.min(), columns.max()))
     percentiles = {"near": 95, "middle": 50, "far": 5}
     foci = [Focus(name, float(np.percentile(disparity, p)), radius) for name, p in percentiles.items()]
-    is_lens = radius >= 1 and sum(foci[0].weight(offset) > 0 for offset in offsets) >= MIN_VIEWS
-    return [focus for focus in foci if is_lens and min(disparity.shape) - 2 * focus.margin_px >= MIN_SIDE_PX]
+    is_lens = radius >= 1 and sum(foci[0].weight(offset) > 0 for offset in offsets) >= 8  # the neighbours
+    return [focus for focus in foci if is_lens and min(disparity.shape) > 2 * focus.margin_px]
 
 
 class FocalStack:
@@ -73,8 +68,6 @@ class FocalStack:
 
     def pictures(self) -> dict[str, FloatImage]:
         """Return the picture of each focus by its title, sRGB-encoded, cropped to what all views show."""
-        found = {}
-        for focus, total in zip(self._foci, self._sums):
-            light, margin = total.light(), focus.margin_px
-            found[focus.title] = srgb_from_linear(light[margin:-margin, margin:-margin])
-        return found
+        inner = [np.s_[focus.margin_px : -focus.margin_px] for focus in self._foci]
+        lights = [total.light()[part, part] for total, part in zip(self._sums, inner)]
+        return {focus.title: srgb_from_linear(light) for focus, light in zip(self._foci, lights)}

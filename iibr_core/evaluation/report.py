@@ -10,6 +10,7 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 
 import msgspec
+import numpy as np
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from PIL import Image
 
@@ -19,9 +20,6 @@ from iibr_core.evaluation.metrics import flip_picture
 from iibr_core.evaluation.scenes import CENTRE_TRIAL
 from iibr_core.formats.outputs import make_folder, write_file
 from iibr_core.runtime.resources import resource_folder
-
-MAX_WIDTH_PX = 480
-"""Largest width of a picture on the page."""
 
 
 @dataclass(frozen=True)
@@ -69,48 +67,47 @@ def render(template: str, results: Sequence[Result], command: str) -> str:
 def summary_table(results: Sequence[Result]) -> Table:
     """Return the full-frame PSNR of all ways, a row for each result, with means over the scenes."""
     names = list(dict.fromkeys(row.name for result in results for row in result.rows))
-    rows = []
+    rows, centred = [], []
     for result in results:
         found = {row.name: row.mean.full_db for row in result.rows}
-        cells = (number(found.get(name, math.nan), 2) for name in names)
-        rows.append((result.scene, result.trial, str(len(result.rows[0].views)), *cells))
-    centred = [result for result in results if result.trial == CENTRE_TRIAL]
+        figures = [found.get(name, math.nan) for name in names]
+        rows.append((result.scene, result.trial, str(len(result.rows[0].views)), *_numbers(figures)))
+        if result.trial == CENTRE_TRIAL:
+            centred.append(figures)
     if len(centred) > 1:
-        columns = [
-            [row.mean.full_db for result in centred for row in result.rows if row.name == name] for name in names
-        ]
-        means = (number(sum(column) / len(column), 2) if len(column) == len(centred) else "–" for column in columns)
-        rows.append((f"mean of {len(centred)} scenes", CENTRE_TRIAL, "–", *means))
+        rows.append((f"mean of {len(centred)} scenes", CENTRE_TRIAL, "–", *_numbers(np.mean(centred, axis=0).tolist())))
     return Table(("scene", "trial", "views", *names), tuple(rows))
 
 
 def figures_table(result: Result) -> Table:
     """Return the figures of a result, a row for each way; columns without any figure are left out."""
     means = [row.mean for row in result.rows]
+    worst = _numbers([row.views[row.worst_view].full_db for row in result.rows])
     columns = {
-        "full dB": [number(mean.full_db, 2) for mean in means],
-        "visible dB": [number(mean.visible_db, 2) for mean in means],
-        "hole dB": [number(mean.hole_db, 2) for mean in means],
-        "worst view dB": [f"{number(row.views[row.worst_view].full_db, 2)} ({row.worst_view})" for row in result.rows],
-        "SSIM": [number(mean.ssim, 4) for mean in means],
-        "FLIP": [number(mean.flip, 4) for mean in means],
-        "LPIPS": [number(mean.lpips, 4) for mean in means],
-        "consistency": [number(row.consistency, 2) for row in result.rows],
-        **{f"{f.name} focus dB": [number(row.refocus_db[f.name], 2) for row in result.rows] for f in result.foci},
+        "full dB": _numbers([mean.full_db for mean in means]),
+        "visible dB": _numbers([mean.visible_db for mean in means]),
+        "hole dB": _numbers([mean.hole_db for mean in means]),
+        "worst view dB": [f"{db} ({row.worst_view})" for db, row in zip(worst, result.rows)],
+        "SSIM": _numbers([mean.ssim for mean in means], 4),
+        "FLIP": _numbers([mean.flip for mean in means], 4),
+        "LPIPS": _numbers([mean.lpips for mean in means], 4),
+        "consistency": _numbers([row.consistency for row in result.rows]),
+        **{f"{f.name} focus dB": _numbers([row.refocus_db[f.name] for row in result.rows]) for f in result.foci},
     }
     known = {title: cells for title, cells in columns.items() if set(cells) != {"–"}}
     names = [row.name for row in result.rows]
     return Table(("way", *known), tuple(zip(names, *known.values(), strict=True)))
 
 
-def number(value: float, digits: int) -> str:
-    """Return a figure as text, a dash for NaN."""
-    return f"{value:.{digits}f}" if math.isfinite(value) else "–"
+def _numbers(values: Sequence[float], digits: int = 2) -> list[str]:
+    """Return figures as text, a dash for NaN."""
+    return [f"{value:.{digits}f}" if math.isfinite(value) else "–" for value in values]
 
 
 def summary_lines(result: Result) -> str:
     """Return the full-frame PSNR of all ways, a line each below a heading."""
-    lines = [f"{number(row.mean.full_db, 2):>7} dB  {row.name}" for row in result.rows]
+    numbers = _numbers([row.mean.full_db for row in result.rows])
+    lines = [f"{number:>7} dB  {row.name}" for number, row in zip(numbers, result.rows)]
     return "\n".join((f"{result.scene}: {result.trial}, {len(result.rows[0].views)} views", *lines))
 
 
@@ -119,8 +116,8 @@ def _error_map(image: Bytes, truth: Bytes) -> Bytes:
 
 
 def _data_uri(image: Bytes) -> str:
-    """Return a picture as the text that a page holds it by."""
+    """Return a picture as the text that a page holds it by, at most 480 pixels wide."""
     picture, buffer = Image.fromarray(image), io.BytesIO()
-    picture.thumbnail((MAX_WIDTH_PX, 4 * MAX_WIDTH_PX), Image.Resampling.LANCZOS)
+    picture.thumbnail((480, 1920), Image.Resampling.LANCZOS)
     picture.save(buffer, "webp", quality=82)
     return f"data:image/webp;base64,{base64.b64encode(buffer.getvalue()).decode()}"

@@ -1,11 +1,11 @@
-"""Scenes whose views are known, the paper's trials on them, and the views and disparity of a trial.
+"""Scenes whose views are known, the paper's trials on them, and the photo and disparity of a trial.
 
 The trials: from the centre view to all others, and on grids from the bottom left to the top left one.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -13,9 +13,8 @@ from typing import Literal
 
 import numpy as np
 
-from iibr_core.beyond.free_cameras import FreeViews
 from iibr_core.beyond.free_view import target_from_photo
-from iibr_core.depth.choice import DepthChoice, DepthKind
+from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.search import PhotoWithDepth, open_with_depth
 from iibr_core.evaluation.alignment import ViewFit
 from iibr_core.evaluation.warp import WarpedView, reference_warp, reference_warp_to
@@ -24,29 +23,18 @@ from iibr_core.formats.images.photo import read_picture
 from iibr_core.formats.light_fields.light_field_formats import LAYOUTS, find_light_field
 from iibr_core.formats.light_fields.multi_view_scene import KnownDisparity, KnownView, MultiView, common_size
 from iibr_core.formats.maps.disparity_file import read_disparity
-from iibr_core.inpainting.background import fill_background
 from iibr_core.inpainting.disparity_holes import fill_disparity_holes
-from iibr_core.method.photo_views import PhotoViews
-from iibr_core.method.view import View
-from iibr_core.stages import ALL_STAGES, Stages
 from iibr_core.types import Camera, Disparity, FloatImage, GridShape, ImageSize, InputError, ViewOffset, image_size
 
 DisparityFrom = Literal["given", "estimate"]
 """Origin of the given view's disparity: the scene's map, or the program's estimate from the photo alone."""
 CENTRE_TRIAL, CORNER_TRIAL = "centre to all others", "bottom left to top left"
-TRUE_MAP, FITTED = "true map", ", fitted"
-"""Kind of a measured or rendered map; end of the kind of a map at its best scale and shift."""
-KIND_NAMES: dict[DepthKind, str] = {
-    "file": "file",
-    "embedded": "photo's own depth",
-    "model": "model",
-    "rough": "guess",
-    "flat": "flat",
-}
+FITTED = ", fitted"
+"""End of the kind of a map at its best scale and shift."""
+ESTIMATES = {"embedded": "photo's own depth", "rough": "guess"}
+"""Kinds of estimates by their origin, where the two differ."""
 FITTED_VIEWS = 4
 """Number of true views, the farthest, that a map's best scale and shift are found with."""
-MIN_STATED_SHARE = 0.1
-"""Smallest disparity as a share of the least one that the data set states; smaller estimates are moved there."""
 
 
 def read_scene(folder: Path) -> MultiView | None:
@@ -67,12 +55,9 @@ def find_scenes(folder: Path) -> Iterator[MultiView]:
     """Yield the scene of a folder, or those of its subfolders. Raises InputError if there is none or one is damaged."""
     if not is_folder(folder):
         raise InputError(f"{folder}: is not a folder; give the folder of a data set ({LAYOUTS})")
+    below = (path for path in entries_of(folder) if is_folder(path) and not path.name.startswith("."))
     scene = read_scene(folder)
-    if scene is not None:
-        yield scene
-        return
-    below = [path for path in entries_of(folder) if is_folder(path) and not path.name.startswith(".")]
-    found = [scene for path in below if (scene := read_scene(path)) is not None]
+    found = [scene] if scene else [scene for path in below if (scene := read_scene(path))]
     if not found:
         raise InputError(f"{folder}: holds no scene with several views; laid out as {LAYOUTS}")
     yield from found
@@ -102,10 +87,11 @@ class Trial:
         """True if cameras are turned or stand off the plane of the given one."""
         return self.scene.views[self.given].camera is not None
 
-    def camera(self, index: int, size: ImageSize) -> Camera | None:
-        """Return the camera of a view with pictures of a size, None if all cameras look the same way from a plane."""
+    def camera(self, index: int, size: ImageSize) -> Camera:
+        """Return the camera of a view of a free trial, with pictures of a size."""
         camera = self.scene.views[index].camera
-        return None if camera is None else camera.resized(size)
+        assert camera is not None
+        return camera.resized(size)
 
 
 def trials_of(scene: MultiView, source: DisparityFrom | Path, max_views: int | None = None) -> list[Trial]:
@@ -115,8 +101,12 @@ def trials_of(scene: MultiView, source: DisparityFrom | Path, max_views: int | N
     if max_views is not None and max_views < len(others):
         others = [others[round(k)] for k in np.linspace(0, len(others) - 1, max_views)]
     trials = [Trial(CENTRE_TRIAL, scene, centre, tuple(others))]
-    corners = _left_corners(scene)
-    return [*trials, Trial(CORNER_TRIAL, scene, corners[0], corners[1:])] if corners else trials
+    places = np.array([view.offset for view in scene.views])
+    (top, left), (bottom, right) = places.min(axis=0), places.max(axis=0)
+    if not trials[0].is_free and bottom - top >= 0.5 and right - left >= 0.5:
+        given, judged = (int(np.hypot(*(places - corner).T).argmin()) for corner in ((bottom, left), (top, left)))
+        trials.append(Trial(CORNER_TRIAL, scene, given, (judged,)))
+    return trials
 
 
 def _mapped_centre(scene: MultiView) -> int:
@@ -126,15 +116,6 @@ def _mapped_centre(scene: MultiView) -> int:
     at = scene.views[scene.centre].offset
     truths = {index for index, known in scene.disparity.items() if known.is_truth} or set(scene.disparity)
     return min(truths, key=lambda k: (scene.views[k].offset.t - at.t) ** 2 + (scene.views[k].offset.s - at.s) ** 2)
-
-
-def _left_corners(scene: MultiView) -> tuple[int, ...]:
-    """Return the bottom left and the top left view of a grid of several rows and columns; none of other scenes."""
-    places = np.array([view.offset for view in scene.views])
-    (top, left), (bottom, right) = places.min(axis=0), places.max(axis=0)
-    if any(view.camera is not None for view in scene.views) or bottom - top < 0.5 or right - left < 0.5:
-        return ()
-    return tuple(int(np.hypot(*(places - corner).T).argmin()) for corner in ((bottom, left), (top, left)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,31 +141,30 @@ def trial_input(trial: Trial, source: DisparityFrom | Path, choice: DepthChoice,
     """
     scene, view = trial.scene, trial.scene.views[trial.given]
     photo = read_view(view, max_pixels)
-    truth = _map_of(trial, {k: known for k, known in scene.disparity.items() if known.is_truth}, max_pixels)
-    truths = {} if truth is None else {TRUE_MAP: truth}
     fit = _fit_of(trial, photo, max_pixels)
-    if source == "given" and truth is not None:
-        maps = truths
-    elif source == "estimate":
-        maps = {**_estimates(trial, choice, max_pixels, fit), **truths}
-    else:
+    known = {index: stored for index, stored in scene.disparity.items() if stored.is_truth}
+    truth = _map_of(trial, known, max_pixels)
+    maps = {} if truth is None else {"true map": truth}
+    if source == "estimate":
+        maps = _estimates(trial, choice, max_pixels, fit) | maps
+    elif isinstance(source, Path) or truth is None:
         stored = {_mapped_centre(scene): KnownDisparity(source)} if isinstance(source, Path) else scene.disparity
         given = _map_of(trial, stored, max_pixels)
         if given is None:
             raise InputError(f"{view.path}: has no disparity map beside it; give --disparity estimate, or a file")
         maps = _with_fitted("given map", given, fit)
-    judge = truth or next((found for kind, found in maps.items() if kind.endswith(FITTED)))
+    judge = truth or next(disparity for kind, disparity in maps.items() if kind.endswith(FITTED))
     return TrialInput(photo, maps, judge, fit)
 
 
 def _estimates(trial: Trial, choice: DepthChoice, max_pixels: int, fit: ViewFit) -> dict[str, Disparity]:
     """Return the program's estimate, and a fitted guess if that is not a guess already."""
     found = _estimate(trial, choice, max_pixels)
-    kind = KIND_NAMES[found.origin.kind]
+    kind = ESTIMATES.get(found.origin.kind, found.origin.kind)
     maps = _with_fitted(kind, found.disparity, fit)
     if kind != "guess":
         guess = _estimate(trial, replace(choice, start="rough", model=None), max_pixels).disparity
-        maps[f"guess{FITTED}"] = _with_fitted("guess", guess, fit)[f"guess{FITTED}"]
+        maps |= dict(list(_with_fitted("guess", guess, fit).items())[1:])
     return maps
 
 
@@ -196,15 +176,14 @@ def _map_of(trial: Trial, maps: Mapping[int, KnownDisparity], max_pixels: int) -
     """Return the given view's map, or the nearest view's carried over; None if there is none."""
     if not maps:
         return None
-    scene = trial.scene
-    nearest = min(maps, key=lambda index: sum(part**2 for part in trial.offset(index)))
-    colors = read_view(scene.views[nearest], max_pixels)
+    views, nearest = trial.scene.views, min(maps, key=lambda index: sum(part**2 for part in trial.offset(index)))
+    colors = read_view(views[nearest], max_pixels)
     stored = read_disparity(maps[nearest].path, image_size(colors), maps[nearest].scale, colors)
     if nearest == trial.given:
         return stored
-    offset = trial.offset(nearest)
-    values = warp_disparity(stored.values, ViewOffset(-offset.t, -offset.s))
-    note = f"The disparity of {scene.views[nearest].name} was carried over to {scene.views[trial.given].name}."
+    t, s = trial.offset(nearest)
+    note = f"The disparity of {views[nearest].name} was carried over to {views[trial.given].name}."
+    values = warp_disparity(stored.values, ViewOffset(-t, -s))
     return Disparity(values, f"{stored.source}, carried over", (*stored.notes, note))
 
 
@@ -225,51 +204,28 @@ def _estimate(trial: Trial, choice: DepthChoice, max_pixels: int) -> PhotoWithDe
 
 def _fit_of(trial: Trial, photo: FloatImage, max_pixels: int) -> ViewFit:
     farthest = sorted(trial.judged, key=lambda k: -max(map(abs, trial.offset(k))))[:FITTED_VIEWS]
-    truths = [
-        (
-            lambda small, disparity, index=index: warp_view(trial, small, disparity, index).colors,
-            read_view(trial.scene.views[index], max_pixels),
-        )
-        for index in farthest
-    ]
+    truths = [(partial(_warped, trial, k), read_view(trial.scene.views[k], max_pixels)) for k in farthest]
     return ViewFit(photo, truths, max(map(abs, trial.offset(farthest[0]))))
+
+
+def _warped(trial: Trial, index: int, photo: FloatImage, disparity: FloatImage) -> FloatImage:
+    return warp_view(trial, photo, disparity, index).colors
 
 
 def warp_view(trial: Trial, photo: FloatImage, disparity: FloatImage, index: int) -> WarpedView:
     """Return a view of the trial by the plain warp. photo: (H, W, 3). disparity: (H, W), px per view step."""
-    size = image_size(photo)
-    given, target = trial.camera(trial.given, size), trial.camera(index, size)
-    if given is None or target is None:
+    if not trial.is_free:
         return reference_warp(photo, disparity, trial.offset(index))
-    matrix = target_from_photo(given, target, given.focal_px[0])
-    return reference_warp_to(photo, _in_front(given, disparity), matrix, size)
-
-
-def plane_views(
-    trial: Trial, photo: FloatImage, disparity: FloatImage, stages: Stages = ALL_STAGES
-) -> Callable[[ViewOffset], View]:
-    """Return a function that makes the program's view at an offset from the given one. Arguments: see `warp_view`."""
-    return PhotoViews(photo, disparity, [trial.offset(index) for index in trial.judged], stages).view
-
-
-def free_views(
-    trial: Trial, photo: FloatImage, disparity: FloatImage, stages: Stages = ALL_STAGES
-) -> Callable[[int], View]:
-    """Return a function that makes the program's view of an index, for cameras that are turned or stand anywhere."""
     size = image_size(photo)
-    cameras = {index: camera for index in trial.judged if (camera := trial.camera(index, size))}
     given = trial.camera(trial.given, size)
-    assert given is not None
-    inverse_depth = _in_front(given, disparity) / np.float32(given.focal_px[0])
-    inpaint = partial(fill_background, stages=stages)
-    free = FreeViews(photo, inverse_depth.astype(np.float32), given, list(cameras.values()), inpaint, stages=stages)
-    return lambda index: free.view(cameras[index])
+    matrix = target_from_photo(given, trial.camera(index, size), given.focal_px[0])
+    return reference_warp_to(photo, in_front(given, disparity), matrix, size)
 
 
-def _in_front(given: Camera, disparity: FloatImage) -> FloatImage:
-    """Return disparity (H, W) of points in front of the camera, not much farther than the data set states.
+def in_front(given: Camera, disparity: FloatImage) -> FloatImage:
+    """Return disparity (H, W) of points in front of the camera, at most ten times as far as the data set states.
 
     Cameras are in view steps, so a step at distance 1 is the focal length.
     """
     farthest = (given.depth_range or (1.0, 1.0))[1]
-    return np.maximum(disparity, np.float32(MIN_STATED_SHARE * given.focal_px[0] / farthest))
+    return np.maximum(disparity, np.float32(0.1 * given.focal_px[0] / farthest))

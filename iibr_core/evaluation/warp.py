@@ -23,11 +23,6 @@ SAME_SURFACE = 0.08
 """Largest difference of disparity (px per view step) between pixels of one surface, which is interpolated."""
 SIMILAR = 1.0
 """Largest difference of disparity (px per view step) from the farthest surface around a hole, which fills it."""
-MAX_REACH_PX = 120
-"""Largest distance of pixels that fill a hole."""
-NOWHERE = -1e30
-"""Disparity of pixels on which nothing landed."""
-EIGHT = np.array([(1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (-1, 1), (1, -1), (-1, -1)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,24 +55,24 @@ def reference_warp_to(
     """
     height, width = disparity.shape
     nearest = _splat(disparity.astype(np.float32), target_from_photo, *size)
-    hole = nearest == NOWHERE
+    hole = np.isneginf(nearest)
     nearest[hole] = 0
-    y, x = np.mgrid[0 : size.height, 0 : size.width]
+    y, x = np.indices(size)
     back = np.linalg.inv(target_from_photo) @ np.stack([x, y, np.ones_like(x), nearest]).reshape(4, -1)
     with np.errstate(divide="ignore", invalid="ignore"):
         from_x, from_y = (back[:2] / back[2]).reshape(2, *size)
     # Places that are not finite lie outside the photo.
     hole |= ~((from_x >= -0.5) & (from_y >= -0.5) & (from_x <= width - 0.5) & (from_y <= height - 0.5))
-    places = [np.where(hole, 0.0, place) for place in (from_y, from_x)]
+    places = np.where(hole, 0, (from_y, from_x))
     channels = [map_coordinates(photo[..., c], places, np.float32, order=3, mode="nearest") for c in range(3)]
     return WarpedView(fill_holes(np.clip(np.stack(channels, -1), 0, 1), hole, nearest), nearest, hole)
 
 
 @kernel
 def _splat(disparity, matrix, target_height, target_width):
-    """Return the nearest (largest) disparity that a 4x4 matrix lands on each pixel of the target, else NOWHERE."""
+    """Return the nearest (largest) disparity that a 4x4 matrix lands on each pixel of the target, else -inf."""
     height, width = disparity.shape
-    nearest = np.full((target_height, target_width), NOWHERE, np.float32)
+    nearest = np.full((target_height, target_width), -np.inf, np.float32)
     for y in range(height):
         for x in range(width):
             for k in range(SAMPLES * SAMPLES):
@@ -119,36 +114,28 @@ def fill_holes(colors, hole, disparity):
     """
     height, width = hole.shape
     filled = colors.copy()
-    met = np.empty((8, 3), np.int64)
-    for y in range(height):
-        for x in range(width):
-            if not hole[y, x]:
+    met = np.empty((9, 3), np.int64)
+    for y, x in np.argwhere(hole):
+        count, farthest = 0, np.inf
+        for k in range(9):
+            step_y, step_x = k // 3 - 1, k % 3 - 1
+            v, u, length = y + step_y, x + step_x, 1
+            while k != 4 and 0 <= u < width and 0 <= v < height and hole[v, u]:
+                u, v, length = u + step_x, v + step_y, length + 1
+            if k == 4 or not (0 <= u < width and 0 <= v < height):
                 continue
-            count, farthest = 0, np.inf
-            for k in range(8):
-                step_x, step_y = EIGHT[k]
-                u, v, length = x + step_x, y + step_y, 1
-                while length < MAX_REACH_PX and 0 <= u < width and 0 <= v < height and hole[v, u]:
-                    u, v, length = u + step_x, v + step_y, length + 1
-                if not (0 <= u < width and 0 <= v < height) or hole[v, u]:
-                    continue
-                # The pixel at the very edge is mixed with the surface that hides the hole.
-                far_u, far_v = min(max(u + step_x, 0), width - 1), min(max(v + step_y, 0), height - 1)
-                if not hole[far_v, far_u]:
-                    u, v = far_u, far_v
-                met[count, 0], met[count, 1], met[count, 2] = v, u, length
-                farthest = min(farthest, disparity[v, u])
-                count += 1
-            total = red = green = blue = 0.0
-            for k in range(count):
-                v, u, length = met[k]
-                if disparity[v, u] >= farthest + SIMILAR:
-                    continue
-                w = 1.0 / length**2
-                total += w
-                red += w * colors[v, u, 0]
-                green += w * colors[v, u, 1]
-                blue += w * colors[v, u, 2]
-            if total > 0:
-                filled[y, x, 0], filled[y, x, 1], filled[y, x, 2] = red / total, green / total, blue / total
+            # The pixel at the very edge is mixed with the surface that hides the hole.
+            far_u, far_v = min(max(u + step_x, 0), width - 1), min(max(v + step_y, 0), height - 1)
+            if not hole[far_v, far_u]:
+                u, v = far_u, far_v
+            met[count] = v, u, length
+            farthest = min(farthest, disparity[v, u])
+            count += 1
+        total, mean = 0.0, np.zeros(3)
+        for v, u, length in met[:count]:
+            if disparity[v, u] < farthest + SIMILAR:
+                total += 1.0 / length**2
+                mean += colors[v, u] / length**2
+        if total > 0:
+            filled[y, x] = mean / total
     return filled
