@@ -22,6 +22,9 @@ SPREAD_SHARES = {"floats": 0.98, "integers": 0.5, "colours": 0.0}
 Depth cameras see less than 32 m, in millimetres of 16 bits.
 """
 
+SURE_AGAINST_FILES = 2.0
+"""Evidence of the photo from which it overrules what files state."""
+
 
 @dataclass(frozen=True, eq=False)
 class OrientedDepth:
@@ -58,18 +61,22 @@ def depth_from_file(path: Path, photo_path: Path, photo: Photo, choice: DepthCho
     return replace(depth, notes=(*found.notes, *notes, *depth.notes))
 
 
-def orient_map(name: str, found: MapFile, photo: Photo, choice: DepthChoice, is_distance: bool) -> OrientedDepth:
+def orient_map(
+    name: str, found: MapFile, photo: Photo, choice: DepthChoice, is_distance: bool, is_stated: bool = False
+) -> OrientedDepth:
     """Return the depth of a map of unknown scale: the photo decides which end is near; in doubt, is_distance does.
 
-    name: of the map, in notes. is_distance: whether the values are likely distances.
+    name: of the map, in notes. is_distance: whether the values are likely distances. is_stated: whether files beside
+    the map state that; the photo must then show the contrary clearly.
     """
     found = _with_unknown_zeros(found)
     is_large_near, is_distance = not is_distance, is_distance or choice.is_metric
-    evidence, reason = near_evidence(photo.pixels, found.values), "as usual"
+    evidence = near_evidence(photo.pixels, found.values)
+    reason = "as its files state" if is_stated else "as usual"
     if choice.is_metric or (choice.file_scale is not None and choice.file_scale < 0):
         is_large_near = False
         reason = "as said" + (", though the photo shows otherwise" if evidence > 1 else "")
-    elif abs(evidence) > 1:
+    elif abs(evidence) > (SURE_AGAINST_FILES if is_stated else 1):
         is_large_near, reason = evidence > 0, "as the photo shows"
     if choice.inverts:
         reason = "as asked"

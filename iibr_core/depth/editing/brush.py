@@ -50,7 +50,7 @@ def lower_distances(photo: FloatImage, stroke: Stroke, index: int, distance: Flo
         part = np.where(is_open & (straight < 1 / radius), straight, np.float32(1))
         colors = np.full(before.shape, 1, np.float32)  # no path crosses pixels that no path from here can shorten
         colors[is_open] = color_distance(photo[window][is_open], touched_colors(photo, stroke, index))
-        colors = without_specks(colors) / np.float32(CONTOUR_CONTRAST)
+        colors = without_outliers(colors) / np.float32(CONTOUR_CONTRAST)
         spread_distances(colors[..., None], 1 / radius, part)
         np.minimum(before, part, out=before)
     return window
@@ -77,10 +77,10 @@ def color_distance(pixels: FloatImage, colors: FloatImage) -> FloatImage:
     return distance
 
 
-def without_specks(colors: FloatImage) -> FloatImage:
+def without_outliers(colors: FloatImage) -> FloatImage:
     """Return color distances (H, W), 0 for pixels that few neighbours resemble."""
     result = colors.copy()
-    _remove_specks(np.ascontiguousarray(colors), result)
+    _remove_outliers(np.ascontiguousarray(colors), result)
     return result
 
 
@@ -138,7 +138,7 @@ def _measure_colors(pixels, colors, distance):
 
 
 @kernel
-def _remove_specks(colors, result):
+def _remove_outliers(colors, result):
     """Set the result to 0 where few pixels in a square of 3 x 3 have another colour."""
     height, width = result.shape
     for y in range(height):

@@ -7,7 +7,7 @@ from math import pi
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.depth.editing.brush import CONTOUR_CONTRAST, color_distance, touched_colors, without_specks
+from iibr_core.depth.editing.brush import CONTOUR_CONTRAST, color_distance, touched_colors, without_outliers
 from iibr_core.depth.editing.edits import Stroke
 from iibr_core.runtime.kernels import kernel
 from iibr_core.types import FloatImage
@@ -36,7 +36,7 @@ def surface_at(
     if not (0 <= x < 1 and 0 <= y < 1):
         return surface
     colors = color_distance(photo.reshape(-1, 3), touched_colors(photo, stroke, index)).reshape(disparity.shape)
-    colors = without_specks(colors)
+    colors = without_outliers(colors)
     depth = disparity / np.float32(DEPTH_EDGE * (extent[1] - extent[0]))
     is_edge, contrasts = colors > OTHER_SURFACE, []
     for axis in (0, 1):

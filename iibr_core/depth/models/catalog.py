@@ -153,13 +153,25 @@ def _wanted_model(wanted: str) -> LocalModel:
         raise InputError(f"{wanted}: no such file or folder")
     elif wanted in (copied := list_own_models()):
         found = _onnx_model(copied[wanted], f"the model {wanted}")
-    elif (here := model_here(known_model(wanted))) is not None:
-        found = here
     else:
-        raise InputError(f"{wanted} is not on this machine; get it with: iibr models get {wanted}")
-    if package := missing_package(found.runner):
-        raise InputError(f"{found.title} needs the package {package}")
+        return _known_model_here(known_model(wanted))
+    _require_package(found.runner, found.title)
     return found
+
+
+def _known_model_here(known: KnownModel) -> LocalModel:
+    """Return a known model. What it needs is named before it is downloaded."""
+    _require_package(known.runner, known.title)
+    found = model_here(known)
+    if found is None:
+        raise InputError(f"{known.name} is not on this machine; get it with: iibr models get {known.name}")
+    return found
+
+
+def _require_package(runner: Runner, title: str) -> None:
+    package = missing_package(runner)
+    if package:
+        raise InputError(f"{title} needs the package {package}")
 
 
 def _model_in(folder: Path) -> LocalModel:
