@@ -73,7 +73,7 @@ TABLES = (
     Table("ablation", ACCURACY, "ablation --maps exact,soft --drawn 4 --data DATA", 6),
     Table("free-views", ACCURACY, "free-views", 2),
     Table("method", "", "method-figures docs/method", 1),
-    Table("pictures", "", "docs/make_pictures.py docs", 4),
+    Table("pictures", "", "docs/make_pictures.py docs/gallery", 4),
 )
 
 

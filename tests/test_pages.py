@@ -19,7 +19,7 @@ from viewer.cli.main import app
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
 PAGES = sorted(path for folder in ("", "docs", "benchmarks", "assets/weights") for path in (ROOT / folder).glob("*.md"))
-MAX_LINES = {"docs/accuracy.md": 250, "CHANGELOG.md": 1000}
+MAX_LINES = {"docs/accuracy.md": 270, "CHANGELOG.md": 1000}
 LINK = re.compile(r"\]\(([^()\s]+(?:\([^()\s]*\))?)\)")
 FENCE = re.compile(r"^```.*?^```$", re.MULTILINE | re.DOTALL)
 CODE = re.compile(r"`([^`\n]*)`")
