@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from urllib.parse import urlsplit
 
 from iibr_core.depth.models.catalog import fetch, known_model, model_here
-from iibr_core.depth.models.known import KNOWN_MODELS, KnownModel
+from iibr_core.depth.models.known import KNOWN_MODELS, KnownModel, missing_package
 from iibr_core.runtime.work import Cancelled, watched
 from viewer.background.job_threads import Failed, Job, JobThread
 from viewer.model.state.model_download import Downloading, ModelOffer, ModelsListed
@@ -68,6 +68,7 @@ def list_models() -> ModelsListed:
 def _offer_of(model: KnownModel) -> ModelOffer:
     from huggingface_hub import constants
 
+    package = missing_package(model.runner)
     return ModelOffer(
         model.name,
         model.title,
@@ -76,6 +77,6 @@ def _offer_of(model: KnownModel) -> ModelOffer:
         host=urlsplit(constants.ENDPOINT).netloc,
         words=" ".join(filter(None, (f"{model.figures}.", model.advice, model.needs))),
         is_here=model_here(model) is not None,
-        lacks=model.needs,
+        lacks=f"needs the package {package}" if package else "",
         is_recommended=model.is_recommended,
     )

@@ -20,6 +20,7 @@ from tests.iibr_core.depth.onnx_graphs import published, weighing
 from tests.local_hub import Hub, local_hub
 from tests.viewer.conftest import Driver, Opener
 from viewer.app.main_loop import App
+from viewer.background.model_downloader import list_models
 from viewer.model.actions import EndGesture, OpenPath, Redo, ShowPrompt, Undo
 from viewer.model.lens.focal_plane import place_of, sharp_disparity
 from viewer.model.reducers.depth_models import offered_model
@@ -281,3 +282,9 @@ def test_a_file_of_ones_own_is_used_in_place_and_is_said_to_be(viewer: Driver, t
     assert viewer.app.state.source is not None
     assert viewer.app.state.source.depth.model == str(file)
     assert not viewer.app.state.preferences.estimates_depth
+
+
+def test_a_missing_package_completes_the_sentence_about_a_model(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The window writes "It ..." before it."""
+    monkeypatch.setattr("iibr_core.depth.models.known.is_installed", lambda name: False)
+    assert all(offer.lacks.startswith("needs the package ") for offer in list_models().known)
