@@ -8,8 +8,6 @@ from typing import Annotated, Any
 
 import typer
 
-from iibr_core.depth.models.catalog import fetch, known_model, list_own_models, model_here, register
-from iibr_core.depth.models.known import KNOWN_MODELS
 from iibr_core.types import InputError
 from viewer.cli.terminal import show_progress
 
@@ -27,6 +25,9 @@ def list_models(context: typer.Context) -> None:
     """
     if context.invoked_subcommand is not None:
         return
+    from iibr_core.depth.models.catalog import list_own_models, model_here
+    from iibr_core.depth.models.known import KNOWN_MODELS
+
     copied = list_own_models()
     names = max(map(len, [*(model.name for model in KNOWN_MODELS), *copied]))
     for model in KNOWN_MODELS:
@@ -48,6 +49,9 @@ def get(
 
     Example: iibr models get depth-anything-v2-small
     """
+    from iibr_core.depth.models.catalog import fetch, known_model, model_here, register
+    from iibr_core.depth.models.known import KNOWN_MODELS
+
     is_published = any(model.name == name for model in KNOWN_MODELS)
     if not is_published and (Path(name).suffix.lower() == ".onnx" or Path(name).exists()):
         copy = register(Path(name))
