@@ -47,7 +47,17 @@ def file_patterns(what: ChoiceOf) -> str:
     return " ".join(f"*.{ending}" for ending in (*endings, *map(str.upper, endings)))
 
 
-class Dialog:
+class _OpenDialog:
+    """A dialog of the system that is open."""
+
+    _dialog: Any
+
+    def close(self) -> None:
+        """Close the dialog; without this, the bundle's destructor waits for the user."""
+        self._dialog.kill()
+
+
+class Dialog(_OpenDialog):
     """An open dialog. what: what it asks for."""
 
     def __init__(self, what: ChoiceOf, beside: str = "") -> None:
@@ -55,17 +65,12 @@ class Dialog:
         from imgui_bundle import portable_file_dialogs as dialogs
 
         self.what = what
-        self._dialog: Any
         start = os.path.join(os.path.dirname(os.path.abspath(beside)), "") if beside else ""
         if what in FOLDER_CHOICES:
             self._dialog = dialogs.select_folder(DIALOG_TITLES[what], start)
         else:
             filters = ["Models" if what == "model" else "Images", file_patterns(what), "All files", "*"]
             self._dialog = dialogs.open_file(DIALOG_TITLES[what], start, filters)
-
-    def close(self) -> None:
-        """Close the dialog; without this, the bundle's destructor waits for the user."""
-        self._dialog.kill()
 
     def answer(self) -> str | None:
         """The path chosen, "" where the user chose none; None while it is open."""
@@ -75,7 +80,7 @@ class Dialog:
         return result if isinstance(result, str) else (result[0] if result else "")
 
 
-class SaveDialog:
+class SaveDialog(_OpenDialog):
     """An open dialog that asks where a file goes, and before one is replaced; or into which folder a folder goes.
     prompt: what asked for it.
     """
@@ -84,16 +89,11 @@ class SaveDialog:
         from imgui_bundle import portable_file_dialogs as dialogs
 
         self.prompt, path = prompt, os.path.abspath(os.path.expanduser(prompt.path))
-        self._dialog: Any
         self._name = os.path.basename(path) if _is_folder_export(prompt) else ""
         if self._name:
             self._dialog = dialogs.select_folder(_title_of(prompt), os.path.dirname(path))
         else:
             self._dialog = dialogs.save_file(_title_of(prompt), path, ["All files", "*"])
-
-    def close(self) -> None:
-        """Close the dialog, as `Dialog.close` does."""
-        self._dialog.kill()
 
     def answer(self) -> str | None:
         """The path chosen, "" where the user chose none; None while it is open."""

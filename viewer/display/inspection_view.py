@@ -262,7 +262,8 @@ class InspectionView:
         """The picture of the snapshot, or its difference from the present one once that is finished."""
         kind, optics = state.inspection.comparison, state.inspection.kept
         if optics is None or kind not in ("kept", "difference"):
-            self._stop_snapshot()
+            if self.is_drawing:
+                self._stop_snapshot()
             return {}
         record = base.generation, base.views, base.previews, optics, size_px, part
         kept = self._snapshot(record, RenderSettings(optics, size_px, part))
