@@ -1,1 +1,1 @@
-"""Measurements, not tests. `make bench` writes docs/speed.md; the text of every module begins with its command."""
+"""Measurements, not tests. README.md lists the programs; the text of each begins with its command."""

@@ -31,7 +31,7 @@ GUIDE_CONTRAST = 0.03
 def guess_depth(photo: Photo) -> DepthEstimate:
     """Return rough inverse depth (H, W) of a photo, finite; 0 everywhere in a photo of one row.
 
-    It orders 86 % of the pairs of points that differ in depth correctly, the height alone 82 % (docs/depth.md).
+    It orders 85 % of the pairs of points that differ in depth correctly, the height alone 82 % (docs/accuracy.md).
     """
     pixels = np.clip(photo.pixels, 0, 1)
     small = resize_picture(pixels, size_within(photo.size, LONGEST_PX))

@@ -203,7 +203,9 @@ class _Search:
         if estimate.meaning == "disparity" or model.is_meaning_known:
             return self.finish(origin, estimate)
         values = MapFile(estimate.values, "floats")
-        depth = orient_map(model.title, values, self.photo, self.choice, estimate.is_metric, estimate.is_metric)
+        depth = orient_map(
+            model.title, values, self.photo, self.choice, estimate.is_metric, is_stated=estimate.is_metric
+        )
         return self.finish(replace(origin, near=depth.near), depth.estimate, depth.notes)
 
     def guess(self) -> PhotoWithDepth:

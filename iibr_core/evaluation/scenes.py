@@ -164,12 +164,16 @@ def _estimates(trial: Trial, choice: DepthChoice, max_pixels: int, fit: ViewFit)
     maps = _with_fitted(kind, found.disparity, fit)
     if kind != "guess":
         guess = _estimate(trial, replace(choice, start="rough", model=None), max_pixels).disparity
-        maps |= dict(list(_with_fitted("guess", guess, fit).items())[1:])
+        maps[f"guess{FITTED}"] = _fitted(guess, fit)
     return maps
 
 
 def _with_fitted(kind: str, disparity: Disparity, fit: ViewFit) -> dict[str, Disparity]:
-    return {kind: disparity, f"{kind}{FITTED}": replace(disparity, values=fit.fitted(disparity.values))}
+    return {kind: disparity, f"{kind}{FITTED}": _fitted(disparity, fit)}
+
+
+def _fitted(disparity: Disparity, fit: ViewFit) -> Disparity:
+    return replace(disparity, values=fit.fitted(disparity.values))
 
 
 def _map_of(trial: Trial, maps: Mapping[int, KnownDisparity], max_pixels: int) -> Disparity | None:

@@ -19,28 +19,21 @@ from iibr_core.depth.choice import DepthChoice
 from iibr_core.evaluation.evaluate import Options, Result, evaluate
 from iibr_core.evaluation.metrics import flip, psnr, ssim
 from iibr_core.evaluation.report import figures_table, render, summary_table, write_report
-from iibr_core.evaluation.scenes import CENTRE_TRIAL, CORNER_TRIAL, read_scene
+from iibr_core.evaluation.scenes import CENTRE_TRIAL, CORNER_TRIAL
 from iibr_core.evaluation.warp import reference_warp
 from iibr_core.formats.images.photo import read_photo
 from iibr_core.formats.images.write import write_image
-from iibr_core.formats.light_fields.multi_view_scene import MultiView
 from iibr_core.method.light_field import generate
 from iibr_core.method.photo_views import PhotoViews
 from iibr_core.types import GridShape, ViewOffset
 from tests.iibr_core.evaluation.test_metrics import networks  # noqa: F401
+from tests.iibr_core.evaluation.test_scenes import UNREFINED, scene_of
 from tests.iibr_core.known_scenes import HEIGHT, WIDTH, disparity_of_square, view_of_square, write_grid
 from tests.iibr_core.lens_scenes import FOLDER
 from tests.iibr_core.scenes import by_index, disparity_of, literal_plan, photo_of
 
 WAYS = ["unchanged photo", "one plane", "plain warp, true map", "iibr, true map"]
 REPORT = ["index.html", "report.json", "report.md"]
-UNREFINED = DepthChoice(refine=False)
-
-
-def scene_of(folder: Path) -> MultiView:
-    scene = read_scene(folder)
-    assert scene is not None
-    return scene
 
 
 def full_db(result: Result) -> dict[str, float]:

@@ -22,7 +22,7 @@ def test_the_blur_of_a_map_is_measured_unless_it_is_exact_or_too_small(sigma, si
 
 
 def parts_blurred(*sigmas: float) -> float:
-    """What is measured of a disc thrice side by side, its map blurred so in each part."""
+    """The blur measured on a disc, three times side by side, whose map is blurred differently in each part."""
     photo, disparity, _ = disc_before_slope(160)
     maps = [blur(np.tile(disparity, (1, 3)), sigma) if sigma else np.tile(disparity, (1, 3)) for sigma in sigmas]
     disparity = np.concatenate([values[:, k * 160 : (k + 1) * 160] for k, values in enumerate(maps)], 1)
