@@ -7,6 +7,7 @@ from typing import Literal
 
 from iibr_core.depth.editing.edits import DepthEdits
 from iibr_core.scenes.scene import Progress, Scene, Source
+from viewer.model.action import Action as VerbAction
 from viewer.model.free_camera import FreeCameraAction
 from viewer.model.state.app_state import DrawReport, Hover
 from viewer.model.state.depth_editing import DepthAction
@@ -223,7 +224,8 @@ class EditsSaved:
 WorkerEvent = SceneOpened | ProgressMade | OpenFailed
 
 Action = (
-    LensAction
+    VerbAction
+    | LensAction
     | MotionAction
     | WorkerEvent
     | PreferencesAction

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import wraps
+from typing import Concatenate, ParamSpec
 
 from iibr_core.beyond.optics import Optics
 from viewer.model.state.app_state import AppState
@@ -11,6 +13,7 @@ from viewer.model.state.history import Edit, History
 from viewer.model.state.motion import Motion
 
 EDITS_KEPT = 200
+P = ParamSpec("P")
 
 
 def edit_of(state: AppState) -> Edit:
@@ -29,6 +32,16 @@ def record_edit(before: AppState, after: AppState, kind: str, always: bool = Fal
     if after.history.gesture != kind:
         past = (*past, edit_of(before))[-EDITS_KEPT:]
     return replace(after, history=History(past, (), kind, kind))
+
+
+def undoable(verb: Callable[Concatenate[AppState, P], AppState]) -> Callable[Concatenate[AppState, P], AppState]:
+    """Return a verb whose edit can be undone. Steps of one gesture by the same verb are one edit."""
+
+    @wraps(verb)
+    def recorded(state: AppState, /, *args: P.args, **kwargs: P.kwargs) -> AppState:
+        return record_edit(state, verb(state, *args, **kwargs), verb.__name__)
+
+    return recorded
 
 
 def end_gesture(state: AppState) -> AppState:

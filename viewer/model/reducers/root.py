@@ -11,6 +11,7 @@ from iibr_core.beyond.optics import Optics
 from iibr_core.gloss.settings import STROKE_RADIUS_LIMITS
 from iibr_core.scenes.lens_limits import clamp, clamp_optics, is_finite
 from iibr_core.scenes.scene import DepthSettings, Progress, Source, is_same_field
+from viewer.model.action import Action as VerbAction
 from viewer.model.actions import (
     Action,
     AskToSave,
@@ -82,6 +83,8 @@ LOST = "Making the views stopped unexpectedly; the picture stays as it is. Open 
 
 def reduce(state: AppState, action: Action) -> AppState:
     """The state after an action. Values that are not finite leave the state as it is, others are clamped."""
+    if isinstance(action, VerbAction):
+        return action.apply(state)
     if isinstance(action, LensAction):
         state = touch(state) if state.awaits_touch else state
         state = replace(state, shows_before=False) if state.shows_before else state

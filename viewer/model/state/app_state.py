@@ -168,6 +168,10 @@ class AppState:
         """As the user wants it; else it gives way to the picture in a narrow window."""
         return self.is_narrow if self.hides_panel is None else self.hides_panel
 
+    def with_task(self, task: Task) -> AppState:
+        """Return the state with one more task for the outside world."""
+        return replace(self, tasks=(*self.tasks, task))
+
     @property
     def has_unsaved_edits(self) -> bool:
         """Whether closing would lose what was done to the depth: no file has it, nor is it kept for the next time."""

@@ -1,0 +1,110 @@
+"""Background work whose newest request wins: frozen requests in, results out, one thread a kind of work.
+
+A request carries all its inputs, so nothing is shared. Heavy imports happen in the thread, so the window comes first.
+"""
+
+from __future__ import annotations
+
+import queue
+import threading
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import Generic, TypeVar
+
+from iibr_core.runtime.work import Cancelled, stoppable
+from iibr_core.types import InputError
+
+MAX_WAITING_RESULTS = 8
+"""Number of results that may wait for the window: enough to keep a thread busy, few enough to need little memory."""
+POST_RETRY_S = 0.02
+
+Request = TypeVar("Request")
+Result = TypeVar("Result")
+Post = Callable[[Result], None]
+Work = Callable[[Request, Post[Result]], None]
+"""Carries out a request and posts its results, in order. Raises InputError; posting raises Cancelled once the request
+is no longer the newest."""
+
+
+@dataclass(frozen=True, eq=False)
+class Failed(Generic[Request]):
+    """A request that failed; message: one line for people."""
+
+    request: Request
+    message: str
+
+
+class Newest(Generic[Request, Result]):
+    """A thread that carries out the newest request. It starts with the first request."""
+
+    def __init__(self, name: str, work: Work[Request, Result], wake: Callable[[], None]) -> None:
+        """wake: called, in the thread, when a result was posted."""
+        self._name, self._work, self._wake = name, work, wake
+        self._number = 0
+        self._requests: queue.SimpleQueue[tuple[int, Request] | None] = queue.SimpleQueue()
+        self._results: queue.Queue[tuple[int, Result | Failed[Request]]] = queue.Queue(MAX_WAITING_RESULTS)
+        self._thread: threading.Thread | None = None
+
+    def submit(self, request: Request) -> None:
+        """Carry out this request instead of all earlier ones."""
+        self.cancel()
+        self._requests.put((self._number, request))
+        if self._thread is None:
+            self._thread = threading.Thread(target=self._run, name=self._name, daemon=True)
+            self._thread.start()
+
+    def cancel(self) -> None:
+        """Stop all requests and drop their results."""
+        self._number += 1
+
+    def next_result(self) -> Result | Failed[Request] | None:
+        """Return the next result of the newest request, None where there is none yet."""
+        while True:
+            try:
+                number, result = self._results.get_nowait()
+            except queue.Empty:
+                return None
+            if number == self._number:
+                return result
+
+    def close(self) -> None:
+        """Stop all requests and wait for the thread to end."""
+        self.cancel()
+        self._requests.put(None)
+        if self._thread is not None:
+            self._thread.join()
+
+    def _run(self) -> None:
+        while (item := self._requests.get()) is not None:
+            self._carry_out(*item)
+
+    def _carry_out(self, number: int, request: Request) -> None:
+        def post(result: Result | Failed[Request]) -> None:
+            self._post(number, result)
+
+        try:
+            with stoppable(lambda: number != self._number):
+                self._work(request, post)
+        except Cancelled:
+            return
+        except Exception as error:  # the only place where an error of the work can still be shown to a person
+            with suppress(Cancelled):
+                post(Failed(request, message_of(error)))
+
+    def _post(self, number: int, result: Result | Failed[Request]) -> None:
+        """Queue a result and wake the window; wait while the queue is full. Raises Cancelled."""
+        while number == self._number:
+            try:
+                self._results.put((number, result), timeout=POST_RETRY_S)
+            except queue.Full:
+                continue
+            self._wake()
+            return
+        raise Cancelled
+
+
+def message_of(error: Exception) -> str:
+    """Return an error as one line for people: an input error as it is, any other with its kind."""
+    text = " ".join(str(error).split())
+    return text if isinstance(error, InputError) else f"{type(error).__name__}: {text or 'no message'}"

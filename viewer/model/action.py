@@ -1,0 +1,35 @@
+"""Actions: a verb of the model, which is a function of the state, and its arguments."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Concatenate, ParamSpec
+
+from viewer.model.state.app_state import AppState
+from viewer.model.state.tasks import Task
+
+P = ParamSpec("P")
+
+
+@dataclass(frozen=True)
+class Action:
+    """A change of the state. Actions with the same verb and arguments are equal."""
+
+    verb: Callable[..., AppState]
+    args: tuple[Any, ...] = ()
+    kwargs: tuple[tuple[str, Any], ...] = ()
+
+    def apply(self, state: AppState) -> AppState:
+        """Return the state after this action."""
+        return self.verb(state, *self.args, **dict(self.kwargs))
+
+
+def do(verb: Callable[Concatenate[AppState, P], AppState], *args: P.args, **kwargs: P.kwargs) -> Action:
+    """Return the action that calls `verb(state, *args, **kwargs)`. A type checker compares the arguments."""
+    return Action(verb, args, tuple(sorted(kwargs.items())))
+
+
+def ask(state: AppState, task: Task) -> AppState:
+    """Ask the outside world to carry out a task; the loop takes it up in its next turn."""
+    return state.with_task(task)
