@@ -8,7 +8,6 @@ from __future__ import annotations
 import csv
 import logging
 import os
-import shutil
 import signal
 import traceback
 from collections import Counter, deque
@@ -34,7 +33,7 @@ from iibr_core.exports.kinds import (
 from iibr_core.exports.photo_folder import list_photos
 from iibr_core.exports.source import OpenDrawn, open_for_export, write_export
 from iibr_core.formats.files import reason_of
-from iibr_core.formats.outputs import TEMPORARY, check_output_folder
+from iibr_core.formats.outputs import check_output_folder, remove_leftovers
 from iibr_core.formats.quilts import TAG
 from iibr_core.runtime import machine
 from iibr_core.runtime.work import report_progress
@@ -176,7 +175,8 @@ def run_batch(
                     _write_failure(folder, outcome)
                 report_progress(count.written + count.failed, len(tasks) - len(finished), "exporting")
     finally:
-        _remove_unfinished({task.target.parent for task in tasks})
+        for place in {task.target.parent for task in tasks}:
+            remove_leftovers(place)
     write_gallery = gallery_of(EXPORTS[settings.kind])
     if write_gallery:
         write_gallery(folder, [os.path.relpath(output, folder) for output in outputs])
@@ -329,10 +329,3 @@ def _write_failure(folder: Path, outcome: Outcome) -> None:
     if outcome.trace:
         with open(folder / LOG, "a", encoding="utf-8", errors="surrogateescape") as file:
             file.write(f"{photo}\n{outcome.trace}\n")
-
-
-def _remove_unfinished(folders: set[Path]) -> None:
-    """Remove the temporary folders that killed processes left."""
-    for folder in folders:
-        for path in folder.glob(f"{TEMPORARY}*"):
-            shutil.rmtree(path, ignore_errors=True)

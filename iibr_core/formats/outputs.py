@@ -6,17 +6,22 @@ Inputs are never overwritten; an output that exists is replaced only where that 
 from __future__ import annotations
 
 import os
+import platform
 import re
+import shutil
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from glob import escape
 from pathlib import Path
 from tempfile import TemporaryDirectory
+
+import psutil
 
 from iibr_core.formats.files import reason_of
 from iibr_core.types import InputError
 
-TEMPORARY = ".iibr-"
-"""Start of the names of unfinished outputs."""
+TEMPORARY = f".iibr-{platform.node()}-"
+"""Start of the names of unfinished outputs of this machine; the number of the process follows."""
 
 
 class AlreadyThereError(InputError):
@@ -74,6 +79,14 @@ def make_folder(folder: Path) -> None:
         raise InputError(f"{folder}: cannot be created ({reason_of(error)}); choose another place") from error
 
 
+def remove_leftovers(folder: Path) -> None:
+    """Remove the unfinished outputs that killed processes of this machine left in a folder."""
+    for path in folder.glob(f"{escape(TEMPORARY)}*"):
+        number = path.name.removeprefix(TEMPORARY).partition("-")[0]
+        if number.isdecimal() and not psutil.pid_exists(int(number)):
+            shutil.rmtree(path, ignore_errors=True)
+
+
 @contextmanager
 def write_file(path: Path) -> Iterator[Path]:
     """Yield the name of a file to write, in a hidden folder beside `path`; it is renamed when the block ends well."""
@@ -101,8 +114,10 @@ def write_folder(folder: Path) -> Iterator[Path]:
 @contextmanager
 def _beside(path: Path, real: Path) -> Iterator[Path]:
     """Yield a hidden temporary folder beside an output. Errors that name files in it name the output instead."""
+    remove_leftovers(real.parent)
+    prefix = f"{TEMPORARY}{os.getpid()}-"
     try:
-        with TemporaryDirectory(dir=real.parent, prefix=TEMPORARY, ignore_cleanup_errors=True) as scratch:
+        with TemporaryDirectory(dir=real.parent, prefix=prefix, ignore_cleanup_errors=True) as scratch:
             yield Path(scratch)
     except InputError as error:
         message = str(error)

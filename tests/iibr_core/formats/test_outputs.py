@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import subprocess
+import sys
 from contextlib import suppress
 from pathlib import Path
 
@@ -75,6 +77,17 @@ def test_half_a_file_leaves_what_was_there_and_nothing_beside_it(tmp_path: Path)
     assert path.read_text() == "after"
     assert list(tmp_path.iterdir()) == [path]
     assert path.stat().st_mode & 0o777 == 0o666 & ~_umask()
+
+
+def test_the_next_output_of_a_folder_removes_what_a_killed_process_left(tmp_path: Path) -> None:
+    code = "import os, sys; from pathlib import Path; from iibr_core.formats.outputs import write_file\n"
+    code += "with write_file(Path(sys.argv[1])) as path: path.write_text('half'); os.kill(os.getpid(), 9)"
+    with write_file(tmp_path / "a.txt") as unfinished:
+        subprocess.run([sys.executable, "-c", code, tmp_path / "b.txt"], check=False)
+        unfinished.write_text("of a process that lives")
+        with write_file(tmp_path / "c.txt") as other:
+            other.write_text("at the same time")
+    assert {path.name for path in tmp_path.iterdir()} == {"a.txt", "c.txt"}
 
 
 def _umask() -> int:

@@ -258,4 +258,5 @@ def test_a_program_that_is_killed_leaves_what_was_there_and_runs_again(folder: P
     assert contents(folder / "field") == before
     assert len(list(read_views(open_light_field(folder / "field"))[1])) == 1
     assert run_forked(*small, "--force", cwd=folder).returncode == 0
+    assert not list(folder.glob(".iibr-*")), "the next run removes what the killed one left"
     assert contents(folder / "field").keys() == before.keys()

@@ -47,6 +47,7 @@ def test_the_folder_of_the_last_is_proposed_again() -> None:
     assert usual_export_path(STATE, "gif") == "/photos/bike-iibr.gif"
     assert usual_export_path(STATE, "anaglyph") == "/photos/bike-anaglyph.png"
     assert usual_export_path(STATE, "hci") == "/photos/bike-hci"
+    assert usual_export_path(STATE, "eslf") == "/photos/bike-iibr_eslf.png"
     assert STATE.scene is not None
     plan = ScenePlan(STATE.scene.grid, 1.0, 0.0, (-2.0, 3.0), 0.1, True, 0, 0, ())
     photo = replace(STATE, scene=replace(STATE.scene, plan=plan))
@@ -84,6 +85,8 @@ def test_another_kind_keeps_the_name_that_was_typed() -> None:
         ("depth", "a_depth.pfm", "a_depth.pfm"),
         ("depth", "a.pfm", "a_depth.pfm"),
         ("hci", "field", "field"),
+        ("eslf", "a", "a_eslf.png"),
+        ("eslf", "a_eslf", "a_eslf.png"),
     ],
 )
 def test_a_name_is_written_as_typed_but_where_it_must_say_what_is_in_it(kind: str, typed: str, written: str) -> None:

@@ -37,8 +37,7 @@ def usual_export_path(state: AppState, name: str) -> str:
     assert state.scene is not None
     kind = EXPORTS[name]
     ending = kind.endings[0] if kind.endings else ""
-    is_plain = ending == f".{name}"  # the ending names the kind
-    return _place_of(state, f"{state.scene.name}-{'iibr' if is_plain else name}{ending}")
+    return _place_of(state, f"{state.scene.name}-{'iibr' if name in ending else name}{ending}")
 
 
 def as_other_kind(state: AppState, prompt: ExportPrompt, name: str) -> ExportPrompt:
@@ -60,7 +59,8 @@ def written_path(kind: ExportKind, typed: str, scene: Scene, options: ExportOpti
     if not path.name:
         raise InputError("There is no name yet: type one, or press Browse…")
     if kind.endings and not path.suffix:
-        path = path.with_name(f"{path.name}{kind.endings[0]}")
+        tag = kind.endings[0].partition(".")[0]
+        path = path.with_name(f"{path.name.removesuffix(tag)}{kind.endings[0]}")
     return export_path(kind, path, scene, options)
 
 
