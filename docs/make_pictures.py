@@ -20,7 +20,7 @@ from iibr_core.evaluation.warp import reference_warp
 from iibr_core.method.photo_views import PhotoViews
 from iibr_core.scenes.scene import Source
 from iibr_core.types import FloatImage, ViewOffset
-from viewer.app.headless import HeadlessViewer
+from viewer.display.offscreen import OffscreenScene
 from viewer.model.actions import DismissNotice, SetHover
 from viewer.model.state.app_state import Hover
 from viewer.model.state.inspection import SetInspection, SetOverlay
@@ -51,7 +51,7 @@ def main() -> None:
 
 def screenshot() -> FloatImage:
     """Return the window: seen from the left, focused on the tank, wide open with seven blades."""
-    with HeadlessViewer() as viewer:
+    with OffscreenScene() as viewer:
         open_demo(viewer)
         viewer.do(MoveEye(ViewOffset(0.5, -1.5)))
         tank = pointer_on_tank(viewer)
@@ -63,21 +63,21 @@ def screenshot() -> FloatImage:
 
 def inspection() -> FloatImage:
     """Return the window with disparity over the picture, EPIs through the pointer and values under it."""
-    with HeadlessViewer() as viewer:
+    with OffscreenScene() as viewer:
         open_demo(viewer, "inspect")
         viewer.do(SetAperture(0.0), SetInspection("shows_epis", True), SetInspection("shows_values", True))
         viewer.do(SetOverlay("disparity"), SetHover(pointer_on_tank(viewer)))
         return viewer.screen(WINDOW) / np.float32(255)
 
 
-def open_demo(viewer: HeadlessViewer, *sections: Section) -> None:
+def open_demo(viewer: OffscreenScene, *sections: Section) -> None:
     """Open the demo photo with these sections of the panel open, and no others."""
     viewer.open(Source(str(DEMO)))
     preferences = replace(viewer.state.preferences, open_sections=with_sections((), *sections))
     viewer.state = replace(viewer.state, preferences=preferences)
 
 
-def pointer_on_tank(viewer: HeadlessViewer) -> Hover:
+def pointer_on_tank(viewer: OffscreenScene) -> Hover:
     """Return the pointer on the motorcycle's tank."""
     scene = viewer.state.scene
     assert scene is not None

@@ -12,7 +12,7 @@ from pathlib import Path
 
 PRELOADED = (
     "viewer.cli.main",
-    "viewer.app.headless",
+    "viewer.display.offscreen",
     "iibr_core.depth.search",
     "iibr_core.method.light_field",
     "iibr_core.evaluation.evaluate",

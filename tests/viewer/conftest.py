@@ -18,8 +18,8 @@ from iibr_core.types import GridShape, InputError
 from tests.xvfb import private_display
 
 if TYPE_CHECKING:
-    from viewer.app.headless import HeadlessViewer
     from viewer.app.main_loop import App
+    from viewer.display.offscreen import OffscreenScene
     from viewer.model.state.preferences import Section
 
 WIDTH, HEIGHT = 96, 64
@@ -53,17 +53,17 @@ def write_scene(folder: Path, name: str = "scene", seed: int = 0) -> Path:
 
 
 @contextmanager
-def headless_with_scene(folder: Path, *open_sections: Section) -> Iterator[HeadlessViewer]:
+def headless_with_scene(folder: Path, *open_sections: Section) -> Iterator[OffscreenScene]:
     """A scene opened without a window, its notices gone; open_sections: of the panel, with those that they lie in, the
     ones that are used most if none. The panel is there however narrow the window is.
     """
     from iibr_core.scenes.scene import Source
-    from viewer.app.headless import HeadlessViewer
+    from viewer.display.offscreen import OffscreenScene
     from viewer.model.actions import DismissNotice
     from viewer.model.state.preferences import with_sections
 
     try:
-        viewer = HeadlessViewer("egl")
+        viewer = OffscreenScene("egl")
     except InputError as error:
         pytest.skip(str(error))
     with viewer:
@@ -76,7 +76,7 @@ def headless_with_scene(folder: Path, *open_sections: Section) -> Iterator[Headl
 
 
 @pytest.fixture
-def viewer(opened: HeadlessViewer) -> Iterator[HeadlessViewer]:
+def viewer(opened: OffscreenScene) -> Iterator[OffscreenScene]:
     """What a module's `opened` gives, its state put back after every test."""
     before = opened.state
     yield opened

@@ -34,10 +34,10 @@ from iibr_core.types import (
 )
 from tests.viewer.background.test_scene_worker import Desk
 from tests.viewer.conftest import write_scene
-from viewer.app.headless import HeadlessViewer
 from viewer.app.image_export import export_picture, shot_of
 from viewer.app.preferences_store import load_preferences, store_preferences
 from viewer.background.job_threads import Failed
+from viewer.display.offscreen import OffscreenScene
 from viewer.model.saved_settings import read_settings
 from viewer.model.state.app_state import AppState
 from viewer.model.state.optics_actions import MoveEye, SetAperture
@@ -167,9 +167,9 @@ def test_photos_of_any_size_and_depth_become_scenes(tmp_path: Path, size: tuple[
 
 
 @pytest.fixture
-def viewer(tmp_path: Path) -> Iterator[HeadlessViewer]:
+def viewer(tmp_path: Path) -> Iterator[OffscreenScene]:
     try:
-        made = HeadlessViewer("egl")
+        made = OffscreenScene("egl")
     except InputError as error:
         pytest.skip(str(error))
     with made:
@@ -178,7 +178,7 @@ def viewer(tmp_path: Path) -> Iterator[HeadlessViewer]:
 
 
 @pytest.mark.parametrize("name", ["a.png", "a.exr", "a.jpg", "a.tif"])
-def test_a_full_disk_while_a_picture_is_saved(viewer: HeadlessViewer, tmp_path: Path, name: str) -> None:
+def test_a_full_disk_while_a_picture_is_saved(viewer: OffscreenScene, tmp_path: Path, name: str) -> None:
     """One line, nothing half-written, what was there stays; with room again the same picture is saved."""
     path = tmp_path / name
     path.write_bytes(b"mine")
@@ -193,7 +193,7 @@ def test_a_full_disk_while_a_picture_is_saved(viewer: HeadlessViewer, tmp_path: 
     assert read_settings(path).size_px == (96, 64)
 
 
-def test_the_photo_may_go_once_it_is_open(viewer: HeadlessViewer, tmp_path: Path) -> None:
+def test_the_photo_may_go_once_it_is_open(viewer: OffscreenScene, tmp_path: Path) -> None:
     before = viewer.picture()
     (tmp_path / "scene.png").unlink()
     (tmp_path / "scene_disparity.npy").unlink()

@@ -14,7 +14,7 @@ from iibr_core.types import GridShape, ViewOffset
 from tests.browser import Pipe, Tab, open_browser
 from tests.viewer.conftest import HEIGHT, WIDTH, write_scene
 from tests.web.conftest import canvas, export, press, set_lens, slide, wait_until_still
-from viewer.app.headless import HeadlessViewer
+from viewer.display.offscreen import OffscreenScene
 from viewer.model.state.optics_actions import MoveEye, SetAperture, SetFocus
 
 SETTINGS = (
@@ -56,7 +56,7 @@ def psnr(one: np.ndarray, other: np.ndarray) -> float:
 
 
 def test_the_canvas_is_the_desktops_picture(shown: Tab, scene: Path) -> None:
-    with HeadlessViewer("egl") as viewer:
+    with OffscreenScene("egl") as viewer:
         viewer.open(Source(str(scene), grid=GridShape(3, 3)))
         for s, t, focus, aperture in SETTINGS:
             viewer.do(MoveEye(ViewOffset(t, s)), SetFocus(focus), SetAperture(aperture))
@@ -69,7 +69,7 @@ def test_the_canvas_is_the_desktops_picture(shown: Tab, scene: Path) -> None:
 
 
 def test_between_views_there_is_no_seam_that_the_desktop_has_not(shown: Tab, scene: Path) -> None:
-    with HeadlessViewer("egl") as viewer:
+    with OffscreenScene("egl") as viewer:
         viewer.open(Source(str(scene), grid=GridShape(3, 3)))
         for s in np.linspace(0, 1, 9):
             viewer.do(MoveEye(ViewOffset(0.5 * s, s)), SetAperture(0.0))

@@ -8,14 +8,14 @@ from numpy.typing import NDArray
 from iibr_core.scenes.lens_limits import aperture_limit
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import ViewOffset
-from viewer.app.headless import HeadlessViewer
+from viewer.display.offscreen import OffscreenScene
 from viewer.model.state.optics_actions import MoveEye, ResetOptics, SetAperture, SetFocus
 
 TILE_WIDTH = 480
 GAP = 8
 
 
-def contact_sheet(viewer: HeadlessViewer) -> NDArray[np.uint8]:
+def contact_sheet(viewer: OffscreenScene) -> NDArray[np.uint8]:
     """Two rows of three: the viewpoint from left to right, and the focus from near to far with an open aperture."""
     scene = viewer.state.scene
     assert scene is not None

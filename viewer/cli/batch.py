@@ -73,7 +73,7 @@ def batch(
     lens = LensChoice(None, focus, aperture, gloss.gloss if gloss else None)
     open_drawn: OpenDrawn | None = None
     if to.is_drawn:
-        from viewer.display.scene_drawer import open_drawn
+        from viewer.display.offscreen import open_drawn
     settings = BatchSettings(name, source, photo.depth_strength, kind_options.options(), lens, open_drawn)
     photos = photos_in(folders)
     if not photos:

@@ -43,17 +43,17 @@ def demo() -> None:
 def _demo_pictures(source: Source, why: str) -> None:
     """why: there is no window, for people."""
     from viewer.app.contact_sheet import contact_sheet
-    from viewer.app.headless import HeadlessViewer
     from viewer.app.image_export import export_image
+    from viewer.display.offscreen import OffscreenScene
 
     window, views = DEMO_FOLDER / "demo.png", DEMO_FOLDER / "demo-views.png"
     check_output_folder(DEMO_FOLDER, inputs_of(source), may_replace=True)
     make_folder(DEMO_FOLDER)
     print(f"{why}. Rendering without one.")
-    with HeadlessViewer() as viewer:
+    with OffscreenScene() as viewer:
         with show_progress("reading"):
             viewer.open(source)
-        export_image(window, viewer.screen(SCREEN_SIZE) if viewer.has_panels else viewer.picture())
+        export_image(window, viewer.screen(SCREEN_SIZE) if viewer.gl.backend != "osmesa" else viewer.picture())
         export_image(views, contact_sheet(viewer))
     print(f"{window}: the viewer's window")
     print(f"{views}: viewpoints above, focus from near to far below")

@@ -111,9 +111,9 @@ def _carry_out(
     open_drawn: OpenDrawn | None = None
     with ExitStack() as stack:
         if kind.is_drawn:
-            from viewer.display.scene_drawer import SceneDrawer
+            from viewer.display.offscreen import OffscreenScene
 
-            open_drawn = stack.enter_context(SceneDrawer()).open
+            open_drawn = stack.enter_context(OffscreenScene()).open_for_export
         with show_progress("reading"):
             opened = open_for_export(kind, options, source, depth_strength, lens.choice, on_ready, open_drawn)
         with show_progress("exporting"):

@@ -33,9 +33,10 @@ from viewer.cli.shared_options import (
 from viewer.cli.terminal import print_depth, print_notes, show_progress
 
 if TYPE_CHECKING:
+    from iibr_core.beyond.optics import Optics
     from iibr_core.depth.choice import DepthOrigin
-    from iibr_core.scenes.scene import Source
-    from viewer.app.headless import HeadlessViewer
+    from iibr_core.scenes.scene import Scene, Source
+    from viewer.display.offscreen import OffscreenScene
     from viewer.model.actions import Action
 
 
@@ -172,7 +173,7 @@ def _shot_like(shot: _Shot, like: Path, given: Collection[str], ui: bool) -> _Sh
     )
 
 
-def _size_of(shot: _Shot, viewer: HeadlessViewer) -> ScreenSize | None:
+def _size_of(shot: _Shot, viewer: OffscreenScene) -> ScreenSize | None:
     """Of the picture. Raises InputError where all of the photo's pixels are asked for and cannot be drawn."""
     from iibr_core.exports.full_picture import require_full
 
@@ -181,30 +182,32 @@ def _size_of(shot: _Shot, viewer: HeadlessViewer) -> ScreenSize | None:
     if viewer.state.optics.gloss is not None:
         raise InputError("--full: gloss is drawn from the views, which may be smaller; leave one of both out")
     require_full(viewer.scene)
-    return viewer.own_size
+    return viewer.scene.own_size or viewer.scene.size
+
+
+def _pictures_of(scene: Scene, shot: _Shot, viewer: OffscreenScene, ui: bool) -> Collection[Optics] | None:
+    """Set the lens; return the optics of the picture if it shows views, None if it shows the panels, too."""
+    shot.lens.require_within(scene)
+    viewer.do(*shot.actions, *shot.lens.actions())
+    if ui:
+        return None
+    return () if viewer.draws_own_pixels(_size_of(shot, viewer)) else (viewer.state.optics,)
 
 
 def _write(shot: _Shot, output: Path, ui: bool, backend: Backend) -> tuple[tuple[str, ...], DepthOrigin | None]:
     """Draw the picture and write it; returns what is to be said of the scene, and where its depth came from."""
     from iibr_core.formats.images.photo import MADE_SMALLER
-    from viewer.app.headless import HeadlessViewer
     from viewer.app.image_export import export_image, export_picture, shot_of
+    from viewer.display.offscreen import OffscreenScene
 
-    with HeadlessViewer(backend.value) as viewer:
-        if ui and not viewer.has_panels:
+    with OffscreenScene(backend.value) as viewer:
+        if ui and viewer.gl.backend == "osmesa":
             raise InputError("--ui: the panels cannot be drawn through OSMesa; use EGL (install libegl1), or no --ui")
         with show_progress("reading"):
-            viewer.open_scene(
-                shot.source,
-                shot.depth_strength,
-                shot.edits,
-                on_ready=shot.lens.require_within,
+            scene = viewer.open(
+                shot.source, shot.depth_strength, shot.edits, lambda scene: _pictures_of(scene, shot, viewer, ui)
             )
-            viewer.do(*shot.actions, *shot.lens.actions())
             size = _size_of(shot, viewer)
-            if ui or viewer.needs_views(size):
-                viewer.make_views(only_seen=not ui)
-            scene = viewer.scene
             saved = shot_of(viewer.state, size or scene.size, shot.form)
         with show_progress("drawing"):
             if ui:

@@ -15,15 +15,15 @@ from iibr_core.scenes.lens_limits import LensChoice
 from iibr_core.scenes.scene import Source
 from iibr_core.types import GridShape, InputError
 from tests.viewer.conftest import write_scene
-from viewer.display.scene_drawer import SceneDrawer
+from viewer.display.offscreen import OffscreenScene
 
 
 @pytest.fixture(scope="package")
 def opened(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ExportSource]:
     source = Source(str(write_scene(tmp_path_factory.mktemp("exports"))), grid=GridShape(3, 3))
-    with SceneDrawer() as drawer:
+    with OffscreenScene() as drawer:
         try:
-            opened = drawer.open(source, 1.0, LensChoice(), lambda scene: None)
+            opened = drawer.open_for_export(source, 1.0, LensChoice(), lambda scene: None)
         except InputError as error:
             pytest.skip(str(error))
         yield opened

@@ -11,13 +11,13 @@ from typing import Any
 import pytest
 
 from iibr_core.exports.kinds import EXPORTS, ExportOptions, export_path
-from iibr_core.exports.source import ExportSource, open_for_export, write_export
+from iibr_core.exports.source import ExportSource, OpenDrawn, open_for_export, write_export
 from iibr_core.scenes import opening, photo
 from iibr_core.scenes.lens_limits import LensChoice
 from iibr_core.scenes.scene import Source
 from iibr_core.types import GridShape, InputError, ViewUpdate
 from tests.viewer.conftest import write_scene
-from viewer.display.scene_drawer import SceneDrawer
+from viewer.display.offscreen import OffscreenScene
 
 OF_A_ROW, OF_A_LENS = 4, 20
 FEW = {"frames": 5}
@@ -78,27 +78,29 @@ def test_an_export_makes_only_the_views_that_it_shows(
     source, chosen = Source(str(write_scene(tmp_path)), grid=GridShape(5, 5)), ExportOptions(**options)
     lens = LensChoice(aperture=aperture)
 
-    def export(name: str, drawer: SceneDrawer) -> dict[str, str]:
+    def export(name: str, open_drawn: OpenDrawn) -> dict[str, str]:
         new_views.clear()
         try:
-            opened = open_for_export(EXPORTS[kind], chosen, source, 1.0, lens, lambda scene: None, drawer.open)
+            opened = open_for_export(
+                EXPORTS[kind], chosen, source, 1.0, lens, lambda scene: None, drawer.open_for_export
+            )
         except InputError as error:
             pytest.skip(str(error))
         target = export_path(EXPORTS[kind], tmp_path / f"{name}{(*EXPORTS[kind].endings, '')[0]}", opened.scene, chosen)
         write_export(EXPORTS[kind], target, opened, chosen)
         return written(target)
 
-    with SceneDrawer() as drawer:
-        few = export("few", drawer)
+    with OffscreenScene() as drawer:
+        few = export("few", drawer.open_for_export)
         assert len(new_views) <= max_views
         make_all(monkeypatch)
-        every = export("all", drawer)
+        every = export("all", drawer.open_for_export)
         assert len(new_views) == 24 or kind == "disparity"
     assert few == every
 
 
 def make_all(monkeypatch: pytest.MonkeyPatch) -> None:
     """Make all views from now on."""
-    monkeypatch.setattr("viewer.display.scene_drawer.views_seen_by", lambda pictures, grid: None)
+    monkeypatch.setattr("viewer.display.offscreen.views_seen_by", lambda pictures, grid: None)
     views = ExportSource.views
     monkeypatch.setattr(ExportSource, "views", lambda self, *given, wanted=None, **named: views(self, *given, **named))

@@ -16,10 +16,10 @@ from iibr_core.formats.images.picture_kinds import KINDS, PictureFormat, is_floa
 from iibr_core.scenes.scene import Source
 from iibr_core.types import GridShape, InputError, ViewOffset
 from tests.viewer.conftest import HEIGHT, WIDTH, headless_with_scene
-from viewer.app.headless import HeadlessViewer
 from viewer.app.image_export import export_picture, shot_of
 from viewer.app.job_queue import JobQueue
 from viewer.app.picture_saver import add_save
+from viewer.display.offscreen import OffscreenScene
 from viewer.model.actions import Action, EditsSaved, Notify
 from viewer.model.saved_settings import read_settings
 from viewer.model.state.jobs import JobsChanged
@@ -41,9 +41,9 @@ def photo(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def opened(photo: Path) -> Iterator[HeadlessViewer]:
+def opened(photo: Path) -> Iterator[OffscreenScene]:
     try:
-        viewer = HeadlessViewer("egl")
+        viewer = OffscreenScene("egl")
     except InputError as error:
         pytest.skip(str(error))
     with viewer:
@@ -52,13 +52,13 @@ def opened(photo: Path) -> Iterator[HeadlessViewer]:
         yield viewer
 
 
-def saved(viewer: HeadlessViewer, path: Path, size_px: tuple[int, int]) -> np.ndarray:
+def saved(viewer: OffscreenScene, path: Path, size_px: tuple[int, int]) -> np.ndarray:
     shot = shot_of(viewer.state, size_px, PictureFormat())
     export_picture(path, viewer.picture(size_px, is_float(path), shot.color_space), shot)
     return np.asarray(oiio.ImageBuf(str(path)).get_pixels(oiio.FLOAT))[..., :3]
 
 
-def test_exr_holds_light_finer_than_png(opened: HeadlessViewer, tmp_path: Path) -> None:
+def test_exr_holds_light_finer_than_png(opened: OffscreenScene, tmp_path: Path) -> None:
     png = saved(opened, tmp_path / "a.png", (WIDTH, HEIGHT)) * 255
     light = saved(opened, tmp_path / "a.exr", (WIDTH, HEIGHT))
     assert oiio.ImageBuf(str(tmp_path / "a.exr")).spec().format == oiio.FLOAT
@@ -68,7 +68,7 @@ def test_exr_holds_light_finer_than_png(opened: HeadlessViewer, tmp_path: Path) 
 
 
 @pytest.mark.parametrize("name", [f"a{ending}" for ending in KINDS])
-def test_settings_are_inside(opened: HeadlessViewer, tmp_path: Path, name: str) -> None:
+def test_settings_are_inside(opened: OffscreenScene, tmp_path: Path, name: str) -> None:
     saved(opened, tmp_path / name, (70, 50))
     settings = read_settings(tmp_path / name)
     assert settings.optics == opened.state.optics
@@ -76,18 +76,18 @@ def test_settings_are_inside(opened: HeadlessViewer, tmp_path: Path, name: str) 
 
 
 def test_pictures_beyond_the_graphics_cards_limit_are_drawn_in_parts(
-    opened: HeadlessViewer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    opened: OffscreenScene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     large = 4 * WIDTH, 4 * HEIGHT
     at_once = saved(opened, tmp_path / "once.png", large) * 255
-    monkeypatch.setattr(opened._gl, "max_texture_size", 192)
+    monkeypatch.setattr(opened.gl, "max_texture_size", 192)
     in_parts = saved(opened, tmp_path / "parts.png", large) * 255
     assert in_parts.shape == (4 * HEIGHT, 4 * WIDTH, 3)
     assert np.mean(np.abs(in_parts - at_once).max(-1) > 3) < 0.005
 
 
-def test_the_window_keeps_its_own_picture(opened: HeadlessViewer) -> None:
-    scene_view, size_px = opened._scene_view, (WIDTH, HEIGHT)
+def test_the_window_keeps_its_own_picture(opened: OffscreenScene) -> None:
+    scene_view, size_px = opened.view, (WIDTH, HEIGHT)
     scene_view.converge(opened.state, size_px)
     shown, drawn = scene_view.renderer.read_image(), scene_view.pictures_drawn
     scene_view.renderer.converged_picture(RenderSettings(opened.state.optics, (40, 30)))
@@ -97,7 +97,7 @@ def test_the_window_keeps_its_own_picture(opened: HeadlessViewer) -> None:
     assert np.array_equal(scene_view.renderer.read_image(), shown)
 
 
-def test_a_place_that_cannot_be_written_is_told(opened: HeadlessViewer, tmp_path: Path) -> None:
+def test_a_place_that_cannot_be_written_is_told(opened: OffscreenScene, tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"missing-folder.* does not exist"):
         saved(opened, tmp_path / "missing-folder" / "a.png", (8, 8))
 
@@ -106,7 +106,7 @@ def test_a_picture_is_as_it_was_when_edited_depth_is_shown_meanwhile(tmp_path: P
     out = tmp_path / "out.png"
     with headless_with_scene(tmp_path) as viewer:
         viewer.do(MoveEye(ViewOffset(0.3, -0.7)))
-        scene_view, state, woken = viewer._scene_view, viewer.state, threading.Event()
+        scene_view, state, woken = viewer.view, viewer.state, threading.Event()
         expected = scene_view.renderer.converged_picture(RenderSettings(state.optics, (90, 60)))
         jobs = JobQueue(scene_view, woken.set)
         actions: list[Action] = []

@@ -18,8 +18,8 @@ from iibr_core.scenes import opening
 from iibr_core.scenes.scene import SceneReady, SceneRequest, Source, ViewReady
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import Driver, Opener, rests, write_scene
-from viewer.app.headless import HeadlessViewer
 from viewer.app.preferences_store import load_preferences
+from viewer.display.offscreen import OffscreenScene
 from viewer.model.actions import DoTask, OpenPath, ShowPrompt, StopWork
 from viewer.model.saved_settings import read_settings
 from viewer.model.state.app_state import AppState
@@ -48,7 +48,7 @@ def test_a_saved_picture_can_be_taken_again_without_the_window(
     assert settings.optics == viewer.app.state.optics
     assert settings.size_px == (96, 64)
     viewer.until_idle()
-    with HeadlessViewer("egl") as again:
+    with OffscreenScene("egl") as again:
         again.open(dataclasses.replace(settings.source, path=str(photo_path)), settings.depth_strength)
         again.do(MoveEye(settings.optics.eye), SetAperture(settings.optics.aperture_diameter))
         difference = np.abs(again.picture(settings.size_px) / 255 - read_photo(out).pixels)

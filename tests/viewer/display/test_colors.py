@@ -14,8 +14,8 @@ from iibr_core.formats.images.picture_kinds import PictureFormat
 from iibr_core.scenes.scene import Source
 from iibr_core.types import DISPLAY_P3, SRGB, ViewOffset
 from tests.iibr_core.formats.test_color_profile import converted, profile_bytes
-from viewer.app.headless import HeadlessViewer
 from viewer.app.image_export import export_picture, shot_of
+from viewer.display.offscreen import OffscreenScene
 from viewer.model.state.optics_actions import MoveEye, SetAperture
 
 PATCHES = ((200, 80, 60), (255, 0, 0), (0, 255, 0), (20, 30, 250), (128, 128, 128), (255, 255, 255))
@@ -38,34 +38,32 @@ def middles(picture):
 
 @pytest.mark.parametrize("eye", [ViewOffset(0.0, 0.0), ViewOffset(0.5, 0.25)], ids=str)
 def test_wide_colours_keep_their_numbers_and_are_shown_as_srgb(tmp_path, eye):
-    with HeadlessViewer() as viewer:
+    with OffscreenScene() as viewer:
         viewer.open(photo_of_patches(tmp_path / "p3.png", icc_profile=profile_bytes()))
         viewer.do(MoveEye(eye), SetAperture(2.0))
         assert viewer.state.scene.color_space == DISPLAY_P3
         assert np.abs(middles(viewer.picture()) - IN_SRGB).max() <= 2
         size = viewer.state.scene.size
-        kept = viewer._scene_view.renderer.converged_picture(
-            RenderSettings(viewer.state.optics, size, color_space=DISPLAY_P3)
-        )
+        kept = viewer.view.renderer.converged_picture(RenderSettings(viewer.state.optics, size, color_space=DISPLAY_P3))
         assert np.abs(middles(kept) - PATCHES).max() <= 1
         light = middles(
-            viewer._scene_view.renderer.converged_picture(RenderSettings(viewer.state.optics, size, is_linear=True))
+            viewer.view.renderer.converged_picture(RenderSettings(viewer.state.optics, size, is_linear=True))
         )
         assert light.min() < -0.01, "light that sRGB lacks is not cut off where nothing asks for it"
-        stored = viewer._inspection_view._passes.read_view(viewer._scene_view.renderer.field, 0, 0)
+        stored = viewer.inspection._passes.read_view(viewer.view.renderer.field, 0, 0)
         assert np.abs(middles(stored) - IN_SRGB).max() <= 3
 
 
 def test_wide_colours_keep_their_numbers_at_the_photos_own_size(tmp_path):
     photo = photo_of_patches(tmp_path / "p3.png", icc_profile=profile_bytes())
-    with HeadlessViewer() as viewer:
+    with OffscreenScene() as viewer:
         viewer.open(replace(photo, max_pixels=SIDE * SIDE))
-        assert viewer.draws_own_pixels(viewer.own_size)
-        assert np.abs(middles(viewer.picture(viewer.own_size, color_space=DISPLAY_P3)) - PATCHES).max() <= 1
+        assert viewer.draws_own_pixels(viewer.scene.own_size)
+        assert np.abs(middles(viewer.picture(viewer.scene.own_size, color_space=DISPLAY_P3)) - PATCHES).max() <= 1
 
 
 def test_srgb_photos_are_not_touched(tmp_path):
-    with HeadlessViewer() as viewer:
+    with OffscreenScene() as viewer:
         viewer.open(photo_of_patches(tmp_path / "plain.png"))
         assert viewer.state.scene.color_space == SRGB
         assert np.array_equal(middles(viewer.picture()), PATCHES)
@@ -78,7 +76,7 @@ def test_saved_colours_are_those_of_the_photo(tmp_path, name, is_wide):
     options = {"icc_profile": profile_bytes()} if is_wide else {}
     source, out = photo_of_patches(tmp_path / "in.png", **options), tmp_path / name
     form = PictureFormat(bits=8, quality=100)
-    with HeadlessViewer() as viewer:
+    with OffscreenScene() as viewer:
         viewer.open(source)
         shot = shot_of(viewer.state, viewer.state.scene.size, form)
         export_picture(out, viewer.picture(color_space=shot.color_space), shot)

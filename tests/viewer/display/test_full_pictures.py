@@ -17,7 +17,7 @@ from iibr_core.formats.images.write import write_image
 from iibr_core.scenes.scene import Source
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import FloatImage, GridShape, ViewOffset
-from viewer.app.headless import HeadlessViewer
+from viewer.display.offscreen import OffscreenScene
 
 SIZE = ScreenSize(300, 200)
 SMALLER = 120 * 80
@@ -54,16 +54,16 @@ def photo(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def viewers(photo: Path) -> Iterator[tuple[HeadlessViewer, HeadlessViewer]]:
+def viewers(photo: Path) -> Iterator[tuple[OffscreenScene, OffscreenScene]]:
     """The photo opened smaller, and at its own size."""
-    with HeadlessViewer("egl") as smaller, HeadlessViewer("egl") as own:
+    with OffscreenScene("egl") as smaller, OffscreenScene("egl") as own:
         for viewer, max_pixels in ((smaller, SMALLER), (own, 10**6)):
             viewer.open(Source(str(photo), grid=GridShape(5, 5), max_pixels=max_pixels))
         yield smaller, own
 
 
 @contextmanager
-def lens(viewer: HeadlessViewer, optics: Optics) -> Iterator[None]:
+def lens(viewer: OffscreenScene, optics: Optics) -> Iterator[None]:
     """The viewer with these optics, in px of its own views."""
     before = viewer.state
     greatest = max(map(abs, viewer.scene.disparity_range_px))
@@ -72,14 +72,14 @@ def lens(viewer: HeadlessViewer, optics: Optics) -> Iterator[None]:
     viewer.state = before
 
 
-def picture(viewer: HeadlessViewer, optics: Optics) -> FloatImage:
+def picture(viewer: OffscreenScene, optics: Optics) -> FloatImage:
     with lens(viewer, optics):
         return np.asarray(viewer.picture(SIZE), np.float32) / 255
 
 
 @pytest.mark.parametrize("name", LENSES)
 def test_a_picture_at_the_photos_own_size_is_that_of_views_so_large(
-    viewers: tuple[HeadlessViewer, HeadlessViewer], name: str
+    viewers: tuple[OffscreenScene, OffscreenScene], name: str
 ) -> None:
     optics = LENSES[name]
     assert [viewer.draws_own_pixels(SIZE) for viewer in viewers] == [True, False]
@@ -89,7 +89,7 @@ def test_a_picture_at_the_photos_own_size_is_that_of_views_so_large(
 
 @pytest.mark.parametrize("name", ["wide, beside the middle", "tilt", "cat's-eye"])
 def test_tiles_are_as_sharp_as_the_whole(
-    viewers: tuple[HeadlessViewer, HeadlessViewer], monkeypatch: pytest.MonkeyPatch, name: str
+    viewers: tuple[OffscreenScene, OffscreenScene], monkeypatch: pytest.MonkeyPatch, name: str
 ) -> None:
     optics = LENSES[name]
     at_once = picture(viewers[0], optics)

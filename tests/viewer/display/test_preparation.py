@@ -9,7 +9,7 @@ import pytest
 
 from iibr_core.scenes.screen_size import ScreenSize
 from tests.viewer.conftest import headless_with_scene
-from viewer.app.headless import HeadlessViewer
+from viewer.display.offscreen import OffscreenScene
 from viewer.display.preparation import NEXT, Preparation
 from viewer.gpu.refocus.picture_renderer import Renderer
 
@@ -17,15 +17,15 @@ SIZE = ScreenSize(384, 256)
 
 
 @pytest.fixture
-def opened(tmp_path: Path) -> Iterator[HeadlessViewer]:
+def opened(tmp_path: Path) -> Iterator[OffscreenScene]:
     """All views are there, and nothing but the photo was drawn."""
     with headless_with_scene(tmp_path) as viewer:
-        viewer._scene_view.converge(viewer.state, SIZE)
+        viewer.view.converge(viewer.state, SIZE)
         yield viewer
 
 
-def test_a_program_a_turn_is_compiled_and_none_when_pictures_are_drawn(opened: HeadlessViewer) -> None:
-    renderer, picture = opened._scene_view.renderer, opened._scene_view.picture_drawn
+def test_a_program_a_turn_is_compiled_and_none_when_pictures_are_drawn(opened: OffscreenScene) -> None:
+    renderer, picture = opened.view.renderer, opened.view.picture_drawn
     preparation, shown = Preparation(renderer), renderer.read_image()
     turns, there = 0, len(renderer.programs)
     while preparation.advance(picture, is_resting=True):
@@ -41,18 +41,18 @@ def test_a_program_a_turn_is_compiled_and_none_when_pictures_are_drawn(opened: H
     assert (renderer.read_image() == shown).all()
 
 
-def test_what_every_photo_takes_is_compiled_before_one_is_open(opened: HeadlessViewer) -> None:
-    renderer = Renderer(opened._gl)
+def test_what_every_photo_takes_is_compiled_before_one_is_open(opened: OffscreenScene) -> None:
+    renderer = Renderer(opened.gl)
     preparation = Preparation(renderer)
     while preparation.advance(None, is_resting=False):
         pass
-    assert renderer.programs._programs.keys() == opened._scene_view.renderer.programs._programs.keys()
+    assert renderer.programs._programs.keys() == opened.view.renderer.programs._programs.keys()
     renderer.release()
 
 
-def test_nothing_is_compiled_while_a_picture_moves_or_views_come(opened: HeadlessViewer) -> None:
-    renderer = opened._scene_view.renderer
+def test_nothing_is_compiled_while_a_picture_moves_or_views_come(opened: OffscreenScene) -> None:
+    renderer = opened.view.renderer
     there = len(renderer.programs)
     preparation = Preparation(renderer)
-    assert not preparation.advance(opened._scene_view.picture_drawn, is_resting=False)
+    assert not preparation.advance(opened.view.picture_drawn, is_resting=False)
     assert len(renderer.programs) == there

@@ -14,8 +14,8 @@ from iibr_core.scenes.scene import SceneReady
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import ViewOffset
 from tests.viewer.conftest import headless_with_scene
-from viewer.app.headless import HeadlessViewer
 from viewer.display import scene_view
+from viewer.display.offscreen import OffscreenScene
 from viewer.display.scene_view import SceneView
 from viewer.model.actions import Action
 from viewer.model.state.optics_actions import MoveEye, SetAperture
@@ -24,15 +24,15 @@ SIZE = ScreenSize(384, 256)
 
 
 @pytest.fixture
-def opened(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[HeadlessViewer]:
+def opened(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[OffscreenScene]:
     """A picture that has got every pass; views are shown as soon as they come, and no frame has time for more than one
     sample.
     """
     monkeypatch.setattr(scene_view, "VIEW_REFRESH_S", 0.0)
     with headless_with_scene(tmp_path) as viewer:
         viewer.do(SetAperture(3.0))
-        monkeypatch.setattr(type(viewer._gl), "frame_budget_s", 1e-9)
-        viewer._scene_view.converge(viewer.state, SIZE)
+        monkeypatch.setattr(type(viewer.gl), "frame_budget_s", 1e-9)
+        viewer.view.converge(viewer.state, SIZE)
         yield viewer
 
 
@@ -43,8 +43,8 @@ def a_view_comes(view: SceneView) -> None:
     view.upload_all()
 
 
-def test_a_view_that_comes_costs_no_frame_all_passes(opened: HeadlessViewer) -> None:
-    view = opened._scene_view
+def test_a_view_that_comes_costs_no_frame_all_passes(opened: OffscreenScene) -> None:
+    view = opened.view
     passes, before = view.renderer.passes_shown, view.renderer.read_image()
     samples_in_all = view.renderer.report.samples
     assert passes > 1
@@ -60,8 +60,8 @@ def test_a_view_that_comes_costs_no_frame_all_passes(opened: HeadlessViewer) -> 
     assert view.renderer.is_converged
 
 
-def test_views_that_come_meanwhile_do_not_put_off_what_is_shown(opened: HeadlessViewer) -> None:
-    view = opened._scene_view
+def test_views_that_come_meanwhile_do_not_put_off_what_is_shown(opened: OffscreenScene) -> None:
+    view = opened.view
     before, samples_in_all = view.renderer.read_image(), view.renderer.report.samples
     for _ in range(2 * samples_in_all):
         a_view_comes(view)
@@ -81,9 +81,9 @@ def test_views_that_come_meanwhile_do_not_put_off_what_is_shown(opened: Headless
     ids=["one view", "between views", "a lens"],
 )
 def test_a_picture_that_is_one_view_is_not_drawn_for_others(
-    opened: HeadlessViewer, lens: tuple[Action, ...], draws: bool
+    opened: OffscreenScene, lens: tuple[Action, ...], draws: bool
 ) -> None:
-    view = opened._scene_view
+    view = opened.view
     opened.do(SetAperture(0.0), *lens)
     view.converge(opened.state, SIZE)
     pictures, shown, record = view.pictures_drawn, view.renderer.read_image(), view.picture_drawn
@@ -95,8 +95,8 @@ def test_a_picture_that_is_one_view_is_not_drawn_for_others(
     assert view.shows_all_views()
 
 
-def test_a_view_that_is_there_as_a_draft_is_drawn_again(opened: HeadlessViewer) -> None:
-    view, at = opened._scene_view, (0, 1)
+def test_a_view_that_is_there_as_a_draft_is_drawn_again(opened: OffscreenScene) -> None:
+    view, at = opened.view, (0, 1)
     view._is_final[at] = False
     assert opened.state.scene is not None
     opened.do(SetAperture(0.0), MoveEye(opened.state.scene.grid.offset(*at)))
@@ -108,8 +108,8 @@ def test_a_view_that_is_there_as_a_draft_is_drawn_again(opened: HeadlessViewer) 
     assert view.pictures_drawn == pictures + 1
 
 
-def test_a_view_stands_in_before_the_second_view_of_the_scene_has_come(opened: HeadlessViewer) -> None:
-    view, scene = opened._scene_view, opened.state.scene
+def test_a_view_stands_in_before_the_second_view_of_the_scene_has_come(opened: OffscreenScene) -> None:
+    view, scene = opened.view, opened.state.scene
     assert scene is not None
     assert view.centre is not None
     view.open(SceneReady(view.generation, scene, view.loaded, view.centre))
@@ -122,8 +122,8 @@ def test_a_view_stands_in_before_the_second_view_of_the_scene_has_come(opened: H
     assert view.renderer.read_image().min() == 255
 
 
-def test_no_view_is_uploaded_in_a_turn_whose_time_is_over(opened: HeadlessViewer) -> None:
-    view = opened._scene_view
+def test_no_view_is_uploaded_in_a_turn_whose_time_is_over(opened: OffscreenScene) -> None:
+    view = opened.view
     assert view.centre is not None
     uploaded = view.views_uploaded
     view.add(replace(view.centre, row=0, column=1))
@@ -133,8 +133,8 @@ def test_no_view_is_uploaded_in_a_turn_whose_time_is_over(opened: HeadlessViewer
     assert view.views_uploaded == uploaded + 1
 
 
-def test_a_picture_of_one_view_drawn_in_a_hurry_becomes_whole_though_views_come(opened: HeadlessViewer) -> None:
-    view = opened._scene_view
+def test_a_picture_of_one_view_drawn_in_a_hurry_becomes_whole_though_views_come(opened: OffscreenScene) -> None:
+    view = opened.view
     opened.do(SetAperture(0.0))
     view.draw(opened.state, SIZE)
     assert view.renderer.passes_shown == 0, "softer than it will be"

@@ -74,8 +74,8 @@ def test_pictures_without_a_window_load_no_window_library() -> None:
     """They take their time before the first picture."""
     code = (
         "import sys\n"
-        "from viewer.app.headless import HeadlessViewer\n"
-        "HeadlessViewer('egl')\n"
+        "from viewer.display.offscreen import OffscreenScene\n"
+        "OffscreenScene('egl')\n"
         "loaded = {'glfw', 'imgui_bundle', 'torch'} & set(sys.modules)\n"
         "assert not loaded, loaded\n"
     )

@@ -11,8 +11,8 @@ import pytest
 from iibr_core.depth.choice import DepthOrigin
 from iibr_core.depth.editing.edits import BrushTool, DepthEdits, Stroke
 from tests.viewer.conftest import headless_with_scene
-from viewer.app.headless import HeadlessViewer
 from viewer.display.depth_preview import DepthPreview
+from viewer.display.offscreen import OffscreenScene
 from viewer.model.actions import SetHover
 from viewer.model.layout import PANEL_WIDTH
 from viewer.model.state.app_state import Hover
@@ -26,7 +26,7 @@ PICTURE = np.s_[:, : -int(PANEL_WIDTH)]
 
 
 @pytest.fixture(scope="module")
-def opened(tmp_path_factory: pytest.TempPathFactory) -> Iterator[HeadlessViewer]:
+def opened(tmp_path_factory: pytest.TempPathFactory) -> Iterator[OffscreenScene]:
     with headless_with_scene(tmp_path_factory.mktemp("depth"), "depth") as viewer:
         yield viewer
 
@@ -37,7 +37,7 @@ def differs(before: np.ndarray, after: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.parametrize("theme", ["dark", "light"])
-def test_clips_show_in_the_histogram_and_sliders_only(viewer: HeadlessViewer, theme: Theme) -> None:
+def test_clips_show_in_the_histogram_and_sliders_only(viewer: OffscreenScene, theme: Theme) -> None:
     viewer.do(SetPreference("theme", theme))
     before = viewer.screen(SIZE)
     viewer.do(SetTone(DepthEdits(far_clip=0.3, near_clip=0.6), is_finished=False))
@@ -46,7 +46,7 @@ def test_clips_show_in_the_histogram_and_sliders_only(viewer: HeadlessViewer, th
     assert not changed[PICTURE].any()
 
 
-def test_poor_depth_is_told_with_advice_and_what_failed(viewer: HeadlessViewer) -> None:
+def test_poor_depth_is_told_with_advice_and_what_failed(viewer: OffscreenScene) -> None:
     before = viewer.screen(SIZE)
     scene = viewer.state.scene
     assert scene is not None
@@ -55,7 +55,7 @@ def test_poor_depth_is_told_with_advice_and_what_failed(viewer: HeadlessViewer) 
     assert differs(before, viewer.screen(SIZE))[PANEL].sum() > 2000
 
 
-def test_the_brush_brings_its_sliders_and_a_ring_over_the_picture(viewer: HeadlessViewer) -> None:
+def test_the_brush_brings_its_sliders_and_a_ring_over_the_picture(viewer: OffscreenScene) -> None:
     viewer.do(SetHover(Hover(48.0, 32.0, 1.5)))
     before = viewer.screen(SIZE)
     viewer.do(SetBrush(Brush(radius=0.1, is_on=True)))
@@ -67,7 +67,7 @@ def test_the_brush_brings_its_sliders_and_a_ring_over_the_picture(viewer: Headle
 @pytest.mark.parametrize("scale", [0.8, 1.5, 2.0])
 @pytest.mark.parametrize("tool", ["nearer", "fill"])
 def test_the_panel_ends_at_its_border_at_any_size_of_text(
-    viewer: HeadlessViewer, scale: float, tool: BrushTool
+    viewer: OffscreenScene, scale: float, tool: BrushTool
 ) -> None:
     sample = DepthSample((0.5, 0.5), 1.0)
     viewer.do(SetPreference("font_scale", scale), SetBrush(Brush(tool, is_on=True, sample=sample)))
@@ -78,9 +78,9 @@ def test_the_panel_ends_at_its_border_at_any_size_of_text(
     assert (margin == margin[0, 0]).all(axis=2).mean() > 0.95, "nor over the right one"
 
 
-def test_a_stroke_under_way_is_seen_in_colours(viewer: HeadlessViewer) -> None:
+def test_a_stroke_under_way_is_seen_in_colours(viewer: OffscreenScene) -> None:
     viewer.do(SetOverlay("disparity"), SetInspection("opacity", 1.0))
-    preview, before = DepthPreview(viewer._scene_view), viewer.screen(SIZE)
+    preview, before = DepthPreview(viewer.view), viewer.screen(SIZE)
     for stroke, is_seen in ((Stroke("farther", ((0.5, 0.5),), 0.1, 1.0), True), (None, False)):
         viewer.state = replace(viewer.state, stroke=stroke)
         preview.update(viewer.state)

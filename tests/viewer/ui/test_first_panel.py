@@ -13,7 +13,7 @@ from iibr_core.scenes.scene import Progress
 from iibr_core.scenes.screen_size import ScreenSize
 from tests.viewer.conftest import headless_with_scene
 from tests.viewer.ui.watched_widgets import watch_widgets
-from viewer.app.headless import HeadlessViewer
+from viewer.display.offscreen import OffscreenScene
 from viewer.model.actions import SetState
 from viewer.model.commands import BY_NAME
 from viewer.model.reducers.root import reduce
@@ -38,13 +38,13 @@ CONTROLS = (
 
 
 @pytest.fixture(scope="module")
-def opened(tmp_path_factory: pytest.TempPathFactory) -> Iterator[HeadlessViewer]:
+def opened(tmp_path_factory: pytest.TempPathFactory) -> Iterator[OffscreenScene]:
     with headless_with_scene(tmp_path_factory.mktemp("first")) as viewer:
         yield viewer
 
 
 @pytest.fixture
-def first(viewer: HeadlessViewer) -> HeadlessViewer:
+def first(viewer: OffscreenScene) -> OffscreenScene:
     """As at the first start, with a scene open."""
     viewer.state = replace(viewer.state, preferences=Preferences(), hides_panel=None)
     return viewer
@@ -65,7 +65,7 @@ def controls(monkeypatch: pytest.MonkeyPatch) -> list[str]:
 
 @pytest.mark.parametrize("is_working", [False, True])
 def test_there_are_few_controls_at_the_first_start(
-    first: HeadlessViewer, controls: list[str], is_working: bool
+    first: OffscreenScene, controls: list[str], is_working: bool
 ) -> None:
     if is_working:
         first.state = replace(first.state, progress=Progress(4, 9, 0.3))
@@ -75,13 +75,13 @@ def test_there_are_few_controls_at_the_first_start(
     assert ("Cancel" in controls) is is_working
 
 
-def test_an_empty_window_has_few_too(first: HeadlessViewer, controls: list[str]) -> None:
+def test_an_empty_window_has_few_too(first: OffscreenScene, controls: list[str]) -> None:
     first.state = AppState()
     first.screen(WINDOW)
     assert 0 < len(controls) <= MOST_CONTROLS
 
 
-def test_more_brings_headings_and_advanced_two_more(first: HeadlessViewer, controls: list[str]) -> None:
+def test_more_brings_headings_and_advanced_two_more(first: OffscreenScene, controls: list[str]) -> None:
     first.do(ToggleSection("more"))
     first.screen(WINDOW)
     headings = [words.removeprefix("section ") for words in controls if words.startswith("section ")]
@@ -119,7 +119,7 @@ def test_each_preset_and_each_motion_says_what_it_does() -> None:
 
 
 def test_in_a_narrow_window_the_panel_folds_away_and_comes_back_when_asked_for(
-    first: HeadlessViewer, controls: list[str]
+    first: OffscreenScene, controls: list[str]
 ) -> None:
     narrow, toggle = ScreenSize(700, 500), BY_NAME["Hide or show the panel"]
     for size, is_there in ((WINDOW, True), (narrow, False), (WINDOW, True), (narrow, False)):

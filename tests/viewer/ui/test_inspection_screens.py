@@ -11,7 +11,7 @@ import pytest
 from iibr_core.scenes.rect import Rect
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import HEIGHT, WIDTH, headless_with_scene
-from viewer.app.headless import HeadlessViewer
+from viewer.display.offscreen import OffscreenScene
 from viewer.model.actions import Action, Notify, SetHover
 from viewer.model.inspection_request import beside_of, sheet_cells
 from viewer.model.layout import PANEL_WIDTH, Layout, layout_of
@@ -28,17 +28,17 @@ HOVER = Hover(48.0, 32.0, 1.0)
 
 
 @pytest.fixture(scope="module")
-def opened(tmp_path_factory: pytest.TempPathFactory) -> Iterator[HeadlessViewer]:
+def opened(tmp_path_factory: pytest.TempPathFactory) -> Iterator[OffscreenScene]:
     with headless_with_scene(tmp_path_factory.mktemp("screens"), "inspect") as viewer:
         yield viewer
 
 
-def layout_now(viewer: HeadlessViewer, size: tuple[int, int] = SIZE) -> Layout:
+def layout_now(viewer: OffscreenScene, size: tuple[int, int] = SIZE) -> Layout:
     scale = viewer.state.preferences.font_scale
     return layout_of(size, (WIDTH, HEIGHT), ui_scale=scale, beside=beside_of(viewer.state))
 
 
-def changed_after(viewer: HeadlessViewer, *actions: Action) -> np.ndarray:
+def changed_after(viewer: OffscreenScene, *actions: Action) -> np.ndarray:
     before = viewer.screen(SIZE).astype(int)
     viewer.do(*actions)
     return np.abs(viewer.screen(SIZE) - before).max(axis=2) > 8
@@ -52,7 +52,7 @@ def part(screen: np.ndarray, rect: Rect | None) -> np.ndarray:
 
 @pytest.mark.parametrize("theme", ["dark", "light"])
 @pytest.mark.parametrize("scale", [1.0, 1.5])
-def test_the_whole_section_is_seen_at_any_size_of_text(viewer: HeadlessViewer, theme: Theme, scale: float) -> None:
+def test_the_whole_section_is_seen_at_any_size_of_text(viewer: OffscreenScene, theme: Theme, scale: float) -> None:
     size = round(SIZE[0] * scale), round(SIZE[1] * scale)
     viewer.do(SetPreference("theme", theme), SetPreference("font_scale", scale), SetOverlay("disparity"))
     opened = viewer.screen(size).astype(int)
@@ -66,7 +66,7 @@ def test_the_whole_section_is_seen_at_any_size_of_text(viewer: HeadlessViewer, t
 
 
 @pytest.mark.parametrize("theme", ["dark", "light"])
-def test_epis_lie_beside_the_picture_and_go_through_the_pointer(viewer: HeadlessViewer, theme: Theme) -> None:
+def test_epis_lie_beside_the_picture_and_go_through_the_pointer(viewer: OffscreenScene, theme: Theme) -> None:
     viewer.do(
         SetPreference("theme", theme), SetHover(replace(HOVER, disparity=None)), SetInspection("shows_epis", True)
     )
@@ -86,14 +86,14 @@ def test_epis_lie_beside_the_picture_and_go_through_the_pointer(viewer: Headless
     assert np.median(near) <= 6
 
 
-def test_the_middle_of_the_epi_moves_with_the_eye(viewer: HeadlessViewer) -> None:
+def test_the_middle_of_the_epi_moves_with_the_eye(viewer: OffscreenScene) -> None:
     viewer.do(SetInspection("shows_epis", True))
     changed = changed_after(viewer, MoveEye(ViewOffset(0, 1)))
     assert part(changed, layout_now(viewer).strip_across).sum() > ENOUGH_PIXELS
 
 
 @pytest.mark.parametrize("kind", OVERLAYS)
-def test_overlays_cover_the_picture_as_much_as_they_are_opaque(viewer: HeadlessViewer, kind: OverlayKind) -> None:
+def test_overlays_cover_the_picture_as_much_as_they_are_opaque(viewer: OffscreenScene, kind: OverlayKind) -> None:
     viewer.do(MoveEye(ViewOffset(0, 1)))
     picture = layout_now(viewer).picture
     plain = part(viewer.screen(SIZE), picture).astype(int)
@@ -109,14 +109,14 @@ def test_overlays_cover_the_picture_as_much_as_they_are_opaque(viewer: HeadlessV
         assert differs.mean() < 0.3, "only what the photo does not show"
 
 
-def test_the_legend_marks_the_value_under_the_pointer(viewer: HeadlessViewer) -> None:
+def test_the_legend_marks_the_value_under_the_pointer(viewer: OffscreenScene) -> None:
     viewer.do(SetOverlay("disparity"), SetHover(HOVER))
     changed = changed_after(viewer, SetHover(replace(HOVER, disparity=-0.5)))
     legend = part(changed, layout_now(viewer).picture)[:40, :180]
     assert 10 < legend.sum() < 800
 
 
-def test_photo_and_result_on_the_two_sides_of_the_divider(viewer: HeadlessViewer) -> None:
+def test_photo_and_result_on_the_two_sides_of_the_divider(viewer: OffscreenScene) -> None:
     viewer.do(MoveEye(ViewOffset(0, 1)))
     result = part(viewer.screen(SIZE), layout_now(viewer).picture).astype(int)
     viewer.do(Compare("photo"), MoveDivider(0.5))
@@ -130,7 +130,7 @@ def test_photo_and_result_on_the_two_sides_of_the_divider(viewer: HeadlessViewer
     assert np.abs(compared[left] - result[left]).mean() > 2 * np.abs(compared[left] - photo[left]).mean()
 
 
-def test_the_sheet_shows_every_view_and_marks_the_present_one(viewer: HeadlessViewer) -> None:
+def test_the_sheet_shows_every_view_and_marks_the_present_one(viewer: OffscreenScene) -> None:
     viewer.do(SetInspection("shows_grid", True))
     screen, layout = viewer.screen(SIZE).astype(int), layout_now(viewer)
     assert layout.picture is not None
@@ -141,7 +141,7 @@ def test_the_sheet_shows_every_view_and_marks_the_present_one(viewer: HeadlessVi
     assert sorted(np.flatnonzero(frames)) == [0, 4]
 
 
-def test_the_status_line_is_not_covered_by_notices(viewer: HeadlessViewer) -> None:
+def test_the_status_line_is_not_covered_by_notices(viewer: OffscreenScene) -> None:
     viewer.do(SetInspection("shows_values", True), SetHover(HOVER))
     line = part(viewer.screen(SIZE), layout_now(viewer).status)
     assert line.std() > 5
@@ -154,7 +154,7 @@ def test_the_status_line_is_not_covered_by_notices(viewer: HeadlessViewer) -> No
     np.testing.assert_array_equal(part(viewer.screen(SIZE), layout_now(viewer).status), line)
 
 
-def test_what_the_photo_does_not_show_is_told_as_inpainted(viewer: HeadlessViewer) -> None:
+def test_what_the_photo_does_not_show_is_told_as_inpainted(viewer: OffscreenScene) -> None:
     """Beside the square, in the middle row, from an eye that looks behind it."""
     viewer.do(SetInspection("shows_values", True), MoveEye(ViewOffset(0, 1)))
     origins = set()

@@ -18,8 +18,8 @@ from iibr_core.scenes.scene import DepthSettings
 from iibr_core.scenes.screen_size import ScreenSize
 from tests.viewer.conftest import headless_with_scene
 from tests.viewer.ui.watched_widgets import watch_widgets
-from viewer.app.headless import HeadlessViewer
 from viewer.background.model_downloader import list_models
+from viewer.display.offscreen import OffscreenScene
 from viewer.model.actions import ShowPrompt
 from viewer.model.layout import PANEL_WIDTH
 from viewer.model.state.app_state import AppState
@@ -79,7 +79,7 @@ def items(monkeypatch: pytest.MonkeyPatch) -> list[Item]:
 
 
 @pytest.fixture(scope="module")
-def opened(tmp_path_factory: pytest.TempPathFactory) -> Iterator[HeadlessViewer]:
+def opened(tmp_path_factory: pytest.TempPathFactory) -> Iterator[OffscreenScene]:
     with headless_with_scene(tmp_path_factory.mktemp("legible"), *SECTIONS) as viewer:
         yield viewer
 
@@ -87,7 +87,7 @@ def opened(tmp_path_factory: pytest.TempPathFactory) -> Iterator[HeadlessViewer]
 @pytest.mark.parametrize("scale", SCALES)
 @pytest.mark.parametrize("units", ["photographic", "light field"])
 def test_no_widget_is_cut_and_none_lies_over_another(
-    viewer: HeadlessViewer, items: list[Item], scale: float, units: Units
+    viewer: OffscreenScene, items: list[Item], scale: float, units: Units
 ) -> None:
     lens = (SetAperture(2.3), SetOptics("focus_range", 0.7), SetOptics("focus_tilt", (0.3, -0.2)))
     kind = APERTURE_KINDS[SCALES.index(scale) % (len(APERTURE_KINDS) - 1)]
@@ -113,7 +113,7 @@ def test_no_widget_is_cut_and_none_lies_over_another(
 
 
 @pytest.mark.parametrize("scale", SCALES)
-def test_the_grip_of_a_slider_lies_below_its_value(viewer: HeadlessViewer, items: list[Item], scale: float) -> None:
+def test_the_grip_of_a_slider_lies_below_its_value(viewer: OffscreenScene, items: list[Item], scale: float) -> None:
     viewer.do(SetPreference("font_scale", scale))
     viewer.screen(ScreenSize(round(120 + PANEL_WIDTH * scale), 2600))
     line = min(item.bottom - item.top for item in items if item.kind == "text")
@@ -139,7 +139,7 @@ WELCOME = "welcome"
 @pytest.mark.parametrize("scale", [0.6, 1.0, 2.0])
 @pytest.mark.parametrize("name", [*PROMPTS, WELCOME])
 def test_prompts_fit_the_window_and_their_words_fit_them(
-    viewer: HeadlessViewer, items: list[Item], monkeypatch: pytest.MonkeyPatch, name: str, scale: float
+    viewer: OffscreenScene, items: list[Item], monkeypatch: pytest.MonkeyPatch, name: str, scale: float
 ) -> None:
     ended: list[tuple[float, ...]] = []
     end = imgui.end

@@ -17,7 +17,7 @@ from iibr_core.beyond.optics import (
 )
 from iibr_core.scenes.scene import Progress, Source
 from tests.viewer.conftest import headless_with_scene
-from viewer.app.headless import HeadlessViewer
+from viewer.display.offscreen import OffscreenScene
 from viewer.model.actions import (
     Action,
     AskToSave,
@@ -50,12 +50,12 @@ ENOUGH_PIXELS = 60
 
 
 @pytest.fixture(scope="module")
-def opened(tmp_path_factory: pytest.TempPathFactory) -> Iterator[HeadlessViewer]:
+def opened(tmp_path_factory: pytest.TempPathFactory) -> Iterator[OffscreenScene]:
     with headless_with_scene(tmp_path_factory.mktemp("screens")) as viewer:
         yield viewer
 
 
-def changed_after(viewer: HeadlessViewer, *actions: Action) -> np.ndarray:
+def changed_after(viewer: OffscreenScene, *actions: Action) -> np.ndarray:
     """(H, W) bool: where the screen differs after the actions."""
     before = viewer.screen(SIZE).astype(int)
     viewer.do(*actions)
@@ -67,7 +67,7 @@ def in_panel(screen: np.ndarray, scale: float = 1.0) -> np.ndarray:
 
 
 @pytest.mark.parametrize("section", SECTIONS)
-def test_every_section_opens_and_closes(viewer: HeadlessViewer, section: Section) -> None:
+def test_every_section_opens_and_closes(viewer: OffscreenScene, section: Section) -> None:
     preferences = viewer.state.preferences
     sections = with_sections(preferences.open_sections, "inspect")  # what a section lies in is open before
     viewer.state = replace(viewer.state, preferences=replace(preferences, open_sections=sections))
@@ -92,7 +92,7 @@ def test_every_section_opens_and_closes(viewer: HeadlessViewer, section: Section
     ],
     ids=lambda action: type(action).__name__,
 )
-def test_what_lies_over_the_picture_is_seen_and_stays_beside_the_panel(viewer: HeadlessViewer, action: Action) -> None:
+def test_what_lies_over_the_picture_is_seen_and_stays_beside_the_panel(viewer: OffscreenScene, action: Action) -> None:
     changed = changed_after(viewer, action)
     assert changed[:, : -int(PANEL_WIDTH)].sum() > ENOUGH_PIXELS
     border = np.concatenate([changed[0], changed[-1], changed[:, 0]])
@@ -100,7 +100,7 @@ def test_what_lies_over_the_picture_is_seen_and_stays_beside_the_panel(viewer: H
 
 
 @pytest.mark.parametrize("kind", APERTURE_KINDS)
-def test_each_aperture_shape_shows_its_own_controls(viewer: HeadlessViewer, kind: ApertureKind) -> None:
+def test_each_aperture_shape_shows_its_own_controls(viewer: OffscreenScene, kind: ApertureKind) -> None:
     mask = ApertureMask("star.png", 2, 2, bytes([255, 0, 0, 255])) if kind == "mask" else None
     other: ApertureKind = "ring" if kind == "disc" else "disc"
     viewer.do(SetOptics("aperture_shape", ApertureShape(other)))
@@ -118,12 +118,12 @@ def test_each_aperture_shape_shows_its_own_controls(viewer: HeadlessViewer, kind
     ],
     ids=lambda action: type(action).__name__,
 )
-def test_the_panel_tells(viewer: HeadlessViewer, action: Action) -> None:
+def test_the_panel_tells(viewer: OffscreenScene, action: Action) -> None:
     viewer.do(ToggleSection("scene"))
     assert in_panel(changed_after(viewer, action)).sum() > ENOUGH_PIXELS
 
 
-def test_light_and_dark(viewer: HeadlessViewer) -> None:
+def test_light_and_dark(viewer: OffscreenScene) -> None:
     for theme, palette in (("dark", DARK), ("light", LIGHT)):
         viewer.do(SetPreference("theme", theme))  # type: ignore[arg-type]
         screen = viewer.screen(SIZE) / 255
@@ -133,7 +133,7 @@ def test_light_and_dark(viewer: HeadlessViewer) -> None:
         assert text.sum() > 20 * ENOUGH_PIXELS
 
 
-def test_text_twice_as_large_in_a_window_twice_as_large_is_the_same_screen_finer(viewer: HeadlessViewer) -> None:
+def test_text_twice_as_large_in_a_window_twice_as_large_is_the_same_screen_finer(viewer: OffscreenScene) -> None:
     viewer.do(Notify(Notice("A notice that is long enough to be wrapped into a second line of text, at any size.")))
     small = viewer.screen(SIZE).astype(float)
     viewer.do(SetPreference("font_scale", 2.0))
@@ -153,14 +153,14 @@ def _blurred(same: np.ndarray) -> np.ndarray:
     return np.any([padded[y : y + height, x : x + width] for y in range(3) for x in range(3)], axis=0)
 
 
-def test_an_empty_window_lists_recent_files(viewer: HeadlessViewer) -> None:
+def test_an_empty_window_lists_recent_files(viewer: OffscreenScene) -> None:
     viewer.state = replace(AppState(hides_panel=False), recent=())
     before = viewer.screen(SIZE).astype(int)
     viewer.state = replace(AppState(hides_panel=False), recent=("/photos/garden.jpg", "/photos/bridge.jpg"))
     assert (np.abs(viewer.screen(SIZE) - before).max(axis=2) > 24).sum() > 3 * ENOUGH_PIXELS
 
 
-def test_settings_on_offer_have_a_button(viewer: HeadlessViewer) -> None:
+def test_settings_on_offer_have_a_button(viewer: OffscreenScene) -> None:
     plain = Notice("This picture was saved by iibr.")
     offer = replace(plain, offer=SavedSettings(viewer.state.optics, 1.0, Source(""), (1, 1)))
     viewer.do(Notify(plain))
@@ -175,7 +175,7 @@ def test_what_is_under_way_in_words() -> None:
     assert job_text(JobProgress(2, "export", "a.mp4")) == "waiting for its turn"
 
 
-def test_the_scene_section_tells_what_reading_a_photo_changed(viewer: HeadlessViewer) -> None:
+def test_the_scene_section_tells_what_reading_a_photo_changed(viewer: OffscreenScene) -> None:
     preferences = replace(viewer.state.preferences, open_sections=with_sections((), "scene"))
     viewer.state = replace(viewer.state, preferences=preferences)
     before = viewer.screen(SIZE).astype(int)
@@ -187,7 +187,7 @@ def test_the_scene_section_tells_what_reading_a_photo_changed(viewer: HeadlessVi
 
 
 def test_an_empty_window_asks_for_a_photo_only_while_none_is_on_its_way(
-    viewer: HeadlessViewer, monkeypatch: pytest.MonkeyPatch
+    viewer: OffscreenScene, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     words: list[str] = []
     monkeypatch.setattr(imgui, "text_wrapped", words.append)

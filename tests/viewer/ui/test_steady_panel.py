@@ -12,7 +12,7 @@ from imgui_bundle import imgui
 from iibr_core.beyond.optics import APERTURE_KINDS, ApertureMask, ApertureShape
 from iibr_core.scenes.screen_size import ScreenSize
 from tests.viewer.conftest import headless_with_scene
-from viewer.app.headless import HeadlessViewer
+from viewer.display.offscreen import OffscreenScene
 from viewer.model.actions import Action, ShowTiltHandles
 from viewer.model.state.depth_editing import Brush, DepthSample, PickDepth, SetBrush
 from viewer.model.state.inspection import Compare, KeepState, SetInspection, SetOverlay
@@ -45,7 +45,7 @@ SWITCHES: dict[str, tuple[Action, ...]] = {
 
 
 @pytest.fixture(scope="module")
-def opened(tmp_path_factory: pytest.TempPathFactory) -> Iterator[HeadlessViewer]:
+def opened(tmp_path_factory: pytest.TempPathFactory) -> Iterator[OffscreenScene]:
     with headless_with_scene(tmp_path_factory.mktemp("steady"), *SECTIONS) as viewer:
         yield viewer
 
@@ -71,7 +71,7 @@ def tops(monkeypatch: pytest.MonkeyPatch) -> dict[str, float]:
 
 
 @pytest.mark.parametrize("name", SWITCHES)
-def test_what_is_switched_on_moves_nothing(viewer: HeadlessViewer, tops: dict[str, float], name: str) -> None:
+def test_what_is_switched_on_moves_nothing(viewer: OffscreenScene, tops: dict[str, float], name: str) -> None:
     viewer.screen(TALL)
     before = dict(tops)
     assert len(before) > 40

@@ -8,23 +8,23 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from iibr_core.beyond.optics import Optics
 from iibr_core.runtime.work import watched
-from iibr_core.scenes.scene import MAKING, Source
+from iibr_core.scenes.scene import MAKING, Scene, Source
 from iibr_core.types import GridShape, InputError, ViewOffset
 from tests.iibr_core.known_scenes import write_llff_row, write_stanford, write_stereo_pair
 from tests.viewer.conftest import HEIGHT, WIDTH
-from viewer.app.contact_sheet import GAP, TILE_WIDTH, contact_sheet
-from viewer.app.headless import HeadlessViewer
 from viewer.app.side_effects import read_truth
+from viewer.display.offscreen import OffscreenScene
 from viewer.model.actions import Action
 from viewer.model.layout import layout_of
 from viewer.model.state.optics_actions import MoveEye, ResetOptics, SetAperture, SetOptics
 
 
 @pytest.fixture
-def viewer(photo_path: Path) -> Iterator[HeadlessViewer]:
+def viewer(photo_path: Path) -> Iterator[OffscreenScene]:
     try:
-        viewer = HeadlessViewer("egl")
+        viewer = OffscreenScene("egl")
     except InputError as error:
         pytest.skip(str(error))
     with viewer:
@@ -32,7 +32,7 @@ def viewer(photo_path: Path) -> Iterator[HeadlessViewer]:
         yield viewer
 
 
-def test_the_centre_view_is_the_photo(viewer: HeadlessViewer, photo_path: Path) -> None:
+def test_the_centre_view_is_the_photo(viewer: OffscreenScene, photo_path: Path) -> None:
     from iibr_core.formats.images.photo import read_photo
 
     picture = viewer.picture()
@@ -40,7 +40,7 @@ def test_the_centre_view_is_the_photo(viewer: HeadlessViewer, photo_path: Path) 
     assert np.abs(picture / 255 - read_photo(photo_path).pixels).max() < 2.5 / 255
 
 
-def test_progress_counts_every_view(viewer: HeadlessViewer) -> None:
+def test_progress_counts_every_view(viewer: OffscreenScene) -> None:
     seen = []
     assert viewer.state.source is not None
     with watched(lambda done, total, doing: seen.append((done, total)) if doing == MAKING else None):
@@ -48,13 +48,13 @@ def test_progress_counts_every_view(viewer: HeadlessViewer) -> None:
     assert seen == [(done, 9) for done in range(1, 10)]
 
 
-def test_pictures_are_letterboxed_and_upright(viewer: HeadlessViewer) -> None:
+def test_pictures_are_letterboxed_and_upright(viewer: OffscreenScene) -> None:
     plain, wide = viewer.picture((WIDTH, HEIGHT)), viewer.picture((WIDTH + 40, HEIGHT))
     np.testing.assert_array_equal(wide[:, 20:-20], plain)
     assert (wide[:, :20] == wide[0, 0]).all()
 
 
-def test_panels_stand_beside_the_same_picture(viewer: HeadlessViewer) -> None:
+def test_panels_stand_beside_the_same_picture(viewer: OffscreenScene) -> None:
     size = (1000, 700)
     viewer.do(MoveEye(ViewOffset(0.5, 1)), SetAperture(2))
     screen = viewer.screen(size)
@@ -71,7 +71,7 @@ def test_panels_stand_beside_the_same_picture(viewer: HeadlessViewer) -> None:
     np.testing.assert_array_equal(viewer.screen(size), screen)
 
 
-def test_reset_gives_the_first_picture_back(viewer: HeadlessViewer) -> None:
+def test_reset_gives_the_first_picture_back(viewer: OffscreenScene) -> None:
     before = viewer.picture()
     viewer.do(MoveEye(ViewOffset(1, 1)))
     assert np.abs(viewer.picture().astype(int) - before).max() > 8
@@ -79,20 +79,8 @@ def test_reset_gives_the_first_picture_back(viewer: HeadlessViewer) -> None:
     np.testing.assert_array_equal(viewer.picture(), before)
 
 
-def test_the_contact_sheet_shows_six_different_pictures(viewer: HeadlessViewer) -> None:
-    sheet = contact_sheet(viewer)
-    tile_height = round(TILE_WIDTH * HEIGHT / WIDTH)
-    assert sheet.shape == (2 * tile_height + 3 * GAP, 3 * TILE_WIDTH + 4 * GAP, 3)
-    tiles = [
-        sheet[y : y + tile_height, x : x + TILE_WIDTH]
-        for y in (GAP, 2 * GAP + tile_height)
-        for x in (GAP + i * (TILE_WIDTH + GAP) for i in range(3))
-    ]
-    assert len({tile.tobytes() for tile in tiles}) == 6
-
-
 @pytest.mark.parametrize("pixels", [np.zeros((1, 1, 3)), np.full((7, 1, 3), 128), np.full((1, 5, 3), 255)])
-def test_tiny_photos_open(tmp_path: Path, viewer: HeadlessViewer, pixels: np.ndarray) -> None:
+def test_tiny_photos_open(tmp_path: Path, viewer: OffscreenScene, pixels: np.ndarray) -> None:
     from iibr_core.formats.images.write import write_image
 
     write_image(tmp_path / "tiny.png", pixels.astype(np.uint8))
@@ -101,7 +89,7 @@ def test_tiny_photos_open(tmp_path: Path, viewer: HeadlessViewer, pixels: np.nda
     assert viewer.screen((800, 600)).shape == (600, 800, 3)
 
 
-def test_light_fields_of_other_layouts_open(tmp_path: Path, viewer: HeadlessViewer) -> None:
+def test_light_fields_of_other_layouts_open(tmp_path: Path, viewer: OffscreenScene) -> None:
     """Stanford's names, whose rows count upwards, and a stereo pair: what is seen are the views on disk."""
     from iibr_core.formats.images.photo import read_photo
 
@@ -137,19 +125,22 @@ def test_light_fields_of_other_layouts_are_truth_to_compare_with(tmp_path: Path)
     ],
 )
 def test_only_the_views_that_a_picture_shows_are_made(
-    viewer: HeadlessViewer, photo_path: Path, actions: tuple[Action, ...], views: int, off: float
+    viewer: OffscreenScene, photo_path: Path, actions: tuple[Action, ...], views: int, off: float
 ) -> None:
     """off: root mean square in 8-bit steps; what few views disocclude, or a lens blurs, is inpainted in fewer outer
     ones.
     """
     source, made = Source(str(photo_path), grid=GridShape(5, 5)), list[float]()
+
+    def pictures_of(scene: Scene) -> list[Optics]:
+        viewer.do(*actions)
+        return [viewer.state.optics]
+
     viewer.open(source)
     viewer.do(*actions)
     expected = viewer.picture()
-    viewer.open_scene(source, 1.0)
-    viewer.do(*actions)
     with watched(lambda done, total, doing: made.append(done / total) if doing == MAKING else None):
-        viewer.make_views(only_seen=True)
+        viewer.open(source, pictures_of=pictures_of)
     difference = viewer.picture().astype(float) - expected
     assert np.sqrt((difference**2).mean()) <= off
     assert len(made) - 1 <= views

@@ -1,0 +1,260 @@
+"""Scenes drawn without a window: for `iibr screenshot`, exports, batches and pictures of the documentation.
+
+Worker, state, pictures and panels are those of the window.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+from types import TracebackType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iibr_core.beyond.optics import CENTRE, Optics
+from iibr_core.color import linear_from_srgb
+from iibr_core.depth.editing.edits import UNEDITED, DepthEdits
+from iibr_core.exports.framing import centred, size_in_frame
+from iibr_core.exports.full_picture import FullPicture, encode_light, is_full
+from iibr_core.exports.render_settings import RenderSettings, require_size
+from iibr_core.exports.source import ExportSource, OpticsOf
+from iibr_core.gloss.settings import Gloss
+from iibr_core.runtime.work import report_progress
+from iibr_core.scenes.lens_limits import LensChoice
+from iibr_core.scenes.opening import results_of
+from iibr_core.scenes.scene import MAKING, DepthSettings, Scene, SceneReady, SceneRequest, Source, ViewReady
+from iibr_core.scenes.scene_gloss import make_maps
+from iibr_core.scenes.screen_size import ScreenSize
+from iibr_core.types import SRGB, ColorSpace, FloatImage, ViewOffset
+from viewer.background.comparison_job import ComparisonJob
+from viewer.display.inspection_view import InspectionView
+from viewer.display.scene_view import SceneView
+from viewer.gpu.headless_context import Backend, create_headless
+from viewer.gpu.refocus.views_seen import views_seen_by
+from viewer.model.actions import Action, OpenPath, ProgressMade, SceneOpened, SetState
+from viewer.model.inspection_request import (
+    NO_INSPECTION_TEXTURES,
+    InspectionTextures,
+    beside_of,
+    make_inspection_request,
+)
+from viewer.model.layout import BACKGROUND, Layout, is_narrow, layout_of
+from viewer.model.reducers.root import reduce
+from viewer.model.state.app_state import AppState
+from viewer.model.state.inspection import SetInspection
+
+LAYOUT_FRAMES = 3
+"""Number of frames until the layout is settled: ImGui knows the size of a text once it was built."""
+
+PicturesOf = Callable[[Scene], Iterable[Optics] | None]
+"""Function from a scene to the optics of the pictures that will be drawn of it, None if any may be."""
+
+_threads = threading.local()
+
+
+def open_drawn(
+    source: Source,
+    depth_strength: float,
+    lens: LensChoice,
+    on_ready: Callable[[Scene], None],
+    optics_of: OpticsOf | None = None,
+) -> ExportSource:
+    """Open a scene off screen, see `OpenDrawn`; the previous scene of this thread can no longer be drawn."""
+    if not hasattr(_threads, "scene"):  # GL contexts belong to threads
+        _threads.scene = OffscreenScene()
+    scene: OffscreenScene = _threads.scene
+    return scene.open_for_export(source, depth_strength, lens, on_ready, optics_of)
+
+
+class OffscreenScene:
+    """Open one scene at a time and draw it. Use as a context manager.
+
+    state: as in the window; it may be replaced between pictures. gl: the GL context, which has no window. view,
+    inspection: the views and the inspection's images on the graphics card.
+    """
+
+    def __init__(self, backend: Backend = "auto") -> None:
+        """Create a GL context. Raises InputError if there is none."""
+        self.state = AppState()
+        self.gl = create_headless(backend)
+        self.view = SceneView(self.gl)
+        self.inspection = InspectionView(self.gl, self.view)
+
+    def __enter__(self) -> OffscreenScene:
+        """Return the scene."""
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+        """Free every GL object."""
+        self.inspection.release()
+        self.view.release()
+        self.gl.release()
+
+    def open(
+        self,
+        source: Source,
+        depth_strength: float = 1.0,
+        edits: DepthEdits = UNEDITED,
+        pictures_of: PicturesOf = lambda scene: None,
+    ) -> Scene:
+        """Open a scene and make its views; return the scene.
+
+        edits: edits of its depth. pictures_of: called before the views are made; a photo's views that these pictures
+        do not show are not made. Its exceptions end the opening. Raises InputError.
+        """
+        wanted: set[ViewOffset] | None = None
+        depth = DepthSettings(source.depth.refine, edits)
+        self.state = AppState(depth_strength=depth_strength)
+        self.do(OpenPath(source))
+        request = SceneRequest(self.state.generation, source, depth_strength, depth_settings=depth, takes_drafts=False)
+        results = results_of(request, lambda: CENTRE, lambda: wanted)
+        ready = next(results)
+        assert isinstance(ready, SceneReady)
+        self.do(SceneOpened(ready.generation, ready.scene))
+        self.state = replace(self.state, depth=depth)
+        pictures = pictures_of(ready.scene)
+        if pictures is not None:
+            wanted = views_seen_by(pictures, ready.scene.grid)
+        self.view.open(ready)
+        self.inspection.open()
+        for result in results:
+            assert isinstance(result, ViewReady)
+            self.view.add(result.view)
+            self.inspection.add(result.view)
+            self.view.upload_all()
+            self.do(ProgressMade(result.generation, result.progress, (result.view.row, result.view.column)))
+            report_progress(result.progress.done, result.progress.total, MAKING)
+        return ready.scene
+
+    def open_for_export(
+        self,
+        source: Source,
+        depth_strength: float,
+        lens: LensChoice,
+        on_ready: Callable[[Scene], None],
+        optics_of: OpticsOf | None = None,
+    ) -> ExportSource:
+        """Open a scene to be exported, see `OpenDrawn`."""
+
+        def pictures_of(scene: Scene) -> Iterable[Optics] | None:
+            on_ready(scene)
+            return None if optics_of is None else optics_of(scene, lens.optics_on(scene))
+
+        scene = self.open(source, depth_strength, pictures_of=pictures_of)
+        return ExportSource(scene, self.view.loaded, lens.optics_on(scene), self.draw, self.view.centre)
+
+    @property
+    def scene(self) -> Scene:
+        """The open scene."""
+        assert self.state.scene is not None
+        return self.state.scene
+
+    def do(self, *actions: Action) -> None:
+        """Change the state."""
+        for action in actions:
+            self.state = reduce(self.state, action)
+
+    def pick(self, x_px: float, y_px: float) -> float | None:
+        """Return the disparity seen at a pixel of the picture from the present eye; None if the scene has none."""
+        return self.view.pick(self.state.optics.eye, x_px, y_px)
+
+    def draw(self, settings: RenderSettings) -> NDArray[Any]:
+        """Return a picture of the open scene, see `iibr_core.exports.source.Draw`."""
+        require_size(settings.size_px)
+        self._prepare_gloss(settings.optics.gloss)
+        return self.view.renderer.converged_picture(settings)
+
+    def draws_own_pixels(self, size: ScreenSize | None) -> bool:
+        """Return whether `picture` draws this size from the photo's own pixels, without the views."""
+        return is_full(self.scene, self.state.optics, size or self.scene.size)
+
+    def picture(
+        self, size: ScreenSize | None = None, is_linear: bool = False, color_space: ColorSpace = SRGB
+    ) -> NDArray[Any]:
+        """Return the picture without panels, (height, width, 3), letterboxed into `size`; None: the size of the views.
+
+        It is uint8, encoded by sRGB's curve, or float32 linear light with 1 = white. Raises InputError for sizes out of
+        range, and if the photo cannot be read again at its own size.
+        """
+        frame = ScreenSize(*(size or self.scene.size))
+        box_size = size_in_frame(self.scene, frame)
+        optics = self.state.optics
+        require_size(box_size)
+        if is_full(self.scene, optics, box_size):
+            light = self._full_picture(optics, box_size)
+            pixels = encode_light(light, is_linear, color_space, self.scene.color_space)
+        else:
+            pixels = self.draw(RenderSettings(optics, box_size, is_linear=is_linear, color_space=color_space))
+        background = np.array(BACKGROUND[:3])
+        return centred(pixels, frame, linear_from_srgb(background) if is_linear else np.round(background * 255))
+
+    def _full_picture(self, optics: Optics, size: ScreenSize) -> FloatImage:
+        from iibr_core.exports.full_drawing import draw_full
+
+        loaded, plan = self.view.loaded, self.scene.plan
+        assert loaded is not None
+        assert plan is not None
+        return draw_full(FullPicture(self.scene, plan, loaded, optics, size), self.view.renderer.converged_picture)
+
+    def screen(self, size: ScreenSize) -> NDArray[np.uint8]:
+        """Return the whole window of this size, (height, width, 3). Not for OSMesa, in which ImGui finds no OpenGL."""
+        from viewer.ui.host import UiHost  # pictures alone need no ImGui
+        from viewer.ui.screen import build_screen
+        from viewer.ui.style import Look
+
+        preferences = self.state.preferences
+        look = Look(preferences.font_scale, preferences.theme)
+        self.do(SetState("is_narrow", is_narrow(size, 1.0)))
+        layout = self._layout(size, look.ui_scale)
+        texture, textures = self._draw_textures(layout)
+        target = self.gl.ctx.simple_framebuffer(size, 4)
+        ui = UiHost(look)
+        try:
+            for _ in range(LAYOUT_FRAMES):
+                ui.begin(layout, look)
+                build_screen(self.state, layout, texture, textures)
+                ui.end()
+                target.use()
+                ui.draw()
+            rows = np.frombuffer(target.read(components=3), np.uint8)
+        finally:
+            ui.release()
+            target.release()
+        return rows.reshape(size[1], size[0], 3)[::-1]
+
+    def _layout(self, size: ScreenSize, ui_scale: float) -> Layout:
+        state, scene = self.state, self.state.scene
+        return layout_of(
+            size,
+            scene.size if scene else None,
+            ui_scale=ui_scale,
+            beside=beside_of(state),
+            has_panel=not state.is_panel_hidden,
+            zoom=state.zoom,
+            own_width=(scene.own_size or scene.size).width if scene else None,
+        )
+
+    def _draw_textures(self, layout: Layout) -> tuple[int | None, InspectionTextures]:
+        """Draw the picture and what inspection shows to the end; return their textures."""
+        self._prepare_gloss(self.state.optics.gloss)
+        if not layout.frame_px or not self.view.converge(self.state, layout.frame_px.size, layout.part):
+            return None, NO_INSPECTION_TEXTURES
+        request = make_inspection_request(self.state, is_moving=False, before=None)
+        inputs = self.inspection.inputs(request, self.state)
+        if request is not None and inputs is not None:
+            for result in ComparisonJob().results_of(request, inputs):
+                self.do(*self.inspection.take(result))
+        self.do(SetInspection("probe", self.inspection.probe(self.state)))
+        textures = self.inspection.draw(self.state, layout)
+        while self.inspection.is_drawing:
+            textures = self.inspection.draw(self.state, layout)
+        return self.view.renderer.image_texture, textures
+
+    def _prepare_gloss(self, gloss: Gloss | None) -> None:
+        """Compute the gloss maps if they are missing."""
+        request = self.view.gloss_request(gloss)
+        if request is not None:
+            self.view.take_gloss(make_maps(request))
