@@ -12,8 +12,7 @@ from iibr_core.types import InputError
 from viewer.app.dialogs import has_dialogs
 from viewer.app.dropped_files import actions_from_drop
 from viewer.app.free_camera_view import FreeCameraView
-from viewer.app.gamepad import GamepadReader
-from viewer.app.keys import actions_from_keys, is_touched, read_keys
+from viewer.app.keys import actions_from_keys, read_keys
 from viewer.app.pace import DIALOG_LOOK_S, IDLE_WAIT_S, NoticeClock, Pace
 from viewer.app.pointer import (
     NO_POINTER,
@@ -39,7 +38,6 @@ from viewer.display.preparation import Preparation
 from viewer.display.scene_view import VIEW_REFRESH_S, SceneView
 from viewer.gpu.glfw_context import create_for_window
 from viewer.model.actions import Action, DoTask, OpenPath, Quit, SetState, WorkerLost
-from viewer.model.free_camera import Poses
 from viewer.model.inspection_request import (
     NO_INSPECTION_TEXTURES,
     InspectionTextures,
@@ -50,7 +48,7 @@ from viewer.model.layout import Layout, is_narrow, layout_of
 from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState, Picture
 from viewer.model.state.inspection import SetInspection
-from viewer.model.state.motion import Tick, Touch
+from viewer.model.state.motion import Tick
 from viewer.model.state.preferences import PlaceWindow, is_seen_open
 from viewer.model.state.tasks import ReadTruthTask
 from viewer.ui.host import UiHost
@@ -115,7 +113,6 @@ class App:
         self._sessions = SessionStore(kept_in, wake)
         self._preferences = PreferencesKeeper(self.state, kept_in)
         self._notice_clock = NoticeClock()
-        self._gamepads = GamepadReader()
         self._shown: Frame | None = None
         self._pointer = NO_POINTER
         self._pace = Pace()
@@ -144,8 +141,7 @@ class App:
         self._pointer = pointer = read_pointer(self._pointer)
         if pointer.step_x or pointer.step_y:
             self._pace.pointer_moved_at = time.perf_counter()
-        actions: list[Action] = [Touch()] if self.state.awaits_touch and is_touched() else []
-        actions += gesture_start(pointer, self.state)
+        actions = gesture_start(pointer, self.state)
         thumbnails = self._filmstrip.thumbnails(filmstrip_paths(self.state, layout))
         sharp = self.sharpener.texture(picture) if picture else None
         texture = sharp or (self.scene_view.renderer.image_texture if picture else None)
@@ -181,7 +177,7 @@ class App:
         idle_s = VIEW_REFRESH_S if is_behind else IDLE_WAIT_S
         idle_s = DIALOG_LOOK_S if self._side_effects.is_waiting else idle_s
         is_moving, is_over_panel = self.state.motion.is_running, self._pointer.is_over_panel
-        return self._pace.wait_s(is_moving, is_over_panel, self._gamepads.is_resting, idle_s)
+        return self._pace.wait_s(is_moving, is_over_panel, idle_s)
 
     def layout(self) -> Layout:
         """Where things lie in the window as it is now."""
@@ -237,7 +233,6 @@ class App:
         while (result := self._comparisons.next_result()) is not None:
             actions += self.inspection_view.take(result)
         actions += self._notice_clock.expire(self.state, self._pace.stepped_at)
-        actions += self._gamepads.read(self.window.gamepad(), self.state, self._pace.stepped_at)
         if self.state.motion.is_running:
             actions.append(Tick(self._pace.stepped_at))
         actions += self._place_window()
@@ -265,7 +260,7 @@ class App:
         pick = partial(self.scene_view.pick, self.state.optics.eye)
         actions = actions_from_pointer(pointer, layout, self.state, pick)
         actions += actions_from_hover(pointer, layout, self.state, pick)
-        actions += actions_from_keys(read_keys(pointer.used_space, self.window.struck), self.state)
+        actions += actions_from_keys(read_keys(), self.state)
         actions += gesture_end(pointer)
         return [*actions, Quit()] if self.window.take_closing() else actions
 
@@ -296,9 +291,7 @@ def run(state: AppState, kept_in: Path | None = None) -> None:
         app.run()
 
 
-def initial_state(
-    action: OpenPath, depth_strength: float = 1.0, ground_truth: str | None = None, poses: Poses | None = None
-) -> AppState:
-    """The state to start with: nothing open yet, this asked for, this light field to compare with, and these poses."""
-    state = replace(reduce(AppState(depth_strength=depth_strength), action), poses=poses)
+def initial_state(action: OpenPath, depth_strength: float = 1.0, ground_truth: str | None = None) -> AppState:
+    """Return the state to start with: nothing open yet, this asked for, this light field to compare with."""
+    state = reduce(AppState(depth_strength=depth_strength), action)
     return reduce(state, DoTask(ReadTruthTask(ground_truth))) if ground_truth else state

@@ -22,9 +22,6 @@ MOTION_FRAME_S = 1 / 60
 DIALOG_LOOK_S = 0.1
 """How often an open file dialog is asked for its answer."""
 
-GAMEPAD_LOOK_S = 0.05
-"""How often a gamepad that rests is asked."""
-
 FRAMES_OF_A_CLICK = 3
 """A press and its release, and the next press, are heard of in as many frames."""
 
@@ -44,9 +41,9 @@ class Pace:
     pointer_moved_at: float = 0.0
     took_s: deque[float] = field(default_factory=lambda: deque(maxlen=FRAMES_OF_A_CLICK))
 
-    def wait_s(self, is_moving: bool, is_over_panel: bool, is_pad_resting: bool | None, idle_s: float) -> float:
+    def wait_s(self, is_moving: bool, is_over_panel: bool, idle_s: float) -> float:
         """How long the next turn may sleep. is_moving: the picture, by itself. is_over_panel: the pointer.
-        is_pad_resting: None without a gamepad. idle_s: where nothing is going on.
+        idle_s: where nothing is going on.
         """
         now = time.perf_counter()
         if is_moving:
@@ -55,8 +52,6 @@ class Pace:
             return 0.0
         if is_over_panel and now - self.pointer_moved_at < TOOLTIP_S:
             return TOOLTIP_LOOK_S
-        if is_pad_resting is not None:
-            return GAMEPAD_LOOK_S if is_pad_resting else 0.0
         return idle_s
 
 

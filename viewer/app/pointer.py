@@ -45,9 +45,8 @@ class Pointer:
     """The mouse as seen in one frame, in window units; steps are how far it moved since the frame before.
 
     drag_distance: the farthest from where it was pressed, the frame of its release included. becomes_drag: whether it
-    has been no drag before this frame. pulls: the middle button is down, or the left one was pressed with Space held:
-    the drag moves the picture; used_space: so it did since Space went down. holds_ctrl: Ctrl is down, or was at the
-    frame's beginning.
+    has been no drag before this frame. pulls: the middle button is down: the drag moves the picture. holds_ctrl:
+    Ctrl is down, or was at the frame's beginning.
     """
 
     x: float = 0.0
@@ -66,7 +65,6 @@ class Pointer:
     is_over_panel: bool = False
     holds_ctrl: bool = False
     pulls: bool = False
-    used_space: bool = False
 
 
 NO_POINTER = Pointer()

@@ -203,8 +203,6 @@ _READERS: dict[str, Callable[[Any], Any]] = {
     "folder_order": _folder_order,
     "units": _units,
     "told_sessions": _yes_or_no,
-    "told_aperture": _yes_or_no,
-    "told_drag": _yes_or_no,
     "estimates_depth": _yes_or_no,
     "last_folder": _folder,
 }

@@ -1,23 +1,24 @@
-"""The part of the picture that is seen, drawn again from the photo at its own size while nothing moves.
+"""Draws the visible part of the picture from the photo at its own size while nothing moves.
 
-It takes the place of the one drawn from the views as soon as it is there, and gives it back when anything changes.
+It replaces the picture drawn from the views as soon as it is ready, until anything changes.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Generator
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.exports.full_picture import FullPicture, is_full
+from iibr_core.exports.full_picture import FullPicture, encode_light, is_full
 from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.scenes.scene import LoadedPhoto
 from iibr_core.scenes.screen_size import ScreenSize
-from viewer.background.job_threads import Failed
-from viewer.background.sharpening import SharpeningWorker, SharpPart
+from iibr_core.types import SRGB
+from viewer.background.newest import Failed, Newest, Post
+from viewer.background.window_work import WindowWork
 from viewer.display.scene_view import SceneView
 from viewer.gpu.context import GLContext
 from viewer.gpu.inspection_passes import InspectionPasses
@@ -25,31 +26,38 @@ from viewer.model.actions import Action, Notify
 from viewer.model.state.app_state import AppState, Picture
 from viewer.model.state.notices import Notice
 
+if TYPE_CHECKING:
+    from iibr_core.beyond.full_size import LargePhoto
+
+Pixels = NDArray[np.uint8]
+
 
 class Sharpener:
-    """Everything is called from the one GL thread. pixels: what is shown sharp, None without."""
+    """Everything but `_make` is called from the GL thread. pixels: (H, W, 3) shown sharp, None without."""
 
     def __init__(self, gl: GLContext, scene_view: SceneView, wake: Callable[[], None]) -> None:
-        """wake: called, in the thread that makes parts, when there is something to draw, or a part is drawn."""
-        self.pixels: NDArray[np.uint8] | None = None
+        """wake: called, in the thread that makes parts, when there is something to draw, or a part is ready."""
+        self.pixels: Pixels | None = None
         self._scene_view = scene_view
         self._passes = InspectionPasses(gl.ctx, scene_view.renderer.programs)
-        self._worker = SharpeningWorker(wake, self._draw)
+        self._worker: Newest[FullPicture, Pixels] = Newest("iibr-sharp", self._make, wake)
+        self._window_work = WindowWork(wake)
+        self._kept: tuple[LoadedPhoto, LargePhoto] | None = None
         self._wanted: Picture | None = None
         self._texture: int | None = None
         self._refused: LoadedPhoto | None = None
 
     @property
     def is_drawing(self) -> bool:
-        """Whether `advance` has something to draw here."""
-        return self._worker.window_work.is_waiting
+        """Whether `advance` has something to draw."""
+        return self._window_work.is_waiting
 
     def texture(self, picture: Picture) -> int | None:
-        """GL name of the sharp part (rows bottom-up) that takes the place of this picture; None while there is none."""
+        """Return the GL name of the sharp part (rows bottom-up) of this picture, None while there is none."""
         return self._texture if self._texture is not None and _key(picture) == self._wanted else None
 
     def advance(self, picture: Picture | None, state: AppState, is_resting: bool, budget_s: float) -> list[Action]:
-        """Draw what is to be drawn here, for about that long, have the rest made, and say what went wrong.
+        """Draw for about `budget_s`, request the visible part and report errors.
 
         is_resting: nothing moves, and nothing else is being drawn.
         """
@@ -57,23 +65,38 @@ class Sharpener:
         if key != self._wanted:
             self._stop()
         if picture is None or state.zoom is None:
-            self._worker.forget()
+            self._kept = None
         request = self._request_of(picture, state) if picture is not None and is_resting else None
         if self._wanted is None and request is not None:
             self._wanted = key
             self._worker.submit(request)
         if is_resting:
-            self._worker.window_work.advance(budget_s)
+            self._window_work.advance(budget_s)
         else:
-            self._worker.window_work.forget_stopped()
+            self._window_work.forget_stopped()
         return self._take()
 
     def close(self) -> None:
         """Stop drawing and free the texture."""
         self._stop()
         self._worker.close()
-        self._worker.window_work.forget_stopped()
+        self._window_work.forget_stopped()
         self._passes.release()
+
+    def _make(self, request: FullPicture, post: Post[Pixels]) -> None:
+        """Post the pixels of a part. Keeps the photo, so that the next part is drawn at once."""
+        from iibr_core.exports.full_drawing import draw_full
+
+        def draw(settings: RenderSettings) -> NDArray[Any]:
+            return self._window_work.run(self._draw(settings))
+
+        def keep(photo: LargePhoto) -> None:
+            self._kept = request.loaded, photo
+
+        kept = self._kept
+        photo = kept[1] if kept is not None and kept[0] is request.loaded else None
+        light = draw_full(request, draw, photo, keep)
+        post(encode_light(light, False, SRGB, request.scene.color_space))
 
     def _draw(self, settings: RenderSettings) -> Generator[None, None, NDArray[Any]]:
         """Draw a tile, a step at a time."""
@@ -87,26 +110,25 @@ class Sharpener:
         return drawing.image
 
     def _request_of(self, picture: Picture, state: AppState) -> FullPicture | None:
-        """None where the photo has no more to show than the views."""
+        """Return the request for the visible part, None if the photo has no more detail than the views."""
         scene, loaded = state.scene, self._scene_view.loaded
         if scene is None or scene.plan is None or loaded is None or scene.own_size is None or state.zoom is None:
             return None
-        if state.free_camera is not None:
+        if state.free_camera is not None or loaded is self._refused:
             return None
         is_finer = picture.size_px.width / picture.part.width > scene.width
-        if not is_finer or loaded is self._refused or not is_full(scene, picture.optics, scene.own_size):
+        if not is_finer or not is_full(scene, picture.optics, scene.own_size):
             return None
         return FullPicture(scene, scene.plan, loaded, picture.optics, ScreenSize(*picture.size_px), part=picture.part)
 
     def _take(self) -> list[Action]:
         result = self._worker.next_result()
-        match result:
-            case SharpPart(pixels):
-                self.pixels = pixels
-                self._texture = self._passes.show("sharp", np.ascontiguousarray(pixels[::-1]))
-            case Failed():
-                self._refused = self._scene_view.loaded  # it would fail again
-                return [Notify(Notice(f"Not shown at the photo's own pixels. {result.message}", is_error=True))]
+        if isinstance(result, Failed):
+            self._refused = self._scene_view.loaded  # it would fail again
+            return [Notify(Notice(f"The photo's full detail cannot be shown. {result.message}", is_error=True))]
+        if result is not None:
+            self.pixels = result
+            self._texture = self._passes.show("sharp", np.ascontiguousarray(result[::-1]))
         return []
 
     def _stop(self) -> None:
@@ -115,5 +137,5 @@ class Sharpener:
 
 
 def _key(picture: Picture) -> Picture:
-    """What the sharp part depends on: not on how many views there are, nor how far they have come."""
+    """Return the picture without the number of views and samples, which the sharp part does not depend on."""
     return replace(picture, views_uploaded=0, samples=0)

@@ -20,7 +20,6 @@ from viewer.app.exporter import add_export
 from viewer.app.image_export import settings_of
 from viewer.app.job_queue import JobQueue
 from viewer.app.picture_saver import add_copy, add_save
-from viewer.app.reduced_motion import prefers_reduced_motion
 from viewer.app.save_places import inputs_of_scene
 from viewer.app.session_store import write_sidecar
 from viewer.background.file_worker import FileRequest, FileResult, FileWorker
@@ -43,7 +42,6 @@ from viewer.model.state.model_download import (
     ListModelsTask,
     ModelsListed,
 )
-from viewer.model.state.motion import Sway, Touch
 from viewer.model.state.notices import Notice
 from viewer.model.state.optics_actions import SetOptics
 from viewer.model.state.photo_facts import FactsRead, ReadFactsTask
@@ -52,7 +50,6 @@ from viewer.model.state.saving import CopyTask, PasteTask, WriteSidecarTask, pat
 from viewer.model.state.tasks import (
     ChoosePlaceTask,
     ChooseTask,
-    MaySwayTask,
     ReadMaskTask,
     ReadTruthTask,
     SaveTask,
@@ -126,8 +123,6 @@ class SideEffects:
                 self._submit(partial(_read_mask, self._masks[-1]))
             case ReadTruthTask(path):
                 self._submit(partial(read_truth, path))
-            case MaySwayTask():
-                self._submit(lambda: Touch() if prefers_reduced_motion() else Sway())
             case ReadFactsTask(path):
                 self._submit(partial(_read_facts, path))
             case ListFolderTask(path):
@@ -227,7 +222,7 @@ def _actions_from(result: FileResult, state: AppState) -> list[Action]:
             return [SetOptics("aperture_shape", replace(state.optics.aperture_shape, kind="mask", mask=mask))]
         case FolderContents() as contents:
             return _show_contents(contents, state)
-        case FolderListed() | FactsRead() | Sway() | Touch() | ModelsListed() as found:
+        case FolderListed() | FactsRead() | ModelsListed() as found:
             return [found]
         case Pasted(path):
             return [OpenPath(source_beside(state.source, path))]

@@ -15,7 +15,6 @@ import glfw
 # isort: on
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import InputError
-from viewer.app.gamepad import Gamepad
 
 WINDOW_SIZE = (1280, 800)
 
@@ -30,8 +29,7 @@ class Window:
 
     handle: GLFW's window. size: (width, height) in window units; framebuffer_size: in pixels, (0, 0) while minimised:
     both are as `poll` found them, since each is a question to the display server. damages: how often the system asked
-    for a redraw. struck: by what is written on a key, what was held down when it was pressed last: (Ctrl or Super,
-    Shift).
+    for a redraw.
     """
 
     def __init__(self, title: str, place: tuple[int, int, int, int] | None = None, is_maximized: bool = False) -> None:
@@ -51,8 +49,6 @@ class Window:
         self.damages = 0
         self._place_before = (0, 0, *WINDOW_SIZE)
         self._dropped: list[str] = []
-        self.struck: dict[str, tuple[bool, bool]] = {}
-        glfw.set_key_callback(self.handle, self._on_key)  # ImGui's own calls it
         glfw.set_drop_callback(self.handle, self.on_drop)  # type: ignore[arg-type]  # the stub is wrong
         glfw.set_window_refresh_callback(self.handle, self._on_damage)
         glfw.make_context_current(self.handle)
@@ -132,13 +128,6 @@ class Window:
         """GLFW calls this when files are dropped."""
         self._dropped.extend(paths)
 
-    def _on_key(self, _: Any, key: int, scancode: int, action: int, modifiers: int) -> None:
-        """GLFW calls this in the order of events; ImGui tells but what is held at a frame's end."""
-        name = glfw.get_key_name(key, scancode) if action == glfw.PRESS else None
-        if name:
-            is_ctrl, is_shift = modifiers & (glfw.MOD_CONTROL | glfw.MOD_SUPER), modifiers & glfw.MOD_SHIFT
-            self.struck[name.lower()] = bool(is_ctrl), bool(is_shift)
-
     @property
     def pointer(self) -> tuple[float, float]:
         """(x, y) of the pointer in window units; while files are dropped, where they are."""
@@ -156,22 +145,6 @@ class Window:
             warnings.simplefilter("ignore")  # that it holds something else, or nothing, is no news
             text: Any = glfw.get_clipboard_string(self.handle)
         return (text or b"").decode(errors="replace")
-
-    def gamepad(self) -> Gamepad | None:
-        """What is held on the first gamepad; None without one."""
-        for joystick in range(glfw.JOYSTICK_LAST + 1):
-            if glfw.joystick_is_gamepad(joystick) and (held := glfw.get_gamepad_state(joystick)) is not None:
-                axes, buttons = held.axes, held.buttons
-                return Gamepad(
-                    (axes[glfw.GAMEPAD_AXIS_LEFT_X], axes[glfw.GAMEPAD_AXIS_LEFT_Y]),
-                    (axes[glfw.GAMEPAD_AXIS_RIGHT_X], axes[glfw.GAMEPAD_AXIS_RIGHT_Y]),
-                    (axes[glfw.GAMEPAD_AXIS_LEFT_TRIGGER] + 1) / 2,
-                    (axes[glfw.GAMEPAD_AXIS_RIGHT_TRIGGER] + 1) / 2,
-                    bool(buttons[glfw.GAMEPAD_BUTTON_A]),
-                    bool(buttons[glfw.GAMEPAD_BUTTON_LEFT_BUMPER]),
-                    bool(buttons[glfw.GAMEPAD_BUTTON_RIGHT_BUMPER]),
-                )
-        return None
 
     def show_frame(self) -> None:
         """Put what was drawn on the screen."""

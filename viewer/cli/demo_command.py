@@ -30,7 +30,7 @@ def demo() -> None:
 
     source = Source(str(demo_photo()))
     try:
-        window = App(initial_state(OpenPath(source, is_demo=True)), user_folder())
+        window = App(initial_state(OpenPath(source)), user_folder())
     except InputError as error:
         _demo_pictures(source, str(error))
         return

@@ -21,7 +21,6 @@ from iibr_core.scenes.scene import MAKING
 from iibr_core.types import Camera, FloatImage, InputError
 from viewer.cli.shared_options import given_options, require_model
 from viewer.cli.terminal import print_depth, print_notes, show_progress
-from viewer.model.free_camera import Poses
 
 if TYPE_CHECKING:
     from iibr_core.scenes.scene import LoadedPhoto, Source
@@ -47,17 +46,17 @@ def require_poses_for(photo_pose: int | None, poses: Path | None) -> None:
         raise InputError("--photo-pose says which of --poses is the photo's: give those, too")
 
 
-def poses_of(path: Path, photo_pose: int | None) -> Poses:
-    """The cameras of a file. photo_pose: the number of the photo's, from 1, None for the middle one.
+def poses_of(path: Path, photo_pose: int | None) -> tuple[tuple[Camera, ...], int]:
+    """Return the cameras of a file, and the index of the photo's.
 
-    Raises InputError.
+    photo_pose: number of the photo's camera, from 1, None for the middle one. Raises InputError.
     """
     from iibr_core.formats.poses import central_camera, read_poses
 
     cameras = read_poses(path)
     if photo_pose is not None and photo_pose > len(cameras):
         raise InputError(f"--photo-pose {photo_pose}: {path} holds {len(cameras)}")
-    return Poses(cameras, central_camera(cameras) if photo_pose is None else photo_pose - 1, str(path.absolute()))
+    return cameras, central_camera(cameras) if photo_pose is None else photo_pose - 1
 
 
 def require_views_folder(out: Path, inputs: Sequence[Path], may_replace: bool) -> None:
@@ -72,15 +71,14 @@ def write_free_views(source: Source, poses: Path, photo_pose: int | None, is_lit
     Raises InputError.
     """
     require_model(source.depth)
-    known = poses_of(poses, photo_pose)
+    cameras, given = poses_of(poses, photo_pose)
     with show_progress("reading"):
         from iibr_core.scenes.photo import load_photo
 
         loaded = load_photo(source)
     from iibr_core.beyond.free_cameras import fitted_cameras
 
-    given = known.given
-    pictures = fitted_cameras(known.cameras, given, loaded.photo.size)
+    pictures = fitted_cameras(cameras, given, loaded.photo.size)
     start, unseen = time.perf_counter(), []
     with show_progress(MAKING):
         for done, share in enumerate(_written(out, source, loaded, is_literal, pictures, given), 1):

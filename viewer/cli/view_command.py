@@ -10,15 +10,12 @@ import typer
 from iibr_core.formats.light_fields.light_field_formats import is_light_field
 from iibr_core.scenes.scene import Source
 from iibr_core.types import InputError
-from viewer.cli.free_views_command import poses_of, require_poses_for
 from viewer.cli.option_records import with_option_records
 from viewer.cli.scene_options import SceneOptions, require_heeded
 from viewer.cli.shared_options import (
     SCENE_HELP,
     FocusDisparity,
     Grid,
-    PhotoPose,
-    PosesFile,
     require_existing,
     require_model,
     require_utf8,
@@ -45,8 +42,6 @@ def view(
     scene: SceneOptions,
     focus_disparity: FocusDisparity = None,
     grid: Grid = None,
-    poses: PosesFile = None,
-    photo_pose: PhotoPose = None,
     ground_truth: Annotated[
         Path | None,
         typer.Option("--ground-truth", metavar="FOLDER", help="A light field to compare with.", show_default=False),
@@ -56,7 +51,7 @@ def view(
 
     Example: iibr view holiday.jpg --disparity holiday.pfm
     """
-    require_utf8(path, scene.disparity, scene.depth_model, ground_truth, poses)
+    require_utf8(path, scene.disparity, scene.depth_model, ground_truth)
     path = path.absolute() if path else demo_photo()
     source = scene.source(path, grid, focus_disparity)
     require_heeded(context, path)
@@ -64,13 +59,9 @@ def view(
     require_model(source.depth)
     if ground_truth is not None and not is_light_field(ground_truth):
         raise InputError(f"{ground_truth}: is not a folder; --ground-truth names one with the views of a light field")
-    require_poses_for(photo_pose, poses)
-    if poses is not None and is_light_field(path):
-        raise InputError(f"--poses: {path} is a light field, whose views stand where they stand; open a photo with it")
-    cameras = None if poses is None else poses_of(poses, photo_pose)
     from viewer.app.main_loop import initial_state, run
     from viewer.app.preferences_store import user_folder
     from viewer.model.actions import OpenPath
 
     truth = str(ground_truth.absolute()) if ground_truth else None
-    run(initial_state(OpenPath(source), scene.depth_strength, truth, cameras), user_folder())
+    run(initial_state(OpenPath(source), scene.depth_strength, truth), user_folder())

@@ -79,10 +79,9 @@ class Redo:
 
 @dataclass(frozen=True)
 class OpenPath:
-    """Open a photo or a light-field folder instead of the present scene. is_demo: show what can be done with it."""
+    """Open a photo or a light-field folder instead of the present scene."""
 
     source: Source
-    is_demo: bool = False
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import PurePath
-from typing import Literal
 
 from iibr_core.depth.editing.edits import BRUSH_TOOLS, BrushTool
 from iibr_core.exports.loops import LOOPS, LoopKind
@@ -30,7 +29,7 @@ from viewer.model.actions import (
 )
 from viewer.model.demo_photo import demo_photo
 from viewer.model.dense_grid import next_denser
-from viewer.model.free_camera import MoveCamera, StepPose
+from viewer.model.free_camera import MoveCamera
 from viewer.model.lens.presets import PRESETS
 from viewer.model.state.app_state import AppState
 from viewer.model.state.depth_editing import ResetDepth, SetBrush, SetTone
@@ -105,20 +104,17 @@ class Chord:
         return "Ctrl+" * self.ctrl + "Shift+" * self.shift + key
 
 
-WhenHeld = Literal["once", "repeats", "paced", "awaits photo"]
-"""What a command does while its key stays down: no more; the same again; the same, as often in a second however long a
-frame takes; the same, once the photo asked for before is shown.
-"""
-
-
 @dataclass(frozen=True)
 class Command:
-    """One thing that can be done. action: of the state in which it was asked for."""
+    """One thing that can be done.
+
+    action: returns the action for a state. repeats: while the key is held.
+    """
 
     name: str
     action: Callable[[AppState], Action]
     chords: tuple[Chord, ...] = ()
-    when_held: WhenHeld = "once"
+    repeats: bool = False
 
 
 def _always(action: Action) -> Callable[[AppState], Action]:
@@ -180,13 +176,13 @@ def _invert_depth(state: AppState) -> Action:
 COMMANDS: tuple[Command, ...] = (
     Command("Open a photo…", _always(DoTask(ChooseTask("photo"))), (Chord("o", ctrl=True),)),
     Command("Open a folder…", _always(DoTask(ChooseTask("folder"))), (Chord("o", ctrl=True, shift=True),)),
-    Command("See the demo", lambda state: OpenPath(Source(str(demo_photo())), is_demo=True)),
+    Command("See the demo", lambda state: OpenPath(Source(str(demo_photo())))),
     Command("Save the picture…", _always(AskToSave()), (Chord("s", ctrl=True),)),
     Command("Copy the picture", _always(DoTask(CopyTask())), (Chord("c", ctrl=True),)),
     Command("Paste a picture, or the path of one", _always(DoTask(PasteTask())), (Chord("v", ctrl=True),)),
     Command("Save these settings beside the photo", _always(DoTask(WriteSidecarTask()))),
-    Command("Next photo of the folder", _always(StepPhoto(1)), (Chord("page_down"),), when_held="awaits photo"),
-    Command("Previous photo of the folder", _always(StepPhoto(-1)), (Chord("page_up"),), when_held="awaits photo"),
+    Command("Next photo of the folder", _always(StepPhoto(1)), (Chord("page_down"),), repeats=True),
+    Command("Previous photo of the folder", _always(StepPhoto(-1)), (Chord("page_up"),), repeats=True),
     Command(
         "Filmstrip",
         lambda state: SetPreference("shows_filmstrip", not state.preferences.shows_filmstrip),
@@ -195,22 +191,20 @@ COMMANDS: tuple[Command, ...] = (
     Command("Photos by name", _always(SetFolderOrder("name"))),
     Command("Photos by time", _always(SetFolderOrder("time"))),
     Command("Share or export…", _always(AskToExport()), (Chord("e", ctrl=True),)),
-    Command("Undo", _always(Undo()), (Chord("z", ctrl=True),), "repeats"),
-    Command("Redo", _always(Redo()), (Chord("z", ctrl=True, shift=True), Chord("y", ctrl=True)), "repeats"),
+    Command("Undo", _always(Undo()), (Chord("z", ctrl=True),), repeats=True),
+    Command("Redo", _always(Redo()), (Chord("z", ctrl=True, shift=True), Chord("y", ctrl=True)), repeats=True),
     Command("Reset viewpoint, focus and aperture", _always(ResetOptics()), (Chord("r"),)),
     Command("Recenter", _always(ReturnHome()), (Chord("c"),)),
     *(Command(f"Preset: {name}", _always(ApplyPreset(name))) for name in PRESETS),
     *(Command(f"Motion: {LOOP_WORDS[kind].lower()}", _always(SetLoop(kind))) for kind in LOOPS),
     Command("Motion: pause or resume", lambda state: PauseMotion(not state.motion.is_paused), (Chord("space"),)),
     Command("Motion: stop", _always(SetLoop(None))),
-    Command("Step forward", _always(MoveCamera(forward=CAMERA_STEP)), (Chord("w"),), "paced"),
-    Command("Step back", _always(MoveCamera(forward=-CAMERA_STEP)), (Chord("s"),), "paced"),
-    Command("Look up", _always(MoveCamera(down=-CAMERA_STEP)), (Chord("w", shift=True),), "paced"),
-    Command("Look down", _always(MoveCamera(down=CAMERA_STEP)), (Chord("s", shift=True),), "paced"),
-    Command("Look left", _always(MoveCamera(right=-CAMERA_STEP)), (Chord("a", shift=True),), "paced"),
-    Command("Look right", _always(MoveCamera(right=CAMERA_STEP)), (Chord("d", shift=True),), "paced"),
-    Command("Next pose", _always(StepPose(1)), (Chord("n"),), "repeats"),
-    Command("Previous pose", _always(StepPose(-1)), (Chord("n", shift=True),), "repeats"),
+    Command("Step forward", _always(MoveCamera(forward=CAMERA_STEP)), (Chord("w"),), repeats=True),
+    Command("Step back", _always(MoveCamera(forward=-CAMERA_STEP)), (Chord("s"),), repeats=True),
+    Command("Look up", _always(MoveCamera(down=-CAMERA_STEP)), (Chord("w", shift=True),), repeats=True),
+    Command("Look down", _always(MoveCamera(down=CAMERA_STEP)), (Chord("s", shift=True),), repeats=True),
+    Command("Look left", _always(MoveCamera(right=-CAMERA_STEP)), (Chord("a", shift=True),), repeats=True),
+    Command("Look right", _always(MoveCamera(right=CAMERA_STEP)), (Chord("d", shift=True),), repeats=True),
     Command("Tilt handles", lambda state: ShowTiltHandles(state.tilt_handles is None), (Chord("t"),)),
     Command("Depth brush", _toggle_brush, (Chord("b"),)),
     *(Command(f"Depth brush: {BRUSH_WORDS[tool].lower()}", _brush_with(tool)) for tool in BRUSH_TOOLS),
@@ -254,9 +248,9 @@ COMMANDS: tuple[Command, ...] = (
         "Larger text",
         _scale_text(FONT_STEP),
         (Chord("equal", ctrl=True), Chord("equal", ctrl=True, shift=True)),
-        "repeats",
+        repeats=True,
     ),
-    Command("Smaller text", _scale_text(1 / FONT_STEP), (Chord("minus", ctrl=True),), "repeats"),
+    Command("Smaller text", _scale_text(1 / FONT_STEP), (Chord("minus", ctrl=True),), repeats=True),
     Command("Reset text size", _always(SetPreference("font_scale", 1.0)), (Chord("_0", ctrl=True),)),
     Command("All commands", _toggle_palette, (Chord("p", ctrl=True),)),
     Command("Mouse and keys", _toggle_help, (Chord("f1"),)),

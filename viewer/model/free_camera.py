@@ -1,42 +1,33 @@
-"""A camera that leaves the plane of the views: it looks around, steps forward, stands at a pose from a file."""
+"""A camera that leaves the plane of the views: it looks around and steps forward, within fixed limits."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
-from iibr_core.types import Camera
+from iibr_core.scenes.lens_limits import clamp
 
-MOST_ASIDE = 0.6
-"""Of half the picture."""
-FORWARD_LIMITS = -0.4, 0.6
-"""In distances of the nearest."""
-LEAST_SEEN = 0.85
-"""Of the camera's picture must lie within the photo's frame: it stops where more would be synthesised."""
-END_SLACK = 1e-3
-STOP_STEPS = 20
-"""Halvings of a step, to find where it stops."""
-
-
-@dataclass(frozen=True, eq=False)
-class Poses:
-    """Cameras from a file. given: index of the one that took the photo. file: where they stand, "" for nowhere."""
-
-    cameras: tuple[Camera, ...]
-    given: int
-    file: str = ""
+MAX_ASIDE = 0.3
+"""Largest turn to each side, in halves of the picture: at most 15 % of the view lies beyond the photo."""
+FORWARD_LIMITS = -0.1, 0.6
+"""Farthest step back and forward, in distances of the nearest surface."""
 
 
 @dataclass(frozen=True)
 class FreeCamera:
-    """pose: index among the poses, None for the photo's own place. right, down: where it looks, 1 is the place where
-    the picture's border was. forward: in distances of the nearest.
+    """Pose of the camera, relative to the photo's.
+
+    right, down: the turn; 1 looks at what was at the picture's border. forward: in distances of the nearest surface.
     """
 
-    pose: int | None = None
     right: float = 0.0
     down: float = 0.0
     forward: float = 0.0
+
+    @property
+    def is_at_end(self) -> bool:
+        """Whether the camera has reached a limit."""
+        return max(abs(self.right), abs(self.down)) >= MAX_ASIDE or self.forward in FORWARD_LIMITS
 
 
 @dataclass(frozen=True)
@@ -46,13 +37,6 @@ class MoveCamera:
     right: float = 0.0
     down: float = 0.0
     forward: float = 0.0
-
-
-@dataclass(frozen=True)
-class StepPose:
-    """Stand at the pose so many further on."""
-
-    steps: int
 
 
 @dataclass(frozen=True)
@@ -67,53 +51,13 @@ class CameraProgress:
     done: float | None
 
 
-FreeCameraAction = MoveCamera | StepPose | LeaveCamera | CameraProgress
+FreeCameraAction = MoveCamera | LeaveCamera | CameraProgress
 
 
-def seen_share(camera: FreeCamera, depth: float) -> float:
-    """How much of the camera's picture lies within the photo's frame, where what it looks at is so far from the photo
-    (in distances of the nearest); relative to its pose. The turn counts as a shift of the picture.
-    """
-    reach = (depth - camera.forward) / depth
-    shares = 1.0
-    for aside in (camera.right, camera.down):
-        low, high = (aside - 1) * reach, (aside + 1) * reach
-        shares *= max(min(high, 1.0) - max(low, -1.0), 0.0) / (high - low)
-    return shares
-
-
-def is_at_end(camera: FreeCamera, depth: float) -> bool:
-    """Whether the camera can go no farther one way: there the photo, or what is near, ends."""
-    asides = max(abs(camera.right), abs(camera.down))
-    is_limit = asides >= MOST_ASIDE or camera.forward in FORWARD_LIMITS
-    return is_limit or seen_share(camera, depth) < LEAST_SEEN + END_SLACK
-
-
-def moved(camera: FreeCamera, action: MoveCamera, depth: float) -> FreeCamera:
-    """The camera within its limits, see `seen_share`; as it was where the numbers are not finite."""
+def moved(camera: FreeCamera, action: MoveCamera) -> FreeCamera:
+    """Return the moved camera within its limits; the same camera if a number is not finite."""
     right, down, forward = camera.right + action.right, camera.down + action.down, camera.forward + action.forward
     if not all(map(math.isfinite, (right, down, forward))):
         return camera
-    right, down = (min(max(aside, -MOST_ASIDE), MOST_ASIDE) for aside in (right, down))
-    there = replace(camera, right=right, down=down, forward=min(max(forward, FORWARD_LIMITS[0]), FORWARD_LIMITS[1]))
-    if seen_share(there, depth) >= min(LEAST_SEEN, seen_share(camera, depth)):
-        return there
-    inside, beyond = 0.0, 1.0
-    for _ in range(STOP_STEPS):
-        middle = (inside + beyond) / 2
-        is_seen = seen_share(_on_the_way(camera, there, middle), depth) >= LEAST_SEEN
-        inside, beyond = (middle, beyond) if is_seen else (inside, middle)
-    return _on_the_way(camera, there, inside)
-
-
-def _on_the_way(start: FreeCamera, end: FreeCamera, share: float) -> FreeCamera:
-    right, down, forward = (
-        a + share * (b - a) for a, b in ((start.right, end.right), (start.down, end.down), (start.forward, end.forward))
-    )
-    return replace(end, right=right, down=down, forward=forward)
-
-
-def stepped(camera: FreeCamera, poses: Poses, steps: int) -> FreeCamera:
-    """At the next pose, looking as it does; the first one after the photo's own comes first."""
-    before = poses.given if camera.pose is None else camera.pose
-    return FreeCamera((before + steps) % len(poses.cameras))
+    right, down = (clamp(turn, -MAX_ASIDE, MAX_ASIDE) for turn in (right, down))
+    return FreeCamera(right, down, clamp(forward, *FORWARD_LIMITS))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import threading
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,11 +10,10 @@ import numpy as np
 import pytest
 
 from iibr_core.formats.images.photo import read_photo
-from iibr_core.types import Camera, ImageSize
-from tests.viewer.conftest import HEIGHT, WIDTH, Driver
+from tests.viewer.conftest import Driver
 from viewer.app import picture_saver
 from viewer.model.actions import DoTask
-from viewer.model.free_camera import FreeCamera, Poses
+from viewer.model.free_camera import FreeCamera
 from viewer.model.state.optics_actions import SetAperture, SetFocus
 from viewer.model.state.tasks import SaveTask
 from viewer.ui.overlays.chips import CHIP
@@ -109,18 +107,3 @@ def test_pictures_that_wait_show_what_the_camera_saw(
     for path, image in zip(paths, expected):
         np.testing.assert_allclose(255 * read_photo(path).pixels, image, atol=1.01)
     assert not np.array_equal(expected[0], expected[2])
-
-
-def test_poses_are_stepped_through_and_what_sees_nothing_is_told(viewer: Driver) -> None:
-    straight = Camera(
-        np.eye(3), np.zeros(3), ImageSize(HEIGHT, WIDTH), (100.0, 100.0), ((WIDTH - 1) / 2, (HEIGHT - 1) / 2), "own"
-    )
-    aside = replace(straight, position=np.array([0.1, 0.0, 0.0]), source="aside")
-    viewer.app.state = replace(viewer.app.state, poses=Poses((straight, aside), 0))
-    viewer.send("key", "n")
-    viewer.until(lambda app: app.state.free_camera == FreeCamera(1))
-    moved_px = 100.0 * 0.1  # the nearest is 1 away
-    assert red_places(seen(viewer))[:, 0].mean() == pytest.approx(0.5 - moved_px / WIDTH, abs=0.02)
-    away = replace(straight, world_from_camera=np.diag([-1.0, 1.0, -1.0]), source="pose away")
-    viewer.app.state = replace(viewer.app.state, poses=Poses((straight, away), 0))
-    viewer.until(lambda app: any("pose away: sees nothing" in notice.text for notice in app.state.notices))

@@ -14,7 +14,6 @@ from viewer.model.actions import Action, AskToSave, SetState, ShowPrompt, Undo
 from viewer.model.commands import BY_NAME, COMMANDS
 from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState
-from viewer.model.state.folder import StepPhoto
 from viewer.model.state.inspection import Compare, SetInspection, SetOverlay
 from viewer.model.state.optics_actions import MoveEye, ResetOptics
 from viewer.model.state.prompts import PalettePrompt
@@ -52,18 +51,8 @@ def test_what_is_typed_too_early_is_no_command() -> None:
     assert len(actions_from_keys(keys, replace(STATE, prompt="help"))) == 3
 
 
-def test_a_held_key_goes_on_to_the_next_photo_once_the_one_before_is_shown() -> None:
-    name = "Next photo of the folder"
-    pressed, held = Keys(commands=(name,)), Keys(commands=(name,), repeats=frozenset({name}))
-    waiting = replace(STATE, generation=STATE.shown_generation + 1)
-    assert actions_from_keys(held, STATE) == actions_from_keys(pressed, waiting) == [StepPhoto(1)]
-    assert actions_from_keys(held, waiting) == []
-    undo = Keys(commands=("Undo",), repeats=frozenset({"Undo"}))
-    assert actions_from_keys(undo, waiting) == [Undo()]
-
-
 def test_what_is_switched_is_not_switched_back_while_its_key_is_held() -> None:
-    repeating = {command.name for command in COMMANDS if command.when_held != "once"}
+    repeating = {command.name for command in COMMANDS if command.repeats}
     for name in ("Undo", "Redo", "Larger text", "Smaller text", "Step forward", "Next photo of the folder"):
         assert name in repeating
     for name in ("Before and after", "Depth brush", "Full screen", "Hide or show the panel", "All views"):

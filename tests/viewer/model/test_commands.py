@@ -55,7 +55,7 @@ def test_what_the_commands_bring_up() -> None:
     assert helped.prompt == "help"
     assert reduce(helped, BY_NAME["Mouse and keys"].action(helped)).prompt is None
     shown = reduce(AppState(), BY_NAME["See the demo"].action(AppState()))
-    assert (shown.source, shown.awaits_touch) == (Source(str(demo_photo())), True)
+    assert shown.source == Source(str(demo_photo()))
     listed = reduce(state, BY_NAME["All commands"].action(state))
     assert listed.prompt == PalettePrompt()
     assert reduce(AppState(), BY_NAME["Save the picture…"].action(AppState())).prompt is None

@@ -21,7 +21,6 @@ from viewer.model.actions import (
     Undo,
 )
 from viewer.model.reducers.history_reducer import EDITS_KEPT
-from viewer.model.reducers.lens_reducer import APERTURE_OPENED
 from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState
 from viewer.model.state.motion import ReturnHome, SetLoop, Tick
@@ -122,17 +121,6 @@ def test_going_home_by_its_key_keeps_what_was_clicked_before() -> None:
     home = after(clicked, ReturnHome())
     assert home.optics.focus_disparity == -1
     assert after(home, Undo(), Undo()).optics.focus_disparity == 0
-
-
-def test_a_double_click_takes_back_what_its_first_click_said_too() -> None:
-    """The aperture is closed again: that it opens by itself is still to be told."""
-    clicked = after(state_with(scene_of()), FocusOn((0.0, 0.0), -1.0), EndGesture())
-    assert clicked.preferences.told_aperture
-    assert [notice.text for notice in clicked.notices] == [APERTURE_OPENED]
-    home = after(clicked, ReturnHome(takes_back_click=True))
-    assert home.optics.aperture_diameter == 0
-    assert not home.notices
-    assert not home.preferences.told_aperture
 
 
 def test_reset_takes_all_of_the_lens_back_in_one_step() -> None:

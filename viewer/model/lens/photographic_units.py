@@ -84,12 +84,6 @@ def metres(scene: Scene, disparity: float) -> float | None:
     return 1 / inverse if inverse > 1 / FARTHEST_M else math.inf
 
 
-def mean_depth(scene: Scene) -> float:
-    """Of what the photo shows, in distances of the nearest: in the middle of their inverses."""
-    far, near = (disparity - scene.infinity_px for disparity in scene.disparity_range_px)
-    return 2 / (1 + max(far, 0.0) / near) if near > 0 else 1.0
-
-
 def metres_text(distance_m: float) -> str:
     """For people: "0.42 m", "12 m", "∞"."""
     if math.isinf(distance_m):

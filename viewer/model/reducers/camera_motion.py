@@ -10,12 +10,7 @@ from iibr_core.exports.loops import point_on_loop
 from iibr_core.types import GridShape, ViewOffset
 from viewer.model.state.motion import Motion, MotionKind
 
-HOME_S, SWAY_TURN_S = 0.4, 8.0
-SWAY_TURNS = 8
-"""Then it rests, as a window that nobody looks at should."""
-
-SWAY_REACH = (0.12, 0.35)
-"""Of the grid's radius, down and right: well within the views."""
+HOME_S = 0.4
 
 LONGEST_STEP_S = 0.1
 """After a hiccup the motion goes on from where it was, without a leap."""
@@ -30,41 +25,21 @@ def start_motion(motion: Motion, kind: MotionKind | None, optics: Optics) -> Mot
 
 
 def advance_motion(motion: Motion, optics: Optics, grid: GridShape, now_s: float) -> tuple[Motion, Optics]:
-    """Motion and optics when the clock shows now_s. Glides end where they arrive, a sway after a while."""
+    """Motion and optics when the clock shows now_s. Glides end where they arrive."""
     if not motion.is_running or not math.isfinite(now_s):
         return motion, optics
     step_s = 0.0 if motion.ticked_s is None else min(max(now_s - motion.ticked_s, 0.0), LONGEST_STEP_S)
-    turns = motion.turns + step_s * _turns_per_s(motion)
+    turns = motion.turns + step_s * (1 / HOME_S if motion.kind == "home" else motion.speed)
     motion = replace(motion, turns=turns, ticked_s=now_s)
     if motion.kind == "home":
         left = 1 - ease(turns)
         eye = ViewOffset(motion.start.t * left, motion.start.s * left)
         there = replace(optics, eye=eye, dolly=motion.start_dolly * left)
         return (replace(motion, kind=None), replace(there, eye=CENTRE, dolly=0.0)) if turns >= 1 else (motion, there)
-    if motion.kind == "sway":
-        eye = _swayed(motion.start, turns, grid)
-        return (replace(motion, kind=None) if turns >= SWAY_TURNS else motion), replace(optics, eye=eye)
     share = ease(turns / EASE_IN_TURNS)
     goal = point_on_loop(motion.kind, turns, grid)
     eye = ViewOffset(*(a + share * (b - a) for a, b in zip(motion.start, goal)))
     return motion, replace(optics, eye=eye)
-
-
-def _turns_per_s(motion: Motion) -> float:
-    """Only that of the loops is the user's."""
-    match motion.kind:
-        case "home":
-            return 1 / HOME_S
-        case "sway":
-            return 1 / SWAY_TURN_S
-    return motion.speed
-
-
-def _swayed(start: ViewOffset, turns: float, grid: GridShape) -> ViewOffset:
-    """On an ellipse about `start`, which grows out of it and shrinks to it in the end."""
-    angle, size = 2 * math.pi * turns, ease(turns) * ease(SWAY_TURNS - turns)
-    down, right = (size * reach * (views - 1) / 2 for reach, views in zip(SWAY_REACH, grid))
-    return ViewOffset(start.t - down * math.cos(angle), start.s + right * math.sin(angle))
 
 
 def ease(share: float) -> float:

@@ -9,18 +9,13 @@ from viewer.model.free_camera import (
     FreeCamera,
     FreeCameraAction,
     LeaveCamera,
-    MoveCamera,
-    StepPose,
     moved,
-    stepped,
 )
-from viewer.model.lens.photographic_units import mean_depth
 from viewer.model.reducers.notices_reducer import add_notice
 from viewer.model.state.app_state import AppState
 from viewer.model.state.notices import Notice
 
 FOR_PHOTOS = "A light field from disk has views from its own plane only: open a photo to look around."
-NO_POSES = "There are no poses: the photo was opened without any."
 
 
 def reduce_free_camera(state: AppState, action: FreeCameraAction) -> AppState:
@@ -34,9 +29,4 @@ def reduce_free_camera(state: AppState, action: FreeCameraAction) -> AppState:
     if state.scene.plan is None:
         return add_notice(state, Notice(FOR_PHOTOS))
     camera = state.free_camera or FreeCamera()
-    match action:
-        case MoveCamera():
-            return replace(state, free_camera=moved(camera, action, mean_depth(state.scene)))
-        case StepPose(steps) if state.poses is not None:
-            return replace(state, free_camera=stepped(camera, state.poses, steps))
-    return add_notice(state, Notice(NO_POSES))
+    return replace(state, free_camera=moved(camera, action))

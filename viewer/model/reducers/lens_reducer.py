@@ -22,9 +22,7 @@ from iibr_core.types import ViewOffset
 from viewer.model.actions import SamePlaces
 from viewer.model.lens.focal_plane import focus_on, sharp_disparity, tilt_through
 from viewer.model.lens.presets import preset_optics
-from viewer.model.reducers.notices_reducer import add_notice
 from viewer.model.state.app_state import AppState, TiltHandles
-from viewer.model.state.notices import Notice
 from viewer.model.state.optics_actions import (
     ApplyPreset,
     FocusOn,
@@ -43,7 +41,6 @@ POINT_SPACING = 1 / 6
 """Distance between the points of a gloss stroke, as a share of its radius."""
 SHARP_SHARE = 0.05
 """Of the range of disparity: a place as near to the focus was made sharp by the click on it."""
-APERTURE_OPENED = "Focusing opened the aperture a little: what is nearer or farther blurs. Its slider sets how much."
 
 
 def reduce_lens(state: AppState, action: LensAction) -> AppState:
@@ -61,9 +58,7 @@ def reduce_lens(state: AppState, action: LensAction) -> AppState:
 
 
 def _note_choice(state: AppState, action: LensAction) -> AppState:
-    """Remember what the user has decided about focus and aperture, and that the viewpoint can be moved. Where the tilt
-    goes, its handles do too.
-    """
+    """Remember what the user has decided about focus and aperture. Where the tilt goes, its handles do too."""
     match action:
         case FocusOn(place):
             return replace(state, has_chosen_focus=True, focused_at=place)
@@ -75,8 +70,6 @@ def _note_choice(state: AppState, action: LensAction) -> AppState:
             return replace(state, has_chosen_aperture=True, has_chosen_focus=False, tilt_handles=None)
         case ResetOptics():
             return replace(state, has_chosen_aperture=False, has_chosen_focus=False, tilt_handles=None)
-        case MoveEye() if not state.preferences.told_drag:
-            return replace(state, preferences=replace(state.preferences, told_drag=True))
     return state
 
 
@@ -85,22 +78,7 @@ def _open_for_focus(state: AppState, scene: Scene) -> AppState:
     diameter = first_aperture(scene)
     if state.has_chosen_aperture or state.optics.aperture_diameter > 0 or diameter == 0:
         return state
-    opened = replace(state, optics=replace(state.optics, aperture_diameter=diameter))
-    if state.preferences.told_aperture:
-        return opened
-    return add_notice(_tell_aperture(opened, True), Notice(APERTURE_OPENED))
-
-
-def take_back_opening(state: AppState) -> AppState:
-    """Where the click that opened the aperture no longer counts, what it said is still to be said."""
-    notices = tuple(notice for notice in state.notices if notice.text != APERTURE_OPENED)
-    if notices == state.notices or state.optics.aperture_diameter > 0:
-        return state
-    return replace(_tell_aperture(state, False), notices=notices)
-
-
-def _tell_aperture(state: AppState, is_told: bool) -> AppState:
-    return replace(state, preferences=replace(state.preferences, told_aperture=is_told))
+    return replace(state, optics=replace(state.optics, aperture_diameter=diameter))
 
 
 def _edit_optics(state: AppState, scene: Scene, action: LensAction) -> Optics:

@@ -8,18 +8,14 @@ from dataclasses import replace
 from iibr_core.scenes.lens_limits import clamp, clamp_optics
 from viewer.model.reducers.camera_motion import advance_motion, start_motion
 from viewer.model.reducers.history_reducer import record_edit
-from viewer.model.reducers.lens_reducer import take_back_opening
 from viewer.model.state.app_state import AppState
 from viewer.model.state.motion import (
-    Motion,
     MotionAction,
     PauseMotion,
     ReturnHome,
     SetLoop,
     SetSpeed,
-    Sway,
     Tick,
-    Touch,
 )
 from viewer.model.window_limits import SPEED_LIMITS
 
@@ -27,8 +23,6 @@ from viewer.model.window_limits import SPEED_LIMITS
 def reduce_motion(state: AppState, action: MotionAction) -> AppState:
     """The state after an action that begins, holds or ends a motion; without a scene there is none."""
     motion, scene = state.motion, state.scene
-    if isinstance(action, Touch):
-        return touch(state)
     if scene is None:
         return state
     match action:
@@ -44,18 +38,10 @@ def reduce_motion(state: AppState, action: MotionAction) -> AppState:
             return replace(state, motion=replace(motion, speed=clamp(speed, *SPEED_LIMITS)))
         case PauseMotion(is_paused):
             return replace(state, motion=replace(motion, is_paused=is_paused, ticked_s=None))
-        case Sway() if state.awaits_touch and motion.kind is None:
-            return replace(state, motion=start_motion(motion, "sway", state.optics))
         case Tick(now_s):
             motion, optics = advance_motion(motion, state.optics, scene.grid, now_s)
             return replace(state, motion=motion, optics=clamp_optics(optics, scene))
     return state
-
-
-def touch(state: AppState) -> AppState:
-    """The demo holds still where it is, and stays so."""
-    motion = Motion(speed=state.motion.speed) if state.motion.kind == "sway" else state.motion
-    return replace(state, awaits_touch=False, motion=motion)
 
 
 def _without_click(state: AppState) -> AppState:
@@ -63,5 +49,4 @@ def _without_click(state: AppState) -> AppState:
     history = state.history
     if history.last != "FocusOn" or not history.past:
         return state
-    before = replace(state, optics=history.past[-1].optics, history=replace(history, past=history.past[:-1], last=""))
-    return take_back_opening(before)
+    return replace(state, optics=history.past[-1].optics, history=replace(history, past=history.past[:-1], last=""))

@@ -47,7 +47,7 @@ from viewer.model.reducers.free_camera_reducer import reduce_free_camera
 from viewer.model.reducers.history_reducer import end_gesture, record_edit, redo, undo
 from viewer.model.reducers.inspection_reducer import move_pointer, reduce_inspection, release_divider
 from viewer.model.reducers.lens_reducer import reduce_lens, with_focus_of
-from viewer.model.reducers.motion_reducer import reduce_motion, touch
+from viewer.model.reducers.motion_reducer import reduce_motion
 from viewer.model.reducers.notices_reducer import add_notice
 from viewer.model.reducers.preferences_reducer import reduce_preferences
 from viewer.model.reducers.worker_events import reduce_worker_event, stop_work
@@ -86,7 +86,6 @@ def reduce(state: AppState, action: Action) -> AppState:
     if isinstance(action, VerbAction):
         return action.apply(state)
     if isinstance(action, LensAction):
-        state = touch(state) if state.awaits_touch else state
         state = replace(state, shows_before=False) if state.shows_before else state
         state = replace(state, free_camera=None) if isinstance(action, ResetOptics) else state
         kind = action.field if isinstance(action, SetOptics) else type(action).__name__
@@ -150,12 +149,12 @@ def _reduce_files(state: AppState, action: Action) -> AppState:
         case SetFolderOrder(order):
             state = replace(state, preferences=replace(state.preferences, folder_order=order))
             return list_folder(state, state.folder.path, state.folder.photos) if state.folder is not None else state
-        case OpenPath(source, is_demo):
+        case OpenPath(source):
             source = _with_filled_views(state, source)
             progress = Progress(doing=f"reading {PurePath(source.path).name}")
             generation, left = state.next_generation, _leave_field(state)
             models = replace(state.models, asked=None, left_focus=None)
-            state = replace(state, free_camera=None, poses=None, prompt=None, awaits_touch=is_demo, models=models)
+            state = replace(state, free_camera=None, prompt=None, models=models)
             return replace(state, source=source, progress=progress, generation=generation, left_field=left)
         case ViewsFilled(field):
             return _take_filled(replace(state, filled=field), field.scene.source)
@@ -274,7 +273,7 @@ def _take_settings(state: AppState, settings: SavedSettings) -> AppState:
         return state
     optics = clamp_optics(settings.optics_at(state.scene.width), state.scene)
     notices = tuple(notice for notice in state.notices if notice.offer != settings)
-    return replace(touch(state), optics=optics, notices=notices, motion=Motion(speed=state.motion.speed))
+    return replace(state, optics=optics, notices=notices, motion=Motion(speed=state.motion.speed))
 
 
 def _restore(state: AppState, settings: SavedSettings) -> AppState:

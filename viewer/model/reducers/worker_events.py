@@ -7,7 +7,7 @@ from pathlib import PurePath
 
 from iibr_core.beyond.optics import Optics
 from iibr_core.depth.editing.edits import UNEDITED
-from iibr_core.scenes.lens_limits import clamp_optics, first_aperture, focus_limits
+from iibr_core.scenes.lens_limits import clamp_optics, focus_limits
 from iibr_core.scenes.scene import DepthSettings, Progress, Scene
 from iibr_core.types import InputError
 from viewer.model.actions import OpenFailed, ProgressMade, SamePlaces, SceneOpened, WorkerEvent
@@ -23,7 +23,6 @@ from viewer.model.state.model_download import ListModelsTask
 from viewer.model.state.motion import Motion
 from viewer.model.state.notices import Notice
 from viewer.model.state.photo_facts import ReadFactsTask
-from viewer.model.state.tasks import MaySwayTask
 from viewer.model.window_words import notice_in_window
 
 RECENT_KEPT = 8
@@ -39,9 +38,7 @@ def reduce_worker_event(state: AppState, news: WorkerEvent) -> AppState:
         case ProgressMade(_, progress, view):
             there = state.views_there if view is None else state.views_there | {view}
             shown = state.progress if state.stopped == state.generation else progress
-            begins = state.awaits_touch and shown.is_complete and not state.progress.is_complete
-            tasks = (*state.tasks, MaySwayTask()) if begins else state.tasks
-            return replace(state, progress=shown, views_there=there, tasks=tasks)
+            return replace(state, progress=shown, views_there=there)
         case OpenFailed(_, message):
             return _fail_to_open(add_notice(state, notice_in_window(message, is_error=True)))
 
@@ -99,8 +96,6 @@ def _open_scene(state: AppState, scene: Scene, same_places: SamePlaces | None) -
     inspection = of_next_scene(state.inspection)
     opened = replace(opened, tilt_handles=None, hover=None, inspection=inspection, zoom=None)
     depth = DepthSettings(scene.source.depth.refine)
-    if state.awaits_touch:
-        opened = replace(opened, optics=replace(opened.optics, aperture_diameter=first_aperture(scene)))
     if scene.plan is not None:  # a photo: it may have neighbours
         folder = str(PurePath(scene.source.path).parent)
         beside = ListFolderTask(folder), ReadFactsTask(scene.source.path), ListModelsTask()

@@ -12,7 +12,7 @@ from iibr_core.depth.editing.edits import UNEDITED, DepthEdits, Stroke
 from iibr_core.scenes.rect import WHOLE, Rect
 from iibr_core.scenes.scene import AS_FOUND, DepthSettings, FilledField, Progress, Scene, Source
 from iibr_core.scenes.screen_size import ScreenSize
-from viewer.model.free_camera import FreeCamera, Poses
+from viewer.model.free_camera import FreeCamera
 from viewer.model.state.depth_editing import Brush
 from viewer.model.state.folder import PhotoFolder
 from viewer.model.state.history import History
@@ -77,7 +77,7 @@ class AppState:
 
     views_there: indices (row, column) of views made. stopped: the generation the user stopped. tilt_handles: None while
     they are hidden. tasks: not yet taken up. recent: paths opened, the latest first. report: None without a window.
-    zoom: None where the whole picture is seen. free_camera: None on the plane of the views; poses: of a file, for it;
+    zoom: None where the whole picture is seen. free_camera: None on the plane of the views;
     free_progress: how much is done of what its views are made of, None when that is there.
     depth: what is made of the scene's depth; stroke: of the brush, while it is drawn. saved_edits: of the depth, as a
     file has them. jobs: saves, copies, exports and fills under way; quits_when_done: the window closes once there are
@@ -90,10 +90,9 @@ class AppState:
     of it, perhaps of the one before. is_fullscreen,
     hides_panel: of the window, None: where that is_narrow, see `layout`; shows_before: the photo as it was taken stands
     in place of the picture.
-    models: of depth. keeps_sessions: whether the photo opens as it is left. awaits_touch: the demo is open and nobody
-    has touched it yet: once all its views are there it sways. filled: the light field whose views between were made
-    last, None before. focused_at: the place (see focal_plane) that was clicked last to be sharp, None where the focus
-    was set otherwise.
+    models: of depth. keeps_sessions: whether the photo opens as it is left. filled: the light field whose views
+    between were made last, None before. focused_at: the place (see focal_plane) that was clicked last to be sharp, None
+    where the focus was set otherwise.
     """
 
     optics: Optics = field(default_factory=Optics)
@@ -119,7 +118,6 @@ class AppState:
     zoom: Zoom | None = None
     free_camera: FreeCamera | None = None
     free_progress: float | None = None
-    poses: Poses | None = None
     depth: DepthSettings = AS_FOUND
     brush: Brush = field(default_factory=Brush)
     stroke: Stroke | None = None
@@ -142,7 +140,6 @@ class AppState:
     is_narrow: bool = False
     shows_before: bool = False
     keeps_sessions: bool = False
-    awaits_touch: bool = False
     filled: FilledField | None = None
 
     @property

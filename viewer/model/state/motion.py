@@ -9,8 +9,8 @@ from iibr_core.beyond.optics import CENTRE
 from iibr_core.exports.loops import LoopKind
 from iibr_core.types import ViewOffset
 
-MotionKind = LoopKind | Literal["home", "sway"]
-"""home: a glide to the middle. sway: slow and small, for a while, as long as nobody touches anything."""
+MotionKind = LoopKind | Literal["home"]
+"""home: a glide to the middle."""
 
 
 @dataclass(frozen=True)
@@ -64,20 +64,10 @@ class PauseMotion:
 
 
 @dataclass(frozen=True)
-class Sway:
-    """Let the viewpoint sway, where the demo waits for that and nobody has touched it yet."""
-
-
-@dataclass(frozen=True)
-class Touch:
-    """The user has pressed a button or a key, or turned the wheel, whatever that was for: the demo holds still."""
-
-
-@dataclass(frozen=True)
 class Tick:
     """The clock shows this many seconds: a motion goes on."""
 
     now_s: float
 
 
-MotionAction = ReturnHome | SetLoop | SetSpeed | PauseMotion | Sway | Touch | Tick
+MotionAction = ReturnHome | SetLoop | SetSpeed | PauseMotion | Tick

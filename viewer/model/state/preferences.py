@@ -51,8 +51,7 @@ def _with_holders(section: Section) -> tuple[Section, ...]:
 @dataclass(frozen=True)
 class Preferences:
     """What outlasts the program. window: x, y, width, height in screen units, None before the first; is_maximized:
-    whether it filled the screen then. told_sessions: that depth edits are kept; told_aperture: that
-    focusing opens the aperture. Each is told once. told_drag: that one drags to look; it is told until one does.
+    whether it filled the screen then. told_sessions: that depth edits are kept; it is told once.
     last_folder: where a picture or an export was put last, "" before the first.
     estimates_depth: photos without depth get it from the recommended model, without a question, once it is here.
     """
@@ -66,8 +65,6 @@ class Preferences:
     folder_order: FolderOrder = "name"
     units: Units = "photographic"
     told_sessions: bool = False
-    told_aperture: bool = False
-    told_drag: bool = False
     estimates_depth: bool = False
     last_folder: str = ""
 

@@ -50,11 +50,6 @@ class ReadMaskTask:
 
 
 @dataclass(frozen=True)
-class MaySwayTask:
-    """Find out whether the demo may move by itself here, and let it."""
-
-
-@dataclass(frozen=True)
 class ReadTruthTask:
     """Look what light field this folder holds, to compare with; once a scene is open."""
 
@@ -72,7 +67,6 @@ Task = (
     | FillTask
     | CancelJobTask
     | ReadMaskTask
-    | MaySwayTask
     | ReadTruthTask
     | ListFolderTask
     | ListContentsTask

@@ -9,9 +9,8 @@ from imgui_bundle import imgui
 
 from viewer.model.actions import Action
 from viewer.model.commands import toggle_panel
-from viewer.model.free_camera import LeaveCamera, is_at_end
+from viewer.model.free_camera import LeaveCamera
 from viewer.model.layout import Layout
-from viewer.model.lens.photographic_units import mean_depth
 from viewer.model.state.app_state import AppState
 from viewer.model.state.model_download import ShowOffer
 from viewer.ui.overlays.prompt_rows import CARD_FLAGS
@@ -37,7 +36,7 @@ def chips(state: AppState, layout: Layout) -> list[Action]:
     camera = state.free_camera
     actions: list[Action] = []
     if camera is not None:
-        words = AT_END if is_at_end(camera, mean_depth(scene)) else FULL
+        words = AT_END if camera.is_at_end else FULL
         if imgui.calc_text_size(words).x + 6 * GAP * layout.ui_scale > frame.width:
             words = SHORT
         if _chip(CHIP, f"{icons.ICON_FA_VIDEO}  {words}###leave", layout, is_right=True):

@@ -48,13 +48,11 @@ MOUSE = (
     ("Wheel", "Focus nearer or farther"),
     ("Ctrl+wheel", "Zoom about the pointer"),
     ("Drag with the middle button", "Move the zoomed picture"),
-    ("Drag with Space", "Move the zoomed picture"),
     ("Arrow keys", "Move the viewpoint"),
     ("Drop", "Open a photo, a folder, a depth map"),
     ("Ctrl+click a slider", "Type a value"),
     ("Drag with the depth brush", "Paint depth; the wheel makes it larger"),
     ("Ctrl+click with the depth brush", "Pick the depth that Level and Bucket give"),
-    ("Gamepad", "Viewpoint, focus; triggers: aperture"),
     ("Esc", "Close what is open, put the brush away"),
 )
 PICTURE_ENDINGS = "The name's ending decides the kind: .png, .jpg, .tif, .webp, .avif, or .exr (HDR)."

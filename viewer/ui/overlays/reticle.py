@@ -8,7 +8,6 @@ from imgui_bundle import imgui
 
 from iibr_core.beyond.optics import Optics
 from iibr_core.depth.editing.edits import DEPTH_TOOLS, BrushTool
-from iibr_core.scenes.lens_limits import aperture_limit
 from iibr_core.scenes.rect import Rect
 from iibr_core.scenes.scene import Scene
 from viewer.model.layout import Layout
@@ -18,7 +17,6 @@ from viewer.model.state.app_state import AppState, Hover, TiltHandles
 from viewer.model.state.preferences import Units
 from viewer.ui.style import DARK, Color, corners, pack_color
 
-HINT = "Drag to look"
 WORD_GAP = "  ·  "
 RETICLE_RADIUS = 11.0
 HANDLE_RADIUS = 8.0
@@ -47,13 +45,6 @@ def overlays(state: AppState, layout: Layout) -> None:
     elif state.hover is not None and state.hover.disparity is not None:
         _draw_reticle(state, scene, state.hover, layout, picture)
     draw.pop_clip_rect()
-
-
-def pointer_text(state: AppState, scene: Scene, hover: Hover) -> str:
-    """What one can do here, until it was done once; then what lies here."""
-    if not state.preferences.told_drag and aperture_limit(scene.grid):
-        return HINT
-    return hover_text(state.optics, scene, hover, state.preferences.units)
 
 
 def hover_text(optics: Optics, scene: Scene, hover: Hover, units: Units = "photographic") -> str:
@@ -97,7 +88,7 @@ def _draw_reticle(state: AppState, scene: Scene, hover: Hover, layout: Layout, p
     x, y = _pointed_at(hover, scene, picture)
     radius, frame = RETICLE_RADIUS * scale, layout.frame or picture
     _ring(draw, x, y, radius, scale, pack_color(DARK.text))
-    words = pointer_text(state, scene, hover)
+    words = hover_text(state.optics, scene, hover, state.preferences.units)
     size, room = imgui.calc_text_size(words), 6 * scale
     left = x + radius + room if x + radius + 3 * room + size.x <= frame.x + frame.width else x - radius - size.x
     left = max(left - (room if left < x else 0), frame.x + room)
