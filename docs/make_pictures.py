@@ -21,7 +21,9 @@ from iibr_core.method.photo_views import PhotoViews
 from iibr_core.scenes.scene import Source
 from iibr_core.types import FloatImage, ViewOffset
 from viewer.display.offscreen import OffscreenScene
-from viewer.model.actions import DismissNotice, SetHover
+from viewer.model import messages
+from viewer.model.action import do
+from viewer.model.actions import SetHover
 from viewer.model.state.app_state import Hover
 from viewer.model.state.inspection import SetInspection, SetOverlay
 from viewer.model.state.optics_actions import ApertureShape, MoveEye, SetAperture, SetFocus, SetOptics
@@ -57,7 +59,7 @@ def screenshot() -> FloatImage:
         tank = pointer_on_tank(viewer)
         blades = ApertureShape("polygon", blades=7)
         viewer.do(SetFocus(tank.disparity), SetAperture(6.0), SetOptics("aperture_shape", blades))
-        viewer.do(DismissNotice(None), SetHover(tank))
+        viewer.do(do(messages.dismiss), SetHover(tank))
         return viewer.screen(WINDOW) / np.float32(255)
 
 

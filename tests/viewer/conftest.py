@@ -16,6 +16,8 @@ import pytest
 
 from iibr_core.types import GridShape, InputError
 from tests.xvfb import private_display
+from viewer.model import messages
+from viewer.model.action import do
 
 if TYPE_CHECKING:
     from viewer.app.main_loop import App
@@ -59,7 +61,6 @@ def headless_with_scene(folder: Path, *open_sections: Section) -> Iterator[Offsc
     """
     from iibr_core.scenes.scene import Source
     from viewer.display.offscreen import OffscreenScene
-    from viewer.model.actions import DismissNotice
     from viewer.model.state.preferences import with_sections
 
     try:
@@ -68,7 +69,7 @@ def headless_with_scene(folder: Path, *open_sections: Section) -> Iterator[Offsc
         pytest.skip(str(error))
     with viewer:
         viewer.open(Source(str(write_scene(folder)), grid=GridShape(3, 3)))
-        viewer.do(*(DismissNotice(notice) for notice in viewer.state.notices))
+        viewer.do(*(do(messages.dismiss, notice) for notice in viewer.state.notices))
         sections = with_sections((), *(open_sections or ("view", "focus", "aperture", "light")))
         preferences = replace(viewer.state.preferences, open_sections=sections)
         viewer.state = replace(viewer.state, preferences=preferences, hides_panel=False)

@@ -10,7 +10,8 @@ from imgui_bundle import imgui
 
 from iibr_core.scenes.screen_size import ScreenSize
 from tests.viewer.conftest import headless_with_scene
-from viewer.model.actions import ShowPrompt
+from viewer.model import messages
+from viewer.model.action import do
 from viewer.model.commands import COMMANDS
 from viewer.ui.overlays.prompt_overlay import MOUSE
 
@@ -40,7 +41,7 @@ def test_the_help_shows_them_all_and_what_they_do(tmp_path: Path, monkeypatch: p
         build(words)
 
     with headless_with_scene(tmp_path) as viewer:
-        viewer.do(ShowPrompt("help"))
+        viewer.do(do(messages.show_prompt, "help"))
         monkeypatch.setattr(imgui, "text_wrapped", note)
         viewer.screen(ScreenSize(1280, 800))
     last_frame = shown[len(shown) - 1 - shown[::-1].index(MOUSE[0][0]) :]

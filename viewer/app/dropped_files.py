@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from pathlib import PurePath
 
 from iibr_core.scenes.scene import Source, source_beside, source_with_map
-from viewer.model.actions import Action, DoTask, OpenPath
+from viewer.model.action import ask, do
+from viewer.model.actions import Action, OpenPath
 from viewer.model.state.app_state import AppState
 from viewer.model.state.tasks import ReadTruthTask
 
@@ -21,7 +22,7 @@ def actions_from_drop(paths: Sequence[str], state: AppState, is_ground_truth: bo
     is_ground_truth: it was dropped where ground truth is.
     """
     if is_ground_truth and state.scene is not None:
-        return [DoTask(ReadTruthTask(paths[0]))]
+        return [do(ask, ReadTruthTask(paths[0]))]
     maps = [path for path in paths if _is_map(PurePath(path))]
     others = [path for path in paths if path not in maps]
     if others:

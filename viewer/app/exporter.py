@@ -15,8 +15,10 @@ from iibr_core.runtime.extras import require_extra
 from iibr_core.types import InputError
 from viewer.app.job import Job
 from viewer.app.job_queue import JobQueue
-from viewer.model.actions import Action, Notify, ShowPrompt
-from viewer.model.reducers.exporting_reducer import written_path
+from viewer.model import messages
+from viewer.model.action import do
+from viewer.model.actions import Action
+from viewer.model.saving import written_path
 from viewer.model.state.app_state import AppState
 from viewer.model.state.exporting import ExportPrompt, ExportTask
 from viewer.model.state.notices import Notice
@@ -40,16 +42,16 @@ def add_export(task: ExportTask, state: AppState, inputs: Sequence[Path], jobs: 
         if jobs.writes(path):
             raise InputError(f"{path} is being written by another export: choose another name.")
     except AlreadyThereError:
-        return [ShowPrompt(replace(prompt, already_there=True))]
+        return [do(messages.show_prompt, replace(prompt, already_there=True))]
     except InputError as error:
-        return [ShowPrompt(replace(prompt, problem=str(error)))]
+        return [do(messages.show_prompt, replace(prompt, problem=str(error)))]
     work = partial(_export, kind, path, task.options)
     pictures = partial(optics_of, kind, task.options)
     jobs.add(Job("export", path, state, lambda scene, optics: "views", work, pictures))
-    closed = [ShowPrompt(None)] if isinstance(state.prompt, ExportPrompt) else []
+    closed = [do(messages.show_prompt, None)] if isinstance(state.prompt, ExportPrompt) else []
     return [*closed, SetPreference("last_folder", os.path.abspath(path.parent))]
 
 
 def _export(kind: ExportKind, path: Path, options: ExportOptions, source: ExportSource) -> list[Action]:
     message = write_export(kind, path, source, options)
-    return [Notify(Notice(f"Exported {path}. {message}" if message else f"Exported {path}", stays=True))]
+    return [do(messages.notify, Notice(f"Exported {path}. {message}" if message else f"Exported {path}", stays=True))]

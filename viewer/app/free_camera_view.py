@@ -24,7 +24,9 @@ from iibr_core.types import Camera, ImageSize, ViewUpdate, image_size
 from viewer.background.newest import Failed, Newest, Post
 from viewer.display.scene_view import SceneView
 from viewer.gpu.refocus.frame_budget import stretch_image
-from viewer.model.actions import Action, Notify
+from viewer.model import messages
+from viewer.model.action import do
+from viewer.model.actions import Action
 from viewer.model.free_camera import FORWARD_LIMITS, MAX_ASIDE, CameraProgress, FreeCamera
 from viewer.model.state.app_state import AppState
 from viewer.model.state.notices import Notice
@@ -127,7 +129,7 @@ class FreeCameraView:
                     actions.append(result)
                 case Failed(_, message):
                     self._may_interrupt = True
-                    actions += [CameraProgress(None), Notify(Notice(message, is_error=True))]
+                    actions += [CameraProgress(None), do(messages.notify, Notice(message, is_error=True))]
         return actions
 
     def _draw(self, request: FreeRequest, post: Post[FreeResult]) -> None:

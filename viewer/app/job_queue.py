@@ -20,10 +20,12 @@ from viewer.app.save_places import inputs_of_scene
 from viewer.background.file_worker import Done, FileRequest, FileWorker
 from viewer.background.window_work import WindowWork
 from viewer.display.scene_view import SceneView
-from viewer.model.actions import Action, EditsSaved, Notify
+from viewer.model import messages, saving
+from viewer.model.action import do
+from viewer.model.actions import Action
 from viewer.model.state.app_state import AppState
 from viewer.model.state.filling import ViewsFilled
-from viewer.model.state.jobs import JobProgress, JobsChanged
+from viewer.model.state.jobs import JobProgress
 from viewer.model.state.notices import Notice
 
 
@@ -114,7 +116,7 @@ class JobQueue:
         shown = tuple(job.describe() for job in self._jobs)
         if shown != self._told:
             self._told = shown
-            actions.append(JobsChanged(shown))
+            actions.append(do(saving.set_jobs, shown))
         return actions
 
     def close(self) -> None:
@@ -176,9 +178,10 @@ class JobQueue:
         self._end(running)
         if isinstance(result, Done):
             is_open = state.scene is not None and running.shows(state.scene)
-            return [action for action in result.value if is_open or not isinstance(action, EditsSaved)]
+            marked = do(saving.mark_saved, running.state.depth.edits)
+            return [action for action in result.value if is_open or action != marked]
         lost = f"{running.path}: writing it stopped unexpectedly, and there is no such file. Try it again."
-        return [Notify(Notice(lost if result is None else result.message, is_error=True, stays=True))]
+        return [do(messages.notify, Notice(lost if result is None else result.message, is_error=True, stays=True))]
 
     def _end(self, job: Job) -> None:
         self._jobs.remove(job)

@@ -7,7 +7,9 @@ from dataclasses import dataclass, replace
 from iibr_core.beyond.optics import CENTRE
 from iibr_core.types import ViewOffset
 from viewer.app.pointer import is_marking_gloss
-from viewer.model.actions import Action, SetState, ShowBefore, ShowPrompt
+from viewer.model import messages
+from viewer.model.action import do
+from viewer.model.actions import Action, SetState, ShowBefore
 from viewer.model.commands import BY_NAME, COMMANDS
 from viewer.model.free_camera import LeaveCamera
 from viewer.model.state.app_state import AppState
@@ -44,7 +46,7 @@ def actions_from_keys(keys: Keys, state: AppState) -> list[Action]:
 def _escape_actions(state: AppState) -> list[Action]:
     """Return the action that closes the topmost thing that Esc can close. Esc never quits."""
     if state.prompt is not None:
-        return [ShowPrompt(None)]
+        return [do(messages.show_prompt, None)]
     if state.free_camera is not None and state.stroke is None:
         return [LeaveCamera()]
     if state.stroke is not None:

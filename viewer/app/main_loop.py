@@ -37,7 +37,9 @@ from viewer.display.inspection_view import InspectionView
 from viewer.display.preparation import Preparation
 from viewer.display.scene_view import VIEW_REFRESH_S, SceneView
 from viewer.gpu.glfw_context import create_for_window
-from viewer.model.actions import Action, DoTask, OpenPath, Quit, SetState, WorkerLost
+from viewer.model import saving
+from viewer.model.action import ask, do
+from viewer.model.actions import Action, OpenPath, SetState, WorkerLost
 from viewer.model.inspection_request import (
     NO_INSPECTION_TEXTURES,
     InspectionTextures,
@@ -262,7 +264,7 @@ class App:
         actions += actions_from_hover(pointer, layout, self.state, pick)
         actions += actions_from_keys(read_keys(), self.state)
         actions += gesture_end(pointer)
-        return [*actions, Quit()] if self.window.take_closing() else actions
+        return [*actions, do(saving.quit_window)] if self.window.take_closing() else actions
 
     def _inspect(self, is_moving: bool) -> None:
         """Tell what is under the pointer, and have worked out what else is looked at."""
@@ -294,4 +296,4 @@ def run(state: AppState, kept_in: Path | None = None) -> None:
 def initial_state(action: OpenPath, depth_strength: float = 1.0, ground_truth: str | None = None) -> AppState:
     """Return the state to start with: nothing open yet, this asked for, this light field to compare with."""
     state = reduce(AppState(depth_strength=depth_strength), action)
-    return reduce(state, DoTask(ReadTruthTask(ground_truth))) if ground_truth else state
+    return reduce(state, do(ask, ReadTruthTask(ground_truth))) if ground_truth else state

@@ -6,7 +6,9 @@ import time
 from collections import deque
 from dataclasses import dataclass, field
 
-from viewer.model.actions import Action, DismissNotice
+from viewer.model import messages
+from viewer.model.action import do
+from viewer.model.actions import Action
 from viewer.model.state.app_state import AppState
 from viewer.model.state.notices import Notice
 
@@ -68,4 +70,4 @@ class NoticeClock:
         if notice is not self._shown:
             self._shown, self._shown_at = notice, now_s
         is_over = notice is not None and now_s - self._shown_at > notice.seconds
-        return [DismissNotice(notice)] if notice is not None and is_over else []
+        return [do(messages.dismiss, notice)] if notice is not None and is_over else []

@@ -27,7 +27,9 @@ from viewer.app.job import Job, Needs
 from viewer.app.job_queue import JobQueue
 from viewer.app.save_places import map_path, picture_path
 from viewer.background.job_threads import message_of
-from viewer.model.actions import Action, EditsSaved, Notify, ShowPrompt
+from viewer.model import messages, saving
+from viewer.model.action import do
+from viewer.model.actions import Action
 from viewer.model.state.app_state import AppState
 from viewer.model.state.jobs import WRITING
 from viewer.model.state.notices import Notice
@@ -80,7 +82,7 @@ def add_save(task: SaveTask, state: AppState, inputs: Sequence[Path], jobs: JobQ
             raise AlreadyThereError(f"{path}: is about to be written")
     except AlreadyThereError:
         prompt = SavePrompt(task.path, task.size_px, already_there=True, what=task.what, form=task.form)
-        return [ShowPrompt(prompt)]
+        return [do(messages.show_prompt, prompt)]
     except InputError as error:
         return [_refusal(task, state, error)]
     if task.what == "map":
@@ -88,14 +90,14 @@ def add_save(task: SaveTask, state: AppState, inputs: Sequence[Path], jobs: JobQ
     else:
         shot = _Shot(path, task.size_px, task.form, state)
         jobs.add(Job("picture", path, state, shot.needs, partial(_save, shot), takes_part=True))
-    closed: list[Action] = [ShowPrompt(None)] if isinstance(state.prompt, SavePrompt) else []
+    closed: list[Action] = [do(messages.show_prompt, None)] if isinstance(state.prompt, SavePrompt) else []
     return closed if task.what == "map" else [*closed, SetPreference("last_folder", os.path.abspath(path.parent))]
 
 
 def add_copy(state: AppState, jobs: JobQueue) -> list[Action]:
     """Put the present picture into the clipboard, at the size of the views."""
     if state.scene is None:
-        return [Notify(Notice("There is no picture to copy yet: open a photo."))]
+        return [do(messages.notify, Notice("There is no picture to copy yet: open a photo."))]
     shot = _Shot(copied_path(), state.scene.size, AS_USUAL, state, is_copied=True)
     jobs.add(Job("copy", shot.path, state, shot.needs, partial(_copy, shot)))
     return []
@@ -104,8 +106,11 @@ def add_copy(state: AppState, jobs: JobQueue) -> list[Action]:
 def _refusal(task: SaveTask, state: AppState, error: InputError) -> Action:
     """Why nothing is saved: where it was asked for, whatever was typed there stays; else in a notice."""
     if isinstance(state.prompt, SavePrompt):
-        return ShowPrompt(SavePrompt(task.path, task.size_px, what=task.what, problem=str(error), form=task.form))
-    return Notify(Notice(str(error), is_error=True))
+        return do(
+            messages.show_prompt,
+            SavePrompt(task.path, task.size_px, what=task.what, problem=str(error), form=task.form),
+        )
+    return do(messages.notify, Notice(str(error), is_error=True))
 
 
 def _save(shot: _Shot, source: ExportSource) -> list[Action]:
@@ -113,7 +118,7 @@ def _save(shot: _Shot, source: ExportSource) -> list[Action]:
     pixels = _drawn(shot, saved, source)
     report_progress(1, 1, WRITING)
     path = export_picture(shot.path, pixels, saved)
-    return [Notify(Notice(f"Saved {path}", stays=True)), EditsSaved(saved.settings.depth_edits)]
+    return [do(messages.notify, Notice(f"Saved {path}", stays=True)), do(saving.mark_saved, saved.settings.depth_edits)]
 
 
 def _copy(shot: _Shot, source: ExportSource) -> list[Action]:
@@ -121,7 +126,7 @@ def _copy(shot: _Shot, source: ExportSource) -> list[Action]:
     pixels = _drawn(shot, saved, source)
     make_folder(shot.path.parent)
     copy_picture(export_picture(shot.path, pixels, saved))
-    return [Notify(Notice("Copied the picture."))]
+    return [do(messages.notify, Notice("Copied the picture."))]
 
 
 def _save_map(path: Path, state: AppState, source: ExportSource) -> list[Action]:
@@ -129,7 +134,10 @@ def _save_map(path: Path, state: AppState, source: ExportSource) -> list[Action]
     if source.loaded is None:
         raise InputError(f"{path}: {NO_MAP}")
     report_progress(1, 1, WRITING)
-    return [Notify(Notice(export_map(path, source.loaded.disparity.values))), EditsSaved(state.depth.edits)]
+    return [
+        do(messages.notify, Notice(export_map(path, source.loaded.disparity.values))),
+        do(saving.mark_saved, state.depth.edits),
+    ]
 
 
 def _drawn(shot: _Shot, saved: SavedShot, source: ExportSource) -> NDArray[Any]:

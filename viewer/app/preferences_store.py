@@ -21,7 +21,9 @@ from iibr_core.formats.files import read_text, status_of
 from iibr_core.formats.outputs import write_file
 from iibr_core.scenes.lens_limits import clamp
 from iibr_core.types import InputError
-from viewer.model.actions import Action, Notify
+from viewer.model import messages
+from viewer.model.action import do
+from viewer.model.actions import Action
 from viewer.model.reducers.worker_events import RECENT_KEPT
 from viewer.model.state.app_state import AppState
 from viewer.model.state.notices import Notice
@@ -99,7 +101,7 @@ class PreferencesKeeper:
             if self._folder is not None:
                 store_preferences(state, self._folder)
         except InputError as error:
-            return [Notify(Notice(str(error), is_error=True))]
+            return [do(messages.notify, Notice(str(error), is_error=True))]
         return []
 
 

@@ -26,7 +26,9 @@ from viewer.background.scene_worker import PhotosFound, SceneResult, SceneWorker
 from viewer.display.depth_preview import DepthPreview
 from viewer.display.inspection_view import InspectionView
 from viewer.display.scene_view import SceneView
-from viewer.model.actions import Action, Notify, OpenFailed, OpenPath, ProgressMade, SceneOpened
+from viewer.model import messages
+from viewer.model.action import do
+from viewer.model.actions import Action, OpenFailed, OpenPath, ProgressMade, SceneOpened
 from viewer.model.reducers.depth_editing_reducer import depth_settings_for_worker, is_depth_ahead
 from viewer.model.reducers.folder_reducer import AHEAD, SKETCHED_AHEAD, photos_ahead
 from viewer.model.state.app_state import AppState
@@ -108,7 +110,7 @@ class SceneLoader:
         try:
             self._preview.update(state)
         except InputError as error:
-            return [Notify(Notice(str(error), is_error=True)), DropStroke()]
+            return [do(messages.notify, Notice(str(error), is_error=True)), DropStroke()]
         return []
 
     def advance(self, state: AppState) -> None:
@@ -179,7 +181,7 @@ class SceneLoader:
         renderer, told = self._scene_view.renderer, self._scene_view.renderer.note
         self._scene_view.add(result.view)
         self._inspection_view.add(result.view)
-        notices: list[Action] = [Notify(Notice(renderer.note))] if renderer.note not in ("", told) else []
+        notices: list[Action] = [do(messages.notify, Notice(renderer.note))] if renderer.note not in ("", told) else []
         return [ProgressMade(result.generation, result.progress, (result.view.row, result.view.column)), *notices]
 
     def _load_brush(self, ready: SceneReady) -> None:

@@ -21,7 +21,9 @@ from iibr_core.types import InputError
 from viewer.app.image_export import settings_of
 from viewer.background.file_worker import FileRequest, FileWorker
 from viewer.background.job_threads import Failed
-from viewer.model.actions import Action, Notify, RestoreSession, SetState
+from viewer.model import messages
+from viewer.model.action import do
+from viewer.model.actions import Action, RestoreSession, SetState
 from viewer.model.state.app_state import AppState
 from viewer.model.state.notices import Notice
 from viewer.model.state.preferences import SetPreference
@@ -86,7 +88,7 @@ class SessionStore:
         is_edited = state.depth.edits not in (UNEDITED, state.saved_edits)
         if not (are_kept and is_edited) or state.preferences.told_sessions:
             return []
-        return [SetPreference("told_sessions", True), Notify(Notice(EDITS_KEPT))]
+        return [SetPreference("told_sessions", True), do(messages.notify, Notice(EDITS_KEPT))]
 
     def close(self, state: AppState) -> None:
         """Keep what is there now, and wait until it is written."""
@@ -120,7 +122,7 @@ class SessionStore:
         actions: list[Action] = []
         while (result := self._files.next_result()) is not None:
             if isinstance(result, Failed):
-                actions += [] if self._has_failed else [Notify(Notice(result.message))]
+                actions += [] if self._has_failed else [do(messages.notify, Notice(result.message))]
                 self._has_failed = True  # once is enough
             elif isinstance(result.value, SessionFound) and result.value.scene is self._scene:
                 actions += self._take_up(result.value, state)
@@ -130,14 +132,14 @@ class SessionStore:
         self._is_known, self._kept, self._latest = True, None, None
         self._can_write = self._folder is not None and _can_write(self._folder)
         if found.problem:
-            return [Notify(Notice(found.problem))]
+            return [do(messages.notify, Notice(found.problem))]
         is_open = state.scene is not None and state.scene.source is found.scene.source
         if not is_open or found.settings is None:
             return []
         from viewer.model.saved_settings import left_out_note
 
         note = left_out_note(found.settings)
-        return [RestoreSession(found.settings), *([Notify(Notice(note))] if note else [])]
+        return [RestoreSession(found.settings), *([do(messages.notify, Notice(note))] if note else [])]
 
 
 def sidecar_of(path: Path) -> Path:

@@ -22,7 +22,9 @@ from viewer.background.window_work import WindowWork
 from viewer.display.scene_view import SceneView
 from viewer.gpu.context import GLContext
 from viewer.gpu.inspection_passes import InspectionPasses
-from viewer.model.actions import Action, Notify
+from viewer.model import messages
+from viewer.model.action import do
+from viewer.model.actions import Action
 from viewer.model.state.app_state import AppState, Picture
 from viewer.model.state.notices import Notice
 
@@ -125,7 +127,9 @@ class Sharpener:
         result = self._worker.next_result()
         if isinstance(result, Failed):
             self._refused = self._scene_view.loaded  # it would fail again
-            return [Notify(Notice(f"The photo's full detail cannot be shown. {result.message}", is_error=True))]
+            return [
+                do(messages.notify, Notice(f"The photo's full detail cannot be shown. {result.message}", is_error=True))
+            ]
         if result is not None:
             self.pixels = result
             self._texture = self._passes.show("sharp", np.ascontiguousarray(result[::-1]))

@@ -26,8 +26,11 @@ from viewer.background.file_worker import FileRequest, FileResult, FileWorker
 from viewer.background.job_threads import Failed
 from viewer.background.model_downloader import Downloaded, DownloadResult, ModelDownloads, ModelRequest, list_models
 from viewer.display.scene_view import SceneView
-from viewer.model.actions import Action, Notify, OpenPath, ShowPrompt, TaskTaken
+from viewer.model import messages
+from viewer.model.action import ask, do, forget_tasks
+from viewer.model.actions import Action, OpenPath
 from viewer.model.commands import action_for_path
+from viewer.model.photo_facts import set_facts
 from viewer.model.state.app_state import AppState
 from viewer.model.state.exporting import ExportTask
 from viewer.model.state.filling import FillTask
@@ -44,7 +47,7 @@ from viewer.model.state.model_download import (
 )
 from viewer.model.state.notices import Notice
 from viewer.model.state.optics_actions import SetOptics
-from viewer.model.state.photo_facts import FactsRead, ReadFactsTask
+from viewer.model.state.photo_facts import PhotoFacts, ReadFactsTask
 from viewer.model.state.prompts import FolderContents, ListContentsTask, PathPrompt
 from viewer.model.state.saving import CopyTask, PasteTask, WriteSidecarTask, path_beside
 from viewer.model.state.tasks import (
@@ -83,13 +86,15 @@ class SideEffects:
 
     def run(self, state: AppState) -> list[Action]:
         """Take up the state's tasks and say what came of earlier ones, and of a dialog that was closed."""
-        actions = self._take_results(state) + self._take_downloads(state) + self._take_answer(state)
+        actions: list[Action] = [do(forget_tasks)] if state.tasks else []
+        actions += self._take_results(state) + self._take_downloads(state) + self._take_answer(state)
         for task in state.tasks:
-            if isinstance(task, ReadTruthTask) and not is_scene_open(state):
-                continue  # what it must fit is not known yet
-            if isinstance(task, PasteTask) and self._jobs.is_copying:
-                continue  # what is pasted is not in the clipboard yet
-            actions += [TaskTaken(task), *self._begin(task, state)]
+            if (isinstance(task, ReadTruthTask) and not is_scene_open(state)) or (
+                isinstance(task, PasteTask) and self._jobs.is_copying
+            ):
+                actions.append(do(ask, task))  # later: the scene is not open, or the copy is not in the clipboard
+                continue
+            actions += self._begin(task, state)
         return actions
 
     def draw(self, state: AppState, budget_s: float) -> list[Action]:
@@ -108,14 +113,17 @@ class SideEffects:
         match task:
             case ChooseTask(what):
                 if not has_dialogs():
-                    return [ShowPrompt(PathPrompt(what, _folder_beside(state)))]
+                    return [do(messages.show_prompt, PathPrompt(what, _folder_beside(state)))]
                 self._dialog = self._dialog or Dialog(what, state.source.path if state.source else "")
             case ListContentsTask(folder, what):
                 self._submit(partial(contents_of, folder, what))
             case ChoosePlaceTask(prompt):
                 if not has_dialogs():
                     return [
-                        ShowPrompt(PathPrompt("place", os.path.abspath(os.path.expanduser(prompt.path)), None, prompt))
+                        do(
+                            messages.show_prompt,
+                            PathPrompt("place", os.path.abspath(os.path.expanduser(prompt.path)), None, prompt),
+                        )
                     ]
                 self._dialog = self._dialog or SaveDialog(prompt)
             case ReadMaskTask(path):
@@ -175,7 +183,10 @@ class SideEffects:
         if self._files.is_lost and self._under_way:
             self._under_way.clear()
             actions.append(
-                Notify(Notice("Reading or writing a file stopped unexpectedly. Try it again.", is_error=True))
+                do(
+                    messages.notify,
+                    Notice("Reading or writing a file stopped unexpectedly. Try it again.", is_error=True),
+                )
             )
         return actions
 
@@ -186,7 +197,7 @@ class SideEffects:
         if self._downloads.is_lost and state.models.downloading is not None:
             actions += [
                 DownloadingChanged(None),
-                Notify(Notice("The download stopped unexpectedly. Try it again.", is_error=True)),
+                do(messages.notify, Notice("The download stopped unexpectedly. Try it again.", is_error=True)),
             ]
         return actions
 
@@ -199,7 +210,7 @@ class SideEffects:
             return []
         if isinstance(dialog, SaveDialog):
             there = os.path.lexists(answer)
-            return [ShowPrompt(replace(dialog.prompt, path=answer, already_there=there, problem=""))]
+            return [do(messages.show_prompt, replace(dialog.prompt, path=answer, already_there=there, problem=""))]
         return [action_for_path(dialog.what, answer, state)]
 
 
@@ -216,20 +227,22 @@ def is_scene_open(state: AppState) -> bool:
 
 def _actions_from(result: FileResult, state: AppState) -> list[Action]:
     if isinstance(result, Failed):
-        return [Notify(Notice(result.message, is_error=True))]
+        return [do(messages.notify, Notice(result.message, is_error=True))]
     match result.value:
         case ApertureMask() as mask:
             return [SetOptics("aperture_shape", replace(state.optics.aperture_shape, kind="mask", mask=mask))]
         case FolderContents() as contents:
             return _show_contents(contents, state)
-        case FolderListed() | FactsRead() | ModelsListed() as found:
+        case PhotoFacts() as facts:
+            return [do(set_facts, facts)]
+        case FolderListed() | ModelsListed() as found:
             return [found]
         case Pasted(path):
             return [OpenPath(source_beside(state.source, path))]
         case GroundTruth() as truth:
             return [TruthRead(truth)]
         case Path() as sidecar:
-            return [Notify(Notice(f"Saved {sidecar}"))]
+            return [do(messages.notify, Notice(f"Saved {sidecar}"))]
     raise AssertionError(f"nothing comes of {result.value!r}")
 
 
@@ -238,7 +251,7 @@ def _show_contents(contents: FolderContents, state: AppState) -> list[Action]:
     prompt = state.prompt
     if not isinstance(prompt, PathPrompt) or prompt.contents is None or prompt.contents.folder != contents.folder:
         return []
-    return [ShowPrompt(replace(prompt, contents=contents))]
+    return [do(messages.show_prompt, replace(prompt, contents=contents))]
 
 
 def _actions_from_download(result: DownloadResult) -> list[Action]:
@@ -247,9 +260,9 @@ def _actions_from_download(result: DownloadResult) -> list[Action]:
         case Downloading() as downloading:
             return [DownloadingChanged(downloading)]
         case Failed(_, message):
-            return [DownloadingChanged(None), Notify(Notice(message, is_error=True))]
+            return [DownloadingChanged(None), do(messages.notify, Notice(message, is_error=True))]
         case Downloaded(model, listed):
-            lacks = [Notify(Notice(f"{model.title} is here. It {model.lacks}"))] if model.lacks else []
+            lacks = [do(messages.notify, Notice(f"{model.title} is here. It {model.lacks}"))] if model.lacks else []
             return [listed, DownloadingChanged(None), *lacks]
     raise AssertionError(f"nothing comes of {result!r}")
 
@@ -264,11 +277,11 @@ def read_truth(path: str) -> GroundTruth:
     return GroundTruth(path, field.name, grid, width, height)
 
 
-def _read_facts(path: str) -> FactsRead:
+def _read_facts(path: str) -> PhotoFacts:
     """Nothing where the file is gone by now."""
     from iibr_core.formats.images.metadata import camera_facts, read_metadata
 
-    return FactsRead(path, camera_facts(read_metadata(Path(path))))
+    return PhotoFacts(path, camera_facts(read_metadata(Path(path))))
 
 
 def _read_mask(path: Path) -> ApertureMask:

@@ -10,7 +10,9 @@ import numpy as np
 from iibr_core.scenes.scene import LoadedPhoto, Source
 from iibr_core.types import FloatImage
 from viewer.background.job_threads import Failed, Job, JobThread
-from viewer.model.actions import Action, Notify, SamePlaces
+from viewer.model import messages
+from viewer.model.action import do
+from viewer.model.actions import Action, SamePlaces
 from viewer.model.reducers.depth_models import wanted_model
 from viewer.model.state.app_state import AppState
 from viewer.model.state.model_download import DepthEstimated, GiveUpEstimate
@@ -93,7 +95,7 @@ class DepthFinder(JobThread[EstimateRequest, EstimateResult]):
 
     def _fail(self, message: str) -> list[Action]:
         self._asked = None
-        return [GiveUpEstimate(), Notify(notice_in_window(message, is_error=True))]
+        return [GiveUpEstimate(), do(messages.notify, notice_in_window(message, is_error=True))]
 
 
 def _results_of(job: Job[EstimateRequest, EstimateResult]) -> Iterator[EstimateResult]:

@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING
 from iibr_core.gloss.settings import Gloss
 from iibr_core.scenes.scene_gloss import GlossRequest, make_maps
 from viewer.background.newest import Failed, Newest, Post
-from viewer.model.actions import Action, Notify
+from viewer.model import messages
+from viewer.model.action import do
+from viewer.model.actions import Action
 from viewer.model.state.notices import Notice
 
 if TYPE_CHECKING:
@@ -36,7 +38,7 @@ class GlossFinder:
         actions: list[Action] = []
         while (result := self._worker.next_result()) is not None:
             if isinstance(result, Failed):
-                actions.append(Notify(Notice(result.message, is_error=True)))
+                actions.append(do(messages.notify, Notice(result.message, is_error=True)))
             else:
                 self._take(result)
         request = self._request_for(gloss)

@@ -27,7 +27,9 @@ from viewer.gpu.inspection_passes import InspectionPasses, Line, OverlayStyle
 from viewer.gpu.light_field_texture import LightFieldTexture
 from viewer.gpu.refocus.picture_drawing import PictureDrawing
 from viewer.gpu.refocus.view_sampling import nearest_present
-from viewer.model.actions import Action, Notify
+from viewer.model import messages
+from viewer.model.action import do
+from viewer.model.actions import Action
 from viewer.model.colormap import VIRIDIS
 from viewer.model.inspection_request import (
     DIFFERENCE_GAIN,
@@ -146,7 +148,7 @@ class InspectionView:
             case Failed(id=request, message=message):
                 is_overlay = request is not None and request.kind == "entropy"
                 off = SetOverlay(None) if is_overlay else Compare(None)
-                return [Notify(Notice(message, is_error=True)), off]
+                return [do(messages.notify, Notice(message, is_error=True)), off]
 
     def release(self) -> None:
         """Free the GL objects."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Concatenate, ParamSpec
 
 from viewer.model.state.app_state import AppState
@@ -33,3 +33,8 @@ def do(verb: Callable[Concatenate[AppState, P], AppState], *args: P.args, **kwar
 def ask(state: AppState, task: Task) -> AppState:
     """Ask the outside world to carry out a task; the loop takes it up in its next turn."""
     return state.with_task(task)
+
+
+def forget_tasks(state: AppState) -> AppState:
+    """Forget the tasks that were taken up."""
+    return replace(state, tasks=())

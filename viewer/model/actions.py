@@ -5,26 +5,19 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from iibr_core.depth.editing.edits import DepthEdits
 from iibr_core.scenes.scene import Progress, Scene, Source
 from viewer.model.action import Action as VerbAction
 from viewer.model.free_camera import FreeCameraAction
 from viewer.model.state.app_state import DrawReport, Hover
 from viewer.model.state.depth_editing import DepthAction
-from viewer.model.state.exporting import AskToExport
 from viewer.model.state.filling import ViewsFilled
 from viewer.model.state.folder import FolderAction
 from viewer.model.state.inspection import InspectionAction
-from viewer.model.state.jobs import JobsChanged, QuitWhenDone
 from viewer.model.state.model_download import ModelAction
 from viewer.model.state.motion import MotionAction
-from viewer.model.state.notices import Notice
 from viewer.model.state.optics_actions import LensAction, SetGlossBrush
-from viewer.model.state.photo_facts import FactsRead
 from viewer.model.state.preferences import PreferencesAction
-from viewer.model.state.prompts import Prompt, Saved
 from viewer.model.state.saving import SavedSettings
-from viewer.model.state.tasks import Task
 from viewer.model.zoom import SetZoom
 
 # The lens as a whole, and undo
@@ -148,37 +141,6 @@ class SetState:
 
 
 @dataclass(frozen=True)
-class DoTask:
-    """Ask this of the outside world."""
-
-    task: Task
-
-
-@dataclass(frozen=True)
-class TaskTaken:
-    """The loop has taken this task up."""
-
-    task: Task
-
-
-# Prompts, notices, preferences
-
-
-@dataclass(frozen=True)
-class ShowPrompt:
-    """Show this prompt in place of any other, or as the user has edited it; None closes it."""
-
-    prompt: Prompt | None
-
-
-@dataclass(frozen=True)
-class AskToSave:
-    """Ask where to save the picture, or its disparity map."""
-
-    what: Saved = "picture"
-
-
-@dataclass(frozen=True)
 class SetHover:
     """The pointer is here in the picture; None where it is not in it."""
 
@@ -186,38 +148,10 @@ class SetHover:
 
 
 @dataclass(frozen=True)
-class Notify:
-    """Show a notice."""
-
-    notice: Notice
-
-
-@dataclass(frozen=True)
-class DismissNotice:
-    """Take this notice away; None: all of them."""
-
-    notice: Notice | None
-
-
-@dataclass(frozen=True)
 class ShowBefore:
     """Show the photo as it was taken, to compare; or the picture again, as any edit of the lens does."""
 
     is_shown: bool
-
-
-@dataclass(frozen=True)
-class Quit:
-    """Close the window; is_sure: also where that loses depth edits, else it is asked."""
-
-    is_sure: bool = False
-
-
-@dataclass(frozen=True)
-class EditsSaved:
-    """A file has these depth edits now."""
-
-    edits: DepthEdits
 
 
 WorkerEvent = SceneOpened | ProgressMade | OpenFailed
@@ -238,7 +172,6 @@ Action = (
     | SetZoom
     | FreeCameraAction
     | SetDepthStrength
-    | FactsRead
     | TakeSettings
     | RestoreSession
     | EndGesture
@@ -248,18 +181,7 @@ Action = (
     | StopWork
     | ResumeWork
     | WorkerLost
-    | DoTask
-    | TaskTaken
-    | ShowPrompt
-    | AskToSave
-    | AskToExport
-    | JobsChanged
     | ViewsFilled
-    | QuitWhenDone
     | ModelAction
     | SetHover
-    | Notify
-    | DismissNotice
-    | EditsSaved
-    | Quit
 )

@@ -12,17 +12,14 @@ from pathlib import PurePath
 from iibr_core.depth.editing.edits import BRUSH_TOOLS, BrushTool
 from iibr_core.exports.loops import LOOPS, LoopKind
 from iibr_core.scenes.scene import Source, source_beside, source_with_map
+from viewer.model import messages, saving
+from viewer.model.action import ask, do
 from viewer.model.actions import (
     Action,
-    AskToSave,
-    DoTask,
-    Notify,
     OpenPath,
-    Quit,
     Redo,
     SetState,
     ShowBefore,
-    ShowPrompt,
     ShowTiltHandles,
     StopWork,
     Undo,
@@ -33,7 +30,6 @@ from viewer.model.free_camera import MoveCamera
 from viewer.model.lens.presets import PRESETS
 from viewer.model.state.app_state import AppState
 from viewer.model.state.depth_editing import ResetDepth, SetBrush, SetTone
-from viewer.model.state.exporting import AskToExport
 from viewer.model.state.filling import FillTask
 from viewer.model.state.folder import SetFolderOrder, StepPhoto
 from viewer.model.state.inspection import (
@@ -126,11 +122,11 @@ def _scale_text(factor: float) -> Callable[[AppState], Action]:
 
 
 def _toggle_help(state: AppState) -> Action:
-    return ShowPrompt(None if state.prompt == "help" else "help")
+    return do(messages.show_prompt, None if state.prompt == "help" else "help")
 
 
 def _toggle_palette(state: AppState) -> Action:
-    return ShowPrompt(None if isinstance(state.prompt, PalettePrompt) else PalettePrompt())
+    return do(messages.show_prompt, None if isinstance(state.prompt, PalettePrompt) else PalettePrompt())
 
 
 def _toggle_overlay(kind: OverlayKind) -> Callable[[AppState], Action]:
@@ -161,7 +157,7 @@ def _own_pixels(state: AppState) -> Action:
 
 def _fill_between(state: AppState) -> Action:
     denser = next_denser(state.scene) if state.scene is not None else None
-    return DoTask(FillTask(denser)) if denser is not None else Notify(Notice(NOTHING_BETWEEN))
+    return do(ask, FillTask(denser)) if denser is not None else do(messages.notify, Notice(NOTHING_BETWEEN))
 
 
 def _brush_with(tool: BrushTool) -> Callable[[AppState], Action]:
@@ -174,13 +170,13 @@ def _invert_depth(state: AppState) -> Action:
 
 
 COMMANDS: tuple[Command, ...] = (
-    Command("Open a photo…", _always(DoTask(ChooseTask("photo"))), (Chord("o", ctrl=True),)),
-    Command("Open a folder…", _always(DoTask(ChooseTask("folder"))), (Chord("o", ctrl=True, shift=True),)),
+    Command("Open a photo…", _always(do(ask, ChooseTask("photo"))), (Chord("o", ctrl=True),)),
+    Command("Open a folder…", _always(do(ask, ChooseTask("folder"))), (Chord("o", ctrl=True, shift=True),)),
     Command("See the demo", lambda state: OpenPath(Source(str(demo_photo())))),
-    Command("Save the picture…", _always(AskToSave()), (Chord("s", ctrl=True),)),
-    Command("Copy the picture", _always(DoTask(CopyTask())), (Chord("c", ctrl=True),)),
-    Command("Paste a picture, or the path of one", _always(DoTask(PasteTask())), (Chord("v", ctrl=True),)),
-    Command("Save these settings beside the photo", _always(DoTask(WriteSidecarTask()))),
+    Command("Save the picture…", _always(do(saving.ask_to_save)), (Chord("s", ctrl=True),)),
+    Command("Copy the picture", _always(do(ask, CopyTask())), (Chord("c", ctrl=True),)),
+    Command("Paste a picture, or the path of one", _always(do(ask, PasteTask())), (Chord("v", ctrl=True),)),
+    Command("Save these settings beside the photo", _always(do(ask, WriteSidecarTask()))),
     Command("Next photo of the folder", _always(StepPhoto(1)), (Chord("page_down"),), repeats=True),
     Command("Previous photo of the folder", _always(StepPhoto(-1)), (Chord("page_up"),), repeats=True),
     Command(
@@ -190,7 +186,7 @@ COMMANDS: tuple[Command, ...] = (
     ),
     Command("Photos by name", _always(SetFolderOrder("name"))),
     Command("Photos by time", _always(SetFolderOrder("time"))),
-    Command("Share or export…", _always(AskToExport()), (Chord("e", ctrl=True),)),
+    Command("Share or export…", _always(do(saving.ask_to_export)), (Chord("e", ctrl=True),)),
     Command("Undo", _always(Undo()), (Chord("z", ctrl=True),), repeats=True),
     Command("Redo", _always(Redo()), (Chord("z", ctrl=True, shift=True), Chord("y", ctrl=True)), repeats=True),
     Command("Reset viewpoint, focus and aperture", _always(ResetOptics()), (Chord("r"),)),
@@ -210,10 +206,10 @@ COMMANDS: tuple[Command, ...] = (
     *(Command(f"Depth brush: {BRUSH_WORDS[tool].lower()}", _brush_with(tool)) for tool in BRUSH_TOOLS),
     Command("Invert depth", _invert_depth),
     Command("Reset depth edits", _always(ResetDepth())),
-    Command("Open a depth map…", _always(DoTask(ChooseTask("map")))),
+    Command("Open a depth map…", _always(do(ask, ChooseTask("map")))),
     Command("Get true depth", _always(GetDepth())),
-    Command("Depth models…", _always(ShowPrompt(ModelsPrompt()))),
-    Command("Save the depth map…", _always(AskToSave("map"))),
+    Command("Depth models…", _always(do(messages.show_prompt, ModelsPrompt()))),
+    Command("Save the depth map…", _always(do(saving.ask_to_save, "map"))),
     Command("EPI strips", lambda s: SetInspection("shows_epis", not s.inspection.shows_epis), (Chord("e"),)),
     Command("All views", lambda s: SetInspection("shows_grid", not s.inspection.shows_grid), (Chord("g"),)),
     Command(
@@ -229,7 +225,7 @@ COMMANDS: tuple[Command, ...] = (
         Command(COMPARE_WORDS[kind], _toggle_comparison(kind), (Chord("p"),) if kind == "photo" else ())
         for kind in COMPARISONS
     ),
-    Command("Open ground truth…", _always(DoTask(ChooseTask("truth")))),
+    Command("Open ground truth…", _always(do(ask, ChooseTask("truth")))),
     Command("Make views between those of a light field", _fill_between),
     Command("Stop making views", _always(StopWork())),
     Command("Zoom: the whole picture", _always(SetZoom(None)), (Chord("_0"),)),
@@ -254,7 +250,7 @@ COMMANDS: tuple[Command, ...] = (
     Command("Reset text size", _always(SetPreference("font_scale", 1.0)), (Chord("_0", ctrl=True),)),
     Command("All commands", _toggle_palette, (Chord("p", ctrl=True),)),
     Command("Mouse and keys", _toggle_help, (Chord("f1"),)),
-    Command("Quit", _always(Quit()), (Chord("q", ctrl=True),)),
+    Command("Quit", _always(do(saving.quit_window)), (Chord("q", ctrl=True),)),
 )
 BY_NAME = {command.name: command for command in COMMANDS}
 
@@ -278,9 +274,9 @@ def action_for_path(what: ChoiceOf, path: str, state: AppState) -> Action:
     """What a path that the user chose is for."""
     match what:
         case "mask":
-            return DoTask(ReadMaskTask(path))
+            return do(ask, ReadMaskTask(path))
         case "truth":
-            return DoTask(ReadTruthTask(path))
+            return do(ask, ReadTruthTask(path))
         case "map" if state.source is not None:
             return OpenPath(source_with_map(state.source, path))
         case "model" | "model folder" if state.source is not None:

@@ -13,7 +13,8 @@ from PIL import Image
 from iibr_core.types import GridShape, InputError
 from tests.viewer.conftest import Driver, Opener, write_scene
 from viewer.app.clipboard import MOST_KEPT, paste_picture
-from viewer.model.actions import DismissNotice, DoTask
+from viewer.model import messages
+from viewer.model.action import ask, do
 from viewer.model.state.optics_actions import SetAperture
 from viewer.model.state.saving import CopyTask, PasteTask
 
@@ -102,7 +103,7 @@ def test_damaged_pictures_are_one_line(display: str, data: bytes, words: str) ->
 def test_what_is_lacking_is_named(viewer: Driver, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PATH", str(tmp_path))
     for task in (CopyTask(), PasteTask()):
-        viewer.app.do(DismissNotice(None), DoTask(task))
+        viewer.app.do(do(messages.dismiss), do(ask, task))
         says(viewer, "install xclip")
 
 

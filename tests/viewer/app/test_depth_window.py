@@ -15,7 +15,9 @@ from iibr_core.depth.editing.edits import UNEDITED, DepthEdits
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import FAR, NEAR, Driver, Opener
 from viewer.app.main_loop import App
-from viewer.model.actions import AskToSave, EndGesture, Notify, SetDepthStrength, ShowPrompt
+from viewer.model import messages, saving
+from viewer.model.action import do
+from viewer.model.actions import EndGesture, SetDepthStrength
 from viewer.model.state.depth_editing import Brush, SetBrush, SetTone
 from viewer.model.state.inspection import SetInspection
 from viewer.model.state.notices import Notice
@@ -212,7 +214,7 @@ def test_a_map_is_saved_and_opened_again_by_its_path(viewer: Driver, photo_path:
     viewer.press("Invert")
     until_made(viewer, 2)
     wanted = disparity_of(viewer.app).copy()
-    viewer.app.do(AskToSave("map"))
+    viewer.app.do(do(saving.ask_to_save, "map"))
     settle(viewer, lambda app: isinstance(app.state.prompt, SavePrompt))
     out = tmp_path / "turned.npy"
     viewer.type(str(out))
@@ -220,7 +222,7 @@ def test_a_map_is_saved_and_opened_again_by_its_path(viewer: Driver, photo_path:
     settle(viewer, lambda app: out.exists())
     np.testing.assert_array_equal(np.load(out), wanted)
     assert str(out) in viewer.app.state.notices[-1].text
-    viewer.app.do(ShowPrompt(PathPrompt("map")))
+    viewer.app.do(do(messages.show_prompt, PathPrompt("map")))
     viewer.until_idle()
     viewer.type(str(out))
     viewer.send("key", "Return")
@@ -246,7 +248,10 @@ def test_a_bad_map_leaves_the_scene_and_its_edits_with_a_notice(viewer: Driver, 
 
 
 def test_a_notice_in_a_low_window_leaves_the_strips_free(viewer: Driver) -> None:
-    viewer.app.do(SetInspection("shows_epis", True), *(Notify(Notice(f"{i}: " + "many words " * 20)) for i in range(5)))
+    viewer.app.do(
+        SetInspection("shows_epis", True),
+        *(do(messages.notify, Notice(f"{i}: " + "many words " * 20)) for i in range(5)),
+    )
     viewer.until_idle()
     frame, layout = imgui.internal.find_window_by_name("notices"), viewer.app.layout()
     assert layout.strip_across is not None

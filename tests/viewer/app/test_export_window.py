@@ -27,15 +27,13 @@ from viewer.app import job_scene
 from viewer.app.main_loop import App
 from viewer.background.window_work import Steps
 from viewer.display.snapshot import SceneSnapshot
+from viewer.model import messages, saving
+from viewer.model.action import ask, do
 from viewer.model.actions import (
     Action,
-    DismissNotice,
-    DoTask,
     EndGesture,
     OpenPath,
-    Quit,
     SetDepthStrength,
-    ShowPrompt,
 )
 from viewer.model.state.depth_editing import Paint, SetTone
 from viewer.model.state.exporting import ExportPrompt, ExportTask
@@ -52,7 +50,7 @@ def viewer(open_window: Opener, photo_path: Path) -> Driver:
     driver = open_window(photo_path, grid=GridShape(3, 3))
     driver.until_idle()
     for notice in driver.app.state.notices:
-        driver.app.do(DismissNotice(notice))
+        driver.app.do(do(messages.dismiss, notice))
     return driver
 
 
@@ -62,7 +60,7 @@ def texts(app: App) -> list[str]:
 
 def start(viewer: Driver, path: Path, options: ExportOptions = SMALL) -> None:
     """Ask for one, and wait until some of it is drawn."""
-    viewer.app.do(DoTask(ExportTask("gif", str(path), options)))
+    viewer.app.do(do(ask, ExportTask("gif", str(path), options)))
     viewer.until(lambda app: bool(app.state.jobs) and app.state.jobs[0].done > 0)
 
 
@@ -70,7 +68,7 @@ def test_the_window_lives_on_while_it_exports(viewer: Driver, tmp_path: Path) ->
     out = tmp_path / "a.gif"
     app = viewer.app
     start(viewer, tmp_path / "long.gif", LARGE)
-    app.do(DoTask(ExportTask("gif", str(out), SMALL)))
+    app.do(do(ask, ExportTask("gif", str(out), SMALL)))
     frames, turns = app.frames_shown, 0
     while turns < 10:
         app.do(MoveEye(ViewOffset(0.05 * turns, 0.2)))
@@ -78,7 +76,7 @@ def test_the_window_lives_on_while_it_exports(viewer: Driver, tmp_path: Path) ->
         turns += 1
     assert app.frames_shown - frames >= 5
     assert [job.doing for job in app.state.jobs] == ["drawing frames", ""]
-    app.do(DoTask(CancelJobTask(app.state.jobs[0].id)))
+    app.do(do(ask, CancelJobTask(app.state.jobs[0].id)))
     viewer.until(lambda app: bool(texts(app)))
     assert texts(app) == [f"Exported {out}"], "what was cancelled is not spoken of"
     viewer.until(lambda app: not app.state.jobs)
@@ -88,7 +86,7 @@ def test_the_window_lives_on_while_it_exports(viewer: Driver, tmp_path: Path) ->
 
 
 def test_a_light_field_is_made_anew_beside_the_window(viewer: Driver, tmp_path: Path) -> None:
-    viewer.app.do(DoTask(ExportTask("hci", str(tmp_path / "field"))))
+    viewer.app.do(do(ask, ExportTask("hci", str(tmp_path / "field"))))
     viewer.until(lambda app: bool(texts(app)))
     assert texts(viewer.app) == [f"Exported {tmp_path / 'field'}"]
     shown = viewer.app.scene_view.renderer.converged_picture(
@@ -175,10 +173,10 @@ def test_what_is_under_way_stays_as_it_was_asked_for_whatever_is_changed(
     viewer.until_idle()
     for folder in ("alone", "disturbed"):
         (tmp_path / folder).mkdir()
-    app.do(DoTask(replace(task, path=str(tmp_path / "alone" / name))))
+    app.do(do(ask, replace(task, path=str(tmp_path / "alone" / name))))
     viewer.until(lambda app: bool(texts(app)) and not app.state.jobs)
     gate.clear()
-    app.do(DismissNotice(None), DoTask(replace(task, path=str(tmp_path / "disturbed" / name))))
+    app.do(do(messages.dismiss), do(ask, replace(task, path=str(tmp_path / "disturbed" / name))))
     viewer.until(lambda app: bool(app.state.jobs) and app.state.jobs[0].done > 0)
     for actions in nine_changes(viewer, tmp_path):
         app.do(*actions)
@@ -202,7 +200,7 @@ def test_what_is_asked_for_before_all_views_are_there_is_not_lost_with_its_photo
     app = viewer.app
     viewer.until(lambda app: app.state.scene is not None and not app.state.scene.is_sketch)
     options = SMALL if kind == "gif" else ExportOptions()
-    app.do(SetAperture(2.0), DoTask(ExportTask(kind, str(tmp_path / f"early.{kind}"), options)))
+    app.do(SetAperture(2.0), do(ask, ExportTask(kind, str(tmp_path / f"early.{kind}"), options)))
     app.step()
     assert [job.doing for job in app.state.jobs] == [WAITING_FOR_VIEWS]
     app.do(other_photo(tmp_path))
@@ -212,7 +210,7 @@ def test_what_is_asked_for_before_all_views_are_there_is_not_lost_with_its_photo
     app.do(OpenPath(Source(str(photo_path), grid=GridShape(5, 5))))
     viewer.until(lambda app: app.state.scene is not None and app.state.scene.name == "scene")
     viewer.until_idle()
-    app.do(DismissNotice(None), SetAperture(2.0), DoTask(ExportTask(kind, str(tmp_path / f"late.{kind}"), options)))
+    app.do(do(messages.dismiss), SetAperture(2.0), do(ask, ExportTask(kind, str(tmp_path / f"late.{kind}"), options)))
     viewer.until(lambda app: f"Exported {tmp_path / f'late.{kind}'}" in texts(app))
     early, late = (bytes_of(tmp_path / f"{when}.{kind}") for when in ("early", "late"))
     assert list(early.values()) == list(late.values())
@@ -233,7 +231,7 @@ def test_of_a_scene_that_was_left_only_the_views_are_made_that_are_shown(
     app = viewer.app
     viewer.until(lambda app: app.state.scene is not None and not app.state.scene.is_sketch)
     path = tmp_path / f"early{'.png' if kind == 'anaglyph' else ''}"
-    app.do(DoTask(ExportTask(kind, str(path), ExportOptions())))
+    app.do(do(ask, ExportTask(kind, str(path), ExportOptions())))
     app.step()
     assert [job.doing for job in app.state.jobs] == [WAITING_FOR_VIEWS]
     app.do(other_photo(tmp_path))
@@ -255,7 +253,7 @@ def test_waiting_jobs_do_not_hold_the_views_of_scenes_that_were_left(
         app.do(OpenPath(Source(str(write_scene(tmp_path / str(seed), f"photo{seed}", seed)), grid=GridShape(3, 3))))
         name = f"photo{seed}"
         viewer.until(lambda app, name=name: app.state.scene.name == name and app.state.progress.is_complete)  # type: ignore[misc]
-        app.do(DoTask(ExportTask("gif", str(tmp_path / f"{seed}.gif"), SMALL)))
+        app.do(do(ask, ExportTask("gif", str(tmp_path / f"{seed}.gif"), SMALL)))
         app.step()
         held = {job.snapshot.field.colors for job in jobs if job.snapshot is not None}
         shown = app.scene_view.renderer.field
@@ -274,7 +272,7 @@ def test_any_job_of_the_queue_can_be_given_up(viewer: Driver, tmp_path: Path, ga
     gate.clear()
     start(viewer, tmp_path / "a.gif")
     for name in "bc":
-        app.do(DoTask(ExportTask("gif", str(tmp_path / f"{name}.gif"), SMALL)))
+        app.do(do(ask, ExportTask("gif", str(tmp_path / f"{name}.gif"), SMALL)))
     viewer.until(lambda app: len(app.state.jobs) == 3)
     viewer.until_idle()
     viewer.press(f"Cancel##job {app.state.jobs[1].id}", "notices")
@@ -291,11 +289,11 @@ def test_closing_asks_while_something_is_exported(viewer: Driver, tmp_path: Path
     app, out = viewer.app, tmp_path / "a.gif"
     gate.clear()
     start(viewer, out)
-    app.do(Quit())
+    app.do(do(saving.quit_window))
     assert app.state.prompt == "quit"
     viewer.press("Cancel", "prompt str")
     viewer.until(lambda app: app.state.prompt is None)
-    app.do(Quit())
+    app.do(do(saving.quit_window))
     viewer.press("Wait, then quit", "prompt str")
     viewer.until(lambda app: app.state.quits_when_done)
     assert not app.state.should_quit
@@ -327,15 +325,15 @@ def test_it_is_asked_for_by_key_and_says_what_is_wrong(viewer: Driver, tmp_path:
         (tmp_path / "a.png", "gif"),
         (tmp_path / "scene.png", "anaglyph"),
     ):
-        app.do(ShowPrompt(None))
+        app.do(do(messages.show_prompt, None))
         viewer.until_idle()  # or the field that is typed in would keep its own text
-        app.do(DoTask(ExportTask(kind, str(path))))
+        app.do(do(ask, ExportTask(kind, str(path))))
         viewer.until(lambda app: not app.state.tasks)
         asked = app.state.prompt
         assert isinstance(asked, ExportPrompt)
         assert (asked.already_there, bool(asked.problem)) == (kind == "sbs", kind != "sbs")
     assert there.read_text() == "mine"
-    app.do(DoTask(ExportTask("sbs", str(tmp_path / "there.png"), replace(SMALL, frames=0), may_replace=True)))
+    app.do(do(ask, ExportTask("sbs", str(tmp_path / "there.png"), replace(SMALL, frames=0), may_replace=True)))
     viewer.until(lambda app: bool(texts(app)))
     assert texts(app) == [f"Exported {there}"]
     assert app.state.prompt is None
@@ -348,7 +346,7 @@ def test_where_it_goes_is_typed_at_once_and_seen_whole(
 ) -> None:
     monkeypatch.setattr("viewer.app.pace.TOOLTIP_S", 0.5)  # as usual
     out = tmp_path / ("a" * 60 + ".gif")
-    viewer.app.do(ShowPrompt(ExportPrompt("gif", "somewhere.gif")))
+    viewer.app.do(do(messages.show_prompt, ExportPrompt("gif", "somewhere.gif")))
     viewer.until_idle()
     viewer.type(str(out))
     viewer.until(lambda app: app.state.prompt == ExportPrompt("gif", str(out)))
@@ -362,7 +360,7 @@ def test_where_it_goes_is_typed_at_once_and_seen_whole(
 def test_the_window_asks_for_what_a_kind_can_be_told(viewer: Driver, tmp_path: Path) -> None:
     out = tmp_path / "a.gif"
     app = viewer.app
-    app.do(ShowPrompt(ExportPrompt("gif", str(out))))
+    app.do(do(messages.show_prompt, ExportPrompt("gif", str(out))))
     window = "prompt ExportPrompt"
     expected = ExportOptions()
     for field, text, said in (

@@ -12,7 +12,7 @@ import pytest
 from iibr_core.formats.images.photo import read_photo
 from tests.viewer.conftest import Driver
 from viewer.app import picture_saver
-from viewer.model.actions import DoTask
+from viewer.model.action import ask, do
 from viewer.model.free_camera import FreeCamera
 from viewer.model.state.optics_actions import SetAperture, SetFocus
 from viewer.model.state.tasks import SaveTask
@@ -73,7 +73,7 @@ def test_the_lens_blurs_what_it_sees_and_a_saved_picture_shows_that(viewer: Driv
     blurred = seen(viewer)
     assert np.abs(blurred - sharp).mean() > 1.0
     path = tmp_path / "seen.png"
-    viewer.app.do(DoTask(SaveTask(str(path), (blurred.shape[1], blurred.shape[0]))))
+    viewer.app.do(do(ask, SaveTask(str(path), (blurred.shape[1], blurred.shape[0]))))
     viewer.until(lambda app: path.exists() and not app.state.jobs)
     viewer.send("key", "Escape")
     viewer.until(lambda app: app.state.free_camera is None and app.free_camera_view.shown is None)
@@ -100,7 +100,7 @@ def test_pictures_that_wait_show_what_the_camera_saw(
         before = app.state.free_camera
         viewer.until(lambda app, before=before: app.state.free_camera != before)  # type: ignore[misc]
         expected.append(seen(viewer))
-        app.do(DoTask(SaveTask(str(path), (expected[-1].shape[1], expected[-1].shape[0]))))
+        app.do(do(ask, SaveTask(str(path), (expected[-1].shape[1], expected[-1].shape[0]))))
         viewer.until(lambda app: not app.state.tasks)
     held.set()
     viewer.until(lambda app: not app.state.jobs)

@@ -20,9 +20,10 @@ from viewer.app.image_export import export_picture, shot_of
 from viewer.app.job_queue import JobQueue
 from viewer.app.picture_saver import add_save
 from viewer.display.offscreen import OffscreenScene
-from viewer.model.actions import Action, EditsSaved, Notify
+from viewer.model import messages, saving
+from viewer.model.action import do
+from viewer.model.actions import Action
 from viewer.model.saved_settings import read_settings
-from viewer.model.state.jobs import JobsChanged
 from viewer.model.state.optics_actions import MoveEye, SetAperture, SetFocus
 from viewer.model.state.preferences import SetPreference
 from viewer.model.state.tasks import SaveTask
@@ -115,10 +116,10 @@ def test_a_picture_is_as_it_was_when_edited_depth_is_shown_meanwhile(tmp_path: P
         assert not np.array_equal(
             scene_view.renderer.converged_picture(RenderSettings(state.optics, (90, 60))), expected
         )
-        while JobsChanged(()) not in actions:
+        while do(saving.set_jobs, ()) not in actions:
             actions += jobs.advance(state, 0.0)
             assert woken.wait(60)
         jobs.close()
-    assert [action.notice.text for action in actions if isinstance(action, Notify)] == [f"Saved {out}"]
-    assert EditsSaved(state.depth.edits) in actions
+    assert [action.args[0].text for action in actions if action.verb is messages.notify] == [f"Saved {out}"]
+    assert do(saving.mark_saved, state.depth.edits) in actions
     np.testing.assert_array_equal(oiio.ImageBuf(str(out)).get_pixels(oiio.UINT8), expected)

@@ -10,7 +10,9 @@ import pytest
 from iibr_core.scenes.scene import Scene, Source
 from iibr_core.types import GridShape, ViewOffset
 from viewer.app.keys import Keys, actions_from_keys
-from viewer.model.actions import Action, AskToSave, SetState, ShowPrompt, Undo
+from viewer.model import messages, saving
+from viewer.model.action import do
+from viewer.model.actions import Action, SetState, Undo
 from viewer.model.commands import BY_NAME, COMMANDS
 from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState
@@ -26,7 +28,7 @@ def test_keys() -> None:
     assert actions_from_keys(Keys(), STATE) == []
     reset = "Reset viewpoint, focus and aperture"
     assert actions_from_keys(Keys(is_escape=True, commands=(reset, "Undo")), STATE) == [ResetOptics(), Undo()]
-    assert actions_from_keys(Keys(is_escape=True), replace(STATE, prompt="help")) == [ShowPrompt(None)]
+    assert actions_from_keys(Keys(is_escape=True), replace(STATE, prompt="help")) == [do(messages.show_prompt, None)]
     assert reset in BY_NAME
 
 
@@ -47,7 +49,7 @@ def test_escape_closes_what_lies_over_the_picture(opens: tuple[Action, ...], clo
 def test_what_is_typed_too_early_is_no_command() -> None:
     """The palette comes up, and has the keyboard a frame later."""
     keys = Keys(arrows=ViewOffset(1, 0), commands=("Take a snapshot to compare with", "Save the picture…"))
-    assert actions_from_keys(keys, replace(STATE, prompt=PalettePrompt())) == [AskToSave()]
+    assert actions_from_keys(keys, replace(STATE, prompt=PalettePrompt())) == [do(saving.ask_to_save)]
     assert len(actions_from_keys(keys, replace(STATE, prompt="help"))) == 3
 
 

@@ -21,7 +21,9 @@ from tests.local_hub import Hub, local_hub
 from tests.viewer.conftest import Driver, Opener
 from viewer.app.main_loop import App
 from viewer.background.model_downloader import list_models
-from viewer.model.actions import EndGesture, OpenPath, Redo, ShowPrompt, Undo
+from viewer.model import messages
+from viewer.model.action import do
+from viewer.model.actions import EndGesture, OpenPath, Redo, Undo
 from viewer.model.lens.focal_plane import place_of, sharp_disparity
 from viewer.model.reducers.depth_models import offered_model
 from viewer.model.state.depth_editing import Brush, Paint, SetBrush
@@ -194,7 +196,7 @@ def test_the_next_photo_is_estimated_unasked(downloaded: Hub, open_window: Opene
 def test_nothing_is_fetched_unasked(hub: Hub, open_window: Opener, tmp_path: Path) -> None:
     hub.may_finish.set()
     driver = open_window(write_photo(tmp_path / "photo.png"), grid=GRID)
-    driver.app.do(SetPreference("estimates_depth", True), ShowPrompt(ModelsPrompt()))
+    driver.app.do(SetPreference("estimates_depth", True), do(messages.show_prompt, ModelsPrompt()))
     with_offer(driver)
     assert not hub.asked
 

@@ -29,7 +29,8 @@ from tests.viewer.conftest import HEIGHT, WIDTH, Driver, Opener, write_scene
 from viewer.app.image_export import export_picture
 from viewer.app.job_queue import JobQueue
 from viewer.app.pace import SETTLING_FRAMES
-from viewer.model.actions import AskToSave, DismissNotice, DoTask
+from viewer.model import messages, saving
+from viewer.model.action import ask, do
 from viewer.model.saved_settings import read_settings
 from viewer.model.state.jobs import WAITING_FOR_VIEWS, WRITING, CancelJobTask, JobProgress
 from viewer.model.state.optics_actions import MoveEye, SetAperture
@@ -58,7 +59,7 @@ def viewer(open_window: Opener, photo_path: Path, monkeypatch: pytest.MonkeyPatc
 
 def start(viewer: Driver, path: Path, size_px: tuple[int, int] = LARGE) -> None:
     """Ask for a picture, and wait until some of it is drawn."""
-    viewer.app.do(DoTask(SaveTask(str(path), size_px)))
+    viewer.app.do(do(ask, SaveTask(str(path), size_px)))
     viewer.until(lambda app: bool(app.state.jobs) and app.state.jobs[0].done > 0)
 
 
@@ -79,7 +80,7 @@ def test_the_window_lives_on_while_a_picture_is_saved(viewer: Driver, tmp_path: 
         RenderSettings(asked.optics, SIZE, is_linear=name.endswith("exr"))
     )
     expected = srgb_from_linear(expected) if name.endswith("exr") else expected
-    app.do(DoTask(SaveTask(str(out), SIZE)))
+    app.do(do(ask, SaveTask(str(out), SIZE)))
     app.step()
     frames, drawn, turns, shares = app.frames_shown, app.scene_view.pictures_drawn, 0, []
     while not texts(viewer):
@@ -117,7 +118,7 @@ def test_views_that_come_again_wait_until_the_picture_is_drawn(viewer: Driver, t
 def test_cancel_leaves_nothing_behind_and_the_next_is_saved(viewer: Driver, tmp_path: Path) -> None:
     before = set(tmp_path.iterdir())
     start(viewer, tmp_path / "large.png")
-    viewer.app.do(DoTask(SaveTask(str(tmp_path / "next.png"), (48, 32))))
+    viewer.app.do(do(ask, SaveTask(str(tmp_path / "next.png"), (48, 32))))
     viewer.until(lambda app: len(app.state.jobs) == 2)
     for _ in range(SETTLING_FRAMES):  # the first row moves up
         viewer.app.step()
@@ -126,14 +127,14 @@ def test_cancel_leaves_nothing_behind_and_the_next_is_saved(viewer: Driver, tmp_
     viewer.until(lambda app: not app.state.jobs)
     assert texts(viewer) == [f"Saved {tmp_path / 'next.png'}"]
     assert set(tmp_path.iterdir()) - before == {tmp_path / "next.png"}
-    viewer.app.do(DoTask(CancelJobTask(1)))
+    viewer.app.do(do(ask, CancelJobTask(1)))
     viewer.until_idle()
 
 
 def test_pictures_are_saved_in_the_order_in_which_they_were_asked_for(viewer: Driver, tmp_path: Path) -> None:
     eyes = [ViewOffset(0.0, s) for s in (-1.0, 0.0, 1.0)]
     for i, eye in enumerate(eyes):
-        viewer.app.do(MoveEye(eye), DoTask(SaveTask(str(tmp_path / f"{i}.png"), (48, 32))))
+        viewer.app.do(MoveEye(eye), do(ask, SaveTask(str(tmp_path / f"{i}.png"), (48, 32))))
         viewer.app.step()
     viewer.until(lambda app: len(app.state.notices) == 3 and not app.state.jobs)
     assert texts(viewer) == [f"Saved {tmp_path / f'{i}.png'}" for i in range(3)]
@@ -143,7 +144,7 @@ def test_pictures_are_saved_in_the_order_in_which_they_were_asked_for(viewer: Dr
 def test_a_file_that_waits_to_be_written_is_replaced_only_when_that_is_said(viewer: Driver, tmp_path: Path) -> None:
     out = tmp_path / "large.png"
     start(viewer, out)
-    viewer.app.do(DoTask(SaveTask(str(out), (48, 32))))
+    viewer.app.do(do(ask, SaveTask(str(out), (48, 32))))
     viewer.until(lambda app: app.state.prompt == SavePrompt(str(out), (48, 32), already_there=True))
     assert not out.exists()
 
@@ -151,13 +152,13 @@ def test_a_file_that_waits_to_be_written_is_replaced_only_when_that_is_said(view
 def test_nothing_is_saved_onto_what_the_window_reads(viewer: Driver, photo_path: Path) -> None:
     """The photo, the map beside it, an aperture: a notice, and no question whether to replace it."""
     shutil.copy(photo_path, photo_path.with_name("mask.png"))
-    viewer.app.do(DoTask(ReadMaskTask(str(photo_path.with_name("mask.png")))))
+    viewer.app.do(do(ask, ReadMaskTask(str(photo_path.with_name("mask.png")))))
     viewer.until(lambda app: app.state.optics.aperture_shape.mask is not None)
     whats: tuple[Saved, ...] = ("picture", "map")
     for what, name in product(whats, ("scene.png", "scene_disparity.npy", "mask.png")):
         path = photo_path.with_name(name)
         before = path.read_bytes()
-        viewer.app.do(DismissNotice(None), DoTask(SaveTask(str(path), (48, 32), may_replace=True, what=what)))
+        viewer.app.do(do(messages.dismiss), do(ask, SaveTask(str(path), (48, 32), may_replace=True, what=what)))
         viewer.until(lambda app: bool(app.state.notices))
         expected = "can be written as .png, .jpg" if (what, path.suffix) == ("picture", ".npy") else "is read here"
         assert expected in texts(viewer)[0], (what, name)
@@ -169,11 +170,11 @@ def test_a_map_that_was_saved_may_be_saved_again(viewer: Driver, tmp_path: Path)
     """It lies beside the photo, but was not read; it is replaced where that is said."""
     path = tmp_path / "scene_disparity.pfm"
     for may_replace in (False, True):
-        viewer.app.do(DoTask(SaveTask(str(path), (48, 32), may_replace, "map")))
+        viewer.app.do(do(ask, SaveTask(str(path), (48, 32), may_replace, "map")))
         viewer.until(lambda app: len(app.state.notices) > 0)
         assert texts(viewer) == [f"Saved {path}."]
-        viewer.app.do(DismissNotice(viewer.app.state.notices[0]))
-    viewer.app.do(DoTask(SaveTask(str(path), (48, 32), what="map")))
+        viewer.app.do(do(messages.dismiss, viewer.app.state.notices[0]))
+    viewer.app.do(do(ask, SaveTask(str(path), (48, 32), what="map")))
     viewer.until(lambda app: app.state.prompt == SavePrompt(str(path), (48, 32), already_there=True, what="map"))
 
 
@@ -181,7 +182,7 @@ def test_a_picture_waits_for_the_views(open_window: Opener, photo_path: Path, tm
     viewer = open_window(photo_path, grid=GridShape(9, 9))
     app, out = viewer.app, tmp_path / "out.png"
     viewer.until(lambda app: app.state.scene is not None and not app.state.scene.is_sketch)
-    app.do(MoveEye(ViewOffset(0.3, -0.7)), SetAperture(2.0), DoTask(SaveTask(str(out), SIZE)))
+    app.do(MoveEye(ViewOffset(0.3, -0.7)), SetAperture(2.0), do(ask, SaveTask(str(out), SIZE)))
     app.step()
     assert job_of(viewer).doing == WAITING_FOR_VIEWS
     asked = app.state.optics
@@ -215,7 +216,7 @@ def test_closing_the_window_waits_for_what_is_being_written(
     close_queue = JobQueue.close
     monkeypatch.setattr("viewer.app.picture_saver.export_picture", write)
     monkeypatch.setattr(JobQueue, "close", close)
-    viewer.app.do(DoTask(SaveTask(str(out), SIZE)))
+    viewer.app.do(do(ask, SaveTask(str(out), SIZE)))
     viewer.until(lambda app: bool(app.state.jobs) and app.state.jobs[0].doing == WRITING)
     viewer.close()
     assert read_photo(out).pixels.shape == (*SIZE[::-1], 3)
@@ -231,10 +232,10 @@ def test_a_file_that_cannot_be_written_is_a_notice_and_the_next_is_saved(
 
     with monkeypatch.context() as broken:
         broken.setattr("viewer.app.picture_saver.export_picture", fail)
-        viewer.app.do(DoTask(SaveTask(str(tmp_path / "a.png"), (48, 32))))
+        viewer.app.do(do(ask, SaveTask(str(tmp_path / "a.png"), (48, 32))))
         viewer.until(lambda app: bool(app.state.notices))
     assert [notice.is_error for notice in viewer.app.state.notices] == [True]
-    viewer.app.do(DoTask(SaveTask(str(tmp_path / "a.png"), (48, 32))))
+    viewer.app.do(do(ask, SaveTask(str(tmp_path / "a.png"), (48, 32))))
     viewer.until(lambda app: f"Saved {tmp_path / 'a.png'}" in texts(viewer))
 
 
@@ -252,11 +253,11 @@ def test_a_picture_is_saved_at_the_photos_own_size(
 ) -> None:
     """Asked for no other size it has all of the photo's pixels; what is out of focus is as in the views."""
     app, out = large.app, tmp_path / "out.png"
-    app.do(SetAperture(aperture), AskToSave())
+    app.do(SetAperture(aperture), do(saving.ask_to_save))
     prompt = app.state.prompt
     assert isinstance(prompt, SavePrompt)
     assert prompt.size_px == (WIDTH, HEIGHT)
-    app.do(DoTask(SaveTask(str(out), prompt.size_px)))
+    app.do(do(ask, SaveTask(str(out), prompt.size_px)))
     large.until(lambda app: f"Saved {out}" in texts(large))
     saved, photo = read_photo(out).pixels, read_photo(photo_path).pixels
     assert saved.shape == photo.shape
@@ -282,9 +283,9 @@ def test_a_picture_at_the_photos_own_size_can_be_given_up(
 
     with monkeypatch.context() as endless:
         endless.setattr("iibr_core.exports.full_drawing.draw_full", draw_full)
-        large.app.do(DoTask(SaveTask(str(tmp_path / "out.png"), (WIDTH, HEIGHT))))
+        large.app.do(do(ask, SaveTask(str(tmp_path / "out.png"), (WIDTH, HEIGHT))))
         large.until(lambda app: begun.is_set())
-        large.app.do(DoTask(CancelJobTask(job_of(large).id)), DoTask(SaveTask(str(tmp_path / "next.png"), (16, 12))))
+        large.app.do(do(ask, CancelJobTask(job_of(large).id)), do(ask, SaveTask(str(tmp_path / "next.png"), (16, 12))))
         large.until(lambda app: f"Saved {tmp_path / 'next.png'}" in texts(large))
     assert set(tmp_path.iterdir()) - before == {tmp_path / "next.png"}
 
@@ -292,6 +293,6 @@ def test_a_picture_at_the_photos_own_size_can_be_given_up(
 def test_a_photo_that_was_replaced_meanwhile_is_noticed(large: Driver, photo_path: Path, tmp_path: Path) -> None:
     out = tmp_path / "out.png"
     shutil.copy(write_scene(tmp_path, "other", seed=3), photo_path)
-    large.app.do(DoTask(SaveTask(str(out), (WIDTH, HEIGHT))))
+    large.app.do(do(ask, SaveTask(str(out), (WIDTH, HEIGHT))))
     large.until(lambda app: any("was changed since it was opened" in text for text in texts(large)))
     assert not out.exists()

@@ -20,7 +20,9 @@ from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import Driver, Opener, rests
 from viewer.app.session_store import EDITS_KEPT, key_of, sidecar_of
-from viewer.model.actions import DoTask, Quit, ShowPrompt, Undo
+from viewer.model import messages, saving
+from viewer.model.action import ask, do
+from viewer.model.actions import Undo
 from viewer.model.saved_settings import settings_text
 from viewer.model.state.depth_editing import Paint, SetBrush, SetTone
 from viewer.model.state.optics_actions import MoveEye, SetAperture, SetFocus
@@ -124,7 +126,7 @@ def test_what_was_only_looked_at_leaves_nothing(open_window: Opener, photo_path:
 def test_beside_the_photo_if_asked(open_window: Opener, photo_path: Path, tmp_path: Path) -> None:
     first = open_window(photo_path, kept_in=tmp_path / "kept", grid=ONE)
     change(first)
-    first.app.do(DoTask(WriteSidecarTask()))
+    first.app.do(do(ask, WriteSidecarTask()))
     first.until(lambda app: sidecar_of(photo_path).is_file())
     left = left_with(first)
     first.app.close()
@@ -205,9 +207,9 @@ def test_closing_asks_nothing_where_the_edits_are_kept_and_says_so_once(
     kept = tmp_path / "kept"
     first = open_window(photo_path, kept_in=kept, grid=ONE)
     first.until(lambda app: app.state.keeps_sessions)
-    first.app.do(ShowPrompt(None), SetTone(replace(UNEDITED, gamma=1.5), is_finished=True))
+    first.app.do(do(messages.show_prompt, None), SetTone(replace(UNEDITED, gamma=1.5), is_finished=True))
     first.until(lambda app: any(notice.text == EDITS_KEPT for notice in app.state.notices))
-    first.app.do(Quit())
+    first.app.do(do(saving.quit_window))
     assert first.app.state.should_quit
     first.app.close()
     second = open_window(photo_path, kept_in=kept, grid=ONE)
@@ -226,6 +228,6 @@ def test_closing_asks_where_the_edits_cannot_be_kept(open_window: Opener, photo_
     driver.until_idle()
     driver.app.do(SetTone(replace(UNEDITED, gamma=1.5), is_finished=True))
     driver.until_idle()
-    driver.app.do(Quit())
+    driver.app.do(do(saving.quit_window))
     assert driver.app.state.prompt == "quit"
     assert not driver.app.state.should_quit

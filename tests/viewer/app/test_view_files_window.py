@@ -23,7 +23,9 @@ from iibr_core.types import (
 )
 from tests.iibr_core.known_scenes import view_of_wall
 from tests.viewer.conftest import Driver
-from viewer.model.actions import DismissNotice, DoTask, OpenPath, SetDepthStrength, StopWork, Undo
+from viewer.model import messages
+from viewer.model.action import ask, do
+from viewer.model.actions import OpenPath, SetDepthStrength, StopWork, Undo
 from viewer.model.commands import COMMANDS
 from viewer.model.dense_grid import with_views_between
 from viewer.model.state.filling import FillTask
@@ -113,7 +115,7 @@ def open_lenslet_image(viewer: Driver, folder: Path) -> Scene:
     viewer.until(lambda app: app.state.scene is not None and app.state.scene.source.path == str(path))
     viewer.until(lambda app: app.state.scene is not None and app.state.scene.depth_source != "none")
     viewer.until_idle()
-    viewer.app.do(DismissNotice(None))
+    viewer.app.do(do(messages.dismiss))
     assert viewer.app.state.scene is not None
     return viewer.app.state.scene
 
@@ -151,11 +153,11 @@ def test_views_between_those_of_a_file_are_made_shown_and_taken_back(
     assert denser.subject_disparity_px == pytest.approx(DISPARITY / 2, abs=0.05)
     assert viewer.app.state.optics.aperture_diameter == pytest.approx(3.0), "twice as many steps"
     assert viewer.app.state.zoom is None
-    viewer.app.do(DoTask(FillTask(with_views_between(denser, GridShape(3, 3)))))
+    viewer.app.do(do(ask, FillTask(with_views_between(denser, GridShape(3, 3)))))
     viewer.until(lambda app: app.state.scene is not None and app.state.scene.grid == (3, 3))
     viewer.until_idle()
     gate.clear()  # they are there, and not made again
-    viewer.app.do(DoTask(FillTask(denser.source)))
+    viewer.app.do(do(ask, FillTask(denser.source)))
     until_filled(viewer)
 
 
@@ -185,9 +187,9 @@ def test_a_fill_is_given_up_by_its_button_or_for_another_grid(
     scene = open_lenslet_image(viewer, tmp_path)
     gate.clear()
     fill_between(viewer)
-    viewer.app.do(DoTask(FillTask(with_views_between(scene, GridShape(9, 9)))))
+    viewer.app.do(do(ask, FillTask(with_views_between(scene, GridShape(9, 9)))))
     viewer.until(lambda app: [job.fills for job in app.state.jobs] == [with_views_between(scene, GridShape(9, 9))])
-    viewer.app.do(DoTask(CancelJobTask(viewer.app.state.jobs[0].id)))
+    viewer.app.do(do(ask, CancelJobTask(viewer.app.state.jobs[0].id)))
     viewer.until(lambda app: not app.state.jobs)
     gate.set()
     viewer.until_idle()

@@ -20,7 +20,9 @@ from viewer.app.main_loop import App
 from viewer.app.pointer import units_per_view
 from viewer.app.preferences_store import PREFERENCES_FILE
 from viewer.display.scene_view import WAITING_VIEWS
-from viewer.model.actions import DismissNotice, SetDepthStrength
+from viewer.model import messages
+from viewer.model.action import do
+from viewer.model.actions import SetDepthStrength
 from viewer.model.state.optics_actions import MoveEye
 
 
@@ -57,7 +59,7 @@ def test_views_that_the_graphics_card_has_no_room_for_are_told_of(
     driver.until(lambda app: app.state.progress.is_complete)
     told = [notice.text for notice in driver.app.state.notices]
     assert any("every 2nd view across and down" in text for text in told), told
-    driver.app.do(DismissNotice(None))
+    driver.app.do(do(messages.dismiss))
 
 
 def test_a_drag_moves_the_viewpoint_and_the_picture(viewer: Driver) -> None:

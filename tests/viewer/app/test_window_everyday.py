@@ -20,7 +20,9 @@ from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import Driver, Opener, rests, write_scene
 from viewer.app.preferences_store import load_preferences
 from viewer.display.offscreen import OffscreenScene
-from viewer.model.actions import DoTask, OpenPath, ShowPrompt, StopWork
+from viewer.model import messages
+from viewer.model.action import ask, do
+from viewer.model.actions import OpenPath, StopWork
 from viewer.model.saved_settings import read_settings
 from viewer.model.state.app_state import AppState
 from viewer.model.state.exporting import ExportPrompt
@@ -58,7 +60,7 @@ def test_a_saved_picture_can_be_taken_again_without_the_window(
 def test_a_file_that_is_there_is_replaced_only_when_that_is_said(viewer: Driver, tmp_path: Path) -> None:
     out = tmp_path / "out.png"
     out.write_text("mine")
-    viewer.app.do(DoTask(SaveTask(str(out), (48, 32))))
+    viewer.app.do(do(ask, SaveTask(str(out), (48, 32))))
     viewer.until(lambda app: app.state.prompt == SavePrompt(str(out), (48, 32), already_there=True))
     assert out.read_text() == "mine"
     viewer.until_idle()
@@ -70,7 +72,7 @@ def test_a_file_that_is_there_is_replaced_only_when_that_is_said(viewer: Driver,
 @pytest.mark.parametrize("name", ["a.jpeg2", "gone/a.png", "a/b/"])
 def test_a_picture_that_cannot_be_written_gives_a_notice(viewer: Driver, tmp_path: Path, name: str) -> None:
     before = viewer.app.state.optics
-    viewer.app.do(DoTask(SaveTask(f"{tmp_path}/{name}", (48, 32))))
+    viewer.app.do(do(ask, SaveTask(f"{tmp_path}/{name}", (48, 32))))
     viewer.until(lambda app: bool(app.state.notices))
     assert viewer.app.state.notices[-1].is_error
     assert viewer.app.state.optics == before
@@ -78,7 +80,7 @@ def test_a_picture_that_cannot_be_written_gives_a_notice(viewer: Driver, tmp_pat
 
 
 def test_a_picture_too_large_for_the_driver_gives_a_notice(viewer: Driver, tmp_path: Path) -> None:
-    viewer.app.do(DoTask(SaveTask(str(tmp_path / "a.png"), (10**6, 6 * 10**5))))
+    viewer.app.do(do(ask, SaveTask(str(tmp_path / "a.png"), (10**6, 6 * 10**5))))
     viewer.until(lambda app: bool(app.state.notices))
     assert "1000000x600000" in viewer.app.state.notices[-1].text
     assert not (tmp_path / "a.png").exists()
@@ -87,7 +89,7 @@ def test_a_picture_too_large_for_the_driver_gives_a_notice(viewer: Driver, tmp_p
 
 def test_a_dropped_saved_picture_offers_its_settings(viewer: Driver, tmp_path: Path) -> None:
     out = tmp_path / "saved.png"
-    viewer.app.do(MoveEye(ViewOffset(1, 1)), SetAperture(1.5), DoTask(SaveTask(str(out), (96, 64))))
+    viewer.app.do(MoveEye(ViewOffset(1, 1)), SetAperture(1.5), do(ask, SaveTask(str(out), (96, 64))))
     viewer.until(lambda app: out.exists())
     wanted = viewer.app.state.optics
     np.save(tmp_path / "saved_disparity.npy", np.load(tmp_path / "scene_disparity.npy"))
@@ -119,7 +121,7 @@ def test_a_mask_that_lets_no_light_through_changes_nothing(
     else:
         mask.write_bytes(contents)
     before = viewer.app.state.optics
-    viewer.app.do(DoTask(ReadMaskTask(str(mask))))
+    viewer.app.do(do(ask, ReadMaskTask(str(mask))))
     viewer.until(lambda app: bool(app.state.notices))
     assert "mask.png" in viewer.app.state.notices[-1].text
     assert viewer.app.state.optics == before
@@ -164,7 +166,7 @@ def test_f1_shows_the_map_and_escape_closes_it(viewer: Driver) -> None:
 def test_a_prompt_comes_up_at_once_not_at_the_next_move(viewer: Driver) -> None:
     """An ImGui window is laid out for a frame before it shows: the loop must not fall asleep in between."""
     shown = viewer.app.frames_shown
-    viewer.app.do(ShowPrompt("help"))
+    viewer.app.do(do(messages.show_prompt, "help"))
     while viewer.app.wait_s == 0:
         viewer.app.step()
     assert viewer.app.frames_shown > shown
@@ -177,7 +179,7 @@ def test_ctrl_counts_where_it_was_held_when_the_key_was_pressed(viewer: Driver) 
     viewer.send("keydown", "e", "keyup", "ctrl", "keyup", "e")
     viewer.until(lambda app: isinstance(app.state.prompt, ExportPrompt))
     assert not viewer.app.state.inspection.shows_epis
-    viewer.app.do(ShowPrompt(None))
+    viewer.app.do(do(messages.show_prompt, None))
     viewer.until_idle()
     viewer.send("keydown", "ctrl")
     viewer.until(lambda app: imgui.get_io().key_ctrl)
@@ -284,7 +286,7 @@ def test_the_state_that_asks_for_a_path_knows_what_for() -> None:
     from viewer.model.reducers.root import reduce
     from viewer.model.state.prompts import PathPrompt
 
-    assert reduce(AppState(), ShowPrompt(PathPrompt("mask"))).prompt == PathPrompt("mask")
+    assert reduce(AppState(), do(messages.show_prompt, PathPrompt("mask"))).prompt == PathPrompt("mask")
 
 
 def test_the_panel_says_how_the_photo_was_taken(open_window: Opener, tmp_path: Path) -> None:

@@ -10,7 +10,9 @@ from iibr_core.beyond.optics import ApertureShape, Optics
 from iibr_core.gloss.settings import Gloss
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import FAR, NEAR, Driver
-from viewer.model.actions import Action, Notify, SetDepthStrength, ShowPrompt, ShowTiltHandles
+from viewer.model import messages
+from viewer.model.action import do
+from viewer.model.actions import Action, SetDepthStrength, ShowTiltHandles
 from viewer.model.lens.focal_plane import handle_points, sharp_disparity
 from viewer.model.state.app_state import TiltHandles
 from viewer.model.state.notices import Notice
@@ -151,8 +153,8 @@ DRAWS = (
 )
 ONLY_PANELS = (
     ShowTiltHandles(True),
-    Notify(Notice("hello")),
-    ShowPrompt("help"),
+    do(messages.notify, Notice("hello")),
+    do(messages.show_prompt, "help"),
     SetPreference("theme", "light"),
     ShowTiltHandles(False),
 )

@@ -14,10 +14,12 @@ from iibr_core.types import GridShape
 from tests.viewer.conftest import SMALL_WINDOW, Driver, Opener
 from viewer.app.main_loop import App
 from viewer.app.window_slot import STEP
-from viewer.model.actions import AskToSave, Notify, OpenPath, SetState, ShowPrompt, StopWork
+from viewer.model import messages, saving
+from viewer.model.action import do
+from viewer.model.actions import OpenPath, SetState, StopWork
 from viewer.model.commands import BY_NAME, COMMANDS
 from viewer.model.layout import PANEL_WIDTH
-from viewer.model.state.exporting import AskToExport, ExportPrompt
+from viewer.model.state.exporting import ExportPrompt
 from viewer.model.state.model_download import ModelsPrompt
 from viewer.model.state.notices import Notice
 from viewer.model.state.preferences import SetPreference, ToggleSection
@@ -32,7 +34,7 @@ def soon() -> None:
 
 
 def test_arrows_select_a_command_far_down_the_list_and_enter_runs_it(viewer: Driver) -> None:
-    viewer.app.do(ShowPrompt(PalettePrompt()))
+    viewer.app.do(do(messages.show_prompt, PalettePrompt()))
     viewer.until_idle()
     place = [command.name for command in COMMANDS].index("Larger text")
     assert place > 12, "else nothing scrolls"
@@ -49,7 +51,7 @@ def test_arrows_select_a_command_far_down_the_list_and_enter_runs_it(viewer: Dri
 
 def test_the_palette_loses_nothing_of_what_is_typed_before_its_field_is_there(viewer: Driver) -> None:
     """In slow frames: a letter for each of those that it takes to come up."""
-    viewer.app.do(ShowPrompt(PalettePrompt()))
+    viewer.app.do(do(messages.show_prompt, PalettePrompt()))
     for typed in ("d", "i", "f", "f", "er"):
         imgui.get_io().add_input_characters_utf8(typed)
         viewer.app.step()
@@ -61,7 +63,7 @@ def test_the_palette_loses_nothing_of_what_is_typed_before_its_field_is_there(vi
 
 def test_the_help_stands_in_the_panels_place_and_leaves_the_picture_to_be_seen(viewer: Driver) -> None:
     for hides_panel in (False, True):
-        viewer.app.do(SetState("hides_panel", hides_panel), ShowPrompt("help"))
+        viewer.app.do(SetState("hides_panel", hides_panel), do(messages.show_prompt, "help"))
         viewer.until_idle()
         pad, window = imgui.internal.find_window_by_name("prompt str"), viewer.app.layout().window
         assert (pad.pos.x + pad.size.x, pad.size.y) == (window.width, window.height)
@@ -86,7 +88,7 @@ def test_tooltips_come_up_before_the_window_sleeps(viewer: Driver) -> None:
 @pytest.mark.usefixtures("wide_window")
 @pytest.mark.parametrize("scale", [1.0, 2.0])
 def test_tooltips_of_a_prompt_leave_it_to_be_seen(viewer: Driver, scale: float) -> None:
-    viewer.app.do(SetPreference("font_scale", scale), ShowPrompt(ExportPrompt("sbs", "a.png")))
+    viewer.app.do(SetPreference("font_scale", scale), do(messages.show_prompt, ExportPrompt("sbs", "a.png")))
     viewer.until_idle()
     viewer.find("##Eyes", "prompt ExportPrompt")
     viewer.until_idle()
@@ -97,7 +99,7 @@ def test_tooltips_of_a_prompt_leave_it_to_be_seen(viewer: Driver, scale: float) 
 
 
 def test_up_stays_at_the_first_command_and_typing_begins_there_again(viewer: Driver) -> None:
-    viewer.app.do(ShowPrompt(PalettePrompt()))
+    viewer.app.do(do(messages.show_prompt, PalettePrompt()))
     viewer.until_idle()
     viewer.send("key", "Down", "key", "Down")
     viewer.until(lambda app: app.state.prompt == PalettePrompt("", 2))
@@ -109,7 +111,7 @@ def test_up_stays_at_the_first_command_and_typing_begins_there_again(viewer: Dri
 
 
 def test_escape_closes_a_drop_down_and_then_the_prompt_under_it(viewer: Driver) -> None:
-    viewer.app.do(AskToExport())
+    viewer.app.do(do(saving.ask_to_export))
     viewer.until_idle()
     viewer.press("##kind", "prompt ExportPrompt")
     viewer.until(lambda app: is_menu_open())
@@ -126,7 +128,7 @@ def is_menu_open() -> bool:
 
 
 def test_tab_goes_on_from_the_name_to_the_width(viewer: Driver, tmp_path: Path) -> None:
-    viewer.app.do(AskToSave())
+    viewer.app.do(do(saving.ask_to_save))
     viewer.until_idle()
     viewer.type(str(tmp_path / "a.png"))
     viewer.send("key", "Tab")
@@ -137,7 +139,7 @@ def test_tab_goes_on_from_the_name_to_the_width(viewer: Driver, tmp_path: Path) 
 
 
 def test_a_wrong_ending_keeps_what_was_typed_and_says_what_is_possible(viewer: Driver, tmp_path: Path) -> None:
-    viewer.app.do(AskToSave())
+    viewer.app.do(do(saving.ask_to_save))
     viewer.until_idle()
     viewer.type(str(tmp_path / "a.jqg"))
     viewer.send("key", "Return")
@@ -196,7 +198,7 @@ def test_a_second_window_does_not_open_exactly_on_the_first(open_window: Opener,
 def test_one_notice_is_shown_at_a_time_and_all_are_closed_at_once(viewer: Driver) -> None:
     heights = []
     for number in range(3):
-        viewer.app.do(Notify(Notice(f"Notice {number}, as long as the others are.")))
+        viewer.app.do(do(messages.notify, Notice(f"Notice {number}, as long as the others are.")))
         viewer.until_idle()
         heights.append(imgui.internal.find_window_by_name("notices").size.y)
     assert heights[2] == heights[1], "they do not pile up"
@@ -206,7 +208,7 @@ def test_one_notice_is_shown_at_a_time_and_all_are_closed_at_once(viewer: Driver
 
 def test_notices_go_by_themselves_the_newest_first(viewer: Driver, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("viewer.model.state.notices.SHORT_NOTICE_S", 0.0)
-    viewer.app.do(Notify(Notice("It failed.", is_error=True)), Notify(Notice("Saved a.png")))
+    viewer.app.do(do(messages.notify, Notice("It failed.", is_error=True)), do(messages.notify, Notice("Saved a.png")))
     viewer.until(lambda app: len(app.state.notices) == 1)
     assert viewer.app.state.notices[0].is_error, "that stays longer"
     monkeypatch.setattr("viewer.model.state.notices.LONG_NOTICE_S", 0.0)
@@ -269,13 +271,13 @@ def test_a_photo_is_looked_for_and_opened_without_a_dialog_of_the_system(viewer:
 
 
 def test_a_folder_that_cannot_be_read_is_told(viewer: Driver, tmp_path: Path) -> None:
-    viewer.app.do(ShowPrompt(PathPrompt("photo", str(tmp_path / "gone" / "a.png"))))
+    viewer.app.do(do(messages.show_prompt, PathPrompt("photo", str(tmp_path / "gone" / "a.png"))))
     assert "cannot be read" in list_of(viewer, tmp_path / "gone").problem
 
 
 def test_browse_brings_a_place_back_to_the_prompt_and_it_is_remembered(viewer: Driver, tmp_path: Path) -> None:
     (tmp_path / "there").mkdir()
-    viewer.app.do(AskToExport())
+    viewer.app.do(do(saving.ask_to_export))
     viewer.until_idle()
     viewer.press("Browse…", "prompt ExportPrompt")
     list_of(viewer, tmp_path)
@@ -289,6 +291,6 @@ def test_browse_brings_a_place_back_to_the_prompt_and_it_is_remembered(viewer: D
     viewer.send("key", "Return")
     viewer.until(lambda app: app.state.prompt is None)
     viewer.until(lambda app: (tmp_path / "there" / "a.html").exists())
-    viewer.app.do(AskToExport())
+    viewer.app.do(do(saving.ask_to_export))
     assert isinstance(viewer.app.state.prompt, ExportPrompt)
     assert viewer.app.state.prompt.path == str(tmp_path / "there" / "scene-web.html")

@@ -9,7 +9,8 @@ import numpy as np
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import SMALL_WINDOW, Driver, Opener
 from viewer.display.inspection_view import ROUNDING
-from viewer.model.actions import DismissNotice
+from viewer.model import messages
+from viewer.model.action import do
 from viewer.model.inspection_request import DIFFERENCE_GAIN
 from viewer.model.state.inspection import Compare, KeepState
 from viewer.model.state.optics_actions import MoveEye, SetAperture, SetOptics
@@ -63,7 +64,7 @@ def test_a_kept_state_is_compared_side_by_side_and_as_a_difference(viewer: Drive
     viewer.app.do(Compare("difference"))
     assert viewer.app.state.inspection.comparison is None
     assert "no snapshot yet" in viewer.app.state.notices[-1].text
-    viewer.app.do(DismissNotice(None), SetAperture(2.0))
+    viewer.app.do(do(messages.dismiss), SetAperture(2.0))
     viewer.until_idle()
     kept = viewer.image()
     viewer.app.do(KeepState(), Compare("difference"))

@@ -9,13 +9,14 @@ from imgui_bundle import imgui
 
 from iibr_core.scenes.scene import Source
 from tests.viewer.model.test_reducers import scene_of, state_with
-from viewer.model.actions import AskToSave
+from viewer.model import saving
+from viewer.model.action import do
 from viewer.model.commands import BY_NAME, COMMANDS, Chord, Command, commands_matching, recent_commands
 from viewer.model.demo_photo import demo_photo
 from viewer.model.lens.presets import PRESETS
 from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState
-from viewer.model.state.exporting import AskToExport, ExportPrompt
+from viewer.model.state.exporting import ExportPrompt
 from viewer.model.state.prompts import PalettePrompt, SavePrompt
 from viewer.model.state.tasks import ChooseTask
 
@@ -78,7 +79,7 @@ def test_recent_files_come_first_in_the_list_but_for_the_open_one() -> None:
 def test_nothing_is_proposed_to_be_put_into_a_folder_of_the_program(path: str) -> None:
     """A cache that is emptied, the demo's in the installation."""
     state = state_with(replace(scene_of(source=Source(path)), name="photo"))
-    saved, exported = (reduce(state, action).prompt for action in (AskToSave(), AskToExport()))
+    saved, exported = (reduce(state, action).prompt for action in (do(saving.ask_to_save), do(saving.ask_to_export)))
     assert isinstance(saved, SavePrompt)
     assert isinstance(exported, ExportPrompt)
     assert (saved.path, exported.path) == ("~/photo-iibr.png", "~/photo-web.html")

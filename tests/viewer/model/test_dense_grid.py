@@ -11,14 +11,17 @@ from iibr_core.beyond.optics import Optics
 from iibr_core.depth.choice import DepthChoice
 from iibr_core.scenes.scene import FilledField, Scene, Source, source_beside
 from iibr_core.types import GridShape, ViewOffset
-from viewer.model.actions import DoTask, OpenPath
-from viewer.model.commands import COMMANDS
+from viewer.model import messages
+from viewer.model.action import ask, do
+from viewer.model.actions import OpenPath
+from viewer.model.commands import COMMANDS, NOTHING_BETWEEN
 from viewer.model.dense_grid import MOST_ACROSS, chosen_grid, denser_grids, next_denser, with_views_between
 from viewer.model.reducers.lens_reducer import carry_optics
 from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState
 from viewer.model.state.filling import FillTask, ViewsFilled
 from viewer.model.state.jobs import STOPPING, JobProgress
+from viewer.model.state.notices import Notice
 
 GIVEN, DENSE = GridShape(3, 3), GridShape(5, 5)
 FIELD = Scene(Source("field"), "field", 60, 40, GIVEN, (-2.0, 3.0), "light field", given_grid=GIVEN)
@@ -101,9 +104,9 @@ def test_the_command_tells_where_nothing_lies_between() -> None:
     photo = replace(FIELD, given_grid=None)
     for scene in (photo, None):
         told = command.action(AppState(scene=scene))
-        assert "No views can be made" in told.notice.text  # type: ignore[union-attr]
+        assert told == do(messages.notify, Notice(NOTHING_BETWEEN))
     opened = command.action(AppState(scene=FIELD))
-    assert opened == DoTask(FillTask(Source("field", filled_grid=DENSE)))
+    assert opened == do(ask, FillTask(Source("field", filled_grid=DENSE)))
 
 
 def test_the_picture_stays_when_views_between_are_there() -> None:

@@ -29,7 +29,9 @@ from tests.viewer.model.test_reducers import plan_of, scene_of, state_with
 from viewer.app.dropped_files import actions_from_drop
 from viewer.app.image_export import settings_of
 from viewer.app.pointer import Pointer, actions_from_pointer
-from viewer.model.actions import AskToSave, EndGesture, OpenFailed, OpenPath, SceneOpened, Undo
+from viewer.model import saving
+from viewer.model.action import do
+from viewer.model.actions import EndGesture, OpenFailed, OpenPath, SceneOpened, Undo
 from viewer.model.commands import action_for_path
 from viewer.model.layout import layout_of
 from viewer.model.reducers.depth_editing_reducer import (
@@ -180,7 +182,7 @@ def test_a_map_is_saved_where_it_is_found_again_but_not_over_a_given_one(given: 
     state = opened()
     assert state.scene is not None
     state = replace(state, scene=replace(state.scene, depth_origin=DepthOrigin("file", given) if given else None))
-    asked = reduce(state, AskToSave("map"))
+    asked = reduce(state, do(saving.ask_to_save, "map"))
     assert isinstance(asked.prompt, SavePrompt)
     assert asked.prompt.path.endswith(proposed)
 

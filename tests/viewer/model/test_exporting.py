@@ -12,16 +12,17 @@ from iibr_core.method.plan import ScenePlan
 from iibr_core.scenes.scene import Source
 from iibr_core.types import InputError
 from tests.viewer.model.test_reducers import scene_of, state_with
-from viewer.model.actions import AskToSave
-from viewer.model.reducers.exporting_reducer import (
+from viewer.model import saving
+from viewer.model.action import do
+from viewer.model.reducers.root import reduce
+from viewer.model.saving import (
     as_other_kind,
     first_kind,
     kinds_for,
     usual_export_path,
     written_path,
 )
-from viewer.model.reducers.root import reduce
-from viewer.model.state.exporting import AskToExport, ExportPrompt
+from viewer.model.state.exporting import ExportPrompt
 from viewer.model.state.preferences import SetPreference
 from viewer.model.state.prompts import SavePrompt
 
@@ -52,7 +53,10 @@ def test_the_folder_of_the_last_is_proposed_again() -> None:
     plan = ScenePlan(STATE.scene.grid, 1.0, 0.0, (-2.0, 3.0), 0.1, True, 0, 0, ())
     photo = replace(STATE, scene=replace(STATE.scene, plan=plan))
     later = reduce(photo, SetPreference("last_folder", "/shared"))
-    exported, saved, mapped = (reduce(later, ask).prompt for ask in (AskToExport(), AskToSave(), AskToSave("map")))
+    exported, saved, mapped = (
+        reduce(later, ask).prompt
+        for ask in (do(saving.ask_to_export), do(saving.ask_to_save), do(saving.ask_to_save, "map"))
+    )
     assert isinstance(exported, ExportPrompt)
     assert isinstance(saved, SavePrompt)
     assert isinstance(mapped, SavePrompt)

@@ -13,7 +13,9 @@ from iibr_core.scenes.screen_size import ScreenSize
 from tests.iibr_core.scenes import literal_plan, square_before_wall
 from tests.viewer.model.test_reducers import scene_of, state_with
 from viewer.app.keys import Keys, actions_from_keys
-from viewer.model.actions import Action, AskToSave, OpenPath
+from viewer.model import saving
+from viewer.model.action import do
+from viewer.model.actions import Action, OpenPath
 from viewer.model.free_camera import FORWARD_LIMITS, MAX_ASIDE, CameraProgress, FreeCamera, LeaveCamera, MoveCamera
 from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState
@@ -99,6 +101,6 @@ def test_its_picture_is_saved_at_the_size_of_the_views() -> None:
     assert state.scene is not None
     state = replace(state, scene=replace(state.scene, own_size=ScreenSize(4000, 3000)))
     for camera, size in ((None, ScreenSize(4000, 3000)), (FreeCamera(forward=0.1), state.scene.size)):
-        prompt = reduce(replace(state, free_camera=camera), AskToSave("picture")).prompt
+        prompt = reduce(replace(state, free_camera=camera), do(saving.ask_to_save, "picture")).prompt
         assert isinstance(prompt, SavePrompt)
         assert prompt.size_px == size

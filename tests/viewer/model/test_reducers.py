@@ -29,15 +29,13 @@ from iibr_core.scenes.lens_limits import (
 )
 from iibr_core.scenes.scene import DepthSettings, Progress, Scene, Source
 from iibr_core.types import GridShape, ViewOffset
+from viewer.model import messages, saving
+from viewer.model.action import do
 from viewer.model.actions import (
-    DismissNotice,
-    EditsSaved,
     EndGesture,
-    Notify,
     OpenFailed,
     OpenPath,
     ProgressMade,
-    Quit,
     SceneOpened,
     SetDepthStrength,
     SetHover,
@@ -47,12 +45,12 @@ from viewer.model.actions import (
     Undo,
 )
 from viewer.model.lens.presets import PRESETS
+from viewer.model.messages import MAX_NOTICES
 from viewer.model.reducers.lens_reducer import carry_optics
-from viewer.model.reducers.notices_reducer import NOTICES_KEPT
 from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState, Hover, Picture
 from viewer.model.state.depth_editing import SetTone
-from viewer.model.state.jobs import JobProgress, JobsChanged, QuitWhenDone
+from viewer.model.state.jobs import JobProgress
 from viewer.model.state.notices import Notice
 from viewer.model.state.optics_actions import (
     ApplyPreset,
@@ -218,37 +216,43 @@ def test_focusing_leaves_an_aperture_alone_that_the_user_chose() -> None:
 def test_quitting_asks_where_depth_edits_would_be_lost() -> None:
     edits = replace(UNEDITED, gamma=1.5)
     edited = replace(state_with(scene_of()), depth=DepthSettings(edits=edits))
-    asked = reduce(edited, Quit())
+    asked = reduce(edited, do(saving.quit_window))
     assert (asked.prompt, asked.should_quit) == ("quit", False)
-    assert reduce(asked, Quit(is_sure=True)).should_quit
-    assert reduce(reduce(edited, EditsSaved(edits)), Quit()).should_quit
-    assert not reduce(reduce(edited, EditsSaved(replace(edits, gamma=2.0))), Quit()).should_quit
-    assert reduce(state_with(scene_of()), Quit()).should_quit
-    other = reduce(reduce(edited, EditsSaved(edits)), OpenPath(Source("other.png")))
+    assert reduce(asked, do(saving.quit_window, is_sure=True)).should_quit
+    assert reduce(reduce(edited, do(saving.mark_saved, edits)), do(saving.quit_window)).should_quit
+    assert not reduce(
+        reduce(edited, do(saving.mark_saved, replace(edits, gamma=2.0))), do(saving.quit_window)
+    ).should_quit
+    assert reduce(state_with(scene_of()), do(saving.quit_window)).should_quit
+    other = reduce(reduce(edited, do(saving.mark_saved, edits)), OpenPath(Source("other.png")))
     other = reduce(other, SceneOpened(other.generation, scene_of(source=other.source)))
-    assert not reduce(replace(other, depth=DepthSettings(edits=edits)), Quit()).should_quit, "those of another photo"
+    assert not reduce(replace(other, depth=DepthSettings(edits=edits)), do(saving.quit_window)).should_quit, (
+        "those of another photo"
+    )
 
 
 def test_quitting_asks_while_jobs_are_under_way_and_can_wait_for_them() -> None:
     job = JobProgress(1, "export", "a.gif")
-    busy = reduce(state_with(scene_of()), JobsChanged((job,)))
-    asked = reduce(busy, Quit())
+    busy = reduce(state_with(scene_of()), do(saving.set_jobs, (job,)))
+    asked = reduce(busy, do(saving.quit_window))
     assert (asked.prompt, asked.should_quit) == ("quit", False)
-    assert reduce(asked, Quit(is_sure=True)).should_quit
-    waiting = reduce(asked, QuitWhenDone())
+    assert reduce(asked, do(saving.quit_window, is_sure=True)).should_quit
+    waiting = reduce(asked, do(saving.quit_when_done))
     assert (waiting.prompt, waiting.should_quit, waiting.quits_when_done) == (None, False, True)
-    assert not reduce(waiting, JobsChanged((replace(job, done=0.5),))).should_quit
-    assert reduce(waiting, JobsChanged(())).should_quit
-    failed = reduce(waiting, Notify(Notice("a.gif: the disk is full", is_error=True)))
-    assert not reduce(failed, JobsChanged(())).should_quit, "what went wrong is to be seen"
-    assert reduce(reduce(asked, JobsChanged(())), QuitWhenDone()).should_quit, "they ended while that was asked"
+    assert not reduce(waiting, do(saving.set_jobs, (replace(job, done=0.5),))).should_quit
+    assert reduce(waiting, do(saving.set_jobs, ())).should_quit
+    failed = reduce(waiting, do(messages.notify, Notice("a.gif: the disk is full", is_error=True)))
+    assert not reduce(failed, do(saving.set_jobs, ())).should_quit, "what went wrong is to be seen"
+    assert reduce(reduce(asked, do(saving.set_jobs, ())), do(saving.quit_when_done)).should_quit, (
+        "they ended while that was asked"
+    )
     edited = replace(waiting, depth=DepthSettings(edits=replace(UNEDITED, gamma=1.5)))
-    assert reduce(edited, JobsChanged(())).prompt == "quit", "edits are still asked for"
+    assert reduce(edited, do(saving.set_jobs, ())).prompt == "quit", "edits are still asked for"
 
 
 def test_what_became_of_a_job_is_still_told_when_another_photo_opens() -> None:
     stays, goes = Notice("Exported a.gif", stays=True), Notice("This photo has no depth.")
-    told = reduce(reduce(state_with(scene_of()), Notify(goes)), Notify(stays))
+    told = reduce(reduce(state_with(scene_of()), do(messages.notify, goes)), do(messages.notify, stays))
     asked = reduce(told, OpenPath(Source("other.png")))
     opened = reduce(asked, SceneOpened(asked.generation, scene_of(source=asked.source)))
     assert opened.notices == (stays,)
@@ -262,11 +266,15 @@ def test_undone_edits_are_lost_as_little_as_others() -> None:
     for action in (SetTone(first, is_finished=True), EndGesture(), SetTone(second, is_finished=True), Undo()):
         half = reduce(half, action)
     assert half.depth.edits == first
-    assert reduce(half, Quit()).prompt == "quit"
-    assert reduce(reduce(half, EditsSaved(second)), Quit()).prompt == "quit", "the file has what was undone"
-    assert reduce(reduce(half, EditsSaved(first)), Quit()).should_quit
-    assert reduce(reduce(half, Undo()), Quit()).should_quit, "all is as it was found"
-    assert reduce(reduce(half, SetState("keeps_sessions", True)), Quit()).should_quit, "it opens as it is left"
+    assert reduce(half, do(saving.quit_window)).prompt == "quit"
+    assert reduce(reduce(half, do(saving.mark_saved, second)), do(saving.quit_window)).prompt == "quit", (
+        "the file has what was undone"
+    )
+    assert reduce(reduce(half, do(saving.mark_saved, first)), do(saving.quit_window)).should_quit
+    assert reduce(reduce(half, Undo()), do(saving.quit_window)).should_quit, "all is as it was found"
+    assert reduce(reduce(half, SetState("keeps_sessions", True)), do(saving.quit_window)).should_quit, (
+        "it opens as it is left"
+    )
 
 
 def test_what_is_opened_closes_the_help() -> None:
@@ -277,7 +285,7 @@ def test_settings_of_another_picture_are_made_to_fit_and_can_be_taken_back() -> 
     state = state_with(scene_of(GridShape(5, 5)))
     optics = Optics(eye=ViewOffset(9, 9), aperture_diameter=20, focus_disparity=1)
     saved = SavedSettings(optics, 1.0, Source(""), (10, 10))
-    offered = reduce(state, Notify(Notice("It has settings.", offer=saved)))
+    offered = reduce(state, do(messages.notify, Notice("It has settings.", offer=saved)))
     after = reduce(offered, TakeSettings(saved))
     assert after.optics == Optics(eye=ViewOffset(2, 2), aperture_diameter=5, focus_disparity=1)
     assert after.notices == ()
@@ -402,8 +410,8 @@ def test_reset_brings_the_first_optics_back() -> None:
         (SetDepthStrength(2.0, is_finished=True), False, True),
         (OpenPath(Source("other.png")), False, True),
         (ProgressMade(1, Progress(3, 81, 0.1)), False, False),
-        (Notify(Notice("hello")), False, False),
-        (Quit(), False, False),
+        (do(messages.notify, Notice("hello")), False, False),
+        (do(saving.quit_window), False, False),
     ],
 )
 def test_what_an_edit_costs(action: object, draws: bool, restarts: bool) -> None:
@@ -501,8 +509,8 @@ def test_a_failure_of_the_open_scene_itself_does_not_start_it_again() -> None:
 
 def test_notices_are_kept_once_bounded_and_dismissable() -> None:
     state = AppState()
-    for i in (*range(NOTICES_KEPT + 3), NOTICES_KEPT + 2):
-        state = reduce(state, Notify(Notice(str(i))))
-    assert [notice.text for notice in state.notices] == [str(i) for i in range(3, NOTICES_KEPT + 3)]
-    state = reduce(state, DismissNotice(Notice("5")))
+    for i in (*range(MAX_NOTICES + 3), MAX_NOTICES + 2):
+        state = reduce(state, do(messages.notify, Notice(str(i))))
+    assert [notice.text for notice in state.notices] == [str(i) for i in range(3, MAX_NOTICES + 3)]
+    state = reduce(state, do(messages.dismiss, Notice("5")))
     assert [notice.text for notice in state.notices] == ["3", "4", "6", "7"]

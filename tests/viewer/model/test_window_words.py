@@ -12,7 +12,7 @@ from iibr_core.depth.choice import BETTER_WAYS
 from iibr_core.method.memory import require_memory
 from iibr_core.types import InputError
 from viewer.model.commands import BY_NAME
-from viewer.model.reducers.notices_reducer import add_notice
+from viewer.model.messages import notify
 from viewer.model.state.app_state import AppState
 from viewer.model.state.notices import Notice
 from viewer.model.window_words import DEPTH_COMMANDS, notice_in_window, words_in_window
@@ -39,6 +39,6 @@ def test_what_does_not_fit_says_what_would_without_options() -> None:
     with pytest.raises(InputError) as refused:
         require_memory(2**60, "17 x 17 views of a.jpg")
     assert "--" in str(refused.value)
-    said = add_notice(AppState(), Notice(str(refused.value), is_error=True)).notices[0]
+    said = notify(AppState(), Notice(str(refused.value), is_error=True)).notices[0]
     assert "--" not in said.text
     assert said.is_error

@@ -12,7 +12,9 @@ from iibr_core.scenes.rect import Rect
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import HEIGHT, WIDTH, headless_with_scene
 from viewer.display.offscreen import OffscreenScene
-from viewer.model.actions import Action, Notify, SetHover
+from viewer.model import messages
+from viewer.model.action import do
+from viewer.model.actions import Action, SetHover
 from viewer.model.inspection_request import beside_of, sheet_cells
 from viewer.model.layout import PANEL_WIDTH, Layout, layout_of
 from viewer.model.state.app_state import Hover
@@ -150,7 +152,7 @@ def test_the_status_line_is_not_covered_by_notices(viewer: OffscreenScene) -> No
     assert (probe.of, probe.origin) == (9, "photo")
     assert probe.rgb[0] > probe.rgb[1] == probe.rgb[2], "the red square"
     assert probe.seen_in is not None
-    viewer.do(Notify(Notice("a notice")))
+    viewer.do(do(messages.notify, Notice("a notice")))
     np.testing.assert_array_equal(part(viewer.screen(SIZE), layout_now(viewer).status), line)
 
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from iibr_core.scenes.scene import Source
 from iibr_core.types import GridShape
-from viewer.model.actions import DoTask
+from viewer.model.action import ask, do
 from viewer.model.state.app_state import AppState
 from viewer.model.state.jobs import STOPPING, WRITING, CancelJobTask, JobProgress
 from viewer.model.state.model_download import CancelGetTask, DepthModels, Downloading
@@ -17,7 +17,7 @@ def test_each_job_has_a_row_and_a_cancel_of_its_own() -> None:
     jobs = [JobProgress(7, "export", "a.gif", "drawing frames", 0.5), JobProgress(9, "copy", "the picture")]
     rows = progress_rows(AppState(jobs=tuple(jobs)))
     assert [row.name for row in rows] == ["Exporting a.gif", "Copying the picture"]
-    assert [row.cancel for row in rows] == [DoTask(CancelJobTask(7)), DoTask(CancelJobTask(9))]
+    assert [row.cancel for row in rows] == [do(ask, CancelJobTask(7)), do(ask, CancelJobTask(9))]
     for doing in (WRITING, STOPPING):
         (row,) = progress_rows(AppState(jobs=(replace(jobs[0], doing=doing),)))
         assert row.cancel is None
@@ -27,10 +27,10 @@ def test_filling_between_views_has_such_a_row_too() -> None:
     filling = JobProgress(3, "fill", "field", "making views", 0.25, 8.0, Source("field", filled_grid=GridShape(9, 9)))
     (row,) = progress_rows(AppState(jobs=(filling,)))
     assert (row.name, row.words) == ("Making views between those of field", "making views, 25 %, about 8 s left")
-    assert row.cancel == DoTask(CancelJobTask(3))
+    assert row.cancel == do(ask, CancelJobTask(3))
 
 
 def test_a_download_has_the_same_row() -> None:
     (row,) = progress_rows(AppState(models=DepthModels(downloading=Downloading("A model", 25, 100))))
     assert (row.name, row.words, row.done) == ("Downloading A model", "25 of 100 MB", 0.25)
-    assert row.cancel == DoTask(CancelGetTask())
+    assert row.cancel == do(ask, CancelGetTask())

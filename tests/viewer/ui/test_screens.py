@@ -18,23 +18,21 @@ from iibr_core.beyond.optics import (
 from iibr_core.scenes.scene import Progress, Source
 from tests.viewer.conftest import headless_with_scene
 from viewer.display.offscreen import OffscreenScene
+from viewer.model import messages, saving
+from viewer.model.action import do
 from viewer.model.actions import (
     Action,
-    AskToSave,
-    DismissNotice,
-    Notify,
     OpenFailed,
     OpenPath,
     ProgressMade,
     SetHover,
     SetState,
-    ShowPrompt,
     ShowTiltHandles,
 )
 from viewer.model.layout import PANEL_WIDTH, layout_of
 from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState, DrawReport, Hover
-from viewer.model.state.jobs import WRITING, JobProgress, JobsChanged
+from viewer.model.state.jobs import WRITING, JobProgress
 from viewer.model.state.motion import SetLoop
 from viewer.model.state.notices import Notice
 from viewer.model.state.optics_actions import SetAperture, SetOptics
@@ -82,11 +80,13 @@ def test_every_section_opens_and_closes(viewer: OffscreenScene, section: Section
 @pytest.mark.parametrize(
     "action",
     [
-        ShowPrompt(PalettePrompt("mo")),
-        AskToSave(),
-        ShowPrompt(PathPrompt("photo")),
-        Notify(Notice("damaged.png: cut off", is_error=True)),
-        JobsChanged((JobProgress(1, "picture", "large.png", "drawing", 0.4), JobProgress(2, "export", "a.mp4"))),
+        do(messages.show_prompt, PalettePrompt("mo")),
+        do(saving.ask_to_save),
+        do(messages.show_prompt, PathPrompt("photo")),
+        do(messages.notify, Notice("damaged.png: cut off", is_error=True)),
+        do(
+            saving.set_jobs, (JobProgress(1, "picture", "large.png", "drawing", 0.4), JobProgress(2, "export", "a.mp4"))
+        ),
         ShowTiltHandles(True),
         SetHover(Hover(48.0, 32.0, 1.5)),
     ],
@@ -134,7 +134,12 @@ def test_light_and_dark(viewer: OffscreenScene) -> None:
 
 
 def test_text_twice_as_large_in_a_window_twice_as_large_is_the_same_screen_finer(viewer: OffscreenScene) -> None:
-    viewer.do(Notify(Notice("A notice that is long enough to be wrapped into a second line of text, at any size.")))
+    viewer.do(
+        do(
+            messages.notify,
+            Notice("A notice that is long enough to be wrapped into a second line of text, at any size."),
+        )
+    )
     small = viewer.screen(SIZE).astype(float)
     viewer.do(SetPreference("font_scale", 2.0))
     large = viewer.screen((2 * SIZE[0], 2 * SIZE[1])).astype(float)
@@ -163,8 +168,8 @@ def test_an_empty_window_lists_recent_files(viewer: OffscreenScene) -> None:
 def test_settings_on_offer_have_a_button(viewer: OffscreenScene) -> None:
     plain = Notice("This picture was saved by iibr.")
     offer = replace(plain, offer=SavedSettings(viewer.state.optics, 1.0, Source(""), (1, 1)))
-    viewer.do(Notify(plain))
-    assert changed_after(viewer, DismissNotice(plain), Notify(offer)).sum() > 5 * ENOUGH_PIXELS
+    viewer.do(do(messages.notify, plain))
+    assert changed_after(viewer, do(messages.dismiss, plain), do(messages.notify, offer)).sum() > 5 * ENOUGH_PIXELS
 
 
 def test_what_is_under_way_in_words() -> None:

@@ -16,8 +16,8 @@ from iibr_core.depth.editing.edits import (
 )
 from iibr_core.scenes.lens_limits import clamp
 from iibr_core.scenes.scene import DepthSettings
+from viewer.model.messages import notify
 from viewer.model.reducers.history_reducer import record_edit
-from viewer.model.reducers.notices_reducer import add_notice
 from viewer.model.state.app_state import AppState
 from viewer.model.state.depth_editing import (
     Brush,
@@ -44,9 +44,7 @@ def reduce_depth(state: AppState, action: DepthAction) -> AppState:
     if state.scene is None or state.source is None:
         return state
     if state.scene.plan is None:
-        return (
-            add_notice(state, Notice(NO_DEPTH_HERE)) if isinstance(action, SetBrush) and action.brush.is_on else state
-        )
+        return notify(state, Notice(NO_DEPTH_HERE)) if isinstance(action, SetBrush) and action.brush.is_on else state
     match action:
         case SetRefine(is_on):
             return _with_settings(state, replace(state.depth, refine=is_on), "SetRefine", is_finished=True)

@@ -11,7 +11,7 @@ from viewer.model.free_camera import (
     LeaveCamera,
     moved,
 )
-from viewer.model.reducers.notices_reducer import add_notice
+from viewer.model.messages import notify
 from viewer.model.state.app_state import AppState
 from viewer.model.state.notices import Notice
 
@@ -27,6 +27,6 @@ def reduce_free_camera(state: AppState, action: FreeCameraAction) -> AppState:
     if state.scene is None:
         return state
     if state.scene.plan is None:
-        return add_notice(state, Notice(FOR_PHOTOS))
+        return notify(state, Notice(FOR_PHOTOS))
     camera = state.free_camera or FreeCamera()
     return replace(state, free_camera=moved(camera, action))

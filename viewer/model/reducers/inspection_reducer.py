@@ -8,7 +8,7 @@ from typing import Any
 
 from iibr_core.scenes.lens_limits import clamp
 from iibr_core.scenes.scene import Scene
-from viewer.model.reducers.notices_reducer import add_notice
+from viewer.model.messages import notify
 from viewer.model.state.app_state import AppState, Hover
 from viewer.model.state.inspection import (
     Compare,
@@ -48,7 +48,7 @@ def reduce_inspection(state: AppState, action: InspectionAction) -> AppState:
         case Compare(comparison):
             return _set_comparison(state, comparison)
         case KeepState() if state.scene is not None:
-            return add_notice(_with(state, kept=state.optics), Notice(KEPT, commands=KEPT_COMMANDS))
+            return notify(_with(state, kept=state.optics), Notice(KEPT, commands=KEPT_COMMANDS))
         case MoveDivider(place) if math.isfinite(place):
             return _with(state, divider=clamp(place, DIVIDER_MARGIN, 1 - DIVIDER_MARGIN), divider_taken=True)
         case TruthRead(truth):
@@ -104,7 +104,7 @@ def _set_overlay(state: AppState, kind: OverlayKind | None) -> AppState:
     if kind is None or state.scene is None:
         return _with(state, overlay=None)
     obstacle = obstacle_to_overlay(state.scene, kind)
-    return add_notice(state, Notice(obstacle)) if obstacle else _with(state, overlay=kind, comparison=None, pair=None)
+    return notify(state, Notice(obstacle)) if obstacle else _with(state, overlay=kind, comparison=None, pair=None)
 
 
 def _set_comparison(state: AppState, kind: Comparison | None) -> AppState:
@@ -113,7 +113,7 @@ def _set_comparison(state: AppState, kind: Comparison | None) -> AppState:
     if kind == "truth" and state.inspection.truth is None:
         return replace(state, tasks=(*state.tasks, ChooseTask("truth")))
     if lacks_kept_state(state, kind):
-        return add_notice(state, Notice(NOTHING_KEPT))
+        return notify(state, Notice(NOTHING_KEPT))
     advised = tuple(notice for notice in state.notices if notice.text != KEPT)  # is done now
     return _with(replace(state, notices=advised), comparison=kind, overlay=None, pair=None)
 
@@ -123,7 +123,7 @@ def _set_truth(state: AppState, truth: GroundTruth) -> AppState:
         return state
     problem = misfit(truth, state.scene)
     if problem:
-        return add_notice(state, Notice(problem, is_error=True))
+        return notify(state, Notice(problem, is_error=True))
     return _with(state, truth=truth, comparison="truth", overlay=None, pair=None)
 
 

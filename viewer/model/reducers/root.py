@@ -14,14 +14,8 @@ from iibr_core.scenes.scene import DepthSettings, Progress, Source, is_same_fiel
 from viewer.model.action import Action as VerbAction
 from viewer.model.actions import (
     Action,
-    AskToSave,
-    DismissNotice,
-    DoTask,
-    EditsSaved,
     EndGesture,
-    Notify,
     OpenPath,
-    Quit,
     Redo,
     RestoreSession,
     ResumeWork,
@@ -29,35 +23,30 @@ from viewer.model.actions import (
     SetHover,
     SetState,
     ShowBefore,
-    ShowPrompt,
     ShowTiltHandles,
     StopWork,
     TakeSettings,
-    TaskTaken,
     Undo,
     WorkerEvent,
     WorkerLost,
 )
 from viewer.model.free_camera import FreeCameraAction
+from viewer.model.messages import notify
 from viewer.model.reducers.depth_editing_reducer import end_stroke, reduce_depth
 from viewer.model.reducers.depth_models import reduce_models
-from viewer.model.reducers.exporting_reducer import ask_to_export, ask_to_save
 from viewer.model.reducers.folder_reducer import list_folder, photo_after, scroll_filmstrip
 from viewer.model.reducers.free_camera_reducer import reduce_free_camera
 from viewer.model.reducers.history_reducer import end_gesture, record_edit, redo, undo
 from viewer.model.reducers.inspection_reducer import move_pointer, reduce_inspection, release_divider
 from viewer.model.reducers.lens_reducer import reduce_lens, with_focus_of
 from viewer.model.reducers.motion_reducer import reduce_motion
-from viewer.model.reducers.notices_reducer import add_notice
 from viewer.model.reducers.preferences_reducer import reduce_preferences
 from viewer.model.reducers.worker_events import reduce_worker_event, stop_work
 from viewer.model.state.app_state import AppState, FinishedField, TiltHandles
 from viewer.model.state.depth_editing import DepthAction
-from viewer.model.state.exporting import AskToExport
 from viewer.model.state.filling import ViewsFilled
 from viewer.model.state.folder import FolderListed, ScrollFilmstrip, SetFolderOrder, StepPhoto
 from viewer.model.state.inspection import InspectionAction
-from viewer.model.state.jobs import JobsChanged, QuitWhenDone
 from viewer.model.state.model_download import ModelAction
 from viewer.model.state.motion import Motion, MotionAction
 from viewer.model.state.notices import Notice
@@ -70,7 +59,6 @@ from viewer.model.state.optics_actions import (
     SetGlossBrush,
     SetOptics,
 )
-from viewer.model.state.photo_facts import FactsRead
 from viewer.model.state.preferences import PreferencesAction
 from viewer.model.state.saving import SavedSettings
 from viewer.model.window_limits import DEPTH_STRENGTH_LIMIT
@@ -125,21 +113,12 @@ def reduce(state: AppState, action: Action) -> AppState:
             return undo(state)
         case Redo():
             return redo(state)
-        case EditsSaved(edits):
-            return replace(state, saved_edits=edits)
-        case Quit(is_sure):
-            return _quit(state, is_sure)
-        case QuitWhenDone():
-            state = replace(state, quits_when_done=True, prompt=None)
-            return state if state.jobs else _quit(state, is_sure=False)
     return _reduce_files(state, action)
 
 
 def _reduce_files(state: AppState, action: Action) -> AppState:
     """What is opened, and what is to be done outside."""
     match action:
-        case FactsRead() as facts:
-            return replace(state, facts=facts)
         case FolderListed(path, photos):
             return list_folder(state, path, photos)
         case StepPhoto(steps):
@@ -163,36 +142,15 @@ def _reduce_files(state: AppState, action: Action) -> AppState:
         case ResumeWork() if state.scene is not None:
             return replace(state, generation=state.next_generation, stopped=None)
         case WorkerLost():
-            return replace(
-                add_notice(state, Notice(LOST, is_error=True)), progress=Progress(), stopped=state.generation
-            )
-        case DoTask(task):
-            return replace(state, tasks=(*state.tasks, task))
-        case TaskTaken(task):
-            return replace(state, tasks=tuple(other for other in state.tasks if other != task))
+            return replace(notify(state, Notice(LOST, is_error=True)), progress=Progress(), stopped=state.generation)
     return _reduce_screen(state, action)
 
 
 def _reduce_screen(state: AppState, action: Action) -> AppState:
     """What stands on the screen beside the picture: prompts, notices, progress, and where one looks."""
     match action:
-        case ShowPrompt(prompt):
-            return replace(state, prompt=prompt)
-        case AskToSave(what):
-            return ask_to_save(state, what)
-        case AskToExport():
-            return ask_to_export(state)
-        case JobsChanged(jobs):
-            state = replace(state, jobs=jobs)
-            return _quit(state, is_sure=False) if state.quits_when_done and not jobs else state
         case SetHover(hover):
             return move_pointer(state, hover)
-        case Notify(notice):
-            # what went wrong must be seen
-            return replace(add_notice(state, notice), quits_when_done=state.quits_when_done and not notice.is_error)
-        case DismissNotice(notice):
-            left = () if notice is None else tuple(other for other in state.notices if other != notice)
-            return replace(state, notices=left)
         case SetGlossBrush(brush):
             return _take_gloss_brush(state, brush)
         case ShowBefore(is_shown):
@@ -202,13 +160,6 @@ def _reduce_screen(state: AppState, action: Action) -> AppState:
         case ShowTiltHandles(is_shown):
             return replace(state, tilt_handles=TiltHandles() if is_shown else None)
     return state
-
-
-def _quit(state: AppState, is_sure: bool) -> AppState:
-    """Ask first where that would lose something."""
-    asks = (state.has_unsaved_edits or bool(state.jobs)) and not is_sure
-    state = replace(state, quits_when_done=False)
-    return replace(state, prompt="quit") if asks else replace(state, should_quit=True)
 
 
 def _take_gloss_brush(state: AppState, brush: GlossBrush) -> AppState:
@@ -230,7 +181,7 @@ def _take_filled(state: AppState, filled: Source) -> AppState:
     """Show the views between where their light field is open still; else say that they are there."""
     if state.source is not None and is_same_field(state.source, filled):
         return _reduce_files(state, OpenPath(filled))
-    return add_notice(state, Notice(f"{PurePath(filled.path).name}: {FILLED}", stays=True))
+    return notify(state, Notice(f"{PurePath(filled.path).name}: {FILLED}", stays=True))
 
 
 def _with_filled_views(state: AppState, source: Source) -> Source:
@@ -293,4 +244,4 @@ def _restore(state: AppState, settings: SavedSettings) -> AppState:
     if (depth, settings.depth_strength) != (state.depth, state.depth_strength):
         restored = replace(restored, depth=depth, depth_strength=settings.depth_strength)
         restored = replace(restored, generation=state.next_generation, saved_edits=settings.depth_edits)
-    return add_notice(restored, Notice(AS_LEFT))
+    return notify(restored, Notice(AS_LEFT))

@@ -11,10 +11,10 @@ from iibr_core.scenes.lens_limits import clamp_optics, focus_limits
 from iibr_core.scenes.scene import DepthSettings, Progress, Scene
 from iibr_core.types import InputError
 from viewer.model.actions import OpenFailed, ProgressMade, SamePlaces, SceneOpened, WorkerEvent
+from viewer.model.messages import MAX_NOTICES, notify
 from viewer.model.reducers.folder_reducer import is_stepped_to
 from viewer.model.reducers.history_reducer import map_optics
 from viewer.model.reducers.lens_reducer import carry_optics, carry_to_depth, with_focus_of
-from viewer.model.reducers.notices_reducer import NOTICES_KEPT, add_notice
 from viewer.model.state.app_state import AppState
 from viewer.model.state.folder import ListFolderTask
 from viewer.model.state.history import History
@@ -40,7 +40,7 @@ def reduce_worker_event(state: AppState, news: WorkerEvent) -> AppState:
             shown = state.progress if state.stopped == state.generation else progress
             return replace(state, progress=shown, views_there=there)
         case OpenFailed(_, message):
-            return _fail_to_open(add_notice(state, notice_in_window(message, is_error=True)))
+            return _fail_to_open(notify(state, notice_in_window(message, is_error=True)))
 
 
 def stop_work(state: AppState) -> AppState:
@@ -82,11 +82,11 @@ def _open_scene(state: AppState, scene: Scene, same_places: SamePlaces | None) -
         history=map_optics(state.history, carried),
         inspection=replace(state.inspection, pair=None, probe=None),
     )
-    notices = (*_told(scene), *_offers(scene))[-NOTICES_KEPT:]
+    notices = (*_told(scene), *_offers(scene))[-MAX_NOTICES:]
     if old is not None and old.source is scene.source:
         is_whole_now = old.is_sketch and not scene.is_sketch
         opened = _with_left_focus(opened) if same_places is not None else opened
-        return replace(opened, notices=(*state.notices, *notices)[-NOTICES_KEPT:]) if is_whole_now else opened
+        return replace(opened, notices=(*state.notices, *notices)[-MAX_NOTICES:]) if is_whole_now else opened
     # the same file, opened again, is new
     motion = Motion(speed=state.motion.speed)
     recent = state.recent
@@ -102,7 +102,7 @@ def _open_scene(state: AppState, scene: Scene, same_places: SamePlaces | None) -
         opened = replace(opened, tasks=(*opened.tasks, *beside))
     return replace(
         opened,
-        notices=(*(notice for notice in state.notices if notice.stays), *notices)[-NOTICES_KEPT:],
+        notices=(*(notice for notice in state.notices if notice.stays), *notices)[-MAX_NOTICES:],
         history=History(),
         motion=motion,
         recent=recent,

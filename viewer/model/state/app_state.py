@@ -22,7 +22,7 @@ from viewer.model.state.model_download import DepthModels
 from viewer.model.state.motion import Motion
 from viewer.model.state.notices import Notice
 from viewer.model.state.optics_actions import GlossBrush
-from viewer.model.state.photo_facts import NO_FACTS, FactsRead
+from viewer.model.state.photo_facts import NO_FACTS, PhotoFacts
 from viewer.model.state.preferences import Preferences
 from viewer.model.state.prompts import Prompt
 from viewer.model.state.tasks import Task
@@ -134,7 +134,7 @@ class AppState:
     shown_generation: int = 0
     given_up: int = 0
     folder: PhotoFolder | None = None
-    facts: FactsRead = NO_FACTS
+    facts: PhotoFacts = NO_FACTS
     is_fullscreen: bool = False
     hides_panel: bool | None = None
     is_narrow: bool = False

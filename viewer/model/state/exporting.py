@@ -29,8 +29,3 @@ class ExportTask:
     path: str
     options: ExportOptions = DEFAULT_OPTIONS
     may_replace: bool = False
-
-
-@dataclass(frozen=True)
-class AskToExport:
-    """A request to show the prompt of an export."""

@@ -36,19 +36,7 @@ class JobProgress:
 
 
 @dataclass(frozen=True)
-class JobsChanged:
-    """The queue, in the order in which the jobs were asked for."""
-
-    jobs: tuple[JobProgress, ...]
-
-
-@dataclass(frozen=True)
 class CancelJobTask:
     """Give up the job of this id; the others continue."""
 
     id: int
-
-
-@dataclass(frozen=True)
-class QuitWhenDone:
-    """Close the window once the queue is empty; a job that fails keeps it open."""

@@ -13,11 +13,11 @@ class ReadFactsTask:
 
 
 @dataclass(frozen=True)
-class FactsRead:
+class PhotoFacts:
     """What the photo's file says: (what, value), for people."""
 
     path: str
     facts: tuple[tuple[str, str], ...] = ()
 
 
-NO_FACTS = FactsRead("")
+NO_FACTS = PhotoFacts("")

@@ -29,9 +29,11 @@ from iibr_core.formats.quilts import DEVICES
 from iibr_core.scenes.lens_limits import clamp
 from iibr_core.scenes.scene import Scene
 from iibr_core.types import InputError
-from viewer.model.actions import Action, AskToSave, DoTask, ShowPrompt
+from viewer.model import messages, saving
+from viewer.model.action import ask, do
+from viewer.model.actions import Action
 from viewer.model.layout import Layout
-from viewer.model.reducers.exporting_reducer import as_other_kind, first_kind, kinds_for, written_path
+from viewer.model.saving import as_other_kind, first_kind, kinds_for, written_path
 from viewer.model.state.app_state import AppState
 from viewer.model.state.exporting import ExportPrompt, ExportTask
 from viewer.model.state.preferences import is_seen_open
@@ -88,9 +90,9 @@ def export_prompt(prompt: ExportPrompt, state: AppState, layout: Layout) -> list
     chosen = prompt.kind if purpose == EXPORTS[prompt.kind].purpose else first_kind(purpose)
     chosen = choice_row("kind", chosen, _entries(purpose), layout)
     if chosen == PICTURE:
-        return [AskToSave()]
+        return [do(saving.ask_to_save)]
     if chosen != prompt.kind:
-        return [ShowPrompt(as_other_kind(state, prompt, chosen))]
+        return [do(messages.show_prompt, as_other_kind(state, prompt, chosen))]
     kind, options, sections = EXPORTS[chosen], prompt.options, state.preferences.open_sections
     filled = with_defaults(kind, options, state.scene, state.optics)
     aspect = picture_aspect(kind, filled.eyes, state.scene, state.optics)
@@ -106,9 +108,9 @@ def export_prompt(prompt: ExportPrompt, state: AppState, layout: Layout) -> list
     say_problem(prompt.problem or (ALREADY_THERE if prompt.already_there else ""), state)
     pressed, closed = prompt_buttons("Replace" if prompt.already_there else _word_of(kind), layout)
     if browses:
-        return [ShowPrompt(edited), DoTask(ChoosePlaceTask(edited))]
+        return [do(messages.show_prompt, edited), do(ask, ChoosePlaceTask(edited))]
     if pressed or entered:
-        return [DoTask(ExportTask(chosen, path, options, prompt.already_there))]
+        return [do(ask, ExportTask(chosen, path, options, prompt.already_there))]
     return prompt_actions(closed, edited, prompt)
 
 

@@ -10,7 +10,9 @@ from dataclasses import replace
 from imgui_bundle import icons_fontawesome_6 as icons
 from imgui_bundle import imgui
 
-from viewer.model.actions import Action, DoTask, ShowPrompt
+from viewer.model import messages
+from viewer.model.action import ask, do
+from viewer.model.actions import Action
 from viewer.model.commands import action_for_path
 from viewer.model.layout import Layout
 from viewer.model.state.app_state import AppState
@@ -61,10 +63,10 @@ def file_browser(prompt: PathPrompt, state: AppState, layout: Layout) -> list[Ac
     folder = folder_of(path)
     if contents is None or contents.folder != folder:
         return [
-            ShowPrompt(replace(edited, contents=FolderContents(folder))),
-            DoTask(ListContentsTask(folder, prompt.what)),
+            do(messages.show_prompt, replace(edited, contents=FolderContents(folder))),
+            do(ask, ListContentsTask(folder, prompt.what)),
         ]
-    return [ShowPrompt(prompt.returns_to)] if closed else prompt_actions(False, edited, prompt)
+    return [do(messages.show_prompt, prompt.returns_to)] if closed else prompt_actions(False, edited, prompt)
 
 
 def folder_of(path: str) -> str:
@@ -83,8 +85,8 @@ def _leads_on(path: str, prompt: PathPrompt) -> bool:
 
 def _take(prompt: PathPrompt, path: str, state: AppState) -> list[Action]:
     if prompt.returns_to is not None:
-        return [ShowPrompt(replace(prompt.returns_to, path=path, already_there=False, problem=""))]
-    return [ShowPrompt(None), action_for_path(prompt.what, path, state)]
+        return [do(messages.show_prompt, replace(prompt.returns_to, path=path, already_there=False, problem=""))]
+    return [do(messages.show_prompt, None), action_for_path(prompt.what, path, state)]
 
 
 def _steps(path: str, layout: Layout) -> str:

@@ -6,7 +6,9 @@ from dataclasses import replace
 
 from imgui_bundle import imgui
 
-from viewer.model.actions import Action, DoTask, ShowPrompt
+from viewer.model import messages
+from viewer.model.action import ask, do
+from viewer.model.actions import Action
 from viewer.model.layout import Layout
 from viewer.model.state.app_state import AppState
 from viewer.model.state.model_download import GetDepth, GetModelTask, ModelOffer, ModelsPrompt, UseModel
@@ -16,7 +18,7 @@ from viewer.ui.widgets import gap, quiet
 
 LIST_SHARE = 0.55
 """Of the window's height: longer lists scroll."""
-CANCEL = ShowPrompt(None)
+CANCEL = do(messages.show_prompt, None)
 
 
 def models_prompt(prompt: ModelsPrompt, state: AppState, layout: Layout) -> list[Action]:
@@ -35,12 +37,12 @@ def models_prompt(prompt: ModelsPrompt, state: AppState, layout: Layout) -> list
     if models and has_photo and not (models[chosen].is_here and models[chosen].lacks):
         offers.append((_word(models[chosen]), UseModel(models[chosen].name)))
     if has_photo:
-        offers.append(("Choose a file…", DoTask(ChooseTask("model"))))
+        offers.append(("Choose a file…", do(ask, ChooseTask("model"))))
     if has_photo and state.has_dialogs:  # what is typed may be either
-        offers.append(("Choose a folder…", DoTask(ChooseTask("model folder"))))
+        offers.append(("Choose a folder…", do(ask, ChooseTask("model folder"))))
     taken = button_rows([*offers, ("Cancel", CANCEL)])
     if not taken:
-        return [ShowPrompt(replace(prompt, selected=pressed))] if pressed is not None else []
+        return [do(messages.show_prompt, replace(prompt, selected=pressed))] if pressed is not None else []
     return [CANCEL] if taken == [CANCEL] else [CANCEL, *_done(taken[0], models[chosen] if models else None)]
 
 
@@ -48,7 +50,7 @@ def _done(action: Action, model: ModelOffer | None) -> list[Action]:
     """What it takes to use a model: one that is not here is downloaded first."""
     if model is None or not isinstance(action, UseModel) or model.is_here:
         return [action]
-    return [GetDepth()] if model.is_recommended else [action, DoTask(GetModelTask(model.name))]
+    return [GetDepth()] if model.is_recommended else [action, do(ask, GetModelTask(model.name))]
 
 
 def _word(model: ModelOffer) -> str:

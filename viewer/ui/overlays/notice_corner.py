@@ -6,7 +6,9 @@ from __future__ import annotations
 
 from imgui_bundle import imgui
 
-from viewer.model.actions import Action, DismissNotice, TakeSettings
+from viewer.model import messages
+from viewer.model.action import do
+from viewer.model.actions import Action, TakeSettings
 from viewer.model.commands import BY_NAME
 from viewer.model.layout import MARGIN, STRIP_GAP, Layout
 from viewer.model.reducers.depth_models import offered_model
@@ -78,14 +80,14 @@ def _offer(model: ModelOffer) -> list[Action]:
 def _notice(notice: Notice, state: AppState) -> list[Action]:
     """The notice, what it offers, and how many more there are."""
     palette, others = palette_of(state.preferences.theme), len(state.notices) - 1
-    actions: list[Action] = [DismissNotice(notice)] if imgui.button("×") else []
+    actions: list[Action] = [do(messages.dismiss, notice)] if imgui.button("×") else []
     imgui.same_line()
     imgui.begin_group()
     imgui.align_text_to_frame_padding()
     colored(notice.text, imgui.ImVec4(*(palette.error if notice.is_error else palette.text)))
     offers: list[tuple[str, Action]] = [(name, BY_NAME[name].action(state)) for name in notice.commands]
     offers += [("Use its settings", TakeSettings(notice.offer))] if notice.offer is not None else []
-    offers += [(f"Close all ({others + 1})", DismissNotice(None))] if others else []
+    offers += [(f"Close all ({others + 1})", do(messages.dismiss))] if others else []
     actions += button_rows(offers)
     imgui.end_group()
     return actions

@@ -10,7 +10,8 @@ from dataclasses import dataclass
 from imgui_bundle import imgui
 
 from iibr_core.runtime.time_left import about_left
-from viewer.model.actions import Action, DoTask
+from viewer.model.action import ask, do
+from viewer.model.actions import Action
 from viewer.model.free_camera import LeaveCamera
 from viewer.model.layout import Layout
 from viewer.model.reducers.depth_models import wanted_model
@@ -84,7 +85,7 @@ def job_text(job: JobProgress) -> str:
 
 
 def _job_row(job: JobProgress) -> ProgressRow:
-    cancel = DoTask(CancelJobTask(job.id)) if job.can_be_cancelled else None
+    cancel = do(ask, CancelJobTask(job.id)) if job.can_be_cancelled else None
     return ProgressRow(f"job {job.id}", f"{VERBS[job.kind]} {job.name}", job_text(job), job.done, cancel)
 
 
@@ -98,7 +99,7 @@ def _work_on_views(state: AppState) -> Iterator[ProgressRow]:
     if downloading is not None:
         words = f"{downloading.done:,} of {downloading.total:,} MB"
         share = downloading.done / max(downloading.total, 1)
-        yield ProgressRow("download", f"Downloading {downloading.title}", words, share, DoTask(CancelGetTask()))
+        yield ProgressRow("download", f"Downloading {downloading.title}", words, share, do(ask, CancelGetTask()))
     model = wanted_model(state)
     if model is not None:
         titles = {offer.name: offer.title for offer in state.models.known}

@@ -12,12 +12,14 @@ from imgui_bundle import imgui
 from iibr_core.formats.images.picture_kinds import BEST_QUALITY, KINDS, PROFILES
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import SRGB
-from viewer.model.actions import Action, AskToSave, DoTask, Quit, ShowPrompt
+from viewer.model import messages, saving
+from viewer.model.action import ask, do
+from viewer.model.actions import Action
 from viewer.model.commands import COMMANDS, Command, commands_matching, recent_commands
 from viewer.model.layout import PANEL_WIDTH, Layout
 from viewer.model.state.app_state import AppState
 from viewer.model.state.exporting import ExportPrompt
-from viewer.model.state.jobs import JobProgress, QuitWhenDone
+from viewer.model.state.jobs import JobProgress
 from viewer.model.state.model_download import ModelsPrompt
 from viewer.model.state.prompts import PalettePrompt, PathPrompt, Prompt, SavePrompt
 from viewer.model.state.tasks import ChoosePlaceTask, SaveTask
@@ -71,7 +73,7 @@ def prompts(state: AppState, layout: Layout) -> list[Action]:
     actions = _contents(prompt, state, layout)
     imgui.end()
     if is_left:
-        return [ShowPrompt(None)]
+        return [do(messages.show_prompt, None)]
     return actions
 
 
@@ -121,9 +123,9 @@ def _save(prompt: SavePrompt, state: AppState, layout: Layout) -> list[Action]:
     say_problem(prompt.problem or (ALREADY_THERE if prompt.already_there else ""), state)
     pressed, closed = prompt_buttons("Replace" if prompt.already_there else "Save", layout)
     if browses:
-        return [ShowPrompt(edited), DoTask(ChoosePlaceTask(edited))]
+        return [do(messages.show_prompt, edited), do(ask, ChoosePlaceTask(edited))]
     if pressed or entered:
-        return [DoTask(SaveTask(edited.path, edited.size_px, prompt.already_there, prompt.what, edited.form))]
+        return [do(ask, SaveTask(edited.path, edited.size_px, prompt.already_there, prompt.what, edited.form))]
     return prompt_actions(closed, edited, prompt)
 
 
@@ -185,7 +187,7 @@ def _palette(prompt: PalettePrompt, state: AppState, layout: Layout) -> list[Act
         quiet("No command has these words: try fewer.")
     chosen = pressed or chosen
     if chosen is not None:
-        return [ShowPrompt(None), chosen.action(replace(state, prompt=None))]
+        return [do(messages.show_prompt, None), chosen.action(replace(state, prompt=None))]
     return prompt_actions(False, PalettePrompt(text, selected), prompt)
 
 
@@ -226,7 +228,7 @@ def _help(layout: Layout, rows: list[tuple[str, str]]) -> list[Action]:
             imgui.table_next_column()
             imgui.text_wrapped(meaning.rstrip("…"))
         imgui.end_table()
-    return [ShowPrompt(None)] if is_closed else []
+    return [do(messages.show_prompt, None)] if is_closed else []
 
 
 def _quit(state: AppState, layout: Layout) -> list[Action]:
@@ -234,13 +236,15 @@ def _quit(state: AppState, layout: Layout) -> list[Action]:
     offers: list[tuple[str, Action]] = []
     if state.jobs:
         imgui.text(f"{jobs_text(state.jobs)} under way.")
-        offers.append(("Wait, then quit", QuitWhenDone()))
+        offers.append(("Wait, then quit", do(saving.quit_when_done)))
     if state.has_unsaved_edits:
         imgui.text("The depth edits are not saved.")
-        offers.append(("Save the depth map…", AskToSave("map")))
+        offers.append(("Save the depth map…", do(saving.ask_to_save, "map")))
     gap(layout, 2)
     sure = "Quit without saving" if state.has_unsaved_edits else "Cancel them and quit" if state.jobs else "Quit"
-    return button_rows([*offers, (sure, Quit(is_sure=True)), ("Cancel", ShowPrompt(None))])
+    return button_rows(
+        [*offers, (sure, do(saving.quit_window, is_sure=True)), ("Cancel", do(messages.show_prompt, None))]
+    )
 
 
 def jobs_text(jobs: Sequence[JobProgress]) -> str:

@@ -7,7 +7,9 @@ from typing import TypeVar
 
 from imgui_bundle import imgui
 
-from viewer.model.actions import Action, ShowPrompt
+from viewer.model import messages
+from viewer.model.action import do
+from viewer.model.actions import Action
 from viewer.model.layout import Layout
 from viewer.model.state.app_state import AppState
 from viewer.model.state.prompts import Prompt
@@ -31,8 +33,8 @@ CARD_FLAGS = PROMPT_FLAGS | imgui.WindowFlags_.no_nav | imgui.WindowFlags_.no_fo
 def prompt_actions(closed: bool, edited: Prompt, prompt: Prompt) -> list[Action]:
     """What becomes of the prompt: it goes, or what was edited in it is kept."""
     if closed:
-        return [ShowPrompt(None)]
-    return [ShowPrompt(edited)] if edited != prompt else []
+        return [do(messages.show_prompt, None)]
+    return [do(messages.show_prompt, edited)] if edited != prompt else []
 
 
 def prompt_buttons(word: str, layout: Layout) -> tuple[bool, bool]:

@@ -9,7 +9,9 @@ from imgui_bundle import imgui
 from iibr_core.depth.choice import DepthStart
 from iibr_core.depth.editing.edits import BRUSH_TOOLS, DEPTH_TOOLS, GAMMA_LIMITS, RADIUS_LIMITS, BrushTool, DepthEdits
 from iibr_core.scenes.scene import Scene, source_with_depth
-from viewer.model.actions import Action, AskToSave, DoTask, OpenPath, ShowPrompt
+from viewer.model import messages, saving
+from viewer.model.action import ask, do
+from viewer.model.actions import Action, OpenPath
 from viewer.model.commands import BRUSH_WORDS
 from viewer.model.layout import Layout
 from viewer.model.state.app_state import AppState
@@ -120,7 +122,7 @@ def _origin(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
     picked = combo("depth from", wanted, entries, layout, FROM_TIP)
     actions: list[Action] = []
     if picked == len(ways):
-        actions.append(ShowPrompt(ModelsPrompt()))
+        actions.append(do(messages.show_prompt, ModelsPrompt()))
     elif picked is not None:
         start, model = ways[picked]
         actions.append(UseModel(model) if model is not None else OpenPath(source_with_depth(source, start)))
@@ -216,10 +218,10 @@ def _sample(brush: Brush, layout: Layout) -> list[Action]:
 def _files(state: AppState, layout: Layout) -> list[Action]:
     actions: list[Action] = []
     if button("Open map…", layout, "A depth map for this photo: PFM, EXR, NPY or 16-bit PNG."):
-        actions.append(DoTask(ChooseTask("map")))
+        actions.append(do(ask, ChooseTask("map")))
     imgui.same_line(0, 4 * layout.ui_scale)
     if button("Save map…", layout, "Depth with all your edits. Beside the photo it is found again the next time."):
-        actions.append(AskToSave("map"))
+        actions.append(do(saving.ask_to_save, "map"))
     imgui.same_line(0, 4 * layout.ui_scale)
     is_edited = state.source is not None and state.depth.edits != DepthEdits()
     if button("Reset", layout, "Depth as it was found, without your edits.", is_edited):

@@ -8,7 +8,8 @@ from typing import Literal
 from imgui_bundle import imgui
 
 from iibr_core.scenes.scene import Scene
-from viewer.model.actions import Action, DoTask
+from viewer.model.action import ask, do
+from viewer.model.actions import Action
 from viewer.model.commands import OVERLAY_WORDS
 from viewer.model.inspection_request import grid_to_compare, view_label, view_to_compare
 from viewer.model.layout import Layout
@@ -137,7 +138,7 @@ def _comparisons(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
         actions.append(Compare(None if chosen == COMPARISONS[pressed] else COMPARISONS[pressed]))
     truth = inspection.truth
     if button("Truth…", layout, TRUTH_TIP if truth is None else truth.path):
-        actions.append(DoTask(ChooseTask("truth")))
+        actions.append(do(ask, ChooseTask("truth")))
     if truth is not None:
         imgui.same_line()
         imgui.align_text_to_frame_padding()

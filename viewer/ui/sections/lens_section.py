@@ -18,7 +18,8 @@ from iibr_core.beyond.optics import (
 )
 from iibr_core.scenes.lens_limits import BLADES_LIMITS, aperture_limit, focus_limits, focus_span
 from iibr_core.scenes.scene import Scene
-from viewer.model.actions import Action, DoTask, ShowTiltHandles
+from viewer.model.action import ask, do
+from viewer.model.actions import Action, ShowTiltHandles
 from viewer.model.layout import Layout
 from viewer.model.lens.photographic_units import (
     ASSUMED_DISTANCE_M,
@@ -172,7 +173,7 @@ def _kinds(shape: ApertureShape, layout: Layout, palette: Palette) -> list[Actio
         if choice(f"##{kind}", shape.kind == kind, layout, (width, height), KIND_TIPS[kind]):
             needs_image = kind == "mask" and shape.mask is None
             actions.append(
-                DoTask(ChooseTask("mask")) if needs_image else SetOptics("aperture_shape", replace(shape, kind=kind))
+                do(ask, ChooseTask("mask")) if needs_image else SetOptics("aperture_shape", replace(shape, kind=kind))
             )
         middle = corner.x + width / 2, corner.y + height / 2
         draw_shape(replace(shape, kind=kind), middle, 0.32 * height, palette)
@@ -202,7 +203,7 @@ def _shape_edits(shape: ApertureShape, layout: Layout) -> list[ApertureShape]:
 def _mask_row(shape: ApertureShape, layout: Layout) -> list[Action]:
     actions: list[Action] = []
     if button("Image…", layout, "Choose a small grey image; white lets light through."):
-        actions.append(DoTask(ChooseTask("mask")))
+        actions.append(do(ask, ChooseTask("mask")))
     if shape.mask is not None:
         imgui.same_line()
         imgui.align_text_to_frame_padding()

@@ -6,7 +6,8 @@ from __future__ import annotations
 
 from iibr_core.scenes.scene import Scene
 from iibr_core.types import GridShape
-from viewer.model.actions import Action, DoTask
+from viewer.model.action import ask, do
+from viewer.model.actions import Action
 from viewer.model.dense_grid import chosen_grid, denser_grids, with_views_between
 from viewer.model.layout import Layout
 from viewer.model.state.app_state import AppState
@@ -45,7 +46,7 @@ def _views_between(scene: Scene, chosen: GridShape, given: GridShape, layout: La
     entries = [(_grid_words(grid, given), _grid_tip(grid, given)) for grid in grids]
     picked = combo("views", _grid_words(chosen, given), entries, layout, BETWEEN_TIP)
     is_new = picked is not None and grids[picked] != chosen
-    return [DoTask(FillTask(with_views_between(scene, grids[picked or 0])))] if is_new else []
+    return [do(ask, FillTask(with_views_between(scene, grids[picked or 0])))] if is_new else []
 
 
 def _grid_tip(grid: GridShape, given: GridShape) -> str:

@@ -1,15 +1,17 @@
-"""Prompts and default paths of exports and saved pictures."""
+"""Saves and exports: their prompts and default paths, the jobs under way, and quitting."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path, PurePath
 
+from iibr_core.depth.editing.edits import DepthEdits
 from iibr_core.exports.kinds import EXPORTS, ExportKind, ExportOptions, Purpose, export_path
 from iibr_core.scenes.scene import Scene
 from iibr_core.types import InputError
 from viewer.model.state.app_state import AppState
 from viewer.model.state.exporting import ExportPrompt
+from viewer.model.state.jobs import JobProgress
 from viewer.model.state.prompts import Saved, SavePrompt
 from viewer.model.state.saving import path_beside
 
@@ -71,7 +73,7 @@ def _place_of(state: AppState, name: str) -> str:
     return str(PurePath(folder) / name) if folder else path_beside(state.source.path, name)
 
 
-def ask_to_save(state: AppState, what: Saved) -> AppState:
+def ask_to_save(state: AppState, what: Saved = "picture") -> AppState:
     """Show the prompt to save the picture, at the photo's own size if that can be drawn, or the map of a photo."""
     scene = state.scene
     if scene is None or (what == "map" and scene.plan is None):
@@ -93,3 +95,27 @@ def _usual_path(state: AppState, what: Saved) -> str:
     is_given = origin is not None and origin.kind == "file"
     ending = "-edited.pfm" if is_given else "_disparity.pfm"
     return path_beside(state.source.path, f"{state.scene.name}{ending}")
+
+
+def set_jobs(state: AppState, jobs: tuple[JobProgress, ...]) -> AppState:
+    """Take over the list of jobs; close the window where it waited for the last."""
+    state = replace(state, jobs=jobs)
+    return quit_window(state) if state.quits_when_done and not jobs else state
+
+
+def mark_saved(state: AppState, edits: DepthEdits) -> AppState:
+    """Note that a file has these depth edits."""
+    return replace(state, saved_edits=edits)
+
+
+def quit_window(state: AppState, is_sure: bool = False) -> AppState:
+    """Close the window; ask first where that would lose something."""
+    asks = (state.has_unsaved_edits or bool(state.jobs)) and not is_sure
+    state = replace(state, quits_when_done=False)
+    return replace(state, prompt="quit") if asks else replace(state, should_quit=True)
+
+
+def quit_when_done(state: AppState) -> AppState:
+    """Close the window after the last job; a job that fails keeps it open."""
+    state = replace(state, quits_when_done=True, prompt=None)
+    return state if state.jobs else quit_window(state)
