@@ -51,9 +51,10 @@ def _end_by(error: Exception) -> int:
     import typer
 
     from iibr_core.types import InputError
+    from viewer.cli.remedies import words_of
 
     if isinstance(error, InputError):
-        return _end(str(error), EXIT_BAD_INPUT)
+        return _end(words_of(error), EXIT_BAD_INPUT)
     if isinstance(error, typer.Abort):  # Click's word for Ctrl-C
         return _end("interrupted", EXIT_INTERRUPTED)
     if hasattr(error, "format_message"):  # Click's errors about the words of a command

@@ -97,7 +97,7 @@ def _denser(sparse: GridShape, steps: int) -> GridShape:
 
 def _advice(sparse: GridShape, dense: GridShape) -> str:
     if max(sparse) == 1:
-        return "have none beside them to go between: give the picture itself to `iibr generate`"
+        return "have none beside them to go between: generate views of the picture itself"
     grids = ", ".join(f"{grid.rows}x{grid.columns}" for grid in (_denser(sparse, steps) for steps in (2, 3, 4)))
     return f"have no places on a grid of {dense.rows}x{dense.columns} (rows x columns): give {grids} and so on"
 

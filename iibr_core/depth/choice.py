@@ -11,11 +11,6 @@ DepthKind = Literal["file", "embedded", "model", "rough", "flat"]
 DepthStart = Literal["auto", "embedded", "model", "rough", "flat"]
 """First kind of source that is tried; "auto" begins with a file."""
 
-BETTER_WAYS = (
-    "Better: give a depth map with --disparity FILE, or a trained model with --depth-model "
-    "(`iibr models` lists what is there)."
-)
-
 
 @dataclass(frozen=True)
 class DepthOrigin:
@@ -33,19 +28,14 @@ class DepthOrigin:
     near: str = ""
 
     @property
-    def advice(self) -> str:
-        """Return advice on better depth; "" if the depth is good."""
-        return BETTER_WAYS if self.kind in ("rough", "flat") else ""
+    def is_poor(self) -> bool:
+        """Return whether a depth map or a model would be better."""
+        return self.kind in ("rough", "flat")
 
     @property
     def line(self) -> str:
         """Return the origin in one line."""
         return f"Depth: {self.words}."
-
-    @property
-    def advising_line(self) -> str:
-        """Return the origin and the advice in one line; "" without advice."""
-        return f"{self.line} {self.advice}" if self.advice else ""
 
 
 @dataclass(frozen=True)

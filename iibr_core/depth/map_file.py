@@ -14,7 +14,8 @@ from iibr_core.formats.images.decode import read_orientation
 from iibr_core.formats.images.picture import upright
 from iibr_core.formats.maps.disparity_file import has_shape_of, require_scale, resampling_note, scaled_disparity
 from iibr_core.formats.maps.reader import MapFile, read_map_file
-from iibr_core.types import InputError, Photo, image_size
+from iibr_core.remedies import FixableError, Remedy
+from iibr_core.types import Photo, image_size
 
 SPREAD_SHARES = {"floats": 0.98, "integers": 0.5, "colours": 0.0}
 """Share of the greatest value, 1 for floats, that a map reaches if it was spread over a range: distances end lower.
@@ -53,9 +54,8 @@ def depth_from_file(path: Path, photo_path: Path, photo: Photo, choice: DepthCho
     elif choice.stretches:
         notes = (f"{path.name}, {size}, was stretched to the photo's shape, {photo_size}.",)
     else:
-        raise InputError(
-            f"{path}: {size} differs in shape from the photo, {photo_size}; add --stretch if it shows the whole photo,"
-            " else crop or rotate it to match"
+        raise FixableError(
+            f"{path}: {size} differs in shape from the photo, {photo_size}; crop or rotate it to match", Remedy.STRETCH
         )
     depth = _depth_of_map(path, found, photo, choice)
     return replace(depth, notes=(*found.notes, *notes, *depth.notes))
@@ -81,9 +81,7 @@ def orient_map(
     if choice.inverts:
         reason = "as asked"
     elif not reason.startswith("as said"):
-        reason += "; --invert-depth turns it if that is wrong"
-        if found.numbers == "floats" and is_large_near:
-            reason += ", --metric if the values are distances"
+        reason += "; invert the depth if that is wrong"
     ends = ("black", "white") if found.numbers == "integers" else ("the low end", "the high end")
     near = ends[is_large_near != choice.inverts]
     note = f"In {name} {near} counts as near, {reason}."
@@ -144,7 +142,7 @@ def _disparity(path: Path, found: MapFile, photo: Photo, choice: DepthChoice) ->
     scale = require_scale(choice.file_scale)
     scaled, notes = scaled_disparity(path, found.values, scale)
     if not choice.inverts and near_evidence(photo.pixels, scaled) < -1:
-        notes += (f"In {path.name} near and far look swapped: turn them with --invert-depth.",)
+        notes += (f"In {path.name} near and far look swapped: invert the depth if that is wrong.",)
     return OrientedDepth(DepthEstimate(scaled, "disparity"), "the high end" if scale > 0 else "the low end", notes)
 
 

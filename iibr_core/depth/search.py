@@ -244,8 +244,7 @@ def _at_size(small: FloatImage, width: int, photo: Photo) -> FloatImage:
 
 
 def _with_failures(found: PhotoWithDepth, failures: tuple[str, ...]) -> PhotoWithDepth:
-    """Return the photo with notes on the sources that failed before, and with advice on better depth."""
+    """Return the photo with notes on the sources that failed before."""
     origin = replace(found.origin, failures=failures)
-    advice = (origin.advising_line,) if origin.advice else ()
-    notes = (*found.disparity.notes, *failures, *advice)
+    notes = (*found.disparity.notes, *failures)
     return replace(found, disparity=replace(found.disparity, notes=notes), origin=origin)

@@ -61,4 +61,4 @@ def _load(module: nn.Module, path: Path, stored_name: Callable[[str], str]) -> N
         module.load_state_dict({key: stored[stored_name(key)] for key in module.state_dict()})
     except (OSError, RuntimeError, KeyError, TypeError, AttributeError, EOFError, pickle.UnpicklingError) as error:
         reason = str(error).strip().partition("\n")[0][:100] or type(error).__name__
-        raise InputError(f"{path}: cannot be read ({reason}); --lpips needs a folder with {FILES}") from error
+        raise InputError(f"{path}: cannot be read ({reason}); LPIPS needs a folder with {FILES}") from error

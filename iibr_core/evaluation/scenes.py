@@ -151,7 +151,7 @@ def trial_input(trial: Trial, source: DisparityFrom | Path, choice: DepthChoice,
         stored = {_mapped_centre(scene): KnownDisparity(source)} if isinstance(source, Path) else scene.disparity
         given = _map_of(trial, stored, max_pixels)
         if given is None:
-            raise InputError(f"{view.path}: has no disparity map beside it; give --disparity estimate, or a file")
+            raise InputError(f"{view.path}: has no disparity map beside it; give a map, or have it estimated")
         maps = _with_fitted("given map", given, fit)
     judge = truth or next(disparity for kind, disparity in maps.items() if kind.endswith(FITTED))
     return TrialInput(photo, maps, judge, fit)

@@ -215,7 +215,7 @@ def export_photo(task: PhotoTask) -> Outcome:
     except (InputError, OSError) as error:
         return Outcome(task, reason=str(error))
     except MemoryError as error:
-        return Outcome(task, reason=f"out of memory ({error}): lower --max-pixels, or --workers")
+        return Outcome(task, reason=f"out of memory ({error}): use smaller photos or fewer workers")
     except Exception as error:
         reason = f"unexpected {type(error).__name__}: {error} (please report it with {LOG})"
         return Outcome(task, reason=reason, trace=traceback.format_exc())
@@ -302,7 +302,7 @@ def _run_on_dask(address: str, tasks: Sequence[PhotoTask]) -> Generator[Outcome]
         client = Client(address, timeout=CONNECT_S)
         client.wait_for_workers(1, timeout=CONNECT_S)
     except (OSError, ValueError, TypeError, RuntimeError) as error:
-        raise InputError(f"--dask {address}: no scheduler with workers answers ({reason_of(error)})") from error
+        raise InputError(f"{address}: no Dask scheduler with workers answers ({reason_of(error)})") from error
     with client:
         executor = client.get_executor(pure=False)
         running = {executor.submit(export_photo, task): task for task in tasks}

@@ -175,7 +175,7 @@ class ViewStore:
                 better = (self.encode(replace(form, quality=quality)) for quality in QUALITIES[:-1])
                 return next((views for views in better if page_bytes(views) <= budget), smallest)
         missing = (page_bytes(smallest) - budget) / 1e6
-        raise InputError(f"--budget: the smallest page is {missing:.2f} MB larger; give a larger budget")
+        raise InputError(f"budget: the smallest page is {missing:.2f} MB larger; give a larger budget")
 
 
 def _smaller_colors(colors: Bytes, size: ImageSize) -> Bytes:

@@ -18,14 +18,18 @@ from tempfile import TemporaryDirectory
 import psutil
 
 from iibr_core.formats.files import reason_of
+from iibr_core.remedies import FixableError, Remedy
 from iibr_core.types import InputError
 
 TEMPORARY = f".iibr-{platform.node()}-"
 """Start of the names of unfinished outputs of this machine; the number of the process follows."""
 
 
-class AlreadyThereError(InputError):
+class AlreadyThereError(FixableError):
     """The output exists, and may not be replaced."""
+
+    def __init__(self, message: str) -> None:
+        super().__init__(message, Remedy.REPLACE)
 
 
 def check_output(path: Path, inputs: Iterable[Path] = (), may_replace: bool = False) -> None:
@@ -43,7 +47,7 @@ def check_output(path: Path, inputs: Iterable[Path] = (), may_replace: bool = Fa
     if real.exists() and not real.is_file():
         raise InputError(f"{path}: is a device or a pipe; give the name of a file")
     if real.exists() and not may_replace:
-        raise AlreadyThereError(f"{path}: already exists; give --force to replace it, or choose another name")
+        raise AlreadyThereError(f"{path}: already exists")
 
 
 def check_output_folder(
@@ -66,7 +70,7 @@ def check_output_folder(
         if real in _resolve(read).parents:
             raise InputError(f"{folder}: holds {read}, which is read, and no input is overwritten; choose another")
     if real.is_dir() and not may_replace and any(real.iterdir()):
-        raise AlreadyThereError(f"{folder}: already exists; give --force to replace it, or choose another folder")
+        raise AlreadyThereError(f"{folder}: already exists")
     if own_files is not None and real.is_dir():
         _require_own_files(folder, real, own_files)
 

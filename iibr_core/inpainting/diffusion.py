@@ -77,7 +77,7 @@ class DiffusionInpainter:
                 callback_on_step_end=_after_step,
             ).images  # fmt: skip
         except torch.OutOfMemoryError as error:
-            raise InputError(f"{self._folder}: out of memory; lower --max-pixels or give a smaller model") from error
+            raise InputError(f"{self._folder}: out of memory; use a smaller photo or a smaller model") from error
         enlarged = _resized(painted.float().cpu(), image_size(colors))[0].permute(1, 2, 0)
         return np.asarray(np.nan_to_num(enlarged.numpy()).clip(0, 1), np.float32)
 

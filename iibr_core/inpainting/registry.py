@@ -67,6 +67,6 @@ def require_inpainter(choice: str) -> None:
     """Raise InputError if there is no such inpainter or no such folder. Nothing is loaded."""
     name, _, folder = choice.partition(":")
     if choice not in INPAINTERS and not (name in MODEL_INPAINTERS and folder):
-        raise InputError(f"--inpaint {choice}: unknown inpainter; give {' or '.join(INPAINTER_FORMS)}")
+        raise InputError(f"{choice}: unknown inpainter; give {' or '.join(INPAINTER_FORMS)}")
     if folder and not os.path.isdir(os.path.expanduser(folder)):
-        raise InputError(f"--inpaint {choice}: no such folder; give that of an inpainting pipeline")
+        raise InputError(f"{choice}: no such folder; give that of an inpainting pipeline")

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
+from iibr_core.remedies import FixableError, Remedy
 from iibr_core.runtime.machine import free_memory_bytes
-from iibr_core.types import InputError
 
 FREE_SHARE = 0.5
 PHOTO_BYTES = 90
@@ -36,12 +36,11 @@ def scene_bytes(pixels: int, field_bytes: int) -> int:
 
 
 def require_memory(needed_bytes: float, what: str) -> None:
-    """Raise InputError where `what` takes more than this process may; the message names what makes it less."""
+    """Raise InputError where `what` takes more than this process may."""
     allowed = budget_bytes()
     if needed_bytes > allowed:
-        raise InputError(
-            f"{what} takes {mebibytes(needed_bytes)}, half of the free memory is {mebibytes(allowed)}: lower --grid or"
-            " --max-pixels"
+        raise FixableError(
+            f"{what} takes {mebibytes(needed_bytes)}, half of the free memory is {mebibytes(allowed)}", Remedy.SMALLER
         )
 
 

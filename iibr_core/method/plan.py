@@ -99,7 +99,7 @@ def plan_for_viewing(
     """
     wanted = overrides or PlanOverrides()
     if not abs(wanted.depth_strength) <= MOST_STRENGTH:
-        raise InputError(f"--depth-strength {wanted.depth_strength:g}: give a number up to {MOST_STRENGTH:g}")
+        raise InputError(f"depth strength {wanted.depth_strength:g}: give a number up to {MOST_STRENGTH:g}")
     span = measure_disparity_range(disparity.values)
     given = disparity.values
     disparity = replace(disparity, values=np.clip(given, span.low, span.high))
@@ -166,7 +166,7 @@ def _complete_plan(
 ) -> ScenePlan:
     """Return the plan with everything that follows from grid, scale and zero."""
     if grid.rows < 1 or grid.columns < 1:
-        raise InputError(f"--grid {grid.columns}x{grid.rows}: give at least one view each way, such as 9")
+        raise InputError(f"grid {grid.columns}x{grid.rows}: give at least one view each way, such as 9")
     scale, zero = scale_and_zero
     field = (disparity.values - np.float32(zero)) * np.float32(scale)
     outer = outer_views_of_grid(grid)

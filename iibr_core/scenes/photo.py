@@ -136,7 +136,7 @@ def make_plan(source: Source, loaded: LoadedPhoto, depth_strength: float, keeps_
     """
     if source.is_literal:
         if source.grid is None:
-            raise InputError("--literal counts disparity in px from view to view: say how many with --grid")
+            raise InputError("literal disparity counts in px from view to view: give the grid of views")
         return plan_literal(loaded.photo, loaded.disparity, source.grid, keeps_views, source.inpaint)
     zero = source.focus_disparity
     if loaded.depth_settings.edits != UNEDITED:
@@ -176,9 +176,7 @@ def _pixels_to_read(source: Source) -> tuple[int, ImageSize]:
     """Return the largest number of pixels to read, and the stored size. Raises InputError for files of views."""
     path = Path(source.path)
     if is_view_file(path):
-        raise InputError(
-            f"{path}: holds the views of a light field, not a photo; `iibr view`, export and depth read it"
-        )
+        raise InputError(f"{path}: holds the views of a light field, not a photo; open it as a light field")
     return source.max_pixels or DEFAULT_MAX_PIXELS, photo_size(path)
 
 

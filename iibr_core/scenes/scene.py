@@ -130,12 +130,6 @@ class Scene:
         """Return the size of a view on the screen."""
         return ScreenSize(self.width, self.height)
 
-    @property
-    def further_notes(self) -> tuple[str, ...]:
-        """Return the notes without the panel's line about depth."""
-        line = self.depth_origin.advising_line if self.depth_origin is not None else ""
-        return tuple(note for note in self.notes if note != line)
-
 
 @dataclass(frozen=True)
 class Progress:

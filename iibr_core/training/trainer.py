@@ -128,7 +128,7 @@ def choose_device(name: str) -> torch.device:
     try:
         return torch.empty(0, device=name).device
     except (RuntimeError, AssertionError) as error:
-        raise InputError(f"--device {name}: no such device here; choose auto or cpu") from error
+        raise InputError(f"device {name}: this machine has none; choose auto or cpu") from error
 
 
 class TrainingRun:
@@ -151,7 +151,7 @@ class TrainingRun:
         norm = nn.utils.get_total_norm(p.grad for p in self.model.parameters() if p.grad is not None)
         total, color, entropy, epi, gradient_norm = torch.stack([*losses, norm]).tolist()
         if not isfinite(total + gradient_norm):
-            raise InputError(f"the loss is not finite at step {self.step + 1}; lower --learning-rate and start again")
+            raise InputError(f"the loss is not finite at step {self.step + 1}; lower the learning rate and start again")
         for group in self.optimizer.param_groups:
             group["lr"] = rate
         self.optimizer.step()

@@ -18,6 +18,7 @@ from viewer.app.job_queue import JobQueue
 from viewer.model import messages
 from viewer.model.action import do
 from viewer.model.actions import Action
+from viewer.model.remedies import words_of
 from viewer.model.saving import written_path
 from viewer.model.state.app_state import AppState
 from viewer.model.state.exporting import ExportPrompt, ExportTask
@@ -44,7 +45,7 @@ def add_export(task: ExportTask, state: AppState, inputs: Sequence[Path], jobs: 
     except AlreadyThereError:
         return [do(messages.show_prompt, replace(prompt, already_there=True))]
     except InputError as error:
-        return [do(messages.show_prompt, replace(prompt, problem=str(error)))]
+        return [do(messages.show_prompt, replace(prompt, problem=words_of(error)))]
     work = partial(_export, kind, path, task.options)
     pictures = partial(optics_of, kind, task.options)
     jobs.add(Job("export", path, state, lambda scene, optics: "views", work, pictures))

@@ -31,6 +31,7 @@ from viewer.model.action import do
 from viewer.model.actions import Action, OpenFailed, OpenPath, ProgressMade, SceneOpened
 from viewer.model.reducers.depth_editing_reducer import depth_settings_for_worker, is_depth_ahead
 from viewer.model.reducers.folder_reducer import AHEAD, SKETCHED_AHEAD, photos_ahead
+from viewer.model.remedies import words_of
 from viewer.model.state.app_state import AppState
 from viewer.model.state.depth_editing import DropStroke
 from viewer.model.state.notices import Notice
@@ -159,7 +160,7 @@ class SceneLoader:
             return self._take_views(result, state)
         except InputError as error:  # no room on the graphics card: there is no use in more views
             self._worker.cancel()
-            return [OpenFailed(result.generation, str(error))]
+            return [OpenFailed(result.generation, words_of(error))]
 
     def _take_views(self, result: SceneReady | ViewReady, state: AppState) -> list[Action]:
         if result.generation < self._scene_view.generation:

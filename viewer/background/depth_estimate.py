@@ -14,9 +14,10 @@ from viewer.model import messages
 from viewer.model.action import do
 from viewer.model.actions import Action, SamePlaces
 from viewer.model.reducers.depth_models import wanted_model
+from viewer.model.remedies import DEPTH_COMMANDS
 from viewer.model.state.app_state import AppState
 from viewer.model.state.model_download import DepthEstimated, GiveUpEstimate
-from viewer.model.window_words import notice_in_window
+from viewer.model.state.notices import Notice
 
 COMPARED = 200
 """So many rows and columns of two maps are compared, at most."""
@@ -95,7 +96,7 @@ class DepthFinder(JobThread[EstimateRequest, EstimateResult]):
 
     def _fail(self, message: str) -> list[Action]:
         self._asked = None
-        return [GiveUpEstimate(), do(messages.notify, notice_in_window(message, is_error=True))]
+        return [GiveUpEstimate(), do(messages.notify, Notice(message, is_error=True, commands=DEPTH_COMMANDS))]
 
 
 def _results_of(job: Job[EstimateRequest, EstimateResult]) -> Iterator[EstimateResult]:

@@ -17,6 +17,7 @@ from iibr_core.runtime.machine import give_back_memory
 from iibr_core.runtime.work import stoppable
 from iibr_core.scenes.scene import Progress
 from iibr_core.types import InputError
+from viewer.model.remedies import words_of
 
 QUEUED_RESULTS = 8
 """Results that may wait for the window: enough to keep a thread busy, few enough to cost no memory."""
@@ -168,5 +169,5 @@ class JobThread(Generic[Request, Result]):
 
 def message_of(error: Exception) -> str:
     """One line for people: an input error speaks for itself, any other says what kind it is."""
-    text = " ".join(str(error).split())
+    text = " ".join(words_of(error).split())
     return text if isinstance(error, InputError) else f"{type(error).__name__}: {text or 'no message'}"

@@ -14,6 +14,7 @@ from typing import Generic, TypeVar
 
 from iibr_core.runtime.work import Cancelled, stoppable
 from iibr_core.types import InputError
+from viewer.model.remedies import words_of
 
 MAX_WAITING_RESULTS = 8
 """Number of results that may wait for the window: enough to keep a thread busy, few enough to need little memory."""
@@ -106,5 +107,5 @@ class Newest(Generic[Request, Result]):
 
 def message_of(error: Exception) -> str:
     """Return an error as one line for people: an input error as it is, any other with its kind."""
-    text = " ".join(str(error).split())
+    text = " ".join(words_of(error).split())
     return text if isinstance(error, InputError) else f"{type(error).__name__}: {text or 'no message'}"

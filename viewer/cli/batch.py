@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from iibr_core.depth.choice import BETTER_WAYS
 from iibr_core.exports.kinds import EXPORTS
 from iibr_core.runtime.extras import require_extra
 from iibr_core.types import InputError
 from viewer.cli.export_options import KindOptions, To, require_kind
 from viewer.cli.lens_options import Aperture, Focus, GlossFile
 from viewer.cli.option_records import with_option_records
+from viewer.cli.remedies import BETTER_DEPTH
 from viewer.cli.scene_options import PhotoOptions
 from viewer.cli.shared_options import Force, Grid, Literal, require_model
 from viewer.cli.terminal import show_progress
@@ -87,7 +87,7 @@ def batch(
         count = run_batch(photos, settings, output, folders, workers=workers, dask=dask, force=force)
     print(f"{output}: {count.written} written, {count.there_before} there before, {count.failed} failed")
     if count.guessed:
-        print(f"{count.guessed} of {count.written} written have guessed depth. {BETTER_WAYS}")
+        print(f"{count.guessed} of {count.written} written have guessed depth. {BETTER_DEPTH}")
     if count.failed:
         raise InputError(f"{output / FAILURES}: lists what failed, and why")
 

@@ -68,7 +68,7 @@ def inpainter_from_text(text: str) -> str:
     try:
         require_inpainter(text)
     except InputError as error:
-        raise typer.BadParameter(f"{text!r}: {str(error).removeprefix(f'--inpaint {text}: ')}") from None
+        raise typer.BadParameter(f"{text!r}: {str(error).removeprefix(f'{text}: ')}") from None
     return text
 
 

@@ -18,6 +18,7 @@ from iibr_core.depth.choice import DepthOrigin
 from iibr_core.runtime.compiling import watch_compiling
 from iibr_core.runtime.time_left import TimeLeft, about_left
 from iibr_core.runtime.work import watched
+from viewer.cli.remedies import BETTER_DEPTH
 
 FORMER_NAMES = {"--out": "--output"}
 """Former names of options, which are still understood."""
@@ -87,9 +88,9 @@ def print_notes(notes: tuple[str, ...]) -> None:
 
 
 def print_depth(origin: DepthOrigin | None) -> None:
-    """One line about where depth comes from; none for light fields, and where the notes say it with advice."""
-    if origin is not None and not origin.advice:
-        print_notes((origin.line,))
+    """Print where depth comes from, with advice if it is poor; nothing for light fields."""
+    if origin is not None:
+        print_notes((f"{origin.line} {BETTER_DEPTH}" if origin.is_poor else origin.line,))
 
 
 @contextmanager

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.color import encoded_from_stored, linear_from_srgb
+from iibr_core.remedies import FixableError, Remedy
 from iibr_core.types import (
     SRGB,
     FloatImage,
@@ -205,9 +206,11 @@ def check_fits(ctx: moderngl.Context, grid: GridShape, width: int, height: int) 
             f"{max_layers}: use at most {fits}x{fits} views"
         )
     if max(width, height) > max_size:
-        raise InputError(
-            f"views of {width}x{height} px exceed this graphics driver's limit of {max_size} px: give --max-pixels "
-            f"{width * height * max_size**2 // max(width, height) ** 2}"
+        largest = width * height * max_size**2 // max(width, height) ** 2
+        raise FixableError(
+            f"views of {width}x{height} px exceed this graphics driver's limit of {max_size} px; the largest photo has"
+            f" {largest} pixels",
+            Remedy.SMALLER,
         )
 
 
@@ -217,10 +220,10 @@ def _allocate(ctx: moderngl.Context, size: tuple[int, int, int], components: int
         texture = ctx.texture_array(size, components, dtype=dtype)
         problem = ctx.error
     except moderngl.Error as error:
-        raise InputError(_no_memory(size, components, dtype, str(error))) from error
+        raise FixableError(_no_memory(size, components, dtype, str(error)), Remedy.SMALLER) from error
     if problem != "GL_NO_ERROR":
         texture.release()
-        raise InputError(_no_memory(size, components, dtype, problem))
+        raise FixableError(_no_memory(size, components, dtype, problem), Remedy.SMALLER)
     texture.repeat_x = texture.repeat_y = False
     return texture
 
@@ -229,7 +232,7 @@ def _no_memory(size: tuple[int, int, int], components: int, dtype: str, problem:
     width, height, layers = size
     mebibytes = width * height * layers * components * (2 if dtype == "f2" else 1) // 2**20
     size_text = f"{layers} views of {width}x{height} ({mebibytes} MiB, {problem})"
-    return f"no room for {size_text}: use a smaller --grid or --max-pixels"
+    return f"no room for {size_text}"
 
 
 def _root_of_linear(colors: StoredColors, hdr: bool) -> StoredColors:

@@ -30,4 +30,4 @@ def read_gloss(path: Path) -> Gloss:
         return msgspec.convert(whole, Gloss)
     except (ValueError, RecursionError) as error:
         reason = " ".join(str(error).replace("- at `$.", "at `").split())[:120]
-        raise InputError(f"{path}: is no gloss ({reason}); see `iibr generate --help`") from error
+        raise InputError(f"{path}: is no gloss ({reason}); correct it") from error

@@ -7,14 +7,12 @@ from dataclasses import replace
 from viewer.model.state.app_state import AppState
 from viewer.model.state.notices import Notice
 from viewer.model.state.prompts import Prompt
-from viewer.model.window_words import words_in_window
 
 MAX_NOTICES = 5
 
 
 def notify(state: AppState, notice: Notice) -> AppState:
     """Show a notice last, in place of the same one; the oldest goes. An error keeps the window open."""
-    notice = replace(notice, text=words_in_window(notice.text))
     others = tuple(other for other in state.notices if other != notice)
     quits = state.quits_when_done and not notice.is_error
     return replace(state, notices=(*others, notice)[-MAX_NOTICES:], quits_when_done=quits)

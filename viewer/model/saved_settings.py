@@ -140,7 +140,7 @@ def require_saved_size(saved: SavedSettings, path: Path) -> None:
     width, height = saved.size_px
     if max(width, height) > MOST_SIDE_PX or width * height > MOST_PIXELS:
         raise InputError(
-            f"{path}: its settings ask for a picture of {width}x{height} px; give a smaller one with --size"
+            f"{path}: its settings ask for a picture of {width}x{height} px, which is too large; give a smaller size"
         )
 
 

@@ -20,6 +20,7 @@ from iibr_core.depth.models.known import KNOWN_MODELS, USUAL_MODEL, KnownModel, 
 from iibr_core.depth.models.preparation import CONFIG, PREPROCESSOR, read_object
 from iibr_core.formats.files import entries_of, is_file, is_folder
 from iibr_core.formats.outputs import write_folder
+from iibr_core.remedies import FixableError, Remedy
 from iibr_core.runtime.work import report_progress
 from iibr_core.types import InputError, Photo
 
@@ -78,7 +79,7 @@ def model_to_use(choice: DepthChoice) -> LocalModel | None:
     usual = known_model(USUAL_MODEL)
     found = None if usual.needs else model_here(usual)
     if found is None and choice.asks_for_model:
-        raise InputError(f"--depth model: none is on this machine; get one with: iibr models get {USUAL_MODEL}")
+        raise FixableError(f"the depth model {USUAL_MODEL} is not on this machine", Remedy.DEPTH)
     return found
 
 
@@ -119,7 +120,7 @@ def register(path: Path) -> LocalModel:
     """
     model = _wanted_model(str(path))
     if model.runner != "onnx":
-        raise InputError(f"{path}: only ONNX files are copied; use this folder as it is with --depth-model {path}")
+        raise InputError(f"{path}: only ONNX files are copied; use this folder itself as the depth model")
     file = model.weights[0].resolve()
     onnx.picture_input(onnx.open_session(file), file)
     # Those from the Hugging Face hub are named after their folders.
@@ -148,7 +149,7 @@ def _wanted_model(wanted: str) -> LocalModel:
     elif path.suffix.lower() == ".onnx" and is_file(path):
         found = _onnx_model(path, f"the model {path.name}")
     elif is_file(path):
-        raise InputError(f"{path}: is not an ONNX file; --depth-model takes one, a folder, or a name of `iibr models`")
+        raise InputError(f"{path}: is not an ONNX file; give one, a model folder, or the name of a known model")
     elif "/" in wanted or "\\" in wanted or path.suffix.lower() == ".onnx":
         raise InputError(f"{wanted}: no such file or folder")
     elif wanted in (copied := list_own_models()):
@@ -164,7 +165,7 @@ def _known_model_here(known: KnownModel) -> LocalModel:
     _require_package(known.runner, known.title)
     found = model_here(known)
     if found is None:
-        raise InputError(f"{known.name} is not on this machine; get it with: iibr models get {known.name}")
+        raise FixableError(f"the depth model {known.name} is not on this machine", Remedy.DEPTH)
     return found
 
 
@@ -182,7 +183,7 @@ def _model_in(folder: Path) -> LocalModel:
         full = [file for file in files if file.name == "model.onnx"]
         if 1 not in (len(files), len(full)):
             names = ", ".join(file.name for file in files[:3])
-            raise InputError(f"{folder}: which ONNX file is meant ({names})? Use --depth-model {folder}/FILE.onnx")
+            raise InputError(f"{folder}: holds several ONNX files ({names}); give one of them")
         return _onnx_model((full or files)[0], title)
     if not config:
         raise InputError(f"{folder}: holds no {CONFIG}; get the whole model folder")

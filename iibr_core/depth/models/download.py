@@ -51,7 +51,7 @@ def download(model: KnownModel) -> None:
     except Exception as error:  # whatever the library's clients raise: they change with its versions
         raise InputError(
             f"{model.repository} cannot be downloaded ({reason_of(error)[:120]}); what has come is kept: check the"
-            " network and try again, name a mirror with HF_ENDPOINT, or use a file with --depth-model FILE.onnx"
+            " network and try again, name a mirror in HF_ENDPOINT, or use an ONNX file of your own"
         ) from error
 
 

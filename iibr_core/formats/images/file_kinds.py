@@ -41,7 +41,7 @@ KINDS: tuple[tuple[bytes, FileKind], ...] = (
         FileKind("a web page, not a picture", "download the picture itself"),
     ),
     (rb"gimp xcf", FileKind("a GIMP image (XCF)", "export it as PNG")),
-    (rb"\x93NUMPY", FileKind("an array of numbers (NumPy)", "give it as a map with --disparity")),
+    (rb"\x93NUMPY", FileKind("an array of numbers (NumPy)", "give it as a depth map")),
     (rb"ply\r?\n|glTF", FileKind("a 3D model", "save a view of it as PNG")),
     (rb"version https://git-lfs", FileKind("a pointer of Git LFS", "get the file itself with `git lfs pull`")),
     (rb"PK\x03\x04|\x1f\x8b|7z\xbc\xaf\x27\x1c|Rar!|\xfd7zXZ|BZh|\x28\xb5\x2f\xfd", ARCHIVE),

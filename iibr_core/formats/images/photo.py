@@ -62,7 +62,7 @@ def read_picture(
 ) -> Photo:
     """Read any picture of a file, as `read_photo` does."""
     if max_pixels < 1:
-        raise InputError(f"--max-pixels {max_pixels}: must be 1 or more")
+        raise InputError(f"limit of {max_pixels} pixels: give 1 or more")
     require_file(source.path)
     stored_size = source_size(source)
     size = size_within(stored_size, max_pixels)
@@ -84,7 +84,7 @@ def read_picture(
     if picture.alpha is not None:
         notes += ("Transparency was dropped: the photo is laid over black.",)
     if is_smaller:
-        notes += (f"{MADE_SMALLER}, from {stored_size} to {size} (--max-pixels {max_pixels}).",)
+        notes += (f"{MADE_SMALLER}, from {stored_size} to {size} (max pixels: {max_pixels}).",)
     pixels = upright(encoded, picture.orientation)
     focal_px = focal_px_from_fov(pixels.shape[1], fov_deg)
     if picture.focal_px > 0:

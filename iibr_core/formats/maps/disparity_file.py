@@ -54,7 +54,7 @@ def has_shape_of(first: ImageSize, second: ImageSize) -> bool:
 def require_scale(scale: float | None) -> float:
     """Return the scale, 1 for None. Raises InputError for 0, NaN and infinity."""
     if scale is not None and (not math.isfinite(scale) or scale == 0):
-        raise InputError(f"--disparity-scale {scale}: must be a number other than 0")
+        raise InputError(f"disparity scale {scale}: must be a number other than 0")
     return 1.0 if scale is None else scale
 
 
@@ -69,7 +69,7 @@ def scaled_disparity(path: Path, values: FloatImage, scale: float) -> tuple[Floa
     count = int((is_absurd & np.isfinite(scaled)).sum())
     known = np.where(is_absurd, np.nan, scaled).astype(np.float32)
     if np.isnan(known).all() and count:
-        raise InputError(f"{path}: every value exceeds {limit_px:g} px per view step; give a smaller --disparity-scale")
+        raise InputError(f"{path}: every value exceeds {limit_px:g} px per view step; give a smaller disparity scale")
     if np.isnan(known).all():
         raise InputError(f"{path}: no value is known (all are NaN, infinite, 0 or masked); give another map")
     note = f"{count} values of {path.name} beyond {limit_px:g} px per view step count as unknown."

@@ -95,4 +95,4 @@ def test_a_hub_without_the_model_is_one_line(hub: Hub, tmp_path: Path) -> None:
     error = error_of(hub, tmp_path)
     assert error.startswith(f"iibr: {MODEL.repository} cannot be downloaded (404")
     assert "HF_ENDPOINT" in error
-    assert "--depth-model FILE.onnx" in error
+    assert "an ONNX file of your own" in error

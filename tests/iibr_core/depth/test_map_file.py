@@ -87,7 +87,7 @@ def test_float_maps_are_disparity_and_warn_where_they_look_swapped(tmp_path: Pat
     np.save(tmp_path / "map.npy", near * -4)
     found = opened(tmp_path, "map.npy")
     assert found.disparity.values[DISC] < found.disparity.values[WALL]
-    assert any("swapped" in note and "--invert-depth" in note for note in found.disparity.notes)
+    assert any("swapped" in note and "invert the depth" in note for note in found.disparity.notes)
 
 
 @pytest.mark.parametrize("name", ["photo_depth.npy", "map.tif"])
@@ -148,7 +148,7 @@ def test_maps_drawn_in_colours_are_read_back(tmp_path: Path, scale: str) -> None
 
 def test_a_squashed_map_is_refused_with_the_way_out(tmp_path: Path) -> None:
     integers(scene()[1], np.uint8).resize((112, 112)).save(tmp_path / "map.png")
-    with pytest.raises(InputError, match=r"112x112 .* 240x160; add --stretch"):
+    with pytest.raises(InputError, match=r"112x112 .* 240x160; crop or rotate it"):
         opened(tmp_path, "map.png")
     found = opened(tmp_path, "map.png", stretches=True)
     assert_true_to_scene(found)

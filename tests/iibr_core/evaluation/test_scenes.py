@@ -130,7 +130,7 @@ def test_a_true_map_comes_alone_and_another_one_also_fitted(tmp_path: Path) -> N
     assert mine.judge.source == "gt_disp_u01_v01.npy"
     assert np.abs(mine.maps["given map, fitted"].values - disparity_of_square()).max() < 0.2
     (folder / "gt_disp_u01_v01.npy").unlink()
-    with pytest.raises(InputError, match="--disparity estimate"):
+    with pytest.raises(InputError, match="has no disparity map beside it"):
         trial_input(trials_of(scene_of(folder), "given")[0], "given", UNREFINED, 10**6)
 
 

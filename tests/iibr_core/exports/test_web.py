@@ -63,7 +63,7 @@ def test_a_budget_takes_quality_then_views_then_size(opened) -> None:
 
 
 def test_a_budget_that_holds_no_page_is_refused(opened) -> None:
-    with pytest.raises(InputError, match="--budget"):
+    with pytest.raises(InputError, match="budget"):
         page_of(opened, budget=10_000)
 
 

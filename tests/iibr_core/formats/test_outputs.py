@@ -40,9 +40,9 @@ def test_nothing_is_written_into_a_folder_that_is_read(photo: Path, tmp_path: Pa
 
 
 def test_what_exists_is_replaced_only_where_that_is_allowed(photo: Path, tmp_path: Path) -> None:
-    with pytest.raises(AlreadyThereError, match="--force"):
+    with pytest.raises(AlreadyThereError, match="already exists"):
         check_output(photo)
-    with pytest.raises(AlreadyThereError, match="--force"):
+    with pytest.raises(AlreadyThereError, match="already exists"):
         check_output_folder(photo.parent)
     check_output(photo, may_replace=True)
     check_output_folder(photo.parent, may_replace=True, own_files=r"photo\.png")

@@ -198,7 +198,7 @@ def test_files_that_are_no_pictures_are_refused_in_one_line(tmp_path):
             read_photo(path)
         assert str(path) in str(caught.value)
         assert "\n" not in str(caught.value)
-    with pytest.raises(InputError, match="--max-pixels 0"):
+    with pytest.raises(InputError, match="limit of 0 pixels"):
         read_photo(tmp_path / "a.png", max_pixels=0)
 
 

@@ -142,7 +142,7 @@ def test_estimates_that_say_nothing_or_the_opposite_change_nothing():
 def test_errors_are_one_line_that_names_the_folder(folder, tmp_path):
     with pytest.raises(InputError, match="no such folder"):
         load_inpainter(f"diffusion:{tmp_path / 'none'}")
-    with pytest.raises(InputError, match=r"--inpaint diffusion: .*diffusion:FOLDER"):
+    with pytest.raises(InputError, match=r"diffusion: .*diffusion:FOLDER"):
         load_inpainter("diffusion")
     (tmp_path / "empty").mkdir()
     other = tmp_path / "other"

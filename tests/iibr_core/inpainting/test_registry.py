@@ -26,14 +26,14 @@ def view_with_holes():
 
 
 def test_an_unknown_name_is_one_line_that_names_those_there_are():
-    with pytest.raises(InputError, match=f"--inpaint magic: .*{DEFAULT_INPAINTER}"):
+    with pytest.raises(InputError, match=f"magic: .*{DEFAULT_INPAINTER}"):
         load_inpainter("magic")
 
 
 @pytest.mark.parametrize("name", MODEL_INPAINTERS)
 def test_a_name_that_needs_a_folder_asks_for_it_and_others_want_none(name):
     for typed in (name, f"{name}:", f"{DEFAULT_INPAINTER}:folder"):
-        with pytest.raises(InputError, match=f"--inpaint {typed}: .*{name}:FOLDER"):
+        with pytest.raises(InputError, match=f"{typed}: .*{name}:FOLDER"):
             load_inpainter(typed)
 
 

@@ -89,7 +89,7 @@ def test_the_inpainter_of_that_name_fills_all_that_is_inpainted(monkeypatch):
 
 def test_an_unknown_inpainter_is_refused():
     photo, disparity = square_before_wall()
-    with pytest.raises(InputError, match="--inpaint magic"):
+    with pytest.raises(InputError, match="magic: unknown inpainter"):
         views_of(photo, disparity, 3, inpaint="magic")
 
 

@@ -99,17 +99,17 @@ def test_less_memory_gives_fewer_views(monkeypatch):
     monkeypatch.setattr(memory, "free_memory_bytes", lambda: 2 * needed - 2)
     assert plan_for_viewing(photo, disparity).grid.columns < roomy.grid.columns
     monkeypatch.setattr(memory, "free_memory_bytes", lambda: 2000)
-    with pytest.raises(InputError, match=r"takes \d+ MiB, half of the free memory is 1 MiB: lower --grid or --max-pix"):
+    with pytest.raises(InputError, match=r"takes \d+ MiB, half of the free memory is 1 MiB"):
         plan_for_viewing(photo, disparity)
 
 
 def test_a_grid_of_no_views_is_refused_in_one_line():
-    with pytest.raises(InputError, match="--grid 3x0") as error:
+    with pytest.raises(InputError, match="grid 3x0") as error:
         plan_literal(*square_before_wall(), GridShape(0, 3))
     assert "\n" not in str(error.value)
 
 
 @pytest.mark.parametrize("strength", [float("nan"), float("inf")])
 def test_depth_strength_must_be_finite(strength):
-    with pytest.raises(InputError, match="depth-strength"):
+    with pytest.raises(InputError, match="depth strength"):
         plan_for_viewing(*square_before_wall(), PlanOverrides(depth_strength=strength))

@@ -164,7 +164,7 @@ def test_a_loss_that_is_not_finite_stops_and_keeps_the_last_good_checkpoint(out,
             getattr(batch, field)[3] = value
         return batch
 
-    with pytest.raises(InputError, match="the loss is not finite at step 8; lower --learning-rate"):
+    with pytest.raises(InputError, match="the loss is not finite at step 8; lower the learning rate"):
         train(Scorer(), spoilt, CONFIG, out)
     assert not out.exists()
     run = TrainingRun(Scorer(), CONFIG)
@@ -211,7 +211,7 @@ def test_devices():
     assert choose_device("cpu").type == "cpu"
     assert choose_device("auto").type in ("cuda", "mps", "cpu")
     for name in ("gpu", "cuda:99", ""):
-        with pytest.raises(InputError, match=f"--device {name}: no such device here; choose auto or cpu"):
+        with pytest.raises(InputError, match=f"device {name}: this machine has none; choose auto or cpu"):
             choose_device(name)
 
 

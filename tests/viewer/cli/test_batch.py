@@ -18,9 +18,9 @@ import psutil
 import pytest
 from PIL import Image
 
-from iibr_core.depth.choice import BETTER_WAYS
 from iibr_core.types import InputError
 from viewer.cli.main import app
+from viewer.cli.remedies import BETTER_DEPTH
 
 needs_process_groups = pytest.mark.skipif(os.name != "posix", reason="process groups")
 
@@ -72,7 +72,7 @@ def test_an_archive_is_exported_once(archive: Path) -> None:
         path.unlink()
     (archive / "torn.png").write_bytes((archive / "00.png").read_bytes()[:200])
     done = run_batch(archive, "--workers", 2, to="depth")
-    guesses = f"3 of 3 written have guessed depth. {BETTER_WAYS}"
+    guesses = f"3 of 3 written have guessed depth. {BETTER_DEPTH}"
     assert done.stdout.splitlines() == [f"{out}: 3 written, 0 there before, 1 failed", guesses]
     assert done.returncode == 2
     assert done.stderr.splitlines()[-1] == f"iibr: {out / 'failures.csv'}: lists what failed, and why"

@@ -124,7 +124,7 @@ def test_too_large_views_say_the_limit(gl: GLContext) -> None:
 
 def test_no_memory_is_an_error_in_words(gl: GLContext) -> None:
     """GL itself only sets a flag; this field is far larger than software GL accepts."""
-    with pytest.raises(InputError, match=r"no room for 1936 views of 16384x16384 .*smaller --grid"):
+    with pytest.raises(InputError, match=r"no room for 1936 views of 16384x16384 "):
         LightFieldTexture(gl.ctx, GridShape(44, 44), 16384, 16384, hdr=True, with_disparity=False)
     assert gl.ctx.error == "GL_NO_ERROR"
 
@@ -140,8 +140,8 @@ def test_foreign_views_are_refused(gl: GLContext, row: int, shape: tuple[int, ..
 @pytest.mark.parametrize("size", [(20_000, 2), (2, 20_000), (40_000, 30)])
 def test_views_longer_than_the_driver_allows_are_told_the_size_that_fits(gl: GLContext, size: tuple[int, int]) -> None:
     width, height = (side * gl.max_texture_size // 16_384 for side in size)
-    with pytest.raises(InputError, match=r"give --max-pixels \d+$") as error:
+    with pytest.raises(InputError, match=r"the largest photo has \d+ pixels$") as error:
         check_fits(gl.ctx, GridShape(3, 3), width, height)
-    fitting = size_within(ImageSize(height, width), int(str(error.value).split()[-1]))
+    fitting = size_within(ImageSize(height, width), int(str(error.value).split()[-2]))
     check_fits(gl.ctx, GridShape(3, 3), fitting.width, fitting.height)
     assert max(fitting) > 0.9 * gl.max_texture_size

@@ -16,6 +16,7 @@ from iibr_core.beyond.optics import (
     ApertureShape,
     Optics,
 )
+from iibr_core.depth.choice import DepthOrigin
 from iibr_core.depth.editing.edits import UNEDITED
 from iibr_core.method.plan import ScenePlan
 from iibr_core.scenes.lens_limits import (
@@ -48,6 +49,7 @@ from viewer.model.lens.presets import PRESETS
 from viewer.model.messages import MAX_NOTICES
 from viewer.model.reducers.lens_reducer import carry_optics
 from viewer.model.reducers.root import reduce
+from viewer.model.remedies import DEPTH_COMMANDS
 from viewer.model.state.app_state import AppState, Hover, Picture
 from viewer.model.state.depth_editing import SetTone
 from viewer.model.state.jobs import JobProgress
@@ -430,14 +432,14 @@ def test_opening_shows_what_is_read_and_keeps_the_old_scene_until_then() -> None
     assert "other.png" in after.progress.doing
 
 
-def test_a_new_scene_starts_with_fresh_optics_and_tells_only_what_failed_and_what_a_button_helps_with() -> None:
+def test_a_new_scene_starts_with_fresh_optics_and_names_only_what_failed() -> None:
     state = reduce(reduce(state_with(scene_of()), SetAperture(2)), OpenPath(Source("other.png")))
-    notes = ("Made smaller.", "A map is damaged.", "No depth. Give a map with --disparity FILE, or put one beside.")
-    scene = scene_of(source=state.source, notes=notes, problems=notes[1:2])
+    notes = ("Made smaller.", "A map is damaged.")
+    origin = DepthOrigin("rough", "rough, guessed without a model")
+    scene = scene_of(source=state.source, notes=notes, problems=notes[1:], depth_origin=origin)
     state = reduce(state, SceneOpened(state.generation, scene))
     assert state.optics == Optics()
-    assert [notice.text[:8] for notice in state.notices] == ["A map is", "No depth"]
-    assert scene.further_notes == notes, "the rest stands in its section"
+    assert state.notices == (Notice("A map is damaged.", commands=DEPTH_COMMANDS),)
 
 
 def test_the_same_file_opened_again_is_a_new_scene() -> None:

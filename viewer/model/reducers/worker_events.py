@@ -15,6 +15,7 @@ from viewer.model.messages import MAX_NOTICES, notify
 from viewer.model.reducers.folder_reducer import is_stepped_to
 from viewer.model.reducers.history_reducer import map_optics
 from viewer.model.reducers.lens_reducer import carry_optics, carry_to_depth, with_focus_of
+from viewer.model.remedies import DEPTH_COMMANDS
 from viewer.model.state.app_state import AppState
 from viewer.model.state.folder import ListFolderTask
 from viewer.model.state.history import History
@@ -23,7 +24,6 @@ from viewer.model.state.model_download import ListModelsTask
 from viewer.model.state.motion import Motion
 from viewer.model.state.notices import Notice
 from viewer.model.state.photo_facts import ReadFactsTask
-from viewer.model.window_words import notice_in_window
 
 RECENT_KEPT = 8
 
@@ -40,7 +40,9 @@ def reduce_worker_event(state: AppState, news: WorkerEvent) -> AppState:
             shown = state.progress if state.stopped == state.generation else progress
             return replace(state, progress=shown, views_there=there)
         case OpenFailed(_, message):
-            return _fail_to_open(notify(state, notice_in_window(message, is_error=True)))
+            asks_for_model = state.source is not None and state.source.depth.asks_for_model
+            commands = DEPTH_COMMANDS if asks_for_model else ()
+            return _fail_to_open(notify(state, Notice(message, is_error=True, commands=commands)))
 
 
 def stop_work(state: AppState) -> AppState:
@@ -82,7 +84,7 @@ def _open_scene(state: AppState, scene: Scene, same_places: SamePlaces | None) -
         history=map_optics(state.history, carried),
         inspection=replace(state.inspection, pair=None, probe=None),
     )
-    notices = (*_told(scene), *_offers(scene))[-MAX_NOTICES:]
+    notices = (*_problems(scene), *_offers(scene))[-MAX_NOTICES:]
     if old is not None and old.source is scene.source:
         is_whole_now = old.is_sketch and not scene.is_sketch
         opened = _with_left_focus(opened) if same_places is not None else opened
@@ -150,10 +152,10 @@ def remember_recent(recent: tuple[str, ...], path: str) -> tuple[str, ...]:
     return (path, *(other for other in recent if other != path))[:RECENT_KEPT]
 
 
-def _told(scene: Scene) -> tuple[Notice, ...]:
-    """What failed, and what a button helps with; the other notes stand in the panel's section for the scene."""
-    notices = ((note, notice_in_window(note)) for note in scene.further_notes)
-    return tuple(notice for note, notice in notices if note in scene.problems or notice.commands)
+def _problems(scene: Scene) -> tuple[Notice, ...]:
+    """Return a notice for each source of depth that failed, with buttons that give better depth if it is poor."""
+    is_poor = scene.depth_origin is not None and scene.depth_origin.is_poor
+    return tuple(Notice(problem, commands=DEPTH_COMMANDS if is_poor else ()) for problem in scene.problems)
 
 
 def _offers(scene: Scene) -> tuple[Notice, ...]:

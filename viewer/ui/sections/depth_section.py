@@ -14,13 +14,13 @@ from viewer.model.action import ask, do
 from viewer.model.actions import Action, OpenPath
 from viewer.model.commands import BRUSH_WORDS
 from viewer.model.layout import Layout
+from viewer.model.remedies import BETTER_DEPTH
 from viewer.model.state.app_state import AppState
 from viewer.model.state.depth_editing import Brush, ResetDepth, SetBrush, SetRefine, SetTone
 from viewer.model.state.inspection import SetOverlay
 from viewer.model.state.model_download import DepthModels, ModelsPrompt, UseModel
 from viewer.model.state.preferences import SetPreference
 from viewer.model.state.tasks import ChooseTask
-from viewer.model.window_words import words_in_window
 from viewer.ui.sections.depth_histogram import depth_histogram
 from viewer.ui.widgets import (
     button,
@@ -79,7 +79,7 @@ def depth_line(scene: Scene, layout: Layout) -> None:
     origin = scene.depth_origin
     quiet(origin.line if origin is not None else f"Depth: {scene.depth_source}.")
     if origin is not None:
-        tooltip("\n".join(map(words_in_window, (*origin.failures, origin.advice))).strip(), layout)
+        tooltip("\n".join((*origin.failures, BETTER_DEPTH) if origin.is_poor else origin.failures), layout)
 
 
 def depth_section(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
@@ -101,11 +101,11 @@ def depth_section(state: AppState, scene: Scene, layout: Layout) -> list[Action]
 def _origin(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
     """Which source of depth is asked for, with the models that are here; advice where it is poor."""
     origin = scene.depth_origin
-    if origin is not None and origin.advice:
-        quiet(words_in_window(origin.advice))
+    if origin is not None and origin.is_poor:
+        quiet(BETTER_DEPTH)
     for failure in origin.failures if origin is not None else ():
         imgui.bullet()
-        quiet(words_in_window(failure))
+        quiet(failure)
     if origin is not None and origin.near:
         end = origin.near if not state.depth.edits.is_inverted else "the other end"
         quiet(f"Near in the map: {end}.")

@@ -12,7 +12,6 @@ from viewer.model.dense_grid import chosen_grid, denser_grids, with_views_betwee
 from viewer.model.layout import Layout
 from viewer.model.state.app_state import AppState
 from viewer.model.state.filling import FillTask
-from viewer.model.window_words import words_in_window
 from viewer.ui.widgets import combo, gap, label, quiet
 
 BETWEEN_TIP = (
@@ -32,8 +31,8 @@ def scene_section(state: AppState, scene: Scene, layout: Layout) -> list[Action]
     gap(layout, 2)
     for reason in scene.plan.reasons if scene.plan else (_of_light_field(scene),):
         quiet(reason)
-    for note in scene.further_notes:
-        quiet(words_in_window(note))
+    for note in scene.notes:
+        quiet(note)
     if scene.given_grid is not None and denser_grids(scene.given_grid):
         return _views_between(scene, chosen_grid(scene, state.source, state.jobs), scene.given_grid, layout)
     return []

@@ -1,0 +1,33 @@
+"""Remedies of bad input, by name: the command line and the window each have their own words for them."""
+
+from __future__ import annotations
+
+from enum import Enum, auto
+
+from iibr_core.types import InputError
+
+
+class Remedy(Enum):
+    """What a person can do about an error."""
+
+    REPLACE = auto()
+    """Replace the output that exists, or choose another name."""
+    SMALLER = auto()
+    """Make fewer or smaller views."""
+    DEPTH = auto()
+    """Give a depth map, or get a depth model."""
+    STRETCH = auto()
+    """Stretch a depth map to the shape of the photo."""
+
+
+class FixableError(InputError):
+    """Bad input with a known remedy. The message is what is wrong; each interface adds its words for the remedy."""
+
+    def __init__(self, message: str, remedy: Remedy | None = None) -> None:
+        super().__init__(message)
+        self.remedy = remedy
+
+
+def remedy_of(error: Exception) -> Remedy | None:
+    """Return the remedy of an error, None if none is known."""
+    return error.remedy if isinstance(error, FixableError) else None

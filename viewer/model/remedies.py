@@ -1,0 +1,21 @@
+"""Remedies of errors in the words of the window."""
+
+from __future__ import annotations
+
+from iibr_core.remedies import Remedy, remedy_of
+
+DEPTH_COMMANDS = ("Depth models…", "Open a depth map…")
+"""Names of commands that give better depth."""
+BETTER_DEPTH = "A depth map or a depth model is more accurate."
+WORDS = {
+    Remedy.REPLACE: "choose another name",
+    Remedy.SMALLER: "open a smaller copy of the photo",
+    Remedy.DEPTH: "get it, or open a depth map",
+    Remedy.STRETCH: "or open it as a depth map if it shows the whole photo",
+}
+
+
+def words_of(error: Exception) -> str:
+    """Return the message of an error, with its remedy."""
+    remedy = remedy_of(error)
+    return str(error) if remedy is None else f"{error}; {WORDS[remedy]}"
