@@ -21,11 +21,9 @@ from iibr_core.method.photo_views import PhotoViews
 from iibr_core.scenes.scene import Source
 from iibr_core.types import FloatImage, ViewOffset
 from viewer.display.offscreen import OffscreenScene
-from viewer.model import messages
+from viewer.model import inspection, messages
 from viewer.model.action import do
-from viewer.model.actions import SetHover
 from viewer.model.state.app_state import Hover
-from viewer.model.state.inspection import SetInspection, SetOverlay
 from viewer.model.state.optics_actions import ApertureShape, MoveEye, SetAperture, SetFocus, SetOptics
 from viewer.model.state.preferences import Section, with_sections
 
@@ -39,7 +37,7 @@ FORK, HANDLEBAR = np.s_[185:295, 430:590], np.s_[80:190, 340:500]
 def main() -> None:
     """Make the pictures named on the command line."""
     folder, names = Path(sys.argv[1]), sys.argv[2:]
-    makers = {"screenshot.png": screenshot, "inspection.png": inspection, "edges.png": edges}
+    makers = {"screenshot.png": screenshot, "inspection.png": inspection_screen, "edges.png": edges}
     lines = (ROOT / "docs" / "gallery.md").read_text("utf-8").splitlines()
     commands = {Path(line).name: shlex.split(line) for line in lines if line.startswith("iibr ")}
     for name in names or [*commands, *makers]:
@@ -59,16 +57,16 @@ def screenshot() -> FloatImage:
         tank = pointer_on_tank(viewer)
         blades = ApertureShape("polygon", blades=7)
         viewer.do(SetFocus(tank.disparity), SetAperture(6.0), SetOptics("aperture_shape", blades))
-        viewer.do(do(messages.dismiss), SetHover(tank))
+        viewer.do(do(messages.dismiss), do(inspection.set_hover, tank))
         return viewer.screen(WINDOW) / np.float32(255)
 
 
-def inspection() -> FloatImage:
+def inspection_screen() -> FloatImage:
     """Return the window with disparity over the picture, EPIs through the pointer and values under it."""
     with OffscreenScene() as viewer:
         open_demo(viewer, "inspect")
-        viewer.do(SetAperture(0.0), SetInspection("shows_epis", True), SetInspection("shows_values", True))
-        viewer.do(SetOverlay("disparity"), SetHover(pointer_on_tank(viewer)))
+        viewer.do(SetAperture(0.0), do(inspection.show_epis, True), do(inspection.show_values, True))
+        viewer.do(do(inspection.set_overlay, "disparity"), do(inspection.set_hover, pointer_on_tank(viewer)))
         return viewer.screen(WINDOW) / np.float32(255)
 
 

@@ -29,7 +29,6 @@ DIALOG_TITLES: dict[ChoiceOf, str] = {
     "photo": "Open a photo, a stereo photo or a quilt",
     "folder": "Open a folder of photos or views",
     "mask": "Picture as the shape of the aperture",
-    "truth": "Ground truth: a folder of views",
     "map": "Open a disparity map for this photo",
     "model": "Open a depth model: an ONNX file",
     "model folder": "Open the folder of a depth model",

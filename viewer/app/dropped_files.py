@@ -6,23 +6,16 @@ from collections.abc import Sequence
 from pathlib import PurePath
 
 from iibr_core.scenes.scene import Source, source_beside, source_with_map
-from viewer.model.action import ask, do
 from viewer.model.actions import Action, OpenPath
 from viewer.model.state.app_state import AppState
-from viewer.model.state.tasks import ReadTruthTask
 
 MAP_SUFFIXES = (".pfm", ".npy", ".npz")
 MAP_NAMES = ("_depth", "_disparity")
 """At the end of a map's name, whatever kind of file it is."""
 
 
-def actions_from_drop(paths: Sequence[str], state: AppState, is_ground_truth: bool = False) -> list[Action]:
-    """Open the dropped photo, with a disparity map dropped along; a map alone is for the photo that is open.
-
-    is_ground_truth: it was dropped where ground truth is.
-    """
-    if is_ground_truth and state.scene is not None:
-        return [do(ask, ReadTruthTask(paths[0]))]
+def actions_from_drop(paths: Sequence[str], state: AppState) -> list[Action]:
+    """Open the dropped photo, with a depth map that was dropped with it; a map alone is for the photo that is open."""
     maps = [path for path in paths if _is_map(PurePath(path))]
     others = [path for path in paths if path not in maps]
     if others:

@@ -7,14 +7,13 @@ from dataclasses import dataclass, replace
 from iibr_core.beyond.optics import CENTRE
 from iibr_core.types import ViewOffset
 from viewer.app.pointer import is_marking_gloss
-from viewer.model import messages
+from viewer.model import inspection, messages
 from viewer.model.action import do
 from viewer.model.actions import Action, SetState, ShowBefore
 from viewer.model.commands import BY_NAME, COMMANDS
 from viewer.model.free_camera import LeaveCamera
 from viewer.model.state.app_state import AppState
 from viewer.model.state.depth_editing import DropStroke, SetBrush
-from viewer.model.state.inspection import Compare, SetInspection, SetOverlay
 from viewer.model.state.optics_actions import MoveEye, SetGlossBrush
 
 ARROW_STEP_VIEWS = 0.5
@@ -51,8 +50,8 @@ def _escape_actions(state: AppState) -> list[Action]:
         return [LeaveCamera()]
     if state.stroke is not None:
         return [DropStroke()]
-    if state.inspection.shows_grid:
-        return [SetInspection("shows_grid", False)]
+    if state.inspection.shows_views:
+        return [do(inspection.show_views, False)]
     if is_marking_gloss(state):
         return [SetGlossBrush(replace(state.gloss_brush, is_on=False))]
     if state.shows_before:
@@ -60,9 +59,9 @@ def _escape_actions(state: AppState) -> list[Action]:
     if state.brush.is_on:
         return [SetBrush(replace(state.brush, is_on=False))]
     if state.inspection.comparison is not None:
-        return [Compare(None)]
+        return [do(inspection.compare, None)]
     if state.inspection.overlay is not None:
-        return [SetOverlay(None)]
+        return [do(inspection.set_overlay, None)]
     return [SetState("is_fullscreen", False)] if state.is_fullscreen else []
 
 

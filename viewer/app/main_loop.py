@@ -30,29 +30,23 @@ from viewer.app.sharpener import Sharpener
 from viewer.app.side_effects import SideEffects
 from viewer.app.window import Window, wake
 from viewer.app.window_slot import WindowSlot
-from viewer.background.comparison_worker import ComparisonWorker
+from viewer.background.entropy import EntropyWork
 from viewer.background.gloss_worker import GlossFinder
+from viewer.background.newest import Newest
 from viewer.display.filmstrip_view import FilmstripView
 from viewer.display.inspection_view import InspectionView
 from viewer.display.preparation import Preparation
 from viewer.display.scene_view import VIEW_REFRESH_S, SceneView
 from viewer.gpu.glfw_context import create_for_window
-from viewer.model import saving
-from viewer.model.action import ask, do
+from viewer.model import inspection, saving
+from viewer.model.action import do
 from viewer.model.actions import Action, OpenPath, SetState, WorkerLost
-from viewer.model.inspection_request import (
-    NO_INSPECTION_TEXTURES,
-    InspectionTextures,
-    beside_of,
-    make_inspection_request,
-)
+from viewer.model.inspection import NO_INSPECTION_TEXTURES, InspectionTextures, beside_of
 from viewer.model.layout import Layout, is_narrow, layout_of
 from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState, Picture
-from viewer.model.state.inspection import SetInspection
 from viewer.model.state.motion import Tick
-from viewer.model.state.preferences import PlaceWindow, is_seen_open
-from viewer.model.state.tasks import ReadTruthTask
+from viewer.model.state.preferences import PlaceWindow
 from viewer.ui.host import UiHost
 from viewer.ui.overlays.filmstrip import filmstrip_paths
 from viewer.ui.screen import build_screen
@@ -107,7 +101,7 @@ class App:
         self.sharpener = Sharpener(self._gl, self.scene_view, wake)
         self.free_camera_view = FreeCameraView(self.scene_view, wake)
         self.gloss_finder = GlossFinder(self.scene_view.gloss_request, self.scene_view.take_gloss, wake)
-        self._comparisons = ComparisonWorker(wake)
+        self._entropy = Newest("iibr-entropy", EntropyWork(), wake)
         self._ui = UiHost(self.look(), self.window.handle)
         self._filmstrip = FilmstripView(self._gl, wake)
         self.scene_loader = SceneLoader(self.scene_view, self.inspection_view, self.window.set_title, wake)
@@ -153,7 +147,7 @@ class App:
         is_still = not actions and not pointer.is_down and not pointer.pulls
         self.do(*actions)
         self.do(*self._side_effects.draw(self.state, SAVE_BUDGET_S))
-        self._inspect(is_moving=pointer.is_down or self.state.motion.is_running)
+        self._inspect()
         self.do(*self.sharpener.advance(picture, self.state, is_still and self._is_resting, SAVE_BUDGET_S))
         self.do(*self.free_camera_view.advance(self.state))
         self._pace.is_busy |= bool(actions) or self._side_effects.is_drawing or self.sharpener.is_drawing
@@ -204,7 +198,7 @@ class App:
         """Stop the worker, keep what is kept, and free everything. A file that is being written is finished first."""
         self.window.hide()
         self.scene_loader.close()
-        self._comparisons.close()
+        self._entropy.close()
         self.gloss_finder.close()
         self._preferences.keep(self.state)
         self._sessions.close(self.state)
@@ -232,8 +226,8 @@ class App:
         """What neither user nor worker says: the clock, side effects done, the window moved, the worker lost."""
         self._pace.stepped_at = time.perf_counter()
         actions = self._side_effects.run(self.state) + self._sessions.run(self.state)
-        while (result := self._comparisons.next_result()) is not None:
-            actions += self.inspection_view.take(result)
+        while (result := self._entropy.next_result()) is not None:
+            actions += self.inspection_view.take_entropy(result)
         actions += self._notice_clock.expire(self.state, self._pace.stepped_at)
         if self.state.motion.is_running:
             actions.append(Tick(self._pace.stepped_at))
@@ -254,9 +248,7 @@ class App:
 
     def _take_dropped(self) -> list[Action]:
         paths = self.window.take_dropped()
-        is_inspecting = is_seen_open("inspect", self.state.preferences.open_sections)
-        on_panel = self.layout().panel.contains(*self.window.pointer)
-        return actions_from_drop(paths, self.state, is_inspecting and on_panel) if paths else []
+        return actions_from_drop(paths, self.state) if paths else []
 
     def _input(self, pointer: Pointer, layout: Layout) -> list[Action]:
         pick = partial(self.scene_view.pick, self.state.optics.eye)
@@ -266,15 +258,14 @@ class App:
         actions += gesture_end(pointer)
         return [*actions, do(saving.quit_window)] if self.window.take_closing() else actions
 
-    def _inspect(self, is_moving: bool) -> None:
-        """Tell what is under the pointer, and have worked out what else is looked at."""
+    def _inspect(self) -> None:
+        """Look up the values under the pointer, and ask for the entropy map that is wanted."""
         probe = self.inspection_view.probe(self.state)
         if probe != self.state.inspection.probe:
-            self.do(SetInspection("probe", probe))
-        before = self._comparisons.wanted
-        request = make_inspection_request(self.state, is_moving, before)
-        if request != before:
-            self._comparisons.want(request, self.inspection_view.inputs(request, self.state))
+            self.do(do(inspection.set_probe, probe))
+        request = self.inspection_view.entropy_request(self.state)
+        if request is not None:
+            self._entropy.submit(request)
 
     def _show(self, frame: Frame) -> None:
         if frame == self._shown or not all(self.window.framebuffer_size):
@@ -293,7 +284,6 @@ def run(state: AppState, kept_in: Path | None = None) -> None:
         app.run()
 
 
-def initial_state(action: OpenPath, depth_strength: float = 1.0, ground_truth: str | None = None) -> AppState:
-    """Return the state to start with: nothing open yet, this asked for, this light field to compare with."""
-    state = reduce(AppState(depth_strength=depth_strength), action)
-    return reduce(state, do(ask, ReadTruthTask(ground_truth))) if ground_truth else state
+def initial_state(action: OpenPath, depth_strength: float = 1.0) -> AppState:
+    """Return the state to start with: this file is to be opened."""
+    return reduce(AppState(depth_strength=depth_strength), action)

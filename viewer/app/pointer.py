@@ -10,13 +10,14 @@ from iibr_core.scenes.lens_limits import focus_limits
 from iibr_core.scenes.rect import Rect
 from iibr_core.scenes.scene import Scene
 from iibr_core.types import ViewOffset
-from viewer.model.actions import Action, EndGesture, SetHover
-from viewer.model.inspection_request import view_at
+from viewer.model import inspection
+from viewer.model.action import do
+from viewer.model.actions import Action, EndGesture
+from viewer.model.inspection import view_at
 from viewer.model.layout import Layout, pixel_at
 from viewer.model.lens.focal_plane import handle_points, place_of
 from viewer.model.state.app_state import AppState, Hover
 from viewer.model.state.depth_editing import DepthSample, Paint, PickDepth, SetBrush
-from viewer.model.state.inspection import MoveDivider
 from viewer.model.state.motion import ReturnHome
 from viewer.model.state.optics_actions import FocusOn, MoveEye, MoveTiltHandle, PaintGloss, SetFocus, SetGlossBrush
 from viewer.model.zoom import SetZoom
@@ -80,7 +81,7 @@ def actions_from_pointer(pointer: Pointer, layout: Layout, state: AppState, pick
     if scene is None or picture is None or pointer.is_over_panel:
         return []
     frame = layout.frame or picture
-    if state.inspection.shows_grid:
+    if state.inspection.shows_views:
         return _on_sheet(pointer, layout, scene, frame)
     if pointer.pulls or _zooms(pointer, layout, frame):
         return _zoom_actions(pointer, layout, frame)
@@ -122,7 +123,7 @@ def actions_from_hover(pointer: Pointer, layout: Layout, state: AppState, pick: 
     hover, paints = None, is_brushing(state) or is_marking_gloss(state)
     is_pointing = (
         not pointer.is_over_panel
-        and not state.inspection.shows_grid
+        and not state.inspection.shows_views
         and not (pointer.pulls or _is_on_minimap(layout, pointer.x, pointer.y))
         and (paints or not (pointer.is_down and pointer.drag_distance > DRAG_THRESHOLD))
     )
@@ -130,7 +131,7 @@ def actions_from_hover(pointer: Pointer, layout: Layout, state: AppState, pick: 
     if scene is not None and picture and frame and is_pointing and frame.contains(pointer.x, pointer.y):
         x_px, y_px = pixel_at(picture, scene.size, pointer.x, pointer.y)
         hover = Hover(x_px, y_px, pick(x_px, y_px))
-    return [SetHover(hover)] if hover != state.hover else []
+    return [do(inspection.set_hover, hover)] if hover != state.hover else []
 
 
 def is_brushing(state: AppState) -> bool:
@@ -214,7 +215,7 @@ def _drag(pointer: Pointer, layout: Layout, state: AppState, scene: Scene, pictu
     """The divider or a tilt handle where one was taken, else the viewpoint."""
     frame = layout.frame or picture
     if _grabs_divider(pointer, layout, state, frame):
-        return [MoveDivider((pointer.x - frame.x) / frame.width)]
+        return [do(inspection.move_divider, (pointer.x - frame.x) / frame.width)]
     index = _grabbed_handle(pointer, layout, state, picture)
     if index is not None:
         at = pixel_at(picture, scene.size, pointer.x, pointer.y)
@@ -224,11 +225,11 @@ def _drag(pointer: Pointer, layout: Layout, state: AppState, scene: Scene, pictu
 
 def _grabs_divider(pointer: Pointer, layout: Layout, state: AppState, frame: Rect) -> bool:
     """Whether the press was close to the divider, or it is dragged already."""
-    inspection = state.inspection
-    if inspection.comparison is None:
+    shown = state.inspection
+    if shown.comparison is None:
         return False
-    x = frame.x + inspection.divider * frame.width
-    return inspection.divider_taken or abs(pointer.pressed_x - x) <= DIVIDER_REACH * layout.ui_scale
+    x = frame.x + shown.divider * frame.width
+    return shown.divider_taken or abs(pointer.pressed_x - x) <= DIVIDER_REACH * layout.ui_scale
 
 
 def _on_sheet(pointer: Pointer, layout: Layout, scene: Scene, frame: Rect) -> list[Action]:

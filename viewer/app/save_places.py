@@ -21,12 +21,11 @@ from viewer.model.state.tasks import SaveTask
 
 
 def inputs_of_scene(state: AppState) -> tuple[Path, ...]:
-    """What is read for what is open, for what is being opened, and to compare with."""
+    """Return the files of the scene that is open, and of one that is being opened."""
     sources = [about.source for about in (state, state.scene) if about is not None and about.source is not None]
     is_open = state.scene is not None and state.scene.source == state.source  # then its map is known
     origin = state.scene.depth_origin if state.scene is not None else None
-    truth = state.inspection.truth
-    beside = (origin and origin.file, truth and truth.path)
+    beside = (origin and origin.file,)
     found = [path for source in sources for path in (named_by(source) if is_open else inputs_of(source))]
     settings = [path for path in (sidecar_of(Path(source.path)) for source in sources if source.path) if is_file(path)]
     return (*found, *settings, *(Path(os.path.expanduser(path)) for path in beside if path))

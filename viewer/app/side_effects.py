@@ -12,7 +12,6 @@ from typing import Any
 
 from iibr_core.beyond.optics import ApertureMask
 from iibr_core.exports.photo_folder import list_photos
-from iibr_core.formats.light_fields.light_field_formats import open_light_field
 from iibr_core.scenes.scene import Source, source_beside
 from viewer.app.clipboard import Pasted, paste_picture
 from viewer.app.dialogs import Dialog, SaveDialog, contents_of, has_dialogs
@@ -35,7 +34,6 @@ from viewer.model.state.app_state import AppState
 from viewer.model.state.exporting import ExportTask
 from viewer.model.state.filling import FillTask
 from viewer.model.state.folder import FolderListed, ListFolderTask
-from viewer.model.state.inspection import GroundTruth, TruthRead
 from viewer.model.state.jobs import CancelJobTask
 from viewer.model.state.model_download import (
     CancelGetTask,
@@ -54,7 +52,6 @@ from viewer.model.state.tasks import (
     ChoosePlaceTask,
     ChooseTask,
     ReadMaskTask,
-    ReadTruthTask,
     SaveTask,
     Task,
 )
@@ -89,10 +86,8 @@ class SideEffects:
         actions: list[Action] = [do(forget_tasks)] if state.tasks else []
         actions += self._take_results(state) + self._take_downloads(state) + self._take_answer(state)
         for task in state.tasks:
-            if (isinstance(task, ReadTruthTask) and not is_scene_open(state)) or (
-                isinstance(task, PasteTask) and self._jobs.is_copying
-            ):
-                actions.append(do(ask, task))  # later: the scene is not open, or the copy is not in the clipboard
+            if isinstance(task, PasteTask) and self._jobs.is_copying:
+                actions.append(do(ask, task))  # later: the copy is not in the clipboard yet
                 continue
             actions += self._begin(task, state)
         return actions
@@ -129,8 +124,6 @@ class SideEffects:
             case ReadMaskTask(path):
                 self._masks.append(Path(os.path.expanduser(path)))
                 self._submit(partial(_read_mask, self._masks[-1]))
-            case ReadTruthTask(path):
-                self._submit(partial(read_truth, path))
             case ReadFactsTask(path):
                 self._submit(partial(_read_facts, path))
             case ListFolderTask(path):
@@ -239,8 +232,6 @@ def _actions_from(result: FileResult, state: AppState) -> list[Action]:
             return [found]
         case Pasted(path):
             return [OpenPath(source_beside(state.source, path))]
-        case GroundTruth() as truth:
-            return [TruthRead(truth)]
         case Path() as sidecar:
             return [do(messages.notify, Notice(f"Saved {sidecar}"))]
     raise AssertionError(f"nothing comes of {result.value!r}")
@@ -265,16 +256,6 @@ def _actions_from_download(result: DownloadResult) -> list[Action]:
             lacks = [do(messages.notify, Notice(f"{model.title} is here. It {model.lacks}"))] if model.lacks else []
             return [listed, DownloadingChanged(None), *lacks]
     raise AssertionError(f"nothing comes of {result!r}")
-
-
-def read_truth(path: str) -> GroundTruth:
-    """The light field of a folder to compare with, as far as its size. Raises InputError where it is none."""
-    from iibr_core.formats.light_fields.multi_view_scene import common_size
-    from iibr_core.formats.light_fields.views import grid_of
-
-    field = open_light_field(Path(os.path.expanduser(path)))
-    grid, (height, width) = grid_of(field), common_size(field.views)
-    return GroundTruth(path, field.name, grid, width, height)
 
 
 def _read_facts(path: str) -> PhotoFacts:

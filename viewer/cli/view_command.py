@@ -7,9 +7,7 @@ from typing import Annotated
 
 import typer
 
-from iibr_core.formats.light_fields.light_field_formats import is_light_field
 from iibr_core.scenes.scene import Source
-from iibr_core.types import InputError
 from viewer.cli.option_records import with_option_records
 from viewer.cli.scene_options import SceneOptions, require_heeded
 from viewer.cli.shared_options import (
@@ -42,26 +40,19 @@ def view(
     scene: SceneOptions,
     focus_disparity: FocusDisparity = None,
     grid: Grid = None,
-    ground_truth: Annotated[
-        Path | None,
-        typer.Option("--ground-truth", metavar="FOLDER", help="A light field to compare with.", show_default=False),
-    ] = None,
 ) -> None:
     """Open the viewer.
 
     Example: iibr view holiday.jpg --disparity holiday.pfm
     """
-    require_utf8(path, scene.disparity, scene.depth_model, ground_truth)
+    require_utf8(path, scene.disparity, scene.depth_model)
     path = path.absolute() if path else demo_photo()
     source = scene.source(path, grid, focus_disparity)
     require_heeded(context, path)
     require_existing(source)
     require_model(source.depth)
-    if ground_truth is not None and not is_light_field(ground_truth):
-        raise InputError(f"{ground_truth}: is not a folder; --ground-truth names one with the views of a light field")
     from viewer.app.main_loop import initial_state, run
     from viewer.app.preferences_store import user_folder
     from viewer.model.actions import OpenPath
 
-    truth = str(ground_truth.absolute()) if ground_truth else None
-    run(initial_state(OpenPath(source), scene.depth_strength, truth), user_folder())
+    run(initial_state(OpenPath(source), scene.depth_strength), user_folder())

@@ -1,6 +1,6 @@
-"""What inspection shows beside and over the picture, drawn from the stage's light field when its record changed.
+"""Images that inspection shows beside and over the picture, drawn again when their record changed.
 
-Everything is called from the one GL thread.
+Called from the thread of the window only.
 """
 
 from __future__ import annotations
@@ -16,45 +16,34 @@ from numpy.typing import NDArray
 from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.scenes.rect import WHOLE, Rect
 from iibr_core.scenes.scene import Scene
-from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import ViewUpdate
-from viewer.background.comparison import ComparisonInputs, EntropyReady, PairReady, PairScored
-from viewer.background.comparison_worker import ComparisonResult
-from viewer.background.job_threads import Failed
+from viewer.background.entropy import Entropy, EntropyRequest
+from viewer.background.newest import Failed
 from viewer.display.scene_view import SceneView
 from viewer.gpu.context import GLContext
 from viewer.gpu.inspection_passes import InspectionPasses, Line, OverlayStyle
 from viewer.gpu.light_field_texture import LightFieldTexture
 from viewer.gpu.refocus.picture_drawing import PictureDrawing
 from viewer.gpu.refocus.view_sampling import nearest_present
-from viewer.model import messages
+from viewer.model import inspection, messages
 from viewer.model.action import do
 from viewer.model.actions import Action
 from viewer.model.colormap import VIRIDIS
-from viewer.model.inspection_request import (
-    DIFFERENCE_GAIN,
-    NO_INSPECTION_TEXTURES,
-    InspectionRequest,
-    InspectionTextures,
-    sheet_cells,
-    view_near,
-)
+from viewer.model.inspection import NO_INSPECTION_TEXTURES, InspectionTextures, sheet_cells, view_near
 from viewer.model.layout import Layout, whole_pixels
 from viewer.model.state.app_state import AppState, Hover
-from viewer.model.state.inspection import Compare, Comparison, Origin, Pair, PairCompared, Probe, SetOverlay, ViewIndex
+from viewer.model.state.inspection import Origin, Probe, ViewIndex
 from viewer.model.state.notices import Notice
 
 INPAINTED_RGB = (255, 184, 60)
 SNAPSHOT_BUDGET_S = 0.025
-"""Time a turn for drawing the snapshot's picture."""
-ROUNDING = 1
-"""Of 255: by so much one picture differs that was summed up in other steps."""
+"""Seconds per turn for drawing the snapshot's picture."""
 
 
 @dataclass(frozen=True)
 class _ViewImage:
-    """What images depend on: the field, how many views were uploaded to it, brightness as a factor, how often edited
-    depth was shown in its place.
+    """Everything that an image of views depends on. views: number of uploads. exposure: factor of brightness. previews:
+    number of previews of edited depth.
     """
 
     generation: int
@@ -64,7 +53,7 @@ class _ViewImage:
 
 
 class InspectionView:
-    """Draws what the state asks for, and keeps what views say beside their colours."""
+    """Draws the images that a state asks for, and keeps which pixels of the views were inpainted."""
 
     def __init__(self, gl: GLContext, scene_view: SceneView) -> None:
         self._scene_view = scene_view
@@ -72,30 +61,30 @@ class InspectionView:
         self._drawn: dict[str, tuple[object, int]] = {}
         self._on_sheet: frozenset[tuple[ViewIndex, int]] = frozenset()
         self._inpainted: dict[ViewIndex, NDArray[np.uint8]] = {}
-        self._entropy: EntropyReady | None = None
-        self._pair: PairReady | None = None
-        self._kept: tuple[object, PictureDrawing] | None = None
+        self._entropy: Entropy | None = None
+        self._entropy_asked: tuple[int, ViewIndex] | None = None
+        self._snapshot: tuple[object, PictureDrawing] | None = None
         self._probed: tuple[object, Probe | None] = (None, None)
 
     def open(self) -> None:
-        """Another scene is on the screen."""
+        """Forget the scene before."""
         self._inpainted.clear()
         self._drawn.clear()
-        self._entropy = self._pair = None
+        self._entropy = self._entropy_asked = None
         self._stop_snapshot()
 
     @property
     def is_drawing(self) -> bool:
         """Whether the picture of the snapshot is being drawn."""
-        return self._kept is not None and not self._kept[1].is_done
+        return self._snapshot is not None and not self._snapshot[1].is_done
 
     def add(self, view: ViewUpdate) -> None:
-        """Keep what of a view was inpainted, eight pixels a byte."""
+        """Keep the mask of inpainted pixels of a view, eight pixels a byte."""
         if view.inpainted is not None:
             self._inpainted[view.row, view.column] = np.packbits(view.inpainted, axis=1)
 
     def draw(self, state: AppState, layout: Layout) -> InspectionTextures:
-        """Draw what changed and say where it is."""
+        """Draw the images that changed and return the names of all."""
         scene, field = state.scene, self._scene_view.renderer.field
         if scene is None or field is None or layout.frame_px is None or not field.present.any():
             return NO_INSPECTION_TEXTURES
@@ -103,15 +92,14 @@ class InspectionView:
         base = _ViewImage(view.generation, view.views_uploaded, 2.0**state.optics.exposure_stops, view.previews)
         names = {"overlay": self._overlay(state, scene, field, layout, base)}
         names["minimap"] = self._minimap(field, layout, base)
-        if field.grid == scene.grid:  # else: only the photo's own view is there, or what is being done to its depth
+        if field.grid == scene.grid:  # else: only the photo is there, or a preview of its depth
             names |= self._strips(state, scene, field, layout, base)
-            names["sheet"] = self._sheet(field, layout, base) if state.inspection.shows_grid else None
-            names |= self._comparison_images(state, scene, field, base)
-            names |= self._kept_images(state, layout.frame_px.size, layout.part, base)
+            names["sheet"] = self._sheet(field, layout, base) if state.inspection.shows_views else None
+            names["compared"] = self._compared(state, scene, field, layout, base)
         return self._textures(names)
 
     def probe(self, state: AppState) -> Probe | None:
-        """What is known of the picture under the pointer, where that is asked for."""
+        """Return the values under the pointer; None where they are not asked for."""
         scene, hover, field = state.scene, state.hover, self._scene_view.renderer.field
         if scene is None or hover is None or field is None or not state.inspection.shows_values:
             return None
@@ -121,34 +109,24 @@ class InspectionView:
             self._probed = asked, self._probe_at(hover, state, scene, field)
         return self._probed[1]
 
-    def inputs(self, request: InspectionRequest | None, state: AppState) -> ComparisonInputs | None:
-        """What this request is made from; None while that is not there."""
+    def entropy_request(self, state: AppState) -> EntropyRequest | None:
+        """Return the entropy map to be computed now; None where none is wanted, or it was asked for before."""
         scene, view = state.scene, self._scene_view
-        field = view.renderer.field
-        if request is None or scene is None or field is None or view.generation != request.generation:
+        if scene is None or scene.plan is None or view.loaded is None or state.inspection.overlay != "entropy":
             return None
-        if view.loaded is not None and scene.plan is not None:
-            return ComparisonInputs(view.loaded, scene.plan, inpaint=scene.source.inpaint)
-        if field.grid != scene.grid:
+        asked = view.generation, view_near(state.optics.eye, scene.grid)
+        if asked == self._entropy_asked or view.generation != state.generation:
             return None
-        stored = self._passes.read_view(field, *request.view)
-        return None if stored is None else ComparisonInputs(stored=stored)
+        self._entropy_asked = asked
+        return EntropyRequest(*asked, view.loaded, scene.plan, scene.source.inpaint)
 
-    def take(self, result: ComparisonResult) -> list[Action]:
-        """Show what was found; what is to be known of it comes back as actions."""
-        match result:
-            case PairReady(request):
-                self._pair = result
-                return [PairCompared(Pair(request.generation, _comparison_of(request), request.view))]
-            case PairScored(request, psnr_db, flip):
-                return [PairCompared(Pair(request.generation, _comparison_of(request), request.view, psnr_db, flip))]
-            case EntropyReady():
-                self._entropy = result
-                return []
-            case Failed(id=request, message=message):
-                is_overlay = request is not None and request.kind == "entropy"
-                off = SetOverlay(None) if is_overlay else Compare(None)
-                return [do(messages.notify, Notice(message, is_error=True)), off]
+    def take_entropy(self, result: Entropy | Failed[EntropyRequest]) -> list[Action]:
+        """Show an entropy map; a failure takes the overlay away."""
+        if isinstance(result, Failed):
+            self._entropy_asked = None
+            return [do(messages.notify, Notice(result.message, is_error=True)), do(inspection.set_overlay, None)]
+        self._entropy = result
+        return []
 
     def release(self) -> None:
         """Free the GL objects."""
@@ -159,7 +137,7 @@ class InspectionView:
         return InspectionTextures(**names, shown=tuple(self._drawn[name][0] for name in names if names[name]))
 
     def _minimap(self, field: LightFieldTexture, layout: Layout, base: _ViewImage) -> int | None:
-        """The photo, very small."""
+        """Return the photo at a small size."""
         row, column = field.grid.centre
         if layout.minimap is None or not field.present[row, column]:
             return None
@@ -168,7 +146,7 @@ class InspectionView:
         return self._once("minimap", (base.generation, base.exposure, size_px), draw)
 
     def _once(self, name: str, record: object, draw: Callable[[], int]) -> int:
-        """The image of this name, drawn again only if its record changed."""
+        """Return the image of this name, drawn again only if its record changed."""
         if name not in self._drawn or self._drawn[name][0] != record:
             self._drawn[name] = record, draw()
         return self._drawn[name][1]
@@ -191,7 +169,7 @@ class InspectionView:
         return names
 
     def _sheet(self, field: LightFieldTexture, layout: Layout, base: _ViewImage) -> int:
-        """All views; those that came since the last time, or came again, are drawn."""
+        """Return the sheet of all views; only views that are new are drawn."""
         assert layout.frame_px is not None
         size_px = layout.frame_px.size
         record = base.generation, base.exposure, size_px, field.stride
@@ -218,18 +196,17 @@ class InspectionView:
         view: ViewIndex = tuple(nearest_present(field.present)[view_near(optics.eye, field.grid)].tolist())
         if kind is None or not field.has_disparity[view] or (kind != "disparity" and field.grid != scene.grid):
             return None
-        values, looked_up = None, None
+        values = None
         if kind == "inpainted":
             values = self._mask_of(view, field)
         elif kind == "entropy":
-            if self._entropy is None or self._entropy.request.generation != base.generation:
+            if self._entropy is None or self._entropy.generation != base.generation:
                 return None
-            looked_up, values = self._entropy.request, self._entropy.entropy
-            view = looked_up.view
+            view, values = self._entropy.view, self._entropy.values
         colors = (INPAINTED_RGB,) * len(VIRIDIS) if kind == "inpainted" else VIRIDIS
         ends = scene.disparity_range_px if kind == "disparity" else (0.0, 1.0)
         ends = ends if ends[1] > ends[0] else (ends[0] - 0.5, ends[0] + 0.5)
-        record = base, kind, view, optics.eye, optics.dolly, size_px, part, state.inspection.opacity, looked_up
+        record = base, kind, view, optics.eye, optics.dolly, size_px, part, state.inspection.opacity
         if not field.present[view]:
             return None
 
@@ -245,46 +222,30 @@ class InspectionView:
             return np.zeros((field.height, field.width), np.uint8)
         return np.unpackbits(packed, axis=1, count=field.width) * np.uint8(255)
 
-    def _comparison_images(
-        self, state: AppState, scene: Scene, field: LightFieldTexture, base: _ViewImage
-    ) -> dict[str, int | None]:
-        kind, pair = state.inspection.comparison, self._pair
-        if kind in ("kept", "difference"):
-            return {}
+    def _compared(
+        self, state: AppState, scene: Scene, field: LightFieldTexture, layout: Layout, base: _ViewImage
+    ) -> int | None:
+        """Return the left image of the comparison: the photo, or the picture of the snapshot once it is drawn."""
+        kind, optics = state.inspection.comparison, state.inspection.snapshot
         if kind == "photo":
             draw = partial(self._passes.draw_view, field, *scene.grid.centre, "photo", base.exposure)
-            return {"left": self._once("left", (base.generation, base.exposure), draw), "right": None}
-        if kind is None or pair is None or (pair.request.generation, pair.request.kind) != (base.generation, kind):
-            return {"left": None, "right": None}
-        left = self._once("left", (pair.request, "left"), lambda: self._passes.show("left", pair.left))
-        right = self._once("right", (pair.request, "right"), lambda: self._passes.show("right", pair.right))
-        return {"left": left, "right": right}
-
-    def _kept_images(self, state: AppState, size_px: ScreenSize, part: Rect, base: _ViewImage) -> dict[str, int | None]:
-        """The picture of the snapshot, or its difference from the present one once that is finished."""
-        kind, optics = state.inspection.comparison, state.inspection.kept
-        if optics is None or kind not in ("kept", "difference"):
+            return self._once("compared", (base.generation, base.exposure), draw)
+        if kind is None or optics is None or layout.frame_px is None:
             if self.is_drawing:
                 self._stop_snapshot()
-            return {}
-        record = base.generation, base.views, base.previews, optics, size_px, part
-        kept = self._snapshot(record, RenderSettings(optics, size_px, part))
-        if kept is None:
-            return {"left": None, "right": None}
-        if kind == "kept":
-            return {"left": self._once("left", record, lambda: self._passes.show("left", kept)), "right": None}
-        renderer, drawn = self._scene_view.renderer, self._scene_view.picture_drawn
-        if not (renderer.is_converged and self._scene_view.shows_all_views()):
-            before = self._drawn.get("difference")
-            return {"difference": before[1] if before else None}
-        return {"difference": self._once("difference", (record, drawn), lambda: self._show_difference(kept))}
+            return None
+        record = base.generation, base.views, base.previews, optics, layout.frame_px.size, layout.part
+        pixels = self._draw_snapshot(record, RenderSettings(optics, layout.frame_px.size, layout.part))
+        if pixels is None:
+            return None
+        return self._once("compared", record, lambda: self._passes.show("snapshot", pixels))
 
-    def _snapshot(self, record: object, settings: RenderSettings) -> NDArray[Any] | None:
+    def _draw_snapshot(self, record: object, settings: RenderSettings) -> NDArray[Any] | None:
         """Draw the snapshot's picture for about SNAPSHOT_BUDGET_S; None until it is finished."""
-        if self._kept is None or self._kept[0] != record:
+        if self._snapshot is None or self._snapshot[0] != record:
             self._stop_snapshot()
-            self._kept = record, self._scene_view.renderer.start_picture(settings)
-        drawing = self._kept[1]
+            self._snapshot = record, self._scene_view.renderer.start_picture(settings)
+        drawing = self._snapshot[1]
         if not drawing.is_done:
             drawing.advance(SNAPSHOT_BUDGET_S)
             if drawing.is_done:
@@ -292,29 +253,19 @@ class InspectionView:
         return drawing.image if drawing.is_done else None
 
     def _stop_snapshot(self) -> None:
-        if self._kept is not None:
-            self._kept[1].stop()
-            self._kept = None
-
-    def _show_difference(self, kept: NDArray[Any]) -> int:
-        """Black where nothing differs but by rounding; amplified, for what differs little is what one looks for."""
-        difference = np.abs(self._scene_view.renderer.read_image().astype(np.int16) - kept)
-        difference[difference <= ROUNDING] = 0
-        return self._passes.show("difference", np.minimum(difference * DIFFERENCE_GAIN, 255).astype(np.uint8))
+        if self._snapshot is not None:
+            self._snapshot[1].stop()
+            self._snapshot = None
 
     def _probe_at(self, hover: Hover, state: AppState, scene: Scene, field: LightFieldTexture) -> Probe:
-        seen = None
-        if hover.disparity is not None and field.has_disparity.any():
-            shows = self._passes.seen_in(field, state.optics.eye, hover.x_px, hover.y_px, hover.disparity)
-            seen = int(shows.sum())
         at = (hover.x_px + 0.5) / scene.width, (hover.y_px + 0.5) / scene.height
         drawn = self._scene_view.picture_drawn
         part = drawn.part if drawn is not None else WHOLE
         rgb = self._scene_view.renderer.read_pixel((at[0] - part.x) / part.width, (at[1] - part.y) / part.height)
-        return Probe(rgb, seen, int(field.present.sum()), self._origin(hover, state, scene, field))
+        return Probe(rgb, self._origin(hover, state, scene, field))
 
     def _origin(self, hover: Hover, state: AppState, scene: Scene, field: LightFieldTexture) -> Origin:
-        """By what the view nearest to the eye says of the surface under the pointer."""
+        """Return the origin of the surface under the pointer, by the view nearest to the eye."""
         if scene.plan is None:
             return "from disk"
         eye = state.optics.eye
@@ -327,8 +278,3 @@ class InspectionView:
             if 0 <= x < scene.width and 0 <= y < scene.height and packed[y, x // 8] >> (7 - x % 8) & 1:
                 return "inpainted"
         return "photo" if eye == scene.grid.offset(*scene.grid.centre) else "generated"
-
-
-def _comparison_of(request: InspectionRequest) -> Comparison:
-    assert request.kind != "entropy"  # the kept state is compared without a request
-    return request.kind

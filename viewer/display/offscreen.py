@@ -29,22 +29,22 @@ from iibr_core.scenes.scene import MAKING, DepthSettings, Scene, SceneReady, Sce
 from iibr_core.scenes.scene_gloss import make_maps
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import SRGB, ColorSpace, FloatImage, ViewOffset
-from viewer.background.comparison_job import ComparisonJob
+from viewer.background.entropy import Entropy, EntropyWork
 from viewer.display.inspection_view import InspectionView
 from viewer.display.scene_view import SceneView
 from viewer.gpu.headless_context import Backend, create_headless
 from viewer.gpu.refocus.views_seen import views_seen_by
+from viewer.model.action import do
 from viewer.model.actions import Action, OpenPath, ProgressMade, SceneOpened, SetState
-from viewer.model.inspection_request import (
+from viewer.model.inspection import (
     NO_INSPECTION_TEXTURES,
     InspectionTextures,
     beside_of,
-    make_inspection_request,
+    set_probe,
 )
 from viewer.model.layout import BACKGROUND, Layout, is_narrow, layout_of
 from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState
-from viewer.model.state.inspection import SetInspection
 
 LAYOUT_FRAMES = 3
 """Number of frames until the layout is settled: ImGui knows the size of a text once it was built."""
@@ -242,12 +242,13 @@ class OffscreenScene:
         self._prepare_gloss(self.state.optics.gloss)
         if not layout.frame_px or not self.view.converge(self.state, layout.frame_px.size, layout.part):
             return None, NO_INSPECTION_TEXTURES
-        request = make_inspection_request(self.state, is_moving=False, before=None)
-        inputs = self.inspection.inputs(request, self.state)
-        if request is not None and inputs is not None:
-            for result in ComparisonJob().results_of(request, inputs):
-                self.do(*self.inspection.take(result))
-        self.do(SetInspection("probe", self.inspection.probe(self.state)))
+        request = self.inspection.entropy_request(self.state)
+        if request is not None:
+            results: list[Entropy] = []
+            EntropyWork()(request, results.append)
+            for result in results:
+                self.inspection.take_entropy(result)
+        self.do(do(set_probe, self.inspection.probe(self.state)))
         textures = self.inspection.draw(self.state, layout)
         while self.inspection.is_drawing:
             textures = self.inspection.draw(self.state, layout)

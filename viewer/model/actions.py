@@ -8,11 +8,10 @@ from typing import Literal
 from iibr_core.scenes.scene import Progress, Scene, Source
 from viewer.model.action import Action as VerbAction
 from viewer.model.free_camera import FreeCameraAction
-from viewer.model.state.app_state import DrawReport, Hover
+from viewer.model.state.app_state import DrawReport
 from viewer.model.state.depth_editing import DepthAction
 from viewer.model.state.filling import ViewsFilled
 from viewer.model.state.folder import FolderAction
-from viewer.model.state.inspection import InspectionAction
 from viewer.model.state.model_download import ModelAction
 from viewer.model.state.motion import MotionAction
 from viewer.model.state.optics_actions import LensAction, SetGlossBrush
@@ -141,13 +140,6 @@ class SetState:
 
 
 @dataclass(frozen=True)
-class SetHover:
-    """The pointer is here in the picture; None where it is not in it."""
-
-    hover: Hover | None
-
-
-@dataclass(frozen=True)
 class ShowBefore:
     """Show the photo as it was taken, to compare; or the picture again, as any edit of the lens does."""
 
@@ -163,7 +155,6 @@ Action = (
     | WorkerEvent
     | PreferencesAction
     | SetState
-    | InspectionAction
     | DepthAction
     | FolderAction
     | ShowTiltHandles
@@ -183,5 +174,4 @@ Action = (
     | WorkerLost
     | ViewsFilled
     | ModelAction
-    | SetHover
 )

@@ -12,7 +12,7 @@ from pathlib import PurePath
 from iibr_core.depth.editing.edits import BRUSH_TOOLS, BrushTool
 from iibr_core.exports.loops import LOOPS, LoopKind
 from iibr_core.scenes.scene import Source, source_beside, source_with_map
-from viewer.model import messages, saving
+from viewer.model import inspection, messages, saving
 from viewer.model.action import ask, do
 from viewer.model.actions import (
     Action,
@@ -32,16 +32,7 @@ from viewer.model.state.app_state import AppState
 from viewer.model.state.depth_editing import ResetDepth, SetBrush, SetTone
 from viewer.model.state.filling import FillTask
 from viewer.model.state.folder import SetFolderOrder, StepPhoto
-from viewer.model.state.inspection import (
-    COMPARISONS,
-    OVERLAYS,
-    Compare,
-    Comparison,
-    KeepState,
-    OverlayKind,
-    SetInspection,
-    SetOverlay,
-)
+from viewer.model.state.inspection import COMPARISONS, OVERLAYS, Comparison, OverlayKind
 from viewer.model.state.model_download import GetDepth, ModelsPrompt, UseModel
 from viewer.model.state.motion import PauseMotion, ReturnHome, SetLoop
 from viewer.model.state.notices import Notice
@@ -49,7 +40,7 @@ from viewer.model.state.optics_actions import ApplyPreset, ResetOptics
 from viewer.model.state.preferences import SECTIONS, SetPreference, ToggleSection
 from viewer.model.state.prompts import ChoiceOf, PalettePrompt
 from viewer.model.state.saving import CopyTask, PasteTask, WriteSidecarTask
-from viewer.model.state.tasks import ChooseTask, ReadMaskTask, ReadTruthTask
+from viewer.model.state.tasks import ChooseTask, ReadMaskTask
 from viewer.model.zoom import SetZoom, Zoom
 
 NOTHING_BETWEEN = "No views can be made between these: that is for light fields of few views."
@@ -69,10 +60,8 @@ KEY_WORDS = {
 }
 """Of ImGui's names for keys, those that people write otherwise."""
 COMPARE_WORDS: dict[Comparison, str] = {
-    "photo": "Compare photo and picture",
-    "truth": "Compare with ground truth",
-    "kept": "Compare with the snapshot",
-    "difference": "Difference from the snapshot",
+    "photo": "Compare with the photo",
+    "snapshot": inspection.COMPARE_SNAPSHOT,
 }
 BRUSH_WORDS: dict[BrushTool, str] = {
     "nearer": "Nearer",
@@ -130,11 +119,11 @@ def _toggle_palette(state: AppState) -> Action:
 
 
 def _toggle_overlay(kind: OverlayKind) -> Callable[[AppState], Action]:
-    return lambda state: SetOverlay(None if state.inspection.overlay == kind else kind)
+    return lambda state: do(inspection.set_overlay, None if state.inspection.overlay == kind else kind)
 
 
 def _toggle_comparison(kind: Comparison) -> Callable[[AppState], Action]:
-    return lambda state: Compare(None if state.inspection.comparison == kind else kind)
+    return lambda state: do(inspection.compare, None if state.inspection.comparison == kind else kind)
 
 
 def _toggle_brush(state: AppState) -> Action:
@@ -210,11 +199,11 @@ COMMANDS: tuple[Command, ...] = (
     Command("Get true depth", _always(GetDepth())),
     Command("Depth models…", _always(do(messages.show_prompt, ModelsPrompt()))),
     Command("Save the depth map…", _always(do(saving.ask_to_save, "map"))),
-    Command("EPI strips", lambda s: SetInspection("shows_epis", not s.inspection.shows_epis), (Chord("e"),)),
-    Command("All views", lambda s: SetInspection("shows_grid", not s.inspection.shows_grid), (Chord("g"),)),
+    Command("EPI strips", lambda s: do(inspection.show_epis, not s.inspection.shows_epis), (Chord("e"),)),
+    Command("All views", lambda s: do(inspection.show_views, not s.inspection.shows_views), (Chord("g"),)),
     Command(
         "Values under the pointer",
-        lambda s: SetInspection("shows_values", not s.inspection.shows_values),
+        lambda s: do(inspection.show_values, not s.inspection.shows_values),
         (Chord("v"),),
     ),
     *(
@@ -225,7 +214,6 @@ COMMANDS: tuple[Command, ...] = (
         Command(COMPARE_WORDS[kind], _toggle_comparison(kind), (Chord("p"),) if kind == "photo" else ())
         for kind in COMPARISONS
     ),
-    Command("Open ground truth…", _always(do(ask, ChooseTask("truth")))),
     Command("Make views between those of a light field", _fill_between),
     Command("Stop making views", _always(StopWork())),
     Command("Zoom: the whole picture", _always(SetZoom(None)), (Chord("_0"),)),
@@ -234,7 +222,7 @@ COMMANDS: tuple[Command, ...] = (
     Command("Full screen", lambda s: SetState("is_fullscreen", not s.is_fullscreen), (Chord("f11"),)),
     Command("Hide or show the panel", toggle_panel, (Chord("tab"),)),
     Command("Before and after", lambda s: ShowBefore(not s.shows_before), (Chord("backslash"),)),
-    Command("Take a snapshot to compare with", _always(KeepState()), (Chord("k"),)),
+    Command("Take a snapshot", _always(do(inspection.take_snapshot)), (Chord("k"),)),
     Command("Light or dark", lambda s: SetPreference("theme", "dark" if s.preferences.theme == "light" else "light")),
     Command(
         "Units: a photographer's or a light field's",
@@ -275,8 +263,6 @@ def action_for_path(what: ChoiceOf, path: str, state: AppState) -> Action:
     match what:
         case "mask":
             return do(ask, ReadMaskTask(path))
-        case "truth":
-            return do(ask, ReadTruthTask(path))
         case "map" if state.source is not None:
             return OpenPath(source_with_map(state.source, path))
         case "model" | "model folder" if state.source is not None:

@@ -8,7 +8,7 @@ from types import MappingProxyType
 from imgui_bundle import imgui
 
 from viewer.model.actions import Action
-from viewer.model.inspection_request import NO_INSPECTION_TEXTURES, InspectionTextures
+from viewer.model.inspection import NO_INSPECTION_TEXTURES, InspectionTextures
 from viewer.model.layout import Layout
 from viewer.model.state.app_state import AppState
 from viewer.model.state.folder import Thumbnail
@@ -43,7 +43,7 @@ def build_screen(
         _picture(layout, picture_texture)
         draw_over_picture(state, layout, textures)
         draw_beside_picture(state, layout, textures)
-        if not state.inspection.shows_grid:
+        if not state.inspection.shows_views:
             overlays(state, layout)
             if textures.minimap is not None:
                 draw_minimap(layout, textures.minimap)

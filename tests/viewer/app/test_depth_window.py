@@ -15,11 +15,10 @@ from iibr_core.depth.editing.edits import UNEDITED, DepthEdits
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import FAR, NEAR, Driver, Opener
 from viewer.app.main_loop import App
-from viewer.model import messages, saving
+from viewer.model import inspection, messages, saving
 from viewer.model.action import do
 from viewer.model.actions import EndGesture, SetDepthStrength
 from viewer.model.state.depth_editing import Brush, SetBrush, SetTone
-from viewer.model.state.inspection import SetInspection
 from viewer.model.state.notices import Notice
 from viewer.model.state.optics_actions import MoveEye
 from viewer.model.state.preferences import SECTIONS, with_sections
@@ -249,7 +248,7 @@ def test_a_bad_map_leaves_the_scene_and_its_edits_with_a_notice(viewer: Driver, 
 
 def test_a_notice_in_a_low_window_leaves_the_strips_free(viewer: Driver) -> None:
     viewer.app.do(
-        SetInspection("shows_epis", True),
+        do(inspection.show_epis, True),
         *(do(messages.notify, Notice(f"{i}: " + "many words " * 20)) for i in range(5)),
     )
     viewer.until_idle()

@@ -10,13 +10,12 @@ import pytest
 from iibr_core.scenes.scene import Scene, Source
 from iibr_core.types import GridShape, ViewOffset
 from viewer.app.keys import Keys, actions_from_keys
-from viewer.model import messages, saving
+from viewer.model import inspection, messages, saving
 from viewer.model.action import do
 from viewer.model.actions import Action, SetState, Undo
 from viewer.model.commands import BY_NAME, COMMANDS
 from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState
-from viewer.model.state.inspection import Compare, SetInspection, SetOverlay
 from viewer.model.state.optics_actions import MoveEye, ResetOptics
 from viewer.model.state.prompts import PalettePrompt
 
@@ -35,11 +34,11 @@ def test_keys() -> None:
 @pytest.mark.parametrize(
     ("opens", "closes"),
     [
-        ((Compare("photo"),), Compare(None)),
-        ((SetOverlay("disparity"),), SetOverlay(None)),
-        ((SetState("is_fullscreen", True), SetOverlay("disparity")), SetOverlay(None)),
+        ((do(inspection.compare, "photo"),), do(inspection.compare, None)),
+        ((do(inspection.set_overlay, "disparity"),), do(inspection.set_overlay, None)),
+        ((SetState("is_fullscreen", True), do(inspection.set_overlay, "disparity")), do(inspection.set_overlay, None)),
         ((SetState("is_fullscreen", True),), SetState("is_fullscreen", False)),
-        ((SetInspection("shows_grid", True), Compare("photo")), SetInspection("shows_grid", False)),
+        ((do(inspection.show_views, True), do(inspection.compare, "photo")), do(inspection.show_views, False)),
     ],
 )
 def test_escape_closes_what_lies_over_the_picture(opens: tuple[Action, ...], closes: Action) -> None:
@@ -48,7 +47,7 @@ def test_escape_closes_what_lies_over_the_picture(opens: tuple[Action, ...], clo
 
 def test_what_is_typed_too_early_is_no_command() -> None:
     """The palette comes up, and has the keyboard a frame later."""
-    keys = Keys(arrows=ViewOffset(1, 0), commands=("Take a snapshot to compare with", "Save the picture…"))
+    keys = Keys(arrows=ViewOffset(1, 0), commands=("Take a snapshot", "Save the picture…"))
     assert actions_from_keys(keys, replace(STATE, prompt=PalettePrompt())) == [do(saving.ask_to_save)]
     assert len(actions_from_keys(keys, replace(STATE, prompt="help"))) == 3
 

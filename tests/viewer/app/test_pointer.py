@@ -19,7 +19,9 @@ from viewer.app.pointer import (
     gesture_start,
     units_per_view,
 )
-from viewer.model.actions import EndGesture, SetHover
+from viewer.model import inspection
+from viewer.model.action import do
+from viewer.model.actions import EndGesture
 from viewer.model.layout import Layout, layout_of, letterbox, pixel_at
 from viewer.model.lens.focal_plane import handle_points
 from viewer.model.state.app_state import AppState, Hover, TiltHandles
@@ -168,9 +170,8 @@ def hovered(pointer: Pointer, state: AppState = STATE) -> list[object]:
 
 def test_the_pointer_says_once_where_it_is_and_once_that_it_left() -> None:
     (found,) = hovered(OVER_PICTURE)
-    assert found == SetHover(Hover(pytest.approx(299.5), pytest.approx(199.5), pytest.approx(2.995)))
-    assert isinstance(found, SetHover)
-    there = replace(STATE, hover=found.hover)
+    assert found == do(inspection.set_hover, Hover(pytest.approx(299.5), pytest.approx(199.5), pytest.approx(2.995)))
+    there = found.apply(STATE)
     assert hovered(OVER_PICTURE, there) == []
     outside = (
         replace(OVER_PICTURE, x=1.0),
@@ -178,7 +179,7 @@ def test_the_pointer_says_once_where_it_is_and_once_that_it_left() -> None:
         replace(OVER_PICTURE, is_down=True, drag_distance=50),
     )
     for pointer in outside:
-        assert hovered(pointer, there) == [SetHover(None)]
+        assert hovered(pointer, there) == [do(inspection.set_hover, None)]
         assert hovered(pointer) == []
 
 

@@ -17,7 +17,6 @@ from iibr_core.types import GridShape, InputError
 from tests.viewer.conftest import write_scene
 from viewer.app.save_places import inputs_of_scene, map_path, picture_path
 from viewer.model.state.app_state import AppState
-from viewer.model.state.inspection import GroundTruth, Inspection
 from viewer.model.state.tasks import SaveTask
 
 
@@ -62,12 +61,11 @@ def test_what_is_read_is_all_that_was_named(tmp_path: Path) -> None:
 
 
 def test_what_is_read_for_a_scene(tmp_path: Path) -> None:
-    """What is open, what is being opened, the map that was found beside the photo, what it is compared with."""
+    """What is open, what is being opened, and the map that was found beside the photo."""
     scene = Scene(Source("open.png"), "open", 9, 6, GridShape(1, 1), (0.0, 1.0), "map")
     scene = replace(scene, depth_origin=DepthOrigin("file", "map", file="open_disparity.npy"))
-    truth = GroundTruth("truth", "truth", GridShape(1, 1), 9, 6)
-    state = AppState(source=Source("next.png"), scene=scene, inspection=Inspection(truth=truth))
-    names = ("next.png", "open.png", "open_disparity.npy", "truth")
+    state = AppState(source=Source("next.png"), scene=scene)
+    names = ("next.png", "open.png", "open_disparity.npy")
     assert inputs_of_scene(state) == tuple(map(Path, names))
     assert inputs_of_scene(AppState()) == ()
 

@@ -12,9 +12,8 @@ from iibr_core.beyond.optics import Optics
 from iibr_core.runtime.work import watched
 from iibr_core.scenes.scene import MAKING, Scene, Source
 from iibr_core.types import GridShape, InputError, ViewOffset
-from tests.iibr_core.known_scenes import write_llff_row, write_stanford, write_stereo_pair
+from tests.iibr_core.known_scenes import write_stanford, write_stereo_pair
 from tests.viewer.conftest import HEIGHT, WIDTH
-from viewer.app.side_effects import read_truth
 from viewer.display.offscreen import OffscreenScene
 from viewer.model.actions import Action
 from viewer.model.layout import layout_of
@@ -103,13 +102,6 @@ def test_light_fields_of_other_layouts_open(tmp_path: Path, viewer: OffscreenSce
     assert viewer.state.scene.grid == (1, 2)
     right = read_photo(tmp_path / "pair" / "im1.png").pixels
     assert np.abs(viewer.picture() / 255 - right).max() < 1.5 / 255
-
-
-def test_light_fields_of_other_layouts_are_truth_to_compare_with(tmp_path: Path) -> None:
-    truth = read_truth(str(write_stanford(tmp_path / "stanford", 2, 3)))
-    assert (truth.name, truth.grid) == ("stanford", (2, 3))
-    with pytest.raises(InputError, match="`iibr evaluate` reads them"):
-        read_truth(str(write_llff_row(tmp_path / "fern")))
 
 
 @pytest.mark.parametrize(

@@ -30,7 +30,7 @@ from iibr_core.scenes.lens_limits import (
 )
 from iibr_core.scenes.scene import DepthSettings, Progress, Scene, Source
 from iibr_core.types import GridShape, ViewOffset
-from viewer.model import messages, saving
+from viewer.model import inspection, messages, saving
 from viewer.model.action import do
 from viewer.model.actions import (
     EndGesture,
@@ -39,7 +39,6 @@ from viewer.model.actions import (
     ProgressMade,
     SceneOpened,
     SetDepthStrength,
-    SetHover,
     SetState,
     StopWork,
     TakeSettings,
@@ -401,7 +400,7 @@ def test_reset_brings_the_first_optics_back() -> None:
         (SetOptics("highlight_recovery", 0.5), True, False),
         (FocusOn((0.0, 0.0), 1.0), True, False),
         (ApplyPreset("macro"), True, False),
-        (SetHover(Hover(3.0, 4.0, 1.0)), False, False),
+        (do(inspection.set_hover, Hover(3.0, 4.0, 1.0)), False, False),
         (SetPreference("theme", "light"), False, False),
         (StopWork(), False, False),
         (Undo(), False, False),

@@ -13,11 +13,11 @@ from iibr_core.depth.editing.edits import BrushTool, DepthEdits, Stroke
 from tests.viewer.conftest import headless_with_scene
 from viewer.display.depth_preview import DepthPreview
 from viewer.display.offscreen import OffscreenScene
-from viewer.model.actions import SetHover
+from viewer.model import inspection
+from viewer.model.action import do
 from viewer.model.layout import PANEL_WIDTH
 from viewer.model.state.app_state import Hover
 from viewer.model.state.depth_editing import Brush, DepthSample, SetBrush, SetTone
-from viewer.model.state.inspection import SetInspection, SetOverlay
 from viewer.model.state.preferences import SetPreference, Theme
 
 SIZE = 640, 800
@@ -56,7 +56,7 @@ def test_poor_depth_is_told_with_advice_and_what_failed(viewer: OffscreenScene) 
 
 
 def test_the_brush_brings_its_sliders_and_a_ring_over_the_picture(viewer: OffscreenScene) -> None:
-    viewer.do(SetHover(Hover(48.0, 32.0, 1.5)))
+    viewer.do(do(inspection.set_hover, Hover(48.0, 32.0, 1.5)))
     before = viewer.screen(SIZE)
     viewer.do(SetBrush(Brush(radius=0.1, is_on=True)))
     changed = differs(before, viewer.screen(SIZE))
@@ -79,7 +79,7 @@ def test_the_panel_ends_at_its_border_at_any_size_of_text(
 
 
 def test_a_stroke_under_way_is_seen_in_colours(viewer: OffscreenScene) -> None:
-    viewer.do(SetOverlay("disparity"), SetInspection("opacity", 1.0))
+    viewer.do(do(inspection.set_overlay, "disparity"), do(inspection.set_opacity, 1.0))
     preview, before = DepthPreview(viewer.view), viewer.screen(SIZE)
     for stroke, is_seen in ((Stroke("farther", ((0.5, 0.5),), 0.1, 1.0), True), (None, False)):
         viewer.state = replace(viewer.state, stroke=stroke)

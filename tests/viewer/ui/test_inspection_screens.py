@@ -12,13 +12,13 @@ from iibr_core.scenes.rect import Rect
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import HEIGHT, WIDTH, headless_with_scene
 from viewer.display.offscreen import OffscreenScene
-from viewer.model import messages
+from viewer.model import inspection, messages
 from viewer.model.action import do
-from viewer.model.actions import Action, SetHover
-from viewer.model.inspection_request import beside_of, sheet_cells
+from viewer.model.actions import Action
+from viewer.model.inspection import beside_of, sheet_cells
 from viewer.model.layout import PANEL_WIDTH, Layout, layout_of
 from viewer.model.state.app_state import Hover
-from viewer.model.state.inspection import OVERLAYS, Compare, MoveDivider, OverlayKind, SetInspection, SetOverlay
+from viewer.model.state.inspection import OVERLAYS, OverlayKind
 from viewer.model.state.notices import Notice
 from viewer.model.state.optics_actions import MoveEye
 from viewer.model.state.preferences import SetPreference, Theme, ToggleSection
@@ -56,7 +56,9 @@ def part(screen: np.ndarray, rect: Rect | None) -> np.ndarray:
 @pytest.mark.parametrize("scale", [1.0, 1.5])
 def test_the_whole_section_is_seen_at_any_size_of_text(viewer: OffscreenScene, theme: Theme, scale: float) -> None:
     size = round(SIZE[0] * scale), round(SIZE[1] * scale)
-    viewer.do(SetPreference("theme", theme), SetPreference("font_scale", scale), SetOverlay("disparity"))
+    viewer.do(
+        SetPreference("theme", theme), SetPreference("font_scale", scale), do(inspection.set_overlay, "disparity")
+    )
     opened = viewer.screen(size).astype(int)
     viewer.do(ToggleSection("inspect"))
     changed = np.abs(viewer.screen(size) - opened).max(axis=2) > 24
@@ -70,7 +72,9 @@ def test_the_whole_section_is_seen_at_any_size_of_text(viewer: OffscreenScene, t
 @pytest.mark.parametrize("theme", ["dark", "light"])
 def test_epis_lie_beside_the_picture_and_go_through_the_pointer(viewer: OffscreenScene, theme: Theme) -> None:
     viewer.do(
-        SetPreference("theme", theme), SetHover(replace(HOVER, disparity=None)), SetInspection("shows_epis", True)
+        SetPreference("theme", theme),
+        do(inspection.set_hover, replace(HOVER, disparity=None)),
+        do(inspection.show_epis, True),
     )
     screen, layout = viewer.screen(SIZE).astype(int), layout_now(viewer)
     across, down = part(screen, layout.strip_across), part(screen, layout.strip_down)
@@ -89,7 +93,7 @@ def test_epis_lie_beside_the_picture_and_go_through_the_pointer(viewer: Offscree
 
 
 def test_the_middle_of_the_epi_moves_with_the_eye(viewer: OffscreenScene) -> None:
-    viewer.do(SetInspection("shows_epis", True))
+    viewer.do(do(inspection.show_epis, True))
     changed = changed_after(viewer, MoveEye(ViewOffset(0, 1)))
     assert part(changed, layout_now(viewer).strip_across).sum() > ENOUGH_PIXELS
 
@@ -99,11 +103,11 @@ def test_overlays_cover_the_picture_as_much_as_they_are_opaque(viewer: Offscreen
     viewer.do(MoveEye(ViewOffset(0, 1)))
     picture = layout_now(viewer).picture
     plain = part(viewer.screen(SIZE), picture).astype(int)
-    viewer.do(SetOverlay(kind), SetInspection("opacity", 0.0))
+    viewer.do(do(inspection.set_overlay, kind), do(inspection.set_opacity, 0.0))
     clear = part(viewer.screen(SIZE), picture).astype(int)
     below_legend = np.s_[60:]
     assert np.abs(clear - plain)[below_legend].max() <= 2
-    viewer.do(SetInspection("opacity", 1.0))
+    viewer.do(do(inspection.set_opacity, 1.0))
     covered = part(viewer.screen(SIZE), picture).astype(int)
     differs = (np.abs(covered - plain).max(axis=2) > 24)[below_legend]
     assert differs.sum() > 3 * ENOUGH_PIXELS
@@ -112,8 +116,8 @@ def test_overlays_cover_the_picture_as_much_as_they_are_opaque(viewer: Offscreen
 
 
 def test_the_legend_marks_the_value_under_the_pointer(viewer: OffscreenScene) -> None:
-    viewer.do(SetOverlay("disparity"), SetHover(HOVER))
-    changed = changed_after(viewer, SetHover(replace(HOVER, disparity=-0.5)))
+    viewer.do(do(inspection.set_overlay, "disparity"), do(inspection.set_hover, HOVER))
+    changed = changed_after(viewer, do(inspection.set_hover, replace(HOVER, disparity=-0.5)))
     legend = part(changed, layout_now(viewer).picture)[:40, :180]
     assert 10 < legend.sum() < 800
 
@@ -121,9 +125,9 @@ def test_the_legend_marks_the_value_under_the_pointer(viewer: OffscreenScene) ->
 def test_photo_and_result_on_the_two_sides_of_the_divider(viewer: OffscreenScene) -> None:
     viewer.do(MoveEye(ViewOffset(0, 1)))
     result = part(viewer.screen(SIZE), layout_now(viewer).picture).astype(int)
-    viewer.do(Compare("photo"), MoveDivider(0.5))
+    viewer.do(do(inspection.compare, "photo"), do(inspection.move_divider, 0.5))
     compared = part(viewer.screen(SIZE), layout_now(viewer).picture).astype(int)
-    viewer.do(Compare(None), MoveEye(ViewOffset(0, 0)))
+    viewer.do(do(inspection.compare, None), MoveEye(ViewOffset(0, 0)))
     photo = part(viewer.screen(SIZE), layout_now(viewer).picture).astype(int)
     half = compared.shape[1] // 2
     left, right = np.s_[60:, : half - 20], np.s_[60:, half + 20 :]
@@ -133,7 +137,7 @@ def test_photo_and_result_on_the_two_sides_of_the_divider(viewer: OffscreenScene
 
 
 def test_the_sheet_shows_every_view_and_marks_the_present_one(viewer: OffscreenScene) -> None:
-    viewer.do(SetInspection("shows_grid", True))
+    viewer.do(do(inspection.show_views, True))
     screen, layout = viewer.screen(SIZE).astype(int), layout_now(viewer)
     assert layout.picture is not None
     for cell in sheet_cells(layout.picture, GRID):
@@ -144,25 +148,24 @@ def test_the_sheet_shows_every_view_and_marks_the_present_one(viewer: OffscreenS
 
 
 def test_the_status_line_is_not_covered_by_notices(viewer: OffscreenScene) -> None:
-    viewer.do(SetInspection("shows_values", True), SetHover(HOVER))
+    viewer.do(do(inspection.show_values, True), do(inspection.set_hover, HOVER))
     line = part(viewer.screen(SIZE), layout_now(viewer).status)
     assert line.std() > 5
     probe = viewer.state.inspection.probe
     assert probe is not None
-    assert (probe.of, probe.origin) == (9, "photo")
+    assert probe.origin == "photo"
     assert probe.rgb[0] > probe.rgb[1] == probe.rgb[2], "the red square"
-    assert probe.seen_in is not None
     viewer.do(do(messages.notify, Notice("a notice")))
     np.testing.assert_array_equal(part(viewer.screen(SIZE), layout_now(viewer).status), line)
 
 
 def test_what_the_photo_does_not_show_is_told_as_inpainted(viewer: OffscreenScene) -> None:
     """Beside the square, in the middle row, from an eye that looks behind it."""
-    viewer.do(SetInspection("shows_values", True), MoveEye(ViewOffset(0, 1)))
+    viewer.do(do(inspection.show_values, True), MoveEye(ViewOffset(0, 1)))
     origins = set()
     for x in range(0, WIDTH, 2):
         disparity = viewer.pick(x, HEIGHT / 2)
-        viewer.do(SetHover(Hover(x, HEIGHT / 2, disparity)))
+        viewer.do(do(inspection.set_hover, Hover(x, HEIGHT / 2, disparity)))
         viewer.screen((400, 300))
         assert viewer.state.inspection.probe is not None
         origins.add(viewer.state.inspection.probe.origin)

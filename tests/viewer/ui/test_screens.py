@@ -18,14 +18,13 @@ from iibr_core.beyond.optics import (
 from iibr_core.scenes.scene import Progress, Source
 from tests.viewer.conftest import headless_with_scene
 from viewer.display.offscreen import OffscreenScene
-from viewer.model import messages, saving
+from viewer.model import inspection, messages, saving
 from viewer.model.action import do
 from viewer.model.actions import (
     Action,
     OpenFailed,
     OpenPath,
     ProgressMade,
-    SetHover,
     SetState,
     ShowTiltHandles,
 )
@@ -88,7 +87,7 @@ def test_every_section_opens_and_closes(viewer: OffscreenScene, section: Section
             saving.set_jobs, (JobProgress(1, "picture", "large.png", "drawing", 0.4), JobProgress(2, "export", "a.mp4"))
         ),
         ShowTiltHandles(True),
-        SetHover(Hover(48.0, 32.0, 1.5)),
+        do(inspection.set_hover, Hover(48.0, 32.0, 1.5)),
     ],
     ids=lambda action: type(action).__name__,
 )

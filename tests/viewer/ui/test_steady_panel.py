@@ -13,9 +13,10 @@ from iibr_core.beyond.optics import APERTURE_KINDS, ApertureMask, ApertureShape
 from iibr_core.scenes.screen_size import ScreenSize
 from tests.viewer.conftest import headless_with_scene
 from viewer.display.offscreen import OffscreenScene
+from viewer.model import inspection
+from viewer.model.action import do
 from viewer.model.actions import Action, ShowTiltHandles
 from viewer.model.state.depth_editing import Brush, DepthSample, PickDepth, SetBrush
-from viewer.model.state.inspection import Compare, KeepState, SetInspection, SetOverlay
 from viewer.model.state.motion import SetLoop
 from viewer.model.state.optics_actions import FIRST_GLOSS, GlossBrush, SetGlossBrush, SetOptics
 from viewer.model.state.preferences import SECTIONS
@@ -37,10 +38,10 @@ SWITCHES: dict[str, tuple[Action, ...]] = {
     "gloss brush": (GLOSSY, SetGlossBrush(GlossBrush(is_on=True))),
     "brush": (SetBrush(Brush("nearer", is_on=True)),),
     "bucket": (SetBrush(Brush("fill", is_on=True)), PickDepth(DepthSample((0.5, 0.5), 1.0))),
-    "EPIs": (SetInspection("shows_epis", True),),
-    "overlay": (SetOverlay("disparity"),),
-    "photo": (Compare("photo"),),
-    "kept": (KeepState(), Compare("kept")),
+    "EPIs": (do(inspection.show_epis, True),),
+    "overlay": (do(inspection.set_overlay, "disparity"),),
+    "photo": (do(inspection.compare, "photo"),),
+    "snapshot": (do(inspection.take_snapshot), do(inspection.compare, "snapshot")),
 }
 
 

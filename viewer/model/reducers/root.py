@@ -20,7 +20,6 @@ from viewer.model.actions import (
     RestoreSession,
     ResumeWork,
     SetDepthStrength,
-    SetHover,
     SetState,
     ShowBefore,
     ShowTiltHandles,
@@ -31,13 +30,13 @@ from viewer.model.actions import (
     WorkerLost,
 )
 from viewer.model.free_camera import FreeCameraAction
+from viewer.model.inspection import release_divider
 from viewer.model.messages import notify
 from viewer.model.reducers.depth_editing_reducer import end_stroke, reduce_depth
 from viewer.model.reducers.depth_models import reduce_models
 from viewer.model.reducers.folder_reducer import list_folder, photo_after, scroll_filmstrip
 from viewer.model.reducers.free_camera_reducer import reduce_free_camera
 from viewer.model.reducers.history_reducer import end_gesture, record_edit, redo, undo
-from viewer.model.reducers.inspection_reducer import move_pointer, reduce_inspection, release_divider
 from viewer.model.reducers.lens_reducer import reduce_lens, with_focus_of
 from viewer.model.reducers.motion_reducer import reduce_motion
 from viewer.model.reducers.preferences_reducer import reduce_preferences
@@ -46,7 +45,6 @@ from viewer.model.state.app_state import AppState, FinishedField, TiltHandles
 from viewer.model.state.depth_editing import DepthAction
 from viewer.model.state.filling import ViewsFilled
 from viewer.model.state.folder import FolderListed, ScrollFilmstrip, SetFolderOrder, StepPhoto
-from viewer.model.state.inspection import InspectionAction
 from viewer.model.state.model_download import ModelAction
 from viewer.model.state.motion import Motion, MotionAction
 from viewer.model.state.notices import Notice
@@ -89,8 +87,6 @@ def reduce(state: AppState, action: Action) -> AppState:
         return reduce_free_camera(state, action)
     if isinstance(action, WorkerEvent):
         return reduce_worker_event(state, action)
-    if isinstance(action, InspectionAction):
-        return reduce_inspection(state, action)
     if isinstance(action, DepthAction):
         return reduce_depth(state, action)
     if isinstance(action, ModelAction):
@@ -149,8 +145,6 @@ def _reduce_files(state: AppState, action: Action) -> AppState:
 def _reduce_screen(state: AppState, action: Action) -> AppState:
     """What stands on the screen beside the picture: prompts, notices, progress, and where one looks."""
     match action:
-        case SetHover(hover):
-            return move_pointer(state, hover)
         case SetGlossBrush(brush):
             return _take_gloss_brush(state, brush)
         case ShowBefore(is_shown):

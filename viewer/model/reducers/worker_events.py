@@ -19,7 +19,6 @@ from viewer.model.remedies import DEPTH_COMMANDS
 from viewer.model.state.app_state import AppState
 from viewer.model.state.folder import ListFolderTask
 from viewer.model.state.history import History
-from viewer.model.state.inspection import of_next_scene
 from viewer.model.state.model_download import ListModelsTask
 from viewer.model.state.motion import Motion
 from viewer.model.state.notices import Notice
@@ -82,7 +81,7 @@ def _open_scene(state: AppState, scene: Scene, same_places: SamePlaces | None) -
         shown_generation=state.generation,
         optics=carried(state.optics),
         history=map_optics(state.history, carried),
-        inspection=replace(state.inspection, pair=None, probe=None),
+        inspection=replace(state.inspection, probe=None),
     )
     notices = (*_problems(scene), *_offers(scene))[-MAX_NOTICES:]
     if old is not None and old.source is scene.source:
@@ -95,7 +94,7 @@ def _open_scene(state: AppState, scene: Scene, same_places: SamePlaces | None) -
     if old is not None and is_stepped_to(state.folder, scene.source):
         recent = tuple(path for path in recent if path != old.source.path)  # or a walk would be all that is left there
     recent = remember_recent(recent, scene.source.path)
-    inspection = of_next_scene(state.inspection)
+    inspection = state.inspection.for_next_scene
     opened = replace(opened, tilt_handles=None, hover=None, inspection=inspection, zoom=None)
     depth = DepthSettings(scene.source.depth.refine)
     if scene.plan is not None:  # a photo: it may have neighbours

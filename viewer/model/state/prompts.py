@@ -11,9 +11,9 @@ from iibr_core.scenes.screen_size import ScreenSize
 from viewer.model.state.exporting import ExportPrompt
 from viewer.model.state.model_download import ModelsPrompt
 
-ChoiceOf = Literal["photo", "folder", "mask", "truth", "map", "model", "model folder", "place"]
+ChoiceOf = Literal["photo", "folder", "mask", "map", "model", "model folder", "place"]
 """map: a disparity map for the open photo; model: an ONNX file of a depth model; place: where a file goes."""
-FOLDER_CHOICES: tuple[ChoiceOf, ...] = ("folder", "truth", "model folder")
+FOLDER_CHOICES: tuple[ChoiceOf, ...] = ("folder", "model folder")
 """What is a folder."""
 
 

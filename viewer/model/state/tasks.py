@@ -49,13 +49,6 @@ class ReadMaskTask:
     path: str
 
 
-@dataclass(frozen=True)
-class ReadTruthTask:
-    """Look what light field this folder holds, to compare with; once a scene is open."""
-
-    path: str
-
-
 Task = (
     ChooseTask
     | ChoosePlaceTask
@@ -67,7 +60,6 @@ Task = (
     | FillTask
     | CancelJobTask
     | ReadMaskTask
-    | ReadTruthTask
     | ListFolderTask
     | ListContentsTask
     | ReadFactsTask

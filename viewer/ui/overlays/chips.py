@@ -31,7 +31,7 @@ def chips(state: AppState, layout: Layout) -> list[Action]:
     depth again.
     """
     frame, scene = layout.frame, state.scene
-    if frame is None or scene is None or state.inspection.shows_grid or state.shows_before:
+    if frame is None or scene is None or state.inspection.shows_views or state.shows_before:
         return []
     camera = state.free_camera
     actions: list[Action] = []

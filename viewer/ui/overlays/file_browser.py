@@ -25,7 +25,6 @@ PATH_WORDS: dict[ChoiceOf, str] = {
     "photo": "Open a photo",
     "folder": "Open a folder of photos or views",
     "mask": "A picture as the shape of the aperture; white lets light through",
-    "truth": "Ground truth: a folder of views",
     "map": "A depth map for this photo",
     "model": "A depth model: an ONNX file, or a folder",
     "model folder": "The folder of a depth model",

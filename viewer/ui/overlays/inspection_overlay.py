@@ -1,4 +1,4 @@
-"""What inspection draws over and beside the picture: overlay and legend, comparison, sheet of views, EPIs, status."""
+"""Drawings of inspection over and beside the picture: overlay and legend, comparison, sheet of views, EPIs, status."""
 
 from __future__ import annotations
 
@@ -8,14 +8,7 @@ from iibr_core.scenes.rect import Rect
 from iibr_core.scenes.scene import Scene
 from iibr_core.types import ViewOffset
 from viewer.model.colormap import VIRIDIS, map_color
-from viewer.model.inspection_request import (
-    DIFFERENCE_GAIN,
-    InspectionTextures,
-    grid_to_compare,
-    sheet_cells,
-    view_label,
-    view_near,
-)
+from viewer.model.inspection import InspectionTextures, sheet_cells, view_near
 from viewer.model.layout import Layout
 from viewer.model.lens.photographic_units import metres, metres_text
 from viewer.model.state.app_state import AppState, Hover
@@ -25,9 +18,8 @@ from viewer.ui.style import DARK, Color, corners, pack_color, palette_of
 
 LEGEND_WIDTH, LEGEND_HEIGHT = 150.0, 10.0
 SIDES: dict[Comparison, tuple[str, str]] = {
-    "photo": ("photo", "result"),
-    "truth": ("result", "truth"),
-    "kept": ("snapshot", "now"),
+    "photo": ("photo", "picture"),
+    "snapshot": ("snapshot", "picture"),
 }
 BLACK: Color = (0.0, 0.0, 0.0, 1.0)
 
@@ -42,12 +34,8 @@ def draw_over_picture(state: AppState, layout: Layout, textures: InspectionTextu
         _draw_legend(state, scene, layout, frame)
     if state.shows_before:
         _words("before", frame.x + 8 * layout.ui_scale, frame.y + 8 * layout.ui_scale, layout.ui_scale)
-    if textures.difference is not None:
-        _image(textures.difference, frame)
-        words = f"difference from the snapshot, × {DIFFERENCE_GAIN}"
-        _words(words, frame.x + 8 * layout.ui_scale, frame.y + 8 * layout.ui_scale, layout.ui_scale)
-    if textures.left is not None:
-        _draw_comparison(state, scene, layout, frame, textures)
+    if textures.compared is not None:
+        _draw_comparison(state, layout, frame, textures.compared)
     if textures.sheet is not None:
         _draw_sheet(state, scene, layout, frame, textures.sheet)
 
@@ -64,14 +52,11 @@ def draw_beside_picture(state: AppState, layout: Layout, textures: InspectionTex
 
 
 def status_text(state: AppState, scene: Scene, hover: Hover, probe: Probe | None) -> list[str]:
-    """What is under the pointer, in order of importance."""
+    """Return the values under the pointer, the most important first."""
     words = [f"{hover.x_px:.0f}, {hover.y_px:.0f}"]
     if hover.disparity is not None:
         words += hover_text(state.optics, scene, hover, state.preferences.units).split(WORD_GAP)
-    if probe is None:
-        return words
-    counted = f"{probe.of} views" if probe.seen_in is None else f"seen in {probe.seen_in} of {probe.of} views"
-    return [*words, probe.origin, "RGB {} {} {}".format(*probe.rgb), counted]
+    return words if probe is None else [*words, probe.origin, "RGB {} {} {}".format(*probe.rgb)]
 
 
 def _image(texture: int, rect: Rect) -> None:
@@ -79,7 +64,7 @@ def _image(texture: int, rect: Rect) -> None:
 
 
 def _line(x0: float, y0: float, x1: float, y1: float, color: int, width: float) -> None:
-    """Legible on any ground: the line, in a dark one."""
+    """Draw a line with a dark rim, legible on any ground."""
     draw = imgui.get_background_draw_list()
     ends = imgui.ImVec2(x0, y0), imgui.ImVec2(x1, y1)
     draw.add_line(*ends, pack_color(BLACK, 0.55), 2.5 * width)
@@ -87,7 +72,7 @@ def _line(x0: float, y0: float, x1: float, y1: float, color: int, width: float) 
 
 
 def _words(words: str, x: float, y: float, scale: float, align: float = 0.0) -> None:
-    """Words on a dark ground. align: 0 begins at x, 1 ends there."""
+    """Draw words on a dark ground. align: 0 begins at x, 1 ends there."""
     draw, size, room = imgui.get_background_draw_list(), imgui.calc_text_size(words), 5 * scale
     left = x - align * (size.x + 2 * room)
     corners = imgui.ImVec2(left, y), imgui.ImVec2(left + size.x + 2 * room, y + size.y + room)
@@ -96,7 +81,7 @@ def _words(words: str, x: float, y: float, scale: float, align: float = 0.0) -> 
 
 
 def _draw_legend(state: AppState, scene: Scene, layout: Layout, frame: Rect) -> None:
-    """The colours and their values, and where among them the pointer is."""
+    """Draw the colors with their values, and a mark for the value under the pointer."""
     kind, scale = state.inspection.overlay, layout.ui_scale
     x, y, room = frame.x + 8 * scale, frame.y + 8 * scale, 5 * scale
     if kind == "inpainted":
@@ -128,7 +113,7 @@ def _draw_legend(state: AppState, scene: Scene, layout: Layout, frame: Rect) -> 
 
 
 def legend_words(state: AppState, scene: Scene, ends: tuple[float, float]) -> tuple[str, list[str]]:
-    """What the colours are of, and the words at their ends."""
+    """Return the name of the values and the words at both ends."""
     numbers = [f"{value:.2f}".replace("-", "−") for value in ends]
     if state.inspection.overlay != "disparity":
         return "entropy", numbers
@@ -138,39 +123,37 @@ def legend_words(state: AppState, scene: Scene, ends: tuple[float, float]) -> tu
     return "distance", [name if m is None else metres_text(m) for name, m in zip(("far", "near"), distances)]
 
 
-def _draw_comparison(state: AppState, scene: Scene, layout: Layout, frame: Rect, textures: InspectionTextures) -> None:
-    """Left image, right image, the divider between them, and what each is."""
+def _draw_comparison(state: AppState, layout: Layout, frame: Rect, texture: int) -> None:
+    """Draw the compared image left of the divider, the divider, and the names of both sides."""
     kind, scale, draw = state.inspection.comparison, layout.ui_scale, imgui.get_background_draw_list()
-    assert kind is not None
-    assert layout.picture is not None
-    whole = frame if kind == "kept" else layout.picture
+    if kind is None or layout.picture is None:
+        return
     x, bottom = frame.x + state.inspection.divider * frame.width, frame.y + frame.height
-    for texture, left, right in ((textures.left, frame.x, x), (textures.right, x, frame.x + frame.width)):
-        if texture is not None:
-            draw.push_clip_rect(imgui.ImVec2(left, frame.y), imgui.ImVec2(right, bottom), True)
-            _image(texture, whole)
-            draw.pop_clip_rect()
+    draw.push_clip_rect(imgui.ImVec2(frame.x, frame.y), imgui.ImVec2(x, bottom), True)
+    _image(texture, layout.picture if kind == "photo" else frame)
+    draw.pop_clip_rect()
     _line(x, frame.y, x, bottom, pack_color(DARK.text), 1.5 * scale)
-    knob = imgui.ImVec2(x, frame.y + frame.height / 2)
-    draw.add_circle_filled(knob, 9 * scale, pack_color(BLACK, 0.55))
-    draw.add_circle_filled(knob, 7.5 * scale, pack_color(DARK.text))
-    for side in (-1, 1):
-        tip, back = knob.x + side * 5 * scale, knob.x + side * 1.5 * scale
-        base = imgui.ImVec2(back, knob.y - 3 * scale), imgui.ImVec2(back, knob.y + 3 * scale)
-        draw.add_triangle_filled(imgui.ImVec2(tip, knob.y), *base, pack_color(DARK.background))
+    _draw_knob(x, frame.y + frame.height / 2, scale)
     names, top = SIDES[kind], frame.y + 8 * scale
     draw.push_clip_rect(*corners(frame), True)
     _words(names[0], x - 10 * scale, top, scale, align=1.0)
     _words(names[1], x + 10 * scale, top, scale)
-    pair = state.inspection.pair
-    if pair is not None and kind not in ("photo", "kept"):
-        words = view_label(pair.view, grid_to_compare(scene, kind, state.inspection.truth))
-        _words(words, frame.x + 8 * scale, bottom - imgui.get_text_line_height() - 13 * scale, scale)
     draw.pop_clip_rect()
 
 
+def _draw_knob(x: float, y: float, scale: float) -> None:
+    """Draw the knob of the divider, with arrows to both sides."""
+    draw, knob = imgui.get_background_draw_list(), imgui.ImVec2(x, y)
+    draw.add_circle_filled(knob, 9 * scale, pack_color(BLACK, 0.55))
+    draw.add_circle_filled(knob, 7.5 * scale, pack_color(DARK.text))
+    for side in (-1, 1):
+        tip, back = x + side * 5 * scale, x + side * 1.5 * scale
+        base = imgui.ImVec2(back, y - 3 * scale), imgui.ImVec2(back, y + 3 * scale)
+        draw.add_triangle_filled(imgui.ImVec2(tip, y), *base, pack_color(DARK.background))
+
+
 def _draw_sheet(state: AppState, scene: Scene, layout: Layout, frame: Rect, texture: int) -> None:
-    """All views; a frame around the one the eye is nearest to, a finer one around the one under the pointer."""
+    """Draw all views, with a frame around the nearest view and a finer frame around the view under the pointer."""
     draw, scale = imgui.get_background_draw_list(), layout.ui_scale
     _image(texture, frame)
     cells = sheet_cells(frame, scene.grid, scale)
@@ -187,7 +170,7 @@ def _draw_sheet(state: AppState, scene: Scene, layout: Layout, frame: Rect, text
 
 
 def _draw_strips(state: AppState, scene: Scene, layout: Layout, picture: Rect, textures: InspectionTextures) -> None:
-    """The EPIs, where the eye is in them, and the pointer's column and row."""
+    """Draw the EPIs with the place of the eye, and the pointer's column and row."""
     across, down, scale = layout.strip_across, layout.strip_down, layout.ui_scale
     assert across is not None
     assert down is not None
@@ -207,7 +190,7 @@ def _draw_strips(state: AppState, scene: Scene, layout: Layout, picture: Rect, t
 
 
 def _draw_marks(state: AppState, scene: Scene, rect: Rect, layout: Layout, is_upright: bool) -> None:
-    """A line along the eye's place among the views, one across at the pointer, and the slope of what lies there."""
+    """Draw a line at the viewpoint, a line at the pointer, and the slope of the surface there."""
     x_px, y_px = state.inspection.place or ((scene.width - 1) / 2, (scene.height - 1) / 2)
     eye: ViewOffset = state.optics.eye
     part, scale = layout.part, layout.ui_scale
@@ -236,7 +219,7 @@ def _draw_marks(state: AppState, scene: Scene, rect: Rect, layout: Layout, is_up
 
 
 def _draw_status(state: AppState, scene: Scene, layout: Layout, rect: Rect) -> None:
-    """One line; what does not fit is left out, the least important first."""
+    """Draw one line of values; the last values are left out where they do not fit."""
     draw, palette, scale = imgui.get_background_draw_list(), palette_of(state.preferences.theme), layout.ui_scale
     hover, probe = state.hover, state.inspection.probe
     y = rect.y + rect.height - imgui.get_text_line_height()

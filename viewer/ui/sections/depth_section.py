@@ -9,7 +9,7 @@ from imgui_bundle import imgui
 from iibr_core.depth.choice import DepthStart
 from iibr_core.depth.editing.edits import BRUSH_TOOLS, DEPTH_TOOLS, GAMMA_LIMITS, RADIUS_LIMITS, BrushTool, DepthEdits
 from iibr_core.scenes.scene import Scene, source_with_depth
-from viewer.model import messages, saving
+from viewer.model import inspection, messages, saving
 from viewer.model.action import ask, do
 from viewer.model.actions import Action, OpenPath
 from viewer.model.commands import BRUSH_WORDS
@@ -17,7 +17,6 @@ from viewer.model.layout import Layout
 from viewer.model.remedies import BETTER_DEPTH
 from viewer.model.state.app_state import AppState
 from viewer.model.state.depth_editing import Brush, ResetDepth, SetBrush, SetRefine, SetTone
-from viewer.model.state.inspection import SetOverlay
 from viewer.model.state.model_download import DepthModels, ModelsPrompt, UseModel
 from viewer.model.state.preferences import SetPreference
 from viewer.model.state.tasks import ChooseTask
@@ -172,7 +171,7 @@ def _tone(state: AppState, layout: Layout) -> list[Action]:
     shows = state.inspection.overlay == "disparity"
     shown = checkbox("Show as colours", shows, layout, "Depth over the picture: the lighter, the nearer (D).")
     if shown is not None:
-        actions.append(SetOverlay("disparity" if shown else None))
+        actions.append(do(inspection.set_overlay, "disparity" if shown else None))
     return actions
 
 
