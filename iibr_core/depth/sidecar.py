@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 from iibr_core.depth.choice import DepthChoice
-from iibr_core.formats.files import is_file
 
 SIDECAR_KINDS = ("_disparity", "_depth")
 SIDECAR_EXTENSIONS = (".pfm", ".exr", ".npy", ".npz", ".tif", ".tiff", ".png", ".webp", ".jpg", ".jpeg")
@@ -17,7 +16,7 @@ def find_sidecars(photo_path: Path) -> list[Path]:
         return []
     names = [photo_path.stem + kind + extension for kind in SIDECAR_KINDS for extension in SIDECAR_EXTENSIONS]
     candidates = [photo_path.with_name(name) for name in names]
-    return [candidate for candidate in candidates if candidate != photo_path and is_file(candidate)]
+    return [candidate for candidate in candidates if candidate != photo_path and candidate.is_file()]
 
 
 def map_to_read(photo_path: Path, choice: DepthChoice) -> Path | None:

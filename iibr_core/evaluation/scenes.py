@@ -18,7 +18,7 @@ from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.search import PhotoWithDepth, open_with_depth
 from iibr_core.evaluation.alignment import ViewFit
 from iibr_core.evaluation.warp import WarpedView, reference_warp, reference_warp_to
-from iibr_core.formats.files import entries_of, is_folder
+from iibr_core.formats.files import entries_of
 from iibr_core.formats.images.photo import read_picture
 from iibr_core.formats.light_fields.light_field_formats import LAYOUTS, find_light_field
 from iibr_core.formats.light_fields.multi_view_scene import KnownDisparity, KnownView, MultiView, common_size
@@ -53,9 +53,9 @@ def read_scene(folder: Path) -> MultiView | None:
 
 def find_scenes(folder: Path) -> Iterator[MultiView]:
     """Yield the scene of a folder, or those of its subfolders. Raises InputError if there is none or one is damaged."""
-    if not is_folder(folder):
+    if not folder.is_dir():
         raise InputError(f"{folder}: is not a folder; give the folder of a data set ({LAYOUTS})")
-    below = (path for path in entries_of(folder) if is_folder(path) and not path.name.startswith("."))
+    below = (path for path in entries_of(folder) if path.is_dir() and not path.name.startswith("."))
     scene = read_scene(folder)
     found = [scene] if scene else [scene for path in below if (scene := read_scene(path))]
     if not found:

@@ -30,7 +30,7 @@ MAX_KEYS = 1000
 
 
 def write_motion(path: Path, source: ExportSource, options: ExportOptions) -> None:
-    """Write an animation. Raises InputError if it cannot be written, Cancelled once the export should stop."""
+    """Write an animation."""
     size = ImageSize(options.size.height, options.size.width)
     frames = optics_on_path(source.scene, source.optics, options)
     drawn = (draw_framed(source, RenderSettings(optics, options.size)) for optics in frames)
@@ -38,7 +38,7 @@ def write_motion(path: Path, source: ExportSource, options: ExportOptions) -> No
 
 
 def optics_on_path(scene: Scene, optics: Optics, options: ExportOptions) -> list[Optics]:
-    """Return the optics of every frame, evenly spread over a closed path. Raises InputError for an invalid file."""
+    """Return the optics of every frame, evenly spread over a closed path."""
     turns = [k / options.frames for k in range(options.frames)]
     if options.keys is None:
         return [_on_motion(scene, optics, options.motion, turn) for turn in turns]
@@ -51,7 +51,7 @@ def optics_on_path(scene: Scene, optics: Optics, options: ExportOptions) -> list
 def read_keys(path: Path) -> list[tuple[float, ...]]:
     """Return the keys of a camera path, each (s, t), (s, t, focus) or (s, t, focus, aperture).
 
-    The file has one key a line, and comments that begin with #. Raises InputError for any other text.
+    The file has one key a line, and comments that begin with #.
     """
     keys: list[tuple[float, ...]] = []
     for number, line in enumerate(read_text(path, MAX_PATH_BYTES).splitlines(), 1):

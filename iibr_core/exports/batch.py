@@ -27,7 +27,6 @@ from iibr_core.exports.kinds import (
     EXPORTS,
     ExportOptions,
     export_path,
-    gallery_of,
     require_export_place,
 )
 from iibr_core.exports.photo_folder import list_photos
@@ -151,8 +150,6 @@ def run_batch(
 
     inputs: the photos' folders. workers: number of processes, None for one a core. dask: address of a scheduler whose
     workers are used instead. force: replace outputs that are up to date, too.
-
-    Raises InputError where the scheduler cannot be reached or is lost.
     """
     folder, read = folder.absolute(), tuple(path.absolute() for path in inputs)
     processes, threads = (0, 1) if dask else shares_of_machine(workers)
@@ -177,9 +174,9 @@ def run_batch(
     finally:
         for place in {task.target.parent for task in tasks}:
             remove_leftovers(place)
-    write_gallery = gallery_of(EXPORTS[settings.kind])
-    if write_gallery:
-        write_gallery(folder, [os.path.relpath(output, folder) for output in outputs])
+    kind = EXPORTS[settings.kind]
+    if kind.gallery:
+        kind.function(kind.gallery)(folder, [os.path.relpath(output, folder) for output in outputs])
     return count
 
 
@@ -293,7 +290,7 @@ def _prepare_worker() -> None:
 
 
 def _run_on_dask(address: str, tasks: Sequence[PhotoTask]) -> Generator[Outcome]:
-    """Export photos with the workers of a Dask scheduler. Raises InputError where it cannot be reached or is lost."""
+    """Export photos with the workers of a Dask scheduler."""
     from distributed import Client
     from distributed.scheduler import KilledWorker
 

@@ -1,7 +1,8 @@
-"""Views with their cameras, for programs that reconstruct scenes: LLFF, nerfstudio, COLMAP."""
+"""All views: as a light field, or with their cameras for programs that reconstruct scenes (LLFF, COLMAP)."""
 
 from __future__ import annotations
 
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,13 +14,9 @@ from iibr_core.exports.kinds import ExportOptions
 from iibr_core.exports.source import ExportSource
 from iibr_core.formats.cameras import FieldCameras, infinity_of, write_colmap, write_llff, write_nerfstudio
 from iibr_core.formats.images.write import write_image
+from iibr_core.formats.light_fields import write
 from iibr_core.formats.outputs import write_folder
-from iibr_core.types import (
-    ImageSize,
-    InputError,
-    ViewOffset,
-    ViewUpdate,
-)
+from iibr_core.types import ImageSize, InputError, ViewOffset, ViewUpdate
 
 MAX_POINTS = 20_000
 """Largest number of points for COLMAP, about as many as a reconstruction finds."""
@@ -28,7 +25,7 @@ MAX_DEPTH_RATIO = 1000.0
 
 
 def cameras_of(source: ExportSource) -> FieldCameras:
-    """Return the cameras of the scene's views. Raises InputError if no depth is known."""
+    """Return the cameras of the scene's views."""
     scene = source.scene
     size = ImageSize(scene.height, scene.width)
     if source.loaded is None:
@@ -73,10 +70,7 @@ def _straight_cameras(source: ExportSource) -> tuple[FieldCameras, float | None]
 
 
 def write_cameras(path: Path, source: ExportSource, options: ExportOptions, variant: str) -> None:
-    """Write all views as images/v00_u00.png ... and their cameras as "llff", "nerfstudio" or "colmap".
-
-    Raises InputError if the folder cannot be written, Cancelled once the export should stop.
-    """
+    """Write all views as images/v00_u00.png ... and their cameras as "llff", "nerfstudio" or "colmap"."""
     cameras, static_disparity = _straight_cameras(source)
     places: dict[str, ViewOffset] = {}
     centre: ViewUpdate | None = None
@@ -92,6 +86,14 @@ def write_cameras(path: Path, source: ExportSource, options: ExportOptions, vari
             write_colmap(folder, cameras, places, *_points_of(centre, cameras))
         else:
             (write_llff if variant == "llff" else write_nerfstudio)(folder, cameras, places)
+
+
+def write_light_field(path: Path, source: ExportSource, options: ExportOptions, variant: str) -> None:
+    """Write all views, with the disparity of every view if the layout has a place for it."""
+    scene = source.scene
+    focal_px = source.focal_px or float(scene.width)
+    with closing(source.views()) as views:
+        write.write_light_field(path, variant, scene.grid, views, focal_px, scene.name, True)
 
 
 def _points_of(centre: ViewUpdate, cameras: FieldCameras) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:

@@ -74,7 +74,7 @@ def side_pictures(scene: Scene, settings: RenderSettings, count: int, span_views
     pictures are cropped by the largest shear, so none shows pixels that do not exist.
 
     settings: those of every picture, apart from viewpoint and part. span_views: view steps from the first viewpoint to
-    the last, about the middle of the grid. Raises InputError if the crop leaves less than MIN_WIDTH.
+    the last, about the middle of the grid.
     """
     optics = settings.optics
     middle = (scene.grid.columns - 1) / 2 - scene.grid.centre[1]

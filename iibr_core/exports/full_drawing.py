@@ -45,7 +45,7 @@ def draw_full(
     """Return the picture, linear light (height, width, 3).
 
     draw: draws a tile. photo: the photo as it was kept for an earlier picture. keep: is called with the photo once it
-    is read, and again once its hidden surfaces are inpainted. Raises InputError if the file is missing or has changed.
+    is read, and again once its hidden surfaces are inpainted.
     """
     return _draw_tiles(picture, _read_photo(picture, photo, keep), draw)
 

@@ -6,7 +6,7 @@ Functions are named as "module:function" and imported when they are used, so tha
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -140,7 +140,7 @@ def _cameras(words: str, variant: str) -> ExportKind:
 
 
 def _light_field(words: str, variant: str, endings: tuple[str, ...] = ()) -> ExportKind:
-    write = "light_field:write_light_field"
+    write = "cameras:write_light_field"
     return ExportKind(words, endings, write, variant=variant, is_light_field=True, purpose="software")
 
 
@@ -188,7 +188,7 @@ EXPORTS = {
 
 
 def export_kind(name: str) -> ExportKind:
-    """Return the kind of this name. Raises InputError for an unknown name."""
+    """Return the kind of this name."""
     if name not in EXPORTS:
         raise InputError(f"{name!r} is not a known kind of export: give {', '.join(EXPORTS)}")
     return EXPORTS[name]
@@ -239,7 +239,7 @@ def require_ending(kind: ExportKind, path: Path) -> None:
 
 
 def export_path(kind: ExportKind, path: Path, scene: Scene, options: ExportOptions) -> Path:
-    """Return the path that is written: some kinds add a tag to the name. Raises InputError for an unknown display."""
+    """Return the path that is written: some kinds add a tag to the name."""
     tagged_path: Path = kind.function(kind.path)(path, scene, options) if kind.path else path
     return tagged_path
 
@@ -259,17 +259,9 @@ def require_export_place(kind: ExportKind, path: Path, inputs: Sequence[Path], m
 
 
 def optics_of(kind: ExportKind, options: ExportOptions, scene: Scene, optics: Optics) -> Sequence[Optics]:
-    """Return the optics of the pictures that are drawn of a scene shown with these optics; none if nothing is drawn.
-
-    Raises InputError if they cannot be drawn.
-    """
+    """Return the optics of the pictures that are drawn of a scene shown with these optics; none if nothing is drawn."""
     if not kind.is_drawn:
         return ()
     find = resolve_name(f"{__package__}.{kind.optics}")
     pictures: Sequence[Optics] = find(scene, optics, with_defaults(kind, options, scene, optics))
     return pictures
-
-
-def gallery_of(kind: ExportKind) -> Callable[[Path, Iterable[str]], Path] | None:
-    """Return the function that writes a page about a batch, see `web_gallery.write_gallery`; None if there is none."""
-    return kind.function(kind.gallery) if kind.gallery else None

@@ -39,10 +39,7 @@ def write_depth(path: Path, source: ExportSource, options: ExportOptions) -> str
 
 
 def write_rgbd(path: Path, source: ExportSource, options: ExportOptions) -> None:
-    """Write the centre view with its disparity beside it, black for the farthest and white for the nearest pixel.
-
-    Raises InputError if there is no depth or the file cannot be written.
-    """
+    """Write the centre view with its disparity beside it, black for the farthest and white for the nearest pixel."""
     colors, disparity = _disparity_of(source)
     far, near = float(disparity.min()), float(disparity.max())
     nearness = bytes_from_encoded((disparity - far) / ((near - far) or 1.0))

@@ -55,10 +55,7 @@ def belongs_to_another(stem: str, stems: Container[str]) -> bool:
 
 
 def first_photo(folder: Path) -> Path | None:
-    """Return the first photo of a folder, None if the folder is a light field or has no photo.
-
-    Raises InputError for a damaged light field.
-    """
+    """Return the first photo of a folder, None if the folder is a light field or has no photo."""
     photos = in_order(list_photos(str(folder)), "name")
     if not photos:
         return None

@@ -22,21 +22,20 @@ Points = tuple[FloatImage, NDArray[np.uint8], FloatImage]
 
 
 def write_point_cloud(path: Path, source: ExportSource, options: ExportOptions) -> None:
-    """Write a PLY file of points, y up and z backwards, as most viewers of point clouds expect. Raises InputError."""
+    """Write a PLY file of points, y up and z backwards, as most viewers of point clouds expect."""
     places, colors, _ = scene_points(source)
     write_points(path, places * np.array([1, -1, -1], np.float32), colors)
 
 
 def write_gaussians(path: Path, source: ExportSource, options: ExportOptions) -> None:
-    """Write a PLY file of Gaussian splats, y down and z forward, as 3DGS leaves them. Raises InputError."""
+    """Write a PLY file of Gaussian splats, y down and z forward, as 3DGS leaves them."""
     write_splats(path, *scene_points(source))
 
 
 def scene_points(source: ExportSource) -> Points:
     """Return the pixels of the centre view and the inpainted pixels of the corner views as points.
 
-    They are in metres if distances are known in metres, otherwise in distances of the nearest point. Raises InputError
-    without depth, Cancelled once the export should stop.
+    They are in metres if distances are known in metres, otherwise in distances of the nearest point.
     """
     cameras = cameras_of(source)
     parts: list[Points] = []

@@ -33,21 +33,18 @@ MONITOR = "thirdparty"
 
 
 def quilt_path(path: Path, scene: Scene, options: ExportOptions) -> Path:
-    """Return the path with the tag that players read. Raises InputError for an unknown display."""
+    """Return the path with the tag that players read."""
     return tagged(path, _quilt_of(scene, options.device).tag)
 
 
 def optics_of_quilt(scene: Scene, optics: Optics, options: ExportOptions) -> list[Optics]:
-    """Return the optics of its views, the leftmost first. Raises InputError if the focus leaves no common frame."""
+    """Return the optics of its views, the leftmost first."""
     tile, count = RenderSettings(optics, options.size), _quilt_of(scene, options.device).views
     return [picture.optics for picture in side_pictures(scene, tile, count, options.eyes)]
 
 
 def write_quilt(path: Path, source: ExportSource, options: ExportOptions) -> str | None:
-    """Write a quilt and show it if that is asked for; return a sentence about the display.
-
-    Raises InputError if it cannot be written or shown, Cancelled once the export should stop.
-    """
+    """Write a quilt and show it if that is asked for; return a sentence about the display."""
     bridge = Bridge() if options.show else None  # a missing display is reported before anything is drawn
     quilt = _quilt_of(source.scene, options.device)
     tile = RenderSettings(source.optics, ScreenSize(quilt.tile.width, quilt.tile.height))
@@ -65,7 +62,7 @@ class Bridge:
     """A session with the Looking Glass Bridge on this machine."""
 
     def __init__(self) -> None:
-        """Open a session. Raises InputError if Bridge does not answer or has no display."""
+        """Open a session."""
         self._session = ""
         session = _value(self._ask("enter_orchestration", name="default"), "payload")
         if not isinstance(session, str) or not session:
@@ -78,7 +75,7 @@ class Bridge:
             raise InputError("Looking Glass Bridge sees no display; connect one, and switch it on")
 
     def show_quilt(self, path: Path, quilt: Quilt) -> str:
-        """Show a written quilt on the first display; return a sentence for the user. Raises InputError."""
+        """Show a written quilt on the first display; return a sentence for the user."""
         entry: dict[str, Any] = {"id": 0, "index": 0, "name": PLAYLIST, "uri": str(path.absolute()), "isRGBD": 0}
         entry |= {"rows": quilt.rows, "cols": quilt.columns, "view_count": quilt.views, "aspect": quilt.aspect}
         entry |= {"focus": 0, "zoom": 1, "crop_pos_x": 0, "crop_pos_y": 0, "tag": ""}

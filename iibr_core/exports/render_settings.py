@@ -7,13 +7,7 @@ from dataclasses import dataclass
 from iibr_core.beyond.optics import Optics
 from iibr_core.scenes.rect import WHOLE, Rect
 from iibr_core.scenes.screen_size import ScreenSize
-from iibr_core.types import (
-    SRGB,
-    ColorSpace,
-    GridShape,
-    InputError,
-    ViewUpdate,
-)
+from iibr_core.types import SRGB, ColorSpace, GridShape, InputError, ViewUpdate
 
 MAX_PIXELS = 100_000_000
 """Largest number of pixels of a picture; as linear light it takes 1.2 GB."""

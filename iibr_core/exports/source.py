@@ -26,12 +26,7 @@ from iibr_core.runtime.work import raise_if_stopped, report_progress
 from iibr_core.scenes.lens_limits import LensChoice
 from iibr_core.scenes.scene import MAKING, LoadedPhoto, Scene, SceneReady, SceneRequest, Source
 from iibr_core.scenes.scene_gloss import add_gloss
-from iibr_core.types import (
-    SRGB,
-    ColorSpace,
-    ViewOffset,
-    ViewUpdate,
-)
+from iibr_core.types import SRGB, ColorSpace, ViewOffset, ViewUpdate
 
 Item = TypeVar("Item")
 Draw = Callable[[RenderSettings], NDArray[Any]]
@@ -65,7 +60,7 @@ class ExportSource:
         return self.scene.focal_px if self.loaded is None else self.loaded.photo.focal_px
 
     def watched(self, items: Iterable[Item], total: int, doing: str) -> Iterator[Item]:
-        """Yield the items and report progress. Raises Cancelled once the export should stop."""
+        """Yield the items and report progress."""
         for done, item in enumerate(items):
             raise_if_stopped()
             report_progress(done, total, doing)
@@ -84,7 +79,7 @@ class ExportSource:
         static_disparity: the disparity (as given) that does not move, if it is not the plan's; for photos only.
         with_disparity: whether light fields from disk yield the disparity of each view, as far as it can be found.
         wanted: the views of a photo to make beside the centre, None for all. in_srgb: whether colours are converted to
-        sRGB; otherwise they stay in the scene's colour space. Raises Cancelled once the export should stop.
+        sRGB; otherwise they stay in the scene's colour space.
         """
         if self.loaded is None:
             views = self._views_of_folder(with_disparity)
@@ -95,17 +90,14 @@ class ExportSource:
             views = views_of_photo(self.scene.source, self.loaded, plan, in_srgb=in_srgb, wanted=lambda: wanted)
         scene = self.scene
         if static_disparity is not None:
-            scene = replace(scene, infinity_px=self._infinity_px(static_disparity))
+            moved = (self.plan().disparity_zero - static_disparity) * self.plan().disparity_scale
+            scene = replace(scene, infinity_px=scene.infinity_px + moved)
         total = math.prod(scene.grid) if wanted is None else len({*wanted, CENTRE})
         for done, view in enumerate(add_gloss(views, self.optics.gloss, scene), 1):
             raise_if_stopped()
             report_progress(done, total, MAKING)
             yield view
         raise_if_stopped()
-
-    def _infinity_px(self, static_disparity: float) -> float:
-        before, after = self.plan(), self.plan(static_disparity)
-        return self.scene.infinity_px + (before.disparity_zero - after.disparity_zero) * after.disparity_scale
 
     def _views_of_folder(self, with_disparity: bool) -> Iterator[ViewUpdate]:
         """Return the views from disk, with found disparity and views between them if the scene has these."""
@@ -148,10 +140,7 @@ class ExportSource:
     def write_picture(
         self, path: Path, pixels: NDArray[Any], form: PictureFormat = AS_USUAL, color_space: ColorSpace = SRGB
     ) -> None:
-        """Write a picture (H, W, 3) of this colour space with the Exif and XMP of the photo, as `write_picture` does.
-
-        Raises InputError if it cannot be written.
-        """
+        """Write a picture (H, W, 3) of this colour space with the Exif and XMP of the photo."""
         from iibr_core.formats.images.metadata import PictureMetadata, read_metadata
 
         photo = PictureMetadata() if self.loaded is None else read_metadata(Path(self.scene.source.path))
@@ -175,7 +164,7 @@ def open_for_export(
     on_ready: Callable[[Scene], None],
     open_drawn: OpenDrawn | None,
 ) -> ExportSource:
-    """Open a scene for an export of this kind, by `open_drawn` if the kind is drawn. Raises as `OpenDrawn` does."""
+    """Open a scene for an export of this kind, by `open_drawn` if the kind is drawn."""
     if kind.is_drawn:
         assert open_drawn is not None
         return open_drawn(source, depth_strength, lens, on_ready, partial(optics_of, kind, options))
@@ -191,10 +180,7 @@ def open_for_export(
 
 
 def write_export(kind: ExportKind, path: Path, source: ExportSource, options: ExportOptions) -> str | None:
-    """Write an export of this kind; return a sentence about it for the user, or None.
-
-    Raises InputError if it cannot be written, Cancelled once the source asks to stop.
-    """
+    """Write an export of this kind; return a sentence about it for the user, or None."""
     filled = with_defaults(kind, options, source.scene, source.optics)
     message: str | None = kind.function(kind.write)(path, source, filled)
     return message

@@ -45,10 +45,7 @@ def optics_of_stack(scene: Scene, optics: Optics, options: ExportOptions) -> lis
 
 
 def write_focal_stack(path: Path, source: ExportSource, options: ExportOptions) -> None:
-    """Write a folder of PNGs, with the disparity of the centre view if that is the viewpoint.
-
-    Raises InputError if it cannot be written, Cancelled once the export should stop.
-    """
+    """Write a folder of PNGs, with the disparity of the centre view if that is the viewpoint."""
     if options.bits not in STACK_BITS:
         raise InputError(f"{options.bits} bits: PNGs have {' or '.join(map(str, STACK_BITS))} bits a channel")
     form, space = PictureFormat(options.bits), source.color_space

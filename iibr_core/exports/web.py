@@ -36,10 +36,7 @@ COMMENT = re.compile(r"[ \t]*//[^\n]*|\n(?=[ \t]*(?://[^\n]*)?\n)")
 
 
 def write_page(path: Path, source: ExportSource, options: ExportOptions) -> str:
-    """Write an .html file; return a sentence about its views.
-
-    Raises InputError if it cannot be written or no page fits the budget, Cancelled once the export should stop.
-    """
+    """Write an .html file; return a sentence about its views."""
     page, views = make_page(source, options)
     with write_file(path) as temporary:
         temporary.write_bytes(page)
@@ -52,7 +49,7 @@ def write_page(path: Path, source: ExportSource, options: ExportOptions) -> str:
 
 
 def make_page(source: ExportSource, options: ExportOptions) -> tuple[bytes, WebViews]:
-    """Return the page and its views. Raises as `write_page` does."""
+    """Return the page and its views."""
     scene = source.scene
     form = form_that_fits(scene.grid, ImageSize(scene.height, scene.width), options.stills)
     store = ViewStore(source.views(with_disparity=True, in_srgb=False), scene.grid, form, scene.color_space)

@@ -15,7 +15,7 @@ from urllib.parse import quote
 from PIL import Image
 
 from iibr_core.exports.web import POLICY, hash_of
-from iibr_core.formats.files import is_file, read_text
+from iibr_core.formats.files import read_text
 from iibr_core.formats.outputs import write_file
 from iibr_core.runtime.resources import resource_folder
 from iibr_core.types import InputError
@@ -32,13 +32,10 @@ ENTRY = '<li><a href="{link}"><img alt="{alt}" src="{picture}"><span>{title}</sp
 
 
 def write_gallery(folder: Path, outputs: Iterable[str]) -> Path:
-    """Write the gallery of the pages with these names in the folder; return its path.
-
-    Raises InputError if it cannot be written or would replace a file that is no gallery.
-    """
+    """Write the gallery of the pages with these names in the folder; return its path."""
     pages = sorted(outputs)
     path = folder / (NAME if NAME not in pages else OTHER_NAME)
-    if os.path.lexists(path) and not _is_gallery(path):
+    if os.path.lexists(path) and not (path.is_file() and MARK in read_text(path, 1 << 30)[:4000]):
         raise InputError(f"{path}: already exists and is no gallery; move it, for the index of these pages goes there")
     parts = resource_folder("web")
     style = (parts / "gallery.css").read_text("utf-8")
@@ -53,10 +50,6 @@ def write_gallery(folder: Path, outputs: Iterable[str]) -> Path:
     with write_file(path) as temporary:
         temporary.write_bytes(text.encode("utf-8", "replace"))
     return path
-
-
-def _is_gallery(path: Path) -> bool:
-    return is_file(path) and MARK in read_text(path, 1 << 30)[:4000]
 
 
 def _entry(folder: Path, page: str) -> str:

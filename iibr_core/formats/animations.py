@@ -35,7 +35,7 @@ def even_size(size: ImageSize) -> ImageSize:
 def write_animation(path: Path, frames: Iterable[NDArray[np.uint8]], size: ImageSize, rate: float) -> None:
     """Write an animation of the kind that the ending states: one of VIDEOS, .gif or .webp; whole or not at all.
 
-    frames: (H, W, 3), sRGB-encoded, all of this size. rate: frames a second. Raises InputError for videos of odd sizes.
+    frames: (H, W, 3), sRGB-encoded, all of this size. rate: frames a second.
     """
     is_video = path.suffix.lower() in VIDEOS
     if is_video and size != even_size(size):

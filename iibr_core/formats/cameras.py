@@ -15,13 +15,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.types import (
-    FloatImage,
-    GridShape,
-    ImageSize,
-    InputError,
-    ViewOffset,
-)
+from iibr_core.types import FloatImage, GridShape, ImageSize, InputError, ViewOffset
 
 MAX_DEPTH_RATIO = 20.0
 """Ratio of the farthest depth to the nearest one where the disparity at infinity is unknown."""

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-import errno
 import os
 import stat
+import struct
+import tokenize
+import zipfile
+import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path, PurePosixPath, PureWindowsPath
@@ -20,7 +23,11 @@ HARMLESS_BYTES = 256 * 2**20
 """Number of bytes that may be decoded from a file of any size."""
 MAX_TEXT_BYTES = 1 << 20
 """Size of the largest text file that is read: settings and lists are smaller."""
-MISSING_ERRORS = (errno.ENOENT, errno.ENOTDIR, errno.ELOOP, errno.ENAMETOOLONG)
+PARSE_ERRORS = (
+    ValueError, TypeError, LookupError, ArithmeticError, AttributeError, RuntimeError, OSError, EOFError, SyntaxError,
+    MemoryError, struct.error, zlib.error, zipfile.BadZipFile, tokenize.TokenError,
+)  # fmt: skip
+"""Errors of the parsers of other projects, and of ours, for damaged files."""
 MAX_REASON_CHARACTERS = 200
 MAX_SHOWN_CHARACTERS = 80
 
@@ -40,35 +47,6 @@ def printable(text: str) -> str:
     return line if len(line) <= MAX_SHOWN_CHARACTERS else f"{line[: MAX_SHOWN_CHARACTERS - 3]}..."
 
 
-def status_of(path: Path) -> os.stat_result | None:
-    """Return the status of a file or folder, links followed; None where there is nothing.
-
-    Raises InputError where permissions hide it, as below a folder without search permission.
-    """
-    try:
-        return os.stat(path)
-    except ValueError:  # a NUL in the name
-        return None
-    except OSError as error:
-        if error.errno in MISSING_ERRORS:
-            return None
-        raise InputError(
-            f"{path}: cannot be looked at ({reason_of(error)}); change the permissions of its folders"
-        ) from error
-
-
-def is_file(path: Path) -> bool:
-    """Return whether there is an ordinary file."""
-    status = status_of(path)
-    return status is not None and stat.S_ISREG(status.st_mode)
-
-
-def is_folder(path: Path) -> bool:
-    """Return whether there is a folder."""
-    status = status_of(path)
-    return status is not None and stat.S_ISDIR(status.st_mode)
-
-
 def stays_within(name: str) -> bool:
     """Return whether a path from a file, joined to a folder, cannot lead out of it by its words."""
     windows = PureWindowsPath(name)
@@ -85,9 +63,12 @@ def entries_of(folder: Path) -> list[Path]:
 
 def require_file(path: Path) -> None:
     """Raise InputError unless `path` is a readable file with something in it."""
-    status = status_of(path)
-    if status is None:
-        raise InputError(f"{path}: no such file")
+    try:
+        status = path.stat()
+    except (FileNotFoundError, NotADirectoryError, ValueError) as error:  # ValueError: a NUL in the name
+        raise InputError(f"{path}: no such file") from error
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({reason_of(error)}); choose another") from error
     if stat.S_ISDIR(status.st_mode):
         raise InputError(f"{path}: is a folder, not a file")
     if not stat.S_ISREG(status.st_mode):

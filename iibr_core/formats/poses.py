@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from iibr_core.formats.files import is_file, is_folder, printable, read_text, reason_of, stays_within
+from iibr_core.formats.files import printable, read_text, reason_of, stays_within
 from iibr_core.formats.images.decode import read_size
 from iibr_core.formats.maps.npy import read_array
 from iibr_core.types import Camera, ImageSize, InputError
@@ -51,7 +51,7 @@ def read_poses(path: Path) -> tuple[Camera, ...]:
 
     A folder is searched for either of them, else for COLMAP's cameras.txt and images.txt (sorted by picture).
     """
-    if is_folder(path):
+    if path.is_dir():
         return _read_folder(path)
     if path.suffix.lower() == ".npy":
         return read_llff_poses(path)
@@ -68,10 +68,10 @@ def central_camera(cameras: Sequence[Camera]) -> int:
 
 def _read_folder(folder: Path) -> tuple[Camera, ...]:
     for name in ("poses_bounds.npy", "transforms.json"):
-        if is_file(folder / name):
+        if (folder / name).is_file():
             return read_poses(folder / name)
     for model in (folder, folder / "sparse" / "0"):
-        if all(is_file(model / name) for name in COLMAP_FILES):
+        if all((model / name).is_file() for name in COLMAP_FILES):
             return _read_colmap(model)
     raise InputError(f"{folder}: holds neither poses_bounds.npy nor transforms.json nor COLMAP's cameras.txt")
 

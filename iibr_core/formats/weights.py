@@ -1,6 +1,6 @@
 """Trained weights on disk: safetensors, which hold numbers and text only, so a foreign file runs no code.
 
-A file states its content and version. A file that does not fit the model is refused before the model changes.
+A file states its content and version.
 """
 
 from __future__ import annotations
@@ -33,16 +33,6 @@ def save_weights(model: nn.Module, path: Path, metadata: Mapping[str, str] | Non
     data = save(arrays, {**(metadata or {}), "content": WEIGHTS, "version": VERSION})
     with write_file(path) as temporary:
         temporary.write_bytes(data)
-
-
-def load_weights(path: Path, model: nn.Module) -> dict[str, str]:
-    """Put the weights of a file into the model, which stays unchanged on errors, and return their metadata."""
-    import torch
-
-    arrays, metadata = read_weights(path)
-    require_shapes(path, arrays, {name: tensor.shape for name, tensor in model.state_dict().items()})
-    model.load_state_dict({name: torch.from_numpy(array) for name, array in arrays.items()})
-    return metadata
 
 
 def read_weights(path: Path) -> tuple[dict[str, NDArray[Any]], dict[str, str]]:

@@ -6,7 +6,6 @@ import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,15 +15,7 @@ from iibr_core.beyond.lens import LensSum
 from iibr_core.beyond.optics import CENTRE, ApertureShape, Optics
 from iibr_core.color import encoded_from_stored, srgb_from_linear
 from iibr_core.formats.light_fields.write import WRITERS, check_light_field, write_light_field
-from iibr_core.types import (
-    FloatImage,
-    GridShape,
-    InputError,
-    StoredColors,
-    ViewOffset,
-    ViewUpdate,
-    image_size,
-)
+from iibr_core.types import FloatImage, GridShape, InputError, StoredColors, ViewOffset, ViewUpdate, image_size
 
 CAMERAS_PER_PX = 4.0
 """Views that `LightField.refocus` makes for each pixel of its widest blur."""
@@ -137,7 +128,8 @@ def gather(
 ) -> LightField:
     """Return the light field of all views."""
     first = next(views)
-    arrays = [_room_for(values, grid) for values in (first.colors, first.disparity, first.inpainted)]
+    parts = (first.colors, first.disparity, first.inpainted)
+    arrays = [None if part is None else np.empty((*grid, *part.shape), part.dtype) for part in parts]
     for view in (first, *views):
         for array, values in zip(arrays, (view.colors, view.disparity, view.inpainted)):
             if array is not None:
@@ -145,7 +137,3 @@ def gather(
     colors, disparity, inpainted = arrays
     assert colors is not None
     return LightField(colors, disparity, inpainted, focal_px, name, view_between)
-
-
-def _room_for(values: NDArray[Any] | None, grid: GridShape) -> NDArray[Any] | None:
-    return None if values is None else np.empty((*grid, *values.shape), values.dtype)

@@ -8,7 +8,7 @@ from dataclasses import replace
 from functools import cache
 from itertools import count
 from pathlib import Path
-from typing import Any, Literal, NamedTuple, get_args
+from typing import Any, Literal, NamedTuple, TypedDict, Unpack, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,17 +36,10 @@ from iibr_core.runtime.work import (
     stoppable,
     watched,
 )
-from iibr_core.scenes.dense import read_dense
-from iibr_core.scenes.light_fields import READING
+from iibr_core.scenes.light_fields import READING, read_dense
 from iibr_core.scenes.photo import load_photo, make_plan, photo_of_arrays, views_of_photo
 from iibr_core.scenes.scene import MAKING, LoadedPhoto, Source
-from iibr_core.types import (
-    Disparity,
-    FloatImage,
-    GridShape,
-    InputError,
-    Photo,
-)
+from iibr_core.types import Disparity, FloatImage, GridShape, InputError, Photo
 
 Parallax = Literal["viewing", "literal"]
 """Distance by which views move: "viewing" as the window shows a scene, whatever the unit of its disparity; "literal" by
@@ -56,13 +49,12 @@ Grid = int | tuple[int, int] | None
 """Rows and columns of views: 9 is 9 x 9, (5, 9) five rows of nine, None the grid of the plan or of the files."""
 
 
-class _Choices(NamedTuple):
-    """Options of `Scene.light_field`."""
+class ViewOptions(TypedDict, total=False):
+    """Options of `Scene.light_field`: "viewing" parallax, depth strength 1 and the background inpainter by default."""
 
-    grid: GridShape | None
-    parallax: Parallax = "viewing"
-    depth_strength: float = 1.0
-    inpaint: str = DEFAULT_INPAINTER
+    parallax: Parallax
+    depth_strength: float
+    inpaint: str
 
 
 class _Making(NamedTuple):
@@ -103,10 +95,7 @@ class Scene(ABC):
         grid: Grid = None,
         should_stop: ShouldStop = never,
         report_progress: ReportProgress = ignore_progress,
-        *,
-        parallax: Parallax = "viewing",
-        depth_strength: float = 1.0,
-        inpaint: str = DEFAULT_INPAINTER,
+        **options: Unpack[ViewOptions],
     ) -> LightField:
         """Return all views, in memory.
 
@@ -115,9 +104,8 @@ class Scene(ABC):
         views between its own. Raises InputError for other options and if memory does not suffice, Cancelled once
         should_stop is true.
         """
-        choices = _Choices(_grid_shape(grid), parallax, depth_strength, inpaint)
         with stoppable(should_stop), watched(report_progress):
-            making = self._make(choices)
+            making = self._make(_grid_shape(grid), **options)
         views = making.watched(should_stop, report_progress)
         return gather(views, making.grid, self.focal_px, self.name, making.view_between)
 
@@ -126,19 +114,15 @@ class Scene(ABC):
         grid: Grid = None,
         should_stop: ShouldStop = never,
         report_progress: ReportProgress = ignore_progress,
-        *,
-        parallax: Parallax = "viewing",
-        depth_strength: float = 1.0,
-        inpaint: str = DEFAULT_INPAINTER,
+        **options: Unpack[ViewOptions],
     ) -> Iterator[View]:
         """Yield every view once, the middle one first; none is kept. Arguments of `light_field`."""
-        choices = _Choices(_grid_shape(grid), parallax, depth_strength, inpaint)
         with stoppable(should_stop), watched(report_progress):
-            making = self._make(choices)
+            making = self._make(_grid_shape(grid), **options)
         return making.watched(should_stop, report_progress)
 
     @abstractmethod
-    def _make(self, choices: _Choices) -> _Making:
+    def _make(self, grid: GridShape | None, **options: Unpack[ViewOptions]) -> _Making:
         """Begin to make views. Raises InputError."""
 
 
@@ -159,21 +143,28 @@ class PhotoScene(Scene):
 
     def plan(self, grid: Grid = None, parallax: Parallax = "viewing", depth_strength: float = 1.0) -> ScenePlan:
         """Return the plan of the views, with their cost. Arguments of `light_field`. Raises InputError."""
-        choices = _Choices(_grid_shape(grid), parallax, depth_strength)
-        return make_plan(self._source_for(choices), self._loaded, depth_strength)
+        return self._planned(_grid_shape(grid), parallax, depth_strength)[1]
 
-    def _source_for(self, choices: _Choices) -> Source:
-        """Return the source with these options. Raises InputError if they make no sense."""
-        if choices.parallax not in get_args(Parallax):
-            raise InputError(f"parallax {choices.parallax!r}: give 'viewing' or 'literal'")
-        is_literal = choices.parallax == "literal"
-        if is_literal and (choices.grid is None or choices.depth_strength != 1):
+    def _planned(
+        self, grid: GridShape | None, parallax: Parallax, depth_strength: float, inpaint: str = DEFAULT_INPAINTER
+    ) -> tuple[Source, ScenePlan]:
+        """Return the source with these options, and the plan of its views."""
+        if parallax not in get_args(Parallax):
+            raise InputError(f"parallax {parallax!r}: give 'viewing' or 'literal'")
+        is_literal = parallax == "literal"
+        if is_literal and (grid is None or depth_strength != 1):
             raise InputError("parallax 'literal' takes the disparity as given: give a grid, and no depth_strength")
-        return replace(self._source, grid=choices.grid, inpaint=choices.inpaint, is_literal=is_literal)
+        source = replace(self._source, grid=grid, inpaint=inpaint, is_literal=is_literal)
+        return source, make_plan(source, self._loaded, depth_strength)
 
-    def _make(self, choices: _Choices) -> _Making:
-        source = self._source_for(choices)
-        plan = make_plan(source, self._loaded, choices.depth_strength)
+    def _make(
+        self,
+        grid: GridShape | None,
+        parallax: Parallax = "viewing",
+        depth_strength: float = 1.0,
+        inpaint: str = DEFAULT_INPAINTER,
+    ) -> _Making:
+        source, plan = self._planned(grid, parallax, depth_strength, inpaint)
         values = plan.field_disparity(self._loaded.disparity).values
         rays = cache(lambda: PhotoViews(self.photo, values, outer_views_of_grid(plan.grid)))
         return _Making(plan.grid, views_of_photo(source, self._loaded, plan), lambda offset: rays().view(offset).colors)
@@ -188,12 +179,12 @@ class FieldScene(Scene):
         self.name, self.notes, self.focal_px = field.name, field.notes, field.focal_px or float(self.photo.shape[1])
         self.depth_source = "the light field" if field.disparity else "none"
 
-    def _make(self, choices: _Choices) -> _Making:
-        if (choices.parallax, choices.depth_strength) != ("viewing", 1):
+    def _make(self, grid: GridShape | None, **options: Unpack[ViewOptions]) -> _Making:
+        if options.get("parallax", "viewing") != "viewing" or options.get("depth_strength", 1) != 1:
             raise InputError(f"{self.name}: parallax and depth_strength are for photos; leave them out")
-        if choices.grid in (None, self._grid):
+        if grid is None or grid == self._grid:
             return _Making(self._grid, read_views(self._field)[1], doing=READING)
-        return _Making(choices.grid, read_dense(self._field, choices.grid, choices.inpaint).views)
+        return _Making(grid, read_dense(self._field, grid, options.get("inpaint", DEFAULT_INPAINTER))[2])
 
 
 def open(

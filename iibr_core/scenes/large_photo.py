@@ -31,7 +31,7 @@ from iibr_core.types import Disparity, FloatImage, InputError, Photo
 def load_large(source: Source, loaded: LoadedPhoto, plan: ScenePlan, max_pixels: int) -> LargePhoto:
     """Return the photo of `source`, which was `loaded` smaller, with at most max_pixels and without `fills`.
 
-    Its disparity is the same, with edges drawn to those of the larger photo. Raises InputError if the file has changed.
+    Its disparity is the same, with edges drawn to those of the larger photo.
     """
     path = Path(source.path)
     if stamp_of(path) != loaded.stamp:
@@ -48,10 +48,7 @@ def load_large(source: Source, loaded: LoadedPhoto, plan: ScenePlan, max_pixels:
 
 
 def complete_fills(source: Source, loaded: LoadedPhoto, plan: ScenePlan) -> RaySet | None:
-    """Return the complete ray set of the light field, None if nothing is disoccluded.
-
-    Raises InputError if the inpainter is not available.
-    """
+    """Return the complete ray set of the light field, None if nothing is disoccluded."""
     if not plan.has_disocclusion:
         return None
     renderer = Renderer(inpaint=load_inpainter(source.inpaint))
@@ -63,11 +60,12 @@ def _disparity(source: Source, loaded: LoadedPhoto, photo: Photo) -> FloatImage:
     settings, enlarged = loaded.depth_settings, np.float32(photo.size.width / loaded.photo.size.width)
     if enlarged == 1:
         return loaded.disparity.values
-    file = _larger_map(loaded)
-    if file is not None:
+    file = Path(loaded.origin.file) if loaded.origin.file is not None else None
+    if file is not None and math.prod(read_map_size(file)) > math.prod(loaded.photo.size):
         choice = replace(source.depth, file=str(file), refine=False)
         given = find_depth(Path(source.path), photo, choice, source.grid).disparity
     else:
+        file = None
         given = Disparity(resample_surfaces(loaded.disparity.values, photo.size) * enlarged, loaded.disparity.source)
     raise_if_stopped()
     values = given.values
@@ -76,9 +74,3 @@ def _disparity(source: Source, loaded: LoadedPhoto, photo: Photo) -> FloatImage:
     if file is None or settings.edits == UNEDITED:
         return values
     return apply_edits(photo.pixels, values / enlarged, settings.edits) * enlarged
-
-
-def _larger_map(loaded: LoadedPhoto) -> Path | None:
-    """Return the map's file if it holds more pixels than the disparity that was made of it."""
-    file = Path(loaded.origin.file) if loaded.origin.file is not None else None
-    return file if file and math.prod(read_map_size(file)) > math.prod(loaded.photo.size) else None

@@ -27,18 +27,13 @@ def clamp(value: float, low: float, high: float) -> float:
     return float(min(max(value, low), high))
 
 
-def eye_margin(views: int) -> float:
-    """Return how far the viewpoint may leave a row of views on each side: only if it could not move otherwise.
-
-    The views do not show the surfaces that become visible there; they are stretched.
-    """
-    return LONE_VIEW_MARGIN if views == 1 else 0.0
-
-
 def eye_limits(views: int) -> tuple[float, float]:
-    """Return the least and greatest view offset along a row of views."""
-    first, last = -(views // 2), views - 1 - views // 2
-    return first - eye_margin(views), last + eye_margin(views)
+    """Return the least and greatest view offset along a row of views.
+
+    The viewpoint leaves a single view a little, because it could not move otherwise; the view is stretched there.
+    """
+    margin = LONE_VIEW_MARGIN if views == 1 else 0.0
+    return -(views // 2) - margin, views - 1 - views // 2 + margin
 
 
 def clamp_eye(eye: ViewOffset, grid: GridShape) -> ViewOffset:

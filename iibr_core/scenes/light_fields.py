@@ -5,13 +5,14 @@ wide apertures and viewpoints between the views work as with a photo; or with vi
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
 
 import numpy as np
 
+from iibr_core.beyond.between_views import GivenView, densify, read_given_views, require_steps
 from iibr_core.color import encoded_from_stored
 from iibr_core.depth.multi_view.estimate import estimate_coarse, estimate_disparity, sweep_bytes
 from iibr_core.depth.multi_view.matching import FINDING
@@ -21,11 +22,11 @@ from iibr_core.formats.light_fields.light_field_formats import open_light_field
 from iibr_core.formats.light_fields.multi_view_scene import MultiView
 from iibr_core.formats.light_fields.views import disparity_range, grid_of, read_views
 from iibr_core.formats.maps.disparity_file import read_disparity
+from iibr_core.inpainting.registry import load_inpainter
 from iibr_core.method.light_field import generate
 from iibr_core.method.memory import require_memory, view_bytes
 from iibr_core.method.plan import plan_literal
 from iibr_core.runtime.work import report_progress
-from iibr_core.scenes.dense import read_dense
 from iibr_core.scenes.scene import Scene, Source
 from iibr_core.types import (
     Disparity,
@@ -64,10 +65,10 @@ def load_light_field(
 ) -> Iterator[LoadedField]:
     """Yield the light field of a folder or file, again each time its disparity is known better.
 
-    takes_drafts: views without disparity come as read, then with a coarse disparity, then with the final one;
-    otherwise the field comes once, when all is known. known: disparity of the centre view that was found before.
-    nearest_to: returns the viewpoint near which views between those on disk are made first. The views of a field must
-    be taken before the next field is asked for. Raises InputError for a field or a map that cannot be read.
+    takes_drafts: views without disparity come as read, then with a coarse disparity, then with the final one; otherwise
+    the field comes once, when all is known. known: disparity of the centre view that was found before. nearest_to:
+    returns the viewpoint near which views between those on disk are made first. The views of a field must be taken
+    before the next field is asked for.
     """
     field = open_light_field(Path(source.path))
     grid, (size, views) = grid_of(field), read_views(field)
@@ -100,10 +101,7 @@ def load_light_field(
 
 
 def find_disparity(field: MultiView) -> FloatImage:
-    """Return the disparity (H, W) of the centre view, of a stereo pair that of the left one, in pixels per view step.
-
-    Raises InputError, also if memory does not suffice.
-    """
+    """Return the disparity (H, W) of the centre view, of a pair that of the left one, in pixels per view step."""
     grid, (size, views) = grid_of(field), read_views(field)
     _require_field(field.name, size, grid)
     # The centre comes first; of a pair it is the left one.
@@ -115,6 +113,22 @@ def find_disparity(field: MultiView) -> FloatImage:
     return estimate_disparity(colors, offsets, 0, coarse.range_px)
 
 
+def read_dense(
+    field: MultiView,
+    grid: GridShape,
+    inpaint: str,
+    nearest_to: Callable[[], ViewOffset] = lambda: ViewOffset(0.0, 0.0),
+) -> tuple[Sequence[GivenView], int, Generator[ViewUpdate]]:
+    """Read the views of a light field, and begin to make views between them.
+
+    Return its own views, the middle one first; the number of steps from one of them to the next; and all views.
+    """
+    sparse = grid_of(field)
+    steps, inpainter = require_steps(sparse, grid, field.name), load_inpainter(inpaint)
+    given = read_given_views(field)
+    return given, steps, densify(given, sparse, grid, inpainter, nearest_to)
+
+
 def _filled_between(
     source: Source, field: MultiView, wanted: GridShape, nearest_to: Callable[[], ViewOffset]
 ) -> LoadedField:
@@ -124,9 +138,9 @@ def _filled_between(
             f"{source.depth.file}: is the disparity of one view, and views between take that of all: open"
             f" {field.name} without it"
         )
-    dense = read_dense(field, wanted, source.inpaint, nearest_to)
-    low, high = min(view.disparity.min() for view in dense.given), max(view.disparity.max() for view in dense.given)
-    middle, steps = dense.given[0], dense.steps
+    given, steps, views = read_dense(field, wanted, source.inpaint, nearest_to)
+    low, high = min(view.disparity.min() for view in given), max(view.disparity.max() for view in given)
+    middle = given[0]
     centre = ViewUpdate(middle.row, middle.column, middle.colors, middle.disparity / np.float32(steps))
     scene = replace(
         _scene_as_read(source, field, centre, (float(low) / steps, float(high) / steps)),
@@ -134,7 +148,7 @@ def _filled_between(
         depth_source="light field" if len(field.disparity) == len(field.views) else FROM_VIEWS,
         has_view_disparity=True,
     )
-    return LoadedField(scene, dense.views)
+    return LoadedField(scene, views)
 
 
 def _with_found_disparity(scene: Scene, views: Sequence[ViewUpdate], takes_drafts: bool) -> Iterator[LoadedField]:

@@ -37,7 +37,7 @@ from iibr_core.scenes.scene import (
     WantedPhoto,
 )
 from iibr_core.scenes.screen_size import ScreenSize
-from iibr_core.types import InputError, Photo, ViewOffset, ViewUpdate
+from iibr_core.types import InputError, ViewOffset, ViewUpdate
 
 Wanted = Callable[[], Collection[ViewOffset] | None]
 """Function that returns the offsets of the views to make, None for all views of the grid."""
@@ -49,7 +49,7 @@ def results_of(
     """Yield all results of opening a scene: the scene, then each of its views; a light field perhaps more than once.
 
     nearest_to: returns the viewpoint near which views are made first. wanted: called once, after the scene was taken;
-    for photos only. Raises InputError for a file that cannot be opened.
+    for photos only.
     """
     try:
         if request.filled is not None:
@@ -77,7 +77,7 @@ def sketch_of(photo: WantedPhoto) -> SceneReady | None:
 
 def scene_of_photo(source: Source, loaded: LoadedPhoto, plan: ScenePlan) -> Scene:
     """Return the scene of a photo and its plan."""
-    height, width = loaded.photo.size
+    (height, width), focal_px = loaded.photo.size, loaded.photo.focal_px
     values = loaded.disparity.values
     infinity = infinity_of(float(values.min()), float(values.max()), loaded.disparity.inverse_metres)
     return Scene(
@@ -92,7 +92,7 @@ def scene_of_photo(source: Source, loaded: LoadedPhoto, plan: ScenePlan) -> Scen
         plan=plan,
         notes=loaded.photo.notes + loaded.disparity.notes + plan.notes,
         problems=loaded.origin.failures,
-        focal_px=_known_focal_px(loaded.photo),
+        focal_px=None if focal_px == focal_px_from_fov(width) else focal_px,
         subject_disparity_px=subject_disparity(plan.field_disparity(loaded.disparity).values),
         settings=loaded.settings,
         depth_origin=loaded.origin,
@@ -114,11 +114,6 @@ def _found_span_px(loaded: LoadedPhoto, plan: ScenePlan) -> float:
     found = loaded.refined.values
     span = float(np.ptp(found)) if plan.given_range is None else measure_disparity_range(found).range
     return span * abs(plan.disparity_scale)
-
-
-def _known_focal_px(photo: Photo) -> float | None:
-    """Return the focal length; None if the photo has none and a usual field of view is assumed."""
-    return None if photo.focal_px == focal_px_from_fov(photo.size.width) else photo.focal_px
 
 
 def _centre_view(loaded: LoadedPhoto, plan: ScenePlan) -> ViewUpdate:

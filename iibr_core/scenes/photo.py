@@ -26,23 +26,10 @@ from iibr_core.formats.light_fields.light_field_formats import is_view_file
 from iibr_core.inpainting.registry import EstimateDepth
 from iibr_core.method.disparity_range import measure_disparity_range
 from iibr_core.method.light_field import generate
-from iibr_core.method.plan import (
-    MOST_STRENGTH,
-    PlanOverrides,
-    ScenePlan,
-    plan_for_viewing,
-    plan_literal,
-)
+from iibr_core.method.plan import MOST_STRENGTH, PlanOverrides, ScenePlan, plan_for_viewing, plan_literal
 from iibr_core.runtime.machine import give_back_memory
 from iibr_core.scenes.scene import DepthSettings, LoadedPhoto, Source, still_disparity
-from iibr_core.types import (
-    Disparity,
-    ImageSize,
-    InputError,
-    Photo,
-    ViewOffset,
-    ViewUpdate,
-)
+from iibr_core.types import Disparity, ImageSize, InputError, Photo, ViewOffset, ViewUpdate
 
 SKETCH = ImageSize(height=480, width=480)
 """Largest size of a sketch."""
@@ -51,7 +38,7 @@ SKETCH_WORTH_PIXELS = 1_500_000
 
 
 def stamp_of(path: Path) -> tuple[int, ...]:
-    """Return a stamp that changes when another file takes the place of this one. Raises InputError without a file."""
+    """Return a stamp that changes when another file takes the place of this one."""
     require_file(path)
     status = path.stat()
     return status.st_ino, status.st_size, status.st_mtime_ns
@@ -61,7 +48,7 @@ def load_photo(source: Source, depth_settings: DepthSettings | None = None, asks
     """Read a photo and find its disparity.
 
     depth_settings: refinement and edits of the disparity, None for those of the source. asks_model: False to guess
-    depth where a model would estimate it. Raises InputError.
+    depth where a model would estimate it.
     """
     path = Path(source.path)
     max_pixels, stored_size = _pixels_to_read(source)
@@ -75,10 +62,7 @@ def load_photo(source: Source, depth_settings: DepthSettings | None = None, asks
 
 
 def deepen(source: Source, loaded: LoadedPhoto, refines: bool) -> LoadedPhoto:
-    """Return the same photo with the depth that a model estimates, refined or not, and not edited.
-
-    Raises InputError.
-    """
+    """Return the same photo with the depth that a model estimates, refined or not, and not edited."""
     choice = replace(source.depth, start="model", file=None, refine=False)
     found = find_depth(Path(source.path), loaded.photo, choice, source.grid)
     deepened = _loaded(found, loaded.settings, source, loaded.own_size, loaded.stamp)
@@ -88,7 +72,7 @@ def deepen(source: Source, loaded: LoadedPhoto, refines: bool) -> LoadedPhoto:
 def sketch_photo(source: Source) -> LoadedPhoto | None:
     """Return a large photo at a small size with depth that is found quickly, to be shown while it is read.
 
-    None if it is not worth while. Raises InputError.
+    None if it is not worth while.
     """
     path = Path(source.path)
     max_pixels, stored_size = _pixels_to_read(source)
@@ -108,7 +92,7 @@ def photo_of_arrays(photo: Photo, disparity: Disparity) -> LoadedPhoto:
 
 
 def apply_depth_settings(loaded: LoadedPhoto, depth_settings: DepthSettings) -> LoadedPhoto:
-    """Return the same photo with other refinement and edits; only what changed is computed. Raises InputError."""
+    """Return the same photo with other refinement and edits; only what changed is computed."""
     if loaded.depth_settings == depth_settings:
         return loaded
     if loaded.depth_settings.refine != depth_settings.refine:
@@ -132,7 +116,7 @@ def depth_estimator(source: Source, loaded: LoadedPhoto) -> EstimateDepth | None
 def make_plan(source: Source, loaded: LoadedPhoto, depth_strength: float, keeps_views: bool = True) -> ScenePlan:
     """Return the plan for viewing, or for literal disparity. Places without edits keep their parallax.
 
-    keeps_views: False if each view is written and forgotten. Raises InputError if an override is out of range.
+    keeps_views: False if each view is written and forgotten.
     """
     if source.is_literal:
         if source.grid is None:
@@ -158,7 +142,7 @@ def views_of_photo(
     in_srgb: bool = True,
     wanted: Callable[[], Collection[ViewOffset] | None] = lambda: None,
 ) -> Generator[ViewUpdate]:
-    """Yield the views as `generate` does, in sRGB or in the photo's colour space. Raises InputError as that does."""
+    """Yield the views as `generate` does, in sRGB or in the photo's colour space."""
     photo, disparity = loaded.photo, plan.field_disparity(loaded.disparity)
     estimate_depth = depth_estimator(source, loaded)
     return generate(
@@ -173,7 +157,7 @@ def _turned_like(size: ImageSize, upright: ImageSize) -> ImageSize:
 
 
 def _pixels_to_read(source: Source) -> tuple[int, ImageSize]:
-    """Return the largest number of pixels to read, and the stored size. Raises InputError for files of views."""
+    """Return the largest number of pixels to read, and the stored size."""
     path = Path(source.path)
     if is_view_file(path):
         raise InputError(f"{path}: holds the views of a light field, not a photo; open it as a light field")

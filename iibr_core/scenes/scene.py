@@ -12,16 +12,7 @@ from iibr_core.depth.editing.edits import UNEDITED, DepthEdits, Levels
 from iibr_core.inpainting.registry import DEFAULT_INPAINTER
 from iibr_core.method.plan import ScenePlan
 from iibr_core.scenes.screen_size import ScreenSize
-from iibr_core.types import (
-    SRGB,
-    ColorSpace,
-    Disparity,
-    FloatImage,
-    GridShape,
-    ImageSize,
-    Photo,
-    ViewUpdate,
-)
+from iibr_core.types import SRGB, ColorSpace, Disparity, FloatImage, GridShape, ImageSize, Photo, ViewUpdate
 
 if TYPE_CHECKING:
     from iibr_core.depth.editing.canvas import DepthCanvas

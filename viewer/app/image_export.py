@@ -8,7 +8,6 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from iibr_core.formats.files import is_folder
 from iibr_core.formats.images.picture_kinds import PictureFormat
 from iibr_core.formats.images.write import write_picture
 from iibr_core.scenes.screen_size import ScreenSize
@@ -75,4 +74,4 @@ def shot_of(state: AppState, size_px: ScreenSize, form: PictureFormat) -> SavedS
     assert state.source is not None
     space = SRGB if state.scene is None else state.scene.color_space
     photo = Path(state.source.path)
-    return SavedShot(settings_of(state, size_px), form, form.space_for(space), None if is_folder(photo) else photo)
+    return SavedShot(settings_of(state, size_px), form, form.space_for(space), None if photo.is_dir() else photo)

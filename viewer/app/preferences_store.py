@@ -17,7 +17,7 @@ from typing import Any
 from platformdirs import user_config_path
 
 from iibr_core.exports.photo_folder import FolderOrder
-from iibr_core.formats.files import read_text, status_of
+from iibr_core.formats.files import read_text
 from iibr_core.formats.outputs import write_file
 from iibr_core.scenes.lens_limits import clamp
 from iibr_core.types import InputError
@@ -118,7 +118,7 @@ def _write(path: Path, value: Any) -> None:
 def _read(path: Path) -> Any:
     """What the file holds; None where there is none. Raises InputError where it is damaged."""
     try:
-        return None if status_of(path) is None else json.loads(read_text(path, MOST_BYTES))
+        return json.loads(read_text(path, MOST_BYTES)) if path.exists() else None
     except (ValueError, RecursionError) as error:
         raise InputError(f"{path}: damaged ({' '.join(str(error).split())[:80]})") from error
 

@@ -9,7 +9,6 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from iibr_core.exports.render_settings import require_size
-from iibr_core.formats.files import is_file
 from iibr_core.formats.images.picture_kinds import AS_USUAL, PictureFormat, require_picture_format
 from iibr_core.formats.outputs import check_output
 from iibr_core.scenes.inputs import inputs_of, named_by
@@ -27,7 +26,7 @@ def inputs_of_scene(state: AppState) -> tuple[Path, ...]:
     origin = state.scene.depth_origin if state.scene is not None else None
     beside = (origin and origin.file,)
     found = [path for source in sources for path in (named_by(source) if is_open else inputs_of(source))]
-    settings = [path for path in (sidecar_of(Path(source.path)) for source in sources if source.path) if is_file(path)]
+    settings = [path for path in (sidecar_of(Path(source.path)) for source in sources if source.path) if path.is_file()]
     return (*found, *settings, *(Path(os.path.expanduser(path)) for path in beside if path))
 
 

@@ -14,7 +14,7 @@ from itertools import count
 from pathlib import Path
 
 from iibr_core.depth.editing.edits import UNEDITED
-from iibr_core.formats.files import is_file, is_folder, read_text
+from iibr_core.formats.files import read_text
 from iibr_core.formats.outputs import write_file
 from iibr_core.scenes.scene import Scene, Source
 from iibr_core.types import InputError
@@ -160,9 +160,9 @@ def _find(folder: Path, scene: Scene) -> SessionFound:
     sidecar = sidecar_of(Path(scene.source.path))
     kept = folder / f"{key_of(scene.source)}.json"
     try:
-        if is_file(kept):
+        if kept.is_file():
             return SessionFound(scene, settings_from_text(read_text(kept, MOST_BYTES), str(kept), is_own=True))
-        if is_file(sidecar):
+        if sidecar.is_file():
             return SessionFound(scene, settings_from_text(read_text(sidecar, MOST_BYTES), str(sidecar)))
     except InputError as error:
         return SessionFound(scene, None, str(error))
@@ -209,7 +209,7 @@ def key_of(source: Source) -> str:
     start = "auto" if depth.start == "model" else depth.start
     reading = (depth.file_scale, depth.inverts, depth.is_metric, depth.stretches)
     digest.update(repr((depth.file and str(depth.file), *reading, start)).encode())
-    if is_folder(path):
+    if path.is_dir():
         digest.update(str(path.absolute()).encode("utf-8", "surrogateescape"))
         return digest.hexdigest()
     try:

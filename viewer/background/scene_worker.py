@@ -12,7 +12,6 @@ from pathlib import Path
 
 from iibr_core.beyond.optics import CENTRE
 from iibr_core.exports.photo_folder import first_photo
-from iibr_core.formats.files import is_folder
 from iibr_core.runtime.compiling import watch_compiling
 from iibr_core.runtime.time_left import TimeLeft
 from iibr_core.runtime.work import watched
@@ -51,7 +50,7 @@ class SceneWorker(JobThread[SceneRequest, SceneResult]):
 
     def _carry_out_scene(self, job: Job[SceneRequest, SceneResult]) -> Iterator[SceneResult]:
         source = Path(job.request.source.path)
-        if is_folder(source) and (photo := first_photo(source)) is not None:
+        if source.is_dir() and (photo := first_photo(source)) is not None:
             yield PhotosFound(job.request.generation, str(photo))
             return
         if self._scene_work is not None:

@@ -24,12 +24,12 @@ NOT_FOR_DENSE_FIELDS = NOT_FOR_LIGHT_FIELDS - {"grid", "inpaint"} | {"disparity"
 
 def write_dense_field(source: Source, grid: GridShape, out: Path, layout: str, with_disparity: bool) -> None:
     """Write a light field's views and those between. Raises InputError if the views have no places on the grid."""
-    from iibr_core.scenes.dense import read_dense
+    from iibr_core.scenes.light_fields import read_dense
 
     field = open_light_field(Path(source.path))
     with show_progress("reading"):
-        dense = read_dense(field, grid, source.inpaint)
-        size = image_size(dense.given[0].colors)
+        given, _, all_views = read_dense(field, grid, source.inpaint)
+        size = image_size(given[0].colors)
         write = partial(
             write_light_field,
             out,
@@ -39,7 +39,7 @@ def write_dense_field(source: Source, grid: GridShape, out: Path, layout: str, w
             name=field.name,
             with_disparity=with_disparity,
         )
-        with closing(dense.views) as views:
+        with closing(all_views) as views:
             summary = write_views(views, write, size, math.prod(grid))
     print(f"{summary}: {out}")
     print_notes(field.notes)

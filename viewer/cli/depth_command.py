@@ -7,7 +7,6 @@ from typing import Annotated
 
 import typer
 
-from iibr_core.formats.files import is_file
 from iibr_core.formats.light_fields.light_field_formats import find_light_field, open_light_field
 from iibr_core.formats.outputs import check_output
 from viewer.cli.scene_options import PhotoOptions, require_heeded
@@ -51,7 +50,7 @@ def depth(
 
     check_output(out, inputs_of_command(context, source), force)
     require_model(source.depth)
-    if is_file(path) and (source.depth.start != "auto" or find_light_field(path) is None):
+    if path.is_file() and (source.depth.start != "auto" or find_light_field(path) is None):
         loaded = load_photo(source)
         name, values, notes = loaded.photo.name, loaded.disparity.values, loaded.disparity.notes
         origin = loaded.origin

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from iibr_core.depth.choice import DepthChoice
-from iibr_core.formats.files import is_file
 from iibr_core.formats.outputs import check_output_folder
 from iibr_core.runtime.extras import require_extra
 from iibr_core.runtime.work import part_of_job
@@ -136,6 +135,6 @@ def _disparity_source(text: str) -> DisparityFrom | Path:
         if text == word:
             return word
     path = Path(text)
-    if not is_file(path):
+    if not path.is_file():
         raise InputError(f"--disparity {text}: is no file; give {', '.join(WORDS)} or a disparity map")
     return path

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Annotated, Any, get_args
 import typer
 
 from iibr_core.depth.choice import DepthChoice, DepthStart
-from iibr_core.formats.files import status_of
 from iibr_core.formats.light_fields.write import WRITERS
 from iibr_core.inpainting.registry import INPAINTER_FORMS, require_inpainter
 from iibr_core.scenes.inputs import inputs_of
@@ -101,7 +100,7 @@ def given_options(context: typer.Context) -> set[str]:
 def require_existing(source: Source) -> None:
     """Raise InputError before a window opens, rather than say so in it."""
     for path in (source.path, source.depth.file):
-        if path is not None and status_of(Path(path)) is None:
+        if path is not None and not Path(path).exists():
             raise InputError(f"{path}: no such file")
 
 

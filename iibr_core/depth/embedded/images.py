@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import zlib
 from io import BytesIO
 
 import numpy as np
 from PIL import Image
 
 from iibr_core.depth.embedded.jpeg import JPEG_START
-from iibr_core.formats.images import pillow_reader
+from iibr_core.formats.images.pillow_reader import DECODE_ERRORS
 from iibr_core.types import FloatImage, InputError
 
-DECODE_ERRORS = (*pillow_reader.DECODE_ERRORS, zlib.error)
 MAX_MAP_PIXELS = 64_000_000
 """Largest map; no phone stores one as large as its photo."""
 PNG_START, PNG_END = b"\x89PNG\r\n\x1a\n", b"IEND\xaeB`\x82"

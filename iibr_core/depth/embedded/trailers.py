@@ -15,9 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from iibr_core.depth.embedded.images import DECODE_ERRORS, GREY_TOLERANCE, decode_map
+from iibr_core.depth.embedded.images import GREY_TOLERANCE, decode_map
 from iibr_core.depth.embedded.jpeg import HEADER_BYTES, appended_pictures
 from iibr_core.depth.estimate import DepthEstimate
+from iibr_core.formats.images.pillow_reader import DECODE_ERRORS
 from iibr_core.formats.maps.disparity_file import has_shape_of
 from iibr_core.types import FloatImage, ImageSize, InputError
 

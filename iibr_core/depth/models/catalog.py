@@ -18,7 +18,7 @@ from iibr_core.depth.models import cache, onnx, torch_models
 from iibr_core.depth.models.download import download, local_folder
 from iibr_core.depth.models.known import KNOWN_MODELS, USUAL_MODEL, KnownModel, Runner, missing_package
 from iibr_core.depth.models.preparation import CONFIG, PREPROCESSOR, read_object
-from iibr_core.formats.files import entries_of, is_file, is_folder
+from iibr_core.formats.files import entries_of
 from iibr_core.formats.outputs import write_folder
 from iibr_core.remedies import FixableError, Remedy
 from iibr_core.runtime.work import report_progress
@@ -86,7 +86,7 @@ def model_to_use(choice: DepthChoice) -> LocalModel | None:
 def model_here(model: KnownModel) -> LocalModel | None:
     """Return a known model if all of its files are in the Hugging Face cache, else None."""
     folder = local_folder(model)
-    if not all(is_file(folder / name) for name in model.files):
+    if not all((folder / name).is_file() for name in model.files):
         return None
     return LocalModel(model.title, folder, model.runner, (folder / model.files[-1],))
 
@@ -107,9 +107,9 @@ def own_models_folder() -> Path:
 def list_own_models() -> dict[str, Path]:
     """Return the ONNX files of the copied models by name. Raises InputError if they cannot be listed."""
     place = own_models_folder()
-    folders = entries_of(place) if is_folder(place) else []
+    folders = entries_of(place) if place.is_dir() else []
     files = {folder.name: folder / f"{folder.name}.onnx" for folder in folders}
-    return {name: file for name, file in files.items() if is_file(file)}
+    return {name: file for name, file in files.items() if file.is_file()}
 
 
 def register(path: Path) -> LocalModel:
@@ -130,13 +130,13 @@ def register(path: Path) -> LocalModel:
     copy = own_models_folder() / name / f"{name}.onnx"
     if not copy.parent.exists():
         files = {weights: str(weights.relative_to(file.parent)) for weights in onnx.external_files(file)}
-        files |= {model.folder / name: name for name in (CONFIG, PREPROCESSOR) if is_file(model.folder / name)}
+        files |= {model.folder / name: name for name in (CONFIG, PREPROCESSOR) if (model.folder / name).is_file()}
         files[file] = copy.name
         with write_folder(copy.parent) as unfinished:
             for source, target in files.items():
                 (unfinished / target).parent.mkdir(parents=True, exist_ok=True)
                 shutil.copyfile(source, unfinished / target)
-    elif not is_file(copy) or not filecmp.cmp(file, copy, shallow=False):
+    elif not copy.is_file() or not filecmp.cmp(file, copy, shallow=False):
         raise InputError(f"{copy.parent}: another model has this name; rename {file}, or delete that folder")
     return _wanted_model(name)
 
@@ -144,11 +144,11 @@ def register(path: Path) -> LocalModel:
 def _wanted_model(wanted: str) -> LocalModel:
     """Return the model in a folder, of an ONNX file, or of the name of a copied or a known one."""
     path = Path(os.path.expanduser(wanted))
-    if is_folder(path):
+    if path.is_dir():
         found = _model_in(path)
-    elif path.suffix.lower() == ".onnx" and is_file(path):
+    elif path.suffix.lower() == ".onnx" and path.is_file():
         found = _onnx_model(path, f"the model {path.name}")
-    elif is_file(path):
+    elif path.is_file():
         raise InputError(f"{path}: is not an ONNX file; give one, a model folder, or the name of a known model")
     elif "/" in wanted or "\\" in wanted or path.suffix.lower() == ".onnx":
         raise InputError(f"{wanted}: no such file or folder")

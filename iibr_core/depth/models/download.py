@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from iibr_core.depth.models.known import KnownModel
-from iibr_core.formats.files import is_file, reason_of
+from iibr_core.formats.files import reason_of
 from iibr_core.runtime.work import Cancelled, in_this_job, raise_if_stopped, report_progress, wait_unless_stopped
 from iibr_core.types import InputError
 
@@ -37,7 +37,7 @@ def download(model: KnownModel) -> None:
     def work() -> None:
         try:
             for name in model.files:
-                if not is_file(folder / name):
+                if not (folder / name).is_file():
                     _fetch(model, name, folder / name)
             done.set_result(None)
         except BaseException as error:

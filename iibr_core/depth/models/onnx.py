@@ -25,7 +25,7 @@ from iibr_core.depth.models.preparation import (
     read_object,
     read_preparation,
 )
-from iibr_core.formats.files import is_file, printable, reason_of, stays_within
+from iibr_core.formats.files import printable, reason_of, stays_within
 from iibr_core.runtime.machine import core_count
 from iibr_core.runtime.work import Cancelled, report_progress, wait_unless_stopped
 from iibr_core.types import FloatImage, ImageSize, InputError, Photo
@@ -160,7 +160,7 @@ def external_files(file: Path) -> tuple[Path, ...]:
     ends = [(match.end(), match[1][0]) for match in EXTERNAL_FILE.finditer(content)]
     names = sorted({content[end : end + length].decode("utf-8", "replace") for end, length in ends})
     for name in names:
-        if not stays_within(name) or not is_file(file.parent / name):
+        if not stays_within(name) or not (file.parent / name).is_file():
             raise InputError(f"{file}: its weights are in {printable(name)}, which does not lie beside it; get it, too")
     return tuple(file.parent / name for name in names)
 

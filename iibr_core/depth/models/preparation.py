@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
-from iibr_core.formats.files import is_file, read_text, reason_of
+from iibr_core.formats.files import read_text, reason_of
 from iibr_core.types import FloatImage, ImageSize, InputError
 
 CONFIG, PREPROCESSOR = "config.json", "preprocessor_config.json"
@@ -87,7 +87,7 @@ def read_preparation(folder: Path, usual: Preparation = USUAL_PREPARATION) -> Pr
 
 def read_object(path: Path) -> dict[str, Any]:
     """Return the object in a JSON file, empty if there is no file. Raises InputError if it is damaged."""
-    if not is_file(path):
+    if not path.is_file():
         return {}
     try:
         return dict(json.loads(read_text(path)).items())

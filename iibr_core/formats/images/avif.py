@@ -9,7 +9,7 @@ from pathlib import Path
 
 from PIL.Image import Image
 
-from iibr_core.formats.files import open_binary, require_file
+from iibr_core.formats.files import PARSE_ERRORS, open_binary, require_file
 from iibr_core.formats.images.iso_boxes import associations, box, boxes
 from iibr_core.formats.images.pillow_reader import COLOR_CODES, open_with_pillow
 
@@ -17,7 +17,6 @@ BRANDS = frozenset({b"avif", b"avis"})
 MAX_BRANDS_BYTES = 256
 DEPTH_TYPES = (b"urn:mpeg:mpegB:cicp:systems:auxiliary:depth", b"urn:mpeg:hevc:2015:auxid:2")
 """Types of auxiliary pictures that are depth maps, as AVIF has them and as HEIC."""
-DAMAGE = (KeyError, IndexError, struct.error, OverflowError)
 
 
 def is_avif(path: Path) -> bool:
@@ -49,7 +48,7 @@ def avif_depth_file(path: Path) -> bytes | None:
             if any(kind == b"auxC" and content[4:].split(b"\0")[0] in DEPTH_TYPES for kind, content in known):
                 shown = pitm[:4] + item.to_bytes(len(pitm) - 4, "big")
                 return data.replace(box(b"pitm", pitm), box(b"pitm", shown), 1)
-    except DAMAGE:
+    except PARSE_ERRORS:
         pass
     return None
 
@@ -62,7 +61,7 @@ def _color_codes(data: bytes) -> tuple[int, int, int, int] | None:
             if kind == b"colr" and content[:4] == b"nclx":
                 primaries, transfer, matrix, full_range = struct.unpack_from(">HHHB", content, 4)
                 return primaries, transfer, matrix, full_range >> 7
-    except DAMAGE:
+    except PARSE_ERRORS:
         pass
     return None
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from PIL.Image import Image
 
 from iibr_core.color import ROWS_AT_ONCE
-from iibr_core.formats.files import is_file, reason_of, require_file
+from iibr_core.formats.files import reason_of, require_file
 from iibr_core.formats.images.avif import is_avif, open_avif
 from iibr_core.formats.images.file_kinds import raw_kind, unreadable_kind
 from iibr_core.formats.images.heic import heic_size, is_heic, read_heic
@@ -98,7 +98,7 @@ def read_size(path: Path, number: int = 0) -> ImageSize:
 
 def read_orientation(path: Path) -> int:
     """Return Exif's Orientation, 1 to 8; 1 for HEIC, which is decoded upright, and for files that cannot be read."""
-    if is_file(path) and is_avif(path):
+    if path.is_file() and is_avif(path):
         with open_avif(path) as image:
             return orientation_in(image.getexif())
     header = open_header(path)

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from iibr_core.formats.files import MAX_FILE_PIXELS, open_binary, reason_of
+from iibr_core.formats.files import MAX_FILE_PIXELS, PARSE_ERRORS, open_binary, reason_of
 from iibr_core.formats.images.picture import Picture
 from iibr_core.formats.images.pillow_reader import open_with_pillow
 from iibr_core.types import FloatImage, ImageSize, InputError
@@ -28,7 +28,6 @@ SECTION_START = b"\x89LF"
 JSON_KIND = b"M"
 HEADER_BYTES, NAME_BYTES, ALIGNMENT = 16, 80, 16
 MAX_FILE_BYTES, MAX_JSON_BYTES, MAX_PICTURES = 1 << 30, 1 << 24, 64
-DAMAGE = (KeyError, TypeError, ValueError, AttributeError, RecursionError, OverflowError)
 
 Chunks = Mapping[str, bytes]
 
@@ -69,7 +68,7 @@ def open_lfp(path: Path) -> Lfp | None:
         text, chunks = _sections(file.read(MAX_FILE_BYTES))
     try:
         return _processed(list(_objects(json.loads(text))), chunks) if text else None
-    except DAMAGE as error:
+    except PARSE_ERRORS as error:
         raise InputError(f"{path}: damaged or too new ({reason_of(error)}); get the whole file again") from error
 
 

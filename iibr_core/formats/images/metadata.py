@@ -17,7 +17,7 @@ from PIL import Image
 
 from iibr_core.formats.images.decode import read_size, read_text
 from iibr_core.formats.images.heic import heic_info, is_heic
-from iibr_core.formats.images.pillow_reader import EXIF_ERRORS, EXIF_FOLDER, ORIENTATION_TAG, exif_of
+from iibr_core.formats.images.pillow_reader import DECODE_ERRORS, EXIF_FOLDER, ORIENTATION_TAG, exif_of
 from iibr_core.formats.images.xmp import NAMESPACES, list_value_in, parse_packet, text_in, unpack
 from iibr_core.types import SRGB, ColorSpace, ImageSize, InputError
 
@@ -79,7 +79,7 @@ def read_metadata(path: Path) -> PictureMetadata:
             if not exif and (stored := image.getexif()):  # a TIFF keeps it in its first folder
                 exif = _exif_from(*_folders_of(stored)).tobytes()
             return PictureMetadata(exif, _bytes_of(image.info.get("xmp")))
-    except (InputError, *EXIF_ERRORS):
+    except DECODE_ERRORS:
         return PictureMetadata()
 
 
@@ -93,7 +93,7 @@ def exif_for(exif: bytes, size: ImageSize, color_space: ColorSpace, keeps_positi
             _set_camera(camera, size, color_space)
         kept = _exif_from(photo, camera, position if keeps_position else {})
         return kept if len(kept.tobytes()) <= MAX_EXIF_BYTES else Image.Exif()
-    except EXIF_ERRORS:
+    except DECODE_ERRORS:
         return Image.Exif()
 
 
@@ -154,7 +154,7 @@ def number_of(value: Any) -> float:
     """Return a number of Exif; 0 where it is none, is not positive, or makes no sense."""
     try:
         number = float(value[0] if isinstance(value, tuple) else value)
-    except EXIF_ERRORS:
+    except DECODE_ERRORS:
         return 0.0
     return number if math.isfinite(number) and 0 < number < 1e9 else 0.0
 
@@ -172,7 +172,7 @@ def _bytes_of(value: Any) -> bytes:
 
 def _folders_in(exif: bytes) -> tuple[Tags, Tags, Tags]:
     """Return the tags of the photo, its camera and its position from Exif as JPEGs have it; empty where damaged."""
-    with suppress(*EXIF_ERRORS):
+    with suppress(*DECODE_ERRORS):
         return _folders_of(exif_of(exif))
     return {}, {}, {}
 

@@ -21,9 +21,8 @@ from iibr_core.formats.images.decode import decode_bands
 from iibr_core.formats.images.file_notes import file_notes
 from iibr_core.formats.images.hdr import tone_map
 from iibr_core.formats.images.picture import Picture, full_scale, upright
-from iibr_core.formats.images.picture_source import PictureSource, read_source, source_size
+from iibr_core.formats.images.picture_source import PictureSource, read_source, small_picture, source_size
 from iibr_core.formats.images.side_by_side import left_picture
-from iibr_core.formats.images.small_picture import small_picture
 from iibr_core.formats.images.stereo_jpeg import is_jpeg
 from iibr_core.runtime.kernels import kernel
 from iibr_core.runtime.work import raise_if_stopped

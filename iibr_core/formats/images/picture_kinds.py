@@ -66,7 +66,7 @@ class PictureFormat:
         return self.color_space or (SRGB if photo == SRGB else DISPLAY_P3)
 
     def bits_for(self, path: Path) -> int:
-        """Return the bits of a channel for a file. Raises InputError where its kind is unknown or lacks them."""
+        """Return the bits of a channel for a file."""
         kind = picture_kind(path)
         bits = kind.bits[0] if self.bits is None else self.bits
         if bits not in kind.bits:
@@ -80,7 +80,7 @@ AS_USUAL = PictureFormat()
 
 
 def picture_kind(path: Path) -> PictureKind:
-    """Return the kind of a file by its ending. Raises InputError for unknown ones."""
+    """Return the kind of a file by its ending."""
     kind = KINDS.get(path.suffix.lower())
     if kind is None:
         raise InputError(f"{path}: can be written as {', '.join(KINDS)} only")

@@ -21,8 +21,7 @@ from PIL import Image
 
 from iibr_core.color import ROWS_AT_ONCE
 from iibr_core.formats.files import reason_of
-from iibr_core.formats.images.color_primaries import PRIMARIES
-from iibr_core.formats.images.color_profile import icc_profile
+from iibr_core.formats.images.color_profile import PRIMARIES, icc_profile
 from iibr_core.formats.images.decode import complaint_of, oiio_name
 from iibr_core.formats.images.metadata import PictureMetadata, exif_for, number_of
 from iibr_core.formats.images.picture_kinds import BEST_QUALITY, PNG_SETTINGS, PictureFormat

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from io import BytesIO
@@ -12,7 +11,7 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
-from iibr_core.formats.files import MAX_FILE_PIXELS, reason_of
+from iibr_core.formats.files import MAX_FILE_PIXELS, PARSE_ERRORS, reason_of
 from iibr_core.formats.images.hdr import HLG, PQ
 from iibr_core.formats.images.picture import EXIF_NUMBERS, Picture, exif_focal_px, opaque_as_none, require_sound_size
 from iibr_core.types import ImageSize, InputError
@@ -23,20 +22,8 @@ Image.MAX_IMAGE_PIXELS = MAX_FILE_PIXELS
 EXIF_FOLDER, ORIENTATION_TAG = 0x8769, 0x0112
 COLOR_CODES = "color_primaries", "transfer_characteristics", "matrix_coefficients", "full_range_flag"
 """Keys of Pillow's `nclx_profile`, in the order of `Picture.codes`."""
-DECODE_ERRORS = (
-    ValueError,
-    OSError,
-    RuntimeError,
-    EOFError,
-    SyntaxError,
-    MemoryError,
-    IndexError,
-    struct.error,
-    Image.DecompressionBombError,
-)
+DECODE_ERRORS = (*PARSE_ERRORS, Image.DecompressionBombError)
 """Errors that Pillow and pillow-heif raise for damaged files."""
-EXIF_ERRORS = (*DECODE_ERRORS, TypeError, ZeroDivisionError, KeyError, AttributeError, OverflowError)
-"""Errors that Pillow raises for damaged Exif."""
 
 
 @contextmanager
@@ -85,7 +72,7 @@ def orientation_in(exif: Image.Exif) -> int:
 def exif_of(data: bytes | None) -> Image.Exif:
     """Return Exif in the form of JPEG files as Pillow's record; empty where it is missing or damaged."""
     exif = Image.Exif()
-    with suppress(*EXIF_ERRORS):
+    with suppress(*DECODE_ERRORS):
         exif.load(data or b"")
     return exif
 
@@ -96,7 +83,7 @@ def facts_of(info: Mapping[Any, Any], size: ImageSize) -> dict[str, Any]:
     A profile counts more than colours in numbers, except for the curves of HDR.
     """
     numbers = {}
-    with suppress(*EXIF_ERRORS):  # a photo without Exif is a photo, too
+    with suppress(*DECODE_ERRORS):  # a photo without Exif is a photo, too
         tags = exif_of(info.get("exif")).get_ifd(EXIF_FOLDER)
         numbers = {name: float(tags[tag]) for tag, name in EXIF_NUMBERS.items() if tag in tags}
     facts: dict[str, Any] = {"focal_px": exif_focal_px(numbers, size)}

@@ -9,9 +9,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.formats.files import status_of
-from iibr_core.formats.images.picture_source import PicturePart, PictureSource, upright_size
-from iibr_core.formats.images.small_picture import small_picture
+from iibr_core.formats.files import require_file
+from iibr_core.formats.images.picture_source import PicturePart, PictureSource, small_picture, upright_size
 from iibr_core.types import ImageSize
 
 TAG = re.compile(r"(?:[_.-]|^)rgbd$", re.IGNORECASE)
@@ -35,12 +34,12 @@ def rgbd_parts(path: Path) -> tuple[PictureSource, PictureSource] | None:
     One half must be grey and the other one coloured. The file's name must state the pair, or its sides differ by a
     factor of about 2.
     """
-    status = status_of(path)
-    return None if status is None else _parts(path, status.st_mtime_ns, status.st_size)
+    require_file(path)
+    return _parts(path, path.stat().st_mtime_ns)
 
 
 @lru_cache(maxsize=64)
-def _parts(path: Path, modified_ns: int, size_bytes: int) -> tuple[PictureSource, PictureSource] | None:
+def _parts(path: Path, modified_ns: int) -> tuple[PictureSource, PictureSource] | None:
     size, is_named = upright_size(path), TAG.search(path.stem) is not None
     if min(size) < 2 or not (is_named or max(size) >= MIN_ASPECT * min(size)):
         return None

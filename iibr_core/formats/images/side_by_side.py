@@ -12,13 +12,19 @@ from functools import lru_cache
 from pathlib import Path
 from typing import BinaryIO, Literal
 
-from iibr_core.formats.files import open_binary, status_of
+from iibr_core.formats.files import open_binary, require_file
 from iibr_core.formats.images.alike_halves import is_one_scene
 from iibr_core.formats.images.file_kinds import raw_kind
 from iibr_core.formats.images.lfp import open_lfp
-from iibr_core.formats.images.picture_source import PicturePart, PictureSource, cut_part, source_size, upright_size
+from iibr_core.formats.images.picture_source import (
+    PicturePart,
+    PictureSource,
+    cut_part,
+    small_decoded_picture,
+    source_size,
+    upright_size,
+)
 from iibr_core.formats.images.rgbd import rgbd_parts
-from iibr_core.formats.images.small_picture import small_decoded_picture
 from iibr_core.types import ImageSize, InputError, image_size
 
 FULL_TAG, HALF_TAG, OVER_TAG = "_LRF_Full_SBS", "_LRF_Half_SBS", "_TB"
@@ -92,12 +98,12 @@ def stated_pair(path: Path) -> tuple[Eyes | None, str]:
 
     They are None where a file states no pair, with "" as note, and where its halves differ and it may be one picture.
     """
-    status = status_of(path)
-    return (None, "") if status is None else _stated_pair(path, status.st_mtime_ns, status.st_size)
+    require_file(path)
+    return _stated_pair(path, path.stat().st_mtime_ns)
 
 
 @lru_cache(maxsize=64)
-def _stated_pair(path: Path, modified_ns: int, size_bytes: int) -> tuple[Eyes | None, str]:
+def _stated_pair(path: Path, modified_ns: int) -> tuple[Eyes | None, str]:
     layout = stated_layout(path)
     if layout is None:
         return None, ""

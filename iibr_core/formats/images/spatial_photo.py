@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from iibr_core.formats.files import reason_of
+from iibr_core.formats.files import PARSE_ERRORS, reason_of
 from iibr_core.formats.images.iso_boxes import associations, box, boxes, joined
 from iibr_core.formats.outputs import write_file
 from iibr_core.types import InputError
@@ -43,7 +43,7 @@ def write_spatial_photo(path: Path, left: NDArray[np.uint8], right: NDArray[np.u
         encoded = BytesIO()
         file.save(encoded, quality=QUALITY, chroma=444, primary_index=0)
         stored = _with_pair(encoded.getvalue(), focal_px / left.shape[1])
-    except (ValueError, OSError, RuntimeError, MemoryError, KeyError, IndexError, struct.error) as error:
+    except PARSE_ERRORS as error:
         raise InputError(f"{path}: cannot be encoded as a spatial photo ({reason_of(error)})") from error
     with write_file(path) as temporary:
         temporary.write_bytes(stored)

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from iibr_core.formats.files import open_binary
+from iibr_core.formats.files import PARSE_ERRORS, open_binary
 from iibr_core.formats.images.pillow_reader import open_with_pillow
 from iibr_core.types import InputError
 
@@ -78,7 +78,7 @@ def open_lif(path: Path) -> Lif | None:
 
 
 def lif_bytes(path: Path, number: int) -> bytes:
-    """Return the content of a field. Raises InputError where there is no such field."""
+    """Return the content of a field."""
     lif = open_lif(path)
     if lif is None or number not in lif.fields:
         raise InputError(f"{path}: has no picture {number}; get the whole file again")
@@ -103,7 +103,7 @@ def _views(text: bytes, fields: Mapping[int, Any]) -> tuple[LifView, ...]:
     try:
         entries = json.loads(text)["views"]
         views = [_view({NAMES.get(key, key): value for key, value in entry.items()}) for entry in entries]
-    except (ValueError, KeyError, TypeError, AttributeError, IndexError, OverflowError, RecursionError) as error:
+    except PARSE_ERRORS as error:
         reason = type(error).__name__
         raise InputError(f"its Leia fields cannot be read ({reason}); get the whole file again") from error
     wanted = {number for view in views for number in (view.image, view.inverse_depth) if number is not None}

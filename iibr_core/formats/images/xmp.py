@@ -99,12 +99,12 @@ def xmp_for(xmp: bytes, texts: Mapping[str, str]) -> bytes:
 
 
 def text_in(xmp: bytes, name: str) -> str:
-    """Return a text of ours in a packet, packed or not; "" without. Raises InputError for damaged packets."""
+    """Return a text of ours in a packet, packed or not; "" without."""
     return value_in(parse_packet(xmp), OURS, name.rpartition(":")[2]) or "" if OURS.encode() in xmp else ""
 
 
 def unpack(text: str) -> str:
-    """Return a text of ours as it was before it was packed. Raises InputError where it is damaged."""
+    """Return a text of ours as it was before it was packed."""
     if not text.startswith(PACKED):
         return text
     try:

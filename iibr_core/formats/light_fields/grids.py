@@ -8,12 +8,14 @@ by place (`gt_disp_u00_v00.npy`, estimates `disp_est_u00_v00.npy`).
 
 from __future__ import annotations
 
+import configparser
 import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 
-from iibr_core.formats.files import entries_of, is_folder
+from iibr_core.formats.files import entries_of, read_text, reason_of
 from iibr_core.formats.images.decode import read_size
 from iibr_core.formats.images.picture_source import PictureSource
 from iibr_core.formats.light_fields.multi_view_scene import (
@@ -26,8 +28,8 @@ from iibr_core.formats.light_fields.multi_view_scene import (
     pictures_in,
     preferred_files,
 )
-from iibr_core.formats.light_fields.parameters import read_parameters, stated_focal_px, stated_grid, stated_range_px
-from iibr_core.types import GridShape, InputError, ViewOffset
+from iibr_core.formats.light_fields.write import PARAMETERS_NAME
+from iibr_core.types import GridShape, ImageSize, InputError, ViewOffset
 
 HCI_NAME = re.compile(r"input_cam(\d{1,9})$", re.IGNORECASE)
 ROW_COLUMN_NAME = re.compile(r"v(\d{1,9})_u(\d{1,9})$")
@@ -40,11 +42,8 @@ MIN_SIDE = 9
 
 
 def read_grid(folder: Path) -> MultiView | None:
-    """Return the views of a grid folder, None if its pictures are not numbered as a grid.
-
-    Raises InputError if views are missing, double, or do not fit the grid that parameters.cfg states.
-    """
-    inside = folder / "views" if is_folder(folder / "views") else folder
+    """Return the views of a grid folder, None if its pictures are not numbered as a grid."""
+    inside = folder / "views" if (folder / "views").is_dir() else folder
     layout, paths = _lay_out(folder, sorted(preferred_files(pictures_in(inside), PICTURE_EXTENSIONS).values()))
     if not paths:
         return None
@@ -110,7 +109,9 @@ def _row_by_row(folder: Path, pictures: Mapping[int, Path], is_named: bool) -> d
     is_named: whether their names are those of a light field; else they must form a large square. Where most numbers are
     left out, as where every tenth view was kept, no view counts as missing.
     """
-    count, side, stated = len(pictures), math.isqrt(len(pictures)), stated_grid(read_parameters(folder))
+    count, side, parameters = len(pictures), math.isqrt(len(pictures)), read_parameters(folder)
+    cameras = GridShape(int(parameters.get("num_cams_y", 0)), int(parameters.get("num_cams_x", 0)))
+    stated = cameras if any(cameras) else None
     if stated is None and not is_named and (side < MIN_SIDE or side**2 != count):
         return {}
     numbers = sorted(pictures)
@@ -157,12 +158,13 @@ def _grid_scene(folder: Path, layout: str, grid: GridShape, paths: Mapping[GridI
         for v, u in places
     )
     parameters = read_parameters(folder)
+    low, high = (parameters.get(name, math.nan) for name in ("disp_min", "disp_max"))
     return MultiView(
         folder.resolve().name,
         layout,
         views,
         {places.index(at): known for at, known in _maps(folder, grid).items()},
-        stated_range_px(parameters),
+        (low, high) if low <= high else None,
         grid=grid,
         focal_px=stated_focal_px(parameters, read_size(views[0].path)) if parameters else None,
     )
@@ -186,3 +188,30 @@ def _only_map(folder: Path) -> Path | None:
     kinds = (".pfm", ".npy", ".exr")
     maps = [path for path in entries_of(folder) if "disp" in path.stem.lower() and path.suffix.lower() in kinds]
     return maps[0] if len(maps) == 1 and not re.search(r"\d", maps[0].stem) else None
+
+
+def read_parameters(folder: Path) -> dict[str, float]:
+    """Return every finite number of the folder's parameters by name, whatever its section; empty without a file."""
+    path = folder / PARAMETERS_NAME
+    if not path.is_file() or path.stat().st_size == 0:
+        return {}
+    parser = configparser.ConfigParser(interpolation=None, strict=False)
+    try:
+        parser.read_string(read_text(path))
+    except configparser.Error as error:
+        raise InputError(f"{path}: is not a valid parameter file ({reason_of(error)}); correct or remove it") from error
+    numbers: dict[str, float] = {}
+    for section in parser.sections():
+        for name, text in parser.items(section):
+            with suppress(ValueError):
+                if math.isfinite(number := float(text)):
+                    numbers[name] = number
+    return numbers
+
+
+def stated_focal_px(parameters: Mapping[str, float], size: ImageSize) -> float | None:
+    """Return the focal length in pixels of a view of this size; None if it is not stated or makes no sense."""
+    focal_mm, sensor_mm = parameters.get("focal_length_mm", 0.0), parameters.get("sensor_size_mm", 0.0)
+    if focal_mm > 0 and sensor_mm > 0 and math.isfinite(focal_px := focal_mm / sensor_mm * max(size)):
+        return focal_px
+    return None

@@ -11,7 +11,7 @@ from pathlib import Path
 from pkgutil import resolve_name
 from typing import TYPE_CHECKING
 
-from iibr_core.formats.files import is_folder, require_file
+from iibr_core.formats.files import require_file
 from iibr_core.formats.light_fields.write import LENSLET_TAG
 from iibr_core.formats.quilts import TAG as QUILT_TAG
 from iibr_core.types import InputError
@@ -31,7 +31,7 @@ FILES = "give a quilt (..._qs8x6a0.75.png), a lenslet image (..._eslf.png), a st
 
 def is_light_field(path: Path) -> bool:
     """Return whether a path opens as many views, not as a photo: a folder, or a file as in `is_view_file`."""
-    return is_folder(path) or is_view_file(path)
+    return path.is_dir() or is_view_file(path)
 
 
 def is_view_file(path: Path) -> bool:
@@ -41,7 +41,7 @@ def is_view_file(path: Path) -> bool:
 
 def find_light_field(path: Path) -> MultiView | None:
     """Return the scene of a folder or file, None if no reader knows its layout."""
-    for entry in FOLDER_READERS if is_folder(path) else FILE_READERS:
+    for entry in FOLDER_READERS if path.is_dir() else FILE_READERS:
         read: Callable[[Path], MultiView | None] = resolve_name(f"{__package__}.{entry}")
         if (scene := read(path)) is not None:
             return scene
@@ -49,12 +49,12 @@ def find_light_field(path: Path) -> MultiView | None:
 
 
 def open_light_field(path: Path) -> MultiView:
-    """Return the scene of a folder or file. Raises InputError if no reader knows its layout."""
-    if not is_folder(path):
+    """Return the scene of a folder or file."""
+    if not path.is_dir():
         require_file(path)
     scene = find_light_field(path)
     if scene is None:
-        if is_folder(path) and not any(path.iterdir()):
+        if path.is_dir() and not any(path.iterdir()):
             raise InputError(f"{path}: no photos in it")
-        raise InputError(f"{path}: holds no light field; {f'laid out as {LAYOUTS}' if is_folder(path) else FILES}")
+        raise InputError(f"{path}: holds no light field; {f'laid out as {LAYOUTS}' if path.is_dir() else FILES}")
     return scene

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 
-from iibr_core.formats.files import is_file, is_folder
 from iibr_core.formats.images.decode import read_size
 from iibr_core.formats.images.picture_source import PictureSource
 from iibr_core.formats.light_fields.multi_view_scene import KnownView, MultiView, pictures_in
@@ -22,13 +21,12 @@ def read_llff(folder: Path) -> MultiView | None:
     """Return the views of an LLFF scene, None without poses_bounds.npy.
 
     Viewpoints are positions across the viewing direction of the central camera, in steps of the mean distance of
-    neighbours. The `camera` of each view adds its distance from that plane and its rotation. Raises InputError if poses
-    are damaged or do not fit the pictures.
+    neighbours. The `camera` of each view adds its distance from that plane and its rotation.
     """
     path = folder / "poses_bounds.npy"
-    if not is_file(path):
+    if not path.is_file():
         return None
-    inside = next((folder / name for name in FOLDERS if is_folder(folder / name)), folder)
+    inside = next((folder / name for name in FOLDERS if (folder / name).is_dir()), folder)
     pictures, cameras = pictures_in(inside), read_llff_poses(path)
     if len(cameras) != len(pictures) or len(pictures) < 2:
         raise InputError(f"{path}: {len(cameras)} poses for {len(pictures)} pictures; give both, and at least two")

@@ -9,7 +9,6 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from iibr_core.formats.files import is_file
 from iibr_core.formats.images.decode import read_size
 from iibr_core.formats.images.picture_source import PictureSource
 from iibr_core.formats.light_fields.multi_view_scene import (
@@ -40,19 +39,15 @@ def read_middlebury(folder: Path) -> MultiView | None:
     if len(named) < 2 or len({kind for kind, _ in named}) > 1:
         return None
     kind = next(iter(named))[0]
-    if is_file(folder / "disp0.pfm") and set(named) == {("im", 0), ("im", 1)}:
-        maps, layout = _float_maps(folder), "Middlebury pair"
+    if (folder / "disp0.pfm").is_file() and set(named) == {("im", 0), ("im", 1)}:
+        maps = {n: KnownDisparity(path) for n in (0, 1) if (path := folder / f"disp{n}.pfm").is_file()}
+        layout = "Middlebury pair"
     else:
         maps, layout = _coded_maps(folder, kind, next(iter(named.values()))), f"Middlebury, {len(named)} views"
     numbers = sorted(number for _, number in named)
     views = tuple(KnownView(f"{kind}{n}", ViewOffset(0.0, float(n)), PictureSource(named[kind, n])) for n in numbers)
     known = {numbers.index(n): disparity for n, disparity in maps.items() if n in numbers}
     return place_on_grid(MultiView(folder.resolve().name, layout, views, known), [(0, n) for n in numbers])
-
-
-def _float_maps(folder: Path) -> dict[int, KnownDisparity]:
-    maps = {n: folder / f"disp{n}.pfm" for n in (0, 1)}
-    return {n: KnownDisparity(path) for n, path in maps.items() if is_file(path)}
 
 
 def _coded_maps(folder: Path, kind: str, picture: Path) -> dict[int, KnownDisparity]:

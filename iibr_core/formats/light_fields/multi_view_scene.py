@@ -10,15 +10,9 @@ from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from pathlib import Path
 
-from iibr_core.formats.files import entries_of, is_file
+from iibr_core.formats.files import entries_of
 from iibr_core.formats.images.picture_source import PictureSource, source_size
-from iibr_core.types import (
-    Camera,
-    GridShape,
-    ImageSize,
-    InputError,
-    ViewOffset,
-)
+from iibr_core.types import Camera, GridShape, ImageSize, InputError, ViewOffset
 
 PICTURE_EXTENSIONS = (".png", ".jpg", ".jpeg", ".ppm", ".exr", ".tif", ".tiff", ".bmp", ".webp")
 """Endings of views; the first one counts where a view exists in several kinds."""
@@ -116,7 +110,7 @@ def nearest_view(views: Sequence[KnownView], to: ViewOffset) -> int:
 
 
 def common_size(views: Sequence[KnownView]) -> ImageSize:
-    """Return the size of all views, read from their headers. Raises InputError if one differs from the first."""
+    """Return the size of all views, read from their headers."""
     sizes = {view.picture: source_size(view.picture) for view in views}
     first = views[0].picture
     for picture, size in sizes.items():
@@ -142,8 +136,8 @@ def place_on_grid(scene: MultiView, numbers: Sequence[GridIndex]) -> MultiView:
 
 
 def pictures_in(folder: Path) -> list[Path]:
-    """Return the pictures directly in a folder, sorted by name. Raises InputError for more than MAX_VIEWS."""
-    pictures = [path for path in entries_of(folder) if path.suffix.lower() in PICTURE_EXTENSIONS and is_file(path)]
+    """Return the pictures directly in a folder, sorted by name."""
+    pictures = [path for path in entries_of(folder) if path.suffix.lower() in PICTURE_EXTENSIONS and path.is_file()]
     if len(pictures) > MAX_VIEWS:
         raise InputError(
             f"{folder}: holds {len(pictures)} pictures, more than {MAX_VIEWS}; give the folder of one scene"
@@ -153,7 +147,7 @@ def pictures_in(folder: Path) -> list[Path]:
 
 def maps_in(folder: Path) -> dict[str, Path]:
     """Return the files of a folder that may be maps, by stem: the folder is listed once for the maps of all views."""
-    return preferred_files((path for path in entries_of(folder) if is_file(path)), MAP_EXTENSIONS)
+    return preferred_files((path for path in entries_of(folder) if path.is_file()), MAP_EXTENSIONS)
 
 
 def preferred_files(files: Iterable[Path], extensions: Sequence[str]) -> dict[str, Path]:

@@ -11,7 +11,6 @@ from pathlib import Path
 
 import numpy as np
 
-from iibr_core.formats.files import is_folder
 from iibr_core.formats.images.picture_source import PictureSource
 from iibr_core.formats.light_fields.multi_view_scene import KnownView, MultiView, pictures_in, place_on_grid
 from iibr_core.types import InputError, ViewOffset
@@ -26,11 +25,8 @@ USUAL_DIRECTIONS = np.array([-1, 1])
 
 
 def read_stanford(folder: Path) -> MultiView | None:
-    """Return the views of a Stanford archive folder or of its subfolder `rectified`; None if names are different.
-
-    Raises InputError for two pictures of one place.
-    """
-    inside = folder / "rectified" if is_folder(folder / "rectified") else folder
+    """Return the views of a Stanford archive folder or of its subfolder `rectified`; None if names are different."""
+    inside = folder / "rectified" if (folder / "rectified").is_dir() else folder
     named = [(path, match) for path in pictures_in(inside) if (match := NAME.match(path.stem))]
     if not named:
         return None

@@ -13,12 +13,7 @@ from iibr_core.formats.images.stereo_jpeg import SOURCE_IMAGE, is_jpeg, is_stere
 from iibr_core.formats.light_fields.multi_view_scene import GridIndex, KnownView, MultiView
 from iibr_core.formats.light_fields.write import LENSLET_KEY, LENSLET_TAG
 from iibr_core.formats.quilts import TAG, Quilt, quilt_named
-from iibr_core.types import (
-    GridShape,
-    ImageSize,
-    InputError,
-    ViewOffset,
-)
+from iibr_core.types import GridShape, ImageSize, InputError, ViewOffset
 
 MAX_ASPECT_ERROR = 0.02
 """Share by which the shape of a tile may differ from the displayed shape without stretching: sides are whole pixels."""
@@ -56,7 +51,7 @@ def read_lenslet_image(path: Path) -> MultiView | None:
     """Return the views of a lenslet image (`*_eslf.png`), as the Stanford Lytro archive has them; None for other names.
 
     The pixels under one lens lie together as a small rectangle, one pixel of each view. A Lytro's outer views are left
-    out. Raises InputError if the picture's sides are no multiples of a lens's.
+    out.
     """
     if not LENSLET_TAG.search(path.stem):
         return None
@@ -81,7 +76,7 @@ def read_lenslet_image(path: Path) -> MultiView | None:
 
 
 def read_stereo_file(path: Path) -> MultiView | None:
-    """Return the two views of a stereo photo, None for other files. Raises InputError for raw light fields."""
+    """Return the two views of a stereo photo, None for other files."""
     refuse_raw_light_field(path)
     stereo = _stereo_pictures(path)
     if stereo is None:

@@ -11,19 +11,11 @@ from iibr_core.formats.images.picture import Picture
 from iibr_core.formats.images.picture_source import PictureSource, part_of, read_source
 from iibr_core.formats.light_fields.multi_view_scene import GridIndex, MultiView, common_size
 from iibr_core.formats.maps.disparity_file import read_disparity
-from iibr_core.types import (
-    FloatImage,
-    GridShape,
-    ImageSize,
-    InputError,
-    StoredColors,
-    ViewUpdate,
-    image_size,
-)
+from iibr_core.types import FloatImage, GridShape, ImageSize, InputError, StoredColors, ViewUpdate, image_size
 
 
 def grid_of(scene: MultiView) -> GridShape:
-    """Return the grid that the views fill. Raises InputError if they fill none."""
+    """Return the grid that the views fill."""
     if scene.grid is None:
         raise InputError(
             f"{scene.place}: the views ({scene.layout}) fill no regular grid,"
@@ -33,16 +25,13 @@ def grid_of(scene: MultiView) -> GridShape:
 
 
 def read_views(scene: MultiView) -> tuple[ImageSize, Iterator[ViewUpdate]]:
-    """Return the size of the views, and an iterator that reads them: the centre first, then the nearest to it.
-
-    Raises InputError, with the file's name, for an unreadable view; for views of several sizes before any is read.
-    """
+    """Return the size of the views, and an iterator that reads them: the centre first, then the nearest to it."""
     grid, size = grid_of(scene), common_size(scene.views)
     return size, _iterate_views(scene, grid, size)
 
 
 def read_stored_view(scene: MultiView, row: int, column: int) -> StoredColors:
-    """Return the colours (H, W, 3) of one view. Raises InputError for a bad row or column."""
+    """Return the colours (H, W, 3) of one view."""
     grid = grid_of(scene)
     if not (0 <= row < grid.rows and 0 <= column < grid.columns):
         raise InputError(f"{scene.place}: has {grid.rows}x{grid.columns} views, none in row {row}, column {column}")

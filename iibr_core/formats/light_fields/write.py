@@ -12,18 +12,12 @@ import numpy as np
 
 from iibr_core.color import bytes_from_encoded, encoded_from_stored
 from iibr_core.formats.images.write import write_image  # brings numba, which errors should not wait for
-from iibr_core.formats.light_fields.parameters import FILE_NAME
 from iibr_core.formats.maps.pfm import write_pfm
 from iibr_core.formats.outputs import check_output, check_output_folder, write_folder
 from iibr_core.runtime.tiling import side_by_side
-from iibr_core.types import (
-    GridShape,
-    ImageSize,
-    InputError,
-    ViewUpdate,
-    image_size,
-)
+from iibr_core.types import GridShape, ImageSize, InputError, ViewUpdate, image_size
 
+PARAMETERS_NAME = "parameters.cfg"
 WRITERS = ("hci", "eslf")
 """Layouts that can be written, by the names that people type."""
 LENSLET_TAG = re.compile(r"_eslf$", re.IGNORECASE)
@@ -91,8 +85,7 @@ def write_light_field(
     """Write a light field, whole or not at all, to a path that `check_light_field` admits; an older one is replaced.
 
     layout: one of WRITERS. views: each view of the grid in any order, all of one size. focal_px: focal length in pixels
-    of a view. with_disparity: whether HCI folders hold the disparity of every view, not of the centre view only. Raises
-    InputError if views are missing or cannot be written; exceptions of the iterator `views` pass through.
+    of a view. with_disparity: whether HCI folders hold the disparity of every view, not of the centre view only.
     """
     views = _require_all(path, grid, views)
     if layout == "eslf":
@@ -123,7 +116,7 @@ def _write_hci(
             if view.disparity is not None:
                 low, high = min(low, float(view.disparity.min())), max(high, float(view.disparity.max()))
         parameters = _parameters(name, grid, size, focal_px, low, high)
-        (unfinished / FILE_NAME).write_text(parameters, encoding="utf-8")
+        (unfinished / PARAMETERS_NAME).write_text(parameters, encoding="utf-8")
 
 
 def _write_view(folder: Path, grid: GridShape, with_disparity: bool, view: ViewUpdate) -> ViewUpdate:

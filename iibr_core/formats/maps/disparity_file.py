@@ -52,7 +52,7 @@ def has_shape_of(first: ImageSize, second: ImageSize) -> bool:
 
 
 def require_scale(scale: float | None) -> float:
-    """Return the scale, 1 for None. Raises InputError for 0, NaN and infinity."""
+    """Return the scale, 1 for None."""
     if scale is not None and (not math.isfinite(scale) or scale == 0):
         raise InputError(f"disparity scale {scale}: must be a number other than 0")
     return 1.0 if scale is None else scale

@@ -2,51 +2,29 @@
 
 from __future__ import annotations
 
-import tokenize
-import zipfile
-import zlib
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.formats.files import reason_of, require_file
+from iibr_core.formats.files import PARSE_ERRORS, reason_of, require_file
 from iibr_core.types import InputError
 
-MISREADINGS = (
-    ValueError,
-    OSError,
-    EOFError,
-    OverflowError,
-    TypeError,
-    KeyError,
-    SyntaxError,
-    tokenize.TokenError,
-    MemoryError,
-    zipfile.BadZipFile,
-    zlib.error,
-    NotImplementedError,
-    RuntimeError,
-)
-"""Errors that NumPy and zipfile raise for damaged files; NumPy parses headers as Python."""
 USUAL_NAMES = ("depth", "disparity", "disp", "arr_0", "predicted_depth")
 """Names of the array that is read from an archive of several arrays, the best first."""
 MAX_VALUE_BYTES = 16
 
 
 def read_array(path: Path, max_values: int) -> NDArray[Any]:
-    """Return the array of an NPY file, read-only, or the map in an NPZ archive.
-
-    Raises InputError where the file holds no array of numbers, or a larger one.
-    """
+    """Return the array of an NPY file, read-only, or the map in an NPZ archive."""
     require_file(path)
     try:
         stored = np.load(path, mmap_mode="r", allow_pickle=False)
         array: NDArray[Any] = stored if isinstance(stored, np.ndarray) else _map_in(path, stored, max_values)
     except InputError:
         raise
-    except MISREADINGS as error:
+    except PARSE_ERRORS as error:
         raise InputError(f"{path}: is no whole array ({reason_of(error)}); get the file again") from error
     if array.dtype.kind not in "fiu":
         raise InputError(f"{path}: holds {array.dtype} of shape {array.shape}; an array of numbers is expected")

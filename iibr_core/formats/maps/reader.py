@@ -99,10 +99,7 @@ def read_map_picture(source: PictureSource) -> MapFile:
 
 
 def read_depth_channel(path: Path) -> FloatImage | None:
-    """Return distances (H, W) float32, infinite without a surface; None where a file is no EXR, or has no such channel.
-
-    Raises InputError where the file is damaged.
-    """
+    """Return distances (H, W) float32, infinite without a surface; None where a file has no such channel."""
     if path.suffix.lower() != ".exr":
         return None
     source = open_header(path)

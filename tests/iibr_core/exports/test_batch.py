@@ -14,13 +14,7 @@ import pytest
 from PIL import Image
 
 from iibr_core.exports import batch
-from iibr_core.exports.batch import (
-    BatchCount,
-    BatchSettings,
-    check_batch_folder,
-    photos_in,
-    run_batch,
-)
+from iibr_core.exports.batch import BatchCount, BatchSettings, check_batch_folder, photos_in, run_batch
 from iibr_core.scenes.scene import Source
 from iibr_core.types import InputError
 

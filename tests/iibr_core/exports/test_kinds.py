@@ -7,12 +7,7 @@ from pathlib import Path
 import pytest
 
 from iibr_core.beyond.optics import Optics
-from iibr_core.exports.kinds import (
-    EXPORTS,
-    ExportOptions,
-    require_export_place,
-    with_defaults,
-)
+from iibr_core.exports.kinds import EXPORTS, ExportOptions, require_export_place, with_defaults
 from iibr_core.exports.source import ExportSource
 from iibr_core.formats.outputs import AlreadyThereError
 from iibr_core.scenes.scene import Scene, Source

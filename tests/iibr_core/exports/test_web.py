@@ -23,12 +23,7 @@ from iibr_core.formats.images.color_profile import icc_profile
 from iibr_core.formats.images.metadata import read_caption
 from iibr_core.scenes.lens_limits import LensChoice
 from iibr_core.scenes.scene import Source
-from iibr_core.types import (
-    DISPLAY_P3,
-    GridShape,
-    ImageSize,
-    InputError,
-)
+from iibr_core.types import DISPLAY_P3, GridShape, ImageSize, InputError
 from tests.viewer.conftest import write_scene
 
 KIND = EXPORTS["web"]

@@ -11,10 +11,7 @@ import pillow_heif
 import pytest
 from PIL import Image, ImageCms
 
-from iibr_core.formats.images.color_profile import (
-    icc_profile,
-    read_profile,
-)
+from iibr_core.formats.images.color_profile import icc_profile, read_profile
 from iibr_core.formats.images.photo import read_photo
 from iibr_core.types import DISPLAY_P3, SRGB
 

@@ -15,7 +15,7 @@ from iibr_core.types import InputError
     ("name", "says"),
     [
         ("gone", "no such file"),
-        ("loop", "no such file"),
+        ("loop", "cannot be read"),
         ("folder", "is a folder"),
         ("empty", "the file is empty"),
         ("pipe", "is a pipe or a device"),

@@ -18,12 +18,7 @@ from iibr_core.formats.images.write import write_image
 from iibr_core.formats.maps.pfm import write_pfm
 from iibr_core.method.light_field import generate
 from iibr_core.method.plan import plan_literal
-from iibr_core.types import (
-    Disparity,
-    GridShape,
-    InputError,
-    Photo,
-)
+from iibr_core.types import Disparity, GridShape, InputError, Photo
 from tests.iibr_core.scenes import square_before_wall
 
 PAGE = Path(__file__).parents[3] / "docs" / "python.md"

@@ -5,12 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from iibr_core.method.plan import ScenePlan, plan_literal
-from iibr_core.types import (
-    Disparity,
-    GridShape,
-    Photo,
-    ViewUpdate,
-)
+from iibr_core.types import Disparity, GridShape, Photo, ViewUpdate
 
 
 def smooth_texture(height: int, width: int, seed: int = 0) -> np.ndarray:

@@ -13,13 +13,7 @@ from iibr_core.beyond.optics import CENTRE
 from iibr_core.runtime.work import Cancelled, stoppable
 from iibr_core.scenes.opening import results_of, sketch_of
 from iibr_core.scenes.photo import load_photo, sketch_photo
-from iibr_core.scenes.scene import (
-    SceneReady,
-    SceneRequest,
-    Source,
-    ViewReady,
-    WantedPhoto,
-)
+from iibr_core.scenes.scene import SceneReady, SceneRequest, Source, ViewReady, WantedPhoto
 from iibr_core.types import GridShape, InputError
 from tests.iibr_core.scenes.test_light_fields import showings
 

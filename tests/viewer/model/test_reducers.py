@@ -23,7 +23,6 @@ from iibr_core.scenes.lens_limits import (
     STEEPEST_TILT,
     aperture_limit,
     dolly_limit,
-    eye_margin,
     focus_limits,
     focus_span,
     is_finite,
@@ -94,7 +93,6 @@ def test_the_eye_stays_within_the_grid_and_a_margin(grid: GridShape, t: float, s
     for value, wanted, views in zip(eye, (t, s), grid):
         margin = 0.5 if views == 1 else 0.0
         low, high = -(views // 2) - margin, views - 1 - views // 2 + margin
-        assert eye_margin(views) == margin
         assert low <= value <= high
         assert value == wanted or value in (low, high)
 
