@@ -100,11 +100,11 @@ class ExportSource:
         raise_if_stopped()
 
     def _views_of_folder(self, with_disparity: bool) -> Iterator[ViewUpdate]:
-        """Return the views from disk, with found disparity and views between them if the scene has these."""
+        """Return the views from disk, with found disparity if the scene has it."""
         from iibr_core.formats.light_fields.views import read_views
         from iibr_core.scenes.light_fields import load_light_field
 
-        is_as_read = self.scene.grid == self.scene.given_grid and self.scene.depth_source in ("none", "light field")
+        is_as_read = self.scene.plan is None and self.scene.depth_source in ("none", "light field")
         if is_as_read and not with_disparity:
             return read_views(open_light_field(Path(self.scene.source.path)))[1]
         centre = self._final_centre

@@ -5,12 +5,10 @@ wide apertures and viewpoints between the views work as with a photo; or with vi
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Generator, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
-
-import numpy as np
 
 from iibr_core.beyond.between_views import GivenView, densify, read_given_views, require_steps
 from iibr_core.color import encoded_from_stored
@@ -57,25 +55,16 @@ class LoadedField:
     views: Iterator[ViewUpdate]
 
 
-def load_light_field(
-    source: Source,
-    takes_drafts: bool,
-    known: FloatImage | None = None,
-    nearest_to: Callable[[], ViewOffset] = lambda: ViewOffset(0.0, 0.0),
-) -> Iterator[LoadedField]:
+def load_light_field(source: Source, takes_drafts: bool, known: FloatImage | None = None) -> Iterator[LoadedField]:
     """Yield the light field of a folder or file, again each time its disparity is known better.
 
     takes_drafts: views without disparity come as read, then with a coarse disparity, then with the final one; otherwise
-    the field comes once, when all is known. known: disparity of the centre view that was found before. nearest_to:
-    returns the viewpoint near which views between those on disk are made first. The views of a field must be taken
-    before the next field is asked for.
+    the field comes once, when all is known. known: disparity of the centre view that was found before. The views of a
+    field must be taken before the next field is asked for.
     """
     field = open_light_field(Path(source.path))
     grid, (size, views) = grid_of(field), read_views(field)
-    _require_field(field.name, size, source.filled_grid or grid)
-    if source.filled_grid not in (None, grid):
-        yield _filled_between(source, field, source.filled_grid, nearest_to)
-        return
+    _require_field(field.name, size, grid)
     given, map_file = known, source.depth.file
     if map_file is not None:
         given = read_disparity(Path(map_file), size, source.depth.file_scale or 1.0).values
@@ -114,10 +103,7 @@ def find_disparity(field: MultiView) -> FloatImage:
 
 
 def read_dense(
-    field: MultiView,
-    grid: GridShape,
-    inpaint: str,
-    nearest_to: Callable[[], ViewOffset] = lambda: ViewOffset(0.0, 0.0),
+    field: MultiView, grid: GridShape, inpaint: str
 ) -> tuple[Sequence[GivenView], int, Generator[ViewUpdate]]:
     """Read the views of a light field, and begin to make views between them.
 
@@ -126,29 +112,7 @@ def read_dense(
     sparse = grid_of(field)
     steps, inpainter = require_steps(sparse, grid, field.name), load_inpainter(inpaint)
     given = read_given_views(field)
-    return given, steps, densify(given, sparse, grid, inpainter, nearest_to)
-
-
-def _filled_between(
-    source: Source, field: MultiView, wanted: GridShape, nearest_to: Callable[[], ViewOffset]
-) -> LoadedField:
-    """Return the field with views made between its own, from all of them."""
-    if source.depth.file is not None:
-        raise InputError(
-            f"{source.depth.file}: is the disparity of one view, and views between take that of all: open"
-            f" {field.name} without it"
-        )
-    given, steps, views = read_dense(field, wanted, source.inpaint, nearest_to)
-    low, high = min(view.disparity.min() for view in given), max(view.disparity.max() for view in given)
-    middle = given[0]
-    centre = ViewUpdate(middle.row, middle.column, middle.colors, middle.disparity / np.float32(steps))
-    scene = replace(
-        _scene_as_read(source, field, centre, (float(low) / steps, float(high) / steps)),
-        grid=wanted,
-        depth_source="light field" if len(field.disparity) == len(field.views) else FROM_VIEWS,
-        has_view_disparity=True,
-    )
-    return LoadedField(scene, views)
+    return given, steps, densify(given, sparse, grid, inpainter)
 
 
 def _with_found_disparity(scene: Scene, views: Sequence[ViewUpdate], takes_drafts: bool) -> Iterator[LoadedField]:
@@ -206,7 +170,6 @@ def _scene_as_read(source: Source, field: MultiView, centre: ViewUpdate, range_p
         notes=field.notes,
         has_view_disparity=len(field.disparity) == len(field.views),
         subject_disparity_px=subject_disparity(centre.disparity) if centre.disparity is not None else 0.0,
-        given_grid=grid_of(field),
     )
 
 

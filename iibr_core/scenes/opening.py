@@ -26,7 +26,6 @@ from iibr_core.scenes.light_fields import READING, load_light_field
 from iibr_core.scenes.photo import apply_depth_settings, load_photo, make_plan, sketch_photo, views_of_photo
 from iibr_core.scenes.scene import (
     DepthSettings,
-    FilledField,
     LoadedPhoto,
     Progress,
     Scene,
@@ -52,10 +51,8 @@ def results_of(
     for photos only.
     """
     try:
-        if request.filled is not None:
-            yield from _results_of_filled(request, request.filled)
-        elif is_light_field(Path(request.source.path)):
-            yield from _results_of_light_field(request, nearest_to)
+        if is_light_field(Path(request.source.path)):
+            yield from _results_of_light_field(request)
         else:
             yield from _results_of_photo(request, nearest_to, wanted)
     finally:
@@ -137,16 +134,8 @@ def _results_of_photo(
     yield from _count_views(request.generation, views, scene, wanted)
 
 
-def _results_of_filled(request: SceneRequest, filled: FilledField) -> Iterator[SceneReady | ViewReady]:
-    scene = replace(filled.scene, source=request.source)
-    yield SceneReady(request.generation, scene, None, filled.views[0])
-    yield from _count_views(request.generation, iter(filled.views), scene)
-
-
-def _results_of_light_field(
-    request: SceneRequest, nearest_to: Callable[[], ViewOffset]
-) -> Iterator[SceneReady | ViewReady]:
-    for field in load_light_field(request.source, request.takes_drafts, nearest_to=nearest_to):
+def _results_of_light_field(request: SceneRequest) -> Iterator[SceneReady | ViewReady]:
+    for field in load_light_field(request.source, request.takes_drafts):
         centre = next(field.views)
         yield SceneReady(request.generation, field.scene, None, centre)
         rest = itertools.takewhile(lambda _: not is_stopped(), itertools.chain((centre,), field.views))

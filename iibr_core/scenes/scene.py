@@ -28,8 +28,7 @@ class Source:
 
     path: a photo or a light-field folder. focus_disparity: plane that does not move, in the units of the given
     disparity. inpaint: way of filling hidden surfaces, see `load_inpainter`. is_literal: whether the given disparity
-    is px per step of the grid, instead of the plan's parallax. grid: views of a photo. filled_grid: grid of a light
-    field with views made between those on disk.
+    is px per step of the grid, instead of the plan's parallax. grid: views of a photo.
     """
 
     path: str
@@ -39,12 +38,11 @@ class Source:
     max_pixels: int | None = None
     inpaint: str = DEFAULT_INPAINTER
     is_literal: bool = False
-    filled_grid: GridShape | None = None
 
 
 def source_beside(source: Source | None, path: str) -> Source:
-    """Return the source of another file, with the decisions about this one but its depth map and filled grid."""
-    return _with_depth(replace(source or Source(""), path=path, filled_grid=None), file=None)
+    """Return the source of another file, with the decisions about this one but its depth map."""
+    return _with_depth(replace(source or Source(""), path=path), file=None)
 
 
 def source_with_map(source: Source, path: str) -> Source:
@@ -75,9 +73,9 @@ class Scene:
     step as given. depth_model: name or path of the model that estimated the depth, None without. inverse_metres:
     (slope, offset) of 1 / distance over the disparity as given, None if distances are not known in metres. color_space:
     of its views. own_size: size of the photo in its file, which may exceed that of a view; None for light fields.
-    given_grid: grid of a light field's files; None for photos. infinity_px: field disparity of infinitely far points of
-    a photo. is_sketch: whether it is a small picture that is shown while the photo is read. found_span_px: range of the
-    field disparity before edits, None if it cannot be edited.
+    infinity_px: field disparity of infinitely far points of a photo. is_sketch: whether it is a small picture that is
+    shown while the photo is read. found_span_px: range of the field disparity before edits, None if it cannot be
+    edited.
     """
 
     source: Source
@@ -103,7 +101,6 @@ class Scene:
     own_size: ScreenSize | None = None
     is_sketch: bool = False
     infinity_px: float = 0.0
-    given_grid: GridShape | None = None
     found_span_px: float | None = None
 
     @property
@@ -156,23 +153,6 @@ AS_FOUND = DepthSettings()
 
 
 @dataclass(frozen=True, eq=False)
-class FilledField:
-    """A light field with all views between those on disk. views: views of all places, the centre first."""
-
-    scene: Scene
-    views: tuple[ViewUpdate, ...]
-
-    def is_of(self, source: Source) -> bool:
-        """Return whether opening this source shows these views."""
-        return is_same_field(self.scene.source, source) and self.scene.source.filled_grid == source.filled_grid
-
-
-def is_same_field(one: Source, other: Source) -> bool:
-    """Return whether both have the same stored views and would fill the same views between them."""
-    return (one.path, one.depth.file, one.inpaint) == (other.path, other.depth.file, other.inpaint)
-
-
-@dataclass(frozen=True, eq=False)
 class LoadedPhoto:
     """A photo as read and its disparity, kept so that another plan does not read them again.
 
@@ -213,7 +193,7 @@ class SceneRequest:
 
     loaded: the photo, if it was read before. depth_settings: refinement and edits of depth, None for those of the
     source. takes_drafts: whether a light field without disparity comes before its disparity is known, too. plan: the
-    plan of the loaded photo, if it was made before. filled: the same light field, if all its views were made before.
+    plan of the loaded photo, if it was made before.
     asks_model: whether a model estimates depth if there is one; otherwise it is guessed.
     """
 
@@ -224,7 +204,6 @@ class SceneRequest:
     depth_settings: DepthSettings | None = None
     takes_drafts: bool = True
     plan: ScenePlan | None = None
-    filled: FilledField | None = None
     asks_model: bool = True
 
 

@@ -11,7 +11,7 @@ from typing import Literal
 from iibr_core.beyond.optics import Optics
 from iibr_core.exports.source import ExportSource
 from iibr_core.runtime.time_left import TimeLeft
-from iibr_core.scenes.scene import Scene, SceneRequest, Source
+from iibr_core.scenes.scene import Scene, SceneRequest
 from viewer.display.snapshot import SceneSnapshot
 from viewer.model.actions import Action
 from viewer.model.reducers.lens_reducer import carry_optics
@@ -20,16 +20,15 @@ from viewer.model.state.jobs import STOPPING, WAITING_FOR_VIEWS, JobKind, JobPro
 
 Needs = Literal["shown", "scene", "views"]
 """What of the scene must be there before a job begins: what is on the screen; its photo and plan; all its views."""
-Lane = Literal["pictures", "exports", "fills"]
+Lane = Literal["pictures", "exports"]
 """Jobs of one lane follow each other: a picture need not wait for a long export."""
 
 
 @dataclass(eq=False)
 class Job:
     """state: of the window when it was asked for. needs: asked again as more of the scene is known. work: what it does,
-    in a thread; what comes of it is returned; None where it fills. pictures: finds what those that it draws are taken
-    with. takes_part: of the views will do where the user makes no more. fills: the light field as it is to be, None of
-    another kind. is_ours: path is not for the user's eyes.
+    in a thread; what comes of it is returned. pictures: finds what those that it draws are taken
+    with. takes_part: of the views will do where the user makes no more.
 
     generation: whose views it shows; request: makes the same once more, where is_left: the window does not make them.
     snapshot: None until it is there.
@@ -39,10 +38,9 @@ class Job:
     path: Path
     state: AppState
     needs: Callable[[Scene, Optics], Needs]
-    work: Callable[[ExportSource], list[Action]] | None = None
+    work: Callable[[ExportSource], list[Action]]
     pictures: Callable[[Scene, Optics], Iterable[Optics]] = lambda scene, optics: (optics,)
     takes_part: bool = False
-    fills: Source | None = None
     id: int = 0
     generation: int = 0
     request: SceneRequest | None = None
@@ -56,16 +54,12 @@ class Job:
     @property
     def lane(self) -> Lane:
         """Where it waits for its turn."""
-        return "exports" if self.kind == "export" else "fills" if self.kind == "fill" else "pictures"
+        return "exports" if self.kind == "export" else "pictures"
 
     @property
     def should_stop(self) -> Callable[[], bool]:
         """For what it does."""
         return self.is_given_up.is_set
-
-    def shows(self, scene: Scene) -> bool:
-        """Whether it was asked for while this photo was open."""
-        return self.state.scene is not None and self.state.scene.source.path == scene.source.path
 
     def report(self, done: float, total: float, doing: str) -> None:
         """In whatever thread works: how far it is with what it is doing now."""
@@ -80,12 +74,12 @@ class Job:
         """For the window; changes at most a hundred times a stage, and with the seconds left."""
         name = "the picture" if self.kind == "copy" else self.path.name
         if self.is_given_up.is_set():
-            return JobProgress(self.id, self.kind, name, STOPPING, fills=self.fills)
+            return JobProgress(self.id, self.kind, name, STOPPING)
         if not self.is_running:
             doing = "" if self.snapshot or self.is_left else WAITING_FOR_VIEWS
-            return JobProgress(self.id, self.kind, name, doing, fills=self.fills)
+            return JobProgress(self.id, self.kind, name, doing)
         done, total, doing = self._reported
         left_s = self._time_left.update(done, total, doing)
         share = int(100 * done / total) / 100 if total else 0.0
         left_s = None if left_s is None else float(round(left_s))
-        return JobProgress(self.id, self.kind, name, doing, share, left_s, self.fills)
+        return JobProgress(self.id, self.kind, name, doing, share, left_s)

@@ -13,7 +13,7 @@ from itertools import count
 from pathlib import Path
 
 from iibr_core.runtime.work import Cancelled, raise_if_stopped, stoppable, watched
-from iibr_core.scenes.scene import SceneRequest, Source, is_same_field
+from iibr_core.scenes.scene import SceneRequest
 from viewer.app.job import Job, Lane
 from viewer.app.job_scene import JobScenes
 from viewer.app.save_places import inputs_of_scene
@@ -24,7 +24,6 @@ from viewer.model import messages, saving
 from viewer.model.action import do
 from viewer.model.actions import Action
 from viewer.model.state.app_state import AppState
-from viewer.model.state.filling import ViewsFilled
 from viewer.model.state.jobs import JobProgress
 from viewer.model.state.notices import Notice
 
@@ -40,7 +39,6 @@ class JobQueue:
         self._threads: dict[Lane, FileWorker] = {
             "pictures": FileWorker("iibr-pictures", wake),
             "exports": FileWorker("iibr-exports", wake),
-            "fills": FileWorker("iibr-fills", wake),
         }
         self._jobs: list[Job] = []
         self._ids = count(1)
@@ -87,18 +85,6 @@ class JobQueue:
         """Give this one up; nothing happens where it is done."""
         for job in self._jobs:
             if job.id == id_:
-                job.is_given_up.set()
-
-    def add_fill(self, source: Source, state: AppState) -> None:
-        """Make the views between those of a light field, from its files: nothing of the window is needed."""
-        job = Job("fill", Path(source.path), state, lambda scene, optics: "scene", fills=source, is_left=True)
-        job.id, job.request = next(self._ids), SceneRequest(0, source, takes_drafts=False)
-        self._jobs.append(job)
-
-    def cancel_fills(self, source: Source) -> None:
-        """Give up what makes views between those of this light field: another choice was made."""
-        for job in self._jobs:
-            if job.fills is not None and is_same_field(job.fills, source):
                 job.is_given_up.set()
 
     def advance(self, state: AppState, budget_s: float) -> list[Action]:
@@ -177,9 +163,8 @@ class JobQueue:
             return []
         self._end(running)
         if isinstance(result, Done):
-            is_open = state.scene is not None and running.shows(state.scene)
-            marked = do(saving.mark_saved, running.state.depth.edits)
-            return [action for action in result.value if is_open or action != marked]
+            done: list[Action] = result.value
+            return done
         lost = f"{running.path}: writing it stopped unexpectedly, and there is no such file. Try it again."
         return [do(messages.notify, Notice(lost if result is None else result.message, is_error=True, stays=True))]
 
@@ -196,6 +181,6 @@ def _carry_out(job: Job, scenes: JobScenes) -> list[Action]:
     try:
         with stoppable(job.should_stop), watched(partial(scenes.report, job)):
             raise_if_stopped()
-            return [ViewsFilled(scenes.fill(job))] if job.work is None else job.work(scenes.source_of(job))
+            return job.work(scenes.source_of(job))
     except Cancelled:
         return []

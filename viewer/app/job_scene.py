@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from iibr_core.beyond.optics import CENTRE
 from iibr_core.exports.render_settings import RenderSettings, require_size
 from iibr_core.exports.source import ExportSource
-from iibr_core.runtime.work import raise_if_stopped, report_progress
-from iibr_core.scenes.scene import MAKING, FilledField, SceneReady, ViewReady
+from iibr_core.runtime.work import report_progress
+from iibr_core.scenes.scene import MAKING, SceneReady, ViewReady
 from iibr_core.scenes.scene_gloss import gloss_request, make_maps
 from iibr_core.types import ViewOffset, ViewUpdate
 from viewer.app.job import Job
@@ -51,22 +51,6 @@ class JobScenes:
             return self._run(job, self._draw(job, snapshot, settings))
 
         return ExportSource(snapshot.scene, snapshot.loaded, optics, draw, snapshot.centre)
-
-    def fill(self, job: Job) -> FilledField:
-        """Return its light field with all views between. Raises InputError if it has none, Cancelled once given up."""
-        from iibr_core.scenes.opening import results_of
-
-        assert job.request is not None
-        views = []
-        with closing(results_of(job.request, lambda: CENTRE)) as results:
-            ready = next(results)
-            assert isinstance(ready, SceneReady)
-            for made in results:
-                assert isinstance(made, ViewReady)
-                views.append(made.view)
-                report_progress(made.progress.done, made.progress.total, MAKING)
-        raise_if_stopped()
-        return FilledField(ready.scene, tuple(views))
 
     def report(self, job: Job, done: float, total: float, doing: str) -> None:
         """Note how far a job is, and wake the window now and then."""

@@ -29,7 +29,6 @@ from viewer.app.session_store import SessionStore
 from viewer.app.sharpener import Sharpener
 from viewer.app.side_effects import SideEffects
 from viewer.app.window import Window, wake
-from viewer.app.window_slot import WindowSlot
 from viewer.background.entropy import EntropyWork
 from viewer.background.gloss_worker import GlossFinder
 from viewer.background.newest import Newest
@@ -40,7 +39,7 @@ from viewer.display.scene_view import VIEW_REFRESH_S, SceneView
 from viewer.gpu.glfw_context import create_for_window
 from viewer.model import inspection, saving
 from viewer.model.action import do
-from viewer.model.actions import Action, OpenPath, SetState, WorkerLost
+from viewer.model.actions import Action, OpenPath, SetState
 from viewer.model.inspection import NO_INSPECTION_TEXTURES, InspectionTextures, beside_of
 from viewer.model.layout import Layout, is_narrow, layout_of
 from viewer.model.reducers.root import reduce
@@ -85,15 +84,12 @@ class App:
         state = state or AppState()
         self.state = replace(load_preferences(state, kept_in) if kept_in else state, has_dialogs=has_dialogs())
         self.frames_shown = 0
-        self._window_slot = WindowSlot(kept_in)
         preferences = self.state.preferences
-        place = self._window_slot.shift(preferences.window)
-        self.window = Window("iibr", place, preferences.is_maximized)
+        self.window = Window("iibr", preferences.window, preferences.is_maximized)
         try:
             self._gl = create_for_window(self.window.handle)
         except InputError:
             self.window.close()
-            self._window_slot.close()
             raise
         self.scene_view = SceneView(self._gl)
         self.inspection_view = InspectionView(self._gl, self.scene_view)
@@ -212,7 +208,6 @@ class App:
         self.scene_view.release()
         self._gl.release()
         self.window.close()
-        self._window_slot.close()
 
     def do(self, *actions: Action) -> None:
         """Change the state. What follows from it may take a few frames to be seen, see SETTLING_FRAMES."""
@@ -234,8 +229,6 @@ class App:
         actions += self._place_window()
         if is_narrow(self.window.size, self.window.ui_scale) != self.state.is_narrow:
             actions.append(SetState("is_narrow", not self.state.is_narrow))
-        if self.scene_loader.has_lost(self.state):
-            actions.append(WorkerLost())
         return actions
 
     def _place_window(self) -> list[Action]:

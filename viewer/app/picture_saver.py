@@ -27,7 +27,7 @@ from viewer.app.job import Job, Needs
 from viewer.app.job_queue import JobQueue
 from viewer.app.save_places import map_path, picture_path
 from viewer.background.job_threads import message_of
-from viewer.model import messages, saving
+from viewer.model import messages
 from viewer.model.action import do
 from viewer.model.actions import Action
 from viewer.model.state.app_state import AppState
@@ -118,7 +118,7 @@ def _save(shot: _Shot, source: ExportSource) -> list[Action]:
     pixels = _drawn(shot, saved, source)
     report_progress(1, 1, WRITING)
     path = export_picture(shot.path, pixels, saved)
-    return [do(messages.notify, Notice(f"Saved {path}", stays=True)), do(saving.mark_saved, saved.settings.depth_edits)]
+    return [do(messages.notify, Notice(f"Saved {path}", stays=True))]
 
 
 def _copy(shot: _Shot, source: ExportSource) -> list[Action]:
@@ -134,10 +134,7 @@ def _save_map(path: Path, state: AppState, source: ExportSource) -> list[Action]
     if source.loaded is None:
         raise InputError(f"{path}: {NO_MAP}")
     report_progress(1, 1, WRITING)
-    return [
-        do(messages.notify, Notice(export_map(path, source.loaded.disparity.values))),
-        do(saving.mark_saved, state.depth.edits),
-    ]
+    return [do(messages.notify, Notice(export_map(path, source.loaded.disparity.values)))]
 
 
 def _drawn(shot: _Shot, saved: SavedShot, source: ExportSource) -> NDArray[Any]:

@@ -14,7 +14,6 @@ from iibr_core.formats.outputs import check_output
 from iibr_core.scenes.inputs import inputs_of, named_by
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import ImageSize, InputError
-from viewer.app.session_store import sidecar_of
 from viewer.model.state.app_state import AppState
 from viewer.model.state.tasks import SaveTask
 
@@ -26,8 +25,7 @@ def inputs_of_scene(state: AppState) -> tuple[Path, ...]:
     origin = state.scene.depth_origin if state.scene is not None else None
     beside = (origin and origin.file,)
     found = [path for source in sources for path in (named_by(source) if is_open else inputs_of(source))]
-    settings = [path for path in (sidecar_of(Path(source.path)) for source in sources if source.path) if path.is_file()]
-    return (*found, *settings, *(Path(os.path.expanduser(path)) for path in beside if path))
+    return (*found, *(Path(os.path.expanduser(path)) for path in beside if path))
 
 
 def require_picture_place(

@@ -78,10 +78,6 @@ class SceneLoader:
         self._untold: list[Action] = []
         self._told_at = 0.0
 
-    def has_lost(self, state: AppState) -> bool:
-        """Whether what the state waits for will never come."""
-        return self._worker.is_lost and state.stopped != state.generation == self._submitted
-
     def look_from(self, eye: ViewOffset) -> None:
         """Views near this place are made first."""
         self._worker.eye = eye
@@ -212,7 +208,6 @@ class SceneLoader:
                 return
             loaded, plan = (ahead.loaded, ahead.plan) if ahead is not None else (None, None)
         self._submitted, self._depth_settings = state.generation, depth_settings_for_worker(state)
-        filled = state.filled if state.filled is not None and state.filled.is_of(source) else None
         self._worker.submit(
             SceneRequest(
                 state.generation,
@@ -221,7 +216,6 @@ class SceneLoader:
                 loaded,
                 self._depth_settings,
                 plan=plan,
-                filled=filled,
                 asks_model=False,
             )
         )

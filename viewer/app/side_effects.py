@@ -12,15 +12,13 @@ from typing import Any
 
 from iibr_core.beyond.optics import ApertureMask
 from iibr_core.exports.photo_folder import list_photos
-from iibr_core.scenes.scene import Source, source_beside
+from iibr_core.scenes.scene import source_beside
 from viewer.app.clipboard import Pasted, paste_picture
 from viewer.app.dialogs import Dialog, SaveDialog, contents_of, has_dialogs
 from viewer.app.exporter import add_export
-from viewer.app.image_export import settings_of
 from viewer.app.job_queue import JobQueue
 from viewer.app.picture_saver import add_copy, add_save
 from viewer.app.save_places import inputs_of_scene
-from viewer.app.session_store import write_sidecar
 from viewer.background.file_worker import FileRequest, FileResult, FileWorker
 from viewer.background.job_threads import Failed
 from viewer.background.model_downloader import Downloaded, DownloadResult, ModelDownloads, ModelRequest, list_models
@@ -32,7 +30,6 @@ from viewer.model.commands import action_for_path
 from viewer.model.photo_facts import set_facts
 from viewer.model.state.app_state import AppState
 from viewer.model.state.exporting import ExportTask
-from viewer.model.state.filling import FillTask
 from viewer.model.state.folder import FolderListed, ListFolderTask
 from viewer.model.state.jobs import CancelJobTask
 from viewer.model.state.model_download import (
@@ -47,7 +44,7 @@ from viewer.model.state.notices import Notice
 from viewer.model.state.optics_actions import SetOptics
 from viewer.model.state.photo_facts import PhotoFacts, ReadFactsTask
 from viewer.model.state.prompts import FolderContents, ListContentsTask, PathPrompt
-from viewer.model.state.saving import CopyTask, PasteTask, WriteSidecarTask, path_beside
+from viewer.model.state.saving import CopyTask, PasteTask, path_beside
 from viewer.model.state.tasks import (
     ChoosePlaceTask,
     ChooseTask,
@@ -132,13 +129,8 @@ class SideEffects:
                 return add_save(task, state, self._inputs(state), self._jobs)
             case ExportTask():
                 return add_export(task, state, self._inputs(state), self._jobs)
-            case FillTask(source):
-                return self._fill(source, state)
             case CancelJobTask(id_):
                 self._jobs.cancel(id_)
-            case WriteSidecarTask() if state.scene is not None and is_scene_open(state):
-                settings = settings_of(state, state.scene.size)
-                self._submit(partial(write_sidecar, Path(state.scene.source.path), settings))
             case ListModelsTask():
                 self._submit(list_models)
             case GetModelTask(name):
@@ -150,14 +142,6 @@ class SideEffects:
                 return add_copy(state, self._jobs)
             case PasteTask():
                 self._submit(partial(paste_picture, self._clipboard_text()))
-        return []
-
-    def _fill(self, source: Source, state: AppState) -> list[Action]:
-        """At once where the views are there; what was chosen before counts no longer."""
-        self._jobs.cancel_fills(source)
-        if source.filled_grid is None or (state.filled is not None and state.filled.is_of(source)):
-            return [OpenPath(source)] if source != state.source else []
-        self._jobs.add_fill(source, state)
         return []
 
     def _inputs(self, state: AppState) -> tuple[Path, ...]:
@@ -232,8 +216,6 @@ def _actions_from(result: FileResult, state: AppState) -> list[Action]:
             return [found]
         case Pasted(path):
             return [OpenPath(source_beside(state.source, path))]
-        case Path() as sidecar:
-            return [do(messages.notify, Notice(f"Saved {sidecar}"))]
     raise AssertionError(f"nothing comes of {result.value!r}")
 
 

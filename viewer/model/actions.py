@@ -10,7 +10,6 @@ from viewer.model.action import Action as VerbAction
 from viewer.model.free_camera import FreeCameraAction
 from viewer.model.state.app_state import DrawReport
 from viewer.model.state.depth_editing import DepthAction
-from viewer.model.state.filling import ViewsFilled
 from viewer.model.state.folder import FolderAction
 from viewer.model.state.model_download import ModelAction
 from viewer.model.state.motion import MotionAction
@@ -82,11 +81,6 @@ class StopWork:
 
 
 @dataclass(frozen=True)
-class ResumeWork:
-    """Make the views again that were stopped."""
-
-
-@dataclass(frozen=True)
 class SamePlaces:
     """Field disparities of the same places of a photo, (before, now), where its depth was found again.
 
@@ -127,15 +121,10 @@ class OpenFailed:
 
 
 @dataclass(frozen=True)
-class WorkerLost:
-    """The worker's thread ended unasked."""
-
-
-@dataclass(frozen=True)
 class SetState:
     """Give one field of `AppState` this value; most have actions of their own, for more depends on them."""
 
-    field: Literal["is_fullscreen", "hides_panel", "is_narrow", "keeps_sessions", "report"]
+    field: Literal["is_fullscreen", "hides_panel", "is_narrow", "report"]
     value: bool | DrawReport | None
 
 
@@ -170,8 +159,5 @@ Action = (
     | Redo
     | OpenPath
     | StopWork
-    | ResumeWork
-    | WorkerLost
-    | ViewsFilled
     | ModelAction
 )

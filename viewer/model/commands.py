@@ -25,25 +25,21 @@ from viewer.model.actions import (
     Undo,
 )
 from viewer.model.demo_photo import demo_photo
-from viewer.model.dense_grid import next_denser
 from viewer.model.free_camera import MoveCamera
 from viewer.model.lens.presets import PRESETS
 from viewer.model.state.app_state import AppState
 from viewer.model.state.depth_editing import ResetDepth, SetBrush, SetTone
-from viewer.model.state.filling import FillTask
 from viewer.model.state.folder import SetFolderOrder, StepPhoto
 from viewer.model.state.inspection import COMPARISONS, OVERLAYS, Comparison, OverlayKind
 from viewer.model.state.model_download import GetDepth, ModelsPrompt, UseModel
 from viewer.model.state.motion import PauseMotion, ReturnHome, SetLoop
-from viewer.model.state.notices import Notice
 from viewer.model.state.optics_actions import ApplyPreset, ResetOptics
 from viewer.model.state.preferences import SECTIONS, SetPreference, ToggleSection
 from viewer.model.state.prompts import ChoiceOf, PalettePrompt
-from viewer.model.state.saving import CopyTask, PasteTask, WriteSidecarTask
+from viewer.model.state.saving import CopyTask, PasteTask
 from viewer.model.state.tasks import ChooseTask, ReadMaskTask
 from viewer.model.zoom import SetZoom, Zoom
 
-NOTHING_BETWEEN = "No views can be made between these: that is for light fields of few views."
 FONT_STEP = 1.1
 CAMERA_STEP = 0.05
 RECENT_SHOWN = 4
@@ -144,11 +140,6 @@ def _own_pixels(state: AppState) -> Action:
     return SetZoom(Zoom(1.0, centre))
 
 
-def _fill_between(state: AppState) -> Action:
-    denser = next_denser(state.scene) if state.scene is not None else None
-    return do(ask, FillTask(denser)) if denser is not None else do(messages.notify, Notice(NOTHING_BETWEEN))
-
-
 def _brush_with(tool: BrushTool) -> Callable[[AppState], Action]:
     return lambda state: SetBrush(replace(state.brush, tool=tool, is_on=True))
 
@@ -165,7 +156,6 @@ COMMANDS: tuple[Command, ...] = (
     Command("Save the picture…", _always(do(saving.ask_to_save)), (Chord("s", ctrl=True),)),
     Command("Copy the picture", _always(do(ask, CopyTask())), (Chord("c", ctrl=True),)),
     Command("Paste a picture, or the path of one", _always(do(ask, PasteTask())), (Chord("v", ctrl=True),)),
-    Command("Save these settings beside the photo", _always(do(ask, WriteSidecarTask()))),
     Command("Next photo of the folder", _always(StepPhoto(1)), (Chord("page_down"),), repeats=True),
     Command("Previous photo of the folder", _always(StepPhoto(-1)), (Chord("page_up"),), repeats=True),
     Command(
@@ -214,7 +204,6 @@ COMMANDS: tuple[Command, ...] = (
         Command(COMPARE_WORDS[kind], _toggle_comparison(kind), (Chord("p"),) if kind == "photo" else ())
         for kind in COMPARISONS
     ),
-    Command("Make views between those of a light field", _fill_between),
     Command("Stop making views", _always(StopWork())),
     Command("Zoom: the whole picture", _always(SetZoom(None)), (Chord("_0"),)),
     Command("Zoom: the photo's own pixels, 1:1", _own_pixels, (Chord("_1"),)),

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path, PurePath
 
-from iibr_core.depth.editing.edits import DepthEdits
 from iibr_core.exports.kinds import EXPORTS, ExportKind, ExportOptions, Purpose, export_path
 from iibr_core.scenes.scene import Scene
 from iibr_core.types import InputError
@@ -103,14 +102,9 @@ def set_jobs(state: AppState, jobs: tuple[JobProgress, ...]) -> AppState:
     return quit_window(state) if state.quits_when_done and not jobs else state
 
 
-def mark_saved(state: AppState, edits: DepthEdits) -> AppState:
-    """Note that a file has these depth edits."""
-    return replace(state, saved_edits=edits)
-
-
 def quit_window(state: AppState, is_sure: bool = False) -> AppState:
-    """Close the window; ask first where that would lose something."""
-    asks = (state.has_unsaved_edits or bool(state.jobs)) and not is_sure
+    """Close the window; ask first while jobs are under way."""
+    asks = bool(state.jobs) and not is_sure
     state = replace(state, quits_when_done=False)
     return replace(state, prompt="quit") if asks else replace(state, should_quit=True)
 

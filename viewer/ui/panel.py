@@ -12,7 +12,7 @@ from imgui_bundle import imgui
 from iibr_core.runtime.time_left import about_left
 from iibr_core.scenes.lens_limits import aperture_limit
 from iibr_core.scenes.scene import Progress, Scene, Source, source_beside
-from viewer.model.actions import Action, OpenPath, ResumeWork, StopWork
+from viewer.model.actions import Action, OpenPath, StopWork
 from viewer.model.commands import BY_NAME
 from viewer.model.layout import Layout
 from viewer.model.state.app_state import AppState, DrawReport
@@ -194,9 +194,6 @@ def _progress(state: AppState, layout: Layout) -> list[Action]:
     if is_working:
         if _words_and_button(words, "Cancel", CANCEL_TIP, layout):
             actions.append(StopWork())
-    elif state.stopped == state.generation and state.scene:
-        if _words_and_button(words, "Resume", "Go on from where the work was stopped.", layout):
-            actions.append(ResumeWork())
     else:
         quiet(words)
     return actions
@@ -247,7 +244,8 @@ def _figures(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
     quiet(size_text(scene))
     quiet(progress_text(state.progress) or "No views asked for.")
     quiet("" if state.report is None else report_text(state.report, state.progress.is_complete))
-    return scene_section(state, scene, layout)
+    scene_section(state, scene, layout)
+    return []
 
 
 BUILDERS: dict[Section, Callable[[AppState, Scene, Layout], list[Action]]] = {

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +18,6 @@ from iibr_core.scenes.lens_limits import focus_limits
 from iibr_core.scenes.light_fields import FROM_VIEWS
 from iibr_core.scenes.opening import results_of
 from iibr_core.scenes.scene import Scene, SceneReady, SceneRequest, Source, ViewReady
-from iibr_core.types import GridShape, InputError
 from viewer.model.actions import OpenPath, SceneOpened
 from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState
@@ -129,43 +127,9 @@ def bilinear(image: np.ndarray, y: np.ndarray, x: np.ndarray) -> np.ndarray:
     return top * (1 - y + y0) + bottom * (y - y0)
 
 
-@pytest.mark.parametrize("filled_grid", [None, GridShape(9, 9)])
-def test_finding_disparity_can_be_stopped(tmp_path: Path, filled_grid: GridShape | None) -> None:
+def test_finding_disparity_can_be_stopped(tmp_path: Path) -> None:
     """Asked to stop once it has begun."""
     said: list[str] = []
-    request = SceneRequest(1, Source(str(write_two_planes(tmp_path / "field")), filled_grid=filled_grid))
+    request = SceneRequest(1, Source(str(write_two_planes(tmp_path / "field"))))
     with pytest.raises(Cancelled), stoppable(lambda: FINDING in said), watched(lambda *now: said.append(now[2])):
         list(results_of(request, lambda: CENTRE))
-
-
-def test_views_between_are_made_of_all_views_on_disk(tmp_path: Path) -> None:
-    request = SceneRequest(1, Source(str(write_two_planes(tmp_path / "field")), filled_grid=GridShape(9, 9)))
-    said: list[str] = []
-    with watched(lambda done, total, doing: said.append(doing)):
-        ((ready, views),) = showings(results_of(request, lambda: CENTRE))
-    assert (ready.scene.grid, ready.scene.given_grid, ready.scene.depth_source) == ((9, 9), (5, 5), FROM_VIEWS)
-    assert ready.scene.disparity_range_px == pytest.approx((WALL_PX / 2, SQUARE_PX / 2), abs=0.15)
-    assert (ready.centre.row, ready.centre.column) == (4, 4)
-    assert {(view.view.row, view.view.column) for view in views} == set(np.ndindex(9, 9))
-    assert {view.view.is_final for view in views} == {True}
-    assert FINDING in said
-    between = next(view.view for view in views if (view.view.row, view.view.column) == (3, 5))
-    assert between.disparity is not None
-    assert between.disparity[48, 48] == pytest.approx(SQUARE_PX / 2, abs=0.05)
-
-
-@pytest.mark.parametrize(
-    ("source", "message"),
-    [
-        (Source("", filled_grid=GridShape(8, 8)), "give 9x9, 13x13, 17x17"),
-        (Source("", DepthChoice(file="centre.npy"), filled_grid=GridShape(9, 9)), "the disparity of one view"),
-        (Source("", filled_grid=GridShape(100_001, 100_001)), "100001 x 100001 views"),
-    ],
-)
-def test_views_between_that_cannot_be_made_are_told_in_a_line(tmp_path: Path, source: Source, message: str) -> None:
-    np.save(tmp_path / "centre.npy", np.zeros((96, 96), np.float32))
-    file = str(tmp_path / "centre.npy") if source.depth.file else None
-    depth = replace(source.depth, file=file)
-    source = replace(source, path=str(write_two_planes(tmp_path / "field")), depth=depth)
-    with pytest.raises(InputError, match=message):
-        list(results_of(SceneRequest(1, source), lambda: CENTRE))

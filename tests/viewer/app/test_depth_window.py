@@ -6,12 +6,11 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
-import glfw
 import numpy as np
 import pytest
 from imgui_bundle import imgui
 
-from iibr_core.depth.editing.edits import UNEDITED, DepthEdits
+from iibr_core.depth.editing.edits import DepthEdits
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import FAR, NEAR, Driver, Opener
 from viewer.app.main_loop import App
@@ -135,19 +134,6 @@ def test_escape_in_the_middle_of_a_stroke_takes_it_back(viewer: Driver) -> None:
     viewer.send("key", "Escape")
     viewer.until(lambda app: not app.state.brush.is_on)
     assert not viewer.app.state.should_quit
-
-
-def test_closing_the_window_asks_before_depth_edits_are_lost(viewer: Driver, tmp_path: Path) -> None:
-    viewer.app.do(SetTone(replace(UNEDITED, gamma=1.5), is_finished=True))
-    settle(viewer, is_made)
-    glfw.set_window_should_close(viewer.app.window.handle, True)
-    settle(viewer, lambda app: app.state.prompt == "quit")
-    viewer.press("Save the depth map…", "prompt str")
-    settle(viewer, lambda app: isinstance(app.state.prompt, SavePrompt))
-    viewer.send("key", "Return")
-    settle(viewer, lambda app: not app.state.has_unsaved_edits)
-    glfw.set_window_should_close(viewer.app.window.handle, True)
-    viewer.until(lambda app: app.state.should_quit)
 
 
 def test_the_key_that_takes_the_brush_brings_it_into_sight_and_puts_it_away(viewer: Driver) -> None:

@@ -24,13 +24,7 @@ from iibr_core.types import (
 from tests.iibr_core.known_scenes import view_of_wall
 from tests.viewer.conftest import Driver
 from viewer.model import messages
-from viewer.model.action import ask, do
-from viewer.model.actions import OpenPath, SetDepthStrength, StopWork, Undo
-from viewer.model.commands import COMMANDS
-from viewer.model.dense_grid import with_views_between
-from viewer.model.state.filling import FillTask
-from viewer.model.state.jobs import CancelJobTask
-from viewer.model.state.optics_actions import SetAperture, SetFocus
+from viewer.model.action import do
 
 SIZE = 48, 64
 DISPARITY = 1.0
@@ -118,80 +112,3 @@ def open_lenslet_image(viewer: Driver, folder: Path) -> Scene:
     viewer.app.do(do(messages.dismiss))
     assert viewer.app.state.scene is not None
     return viewer.app.state.scene
-
-
-def fill_between(viewer: Driver) -> None:
-    (fill,) = (command for command in COMMANDS if command.name == "Make views between those of a light field")
-    viewer.app.do(fill.action(viewer.app.state))
-    viewer.until(lambda app: bool(app.state.jobs))
-
-
-def until_filled(viewer: Driver) -> Scene:
-    viewer.until(lambda app: app.state.scene is not None and app.state.scene.grid == (5, 5))
-    viewer.until_idle()
-    assert viewer.app.state.scene is not None
-    assert viewer.app.state.views_there == set(np.ndindex(5, 5))
-    assert viewer.app.scene_view.is_whole
-    assert [notice.text for notice in viewer.app.state.notices if notice.is_error] == []
-    return viewer.app.state.scene
-
-
-def test_views_between_those_of_a_file_are_made_shown_and_taken_back(
-    viewer: Driver, tmp_path: Path, gate: threading.Event
-) -> None:
-    """Whatever is touched meanwhile; the picture is that of the views on disk until all are there."""
-    on_disk = open_lenslet_image(viewer, tmp_path)
-    gate.clear()
-    fill_between(viewer)
-    for touched in (SetAperture(1.5), SetFocus(0.8), SetDepthStrength(0.5, is_finished=True), StopWork(), Undo()):
-        viewer.app.do(touched)
-        viewer.app.step()
-    assert viewer.app.state.scene == on_disk
-    assert viewer.app.state.views_there == set(np.ndindex(3, 3))
-    gate.set()
-    denser = until_filled(viewer)
-    assert denser.subject_disparity_px == pytest.approx(DISPARITY / 2, abs=0.05)
-    assert viewer.app.state.optics.aperture_diameter == pytest.approx(3.0), "twice as many steps"
-    assert viewer.app.state.zoom is None
-    viewer.app.do(do(ask, FillTask(with_views_between(denser, GridShape(3, 3)))))
-    viewer.until(lambda app: app.state.scene is not None and app.state.scene.grid == (3, 3))
-    viewer.until_idle()
-    gate.clear()  # they are there, and not made again
-    viewer.app.do(do(ask, FillTask(denser.source)))
-    until_filled(viewer)
-
-
-def test_views_between_are_made_on_when_another_photo_is_opened_and_found_by_who_goes_back(
-    viewer: Driver, tmp_path: Path, gate: threading.Event
-) -> None:
-    photo = viewer.app.state.source
-    on_disk = open_lenslet_image(viewer, tmp_path)
-    assert photo is not None
-    gate.clear()
-    fill_between(viewer)
-    viewer.app.do(OpenPath(photo))
-    viewer.until(lambda app: app.state.scene is not None and app.state.scene.source.path == photo.path)
-    gate.set()
-    viewer.until(lambda app: not app.state.jobs)
-    assert ["are ready" in notice.text for notice in viewer.app.state.notices] == [True]
-    assert viewer.app.state.scene is not None
-    assert viewer.app.state.scene.source.path == photo.path
-    gate.clear()  # they are there, and not made again
-    viewer.app.do(OpenPath(on_disk.source))
-    until_filled(viewer)
-
-
-def test_a_fill_is_given_up_by_its_button_or_for_another_grid(
-    viewer: Driver, tmp_path: Path, gate: threading.Event
-) -> None:
-    scene = open_lenslet_image(viewer, tmp_path)
-    gate.clear()
-    fill_between(viewer)
-    viewer.app.do(do(ask, FillTask(with_views_between(scene, GridShape(9, 9)))))
-    viewer.until(lambda app: [job.fills for job in app.state.jobs] == [with_views_between(scene, GridShape(9, 9))])
-    viewer.app.do(do(ask, CancelJobTask(viewer.app.state.jobs[0].id)))
-    viewer.until(lambda app: not app.state.jobs)
-    gate.set()
-    viewer.until_idle()
-    assert viewer.app.state.scene == scene
-    assert not viewer.app.state.notices

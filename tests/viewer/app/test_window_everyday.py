@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -14,15 +13,13 @@ from iibr_core.beyond.optics import Optics
 from iibr_core.formats.images.metadata import SETTINGS_KEY
 from iibr_core.formats.images.photo import read_photo
 from iibr_core.formats.images.write import write_image
-from iibr_core.scenes import opening
-from iibr_core.scenes.scene import SceneReady, SceneRequest, Source, ViewReady
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import Driver, Opener, rests, write_scene
 from viewer.app.preferences_store import load_preferences
 from viewer.display.offscreen import OffscreenScene
 from viewer.model import messages
 from viewer.model.action import ask, do
-from viewer.model.actions import OpenPath, StopWork
+from viewer.model.actions import StopWork
 from viewer.model.saved_settings import read_settings
 from viewer.model.state.app_state import AppState
 from viewer.model.state.exporting import ExportPrompt
@@ -258,28 +255,6 @@ def test_stopping_keeps_the_views_that_are_there(open_window: Opener, photo_path
     assert 3 < made < 41 * 41
     assert driver.app.scene_view.renderer.field.present.sum() == made == len(driver.app.state.views_there)
     assert "stopped at" in driver.app.state.progress.doing
-    driver.press("Resume")
-    driver.until(lambda app: app.scene_view.generation == 2)
-
-
-def test_a_lost_worker_is_told_and_replaced(
-    open_window: Opener, photo_path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    real = opening.results_of
-
-    def dying(request: SceneRequest, nearest_to: Callable[[], ViewOffset]) -> Iterator[SceneReady | ViewReady]:
-        if request.generation == 1:
-            raise SystemExit
-        yield from real(request, nearest_to)
-
-    monkeypatch.setattr(opening, "results_of", dying)
-    driver = open_window(photo_path)
-    driver.until(lambda app: bool(app.state.notices))
-    assert "stopped unexpectedly" in driver.app.state.notices[0].text
-    driver.app.do(OpenPath(Source(str(write_scene(tmp_path, "other", seed=1)), grid=GridShape(1, 1))))
-    driver.until_idle()
-    assert driver.app.state.scene is not None
-    assert driver.app.state.scene.name == "other"
 
 
 def test_the_state_that_asks_for_a_path_knows_what_for() -> None:

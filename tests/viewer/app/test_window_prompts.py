@@ -11,9 +11,8 @@ from imgui_bundle import imgui
 from iibr_core.formats.images.write import write_image
 from iibr_core.scenes.scene import Source
 from iibr_core.types import GridShape
-from tests.viewer.conftest import SMALL_WINDOW, Driver, Opener
+from tests.viewer.conftest import Driver, Opener
 from viewer.app.main_loop import App
-from viewer.app.window_slot import STEP
 from viewer.model import messages, saving
 from viewer.model.action import do
 from viewer.model.actions import OpenPath, SetState, StopWork
@@ -153,46 +152,18 @@ def test_a_wrong_ending_keeps_what_was_typed_and_says_what_is_possible(viewer: D
     viewer.until(lambda app: app.state.prompt is None)
 
 
-def test_a_file_that_does_not_open_leaves_the_finished_field_alone(viewer: Driver, tmp_path: Path) -> None:
-    before, generation = viewer.app.scene_view.views_uploaded, viewer.app.state.generation
+def test_the_open_photo_is_whole_again_after_a_file_that_does_not_open(viewer: Driver, tmp_path: Path) -> None:
+    before = viewer.app.state.optics
     broken = tmp_path / "broken.jpg"
     broken.write_bytes(b"no picture")
-    for number in (1, 2):
-        viewer.app.window.on_drop(None, [str(broken)])
-        viewer.until(lambda app: bool(app.state.notices) and "broken.jpg" in app.state.notices[-1].text)
-        viewer.until_idle()
-        assert viewer.app.state.generation == viewer.app.scene_view.generation == generation, number
-        assert viewer.app.state.progress.done == 9
-    assert viewer.app.scene_view.views_uploaded == before
-    viewer.app.do(OpenPath(Source(str(tmp_path / "scene.png"), grid=GridShape(1, 1))))
-    viewer.until(lambda app: app.scene_view.generation > generation)
+    viewer.app.window.on_drop(None, [str(broken)])
+    viewer.until(lambda app: bool(app.state.notices) and "broken.jpg" in app.state.notices[-1].text)
     viewer.until_idle()
-    assert viewer.app.state.progress.total == 1
-
-
-def test_a_file_that_is_given_up_while_it_is_read_leaves_the_finished_field_alone(
-    viewer: Driver, tmp_path: Path
-) -> None:
-    before = viewer.app.scene_view.views_uploaded
     viewer.app.do(OpenPath(Source(str(tmp_path / "scene.png"))), StopWork())
     viewer.until_idle()
-    assert viewer.app.scene_view.views_uploaded == before
     assert viewer.app.state.progress.is_complete
-
-
-def test_a_second_window_does_not_open_exactly_on_the_first(open_window: Opener, tmp_path: Path) -> None:
-    """Two windows of one process, one after the other made: the slots are files, so that processes see them too."""
-    from viewer.app.window_slot import WindowSlot
-
-    first = open_window(None, kept_in=tmp_path)
-    first.until(lambda app: app.frames_shown > 0)
-    second = WindowSlot(tmp_path)
-    assert second.shift(SMALL_WINDOW) == (STEP, STEP, *SMALL_WINDOW[2:])
-    second.close()
-    first.close()
-    again = WindowSlot(tmp_path)
-    assert again.shift(SMALL_WINDOW) == SMALL_WINDOW
-    again.close()
+    assert viewer.app.scene_view.is_whole
+    assert viewer.app.state.optics == before
 
 
 def test_one_notice_is_shown_at_a_time_and_all_are_closed_at_once(viewer: Driver) -> None:

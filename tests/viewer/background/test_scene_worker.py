@@ -89,25 +89,6 @@ def test_a_photo_comes_with_its_first_view_at_once_and_then_all_of_them(photo_pa
     assert [v.progress.done for v in views if isinstance(v, ViewReady)] == list(range(1, 10))
 
 
-def test_a_lost_worker_says_so_and_the_next_request_starts_another(
-    desk_for: Callable[..., Desk], capfd: pytest.CaptureFixture[str]
-) -> None:
-    def work(asked: SceneRequest, *_: object) -> Iterator[ViewReady]:
-        if asked.generation == 1:
-            raise SystemExit("a library tried to end the program")
-        yield view(asked.generation)
-
-    desk = desk_for(work)
-    desk.worker.submit(request(1))
-    assert desk.woken()
-    assert desk.worker.is_lost
-    desk.worker.submit(request(2))
-    result = desk.next()
-    assert result.generation == 2
-    assert not desk.worker.is_lost
-    assert "a library tried" in capfd.readouterr().err
-
-
 def test_depth_painted_beyond_its_range_is_no_other_lens(photo_path: Path) -> None:
     """The views are others, the aperture is carried over to them: its f-number stays."""
     source, loaded, stops, state = Source(str(photo_path)), None, [], AppState()
@@ -290,12 +271,11 @@ def test_kernels_that_are_compiled_are_told_beside_the_views_that_are_there(
     assert all(progress.left_s is None for progress in told), "of two times left, one is wrong"
 
 
-@pytest.mark.parametrize("filled_grid", [None, GridShape(9, 9)])
 def test_the_bar_of_each_work_grows_and_the_last_view_completes_it(
-    desk_for: Callable[..., Desk], tmp_path: Path, filled_grid: GridShape | None
+    desk_for: Callable[..., Desk], tmp_path: Path
 ) -> None:
     """Through all showings of a light field, as the window's state has it."""
-    source = Source(str(write_two_planes(tmp_path / "field")), filled_grid=filled_grid)
+    source = Source(str(write_two_planes(tmp_path / "field")))
     desk, state = desk_for(), reduce(AppState(), OpenPath(source))
     desk.worker.submit(SceneRequest(1, source))
     shown = [state.progress]

@@ -17,7 +17,6 @@ from iibr_core.beyond.optics import (
     Optics,
 )
 from iibr_core.depth.choice import DepthOrigin
-from iibr_core.depth.editing.edits import UNEDITED
 from iibr_core.method.plan import ScenePlan
 from iibr_core.scenes.lens_limits import (
     STEEPEST_TILT,
@@ -27,18 +26,16 @@ from iibr_core.scenes.lens_limits import (
     focus_span,
     is_finite,
 )
-from iibr_core.scenes.scene import DepthSettings, Progress, Scene, Source
+from iibr_core.scenes.scene import Progress, Scene, Source
 from iibr_core.types import GridShape, ViewOffset
 from viewer.model import inspection, messages, saving
 from viewer.model.action import do
 from viewer.model.actions import (
-    EndGesture,
     OpenFailed,
     OpenPath,
     ProgressMade,
     SceneOpened,
     SetDepthStrength,
-    SetState,
     StopWork,
     TakeSettings,
     Undo,
@@ -49,7 +46,6 @@ from viewer.model.reducers.lens_reducer import carry_optics
 from viewer.model.reducers.root import reduce
 from viewer.model.remedies import DEPTH_COMMANDS
 from viewer.model.state.app_state import AppState, Hover, Picture
-from viewer.model.state.depth_editing import SetTone
 from viewer.model.state.jobs import JobProgress
 from viewer.model.state.notices import Notice
 from viewer.model.state.optics_actions import (
@@ -212,24 +208,6 @@ def test_focusing_leaves_an_aperture_alone_that_the_user_chose() -> None:
     assert (one_view.optics.aperture_diameter, one_view.notices) == (0, ())
 
 
-def test_quitting_asks_where_depth_edits_would_be_lost() -> None:
-    edits = replace(UNEDITED, gamma=1.5)
-    edited = replace(state_with(scene_of()), depth=DepthSettings(edits=edits))
-    asked = reduce(edited, do(saving.quit_window))
-    assert (asked.prompt, asked.should_quit) == ("quit", False)
-    assert reduce(asked, do(saving.quit_window, is_sure=True)).should_quit
-    assert reduce(reduce(edited, do(saving.mark_saved, edits)), do(saving.quit_window)).should_quit
-    assert not reduce(
-        reduce(edited, do(saving.mark_saved, replace(edits, gamma=2.0))), do(saving.quit_window)
-    ).should_quit
-    assert reduce(state_with(scene_of()), do(saving.quit_window)).should_quit
-    other = reduce(reduce(edited, do(saving.mark_saved, edits)), OpenPath(Source("other.png")))
-    other = reduce(other, SceneOpened(other.generation, scene_of(source=other.source)))
-    assert not reduce(replace(other, depth=DepthSettings(edits=edits)), do(saving.quit_window)).should_quit, (
-        "those of another photo"
-    )
-
-
 def test_quitting_asks_while_jobs_are_under_way_and_can_wait_for_them() -> None:
     job = JobProgress(1, "export", "a.gif")
     busy = reduce(state_with(scene_of()), do(saving.set_jobs, (job,)))
@@ -245,8 +223,6 @@ def test_quitting_asks_while_jobs_are_under_way_and_can_wait_for_them() -> None:
     assert reduce(reduce(asked, do(saving.set_jobs, ())), do(saving.quit_when_done)).should_quit, (
         "they ended while that was asked"
     )
-    edited = replace(waiting, depth=DepthSettings(edits=replace(UNEDITED, gamma=1.5)))
-    assert reduce(edited, do(saving.set_jobs, ())).prompt == "quit", "edits are still asked for"
 
 
 def test_what_became_of_a_job_is_still_told_when_another_photo_opens() -> None:
@@ -255,25 +231,6 @@ def test_what_became_of_a_job_is_still_told_when_another_photo_opens() -> None:
     asked = reduce(told, OpenPath(Source("other.png")))
     opened = reduce(asked, SceneOpened(asked.generation, scene_of(source=asked.source)))
     assert opened.notices == (stays,)
-
-
-def test_undone_edits_are_lost_as_little_as_others() -> None:
-    """Redo alone is not asked for: what is there is kept, in a file or for the next time."""
-    opened = state_with(scene_of(plan=plan_of(GridShape(9, 9))))
-    first, second = replace(UNEDITED, gamma=1.5), replace(UNEDITED, gamma=1.5, is_inverted=True)
-    half = opened
-    for action in (SetTone(first, is_finished=True), EndGesture(), SetTone(second, is_finished=True), Undo()):
-        half = reduce(half, action)
-    assert half.depth.edits == first
-    assert reduce(half, do(saving.quit_window)).prompt == "quit"
-    assert reduce(reduce(half, do(saving.mark_saved, second)), do(saving.quit_window)).prompt == "quit", (
-        "the file has what was undone"
-    )
-    assert reduce(reduce(half, do(saving.mark_saved, first)), do(saving.quit_window)).should_quit
-    assert reduce(reduce(half, Undo()), do(saving.quit_window)).should_quit, "all is as it was found"
-    assert reduce(reduce(half, SetState("keeps_sessions", True)), do(saving.quit_window)).should_quit, (
-        "it opens as it is left"
-    )
 
 
 def test_what_is_opened_closes_the_help() -> None:

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from iibr_core.scenes.scene import Source
-from iibr_core.types import GridShape
 from viewer.model.action import ask, do
 from viewer.model.state.app_state import AppState
 from viewer.model.state.jobs import STOPPING, WRITING, CancelJobTask, JobProgress
@@ -21,13 +19,6 @@ def test_each_job_has_a_row_and_a_cancel_of_its_own() -> None:
     for doing in (WRITING, STOPPING):
         (row,) = progress_rows(AppState(jobs=(replace(jobs[0], doing=doing),)))
         assert row.cancel is None
-
-
-def test_filling_between_views_has_such_a_row_too() -> None:
-    filling = JobProgress(3, "fill", "field", "making views", 0.25, 8.0, Source("field", filled_grid=GridShape(9, 9)))
-    (row,) = progress_rows(AppState(jobs=(filling,)))
-    assert (row.name, row.words) == ("Making views between those of field", "making views, 25 %, about 8 s left")
-    assert row.cancel == do(ask, CancelJobTask(3))
 
 
 def test_a_download_has_the_same_row() -> None:

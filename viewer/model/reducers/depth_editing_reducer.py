@@ -62,7 +62,7 @@ def reduce_depth(state: AppState, action: DepthAction) -> AppState:
             return replace(state, brush=replace(state.brush, tool=tool, sample=sample))
         case DropStroke() if state.stroke is not None:
             # the worker was stopped when the stroke began
-            return replace(state, stroke=None, generation=state.next_generation)
+            return replace(state, stroke=None, generation=state.generation + 1)
         case ResetDepth():
             return _with_settings(state, DepthSettings(state.scene.source.depth.refine), "ResetDepth", is_finished=True)
     return state
@@ -103,7 +103,7 @@ def _with_depth_section(state: AppState) -> AppState:
 
 
 def _with_settings(state: AppState, depth_settings: DepthSettings, kind: str, is_finished: bool) -> AppState:
-    generation = state.next_generation if is_finished else state.generation
+    generation = state.generation + 1 if is_finished else state.generation
     after = replace(state, depth=depth_settings, generation=generation)
     return record_edit(state, after, kind)
 

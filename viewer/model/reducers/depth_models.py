@@ -107,6 +107,6 @@ def _take_estimate(state: AppState, scene: Scene, model: str) -> AppState:
         source=source,
         scene=replace(scene, source=source, depth_model=model),
         models=replace(models, asked=None),
-        generation=state.next_generation,
+        generation=state.generation + 1,
         stopped=None,
     )

@@ -86,7 +86,7 @@ def _restore(state: AppState, edit: Edit, history: History) -> AppState:
         optics=edit.optics,
         depth_strength=edit.depth_strength,
         depth=edit.depth,
-        generation=state.next_generation if restarts else state.generation,
+        generation=state.generation + 1 if restarts else state.generation,
         motion=Motion(speed=state.motion.speed),
         history=history,
     )

@@ -17,7 +17,7 @@ from iibr_core.scenes.lens_limits import (
     first_aperture,
     is_finite,
 )
-from iibr_core.scenes.scene import Scene, Source
+from iibr_core.scenes.scene import Scene
 from iibr_core.types import ViewOffset
 from viewer.model.actions import SamePlaces
 from viewer.model.lens.focal_plane import focus_on, sharp_disparity, tilt_through
@@ -134,7 +134,7 @@ def _move_handle(state: AppState, scene: Scene, action: MoveTiltHandle) -> AppSt
 
 def carry_optics(optics: Optics, old: Scene | None, new: Scene) -> Optics:
     """The optics that show a newly planned scene as it was seen before; a scene not seen before starts afresh."""
-    if old is None or not is_same_scene(old.source, new.source, new.given_grid is not None):
+    if old is None or old.source is not new.source:  # a file opened again is new
         return Optics()
     eye = ViewOffset(*(x * _steps(b) / _steps(a) for x, a, b in zip(optics.eye, old.grid, new.grid)))
     columns = _steps(new.grid.columns) / _steps(old.grid.columns)
@@ -184,12 +184,6 @@ def _disparity_now(disparity: float, pairs: tuple[tuple[float, float], ...]) -> 
             share = clamp((disparity - low) / (high - low), 0.0, 1.0) if high > low else 0.0
             return low_now + share * (high_now - low_now)
     return pairs[-1][1]
-
-
-def is_same_scene(old: Source, new: Source, is_light_field: bool) -> bool:
-    """Whether what is opened was open before: a file opened again is new, other views of a light field are not."""
-    filled = replace(old, filled_grid=new.filled_grid)
-    return old is new or (is_light_field and filled != old and filled == new)
 
 
 def _steps(views: int) -> int:

@@ -10,7 +10,7 @@ from typing import Any
 from iibr_core.beyond.optics import Optics
 from iibr_core.gloss.settings import STROKE_RADIUS_LIMITS
 from iibr_core.scenes.lens_limits import clamp, clamp_optics, is_finite
-from iibr_core.scenes.scene import DepthSettings, Progress, Source, is_same_field
+from iibr_core.scenes.scene import DepthSettings, Progress
 from viewer.model.action import Action as VerbAction
 from viewer.model.actions import (
     Action,
@@ -18,7 +18,6 @@ from viewer.model.actions import (
     OpenPath,
     Redo,
     RestoreSession,
-    ResumeWork,
     SetDepthStrength,
     SetState,
     ShowBefore,
@@ -27,7 +26,6 @@ from viewer.model.actions import (
     TakeSettings,
     Undo,
     WorkerEvent,
-    WorkerLost,
 )
 from viewer.model.free_camera import FreeCameraAction
 from viewer.model.inspection import release_divider
@@ -41,9 +39,8 @@ from viewer.model.reducers.lens_reducer import reduce_lens, with_focus_of
 from viewer.model.reducers.motion_reducer import reduce_motion
 from viewer.model.reducers.preferences_reducer import reduce_preferences
 from viewer.model.reducers.worker_events import reduce_worker_event, stop_work
-from viewer.model.state.app_state import AppState, FinishedField, TiltHandles
+from viewer.model.state.app_state import AppState, TiltHandles
 from viewer.model.state.depth_editing import DepthAction
-from viewer.model.state.filling import ViewsFilled
 from viewer.model.state.folder import FolderListed, ScrollFilmstrip, SetFolderOrder, StepPhoto
 from viewer.model.state.model_download import ModelAction
 from viewer.model.state.motion import Motion, MotionAction
@@ -62,9 +59,7 @@ from viewer.model.state.saving import SavedSettings
 from viewer.model.window_limits import DEPTH_STRENGTH_LIMIT
 from viewer.model.zoom import LEAST_ZOOM, SetZoom, Zoom
 
-AS_LEFT = "As you left it. Undo (Ctrl+Z) starts afresh."
-FILLED = "its further views are ready. Open it again to see them."
-LOST = "Making the views stopped unexpectedly; the picture stays as it is. Open the photo again to go on."
+AS_LEFT = "Restored as you left it. Ctrl+Z resets."
 
 
 def reduce(state: AppState, action: Action) -> AppState:
@@ -125,20 +120,12 @@ def _reduce_files(state: AppState, action: Action) -> AppState:
             state = replace(state, preferences=replace(state.preferences, folder_order=order))
             return list_folder(state, state.folder.path, state.folder.photos) if state.folder is not None else state
         case OpenPath(source):
-            source = _with_filled_views(state, source)
             progress = Progress(doing=f"reading {PurePath(source.path).name}")
-            generation, left = state.next_generation, _leave_field(state)
             models = replace(state.models, asked=None, left_focus=None)
             state = replace(state, free_camera=None, prompt=None, models=models)
-            return replace(state, source=source, progress=progress, generation=generation, left_field=left)
-        case ViewsFilled(field):
-            return _take_filled(replace(state, filled=field), field.scene.source)
+            return replace(state, source=source, progress=progress, generation=state.generation + 1)
         case StopWork():
             return stop_work(state)
-        case ResumeWork() if state.scene is not None:
-            return replace(state, generation=state.next_generation, stopped=None)
-        case WorkerLost():
-            return replace(notify(state, Notice(LOST, is_error=True)), progress=Progress(), stopped=state.generation)
     return _reduce_screen(state, action)
 
 
@@ -171,21 +158,6 @@ def _checked_zoom(zoom: Zoom | None) -> Zoom | None:
     return Zoom(max(zoom.scale, LEAST_ZOOM), (x, y))
 
 
-def _take_filled(state: AppState, filled: Source) -> AppState:
-    """Show the views between where their light field is open still; else say that they are there."""
-    if state.source is not None and is_same_field(state.source, filled):
-        return _reduce_files(state, OpenPath(filled))
-    return notify(state, Notice(f"{PurePath(filled.path).name}: {FILLED}", stays=True))
-
-
-def _with_filled_views(state: AppState, source: Source) -> Source:
-    """Who goes back to a light field finds the views between that were made of it."""
-    filled, is_back = state.filled, state.source is None or state.source.path != source.path
-    if filled is None or not is_back or not is_same_field(filled.scene.source, source):
-        return source
-    return replace(source, filled_grid=filled.scene.source.filled_grid)
-
-
 def _step_photo(state: AppState, steps: int) -> AppState:
     source = photo_after(state, steps)
     if source is None or state.folder is None:
@@ -195,20 +167,12 @@ def _step_photo(state: AppState, steps: int) -> AppState:
     return _reduce_files(replace(state, folder=folder), OpenPath(source))
 
 
-def _leave_field(state: AppState) -> FinishedField | None:
-    """What to come back to should the next file not open; as before where none has opened since."""
-    if state.scene is None or state.scene.source is not state.source:
-        return state.left_field
-    is_finished = state.progress.is_complete and state.shown_generation == state.generation
-    return FinishedField(state.progress, state.depth_strength, state.depth) if is_finished else None
-
-
 def _set_depth_strength(state: AppState, action: SetDepthStrength) -> AppState:
     if not math.isfinite(action.strength):
         return state
     strength = clamp(action.strength, 0.0, DEPTH_STRENGTH_LIMIT)
     restarts = action.is_finished and state.source is not None
-    generation = state.next_generation if restarts else state.generation
+    generation = state.generation + 1 if restarts else state.generation
     return replace(state, depth_strength=strength, generation=generation)
 
 
@@ -222,7 +186,7 @@ def _take_settings(state: AppState, settings: SavedSettings) -> AppState:
 
 
 def _restore(state: AppState, settings: SavedSettings) -> AppState:
-    """As the photo was left: the lens, and what was made of its depth; the edits are kept, so nothing is unsaved."""
+    """As the photo was left: the lens, and what was made of its depth."""
     restored = _take_settings(state, settings)
     if state.scene is None or restored is state:
         return state
@@ -237,5 +201,5 @@ def _restore(state: AppState, settings: SavedSettings) -> AppState:
     depth = DepthSettings(settings.source.depth.refine, settings.depth_edits)
     if (depth, settings.depth_strength) != (state.depth, state.depth_strength):
         restored = replace(restored, depth=depth, depth_strength=settings.depth_strength)
-        restored = replace(restored, generation=state.next_generation, saved_edits=settings.depth_edits)
+        restored = replace(restored, generation=state.generation + 1)
     return notify(restored, Notice(AS_LEFT))

@@ -6,7 +6,6 @@ from dataclasses import replace
 from pathlib import PurePath
 
 from iibr_core.beyond.optics import Optics
-from iibr_core.depth.editing.edits import UNEDITED
 from iibr_core.scenes.lens_limits import clamp_optics, focus_limits
 from iibr_core.scenes.scene import DepthSettings, Progress, Scene
 from iibr_core.types import InputError
@@ -77,7 +76,6 @@ def _open_scene(state: AppState, scene: Scene, same_places: SamePlaces | None) -
         scene=scene,
         progress=_progress_of(state, scene),
         views_there=frozenset({scene.grid.centre}),
-        left_field=None,
         shown_generation=state.generation,
         optics=carried(state.optics),
         history=map_optics(state.history, carried),
@@ -110,7 +108,6 @@ def _open_scene(state: AppState, scene: Scene, same_places: SamePlaces | None) -
         depth=depth,
         stroke=None,
         brush=replace(state.brush, sample=None),
-        saved_edits=UNEDITED,
         has_chosen_focus=False,
         has_chosen_aperture=False,
         focused_at=None,
@@ -186,14 +183,8 @@ def _fail_to_open(state: AppState) -> AppState:
 
 
 def _leave_job(state: AppState) -> AppState:
-    """Nothing more comes of this job. Where another scene was open before, the program returns to it: as it is where
-    all its views are there, else they are made.
-    """
-    left = state.left_field
-    state = replace(state, progress=Progress(), left_field=None)
+    """Return the state without this job; where another scene is open, its views are made again."""
+    state = replace(state, progress=Progress())
     if state.scene is None or state.scene.source is state.source:
         return state
-    state = replace(state, source=state.scene.source)
-    if left is not None and (left.depth_strength, left.depth) == (state.depth_strength, state.depth):
-        return replace(state, progress=left.progress, generation=state.shown_generation, given_up=state.generation)
-    return replace(state, generation=state.next_generation)
+    return replace(state, source=state.scene.source, generation=state.generation + 1)

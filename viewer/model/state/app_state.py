@@ -8,9 +8,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 from iibr_core.beyond.optics import Optics
-from iibr_core.depth.editing.edits import UNEDITED, DepthEdits, Stroke
+from iibr_core.depth.editing.edits import Stroke
 from iibr_core.scenes.rect import WHOLE, Rect
-from iibr_core.scenes.scene import AS_FOUND, DepthSettings, FilledField, Progress, Scene, Source
+from iibr_core.scenes.scene import AS_FOUND, DepthSettings, Progress, Scene, Source
 from iibr_core.scenes.screen_size import ScreenSize
 from viewer.model.free_camera import FreeCamera
 from viewer.model.state.depth_editing import Brush
@@ -51,15 +51,6 @@ class TiltHandles:
 
 
 @dataclass(frozen=True)
-class FinishedField:
-    """All views of a scene are there, while another one is read: what they were made with, to come back to."""
-
-    progress: Progress
-    depth_strength: float
-    depth: DepthSettings
-
-
-@dataclass(frozen=True)
 class DrawReport:
     """What is known of the picture drawn last.
 
@@ -78,21 +69,14 @@ class AppState:
     views_there: indices (row, column) of views made. stopped: the generation the user stopped. tilt_handles: None while
     they are hidden. tasks: not yet taken up. recent: paths opened, the latest first. report: None without a window.
     zoom: None where the whole picture is seen. free_camera: None on the plane of the views;
-    free_progress: how much is done of what its views are made of, None when that is there.
-    depth: what is made of the scene's depth; stroke: of the brush, while it is drawn. saved_edits: of the depth, as a
-    file has them. jobs: saves, copies, exports and fills under way; quits_when_done: the window closes once there are
-    none.
-    has_chosen_focus, has_chosen_aperture: whether the user said in this scene what is sharp, and how wide the aperture
-    is. has_dialogs: whether the system has file dialogs. left_field: None
-    where the open scene was left unfinished, or not at all.
-    shown_generation: whose views are shown; given_up: the newest one that led to nothing, so that no two jobs share a
-    number. folder: the photos beside the one that is open, None before they are known. facts: what a photo's file says
-    of it, perhaps of the one before. is_fullscreen,
-    hides_panel: of the window, None: where that is_narrow, see `layout`; shows_before: the photo as it was taken stands
-    in place of the picture.
-    models: of depth. keeps_sessions: whether the photo opens as it is left. filled: the light field whose views
-    between were made last, None before. focused_at: the place (see focal_plane) that was clicked last to be sharp, None
-    where the focus was set otherwise.
+    free_progress: how much is done of what its views are made of, None when that is there. depth: what is made of the
+    scene's depth; stroke: of the brush, while it is drawn. jobs: saves, copies and exports under way; quits_when_done:
+    the window closes once there are none. has_chosen_focus, has_chosen_aperture: whether the user said in this scene
+    what is sharp, and how wide the aperture is. has_dialogs: whether the system has file dialogs. shown_generation:
+    whose views are shown. folder: the photos beside the one that is open, None before they are known. facts: what a
+    photo's file says of it, perhaps of the one before. is_fullscreen, hides_panel: of the window, None: where that
+    is_narrow, see `layout`; shows_before: the photo as it was taken stands in place of the picture. models: of depth.
+    focused_at: the place (see focal_plane) that was clicked last to be sharp, None where the focus was set otherwise.
     """
 
     optics: Optics = field(default_factory=Optics)
@@ -122,7 +106,6 @@ class AppState:
     brush: Brush = field(default_factory=Brush)
     stroke: Stroke | None = None
     gloss_brush: GlossBrush = field(default_factory=GlossBrush)
-    saved_edits: DepthEdits = UNEDITED
     jobs: tuple[JobProgress, ...] = ()
     quits_when_done: bool = False
     models: DepthModels = field(default_factory=DepthModels)
@@ -130,17 +113,13 @@ class AppState:
     has_chosen_aperture: bool = False
     focused_at: tuple[float, float] | None = None
     has_dialogs: bool = False
-    left_field: FinishedField | None = None
     shown_generation: int = 0
-    given_up: int = 0
     folder: PhotoFolder | None = None
     facts: PhotoFacts = NO_FACTS
     is_fullscreen: bool = False
     hides_panel: bool | None = None
     is_narrow: bool = False
     shows_before: bool = False
-    keeps_sessions: bool = False
-    filled: FilledField | None = None
 
     @property
     def at_rest(self) -> AppState:
@@ -156,11 +135,6 @@ class AppState:
         return Optics() if self.shows_before else self.optics
 
     @property
-    def next_generation(self) -> int:
-        """Of the next job."""
-        return max(self.generation, self.given_up) + 1
-
-    @property
     def is_panel_hidden(self) -> bool:
         """As the user wants it; else it gives way to the picture in a narrow window."""
         return self.is_narrow if self.hides_panel is None else self.hides_panel
@@ -168,13 +142,6 @@ class AppState:
     def with_task(self, task: Task) -> AppState:
         """Return the state with one more task for the outside world."""
         return replace(self, tasks=(*self.tasks, task))
-
-    @property
-    def has_unsaved_edits(self) -> bool:
-        """Whether closing would lose what was done to the depth: no file has it, nor is it kept for the next time."""
-        if self.keeps_sessions:
-            return False
-        return self.stroke is not None or self.depth.edits not in (UNEDITED, self.saved_edits)
 
 
 @dataclass(frozen=True)

@@ -1,13 +1,11 @@
-"""The queue of saves, copies, exports and fills between views: what the window shows of it, and what changes it."""
+"""The queue of saves, copies and exports: what the window shows of it, and what changes it."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import Literal
 
-from iibr_core.scenes.scene import Source
-
-JobKind = Literal["picture", "map", "copy", "export", "fill"]
+JobKind = Literal["picture", "map", "copy", "export"]
 
 WAITING_FOR_VIEWS = "waiting for the views"
 WRITING = "writing the file"
@@ -17,8 +15,7 @@ STOPPING = "stopping"
 @dataclass(frozen=True)
 class JobProgress:
     """One job of the queue. name: of its file or folder. doing: in words, "" while it waits for its turn. done: share
-    of what it is doing, 0..1. left_s: seconds that this still takes, None where that is not known. fills: the
-    light field as it will be, None of another kind.
+    of what it is doing, 0..1. left_s: seconds that this still takes, None where that is not known.
     """
 
     id: int
@@ -27,7 +24,6 @@ class JobProgress:
     doing: str = ""
     done: float = 0.0
     left_s: float | None = None
-    fills: Source | None = None
 
     @property
     def can_be_cancelled(self) -> bool:

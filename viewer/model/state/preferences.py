@@ -51,8 +51,7 @@ def _with_holders(section: Section) -> tuple[Section, ...]:
 @dataclass(frozen=True)
 class Preferences:
     """What outlasts the program. window: x, y, width, height in screen units, None before the first; is_maximized:
-    whether it filled the screen then. told_sessions: that depth edits are kept; it is told once.
-    last_folder: where a picture or an export was put last, "" before the first.
+    whether it filled the screen then. last_folder: where a picture or an export was put last, "" before the first.
     estimates_depth: photos without depth get it from the recommended model, without a question, once it is here.
     """
 
@@ -64,7 +63,6 @@ class Preferences:
     shows_filmstrip: bool = False
     folder_order: FolderOrder = "name"
     units: Units = "photographic"
-    told_sessions: bool = False
     estimates_depth: bool = False
     last_folder: str = ""
 
@@ -73,7 +71,7 @@ class Preferences:
 class SetPreference:
     """Give one field of `Preferences` this value; the others have actions of their own, for more depends on them."""
 
-    field: Literal["theme", "font_scale", "units", "shows_filmstrip", "told_sessions", "estimates_depth", "last_folder"]
+    field: Literal["theme", "font_scale", "units", "shows_filmstrip", "estimates_depth", "last_folder"]
     value: Theme | float | Units | bool | str
 
 

@@ -55,8 +55,3 @@ class CopyTask:
 @dataclass(frozen=True)
 class PasteTask:
     """Open what the system's clipboard holds: a picture, or the path of one."""
-
-
-@dataclass(frozen=True)
-class WriteSidecarTask:
-    """Keep what the photo is left with beside it too, for other machines."""

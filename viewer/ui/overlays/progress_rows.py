@@ -25,7 +25,6 @@ VERBS: dict[JobKind, str] = {
     "map": "Saving",
     "copy": "Copying",
     "export": "Exporting",
-    "fill": "Making views between those of",
 }
 
 WAITING = "waiting for its turn"

@@ -237,19 +237,15 @@ def _quit(state: AppState, layout: Layout) -> list[Action]:
     if state.jobs:
         imgui.text(f"{jobs_text(state.jobs)} under way.")
         offers.append(("Wait, then quit", do(saving.quit_when_done)))
-    if state.has_unsaved_edits:
-        imgui.text("The depth edits are not saved.")
-        offers.append(("Save the depth map…", do(saving.ask_to_save, "map")))
     gap(layout, 2)
-    sure = "Quit without saving" if state.has_unsaved_edits else "Cancel them and quit" if state.jobs else "Quit"
-    return button_rows(
-        [*offers, (sure, do(saving.quit_window, is_sure=True)), ("Cancel", do(messages.show_prompt, None))]
-    )
+    sure = do(saving.quit_window, is_sure=True)
+    words = "Cancel them and quit" if state.jobs else "Quit"
+    return button_rows([*offers, (words, sure), ("Cancel", do(messages.show_prompt, None))])
 
 
 def jobs_text(jobs: Sequence[JobProgress]) -> str:
     """What is under way, in words: "2 exports are", "1 picture and 1 export are"."""
-    exports, fills = (sum(job.kind == kind for job in jobs) for kind in ("export", "fill"))
-    counts = (("picture", len(jobs) - exports - fills), ("export", exports), ("light field", fills))
+    exports = sum(job.kind == "export" for job in jobs)
+    counts = (("picture", len(jobs) - exports), ("export", exports))
     words = " and ".join(f"{count} {noun}{'s' if count > 1 else ''}" for noun, count in counts if count)
     return f"{words} {'is' if len(jobs) == 1 else 'are'}"
