@@ -34,7 +34,6 @@ from viewer.background.gloss_worker import GlossFinder
 from viewer.background.newest import Newest
 from viewer.display.filmstrip_view import FilmstripView
 from viewer.display.inspection_view import InspectionView
-from viewer.display.preparation import Preparation
 from viewer.display.scene_view import VIEW_REFRESH_S, SceneView
 from viewer.gpu.glfw_context import create_for_window
 from viewer.model import inspection, saving
@@ -93,7 +92,6 @@ class App:
             raise
         self.scene_view = SceneView(self._gl)
         self.inspection_view = InspectionView(self._gl, self.scene_view)
-        self._preparation = Preparation(self.scene_view.renderer)
         self.sharpener = Sharpener(self._gl, self.scene_view, wake)
         self.free_camera_view = FreeCameraView(self.scene_view, wake)
         self.gloss_finder = GlossFinder(self.scene_view.gloss_request, self.scene_view.take_gloss, wake)
@@ -148,8 +146,6 @@ class App:
         self.do(*self.free_camera_view.advance(self.state))
         self._pace.is_busy |= bool(actions) or self._side_effects.is_drawing or self.sharpener.is_drawing
         self._pace.is_busy |= self.inspection_view.is_drawing
-        if not self._pace.is_busy:
-            self._pace.is_busy = self._preparation.advance(picture, is_still and self._is_resting)
         self.scene_loader.advance(self.state)
         self.do(*self._preferences.keep_news(self.state))
         self._pace.took_s.append(time.perf_counter() - start)
@@ -203,7 +199,6 @@ class App:
         self._filmstrip.release()
         self.sharpener.close()
         self.free_camera_view.close()
-        self._preparation.release()
         self.inspection_view.release()
         self.scene_view.release()
         self._gl.release()

@@ -175,11 +175,9 @@ class SceneLoader:
             if is_deepened and before_px is not None and now_px is not None:
                 same = same_places(before_px, now_px, state.focused_at)
             return [SceneOpened(result.generation, result.scene, same)]
-        renderer, told = self._scene_view.renderer, self._scene_view.renderer.note
         self._scene_view.add(result.view)
         self._inspection_view.add(result.view)
-        notices: list[Action] = [do(messages.notify, Notice(renderer.note))] if renderer.note not in ("", told) else []
-        return [ProgressMade(result.generation, result.progress, (result.view.row, result.view.column)), *notices]
+        return [ProgressMade(result.generation, result.progress, (result.view.row, result.view.column))]
 
     def _load_brush(self, ready: SceneReady) -> None:
         """Beside the first photo's views, so that the first stroke does not wait."""

@@ -172,7 +172,7 @@ class InspectionView:
         """Return the sheet of all views; only views that are new are drawn."""
         assert layout.frame_px is not None
         size_px = layout.frame_px.size
-        record = base.generation, base.exposure, size_px, field.stride
+        record = base.generation, base.exposure, size_px
         there = frozenset((view, int(uploads)) for view, uploads in np.ndenumerate(field.uploads) if uploads)
         old = self._drawn.get("sheet")
         is_new = old is None or old[0] != (record, self._on_sheet)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from iibr_core.scenes.scene import LoadedPhoto, Scene, SceneReady
 from iibr_core.types import ViewUpdate
 from viewer.gpu.context import GLContext
-from viewer.gpu.light_field_texture import LightFieldTexture, field_that_fits
+from viewer.gpu.light_field_texture import LightFieldTexture
 
 if TYPE_CHECKING:
     from iibr_core.gloss.shading import GlossMaps
@@ -44,7 +44,7 @@ def snapshot_of(gl: GLContext, ready: SceneReady) -> SceneSnapshot:
     """
     scene, centre = ready.scene, ready.centre
     size = scene.width, scene.height, scene.is_hdr, scene.has_view_disparity
-    field, _ = field_that_fits(gl.ctx, scene.grid, *size)
+    field = LightFieldTexture(gl.ctx, scene.grid, *size)
     field.color_space = scene.color_space
     field.upload(*scene.grid.centre, centre.colors, centre.disparity)
     return SceneSnapshot(scene, ready.loaded, centre, field)

@@ -14,7 +14,7 @@ from iibr_core.color import bytes_from_encoded, convert, encoded_from_stored, sr
 from iibr_core.gloss.settings import Gloss
 from iibr_core.scenes.rect import WHOLE, Rect
 from iibr_core.scenes.screen_size import ScreenSize
-from iibr_core.types import SRGB, ViewOffset
+from iibr_core.types import SRGB
 from viewer.gpu.light_field_texture import LightFieldTexture
 from viewer.gpu.programs import Program, ProgramCache, set_primaries
 from viewer.gpu.render_targets import RenderTarget, unbind
@@ -24,9 +24,6 @@ MAX_VIEWS = 128
 """As in shaders/epi.frag: of one row or column of the grid."""
 
 MAX_TAPS = 3
-SAME_SURFACE = 0.02
-"""Of the scene's disparity: as close as that, two disparities are of one surface. Plus SAME_SURFACE_PX."""
-SAME_SURFACE_PX = 0.05
 
 
 class OverlayStyle(NamedTuple):
@@ -159,7 +156,7 @@ class InspectionPasses:
         dolly = -2.0 * optics.dolly, -2.0 * optics.dolly * field.height / field.width
         field.disparities.use(1)
         program.set_uniforms(disparities=1, view_size_px=(field.width, field.height), nearest=near, farthest=far)
-        program.set_uniforms(dolly=dolly, to_view=to_view, layer=float(field.layer(*view)))
+        program.set_uniforms(dolly=dolly, to_view=to_view, layer=float(field.layers[view]))
         colors = [tuple(value / 255 for value in color) for color in style.color_map]
         program.set_uniforms(color_map=colors, map_ends=style.map_ends, opacity=style.opacity)
         program.set_uniforms(part=part)
@@ -169,31 +166,6 @@ class InspectionPasses:
         texture = self._use_image("overlay", size_px)
         quad.render(moderngl.TRIANGLES, vertices=3)
         return texture
-
-    def seen_in(
-        self, field: LightFieldTexture, eye: ViewOffset, x_px: float, y_px: float, disparity: float
-    ) -> NDArray[np.bool_]:
-        """(V, U): which views show the surface that the eye sees at a pixel, by its disparity (px per view step)."""
-        rows, columns = field.grid
-        layers = [
-            [_layer(field, row, column) if field.has_disparity[row, column] else -1 for column in range(columns)]
-            for row in range(rows)
-        ]
-        program, quad = self._programs.get("seen_in.frag")
-        far, near = field.range_px
-        centre_row, centre_column = field.grid.centre
-        field.disparities.use(1)
-        self._texture("layers", np.array(layers, np.float32)[..., None]).use(2)
-        program.set_uniforms(disparities=1, layers=2, view_size_px=(field.width, field.height), disparity=disparity)
-        program.set_uniforms(
-            eye_in_grid=(centre_column + eye.s, centre_row + eye.t),
-            point_px=(x_px, y_px),
-            tolerance=SAME_SURFACE * (near - far) + SAME_SURFACE_PX,
-        )
-        self._use_image("seen_in", ScreenSize(columns, rows))
-        quad.render(moderngl.TRIANGLES, vertices=3)
-        read = self._images["seen_in"].framebuffer.read(components=1, alignment=1)
-        return np.frombuffer(read, np.uint8).reshape(rows, columns) > 0
 
     def show(self, name: str, pixels: NDArray[np.uint8]) -> int:
         """Upload an image (H, W, 3) under this name."""
@@ -258,7 +230,7 @@ class InspectionPasses:
 
 
 def _layer(field: LightFieldTexture, row: int, column: int) -> int:
-    return field.layer(row, column) if field.present[row, column] else -1
+    return int(field.layers[row, column]) if field.present[row, column] else -1
 
 
 def _converting(field: LightFieldTexture) -> tuple[str, ...]:

@@ -43,8 +43,8 @@ class LightFieldTexture:
     """Texture arrays of the views present.
 
     colors: RGBA8, or RGBA16F for HDR; alpha is the disparity scaled to 0..1 over `range_px`. disparities: R16F, px per
-    view step. present, has_disparity: (V, U) bool.
-    uploads: (V, U), how often each was stored.
+    view step. layers: (V, U), layer of each view. present, has_disparity: (V, U) bool. uploads: (V, U), how often each
+    was stored.
     color_space: of the light; sRGB until something else is said. gloss: maps of a glossy surface, None without.
     range_px: (farthest, nearest) disparity, known from the first view that has any.
     """
@@ -57,16 +57,14 @@ class LightFieldTexture:
         height: int,
         hdr: bool,
         with_disparity: bool,
-        stride: int = 1,
+        is_single: bool = False,
     ) -> None:
-        """Allocate. Raises InputError where this graphics driver cannot hold it, saying what to do.
+        """Allocate. Raises InputError if this graphics driver cannot hold it, with what to do.
 
-        stride: room for every so manieth view across and down, the centre among them; others are not kept.
+        is_single: whether there is room for one view only.
         """
-        self.stride = stride
-        counts = (len(range(middle % stride, count, stride)) for middle, count in zip(grid.centre, grid))
-        self._kept = GridShape(*counts)
-        check_fits(ctx, self._kept, width, height)
+        kept = GridShape(1, 1) if is_single else grid
+        check_fits(ctx, kept, width, height)
         self._ctx = ctx
         self.grid, self.width, self.height, self.hdr = grid, width, height, hdr
         self.present = np.zeros(grid, bool)
@@ -76,7 +74,8 @@ class LightFieldTexture:
         self.color_space = SRGB
         self.gloss: GlossTexture | None = None
         self._dtype = np.float16 if hdr else np.uint8
-        layers = self._kept.rows * self._kept.columns
+        self.layers = np.zeros(grid, int) if is_single else np.arange(grid.rows * grid.columns).reshape(grid)
+        layers = kept.rows * kept.columns
         self.colors = _allocate(ctx, (width, height, layers), 4, "f2" if hdr else "f1")
         self.colors.filter = (moderngl.LINEAR, moderngl.LINEAR)
         self.disparities = _allocate(ctx, (width, height, layers) if with_disparity else (1, 1, 1), 1, "f2")
@@ -84,23 +83,13 @@ class LightFieldTexture:
         self._texels = np.zeros((height, width, 4), self._dtype)
         self._holders = Holders(self._free)
 
-    def layer(self, row: int, column: int) -> int:
-        """Array layer of a view that is kept."""
-        return (row // self.stride) * self._kept.columns + column // self.stride
-
-    def keeps(self, row: int, column: int) -> bool:
-        """Whether there is room for this view."""
-        return all((at - middle) % self.stride == 0 for at, middle in zip((row, column), self.grid.centre))
-
     def upload(self, row: int, column: int, colors: StoredColors, disparity: FloatImage | None) -> None:
-        """Store the view at index (row, column), if it is kept.
+        """Store the view at index (row, column).
 
         colors: (H, W, 3), see StoredColors. disparity: (H, W) px per view step; ignored in a field opened without.
         Raises ValueError for an index or a shape that does not belong to this field.
         """
         self._check(row, column, colors, disparity)
-        if not self.keeps(row, column):
-            return
         keeps_disparity = disparity is not None and self.disparities.size == self.colors.size
         if disparity is not None and keeps_disparity:
             if not self.has_disparity.any():
@@ -109,7 +98,7 @@ class LightFieldTexture:
         else:
             self._texels[..., 3] = 0
         np.copyto(self._texels[..., :3], _root_of_linear(colors, self.hdr), casting="same_kind")
-        self.colors.write(self._texels, (0, 0, self.layer(row, column), self.width, self.height, 1))
+        self.colors.write(self._texels, (0, 0, int(self.layers[row, column]), self.width, self.height, 1))
         self.present[row, column], self.has_disparity[row, column] = True, keeps_disparity
         self.uploads[row, column] += 1
 
@@ -165,7 +154,7 @@ class LightFieldTexture:
     def _viewport(self, row: int, column: int, box: Box) -> tuple[int, int, int, int, int, int]:
         rows, columns = box
         size = columns.stop - columns.start, rows.stop - rows.start
-        return columns.start, rows.start, self.layer(row, column), *size, 1
+        return columns.start, rows.start, int(self.layers[row, column]), *size, 1
 
     def _check(self, row: int, column: int, colors: StoredColors, disparity: FloatImage | None) -> None:
         if not (0 <= row < self.grid.rows and 0 <= column < self.grid.columns):
@@ -174,25 +163,6 @@ class LightFieldTexture:
         if colors.shape != (*size, 3) or (disparity is not None and disparity.shape != size):
             given = colors.shape, None if disparity is None else disparity.shape
             raise ValueError(f"view ({row}, {column}): colours and disparity are {given}, the field's size is {size}")
-
-
-def field_that_fits(
-    ctx: moderngl.Context, grid: GridShape, width: int, height: int, hdr: bool, with_disparity: bool
-) -> tuple[LightFieldTexture, str]:
-    """Room for as many views as the driver can hold, and a sentence where that is not all.
-
-    Raises InputError where it cannot hold a single one.
-    """
-    note = ""
-    for stride in range(1, max(grid) + 1):
-        try:
-            return LightFieldTexture(ctx, grid, width, height, hdr, with_disparity, stride), note
-        except InputError as error:
-            if stride == max(grid):
-                raise
-            ordinal = f"{stride + 1}{ {2: 'nd', 3: 'rd'}.get(stride + 1, 'th') }"
-            note = f"showing every {ordinal} view across and down: {error}"
-    raise AssertionError("the last try returns or raises")
 
 
 def check_fits(ctx: moderngl.Context, grid: GridShape, width: int, height: int) -> None:

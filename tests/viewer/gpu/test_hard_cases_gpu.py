@@ -21,7 +21,6 @@ from iibr_core.scenes.lens_limits import eye_limits
 from iibr_core.types import GridShape, ViewOffset
 from tests.image_compare import ROUNDING, assert_close
 from tests.viewer.gpu.scenes import TwoPlanes, rms
-from viewer.gpu.context import GLContext
 from viewer.gpu.refocus.picture_renderer import Renderer
 
 SCENE = TwoPlanes(width=48, height=32, radius_px=8.0)
@@ -130,16 +129,6 @@ def test_float16_sums_of_289_views(renderer: Renderer) -> None:
     assert np.abs(picture(renderer, optics, (8, 6)) - expected).max() <= 2
     linear = renderer.converged_picture(RenderSettings(replace(optics, exposure_stops=0.0), (8, 6), is_linear=True))
     assert linear == pytest.approx(float(linear_from_srgb(encoded)[0, 0, 0]), rel=2e-3)
-
-
-def test_texture_arrays_over_the_layer_limit_keep_fewer_views(renderer: Renderer, gl: GLContext) -> None:
-    """This driver's own limit: every other view is shown, and said."""
-    side = math.isqrt(gl.max_layers) + 1
-    renderer.open_field(GridShape(side, side), 4, 4, hdr=False, with_disparity=False)
-    assert "2nd view across and down" in renderer.note
-    centre = GridShape(side, side).centre
-    renderer.upload_view(*centre, np.full((4, 4, 3), COLOR, np.uint8), None)
-    assert np.abs(picture(renderer, Optics(aperture_diameter=1e3), (4, 4)) - COLOR).max() <= 1
 
 
 @pytest.mark.parametrize("with_disparity", [True, False])

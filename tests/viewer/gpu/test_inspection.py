@@ -12,7 +12,7 @@ from iibr_core.color import linear_from_srgb, srgb_from_linear
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.gpu.scenes import TwoPlanes
 from viewer.gpu.context import GLContext
-from viewer.gpu.inspection_passes import SAME_SURFACE, SAME_SURFACE_PX, InspectionPasses, Line, OverlayStyle
+from viewer.gpu.inspection_passes import InspectionPasses, Line, OverlayStyle
 from viewer.gpu.light_field_texture import LightFieldTexture
 from viewer.gpu.refocus.picture_renderer import Renderer
 from viewer.model.colormap import VIRIDIS, map_color
@@ -197,33 +197,6 @@ def test_values_are_laid_over_the_surface_they_belong_to(renderer: Renderer, pas
     assert (covered != (SCENE.view(eye)[1] > 0)).mean() < 0.02
     np.testing.assert_array_equal(np.unique(overlay[covered][:, :3], axis=0), [[255, 184, 60]])
     assert not overlay[~covered][:, 3].any()
-
-
-@pytest.mark.parametrize(
-    ("eye", "place"), [(ViewOffset(0, 0), (48, 36)), (ViewOffset(1.5, -2.5), (30, 20)), (ViewOffset(0, 3), (2, 70))]
-)
-def test_how_many_views_see_a_surface(
-    renderer: Renderer, passes: InspectionPasses, eye: ViewOffset, place: tuple[int, int]
-) -> None:
-    field = full(renderer)
-    x, y = place
-    disparity = float(SCENE.view(eye)[1][y, x])
-    seen = passes.seen_in(field, eye, x, y, disparity)
-    tolerance = SAME_SURFACE * (field.range_px[1] - field.range_px[0]) + SAME_SURFACE_PX
-    expected = np.zeros(GRID, bool)
-    for v, u in np.ndindex(*GRID):
-        t, s = GRID.offset(v, u)
-        column, row = round(x - disparity * (s - eye.s) + 1e-6), round(y - disparity * (t - eye.t) + 1e-6)
-        if 0 <= column < SCENE.width and 0 <= row < SCENE.height:
-            expected[v, u] = abs(SCENE.view(ViewOffset(t, s))[1][row, column] - disparity) <= tolerance
-    np.testing.assert_array_equal(seen, expected)
-    assert expected.any()
-
-
-def test_views_that_are_not_there_see_nothing(renderer: Renderer, passes: InspectionPasses) -> None:
-    seen = passes.seen_in(middle_only(renderer), ViewOffset(0, 0), 48, 36, SCENE.foreground)
-    assert seen.sum() == 1
-    assert seen[GRID.centre]
 
 
 @pytest.mark.parametrize("size", [(33, 21), (1, 1), (64, 9)])

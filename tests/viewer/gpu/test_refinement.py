@@ -11,7 +11,7 @@ import pytest
 
 from iibr_core.beyond.optics import CENTRE, Optics
 from iibr_core.types import GridShape, InputError, ViewOffset
-from tests.viewer.gpu.scenes import TwoPlanes, psnr, rms, through_lens
+from tests.viewer.gpu.scenes import TwoPlanes, psnr, through_lens
 from viewer.gpu.context import GLContext
 from viewer.gpu.refocus import accumulation
 from viewer.gpu.refocus.frame_budget import QualityLevel
@@ -177,24 +177,6 @@ def test_switching_scenes_sizes_and_apertures_leaves_no_gl_objects(renderer: Ren
     assert all(isinstance(thing, moderngl.mgl.InvalidObject) for thing in ctx.objects), "dropped, but not released"
     assert max(counts[10:]) <= max(counts[:10])
     ctx.gc_mode = None
-
-
-def test_fewer_views_are_kept_where_not_all_fit_and_the_picture_still_comes(
-    renderer: Renderer, gl: GLContext, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setitem(gl.ctx.info, "GL_MAX_ARRAY_TEXTURE_LAYERS", 10)
-    SCENE.fill(renderer, GRID)
-    assert renderer.field is not None
-    assert renderer.field.present.sum() == 9
-    assert renderer.note.startswith("showing every 2nd view across and down: a grid of 5x5 needs 25 texture layers")
-    for optics in (WIDE, Optics(dolly=1.0, aperture_diameter=2.0)):
-        kept = converged(renderer, optics)
-        monkeypatch.undo()
-        SCENE.fill(renderer, GRID)
-        assert renderer.note == ""
-        assert rms(kept, converged(renderer, optics), border=8) < 0.03
-        monkeypatch.setitem(gl.ctx.info, "GL_MAX_ARRAY_TEXTURE_LAYERS", 10)
-        SCENE.fill(renderer, GRID)
 
 
 def test_views_too_large_for_the_driver_leave_the_old_field(renderer: Renderer, gl: GLContext) -> None:

@@ -8,7 +8,6 @@ from typing import Any
 
 import moderngl
 import numpy as np
-from numpy.typing import NDArray
 
 from iibr_core.beyond.aperture_sampling import SQRT_STEPS, fractions
 from iibr_core.types import SRGB, ColorSpace
@@ -110,7 +109,7 @@ class Passes:
         nearest = nearest_present(field.present)
         table[..., :2] = nearest[..., ::-1]
         table[..., 2] = field.has_disparity[nearest[..., 0], nearest[..., 1]]
-        table[..., 3] = _layers(field, nearest)
+        table[..., 3] = field.layers[nearest[..., 0], nearest[..., 1]]
         if self._nearest_views is None or self._nearest_views.size != (columns, rows):
             if self._nearest_views is not None:
                 self._nearest_views.release()
@@ -153,7 +152,7 @@ class Passes:
         cameras[:count, 2:] = fractions(*numbered, SQRT_STEPS[3:]) - 0.5 + OFF_BORDER_PX
         offsets = samples.views - np.array(field.grid.centre)
         answers[:count, :2] = (offsets - np.array(lens.eye) - samples.cameras)[:, ::-1]
-        numbers[:count, 0] = _layers(field, samples.views)
+        numbers[:count, 0] = field.layers[tuple(samples.views.T)]
         numbers[:count, 1] = field.has_disparity[tuple(samples.views.T)]
         numbers[:count, 2] = samples.weights
         if lens.has_dolly and "nearest_views" in program.declared:
@@ -190,12 +189,6 @@ def _are_near(field: LightFieldTexture, lens: Lens, samples: Samples) -> bool:
     most_px = NEAR_PX if field.present.sum() > 1 else ALONE_NEAR_PX
     is_in_cell = bool(np.abs(to_views).max() <= 1)
     return is_in_cell and (parallax_px + np.hypot(*samples.cameras.T) * 2 * lens.optics.focus_range).max() <= most_px
-
-
-def _layers(field: LightFieldTexture, views: NDArray[np.intp]) -> NDArray[np.float32]:
-    """Array layers of views (..., 2), as rows and columns."""
-    layers = [field.layer(int(row), int(column)) for row, column in views.reshape(-1, 2)]
-    return np.array(layers, np.float32).reshape(views.shape[:-1])
 
 
 def _set_declared(program: Program, **values: Any) -> None:

@@ -27,7 +27,7 @@ from iibr_core.types import (
     ViewUpdate,
 )
 from viewer.gpu.context import GLContext
-from viewer.gpu.light_field_texture import Box, LightFieldTexture, field_that_fits
+from viewer.gpu.light_field_texture import Box, LightFieldTexture
 from viewer.gpu.programs import ProgramCache
 from viewer.gpu.refocus.accumulation import Accumulator, ProgressiveAccumulation
 from viewer.gpu.refocus.frame_budget import (
@@ -48,18 +48,12 @@ from viewer.model.state.app_state import DrawReport
 if TYPE_CHECKING:
     from iibr_core.gloss.shading import GlossMaps
 
-PREPARED_SIZE = ScreenSize(48, 48)
-"""Size of what is drawn to compile programs; not a power of two, for which software GL compiles them again."""
-PREPARED_PASSES = 2
-"""Those that follow take the same programs."""
-
 
 class Renderer:
     """Draws one light field at a time. Call it only from the thread its context belongs to.
 
     report: what is known of the picture drawn last. passes_shown: how many passes of the best picture what is shown is
-    made of; 0: it is softer than that. field: None before the first. note: what of it had to be left out, a sentence
-    for people.
+    made of; 0: it is softer than that. field: None before the first.
     """
 
     def __init__(self, gl: GLContext) -> None:
@@ -70,7 +64,6 @@ class Renderer:
         self.programs = ProgramCache(self.ctx)
         self._accumulator = Accumulator(self.ctx, self.programs)
         self.field: LightFieldTexture | None = None
-        self.note = ""
         self._fallback_view: LightFieldTexture | None = None
         self._screen = ScreenImage(self.ctx)
         self._accumulation: ProgressiveAccumulation | None = None
@@ -101,10 +94,9 @@ class Renderer:
     ) -> None:
         """Start an empty light field of this size in place of the one before. color_space: of its views.
 
-        Where the graphics driver cannot hold all views, fewer are kept, and `note` says so. Raises InputError where it
-        cannot hold a single one; the old field then stays.
+        Raises InputError if the graphics driver cannot hold it; the field before then stays.
         """
-        field, self.note = field_that_fits(self.ctx, grid, width, height, hdr, with_disparity)
+        field = LightFieldTexture(self.ctx, grid, width, height, hdr, with_disparity)
         if self.field is not None:
             self.field.release()
         field.color_space = color_space
@@ -131,10 +123,8 @@ class Renderer:
             self._fallback_view = None
         if view is not None:
             field = self._loaded
-            size = field.grid, field.width, field.height
-            self._fallback_view = LightFieldTexture(
-                self.ctx, *size, field.hdr, with_disparity=True, stride=max(field.grid)
-            )
+            size = field.width, field.height, field.hdr
+            self._fallback_view = LightFieldTexture(self.ctx, field.grid, *size, with_disparity=True, is_single=True)
             self._fallback_view.upload(*field.grid.centre, view.colors, view.disparity)
         self._accumulation = None
 
@@ -215,21 +205,16 @@ class Renderer:
             return
         self._learn(accumulation.done, seconds)
 
-    def start_picture(
-        self, settings: RenderSettings, field: LightFieldTexture | None = None, most_passes: int | None = None
-    ) -> PictureDrawing:
+    def start_picture(self, settings: RenderSettings, field: LightFieldTexture | None = None) -> PictureDrawing:
         """A picture with every sample it will get, to be drawn step by step, and stopped once it is no longer wanted.
 
-        What was drawn last stays as it is. field: it is drawn from, by default what the screen shows. most_passes: else
-        it is left as it is by then.
+        What was drawn last stays as it is. field: it is drawn from, by default what the screen shows.
         """
         if settings.tile is not None:
             return self._start_tile(settings, settings.tile)
         field = self.drawn_field if field is None else field
         accumulator = Accumulator(self.ctx, self.programs)
         whole = self._accumulation_of(settings.optics, settings.size_px, BEST_QUALITY, settings.part, field)
-        if most_passes is not None:
-            whole.passes = min(whole.passes, most_passes)
         return PictureDrawing(self.gl, accumulator, field, whole, settings.is_linear, settings.color_space)
 
     def _start_tile(self, settings: RenderSettings, tile: LensTile) -> PictureDrawing:
@@ -268,19 +253,6 @@ class Renderer:
     def is_renewing(self) -> bool:
         """Whether what is shown still waits for what `renew` has begun."""
         return self._accumulation is not None and self._accumulation.pass_index < self._shown_from_pass
-
-    def start_preparing(self, optics: Optics, size_px: ScreenSize) -> PictureDrawing:
-        """A drawing that nobody needs: what draws such a picture is compiled by it, a program a step."""
-        width, height = (min(wanted / there, 1.0) for wanted, there in zip(PREPARED_SIZE, size_px))
-        settings = RenderSettings(optics, PREPARED_SIZE, part=Rect(0.5 - width / 2, 0.5 - height / 2, width, height))
-        if self.field is not None:
-            return self.start_picture(settings, most_passes=PREPARED_PASSES)
-        field = LightFieldTexture(self.ctx, GridShape(1, 1), *PREPARED_SIZE, hdr=False, with_disparity=True)
-        colors, disparity = np.zeros((*PREPARED_SIZE[::-1], 3), np.uint8), np.zeros(PREPARED_SIZE[::-1], np.float32)
-        field.upload(0, 0, colors, disparity)
-        drawing = self.start_picture(settings, field, PREPARED_PASSES)
-        field.release()
-        return drawing
 
     @property
     def samples_drawn(self) -> int:
