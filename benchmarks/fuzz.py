@@ -41,7 +41,7 @@ from iibr_core.scenes.scene import Source
 from iibr_core.types import ImageSize, InputError
 from tests.iibr_core import embedded_files
 from viewer.app.preferences_store import load_preferences
-from viewer.model.lens.aperture_mask import read_mask
+from viewer.model.aperture_mask import read_mask
 from viewer.model.saved_settings import read_settings, settings_text
 from viewer.model.state.app_state import AppState
 from viewer.model.state.saving import SavedSettings

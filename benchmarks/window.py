@@ -24,8 +24,9 @@ from iibr_core.scenes.scene import Source
 from iibr_core.types import ViewOffset
 from tests.xvfb import private_display
 from viewer.app.main_loop import App, initial_state
+from viewer.model import lens
+from viewer.model.action import do
 from viewer.model.actions import OpenPath
-from viewer.model.state.optics_actions import SetAperture
 
 DEMO = resource_folder("assets") / "motorcycle" / "motorcycle.png"
 
@@ -56,7 +57,7 @@ def rows(app: App, began: tuple[float, float], idle_s: float) -> Iterator[tuple[
     yield f"all {app.state.progress.total} views", f"{since(began)}; {pictures}"
     yield "longest frame until then", f"{1e3 * max(first, rest):.0f} ms of processor time"
     for aperture in (0, 4):
-        app.do(SetAperture(aperture))
+        app.do(do(lens.set_aperture, aperture))
         step_while(app, lambda: not is_idle(app))
         yield f"dragging, aperture of {aperture} view steps", drag(app)
         step_while(app, lambda: not is_idle(app))

@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import OpenImageIO as oiio
 
+from iibr_core.beyond.optics import ApertureShape
 from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.search import open_with_depth
 from iibr_core.evaluation.warp import reference_warp
@@ -21,10 +22,9 @@ from iibr_core.method.photo_views import PhotoViews
 from iibr_core.scenes.scene import Source
 from iibr_core.types import FloatImage, ViewOffset
 from viewer.display.offscreen import OffscreenScene
-from viewer.model import inspection, messages
+from viewer.model import inspection, lens, messages
 from viewer.model.action import do
 from viewer.model.state.app_state import Hover
-from viewer.model.state.optics_actions import ApertureShape, MoveEye, SetAperture, SetFocus, SetOptics
 from viewer.model.state.preferences import Section, with_sections
 
 ROOT = Path(__file__).parents[1]
@@ -53,10 +53,10 @@ def screenshot() -> FloatImage:
     """Return the window: seen from the left, focused on the tank, wide open with seven blades."""
     with OffscreenScene() as viewer:
         open_demo(viewer)
-        viewer.do(MoveEye(ViewOffset(0.5, -1.5)))
+        viewer.do(do(lens.move_eye, ViewOffset(0.5, -1.5)))
         tank = pointer_on_tank(viewer)
         blades = ApertureShape("polygon", blades=7)
-        viewer.do(SetFocus(tank.disparity), SetAperture(6.0), SetOptics("aperture_shape", blades))
+        viewer.do(do(lens.set_focus, tank.disparity), do(lens.set_aperture, 6.0), do(lens.set_aperture_shape, blades))
         viewer.do(do(messages.dismiss), do(inspection.set_hover, tank))
         return viewer.screen(WINDOW) / np.float32(255)
 
@@ -65,7 +65,7 @@ def inspection_screen() -> FloatImage:
     """Return the window with disparity over the picture, EPIs through the pointer and values under it."""
     with OffscreenScene() as viewer:
         open_demo(viewer, "inspect")
-        viewer.do(SetAperture(0.0), do(inspection.show_epis, True), do(inspection.show_values, True))
+        viewer.do(do(lens.set_aperture, 0.0), do(inspection.show_epis, True), do(inspection.show_values, True))
         viewer.do(do(inspection.set_overlay, "disparity"), do(inspection.set_hover, pointer_on_tank(viewer)))
         return viewer.screen(WINDOW) / np.float32(255)
 

@@ -38,9 +38,10 @@ from viewer.app.image_export import export_picture, shot_of
 from viewer.app.preferences_store import load_preferences, store_preferences
 from viewer.background.job_threads import Failed
 from viewer.display.offscreen import OffscreenScene
+from viewer.model import lens
+from viewer.model.action import do
 from viewer.model.saved_settings import read_settings
 from viewer.model.state.app_state import AppState
-from viewer.model.state.optics_actions import MoveEye, SetAperture
 
 GRID = GridShape(3, 3)
 
@@ -197,7 +198,7 @@ def test_the_photo_may_go_once_it_is_open(viewer: OffscreenScene, tmp_path: Path
     before = viewer.picture()
     (tmp_path / "scene.png").unlink()
     (tmp_path / "scene_disparity.npy").unlink()
-    viewer.do(MoveEye(ViewOffset(0.5, 0.5)), SetAperture(2.0))
+    viewer.do(do(lens.move_eye, ViewOffset(0.5, 0.5)), do(lens.set_aperture, 2.0))
     assert (viewer.picture() != before).any()
     with pytest.raises(InputError, match=r"scene\.png: no such file"):
         viewer.open(Source(str(tmp_path / "scene.png")))

@@ -15,7 +15,8 @@ from tests.browser import Pipe, Tab, open_browser
 from tests.viewer.conftest import HEIGHT, WIDTH, write_scene
 from tests.web.conftest import canvas, export, press, set_lens, slide, wait_until_still
 from viewer.display.offscreen import OffscreenScene
-from viewer.model.state.optics_actions import MoveEye, SetAperture, SetFocus
+from viewer.model import lens
+from viewer.model.action import do
 
 SETTINGS = (
     (0.0, 0.0, 0.0, 0.0),
@@ -59,7 +60,7 @@ def test_the_canvas_is_the_desktops_picture(shown: Tab, scene: Path) -> None:
     with OffscreenScene("egl") as viewer:
         viewer.open(Source(str(scene), grid=GridShape(3, 3)))
         for s, t, focus, aperture in SETTINGS:
-            viewer.do(MoveEye(ViewOffset(t, s)), SetFocus(focus), SetAperture(aperture))
+            viewer.do(do(lens.move_eye, ViewOffset(t, s)), do(lens.set_focus, focus), do(lens.set_aperture, aperture))
             set_lens(shown, s, t, focus, aperture)
             wait_until_still(shown)
             drawn = canvas(shown)
@@ -72,7 +73,7 @@ def test_between_views_there_is_no_seam_that_the_desktop_has_not(shown: Tab, sce
     with OffscreenScene("egl") as viewer:
         viewer.open(Source(str(scene), grid=GridShape(3, 3)))
         for s in np.linspace(0, 1, 9):
-            viewer.do(MoveEye(ViewOffset(0.5 * s, s)), SetAperture(0.0))
+            viewer.do(do(lens.move_eye, ViewOffset(0.5 * s, s)), do(lens.set_aperture, 0.0))
             set_lens(shown, s, 0.5 * s, 0.0, 0.0)
             wait_until_still(shown)
             difference = np.abs(canvas(shown).astype(float) - viewer.picture()).mean(axis=2)

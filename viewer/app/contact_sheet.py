@@ -9,7 +9,8 @@ from iibr_core.scenes.lens_limits import aperture_limit
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import ViewOffset
 from viewer.display.offscreen import OffscreenScene
-from viewer.model.state.optics_actions import MoveEye, ResetOptics, SetAperture, SetFocus
+from viewer.model import lens
+from viewer.model.action import do
 
 TILE_WIDTH = 480
 GAP = 8
@@ -22,13 +23,16 @@ def contact_sheet(viewer: OffscreenScene) -> NDArray[np.uint8]:
     size = ScreenSize(TILE_WIDTH, max(round(TILE_WIDTH * scene.height / scene.width), 1))
     reach = scene.grid.columns // 2
     far, near = scene.disparity_range_px
-    viewpoints = [(MoveEye(ViewOffset(0, s)),) for s in (-reach, 0, reach)]
-    focused = [(SetFocus(d), SetAperture(0.8 * aperture_limit(scene.grid))) for d in (near, (near + far) / 2, far)]
+    viewpoints = [(do(lens.move_eye, ViewOffset(0, s)),) for s in (-reach, 0, reach)]
+    focused = [
+        (do(lens.set_focus, d), do(lens.set_aperture, 0.8 * aperture_limit(scene.grid)))
+        for d in (near, (near + far) / 2, far)
+    ]
     tiles = []
     for actions in (*viewpoints, *focused):
-        viewer.do(ResetOptics(), *actions)
+        viewer.do(do(lens.reset), *actions)
         tiles.append(viewer.picture(size))
-    viewer.do(ResetOptics())
+    viewer.do(do(lens.reset))
     return _sheet(tiles, columns=3)
 
 

@@ -24,12 +24,13 @@ from iibr_core.types import Camera, ImageSize, ViewUpdate, image_size
 from viewer.background.newest import Failed, Newest, Post
 from viewer.display.scene_view import SceneView
 from viewer.gpu.refocus.frame_budget import stretch_image
-from viewer.model import messages
+from viewer.model import messages, viewpoint
+from viewer.model.action import Action as VerbAction
 from viewer.model.action import do
 from viewer.model.actions import Action
-from viewer.model.free_camera import FORWARD_LIMITS, MAX_ASIDE, CameraProgress, FreeCamera
 from viewer.model.state.app_state import AppState
 from viewer.model.state.notices import Notice
+from viewer.model.state.viewpoint import FORWARD_LIMITS, MAX_ASIDE, FreeCamera
 
 if TYPE_CHECKING:
     from iibr_core.beyond.free_cameras import FreeViews
@@ -56,7 +57,7 @@ class FreeView:
     is_draft: bool
 
 
-FreeResult = FreeView | CameraProgress
+FreeResult = FreeView | VerbAction
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,7 +117,7 @@ class FreeCameraView:
         self._scene_view.show_fallback(None)
         self._asked, self.shown, self._may_interrupt = None, None, True
         self._ready = {}  # a request that is being cancelled keeps its results in the old one
-        return [CameraProgress(None)]
+        return [do(viewpoint.report_camera, None)]
 
     def _take(self) -> list[Action]:
         actions: list[Action] = []
@@ -125,11 +126,11 @@ class FreeCameraView:
                 case FreeView(request, view, is_draft):
                     self._scene_view.show_fallback(view)
                     self.shown, self._may_interrupt = None if is_draft else request, True
-                case CameraProgress():
+                case VerbAction():
                     actions.append(result)
                 case Failed(_, message):
                     self._may_interrupt = True
-                    actions += [CameraProgress(None), do(messages.notify, Notice(message, is_error=True))]
+                    actions += [do(viewpoint.report_camera, None), do(messages.notify, Notice(message, is_error=True))]
         return actions
 
     def _draw(self, request: FreeRequest, post: Post[FreeResult]) -> None:
@@ -140,10 +141,10 @@ class FreeCameraView:
             ready = kept.get(is_draft)
             if ready is None or ready.loaded is not request.loaded or ready.centre is not request.centre:
                 kept.pop(is_draft, None)  # frees its memory first
-                with watched(lambda done, total, doing: post(CameraProgress(done / total))):
+                with watched(lambda done, total, doing: post(do(viewpoint.report_camera, done / total))):
                     ready = kept[is_draft] = _make_ready(request, is_draft)
             post(FreeView(request, _view(request, ready), is_draft))
-        post(CameraProgress(None))
+        post(do(viewpoint.report_camera, None))
 
 
 def _make_ready(request: FreeRequest, is_draft: bool) -> _Ready:

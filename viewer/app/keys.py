@@ -7,14 +7,12 @@ from dataclasses import dataclass, replace
 from iibr_core.beyond.optics import CENTRE
 from iibr_core.types import ViewOffset
 from viewer.app.pointer import is_marking_gloss
-from viewer.model import inspection, messages
+from viewer.model import inspection, lens, messages, viewpoint
 from viewer.model.action import do
-from viewer.model.actions import Action, SetState, ShowBefore
+from viewer.model.actions import Action, SetState
 from viewer.model.commands import BY_NAME, COMMANDS
-from viewer.model.free_camera import LeaveCamera
 from viewer.model.state.app_state import AppState
 from viewer.model.state.depth_editing import DropStroke, SetBrush
-from viewer.model.state.optics_actions import MoveEye, SetGlossBrush
 
 ARROW_STEP_VIEWS = 0.5
 """Step of an arrow key, in view steps."""
@@ -38,7 +36,7 @@ def actions_from_keys(keys: Keys, state: AppState) -> list[Action]:
     if any(keys.arrows) and not is_typing:
         eye, arrows = state.optics.eye, keys.arrows
         step = ARROW_STEP_VIEWS
-        actions.append(MoveEye(ViewOffset(eye.t + step * arrows.t, eye.s + step * arrows.s)))
+        actions.append(do(lens.move_eye, ViewOffset(eye.t + step * arrows.t, eye.s + step * arrows.s)))
     return actions
 
 
@@ -47,15 +45,15 @@ def _escape_actions(state: AppState) -> list[Action]:
     if state.prompt is not None:
         return [do(messages.show_prompt, None)]
     if state.free_camera is not None and state.stroke is None:
-        return [LeaveCamera()]
+        return [do(viewpoint.leave_camera)]
     if state.stroke is not None:
         return [DropStroke()]
     if state.inspection.shows_views:
         return [do(inspection.show_views, False)]
     if is_marking_gloss(state):
-        return [SetGlossBrush(replace(state.gloss_brush, is_on=False))]
+        return [do(lens.take_gloss_brush, replace(state.gloss_brush, is_on=False))]
     if state.shows_before:
-        return [ShowBefore(False)]
+        return [do(lens.show_before, False)]
     if state.brush.is_on:
         return [SetBrush(replace(state.brush, is_on=False))]
     if state.inspection.comparison is not None:

@@ -36,14 +36,13 @@ from viewer.display.filmstrip_view import FilmstripView
 from viewer.display.inspection_view import InspectionView
 from viewer.display.scene_view import VIEW_REFRESH_S, SceneView
 from viewer.gpu.glfw_context import create_for_window
-from viewer.model import inspection, saving
+from viewer.model import inspection, saving, viewpoint
 from viewer.model.action import do
 from viewer.model.actions import Action, OpenPath, SetState
 from viewer.model.inspection import NO_INSPECTION_TEXTURES, InspectionTextures, beside_of
 from viewer.model.layout import Layout, is_narrow, layout_of
 from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState, Picture
-from viewer.model.state.motion import Tick
 from viewer.model.state.preferences import PlaceWindow
 from viewer.ui.host import UiHost
 from viewer.ui.overlays.filmstrip import filmstrip_paths
@@ -220,7 +219,7 @@ class App:
             actions += self.inspection_view.take_entropy(result)
         actions += self._notice_clock.expire(self.state, self._pace.stepped_at)
         if self.state.motion.is_running:
-            actions.append(Tick(self._pace.stepped_at))
+            actions.append(do(viewpoint.tick, self._pace.stepped_at))
         actions += self._place_window()
         if is_narrow(self.window.size, self.window.ui_scale) != self.state.is_narrow:
             actions.append(SetState("is_narrow", not self.state.is_narrow))

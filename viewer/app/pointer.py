@@ -10,17 +10,14 @@ from iibr_core.scenes.lens_limits import focus_limits
 from iibr_core.scenes.rect import Rect
 from iibr_core.scenes.scene import Scene
 from iibr_core.types import ViewOffset
-from viewer.model import inspection
+from viewer.model import gesture, inspection, lens, viewpoint
 from viewer.model.action import do
-from viewer.model.actions import Action, EndGesture
+from viewer.model.actions import Action
+from viewer.model.focal_plane import handle_points, place_of
 from viewer.model.inspection import view_at
 from viewer.model.layout import Layout, pixel_at
-from viewer.model.lens.focal_plane import handle_points, place_of
 from viewer.model.state.app_state import AppState, Hover
 from viewer.model.state.depth_editing import DepthSample, Paint, PickDepth, SetBrush
-from viewer.model.state.motion import ReturnHome
-from viewer.model.state.optics_actions import FocusOn, MoveEye, MoveTiltHandle, PaintGloss, SetFocus, SetGlossBrush
-from viewer.model.zoom import SetZoom
 
 DRAG_THRESHOLD = 4.0
 """A press that moved farther than this (window units) is a drag, not a click."""
@@ -91,7 +88,7 @@ def actions_from_pointer(pointer: Pointer, layout: Layout, state: AppState, pick
         return _paint_actions(pointer, layout, state, scene, picture, pick)
     if pointer.wheel and frame.contains(pointer.x, pointer.y):
         low, high = focus_limits(scene)
-        return [SetFocus(state.optics.focus_disparity + pointer.wheel * (high - low) / FOCUS_STEPS)]
+        return [do(lens.set_focus, state.optics.focus_disparity + pointer.wheel * (high - low) / FOCUS_STEPS)]
     if not frame.contains(pointer.pressed_x, pointer.pressed_y):
         return []
     if (pointer.is_down or pointer.is_released) and pointer.drag_distance > DRAG_THRESHOLD:
@@ -100,21 +97,21 @@ def actions_from_pointer(pointer: Pointer, layout: Layout, state: AppState, pick
         if _grabs_divider(pointer, layout, state, frame):
             return []
         if pointer.clicks > 1:
-            return [ReturnHome(takes_back_click=True)]
+            return [do(viewpoint.return_home, takes_back_click=True)]
         at = pixel_at(picture, scene.size, pointer.x, pointer.y)
         picked = pick(*at)
-        return [] if picked is None else [FocusOn(place_of(*at, scene), picked)]
+        return [] if picked is None else [do(lens.focus_on, place_of(*at, scene), picked)]
     return []
 
 
 def gesture_start(pointer: Pointer, state: AppState) -> list[Action]:
     """What a press ends: more of the same kind is another edit from here on. Goes before the frame's edits."""
-    return [EndGesture()] if pointer.is_pressed and state.history.gesture else []
+    return [do(gesture.end_gesture)] if pointer.is_pressed and state.history.gesture else []
 
 
 def gesture_end(pointer: Pointer) -> list[Action]:
     """What letting go ends. Goes after the frame's edits."""
-    return [EndGesture()] if pointer.is_released else []
+    return [do(gesture.end_gesture)] if pointer.is_released else []
 
 
 def actions_from_hover(pointer: Pointer, layout: Layout, state: AppState, pick: Pick) -> list[Action]:
@@ -162,12 +159,12 @@ def _zoom_actions(pointer: Pointer, layout: Layout, frame: Rect) -> list[Action]
     picture.
     """
     if pointer.wheel and pointer.holds_ctrl and frame.contains(pointer.x, pointer.y):
-        return [SetZoom(layout.zoomed(pointer.wheel, pointer.x, pointer.y))]
+        return [do(viewpoint.set_zoom, layout.zoomed(pointer.wheel, pointer.x, pointer.y))]
     if not pointer.pulls:
-        return [SetZoom(layout.shown_on_minimap(pointer.x, pointer.y))]
+        return [do(viewpoint.set_zoom, layout.shown_on_minimap(pointer.x, pointer.y))]
     if not layout.is_zoomed or not (pointer.step_x or pointer.step_y):
         return []
-    return [SetZoom(layout.pulled(pointer.step_x, pointer.step_y))]
+    return [do(viewpoint.set_zoom, layout.pulled(pointer.step_x, pointer.step_y))]
 
 
 def _paint_actions(
@@ -204,11 +201,11 @@ def _gloss_actions(
     """Mark the surface under the pointer; the wheel makes the brush larger."""
     frame, brush = layout.frame or picture, state.gloss_brush
     if pointer.wheel and frame.contains(pointer.x, pointer.y):
-        return [SetGlossBrush(replace(brush, radius=brush.radius * BRUSH_NOTCH**pointer.wheel))]
+        return [do(lens.take_gloss_brush, replace(brush, radius=brush.radius * BRUSH_NOTCH**pointer.wheel))]
     if not pointer.is_down or not frame.contains(pointer.pressed_x, pointer.pressed_y):
         return []
     place, _ = _place_in_photo(pointer, state, scene, picture, pick)
-    return [PaintGloss(place, brush, begins=pointer.is_pressed)]
+    return [do(lens.paint_gloss, place, brush, begins=pointer.is_pressed)]
 
 
 def _drag(pointer: Pointer, layout: Layout, state: AppState, scene: Scene, picture: Rect, pick: Pick) -> list[Action]:
@@ -219,7 +216,7 @@ def _drag(pointer: Pointer, layout: Layout, state: AppState, scene: Scene, pictu
     index = _grabbed_handle(pointer, layout, state, picture)
     if index is not None:
         at = pixel_at(picture, scene.size, pointer.x, pointer.y)
-        return [MoveTiltHandle(index, place_of(*at, scene), pick(*at))]
+        return [do(lens.move_tilt_handle, index, place_of(*at, scene), pick(*at))]
     return _eye_drag(pointer, layout, scene, state.optics.eye)
 
 
@@ -236,7 +233,7 @@ def _on_sheet(pointer: Pointer, layout: Layout, scene: Scene, frame: Rect) -> li
     """Go to the view that was clicked."""
     is_click = pointer.is_released and pointer.drag_distance <= DRAG_THRESHOLD
     view = view_at(frame, scene.grid, layout.ui_scale, pointer.x, pointer.y) if is_click else None
-    return [] if view is None else [MoveEye(scene.grid.offset(*view))]
+    return [] if view is None else [do(lens.move_eye, scene.grid.offset(*view))]
 
 
 def _grabbed_handle(pointer: Pointer, layout: Layout, state: AppState, picture: Rect) -> int | None:
@@ -262,7 +259,7 @@ def _eye_drag(pointer: Pointer, layout: Layout, scene: Scene, eye: ViewOffset) -
     if not (step_x or step_y):
         return []
     per_view = units_per_view(layout, scene)
-    return [MoveEye(ViewOffset(eye.t - step_y / per_view, eye.s - step_x / per_view))]
+    return [do(lens.move_eye, ViewOffset(eye.t - step_y / per_view, eye.s - step_x / per_view))]
 
 
 def units_per_view(layout: Layout, scene: Scene) -> float:

@@ -23,7 +23,7 @@ from viewer.background.file_worker import FileRequest, FileResult, FileWorker
 from viewer.background.job_threads import Failed
 from viewer.background.model_downloader import Downloaded, DownloadResult, ModelDownloads, ModelRequest, list_models
 from viewer.display.scene_view import SceneView
-from viewer.model import messages
+from viewer.model import lens, messages
 from viewer.model.action import ask, do, forget_tasks
 from viewer.model.actions import Action, OpenPath
 from viewer.model.commands import action_for_path
@@ -41,7 +41,6 @@ from viewer.model.state.model_download import (
     ModelsListed,
 )
 from viewer.model.state.notices import Notice
-from viewer.model.state.optics_actions import SetOptics
 from viewer.model.state.photo_facts import PhotoFacts, ReadFactsTask
 from viewer.model.state.prompts import FolderContents, ListContentsTask, PathPrompt
 from viewer.model.state.saving import CopyTask, PasteTask, path_beside
@@ -207,7 +206,7 @@ def _actions_from(result: FileResult, state: AppState) -> list[Action]:
         return [do(messages.notify, Notice(result.message, is_error=True))]
     match result.value:
         case ApertureMask() as mask:
-            return [SetOptics("aperture_shape", replace(state.optics.aperture_shape, kind="mask", mask=mask))]
+            return [do(lens.set_aperture_shape, replace(state.optics.aperture_shape, kind="mask", mask=mask))]
         case FolderContents() as contents:
             return _show_contents(contents, state)
         case PhotoFacts() as facts:
@@ -249,7 +248,7 @@ def _read_facts(path: str) -> PhotoFacts:
 
 def _read_mask(path: Path) -> ApertureMask:
     """Raises InputError where it is no mask."""
-    from viewer.model.lens.aperture_mask import read_mask
+    from viewer.model.aperture_mask import read_mask
 
     return read_mask(path)
 

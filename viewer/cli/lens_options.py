@@ -11,6 +11,8 @@ import typer
 from iibr_core.gloss.settings import Gloss
 from iibr_core.types import InputError, ViewOffset
 from viewer.cli.shared_options import not_negative_from_text, number_option, view_from_text
+from viewer.model import lens
+from viewer.model.action import do
 
 if TYPE_CHECKING:
     from iibr_core.beyond.optics import Optics
@@ -86,12 +88,10 @@ class LensOptions:
 
     def actions(self) -> list[Action]:
         """Return the actions that set the lens."""
-        from viewer.model.state.optics_actions import MoveEye, SetAperture, SetFocus, SetOptics
-
-        actions: list[Action] = [] if self.view is None else [MoveEye(self.view)]
-        actions += [] if self.focus is None else [SetFocus(self.focus)]
-        actions += [] if self.aperture is None else [SetAperture(self.aperture)]
-        return actions + ([] if self.gloss is None else [SetOptics("gloss", self.gloss.gloss)])
+        actions: list[Action] = [] if self.view is None else [do(lens.move_eye, self.view)]
+        actions += [] if self.focus is None else [do(lens.set_focus, self.focus)]
+        actions += [] if self.aperture is None else [do(lens.set_aperture, self.aperture)]
+        return actions + ([] if self.gloss is None else [do(lens.set_gloss, self.gloss.gloss)])
 
     def require_within(self, scene: Scene) -> None:
         """Raise InputError for a viewpoint outside the scene's views; a single view shows every viewpoint."""

@@ -7,33 +7,14 @@ from typing import Literal
 
 from iibr_core.scenes.scene import Progress, Scene, Source
 from viewer.model.action import Action as VerbAction
-from viewer.model.free_camera import FreeCameraAction
 from viewer.model.state.app_state import DrawReport
 from viewer.model.state.depth_editing import DepthAction
 from viewer.model.state.folder import FolderAction
 from viewer.model.state.model_download import ModelAction
-from viewer.model.state.motion import MotionAction
-from viewer.model.state.optics_actions import LensAction, SetGlossBrush
 from viewer.model.state.preferences import PreferencesAction
 from viewer.model.state.saving import SavedSettings
-from viewer.model.zoom import SetZoom
 
 # The lens as a whole, and undo
-
-
-@dataclass(frozen=True)
-class ShowTiltHandles:
-    """Show or hide the two handles over the picture."""
-
-    is_shown: bool
-
-
-@dataclass(frozen=True)
-class SetDepthStrength:
-    """Multiply the planned parallax; the field is generated again once the edit is finished."""
-
-    strength: float
-    is_finished: bool
 
 
 @dataclass(frozen=True)
@@ -48,21 +29,6 @@ class RestoreSession:
     """Go on with an opened photo as it was left."""
 
     settings: SavedSettings
-
-
-@dataclass(frozen=True)
-class EndGesture:
-    """The pointer went down or up: the next edit is another one, for undo."""
-
-
-@dataclass(frozen=True)
-class Undo:
-    """Take the last edit back."""
-
-
-@dataclass(frozen=True)
-class Redo:
-    """Do again what was taken back last."""
 
 
 # Files and the worker
@@ -128,35 +94,17 @@ class SetState:
     value: bool | DrawReport | None
 
 
-@dataclass(frozen=True)
-class ShowBefore:
-    """Show the photo as it was taken, to compare; or the picture again, as any edit of the lens does."""
-
-    is_shown: bool
-
-
 WorkerEvent = SceneOpened | ProgressMade | OpenFailed
 
 Action = (
     VerbAction
-    | LensAction
-    | MotionAction
     | WorkerEvent
     | PreferencesAction
     | SetState
     | DepthAction
     | FolderAction
-    | ShowTiltHandles
-    | SetGlossBrush
-    | ShowBefore
-    | SetZoom
-    | FreeCameraAction
-    | SetDepthStrength
     | TakeSettings
     | RestoreSession
-    | EndGesture
-    | Undo
-    | Redo
     | OpenPath
     | StopWork
     | ModelAction

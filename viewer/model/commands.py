@@ -12,33 +12,21 @@ from pathlib import PurePath
 from iibr_core.depth.editing.edits import BRUSH_TOOLS, BrushTool
 from iibr_core.exports.loops import LOOPS, LoopKind
 from iibr_core.scenes.scene import Source, source_beside, source_with_map
-from viewer.model import inspection, messages, saving
+from viewer.model import history, inspection, lens, messages, saving, viewpoint
 from viewer.model.action import ask, do
-from viewer.model.actions import (
-    Action,
-    OpenPath,
-    Redo,
-    SetState,
-    ShowBefore,
-    ShowTiltHandles,
-    StopWork,
-    Undo,
-)
+from viewer.model.actions import Action, OpenPath, SetState, StopWork
 from viewer.model.demo_photo import demo_photo
-from viewer.model.free_camera import MoveCamera
-from viewer.model.lens.presets import PRESETS
 from viewer.model.state.app_state import AppState
 from viewer.model.state.depth_editing import ResetDepth, SetBrush, SetTone
 from viewer.model.state.folder import SetFolderOrder, StepPhoto
 from viewer.model.state.inspection import COMPARISONS, OVERLAYS, Comparison, OverlayKind
+from viewer.model.state.lens import PRESETS
 from viewer.model.state.model_download import GetDepth, ModelsPrompt, UseModel
-from viewer.model.state.motion import PauseMotion, ReturnHome, SetLoop
-from viewer.model.state.optics_actions import ApplyPreset, ResetOptics
 from viewer.model.state.preferences import SECTIONS, SetPreference, ToggleSection
 from viewer.model.state.prompts import ChoiceOf, PalettePrompt
 from viewer.model.state.saving import CopyTask, PasteTask
 from viewer.model.state.tasks import ChooseTask, ReadMaskTask
-from viewer.model.zoom import SetZoom, Zoom
+from viewer.model.state.viewpoint import Zoom
 
 FONT_STEP = 1.1
 CAMERA_STEP = 0.05
@@ -137,7 +125,7 @@ def _own_pixels(state: AppState) -> Action:
     scene, hover, centre = state.scene, state.hover, (0.5, 0.5) if state.zoom is None else state.zoom.centre
     if scene is not None and hover is not None and state.zoom is None:
         centre = (hover.x_px + 0.5) / scene.width, (hover.y_px + 0.5) / scene.height
-    return SetZoom(Zoom(1.0, centre))
+    return do(viewpoint.set_zoom, Zoom(1.0, centre))
 
 
 def _brush_with(tool: BrushTool) -> Callable[[AppState], Action]:
@@ -166,21 +154,29 @@ COMMANDS: tuple[Command, ...] = (
     Command("Photos by name", _always(SetFolderOrder("name"))),
     Command("Photos by time", _always(SetFolderOrder("time"))),
     Command("Share or export…", _always(do(saving.ask_to_export)), (Chord("e", ctrl=True),)),
-    Command("Undo", _always(Undo()), (Chord("z", ctrl=True),), repeats=True),
-    Command("Redo", _always(Redo()), (Chord("z", ctrl=True, shift=True), Chord("y", ctrl=True)), repeats=True),
-    Command("Reset viewpoint, focus and aperture", _always(ResetOptics()), (Chord("r"),)),
-    Command("Recenter", _always(ReturnHome()), (Chord("c"),)),
-    *(Command(f"Preset: {name}", _always(ApplyPreset(name))) for name in PRESETS),
-    *(Command(f"Motion: {LOOP_WORDS[kind].lower()}", _always(SetLoop(kind))) for kind in LOOPS),
-    Command("Motion: pause or resume", lambda state: PauseMotion(not state.motion.is_paused), (Chord("space"),)),
-    Command("Motion: stop", _always(SetLoop(None))),
-    Command("Step forward", _always(MoveCamera(forward=CAMERA_STEP)), (Chord("w"),), repeats=True),
-    Command("Step back", _always(MoveCamera(forward=-CAMERA_STEP)), (Chord("s"),), repeats=True),
-    Command("Look up", _always(MoveCamera(down=-CAMERA_STEP)), (Chord("w", shift=True),), repeats=True),
-    Command("Look down", _always(MoveCamera(down=CAMERA_STEP)), (Chord("s", shift=True),), repeats=True),
-    Command("Look left", _always(MoveCamera(right=-CAMERA_STEP)), (Chord("a", shift=True),), repeats=True),
-    Command("Look right", _always(MoveCamera(right=CAMERA_STEP)), (Chord("d", shift=True),), repeats=True),
-    Command("Tilt handles", lambda state: ShowTiltHandles(state.tilt_handles is None), (Chord("t"),)),
+    Command("Undo", _always(do(history.undo)), (Chord("z", ctrl=True),), repeats=True),
+    Command(
+        "Redo", _always(do(history.redo)), (Chord("z", ctrl=True, shift=True), Chord("y", ctrl=True)), repeats=True
+    ),
+    Command("Reset viewpoint, focus and aperture", _always(do(lens.reset)), (Chord("r"),)),
+    Command("Recenter", _always(do(viewpoint.return_home)), (Chord("c"),)),
+    *(Command(f"Preset: {name}", _always(do(lens.apply_preset, name))) for name in PRESETS),
+    *(Command(f"Motion: {LOOP_WORDS[kind].lower()}", _always(do(viewpoint.set_loop, kind))) for kind in LOOPS),
+    Command(
+        "Motion: pause or resume", lambda state: do(viewpoint.pause, not state.motion.is_paused), (Chord("space"),)
+    ),
+    Command("Motion: stop", _always(do(viewpoint.set_loop, None))),
+    Command("Step forward", _always(do(viewpoint.move_camera, forward=CAMERA_STEP)), (Chord("w"),), repeats=True),
+    Command("Step back", _always(do(viewpoint.move_camera, forward=-CAMERA_STEP)), (Chord("s"),), repeats=True),
+    Command("Look up", _always(do(viewpoint.move_camera, down=-CAMERA_STEP)), (Chord("w", shift=True),), repeats=True),
+    Command("Look down", _always(do(viewpoint.move_camera, down=CAMERA_STEP)), (Chord("s", shift=True),), repeats=True),
+    Command(
+        "Look left", _always(do(viewpoint.move_camera, right=-CAMERA_STEP)), (Chord("a", shift=True),), repeats=True
+    ),
+    Command(
+        "Look right", _always(do(viewpoint.move_camera, right=CAMERA_STEP)), (Chord("d", shift=True),), repeats=True
+    ),
+    Command("Tilt handles", lambda state: do(lens.show_tilt_handles, state.tilt_handles is None), (Chord("t"),)),
     Command("Depth brush", _toggle_brush, (Chord("b"),)),
     *(Command(f"Depth brush: {BRUSH_WORDS[tool].lower()}", _brush_with(tool)) for tool in BRUSH_TOOLS),
     Command("Invert depth", _invert_depth),
@@ -205,12 +201,12 @@ COMMANDS: tuple[Command, ...] = (
         for kind in COMPARISONS
     ),
     Command("Stop making views", _always(StopWork())),
-    Command("Zoom: the whole picture", _always(SetZoom(None)), (Chord("_0"),)),
+    Command("Zoom: the whole picture", _always(do(viewpoint.set_zoom, None)), (Chord("_0"),)),
     Command("Zoom: the photo's own pixels, 1:1", _own_pixels, (Chord("_1"),)),
     *(Command(f"Section: {section}", _always(ToggleSection(section))) for section in SECTIONS),
     Command("Full screen", lambda s: SetState("is_fullscreen", not s.is_fullscreen), (Chord("f11"),)),
     Command("Hide or show the panel", toggle_panel, (Chord("tab"),)),
-    Command("Before and after", lambda s: ShowBefore(not s.shows_before), (Chord("backslash"),)),
+    Command("Before and after", lambda s: do(lens.show_before, not s.shows_before), (Chord("backslash"),)),
     Command("Take a snapshot", _always(do(inspection.take_snapshot)), (Chord("k"),)),
     Command("Light or dark", lambda s: SetPreference("theme", "dark" if s.preferences.theme == "light" else "light")),
     Command(

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from iibr_core.scenes.rect import WHOLE, Rect
 from iibr_core.scenes.screen_size import ScreenSize
-from viewer.model.zoom import MOST_ZOOM, Zoom
+from viewer.model.state.viewpoint import Zoom
 
 BACKGROUND = 0.07, 0.07, 0.08, 1.0
 """Behind the picture, where the theme is dark."""
@@ -37,6 +37,8 @@ class PixelRect(NamedTuple):
 MINIMAP_SIDE = 150.0
 """The longer side of the small picture that says which part is seen."""
 
+MAX_ZOOM = 4.0
+"""Largest zoom: this many times the photo's own size, or what fits where that is larger."""
 ZOOM_NOTCH = 1.25
 """A notch of the wheel makes the picture so many times as large."""
 
@@ -125,7 +127,7 @@ class Layout:
 
     def zoomed(self, notches: float, x: float, y: float) -> Zoom | None:
         """The zoom after so many notches of the wheel: what lies at (x, y) stays there. None: it fits."""
-        low, high = min(self.fit, 1.0), MOST_ZOOM * max(self.fit, 1.0)
+        low, high = min(self.fit, 1.0), MAX_ZOOM * max(self.fit, 1.0)
         scale = min(max(self.scale * ZOOM_NOTCH**notches, low), high)
         passes_fit = (scale - self.fit) * (self.scale - self.fit) < 0
         if self.picture is None or passes_fit or 1 / NEAR_FIT < scale / self.fit < NEAR_FIT:

@@ -18,10 +18,11 @@ from iibr_core.scenes.lens_limits import focus_limits
 from iibr_core.scenes.light_fields import FROM_VIEWS
 from iibr_core.scenes.opening import results_of
 from iibr_core.scenes.scene import Scene, SceneReady, SceneRequest, Source, ViewReady
+from viewer.model import lens
+from viewer.model.action import do
 from viewer.model.actions import OpenPath, SceneOpened
 from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState
-from viewer.model.state.optics_actions import SetAperture, SetFocus
 
 WALL_PX, SQUARE_PX = -0.5, 1.25
 
@@ -73,11 +74,13 @@ def test_focus_that_is_set_while_it_loads_stays(tmp_path: Path) -> None:
     state = reduce(AppState(), OpenPath(source))
     results = results_of(SceneRequest(1, source), lambda: CENTRE)
     state = reduce(state, SceneOpened(1, first_scene(results)))
-    state = reduce(reduce(state, SetAperture(2.0)), SetFocus(3.5))
+    state = reduce(reduce(state, do(lens.set_aperture, 2.0)), do(lens.set_focus, 3.5))
     for result in results:
         if isinstance(result, SceneReady):
             state = reduce(state, SceneOpened(1, result.scene))
-            state = reduce(state, SetAperture(state.optics.aperture_diameter + 0.1))  # which checks all limits
+            state = reduce(
+                state, do(lens.set_aperture, state.optics.aperture_diameter + 0.1)
+            )  # which checks all limits
     assert state.optics.focus_disparity == 3.5
     assert focus_limits(state.scene)[1] >= 3.5
 

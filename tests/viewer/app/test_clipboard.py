@@ -13,9 +13,8 @@ from PIL import Image
 from iibr_core.types import GridShape, InputError
 from tests.viewer.conftest import Driver, Opener, write_scene
 from viewer.app.clipboard import MOST_KEPT, paste_picture
-from viewer.model import messages
+from viewer.model import lens, messages
 from viewer.model.action import ask, do
-from viewer.model.state.optics_actions import SetAperture
 from viewer.model.state.saving import CopyTask, PasteTask
 
 CLIPBOARD = ["xclip", "-selection", "clipboard"]
@@ -47,7 +46,7 @@ def says(driver: Driver, text: str) -> None:
 
 
 def test_the_picture_is_copied_as_it_is_drawn_and_pasted_again(viewer: Driver) -> None:
-    viewer.app.do(SetAperture(2.0))
+    viewer.app.do(do(lens.set_aperture, 2.0))
     viewer.until_idle()
     viewer.send("key", "ctrl+c")
     says(viewer, "Copied")

@@ -14,12 +14,10 @@ from iibr_core.depth.editing.edits import DepthEdits
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import FAR, NEAR, Driver, Opener
 from viewer.app.main_loop import App
-from viewer.model import inspection, messages, saving
+from viewer.model import gesture, inspection, lens, messages, saving
 from viewer.model.action import do
-from viewer.model.actions import EndGesture, SetDepthStrength
 from viewer.model.state.depth_editing import Brush, SetBrush, SetTone
 from viewer.model.state.notices import Notice
-from viewer.model.state.optics_actions import MoveEye
 from viewer.model.state.preferences import SECTIONS, with_sections
 from viewer.model.state.prompts import PathPrompt, SavePrompt
 
@@ -71,7 +69,7 @@ def press_at(viewer: Driver, x_share: float, y_share: float) -> None:
 
 
 def test_a_stroke_is_seen_while_it_is_drawn_and_made_when_it_ends(viewer: Driver) -> None:
-    viewer.app.do(MoveEye(ViewOffset(0.0, 1.0)), SetBrush(Brush(radius=0.1, strength=1.0, is_on=True)))
+    viewer.app.do(do(lens.move_eye, ViewOffset(0.0, 1.0)), SetBrush(Brush(radius=0.1, strength=1.0, is_on=True)))
     viewer.until_idle()
     before, given = viewer.image(), disparity_of(viewer.app).copy()
     press_at(viewer, 0.5, 0.5)
@@ -168,7 +166,9 @@ def test_sliders_and_handles_change_the_map_once_they_are_let_go(viewer: Driver)
     until_made(viewer, 2)
     assert 0 < viewer.app.state.depth.edits.far_clip < 0.5
     # where `find` looks
-    viewer.app.do(SetTone(replace(viewer.app.state.depth.edits, near_clip=0.77), is_finished=True), EndGesture())
+    viewer.app.do(
+        SetTone(replace(viewer.app.state.depth.edits, near_clip=0.77), is_finished=True), do(gesture.end_gesture)
+    )
     until_made(viewer, 3)
     x, y = viewer.find("handle near_clip")
     viewer.send("mousedown", 1)
@@ -190,7 +190,7 @@ def test_refine_is_worked_out_anew_without_reading_the_photo(viewer: Driver, pho
     assert not viewer.app.state.depth.refine
     assert viewer.app.scene_view.loaded is not None
     assert viewer.app.scene_view.loaded.depth_settings == viewer.app.state.depth
-    viewer.app.do(SetDepthStrength(2.0, is_finished=True))
+    viewer.app.do(do(lens.set_depth_strength, 2.0, is_finished=True))
     until_made(viewer, 3)
     assert not viewer.app.state.notices
 

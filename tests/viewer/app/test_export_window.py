@@ -27,18 +27,12 @@ from viewer.app import job_scene
 from viewer.app.main_loop import App
 from viewer.background.window_work import Steps
 from viewer.display.snapshot import SceneSnapshot
-from viewer.model import messages, saving
+from viewer.model import gesture, lens, messages, saving
 from viewer.model.action import ask, do
-from viewer.model.actions import (
-    Action,
-    EndGesture,
-    OpenPath,
-    SetDepthStrength,
-)
+from viewer.model.actions import Action, OpenPath
 from viewer.model.state.depth_editing import Paint, SetTone
 from viewer.model.state.exporting import ExportPrompt, ExportTask
 from viewer.model.state.jobs import WAITING_FOR_VIEWS, CancelJobTask
-from viewer.model.state.optics_actions import MoveEye, SetAperture, SetFocus, SetOptics
 from viewer.model.state.tasks import SaveTask
 
 SMALL = ExportOptions(size=ScreenSize(96, 64), frames=4)
@@ -71,7 +65,7 @@ def test_the_window_lives_on_while_it_exports(viewer: Driver, tmp_path: Path) ->
     app.do(do(ask, ExportTask("gif", str(out), SMALL)))
     frames, turns = app.frames_shown, 0
     while turns < 10:
-        app.do(MoveEye(ViewOffset(0.05 * turns, 0.2)))
+        app.do(do(lens.move_eye, ViewOffset(0.05 * turns, 0.2)))
         app.step()
         turns += 1
     assert app.frames_shown - frames >= 5
@@ -107,12 +101,12 @@ def nine_changes(viewer: Driver, folder: Path) -> list[tuple[Action, ...]]:
     source = viewer.app.state.source
     assert source is not None
     return [
-        (MoveEye(ViewOffset(0.7, -0.4)),),
-        (SetFocus(1.5), SetAperture(1.2)),
-        (SetOptics("focus_tilt", (0.5, 0.2)),),
-        (SetOptics("gloss", Gloss()),),
-        (SetDepthStrength(0.6, is_finished=True),),
-        (Paint((0.5, 0.5)), Paint((0.7, 0.5)), EndGesture()),
+        (do(lens.move_eye, ViewOffset(0.7, -0.4)),),
+        (do(lens.set_focus, 1.5), do(lens.set_aperture, 1.2)),
+        (do(lens.set_focus_tilt, (0.5, 0.2)),),
+        (do(lens.set_gloss, Gloss()),),
+        (do(lens.set_depth_strength, 0.6, is_finished=True),),
+        (Paint((0.5, 0.5)), Paint((0.7, 0.5)), do(gesture.end_gesture)),
         (SetTone(DepthEdits(gamma=1.7), is_finished=True),),
         (OpenPath(replace(source, grid=GridShape(5, 5))),),
         (other_photo(folder),),
@@ -169,7 +163,7 @@ def test_what_is_under_way_stays_as_it_was_asked_for_whatever_is_changed(
 ) -> None:
     """Ten changes, each seen by the window: the bytes are those of the same without them."""
     app, name = viewer.app, task.path
-    app.do(SetAperture(2.0), MoveEye(ViewOffset(0.3, -0.2)), SetFocus(0.5))
+    app.do(do(lens.set_aperture, 2.0), do(lens.move_eye, ViewOffset(0.3, -0.2)), do(lens.set_focus, 0.5))
     viewer.until_idle()
     for folder in ("alone", "disturbed"):
         (tmp_path / folder).mkdir()
@@ -200,7 +194,7 @@ def test_what_is_asked_for_before_all_views_are_there_is_not_lost_with_its_photo
     app = viewer.app
     viewer.until(lambda app: app.state.scene is not None and not app.state.scene.is_sketch)
     options = SMALL if kind == "gif" else ExportOptions()
-    app.do(SetAperture(2.0), do(ask, ExportTask(kind, str(tmp_path / f"early.{kind}"), options)))
+    app.do(do(lens.set_aperture, 2.0), do(ask, ExportTask(kind, str(tmp_path / f"early.{kind}"), options)))
     app.step()
     assert [job.doing for job in app.state.jobs] == [WAITING_FOR_VIEWS]
     app.do(other_photo(tmp_path))
@@ -210,7 +204,11 @@ def test_what_is_asked_for_before_all_views_are_there_is_not_lost_with_its_photo
     app.do(OpenPath(Source(str(photo_path), grid=GridShape(5, 5))))
     viewer.until(lambda app: app.state.scene is not None and app.state.scene.name == "scene")
     viewer.until_idle()
-    app.do(do(messages.dismiss), SetAperture(2.0), do(ask, ExportTask(kind, str(tmp_path / f"late.{kind}"), options)))
+    app.do(
+        do(messages.dismiss),
+        do(lens.set_aperture, 2.0),
+        do(ask, ExportTask(kind, str(tmp_path / f"late.{kind}"), options)),
+    )
     viewer.until(lambda app: f"Exported {tmp_path / f'late.{kind}'}" in texts(app))
     early, late = (bytes_of(tmp_path / f"{when}.{kind}") for when in ("early", "late"))
     assert list(early.values()) == list(late.values())

@@ -12,10 +12,10 @@ import pytest
 from iibr_core.formats.images.photo import read_photo
 from tests.viewer.conftest import Driver
 from viewer.app import picture_saver
+from viewer.model import lens
 from viewer.model.action import ask, do
-from viewer.model.free_camera import FreeCamera
-from viewer.model.state.optics_actions import SetAperture, SetFocus
 from viewer.model.state.tasks import SaveTask
+from viewer.model.state.viewpoint import FreeCamera
 from viewer.ui.overlays.chips import CHIP
 
 
@@ -67,9 +67,9 @@ def test_looking_right_moves_everything_to_the_left(viewer: Driver) -> None:
 def test_the_lens_blurs_what_it_sees_and_a_saved_picture_shows_that(viewer: Driver, tmp_path: Path) -> None:
     viewer.send("key", "w")
     viewer.until(lambda app: app.state.free_camera is not None)
-    viewer.app.do(SetAperture(0.0))
+    viewer.app.do(do(lens.set_aperture, 0.0))
     sharp = seen(viewer)
-    viewer.app.do(SetAperture(3.0), SetFocus(0.0))
+    viewer.app.do(do(lens.set_aperture, 3.0), do(lens.set_focus, 0.0))
     blurred = seen(viewer)
     assert np.abs(blurred - sharp).mean() > 1.0
     path = tmp_path / "seen.png"

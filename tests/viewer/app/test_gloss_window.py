@@ -11,7 +11,8 @@ import pytest
 from iibr_core.gloss.settings import Gloss
 from iibr_core.types import GridShape
 from tests.viewer.conftest import Driver, Opener
-from viewer.model.state.optics_actions import SetOptics
+from viewer.model import lens
+from viewer.model.action import do
 from viewer.model.state.preferences import with_sections
 
 
@@ -63,7 +64,7 @@ def test_dragging_the_light_finds_nothing_out_anew(viewer: Driver) -> None:
     make_glossy(viewer)
     asked, gloss = viewer.app.gloss_finder.asked, shown_gloss(viewer)
     viewer.app.do(
-        SetOptics("gloss", replace(gloss, roughness=0.1, light=replace(gloss.light, direction=(0.5, 0.1, -1))))
+        do(lens.set_gloss, replace(gloss, roughness=0.1, light=replace(gloss.light, direction=(0.5, 0.1, -1))))
     )
     viewer.until_idle()
     assert viewer.app.gloss_finder.asked is asked

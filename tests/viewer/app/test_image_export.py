@@ -20,11 +20,10 @@ from viewer.app.image_export import export_picture, shot_of
 from viewer.app.job_queue import JobQueue
 from viewer.app.picture_saver import add_save
 from viewer.display.offscreen import OffscreenScene
-from viewer.model import messages, saving
+from viewer.model import lens, messages, saving
 from viewer.model.action import do
 from viewer.model.actions import Action
 from viewer.model.saved_settings import read_settings
-from viewer.model.state.optics_actions import MoveEye, SetAperture, SetFocus
 from viewer.model.state.preferences import SetPreference
 from viewer.model.state.tasks import SaveTask
 
@@ -49,7 +48,7 @@ def opened(photo: Path) -> Iterator[OffscreenScene]:
         pytest.skip(str(error))
     with viewer:
         viewer.open(Source(str(photo), grid=GridShape(3, 3)))
-        viewer.do(MoveEye(ViewOffset(0.3, -0.4)), SetAperture(2.0), SetFocus(0.2))
+        viewer.do(do(lens.move_eye, ViewOffset(0.3, -0.4)), do(lens.set_aperture, 2.0), do(lens.set_focus, 0.2))
         yield viewer
 
 
@@ -106,7 +105,7 @@ def test_a_place_that_cannot_be_written_is_told(opened: OffscreenScene, tmp_path
 def test_a_picture_is_as_it_was_when_edited_depth_is_shown_meanwhile(tmp_path: Path) -> None:
     out = tmp_path / "out.png"
     with headless_with_scene(tmp_path) as viewer:
-        viewer.do(MoveEye(ViewOffset(0.3, -0.7)))
+        viewer.do(do(lens.move_eye, ViewOffset(0.3, -0.7)))
         scene_view, state, woken = viewer.view, viewer.state, threading.Event()
         expected = scene_view.renderer.converged_picture(RenderSettings(state.optics, (90, 60)))
         jobs = JobQueue(scene_view, woken.set)

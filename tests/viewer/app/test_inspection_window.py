@@ -14,11 +14,10 @@ from iibr_core.scenes.photo import load_photo
 from iibr_core.scenes.scene import Source
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import Driver, Opener, write_scene
-from viewer.model import inspection
+from viewer.model import inspection, lens
 from viewer.model.action import do
 from viewer.model.actions import OpenPath
 from viewer.model.inspection import sheet_cells
-from viewer.model.state.optics_actions import MoveEye, SetAperture
 from viewer.model.state.preferences import ToggleSection
 
 GRID = GridShape(5, 5)
@@ -135,10 +134,10 @@ def test_a_snapshot_is_drawn_over_several_turns(viewer: Driver) -> None:
     """A turn draws for a short time only, so the window answers while a finished picture is drawn."""
     app = viewer.app
     app.do(
-        MoveEye(ViewOffset(0.3, 0.4)),
-        SetAperture(3.0),
+        do(lens.move_eye, ViewOffset(0.3, 0.4)),
+        do(lens.set_aperture, 3.0),
         do(inspection.take_snapshot),
-        MoveEye(ViewOffset(0, 0)),
+        do(lens.move_eye, ViewOffset(0, 0)),
         do(inspection.compare, "snapshot"),
     )
     viewer.until(lambda app: app.inspection_view.is_drawing)

@@ -10,13 +10,13 @@ import pytest
 from iibr_core.scenes.scene import Scene, Source
 from iibr_core.types import GridShape, ViewOffset
 from viewer.app.keys import Keys, actions_from_keys
-from viewer.model import inspection, messages, saving
+from viewer.model import history, inspection, lens, messages, saving
+from viewer.model.action import Action as VerbAction
 from viewer.model.action import do
-from viewer.model.actions import Action, SetState, Undo
+from viewer.model.actions import Action, SetState
 from viewer.model.commands import BY_NAME, COMMANDS
 from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState
-from viewer.model.state.optics_actions import MoveEye, ResetOptics
 from viewer.model.state.prompts import PalettePrompt
 
 SCENE = Scene(Source("photo.png", max_pixels=7), "photo", 600, 400, GridShape(9, 9), (-2.0, 3.0), "photo.pfm")
@@ -26,7 +26,10 @@ STATE = AppState(source=SCENE.source, scene=SCENE)
 def test_keys() -> None:
     assert actions_from_keys(Keys(), STATE) == []
     reset = "Reset viewpoint, focus and aperture"
-    assert actions_from_keys(Keys(is_escape=True, commands=(reset, "Undo")), STATE) == [ResetOptics(), Undo()]
+    assert actions_from_keys(Keys(is_escape=True, commands=(reset, "Undo")), STATE) == [
+        do(lens.reset),
+        do(history.undo),
+    ]
     assert actions_from_keys(Keys(is_escape=True), replace(STATE, prompt="help")) == [do(messages.show_prompt, None)]
     assert reset in BY_NAME
 
@@ -62,5 +65,6 @@ def test_what_is_switched_is_not_switched_back_while_its_key_is_held() -> None:
 
 def test_arrows() -> None:
     (move,) = actions_from_keys(Keys(arrows=ViewOffset(1, -1)), STATE)
-    assert isinstance(move, MoveEye)
-    assert move.eye.t > 0 > move.eye.s
+    assert isinstance(move, VerbAction)
+    assert move.verb is lens.move_eye
+    assert move.args[0].t > 0 > move.args[0].s

@@ -21,14 +21,13 @@ from tests.local_hub import Hub, local_hub
 from tests.viewer.conftest import Driver, Opener
 from viewer.app.main_loop import App
 from viewer.background.model_downloader import list_models
-from viewer.model import messages
+from viewer.model import gesture, history, lens, messages
 from viewer.model.action import do
-from viewer.model.actions import EndGesture, OpenPath, Redo, Undo
-from viewer.model.lens.focal_plane import place_of, sharp_disparity
+from viewer.model.actions import OpenPath
+from viewer.model.focal_plane import place_of, sharp_disparity
 from viewer.model.reducers.depth_models import offered_model
 from viewer.model.state.depth_editing import Brush, Paint, SetBrush
 from viewer.model.state.model_download import ModelsPrompt, UseModel
-from viewer.model.state.optics_actions import FocusOn, MoveEye, SetAperture, SetFocus
 from viewer.model.state.preferences import SetPreference
 
 MODEL = known_model("depth-anything-v2-small")
@@ -103,8 +102,13 @@ def test_one_click_deepens_the_picture_as_it_is_seen_and_edited(viewer: Driver, 
     assert not hub.asked, "nothing is fetched unasked"
     at = place_of(50, 20, viewer.app.state.scene)  # type: ignore[arg-type]
     before = viewer.app.scene_view.pick(ViewOffset(0, 0), 50, 20)
-    viewer.app.do(MoveEye(ViewOffset(0.5, -0.5)), EndGesture(), FocusOn(at, before or 0.0), SetAperture(1.0))
-    viewer.app.do(SetBrush(Brush(radius=0.1, strength=1.0)), Paint((0.1, 0.9)), EndGesture())
+    viewer.app.do(
+        do(lens.move_eye, ViewOffset(0.5, -0.5)),
+        do(gesture.end_gesture),
+        do(lens.focus_on, at, before or 0.0),
+        do(lens.set_aperture, 1.0),
+    )
+    viewer.app.do(SetBrush(Brush(radius=0.1, strength=1.0)), Paint((0.1, 0.9)), do(gesture.end_gesture))
     viewer.until_idle()
     edits = viewer.app.state.depth.edits
     assert wall_slope(viewer) > 0.5, "a guess has what is low near"
@@ -129,14 +133,14 @@ def test_one_click_deepens_the_picture_as_it_is_seen_and_edited(viewer: Driver, 
 
 
 def test_undo_works_across_the_estimate(viewer: Driver, hub: Hub) -> None:
-    viewer.app.do(MoveEye(ViewOffset(0.5, 0.0)), EndGesture())
+    viewer.app.do(do(lens.move_eye, ViewOffset(0.5, 0.0)), do(gesture.end_gesture))
     hub.may_finish.set()
     viewer.press(GET, "notices")
     viewer.until(is_deep)
     viewer.until_idle()
-    viewer.app.do(Undo())
+    viewer.app.do(do(history.undo))
     assert viewer.app.state.optics.eye == ViewOffset(0.0, 0.0)
-    viewer.app.do(Redo())
+    viewer.app.do(do(history.redo))
     viewer.until_idle()
     assert viewer.app.state.optics.eye == ViewOffset(0.5, 0.0)
     assert is_deep(viewer.app)
@@ -264,7 +268,7 @@ def test_a_photo_opens_with_the_focus_that_it_was_left_with(
     first.until(is_deep)
     first.until_idle()
     assert not list((kept / "sessions").glob("*.json")), "the user did nothing yet"
-    first.app.do(MoveEye(ViewOffset(0.5, 0.0)), SetFocus(0.25), EndGesture())
+    first.app.do(do(lens.move_eye, ViewOffset(0.5, 0.0)), do(lens.set_focus, 0.25), do(gesture.end_gesture))
     first.until_idle()
     left = first.app.state.optics
     first.app.close()
@@ -277,7 +281,7 @@ def test_a_photo_opens_with_the_focus_that_it_was_left_with(
 
 def test_a_file_of_ones_own_is_used_in_place_and_is_said_to_be(viewer: Driver, tmp_path: Path) -> None:
     file = weighing(tmp_path / "own.onnx", (1, 1, 1))
-    viewer.app.do(MoveEye(ViewOffset(0.5, 0.5)), EndGesture(), UseModel(str(file)))
+    viewer.app.do(do(lens.move_eye, ViewOffset(0.5, 0.5)), do(gesture.end_gesture), UseModel(str(file)))
     viewer.until(is_deep)
     viewer.until_idle()
     assert viewer.app.state.optics.eye == ViewOffset(0.5, 0.5)

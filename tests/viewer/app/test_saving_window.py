@@ -29,11 +29,10 @@ from tests.viewer.conftest import HEIGHT, WIDTH, Driver, Opener, write_scene
 from viewer.app.image_export import export_picture
 from viewer.app.job_queue import JobQueue
 from viewer.app.pace import SETTLING_FRAMES
-from viewer.model import messages, saving
+from viewer.model import lens, messages, saving
 from viewer.model.action import ask, do
 from viewer.model.saved_settings import read_settings
 from viewer.model.state.jobs import WAITING_FOR_VIEWS, WRITING, CancelJobTask, JobProgress
-from viewer.model.state.optics_actions import MoveEye, SetAperture
 from viewer.model.state.prompts import Saved, SavePrompt
 from viewer.model.state.tasks import ReadMaskTask, SaveTask
 
@@ -52,7 +51,7 @@ def viewer(open_window: Opener, photo_path: Path, monkeypatch: pytest.MonkeyPatc
     driver = open_window(photo_path, grid=GridShape(3, 3))
     driver.until_idle()
     driver.send("mousemove", *driver.position(0.1, 0.1))
-    driver.app.do(MoveEye(ViewOffset(0.3, -0.7)), SetAperture(2.0))
+    driver.app.do(do(lens.move_eye, ViewOffset(0.3, -0.7)), do(lens.set_aperture, 2.0))
     driver.until_idle()
     return driver
 
@@ -84,7 +83,7 @@ def test_the_window_lives_on_while_a_picture_is_saved(viewer: Driver, tmp_path: 
     app.step()
     frames, drawn, turns, shares = app.frames_shown, app.scene_view.pictures_drawn, 0, []
     while not texts(viewer):
-        app.do(MoveEye(ViewOffset(0.01 * (turns % 50), 0.2)))
+        app.do(do(lens.move_eye, ViewOffset(0.01 * (turns % 50), 0.2)))
         app.step()
         turns += 1
         if app.state.jobs:
@@ -134,7 +133,7 @@ def test_cancel_leaves_nothing_behind_and_the_next_is_saved(viewer: Driver, tmp_
 def test_pictures_are_saved_in_the_order_in_which_they_were_asked_for(viewer: Driver, tmp_path: Path) -> None:
     eyes = [ViewOffset(0.0, s) for s in (-1.0, 0.0, 1.0)]
     for i, eye in enumerate(eyes):
-        viewer.app.do(MoveEye(eye), do(ask, SaveTask(str(tmp_path / f"{i}.png"), (48, 32))))
+        viewer.app.do(do(lens.move_eye, eye), do(ask, SaveTask(str(tmp_path / f"{i}.png"), (48, 32))))
         viewer.app.step()
     viewer.until(lambda app: len(app.state.notices) == 3 and not app.state.jobs)
     assert texts(viewer) == [f"Saved {tmp_path / f'{i}.png'}" for i in range(3)]
@@ -182,7 +181,7 @@ def test_a_picture_waits_for_the_views(open_window: Opener, photo_path: Path, tm
     viewer = open_window(photo_path, grid=GridShape(9, 9))
     app, out = viewer.app, tmp_path / "out.png"
     viewer.until(lambda app: app.state.scene is not None and not app.state.scene.is_sketch)
-    app.do(MoveEye(ViewOffset(0.3, -0.7)), SetAperture(2.0), do(ask, SaveTask(str(out), SIZE)))
+    app.do(do(lens.move_eye, ViewOffset(0.3, -0.7)), do(lens.set_aperture, 2.0), do(ask, SaveTask(str(out), SIZE)))
     app.step()
     assert job_of(viewer).doing == WAITING_FOR_VIEWS
     asked = app.state.optics
@@ -253,7 +252,7 @@ def test_a_picture_is_saved_at_the_photos_own_size(
 ) -> None:
     """Asked for no other size it has all of the photo's pixels; what is out of focus is as in the views."""
     app, out = large.app, tmp_path / "out.png"
-    app.do(SetAperture(aperture), do(saving.ask_to_save))
+    app.do(do(lens.set_aperture, aperture), do(saving.ask_to_save))
     prompt = app.state.prompt
     assert isinstance(prompt, SavePrompt)
     assert prompt.size_px == (WIDTH, HEIGHT)

@@ -20,10 +20,10 @@ from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import Driver, Opener, rests
 from viewer.app.session_store import key_of
-from viewer.model.actions import EndGesture, Undo
+from viewer.model import gesture, history, lens
+from viewer.model.action import do
 from viewer.model.saved_settings import settings_text
 from viewer.model.state.depth_editing import Paint, SetBrush, SetTone
-from viewer.model.state.optics_actions import MoveEye, SetAperture, SetFocus
 from viewer.model.state.saving import SavedSettings
 
 ONE = GridShape(1, 1)
@@ -39,9 +39,9 @@ def change(driver: Driver) -> None:
     """Change all that a session keeps."""
     app = driver.app
     driver.until_idle()
-    app.do(MoveEye(ViewOffset(0.3, -0.2)), SetAperture(1.5), SetFocus(0.25))
+    app.do(do(lens.move_eye, ViewOffset(0.3, -0.2)), do(lens.set_aperture, 1.5), do(lens.set_focus, 0.25))
     app.do(SetTone(replace(UNEDITED, gamma=1.5), is_finished=True))
-    app.do(SetBrush(replace(app.state.brush, is_on=True)), Paint((0.5, 0.5)), EndGesture())
+    app.do(SetBrush(replace(app.state.brush, is_on=True)), Paint((0.5, 0.5)), do(gesture.end_gesture))
     driver.until_idle()
 
 
@@ -76,7 +76,7 @@ def test_a_photo_opens_as_it_was_left_after_a_crash_too(open_window: Opener, pho
     assert left_with(second) == left
     assert isinstance(second.app.state.depth.edits.strokes[0], Stroke)
     assert second.app.scene_view.loaded.depth_settings == second.app.state.depth  # type: ignore[union-attr]
-    second.app.do(Undo())
+    second.app.do(do(history.undo))
     second.until_idle()
     assert second.app.state.depth.edits == UNEDITED
 
@@ -133,7 +133,7 @@ def test_many_strokes_are_painted_beside_the_window(
     app = driver.app
     app.do(SetBrush(replace(app.state.brush, is_on=True)), Paint((0.5, 0.5)))
     driver.until(lambda app: len(painted_here) > 0)
-    app.do(EndGesture())
+    app.do(do(gesture.end_gesture))
     driver.until(lambda app: app.state.shown_generation == app.state.generation)
     driver.until_idle()
     assert len({stroke.points[0] for stroke in painted_here}) == 1

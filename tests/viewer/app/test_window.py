@@ -20,10 +20,8 @@ from viewer.app.main_loop import App
 from viewer.app.pointer import units_per_view
 from viewer.app.preferences_store import PREFERENCES_FILE
 from viewer.display.scene_view import WAITING_VIEWS
-from viewer.model import messages
+from viewer.model import lens, messages
 from viewer.model.action import do
-from viewer.model.actions import SetDepthStrength
-from viewer.model.state.optics_actions import MoveEye
 
 
 @pytest.fixture
@@ -254,7 +252,7 @@ def test_views_come_nearest_first_to_where_the_user_looks(open_window: Opener, p
     driver = open_window(photo_path, grid=GridShape(9, 9))
     driver.until_idle()
     before = driver.app.state.scene
-    driver.app.do(MoveEye(ViewOffset(-4.0, -4.0)), SetDepthStrength(1.5, is_finished=True))
+    driver.app.do(do(lens.move_eye, ViewOffset(-4.0, -4.0)), do(lens.set_depth_strength, 1.5, is_finished=True))
     driver.until(lambda app: app.state.scene is not before)
     arrived: list[tuple[int, int]] = []
 

@@ -17,13 +17,12 @@ from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import Driver, Opener, rests, write_scene
 from viewer.app.preferences_store import load_preferences
 from viewer.display.offscreen import OffscreenScene
-from viewer.model import messages
+from viewer.model import lens, messages
 from viewer.model.action import ask, do
 from viewer.model.actions import StopWork
 from viewer.model.saved_settings import read_settings
 from viewer.model.state.app_state import AppState
 from viewer.model.state.exporting import ExportPrompt
-from viewer.model.state.optics_actions import MoveEye, SetAperture
 from viewer.model.state.prompts import PalettePrompt, SavePrompt
 from viewer.model.state.tasks import ReadMaskTask, SaveTask
 
@@ -33,7 +32,7 @@ pytestmark = pytest.mark.usefixtures("no_dialogs")
 def test_a_saved_picture_can_be_taken_again_without_the_window(
     viewer: Driver, photo_path: Path, tmp_path: Path
 ) -> None:
-    viewer.app.do(MoveEye(ViewOffset(0.3, -0.7)), SetAperture(2.0))
+    viewer.app.do(do(lens.move_eye, ViewOffset(0.3, -0.7)), do(lens.set_aperture, 2.0))
     viewer.send("key", "ctrl+s")
     viewer.until(lambda app: isinstance(app.state.prompt, SavePrompt))
     viewer.until_idle()
@@ -49,7 +48,7 @@ def test_a_saved_picture_can_be_taken_again_without_the_window(
     viewer.until_idle()
     with OffscreenScene("egl") as again:
         again.open(dataclasses.replace(settings.source, path=str(photo_path)), settings.depth_strength)
-        again.do(MoveEye(settings.optics.eye), SetAperture(settings.optics.aperture_diameter))
+        again.do(do(lens.move_eye, settings.optics.eye), do(lens.set_aperture, settings.optics.aperture_diameter))
         difference = np.abs(again.picture(settings.size_px) / 255 - read_photo(out).pixels)
     assert difference.max() <= 1 / 255, "another GL context may round differently"
 
@@ -86,7 +85,9 @@ def test_a_picture_too_large_for_the_driver_gives_a_notice(viewer: Driver, tmp_p
 
 def test_a_dropped_saved_picture_offers_its_settings(viewer: Driver, tmp_path: Path) -> None:
     out = tmp_path / "saved.png"
-    viewer.app.do(MoveEye(ViewOffset(1, 1)), SetAperture(1.5), do(ask, SaveTask(str(out), (96, 64))))
+    viewer.app.do(
+        do(lens.move_eye, ViewOffset(1, 1)), do(lens.set_aperture, 1.5), do(ask, SaveTask(str(out), (96, 64)))
+    )
     viewer.until(lambda app: out.exists())
     wanted = viewer.app.state.optics
     np.save(tmp_path / "saved_disparity.npy", np.load(tmp_path / "scene_disparity.npy"))

@@ -10,13 +10,12 @@ from iibr_core.beyond.optics import ApertureShape, Optics
 from iibr_core.gloss.settings import Gloss
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import FAR, NEAR, Driver
-from viewer.model import messages
+from viewer.model import lens, messages
 from viewer.model.action import do
-from viewer.model.actions import Action, SetDepthStrength, ShowTiltHandles
-from viewer.model.lens.focal_plane import handle_points, sharp_disparity
-from viewer.model.state.app_state import TiltHandles
+from viewer.model.actions import Action
+from viewer.model.focal_plane import handle_points, sharp_disparity
+from viewer.model.state.lens import TiltHandles
 from viewer.model.state.notices import Notice
-from viewer.model.state.optics_actions import ApplyPreset, MoveEye, SetOptics
 from viewer.model.state.preferences import SetPreference
 
 
@@ -142,21 +141,21 @@ def test_the_reticle_follows_the_pointer_and_costs_no_picture(viewer: Driver) ->
 
 
 DRAWS = (
-    SetOptics("dolly", 0.5),
-    SetOptics("focus_range", 0.3),
-    SetOptics("focus_tilt", (0.2, 0.1)),
-    SetOptics("aperture_shape", ApertureShape("polygon", blades=5)),
-    SetOptics("highlight_recovery", 0.5),
-    MoveEye(ViewOffset(0.5, 0.5)),
-    SetOptics("gloss", Gloss()),
-    ApplyPreset("portrait"),
+    do(lens.set_dolly, 0.5),
+    do(lens.set_focus_range, 0.3),
+    do(lens.set_focus_tilt, (0.2, 0.1)),
+    do(lens.set_aperture_shape, ApertureShape("polygon", blades=5)),
+    do(lens.set_highlights, 0.5),
+    do(lens.move_eye, ViewOffset(0.5, 0.5)),
+    do(lens.set_gloss, Gloss()),
+    do(lens.apply_preset, "portrait"),
 )
 ONLY_PANELS = (
-    ShowTiltHandles(True),
+    do(lens.show_tilt_handles, True),
     do(messages.notify, Notice("hello")),
     do(messages.show_prompt, "help"),
     SetPreference("theme", "light"),
-    ShowTiltHandles(False),
+    do(lens.show_tilt_handles, False),
 )
 
 
@@ -179,8 +178,10 @@ def test_what_each_edit_rebuilds(viewer: Driver, monkeypatch: pytest.MonkeyPatch
     for action in ONLY_PANELS:
         assert cost_of(action) == (False, True, False, False), action
     assert cost_of(DRAWS[-1]) == (False, False, False, False), "the same again"
-    assert cost_of(SetDepthStrength(2.0, is_finished=False)) == (False, True, False, False), "its slider moves"
-    assert cost_of(SetDepthStrength(2.0, is_finished=True)) == (True, True, True, True)
+    assert cost_of(do(lens.set_depth_strength, 2.0, is_finished=False)) == (False, True, False, False), (
+        "its slider moves"
+    )
+    assert cost_of(do(lens.set_depth_strength, 2.0, is_finished=True)) == (True, True, True, True)
     assert cost_of(SetPreference("font_scale", 1.3))[2:] == (False, False)
 
 

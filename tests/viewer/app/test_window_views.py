@@ -6,9 +6,8 @@ import numpy as np
 
 from iibr_core.types import ViewOffset
 from tests.viewer.conftest import SMALL_WINDOW, Driver
-from viewer.model import inspection
+from viewer.model import inspection, lens
 from viewer.model.action import do
-from viewer.model.state.optics_actions import MoveEye, SetAperture, SetOptics
 
 ROUNDING = 1
 """Largest difference between equal pictures that were drawn in other steps, of 255."""
@@ -40,7 +39,7 @@ def test_tab_gives_the_panels_room_to_the_picture(viewer: Driver) -> None:
 
 def test_before_is_the_photo_until_the_key_or_an_edit_ends_it(viewer: Driver) -> None:
     photo = viewer.image()
-    viewer.app.do(SetAperture(3.0), SetOptics("exposure_stops", 1.0), MoveEye(ViewOffset(0, 1)))
+    viewer.app.do(do(lens.set_aperture, 3.0), do(lens.set_exposure, 1.0), do(lens.move_eye, ViewOffset(0, 1)))
     viewer.until_idle()
     edited = viewer.image()
     viewer.send("key", "backslash")
@@ -58,10 +57,10 @@ def test_before_is_the_photo_until_the_key_or_an_edit_ends_it(viewer: Driver) ->
 
 
 def test_a_snapshot_is_compared_side_by_side(viewer: Driver) -> None:
-    viewer.app.do(SetAperture(2.0))
+    viewer.app.do(do(lens.set_aperture, 2.0))
     viewer.until_idle()
     before = viewer.image()
-    viewer.app.do(do(inspection.take_snapshot), SetOptics("exposure_stops", -0.5), do(inspection.compare, "snapshot"))
+    viewer.app.do(do(inspection.take_snapshot), do(lens.set_exposure, -0.5), do(inspection.compare, "snapshot"))
     viewer.until_idle()
     np.testing.assert_allclose(shown(viewer, "snapshot").astype(int), before, atol=2)
 

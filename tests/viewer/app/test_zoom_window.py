@@ -11,8 +11,9 @@ from iibr_core.formats.images.photo import read_photo
 from iibr_core.scenes.rect import Rect
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import NEAR, Driver, Opener
-from viewer.model.state.optics_actions import MoveEye, SetAperture
-from viewer.model.zoom import SetZoom, Zoom
+from viewer.model import lens, viewpoint
+from viewer.model.action import do
+from viewer.model.state.viewpoint import Zoom
 
 
 def until_sharp(viewer: Driver) -> np.ndarray:
@@ -51,7 +52,7 @@ def test_a_zoomed_picture_is_its_part_of_the_whole(viewer: Driver) -> None:
     """Twice as large, its middle is what the middle half of the whole shows."""
     whole = viewer.image().astype(int)
     fit = viewer.app.layout().fit
-    viewer.app.do(SetZoom(Zoom(2 * fit)))
+    viewer.app.do(do(viewpoint.set_zoom, Zoom(2 * fit)))
     viewer.until_idle()
     image, part = viewer.image().astype(int), part_of(viewer)
     height, width = image.shape[:2]
@@ -65,7 +66,7 @@ def test_a_zoomed_picture_is_its_part_of_the_whole(viewer: Driver) -> None:
 @pytest.mark.usefixtures("wide_window")
 def test_the_middle_button_pulls_the_picture(viewer: Driver) -> None:
     app = viewer.app
-    app.do(SetZoom(Zoom(3 * app.layout().fit)))
+    app.do(do(viewpoint.set_zoom, Zoom(3 * app.layout().fit)))
     viewer.until_idle()
     eye, frame = app.state.optics.eye, app.layout().frame
     assert frame is not None
@@ -85,7 +86,7 @@ def test_a_click_in_the_zoomed_picture_focuses_on_what_is_seen_there(viewer: Dri
     scene = app.state.scene
     assert scene is not None
     assert scene.plan is not None
-    app.do(SetZoom(Zoom(4 * app.layout().fit, (0.5, 0.5))))
+    app.do(do(viewpoint.set_zoom, Zoom(4 * app.layout().fit, (0.5, 0.5))))
     viewer.until_idle()
     frame = app.layout().frame
     assert frame is not None
@@ -99,18 +100,18 @@ def test_at_rest_the_photos_own_pixels_are_seen_until_anything_moves(open_window
     viewer = open_window(photo_path, grid=GridShape(3, 3), max_pixels=24 * 16)
     viewer.until_idle()
     app, photo = viewer.app, read_photo(photo_path).pixels * 255
-    app.do(SetZoom(Zoom(1.0)))
+    app.do(do(viewpoint.set_zoom, Zoom(1.0)))
     sharp = until_sharp(viewer)
     assert sharp.shape == photo.shape
     assert np.abs(sharp - photo).max() <= 1
     assert np.abs(viewer.image().astype(int) - photo).mean() > 3  # the views hold less
-    app.do(SetZoom(Zoom(2.0, (0.3, 0.6))))
+    app.do(do(viewpoint.set_zoom, Zoom(2.0, (0.3, 0.6))))
     viewer.until(lambda app: app.layout().scale == 2.0 and app.sharpener.pixels is not None)
-    app.do(MoveEye(ViewOffset(0.0, 0.5)))
+    app.do(do(lens.move_eye, ViewOffset(0.0, 0.5)))
     viewer.until(lambda app: app.sharpener.pixels is None)
     moved = until_sharp(viewer)
     assert np.abs(moved - viewer.image()).mean() < 12
-    app.do(SetZoom(None))
+    app.do(do(viewpoint.set_zoom, None))
     viewer.until(lambda app: app.sharpener.pixels is None)
 
 
@@ -118,7 +119,7 @@ def test_what_is_blurred_stays_so_where_it_is_sharpened(open_window: Opener, pho
     viewer = open_window(photo_path, grid=GridShape(3, 3), max_pixels=24 * 16)
     viewer.until_idle()
     for zoom in (Zoom(1.0), Zoom(2.0, (0.4, 0.5))):  # the second is made of what the first was
-        viewer.app.do(SetAperture(2.5), SetZoom(zoom))
+        viewer.app.do(do(lens.set_aperture, 2.5), do(viewpoint.set_zoom, zoom))
         viewer.until(lambda app: app.sharpener.pixels is None)
         sharp = until_sharp(viewer)
         assert np.abs(sharp - viewer.image()).mean() < 12
@@ -128,7 +129,7 @@ def test_a_photo_that_is_gone_is_said_and_the_views_are_seen_on(open_window: Ope
     viewer = open_window(photo_path, grid=GridShape(3, 3), max_pixels=24 * 16)
     viewer.until_idle()
     photo_path.unlink()
-    viewer.app.do(SetZoom(Zoom(1.0)))
+    viewer.app.do(do(viewpoint.set_zoom, Zoom(1.0)))
     viewer.until(lambda app: any("full detail" in notice.text for notice in app.state.notices))
     viewer.until_idle()
     assert viewer.app.sharpener.pixels is None

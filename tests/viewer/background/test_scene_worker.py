@@ -22,11 +22,12 @@ from iibr_core.types import GridShape, InputError, ViewUpdate
 from tests.iibr_core.scenes.test_light_fields import write_two_planes
 from viewer.background.job_threads import QUEUED_RESULTS, Failed, ProgressReport
 from viewer.background.scene_worker import PhotosFound, SceneResult, SceneWork, SceneWorker
+from viewer.model import lens
+from viewer.model.action import do
 from viewer.model.actions import OpenPath, ProgressMade, SceneOpened
-from viewer.model.lens.photographic_units import equivalent_f_number
 from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState
-from viewer.model.state.optics_actions import SetAperture
+from viewer.model.units import equivalent_f_number
 
 DEADLINE_S = 120.0
 VIEW = ViewUpdate(0, 0, np.zeros((1, 1, 3), np.uint8), None)
@@ -100,7 +101,7 @@ def test_depth_painted_beyond_its_range_is_no_other_lens(photo_path: Path) -> No
         ready = next(results_of(request, lambda: CENTRE))
         assert isinstance(ready, SceneReady)
         state, loaded = reduce(state, SceneOpened(count + 1, replace(ready.scene, source=source))), ready.loaded
-        state = state if count else reduce(state, SetAperture(1.0))
+        state = state if count else reduce(state, do(lens.set_aperture, 1.0))
         stops.append(equivalent_f_number(ready.scene, state.optics.aperture_diameter))
     assert ready.scene.found_span_px < 0.5 * np.ptp(ready.scene.disparity_range_px)
     assert stops == pytest.approx([stops[0]] * 3)

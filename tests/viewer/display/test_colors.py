@@ -16,7 +16,8 @@ from iibr_core.types import DISPLAY_P3, SRGB, ViewOffset
 from tests.iibr_core.formats.test_color_profile import converted, profile_bytes
 from viewer.app.image_export import export_picture, shot_of
 from viewer.display.offscreen import OffscreenScene
-from viewer.model.state.optics_actions import MoveEye, SetAperture
+from viewer.model import lens
+from viewer.model.action import do
 
 PATCHES = ((200, 80, 60), (255, 0, 0), (0, 255, 0), (20, 30, 250), (128, 128, 128), (255, 255, 255))
 IN_SRGB = converted(np.array([PATCHES], np.uint8), profile_bytes())[0].astype(float)
@@ -40,7 +41,7 @@ def middles(picture):
 def test_wide_colours_keep_their_numbers_and_are_shown_as_srgb(tmp_path, eye):
     with OffscreenScene() as viewer:
         viewer.open(photo_of_patches(tmp_path / "p3.png", icc_profile=profile_bytes()))
-        viewer.do(MoveEye(eye), SetAperture(2.0))
+        viewer.do(do(lens.move_eye, eye), do(lens.set_aperture, 2.0))
         assert viewer.state.scene.color_space == DISPLAY_P3
         assert np.abs(middles(viewer.picture()) - IN_SRGB).max() <= 2
         size = viewer.state.scene.size

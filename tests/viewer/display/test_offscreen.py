@@ -15,9 +15,10 @@ from iibr_core.types import GridShape, InputError, ViewOffset
 from tests.iibr_core.known_scenes import write_stanford, write_stereo_pair
 from tests.viewer.conftest import HEIGHT, WIDTH
 from viewer.display.offscreen import OffscreenScene
+from viewer.model import lens
+from viewer.model.action import do
 from viewer.model.actions import Action
 from viewer.model.layout import layout_of
-from viewer.model.state.optics_actions import MoveEye, ResetOptics, SetAperture, SetOptics
 
 
 @pytest.fixture
@@ -55,7 +56,7 @@ def test_pictures_are_letterboxed_and_upright(viewer: OffscreenScene) -> None:
 
 def test_panels_stand_beside_the_same_picture(viewer: OffscreenScene) -> None:
     size = (1000, 700)
-    viewer.do(MoveEye(ViewOffset(0.5, 1)), SetAperture(2))
+    viewer.do(do(lens.move_eye, ViewOffset(0.5, 1)), do(lens.set_aperture, 2))
     screen = viewer.screen(size)
     layout = layout_of(size, (WIDTH, HEIGHT))
     assert layout.frame_px is not None
@@ -72,9 +73,9 @@ def test_panels_stand_beside_the_same_picture(viewer: OffscreenScene) -> None:
 
 def test_reset_gives_the_first_picture_back(viewer: OffscreenScene) -> None:
     before = viewer.picture()
-    viewer.do(MoveEye(ViewOffset(1, 1)))
+    viewer.do(do(lens.move_eye, ViewOffset(1, 1)))
     assert np.abs(viewer.picture().astype(int) - before).max() > 8
-    viewer.do(ResetOptics())
+    viewer.do(do(lens.reset))
     np.testing.assert_array_equal(viewer.picture(), before)
 
 
@@ -95,7 +96,7 @@ def test_light_fields_of_other_layouts_open(tmp_path: Path, viewer: OffscreenSce
     stanford = write_stanford(tmp_path / "stanford", 3, 3)
     viewer.open(Source(str(stanford)))
     for eye, name in ((ViewOffset(0, 0), "out_01_01_-1.0_1.0"), (ViewOffset(-1, 1), "out_02_02_-2.0_2.0")):
-        viewer.do(MoveEye(eye))
+        viewer.do(do(lens.move_eye, eye))
         assert np.abs(viewer.picture() / 255 - read_photo(stanford / f"{name}.png").pixels).max() < 1.5 / 255
     viewer.open(Source(str(write_stereo_pair(tmp_path / "pair"))))
     assert viewer.state.scene is not None
@@ -108,12 +109,12 @@ def test_light_fields_of_other_layouts_open(tmp_path: Path, viewer: OffscreenSce
     ("actions", "views", "off"),
     [
         ((), 0, 0),
-        ((MoveEye(ViewOffset(0, 1)),), 1, 2),
-        ((MoveEye(ViewOffset(-1.5, 0.5)),), 4, 2),
-        ((MoveEye(ViewOffset(1, 1)), SetAperture(1.5)), 24, 0),
-        ((SetAperture(2.5),), 20, 1),
-        ((SetAperture(2.5), SetOptics("focus_range", 0.2)), 20, 1),
-        ((SetOptics("dolly", 0.3),), 24, 0),
+        ((do(lens.move_eye, ViewOffset(0, 1)),), 1, 2),
+        ((do(lens.move_eye, ViewOffset(-1.5, 0.5)),), 4, 2),
+        ((do(lens.move_eye, ViewOffset(1, 1)), do(lens.set_aperture, 1.5)), 24, 0),
+        ((do(lens.set_aperture, 2.5),), 20, 1),
+        ((do(lens.set_aperture, 2.5), do(lens.set_focus_range, 0.2)), 20, 1),
+        ((do(lens.set_dolly, 0.3),), 24, 0),
     ],
 )
 def test_only_the_views_that_a_picture_shows_are_made(

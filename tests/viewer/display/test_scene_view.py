@@ -17,8 +17,9 @@ from tests.viewer.conftest import headless_with_scene
 from viewer.display import scene_view
 from viewer.display.offscreen import OffscreenScene
 from viewer.display.scene_view import SceneView
+from viewer.model import lens
+from viewer.model.action import do
 from viewer.model.actions import Action
-from viewer.model.state.optics_actions import MoveEye, SetAperture
 
 SIZE = ScreenSize(384, 256)
 
@@ -30,7 +31,7 @@ def opened(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Offscree
     """
     monkeypatch.setattr(scene_view, "VIEW_REFRESH_S", 0.0)
     with headless_with_scene(tmp_path) as viewer:
-        viewer.do(SetAperture(3.0))
+        viewer.do(do(lens.set_aperture, 3.0))
         monkeypatch.setattr(type(viewer.gl), "frame_budget_s", 1e-9)
         viewer.view.converge(viewer.state, SIZE)
         yield viewer
@@ -77,14 +78,14 @@ def test_views_that_come_meanwhile_do_not_put_off_what_is_shown(opened: Offscree
 
 @pytest.mark.parametrize(
     ("lens", "draws"),
-    [((), False), ((MoveEye(ViewOffset(-0.5, 0.0)),), True), ((SetAperture(3.0),), True)],
+    [((), False), ((do(lens.move_eye, ViewOffset(-0.5, 0.0)),), True), ((do(lens.set_aperture, 3.0),), True)],
     ids=["one view", "between views", "a lens"],
 )
 def test_a_picture_that_is_one_view_is_not_drawn_for_others(
     opened: OffscreenScene, lens: tuple[Action, ...], draws: bool
 ) -> None:
     view = opened.view
-    opened.do(SetAperture(0.0), *lens)
+    opened.do(do(lens.set_aperture, 0.0), *lens)
     view.converge(opened.state, SIZE)
     pictures, shown, record = view.pictures_drawn, view.renderer.read_image(), view.picture_drawn
     a_view_comes(view)
@@ -99,7 +100,7 @@ def test_a_view_that_is_there_as_a_draft_is_drawn_again(opened: OffscreenScene) 
     view, at = opened.view, (0, 1)
     view._is_final[at] = False
     assert opened.state.scene is not None
-    opened.do(SetAperture(0.0), MoveEye(opened.state.scene.grid.offset(*at)))
+    opened.do(do(lens.set_aperture, 0.0), do(lens.move_eye, opened.state.scene.grid.offset(*at)))
     view.converge(opened.state, SIZE)
     pictures = view.pictures_drawn
     for _ in range(2):
@@ -135,7 +136,7 @@ def test_no_view_is_uploaded_in_a_turn_whose_time_is_over(opened: OffscreenScene
 
 def test_a_picture_of_one_view_drawn_in_a_hurry_becomes_whole_though_views_come(opened: OffscreenScene) -> None:
     view = opened.view
-    opened.do(SetAperture(0.0))
+    opened.do(do(lens.set_aperture, 0.0))
     view.draw(opened.state, SIZE)
     assert view.renderer.passes_shown == 0, "softer than it will be"
     a_view_comes(view)

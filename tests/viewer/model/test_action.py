@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from viewer.model.action import ask, do
-from viewer.model.reducers.history_reducer import undo, undoable
+from viewer.model.history import undo, undoable
 from viewer.model.state.app_state import AppState
 from viewer.model.state.saving import CopyTask
 

@@ -9,7 +9,7 @@ import OpenImageIO as oiio
 import pytest
 
 from iibr_core.types import InputError
-from viewer.model.lens.aperture_mask import LARGEST_SIDE, read_mask
+from viewer.model.aperture_mask import LARGEST_SIDE, read_mask
 
 
 def write(path: Path, pixels: np.ndarray, kind: str = "uint8") -> Path:

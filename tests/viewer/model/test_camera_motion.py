@@ -13,11 +13,11 @@ from hypothesis import strategies as st
 from iibr_core.exports.loops import LOOPS, LoopKind, point_on_loop
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.model.test_reducers import scene_of, state_with
-from viewer.model.reducers.camera_motion import HOME_S, LONGEST_STEP_S, ease
+from viewer.model import lens, viewpoint
+from viewer.model.action import do
 from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState
-from viewer.model.state.motion import PauseMotion, ReturnHome, SetLoop, SetSpeed, Tick
-from viewer.model.state.optics_actions import MoveEye, ResetOptics, SetOptics
+from viewer.model.viewpoint import HOME_S, MAX_STEP_S, ease
 from viewer.model.window_limits import SPEED_LIMITS
 
 grids = st.builds(GridShape, st.integers(1, 17), st.integers(1, 17))
@@ -27,7 +27,7 @@ def ticked(state: AppState, seconds: float, start: float = 100.0, step: float = 
     """The states while the clock runs."""
     states = []
     for i in range(round(seconds / step) + 1):
-        state = reduce(state, Tick(start + i * step))
+        state = reduce(state, do(viewpoint.tick, start + i * step))
         states.append(state)
     return states
 
@@ -54,8 +54,8 @@ def test_the_shapes_of_the_loops() -> None:
 
 @pytest.mark.parametrize("kind", LOOPS)
 def test_a_loop_begins_where_the_eye_is_and_goes_without_leaps(kind: LoopKind) -> None:
-    start = reduce(state_with(scene_of()), MoveEye(ViewOffset(2, -3)))
-    states = ticked(reduce(start, SetLoop(kind)), seconds=4)
+    start = reduce(state_with(scene_of()), do(lens.move_eye, ViewOffset(2, -3)))
+    states = ticked(reduce(start, do(viewpoint.set_loop, kind)), seconds=4)
     eyes = [state.optics.eye for state in states]
     assert eyes[0] == ViewOffset(2, -3)
     steps = [math.dist(a, b) for a, b in itertools.pairwise(eyes)]
@@ -64,8 +64,8 @@ def test_a_loop_begins_where_the_eye_is_and_goes_without_leaps(kind: LoopKind) -
 
 
 def test_the_glide_home_is_short_monotone_and_ends_exactly_there() -> None:
-    start = reduce(reduce(state_with(scene_of()), MoveEye(ViewOffset(2, -3))), SetOptics("dolly", 1.5))
-    states = ticked(reduce(start, ReturnHome()), HOME_S + 0.1)
+    start = reduce(reduce(state_with(scene_of()), do(lens.move_eye, ViewOffset(2, -3))), do(lens.set_dolly, 1.5))
+    states = ticked(reduce(start, do(viewpoint.return_home)), HOME_S + 0.1)
     distances = [math.hypot(*state.optics.eye) for state in states]
     assert distances[0] == math.hypot(2, 3)
     assert all(a >= b for a, b in itertools.pairwise(distances))
@@ -74,35 +74,38 @@ def test_the_glide_home_is_short_monotone_and_ends_exactly_there() -> None:
 
 
 def test_a_hiccup_is_no_leap() -> None:
-    state = reduce(reduce(state_with(scene_of()), SetLoop("circle")), Tick(0.0))
-    assert reduce(state, Tick(1000.0)).motion.turns <= LONGEST_STEP_S * state.motion.speed
-    assert reduce(state, Tick(-5.0)).motion.turns == 0, "a clock that goes back"
-    assert reduce(state, Tick(math.nan)) == state
+    state = reduce(reduce(state_with(scene_of()), do(viewpoint.set_loop, "circle")), do(viewpoint.tick, 0.0))
+    assert reduce(state, do(viewpoint.tick, 1000.0)).motion.turns <= MAX_STEP_S * state.motion.speed
+    assert reduce(state, do(viewpoint.tick, -5.0)).motion.turns == 0, "a clock that goes back"
+    assert reduce(state, do(viewpoint.tick, math.nan)) == state
 
 
 def test_pause_and_speed_leave_the_eye_where_it_is() -> None:
-    running = ticked(reduce(state_with(scene_of()), SetLoop("eight")), 1.0)[-1]
-    paused = reduce(running, PauseMotion(True))
+    running = ticked(reduce(state_with(scene_of()), do(viewpoint.set_loop, "eight")), 1.0)[-1]
+    paused = reduce(running, do(viewpoint.pause, True))
     assert ticked(paused, 1.0, start=500.0)[-1].optics == running.optics
-    again = ticked(reduce(paused, PauseMotion(False)), 0.0, start=900.0)[-1]
+    again = ticked(reduce(paused, do(viewpoint.pause, False)), 0.0, start=900.0)[-1]
     assert again.optics.eye == pytest.approx(running.optics.eye)
-    faster = reduce(running, SetSpeed(99.0))
+    faster = reduce(running, do(viewpoint.set_speed, 99.0))
     assert faster.motion.speed == SPEED_LIMITS[1]
     assert faster.motion.turns == running.motion.turns
-    assert reduce(running, SetSpeed(math.inf)) == running
+    assert reduce(running, do(viewpoint.set_speed, math.inf)) == running
 
 
-@pytest.mark.parametrize("action", [MoveEye(ViewOffset(1, 1)), SetOptics("dolly", 1.0), ResetOptics(), SetLoop(None)])
+@pytest.mark.parametrize(
+    "action",
+    [do(lens.move_eye, ViewOffset(1, 1)), do(lens.set_dolly, 1.0), do(lens.reset), do(viewpoint.set_loop, None)],
+)
 def test_a_hand_on_the_viewpoint_stops_the_motion_and_keeps_its_speed(action: object) -> None:
-    running = reduce(reduce(state_with(scene_of()), SetSpeed(0.5)), SetLoop("circle"))
+    running = reduce(reduce(state_with(scene_of()), do(viewpoint.set_speed, 0.5)), do(viewpoint.set_loop, "circle"))
     state = reduce(running, action)  # type: ignore[arg-type]
     assert not state.motion.is_running
     assert state.motion.speed == 0.5
 
 
 def test_nothing_moves_without_a_scene() -> None:
-    assert reduce(AppState(), SetLoop("circle")) == AppState()
-    assert reduce(replace(AppState()), Tick(1.0)) == AppState()
+    assert reduce(AppState(), do(viewpoint.set_loop, "circle")) == AppState()
+    assert reduce(replace(AppState()), do(viewpoint.tick, 1.0)) == AppState()
 
 
 def test_easing_is_flat_at_both_ends_and_clamped() -> None:

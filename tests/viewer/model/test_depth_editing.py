@@ -29,9 +29,9 @@ from tests.viewer.model.test_reducers import plan_of, scene_of, state_with
 from viewer.app.dropped_files import actions_from_drop
 from viewer.app.image_export import settings_of
 from viewer.app.pointer import Pointer, actions_from_pointer
-from viewer.model import saving
+from viewer.model import gesture, history, lens, saving
 from viewer.model.action import do
-from viewer.model.actions import EndGesture, OpenFailed, OpenPath, SceneOpened, Undo
+from viewer.model.actions import OpenFailed, OpenPath, SceneOpened
 from viewer.model.commands import action_for_path
 from viewer.model.layout import layout_of
 from viewer.model.reducers.depth_editing_reducer import (
@@ -50,7 +50,6 @@ from viewer.model.state.depth_editing import (
     SetRefine,
     SetTone,
 )
-from viewer.model.state.optics_actions import MoveEye, SetFocus
 from viewer.model.state.prompts import SavePrompt
 from viewer.ui.sections.depth_histogram import bar_heights, focus_share
 
@@ -87,7 +86,7 @@ def test_values_that_are_not_finite_change_nothing() -> None:
 
 
 def test_a_stroke_keeps_points_that_lie_apart() -> None:
-    drawn = after(opened(), Paint((0.1, 0.1)), Paint((0.101, 0.1)), Paint((0.3, 0.1)), EndGesture())
+    drawn = after(opened(), Paint((0.1, 0.1)), Paint((0.101, 0.1)), Paint((0.3, 0.1)), do(gesture.end_gesture))
     assert drawn.depth.edits.strokes == (Stroke("nearer", ((0.1, 0.1), (0.3, 0.1)), 0.06, Brush().strength),)
 
 
@@ -122,11 +121,11 @@ def test_another_photo_begins_with_its_own_depth_and_a_failed_one_gives_the_old_
 
 
 def test_the_same_scene_planned_anew_keeps_its_edits_and_its_history() -> None:
-    edited = after(opened(), SetTone(TONE, True), EndGesture())
+    edited = after(opened(), SetTone(TONE, True), do(gesture.end_gesture))
     assert edited.scene is not None
     state = reduce(edited, SceneOpened(edited.generation, replace(edited.scene, plan=plan_of(GRID, scale=0.5))))
     assert state.depth == edited.depth
-    assert reduce(state, Undo()).depth == DepthSettings()
+    assert reduce(state, do(history.undo)).depth == DepthSettings()
 
 
 def test_reset_takes_everything_back_at_once() -> None:
@@ -164,7 +163,9 @@ def pointer_at(share_x: float, share_y: float, **more: object) -> tuple[Pointer,
 def test_the_brush_paints_on_the_surface_seen_under_it() -> None:
     state = opened()
     assert state.scene is not None
-    state = reduce(replace(state, scene=replace(state.scene, width=96, height=64)), MoveEye(GRID.offset(0, 2)))
+    state = reduce(
+        replace(state, scene=replace(state.scene, width=96, height=64)), do(lens.move_eye, GRID.offset(0, 2))
+    )
     pointer, layout = pointer_at(0.5, 0.25, is_down=True, is_pressed=True)
     (paint,) = actions_from_pointer(pointer, layout, state, lambda x, y: 3.0)  # type: ignore[arg-type]
     assert isinstance(paint, Paint)
@@ -236,4 +237,4 @@ def test_the_histogram_turns_with_the_map_and_the_focus_stays_on_its_surface(pho
     assert (heights[0], max(heights), heights[-1] > 0) == (1.0, 1.0, True)
     state = replace(AppState(source=source), scene=scene)
     near = (NEAR - scene.plan.disparity_zero) * scene.plan.disparity_scale
-    assert focus_share(reduce(state, SetFocus(near)), scene, levels) == pytest.approx(1.0)
+    assert focus_share(reduce(state, do(lens.set_focus, near)), scene, levels) == pytest.approx(1.0)

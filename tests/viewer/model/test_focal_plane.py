@@ -12,8 +12,9 @@ from iibr_core.beyond.optics import Optics
 from iibr_core.scenes.rect import Rect
 from iibr_core.types import GridShape
 from tests.viewer.model.test_reducers import scene_of, state_with
-from viewer.model.actions import EndGesture, ShowTiltHandles
-from viewer.model.lens.focal_plane import (
+from viewer.model import gesture, lens
+from viewer.model.action import do
+from viewer.model.focal_plane import (
     CLOSEST_HANDLES,
     focus_on,
     handle_points,
@@ -22,8 +23,7 @@ from viewer.model.lens.focal_plane import (
     tilt_through,
 )
 from viewer.model.reducers.root import reduce
-from viewer.model.state.app_state import TiltHandles
-from viewer.model.state.optics_actions import FocusOn, MoveTiltHandle
+from viewer.model.state.lens import TiltHandles
 
 shares = st.floats(-1, 1)
 places = st.tuples(shares, shares)
@@ -64,25 +64,25 @@ def test_what_is_clicked_is_sharp_whatever_the_tilt(place: tuple[float, float], 
 
 
 def test_dragging_a_handle_is_one_action_a_step_and_lets_go_at_the_end() -> None:
-    state = reduce(state_with(scene_of()), ShowTiltHandles(True))
+    state = reduce(state_with(scene_of()), do(lens.show_tilt_handles, True))
     kept = TiltHandles().second
-    state = reduce(state, MoveTiltHandle(0, (-0.8, 0.6), 2.5))
+    state = reduce(state, do(lens.move_tilt_handle, 0, (-0.8, 0.6), 2.5))
     assert state.tilt_handles == TiltHandles((-0.8, 0.6), kept, taken=0)
     assert sharp_disparity(state.optics, (-0.8, 0.6)) == pytest.approx(2.5)
-    state = reduce(state, MoveTiltHandle(0, (-0.9, 5.0), None))
+    state = reduce(state, do(lens.move_tilt_handle, 0, (-0.9, 5.0), None))
     assert state.tilt_handles is not None
     assert state.tilt_handles.first == (-0.9, 1.0), "held within the picture"
-    state = reduce(state, EndGesture())
+    state = reduce(state, do(gesture.end_gesture))
     assert state.tilt_handles is not None
     assert state.tilt_handles.taken is None
     assert len(state.history.past) == 1
-    assert reduce(state, MoveTiltHandle(1, (math.nan, 0.0), 1.0)).optics == state.optics
+    assert reduce(state, do(lens.move_tilt_handle, 1, (math.nan, 0.0), 1.0)).optics == state.optics
 
 
 def test_a_click_on_a_tilted_plane_focuses_there() -> None:
-    state = reduce(state_with(scene_of()), ShowTiltHandles(True))
-    state = reduce(state, MoveTiltHandle(1, (0.5, -0.5), 1.0))
-    state = reduce(state, FocusOn((0.9, 0.9), 0.3))
+    state = reduce(state_with(scene_of()), do(lens.show_tilt_handles, True))
+    state = reduce(state, do(lens.move_tilt_handle, 1, (0.5, -0.5), 1.0))
+    state = reduce(state, do(lens.focus_on, (0.9, 0.9), 0.3))
     assert sharp_disparity(state.optics, (0.9, 0.9)) == pytest.approx(0.3)
 
 

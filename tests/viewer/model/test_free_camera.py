@@ -13,15 +13,13 @@ from iibr_core.scenes.screen_size import ScreenSize
 from tests.iibr_core.scenes import literal_plan, square_before_wall
 from tests.viewer.model.test_reducers import scene_of, state_with
 from viewer.app.keys import Keys, actions_from_keys
-from viewer.model import saving
+from viewer.model import lens, saving, viewpoint
 from viewer.model.action import do
 from viewer.model.actions import Action, OpenPath
-from viewer.model.free_camera import FORWARD_LIMITS, MAX_ASIDE, CameraProgress, FreeCamera, LeaveCamera, MoveCamera
 from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState
-from viewer.model.state.motion import ReturnHome
-from viewer.model.state.optics_actions import MoveEye, ResetOptics, SetAperture, SetFocus
 from viewer.model.state.prompts import SavePrompt
+from viewer.model.state.viewpoint import FORWARD_LIMITS, MAX_ASIDE, FreeCamera
 
 
 def opened() -> AppState:
@@ -30,70 +28,72 @@ def opened() -> AppState:
 
 
 def test_it_moves_from_where_it_is() -> None:
-    state = reduce(reduce(opened(), MoveCamera(forward=0.1)), MoveCamera(0.2, -0.1, 0.1))
+    state = reduce(reduce(opened(), do(viewpoint.move_camera, forward=0.1)), do(viewpoint.move_camera, 0.2, -0.1, 0.1))
     assert state.free_camera == FreeCamera(0.2, -0.1, 0.2)
 
 
 def test_before_a_photo_is_open_there_is_nothing_to_look_around_in() -> None:
-    assert reduce(AppState(), MoveCamera(0.1)).free_camera is None
+    assert reduce(AppState(), do(viewpoint.move_camera, 0.1)).free_camera is None
 
 
 @pytest.mark.parametrize(
     ("step", "end"),
     [
-        (MoveCamera(forward=0.05), FreeCamera(forward=FORWARD_LIMITS[1])),
-        (MoveCamera(forward=-0.05), FreeCamera(forward=FORWARD_LIMITS[0])),
-        (MoveCamera(right=-0.05, down=0.05), FreeCamera(right=-MAX_ASIDE, down=MAX_ASIDE)),
-        (MoveCamera(1e300, -1e300, 1e300), FreeCamera(MAX_ASIDE, -MAX_ASIDE, FORWARD_LIMITS[1])),
+        ((0.0, 0.0, 0.05), FreeCamera(forward=FORWARD_LIMITS[1])),
+        ((0.0, 0.0, -0.05), FreeCamera(forward=FORWARD_LIMITS[0])),
+        ((-0.05, 0.05, 0.0), FreeCamera(right=-MAX_ASIDE, down=MAX_ASIDE)),
+        ((1e300, -1e300, 1e300), FreeCamera(MAX_ASIDE, -MAX_ASIDE, FORWARD_LIMITS[1])),
     ],
 )
-def test_steps_lead_to_the_limits_and_back(step: MoveCamera, end: FreeCamera) -> None:
+def test_steps_lead_to_the_limits_and_back(step: tuple[float, float, float], end: FreeCamera) -> None:
     state = opened()
     for _ in range(40):
-        state = reduce(state, step)
+        state = viewpoint.move_camera(state, *step)
     assert state.free_camera == end
     assert end.is_at_end
-    back = reduce(state, MoveCamera(-step.right / 2, -step.down / 2, -step.forward / 2)).free_camera
+    back = viewpoint.move_camera(state, *(-part / 2 for part in step)).free_camera
     assert back is not None
     assert back != end
 
 
 @pytest.mark.parametrize("value", [math.inf, math.nan])
 def test_numbers_that_are_not_finite_move_nothing(value: float) -> None:
-    assert reduce(opened(), MoveCamera(value, 0.1, 0.1)).free_camera == FreeCamera()
+    assert reduce(opened(), do(viewpoint.move_camera, value, 0.1, 0.1)).free_camera is None
 
 
 def test_a_light_field_from_disk_cannot_be_looked_around_in() -> None:
     state = opened()
     assert state.scene is not None
-    told = reduce(replace(state, scene=replace(state.scene, plan=None)), MoveCamera(forward=0.1))
+    told = reduce(replace(state, scene=replace(state.scene, plan=None)), do(viewpoint.move_camera, forward=0.1))
     assert told.free_camera is None
-    assert "open a photo" in told.notices[-1].text
+    assert "needs a photo" in told.notices[-1].text
 
 
-@pytest.mark.parametrize("action", [LeaveCamera(), ResetOptics(), ReturnHome(), OpenPath(Source("b.png"))])
+@pytest.mark.parametrize(
+    "action", [do(viewpoint.leave_camera), do(lens.reset), do(viewpoint.return_home), OpenPath(Source("b.png"))]
+)
 def test_what_goes_back_to_the_views(action: Action) -> None:
-    state = reduce(opened(), MoveCamera(forward=0.1))
+    state = reduce(opened(), do(viewpoint.move_camera, forward=0.1))
     assert state.free_camera is not None
     assert reduce(state, action).free_camera is None
 
 
-@pytest.mark.parametrize("action", [MoveEye(CENTRE), SetAperture(2.0), SetFocus(0.5)])
+@pytest.mark.parametrize("action", [do(lens.move_eye, CENTRE), do(lens.set_aperture, 2.0), do(lens.set_focus, 0.5)])
 def test_it_looks_through_the_same_lens(action: Action) -> None:
-    state = reduce(reduce(opened(), MoveCamera(forward=0.1)), action)
+    state = reduce(reduce(opened(), do(viewpoint.move_camera, forward=0.1)), action)
     assert state.free_camera == FreeCamera(forward=0.1)
     assert state.optics == reduce(opened(), action).optics
 
 
 def test_esc_goes_back_to_the_views() -> None:
-    state = reduce(opened(), MoveCamera(forward=0.1))
-    assert actions_from_keys(Keys(is_escape=True), state) == [LeaveCamera()]
+    state = reduce(opened(), do(viewpoint.move_camera, forward=0.1))
+    assert actions_from_keys(Keys(is_escape=True), state) == [do(viewpoint.leave_camera)]
 
 
 def test_how_far_it_is_lasts_until_it_is_there() -> None:
-    state = reduce(opened(), CameraProgress(0.25))
+    state = reduce(opened(), do(viewpoint.report_camera, 0.25))
     assert state.free_progress == 0.25
-    assert reduce(state, CameraProgress(None)).free_progress is None
+    assert reduce(state, do(viewpoint.report_camera, None)).free_progress is None
 
 
 def test_its_picture_is_saved_at_the_size_of_the_views() -> None:

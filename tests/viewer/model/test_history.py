@@ -10,36 +10,17 @@ from iibr_core.beyond.optics import Optics
 from iibr_core.scenes.scene import Source
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.model.test_reducers import plan_of, scene_of, state_with
-from viewer.model.actions import (
-    Action,
-    EndGesture,
-    OpenPath,
-    Redo,
-    SceneOpened,
-    SetDepthStrength,
-    ShowTiltHandles,
-    Undo,
-)
-from viewer.model.reducers.history_reducer import EDITS_KEPT
+from viewer.model import gesture, history, lens, viewpoint
+from viewer.model.action import do
+from viewer.model.actions import Action, OpenPath, SceneOpened
+from viewer.model.history import MAX_EDITS
 from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState
-from viewer.model.state.motion import ReturnHome, SetLoop, Tick
-from viewer.model.state.optics_actions import (
-    ApplyPreset,
-    FocusOn,
-    MoveEye,
-    ResetOptics,
-    SetAperture,
-    SetFocus,
-    SetOptics,
-)
 
 values = st.floats(0, 3)
 edits = st.one_of(
-    st.builds(SetFocus, values),
-    st.builds(SetAperture, values),
-    st.builds(SetOptics, st.just("exposure_stops"), values),
-    st.builds(lambda t, s: MoveEye(ViewOffset(t, s)), values, values),
+    st.builds(do, st.sampled_from((lens.set_focus, lens.set_aperture, lens.set_exposure)), values),
+    st.builds(lambda t, s: do(lens.move_eye, ViewOffset(t, s)), values, values),
 )
 
 
@@ -54,131 +35,173 @@ def test_undoing_everything_and_doing_it_again_comes_back_to_the_same(wanted: li
     start = state_with(scene_of())
     state, seen = start, [start.optics]
     for edit in wanted:
-        state = after(state, edit, EndGesture())
+        state = after(state, edit, do(gesture.end_gesture))
         if state.optics != seen[-1]:
             seen.append(state.optics)
     back = state
     for optics in reversed(seen[:-1]):
-        back = reduce(back, Undo())
+        back = reduce(back, do(history.undo))
         assert back.optics == optics
-    assert reduce(back, Undo()).optics == start.optics
+    assert reduce(back, do(history.undo)).optics == start.optics
     for optics in seen[1:]:
-        back = reduce(back, Redo())
+        back = reduce(back, do(history.redo))
         assert back.optics == optics
-    assert reduce(back, Redo()).optics == state.optics
+    assert reduce(back, do(history.redo)).optics == state.optics
     for optics in reversed(seen[:-1]):
-        back = reduce(back, Undo())
+        back = reduce(back, do(history.undo))
         assert back.optics == optics, "what was done again is undone again"
 
 
 def test_a_drag_is_one_edit() -> None:
-    start = reduce(state_with(scene_of()), SetAperture(1))
-    state = after(start, EndGesture(), *(MoveEye(ViewOffset(0, 0.1 * i)) for i in range(1, 20)), EndGesture())
+    start = reduce(state_with(scene_of()), do(lens.set_aperture, 1))
+    state = after(
+        start,
+        do(gesture.end_gesture),
+        *(do(lens.move_eye, ViewOffset(0, 0.1 * i)) for i in range(1, 20)),
+        do(gesture.end_gesture),
+    )
     assert len(state.history.past) == 2
-    assert reduce(state, Undo()).optics == start.optics
+    assert reduce(state, do(history.undo)).optics == start.optics
 
 
 def test_two_drags_are_two_edits_and_another_kind_is_always_another() -> None:
-    state = after(state_with(scene_of()), MoveEye(ViewOffset(0, 1)), EndGesture(), MoveEye(ViewOffset(0, 2)))
-    assert reduce(state, Undo()).optics.eye == ViewOffset(0, 1)
-    state = after(state, SetFocus(1), MoveEye(ViewOffset(0, 3)))
-    assert reduce(state, Undo()).optics.eye == ViewOffset(0, 2)
+    state = after(
+        state_with(scene_of()),
+        do(lens.move_eye, ViewOffset(0, 1)),
+        do(gesture.end_gesture),
+        do(lens.move_eye, ViewOffset(0, 2)),
+    )
+    assert reduce(state, do(history.undo)).optics.eye == ViewOffset(0, 1)
+    state = after(state, do(lens.set_focus, 1), do(lens.move_eye, ViewOffset(0, 3)))
+    assert reduce(state, do(history.undo)).optics.eye == ViewOffset(0, 2)
 
 
 def test_an_edit_after_undo_forgets_what_was_undone() -> None:
-    state = after(state_with(scene_of()), SetFocus(1), Undo(), SetAperture(2))
-    assert reduce(state, Redo()) == state
+    state = after(state_with(scene_of()), do(lens.set_focus, 1), do(history.undo), do(lens.set_aperture, 2))
+    assert reduce(state, do(history.redo)) == state
 
 
 def test_the_history_is_bounded() -> None:
     state = state_with(scene_of())
-    for i in range(EDITS_KEPT + 10):
-        state = after(state, SetFocus(0.001 * i), EndGesture())
-    assert len(state.history.past) == EDITS_KEPT
+    for i in range(MAX_EDITS + 10):
+        state = after(state, do(lens.set_focus, 0.001 * i), do(gesture.end_gesture))
+    assert len(state.history.past) == MAX_EDITS
 
 
 def test_a_double_click_takes_back_the_focus_its_first_click_set() -> None:
-    start = after(state_with(scene_of()), SetFocus(1), EndGesture(), MoveEye(ViewOffset(1, 2)), EndGesture())
-    click = FocusOn((0.0, 0.0), -1.0)
-    clicked = after(start, click, EndGesture())
+    start = after(
+        state_with(scene_of()),
+        do(lens.set_focus, 1),
+        do(gesture.end_gesture),
+        do(lens.move_eye, ViewOffset(1, 2)),
+        do(gesture.end_gesture),
+    )
+    click = do(lens.focus_on, (0.0, 0.0), -1.0)
+    clicked = after(start, click, do(gesture.end_gesture))
     assert clicked.optics.focus_disparity == -1
-    state = after(clicked, ReturnHome(takes_back_click=True), Tick(0.0), *(Tick(0.05 * i) for i in range(1, 20)))
+    state = after(
+        clicked,
+        do(viewpoint.return_home, takes_back_click=True),
+        do(viewpoint.tick, 0.0),
+        *(do(viewpoint.tick, 0.05 * i) for i in range(1, 20)),
+    )
     assert state.optics.eye == ViewOffset(0, 0)
     assert state.optics.focus_disparity == 1
     assert not state.motion.is_running
-    undone = reduce(state, Undo())
+    undone = reduce(state, do(history.undo))
     assert undone.optics == start.optics
 
 
 def test_a_double_click_on_what_is_sharp_already_keeps_an_earlier_click() -> None:
-    click = FocusOn((0.0, 0.0), -1.0)
-    state = after(state_with(scene_of()), click, EndGesture(), click, EndGesture(), ReturnHome(True))
+    click = do(lens.focus_on, (0.0, 0.0), -1.0)
+    state = after(
+        state_with(scene_of()),
+        click,
+        do(gesture.end_gesture),
+        click,
+        do(gesture.end_gesture),
+        do(viewpoint.return_home, True),
+    )
     assert state.optics.focus_disparity == -1
 
 
 def test_going_home_by_its_key_keeps_what_was_clicked_before() -> None:
-    clicked = after(state_with(scene_of()), FocusOn((0.0, 0.0), -1.0), EndGesture())
-    home = after(clicked, ReturnHome())
+    clicked = after(state_with(scene_of()), do(lens.focus_on, (0.0, 0.0), -1.0), do(gesture.end_gesture))
+    home = after(clicked, do(viewpoint.return_home))
     assert home.optics.focus_disparity == -1
-    assert after(home, Undo(), Undo()).optics.focus_disparity == 0
+    assert after(home, do(history.undo), do(history.undo)).optics.focus_disparity == 0
 
 
 def test_reset_takes_all_of_the_lens_back_in_one_step() -> None:
     edits = (
-        SetFocus(1.0),
-        SetAperture(2.0),
-        SetOptics("focus_range", 0.2),
-        ShowTiltHandles(True),
-        SetOptics("focus_tilt", (0.5, -0.25)),
+        do(lens.set_focus, 1.0),
+        do(lens.set_aperture, 2.0),
+        do(lens.set_focus_range, 0.2),
+        do(lens.show_tilt_handles, True),
+        do(lens.set_focus_tilt, (0.5, -0.25)),
     )
-    state = after(state_with(scene_of()), *(action for edit in edits for action in (edit, EndGesture())))
-    reset = after(state, ResetOptics())
+    state = after(state_with(scene_of()), *(action for edit in edits for action in (edit, do(gesture.end_gesture))))
+    reset = after(state, do(lens.reset))
     assert reset.optics == Optics()
     assert reset.tilt_handles is None
-    assert after(reset, Undo()).optics == state.optics
+    assert after(reset, do(history.undo)).optics == state.optics
 
 
 def test_a_preset_without_tilt_has_no_handles() -> None:
     state = after(
-        state_with(scene_of()), ShowTiltHandles(True), SetOptics("focus_tilt", (0.5, 0.0)), ApplyPreset("macro")
+        state_with(scene_of()),
+        do(lens.show_tilt_handles, True),
+        do(lens.set_focus_tilt, (0.5, 0.0)),
+        do(lens.apply_preset, "macro"),
     )
     assert state.optics.focus_tilt == (0.0, 0.0)
     assert state.tilt_handles is None
 
 
 def test_undo_after_a_loop_returns_to_where_it_began() -> None:
-    start = reduce(state_with(scene_of()), MoveEye(ViewOffset(1, 1)))
-    state = after(start, SetLoop("circle"), *(Tick(0.1 * i) for i in range(30)))
+    start = reduce(state_with(scene_of()), do(lens.move_eye, ViewOffset(1, 1)))
+    state = after(start, do(viewpoint.set_loop, "circle"), *(do(viewpoint.tick, 0.1 * i) for i in range(30)))
     assert state.optics.eye != start.optics.eye
-    state = reduce(state, Undo())
+    state = reduce(state, do(history.undo))
     assert state.optics == start.optics
     assert not state.motion.is_running
 
 
 def test_undoing_depth_strength_makes_the_field_anew() -> None:
-    state = after(state_with(scene_of()), SetDepthStrength(2, False), SetDepthStrength(3, True), EndGesture())
+    state = after(
+        state_with(scene_of()),
+        do(lens.set_depth_strength, 2, False),
+        do(lens.set_depth_strength, 3, True),
+        do(gesture.end_gesture),
+    )
     assert len(state.history.past) == 1
-    undone = reduce(state, Undo())
+    undone = reduce(state, do(history.undo))
     assert undone.depth_strength == 1
     assert undone.generation == state.generation + 1
-    redone = reduce(undone, Redo())
+    redone = reduce(undone, do(history.redo))
     assert (redone.depth_strength, redone.generation) == (3, undone.generation + 1)
 
 
 def test_edits_before_another_plan_are_undone_in_its_units() -> None:
     old, new = plan_of(GridShape(9, 9), scale=0.5), plan_of(GridShape(9, 9), scale=1.0)
-    state = after(state_with(scene_of(plan=old)), SetFocus(1.0), EndGesture(), SetFocus(0.25), EndGesture())
-    state = after(state, SetDepthStrength(2.0, True), EndGesture())
+    state = after(
+        state_with(scene_of(plan=old)),
+        do(lens.set_focus, 1.0),
+        do(gesture.end_gesture),
+        do(lens.set_focus, 0.25),
+        do(gesture.end_gesture),
+    )
+    state = after(state, do(lens.set_depth_strength, 2.0, True), do(gesture.end_gesture))
     state = reduce(state, SceneOpened(state.generation, scene_of(plan=new)))
     assert state.optics.focus_disparity == pytest.approx(0.5)
-    state = reduce(state, Undo())
+    state = reduce(state, do(history.undo))
     state = reduce(state, SceneOpened(state.generation, scene_of(plan=old)))
     assert state.optics.focus_disparity == pytest.approx(0.25)
-    assert reduce(state, Undo()).optics.focus_disparity == pytest.approx(1.0)
+    assert reduce(state, do(history.undo)).optics.focus_disparity == pytest.approx(1.0)
 
 
 def test_another_file_begins_a_new_history() -> None:
-    state = after(state_with(scene_of()), SetFocus(1), OpenPath(Source("b.png")))
+    state = after(state_with(scene_of()), do(lens.set_focus, 1), OpenPath(Source("b.png")))
     assert state.history.past
     state = reduce(state, SceneOpened(state.generation, scene_of(source=state.source)))
     assert state.history.past == ()

@@ -12,8 +12,9 @@ from iibr_core.method.plan import ScenePlan
 from iibr_core.scenes.rect import Rect
 from iibr_core.scenes.scene import Scene, Source
 from iibr_core.types import GridShape, ViewOffset
-from viewer.model import inspection
-from viewer.model.actions import EndGesture, SceneOpened
+from viewer.model import gesture, inspection
+from viewer.model.action import do
+from viewer.model.actions import SceneOpened
 from viewer.model.colormap import VIRIDIS, map_color
 from viewer.model.commands import BY_NAME, OVERLAY_WORDS
 from viewer.model.inspection import beside_of, sheet_cells, view_at, view_near
@@ -51,7 +52,7 @@ def test_opacity_and_divider_are_held_within_the_picture() -> None:
     held = inspection.move_divider(OPEN, 5)
     assert 0.9 < held.inspection.divider < 1
     assert held.inspection.divider_taken
-    assert not reduce(held, EndGesture()).inspection.divider_taken
+    assert not reduce(held, do(gesture.end_gesture)).inspection.divider_taken
 
 
 @pytest.mark.parametrize("kind", ["entropy", "inpainted"])

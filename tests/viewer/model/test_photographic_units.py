@@ -12,7 +12,8 @@ from iibr_core.scenes.lens_limits import focus_limits
 from iibr_core.scenes.scene import Scene
 from iibr_core.types import GridShape
 from tests.viewer.model.test_reducers import plan_of, scene_of
-from viewer.model.lens.photographic_units import (
+from viewer.model.state.app_state import Hover
+from viewer.model.units import (
     ASSUMED_DISTANCE_M,
     disparity_at,
     disparity_at_percent,
@@ -25,7 +26,6 @@ from viewer.model.lens.photographic_units import (
     metres_text,
     relative_distance,
 )
-from viewer.model.state.app_state import Hover
 from viewer.ui.overlays.reticle import hover_text
 
 FOCAL_PX, STEP_M = 1000.0, 0.01

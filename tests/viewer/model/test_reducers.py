@@ -28,35 +28,17 @@ from iibr_core.scenes.lens_limits import (
 )
 from iibr_core.scenes.scene import Progress, Scene, Source
 from iibr_core.types import GridShape, ViewOffset
-from viewer.model import inspection, messages, saving
-from viewer.model.action import do
-from viewer.model.actions import (
-    OpenFailed,
-    OpenPath,
-    ProgressMade,
-    SceneOpened,
-    SetDepthStrength,
-    StopWork,
-    TakeSettings,
-    Undo,
-)
-from viewer.model.lens.presets import PRESETS
+from viewer.model import history, inspection, lens, messages, saving
+from viewer.model.action import Action, do
+from viewer.model.actions import OpenFailed, OpenPath, ProgressMade, SceneOpened, StopWork, TakeSettings
+from viewer.model.carried_optics import carry_optics
 from viewer.model.messages import MAX_NOTICES
-from viewer.model.reducers.lens_reducer import carry_optics
 from viewer.model.reducers.root import reduce
 from viewer.model.remedies import DEPTH_COMMANDS
 from viewer.model.state.app_state import AppState, Hover, Picture
 from viewer.model.state.jobs import JobProgress
+from viewer.model.state.lens import PRESETS
 from viewer.model.state.notices import Notice
-from viewer.model.state.optics_actions import (
-    ApplyPreset,
-    FocusOn,
-    MoveEye,
-    ResetOptics,
-    SetAperture,
-    SetFocus,
-    SetOptics,
-)
 from viewer.model.state.preferences import SetPreference
 from viewer.model.state.saving import SavedSettings
 from viewer.model.window_limits import DEPTH_STRENGTH_LIMIT
@@ -82,7 +64,7 @@ def state_with(scene: Scene | None) -> AppState:
 @given(grids, floats, floats)
 def test_the_eye_stays_within_the_grid_and_a_margin(grid: GridShape, t: float, s: float) -> None:
     before = state_with(scene_of(grid))
-    eye = reduce(before, MoveEye(ViewOffset(t, s))).optics.eye
+    eye = reduce(before, do(lens.move_eye, ViewOffset(t, s))).optics.eye
     if not (math.isfinite(t) and math.isfinite(s)):
         assert eye == before.optics.eye
         return
@@ -96,7 +78,7 @@ def test_the_eye_stays_within_the_grid_and_a_margin(grid: GridShape, t: float, s
 @given(grids, floats)
 def test_the_aperture_lies_between_pinhole_and_grid(grid: GridShape, diameter: float) -> None:
     widest = max(grid) if max(grid) > 1 else 0
-    result = reduce(state_with(scene_of(grid)), SetAperture(diameter)).optics.aperture_diameter
+    result = reduce(state_with(scene_of(grid)), do(lens.set_aperture, diameter)).optics.aperture_diameter
     assert 0 <= result <= widest
     if 0 <= diameter <= widest:
         assert result == diameter
@@ -106,7 +88,11 @@ def test_the_aperture_lies_between_pinhole_and_grid(grid: GridShape, diameter: f
 def test_focus_exposure_and_depth_stay_finite_and_in_range(value: float) -> None:
     scene = scene_of()
     state = state_with(scene)
-    for action in (SetFocus(value), SetOptics("exposure_stops", value), SetDepthStrength(value, is_finished=False)):
+    for action in (
+        do(lens.set_focus, value),
+        do(lens.set_exposure, value),
+        do(lens.set_depth_strength, value, is_finished=False),
+    ):
         state = reduce(state, action)
     low, high = focus_limits(scene)
     assert low <= state.optics.focus_disparity <= high
@@ -126,12 +112,12 @@ def test_every_optic_stays_finite_and_within_its_limits(
     scene = scene_of(grid)
     state = state_with(scene)
     edits = (
-        SetOptics("dolly", dolly),
-        SetOptics("focus_range", spread),
-        SetOptics("focus_tilt", tilt),
-        SetOptics("aperture_shape", shape),
+        do(lens.set_dolly, dolly),
+        do(lens.set_focus_range, spread),
+        do(lens.set_focus_tilt, tilt),
+        do(lens.set_aperture_shape, shape),
     )
-    for action in (*edits, SetOptics("highlight_recovery", highlights)):
+    for action in (*edits, do(lens.set_highlights, highlights)):
         state = reduce(state, action)
     optics, span = state.optics, focus_span(scene)
     assert is_finite(optics)
@@ -149,9 +135,9 @@ def test_every_optic_stays_finite_and_within_its_limits(
 
 def test_a_mask_is_kept_while_another_shape_is_tried() -> None:
     mask = ApertureMask("star.png", 2, 2, bytes([255, 0, 0, 255]))
-    state = reduce(state_with(scene_of()), SetOptics("aperture_shape", ApertureShape("mask", mask=mask)))
+    state = reduce(state_with(scene_of()), do(lens.set_aperture_shape, ApertureShape("mask", mask=mask)))
     assert state.optics.aperture_shape.kind == "mask"
-    state = reduce(state, SetOptics("aperture_shape", replace(state.optics.aperture_shape, kind="ring")))
+    state = reduce(state, do(lens.set_aperture_shape, replace(state.optics.aperture_shape, kind="ring")))
     assert state.optics.aperture_shape.mask == mask
 
 
@@ -159,23 +145,23 @@ def test_a_mask_is_kept_while_another_shape_is_tried() -> None:
 def test_presets_keep_viewpoint_and_light_and_can_be_taken_back(name: str) -> None:
     before = state_with(scene_of(subject_disparity_px=1.5))
     for action in (
-        MoveEye(ViewOffset(1, 2)),
-        SetOptics("dolly", 1),
-        SetOptics("exposure_stops", 1),
-        SetOptics("focus_tilt", (1, 1)),
-        SetAperture(2),
+        do(lens.move_eye, ViewOffset(1, 2)),
+        do(lens.set_dolly, 1),
+        do(lens.set_exposure, 1),
+        do(lens.set_focus_tilt, (1, 1)),
+        do(lens.set_aperture, 2),
     ):
         before = reduce(before, action)
-    after = reduce(before, ApplyPreset(name))  # type: ignore[arg-type]
+    after = reduce(before, do(lens.apply_preset, name))  # type: ignore[arg-type]
     kept = [(o.eye, o.dolly, o.exposure_stops) for o in (before.optics, after.optics)]
     assert kept[0] == kept[1]
     assert after.optics.focus_tilt == (0, 0)
-    assert reduce(after, Undo()).optics == before.optics
+    assert reduce(after, do(history.undo)).optics == before.optics
 
 
 def test_what_the_presets_are_for() -> None:
     state = state_with(scene_of(subject_disparity_px=1.5))
-    portrait, macro, sharp = (reduce(state, ApplyPreset(name)).optics for name in PRESETS)
+    portrait, macro, sharp = (reduce(state, do(lens.apply_preset, name)).optics for name in PRESETS)
     assert portrait.focus_disparity == 1.5
     assert portrait.focus_range > 0
     assert macro.focus_disparity == 3.0, "the nearest"
@@ -184,27 +170,27 @@ def test_what_the_presets_are_for() -> None:
 
 
 def test_a_portrait_keeps_what_the_user_made_sharp_and_lets_the_light_be() -> None:
-    state = reduce(state_with(scene_of(subject_disparity_px=1.5)), SetOptics("highlight_recovery", 0.2))
-    chosen = reduce(reduce(state, FocusOn((0.1, -0.2), 2.5)), ApplyPreset("portrait")).optics
+    state = reduce(state_with(scene_of(subject_disparity_px=1.5)), do(lens.set_highlights, 0.2))
+    chosen = reduce(reduce(state, do(lens.focus_on, (0.1, -0.2), 2.5)), do(lens.apply_preset, "portrait")).optics
     assert chosen.focus_disparity == 2.5
     assert chosen.highlight_recovery == 0.2
-    reset = reduce(reduce(state, FocusOn((0.1, -0.2), 2.5)), ResetOptics())
-    assert reduce(reset, ApplyPreset("portrait")).optics.focus_disparity == 1.5
+    reset = reduce(reduce(state, do(lens.focus_on, (0.1, -0.2), 2.5)), do(lens.reset))
+    assert reduce(reset, do(lens.apply_preset, "portrait")).optics.focus_disparity == 1.5
 
 
-@pytest.mark.parametrize("action", [FocusOn((0.0, 0.0), 1.0), SetFocus(1.0)])
-def test_the_first_focusing_opens_the_aperture(action: FocusOn | SetFocus) -> None:
+@pytest.mark.parametrize("action", [do(lens.focus_on, (0.0, 0.0), 1.0), do(lens.set_focus, 1.0)])
+def test_the_first_focusing_opens_the_aperture(action: Action) -> None:
     """Through a pinhole everything is sharp: a click would seem to do nothing."""
     first = reduce(state_with(scene_of()), action)
     assert 0 < first.optics.aperture_diameter < aperture_limit(GridShape(9, 9))
-    assert reduce(first, Undo()).optics == Optics()
+    assert reduce(first, do(history.undo)).optics == Optics()
 
 
 def test_focusing_leaves_an_aperture_alone_that_the_user_chose() -> None:
-    for chosen in (SetAperture(0), SetAperture(2), ApplyPreset("everything sharp")):
+    for chosen in (do(lens.set_aperture, 0), do(lens.set_aperture, 2), do(lens.apply_preset, "everything sharp")):
         before = reduce(state_with(scene_of()), chosen)
-        assert reduce(before, SetFocus(1.0)).optics.aperture_diameter == before.optics.aperture_diameter
-    one_view = reduce(state_with(scene_of(GridShape(1, 1))), SetFocus(1.0))
+        assert reduce(before, do(lens.set_focus, 1.0)).optics.aperture_diameter == before.optics.aperture_diameter
+    one_view = reduce(state_with(scene_of(GridShape(1, 1))), do(lens.set_focus, 1.0))
     assert (one_view.optics.aperture_diameter, one_view.notices) == (0, ())
 
 
@@ -245,7 +231,7 @@ def test_settings_of_another_picture_are_made_to_fit_and_can_be_taken_back() -> 
     after = reduce(offered, TakeSettings(saved))
     assert after.optics == Optics(eye=ViewOffset(2, 2), aperture_diameter=5, focus_disparity=1)
     assert after.notices == ()
-    assert reduce(after, Undo()).optics == state.optics
+    assert reduce(after, do(history.undo)).optics == state.optics
     wider = replace(saved, view_width=2 * state.scene.width)
     assert reduce(offered, TakeSettings(wider)).optics == replace(after.optics, focus_disparity=0.5)
     broken = replace(saved, optics=replace(optics, dolly=math.nan))
@@ -290,13 +276,13 @@ def test_a_sketch_opens_the_photo_and_the_whole_photo_goes_on_with_it() -> None:
     sketch = scene_of(source=SOURCE, is_sketch=True)
     state = reduce(state_with(None), SceneOpened(1, sketch))
     assert state.progress.doing.startswith("reading")
-    state = reduce(replace(state, source=SOURCE), FocusOn((0.0, 0.0), 1.0))
+    state = reduce(replace(state, source=SOURCE), do(lens.focus_on, (0.0, 0.0), 1.0))
     whole = reduce(
         state, SceneOpened(1, scene_of(source=SOURCE, notes=("A map is damaged.",), problems=("A map is damaged.",)))
     )
     assert whole.notices == (*state.notices, Notice("A map is damaged."))
     assert whole.history.past == state.history.past != ()
-    assert whole.has_chosen_focus
+    assert whole.chosen_focus is not None
     stopped = reduce(state, StopWork())
     assert stopped.stopped == 1
     assert stopped.scene is sketch
@@ -317,16 +303,16 @@ def test_focus_can_be_set_in_a_flat_scene() -> None:
 @pytest.mark.parametrize(
     "action",
     [
-        MoveEye(ViewOffset(1, 1)),
-        SetFocus(1),
-        SetAperture(1),
-        SetOptics("dolly", 1),
-        SetOptics("focus_tilt", (1, 1)),
-        FocusOn((0, 0), 1),
-        ApplyPreset("macro"),
-        ResetOptics(),
+        do(lens.move_eye, ViewOffset(1, 1)),
+        do(lens.set_focus, 1),
+        do(lens.set_aperture, 1),
+        do(lens.set_dolly, 1),
+        do(lens.set_focus_tilt, (1, 1)),
+        do(lens.focus_on, (0, 0), 1),
+        do(lens.apply_preset, "macro"),
+        do(lens.reset),
         StopWork(),
-        Undo(),
+        do(history.undo),
     ],
 )
 def test_optics_do_not_change_before_a_scene_is_open(action: object) -> None:
@@ -335,35 +321,40 @@ def test_optics_do_not_change_before_a_scene_is_open(action: object) -> None:
 
 def test_reset_brings_the_first_optics_back() -> None:
     state = state_with(scene_of())
-    for action in (MoveEye(ViewOffset(1, 2)), SetFocus(1), SetAperture(3), SetOptics("exposure_stops", 1)):
+    for action in (
+        do(lens.move_eye, ViewOffset(1, 2)),
+        do(lens.set_focus, 1),
+        do(lens.set_aperture, 3),
+        do(lens.set_exposure, 1),
+    ):
         state = reduce(state, action)
     assert state.optics == Optics(eye=ViewOffset(1, 2), focus_disparity=1, aperture_diameter=3, exposure_stops=1)
-    assert reduce(state, ResetOptics()).optics == Optics()
+    assert reduce(state, do(lens.reset)).optics == Optics()
 
 
 @pytest.mark.parametrize(
     ("action", "draws", "restarts"),
     [
-        (MoveEye(ViewOffset(0.0, 1.0)), True, False),
-        (SetFocus(1.0), True, False),
-        (SetAperture(2.0), True, False),
-        (SetOptics("exposure_stops", 1.0), True, False),
-        (SetOptics("dolly", 1.0), True, False),
-        (SetOptics("focus_range", 0.5), True, False),
-        (SetOptics("focus_tilt", (0.5, 0.0)), True, False),
-        (SetOptics("aperture_shape", ApertureShape("polygon")), True, False),
-        (SetOptics("highlight_recovery", 0.5), True, False),
-        (FocusOn((0.0, 0.0), 1.0), True, False),
-        (ApplyPreset("macro"), True, False),
+        (do(lens.move_eye, ViewOffset(0.0, 1.0)), True, False),
+        (do(lens.set_focus, 1.0), True, False),
+        (do(lens.set_aperture, 2.0), True, False),
+        (do(lens.set_exposure, 1.0), True, False),
+        (do(lens.set_dolly, 1.0), True, False),
+        (do(lens.set_focus_range, 0.5), True, False),
+        (do(lens.set_focus_tilt, (0.5, 0.0)), True, False),
+        (do(lens.set_aperture_shape, ApertureShape("polygon")), True, False),
+        (do(lens.set_highlights, 0.5), True, False),
+        (do(lens.focus_on, (0.0, 0.0), 1.0), True, False),
+        (do(lens.apply_preset, "macro"), True, False),
         (do(inspection.set_hover, Hover(3.0, 4.0, 1.0)), False, False),
         (SetPreference("theme", "light"), False, False),
         (StopWork(), False, False),
-        (Undo(), False, False),
-        (SetOptics("focus_tilt", (math.inf, 0.0)), False, False),
-        (SetFocus(0.0), False, False),
-        (MoveEye(ViewOffset(math.nan, 0.0)), False, False),
-        (SetDepthStrength(2.0, is_finished=False), False, False),
-        (SetDepthStrength(2.0, is_finished=True), False, True),
+        (do(history.undo), False, False),
+        (do(lens.set_focus_tilt, (math.inf, 0.0)), False, False),
+        (do(lens.set_focus, 0.0), False, False),
+        (do(lens.move_eye, ViewOffset(math.nan, 0.0)), False, False),
+        (do(lens.set_depth_strength, 2.0, is_finished=False), False, False),
+        (do(lens.set_depth_strength, 2.0, is_finished=True), False, True),
         (OpenPath(Source("other.png")), False, True),
         (ProgressMade(1, Progress(3, 81, 0.1)), False, False),
         (do(messages.notify, Notice("hello")), False, False),
@@ -387,7 +378,7 @@ def test_opening_shows_what_is_read_and_keeps_the_old_scene_until_then() -> None
 
 
 def test_a_new_scene_starts_with_fresh_optics_and_names_only_what_failed() -> None:
-    state = reduce(reduce(state_with(scene_of()), SetAperture(2)), OpenPath(Source("other.png")))
+    state = reduce(reduce(state_with(scene_of()), do(lens.set_aperture, 2)), OpenPath(Source("other.png")))
     notes = ("Made smaller.", "A map is damaged.")
     origin = DepthOrigin("rough", "rough, guessed without a model")
     scene = scene_of(source=state.source, notes=notes, problems=notes[1:], depth_origin=origin)
@@ -397,7 +388,7 @@ def test_a_new_scene_starts_with_fresh_optics_and_names_only_what_failed() -> No
 
 
 def test_the_same_file_opened_again_is_a_new_scene() -> None:
-    state = reduce(reduce(state_with(scene_of()), SetAperture(2)), OpenPath(replace(SOURCE)))
+    state = reduce(reduce(state_with(scene_of()), do(lens.set_aperture, 2)), OpenPath(replace(SOURCE)))
     state = reduce(state, SceneOpened(state.generation, scene_of(source=state.source)))
     assert state.optics == Optics()
 
@@ -408,13 +399,13 @@ def test_another_depth_strength_keeps_the_surface_in_focus_and_the_place_in_the_
     state = state_with(scene_of(GridShape(5, 5), plan=old))
     given = 13.0  # the surface in focus, in the disparity file's units
     for action in (
-        MoveEye(ViewOffset(1, -2)),
-        SetFocus((given - 10.0) * 0.5),
-        SetAperture(2.0),
-        SetOptics("exposure_stops", 1.0),
+        do(lens.move_eye, ViewOffset(1, -2)),
+        do(lens.set_focus, (given - 10.0) * 0.5),
+        do(lens.set_aperture, 2.0),
+        do(lens.set_exposure, 1.0),
     ):
         state = reduce(state, action)
-    state = reduce(state, SetDepthStrength(1.5, is_finished=True))
+    state = reduce(state, do(lens.set_depth_strength, 1.5, is_finished=True))
     optics = reduce(state, SceneOpened(state.generation, scene_of(GridShape(9, 9), plan=new))).optics
     assert optics.focus_disparity == pytest.approx((given - 12.0) * 0.25)
     assert optics.eye == ViewOffset(2, -4)
@@ -431,7 +422,7 @@ def test_a_step_between_two_views_is_the_whole_grid_and_of_one_view_it_is_one(vi
 def test_depth_strength_of_zero_and_back_gives_finite_optics() -> None:
     flat, deep = plan_of(GridShape(1, 1), scale=0.0), plan_of(GridShape(9, 9), scale=0.5)
     state = state_with(scene_of(GridShape(9, 9), plan=deep))
-    for action in (MoveEye(ViewOffset(4, 4)), SetFocus(1), SetAperture(9)):
+    for action in (do(lens.move_eye, ViewOffset(4, 4)), do(lens.set_focus, 1), do(lens.set_aperture, 9)):
         state = reduce(state, action)
     for plan in (flat, deep):
         state = reduce(state, SceneOpened(1, scene_of(plan.grid, plan=plan)))

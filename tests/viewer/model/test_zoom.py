@@ -10,11 +10,13 @@ from iibr_core.scenes.rect import WHOLE
 from iibr_core.scenes.scene import Scene, Source
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape
+from viewer.model import viewpoint
+from viewer.model.action import do
 from viewer.model.actions import OpenPath, SceneOpened
-from viewer.model.layout import Beside, Layout, layout_of, pixel_at
+from viewer.model.layout import MAX_ZOOM, Beside, Layout, layout_of, pixel_at
 from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState
-from viewer.model.zoom import MOST_ZOOM, SetZoom, Zoom
+from viewer.model.state.viewpoint import Zoom
 
 WINDOW, SIZE, OWN_WIDTH = ScreenSize(1280, 800), ScreenSize(600, 400), 4800
 SCENE = Scene(Source("photo.png"), "photo", 600, 400, GridShape(9, 9), (-2.0, 3.0), "photo.pfm")
@@ -82,7 +84,7 @@ def test_the_wheel_ends_at_the_whole_picture_and_at_the_largest() -> None:
     assert layout.zoomed(-3.0, 400, 300) is None
     nearest = layout.zoomed(100.0, 400, 300)
     assert nearest is not None
-    assert nearest.scale == MOST_ZOOM
+    assert nearest.scale == MAX_ZOOM
     assert laid_out(nearest).zoomed(-100.0, 400, 300) is None
 
 
@@ -95,7 +97,7 @@ def test_a_photo_smaller_than_the_window_is_seen_at_its_own_pixels_in_the_middle
     assert layout.zoomed(100.0, 400, 300) is None  # the wheel stops where it fits
     nearest = layout_of(WINDOW, ScreenSize(60, 40)).zoomed(100.0, 400, 300)
     assert nearest is not None
-    assert nearest.scale == MOST_ZOOM * layout.fit
+    assert nearest.scale == MAX_ZOOM * layout.fit
 
 
 def test_the_picture_follows_the_hand_as_far_as_it_goes() -> None:
@@ -122,22 +124,22 @@ def test_the_small_picture_moves_the_large_one() -> None:
 
 @pytest.mark.parametrize("zoom", [Zoom(float("nan")), Zoom(1.0, (float("inf"), 0.5)), Zoom(float("inf"))])
 def test_a_zoom_that_is_no_number_shows_the_whole_picture(zoom: Zoom) -> None:
-    assert reduce(STATE, SetZoom(zoom)).zoom is None
+    assert reduce(STATE, do(viewpoint.set_zoom, zoom)).zoom is None
 
 
 @pytest.mark.parametrize("zoom", [Zoom(-3.0), Zoom(0.0, (-7.0, 9.0)), Zoom(1e30, (0.2, 0.2))])
 def test_absurd_zooms_still_show_something(zoom: Zoom) -> None:
-    frame_px = laid_out(reduce(STATE, SetZoom(zoom)).zoom).frame_px
+    frame_px = laid_out(reduce(STATE, do(viewpoint.set_zoom, zoom)).zoom).frame_px
     assert frame_px is not None
     assert min(frame_px.size) >= 1
     assert max(frame_px.size) <= max(WINDOW)
 
 
 def test_another_photo_is_seen_whole_and_the_same_one_as_before() -> None:
-    zoomed = reduce(STATE, SetZoom(Zoom(1.0)))
+    zoomed = reduce(STATE, do(viewpoint.set_zoom, Zoom(1.0)))
     assert reduce(zoomed, SceneOpened(zoomed.generation, replace(SCENE))).zoom == Zoom(1.0)
     asked = reduce(zoomed, OpenPath(Source("other.png")))
     assert asked.source is not None
     other = replace(SCENE, source=asked.source)
     assert reduce(asked, SceneOpened(asked.generation, other)).zoom is None
-    assert reduce(AppState(), SetZoom(Zoom(1.0))).zoom is None
+    assert reduce(AppState(), do(viewpoint.set_zoom, Zoom(1.0))).zoom is None

@@ -12,7 +12,7 @@ from iibr_core.scenes.rect import Rect
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import HEIGHT, WIDTH, headless_with_scene
 from viewer.display.offscreen import OffscreenScene
-from viewer.model import inspection, messages
+from viewer.model import inspection, lens, messages
 from viewer.model.action import do
 from viewer.model.actions import Action
 from viewer.model.inspection import beside_of, sheet_cells
@@ -20,7 +20,6 @@ from viewer.model.layout import PANEL_WIDTH, Layout, layout_of
 from viewer.model.state.app_state import Hover
 from viewer.model.state.inspection import OVERLAYS, OverlayKind
 from viewer.model.state.notices import Notice
-from viewer.model.state.optics_actions import MoveEye
 from viewer.model.state.preferences import SetPreference, Theme, ToggleSection
 
 SIZE = 640, 1000
@@ -94,13 +93,13 @@ def test_epis_lie_beside_the_picture_and_go_through_the_pointer(viewer: Offscree
 
 def test_the_middle_of_the_epi_moves_with_the_eye(viewer: OffscreenScene) -> None:
     viewer.do(do(inspection.show_epis, True))
-    changed = changed_after(viewer, MoveEye(ViewOffset(0, 1)))
+    changed = changed_after(viewer, do(lens.move_eye, ViewOffset(0, 1)))
     assert part(changed, layout_now(viewer).strip_across).sum() > ENOUGH_PIXELS
 
 
 @pytest.mark.parametrize("kind", OVERLAYS)
 def test_overlays_cover_the_picture_as_much_as_they_are_opaque(viewer: OffscreenScene, kind: OverlayKind) -> None:
-    viewer.do(MoveEye(ViewOffset(0, 1)))
+    viewer.do(do(lens.move_eye, ViewOffset(0, 1)))
     picture = layout_now(viewer).picture
     plain = part(viewer.screen(SIZE), picture).astype(int)
     viewer.do(do(inspection.set_overlay, kind), do(inspection.set_opacity, 0.0))
@@ -123,11 +122,11 @@ def test_the_legend_marks_the_value_under_the_pointer(viewer: OffscreenScene) ->
 
 
 def test_photo_and_result_on_the_two_sides_of_the_divider(viewer: OffscreenScene) -> None:
-    viewer.do(MoveEye(ViewOffset(0, 1)))
+    viewer.do(do(lens.move_eye, ViewOffset(0, 1)))
     result = part(viewer.screen(SIZE), layout_now(viewer).picture).astype(int)
     viewer.do(do(inspection.compare, "photo"), do(inspection.move_divider, 0.5))
     compared = part(viewer.screen(SIZE), layout_now(viewer).picture).astype(int)
-    viewer.do(do(inspection.compare, None), MoveEye(ViewOffset(0, 0)))
+    viewer.do(do(inspection.compare, None), do(lens.move_eye, ViewOffset(0, 0)))
     photo = part(viewer.screen(SIZE), layout_now(viewer).picture).astype(int)
     half = compared.shape[1] // 2
     left, right = np.s_[60:, : half - 20], np.s_[60:, half + 20 :]
@@ -142,7 +141,7 @@ def test_the_sheet_shows_every_view_and_marks_the_present_one(viewer: OffscreenS
     assert layout.picture is not None
     for cell in sheet_cells(layout.picture, GRID):
         assert part(screen, cell).std() > 5
-    changed = changed_after(viewer, MoveEye(ViewOffset(-1, -1)))
+    changed = changed_after(viewer, do(lens.move_eye, ViewOffset(-1, -1)))
     frames = [part(changed, cell).sum() for cell in sheet_cells(layout.picture, GRID)]
     assert sorted(np.flatnonzero(frames)) == [0, 4]
 
@@ -161,7 +160,7 @@ def test_the_status_line_is_not_covered_by_notices(viewer: OffscreenScene) -> No
 
 def test_what_the_photo_does_not_show_is_told_as_inpainted(viewer: OffscreenScene) -> None:
     """Beside the square, in the middle row, from an eye that looks behind it."""
-    viewer.do(do(inspection.show_values, True), MoveEye(ViewOffset(0, 1)))
+    viewer.do(do(inspection.show_values, True), do(lens.move_eye, ViewOffset(0, 1)))
     origins = set()
     for x in range(0, WIDTH, 2):
         disparity = viewer.pick(x, HEIGHT / 2)

@@ -20,14 +20,13 @@ from tests.viewer.conftest import headless_with_scene
 from tests.viewer.ui.watched_widgets import watch_widgets
 from viewer.background.model_downloader import list_models
 from viewer.display.offscreen import OffscreenScene
-from viewer.model import messages
+from viewer.model import lens, messages
 from viewer.model.action import do
 from viewer.model.layout import PANEL_WIDTH
 from viewer.model.state.app_state import AppState
 from viewer.model.state.exporting import ExportPrompt
 from viewer.model.state.jobs import JobProgress
 from viewer.model.state.model_download import ModelsPrompt
-from viewer.model.state.optics_actions import SetAperture, SetOptics
 from viewer.model.state.preferences import SECTIONS, SetPreference, Theme, Units
 from viewer.model.state.prompts import PalettePrompt, PathPrompt, Prompt, SavePrompt
 from viewer.ui.overlays.export_prompt import MOTION_TIPS
@@ -90,13 +89,13 @@ def opened(tmp_path_factory: pytest.TempPathFactory) -> Iterator[OffscreenScene]
 def test_no_widget_is_cut_and_none_lies_over_another(
     viewer: OffscreenScene, items: list[Item], scale: float, units: Units
 ) -> None:
-    lens = (SetAperture(2.3), SetOptics("focus_range", 0.7), SetOptics("focus_tilt", (0.3, -0.2)))
+    optics = (do(lens.set_aperture, 2.3), do(lens.set_focus_range, 0.7), do(lens.set_focus_tilt, (0.3, -0.2)))
     kind = APERTURE_KINDS[SCALES.index(scale) % (len(APERTURE_KINDS) - 1)]
     viewer.do(
         SetPreference("font_scale", scale),
         SetPreference("units", units),
-        SetOptics("aperture_shape", ApertureShape(kind)),
-        *lens,
+        do(lens.set_aperture_shape, ApertureShape(kind)),
+        *optics,
     )
     left = 120  # room for a small picture: it is not what is looked at
     right = left + PANEL_WIDTH * scale

@@ -18,23 +18,14 @@ from iibr_core.beyond.optics import (
 from iibr_core.scenes.scene import Progress, Source
 from tests.viewer.conftest import headless_with_scene
 from viewer.display.offscreen import OffscreenScene
-from viewer.model import inspection, messages, saving
+from viewer.model import inspection, lens, messages, saving, viewpoint
 from viewer.model.action import do
-from viewer.model.actions import (
-    Action,
-    OpenFailed,
-    OpenPath,
-    ProgressMade,
-    SetState,
-    ShowTiltHandles,
-)
+from viewer.model.actions import Action, OpenFailed, OpenPath, ProgressMade, SetState
 from viewer.model.layout import PANEL_WIDTH, layout_of
 from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState, DrawReport, Hover
 from viewer.model.state.jobs import WRITING, JobProgress
-from viewer.model.state.motion import SetLoop
 from viewer.model.state.notices import Notice
-from viewer.model.state.optics_actions import SetAperture, SetOptics
 from viewer.model.state.preferences import SECTIONS, Section, SetPreference, ToggleSection, with_sections
 from viewer.model.state.prompts import PalettePrompt, PathPrompt
 from viewer.model.state.saving import SavedSettings
@@ -86,7 +77,7 @@ def test_every_section_opens_and_closes(viewer: OffscreenScene, section: Section
         do(
             saving.set_jobs, (JobProgress(1, "picture", "large.png", "drawing", 0.4), JobProgress(2, "export", "a.mp4"))
         ),
-        ShowTiltHandles(True),
+        do(lens.show_tilt_handles, True),
         do(inspection.set_hover, Hover(48.0, 32.0, 1.5)),
     ],
     ids=lambda action: type(action).__name__,
@@ -102,16 +93,16 @@ def test_what_lies_over_the_picture_is_seen_and_stays_beside_the_panel(viewer: O
 def test_each_aperture_shape_shows_its_own_controls(viewer: OffscreenScene, kind: ApertureKind) -> None:
     mask = ApertureMask("star.png", 2, 2, bytes([255, 0, 0, 255])) if kind == "mask" else None
     other: ApertureKind = "ring" if kind == "disc" else "disc"
-    viewer.do(SetOptics("aperture_shape", ApertureShape(other)))
-    changed = changed_after(viewer, SetOptics("aperture_shape", ApertureShape(kind, mask=mask)))
+    viewer.do(do(lens.set_aperture_shape, ApertureShape(other)))
+    changed = changed_after(viewer, do(lens.set_aperture_shape, ApertureShape(kind, mask=mask)))
     assert in_panel(changed).sum() > 10 * ENOUGH_PIXELS
 
 
 @pytest.mark.parametrize(
     "action",
     [
-        SetLoop("eight"),
-        SetAperture(2.0),
+        do(viewpoint.set_loop, "eight"),
+        do(lens.set_aperture, 2.0),
         ProgressMade(1, Progress(4, 9, 0.3)),
         SetState("report", DrawReport(3, 9, 12.0)),
     ],

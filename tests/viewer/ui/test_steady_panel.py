@@ -13,29 +13,28 @@ from iibr_core.beyond.optics import APERTURE_KINDS, ApertureMask, ApertureShape
 from iibr_core.scenes.screen_size import ScreenSize
 from tests.viewer.conftest import headless_with_scene
 from viewer.display.offscreen import OffscreenScene
-from viewer.model import inspection
+from viewer.model import inspection, lens, viewpoint
 from viewer.model.action import do
-from viewer.model.actions import Action, ShowTiltHandles
+from viewer.model.actions import Action
 from viewer.model.state.depth_editing import Brush, DepthSample, PickDepth, SetBrush
-from viewer.model.state.motion import SetLoop
-from viewer.model.state.optics_actions import FIRST_GLOSS, GlossBrush, SetGlossBrush, SetOptics
+from viewer.model.state.lens import FIRST_GLOSS, GlossBrush
 from viewer.model.state.preferences import SECTIONS
 
 MASK = ApertureMask("star.png", 1, 1, b"\xff")
-GLOSSY = SetOptics("gloss", FIRST_GLOSS)
+GLOSSY = do(lens.set_gloss, FIRST_GLOSS)
 TALL = ScreenSize(900, 2600)
 SWITCHES: dict[str, tuple[Action, ...]] = {
-    "loop": (SetLoop("circle"),),
-    "tilt": (ShowTiltHandles(True),),
-    **{kind: (SetOptics("aperture_shape", ApertureShape(kind, mask=MASK)),) for kind in APERTURE_KINDS},
+    "loop": (do(viewpoint.set_loop, "circle"),),
+    "tilt": (do(lens.show_tilt_handles, True),),
+    **{kind: (do(lens.set_aperture_shape, ApertureShape(kind, mask=MASK)),) for kind in APERTURE_KINDS},
     "gloss": (GLOSSY,),
     "gloss of strokes": (
-        SetOptics("gloss", replace(FIRST_GLOSS, surface=replace(FIRST_GLOSS.surface, strokes_only=True))),
+        do(lens.set_gloss, replace(FIRST_GLOSS, surface=replace(FIRST_GLOSS.surface, strokes_only=True))),
     ),
     "gloss of a colour": (
-        SetOptics("gloss", replace(FIRST_GLOSS, surface=replace(FIRST_GLOSS.surface, color=(1, 0, 0)))),
+        do(lens.set_gloss, replace(FIRST_GLOSS, surface=replace(FIRST_GLOSS.surface, color=(1, 0, 0)))),
     ),
-    "gloss brush": (GLOSSY, SetGlossBrush(GlossBrush(is_on=True))),
+    "gloss brush": (GLOSSY, do(lens.take_gloss_brush, GlossBrush(is_on=True))),
     "brush": (SetBrush(Brush("nearer", is_on=True)),),
     "bucket": (SetBrush(Brush("fill", is_on=True)), PickDepth(DepthSample((0.5, 0.5), 1.0))),
     "EPIs": (do(inspection.show_epis, True),),

@@ -16,8 +16,8 @@ from iibr_core.depth.editing.edits import (
 )
 from iibr_core.scenes.lens_limits import clamp
 from iibr_core.scenes.scene import DepthSettings
+from viewer.model.history import record_edit
 from viewer.model.messages import notify
-from viewer.model.reducers.history_reducer import record_edit
 from viewer.model.state.app_state import AppState
 from viewer.model.state.depth_editing import (
     Brush,

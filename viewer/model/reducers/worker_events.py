@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import PurePath
 
@@ -10,18 +11,18 @@ from iibr_core.scenes.lens_limits import clamp_optics, focus_limits
 from iibr_core.scenes.scene import DepthSettings, Progress, Scene
 from iibr_core.types import InputError
 from viewer.model.actions import OpenFailed, ProgressMade, SamePlaces, SceneOpened, WorkerEvent
+from viewer.model.carried_optics import carry_optics, carry_to_depth, with_focus_of
+from viewer.model.history import map_optics
 from viewer.model.messages import MAX_NOTICES, notify
 from viewer.model.reducers.folder_reducer import is_stepped_to
-from viewer.model.reducers.history_reducer import map_optics
-from viewer.model.reducers.lens_reducer import carry_optics, carry_to_depth, with_focus_of
 from viewer.model.remedies import DEPTH_COMMANDS
 from viewer.model.state.app_state import AppState
 from viewer.model.state.folder import ListFolderTask
 from viewer.model.state.history import History
 from viewer.model.state.model_download import ListModelsTask
-from viewer.model.state.motion import Motion
 from viewer.model.state.notices import Notice
 from viewer.model.state.photo_facts import ReadFactsTask
+from viewer.model.state.viewpoint import Motion
 
 RECENT_KEPT = 8
 
@@ -78,6 +79,7 @@ def _open_scene(state: AppState, scene: Scene, same_places: SamePlaces | None) -
         views_there=frozenset({scene.grid.centre}),
         shown_generation=state.generation,
         optics=carried(state.optics),
+        chosen_focus=_carried_focus(state, carried),
         history=map_optics(state.history, carried),
         inspection=replace(state.inspection, probe=None),
     )
@@ -108,10 +110,17 @@ def _open_scene(state: AppState, scene: Scene, same_places: SamePlaces | None) -
         depth=depth,
         stroke=None,
         brush=replace(state.brush, sample=None),
-        has_chosen_focus=False,
+        chosen_focus=None,
         has_chosen_aperture=False,
         focused_at=None,
     )
+
+
+def _carried_focus(state: AppState, carried: Callable[[Optics], Optics]) -> float | None:
+    """Return the chosen focus in the disparity of the new scene."""
+    if state.chosen_focus is None:
+        return None
+    return carried(replace(state.optics, focus_disparity=state.chosen_focus, focus_tilt=(0.0, 0.0))).focus_disparity
 
 
 def _with_steady_focus(state: AppState, old: Scene, scene: Scene) -> Scene:
@@ -121,7 +130,7 @@ def _with_steady_focus(state: AppState, old: Scene, scene: Scene) -> Scene:
     (low, high), (least, most) = scene.disparity_range_px, focus_limits(old)
     if old.has_view_disparity and least <= low <= high <= most:
         return replace(scene, disparity_range_px=old.disparity_range_px)
-    if not state.has_chosen_focus:
+    if state.chosen_focus is None:
         return scene
     focus = state.optics.focus_disparity
     return replace(scene, disparity_range_px=(min(low, focus), max(high, focus)))
@@ -130,10 +139,12 @@ def _with_steady_focus(state: AppState, old: Scene, scene: Scene) -> Scene:
 def _with_left_focus(state: AppState) -> AppState:
     """With the depth that the photo was left with, and the focus, unless the user chose another meanwhile."""
     left = state.models.left_focus
-    if left is None or state.has_chosen_focus or state.scene is None:
+    if left is None or state.chosen_focus is not None or state.scene is None:
         return state
     optics = clamp_optics(with_focus_of(state.optics, left), state.scene)
-    return replace(state, optics=optics, has_chosen_focus=True, models=replace(state.models, left_focus=None))
+    return replace(
+        state, optics=optics, chosen_focus=optics.focus_disparity, models=replace(state.models, left_focus=None)
+    )
 
 
 def _progress_of(state: AppState, scene: Scene) -> Progress:

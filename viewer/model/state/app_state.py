@@ -12,21 +12,19 @@ from iibr_core.depth.editing.edits import Stroke
 from iibr_core.scenes.rect import WHOLE, Rect
 from iibr_core.scenes.scene import AS_FOUND, DepthSettings, Progress, Scene, Source
 from iibr_core.scenes.screen_size import ScreenSize
-from viewer.model.free_camera import FreeCamera
 from viewer.model.state.depth_editing import Brush
 from viewer.model.state.folder import PhotoFolder
 from viewer.model.state.history import History
 from viewer.model.state.inspection import Inspection
 from viewer.model.state.jobs import JobProgress
+from viewer.model.state.lens import GlossBrush, TiltHandles
 from viewer.model.state.model_download import DepthModels
-from viewer.model.state.motion import Motion
 from viewer.model.state.notices import Notice
-from viewer.model.state.optics_actions import GlossBrush
 from viewer.model.state.photo_facts import NO_FACTS, PhotoFacts
 from viewer.model.state.preferences import Preferences
 from viewer.model.state.prompts import Prompt
 from viewer.model.state.tasks import Task
-from viewer.model.zoom import Zoom
+from viewer.model.state.viewpoint import FreeCamera, Motion, Zoom
 
 
 @dataclass(frozen=True)
@@ -36,18 +34,6 @@ class Hover:
     x_px: float
     y_px: float
     disparity: float | None
-
-
-@dataclass(frozen=True)
-class TiltHandles:
-    """Two places that the sharp plane is laid through, (x, y) from -1 to 1 across the picture, y down.
-
-    taken: which of them is being dragged.
-    """
-
-    first: tuple[float, float] = (-0.5, 0.4)
-    second: tuple[float, float] = (0.5, -0.4)
-    taken: int | None = None
 
 
 @dataclass(frozen=True)
@@ -109,7 +95,7 @@ class AppState:
     jobs: tuple[JobProgress, ...] = ()
     quits_when_done: bool = False
     models: DepthModels = field(default_factory=DepthModels)
-    has_chosen_focus: bool = False
+    chosen_focus: float | None = None
     has_chosen_aperture: bool = False
     focused_at: tuple[float, float] | None = None
     has_dialogs: bool = False

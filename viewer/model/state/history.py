@@ -1,4 +1,4 @@
-"""What undo and redo go through. `viewer.model.reducers.history_reducer` says how."""
+"""Records of undo and redo."""
 
 from __future__ import annotations
 

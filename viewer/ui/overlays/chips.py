@@ -7,9 +7,10 @@ from __future__ import annotations
 from imgui_bundle import icons_fontawesome_6 as icons
 from imgui_bundle import imgui
 
+from viewer.model import viewpoint
+from viewer.model.action import do
 from viewer.model.actions import Action
 from viewer.model.commands import toggle_panel
-from viewer.model.free_camera import LeaveCamera
 from viewer.model.layout import Layout
 from viewer.model.state.app_state import AppState
 from viewer.model.state.model_download import ShowOffer
@@ -40,7 +41,7 @@ def chips(state: AppState, layout: Layout) -> list[Action]:
         if imgui.calc_text_size(words).x + 6 * GAP * layout.ui_scale > frame.width:
             words = SHORT
         if _chip(CHIP, f"{icons.ICON_FA_VIDEO}  {words}###leave", layout, is_right=True):
-            actions.append(LeaveCamera())
+            actions.append(do(viewpoint.leave_camera))
     elif scene.is_guessed and imgui.calc_text_size(BADGE).x + 4 * GAP * layout.ui_scale <= frame.width:
         actions += [ShowOffer(True)] if _chip(BADGE, BADGE, layout, GUESS_TIP) else []
     return actions

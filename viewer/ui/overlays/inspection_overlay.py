@@ -10,9 +10,9 @@ from iibr_core.types import ViewOffset
 from viewer.model.colormap import VIRIDIS, map_color
 from viewer.model.inspection import InspectionTextures, sheet_cells, view_near
 from viewer.model.layout import Layout
-from viewer.model.lens.photographic_units import metres, metres_text
 from viewer.model.state.app_state import AppState, Hover
 from viewer.model.state.inspection import Comparison, Probe
+from viewer.model.units import metres, metres_text
 from viewer.ui.overlays.reticle import WORD_GAP, hover_text
 from viewer.ui.style import DARK, Color, corners, pack_color, palette_of
 

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 from imgui_bundle import imgui
 
 from iibr_core.runtime.time_left import about_left
+from viewer.model import viewpoint
 from viewer.model.action import ask, do
 from viewer.model.actions import Action
-from viewer.model.free_camera import LeaveCamera
 from viewer.model.layout import Layout
 from viewer.model.reducers.depth_models import wanted_model
 from viewer.model.state.app_state import AppState
@@ -93,7 +93,11 @@ def _work_on_views(state: AppState) -> Iterator[ProgressRow]:
     if state.free_progress is not None:
         share = min(state.free_progress, 0.99)  # what is whole has no row
         yield ProgressRow(
-            "looking", "Filling in what the photo does not show", f"{round(100 * share)} %", share, LeaveCamera()
+            "looking",
+            "Filling in what the photo does not show",
+            f"{round(100 * share)} %",
+            share,
+            do(viewpoint.leave_camera),
         )
     if downloading is not None:
         words = f"{downloading.done:,} of {downloading.total:,} MB"

@@ -10,11 +10,12 @@ from iibr_core.beyond.optics import Optics
 from iibr_core.depth.editing.edits import DEPTH_TOOLS, BrushTool
 from iibr_core.scenes.rect import Rect
 from iibr_core.scenes.scene import Scene
+from viewer.model.focal_plane import handle_points, place_of, sharp_disparity
 from viewer.model.layout import Layout
-from viewer.model.lens.focal_plane import handle_points, place_of, sharp_disparity
-from viewer.model.lens.photographic_units import far_percent, metres, metres_text, relative_distance
-from viewer.model.state.app_state import AppState, Hover, TiltHandles
+from viewer.model.state.app_state import AppState, Hover
+from viewer.model.state.lens import TiltHandles
 from viewer.model.state.preferences import Units
+from viewer.model.units import far_percent, metres, metres_text, relative_distance
 from viewer.ui.style import DARK, Color, corners, pack_color
 
 WORD_GAP = "  ·  "

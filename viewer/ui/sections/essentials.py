@@ -7,12 +7,12 @@ from imgui_bundle import imgui
 from iibr_core.exports.loops import LOOPS, LoopKind
 from iibr_core.scenes.lens_limits import aperture_limit
 from iibr_core.scenes.scene import Scene
-from viewer.model.actions import Action, SetDepthStrength
+from viewer.model import lens, viewpoint
+from viewer.model.action import do
+from viewer.model.actions import Action
 from viewer.model.layout import Layout
-from viewer.model.lens.presets import PRESETS
 from viewer.model.state.app_state import AppState
-from viewer.model.state.motion import SetLoop
-from viewer.model.state.optics_actions import ApplyPreset, PresetName
+from viewer.model.state.lens import PRESETS, PresetName
 from viewer.model.window_limits import DEPTH_STRENGTH_LIMIT
 from viewer.ui.sections.lens_section import aperture_slider, focus_slider
 from viewer.ui.widgets import button, choice, in_row, label, slider
@@ -56,7 +56,7 @@ def _presets(layout: Layout) -> list[Action]:
         if i:
             imgui.same_line(0, spacing)
         if button(word, layout, PRESET_TIPS[name], width=length + padding):
-            actions.append(ApplyPreset(name))
+            actions.append(do(lens.apply_preset, name))
     return actions
 
 
@@ -67,7 +67,7 @@ def _depth_strength(state: AppState, layout: Layout) -> list[Action]:
     is_finished = imgui.is_item_deactivated_after_edit()
     if strength is None and not is_finished:
         return []
-    return [SetDepthStrength(state.depth_strength if strength is None else strength, is_finished)]
+    return [do(lens.set_depth_strength, state.depth_strength if strength is None else strength, is_finished)]
 
 
 def _move(state: AppState, layout: Layout) -> list[Action]:
@@ -77,5 +77,5 @@ def _move(state: AppState, layout: Layout) -> list[Action]:
     for kind, width in in_row(LOOPS, layout):
         is_chosen = state.motion.kind == kind
         if choice(MOVE_WORDS[kind], is_chosen, layout, (width, 0), MOVE_TIPS[kind]):
-            actions.append(SetLoop(None if is_chosen else kind))
+            actions.append(do(viewpoint.set_loop, None if is_chosen else kind))
     return actions

@@ -17,10 +17,12 @@ from iibr_core.gloss.settings import (
     Triple,
 )
 from iibr_core.scenes.scene import Scene
+from viewer.model import lens
+from viewer.model.action import do
 from viewer.model.actions import Action
 from viewer.model.layout import Layout
 from viewer.model.state.app_state import AppState
-from viewer.model.state.optics_actions import FIRST_GLOSS, GlossBrush, SetGlossBrush, SetOptics
+from viewer.model.state.lens import FIRST_GLOSS, GlossBrush
 from viewer.ui.style import Palette, pack_color, palette_of
 from viewer.ui.widgets import button, checkbox, choice, gap, percent_slider, slider, tooltip
 
@@ -50,11 +52,11 @@ def gloss_section(state: AppState, scene: Scene, layout: Layout) -> list[Action]
     light = _light(gloss.light, layout, palette_of(state.preferences.theme))
     edited = _reflection(replace(gloss, light=light), layout)
     edited = replace(edited, surface=_surface(gloss.surface, layout))
-    actions: list[Action] = [] if edited == gloss else [SetOptics("gloss", edited)]
+    actions: list[Action] = [] if edited == gloss else [do(lens.set_gloss, edited)]
     actions += _brush(state.gloss_brush, gloss, layout)
     imgui.end_disabled()
     if is_on is not None:
-        return [SetOptics("gloss", FIRST_GLOSS if is_on else None)]
+        return [do(lens.set_gloss, FIRST_GLOSS if is_on else None)]
     return actions if is_glossy else []
 
 
@@ -155,11 +157,11 @@ def _brush(brush: GlossBrush, gloss: Gloss, layout: Layout) -> list[Action]:
     for label, erases, tip in (("Mark", False, MARK_TIP), ("Erase", True, ERASE_TIP)):
         is_in_hand = brush.is_on and brush.erases == erases
         if choice(label, is_in_hand, layout, (width, 0), tip):
-            actions.append(SetGlossBrush(replace(brush, erases=erases, is_on=not is_in_hand)))
+            actions.append(do(lens.take_gloss_brush, replace(brush, erases=erases, is_on=not is_in_hand)))
         imgui.same_line(0, spacing)
     if button("Wipe", layout, "Take all strokes away.", bool(gloss.surface.strokes), width):
-        actions.append(SetOptics("gloss", replace(gloss, surface=replace(gloss.surface, strokes=()))))
+        actions.append(do(lens.set_gloss, replace(gloss, surface=replace(gloss.surface, strokes=()))))
     limits = (100 * STROKE_RADIUS_LIMITS[0], 100 * STROKE_RADIUS_LIMITS[1])
     tip = "How wide it paints, as a share of the photo's width (wheel over the picture)."
     size = slider("Brush size", 100 * brush.radius, limits, "%.1f %%", layout, tip, True, brush.is_on)
-    return actions + ([] if size is None else [SetGlossBrush(replace(brush, radius=size / 100))])
+    return actions + ([] if size is None else [do(lens.take_gloss_brush, replace(brush, radius=size / 100))])

@@ -18,10 +18,13 @@ from iibr_core.beyond.optics import (
 )
 from iibr_core.scenes.lens_limits import BLADES_LIMITS, aperture_limit, focus_limits, focus_span
 from iibr_core.scenes.scene import Scene
+from viewer.model import lens
 from viewer.model.action import ask, do
-from viewer.model.actions import Action, ShowTiltHandles
+from viewer.model.actions import Action
 from viewer.model.layout import Layout
-from viewer.model.lens.photographic_units import (
+from viewer.model.state.app_state import AppState
+from viewer.model.state.tasks import ChooseTask
+from viewer.model.units import (
     ASSUMED_DISTANCE_M,
     disparity_at,
     disparity_at_percent,
@@ -33,13 +36,6 @@ from viewer.model.lens.photographic_units import (
     metres_text,
     relative_distance,
 )
-from viewer.model.state.app_state import AppState
-from viewer.model.state.optics_actions import (
-    SetAperture,
-    SetFocus,
-    SetOptics,
-)
-from viewer.model.state.tasks import ChooseTask
 from viewer.ui.sections.aperture_icons import draw_shape
 from viewer.ui.style import Palette, palette_of
 from viewer.ui.widgets import button, checkbox, choice, end_words, percent_slider, quiet, slider, whole_slider
@@ -74,18 +70,22 @@ def focus_section(state: AppState, scene: Scene, layout: Layout) -> list[Action]
     span, unit = focus_span(scene), _unit_of_focus(state, scene)
     form = f"± {unit.form}" if optics.focus_range else "none"
     new = slider("Range", optics.focus_range / unit.size, (0.0, span / unit.size), form, layout, RANGE_TIP)
-    _add(actions, lambda value: SetOptics("focus_range", value * unit.size), new)
+    _add(actions, lambda value: do(lens.set_focus_range, value * unit.size), new)
     shown = checkbox("Tilt", state.tilt_handles is not None or any(optics.focus_tilt), layout, TILT_TIP)
     if shown is not None:
-        actions += [ShowTiltHandles(shown)] if shown else [ShowTiltHandles(False), SetOptics("focus_tilt", (0.0, 0.0))]
+        actions += (
+            [do(lens.show_tilt_handles, shown)]
+            if shown
+            else [do(lens.show_tilt_handles, False), do(lens.set_focus_tilt, (0.0, 0.0))]
+        )
     is_tilted = state.tilt_handles is not None or any(optics.focus_tilt)
     right, down = optics.focus_tilt
     limits = (-span / unit.size, span / unit.size)
     form = unit.form.replace("%", "%+", 1)
     new = slider("to the right", right / unit.size, limits, form, layout, is_enabled=is_tilted)
-    _add(actions, lambda value: SetOptics("focus_tilt", (value * unit.size, down)), new)
+    _add(actions, lambda value: do(lens.set_focus_tilt, (value * unit.size, down)), new)
     new = slider("downward", down / unit.size, limits, form, layout, is_enabled=is_tilted)
-    _add(actions, lambda value: SetOptics("focus_tilt", (right, value * unit.size)), new)
+    _add(actions, lambda value: do(lens.set_focus_tilt, (right, value * unit.size)), new)
     return actions
 
 
@@ -110,13 +110,13 @@ def focus_slider(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
     disparity = state.optics.focus_disparity
     if state.preferences.units == "light field" or not scene.has_view_disparity:  # else nothing is near or far yet
         new = slider("Focus", disparity, focus_limits(scene), "%.2f px", layout, FOCUS_DISPARITY_TIP)
-        _add(actions, SetFocus, new)
+        _add(actions, lambda disparity: do(lens.set_focus, disparity), new)
         return actions
     distance = metres(scene, disparity)
     form = "%.0f %%" if distance is None else metres_text(distance)
     new = slider("Focus", far_percent(scene, disparity), (0.0, 100.0), form, layout, FOCUS_TIP)
     end_words("near", "far", layout)
-    _add(actions, lambda percent: SetFocus(disparity_at_percent(scene, percent)), new)
+    _add(actions, lambda percent: do(lens.set_focus, disparity_at_percent(scene, percent)), new)
     return actions
 
 
@@ -129,7 +129,7 @@ def _distance(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
     shown = min(max(distance if distance is not None else limits[1], limits[0]), limits[1])
     new = slider("Distance", shown, limits, "× %.2f", layout, DISTANCE_TIP, is_logarithmic=True)
     disparity = None if new is None else disparity_at(scene, new)
-    return [] if disparity is None else [SetFocus(disparity)]
+    return [] if disparity is None else [do(lens.set_focus, disparity)]
 
 
 def aperture_slider(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
@@ -140,7 +140,7 @@ def aperture_slider(state: AppState, scene: Scene, layout: Layout) -> list[Actio
     if state.preferences.units == "light field":
         form = ALL_SHARP if diameter == 0 else f"%.1f views  ·  {words}"
         new = slider("Aperture", diameter, (0.0, widest), form, layout, tip)
-        return [] if new is None else [SetAperture(new)]
+        return [] if new is None else [do(lens.set_aperture, new)]
     return _stops(diameter, widest, ALL_SHARP if diameter == 0 else words, layout, tip)
 
 
@@ -150,7 +150,7 @@ def aperture_section(state: AppState, scene: Scene, layout: Layout) -> list[Acti
     actions = _kinds(shape, layout, palette_of(state.preferences.theme))
     if shape.kind == "mask":
         actions += _mask_row(shape, layout)
-    return actions + [SetOptics("aperture_shape", new) for new in _shape_edits(shape, layout)]
+    return actions + [do(lens.set_aperture_shape, new) for new in _shape_edits(shape, layout)]
 
 
 def _stops(diameter: float, widest: float, words: str, layout: Layout, tip: str) -> list[Action]:
@@ -159,7 +159,7 @@ def _stops(diameter: float, widest: float, words: str, layout: Layout, tip: str)
     stops = slider("Aperture", CLOSED_STOPS - closed, (0.0, CLOSED_STOPS), words, layout, tip)
     if stops is None:
         return []
-    return [SetAperture(widest * 2.0 ** (stops - CLOSED_STOPS) if stops > 0 else 0.0)]
+    return [do(lens.set_aperture, widest * 2.0 ** (stops - CLOSED_STOPS) if stops > 0 else 0.0)]
 
 
 def _kinds(shape: ApertureShape, layout: Layout, palette: Palette) -> list[Action]:
@@ -173,7 +173,7 @@ def _kinds(shape: ApertureShape, layout: Layout, palette: Palette) -> list[Actio
         if choice(f"##{kind}", shape.kind == kind, layout, (width, height), KIND_TIPS[kind]):
             needs_image = kind == "mask" and shape.mask is None
             actions.append(
-                do(ask, ChooseTask("mask")) if needs_image else SetOptics("aperture_shape", replace(shape, kind=kind))
+                do(ask, ChooseTask("mask")) if needs_image else do(lens.set_aperture_shape, replace(shape, kind=kind))
             )
         middle = corner.x + width / 2, corner.y + height / 2
         draw_shape(replace(shape, kind=kind), middle, 0.32 * height, palette)
@@ -217,9 +217,9 @@ def light_section(state: AppState, scene: Scene, layout: Layout) -> list[Action]
     actions: list[Action] = []
     limits = (-EXPOSURE_LIMIT_STOPS, EXPOSURE_LIMIT_STOPS)
     new = slider("Exposure", optics.exposure_stops, limits, "%+.1f stops", layout)
-    _add(actions, lambda stops: SetOptics("exposure_stops", stops), new)
+    _add(actions, lambda stops: do(lens.set_exposure, stops), new)
     new = percent_slider("Highlights", optics.highlight_recovery, layout, HIGHLIGHT_TIP)
-    _add(actions, lambda share: SetOptics("highlight_recovery", share), new)
+    _add(actions, lambda share: do(lens.set_highlights, share), new)
     return actions
 
 

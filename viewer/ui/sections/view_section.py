@@ -7,11 +7,11 @@ from imgui_bundle import imgui
 from iibr_core.exports.loops import LOOPS
 from iibr_core.scenes.lens_limits import dolly_limit
 from iibr_core.scenes.scene import Scene
+from viewer.model import lens, viewpoint
+from viewer.model.action import do
 from viewer.model.actions import Action
 from viewer.model.layout import Layout
 from viewer.model.state.app_state import AppState
-from viewer.model.state.motion import PauseMotion, ReturnHome, SetSpeed
-from viewer.model.state.optics_actions import SetOptics
 from viewer.model.window_limits import SPEED_LIMITS
 from viewer.ui.sections.viewpoint_pad import pad
 from viewer.ui.widgets import button, slider, tooltip
@@ -33,11 +33,11 @@ def view_section(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
     _place(state)
     imgui.end_group()
     speed = slider("Speed", state.motion.speed, SPEED_LIMITS, "%.2f turns/s", layout, SPEED_TIP, is_logarithmic=True)
-    actions += [] if speed is None else [SetSpeed(speed)]
+    actions += [] if speed is None else [do(viewpoint.set_speed, speed)]
     if farthest := dolly_limit(scene.grid):
         tip = "Step into the picture, or back out of it. The end of the slider is as far as the views reach."
         dolly = slider("Dolly", state.optics.dolly, (-farthest, farthest), "%+.2f views", layout, tip)
-        actions += [] if dolly is None else [SetOptics("dolly", dolly)]
+        actions += [] if dolly is None else [do(lens.set_dolly, dolly)]
     return actions
 
 
@@ -46,10 +46,10 @@ def _beside_pad(state: AppState, layout: Layout) -> list[Action]:
     actions: list[Action] = []
     width = imgui.get_content_region_avail().x
     if button("Recenter", layout, RECENTER_TIP, width=width):
-        actions.append(ReturnHome())
+        actions.append(do(viewpoint.return_home))
     word = "Resume" if state.motion.is_paused else "Pause"
     if button(f"{word}##motion", layout, PAUSE_TIP, state.motion.kind in LOOPS, width):
-        actions.append(PauseMotion(not state.motion.is_paused))
+        actions.append(do(viewpoint.pause, not state.motion.is_paused))
     return actions
 
 

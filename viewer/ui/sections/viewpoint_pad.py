@@ -10,10 +10,11 @@ from iibr_core.scenes.lens_limits import eye_limits
 from iibr_core.scenes.rect import Rect
 from iibr_core.scenes.scene import Scene
 from iibr_core.types import GridShape, ViewOffset
+from viewer.model import lens
+from viewer.model.action import do
 from viewer.model.actions import Action
 from viewer.model.layout import Layout
 from viewer.model.state.app_state import AppState
-from viewer.model.state.optics_actions import MoveEye
 from viewer.ui.style import Palette, corners, pack_color, palette_of
 
 PAD_SIDE = 136.0
@@ -58,7 +59,7 @@ def pad(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
         return []
     mouse = imgui.get_io().mouse_pos
     eye = chart.eye(mouse.x, mouse.y)
-    return [MoveEye(eye)] if eye != state.optics.eye else []
+    return [do(lens.move_eye, eye)] if eye != state.optics.eye else []
 
 
 def _draw(state: AppState, grid: GridShape, chart: PadMap, scale: float) -> None:

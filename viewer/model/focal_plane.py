@@ -12,7 +12,7 @@ from dataclasses import replace
 from iibr_core.beyond.optics import Optics
 from iibr_core.scenes.rect import Rect
 from iibr_core.scenes.scene import Scene
-from viewer.model.state.app_state import TiltHandles
+from viewer.model.state.lens import TiltHandles
 
 Place = tuple[float, float]
 

@@ -1,4 +1,4 @@
-"""Undo and redo. An edit is remembered by what it replaced; a drag is one edit, however many steps it took."""
+"""Undo and redo. An edit stores the state that it replaced; all steps of a drag are one edit."""
 
 from __future__ import annotations
 
@@ -10,27 +10,23 @@ from typing import Concatenate, ParamSpec
 from iibr_core.beyond.optics import Optics
 from viewer.model.state.app_state import AppState
 from viewer.model.state.history import Edit, History
-from viewer.model.state.motion import Motion
+from viewer.model.state.viewpoint import Motion
 
-EDITS_KEPT = 200
+MAX_EDITS = 200
+"""Number of edits that can be undone."""
 P = ParamSpec("P")
 
 
-def edit_of(state: AppState) -> Edit:
-    """What undo would bring back if something else took its place."""
-    return Edit(state.optics, state.depth_strength, state.depth)
-
-
 def record_edit(before: AppState, after: AppState, kind: str, always: bool = False) -> AppState:
-    """`after`, with what it replaced remembered; nothing if nothing changed, unless `always`.
+    """Return `after` with the edit in its history. Edits of one kind in one gesture are one edit.
 
-    kind: edits of one kind in a row are one, until the gesture ends.
+    always: record the edit even if nothing changed.
     """
-    if edit_of(before) == edit_of(after) and not always:
+    if _edit_of(before) == _edit_of(after) and not always:
         return after
     past = after.history.past
     if after.history.gesture != kind:
-        past = (*past, edit_of(before))[-EDITS_KEPT:]
+        past = (*past, _edit_of(before))[-MAX_EDITS:]
     return replace(after, history=History(past, (), kind, kind))
 
 
@@ -44,16 +40,9 @@ def undoable(verb: Callable[Concatenate[AppState, P], AppState]) -> Callable[Con
     return recorded
 
 
-def end_gesture(state: AppState) -> AppState:
-    """The next edit is one of its own, and no tilt handle is held."""
-    if state.tilt_handles is not None and state.tilt_handles.taken is not None:
-        state = replace(state, tilt_handles=replace(state.tilt_handles, taken=None))
-    return replace(state, history=replace(state.history, gesture="")) if state.history.gesture else state
-
-
 def undo(state: AppState) -> AppState:
-    """The state before the last edit that made a difference; without one, the same."""
-    now, past = edit_of(state), state.history.past
+    """Return the state before the last edit that made a difference."""
+    now, past = _edit_of(state), state.history.past
     while past and past[-1] == now:
         past = past[:-1]
     if not past:
@@ -62,23 +51,27 @@ def undo(state: AppState) -> AppState:
 
 
 def redo(state: AppState) -> AppState:
-    """The state before the last `undo`; without one, the same."""
+    """Return the state before the last `undo`."""
     if not state.history.future:
         return state
     edit, *rest = state.history.future
-    return _restore(state, edit, History((*state.history.past, edit_of(state)), tuple(rest)))
+    return _restore(state, edit, History((*state.history.past, _edit_of(state)), tuple(rest)))
 
 
 def map_optics(history: History, carried: Callable[[Optics], Optics]) -> History:
-    """The history in the units of another plan of the same scene."""
+    """Return the history with the optics of all edits mapped to another plan of the same scene."""
     past, future = (
         tuple(replace(edit, optics=carried(edit.optics)) for edit in edits) for edits in (history.past, history.future)
     )
     return replace(history, past=past, future=future)
 
 
+def _edit_of(state: AppState) -> Edit:
+    return Edit(state.optics, state.depth_strength, state.depth)
+
+
 def _restore(state: AppState, edit: Edit, history: History) -> AppState:
-    """Other depth needs a new field, which then brings the optics along."""
+    """Return the state with an edit restored. Another depth needs a new field, which carries the optics over."""
     is_same_depth = (edit.depth_strength, edit.depth) == (state.depth_strength, state.depth)
     restarts = not is_same_depth and state.source is not None
     return replace(

@@ -1,0 +1,74 @@
+"""Optics that show a newly planned scene as it was seen before."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+
+from iibr_core.beyond.optics import Optics
+from iibr_core.scenes.lens_limits import aperture_limit, clamp, clamp_eye
+from iibr_core.scenes.scene import Scene
+from iibr_core.types import ViewOffset
+from viewer.model.actions import SamePlaces
+from viewer.model.focal_plane import focus_on, sharp_disparity
+
+SHARP_SHARE = 0.05
+"""Distance from the focus up to which a place counts as sharp, as a share of the range of disparity."""
+
+
+def carry_optics(optics: Optics, old: Scene | None, new: Scene) -> Optics:
+    """Return the optics that show a newly planned scene as it was seen before; the usual optics for a new scene."""
+    if old is None or old.source is not new.source:  # a file opened again is new
+        return Optics()
+    eye = ViewOffset(*(x * _steps(b) / _steps(a) for x, a, b in zip(optics.eye, old.grid, new.grid)))
+    columns = _steps(new.grid.columns) / _steps(old.grid.columns)
+    if old.plan is None or new.plan is None:
+        ratio, shift = 1 / columns, 0.0  # a light field: the same rays in other steps
+    else:
+        ratio = new.plan.disparity_scale / old.plan.disparity_scale if old.plan.disparity_scale else 0.0
+        # (given - zero) * scale, for the given disparity that was in focus
+        shift = (old.plan.disparity_zero - new.plan.disparity_zero) * new.plan.disparity_scale
+    aperture = min(optics.aperture_diameter * _steps(new.grid[0]) / _steps(old.grid[0]), aperture_limit(new.grid))
+    return replace(
+        optics.with_focus_scaled(ratio),
+        eye=clamp_eye(eye, new.grid),
+        dolly=optics.dolly * columns,
+        focus_disparity=optics.focus_disparity * ratio + shift,
+        aperture_diameter=aperture,
+    )
+
+
+def carry_to_depth(
+    optics: Optics, old: Scene, new: Scene, same: SamePlaces, focused_at: tuple[float, float] | None
+) -> Optics:
+    """Return the optics that show a photo with new depth as it was seen before: what was sharp stays sharp."""
+    (first, first_now), (last, last_now) = same.pairs[0], same.pairs[-1]
+    ratio = abs(last_now - first_now) / (last - first) if last > first else 1.0
+    # nobody chose a focus of 0: it is the plan's own, and stays that
+    focus = _disparity_now(optics.focus_disparity, same.pairs) if optics.focus_disparity else 0.0
+    carried = with_focus_of(carry_optics(optics, old, new), optics.with_focus_scaled(ratio))
+    carried = replace(carried, focus_disparity=focus)
+    if same.in_focus is None or focused_at is None:
+        return carried
+    before, now = same.in_focus
+    is_sharp_there = abs(sharp_disparity(optics, focused_at) - before) <= SHARP_SHARE * (last - first)
+    return focus_on(carried, focused_at, now) if is_sharp_there else carried
+
+
+def with_focus_of(optics: Optics, other: Optics) -> Optics:
+    """Return the optics with the plane of focus of `other`."""
+    disparity, range_, tilt = other.focus_disparity, other.focus_range, other.focus_tilt
+    return replace(optics, focus_disparity=disparity, focus_range=range_, focus_tilt=tilt)
+
+
+def _disparity_now(disparity: float, pairs: tuple[tuple[float, float], ...]) -> float:
+    """Return the disparity now of places that had this disparity, interpolated."""
+    for (low, low_now), (high, high_now) in pairwise(pairs):
+        if disparity <= high:
+            share = clamp((disparity - low) / (high - low), 0.0, 1.0) if high > low else 0.0
+            return low_now + share * (high_now - low_now)
+    return pairs[-1][1]
+
+
+def _steps(views: int) -> int:
+    return max(views - 1, 1)

@@ -1,0 +1,18 @@
+"""The verb that ends a gesture of the pointer."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from viewer.model.inspection import release_divider
+from viewer.model.reducers.depth_editing_reducer import end_stroke
+from viewer.model.state.app_state import AppState
+
+
+def end_gesture(state: AppState) -> AppState:
+    """Let go of what is held: the next step is another edit, for undo."""
+    if state.tilt_handles is not None and state.tilt_handles.taken is not None:
+        state = replace(state, tilt_handles=replace(state.tilt_handles, taken=None))
+    if state.history.gesture:
+        state = replace(state, history=replace(state.history, gesture=""))
+    return release_divider(end_stroke(state))

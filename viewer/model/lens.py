@@ -1,0 +1,229 @@
+"""Verbs of the lens: viewpoint, focus, aperture, light, gloss. They can be undone.
+
+Without a scene, or with numbers that are not finite, they change nothing; other numbers are clamped to the scene.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from functools import wraps
+from typing import Concatenate, ParamSpec
+
+from iibr_core.beyond.optics import ApertureShape, Optics
+from iibr_core.gloss.settings import MAX_STROKE_POINTS, STROKE_RADIUS_LIMITS, Gloss, GlossStroke
+from iibr_core.scenes.lens_limits import clamp, clamp_optics, first_aperture, is_finite
+from iibr_core.scenes.scene import Scene
+from iibr_core.types import ViewOffset
+from viewer.model import focal_plane
+from viewer.model.history import record_edit, undoable
+from viewer.model.presets import preset_optics, subject_disparity
+from viewer.model.state.app_state import AppState
+from viewer.model.state.lens import GlossBrush, PresetName, TiltHandles
+from viewer.model.state.viewpoint import Motion
+from viewer.model.window_limits import DEPTH_STRENGTH_LIMIT
+
+POINT_SPACING = 1 / 6
+"""Distance between the points of a gloss stroke, as a share of its radius."""
+P = ParamSpec("P")
+
+
+def _edited(state: AppState, scene: Scene, optics: Optics) -> AppState:
+    """Return the state with these optics, clamped; the same state if a number is not finite."""
+    if not is_finite(optics):
+        return state
+    return replace(state, optics=clamp_optics(optics, scene), shows_before=False)
+
+
+def _lens_verb(edit: Callable[Concatenate[Optics, P], Optics]) -> Callable[Concatenate[AppState, P], AppState]:
+    """Return the verb that edits the optics by a function of them."""
+
+    @undoable
+    @wraps(edit)
+    def verb(state: AppState, *args: P.args, **kwargs: P.kwargs) -> AppState:
+        return state if state.scene is None else _edited(state, state.scene, edit(state.optics, *args, **kwargs))
+
+    return verb
+
+
+def _still(state: AppState) -> AppState:
+    """Return the state without a motion of the viewpoint."""
+    return replace(state, motion=Motion(speed=state.motion.speed))
+
+
+# Viewpoint
+
+
+@undoable
+def move_eye(state: AppState, eye: ViewOffset) -> AppState:
+    """Put the viewpoint at a view offset."""
+    return _edited(_still(state), state.scene, replace(state.optics, eye=eye)) if state.scene else state
+
+
+@undoable
+def set_dolly(state: AppState, dolly: float) -> AppState:
+    """Step into the picture; see `Optics.dolly`."""
+    return _edited(_still(state), state.scene, replace(state.optics, dolly=dolly)) if state.scene else state
+
+
+@undoable
+def reset(state: AppState) -> AppState:
+    """Reset viewpoint, focus, aperture and light; gloss stays."""
+    if state.scene is None:
+        return state
+    state = replace(_still(state), free_camera=None, tilt_handles=None, has_chosen_aperture=False, chosen_focus=None)
+    return _edited(state, state.scene, Optics(gloss=state.optics.gloss)) if state.scene else state
+
+
+# Focus
+
+
+def set_focus(state: AppState, disparity: float) -> AppState:
+    """Focus on a field disparity (px per view step) in the middle of the picture."""
+    if state.scene is None:
+        return state
+    focused = _edited(state, state.scene, replace(state.optics, focus_disparity=disparity))
+    if focused is state:
+        return state
+    focused = replace(focused, chosen_focus=focused.optics.focus_disparity, focused_at=None)
+    return record_edit(state, _opened(focused, state.scene), "set_focus")
+
+
+def focus_on(state: AppState, place: focal_plane.Place, disparity: float) -> AppState:
+    """Focus on what was clicked at a place (-1..1, see `focal_plane`), with its disparity."""
+    if state.scene is None:
+        return state
+    focused = _edited(state, state.scene, focal_plane.focus_on(state.optics, place, disparity))
+    if focused is state:
+        return state
+    focused = replace(focused, chosen_focus=disparity, focused_at=place)
+    # a click is recorded even if nothing changed: a double click takes it back
+    return record_edit(state, _opened(focused, state.scene), "focus_on", always=True)
+
+
+@_lens_verb
+def set_focus_range(optics: Optics, disparity: float) -> Optics:
+    """Make everything within this much disparity of the focus sharp."""
+    return replace(optics, focus_range=disparity)
+
+
+@_lens_verb
+def set_focus_tilt(optics: Optics, tilt: tuple[float, float]) -> Optics:
+    """Tilt the plane of focus; see `Optics.focus_tilt`."""
+    return replace(optics, focus_tilt=tilt)
+
+
+def show_tilt_handles(state: AppState, is_shown: bool) -> AppState:
+    """Show or hide the handles over the picture."""
+    return replace(state, tilt_handles=TiltHandles() if is_shown else None)
+
+
+@undoable
+def move_tilt_handle(state: AppState, index: int, place: focal_plane.Place, disparity: float | None) -> AppState:
+    """Drag a handle (0 or 1) to a place; the plane of focus runs through the disparity there, None if unknown."""
+    scene, handles = state.scene, state.tilt_handles or TiltHandles()
+    if scene is None:
+        return state
+    x, y = (clamp(value, -1.0, 1.0) for value in place)
+    old, kept = (handles.first, handles.second) if index == 0 else (handles.second, handles.first)
+    disparity = focal_plane.sharp_disparity(state.optics, old) if disparity is None else disparity
+    optics = focal_plane.tilt_through(state.optics, (x, y), disparity, kept, scene.height / scene.width)
+    tilted = _edited(state, scene, optics)
+    first, second = ((x, y), kept) if index == 0 else (kept, (x, y))
+    return state if tilted is state else replace(tilted, tilt_handles=TiltHandles(first, second, taken=index))
+
+
+def _opened(state: AppState, scene: Scene) -> AppState:
+    """Return the state with the aperture opened a little, unless the user chose it: a pinhole has no focus."""
+    if state.has_chosen_aperture or state.optics.aperture_diameter > 0:
+        return state
+    return replace(state, optics=replace(state.optics, aperture_diameter=first_aperture(scene)))
+
+
+# Aperture and light
+
+
+@undoable
+def set_aperture(state: AppState, diameter: float) -> AppState:
+    """Open the aperture to a diameter in view steps."""
+    if state.scene is None:
+        return state
+    opened = replace(state, has_chosen_aperture=True)
+    return _edited(opened, state.scene, replace(state.optics, aperture_diameter=diameter))
+
+
+@undoable
+def apply_preset(state: AppState, name: PresetName) -> AppState:
+    """Set focus and aperture for a purpose."""
+    if state.scene is None:
+        return state
+    optics = preset_optics(name, state.optics, state.scene, subject_disparity(state, state.scene))
+    return _edited(replace(state, has_chosen_aperture=True, tilt_handles=None), state.scene, optics)
+
+
+@_lens_verb
+def set_aperture_shape(optics: Optics, shape: ApertureShape) -> Optics:
+    """Give the aperture a shape."""
+    return replace(optics, aperture_shape=shape)
+
+
+@_lens_verb
+def set_highlights(optics: Optics, share: float) -> Optics:
+    """Let clipped highlights glow; see `Optics.highlight_recovery`."""
+    return replace(optics, highlight_recovery=share)
+
+
+@_lens_verb
+def set_exposure(optics: Optics, stops: float) -> Optics:
+    """Brighten the picture by stops."""
+    return replace(optics, exposure_stops=stops)
+
+
+def show_before(state: AppState, is_shown: bool) -> AppState:
+    """Show the photo as it was taken, or the picture again."""
+    return replace(state, shows_before=is_shown and state.scene is not None)
+
+
+@undoable
+def set_depth_strength(state: AppState, strength: float, is_finished: bool) -> AppState:
+    """Multiply the planned parallax. is_finished: the edit is over, so the field is made again."""
+    if not math.isfinite(strength):
+        return state
+    restarts = is_finished and state.source is not None
+    generation = state.generation + 1 if restarts else state.generation
+    return replace(state, depth_strength=clamp(strength, 0.0, DEPTH_STRENGTH_LIMIT), generation=generation)
+
+
+# Gloss
+
+
+@_lens_verb
+def set_gloss(optics: Optics, gloss: Gloss | None) -> Optics:
+    """Make a surface glossy; None: no surface."""
+    return replace(optics, gloss=gloss)
+
+
+def take_gloss_brush(state: AppState, brush: GlossBrush) -> AppState:
+    """Take the gloss brush, or put it away; the depth brush is put away."""
+    depth_brush = replace(state.brush, is_on=state.brush.is_on and not brush.is_on)
+    taken = replace(brush, radius=clamp(brush.radius, *STROKE_RADIUS_LIMITS))
+    return replace(state, gloss_brush=taken, brush=depth_brush)
+
+
+@undoable
+def paint_gloss(state: AppState, place: tuple[float, float], brush: GlossBrush, begins: bool) -> AppState:
+    """Begin a stroke of the gloss brush at a place (x, y), in shares of the photo's size, or continue the last one."""
+    gloss, scene = state.optics.gloss, state.scene
+    if gloss is None or scene is None or not all(map(math.isfinite, place)):
+        return state
+    strokes, place = gloss.surface.strokes, (clamp(place[0], -1.0, 2.0), clamp(place[1], -1.0, 2.0))
+    stroke = GlossStroke((place,), brush.radius, brush.erases)
+    if strokes and not begins:
+        last = strokes[-1]
+        step = math.hypot(place[0] - last.points[-1][0], (place[1] - last.points[-1][1]) * scene.height / scene.width)
+        if step < POINT_SPACING * last.radius or len(last.points) >= MAX_STROKE_POINTS:
+            return state
+        strokes, stroke = strokes[:-1], replace(last, points=(*last.points, place))
+    painted = replace(gloss, surface=replace(gloss.surface, strokes=(*strokes, stroke)))
+    return replace(state, optics=replace(state.optics, gloss=painted))

@@ -1,1 +1,0 @@
-"""What a lens does: its focal surface, its aperture, its limits, its units."""

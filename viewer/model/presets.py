@@ -1,0 +1,44 @@
+"""Focus and aperture for a purpose, chosen for the scene."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from iibr_core.beyond.optics import ApertureShape, Optics
+from iibr_core.scenes.lens_limits import aperture_limit, clamp_optics, focus_span
+from iibr_core.scenes.scene import Scene
+from viewer.model.state.app_state import AppState
+from viewer.model.state.lens import PRESETS, PresetName
+
+PORTRAIT_APERTURE = 0.6
+"""Aperture of a portrait, as a share of the widest."""
+PORTRAIT_RANGE = 0.06
+"""Sharp depth before and behind a portrait's focus, as a share of all disparity: a face from nose to ear."""
+
+
+def preset_optics(name: PresetName, optics: Optics, scene: Scene, subject: float) -> Optics:
+    """Return the optics for a purpose; viewpoint, dolly, exposure and highlights stay.
+
+    subject: disparity of a portrait's subject.
+    """
+    plain = replace(optics, focus_range=0.0, focus_tilt=(0.0, 0.0))
+    if name == "everything sharp":
+        return replace(plain, aperture_diameter=0.0)
+    if name == "macro":
+        focus, range_, share = scene.disparity_range_px[1], 0.0, 1.0
+    else:
+        focus, range_, share = subject, PORTRAIT_RANGE * focus_span(scene), PORTRAIT_APERTURE
+    diameter = share * aperture_limit(scene.grid)
+    shaped = replace(plain, aperture_diameter=diameter, aperture_shape=ApertureShape())
+    return clamp_optics(replace(shaped, focus_disparity=focus, focus_range=range_), scene)
+
+
+def subject_disparity(state: AppState, scene: Scene) -> float:
+    """Return the disparity that the user made sharp last, else that of the likely subject."""
+    return scene.subject_disparity_px if state.chosen_focus is None else state.chosen_focus
+
+
+def active_preset(state: AppState, scene: Scene) -> PresetName | None:
+    """Return the preset that the lens is set to, None if it is set otherwise."""
+    optics, subject = state.optics, subject_disparity(state, scene)
+    return next((name for name in PRESETS if preset_optics(name, optics, scene, subject) == optics), None)

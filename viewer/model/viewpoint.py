@@ -1,0 +1,129 @@
+"""Verbs of the viewpoint: motions that run by themselves, the free camera, and zoom."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+from iibr_core.beyond.optics import CENTRE, Optics
+from iibr_core.exports.loops import LoopKind, point_on_loop
+from iibr_core.scenes.lens_limits import clamp, clamp_optics
+from iibr_core.types import GridShape, ViewOffset
+from viewer.model.history import record_edit
+from viewer.model.messages import notify
+from viewer.model.state.app_state import AppState
+from viewer.model.state.notices import Notice
+from viewer.model.state.viewpoint import FORWARD_LIMITS, MAX_ASIDE, FreeCamera, Motion, MotionKind, Zoom
+from viewer.model.window_limits import SPEED_LIMITS
+
+HOME_S = 0.4
+"""Duration of the glide to the middle, in seconds."""
+MAX_STEP_S = 0.1
+"""Longest step of a motion, in seconds: after a delay it continues without a jump."""
+EASE_IN_TURNS = 0.2
+"""Part of a loop's first turn over which it leaves its starting viewpoint."""
+MIN_ZOOM = 1e-3
+"""Smallest scale of a zoom."""
+PHOTOS_ONLY = "The free camera needs a photo: a light field holds only the views of its own plane."
+
+
+def return_home(state: AppState, takes_back_click: bool = False) -> AppState:
+    """Glide back to the middle viewpoint. takes_back_click: undo the focus set by a double click's first click."""
+    if state.scene is None:
+        return state
+    state = replace(_without_click(state) if takes_back_click else state, free_camera=None)
+    return record_edit(state, replace(state, motion=_start(state, "home")), "return_home", always=True)
+
+
+def set_loop(state: AppState, kind: LoopKind | None) -> AppState:
+    """Move the viewpoint along a loop, over and over; None stops it where it is."""
+    if state.scene is None:
+        return state
+    return record_edit(state, replace(state, motion=_start(state, kind)), "set_loop", always=True)
+
+
+def set_speed(state: AppState, turns_per_second: float) -> AppState:
+    """Set the speed of loops."""
+    if not math.isfinite(turns_per_second):
+        return state
+    return replace(state, motion=replace(state.motion, speed=clamp(turns_per_second, *SPEED_LIMITS)))
+
+
+def pause(state: AppState, is_paused: bool) -> AppState:
+    """Hold the motion, or continue it."""
+    return replace(state, motion=replace(state.motion, is_paused=is_paused, ticked_s=None))
+
+
+def tick(state: AppState, now_s: float) -> AppState:
+    """Continue the motion up to a time on the clock, in seconds."""
+    if state.scene is None or not state.motion.is_running or not math.isfinite(now_s):
+        return state
+    motion, optics = _advance(state.motion, state.optics, state.scene.grid, now_s)
+    return replace(state, motion=motion, optics=clamp_optics(optics, state.scene))
+
+
+def move_camera(state: AppState, right: float = 0.0, down: float = 0.0, forward: float = 0.0) -> AppState:
+    """Turn the free camera and step forward, within its limits. Without a free camera, it leaves the views' plane."""
+    if state.scene is None:
+        return state
+    if state.scene.plan is None:
+        return notify(state, Notice(PHOTOS_ONLY))
+    camera = state.free_camera or FreeCamera()
+    right, down, forward = camera.right + right, camera.down + down, camera.forward + forward
+    if not all(map(math.isfinite, (right, down, forward))):
+        return state
+    right, down = (clamp(turn, -MAX_ASIDE, MAX_ASIDE) for turn in (right, down))
+    return replace(state, free_camera=FreeCamera(right, down, clamp(forward, *FORWARD_LIMITS)))
+
+
+def leave_camera(state: AppState) -> AppState:
+    """Return to the plane of the views."""
+    return replace(state, free_camera=None)
+
+
+def report_camera(state: AppState, done: float | None) -> AppState:
+    """Show the progress of preparing the free camera's views, as a share; None when they are ready."""
+    return replace(state, free_progress=done)
+
+
+def set_zoom(state: AppState, zoom: Zoom | None) -> AppState:
+    """Show a part of the picture; None, or numbers that are not finite: the whole picture."""
+    if zoom is None or state.scene is None or not all(map(math.isfinite, (zoom.scale, *zoom.centre))):
+        return replace(state, zoom=None)
+    x, y = (clamp(at, 0.0, 1.0) for at in zoom.centre)
+    return replace(state, zoom=Zoom(max(zoom.scale, MIN_ZOOM), (x, y)))
+
+
+def ease(share: float) -> float:
+    """Map 0..1 to 0..1, slow at both ends."""
+    x = clamp(share, 0.0, 1.0)
+    return x * x * (3 - 2 * x)
+
+
+def _start(state: AppState, kind: MotionKind | None) -> Motion:
+    return Motion(kind, start=state.optics.eye, start_dolly=state.optics.dolly, speed=state.motion.speed)
+
+
+def _without_click(state: AppState) -> AppState:
+    """Return the state before the last edit if that was a click that set the focus."""
+    history = state.history
+    if history.last != "focus_on" or not history.past:
+        return state
+    return replace(state, optics=history.past[-1].optics, history=replace(history, past=history.past[:-1], last=""))
+
+
+def _advance(motion: Motion, optics: Optics, grid: GridShape, now_s: float) -> tuple[Motion, Optics]:
+    """Return motion and optics at a time on the clock. Glides end where they arrive."""
+    step_s = 0.0 if motion.ticked_s is None else clamp(now_s - motion.ticked_s, 0.0, MAX_STEP_S)
+    turns = motion.turns + step_s * (1 / HOME_S if motion.kind == "home" else motion.speed)
+    motion = replace(motion, turns=turns, ticked_s=now_s)
+    if motion.kind == "home":
+        if turns >= 1:
+            return replace(motion, kind=None), replace(optics, eye=CENTRE, dolly=0.0)
+        left = 1 - ease(turns)
+        eye = ViewOffset(motion.start.t * left, motion.start.s * left)
+        return motion, replace(optics, eye=eye, dolly=motion.start_dolly * left)
+    share = ease(turns / EASE_IN_TURNS)
+    goal = point_on_loop(motion.kind, turns, grid)
+    eye = ViewOffset(*(a + share * (b - a) for a, b in zip(motion.start, goal)))
+    return motion, replace(optics, eye=eye)
