@@ -7,12 +7,11 @@ from dataclasses import dataclass, replace
 from iibr_core.beyond.optics import CENTRE
 from iibr_core.types import ViewOffset
 from viewer.app.pointer import is_marking_gloss
-from viewer.model import inspection, lens, messages, viewpoint
+from viewer.model import depth, inspection, lens, messages, viewpoint
 from viewer.model.action import do
 from viewer.model.actions import Action, SetState
 from viewer.model.commands import BY_NAME, COMMANDS
 from viewer.model.state.app_state import AppState
-from viewer.model.state.depth_editing import DropStroke, SetBrush
 
 ARROW_STEP_VIEWS = 0.5
 """Step of an arrow key, in view steps."""
@@ -47,7 +46,7 @@ def _escape_actions(state: AppState) -> list[Action]:
     if state.free_camera is not None and state.stroke is None:
         return [do(viewpoint.leave_camera)]
     if state.stroke is not None:
-        return [DropStroke()]
+        return [do(depth.drop_stroke)]
     if state.inspection.shows_views:
         return [do(inspection.show_views, False)]
     if is_marking_gloss(state):
@@ -55,7 +54,7 @@ def _escape_actions(state: AppState) -> list[Action]:
     if state.shows_before:
         return [do(lens.show_before, False)]
     if state.brush.is_on:
-        return [SetBrush(replace(state.brush, is_on=False))]
+        return [do(depth.set_brush, replace(state.brush, is_on=False))]
     if state.inspection.comparison is not None:
         return [do(inspection.compare, None)]
     if state.inspection.overlay is not None:

@@ -10,14 +10,14 @@ from iibr_core.scenes.lens_limits import focus_limits
 from iibr_core.scenes.rect import Rect
 from iibr_core.scenes.scene import Scene
 from iibr_core.types import ViewOffset
-from viewer.model import gesture, inspection, lens, viewpoint
+from viewer.model import depth, gesture, inspection, lens, viewpoint
 from viewer.model.action import do
 from viewer.model.actions import Action
 from viewer.model.focal_plane import handle_points, place_of
 from viewer.model.inspection import view_at
 from viewer.model.layout import Layout, pixel_at
 from viewer.model.state.app_state import AppState, Hover
-from viewer.model.state.depth_editing import DepthSample, Paint, PickDepth, SetBrush
+from viewer.model.state.depth import DepthSample
 
 DRAG_THRESHOLD = 4.0
 """A press that moved farther than this (window units) is a drag, not a click."""
@@ -175,14 +175,14 @@ def _paint_actions(
     """
     frame = layout.frame or picture
     if pointer.wheel and frame.contains(pointer.x, pointer.y):
-        return [SetBrush(replace(state.brush, radius=state.brush.radius * BRUSH_NOTCH**pointer.wheel))]
+        return [do(depth.set_brush, replace(state.brush, radius=state.brush.radius * BRUSH_NOTCH**pointer.wheel))]
     begins = pointer.is_pressed and frame.contains(pointer.pressed_x, pointer.pressed_y)
     if not pointer.is_down or not (begins or state.stroke is not None):
         return []
     place, disparity = _place_in_photo(pointer, state, scene, picture, pick)
     if state.stroke is None and pointer.holds_ctrl:
-        return [PickDepth(DepthSample(place, disparity))]
-    return [Paint(place)]
+        return [do(depth.pick, DepthSample(place, disparity))]
+    return [do(depth.paint, place)]
 
 
 def _place_in_photo(

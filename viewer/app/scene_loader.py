@@ -18,7 +18,7 @@ from iibr_core.scenes.scene import (
     source_beside,
 )
 from iibr_core.types import InputError, ViewOffset
-from viewer.background.depth_estimate import DepthFinder, same_places
+from viewer.background.depth_models import DepthFinder, same_places
 from viewer.background.file_worker import FileRequest, FileWorker
 from viewer.background.job_threads import Failed, ProgressReport
 from viewer.background.read_ahead import PhotoAhead, ReadAhead, photos_within_budget, read_sketch, read_whole_photo
@@ -26,14 +26,13 @@ from viewer.background.scene_worker import PhotosFound, SceneResult, SceneWorker
 from viewer.display.depth_preview import DepthPreview
 from viewer.display.inspection_view import InspectionView
 from viewer.display.scene_view import SceneView
-from viewer.model import messages
+from viewer.model import depth, messages
 from viewer.model.action import do
 from viewer.model.actions import Action, OpenFailed, OpenPath, ProgressMade, SceneOpened
-from viewer.model.reducers.depth_editing_reducer import depth_settings_for_worker, is_depth_ahead
+from viewer.model.depth import is_ahead, settings_for_worker
 from viewer.model.reducers.folder_reducer import AHEAD, SKETCHED_AHEAD, photos_ahead
 from viewer.model.remedies import words_of
 from viewer.model.state.app_state import AppState
-from viewer.model.state.depth_editing import DropStroke
 from viewer.model.state.notices import Notice
 from viewer.model.state.preferences import SetPreference
 
@@ -101,13 +100,13 @@ class SceneLoader:
 
     def preview_depth(self, state: AppState) -> list[Action]:
         """While depth is edited, show it; the views of what it was before need not be made."""
-        if not is_depth_ahead(state, self._depth_settings):
+        if not is_ahead(state, self._depth_settings):
             return []
         self._worker.cancel()
         try:
             self._preview.update(state)
         except InputError as error:
-            return [do(messages.notify, Notice(str(error), is_error=True)), DropStroke()]
+            return [do(messages.notify, Notice(str(error), is_error=True)), do(depth.drop_stroke)]
         return []
 
     def advance(self, state: AppState) -> None:
@@ -192,7 +191,7 @@ class SceneLoader:
             self._stopped = state.stopped
         if self._scene_view.generation == state.generation < self._submitted:
             self._worker.cancel()  # another file was being read, and will not be opened: what is here is whole
-            self._submitted, self._depth_settings = state.generation, depth_settings_for_worker(state)
+            self._submitted, self._depth_settings = state.generation, settings_for_worker(state)
 
     def _load(self, state: AppState, source: Source) -> None:
         """A new generation is a new job. The photo is read again only if another one was opened."""
@@ -205,7 +204,7 @@ class SceneLoader:
             if ahead is None and (self.ahead.is_reading(photo) or not self._has_sketches(state)):
                 return
             loaded, plan = (ahead.loaded, ahead.plan) if ahead is not None else (None, None)
-        self._submitted, self._depth_settings = state.generation, depth_settings_for_worker(state)
+        self._submitted, self._depth_settings = state.generation, settings_for_worker(state)
         self._worker.submit(
             SceneRequest(
                 state.generation,

@@ -19,27 +19,26 @@ from viewer.app.exporter import add_export
 from viewer.app.job_queue import JobQueue
 from viewer.app.picture_saver import add_copy, add_save
 from viewer.app.save_places import inputs_of_scene
+from viewer.background.depth_models import actions_of_download, download, list_models
 from viewer.background.file_worker import FileRequest, FileResult, FileWorker
 from viewer.background.job_threads import Failed
-from viewer.background.model_downloader import Downloaded, DownloadResult, ModelDownloads, ModelRequest, list_models
+from viewer.background.newest import Newest
 from viewer.display.scene_view import SceneView
-from viewer.model import lens, messages
+from viewer.model import depth_models, lens, messages
+from viewer.model.action import Action as VerbAction
 from viewer.model.action import ask, do, forget_tasks
 from viewer.model.actions import Action, OpenPath
 from viewer.model.commands import action_for_path
 from viewer.model.photo_facts import set_facts
 from viewer.model.state.app_state import AppState
+from viewer.model.state.depth_models import (
+    CancelGetTask,
+    GetModelTask,
+    ListModelsTask,
+)
 from viewer.model.state.exporting import ExportTask
 from viewer.model.state.folder import FolderListed, ListFolderTask
 from viewer.model.state.jobs import CancelJobTask
-from viewer.model.state.model_download import (
-    CancelGetTask,
-    Downloading,
-    DownloadingChanged,
-    GetModelTask,
-    ListModelsTask,
-    ModelsListed,
-)
 from viewer.model.state.notices import Notice
 from viewer.model.state.photo_facts import PhotoFacts, ReadFactsTask
 from viewer.model.state.prompts import FolderContents, ListContentsTask, PathPrompt
@@ -61,7 +60,7 @@ class SideEffects:
         self._clipboard_text = clipboard_text
         self._jobs = JobQueue(scene_view, wake)
         self._files = FileWorker("iibr-files", wake)
-        self._downloads = ModelDownloads(wake)
+        self._downloads = Newest("iibr-models", download, wake)
         self._ids = count(1)
         self._under_way: set[int] = set()
         self._masks: list[Path] = []
@@ -80,7 +79,7 @@ class SideEffects:
     def run(self, state: AppState) -> list[Action]:
         """Take up the state's tasks and say what came of earlier ones, and of a dialog that was closed."""
         actions: list[Action] = [do(forget_tasks)] if state.tasks else []
-        actions += self._take_results(state) + self._take_downloads(state) + self._take_answer(state)
+        actions += self._take_results(state) + self._take_downloads() + self._take_answer(state)
         for task in state.tasks:
             if isinstance(task, PasteTask) and self._jobs.is_copying:
                 actions.append(do(ask, task))  # later: the copy is not in the clipboard yet
@@ -131,12 +130,12 @@ class SideEffects:
             case CancelJobTask(id_):
                 self._jobs.cancel(id_)
             case ListModelsTask():
-                self._submit(list_models)
+                self._submit(lambda: do(depth_models.set_known, list_models()))
             case GetModelTask(name):
-                self._downloads.submit(ModelRequest(name))
+                self._downloads.submit(name)
             case CancelGetTask():
                 self._downloads.cancel()
-                return [DownloadingChanged(None)]
+                return [do(depth_models.set_downloading, None)]
             case CopyTask():
                 return add_copy(state, self._jobs)
             case PasteTask():
@@ -166,15 +165,10 @@ class SideEffects:
             )
         return actions
 
-    def _take_downloads(self, state: AppState) -> list[Action]:
+    def _take_downloads(self) -> list[Action]:
         actions: list[Action] = []
         while (result := self._downloads.next_result()) is not None:
-            actions += _actions_from_download(result)
-        if self._downloads.is_lost and state.models.downloading is not None:
-            actions += [
-                DownloadingChanged(None),
-                do(messages.notify, Notice("The download stopped unexpectedly. Try it again.", is_error=True)),
-            ]
+            actions += actions_of_download(result)
         return actions
 
     def _take_answer(self, state: AppState) -> list[Action]:
@@ -211,7 +205,7 @@ def _actions_from(result: FileResult, state: AppState) -> list[Action]:
             return _show_contents(contents, state)
         case PhotoFacts() as facts:
             return [do(set_facts, facts)]
-        case FolderListed() | ModelsListed() as found:
+        case FolderListed() | VerbAction() as found:
             return [found]
         case Pasted(path):
             return [OpenPath(source_beside(state.source, path))]
@@ -224,19 +218,6 @@ def _show_contents(contents: FolderContents, state: AppState) -> list[Action]:
     if not isinstance(prompt, PathPrompt) or prompt.contents is None or prompt.contents.folder != contents.folder:
         return []
     return [do(messages.show_prompt, replace(prompt, contents=contents))]
-
-
-def _actions_from_download(result: DownloadResult) -> list[Action]:
-    """A model that came is used at once where that is wanted: see `wanted_model`."""
-    match result:
-        case Downloading() as downloading:
-            return [DownloadingChanged(downloading)]
-        case Failed(_, message):
-            return [DownloadingChanged(None), do(messages.notify, Notice(message, is_error=True))]
-        case Downloaded(model, listed):
-            lacks = [do(messages.notify, Notice(f"{model.title} is here. It {model.lacks}"))] if model.lacks else []
-            return [listed, DownloadingChanged(None), *lacks]
-    raise AssertionError(f"nothing comes of {result!r}")
 
 
 def _read_facts(path: str) -> PhotoFacts:

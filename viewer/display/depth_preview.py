@@ -12,7 +12,7 @@ import numpy as np
 from iibr_core.depth.editing.edits import DepthEdits
 from iibr_core.scenes.scene import LoadedPhoto, Scene, still_disparity
 from viewer.display.scene_view import SceneView
-from viewer.model.reducers.depth_editing_reducer import current_depth_settings
+from viewer.model.depth import current_settings
 from viewer.model.state.app_state import AppState
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ class DepthPreview:
             if self._loaded is None or loaded.refined is not self._loaded.refined:
                 self._canvas = self._still = None
             self._loaded, self._shown = loaded, loaded.depth_settings.edits
-        wanted = current_depth_settings(state).edits
+        wanted = current_settings(state).edits
         if wanted != self._shown and scene.source is state.source and self._is_quick(wanted, loaded):
             self._scene_view.show_disparity(self._field_disparity(wanted, scene, loaded))
             self._shown = wanted

@@ -8,9 +8,7 @@ from typing import Literal
 from iibr_core.scenes.scene import Progress, Scene, Source
 from viewer.model.action import Action as VerbAction
 from viewer.model.state.app_state import DrawReport
-from viewer.model.state.depth_editing import DepthAction
 from viewer.model.state.folder import FolderAction
-from viewer.model.state.model_download import ModelAction
 from viewer.model.state.preferences import PreferencesAction
 from viewer.model.state.saving import SavedSettings
 
@@ -101,11 +99,9 @@ Action = (
     | WorkerEvent
     | PreferencesAction
     | SetState
-    | DepthAction
     | FolderAction
     | TakeSettings
     | RestoreSession
     | OpenPath
     | StopWork
-    | ModelAction
 )

@@ -12,16 +12,15 @@ from pathlib import PurePath
 from iibr_core.depth.editing.edits import BRUSH_TOOLS, BrushTool
 from iibr_core.exports.loops import LOOPS, LoopKind
 from iibr_core.scenes.scene import Source, source_beside, source_with_map
-from viewer.model import history, inspection, lens, messages, saving, viewpoint
+from viewer.model import depth, depth_models, history, inspection, lens, messages, saving, viewpoint
 from viewer.model.action import ask, do
 from viewer.model.actions import Action, OpenPath, SetState, StopWork
 from viewer.model.demo_photo import demo_photo
 from viewer.model.state.app_state import AppState
-from viewer.model.state.depth_editing import ResetDepth, SetBrush, SetTone
+from viewer.model.state.depth_models import ModelsPrompt
 from viewer.model.state.folder import SetFolderOrder, StepPhoto
 from viewer.model.state.inspection import COMPARISONS, OVERLAYS, Comparison, OverlayKind
 from viewer.model.state.lens import PRESETS
-from viewer.model.state.model_download import GetDepth, ModelsPrompt, UseModel
 from viewer.model.state.preferences import SECTIONS, SetPreference, ToggleSection
 from viewer.model.state.prompts import ChoiceOf, PalettePrompt
 from viewer.model.state.saving import CopyTask, PasteTask
@@ -111,7 +110,7 @@ def _toggle_comparison(kind: Comparison) -> Callable[[AppState], Action]:
 
 
 def _toggle_brush(state: AppState) -> Action:
-    return SetBrush(replace(state.brush, is_on=not state.brush.is_on))
+    return do(depth.set_brush, replace(state.brush, is_on=not state.brush.is_on))
 
 
 def toggle_panel(state: AppState) -> Action:
@@ -129,12 +128,12 @@ def _own_pixels(state: AppState) -> Action:
 
 
 def _brush_with(tool: BrushTool) -> Callable[[AppState], Action]:
-    return lambda state: SetBrush(replace(state.brush, tool=tool, is_on=True))
+    return lambda state: do(depth.set_brush, replace(state.brush, tool=tool, is_on=True))
 
 
 def _invert_depth(state: AppState) -> Action:
     edits = state.depth.edits
-    return SetTone(replace(edits, is_inverted=not edits.is_inverted), is_finished=True)
+    return do(depth.set_tone, replace(edits, is_inverted=not edits.is_inverted), is_finished=True)
 
 
 COMMANDS: tuple[Command, ...] = (
@@ -180,9 +179,9 @@ COMMANDS: tuple[Command, ...] = (
     Command("Depth brush", _toggle_brush, (Chord("b"),)),
     *(Command(f"Depth brush: {BRUSH_WORDS[tool].lower()}", _brush_with(tool)) for tool in BRUSH_TOOLS),
     Command("Invert depth", _invert_depth),
-    Command("Reset depth edits", _always(ResetDepth())),
+    Command("Reset depth edits", _always(do(depth.reset))),
     Command("Open a depth map…", _always(do(ask, ChooseTask("map")))),
-    Command("Get true depth", _always(GetDepth())),
+    Command("Get true depth", _always(do(depth_models.get_depth))),
     Command("Depth models…", _always(do(messages.show_prompt, ModelsPrompt()))),
     Command("Save the depth map…", _always(do(saving.ask_to_save, "map"))),
     Command("EPI strips", lambda s: do(inspection.show_epis, not s.inspection.shows_epis), (Chord("e"),)),
@@ -251,5 +250,5 @@ def action_for_path(what: ChoiceOf, path: str, state: AppState) -> Action:
         case "map" if state.source is not None:
             return OpenPath(source_with_map(state.source, path))
         case "model" | "model folder" if state.source is not None:
-            return UseModel(path)
+            return do(depth_models.use_model, path)
     return OpenPath(source_beside(state.source, path))

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from viewer.model.depth import end_stroke
 from viewer.model.inspection import release_divider
-from viewer.model.reducers.depth_editing_reducer import end_stroke
 from viewer.model.state.app_state import AppState
 
 
 def end_gesture(state: AppState) -> AppState:
     """Let go of what is held: the next step is another edit, for undo."""
+    state = release_divider(end_stroke(state))
     if state.tilt_handles is not None and state.tilt_handles.taken is not None:
         state = replace(state, tilt_handles=replace(state.tilt_handles, taken=None))
     if state.history.gesture:
         state = replace(state, history=replace(state.history, gesture=""))
-    return release_divider(end_stroke(state))
+    return state

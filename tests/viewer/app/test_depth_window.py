@@ -14,9 +14,9 @@ from iibr_core.depth.editing.edits import DepthEdits
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import FAR, NEAR, Driver, Opener
 from viewer.app.main_loop import App
-from viewer.model import gesture, inspection, lens, messages, saving
+from viewer.model import depth, gesture, inspection, lens, messages, saving
 from viewer.model.action import do
-from viewer.model.state.depth_editing import Brush, SetBrush, SetTone
+from viewer.model.state.depth import Brush
 from viewer.model.state.notices import Notice
 from viewer.model.state.preferences import SECTIONS, with_sections
 from viewer.model.state.prompts import PathPrompt, SavePrompt
@@ -69,7 +69,9 @@ def press_at(viewer: Driver, x_share: float, y_share: float) -> None:
 
 
 def test_a_stroke_is_seen_while_it_is_drawn_and_made_when_it_ends(viewer: Driver) -> None:
-    viewer.app.do(do(lens.move_eye, ViewOffset(0.0, 1.0)), SetBrush(Brush(radius=0.1, strength=1.0, is_on=True)))
+    viewer.app.do(
+        do(lens.move_eye, ViewOffset(0.0, 1.0)), do(depth.set_brush, Brush(radius=0.1, strength=1.0, is_on=True))
+    )
     viewer.until_idle()
     before, given = viewer.image(), disparity_of(viewer.app).copy()
     press_at(viewer, 0.5, 0.5)
@@ -96,7 +98,7 @@ def test_a_stroke_is_seen_while_it_is_drawn_and_made_when_it_ends(viewer: Driver
 
 def test_the_bucket_fills_the_surface_that_is_clicked_with_the_depth_picked_elsewhere(viewer: Driver) -> None:
     given = disparity_of(viewer.app).copy()
-    viewer.app.do(SetBrush(Brush(radius=0.15)))
+    viewer.app.do(do(depth.set_brush, Brush(radius=0.15)))
     viewer.press("Bucket")
     viewer.until(lambda app: app.state.brush.is_on)
     viewer.send("mousemove", *viewer.position(0.1, 0.9))
@@ -119,7 +121,7 @@ def test_the_bucket_fills_the_surface_that_is_clicked_with_the_depth_picked_else
 
 
 def test_escape_in_the_middle_of_a_stroke_takes_it_back(viewer: Driver) -> None:
-    viewer.app.do(SetBrush(Brush(is_on=True)))
+    viewer.app.do(do(depth.set_brush, Brush(is_on=True)))
     viewer.until_idle()
     given = disparity_of(viewer.app).copy()
     press_at(viewer, 0.5, 0.5)
@@ -167,7 +169,8 @@ def test_sliders_and_handles_change_the_map_once_they_are_let_go(viewer: Driver)
     assert 0 < viewer.app.state.depth.edits.far_clip < 0.5
     # where `find` looks
     viewer.app.do(
-        SetTone(replace(viewer.app.state.depth.edits, near_clip=0.77), is_finished=True), do(gesture.end_gesture)
+        do(depth.set_tone, replace(viewer.app.state.depth.edits, near_clip=0.77), is_finished=True),
+        do(gesture.end_gesture),
     )
     until_made(viewer, 3)
     x, y = viewer.find("handle near_clip")

@@ -27,10 +27,9 @@ from viewer.app import job_scene
 from viewer.app.main_loop import App
 from viewer.background.window_work import Steps
 from viewer.display.snapshot import SceneSnapshot
-from viewer.model import gesture, lens, messages, saving
+from viewer.model import depth, gesture, lens, messages, saving
 from viewer.model.action import ask, do
 from viewer.model.actions import Action, OpenPath
-from viewer.model.state.depth_editing import Paint, SetTone
 from viewer.model.state.exporting import ExportPrompt, ExportTask
 from viewer.model.state.jobs import WAITING_FOR_VIEWS, CancelJobTask
 from viewer.model.state.tasks import SaveTask
@@ -106,8 +105,8 @@ def nine_changes(viewer: Driver, folder: Path) -> list[tuple[Action, ...]]:
         (do(lens.set_focus_tilt, (0.5, 0.2)),),
         (do(lens.set_gloss, Gloss()),),
         (do(lens.set_depth_strength, 0.6, is_finished=True),),
-        (Paint((0.5, 0.5)), Paint((0.7, 0.5)), do(gesture.end_gesture)),
-        (SetTone(DepthEdits(gamma=1.7), is_finished=True),),
+        (do(depth.paint, (0.5, 0.5)), do(depth.paint, (0.7, 0.5)), do(gesture.end_gesture)),
+        (do(depth.set_tone, DepthEdits(gamma=1.7), is_finished=True),),
         (OpenPath(replace(source, grid=GridShape(5, 5))),),
         (other_photo(folder),),
     ]

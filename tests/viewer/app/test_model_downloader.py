@@ -20,14 +20,14 @@ from tests.iibr_core.depth.onnx_graphs import published, weighing
 from tests.local_hub import Hub, local_hub
 from tests.viewer.conftest import Driver, Opener
 from viewer.app.main_loop import App
-from viewer.background.model_downloader import list_models
-from viewer.model import gesture, history, lens, messages
+from viewer.background.depth_models import list_models
+from viewer.model import depth, depth_models, gesture, history, lens, messages
 from viewer.model.action import do
 from viewer.model.actions import OpenPath
+from viewer.model.depth_models import offered_model
 from viewer.model.focal_plane import place_of, sharp_disparity
-from viewer.model.reducers.depth_models import offered_model
-from viewer.model.state.depth_editing import Brush, Paint, SetBrush
-from viewer.model.state.model_download import ModelsPrompt, UseModel
+from viewer.model.state.depth import Brush
+from viewer.model.state.depth_models import ModelsPrompt
 from viewer.model.state.preferences import SetPreference
 
 MODEL = known_model("depth-anything-v2-small")
@@ -108,7 +108,9 @@ def test_one_click_deepens_the_picture_as_it_is_seen_and_edited(viewer: Driver, 
         do(lens.focus_on, at, before or 0.0),
         do(lens.set_aperture, 1.0),
     )
-    viewer.app.do(SetBrush(Brush(radius=0.1, strength=1.0)), Paint((0.1, 0.9)), do(gesture.end_gesture))
+    viewer.app.do(
+        do(depth.set_brush, Brush(radius=0.1, strength=1.0)), do(depth.paint, (0.1, 0.9)), do(gesture.end_gesture)
+    )
     viewer.until_idle()
     edits = viewer.app.state.depth.edits
     assert wall_slope(viewer) > 0.5, "a guess has what is low near"
@@ -250,7 +252,7 @@ def test_a_running_estimate_is_given_up_by_one_click(
 
 def test_a_broken_model_leaves_the_guess(viewer: Driver, tmp_path: Path) -> None:
     (tmp_path / "broken.onnx").write_bytes(b"no model")
-    viewer.app.do(UseModel(str(tmp_path / "broken.onnx")))
+    viewer.app.do(do(depth_models.use_model, str(tmp_path / "broken.onnx")))
     viewer.until(lambda app: any(notice.is_error for notice in app.state.notices))
     viewer.until_idle()
     assert depth_kind(viewer.app) == "rough"
@@ -281,7 +283,9 @@ def test_a_photo_opens_with_the_focus_that_it_was_left_with(
 
 def test_a_file_of_ones_own_is_used_in_place_and_is_said_to_be(viewer: Driver, tmp_path: Path) -> None:
     file = weighing(tmp_path / "own.onnx", (1, 1, 1))
-    viewer.app.do(do(lens.move_eye, ViewOffset(0.5, 0.5)), do(gesture.end_gesture), UseModel(str(file)))
+    viewer.app.do(
+        do(lens.move_eye, ViewOffset(0.5, 0.5)), do(gesture.end_gesture), do(depth_models.use_model, str(file))
+    )
     viewer.until(is_deep)
     viewer.until_idle()
     assert viewer.app.state.optics.eye == ViewOffset(0.5, 0.5)

@@ -20,10 +20,9 @@ from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import Driver, Opener, rests
 from viewer.app.session_store import key_of
-from viewer.model import gesture, history, lens
+from viewer.model import depth, gesture, history, lens
 from viewer.model.action import do
 from viewer.model.saved_settings import settings_text
-from viewer.model.state.depth_editing import Paint, SetBrush, SetTone
 from viewer.model.state.saving import SavedSettings
 
 ONE = GridShape(1, 1)
@@ -40,8 +39,10 @@ def change(driver: Driver) -> None:
     app = driver.app
     driver.until_idle()
     app.do(do(lens.move_eye, ViewOffset(0.3, -0.2)), do(lens.set_aperture, 1.5), do(lens.set_focus, 0.25))
-    app.do(SetTone(replace(UNEDITED, gamma=1.5), is_finished=True))
-    app.do(SetBrush(replace(app.state.brush, is_on=True)), Paint((0.5, 0.5)), do(gesture.end_gesture))
+    app.do(do(depth.set_tone, replace(UNEDITED, gamma=1.5), is_finished=True))
+    app.do(
+        do(depth.set_brush, replace(app.state.brush, is_on=True)), do(depth.paint, (0.5, 0.5)), do(gesture.end_gesture)
+    )
     driver.until_idle()
 
 
@@ -131,7 +132,7 @@ def test_many_strokes_are_painted_beside_the_window(
     driver.until_idle()
     assert painted_here == []
     app = driver.app
-    app.do(SetBrush(replace(app.state.brush, is_on=True)), Paint((0.5, 0.5)))
+    app.do(do(depth.set_brush, replace(app.state.brush, is_on=True)), do(depth.paint, (0.5, 0.5)))
     driver.until(lambda app: len(painted_here) > 0)
     app.do(do(gesture.end_gesture))
     driver.until(lambda app: app.state.shown_generation == app.state.generation)

@@ -18,8 +18,8 @@ from viewer.model.action import do
 from viewer.model.actions import OpenPath, SetState, StopWork
 from viewer.model.commands import BY_NAME, COMMANDS
 from viewer.model.layout import PANEL_WIDTH
+from viewer.model.state.depth_models import ModelsPrompt
 from viewer.model.state.exporting import ExportPrompt
-from viewer.model.state.model_download import ModelsPrompt
 from viewer.model.state.notices import Notice
 from viewer.model.state.preferences import SetPreference, ToggleSection
 from viewer.model.state.prompts import FolderContents, PalettePrompt, PathPrompt, SavePrompt

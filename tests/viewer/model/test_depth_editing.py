@@ -29,27 +29,18 @@ from tests.viewer.model.test_reducers import plan_of, scene_of, state_with
 from viewer.app.dropped_files import actions_from_drop
 from viewer.app.image_export import settings_of
 from viewer.app.pointer import Pointer, actions_from_pointer
-from viewer.model import gesture, history, lens, saving
+from viewer.model import depth, gesture, history, lens, saving
 from viewer.model.action import do
 from viewer.model.actions import OpenFailed, OpenPath, SceneOpened
 from viewer.model.commands import action_for_path
-from viewer.model.layout import layout_of
-from viewer.model.reducers.depth_editing_reducer import (
-    depth_settings_for_worker,
+from viewer.model.depth import (
+    settings_for_worker,
 )
+from viewer.model.layout import layout_of
 from viewer.model.reducers.root import reduce
 from viewer.model.saved_settings import settings_from_text, settings_text
 from viewer.model.state.app_state import AppState
-from viewer.model.state.depth_editing import (
-    Brush,
-    DepthSample,
-    Paint,
-    PickDepth,
-    ResetDepth,
-    SetBrush,
-    SetRefine,
-    SetTone,
-)
+from viewer.model.state.depth import Brush, DepthSample
 from viewer.model.state.prompts import SavePrompt
 from viewer.ui.sections.depth_histogram import bar_heights, focus_share
 
@@ -67,35 +58,45 @@ def opened(source: Source | None = None) -> AppState:
 
 
 def test_clips_do_not_cross_and_values_are_clamped() -> None:
-    state = reduce(opened(), SetTone(DepthEdits(far_clip=0.3, near_clip=0.6), True))
-    pushed = reduce(state, SetTone(DepthEdits(far_clip=0.9, near_clip=0.6), True)).depth.edits
+    state = reduce(opened(), do(depth.set_tone, DepthEdits(far_clip=0.3, near_clip=0.6), True))
+    pushed = reduce(state, do(depth.set_tone, DepthEdits(far_clip=0.9, near_clip=0.6), True)).depth.edits
     assert pushed.far_clip < pushed.near_clip == 0.6
-    pulled = reduce(state, SetTone(DepthEdits(far_clip=0.3, near_clip=0.1), True)).depth.edits
+    pulled = reduce(state, do(depth.set_tone, DepthEdits(far_clip=0.3, near_clip=0.1), True)).depth.edits
     assert 0.3 == pulled.far_clip < pulled.near_clip
-    wild = reduce(opened(), SetTone(DepthEdits(far_clip=-3, near_clip=7, gamma=1e9), True)).depth.edits
+    wild = reduce(opened(), do(depth.set_tone, DepthEdits(far_clip=-3, near_clip=7, gamma=1e9), True)).depth.edits
     assert (wild.far_clip, wild.near_clip, wild.gamma) == (0, 1, GAMMA_LIMITS[1])
-    brush = reduce(opened(), SetBrush(Brush(radius=9, strength=9))).brush
+    brush = reduce(opened(), do(depth.set_brush, Brush(radius=9, strength=9))).brush
     assert (brush.radius, brush.strength) == (RADIUS_LIMITS[1], 1)
 
 
 def test_values_that_are_not_finite_change_nothing() -> None:
     nan, state = float("nan"), opened()
-    for action in (SetTone(DepthEdits(gamma=nan), True), SetBrush(Brush(radius=nan)), Paint((nan, 0.0))):
+    for action in (
+        do(depth.set_tone, DepthEdits(gamma=nan), True),
+        do(depth.set_brush, Brush(radius=nan)),
+        do(depth.paint, (nan, 0.0)),
+    ):
         assert reduce(state, action) == state
-    assert reduce(state, PickDepth(DepthSample((0.5, 0.5), float("inf")))) == state
+    assert reduce(state, do(depth.pick, DepthSample((0.5, 0.5), float("inf")))) == state
 
 
 def test_a_stroke_keeps_points_that_lie_apart() -> None:
-    drawn = after(opened(), Paint((0.1, 0.1)), Paint((0.101, 0.1)), Paint((0.3, 0.1)), do(gesture.end_gesture))
+    drawn = after(
+        opened(),
+        do(depth.paint, (0.1, 0.1)),
+        do(depth.paint, (0.101, 0.1)),
+        do(depth.paint, (0.3, 0.1)),
+        do(gesture.end_gesture),
+    )
     assert drawn.depth.edits.strokes == (Stroke("nearer", ((0.1, 0.1), (0.3, 0.1)), 0.06, Brush().strength),)
 
 
 @pytest.mark.parametrize("tool", DEPTH_TOOLS)
 def test_level_and_bucket_give_the_picked_depth_wholly_until_another_photo_opens(tool: BrushTool) -> None:
-    start = reduce(opened(), SetBrush(Brush(tool, strength=0.2, is_on=True)))
-    picked = reduce(start, PickDepth(SAMPLE))
+    start = reduce(opened(), do(depth.set_brush, Brush(tool, strength=0.2, is_on=True)))
+    picked = reduce(start, do(depth.pick, SAMPLE))
     for state, taken_from in ((start, None), (picked, SAMPLE.place)):
-        stroke = reduce(state, Paint((0.1, 0.1))).stroke
+        stroke = reduce(state, do(depth.paint, (0.1, 0.1))).stroke
         assert stroke == Stroke(tool, ((0.1, 0.1),), stroke.radius if stroke else 0, 1.0, taken_from)
     elsewhere = reduce(picked, SceneOpened(picked.generation, scene_of(GRID, source=Source("b.png"))))
     assert elsewhere.brush.sample is None
@@ -103,25 +104,25 @@ def test_level_and_bucket_give_the_picked_depth_wholly_until_another_photo_opens
 
 def test_the_depth_of_a_light_field_is_left_alone() -> None:
     start = state_with(scene_of())
-    assert reduce(start, SetTone(TONE, True)) == start
-    told = reduce(start, SetBrush(Brush(is_on=True)))
+    assert reduce(start, do(depth.set_tone, TONE, True)) == start
+    told = reduce(start, do(depth.set_brush, Brush(is_on=True)))
     assert not told.brush.is_on
     assert "cannot be edited" in told.notices[-1].text
 
 
 def test_another_photo_begins_with_its_own_depth_and_a_failed_one_gives_the_old_back() -> None:
-    edited = after(opened(), SetTone(TONE, True), SetRefine(False))
+    edited = after(opened(), do(depth.set_tone, TONE, True), do(depth.set_refine, False))
     source = Source("b.png", DepthChoice(refine=False))
     asked = reduce(edited, OpenPath(source))
-    assert depth_settings_for_worker(asked) == DepthSettings(False)
+    assert settings_for_worker(asked) == DepthSettings(False)
     failed = reduce(asked, OpenFailed(asked.generation, "gone"))
-    assert depth_settings_for_worker(failed) == edited.depth
+    assert settings_for_worker(failed) == edited.depth
     scene = scene_of(GRID, source=source, plan=plan_of(GRID))
     assert reduce(asked, SceneOpened(asked.generation, scene)).depth == DepthSettings(False)
 
 
 def test_the_same_scene_planned_anew_keeps_its_edits_and_its_history() -> None:
-    edited = after(opened(), SetTone(TONE, True), do(gesture.end_gesture))
+    edited = after(opened(), do(depth.set_tone, TONE, True), do(gesture.end_gesture))
     assert edited.scene is not None
     state = reduce(edited, SceneOpened(edited.generation, replace(edited.scene, plan=plan_of(GRID, scale=0.5))))
     assert state.depth == edited.depth
@@ -130,7 +131,10 @@ def test_the_same_scene_planned_anew_keeps_its_edits_and_its_history() -> None:
 
 def test_reset_takes_everything_back_at_once() -> None:
     state = after(
-        opened(Source("a.png", DepthChoice(refine=False))), SetTone(TONE, True), SetRefine(True), ResetDepth()
+        opened(Source("a.png", DepthChoice(refine=False))),
+        do(depth.set_tone, TONE, True),
+        do(depth.set_refine, True),
+        do(depth.reset),
     )
     assert state.depth == DepthSettings(False)
 
@@ -168,12 +172,11 @@ def test_the_brush_paints_on_the_surface_seen_under_it() -> None:
     )
     pointer, layout = pointer_at(0.5, 0.25, is_down=True, is_pressed=True)
     (paint,) = actions_from_pointer(pointer, layout, state, lambda x, y: 3.0)  # type: ignore[arg-type]
-    assert isinstance(paint, Paint)
-    assert paint.place == pytest.approx((0.5 + 3 / 96, 0.25 - 3 / 64))
+    assert paint.verb is depth.paint
+    assert paint.args[0] == pytest.approx((0.5 + 3 / 96, 0.25 - 3 / 64))
     wheel, layout = pointer_at(0.5, 0.5, wheel=1.0)
     (larger,) = actions_from_pointer(wheel, layout, state, lambda x, y: None)  # type: ignore[arg-type]
-    assert isinstance(larger, SetBrush)
-    assert larger.brush.radius > state.brush.radius
+    assert reduce(state, larger).brush.radius > state.brush.radius
     drag, layout = pointer_at(0.5, 0.5, is_down=True, drag_distance=50.0)
     assert actions_from_pointer(drag, layout, state, lambda x, y: 0.0) == [], "it began elsewhere"  # type: ignore[arg-type]
 

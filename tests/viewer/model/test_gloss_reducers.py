@@ -6,11 +6,11 @@ from dataclasses import replace
 
 from iibr_core.types import GridShape
 from tests.viewer.model.test_reducers import plan_of, scene_of, state_with
-from viewer.model import gesture, history, lens
+from viewer.model import depth, gesture, history, lens
 from viewer.model.action import do
 from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState
-from viewer.model.state.depth_editing import Brush, SetBrush
+from viewer.model.state.depth import Brush
 from viewer.model.state.lens import FIRST_GLOSS, GlossBrush
 
 BRUSH = GlossBrush(radius=0.1, is_on=True)
@@ -56,7 +56,7 @@ def test_painting_without_gloss_does_nothing() -> None:
 
 def test_there_is_one_brush_in_hand() -> None:
     state = replace(glossy(), scene=scene_of(plan=plan_of(GridShape(9, 9))))
-    state = reduce(reduce(state, SetBrush(Brush(is_on=True))), do(lens.take_gloss_brush, BRUSH))
+    state = reduce(reduce(state, do(depth.set_brush, Brush(is_on=True))), do(lens.take_gloss_brush, BRUSH))
     assert (state.brush.is_on, state.gloss_brush.is_on) == (False, True)
-    state = reduce(state, SetBrush(Brush(is_on=True)))
+    state = reduce(state, do(depth.set_brush, Brush(is_on=True)))
     assert (state.brush.is_on, state.gloss_brush.is_on) == (True, False)

@@ -18,15 +18,15 @@ from iibr_core.scenes.scene import DepthSettings
 from iibr_core.scenes.screen_size import ScreenSize
 from tests.viewer.conftest import headless_with_scene
 from tests.viewer.ui.watched_widgets import watch_widgets
-from viewer.background.model_downloader import list_models
+from viewer.background.depth_models import list_models
 from viewer.display.offscreen import OffscreenScene
 from viewer.model import lens, messages
 from viewer.model.action import do
 from viewer.model.layout import PANEL_WIDTH
 from viewer.model.state.app_state import AppState
+from viewer.model.state.depth_models import ModelsPrompt
 from viewer.model.state.exporting import ExportPrompt
 from viewer.model.state.jobs import JobProgress
-from viewer.model.state.model_download import ModelsPrompt
 from viewer.model.state.preferences import SECTIONS, SetPreference, Theme, Units
 from viewer.model.state.prompts import PalettePrompt, PathPrompt, Prompt, SavePrompt
 from viewer.ui.overlays.export_prompt import MOTION_TIPS

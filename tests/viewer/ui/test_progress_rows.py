@@ -6,8 +6,8 @@ from dataclasses import replace
 
 from viewer.model.action import ask, do
 from viewer.model.state.app_state import AppState
+from viewer.model.state.depth_models import CancelGetTask, DepthModels, Downloading
 from viewer.model.state.jobs import STOPPING, WRITING, CancelJobTask, JobProgress
-from viewer.model.state.model_download import CancelGetTask, DepthModels, Downloading
 from viewer.ui.overlays.progress_rows import progress_rows
 
 

@@ -13,10 +13,10 @@ from iibr_core.beyond.optics import APERTURE_KINDS, ApertureMask, ApertureShape
 from iibr_core.scenes.screen_size import ScreenSize
 from tests.viewer.conftest import headless_with_scene
 from viewer.display.offscreen import OffscreenScene
-from viewer.model import inspection, lens, viewpoint
+from viewer.model import depth, inspection, lens, viewpoint
 from viewer.model.action import do
 from viewer.model.actions import Action
-from viewer.model.state.depth_editing import Brush, DepthSample, PickDepth, SetBrush
+from viewer.model.state.depth import Brush, DepthSample
 from viewer.model.state.lens import FIRST_GLOSS, GlossBrush
 from viewer.model.state.preferences import SECTIONS
 
@@ -35,8 +35,8 @@ SWITCHES: dict[str, tuple[Action, ...]] = {
         do(lens.set_gloss, replace(FIRST_GLOSS, surface=replace(FIRST_GLOSS.surface, color=(1, 0, 0)))),
     ),
     "gloss brush": (GLOSSY, do(lens.take_gloss_brush, GlossBrush(is_on=True))),
-    "brush": (SetBrush(Brush("nearer", is_on=True)),),
-    "bucket": (SetBrush(Brush("fill", is_on=True)), PickDepth(DepthSample((0.5, 0.5), 1.0))),
+    "brush": (do(depth.set_brush, Brush("nearer", is_on=True)),),
+    "bucket": (do(depth.set_brush, Brush("fill", is_on=True)), do(depth.pick, DepthSample((0.5, 0.5), 1.0))),
     "EPIs": (do(inspection.show_epis, True),),
     "overlay": (do(inspection.set_overlay, "disparity"),),
     "photo": (do(inspection.compare, "photo"),),

@@ -14,15 +14,11 @@ from viewer.model.actions import Action, OpenPath, RestoreSession, SetState, Sto
 from viewer.model.carried_optics import with_focus_of
 from viewer.model.history import record_edit
 from viewer.model.messages import notify
-from viewer.model.reducers.depth_editing_reducer import reduce_depth
-from viewer.model.reducers.depth_models import reduce_models
 from viewer.model.reducers.folder_reducer import list_folder, photo_after, scroll_filmstrip
 from viewer.model.reducers.preferences_reducer import reduce_preferences
 from viewer.model.reducers.worker_events import reduce_worker_event, stop_work
 from viewer.model.state.app_state import AppState
-from viewer.model.state.depth_editing import DepthAction
 from viewer.model.state.folder import FolderListed, ScrollFilmstrip, SetFolderOrder, StepPhoto
-from viewer.model.state.model_download import ModelAction
 from viewer.model.state.notices import Notice
 from viewer.model.state.preferences import PreferencesAction
 from viewer.model.state.saving import SavedSettings
@@ -37,10 +33,6 @@ def reduce(state: AppState, action: Action) -> AppState:
         return action.apply(state)
     if isinstance(action, WorkerEvent):
         return reduce_worker_event(state, action)
-    if isinstance(action, DepthAction):
-        return reduce_depth(state, action)
-    if isinstance(action, ModelAction):
-        return reduce_models(state, action)
     if isinstance(action, PreferencesAction):
         return replace(state, preferences=reduce_preferences(state.preferences, action))
     match action:

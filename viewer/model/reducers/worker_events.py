@@ -17,9 +17,9 @@ from viewer.model.messages import MAX_NOTICES, notify
 from viewer.model.reducers.folder_reducer import is_stepped_to
 from viewer.model.remedies import DEPTH_COMMANDS
 from viewer.model.state.app_state import AppState
+from viewer.model.state.depth_models import ListModelsTask
 from viewer.model.state.folder import ListFolderTask
 from viewer.model.state.history import History
-from viewer.model.state.model_download import ListModelsTask
 from viewer.model.state.notices import Notice
 from viewer.model.state.photo_facts import ReadFactsTask
 from viewer.model.state.viewpoint import Motion

@@ -12,13 +12,13 @@ from iibr_core.depth.editing.edits import Stroke
 from iibr_core.scenes.rect import WHOLE, Rect
 from iibr_core.scenes.scene import AS_FOUND, DepthSettings, Progress, Scene, Source
 from iibr_core.scenes.screen_size import ScreenSize
-from viewer.model.state.depth_editing import Brush
+from viewer.model.state.depth import Brush
+from viewer.model.state.depth_models import DepthModels
 from viewer.model.state.folder import PhotoFolder
 from viewer.model.state.history import History
 from viewer.model.state.inspection import Inspection
 from viewer.model.state.jobs import JobProgress
 from viewer.model.state.lens import GlossBrush, TiltHandles
-from viewer.model.state.model_download import DepthModels
 from viewer.model.state.notices import Notice
 from viewer.model.state.photo_facts import NO_FACTS, PhotoFacts
 from viewer.model.state.preferences import Preferences

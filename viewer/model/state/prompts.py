@@ -8,8 +8,8 @@ from typing import Literal
 from iibr_core.formats.images.picture_kinds import AS_USUAL as USUAL_FORM
 from iibr_core.formats.images.picture_kinds import PictureFormat
 from iibr_core.scenes.screen_size import ScreenSize
+from viewer.model.state.depth_models import ModelsPrompt
 from viewer.model.state.exporting import ExportPrompt
-from viewer.model.state.model_download import ModelsPrompt
 
 ChoiceOf = Literal["photo", "folder", "mask", "map", "model", "model folder", "place"]
 """map: a disparity map for the open photo; model: an ONNX file of a depth model; place: where a file goes."""

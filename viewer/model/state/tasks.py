@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from iibr_core.formats.images.picture_kinds import AS_USUAL as USUAL_FORM
 from iibr_core.formats.images.picture_kinds import PictureFormat
 from iibr_core.scenes.screen_size import ScreenSize
+from viewer.model.state.depth_models import CancelGetTask, GetModelTask, ListModelsTask
 from viewer.model.state.exporting import ExportPrompt, ExportTask
 from viewer.model.state.folder import ListFolderTask
 from viewer.model.state.jobs import CancelJobTask
-from viewer.model.state.model_download import CancelGetTask, GetModelTask, ListModelsTask
 from viewer.model.state.photo_facts import ReadFactsTask
 from viewer.model.state.prompts import ChoiceOf, ListContentsTask, Saved, SavePrompt
 from viewer.model.state.saving import CopyTask, PasteTask

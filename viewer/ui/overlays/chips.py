@@ -7,13 +7,12 @@ from __future__ import annotations
 from imgui_bundle import icons_fontawesome_6 as icons
 from imgui_bundle import imgui
 
-from viewer.model import viewpoint
+from viewer.model import depth_models, viewpoint
 from viewer.model.action import do
 from viewer.model.actions import Action
 from viewer.model.commands import toggle_panel
 from viewer.model.layout import Layout
 from viewer.model.state.app_state import AppState
-from viewer.model.state.model_download import ShowOffer
 from viewer.ui.overlays.prompt_rows import CARD_FLAGS
 from viewer.ui.style import DARK
 from viewer.ui.widgets import tooltip
@@ -43,7 +42,7 @@ def chips(state: AppState, layout: Layout) -> list[Action]:
         if _chip(CHIP, f"{icons.ICON_FA_VIDEO}  {words}###leave", layout, is_right=True):
             actions.append(do(viewpoint.leave_camera))
     elif scene.is_guessed and imgui.calc_text_size(BADGE).x + 4 * GAP * layout.ui_scale <= frame.width:
-        actions += [ShowOffer(True)] if _chip(BADGE, BADGE, layout, GUESS_TIP) else []
+        actions += [do(depth_models.show_offer, True)] if _chip(BADGE, BADGE, layout, GUESS_TIP) else []
     return actions
 
 

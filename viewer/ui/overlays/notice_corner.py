@@ -6,14 +6,14 @@ from __future__ import annotations
 
 from imgui_bundle import imgui
 
-from viewer.model import messages
+from viewer.model import depth_models, messages
 from viewer.model.action import do
 from viewer.model.actions import Action, TakeSettings
 from viewer.model.commands import BY_NAME
+from viewer.model.depth_models import offered_model
 from viewer.model.layout import MARGIN, STRIP_GAP, Layout
-from viewer.model.reducers.depth_models import offered_model
 from viewer.model.state.app_state import AppState
-from viewer.model.state.model_download import GetDepth, ModelOffer, ShowOffer
+from viewer.model.state.depth_models import ModelOffer
 from viewer.model.state.notices import Notice
 from viewer.ui.overlays.progress_rows import build_rows, progress_rows
 from viewer.ui.overlays.prompt_rows import CARD_FLAGS, button_rows
@@ -65,14 +65,14 @@ def _offer(model: ModelOffer) -> list[Action]:
     elif not model.is_here:
         words = f"{model.title} finds true depth: {model.megabytes:,} MB, {model.licence}, from {model.host}."
         button = "Get true depth"
-    actions: list[Action] = [ShowOffer(False)] if imgui.button("×##offer") else []
+    actions: list[Action] = [do(depth_models.show_offer, False)] if imgui.button("×##offer") else []
     imgui.same_line()
     imgui.begin_group()
     imgui.align_text_to_frame_padding()
     imgui.text_wrapped("Depth is guessed: near and far may be wrong.")
     quiet(words)
     if not model.lacks:
-        actions += button_rows([(button, GetDepth())])
+        actions += button_rows([(button, do(depth_models.get_depth))])
     imgui.end_group()
     return actions
 

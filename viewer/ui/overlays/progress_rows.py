@@ -10,14 +10,13 @@ from dataclasses import dataclass
 from imgui_bundle import imgui
 
 from iibr_core.runtime.time_left import about_left
-from viewer.model import viewpoint
+from viewer.model import depth_models, viewpoint
 from viewer.model.action import ask, do
 from viewer.model.actions import Action
 from viewer.model.layout import Layout
-from viewer.model.reducers.depth_models import wanted_model
 from viewer.model.state.app_state import AppState
+from viewer.model.state.depth_models import CancelGetTask
 from viewer.model.state.jobs import WRITING, CancelJobTask, JobKind, JobProgress
-from viewer.model.state.model_download import CancelGetTask, GiveUpEstimate
 from viewer.ui.widgets import gap, last_part, tooltip
 
 VERBS: dict[JobKind, str] = {
@@ -103,8 +102,8 @@ def _work_on_views(state: AppState) -> Iterator[ProgressRow]:
         words = f"{downloading.done:,} of {downloading.total:,} MB"
         share = downloading.done / max(downloading.total, 1)
         yield ProgressRow("download", f"Downloading {downloading.title}", words, share, do(ask, CancelGetTask()))
-    model = wanted_model(state)
+    model = depth_models.wanted_model(state)
     if model is not None:
         titles = {offer.name: offer.title for offer in state.models.known}
         words = f"with {titles.get(model, last_part(model))}"
-        yield ProgressRow("estimate", "Estimating depth", words, 0.0, GiveUpEstimate())
+        yield ProgressRow("estimate", "Estimating depth", words, 0.0, do(depth_models.give_up))

@@ -18,9 +18,9 @@ from viewer.model.actions import Action
 from viewer.model.commands import COMMANDS, Command, commands_matching, recent_commands
 from viewer.model.layout import PANEL_WIDTH, Layout
 from viewer.model.state.app_state import AppState
+from viewer.model.state.depth_models import ModelsPrompt
 from viewer.model.state.exporting import ExportPrompt
 from viewer.model.state.jobs import JobProgress
-from viewer.model.state.model_download import ModelsPrompt
 from viewer.model.state.prompts import PalettePrompt, PathPrompt, Prompt, SavePrompt
 from viewer.model.state.tasks import ChoosePlaceTask, SaveTask
 from viewer.ui.overlays.export_prompt import ALREADY_THERE, export_prompt

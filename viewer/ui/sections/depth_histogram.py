@@ -9,11 +9,12 @@ from imgui_bundle import imgui
 from iibr_core.depth.editing.edits import DepthEdits, Levels, invert_tone_curve, tone_curve
 from iibr_core.scenes.rect import Rect
 from iibr_core.scenes.scene import Scene
+from viewer.model import depth
+from viewer.model.action import do
 from viewer.model.actions import Action
 from viewer.model.colormap import map_color
 from viewer.model.layout import Layout
 from viewer.model.state.app_state import AppState
-from viewer.model.state.depth_editing import SetTone
 from viewer.ui.style import corners, pack_color, palette_of
 from viewer.ui.widgets import tooltip
 
@@ -101,4 +102,4 @@ def _handle(name: str, rect: Rect, state: AppState, scale: float) -> list[Action
         return []
     share = min(max((imgui.get_io().mouse_pos.x - left) / width, 0.0), 1.0)
     changed: DepthEdits = replace(edits, **{name: share})  # type: ignore[arg-type]
-    return [SetTone(changed, is_finished=is_released)]
+    return [do(depth.set_tone, changed, is_finished=is_released)]

@@ -9,15 +9,15 @@ from imgui_bundle import imgui
 from iibr_core.depth.choice import DepthStart
 from iibr_core.depth.editing.edits import BRUSH_TOOLS, DEPTH_TOOLS, GAMMA_LIMITS, RADIUS_LIMITS, BrushTool, DepthEdits
 from iibr_core.scenes.scene import Scene, source_with_depth
-from viewer.model import inspection, messages, saving
+from viewer.model import depth, depth_models, inspection, messages, saving
 from viewer.model.action import ask, do
 from viewer.model.actions import Action, OpenPath
 from viewer.model.commands import BRUSH_WORDS
 from viewer.model.layout import Layout
 from viewer.model.remedies import BETTER_DEPTH
 from viewer.model.state.app_state import AppState
-from viewer.model.state.depth_editing import Brush, ResetDepth, SetBrush, SetRefine, SetTone
-from viewer.model.state.model_download import DepthModels, ModelsPrompt, UseModel
+from viewer.model.state.depth import Brush
+from viewer.model.state.depth_models import DepthModels, ModelsPrompt
 from viewer.model.state.preferences import SetPreference
 from viewer.model.state.tasks import ChooseTask
 from viewer.ui.sections.depth_histogram import depth_histogram
@@ -124,7 +124,9 @@ def _origin(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
         actions.append(do(messages.show_prompt, ModelsPrompt()))
     elif picked is not None:
         start, model = ways[picked]
-        actions.append(UseModel(model) if model is not None else OpenPath(source_with_depth(source, start)))
+        actions.append(
+            do(depth_models.use_model, model) if model is not None else OpenPath(source_with_depth(source, start))
+        )
     return actions
 
 
@@ -146,7 +148,7 @@ def _choice_text(start: DepthStart, model: str | None, path: str | None) -> str:
 
 def _refine(state: AppState, layout: Layout) -> list[Action]:
     refines = checkbox("Refine edges", state.depth.refine, layout, REFINE_TIP)
-    return [] if refines is None else [SetRefine(refines)]
+    return [] if refines is None else [do(depth.set_refine, refines)]
 
 
 def _tone(state: AppState, layout: Layout) -> list[Action]:
@@ -157,7 +159,7 @@ def _tone(state: AppState, layout: Layout) -> list[Action]:
         is_finished = imgui.is_item_deactivated_after_edit()
         if value is not None or is_finished:
             changed: DepthEdits = edits if value is None else replace(edits, **{name: value})  # type: ignore[arg-type]
-            actions.append(SetTone(changed, is_finished))
+            actions.append(do(depth.set_tone, changed, is_finished))
 
     far_form = "off" if edits.far_clip == 0 else "%.2f"
     edit(slider("Far clip", edits.far_clip, (0.0, 1.0), far_form, layout, FAR_TIP), "far_clip")
@@ -166,7 +168,7 @@ def _tone(state: AppState, layout: Layout) -> list[Action]:
     edit(slider("Gamma", edits.gamma, GAMMA_LIMITS, "%.2f", layout, GAMMA_TIP, is_logarithmic=True), "gamma")
     inverted = checkbox("Invert", edits.is_inverted, layout, INVERT_TIP)
     if inverted is not None:
-        actions.append(SetTone(replace(edits, is_inverted=inverted), is_finished=True))
+        actions.append(do(depth.set_tone, replace(edits, is_inverted=inverted), is_finished=True))
     imgui.same_line()
     shows = state.inspection.overlay == "disparity"
     shown = checkbox("Show as colours", shows, layout, "Depth over the picture: the lighter, the nearer (D).")
@@ -183,11 +185,11 @@ def _brush(state: AppState, layout: Layout) -> list[Action]:
     for tool, width in in_row(BRUSH_TOOLS, layout, TOOLS_A_ROW):
         is_in_hand = brush.is_on and brush.tool == tool
         if choice(BRUSH_WORDS[tool], is_in_hand, layout, (width, 0), BRUSH_TIPS[tool]):
-            actions.append(SetBrush(replace(brush, tool=tool, is_on=not is_in_hand)))
+            actions.append(do(depth.set_brush, replace(brush, tool=tool, is_on=not is_in_hand)))
     limits = (100 * RADIUS_LIMITS[0], 100 * RADIUS_LIMITS[1])
     tip = "How wide it paints, as a share of the photo's width (wheel over the picture)."
     size = slider("Size", 100 * brush.radius, limits, "%.1f %%", layout, tip, True, brush.is_on)
-    actions += [] if size is None else [SetBrush(replace(brush, radius=size / 100))]
+    actions += [] if size is None else [do(depth.set_brush, replace(brush, radius=size / 100))]
     actions += _strength(brush, layout) + _sample(brush, layout)
     _scroll_here_when_taken(brush.is_on)
     return actions
@@ -204,14 +206,14 @@ def _scroll_here_when_taken(is_in_hand: bool) -> None:
 def _strength(brush: Brush, layout: Layout) -> list[Action]:
     is_used = brush.is_on and brush.tool not in DEPTH_TOOLS
     strength = percent_slider("Strength", brush.strength, layout, STROKE_TIP, is_used)
-    return [] if strength is None else [SetBrush(replace(brush, strength=strength))]
+    return [] if strength is None else [do(depth.set_brush, replace(brush, strength=strength))]
 
 
 def _sample(brush: Brush, layout: Layout) -> list[Action]:
     """Level and bucket give the depth where one presses, or that of the place that was picked."""
     is_picked = brush.is_on and brush.tool in DEPTH_TOOLS and brush.sample is not None
     is_dropped = button("Forget the picked depth", layout, SAMPLE_TIP, is_picked)
-    return [SetBrush(replace(brush, sample=None))] if is_dropped else []
+    return [do(depth.set_brush, replace(brush, sample=None))] if is_dropped else []
 
 
 def _files(state: AppState, layout: Layout) -> list[Action]:
@@ -224,5 +226,5 @@ def _files(state: AppState, layout: Layout) -> list[Action]:
     imgui.same_line(0, 4 * layout.ui_scale)
     is_edited = state.source is not None and state.depth.edits != DepthEdits()
     if button("Reset", layout, "Depth as it was found, without your edits.", is_edited):
-        actions.append(ResetDepth())
+        actions.append(do(depth.reset))
     return actions

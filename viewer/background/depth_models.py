@@ -1,0 +1,158 @@
+"""Depth models in threads: their list, their download, and the estimate for the open photo."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from urllib.parse import urlsplit
+
+import numpy as np
+
+from iibr_core.depth.models.catalog import fetch, known_model, model_here
+from iibr_core.depth.models.known import KNOWN_MODELS, KnownModel, missing_package
+from iibr_core.runtime.work import Cancelled, watched
+from iibr_core.scenes.scene import LoadedPhoto, Source
+from iibr_core.types import FloatImage
+from viewer.background.newest import Failed, Newest, Post
+from viewer.model import depth_models, messages
+from viewer.model.action import Action as VerbAction
+from viewer.model.action import do
+from viewer.model.actions import Action, SamePlaces
+from viewer.model.remedies import DEPTH_COMMANDS
+from viewer.model.state.app_state import AppState
+from viewer.model.state.depth_models import Downloading, ModelOffer
+from viewer.model.state.notices import Notice
+
+MEGABYTE = 1e6
+COMPARED = 200
+"""So many rows and columns of two maps are compared, at most."""
+PAIRS = 33
+
+
+@dataclass(frozen=True, eq=False)
+class EstimateRequest:
+    """A photo as it is open, a model's name or path, and whether edges are refined."""
+
+    source: Source
+    loaded: LoadedPhoto
+    model: str
+    refine: bool
+
+
+class DepthFinder:
+    """Estimates depth of the open photo where the state wants that. Called from the thread of the window."""
+
+    def __init__(self, wake: Callable[[], None]) -> None:
+        """wake: called, in the thread, when a result was posted."""
+        self._newest: Newest[EstimateRequest, LoadedPhoto] = Newest("iibr-depth", _estimate, wake)
+        self._asked: EstimateRequest | None = None
+        self._found: LoadedPhoto | None = None
+
+    def advance(self, state: AppState, loaded: LoadedPhoto | None) -> list[Action]:
+        """Return what came of an estimate, and start the one that is wanted now."""
+        result = self._newest.next_result()
+        if result is not None and self._asked is not None:
+            model, self._asked = self._asked.model, None
+            if isinstance(result, Failed):
+                notice = Notice(result.message, is_error=True, commands=DEPTH_COMMANDS)
+                return [do(depth_models.give_up), do(messages.notify, notice)]
+            self._found = result
+            return [do(depth_models.take_estimate, model)]
+        self._start(state, loaded)
+        return []
+
+    def newest(self, loaded: LoadedPhoto | None) -> LoadedPhoto | None:
+        """Return the loaded photo, with the depth that was estimated for it if the screen does not show that yet."""
+        found = self._found
+        if loaded is None or found is None or found.photo is not loaded.photo or found.found is loaded.found:
+            self._found = None
+            return loaded
+        return found
+
+    def close(self) -> None:
+        """Stop the thread."""
+        self._newest.close()
+
+    def _start(self, state: AppState, loaded: LoadedPhoto | None) -> None:
+        model, asked = depth_models.wanted_model(state), self._asked
+        if model is None or loaded is None or state.scene is None:
+            self._newest.cancel()
+            self._asked = None
+        elif asked is None or model != asked.model or loaded.photo is not asked.loaded.photo:
+            self._asked = EstimateRequest(state.scene.source, loaded, model, state.depth.refine)
+            self._newest.submit(self._asked)
+
+
+def _estimate(request: EstimateRequest, post: Post[LoadedPhoto]) -> None:
+    from iibr_core.scenes.photo import deepen
+
+    source = request.source
+    source = replace(source, depth=replace(source.depth, file=None, start="model", model=request.model))
+    post(deepen(source, request.loaded, request.refine))
+
+
+def download(name: str, post: Post[VerbAction]) -> None:
+    """Download a known model and post the progress as actions. A model that came is used where it is wanted."""
+    model = known_model(name)
+    shown = Downloading(model.title, 0, model.megabytes)
+    post(do(depth_models.set_downloading, shown))
+
+    def report(done_bytes: float, total_bytes: float, doing: str) -> None:
+        nonlocal shown
+        latest = Downloading(model.title, int(done_bytes / MEGABYTE), max(int(total_bytes / MEGABYTE), 1))
+        if latest != shown:
+            shown = latest
+            post(do(depth_models.set_downloading, latest))
+
+    with suppress(Cancelled), watched(report):
+        fetch(model)
+        models = list_models()
+        post(do(depth_models.set_known, models))
+        post(do(depth_models.set_downloading, None))
+        (offer,) = (offer for offer in models if offer.name == name)
+        if offer.lacks:
+            post(do(messages.notify, Notice(f"{offer.title} is here. It {offer.lacks}.")))
+
+
+def actions_of_download(result: VerbAction | Failed[str]) -> list[Action]:
+    """Return what follows from a step of a download, or from its failure."""
+    if isinstance(result, Failed):
+        return [do(depth_models.set_downloading, None), do(messages.notify, Notice(result.message, is_error=True))]
+    return [result]
+
+
+def list_models() -> tuple[ModelOffer, ...]:
+    """Return the known models. Takes half a second the first time."""
+    return tuple(map(_offer_of, KNOWN_MODELS))
+
+
+def _offer_of(model: KnownModel) -> ModelOffer:
+    from huggingface_hub import constants
+
+    package = missing_package(model.runner)
+    return ModelOffer(
+        model.name,
+        model.title,
+        model.megabytes,
+        model.licence,
+        host=urlsplit(constants.ENDPOINT).netloc,
+        words=" ".join(filter(None, (f"{model.figures}.", model.advice, model.needs))),
+        is_here=model_here(model) is not None,
+        lacks=f"needs the package {package}" if package else "",
+        is_recommended=model.is_recommended,
+    )
+
+
+def same_places(before: FloatImage, now: FloatImage, focused_at: tuple[float, float] | None) -> SamePlaces:
+    """Two field disparities (H, W) of one photo, compared. focused_at: a place, -1..1 across the picture, y down."""
+    steps = tuple(slice(None, None, -(-length // COMPARED)) for length in before.shape)
+    old, new = before[steps].ravel(), now[steps].ravel()
+    order = np.array_split(np.argsort(old, kind="stable"), min(PAIRS, old.size))
+    pairs = tuple((float(np.median(old[places])), float(np.median(new[places]))) for places in order)
+    if focused_at is None:
+        return SamePlaces(pairs)
+    height, width = before.shape
+    column, row = ((at + 1) / 2 * length - 0.5 for at, length in zip(focused_at, (width, height)))
+    at = min(max(round(row), 0), height - 1), min(max(round(column), 0), width - 1)
+    return SamePlaces(pairs, (float(before[at]), float(now[at])))

@@ -1,0 +1,149 @@
+"""Editing of depth: verbs, and what follows from the state. Values that are not finite change nothing."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import hypot, isfinite
+
+from iibr_core.depth.editing.edits import (
+    DEPTH_TOOLS,
+    GAMMA_LIMITS,
+    MAX_POINTS,
+    RADIUS_LIMITS,
+    UNEDITED,
+    DepthEdits,
+    Stroke,
+)
+from iibr_core.scenes.lens_limits import clamp
+from iibr_core.scenes.scene import DepthSettings
+from viewer.model.history import record_edit, undoable
+from viewer.model.messages import notify
+from viewer.model.state.app_state import AppState
+from viewer.model.state.depth import Brush, DepthSample
+from viewer.model.state.notices import Notice
+from viewer.model.state.preferences import with_sections
+
+POINT_SPACING = 1 / 6
+"""Distance between the points of a stroke, as a share of its radius."""
+MIN_CLIP_GAP = 0.01
+NO_DEPTH_HERE = "The depth of a light field from disk cannot be edited. Open a photo."
+
+
+@undoable
+def set_refine(state: AppState, is_on: bool) -> AppState:
+    """Move depth edges to the photo's edges, or leave them as they are."""
+    return _with_settings(state, replace(state.depth, refine=is_on)) if _is_editable(state) else state
+
+
+@undoable
+def set_tone(state: AppState, tone: DepthEdits, is_finished: bool) -> AppState:
+    """Invert, clip and bend the disparity; strokes of `tone` do not count. Only the preview shows unfinished edits."""
+    if not (_is_editable(state) and all(map(isfinite, (tone.far_clip, tone.near_clip, tone.gamma)))):
+        return state
+    edits = replace(_clamp_tone(tone, state.depth.edits), strokes=state.depth.edits.strokes)
+    return _with_settings(state, replace(state.depth, edits=edits), is_finished)
+
+
+@undoable
+def reset(state: AppState) -> AppState:
+    """Go back to the depth that was found."""
+    if state.scene is None or not _is_editable(state):
+        return state
+    return _with_settings(state, DepthSettings(state.scene.source.depth.refine))
+
+
+def set_brush(state: AppState, brush: Brush) -> AppState:
+    """Take this brush or put it away. Taking it opens the section with its settings."""
+    if not (isfinite(brush.radius) and isfinite(brush.strength)):
+        return state
+    if not _is_editable(state):
+        is_refused = brush.is_on and state.scene is not None
+        return notify(state, Notice(NO_DEPTH_HERE)) if is_refused else state
+    limited = replace(brush, radius=clamp(brush.radius, *RADIUS_LIMITS), strength=clamp(brush.strength, 0.0, 1.0))
+    gloss_brush = replace(state.gloss_brush, is_on=state.gloss_brush.is_on and not brush.is_on)
+    taken = replace(state, brush=limited, gloss_brush=gloss_brush)
+    if state.brush.is_on or not brush.is_on:
+        return taken
+    sections = with_sections(state.preferences.open_sections, "depth")
+    return replace(taken, preferences=replace(state.preferences, open_sections=sections))
+
+
+def paint(state: AppState, place: tuple[float, float]) -> AppState:
+    """Begin or continue a stroke at a place, (x, y) as shares of the photo's width and height."""
+    if state.scene is None or not (_is_editable(state) and all(map(isfinite, place))):
+        return state
+    if state.stroke is None:
+        return replace(state, stroke=_first_stroke(state.brush, place))
+    stroke, size = state.stroke, state.scene.size
+    last = stroke.points[-1]
+    step = hypot(place[0] - last[0], (place[1] - last[1]) * size.height / size.width)
+    if step < POINT_SPACING * stroke.radius or len(stroke.points) >= MAX_POINTS:
+        return state
+    return replace(state, stroke=replace(stroke, points=(*stroke.points, place)))
+
+
+def pick(state: AppState, sample: DepthSample) -> AppState:
+    """Let the brush paint the depth of this place."""
+    if not (_is_editable(state) and all(map(isfinite, (*sample.place, sample.disparity)))):
+        return state
+    tool = state.brush.tool if state.brush.tool in DEPTH_TOOLS else "level"
+    return replace(state, brush=replace(state.brush, tool=tool, sample=sample))
+
+
+def drop_stroke(state: AppState) -> AppState:
+    """Take the unfinished stroke back; the worker, which stopped for it, goes on."""
+    return state if state.stroke is None else replace(state, stroke=None, generation=state.generation + 1)
+
+
+def end_stroke(state: AppState) -> AppState:
+    """Add the unfinished stroke to the edits."""
+    if state.stroke is None:
+        return state
+    return record_edit(state, _with_settings(replace(state, stroke=None), current_settings(state)), "paint")
+
+
+def current_settings(state: AppState) -> DepthSettings:
+    """Return the settings of the open scene, with the unfinished stroke."""
+    if state.stroke is None:
+        return state.depth
+    edits = state.depth.edits
+    return replace(state.depth, edits=replace(edits, strokes=(*edits.strokes, state.stroke)))
+
+
+def settings_for_worker(state: AppState) -> DepthSettings:
+    """Return the settings of the scene that was asked for last; a scene that is not open yet has none of its own."""
+    source, scene = state.source, state.scene
+    is_open = source is None or (scene is not None and scene.source is source)
+    return state.depth if source is None or is_open else DepthSettings(source.depth.refine)
+
+
+def is_ahead(state: AppState, asked_for: DepthSettings) -> bool:
+    """Return whether the depth of the open scene was edited since the worker was asked for it."""
+    is_open = state.scene is not None and state.scene.source is state.source
+    return is_open and current_settings(state) != asked_for
+
+
+def _is_editable(state: AppState) -> bool:
+    return state.source is not None and state.scene is not None and state.scene.plan is not None
+
+
+def _with_settings(state: AppState, settings: DepthSettings, is_finished: bool = True) -> AppState:
+    return replace(state, depth=settings, generation=state.generation + 1 if is_finished else state.generation)
+
+
+def _first_stroke(brush: Brush, place: tuple[float, float]) -> Stroke:
+    """Return a new stroke; tools that paint one depth paint it whole."""
+    is_whole = brush.tool in DEPTH_TOOLS
+    taken_from = brush.sample.place if brush.sample is not None and is_whole else None
+    return Stroke(brush.tool, (place,), brush.radius, 1.0 if is_whole else brush.strength, taken_from)
+
+
+def _clamp_tone(tone: DepthEdits, before: DepthEdits) -> DepthEdits:
+    """Return gamma and clips within their limits; the clip that was not moved gives way."""
+    far, near = clamp(tone.far_clip, 0.0, 1.0), clamp(tone.near_clip, 0.0, 1.0)
+    if far > near - MIN_CLIP_GAP and far != before.far_clip:
+        far = max(near - MIN_CLIP_GAP, 0.0)
+    if near < far + MIN_CLIP_GAP:
+        near = min(far + MIN_CLIP_GAP, 1.0)
+    gamma = clamp(tone.gamma, *GAMMA_LIMITS)
+    return replace(UNEDITED, is_inverted=tone.is_inverted, far_clip=far, near_clip=near, gamma=gamma)

@@ -1,0 +1,84 @@
+"""Records of depth models and tasks about them; `viewer.model.depth_models` has the verbs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from iibr_core.beyond.optics import Optics
+
+
+@dataclass(frozen=True)
+class ModelOffer:
+    """A depth model that can be had. host: source of its download. words: one line about it. is_here: whether it is on
+    this machine. lacks: end of a sentence that names what is missing to run it, "" where nothing is.
+    """
+
+    name: str
+    title: str
+    megabytes: int
+    licence: str
+    host: str = ""
+    words: str = ""
+    is_here: bool = False
+    lacks: str = ""
+    is_recommended: bool = False
+
+    @property
+    def is_ready(self) -> bool:
+        """Whether it can run at once."""
+        return self.is_here and not self.lacks
+
+
+@dataclass(frozen=True)
+class ModelsPrompt:
+    """The list of models. selected: index of a model, None for the recommended model."""
+
+    selected: int | None = None
+
+
+@dataclass(frozen=True)
+class Downloading:
+    """A download under way. done, total: megabytes, rounded."""
+
+    title: str
+    done: int
+    total: int
+
+
+@dataclass(frozen=True)
+class DepthModels:
+    """Depth models that can be had, and the choice of the user.
+
+    known: () before they were listed. asked: name or path of the model for the open photo, None where nobody chose.
+    dismissed: paths of photos whose offer was closed in this run. given_up: paths of photos whose estimate was stopped
+    or failed. left_focus: focus of the session, where it belongs to the depth that is still to be estimated.
+    """
+
+    known: tuple[ModelOffer, ...] = ()
+    asked: str | None = None
+    downloading: Downloading | None = None
+    left_focus: Optics | None = None
+    dismissed: frozenset[str] = frozenset()
+    given_up: frozenset[str] = frozenset()
+
+    @property
+    def recommended(self) -> ModelOffer | None:
+        """The recommended model; None before the models are listed."""
+        return next((offer for offer in self.known if offer.is_recommended), None)
+
+
+@dataclass(frozen=True)
+class ListModelsTask:
+    """List the models, and which of them are on this machine."""
+
+
+@dataclass(frozen=True)
+class GetModelTask:
+    """Download the model of this name."""
+
+    name: str
+
+
+@dataclass(frozen=True)
+class CancelGetTask:
+    """Stop the download; the next download continues it."""
