@@ -297,4 +297,4 @@ def test_a_file_of_ones_own_is_used_in_place_and_is_said_to_be(viewer: Driver, t
 def test_a_missing_package_completes_the_sentence_about_a_model(monkeypatch: pytest.MonkeyPatch) -> None:
     """The window writes "It ..." before it."""
     monkeypatch.setattr("iibr_core.depth.models.known.is_installed", lambda name: False)
-    assert all(offer.lacks.startswith("needs the package ") for offer in list_models().known)
+    assert all(offer.lacks.startswith("needs the package ") for offer in list_models())

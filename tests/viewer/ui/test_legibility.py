@@ -20,7 +20,7 @@ from tests.viewer.conftest import headless_with_scene
 from tests.viewer.ui.watched_widgets import watch_widgets
 from viewer.background.depth_models import list_models
 from viewer.display.offscreen import OffscreenScene
-from viewer.model import lens, messages
+from viewer.model import depth_models, lens, messages
 from viewer.model.action import do
 from viewer.model.layout import PANEL_WIDTH
 from viewer.model.state.app_state import AppState
@@ -157,7 +157,11 @@ def test_prompts_fit_the_window_and_their_words_fit_them(
         viewer.state = replace(viewer.state, jobs=jobs, depth=edited)
     if name == WELCOME:
         viewer.state = AppState()
-    viewer.do(SetPreference("font_scale", scale), list_models(), do(messages.show_prompt, PROMPTS.get(name)))
+    viewer.do(
+        SetPreference("font_scale", scale),
+        do(depth_models.set_known, list_models()),
+        do(messages.show_prompt, PROMPTS.get(name)),
+    )
     viewer.screen(WINDOW)
     left, top, right, bottom, hidden = ended[-1]
     assert (left >= 0, top >= 0, right <= WINDOW.width, bottom <= WINDOW.height) == (True,) * 4, ended[-1]
