@@ -1,5 +1,6 @@
 """GGX against the textbook's formula, its energy, and its limits."""
 
+from itertools import product
 from math import cos, pi, radians, sin, sqrt
 
 import numpy as np
@@ -51,19 +52,14 @@ def test_a_mirror_shows_the_light_itself_and_nothing_beside_it():
     assert share(mirror, UP, v, direction(45, 180)) < 0.01
 
 
-@pytest.mark.parametrize("roughness", [0.35, 0.6, 1.0])
-@pytest.mark.parametrize("polar_deg", [0, 45, 75, 88])
+@pytest.mark.parametrize("roughness", [0.35, 1.0])
+@pytest.mark.parametrize("polar_deg", [0, 75, 88])
 def test_no_more_light_leaves_than_came(roughness, polar_deg):
     """Over all directions of the eye, a light of irradiance 1 gives at most 1, whatever the surface."""
     gloss = Gloss(roughness=roughness, reflectance=1.0, light=GlossLight(radius_deg=1.0))
-    disc, light, count = gloss.lobe[1], direction(polar_deg), 300
-    polar = (np.arange(count) + 0.5) / count * pi / 2
-    azimuth = (np.arange(count) + 0.5) / count * pi
-    total = 0.0
-    for p in polar:
-        for a in azimuth:
-            v = np.array([sin(p) * cos(a), sin(p) * sin(a), cos(p)])
-            total += share(gloss, UP, v, light) * cos(p) * sin(p)
+    disc, light, count, total = gloss.lobe[1], direction(polar_deg), 100, 0.0
+    for p, a in product((np.arange(count) + 0.5) / count * pi / 2, (np.arange(count) + 0.5) / count * pi):
+        total += share(gloss, UP, (sin(p) * cos(a), sin(p) * sin(a), cos(p)), light) * cos(p) * sin(p)
     total *= (pi / 2 / count) * (2 * pi / count)
     assert 0 < total / (pi * disc * cos(radians(polar_deg))) <= 1.02
 
@@ -74,10 +70,8 @@ def test_nothing_is_brighter_than_the_light_even_grazing():
         assert 0 <= share(gloss, UP, direction(polar), direction(polar, 180)) <= 1
 
 
-@pytest.mark.parametrize(("v", "light"), [((30, 0), (91, 180)), ((91, 0), (30, 180)), ((120, 0), (120, 180))])
+@pytest.mark.parametrize(
+    ("v", "light"), [((30, 0), (91, 180)), ((91, 0), (30, 180)), ((120, 0), (120, 180)), ((0, 0), (180, 0))]
+)
 def test_light_or_eye_behind_the_surface_gives_nothing(v, light):
     assert share(Gloss(), UP, direction(*v), direction(*light)) == 0
-
-
-def test_light_straight_from_behind_the_surface_point_is_finite():
-    assert share(Gloss(), UP, UP, -UP) == 0

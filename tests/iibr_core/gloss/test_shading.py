@@ -54,16 +54,12 @@ def test_it_is_the_lobe_at_every_pixel(offset):
     assert np.allclose(shaded(GLOSS, maps, offset)[inner], plainly_shaded(GLOSS, maps, offset, GREY)[inner], atol=1e-4)
 
 
-def brightest(colors):
-    return np.unravel_index(colors.sum(-1).argmax(), colors.shape[:2])
-
-
 def test_on_a_plane_the_highlight_of_a_far_light_stays_in_the_frame_of_what_is_far():
     """Its virtual image is infinitely far: it moves by the disparity of infinity, not by the surface's."""
     disparity, _ = plane((0, 0, -1))
     gloss = replace(GLOSS, light=GlossLight((0.05, 0, -1)))
     maps = maps_of(gloss, disparity)
-    places = [brightest(shaded(gloss, maps, (0, s)))[1] for s in (-2, 0, 2)]
+    places = [shaded(gloss, maps, (0, s)).sum(-1).argmax() % SIZE[1] for s in (-2, 0, 2)]
     assert places[0] - places[1] == pytest.approx(2 * GEOMETRY.infinity, abs=1)
     assert places[1] - places[2] == pytest.approx(2 * GEOMETRY.infinity, abs=1)
 
@@ -78,10 +74,9 @@ def test_colours_stay_between_the_matt_ones_and_the_light():
     assert (linear <= np.maximum(matt, white) + 1e-4).all()
 
 
-@pytest.mark.parametrize("direction", [(0, 0, 1), (0, 0.2, 1)])
-def test_light_from_behind_changes_nothing(direction):
+def test_light_from_behind_changes_nothing():
     disparity, _, _ = sphere()
-    gloss = replace(GLOSS, light=GlossLight(direction))
+    gloss = replace(GLOSS, light=GlossLight((0, 0.2, 1)))
     maps = maps_of(gloss, disparity)
     facing = maps.normals[..., 2] < -0.5
     assert np.allclose(shaded(gloss, maps, (0, 0))[facing], GREY[facing], atol=1e-6)
@@ -97,7 +92,7 @@ def test_mirrors_and_dull_surfaces_of_any_size_are_finite(roughness, shape):
     assert np.isfinite(shaded(gloss, maps, (1.5, -100.0), photo=photo)).all()
 
 
-@pytest.mark.parametrize("roughness", [0.0, 0.2, 1.0])
+@pytest.mark.parametrize("roughness", [0.0, 1.0])
 def test_a_plane_seen_edge_on_is_no_brighter_than_the_light(roughness):
     """Grazing, everything is a mirror: what is reflected replaces the paint."""
     grazing = 1.45
@@ -124,22 +119,22 @@ def test_what_shows_beside_a_surface_in_other_views_gets_none_of_its_gloss():
     assert np.array_equal(shaded(gloss, maps, (0, 3), disparity=wall), GREY)
 
 
-def updates():
-    yield ViewUpdate(1, 1, (GREY * 255).astype(np.uint8), np.full(SIZE, 0.75, np.float32))
-    yield ViewUpdate(1, 0, GREY.astype(np.float16), None)
-
-
-def test_views_keep_their_kind_and_those_without_disparity_stay():
-    maps = maps_of(GLOSS, np.full(SIZE, 0.75, np.float32))
-    given = list(updates())
-    first, second = shade_views(iter(given), GLOSS, maps, GridShape(3, 3))
-    assert first.colors.dtype == np.uint8
-    assert first.colors.max() > given[0].colors.max()
+@pytest.mark.parametrize("is_marked", [True, False])
+def test_views_keep_their_kind_and_those_without_disparity_or_surface_stay(is_marked):
+    flat = np.full(SIZE, 0.75, np.float32)
+    given = [ViewUpdate(1, 1, (GREY * 255).astype(np.uint8), flat), ViewUpdate(1, 0, GREY.astype(np.float16), None)]
+    gloss = replace(GLOSS, surface=GlossSurface(strokes_only=not is_marked))
+    first, second = shade_views(iter(given), gloss, maps_of(gloss, flat), GridShape(3, 3))
     assert second is given[1]
+    if is_marked:
+        assert first.colors.dtype == np.uint8
+        assert first.colors.max() > given[0].colors.max()
+    else:
+        assert first is given[0]
 
 
-def test_with_nothing_marked_every_view_is_handed_on_untouched():
-    nothing = replace(GLOSS, surface=GlossSurface(strokes_only=True))
-    maps = maps_of(nothing, np.full(SIZE, 0.75, np.float32))
-    given = list(updates())
-    assert all(made is view for made, view in zip(shade_views(iter(given), nothing, maps, GridShape(3, 3)), given))
+def test_a_smaller_light_of_the_same_strength_is_brighter_and_needs_a_direction():
+    wide = GlossLight(radius_deg=4.0)
+    assert replace(wide, radius_deg=2.0).radiance[0] == pytest.approx(4 * wide.radiance[0], rel=0.01)
+    with pytest.raises(ValueError, match="direction"):
+        GlossLight(direction=(0.0, 0.0, 0.0))

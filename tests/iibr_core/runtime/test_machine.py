@@ -9,15 +9,6 @@ import pytest
 from iibr_core.runtime import machine
 
 
-def groups(tmp_path, own, files):
-    for name, text in files.items():
-        path = tmp_path / "fs" / name
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(text)
-    (tmp_path / "own").write_text(own)
-    return tmp_path / "fs", tmp_path / "own"
-
-
 @pytest.mark.parametrize(
     ("own", "files", "memory", "cores"),
     [
@@ -29,13 +20,12 @@ def groups(tmp_path, own, files):
     ],
 )
 def test_limits_of_control_groups(tmp_path, own, files, memory, cores):
-    where = groups(tmp_path, own, files)
-    assert machine.cgroup_free_bytes(*where) == memory
-    assert machine.cgroup_cores(*where) == cores
-
-
-def test_no_limit_files_no_limits(tmp_path):
-    assert machine.cgroup_free_bytes(tmp_path / "none", tmp_path / "neither") == math.inf
+    for name, text in files.items():
+        (tmp_path / "fs" / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / "fs" / name).write_text(text)
+    (tmp_path / "own").write_text(own)
+    assert machine.cgroup_free_bytes(tmp_path / "fs", tmp_path / "own") == memory
+    assert machine.cgroup_cores(tmp_path / "fs", tmp_path / "own") == cores
 
 
 def test_the_machine_is_no_larger_than_the_host():

@@ -2,7 +2,6 @@
 
 import math
 import threading
-from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -75,7 +74,7 @@ def test_the_number_of_bands_changes_no_bit(name, request):
         np.testing.assert_array_equal(part, expected)
 
 
-class Telling:
+class StopAt:
     """A should_stop that is true from the n-th question on; counts them."""
 
     def __init__(self, n=math.inf):
@@ -89,26 +88,26 @@ class Telling:
 @pytest.mark.usefixtures("narrow")
 @pytest.mark.parametrize("name", STAGES)
 def test_a_stage_asks_for_every_band_and_ends_wherever_it_is_told_to(name):
-    watch = Telling()
+    watch = StopAt()
     with stoppable(watch):
         STAGES[name]()
     assert watch.asked >= (3 if name == "unknown depth" else SIZE[0] // 7)
     for n in (1, watch.asked // 2, watch.asked):
-        with pytest.raises(Cancelled), stoppable(Telling(n)):
+        with pytest.raises(Cancelled), stoppable(StopAt(n)):
             STAGES[name]()
 
 
 @pytest.mark.usefixtures("narrow")
 def test_a_field_ends_wherever_it_is_told_to():
     photo, disparity = square_before_wall()
-    plan, watch = literal_plan(photo, disparity, 3), Telling()
+    plan, watch = literal_plan(photo, disparity, 3), StopAt()
 
     def count(stop):
         with stoppable(stop):
             return len(list(generate(photo, disparity, plan)))
 
     assert count(watch) == 9
-    counts = [count(Telling(n)) for n in np.linspace(1, watch.asked, 7).astype(int)]
+    counts = [count(StopAt(n)) for n in np.linspace(1, watch.asked, 7).astype(int)]
     assert counts[0] == 0
     assert counts[-1] < 9
 
@@ -130,12 +129,10 @@ def test_nothing_is_begun_after_the_word(threads):
 
 
 @pytest.mark.parametrize("size", [(1, 1), (5, 1), (1, 5), (17, 4), (100, 3), (0, 4), (4, 0), (0, 0)])
-@pytest.mark.parametrize("most", [1, 8, 1000])
-@pytest.mark.parametrize("threads", [1, 2, 5])
+@pytest.mark.parametrize(("most", "threads"), [(1, 1), (8, 2), (8, 5), (1000, 1), (1000, 5)])
 def test_every_row_is_in_one_band(size, most, threads):
     found = in_bands(lambda first, last: (first, last), ImageSize(*size), threads=threads, most_pixels=most)
-    assert all(before[1] == after[0] for before, after in pairwise(found))
-    assert [found[0][0], found[-1][1]] == [0, size[0]] if found else size[0] == 0
+    assert [row for first, last in found for row in range(first, last)] == list(range(size[0]))
     assert all(first < last and ((last - first) * size[1] <= most or last - first == 1) for first, last in found)
 
 

@@ -1,43 +1,134 @@
-"""Limits of the lens: what a slider's ends must include, whatever a scene's disparity is."""
-
-from __future__ import annotations
+"""Limits of the lens, whatever a scene's disparity is; rectangles; sources of other files and maps."""
 
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from iibr_core.beyond.optics import CENTRE, Optics
-from iibr_core.scenes.lens_limits import LensChoice, clamp_optics, focus_limits
+from iibr_core.beyond.optics import CENTRE, ApertureShape, Optics
+from iibr_core.depth.choice import DepthChoice, DepthOrigin
+from iibr_core.scenes.lens_limits import LensChoice, clamp_optics, clamp_to_grid, eye_limits, focus_limits, is_finite
 from iibr_core.scenes.opening import results_of
-from iibr_core.scenes.scene import Scene, SceneReady, SceneRequest, Source
-from iibr_core.types import GridShape
+from iibr_core.scenes.rect import Rect
+from iibr_core.scenes.scene import (
+    Progress,
+    Scene,
+    SceneReady,
+    SceneRequest,
+    Source,
+    source_beside,
+    source_with_depth,
+    source_with_map,
+)
+from iibr_core.types import GridShape, ViewOffset
 
 RANGES = [(-1.0, 2.0), (1.0, 4.0), (-3.0, -1.0), (2.0, -1.0), (-1.0, -3.0), (0.0, 2.0), (-2.0, 0.0), (0.0, 0.0)]
+SCENE = Scene(Source("a.png"), "a", 96, 64, GridShape(5, 9), (-1.0, 2.0), "file")
 
 
 @pytest.mark.parametrize("range_px", RANGES)
-def test_the_focus_goes_from_beyond_one_end_over_the_still_plane_to_the_other(range_px: tuple[float, float]) -> None:
-    """Also where all lies before the plane that stays still, all behind it, or near and far are exchanged."""
-    scene = Scene(Source("a.png"), "a", 96, 64, GridShape(5, 5), range_px, "file")
-    low, high = focus_limits(scene)
-    assert low < min(*range_px, 0.0) <= max(*range_px, 0.0) < high
+def test_the_focus_goes_from_beyond_one_end_over_the_static_plane_to_the_other(range_px: tuple[float, float]) -> None:
+    """Also where all lies before the plane that does not move, all behind it, or near and far are exchanged."""
+    scene = replace(SCENE, disparity_range_px=range_px)
+    low, high = min(*range_px, 0.0), max(*range_px, 0.0)
+    margin = 0.1 * (high - low) or 0.1
+    assert focus_limits(scene) == pytest.approx((low - margin, high + margin))
     for focus in (*range_px, 0.0):
         assert clamp_optics(Optics(focus_disparity=focus), scene).focus_disparity == focus
         assert LensChoice(focus=focus).optics_on(scene).focus_disparity == focus
 
 
-@pytest.mark.parametrize("strength", [1.0, -1.0])
-@pytest.mark.parametrize("still", [None, -4.0, 5.0])
-def test_a_photo_whose_still_plane_lies_anywhere_may_be_focused_on_it(
-    photo_path: Path, still: float | None, strength: float
+@pytest.mark.parametrize(("strength", "static"), [(1.0, None), (-1.0, -4.0), (1.0, 5.0)])
+def test_a_photo_whose_static_plane_lies_anywhere_may_be_focused_on_it(
+    photo_path: Path, static: float | None, strength: float
 ) -> None:
-    source = Source(str(photo_path), grid=GridShape(3, 3), focus_disparity=still)
+    source = Source(str(photo_path), grid=GridShape(3, 3), focus_disparity=static)
     ready = next(results_of(SceneRequest(1, source, strength), lambda: CENTRE))
     assert isinstance(ready, SceneReady)
     low, high = focus_limits(ready.scene)
     least, most = ready.scene.disparity_range_px
     assert low < min(least, 0.0) <= max(most, 0.0) < high
-    assert (least <= 0 <= most) == (still is None)
-    turned = replace(ready.scene, disparity_range_px=(most, least))
-    assert focus_limits(turned) == (low, high)
+    assert (least <= 0 <= most) == (static is None)
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_every_number_of_the_lens_stays_within_its_limits(sign: int) -> None:
+    shape = ApertureShape("mask", 7 + sign * 9, 360.0 + sign * 30, 0.5 + sign * 9, 0.5 + sign * 9)
+    wild = Optics(
+        ViewOffset(sign * 9, -sign * 9),
+        sign * 9,
+        sign * 9,
+        sign * 9,
+        (sign * 99, -sign * 99),
+        sign * 99,
+        shape,
+        sign * 9,
+    )
+    clamped, is_low = clamp_optics(wild, SCENE), sign < 0
+    assert clamped.eye == (sign * 2, -sign * 4)
+    assert clamped.dolly == sign * 4
+    assert clamped.focus_disparity == pytest.approx(-1.3 if is_low else 2.3)
+    assert clamped.focus_range == pytest.approx(0 if is_low else 3.6)
+    assert clamped.focus_tilt == pytest.approx((sign * 14.4, -sign * 14.4))
+    assert (clamped.aperture_diameter, clamped.highlight_recovery) == ((0, 0) if is_low else (9, 1))
+    shape = clamped.aperture_shape
+    assert (shape.kind, shape.blades, shape.rotation_deg) == ("disc", 3 if is_low else 11, 330 if is_low else 30)
+    assert (shape.ring_inner > 0.5, shape.cat_eye) == (not is_low, 0 if is_low else 1)
+    assert clamp_optics(clamped, SCENE) == clamped
+
+
+def test_the_viewpoint_leaves_a_single_view_only() -> None:
+    assert [eye_limits(views) for views in (1, 2, 3, 4)] == [(-0.5, 0.5), (-1, 0), (-1, 1), (-2, 1)]
+    single = replace(SCENE, grid=GridShape(1, 1))
+    assert clamp_optics(Optics(ViewOffset(1.0, -1.0), aperture_diameter=3.0), single).eye == (0.5, -0.5)
+    assert clamp_optics(Optics(aperture_diameter=3.0), single).aperture_diameter == 0
+    assert clamp_to_grid(ViewOffset(0.4, -0.4), GridShape(1, 4)) == (0, -0.4)
+    assert clamp_to_grid(ViewOffset(9, 9), GridShape(3, 4)) == (1, 1)
+
+
+def test_focusing_opens_a_pinhole_and_other_choices_stay() -> None:
+    assert LensChoice().optics_on(SCENE) == Optics()
+    focused = LensChoice(focus=1.0).optics_on(SCENE)
+    assert (focused.focus_disparity, focused.aperture_diameter) == (1.0, pytest.approx(2.7))
+    chosen = LensChoice(ViewOffset(1.0, -2.0), 1.0, 0.5).optics_on(SCENE)
+    assert (chosen.eye, chosen.aperture_diameter) == ((1.0, -2.0), 0.5)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [{"dolly": float("nan")}, {"focus_tilt": (0.0, float("inf"))}, {"eye": ViewOffset(0.0, float("nan"))},
+     {"aperture_shape": ApertureShape(rotation_deg=float("inf"))}],
+)  # fmt: skip
+def test_numbers_that_are_not_finite_are_known(changes: dict[str, object]) -> None:
+    assert is_finite(Optics())
+    assert not is_finite(replace(Optics(), **changes))  # type: ignore[arg-type]
+
+
+def test_rectangles() -> None:
+    outer = Rect(10.0, 20.0, 40.0, 80.0)
+    assert outer.part(Rect(0.5, 0.25, 0.5, 0.5)) == (30, 40, 20, 40)
+    assert Rect(0.0, 90.0, 20.0, 40.0).within(outer) == (10, 90, 10, 10)
+    assert Rect(60.0, 0.0, 9.0, 9.0).within(outer)[2:] == (0, 0)
+    corners = [(10, 20), (49, 99), (50, 20), (10, 100), (9, 20), (10, 19)]
+    assert [outer.contains(*corner) for corner in corners] == [True, True, False, False, False, False]
+
+
+def test_another_file_or_map_keeps_only_decisions_that_still_make_sense() -> None:
+    depth = DepthChoice("rough", file="m.png", file_scale=2.0, inverts=True, is_metric=True, model="m")
+    source = Source("a.png", depth, GridShape(3, 3), 0.5, 100, "i", True)
+    beside = source_beside(source, "b.png")
+    assert beside == replace(source, path="b.png", focus_disparity=None, depth=beside.depth)
+    assert beside.depth == DepthChoice("rough", model="m")
+    assert source_with_map(source, "n.png").depth == DepthChoice("auto", file="n.png", stretches=True, model="m")
+    assert source_with_depth(source, "model").depth == DepthChoice("model", model="m")
+    assert source_with_depth(source, "model", "n").depth == DepthChoice("model", model="n")
+    assert source_beside(None, "b.png") == Source("b.png")
+
+
+def test_scenes_and_progress_state_what_they_are() -> None:
+    progress = [Progress(), Progress(3, 4), Progress(4, 4)]
+    assert [now.is_complete for now in progress] == [False, False, True]
+    assert SCENE.size == (96, 64)
+    for kind, model, is_guessed, has_model in (("rough", None, True, False), ("model", "m", False, True)):
+        scene = replace(SCENE, depth_origin=DepthOrigin(kind, "words"), depth_model=model)
+        assert (scene.is_guessed, scene.has_model_depth) == (is_guessed, has_model)

@@ -1,6 +1,4 @@
-"""What comes of opening a scene, in order: the scene, its first view, every other; what stops it, what it refuses."""
-
-from __future__ import annotations
+"""Opening of a scene, in order: the scene, its first view, every other; what stops it, what it refuses."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -10,12 +8,29 @@ import pytest
 from PIL import Image
 
 from iibr_core.beyond.optics import CENTRE
+from iibr_core.depth.editing.edits import DepthEdits, Stroke
+from iibr_core.formats.images.photo import focal_px_from_fov, read_photo
+from iibr_core.formats.images.write import write_image
+from iibr_core.formats.light_fields.write import write_light_field
+from iibr_core.gloss.settings import Gloss, GlossSurface
+from iibr_core.method.plan import MOST_STRENGTH
 from iibr_core.runtime.work import Cancelled, stoppable
-from iibr_core.scenes.opening import results_of, sketch_of
-from iibr_core.scenes.photo import load_photo, sketch_photo
-from iibr_core.scenes.scene import SceneReady, SceneRequest, Source, ViewReady, WantedPhoto
-from iibr_core.types import GridShape, InputError
+from iibr_core.scenes.opening import results_of, scene_of_photo, sketch_of
+from iibr_core.scenes.photo import apply_depth_settings, load_photo, make_plan, photo_of_arrays, sketch_photo
+from iibr_core.scenes.scene import DepthSettings, SceneReady, SceneRequest, Source, ViewReady, WantedPhoto
+from iibr_core.scenes.scene_gloss import add_gloss, gloss_request, make_maps
+from iibr_core.types import GridShape, ImageSize, InputError, ViewOffset, ViewUpdate
+from tests.iibr_core.scenes import square_before_wall
 from tests.iibr_core.scenes.test_light_fields import showings
+
+GRID = GridShape(3, 3)
+
+
+def opened(source: Source, **changes: object) -> SceneReady:
+    """The scene and its centre view."""
+    ready = next(results_of(SceneRequest(1, source, **changes), lambda: CENTRE))  # type: ignore[arg-type]
+    assert isinstance(ready, SceneReady)
+    return ready
 
 
 def write_large_photo(folder: Path, name: str = "large", ending: str = "jpg") -> Path:
@@ -27,26 +42,18 @@ def write_large_photo(folder: Path, name: str = "large", ending: str = "jpg") ->
     return path
 
 
-@pytest.mark.parametrize("ending", ["jpg", "png"])
-def test_a_large_photo_has_a_sketch(tmp_path: Path, ending: str) -> None:
-    source = Source(str(write_large_photo(tmp_path, ending=ending)), grid=GridShape(3, 3))
+def test_a_large_photo_has_a_sketch(tmp_path: Path) -> None:
+    source = Source(str(write_large_photo(tmp_path)), grid=GRID)
     sketch = sketch_of(WantedPhoto(source, 1.0))
-    whole = next(results_of(SceneRequest(1, source), lambda: CENTRE))
-    assert isinstance(whole, SceneReady)
+    whole = opened(source)
     assert sketch is not None
     assert (sketch.scene.size, sketch.scene.own_size) == ((480, 360), (1600, 1200))
-    assert sketch.scene.is_sketch
-    assert sketch.loaded is None
+    assert (sketch.scene.is_sketch, sketch.loaded, sketch.scene.name) == (True, None, whole.scene.name)
     assert sketch.centre.colors.shape == (360, 480, 3)
-    assert sketch.scene.name == whole.scene.name
     assert (whole.scene.size, whole.scene.is_sketch) == ((1600, 1200), False)
-    assert whole.loaded is not None
-
-
-@pytest.mark.parametrize("changes", [{"max_pixels": 10_000}, {"is_literal": True}], ids=str)
-def test_what_is_read_in_no_time_or_taken_literally_has_no_sketch(tmp_path: Path, changes: dict[str, object]) -> None:
-    source = replace(Source(str(write_large_photo(tmp_path)), grid=GridShape(3, 3)), **changes)  # type: ignore[arg-type]
-    assert sketch_photo(source) is None
+    for changes in ({"max_pixels": 1_499_999}, {"is_literal": True}):
+        assert sketch_photo(replace(source, **changes)) is None  # type: ignore[arg-type]
+    assert sketch_photo(replace(source, max_pixels=1_500_000)) is not None
 
 
 def test_a_cut_jpeg_has_no_sketch_and_fails_as_it_did_without(tmp_path: Path) -> None:
@@ -54,104 +61,141 @@ def test_a_cut_jpeg_has_no_sketch_and_fails_as_it_did_without(tmp_path: Path) ->
     path.write_bytes(path.read_bytes()[:20_000])
     assert sketch_of(WantedPhoto(Source(str(path)), 1.0)) is None
     with pytest.raises(InputError, match=r"large\.jpg"):
-        list(results_of(SceneRequest(1, Source(str(path))), lambda: CENTRE))
+        opened(Source(str(path)))
 
 
 def test_progress_counts_every_view_once(photo_path: Path) -> None:
-    request = SceneRequest(1, Source(str(photo_path), grid=GridShape(3, 3)))
+    request = SceneRequest(1, Source(str(photo_path), grid=GRID))
     ready, *results = results_of(request, lambda: CENTRE)
     views = [result for result in results if isinstance(result, ViewReady)]
     assert isinstance(ready, SceneReady)
-    assert [view.progress.done for view in views] == list(range(1, 10))
+    assert [(view.progress.done, view.progress.total, view.progress.doing) for view in views] == [
+        (done, 9, "") for done in range(1, 10)
+    ]
+    assert [view.progress.share for view in views] == [done / 9 for done in range(1, 10)]
     assert [view.progress.is_complete for view in views] == [False] * 8 + [True]
     assert all(view.view.is_final for view in views)
+    seconds = [view.progress.seconds for view in views]
+    assert 0 < seconds[0] <= seconds[-1] < 600
+    few = list(results_of(request, lambda: CENTRE, lambda: [ViewOffset(1.0, 1.0)]))[1:]
+    assert [(view.view.row, view.view.column, view.progress.total) for view in few] == [(1, 1, 2), (2, 2, 2)]
 
 
-def test_a_photo_tells_its_focal_length_only_where_it_knows_it(photo_path: Path, tmp_path: Path) -> None:
-    from iibr_core.formats.images.photo import read_photo
-    from iibr_core.formats.images.write import write_image
-
+def test_a_photo_states_its_focal_length_only_where_it_is_known_and_its_size_upright(tmp_path: Path) -> None:
+    path = tmp_path / "a.jpg"
+    exif = Image.Exif()
+    exif[0x0112] = 6  # stored lying on its side
+    Image.new("RGB", (80, 60)).save(path, exif=exif)
+    scene = opened(Source(str(path))).scene
+    assert (scene.size, scene.own_size, scene.focal_px) == ((60, 80), (60, 80), None)
     known = tmp_path / "known.png"
     write_image(known, np.zeros((20, 30, 3), np.uint8), {"Exif:FocalLengthIn35mmFilm": 50})
-    for path, expected in ((photo_path, None), (known, read_photo(known).focal_px)):
-        ready = next(results_of(SceneRequest(1, Source(str(path))), lambda: CENTRE))
-        assert isinstance(ready, SceneReady)
-        assert ready.scene.focal_px == expected
+    assert opened(Source(str(known))).scene.focal_px == read_photo(known).focal_px
     assert read_photo(known).focal_px == pytest.approx(50 / np.hypot(36, 24) * np.hypot(20, 30))
 
 
-def test_the_subject_is_what_fills_the_middle(photo_path: Path) -> None:
-    ready = next(results_of(SceneRequest(1, Source(str(photo_path))), lambda: CENTRE))
-    assert isinstance(ready, SceneReady)
-    assert ready.scene.subject_disparity_px == ready.scene.disparity_range_px[1], "the near square"
+def test_a_scene_states_its_range_its_infinity_and_its_subject() -> None:
+    photo, disparity = square_before_wall()  # 2 before 0, the square in the middle
+    loaded = photo_of_arrays(photo, replace(disparity, inverse_metres=(0.5, 0.25)))
+    source = Source("", grid=GRID, focus_disparity=0.5)
+    plan = make_plan(source, loaded, 1.0)
+    scene, scale = scene_of_photo(source, loaded, plan), plan.disparity_scale
+    assert scale > 0
+    assert scene.disparity_range_px == pytest.approx((-0.5 * scale, 1.5 * scale))
+    assert scene.infinity_px == pytest.approx((-0.5 - 0.5) * scale)
+    assert scene.found_span_px == pytest.approx(2 * scale)
+    assert scene.subject_disparity_px == pytest.approx(1.5 * scale)
+    assert (scene.inverse_metres, scene.own_size, scene.focal_px) == ((0.5, 0.25), (80, 60), 100)
+
+
+@pytest.mark.parametrize("static", [None, 0.5])
+@pytest.mark.parametrize("strength", [1.0, -0.5])
+def test_edits_change_no_parallax_elsewhere(static: float | None, strength: float) -> None:
+    loaded = photo_of_arrays(*square_before_wall())
+    source = Source("", grid=GRID, focus_disparity=static)
+    stroke = DepthEdits(strokes=(Stroke("nearer", ((0.5, 0.5),), 0.1, 1.0),))
+    edited = apply_depth_settings(loaded, DepthSettings(False, stroke))
+    before, after = make_plan(source, loaded, strength), make_plan(source, edited, strength)
+    assert np.ptp(edited.disparity.values) > 2.5
+    elsewhere = np.s_[45:, :]
+    unchanged = before.field_disparity(loaded.disparity).values[elsewhere]
+    np.testing.assert_allclose(after.field_disparity(edited.disparity).values[elsewhere], unchanged, atol=1e-4)
+    scene = scene_of_photo(source, edited, after)
+    assert scene.found_span_px == pytest.approx(np.ptp(before.field_disparity(loaded.disparity).values), rel=1e-3)
+    assert scene.inverse_metres is None
+    assert apply_depth_settings(edited, edited.depth_settings) is edited
+    back = apply_depth_settings(edited, DepthSettings(False))
+    np.testing.assert_array_equal(back.disparity.values, loaded.disparity.values)
+    assert make_plan(source, edited, MOST_STRENGTH).disparity_scale > 0
+
+
+def test_gloss_maps_are_made_once_for_a_surface(photo_path: Path) -> None:
+    ready, gloss = opened(Source(str(photo_path), grid=GRID)), Gloss(reflectance=1.0, roughness=1.0)
+    scene, centre = ready.scene, ready.centre
+    request = gloss_request(gloss, scene, centre)
+    assert request is not None
+    maps = make_maps(request)
+    assert maps.geometry == (focal_px_from_fov(scene.width), scene.infinity_px)
+    of_field = make_maps(replace(request, scene=replace(scene, plan=None, focal_px=50.0)))
+    low, high = float(centre.disparity.min()), float(centre.disparity.max())
+    assert of_field.geometry == (50.0, pytest.approx(low - (high - low) / 19))
+    assert gloss_request(gloss, scene, centre, maps) is None
+    assert gloss_request(None, scene, centre) is None
+    assert gloss_request(gloss, scene, replace(centre, disparity=None)) is None
+    again = gloss_request(replace(gloss, surface=GlossSurface(0.5)), scene, centre, maps)
+    assert again is not None
+    assert again.normals is maps.normals
+    assert request.is_like(gloss_request(gloss, scene, centre))
+    assert not request.is_like(again)
+    views = [centre, ViewUpdate(0, 0, centre.colors, centre.disparity)]
+    assert list(add_gloss(iter(views), None, scene)) == views
+    assert any((shown.colors != view.colors).any() for shown, view in zip(add_gloss(iter(views), gloss, scene), views))
 
 
 def test_a_loaded_photo_is_not_read_again(photo_path: Path) -> None:
     source = Source(str(photo_path), grid=GridShape(1, 1))
-    first = next(results_of(SceneRequest(1, source), lambda: CENTRE))
-    assert isinstance(first, SceneReady)
+    first = opened(source)
+    assert first.scene.subject_disparity_px == first.scene.disparity_range_px[1], "the near square fills the middle"
     photo_path.unlink()
-    again = next(results_of(SceneRequest(2, source, 2.0, first.loaded), lambda: CENTRE))
-    assert isinstance(again, SceneReady)
+    again = opened(source, depth_strength=2.0, loaded=first.loaded)
     assert again.loaded is first.loaded
-    assert again.scene.plan is not None
-    assert first.scene.plan is not None
     assert again.scene.plan.disparity_scale == pytest.approx(2 * first.scene.plan.disparity_scale)
 
 
 @pytest.mark.parametrize("with_disparity", [True, False])
 def test_a_light_field_folder_goes_the_same_way(tmp_path: Path, photo_path: Path, with_disparity: bool) -> None:
-    from iibr_core.formats.light_fields.write import write_light_field
-
-    request = SceneRequest(1, Source(str(photo_path), grid=GridShape(3, 3)))
-    made = list(results_of(request, lambda: CENTRE))
-    folder = tmp_path / "field"
+    made = list(results_of(SceneRequest(1, Source(str(photo_path), grid=GRID)), lambda: CENTRE))
     views = (result.view for result in made if isinstance(result, ViewReady))
-    write_light_field(folder, "hci", GridShape(3, 3), views, 100.0, "field", with_disparity)
-    results = results_of(SceneRequest(2, Source(str(folder))), lambda: CENTRE)
-    ready, views = next(showings(results))
+    write_light_field(tmp_path / "field", "hci", GRID, views, 100.0, "field", with_disparity)
+    ready, views = next(showings(results_of(SceneRequest(2, Source(str(tmp_path / "field"))), lambda: CENTRE)))
     assert (ready.scene.grid, ready.scene.plan, ready.loaded) == ((3, 3), None, None)
     assert ready.scene.has_view_disparity == with_disparity
     assert ready.scene.disparity_range_px[0] < ready.scene.disparity_range_px[1]
     assert len(views) == 9
 
 
-def test_a_folder_without_views_is_told_what_would_be_some(tmp_path: Path) -> None:
+def test_a_folder_without_views_is_refused_with_what_would_be_some(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="no photos in it"):
-        next(results_of(SceneRequest(1, Source(str(tmp_path))), lambda: CENTRE))
+        opened(Source(str(tmp_path)))
     (tmp_path / "notes.txt").touch()
     with pytest.raises(InputError, match="holds no light field; laid out as HCI, Stanford"):
-        next(results_of(SceneRequest(1, Source(str(tmp_path))), lambda: CENTRE))
+        opened(Source(str(tmp_path)))
 
 
-def test_generating_stops_between_row_bands(photo_path: Path) -> None:
-    """Asked to stop once the scene is there, it ends without another view."""
+def test_generating_stops_between_row_bands_and_reading_too(photo_path: Path) -> None:
     kinds: list[type] = []
-    asked = []
-
-    def should_stop() -> bool:
-        asked.append(len(kinds))
-        return bool(kinds)
-
-    with stoppable(should_stop):
-        for result in results_of(SceneRequest(1, Source(str(photo_path), grid=GridShape(3, 3))), lambda: CENTRE):
+    request = SceneRequest(1, Source(str(photo_path), grid=GRID))
+    with stoppable(lambda: bool(kinds)):
+        for result in results_of(request, lambda: CENTRE):
             kinds.append(type(result))
-    assert asked[-1] > 0
     assert kinds[0] is SceneReady
     assert kinds.count(ViewReady) <= 1  # the photo's own view costs nothing
-
-
-def test_reading_stops_too(photo_path: Path) -> None:
-    """Asked to stop while it refines depth."""
-    request = SceneRequest(1, Source(str(photo_path), grid=GridShape(3, 3)))
     with pytest.raises(Cancelled), stoppable(lambda: True):
         next(results_of(request, lambda: CENTRE))
 
 
 def test_an_avif_photo_opens(tmp_path: Path) -> None:
     """It is read by another library than the settings in saved pictures."""
-    from PIL import Image
-
     Image.new("RGB", (48, 32), (200, 80, 60)).save(tmp_path / "a.avif")
     loaded = load_photo(Source(str(tmp_path / "a.avif")))
-    assert (loaded.photo.size, loaded.settings) == ((32, 48), "")
+    assert (loaded.photo.size, loaded.settings, loaded.own_size) == ((32, 48), "", ImageSize(32, 48))
