@@ -18,7 +18,7 @@ from iibr_core.scenes.scene import (
     source_beside,
 )
 from iibr_core.types import InputError, ViewOffset
-from viewer.background.depth_models import DepthFinder, same_places
+from viewer.background.depth_models import DepthFinder, focus_before_and_now
 from viewer.background.file_worker import FileRequest, FileWorker
 from viewer.background.job_threads import Failed, ProgressReport
 from viewer.background.read_ahead import PhotoAhead, ReadAhead, photos_within_budget, read_sketch, read_whole_photo
@@ -28,7 +28,7 @@ from viewer.display.inspection_view import InspectionView
 from viewer.display.scene_view import SceneView
 from viewer.model import depth, messages
 from viewer.model.action import do
-from viewer.model.actions import Action, OpenFailed, OpenPath, ProgressMade, SceneOpened
+from viewer.model.actions import Action, NewDepth, OpenFailed, OpenPath, ProgressMade, SceneOpened
 from viewer.model.depth import is_ahead, settings_for_worker
 from viewer.model.reducers.folder_reducer import AHEAD, SKETCHED_AHEAD, photos_ahead
 from viewer.model.remedies import words_of
@@ -170,10 +170,10 @@ class SceneLoader:
             self._load_brush(result)
             is_deepened = before is not None and _has_other_depth(before, result.loaded)
             before_px, now_px = centre.disparity if centre is not None else None, result.centre.disparity
-            same = None
+            new_depth = None
             if is_deepened and before_px is not None and now_px is not None:
-                same = same_places(before_px, now_px, state.focused_at)
-            return [SceneOpened(result.generation, result.scene, same)]
+                new_depth = NewDepth(focus_before_and_now(before_px, now_px, state.focused_at))
+            return [SceneOpened(result.generation, result.scene, new_depth)]
         self._scene_view.add(result.view)
         self._inspection_view.add(result.view)
         return [ProgressMade(result.generation, result.progress, (result.view.row, result.view.column))]

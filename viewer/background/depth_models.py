@@ -7,8 +7,6 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from urllib.parse import urlsplit
 
-import numpy as np
-
 from iibr_core.depth.models.catalog import fetch, known_model, model_here
 from iibr_core.depth.models.known import KNOWN_MODELS, KnownModel, missing_package
 from iibr_core.runtime.work import Cancelled, watched
@@ -18,16 +16,13 @@ from viewer.background.newest import Failed, Newest, Post
 from viewer.model import depth_models, messages
 from viewer.model.action import Action as VerbAction
 from viewer.model.action import do
-from viewer.model.actions import Action, SamePlaces
+from viewer.model.actions import Action
 from viewer.model.remedies import DEPTH_COMMANDS
 from viewer.model.state.app_state import AppState
 from viewer.model.state.depth_models import Downloading, ModelOffer
 from viewer.model.state.notices import Notice
 
 MEGABYTE = 1e6
-COMPARED = 200
-"""So many rows and columns of two maps are compared, at most."""
-PAIRS = 33
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,15 +139,13 @@ def _offer_of(model: KnownModel) -> ModelOffer:
     )
 
 
-def same_places(before: FloatImage, now: FloatImage, focused_at: tuple[float, float] | None) -> SamePlaces:
-    """Two field disparities (H, W) of one photo, compared. focused_at: a place, -1..1 across the picture, y down."""
-    steps = tuple(slice(None, None, -(-length // COMPARED)) for length in before.shape)
-    old, new = before[steps].ravel(), now[steps].ravel()
-    order = np.array_split(np.argsort(old, kind="stable"), min(PAIRS, old.size))
-    pairs = tuple((float(np.median(old[places])), float(np.median(new[places]))) for places in order)
+def focus_before_and_now(
+    before: FloatImage, now: FloatImage, focused_at: tuple[float, float] | None
+) -> tuple[float, float] | None:
+    """Return the values of two maps (H, W) at a place, -1..1 across the picture, y down; None without a place."""
     if focused_at is None:
-        return SamePlaces(pairs)
+        return None
     height, width = before.shape
     column, row = ((at + 1) / 2 * length - 0.5 for at, length in zip(focused_at, (width, height)))
     at = min(max(round(row), 0), height - 1), min(max(round(column), 0), width - 1)
-    return SamePlaces(pairs, (float(before[at]), float(now[at])))
+    return float(before[at]), float(now[at])

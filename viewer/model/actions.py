@@ -45,26 +45,19 @@ class StopWork:
 
 
 @dataclass(frozen=True)
-class SamePlaces:
-    """Field disparities of the same places of a photo, (before, now), where its depth was found again.
+class NewDepth:
+    """The open photo has new depth. in_focus: disparity before and now of the place that was clicked to be sharp."""
 
-    pairs: over the whole range, in order of what was before. in_focus: of the place that was clicked to be sharp, None
-    where none was.
-    """
-
-    pairs: tuple[tuple[float, float], ...]
     in_focus: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True)
 class SceneOpened:
-    """The worker has read and planned the scene of this generation; its views follow. same_places: where the photo that
-    is open has another depth now.
-    """
+    """The worker has planned the scene of this generation; its views follow. new_depth: of the photo that is open."""
 
     generation: int
     scene: Scene
-    same_places: SamePlaces | None = None
+    new_depth: NewDepth | None = None
 
 
 @dataclass(frozen=True)

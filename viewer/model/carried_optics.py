@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import pairwise
 
 from iibr_core.beyond.optics import Optics
-from iibr_core.scenes.lens_limits import aperture_limit, clamp, clamp_eye
+from iibr_core.scenes.lens_limits import aperture_limit, clamp_eye
 from iibr_core.scenes.scene import Scene
 from iibr_core.types import ViewOffset
-from viewer.model.actions import SamePlaces
+from viewer.model.actions import NewDepth
 from viewer.model.focal_plane import focus_on, sharp_disparity
 
 SHARP_SHARE = 0.05
@@ -39,19 +38,22 @@ def carry_optics(optics: Optics, old: Scene | None, new: Scene) -> Optics:
 
 
 def carry_to_depth(
-    optics: Optics, old: Scene, new: Scene, same: SamePlaces, focused_at: tuple[float, float] | None
+    optics: Optics, old: Scene, new: Scene, new_depth: NewDepth, focused_at: tuple[float, float] | None
 ) -> Optics:
-    """Return the optics that show a photo with new depth as it was seen before: what was sharp stays sharp."""
-    (first, first_now), (last, last_now) = same.pairs[0], same.pairs[-1]
-    ratio = abs(last_now - first_now) / (last - first) if last > first else 1.0
-    # nobody chose a focus of 0: it is the plan's own, and stays that
-    focus = _disparity_now(optics.focus_disparity, same.pairs) if optics.focus_disparity else 0.0
+    """Return the optics that show a photo with new depth as it was seen before.
+
+    A place that was clicked stays sharp; any other focus keeps its share of the range from far to near.
+    """
+    (far, near), (far_now, near_now) = old.disparity_range_px, new.disparity_range_px
+    ratio = (near_now - far_now) / (near - far) if near > far else 1.0
+    # nobody chose a focus of 0: it is the plan's and stays 0
+    focus = far_now + (optics.focus_disparity - far) * ratio if optics.focus_disparity else 0.0
     carried = with_focus_of(carry_optics(optics, old, new), optics.with_focus_scaled(ratio))
     carried = replace(carried, focus_disparity=focus)
-    if same.in_focus is None or focused_at is None:
+    if new_depth.in_focus is None or focused_at is None:
         return carried
-    before, now = same.in_focus
-    is_sharp_there = abs(sharp_disparity(optics, focused_at) - before) <= SHARP_SHARE * (last - first)
+    before, now = new_depth.in_focus
+    is_sharp_there = abs(sharp_disparity(optics, focused_at) - before) <= SHARP_SHARE * (near - far)
     return focus_on(carried, focused_at, now) if is_sharp_there else carried
 
 
@@ -59,15 +61,6 @@ def with_focus_of(optics: Optics, other: Optics) -> Optics:
     """Return the optics with the plane of focus of `other`."""
     disparity, range_, tilt = other.focus_disparity, other.focus_range, other.focus_tilt
     return replace(optics, focus_disparity=disparity, focus_range=range_, focus_tilt=tilt)
-
-
-def _disparity_now(disparity: float, pairs: tuple[tuple[float, float], ...]) -> float:
-    """Return the disparity now of places that had this disparity, interpolated."""
-    for (low, low_now), (high, high_now) in pairwise(pairs):
-        if disparity <= high:
-            share = clamp((disparity - low) / (high - low), 0.0, 1.0) if high > low else 0.0
-            return low_now + share * (high_now - low_now)
-    return pairs[-1][1]
 
 
 def _steps(views: int) -> int:

@@ -10,7 +10,7 @@ from iibr_core.beyond.optics import Optics
 from iibr_core.scenes.lens_limits import clamp_optics, focus_limits
 from iibr_core.scenes.scene import DepthSettings, Progress, Scene
 from iibr_core.types import InputError
-from viewer.model.actions import OpenFailed, ProgressMade, SamePlaces, SceneOpened, WorkerEvent
+from viewer.model.actions import NewDepth, OpenFailed, ProgressMade, SceneOpened, WorkerEvent
 from viewer.model.carried_optics import carry_optics, carry_to_depth, with_focus_of
 from viewer.model.history import map_optics
 from viewer.model.messages import MAX_NOTICES, notify
@@ -32,8 +32,8 @@ def reduce_worker_event(state: AppState, news: WorkerEvent) -> AppState:
     if news.generation != state.generation:
         return state
     match news:
-        case SceneOpened(_, scene, same_places):
-            return _open_scene(state, scene, same_places)
+        case SceneOpened(_, scene, new_depth):
+            return _open_scene(state, scene, new_depth)
         case ProgressMade(_, progress, view):
             there = state.views_there if view is None else state.views_there | {view}
             shown = state.progress if state.stopped == state.generation else progress
@@ -62,15 +62,15 @@ def stop_work(state: AppState) -> AppState:
     return replace(state, stopped=state.generation, progress=Progress(doing=doing))
 
 
-def _open_scene(state: AppState, scene: Scene, same_places: SamePlaces | None) -> AppState:
+def _open_scene(state: AppState, scene: Scene, new_depth: NewDepth | None) -> AppState:
     old = state.scene
     if old is not None and old.source is scene.source and scene.plan is None:
         scene = _with_steady_focus(state, old, scene)
 
     def carried(optics: Optics) -> Optics:
-        if same_places is None or old is None:
+        if new_depth is None or old is None:
             return carry_optics(optics, old, scene)
-        return carry_to_depth(optics, old, scene, same_places, state.focused_at)
+        return carry_to_depth(optics, old, scene, new_depth, state.focused_at)
 
     opened = replace(
         state,
@@ -86,7 +86,7 @@ def _open_scene(state: AppState, scene: Scene, same_places: SamePlaces | None) -
     notices = (*_problems(scene), *_offers(scene))[-MAX_NOTICES:]
     if old is not None and old.source is scene.source:
         is_whole_now = old.is_sketch and not scene.is_sketch
-        opened = _with_left_focus(opened) if same_places is not None else opened
+        opened = _with_left_focus(opened) if new_depth is not None else opened
         return replace(opened, notices=(*state.notices, *notices)[-MAX_NOTICES:]) if is_whole_now else opened
     # the same file, opened again, is new
     motion = Motion(speed=state.motion.speed)

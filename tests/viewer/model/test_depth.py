@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from iibr_core.beyond.optics import Optics
 from iibr_core.depth.choice import DepthChoice, DepthOrigin
 from iibr_core.depth.editing.edits import (
     DEPTH_TOOLS,
@@ -31,7 +32,7 @@ from viewer.app.image_export import settings_of
 from viewer.app.pointer import Pointer, actions_from_pointer
 from viewer.model import depth, gesture, history, lens, saving
 from viewer.model.action import do
-from viewer.model.actions import OpenFailed, OpenPath, SceneOpened
+from viewer.model.actions import NewDepth, OpenFailed, OpenPath, SceneOpened
 from viewer.model.commands import action_for_path
 from viewer.model.depth import (
     settings_for_worker,
@@ -241,3 +242,24 @@ def test_the_histogram_turns_with_the_map_and_the_focus_stays_on_its_surface(pho
     state = replace(AppState(source=source), scene=scene)
     near = (NEAR - scene.plan.disparity_zero) * scene.plan.disparity_scale
     assert focus_share(reduce(state, do(lens.set_focus, near)), scene, levels) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(
+    ("focus", "focused_at", "in_focus", "expected"),
+    [
+        (2.0, None, None, 2.4),  # 80 % of the way from far (-2) to near (3), of -4 to 4
+        (2.0, (0.5, 0.5), (2.0, -1.0), -1.0),  # the place that was clicked stays sharp
+        (0.0, (0.5, 0.5), (2.0, -1.0), 0.0),  # nobody chose a focus, and the click was elsewhere
+    ],
+)
+def test_new_depth_keeps_the_focus_where_it_was(
+    focus: float,
+    focused_at: tuple[float, float] | None,
+    in_focus: tuple[float, float] | None,
+    expected: float,
+) -> None:
+    state = replace(opened(), optics=Optics(focus_disparity=focus, focus_range=0.5), focused_at=focused_at)
+    assert state.scene is not None
+    deeper = replace(state.scene, plan=plan_of(GRID, scale=2.0), disparity_range_px=(-4.0, 4.0))
+    now = reduce(state, SceneOpened(state.generation, deeper, NewDepth(in_focus))).optics
+    assert (now.focus_disparity, now.focus_range) == (pytest.approx(expected), pytest.approx(0.8))
