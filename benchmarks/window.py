@@ -106,7 +106,7 @@ def drag(app: App) -> str:
             frames.append(turn - read_turn + 1)
             latencies.append(1e3 * (time.perf_counter() - read_at))
         if app.scene_view.pictures_drawn > drawn:
-            pictures.append(app.scene_view.renderer.report.draw_ms)
+            pictures.append(app.scene_view.report.draw_ms)
         if app.state.optics.eye != eye:
             waiting[app.state.optics.eye] = turn, began
     subprocess.run(["xdotool", "mouseup", "1"], check=True)

@@ -16,9 +16,5 @@ void main() {
         vec3 root = textureLod(colors, vec3(uv + place * pixel, max(layer, 0.0)), 0.0).rgb;
         light += root * root;
     }
-#ifdef AS_STORED
-    color = vec4(sqrt(light / float(taps * taps)), 1.0);
-#else
     color = vec4(layer < 0.0 ? missing() : shown(sqrt(light / float(taps * taps))), 1.0);
-#endif
 }

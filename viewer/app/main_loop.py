@@ -123,8 +123,8 @@ class App:
         self.do(*self.gloss_finder.advance(self.state.optics.gloss))
         layout, look = self.layout(), self.look()
         picture = self.scene_view.draw(self.state, layout.frame_px.size, layout.part) if layout.frame_px else None
-        if picture and self.scene_view.renderer.report != self.state.report:
-            self.do(SetState("report", self.scene_view.renderer.report))
+        if picture and self.scene_view.report != self.state.report:
+            self.do(SetState("report", self.scene_view.report))
         textures = self.inspection_view.draw(self.state, layout) if picture else NO_INSPECTION_TEXTURES
         self._ui.begin(layout, look, sum(self._pace.took_s))
         self._pointer = pointer = read_pointer(self._pointer)

@@ -104,7 +104,7 @@ class InspectionView:
         if scene is None or hover is None or field is None or not state.inspection.shows_values:
             return None
         view = self._scene_view
-        asked = hover, state.optics, view.generation, view.views_uploaded, view.renderer.report
+        asked = hover, state.optics, view.generation, view.views_uploaded, view.renderer.samples
         if self._probed[0] != asked:
             self._probed = asked, self._probe_at(hover, state, scene, field)
         return self._probed[1]

@@ -32,7 +32,7 @@ from iibr_core.types import SRGB, ColorSpace, FloatImage, ViewOffset
 from viewer.background.entropy import Entropy, EntropyWork
 from viewer.display.inspection_view import InspectionView
 from viewer.display.scene_view import SceneView
-from viewer.gpu.headless_context import Backend, create_headless
+from viewer.gpu.context import Backend, create_headless
 from viewer.gpu.refocus.views_seen import views_seen_by
 from viewer.model.action import do
 from viewer.model.actions import Action, OpenPath, ProgressMade, SceneOpened, SetState

@@ -29,7 +29,7 @@ from viewer.display.snapshot import SceneSnapshot
 from viewer.gpu.context import GLContext
 from viewer.gpu.light_field_texture import box_around
 from viewer.gpu.refocus.picture_renderer import Renderer
-from viewer.model.state.app_state import AppState, Picture
+from viewer.model.state.app_state import AppState, DrawReport, Picture
 
 if TYPE_CHECKING:
     from iibr_core.gloss.shading import GlossMaps
@@ -209,11 +209,17 @@ class SceneView:
             self._drawn_at = time.perf_counter()
             self.pictures_drawn += 1
             self._shows_one_view = self._is_one_view(wanted.optics)
-            self.picture_drawn = replace(wanted, samples=self.renderer.report.samples)
+            self.picture_drawn = replace(wanted, samples=self.renderer.samples)
         elif self.renderer.is_renewing or (self._is_same(wanted) and self._refines()):
             self.renderer.refine(budget_s)
             self.picture_drawn = replace(self.picture_drawn, samples=self.picture_drawn.samples + 1)
         return self.picture_drawn
+
+    @property
+    def report(self) -> DrawReport:
+        """The report on the last picture."""
+        renderer = self.renderer
+        return DrawReport(renderer.samples, renderer.samples_converged, 1e3 * renderer.draw_s)
 
     def converge(self, state: AppState, size_px: ScreenSize, part: Rect = WHOLE) -> Picture | None:
         """Like `draw`, with every sample the picture will ever get, however long that takes."""

@@ -1,1 +1,1 @@
-"""Everything that touches OpenGL: contexts, programs, textures, the renderer. Nothing else imports moderngl."""
+"""Contexts, programs, textures and the renderer. Only this package imports moderngl."""

@@ -1,7 +1,7 @@
-"""OpenGL contexts by way of GLFW: of a window, and of OSMesa through GLFW's null platform.
+"""OpenGL contexts from GLFW: of a window, and of OSMesa on GLFW's null platform.
 
-The bundle is imported before glfw on purpose: it brings the GLFW library that both must share, for two copies do not
-know of each other.
+imgui_bundle is imported before glfw because it brings the GLFW library that both must share: two copies of the library
+do not know each other's windows.
 """
 
 from __future__ import annotations
@@ -19,15 +19,23 @@ from viewer.gpu.context import GLContext
 
 import glfw  # isort: skip
 
+OSMESA_HINTS = {
+    glfw.CONTEXT_CREATION_API: glfw.OSMESA_CONTEXT_API,
+    glfw.CONTEXT_VERSION_MAJOR: 3,
+    glfw.CONTEXT_VERSION_MINOR: 3,
+    glfw.OPENGL_PROFILE: glfw.OPENGL_CORE_PROFILE,
+    glfw.VISIBLE: glfw.FALSE,
+}
+
 
 class GlfwLoader:
-    """Tells moderngl where a GLFW window's GL functions are: GLX, EGL, OSMesa, Cocoa and WGL alike."""
+    """Finds the GL functions of a GLFW window for moderngl: for GLX, EGL, OSMesa, Cocoa and WGL alike."""
 
     def __init__(self, window: Any) -> None:
         self.window = window
 
     def load_opengl_function(self, name: str) -> int:
-        """Address of a GL function, 0 where the driver lacks it."""
+        """Return the address of a GL function, 0 if the driver lacks it."""
         return ctypes.cast(glfw.get_proc_address(name), ctypes.c_void_p).value or 0
 
     load = load_opengl_function
@@ -37,76 +45,60 @@ class GlfwLoader:
         return self
 
     def __exit__(self, *_exception: object) -> None:
-        """Leave the context current: the next one entered replaces it."""
+        """Leave the context current: the next context that is entered replaces it."""
 
     def release(self) -> None:
-        """The context dies with its window."""
+        """Do nothing: the context ends with its window."""
 
 
 def create_for_window(window: Any) -> GLContext:
-    """The GL context of a GLFW window made for OpenGL 3.3 core, made current.
+    """Return the GL context of a GLFW window made for OpenGL 3.3 core, made current; the caller keeps the window.
 
-    The window stays the caller's. Raises InputError where the driver offers less than OpenGL 3.3.
+    Raises InputError if the driver offers less than OpenGL 3.3.
     """
-    glfw.make_context_current(window)
     try:
-        ctx = _context_of(window)
+        return GLContext(_context_of(window), "window")
     except (ValueError, moderngl.Error) as error:
         raise InputError(f"this display's driver offers no OpenGL 3.3 ({error}): try `iibr screenshot`") from error
-    return GLContext(ctx, "window")
+
+
+def create_osmesa() -> GLContext:
+    """Return a context of the software renderer OSMesa, made current. Raises InputError if there is none."""
+    with warnings.catch_warnings(action="ignore"):  # GLFW reports failures as warnings
+        window = _null_window()
+    try:
+        if window is None:
+            raise InputError("osmesa: libOSMesa not found or too old (install libosmesa6)")
+        return GLContext(_context_of(window), "osmesa", partial(_close_null_window, window))
+    except (InputError, ValueError, moderngl.Error) as error:
+        _close_null_window(window)
+        raise error if isinstance(error, InputError) else InputError(f"osmesa: {error}") from error
 
 
 def _context_of(window: Any) -> moderngl.Context:
+    glfw.make_context_current(window)
     settings: dict[str, Any] = {"context": GlfwLoader(window)}
     return moderngl.create_context(require=330, **settings)
 
 
-_null_windows = 0
-
-
-def create_osmesa() -> GLContext:
-    """A context of a software renderer, current on return. Raises InputError where there is none."""
-    window = _open_null_window()
-    if window is None:
-        raise InputError("osmesa: libOSMesa not found or too old (install libosmesa6)")
-    glfw.make_context_current(window)
-    try:
-        ctx = _context_of(window)
-    except (ValueError, moderngl.Error) as error:
-        _close_null_window(window)
-        raise InputError(f"osmesa: {error}") from error
-    return GLContext(ctx, "osmesa", partial(_close_null_window, window))
-
-
-def _open_null_window() -> Any | None:
-    """An OSMesa window of GLFW's null platform (of the running platform, where GLFW is in use); None where it fails."""
-    global _null_windows
-    with warnings.catch_warnings(action="ignore"):  # GLFW reports failures as warnings; here one is an answer
-        glfw.init_hint(glfw.PLATFORM, glfw.PLATFORM_NULL)
-        ready = glfw.init()
-        glfw.init_hint(glfw.PLATFORM, glfw.ANY_PLATFORM)
-        if not ready:
-            return None
-        glfw.default_window_hints()
-        glfw.window_hint(glfw.CONTEXT_CREATION_API, glfw.OSMESA_CONTEXT_API)
-        glfw.window_hint(glfw.CONTEXT_VERSION_MAJOR, 3)
-        glfw.window_hint(glfw.CONTEXT_VERSION_MINOR, 3)
-        glfw.window_hint(glfw.OPENGL_PROFILE, glfw.OPENGL_CORE_PROFILE)
-        glfw.window_hint(glfw.VISIBLE, glfw.FALSE)
-        window = glfw.create_window(16, 16, "iibr", None, None)
-        glfw.default_window_hints()
-        _null_windows += 1
-        if not window:
-            _close_null_window(None)
-            return None
-    return window
+def _null_window() -> Any | None:
+    """Return an OSMesa window of GLFW's null platform, or of the platform in use; None if there is none."""
+    glfw.init_hint(glfw.PLATFORM, glfw.PLATFORM_NULL)
+    is_ready = glfw.init()
+    glfw.init_hint(glfw.PLATFORM, glfw.ANY_PLATFORM)
+    if not is_ready:
+        return None
+    glfw.default_window_hints()
+    for hint, value in OSMESA_HINTS.items():
+        glfw.window_hint(hint, value)
+    window = glfw.create_window(16, 16, "iibr", None, None)
+    glfw.default_window_hints()
+    return window or None
 
 
 def _close_null_window(window: Any | None) -> None:
-    """Destroy it; after the last one the null platform goes too, so that a real display can be opened later."""
-    global _null_windows
+    """Destroy the window and end the null platform, so that a real display can be opened later."""
     if window is not None:
         glfw.destroy_window(window)
-    _null_windows -= 1
-    if _null_windows == 0 and glfw.get_platform() == glfw.PLATFORM_NULL:
+    if glfw.get_platform() == glfw.PLATFORM_NULL:
         glfw.terminate()

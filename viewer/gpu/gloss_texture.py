@@ -1,4 +1,4 @@
-"""The maps of a glossy surface on the graphics card. Light, roughness and reflectance are uniforms."""
+"""Maps of a glossy surface on the graphics card. Light, roughness and reflectance are uniforms."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from iibr_core.gloss.shading import GlossMaps
 
 UNIT = 8
-"""Texture unit; the passes use those below."""
+"""Texture unit; the passes use smaller numbers."""
 
 
 class GlossTexture:

@@ -1,10 +1,11 @@
-"""The views of a light field on the graphics card, one array layer each, filled as they arrive.
+"""The views of a light field on the graphics card, an array layer each, filled as they arrive.
 
 Colours are stored as the square root of linear light: summing light then costs one multiplication a fetch, not a power.
 """
 
 from __future__ import annotations
 
+import math
 from copy import copy
 from functools import cache
 from typing import TYPE_CHECKING
@@ -15,13 +16,7 @@ from numpy.typing import NDArray
 
 from iibr_core.color import encoded_from_stored, linear_from_srgb
 from iibr_core.remedies import FixableError, Remedy
-from iibr_core.types import (
-    SRGB,
-    FloatImage,
-    GridShape,
-    InputError,
-    StoredColors,
-)
+from iibr_core.types import SRGB, FloatImage, GridShape, InputError, StoredColors
 from viewer.gpu.gloss_texture import GlossTexture
 from viewer.gpu.shared import Holders
 
@@ -36,17 +31,16 @@ Box = tuple[slice, slice]
 """Rows and columns of pixels."""
 
 RANGE_MARGIN = 0.05
-"""Views generated later may reach a little beyond the first one's disparity range."""
+"""Margin around the disparity range of the first view, as a share of it: later views may exceed the range a little."""
 
 
 class LightFieldTexture:
-    """Texture arrays of the views present.
+    """Texture arrays of the views.
 
     colors: RGBA8, or RGBA16F for HDR; alpha is the disparity scaled to 0..1 over `range_px`. disparities: R16F, px per
-    view step. layers: (V, U), layer of each view. present, has_disparity: (V, U) bool. uploads: (V, U), how often each
-    was stored.
-    color_space: of the light; sRGB until something else is said. gloss: maps of a glossy surface, None without.
-    range_px: (farthest, nearest) disparity, known from the first view that has any.
+    view step. layers: (V, U), layer of each view. present, has_disparity: (V, U) bool. uploads: (V, U), number of times
+    that a view was stored. color_space: of the light. gloss: maps of a glossy surface, None without. range_px:
+    (farthest, nearest) disparity, known from the first view that has any.
     """
 
     def __init__(
@@ -59,28 +53,26 @@ class LightFieldTexture:
         with_disparity: bool,
         is_single: bool = False,
     ) -> None:
-        """Allocate. Raises InputError if this graphics driver cannot hold it, with what to do.
+        """Allocate the arrays. is_single: there is room for one view only.
 
-        is_single: whether there is room for one view only.
+        Raises InputError if this graphics driver cannot hold them, with what to do.
         """
-        kept = GridShape(1, 1) if is_single else grid
-        check_fits(ctx, kept, width, height)
+        count = 1 if is_single else math.prod(grid)
+        check_fits(ctx, GridShape(1, 1) if is_single else grid, width, height)
         self._ctx = ctx
         self.grid, self.width, self.height, self.hdr = grid, width, height, hdr
+        self.layers = np.arange(math.prod(grid)).reshape(grid) * (not is_single)
         self.present = np.zeros(grid, bool)
         self.has_disparity = np.zeros(grid, bool)
         self.uploads = np.zeros(grid, int)
         self.range_px = (0.0, 0.0)
         self.color_space = SRGB
         self.gloss: GlossTexture | None = None
-        self._dtype = np.float16 if hdr else np.uint8
-        self.layers = np.zeros(grid, int) if is_single else np.arange(grid.rows * grid.columns).reshape(grid)
-        layers = kept.rows * kept.columns
-        self.colors = _allocate(ctx, (width, height, layers), 4, "f2" if hdr else "f1")
+        self.colors = _allocate(ctx, (width, height, count), 4, "f2" if hdr else "f1")
         self.colors.filter = (moderngl.LINEAR, moderngl.LINEAR)
-        self.disparities = _allocate(ctx, (width, height, layers) if with_disparity else (1, 1, 1), 1, "f2")
+        self.disparities = _allocate(ctx, (width, height, count) if with_disparity else (1, 1, 1), 1, "f2")
         self.disparities.filter = (moderngl.NEAREST, moderngl.NEAREST)
-        self._texels = np.zeros((height, width, 4), self._dtype)
+        self._texels = np.zeros((height, width, 4), np.float16 if hdr else np.uint8)
         self._holders = Holders(self._free)
 
     def upload(self, row: int, column: int, colors: StoredColors, disparity: FloatImage | None) -> None:
@@ -103,15 +95,13 @@ class LightFieldTexture:
         self.uploads[row, column] += 1
 
     def change_disparity(self, row: int, column: int, disparity: FloatImage, box: Box) -> None:
-        """Store another disparity (H, W) of the view that was uploaded last, whose colours stay. box: outside of it
-        nothing changed.
-        """
+        """Store another disparity (H, W) of the view uploaded last, whose colours stay; only `box` has changed."""
         self._store_disparity(row, column, disparity, box)
         self.colors.write(np.ascontiguousarray(self._texels[box]), self._viewport(row, column, box))
         self.uploads[row, column] += 1
 
     def _store_disparity(self, row: int, column: int, disparity: FloatImage, box: Box) -> None:
-        """Store what lies within a box; the texels' alpha is set, and left to be written."""
+        """Store the disparity within a box; the texels' alpha is set but not written."""
         values = _finite_half(disparity[box])
         self.disparities.write(values.astype(np.float16), self._viewport(row, column, box))
         far, near = self.range_px
@@ -126,23 +116,23 @@ class LightFieldTexture:
         self.gloss = None if maps is None else GlossTexture(self._ctx, maps)
 
     def share(self) -> LightFieldTexture:
-        """The same arrays, with the views and the gloss that are there now: what comes later is not seen in it.
+        """Return the same arrays with the present views and gloss; views that come later are not present in it.
 
-        Both are to be released. Until then no view that is there should be stored again.
+        Both are to be released. Until then no present view should be stored again.
         """
-        now = copy(self)
-        now.present, now.has_disparity = self.present.copy(), self.has_disparity.copy()
-        now.gloss = None if self.gloss is None else self.gloss.share()
+        shared = copy(self)
+        shared.present, shared.has_disparity = self.present.copy(), self.has_disparity.copy()
+        shared.gloss = None if self.gloss is None else self.gloss.share()
         self._holders.add()
-        return now
+        return shared
 
     @property
     def is_shared(self) -> bool:
-        """Whether somebody else holds these arrays too."""
+        """Whether the arrays have other holders."""
         return self._holders.is_shared
 
     def release(self) -> None:
-        """Free the arrays, unless somebody else holds them."""
+        """Free the arrays, unless another holder needs them."""
         if self.gloss is not None:
             self.gloss.release()
         self._holders.release()
@@ -161,19 +151,19 @@ class LightFieldTexture:
             raise ValueError(f"view ({row}, {column}) is outside the grid of {self.grid.rows}x{self.grid.columns}")
         size = (self.height, self.width)
         if colors.shape != (*size, 3) or (disparity is not None and disparity.shape != size):
-            given = colors.shape, None if disparity is None else disparity.shape
-            raise ValueError(f"view ({row}, {column}): colours and disparity are {given}, the field's size is {size}")
+            shapes = colors.shape, None if disparity is None else disparity.shape
+            raise ValueError(f"view ({row}, {column}): colours and disparity are {shapes}, the field's size is {size}")
 
 
 def check_fits(ctx: moderngl.Context, grid: GridShape, width: int, height: int) -> None:
-    """Raise InputError where the driver's limits do not allow such arrays: GL itself fails silently."""
+    """Raise InputError if the driver's limits do not allow such arrays: GL itself fails silently."""
     max_layers, max_size = ctx.info["GL_MAX_ARRAY_TEXTURE_LAYERS"], ctx.info["GL_MAX_TEXTURE_SIZE"]
-    layers = grid.rows * grid.columns
+    layers = math.prod(grid)
     if layers > max_layers:
-        fits = int(max_layers**0.5)
+        side = math.isqrt(max_layers)
         raise InputError(
             f"a grid of {grid.rows}x{grid.columns} needs {layers} texture layers, this graphics driver has "
-            f"{max_layers}: use at most {fits}x{fits} views"
+            f"{max_layers}: use at most {side}x{side} views"
         )
     if max(width, height) > max_size:
         largest = width * height * max_size**2 // max(width, height) ** 2
@@ -185,7 +175,7 @@ def check_fits(ctx: moderngl.Context, grid: GridShape, width: int, height: int) 
 
 
 def _allocate(ctx: moderngl.Context, size: tuple[int, int, int], components: int, dtype: str) -> moderngl.TextureArray:
-    ctx.error  # noqa: B018  (reading it clears what earlier calls left)
+    ctx.error  # noqa: B018  (reading it clears errors of earlier calls)
     try:
         texture = ctx.texture_array(size, components, dtype=dtype)
         problem = ctx.error
@@ -201,8 +191,7 @@ def _allocate(ctx: moderngl.Context, size: tuple[int, int, int], components: int
 def _no_memory(size: tuple[int, int, int], components: int, dtype: str, problem: str) -> str:
     width, height, layers = size
     mebibytes = width * height * layers * components * (2 if dtype == "f2" else 1) // 2**20
-    size_text = f"{layers} views of {width}x{height} ({mebibytes} MiB, {problem})"
-    return f"no room for {size_text}"
+    return f"no room for {layers} views of {width}x{height} ({mebibytes} MiB, {problem})"
 
 
 def _root_of_linear(colors: StoredColors, hdr: bool) -> StoredColors:
@@ -216,7 +205,7 @@ def _root_of_linear(colors: StoredColors, hdr: bool) -> StoredColors:
 
 @cache
 def _root_from_half() -> NDArray[np.float16]:
-    """Root of linear light for each half float, by its bits, of encoded colours."""
+    """Return the root of linear light for each encoded half float, by its bits."""
     every = np.arange(2**16, dtype=np.uint16).view(np.float16)
     with np.errstate(invalid="ignore", over="ignore"):
         root = np.sqrt(linear_from_srgb(encoded_from_stored(np.nan_to_num(every))))
@@ -224,18 +213,18 @@ def _root_from_half() -> NDArray[np.float16]:
 
 
 def _finite_half(disparity: FloatImage) -> FloatImage:
-    """Half floats hold no more, and differences of the largest floats are infinite."""
+    """Return the disparity within the range of half floats; differences of the largest floats are infinite."""
     return np.clip(disparity, -HALF_MAX, HALF_MAX)
 
 
 def _range_of(disparity: FloatImage) -> tuple[float, float]:
-    """(farthest, nearest) with a margin; a few stray pixels (under 1 in 5000) do not stretch it."""
+    """Return (farthest, nearest) with a margin; a few stray pixels (under 1 in 5000) do not stretch it."""
     far, near = np.quantile(disparity, [0.0002, 0.9998])
     margin = RANGE_MARGIN * (near - far) + 1e-3
     return float(far - margin), float(near + margin)
 
 
 def box_around(marks: NDArray[np.bool_]) -> Box:
-    """The least rows and columns that hold all marks, of which there are some."""
+    """Return the smallest box around all marks; there must be some."""
     rows, columns = (np.flatnonzero(marks.any(axis)) for axis in (1, 0))
     return slice(int(rows[0]), int(rows[-1]) + 1), slice(int(columns[0]), int(columns[-1]) + 1)

@@ -1,7 +1,4 @@
-"""The images that passes draw into on the way to the screen: sums of linear light as RGBA32F.
-
-Row 0 comes first in all but the last, which is the screen's.
-"""
+"""Images that passes draw into. Row 0 comes first in all but the picture for the screen."""
 
 from __future__ import annotations
 
@@ -15,64 +12,39 @@ from iibr_core.scenes.screen_size import ScreenSize
 
 
 class RenderTarget:
-    """Textures of one size that a pass draws into together."""
+    """An RGBA texture of a size and its framebuffer. dtype: "f1" for bytes, "f4" for floats."""
 
-    def __init__(self, ctx: moderngl.Context, textures: list[moderngl.Texture]) -> None:
-        self.textures = textures
-        self.framebuffer = ctx.framebuffer(textures)
+    def __init__(self, ctx: moderngl.Context, size_px: ScreenSize, dtype: str) -> None:
         self._ctx = ctx
+        self.size_px = ScreenSize(*size_px)
+        self.texture = ctx.texture(size_px, 4, dtype=dtype)
+        self.texture.repeat_x = self.texture.repeat_y = False
+        self.framebuffer = ctx.framebuffer([self.texture])
+        self._dtype = dtype
 
-    def use(self) -> None:
-        """Draw here from now on."""
-        self.framebuffer.use()
-
-    def add(self) -> None:
-        """Add what is drawn from now on to what is here: the first light, too, for drivers compile a program again for
-        passes that replace.
-        """
-        self.framebuffer.use()
-        self._ctx.enable(moderngl.BLEND)
-        self._ctx.blend_func = moderngl.ONE, moderngl.ONE
-
-    def read(self, dtype: type[np.uint8] | type[np.float32]) -> NDArray[Any]:
-        """What was drawn, (H, W, 3), bytes or floats, row 0 at the top."""
-        width, height = self.framebuffer.size
-        raw = self.framebuffer.read(components=3, alignment=1, dtype="f1" if dtype is np.uint8 else "f4")
-        return np.frombuffer(raw, dtype).reshape(height, width, 3)[::-1].copy()
+    def read(self) -> NDArray[Any]:
+        """Return the colours of a picture drawn bottom-up, (H, W, 3), bytes or floats, row 0 at the top."""
+        raw = self.framebuffer.read(components=3, alignment=1, dtype=self._dtype)
+        pixels = np.frombuffer(raw, np.uint8 if self._dtype == "f1" else np.float32)
+        return pixels.reshape(self.size_px.height, self.size_px.width, 3)[::-1].copy()
 
     def release(self) -> None:
-        """Free framebuffer and textures."""
+        """Free framebuffer and texture. Afterwards the screen is bound: moderngl binds the last framebuffer again."""
+        self._ctx.detect_framebuffer(0).use()
         self.framebuffer.release()
-        for texture in self.textures:
-            texture.release()
+        self.texture.release()
 
 
-class RenderTargets:
-    """The targets of one picture size.
+class PictureTargets:
+    """The targets of a picture. light: sum of light, weighted by alpha. image: finished picture, rows bottom-up."""
 
-    light: the sum of light, weighted by alpha. image: the finished picture, RGBA8, rows bottom-up.
-    """
-
-    def __init__(self, ctx: moderngl.Context, size_px: ScreenSize) -> None:
-        self._ctx = ctx
-        self.size_px = size_px
-        self.image = RenderTarget(ctx, [ctx.texture(size_px, 4)])
-        self.light = RenderTarget(ctx, [_light(ctx, size_px)])
+    def __init__(self, ctx: moderngl.Context, size_px: ScreenSize, dtype: str = "f1") -> None:
+        """dtype: of the image, see `RenderTarget`."""
+        self.size_px = ScreenSize(*size_px)
+        self.image = RenderTarget(ctx, size_px, dtype)
+        self.light = RenderTarget(ctx, size_px, "f4")
 
     def release(self) -> None:
-        """Free framebuffers and textures."""
-        unbind(self._ctx)
+        """Free both."""
         self.image.release()
         self.light.release()
-
-
-def unbind(ctx: moderngl.Context) -> None:
-    """Needed before a framebuffer is released: moderngl binds what was last used again, and that must still exist."""
-    ctx.detect_framebuffer(0).use()
-
-
-def _light(ctx: moderngl.Context, size_px: ScreenSize) -> moderngl.Texture:
-    texture = ctx.texture(size_px, 4, dtype="f4")
-    texture.filter = (moderngl.LINEAR, moderngl.LINEAR)
-    texture.repeat_x = texture.repeat_y = False
-    return texture

@@ -1,4 +1,4 @@
-"""GL objects with more than one holder: they are freed with the last of them, in the thread of their context."""
+"""GL objects with several holders: they are freed with the last holder, in the thread of their context."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 
 class Holders:
-    """Counts who holds some GL objects. Each calls `release` once; free: called by the last."""
+    """Counts the holders of GL objects, which each call `release` once. free: called by the last."""
 
     def __init__(self, free: Callable[[], None]) -> None:
         self._free = free
@@ -14,15 +14,15 @@ class Holders:
 
     @property
     def is_shared(self) -> bool:
-        """Whether there is more than one."""
+        """Whether there are several holders."""
         return self._count > 1
 
     def add(self) -> None:
-        """One more."""
+        """Count a holder."""
         self._count += 1
 
     def release(self) -> None:
-        """One less."""
+        """Count a holder less."""
         self._count -= 1
         if self._count == 0:
             self._free()

@@ -9,7 +9,7 @@ import numpy as np
 from PIL import Image
 
 from viewer.display.filmstrip_view import FilmstripView
-from viewer.gpu.headless_context import create_headless
+from viewer.gpu.context import create_headless
 
 
 def test_an_unexpected_error_costs_one_thumbnail(tmp_path: Path) -> None:

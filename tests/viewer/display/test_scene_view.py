@@ -47,7 +47,7 @@ def a_view_comes(view: SceneView) -> None:
 def test_a_view_that_comes_costs_no_frame_all_passes(opened: OffscreenScene) -> None:
     view = opened.view
     passes, before = view.renderer.passes_shown, view.renderer.read_image()
-    samples_in_all = view.renderer.report.samples
+    samples_in_all = view.renderer.samples
     assert passes > 1
     a_view_comes(view)
     frames = 0
@@ -63,7 +63,7 @@ def test_a_view_that_comes_costs_no_frame_all_passes(opened: OffscreenScene) -> 
 
 def test_views_that_come_meanwhile_do_not_put_off_what_is_shown(opened: OffscreenScene) -> None:
     view = opened.view
-    before, samples_in_all = view.renderer.read_image(), view.renderer.report.samples
+    before, samples_in_all = view.renderer.read_image(), view.renderer.samples
     for _ in range(2 * samples_in_all):
         a_view_comes(view)
         view.renderer._refining_s = 1.0

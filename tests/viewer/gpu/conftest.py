@@ -6,8 +6,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from viewer.gpu.context import GLContext
-from viewer.gpu.headless_context import create_headless
+from viewer.gpu.context import GLContext, create_headless
 from viewer.gpu.refocus.picture_renderer import Renderer
 
 

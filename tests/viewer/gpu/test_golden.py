@@ -12,7 +12,7 @@ from iibr_core.beyond.optics import Optics
 from iibr_core.types import GridShape, ViewOffset
 from tests.image_compare import SAME_RASTERISER, assert_close, read_png, write_png
 from tests.viewer.gpu.scenes import TwoPlanes
-from viewer.gpu.headless_context import Backend, create_headless
+from viewer.gpu.context import Backend, create_headless
 from viewer.gpu.refocus.picture_renderer import Renderer
 
 GOLDEN = Path(__file__).parents[2] / "golden"

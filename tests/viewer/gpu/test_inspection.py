@@ -109,37 +109,6 @@ def test_exposure_is_a_factor_of_light(renderer: Renderer, passes: InspectionPas
     np.testing.assert_allclose(passes.read("photo")[..., :3], expected, atol=2)
 
 
-def test_a_stored_view_is_read_back(renderer: Renderer, passes: InspectionPasses) -> None:
-    field = full(renderer)
-    read = passes.read_view(field, 4, 0)
-    assert read is not None
-    np.testing.assert_allclose(read, SCENE.view(GRID.offset(4, 0))[0], atol=1)
-    assert passes.read_view(middle_only(renderer), 4, 0) is None
-
-
-def test_every_byte_comes_back_within_one_step_and_bright_ones_exactly(
-    renderer: Renderer, passes: InspectionPasses
-) -> None:
-    colors = np.arange(256, dtype=np.uint8).reshape(16, 16, 1).repeat(3, 2)
-    renderer.open_field(GridShape(1, 1), 16, 16, hdr=False, with_disparity=False)
-    renderer.upload_view(0, 0, colors, None)
-    assert renderer.field is not None
-    read = passes.read_view(renderer.field, 0, 0)
-    assert read is not None
-    np.testing.assert_allclose(read, colors, atol=1)
-    bright = colors > 130
-    np.testing.assert_array_equal(read[bright], colors[bright])
-
-
-def test_hdr_views_are_read_back_as_bytes_white_beyond_white(renderer: Renderer, passes: InspectionPasses) -> None:
-    colors = np.array([[[0.0, 0.25, 0.5], [0.75, 1.0, 30.0]]], np.float16)
-    renderer.open_field(GridShape(1, 1), 2, 1, hdr=True, with_disparity=False)
-    renderer.upload_view(0, 0, colors, None)
-    assert renderer.field is not None
-    read = passes.read_view(renderer.field, 0, 0)
-    np.testing.assert_allclose(read, np.clip(colors.astype(float), 0, 1) * 255, atol=0.6)
-
-
 def test_the_sheet_shows_each_view_in_its_cell_and_grey_where_none_is(
     renderer: Renderer, passes: InspectionPasses
 ) -> None:

@@ -13,8 +13,8 @@ from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.gpu.scenes import TwoPlanes
 from viewer.gpu.context import GLContext
+from viewer.gpu.refocus.picture_drawing import MAX_TILE_PX, picture_tiles
 from viewer.gpu.refocus.picture_renderer import Renderer
-from viewer.gpu.refocus.picture_tiling import PART_PX, picture_tiles
 
 GRID = GridShape(5, 5)
 SCENE = TwoPlanes(width=160, height=120, background=-6.0, foreground=1.0, radius_px=25.0)
@@ -25,7 +25,7 @@ LARGE = 384, 256
 def test_every_pixel_is_kept_once_and_no_part_is_too_large(width: int, height: int, largest: int) -> None:
     kept = np.zeros((height, width), np.uint8)
     for part in picture_tiles((width, height), largest):
-        assert max(part.size_px) <= min(largest, PART_PX)
+        assert max(part.size_px) <= min(largest, MAX_TILE_PX)
         kept[part.rows, part.columns] += 1
         assert kept[part.rows, part.columns].shape == part.size_px[::-1]
         left, top, across, down = part.window

@@ -9,20 +9,22 @@ from pathlib import Path
 import pytest
 
 from iibr_core.runtime.resources import resource_folder
+from iibr_core.runtime.shader_sources import ShaderError, flatten
 from viewer.gpu.context import GLContext
-from viewer.gpu.programs import ShaderError, declared_uniforms, flatten, load_program
+from viewer.gpu.programs import Program, declared_uniforms
 
-VERTEX = "#version 330 core\nvoid main() { gl_Position = vec4(0.0); }\n"
+VERTEX = "#version 330 core\nuniform vec4 part;\nvoid main() { gl_Position = part; }\n"
 FRAGMENTS = sorted(path.name for path in resource_folder("shaders").glob("*.frag"))
+INCLUDING = '#version 330 core\n#include "part_a.glsl"\nout vec4 color;\nvoid main() { color = CODE; }\n'
 
 
 @pytest.mark.parametrize("fragment", FRAGMENTS)
 def test_every_shader_compiles_with_every_switch(gl: GLContext, fragment: str) -> None:
     text = flatten(resource_folder("shaders") / fragment).text
     switches = sorted(set(re.findall(r"#ifdef (\w+)", text)))
-    for count in range(len(switches) + 1):
-        for chosen in itertools.combinations(switches, count):
-            load_program(gl.ctx, "fullscreen.vert", fragment, dict.fromkeys(chosen, 1)).release()
+    pairs = [(one, other) for one, other in itertools.combinations(switches, 2)]
+    for chosen in ((), *zip(switches), *pairs, tuple(switches)):
+        Program(gl.ctx, fragment, chosen).release()
 
 
 def write(folder: Path, **files: str) -> Path:
@@ -30,7 +32,7 @@ def write(folder: Path, **files: str) -> Path:
     for name, text in files.items():
         path = folder / "include" / f"{name}.glsl" if name.startswith("part") else folder / f"{name}.frag"
         path.write_text(text)
-    (folder / "plain.vert").write_text(VERTEX)
+    (folder / "fullscreen.vert").write_text(VERTEX)
     return folder
 
 
@@ -43,39 +45,21 @@ def test_include_comes_once_and_defines_follow_the_version(tmp_path: Path) -> No
     )
     flat = flatten(folder / "pass_.frag", {"SIZE": 3})
     assert flat.text.splitlines() == ["#version 330 core", "#define SIZE 3", "float b;", "float a;", "void main() {}"]
-    assert flat.locate(3) == "part_b.glsl:1"
-    assert flat.locate(4) == "part_a.glsl:2"
-    assert flat.locate(5) == "pass_.frag:4"
+    assert [flat.locate(line) for line in (3, 4, 5)] == ["part_b.glsl:1", "part_a.glsl:2", "pass_.frag:4"]
 
 
-def test_compile_error_names_file_and_line_of_an_include(gl: GLContext, tmp_path: Path) -> None:
-    folder = write(
-        tmp_path,
-        pass_='#version 330 core\n#include "part_a.glsl"\nout vec4 color;\nvoid main() { color = vec4(value()); }\n',
-        part_a="// one\n// two\nfloat value() { return nonsense; }\n",
-    )
-    with pytest.raises(ShaderError, match=r"\Apart_a\.glsl:3: the shader does not compile\n(.|\n)*nonsense"):
-        load_program(gl.ctx, "plain.vert", "pass_.frag", {"A": 1, "B": 2}, folder)
-
-
-def test_compile_error_names_file_and_line_of_the_pass(gl: GLContext, tmp_path: Path) -> None:
-    source = '#version 330 core\n#include "part_a.glsl"\nout vec4 color;\nvoid main() { color = vec3(1.0); }\n'
-    folder = write(tmp_path, pass_=source, part_a="float a;\nfloat b;\n")
-    with pytest.raises(ShaderError, match=r"\Apass_\.frag:4:"):
-        load_program(gl.ctx, "plain.vert", "pass_.frag", folder=folder)
-
-
-def test_compile_error_in_the_vertex_stage_names_it(gl: GLContext, tmp_path: Path) -> None:
-    folder = write(tmp_path, pass_="#version 330 core\nout vec4 color;\nvoid main() { color = vec4(1.0); }\n")
-    (folder / "plain.vert").write_text("#version 330 core\nvoid main() { gl_Position = vec3(0.0); }\n")
-    with pytest.raises(ShaderError, match=r"\Aplain\.vert:2:"):
-        load_program(gl.ctx, "plain.vert", "pass_.frag", folder=folder)
-
-
-def test_missing_include_names_the_line_that_asks(tmp_path: Path) -> None:
-    folder = write(tmp_path, pass_='#version 330 core\n#include "absent.glsl"\n')
-    with pytest.raises(ShaderError, match=r"pass_\.frag:2: no such include: absent\.glsl"):
-        flatten(folder / "pass_.frag")
+@pytest.mark.parametrize(
+    ("source", "part_a", "place"),
+    [
+        (INCLUDING.replace("CODE", "vec4(value())"), "//\n//\nfloat value() { return none; }\n", r"part_a\.glsl:3"),
+        (INCLUDING.replace("CODE", "vec3(1.0)"), "float a;\nfloat b;\n", r"pass_\.frag:4"),
+        ('#version 330 core\n#include "absent.glsl"\n', "", r"pass_\.frag:2: no such include: absent\.glsl"),
+    ],
+)
+def test_errors_name_file_and_line(gl: GLContext, tmp_path: Path, source: str, part_a: str, place: str) -> None:
+    folder = write(tmp_path, pass_=source, part_a=part_a)
+    with pytest.raises(ShaderError, match=rf"\A{place}"):
+        Program(gl.ctx, "pass_.frag", ("A", "B"), folder)
 
 
 def test_unused_uniform_is_skipped_and_misspelt_one_raises(gl: GLContext, tmp_path: Path) -> None:
@@ -83,15 +67,16 @@ def test_unused_uniform_is_skipped_and_misspelt_one_raises(gl: GLContext, tmp_pa
         "#version 330 core\nuniform float used, unused; // uniform float commented;\nout vec4 color;\n"
         "void main() { color = vec4(used); }\n"
     )
-    program = load_program(gl.ctx, "plain.vert", "pass_.frag", folder=write(tmp_path, pass_=source))
-    program.set_uniform("used", 0.5)
-    program.set_uniform("unused", 0.5)
-    assert program.program["used"].value == 0.5
+    program = Program(gl.ctx, "pass_.frag", folder=write(tmp_path, pass_=source))
+    target = gl.ctx.simple_framebuffer((1, 1))
+    target.use()
+    program.set_uniforms(used=0.5, unused=0.5, part=(-1.0, -1.0, 2.0, 2.0))
     with pytest.raises(KeyError, match=r"no uniform usde; did you mean used\?"):
-        program.set_uniform("usde", 0.5)
+        program.set_uniforms(usde=0.5)
     with pytest.raises(KeyError, match="commented"):
-        program.set_uniform("commented", 0.5)
+        program.set_uniforms(commented=0.5)
     program.release()
+    target.release()
 
 
 def test_declared_uniforms_of_lists_and_arrays() -> None:

@@ -47,17 +47,17 @@ def test_small_steps_end_at_the_same_picture_as_one_large(renderer: Renderer) ->
     SCENE.fill(renderer, GRID)
     at_once = converged(renderer, WIDE)
     renderer.render_in_time(WIDE, SIZE, 1e-6)
-    samples = [renderer.report.samples]
+    samples = [renderer.samples]
     while not renderer.is_converged:
         renderer.refine(1e-6)
-        samples.append(renderer.report.samples)
+        samples.append(renderer.samples)
     assert samples[0] < 16
     assert len(samples) > 10
     assert samples[1:] == sorted(samples[1:])
-    assert renderer.report.samples_converged == samples[-1]
+    assert renderer.samples_converged == samples[-1]
     assert np.abs(renderer.read_image().astype(int) - at_once).max() <= 1
     renderer.refine()
-    assert renderer.report.samples == samples[-1], "nothing is drawn once it has converged"
+    assert renderer.samples == samples[-1], "nothing is drawn once it has converged"
 
 
 def test_how_much_is_refined_at_once_goes_by_the_picture_on_show_not_by_the_one_before(renderer: Renderer) -> None:
@@ -65,7 +65,7 @@ def test_how_much_is_refined_at_once_goes_by_the_picture_on_show_not_by_the_one_
     renderer._refining_s = 1e-15  # as after a picture that took next to nothing
     renderer.render_in_time(WIDE, SIZE, 1e-6)
     renderer.refine(1e-6)
-    assert renderer.report.samples == 1
+    assert renderer.samples == 1
 
 
 def test_refining_waits_for_a_driver_that_queues_its_work(renderer: Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -85,14 +85,14 @@ def test_refining_waits_for_a_driver_that_queues_its_work(renderer: Renderer, mo
     monkeypatch.setattr(renderer._accumulator, "_ctx", Queueing())
     monkeypatch.setattr(accumulation, "time", SimpleNamespace(perf_counter=lambda: now[0]))
     renderer.refine(1e-6)
-    assert renderer.report.samples == 1
+    assert renderer.samples == 1
 
 
 def test_a_picture_that_views_change_stays_until_the_new_one_has_as_many_passes(renderer: Renderer) -> None:
     """A sample of it is drawn at once, not all of them: the hand must not wait."""
     SCENE.fill(renderer, GRID)
     before = converged(renderer, WIDE)
-    passes, samples, sample_s = renderer.passes_shown, renderer.report.samples, renderer._refining_s
+    passes, samples, sample_s = renderer.passes_shown, renderer.samples, renderer._refining_s
     assert passes > 1
     white, disparity = np.full((SCENE.height, SCENE.width, 3), 255, np.uint8), SCENE.view(CENTRE)[1]
     renderer.upload_view(2, 3, white, disparity)
@@ -129,7 +129,7 @@ def test_more_time_takes_more_samples(renderer: Renderer) -> None:
     drawn = []
     for budget_s in (1e-9, 60.0):
         renderer.render_in_time(WIDE, SIZE, budget_s)
-        drawn.append(renderer.report.samples)
+        drawn.append(renderer.samples)
     assert drawn[0] < drawn[1] == len(renderer._current().lens.samples(renderer.drawn_field, 0))
 
 
@@ -141,7 +141,7 @@ def test_edges_of_a_warped_view_become_smooth_and_stored_views_stay(renderer: Re
     renderer.render(Optics(ViewOffset(0.5, 0.3)), size)
     tones = len(np.unique(renderer.read_image().reshape(-1, 3), axis=0))
     renderer.refine()
-    assert renderer.report.samples == EDGE_PASSES * MAX_SOURCES
+    assert renderer.samples == EDGE_PASSES * MAX_SOURCES
     assert len(np.unique(renderer.read_image().reshape(-1, 3), axis=0)) >= tones + EDGE_PASSES - 3
     renderer.render(Optics(ViewOffset(1.0, -2.0)), size)
     assert renderer.is_converged

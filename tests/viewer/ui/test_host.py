@@ -8,7 +8,7 @@ import pytest
 from imgui_bundle import imgui
 
 from iibr_core.scenes.screen_size import ScreenSize
-from viewer.gpu.headless_context import create_headless
+from viewer.gpu.context import create_headless
 from viewer.model.layout import Layout, layout_of
 from viewer.ui.host import UiHost
 from viewer.ui.style import Look

@@ -1,4 +1,4 @@
-"""A picture is summed up in passes, each with its cameras elsewhere in the lens and in the pixel."""
+"""Pictures as sums of passes, each with its cameras at other places of the lens and of the pixel."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ from viewer.gpu.programs import ProgramCache
 from viewer.gpu.refocus.passes import MAX_SAMPLES, Passes, Rows
 from viewer.gpu.refocus.picture_lens import Lens
 from viewer.gpu.refocus.view_sampling import Samples
-from viewer.gpu.render_targets import RenderTargets
+from viewer.gpu.render_targets import PictureTargets
 
-LEAST_ROWS = 16
-"""Rows of a step, at least: fewer save nothing, for a draw has its own cost."""
+MIN_ROWS = 16
+"""Smallest number of rows of a step: fewer rows save no time, because a draw has a cost of its own."""
 
 
 @dataclass
 class ProgressiveAccumulation:
-    """A picture on its way to its best: all cameras drawn up to camera `at` of pass `pass_index`, of `passes`.
+    """A picture being summed up: cameras before camera `at` of pass `pass_index` are drawn, out of `passes` passes.
 
-    samples: of this pass. done: cameras drawn in all passes.
+    samples: cameras of this pass. done: number of cameras drawn in all passes.
     """
 
     lens: Lens
@@ -48,36 +48,32 @@ class Accumulator:
 
     def __init__(self, ctx: moderngl.Context, programs: ProgramCache) -> None:
         self._ctx = ctx
-        self.passes = Passes(ctx, programs)
+        self._passes = Passes(ctx, programs)
 
     def release(self) -> None:
-        """Free every GL object of its own."""
-        self.passes.release()
+        """Free every GL object but the programs."""
+        self._passes.release()
 
     def sum_up(
         self,
         field: LightFieldTexture,
         accumulation: ProgressiveAccumulation,
-        targets: RenderTargets,
+        targets: PictureTargets,
         passes: int,
         budget_s: float = math.inf,
         seconds_per_sample: float = 0.0,
     ) -> None:
-        """Draw cameras until so many passes are complete or the time is spent, with at least one camera.
+        """Draw cameras until `passes` passes are complete or the time is spent, at least one camera.
 
-        seconds_per_sample: how long one is thought to take; no more are drawn at once than there is time for.
+        seconds_per_sample: expected time of a camera; one draw takes no more cameras than there is time for.
         """
-        if not field.present.any():
-            targets.light.framebuffer.clear()
-            accumulation.pass_index = accumulation.passes
-            return
         end = time.perf_counter() + budget_s
-        at_once = int(min(max(budget_s / max(seconds_per_sample, 1e-9), 1), MAX_SAMPLES))
+        count = int(min(max(budget_s / max(seconds_per_sample, 1e-9), 1), MAX_SAMPLES))
         while accumulation.pass_index < passes:
-            for _ in self._batch_steps(field, accumulation, targets, at_once, math.inf):
+            for _ in self._draw_batch(field, accumulation, targets, count, math.inf):
                 pass
             if budget_s < math.inf:
-                self._ctx.finish()  # a driver that queues its work tells no time before that
+                self._ctx.finish()  # a driver that queues its work shows no time before
             if time.perf_counter() >= end:
                 break
         self._ctx.disable(moderngl.BLEND)
@@ -86,69 +82,63 @@ class Accumulator:
         self,
         field: LightFieldTexture,
         accumulation: ProgressiveAccumulation,
-        targets: RenderTargets,
+        targets: PictureTargets,
         pixels_per_step: float,
     ) -> Iterator[None]:
-        """All passes, in steps of about so many pixels and cameras; between two, anything else may be drawn.
+        """Draw all passes in steps of about so many pixels times cameras; anything else may be drawn between two steps.
 
-        The sum is the same to the last bit however small the steps are: they part rows, never cameras.
+        The sum does not depend on the size of the steps, to the last bit: they split rows, never cameras.
         """
-        if not field.present.any():
-            self.sum_up(field, accumulation, targets, accumulation.passes)
         while not accumulation.is_complete:
-            yield from self._batch_steps(field, accumulation, targets, MAX_SAMPLES, pixels_per_step)
+            yield from self._draw_batch(field, accumulation, targets, MAX_SAMPLES, pixels_per_step)
 
     def finish(
         self,
         accumulation: ProgressiveAccumulation,
-        targets: RenderTargets,
-        framebuffer: moderngl.Framebuffer,
-        is_linear: bool,
+        targets: PictureTargets,
+        is_linear: bool = False,
         color_space: ColorSpace = SRGB,
     ) -> None:
-        """Write what is summed up. is_linear: as light, unbounded, instead of encoded. color_space: of the result."""
-        self._disable_tests()
-        framebuffer.use()
-        self.passes.present(accumulation.lens, targets, is_linear, color_space)
+        """Write the sum to the image, see `Passes.present`."""
+        self._passes.present(accumulation.lens, targets.light, targets.image, is_linear, color_space)
 
-    def _batch_steps(
+    def _draw_batch(
         self,
         field: LightFieldTexture,
         accumulation: ProgressiveAccumulation,
-        targets: RenderTargets,
+        targets: PictureTargets,
         count: int,
         pixels_per_step: float,
     ) -> Iterator[None]:
-        """Draw the next cameras of a pass, at most count."""
+        """Draw the next cameras of a pass, at most `count`, in bands of rows."""
         lens, at = accumulation.lens, accumulation.at
+        if at == 0 and accumulation.pass_index == 0:
+            targets.light.framebuffer.clear()
+        if not field.present.any():
+            accumulation.pass_index = accumulation.passes
+            return
         if at == 0:
             accumulation.samples = lens.samples(field, accumulation.pass_index)
-            if accumulation.pass_index == 0:
-                targets.light.framebuffer.clear()
-                if lens.has_dolly:
-                    self.passes.update_nearest_views(field)
+            if accumulation.pass_index == 0 and lens.has_dolly:
+                self._passes.update_nearest_views(field)
         samples = accumulation.samples
         assert samples is not None
-        if lens.diameter == 0:
-            count = len(samples)  # the views that answer a pinhole are blended: none is shown alone
-        batch = samples.part(at, at + count)
+        # The views that answer a pinhole are blended: none is shown alone.
+        batch = samples if lens.diameter == 0 else samples.part(at, at + count)
         cell = lens.cell(accumulation.pass_index)
         for rows in _row_bands(targets.size_px, pixels_per_step / len(batch)):
-            self._disable_tests()  # anything else may have been drawn meanwhile
-            self.passes.draw_lens(field, lens, batch, accumulation.done, cell, targets, rows)
+            self._ctx.disable(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
+            self._passes.draw_lens(field, lens, batch, accumulation.done, cell, targets, rows)
             yield
         accumulation.at, accumulation.done = at + len(batch), accumulation.done + len(batch)
         if accumulation.at >= len(samples):
             accumulation.pass_index, accumulation.at = accumulation.pass_index + 1, 0
 
-    def _disable_tests(self) -> None:
-        self._ctx.disable(moderngl.DEPTH_TEST | moderngl.CULL_FACE | moderngl.BLEND)
-
 
 def _row_bands(size_px: ScreenSize, pixels: float) -> list[Rows]:
-    """The rows of a target in bands of so many pixels, at least LEAST_ROWS each."""
+    """Return the rows of a target in bands of about so many pixels, at least MIN_ROWS each."""
     width, height = size_px
     if width * height <= pixels:
         return [(0, height)]
-    rows = max(int(pixels / width), LEAST_ROWS)
+    rows = max(int(pixels / width), MIN_ROWS)
     return [(top, min(top + rows, height)) for top in range(0, height, rows)]

@@ -1,40 +1,38 @@
-"""The passes over a light field: each sets its uniforms and draws one triangle into a target. What is drawn when, the
-renderer decides.
-"""
+"""The passes over a light field: each sets its uniforms and draws into a target. The renderer decides on the order."""
 
 from __future__ import annotations
 
-from typing import Any
-
 import moderngl
 import numpy as np
+from numpy.typing import NDArray
 
 from iibr_core.beyond.aperture_sampling import SQRT_STEPS, fractions
 from iibr_core.types import SRGB, ColorSpace
 from viewer.gpu.light_field_texture import LightFieldTexture
-from viewer.gpu.programs import Program, ProgramCache, set_primaries
+from viewer.gpu.programs import Program, ProgramCache
 from viewer.gpu.refocus.picture_lens import BARREL_EDGE, Lens
 from viewer.gpu.refocus.view_sampling import Samples, nearest_present
-from viewer.gpu.render_targets import RenderTargets
+from viewer.gpu.render_targets import PictureTargets, RenderTarget
 
 MAX_SAMPLES = 256
-"""As in shaders/lens.frag; more views without disparity are summed in several draws."""
+"""Largest number of samples of a draw, as in shaders/lens.frag; more samples take several draws."""
 
 OFF_BORDER_PX = 1 / 256
-"""Halfway between views a look-up may hit the border between two texels: rounding must not decide which one is read."""
+"""Shift of a camera's place in its pixel: halfway between views, look-ups would lie on the border of two texels."""
 
 NEAR_PX = 32.0
-"""Parallax between a camera and its view, at most, up to which three steps find the surface: see first_hit.glsl."""
+"""Largest parallax between a camera and its view at which three steps find the surface, see first_hit.glsl."""
 
 ALONE_NEAR_PX = 2.0
-"""The same where there is only one view."""
+"""The same limit for a single view."""
 
-UNITS = {"colors": 0, "disparities": 1, "nearest_views": 2}
+COLORS, DISPARITIES, NEAREST_VIEWS = range(3)
+"""Texture units."""
 CORNERS = np.array([(0, 0), (1, 1), (1, 0), (0, 1)], np.float32)
 """Corners (s, t) of a cell of the grid: with dolly they answer a pinhole's ray together."""
 
 Rows = tuple[int, int]
-"""First row of a target, and the one after the last."""
+"""First row of a target, and the row after the last."""
 
 
 class Passes:
@@ -47,7 +45,7 @@ class Passes:
         self._nearest_views: moderngl.Texture | None = None
 
     def release(self) -> None:
-        """Free every GL object of its own."""
+        """Free every GL object but the programs."""
         self._samples.release()
         if self._nearest_views is not None:
             self._nearest_views.release()
@@ -59,57 +57,61 @@ class Passes:
         samples: Samples,
         first: int,
         cell: float,
-        targets: RenderTargets,
+        targets: PictureTargets,
         rows: Rows,
     ) -> None:
-        """Add the light of at most MAX_SAMPLES cameras to some rows of the target. first: number of the first
-        camera. cell: side of the square of the aperture that a camera stands for, view steps.
+        """Add the light of at most MAX_SAMPLES cameras to some rows of the target.
+
+        first: number of the first camera. cell: side of the square of the aperture around a camera, view steps.
         """
-        warps = bool(field.has_disparity.any())
-        has_gloss = field.gloss is not None and lens.optics.gloss is not None
-        program, quad = self._programs.get(
+        has_views_to_warp = bool(field.has_disparity.any())
+        program = self._programs.get(
             "lens.frag",
-            switches(
-                WARP=warps,
-                NEAR=warps and _are_near(field, lens, samples),
-                RANGE=lens.optics.focus_range > 0,
-                DOLLY=lens.has_dolly,
-                GLOSS=has_gloss,
-                HIGHLIGHTS=lens.highlight_gain > 0,
-                CAT_EYE=lens.optics.aperture_shape.kind == "cat_eye",
-            ),
+            {
+                "WARP": has_views_to_warp,
+                "NEAR": has_views_to_warp and _are_near(field, lens, samples),
+                "RANGE": lens.optics.focus_range > 0,
+                "DOLLY": lens.has_dolly,
+                "GLOSS": field.gloss is not None and lens.optics.gloss is not None,
+                "HIGHLIGHTS": lens.highlight_gain > 0,
+                "CAT_EYE": lens.optics.aperture_shape.kind == "cat_eye",
+            },
         )
         width, height = targets.size_px
+        across, down = lens.part.width / lens.field_part.width, lens.part.height / lens.field_part.height
         self._set_field(program, field, lens)
         self._set_samples(program, field, lens, samples, first)
-        across, down = lens.part.width / lens.field_part.width, lens.part.height / lens.field_part.height
-        _set_declared(program, cell_views=cell, pixel_uv=(across / width, down / height), field_part=lens.field_part)
-        target = targets.light
-        target.framebuffer.scissor = 0, rows[0], width, rows[1] - rows[0]
-        target.add()
-        quad.render(moderngl.TRIANGLES, vertices=3)
-        target.framebuffer.scissor = 0, 0, width, height
+        program.set_uniforms(cell_views=cell, pixel_uv=(across / width, down / height), field_part=lens.field_part)
+        framebuffer = targets.light.framebuffer
+        framebuffer.scissor = 0, rows[0], width, rows[1] - rows[0]
+        framebuffer.use()
+        # Blending is on for the first light, too: drivers compile a program again for passes that replace.
+        self._ctx.enable(moderngl.BLEND)
+        self._ctx.blend_func = moderngl.ONE, moderngl.ONE
+        program.draw()
+        framebuffer.scissor = 0, 0, width, height
 
-    def present(self, lens: Lens, targets: RenderTargets, is_linear: bool, color_space: ColorSpace = SRGB) -> None:
-        """The finished picture, into the framebuffer in use. is_linear: as light, unbounded, not encoded.
-        color_space: of the result.
-        """
-        self._ctx.disable(moderngl.BLEND)
-        converts = lens.color_space != color_space
-        program, quad = self._programs.get("present.frag", switches(LINEAR=is_linear, OTHER_PRIMARIES=converts))
-        set_primaries(program, color_space, lens.color_space)
-        targets.light.textures[0].use(0)
+    def present(
+        self, lens: Lens, light: RenderTarget, image: RenderTarget, is_linear: bool, color_space: ColorSpace = SRGB
+    ) -> None:
+        """Write the finished picture. is_linear: as unclipped light, not encoded. color_space: of the result."""
+        image.framebuffer.use()
+        self._ctx.disable(moderngl.DEPTH_TEST | moderngl.CULL_FACE | moderngl.BLEND)
+        switches = {"LINEAR": is_linear, "OTHER_PRIMARIES": lens.color_space != color_space}
+        program = self._programs.get("present.frag", switches)
+        program.set_primaries(color_space, lens.color_space)
+        light.texture.use(0)
         program.set_uniforms(light_sum=0, exposure=lens.exposure)
-        quad.render(moderngl.TRIANGLES, vertices=3)
+        program.draw()
 
     def update_nearest_views(self, field: LightFieldTexture) -> None:
-        """Tell the shaders which views are there; needed for dolly."""
+        """Upload the table of present views, which dolly needs."""
         rows, columns = field.grid
         table = np.zeros((rows, columns, 4), np.float32)
         nearest = nearest_present(field.present)
+        at = nearest[..., 0], nearest[..., 1]
         table[..., :2] = nearest[..., ::-1]
-        table[..., 2] = field.has_disparity[nearest[..., 0], nearest[..., 1]]
-        table[..., 3] = field.layers[nearest[..., 0], nearest[..., 1]]
+        table[..., 2], table[..., 3] = field.has_disparity[at], field.layers[at]
         if self._nearest_views is None or self._nearest_views.size != (columns, rows):
             if self._nearest_views is not None:
                 self._nearest_views.release()
@@ -117,14 +119,13 @@ class Passes:
         self._nearest_views.write(table.tobytes())
 
     def _set_field(self, program: Program, field: LightFieldTexture, lens: Lens) -> None:
-        field.colors.use(UNITS["colors"])
-        field.disparities.use(UNITS["disparities"])
+        field.colors.use(COLORS)
+        field.disparities.use(DISPARITIES)
         far, near = field.range_px
         aspect = field.height / field.width * lens.field_part.width / lens.field_part.height
-        _set_declared(
-            program,
-            colors=UNITS["colors"],
-            disparities=UNITS["disparities"],
+        program.set_uniforms(
+            colors=COLORS,
+            disparities=DISPARITIES,
             view_size_px=(field.width, field.height),
             nearest=near,
             farthest=far,
@@ -137,7 +138,7 @@ class Passes:
             barrel_edge=max(BARREL_EDGE * lens.diameter, 1e-6),
             part=lens.part,
         )
-        if field.gloss is not None and lens.optics.gloss is not None and "gloss_surface" in program.declared:
+        if field.gloss is not None and lens.optics.gloss is not None:
             field.gloss.use(program, lens.optics.gloss, (lens.eye.s, lens.eye.t))
 
     def _set_samples(
@@ -147,49 +148,42 @@ class Passes:
         table = np.zeros((3, MAX_SAMPLES, 4), np.float32)
         cameras, answers, numbers = table
         cameras[:count, :2] = samples.cameras[:, ::-1]
-        # All views that answer a pinhole are asked at the same place of the pixel.
+        # All views that answer a pinhole have the same place in the pixel.
         numbered = (first // count, 1) if lens.diameter == 0 else (first, count)
         cameras[:count, 2:] = fractions(*numbered, SQRT_STEPS[3:]) - 0.5 + OFF_BORDER_PX
-        offsets = samples.views - np.array(field.grid.centre)
-        answers[:count, :2] = (offsets - np.array(lens.eye) - samples.cameras)[:, ::-1]
-        numbers[:count, 0] = field.layers[tuple(samples.views.T)]
-        numbers[:count, 1] = field.has_disparity[tuple(samples.views.T)]
+        answers[:count, :2] = _to_views(field, lens, samples)[:, ::-1]
+        views = tuple(samples.views.T)
+        numbers[:count, 0], numbers[:count, 1] = field.layers[views], field.has_disparity[views]
         numbers[:count, 2] = samples.weights
-        if lens.has_dolly and "nearest_views" in program.declared:
+        if lens.has_dolly:
             assert self._nearest_views is not None
             if lens.diameter == 0:
                 answers[:count, :2], answers[:count, 2] = CORNERS, 1
             else:
                 answers[:count, :2] = fractions(first, count, SQRT_STEPS[1::-1])
-            self._nearest_views.use(UNITS["nearest_views"])
+            self._nearest_views.use(NEAREST_VIEWS)
             row, column = field.grid.centre
-            _set_declared(
-                program, nearest_views=UNITS["nearest_views"], eye_in_grid=(column + lens.eye.s, row + lens.eye.t)
-            )
+            program.set_uniforms(nearest_views=NEAREST_VIEWS, eye_in_grid=(column + lens.eye.s, row + lens.eye.t))
         self._samples.write(table.tobytes())
-        self._samples.bind_to_uniform_block(0)
-        program.bind_block("Samples", 0)
+        program.use_block("Samples", self._samples)
         program.set_uniforms(sample_count=count)
 
 
-def switches(**names: bool) -> tuple[str, ...]:
-    """Names of the switches of a program that are on."""
-    return tuple(name for name, is_on in names.items() if is_on)
+def _to_views(field: LightFieldTexture, lens: Lens, samples: Samples) -> NDArray[np.float64]:
+    """Return the offsets (t, s) from the cameras to the views that answer them, in view steps."""
+    offsets: NDArray[np.float64] = samples.views - np.array(field.grid.centre) - np.array(lens.eye) - samples.cameras
+    return offsets
 
 
 def _are_near(field: LightFieldTexture, lens: Lens, samples: Samples) -> bool:
-    """Whether all cameras are a few pixels of parallax from the views that answer them: corners of their own cells.
+    """Return whether every camera is a few pixels of parallax from the view that answers it, a corner of its own cell.
 
-    Where a single view stands in for all, what it does not see is shown too: that takes the whole search.
+    A single view also shows the background beside what covers it, which takes the whole search.
     """
     if lens.has_dolly:
         return False
-    to_views = samples.views - np.array(field.grid.centre) - np.array(lens.eye) - samples.cameras
+    to_views = _to_views(field, lens, samples)
     parallax_px = np.hypot(*to_views.T) * (field.range_px[1] - field.range_px[0])
-    most_px = NEAR_PX if field.present.sum() > 1 else ALONE_NEAR_PX
+    max_px = NEAR_PX if field.present.sum() > 1 else ALONE_NEAR_PX
     is_in_cell = bool(np.abs(to_views).max() <= 1)
-    return is_in_cell and (parallax_px + np.hypot(*samples.cameras.T) * 2 * lens.optics.focus_range).max() <= most_px
-
-
-def _set_declared(program: Program, **values: Any) -> None:
-    program.set_uniforms(**{name: value for name, value in values.items() if name in program.declared})
+    return is_in_cell and (parallax_px + np.hypot(*samples.cameras.T) * 2 * lens.optics.focus_range).max() <= max_px

@@ -1,76 +1,111 @@
-"""A picture of any size with every sample it will get, drawn a step at a time beside what the screen shows."""
+"""Pictures of any size with all their samples, drawn in steps beside what the screen shows."""
 
 from __future__ import annotations
 
 import math
 import time
 from collections.abc import Generator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from iibr_core.scenes.rect import Rect
+from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import ColorSpace, ViewUpdate
 from viewer.gpu.context import GLContext
 from viewer.gpu.light_field_texture import LightFieldTexture
+from viewer.gpu.programs import ProgramCache
 from viewer.gpu.refocus.accumulation import Accumulator, ProgressiveAccumulation
-from viewer.gpu.refocus.picture_tiling import PictureTile, picture_tiles
-from viewer.gpu.render_targets import RenderTarget, RenderTargets, unbind
+from viewer.gpu.render_targets import PictureTargets
 
 STEP_S = 0.005
-"""What a step is meant to take: a hand that drags waits for no more than one of them."""
+"""Time of a step in seconds; whoever drags waits for one step at most."""
+
+MAX_TILE_PX = 2048
+"""Largest side of a tile in pixels; its targets take at most 32 bytes a pixel."""
 
 Pixels = NDArray[np.uint8 | np.float32]
 
 
-class PictureDrawing:
-    """Draws a picture tile by tile into targets of its own. Call it only from the thread its context belongs to.
+@dataclass(frozen=True)
+class PictureTile:
+    """A part of a picture, drawn at once. window: the part as a share of the picture. rows, columns: its pixels."""
 
-    image: (height, width, 3), whole once `is_done`: float32 linear light, not cut off at white or 0, or uint8, encoded
-    by sRGB's curve.
-    is_stopped: by `stop`, before it was whole; the image then stays unfinished.
+    window: Rect
+    rows: slice
+    columns: slice
+
+    @property
+    def size_px(self) -> ScreenSize:
+        """Width and height."""
+        return ScreenSize(self.columns.stop - self.columns.start, self.rows.stop - self.rows.start)
+
+
+def picture_tiles(size_px: ScreenSize, max_px: int) -> list[PictureTile]:
+    """Return tiles that together are the whole picture, at most max_px wide and high. size_px: (width, height)."""
+    width, height = size_px
+    side = min(MAX_TILE_PX, max_px)
+    return [
+        PictureTile(
+            Rect(left / width, top / height, (right - left) / width, (bottom - top) / height),
+            slice(top, bottom),
+            slice(left, right),
+        )
+        for top, bottom in _spans(height, side)
+        for left, right in _spans(width, side)
+    ]
+
+
+def _spans(length: int, side: int) -> list[tuple[int, int]]:
+    return [(first, min(first + side, length)) for first in range(0, length, side)]
+
+
+class PictureDrawing:
+    """Draws a picture tile by tile into targets of its own. Call it only from the thread of its context.
+
+    image: (height, width, 3), float32 linear light, unclipped, or uint8, encoded by sRGB's curve; complete once
+    `is_done`. is_stopped: whether `stop` came before.
     """
 
     def __init__(
         self,
         gl: GLContext,
-        accumulator: Accumulator,
+        programs: ProgramCache,
         field: LightFieldTexture,
         whole: ProgressiveAccumulation,
         is_linear: bool,
         color_space: ColorSpace,
         views: Sequence[ViewUpdate] = (),
     ) -> None:
-        """Draw nothing yet. accumulator: its own, released with it. whole: the picture, not begun.
+        """Prepare the drawing.
 
-        is_linear, color_space: see `RenderSettings`. field: held until `stop`, so that another may take its place on
-        the screen. Views that it gets from now on are not seen: all tiles show the same. views: those that this picture
-        alone shows, uploaded first, a view a step.
+        field: shared until `stop`; views that it gets later are not drawn. whole: the picture, not begun. is_linear,
+        color_space: see `RenderSettings`. views: uploaded first, a view a step.
         """
         width, height = whole.size_px
         self.image: Pixels = np.empty((height, width, 3), np.float32 if is_linear else np.uint8)
         self.is_done = self.is_stopped = self._is_released = False
         self._gl = gl
-        self._accumulator = accumulator
+        self._accumulator = Accumulator(gl.ctx, programs)
         self._field = field.share()
         self._whole, self._views = whole, views
-        self._is_linear = is_linear
-        self._color_space = color_space
+        self._is_linear, self._color_space = is_linear, color_space
         self._tiles = picture_tiles(whole.size_px, gl.max_texture_size)
         self._tiles_done = 0
-        self._under_way: ProgressiveAccumulation | None = None
+        self._current: ProgressiveAccumulation | None = None
         self._is_in_steps = False
         self._steps = self._draw()
 
     @property
     def progress(self) -> float:
-        """How much of it is drawn, 0..1."""
+        """Drawn share, 0..1."""
         passes = self._whole.passes
-        begun = self._under_way.pass_index if self._under_way is not None else 0
-        return (self._tiles_done * passes + begun) / (len(self._tiles) * passes)
+        passes_done = 0 if self._current is None else self._current.pass_index
+        return (self._tiles_done * passes + passes_done) / (len(self._tiles) * passes)
 
     def advance(self, budget_s: float = math.inf) -> None:
-        """Draw on for about that long, at least a step; all of it without a budget."""
+        """Draw for about that long, at least a step; all of it without a budget."""
         self._is_in_steps = budget_s < math.inf
         end = time.perf_counter() + budget_s
         for _ in self._steps:
@@ -80,39 +115,32 @@ class PictureDrawing:
                     return
 
     def stop(self) -> None:
-        """Draw no more, and free every GL object; the image stays. To be called even where it is done."""
-        if self._is_released:
-            return
-        self._is_released, self.is_stopped = True, not self.is_done
-        self._steps.close()
-        self._accumulator.release()
-        self._field.release()
+        """Free every GL object; the image stays. To be called in any case."""
+        if not self._is_released:
+            self._is_released, self.is_stopped = True, not self.is_done
+            self._steps.close()
+            self._accumulator.release()
+            self._field.release()
 
     def _draw(self) -> Generator[None]:
         for view in self._views:
             self._field.upload(view.row, view.column, view.colors, view.disparity)
             yield
         for tile in self._tiles:
-            target = RenderTarget(
-                self._gl.ctx, [self._gl.ctx.texture(tile.size_px, 4, dtype="f4" if self._is_linear else "f1")]
-            )
-            targets = RenderTargets(self._gl.ctx, tile.size_px)
+            targets = PictureTargets(self._gl.ctx, tile.size_px, "f4" if self._is_linear else "f1")
             try:
-                yield from self._draw_tile(tile, targets, target)
+                yield from self._draw_tile(tile, targets)
             finally:
-                unbind(self._gl.ctx)
-                target.release()
                 targets.release()
-            self._tiles_done, self._under_way = self._tiles_done + 1, None
+            self._tiles_done, self._current = self._tiles_done + 1, None
             yield
         self.is_done = True
 
-    def _draw_tile(self, tile: PictureTile, targets: RenderTargets, target: RenderTarget) -> Generator[None]:
+    def _draw_tile(self, tile: PictureTile, targets: PictureTargets) -> Generator[None]:
         lens = replace(self._whole.lens, part=self._whole.lens.part.part(tile.window))
-        self._under_way = accumulation = replace(self._whole, lens=lens, size_px=tile.size_px)
+        self._current = accumulation = replace(self._whole, lens=lens, size_px=tile.size_px)
         pixels = STEP_S / self._gl.seconds_per_fetch if self._is_in_steps else math.inf
         yield from self._accumulator.sum_up_in_steps(self._field, accumulation, targets, pixels)
-        self._accumulator.finish(accumulation, targets, target.framebuffer, self._is_linear, self._color_space)
+        self._accumulator.finish(accumulation, targets, self._is_linear, self._color_space)
         yield
-        drawn = target.read(np.float32 if self._is_linear else np.uint8)
-        self.image[tile.rows, tile.columns] = drawn
+        self.image[tile.rows, tile.columns] = targets.image.read()

@@ -1,4 +1,4 @@
-"""What the optics mean for one picture: numbers for the passes, worked out before anything is drawn. No GL."""
+"""Numbers of one picture that follow from the optics, computed before anything is drawn. No GL."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ from viewer.gpu.refocus.view_sampling import (
 )
 
 FIRST_SPACING_PX = 6.5
-"""Blur of the picture, in output pixels, for which its first pass has one more camera."""
+"""Blur, in output pixels, for which the first pass has one more camera."""
 
 MIN_PASS, MAX_PASS = 4, 12
-"""Least and greatest number of cameras of a pass."""
+"""Smallest and largest number of cameras of a pass."""
 
 CAMERAS_PER_PX = 4.0
 """Cameras of a finished picture for each output pixel of its widest blur: an edge then turns into a smooth ramp."""
 
 MIN_CAMERAS, MAX_CAMERAS = 64, 144
-"""Least and greatest number of cameras of a finished picture; between views that many blend them smoothly, too."""
+"""Smallest and largest number of cameras of a finished picture; between views, that many blend them smoothly, too."""
 
 EDGE_PASSES = 5
 """Passes that make the edges of a warped pinhole view smooth."""
@@ -44,12 +44,12 @@ BARREL_EDGE = 1 / 16
 
 @dataclass(frozen=True)
 class Lens:
-    """What the optics mean for one picture. optics: as given; shaders take some of its numbers as they are.
+    """The lens of one picture.
 
     diameter: of the aperture, view steps, 0 for a pinhole. widest: side of the square of views, which cuts it off.
-    dolly: view steps (s, t) by which the ray crosses the grid elsewhere, per picture size. blur_px: width, in output
-    pixels, of the widest blur in this field. level: what is left out. part: what is drawn. field_part: what of the
-    picture the field's views show. color_space: of the field's light.
+    dolly: change of the place (s, t) where rays cross the grid, view steps per picture size. blur_px: width of the
+    widest blur in this field, output pixels. level: limits of quality. part: drawn part of the picture. field_part:
+    part of the picture that the field's views show. color_space: of the field's light.
     """
 
     optics: Optics
@@ -79,7 +79,10 @@ class Lens:
         return float(2.0**self.optics.exposure_stops)
 
     def barrel(self, aspect: float) -> tuple[float, float, float]:
-        """How far the barrel's opening moves across the picture (s, t), and its radius, view steps. aspect: H / W."""
+        """Return the motion of the barrel's opening across the picture (s, t) and its radius, view steps.
+
+        aspect: height / width.
+        """
         radius = self.diameter / 2
         across = 2 * self.optics.aperture_shape.cat_eye * radius / math.hypot(1.0, aspect)
         return across, across * aspect, radius
@@ -99,7 +102,7 @@ class Lens:
         return math.ceil(cameras / self.cameras_per_pass)
 
     def pass_count(self, field: LightFieldTexture) -> int:
-        """Number of passes until the most blurred surface and all edges are smooth."""
+        """Return the number of passes until the most blurred surface and all edges are smooth."""
         is_warped = bool(field.has_disparity.any())
         if not (is_warped or self.has_dolly):
             return 1
@@ -109,7 +112,7 @@ class Lens:
         return EDGE_PASSES if self.level == BEST_QUALITY and is_moved else 1
 
     def samples(self, field: LightFieldTexture, pass_index: int) -> Samples:
-        """The cameras of a pass, and which views answer them. field: has views."""
+        """Return the cameras of a pass and the views that answer them. field: has views."""
         grid, present = field.grid, field.present
         if self.diameter == 0 and self.has_dolly:
             return every_corner()
@@ -124,8 +127,9 @@ class Lens:
         return answered_samples(points, pass_index * count, self.eye, grid, present)
 
     def cell(self, pass_index: int) -> float:
-        """Side, in view steps, of the square of the aperture that each camera of a pass stands for: among those of the
-        first pass, which is shown alone, or among all.
+        """Return the side, in view steps, of the square of the aperture around each camera of a pass.
+
+        The first pass, which is shown alone, fills the aperture by itself; the other cameras share it with all.
         """
         if self.diameter == 0:
             return 0.0
@@ -134,7 +138,7 @@ class Lens:
         return math.sqrt(area / (self.cameras_per_pass * passes))
 
     def sample_count(self, field: LightFieldTexture) -> int:
-        """Number of samples of a pass."""
+        """Return the number of samples of a pass."""
         return len(self.samples(field, 0)) if field.present.any() else 0
 
 
@@ -145,7 +149,7 @@ def lens_of(
     level: QualityLevel = BEST_QUALITY,
     widest: float | None = None,
 ) -> Lens:
-    """The lens for a picture of that width. widest: see `Lens`; the grid's side by default."""
+    """Return the lens of a picture of that width. widest: see `Lens`; None for the side of the grid."""
     diameter = max(optics.aperture_diameter, 0.0)
     widest = float(max(field.grid)) if widest is None else widest
     return Lens(
@@ -153,7 +157,7 @@ def lens_of(
         diameter=diameter,
         widest=widest,
         dolly=(-2.0 * optics.dolly, -2.0 * optics.dolly * field.height / field.width),
-        blur_px=min(diameter, widest) * _most_beside_focus(optics, field.range_px) * width_px / field.width,
+        blur_px=min(diameter, widest) * _max_defocus(optics, field.range_px) * width_px / field.width,
         highlight_gain=optics.highlight_gain(diameter, field.hdr),
         level=level,
         color_space=field.color_space,
@@ -161,13 +165,14 @@ def lens_of(
 
 
 def is_stored(eye: ViewOffset, field: LightFieldTexture) -> bool:
-    """Whether a view that is there lies at this viewpoint."""
+    """Return whether a present view lies at this viewpoint."""
     row, column = float(eye.t + field.grid.centre[0]), float(eye.s + field.grid.centre[1])
     is_on_grid = 0 <= row < field.grid.rows and 0 <= column < field.grid.columns
     return is_on_grid and row.is_integer() and column.is_integer() and bool(field.present[int(row), int(column)])
 
 
-def _most_beside_focus(optics: Optics, range_px: tuple[float, float]) -> float:
+def _max_defocus(optics: Optics, range_px: tuple[float, float]) -> float:
+    """Return the largest difference between a disparity and the sharp ones."""
     tilt = sum(map(abs, optics.focus_tilt))
     farthest = max(abs(edge - optics.focus_disparity) for edge in range_px) + tilt
     return max(farthest - max(optics.focus_range, 0.0), 0.0)

@@ -18,14 +18,7 @@ from iibr_core.beyond.optics import Optics
 from iibr_core.exports.render_settings import LensTile, RenderSettings
 from iibr_core.scenes.rect import WHOLE, Rect
 from iibr_core.scenes.screen_size import ScreenSize
-from iibr_core.types import (
-    SRGB,
-    ColorSpace,
-    FloatImage,
-    GridShape,
-    StoredColors,
-    ViewUpdate,
-)
+from iibr_core.types import SRGB, ColorSpace, FloatImage, GridShape, StoredColors, ViewUpdate
 from viewer.gpu.context import GLContext
 from viewer.gpu.light_field_texture import Box, LightFieldTexture
 from viewer.gpu.programs import ProgramCache
@@ -43,7 +36,6 @@ from viewer.gpu.refocus.frame_budget import (
 from viewer.gpu.refocus.picture_drawing import PictureDrawing
 from viewer.gpu.refocus.picture_lens import lens_of
 from viewer.gpu.refocus.screen_image import ScreenImage
-from viewer.model.state.app_state import DrawReport
 
 if TYPE_CHECKING:
     from iibr_core.gloss.shading import GlossMaps
@@ -52,18 +44,20 @@ if TYPE_CHECKING:
 class Renderer:
     """Draws one light field at a time. Call it only from the thread its context belongs to.
 
-    report: what is known of the picture drawn last. passes_shown: how many passes of the best picture what is shown is
-    made of; 0: it is softer than that. field: None before the first.
+    field: None before the first. passes_shown: number of passes of the best picture in what is shown, 0 for a softer
+    picture. samples, samples_converged, draw_s: cameras of the last picture so far and in all, and the time of the
+    last drawing in seconds.
     """
 
     def __init__(self, gl: GLContext) -> None:
         self.gl = gl
         self.ctx = gl.ctx
-        self.report = DrawReport()
+        self.field: LightFieldTexture | None = None
         self.passes_shown = 0
+        self.samples = self.samples_converged = 0
+        self.draw_s = 0.0
         self.programs = ProgramCache(self.ctx)
         self._accumulator = Accumulator(self.ctx, self.programs)
-        self.field: LightFieldTexture | None = None
         self._fallback_view: LightFieldTexture | None = None
         self._screen = ScreenImage(self.ctx)
         self._accumulation: ProgressiveAccumulation | None = None
@@ -74,7 +68,7 @@ class Renderer:
 
     @property
     def drawn_field(self) -> LightFieldTexture:
-        """What is drawn: the field, or what stands in for it. Raises ValueError before the first."""
+        """The field that is drawn, or the view in its place. Raises ValueError before the first."""
         return self._fallback_view or self._loaded
 
     @property
@@ -134,55 +128,43 @@ class Renderer:
         self._accumulation = None
 
     def render(
-        self,
-        optics: Optics,
-        size_px: ScreenSize,
-        level: QualityLevel = BEST_QUALITY,
-        part: Rect = WHOLE,
+        self, optics: Optics, size_px: ScreenSize, level: QualityLevel = BEST_QUALITY, part: Rect = WHOLE
     ) -> None:
-        """Draw the picture (`image_texture`, `read_image`) at once, with every view the aperture sees.
+        """Draw the first pass of a picture at once (`image_texture`, `read_image`).
 
-        level: what to leave out, except for its scale. part: what of the picture is drawn, stretched to size_px =
-        (width, height). Before the first view the picture is black. Its framebuffer stays bound.
+        level: its scale is ignored. part: part of the picture, stretched to size_px = (width, height). Before the first
+        view the picture is black. Its framebuffer stays bound.
         """
         self._accumulation, self._shown_from_pass = self._accumulation_of(optics, size_px, level, part), 0
         self._draw(math.inf, passes=1)
         self._finish()
 
-    def render_in_time(
-        self,
-        optics: Optics,
-        size_px: ScreenSize,
-        budget_s: float,
-        part: Rect = WHOLE,
-    ) -> None:
-        """Draw the picture as well as the time is thought to allow; `refine` then makes it better.
+    def render_in_time(self, optics: Optics, size_px: ScreenSize, budget_s: float, part: Rect = WHOLE) -> None:
+        """Draw a picture as well as the time is expected to allow; `refine` then makes it better.
 
-        Its own image may then be smaller than size_px. part: what of the picture is drawn, stretched to size_px.
+        The image may be smaller than size_px. part: part of the picture, stretched to size_px.
         """
-        start = time.perf_counter()
-        programs_before = len(self.programs)
-        self._level = choose_quality_level(
-            partial(self._work, optics, size_px, part), self._frame_time, budget_s, self._level
-        )
+        start, programs = time.perf_counter(), len(self.programs)
+        cost_of = partial(self._cost, optics, size_px, part)
+        self._level = choose_quality_level(cost_of, self._frame_time, budget_s, self._level)
         level = QUALITY_LEVELS[self._level]
-        self.render(optics, scale_size(size_px, level.scale), level=level, part=part)
+        self.render(optics, scale_size(size_px, level.scale), level, part)
         self.ctx.finish()
         seconds = time.perf_counter() - start
-        if len(self.programs) == programs_before:
-            self._frame_time.learn(self._work(optics, size_px, part, level), seconds)
-        drawn = self._current().done
-        self._refining_s = seconds / max(drawn, 1) / math.prod(self._current().size_px)
+        if len(self.programs) == programs:  # compiling says nothing about drawing
+            self._frame_time.learn(cost_of(level), seconds)
+        drawn = self._current()
+        self._refining_s = seconds / max(drawn.done, 1) / math.prod(drawn.size_px)
         if level != BEST_QUALITY:
             self._accumulation = self._accumulation_of(optics, size_px, BEST_QUALITY, part)
             self.passes_shown = 0
-        self._learn(drawn, seconds)
+        self._report(drawn.done, seconds)
 
     def renew(self, optics: Optics, size_px: ScreenSize, part: Rect = WHOLE) -> None:
-        """Begin the picture that is shown again, as its views have changed: `refine` draws it.
+        """Begin the shown picture again because its views have changed: `refine` draws it.
 
-        What is shown stays until the new one is made of as many passes; it has a texture of its own already. Views that
-        come in between are seen in the passes that follow, so that they do not keep the new one from being shown.
+        The old picture stays until the new one has as many passes. Views that come in between are drawn in the passes
+        that follow, so that they do not delay the new picture.
         """
         self._accumulation = self._accumulation_of(optics, size_px, BEST_QUALITY, part)
         self._shown_from_pass = min(self.passes_shown, self._accumulation.passes)
@@ -191,34 +173,31 @@ class Renderer:
         """Draw more samples of the same picture, for about that long; the image changes after each pass."""
         if self.is_converged:
             return
-        accumulation = self._current()
-        start = time.perf_counter()
-        pass_before, done_before, programs_before = accumulation.pass_index, accumulation.done, len(self.programs)
-        self._draw(budget_s, passes=accumulation.passes)
+        accumulation, programs = self._current(), len(self.programs)
+        pass_before, done_before, start = accumulation.pass_index, accumulation.done, time.perf_counter()
+        self._draw(budget_s, accumulation.passes)
         if accumulation.pass_index > pass_before and not self.is_renewing:
             self._finish()
         self.ctx.finish()
         seconds = time.perf_counter() - start
-        if len(self.programs) == programs_before:
+        if len(self.programs) == programs:
             self._refining_s = seconds / max(accumulation.done - done_before, 1) / math.prod(accumulation.size_px)
-        if self.is_renewing:
-            return
-        self._learn(accumulation.done, seconds)
+        if not self.is_renewing:
+            self._report(accumulation.done, seconds)
 
     def start_picture(self, settings: RenderSettings, field: LightFieldTexture | None = None) -> PictureDrawing:
-        """A picture with every sample it will get, to be drawn step by step, and stopped once it is no longer wanted.
+        """Return a picture with all its samples, to be drawn step by step, or stopped.
 
-        What was drawn last stays as it is. field: it is drawn from, by default what the screen shows.
+        The picture on the screen stays. field: drawn field, None for the field that the screen shows.
         """
         if settings.tile is not None:
             return self._start_tile(settings, settings.tile)
         field = self.drawn_field if field is None else field
-        accumulator = Accumulator(self.ctx, self.programs)
         whole = self._accumulation_of(settings.optics, settings.size_px, BEST_QUALITY, settings.part, field)
-        return PictureDrawing(self.gl, accumulator, field, whole, settings.is_linear, settings.color_space)
+        return PictureDrawing(self.gl, self.programs, field, whole, settings.is_linear, settings.color_space)
 
     def _start_tile(self, settings: RenderSettings, tile: LensTile) -> PictureDrawing:
-        """A picture of the tile's own views, which nothing else shows."""
+        """Return a picture of the tile's own views."""
         first, *others = tile.views
         height, width = first.colors.shape[:2]
         field = LightFieldTexture(self.ctx, tile.grid, width, height, hdr=True, with_disparity=True)
@@ -232,13 +211,12 @@ class Renderer:
             field_part=tile.window,
         )
         whole = ProgressiveAccumulation(lens, settings.size_px, lens.pass_count(field))
-        accumulator = Accumulator(self.ctx, self.programs)
-        drawing = PictureDrawing(self.gl, accumulator, field, whole, settings.is_linear, settings.color_space, others)
+        drawing = PictureDrawing(self.gl, self.programs, field, whole, settings.is_linear, settings.color_space, others)
         field.release()
         return drawing
 
     def converged_picture(self, settings: RenderSettings) -> NDArray[Any]:
-        """The picture of `start_picture`, at once."""
+        """Return the picture of `start_picture`, drawn at once."""
         drawing = self.start_picture(settings)
         drawing.advance()
         drawing.stop()
@@ -251,34 +229,22 @@ class Renderer:
 
     @property
     def is_renewing(self) -> bool:
-        """Whether what is shown still waits for what `renew` has begun."""
+        """Whether the picture that `renew` has begun is not shown yet."""
         return self._accumulation is not None and self._accumulation.pass_index < self._shown_from_pass
 
     @property
-    def samples_drawn(self) -> int:
-        """How many points of the lens the picture drawn last is made of."""
-        return self._current().done
-
-    @property
-    def samples_converged(self) -> int:
-        """How many the converged picture is made of, about."""
-        accumulation, field = self._current(), self.drawn_field
-        in_all = accumulation.lens.sample_count(field) * accumulation.passes
-        return accumulation.done if self.is_converged else max(in_all, accumulation.done)
-
-    @property
     def image_texture(self) -> int:
-        """GL name of the renderer's own image (RGBA8, rows bottom-up). Another picture may change it."""
-        return self._screen.shown.image.textures[0].glo
+        """GL name of the shown image (RGBA8, rows bottom-up). Another picture may change it."""
+        return self._screen.shown.image.texture.glo
 
     def read_image(self) -> NDArray[np.uint8]:
-        """The picture as (H, W, 3) uint8, sRGB-encoded, row 0 at the top; stretched where it was drawn smaller."""
+        """Return the picture (H, W, 3), sRGB-encoded, row 0 at the top; stretched if it was drawn smaller."""
         image, drawn_px = self._screen.read(), self._screen.shown.size_px
         size_px = self._accumulation.size_px if self._accumulation else drawn_px
         return image if drawn_px == size_px else stretch_image(image, size_px)
 
     def read_pixel(self, u: float, v: float) -> tuple[int, int, int]:
-        """The picture at texture coordinates (0..1, row 0 at the top), sRGB bytes."""
+        """Return the picture's colour at texture coordinates (0..1, row 0 at the top), sRGB bytes."""
         return self._screen.read_pixel(u, v)
 
     def release(self) -> None:
@@ -302,9 +268,8 @@ class Renderer:
         part: Rect = WHOLE,
         field: LightFieldTexture | None = None,
     ) -> ProgressiveAccumulation:
-        field = self.drawn_field if field is None else field
-        whole_width_px = round(size_px[0] / part.width)
-        lens = replace(lens_of(optics, field, whole_width_px, level), part=part)
+        field = field or self.drawn_field
+        lens = replace(lens_of(optics, field, round(size_px[0] / part.width), level), part=part)
         return ProgressiveAccumulation(lens, size_px, lens.pass_count(field))
 
     def _draw(self, budget_s: float, passes: int) -> None:
@@ -314,20 +279,18 @@ class Renderer:
         self._accumulator.sum_up(self.drawn_field, accumulation, targets, passes, budget_s, sample_s)
 
     def _finish(self) -> None:
-        targets = self._screen.targets_of(self._current().size_px)
-        self._accumulator.finish(self._current(), targets, targets.image.framebuffer, is_linear=False)
-        self._screen.show(targets)
+        self._screen.shown = targets = self._screen.targets_of(self._current().size_px)
+        self._accumulator.finish(self._current(), targets)
         self.passes_shown = self._current().pass_index
 
-    def _work(self, optics: Optics, size_px: ScreenSize, part: Rect, level: QualityLevel) -> DrawCost:
+    def _cost(self, optics: Optics, size_px: ScreenSize, part: Rect, level: QualityLevel) -> DrawCost:
         field = self.drawn_field
         lens = lens_of(optics, field, round(size_px[0] / part.width * level.scale), level)
-        return DrawCost(
-            samples=lens.sample_count(field),
-            warps=bool(field.has_disparity.any()),
-            pixels=math.prod(scale_size(size_px, level.scale)),
-        )
+        pixels = math.prod(scale_size(size_px, level.scale))
+        return DrawCost(lens.sample_count(field), bool(field.has_disparity.any()), pixels)
 
-    def _learn(self, samples: int, seconds: float) -> None:
-        in_all = max(self.samples_converged, samples)
-        self.report = DrawReport(samples, in_all, 1e3 * seconds)
+    def _report(self, samples: int, seconds: float) -> None:
+        """Keep the numbers of the last picture."""
+        self.samples, self.draw_s, accumulation = samples, seconds, self._current()
+        in_all = accumulation.lens.sample_count(self.drawn_field) * accumulation.passes
+        self.samples_converged = samples if self.is_converged else max(in_all, accumulation.done, samples)

@@ -1,4 +1,4 @@
-"""The picture as it stands on the screen, and what the next one is drawn into meanwhile."""
+"""The picture that the screen shows, and targets of the next picture."""
 
 from __future__ import annotations
 
@@ -7,23 +7,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.scenes.screen_size import ScreenSize
-from viewer.gpu.render_targets import RenderTargets
+from viewer.gpu.render_targets import PictureTargets
 
 KEPT_SIZES = 2
-"""Of the picture: one drawn in a hurry is smaller than the one that follows it."""
+"""Number of picture sizes whose targets are kept: a picture drawn quickly is smaller than the next."""
 
 
 class ScreenImage:
-    """Render targets of the sizes asked for last; the image of one of them is shown."""
+    """Targets of the last sizes; the image of one of them is shown."""
 
     def __init__(self, ctx: moderngl.Context) -> None:
         self._ctx = ctx
-        self._targets: dict[ScreenSize, RenderTargets] = {}
-        self._shown: RenderTargets | None = None
+        self._targets: dict[ScreenSize, PictureTargets] = {}
+        self._shown: PictureTargets | None = None
 
-    def targets_of(self, size_px: ScreenSize) -> RenderTargets:
-        """Those of this size; beside them only the ones that were asked for last are kept."""
-        targets = self._targets.pop(size_px, None) or RenderTargets(self._ctx, size_px)
+    def targets_of(self, size_px: ScreenSize) -> PictureTargets:
+        """Return the targets of this size; those of the size used longest ago are freed."""
+        targets = self._targets.pop(size_px, None) or PictureTargets(self._ctx, size_px)
         while len(self._targets) >= KEPT_SIZES:
             oldest = self._targets.pop(next(iter(self._targets)))
             self._shown = None if self._shown is oldest else self._shown
@@ -31,25 +31,24 @@ class ScreenImage:
         self._targets[size_px] = targets
         return targets
 
-    def show(self, targets: RenderTargets) -> None:
-        """From now on the image of these is shown."""
-        self._shown = targets
-
     @property
-    def shown(self) -> RenderTargets:
-        """What is shown. Something must have been drawn."""
+    def shown(self) -> PictureTargets:
+        """The targets whose image is shown; set them once a picture is drawn."""
         assert self._shown is not None, "render first"
         return self._shown
 
+    @shown.setter
+    def shown(self, targets: PictureTargets) -> None:
+        self._shown = targets
+
     def read(self) -> NDArray[np.uint8]:
-        """What is shown, (H, W, 3), sRGB-encoded, row 0 at the top, as large as it was drawn."""
-        return self.shown.image.read(np.uint8)
+        """Return the picture at the size at which it was drawn, (H, W, 3), sRGB-encoded, row 0 at the top."""
+        return self.shown.image.read()
 
     def read_pixel(self, u: float, v: float) -> tuple[int, int, int]:
-        """What is shown at texture coordinates (0..1, row 0 at the top), sRGB bytes."""
-        framebuffer = self.shown.image.framebuffer
-        x, y = (min(max(int(at * size), 0), size - 1) for at, size in zip((u, 1 - v), framebuffer.size))
-        red, green, blue = framebuffer.read((x, y, 1, 1), components=3, alignment=1)
+        """Return the colour at texture coordinates (0..1, row 0 at the top), sRGB bytes."""
+        x, y = (min(max(int(at * size), 0), size - 1) for at, size in zip((u, 1 - v), self.shown.size_px))
+        red, green, blue = self.shown.image.framebuffer.read((x, y, 1, 1), components=3, alignment=1)
         return red, green, blue
 
     def release(self) -> None:

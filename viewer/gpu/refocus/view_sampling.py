@@ -1,5 +1,4 @@
-"""Which stored views answer the cameras of a picture, and with what weights. Plain arrays, no GL; offsets in view steps
-(t, s).
+"""Stored views that answer the cameras of a picture, with weights. Plain arrays, no GL; offsets in view steps (t, s).
 
 Weights change smoothly with the eye and the aperture, so that nothing jumps while the user drags.
 """
@@ -24,11 +23,11 @@ from iibr_core.types import GridShape, ViewOffset
 
 MAX_SOURCES = 4
 MIN_WEIGHT = 2e-4
-"""Least weight of a view that is drawn: a lighter one changes white by a twentieth of an 8-bit step."""
+"""Smallest weight of a view that is drawn; a smaller weight changes white by a twentieth of an 8-bit step."""
 
 
 class WeightedView(NamedTuple):
-    """A stored view that takes part in a picture: its index, and its weight (all weights sum to 1)."""
+    """Index of a stored view that answers a pinhole, and its weight; all weights sum to 1."""
 
     row: int
     column: int
@@ -58,23 +57,23 @@ class Samples:
 
 
 def pinhole_sources(eye: ViewOffset, grid: GridShape, present: NDArray[np.bool_]) -> list[WeightedView]:
-    """Up to four views around the eye, nearest first: the corners of its cell, where all are present.
+    """Return up to four views around the eye, nearest first: the corners of its cell if all are present.
 
-    Elsewhere the nearest ones, weighted by reciprocal distance less that of the next view left out: continuous in the
-    eye, and a stored view's own place belongs to it alone. present: (V, U) bool; empty if none is.
+    Otherwise these are the nearest views, weighted by reciprocal distance less that of the next view left out: weights
+    are continuous in the eye, and at a stored view it counts alone. present: (V, U) bool.
     """
     return _cell_corners(eye, grid, present) or _nearest_present(eye, grid, present)
 
 
 def pinhole_samples(sources: list[WeightedView]) -> Samples:
-    """The camera at the eye, answered by each of these views."""
+    """Return the camera at the eye, answered by each of these views."""
     views = np.array([(source.row, source.column) for source in sources], np.intp)
     weights = np.array([source.weight for source in sources])
     return Samples(np.zeros((len(sources), 2)), views, weights / weights.sum())
 
 
 def every_corner() -> Samples:
-    """A camera at the eye for each corner of a cell: with dolly, each pixel's ray tells which cell, and the weights."""
+    """Return a camera at the eye for each corner of a cell; with dolly, cell and weights depend on the pixel."""
     return Samples(
         np.zeros((MAX_SOURCES, 2)), np.zeros((MAX_SOURCES, 2), np.intp), np.full(MAX_SOURCES, 1 / MAX_SOURCES)
     )
@@ -102,7 +101,7 @@ def _nearest_present(eye: ViewOffset, grid: GridShape, present: NDArray[np.bool_
         return []
     distance = np.hypot(rows - grid.centre[0] - eye.t, columns - grid.centre[1] - eye.s)
     order = np.argsort(distance, kind="stable")[: MAX_SOURCES + 1]
-    # Less the closeness of the next view left out: a view comes and goes with weight 0, so nothing jumps.
+    # A view comes and goes with weight 0, so nothing jumps.
     reach = 1 / distance[order[MAX_SOURCES]] if len(order) > MAX_SOURCES else 0.0
     closeness = np.maximum(1 / np.maximum(distance[order[:MAX_SOURCES]], 1e-6) - reach, 0)
     if closeness.sum() == 0:
@@ -114,10 +113,10 @@ def _nearest_present(eye: ViewOffset, grid: GridShape, present: NDArray[np.bool_
 def answered_samples(
     points: Points, first: int, eye: ViewOffset, grid: GridShape, present: NDArray[np.bool_]
 ) -> Samples:
-    """Cameras at these points (N, 2) of the lens, of equal weight, each answered by a corner of its cell of the grid.
+    """Return cameras at these points (N, 2) of the lens, of equal weight, each answered by a corner of its cell.
 
-    Which corner is chosen by a sequence, in the shares that `pinhole_sources` would give: so all cameras together
-    blend views as a pinhole does. first: number of the first point in the sequence. present: (V, U) bool, some True.
+    A sequence chooses the corners in the shares of `pinhole_sources`, so that all cameras together blend views as a
+    pinhole does. first: number of the first point in the sequence. present: (V, U) bool, some True.
     """
     places = np.array(eye) + np.array(grid.centre) + points
     last = np.array(grid) - 1
@@ -129,9 +128,9 @@ def answered_samples(
 
 
 def blended_samples(points: Points, eye: ViewOffset, grid: GridShape, present: NDArray[np.bool_]) -> Samples:
-    """The stored views themselves in place of cameras at these points, each weighted by what the points ask of it.
+    """Return the stored views in place of cameras at these points, weighted by the points around them.
 
-    For views without disparity, which cannot be warped. Arguments: see `answered_samples`.
+    This is for views without disparity, which cannot be warped. Arguments: see `answered_samples`.
     """
     weights = np.zeros(tuple(grid))
     np.add.at(weights, tuple(np.moveaxis(nearest_present(present), -1, 0)), grid_weights(points, eye, grid))
@@ -142,9 +141,9 @@ def blended_samples(points: Points, eye: ViewOffset, grid: GridShape, present: N
 
 
 def nearest_present(present: NDArray[np.bool_]) -> NDArray[np.intp]:
-    """(V, U, 2): index of the present view nearest to each of the grid.
+    """Return, for each view of the grid, the index of the nearest present view: (V, U, 2).
 
-    Neighbours take turns among equally near ones, lest all their errors lie on one side.
+    Neighbours alternate between equally near views, so that their errors do not all lie on one side.
     """
     return _nearest_present_of(present.tobytes(), (present.shape[0], present.shape[1]))
 
@@ -156,7 +155,7 @@ def _nearest_present_of(present: bytes, shape: tuple[int, int]) -> NDArray[np.in
     every = np.indices(shape).reshape(2, -1).T
     distances = ((every[:, None] - indices[None]) ** 2).sum(-1)
     is_nearest = distances == distances.min(1, keepdims=True)
-    # Ties: which of the equally near ones, by the place in the grid.
+    # The place in the grid decides between equally near views.
     turn = (every @ (1, 2)) % is_nearest.sum(1)
     chosen = (is_nearest & (np.cumsum(is_nearest, 1) == turn[:, None] + 1)).argmax(1)
     return np.asarray(indices[chosen]).reshape(*shape, 2)
