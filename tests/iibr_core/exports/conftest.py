@@ -1,7 +1,5 @@
 """A small open scene, and a function that exports it."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path

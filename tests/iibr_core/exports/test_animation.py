@@ -1,7 +1,5 @@
 """Animations, read by PyAV and Pillow: every frame is what the renderer shows, and the last leads to the first."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path

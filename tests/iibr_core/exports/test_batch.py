@@ -1,7 +1,5 @@
 """Batches in this process: which photos are exported, skipped and listed as failed. Nothing is written to inputs."""
 
-from __future__ import annotations
-
 import csv
 import os
 from concurrent.futures import Future, ThreadPoolExecutor

@@ -1,7 +1,5 @@
 """Opening for exports: the whole photo, even if the window shows a sketch first."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

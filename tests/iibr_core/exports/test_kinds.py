@@ -1,7 +1,5 @@
 """The table of kinds: defaults of the options, and places where exports may be written."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

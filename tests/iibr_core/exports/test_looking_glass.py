@@ -1,7 +1,5 @@
 """Quilts shown by Looking Glass Bridge: against an HTTP server that answers as Bridge does."""
 
-from __future__ import annotations
-
 import json
 import threading
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """Folders: which are of photos, and which photos lie in them."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

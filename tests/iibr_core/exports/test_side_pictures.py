@@ -1,7 +1,5 @@
 """Quilts and stereo pictures, read by Pillow: places of the views, the focused surface, colours of the anaglyph."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 from typing import Any

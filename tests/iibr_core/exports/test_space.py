@@ -1,7 +1,5 @@
 """Cameras, points and maps, read by plyfile, OpenImageIO and our own readers: all agree on where things are."""
 
-from __future__ import annotations
-
 import json
 import math
 from dataclasses import replace

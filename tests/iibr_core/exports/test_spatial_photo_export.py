@@ -1,7 +1,5 @@
 """Spatial photos, read by pillow-heif: two pictures, a pair, each with its camera."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

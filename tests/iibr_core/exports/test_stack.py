@@ -1,7 +1,5 @@
 """Focal stacks, read by Pillow and OpenImageIO: every picture is what the renderer shows."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Exports make only the views that they show, and write the same file as with all views."""
 
-from __future__ import annotations
-
 import hashlib
 import re
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """Web pages as text: what they carry, within a budget, with the photo's words; and their index. Browsers: tests/web."""
 
-from __future__ import annotations
-
 import base64
 import json
 import re

@@ -1,7 +1,5 @@
 """Cameras of a field: where points lie, what is infinitely far, and numbers that make no cameras."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

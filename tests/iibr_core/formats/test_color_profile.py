@@ -1,7 +1,5 @@
 """Colour profiles: against Pillow's conversion of the same profile, in closed form, and damaged ones."""
 
-from __future__ import annotations
-
 import struct
 import zlib
 from io import BytesIO
@@ -156,19 +154,17 @@ BAD = {
 
 
 @pytest.mark.parametrize("data", BAD.values(), ids=BAD)
-def test_unusable_profiles_are_refused(data):
+def test_unusable_profiles_are_refused_and_photos_with_them_count_as_srgb(tmp_path, data):
     profile, reason = read_profile(data)
     assert profile is None
     assert reason
-
-
-def test_a_photo_with_an_unusable_profile_counts_as_srgb(tmp_path):
-    Image.fromarray(COLORS).save(tmp_path / "a.png", icc_profile=BAD["tables only"])
+    if len(data) > 10**6:  # readers cut it to the size that its header states
+        return
+    Image.fromarray(COLORS).save(tmp_path / "a.png", icc_profile=data)
     photo = read_photo(tmp_path / "a.png")
     assert np.array_equal(np.rint(255 * photo.pixels), COLORS)
-    assert photo.notes == (
-        "The colour profile 'made here' has no curves with a matrix and is ignored: colours are taken as sRGB.",
-    )
+    note = f"The colour profile 'made here' {reason} and is ignored: colours are taken as sRGB."
+    assert photo.notes == (note,) or data is not BAD["tables only"]
 
 
 @pytest.mark.parametrize("seed", range(6))
@@ -177,11 +173,8 @@ def test_flipped_bytes_give_colours_or_a_refusal(seed):
     data = np.frombuffer(profile_bytes(curve=CURVES["raised"]), np.uint8).copy()
     data[rng.integers(0, len(data), 12)] = rng.integers(0, 256, 12)
     profile, reason = read_profile(data.tobytes())
+    linear = np.zeros(1) if profile is None else profile.linear(COLORS)
     assert (profile is None) == bool(reason)
-    if profile is None:
-        return
-    linear = profile.linear(COLORS)
-    assert np.isfinite(linear).all()
     assert 0 <= linear.min() <= linear.max() <= 1
 
 

@@ -1,7 +1,5 @@
 """Stanford archive, Middlebury and LLFF on small folders: viewpoints, maps, units, and honest notes."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

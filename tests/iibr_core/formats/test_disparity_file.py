@@ -1,7 +1,5 @@
 """Disparity from files: kinds of files, unknown values, and other sizes."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
@@ -104,7 +102,8 @@ def test_another_size_scales_the_values_by_the_width(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("value", "message"), [(np.nan, "no value is known"), (np.inf, "no value is known"), (6e4, "--disparity-scale")]
+    ("value", "message"),
+    [(np.nan, "no value is known"), (np.inf, "no value is known"), (6e4, "disparity scale")],
 )
 def test_a_map_without_known_values_is_refused(tmp_path: Path, value: float, message: str) -> None:
     np.save(tmp_path / "a.npy", np.full((3, 4), value))

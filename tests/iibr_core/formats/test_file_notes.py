@@ -1,7 +1,5 @@
 """Notes about files of which one flat picture is shown: panoramas, animations, photos with a right eye's picture."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
@@ -21,11 +19,11 @@ GPANO = "http://ns.google.com/photos/1.0/panorama/"
 GIMAGE = "http://ns.google.com/photos/1.0/image/"
 
 
-def xmp(attributes: str = "", elements: str = "") -> str:
+def xmp(attributes: str = "") -> str:
     return (
         '<x:xmpmeta xmlns:x="adobe:ns:meta/"><rdf:RDF xmlns:rdf="http://www.w3.org/1999/02/22-rdf-syntax-ns#">'
         f'<rdf:Description rdf:about="" xmlns:GPano="{GPANO}" xmlns:GImage="{GIMAGE}" {attributes}>'
-        f"{elements}</rdf:Description></rdf:RDF></x:xmpmeta>"
+        "</rdf:Description></rdf:RDF></x:xmpmeta>"
     )
 
 

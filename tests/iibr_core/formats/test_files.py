@@ -1,7 +1,5 @@
 """Files that are read: anything but an ordinary file is refused by name."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Folders of views on a grid: which view stands where, and which folders are refused or are none."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

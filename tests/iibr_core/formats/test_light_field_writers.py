@@ -1,7 +1,5 @@
 """Light fields are written whole or not at all, and read again."""
 
-from __future__ import annotations
-
 import configparser
 from collections.abc import Iterable, Iterator
 from pathlib import Path

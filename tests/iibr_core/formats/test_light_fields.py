@@ -1,7 +1,5 @@
 """Every layout opens through one function; views come in order, with disparity in px per step of the grid."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Disparity maps on disk come back as they were written, or up to the steps of 16 bits."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Cameras from files: our files are read again, other programs' conventions hold, damaged files are refused."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

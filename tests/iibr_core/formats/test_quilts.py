@@ -1,7 +1,5 @@
 """Quilts: the shapes of displays and tiles, and the quilt for any display."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

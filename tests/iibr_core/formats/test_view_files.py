@@ -1,7 +1,5 @@
 """Light fields in one file: quilts, lenslet images, and all kinds of stereo photos."""
 
-from __future__ import annotations
-
 import json
 import struct
 from collections.abc import Callable
@@ -72,10 +70,6 @@ def smooth(height: int = 48, width: int = 64, shift: int = 0) -> np.ndarray:
     return np.stack([127 + 100 * np.sin((x + shift) / 9), 2.0 * y, x + 0.0 * y], -1).astype(np.uint8)
 
 
-def write_spatial(path: Path, left: np.ndarray, right: np.ndarray) -> None:
-    write_spatial_photo(path, left, right, 80.0)
-
-
 def write_mpo(path: Path, left: np.ndarray, right: np.ndarray) -> None:
     Image.fromarray(left).save(path, "MPO", save_all=True, append_images=[Image.fromarray(right)], quality=95)
 
@@ -108,26 +102,18 @@ def leia_image(left: np.ndarray, right: np.ndarray, *more: tuple[int, bytes], **
     return jpeg(left) + region + struct.pack(">I", len(region) + 6) + b"\x1e\x1a"
 
 
-def write_leia(path: Path, left: np.ndarray, right: np.ndarray) -> None:
-    path.write_bytes(leia_image(left, right))
-
-
-def write_full(path: Path, left: np.ndarray, right: np.ndarray) -> None:
-    Image.fromarray(np.hstack([left, right])).save(path)
-
-
-def write_over(path: Path, left: np.ndarray, right: np.ndarray) -> None:
-    Image.fromarray(np.vstack([left, right])).save(path)
-
-
-STEREO: dict[str, tuple[str, Callable[[Path, np.ndarray, np.ndarray], None], str]] = {
-    "spatial": ("a.heic", write_spatial, "spatial HEIC"),
+STEREO: dict[str, tuple[str, Callable[..., object], str]] = {
+    "spatial": ("a.heic", lambda path, *eyes: write_spatial_photo(path, *eyes, 80.0), "spatial HEIC"),
     "mpo": ("a.mpo", write_mpo, "MPO stereo"),
     "stereo jpeg": ("a.jpg", write_stereo_jpeg, "MPO stereo"),
-    "leia": ("a.jpg", write_leia, "Leia stereo"),
-    "lif": ("a.lif", write_leia, "Leia stereo"),
-    "full": ("a_LRF_Full_SBS.png", write_full, "side-by-side stereo"),
-    "over": ("a_TB.png", write_over, "side-by-side stereo"),
+    "leia": ("a.jpg", lambda path, *eyes: path.write_bytes(leia_image(*eyes)), "Leia stereo"),
+    "lif": ("a.lif", lambda path, *eyes: path.write_bytes(leia_image(*eyes)), "Leia stereo"),
+    "full": (
+        "a_LRF_Full_SBS.png",
+        lambda path, *eyes: Image.fromarray(np.hstack(eyes)).save(path),
+        "side-by-side stereo",
+    ),
+    "over": ("a_TB.png", lambda path, *eyes: Image.fromarray(np.vstack(eyes)).save(path), "side-by-side stereo"),
 }
 
 

@@ -1,7 +1,5 @@
 """Saved pictures: colours, bits, Exif, XMP and settings come back; a full disk leaves the old file."""
 
-from __future__ import annotations
-
 import struct
 from io import BytesIO
 
@@ -58,17 +56,8 @@ def middles(picture):
 def camera_exif():
     exif = Image.Exif()
     exif.update({MAKE: "Maker", ORIENTATION: 6, COMPRESSION: 6})
-    exif.get_ifd(EXIF).update(
-        {
-            EXPOSURE: 1 / 125,
-            FOCAL: 4.25,
-            FOCAL_35: 26,
-            MAKER_NOTE: b"bound",
-            WIDTH: 4000,
-            HEIGHT: 3000,
-            PER_UNIT: 1000.0,
-        }
-    )
+    exif.get_ifd(EXIF).update({EXPOSURE: 1 / 125, FOCAL: 4.25, FOCAL_35: 26, MAKER_NOTE: b"bound"})
+    exif.get_ifd(EXIF).update({WIDTH: 4000, HEIGHT: 3000, PER_UNIT: 1000.0})
     exif.get_ifd(GPS).update({1: "N", 2: (48.0, 51.0, 24.0)})
     return exif
 
@@ -177,7 +166,7 @@ def test_long_texts_are_packed(tmp_path, ending):
     assert settings_text_in(tmp_path / f"a{ending}") == text
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(4))
 def test_damaged_metadata_costs_no_picture(tmp_path, seed):
     rng = np.random.default_rng(seed)
     exif = bytearray(camera_exif().tobytes())

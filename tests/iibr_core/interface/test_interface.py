@@ -120,7 +120,7 @@ def test_a_wider_blur_takes_more_views(disparity: float | None, aperture: float,
     field = iibr.LightField(views, known, None, 4.0, _view_between=view)
     np.testing.assert_allclose(field.refocus(1.0, aperture), 0.5, atol=1e-3)
     assert count - 2 <= len(made) <= count
-    assert np.abs(made).max() <= min(aperture, 3.0) / 2
+    assert np.abs(made).max() <= min(aperture / 2, 1.6)
 
 
 @pytest.mark.parametrize("format", iibr.FORMATS)

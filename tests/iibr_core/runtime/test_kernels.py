@@ -1,7 +1,5 @@
 """Compiled kernels on disk, in a small copy of the package whose files are edited between two processes."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess

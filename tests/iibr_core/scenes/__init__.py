@@ -1,7 +1,5 @@
 """Small scenes with known answers."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from iibr_core.method.plan import ScenePlan, plan_literal

@@ -1,7 +1,5 @@
 """A photo at its own size: the same parallax as in the light field, in relation to its width."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Light fields from disk: shown as read, and with disparity found from their views where they bring none."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 
