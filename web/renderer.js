@@ -1,17 +1,9 @@
 // Draws a light field through a virtual lens, by the desktop's shaders in WebGL 2. Offsets are { t, s } in view steps
 // (down, right), disparities px per view step, as in the core. Names, numbers and their reasons are those of
-// viewer/gpu/refocus and iibr_core/rendering/aperture_sampling.py, where everything is explained at length.
+// viewer/gpu/refocus and iibr_core/beyond/aperture_sampling.py, where everything is explained at length.
 
-export const FIRST_SPACING_PX = 6.5, MIN_PASS = 4, MAX_PASS = 12, CAMERAS_PER_PX = 4, MIN_CAMERAS = 64;
-export const MAX_CAMERAS = 144, EDGE_PASSES = 5, BLEND_POINTS = 1024, MIN_WEIGHT = 2e-4;
-export const MAX_SAMPLES = 256, NEAR_PX = 32, ALONE_NEAR_PX = 2, OFF_BORDER_PX = 1 / 256;
-export const GRID_SIDE = 64, EDGE = 1 / GRID_SIDE, COARSENESS_VARIANCE = 1 / 12;
-export const GOLDEN_ANGLE = Math.PI * (3 - Math.sqrt(5));
-export const TURN_STEP = 0.7548776662466927, SHIFT_STEP = 0.5698402909980532;
-export const SQRT_STEPS = [
-    0.41421356237309515, 0.7320508075688772, 0.23606797749978969, 0.6457513110645906, 0.3166247903553998];
-export const LEVELS = [[1, 4, 1], [1, 2, 1], [1, 1, 1], [1, 1, 0.7], [1, 1, 0.5], [1, 1, 0.35], [0.5, 1, 0.35]]
-    .map(([cameras, sources, scale]) => ({ cameras, sources, scale }));
+// Numbers of iibr_core/beyond/picture_quality.py, by name: the page brings them.
+export const NUMBERS = {};
 export const WHOLE = { x: 0, y: 0, width: 1, height: 1 };
 
 export const clamp = (x, low, high) => Math.min(Math.max(x, low), high);
@@ -29,12 +21,13 @@ const reachOf = (cut) => Math.min(Math.SQRT2 * cut, 1);
 // How open it is at a point, for a diameter of 1.
 function openness(t, s, cut) {
     const inside = Math.min(0.5 - Math.hypot(t, s), cut / 2 - Math.max(Math.abs(t), Math.abs(s)));
-    return clamp(0.5 + inside / (EDGE * reachOf(cut)), 0, 1);
+    return clamp(0.5 + inside / (NUMBERS.EDGE * reachOf(cut)), 0, 1);
 }
 
 // Its area, as a share of the circle's, and its second moment about the middle, per axis, for a diameter of 1.
 function measure(cut) {
-    const places = Array.from({ length: GRID_SIDE }, (_, i) => reachOf(cut) * ((i + 0.5) / GRID_SIDE - 0.5));
+    const side = NUMBERS.GRID_SIDE;
+    const places = Array.from({ length: side }, (_, i) => reachOf(cut) * ((i + 0.5) / side - 0.5));
     let total = 0, moment = 0;
     for (const t of places) {
         for (const s of places) {
@@ -43,17 +36,17 @@ function measure(cut) {
             moment += weight * (t * t + s * s);
         }
     }
-    return { area: Math.min(total / GRID_SIDE ** 2 * 4 / Math.PI, 1), moment: moment / total / 2 };
+    return { area: Math.min(total / side ** 2 * 4 / Math.PI, 1), moment: moment / total / 2 };
 }
 
 // Those of `count` points of a spiral that pass, for a diameter of 1.
 function openSpiral(cut, count, passIndex) {
     const all = Array.from({ length: count }, (_, i) => {
-        const radius = reachOf(cut) / 2 * Math.sqrt((i + fraction(passIndex, SHIFT_STEP)) / count);
-        const angle = GOLDEN_ANGLE * i + 2 * Math.PI * TURN_STEP * passIndex;
+        const radius = reachOf(cut) / 2 * Math.sqrt((i + fraction(passIndex, NUMBERS.SHIFT_STEP)) / count);
+        const angle = NUMBERS.GOLDEN_ANGLE * i + 2 * Math.PI * NUMBERS.TURN_STEP * passIndex;
         return { t: radius * Math.sin(angle), s: radius * Math.cos(angle) };
     });
-    return all.filter(({ t, s }, i) => openness(t, s, cut) > fraction(passIndex * count + i, SQRT_STEPS[2]));
+    return all.filter(({ t, s }, i) => openness(t, s, cut) > fraction(passIndex * count + i, NUMBERS.SQRT_STEPS[2]));
 }
 
 // About `count` points of the aperture from its middle, for one pass; the first is moved and scaled to its centre and
@@ -65,7 +58,7 @@ export function aperturePoints(diameter, widest, count, passIndex, cell = 0) {
     const mean = (of) => points.reduce((sum, point) => sum + of(point), 0) / points.length;
     const middle = passIndex ? { t: 0, s: 0 } : { t: mean(({ t }) => t), s: mean(({ s }) => s) };
     const own = passIndex ? moment : mean(({ t, s }) => ((t - middle.t) ** 2 + (s - middle.s) ** 2) / 2);
-    const wanted = Math.max(moment - COARSENESS_VARIANCE * (cell / diameter) ** 2, 0);
+    const wanted = Math.max(moment - NUMBERS.COARSENESS_VARIANCE * (cell / diameter) ** 2, 0);
     const scale = own > 0 ? Math.sqrt(wanted / own) : 1;
     return points.map((point) => {
         const t = scale * (point.t - middle.t), s = scale * (point.s - middle.s);
@@ -106,8 +99,8 @@ export function pinholeSources(eye, field) {
 export function answeredSamples(points, first, eye, { rows, columns, step }) {
     const chosen = (two, number) => (number < two.at(-1)[1] ? two.at(-1) : two[0])[0];
     return points.map(({ t, s }, i) => {
-        const row = chosen(bracket(eye.t + t, rows, step), fraction(first + i, SQRT_STEPS[0]));
-        const column = chosen(bracket(eye.s + s, columns, step), fraction(first + i, SQRT_STEPS[1]));
+        const row = chosen(bracket(eye.t + t, rows, step), fraction(first + i, NUMBERS.SQRT_STEPS[0]));
+        const column = chosen(bracket(eye.s + s, columns, step), fraction(first + i, NUMBERS.SQRT_STEPS[1]));
         return { t, s, view: { t: row, s: column }, weight: 1 };
     });
 }
@@ -122,31 +115,32 @@ export function blendedSamples(points, eye, field) {
             asked.set(hash(corner), { ...corner, weight });
         }
     }
-    const kept = [...asked.values()].filter(({ weight }) => weight > MIN_WEIGHT * points.length), total = sumOf(kept);
+    const least = NUMBERS.MIN_WEIGHT * points.length;
+    const kept = [...asked.values()].filter(({ weight }) => weight > least), total = sumOf(kept);
     return kept.map((view) => ({ t: view.t - eye.t, s: view.s - eye.s, view, weight: view.weight / total }));
 }
 
 // ---- What the optics mean for one picture: see picture_lens.py
 
-export function lensOf(optics, field, widthPx, level = LEVELS[0]) {
+export function lensOf(optics, field, widthPx, level = NUMBERS.LEVELS[0]) {
     const diameter = Math.max(optics.aperture, 0), widest = Math.max(field.rows, field.columns);
     const beside = Math.max(...field.range.map((edge) => Math.abs(edge - optics.focus)));
     const blurPx = Math.min(diameter, widest) * beside * widthPx / field.width;
-    const best = clamp(Math.ceil(blurPx / FIRST_SPACING_PX), MIN_PASS, MAX_PASS);
+    const best = clamp(Math.ceil(blurPx / NUMBERS.FIRST_SPACING_PX), NUMBERS.MIN_PASS, NUMBERS.MAX_PASS);
     return { ...optics, diameter, widest, blurPx, level, camerasPerPass: Math.max(rounded(best * level.cameras), 1) };
 }
 
 // Number of passes until the most blurred surface is smooth.
 function passesThroughAperture({ level, blurPx, camerasPerPass }) {
-    if (level !== LEVELS[0]) return 1;
-    return Math.ceil(clamp(CAMERAS_PER_PX * blurPx, MIN_CAMERAS, MAX_CAMERAS) / camerasPerPass);
+    if (level !== NUMBERS.LEVELS[0]) return 1;
+    return Math.ceil(clamp(NUMBERS.CAMERAS_PER_PX * blurPx, NUMBERS.MIN_CAMERAS, NUMBERS.MAX_CAMERAS) / camerasPerPass);
 }
 
 // The same for the picture, whose edges are to be smooth, too.
 export function passCount(lens, field) {
     if (!field.hasDisparity) return 1;
     if (lens.diameter > 0) return passesThroughAperture(lens);
-    return lens.level === LEVELS[0] && !field.layers.has(hash(lens.eye)) ? EDGE_PASSES : 1;
+    return lens.level === NUMBERS.LEVELS[0] && !field.layers.has(hash(lens.eye)) ? NUMBERS.EDGE_PASSES : 1;
 }
 
 // Side, in view steps, of the square of the aperture that each camera of a pass stands for: among those of the first
@@ -167,7 +161,7 @@ export function samplesOf(lens, field, passIndex) {
         return sources.map((view) => ({ t: 0, s: 0, view, weight: view.weight / total }));
     }
     if (!field.hasDisparity) {
-        return blendedSamples(aperturePoints(diameter, widest, BLEND_POINTS, passIndex), eye, field);
+        return blendedSamples(aperturePoints(diameter, widest, NUMBERS.BLEND_POINTS, passIndex), eye, field);
     }
     const points = aperturePoints(diameter, widest, count, passIndex, cellOf(lens, passIndex));
     return answeredSamples(points, passIndex * count, eye, field);
@@ -248,7 +242,7 @@ export class Renderer {
         this.colors = this.texture(gl.TEXTURE_2D_ARRAY, gl.RGBA8, gl.LINEAR, width, height, layers);
         this.disparities = this.texture(gl.TEXTURE_2D_ARRAY, gl.R16F, gl.NEAREST, width, height, layers);
         this.values = new Float32Array(width * height);
-        this.table = new Float32Array(3 * MAX_SAMPLES * 4);
+        this.table = new Float32Array(3 * NUMBERS.MAX_SAMPLES * 4);
         gl.bindBufferBase(gl.UNIFORM_BUFFER, 0, gl.createBuffer());
         gl.bufferData(gl.UNIFORM_BUFFER, this.table, gl.DYNAMIC_DRAW);
         this.disparityOf = Float32Array.from({ length: 256 }, (_, i) => far + (near - far) * i / 255);
@@ -315,7 +309,7 @@ export class Renderer {
 
     // ---- Pictures: summed up in passes, as accumulation.py and passes.py have it
 
-    begin(optics, part, width, height, level = LEVELS[0]) {
+    begin(optics, part, width, height, level = NUMBERS.LEVELS[0]) {
         const { gl, field } = this, lens = lensOf(optics, field, Math.round(width / part.width), level);
         const target = this.targetOf(width, height), passes = passCount(lens, field);
         this.picture = { lens, part, width, height, target, passes, pass: 0, done: 0 };
@@ -339,6 +333,7 @@ export class Renderer {
     }
 
     setSamples(samples) {
+        const { MAX_SAMPLES, OFF_BORDER_PX, SQRT_STEPS } = NUMBERS;
         const { gl, table, field: { layers, hasDisparity }, picture: { lens, pass, done } } = this;
         samples.forEach(({ t, s, view, weight }, i) => {
             // All views that answer a pinhole are asked at the same place of the pixel.
@@ -354,7 +349,7 @@ export class Renderer {
     drawLens(samples) {
         const { gl, field, picture: { lens, part, width, height, target, pass } } = this;
         const { hasDisparity, range: [farthest, nearest] } = field;
-        const mostPx = field.layers.size > 1 ? NEAR_PX : ALONE_NEAR_PX;
+        const mostPx = field.layers.size > 1 ? NUMBERS.NEAR_PX : NUMBERS.ALONE_NEAR_PX;
         const isNear = samples.every(({ t, s, view }) => {
             const [dt, ds] = [view.t - lens.eye.t - t, view.s - lens.eye.s - s];
             const isInCell = Math.max(Math.abs(dt), Math.abs(ds)) <= field.step;

@@ -1,6 +1,6 @@
 // The page: loads the views, and moves the lens by touch, mouse and keys.
 
-import { LEVELS, Renderer, WHOLE, clamp, hash, pick } from "./renderer.js";
+import { NUMBERS, Renderer, WHOLE, clamp, hash, pick } from "./renderer.js";
 
 const SWING_S = 9, BAR_AWAY_MS = 4000, TAP_MS = 350, TAP_PX = 8, TILT_DEG = 20, MOST_ZOOM = 16, MOST_SIDE_PX = 4096;
 const SLOW_MS = 45, QUICK_MS = 24;  // of a frame while the hand moves
@@ -109,11 +109,11 @@ class Page {
             // As good as there is time for while the hand moves, the best once it rests.
             const took = now - this.drawnAt, { width, height } = this.size();
             const change = this.changed && took < 400 ? (took > SLOW_MS) - (took < QUICK_MS) : 0;
-            this.level = clamp(this.level + change, 0, LEVELS.length - 1);
-            const level = LEVELS[this.changed ? this.level : 0];
+            this.level = clamp(this.level + change, 0, NUMBERS.LEVELS.length - 1);
+            const level = NUMBERS.LEVELS[this.changed ? this.level : 0];
             const [w, h] = [width, height].map((side) => Math.max(Math.round(side * level.scale), 1));
             renderer.begin(this.optics, this.part, w, h, level);
-            this.isBest = level === LEVELS[0];
+            this.isBest = level === NUMBERS.LEVELS[0];
             [this.drawnAt, this.changed] = [now, false];
             renderer.step();
         } else if (!renderer.isComplete) {
@@ -256,6 +256,7 @@ class Page {
 async function start() {
     if (!$("end")) return say("This page is cut off: get the whole file.");
     const field = JSON.parse($("field").textContent);
+    Object.assign(NUMBERS, field.numbers);
     Object.assign(field, { fullStep: field.step, step: 1e6, layers: new Map([["0,0", 0]]) });
     let page = null, renderer = null;
     try {

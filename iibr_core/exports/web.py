@@ -11,6 +11,7 @@ from pathlib import Path
 from string import Template
 from typing import Any
 
+from iibr_core.beyond.picture_quality import page_numbers
 from iibr_core.exports.kinds import ExportOptions
 from iibr_core.exports.source import ExportSource
 from iibr_core.exports.web_views import ViewStore, WebViews, form_that_fits
@@ -129,6 +130,7 @@ def _field(source: ExportSource, views: WebViews) -> dict[str, Any]:
         "firstAperture": first_aperture(scene),
         "focus": scale * source.optics.focus_disparity,
         "aperture": source.optics.aperture_diameter,
+        "numbers": page_numbers(),
     }
 
 

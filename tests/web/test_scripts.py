@@ -6,22 +6,19 @@ import json
 import shutil
 import subprocess
 from collections.abc import Callable
-from dataclasses import asdict
 from types import SimpleNamespace
 from typing import Any, cast
 
 import numpy as np
 import pytest
 
-import iibr_core.beyond.aperture_sampling as points_module
 from iibr_core.beyond.aperture_sampling import aperture_points
 from iibr_core.beyond.optics import ApertureShape, Optics
+from iibr_core.beyond.picture_quality import QUALITY_LEVELS, page_numbers
 from iibr_core.exports.web import page_script
 from iibr_core.runtime.resources import resource_folder
 from iibr_core.types import SRGB, GridShape, ViewOffset
 from viewer.gpu.light_field_texture import LightFieldTexture
-from viewer.gpu.refocus import passes, picture_lens, view_sampling
-from viewer.gpu.refocus.frame_budget import QUALITY_LEVELS
 from viewer.gpu.refocus.picture_lens import lens_of
 from viewer.gpu.refocus.view_sampling import Samples, answered_samples, blended_samples, pinhole_sources
 
@@ -30,12 +27,6 @@ SCRIPTS = sorted(WEB.glob("*.js"))
 GRID = GridShape(5, 7)
 PRESENT = np.ones(GRID, bool)
 MOST_LINES, MOST_WIDTH = 400, 120
-CONSTANTS = {
-    picture_lens: "FIRST_SPACING_PX MIN_PASS MAX_PASS CAMERAS_PER_PX MIN_CAMERAS MAX_CAMERAS EDGE_PASSES BLEND_POINTS",
-    passes: "MAX_SAMPLES NEAR_PX ALONE_NEAR_PX OFF_BORDER_PX",
-    view_sampling: "MIN_WEIGHT",
-    points_module: "GRID_SIDE EDGE GOLDEN_ANGLE TURN_STEP SHIFT_STEP SQRT_STEPS COARSENESS_VARIANCE",
-}
 DESKTOP_FIELD = {
     "grid": GRID,
     "width": 96,
@@ -65,6 +56,7 @@ def node(code: str, given: Any = None) -> Any:
     )
     text = (
         f"import * as renderer from {json.dumps((WEB / 'renderer.js').as_uri())};\n"
+        f"Object.assign(renderer.NUMBERS, {json.dumps(page_numbers())});\n"
         f"const given = {json.dumps(given)}, field = {field};\nconsole.log(JSON.stringify({code}));"
     )
     done = subprocess.run([program, "--input-type=module", "-e", text], capture_output=True, text=True, check=True)
@@ -114,17 +106,6 @@ def test_the_pages_script_is_one_module_that_ends_no_element(tmp_path) -> None:
     assert "<!--" not in script
 
 
-def test_constants_are_the_desktops() -> None:
-    wanted = {name: getattr(module, name) for module, names in CONSTANTS.items() for name in names.split()}
-    found = node("Object.fromEntries(given.map(name => [name, renderer[name]]))", list(wanted))
-    for name, value in wanted.items():
-        assert found[name] == pytest.approx(value, rel=1e-12), name
-
-
-def test_levels_are_the_desktops() -> None:
-    assert node("renderer.LEVELS") == [asdict(level) for level in QUALITY_LEVELS]
-
-
 def test_halves_are_rounded_as_in_python() -> None:
     halves = [k / 2 for k in range(20)]
     assert node("given.map(renderer.rounded)", halves) == list(map(round, halves))
@@ -172,7 +153,7 @@ def test_a_lens_is_the_desktops(diameter: float, has_disparity: bool) -> None:
     code = """given.map(({ eye, aperture, widthPx, level, passIndex, hasDisparity }) => {
         const places = Array.from({ length: 35 }, (_, i) => [`${Math.floor(i / 7) - 2},${i % 7 - 3}`, i]);
         const there = { ...field, hasDisparity, layers: new Map(places) };
-        const lens = renderer.lensOf({ eye, focus: 0.5, aperture }, there, widthPx, renderer.LEVELS[level]);
+        const lens = renderer.lensOf({ eye, focus: 0.5, aperture }, there, widthPx, renderer.NUMBERS.LEVELS[level]);
         return {
             cameras: lens.camerasPerPass, blurPx: lens.blurPx, passes: renderer.passCount(lens, there),
             cell: renderer.cellOf(lens, passIndex), samples: renderer.samplesOf(lens, there, passIndex),

@@ -10,12 +10,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from iibr_core.beyond.picture_quality import QUALITY_LEVELS, QualityLevel
 from viewer.gpu.refocus.frame_budget import (
     OVERHEAD_S,
-    QUALITY_LEVELS,
     DrawCost,
     FrameTimeModel,
-    QualityLevel,
     choose_quality_level,
     stretch_image,
 )

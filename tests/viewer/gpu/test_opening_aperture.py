@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from iibr_core.beyond.optics import CENTRE, Optics
+from iibr_core.beyond.picture_quality import BEST_QUALITY, QualityLevel
 from iibr_core.color import linear_from_srgb, srgb_from_linear, stored_from_encoded
 from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.gpu.scenes import PhotoLike, TwoPlanes, first_frame, psnr, rms, settled, sharpness, through_lens
-from viewer.gpu.refocus.frame_budget import BEST_QUALITY, QualityLevel
 from viewer.gpu.refocus.picture_renderer import Renderer
 
 GRID = GridShape(5, 5)

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 from iibr_core.beyond.optics import Optics
+from iibr_core.beyond.picture_quality import QUALITY_LEVELS, QualityLevel
 from iibr_core.color import linear_from_srgb, srgb_from_linear
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, ViewOffset
 from tests.image_compare import FILTERING, ROUNDING, assert_close
 from tests.viewer.gpu.scenes import TwoPlanes, psnr, rms, settled, through_lens
-from viewer.gpu.refocus.frame_budget import QUALITY_LEVELS, QualityLevel
 from viewer.gpu.refocus.picture_renderer import Renderer
 
 GRID = GridShape(5, 5)

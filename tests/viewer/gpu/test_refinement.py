@@ -10,14 +10,12 @@ import numpy as np
 import pytest
 
 from iibr_core.beyond.optics import CENTRE, Optics
+from iibr_core.beyond.picture_quality import EDGE_PASSES, MAX_SOURCES, QualityLevel
 from iibr_core.types import GridShape, InputError, ViewOffset
 from tests.viewer.gpu.scenes import TwoPlanes, psnr, through_lens
 from viewer.gpu.context import GLContext
 from viewer.gpu.refocus import accumulation
-from viewer.gpu.refocus.frame_budget import QualityLevel
-from viewer.gpu.refocus.picture_lens import EDGE_PASSES
 from viewer.gpu.refocus.picture_renderer import Renderer
-from viewer.gpu.refocus.view_sampling import MAX_SOURCES
 
 GRID = GridShape(5, 5)
 SCENE = TwoPlanes(width=160, height=120, background=-6.0, foreground=0.0, radius_px=25.0)

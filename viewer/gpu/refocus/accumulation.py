@@ -9,11 +9,12 @@ from dataclasses import dataclass
 
 import moderngl
 
+from iibr_core.beyond.picture_quality import MAX_SAMPLES
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import SRGB, ColorSpace
 from viewer.gpu.light_field_texture import LightFieldTexture
 from viewer.gpu.programs import ProgramCache
-from viewer.gpu.refocus.passes import MAX_SAMPLES, Passes, Rows
+from viewer.gpu.refocus.passes import Passes, Rows
 from viewer.gpu.refocus.picture_lens import Lens
 from viewer.gpu.refocus.view_sampling import Samples
 from viewer.gpu.render_targets import PictureTargets

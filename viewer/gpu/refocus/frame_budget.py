@@ -11,36 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from iibr_core.beyond.picture_quality import QUALITY_LEVELS, QualityLevel
 from iibr_core.scenes.screen_size import ScreenSize
-from viewer.gpu.refocus.view_sampling import MAX_SOURCES
-
-
-@dataclass(frozen=True)
-class QualityLevel:
-    """Limits of a picture.
-
-    cameras: share of a pass's cameras in the aperture. sources: largest number of stored views that answer a pinhole.
-    scale: share of the picture's width and height.
-    """
-
-    cameras: float = 1.0
-    sources: int = MAX_SOURCES
-    scale: float = 1.0
-
-
-BEST_QUALITY = QualityLevel()
-QUALITY_LEVELS = (
-    BEST_QUALITY,
-    QualityLevel(1.0, 2),
-    QualityLevel(1.0, 1),
-    QualityLevel(1.0, 1, 0.7),
-    QualityLevel(1.0, 1, 0.5),
-    QualityLevel(1.0, 1, 0.35),
-    QualityLevel(0.5, 1, 0.35),
-)
-"""Quality levels from the best to the fastest. At equal cost, half the width is nearer to the converged picture than a
-quarter of the cameras.
-"""
 
 PICTURE_FETCHES = 4.0
 """Cost of a pixel without any camera."""

@@ -7,24 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.beyond.aperture_sampling import SQRT_STEPS, fractions
+from iibr_core.beyond.picture_quality import ALONE_NEAR_PX, MAX_SAMPLES, NEAR_PX, OFF_BORDER_PX
 from iibr_core.types import SRGB, ColorSpace
 from viewer.gpu.light_field_texture import LightFieldTexture
 from viewer.gpu.programs import Program, ProgramCache
 from viewer.gpu.refocus.picture_lens import BARREL_EDGE, Lens
 from viewer.gpu.refocus.view_sampling import Samples, nearest_present
 from viewer.gpu.render_targets import PictureTargets, RenderTarget
-
-MAX_SAMPLES = 256
-"""Largest number of samples of a draw, as in shaders/lens.frag; more samples take several draws."""
-
-OFF_BORDER_PX = 1 / 256
-"""Shift of a camera's place in its pixel: halfway between views, look-ups would lie on the border of two texels."""
-
-NEAR_PX = 32.0
-"""Largest parallax between a camera and its view at which three steps find the surface, see first_hit.glsl."""
-
-ALONE_NEAR_PX = 2.0
-"""The same limit for a single view."""
 
 COLORS, DISPARITIES, NEAREST_VIEWS = range(3)
 """Texture units."""

@@ -7,10 +7,21 @@ from dataclasses import dataclass
 
 from iibr_core.beyond.aperture_sampling import aperture_points, open_area
 from iibr_core.beyond.optics import Optics
+from iibr_core.beyond.picture_quality import (
+    BEST_QUALITY,
+    BLEND_POINTS,
+    CAMERAS_PER_PX,
+    EDGE_PASSES,
+    FIRST_SPACING_PX,
+    MAX_CAMERAS,
+    MAX_PASS,
+    MIN_CAMERAS,
+    MIN_PASS,
+    QualityLevel,
+)
 from iibr_core.scenes.rect import WHOLE, Rect
 from iibr_core.types import SRGB, ColorSpace, ViewOffset
 from viewer.gpu.light_field_texture import LightFieldTexture
-from viewer.gpu.refocus.frame_budget import BEST_QUALITY, QualityLevel
 from viewer.gpu.refocus.view_sampling import (
     Samples,
     answered_samples,
@@ -19,24 +30,6 @@ from viewer.gpu.refocus.view_sampling import (
     pinhole_samples,
     pinhole_sources,
 )
-
-FIRST_SPACING_PX = 6.5
-"""Blur, in output pixels, for which the first pass has one more camera."""
-
-MIN_PASS, MAX_PASS = 4, 12
-"""Smallest and largest number of cameras of a pass."""
-
-CAMERAS_PER_PX = 4.0
-"""Cameras of a finished picture for each output pixel of its widest blur: an edge then turns into a smooth ramp."""
-
-MIN_CAMERAS, MAX_CAMERAS = 64, 144
-"""Smallest and largest number of cameras of a finished picture; between views, that many blend them smoothly, too."""
-
-EDGE_PASSES = 5
-"""Passes that make the edges of a warped pinhole view smooth."""
-
-BLEND_POINTS = 1024
-"""Points of the aperture that weigh views without disparity."""
 
 BARREL_EDGE = 1 / 16
 """Width of the edge of a cat's-eye, as a share of the aperture's diameter."""

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.beyond.optics import Optics
+from iibr_core.beyond.picture_quality import BEST_QUALITY, QUALITY_LEVELS, QualityLevel
 from iibr_core.exports.render_settings import LensTile, RenderSettings
 from iibr_core.scenes.rect import WHOLE, Rect
 from iibr_core.scenes.screen_size import ScreenSize
@@ -24,11 +25,8 @@ from viewer.gpu.light_field_texture import Box, LightFieldTexture
 from viewer.gpu.programs import ProgramCache
 from viewer.gpu.refocus.accumulation import Accumulator, ProgressiveAccumulation
 from viewer.gpu.refocus.frame_budget import (
-    BEST_QUALITY,
-    QUALITY_LEVELS,
     DrawCost,
     FrameTimeModel,
-    QualityLevel,
     choose_quality_level,
     scale_size,
     stretch_image,

@@ -18,12 +18,9 @@ from iibr_core.beyond.aperture_sampling import (
     fractions,
     grid_weights,
 )
+from iibr_core.beyond.picture_quality import MAX_SOURCES, MIN_WEIGHT
 from iibr_core.scenes.lens_limits import clamp_to_grid
 from iibr_core.types import GridShape, ViewOffset
-
-MAX_SOURCES = 4
-MIN_WEIGHT = 2e-4
-"""Smallest weight of a view that is drawn; a smaller weight changes white by a twentieth of an 8-bit step."""
 
 
 class WeightedView(NamedTuple):
