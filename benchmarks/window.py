@@ -26,7 +26,6 @@ from tests.xvfb import private_display
 from viewer.app.main_loop import App, initial_state
 from viewer.model import lens
 from viewer.model.action import do
-from viewer.model.actions import OpenPath
 
 DEMO = resource_folder("assets") / "motorcycle" / "motorcycle.png"
 
@@ -41,7 +40,7 @@ def main() -> None:
         os.environ["MESA_SHADER_CACHE_DISABLE"] = "true"
     began = time.perf_counter(), time.process_time()
     with private_display():
-        app = App(initial_state(OpenPath(Source(str(DEMO)))))
+        app = App(initial_state(Source(str(DEMO))))
         try:
             print(markdown(("what", "measured"), rows(app, began, options.idle)))
         finally:

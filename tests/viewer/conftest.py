@@ -22,6 +22,8 @@ from viewer.model.action import do
 if TYPE_CHECKING:
     from viewer.app.main_loop import App
     from viewer.display.offscreen import OffscreenScene
+    from viewer.model.action import Action
+    from viewer.model.state.app_state import AppState
     from viewer.model.state.preferences import Section
 
 WIDTH, HEIGHT = 96, 64
@@ -89,6 +91,11 @@ def display() -> Iterator[str]:
     """A private X server; DISPLAY names it while the session runs."""
     with private_display() as name:
         yield name
+
+
+def reduce(state: AppState, action: Action) -> AppState:
+    """The state after an action."""
+    return action.apply(state)
 
 
 def rests(app: App) -> bool:
@@ -236,7 +243,6 @@ def open_window(display: str, no_egl_context: None) -> Iterator[Opener]:
     """Opens the viewer on a photo, with the panel and the sections that are used most; closes it after the test."""
     from iibr_core.scenes.scene import Source
     from viewer.app.main_loop import App, initial_state
-    from viewer.model.actions import OpenPath
     from viewer.model.state.app_state import AppState
     from viewer.model.state.preferences import Preferences, with_sections
 
@@ -244,7 +250,7 @@ def open_window(display: str, no_egl_context: None) -> Iterator[Opener]:
     sections = with_sections((), "view", "focus", "aperture", "light")
 
     def start(path: Path | None, kept_in: Path | None = None, **changes: object) -> Driver:
-        state = initial_state(OpenPath(Source(str(path), **changes))) if path else None  # type: ignore[arg-type]
+        state = initial_state(Source(str(path), **changes)) if path else None  # type: ignore[arg-type]
         preferences = Preferences(window=SMALL_WINDOW, open_sections=sections)
         apps.append(App(replace(state or AppState(), preferences=preferences, hides_panel=False), kept_in))
         return Driver(apps[-1])

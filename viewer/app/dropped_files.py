@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from pathlib import PurePath
 
 from iibr_core.scenes.scene import Source, source_beside, source_with_map
-from viewer.model.actions import Action, OpenPath
+from viewer.model import opening
+from viewer.model.action import Action, do
 from viewer.model.state.app_state import AppState
 
 MAP_SUFFIXES = (".pfm", ".npy", ".npz")
@@ -20,10 +21,10 @@ def actions_from_drop(paths: Sequence[str], state: AppState) -> list[Action]:
     others = [path for path in paths if path not in maps]
     if others:
         source = source_beside(state.source, others[0])
-        return [OpenPath(source_with_map(source, maps[0]) if maps else source)]
+        return [do(opening.open_source, source_with_map(source, maps[0]) if maps else source)]
     if maps and state.source:
-        return [OpenPath(source_with_map(state.source, maps[0]))]
-    return [OpenPath(Source(path)) for path in maps[:1]]
+        return [do(opening.open_source, source_with_map(state.source, maps[0]))]
+    return [do(opening.open_source, Source(path)) for path in maps[:1]]
 
 
 def _is_map(path: PurePath) -> bool:

@@ -15,15 +15,13 @@ from iibr_core.runtime.extras import require_extra
 from iibr_core.types import InputError
 from viewer.app.job import Job
 from viewer.app.job_queue import JobQueue
-from viewer.model import messages
-from viewer.model.action import do
-from viewer.model.actions import Action
+from viewer.model import messages, preferences
+from viewer.model.action import Action, do
 from viewer.model.remedies import words_of
 from viewer.model.saving import written_path
 from viewer.model.state.app_state import AppState
 from viewer.model.state.exporting import ExportPrompt, ExportTask
 from viewer.model.state.notices import Notice
-from viewer.model.state.preferences import SetPreference
 
 
 def add_export(task: ExportTask, state: AppState, inputs: Sequence[Path], jobs: JobQueue) -> list[Action]:
@@ -50,7 +48,7 @@ def add_export(task: ExportTask, state: AppState, inputs: Sequence[Path], jobs: 
     pictures = partial(optics_of, kind, task.options)
     jobs.add(Job("export", path, state, lambda scene, optics: "views", work, pictures))
     closed = [do(messages.show_prompt, None)] if isinstance(state.prompt, ExportPrompt) else []
-    return [*closed, SetPreference("last_folder", os.path.abspath(path.parent))]
+    return [*closed, do(preferences.set_last_folder, os.path.abspath(path.parent))]
 
 
 def _export(kind: ExportKind, path: Path, options: ExportOptions, source: ExportSource) -> list[Action]:

@@ -25,9 +25,7 @@ from viewer.background.newest import Failed, Newest, Post
 from viewer.display.scene_view import SceneView
 from viewer.gpu.refocus.frame_budget import stretch_image
 from viewer.model import messages, viewpoint
-from viewer.model.action import Action as VerbAction
-from viewer.model.action import do
-from viewer.model.actions import Action
+from viewer.model.action import Action, do
 from viewer.model.state.app_state import AppState
 from viewer.model.state.notices import Notice
 from viewer.model.state.viewpoint import FORWARD_LIMITS, MAX_ASIDE, FreeCamera
@@ -57,7 +55,7 @@ class FreeView:
     is_draft: bool
 
 
-FreeResult = FreeView | VerbAction
+FreeResult = FreeView | Action
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,7 +124,7 @@ class FreeCameraView:
                 case FreeView(request, view, is_draft):
                     self._scene_view.show_fallback(view)
                     self.shown, self._may_interrupt = None if is_draft else request, True
-                case VerbAction():
+                case Action():
                     actions.append(result)
                 case Failed(_, message):
                     self._may_interrupt = True

@@ -13,7 +13,7 @@ from iibr_core.exports.source import ExportSource
 from iibr_core.runtime.time_left import TimeLeft
 from iibr_core.scenes.scene import Scene, SceneRequest
 from viewer.display.snapshot import SceneSnapshot
-from viewer.model.actions import Action
+from viewer.model.action import Action
 from viewer.model.carried_optics import carry_optics
 from viewer.model.state.app_state import AppState
 from viewer.model.state.jobs import STOPPING, WAITING_FOR_VIEWS, JobKind, JobProgress

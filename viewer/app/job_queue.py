@@ -21,8 +21,7 @@ from viewer.background.file_worker import Done, FileRequest, FileWorker
 from viewer.background.window_work import WindowWork
 from viewer.display.scene_view import SceneView
 from viewer.model import messages, saving
-from viewer.model.action import do
-from viewer.model.actions import Action
+from viewer.model.action import Action, do
 from viewer.model.state.app_state import AppState
 from viewer.model.state.jobs import JobProgress
 from viewer.model.state.notices import Notice

@@ -7,9 +7,8 @@ from dataclasses import dataclass, replace
 from iibr_core.beyond.optics import CENTRE
 from iibr_core.types import ViewOffset
 from viewer.app.pointer import is_marking_gloss
-from viewer.model import depth, inspection, lens, messages, viewpoint
-from viewer.model.action import do
-from viewer.model.actions import Action, SetState
+from viewer.model import depth, inspection, lens, messages, viewpoint, window
+from viewer.model.action import Action, do
 from viewer.model.commands import BY_NAME, COMMANDS
 from viewer.model.state.app_state import AppState
 
@@ -59,7 +58,7 @@ def _escape_actions(state: AppState) -> list[Action]:
         return [do(inspection.compare, None)]
     if state.inspection.overlay is not None:
         return [do(inspection.set_overlay, None)]
-    return [SetState("is_fullscreen", False)] if state.is_fullscreen else []
+    return [do(window.set_fullscreen, False)] if state.is_fullscreen else []
 
 
 def read_keys() -> Keys:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
+from iibr_core.scenes.scene import Source
 from iibr_core.types import InputError
 from viewer.app.dialogs import has_dialogs
 from viewer.app.dropped_files import actions_from_drop
@@ -36,14 +37,11 @@ from viewer.display.filmstrip_view import FilmstripView
 from viewer.display.inspection_view import InspectionView
 from viewer.display.scene_view import VIEW_REFRESH_S, SceneView
 from viewer.gpu.glfw_context import create_for_window
-from viewer.model import inspection, saving, viewpoint
-from viewer.model.action import do
-from viewer.model.actions import Action, OpenPath, SetState
+from viewer.model import inspection, opening, preferences, saving, viewpoint, window
+from viewer.model.action import Action, do
 from viewer.model.inspection import NO_INSPECTION_TEXTURES, InspectionTextures, beside_of
 from viewer.model.layout import Layout, is_narrow, layout_of
-from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState, Picture
-from viewer.model.state.preferences import PlaceWindow
 from viewer.ui.host import UiHost
 from viewer.ui.overlays.filmstrip import filmstrip_paths
 from viewer.ui.screen import build_screen
@@ -82,8 +80,7 @@ class App:
         state = state or AppState()
         self.state = replace(load_preferences(state, kept_in) if kept_in else state, has_dialogs=has_dialogs())
         self.frames_shown = 0
-        preferences = self.state.preferences
-        self.window = Window("iibr", preferences.window, preferences.is_maximized)
+        self.window = Window("iibr", self.state.preferences.window, self.state.preferences.is_maximized)
         try:
             self._gl = create_for_window(self.window.handle)
         except InputError:
@@ -124,7 +121,7 @@ class App:
         layout, look = self.layout(), self.look()
         picture = self.scene_view.draw(self.state, layout.frame_px.size, layout.part) if layout.frame_px else None
         if picture and self.scene_view.report != self.state.report:
-            self.do(SetState("report", self.scene_view.report))
+            self.do(do(window.set_report, self.scene_view.report))
         textures = self.inspection_view.draw(self.state, layout) if picture else NO_INSPECTION_TEXTURES
         self._ui.begin(layout, look, sum(self._pace.took_s))
         self._pointer = pointer = read_pointer(self._pointer)
@@ -160,7 +157,7 @@ class App:
     @property
     def wait_s(self) -> float:
         """How long the next turn may sleep before it looks."""
-        is_behind = self.scene_loader.has_untold or not self.scene_view.shows_all_views()
+        is_behind = self.scene_loader.holds_progress or not self.scene_view.shows_all_views()
         idle_s = VIEW_REFRESH_S if is_behind else IDLE_WAIT_S
         idle_s = DIALOG_LOOK_S if self._side_effects.is_waiting else idle_s
         is_moving, is_over_panel = self.state.motion.is_running, self._pointer.is_over_panel
@@ -208,7 +205,7 @@ class App:
         if actions:
             self._pace.same_frames = 0
         for action in actions:
-            self.state = reduce(self.state, action)
+            self.state = action.apply(self.state)
         self.scene_loader.look_from(self.state.optics.eye)
 
     def _take_events(self) -> list[Action]:
@@ -222,16 +219,17 @@ class App:
             actions.append(do(viewpoint.tick, self._pace.stepped_at))
         actions += self._place_window()
         if is_narrow(self.window.size, self.window.ui_scale) != self.state.is_narrow:
-            actions.append(SetState("is_narrow", not self.state.is_narrow))
+            actions.append(do(window.set_narrow, not self.state.is_narrow))
         return actions
 
     def _place_window(self) -> list[Action]:
-        """Where the window is, where that is news."""
-        preferences, place = self.state.preferences, self.window.place
+        """Return where the window is, if that is news."""
+        before, place = self.state.preferences, self.window.place
         self.window.set_fullscreen(self.state.is_fullscreen)
-        if self.window.is_fullscreen or self.window.is_hidden or (place is None and preferences.is_maximized):
+        if self.window.is_fullscreen or self.window.is_hidden or (place is None and before.is_maximized):
             return []
-        return [] if place == preferences.window and not preferences.is_maximized else [PlaceWindow(place)]
+        is_known = place == before.window and not before.is_maximized
+        return [] if is_known else [do(preferences.place_window, place)]
 
     def _take_dropped(self) -> list[Action]:
         paths = self.window.take_dropped()
@@ -271,6 +269,6 @@ def run(state: AppState, kept_in: Path | None = None) -> None:
         app.run()
 
 
-def initial_state(action: OpenPath, depth_strength: float = 1.0) -> AppState:
-    """Return the state to start with: this file is to be opened."""
-    return reduce(AppState(depth_strength=depth_strength), action)
+def initial_state(source: Source, depth_strength: float = 1.0) -> AppState:
+    """Return the state to start with: this source is to be opened."""
+    return opening.open_source(AppState(depth_strength=depth_strength), source)

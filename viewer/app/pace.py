@@ -7,8 +7,7 @@ from collections import deque
 from dataclasses import dataclass, field
 
 from viewer.model import messages
-from viewer.model.action import do
-from viewer.model.actions import Action
+from viewer.model.action import Action, do
 from viewer.model.state.app_state import AppState
 from viewer.model.state.notices import Notice
 

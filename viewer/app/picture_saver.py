@@ -27,13 +27,11 @@ from viewer.app.job import Job, Needs
 from viewer.app.job_queue import JobQueue
 from viewer.app.save_places import map_path, picture_path
 from viewer.background.job_threads import message_of
-from viewer.model import messages
-from viewer.model.action import do
-from viewer.model.actions import Action
+from viewer.model import messages, preferences
+from viewer.model.action import Action, do
 from viewer.model.state.app_state import AppState
 from viewer.model.state.jobs import WRITING
 from viewer.model.state.notices import Notice
-from viewer.model.state.preferences import SetPreference
 from viewer.model.state.prompts import SavePrompt
 from viewer.model.state.tasks import SaveTask
 
@@ -91,7 +89,7 @@ def add_save(task: SaveTask, state: AppState, inputs: Sequence[Path], jobs: JobQ
         shot = _Shot(path, task.size_px, task.form, state)
         jobs.add(Job("picture", path, state, shot.needs, partial(_save, shot), takes_part=True))
     closed: list[Action] = [do(messages.show_prompt, None)] if isinstance(state.prompt, SavePrompt) else []
-    return closed if task.what == "map" else [*closed, SetPreference("last_folder", os.path.abspath(path.parent))]
+    return closed if task.what == "map" else [*closed, do(preferences.set_last_folder, os.path.abspath(path.parent))]
 
 
 def add_copy(state: AppState, jobs: JobQueue) -> list[Action]:

@@ -11,8 +11,7 @@ from iibr_core.scenes.rect import Rect
 from iibr_core.scenes.scene import Scene
 from iibr_core.types import ViewOffset
 from viewer.model import depth, gesture, inspection, lens, viewpoint
-from viewer.model.action import do
-from viewer.model.actions import Action
+from viewer.model.action import Action, do
 from viewer.model.focal_plane import handle_points, place_of
 from viewer.model.inspection import view_at
 from viewer.model.layout import Layout, pixel_at

@@ -18,9 +18,8 @@ from iibr_core.formats.outputs import make_folder, write_file
 from iibr_core.scenes.lens_limits import clamp
 from iibr_core.types import InputError
 from viewer.model import messages
-from viewer.model.action import do
-from viewer.model.actions import Action
-from viewer.model.reducers.worker_events import RECENT_KEPT
+from viewer.model.action import Action, do
+from viewer.model.opening import MAX_RECENT
 from viewer.model.state.app_state import AppState
 from viewer.model.state.notices import Notice
 from viewer.model.state.preferences import Preferences
@@ -52,7 +51,7 @@ def load_preferences(state: AppState, folder: Path) -> AppState:
     font_scale = clamp(preferences.font_scale, *FONT_SCALE_LIMITS)
     last_folder = preferences.last_folder if os.path.isdir(preferences.last_folder) else ""
     preferences = replace(preferences, font_scale=font_scale, last_folder=last_folder)
-    return replace(state, preferences=preferences, recent=recent[:RECENT_KEPT], notices=tuple(notices))
+    return replace(state, preferences=preferences, recent=recent[:MAX_RECENT], notices=tuple(notices))
 
 
 def last_opened(folder: Path) -> str | None:

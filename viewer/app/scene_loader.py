@@ -26,15 +26,14 @@ from viewer.background.scene_worker import PhotosFound, SceneResult, SceneWorker
 from viewer.display.depth_preview import DepthPreview
 from viewer.display.inspection_view import InspectionView
 from viewer.display.scene_view import SceneView
-from viewer.model import depth, messages
-from viewer.model.action import do
-from viewer.model.actions import Action, NewDepth, OpenFailed, OpenPath, ProgressMade, SceneOpened
+from viewer.model import depth, messages, opening, preferences
+from viewer.model.action import Action, do
+from viewer.model.carried_optics import NewDepth
 from viewer.model.depth import is_ahead, settings_for_worker
-from viewer.model.reducers.folder_reducer import AHEAD, SKETCHED_AHEAD, photos_ahead
+from viewer.model.folder import AHEAD, SKETCHED_AHEAD, photos_ahead
 from viewer.model.remedies import words_of
 from viewer.model.state.app_state import AppState
 from viewer.model.state.notices import Notice
-from viewer.model.state.preferences import SetPreference
 
 SKETCHES_FIRST = 3
 """A photo and the next two are there in small before all of it is read: who goes on quickly meets none of that work.
@@ -74,8 +73,9 @@ class SceneLoader:
         self._depth_settings = DepthSettings()
         self._stopped: int | None = None
         self._room_beside: tuple[Scene, int] | None = None
-        self._untold: list[Action] = []
-        self._told_at = 0.0
+        self._held: list[Action] = []
+        self._reported_at = 0.0
+        self._is_urgent = False
 
     def look_from(self, eye: ViewOffset) -> None:
         """Views near this place are made first."""
@@ -87,16 +87,18 @@ class SceneLoader:
         """
         actions = self._show_sketch(state) + self._depth_finder.advance(state, self._scene_view.loaded)
         while self._scene_view.has_room and (result := self._worker.next_result()) is not None:
-            actions += self._take(result, state)
+            self._held += self._take(result, state)
+            self._is_urgent |= not (isinstance(result, ViewReady | ProgressReport) and not result.progress.is_complete)
             if time.perf_counter() >= until:
                 break
-        self._untold += actions
-        return self._take_untold()
+        self._held += actions
+        self._is_urgent |= bool(actions)
+        return self._take_held()
 
     @property
-    def has_untold(self) -> bool:
-        """Whether progress was made that was not told yet."""
-        return bool(self._untold)
+    def holds_progress(self) -> bool:
+        """Whether progress was made that the state does not show yet."""
+        return bool(self._held)
 
     def preview_depth(self, state: AppState) -> list[Action]:
         """While depth is edited, show it; the views of what it was before need not be made."""
@@ -126,15 +128,14 @@ class SceneLoader:
         self.ahead.close()
         self._brush_loader.close()
 
-    def _take_untold(self) -> list[Action]:
-        """What is to be told now."""
-        told, now = self._untold, time.perf_counter()
-        is_progress = all(isinstance(news, ProgressMade) and not news.progress.is_complete for news in told)
-        if is_progress and now - self._told_at < PROGRESS_S:
+    def _take_held(self) -> list[Action]:
+        """Return the actions that are due: progress alone only now and then."""
+        now = time.perf_counter()
+        if not self._is_urgent and now - self._reported_at < PROGRESS_S:
             return []
-        if told:
-            self._untold, self._told_at = [], now
-        return told
+        actions, self._held, self._is_urgent = self._held, [], False
+        self._reported_at = now if actions else self._reported_at
+        return actions
 
     def _show_sketch(self, state: AppState) -> list[Action]:
         """What was asked for, in small, as long as nothing else of it is there."""
@@ -146,16 +147,19 @@ class SceneLoader:
     def _take(self, result: SceneResult, state: AppState) -> list[Action]:
         match result:
             case ProgressReport():
-                return [ProgressMade(result.id, result.progress)]
+                return [do(opening.set_progress, result.id, result.progress)]
             case Failed():
-                return [OpenFailed(result.id, result.message)]
+                return [do(opening.report_failure, result.id, result.message)]
             case PhotosFound():
-                return [OpenPath(source_beside(state.source, result.path)), SetPreference("shows_filmstrip", True)]
+                return [
+                    do(opening.open_source, source_beside(state.source, result.path)),
+                    do(preferences.show_filmstrip, True),
+                ]
         try:
             return self._take_views(result, state)
         except InputError as error:  # no room on the graphics card: there is no use in more views
             self._worker.cancel()
-            return [OpenFailed(result.generation, words_of(error))]
+            return [do(opening.report_failure, result.generation, words_of(error))]
 
     def _take_views(self, result: SceneReady | ViewReady, state: AppState) -> list[Action]:
         if result.generation < self._scene_view.generation:
@@ -173,10 +177,10 @@ class SceneLoader:
             new_depth = None
             if is_deepened and before_px is not None and now_px is not None:
                 new_depth = NewDepth(focus_before_and_now(before_px, now_px, state.focused_at))
-            return [SceneOpened(result.generation, result.scene, new_depth)]
+            return [do(opening.show_scene, result.generation, result.scene, new_depth)]
         self._scene_view.add(result.view)
         self._inspection_view.add(result.view)
-        return [ProgressMade(result.generation, result.progress, (result.view.row, result.view.column))]
+        return [do(opening.set_progress, result.generation, result.progress, (result.view.row, result.view.column))]
 
     def _load_brush(self, ready: SceneReady) -> None:
         """Beside the first photo's views, so that the first stroke does not wait."""

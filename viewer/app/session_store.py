@@ -17,9 +17,8 @@ from iibr_core.formats.outputs import make_folder, write_file
 from iibr_core.scenes.scene import Scene, Source
 from iibr_core.types import InputError
 from viewer.app.image_export import settings_of
-from viewer.model import messages
-from viewer.model.action import do
-from viewer.model.actions import Action, RestoreSession
+from viewer.model import messages, opening
+from viewer.model.action import Action, do
 from viewer.model.state.app_state import AppState
 from viewer.model.state.notices import Notice
 from viewer.model.state.saving import SavedSettings
@@ -97,7 +96,7 @@ class SessionStore:
         except InputError as error:
             return [do(messages.notify, Notice(str(error)))]
         is_open = state.scene is not None and state.scene.source is self._scene.source
-        return [RestoreSession(settings)] if is_open and settings is not None else []
+        return [do(opening.restore_session, settings)] if is_open and settings is not None else []
 
     def _report_failure(self) -> list[Action]:
         """Return a notice for the first session that cannot be written."""

@@ -23,8 +23,7 @@ from viewer.display.scene_view import SceneView
 from viewer.gpu.context import GLContext
 from viewer.gpu.inspection_passes import InspectionPasses
 from viewer.model import messages
-from viewer.model.action import do
-from viewer.model.actions import Action
+from viewer.model.action import Action, do
 from viewer.model.state.app_state import AppState, Picture
 from viewer.model.state.notices import Notice
 

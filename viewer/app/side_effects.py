@@ -24,10 +24,8 @@ from viewer.background.file_worker import FileRequest, FileResult, FileWorker
 from viewer.background.job_threads import Failed
 from viewer.background.newest import Newest
 from viewer.display.scene_view import SceneView
-from viewer.model import depth_models, lens, messages
-from viewer.model.action import Action as VerbAction
-from viewer.model.action import ask, do, forget_tasks
-from viewer.model.actions import Action, OpenPath
+from viewer.model import depth_models, folder, lens, messages, opening
+from viewer.model.action import Action, ask, do, forget_tasks
 from viewer.model.commands import action_for_path
 from viewer.model.photo_facts import set_facts
 from viewer.model.state.app_state import AppState
@@ -37,7 +35,7 @@ from viewer.model.state.depth_models import (
     ListModelsTask,
 )
 from viewer.model.state.exporting import ExportTask
-from viewer.model.state.folder import FolderListed, ListFolderTask
+from viewer.model.state.folder import ListFolderTask
 from viewer.model.state.jobs import CancelJobTask
 from viewer.model.state.notices import Notice
 from viewer.model.state.photo_facts import PhotoFacts, ReadFactsTask
@@ -205,10 +203,10 @@ def _actions_from(result: FileResult, state: AppState) -> list[Action]:
             return _show_contents(contents, state)
         case PhotoFacts() as facts:
             return [do(set_facts, facts)]
-        case FolderListed() | VerbAction() as found:
+        case Action() as found:
             return [found]
         case Pasted(path):
-            return [OpenPath(source_beside(state.source, path))]
+            return [do(opening.open_source, source_beside(state.source, path))]
     raise AssertionError(f"nothing comes of {result.value!r}")
 
 
@@ -234,5 +232,5 @@ def _read_mask(path: Path) -> ApertureMask:
     return read_mask(path)
 
 
-def _list_folder(path: str) -> FolderListed:
-    return FolderListed(path, list_photos(path))
+def _list_folder(path: str) -> Action:
+    return do(folder.set_photos, path, list_photos(path))

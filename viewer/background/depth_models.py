@@ -14,9 +14,7 @@ from iibr_core.scenes.scene import LoadedPhoto, Source
 from iibr_core.types import FloatImage
 from viewer.background.newest import Failed, Newest, Post
 from viewer.model import depth_models, messages
-from viewer.model.action import Action as VerbAction
-from viewer.model.action import do
-from viewer.model.actions import Action
+from viewer.model.action import Action, do
 from viewer.model.remedies import DEPTH_COMMANDS
 from viewer.model.state.app_state import AppState
 from viewer.model.state.depth_models import Downloading, ModelOffer
@@ -87,7 +85,7 @@ def _estimate(request: EstimateRequest, post: Post[LoadedPhoto]) -> None:
     post(deepen(source, request.loaded, request.refine))
 
 
-def download(name: str, post: Post[VerbAction]) -> None:
+def download(name: str, post: Post[Action]) -> None:
     """Download a known model and post the progress as actions. A model that came is used where it is wanted."""
     model = known_model(name)
     shown = Downloading(model.title, 0, model.megabytes)
@@ -110,7 +108,7 @@ def download(name: str, post: Post[VerbAction]) -> None:
             post(do(messages.notify, Notice(f"{offer.title} is here. It {offer.lacks}.")))
 
 
-def actions_of_download(result: VerbAction | Failed[str]) -> list[Action]:
+def actions_of_download(result: Action | Failed[str]) -> list[Action]:
     """Return what follows from a step of a download, or from its failure."""
     if isinstance(result, Failed):
         return [do(depth_models.set_downloading, None), do(messages.notify, Notice(result.message, is_error=True))]

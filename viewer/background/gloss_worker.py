@@ -9,8 +9,7 @@ from iibr_core.gloss.settings import Gloss
 from iibr_core.scenes.scene_gloss import GlossRequest, make_maps
 from viewer.background.newest import Failed, Newest, Post
 from viewer.model import messages
-from viewer.model.action import do
-from viewer.model.actions import Action
+from viewer.model.action import Action, do
 from viewer.model.state.notices import Notice
 
 if TYPE_CHECKING:

@@ -26,11 +26,10 @@ def demo() -> None:
     """
     from viewer.app.main_loop import App, initial_state
     from viewer.app.preferences_store import user_folder
-    from viewer.model.actions import OpenPath
 
     source = Source(str(demo_photo()))
     try:
-        window = App(initial_state(OpenPath(source)), user_folder())
+        window = App(initial_state(source), user_folder())
     except InputError as error:
         _demo_pictures(source, str(error))
         return

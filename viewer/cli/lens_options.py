@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from iibr_core.beyond.optics import Optics
     from iibr_core.scenes.lens_limits import LensChoice
     from iibr_core.scenes.scene import Scene
-    from viewer.model.actions import Action
+    from viewer.model.action import Action
 
 View = Annotated[
     ViewOffset | None,

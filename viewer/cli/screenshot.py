@@ -31,13 +31,15 @@ from viewer.cli.shared_options import (
     size_from_text,
 )
 from viewer.cli.terminal import print_depth, print_notes, show_progress
+from viewer.model import opening
+from viewer.model.action import do
 
 if TYPE_CHECKING:
     from iibr_core.beyond.optics import Optics
     from iibr_core.depth.choice import DepthOrigin
     from iibr_core.scenes.scene import Scene, Source
     from viewer.display.offscreen import OffscreenScene
-    from viewer.model.actions import Action
+    from viewer.model.action import Action
 
 
 class Backend(StrEnum):
@@ -157,7 +159,6 @@ def screenshot(
 
 def _shot_like(shot: _Shot, like: Path, given: Collection[str], ui: bool) -> _Shot:
     """With the settings of a picture saved before, except for the options given."""
-    from viewer.model.actions import TakeSettings
     from viewer.model.saved_settings import left_out_note, read_settings, require_saved_size, source_like
 
     saved = read_settings(like)
@@ -168,7 +169,7 @@ def _shot_like(shot: _Shot, like: Path, given: Collection[str], ui: bool) -> _Sh
         shot.depth_strength if "depth_strength" in given else saved.depth_strength,
         shot.size or (None if ui else ScreenSize(*saved.size_px)),
         saved.depth_edits,
-        (TakeSettings(saved),),
+        (do(opening.take_settings, saved),),
         tuple(filter(None, [left_out_note(saved)])),
     )
 

@@ -25,11 +25,10 @@ def open_window() -> None:
     """The window with what was open last, if that is still there. Raises InputError where no window can be opened."""
     from viewer.app.main_loop import initial_state, run
     from viewer.app.preferences_store import last_opened, user_folder
-    from viewer.model.actions import OpenPath
     from viewer.model.state.app_state import AppState
 
     last = last_opened(user_folder())
-    run(initial_state(OpenPath(Source(last))) if last is not None else AppState(), user_folder())
+    run(initial_state(Source(last)) if last is not None else AppState(), user_folder())
 
 
 @with_option_records
@@ -53,6 +52,5 @@ def view(
     require_model(source.depth)
     from viewer.app.main_loop import initial_state, run
     from viewer.app.preferences_store import user_folder
-    from viewer.model.actions import OpenPath
 
-    run(initial_state(OpenPath(source), scene.depth_strength), user_folder())
+    run(initial_state(source, scene.depth_strength), user_folder())

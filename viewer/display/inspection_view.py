@@ -26,8 +26,7 @@ from viewer.gpu.light_field_texture import LightFieldTexture
 from viewer.gpu.refocus.picture_drawing import PictureDrawing
 from viewer.gpu.refocus.view_sampling import nearest_present
 from viewer.model import inspection, messages
-from viewer.model.action import do
-from viewer.model.actions import Action
+from viewer.model.action import Action, do
 from viewer.model.colormap import VIRIDIS
 from viewer.model.inspection import NO_INSPECTION_TEXTURES, InspectionTextures, sheet_cells, view_near
 from viewer.model.layout import Layout, whole_pixels

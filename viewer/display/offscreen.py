@@ -34,8 +34,8 @@ from viewer.display.inspection_view import InspectionView
 from viewer.display.scene_view import SceneView
 from viewer.gpu.context import Backend, create_headless
 from viewer.gpu.refocus.views_seen import views_seen_by
-from viewer.model.action import do
-from viewer.model.actions import Action, OpenPath, ProgressMade, SceneOpened, SetState
+from viewer.model import opening, window
+from viewer.model.action import Action, do
 from viewer.model.inspection import (
     NO_INSPECTION_TEXTURES,
     InspectionTextures,
@@ -43,7 +43,6 @@ from viewer.model.inspection import (
     set_probe,
 )
 from viewer.model.layout import BACKGROUND, Layout, is_narrow, layout_of
-from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState
 
 LAYOUT_FRAMES = 3
@@ -108,12 +107,12 @@ class OffscreenScene:
         wanted: set[ViewOffset] | None = None
         depth = DepthSettings(source.depth.refine, edits)
         self.state = AppState(depth_strength=depth_strength)
-        self.do(OpenPath(source))
+        self.do(do(opening.open_source, source))
         request = SceneRequest(self.state.generation, source, depth_strength, depth_settings=depth, takes_drafts=False)
         results = results_of(request, lambda: CENTRE, lambda: wanted)
         ready = next(results)
         assert isinstance(ready, SceneReady)
-        self.do(SceneOpened(ready.generation, ready.scene))
+        self.do(do(opening.show_scene, ready.generation, ready.scene))
         self.state = replace(self.state, depth=depth)
         pictures = pictures_of(ready.scene)
         if pictures is not None:
@@ -125,7 +124,7 @@ class OffscreenScene:
             self.view.add(result.view)
             self.inspection.add(result.view)
             self.view.upload_all()
-            self.do(ProgressMade(result.generation, result.progress, (result.view.row, result.view.column)))
+            self.do(do(opening.set_progress, result.generation, result.progress, (result.view.row, result.view.column)))
             report_progress(result.progress.done, result.progress.total, MAKING)
         return ready.scene
 
@@ -155,7 +154,7 @@ class OffscreenScene:
     def do(self, *actions: Action) -> None:
         """Change the state."""
         for action in actions:
-            self.state = reduce(self.state, action)
+            self.state = action.apply(self.state)
 
     def pick(self, x_px: float, y_px: float) -> float | None:
         """Return the disparity seen at a pixel of the picture from the present eye; None if the scene has none."""
@@ -207,7 +206,7 @@ class OffscreenScene:
 
         preferences = self.state.preferences
         look = Look(preferences.font_scale, preferences.theme)
-        self.do(SetState("is_narrow", is_narrow(size, 1.0)))
+        self.do(do(window.set_narrow, is_narrow(size, 1.0)))
         layout = self._layout(size, look.ui_scale)
         texture, textures = self._draw_textures(layout)
         target = self.gl.ctx.simple_framebuffer(size, 4)

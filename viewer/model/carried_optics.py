@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from iibr_core.beyond.optics import Optics
 from iibr_core.scenes.lens_limits import aperture_limit, clamp_eye
 from iibr_core.scenes.scene import Scene
 from iibr_core.types import ViewOffset
-from viewer.model.actions import NewDepth
 from viewer.model.focal_plane import focus_on, sharp_disparity
 
 SHARP_SHARE = 0.05
 """Distance from the focus up to which a place counts as sharp, as a share of the range of disparity."""
+
+
+@dataclass(frozen=True)
+class NewDepth:
+    """The open photo has new depth. in_focus: disparity before and now of the place that was clicked to be sharp."""
+
+    in_focus: tuple[float, float] | None = None
 
 
 def carry_optics(optics: Optics, old: Scene | None, new: Scene) -> Optics:

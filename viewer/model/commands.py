@@ -12,16 +12,27 @@ from pathlib import PurePath
 from iibr_core.depth.editing.edits import BRUSH_TOOLS, BrushTool
 from iibr_core.exports.loops import LOOPS, LoopKind
 from iibr_core.scenes.scene import Source, source_beside, source_with_map
-from viewer.model import depth, depth_models, history, inspection, lens, messages, saving, viewpoint
-from viewer.model.action import ask, do
-from viewer.model.actions import Action, OpenPath, SetState, StopWork
+from viewer.model import (
+    depth,
+    depth_models,
+    folder,
+    history,
+    inspection,
+    lens,
+    messages,
+    opening,
+    preferences,
+    saving,
+    viewpoint,
+    window,
+)
+from viewer.model.action import Action, ask, do
 from viewer.model.demo_photo import demo_photo
 from viewer.model.state.app_state import AppState
 from viewer.model.state.depth_models import ModelsPrompt
-from viewer.model.state.folder import SetFolderOrder, StepPhoto
 from viewer.model.state.inspection import COMPARISONS, OVERLAYS, Comparison, OverlayKind
 from viewer.model.state.lens import PRESETS
-from viewer.model.state.preferences import SECTIONS, SetPreference, ToggleSection
+from viewer.model.state.preferences import SECTIONS
 from viewer.model.state.prompts import ChoiceOf, PalettePrompt
 from viewer.model.state.saving import CopyTask, PasteTask
 from viewer.model.state.tasks import ChooseTask, ReadMaskTask
@@ -90,7 +101,7 @@ def _always(action: Action) -> Callable[[AppState], Action]:
 
 
 def _scale_text(factor: float) -> Callable[[AppState], Action]:
-    return lambda state: SetPreference("font_scale", state.preferences.font_scale * factor)
+    return lambda state: do(preferences.set_font_scale, state.preferences.font_scale * factor)
 
 
 def _toggle_help(state: AppState) -> Action:
@@ -113,12 +124,6 @@ def _toggle_brush(state: AppState) -> Action:
     return do(depth.set_brush, replace(state.brush, is_on=not state.brush.is_on))
 
 
-def toggle_panel(state: AppState) -> Action:
-    """Hide or show it; where that is what the window's size asks for, it follows that again."""
-    hides = not state.is_panel_hidden
-    return SetState("hides_panel", None if hides == state.is_narrow else hides)
-
-
 def _own_pixels(state: AppState) -> Action:
     """About the pointer, where it is over the picture, else about what is in the middle."""
     scene, hover, centre = state.scene, state.hover, (0.5, 0.5) if state.zoom is None else state.zoom.centre
@@ -139,19 +144,19 @@ def _invert_depth(state: AppState) -> Action:
 COMMANDS: tuple[Command, ...] = (
     Command("Open a photo…", _always(do(ask, ChooseTask("photo"))), (Chord("o", ctrl=True),)),
     Command("Open a folder…", _always(do(ask, ChooseTask("folder"))), (Chord("o", ctrl=True, shift=True),)),
-    Command("See the demo", lambda state: OpenPath(Source(str(demo_photo())))),
+    Command("See the demo", lambda state: do(opening.open_source, Source(str(demo_photo())))),
     Command("Save the picture…", _always(do(saving.ask_to_save)), (Chord("s", ctrl=True),)),
     Command("Copy the picture", _always(do(ask, CopyTask())), (Chord("c", ctrl=True),)),
     Command("Paste a picture, or the path of one", _always(do(ask, PasteTask())), (Chord("v", ctrl=True),)),
-    Command("Next photo of the folder", _always(StepPhoto(1)), (Chord("page_down"),), repeats=True),
-    Command("Previous photo of the folder", _always(StepPhoto(-1)), (Chord("page_up"),), repeats=True),
+    Command("Next photo of the folder", _always(do(folder.step, 1)), (Chord("page_down"),), repeats=True),
+    Command("Previous photo of the folder", _always(do(folder.step, -1)), (Chord("page_up"),), repeats=True),
     Command(
         "Filmstrip",
-        lambda state: SetPreference("shows_filmstrip", not state.preferences.shows_filmstrip),
+        lambda state: do(preferences.show_filmstrip, not state.preferences.shows_filmstrip),
         (Chord("f"),),
     ),
-    Command("Photos by name", _always(SetFolderOrder("name"))),
-    Command("Photos by time", _always(SetFolderOrder("time"))),
+    Command("Photos by name", _always(do(folder.set_order, "name"))),
+    Command("Photos by time", _always(do(folder.set_order, "time"))),
     Command("Share or export…", _always(do(saving.ask_to_export)), (Chord("e", ctrl=True),)),
     Command("Undo", _always(do(history.undo)), (Chord("z", ctrl=True),), repeats=True),
     Command(
@@ -199,18 +204,20 @@ COMMANDS: tuple[Command, ...] = (
         Command(COMPARE_WORDS[kind], _toggle_comparison(kind), (Chord("p"),) if kind == "photo" else ())
         for kind in COMPARISONS
     ),
-    Command("Stop making views", _always(StopWork())),
+    Command("Stop making views", _always(do(opening.stop))),
     Command("Zoom: the whole picture", _always(do(viewpoint.set_zoom, None)), (Chord("_0"),)),
     Command("Zoom: the photo's own pixels, 1:1", _own_pixels, (Chord("_1"),)),
-    *(Command(f"Section: {section}", _always(ToggleSection(section))) for section in SECTIONS),
-    Command("Full screen", lambda s: SetState("is_fullscreen", not s.is_fullscreen), (Chord("f11"),)),
-    Command("Hide or show the panel", toggle_panel, (Chord("tab"),)),
+    *(Command(f"Section: {section}", _always(do(preferences.toggle_section, section))) for section in SECTIONS),
+    Command("Full screen", lambda s: do(window.set_fullscreen, not s.is_fullscreen), (Chord("f11"),)),
+    Command("Hide or show the panel", _always(do(window.toggle_panel)), (Chord("tab"),)),
     Command("Before and after", lambda s: do(lens.show_before, not s.shows_before), (Chord("backslash"),)),
     Command("Take a snapshot", _always(do(inspection.take_snapshot)), (Chord("k"),)),
-    Command("Light or dark", lambda s: SetPreference("theme", "dark" if s.preferences.theme == "light" else "light")),
+    Command(
+        "Light or dark", lambda s: do(preferences.set_theme, "dark" if s.preferences.theme == "light" else "light")
+    ),
     Command(
         "Units: a photographer's or a light field's",
-        lambda s: SetPreference("units", "photographic" if s.preferences.units == "light field" else "light field"),
+        lambda s: do(preferences.set_units, "photographic" if s.preferences.units == "light field" else "light field"),
     ),
     Command(
         "Larger text",
@@ -219,7 +226,7 @@ COMMANDS: tuple[Command, ...] = (
         repeats=True,
     ),
     Command("Smaller text", _scale_text(1 / FONT_STEP), (Chord("minus", ctrl=True),), repeats=True),
-    Command("Reset text size", _always(SetPreference("font_scale", 1.0)), (Chord("_0", ctrl=True),)),
+    Command("Reset text size", _always(do(preferences.set_font_scale, 1.0)), (Chord("_0", ctrl=True),)),
     Command("All commands", _toggle_palette, (Chord("p", ctrl=True),)),
     Command("Mouse and keys", _toggle_help, (Chord("f1"),)),
     Command("Quit", _always(do(saving.quit_window)), (Chord("q", ctrl=True),)),
@@ -238,7 +245,8 @@ def recent_commands(state: AppState) -> tuple[Command, ...]:
     open_now = state.source.path if state.source is not None else None
     others = [path for path in state.recent if path != open_now][:RECENT_SHOWN]
     return tuple(
-        Command(f"Open {PurePath(path).name}", _always(OpenPath(source_beside(state.source, path)))) for path in others
+        Command(f"Open {PurePath(path).name}", _always(do(opening.open_source, source_beside(state.source, path))))
+        for path in others
     )
 
 
@@ -248,7 +256,7 @@ def action_for_path(what: ChoiceOf, path: str, state: AppState) -> Action:
         case "mask":
             return do(ask, ReadMaskTask(path))
         case "map" if state.source is not None:
-            return OpenPath(source_with_map(state.source, path))
+            return do(opening.open_source, source_with_map(state.source, path))
         case "model" | "model folder" if state.source is not None:
             return do(depth_models.use_model, path)
-    return OpenPath(source_beside(state.source, path))
+    return do(opening.open_source, source_beside(state.source, path))

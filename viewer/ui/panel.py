@@ -12,11 +12,12 @@ from imgui_bundle import imgui
 from iibr_core.runtime.time_left import about_left
 from iibr_core.scenes.lens_limits import aperture_limit
 from iibr_core.scenes.scene import Progress, Scene, Source, source_beside
-from viewer.model.actions import Action, OpenPath, StopWork
+from viewer.model import opening, preferences
+from viewer.model.action import Action, do
 from viewer.model.commands import BY_NAME
 from viewer.model.layout import Layout
 from viewer.model.state.app_state import AppState, DrawReport
-from viewer.model.state.preferences import HOLDERS, SECTIONS, Section, ToggleSection, is_seen_open
+from viewer.model.state.preferences import PARENT_SECTION, SECTIONS, Section, is_seen_open
 from viewer.ui.sections.depth_section import depth_line, depth_section
 from viewer.ui.sections.essentials import essentials
 from viewer.ui.sections.gloss_section import gloss_section
@@ -178,7 +179,7 @@ def _recent(paths: tuple[str, ...], source: Source | None, layout: Layout) -> li
         is_chosen, _ = imgui.selectable(f"{last_part(path)}##{path}", False)
         tooltip(path, layout)
         if is_chosen:
-            actions.append(OpenPath(source_beside(source, path)))
+            actions.append(do(opening.open_source, source_beside(source, path)))
     return actions
 
 
@@ -193,7 +194,7 @@ def _progress(state: AppState, layout: Layout) -> list[Action]:
     is_working = not progress.is_complete and state.stopped != state.generation
     if is_working:
         if _words_and_button(words, "Cancel", CANCEL_TIP, layout):
-            actions.append(StopWork())
+            actions.append(do(opening.stop))
     else:
         quiet(words)
     return actions
@@ -216,12 +217,14 @@ def _words_and_button(words: str, text: str, tip: str, layout: Layout) -> bool:
 def _section(section: Section, state: AppState, scene: Scene, layout: Layout) -> list[Action]:
     """A heading that opens and closes what is under it. Where there is one view, focus and aperture mean nothing."""
     sections = state.preferences.open_sections
-    if section in HOLDERS and not is_seen_open(HOLDERS[section], sections):
+    if section in PARENT_SECTION and not is_seen_open(PARENT_SECTION[section], sections):
         return []
     if section in ("focus", "aperture", "view") and not aperture_limit(scene.grid):
         return []
     is_open = section in sections
-    toggled: list[Action] = [ToggleSection(section)] if heading(section.capitalize(), is_open, layout) else []
+    toggled: list[Action] = (
+        [do(preferences.toggle_section, section)] if heading(section.capitalize(), is_open, layout) else []
+    )
     return toggled + (BUILDERS[section](state, scene, layout) if is_open else [])
 
 

@@ -7,7 +7,7 @@ from types import MappingProxyType
 
 from imgui_bundle import imgui
 
-from viewer.model.actions import Action
+from viewer.model.action import Action
 from viewer.model.inspection import NO_INSPECTION_TEXTURES, InspectionTextures
 from viewer.model.layout import Layout
 from viewer.model.state.app_state import AppState

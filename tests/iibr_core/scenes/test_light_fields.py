@@ -16,10 +16,9 @@ from iibr_core.scenes.lens_limits import focus_limits
 from iibr_core.scenes.light_fields import FROM_VIEWS
 from iibr_core.scenes.opening import results_of
 from iibr_core.scenes.scene import Scene, SceneReady, SceneRequest, Source, ViewReady
-from viewer.model import lens
+from tests.viewer.conftest import reduce
+from viewer.model import lens, opening
 from viewer.model.action import do
-from viewer.model.actions import OpenPath, SceneOpened
-from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState
 
 WALL_PX, SQUARE_PX = -0.5, 1.25
@@ -69,13 +68,13 @@ def test_views_that_tell_nothing_are_shown_as_they_are(tmp_path: Path) -> None:
 
 def test_focus_that_is_set_while_it_loads_stays(tmp_path: Path) -> None:
     source = Source(str(write_two_planes(tmp_path / "field")))
-    state = reduce(AppState(), OpenPath(source))
+    state = reduce(AppState(), do(opening.open_source, source))
     results = results_of(SceneRequest(1, source), lambda: CENTRE)
-    state = reduce(state, SceneOpened(1, first_scene(results)))
+    state = reduce(state, do(opening.show_scene, 1, first_scene(results)))
     state = reduce(reduce(state, do(lens.set_aperture, 2.0)), do(lens.set_focus, 3.5))
     for result in results:
         if isinstance(result, SceneReady):
-            state = reduce(state, SceneOpened(1, result.scene))
+            state = reduce(state, do(opening.show_scene, 1, result.scene))
             state = reduce(
                 state, do(lens.set_aperture, state.optics.aperture_diameter + 0.1)
             )  # which checks all limits

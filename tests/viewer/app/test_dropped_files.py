@@ -8,7 +8,8 @@ from iibr_core.depth.choice import DepthChoice
 from iibr_core.scenes.scene import Scene, Source
 from iibr_core.types import GridShape
 from viewer.app.dropped_files import actions_from_drop
-from viewer.model.actions import OpenPath
+from viewer.model import opening
+from viewer.model.action import do
 from viewer.model.state.app_state import AppState
 
 SCENE = Scene(Source("photo.png", max_pixels=7), "photo", 600, 400, GridShape(9, 9), (-2.0, 3.0), "photo.pfm")
@@ -29,9 +30,9 @@ STATE = AppState(source=SCENE.source, scene=SCENE)
 def test_dropped_files(paths: list[str], opened: str, disparity: str | None) -> None:
     (action,) = actions_from_drop(paths, STATE)
     choice = DepthChoice(file=disparity, stretches=disparity is not None)
-    assert action == OpenPath(Source(opened, choice, max_pixels=7))
+    assert action == do(opening.open_source, Source(opened, choice, max_pixels=7))
 
 
 def test_a_map_dropped_on_nothing_is_tried_as_a_photo() -> None:
-    assert actions_from_drop(["a.pfm"], AppState()) == [OpenPath(Source("a.pfm"))]
+    assert actions_from_drop(["a.pfm"], AppState()) == [do(opening.open_source, Source("a.pfm"))]
     assert actions_from_drop([], AppState()) == []

@@ -27,9 +27,8 @@ from viewer.app import job_scene
 from viewer.app.main_loop import App
 from viewer.background.window_work import Steps
 from viewer.display.snapshot import SceneSnapshot
-from viewer.model import depth, gesture, lens, messages, saving
-from viewer.model.action import ask, do
-from viewer.model.actions import Action, OpenPath
+from viewer.model import depth, gesture, lens, messages, opening, saving
+from viewer.model.action import Action, ask, do
 from viewer.model.state.exporting import ExportPrompt, ExportTask
 from viewer.model.state.jobs import WAITING_FOR_VIEWS, CancelJobTask
 from viewer.model.state.tasks import SaveTask
@@ -92,7 +91,9 @@ def test_a_light_field_is_made_anew_beside_the_window(viewer: Driver, tmp_path: 
 def other_photo(folder: Path) -> Action:
     """Opens a photo of another folder."""
     (folder / "elsewhere").mkdir(exist_ok=True)
-    return OpenPath(Source(str(write_scene(folder / "elsewhere", "other", seed=1)), grid=GridShape(3, 3)))
+    return do(
+        opening.open_source, Source(str(write_scene(folder / "elsewhere", "other", seed=1)), grid=GridShape(3, 3))
+    )
 
 
 def nine_changes(viewer: Driver, folder: Path) -> list[tuple[Action, ...]]:
@@ -107,7 +108,7 @@ def nine_changes(viewer: Driver, folder: Path) -> list[tuple[Action, ...]]:
         (do(lens.set_depth_strength, 0.6, is_finished=True),),
         (do(depth.paint, (0.5, 0.5)), do(depth.paint, (0.7, 0.5)), do(gesture.end_gesture)),
         (do(depth.set_tone, DepthEdits(gamma=1.7), is_finished=True),),
-        (OpenPath(replace(source, grid=GridShape(5, 5))),),
+        (do(opening.open_source, replace(source, grid=GridShape(5, 5))),),
         (other_photo(folder),),
     ]
 
@@ -200,7 +201,7 @@ def test_what_is_asked_for_before_all_views_are_there_is_not_lost_with_its_photo
     viewer.until(lambda app: not app.state.jobs)
     assert f"Exported {tmp_path / f'early.{kind}'}" in texts(app)
     viewer.until_idle()
-    app.do(OpenPath(Source(str(photo_path), grid=GridShape(5, 5))))
+    app.do(do(opening.open_source, Source(str(photo_path), grid=GridShape(5, 5))))
     viewer.until(lambda app: app.state.scene is not None and app.state.scene.name == "scene")
     viewer.until_idle()
     app.do(
@@ -247,7 +248,12 @@ def test_waiting_jobs_do_not_hold_the_views_of_scenes_that_were_left(
     start(viewer, tmp_path / "a.gif")
     for seed in range(3):
         (tmp_path / str(seed)).mkdir()
-        app.do(OpenPath(Source(str(write_scene(tmp_path / str(seed), f"photo{seed}", seed)), grid=GridShape(3, 3))))
+        app.do(
+            do(
+                opening.open_source,
+                Source(str(write_scene(tmp_path / str(seed), f"photo{seed}", seed)), grid=GridShape(3, 3)),
+            )
+        )
         name = f"photo{seed}"
         viewer.until(lambda app, name=name: app.state.scene.name == name and app.state.progress.is_complete)  # type: ignore[misc]
         app.do(do(ask, ExportTask("gif", str(tmp_path / f"{seed}.gif"), SMALL)))

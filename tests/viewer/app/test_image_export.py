@@ -20,11 +20,9 @@ from viewer.app.image_export import export_picture, shot_of
 from viewer.app.job_queue import JobQueue
 from viewer.app.picture_saver import add_save
 from viewer.display.offscreen import OffscreenScene
-from viewer.model import lens, messages, saving
-from viewer.model.action import do
-from viewer.model.actions import Action
+from viewer.model import lens, messages, preferences, saving
+from viewer.model.action import Action, do
 from viewer.model.saved_settings import read_settings
-from viewer.model.state.preferences import SetPreference
 from viewer.model.state.tasks import SaveTask
 
 
@@ -110,7 +108,9 @@ def test_a_picture_is_as_it_was_when_edited_depth_is_shown_meanwhile(tmp_path: P
         expected = scene_view.renderer.converged_picture(RenderSettings(state.optics, (90, 60)))
         jobs = JobQueue(scene_view, woken.set)
         actions: list[Action] = []
-        assert add_save(SaveTask(str(out), (90, 60)), state, (), jobs) == [SetPreference("last_folder", str(tmp_path))]
+        assert add_save(SaveTask(str(out), (90, 60)), state, (), jobs) == [
+            do(preferences.set_last_folder, str(tmp_path))
+        ]
         scene_view.show_disparity(np.zeros((HEIGHT, WIDTH), np.float32))
         assert not np.array_equal(
             scene_view.renderer.converged_picture(RenderSettings(state.optics, (90, 60))), expected

@@ -14,11 +14,9 @@ from iibr_core.scenes.photo import load_photo
 from iibr_core.scenes.scene import Source
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import Driver, Opener, write_scene
-from viewer.model import inspection, lens
+from viewer.model import inspection, lens, opening, preferences
 from viewer.model.action import do
-from viewer.model.actions import OpenPath
 from viewer.model.inspection import sheet_cells
-from viewer.model.state.preferences import ToggleSection
 
 GRID = GridShape(5, 5)
 
@@ -91,7 +89,9 @@ def test_the_divider_is_dragged_and_the_viewpoint_stays(viewer: Driver) -> None:
 
 
 def test_buttons_of_the_section_and_the_values_under_the_pointer(viewer: Driver) -> None:
-    viewer.app.do(*(ToggleSection(section) for section in ("view", "focus", "aperture", "light", "inspect")))  # type: ignore[arg-type]
+    viewer.app.do(
+        *(do(preferences.toggle_section, section) for section in ("view", "focus", "aperture", "light", "inspect"))
+    )  # type: ignore[arg-type]
     viewer.until_idle()
     viewer.press("Values")
     viewer.until(lambda app: app.layout().status is not None)
@@ -125,7 +125,7 @@ def test_a_light_field_from_disk_has_epis_but_no_inpainting(
     app.do(do(inspection.show_epis, True), do(inspection.set_overlay, "inpainted"))
     assert app.state.inspection.overlay is None
     assert "from disk" in app.state.notices[-1].text
-    app.do(OpenPath(Source(str(write_scene(tmp_path, "other", seed=3)))))
+    app.do(do(opening.open_source, Source(str(write_scene(tmp_path, "other", seed=3)))))
     driver.until(lambda app: app.state.scene is not None and app.state.scene.name == "other")
     assert app.state.inspection.shows_epis
 

@@ -9,13 +9,11 @@ import pytest
 
 from iibr_core.scenes.scene import Scene, Source
 from iibr_core.types import GridShape, ViewOffset
+from tests.viewer.conftest import reduce
 from viewer.app.keys import Keys, actions_from_keys
-from viewer.model import history, inspection, lens, messages, saving
-from viewer.model.action import Action as VerbAction
-from viewer.model.action import do
-from viewer.model.actions import Action, SetState
+from viewer.model import history, inspection, lens, messages, saving, window
+from viewer.model.action import Action, do
 from viewer.model.commands import BY_NAME, COMMANDS
-from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState
 from viewer.model.state.prompts import PalettePrompt
 
@@ -39,8 +37,8 @@ def test_keys() -> None:
     [
         ((do(inspection.compare, "photo"),), do(inspection.compare, None)),
         ((do(inspection.set_overlay, "disparity"),), do(inspection.set_overlay, None)),
-        ((SetState("is_fullscreen", True), do(inspection.set_overlay, "disparity")), do(inspection.set_overlay, None)),
-        ((SetState("is_fullscreen", True),), SetState("is_fullscreen", False)),
+        ((do(window.set_fullscreen, True), do(inspection.set_overlay, "disparity")), do(inspection.set_overlay, None)),
+        ((do(window.set_fullscreen, True),), do(window.set_fullscreen, False)),
         ((do(inspection.show_views, True), do(inspection.compare, "photo")), do(inspection.show_views, False)),
     ],
 )
@@ -65,6 +63,6 @@ def test_what_is_switched_is_not_switched_back_while_its_key_is_held() -> None:
 
 def test_arrows() -> None:
     (move,) = actions_from_keys(Keys(arrows=ViewOffset(1, -1)), STATE)
-    assert isinstance(move, VerbAction)
+    assert isinstance(move, Action)
     assert move.verb is lens.move_eye
     assert move.args[0].t > 0 > move.args[0].s

@@ -21,14 +21,12 @@ from tests.local_hub import Hub, local_hub
 from tests.viewer.conftest import Driver, Opener
 from viewer.app.main_loop import App
 from viewer.background.depth_models import list_models
-from viewer.model import depth, depth_models, gesture, history, lens, messages
+from viewer.model import depth, depth_models, gesture, history, lens, messages, opening, preferences
 from viewer.model.action import do
-from viewer.model.actions import OpenPath
 from viewer.model.depth_models import offered_model
 from viewer.model.focal_plane import place_of, sharp_disparity
 from viewer.model.state.depth import Brush
 from viewer.model.state.depth_models import ModelsPrompt
-from viewer.model.state.preferences import SetPreference
 
 MODEL = known_model("depth-anything-v2-small")
 GRID = GridShape(3, 3)
@@ -183,7 +181,7 @@ def test_the_next_photo_is_estimated_unasked(downloaded: Hub, open_window: Opene
     driver.until_idle()
     source = source_beside(driver.app.state.source, str(write_photo(tmp_path / "other.png", seed=9)))
     seen: list[str | None] = []
-    driver.app.do(OpenPath(source))
+    driver.app.do(do(opening.open_source, source))
 
     def is_next_deep(app: App) -> bool:
         if app.state.scene is not None and app.state.scene.source is source:
@@ -193,8 +191,8 @@ def test_the_next_photo_is_estimated_unasked(downloaded: Hub, open_window: Opene
     driver.until(is_next_deep)
     assert seen[0] == "rough", "the guess comes first"
     assert not downloaded.asked
-    driver.app.do(SetPreference("estimates_depth", False))
-    driver.app.do(OpenPath(source_beside(source, str(write_photo(tmp_path / "third.png", seed=99)))))
+    driver.app.do(do(preferences.estimate_depth_always, False))
+    driver.app.do(do(opening.open_source, source_beside(source, str(write_photo(tmp_path / "third.png", seed=99)))))
     with_offer(driver)
     assert depth_kind(driver.app) == "rough"
 
@@ -202,7 +200,7 @@ def test_the_next_photo_is_estimated_unasked(downloaded: Hub, open_window: Opene
 def test_nothing_is_fetched_unasked(hub: Hub, open_window: Opener, tmp_path: Path) -> None:
     hub.may_finish.set()
     driver = open_window(write_photo(tmp_path / "photo.png"), grid=GRID)
-    driver.app.do(SetPreference("estimates_depth", True), do(messages.show_prompt, ModelsPrompt()))
+    driver.app.do(do(preferences.estimate_depth_always, True), do(messages.show_prompt, ModelsPrompt()))
     with_offer(driver)
     assert not hub.asked
 
@@ -213,9 +211,9 @@ def test_the_offer_is_dismissed_for_this_photo_and_comes_back_by_the_badge(viewe
     viewer.press("×##offer", "notices")
     viewer.until(lambda app: offered_model(app.state) is None)
     other = source_beside(first, str(write_photo(tmp_path / "other.png", seed=9)))
-    viewer.app.do(OpenPath(other))
+    viewer.app.do(do(opening.open_source, other))
     with_offer(viewer)
-    viewer.app.do(OpenPath(replace(first)))
+    viewer.app.do(do(opening.open_source, replace(first)))
     viewer.until(lambda app: app.state.scene is not None and app.state.scene.source is app.state.source)
     viewer.until_idle()
     assert offered_model(viewer.app.state) is None
@@ -224,7 +222,7 @@ def test_the_offer_is_dismissed_for_this_photo_and_comes_back_by_the_badge(viewe
 
 
 def test_the_button_is_in_reach_where_the_panel_leaves_no_room(viewer: Driver) -> None:
-    viewer.app.do(SetPreference("font_scale", 2.3))
+    viewer.app.do(do(preferences.set_font_scale, 2.3))
     viewer.until_idle()
     viewer.find(GET, "notices")
 

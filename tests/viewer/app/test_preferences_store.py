@@ -9,21 +9,23 @@ from pathlib import Path
 import pytest
 
 from iibr_core.types import InputError
+from tests.viewer.conftest import reduce
 from viewer.app.preferences_store import PREFERENCES_FILE, RECENT_FILE, last_opened, load_preferences, store_preferences
-from viewer.model.reducers.root import reduce
+from viewer.model import preferences
+from viewer.model.action import do
 from viewer.model.state.app_state import AppState
-from viewer.model.state.preferences import PlaceWindow, Preferences, SetPreference, ToggleSection
+from viewer.model.state.preferences import Preferences
 from viewer.model.window_limits import FONT_SCALE_LIMITS
 
 
 def test_kept_values_come_back(tmp_path: Path) -> None:
     state = AppState(recent=("/photos/ä.png", "b.png"))
     for action in (
-        SetPreference("theme", "light"),
-        SetPreference("font_scale", 1.5),
-        ToggleSection("scene"),
-        PlaceWindow((10, 20, 900, 700)),
-        PlaceWindow(None),
+        do(preferences.set_theme, "light"),
+        do(preferences.set_font_scale, 1.5),
+        do(preferences.toggle_section, "scene"),
+        do(preferences.place_window, (10, 20, 900, 700)),
+        do(preferences.place_window, None),
     ):
         state = reduce(state, action)
     folder = tmp_path / "not" / "there" / "yet"

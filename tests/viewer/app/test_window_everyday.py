@@ -17,9 +17,8 @@ from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import Driver, Opener, rests, write_scene
 from viewer.app.preferences_store import load_preferences
 from viewer.display.offscreen import OffscreenScene
-from viewer.model import lens, messages
+from viewer.model import lens, messages, opening
 from viewer.model.action import ask, do
-from viewer.model.actions import StopWork
 from viewer.model.saved_settings import read_settings
 from viewer.model.state.app_state import AppState
 from viewer.model.state.exporting import ExportPrompt
@@ -250,7 +249,7 @@ def test_damaged_preferences_are_told_and_do_not_keep_the_window_from_opening(
 def test_stopping_keeps_the_views_that_are_there(open_window: Opener, photo_path: Path) -> None:
     driver = open_window(photo_path, grid=GridShape(41, 41))
     driver.until(lambda app: app.state.progress.done > 3)
-    driver.app.do(StopWork())
+    driver.app.do(do(opening.stop))
     driver.until(lambda app: rests(app))
     made = driver.app.scene_view.renderer.field.present.sum()
     assert 3 < made < 41 * 41
@@ -259,7 +258,7 @@ def test_stopping_keeps_the_views_that_are_there(open_window: Opener, photo_path
 
 
 def test_the_state_that_asks_for_a_path_knows_what_for() -> None:
-    from viewer.model.reducers.root import reduce
+    from tests.viewer.conftest import reduce
     from viewer.model.state.prompts import PathPrompt
 
     assert reduce(AppState(), do(messages.show_prompt, PathPrompt("mask"))).prompt == PathPrompt("mask")

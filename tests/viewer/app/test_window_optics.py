@@ -10,13 +10,11 @@ from iibr_core.beyond.optics import ApertureShape, Optics
 from iibr_core.gloss.settings import Gloss
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import FAR, NEAR, Driver
-from viewer.model import lens, messages
-from viewer.model.action import do
-from viewer.model.actions import Action
+from viewer.model import lens, messages, preferences
+from viewer.model.action import Action, do
 from viewer.model.focal_plane import handle_points, sharp_disparity
 from viewer.model.state.lens import TiltHandles
 from viewer.model.state.notices import Notice
-from viewer.model.state.preferences import SetPreference
 
 
 @pytest.fixture
@@ -154,7 +152,7 @@ ONLY_PANELS = (
     do(lens.show_tilt_handles, True),
     do(messages.notify, Notice("hello")),
     do(messages.show_prompt, "help"),
-    SetPreference("theme", "light"),
+    do(preferences.set_theme, "light"),
     do(lens.show_tilt_handles, False),
 )
 
@@ -182,7 +180,7 @@ def test_what_each_edit_rebuilds(viewer: Driver, monkeypatch: pytest.MonkeyPatch
         "its slider moves"
     )
     assert cost_of(do(lens.set_depth_strength, 2.0, is_finished=True)) == (True, True, True, True)
-    assert cost_of(SetPreference("font_scale", 1.3))[2:] == (False, False)
+    assert cost_of(do(preferences.set_font_scale, 1.3))[2:] == (False, False)
 
 
 def count_calls(monkeypatch: pytest.MonkeyPatch, owner: object, name: str) -> list[object]:

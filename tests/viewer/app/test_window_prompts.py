@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,15 +14,13 @@ from iibr_core.scenes.scene import Source
 from iibr_core.types import GridShape
 from tests.viewer.conftest import Driver, Opener
 from viewer.app.main_loop import App
-from viewer.model import messages, saving
+from viewer.model import messages, opening, preferences, saving
 from viewer.model.action import do
-from viewer.model.actions import OpenPath, SetState, StopWork
 from viewer.model.commands import BY_NAME, COMMANDS
 from viewer.model.layout import PANEL_WIDTH
 from viewer.model.state.depth_models import ModelsPrompt
 from viewer.model.state.exporting import ExportPrompt
 from viewer.model.state.notices import Notice
-from viewer.model.state.preferences import SetPreference, ToggleSection
 from viewer.model.state.prompts import FolderContents, PalettePrompt, PathPrompt, SavePrompt
 
 pytestmark = pytest.mark.usefixtures("no_dialogs")
@@ -62,7 +61,8 @@ def test_the_palette_loses_nothing_of_what_is_typed_before_its_field_is_there(vi
 
 def test_the_help_stands_in_the_panels_place_and_leaves_the_picture_to_be_seen(viewer: Driver) -> None:
     for hides_panel in (False, True):
-        viewer.app.do(SetState("hides_panel", hides_panel), do(messages.show_prompt, "help"))
+        viewer.app.state = replace(viewer.app.state, hides_panel=hides_panel)
+        viewer.app.do(do(messages.show_prompt, "help"))
         viewer.until_idle()
         pad, window = imgui.internal.find_window_by_name("prompt str"), viewer.app.layout().window
         assert (pad.pos.x + pad.size.x, pad.size.y) == (window.width, window.height)
@@ -87,7 +87,7 @@ def test_tooltips_come_up_before_the_window_sleeps(viewer: Driver) -> None:
 @pytest.mark.usefixtures("wide_window")
 @pytest.mark.parametrize("scale", [1.0, 2.0])
 def test_tooltips_of_a_prompt_leave_it_to_be_seen(viewer: Driver, scale: float) -> None:
-    viewer.app.do(SetPreference("font_scale", scale), do(messages.show_prompt, ExportPrompt("sbs", "a.png")))
+    viewer.app.do(do(preferences.set_font_scale, scale), do(messages.show_prompt, ExportPrompt("sbs", "a.png")))
     viewer.until_idle()
     viewer.find("##Eyes", "prompt ExportPrompt")
     viewer.until_idle()
@@ -159,7 +159,7 @@ def test_the_open_photo_is_whole_again_after_a_file_that_does_not_open(viewer: D
     viewer.app.window.on_drop(None, [str(broken)])
     viewer.until(lambda app: bool(app.state.notices) and "broken.jpg" in app.state.notices[-1].text)
     viewer.until_idle()
-    viewer.app.do(OpenPath(Source(str(tmp_path / "scene.png"))), StopWork())
+    viewer.app.do(do(opening.open_source, Source(str(tmp_path / "scene.png"))), do(opening.stop))
     viewer.until_idle()
     assert viewer.app.state.progress.is_complete
     assert viewer.app.scene_view.is_whole
@@ -189,7 +189,7 @@ def test_notices_go_by_themselves_the_newest_first(viewer: Driver, monkeypatch: 
 def test_a_map_or_a_model_of_ones_own_is_opened(open_window: Opener, tmp_path: Path) -> None:
     write_image(tmp_path / "alone.png", np.full((64, 96, 3), 100, np.uint8))
     driver = open_window(tmp_path / "alone.png", grid=GridShape(3, 3))
-    driver.app.do(ToggleSection("depth"))
+    driver.app.do(do(preferences.toggle_section, "depth"))
     driver.until_idle()
     driver.press("Open map…")
     driver.until(lambda app: asks_for(app, "map"))

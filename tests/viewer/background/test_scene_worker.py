@@ -20,12 +20,11 @@ from iibr_core.scenes.opening import results_of
 from iibr_core.scenes.scene import DepthSettings, Progress, SceneReady, SceneRequest, Source, ViewReady
 from iibr_core.types import GridShape, InputError, ViewUpdate
 from tests.iibr_core.scenes.test_light_fields import write_two_planes
+from tests.viewer.conftest import reduce
 from viewer.background.job_threads import QUEUED_RESULTS, Failed, ProgressReport
 from viewer.background.scene_worker import PhotosFound, SceneResult, SceneWork, SceneWorker
-from viewer.model import lens
+from viewer.model import lens, opening
 from viewer.model.action import do
-from viewer.model.actions import OpenPath, ProgressMade, SceneOpened
-from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState
 from viewer.model.units import equivalent_f_number
 
@@ -93,14 +92,17 @@ def test_a_photo_comes_with_its_first_view_at_once_and_then_all_of_them(photo_pa
 def test_depth_painted_beyond_its_range_is_no_other_lens(photo_path: Path) -> None:
     """The views are others, the aperture is carried over to them: its f-number stays."""
     source, loaded, stops, state = Source(str(photo_path)), None, [], AppState()
-    state = reduce(state, OpenPath(source))
+    state = reduce(state, do(opening.open_source, source))
     for count in (0, 1, 4):
         strokes = tuple(Stroke("nearer", ((0.5, 0.5), (0.6, 0.5)), 0.1, 1.0) for _ in range(count))
         state = replace(state, generation=count + 1, depth=DepthSettings(1.0, DepthEdits(strokes=strokes)))
         request = SceneRequest(count + 1, source, loaded=loaded, depth_settings=state.depth)
         ready = next(results_of(request, lambda: CENTRE))
         assert isinstance(ready, SceneReady)
-        state, loaded = reduce(state, SceneOpened(count + 1, replace(ready.scene, source=source))), ready.loaded
+        state, loaded = (
+            reduce(state, do(opening.show_scene, count + 1, replace(ready.scene, source=source))),
+            ready.loaded,
+        )
         state = state if count else reduce(state, do(lens.set_aperture, 1.0))
         stops.append(equivalent_f_number(ready.scene, state.optics.aperture_diameter))
     assert ready.scene.found_span_px < 0.5 * np.ptp(ready.scene.disparity_range_px)
@@ -277,17 +279,17 @@ def test_the_bar_of_each_work_grows_and_the_last_view_completes_it(
 ) -> None:
     """Through all showings of a light field, as the window's state has it."""
     source = Source(str(write_two_planes(tmp_path / "field")))
-    desk, state = desk_for(), reduce(AppState(), OpenPath(source))
+    desk, state = desk_for(), reduce(AppState(), do(opening.open_source, source))
     desk.worker.submit(SceneRequest(1, source))
     shown = [state.progress]
     while not state.progress.is_complete:
         result = desk.next(with_progress=True)
         assert not isinstance(result, Failed | PhotosFound)
         if isinstance(result, SceneReady):
-            state = reduce(state, SceneOpened(1, result.scene))
+            state = reduce(state, do(opening.show_scene, 1, result.scene))
         else:
             view = (result.view.row, result.view.column) if isinstance(result, ViewReady) else None
-            state = reduce(state, ProgressMade(1, result.progress, view))
+            state = reduce(state, do(opening.set_progress, 1, result.progress, view))
         shown.append(state.progress)
     for before, now in pairwise(shown):
         same_work = before.doing.partition(",")[0] == now.doing.partition(",")[0]

@@ -16,8 +16,7 @@ from tests.iibr_core.known_scenes import write_stanford, write_stereo_pair
 from tests.viewer.conftest import HEIGHT, WIDTH
 from viewer.display.offscreen import OffscreenScene
 from viewer.model import lens
-from viewer.model.action import do
-from viewer.model.actions import Action
+from viewer.model.action import Action, do
 from viewer.model.layout import layout_of
 
 

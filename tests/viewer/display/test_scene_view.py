@@ -18,8 +18,7 @@ from viewer.display import scene_view
 from viewer.display.offscreen import OffscreenScene
 from viewer.display.scene_view import SceneView
 from viewer.model import lens
-from viewer.model.action import do
-from viewer.model.actions import Action
+from viewer.model.action import Action, do
 
 SIZE = ScreenSize(384, 256)
 
@@ -77,15 +76,15 @@ def test_views_that_come_meanwhile_do_not_put_off_what_is_shown(opened: Offscree
 
 
 @pytest.mark.parametrize(
-    ("lens", "draws"),
+    ("edits", "draws"),
     [((), False), ((do(lens.move_eye, ViewOffset(-0.5, 0.0)),), True), ((do(lens.set_aperture, 3.0),), True)],
     ids=["one view", "between views", "a lens"],
 )
 def test_a_picture_that_is_one_view_is_not_drawn_for_others(
-    opened: OffscreenScene, lens: tuple[Action, ...], draws: bool
+    opened: OffscreenScene, edits: tuple[Action, ...], draws: bool
 ) -> None:
     view = opened.view
-    opened.do(do(lens.set_aperture, 0.0), *lens)
+    opened.do(do(lens.set_aperture, 0.0), *edits)
     view.converge(opened.state, SIZE)
     pictures, shown, record = view.pictures_drawn, view.renderer.read_image(), view.picture_drawn
     a_view_comes(view)

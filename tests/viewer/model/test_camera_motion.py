@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 
 from iibr_core.exports.loops import LOOPS, LoopKind, point_on_loop
 from iibr_core.types import GridShape, ViewOffset
+from tests.viewer.conftest import reduce
 from tests.viewer.model.test_reducers import scene_of, state_with
 from viewer.model import lens, viewpoint
 from viewer.model.action import do
-from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState
 from viewer.model.viewpoint import HOME_S, MAX_STEP_S, ease
 from viewer.model.window_limits import SPEED_LIMITS

@@ -8,12 +8,12 @@ import pytest
 from imgui_bundle import imgui
 
 from iibr_core.scenes.scene import Source
+from tests.viewer.conftest import reduce
 from tests.viewer.model.test_reducers import scene_of, state_with
 from viewer.model import saving
 from viewer.model.action import do
 from viewer.model.commands import BY_NAME, COMMANDS, Chord, Command, commands_matching, recent_commands
 from viewer.model.demo_photo import demo_photo
-from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState
 from viewer.model.state.exporting import ExportPrompt
 from viewer.model.state.lens import PRESETS

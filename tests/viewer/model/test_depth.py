@@ -24,21 +24,20 @@ from iibr_core.scenes.photo import apply_depth_settings, load_photo, make_plan
 from iibr_core.scenes.scene import DepthSettings, SceneRequest, Source
 from iibr_core.training.degradation import blur
 from iibr_core.types import GridShape
-from tests.viewer.conftest import FAR, HEIGHT, NEAR, WIDTH, write_scene
+from tests.viewer.conftest import FAR, HEIGHT, NEAR, WIDTH, reduce, write_scene
 from tests.viewer.model.test_history import after
 from tests.viewer.model.test_reducers import plan_of, scene_of, state_with
 from viewer.app.dropped_files import actions_from_drop
 from viewer.app.image_export import settings_of
 from viewer.app.pointer import Pointer, actions_from_pointer
-from viewer.model import depth, gesture, history, lens, saving
+from viewer.model import depth, gesture, history, lens, opening, saving
 from viewer.model.action import do
-from viewer.model.actions import NewDepth, OpenFailed, OpenPath, SceneOpened
+from viewer.model.carried_optics import NewDepth
 from viewer.model.commands import action_for_path
 from viewer.model.depth import (
     settings_for_worker,
 )
 from viewer.model.layout import layout_of
-from viewer.model.reducers.root import reduce
 from viewer.model.saved_settings import settings_from_text, settings_text
 from viewer.model.state.app_state import AppState
 from viewer.model.state.depth import Brush, DepthSample
@@ -99,7 +98,7 @@ def test_level_and_bucket_give_the_picked_depth_wholly_until_another_photo_opens
     for state, taken_from in ((start, None), (picked, SAMPLE.place)):
         stroke = reduce(state, do(depth.paint, (0.1, 0.1))).stroke
         assert stroke == Stroke(tool, ((0.1, 0.1),), stroke.radius if stroke else 0, 1.0, taken_from)
-    elsewhere = reduce(picked, SceneOpened(picked.generation, scene_of(GRID, source=Source("b.png"))))
+    elsewhere = reduce(picked, do(opening.show_scene, picked.generation, scene_of(GRID, source=Source("b.png"))))
     assert elsewhere.brush.sample is None
 
 
@@ -114,18 +113,20 @@ def test_the_depth_of_a_light_field_is_left_alone() -> None:
 def test_another_photo_begins_with_its_own_depth_and_a_failed_one_gives_the_old_back() -> None:
     edited = after(opened(), do(depth.set_tone, TONE, True), do(depth.set_refine, False))
     source = Source("b.png", DepthChoice(refine=False))
-    asked = reduce(edited, OpenPath(source))
+    asked = reduce(edited, do(opening.open_source, source))
     assert settings_for_worker(asked) == DepthSettings(False)
-    failed = reduce(asked, OpenFailed(asked.generation, "gone"))
+    failed = reduce(asked, do(opening.report_failure, asked.generation, "gone"))
     assert settings_for_worker(failed) == edited.depth
     scene = scene_of(GRID, source=source, plan=plan_of(GRID))
-    assert reduce(asked, SceneOpened(asked.generation, scene)).depth == DepthSettings(False)
+    assert reduce(asked, do(opening.show_scene, asked.generation, scene)).depth == DepthSettings(False)
 
 
 def test_the_same_scene_planned_anew_keeps_its_edits_and_its_history() -> None:
     edited = after(opened(), do(depth.set_tone, TONE, True), do(gesture.end_gesture))
     assert edited.scene is not None
-    state = reduce(edited, SceneOpened(edited.generation, replace(edited.scene, plan=plan_of(GRID, scale=0.5))))
+    state = reduce(
+        edited, do(opening.show_scene, edited.generation, replace(edited.scene, plan=plan_of(GRID, scale=0.5)))
+    )
     assert state.depth == edited.depth
     assert reduce(state, do(history.undo)).depth == DepthSettings()
 
@@ -150,9 +151,9 @@ DECIDED = Source(
 
 def test_another_photo_keeps_what_was_decided_about_depth_and_a_map_is_for_the_photo_that_is_open() -> None:
     depth = DepthChoice("model", model="midas", refine=False)
-    photo = OpenPath(replace(DECIDED, path="b.png", depth=depth, focus_disparity=None))
+    photo = do(opening.open_source, replace(DECIDED, path="b.png", depth=depth, focus_disparity=None))
     given = replace(depth, start="auto", file="b.pfm", stretches=True)
-    a_map = OpenPath(replace(DECIDED, depth=given, focus_disparity=None))
+    a_map = do(opening.open_source, replace(DECIDED, depth=given, focus_disparity=None))
     for kind, path, action in (("photo", "b.png", photo), ("map", "b.pfm", a_map)):
         assert action_for_path(kind, path, opened(DECIDED)) == action  # type: ignore[arg-type]
         assert actions_from_drop([path], opened(DECIDED)) == [action]
@@ -261,5 +262,5 @@ def test_new_depth_keeps_the_focus_where_it_was(
     state = replace(opened(), optics=Optics(focus_disparity=focus, focus_range=0.5), focused_at=focused_at)
     assert state.scene is not None
     deeper = replace(state.scene, plan=plan_of(GRID, scale=2.0), disparity_range_px=(-4.0, 4.0))
-    now = reduce(state, SceneOpened(state.generation, deeper, NewDepth(in_focus))).optics
+    now = reduce(state, do(opening.show_scene, state.generation, deeper, NewDepth(in_focus))).optics
     assert (now.focus_disparity, now.focus_range) == (pytest.approx(expected), pytest.approx(0.8))

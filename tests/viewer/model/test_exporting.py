@@ -11,10 +11,10 @@ from iibr_core.exports.kinds import EXPORTS, PURPOSES, ExportOptions, Purpose
 from iibr_core.method.plan import ScenePlan
 from iibr_core.scenes.scene import Source
 from iibr_core.types import InputError
+from tests.viewer.conftest import reduce
 from tests.viewer.model.test_reducers import scene_of, state_with
-from viewer.model import saving
+from viewer.model import preferences, saving
 from viewer.model.action import do
-from viewer.model.reducers.root import reduce
 from viewer.model.saving import (
     as_other_kind,
     first_kind,
@@ -23,7 +23,6 @@ from viewer.model.saving import (
     written_path,
 )
 from viewer.model.state.exporting import ExportPrompt
-from viewer.model.state.preferences import SetPreference
 from viewer.model.state.prompts import SavePrompt
 
 STATE = state_with(replace(scene_of(source=Source("/photos/bike.jpg")), name="bike"))
@@ -52,7 +51,7 @@ def test_the_folder_of_the_last_is_proposed_again() -> None:
     assert STATE.scene is not None
     plan = ScenePlan(STATE.scene.grid, 1.0, 0.0, (-2.0, 3.0), 0.1, True, 0, 0, ())
     photo = replace(STATE, scene=replace(STATE.scene, plan=plan))
-    later = reduce(photo, SetPreference("last_folder", "/shared"))
+    later = reduce(photo, do(preferences.set_last_folder, "/shared"))
     exported, saved, mapped = (
         reduce(later, ask).prompt
         for ask in (do(saving.ask_to_export), do(saving.ask_to_save), do(saving.ask_to_save, "map"))

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from iibr_core.beyond.optics import Optics
 from iibr_core.scenes.rect import Rect
 from iibr_core.types import GridShape
+from tests.viewer.conftest import reduce
 from tests.viewer.model.test_reducers import scene_of, state_with
 from viewer.model import gesture, lens
 from viewer.model.action import do
@@ -22,7 +23,6 @@ from viewer.model.focal_plane import (
     sharp_disparity,
     tilt_through,
 )
-from viewer.model.reducers.root import reduce
 from viewer.model.state.lens import TiltHandles
 
 shares = st.floats(-1, 1)

@@ -8,19 +8,19 @@ import pytest
 
 from iibr_core.exports.photo_folder import FolderPhoto, in_order
 from iibr_core.scenes.scene import Source
+from tests.viewer.conftest import reduce
 from tests.viewer.model.test_reducers import scene_of
-from viewer.model.actions import OpenFailed, OpenPath, SceneOpened, StopWork
-from viewer.model.reducers.folder_reducer import AHEAD, filmstrip_range, photos_ahead
-from viewer.model.reducers.root import reduce
+from viewer.model import folder, opening
+from viewer.model.action import do
+from viewer.model.folder import AHEAD, filmstrip_range, photos_ahead
 from viewer.model.state.app_state import AppState
-from viewer.model.state.folder import FolderListed, ScrollFilmstrip, SetFolderOrder, StepPhoto
 
 NAMES = ("IMG_10.jpg", "img_9.jpg", "IMG_11.jpg", "Ä.png")
 
 
 def state_at(name: str, names: tuple[str, ...] = NAMES) -> AppState:
     photos = tuple(FolderPhoto(name, float(-i)) for i, name in enumerate(names))
-    return reduce(AppState(source=Source(f"/photos/{name}", max_pixels=7)), FolderListed("/photos", photos))
+    return reduce(AppState(source=Source(f"/photos/{name}", max_pixels=7)), do(folder.set_photos, "/photos", photos))
 
 
 def open_name(state: AppState) -> str:
@@ -32,68 +32,68 @@ def test_numbers_in_names_are_counted_and_times_go_first_where_that_is_wanted() 
     state = state_at("img_9.jpg")
     assert state.folder is not None
     assert [photo.name for photo in state.folder.photos] == ["img_9.jpg", "IMG_10.jpg", "IMG_11.jpg", "Ä.png"]
-    state = reduce(state, SetFolderOrder("time"))
+    state = reduce(state, do(folder.set_order, "time"))
     assert state.folder is not None
     assert [photo.name for photo in state.folder.photos] == list(reversed(NAMES))
     assert in_order((), "name") == ()
 
 
 def test_steps_open_the_next_photo_with_what_was_decided_and_end_at_the_ends() -> None:
-    state = reduce(state_at("img_9.jpg"), StepPhoto(1))
+    state = reduce(state_at("img_9.jpg"), do(folder.step, 1))
     assert (open_name(state), state.generation) == ("IMG_10.jpg", 1)
     assert state.source is not None
     assert state.source.max_pixels == 7
-    state = reduce(reduce(state, StepPhoto(1)), StepPhoto(1))
+    state = reduce(reduce(state, do(folder.step, 1)), do(folder.step, 1))
     assert open_name(state) == "Ä.png"
-    assert reduce(state, StepPhoto(1)) is state
-    assert open_name(reduce(state, StepPhoto(-9))) == "img_9.jpg"
+    assert reduce(state, do(folder.step, 1)) is state
+    assert open_name(reduce(state, do(folder.step, -9))) == "img_9.jpg"
 
 
 def test_steps_do_nothing_where_no_photo_of_the_folder_is_open() -> None:
     elsewhere = replace(state_at("img_9.jpg"), source=Source("/other/img_9.jpg"))
     for state in (AppState(), elsewhere, state_at("gone.jpg")):
-        assert reduce(state, StepPhoto(1)) is state
+        assert reduce(state, do(folder.step, 1)) is state
 
 
 def test_a_walk_through_a_folder_leaves_one_recent_file() -> None:
     state = replace(state_at("img_9.jpg"), recent=("/other/a.jpg", "/other/b.jpg"))
-    state = reduce(state, SceneOpened(0, scene_of(source=Source("/photos/img_9.jpg"))))
+    state = reduce(state, do(opening.show_scene, 0, scene_of(source=Source("/photos/img_9.jpg"))))
     for _ in range(2):
-        state = reduce(state, StepPhoto(1))
+        state = reduce(state, do(folder.step, 1))
         assert state.source is not None
-        state = reduce(state, SceneOpened(state.generation, scene_of(source=state.source)))
+        state = reduce(state, do(opening.show_scene, state.generation, scene_of(source=state.source)))
     assert state.recent == ("/photos/IMG_11.jpg", "/other/a.jpg", "/other/b.jpg")
-    state = reduce(state, OpenPath(Source("/photos/img_9.jpg")))
-    state = reduce(state, SceneOpened(state.generation, scene_of(source=Source("/photos/img_9.jpg"))))
+    state = reduce(state, do(opening.open_source, Source("/photos/img_9.jpg")))
+    state = reduce(state, do(opening.show_scene, state.generation, scene_of(source=Source("/photos/img_9.jpg"))))
     assert state.recent[:2] == ("/photos/img_9.jpg", "/photos/IMG_11.jpg")
 
 
 def test_a_photo_that_does_not_open_is_told_once_and_passed_by() -> None:
     state = state_at("img_9.jpg")
-    state = reduce(state, SceneOpened(0, scene_of(source=Source("/photos/img_9.jpg", max_pixels=7))))
-    damaged = reduce(replace(state, source=state.scene.source), StepPhoto(1))  # type: ignore[union-attr]
-    state = reduce(damaged, OpenFailed(damaged.generation, "IMG_10.jpg: damaged"))
+    state = reduce(state, do(opening.show_scene, 0, scene_of(source=Source("/photos/img_9.jpg", max_pixels=7))))
+    damaged = reduce(replace(state, source=state.scene.source), do(folder.step, 1))  # type: ignore[union-attr]
+    state = reduce(damaged, do(opening.report_failure, damaged.generation, "IMG_10.jpg: damaged"))
     assert open_name(state) == "img_9.jpg"
     assert "damaged" in state.notices[-1].text
-    state = reduce(state, StepPhoto(1))
+    state = reduce(state, do(folder.step, 1))
     assert open_name(state) == "IMG_11.jpg"
-    state = reduce(state, SceneOpened(state.generation, scene_of(source=state.source)))
-    assert open_name(reduce(state, StepPhoto(-1))) == "img_9.jpg"
-    assert reduce(damaged, StopWork()).folder.unreadable == frozenset()  # type: ignore[union-attr]
+    state = reduce(state, do(opening.show_scene, state.generation, scene_of(source=state.source)))
+    assert open_name(reduce(state, do(folder.step, -1))) == "img_9.jpg"
+    assert reduce(damaged, do(opening.stop)).folder.unreadable == frozenset()  # type: ignore[union-attr]
 
 
 def test_steps_end_where_nothing_beyond_can_be_opened() -> None:
     state = state_at("IMG_11.jpg")
     assert state.folder is not None
     state = replace(state, folder=replace(state.folder, unreadable=frozenset({"Ä.png"})))
-    assert reduce(state, StepPhoto(1)) is state
-    assert reduce(state, StepPhoto(9)) is state
+    assert reduce(state, do(folder.step, 1)) is state
+    assert reduce(state, do(folder.step, 9)) is state
 
 
 def test_what_is_read_ahead_lies_in_the_direction_of_the_last_step() -> None:
     state = state_at("IMG_10.jpg")
     assert [source.path[8:] for source in photos_ahead(state, AHEAD)] == ["IMG_11.jpg", "img_9.jpg", "Ä.png"]
-    back = reduce(reduce(state, StepPhoto(1)), StepPhoto(-1))
+    back = reduce(reduce(state, do(folder.step, 1)), do(folder.step, -1))
     assert [source.path[8:] for source in photos_ahead(back, AHEAD)] == ["img_9.jpg", "IMG_11.jpg"]
     assert photos_ahead(AppState(), AHEAD) == ()
 
@@ -114,5 +114,5 @@ def test_the_filmstrip_shows_what_lies_around_the_open_photo(
     place: int, scrolled: int, most: int, shown: range
 ) -> None:
     names = tuple(f"{i}.jpg" for i in range(10))
-    state = reduce(state_at(f"{place}.jpg", names), ScrollFilmstrip(scrolled))
+    state = reduce(state_at(f"{place}.jpg", names), do(folder.scroll, scrolled))
     assert filmstrip_range(state, most) == shown

@@ -11,12 +11,11 @@ from iibr_core.beyond.optics import CENTRE
 from iibr_core.scenes.scene import Source
 from iibr_core.scenes.screen_size import ScreenSize
 from tests.iibr_core.scenes import literal_plan, square_before_wall
+from tests.viewer.conftest import reduce
 from tests.viewer.model.test_reducers import scene_of, state_with
 from viewer.app.keys import Keys, actions_from_keys
-from viewer.model import lens, saving, viewpoint
-from viewer.model.action import do
-from viewer.model.actions import Action, OpenPath
-from viewer.model.reducers.root import reduce
+from viewer.model import lens, opening, saving, viewpoint
+from viewer.model.action import Action, do
 from viewer.model.state.app_state import AppState
 from viewer.model.state.prompts import SavePrompt
 from viewer.model.state.viewpoint import FORWARD_LIMITS, MAX_ASIDE, FreeCamera
@@ -70,7 +69,8 @@ def test_a_light_field_from_disk_cannot_be_looked_around_in() -> None:
 
 
 @pytest.mark.parametrize(
-    "action", [do(viewpoint.leave_camera), do(lens.reset), do(viewpoint.return_home), OpenPath(Source("b.png"))]
+    "action",
+    [do(viewpoint.leave_camera), do(lens.reset), do(viewpoint.return_home), do(opening.open_source, Source("b.png"))],
 )
 def test_what_goes_back_to_the_views(action: Action) -> None:
     state = reduce(opened(), do(viewpoint.move_camera, forward=0.1))

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 
 from iibr_core.types import GridShape
+from tests.viewer.conftest import reduce
 from tests.viewer.model.test_reducers import plan_of, scene_of, state_with
 from viewer.model import depth, gesture, history, lens
 from viewer.model.action import do
-from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState
 from viewer.model.state.depth import Brush
 from viewer.model.state.lens import FIRST_GLOSS, GlossBrush

@@ -9,12 +9,11 @@ from hypothesis import strategies as st
 from iibr_core.beyond.optics import Optics
 from iibr_core.scenes.scene import Source
 from iibr_core.types import GridShape, ViewOffset
+from tests.viewer.conftest import reduce
 from tests.viewer.model.test_reducers import plan_of, scene_of, state_with
-from viewer.model import gesture, history, lens, viewpoint
-from viewer.model.action import do
-from viewer.model.actions import Action, OpenPath, SceneOpened
+from viewer.model import gesture, history, lens, opening, viewpoint
+from viewer.model.action import Action, do
 from viewer.model.history import MAX_EDITS
-from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState
 
 values = st.floats(0, 3)
@@ -192,16 +191,16 @@ def test_edits_before_another_plan_are_undone_in_its_units() -> None:
         do(gesture.end_gesture),
     )
     state = after(state, do(lens.set_depth_strength, 2.0, True), do(gesture.end_gesture))
-    state = reduce(state, SceneOpened(state.generation, scene_of(plan=new)))
+    state = reduce(state, do(opening.show_scene, state.generation, scene_of(plan=new)))
     assert state.optics.focus_disparity == pytest.approx(0.5)
     state = reduce(state, do(history.undo))
-    state = reduce(state, SceneOpened(state.generation, scene_of(plan=old)))
+    state = reduce(state, do(opening.show_scene, state.generation, scene_of(plan=old)))
     assert state.optics.focus_disparity == pytest.approx(0.25)
     assert reduce(state, do(history.undo)).optics.focus_disparity == pytest.approx(1.0)
 
 
 def test_another_file_begins_a_new_history() -> None:
-    state = after(state_with(scene_of()), do(lens.set_focus, 1), OpenPath(Source("b.png")))
+    state = after(state_with(scene_of()), do(lens.set_focus, 1), do(opening.open_source, Source("b.png")))
     assert state.history.past
-    state = reduce(state, SceneOpened(state.generation, scene_of(source=state.source)))
+    state = reduce(state, do(opening.show_scene, state.generation, scene_of(source=state.source)))
     assert state.history.past == ()

@@ -12,14 +12,13 @@ from iibr_core.method.plan import ScenePlan
 from iibr_core.scenes.rect import Rect
 from iibr_core.scenes.scene import Scene, Source
 from iibr_core.types import GridShape, ViewOffset
-from viewer.model import gesture, inspection
+from tests.viewer.conftest import reduce
+from viewer.model import gesture, inspection, opening
 from viewer.model.action import do
-from viewer.model.actions import SceneOpened
 from viewer.model.colormap import VIRIDIS, map_color
 from viewer.model.commands import BY_NAME, OVERLAY_WORDS
 from viewer.model.inspection import beside_of, sheet_cells, view_at, view_near
 from viewer.model.layout import Beside, layout_of
-from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState, Hover
 from viewer.model.state.inspection import OVERLAYS, Inspection, OverlayKind, Probe
 from viewer.model.state.preferences import Preferences
@@ -80,7 +79,7 @@ def test_a_snapshot_is_needed_before_it_is_compared() -> None:
 def test_the_next_scene_is_looked_at_in_the_same_way_without_the_findings() -> None:
     state = inspection.take_snapshot(inspection.show_epis(OPEN, True))
     state = inspection.compare(inspection.set_hover(state, Hover(3, 4, 0.5)), "snapshot")
-    opened = reduce(state, SceneOpened(3, replace(SCENE, source=Source("b.png"))))
+    opened = reduce(state, do(opening.show_scene, 3, replace(SCENE, source=Source("b.png"))))
     assert opened.inspection == Inspection(shows_epis=True)
 
 

@@ -28,18 +28,16 @@ from iibr_core.scenes.lens_limits import (
 )
 from iibr_core.scenes.scene import Progress, Scene, Source
 from iibr_core.types import GridShape, ViewOffset
-from viewer.model import history, inspection, lens, messages, saving
+from tests.viewer.conftest import reduce
+from viewer.model import history, inspection, lens, messages, opening, preferences, saving
 from viewer.model.action import Action, do
-from viewer.model.actions import OpenFailed, OpenPath, ProgressMade, SceneOpened, StopWork, TakeSettings
 from viewer.model.carried_optics import carry_optics
 from viewer.model.messages import MAX_NOTICES
-from viewer.model.reducers.root import reduce
 from viewer.model.remedies import DEPTH_COMMANDS
 from viewer.model.state.app_state import AppState, Hover, Picture
 from viewer.model.state.jobs import JobProgress
 from viewer.model.state.lens import PRESETS
 from viewer.model.state.notices import Notice
-from viewer.model.state.preferences import SetPreference
 from viewer.model.state.saving import SavedSettings
 from viewer.model.window_limits import DEPTH_STRENGTH_LIMIT
 
@@ -125,12 +123,12 @@ def test_every_optic_stays_finite_and_within_its_limits(
     assert 0 <= optics.focus_range <= span
     assert max(map(abs, optics.focus_tilt)) <= STEEPEST_TILT * span
     assert 0 <= optics.highlight_recovery <= 1
-    opening = optics.aperture_shape
-    assert 3 <= opening.blades <= 11
-    assert 0 <= opening.rotation_deg < 360
-    assert 0 <= opening.ring_inner < 1
-    assert 0 <= opening.cat_eye <= 1
-    assert opening.kind != "mask", "there is no mask"
+    shape_now = optics.aperture_shape
+    assert 3 <= shape_now.blades <= 11
+    assert 0 <= shape_now.rotation_deg < 360
+    assert 0 <= shape_now.ring_inner < 1
+    assert 0 <= shape_now.cat_eye <= 1
+    assert shape_now.kind != "mask", "there is no mask"
 
 
 def test_a_mask_is_kept_while_another_shape_is_tried() -> None:
@@ -214,13 +212,13 @@ def test_quitting_asks_while_jobs_are_under_way_and_can_wait_for_them() -> None:
 def test_what_became_of_a_job_is_still_told_when_another_photo_opens() -> None:
     stays, goes = Notice("Exported a.gif", stays=True), Notice("This photo has no depth.")
     told = reduce(reduce(state_with(scene_of()), do(messages.notify, goes)), do(messages.notify, stays))
-    asked = reduce(told, OpenPath(Source("other.png")))
-    opened = reduce(asked, SceneOpened(asked.generation, scene_of(source=asked.source)))
+    asked = reduce(told, do(opening.open_source, Source("other.png")))
+    opened = reduce(asked, do(opening.show_scene, asked.generation, scene_of(source=asked.source)))
     assert opened.notices == (stays,)
 
 
 def test_what_is_opened_closes_the_help() -> None:
-    assert reduce(replace(AppState(), prompt="help"), OpenPath(Source("photo.png"))).prompt is None
+    assert reduce(replace(AppState(), prompt="help"), do(opening.open_source, Source("photo.png"))).prompt is None
 
 
 def test_settings_of_another_picture_are_made_to_fit_and_can_be_taken_back() -> None:
@@ -228,62 +226,67 @@ def test_settings_of_another_picture_are_made_to_fit_and_can_be_taken_back() -> 
     optics = Optics(eye=ViewOffset(9, 9), aperture_diameter=20, focus_disparity=1)
     saved = SavedSettings(optics, 1.0, Source(""), (10, 10))
     offered = reduce(state, do(messages.notify, Notice("It has settings.", offer=saved)))
-    after = reduce(offered, TakeSettings(saved))
+    after = reduce(offered, do(opening.take_settings, saved))
     assert after.optics == Optics(eye=ViewOffset(2, 2), aperture_diameter=5, focus_disparity=1)
     assert after.notices == ()
     assert reduce(after, do(history.undo)).optics == state.optics
     wider = replace(saved, view_width=2 * state.scene.width)
-    assert reduce(offered, TakeSettings(wider)).optics == replace(after.optics, focus_disparity=0.5)
+    assert reduce(offered, do(opening.take_settings, wider)).optics == replace(after.optics, focus_disparity=0.5)
     broken = replace(saved, optics=replace(optics, dolly=math.nan))
-    assert reduce(state, TakeSettings(broken)).optics == state.optics
+    assert reduce(state, do(opening.take_settings, broken)).optics == state.optics
 
 
 def test_stopping_keeps_what_is_there_and_late_progress_does_not_bring_it_back() -> None:
-    state = reduce(state_with(scene_of()), ProgressMade(1, Progress(3, 81, 0.1), (0, 0)))
-    state = reduce(state, StopWork())
+    state = reduce(state_with(scene_of()), do(opening.set_progress, 1, Progress(3, 81, 0.1), (0, 0)))
+    state = reduce(state, do(opening.stop))
     assert state.stopped == state.generation == 1
     assert "3 of 81" in state.progress.doing
-    late = reduce(state, ProgressMade(1, Progress(4, 81, 0.2), (0, 1)))
+    late = reduce(state, do(opening.set_progress, 1, Progress(4, 81, 0.2), (0, 1)))
     assert late.progress == state.progress
     assert late.views_there == {(0, 0), (0, 1)}
 
 
 def test_stopping_while_another_file_is_read_returns_to_the_scene_that_is_open() -> None:
     before = state_with(scene_of())
-    state = reduce(reduce(before, OpenPath(Source("other.png"))), StopWork())
+    state = reduce(reduce(before, do(opening.open_source, Source("other.png"))), do(opening.stop))
     assert state.source is before.source
     assert state.generation == before.generation + 2
     assert state.stopped is None
-    first = reduce(reduce(AppState(), OpenPath(SOURCE)), StopWork())
+    first = reduce(reduce(AppState(), do(opening.open_source, SOURCE)), do(opening.stop))
     assert (first.source, first.stopped, first.progress) == (None, 1, Progress())
 
 
 def test_a_finished_field_cannot_be_stopped() -> None:
-    state = reduce(state_with(scene_of()), ProgressMade(1, Progress(81, 81, 0.1), (0, 0)))
-    assert reduce(state, StopWork()) == state
+    state = reduce(state_with(scene_of()), do(opening.set_progress, 1, Progress(81, 81, 0.1), (0, 0)))
+    assert reduce(state, do(opening.stop)) == state
 
 
 def test_views_that_came_are_known_until_another_field_is_made() -> None:
-    state = reduce(state_with(None), SceneOpened(1, scene_of(GridShape(3, 3))))
+    state = reduce(state_with(None), do(opening.show_scene, 1, scene_of(GridShape(3, 3))))
     assert state.views_there == {(1, 1)}
-    state = reduce(state, ProgressMade(1, Progress(2, 9, 0.1), (0, 2)))
+    state = reduce(state, do(opening.set_progress, 1, Progress(2, 9, 0.1), (0, 2)))
     assert state.views_there == {(1, 1), (0, 2)}
-    state = reduce(state, SceneOpened(1, scene_of(GridShape(5, 5))))
+    state = reduce(state, do(opening.show_scene, 1, scene_of(GridShape(5, 5))))
     assert state.views_there == {(2, 2)}
 
 
 def test_a_sketch_opens_the_photo_and_the_whole_photo_goes_on_with_it() -> None:
     sketch = scene_of(source=SOURCE, is_sketch=True)
-    state = reduce(state_with(None), SceneOpened(1, sketch))
+    state = reduce(state_with(None), do(opening.show_scene, 1, sketch))
     assert state.progress.doing.startswith("reading")
     state = reduce(replace(state, source=SOURCE), do(lens.focus_on, (0.0, 0.0), 1.0))
     whole = reduce(
-        state, SceneOpened(1, scene_of(source=SOURCE, notes=("A map is damaged.",), problems=("A map is damaged.",)))
+        state,
+        do(
+            opening.show_scene,
+            1,
+            scene_of(source=SOURCE, notes=("A map is damaged.",), problems=("A map is damaged.",)),
+        ),
     )
     assert whole.notices == (*state.notices, Notice("A map is damaged."))
     assert whole.history.past == state.history.past != ()
     assert whole.chosen_focus is not None
-    stopped = reduce(state, StopWork())
+    stopped = reduce(state, do(opening.stop))
     assert stopped.stopped == 1
     assert stopped.scene is sketch
 
@@ -291,7 +294,7 @@ def test_a_sketch_opens_the_photo_and_the_whole_photo_goes_on_with_it() -> None:
 def test_recent_files_are_listed_once_the_latest_first() -> None:
     state = state_with(None)
     for name in ("a.png", "b.png", "a.png"):
-        state = reduce(state, SceneOpened(1, scene_of(source=Source(name))))
+        state = reduce(state, do(opening.show_scene, 1, scene_of(source=Source(name))))
     assert state.recent == ("a.png", "b.png")
 
 
@@ -311,7 +314,7 @@ def test_focus_can_be_set_in_a_flat_scene() -> None:
         do(lens.focus_on, (0, 0), 1),
         do(lens.apply_preset, "macro"),
         do(lens.reset),
-        StopWork(),
+        do(opening.stop),
         do(history.undo),
     ],
 )
@@ -347,16 +350,16 @@ def test_reset_brings_the_first_optics_back() -> None:
         (do(lens.focus_on, (0.0, 0.0), 1.0), True, False),
         (do(lens.apply_preset, "macro"), True, False),
         (do(inspection.set_hover, Hover(3.0, 4.0, 1.0)), False, False),
-        (SetPreference("theme", "light"), False, False),
-        (StopWork(), False, False),
+        (do(preferences.set_theme, "light"), False, False),
+        (do(opening.stop), False, False),
         (do(history.undo), False, False),
         (do(lens.set_focus_tilt, (math.inf, 0.0)), False, False),
         (do(lens.set_focus, 0.0), False, False),
         (do(lens.move_eye, ViewOffset(math.nan, 0.0)), False, False),
         (do(lens.set_depth_strength, 2.0, is_finished=False), False, False),
         (do(lens.set_depth_strength, 2.0, is_finished=True), False, True),
-        (OpenPath(Source("other.png")), False, True),
-        (ProgressMade(1, Progress(3, 81, 0.1)), False, False),
+        (do(opening.open_source, Source("other.png")), False, True),
+        (do(opening.set_progress, 1, Progress(3, 81, 0.1)), False, False),
         (do(messages.notify, Notice("hello")), False, False),
         (do(saving.quit_window), False, False),
     ],
@@ -372,24 +375,26 @@ def test_what_an_edit_costs(action: object, draws: bool, restarts: bool) -> None
 
 def test_opening_shows_what_is_read_and_keeps_the_old_scene_until_then() -> None:
     before = state_with(scene_of())
-    after = reduce(before, OpenPath(Source("other.png")))
+    after = reduce(before, do(opening.open_source, Source("other.png")))
     assert after.scene is before.scene
     assert "other.png" in after.progress.doing
 
 
 def test_a_new_scene_starts_with_fresh_optics_and_names_only_what_failed() -> None:
-    state = reduce(reduce(state_with(scene_of()), do(lens.set_aperture, 2)), OpenPath(Source("other.png")))
+    state = reduce(
+        reduce(state_with(scene_of()), do(lens.set_aperture, 2)), do(opening.open_source, Source("other.png"))
+    )
     notes = ("Made smaller.", "A map is damaged.")
     origin = DepthOrigin("rough", "rough, guessed without a model")
     scene = scene_of(source=state.source, notes=notes, problems=notes[1:], depth_origin=origin)
-    state = reduce(state, SceneOpened(state.generation, scene))
+    state = reduce(state, do(opening.show_scene, state.generation, scene))
     assert state.optics == Optics()
     assert state.notices == (Notice("A map is damaged.", commands=DEPTH_COMMANDS),)
 
 
 def test_the_same_file_opened_again_is_a_new_scene() -> None:
-    state = reduce(reduce(state_with(scene_of()), do(lens.set_aperture, 2)), OpenPath(replace(SOURCE)))
-    state = reduce(state, SceneOpened(state.generation, scene_of(source=state.source)))
+    state = reduce(reduce(state_with(scene_of()), do(lens.set_aperture, 2)), do(opening.open_source, replace(SOURCE)))
+    state = reduce(state, do(opening.show_scene, state.generation, scene_of(source=state.source)))
     assert state.optics == Optics()
 
 
@@ -406,7 +411,7 @@ def test_another_depth_strength_keeps_the_surface_in_focus_and_the_place_in_the_
     ):
         state = reduce(state, action)
     state = reduce(state, do(lens.set_depth_strength, 1.5, is_finished=True))
-    optics = reduce(state, SceneOpened(state.generation, scene_of(GridShape(9, 9), plan=new))).optics
+    optics = reduce(state, do(opening.show_scene, state.generation, scene_of(GridShape(9, 9), plan=new))).optics
     assert optics.focus_disparity == pytest.approx((given - 12.0) * 0.25)
     assert optics.eye == ViewOffset(2, -4)
     assert optics.aperture_diameter == 4.0
@@ -425,14 +430,18 @@ def test_depth_strength_of_zero_and_back_gives_finite_optics() -> None:
     for action in (do(lens.move_eye, ViewOffset(4, 4)), do(lens.set_focus, 1), do(lens.set_aperture, 9)):
         state = reduce(state, action)
     for plan in (flat, deep):
-        state = reduce(state, SceneOpened(1, scene_of(plan.grid, plan=plan)))
+        state = reduce(state, do(opening.show_scene, 1, scene_of(plan.grid, plan=plan)))
         assert all(map(math.isfinite, (*state.optics.eye, state.optics.focus_disparity)))
         assert 0 <= state.optics.aperture_diameter <= max(plan.grid)
 
 
 @pytest.mark.parametrize(
     "late",
-    [SceneOpened(0, scene_of(GridShape(3, 3))), ProgressMade(0, Progress(1, 9)), OpenFailed(0, "no such file")],
+    [
+        do(opening.show_scene, 0, scene_of(GridShape(3, 3))),
+        do(opening.set_progress, 0, Progress(1, 9)),
+        do(opening.report_failure, 0, "no such file"),
+    ],
 )
 def test_late_words_of_an_earlier_generation_change_nothing(late: object) -> None:
     state = state_with(scene_of())
@@ -441,8 +450,8 @@ def test_late_words_of_an_earlier_generation_change_nothing(late: object) -> Non
 
 def test_a_failure_is_said_and_the_scene_before_is_taken_up_again() -> None:
     before = state_with(scene_of())
-    state = reduce(before, OpenPath(Source("broken.png")))
-    state = reduce(state, OpenFailed(state.generation, "broken.png: truncated"))
+    state = reduce(before, do(opening.open_source, Source("broken.png")))
+    state = reduce(state, do(opening.report_failure, state.generation, "broken.png: truncated"))
     assert state.notices == (Notice("broken.png: truncated", is_error=True),)
     assert state.source is SOURCE
     assert state.generation == before.generation + 2
@@ -450,7 +459,7 @@ def test_a_failure_is_said_and_the_scene_before_is_taken_up_again() -> None:
 
 def test_a_failure_of_the_open_scene_itself_does_not_start_it_again() -> None:
     before = state_with(scene_of())
-    state = reduce(before, OpenFailed(1, "no memory"))
+    state = reduce(before, do(opening.report_failure, 1, "no memory"))
     assert (state.generation, state.progress) == (before.generation, Progress())
 
 

@@ -25,9 +25,10 @@ from iibr_core.formats.images.write import write_image
 from iibr_core.gloss.settings import Gloss, GlossLight, GlossSurface
 from iibr_core.scenes.scene import Source
 from iibr_core.types import GridShape, InputError, ViewOffset
+from tests.viewer.conftest import reduce
 from tests.viewer.model.test_reducers import scene_of, state_with
-from viewer.model.actions import SceneOpened
-from viewer.model.reducers.root import reduce
+from viewer.model import opening
+from viewer.model.action import do
 from viewer.model.saved_settings import (
     MOST_CHARACTERS,
     left_out_note,
@@ -143,7 +144,7 @@ def test_damaged_settings_are_one_line_and_change_nothing(text: str) -> None:
     assert "\n" not in str(error.value)
     assert len(str(error.value)) < 300
     before = state_with(None)
-    state = reduce(before, SceneOpened(1, scene_of(settings=text or "x")))
+    state = reduce(before, do(opening.show_scene, 1, scene_of(settings=text or "x")))
     assert state.optics == Optics()
     assert [notice.is_error for notice in state.notices] == [True]
 
@@ -225,7 +226,7 @@ def test_what_is_damaged_is_named(text: str, named: str) -> None:
 def test_what_a_later_program_added_is_named_and_the_rest_counts() -> None:
     strokes = [{"tool": "nearer", "points": [[0.5, 0.25]], "radius": 0.03, "strength": 0.25, "tilt_deg": 5}]
     text = changed(film="grain", optics__bokeh={"deep": [1]}, depth_edits={"strokes": strokes}, source__a="\n" * 90)
-    state = reduce(state_with(None), SceneOpened(1, scene_of(settings=text)))
+    state = reduce(state_with(None), do(opening.show_scene, 1, scene_of(settings=text)))
     (notice,) = state.notices
     assert not notice.is_error
     assert notice.offer is not None
@@ -236,7 +237,7 @@ def test_what_a_later_program_added_is_named_and_the_rest_counts() -> None:
 
 
 def test_a_saved_picture_opens_as_a_photo_and_offers_its_settings() -> None:
-    state = reduce(state_with(None), SceneOpened(1, scene_of(settings=settings_text(ONE))))
+    state = reduce(state_with(None), do(opening.show_scene, 1, scene_of(settings=settings_text(ONE))))
     (notice,) = state.notices
     assert notice.offer == ONE
     assert state.optics == Optics()

@@ -10,11 +10,10 @@ from iibr_core.scenes.rect import WHOLE
 from iibr_core.scenes.scene import Scene, Source
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape
-from viewer.model import viewpoint
+from tests.viewer.conftest import reduce
+from viewer.model import opening, viewpoint
 from viewer.model.action import do
-from viewer.model.actions import OpenPath, SceneOpened
 from viewer.model.layout import MAX_ZOOM, Beside, Layout, layout_of, pixel_at
-from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState
 from viewer.model.state.viewpoint import Zoom
 
@@ -137,9 +136,9 @@ def test_absurd_zooms_still_show_something(zoom: Zoom) -> None:
 
 def test_another_photo_is_seen_whole_and_the_same_one_as_before() -> None:
     zoomed = reduce(STATE, do(viewpoint.set_zoom, Zoom(1.0)))
-    assert reduce(zoomed, SceneOpened(zoomed.generation, replace(SCENE))).zoom == Zoom(1.0)
-    asked = reduce(zoomed, OpenPath(Source("other.png")))
+    assert reduce(zoomed, do(opening.show_scene, zoomed.generation, replace(SCENE))).zoom == Zoom(1.0)
+    asked = reduce(zoomed, do(opening.open_source, Source("other.png")))
     assert asked.source is not None
     other = replace(SCENE, source=asked.source)
-    assert reduce(asked, SceneOpened(asked.generation, other)).zoom is None
+    assert reduce(asked, do(opening.show_scene, asked.generation, other)).zoom is None
     assert reduce(AppState(), do(viewpoint.set_zoom, Zoom(1.0))).zoom is None

@@ -13,12 +13,12 @@ from iibr_core.depth.editing.edits import BrushTool, DepthEdits, Stroke
 from tests.viewer.conftest import headless_with_scene
 from viewer.display.depth_preview import DepthPreview
 from viewer.display.offscreen import OffscreenScene
-from viewer.model import depth, inspection
+from viewer.model import depth, inspection, preferences
 from viewer.model.action import do
 from viewer.model.layout import PANEL_WIDTH
 from viewer.model.state.app_state import Hover
 from viewer.model.state.depth import Brush, DepthSample
-from viewer.model.state.preferences import SetPreference, Theme
+from viewer.model.state.preferences import Theme
 
 SIZE = 640, 800
 PANEL = np.s_[:, -int(PANEL_WIDTH) :]
@@ -38,7 +38,7 @@ def differs(before: np.ndarray, after: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize("theme", ["dark", "light"])
 def test_clips_show_in_the_histogram_and_sliders_only(viewer: OffscreenScene, theme: Theme) -> None:
-    viewer.do(SetPreference("theme", theme))
+    viewer.do(do(preferences.set_theme, theme))
     before = viewer.screen(SIZE)
     viewer.do(do(depth.set_tone, DepthEdits(far_clip=0.3, near_clip=0.6), is_finished=False))
     changed = differs(before, viewer.screen(SIZE))
@@ -70,7 +70,7 @@ def test_the_panel_ends_at_its_border_at_any_size_of_text(
     viewer: OffscreenScene, scale: float, tool: BrushTool
 ) -> None:
     sample = DepthSample((0.5, 0.5), 1.0)
-    viewer.do(SetPreference("font_scale", scale), do(depth.set_brush, Brush(tool, is_on=True, sample=sample)))
+    viewer.do(do(preferences.set_font_scale, scale), do(depth.set_brush, Brush(tool, is_on=True, sample=sample)))
     panel = viewer.screen((900, 2200))[:, -int(PANEL_WIDTH * scale) :]
     ground = panel[2:-2, 3]
     assert (ground == ground[0]).all(), "nothing reaches over the left border"

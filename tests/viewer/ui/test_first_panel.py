@@ -11,22 +11,14 @@ from imgui_bundle import imgui
 
 from iibr_core.scenes.scene import Progress
 from iibr_core.scenes.screen_size import ScreenSize
-from tests.viewer.conftest import headless_with_scene
+from tests.viewer.conftest import headless_with_scene, reduce
 from tests.viewer.ui.watched_widgets import watch_widgets
 from viewer.display.offscreen import OffscreenScene
-from viewer.model.actions import SetState
+from viewer.model import preferences, window
+from viewer.model.action import do
 from viewer.model.commands import BY_NAME
-from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState
-from viewer.model.state.preferences import (
-    HOLDERS,
-    SECTIONS,
-    Preferences,
-    Section,
-    ToggleSection,
-    is_seen_open,
-    with_sections,
-)
+from viewer.model.state.preferences import PARENT_SECTION, SECTIONS, Preferences, Section, is_seen_open, with_sections
 from viewer.ui.sections.essentials import MOVE_TIPS, PRESET_TIPS
 
 WINDOW = ScreenSize(1280, 800)
@@ -82,35 +74,35 @@ def test_an_empty_window_has_few_too(first: OffscreenScene, controls: list[str])
 
 
 def test_more_brings_headings_and_advanced_two_more(first: OffscreenScene, controls: list[str]) -> None:
-    first.do(ToggleSection("more"))
+    first.do(do(preferences.toggle_section, "more"))
     first.screen(WINDOW)
     headings = [words.removeprefix("section ") for words in controls if words.startswith("section ")]
     assert headings == ["More", "View", "Focus", "Aperture", "Light", "Gloss", "Depth", "Advanced"]
-    first.do(ToggleSection("advanced"))
+    first.do(do(preferences.toggle_section, "advanced"))
     first.screen(WINDOW)
     assert {"section Inspect", "section Scene"} <= set(controls)
 
 
 @pytest.mark.parametrize("section", SECTIONS)
 def test_a_section_that_is_asked_for_is_seen_whatever_it_lies_in(section: Section) -> None:
-    opened = reduce(AppState(), ToggleSection(section)).preferences.open_sections
+    opened = reduce(AppState(), do(preferences.toggle_section, section)).preferences.open_sections
     assert is_seen_open(section, opened)
     assert opened == with_sections((), section)
-    holder = HOLDERS.get(section)
+    holder = PARENT_SECTION.get(section)
     assert holder is None or holder in opened
     assert (
         section
         not in reduce(
-            AppState(preferences=Preferences(open_sections=opened)), ToggleSection(section)
+            AppState(preferences=Preferences(open_sections=opened)), do(preferences.toggle_section, section)
         ).preferences.open_sections
     )
 
 
 def test_what_is_open_within_a_closed_section_opens_again_with_it() -> None:
     state = AppState(preferences=Preferences(open_sections=with_sections((), "depth")))
-    closed = reduce(state, ToggleSection("more"))
+    closed = reduce(state, do(preferences.toggle_section, "more"))
     assert not is_seen_open("depth", closed.preferences.open_sections)
-    assert reduce(closed, ToggleSection("more")) == state
+    assert reduce(closed, do(preferences.toggle_section, "more")) == state
 
 
 def test_each_preset_and_each_motion_says_what_it_does() -> None:
@@ -131,6 +123,6 @@ def test_in_a_narrow_window_the_panel_folds_away_and_comes_back_when_asked_for(
     assert controls
     first.do(toggle.action(first.state))
     assert first.state.hides_panel is None, "it follows the window again"
-    first.do(SetState("is_narrow", False))
+    first.do(do(window.set_narrow, False))
     first.do(toggle.action(first.state))
     assert first.state.is_panel_hidden

@@ -20,14 +20,14 @@ from tests.viewer.conftest import headless_with_scene
 from tests.viewer.ui.watched_widgets import watch_widgets
 from viewer.background.depth_models import list_models
 from viewer.display.offscreen import OffscreenScene
-from viewer.model import depth_models, lens, messages
+from viewer.model import depth_models, lens, messages, preferences
 from viewer.model.action import do
 from viewer.model.layout import PANEL_WIDTH
 from viewer.model.state.app_state import AppState
 from viewer.model.state.depth_models import ModelsPrompt
 from viewer.model.state.exporting import ExportPrompt
 from viewer.model.state.jobs import JobProgress
-from viewer.model.state.preferences import SECTIONS, SetPreference, Theme, Units
+from viewer.model.state.preferences import SECTIONS, Theme, Units
 from viewer.model.state.prompts import PalettePrompt, PathPrompt, Prompt, SavePrompt
 from viewer.ui.overlays.export_prompt import MOTION_TIPS
 from viewer.ui.sections.depth_section import START_TIPS, START_WORDS
@@ -92,8 +92,8 @@ def test_no_widget_is_cut_and_none_lies_over_another(
     optics = (do(lens.set_aperture, 2.3), do(lens.set_focus_range, 0.7), do(lens.set_focus_tilt, (0.3, -0.2)))
     kind = APERTURE_KINDS[SCALES.index(scale) % (len(APERTURE_KINDS) - 1)]
     viewer.do(
-        SetPreference("font_scale", scale),
-        SetPreference("units", units),
+        do(preferences.set_font_scale, scale),
+        do(preferences.set_units, units),
         do(lens.set_aperture_shape, ApertureShape(kind)),
         *optics,
     )
@@ -114,7 +114,7 @@ def test_no_widget_is_cut_and_none_lies_over_another(
 
 @pytest.mark.parametrize("scale", SCALES)
 def test_the_grip_of_a_slider_lies_below_its_value(viewer: OffscreenScene, items: list[Item], scale: float) -> None:
-    viewer.do(SetPreference("font_scale", scale))
+    viewer.do(do(preferences.set_font_scale, scale))
     viewer.screen(ScreenSize(round(120 + PANEL_WIDTH * scale), 2600))
     line = min(item.bottom - item.top for item in items if item.kind == "text")
     sliders = [item.bottom - item.top for item in items if item.kind == "slider_float"]
@@ -158,7 +158,7 @@ def test_prompts_fit_the_window_and_their_words_fit_them(
     if name == WELCOME:
         viewer.state = AppState()
     viewer.do(
-        SetPreference("font_scale", scale),
+        do(preferences.set_font_scale, scale),
         do(depth_models.set_known, list_models()),
         do(messages.show_prompt, PROMPTS.get(name)),
     )

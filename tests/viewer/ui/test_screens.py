@@ -16,17 +16,15 @@ from iibr_core.beyond.optics import (
     ApertureShape,
 )
 from iibr_core.scenes.scene import Progress, Source
-from tests.viewer.conftest import headless_with_scene
+from tests.viewer.conftest import headless_with_scene, reduce
 from viewer.display.offscreen import OffscreenScene
-from viewer.model import inspection, lens, messages, saving, viewpoint
-from viewer.model.action import do
-from viewer.model.actions import Action, OpenFailed, OpenPath, ProgressMade, SetState
+from viewer.model import inspection, lens, messages, opening, preferences, saving, viewpoint, window
+from viewer.model.action import Action, do
 from viewer.model.layout import PANEL_WIDTH, layout_of
-from viewer.model.reducers.root import reduce
 from viewer.model.state.app_state import AppState, DrawReport, Hover
 from viewer.model.state.jobs import WRITING, JobProgress
 from viewer.model.state.notices import Notice
-from viewer.model.state.preferences import SECTIONS, Section, SetPreference, ToggleSection, with_sections
+from viewer.model.state.preferences import SECTIONS, Section, with_sections
 from viewer.model.state.prompts import PalettePrompt, PathPrompt
 from viewer.model.state.saving import SavedSettings
 from viewer.ui.overlays.progress_rows import job_text
@@ -56,14 +54,14 @@ def in_panel(screen: np.ndarray, scale: float = 1.0) -> np.ndarray:
 
 @pytest.mark.parametrize("section", SECTIONS)
 def test_every_section_opens_and_closes(viewer: OffscreenScene, section: Section) -> None:
-    preferences = viewer.state.preferences
-    sections = with_sections(preferences.open_sections, "inspect")  # what a section lies in is open before
-    viewer.state = replace(viewer.state, preferences=replace(preferences, open_sections=sections))
+    before = viewer.state.preferences
+    sections = with_sections(before.open_sections, "inspect")  # the sections that hold it are open
+    viewer.state = replace(viewer.state, preferences=replace(before, open_sections=sections))
     first = viewer.screen(SIZE)
-    changed = changed_after(viewer, ToggleSection(section))
+    changed = changed_after(viewer, do(preferences.toggle_section, section))
     assert in_panel(changed).sum() > 10 * ENOUGH_PIXELS
     assert not changed[:, : -int(PANEL_WIDTH)].any()
-    viewer.do(ToggleSection(section))
+    viewer.do(do(preferences.toggle_section, section))
     np.testing.assert_array_equal(viewer.screen(SIZE), first)
 
 
@@ -103,19 +101,19 @@ def test_each_aperture_shape_shows_its_own_controls(viewer: OffscreenScene, kind
     [
         do(viewpoint.set_loop, "eight"),
         do(lens.set_aperture, 2.0),
-        ProgressMade(1, Progress(4, 9, 0.3)),
-        SetState("report", DrawReport(3, 9, 12.0)),
+        do(opening.set_progress, 1, Progress(4, 9, 0.3)),
+        do(window.set_report, DrawReport(3, 9, 12.0)),
     ],
     ids=lambda action: type(action).__name__,
 )
 def test_the_panel_tells(viewer: OffscreenScene, action: Action) -> None:
-    viewer.do(ToggleSection("scene"))
+    viewer.do(do(preferences.toggle_section, "scene"))
     assert in_panel(changed_after(viewer, action)).sum() > ENOUGH_PIXELS
 
 
 def test_light_and_dark(viewer: OffscreenScene) -> None:
     for theme, palette in (("dark", DARK), ("light", LIGHT)):
-        viewer.do(SetPreference("theme", theme))  # type: ignore[arg-type]
+        viewer.do(do(preferences.set_theme, theme))  # type: ignore[arg-type]
         screen = viewer.screen(SIZE) / 255
         np.testing.assert_allclose(screen[-2, -8], palette.panel[:3], atol=0.01)
         np.testing.assert_allclose(screen[2, 2], palette.background[:3], atol=0.01)
@@ -131,7 +129,7 @@ def test_text_twice_as_large_in_a_window_twice_as_large_is_the_same_screen_finer
         )
     )
     small = viewer.screen(SIZE).astype(float)
-    viewer.do(SetPreference("font_scale", 2.0))
+    viewer.do(do(preferences.set_font_scale, 2.0))
     large = viewer.screen((2 * SIZE[0], 2 * SIZE[1])).astype(float)
     halved = large.reshape(SIZE[1], 2, SIZE[0], 2, 3).mean(axis=(1, 3))
     layout = layout_of(SIZE, (96, 64))
@@ -190,10 +188,10 @@ def test_an_empty_window_asks_for_a_photo_only_while_none_is_on_its_way(
     viewer.screen(SIZE)
     assert any(text.startswith("Drop a photo") for text in words)
     words.clear()
-    viewer.state = reduce(viewer.state, OpenPath(Source("holiday.jpg")))
+    viewer.state = reduce(viewer.state, do(opening.open_source, Source("holiday.jpg")))
     viewer.screen(SIZE)
     assert not words
     words.clear()
-    viewer.state = reduce(viewer.state, OpenFailed(viewer.state.generation, "no photo"))
+    viewer.state = reduce(viewer.state, do(opening.report_failure, viewer.state.generation, "no photo"))
     viewer.screen(SIZE)
     assert any(text.startswith("Drop a photo") for text in words)

@@ -14,8 +14,7 @@ from iibr_core.scenes.screen_size import ScreenSize
 from tests.viewer.conftest import headless_with_scene
 from viewer.display.offscreen import OffscreenScene
 from viewer.model import depth, inspection, lens, viewpoint
-from viewer.model.action import do
-from viewer.model.actions import Action
+from viewer.model.action import Action, do
 from viewer.model.state.depth import Brush, DepthSample
 from viewer.model.state.lens import FIRST_GLOSS, GlossBrush
 from viewer.model.state.preferences import SECTIONS

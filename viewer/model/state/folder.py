@@ -1,22 +1,21 @@
-"""The photos that lie beside the one that is open, and the actions that go from one to the next.
-
-`viewer.model.reducers.folder_reducer` says what each action does.
-"""
+"""The photos beside the open one."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import PurePath
 
-from iibr_core.exports.photo_folder import FolderOrder, FolderPhoto
+from iibr_core.exports.photo_folder import FolderPhoto
+from iibr_core.scenes.scene import Source
 
 
 @dataclass(frozen=True)
 class PhotoFolder:
-    """A folder and its photos, in the order in which one goes through them. step: of the last, 1 or -1.
+    """A folder and its photos in order.
 
-    stepped_to: the name of the photo that the last step asked for, "" before the first. scrolled: the filmstrip
-    shows what lies so many photos after the one that is open. unreadable: names of those that could not be opened:
-    steps pass them by.
+    step: direction of the last step, 1 or -1; stepped_to: name of the photo that it asked for, "" before the first.
+    scrolled: number of photos by which the filmstrip was moved. unreadable: names of photos that did not open; steps
+    pass them by.
     """
 
     path: str
@@ -26,11 +25,15 @@ class PhotoFolder:
     scrolled: int = 0
     unreadable: frozenset[str] = frozenset()
 
+    def is_stepped_to(self, source: Source) -> bool:
+        """Return whether the last step asked for this source."""
+        return str(PurePath(self.path) / self.stepped_to) == source.path
+
 
 @dataclass(frozen=True)
 class Thumbnail:
-    """A part of the texture of this GL name. low, high: its corners (x, y) in the texture, 0..1. aspect: width over
-    height.
+    """A part of a texture. texture: its GL name. low, high: corners (x, y) of the part, 0 to 1. aspect: its width over
+    its height.
     """
 
     texture: int
@@ -40,41 +43,7 @@ class Thumbnail:
 
 
 @dataclass(frozen=True)
-class FolderListed:
-    """These photos lie in this folder."""
-
-    path: str
-    photos: tuple[FolderPhoto, ...]
-
-
-@dataclass(frozen=True)
-class StepPhoto:
-    """Open the photo so many after the one that is open; the first or the last where there are not so many, the one
-    beyond where that could not be opened.
-    """
-
-    steps: int
-
-
-@dataclass(frozen=True)
-class ScrollFilmstrip:
-    """Show what lies so many photos farther."""
-
-    photos: int
-
-
-@dataclass(frozen=True)
-class SetFolderOrder:
-    """Go through the photos by name, or by the time they were written."""
-
-    order: FolderOrder
-
-
-@dataclass(frozen=True)
 class ListFolderTask:
-    """Look which photos lie in this folder."""
+    """List the photos in this folder."""
 
     path: str
-
-
-FolderAction = FolderListed | StepPhoto | ScrollFilmstrip | SetFolderOrder

@@ -1,4 +1,4 @@
-"""What the user sets once, for every photo."""
+"""Preferences: what the user sets once, for every photo."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from iibr_core.exports.photo_folder import FolderOrder
 
 Theme = Literal["dark", "light"]
 Units = Literal["photographic", "light field"]
-"""near to far and f-numbers, or pixels per view step and view steps."""
+"""Units of distances and apertures: near to far and f-numbers, or pixels per view step and view steps."""
 
 Section = Literal[
     "more", "view", "focus", "aperture", "light", "gloss", "depth", "advanced", "inspect", "scene"
@@ -17,8 +17,8 @@ Section = Literal[
 SECTIONS: tuple[Section, ...] = (
     "more", "view", "focus", "aperture", "light", "gloss", "depth", "advanced", "inspect", "scene",
 )  # fmt: skip
-"""In their order from above."""
-HOLDERS: dict[Section, Section] = {
+"""Sections of the panel, from top to bottom."""
+PARENT_SECTION: dict[Section, Section] = {
     "view": "more",
     "focus": "more",
     "aperture": "more",
@@ -29,23 +29,23 @@ HOLDERS: dict[Section, Section] = {
     "inspect": "advanced",
     "scene": "advanced",
 }
-"""Sections that lie in another one, and which: they are seen only while that is open, too."""
+"""Section that holds each section: it is seen only while that one is open, too."""
 
 
 def is_seen_open(section: Section, open_sections: tuple[Section, ...]) -> bool:
-    """Whether a section is open, and every one that it lies in."""
-    return all(each in open_sections for each in _with_holders(section))
+    """Return whether a section is open, and every section that holds it."""
+    return all(each in open_sections for each in _with_parents(section))
 
 
 def with_sections(open_sections: tuple[Section, ...], *wanted: Section) -> tuple[Section, ...]:
-    """The open sections with these, and every one that they lie in, in their order from above."""
-    opened = {*open_sections, *(each for section in wanted for each in _with_holders(section))}
+    """Return the open sections with these and all that hold them, from top to bottom."""
+    opened = {*open_sections, *(each for section in wanted for each in _with_parents(section))}
     return tuple(section for section in SECTIONS if section in opened)
 
 
-def _with_holders(section: Section) -> tuple[Section, ...]:
-    holder = HOLDERS.get(section)
-    return (section,) if holder is None else (section, *_with_holders(holder))
+def _with_parents(section: Section) -> tuple[Section, ...]:
+    parent = PARENT_SECTION.get(section)
+    return (section,) if parent is None else (section, *_with_parents(parent))
 
 
 @dataclass(frozen=True)
@@ -65,28 +65,3 @@ class Preferences:
     units: Units = "photographic"
     estimates_depth: bool = False
     last_folder: str = ""
-
-
-@dataclass(frozen=True)
-class SetPreference:
-    """Give one field of `Preferences` this value; the others have actions of their own, for more depends on them."""
-
-    field: Literal["theme", "font_scale", "units", "shows_filmstrip", "estimates_depth", "last_folder"]
-    value: Theme | float | Units | bool | str
-
-
-@dataclass(frozen=True)
-class ToggleSection:
-    """Close a section of the panel that is seen open; else open it, with those that it lies in."""
-
-    section: Section
-
-
-@dataclass(frozen=True)
-class PlaceWindow:
-    """The window is here: x, y, width, height in screen units; None: where it was, while it fills the screen."""
-
-    place: tuple[int, int, int, int] | None
-
-
-PreferencesAction = SetPreference | ToggleSection | PlaceWindow

@@ -7,10 +7,8 @@ from __future__ import annotations
 from imgui_bundle import icons_fontawesome_6 as icons
 from imgui_bundle import imgui
 
-from viewer.model import depth_models, viewpoint
-from viewer.model.action import do
-from viewer.model.actions import Action
-from viewer.model.commands import toggle_panel
+from viewer.model import depth_models, viewpoint, window
+from viewer.model.action import Action, do
 from viewer.model.layout import Layout
 from viewer.model.state.app_state import AppState
 from viewer.ui.overlays.prompt_rows import CARD_FLAGS
@@ -59,7 +57,7 @@ def panel_handle(state: AppState, layout: Layout) -> list[Action]:
     tooltip("Show the panel (Tab)" if state.is_panel_hidden else "Hide the panel (Tab)", layout)
     imgui.end()
     imgui.pop_style_var()
-    return [toggle_panel(state)] if pressed else []
+    return [do(window.toggle_panel)] if pressed else []
 
 
 def _chip(name: str, words: str, layout: Layout, tip: str = "", is_right: bool = False) -> bool:

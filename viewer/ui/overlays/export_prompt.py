@@ -30,8 +30,7 @@ from iibr_core.scenes.lens_limits import clamp
 from iibr_core.scenes.scene import Scene
 from iibr_core.types import InputError
 from viewer.model import messages, saving
-from viewer.model.action import ask, do
-from viewer.model.actions import Action
+from viewer.model.action import Action, ask, do
 from viewer.model.layout import Layout
 from viewer.model.saving import as_other_kind, first_kind, kinds_for, written_path
 from viewer.model.state.app_state import AppState

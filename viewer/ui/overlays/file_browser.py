@@ -11,8 +11,7 @@ from imgui_bundle import icons_fontawesome_6 as icons
 from imgui_bundle import imgui
 
 from viewer.model import messages
-from viewer.model.action import ask, do
-from viewer.model.actions import Action
+from viewer.model.action import Action, ask, do
 from viewer.model.commands import action_for_path
 from viewer.model.layout import Layout
 from viewer.model.state.app_state import AppState

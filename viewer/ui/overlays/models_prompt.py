@@ -7,8 +7,7 @@ from dataclasses import replace
 from imgui_bundle import imgui
 
 from viewer.model import depth_models, messages
-from viewer.model.action import ask, do
-from viewer.model.actions import Action
+from viewer.model.action import Action, ask, do
 from viewer.model.layout import Layout
 from viewer.model.state.app_state import AppState
 from viewer.model.state.depth_models import ModelOffer, ModelsPrompt

@@ -6,9 +6,8 @@ from __future__ import annotations
 
 from imgui_bundle import imgui
 
-from viewer.model import depth_models, messages
-from viewer.model.action import do
-from viewer.model.actions import Action, TakeSettings
+from viewer.model import depth_models, messages, opening
+from viewer.model.action import Action, do
 from viewer.model.commands import BY_NAME
 from viewer.model.depth_models import offered_model
 from viewer.model.layout import MARGIN, STRIP_GAP, Layout
@@ -86,7 +85,7 @@ def _notice(notice: Notice, state: AppState) -> list[Action]:
     imgui.align_text_to_frame_padding()
     colored(notice.text, imgui.ImVec4(*(palette.error if notice.is_error else palette.text)))
     offers: list[tuple[str, Action]] = [(name, BY_NAME[name].action(state)) for name in notice.commands]
-    offers += [("Use its settings", TakeSettings(notice.offer))] if notice.offer is not None else []
+    offers += [("Use its settings", do(opening.take_settings, notice.offer))] if notice.offer is not None else []
     offers += [(f"Close all ({others + 1})", do(messages.dismiss))] if others else []
     actions += button_rows(offers)
     imgui.end_group()

@@ -11,8 +11,7 @@ from imgui_bundle import imgui
 
 from iibr_core.runtime.time_left import about_left
 from viewer.model import depth_models, viewpoint
-from viewer.model.action import ask, do
-from viewer.model.actions import Action
+from viewer.model.action import Action, ask, do
 from viewer.model.layout import Layout
 from viewer.model.state.app_state import AppState
 from viewer.model.state.depth_models import CancelGetTask

@@ -13,8 +13,7 @@ from iibr_core.formats.images.picture_kinds import BEST_QUALITY, KINDS, PROFILES
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import SRGB
 from viewer.model import messages, saving
-from viewer.model.action import ask, do
-from viewer.model.actions import Action
+from viewer.model.action import Action, ask, do
 from viewer.model.commands import COMMANDS, Command, commands_matching, recent_commands
 from viewer.model.layout import PANEL_WIDTH, Layout
 from viewer.model.state.app_state import AppState

@@ -8,8 +8,7 @@ from typing import TypeVar
 from imgui_bundle import imgui
 
 from viewer.model import messages
-from viewer.model.action import do
-from viewer.model.actions import Action
+from viewer.model.action import Action, do
 from viewer.model.layout import Layout
 from viewer.model.state.app_state import AppState
 from viewer.model.state.prompts import Prompt

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from imgui_bundle import imgui
 
-from viewer.model.actions import Action
+from viewer.model.action import Action
 from viewer.model.commands import BY_NAME
 from viewer.model.layout import Layout
 from viewer.model.state.app_state import AppState

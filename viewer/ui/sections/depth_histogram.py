@@ -10,8 +10,7 @@ from iibr_core.depth.editing.edits import DepthEdits, Levels, invert_tone_curve,
 from iibr_core.scenes.rect import Rect
 from iibr_core.scenes.scene import Scene
 from viewer.model import depth
-from viewer.model.action import do
-from viewer.model.actions import Action
+from viewer.model.action import Action, do
 from viewer.model.colormap import map_color
 from viewer.model.layout import Layout
 from viewer.model.state.app_state import AppState

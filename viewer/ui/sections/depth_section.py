@@ -9,16 +9,14 @@ from imgui_bundle import imgui
 from iibr_core.depth.choice import DepthStart
 from iibr_core.depth.editing.edits import BRUSH_TOOLS, DEPTH_TOOLS, GAMMA_LIMITS, RADIUS_LIMITS, BrushTool, DepthEdits
 from iibr_core.scenes.scene import Scene, source_with_depth
-from viewer.model import depth, depth_models, inspection, messages, saving
-from viewer.model.action import ask, do
-from viewer.model.actions import Action, OpenPath
+from viewer.model import depth, depth_models, inspection, messages, opening, preferences, saving
+from viewer.model.action import Action, ask, do
 from viewer.model.commands import BRUSH_WORDS
 from viewer.model.layout import Layout
 from viewer.model.remedies import BETTER_DEPTH
 from viewer.model.state.app_state import AppState
 from viewer.model.state.depth import Brush
 from viewer.model.state.depth_models import DepthModels, ModelsPrompt
-from viewer.model.state.preferences import SetPreference
 from viewer.model.state.tasks import ChooseTask
 from viewer.ui.sections.depth_histogram import depth_histogram
 from viewer.ui.widgets import (
@@ -125,14 +123,16 @@ def _origin(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
     elif picked is not None:
         start, model = ways[picked]
         actions.append(
-            do(depth_models.use_model, model) if model is not None else OpenPath(source_with_depth(source, start))
+            do(depth_models.use_model, model)
+            if model is not None
+            else do(opening.open_source, source_with_depth(source, start))
         )
     return actions
 
 
 def _estimates_new(state: AppState, layout: Layout) -> list[Action]:
     estimates = checkbox("Estimate depth of new photos", state.preferences.estimates_depth, layout, ESTIMATES_TIP)
-    return [] if estimates is None else [SetPreference("estimates_depth", estimates)]
+    return [] if estimates is None else [do(preferences.estimate_depth_always, estimates)]
 
 
 def _models(models: DepthModels, chosen: str | None) -> list[str]:

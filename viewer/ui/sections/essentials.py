@@ -8,8 +8,7 @@ from iibr_core.exports.loops import LOOPS, LoopKind
 from iibr_core.scenes.lens_limits import aperture_limit
 from iibr_core.scenes.scene import Scene
 from viewer.model import lens, viewpoint
-from viewer.model.action import do
-from viewer.model.actions import Action
+from viewer.model.action import Action, do
 from viewer.model.layout import Layout
 from viewer.model.state.app_state import AppState
 from viewer.model.state.lens import PRESETS, PresetName

@@ -18,8 +18,7 @@ from iibr_core.gloss.settings import (
 )
 from iibr_core.scenes.scene import Scene
 from viewer.model import lens
-from viewer.model.action import do
-from viewer.model.actions import Action
+from viewer.model.action import Action, do
 from viewer.model.layout import Layout
 from viewer.model.state.app_state import AppState
 from viewer.model.state.lens import FIRST_GLOSS, GlossBrush

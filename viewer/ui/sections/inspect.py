@@ -5,14 +5,12 @@ from __future__ import annotations
 from imgui_bundle import imgui
 
 from iibr_core.scenes.scene import Scene
-from viewer.model import inspection
-from viewer.model.action import do
-from viewer.model.actions import Action
+from viewer.model import inspection, preferences
+from viewer.model.action import Action, do
 from viewer.model.commands import OVERLAY_WORDS
 from viewer.model.layout import Layout
 from viewer.model.state.app_state import AppState
 from viewer.model.state.inspection import COMPARISONS, OVERLAYS, Comparison, OverlayKind
-from viewer.model.state.preferences import SetPreference
 from viewer.ui.widgets import button, checkbox, choice, in_row, percent_slider
 
 EPI_TIP = (
@@ -45,7 +43,7 @@ def inspect_section(state: AppState, scene: Scene, layout: Layout) -> list[Actio
 def _units(state: AppState, layout: Layout) -> list[Action]:
     is_on = state.preferences.units == "light field"
     is_chosen = checkbox("Light-field units", is_on, layout, UNITS_TIP)
-    return [] if is_chosen is None else [SetPreference("units", "light field" if is_chosen else "photographic")]
+    return [] if is_chosen is None else [do(preferences.set_units, "light field" if is_chosen else "photographic")]
 
 
 def _toggles(state: AppState, layout: Layout) -> list[Action]:

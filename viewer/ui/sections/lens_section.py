@@ -19,8 +19,7 @@ from iibr_core.beyond.optics import (
 from iibr_core.scenes.lens_limits import BLADES_LIMITS, aperture_limit, focus_limits, focus_span
 from iibr_core.scenes.scene import Scene
 from viewer.model import lens
-from viewer.model.action import ask, do
-from viewer.model.actions import Action
+from viewer.model.action import Action, ask, do
 from viewer.model.layout import Layout
 from viewer.model.state.app_state import AppState
 from viewer.model.state.tasks import ChooseTask

@@ -11,8 +11,7 @@ from iibr_core.scenes.rect import Rect
 from iibr_core.scenes.scene import Scene
 from iibr_core.types import GridShape, ViewOffset
 from viewer.model import lens
-from viewer.model.action import do
-from viewer.model.actions import Action
+from viewer.model.action import Action, do
 from viewer.model.layout import Layout
 from viewer.model.state.app_state import AppState
 from viewer.ui.style import Palette, corners, pack_color, palette_of

@@ -1,0 +1,253 @@
+"""Verbs about opening: a source is asked for, read, shown, and its views arrive; or it fails, or is stopped.
+
+Each request has a generation. Results of an earlier generation change nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import PurePath
+
+from iibr_core.beyond.optics import Optics
+from iibr_core.scenes.lens_limits import clamp_optics, focus_limits, is_finite
+from iibr_core.scenes.scene import DepthSettings, Progress, Scene, Source
+from iibr_core.types import InputError
+from viewer.model.carried_optics import NewDepth, carry_optics, carry_to_depth, with_focus_of
+from viewer.model.history import map_optics, undoable
+from viewer.model.messages import MAX_NOTICES, notify
+from viewer.model.remedies import DEPTH_COMMANDS
+from viewer.model.state.app_state import AppState
+from viewer.model.state.depth_models import ListModelsTask
+from viewer.model.state.folder import ListFolderTask
+from viewer.model.state.history import History
+from viewer.model.state.notices import Notice
+from viewer.model.state.photo_facts import ReadFactsTask
+from viewer.model.state.saving import SavedSettings
+from viewer.model.state.viewpoint import Motion
+
+MAX_RECENT = 8
+RESTORED = "Restored as you left it. Ctrl+Z resets."
+
+
+def open_source(state: AppState, source: Source) -> AppState:
+    """Open a photo or a light field in place of the open scene, which stays until the new one is read."""
+    return replace(
+        state,
+        source=source,
+        progress=Progress(doing=f"reading {PurePath(source.path).name}"),
+        generation=state.generation + 1,
+        models=replace(state.models, asked=None, left_focus=None),
+        free_camera=None,
+        prompt=None,
+    )
+
+
+def stop(state: AppState) -> AppState:
+    """Stop the work: views made so far stay; a source that was only being read is not opened."""
+    progress, source = state.progress, state.source
+    if source is not None and (state.scene is None or state.scene.source is not source):
+        before = _leave_source(state)
+        return before if state.scene is not None else replace(before, stopped=state.generation, source=None)
+    if state.scene is not None and state.scene.is_sketch:
+        return replace(state, stopped=state.generation, progress=Progress(doing="stopped: this is a small preview"))
+    if not progress.total or progress.is_complete:
+        return state
+    doing = progress.doing or f"at {progress.done} of {progress.total} views"
+    return replace(state, stopped=state.generation, progress=Progress(doing=f"stopped {doing}"))
+
+
+def set_progress(state: AppState, generation: int, progress: Progress, view: tuple[int, int] | None = None) -> AppState:
+    """Show how far the work is. view: row and column of the view that was just made."""
+    if generation != state.generation:
+        return state
+    there = state.views_there if view is None else state.views_there | {view}
+    shown = state.progress if state.stopped == state.generation else progress
+    return replace(state, progress=shown, views_there=there)
+
+
+def report_failure(state: AppState, generation: int, message: str) -> AppState:
+    """Say why a source did not open, and return to the open scene. Steps pass such a photo by."""
+    if generation != state.generation:
+        return state
+    source, folder = state.source, state.folder
+    asks_for_model = source is not None and source.depth.asks_for_model
+    state = notify(state, Notice(message, is_error=True, commands=DEPTH_COMMANDS if asks_for_model else ()))
+    if source is not None and state.scene is None:  # one may go on to the photos beside it
+        state = state.with_task(ListFolderTask(str(PurePath(source.path).parent)))
+    elif source is not None and folder is not None and folder.is_stepped_to(source):
+        state = replace(state, folder=replace(folder, unreadable=folder.unreadable | {folder.stepped_to}))
+    return _leave_source(state)
+
+
+def show_scene(state: AppState, generation: int, scene: Scene, new_depth: NewDepth | None = None) -> AppState:
+    """Show a scene that was read and planned. new_depth: of the open photo, if it has other depth now."""
+    if generation != state.generation:
+        return state
+    old = state.scene
+    is_same = old is not None and old.source is scene.source  # the same file, opened again, is new
+    if old is not None and is_same and scene.plan is None:
+        scene = _with_steady_focus(state, old, scene)
+
+    def carried(optics: Optics) -> Optics:
+        if new_depth is None or old is None:
+            return carry_optics(optics, old, scene)
+        return carry_to_depth(optics, old, scene, new_depth, state.focused_at)
+
+    shown = replace(
+        state,
+        scene=scene,
+        progress=_first_progress(state, scene),
+        views_there=frozenset({scene.grid.centre}),
+        shown_generation=state.generation,
+        optics=carried(state.optics),
+        history=map_optics(state.history, carried),
+        chosen_focus=_carried_focus(state, carried),
+        inspection=replace(state.inspection, probe=None),
+    )
+    if old is None or not is_same:
+        return _begin_scene(shown, old, scene)
+    shown = shown if new_depth is None else _with_left_focus(shown)
+    return _add_notices(shown, scene) if old.is_sketch and not scene.is_sketch else shown
+
+
+@undoable
+def take_settings(state: AppState, settings: SavedSettings) -> AppState:
+    """Take over the optics that a picture was saved with, made to fit the open scene."""
+    return _with_settings(state, settings)
+
+
+@undoable
+def restore_session(state: AppState, settings: SavedSettings) -> AppState:
+    """Restore what the open photo was left with: the lens, the depth edits, and the depth strength."""
+    scene, restored = state.scene, _with_settings(state, settings)
+    if scene is None or restored is state:
+        return state
+    has_aperture = settings.optics.aperture_diameter > 0
+    restored = replace(restored, chosen_focus=restored.optics.focus_disparity, has_chosen_aperture=has_aperture)
+    if settings.has_model_depth and scene.is_guessed:  # the focus belongs to another depth than this
+        models = replace(state.models, left_focus=settings.optics_at(scene.width))
+        optics = with_focus_of(restored.optics, Optics())
+        restored = replace(restored, optics=optics, chosen_focus=None, models=models)
+    if scene.plan is None:
+        return restored
+    depth = DepthSettings(settings.source.depth.refine, settings.depth_edits)
+    if (depth, settings.depth_strength) != (state.depth, state.depth_strength):
+        restored = replace(restored, depth=depth, depth_strength=settings.depth_strength)
+        restored = replace(restored, generation=state.generation + 1)
+    return notify(restored, Notice(RESTORED))
+
+
+def with_recent(recent: tuple[str, ...], path: str) -> tuple[str, ...]:
+    """Return the recent paths with this one first."""
+    return (path, *(other for other in recent if other != path))[:MAX_RECENT]
+
+
+def _begin_scene(state: AppState, old: Scene | None, scene: Scene) -> AppState:
+    """Return the state of a scene that was not open before; nothing of the last one is kept."""
+    recent, folder = state.recent, str(PurePath(scene.source.path).parent)
+    if old is not None and state.folder is not None and state.folder.is_stepped_to(scene.source):
+        recent = tuple(path for path in recent if path != old.source.path)  # a walk through a folder leaves one path
+    state = replace(
+        state,
+        notices=tuple(notice for notice in state.notices if notice.stays),
+        history=History(),
+        inspection=state.inspection.for_next_scene,
+        motion=Motion(speed=state.motion.speed),
+        recent=with_recent(recent, scene.source.path),
+        folder=state.folder if state.folder is not None and state.folder.path == folder else None,
+        depth=DepthSettings(scene.source.depth.refine),
+        stroke=None,
+        brush=replace(state.brush, sample=None),
+        tilt_handles=None,
+        hover=None,
+        zoom=None,
+        chosen_focus=None,
+        has_chosen_aperture=False,
+        focused_at=None,
+    )
+    state = _add_notices(state, scene)
+    if scene.plan is None:
+        return state
+    return replace(
+        state, tasks=(*state.tasks, ListFolderTask(folder), ReadFactsTask(scene.source.path), ListModelsTask())
+    )
+
+
+def _add_notices(state: AppState, scene: Scene) -> AppState:
+    notices = (*state.notices, *_problems(scene), *_offers(scene))
+    return replace(state, notices=notices[-MAX_NOTICES:])
+
+
+def _leave_source(state: AppState) -> AppState:
+    """Return the state without the source that was asked for; the views of the open scene are made again."""
+    state = replace(state, progress=Progress())
+    if state.scene is None or state.scene.source is state.source:
+        return state
+    return replace(state, source=state.scene.source, generation=state.generation + 1)
+
+
+def _with_settings(state: AppState, settings: SavedSettings) -> AppState:
+    if state.scene is None or not is_finite(settings.optics):
+        return state
+    optics = clamp_optics(settings.optics_at(state.scene.width), state.scene)
+    notices = tuple(notice for notice in state.notices if notice.offer != settings)
+    return replace(state, optics=optics, notices=notices, motion=Motion(speed=state.motion.speed))
+
+
+def _carried_focus(state: AppState, carried: Callable[[Optics], Optics]) -> float | None:
+    """Return the chosen focus in the disparity of the new scene."""
+    if state.chosen_focus is None:
+        return None
+    return carried(replace(state.optics, focus_disparity=state.chosen_focus, focus_tilt=(0.0, 0.0))).focus_disparity
+
+
+def _with_steady_focus(state: AppState, old: Scene, scene: Scene) -> Scene:
+    """Return a light field of which more is known now, with a focus control that does not move by itself.
+
+    The limits stay where they hold the disparity that was found; they always hold the focus that the user chose.
+    """
+    (low, high), (low_limit, high_limit) = scene.disparity_range_px, focus_limits(old)
+    if old.has_view_disparity and low_limit <= low <= high <= high_limit:
+        return replace(scene, disparity_range_px=old.disparity_range_px)
+    if state.chosen_focus is None:
+        return scene
+    focus = state.optics.focus_disparity
+    return replace(scene, disparity_range_px=(min(low, focus), max(high, focus)))
+
+
+def _with_left_focus(state: AppState) -> AppState:
+    """Return the state with the focus that the photo was left with, unless the user chose another meanwhile."""
+    left = state.models.left_focus
+    if left is None or state.chosen_focus is not None or state.scene is None:
+        return state
+    optics = clamp_optics(with_focus_of(state.optics, left), state.scene)
+    models = replace(state.models, left_focus=None)
+    return replace(state, optics=optics, chosen_focus=optics.focus_disparity, models=models)
+
+
+def _first_progress(state: AppState, scene: Scene) -> Progress:
+    """Return what is shown until the worker reports: a light field is shown several times and keeps its progress."""
+    if scene.plan is None and state.progress.share > 0 and not state.progress.is_complete:
+        return state.progress
+    return Progress(doing=f"reading {scene.name}" if scene.is_sketch else "making views")
+
+
+def _problems(scene: Scene) -> tuple[Notice, ...]:
+    """Return a notice for each source of depth that failed, with buttons that give better depth if it is poor."""
+    is_poor = scene.depth_origin is not None and scene.depth_origin.is_poor
+    return tuple(Notice(problem, commands=DEPTH_COMMANDS if is_poor else ()) for problem in scene.problems)
+
+
+def _offers(scene: Scene) -> tuple[Notice, ...]:
+    """Return the offer to take over the settings of a picture that this program saved."""
+    if not scene.settings:
+        return ()
+    from viewer.model.saved_settings import left_out_note, settings_from_text
+
+    try:
+        settings = settings_from_text(scene.settings, scene.name)
+    except InputError as error:
+        return (Notice(str(error), is_error=True),)
+    words = f"This picture was saved by iibr, with its settings. {left_out_note(settings)}"
+    return (Notice(words.strip(), offer=settings),)

@@ -1,1 +1,0 @@
-"""What each action does to the state: pure functions."""

@@ -1,0 +1,28 @@
+"""Verbs about the window: full screen, the panel, and the report of the last drawing."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from viewer.model.state.app_state import AppState, DrawReport
+
+
+def set_fullscreen(state: AppState, is_fullscreen: bool) -> AppState:
+    """Fill the screen with the window, or stop that."""
+    return replace(state, is_fullscreen=is_fullscreen)
+
+
+def toggle_panel(state: AppState) -> AppState:
+    """Show or hide the panel; a choice that agrees with the window's width is forgotten."""
+    hides = not state.is_panel_hidden
+    return replace(state, hides_panel=None if hides == state.is_narrow else hides)
+
+
+def set_narrow(state: AppState, is_narrow: bool) -> AppState:
+    """Note whether the window is too narrow for a panel beside the picture."""
+    return replace(state, is_narrow=is_narrow)
+
+
+def set_report(state: AppState, report: DrawReport | None) -> AppState:
+    """Note how the last picture was drawn."""
+    return replace(state, report=report)
