@@ -62,12 +62,6 @@ def write_map(path: Path) -> None:
     Image.fromarray(np.tile(np.arange(0, 256, 8, dtype=np.uint8), (24, 1))).save(path)
 
 
-def touch(*paths: Path) -> None:
-    for path in paths:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.touch()
-
-
 def export(archive: Path, settings: BatchSettings = DEPTH, force: bool = False) -> BatchCount:
     out = archive.with_name("out")
     check_batch_folder(out, [archive], force)
@@ -111,18 +105,17 @@ def test_every_photo_of_a_mixed_folder_is_exported_and_no_map(archive: Path, tmp
 
 def test_names_of_outputs_repeat_subfolders_and_differ(tmp_path: Path) -> None:
     one, two = tmp_path / "one", tmp_path / "two"
-    touch(*(one / name for name in ("a.jpg", "A.heic", "c.png", "c.png.png", "d.x.png", ".hidden.png", ".h/x.png")))
-    touch(two / "sub" / "a.png")
+    write_photos(one, "a.jpg", "A.tif", "c.png", "c.png.png", "d.x.png", ".hidden.png", ".h/x.png")
+    write_photos(two, "sub/a.png")
     (two / "round").symlink_to(two)
     names = [name for _, name in photos_in([one, two])]
-    assert {"one/A.heic", "one/a.jpg", "one/d.x", "two/sub/a"} < set(names)
+    assert {"one/A.tif", "one/a.jpg", "one/d.x", "two/sub/a"} < set(names)
     assert len({name.casefold() for name in names}) == len(names) == 6
     assert [name for _, name in photos_in([two])] == ["sub/a"]
-    touch(tmp_path / "other" / "one" / "a.png")
-    with pytest.raises(InputError, match="one: two folders"):
-        photos_in([one, tmp_path / "other" / "one"])
-    with pytest.raises(InputError, match="missing: no such folder"):
-        photos_in([tmp_path / "missing"])
+    for folders, message in (([one, tmp_path / "other" / "one"], "one: two folders"), ([tmp_path / "gone"], "no such")):
+        folders[-1].mkdir(parents=True) if len(folders) > 1 else None
+        with pytest.raises(InputError, match=message):
+            photos_in(folders)
 
 
 def test_an_unexpected_error_fails_its_photo_and_leaves_a_traceback(
@@ -157,7 +150,8 @@ def test_photos_are_not_overwritten_through_links(archive: Path, tmp_path: Path,
 
 
 def test_outputs_go_into_an_empty_folder_or_one_of_a_batch_unless_forced(archive: Path, tmp_path: Path) -> None:
-    touch(tmp_path / "out" / "mine.txt")
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "mine.txt").touch()
     with pytest.raises(InputError, match="already exists"):
         export(archive)
     with pytest.raises(InputError, match="is read"):

@@ -58,7 +58,7 @@ class Handler(BaseHTTPRequestHandler):
 def bridge(monkeypatch: pytest.MonkeyPatch) -> Iterator[FakeBridge]:
     monkeypatch.setenv("http_proxy", "http://localhost:1")  # must not be used for this machine
     with FakeBridge() as server:
-        thread = threading.Thread(target=server.serve_forever)
+        thread = threading.Thread(target=server.serve_forever, args=(0.02,))
         thread.start()
         monkeypatch.setattr(quilt, "ADDRESS", f"localhost:{server.server_port}")
         yield server
@@ -73,11 +73,8 @@ def test_a_quilt_is_shown(
     options = ExportOptions(show=True)
     assert write_export(EXPORTS["quilt"], Path("a_qs8x6a1.5.png"), source, options) == "It is shown on the display."
     (out,) = tmp_path.glob("a_qs8x6a*.png")
-    assert [endpoint for endpoint, _ in bridge.requests] == [
-        "enter_orchestration",
-        "available_output_devices",
-        *SHOWING,
-    ]
+    asked = [endpoint for endpoint, _ in bridge.requests]
+    assert asked == ["enter_orchestration", "available_output_devices", *SHOWING]
     assert all(body["orchestration"] == TOKEN for _, body in bridge.requests[1:])
     entry = dict(bridge.requests)["insert_playlist_entry"]
     assert entry["uri"] == str(out), "an absolute path: Bridge has another working folder"
@@ -85,32 +82,22 @@ def test_a_quilt_is_shown(
     assert dict(bridge.requests)["play_playlist"]["head_index"] == -1
 
 
-@pytest.mark.parametrize(
-    ("trouble", "message"),
-    [
-        ("nothing", "Looking Glass Bridge does not answer"),
-        ("no display", "sees no display"),
-        ("old", "enter_orchestration .no answer"),
-        ("failing", "play_playlist .Failure"),
-    ],
-)
+TROUBLE = {
+    "nothing": ({"server_port": 1}, "Looking Glass Bridge does not answer"),
+    "no display": ({"displays": [MONITOR]}, "sees no display"),
+    "old": ({"raw": {"enter_orchestration": b""}}, "enter_orchestration .no answer"),
+    "failing": ({"failing": {"play_playlist"}}, "play_playlist .Failure"),
+}
+
+
+@pytest.mark.parametrize("trouble", TROUBLE)
 def test_failures_are_one_line(
-    bridge: FakeBridge,
-    source: ExportSource,
-    tmp_path: Path,
-    trouble: str,
-    message: str,
-    monkeypatch: pytest.MonkeyPatch,
+    bridge: FakeBridge, source: ExportSource, tmp_path: Path, trouble: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    match trouble:
-        case "nothing":
-            monkeypatch.setattr(quilt, "ADDRESS", "localhost:1")
-        case "no display":
-            bridge.displays = [MONITOR]
-        case "old":
-            bridge.raw = {"enter_orchestration": b""}
-        case "failing":
-            bridge.failing = {"play_playlist"}
+    changes, message = TROUBLE[trouble]
+    for name, value in changes.items():
+        setattr(bridge, name, value)
+    monkeypatch.setattr(quilt, "ADDRESS", f"localhost:{bridge.server_port}")
     with pytest.raises(InputError, match=message) as error:
         exported(source, "quilt", tmp_path / "a.png", show=True)
     assert "\n" not in str(error.value)
