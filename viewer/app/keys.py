@@ -52,6 +52,8 @@ def _escape_actions(state: AppState) -> list[Action]:
         return [do(lens.take_gloss_brush, replace(state.gloss_brush, is_on=False))]
     if state.shows_before:
         return [do(lens.show_before, False)]
+    if state.tilt_handles is not None:
+        return [do(lens.show_tilt_handles, False)]
     if state.brush.is_on:
         return [do(depth.set_brush, replace(state.brush, is_on=False))]
     if state.inspection.comparison is not None:

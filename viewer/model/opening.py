@@ -157,6 +157,7 @@ def _begin_scene(state: AppState, old: Scene | None, scene: Scene) -> AppState:
         recent=with_recent(recent, scene.source.path),
         folder=state.folder if state.folder is not None and state.folder.path == folder else None,
         depth=DepthSettings(scene.source.depth.refine),
+        depth_strength=1.0 if old is not None else state.depth_strength,
         stroke=None,
         brush=replace(state.brush, sample=None),
         tilt_handles=None,

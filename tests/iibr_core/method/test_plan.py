@@ -1,7 +1,5 @@
 """Which views a scene needs, and why."""
 
-from dataclasses import replace
-
 import pytest
 
 from iibr_core.method import memory
@@ -12,13 +10,11 @@ from tests.iibr_core.scenes import disparity_of, square_before_wall
 
 
 @pytest.mark.parametrize("scale", [1e-3, 1.0, 1e3])
-@pytest.mark.parametrize("trust", [0.5, 1.0])
-def test_parallax_is_a_share_of_the_width_whatever_the_units_and_less_of_a_guess(scale, trust):
+def test_parallax_is_a_share_of_the_width_whatever_the_units(scale):
     photo, disparity = square_before_wall(60, 500)
-    given = replace(disparity_of(disparity.values * scale), viewing_share=trust)
-    plan = plan_for_viewing(photo, given)
+    plan = plan_for_viewing(photo, disparity_of(disparity.values * scale))
     low, high = plan.disparity_range_px
-    assert (high - low) * (plan.grid.columns - 1) == pytest.approx(trust * TOTAL_PARALLAX * 500, rel=1e-3)
+    assert (high - low) * (plan.grid.columns - 1) == pytest.approx(TOTAL_PARALLAX * 500, rel=1e-3)
     assert plan.has_disocclusion
 
 
