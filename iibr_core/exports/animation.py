@@ -3,8 +3,6 @@
 Every path is closed: the last frame leads to the first.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """The scene in three dimensions: the surfaces of the photo, and the inpainted surfaces behind them."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

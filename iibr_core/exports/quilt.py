@@ -3,8 +3,6 @@
 Bridge runs beside the display and takes JSON by HTTP (endpoints and bodies as in its client bridge.js).
 """
 
-from __future__ import annotations
-
 import json
 from http.client import HTTPException
 from pathlib import Path

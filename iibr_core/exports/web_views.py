@@ -4,8 +4,6 @@ Views differ little, so all lie in one moving picture (AVIF), one frame a view f
 of single files or less. Disparity is stored the same way, in 8 bits.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace

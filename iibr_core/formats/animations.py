@@ -1,7 +1,5 @@
 """Moving pictures: MP4 and WebM by PyAV, GIF and WebP by Pillow. They repeat for ever where the player can do so."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from fractions import Fraction
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Write PLY files: points with colours, and Gaussian splats as 3DGS stores them (Kerbl et al. 2023)."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any

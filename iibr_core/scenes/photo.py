@@ -2,8 +2,6 @@
 its plan, and its views.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Collection, Generator
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """AVIF photos, which OpenImageIO's wheel does not read: Pillow decodes them."""
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Iterator
 from contextlib import contextmanager

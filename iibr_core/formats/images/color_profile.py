@@ -4,8 +4,6 @@ Photos have profiles of one kind: a curve for each of red, green and blue, then 
 are computed here with all the bits of the photo, whose primaries stay. The numbers are those of ITU-T H.273.
 """
 
-from __future__ import annotations
-
 import re
 import struct
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """Decodes picture files of every kind. Headers are checked before memory is spent; a file is read whole, or refused."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager

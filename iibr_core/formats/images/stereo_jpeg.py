@@ -5,8 +5,6 @@ inverse depth, and JSON that describes them. Leia publishes readers, not a descr
 to 5.3. The last bytes of the file hold the size of the region. All numbers are big-endian.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass

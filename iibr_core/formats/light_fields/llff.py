@@ -1,7 +1,5 @@
 """NeRF's LLFF scenes: poses_bounds.npy beside a folder of photos, taken by hand near a plane, facing forward."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

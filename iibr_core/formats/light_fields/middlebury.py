@@ -4,8 +4,6 @@ view0..view6) with ground truth for two of them.
 Pictures are rectified and evenly spaced, from left to right; one view step is the distance of neighbours.
 """
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

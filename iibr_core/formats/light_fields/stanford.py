@@ -4,8 +4,6 @@ Positions count: X grows to the right and Y downwards. Rows and columns are coun
 from scene to scene. Cameras stand slightly off the grid; one view step is the mean spacing of columns.
 """
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Arrays of numbers in NPY files and NPZ archives. NPY files are mapped: a cut one is refused before memory is used."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 
