@@ -21,10 +21,8 @@ from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import ImageSize, InputError
 
 ADDRESS = "localhost:33334"
-TIMEOUT_S = 10.0
-MAX_ANSWER_BYTES = 1 << 20
-PLAYLIST = "iibr"
-FIRST_DISPLAY = -1
+TIMEOUT_S, MAX_ANSWER_BYTES = 10.0, 1 << 20
+PLAYLIST, FIRST_DISPLAY = "iibr", -1
 FAILURES = ("Failure", "UnknownOrchestration")
 MONITOR = "thirdparty"
 """Hardware version of screens that are no Looking Glass."""
