@@ -34,8 +34,7 @@ from viewer.model.state.inspection import COMPARISONS, OVERLAYS, Comparison, Ove
 from viewer.model.state.lens import PRESETS
 from viewer.model.state.preferences import SECTIONS
 from viewer.model.state.prompts import ChoiceOf, PalettePrompt
-from viewer.model.state.saving import CopyTask, PasteTask
-from viewer.model.state.tasks import ChooseTask, ReadMaskTask
+from viewer.model.state.tasks import ChooseTask, CopyTask, PasteTask, ReadMaskTask
 from viewer.model.state.viewpoint import Zoom
 
 FONT_STEP = 1.1
@@ -158,6 +157,7 @@ COMMANDS: tuple[Command, ...] = (
     Command("Photos by name", _always(do(folder.set_order, "name"))),
     Command("Photos by time", _always(do(folder.set_order, "time"))),
     Command("Share or export…", _always(do(saving.ask_to_export)), (Chord("e", ctrl=True),)),
+    Command("Exports…", _always(do(messages.show_prompt, "exports"))),
     Command("Undo", _always(do(history.undo)), (Chord("z", ctrl=True),), repeats=True),
     Command(
         "Redo", _always(do(history.redo)), (Chord("z", ctrl=True, shift=True), Chord("y", ctrl=True)), repeats=True

@@ -150,7 +150,7 @@ def _begin_scene(state: AppState, old: Scene | None, scene: Scene) -> AppState:
         recent = tuple(path for path in recent if path != old.source.path)  # a walk through a folder leaves one path
     state = replace(
         state,
-        notices=tuple(notice for notice in state.notices if notice.stays),
+        notices=tuple(notice for notice in state.notices if notice.is_result),
         history=History(),
         inspection=state.inspection.for_next_scene,
         motion=Motion(speed=state.motion.speed),

@@ -28,7 +28,6 @@ from tests.viewer.conftest import FAR, HEIGHT, NEAR, WIDTH, reduce, write_scene
 from tests.viewer.model.test_history import after
 from tests.viewer.model.test_reducers import plan_of, scene_of, state_with
 from viewer.app.dropped_files import actions_from_drop
-from viewer.app.image_export import settings_of
 from viewer.app.pointer import Pointer, actions_from_pointer
 from viewer.model import depth, gesture, history, lens, opening, saving
 from viewer.model.action import do
@@ -39,6 +38,7 @@ from viewer.model.depth import (
 )
 from viewer.model.layout import layout_of
 from viewer.model.saved_settings import settings_from_text, settings_text
+from viewer.model.saving import settings_of
 from viewer.model.state.app_state import AppState
 from viewer.model.state.depth import Brush, DepthSample
 from viewer.model.state.prompts import SavePrompt

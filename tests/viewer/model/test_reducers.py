@@ -62,7 +62,7 @@ def test_quitting_asks_while_jobs_are_under_way_and_can_wait_for_them() -> None:
 
 
 def test_what_became_of_a_job_is_still_told_when_another_photo_opens() -> None:
-    stays, goes = Notice("Exported a.gif", stays=True), Notice("This photo has no depth.")
+    stays, goes = Notice("Exported a.gif", is_result=True), Notice("This photo has no depth.")
     told = reduce(reduce(state_with(scene_of()), do(messages.notify, goes)), do(messages.notify, stays))
     asked = reduce(told, do(opening.open_source, Source("other.png")))
     opened = reduce(asked, do(opening.show_scene, asked.generation, scene_of(source=asked.source)))
