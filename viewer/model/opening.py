@@ -160,6 +160,7 @@ def _begin_scene(state: AppState, old: Scene | None, scene: Scene) -> AppState:
         depth_strength=1.0 if old is not None else state.depth_strength,
         stroke=None,
         brush=replace(state.brush, sample=None),
+        selection=None,
         tilt_handles=None,
         hover=None,
         zoom=None,

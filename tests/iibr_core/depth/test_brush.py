@@ -132,3 +132,16 @@ def test_tiny_photos_and_wild_values_stay_finite(shape: tuple[int, int], tool: B
     result = apply_edits(photo, disparity, DepthEdits(strokes=(stroke, stroke)))
     assert np.isfinite(result).all()
     assert wild or tool in ("smooth", *DEPTH_TOOLS) or result.any()
+
+
+@pytest.mark.parametrize(("tool", "change"), [("forward", 0.3), ("back", -0.3)])
+def test_a_surface_moves_as_a_whole_by_a_share_of_the_range(tool: BrushTool, change: float) -> None:
+    photo, disparity = np.full((40, 60, 3), 0.3, np.float32), np.zeros((40, 60), np.float32)
+    photo[10:30, 20:40] = 0.8
+    disparity[10:30, 20:40] = np.linspace(4.0, 5.0, 20)
+    disparity[:, 50:] = 10.0
+    moved = apply_edits(photo, disparity, DepthEdits(strokes=(Stroke(tool, ((0.5, 0.5),), 0.02, 0.3),)))
+    expected = disparity.copy()
+    expected[10:30, 20:40] += 10 * change
+    differs = np.abs(moved - expected) > 1e-5
+    assert differs.sum() <= 4, "only its corners may belong to either side"

@@ -79,3 +79,14 @@ def test_thin_surfaces_and_clicks_on_edges_give_something(place: tuple[float, fl
 @pytest.mark.parametrize("place", [(-0.1, 0.5), (0.5, 1.0), (1e30, 0.5)])
 def test_outside_the_photo_there_is_none(place: tuple[float, float]) -> None:
     assert not filled(photo_of(), x=place[0], y=place[1]).any()
+
+
+@pytest.mark.parametrize(("tolerance", "columns"), [(0.25, 20), (1.0, 50), (4.0, 80)])
+def test_tolerance_is_the_contrast_that_ends_the_surface(tolerance: float, columns: int) -> None:
+    photo = photo_of()
+    photo[:, 20:] += 0.06
+    photo[:, 50:] += 0.2
+    stroke = Stroke("fill", ((0.1, 0.5),), 0.02, 1.0, tolerance=tolerance)
+    mask = surface_at(photo, np.zeros((HEIGHT, WIDTH), np.float32), stroke, 0, (0.0, 1.0))
+    assert mask[:, : columns - 2].all()
+    assert not mask[:, columns + 2 :].any()

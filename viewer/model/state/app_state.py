@@ -12,7 +12,7 @@ from iibr_core.depth.editing.edits import Stroke
 from iibr_core.scenes.rect import WHOLE, Rect
 from iibr_core.scenes.scene import AS_FOUND, DepthSettings, Progress, Scene, Source
 from iibr_core.scenes.screen_size import ScreenSize
-from viewer.model.state.depth import Brush
+from viewer.model.state.depth import Brush, Selection
 from viewer.model.state.depth_models import DepthModels
 from viewer.model.state.folder import PhotoFolder
 from viewer.model.state.history import History
@@ -90,6 +90,7 @@ class AppState:
     free_progress: float | None = None
     depth: DepthSettings = AS_FOUND
     brush: Brush = field(default_factory=Brush)
+    selection: Selection | None = None
     stroke: Stroke | None = None
     gloss_brush: GlossBrush = field(default_factory=GlossBrush)
     jobs: tuple[JobProgress, ...] = ()
