@@ -1,5 +1,7 @@
 """Loops of the viewpoint through the grid."""
 
+from __future__ import annotations
+
 import math
 from typing import Literal
 

@@ -1,5 +1,7 @@
 """Photos of a folder, and whether a folder holds photos rather than a light field."""
 
+from __future__ import annotations
+
 import os
 import re
 from collections.abc import Container, Iterable

@@ -1,5 +1,7 @@
 """The settings of a finished picture."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 
 from iibr_core.beyond.optics import Optics

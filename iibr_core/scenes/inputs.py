@@ -1,5 +1,7 @@
 """Files and folders that opening a scene reads."""
 
+from __future__ import annotations
+
 import os
 from pathlib import Path
 

@@ -23,10 +23,8 @@ from viewer.gpu.refocus.picture_lens import lens_of
 from viewer.gpu.refocus.view_sampling import Samples, answered_samples, blended_samples, pinhole_sources
 
 WEB = resource_folder("web")
-SCRIPTS = sorted(WEB.glob("*.js"))
 GRID = GridShape(5, 7)
 PRESENT = np.ones(GRID, bool)
-MOST_LINES, MOST_WIDTH = 400, 120
 DESKTOP_FIELD = {
     "grid": GRID,
     "width": 96,
@@ -87,14 +85,6 @@ def found_weights(samples: list[dict[str, Any]]) -> dict[tuple[float, ...], floa
 def wanted_weights(samples: Samples, grid: GridShape, step: int = 1) -> dict[tuple[float, ...], float]:
     """Return the same for those of the desktop. step: from one view of the grid to the next, view steps."""
     return weights_of(step * samples.cameras, step * (samples.views - np.array(grid.centre)), samples.weights)
-
-
-@pytest.mark.parametrize("path", SCRIPTS, ids=lambda path: path.name)
-def test_a_script_is_short_and_sound(path) -> None:
-    lines = path.read_text("utf-8").splitlines()
-    assert len(lines) <= MOST_LINES
-    assert max(map(len, lines)) <= MOST_WIDTH
-    subprocess.run(["node", "--check", str(path)], check=True)
 
 
 def test_the_pages_script_is_one_module_that_ends_no_element(tmp_path) -> None:

@@ -79,9 +79,7 @@ class LightFieldTexture:
         """Store the view at index (row, column).
 
         colors: (H, W, 3), see StoredColors. disparity: (H, W) px per view step; ignored in a field opened without.
-        Raises ValueError for an index or a shape that does not belong to this field.
         """
-        self._check(row, column, colors, disparity)
         keeps_disparity = disparity is not None and self.disparities.size == self.colors.size
         if disparity is not None and keeps_disparity:
             if not self.has_disparity.any():
@@ -145,14 +143,6 @@ class LightFieldTexture:
         rows, columns = box
         size = columns.stop - columns.start, rows.stop - rows.start
         return columns.start, rows.start, int(self.layers[row, column]), *size, 1
-
-    def _check(self, row: int, column: int, colors: StoredColors, disparity: FloatImage | None) -> None:
-        if not (0 <= row < self.grid.rows and 0 <= column < self.grid.columns):
-            raise ValueError(f"view ({row}, {column}) is outside the grid of {self.grid.rows}x{self.grid.columns}")
-        size = (self.height, self.width)
-        if colors.shape != (*size, 3) or (disparity is not None and disparity.shape != size):
-            shapes = colors.shape, None if disparity is None else disparity.shape
-            raise ValueError(f"view ({row}, {column}): colours and disparity are {shapes}, the field's size is {size}")
 
 
 def check_fits(ctx: moderngl.Context, grid: GridShape, width: int, height: int) -> None:

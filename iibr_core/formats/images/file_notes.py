@@ -1,5 +1,7 @@
 """Notes for people about stereo pairs, panoramas and animations, of which one flat picture is shown."""
 
+from __future__ import annotations
+
 from contextlib import suppress
 from pathlib import Path
 

@@ -1,5 +1,7 @@
 """HEIC photos (HEIF with HEVC), which OpenImageIO's wheel does not read."""
 
+from __future__ import annotations
+
 from pathlib import Path
 from typing import Any
 

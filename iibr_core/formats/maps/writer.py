@@ -3,6 +3,8 @@
 Reading gives back the map as it was written.
 """
 
+from __future__ import annotations
+
 from pathlib import Path
 from typing import Literal
 

@@ -14,7 +14,7 @@ from iibr_core.formats.images.picture_kinds import PictureFormat
 from iibr_core.scenes.scene import Source
 from iibr_core.types import DISPLAY_P3, SRGB, ViewOffset
 from tests.iibr_core.formats.test_color_profile import converted, profile_bytes
-from viewer.app.picture_files import export_picture, shot_of
+from viewer.app.image_export import export_picture, shot_of
 from viewer.display.offscreen import OffscreenScene
 from viewer.model import lens
 from viewer.model.action import do
@@ -64,15 +64,7 @@ def test_wide_colours_keep_their_numbers_at_the_photos_own_size(tmp_path):
         assert np.abs(middles(viewer.picture(viewer.scene.own_size, color_space=DISPLAY_P3)) - PATCHES).max() <= 1
 
 
-def test_srgb_photos_are_not_touched(tmp_path):
-    with OffscreenScene() as viewer:
-        viewer.open(photo_of_patches(tmp_path / "plain.png"))
-        assert viewer.state.scene.color_space == SRGB
-        assert np.array_equal(middles(viewer.picture()), PATCHES)
-
-
-@pytest.mark.parametrize("name", ["out.png", "out.jpg", "out.tif"])
-@pytest.mark.parametrize("is_wide", [True, False], ids=["P3", "sRGB"])
+@pytest.mark.parametrize(("name", "is_wide"), [("out.png", True), ("out.jpg", False), ("out.tif", True)])
 def test_saved_colours_are_those_of_the_photo(tmp_path, name, is_wide):
     """Seen by a reader that supports profiles, within 1 of 255."""
     options = {"icc_profile": profile_bytes()} if is_wide else {}

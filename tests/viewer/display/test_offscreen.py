@@ -39,14 +39,6 @@ def test_the_centre_view_is_the_photo(viewer: OffscreenScene, photo_path: Path) 
     assert np.abs(picture / 255 - read_photo(photo_path).pixels).max() < 2.5 / 255
 
 
-def test_progress_counts_every_view(viewer: OffscreenScene) -> None:
-    seen = []
-    assert viewer.state.source is not None
-    with watched(lambda done, total, doing: seen.append((done, total)) if doing == MAKING else None):
-        viewer.open(viewer.state.source)
-    assert seen == [(done, 9) for done in range(1, 10)]
-
-
 def test_pictures_are_letterboxed_and_upright(viewer: OffscreenScene) -> None:
     plain, wide = viewer.picture((WIDTH, HEIGHT)), viewer.picture((WIDTH + 40, HEIGHT))
     np.testing.assert_array_equal(wide[:, 20:-20], plain)
@@ -68,14 +60,6 @@ def test_panels_stand_beside_the_same_picture(viewer: OffscreenScene) -> None:
     assert panel.std() > 10, "text and sliders"
     assert (panel[0, -1] == panel[-1, -1]).all()
     np.testing.assert_array_equal(viewer.screen(size), screen)
-
-
-def test_reset_gives_the_first_picture_back(viewer: OffscreenScene) -> None:
-    before = viewer.picture()
-    viewer.do(do(lens.move_eye, ViewOffset(1, 1)))
-    assert np.abs(viewer.picture().astype(int) - before).max() > 8
-    viewer.do(do(lens.reset))
-    np.testing.assert_array_equal(viewer.picture(), before)
 
 
 @pytest.mark.parametrize("pixels", [np.zeros((1, 1, 3)), np.full((7, 1, 3), 128), np.full((1, 5, 3), 255)])
@@ -108,10 +92,8 @@ def test_light_fields_of_other_layouts_open(tmp_path: Path, viewer: OffscreenSce
     ("actions", "views", "off"),
     [
         ((), 0, 0),
-        ((do(lens.move_eye, ViewOffset(0, 1)),), 1, 2),
         ((do(lens.move_eye, ViewOffset(-1.5, 0.5)),), 4, 2),
         ((do(lens.move_eye, ViewOffset(1, 1)), do(lens.set_aperture, 1.5)), 24, 0),
-        ((do(lens.set_aperture, 2.5),), 20, 1),
         ((do(lens.set_aperture, 2.5), do(lens.set_focus_range, 0.2)), 20, 1),
         ((do(lens.set_dolly, 0.3),), 24, 0),
     ],

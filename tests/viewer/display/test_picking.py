@@ -67,10 +67,6 @@ def test_the_map_nearest_to_the_eye_is_asked() -> None:
     assert pick_disparity(maps, ViewOffset(0, 2.1), 2, 2) == 0.25
 
 
-def test_nothing_to_pick_from() -> None:
-    assert pick_disparity({}, CENTRE, 0, 0) is None
-
-
 @pytest.mark.parametrize(("x", "y"), [(-50, -50), (1e6, 3), (2, 2)])
 def test_an_outlier_and_a_pointer_outside_give_a_value_of_the_map(x: float, y: float) -> None:
     disparity = np.zeros((5, 5), np.float32)

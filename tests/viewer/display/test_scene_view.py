@@ -60,21 +60,6 @@ def test_a_view_that_comes_costs_no_frame_all_passes(opened: OffscreenScene) -> 
     assert view.renderer.is_converged
 
 
-def test_views_that_come_meanwhile_do_not_put_off_what_is_shown(opened: OffscreenScene) -> None:
-    view = opened.view
-    before, samples_in_all = view.renderer.read_image(), view.renderer.samples
-    for _ in range(2 * samples_in_all):
-        a_view_comes(view)
-        view.renderer._refining_s = 1.0
-        view.draw(opened.state, SIZE)
-    assert not np.array_equal(view.renderer.read_image(), before)
-    while not view.shows_all_views():
-        view.draw(opened.state, SIZE)
-    view.renderer.refine()
-    shown = view.renderer.read_image().astype(int)
-    assert np.abs(shown - view.renderer.converged_picture(RenderSettings(opened.state.optics, SIZE))).max() <= 1
-
-
 @pytest.mark.parametrize(
     ("edits", "draws"),
     [((), False), ((do(lens.move_eye, ViewOffset(-0.5, 0.0)),), True), ((do(lens.set_aperture, 3.0),), True)],
@@ -120,17 +105,6 @@ def test_a_view_stands_in_before_the_second_view_of_the_scene_has_come(opened: O
     view.upload_all()
     view.converge(opened.state, SIZE)
     assert view.renderer.read_image().min() == 255
-
-
-def test_no_view_is_uploaded_in_a_turn_whose_time_is_over(opened: OffscreenScene) -> None:
-    view = opened.view
-    assert view.centre is not None
-    uploaded = view.views_uploaded
-    view.add(replace(view.centre, row=0, column=1))
-    assert view.upload(0.0)
-    assert view.views_uploaded == uploaded
-    view.upload_all()
-    assert view.views_uploaded == uploaded + 1
 
 
 def test_a_picture_of_one_view_drawn_in_a_hurry_becomes_whole_though_views_come(opened: OffscreenScene) -> None:

@@ -41,9 +41,7 @@ def share_inside(shape: ApertureShape) -> NDArray[np.float64]:
     "shape",
     [
         ApertureShape(),
-        ApertureShape("cat_eye"),
         ApertureShape("ring", ring_inner=0.6),
-        ApertureShape("polygon", blades=3),
         ApertureShape("polygon", blades=5, rotation_deg=20.0),
         ApertureShape("polygon", blades=11, rotation_deg=-70.0),
     ],
@@ -55,13 +53,6 @@ def test_openings_against_point_tests(shape: ApertureShape) -> None:
     decided = (expected == 0) | (expected == 1)
     assert np.abs(weights - expected)[decided].max() < 0.3, "only near the edge"
     assert weights.sum() == pytest.approx(expected.sum(), rel=0.01)
-
-
-def test_many_blades_are_nearly_a_disc() -> None:
-    few, many = (opening(ApertureShape("polygon", blades=blades), T, S, DIAMETER, WIDTH) for blades in (3, 11))
-    disc = opening(ApertureShape(), T, S, DIAMETER, WIDTH)
-    assert many.sum() / disc.sum() == pytest.approx(11 / 2 * np.sin(2 * np.pi / 11) / np.pi, rel=0.01)
-    assert few.sum() < 0.5 * disc.sum()
 
 
 def test_mask_lies_upright_and_turns_clockwise() -> None:

@@ -39,15 +39,6 @@ def test_other_systems_have_one_backend() -> None:
     assert usual_backends("darwin") == usual_backends("win32") == ("system",)
 
 
-def test_contexts_live_side_by_side() -> None:
-    both = [create_headless("osmesa"), create_headless("egl")]
-    for gl in both + both[::-1]:
-        with gl.ctx:
-            assert paints_red(gl)
-    for gl in both:
-        gl.release()
-
-
 def test_failure_names_what_was_tried(monkeypatch: pytest.MonkeyPatch) -> None:
     def no_display(*_args: object, **_settings: object) -> None:
         raise RuntimeError("eglInitialize failed")

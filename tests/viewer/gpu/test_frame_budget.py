@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -37,15 +36,6 @@ def test_more_time_means_less_haste() -> None:
     assert chosen[-1] == len(QUALITY_LEVELS) - 1, "at the least, something is drawn"
 
 
-def test_what_is_chosen_fits_the_time() -> None:
-    frame_time = FrameTimeModel(5e-9)
-    for budget_s in np.geomspace(0.01, 1, 20):
-        chosen = choose_quality_level(work_in, frame_time, budget_s, 0)
-        if chosen < len(QUALITY_LEVELS) - 1:
-            assert frame_time.seconds(work_in(QUALITY_LEVELS[chosen])) <= budget_s
-        assert all(frame_time.seconds(work_in(better)) > budget_s for better in QUALITY_LEVELS[:chosen])
-
-
 def test_the_pace_is_learnt_for_each_sort_of_work() -> None:
     frame_time = FrameTimeModel(5e-9)
     guess = frame_time.seconds(BLEND)
@@ -56,33 +46,6 @@ def test_the_pace_is_learnt_for_each_sort_of_work() -> None:
         (0.1 - OVERHEAD_S) / 4 + OVERHEAD_S, 0.02
     )
     assert frame_time.seconds(BLEND) == guess
-
-
-def test_cheap_frames_of_one_sort_tell_nothing_of_others() -> None:
-    """Else the first frame that warps views is drawn as if it took next to no time."""
-    frame_time = FrameTimeModel(5e-9)
-    before = frame_time.seconds(LENS)
-    for _ in range(12):
-        frame_time.learn(BLEND, 0.004)
-    assert frame_time.seconds(BLEND) < before / 3
-    assert frame_time.seconds(LENS) == before
-
-
-def test_every_level_costs_less_than_the_one_before() -> None:
-    costs = [work_in(level).fetches for level in QUALITY_LEVELS if level.sources == 1]
-    assert costs == sorted(costs, reverse=True)
-    assert len(set(costs)) == len(costs)
-    for better, worse in pairwise(QUALITY_LEVELS):
-        assert worse != better
-        assert (worse.cameras, worse.sources, worse.scale) <= (better.cameras, better.sources, better.scale)
-    assert replace(LENS, warps=False).fetches < LENS.fetches
-
-
-def test_what_was_not_drawn_yet_is_not_thought_quicker_than_what_was() -> None:
-    frame_time = FrameTimeModel(5e-9)
-    frame_time.learn(LENS, 3.0)
-    per_fetch = (3.0 - OVERHEAD_S) / LENS.fetches
-    assert frame_time.seconds(BLEND) == pytest.approx(OVERHEAD_S + per_fetch * BLEND.fetches)
 
 
 def test_a_picture_near_the_limit_does_not_change_back_and_forth() -> None:

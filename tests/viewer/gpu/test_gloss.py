@@ -67,7 +67,7 @@ def test_the_photo_with_gloss_is_the_cores(renderer: Renderer, gloss: Gloss) -> 
 
 
 @pytest.mark.parametrize("gloss", [LIT, METAL], ids=["lit", "metal"])
-@pytest.mark.parametrize("eye", [ViewOffset(0.0, 1.0), ViewOffset(-1.0, 0.0), ViewOffset(0.5, -0.5)])
+@pytest.mark.parametrize("eye", [ViewOffset(-1.0, 1.0), ViewOffset(0.5, -0.5)])
 def test_other_viewpoints_are_the_cores_too(renderer: Renderer, gloss: Gloss, eye: ViewOffset) -> None:
     flat, photo = np.full((HEIGHT, WIDTH), 2.0, np.float32), grey_photo()
     maps = maps_of(gloss, photo, flat)
@@ -93,20 +93,7 @@ def test_through_an_aperture_each_point_of_the_lens_sees_its_own_highlight(rende
     assert drawn.astype(int).sum() == pytest.approx(narrow.astype(int).sum(), rel=0.03)
 
 
-def test_without_gloss_the_maps_change_nothing(renderer: Renderer) -> None:
-    photo, disparity = grey_photo(), bump()
-    renderer.open_field(GRID, WIDTH, HEIGHT, hdr=False, with_disparity=True)
-    renderer.upload_view(1, 1, photo, disparity)
-    renderer.render(Optics(), (WIDTH, HEIGHT))
-    before, programs = renderer.read_image(), len(renderer.programs)
-    renderer.set_gloss(maps_of(LIT, photo, disparity))
-    renderer.render(Optics(), (WIDTH, HEIGHT))
-    assert np.array_equal(renderer.read_image(), before)
-    assert len(renderer.programs) == programs, "no shader with gloss is even compiled"
-
-
-@pytest.mark.parametrize("is_upright", [False, True])
-@pytest.mark.parametrize("gloss", [LIT, METAL], ids=["lit", "metal"])
+@pytest.mark.parametrize(("gloss", "is_upright"), [(LIT, False), (METAL, True)])
 def test_an_epi_shows_every_views_gloss(renderer: Renderer, gloss: Gloss, is_upright: bool) -> None:
     flat, photo = np.full((HEIGHT, WIDTH), 2.0, np.float32), grey_photo()
     maps = maps_of(gloss, photo, flat)
@@ -124,13 +111,3 @@ def test_an_epi_shows_every_views_gloss(renderer: Renderer, gloss: Gloss, is_upr
         view = shaded(gloss, maps, np.roll(photo, (-round(2 * offset.t), -round(2 * offset.s)), (0, 1)), offset)
         seen, expected = (drawn[:, index], view[:, place]) if is_upright else (drawn[index], view[place])
         assert np.abs(seen.astype(int) - expected)[4:-4].max() <= 3
-
-
-def test_nothing_marked_is_nothing_drawn(renderer: Renderer) -> None:
-    photo, disparity = grey_photo(), bump()
-    nothing = replace(LIT, surface=GlossSurface(strokes_only=True))
-    renderer.open_field(GRID, WIDTH, HEIGHT, hdr=False, with_disparity=True)
-    renderer.upload_view(1, 1, photo, disparity)
-    renderer.set_gloss(maps_of(nothing, photo, disparity))
-    renderer.render(Optics(gloss=nothing), (WIDTH, HEIGHT))
-    assert rms(renderer.read_image(), photo) < 0.003

@@ -68,38 +68,6 @@ def test_an_upright_epi_is_one_column_of_every_view_of_its_column(renderer: Rend
     np.testing.assert_allclose(epi.transpose(1, 0, 2), expected, atol=1)
 
 
-def test_edges_in_an_epi_are_straight_and_as_steep_as_the_disparity(
-    renderer: Renderer, passes: InspectionPasses
-) -> None:
-    scene = TwoPlanes(contrast=0.0)  # disc and background, one colour each
-    scene.fill(renderer, GRID)
-    assert renderer.field is not None
-    epi = epi_across(passes, renderer.field, row=2, y=scene.height // 2).astype(int)
-    is_front = np.abs(epi - epi[:, scene.width // 2][:, None]).sum(axis=2) < 3
-    left = is_front.argmax(axis=1)
-    s = np.arange(GRID.columns) - GRID.centre[1]
-    slope, middle = np.polyfit(s, left, 1)
-    assert slope == pytest.approx(-scene.foreground, abs=1e-6)
-    np.testing.assert_allclose(left, slope * s + middle, atol=1e-6)
-
-
-def test_views_that_are_not_there_are_hatched_grey(renderer: Renderer, passes: InspectionPasses) -> None:
-    field = middle_only(renderer)
-    epi = epi_across_as_drawn(passes, field)
-    there = GRID.centre[1]
-    np.testing.assert_allclose(epi[there, 0], SCENE.view(ViewOffset(0, 0))[0][30], atol=1)
-    missing = np.delete(epi, there, axis=0)
-    assert (missing.min(axis=-1) == missing.max(axis=-1)).all()
-    assert len(np.unique(missing)) == 2
-    np.testing.assert_array_equal(epi_across_as_drawn(passes, field, row=0)[..., 0] > 0, True)
-
-
-def epi_across_as_drawn(passes: InspectionPasses, field: LightFieldTexture, row: int = GRID.centre[0]) -> np.ndarray:
-    """(U, BAND, W, 3)."""
-    passes.draw_epi(field, Line(row, (30 + 0.5) / SCENE.height), (SCENE.width, BAND * GRID.columns), 1.0)
-    return passes.read("across")[..., :3].reshape(GRID.columns, BAND, SCENE.width, 3)
-
-
 @pytest.mark.parametrize("stops", [-2.0, 0.0, 1.5])
 def test_exposure_is_a_factor_of_light(renderer: Renderer, passes: InspectionPasses, stops: float) -> None:
     field = full(renderer)
@@ -166,11 +134,3 @@ def test_values_are_laid_over_the_surface_they_belong_to(renderer: Renderer, pas
     assert (covered != (SCENE.view(eye)[1] > 0)).mean() < 0.02
     np.testing.assert_array_equal(np.unique(overlay[covered][:, :3], axis=0), [[255, 184, 60]])
     assert not overlay[~covered][:, 3].any()
-
-
-@pytest.mark.parametrize("size", [(33, 21), (1, 1), (64, 9)])
-def test_images_take_any_size(renderer: Renderer, passes: InspectionPasses, size: tuple[int, int]) -> None:
-    field = middle_only(renderer)
-    for used in ((16, 16), size):
-        passes.draw_epi(field, Line(0, 0.5), used, 1.0)
-    assert passes.read("across").shape == (size[1], size[0], 4)

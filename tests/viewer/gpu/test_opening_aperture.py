@@ -10,20 +10,18 @@ import numpy as np
 import pytest
 
 from iibr_core.beyond.optics import CENTRE, Optics
-from iibr_core.beyond.picture_quality import BEST_QUALITY, QualityLevel
+from iibr_core.beyond.picture_quality import QualityLevel
 from iibr_core.color import linear_from_srgb, srgb_from_linear, stored_from_encoded
 from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.types import GridShape, ViewOffset
-from tests.viewer.gpu.scenes import PhotoLike, TwoPlanes, first_frame, psnr, rms, settled, sharpness, through_lens
+from tests.viewer.gpu.scenes import PhotoLike, TwoPlanes, first_frame, psnr, rms, settled, sharpness
 from viewer.gpu.refocus.picture_renderer import Renderer
 
 GRID = GridShape(5, 5)
 BETWEEN = ViewOffset(0.3, 0.2)
-SPARSE = TwoPlanes(width=128, height=96, background=-4.0, foreground=3.0, radius_px=24.0)
-"""Its planes move by 7 px against each other from one view to the next."""
 PHOTO = PhotoLike(width=160, height=120, background=-4.0, foreground=3.0, radius_px=30.0)
 ON_DISC, ON_WALL = Optics(focus_disparity=3.0), Optics(BETWEEN, focus_disparity=-4.0)
-DIAMETERS = [0.3, 0.8, 1.1, 1.5, 3.0, 5.0]
+DIAMETERS = [0.8, 3.0]
 Drawn = Callable[[Renderer, Optics, TwoPlanes], np.ndarray]
 
 
@@ -32,41 +30,17 @@ def opened(renderer: Renderer, optics: Optics, draw: Drawn, diameters: np.ndarra
     return [draw(renderer, replace(optics, aperture_diameter=float(diameter)), PHOTO) for diameter in diameters]
 
 
-@pytest.mark.parametrize("draw", [first_frame, settled])
-@pytest.mark.parametrize("optics", [ON_DISC, ON_WALL, Optics(ViewOffset(0.5, 0.5), focus_disparity=3.0)])
+@pytest.mark.parametrize(("optics", "draw"), [(ON_DISC, first_frame), (ON_WALL, settled)])
 def test_what_is_out_of_focus_becomes_softer_and_softer(renderer: Renderer, optics: Optics, draw: Drawn) -> None:
-    steps = [sharpness(image) for image in opened(renderer, optics, draw, np.linspace(0, 5, 13))]
+    steps = [sharpness(image) for image in opened(renderer, optics, draw, np.linspace(0, 5, 9))]
     assert max(after / before for before, after in pairwise(steps)) < 1.01
     assert steps[-1] < 0.8 * steps[0]
 
 
-@pytest.mark.parametrize("draw", [first_frame, settled])
-@pytest.mark.parametrize("optics", [ON_DISC, ON_WALL])
-def test_nothing_jumps_where_the_lens_reaches_the_next_views(renderer: Renderer, optics: Optics, draw: Drawn) -> None:
-    images = opened(renderer, optics, draw, np.linspace(0.95, 1.05, 11))
+def test_nothing_jumps_where_the_lens_reaches_the_next_views(renderer: Renderer) -> None:
+    images = opened(renderer, ON_WALL, first_frame, np.linspace(0.95, 1.05, 7))
     assert max(rms(before, after) for before, after in pairwise(images)) < 0.006
     assert rms(images[0], images[-1]) > 0.001, "it does open"
-
-
-@pytest.mark.parametrize("optics", [ON_DISC, ON_WALL])
-def test_a_small_aperture_is_nearly_a_pinhole(renderer: Renderer, optics: Optics) -> None:
-    images = opened(renderer, optics, settled, np.array([0.0, 1e-3, 0.05, 0.1, 0.2, 0.3]))
-    assert max(rms(before, after) for before, after in pairwise(images)) < 0.006
-
-
-@pytest.mark.parametrize(("optics", "least_db"), [(ON_DISC, 42.5), (ON_WALL, 40.0)])
-@pytest.mark.parametrize("diameter", DIAMETERS)
-def test_settled_pictures_of_a_sparse_field_against_brute_force(
-    renderer: Renderer, optics: Optics, least_db: float, diameter: float
-) -> None:
-    SPARSE.fill(renderer, GRID)
-    optics = replace(optics, aperture_diameter=diameter)
-    image = settled(renderer, optics, SPARSE)
-    likeness = psnr(image, through_lens(SPARSE, optics, GRID, across=16), border=16)
-    assert likeness > least_db
-    if diameter > 0.5:  # else what it blurs is less than a pixel
-        wrong = replace(optics, aperture_diameter=diameter / 2)
-        assert psnr(image, through_lens(SPARSE, wrong, GRID, across=16), border=16) < likeness - 1.5
 
 
 @pytest.mark.parametrize("optics", [ON_DISC, ON_WALL])
@@ -80,12 +54,11 @@ def test_the_first_frame_is_near_the_settled_picture(renderer: Renderer, optics:
     assert light[0] == pytest.approx(light[1], abs=0.003)
 
 
-@pytest.mark.parametrize("draw", [first_frame, settled])
-def test_a_pinhole_between_views_is_as_sharp_as_at_them(renderer: Renderer, draw: Drawn) -> None:
+def test_a_pinhole_between_views_is_as_sharp_as_at_them(renderer: Renderer) -> None:
     PHOTO.fill(renderer, GRID)
     for eye in (CENTRE, BETWEEN, ViewOffset(0.5, 0.0), ViewOffset(0.5, 0.5), ViewOffset(-1.1, 1.0)):
         truth = sharpness(PHOTO.view(eye)[0])
-        assert sharpness(draw(renderer, Optics(eye), PHOTO)) == pytest.approx(truth, rel=0.03), eye
+        assert sharpness(first_frame(renderer, Optics(eye), PHOTO)) == pytest.approx(truth, rel=0.03), eye
 
 
 def width_of_spot(renderer: Renderer, optics: Optics, level: QualityLevel | None) -> float:
@@ -108,8 +81,8 @@ def width_of_spot(renderer: Renderer, optics: Optics, level: QualityLevel | None
     return float((in_all_px - own_px**2) / px_per_view**2)
 
 
-@pytest.mark.parametrize("level", [None, BEST_QUALITY, QualityLevel(0.5), QualityLevel(0.25)])
-@pytest.mark.parametrize("radius", [0.75, 1.5, 3.0])
+@pytest.mark.parametrize("level", [None, QualityLevel(0.25)])
+@pytest.mark.parametrize("radius", [0.75, 3.0])
 def test_a_spot_of_light_is_as_wide_as_the_lens_has_it(
     renderer: Renderer, radius: float, level: QualityLevel | None
 ) -> None:

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
-from iibr_core.beyond.optics import CENTRE, Optics
+from iibr_core.beyond.optics import Optics
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.gpu.scenes import TwoPlanes, rms, settled
 from viewer.gpu.refocus import accumulation, passes
@@ -15,7 +13,6 @@ from viewer.gpu.refocus.picture_renderer import Renderer
 
 GRID = GridShape(5, 5)
 SCENE = TwoPlanes(width=160, height=96, background=-4.0, foreground=5.0, radius_px=25.0)
-SIZE = SCENE.width, SCENE.height
 
 
 @pytest.mark.parametrize(
@@ -59,20 +56,3 @@ def test_outside_all_views_mirror_images_stand_in(renderer: Renderer) -> None:
     moved = round(6.0 * (eye.s - 1.0))
     mirrored = np.concatenate([photo, photo[:, ::-1]], axis=1)[:, moved : moved + 96]
     assert rms(image, mirrored, border=2) < 0.01
-
-
-def test_edits_of_the_optics_rebuild_nothing(renderer: Renderer) -> None:
-    """No program, texture or view is made again: numbers change, and the picture is drawn."""
-    SCENE.fill(renderer, GRID)
-    first = Optics(ViewOffset(0.2, 0.1), focus_disparity=1.0, aperture_diameter=3.0)
-    renderer.render(first, SIZE)
-    before = len(renderer.programs), renderer.field, renderer.image_texture
-    for edit in (
-        replace(first, eye=CENTRE),
-        replace(first, focus_disparity=-3.0),
-        replace(first, aperture_diameter=4.5),
-        replace(first, focus_tilt=(1.0, 0.5)),
-        replace(first, exposure_stops=1.0),
-    ):
-        renderer.render(edit, SIZE)
-        assert (len(renderer.programs), renderer.field, renderer.image_texture) == before, edit

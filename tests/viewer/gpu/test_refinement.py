@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import gc
-from types import SimpleNamespace
 
 import moderngl
 import numpy as np
@@ -14,7 +13,6 @@ from iibr_core.beyond.picture_quality import EDGE_PASSES, MAX_SOURCES, QualityLe
 from iibr_core.types import GridShape, InputError, ViewOffset
 from tests.viewer.gpu.scenes import TwoPlanes, psnr, through_lens
 from viewer.gpu.context import GLContext
-from viewer.gpu.refocus import accumulation
 from viewer.gpu.refocus.picture_renderer import Renderer
 
 GRID = GridShape(5, 5)
@@ -58,34 +56,6 @@ def test_small_steps_end_at_the_same_picture_as_one_large(renderer: Renderer) ->
     assert renderer.samples == samples[-1], "nothing is drawn once it has converged"
 
 
-def test_how_much_is_refined_at_once_goes_by_the_picture_on_show_not_by_the_one_before(renderer: Renderer) -> None:
-    SCENE.fill(renderer, GRID)
-    renderer._refining_s = 1e-15  # as after a picture that took next to nothing
-    renderer.render_in_time(WIDE, SIZE, 1e-6)
-    renderer.refine(1e-6)
-    assert renderer.samples == 1
-
-
-def test_refining_waits_for_a_driver_that_queues_its_work(renderer: Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Time passes only while the driver is waited for: without that, all passes would be queued within any budget."""
-    SCENE.fill(renderer, GRID)
-    renderer.render_in_time(WIDE, SIZE, 1e-6)
-    now = [0]
-
-    class Queueing:
-        def __getattr__(self, name: str) -> object:
-            return getattr(renderer.ctx, name)
-
-        def finish(self) -> None:
-            renderer.ctx.finish()
-            now[0] += 1
-
-    monkeypatch.setattr(renderer._accumulator, "_ctx", Queueing())
-    monkeypatch.setattr(accumulation, "time", SimpleNamespace(perf_counter=lambda: now[0]))
-    renderer.refine(1e-6)
-    assert renderer.samples == 1
-
-
 def test_a_picture_that_views_change_stays_until_the_new_one_has_as_many_passes(renderer: Renderer) -> None:
     """A sample of it is drawn at once, not all of them: the hand must not wait."""
     SCENE.fill(renderer, GRID)
@@ -112,25 +82,6 @@ def test_a_picture_that_views_change_stays_until_the_new_one_has_as_many_passes(
     assert np.abs(renderer.read_image().astype(int) - converged(renderer, WIDE)).max() <= 1
 
 
-def test_the_first_picture_after_a_move_is_drawn_at_once_whatever_was_begun(renderer: Renderer) -> None:
-    SCENE.fill(renderer, GRID)
-    before = converged(renderer, WIDE)
-    renderer.renew(WIDE, SIZE)
-    renderer.refine(1e-9)
-    renderer.render_in_time(Optics(ViewOffset(1.0, 1.0)), SIZE, 1e-9)
-    assert not renderer.is_renewing
-    assert not np.array_equal(renderer.read_image(), before)
-
-
-def test_more_time_takes_more_samples(renderer: Renderer) -> None:
-    SCENE.fill(renderer, GRID)
-    drawn = []
-    for budget_s in (1e-9, 60.0):
-        renderer.render_in_time(WIDE, SIZE, budget_s)
-        drawn.append(renderer.samples)
-    assert drawn[0] < drawn[1] == len(renderer._current().lens.samples(renderer.drawn_field, 0))
-
-
 def test_edges_of_a_warped_view_become_smooth_and_stored_views_stay(renderer: Renderer) -> None:
     """A hard edge between two colours takes colours in between, as in a finely sampled picture."""
     scene = TwoPlanes(contrast=0.0)
@@ -146,7 +97,7 @@ def test_edges_of_a_warped_view_become_smooth_and_stored_views_stay(renderer: Re
     assert np.abs(renderer.read_image().astype(int) - scene.view(ViewOffset(1.0, -2.0))[0]).max() <= 1
 
 
-@pytest.mark.parametrize("optics", [Optics(), WIDE, Optics(aperture_diameter=1.5), Optics(dolly=1.0)])
+@pytest.mark.parametrize("optics", [WIDE, Optics(dolly=1.0)])
 def test_an_empty_field_is_black_and_done(renderer: Renderer, optics: Optics) -> None:
     SCENE.open(renderer, GRID)
     renderer.render_in_time(optics, SIZE, 0.01)
@@ -164,7 +115,7 @@ def live_objects() -> int:
 def test_switching_scenes_sizes_and_apertures_leaves_no_gl_objects(renderer: Renderer) -> None:
     ctx, counts = renderer.ctx, []
     ctx.gc_mode = "context_gc"  # what is dropped without being released is kept in a list
-    for k in range(30):
+    for k in range(16):
         scene = TwoPlanes(48 + 16 * (k % 2), 40)
         scene.fill(renderer, GridShape(2 + k % 3, 3), with_disparity=k % 5 > 0)
         optics = Optics(ViewOffset(0.1, 0.0), dolly=0.5 * (k % 2), aperture_diameter=float(k % 4))
@@ -173,7 +124,7 @@ def test_switching_scenes_sizes_and_apertures_leaves_no_gl_objects(renderer: Ren
         counts.append(live_objects() - len(renderer.programs))
     gc.collect()
     assert all(isinstance(thing, moderngl.mgl.InvalidObject) for thing in ctx.objects), "dropped, but not released"
-    assert max(counts[10:]) <= max(counts[:10])
+    assert max(counts[8:]) <= max(counts[:8])
     ctx.gc_mode = None
 
 

@@ -7,7 +7,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from iibr_core.scenes.lens_limits import clamp_to_grid
 from iibr_core.types import GridShape, ViewOffset
 from viewer.gpu.refocus.view_sampling import (
     Samples,
@@ -78,10 +77,6 @@ def test_a_stored_view_alone_shows_its_own_place() -> None:
         assert weights[row, column] == pytest.approx(1, abs=1e-4)
 
 
-def test_no_views_no_sources() -> None:
-    assert pinhole_sources(ViewOffset(0.0, 0.0), GRID, np.zeros(GRID, bool)) == []
-
-
 @given(eye=places, first=st.integers(0, 1000))
 def test_a_camera_is_answered_by_a_corner_of_its_cell(eye: ViewOffset, first: int) -> None:
     points = spread_points(40, 3.0)
@@ -102,25 +97,6 @@ def test_cameras_together_blend_views_as_a_pinhole_does(eye: ViewOffset) -> None
     assert np.array_equal(later.views, samples.views[100:120])
 
 
-def test_missing_views_are_answered_by_the_nearest_present() -> None:
-    present = np.zeros(GRID, bool)
-    present[2, 2] = present[0, 0] = True
-    points = np.array([(-2.0, -1.0), (2.0, 2.0), (0.0, 0.0)])
-    samples = answered_samples(points, 0, ViewOffset(0.0, 0.0), GRID, present)
-    assert samples.views.tolist() == [[0, 0], [2, 2], [2, 2]]
-    blended = blended_samples(points, ViewOffset(0.0, 0.0), GRID, present)
-    assert sorted(blended.views.tolist()) == [[0, 0], [2, 2]]
-
-
-@given(eye=places, radius=st.floats(0, 6), seed=st.integers(0, 50))
-def test_blended_views_weigh_one_and_are_there(eye: ViewOffset, radius: float, seed: int) -> None:
-    present = some_views(seed)
-    samples = blended_samples(spread_points(200, radius), eye, GRID, present)
-    assert samples.weights.sum() == pytest.approx(1)
-    assert present[tuple(samples.views.T)].all()
-    assert np.allclose(samples.cameras + np.array(eye), samples.views - np.array(GRID.centre))
-
-
 def test_blended_views_weigh_what_the_points_ask_of_them() -> None:
     points = spread_points(300, 0.8)
     eye = ViewOffset(0.25, -0.5)
@@ -130,20 +106,9 @@ def test_blended_views_weigh_what_the_points_ask_of_them() -> None:
     assert shares_of_views(blended_samples(points, eye, GRID, FULL)) == pytest.approx(expected, abs=1e-3)
 
 
-def test_through_next_to_no_aperture_a_stored_view_is_shown_alone() -> None:
-    samples = blended_samples(spread_points(200, 1e-6), ViewOffset(1.0, -1.0), GRID, FULL)
-    assert samples.views.tolist() == [[3, 1]]
-    answered = answered_samples(np.zeros((50, 2)), 7, ViewOffset(1.0, -1.0), GRID, FULL)
-    assert np.unique(answered.views, axis=0).tolist() == [[3, 1]]
-
-
 def test_nearest_present_against_a_plain_search() -> None:
     present = some_views(7)
     for (row, column), answer in zip(np.ndindex(*GRID), nearest_present(present).reshape(-1, 2)):
         least = min(np.hypot(row - r, column - c) for r, c in np.argwhere(present))
         assert np.hypot(row - answer[0], column - answer[1]) == least
         assert present[tuple(answer)]
-
-
-def test_clamped_to_grid_of_even_and_single_sizes() -> None:
-    assert clamp_to_grid(ViewOffset(9.0, -9.0), GridShape(4, 1)) == ViewOffset(1.0, 0.0)

@@ -32,13 +32,9 @@ class PhotoFolder:
 
 @dataclass(frozen=True)
 class Thumbnail:
-    """A part of a texture. texture: its GL name. low, high: corners (x, y) of the part, 0 to 1. aspect: its width over
-    its height.
-    """
+    """GL name of a texture, and its width / height."""
 
     texture: int
-    low: tuple[float, float]
-    high: tuple[float, float]
     aspect: float
 
 

@@ -1,11 +1,9 @@
-"""Saves, copies and exports that wait or run, and exports that are done."""
+"""The queue of saves, copies and exports: what the window shows of it, and what changes it."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import Literal
-
-from viewer.model.state.prompts import ExportPrompt
 
 JobKind = Literal["picture", "map", "copy", "export"]
 
@@ -16,10 +14,8 @@ STOPPING = "stopping"
 
 @dataclass(frozen=True)
 class JobProgress:
-    """A job that waits or runs.
-
-    name: of its file or folder. doing: its present step, "" while it waits for its turn. done: share of this step,
-    0..1. left_s: seconds that the step still takes, None if not known.
+    """One job of the queue. name: of its file or folder. doing: in words, "" while it waits for its turn. done: share
+    of what it is doing, 0..1. left_s: seconds that this still takes, None where that is not known.
     """
 
     id: int
@@ -31,14 +27,12 @@ class JobProgress:
 
     @property
     def can_be_cancelled(self) -> bool:
-        """Whether it has not come to writing its file."""
+        """A file that is being written is finished."""
         return self.doing not in (WRITING, STOPPING)
 
 
 @dataclass(frozen=True)
-class FinishedExport:
-    """An export that was written or failed. prompt: asks for the same again. problem: why it failed."""
+class CancelJobTask:
+    """Give up the job of this id; the others continue."""
 
-    path: str
-    prompt: ExportPrompt
-    problem: str = ""
+    id: int

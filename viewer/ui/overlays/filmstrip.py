@@ -99,8 +99,7 @@ def _photo(cell: Rect, name: str, thumbnail: Thumbnail | None, is_open: bool, st
         width = min(cell.width, cell.height * thumbnail.aspect)
         height = width / thumbnail.aspect
         place = Rect(cell.x + (cell.width - width) / 2, cell.y + (cell.height - height) / 2, width, height)
-        uv = imgui.ImVec2(*thumbnail.low), imgui.ImVec2(*thumbnail.high)
-        draw.add_image(imgui.ImTextureRef(thumbnail.texture), *corners(place), *uv)
+        draw.add_image(imgui.ImTextureRef(thumbnail.texture), *corners(place))
     if is_open or is_hovered:
         color = pack_color(palette.accent if is_open else palette.quiet)
         draw.add_rect(corner, far, color, 3 * scale, (3 if is_open else 1.5) * scale)
