@@ -140,8 +140,8 @@ class Disparity:
 
     values: (H, W) float32, finite, pixels per view step. source: its origin, in words for people ("scene.pfm", "none").
     inverse_metres: (slope, offset) of 1 / distance in metres over the values, None if only their order is known.
-    unknown: (H, W) bool, True where values were filled in; None: nowhere. viewing_share: share of TOTAL_PARALLAX that
-    viewing plans for; a guess moves less. is_enlarged: values come from a smaller map with soft edges.
+    unknown: (H, W) bool, True where values were filled in; None: nowhere. is_enlarged: values come from a smaller
+    map with soft edges.
     """
 
     values: FloatImage
@@ -149,7 +149,6 @@ class Disparity:
     notes: tuple[str, ...] = ()
     inverse_metres: tuple[float, float] | None = None
     unknown: NDArray[np.bool_] | None = None
-    viewing_share: float = 1.0
     is_enlarged: bool = False
 
 

@@ -27,13 +27,11 @@ settings.load_profile("untimed")
 
 
 LONG_FILES = {
-    "test_limits.py",
     "test_batch.py",
-    "test_memory.py",
-    "test_kernel_cache.py",
-    "test_precompile.py",
-    "test_speed_command.py",
     "test_cli.py",
+    "test_diffusion.py",
+    "test_evaluate.py",
+    "test_precompile.py",
     "test_window_optics.py",
 }
 """Begun first, so that all workers end together: those that take ten seconds and more."""

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import re
 import shlex
-import subprocess
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, cast
@@ -60,14 +58,6 @@ def test_every_picture_is_shown() -> None:
     assert {path for path in DOCS.rglob("*.*") if path.suffix in (".png", ".svg", ".jpg", ".gif", ".webp")} <= shown
 
 
-def test_the_readme_begins_with_a_moving_picture() -> None:
-    before, _, after = (ROOT / "README.md").read_text("utf-8").partition("![")
-    picture = ROOT / LINK.findall(f"![{after}")[0]
-    assert picture.suffix in (".gif", ".apng")
-    assert picture.stat().st_size < 2_000_000
-    assert before.count("\n") < 20
-
-
 @pytest.mark.parametrize("page", ["CONTRIBUTING.md", "docs/architecture.md"])
 def test_files_and_names_that_developers_read_of_exist(page: str) -> None:
     """A file name without a folder lies in the folder of the file named before it, or in `iibr_core/`."""
@@ -103,12 +93,3 @@ def test_commands_of_a_page_know_their_options(page: Path) -> None:
         command = commands.get(words[1] if len(words) > 1 else "view", commands["view"])
         known = {name for option in command.params for name in (*option.opts, *option.secondary_opts)}
         assert {word for word in words[2:] if re.match("--?[a-z]", word)} <= known, words
-
-
-def test_the_site_builds_without_a_warning(tmp_path: Path) -> None:
-    pytest.importorskip("sphinx", reason="pip install '.[docs]'")
-    pytest.importorskip("myst_parser", reason="pip install '.[docs]'")
-    words = [sys.executable, "-P", "-m", "sphinx", "-q", "-W", "--keep-going", "-n", "-b", "html"]
-    run = subprocess.run([*words, "-d", tmp_path / "trees", DOCS, tmp_path / "site"], capture_output=True, text=True)
-    assert run.returncode == 0, run.stderr
-    assert (tmp_path / "site" / "index.html").exists()

@@ -37,8 +37,6 @@ from iibr_core.types import Disparity, FloatImage, GridShape, InputError, Photo
 
 USUAL_GRID = GridShape(9, 9)
 """Grid of views that depth without a scale is made for while the real one is unknown."""
-GUESS_SHARE = 0.6
-"""Share of the usual parallax that guessed depth gets: errors then move less."""
 SUBJECTS: dict[DepthKind, str] = {
     "file": "The map beside the photo",
     "embedded": "The photo's own depth",
@@ -232,8 +230,7 @@ class _Search:
             values = fill_disparity_by_color(photo.pixels, values)
         if self.choice.refine:
             values = refine(photo.pixels, values, unknown, is_enlarged=is_enlarged)
-        share = GUESS_SHARE if origin.kind == "rough" else 1.0
-        disparity = Disparity(values, origin.words, notes, metres, unknown, share, is_enlarged)
+        disparity = Disparity(values, origin.words, notes, metres, unknown, is_enlarged)
         return PhotoWithDepth(photo, disparity, origin)
 
 

@@ -3,8 +3,6 @@
 Every path is closed: the last frame leads to the first.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import replace
@@ -25,7 +23,6 @@ from iibr_core.scenes.lens_limits import clamp_optics
 from iibr_core.scenes.scene import Scene
 from iibr_core.types import ImageSize, InputError, ViewOffset
 
-MAX_PATH_BYTES = 1_000_000
 MAX_KEYS = 1000
 
 
@@ -54,7 +51,7 @@ def read_keys(path: Path) -> list[tuple[float, ...]]:
     The file has one key a line, and comments that begin with #.
     """
     keys: list[tuple[float, ...]] = []
-    for number, line in enumerate(read_text(path, MAX_PATH_BYTES).splitlines(), 1):
+    for number, line in enumerate(read_text(path).splitlines(), 1):
         words = line.split("#")[0].replace(",", " ").split()
         if not words:
             continue

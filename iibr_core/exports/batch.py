@@ -3,8 +3,6 @@
 A photo is skipped where its output exists and is newer than the photo and the map beside it.
 """
 
-from __future__ import annotations
-
 import csv
 import logging
 import os

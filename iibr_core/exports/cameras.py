@@ -1,7 +1,5 @@
 """All views: as a light field, or with their cameras for programs that reconstruct scenes (LLFF, COLMAP)."""
 
-from __future__ import annotations
-
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Pictures fitted into frames of another shape, and pictures from a row of viewpoints for displays and eyes."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

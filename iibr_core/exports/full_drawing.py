@@ -3,8 +3,6 @@
 The views of a tile lie around the eye, only as many as its lens needs; the renderer of the window draws it from them.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """A picture of a photo at its own size or smaller; `full_drawing` draws it from views of the photo on disk."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Any

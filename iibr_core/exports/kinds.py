@@ -4,8 +4,6 @@ The window's dialog and the command line read this table; a new kind is one line
 Functions are named as "module:function" and imported when they are used, so that the table loads quickly.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial

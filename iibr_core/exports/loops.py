@@ -1,7 +1,5 @@
 """Loops of the viewpoint through the grid."""
 
-from __future__ import annotations
-
 import math
 from typing import Literal
 

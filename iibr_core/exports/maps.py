@@ -1,7 +1,5 @@
 """Maps of the centre view's disparity and depth, pictures with their depth, and epipolar plane images."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Photos of a folder, and whether a folder holds photos rather than a light field."""
 
-from __future__ import annotations
-
 import os
 import re
 from collections.abc import Container, Iterable

@@ -3,8 +3,6 @@
 Bridge runs beside the display and takes JSON by HTTP (endpoints and bodies as in its client bridge.js).
 """
 
-from __future__ import annotations
-
 import json
 from http.client import HTTPException
 from pathlib import Path
@@ -23,10 +21,8 @@ from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import ImageSize, InputError
 
 ADDRESS = "localhost:33334"
-TIMEOUT_S = 10.0
-MAX_ANSWER_BYTES = 1 << 20
-PLAYLIST = "iibr"
-FIRST_DISPLAY = -1
+TIMEOUT_S, MAX_ANSWER_BYTES = 10.0, 1 << 20
+PLAYLIST, FIRST_DISPLAY = "iibr", -1
 FAILURES = ("Failure", "UnknownOrchestration")
 MONITOR = "thirdparty"
 """Hardware version of screens that are no Looking Glass."""

@@ -1,7 +1,5 @@
 """The settings of a finished picture."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from iibr_core.beyond.optics import Optics

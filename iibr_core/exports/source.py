@@ -4,8 +4,6 @@ A kind of export is a function that writes one file or folder from an `ExportSou
 pictures wherever the graphics card may be used.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Collection, Generator, Iterable, Iterator
 from dataclasses import dataclass, replace

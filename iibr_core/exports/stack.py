@@ -1,7 +1,5 @@
 """Focal stacks: pictures focused from far to near, a picture that is sharp everywhere, and the disparity."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Pictures for the left and the right eye in one file: side by side, above each other, crossed, anaglyph, spatial."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple

@@ -1,7 +1,5 @@
 """A light field as one web page with its views and the program that draws them, for any browser, offline."""
 
-from __future__ import annotations
-
 import base64
 import hashlib
 import json

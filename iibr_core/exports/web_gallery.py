@@ -1,7 +1,5 @@
 """A page that lists the web pages of a batch, with the first picture and the title of each. It needs no server."""
 
-from __future__ import annotations
-
 import base64
 import html
 import os

@@ -4,8 +4,6 @@ Views differ little, so all lie in one moving picture (AVIF), one frame a view f
 of single files or less. Disparity is stored the same way, in 8 bits.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
@@ -41,15 +39,13 @@ MAX_VIEWS = 256
 """Number of texture layers that every WebGL 2 has."""
 RANGE_MARGIN, OUTLIERS = 0.05, 0.0002
 """Margin and quantile of the disparity range, the same as in the desktop's texture (`light_field_texture.py`)."""
-DEPTH_QUALITY, FIRST_QUALITY = 60, 50
-QUALITIES = 82, 65, 48
-"""Qualities of colours; the lower ones are for budgets."""
+QUALITIES, DEPTH_QUALITY, FIRST_QUALITY = (82, 65, 48), 60, 50
+"""Qualities of colours, the lower ones for budgets; of disparity; and of the first picture."""
 MAX_HALVINGS = 4
 """Largest number of times that a budget halves the size of the views."""
 SPEED = 8
 """Speed of the AV1 encoder, 0 to 10: 6 takes four times as long for a third less."""
-FIRST_SIDE_PX = 1600
-FRAME_MS = 40
+FIRST_SIDE_PX, FRAME_MS = 1600, 40
 MOVING_RANGE = "limited"
 """Range of luma: Chromium 156 assumes it for moving pictures and ignores their `colr` boxes and sequence headers."""
 

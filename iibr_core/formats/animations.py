@@ -1,7 +1,5 @@
 """Moving pictures: MP4 and WebM by PyAV, GIF and WebP by Pillow. They repeat for ever where the player can do so."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from fractions import Fraction
 from pathlib import Path
@@ -20,10 +18,8 @@ VIDEOS: dict[str, tuple[str, dict[str, str]]] = {
 }
 """Codec and its options, by the ending of the file."""
 BT709, MPEG_RANGE = 1, 1
-PALETTE_COLORS = 255
-PALETTE_SAMPLES = 8
-"""Number of evenly spread frames that the palette of a GIF is made from."""
-PALETTE_SIDE_PX = 128
+PALETTE_COLORS, PALETTE_SAMPLES, PALETTE_SIDE_PX = 255, 8, 128
+"""Colours of a GIF, and the number and size of the evenly spread frames that they are chosen from."""
 WEBP_QUALITY = 85
 
 

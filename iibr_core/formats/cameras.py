@@ -5,8 +5,6 @@ its unit. A plane that stands still in the field lies at a finite distance, but 
 ahead; therefore their principal points move.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass

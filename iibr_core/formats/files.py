@@ -1,7 +1,5 @@
 """Look at files and read them, with limits: paths come from people, and contents from anywhere."""
 
-from __future__ import annotations
-
 import os
 import stat
 import struct

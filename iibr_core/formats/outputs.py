@@ -3,8 +3,6 @@
 Inputs are never overwritten; an output that exists is replaced only where that is allowed. Links are followed.
 """
 
-from __future__ import annotations
-
 import os
 import platform
 import re

@@ -3,8 +3,6 @@
 Worlds may have any axes: only the poses of cameras relative to each other count. `cameras.py` writes these files.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from math import tan
 from pathlib import Path

@@ -4,8 +4,6 @@ View 0 is the leftmost one, at the bottom left; the next ones follow to the righ
 rightmost view is at the top right.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """A light field in memory: its views, views between them, pictures through a lens, and writing it."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field

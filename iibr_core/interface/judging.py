@@ -1,7 +1,5 @@
 """Comparison of pictures with true ones, and of views with those of data sets."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any

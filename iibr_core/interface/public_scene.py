@@ -1,7 +1,5 @@
 """Scenes: a photo with its disparity, or a light field from disk, and the light fields that are made of them."""
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from dataclasses import replace

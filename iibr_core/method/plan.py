@@ -105,7 +105,7 @@ def plan_for_viewing(
     disparity = replace(disparity, values=np.clip(given, span.low, span.high))
     zero = float(np.median(disparity.values)) if wanted.focus_disparity is None else wanted.focus_disparity
     width = photo.size.width
-    parallax_px = _parallax_px(span, disparity.viewing_share, width) * abs(wanted.depth_strength)
+    parallax_px = _parallax_px(span, width) * abs(wanted.depth_strength)
     grid = wanted.grid or _grid_for(parallax_px, photo)
     steps = max(grid.rows, grid.columns) - 1
     scale = parallax_px / steps / span.range * np.sign(wanted.depth_strength) if steps and parallax_px else 0.0
@@ -137,12 +137,12 @@ def plan_literal(
     return replace(plan, notes=_wide_notes(plan, photo.size.width))
 
 
-def _parallax_px(span: DisparityRange, viewing_share: float, width: int) -> float:
+def _parallax_px(span: DisparityRange, width: int) -> float:
     """Return how far the nearest moves against the farthest from the first view to the last, in pixels."""
     if span.range <= 0:
         return 0.0
     carried_px = MAX_NOISE_PX * span.range / span.noise if span.noise > 0 else np.inf
-    return float(min(TOTAL_PARALLAX * viewing_share * width, carried_px))
+    return float(min(TOTAL_PARALLAX * width, carried_px))
 
 
 def _grid_for(parallax_px: float, photo: Photo) -> GridShape:

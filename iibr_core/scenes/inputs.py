@@ -1,7 +1,5 @@
 """Files and folders that opening a scene reads."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The open photo at its own size, which is read again when a picture of that size is needed."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from pathlib import Path

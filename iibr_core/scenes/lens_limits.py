@@ -1,7 +1,5 @@
 """Limits of the lens for a scene; sliders and clamps take their ends from here."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, fields, replace
 from typing import Any, TypeVar

@@ -2,8 +2,6 @@
 wide apertures and viewpoints between the views work as with a photo; or with views made between its own.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Generator, Iterator, Sequence
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """Opening of a scene: read the file, plan, make the views; each result is yielded at once."""
 
-from __future__ import annotations
-
 import itertools
 import time
 from collections.abc import Callable, Collection, Generator, Iterator

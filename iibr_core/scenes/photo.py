@@ -2,8 +2,6 @@
 its plan, and its views.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Collection, Generator
 from dataclasses import replace
@@ -15,7 +13,7 @@ from iibr_core.color import photo_in_srgb
 from iibr_core.depth.choice import DepthOrigin
 from iibr_core.depth.edges.refine import refine
 from iibr_core.depth.editing.canvas import DepthCanvas
-from iibr_core.depth.editing.edits import BRUSH_TOOLS, UNEDITED, DepthEdits, Stroke, levels_of
+from iibr_core.depth.editing.edits import BRUSH_TOOLS, UNEDITED, DepthEdits, Levels, Stroke, extent_of, levels_of
 from iibr_core.depth.models.known import USUAL_MODEL
 from iibr_core.depth.search import PhotoWithDepth, SlowSource, estimator_of, find_depth, open_with_depth
 from iibr_core.formats.files import require_file
@@ -29,7 +27,7 @@ from iibr_core.method.light_field import generate
 from iibr_core.method.plan import MOST_STRENGTH, PlanOverrides, ScenePlan, plan_for_viewing, plan_literal
 from iibr_core.runtime.machine import give_back_memory
 from iibr_core.scenes.scene import DepthSettings, LoadedPhoto, Source, still_disparity
-from iibr_core.types import Disparity, ImageSize, InputError, Photo, ViewOffset, ViewUpdate
+from iibr_core.types import Disparity, FloatImage, ImageSize, InputError, Photo, ViewOffset, ViewUpdate
 
 SKETCH = ImageSize(height=480, width=480)
 """Largest size of a sketch."""
@@ -98,7 +96,21 @@ def apply_depth_settings(loaded: LoadedPhoto, depth_settings: DepthSettings) -> 
     if loaded.depth_settings.refine != depth_settings.refine:
         loaded = _refine(loaded, depth_settings.refine)
     values = loaded.canvas.apply(depth_settings.edits)
-    return replace(loaded, depth_settings=depth_settings, disparity=replace(loaded.refined, values=values))
+    return replace(
+        loaded,
+        depth_settings=depth_settings,
+        disparity=replace(loaded.refined, values=values),
+        levels=_levels(loaded, depth_settings.edits, values),
+    )
+
+
+def _levels(loaded: LoadedPhoto, edits: DepthEdits, values: FloatImage) -> Levels:
+    """Return the histogram of the map with its strokes, but before inversion, clips and gamma."""
+    given = loaded.refined.values
+    if not edits.strokes:
+        return levels_of(given)
+    moved = values - loaded.canvas.without_strokes(edits)
+    return levels_of(given - moved if edits.is_inverted else given + moved, extent_of(given))
 
 
 def prepare_brush() -> None:
@@ -191,4 +203,4 @@ def _refine(loaded: LoadedPhoto, refines: bool) -> LoadedPhoto:
     if refines:
         values = refine(loaded.photo.pixels, values, found.unknown, is_enlarged=found.is_enlarged)
     canvas = DepthCanvas(loaded.photo.pixels, values)
-    return replace(loaded, refined=replace(found, values=values), levels=levels_of(values), canvas=canvas)
+    return replace(loaded, refined=replace(found, values=values), canvas=canvas)

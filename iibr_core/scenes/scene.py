@@ -69,10 +69,11 @@ class Scene:
     has_view_disparity: whether every view has a disparity. notes: changes that reading made, one sentence each;
     problems: the notes for a notice. focal_px: focal length in pixels of the picture, None if it is not known.
     subject_disparity_px: disparity of the subject in the picture's middle, for presets. settings: text of the settings
-    that this program saved in the file, "" without. levels: distribution of the disparity before edits, px per view
-    step as given. depth_model: name or path of the model that estimated the depth, None without. inverse_metres:
-    (slope, offset) of 1 / distance over the disparity as given, None if distances are not known in metres. color_space:
-    of its views. own_size: size of the photo in its file, which may exceed that of a view; None for light fields.
+    that this program saved in the file, "" without. levels: histogram of the disparity before inversion, clips and
+    gamma, px per view step as given. depth_model: name or path of the model that estimated the depth, None without.
+    inverse_metres: (slope, offset) of 1 / distance over the disparity as given, None if distances are not known in
+    metres. color_space: of its views. own_size: size of the photo in its file, which may exceed that of a view; None
+    for light fields.
     infinity_px: field disparity of infinitely far points of a photo. is_sketch: whether it is a small picture that is
     shown while the photo is read. found_span_px: range of the field disparity before edits, None if it cannot be
     edited.
@@ -158,8 +159,9 @@ class LoadedPhoto:
 
     disparity: result of `depth_settings`: `found` is refined to `refined`, which is edited. origin: source of `found`.
     settings: text of the settings that this program saved in the photo, "" without. model: name or path of the depth
-    model that estimated its depth, None without. levels: distribution of `refined`. canvas: the worker's edits; only
-    the worker uses it. own_size: size of the photo in its file, upright. stamp: see `stamp_of`.
+    model that estimated its depth, None without. levels: histogram of the disparity with strokes, before inversion,
+    clips and gamma. canvas: the worker's edits; only the worker uses it. own_size: size of the photo in its file,
+    upright. stamp: see `stamp_of`.
     """
 
     photo: Photo

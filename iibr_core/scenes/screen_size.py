@@ -1,7 +1,5 @@
 """Sizes of pictures, as graphics cards and windows give them."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 

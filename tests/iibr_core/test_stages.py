@@ -16,12 +16,7 @@ from iibr_core.stages import ALL_STAGES, STAGE_NAMES, Stages, stages_without
 from iibr_core.training.degradation import blur
 from iibr_core.training.scenes.random_scene import random_scene
 from iibr_core.training.scenes.raycast import render
-from iibr_core.types import (
-    FloatImage,
-    ImageSize,
-    InputError,
-    ViewOffset,
-)
+from iibr_core.types import FloatImage, ImageSize, InputError, ViewOffset
 
 SIZE = ImageSize(96, 128)
 CASES = {

@@ -34,7 +34,7 @@ from iibr_core.types import (
 )
 from tests.viewer.background.test_scene_worker import Desk
 from tests.viewer.conftest import write_scene
-from viewer.app.image_export import export_picture, shot_of
+from viewer.app.picture_files import export_picture, shot_of
 from viewer.app.preferences_store import load_preferences, store_preferences
 from viewer.background.job_threads import Failed
 from viewer.display.offscreen import OffscreenScene

@@ -7,89 +7,73 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
-from PIL import Image, ImageGrab, UnidentifiedImageError
+from PIL import Image, ImageGrab
 from platformdirs import user_cache_path
 
-from iibr_core.formats.outputs import write_file
+from iibr_core.formats.outputs import make_folder, write_file
 from iibr_core.types import InputError
-from viewer.model.state.saving import PASTED_FOLDER
+from viewer.model.saving import PASTED_FOLDER
 
-MOST_KEPT = 20
-"""Pasted pictures; older ones go."""
-PATIENCE_S = 20.0
-"""For the program that carries a picture: on X11 it asks another window, which may hang."""
+MAX_PASTED = 20
+"""Number of pasted pictures that are kept."""
+TIMEOUT_S = 20.0
+"""Time for the program that carries a picture: on X11 it asks another window, which may hang."""
 _MAC_COPY = "set the clipboard to (read (POSIX file (item 1 of argv)) as «class PNGf»)"
-LACKING = "Pictures cannot be copied and pasted here: install xclip, or wl-clipboard under Wayland."
-NOTHING = "There is neither a picture in the clipboard nor the path of one: copy one, and paste again."
-
-
-@dataclass(frozen=True)
-class Pasted:
-    """What came out of the clipboard, as a file."""
-
-    path: str
+LACKING = "Pictures cannot be copied and pasted here. Install xclip, or wl-clipboard under Wayland."
+NOTHING = "The clipboard holds neither a picture nor the path of one. Copy one and paste again."
 
 
 def copied_path() -> Path:
-    """Where a picture lies that is about to be copied."""
+    """Return the path of the file that holds a picture to be copied."""
     return _cache_folder() / "copied.png"
 
 
 def copy_picture(path: Path) -> None:
-    """Put the picture of this PNG file into the clipboard. Raises InputError, which says what is lacking."""
+    """Put the picture of a PNG file into the clipboard. Raises InputError."""
     command = _copying_command(path)
     try:
         with path.open("rb") as picture:
             # The program stays behind to hand the picture out: it must hold no pipe of ours.
             quiet = subprocess.DEVNULL
-            subprocess.run(command, stdin=picture, stdout=quiet, stderr=quiet, check=True, timeout=PATIENCE_S)
+            subprocess.run(command, stdin=picture, stdout=quiet, stderr=quiet, check=True, timeout=TIMEOUT_S)
     except (OSError, subprocess.SubprocessError) as error:
         raise InputError(f"The picture cannot be copied: {command[0]} failed ({error})") from error
 
 
-def paste_picture(text: str) -> Pasted:
-    """What the clipboard holds: a path, where its text is one, else a picture, written into the user's cache folder.
+def paste_picture(text: str) -> str:
+    """Return the path in the clipboard's text, else that of a new file with the clipboard's picture.
 
-    text: of the clipboard, "" without. Raises InputError where there is nothing to open, or a program is lacking.
+    Raises InputError if there is neither.
     """
-    path = _path_in(text)
-    return Pasted(path) if path is not None else _paste_pixels(_cache_folder() / PASTED_FOLDER)
+    return _path_in(text) or _paste_pixels(_cache_folder() / PASTED_FOLDER)
 
 
-def _paste_pixels(folder: Path) -> Pasted:
+def _paste_pixels(folder: Path) -> str:
     try:
         held = ImageGrab.grabclipboard()
     except NotImplementedError as error:
         raise InputError(LACKING) from error
-    except UnidentifiedImageError as error:  # xclip hands out text, too, where a picture is asked for
-        raise InputError(NOTHING) from error
     except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
-        raise InputError(
-            f"The picture in the clipboard cannot be read ({' '.join(str(error).split())[:120]})"
-        ) from error
+        raise InputError(f"{NOTHING} ({' '.join(str(error).split())[:120]})") from error
     if isinstance(held, list) and held:
-        return Pasted(held[0])
+        return held[0]
     if not isinstance(held, Image.Image):
         raise InputError(NOTHING)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        path = folder / f"pasted-{datetime.now():%Y-%m-%d-%H%M%S-%f}.png"
-        with write_file(path) as temporary:
-            held.save(temporary, "PNG")
-    except (OSError, ValueError) as error:
-        raise InputError(f"{folder}: the pasted picture cannot be kept there ({error})") from error
-    for old in sorted(folder.glob("pasted-*.png"))[:-MOST_KEPT]:
+    make_folder(folder)
+    path = folder / f"pasted-{datetime.now():%Y-%m-%d-%H%M%S-%f}.png"
+    with write_file(path) as temporary:
+        held.save(temporary, "PNG")
+    for old in sorted(folder.glob("pasted-*.png"))[:-MAX_PASTED]:
         old.unlink(missing_ok=True)
-    return Pasted(str(path))
+    return str(path)
 
 
 def _path_in(text: str) -> str | None:
-    """The file or folder that a text names, as file managers and terminals copy them."""
+    """Return the existing file or folder that a text names, as file managers and terminals copy them."""
     line = text.strip().partition("\n")[0].strip().strip("'\"")
     if line.startswith("file://"):
         line = unquote(urlsplit(line).path)
@@ -98,16 +82,14 @@ def _path_in(text: str) -> str | None:
 
 
 def _copying_command(path: Path) -> Sequence[str]:
-    """What puts a PNG file, given as its input too, into the clipboard. Raises InputError where there is nothing."""
+    """Return the command that puts a PNG file, also given as its input, into the clipboard. Raises InputError."""
     if sys.platform == "darwin":
         return ["osascript", "-e", "on run argv", "-e", _MAC_COPY, "-e", "end run", str(path)]
     if os.environ.get("WAYLAND_DISPLAY") and shutil.which("wl-copy"):
         return ["wl-copy", "--type", "image/png"]
     if sys.platform != "win32" and os.environ.get("DISPLAY") and shutil.which("xclip"):
         return ["xclip", "-selection", "clipboard", "-t", "image/png", "-i"]
-    raise InputError(
-        "Pictures cannot be copied on this system; save it instead." if sys.platform == "win32" else LACKING
-    )
+    raise InputError("Pictures cannot be copied on Windows. Save it instead." if sys.platform == "win32" else LACKING)
 
 
 def _cache_folder() -> Path:

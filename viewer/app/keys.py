@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from iibr_core.beyond.optics import CENTRE
 from iibr_core.types import ViewOffset
 from viewer.app.pointer import is_marking_gloss
-from viewer.model import depth, inspection, lens, messages, viewpoint, window
+from viewer.model import depth, inspection, lens, messages, selection, viewpoint, window
 from viewer.model.action import Action, do
 from viewer.model.commands import BY_NAME, COMMANDS
 from viewer.model.state.app_state import AppState
@@ -52,6 +52,10 @@ def _escape_actions(state: AppState) -> list[Action]:
         return [do(lens.take_gloss_brush, replace(state.gloss_brush, is_on=False))]
     if state.shows_before:
         return [do(lens.show_before, False)]
+    if state.tilt_handles is not None:
+        return [do(lens.show_tilt_handles, False)]
+    if state.selection is not None:
+        return [do(selection.deselect)]
     if state.brush.is_on:
         return [do(depth.set_brush, replace(state.brush, is_on=False))]
     if state.inspection.comparison is not None:

@@ -33,6 +33,7 @@ from viewer.app.window import Window, wake
 from viewer.background.entropy import EntropyWork
 from viewer.background.gloss_worker import GlossFinder
 from viewer.background.newest import Newest
+from viewer.background.surface import find_surface
 from viewer.display.filmstrip_view import FilmstripView
 from viewer.display.inspection_view import InspectionView
 from viewer.display.scene_view import VIEW_REFRESH_S, SceneView
@@ -92,6 +93,7 @@ class App:
         self.free_camera_view = FreeCameraView(self.scene_view, wake)
         self.gloss_finder = GlossFinder(self.scene_view.gloss_request, self.scene_view.take_gloss, wake)
         self._entropy = Newest("iibr-entropy", EntropyWork(), wake)
+        self._surfaces = Newest("iibr-surface", find_surface, wake)
         self._ui = UiHost(self.look(), self.window.handle)
         self._filmstrip = FilmstripView(self._gl, wake)
         self.scene_loader = SceneLoader(self.scene_view, self.inspection_view, self.window.set_title, wake)
@@ -187,6 +189,7 @@ class App:
         self.window.hide()
         self.scene_loader.close()
         self._entropy.close()
+        self._surfaces.close()
         self.gloss_finder.close()
         self._preferences.keep(self.state)
         self._sessions.close(self.state)
@@ -214,6 +217,8 @@ class App:
         actions = self._side_effects.run(self.state) + self._sessions.run(self.state)
         while (result := self._entropy.next_result()) is not None:
             actions += self.inspection_view.take_entropy(result)
+        while (found := self._surfaces.next_result()) is not None:
+            actions += self.inspection_view.take_surface(found)
         actions += self._notice_clock.expire(self.state, self._pace.stepped_at)
         if self.state.motion.is_running:
             actions.append(do(viewpoint.tick, self._pace.stepped_at))
@@ -244,13 +249,16 @@ class App:
         return [*actions, do(saving.quit_window)] if self.window.take_closing() else actions
 
     def _inspect(self) -> None:
-        """Look up the values under the pointer, and ask for the entropy map that is wanted."""
+        """Look up the values under the pointer, and ask for the maps that are wanted."""
         probe = self.inspection_view.probe(self.state)
         if probe != self.state.inspection.probe:
             self.do(do(inspection.set_probe, probe))
         request = self.inspection_view.entropy_request(self.state)
         if request is not None:
             self._entropy.submit(request)
+        surface = self.inspection_view.surface_request(self.state)
+        if surface is not None:
+            self._surfaces.submit(surface)
 
     def _show(self, frame: Frame) -> None:
         if frame == self._shown or not all(self.window.framebuffer_size):

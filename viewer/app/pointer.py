@@ -10,7 +10,7 @@ from iibr_core.scenes.lens_limits import focus_limits
 from iibr_core.scenes.rect import Rect
 from iibr_core.scenes.scene import Scene
 from iibr_core.types import ViewOffset
-from viewer.model import depth, gesture, inspection, lens, viewpoint
+from viewer.model import depth, gesture, inspection, lens, selection, viewpoint
 from viewer.model.action import Action, do
 from viewer.model.focal_plane import handle_points, place_of
 from viewer.model.inspection import view_at
@@ -169,16 +169,22 @@ def _zoom_actions(pointer: Pointer, layout: Layout, frame: Rect) -> list[Action]
 def _paint_actions(
     pointer: Pointer, layout: Layout, state: AppState, scene: Scene, picture: Rect, pick: Pick
 ) -> list[Action]:
-    """Paint on the surface under the pointer, wherever it lies in the photo, or with Ctrl pick its depth; the wheel
-    makes the brush larger.
+    """Return the actions of a tool: it paints on the surface under the pointer, picks its depth (Ctrl), or selects it.
+    The wheel sets the size of the brush, or the tolerance of the selection.
     """
     frame = layout.frame or picture
+    brush = state.brush
     if pointer.wheel and frame.contains(pointer.x, pointer.y):
-        return [do(depth.set_brush, replace(state.brush, radius=state.brush.radius * BRUSH_NOTCH**pointer.wheel))]
+        factor = BRUSH_NOTCH**pointer.wheel
+        if brush.tool == "select":
+            return [do(depth.set_brush, replace(brush, tolerance=brush.tolerance * factor))]
+        return [do(depth.set_brush, replace(brush, radius=brush.radius * factor))]
     begins = pointer.is_pressed and frame.contains(pointer.pressed_x, pointer.pressed_y)
     if not pointer.is_down or not (begins or state.stroke is not None):
         return []
     place, disparity = _place_in_photo(pointer, state, scene, picture, pick)
+    if brush.tool == "select":
+        return [do(selection.select, place)] if begins else []
     if state.stroke is None and pointer.holds_ctrl:
         return [do(depth.pick, DepthSample(place, disparity))]
     return [do(depth.paint, place)]

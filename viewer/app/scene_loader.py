@@ -31,6 +31,7 @@ from viewer.model.action import Action, do
 from viewer.model.carried_optics import NewDepth
 from viewer.model.depth import is_ahead, settings_for_worker
 from viewer.model.folder import AHEAD, SKETCHED_AHEAD, photos_ahead
+from viewer.model.lens import requested_strength
 from viewer.model.remedies import words_of
 from viewer.model.state.app_state import AppState
 from viewer.model.state.notices import Notice
@@ -141,7 +142,7 @@ class SceneLoader:
         """What was asked for, in small, as long as nothing else of it is there."""
         if state.source is None or self._scene_view.generation == state.generation or self._reuses_photo(state):
             return []
-        sketch = self.sketches.get(WantedPhoto(state.source, state.depth_strength))
+        sketch = self.sketches.get(WantedPhoto(state.source, requested_strength(state)))
         return self._take(replace(sketch, generation=state.generation), state) if sketch is not None else []
 
     def _take(self, result: SceneResult, state: AppState) -> list[Action]:
@@ -203,7 +204,7 @@ class SceneLoader:
         if not self._reuses_photo(state):
             self._keep_left(state)
             self._worker.cancel()
-            photo = WantedPhoto(source, state.depth_strength)
+            photo = WantedPhoto(source, requested_strength(state))
             ahead = self.ahead.get(photo)
             if ahead is None and (self.ahead.is_reading(photo) or not self._has_sketches(state)):
                 return
@@ -213,7 +214,7 @@ class SceneLoader:
             SceneRequest(
                 state.generation,
                 source,
-                state.depth_strength,
+                requested_strength(state),
                 loaded,
                 self._depth_settings,
                 plan=plan,
@@ -286,4 +287,5 @@ def _photos_to_sketch(state: AppState) -> list[WantedPhoto]:
 
 
 def _wanted(state: AppState, sources: Iterable[Source]) -> list[WantedPhoto]:
-    return [WantedPhoto(source, state.depth_strength) for source in sources]
+    strength = requested_strength(state)
+    return [WantedPhoto(source, strength if source is state.source else 1.0) for source in sources]

@@ -16,9 +16,9 @@ from iibr_core.formats.files import read_text
 from iibr_core.formats.outputs import make_folder, write_file
 from iibr_core.scenes.scene import Scene, Source
 from iibr_core.types import InputError
-from viewer.app.image_export import settings_of
 from viewer.model import messages, opening
 from viewer.model.action import Action, do
+from viewer.model.saving import settings_of
 from viewer.model.state.app_state import AppState
 from viewer.model.state.notices import Notice
 from viewer.model.state.saving import SavedSettings

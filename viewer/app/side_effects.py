@@ -1,68 +1,68 @@
-"""What the state asks of the outside world, done: files chosen, read and written. Actions come back."""
+"""Carries out tasks of the state (dialogs, files, downloads, jobs) and returns actions."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import replace
 from functools import partial
-from itertools import count
 from pathlib import Path
-from typing import Any
 
-from iibr_core.beyond.optics import ApertureMask
+import typer
+
 from iibr_core.exports.photo_folder import list_photos
 from iibr_core.scenes.scene import source_beside
-from viewer.app.clipboard import Pasted, paste_picture
-from viewer.app.dialogs import Dialog, SaveDialog, contents_of, has_dialogs
-from viewer.app.exporter import add_export
-from viewer.app.job_queue import JobQueue
-from viewer.app.picture_saver import add_copy, add_save
-from viewer.app.save_places import inputs_of_scene
+from viewer.app.clipboard import paste_picture
+from viewer.app.dialogs import Dialog, ask_for_path, ask_for_place, has_dialogs
+from viewer.app.jobs import Jobs
+from viewer.app.picture_files import inputs_of_scene
+from viewer.app.saving import add_copy, add_export, add_save
 from viewer.background.depth_models import actions_of_download, download, list_models
-from viewer.background.file_worker import FileRequest, FileResult, FileWorker
-from viewer.background.job_threads import Failed
-from viewer.background.newest import Newest
+from viewer.background.newest import Newest, message_of
 from viewer.display.scene_view import SceneView
 from viewer.model import depth_models, folder, lens, messages, opening
 from viewer.model.action import Action, ask, do, forget_tasks
 from viewer.model.commands import action_for_path
 from viewer.model.photo_facts import set_facts
+from viewer.model.saving import path_beside
 from viewer.model.state.app_state import AppState
 from viewer.model.state.depth_models import (
     CancelGetTask,
     GetModelTask,
     ListModelsTask,
 )
-from viewer.model.state.exporting import ExportTask
 from viewer.model.state.folder import ListFolderTask
-from viewer.model.state.jobs import CancelJobTask
 from viewer.model.state.notices import Notice
 from viewer.model.state.photo_facts import PhotoFacts, ReadFactsTask
-from viewer.model.state.prompts import FolderContents, ListContentsTask, PathPrompt
-from viewer.model.state.saving import CopyTask, PasteTask, path_beside
+from viewer.model.state.prompts import PathPrompt
 from viewer.model.state.tasks import (
+    CancelJobTask,
     ChoosePlaceTask,
     ChooseTask,
+    CopyTask,
+    ExportTask,
+    PasteTask,
     ReadMaskTask,
     SaveTask,
+    ShowFileTask,
+    TakePathTask,
     Task,
 )
 
 
 class SideEffects:
-    """Takes tasks up in the window's thread and has them carried out beside it; a file dialog is asked each turn."""
+    """Begins tasks in the window's thread; files are read and written in other threads."""
 
     def __init__(self, scene_view: SceneView, wake: Callable[[], None], clipboard_text: Callable[[], str]) -> None:
-        """wake: called, in another thread, when something came of a task. clipboard_text: what it holds, "" without."""
-        self._clipboard_text = clipboard_text
-        self._jobs = JobQueue(scene_view, wake)
-        self._files = FileWorker("iibr-files", wake)
+        """wake: called, in a thread, when there is a result. clipboard_text: returns the clipboard's text or ""."""
+        self._wake, self._clipboard_text = wake, clipboard_text
+        self._jobs = Jobs(scene_view, wake)
+        self._executor = ThreadPoolExecutor(2, "iibr-files")
+        self._results: list[Future[Action]] = []
         self._downloads = Newest("iibr-models", download, wake)
-        self._ids = count(1)
-        self._under_way: set[int] = set()
         self._masks: list[Path] = []
-        self._dialog: Dialog | SaveDialog | None = None
+        self._dialog: Dialog | None = None
 
     @property
     def is_waiting(self) -> bool:
@@ -75,58 +75,51 @@ class SideEffects:
         return self._jobs.is_drawing
 
     def run(self, state: AppState) -> list[Action]:
-        """Take up the state's tasks and say what came of earlier ones, and of a dialog that was closed."""
+        """Begin the state's tasks, and return the results of earlier ones."""
         actions: list[Action] = [do(forget_tasks)] if state.tasks else []
-        actions += self._take_results(state) + self._take_downloads() + self._take_answer(state)
+        actions += self._take_results() + self._take_downloads() + self._take_answer(state)
         for task in state.tasks:
-            if isinstance(task, PasteTask) and self._jobs.is_copying:
-                actions.append(do(ask, task))  # later: the copy is not in the clipboard yet
-                continue
             actions += self._begin(task, state)
         return actions
 
     def draw(self, state: AppState, budget_s: float) -> list[Action]:
-        """Continue what is being saved, copied and exported, for about that long."""
+        """Continue saves, copies and exports for about `budget_s`."""
         return self._jobs.advance(state, budget_s)
 
     def close(self) -> None:
-        """Finish the files that are being written; give up everything else."""
+        """Finish the files that are being written; cancel everything else."""
         if self._dialog is not None:
             self._dialog.close()
         self._jobs.close()
         self._downloads.close()
-        self._files.close(cancels=False)
+        self._executor.shutdown()
 
     def _begin(self, task: Task, state: AppState) -> list[Action]:
         match task:
+            case ChooseTask(what) if not has_dialogs():
+                return [do(messages.show_prompt, PathPrompt(what, _folder_beside(state)))]
             case ChooseTask(what):
-                if not has_dialogs():
-                    return [do(messages.show_prompt, PathPrompt(what, _folder_beside(state)))]
-                self._dialog = self._dialog or Dialog(what, state.source.path if state.source else "")
-            case ListContentsTask(folder, what):
-                self._submit(partial(contents_of, folder, what))
+                beside = state.source.path if state.source else next(iter(state.recent), "")
+                self._dialog = self._dialog or ask_for_path(what, beside)
+            case TakePathTask(prompt):
+                return _take_path(prompt, state)
             case ChoosePlaceTask(prompt):
-                if not has_dialogs():
-                    return [
-                        do(
-                            messages.show_prompt,
-                            PathPrompt("place", os.path.abspath(os.path.expanduser(prompt.path)), None, prompt),
-                        )
-                    ]
-                self._dialog = self._dialog or SaveDialog(prompt)
+                self._dialog = self._dialog or ask_for_place(prompt)
             case ReadMaskTask(path):
                 self._masks.append(Path(os.path.expanduser(path)))
                 self._submit(partial(_read_mask, self._masks[-1]))
             case ReadFactsTask(path):
                 self._submit(partial(_read_facts, path))
             case ListFolderTask(path):
-                self._submit(partial(_list_folder, path))
+                self._submit(lambda: do(folder.set_photos, path, list_photos(path)))
             case SaveTask():
                 return add_save(task, state, self._inputs(state), self._jobs)
             case ExportTask():
                 return add_export(task, state, self._inputs(state), self._jobs)
             case CancelJobTask(id_):
                 self._jobs.cancel(id_)
+            case ShowFileTask(path, in_folder):
+                typer.launch(path, locate=in_folder)
             case ListModelsTask():
                 self._submit(lambda: do(depth_models.set_known, list_models()))
             case GetModelTask(name):
@@ -136,32 +129,23 @@ class SideEffects:
                 return [do(depth_models.set_downloading, None)]
             case CopyTask():
                 return add_copy(state, self._jobs)
+            case PasteTask() if self._jobs.is_copying:
+                return [do(ask, task)]  # the copy is not in the clipboard yet
             case PasteTask():
-                self._submit(partial(paste_picture, self._clipboard_text()))
+                self._submit(lambda: do(_open, paste_picture(self._clipboard_text())))
         return []
 
     def _inputs(self, state: AppState) -> tuple[Path, ...]:
         return (*inputs_of_scene(state), *self._jobs.inputs, *self._masks)
 
-    def _submit(self, work: Callable[[], Any]) -> None:
-        id_ = next(self._ids)
-        self._under_way.add(id_)
-        self._files.submit(FileRequest(id_, work))
+    def _submit(self, work: Callable[[], Action]) -> None:
+        self._results.append(self._executor.submit(work))
+        self._results[-1].add_done_callback(lambda _: self._wake())
 
-    def _take_results(self, state: AppState) -> list[Action]:
-        actions: list[Action] = []
-        while (result := self._files.next_result()) is not None:
-            self._under_way.discard(result.id)
-            actions += _actions_from(result, state)
-        if self._files.is_lost and self._under_way:
-            self._under_way.clear()
-            actions.append(
-                do(
-                    messages.notify,
-                    Notice("Reading or writing a file stopped unexpectedly. Try it again.", is_error=True),
-                )
-            )
-        return actions
+    def _take_results(self) -> list[Action]:
+        done = [result for result in self._results if result.done()]
+        self._results = [result for result in self._results if result not in done]
+        return [_action_of(result) for result in done]
 
     def _take_downloads(self) -> list[Action]:
         actions: list[Action] = []
@@ -170,67 +154,60 @@ class SideEffects:
         return actions
 
     def _take_answer(self, state: AppState) -> list[Action]:
+        """Use the answer of the dialog once it is closed."""
         answer = self._dialog.answer() if self._dialog is not None else None
         if self._dialog is None or answer is None:
             return []
-        dialog, self._dialog = self._dialog, None
+        asked, self._dialog = self._dialog.asked, None
         if not answer:
             return []
-        if isinstance(dialog, SaveDialog):
-            there = os.path.lexists(answer)
-            return [do(messages.show_prompt, replace(dialog.prompt, path=answer, already_there=there, problem=""))]
-        return [action_for_path(dialog.what, answer, state)]
+        if isinstance(asked, str):
+            return [action_for_path(asked, answer, state)]
+        there = os.path.lexists(answer)
+        return [do(messages.show_prompt, replace(asked, path=answer, already_there=there, problem=""))]
+
+
+def _take_path(prompt: PathPrompt, state: AppState) -> list[Action]:
+    """Use a typed path; if nothing lies there, keep the prompt and say so."""
+    path = prompt.path.strip()
+    if not os.path.exists(os.path.expanduser(path)):
+        problem = f"There is no file or folder {path}." if path else "Type a path."
+        return [do(messages.show_prompt, replace(prompt, problem=problem))]
+    return [do(messages.show_prompt, None), action_for_path(prompt.what, path, state)]
 
 
 def _folder_beside(state: AppState) -> str:
-    """Where to look for what is to be opened: beside what is open, at home before anything was."""
-    path = "~/photo" if state.source is None else path_beside(state.source.path, "photo")
-    return os.path.join(os.path.dirname(os.path.abspath(os.path.expanduser(path))), "")
+    """Return the folder of the open photo, with a separator at its end."""
+    path = state.source.path if state.source is not None else next(iter(state.recent), "~/photo")
+    return os.path.join(os.path.dirname(path_beside(path, "photo")), "")
 
 
-def is_scene_open(state: AppState) -> bool:
-    """Whether what was asked for last is open."""
-    return state.scene is not None and state.scene.source is state.source
+def _action_of(result: Future[Action]) -> Action:
+    error = result.exception()
+    if error is None:
+        return result.result()
+    text = message_of(error) if isinstance(error, Exception) else repr(error)
+    return do(messages.notify, Notice(text, is_error=True))
 
 
-def _actions_from(result: FileResult, state: AppState) -> list[Action]:
-    if isinstance(result, Failed):
-        return [do(messages.notify, Notice(result.message, is_error=True))]
-    match result.value:
-        case ApertureMask() as mask:
-            return [do(lens.set_aperture_shape, replace(state.optics.aperture_shape, kind="mask", mask=mask))]
-        case FolderContents() as contents:
-            return _show_contents(contents, state)
-        case PhotoFacts() as facts:
-            return [do(set_facts, facts)]
-        case Action() as found:
-            return [found]
-        case Pasted(path):
-            return [do(opening.open_source, source_beside(state.source, path))]
-    raise AssertionError(f"nothing comes of {result.value!r}")
+def _open(state: AppState, path: str) -> AppState:
+    return opening.open_source(state, source_beside(state.source, path))
 
 
-def _show_contents(contents: FolderContents, state: AppState) -> list[Action]:
-    """Where they are still asked for."""
-    prompt = state.prompt
-    if not isinstance(prompt, PathPrompt) or prompt.contents is None or prompt.contents.folder != contents.folder:
-        return []
-    return [do(messages.show_prompt, replace(prompt, contents=contents))]
-
-
-def _read_facts(path: str) -> PhotoFacts:
-    """Nothing where the file is gone by now."""
+def _read_facts(path: str) -> Action:
     from iibr_core.formats.images.metadata import camera_facts, read_metadata
 
-    return PhotoFacts(path, camera_facts(read_metadata(Path(path))))
+    return do(set_facts, PhotoFacts(path, camera_facts(read_metadata(Path(path)))))
 
 
-def _read_mask(path: Path) -> ApertureMask:
-    """Raises InputError where it is no mask."""
+def _read_mask(path: Path) -> Action:
+    """Read an aperture mask and return the action that uses it. Raises InputError."""
     from viewer.model.aperture_mask import read_mask
 
-    return read_mask(path)
+    mask = read_mask(path)
 
+    def set_mask(state: AppState) -> AppState:
+        shape = replace(state.optics.aperture_shape, kind="mask", mask=mask)
+        return lens.set_aperture_shape(state, shape)
 
-def _list_folder(path: str) -> Action:
-    return do(folder.set_photos, path, list_photos(path))
+    return do(set_mask)

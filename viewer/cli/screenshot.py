@@ -136,7 +136,7 @@ def screenshot(
 
     Example: iibr screenshot photo.png --view 2,-1 --focus 0.5 --aperture 4 -o out.png
     """
-    from viewer.app.save_places import require_picture_place
+    from viewer.app.picture_files import require_picture_place
 
     shot = _Shot(scene.source(path, grid, focus_disparity), scene.depth_strength, size)
     require_heeded(context, path)
@@ -198,7 +198,8 @@ def _pictures_of(scene: Scene, shot: _Shot, viewer: OffscreenScene, ui: bool) ->
 def _write(shot: _Shot, output: Path, ui: bool, backend: Backend) -> tuple[tuple[str, ...], DepthOrigin | None]:
     """Draw the picture and write it; returns what is to be said of the scene, and where its depth came from."""
     from iibr_core.formats.images.photo import MADE_SMALLER
-    from viewer.app.image_export import export_image, export_picture, shot_of
+    from iibr_core.formats.images.write import write_picture
+    from viewer.app.picture_files import export_picture, shot_of
     from viewer.display.offscreen import OffscreenScene
 
     with OffscreenScene(backend.value) as viewer:
@@ -216,7 +217,7 @@ def _write(shot: _Shot, output: Path, ui: bool, backend: Backend) -> tuple[tuple
             else:
                 pixels = viewer.picture(size, is_float(output, shot.form), saved.color_space)
     if ui:
-        export_image(output, pixels)
+        write_picture(output, pixels)
     else:
         export_picture(output, pixels, saved)
     clamped = shot.lens.notes(viewer.state.optics)

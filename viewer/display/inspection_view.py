@@ -8,33 +8,37 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.scenes.rect import WHOLE, Rect
-from iibr_core.scenes.scene import Scene
+from iibr_core.scenes.scene import LoadedPhoto, Scene
 from iibr_core.types import ViewUpdate
 from viewer.background.entropy import Entropy, EntropyRequest
 from viewer.background.newest import Failed
+from viewer.background.surface import Surface, SurfaceRequest
 from viewer.display.scene_view import SceneView
 from viewer.gpu.context import GLContext
 from viewer.gpu.inspection_passes import InspectionPasses, Line, OverlayStyle
 from viewer.gpu.light_field_texture import LightFieldTexture
 from viewer.gpu.refocus.picture_drawing import PictureDrawing
 from viewer.gpu.refocus.view_sampling import nearest_present
-from viewer.model import inspection, messages
+from viewer.model import inspection, messages, selection
 from viewer.model.action import Action, do
 from viewer.model.colormap import VIRIDIS
 from viewer.model.inspection import NO_INSPECTION_TEXTURES, InspectionTextures, sheet_cells, view_near
 from viewer.model.layout import Layout, whole_pixels
 from viewer.model.state.app_state import AppState, Hover
-from viewer.model.state.inspection import Origin, Probe, ViewIndex
+from viewer.model.state.inspection import Origin, OverlayKind, Probe, ViewIndex
 from viewer.model.state.notices import Notice
 
-INPAINTED_RGB = (255, 184, 60)
+MASK_COLORS = {"inpainted": (255, 184, 60), "surface": (64, 160, 255)}
+"""Colours (sRGB bytes) of overlays that are masks."""
+MAX_BRUSH_OPACITY = 0.5
+"""Largest opacity of overlays while a brush is in hand."""
 SNAPSHOT_BUDGET_S = 0.025
 """Seconds per turn for drawing the snapshot's picture."""
 
@@ -51,6 +55,14 @@ class _ViewImage:
     previews: int
 
 
+class _OverlayValues(NamedTuple):
+    """A map over the picture. values: (H, W) in `view`, 255 = 1; None: its disparity."""
+
+    kind: OverlayKind | Literal["surface"]
+    view: ViewIndex
+    values: NDArray[np.uint8] | None
+
+
 class InspectionView:
     """Draws the images that a state asks for, and keeps which pixels of the views were inpainted."""
 
@@ -62,6 +74,8 @@ class InspectionView:
         self._inpainted: dict[ViewIndex, NDArray[np.uint8]] = {}
         self._entropy: Entropy | None = None
         self._entropy_asked: tuple[int, ViewIndex] | None = None
+        self._surface: Surface | None = None
+        self._surface_asked: tuple[object, LoadedPhoto] | None = None
         self._snapshot: tuple[object, PictureDrawing] | None = None
         self._probed: tuple[object, Probe | None] = (None, None)
 
@@ -127,6 +141,25 @@ class InspectionView:
         self._entropy = result
         return []
 
+    def surface_request(self, state: AppState) -> SurfaceRequest | None:
+        """Return the surface to be found now; None where none is selected, or it was asked for before."""
+        scene, loaded = state.scene, self._scene_view.loaded
+        if state.selection is None or scene is None or scene.plan is None or loaded is None:
+            self._surface = self._surface_asked = None
+            return None
+        asked = state.selection.place, state.brush.tolerance
+        if self._surface_asked is not None and self._surface_asked[0] == asked and self._surface_asked[1] is loaded:
+            return None
+        self._surface_asked = asked, loaded
+        return SurfaceRequest(*asked, loaded, scene.plan)
+
+    def take_surface(self, result: Surface | Failed[SurfaceRequest]) -> list[Action]:
+        """Show the selected surface."""
+        if isinstance(result, Failed):
+            return [do(messages.notify, Notice(result.message, is_error=True)), do(selection.deselect)]
+        self._surface = result
+        return [do(selection.set_range, result.range_px)]
+
     def release(self) -> None:
         """Free the GL objects."""
         self._stop_snapshot()
@@ -189,31 +222,46 @@ class InspectionView:
     def _overlay(
         self, state: AppState, scene: Scene, field: LightFieldTexture, layout: Layout, base: _ViewImage
     ) -> int | None:
-        assert layout.frame_px is not None
-        size_px, part = layout.frame_px.size, layout.part
-        kind, optics = state.inspection.overlay, state.optics
-        view: ViewIndex = tuple(nearest_present(field.present)[view_near(optics.eye, field.grid)].tolist())
-        if kind is None or not field.has_disparity[view] or (kind != "disparity" and field.grid != scene.grid):
+        """Return the map over the picture: of the selected surface, or the overlay that was chosen."""
+        found = self._overlay_values(state, scene, field)
+        if found is None or layout.frame_px is None or not field.has_disparity[found.view]:
             return None
-        values = None
-        if kind == "inpainted":
-            values = self._mask_of(view, field)
-        elif kind == "entropy":
-            if self._entropy is None or self._entropy.generation != base.generation:
-                return None
-            view, values = self._entropy.view, self._entropy.values
-        colors = (INPAINTED_RGB,) * len(VIRIDIS) if kind == "inpainted" else VIRIDIS
-        ends = scene.disparity_range_px if kind == "disparity" else (0.0, 1.0)
+        optics, size_px, part = state.optics, layout.frame_px.size, layout.part
+        opacity = state.inspection.opacity
+        if found.kind == "surface" or state.brush.is_on:  # the photo must be seen, to paint on it
+            opacity = min(opacity, MAX_BRUSH_OPACITY)
+        ends = scene.disparity_range_px if found.kind == "disparity" else (0.0, 1.0)
         ends = ends if ends[1] > ends[0] else (ends[0] - 0.5, ends[0] + 0.5)
-        record = base, kind, view, optics.eye, optics.dolly, size_px, part, state.inspection.opacity
-        if not field.present[view]:
-            return None
-
-        def draw() -> int:
-            style = OverlayStyle(colors, ends, state.inspection.opacity, is_mask=kind == "inpainted")
-            return self._passes.draw_overlay(field, optics, view, size_px, style, values, part)
-
+        color = MASK_COLORS.get(found.kind)
+        style = OverlayStyle((color,) * len(VIRIDIS) if color else VIRIDIS, ends, opacity, is_mask=color is not None)
+        record = (
+            base,
+            found.kind,
+            found.view,
+            self._entropy,
+            self._surface,
+            optics.eye,
+            optics.dolly,
+            size_px,
+            part,
+            style,
+        )
+        draw = partial(self._passes.draw_overlay, field, optics, found.view, size_px, style, found.values, part)
         return self._once("overlay", record, draw)
+
+    def _overlay_values(self, state: AppState, scene: Scene, field: LightFieldTexture) -> _OverlayValues | None:
+        """Return the map to be shown; None if there is none, or not yet."""
+        kind = state.inspection.overlay
+        if state.selection is not None and self._surface is not None:
+            return _OverlayValues("surface", field.grid.centre, self._surface.mask)
+        if kind is None or (kind != "disparity" and field.grid != scene.grid):
+            return None
+        if kind == "entropy":
+            entropy = self._entropy
+            is_known = entropy is not None and entropy.generation == self._scene_view.generation
+            return _OverlayValues("entropy", entropy.view, entropy.values) if entropy is not None and is_known else None
+        view: ViewIndex = tuple(nearest_present(field.present)[view_near(state.optics.eye, field.grid)].tolist())
+        return _OverlayValues(kind, view, self._mask_of(view, field) if kind == "inpainted" else None)
 
     def _mask_of(self, view: ViewIndex, field: LightFieldTexture) -> NDArray[np.uint8]:
         packed = self._inpainted.get(view)

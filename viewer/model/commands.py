@@ -9,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import PurePath
 
-from iibr_core.depth.editing.edits import BRUSH_TOOLS, BrushTool
+from iibr_core.depth.editing.edits import BRUSH_TOOLS
 from iibr_core.exports.loops import LOOPS, LoopKind
 from iibr_core.scenes.scene import Source, source_beside, source_with_map
 from viewer.model import (
@@ -29,13 +29,13 @@ from viewer.model import (
 from viewer.model.action import Action, ask, do
 from viewer.model.demo_photo import demo_photo
 from viewer.model.state.app_state import AppState
+from viewer.model.state.depth import Tool
 from viewer.model.state.depth_models import ModelsPrompt
 from viewer.model.state.inspection import COMPARISONS, OVERLAYS, Comparison, OverlayKind
 from viewer.model.state.lens import PRESETS
 from viewer.model.state.preferences import SECTIONS
 from viewer.model.state.prompts import ChoiceOf, PalettePrompt
-from viewer.model.state.saving import CopyTask, PasteTask
-from viewer.model.state.tasks import ChooseTask, ReadMaskTask
+from viewer.model.state.tasks import ChooseTask, CopyTask, PasteTask, ReadMaskTask
 from viewer.model.state.viewpoint import Zoom
 
 FONT_STEP = 1.1
@@ -57,12 +57,13 @@ COMPARE_WORDS: dict[Comparison, str] = {
     "photo": "Compare with the photo",
     "snapshot": inspection.COMPARE_SNAPSHOT,
 }
-BRUSH_WORDS: dict[BrushTool, str] = {
+BRUSH_WORDS: dict[Tool, str] = {
     "nearer": "Nearer",
     "farther": "Farther",
     "smooth": "Smooth",
     "level": "Level",
     "fill": "Bucket",
+    "select": "Select",
 }
 OVERLAY_WORDS: dict[OverlayKind, str] = {"disparity": "depth", "entropy": "entropy", "inpainted": "inpainting"}
 LOOP_WORDS: dict[LoopKind, str] = {"circle": "Circle", "eight": "Figure of eight", "swing": "Swing"}
@@ -132,7 +133,7 @@ def _own_pixels(state: AppState) -> Action:
     return do(viewpoint.set_zoom, Zoom(1.0, centre))
 
 
-def _brush_with(tool: BrushTool) -> Callable[[AppState], Action]:
+def _brush_with(tool: Tool) -> Callable[[AppState], Action]:
     return lambda state: do(depth.set_brush, replace(state.brush, tool=tool, is_on=True))
 
 
@@ -158,6 +159,7 @@ COMMANDS: tuple[Command, ...] = (
     Command("Photos by name", _always(do(folder.set_order, "name"))),
     Command("Photos by time", _always(do(folder.set_order, "time"))),
     Command("Share or export…", _always(do(saving.ask_to_export)), (Chord("e", ctrl=True),)),
+    Command("Exports…", _always(do(messages.show_prompt, "exports"))),
     Command("Undo", _always(do(history.undo)), (Chord("z", ctrl=True),), repeats=True),
     Command(
         "Redo", _always(do(history.redo)), (Chord("z", ctrl=True, shift=True), Chord("y", ctrl=True)), repeats=True
@@ -183,6 +185,7 @@ COMMANDS: tuple[Command, ...] = (
     Command("Tilt handles", lambda state: do(lens.show_tilt_handles, state.tilt_handles is None), (Chord("t"),)),
     Command("Depth brush", _toggle_brush, (Chord("b"),)),
     *(Command(f"Depth brush: {BRUSH_WORDS[tool].lower()}", _brush_with(tool)) for tool in BRUSH_TOOLS),
+    Command("Select a subject", _brush_with("select")),
     Command("Invert depth", _invert_depth),
     Command("Reset depth edits", _always(do(depth.reset))),
     Command("Open a depth map…", _always(do(ask, ChooseTask("map")))),

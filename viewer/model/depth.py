@@ -10,6 +10,7 @@ from iibr_core.depth.editing.edits import (
     GAMMA_LIMITS,
     MAX_POINTS,
     RADIUS_LIMITS,
+    TOLERANCE_LIMITS,
     UNEDITED,
     DepthEdits,
     Stroke,
@@ -17,6 +18,7 @@ from iibr_core.depth.editing.edits import (
 from iibr_core.scenes.lens_limits import clamp
 from iibr_core.scenes.scene import DepthSettings
 from viewer.model.history import record_edit, undoable
+from viewer.model.inspection import set_overlay
 from viewer.model.messages import notify
 from viewer.model.state.app_state import AppState
 from viewer.model.state.depth import Brush, DepthSample
@@ -54,18 +56,28 @@ def reset(state: AppState) -> AppState:
 
 def set_brush(state: AppState, brush: Brush) -> AppState:
     """Take this brush or put it away. Taking it opens the section with its settings."""
-    if not (isfinite(brush.radius) and isfinite(brush.strength)):
+    if not all(map(isfinite, (brush.radius, brush.strength, brush.tolerance))):
         return state
     if not _is_editable(state):
         is_refused = brush.is_on and state.scene is not None
         return notify(state, Notice(NO_DEPTH_HERE)) if is_refused else state
-    limited = replace(brush, radius=clamp(brush.radius, *RADIUS_LIMITS), strength=clamp(brush.strength, 0.0, 1.0))
     gloss_brush = replace(state.gloss_brush, is_on=state.gloss_brush.is_on and not brush.is_on)
-    taken = replace(state, brush=limited, gloss_brush=gloss_brush)
-    if state.brush.is_on or not brush.is_on:
-        return taken
-    sections = with_sections(state.preferences.open_sections, "depth")
-    return replace(taken, preferences=replace(state.preferences, open_sections=sections))
+    is_selecting = brush.is_on and brush.tool == "select"
+    taken = replace(state, gloss_brush=gloss_brush, selection=state.selection if is_selecting else None)
+    if brush.is_on and not state.brush.is_on:
+        sections = with_sections(state.preferences.open_sections, "depth")
+        taken = replace(taken, preferences=replace(state.preferences, open_sections=sections))
+    return _with_brush_overlay(taken, _clamp_brush(brush))
+
+
+def _with_brush_overlay(state: AppState, brush: Brush) -> AppState:
+    """Return the state with this brush. A brush that paints brings the depth overlay, and takes it away again."""
+    overlay = state.inspection.overlay
+    paints, painted = (tool.is_on and tool.tool != "select" for tool in (brush, state.brush))
+    if paints and not painted and overlay is None:
+        return set_overlay(replace(state, brush=replace(brush, brought_overlay=True)), "disparity")
+    state = replace(state, brush=brush if paints else replace(brush, brought_overlay=False))
+    return set_overlay(state, None) if painted and not paints and brush.brought_overlay else state
 
 
 def paint(state: AppState, place: tuple[float, float]) -> AppState:
@@ -73,7 +85,8 @@ def paint(state: AppState, place: tuple[float, float]) -> AppState:
     if state.scene is None or not (_is_editable(state) and all(map(isfinite, place))):
         return state
     if state.stroke is None:
-        return replace(state, stroke=_first_stroke(state.brush, place))
+        stroke = _first_stroke(state.brush, place)
+        return state if stroke is None else replace(state, stroke=stroke)
     stroke, size = state.stroke, state.scene.size
     last = stroke.points[-1]
     step = hypot(place[0] - last[0], (place[1] - last[1]) * size.height / size.width)
@@ -131,11 +144,23 @@ def _with_settings(state: AppState, settings: DepthSettings, is_finished: bool =
     return replace(state, depth=settings, generation=state.generation + 1 if is_finished else state.generation)
 
 
-def _first_stroke(brush: Brush, place: tuple[float, float]) -> Stroke:
-    """Return a new stroke; tools that paint one depth paint it whole."""
+def _first_stroke(brush: Brush, place: tuple[float, float]) -> Stroke | None:
+    """Return a new stroke, None if the tool does not paint; tools that paint one depth paint it whole."""
+    if brush.tool == "select":
+        return None
     is_whole = brush.tool in DEPTH_TOOLS
     taken_from = brush.sample.place if brush.sample is not None and is_whole else None
-    return Stroke(brush.tool, (place,), brush.radius, 1.0 if is_whole else brush.strength, taken_from)
+    strength = 1.0 if is_whole else brush.strength
+    return Stroke(brush.tool, (place,), brush.radius, strength, taken_from, brush.tolerance)
+
+
+def _clamp_brush(brush: Brush) -> Brush:
+    return replace(
+        brush,
+        radius=clamp(brush.radius, *RADIUS_LIMITS),
+        strength=clamp(brush.strength, 0.0, 1.0),
+        tolerance=clamp(brush.tolerance, *TOLERANCE_LIMITS),
+    )
 
 
 def _clamp_tone(tone: DepthEdits, before: DepthEdits) -> DepthEdits:

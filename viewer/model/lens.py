@@ -41,7 +41,7 @@ def _lens_verb(edit: Callable[Concatenate[Optics, P], Optics]) -> Callable[Conca
 
     @undoable
     @wraps(edit)
-    def verb(state: AppState, *args: P.args, **kwargs: P.kwargs) -> AppState:
+    def verb(state: AppState, /, *args: P.args, **kwargs: P.kwargs) -> AppState:
         return state if state.scene is None else _edited(state, state.scene, edit(state.optics, *args, **kwargs))
 
     return verb
@@ -193,6 +193,12 @@ def set_depth_strength(state: AppState, strength: float, is_finished: bool) -> A
     restarts = is_finished and state.source is not None
     generation = state.generation + 1 if restarts else state.generation
     return replace(state, depth_strength=clamp(strength, 0.0, DEPTH_STRENGTH_LIMIT), generation=generation)
+
+
+def requested_strength(state: AppState) -> float:
+    """Return the depth strength of the scene that was asked for last; the next photo begins with the usual one."""
+    is_next = state.scene is not None and state.scene.source is not state.source
+    return 1.0 if is_next else state.depth_strength
 
 
 # Gloss

@@ -150,15 +150,17 @@ def _begin_scene(state: AppState, old: Scene | None, scene: Scene) -> AppState:
         recent = tuple(path for path in recent if path != old.source.path)  # a walk through a folder leaves one path
     state = replace(
         state,
-        notices=tuple(notice for notice in state.notices if notice.stays),
+        notices=tuple(notice for notice in state.notices if notice.is_result),
         history=History(),
         inspection=state.inspection.for_next_scene,
         motion=Motion(speed=state.motion.speed),
         recent=with_recent(recent, scene.source.path),
         folder=state.folder if state.folder is not None and state.folder.path == folder else None,
         depth=DepthSettings(scene.source.depth.refine),
+        depth_strength=1.0 if old is not None else state.depth_strength,
         stroke=None,
         brush=replace(state.brush, sample=None),
+        selection=None,
         tilt_handles=None,
         hover=None,
         zoom=None,

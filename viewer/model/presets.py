@@ -10,10 +10,8 @@ from iibr_core.scenes.scene import Scene
 from viewer.model.state.app_state import AppState
 from viewer.model.state.lens import PRESETS, PresetName
 
-PORTRAIT_APERTURE = 0.6
-"""Aperture of a portrait, as a share of the widest."""
-PORTRAIT_RANGE = 0.06
-"""Sharp depth before and behind a portrait's focus, as a share of all disparity: a face from nose to ear."""
+PORTRAIT_RANGE = 0.1
+"""Sharp depth before and behind a portrait's focus, as a share of all disparity: a head and its shoulders."""
 
 
 def preset_optics(name: PresetName, optics: Optics, scene: Scene, subject: float) -> Optics:
@@ -24,13 +22,11 @@ def preset_optics(name: PresetName, optics: Optics, scene: Scene, subject: float
     plain = replace(optics, focus_range=0.0, focus_tilt=(0.0, 0.0))
     if name == "everything sharp":
         return replace(plain, aperture_diameter=0.0)
+    plain = replace(plain, aperture_diameter=aperture_limit(scene.grid), aperture_shape=ApertureShape())
     if name == "macro":
-        focus, range_, share = scene.disparity_range_px[1], 0.0, 1.0
-    else:
-        focus, range_, share = subject, PORTRAIT_RANGE * focus_span(scene), PORTRAIT_APERTURE
-    diameter = share * aperture_limit(scene.grid)
-    shaped = replace(plain, aperture_diameter=diameter, aperture_shape=ApertureShape())
-    return clamp_optics(replace(shaped, focus_disparity=focus, focus_range=range_), scene)
+        return replace(plain, focus_disparity=scene.disparity_range_px[1])
+    focused = replace(plain, focus_disparity=subject, focus_range=PORTRAIT_RANGE * focus_span(scene))
+    return clamp_optics(focused, scene)
 
 
 def subject_disparity(state: AppState, scene: Scene) -> float:

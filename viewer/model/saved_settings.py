@@ -25,7 +25,6 @@ from iibr_core.scenes.scene import Source
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, InputError
 from viewer.model.gloss_bounds import GlossBounds
-from viewer.model.painting_work import require_bounded
 from viewer.model.state.saving import SavedSettings
 
 FORMAT = 1
@@ -39,6 +38,9 @@ NAMED_FIELDS = 3
 
 MOST_SIDE_PX, MOST_PIXELS = 16_384, 100_000_000
 """Largest picture that a file may ask for."""
+
+MAX_STROKES = 10_000
+"""Largest number of strokes in a file from elsewhere: as many as days of work."""
 
 SidePx = Annotated[int, msgspec.Meta(ge=1, le=1_000_000)]
 Views = Annotated[int, msgspec.Meta(ge=1, le=99)]
@@ -112,8 +114,9 @@ def settings_from_text(text: str, name: str, is_own: bool = False) -> SavedSetti
         gloss = read.optics.gloss
         if gloss is not None:
             msgspec.convert(whole["optics"]["gloss"], GlossBounds)
-        if not is_own:
-            require_bounded(read.depth_edits.strokes, gloss.surface.strokes if gloss else ())
+        strokes = len(read.depth_edits.strokes) + (len(gloss.surface.strokes) if gloss is not None else 0)
+        if not is_own and strokes > MAX_STROKES:
+            raise ValueError(f"{strokes:,} strokes, at most {MAX_STROKES:,} are painted")
     except (ValueError, RecursionError) as error:
         reason = " ".join(str(error).replace("- at `$.", "at `").split())[:120]
         raise InputError(

@@ -6,13 +6,99 @@ from dataclasses import replace
 from pathlib import Path, PurePath
 
 from iibr_core.exports.kinds import EXPORTS, ExportKind, ExportOptions, Purpose, export_path
+from iibr_core.runtime.resources import resource_folder
 from iibr_core.scenes.scene import Scene
+from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import InputError
+from viewer.model.messages import notify
 from viewer.model.state.app_state import AppState
-from viewer.model.state.exporting import ExportPrompt
-from viewer.model.state.jobs import JobProgress
-from viewer.model.state.prompts import Saved, SavePrompt
-from viewer.model.state.saving import path_beside
+from viewer.model.state.jobs import FinishedExport, JobProgress
+from viewer.model.state.notices import Notice
+from viewer.model.state.prompts import ExportPrompt, Saved, SavePrompt
+from viewer.model.state.saving import SavedSettings
+
+MAX_FINISHED = 8
+"""Number of finished exports in the list."""
+PASTED_FOLDER = "pasted"
+"""Name of the folder that keeps pasted pictures for a while; nothing else is saved there."""
+
+
+def ask_to_save(state: AppState, what: Saved = "picture") -> AppState:
+    """Show the prompt to save the picture, at the photo's own size if that can be drawn, or the map of a photo."""
+    scene = state.scene
+    if scene is None or (what == "map" and scene.plan is None):
+        return state
+    is_full = state.optics.dolly == 0 and state.free_camera is None
+    size = (scene.own_size if is_full else None) or scene.size
+    path = _map_path(state, scene) if what == "map" else _place_of(state, f"{scene.name}-iibr.png")
+    return replace(state, prompt=SavePrompt(path, size, what=what))
+
+
+def ask_to_export(state: AppState) -> AppState:
+    """Show the prompt of an export, with the kind and options of the last one."""
+    if state.scene is None:
+        return state
+    last = state.last_export
+    kind = first_kind("share") if last is None else last.kind
+    path = usual_export_path(state, kind)
+    return replace(state, prompt=ExportPrompt(kind, path) if last is None else ExportPrompt(kind, path, last.options))
+
+
+def begin_job(state: AppState, path: Path, prompt: ExportPrompt | None = None) -> AppState:
+    """Close the prompt of a save or export that begins, and remember its folder, kind and options.
+
+    path: absolute.
+    """
+    preferences, last = replace(state.preferences, last_folder=str(path.parent)), prompt or state.last_export
+    shown = None if isinstance(state.prompt, SavePrompt | ExportPrompt) else state.prompt
+    return replace(state, preferences=preferences, last_export=last, prompt=shown)
+
+
+def finish_job(state: AppState, path: Path, message: str = "", prompt: ExportPrompt | None = None) -> AppState:
+    """Tell that a file was written; an export enters the list of exports. message: more about the file."""
+    verb = "Saved" if prompt is None else "Exported"
+    notice = Notice(f"{verb} {path}. {message}" if message else f"{verb} {path}", is_result=True, path=str(path))
+    return _with_finished(notify(state, notice), path, prompt)
+
+
+def fail_job(state: AppState, path: Path, problem: str, prompt: ExportPrompt | None = None) -> AppState:
+    """Tell that a file was not written, and why."""
+    return _with_finished(notify(state, Notice(problem, is_error=True, is_result=True)), path, prompt, problem)
+
+
+def set_jobs(state: AppState, jobs: tuple[JobProgress, ...]) -> AppState:
+    """Replace the list of jobs; close the window if it waits for the last."""
+    state = replace(state, jobs=jobs)
+    return quit_window(state) if state.quits_when_done and not jobs else state
+
+
+def quit_window(state: AppState, is_sure: bool = False) -> AppState:
+    """Close the window; ask first while jobs are under way."""
+    asks = bool(state.jobs) and not is_sure
+    state = replace(state, quits_when_done=False)
+    return replace(state, prompt="quit") if asks else replace(state, should_quit=True)
+
+
+def quit_when_done(state: AppState) -> AppState:
+    """Close the window after the last job; a job that fails keeps it open."""
+    state = replace(state, quits_when_done=True, prompt=None)
+    return state if state.jobs else quit_window(state)
+
+
+def settings_of(state: AppState, size_px: ScreenSize) -> SavedSettings:
+    """Return the settings that take the present picture again."""
+    assert state.source is not None
+    source = replace(state.source, path="", depth=replace(state.source.depth, file=None, refine=state.depth.refine))
+    scene = state.scene
+    return SavedSettings(
+        state.optics,
+        state.depth_strength,
+        source,
+        size_px,
+        state.depth.edits,
+        has_model_depth=scene is not None and scene.has_model_depth,
+        view_width=scene.width if scene is not None else None,
+    )
 
 
 def kinds_for(purpose: Purpose) -> dict[str, ExportKind]:
@@ -25,20 +111,13 @@ def first_kind(purpose: Purpose) -> str:
     return next(name for name, kind in kinds_for(purpose).items() if not kind.needs)
 
 
-def ask_to_export(state: AppState) -> AppState:
-    """Show the prompt of an export if a scene is open."""
-    if state.scene is None:
-        return state
-    kind = first_kind("share")
-    return replace(state, prompt=ExportPrompt(kind, usual_export_path(state, kind)))
-
-
 def usual_export_path(state: AppState, name: str) -> str:
     """Return the default path of an export of this kind."""
     assert state.scene is not None
     kind = EXPORTS[name]
     ending = kind.endings[0] if kind.endings else ""
-    return _place_of(state, f"{state.scene.name}-{'iibr' if name in ending else name}{ending}")
+    tag = "" if ending.startswith("_") else "-iibr" if ending == f".{name}" else f"-{name}"
+    return _place_of(state, f"{state.scene.name}{tag}{ending}")
 
 
 def as_other_kind(state: AppState, prompt: ExportPrompt, name: str) -> ExportPrompt:
@@ -58,11 +137,26 @@ def written_path(kind: ExportKind, typed: str, scene: Scene, options: ExportOpti
     """
     path = Path(typed.strip())
     if not path.name:
-        raise InputError("There is no name yet: type one, or press Browse…")
-    if kind.endings and not path.suffix:
-        tag = kind.endings[0].partition(".")[0]
-        path = path.with_name(f"{path.name.removesuffix(tag)}{kind.endings[0]}")
+        raise InputError("There is no name yet. Type one, or press Browse…")
+    ending = next(iter(kind.endings), "")
+    if not path.suffix and not path.name.endswith(PurePath(ending).stem):
+        path = path.with_name(f"{path.name}{ending}")
+    elif not path.suffix:
+        path = path.with_suffix(PurePath(ending).suffix)
     return export_path(kind, path, scene, options)
+
+
+def path_beside(path: str, name: str) -> str:
+    """Return a path beside a photo; in the home folder for a pasted photo and for the demo."""
+    folder = PurePath(path).parent
+    is_ours = folder.name == PASTED_FOLDER or folder.is_relative_to(resource_folder("assets"))
+    return str((PurePath("~") if is_ours else folder) / name)
+
+
+def _map_path(state: AppState, scene: Scene) -> str:
+    """Return the default path of a map: where it is found when the photo is opened again, unless a map was given."""
+    is_given = scene.depth_origin is not None and scene.depth_origin.kind == "file"
+    return path_beside(scene.source.path, f"{scene.name}{'-edited.pfm' if is_given else '_disparity.pfm'}")
 
 
 def _place_of(state: AppState, name: str) -> str:
@@ -72,44 +166,7 @@ def _place_of(state: AppState, name: str) -> str:
     return str(PurePath(folder) / name) if folder else path_beside(state.source.path, name)
 
 
-def ask_to_save(state: AppState, what: Saved = "picture") -> AppState:
-    """Show the prompt to save the picture, at the photo's own size if that can be drawn, or the map of a photo."""
-    scene = state.scene
-    if scene is None or (what == "map" and scene.plan is None):
+def _with_finished(state: AppState, path: Path, prompt: ExportPrompt | None, problem: str = "") -> AppState:
+    if prompt is None:
         return state
-    is_full = state.optics.dolly == 0 and state.free_camera is None
-    size = (scene.own_size if is_full else None) or scene.size
-    return replace(state, prompt=SavePrompt(_usual_path(state, what), size, what=what))
-
-
-def _usual_path(state: AppState, what: Saved) -> str:
-    """Return the default path. A map goes beside the photo, where it is found when the photo is opened again, unless
-    the user gave a map.
-    """
-    assert state.source is not None
-    assert state.scene is not None
-    if what == "picture":
-        return _place_of(state, f"{state.scene.name}-iibr.png")
-    origin = state.scene.depth_origin
-    is_given = origin is not None and origin.kind == "file"
-    ending = "-edited.pfm" if is_given else "_disparity.pfm"
-    return path_beside(state.source.path, f"{state.scene.name}{ending}")
-
-
-def set_jobs(state: AppState, jobs: tuple[JobProgress, ...]) -> AppState:
-    """Take over the list of jobs; close the window where it waited for the last."""
-    state = replace(state, jobs=jobs)
-    return quit_window(state) if state.quits_when_done and not jobs else state
-
-
-def quit_window(state: AppState, is_sure: bool = False) -> AppState:
-    """Close the window; ask first while jobs are under way."""
-    asks = bool(state.jobs) and not is_sure
-    state = replace(state, quits_when_done=False)
-    return replace(state, prompt="quit") if asks else replace(state, should_quit=True)
-
-
-def quit_when_done(state: AppState) -> AppState:
-    """Close the window after the last job; a job that fails keeps it open."""
-    state = replace(state, quits_when_done=True, prompt=None)
-    return state if state.jobs else quit_window(state)
+    return replace(state, exports=(FinishedExport(str(path), prompt, problem), *state.exports)[:MAX_FINISHED])

@@ -242,11 +242,17 @@ def _more(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
     return _further_tools(state, layout) + _recent_elsewhere(state, layout)
 
 
+def _is_final(state: AppState) -> bool:
+    """Return whether no further view can change the picture."""
+    is_shown = state.shown_generation == state.generation and state.free_progress is None
+    return is_shown and state.progress.is_complete
+
+
 def _figures(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
     """How the views are made and drawn, before what else is known of the scene."""
     quiet(size_text(scene))
     quiet(progress_text(state.progress) or "No views asked for.")
-    quiet("" if state.report is None else report_text(state.report, state.progress.is_complete))
+    quiet("" if state.report is None else report_text(state.report, _is_final(state)))
     scene_section(state, scene, layout)
     return []
 

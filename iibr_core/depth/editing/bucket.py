@@ -38,12 +38,12 @@ def surface_at(
     colors = color_distance(photo.reshape(-1, 3), touched_colors(photo, stroke, index)).reshape(disparity.shape)
     colors = without_outliers(colors)
     depth = disparity / np.float32(DEPTH_EDGE * (extent[1] - extent[0]))
-    is_edge, contrasts = colors > OTHER_SURFACE, []
+    is_edge, contrasts = colors > OTHER_SURFACE * stroke.tolerance, []
     for axis in (0, 1):
         contrast = _contrast(*(image.swapaxes(0, axis) for image in (photo, colors, depth)))
         turned = is_edge.swapaxes(0, axis)
-        turned[:-EDGE_PX] |= contrast > 1
-        turned[EDGE_PX:] |= contrast > 1
+        turned[:-EDGE_PX] |= contrast > stroke.tolerance
+        turned[EDGE_PX:] |= contrast > stroke.tolerance
         contrasts.append(contrast)
     queue = np.empty(surface.size, np.int32)
     row, column = _nearest_free(~is_edge, int(y * height), int(x * width))

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from iibr_core.depth.editing.brush import Window, falloff, lower_distances, smooth_within_contours
 from iibr_core.depth.editing.bucket import surface_at
-from iibr_core.depth.editing.edits import DEPTH_TOOLS, DepthEdits, Stroke, apply_tone, extent_of
+from iibr_core.depth.editing.edits import DEPTH_TOOLS, SURFACE_TOOLS, DepthEdits, Stroke, apply_tone, extent_of
 from iibr_core.runtime.work import raise_if_stopped
 from iibr_core.types import FloatImage
 
@@ -101,12 +101,13 @@ class DepthCanvas:
             target = _value_at(under, stroke.taken_from or stroke.points[0])
         else:
             span = self._extent[1] - self._extent[0]
-            return np.broadcast_to(stroke.strength * (span if stroke.tool == "nearer" else -span), under.shape)
+            is_nearer = stroke.tool in ("nearer", "forward")
+            return np.broadcast_to(stroke.strength * (span if is_nearer else -span), under.shape)
         return np.asarray(stroke.strength * np.subtract(target, under, dtype=np.float64))
 
     def _reach(self, stroke: Stroke, index: int, last: _PaintedStroke) -> Window:
         """Update the distances for the stroke's point of this index. Return the window in which they changed."""
-        if stroke.tool != "fill":
+        if stroke.tool not in SURFACE_TOOLS:
             return lower_distances(self._photo, stroke, index, last.distance)
         if _value_at(last.distance, stroke.points[index]) == 0:  # filled already
             return slice(0), slice(0)

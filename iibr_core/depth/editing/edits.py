@@ -13,13 +13,16 @@ import numpy as np
 
 from iibr_core.types import FloatImage, InputError
 
-BrushTool = Literal["nearer", "farther", "smooth", "level", "fill"]
+BrushTool = Literal["nearer", "farther", "smooth", "level", "fill", "forward", "back"]
 BRUSH_TOOLS: tuple[BrushTool, ...] = ("nearer", "farther", "smooth", "level", "fill")
 DEPTH_TOOLS: tuple[BrushTool, ...] = ("level", "fill")
 """Tools that paint one depth: along the stroke, or on the surface under it (the bucket)."""
+SURFACE_TOOLS: tuple[BrushTool, ...] = ("fill", "forward", "back")
+"""Tools that change the whole surface under the stroke: to one depth, or by the stroke's strength."""
 
 GAMMA_LIMITS = (0.25, 4.0)
 RADIUS_LIMITS = (0.002, 0.25)
+TOLERANCE_LIMITS = (0.25, 4.0)
 MAX_POINTS = 10_000
 """Largest number of points of one stroke."""
 EXTENT_PERCENTILES = (0.1, 99.9)
@@ -32,9 +35,10 @@ class Stroke:
     """One stroke of the brush.
 
     points: its path, (x, y) as shares of the photo's width and height (0 = left or top border). radius: share of the
-    photo's width. strength: 0..1, the largest change: for "nearer" and "farther" as a share of the map's range, for
-    "smooth" of the way to the smoothed map, for "level" and "fill" of the way to the depth that the map had before the
-    stroke at the place `taken_from`, or if that is None at the first point.
+    photo's width. strength: 0..1, the largest change: for "nearer", "farther", "forward" and "back" as a share of the
+    map's range, for "smooth" of the way to the smoothed map, for "level" and "fill" of the way to the depth that the
+    map had before the stroke at the place `taken_from`, or if that is None at the first point. tolerance: factor of
+    the contrast that ends a surface, for the tools that change a surface.
     """
 
     tool: BrushTool
@@ -42,6 +46,7 @@ class Stroke:
     radius: float
     strength: float
     taken_from: tuple[float, float] | None = None
+    tolerance: float = 1.0
 
     def radius_px(self, width: int) -> float:
         """Return the radius in pixels of a map of this width, at least one."""
@@ -88,9 +93,10 @@ def require_sound(edits: DepthEdits) -> None:
         ("far clip", edits.far_clip, (0.0, 1.0)),
     ]
     for stroke in edits.strokes:
-        if stroke.tool not in BRUSH_TOOLS or not 1 <= len(stroke.points) <= MAX_POINTS:
+        if stroke.tool not in (*BRUSH_TOOLS, *SURFACE_TOOLS) or not 1 <= len(stroke.points) <= MAX_POINTS:
             raise InputError(f"depth edits: a stroke {stroke.tool!r} with {len(stroke.points)} points; paint it again")
         checks += [("brush radius", stroke.radius, RADIUS_LIMITS), ("brush strength", stroke.strength, (0.0, 1.0))]
+        checks.append(("tolerance", stroke.tolerance, TOLERANCE_LIMITS))
         places = (*stroke.points, *([stroke.taken_from] if stroke.taken_from else []))
         checks += [("place of a stroke", at, (-inf, inf)) for place in places for at in place]
     for name, value, (low, high) in checks:
@@ -142,12 +148,12 @@ def invert_tone_curve(share: float, edits: DepthEdits) -> float:
     return share ** (1 / edits.gamma) if 0 < share < 1 else share if share <= 0 else 1 + (share - 1) / edits.gamma
 
 
-def levels_of(disparity: FloatImage) -> Levels:
-    """Return the histogram of a map (H, W) over its extent; values beyond count at the ends.
+def levels_of(disparity: FloatImage, extent: tuple[float, float] | None = None) -> Levels:
+    """Return the histogram of a map (H, W) over an extent, by default its own; values beyond count at the ends.
 
     Raises InputError if no value is finite.
     """
-    low, high = extent_of(disparity)
+    low, high = extent or extent_of(disparity)
     known = disparity[np.isfinite(disparity)][:: max(1, disparity.size // 1_000_000)]
     counts, _ = np.histogram(np.clip(known, low, high), HISTOGRAM_BINS, (low, high))
     return Levels(low, high, tuple(counts.tolist()))

@@ -1,7 +1,5 @@
 """Decides whether two pictures show one scene, as a stereo pair does. Their exposures may differ."""
 
-from __future__ import annotations
-
 import itertools
 from typing import Any
 

@@ -1,7 +1,5 @@
 """AVIF photos, which OpenImageIO's wheel does not read: Pillow decodes them."""
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -14,7 +12,6 @@ from iibr_core.formats.images.iso_boxes import associations, box, boxes
 from iibr_core.formats.images.pillow_reader import COLOR_CODES, open_with_pillow
 
 BRANDS = frozenset({b"avif", b"avis"})
-MAX_BRANDS_BYTES = 256
 DEPTH_TYPES = (b"urn:mpeg:mpegB:cicp:systems:auxiliary:depth", b"urn:mpeg:hevc:2015:auxid:2")
 """Types of auxiliary pictures that are depth maps, as AVIF has them and as HEIC."""
 
@@ -22,7 +19,7 @@ DEPTH_TYPES = (b"urn:mpeg:mpegB:cicp:systems:auxiliary:depth", b"urn:mpeg:hevc:2
 def is_avif(path: Path) -> bool:
     """Return whether a file begins as AVIF files do, whatever its name."""
     with open_binary(path) as file:
-        start = file.read(MAX_BRANDS_BYTES)
+        start = file.read(256)
     size = int.from_bytes(start[:4], "big")
     return start[4:8] == b"ftyp" and not BRANDS.isdisjoint(start[k : k + 4] for k in range(8, min(size, len(start)), 4))
 

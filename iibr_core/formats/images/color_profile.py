@@ -4,8 +4,6 @@ Photos have profiles of one kind: a curve for each of red, green and blue, then 
 are computed here with all the bits of the photo, whose primaries stay. The numbers are those of ITU-T H.273.
 """
 
-from __future__ import annotations
-
 import re
 import struct
 from collections.abc import Callable
@@ -36,18 +34,13 @@ D50 = np.array([0.9642, 1.0, 0.8249])
 UNNAMED = "its own"
 """Name of a colour space that a file describes and does not name."""
 D65_XY = (0.3127, 0.3290)
-C_XY = (0.310, 0.316)
 PRIMARIES = {
     1: ("sRGB", (0.640, 0.330, 0.300, 0.600, 0.150, 0.060, *D65_XY)),
-    4: ("BT.470 M", (0.670, 0.330, 0.210, 0.710, 0.140, 0.080, *C_XY)),
     5: ("BT.601 (625 lines)", (0.640, 0.330, 0.290, 0.600, 0.150, 0.060, *D65_XY)),
     6: ("BT.601 (525 lines)", (0.630, 0.340, 0.310, 0.595, 0.155, 0.070, *D65_XY)),
-    7: ("SMPTE 240M", (0.630, 0.340, 0.310, 0.595, 0.155, 0.070, *D65_XY)),
-    8: ("film", (0.681, 0.319, 0.243, 0.692, 0.145, 0.049, *C_XY)),
     9: ("BT.2020", (0.708, 0.292, 0.170, 0.797, 0.131, 0.046, *D65_XY)),
     11: ("DCI-P3", (0.680, 0.320, 0.265, 0.690, 0.150, 0.060, 0.314, 0.351)),
     12: ("Display P3", (0.680, 0.320, 0.265, 0.690, 0.150, 0.060, *D65_XY)),
-    22: ("EBU 3213", (0.630, 0.340, 0.295, 0.605, 0.155, 0.077, *D65_XY)),
 }
 """Name, then x and y of red, green, blue and white, by their number (ITU-T H.273, table 2)."""
 KNOTS = 65536

@@ -1,7 +1,5 @@
 """Decodes picture files of every kind. Headers are checked before memory is spent; a file is read whole, or refused."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -31,10 +29,8 @@ NO_READER = "could not find a format reader"
 FLOATING_TYPES = ("half", "float", "double")
 LINEAR_TRANSFERS = (2, 8)
 """Transfer curves of ITU-T H.273 that leave light unchanged: "unspecified" and "linear"."""
-CMYK_NOTE = "CMYK was converted to RGB without its colour profile."
 NOTES_OF_MODELS = {
-    "CMYK": CMYK_NOTE,
-    "YCCK": CMYK_NOTE,
+    **dict.fromkeys(("CMYK", "YCCK"), "CMYK was converted to RGB without its colour profile."),
     "LAB": "Lab was converted to RGB with a tint: save the photo as RGB for its true colours.",
 }
 """Notes on colour models by parts of the names that OpenImageIO gives to them."""
@@ -220,22 +216,11 @@ def _open(path: Path) -> Any:
         if NO_READER in complaint:
             raise InputError(f"{path}: cannot be read as a picture (of no known kind); save it as JPEG, PNG or TIFF")
         raise InputError(f"{path}: cannot be read as a picture ({_reason(complaint, path)})")
-    if source.format_name() == "ico":
-        _seek_largest(source)
     spec = source.spec()
     if spec.depth > 1 or spec.deep:
         raise InputError(f"{path}: {spec.width}x{spec.height}x{spec.depth} is no flat picture")
     require_sound_size(path, spec.width, spec.height, spec.image_bytes())
     return source
-
-
-def _seek_largest(source: Any) -> None:
-    """Choose the largest picture of an icon."""
-    sizes: list[int] = []
-    while source.seek_subimage(len(sizes), 0):
-        sizes.append(source.spec().width * source.spec().height)
-    complaint_of(source)
-    source.seek_subimage(sizes.index(max(sizes)), 0)
 
 
 def _stored(path: Path, spec: Any) -> _Stored:

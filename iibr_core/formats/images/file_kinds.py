@@ -1,7 +1,5 @@
 """Kinds of files that are mistaken for pictures, with advice on what to do instead."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 from typing import NamedTuple

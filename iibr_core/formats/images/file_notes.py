@@ -1,7 +1,5 @@
 """Notes for people about stereo pairs, panoramas and animations, of which one flat picture is shown."""
 
-from __future__ import annotations
-
 from contextlib import suppress
 from pathlib import Path
 

@@ -3,8 +3,6 @@
 Light is relative to the white of ordinary photos, which HDR pictures show at 203 cd/m2 (ITU-R BT.2408).
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

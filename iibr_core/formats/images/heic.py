@@ -1,7 +1,5 @@
 """HEIC photos (HEIF with HEVC), which OpenImageIO's wheel does not read."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

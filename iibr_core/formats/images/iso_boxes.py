@@ -1,7 +1,5 @@
 """Boxes of ISO base media files (ISO/IEC 14496-12), which AVIF and HEIC files consist of."""
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Iterator
 

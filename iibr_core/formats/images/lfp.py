@@ -5,8 +5,6 @@ Lytro publishes no description; readers of others found that a file is a list of
 that names them. Depth is "lambda", how far the focus is from the captured one: linear in disparity, small is near.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass

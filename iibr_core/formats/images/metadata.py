@@ -4,8 +4,6 @@ Saved pictures keep the parts that describe the photo and its camera. They do no
 another picture: thumbnails, depth maps, edits by other programs, maker notes, and, unless asked for, the position.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from contextlib import suppress

@@ -3,8 +3,6 @@
 The notes of a photo name all that reading changed: alpha, size, values that are not finite, colour profile, HDR.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from dataclasses import replace

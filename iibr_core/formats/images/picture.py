@@ -1,7 +1,5 @@
 """A decoded picture, with what its file states about its colours, its orientation and its focal length."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass

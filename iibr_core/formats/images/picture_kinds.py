@@ -3,8 +3,6 @@
 Imports no library of pictures: the window asks for them before anything is loaded.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path

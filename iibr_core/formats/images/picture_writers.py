@@ -3,8 +3,6 @@
 They write to a temporary name; their InputError states the reason without a name.
 """
 
-from __future__ import annotations
-
 import struct
 import zlib
 from collections.abc import Iterator, Mapping

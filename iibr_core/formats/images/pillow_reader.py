@@ -1,7 +1,5 @@
 """Decodes with Pillow the kinds of pictures that OpenImageIO's wheel does not read."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from io import BytesIO

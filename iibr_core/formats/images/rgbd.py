@@ -1,7 +1,5 @@
 """Pictures with their depth map beside or below them in one file, for light-field displays and depth tools."""
 
-from __future__ import annotations
-
 import re
 from functools import lru_cache
 from pathlib import Path

@@ -3,8 +3,6 @@
 Names may be wrong, so the halves are compared. The header is VRex's JPS descriptor, in segment APP3 of stereo JPEGs.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass

@@ -4,8 +4,6 @@ pillow-heif encodes the pictures. This module adds the boxes that make them a pa
 both (ISO/IEC 23008-12, amendment 2 of 2024).
 """
 
-from __future__ import annotations
-
 import struct
 from io import BytesIO
 from pathlib import Path

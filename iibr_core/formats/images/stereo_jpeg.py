@@ -5,8 +5,6 @@ inverse depth, and JSON that describes them. Leia publishes readers, not a descr
 to 5.3. The last bytes of the file hold the size of the region. All numbers are big-endian.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -24,7 +22,7 @@ MPO_ENDING = ".mpo"
 END_MARK = b"\x1e\x1a"
 TRAILER_BYTES = 6
 JSON_FIELDS = (8, 7)
-MAX_FILE_BYTES, MAX_FIELDS, MAX_JSON_BYTES = 1 << 30, 1000, 1 << 24
+MAX_FILE_BYTES = 1 << 30
 SOURCE_IMAGE = -1
 """Number that stands for the file's first JPEG among the fields."""
 LIF_ENDING = ".lif"
@@ -62,7 +60,7 @@ def read_lif(data: bytes) -> Lif | None:
     described = next((fields[number] for number in JSON_FIELDS if number in fields), None)
     if described is None:
         raise InputError("its Leia fields describe no views; get the whole file again")
-    return Lif(fields, _views(described[:MAX_JSON_BYTES], fields))
+    return Lif(fields, _views(described, fields))
 
 
 def open_lif(path: Path) -> Lif | None:
@@ -89,7 +87,7 @@ def _fields(region: bytes) -> dict[int, bytes]:
     """Return the fields by number; of several with one number the first counts."""
     fields: dict[int, bytes] = {}
     count, at = int.from_bytes(region[:4], "big"), 4
-    for _ in range(min(count, MAX_FIELDS)):
+    for _ in range(count):
         number, length = (int.from_bytes(region[k : k + 4], "big") for k in (at, at + 4))
         at += 8
         if at + length > len(region):

@@ -1,7 +1,5 @@
 """XMP packets: properties of photos that saved pictures keep, and texts of this program."""
 
-from __future__ import annotations
-
 import base64
 import binascii
 import zlib

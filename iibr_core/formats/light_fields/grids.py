@@ -6,8 +6,6 @@ named as HCI's (`gt_disp_lowres.pfm` for the centre view, `gt_disp_lowres_Cam000
 by place (`gt_disp_u00_v00.npy`, estimates `disp_est_u00_v00.npy`).
 """
 
-from __future__ import annotations
-
 import configparser
 import math
 import re

@@ -19,7 +19,7 @@ from iibr_core.types import InputError
 if TYPE_CHECKING:
     from iibr_core.formats.light_fields.multi_view_scene import MultiView
 
-FOLDER_READERS = ("llff:read_llff", "stanford:read_stanford", "middlebury:read_middlebury", "grids:read_grid")
+FOLDER_READERS = ("data_sets:read_llff", "data_sets:read_stanford", "data_sets:read_middlebury", "grids:read_grid")
 """Readers of folders, in the order in which they are asked."""
 FILE_READERS = ("view_files:read_quilt", "view_files:read_lenslet_image", "view_files:read_stereo_file")
 """Readers of files, in the order in which they are asked."""

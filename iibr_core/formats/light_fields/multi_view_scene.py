@@ -3,8 +3,6 @@
 The readers of the layouts return these records; `views.py` reads the pixels.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise

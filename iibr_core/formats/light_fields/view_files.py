@@ -1,7 +1,5 @@
 """Light fields in one file: quilts and lenslet images, known by their names, and stereo photos of all kinds."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Read the views of a light field on disk whose views fill a grid, the centre first."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 

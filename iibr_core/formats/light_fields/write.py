@@ -1,7 +1,5 @@
 """Write light fields: a folder laid out as in the HCI 4D Light Field Benchmark, or one lenslet image (ESLF)."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Iterable, Iterator

@@ -1,7 +1,5 @@
 """Depth maps drawn in colours, as depth models show them: the colours are looked up in their scale."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Disparity from a file, in pixels per view step: larger is nearer."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Arrays of numbers in NPY files and NPZ archives. NPY files are mapped: a cut one is refused before memory is used."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +11,6 @@ from iibr_core.types import InputError
 
 USUAL_NAMES = ("depth", "disparity", "disp", "arr_0", "predicted_depth")
 """Names of the array that is read from an archive of several arrays, the best first."""
-MAX_VALUE_BYTES = 16
 
 
 def read_array(path: Path, max_values: int) -> NDArray[Any]:
@@ -43,6 +40,6 @@ def _map_in(path: Path, archive: Any, max_values: int) -> NDArray[Any]:
             raise InputError(f"{path}: which array is the map ({listed})? Save it alone, or name it depth or disparity")
         name = (usual or names)[0]
         size_bytes = archive.zip.getinfo(f"{name}.npy").file_size
-        if size_bytes > MAX_VALUE_BYTES * max_values:
+        if size_bytes > 16 * max_values:
             raise InputError(f"{path}: {name} of {size_bytes:,} bytes is too large; make it smaller")
         return np.asarray(archive[name])

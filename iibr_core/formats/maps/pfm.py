@@ -1,7 +1,5 @@
 """PFM files: one float per pixel, rows bottom-up in the file, top-down here. The scale's sign gives the byte order."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 from typing import Any

@@ -3,8 +3,6 @@
 Renderers write depth as a channel of an OpenEXR picture, beside its colours; this is read, too.
 """
 
-from __future__ import annotations
-
 import itertools
 import re
 from dataclasses import dataclass, replace

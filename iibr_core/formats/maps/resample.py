@@ -4,8 +4,6 @@ Exact maps get no values between foreground and background, which would float in
 they hold such values already, and the width of a ramp shows how soft they are.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

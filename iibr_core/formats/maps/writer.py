@@ -3,8 +3,6 @@
 Reading gives back the map as it was written.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Literal
 

@@ -58,26 +58,12 @@ def test_a_camera_far_beside_asks_for_half_a_picture_of_parallax_at_most():
     assert max(at.s for at in reach.outer) == pytest.approx(FARTHEST_STEPS)
 
 
-def test_from_behind_it_is_looked_through_all_over():
-    photo, behind = camera(40, 48), camera(40, 48, place=(0.0, 0.0, -0.5))
-    reach = reach_of(photo, [behind], (1.0, 3.0))
-    assert min(at.s for at in reach.outer) == pytest.approx(-max(at.s for at in reach.outer))
-    assert all(margin > 2 for margin in reach.margins)
-
-
 def test_a_turned_camera_asks_for_what_lies_beyond_the_frame():
     photo = camera(40, 48)
     margins = reach_of(photo, [camera(40, 48, turned=about(1, 10.0))], (1.0, 3.0)).margins
     assert margins.right >= 60 * np.tan(np.radians(10.0)) > 0 == margins.left
     wide = reach_of(photo, [camera(40, 48, 2.0)], (1.0, 3.0)).margins
     assert tuple(wide) == (MAX_BEYOND * 40,) * 2 + (MAX_BEYOND * 48,) * 2
-
-
-def test_cameras_that_look_along_add_nothing():
-    photo = camera(40, 48)
-    reach = reach_of(photo, [photo], (1.0, 3.0))
-    assert reach.margins == (0, 0, 0, 0)
-    assert reach.outer == ()
 
 
 def test_cameras_are_made_to_fit_a_smaller_photo_of_the_same_shape():

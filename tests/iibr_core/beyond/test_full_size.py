@@ -6,24 +6,13 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from iibr_core.beyond.full_size import (
-    LargePhoto,
-    Part,
-    tiles_of,
-    views_of_tile,
-    whole,
-)
+from iibr_core.beyond.full_size import LargePhoto, Part, tiles_of, views_of_tile, whole
 from iibr_core.beyond.resized_light import mean_of_areas
 from iibr_core.method.light_field import rays_of_grid
 from iibr_core.method.rays import rays_of_photo
 from iibr_core.method.update_loop import update
 from iibr_core.method.view import Renderer, finish
-from iibr_core.types import (
-    ImageSize,
-    Photo,
-    ViewOffset,
-    image_size,
-)
+from iibr_core.types import ImageSize, Photo, ViewOffset
 from tests.iibr_core.scenes import literal_plan, square_before_wall
 
 OFFSET = ViewOffset(0.6, -1.5)
@@ -73,13 +62,6 @@ def test_holes_show_what_the_smaller_light_field_shows() -> None:
     assert hole.sum() > 20
     shown = view.colors[::2, ::2][hole]
     assert (np.abs(shown - red.pixels[0, 0]).max(axis=1) < 0.05).mean() > 0.8
-
-
-def test_the_mean_of_areas_is_a_box_filter() -> None:
-    light = np.random.default_rng(0).random((6, 8, 3)).astype(np.float32)
-    expected = light.reshape(3, 2, 4, 2, 3).mean(axis=(1, 3))
-    np.testing.assert_allclose(mean_of_areas(light, ImageSize(3, 4)), expected, rtol=1e-5)
-    assert mean_of_areas(light, image_size(light)) is light
 
 
 def test_the_mean_of_a_part_counts_the_shares_of_its_border() -> None:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from iibr_core.beyond.free_view import target_from_photo
-from iibr_core.beyond.landed_squares import CORNERS, SAMPLES, _draw_squares, draw_rays, rows_landed_on
+from iibr_core.beyond.landed_squares import CORNERS, SAMPLES, draw_rays, rows_landed_on
 from iibr_core.method.rays import rays_of_photo
 from tests.iibr_core.beyond.test_free_view import about, camera
 
@@ -72,13 +72,3 @@ def test_samples_see_what_a_slow_twin_sees(turn, rounding):
     differ = ~np.isclose(nearest, slow, atol=1e-4)
     assert differ.mean() < 0.01
     np.testing.assert_array_equal(source == 0, np.isneginf(nearest))
-
-
-@pytest.mark.parametrize(("shown", "is_hidden"), [(1, False), (2, True), (0, True)])
-def test_what_is_made_up_must_lie_clearly_before_what_the_photo_shows(shown, is_hidden):
-    """Images 0 of the photo and 1 of inpainted rays have the sources 1 and 2; 0 is none."""
-    corners = np.array([[[-1.0, -1.0, 1.2], [2.0, -1.0, 1.2], [2.0, 2.0, 1.2], [-1.0, 2.0, 1.2]]])
-    nearest, source = np.full((SAMPLES, SAMPLES), 1.0, np.float32), np.full((SAMPLES, SAMPLES), shown, np.uint8)
-    for ahead in (0.5, 0.1):
-        _draw_squares(corners, np.ones(1, np.bool_), np.ones(1), 2, 1, ahead, 0, nearest, source)
-        assert (source == (3 if is_hidden or ahead < 0.2 else shown)).all()

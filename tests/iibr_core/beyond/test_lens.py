@@ -10,19 +10,9 @@ from scipy.ndimage import map_coordinates
 
 from iibr_core.beyond.aperture_sampling import aperture_points, grid_weights
 from iibr_core.beyond.lens import LensSum
-from iibr_core.beyond.optics import (
-    CENTRE,
-    HIGHLIGHT_GAIN,
-    ApertureShape,
-    Optics,
-)
+from iibr_core.beyond.optics import CENTRE, HIGHLIGHT_GAIN, ApertureShape, Optics
 from iibr_core.color import linear_from_srgb
-from iibr_core.types import (
-    FloatImage,
-    GridShape,
-    ImageSize,
-    ViewOffset,
-)
+from iibr_core.types import FloatImage, GridShape, ImageSize, ViewOffset
 from tests.iibr_core.scenes import smooth_texture
 
 SIZE = ImageSize(40, 56)
@@ -61,12 +51,6 @@ def test_a_camera_is_sheared_to_the_focus(tilt: tuple[float, float]) -> None:
     np.testing.assert_allclose(light_of(optics, (CAMERA, view))[INSIDE], expected[INSIDE], atol=0.01)
 
 
-def test_the_camera_at_the_eye_gives_its_view_back() -> None:
-    view = smooth_texture(*SIZE)
-    optics = Optics(EYE, focus_disparity=3.0, focus_tilt=(1.0, 2.0))
-    np.testing.assert_allclose(light_of(optics, (EYE, view)), linear_from_srgb(view), atol=1e-5)
-
-
 def test_within_the_focus_range_content_stays_where_the_eye_sees_it() -> None:
     """A wall at 2: its disparity is within the range, though not the focus; beyond it, it moves by the rest."""
     view, wall = smooth_texture(*SIZE), np.full(SIZE, 2.0, np.float32)
@@ -85,11 +69,6 @@ def test_what_is_within_the_range_stays_so_where_all_disparities_are_scaled(rati
     optics = Optics(focus_disparity=0.5, focus_range=1.0).with_focus_scaled(ratio)
     moved = sheared(view, wall, CAMERA)
     np.testing.assert_allclose(light_of(optics, (CAMERA, view), disparity=wall)[INSIDE], moved[INSIDE], atol=0.01)
-
-
-def test_light_is_averaged_linear_not_encoded() -> None:
-    dark, bright = (np.full((*SIZE, 3), value, np.float32) for value in (0.0, 1.0))
-    np.testing.assert_allclose(light_of(Optics(), (CENTRE, dark), (CENTRE, bright)), 0.5, atol=1e-5)
 
 
 def test_clipped_pixels_and_exposure_count_for_more() -> None:

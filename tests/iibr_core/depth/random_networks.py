@@ -46,16 +46,6 @@ def depth_anything(folder: Path, kind: str = "relative") -> LocalModel:
     return saved(network, folder, size={"height": 56, "width": 56}, keep_aspect_ratio=True, ensure_multiple_of=14)
 
 
-def dpt(folder: Path) -> LocalModel:
-    config = transformers.DPTConfig(
-        **LAYERS, **HEAD, image_size=64, patch_size=16, backbone_out_indices=[0, 1, 2, 3], is_hybrid=False
-    )
-    network = transformers.DPTForDepthEstimation(config)
-    with torch.no_grad():
-        network.head.head[4].bias += 1
-    return saved(network, folder, size={"height": 64, "width": 64}, image_mean=[0.5] * 3, image_std=[0.5] * 3)
-
-
 def zoedepth(folder: Path) -> LocalModel:
     backbone = {**LAYERS, "model_type": "beit", "image_size": 64, "patch_size": 16, "reshape_hidden_states": False}
     stages = [f"stage{n}" for n in range(1, 5)]

@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 
 from iibr_core.depth.editing.canvas import DepthCanvas, apply_edits
 from iibr_core.depth.editing.edits import BRUSH_TOOLS, DEPTH_TOOLS, UNEDITED, BrushTool, DepthEdits, Stroke
-from iibr_core.runtime.work import Cancelled, stoppable
 
 HEIGHT, WIDTH = 30, 40
 
@@ -67,16 +66,6 @@ def test_a_stroke_does_not_cross_a_contour_and_changes_nothing_outside_the_photo
     np.testing.assert_array_equal(apply_edits(photo, disparity, DepthEdits(strokes=outside)), disparity)
 
 
-def test_texture_that_the_stroke_runs_over_does_not_stop_it() -> None:
-    photo = plain_photo(0.9, 0.9)
-    photo[:, : WIDTH // 2 : 2] = 0.1
-    photo[:, 1 : WIDTH // 2 : 2] = 0.4
-    edits = DepthEdits(strokes=(dab(x=0.25),))
-    near, plain = (apply_edits(colors, plane(), edits) - plane() for colors in (photo, plain_photo(0.5, 0.5)))
-    np.testing.assert_allclose(near[:, : WIDTH // 2], plain[:, : WIDTH // 2], atol=1e-5)
-    assert not near[:, WIDTH // 2 :].any()
-
-
 @pytest.mark.parametrize("tool", DEPTH_TOOLS)
 def test_level_and_bucket_paint_the_depth_where_they_begin_or_another_place(tool: BrushTool) -> None:
     photo, disparity = plain_photo(), plane()
@@ -104,7 +93,7 @@ edits = st.builds(
 )
 
 
-@settings(max_examples=30)
+@settings(max_examples=8)
 @given(st.lists(edits, min_size=1, max_size=4))
 def test_a_canvas_shows_the_same_whatever_it_showed_before(wanted: list[DepthEdits]) -> None:
     photo, last = tiled_photo(0, 0.3), UNEDITED
@@ -121,17 +110,6 @@ def test_a_canvas_shows_the_same_whatever_it_showed_before(wanted: list[DepthEdi
         last = edit
 
 
-def test_painting_stops_between_strokes_and_continues_there() -> None:
-    strokes = tuple(replace(dab(), points=((0.05 * k, 0.5),)) for k in range(20))
-    edits, answers = DepthEdits(strokes=strokes), iter([False] * 3 + [True])
-    canvas = DepthCanvas(plain_photo(), plane())
-    with pytest.raises(Cancelled), stoppable(lambda: next(answers)):
-        canvas.apply(edits)
-    assert canvas.strokes_ahead(edits) == 17
-    np.testing.assert_array_equal(canvas.apply(edits), apply_edits(plain_photo(), plane(), edits))
-    assert canvas.strokes_ahead(edits) == 0
-
-
 def test_a_canvas_continues_from_a_map_that_another_painted() -> None:
     photo, disparity = plain_photo(), plane()
     strokes = tuple(replace(dab(), points=((0.1 * k, 0.5),)) for k in range(1, 9))
@@ -145,8 +123,8 @@ def test_a_canvas_continues_from_a_map_that_another_painted() -> None:
 
 
 @pytest.mark.parametrize("tool", BRUSH_TOOLS)
-@pytest.mark.parametrize("shape", [(1, 1), (1, 7), (7, 1), (3, 2), (HEIGHT, WIDTH)])
-@pytest.mark.parametrize("wild", [0.0, np.nan, np.inf, 3e38, -3e38])
+@pytest.mark.parametrize("shape", [(1, 1), (7, 1), (HEIGHT, WIDTH)])
+@pytest.mark.parametrize("wild", [0.0, np.nan, 3e38])
 def test_tiny_photos_and_wild_values_stay_finite(shape: tuple[int, int], tool: BrushTool, wild: float) -> None:
     photo, disparity = np.full((*shape, 3), 0.5, np.float32), np.zeros(shape, np.float32)
     disparity[1:20, 1:] = wild
@@ -154,3 +132,16 @@ def test_tiny_photos_and_wild_values_stay_finite(shape: tuple[int, int], tool: B
     result = apply_edits(photo, disparity, DepthEdits(strokes=(stroke, stroke)))
     assert np.isfinite(result).all()
     assert wild or tool in ("smooth", *DEPTH_TOOLS) or result.any()
+
+
+@pytest.mark.parametrize(("tool", "change"), [("forward", 0.3), ("back", -0.3)])
+def test_a_surface_moves_as_a_whole_by_a_share_of_the_range(tool: BrushTool, change: float) -> None:
+    photo, disparity = np.full((40, 60, 3), 0.3, np.float32), np.zeros((40, 60), np.float32)
+    photo[10:30, 20:40] = 0.8
+    disparity[10:30, 20:40] = np.linspace(4.0, 5.0, 20)
+    disparity[:, 50:] = 10.0
+    moved = apply_edits(photo, disparity, DepthEdits(strokes=(Stroke(tool, ((0.5, 0.5),), 0.02, 0.3),)))
+    expected = disparity.copy()
+    expected[10:30, 20:40] += 10 * change
+    differs = np.abs(moved - expected) > 1e-5
+    assert differs.sum() <= 4, "only its corners may belong to either side"

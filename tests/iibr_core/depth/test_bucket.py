@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from iibr_core.depth.editing.bucket import _fill_holes, _flood, surface_at
+from iibr_core.depth.editing.bucket import surface_at
 from iibr_core.depth.editing.edits import Stroke
 
 HEIGHT, WIDTH = 60, 80
@@ -81,21 +81,12 @@ def test_outside_the_photo_there_is_none(place: tuple[float, float]) -> None:
     assert not filled(photo_of(), x=place[0], y=place[1]).any()
 
 
-@pytest.mark.parametrize("seed", range(4))
-def test_flooding_finds_connected_pixels(seed: int) -> None:
-    space = np.random.default_rng(seed).random((23, 31)) < 0.7
-    start, queue = np.flatnonzero(space)[space.sum() // 2], np.empty(space.size, np.int32)
-    count = _flood(space.copy(), start, queue)
-    labels, _ = ndimage.label(space)
-    np.testing.assert_array_equal(np.sort(queue[:count]), np.flatnonzero(labels == labels.flat[start]))
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_enclosed_holes_up_to_a_size_are_filled(seed: int) -> None:
-    whole = np.random.default_rng(seed).random((23, 31)) < 0.6
-    filled = whole.copy()
-    _fill_holes(filled, np.empty(whole.size, np.int32), 3.0)
-    labels, count = ndimage.label(~whole)
-    border = np.concatenate([labels[0], labels[-1], labels[:, 0], labels[:, -1]])
-    small = [i for i in range(1, count + 1) if (labels == i).sum() <= 3 and i not in border]
-    np.testing.assert_array_equal(filled, whole | np.isin(labels, small))
+@pytest.mark.parametrize(("tolerance", "columns"), [(0.25, 20), (1.0, 50), (4.0, 80)])
+def test_tolerance_is_the_contrast_that_ends_the_surface(tolerance: float, columns: int) -> None:
+    photo = photo_of()
+    photo[:, 20:] += 0.06
+    photo[:, 50:] += 0.2
+    stroke = Stroke("fill", ((0.1, 0.5),), 0.02, 1.0, tolerance=tolerance)
+    mask = surface_at(photo, np.zeros((HEIGHT, WIDTH), np.float32), stroke, 0, (0.0, 1.0))
+    assert mask[:, : columns - 2].all()
+    assert not mask[:, columns + 2 :].any()

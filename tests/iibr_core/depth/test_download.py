@@ -76,12 +76,6 @@ def test_an_interrupted_download_is_resumed(hub: Hub, tmp_path: Path) -> None:
     assert hub.begins == [0, PIECE]
 
 
-def test_a_connection_that_breaks_is_resumed(hub: Hub, tmp_path: Path) -> None:
-    hub.is_cut = True
-    require_whole(hub, tmp_path)
-    assert hub.begins == [0, PIECE]
-
-
 def test_other_bytes_than_the_hub_states_are_refused(hub: Hub, tmp_path: Path) -> None:
     hub.files[WEIGHTS] = PUBLISHED[WEIGHTS][::-1]
     assert f"{WEIGHTS} is not what the hub states" in error_of(hub, tmp_path)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -16,10 +14,8 @@ from iibr_core.depth.editing.edits import (
     Stroke,
     apply_tone,
     extent_of,
-    invert_tone_curve,
     levels_of,
     require_sound,
-    tone_curve,
 )
 from iibr_core.types import InputError
 
@@ -53,12 +49,6 @@ def test_tone_is_its_slow_twin_at_every_pixel(edits: DepthEdits, seed: int) -> N
     low, high = extent_of(disparity)
     wanted = [slow_toned(float(value), low, high, edits) for value in disparity.flat]
     np.testing.assert_allclose(apply_tone(disparity, edits).flat, wanted, rtol=1e-5, atol=1e-5)
-
-
-@given(shares, tones)
-def test_a_share_is_found_again_where_it_was_not_clipped(share: float, edits: DepthEdits) -> None:
-    edits = replace(edits, is_inverted=False, far_clip=0.0, near_clip=1.0)
-    assert invert_tone_curve(tone_curve(share, edits), edits) == pytest.approx(share, abs=1e-9)
 
 
 @pytest.mark.parametrize("edits", [UNEDITED, DepthEdits(True, 0.2, 0.8, 2.0), DepthEdits(gamma=0.25)])

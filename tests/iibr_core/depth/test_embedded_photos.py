@@ -12,7 +12,6 @@ from PIL.PngImagePlugin import PngInfo
 
 from iibr_core.depth.embedded.embedded import embedded_in_jpeg, unread_parts
 from iibr_core.depth.search import PhotoWithDepth, open_with_depth
-from iibr_core.formats.images.lfp import read_lfp
 from iibr_core.formats.images.photo import read_photo
 from iibr_core.formats.images.side_by_side import photo_size
 from iibr_core.types import InputError
@@ -185,27 +184,6 @@ def test_a_processed_lytro_file_opens_with_its_depth(tmp_path: Path, name: str, 
     assert found.disparity.values[60, 60] > found.disparity.values[4, 10]
     assert photo_size(tmp_path / name) == (96, 128)
     np.testing.assert_allclose(read_photo(tmp_path / name).pixels * 255, PIXELS, atol=1)
-
-
-def test_the_middle_view_of_a_film(tmp_path: Path) -> None:
-    av = pytest.importorskip("av")
-    file = io.BytesIO()
-    with av.open(file, "w", format="h264") as film:
-        stream = film.add_stream("h264", rate=25)
-        stream.width, stream.height, stream.pix_fmt = 64, 48, "yuv420p"
-        for grey in (40, 120, 200):
-            frame = av.VideoFrame.from_ndarray(np.full((48, 64, 3), grey, np.uint8), format="rgb24")
-            film.mux(stream.encode(frame))
-        film.mux(stream.encode(None))
-    views = [{"width": 64, "height": 48, "coord": {"x": x, "y": 0.0}} for x in (-0.2, 0.0, 0.2)]
-    block = {"representation": "h264", "blockOfImagesRef": "sha1-film", "metadataArray": views}
-    picture = {"picture": {"accelerationArray": [{"vendorContent": {"blockOfImages": block}}]}}
-    path = tmp_path / "a-stk.lfp"
-    path.write_bytes(files.lytro_file(picture, {"sha1-film": file.getvalue()}))
-    assert abs(int(read_lfp(path).pixels[20, 30, 0]) - 120) < 6
-    path.write_bytes(files.lytro_file(picture, {"sha1-film": b"none"}))
-    with pytest.raises(InputError, match=r"a-stk\.lfp: damaged"):
-        read_lfp(path)
 
 
 @pytest.mark.parametrize("cut", [0.1, 0.5, 0.95])

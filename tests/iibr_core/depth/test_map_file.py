@@ -15,7 +15,6 @@ from PIL import Image
 
 from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.search import PhotoWithDepth, open_with_depth
-from iibr_core.depth.sidecar import find_sidecars
 from iibr_core.formats.images.write import write_image_file
 from iibr_core.formats.maps.writer import MapText, write_map
 from iibr_core.types import FloatImage, InputError
@@ -170,20 +169,6 @@ def test_a_map_lies_like_the_stored_photo_or_is_turned_itself(
     for name in ("upright.png", "stored.png", "own_exif.jpg"):
         choice = DepthChoice(file=str(tmp_path / name), refine=False)
         assert_true_to_scene(open_with_depth(tmp_path / "turned.jpg", choice))
-
-
-def test_maps_beside_a_photo_are_found_in_their_order(tmp_path: Path) -> None:
-    """`_disparity` goes before `_depth`, floating point before pictures."""
-    names = ["photo_disparity.npy", "photo_disparity.png", "photo_depth.png"]
-    for name in names:
-        (tmp_path / name).touch()
-    assert [path.name for path in find_sidecars(tmp_path / "photo.png")] == names
-    integers(scene()[1], np.uint8).save(tmp_path / names[-1])
-    for name in names[:-1]:
-        (tmp_path / name).unlink()
-    found = opened(tmp_path, "", file=None)
-    assert found.origin.file == str(tmp_path / names[-1])
-    assert_true_to_scene(found)
 
 
 @pytest.mark.parametrize("suffix", [".png", ".exr"])

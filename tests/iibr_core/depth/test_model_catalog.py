@@ -18,7 +18,7 @@ from iibr_core.depth.models.catalog import (
 )
 from iibr_core.depth.models.known import USUAL_MODEL
 from iibr_core.types import InputError
-from tests.iibr_core.depth.onnx_graphs import published, weighing
+from tests.iibr_core.depth.onnx_graphs import weighing
 from tests.iibr_core.depth.test_onnx import with_external_weights
 
 
@@ -75,17 +75,6 @@ def test_a_copied_model_brings_its_numbers_and_settings_along(tmp_path: Path) ->
     assert list(list_own_models()) == ["rooms"]
     assert files_below(own_models_folder()) == {"rooms/rooms.onnx", "rooms/rooms.onnx_data", "rooms/config.json"}
     assert model_to_use(DepthChoice(model="rooms")) is not None
-
-
-@pytest.mark.parametrize("given", ["", "onnx/model.onnx"])
-def test_a_file_called_model_is_named_after_its_folder(tmp_path: Path, given: str) -> None:
-    """Also if it lies in a folder `onnx` below, as the hub lays files out."""
-    for name, content in published(tmp_path / "depth-thing").items():
-        (tmp_path / "depth-thing" / name).write_bytes(content)
-    register(tmp_path / "depth-thing" / given)
-    assert files_below(own_models_folder()) == {
-        f"depth-thing/{name}" for name in ("depth-thing.onnx", "config.json", "preprocessor_config.json")
-    }
 
 
 def test_a_name_that_is_taken_stays_with_its_model(tmp_path: Path) -> None:

@@ -171,13 +171,6 @@ def test_damaged_files_are_one_line(tmp_path: Path, name: str, content: str) -> 
         values_of(tmp_path / "model.onnx", photo_of(60, 90))
 
 
-def test_a_model_of_no_picture_is_refused(tmp_path: Path) -> None:
-    takes = helper.make_tensor_value_info("v", TensorProto.FLOAT, [3])
-    file = save_graph(tmp_path / "model.onnx", [helper.make_node("Identity", ["v"], ["o"])], {}, takes, "o")
-    with pytest.raises(InputError, match=r"takes v \[3\] tensor\(float\), not one picture"):
-        values_of(file, photo_of(60, 90))
-
-
 def with_external_weights(file: Path, weights: tuple[float, float, float] = (1.0, 0.0, 0.0)) -> Path:
     """A model whose numbers are in FILE_data beside it."""
     file.with_name(f"{file.name}_data").unlink(missing_ok=True)
@@ -204,14 +197,6 @@ def test_an_estimate_is_kept_until_the_photo_or_a_file_of_the_model_changes(tmp_
     (tmp_path / "model.onnx_data").unlink()
     with pytest.raises(InputError, match=r"its weights are in model\.onnx_data, which does not lie beside it"):
         values_of(file, photo)
-
-
-def test_the_cache_is_bounded_and_the_oldest_go(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr(cache, "MAX_BYTES", 500_000)
-    file = weighing(tmp_path / "model.onnx", (1, 0, 0), ImageSize(200, 250))
-    for height in range(60, 64):
-        values_of(file, photo_of(height, 90))
-    assert len(list((tmp_path / "cache").iterdir())) == 2
 
 
 def halving(file: Path, stride: int) -> Path:

@@ -12,7 +12,7 @@ from skimage.metrics import peak_signal_noise_ratio as skimage_psnr
 from skimage.metrics import structural_similarity
 
 from iibr_core.evaluation.lpips import Lpips
-from iibr_core.evaluation.metrics import MAX_DB, bounded_psnr, flip, flip_map, flip_picture, psnr, ssim
+from iibr_core.evaluation.metrics import MAX_DB, bounded_psnr, flip, psnr, ssim
 from iibr_core.types import InputError
 from tests.iibr_core.scenes import smooth_texture
 
@@ -31,13 +31,6 @@ def test_psnr_of_masks_and_of_what_is_not_known() -> None:
     assert psnr(worse, truth, mask) == pytest.approx(10 * math.log10(1 / 0.25), abs=1e-4)
     assert psnr(worse, truth, ~mask) == math.inf
     assert math.isnan(psnr(np.full_like(truth, np.nan), truth))
-
-
-def test_figures_of_bytes_are_those_of_floats() -> None:
-    left, right = (np.random.default_rng(seed).integers(0, 256, (32, 32, 3), np.uint8) for seed in range(2))
-    for figure in (psnr, flip):
-        assert figure(left, right) == pytest.approx(figure(left / np.float32(255), right / np.float32(255)), abs=1e-5)
-    assert psnr(np.zeros((1, 1, 3), np.uint8), np.full((1, 1, 3), 255, np.uint8)) == 0
 
 
 def test_equal_pictures_count_with_a_bound_where_means_are_taken() -> None:
@@ -64,17 +57,6 @@ def test_flip_of_known_pairs() -> None:
     errors = [flip(np.clip(truth + np.float32(step), 0, 1), truth) for step in (0.01, 0.05, 0.2)]
     assert errors == sorted(errors)
     assert errors[0] > 0
-
-
-def test_flip_masks_and_pictures() -> None:
-    image, truth = pair()
-    of_pixels = flip_map(image, truth)
-    mask = np.zeros(truth.shape[:2], bool)
-    mask[3:9, 4:20] = True
-    assert flip(image, truth, mask) == pytest.approx(float(of_pixels[mask].mean()), rel=1e-5)
-    assert math.isnan(flip(image, truth, np.zeros_like(mask)))
-    assert flip_picture(truth, truth).shape == truth.shape
-    assert flip_picture(truth, truth).max() < 0.05
 
 
 @pytest.fixture(scope="module")
@@ -120,7 +102,7 @@ def test_lpips_is_its_slow_twin(networks: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["alexnet-owt-7be5be79.pth", "alex.pth"])
-@pytest.mark.parametrize("content", ["missing", "text", "other names", "other shapes"])
+@pytest.mark.parametrize("content", ["missing", "text", "other shapes"])
 def test_bad_networks_are_one_clear_line(networks: Path, tmp_path: Path, name: str, content: str) -> None:
     for path in networks.iterdir():
         (tmp_path / path.name).write_bytes(path.read_bytes())

@@ -15,16 +15,7 @@ from iibr_core.evaluation.scenes import find_scenes, read_scene, trial_input, tr
 from iibr_core.formats.images.write import write_image
 from iibr_core.formats.light_fields.multi_view_scene import MultiView
 from iibr_core.types import InputError, ViewOffset
-from tests.iibr_core.known_scenes import (
-    FOREGROUND,
-    HEIGHT,
-    WALL,
-    WIDTH,
-    disparity_of_square,
-    write_grid,
-    write_hci,
-    write_numbered,
-)
+from tests.iibr_core.known_scenes import FOREGROUND, HEIGHT, WALL, WIDTH, disparity_of_square, write_grid
 
 UNREFINED = DepthChoice(refine=False)
 
@@ -73,20 +64,6 @@ def seen_wall(position: np.ndarray, camera: np.ndarray, focal: float, depth: flo
     return (0.5 + 0.3 * np.stack(waves, -1)).astype(np.float32)
 
 
-def test_llff_in_a_turned_world_gives_the_same(tmp_path: Path) -> None:
-    world = rotation("y", 70) @ rotation("z", 20)
-    places = [(0.0, 0.0, 0.0), (2.0, 0.0, 0.0), (0.0, 2.0, 0.5)]
-    plain = scene_of(write_llff(tmp_path / "a", [(p, np.eye(3)) for p in places], 50.0))
-    turned = [(tuple(world.T @ p), world) for p in np.array(places)]
-    other = scene_of(write_llff(tmp_path / "b", turned, 50.0))
-    for one, two in zip(plain.views, other.views):
-        np.testing.assert_allclose(one.offset, two.offset, atol=1e-9)
-        assert one.camera is not None
-        assert two.camera is not None
-        np.testing.assert_allclose(one.camera.world_from_camera, two.camera.world_from_camera, atol=1e-6)
-        np.testing.assert_allclose(one.camera.position, two.camera.position, atol=1e-6)
-
-
 def test_views_of_turned_cameras_are_compared_as_they_are(tmp_path: Path) -> None:
     """A wall at depth 10, seen by cameras that are turned and stand before and behind the plane."""
     focal = 60.0
@@ -103,14 +80,6 @@ def test_views_of_turned_cameras_are_compared_as_they_are(tmp_path: Path) -> Non
     assert rows["unchanged photo"].full_db < 25 < 35 < rows["iibr, given map"].visible_db
     assert rows["plain warp, given map"].visible_db > 35
     assert rows["one plane"].full_db > 30
-
-
-def test_a_pair_is_judged_from_the_left_without_a_corner_trial(tmp_path: Path) -> None:
-    (tmp_path / "views").mkdir()
-    names = {f"views/v00_u{s:02d}.png": ViewOffset(0.0, float(s)) for s in (0, 1)}
-    scene = scene_of(write_numbered(tmp_path, names, (9, 9)))
-    (trial,) = trials_of(scene, "given")
-    assert (scene.views[trial.given].name, trial.offset(trial.judged[0])) == ("v00 u00", (0, 1))
 
 
 def test_few_views_are_spread_and_hold_the_farthest(tmp_path: Path) -> None:
@@ -161,21 +130,8 @@ def test_a_damaged_scene_is_one_clear_line(tmp_path: Path, damage: Callable[[Pat
         list(find_scenes(tmp_path / "scene"))
 
 
-def test_parameters_that_do_not_fit_the_views_of_hci_are_named(tmp_path: Path) -> None:
-    folder = write_hci(tmp_path / "dino")
-    (folder / "parameters.cfg").write_text("[extrinsics]\nnum_cams_x = 4\nnum_cams_y = 2\n")
-    with pytest.raises(InputError, match=r"9 views do not fit a grid of 2x4"):
-        read_scene(folder)
-
-
 def test_a_folder_without_scenes_is_named(tmp_path: Path) -> None:
     (tmp_path / "photo.png").touch()
     for path in (tmp_path, tmp_path / "gone", tmp_path / "photo.png"):
         with pytest.raises(InputError, match="HCI, Stanford"):
             list(find_scenes(path))
-
-
-def test_a_single_view_cannot_be_compared(tmp_path: Path) -> None:
-    write_numbered(tmp_path / "one", {"out_00_00_1.0_2.0.png": ViewOffset(0.0, 0.0)})
-    with pytest.raises(InputError, match="only view"):
-        read_scene(tmp_path / "one")

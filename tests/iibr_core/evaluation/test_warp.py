@@ -95,7 +95,7 @@ def fit_of(photo: FloatImage, views: Sequence[tuple[ViewOffset, FloatImage]]) ->
     return ViewFit(photo, [(warp_to(at), view) for at, view in views], farthest)
 
 
-@pytest.mark.parametrize(("scale", "shift"), [(10.0, -3.0), (0.1, 40.0), (-4.0, 1.0)])
+@pytest.mark.parametrize(("scale", "shift"), [(10.0, -3.0), (-4.0, 1.0)])
 def test_a_known_scale_and_shift_are_found(scale: float, shift: float) -> None:
     truth = disparity_of_square()
     estimate = (truth * np.float32(scale) + np.float32(shift)).astype(np.float32)
@@ -104,7 +104,7 @@ def test_a_known_scale_and_shift_are_found(scale: float, shift: float) -> None:
     assert np.abs(fitted - truth).max() < 0.2
 
 
-@pytest.mark.parametrize("disparity", [WALL, -1.7, 0.0])
+@pytest.mark.parametrize("disparity", [WALL, -1.7])
 def test_the_plane_of_a_wall_is_found(disparity: float) -> None:
     views = [(at, view_of_wall(at, disparity)) for at in (ViewOffset(0.0, 2.0), ViewOffset(-2.0, 0.0))]
     fit = fit_of(view_of_wall(CENTRE), views)
@@ -112,12 +112,12 @@ def test_the_plane_of_a_wall_is_found(disparity: float) -> None:
     np.testing.assert_allclose(fit.fitted(np.full((HEIGHT, WIDTH), 7, np.float32)), fit.plane)
 
 
-@pytest.mark.parametrize("blur", [0.0, 1.0, 3.0])
+@pytest.mark.parametrize("blur", [0.0, 2.0])
 def test_a_fit_never_takes_views_farther_from_the_true_ones(blur: float) -> None:
     """Small copies of sharp pictures, which the fit is found on, may be misleading."""
-    photo = np.random.default_rng(2).random((240, 320, 3)).astype(np.float32)
-    truth = np.full((240, 320), 1.0, np.float32)
-    truth[60:180, 100:220] = 4.0
+    photo = np.random.default_rng(2).random((120, 160, 3)).astype(np.float32)
+    truth = np.full((120, 160), 1.0, np.float32)
+    truth[30:90, 50:110] = 4.0
     views = [(at, reference_warp(photo, truth, at).colors) for at in (ViewOffset(0.0, 2.0), ViewOffset(0.0, -2.0))]
     estimate = gaussian_filter(truth, blur)
     before, after = (

@@ -73,11 +73,10 @@ def fill_slowly(colors, disparity, hole, photo_disparity, offset):
     return copy_slowly(filled_colors, agreed, wide & hole, one_surface), agreed
 
 
-@pytest.mark.parametrize("contrast", [1.0, 0.15])
-def test_agrees_with_a_slow_twin(contrast):
+def test_agrees_with_a_slow_twin():
     random = np.random.default_rng(2)
     size = (27, 31)
-    colors = (0.3 + contrast * random.uniform(0, 1, (*size, 3))).astype(np.float32)
+    colors = (0.3 + 0.4 * random.uniform(0, 1, (*size, 3))).astype(np.float32)
     disparity = random.choice([0.0, 1.0, 3.0], size, p=[0.7, 0.2, 0.1]).astype(np.float32)
     photo_disparity = random.choice([0.0, 1.0, 3.0], size).astype(np.float32)
     hole = random.random(size) < 0.02
@@ -122,29 +121,6 @@ def test_a_disocclusion_takes_the_background_not_what_hid_it():
     fill_background(colors, disparity, hole, photo_disparity, offset)
     assert colors[hole] == pytest.approx(np.tile(np.float32([0, 0, 1]), (hole.sum(), 1)))
     assert disparity[hole].max() == 0
-
-
-def test_what_lies_between_two_surfaces_has_the_disparity_of_one():
-    disparity = np.zeros((20, 40), np.float32)
-    disparity[10:] = 3.0
-    hole = np.zeros((20, 40), bool)
-    hole[:, 34:] = True
-    colors = np.zeros((20, 40, 3), np.float32)
-    disparity[hole] = 9.0
-    fill_background(colors, disparity, hole, np.full((20, 40), 8.0, np.float32), ViewOffset(0.0, 1.0))
-    assert set(disparity[hole]) == {0.0, 3.0}
-
-
-def test_the_frame_border_continues_the_surface_that_leaves_it():
-    photo_disparity = np.full((12, 30), 3.0, np.float32)
-    photo_disparity[:, :10] = 0.0
-    disparity = np.full((12, 30), 3.0, np.float32)
-    disparity[:, :7] = 0.0
-    hole = np.zeros((12, 30), bool)
-    hole[:, 27:] = True
-    colors = np.where(disparity[..., None] > 0, np.float32([1, 0, 0]), np.float32([0, 0, 1])).astype(np.float32)
-    fill_background(colors, disparity, hole, photo_disparity, ViewOffset(0.0, 1.0))
-    assert colors[:, 27:] == pytest.approx(np.tile(np.float32([1, 0, 0]), (12, 3, 1)))
 
 
 def test_a_view_that_is_all_hole_stays_and_stays_finite():

@@ -9,9 +9,9 @@ import pytest
 
 from iibr_core.inpainting import diffusion
 from iibr_core.inpainting.background import fill_background
-from iibr_core.inpainting.diffusion import LARGE_PX, align_in_gaps, large_gaps
+from iibr_core.inpainting.diffusion import LARGE_PX, large_gaps
 from iibr_core.inpainting.registry import load_inpainter
-from iibr_core.runtime.work import Cancelled, stoppable, watched
+from iibr_core.runtime.work import watched
 from iibr_core.types import InputError, ViewOffset
 from tests.iibr_core.scenes import smooth_texture
 
@@ -92,13 +92,6 @@ def test_large_gaps_are_painted_and_all_else_is_background(folder):
     np.testing.assert_array_equal(again, colors)
 
 
-def test_a_stop_is_heard_between_steps(folder):
-    said = []
-    with pytest.raises(Cancelled), watched(lambda *progress: said.append(progress)), stoppable(lambda: len(said) > 1):
-        load_inpainter(f"diffusion:{folder}")(*view_with_holes(), OFFSET)
-    assert len(said) == 2 < STEPS
-
-
 def test_what_was_painted_gets_the_depth_that_the_estimator_sees(folder):
     colors, disparity, hole, photo_disparity = view_with_holes()
     # Twice the disparity and one more, and in the gap something half-way between wall and strip.
@@ -128,15 +121,6 @@ def test_large_is_where_a_square_fits():
     expected[3:11, 5:13] = True
     np.testing.assert_array_equal(large_gaps(hole), expected)
     assert not large_gaps(np.ones((3, 30), np.bool_)).any()
-
-
-def test_estimates_that_say_nothing_or_the_opposite_change_nothing():
-    _, disparity, hole, _ = view_with_holes()
-    continued = np.where(hole, 0, disparity).astype(np.float32)
-    for estimate in (-disparity, np.zeros_like(disparity), np.full_like(disparity, np.nan)):
-        found = continued.copy()
-        align_in_gaps(np.where(hole & np.isfinite(estimate[0, 0]), 1, estimate), found, hole, large_gaps(hole))
-        np.testing.assert_array_equal(found, continued)
 
 
 def test_errors_are_one_line_that_names_the_folder(folder, tmp_path):

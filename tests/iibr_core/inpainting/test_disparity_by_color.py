@@ -5,7 +5,6 @@ import pytest
 
 from iibr_core.inpainting import disparity_by_color
 from iibr_core.inpainting.disparity_by_color import fill_disparity_by_color
-from iibr_core.runtime import tiling
 from iibr_core.runtime.work import Cancelled, stoppable
 
 RED, BLUE = np.float32([0.8, 0.1, 0.1]), np.float32([0.1, 0.2, 0.8])
@@ -51,17 +50,6 @@ def test_a_cable_is_whole_again_where_half_of_it_is_unknown():
     np.testing.assert_allclose(fill_disparity_by_color(photo, values), truth, atol=1e-4)
 
 
-def test_known_values_keep_their_bits_and_the_input_is_left_alone():
-    photo, truth = cable_before_wall()
-    values = truth + np.random.default_rng(4).normal(0, 0.1, truth.shape).astype(np.float32)
-    values[::3, ::2] = np.nan
-    given = values.copy()
-    filled = fill_disparity_by_color(photo, values)
-    np.testing.assert_array_equal(values, given)
-    np.testing.assert_array_equal(filled[~np.isnan(given)], given[~np.isnan(given)])
-    assert np.nanmin(given) <= filled.min() <= filled.max() <= np.nanmax(given)
-
-
 def test_without_colours_that_tell_the_nearest_decide():
     values = np.full((20, 30), np.nan, np.float32)
     values[:, :5], values[:, 25:] = 1.0, 7.0
@@ -77,16 +65,6 @@ def test_what_is_far_from_all_that_is_known_comes_from_the_background(monkeypatc
     filled = fill_disparity_by_color(np.full((9, 40, 3), 0.5, np.float32), values)
     assert (filled[:, :3] == 3).all()
     assert filled[:, 8:] == pytest.approx(1, abs=1e-3), "though the left end is nearer to most of them"
-
-
-def test_results_do_not_depend_on_the_number_of_threads(monkeypatch):
-    photo, truth = cable_before_wall()
-    values = truth.copy()
-    values[5:35, 15:45] = np.nan
-    expected = fill_disparity_by_color(photo, values)
-    monkeypatch.setattr(disparity_by_color, "MOST_PIECE_PIXELS", 7)
-    monkeypatch.setattr(tiling, "THREADS", 3)
-    np.testing.assert_array_equal(fill_disparity_by_color(photo, values), expected)
 
 
 def test_bad_arguments_and_a_stop_are_told():

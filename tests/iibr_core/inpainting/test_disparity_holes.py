@@ -5,13 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from iibr_core.inpainting.disparity_holes import (
-    OPEN_LINE,
-    SHORTNESS,
-    STEP_LENGTHS,
-    fill_disparity_holes,
-    say_filled,
-)
+from iibr_core.inpainting.disparity_holes import OPEN_LINE, SHORTNESS, STEP_LENGTHS, fill_disparity_holes, say_filled
 
 LINES = ((0, 1), (1, 0), (1, 1), (1, -1))
 """Horizontal, vertical, falling diagonal, rising diagonal: (down, right)."""
@@ -61,13 +55,6 @@ def test_what_no_line_reaches_is_reached_in_a_second_round():
     values = np.full((9, 9), np.nan, np.float32)
     values[0, 0] = 3.0
     assert (fill_disparity_holes(values) == 3.0).all()
-
-
-def test_a_hole_beside_what_hid_it_is_as_far_as_the_wall():
-    values = np.full((20, 40), 1.0, np.float32)
-    values[:, 20:] = 6.0
-    values[:, 14:20] = np.nan
-    np.testing.assert_allclose(fill_disparity_holes(values)[:, 14:20], 1.0, atol=1e-3)
 
 
 def test_nothing_known_is_refused_and_shares_are_told():

@@ -19,13 +19,7 @@ from iibr_core.method.farthest_views import outer_views_of_grid, outpainting_mar
 from iibr_core.method.rays import rays_of_photo
 from iibr_core.method.update_loop import update
 from iibr_core.method.view import Renderer
-from iibr_core.runtime.work import Cancelled, stoppable
-from iibr_core.types import (
-    GridShape,
-    ImageSize,
-    Margins,
-    ViewOffset,
-)
+from iibr_core.types import GridShape, ImageSize, Margins, ViewOffset
 from tests.iibr_core.scenes import smooth_texture
 
 SIZE = ImageSize(24, 36)
@@ -103,14 +97,6 @@ def test_against_the_definitions():
         np.testing.assert_allclose(found, expected, atol=2e-6)
 
 
-def test_the_photo_stands_in_the_middle_to_the_bit_and_no_margins_leave_it_alone():
-    colors, disparity = noise(*SIZE), noise(*SIZE)[..., 0]
-    grown, surfaces = outpaint(colors, disparity, MARGINS)
-    np.testing.assert_array_equal(grown[2:-5, 3:-4], colors)
-    np.testing.assert_array_equal(surfaces[2:-5, 3:-4], disparity)
-    assert outpaint(colors, disparity, Margins())[0] is colors
-
-
 @pytest.mark.parametrize("size", [(1, 1), (1, 9), (9, 1), (2, 2)], ids=str)
 def test_tiny_photos_of_one_colour_go_on_in_it(size):
     colors = np.full((*size, 3), 0.25, np.float32)
@@ -127,11 +113,6 @@ def test_a_line_that_leaves_the_frame_goes_on_straight():
         expected = bar(row - 12, np.arange(104) - 12)
         assert abs(int(grown[row, :, 0].argmax()) - int(expected.argmax())) <= 1
         assert grown[row, :, 0].max() > 0.35
-
-
-def test_a_stop_is_heard():
-    with pytest.raises(Cancelled), stoppable(lambda: True):
-        outpaint(noise(*SIZE), noise(*SIZE)[..., 0], MARGINS)
 
 
 def textured_wall(disparity):
@@ -154,10 +135,6 @@ def test_views_agree_beyond_the_frame_and_say_that_it_is_inpainted():
     np.testing.assert_array_equal(corner.inpainted, expected)
     # The same content, three pixels on.
     np.testing.assert_allclose(corner.colors[:-3, :-3], half.colors[3:, 3:], atol=1e-5)
-
-
-def test_nothing_joins_the_rays_where_the_margins_show_all():
-    assert len(textured_wall(2.5)) == 1
 
 
 def test_what_moves_farther_than_the_margins_reach_is_filled_by_the_views():

@@ -17,7 +17,6 @@ from iibr_core.method.closed_form import closed_form
 from iibr_core.method.look_up import look_up
 from iibr_core.method.rays import RaySet, rays_of_photo
 from iibr_core.method.view import Renderer
-from iibr_core.training.degradation import blur
 from iibr_core.types import ViewOffset
 from tests.iibr_core.scenes import photo_of, square_before_wall
 
@@ -80,18 +79,6 @@ def test_rays_that_the_closed_form_leaves_open_are_ambiguous_and_no_others():
     assert (fringed & ~is_open).sum() > 10
 
 
-@pytest.mark.parametrize("softness_px", [0, 2])
-def test_rays_that_one_surface_covers_are_never_ambiguous(softness_px):
-    """However soft the edges beside them are."""
-    photo, disparity = square_before_wall()
-    values = blur(disparity.values, softness_px) if softness_px else disparity.values
-    ambiguous, weights, _ = ambiguous_of(motley(photo.size), values)
-    heavy = (weights > FAINT_WEIGHT).sum(axis=0)
-    is_sure = (weights.sum(axis=0) >= 1 - FAINT_WEIGHT) & (heavy == 1)
-    assert len(ambiguous.pixel) > 20
-    assert not is_sure[tuple(ambiguous.pixel.T)].any()
-
-
 def test_where_hypotheses_look_alike_nothing_is_ambiguous():
     """A square that looks like the wall behind it, but for its lower half."""
     photo, disparity = square_before_wall()
@@ -104,17 +91,6 @@ def test_where_hypotheses_look_alike_nothing_is_ambiguous():
     assert (left * CONTRAST > MIN_COLOR_CHANGE).all(), "whatever is decided, the colour hardly changes"
     everything, _, _ = ambiguous_of(photo_of(pixels), disparity.values, every=True)
     assert len(everything.pixel) == disparity.values.size
-
-
-def test_hypotheses_are_the_surfaces_around_and_differ():
-    photo, disparity = square_before_wall()
-    ambiguous, weights, _ = ambiguous_of(photo, disparity.values)
-    shares = ambiguous.share
-    at = tuple(ambiguous.pixel.T)
-    assert shares.sum(axis=1) == pytest.approx(np.minimum(weights.sum(axis=0), 1)[at], abs=0.05)
-    assert ambiguous.mask.sum(axis=1).min() >= 2
-    for disparities, mask in zip(ambiguous.disparity[:200], ambiguous.mask[:200]):
-        assert set(np.round(disparities[mask])) <= {0.0, 2.0}
 
 
 def test_features_know_no_colour_and_no_place():

@@ -81,12 +81,6 @@ def test_a_constant_surface_covers_every_pixel_once():
     assert found.disparity[0][inside] == pytest.approx(0.37, abs=1e-6)
 
 
-def test_a_stretched_slope_stays_sealed():
-    slope = np.tile(np.arange(30, dtype=np.float32) * -0.2, (5, 1))
-    found = find_candidates(ray_set(slope), ViewOffset(0.0, 3.0), (0, 5))
-    assert used(found, found.coverage).sum(axis=0)[:, 1:29] == pytest.approx(1, abs=1e-4)
-
-
 def test_a_narrow_gap_shows_the_farther_of_both_surfaces_and_nothing_behind_them():
     surfaces = np.tile(np.where(np.arange(12) < 5, 2.0, 1.0), (6, 1))
     closed, opened = (find_candidates(ray_set(surfaces), ViewOffset(0, s), (0, 6)) for s in (1.0, 2.0))
@@ -124,10 +118,8 @@ def test_the_rearmost_gives_way_where_slots_run_out():
     assert sorted(found.disparity[:, 1, 4]) == [*range(2, SLOTS + 2)]
 
 
-@pytest.mark.parametrize("noise", [0.01, 1.0])
-def test_bands_do_not_change_what_is_found(noise):
-    apart = np.random.default_rng(1).uniform(-2, 2, (20, 15))
-    disparity = (np.arange(20)[:, None] * -0.4 + noise * apart).astype(np.float32)
+def test_bands_do_not_change_what_is_found():
+    disparity = (np.arange(20)[:, None] * -0.4 + np.random.default_rng(1).uniform(-2, 2, (20, 15))).astype(np.float32)
     rays, offset = ray_set(disparity), ViewOffset(1.7, -0.4)
     whole = find_candidates(rays, offset, (0, 20))
     for first, last in ((0, 7), (7, 20), *((row, row + 1) for row in range(20))):
@@ -154,15 +146,3 @@ def test_rays_without_coverage_do_not_land():
     found = find_candidates(ray_set(np.zeros((5, 5)), coverage=coverage), ViewOffset(0.0, 1.0), (0, 5))
     assert found.number.sum() == 1
     assert found.coverage[0, 2, 2] == pytest.approx(0.25)
-
-
-@pytest.mark.parametrize("columns", [(0, 24), (5, 11), (23, 24)])
-def test_columns_are_looked_at_alone(columns):
-    random = np.random.default_rng(5)
-    rays, offset = ray_set(random.uniform(-3, 3, (12, 24)).round()), ViewOffset(0.7, -1.2)
-    whole, some = find_candidates(rays, offset, (0, 12)), find_candidates(rays, offset, (0, 12), columns=columns)
-    inside = slice(*columns)
-    assert (some.number[:, inside] == whole.number[:, inside]).all()
-    used = np.arange(SLOTS)[:, None, None] < whole.number[:, inside]
-    assert (some.disparity[:, :, inside] == whole.disparity[:, :, inside])[used].all()
-    assert (np.delete(some.number, np.r_[inside], axis=1) == 0).all()

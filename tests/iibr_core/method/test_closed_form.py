@@ -39,11 +39,6 @@ def test_weights_and_their_sum_agree_with_a_slow_twin(pairs):
     assert covered[0, 0] == pytest.approx(min(weights.sum(), 1), abs=1e-5)
 
 
-def test_the_front_surface_wins_and_coverage_blends():
-    assert closed_form(one_ray([(1.0, 0.0), (1.0, 5.0)]))[0][:2, 0, 0] == pytest.approx([0, 1])
-    assert closed_form(one_ray([(1.0, 0.0), (0.3, 5.0)]))[0][:2, 0, 0] == pytest.approx([0.7, 0.3])
-
-
 def entropy_in_doubles(weights):
     weights = weights.astype(np.float64)
     shares = weights + (1 - np.minimum(weights.sum(axis=0), 1)) / len(weights)
@@ -59,11 +54,3 @@ def test_entropy_is_from_0_to_1_and_that_of_doubles(weights):
         values = entropy(weights * np.float32(factor))
         assert (values >= 0).all()
         assert (values <= 1).all()
-
-
-def test_entropy_of_one_hot_uniform_and_nothing():
-    one_hot, nothing = np.zeros((SLOTS, 1, 1), np.float32), np.zeros((SLOTS, 1, 1), np.float32)
-    one_hot[0] = 1
-    assert entropy(one_hot)[0, 0] == pytest.approx(0, abs=1e-6)
-    assert entropy(nothing)[0, 0] == pytest.approx(1, abs=1e-6)
-    assert entropy(nothing + 1 / SLOTS)[0, 0] == pytest.approx(1, abs=1e-5)

@@ -48,10 +48,10 @@ def test_a_noisy_wall_is_one_view(noise, at):
     assert plan.disparity_range_px == (0.0, 0.0)
 
 
-def test_uniform_noise_and_quantised_noise_have_no_range_either():
-    uniform = np.random.default_rng(0).uniform(-1, 1, (HEIGHT, WIDTH))
-    assert measure_disparity_range(uniform.astype(np.float32)).range == 0
-    assert measure_disparity_range(np.round(2 * uniform).astype(np.float32)).range == 0
+def test_slats_are_no_noise():
+    slats = np.tile(np.float32([0, 0, 0, 3, 3, 3]), (HEIGHT, WIDTH // 6))
+    for values in (slats, np.ascontiguousarray(slats.T)):
+        assert measure_disparity_range(values) == DisparityRange(0.0, 3.0, 0.0)
 
 
 @pytest.mark.parametrize("wild", [1e6, -1e6, 50.0])
@@ -65,16 +65,6 @@ def test_lone_wild_pixels_neither_set_the_range_nor_move_beyond_it(wild, count):
     assert drawn_px(values) == pytest.approx(TOTAL_PARALLAX * WIDTH, rel=1e-3)
     assert [reason for reason in planned(values).reasons if f"{len(set(places))} pixels lie far beyond" in reason]
     assert not [reason for reason in expected.reasons if "beyond" in reason]
-
-
-@pytest.mark.parametrize("strength", [0.25, 1.0, 3.0])
-@pytest.mark.parametrize("values", [bird(0.01), bird(0.3), np.linspace(0, 1, WIDTH) * np.ones((HEIGHT, 1))])
-def test_what_is_printed_is_what_is_drawn_and_never_more_than_asked_for(values, strength):
-    values = values.astype(np.float32)
-    (said,) = (reason for reason in planned(values, depth_strength=strength).reasons if "moves" in reason)
-    drawn = drawn_px(values, depth_strength=strength)
-    assert f"moves {drawn:.0f} px" in said
-    assert drawn <= strength * TOTAL_PARALLAX * WIDTH * 1.001
 
 
 def test_a_range_that_is_hardly_more_than_noise_moves_less():

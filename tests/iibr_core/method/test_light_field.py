@@ -9,12 +9,7 @@ from iibr_core.inpainting.registry import INPAINTERS
 from iibr_core.method.light_field import generate
 from iibr_core.runtime import tiling
 from iibr_core.runtime.work import stoppable
-from iibr_core.types import (
-    GridShape,
-    InputError,
-    ViewOffset,
-    ViewUpdate,
-)
+from iibr_core.types import GridShape, ViewOffset, ViewUpdate
 from tests.iibr_core import red_inpainter
 from tests.iibr_core.scenes import by_index, disparity_of, literal_plan, photo_of, smooth_texture, square_before_wall
 
@@ -85,12 +80,6 @@ def test_the_inpainter_of_that_name_fills_all_that_is_inpainted(monkeypatch):
         inner = view.colors[view.inpainted & ~beside(~view.inpainted)]  # what lies beside is mixed in at edges
         assert (inner[:, :1] > 2.0 * inner[:, 1:]).all(), "the wall behind is blue"
     assert sum(view.inpainted.sum() for view in red.values()) > 0
-
-
-def test_an_unknown_inpainter_is_refused():
-    photo, disparity = square_before_wall()
-    with pytest.raises(InputError, match="magic: unknown inpainter"):
-        views_of(photo, disparity, 3, inpaint="magic")
 
 
 def beside(mask):

@@ -8,7 +8,6 @@ from iibr_core.method.look_up import KEYS_A, MIN_TAP_WEIGHT, cubic_on_surface, l
 from iibr_core.method.rays import RaySet
 from iibr_core.surfaces import SAME_SURFACE_PX
 from iibr_core.types import ImageSize, ViewOffset, image_size
-from tests.iibr_core.scenes import smooth_texture
 
 
 def rays_of(colors, disparity):
@@ -109,23 +108,3 @@ def test_no_colour_crosses_a_depth_edge():
     sole = closed_form(candidates)[0].max(axis=0) > 0.999
     assert colors[sole & (found == 0)].max() == 0
     assert colors[sole & (found == 3)].min() == 1
-
-
-def test_no_candidates_are_black():
-    rays = rays_of(smooth_texture(5, 5), np.full((5, 5), 100.0))
-    candidates = find_candidates(rays, ViewOffset(0.0, 1.0), (0, 5))
-    colors, disparity, _ = look_up(rays, candidates, closed_form(candidates)[0])
-    assert colors.max() == 0
-    assert disparity.max() == 0
-
-
-def test_colours_go_into_a_part_of_a_picture_where_they_are_wanted():
-    random = np.random.default_rng(2)
-    rays = rays_of(random.random((9, 14, 3)).astype(np.float32), random.uniform(-1, 1, (9, 14)).round())
-    candidates = find_candidates(rays, ViewOffset(0.4, 1.3), (0, 9))
-    weights, wanted = closed_form(candidates)[0], np.zeros((9, 14), np.bool_)
-    wanted[2:7, 3:12] = random.random((5, 9)) < 0.7
-    whole = look_up(rays, candidates, weights).colors
-    part = np.full((5, 9, 3), 0.25, np.float32)
-    assert look_up(rays, candidates, weights, wanted, (part, 2, 3)).colors is part
-    assert (part == np.where(wanted[2:7, 3:12, None], whole[2:7, 3:12], np.float32(0.25))).all()

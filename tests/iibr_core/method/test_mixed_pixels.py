@@ -4,14 +4,9 @@ import numpy as np
 import pytest
 
 from iibr_core.color import linear_from_srgb, srgb_from_linear
-from iibr_core.evaluation.metrics import bounded_psnr
-from iibr_core.evaluation.warp import reference_warp
 from iibr_core.method import mixed_pixels
 from iibr_core.method.mixed_pixels import move_with_foreground, split_mixed_pixels
-from iibr_core.method.photo_views import PhotoViews
-from iibr_core.stages import Stages
 from iibr_core.surfaces import SLOPE_SHARE
-from iibr_core.types import ViewOffset
 
 FOREGROUND, BACK = np.float32([0.9, 0.6, 0.3]), np.float32([0.1, 0.2, 0.5])
 
@@ -47,14 +42,6 @@ def test_shares_are_those_of_a_darker_photo_however_bright_an_hdr_one_is():
     np.testing.assert_allclose(shares_of(1e7), shares_of(1.0), atol=3e-3)
     for turn in (1, 2):
         np.testing.assert_allclose(shares_of([1e7, 1e5, 1e4], turn), shares_of([1e7, 1e5, 1e4]), atol=3e-3)
-
-
-def test_where_colors_tell_nothing_the_outline_tells_the_share():
-    _, disparity = edge_photo(0.5)
-    own, fringe, _, coverage = split_mixed_pixels(np.tile(BACK, (9, 12, 1)), disparity, edge_step=0.5)
-    straight_edge = 3 * mixed_pixels.OUTLINE_SHARE
-    assert coverage[4] == pytest.approx(np.where(np.arange(12) == 5, straight_edge, 0.0))
-    assert np.stack([own, fringe]) == pytest.approx(np.broadcast_to(BACK, (2, 9, 12, 3)), abs=1e-5)
 
 
 def test_splits_are_the_most_likely_ones():
@@ -123,25 +110,6 @@ def obvious_split(colors, disparity, y, x):
     return share, srgb_from_linear(bounded), srgb_from_linear(foreground)
 
 
-def test_both_parts_together_are_the_pixel_again():
-    colors, disparity = edge_photo(0.4)
-    noisy = np.clip(colors + np.random.default_rng(0).normal(0, 0.01, colors.shape), 0, 1).astype(np.float32)
-    own, fringe, _, coverage = split_mixed_pixels(noisy, disparity, edge_step=0.5)
-    share = coverage[..., None]
-    together = srgb_from_linear(share * linear_from_srgb(fringe) + (1 - share) * linear_from_srgb(own))
-    assert coverage[2:-2, 5].min() > 0.3
-    assert together == pytest.approx(noisy, abs=1e-4)
-
-
-def test_what_is_not_mixed_stays():
-    colors, disparity = edge_photo(0.0)
-    own, _, _, coverage = split_mixed_pixels(colors, disparity, edge_step=0.5)
-    assert coverage.max() == 0
-    assert (own == colors).all()
-    flat = split_mixed_pixels(edge_photo(0.5)[0], np.zeros_like(disparity), edge_step=0.5)
-    assert flat[3].max() == 0
-
-
 @pytest.mark.parametrize(
     ("behind", "beside", "is_split"),
     [(0.0, 0.0, True), (-0.4, 0.0, True), (-1.4, 0.0, False), (0.0, 0.5, False)],
@@ -171,25 +139,6 @@ def moved(row, steps=STEPS):
     found = move_with_foreground(values, steps)
     np.testing.assert_array_equal(move_with_foreground(np.ascontiguousarray(values.T), steps), found.T)
     return found[1].tolist()
-
-
-@pytest.mark.parametrize("step", [0.125, 0.5, 1.0])
-def test_the_pixel_behind_a_small_step_moves_with_what_is_in_front(step):
-    assert moved([0, 0, 0, step, step, step]) == [0, 0, step, step, step, step]
-    assert moved([step, step, step, 0, 0, 0]) == [step, step, step, step, 0, 0]
-
-
-@pytest.mark.parametrize(
-    "row",
-    [
-        np.linspace(0, 3, 10),
-        [0, 0, 0, 0.5, 1.0, 1.0, 1.0],  # a ramp of two steps
-        0.4 * np.sin(np.arange(60) / 3),
-        *([0, 0, 0, step, step, step] for step in (0.0625, 1.25, np.inf, np.nan)),
-    ],
-)
-def test_slopes_and_smaller_and_larger_steps_keep_their_bits(row):
-    np.testing.assert_array_equal(moved(row), np.float32(row))
 
 
 def test_pixels_move_as_the_slow_way_says():
@@ -223,30 +172,3 @@ def slowly(disparity, y, x):
     falls_away = here - min(near for near, _ in known) > SLOPE_SHARE * step
     goes_on = beyond - foreground > SLOPE_SHARE * step
     return here if falls_away or goes_on else foreground
-
-
-@pytest.mark.parametrize("parallax_px", [0.15, 0.3, 0.6, 0.9])
-def test_views_of_small_steps_are_hardly_worse_than_a_plain_warp(parallax_px):
-    """A disc before a wall, each pixel the mean of 8x8 points, seen from the four corners."""
-    photo, disparity = disc(parallax_px, ViewOffset(0, 0))
-    corners = [ViewOffset(t, s) for t in (-1, 1) for s in (-1, 1)]
-    gains = []
-    views = PhotoViews(photo, disparity, corners, Stages(ray_transformer=False))
-    for offset in corners:
-        truth, plain = disc(parallax_px, offset)[0], reference_warp(photo, disparity, offset)
-        made = views.view(offset).colors
-        gains.append(bounded_psnr(made, truth, plain.visible) - bounded_psnr(plain.colors, truth, plain.visible))
-    assert np.mean(gains) > -0.3
-
-
-def disc(parallax_px, offset, size=48, points=8):
-    """Return its picture (H, W, 3) and disparity (H, W) from a viewpoint."""
-    y, x = (np.mgrid[: size * points, : size * points] + 0.5) / points - 0.5
-    own_y, own_x = y + parallax_px * offset.t, x + parallax_px * offset.s
-    is_disc = (own_y - size / 2) ** 2 + (own_x - size / 2) ** 2 < (size / 3.3) ** 2
-    wall = 0.75 + 0.05 * np.sin(x / 3) * np.sin(y / 4)
-    shown = np.where(is_disc, 0.25 + 0.05 * np.sin(own_x / 4) * np.sin(own_y / 3), wall)
-    picture = shown.reshape(size, points, size, points).mean((1, 3))
-    centre = points // 2
-    disparity = np.where(is_disc, parallax_px, 0.0)[centre::points, centre::points]
-    return np.repeat(picture[..., None], 3, 2).astype(np.float32), disparity.astype(np.float32)

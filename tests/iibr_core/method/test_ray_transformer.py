@@ -33,30 +33,26 @@ from iibr_core.training.scenes.raycast import cast, render
 from iibr_core.types import ImageSize, ViewOffset
 
 SIZE, RADIUS = ImageSize(96, 128), 4
-SEEDS = range(1_000_003, 1_000_011)
+SEEDS = range(1_000_007, 1_000_011)
 """Training counts its steps from 0."""
 OFFSETS = [ViewOffset(0.0, 4.0), ViewOffset(-3.0, -2.0)]
 CORNERS = [ViewOffset(-4.0, -4.0), ViewOffset(4.0, 4.0)]
 MAPS = {
     "exact": lambda photo, d, rng: d,
     "blurred": lambda photo, d, rng: refine(photo, blur(d, 2.0)),
-    "blurred, not refined": lambda photo, d, rng: blur(d, 2.0),
     "degraded": lambda photo, d, rng: refine(photo, degrade(d, rng, RADIUS)),
 }
 LEAST_GAIN = {
-    ("exact", "all"): 0.3,
-    ("exact", "covered in part"): 0.1,
-    ("exact", "beside what is inpainted"): 0.25,
+    ("exact", "all"): 0.5,
+    ("exact", "covered in part"): 0.2,
+    ("exact", "beside what is inpainted"): 0.6,
     ("exact", "between surfaces"): 0.5,
-    ("blurred", "all"): 0.2,
-    ("blurred", "covered in part"): 0.2,
-    ("blurred", "beside what is inpainted"): 0.15,
-    ("blurred", "between surfaces"): 0.2,
-    ("blurred, not refined", "all"): 0.4,
+    ("blurred", "all"): 0.25,
+    ("blurred", "covered in part"): 0.3,
+    ("blurred", "between surfaces"): 0.3,
     ("degraded", "all"): 0.6,
-    ("degraded", "covered in part"): 0.15,
-    ("degraded", "beside what is inpainted"): 0.6,
-    ("degraded", "between surfaces"): 0.7,
+    ("degraded", "beside what is inpainted"): 0.8,
+    ("degraded", "between surfaces"): 0.6,
 }
 """dB over the closed form. T lost 0.2 to 0.9 dB of what it gains when its features of front and back were swapped."""
 
@@ -152,6 +148,18 @@ def test_compiled_weights_are_those_of_the_model_and_sum_to_one(model, compiled,
     assert weights.min() >= 0
 
 
+@pytest.mark.parametrize("factor", [1e4, 1e30, -1e30])
+def test_weights_stay_weights_however_large_the_scores_are(model, tmp_path, factor):
+    with torch.no_grad():
+        model.score.weight *= factor
+    save_weights(model, tmp_path / "weights.safetensors")
+    ambiguous = random_ambiguous()
+    weights = TrainedWeights(tmp_path / "weights.safetensors")(ambiguous)
+    assert (weights >= 0).all()
+    assert weights.sum(axis=1) == pytest.approx(1, abs=1e-5)
+    assert (weights[~ambiguous.mask] == 0).all()
+
+
 def test_weights_of_a_ray_do_not_depend_on_the_others_nor_on_the_order_of_hypotheses(model, compiled):
     ambiguous, order = random_ambiguous(), np.array([3, 0, 4, 1, 5, 2])
     assert (compiled(ambiguous)[37:] == compiled(ambiguous.chosen(np.arange(37, 200)))).all()
@@ -162,11 +170,3 @@ def test_untrained_it_is_the_closed_form():
     ambiguous = random_ambiguous()
     ambiguous.features[..., SHARE] = np.eye(HYPOTHESES)[0]
     assert weights_of(RayTransformer(), ambiguous)[:, 0].min() > 0.9
-
-
-def test_bfloat16_agrees_within_its_precision(model):
-    ambiguous = random_ambiguous()
-    exact = weights_of(model, ambiguous)
-    features = torch.from_numpy(ambiguous.features).to(torch.bfloat16)
-    rounded = model.to(torch.bfloat16)(features, torch.from_numpy(ambiguous.mask))
-    assert np.abs(rounded.detach().float().numpy() - exact).mean() < 0.02

@@ -77,15 +77,6 @@ def test_following_back_gives_what_landing_gives(disparity, offset, monkeypatch)
     assert np.abs(colors - expected).max() < 2 / 255
 
 
-@pytest.mark.parametrize("offset", OFFSETS)
-def test_no_cell_is_smooth_where_two_surfaces_or_none_show(offset):
-    candidates = find_candidates(ray_set(STEP), offset, (0, SIZE[0]))
-    smooth = by_pixel(candidates.smooth, (0, SIZE[0]))
-    left, right = 30 - 2.5 * max(offset.s, 0), 30 - 2.5 * min(offset.s, 0)
-    assert not smooth[:, int(left) - 2 : int(right) + 3].any()
-    assert not smooth[candidates.number != 1].any()
-
-
 @pytest.mark.parametrize(("disparity", "is_smooth"), [(12.0, False), (-12.0, True)], ids=["in front", "behind"])
 def test_inpainted_rays_matter_only_in_front(disparity, is_smooth):
     photo, at = np.zeros(SIZE, np.float32), ViewOffset(0.0, 1.0)
@@ -106,14 +97,3 @@ def test_bands_do_not_change_what_is_followed(rows):
     inner = slice(*rows)
     assert (by_pixel(band.smooth, rows) == by_pixel(whole.smooth, (0, SIZE[0]))[inner]).all()
     assert (band.disparity[0] == whole.disparity[0][inner])[band.number > 0].all()
-
-
-def test_unknown_disparity_is_never_smooth():
-    disparity = SLOPE.copy()
-    disparity[10, 12] = np.nan
-    rays = ray_set(disparity)
-    assert rays.cells.step[2, 3] == np.inf
-    assert rays.cells.step[4, 8] < np.inf
-    smooth, _ = find_smooth_cells(rays, ViewOffset(0.0, 0.01), (0, SIZE[0]))
-    assert not smooth[2, 3]
-    assert smooth[4, 8]

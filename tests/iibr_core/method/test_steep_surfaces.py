@@ -8,7 +8,6 @@ from iibr_core.method.closed_form import closed_form
 from iibr_core.method.rays import RaySet
 from iibr_core.method.steep_surfaces import BELOW, MIN_RUN, RIGHT, STEEP_SHARE, is_joined, join_steep_rays
 from iibr_core.surfaces import SLOPE_SHARE
-from iibr_core.training.degradation import blur
 from iibr_core.types import ViewOffset, image_size
 
 STEP = 0.5
@@ -48,13 +47,6 @@ def test_joined_rays_against_a_slow_twin(noise, unknown):
     )
 
 
-def test_sharp_depth_edges_join_nothing():
-    sharp = np.zeros((40, 60), np.float32)
-    sharp[:, 30:] = 12
-    for sigma in (0, 0.7):
-        assert not join_steep_rays(blur(sharp, sigma), STEP).any(), sigma
-
-
 def ray_set(disparity, farthest=1.0):
     rays = RaySet(1, image_size(disparity), farthest)
     rays.add(ViewOffset(0.0, 0.0), np.zeros((*disparity.shape, 3), np.float32), disparity, np.ones_like(disparity))
@@ -89,8 +81,3 @@ def test_a_steep_surface_is_torn_where_it_ends():
     # The slope's last ray, 39, lands on 38.2; the wall's first on 49.
     assert shown[41:48] == pytest.approx(0)
     assert shown[20:38] == pytest.approx(1, abs=1e-3)
-
-
-def test_look_ups_on_a_steep_surface_meet_no_edge():
-    rays = ray_set(np.tile(0.8 * np.arange(60, dtype=np.float32), (30, 1)))
-    assert not rays.arrays.near_edge[0].any()

@@ -6,7 +6,6 @@ import pytest
 from iibr_core.method.rays import rays_of_photo
 from iibr_core.method.update_loop import update
 from iibr_core.method.view import Renderer
-from iibr_core.runtime.work import Cancelled, stoppable
 from iibr_core.types import ViewOffset
 from tests.iibr_core.method.filled_rays import filled_rays
 from tests.iibr_core.red_inpainter import paint_red
@@ -38,13 +37,6 @@ def test_what_a_view_disoccluded_has_joined_the_rays_when_it_is_yielded(rays):
     assert again.inpainted[expected.occluded].all()
 
 
-def test_views_that_disocclude_nothing_add_nothing(rays):
-    before = len(rays)
-    ((_, view),) = update(rays, [ViewOffset(0.0, 0.0)], Renderer())
-    assert not view.occluded.any()
-    assert len(rays) == before
-
-
 def test_the_inpainter_decides_what_joins(rays):
     ((_, view),) = update(rays, [LEFT], Renderer(inpaint=paint_red))
     colors, disparity, filled = filled_rays(view)
@@ -52,13 +44,6 @@ def test_the_inpainter_decides_what_joins(rays):
     assert (colors[filled == 1] == (1, 0, 0)).all()
     assert (disparity[filled == 1] == -9).all()
     np.testing.assert_array_equal(rays.arrays.disparity[-1] == -9, filled)
-
-
-def test_a_stop_is_heard_and_adds_nothing(rays):
-    before = len(rays)
-    with pytest.raises(Cancelled), stoppable(lambda: True):
-        list(update(rays, [LEFT], Renderer()))
-    assert len(rays) == before
 
 
 def test_what_was_inpainted_farther_back_does_not_show_through_a_hole_in_the_photos_surface():

@@ -11,7 +11,6 @@ from iibr_core.evaluation.warp import reference_warp
 from iibr_core.method.farthest_views import outer_views_of_grid, outpainting_margins
 from iibr_core.method.look_up import KEYS_A
 from iibr_core.method.mixed_pixels import move_with_foreground, split_mixed_pixels
-from iibr_core.method.ray_transformer import shipped_transformer
 from iibr_core.method.rays import MIN_STEP_PX, rays_of_photo
 from iibr_core.method.update_loop import update
 from iibr_core.method.view import Renderer
@@ -50,6 +49,9 @@ def test_an_edge_beside_a_gap_is_the_front_over_what_was_inpainted(share, offset
     assert row[FIRST + moved : LAST + moved] == pytest.approx(np.tile(FOREGROUND, (LAST - FIRST, 1)), abs=2e-3)
     for edge in (FIRST - 1 + moved, LAST + moved):
         assert row[edge] == pytest.approx(mixed(share), abs=5e-3)
+    beside_gap = HEIGHT // 2, LAST + moved if offset == RIGHT else FIRST - 1 + moved
+    assert view.disparity[beside_gap] == pytest.approx(6 if share > 0.5 else 0), "the heavier part's"
+    assert view.inpainted[beside_gap] == (share < 0.5)
     rest = np.r_[8 : FIRST - 1 + moved, LAST + 1 + moved : WIDTH - 8]
     assert row[rest] == pytest.approx(np.tile(WALL, (len(rest), 1)), abs=5e-3), "nothing of the foreground stays behind"
 
@@ -60,12 +62,6 @@ def test_what_is_inpainted_shows_beside_the_edge_and_joins_without_what_comes_ov
     light = 0.3 * linear_from_srgb(FOREGROUND) + 0.7 * linear_from_srgb(np.float32([1, 0, 0]))
     assert view.colors[HEIGHT // 2, LAST - 6] == pytest.approx(srgb_from_linear(light), abs=5e-3)
     assert (rays.arrays.colors[-1][rays.arrays.coverage[-1] > 0] == (1, 0, 0)).all()
-
-
-def test_where_nothing_lies_open_nothing_is_behind():
-    view = Renderer().render(bar(0.0), ViewOffset(0.0, 0.0))
-    assert view.behind is None
-    assert not view.has_new_rays
 
 
 GRID, FARTHEST = GridShape(5, 5), 2.0
@@ -104,7 +100,7 @@ def test_no_view_shows_anything_inpainted_in_front_of_the_photo_and_its_continua
 
 
 SMALL = ImageSize(18, 22)
-few = settings(max_examples=20)
+few = settings(max_examples=8)
 seeds = st.integers(0, 10_000)
 steps = st.integers(-8, 8).map(lambda quarter: quarter / 4)
 offsets = st.builds(ViewOffset, steps, steps)
@@ -149,20 +145,6 @@ def test_flipping_the_photo_flips_the_views(seed, offset, turn, has_mixed_pixels
 
 
 @few
-@given(seeds, st.integers(-3, 3), st.integers(-3, 3))
-def test_shifting_the_photo_shifts_the_views(seed, down, right):
-    """Where the photo is seen, farther from the border than a ray looks around."""
-    pixels, disparity = scene(seed, 44, 50)
-    disparity = np.pad(np.round(disparity)[4:-4, 4:-4], 4)
-    shifted = [np.roll(part, (down, right), axis=(0, 1)) for part in (pixels, disparity)]
-    offset, shipped = ViewOffset(-1.0, 1.0), shipped_transformer()
-    one, other = (rendered(*parts, offset, 1.0, shipped) for parts in ((pixels, disparity), shifted))
-    back = [np.roll(part, (-down, -right), axis=(0, 1)) for part in (other.colors, filled_rays(other)[2])]
-    seen = (filled_rays(one)[2] == 0) & (back[1] == 0)
-    assert np.abs(back[0] - one.colors)[16:-16, 16:-16][seen[16:-16, 16:-16]].max() <= 1 / 255
-
-
-@few
 @given(seeds)
 def test_a_view_offset_of_zero_gives_the_photo_back(seed):
     """Exactly, but where a pixel was split in two, of which one would be darker than black. (A field has the photo
@@ -178,19 +160,6 @@ def test_a_view_offset_of_zero_gives_the_photo_back(seed):
     moved = move_with_foreground(disparity, (MIN_STEP_PX / 2.0, EDGE_PX / 2.0))
     assert (view.disparity == moved).mean() > 0.95, "all but split pixels, whose foreground may weigh more"
     assert not view.inpainted.any()
-
-
-@few
-@given(seeds, offsets)
-def test_an_offset_towards_zero_comes_to_the_photo(seed, offset):
-    """Its error against the photo vanishes with it, but for pixels that were split in two, see above."""
-    pixels, disparity = scene(seed)
-    errors = [
-        float(np.abs(rendered(pixels, disparity, ViewOffset(offset.t * f, offset.s * f)).colors - pixels).mean())
-        for f in (1e-2, 1e-4, 1e-8)
-    ]
-    assert errors[1] <= errors[0] / 10 + 1e-4
-    assert errors[2] <= 1e-4
 
 
 @few
@@ -228,23 +197,3 @@ def test_a_moved_photo_against_its_twin_in_doubles(seed, down, right):
         exact = sum(w * np.roll(exact, 1 - k - whole, axis) for k, w in enumerate(weights))
     inner = np.s_[4:-4, 4:-4]
     assert np.abs(view.colors - np.maximum(exact, 0))[inner].max() <= 4e-6
-
-
-@pytest.mark.parametrize("transformer", [None, shipped_transformer()], ids=["closed form", "transformer"])
-def test_error_falls_with_the_noise_of_the_disparity(transformer):
-    """Before a depth edge too, where the photo shows. What is inpainted is chosen among patches: it stays near, and
-    without noise nothing differs.
-    """
-    pixels, truth = smooth_texture(32, 40), np.where(np.arange(40) < 20, 2.0, 0.0) * np.ones((32, 1), np.float32)
-    noise = np.random.default_rng(0).normal(0, 1, truth.shape)
-    offset = ViewOffset(0.5, 1.0)
-    exact = rendered(pixels, truth.astype(np.float32), offset, transformer=transformer)
-    errors = []
-    for s in (0.4, 0.2, 0.1, 0.05, 0.01, 0.0):
-        view = rendered(pixels, (truth + s * noise).astype(np.float32), offset, 2.0, transformer)
-        seen = ~(exact.inpainted | view.inpainted)
-        errors.append(float(np.sum(((view.colors - exact.colors) ** 2)[seen])))
-        assert seen.mean() > 0.9
-        assert np.mean(((view.colors - exact.colors) ** 2)[~seen]) < 0.03**2
-    assert errors == sorted(errors, reverse=True)
-    np.testing.assert_array_equal(view.colors, exact.colors)

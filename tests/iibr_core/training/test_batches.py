@@ -3,12 +3,8 @@ import pytest
 import torch
 
 from iibr_core.method.ambiguous_rays import FEATURES, HYPOTHESES
-from iibr_core.method.ray_transformer import TrainedWeights
 from iibr_core.training import batches
 from iibr_core.training.batches import training_batch
-from iibr_core.training.losses import LossWeights, color_loss, to_perceptual
-from iibr_core.training.model import RayTransformer
-from iibr_core.training.trainer import TrainConfig, train
 from iibr_core.types import ImageSize
 
 
@@ -27,7 +23,7 @@ def test_a_batch_repeats_and_differs_from_others():
     assert one.features.shape != other.features.shape or not torch.equal(one.features, other.features)
 
 
-@pytest.mark.parametrize("step", range(1, 7))
+@pytest.mark.parametrize("step", range(1, 4))
 def test_batches_are_finite_and_whole(step):
     batch = training_batch(step, seed=0)
     rays = len(batch.truth)
@@ -43,22 +39,3 @@ def test_truth_lies_within_reach_of_the_hypotheses():
     distance = (batch.colors - batch.truth[:, None]).abs().sum(dim=-1).masked_fill(~batch.mask, torch.inf)
     by_chance = (batch.colors - batch.truth.roll(37, 0)[:, None]).abs().sum(dim=-1).masked_fill(~batch.mask, torch.inf)
     assert distance.min(dim=1).values.median() < 0.3 * by_chance.min(dim=1).values.median()
-
-
-def test_training_lowers_the_loss_of_the_real_model(tmp_path):
-    torch.manual_seed(0)
-    model = RayTransformer()
-    few = [training_batch(k, seed=0) for k in range(1, 6)]
-
-    def loss():
-        with torch.no_grad():
-            rendered = [(model(b.features, b.mask)[..., None] * b.colors).sum(dim=1) for b in few]
-        losses = [color_loss(to_perceptual(r), to_perceptual(b.truth)).item() for r, b in zip(rendered, few)]
-        return np.mean([b.color_gain * loss for b, loss in zip(few, losses)])
-
-    before = loss()
-    out = tmp_path / "t.safetensors"
-    config = TrainConfig(steps=100, learning_rate=3e-3, lambdas=LossWeights(entropy=0.05), device="cpu")
-    train(model, lambda step: few[step % len(few)], config, out)
-    assert loss() < 0.97 * before
-    assert TrainedWeights(out) is not None

@@ -1,15 +1,11 @@
 import numpy as np
 import pytest
 
-from iibr_core.training.degradation import add_noise, blur, coarsen, degrade, misalign, quantise, rescale
+from iibr_core.training.degradation import add_noise, blur, coarsen, degrade, misalign
 
 
 def rough(shape=(31, 37), seed=0):
     return np.random.default_rng(seed).normal(0, 2, shape).astype(np.float32)
-
-
-def step_edge():
-    return np.where(np.arange(41) < 20, -1.0, 3.0).astype(np.float32) * np.ones((9, 1), np.float32)
 
 
 @pytest.mark.parametrize("sigma", [0.5, 1.3, 4.0])
@@ -32,13 +28,6 @@ def test_noise_has_the_strength_asked_for(grain):
     assert (neighbours > 0.9) if grain == 3.0 else (neighbours < 0.7)
 
 
-def test_quantised_values_are_multiples_within_half_a_step():
-    d = rough()
-    q = quantise(d, 0.25)
-    assert np.abs(q - d).max() <= 0.125 + 1e-6
-    assert (q / 0.25) == pytest.approx(np.rint(q / 0.25), abs=1e-5)
-
-
 def test_coarse_averages_squares_and_keeps_slopes():
     y, x = np.mgrid[0:24, 0:30].astype(np.float32)
     slope = 0.3 * x - 0.2 * y
@@ -53,10 +42,6 @@ def test_misalignment_moves_down_and_right():
     assert misalign(d, 0.0, -0.25)[:, :-1] == pytest.approx(0.75 * d[:, :-1] + 0.25 * d[:, 1:], abs=1e-4)
 
 
-def test_rescaled():
-    assert rescale(step_edge(), 1.1, -0.2) == pytest.approx(1.1 * step_edge() - 0.2)
-
-
 def test_degrade_repeats_by_seed_and_leaves_its_input_alone():
     d = rough()
     before = d.copy()
@@ -67,11 +52,3 @@ def test_degrade_repeats_by_seed_and_leaves_its_input_alone():
         assert np.isfinite(out).all()
         assert (out == again).all()
     assert (d == before).all()
-
-
-def test_degrade_leaves_some_maps_exact_and_changes_the_others_differently():
-    d = step_edge()
-    outs = [degrade(d, np.random.default_rng(seed), 4.0) for seed in range(60)]
-    exact = sum(bool((out == d).all()) for out in outs)
-    assert 3 <= exact <= 25
-    assert len({out.tobytes() for out in outs}) >= 60 - exact

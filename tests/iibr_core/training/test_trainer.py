@@ -9,17 +9,8 @@ from torch import nn
 
 from iibr_core.formats.weights import read_weights
 from iibr_core.runtime.work import watched
-from iibr_core.training.losses import LossWeights, color_loss, total_loss
-from iibr_core.training.trainer import (
-    Batch,
-    LogRow,
-    TrainConfig,
-    TrainingRun,
-    checkpoint_path,
-    choose_device,
-    log_path,
-    train,
-)
+from iibr_core.training.losses import LossWeights, total_loss
+from iibr_core.training.trainer import Batch, LogRow, TrainConfig, TrainingRun, checkpoint_path, log_path, train
 from iibr_core.types import InputError
 
 EPIS, VIEWS, WIDTH, K = 2, 3, 8, 4
@@ -82,22 +73,6 @@ def out(tmp_path):
     return tmp_path / "weights.safetensors"
 
 
-def test_fifty_steps_lower_the_loss_on_batches_not_trained_on(out):
-    model = Scorer()
-
-    def held_out_loss():
-        batch = batches(1, seed=77)
-        with torch.no_grad():
-            weights = model(batch.features, batch.mask)
-        return color_loss((weights[..., None] * batch.colors).sum(dim=1), batch.truth).item()
-
-    before = held_out_loss()
-    train(model, batches, replace(CONFIG, steps=50, learning_rate=0.03), out)
-    assert held_out_loss() < 0.7 * before
-    totals = [float(row["total"]) for row in log_rows(out)]
-    assert sum(totals[-10:]) < 0.7 * sum(totals[:10])
-
-
 def test_weights_checkpoint_and_log_are_written(out):
     model = Scorer()
     reports = []
@@ -136,24 +111,15 @@ def test_the_first_step_against_adam_by_hand(out):
         assert torch.allclose(trained, by_hand, rtol=1e-5, atol=1e-7)
 
 
-@pytest.mark.parametrize("last", [1, 5, 8])
-def test_an_interrupted_training_continues_from_its_checkpoint(tmp_path, last):
+def test_an_interrupted_training_continues_from_its_checkpoint(tmp_path):
     whole, parts = tmp_path / "whole.safetensors", tmp_path / "parts.safetensors"
     train(Scorer(), batches, CONFIG, whole)
     with pytest.raises(KeyboardInterrupt):
-        train(Scorer(), interrupt_at(last), CONFIG, parts)
+        train(Scorer(), interrupt_at(8), CONFIG, parts)
     assert not parts.exists()
     train(Scorer(seed=123), batches, CONFIG, parts, resume=True)
     assert is_close(read_weights(whole)[0], read_weights(parts)[0])
     assert [int(row["step"]) for row in log_rows(parts)] == list(range(1, 13))
-
-
-def test_a_finished_training_can_go_further(out):
-    train(Scorer(), batches, CONFIG, out)
-    before = read_weights(out)[0]
-    train(Scorer(seed=9), batches, replace(CONFIG, steps=20), out, resume=True)
-    assert not is_close(before, read_weights(out)[0])
-    assert [int(row["step"]) for row in log_rows(out)] == list(range(1, 21))
 
 
 @pytest.mark.parametrize(("field", "value"), [("truth", float("nan")), ("colors", float("inf"))])
@@ -191,39 +157,3 @@ def test_resume_needs_a_whole_checkpoint_of_this_model(out):
     for damaged in (whole[:-300], whole[:10], b"no checkpoint", json.dumps({"step": 3}).encode()):
         path.write_bytes(damaged)
         refused("is damaged or of another model")
-
-
-def test_bad_paths_are_known_before_the_first_step(tmp_path):
-    def never(step):
-        raise AssertionError("a batch was asked for")
-
-    (tmp_path / "folder.safetensors").mkdir()
-    for path, match in [
-        (tmp_path / "weights.pt", "are written as .safetensors"),
-        (tmp_path / "nowhere" / "weights.safetensors", "does not exist"),
-        (tmp_path / "folder.safetensors", "is a folder"),
-    ]:
-        with pytest.raises(InputError, match=match):
-            train(Scorer(), never, CONFIG, path)
-
-
-def test_devices():
-    assert choose_device("cpu").type == "cpu"
-    assert choose_device("auto").type in ("cuda", "mps", "cpu")
-    for name in ("gpu", "cuda:99", ""):
-        with pytest.raises(InputError, match=f"device {name}: this machine has none; choose auto or cpu"):
-            choose_device(name)
-
-
-@pytest.mark.parametrize("device", ["cuda", "mps"])
-def test_training_on_an_accelerator_agrees_with_the_cpu(tmp_path, device):
-    try:
-        choose_device(device)
-    except InputError:
-        pytest.skip(f"no {device} device here")
-    here, there = tmp_path / "cpu.safetensors", tmp_path / "accelerator.safetensors"
-    train(Scorer(), batches, CONFIG, here)
-    train(Scorer(), batches, replace(CONFIG, device=device), there)
-    one, other = read_weights(here)[0], read_weights(there)[0]
-    for name, weights in one.items():
-        assert np.allclose(weights, other[name], atol=1e-4)

@@ -12,10 +12,10 @@ from PIL import Image
 
 from iibr_core.types import GridShape, InputError
 from tests.viewer.conftest import Driver, Opener, write_scene
-from viewer.app.clipboard import MOST_KEPT, paste_picture
+from viewer.app.clipboard import MAX_PASTED, paste_picture
 from viewer.model import lens, messages
 from viewer.model.action import ask, do
-from viewer.model.state.saving import CopyTask, PasteTask
+from viewer.model.state.tasks import CopyTask, PasteTask
 
 CLIPBOARD = ["xclip", "-selection", "clipboard"]
 
@@ -84,18 +84,10 @@ def test_a_path_in_the_clipboard_opens_and_words_do_not(viewer: Driver, tmp_path
     assert viewer.app.state.source is before
 
 
-@pytest.mark.parametrize(
-    ("data", "words"),
-    [
-        (b"", "neither"),
-        (b"\x00\xff\xfe" * 9, "neither"),
-        (b"\x89PNG\r\n\x1a\n" + bytes(40), "neither"),
-        (a_picture()[:-40], "cannot be read"),
-    ],
-)
-def test_damaged_pictures_are_one_line(display: str, data: bytes, words: str) -> None:
+@pytest.mark.parametrize("data", [b"", b"\x00\xff\xfe" * 9, a_picture()[:-40]])
+def test_damaged_pictures_are_one_line(display: str, data: bytes) -> None:
     put(data, "image/png")
-    with pytest.raises(InputError, match=words):
+    with pytest.raises(InputError, match="neither a picture"):
         paste_picture("/no/such/file")
 
 
@@ -103,19 +95,19 @@ def test_what_is_lacking_is_named(viewer: Driver, tmp_path: Path, monkeypatch: p
     monkeypatch.setenv("PATH", str(tmp_path))
     for task in (CopyTask(), PasteTask()):
         viewer.app.do(do(messages.dismiss), do(ask, task))
-        says(viewer, "install xclip")
+        says(viewer, "Install xclip")
 
 
 def test_old_pasted_pictures_go(display: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     put(a_picture(), "image/png")
-    pasted = [paste_picture("").path for _ in range(MOST_KEPT + 2)]
-    assert [Path(path).exists() for path in pasted] == [False] * 2 + [True] * MOST_KEPT
+    pasted = [paste_picture("") for _ in range(MAX_PASTED + 2)]
+    assert [Path(path).exists() for path in pasted] == [False] * 2 + [True] * MAX_PASTED
 
 
 def test_a_cache_that_cannot_be_written_is_told(display: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
     (tmp_path / "file").write_text("in the way")
     put(a_picture(), "image/png")
-    with pytest.raises(InputError, match="cannot be kept there"):
+    with pytest.raises(InputError, match="cannot be created"):
         paste_picture("")

@@ -247,3 +247,29 @@ def test_a_notice_in_a_low_window_leaves_the_strips_free(viewer: Driver) -> None
     assert frame.pos.y >= 0
     assert frame.pos.y + frame.size.y <= layout.strip_across.y
     assert frame.pos.x + frame.size.x <= layout.strip_down.x
+
+
+def test_a_click_selects_a_surface_to_move_it_and_to_keep_it_sharp(viewer: Driver) -> None:
+    app = viewer.app
+    app.do(do(depth.set_brush, Brush("select", is_on=True)))
+    viewer.send("mousemove", *viewer.position(0.5, 0.5), "click", 1)
+    settle(viewer, lambda app: app.state.selection is not None and app.state.selection.range_px is not None)
+    near = app.scene_view.pick(ViewOffset(0, 0), 48, 32)
+    assert app.state.selection is not None
+    assert app.state.selection.range_px == (pytest.approx(near, abs=0.05), pytest.approx(near, abs=0.05))
+    overlay = app.inspection_view.draw(app.state, app.layout()).overlay
+    assert overlay is not None
+    assert app.state.stroke is None
+    before = disparity_of(app).copy()
+    viewer.press("Farther##surface")
+    until_made(viewer, 2)
+    moved = disparity_of(app) - before
+    assert moved[32, 48] == pytest.approx(-0.1 * (NEAR - FAR), abs=0.01)
+    assert moved[4, 4] == 0, "the wall stays"
+    viewer.until(lambda app: app.state.selection is not None and app.state.selection.range_px[1] < near - 0.05)  # type: ignore[index]
+    viewer.press("Keep sharp")
+    viewer.until(lambda app: app.state.optics.aperture_diameter > 0)
+    assert app.state.optics.focus_disparity == pytest.approx(app.scene_view.pick(ViewOffset(0, 0), 48, 32), abs=0.05)
+    viewer.send("key", "Escape")
+    viewer.until(lambda app: app.state.selection is None)
+    assert app.state.brush.is_on

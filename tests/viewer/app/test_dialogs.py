@@ -11,35 +11,37 @@ import pytest
 from imgui_bundle import portable_file_dialogs
 
 from iibr_core.scenes.screen_size import ScreenSize
-from viewer.app.dialogs import Dialog, SaveDialog
-from viewer.model.state.prompts import SavePrompt
+from viewer.app.dialogs import ask_for_path, ask_for_place
+from viewer.model.state.prompts import ChoiceOf, ExportPrompt, SavePrompt
+
+PLACE = SavePrompt("photos/one-iibr.png", ScreenSize(3, 2))
 
 
 @pytest.mark.parametrize(("what", "kind"), [("photo", "open_file"), ("folder", "select_folder")])
 def test_a_dialog_begins_beside_what_is_open_and_shows_names_in_capitals(
-    monkeypatch: pytest.MonkeyPatch, what: str, kind: str
+    monkeypatch: pytest.MonkeyPatch, what: ChoiceOf, kind: str
 ) -> None:
     asked: list[tuple[object, ...]] = []
     monkeypatch.setattr(portable_file_dialogs, kind, lambda *words: asked.append(words))
-    Dialog(what, "photos/one.jpg")  # type: ignore[arg-type]
-    Dialog(what)  # type: ignore[arg-type]
-    (_, start, *filters), (_, anywhere, *_) = asked
+    ask_for_path(what, "photos/one.jpg")
+    _, start, *filters = asked[0]
     assert start == os.path.join(os.getcwd(), "photos", "")
-    assert anywhere == ""
     for patterns in filters:
         assert {"*.jpg", "*.JPG", "*.HEIC", "*.hif"} <= set(patterns[1].split())
 
 
-def test_where_to_save_is_asked_with_what_was_typed(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_place_is_asked_for_with_the_typed_name(monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[tuple[object, ...]] = []
     monkeypatch.setattr(portable_file_dialogs, "save_file", lambda *words: asked.append(words))
-    SaveDialog(SavePrompt("photos/one-iibr.png", ScreenSize(3, 2)))
+    monkeypatch.setattr(portable_file_dialogs, "select_folder", lambda *words: asked.append(words))
+    ask_for_place(PLACE)
+    assert ask_for_place(ExportPrompt("hci", "photos/field")).name == "field"
     assert asked[0][:2] == ("Save the picture", os.path.join(os.getcwd(), "photos", "one-iibr.png"))
+    assert asked[1][1] == os.path.join(os.getcwd(), "photos")
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="other systems show their dialog without a program")
-@pytest.mark.parametrize("dialog", ["Dialog('photo')", "SaveDialog(SavePrompt('a.png', ScreenSize(3, 2)))"])
-def test_an_open_dialog_ends_with_the_program(tmp_path: Path, dialog: str) -> None:
+def test_an_open_dialog_ends_with_the_program(tmp_path: Path) -> None:
     """The dialog's program waits for a person, longer than the test may take."""
     program, started = tmp_path / "zenity", tmp_path / "started"
     program.write_text(f"#!/bin/sh\ntouch {started}\nexec sleep 600\n")
@@ -47,10 +49,8 @@ def test_an_open_dialog_ends_with_the_program(tmp_path: Path, dialog: str) -> No
     code = f"""
 import time
 from pathlib import Path
-from iibr_core.scenes.screen_size import ScreenSize
-from viewer.app.dialogs import Dialog, SaveDialog
-from viewer.model.state.prompts import SavePrompt
-dialog = {dialog}
+from viewer.app.dialogs import ask_for_path
+dialog = ask_for_path("photo")
 while not Path({str(started)!r}).exists():
     time.sleep(0.01)
 assert dialog.answer() is None

@@ -10,10 +10,12 @@ import numpy as np
 import pytest
 
 from iibr_core.formats.images.photo import read_photo
+from iibr_core.scenes.screen_size import ScreenSize
 from tests.viewer.conftest import Driver
-from viewer.app import picture_saver
+from viewer.app import saving
 from viewer.model import lens
 from viewer.model.action import ask, do
+from viewer.model.state.prompts import SavePrompt
 from viewer.model.state.tasks import SaveTask
 from viewer.model.state.viewpoint import FreeCamera
 from viewer.ui.overlays.chips import CHIP
@@ -73,7 +75,7 @@ def test_the_lens_blurs_what_it_sees_and_a_saved_picture_shows_that(viewer: Driv
     blurred = seen(viewer)
     assert np.abs(blurred - sharp).mean() > 1.0
     path = tmp_path / "seen.png"
-    viewer.app.do(do(ask, SaveTask(str(path), (blurred.shape[1], blurred.shape[0]))))
+    viewer.app.do(do(ask, SaveTask(SavePrompt(str(path), ScreenSize(blurred.shape[1], blurred.shape[0])))))
     viewer.until(lambda app: path.exists() and not app.state.jobs)
     viewer.send("key", "Escape")
     viewer.until(lambda app: app.state.free_camera is None and app.free_camera_view.shown is None)
@@ -87,20 +89,20 @@ def test_pictures_that_wait_show_what_the_camera_saw(
 ) -> None:
     """Each of its own camera, however far that has moved when its turn comes."""
     app, paths = viewer.app, [tmp_path / f"{k}.png" for k in range(3)]
-    held, export = threading.Event(), picture_saver.export_picture
+    held, export = threading.Event(), saving.export_picture
 
     def export_when_held(*arguments: Any) -> Path:
         assert held.wait(60)
         return export(*arguments)
 
-    monkeypatch.setattr(picture_saver, "export_picture", export_when_held)
+    monkeypatch.setattr(saving, "export_picture", export_when_held)
     expected = []
     for path in paths:
         viewer.send("key", "w")
         before = app.state.free_camera
         viewer.until(lambda app, before=before: app.state.free_camera != before)  # type: ignore[misc]
         expected.append(seen(viewer))
-        app.do(do(ask, SaveTask(str(path), (expected[-1].shape[1], expected[-1].shape[0]))))
+        app.do(do(ask, SaveTask(SavePrompt(str(path), ScreenSize(expected[-1].shape[1], expected[-1].shape[0])))))
         viewer.until(lambda app: not app.state.tasks)
     held.set()
     viewer.until(lambda app: not app.state.jobs)

@@ -13,6 +13,7 @@ from iibr_core.beyond.optics import Optics
 from iibr_core.formats.images.metadata import SETTINGS_KEY
 from iibr_core.formats.images.photo import read_photo
 from iibr_core.formats.images.write import write_image
+from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import Driver, Opener, rests, write_scene
 from viewer.app.preferences_store import load_preferences
@@ -21,8 +22,7 @@ from viewer.model import lens, messages, opening
 from viewer.model.action import ask, do
 from viewer.model.saved_settings import read_settings
 from viewer.model.state.app_state import AppState
-from viewer.model.state.exporting import ExportPrompt
-from viewer.model.state.prompts import PalettePrompt, SavePrompt
+from viewer.model.state.prompts import ExportPrompt, PalettePrompt, SavePrompt
 from viewer.model.state.tasks import ReadMaskTask, SaveTask
 
 pytestmark = pytest.mark.usefixtures("no_dialogs")
@@ -52,40 +52,12 @@ def test_a_saved_picture_can_be_taken_again_without_the_window(
     assert difference.max() <= 1 / 255, "another GL context may round differently"
 
 
-def test_a_file_that_is_there_is_replaced_only_when_that_is_said(viewer: Driver, tmp_path: Path) -> None:
-    out = tmp_path / "out.png"
-    out.write_text("mine")
-    viewer.app.do(do(ask, SaveTask(str(out), (48, 32))))
-    viewer.until(lambda app: app.state.prompt == SavePrompt(str(out), (48, 32), already_there=True))
-    assert out.read_text() == "mine"
-    viewer.until_idle()
-    viewer.press("Replace", "prompt SavePrompt")
-    viewer.until(lambda app: app.state.prompt is None and bool(app.state.notices))
-    assert read_photo(out).pixels.shape == (32, 48, 3)
-
-
-@pytest.mark.parametrize("name", ["a.jpeg2", "gone/a.png", "a/b/"])
-def test_a_picture_that_cannot_be_written_gives_a_notice(viewer: Driver, tmp_path: Path, name: str) -> None:
-    before = viewer.app.state.optics
-    viewer.app.do(do(ask, SaveTask(f"{tmp_path}/{name}", (48, 32))))
-    viewer.until(lambda app: bool(app.state.notices))
-    assert viewer.app.state.notices[-1].is_error
-    assert viewer.app.state.optics == before
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["scene.png", "scene_disparity.npy"]
-
-
-def test_a_picture_too_large_for_the_driver_gives_a_notice(viewer: Driver, tmp_path: Path) -> None:
-    viewer.app.do(do(ask, SaveTask(str(tmp_path / "a.png"), (10**6, 6 * 10**5))))
-    viewer.until(lambda app: bool(app.state.notices))
-    assert "1000000x600000" in viewer.app.state.notices[-1].text
-    assert not (tmp_path / "a.png").exists()
-    viewer.until_idle()
-
-
 def test_a_dropped_saved_picture_offers_its_settings(viewer: Driver, tmp_path: Path) -> None:
     out = tmp_path / "saved.png"
     viewer.app.do(
-        do(lens.move_eye, ViewOffset(1, 1)), do(lens.set_aperture, 1.5), do(ask, SaveTask(str(out), (96, 64)))
+        do(lens.move_eye, ViewOffset(1, 1)),
+        do(lens.set_aperture, 1.5),
+        do(ask, SaveTask(SavePrompt(str(out), ScreenSize(96, 64)))),
     )
     viewer.until(lambda app: out.exists())
     wanted = viewer.app.state.optics

@@ -11,6 +11,7 @@ from imgui_bundle import imgui
 
 from iibr_core.formats.images.write import write_image
 from iibr_core.scenes.scene import Source
+from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape
 from tests.viewer.conftest import Driver, Opener
 from viewer.app.main_loop import App
@@ -19,9 +20,8 @@ from viewer.model.action import do
 from viewer.model.commands import BY_NAME, COMMANDS
 from viewer.model.layout import PANEL_WIDTH
 from viewer.model.state.depth_models import ModelsPrompt
-from viewer.model.state.exporting import ExportPrompt
 from viewer.model.state.notices import Notice
-from viewer.model.state.prompts import FolderContents, PalettePrompt, PathPrompt, SavePrompt
+from viewer.model.state.prompts import ExportPrompt, PalettePrompt, PathPrompt, SavePrompt
 
 pytestmark = pytest.mark.usefixtures("no_dialogs")
 
@@ -61,8 +61,7 @@ def test_the_palette_loses_nothing_of_what_is_typed_before_its_field_is_there(vi
 
 def test_the_help_stands_in_the_panels_place_and_leaves_the_picture_to_be_seen(viewer: Driver) -> None:
     for hides_panel in (False, True):
-        viewer.app.state = replace(viewer.app.state, hides_panel=hides_panel)
-        viewer.app.do(do(messages.show_prompt, "help"))
+        viewer.app.state = replace(viewer.app.state, hides_panel=hides_panel, prompt="help")
         viewer.until_idle()
         pad, window = imgui.internal.find_window_by_name("prompt str"), viewer.app.layout().window
         assert (pad.pos.x + pad.size.x, pad.size.y) == (window.width, window.height)
@@ -89,7 +88,7 @@ def test_tooltips_come_up_before_the_window_sleeps(viewer: Driver) -> None:
 def test_tooltips_of_a_prompt_leave_it_to_be_seen(viewer: Driver, scale: float) -> None:
     viewer.app.do(do(preferences.set_font_scale, scale), do(messages.show_prompt, ExportPrompt("sbs", "a.png")))
     viewer.until_idle()
-    viewer.find("##Eyes", "prompt ExportPrompt")
+    viewer.find("##3D strength", "prompt ExportPrompt")
     viewer.until_idle()
     tip, prompt = (imgui.internal.find_window_by_name(name) for name in ("##Tooltip_00", "prompt ExportPrompt"))
     assert tip.active
@@ -177,13 +176,16 @@ def test_one_notice_is_shown_at_a_time_and_all_are_closed_at_once(viewer: Driver
     viewer.until(lambda app: not app.state.notices)
 
 
-def test_notices_go_by_themselves_the_newest_first(viewer: Driver, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("viewer.model.state.notices.SHORT_NOTICE_S", 0.0)
-    viewer.app.do(do(messages.notify, Notice("It failed.", is_error=True)), do(messages.notify, Notice("Saved a.png")))
-    viewer.until(lambda app: len(app.state.notices) == 1)
-    assert viewer.app.state.notices[0].is_error, "that stays longer"
-    monkeypatch.setattr("viewer.model.state.notices.LONG_NOTICE_S", 0.0)
-    viewer.until(lambda app: not app.state.notices)
+def test_results_go_by_themselves_and_errors_stay_until_they_are_closed(
+    viewer: Driver, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("viewer.model.state.notices.RESULT_S", 0.0)
+    error = Notice("It failed.", is_error=True)
+    viewer.app.do(do(messages.notify, error), do(messages.notify, Notice("Saved a.png", is_result=True)))
+    viewer.until(lambda app: app.state.notices == (error,))
+    monkeypatch.setattr("viewer.app.main_loop.time.perf_counter", lambda: 1e9)
+    viewer.app.step()
+    assert viewer.app.state.notices == (error,)
 
 
 def test_a_map_or_a_model_of_ones_own_is_opened(open_window: Opener, tmp_path: Path) -> None:
@@ -205,63 +207,35 @@ def asks_for(app: App, what: str) -> bool:
     return isinstance(app.state.prompt, PathPrompt) and app.state.prompt.what == what
 
 
-def list_of(viewer: Driver, folder: Path) -> FolderContents:
-    """What the window for a path shows of this folder."""
-    shown = str(folder / "_")[:-1]
-
-    def is_shown(app: App) -> bool:
-        prompt = app.state.prompt
-        is_read = isinstance(prompt, PathPrompt) and prompt.contents is not None and prompt.contents.is_read
-        return is_read and prompt.contents.folder == shown  # type: ignore[union-attr]
-
-    viewer.until(is_shown)
-    viewer.until_idle()
-    prompt = viewer.app.state.prompt
-    assert isinstance(prompt, PathPrompt)
-    assert prompt.contents is not None
-    return prompt.contents
-
-
-def test_a_photo_is_looked_for_and_opened_without_a_dialog_of_the_system(viewer: Driver, tmp_path: Path) -> None:
-    (tmp_path / "inner" / ".hidden").mkdir(parents=True)
-    (tmp_path / "notes.txt").touch()
+def test_a_typed_path_opens_and_a_typo_keeps_the_prompt(viewer: Driver, tmp_path: Path) -> None:
+    (tmp_path / "inner").mkdir()
     write_image(tmp_path / "inner" / "other.png", np.full((64, 96, 3), 100, np.uint8))
     viewer.app.do(BY_NAME["Open a photo…"].action(viewer.app.state))
-    beside = list_of(viewer, tmp_path)
-    assert beside.folders == ("inner",)
-    assert beside.files == ("scene.png",)
-    viewer.type(str(tmp_path / "inner"))
-    assert list_of(viewer, tmp_path).folders == ("inner",)  # read again: before that Enter opens whatever is there
+    viewer.until(lambda app: app.state.prompt == PathPrompt("photo", f"{tmp_path}/"))
+    viewer.until_idle()
+    viewer.type(str(tmp_path / "inner" / "othr.png"))
     viewer.send("key", "Return")
-    inner = list_of(viewer, tmp_path / "inner")
-    assert (inner.folders, inner.files) == ((), ("other.png",))
+    viewer.until(lambda app: isinstance(app.state.prompt, PathPrompt) and bool(app.state.prompt.problem))
+    viewer.until_idle()
+    before = viewer.app.state
+    viewer.send("type", "fkvtg")
+    viewer.until_idle()
+    assert viewer.app.state.preferences == before.preferences, "letters are no commands now"
+    assert viewer.app.state.inspection == before.inspection
+    viewer.press("##path", "prompt PathPrompt")
     viewer.type(str(tmp_path / "inner" / "other.png"))
     viewer.send("key", "Return")
     viewer.until(lambda app: app.state.scene is not None and app.state.scene.name == "other")
     assert viewer.app.state.prompt is None
 
 
-def test_a_folder_that_cannot_be_read_is_told(viewer: Driver, tmp_path: Path) -> None:
-    viewer.app.do(do(messages.show_prompt, PathPrompt("photo", str(tmp_path / "gone" / "a.png"))))
-    assert "cannot be read" in list_of(viewer, tmp_path / "gone").problem
-
-
-def test_browse_brings_a_place_back_to_the_prompt_and_it_is_remembered(viewer: Driver, tmp_path: Path) -> None:
-    (tmp_path / "there").mkdir()
-    viewer.app.do(do(saving.ask_to_export))
-    viewer.until_idle()
-    viewer.press("Browse…", "prompt ExportPrompt")
-    list_of(viewer, tmp_path)
-    viewer.type(str(tmp_path / "there" / "a.html"))
-    list_of(viewer, tmp_path / "there")
-    viewer.send("key", "Return")
-    viewer.until(lambda app: isinstance(app.state.prompt, ExportPrompt))
-    assert isinstance(viewer.app.state.prompt, ExportPrompt)
-    assert viewer.app.state.prompt.path == str(tmp_path / "there" / "a.html")
-    viewer.until_idle()
-    viewer.send("key", "Return")
-    viewer.until(lambda app: app.state.prompt is None)
-    viewer.until(lambda app: (tmp_path / "there" / "a.html").exists())
-    viewer.app.do(do(saving.ask_to_export))
-    assert isinstance(viewer.app.state.prompt, ExportPrompt)
-    assert viewer.app.state.prompt.path == str(tmp_path / "there" / "scene-web.html")
+def test_a_problem_moves_neither_the_prompt_nor_its_buttons(viewer: Driver) -> None:
+    places = []
+    for problem in ("", "This is the open photo. Choose another name."):
+        prompt = SavePrompt("scene.png", ScreenSize(48, 32), problem=problem)
+        viewer.app.do(do(messages.show_prompt, prompt))
+        viewer.until_idle()
+        places.append(
+            (imgui.internal.find_window_by_name("prompt SavePrompt").pos.y, viewer.find("Save", "prompt SavePrompt"))
+        )
+    assert places[0] == places[1]

@@ -14,7 +14,7 @@ from iibr_core.formats.images.picture_kinds import PictureFormat
 from iibr_core.scenes.scene import Source
 from iibr_core.types import DISPLAY_P3, SRGB, ViewOffset
 from tests.iibr_core.formats.test_color_profile import converted, profile_bytes
-from viewer.app.image_export import export_picture, shot_of
+from viewer.app.picture_files import export_picture, shot_of
 from viewer.display.offscreen import OffscreenScene
 from viewer.model import lens
 from viewer.model.action import do

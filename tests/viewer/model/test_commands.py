@@ -15,9 +15,8 @@ from viewer.model.action import do
 from viewer.model.commands import BY_NAME, COMMANDS, Chord, Command, commands_matching, recent_commands
 from viewer.model.demo_photo import demo_photo
 from viewer.model.state.app_state import AppState
-from viewer.model.state.exporting import ExportPrompt
 from viewer.model.state.lens import PRESETS
-from viewer.model.state.prompts import PalettePrompt, SavePrompt
+from viewer.model.state.prompts import ExportPrompt, PalettePrompt, SavePrompt
 from viewer.model.state.tasks import ChooseTask
 
 

@@ -28,9 +28,8 @@ from tests.viewer.conftest import FAR, HEIGHT, NEAR, WIDTH, reduce, write_scene
 from tests.viewer.model.test_history import after
 from tests.viewer.model.test_reducers import plan_of, scene_of, state_with
 from viewer.app.dropped_files import actions_from_drop
-from viewer.app.image_export import settings_of
 from viewer.app.pointer import Pointer, actions_from_pointer
-from viewer.model import depth, gesture, history, lens, opening, saving
+from viewer.model import depth, gesture, history, inspection, lens, opening, saving, selection
 from viewer.model.action import do
 from viewer.model.carried_optics import NewDepth
 from viewer.model.commands import action_for_path
@@ -39,6 +38,7 @@ from viewer.model.depth import (
 )
 from viewer.model.layout import layout_of
 from viewer.model.saved_settings import settings_from_text, settings_text
+from viewer.model.saving import settings_of
 from viewer.model.state.app_state import AppState
 from viewer.model.state.depth import Brush, DepthSample
 from viewer.model.state.prompts import SavePrompt
@@ -264,3 +264,28 @@ def test_new_depth_keeps_the_focus_where_it_was(
     deeper = replace(state.scene, plan=plan_of(GRID, scale=2.0), disparity_range_px=(-4.0, 4.0))
     now = reduce(state, do(opening.show_scene, state.generation, deeper, NewDepth(in_focus))).optics
     assert (now.focus_disparity, now.focus_range) == (pytest.approx(expected), pytest.approx(0.8))
+
+
+def test_a_selected_surface_moves_and_is_kept_sharp_and_both_are_undone() -> None:
+    state = replace(selection.select(opened(), (0.25, 0.75)), brush=Brush("select", tolerance=2.0, is_on=True))
+    assert selection.keep_sharp(state) == state, "its depth is not known yet"
+    moved = selection.move(state, is_forward=True)
+    assert moved.depth.edits.strokes == (Stroke("forward", ((0.25, 0.75),), 0.03, 0.1, tolerance=2.0),)
+    assert moved.generation == state.generation + 1
+    assert history.undo(moved).depth == state.depth
+    sharp = selection.keep_sharp(selection.set_range(state, (1.0, 2.0)))
+    assert (sharp.optics.focus_disparity, sharp.optics.focus_range) == (1.5, 0.5)
+    assert history.undo(sharp).optics == state.optics, "one edit"
+    assert depth.set_brush(state, replace(state.brush, tool="fill")).selection is None
+    assert opening.show_scene(state, 1, scene_of(GRID, source=Source("b.png"))).selection is None
+
+
+def test_a_brush_that_paints_brings_the_depth_overlay_and_takes_it_away() -> None:
+    start = replace(opened(), brush=Brush())
+    taken = depth.set_brush(start, Brush("nearer", is_on=True))
+    assert taken.inspection.overlay == "disparity"
+    selecting = depth.set_brush(taken, replace(taken.brush, tool="select"))
+    assert selecting.inspection.overlay is None
+    assert depth.set_brush(taken, replace(taken.brush, is_on=False)).inspection.overlay is None
+    own = depth.set_brush(inspection.set_overlay(start, "inpainted"), Brush(is_on=True))
+    assert depth.set_brush(own, replace(own.brush, is_on=False)).inspection.overlay == "inpainted"

@@ -11,10 +11,8 @@ from iibr_core.exports.kinds import EXPORTS, PURPOSES, ExportOptions, Purpose
 from iibr_core.method.plan import ScenePlan
 from iibr_core.scenes.scene import Source
 from iibr_core.types import InputError
-from tests.viewer.conftest import reduce
 from tests.viewer.model.test_reducers import scene_of, state_with
 from viewer.model import preferences, saving
-from viewer.model.action import do
 from viewer.model.saving import (
     as_other_kind,
     first_kind,
@@ -22,8 +20,7 @@ from viewer.model.saving import (
     usual_export_path,
     written_path,
 )
-from viewer.model.state.exporting import ExportPrompt
-from viewer.model.state.prompts import SavePrompt
+from viewer.model.state.prompts import ExportPrompt, SavePrompt
 
 STATE = state_with(replace(scene_of(source=Source("/photos/bike.jpg")), name="bike"))
 PLAIN = ExportOptions()
@@ -47,20 +44,17 @@ def test_the_folder_of_the_last_is_proposed_again() -> None:
     assert usual_export_path(STATE, "gif") == "/photos/bike-iibr.gif"
     assert usual_export_path(STATE, "anaglyph") == "/photos/bike-anaglyph.png"
     assert usual_export_path(STATE, "hci") == "/photos/bike-hci"
-    assert usual_export_path(STATE, "eslf") == "/photos/bike-iibr_eslf.png"
+    assert usual_export_path(STATE, "eslf") == "/photos/bike_eslf.png"
     assert STATE.scene is not None
     plan = ScenePlan(STATE.scene.grid, 1.0, 0.0, (-2.0, 3.0), 0.1, True, 0, 0, ())
     photo = replace(STATE, scene=replace(STATE.scene, plan=plan))
-    later = reduce(photo, do(preferences.set_last_folder, "/shared"))
-    exported, saved, mapped = (
-        reduce(later, ask).prompt
-        for ask in (do(saving.ask_to_export), do(saving.ask_to_save), do(saving.ask_to_save, "map"))
-    )
-    assert isinstance(exported, ExportPrompt)
-    assert isinstance(saved, SavePrompt)
-    assert isinstance(mapped, SavePrompt)
-    assert Path(exported.path).parent == Path(saved.path).parent == Path("/shared")
-    assert Path(mapped.path).parent == Path("/photos"), "there it is found again"
+    later = preferences.set_last_folder(photo, "/shared")
+    exported, saved, mapped = saving.ask_to_export(later), saving.ask_to_save(later), saving.ask_to_save(later, "map")
+    assert isinstance(exported.prompt, ExportPrompt)
+    assert isinstance(saved.prompt, SavePrompt)
+    assert isinstance(mapped.prompt, SavePrompt)
+    assert Path(exported.prompt.path).parent == Path(saved.prompt.path).parent == Path("/shared")
+    assert Path(mapped.prompt.path).parent == Path("/photos"), "there it is found again"
 
 
 def test_another_kind_keeps_the_name_that_was_typed() -> None:

@@ -11,10 +11,7 @@ from hypothesis import strategies as st
 from iibr_core.beyond.optics import Optics
 from iibr_core.scenes.rect import Rect
 from iibr_core.types import GridShape
-from tests.viewer.conftest import reduce
-from tests.viewer.model.test_reducers import scene_of, state_with
-from viewer.model import gesture, lens
-from viewer.model.action import do
+from tests.viewer.model.test_reducers import scene_of
 from viewer.model.focal_plane import (
     CLOSEST_HANDLES,
     focus_on,
@@ -61,29 +58,6 @@ def test_what_is_clicked_is_sharp_whatever_the_tilt(place: tuple[float, float], 
     after = focus_on(Optics(focus_tilt=(0.7, -0.3), focus_disparity=1), place, disparity)
     assert sharp_disparity(after, place) == pytest.approx(disparity)
     assert after.focus_tilt == (0.7, -0.3)
-
-
-def test_dragging_a_handle_is_one_action_a_step_and_lets_go_at_the_end() -> None:
-    state = reduce(state_with(scene_of()), do(lens.show_tilt_handles, True))
-    kept = TiltHandles().second
-    state = reduce(state, do(lens.move_tilt_handle, 0, (-0.8, 0.6), 2.5))
-    assert state.tilt_handles == TiltHandles((-0.8, 0.6), kept, taken=0)
-    assert sharp_disparity(state.optics, (-0.8, 0.6)) == pytest.approx(2.5)
-    state = reduce(state, do(lens.move_tilt_handle, 0, (-0.9, 5.0), None))
-    assert state.tilt_handles is not None
-    assert state.tilt_handles.first == (-0.9, 1.0), "held within the picture"
-    state = reduce(state, do(gesture.end_gesture))
-    assert state.tilt_handles is not None
-    assert state.tilt_handles.taken is None
-    assert len(state.history.past) == 1
-    assert reduce(state, do(lens.move_tilt_handle, 1, (math.nan, 0.0), 1.0)).optics == state.optics
-
-
-def test_a_click_on_a_tilted_plane_focuses_there() -> None:
-    state = reduce(state_with(scene_of()), do(lens.show_tilt_handles, True))
-    state = reduce(state, do(lens.move_tilt_handle, 1, (0.5, -0.5), 1.0))
-    state = reduce(state, do(lens.focus_on, (0.9, 0.9), 0.3))
-    assert sharp_disparity(state.optics, (0.9, 0.9)) == pytest.approx(0.3)
 
 
 def test_places_of_pixels_and_handles() -> None:

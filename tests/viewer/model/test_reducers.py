@@ -6,40 +6,25 @@ import math
 from dataclasses import replace
 
 import pytest
-from hypothesis import given
 from hypothesis import strategies as st
 
 from iibr_core.beyond.optics import (
-    APERTURE_KINDS,
-    EXPOSURE_LIMIT_STOPS,
-    ApertureMask,
     ApertureShape,
     Optics,
 )
 from iibr_core.depth.choice import DepthOrigin
 from iibr_core.method.plan import ScenePlan
-from iibr_core.scenes.lens_limits import (
-    STEEPEST_TILT,
-    aperture_limit,
-    dolly_limit,
-    focus_limits,
-    focus_span,
-    is_finite,
-)
 from iibr_core.scenes.scene import Progress, Scene, Source
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import reduce
 from viewer.model import history, inspection, lens, messages, opening, preferences, saving
-from viewer.model.action import Action, do
-from viewer.model.carried_optics import carry_optics
+from viewer.model.action import do
 from viewer.model.messages import MAX_NOTICES
 from viewer.model.remedies import DEPTH_COMMANDS
 from viewer.model.state.app_state import AppState, Hover, Picture
 from viewer.model.state.jobs import JobProgress
-from viewer.model.state.lens import PRESETS
 from viewer.model.state.notices import Notice
 from viewer.model.state.saving import SavedSettings
-from viewer.model.window_limits import DEPTH_STRENGTH_LIMIT
 
 SOURCE = Source("photo.png")
 floats = st.floats(allow_nan=True, allow_infinity=True)
@@ -57,139 +42,6 @@ def scene_of(grid: GridShape = GridShape(9, 9), source: Source = SOURCE, **chang
 
 def state_with(scene: Scene | None) -> AppState:
     return AppState(source=scene.source if scene else None, scene=scene, generation=1)
-
-
-@given(grids, floats, floats)
-def test_the_eye_stays_within_the_grid_and_a_margin(grid: GridShape, t: float, s: float) -> None:
-    before = state_with(scene_of(grid))
-    eye = reduce(before, do(lens.move_eye, ViewOffset(t, s))).optics.eye
-    if not (math.isfinite(t) and math.isfinite(s)):
-        assert eye == before.optics.eye
-        return
-    for value, wanted, views in zip(eye, (t, s), grid):
-        margin = 0.5 if views == 1 else 0.0
-        low, high = -(views // 2) - margin, views - 1 - views // 2 + margin
-        assert low <= value <= high
-        assert value == wanted or value in (low, high)
-
-
-@given(grids, floats)
-def test_the_aperture_lies_between_pinhole_and_grid(grid: GridShape, diameter: float) -> None:
-    widest = max(grid) if max(grid) > 1 else 0
-    result = reduce(state_with(scene_of(grid)), do(lens.set_aperture, diameter)).optics.aperture_diameter
-    assert 0 <= result <= widest
-    if 0 <= diameter <= widest:
-        assert result == diameter
-
-
-@given(floats)
-def test_focus_exposure_and_depth_stay_finite_and_in_range(value: float) -> None:
-    scene = scene_of()
-    state = state_with(scene)
-    for action in (
-        do(lens.set_focus, value),
-        do(lens.set_exposure, value),
-        do(lens.set_depth_strength, value, is_finished=False),
-    ):
-        state = reduce(state, action)
-    low, high = focus_limits(scene)
-    assert low <= state.optics.focus_disparity <= high
-    assert abs(state.optics.exposure_stops) <= EXPOSURE_LIMIT_STOPS
-    assert 0 <= state.depth_strength <= DEPTH_STRENGTH_LIMIT
-
-
-shapes = st.builds(
-    ApertureShape, st.sampled_from(APERTURE_KINDS), st.integers(-5, 50), floats, floats, floats, st.none()
-)
-
-
-@given(grids, floats, floats, st.tuples(floats, floats), shapes, floats)
-def test_every_optic_stays_finite_and_within_its_limits(
-    grid: GridShape, dolly: float, spread: float, tilt: tuple[float, float], shape: ApertureShape, highlights: float
-) -> None:
-    scene = scene_of(grid)
-    state = state_with(scene)
-    edits = (
-        do(lens.set_dolly, dolly),
-        do(lens.set_focus_range, spread),
-        do(lens.set_focus_tilt, tilt),
-        do(lens.set_aperture_shape, shape),
-    )
-    for action in (*edits, do(lens.set_highlights, highlights)):
-        state = reduce(state, action)
-    optics, span = state.optics, focus_span(scene)
-    assert is_finite(optics)
-    assert abs(optics.dolly) <= dolly_limit(grid) == (grid.columns - 1) / 2
-    assert 0 <= optics.focus_range <= span
-    assert max(map(abs, optics.focus_tilt)) <= STEEPEST_TILT * span
-    assert 0 <= optics.highlight_recovery <= 1
-    shape_now = optics.aperture_shape
-    assert 3 <= shape_now.blades <= 11
-    assert 0 <= shape_now.rotation_deg < 360
-    assert 0 <= shape_now.ring_inner < 1
-    assert 0 <= shape_now.cat_eye <= 1
-    assert shape_now.kind != "mask", "there is no mask"
-
-
-def test_a_mask_is_kept_while_another_shape_is_tried() -> None:
-    mask = ApertureMask("star.png", 2, 2, bytes([255, 0, 0, 255]))
-    state = reduce(state_with(scene_of()), do(lens.set_aperture_shape, ApertureShape("mask", mask=mask)))
-    assert state.optics.aperture_shape.kind == "mask"
-    state = reduce(state, do(lens.set_aperture_shape, replace(state.optics.aperture_shape, kind="ring")))
-    assert state.optics.aperture_shape.mask == mask
-
-
-@pytest.mark.parametrize("name", PRESETS)
-def test_presets_keep_viewpoint_and_light_and_can_be_taken_back(name: str) -> None:
-    before = state_with(scene_of(subject_disparity_px=1.5))
-    for action in (
-        do(lens.move_eye, ViewOffset(1, 2)),
-        do(lens.set_dolly, 1),
-        do(lens.set_exposure, 1),
-        do(lens.set_focus_tilt, (1, 1)),
-        do(lens.set_aperture, 2),
-    ):
-        before = reduce(before, action)
-    after = reduce(before, do(lens.apply_preset, name))  # type: ignore[arg-type]
-    kept = [(o.eye, o.dolly, o.exposure_stops) for o in (before.optics, after.optics)]
-    assert kept[0] == kept[1]
-    assert after.optics.focus_tilt == (0, 0)
-    assert reduce(after, do(history.undo)).optics == before.optics
-
-
-def test_what_the_presets_are_for() -> None:
-    state = state_with(scene_of(subject_disparity_px=1.5))
-    portrait, macro, sharp = (reduce(state, do(lens.apply_preset, name)).optics for name in PRESETS)
-    assert portrait.focus_disparity == 1.5
-    assert portrait.focus_range > 0
-    assert macro.focus_disparity == 3.0, "the nearest"
-    assert macro.aperture_diameter == aperture_limit(GridShape(9, 9)) > portrait.aperture_diameter > 0
-    assert sharp.aperture_diameter == 0
-
-
-def test_a_portrait_keeps_what_the_user_made_sharp_and_lets_the_light_be() -> None:
-    state = reduce(state_with(scene_of(subject_disparity_px=1.5)), do(lens.set_highlights, 0.2))
-    chosen = reduce(reduce(state, do(lens.focus_on, (0.1, -0.2), 2.5)), do(lens.apply_preset, "portrait")).optics
-    assert chosen.focus_disparity == 2.5
-    assert chosen.highlight_recovery == 0.2
-    reset = reduce(reduce(state, do(lens.focus_on, (0.1, -0.2), 2.5)), do(lens.reset))
-    assert reduce(reset, do(lens.apply_preset, "portrait")).optics.focus_disparity == 1.5
-
-
-@pytest.mark.parametrize("action", [do(lens.focus_on, (0.0, 0.0), 1.0), do(lens.set_focus, 1.0)])
-def test_the_first_focusing_opens_the_aperture(action: Action) -> None:
-    """Through a pinhole everything is sharp: a click would seem to do nothing."""
-    first = reduce(state_with(scene_of()), action)
-    assert 0 < first.optics.aperture_diameter < aperture_limit(GridShape(9, 9))
-    assert reduce(first, do(history.undo)).optics == Optics()
-
-
-def test_focusing_leaves_an_aperture_alone_that_the_user_chose() -> None:
-    for chosen in (do(lens.set_aperture, 0), do(lens.set_aperture, 2), do(lens.apply_preset, "everything sharp")):
-        before = reduce(state_with(scene_of()), chosen)
-        assert reduce(before, do(lens.set_focus, 1.0)).optics.aperture_diameter == before.optics.aperture_diameter
-    one_view = reduce(state_with(scene_of(GridShape(1, 1))), do(lens.set_focus, 1.0))
-    assert (one_view.optics.aperture_diameter, one_view.notices) == (0, ())
 
 
 def test_quitting_asks_while_jobs_are_under_way_and_can_wait_for_them() -> None:
@@ -210,7 +62,7 @@ def test_quitting_asks_while_jobs_are_under_way_and_can_wait_for_them() -> None:
 
 
 def test_what_became_of_a_job_is_still_told_when_another_photo_opens() -> None:
-    stays, goes = Notice("Exported a.gif", stays=True), Notice("This photo has no depth.")
+    stays, goes = Notice("Exported a.gif", is_result=True), Notice("This photo has no depth.")
     told = reduce(reduce(state_with(scene_of()), do(messages.notify, goes)), do(messages.notify, stays))
     asked = reduce(told, do(opening.open_source, Source("other.png")))
     opened = reduce(asked, do(opening.show_scene, asked.generation, scene_of(source=asked.source)))
@@ -298,43 +150,6 @@ def test_recent_files_are_listed_once_the_latest_first() -> None:
     assert state.recent == ("a.png", "b.png")
 
 
-def test_focus_can_be_set_in_a_flat_scene() -> None:
-    low, high = focus_limits(scene_of(disparity_range_px=(0.0, 0.0)))
-    assert low < 0 < high
-
-
-@pytest.mark.parametrize(
-    "action",
-    [
-        do(lens.move_eye, ViewOffset(1, 1)),
-        do(lens.set_focus, 1),
-        do(lens.set_aperture, 1),
-        do(lens.set_dolly, 1),
-        do(lens.set_focus_tilt, (1, 1)),
-        do(lens.focus_on, (0, 0), 1),
-        do(lens.apply_preset, "macro"),
-        do(lens.reset),
-        do(opening.stop),
-        do(history.undo),
-    ],
-)
-def test_optics_do_not_change_before_a_scene_is_open(action: object) -> None:
-    assert reduce(AppState(), action) == AppState()  # type: ignore[arg-type]
-
-
-def test_reset_brings_the_first_optics_back() -> None:
-    state = state_with(scene_of())
-    for action in (
-        do(lens.move_eye, ViewOffset(1, 2)),
-        do(lens.set_focus, 1),
-        do(lens.set_aperture, 3),
-        do(lens.set_exposure, 1),
-    ):
-        state = reduce(state, action)
-    assert state.optics == Optics(eye=ViewOffset(1, 2), focus_disparity=1, aperture_diameter=3, exposure_stops=1)
-    assert reduce(state, do(lens.reset)).optics == Optics()
-
-
 @pytest.mark.parametrize(
     ("action", "draws", "restarts"),
     [
@@ -396,43 +211,6 @@ def test_the_same_file_opened_again_is_a_new_scene() -> None:
     state = reduce(reduce(state_with(scene_of()), do(lens.set_aperture, 2)), do(opening.open_source, replace(SOURCE)))
     state = reduce(state, do(opening.show_scene, state.generation, scene_of(source=state.source)))
     assert state.optics == Optics()
-
-
-def test_another_depth_strength_keeps_the_surface_in_focus_and_the_place_in_the_grid() -> None:
-    old = plan_of(GridShape(5, 5), scale=0.5, zero=10.0)
-    new = plan_of(GridShape(9, 9), scale=0.25, zero=12.0)
-    state = state_with(scene_of(GridShape(5, 5), plan=old))
-    given = 13.0  # the surface in focus, in the disparity file's units
-    for action in (
-        do(lens.move_eye, ViewOffset(1, -2)),
-        do(lens.set_focus, (given - 10.0) * 0.5),
-        do(lens.set_aperture, 2.0),
-        do(lens.set_exposure, 1.0),
-    ):
-        state = reduce(state, action)
-    state = reduce(state, do(lens.set_depth_strength, 1.5, is_finished=True))
-    optics = reduce(state, do(opening.show_scene, state.generation, scene_of(GridShape(9, 9), plan=new))).optics
-    assert optics.focus_disparity == pytest.approx((given - 12.0) * 0.25)
-    assert optics.eye == ViewOffset(2, -4)
-    assert optics.aperture_diameter == 4.0
-    assert optics.exposure_stops == 1.0
-
-
-@pytest.mark.parametrize(("views", "eye"), [(2, -2.0), (3, -1.0), (1, -2.0)])
-def test_a_step_between_two_views_is_the_whole_grid_and_of_one_view_it_is_one(views: int, eye: float) -> None:
-    old, new = (scene_of(GridShape(1, n), plan=plan_of(GridShape(1, n), scale=0.5)) for n in (views, 5))
-    assert carry_optics(Optics(eye=ViewOffset(0.0, -0.5)), old, replace(new, source=old.source)).eye.s == eye
-
-
-def test_depth_strength_of_zero_and_back_gives_finite_optics() -> None:
-    flat, deep = plan_of(GridShape(1, 1), scale=0.0), plan_of(GridShape(9, 9), scale=0.5)
-    state = state_with(scene_of(GridShape(9, 9), plan=deep))
-    for action in (do(lens.move_eye, ViewOffset(4, 4)), do(lens.set_focus, 1), do(lens.set_aperture, 9)):
-        state = reduce(state, action)
-    for plan in (flat, deep):
-        state = reduce(state, do(opening.show_scene, 1, scene_of(plan.grid, plan=plan)))
-        assert all(map(math.isfinite, (*state.optics.eye, state.optics.focus_disparity)))
-        assert 0 <= state.optics.aperture_diameter <= max(plan.grid)
 
 
 @pytest.mark.parametrize(

@@ -117,7 +117,6 @@ SMOOTH = {"tool": "smooth", "points": [[0.5, 0.5]], "radius": 0.25, "strength": 
         "[" * 100_000,
         " " * (MOST_CHARACTERS + 1),
         changed(depth_edits={"strokes": [SMOOTH] * 11_000}),
-        changed(optics__gloss={"surface": {"strokes": [{"points": [[0, 0], [1, 1]] * 5_000, "radius": 0.5}]}}),
         changed(format=2),
         changed(depth_strength=float("nan")),
         changed(depth_strength=True),
@@ -136,7 +135,7 @@ SMOOTH = {"tool": "smooth", "points": [[0.5, 0.5]], "radius": 0.25, "strength": 
         changed(source__grid=[0, 3]),
         changed(size_px=[0, 10]),
     ],
-    ids=range(28),
+    ids=range(27),
 )
 def test_damaged_settings_are_one_line_and_change_nothing(text: str) -> None:
     with pytest.raises(InputError, match=r"a\.png") as error:
@@ -261,8 +260,8 @@ def test_a_long_day_of_painting_is_no_attack() -> None:
     strokes = tuple(Stroke(BRUSH_TOOLS[k % 3], path, 0.03, 0.25) for k in range(2000))
     saved = replace(SAVED, depth_edits=DepthEdits(strokes=strokes))
     assert settings_from_text(settings_text(saved), "a.png") == saved
-    longer = replace(SAVED, depth_edits=DepthEdits(strokes=strokes * 5))
-    with pytest.raises(InputError, match=r"10,000 strokes take .* times as long"):
+    longer = replace(SAVED, depth_edits=DepthEdits(strokes=strokes * 6))
+    with pytest.raises(InputError, match=r"12,000 strokes"):
         settings_from_text(settings_text(longer), "a.png")
     assert settings_from_text(settings_text(longer), "a.png", is_own=True) == longer
 

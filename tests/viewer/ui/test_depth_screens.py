@@ -71,7 +71,7 @@ def test_the_panel_ends_at_its_border_at_any_size_of_text(
 ) -> None:
     sample = DepthSample((0.5, 0.5), 1.0)
     viewer.do(do(preferences.set_font_scale, scale), do(depth.set_brush, Brush(tool, is_on=True, sample=sample)))
-    panel = viewer.screen((900, 2200))[:, -int(PANEL_WIDTH * scale) :]
+    panel = viewer.screen((900, 2600))[:, -int(PANEL_WIDTH * scale) :]
     ground = panel[2:-2, 3]
     assert (ground == ground[0]).all(), "nothing reaches over the left border"
     margin = panel[40:-40, -8:-4]

@@ -25,10 +25,9 @@ from viewer.model.action import do
 from viewer.model.layout import PANEL_WIDTH
 from viewer.model.state.app_state import AppState
 from viewer.model.state.depth_models import ModelsPrompt
-from viewer.model.state.exporting import ExportPrompt
 from viewer.model.state.jobs import JobProgress
 from viewer.model.state.preferences import SECTIONS, Theme, Units
-from viewer.model.state.prompts import PalettePrompt, PathPrompt, Prompt, SavePrompt
+from viewer.model.state.prompts import ExportPrompt, PalettePrompt, PathPrompt, Prompt, SavePrompt
 from viewer.ui.overlays.export_prompt import MOTION_TIPS
 from viewer.ui.sections.depth_section import START_TIPS, START_WORDS
 from viewer.ui.style import Color, Look, apply_style, palette_of

@@ -291,4 +291,4 @@ class Renderer:
         """Keep the numbers of the last picture."""
         self.samples, self.draw_s, accumulation = samples, seconds, self._current()
         in_all = accumulation.lens.sample_count(self.drawn_field) * accumulation.passes
-        self.samples_converged = samples if self.is_converged else max(in_all, accumulation.done, samples)
+        self.samples_converged = samples if self.is_converged else max(in_all, accumulation.done, samples + 1)

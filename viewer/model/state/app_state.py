@@ -12,17 +12,17 @@ from iibr_core.depth.editing.edits import Stroke
 from iibr_core.scenes.rect import WHOLE, Rect
 from iibr_core.scenes.scene import AS_FOUND, DepthSettings, Progress, Scene, Source
 from iibr_core.scenes.screen_size import ScreenSize
-from viewer.model.state.depth import Brush
+from viewer.model.state.depth import Brush, Selection
 from viewer.model.state.depth_models import DepthModels
 from viewer.model.state.folder import PhotoFolder
 from viewer.model.state.history import History
 from viewer.model.state.inspection import Inspection
-from viewer.model.state.jobs import JobProgress
+from viewer.model.state.jobs import FinishedExport, JobProgress
 from viewer.model.state.lens import GlossBrush, TiltHandles
 from viewer.model.state.notices import Notice
 from viewer.model.state.photo_facts import NO_FACTS, PhotoFacts
 from viewer.model.state.preferences import Preferences
-from viewer.model.state.prompts import Prompt
+from viewer.model.state.prompts import ExportPrompt, Prompt
 from viewer.model.state.tasks import Task
 from viewer.model.state.viewpoint import FreeCamera, Motion, Zoom
 
@@ -90,10 +90,13 @@ class AppState:
     free_progress: float | None = None
     depth: DepthSettings = AS_FOUND
     brush: Brush = field(default_factory=Brush)
+    selection: Selection | None = None
     stroke: Stroke | None = None
     gloss_brush: GlossBrush = field(default_factory=GlossBrush)
     jobs: tuple[JobProgress, ...] = ()
     quits_when_done: bool = False
+    exports: tuple[FinishedExport, ...] = ()
+    last_export: ExportPrompt | None = None
     models: DepthModels = field(default_factory=DepthModels)
     chosen_focus: float | None = None
     has_chosen_aperture: bool = False

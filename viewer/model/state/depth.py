@@ -1,10 +1,15 @@
-"""Records of depth editing; `viewer.model.depth` has the verbs."""
+"""Records of depth editing; `viewer.model.depth` and `viewer.model.selection` have the verbs."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
-from iibr_core.depth.editing.edits import BrushTool
+from iibr_core.depth.editing.edits import BRUSH_TOOLS, BrushTool
+
+Tool = BrushTool | Literal["select"]
+TOOLS: tuple[Tool, ...] = (*BRUSH_TOOLS, "select")
+"""Tools for the picture: they paint, or select a surface."""
 
 
 @dataclass(frozen=True)
@@ -17,13 +22,27 @@ class DepthSample:
 
 @dataclass(frozen=True)
 class Brush:
-    """The tool that paints while the pointer drags over the picture. radius, strength: see `Stroke`.
+    """The tool for the picture while it is on. radius, strength, tolerance: see `Stroke`.
 
-    sample: source of the depth that "level" and "fill" paint, None: the beginning of the stroke.
+    sample: source of the depth that "level" and "fill" paint, None: the beginning of the stroke. brought_overlay:
+    whether the depth overlay came with the brush, and goes with it.
     """
 
-    tool: BrushTool = "nearer"
+    tool: Tool = "nearer"
     radius: float = 0.03
     strength: float = 0.25
+    tolerance: float = 1.0
     is_on: bool = False
     sample: DepthSample | None = None
+    brought_overlay: bool = False
+
+
+@dataclass(frozen=True)
+class Selection:
+    """A surface that was clicked. place: (x, y) as shares of the photo's width and height.
+
+    range_px: (far, near) disparity of the surface, in px per view step; None until the surface was found.
+    """
+
+    place: tuple[float, float]
+    range_px: tuple[float, float] | None = None

@@ -1,9 +1,11 @@
-"""The queue of saves, copies and exports: what the window shows of it, and what changes it."""
+"""Saves, copies and exports that wait or run, and exports that are done."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import Literal
+
+from viewer.model.state.prompts import ExportPrompt
 
 JobKind = Literal["picture", "map", "copy", "export"]
 
@@ -14,8 +16,10 @@ STOPPING = "stopping"
 
 @dataclass(frozen=True)
 class JobProgress:
-    """One job of the queue. name: of its file or folder. doing: in words, "" while it waits for its turn. done: share
-    of what it is doing, 0..1. left_s: seconds that this still takes, None where that is not known.
+    """A job that waits or runs.
+
+    name: of its file or folder. doing: its present step, "" while it waits for its turn. done: share of this step,
+    0..1. left_s: seconds that the step still takes, None if not known.
     """
 
     id: int
@@ -27,12 +31,14 @@ class JobProgress:
 
     @property
     def can_be_cancelled(self) -> bool:
-        """A file that is being written is finished."""
+        """Whether it has not come to writing its file."""
         return self.doing not in (WRITING, STOPPING)
 
 
 @dataclass(frozen=True)
-class CancelJobTask:
-    """Give up the job of this id; the others continue."""
+class FinishedExport:
+    """An export that was written or failed. prompt: asks for the same again. problem: why it failed."""
 
-    id: int
+    path: str
+    prompt: ExportPrompt
+    problem: str = ""

@@ -2,27 +2,35 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from viewer.model.state.saving import SavedSettings
 
-SHORT_NOTICE_S, LONG_NOTICE_S = 12.0, 30.0
+RESULT_S, NOTE_S, OFFER_S = 6.0, 12.0, 30.0
+"""Seconds for which results, notes, and notices with an offer are shown."""
 
 
 @dataclass(frozen=True)
 class Notice:
-    """A message the user can dismiss, or wait for it to go. offer: settings that a button beside it takes over.
+    """A message that the user can close.
 
-    commands: names of commands that do what it advises, a button each. stays: when another photo is opened.
+    offer: settings that a button takes over. commands: names of commands that help, a button each. is_result: whether
+    it tells the result of a request, and stays when another photo is opened. path: file or folder that was written.
     """
 
     text: str
     is_error: bool = False
     offer: SavedSettings | None = None
     commands: tuple[str, ...] = ()
-    stays: bool = False
+    is_result: bool = False
+    path: str = ""
 
     @property
     def seconds(self) -> float:
-        """How long it stays: long enough to be read, and to reach for what it offers."""
-        return LONG_NOTICE_S if self.is_error or self.offer is not None or self.commands else SHORT_NOTICE_S
+        """Seconds for which it is shown; errors stay until they are closed."""
+        if self.is_error:
+            return math.inf
+        if self.offer is not None or self.commands:
+            return OFFER_S
+        return RESULT_S if self.is_result else NOTE_S

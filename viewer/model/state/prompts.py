@@ -5,47 +5,24 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from iibr_core.exports.kinds import DEFAULT_OPTIONS, ExportOptions
 from iibr_core.formats.images.picture_kinds import AS_USUAL as USUAL_FORM
 from iibr_core.formats.images.picture_kinds import PictureFormat
 from iibr_core.scenes.screen_size import ScreenSize
 from viewer.model.state.depth_models import ModelsPrompt
-from viewer.model.state.exporting import ExportPrompt
 
-ChoiceOf = Literal["photo", "folder", "mask", "map", "model", "model folder", "place"]
-"""map: a disparity map for the open photo; model: an ONNX file of a depth model; place: where a file goes."""
+ChoiceOf = Literal["photo", "folder", "mask", "map", "model", "model folder"]
+"""map: a disparity map for the open photo; model: an ONNX file of a depth model."""
 FOLDER_CHOICES: tuple[ChoiceOf, ...] = ("folder", "model folder")
-"""What is a folder."""
-
-
-@dataclass(frozen=True)
-class FolderContents:
-    """Names of the folders in a folder, and of the files that can be chosen. is_read: whether they are known.
-    problem: why they cannot be.
-    """
-
-    folder: str
-    folders: tuple[str, ...] = ()
-    files: tuple[str, ...] = ()
-    is_read: bool = False
-    problem: str = ""
-
-
-@dataclass(frozen=True)
-class ListContentsTask:
-    """Look what of this kind can be chosen in this folder."""
-
-    folder: str
-    what: ChoiceOf
-
-
+"""Choices of a folder."""
 Saved = Literal["picture", "map"]
 
 
 @dataclass(frozen=True)
 class SavePrompt:
-    """The question where to save the picture, and how large, or its disparity map. already_there: there is one.
+    """The prompt to save the picture or its disparity map.
 
-    problem: why nothing can be saved there, "" before that is known. form: how the picture is written.
+    already_there: whether the file exists. problem: reason why nothing can be saved there, "" without one.
     """
 
     path: str
@@ -57,25 +34,35 @@ class SavePrompt:
 
 
 @dataclass(frozen=True)
-class PathPrompt:
-    """The question for a file or a folder, where the system has no file dialog. path: that is typed; with a separator
-    at its end that of a folder. contents: of its folder, None before that is asked for. returns_to: what is asked again
-    once a place is chosen.
+class ExportPrompt:
+    """The prompt of an export.
+
+    kind: name of its kind. already_there: whether the file exists. problem: reason why it cannot be exported.
     """
+
+    kind: str
+    path: str
+    options: ExportOptions = DEFAULT_OPTIONS
+    already_there: bool = False
+    problem: str = ""
+
+
+@dataclass(frozen=True)
+class PathPrompt:
+    """The prompt for the path of a file or folder, on systems without a file dialog."""
 
     what: ChoiceOf
     path: str = ""
-    contents: FolderContents | None = None
-    returns_to: SavePrompt | ExportPrompt | None = None
+    problem: str = ""
 
 
 @dataclass(frozen=True)
 class PalettePrompt:
-    """The list of commands, narrowed down by what was typed. selected: which of those left Enter runs."""
+    """The list of commands, narrowed down by the typed text. selected: index of the one that Enter runs."""
 
     text: str = ""
     selected: int = 0
 
 
-Prompt = PathPrompt | SavePrompt | ExportPrompt | ModelsPrompt | PalettePrompt | Literal["help", "quit"]
-"""quit: whether to close although jobs are under way, or depth edits are saved nowhere."""
+Prompt = PathPrompt | SavePrompt | ExportPrompt | ModelsPrompt | PalettePrompt | Literal["help", "quit", "exports"]
+"""quit: whether to close although jobs are under way. exports: the list of exports."""

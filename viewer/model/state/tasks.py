@@ -1,44 +1,75 @@
-"""What the state asks of the outside world. The loop has it done, and says what came of it by an action."""
+"""Requests of the state to the outside world. `viewer.app.side_effects` carries them out and returns actions."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-from iibr_core.formats.images.picture_kinds import AS_USUAL as USUAL_FORM
-from iibr_core.formats.images.picture_kinds import PictureFormat
-from iibr_core.scenes.screen_size import ScreenSize
 from viewer.model.state.depth_models import CancelGetTask, GetModelTask, ListModelsTask
-from viewer.model.state.exporting import ExportPrompt, ExportTask
 from viewer.model.state.folder import ListFolderTask
-from viewer.model.state.jobs import CancelJobTask
 from viewer.model.state.photo_facts import ReadFactsTask
-from viewer.model.state.prompts import ChoiceOf, ListContentsTask, Saved, SavePrompt
-from viewer.model.state.saving import CopyTask, PasteTask
+from viewer.model.state.prompts import ChoiceOf, ExportPrompt, PathPrompt, SavePrompt
 
 
 @dataclass(frozen=True)
 class ChooseTask:
-    """Let the user choose, in the system's dialog where it has one."""
+    """Let the user choose a file or folder."""
 
     what: ChoiceOf
 
 
 @dataclass(frozen=True)
+class TakePathTask:
+    """Use the path that was typed, if it exists."""
+
+    prompt: PathPrompt
+
+
+@dataclass(frozen=True)
 class ChoosePlaceTask:
-    """Let the user choose where the file or folder goes that this prompt asks about."""
+    """Let the user choose, in a dialog, the place that a prompt asks for."""
 
     prompt: SavePrompt | ExportPrompt
 
 
 @dataclass(frozen=True)
 class SaveTask:
-    """Write the picture, or its disparity map. size_px: (width, height). form: how the picture is written."""
+    """Save the picture or its disparity map."""
+
+    prompt: SavePrompt
+    may_replace: bool = False
+
+
+@dataclass(frozen=True)
+class ExportTask:
+    """Export the scene."""
+
+    prompt: ExportPrompt
+    may_replace: bool = False
+
+
+@dataclass(frozen=True)
+class CancelJobTask:
+    """Cancel the job of this id; the others continue."""
+
+    id: int
+
+
+@dataclass(frozen=True)
+class ShowFileTask:
+    """Open a file in the system's program for it, or show it in its folder."""
 
     path: str
-    size_px: ScreenSize
-    may_replace: bool = False
-    what: Saved = "picture"
-    form: PictureFormat = USUAL_FORM
+    in_folder: bool = False
+
+
+@dataclass(frozen=True)
+class CopyTask:
+    """Put the picture, at the size of the views, into the system's clipboard."""
+
+
+@dataclass(frozen=True)
+class PasteTask:
+    """Open the picture that is in the system's clipboard, or the path of one."""
 
 
 @dataclass(frozen=True)
@@ -50,15 +81,16 @@ class ReadMaskTask:
 
 Task = (
     ChooseTask
+    | TakePathTask
     | ChoosePlaceTask
     | SaveTask
-    | CopyTask
-    | PasteTask
     | ExportTask
     | CancelJobTask
+    | ShowFileTask
+    | CopyTask
+    | PasteTask
     | ReadMaskTask
     | ListFolderTask
-    | ListContentsTask
     | ReadFactsTask
     | ListModelsTask
     | GetModelTask

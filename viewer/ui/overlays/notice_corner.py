@@ -1,51 +1,50 @@
-"""The newest notice, over the lower left of the picture, with buttons that take it away or do what it advises; the one
-before comes up after it. Above it the long work that is under way, below it what gives a guess true depth.
-"""
+"""The lower left corner of the picture: progress of long work, the newest notice, an offer of better depth."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
 from imgui_bundle import imgui
 
-from viewer.model import depth_models, messages, opening
-from viewer.model.action import Action, do
+from iibr_core.runtime.time_left import about_left
+from viewer.model import depth_models, messages, opening, viewpoint
+from viewer.model.action import Action, ask, do
 from viewer.model.commands import BY_NAME
-from viewer.model.depth_models import offered_model
 from viewer.model.layout import MARGIN, STRIP_GAP, Layout
 from viewer.model.state.app_state import AppState
-from viewer.model.state.depth_models import ModelOffer
+from viewer.model.state.depth_models import CancelGetTask, ModelOffer
+from viewer.model.state.jobs import WRITING, JobKind, JobProgress
 from viewer.model.state.notices import Notice
-from viewer.ui.overlays.progress_rows import build_rows, progress_rows
-from viewer.ui.overlays.prompt_rows import CARD_FLAGS, button_rows
+from viewer.model.state.tasks import CancelJobTask
+from viewer.ui.overlays.prompt_rows import CARD_FLAGS, button_rows, file_offers
 from viewer.ui.style import palette_of
-from viewer.ui.widgets import colored, quiet
+from viewer.ui.widgets import colored, gap, last_part, quiet, tooltip
 
 NOTICE_WIDTH = 420.0
-LEAST_WIDTH, LEAST_HEIGHT = 160.0, 40.0
+MIN_WIDTH, MIN_HEIGHT = 160.0, 40.0
+VERBS: dict[JobKind, str] = {"picture": "Saving", "map": "Saving", "copy": "Copying", "export": "Exporting"}
+WAITING = "waiting for its turn"
+
+
+@dataclass(frozen=True)
+class ProgressRow:
+    """Work in progress. key: identifies its button. done: share, 0..1. cancel: None while it cannot be cancelled."""
+
+    key: str
+    name: str
+    words: str
+    done: float
+    cancel: Action | None
 
 
 def notices(state: AppState, layout: Layout) -> list[Action]:
-    """Build the newest notice; what was pressed comes back as actions."""
-    rows, offer = progress_rows(state), offered_model(state)
-    if not (state.notices or rows or offer):
+    """Draw the corner; return the actions of the buttons that were pressed."""
+    rows, offer = progress_rows(state), depth_models.offered_model(state)
+    if not (state.notices or rows or offer) or not _place(layout):
         return []
-    margin = MARGIN * layout.ui_scale
-    right, bottom = layout.panel.x - margin, layout.window.height - margin
-    if layout.strip_across is not None and layout.strip_down is not None:
-        right, bottom = layout.strip_down.x - STRIP_GAP * layout.ui_scale, layout.strip_across.y - margin / 2
-    elif layout.status is not None:
-        bottom = layout.status.y
-    elif layout.filmstrip is not None:
-        bottom = layout.filmstrip.y - margin / 2
-    if right - margin < LEAST_WIDTH * layout.ui_scale:  # the panel gives way: it must be possible to read them
-        right = layout.window.width - margin
-    width = min(NOTICE_WIDTH * layout.ui_scale, right - margin)
-    if width <= 0:
-        return []
-    imgui.set_next_window_pos(imgui.ImVec2(margin, bottom), 0, imgui.ImVec2(0, 1))
-    most = max(bottom - margin / 2, LEAST_HEIGHT * layout.ui_scale)
-    imgui.set_next_window_size_constraints(imgui.ImVec2(width, 0), imgui.ImVec2(width, most))
     imgui.begin("notices", None, CARD_FLAGS)
-    if state.prompt is not None:  # what is asked has buttons that must be seen
+    if state.prompt is not None:  # the buttons of a prompt must be seen
         imgui.internal.bring_window_to_display_back(imgui.internal.get_current_window())
     actions = build_rows(rows, layout)
     if state.notices:
@@ -56,14 +55,57 @@ def notices(state: AppState, layout: Layout) -> list[Action]:
     return actions
 
 
+def _place(layout: Layout) -> bool:
+    """Place the next window in the corner; return whether there is room."""
+    margin = MARGIN * layout.ui_scale
+    right, bottom = layout.panel.x - margin, layout.window.height - margin
+    if layout.strip_across is not None and layout.strip_down is not None:
+        right, bottom = layout.strip_down.x - STRIP_GAP * layout.ui_scale, layout.strip_across.y - margin / 2
+    elif layout.status is not None:
+        bottom = layout.status.y
+    elif layout.filmstrip is not None:
+        bottom = layout.filmstrip.y - margin / 2
+    if right - margin < MIN_WIDTH * layout.ui_scale:  # over the panel, where there is no room beside it
+        right = layout.window.width - margin
+    width = min(NOTICE_WIDTH * layout.ui_scale, right - margin)
+    imgui.set_next_window_pos(imgui.ImVec2(margin, bottom), 0, imgui.ImVec2(0, 1))
+    height = max(bottom - margin / 2, MIN_HEIGHT * layout.ui_scale)
+    imgui.set_next_window_size_constraints(imgui.ImVec2(width, 0), imgui.ImVec2(width, height))
+    return width > 0
+
+
+def _notice(notice: Notice, state: AppState) -> list[Action]:
+    """Draw a notice, its offers, and the number of those that wait behind it."""
+    palette, others = palette_of(state.preferences.theme), len(state.notices) - 1
+    actions: list[Action] = [do(messages.dismiss, notice)] if imgui.button("×") else []
+    imgui.same_line()
+    imgui.begin_group()
+    imgui.align_text_to_frame_padding()
+    colored(notice.text, imgui.ImVec4(*(palette.error if notice.is_error else palette.text)))
+    offers: list[tuple[str, Action]] = [(name, BY_NAME[name].action(state)) for name in notice.commands]
+    offers += file_offers(notice.path) if notice.path else []
+    offers += [("Use its settings", do(opening.take_settings, notice.offer))] if notice.offer is not None else []
+    offers += [(f"Close all ({others + 1})", do(messages.dismiss))] if others else []
+    actions += button_rows(offers)
+    if notice.path and _beside_last("Copy path"):
+        imgui.set_clipboard_text(notice.path)
+    imgui.end_group()
+    return actions
+
+
+def _beside_last(words: str) -> bool:
+    imgui.same_line()
+    return bool(imgui.button(words))
+
+
 def _offer(model: ModelOffer) -> list[Action]:
-    """How to get true depth in place of a guess; nothing more is asked."""
-    words, button = f"{model.title}, on this machine, finds true depth.", "Estimate depth"
+    """Draw the offer of better depth in place of a guess."""
+    words, button = f"{model.title} is on this machine and estimates it better.", "Estimate depth"
     if model.lacks:
         words = f"{model.title}: {model.lacks}"
     elif not model.is_here:
-        words = f"{model.title} finds true depth: {model.megabytes:,} MB, {model.licence}, from {model.host}."
-        button = "Get true depth"
+        words = f"{model.title} estimates it better: {model.megabytes:,} MB, {model.licence}, from {model.host}."
+        button = "Get better depth"
     actions: list[Action] = [do(depth_models.show_offer, False)] if imgui.button("×##offer") else []
     imgui.same_line()
     imgui.begin_group()
@@ -76,17 +118,68 @@ def _offer(model: ModelOffer) -> list[Action]:
     return actions
 
 
-def _notice(notice: Notice, state: AppState) -> list[Action]:
-    """The notice, what it offers, and how many more there are."""
-    palette, others = palette_of(state.preferences.theme), len(state.notices) - 1
-    actions: list[Action] = [do(messages.dismiss, notice)] if imgui.button("×") else []
-    imgui.same_line()
-    imgui.begin_group()
-    imgui.align_text_to_frame_padding()
-    colored(notice.text, imgui.ImVec4(*(palette.error if notice.is_error else palette.text)))
-    offers: list[tuple[str, Action]] = [(name, BY_NAME[name].action(state)) for name in notice.commands]
-    offers += [("Use its settings", do(opening.take_settings, notice.offer))] if notice.offer is not None else []
-    offers += [(f"Close all ({others + 1})", do(messages.dismiss))] if others else []
-    actions += button_rows(offers)
-    imgui.end_group()
+def build_rows(rows: Sequence[ProgressRow], layout: Layout) -> list[Action]:
+    """Draw work in progress; return the actions of the buttons that were pressed.
+
+    All rows have the same height, so that no button moves while the words change.
+    """
+    actions: list[Action] = []
+    for number, row in enumerate(rows):
+        if number:
+            gap(layout, 2)
+        imgui.progress_bar(row.done, imgui.ImVec2(-1, 4 * layout.ui_scale), "")
+        imgui.begin_disabled(row.cancel is None)
+        if imgui.button(f"Cancel##{row.key}") and row.cancel is not None:
+            actions.append(row.cancel)
+        imgui.end_disabled()
+        imgui.same_line()
+        imgui.align_text_to_frame_padding()
+        imgui.text(row.name)
+        right = imgui.get_window_pos().x + imgui.get_window_size().x - imgui.get_style().window_padding.x
+        tooltip(row.name if imgui.get_item_rect_max().x > right else "", layout)
+        imgui.text_disabled(row.words)
     return actions
+
+
+def progress_rows(state: AppState) -> list[ProgressRow]:
+    """Return the rows of all work in progress."""
+    return [*_work_on_views(state), *job_rows(state.jobs)]
+
+
+def job_rows(jobs: Sequence[JobProgress]) -> list[ProgressRow]:
+    """Return the rows of saves, copies and exports."""
+    return [
+        ProgressRow(
+            f"job {job.id}",
+            f"{VERBS[job.kind]} {job.name}",
+            job_text(job),
+            job.done,
+            do(ask, CancelJobTask(job.id)) if job.can_be_cancelled else None,
+        )
+        for job in jobs
+    ]
+
+
+def job_text(job: JobProgress) -> str:
+    """Return the progress in words: "drawing, 23 %, about 8 s left"."""
+    words = job.doing or WAITING
+    if job.doing == WRITING:
+        return words
+    words += f", {round(100 * job.done)} %" if job.done else ""
+    return words if job.left_s is None else f"{words}, {about_left(job.left_s)}"
+
+
+def _work_on_views(state: AppState) -> Iterator[ProgressRow]:
+    downloading, model = state.models.downloading, depth_models.wanted_model(state)
+    if state.free_progress is not None:
+        share = min(state.free_progress, 0.99)  # finished work has no row
+        words, leave = f"{round(100 * share)} %", do(viewpoint.leave_camera)
+        yield ProgressRow("looking", "Filling in what the photo does not show", words, share, leave)
+    if downloading is not None:
+        words = f"{downloading.done:,} of {downloading.total:,} MB"
+        share = downloading.done / max(downloading.total, 1)
+        yield ProgressRow("download", f"Downloading {downloading.title}", words, share, do(ask, CancelGetTask()))
+    if model is not None:
+        titles = {offer.name: offer.title for offer in state.models.known}
+        words = f"with {titles.get(model, last_part(model))}"
+        yield ProgressRow("estimate", "Estimating depth", words, 0.0, do(depth_models.give_up))

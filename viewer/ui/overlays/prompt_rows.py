@@ -1,22 +1,26 @@
-"""What small windows over the picture share: a text to type, one of some, what is wrong, the buttons below."""
+"""Rows and buttons that prompts and cards share."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path, PurePath
 from typing import TypeVar
 
 from imgui_bundle import imgui
 
 from viewer.model import messages
-from viewer.model.action import Action, do
+from viewer.model.action import Action, ask, do
 from viewer.model.layout import Layout
 from viewer.model.state.app_state import AppState
-from viewer.model.state.prompts import Prompt
+from viewer.model.state.prompts import ExportPrompt, Prompt, SavePrompt
+from viewer.model.state.tasks import ChoosePlaceTask, ExportTask, SaveTask, ShowFileTask
 from viewer.model.window_limits import LARGEST_SIDE_PX
 from viewer.ui.style import palette_of
-from viewer.ui.widgets import button, colored, combo, gap, label, tooltip
+from viewer.ui.widgets import button, colored, combo, gap, label
 
 Choice = TypeVar("Choice", bound=str)
+PlacePrompt = TypeVar("PlacePrompt", SavePrompt, ExportPrompt)
 PROMPT_FLAGS = (
     imgui.WindowFlags_.no_title_bar
     | imgui.WindowFlags_.no_resize
@@ -24,63 +28,120 @@ PROMPT_FLAGS = (
     | imgui.WindowFlags_.no_saved_settings
     | imgui.WindowFlags_.always_auto_resize
 )
-BROWSE = "Browse…"
 CARD_FLAGS = PROMPT_FLAGS | imgui.WindowFlags_.no_nav | imgui.WindowFlags_.no_focus_on_appearing
-"""Of a card that stands by itself over the picture."""
+"""Flags of a card that stands by itself over the picture."""
+BROWSE = "Browse…"
+FILE_EXISTS = "A file with this name exists. Replace it?"
+PROBLEM_LINES = 2
+"""Lines kept free for a problem, so that no button moves when one appears."""
 
 
 def prompt_actions(closed: bool, edited: Prompt, prompt: Prompt) -> list[Action]:
-    """What becomes of the prompt: it goes, or what was edited in it is kept."""
+    """Return the action that closes a prompt, or keeps what was edited in it."""
     if closed:
         return [do(messages.show_prompt, None)]
     return [do(messages.show_prompt, edited)] if edited != prompt else []
 
 
+@dataclass(frozen=True)
+class PlaceRow:
+    """Answer of the row of a path. entered: whether Enter was pressed in it. browses: whether Browse was pressed."""
+
+    path: str
+    entered: bool
+    browses: bool
+
+
+def place_row(text: str, path: str, state: AppState, layout: Layout) -> PlaceRow:
+    """Draw a row for a path, which shows its end if it is long; with a button where the system has dialogs."""
+    style = imgui.get_style()
+    width = imgui.calc_text_size(BROWSE).x + 2 * style.frame_padding.x + style.item_spacing.x
+    focus_on_appearing()
+    label(text, layout)
+    imgui.set_next_item_width(-width if state.has_dialogs else -1)
+    new, is_entered = text_field("path", path, flags=imgui.InputTextFlags_.elide_left)
+    if not state.has_dialogs:
+        return PlaceRow(new, is_entered, False)
+    imgui.same_line()
+    return PlaceRow(new, is_entered, button(BROWSE, layout))
+
+
+def place_actions(
+    prompt: PlacePrompt,
+    edited: PlacePrompt,
+    row: PlaceRow,
+    task: Callable[[PlacePrompt, bool], SaveTask | ExportTask],
+    word: str,
+    state: AppState,
+    layout: Layout,
+    written: str = "",
+) -> list[Action]:
+    """Draw the problem and the buttons of a prompt to save or export; return its actions.
+
+    task: function of the prompt and whether to replace a file that exists. word: on the button that begins it. written:
+    name of the file, if it differs from the typed one.
+    """
+    edited = replace(edited, path=row.path)
+    if edited != prompt:
+        edited = replace(edited, already_there=False, problem="")
+    if edited.already_there:
+        return _ask_to_replace(edited, row, task, written or PurePath(edited.path.strip()).name, state, layout)
+    say_problem(edited.problem, state)
+    pressed, closed = prompt_buttons(word, layout)
+    if row.browses:
+        return [do(messages.show_prompt, edited), do(ask, ChoosePlaceTask(edited))]
+    if pressed or row.entered:
+        return [do(messages.show_prompt, edited), do(ask, task(edited, False))]
+    return prompt_actions(closed, edited, prompt)
+
+
+def _ask_to_replace(
+    prompt: PlacePrompt,
+    row: PlaceRow,
+    task: Callable[[PlacePrompt, bool], SaveTask | ExportTask],
+    name: str,
+    state: AppState,
+    layout: Layout,
+) -> list[Action]:
+    """Ask whether to replace a file that exists. Enter cancels, and goes back to the prompt."""
+    place, folder = Path(prompt.path.strip()).expanduser().parent, state.folder
+    is_photo = folder is not None and place == Path(folder.path) and name in [photo.name for photo in folder.photos]
+    say_problem(f"{name} is a photo of the open folder. Replace it?" if is_photo else FILE_EXISTS, state)
+    gap(layout, 2)
+    cancelled = button("Cancel", layout) or is_enter_free() or row.entered
+    imgui.same_line()
+    if button(f"Replace {name}", layout):
+        return [do(ask, task(prompt, True))]
+    return [do(messages.show_prompt, replace(prompt, already_there=False))] if cancelled else []
+
+
 def prompt_buttons(word: str, layout: Layout) -> tuple[bool, bool]:
-    """(pressed, cancelled); Enter presses, too, but for one that ends typing into a number, or picks from a list."""
+    """Draw the buttons of a prompt; return (whether it was confirmed, by Enter too, whether it was cancelled)."""
     gap(layout, 2)
     pressed = button(word, layout)
     imgui.same_line()
-    return pressed or _is_enter_free(), button("Cancel", layout)
+    return pressed or is_enter_free(), button("Cancel", layout)
 
 
-def _is_enter_free() -> bool:
+def is_enter_free() -> bool:
+    """Return whether Enter went down, neither in a text field nor in a list."""
     is_taken = imgui.get_io().want_text_input or imgui.is_popup_open("", imgui.PopupFlags_.any_popup)
     return is_enter() and not is_taken and not imgui.is_window_appearing()
 
 
 def is_enter() -> bool:
-    """Whether Enter went down in this frame, wherever it is on the keyboard."""
+    """Return whether an Enter key went down in this frame."""
     return bool(imgui.is_key_pressed(imgui.Key.enter, False) or imgui.is_key_pressed(imgui.Key.keypad_enter, False))
 
 
-def text_field(name: str, text: str, hint: str = "") -> tuple[str, bool]:
-    """The text, and whether Enter was pressed in it."""
-    _, new = imgui.input_text_with_hint(f"##{name}", hint, text)
+def text_field(name: str, text: str, hint: str = "", flags: int = 0) -> tuple[str, bool]:
+    """Draw a text field; return the text, and whether Enter was pressed in it."""
+    _, new = imgui.input_text_with_hint(f"##{name}", hint, text, flags)
     return new, bool(imgui.is_item_deactivated() and is_enter())
 
 
-def path_field(path: str, layout: Layout) -> tuple[str, bool]:
-    """A text field for a path; one that is too long for it comes up whole over it."""
-    new, is_entered = text_field("path", path)
-    is_cut = imgui.calc_text_size(new).x > imgui.get_item_rect_size().x
-    tooltip(new if is_cut else "", layout)
-    return new, is_entered
-
-
-def path_row(text: str, path: str, layout: Layout) -> tuple[str, bool, bool]:
-    """A row for a path, whether Enter was pressed in it, and whether the user wants to look for one instead."""
-    width = imgui.calc_text_size(BROWSE).x + 2 * imgui.get_style().frame_padding.x
-    focus_on_appearing()
-    label(text, layout)
-    imgui.set_next_item_width(imgui.get_content_region_avail().x - width - imgui.get_style().item_spacing.x)
-    new, is_entered = path_field(path, layout)
-    imgui.same_line()
-    return new, is_entered, button(BROWSE, layout, "Look for the folder, and choose a name there.")
-
-
 def search_field(name: str, text: str, hint: str) -> tuple[str, bool]:
-    """The same; it also takes what was typed in the frame before it got the keys, with which it begins."""
+    """Draw a text field that also takes what was typed in the frame before it got the keys."""
     typed = "".join(map(chr, imgui.get_io().input_queue_characters))
     new, is_entered = text_field(name, text, hint)
     if imgui.is_window_appearing():
@@ -92,20 +153,20 @@ def search_field(name: str, text: str, hint: str) -> tuple[str, bool]:
 
 
 def focus_on_appearing() -> None:
-    """What comes next has the keys once the prompt is there."""
+    """Give the keys to the next item when its prompt appears."""
     if imgui.is_window_appearing():
         imgui.set_keyboard_focus_here(0)
 
 
 def choice_row(name: str, chosen: Choice, entries: Mapping[Choice, tuple[str, str]], layout: Layout) -> Choice:
-    """One of these: words, and what they mean."""
+    """Draw a list of (words, meaning); return the chosen entry."""
     picked = combo(name, entries[chosen][0], tuple(entries.values()), layout)
     return chosen if picked is None else tuple(entries)[picked]
 
 
 def size_rows(size_px: tuple[int, int], layout: Layout) -> int | None:
-    """Width and height; the new width where the user changed it: the height is to follow."""
-    label("Width", layout, "Pixels; the height follows.")
+    """Draw width and height; return the new width if the user changed it."""
+    label("Width", layout, "Width in pixels; the height follows.")
     changed, width = imgui.input_int("##width", size_px[0], 0, 0)
     label("Height", layout)
     imgui.align_text_to_frame_padding()
@@ -114,20 +175,30 @@ def size_rows(size_px: tuple[int, int], layout: Layout) -> int | None:
 
 
 def say_problem(problem: str, state: AppState) -> None:
-    """Why it cannot be so, if there is a reason."""
-    if problem:
-        colored(problem, imgui.ImVec4(*palette_of(state.preferences.theme).error))
+    """Draw a problem, or keep room for it."""
+    top = imgui.get_cursor_pos_y()
+    colored(problem, imgui.ImVec4(*palette_of(state.preferences.theme).error))
+    bottom = top + PROBLEM_LINES * imgui.get_text_line_height_with_spacing()
+    imgui.set_cursor_pos_y(max(imgui.get_cursor_pos_y(), bottom))
 
 
 def button_rows(offers: list[tuple[str, Action]]) -> list[Action]:
-    """Buttons side by side, on as many lines as they need; what was pressed comes back."""
+    """Draw buttons side by side, on as many lines as they need; return the actions of those that were pressed."""
     actions: list[Action] = []
     style = imgui.get_style()
     right = imgui.get_cursor_screen_pos().x + imgui.get_content_region_avail().x
     for i, (words, action) in enumerate(offers):
-        width = imgui.calc_text_size(words).x + 2 * style.frame_padding.x
+        width = imgui.calc_text_size(words.partition("##")[0]).x + 2 * style.frame_padding.x
         if i and imgui.get_item_rect_max().x + style.item_spacing.x + width <= right:
             imgui.same_line()
         if imgui.button(words):
             actions.append(action)
     return actions
+
+
+def file_offers(path: str, number: int = 0) -> list[tuple[str, Action]]:
+    """Return buttons that show a written file. number: tells the buttons of several files apart."""
+    return [
+        (f"Show in folder##{number}", do(ask, ShowFileTask(path, in_folder=True))),
+        (f"Open##{number}", do(ask, ShowFileTask(path))),
+    ]

@@ -7,12 +7,13 @@ import math
 from imgui_bundle import imgui
 
 from iibr_core.beyond.optics import Optics
-from iibr_core.depth.editing.edits import DEPTH_TOOLS, BrushTool
+from iibr_core.depth.editing.edits import DEPTH_TOOLS
 from iibr_core.scenes.rect import Rect
 from iibr_core.scenes.scene import Scene
 from viewer.model.focal_plane import handle_points, place_of, sharp_disparity
 from viewer.model.layout import Layout
 from viewer.model.state.app_state import AppState, Hover
+from viewer.model.state.depth import Tool
 from viewer.model.state.lens import TiltHandles
 from viewer.model.state.preferences import Units
 from viewer.model.units import far_percent, metres, metres_text, relative_distance
@@ -35,7 +36,7 @@ def overlays(state: AppState, layout: Layout) -> None:
     draw.push_clip_rect(*corners(frame), True)
     if state.tilt_handles is not None:
         _draw_handles(state.tilt_handles, layout, picture)
-    if state.brush.is_on and scene.plan is not None:
+    if state.brush.is_on and state.brush.tool != "select" and scene.plan is not None:
         _draw_sample(state, layout, picture)
         if state.hover is not None:
             _draw_brush(state.brush.radius, scene, state.hover, layout, picture, DARK.text)
@@ -112,7 +113,7 @@ def _draw_brush(radius: float, scene: Scene, hover: Hover, layout: Layout, pictu
     _ring(draw, *place, max(radius * picture.width, 2 * scale), scale, pack_color(color))
 
 
-def _draw_direction(tool: BrushTool, scene: Scene, hover: Hover, layout: Layout, picture: Rect) -> None:
+def _draw_direction(tool: Tool, scene: Scene, hover: Hover, layout: Layout, picture: Rect) -> None:
     """Plus or minus, for what brings nearer or pushes away."""
     draw, scale, (x, y) = imgui.get_background_draw_list(), layout.ui_scale, _pointed_at(hover, scene, picture)
     arm, color = 4 * scale, pack_color(DARK.text)

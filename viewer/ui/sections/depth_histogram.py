@@ -1,4 +1,4 @@
-"""How the disparity is spread, far left, near right, in the overlay's colours, with the clips to drag and the focus."""
+"""The histogram of disparity (far left, near right) in the overlay's colours, with the clips to drag and the focus."""
 
 from __future__ import annotations
 
@@ -18,39 +18,47 @@ from viewer.ui.style import corners, pack_color, palette_of
 from viewer.ui.widgets import tooltip
 
 HEIGHT = 56.0
+"""Height of the bars in window units at usual size."""
 HANDLE_WIDTH = 12.0
+CLIPPED_OPACITY = 0.3
 TIP = (
-    "How much of the picture is how far away: far at the left, near at the right. The line is the focus; the handles"
-    " limit the depth."
+    "Share of the picture at each depth: far at the left, near at the right. The line is the focus; the handles limit"
+    " the depth."
 )
 
 
 def depth_histogram(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
-    """Build it; the places are those before clips and gamma, the colours those after."""
+    """Build the histogram. Places are before clips and gamma, colours after."""
     levels = scene.levels
     if levels is None:
         return []
     scale, corner = layout.ui_scale, imgui.get_cursor_screen_pos()
-    room = HANDLE_WIDTH * scale / 2
-    rect = Rect(corner.x + room, corner.y, imgui.get_content_region_avail().x - 2 * room, HEIGHT * scale)
+    margin = HANDLE_WIDTH * scale / 2
+    rect = Rect(corner.x + margin, corner.y, imgui.get_content_region_avail().x - 2 * margin, HEIGHT * scale)
     _draw_bars(levels, state.depth.edits, rect)
     _draw_focus(state, scene, levels, rect, scale)
-    actions = _handle("far_clip", rect, state, scale) + _handle("near_clip", rect, state, scale)
+    edits, actions = state.depth.edits, list[Action]()
+    far, is_finished = _handle("far_clip", edits.far_clip, rect, state, scale)
+    if far is not None:
+        actions.append(do(depth.set_tone, replace(edits, far_clip=far), is_finished))
+    near, is_finished = _handle("near_clip", edits.near_clip, rect, state, scale)
+    if near is not None:
+        actions.append(do(depth.set_tone, replace(edits, near_clip=near), is_finished))
     imgui.set_cursor_screen_pos(corner)
-    imgui.dummy(imgui.ImVec2(rect.width + 2 * room, rect.height + 4 * scale))
+    imgui.dummy(imgui.ImVec2(rect.width + 2 * margin, rect.height + 4 * scale))
     tooltip(TIP, layout)
     return actions
 
 
 def bar_heights(levels: Levels, is_inverted: bool) -> list[float]:
-    """Of each bar, 0..1, far first. The root: a wall at one depth must not hide all the rest."""
+    """Return the height of each bar, 0..1, far first: the square root, so that a flat wall does not hide the rest."""
     counts = levels.counts[::-1] if is_inverted else levels.counts
-    most = max(counts, default=0) or 1
-    return [(count / most) ** 0.5 for count in counts]
+    highest = max(counts, default=0) or 1
+    return [(count / highest) ** 0.5 for count in counts]
 
 
 def focus_share(state: AppState, scene: Scene, levels: Levels) -> float | None:
-    """Where the focus is among the places of the histogram, 0..1; None where it lies outside."""
+    """Return the place of the focus in the histogram, 0..1; None if it lies outside."""
     plan = scene.plan
     if plan is None or not plan.disparity_scale:
         return None
@@ -69,7 +77,7 @@ def _draw_bars(levels: Levels, edits: DepthEdits, rect: Rect) -> None:
     for i, share in enumerate(heights):
         place = (i + 0.5) / len(heights)
         is_clipped = not edits.far_clip <= place <= edits.near_clip
-        color = pack_color((*map_color(tone_curve(place, tone)), 1.0), 0.3 if is_clipped else 1.0)
+        color = pack_color((*map_color(tone_curve(place, tone)), 1.0), CLIPPED_OPACITY if is_clipped else 1.0)
         corner = imgui.ImVec2(left + i * step, top + height * (1 - share))
         draw.add_rect_filled(corner, imgui.ImVec2(left + (i + 1) * step, top + height), color)
 
@@ -82,11 +90,10 @@ def _draw_focus(state: AppState, scene: Scene, levels: Levels, rect: Rect, scale
         draw.add_line(imgui.ImVec2(x, rect.y), imgui.ImVec2(x, rect.y + rect.height), color, 1.5 * scale)
 
 
-def _handle(name: str, rect: Rect, state: AppState, scale: float) -> list[Action]:
-    """One of the clips: a line over the bars with a grip below; it follows the pointer while it is held."""
-    edits, palette, (left, top, width, height) = state.depth.edits, palette_of(state.preferences.theme), rect
-    x = left + getattr(edits, name) * width
-    grip = HANDLE_WIDTH * scale
+def _handle(name: str, value: float, rect: Rect, state: AppState, scale: float) -> tuple[float | None, bool]:
+    """Build a line over the bars with a grip; return its new value if it is dragged, and whether it was let go."""
+    palette, (left, top, width, height) = palette_of(state.preferences.theme), rect
+    x, grip = left + value * width, HANDLE_WIDTH * scale
     imgui.set_cursor_screen_pos(imgui.ImVec2(x - grip / 2, top))
     imgui.set_next_item_allow_overlap()
     imgui.invisible_button(f"handle {name}", imgui.ImVec2(grip, height + 4 * scale))
@@ -94,11 +101,9 @@ def _handle(name: str, rect: Rect, state: AppState, scale: float) -> list[Action
     color = pack_color(palette.accent if is_held or imgui.is_item_hovered() else palette.text)
     draw, bottom = imgui.get_window_draw_list(), top + height
     draw.add_line(imgui.ImVec2(x, top), imgui.ImVec2(x, bottom), color, scale)
-    side, up = grip / 2, 7 * scale
+    side, tip = grip / 2, imgui.ImVec2(x, bottom - 3 * scale)
     low = imgui.ImVec2(x - side, bottom + 4 * scale), imgui.ImVec2(x + side, bottom + 4 * scale)
-    draw.add_triangle_filled(imgui.ImVec2(x, bottom + 4 * scale - up), *low, color)
+    draw.add_triangle_filled(tip, *low, color)
     if not (is_held or is_released):
-        return []
-    share = min(max((imgui.get_io().mouse_pos.x - left) / width, 0.0), 1.0)
-    changed: DepthEdits = replace(edits, **{name: share})  # type: ignore[arg-type]
-    return [do(depth.set_tone, changed, is_finished=is_released)]
+        return None, False
+    return min(max((imgui.get_io().mouse_pos.x - left) / width, 0.0), 1.0), bool(is_released)

@@ -10,11 +10,12 @@ from iibr_core.scenes.scene import Scene
 from viewer.model import lens, viewpoint
 from viewer.model.action import Action, do
 from viewer.model.layout import Layout
+from viewer.model.presets import active_preset
 from viewer.model.state.app_state import AppState
 from viewer.model.state.lens import PRESETS, PresetName
 from viewer.model.window_limits import DEPTH_STRENGTH_LIMIT
 from viewer.ui.sections.lens_section import aperture_slider, focus_slider
-from viewer.ui.widgets import button, choice, in_row, label, slider
+from viewer.ui.widgets import choice, in_row, label, slider
 
 PRESET_TIPS: dict[PresetName, str] = {
     "portrait": "What you clicked last is sharp, and all else soft. Before a click: what is most likely the subject.",
@@ -37,14 +38,18 @@ def essentials(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
     has_views = bool(aperture_limit(scene.grid))
     actions: list[Action] = []
     if has_views:
-        actions += _presets(layout) + aperture_slider(state, scene, layout) + focus_slider(state, scene, layout)
+        actions += (
+            _presets(active_preset(state, scene), layout)
+            + aperture_slider(state, scene, layout)
+            + focus_slider(state, scene, layout)
+        )
     if scene.plan is not None:
         actions += _depth_strength(state, layout)
     return actions + (_move(state, layout) if has_views else [])
 
 
-def _presets(layout: Layout) -> list[Action]:
-    """Three buttons as wide as their words ask."""
+def _presets(active: PresetName | None, layout: Layout) -> list[Action]:
+    """Build three buttons as wide as their words need; the active preset is lit."""
     actions: list[Action] = []
     spacing = 4 * layout.ui_scale
     words = [name.capitalize() for name in PRESETS]
@@ -54,7 +59,7 @@ def _presets(layout: Layout) -> list[Action]:
     for i, (name, word, length) in enumerate(zip(PRESETS, words, lengths)):
         if i:
             imgui.same_line(0, spacing)
-        if button(word, layout, PRESET_TIPS[name], width=length + padding):
+        if choice(word, name == active, layout, (length + padding, 0), PRESET_TIPS[name]):
             actions.append(do(lens.apply_preset, name))
     return actions
 

@@ -49,6 +49,8 @@ EQUIVALENT_TIP = " ≈ is the 85 mm lens on full frame, focused at 2 m, that wou
 ALL_SHARP = "all sharp"
 """Of an aperture that is a pinhole."""
 
+PROVISIONAL = "f/…"
+"""F-number while the depth that it follows from is not known yet."""
 CLOSED_STOPS = 6.0
 """From the widest aperture to where its slider ends: a pinhole."""
 TILT_TIP = "Two handles appear in the picture: drag them onto two things, and both are sharp, with all between them."
@@ -135,6 +137,8 @@ def aperture_slider(state: AppState, scene: Scene, layout: Layout) -> list[Actio
     """How wide the lens is open."""
     diameter, widest = state.optics.aperture_diameter, aperture_limit(scene.grid)
     words, is_exact = f_number_text(scene, diameter), f_number(scene, widest) is not None
+    if diameter > 0 and (scene.is_sketch or not scene.has_view_disparity):
+        words = PROVISIONAL
     tip = APERTURE_TIP + (F_NUMBER_TIP.format(ASSUMED_DISTANCE_M) if is_exact else EQUIVALENT_TIP)
     if state.preferences.units == "light field":
         form = ALL_SHARP if diameter == 0 else f"%.1f views  ·  {words}"

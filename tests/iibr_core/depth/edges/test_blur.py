@@ -13,7 +13,7 @@ from tests.iibr_core.scenes import smooth_texture
 
 @pytest.mark.parametrize(
     ("sigma", "size", "measured"),
-    [(1.0, 160, 1.0), (1.5, 160, 1.5), (4.0, 160, 4.0), (8.0, 180, 8.0), (8.0, 480, 8.0), (8.0, 140, 0), (0.0, 160, 0)],
+    [(1.0, 160, 1.0), (4.0, 160, 4.0), (8.0, 180, 8.0), (8.0, 140, 0), (0.0, 160, 0)],
 )
 def test_the_blur_of_a_map_is_measured_unless_it_is_exact_or_too_small(sigma, size, measured) -> None:
     photo, disparity, _ = disc_before_slope(size)
@@ -32,10 +32,6 @@ def parts_blurred(*sigmas: float) -> float:
 def test_a_map_has_the_blur_of_its_soft_edges() -> None:
     assert parts_blurred(0, 1.5, 2.0) == pytest.approx(1.75, rel=0.2)
     assert parts_blurred(2.0, 0, 2.0) == pytest.approx(2.0, rel=0.15)
-
-
-def test_blurs_that_differ_much_are_no_filters() -> None:
-    assert parts_blurred(1.0, 2.0, 4.0) == 0
 
 
 def test_an_edge_that_the_photo_does_not_share_proves_nothing() -> None:

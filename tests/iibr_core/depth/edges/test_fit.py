@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from iibr_core.depth.edges.fit import _find_missing, fit_to_blur
-from iibr_core.runtime.work import Cancelled, stoppable
 from iibr_core.training.degradation import blur
 from tests.iibr_core.depth.edges.test_refine import disc_before_slope
 
@@ -33,15 +32,6 @@ def test_ragged_outlines_become_whole() -> None:
     assert wrong_side(fitted, exact) < 0.1 * wrong_side(start, exact)
 
 
-def test_pixels_that_were_not_sharpened_stay_if_nothing_moves_beside_them() -> None:
-    photo, exact, start = scene()
-    soft = blur(exact, SIGMA)
-    soft[:, :60] = start[:, :60]
-    fitted = fit_to_blur(photo, soft, start, SIGMA, EDGE)
-    np.testing.assert_array_equal(fitted[:, :48], start[:, :48])
-    assert not np.array_equal(fitted[:, 66:], start[:, 66:])
-
-
 def test_the_missing_part_is_the_map_minus_the_blurred_one() -> None:
     _, _, exact = scene()
     taps = np.exp(-0.5 * (np.arange(-6, 7) / SIGMA) ** 2)
@@ -51,10 +41,3 @@ def test_the_missing_part_is_the_map_minus_the_blurred_one() -> None:
     padded = np.pad(exact, 6, mode="edge")
     for y, x in ((0, 0), (50, 36), (119, 119)):
         assert -missing[y, x] == pytest.approx(taps @ padded[y : y + 13, x : x + 13] @ taps, abs=1e-5)
-
-
-def test_fitting_can_be_cancelled() -> None:
-    photo, exact, start = scene()
-    answers = iter([False] * 3)
-    with pytest.raises(Cancelled), stoppable(lambda: next(answers, True)):
-        fit_to_blur(photo, blur(exact, SIGMA), start, SIGMA, EDGE)

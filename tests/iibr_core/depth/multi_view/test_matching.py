@@ -5,13 +5,7 @@ import pytest
 from scipy.ndimage import map_coordinates
 
 from iibr_core.depth.guided_filter import GuidedFilter
-from iibr_core.depth.multi_view.matching import (
-    HIDDEN_FACTOR,
-    MAX_DIFFERENCE,
-    MIN_SEEN_SHARE,
-    _match,
-    _store_costs,
-)
+from iibr_core.depth.multi_view.matching import HIDDEN_FACTOR, MAX_DIFFERENCE, MIN_SEEN_SHARE, _match, _store_costs
 from tests.iibr_core.scenes import smooth_texture
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,18 +12,23 @@ import OpenImageIO as oiio
 import pytest
 
 from iibr_core.color import srgb_from_linear
+from iibr_core.depth.choice import DepthChoice, DepthOrigin
 from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.formats.images.picture_kinds import KINDS, PictureFormat, is_float
-from iibr_core.scenes.scene import Source
+from iibr_core.formats.outputs import AlreadyThereError
+from iibr_core.scenes.scene import Scene, Source
+from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, InputError, ViewOffset
-from tests.viewer.conftest import HEIGHT, WIDTH, headless_with_scene
-from viewer.app.image_export import export_picture, shot_of
-from viewer.app.job_queue import JobQueue
-from viewer.app.picture_saver import add_save
+from tests.viewer.conftest import HEIGHT, WIDTH, headless_with_scene, write_scene
+from viewer.app.jobs import Jobs
+from viewer.app.picture_files import export_picture, inputs_of_scene, shot_of
+from viewer.app.saving import add_save, checked_path
 from viewer.display.offscreen import OffscreenScene
-from viewer.model import lens, messages, preferences, saving
+from viewer.model import lens, saving
 from viewer.model.action import Action, do
 from viewer.model.saved_settings import read_settings
+from viewer.model.state.app_state import AppState
+from viewer.model.state.prompts import Saved, SavePrompt
 from viewer.model.state.tasks import SaveTask
 
 
@@ -95,29 +101,56 @@ def test_the_window_keeps_its_own_picture(opened: OffscreenScene) -> None:
     assert np.array_equal(scene_view.renderer.read_image(), shown)
 
 
-def test_a_place_that_cannot_be_written_is_told(opened: OffscreenScene, tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"missing-folder.* does not exist"):
-        saved(opened, tmp_path / "missing-folder" / "a.png", (8, 8))
-
-
 def test_a_picture_is_as_it_was_when_edited_depth_is_shown_meanwhile(tmp_path: Path) -> None:
     out = tmp_path / "out.png"
     with headless_with_scene(tmp_path) as viewer:
         viewer.do(do(lens.move_eye, ViewOffset(0.3, -0.7)))
         scene_view, state, woken = viewer.view, viewer.state, threading.Event()
-        expected = scene_view.renderer.converged_picture(RenderSettings(state.optics, (90, 60)))
-        jobs = JobQueue(scene_view, woken.set)
-        actions: list[Action] = []
-        assert add_save(SaveTask(str(out), (90, 60)), state, (), jobs) == [
-            do(preferences.set_last_folder, str(tmp_path))
-        ]
+        settings = RenderSettings(state.optics, ScreenSize(90, 60))
+        expected = scene_view.renderer.converged_picture(settings)
+        jobs, actions = Jobs(scene_view, woken.set), list[Action]()
+        add_save(SaveTask(SavePrompt(str(out), ScreenSize(90, 60))), state, (), jobs)
         scene_view.show_disparity(np.zeros((HEIGHT, WIDTH), np.float32))
-        assert not np.array_equal(
-            scene_view.renderer.converged_picture(RenderSettings(state.optics, (90, 60))), expected
-        )
+        assert not np.array_equal(scene_view.renderer.converged_picture(settings), expected)
         while do(saving.set_jobs, ()) not in actions:
             actions += jobs.advance(state, 0.0)
             assert woken.wait(60)
         jobs.close()
-    assert [action.args[0].text for action in actions if action.verb is messages.notify] == [f"Saved {out}"]
+    assert do(saving.finish_job, out) in actions
     np.testing.assert_array_equal(oiio.ImageBuf(str(out)).get_pixels(oiio.UINT8), expected)
+
+
+@pytest.mark.parametrize("what", ["picture", "map"])
+def test_a_place_is_checked_before_anything_is_drawn(tmp_path: Path, what: Saved) -> None:
+    photo, taken = write_scene(tmp_path), tmp_path / "taken.png"
+    taken.write_bytes(b"mine")
+    (tmp_path / "link.png").symlink_to(photo)
+
+    def place(name: str, may_replace: bool = False) -> Path:
+        prompt = SavePrompt(f" {tmp_path / name} " if name else "", ScreenSize(8, 8), what=what)
+        return checked_path(SaveTask(prompt, may_replace), (photo,))
+
+    assert place("a") == tmp_path / ("a.png" if what == "picture" else "a.pfm")
+    assert place("taken.png", may_replace=True) == taken
+    with pytest.raises(AlreadyThereError, match=r"taken\.png"):
+        place("taken.png")
+    for name in ("", "missing-folder/a.png", "scene.png", "link.png"):
+        with pytest.raises(InputError) as caught:
+            place(name, may_replace=True)
+        assert not isinstance(caught.value, AlreadyThereError)
+
+
+@pytest.mark.parametrize("size", [ScreenSize(0, 5), ScreenSize(5, -1), ScreenSize(16384, 16384)])
+def test_absurd_sizes_are_refused(tmp_path: Path, size: ScreenSize) -> None:
+    with pytest.raises(InputError, match="1 to 100 million"):
+        checked_path(SaveTask(SavePrompt(str(tmp_path / "a.png"), size)), ())
+
+
+def test_the_inputs_of_a_scene_are_its_files(tmp_path: Path) -> None:
+    """The open scene with the map that was found, and what is being opened; models by name are no files."""
+    scene = Scene(Source("open.png"), "open", 9, 6, GridShape(1, 1), (0.0, 1.0), "map")
+    scene = replace(scene, depth_origin=DepthOrigin("file", "map", file="open_disparity.npy"))
+    names = ("next.png", "map.pfm", "open.png", "open_disparity.npy")
+    state = AppState(source=Source("next.png", DepthChoice(file="map.pfm", model="depth-pro")), scene=scene)
+    assert inputs_of_scene(state) == tuple(map(Path, names))
+    assert inputs_of_scene(AppState()) == ()

@@ -1,0 +1,173 @@
+"""Folders of data sets whose views are no numbered grid: the Stanford archive, Middlebury stereo, NeRF's LLFF scenes.
+
+Stanford: a folder of out_RR_CC_Y_X.png, with row, column and camera position. Positions count: X grows to the right and
+Y downwards. Rows and columns are counted as the camera moved, which differs from scene to scene. Cameras stand slightly
+off the grid; one view step is the mean spacing of columns.
+
+Middlebury: pairs of 2014 and 2021 (im0, im1, disp0.pfm) and rows of views of 2001 to 2006 (im0..im8 or view0..view6)
+with ground truth for two of them. Pictures are rectified and evenly spaced, from left to right; one view step is the
+distance of neighbours.
+
+LLFF: poses_bounds.npy beside a folder of photos, taken by hand near a plane, facing forward.
+"""
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from iibr_core.formats.images.decode import read_size
+from iibr_core.formats.images.picture_source import PictureSource
+from iibr_core.formats.light_fields.multi_view_scene import (
+    KnownDisparity,
+    KnownView,
+    MultiView,
+    maps_in,
+    pictures_in,
+    place_on_grid,
+)
+from iibr_core.formats.poses import central_camera, read_llff_poses
+from iibr_core.types import Camera, InputError, ViewOffset
+
+NUMBER = r"[-+]?\d{1,9}(?:\.\d{0,12})?"
+STANFORD_NAME = re.compile(rf"(?:.*_)?(\d{{1,3}})_(\d{{1,3}})_({NUMBER})_({NUMBER})_?$")
+MAX_STRAY = 0.5
+"""Largest distance of a camera from its place in the grid, in view steps; beyond it, positions mean something else."""
+MIN_NOTED_STRAY = 0.005
+USUAL_DIRECTIONS = np.array([-1, 1])
+"""Directions in which rows and columns are counted where positions are unknown: upwards and to the right."""
+MIDDLEBURY_NAME = re.compile(r"(im|view)(\d)$")
+FULL_WIDTH = {"im": 1800, "view": 1350}
+"""Widths of full-size pictures of 2003, and of 2005 and 2006: smaller copies store disparity times the same ratio."""
+TRUTH_AT = {"im": (2, 6), "view": (1, 5)}
+STEPS_BETWEEN_TRUTHS = 4
+SCALE_2001 = 8.0
+MAX_WIDTH_2001 = 440
+QUANTIZED = (".png", ".pgm")
+LLFF_FOLDERS = ("images_8", "images_4", "images")
+"""Folders of pictures, smaller copies first: papers evaluate on them."""
+
+
+def read_stanford(folder: Path) -> MultiView | None:
+    """Return the views of a Stanford archive folder or of its subfolder `rectified`; None if names are different."""
+    inside = folder / "rectified" if (folder / "rectified").is_dir() else folder
+    named = [(path, match) for path in pictures_in(inside) if (match := STANFORD_NAME.match(path.stem))]
+    if not named:
+        return None
+    index = np.array([[int(match[1]), int(match[2])] for _, match in named])
+    position = np.array([[float(match[3]), float(match[4])] for _, match in named])
+    if len(np.unique(index, axis=0)) < len(index):
+        raise InputError(f"{inside}: two pictures have the same row and column; remove one of them")
+    offsets, directions, note = _viewpoints(index, position)
+    views = tuple(
+        KnownView(f"row {row} column {column}", ViewOffset(float(t), float(s)), PictureSource(path))
+        for (path, _), (row, column), (t, s) in zip(named, index, offsets)
+    )
+    layout = f"Stanford archive, {len(np.unique(index[:, 1]))}x{len(np.unique(index[:, 0]))}"
+    scene = MultiView(folder.resolve().name, layout, views, notes=(note,))
+    return place_on_grid(scene, [(int(row), int(column)) for row, column in index * directions])
+
+
+def _viewpoints(index: np.ndarray, position: np.ndarray) -> tuple[np.ndarray, np.ndarray, str]:
+    """Return viewpoints (N, 2), t down and s right, in view steps; directions in which rows and columns are counted,
+    down and right positive; and a note about the positions.
+
+    index: rows and columns (N, 2). position: Y and X (N, 2) in any unit.
+    """
+    slopes = np.array([_slope(index[:, axis], position[:, axis]) for axis in (0, 1)])
+    step = float(abs(slopes[1] or slopes[0]))
+    if step == 0:
+        return index * USUAL_DIRECTIONS, USUAL_DIRECTIONS, "Camera positions are unknown: a regular grid is assumed."
+    directions = np.where(slopes != 0, np.sign(slopes).astype(int), USUAL_DIRECTIONS)
+    offsets, regular = (position - position.mean(axis=0)) / step, index * directions
+    spacing = np.where(slopes != 0, np.abs(slopes) / step, 1.0)
+    stray = float(np.abs(offsets - (regular - regular.mean(axis=0)) * spacing).max())
+    if stray > MAX_STRAY:
+        note = f"Camera positions lie up to {stray:.1f} view steps off the grid: a regular grid is assumed."
+        return index * USUAL_DIRECTIONS, USUAL_DIRECTIONS, note
+    more = f"; cameras stand up to {stray:.2f} view steps off a regular grid" if stray >= MIN_NOTED_STRAY else ""
+    return offsets, directions, f"Viewpoints from the names{more}."
+
+
+def _slope(x: np.ndarray, y: np.ndarray) -> float:
+    """Return the slope of the line fitted to (x, y), each (N,); 0 if all x are equal."""
+    centred = x - x.mean()
+    spread = float((centred**2).sum())
+    return float((centred * y).sum() / spread) if spread > 0 else 0.0
+
+
+def read_middlebury(folder: Path) -> MultiView | None:
+    """Return the views of a Middlebury folder, None for other folders. In maps, unknown disparity is infinite or 0."""
+    matches = [(MIDDLEBURY_NAME.match(path.stem.lower()), path) for path in pictures_in(folder)]
+    named = {(match[1], int(match[2])): path for match, path in matches if match}
+    if len(named) < 2 or len({kind for kind, _ in named}) > 1:
+        return None
+    kind = next(iter(named))[0]
+    if (folder / "disp0.pfm").is_file() and set(named) == {("im", 0), ("im", 1)}:
+        maps = {n: KnownDisparity(path) for n in (0, 1) if (path := folder / f"disp{n}.pfm").is_file()}
+        layout = "Middlebury pair"
+    else:
+        maps, layout = _coded_maps(folder, kind, next(iter(named.values()))), f"Middlebury, {len(named)} views"
+    numbers = sorted(number for _, number in named)
+    views = tuple(KnownView(f"{kind}{n}", ViewOffset(0.0, float(n)), PictureSource(named[kind, n])) for n in numbers)
+    known = {numbers.index(n): disparity for n, disparity in maps.items() if n in numbers}
+    return place_on_grid(MultiView(folder.resolve().name, layout, views, known), [(0, n) for n in numbers])
+
+
+def _coded_maps(folder: Path, kind: str, picture: Path) -> dict[int, KnownDisparity]:
+    """Return maps of integers: disparity between the two views of TRUTH_AT, times a factor that depends on the size."""
+    maps, width = maps_in(folder), read_size(picture).width
+    is_of_2001 = picture.suffix.lower() == ".ppm" and kind == "im" and width < MAX_WIDTH_2001
+    factor = SCALE_2001 if is_of_2001 else float(max(round(FULL_WIDTH[kind] / width), 1))
+    known: dict[int, KnownDisparity] = {}
+    for n in TRUTH_AT[kind]:
+        if path := maps.get(f"disp{n}"):
+            scale = 1 / factor if path.suffix.lower() in QUANTIZED else 1.0
+            known[n] = KnownDisparity(path, scale / STEPS_BETWEEN_TRUTHS)
+    return known
+
+
+def read_llff(folder: Path) -> MultiView | None:
+    """Return the views of an LLFF scene, None without poses_bounds.npy.
+
+    Viewpoints are positions across the viewing direction of the central camera, in steps of the mean distance of
+    neighbours. The `camera` of each view adds its distance from that plane and its rotation.
+    """
+    path = folder / "poses_bounds.npy"
+    if not path.is_file():
+        return None
+    inside = next((folder / name for name in LLFF_FOLDERS if (folder / name).is_dir()), folder)
+    pictures, cameras = pictures_in(inside), read_llff_poses(path)
+    if len(cameras) != len(pictures) or len(pictures) < 2:
+        raise InputError(f"{path}: {len(cameras)} poses for {len(pictures)} pictures; give both, and at least two")
+    central = central_camera(cameras)
+    cameras, stray = _in_steps(cameras, cameras[central])
+    views = tuple(
+        KnownView(picture.stem, ViewOffset(*map(float, camera.position[1::-1])), PictureSource(picture), camera)
+        for picture, camera in zip(pictures, cameras)
+    )
+    focal_px = cameras[central].resized(read_size(pictures[central])).focal_px[0]
+    near, far = cameras[central].depth_range or (1.0, 1.0)
+    notes = (
+        f"Cameras stand up to {stray:.1f} view steps before or behind the plane of the given one, and are turned"
+        " against it; each view is made for the camera of its photo.",
+        f"Pictures from {inside.name}.",
+    )
+    name, layout = folder.resolve().name, f"LLFF, {len(views)} photos"
+    return MultiView(name, layout, views, {}, (focal_px / far, focal_px / near), notes, central, focal_px=focal_px)
+
+
+def _in_steps(cameras: tuple[Camera, ...], central: Camera) -> tuple[tuple[Camera, ...], float]:
+    """Return the cameras as the central one sees them, in view steps, and their largest distance from its plane."""
+    turned = central.world_from_camera.T
+    positions = np.array([turned @ (camera.position - central.position) for camera in cameras])
+    squared = ((positions[:, None, :2] - positions[None, :, :2]) ** 2).sum(axis=2)
+    np.fill_diagonal(squared, np.inf)
+    step = float(np.sqrt(squared.min(axis=1)).mean()) or 1.0
+    moved = []
+    for camera, position in zip(cameras, positions / step):
+        near, far = camera.depth_range or (1.0, 1.0)
+        rotation, depths = turned @ camera.world_from_camera, (near / step, far / step)
+        moved.append(replace(camera, world_from_camera=rotation, position=position, depth_range=depths))
+    return tuple(moved), float(np.abs(positions[:, 2]).max()) / step

@@ -1,0 +1,58 @@
+"""Verbs about a surface that was clicked: move it nearer or farther, or keep it sharp."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import isfinite
+
+from iibr_core.depth.editing.edits import BrushTool, Stroke
+from viewer.model import lens
+from viewer.model.history import record_edit, undoable
+from viewer.model.state.app_state import AppState
+from viewer.model.state.depth import Selection
+
+MOVE_SHARE = 0.1
+"""Step by which a surface is moved, as a share of the range of depth."""
+HOLE_RADIUS = 0.03
+"""Radius of the largest hole in a surface that is selected with it, as a share of the photo's width."""
+
+
+def select(state: AppState, place: tuple[float, float]) -> AppState:
+    """Select the surface at a place, (x, y) as shares of the photo's width and height."""
+    return replace(state, selection=Selection(place)) if all(map(isfinite, place)) else state
+
+
+def deselect(state: AppState) -> AppState:
+    """Select nothing."""
+    return replace(state, selection=None)
+
+
+def set_range(state: AppState, range_px: tuple[float, float]) -> AppState:
+    """Set the range of disparity that was found at the selected place."""
+    return state if state.selection is None else replace(state, selection=replace(state.selection, range_px=range_px))
+
+
+def surface_stroke(tool: BrushTool, place: tuple[float, float], tolerance: float) -> Stroke:
+    """Return the stroke that changes the whole surface at a place."""
+    return Stroke(tool, (place,), HOLE_RADIUS, MOVE_SHARE, tolerance=tolerance)
+
+
+@undoable
+def move(state: AppState, is_forward: bool) -> AppState:
+    """Move the selected surface nearer or farther by MOVE_SHARE of the range of depth."""
+    if state.selection is None or state.stroke is not None:
+        return state
+    edits, tool = state.depth.edits, "forward" if is_forward else "back"
+    stroke = surface_stroke(tool, state.selection.place, state.brush.tolerance)
+    depth = replace(state.depth, edits=replace(edits, strokes=(*edits.strokes, stroke)))
+    return replace(state, depth=depth, generation=state.generation + 1)
+
+
+def keep_sharp(state: AppState) -> AppState:
+    """Focus on the selected surface, with a range of focus that holds all of it."""
+    if state.selection is None or state.selection.range_px is None:
+        return state
+    (x, y), (far, near) = state.selection.place, state.selection.range_px
+    focused = lens.focus_on(state, (2 * x - 1, 2 * y - 1), (far + near) / 2)
+    focused = lens.set_focus_range(focused, (near - far) / 2)
+    return record_edit(state, replace(focused, history=state.history), "keep_sharp")
