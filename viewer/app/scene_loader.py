@@ -1,4 +1,4 @@
-"""Has the scene made that the state asks for, and takes in what came of it; reads ahead what is likely to follow."""
+"""Loads scenes: submits what the state asks for, takes in the results, and reads ahead what is likely to follow."""
 
 from __future__ import annotations
 
@@ -19,10 +19,9 @@ from iibr_core.scenes.scene import (
 )
 from iibr_core.types import InputError, ViewOffset
 from viewer.background.depth_models import DepthFinder, focus_before_and_now
-from viewer.background.file_worker import FileRequest, FileWorker
-from viewer.background.job_threads import Failed, ProgressReport
+from viewer.background.newest import Failed, Newest, Post
 from viewer.background.read_ahead import PhotoAhead, ReadAhead, photos_within_budget, read_sketch, read_whole_photo
-from viewer.background.scene_worker import PhotosFound, SceneResult, SceneWorker
+from viewer.background.scene_worker import PhotosFound, SceneResult, SceneWork, WorkReport
 from viewer.display.depth_preview import DepthPreview
 from viewer.display.inspection_view import InspectionView
 from viewer.display.scene_view import SceneView
@@ -37,20 +36,16 @@ from viewer.model.state.app_state import AppState
 from viewer.model.state.notices import Notice
 
 SKETCHES_FIRST = 3
-"""A photo and the next two are there in small before all of it is read: who goes on quickly meets none of that work.
-The photo that is opened first does not wait for the next ones.
+"""Number of photos that are read at a small size before the open photo is read whole, so that quick steps show a
+picture. The first photo does not wait for the next ones.
 """
 
 PROGRESS_S = 0.25
-"""While views come, their number is told this often: to show each would take a frame, and that the time of a fifth of a
-view.
-"""
+"""Time between two updates of the progress, in seconds: each update draws a frame."""
 
 
 class SceneLoader:
-    """Everything is called from the one GL thread. ahead, sketches: photos that are read before they are asked for, and
-    in small.
-    """
+    """Call it from the GL thread. ahead, sketches: photos read before they are asked for, whole and at a small size."""
 
     def __init__(
         self,
@@ -65,31 +60,33 @@ class SceneLoader:
         self._scene_view = scene_view
         self._inspection_view = inspection_view
         self._set_title = set_title
-        self._worker = SceneWorker(wake)
+        self._work = SceneWork()
+        self._worker = Newest("iibr-scene", self._work, wake)
         self._preview = DepthPreview(scene_view)
         self._depth_finder = DepthFinder(wake)
-        self._brush_loader = FileWorker("iibr-brush", wake)
+        self._brush_loader = Newest("iibr-brush", _prepare_brush, wake)
         self._has_brush = False
         self._submitted = 0
         self._depth_settings = DepthSettings()
         self._stopped: int | None = None
         self._room_beside: tuple[Scene, int] | None = None
         self._held: list[Action] = []
-        self._reported_at = 0.0
         self._is_urgent = False
+        self._reported_at = 0.0
 
     def look_from(self, eye: ViewOffset) -> None:
-        """Views near this place are made first."""
-        self._worker.eye = eye
+        """Make views near this viewpoint first."""
+        self._work.eye = eye
 
     def take_results(self, state: AppState, until: float) -> list[Action]:
-        """The worker's results, as actions, until then on the clock, at least one; the one place where they arrive.
-        Progress alone is told every PROGRESS_S, and when it is complete.
+        """Return results as actions, at least one result, and more until this time on the clock.
+
+        Progress alone is returned every PROGRESS_S, and when it is complete.
         """
         actions = self._show_sketch(state) + self._depth_finder.advance(state, self._scene_view.loaded)
         while self._scene_view.has_room and (result := self._worker.next_result()) is not None:
             self._held += self._take(result, state)
-            self._is_urgent |= not (isinstance(result, ViewReady | ProgressReport) and not result.progress.is_complete)
+            self._is_urgent |= not (isinstance(result, ViewReady | WorkReport) and not result.progress.is_complete)
             if time.perf_counter() >= until:
                 break
         self._held += actions
@@ -102,7 +99,7 @@ class SceneLoader:
         return bool(self._held)
 
     def preview_depth(self, state: AppState) -> list[Action]:
-        """While depth is edited, show it; the views of what it was before need not be made."""
+        """Show the depth while it is edited; stop making views of the depth before."""
         if not is_ahead(state, self._depth_settings):
             return []
         self._worker.cancel()
@@ -113,12 +110,12 @@ class SceneLoader:
         return []
 
     def advance(self, state: AppState) -> None:
-        """Ask for what the state wants now, if that is news, and for what is likely to be wanted next."""
+        """Submit what the state asks for, and what is likely to be wanted next."""
         self._cancel(state)
         self._read_sketches(state)
         is_wanted = state.generation not in (self._submitted, state.stopped)
         if is_wanted and state.source is not None and state.stroke is None:
-            self._load(state, state.source)  # with a stroke under way it will be another one
+            self._load(state, state.source)
         self._read_ahead(state)
 
     def close(self) -> None:
@@ -139,7 +136,7 @@ class SceneLoader:
         return actions
 
     def _show_sketch(self, state: AppState) -> list[Action]:
-        """What was asked for, in small, as long as nothing else of it is there."""
+        """Show the sketch of the photo that was asked for while nothing else of it is there."""
         if state.source is None or self._scene_view.generation == state.generation or self._reuses_photo(state):
             return []
         sketch = self.sketches.get(WantedPhoto(state.source, requested_strength(state)))
@@ -147,10 +144,10 @@ class SceneLoader:
 
     def _take(self, result: SceneResult, state: AppState) -> list[Action]:
         match result:
-            case ProgressReport():
-                return [do(opening.set_progress, result.id, result.progress)]
+            case WorkReport():
+                return [do(opening.set_progress, result.generation, result.progress)]
             case Failed():
-                return [do(opening.report_failure, result.id, result.message)]
+                return [do(opening.report_failure, result.request.generation, result.message)]
             case PhotosFound():
                 return [
                     do(opening.open_source, source_beside(state.source, result.path)),
@@ -158,13 +155,13 @@ class SceneLoader:
                 ]
         try:
             return self._take_views(result, state)
-        except InputError as error:  # no room on the graphics card: there is no use in more views
+        except InputError as error:  # the graphics card has no room
             self._worker.cancel()
             return [do(opening.report_failure, result.generation, words_of(error))]
 
     def _take_views(self, result: SceneReady | ViewReady, state: AppState) -> list[Action]:
         if result.generation < self._scene_view.generation:
-            return []  # the small picture of another photo is shown by now
+            return []  # the sketch of another photo is shown by now
         if isinstance(result, SceneReady):
             before, centre = self._scene_view.loaded, self._scene_view.centre
             self._scene_view.open(result)
@@ -184,22 +181,19 @@ class SceneLoader:
         return [do(opening.set_progress, result.generation, result.progress, (result.view.row, result.view.column))]
 
     def _load_brush(self, ready: SceneReady) -> None:
-        """Beside the first photo's views, so that the first stroke does not wait."""
+        """Prepare the brush beside the first photo's views, so that the first stroke does not wait."""
         if not self._has_brush and ready.loaded is not None:
             self._has_brush = True
-            self._brush_loader.submit(FileRequest(0, _prepare_brush))
+            self._brush_loader.submit(None)
 
     def _cancel(self, state: AppState) -> None:
-        """What the user stopped, and what is wanted no more."""
+        """Cancel work that the user stopped."""
         if state.stopped == state.generation != self._stopped:
             self._worker.cancel()
             self._stopped = state.stopped
-        if self._scene_view.generation == state.generation < self._submitted:
-            self._worker.cancel()  # another file was being read, and will not be opened: what is here is whole
-            self._submitted, self._depth_settings = state.generation, settings_for_worker(state)
 
     def _load(self, state: AppState, source: Source) -> None:
-        """A new generation is a new job. The photo is read again only if another one was opened."""
+        """Submit a new generation. The photo is read again only if another one was opened."""
         loaded, plan = self._depth_finder.newest(self._scene_view.loaded), None
         if not self._reuses_photo(state):
             self._keep_left(state)
@@ -223,12 +217,12 @@ class SceneLoader:
         )
 
     def _reuses_photo(self, state: AppState) -> bool:
-        """Whether the photo that is asked for is open, and all of it was read."""
+        """Return whether the photo that is asked for is open, and all of it was read."""
         scene = state.scene
         return scene is not None and scene.source is state.source and self._scene_view.loaded is not None
 
     def _keep_left(self, state: AppState) -> None:
-        """The photo that is left may be gone back to."""
+        """Keep the photo that is left: one may go back to it."""
         scene, loaded = state.scene, self._scene_view.loaded
         if scene is None or scene.plan is None or loaded is None:
             return
@@ -237,7 +231,7 @@ class SceneLoader:
             self.ahead.keep(WantedPhoto(scene.source, state.depth_strength), left)
 
     def _read_sketches(self, state: AppState) -> None:
-        """Of what is asked for and what is likely to be next. While the open photo's views are made they can wait."""
+        """Read sketches of what is asked for and of the next photos, but not while views are made."""
         if _is_whole(state) and not state.progress.is_complete:
             return
         self.sketches.want(_photos_to_sketch(state) if state.stopped != state.generation else ())
@@ -247,7 +241,7 @@ class SceneLoader:
         return all(map(self.sketches.is_done, _photos_to_sketch(state)[:count]))
 
     def _read_ahead(self, state: AppState) -> None:
-        """What is likely to be opened next, once all of this photo is there; on the way to it nothing is begun."""
+        """Read the next photos once all of this one is there; before that, only finish what was begun."""
         if state.scene is None or state.source is None:
             return
         photos = _wanted(state, (state.source, *photos_ahead(state, AHEAD)))
@@ -258,31 +252,31 @@ class SceneLoader:
             self.ahead.want([*photos[:is_begun], *filter(self.ahead.is_done, photos)])
 
     def _photos_beside(self, scene: Scene) -> int:
-        """`photos_within_budget`, looked up once a scene: it reads a dozen files of the system."""
+        """Return `photos_within_budget`, computed once a scene: it reads a dozen files of the system."""
         if self._room_beside is None or self._room_beside[0] is not scene:
             self._room_beside = scene, photos_within_budget(scene)
         return self._room_beside[1]
 
 
 def _has_other_depth(before: LoadedPhoto, now: LoadedPhoto | None) -> bool:
-    """Whether the same photo's depth was found again."""
+    """Return whether depth of the same photo was found again."""
     return now is not None and now.photo is before.photo and now.found is not before.found
 
 
-def _prepare_brush() -> None:
+def _prepare_brush(request: None, post: Post[None]) -> None:
     from iibr_core.scenes.photo import prepare_brush
 
     prepare_brush()
 
 
 def _is_whole(state: AppState) -> bool:
-    """Whether all of what is asked for is read and shown."""
+    """Return whether all of what is asked for is read and shown."""
     scene = state.scene
     return scene is not None and scene.source is state.source and not scene.is_sketch
 
 
 def _photos_to_sketch(state: AppState) -> list[WantedPhoto]:
-    """What is asked for, and what is likely to be next."""
+    """Return the photo that is asked for, and those that are likely to be next."""
     return [] if state.source is None else _wanted(state, (state.source, *photos_ahead(state, SKETCHED_AHEAD)))
 
 

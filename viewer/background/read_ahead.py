@@ -1,38 +1,34 @@
-"""Photos read before they are asked for: in small, to be shown at once, and whole, as many as fit the memory budget."""
+"""Photos read before they are asked for: small ones to be shown at once, and whole ones, as many as fit in memory."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
 from iibr_core.method.memory import PHOTO_BYTES, budget_bytes
 from iibr_core.method.plan import ScenePlan
 from iibr_core.scenes.scene import LoadedPhoto, Scene, SceneReady, WantedPhoto
-from viewer.background.job_threads import Job, JobThread
+from viewer.background.newest import Failed, Newest, Post
 
 Read = TypeVar("Read")
 
 
-_Job = Job[WantedPhoto, tuple[WantedPhoto, Read | None]]
-
-
 @dataclass(frozen=True, eq=False)
 class PhotoAhead:
-    """A photo that is ready to be shown: read, its depth found, its views planned."""
+    """A photo that is ready to be shown: read, with its depth and its plan."""
 
     loaded: LoadedPhoto
     plan: ScenePlan
 
 
 def read_whole_photo(wanted: WantedPhoto) -> PhotoAhead:
-    """Read all of a photo, asking no depth model. Raises InputError."""
+    """Read and plan a photo without asking a depth model. Raises InputError."""
     from iibr_core.scenes.photo import load_photo, make_plan
 
     loaded = load_photo(wanted.source, asks_model=False)
-    plan = make_plan(wanted.source, loaded, wanted.depth_strength)
-    return PhotoAhead(loaded, plan)
+    return PhotoAhead(loaded, make_plan(wanted.source, loaded, wanted.depth_strength))
 
 
 def read_sketch(wanted: WantedPhoto) -> SceneReady | None:
@@ -43,30 +39,27 @@ def read_sketch(wanted: WantedPhoto) -> SceneReady | None:
 
 
 def photos_within_budget(scene: Scene) -> int:
-    """How many photos like the open one fit beside it and its views."""
-    plan, pixels = scene.plan, scene.width * scene.height
-    if plan is None:
+    """Return how many photos like the open one fit in memory beside it and its views."""
+    if scene.plan is None:
         return 0
-    return math.floor(budget_bytes() / (2 * pixels * PHOTO_BYTES))
+    return math.floor(budget_bytes() / (2 * scene.width * scene.height * PHOTO_BYTES))
 
 
 class ReadAhead(Generic[Read]):
-    """Reads what it is told to want, one after the other, and keeps that as long as it is wanted."""
+    """Reads wanted photos in a thread, one after the other, and keeps them as long as they are wanted."""
 
     def __init__(self, name: str, wake: Callable[[], None], read: Callable[[WantedPhoto], Read | None]) -> None:
-        """name: of the thread that reads. wake: called there when a photo was read. read: gives None where there is
-        nothing to be had; errors mean the same: opening the photo will say why.
-        """
+        """wake: called, in the thread, when a photo was read. read: its errors are dropped; opening will show them."""
 
-        def read_one(job: _Job[Read]) -> Iterator[tuple[WantedPhoto, Read | None]]:
-            yield job.request, read(job.request)
+        def work(wanted: WantedPhoto, post: Post[tuple[WantedPhoto, Read | None]]) -> None:
+            post((wanted, read(wanted)))
 
-        self._thread = JobThread(name, wake, read_one, lambda wanted, message: (wanted, None))
+        self._thread = Newest(name, work, wake)
         self._known: dict[WantedPhoto, Read | None] = {}
         self._reading: WantedPhoto | None = None
 
     def want(self, wanted: Sequence[WantedPhoto]) -> None:
-        """Read these, the first first, and at once: another one that is being read can wait. Drop all others."""
+        """Read these photos, the first one at once, even if another one is being read; forget all others."""
         self._take_results()
         self._known = {photo: read for photo, read in self._known.items() if photo in wanted}
         missing = [photo for photo in wanted if photo not in self._known]
@@ -74,27 +67,27 @@ class ReadAhead(Generic[Read]):
         if self._reading is not None and self._reading not in (missing[:1] if is_urgent else missing):
             self._thread.cancel()
             self._reading = None
-        if self._reading is None and missing and not self._thread.is_lost:
+        if self._reading is None and missing:
             self._reading = missing[0]
             self._thread.submit(missing[0])
 
     def is_done(self, photo: WantedPhoto) -> bool:
-        """Whether there is no use in waiting for it: it was read, or cannot be."""
+        """Return whether a photo was read, or cannot be read."""
         self._take_results()
-        return photo in self._known or self._thread.is_lost
+        return photo in self._known
 
     def is_reading(self, photo: WantedPhoto) -> bool:
-        """Whether it is under way."""
+        """Return whether a photo is being read."""
         self._take_results()
-        return self._reading == photo and not self._thread.is_lost
+        return self._reading == photo
 
     def get(self, photo: WantedPhoto) -> Read | None:
-        """What was read of it, if it was."""
+        """Return a photo if it was read."""
         self._take_results()
         return self._known.get(photo)
 
     def keep(self, photo: WantedPhoto, read: Read) -> None:
-        """One that was read already may be wanted again."""
+        """Keep a photo that was read elsewhere as long as it is wanted."""
         self._known[photo] = read
 
     def close(self) -> None:
@@ -104,5 +97,5 @@ class ReadAhead(Generic[Read]):
 
     def _take_results(self) -> None:
         while (result := self._thread.next_result()) is not None:
-            self._reading = None
-            self._known[result[0]] = result[1]
+            photo, read = (result.request, None) if isinstance(result, Failed) else result
+            self._reading, self._known[photo] = None, read

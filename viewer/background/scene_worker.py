@@ -1,12 +1,8 @@
-"""The worker thread: reads a scene, plans it and makes its views, and hands each result over as soon as it is there.
-
-The newest request wins: the job before it stops at its next row band, see `viewer.background.job_threads`.
-"""
+"""Opening of scenes in a thread: reads a scene, plans it and makes its views; each result is posted at once."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -16,80 +12,74 @@ from iibr_core.runtime.compiling import watch_compiling
 from iibr_core.runtime.time_left import TimeLeft
 from iibr_core.runtime.work import watched
 from iibr_core.scenes.scene import Progress, SceneReady, SceneRequest, ViewReady
-from iibr_core.types import ViewOffset
-from viewer.background.job_threads import Failed, Job, JobThread, ProgressReport
+from viewer.background.newest import Failed, Post
 
-REPORT_EVERY_S = 0.1
-"""Seconds between two reports of the same work."""
+REPORT_INTERVAL_S = 0.1
+"""Time between two reports of the same work, in seconds."""
 
 
 @dataclass(frozen=True)
 class PhotosFound:
-    """The folder asked for is none of views but of photos; path: of the first."""
+    """The folder of this generation holds photos, no views. path: of its first photo."""
 
     generation: int
     path: str
 
 
-SceneResult = SceneReady | ViewReady | PhotosFound | ProgressReport[int] | Failed[int]
-SceneWork = Callable[[SceneRequest, Callable[[], ViewOffset]], Iterator[SceneReady | ViewReady]]
-"""What a job does: (request, where the user looks) -> its results, in order. See `results_of`."""
+@dataclass(frozen=True, eq=False)
+class WorkReport:
+    """Progress of this generation's work between its results."""
+
+    generation: int
+    progress: Progress
 
 
-class SceneWorker(JobThread[SceneRequest, SceneResult]):
-    """Carries out the newest request. Results are distinguished by the generation of their request.
+Opened = SceneReady | ViewReady | PhotosFound | WorkReport
+SceneResult = Opened | Failed[SceneRequest]
 
-    eye: where the user looks now; views near it are made first. Set by the window, read by the job.
-    """
 
-    def __init__(self, wake: Callable[[], None], work: SceneWork | None = None) -> None:
-        """wake: called, in the thread, when a result was posted. work: what a job does, `results_of` by default."""
-        super().__init__("iibr-scene", wake, self._carry_out_scene, _failure)
+class SceneWork:
+    """The work of `Newest` that opens a scene. eye: viewpoint near which views are made first, set by the window."""
+
+    def __init__(self) -> None:
         self.eye = CENTRE
-        self._scene_work = work
 
-    def _carry_out_scene(self, job: Job[SceneRequest, SceneResult]) -> Iterator[SceneResult]:
-        source = Path(job.request.source.path)
+    def __call__(self, request: SceneRequest, post: Post[Opened]) -> None:
+        """Post all results of a request."""
+        source = Path(request.source.path)
         if source.is_dir() and (photo := first_photo(source)) is not None:
-            yield PhotosFound(job.request.generation, str(photo))
-            return
-        if self._scene_work is not None:
-            yield from self._scene_work(job.request, lambda: self.eye)
+            post(PhotosFound(request.generation, str(photo)))
             return
         from iibr_core.scenes.opening import results_of
 
-        reports = _Reports(job)
+        reports = _Reports(request.generation, post)
         with watch_compiling(lambda words: reports.report(0, 0, words)), watched(reports.report):
-            for result in results_of(job.request, lambda: self.eye):
+            for result in results_of(request, lambda: self.eye):
                 reports.take(result)
-                yield result
+                post(result)
 
 
 class _Reports:
-    """Posts what a job reports while it has no result, beside the progress of its views."""
+    """Posts what the work is doing between its results, with the count of its views."""
 
-    def __init__(self, job: Job[SceneRequest, SceneResult]) -> None:
-        self._job, self._there, self._time_left = job, Progress(), TimeLeft()
-        self._doing, self._told_s = "", 0.0
+    def __init__(self, generation: int, post: Post[Opened]) -> None:
+        self._generation, self._post = generation, post
+        self._views, self._time_left = Progress(), TimeLeft()
+        self._doing, self._posted_s = "", 0.0
 
     def take(self, result: SceneReady | ViewReady) -> None:
         """Note the progress of the views."""
         if isinstance(result, ViewReady):
-            self._there = result.progress
+            self._views = result.progress
         else:
-            self._there = Progress(total=result.scene.grid.rows * result.scene.grid.columns)
+            self._views = Progress(total=result.scene.grid.rows * result.scene.grid.columns)
 
     def report(self, done: float, total: float, doing: str) -> None:
-        """Post what the job is doing, unless the same was posted a moment ago."""
+        """Post the progress, unless the same work was reported a moment ago."""
         left_s, now_s = self._time_left.update(done, total, doing), time.perf_counter()
-        if doing == self._doing and now_s - self._told_s < REPORT_EVERY_S:
+        if doing == self._doing and now_s - self._posted_s < REPORT_INTERVAL_S:
             return
-        self._doing, self._told_s = doing, now_s
-        words = f"{doing}, {done / total:.0%}" if done and total else doing
-        share = done / total if total else self._there.share
-        progress = replace(self._there, doing=words, share=share, left_s=left_s)
-        self._job.post(ProgressReport(self._job.request.generation, progress))
-
-
-def _failure(request: SceneRequest, message: str) -> Failed[int]:
-    return Failed(request.generation, message)
+        self._doing, self._posted_s = doing, now_s
+        words = f"{doing}, {round(100 * done / total)} %" if done and total else doing
+        share = done / total if total else self._views.share
+        self._post(WorkReport(self._generation, replace(self._views, doing=words, share=share, left_s=left_s)))
