@@ -1,4 +1,4 @@
-"""The GLFW window: made, waited on, and asked for its size. The one module beside `viewer.gpu` that calls GLFW.
+"""The GLFW window. Only this module and `viewer.gpu` call GLFW.
 
 The bundle is imported before glfw on purpose: it brings the GLFW library that both must share.
 """
@@ -17,23 +17,23 @@ from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import InputError
 
 WINDOW_SIZE = (1280, 800)
+SMALLEST_SIZE = (200, 150)
 
 
 def wake() -> None:
-    """Make a waiting window look around; may be called in any thread."""
+    """Wake the window's loop; may be called in any thread."""
     glfw.post_empty_event()
 
 
 class Window:
     """A window with an OpenGL 3.3 core context.
 
-    handle: GLFW's window. size: (width, height) in window units; framebuffer_size: in pixels, (0, 0) while minimised:
-    both are as `poll` found them, since each is a question to the display server. damages: how often the system asked
-    for a redraw.
+    handle: GLFW's window. size: in window units; framebuffer_size: in pixels, (0, 0) while minimised; both are updated
+    by `poll`. damages: number of redraws that the system asked for.
     """
 
     def __init__(self, title: str, place: tuple[int, int, int, int] | None = None, is_maximized: bool = False) -> None:
-        """Open it, at (x, y, width, height) if that is still on a screen; is_maximized: filling the screen.
+        """Open the window, at place (x, y, width, height) if that is on a screen.
 
         Raises InputError without a display or without OpenGL 3.3.
         """
@@ -57,7 +57,7 @@ class Window:
 
     @property
     def place(self) -> tuple[int, int, int, int] | None:
-        """(x, y, width, height) in screen units; None while it fills the screen."""
+        """Place (x, y, width, height) in screen units; None while the window is maximized."""
         if glfw.get_window_attrib(self.handle, glfw.MAXIMIZED):
             return None
         x, y = glfw.get_window_pos(self.handle)
@@ -65,11 +65,11 @@ class Window:
 
     @property
     def is_fullscreen(self) -> bool:
-        """Whether it fills the screen without frame and title."""
+        """Whether the window fills the screen without frame and title."""
         return bool(glfw.get_window_monitor(self.handle))
 
     def set_fullscreen(self, is_full: bool) -> None:
-        """Fill the screen that most of the window lies on, or go back to where it was before."""
+        """Fill the screen that most of the window lies on, or return to the place before."""
         if is_full == self.is_fullscreen:
             return
         if not is_full:
@@ -85,7 +85,7 @@ class Window:
 
     @property
     def is_hidden(self) -> bool:
-        """Whether it is minimised."""
+        """Whether the window is minimised."""
         return bool(glfw.get_window_attrib(self.handle, glfw.ICONIFIED))
 
     @property
@@ -95,12 +95,12 @@ class Window:
 
     @property
     def ui_scale(self) -> float:
-        """How much larger than usual text and widgets must be, in window units, to be readable on this display."""
+        """Scale of text and widgets, in window units, that this display asks for."""
         scale: float = glfw.get_window_content_scale(self.handle)[0]
         return max(scale / self.pixel_ratio, 1.0)
 
     def take_closing(self) -> bool:
-        """Whether the user wanted it closed since the last call."""
+        """Return whether the user asked to close the window since the last call."""
         wanted = bool(glfw.window_should_close(self.handle))
         glfw.set_window_should_close(self.handle, False)
         return wanted
@@ -110,13 +110,13 @@ class Window:
         glfw.set_window_title(self.handle, title)
 
     def poll(self, wait_s: float) -> None:
-        """Handle what has happened; with nothing to handle, sleep at most this long."""
+        """Handle events; without any, wait for one at most this long."""
         try:
             if wait_s > 0:
                 glfw.wait_events_timeout(wait_s)
             else:
                 glfw.poll_events()
-        except UnicodeDecodeError as error:  # what was dropped has a name that is not UTF-8: it is told as not found
+        except UnicodeDecodeError as error:  # a dropped name that is not UTF-8 is reported as not found
             self._dropped.append(error.object.decode(errors="replace"))
         self._take_sizes()
 
@@ -125,37 +125,37 @@ class Window:
         self.framebuffer_size = ScreenSize(*glfw.get_framebuffer_size(self.handle))
 
     def on_drop(self, _: Any, paths: Any) -> None:
-        """GLFW calls this when files are dropped."""
+        """Take the paths of dropped files. GLFW calls this."""
         self._dropped.extend(paths)
 
     @property
     def pointer(self) -> tuple[float, float]:
-        """(x, y) of the pointer in window units; while files are dropped, where they are."""
+        """Pointer (x, y) in window units, also while files are dragged."""
         x, y = glfw.get_cursor_pos(self.handle)
         return float(x), float(y)
 
     def take_dropped(self) -> list[str]:
-        """Paths of the files dropped on the window since the last call."""
+        """Return the paths of the files dropped on the window since the last call."""
         dropped, self._dropped = self._dropped, []
         return dropped
 
     def clipboard_text(self) -> str:
-        """The text that the system's clipboard holds, "" without."""
+        """Return the text in the system's clipboard, "" without."""
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # that it holds something else, or nothing, is no news
+            warnings.simplefilter("ignore")  # it holds something else, or nothing
             text: Any = glfw.get_clipboard_string(self.handle)
         return (text or b"").decode(errors="replace")
 
     def show_frame(self) -> None:
-        """Put what was drawn on the screen."""
+        """Show what was drawn."""
         glfw.swap_buffers(self.handle)
 
     def hide(self) -> None:
-        """Take it off the screen."""
+        """Hide the window."""
         glfw.hide_window(self.handle)
 
     def close(self) -> None:
-        """Close the window and GLFW with it."""
+        """Close the window and GLFW."""
         glfw.destroy_window(self.handle)
         glfw.terminate()
         self.handle = None
@@ -165,12 +165,12 @@ class Window:
 
 
 def _words_of(warning: Warning | str) -> str:
-    """GLFW's warnings read "(65550) b'X11: ...'"; people want what is between the quotes."""
+    """Return what stands between the quotes of GLFW's warnings, "(65550) b'X11: ...'"."""
     return str(warning).partition(" b'")[2].rstrip("'") or str(warning)
 
 
 def _overlap(place: tuple[int, int, int, int], monitor: Any) -> int:
-    """Area of a place that lies on a monitor."""
+    """Return the area of a place that lies on a monitor."""
     (left, top), mode = glfw.get_monitor_pos(monitor), glfw.get_video_mode(monitor)
     across = min(place[0] + place[2], left + mode.size.width) - max(place[0], left)
     down = min(place[1] + place[3], top + mode.size.height) - max(place[1], top)
@@ -178,7 +178,7 @@ def _overlap(place: tuple[int, int, int, int], monitor: Any) -> int:
 
 
 def _is_on_a_screen(place: tuple[int, int, int, int]) -> bool:
-    """Whether the middle of the upper edge, where one grips it, can be seen."""
+    """Return whether the middle of the upper edge, where one drags a window, can be seen."""
     x, y = place[0] + place[2] // 2, place[1]
     areas = [glfw.get_monitor_workarea(monitor) for monitor in glfw.get_monitors()]
     return any(left <= x < left + width and top <= y < top + height for left, top, width, height in areas)
@@ -198,9 +198,10 @@ def _open(title: str, place: tuple[int, int, int, int] | None, is_maximized: boo
 
 
 def _size_within_screens(place: tuple[int, int, int, int] | None) -> tuple[int, int]:
-    """No larger than the largest screen: a window of absurd size takes all memory, or is refused."""
+    """Return the size of a new window: no larger than the largest screen, and large enough to be seen."""
     if place is None:
         return WINDOW_SIZE
     areas = [glfw.get_monitor_workarea(monitor) for monitor in glfw.get_monitors()] or [(0, 0, *WINDOW_SIZE)]
     widest, highest = (max(area[side] for area in areas) for side in (2, 3))
-    return min(place[2], max(widest, WINDOW_SIZE[0])), min(place[3], max(highest, WINDOW_SIZE[1]))
+    width, height = max(place[2], SMALLEST_SIZE[0]), max(place[3], SMALLEST_SIZE[1])
+    return min(width, max(widest, WINDOW_SIZE[0])), min(height, max(highest, WINDOW_SIZE[1]))

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from pathlib import PurePath
 
 from iibr_core.depth.editing.edits import BRUSH_TOOLS
 from iibr_core.exports.loops import LOOPS, LoopKind
@@ -244,12 +243,11 @@ def commands_matching(text: str, recent: tuple[Command, ...] = ()) -> tuple[Comm
 
 
 def recent_commands(state: AppState) -> tuple[Command, ...]:
-    """To open what was open before, the latest first; not what is open now."""
-    open_now = state.source.path if state.source is not None else None
-    others = [path for path in state.recent if path != open_now][:RECENT_SHOWN]
+    """Return commands that open recent files, the latest first."""
+    paths = opening.other_recent(state)[:RECENT_SHOWN]
     return tuple(
-        Command(f"Open {PurePath(path).name}", _always(do(opening.open_source, source_beside(state.source, path))))
-        for path in others
+        Command(f"Open {name}", _always(do(opening.open_source, source_beside(state.source, path))))
+        for path, name in zip(paths, opening.names_of(paths))
     )
 
 

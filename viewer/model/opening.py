@@ -5,7 +5,7 @@ Each request has a generation. Results of an earlier generation change nothing.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import PurePath
 
@@ -141,6 +141,20 @@ def restore_session(state: AppState, settings: SavedSettings) -> AppState:
 def with_recent(recent: tuple[str, ...], path: str) -> tuple[str, ...]:
     """Return the recent paths with this one first."""
     return (path, *(other for other in recent if other != path))[:MAX_RECENT]
+
+
+def other_recent(state: AppState) -> tuple[str, ...]:
+    """Return the recent paths other than the open one."""
+    return tuple(path for path in state.recent if state.source is None or path != state.source.path)
+
+
+def names_of(paths: Sequence[str]) -> list[str]:
+    """Return a short name for each path: its last part, with the folder if two are alike."""
+    parts = [path.replace("\\", "/").rstrip("/").split("/") for path in paths]
+    names = [part[-1] for part in parts]
+    return [
+        f"{name} ({part[-2]})" if names.count(name) > 1 and any(part[:-1]) else name for name, part in zip(names, parts)
+    ]
 
 
 def _begin_scene(state: AppState, old: Scene | None, scene: Scene) -> AppState:

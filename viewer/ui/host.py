@@ -1,7 +1,7 @@
 """The ImGui context with its native OpenGL backend, in a window or without one.
 
-A frame is built (`begin`, the panels, `end`) and drawn (`draw`) in two steps: `end` says what the frame looks like, so
-that the loop draws it only when it looks different.
+A frame is built (`begin`, the panels, `end`) and then drawn (`draw`). `end` returns a digest of the frame, so that the
+loop draws it only if it differs from the last one.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ from viewer.model.layout import Layout
 from viewer.ui.style import Look, apply_style, load_fonts
 
 DOUBLE_CLICK_S, SINGLE_CLICK_AFTER_S = 0.3, 0.2
-"""ImGui wants a single click to count as one only after a double click can come no more."""
+"""Longest time between the clicks of a double click, and time after it until a single click counts, in seconds."""
 
 
 class UiHost:
-    """Owns the ImGui context. The GL context must be current when it is made, drawn and released."""
+    """Owner of the ImGui context. The GL context must be current when it is made, drawn and released."""
 
     def __init__(self, look: Look, window: Any = None) -> None:
         self._context = imgui.create_context()
@@ -34,9 +34,9 @@ class UiHost:
         imgui.backends.opengl3_init("#version 330")
 
     def begin(self, layout: Layout, look: Look, behind_s: float = 0.0) -> None:
-        """Start a frame of this look. Without a window its size and time step come from here.
+        """Start a frame of this look. Without a window, its size and time step are set here.
 
-        behind_s: how late the last frames may have heard of a click: a double click may take that much longer.
+        behind_s: delay of the last frames, which a double click may take longer.
         """
         if look != self._look:
             apply_style(look)
@@ -67,7 +67,7 @@ class UiHost:
         imgui.backends.opengl3_render_draw_data(imgui.get_draw_data())
 
     def release(self) -> None:
-        """Give everything back."""
+        """Free everything."""
         imgui.backends.opengl3_shutdown()
         if self._has_window:
             imgui.backends.glfw_shutdown()

@@ -1,6 +1,4 @@
-"""The panel at the right: what everybody needs of what is open; the rest in sections, one level down under "More", and
-for who studies light fields another one down, under "Advanced".
-"""
+"""The panel at the right: tools, the essentials of the open picture, and sections under "More" and "Advanced"."""
 
 from __future__ import annotations
 
@@ -11,7 +9,7 @@ from imgui_bundle import imgui
 
 from iibr_core.runtime.time_left import about_left
 from iibr_core.scenes.lens_limits import aperture_limit
-from iibr_core.scenes.scene import Progress, Scene, Source, source_beside
+from iibr_core.scenes.scene import Progress, Scene, source_beside
 from viewer.model import opening, preferences
 from viewer.model.action import Action, do
 from viewer.model.commands import BY_NAME
@@ -25,26 +23,26 @@ from viewer.ui.sections.inspect import inspect_section
 from viewer.ui.sections.lens_section import aperture_section, focus_section, light_section
 from viewer.ui.sections.scene_section import scene_section
 from viewer.ui.sections.view_section import view_section
-from viewer.ui.widgets import button, gap, heading, in_row, last_part, quiet, tooltip
+from viewer.ui.widgets import button, gap, heading, in_row, quiet, tooltip
 
 TOOLS = (
-    (icons.ICON_FA_IMAGE, "Open", "Open a photo…"),
-    (icons.ICON_FA_FLOPPY_DISK, "Save", "Save the picture…"),
-    (icons.ICON_FA_SHARE_NODES, "Share", "Share or export…"),
+    (f"{icons.ICON_FA_IMAGE}  Open", "Open a photo…"),
+    (f"{icons.ICON_FA_FLOPPY_DISK}  Save", "Save the picture…"),
+    (f"{icons.ICON_FA_SHARE_NODES}  Share", "Share or export…"),
+    (f"{icons.ICON_FA_ROTATE_LEFT}  Undo", "Undo"),
+    (f"{icons.ICON_FA_ROTATE_RIGHT}  Redo", "Redo"),
+    (f"{icons.ICON_FA_CIRCLE_QUESTION}  Help", "Mouse and keys"),
 )
-"""Icon, word, and the command that it gives."""
-
-FURTHER_TOOLS = (
-    (icons.ICON_FA_FOLDER_OPEN, "Open a folder…"),
-    (icons.ICON_FA_ROTATE_LEFT, "Undo"),
-    (icons.ICON_FA_ROTATE_RIGHT, "Redo"),
-    (icons.ICON_FA_CIRCLE_HALF_STROKE, "Light or dark"),
-    (icons.ICON_FA_CIRCLE_QUESTION, "Mouse and keys"),
+"""Label of each tool, and the name of its command."""
+TOOLS_IN_ROW = 3
+MORE_TOOLS = (
+    (f"{icons.ICON_FA_FOLDER_OPEN}  Folder", "Open a folder…"),
+    (f"{icons.ICON_FA_CIRCLE_HALF_STROKE}  Theme", "Light or dark"),
 )
 READY = "Ready"
-HINT = "Drag the picture to look around it, click to focus. Ctrl+Z undoes, F1 shows all keys."
+HINT = "Drag the picture to look around it, click to focus."
+FLAT_HINT = "All of it is equally far away, so nothing moves."
 CANCEL_TIP = "Stop here: the picture stays as it is now, and moves less smoothly."
-FLAT_HINT = "All of it is equally far away, so nothing moves. Ctrl+Z undoes, F1 shows all keys."
 _FIXED = (
     imgui.WindowFlags_.no_title_bar
     | imgui.WindowFlags_.no_resize
@@ -57,29 +55,25 @@ _FIXED = (
 
 
 def panel(state: AppState, layout: Layout) -> list[Action]:
-    """Build the panel; what the user changed comes back as actions."""
+    """Build the panel; return what the user changed."""
     rect = layout.panel
     if not rect.width:
         return []
     imgui.set_next_window_pos(imgui.ImVec2(rect.x, rect.y))
     imgui.set_next_window_size(imgui.ImVec2(rect.width, rect.height))
     imgui.begin("panel", None, _FIXED)
-    actions = _tools(state, layout)
-    if state.scene is None:
-        is_reading = bool(progress_text(state.progress))
-        actions += _progress(state, layout) if is_reading else _nothing_open(state, layout)
-    else:
+    actions = _tools(TOOLS, state, layout)
+    if state.scene is not None:
         actions += _picture(state, state.scene, layout)
+    elif progress_text(state.progress):
+        actions += _progress(state, layout)
+    else:
+        actions += _tools(MORE_TOOLS, state, layout) + _recent(state, layout)
     imgui.end()
     return actions
 
 
-def _nothing_open(state: AppState, layout: Layout) -> list[Action]:
-    return _further_tools(state, layout) + _recent(state.recent, state.source, layout)
-
-
 def _picture(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
-    """What is open, how far the work is, what everybody needs, and the sections."""
     gap(layout, 2)
     imgui.text_wrapped(scene.name)
     depth_line(scene, layout)
@@ -95,8 +89,8 @@ def _picture(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
 
 
 def progress_text(progress: Progress) -> str:
-    """Return the progress in one short line: "23 of 81 views, about 3 s left", "81 of 81 views, 5 s" at the end; empty
-    if nothing was asked for.
+    """Return the progress in a line: "23 of 81 views, about 3 s left", at the end "81 of 81 views, 5 s"; "" if nothing
+    was asked for.
     """
     counted = f"{progress.done} of {view_count_text(progress.total)}" if progress.total else ""
     words = progress.doing or counted
@@ -106,59 +100,39 @@ def progress_text(progress: Progress) -> str:
 
 
 def report_text(report: DrawReport, has_all_views: bool) -> str:
-    """Say how long drawing took, and whether the picture becomes better: "Drawn in 12 ms, refining". It is final only
-    where has_all_views.
-    """
+    """Return how long drawing took, and whether the picture is final: "Drawn in 12 ms, refining"."""
     words = f"Drawn in {report.draw_ms:.0f} ms"
-    if report.samples >= report.samples_converged:
-        return f"{words}, final" if has_all_views else words
-    return f"{words}, refining"
+    if report.samples < report.samples_converged:
+        return f"{words}, refining"
+    return f"{words}, final" if has_all_views else words
 
 
 def time_text(seconds: float) -> str:
-    """Seconds for people: "0.2 s", "12 s", "3 min"."""
+    """Return a duration for people: "0.2 s", "12 s", "3 min"."""
     if seconds >= 100:
         return f"{seconds / 60:.0f} min"
     return f"{seconds:.0f} s" if seconds >= 1 else f"{seconds:.1f} s"
 
 
 def view_count_text(number: int) -> str:
-    """A number of views in words: "1 view", "81 views"."""
+    """Return a number of views in words: "1 view", "81 views"."""
     return f"{number} view" if number == 1 else f"{number} views"
 
 
-def state_text(progress: Progress) -> str:
-    """The same where the panel's first lines say it: there it is enough to know when all is done."""
-    return READY if progress.is_complete else progress_text(progress)
-
-
 def size_text(scene: Scene) -> str:
-    """Return size and views in words: "600 × 400 px, 9 × 9 views"."""
-    return f"{scene.width} × {scene.height} px, {scene.grid.rows} × {scene.grid.columns} views"
+    """Return size and views in words: "600 x 400 px, 9 x 9 views"."""
+    return f"{scene.width} x {scene.height} px, {scene.grid.rows} x {scene.grid.columns} views"
 
 
-def _tools(state: AppState, layout: Layout) -> list[Action]:
-    """A row of commands by icon and word; what cannot be done now is grey."""
+def _tools(tools: tuple[tuple[str, str], ...], state: AppState, layout: Layout) -> list[Action]:
+    """Build rows of buttons for commands; a command that cannot be used now is grey."""
     actions: list[Action] = []
-    for (icon, word, name), width in in_row(TOOLS, layout):
-        if _tool(f"{icon}  {word}##{name}", name, state, layout, width):
+    for (words, name), width in in_row(tools, layout, min(len(tools), TOOLS_IN_ROW)):
+        chords = BY_NAME[name].chords
+        tip = name.rstrip("…") + (f" ({chords[0].words})" if chords else "")
+        if button(f"{words}##{name}", layout, tip, _is_possible(name, state), width):
             actions.append(BY_NAME[name].action(state))
     return actions
-
-
-def _further_tools(state: AppState, layout: Layout) -> list[Action]:
-    """The same of those that fewer people look for, by icon alone."""
-    actions: list[Action] = []
-    for (icon, name), width in in_row(FURTHER_TOOLS, layout):
-        if _tool(f"{icon}##{name}", name, state, layout, width):
-            actions.append(BY_NAME[name].action(state))
-    return actions
-
-
-def _tool(words: str, name: str, state: AppState, layout: Layout, width: float) -> bool:
-    chords = BY_NAME[name].chords
-    tip = name.rstrip("…") + (f" ({chords[0].words})" if chords else "")
-    return button(words, layout, tip, _is_possible(name, state), width)
 
 
 def _is_possible(name: str, state: AppState) -> bool:
@@ -171,75 +145,63 @@ def _is_possible(name: str, state: AppState) -> bool:
     return needs.get(name, True)
 
 
-def _recent(paths: tuple[str, ...], source: Source | None, layout: Layout) -> list[Action]:
+def _recent(state: AppState, layout: Layout) -> list[Action]:
+    """List the recent files other than the open one."""
+    paths = opening.other_recent(state)
     actions: list[Action] = []
     if paths:
         quiet("Recent")
-    for path in paths:
-        is_chosen, _ = imgui.selectable(f"{last_part(path)}##{path}", False)
+    for path, name in zip(paths, opening.names_of(paths)):
+        is_chosen, _ = imgui.selectable(f"{name}##{path}", False)
         tooltip(path, layout)
         if is_chosen:
-            actions.append(do(opening.open_source, source_beside(source, path)))
+            actions.append(do(opening.open_source, source_beside(state.source, path)))
     return actions
 
 
 def _progress(state: AppState, layout: Layout) -> list[Action]:
-    """A bar that stays when the work is done, so that nothing below it jumps; a button stops the work."""
+    """Build a bar, which stays when the work is done so that nothing below it jumps, and a button to stop the work."""
     progress = state.progress
-    words = state_text(progress)
+    words = READY if progress.is_complete else progress_text(progress)
     if not words:
         return []
-    actions: list[Action] = []
     imgui.progress_bar(progress.share, imgui.ImVec2(-1, 4 * layout.ui_scale), "")
-    is_working = not progress.is_complete and state.stopped != state.generation
-    if is_working:
-        if _words_and_button(words, "Cancel", CANCEL_TIP, layout):
-            actions.append(do(opening.stop))
-    else:
+    if progress.is_complete or state.stopped == state.generation:
         quiet(words)
-    return actions
+        return []
+    return [do(opening.stop)] if _words_and_button(words, "Cancel", CANCEL_TIP, layout) else []
 
 
 def _words_and_button(words: str, text: str, tip: str, layout: Layout) -> bool:
-    """Quiet words, and a button at the right end of their first line; the words keep clear of it."""
+    """Build quiet words, and a button at the right end of their first line; the words keep clear of it."""
     start, padding = imgui.get_cursor_pos_x(), 2 * imgui.get_style().frame_padding.x
     room = imgui.get_content_region_avail().x - imgui.calc_text_size(text).x - padding
     imgui.set_cursor_pos_x(start + room)
-    pressed = imgui.small_button(text)
+    is_pressed = imgui.small_button(text)
     tooltip(tip, layout)
     imgui.same_line(start)
     imgui.push_text_wrap_pos(start + room - padding / 2)
     imgui.text_colored(imgui.get_style().color_(imgui.Col_.text_disabled), words)
     imgui.pop_text_wrap_pos()
-    return bool(pressed)
+    return bool(is_pressed)
 
 
 def _section(section: Section, state: AppState, scene: Scene, layout: Layout) -> list[Action]:
-    """A heading that opens and closes what is under it. Where there is one view, focus and aperture mean nothing."""
+    """Build a section's heading, and its content if it is open. A scene of one view has no lens to set."""
     sections = state.preferences.open_sections
     if section in PARENT_SECTION and not is_seen_open(PARENT_SECTION[section], sections):
         return []
     if section in ("focus", "aperture", "view") and not aperture_limit(scene.grid):
         return []
     is_open = section in sections
-    toggled: list[Action] = (
-        [do(preferences.toggle_section, section)] if heading(section.capitalize(), is_open, layout) else []
-    )
+    is_toggled = heading(section.capitalize(), is_open, layout)
+    toggled: list[Action] = [do(preferences.toggle_section, section)] if is_toggled else []
     return toggled + (BUILDERS[section](state, scene, layout) if is_open else [])
 
 
-def _recent_elsewhere(state: AppState, layout: Layout) -> list[Action]:
-    """Recent files other than the one that is open."""
-    others = tuple(path for path in state.recent if state.source is None or path != state.source.path)
-    if not others:
-        return []
-    gap(layout, 2)
-    return _recent(others, state.source, layout)
-
-
 def _more(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
-    """Before the sections that lie in it: further tools and what else was open lately."""
-    return _further_tools(state, layout) + _recent_elsewhere(state, layout)
+    """Build what stands before the sections under "More": tools and recent files."""
+    return _tools(MORE_TOOLS, state, layout) + _recent(state, layout)
 
 
 def _is_final(state: AppState) -> bool:
@@ -249,7 +211,7 @@ def _is_final(state: AppState) -> bool:
 
 
 def _figures(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
-    """How the views are made and drawn, before what else is known of the scene."""
+    """Build how the views are made and drawn, and what else is known of the scene."""
     quiet(size_text(scene))
     quiet(progress_text(state.progress) or "No views asked for.")
     quiet("" if state.report is None else report_text(state.report, _is_final(state)))
@@ -269,4 +231,4 @@ BUILDERS: dict[Section, Callable[[AppState, Scene, Layout], list[Action]]] = {
     "inspect": inspect_section,
     "scene": _figures,
 }
-"""What each section shows before those that lie in it."""
+"""Functions that build what each section shows before the sections in it."""

@@ -1,4 +1,4 @@
-"""How the panels look: fonts, spacing, and one accent colour on grey, dark or light."""
+"""Style of the panels: fonts, spacing, and one accent colour on grey, dark or light."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Color = tuple[float, float, float, float]
 
 @dataclass(frozen=True)
 class Palette:
-    """Colours of a theme, sRGB. background: around the picture. warning: what is inpainted rather than stored."""
+    """Colours of a theme, sRGB. background: around the picture. warning: for inpainted content."""
 
     background: Color
     panel: Color
@@ -63,29 +63,29 @@ LIGHT = Palette(
 
 @dataclass(frozen=True)
 class Look:
-    """What decides the style. ui_scale multiplies every length (HiDPI, font scale)."""
+    """Scale of every length (HiDPI, font scale), and the theme."""
 
     ui_scale: float = 1.0
     theme: Theme = "dark"
 
 
 def palette_of(theme: Theme) -> Palette:
-    """The colours of a theme."""
+    """Return the colours of a theme."""
     return LIGHT if theme == "light" else DARK
 
 
 def pack_color(color: Color, alpha: float = 1.0) -> int:
-    """A colour for draw lists."""
+    """Return a colour for draw lists."""
     return int(imgui.get_color_u32(imgui.ImVec4(color[0], color[1], color[2], color[3] * alpha)))
 
 
 def corners(rect: Rect) -> tuple[imgui.ImVec2, imgui.ImVec2]:
-    """The upper left and the lower right one."""
+    """Return the upper left and the lower right corner."""
     return imgui.ImVec2(rect.x, rect.y), imgui.ImVec2(rect.x + rect.width, rect.y + rect.height)
 
 
 def load_fonts() -> None:
-    """Give ImGui a readable sans serif with icons; its own bitmap font stays where the bundle comes without one."""
+    """Load the fonts of text and icons; ImGui's bitmap font stays if the bundle lacks them."""
     folder = Path(imgui_bundle.__file__).parent / "assets" / "fonts"
     font, icons = folder / "Roboto" / "Roboto-Regular.ttf", folder / "Font_Awesome_6_Free-Solid-900.otf"
     fonts = imgui.get_io().fonts
@@ -129,14 +129,14 @@ def _colors(palette: Palette) -> dict[int, Color]:
         c.frame_bg_hovered: palette.frame_hovered,
         c.frame_bg_active: palette.frame_hovered,
         c.check_mark: palette.accent,
-        c.slider_grab: clear,  # `widgets.slider` draws its own, below the value
+        c.slider_grab: clear,  # `widgets.slider` draws a grip below the value
         c.slider_grab_active: clear,
         c.plot_histogram: palette.accent,
         c.button: palette.frame,
         c.button_hovered: palette.frame_hovered,
         c.button_active: palette.accent_dim,
         c.header: palette.selected,
-        c.header_hovered: palette.accent_dim,  # lists lie on the frame's colour: another must say where the pointer is
+        c.header_hovered: palette.accent_dim,  # differs from the frame's colour, on which lists lie
         c.header_active: palette.accent_dim,
         c.separator: palette.frame,
         c.scrollbar_bg: clear,

@@ -196,7 +196,7 @@ def test_what_was_chosen_is_there_again_the_next_time(open_window: Opener, photo
     kept = tmp_path / "kept"
     first = open_window(photo_path, kept_in=kept, grid=GridShape(1, 1))
     first.until_idle()
-    first.press("section More")
+    first.press("###section More")
     first.until(lambda app: "more" in app.state.preferences.open_sections)
     first.until_idle()
     preferences = first.app.state.preferences

@@ -49,6 +49,18 @@ def test_steps_open_the_next_photo_with_what_was_decided_and_end_at_the_ends() -
     assert open_name(reduce(state, do(folder.step, -9))) == "img_9.jpg"
 
 
+def test_a_click_on_the_open_thumbnail_changes_nothing() -> None:
+    state = state_at("IMG_10.jpg")
+    assert reduce(state, do(folder.step, 0)) is state
+
+
+def test_the_filmstrip_of_another_folder_goes() -> None:
+    state = reduce(state_at("img_9.jpg"), do(opening.open_source, Source("/other/a.jpg")))
+    assert state.folder is not None, "until the other photo is there"
+    state = reduce(state, do(opening.show_scene, state.generation, scene_of(source=state.source)))
+    assert state.folder is None
+
+
 def test_steps_do_nothing_where_no_photo_of_the_folder_is_open() -> None:
     elsewhere = replace(state_at("img_9.jpg"), source=Source("/other/img_9.jpg"))
     for state in (AppState(), elsewhere, state_at("gone.jpg")):

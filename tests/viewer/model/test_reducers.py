@@ -150,6 +150,11 @@ def test_recent_files_are_listed_once_the_latest_first() -> None:
     assert state.recent == ("a.png", "b.png")
 
 
+def test_recent_files_of_one_name_are_told_apart_by_their_folders() -> None:
+    paths = ("/a/x/boxes", "C:\\photos\\tree.jpg", "/a/y/boxes/", "/boxes")
+    assert opening.names_of(paths) == ["boxes (x)", "tree.jpg", "boxes (y)", "boxes"]
+
+
 @pytest.mark.parametrize(
     ("action", "draws", "restarts"),
     [

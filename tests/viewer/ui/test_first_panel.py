@@ -22,7 +22,7 @@ from viewer.model.state.preferences import PARENT_SECTION, SECTIONS, Preferences
 from viewer.ui.sections.essentials import MOVE_TIPS, PRESET_TIPS
 
 WINDOW = ScreenSize(1280, 800)
-MOST_CONTROLS = 14
+MAX_CONTROLS = 17
 CONTROLS = (
     "button", "small_button", "invisible_button", "checkbox", "radio_button", "slider_float", "slider_int",
     "begin_combo", "selectable", "input_int", "input_float", "input_text_with_hint", "color_edit3",
@@ -62,25 +62,25 @@ def test_there_are_few_controls_at_the_first_start(
     if is_working:
         first.state = replace(first.state, progress=Progress(4, 9, 0.3))
     first.screen(WINDOW)
-    assert "section More" in controls
-    assert len(controls) <= MOST_CONTROLS, controls
+    assert any("section More" in words for words in controls)
+    assert len(controls) <= MAX_CONTROLS, controls
     assert ("Cancel" in controls) is is_working
 
 
 def test_an_empty_window_has_few_too(first: OffscreenScene, controls: list[str]) -> None:
     first.state = AppState()
     first.screen(WINDOW)
-    assert 0 < len(controls) <= MOST_CONTROLS
+    assert 0 < len(controls) <= MAX_CONTROLS
 
 
 def test_more_brings_headings_and_advanced_two_more(first: OffscreenScene, controls: list[str]) -> None:
     first.do(do(preferences.toggle_section, "more"))
     first.screen(WINDOW)
-    headings = [words.removeprefix("section ") for words in controls if words.startswith("section ")]
+    headings = [words.partition("###section ")[2] for words in controls if "###section " in words]
     assert headings == ["More", "View", "Focus", "Aperture", "Light", "Gloss", "Depth", "Advanced"]
     first.do(do(preferences.toggle_section, "advanced"))
     first.screen(WINDOW)
-    assert {"section Inspect", "section Scene"} <= set(controls)
+    assert {"Inspect", "Scene"} <= {words.partition("###section ")[2] for words in controls}
 
 
 @pytest.mark.parametrize("section", SECTIONS)

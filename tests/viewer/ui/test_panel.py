@@ -42,5 +42,5 @@ def test_a_picture_is_final_only_with_all_views_as_they_stay() -> None:
 
 def test_the_size_in_words() -> None:
     assert size_text(Scene(Source("a.png"), "a", 60, 40, GridShape(3, 9), (-2.0, 3.0), "a.pfm")) == (
-        "60 × 40 px, 3 × 9 views"
+        "60 x 40 px, 3 x 9 views"
     )

@@ -1,6 +1,4 @@
-"""Chips in the picture's upper corners: what it is drawn from, where that is not the photo and its true depth. And the
-handle at the window's right edge that brings a panel back that has folded away.
-"""
+"""Chips in the picture's corners (free camera, guessed depth), and the handle that shows a hidden panel."""
 
 from __future__ import annotations
 
@@ -15,18 +13,18 @@ from viewer.ui.overlays.prompt_rows import CARD_FLAGS
 from viewer.ui.style import DARK
 from viewer.ui.widgets import tooltip
 
-CHIP, BADGE = "free camera", "guess"
-FULL, SHORT = "Free camera: more is missing from the photo here. C goes back", "Free camera. C goes back"
-AT_END = "The photo shows nothing beyond this. C goes back"
-GUESS_TIP = "Depth is guessed: near and far may be wrong. Press to see how to get true depth."
+CHIP, BADGE = "free camera", "Depth guessed"
+FULL, SHORT = "Free camera: parts are synthesized here. C returns", "Free camera. C returns"
+AT_END = "The photo shows nothing beyond this. C returns"
+GUESS_TIP = "Depth is guessed, so near and far may be wrong. Press to get better depth."
 GAP = 8.0
 HANDLE, HANDLE_SIZE = "panel handle", (22.0, 56.0)
 _BARE = CARD_FLAGS | imgui.WindowFlags_.no_decoration | imgui.WindowFlags_.no_background
 
 
 def chips(state: AppState, layout: Layout) -> list[Action]:
-    """The free camera's in the right corner, which goes back when pressed; a guess's in the left one, which offers true
-    depth again.
+    """Build the free camera's chip at the right, which leaves it, and that of guessed depth at the left, which offers
+    better depth.
     """
     frame, scene = layout.frame, state.scene
     if frame is None or scene is None or state.inspection.shows_views or state.shows_before:
@@ -45,7 +43,7 @@ def chips(state: AppState, layout: Layout) -> list[Action]:
 
 
 def panel_handle(state: AppState, layout: Layout) -> list[Action]:
-    """Where the panel is hidden, or takes the place of half the picture: it comes back, or goes."""
+    """Build the handle that shows and hides the panel where it covers much of the picture."""
     if not (state.is_panel_hidden or state.is_narrow):
         return []
     imgui.set_next_window_pos(imgui.ImVec2(layout.panel.x, layout.window.height / 2), 0, imgui.ImVec2(1, 0.5))
@@ -61,7 +59,7 @@ def panel_handle(state: AppState, layout: Layout) -> list[Action]:
 
 
 def _chip(name: str, words: str, layout: Layout, tip: str = "", is_right: bool = False) -> bool:
-    """Whether it was pressed. Its colours are those of overlays: below is a photo, whatever the theme."""
+    """Build a chip in colours that are legible over any photo; return whether it was pressed."""
     frame, gap = layout.frame, GAP * layout.ui_scale
     assert frame is not None
     x = frame.x + frame.width - gap if is_right else frame.x + gap

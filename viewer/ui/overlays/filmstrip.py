@@ -14,6 +14,7 @@ from viewer.model.layout import Layout
 from viewer.model.state.app_state import AppState
 from viewer.model.state.folder import Thumbnail
 from viewer.ui.style import corners, pack_color, palette_of
+from viewer.ui.widgets import tooltip
 
 CELL_ASPECT = 1.5
 GAP = 6.0
@@ -103,6 +104,5 @@ def _photo(cell: Rect, name: str, thumbnail: Thumbnail | None, is_open: bool, st
     if is_open or is_hovered:
         color = pack_color(palette.accent if is_open else palette.quiet)
         draw.add_rect(corner, far, color, 3 * scale, (3 if is_open else 1.5) * scale)
-    if is_hovered:
-        imgui.set_tooltip(name)
+    tooltip(name, layout)
     return bool(is_pressed)

@@ -1,4 +1,4 @@
-"""What an empty window says: drop a photo, open one, or see the demo."""
+"""The card in an empty window: drop a photo, open one, or see the demo."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from viewer.ui.widgets import gap, quiet
 
 WIDTH = 300.0
 OFFERS = ("Open a photo…", "See the demo")
-"""Commands."""
+"""Names of the commands that the card offers."""
 
 
 def welcome(state: AppState, layout: Layout) -> list[Action]:
-    """Build it where the picture will be, as long as nothing is open or being read and no question is asked."""
+    """Build the card where the picture will be, while nothing is open or being read and no prompt is shown."""
     if state.scene is not None or progress_text(state.progress) or state.prompt is not None:
         return []
     width = min(WIDTH * layout.ui_scale, layout.window.width)
@@ -27,7 +27,7 @@ def welcome(state: AppState, layout: Layout) -> list[Action]:
     imgui.set_next_window_size(imgui.ImVec2(width, 0))
     imgui.begin("welcome", None, CARD_FLAGS)
     imgui.text_wrapped("Drop a photo here")
-    quiet("or a folder: of photos, or of the views of a light field.")
+    quiet("or a folder of photos, or a light field.")
     gap(layout, 2)
     actions = button_rows([(name, BY_NAME[name].action(state)) for name in OFFERS])
     imgui.end()
