@@ -1,4 +1,4 @@
-"""Animations: the viewpoint on a loop, the focus or the aperture going back and forth, or a camera path from a file.
+"""Animations: the viewpoint on a loop, focus or aperture going back and forth, or a camera path from a file.
 
 Every path is closed: the last frame leads to the first.
 """
@@ -12,8 +12,8 @@ import numpy as np
 
 from iibr_core.beyond.optics import Optics
 from iibr_core.exports.framing import draw_framed
-from iibr_core.exports.kinds import AnimationKind, ExportOptions
-from iibr_core.exports.loops import point_on_loop
+from iibr_core.exports.kinds import ExportOptions
+from iibr_core.exports.loops import point_on_loop, rack_share
 from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.exports.source import ExportSource
 from iibr_core.exports.stack import open_diameter
@@ -38,7 +38,7 @@ def optics_on_path(scene: Scene, optics: Optics, options: ExportOptions) -> list
     """Return the optics of every frame, evenly spread over a closed path."""
     turns = [k / options.frames for k in range(options.frames)]
     if options.keys is None:
-        return [_on_motion(scene, optics, options.motion, turn) for turn in turns]
+        return [_on_motion(scene, optics, options, turn) for turn in turns]
     keys = read_keys(options.keys)
     if any(not _is_within(scene, _between(keys, k / len(keys), optics)) for k in range(len(keys))):
         raise InputError(f"{options.keys}: a key lies beyond what {scene.name} has; take smaller numbers")
@@ -88,13 +88,17 @@ def _is_within(scene: Scene, optics: Optics) -> bool:
     return np.allclose(wanted, allowed, atol=1e-6)
 
 
-def _on_motion(scene: Scene, optics: Optics, motion: AnimationKind, turn: float) -> Optics:
+def _on_motion(scene: Scene, optics: Optics, options: ExportOptions, turn: float) -> Optics:
     wave = (1 - math.cos(2 * math.pi * turn)) / 2
     diameter = open_diameter(scene, optics)
-    match motion:
+    far, near = scene.disparity_range_px
+    match options.motion:
+        case "rack":
+            start, end = options.rack or (near, far)
+            focus = start + rack_share(turn) * (end - start)
+            return clamp_optics(replace(optics, focus_disparity=focus, aperture_diameter=diameter), scene)
         case "focus":
-            far, near = scene.disparity_range_px
             return replace(optics, focus_disparity=near + wave * (far - near), aperture_diameter=diameter)
         case "aperture":
             return replace(optics, aperture_diameter=wave * diameter)
-    return replace(optics, eye=point_on_loop(motion, turn, scene.grid))
+    return replace(optics, eye=point_on_loop(options.motion, turn, scene.grid))

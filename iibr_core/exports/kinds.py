@@ -19,9 +19,10 @@ from iibr_core.scenes.scene import Scene
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import ImageSize, InputError
 
-AnimationKind = Literal["circle", "eight", "swing", "focus", "aperture"]
-ANIMATIONS: tuple[AnimationKind, ...] = ("circle", "eight", "swing", "focus", "aperture")
-"""Motions of an animation: the viewpoint on a loop, the focus from near to far and back, or the aperture."""
+AnimationKind = Literal["circle", "eight", "swing", "focus", "rack", "aperture"]
+ANIMATIONS: tuple[AnimationKind, ...] = ("circle", "eight", "swing", "focus", "rack", "aperture")
+"""Motions of an animation: the viewpoint on a loop, the focus from near to far and back, the focus from one surface to
+another and back, or the aperture."""
 DepthLayout = Literal["right", "left", "below"]
 DEPTH_LAYOUTS: tuple[DepthLayout, ...] = ("right", "left", "below")
 """Places of the depth map beside its picture."""
@@ -43,12 +44,13 @@ class ExportOptions:
     which `with_defaults` fills in.
 
     size: (width, height) of each picture in pixels. device: name of a display in `DEVICES`, None for any. eyes: view
-    steps from the first viewpoint to the last. keys: file with a camera path, which replaces the motion. frames: number
-    of frames of an animation or pictures of a stack. rate: frames a second. row: row of an epipolar plane image.
-    show: whether a quilt is shown on a display. budget: maximum size of a web page in bytes, None for no limit.
-    credit: whether the page names the photo's title, author and rights. stills: whether the page stores each view as a
-    file, for browsers that cannot decode frames of moving pictures. layout: place of the depth map beside its picture.
-    bits: bits a channel of the pictures of a stack.
+    steps from the first viewpoint to the last. keys: file with a camera path, which replaces the motion. rack: the two
+    focus disparities (px per view step) of the motion "rack", None for the nearest and the farthest. frames: number of
+    frames of an animation or pictures of a stack. rate: frames a second. row: row of an epipolar plane image. show:
+    whether a quilt is shown on a display. budget: maximum size of a web page in bytes, None for no limit. credit:
+    whether the page names the photo's title, author and rights. stills: whether the page stores each view as a file,
+    for browsers that cannot decode frames of moving pictures. layout: place of the depth map beside its picture. bits:
+    bits a channel of the pictures of a stack.
     """
 
     size: ScreenSize = DEFAULT_SIZE
@@ -56,6 +58,7 @@ class ExportOptions:
     eyes: float = -1.0
     motion: AnimationKind = "circle"
     keys: Path | None = None
+    rack: tuple[float, float] | None = None
     frames: int = 0
     rate: float = 0.0
     row: int = -1
@@ -125,7 +128,7 @@ def _stereo(words: str, variant: str, path: str = "stereo:stereo_path") -> Expor
 
 
 def _animation(words: str, ending: str, rate: float, max_width_px: int = 0, needs: tuple[str, ...] = ()) -> ExportKind:
-    supports = ("view", "focus", "aperture", "size", "motion", "keys", "frames", "rate")
+    supports = ("view", "focus", "aperture", "size", "motion", "rack", "keys", "frames", "rate")
     return ExportKind(
         words, (ending,), "animation:write_motion", supports,
         optics="animation:optics_on_path", needs=needs, rate=rate, max_width_px=max_width_px,

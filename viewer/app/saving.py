@@ -35,6 +35,7 @@ from viewer.model.state.jobs import WRITING
 from viewer.model.state.notices import Notice
 from viewer.model.state.prompts import ExportPrompt
 from viewer.model.state.tasks import ExportTask, SaveTask
+from viewer.model.viewpoint import clicked_rack
 
 OPEN_PHOTO = "This is the open photo. Choose another name."
 NO_MAP = "a light field has no depth map to save"
@@ -132,6 +133,7 @@ def add_export(task: ExportTask, state: AppState, inputs: Sequence[Path], jobs: 
         return [do(messages.show_prompt, replace(prompt, already_there=True, problem=""))]
     except InputError as error:
         return [do(messages.show_prompt, replace(prompt, already_there=False, problem=words_of(error)))]
+    prompt = replace(prompt, options=replace(prompt.options, rack=clicked_rack(state)))
     work, pictures = partial(_export, kind, path, prompt), partial(optics_of, kind, prompt.options)
     jobs.add(Job("export", path, state, work, pictures=pictures, prompt=prompt))
     return [do(saving.begin_job, Path(os.path.abspath(path)), prompt)]

@@ -135,6 +135,12 @@ class KindOptions:
             parser=motion_from_text, metavar="|".join(ANIMATIONS), help="Motion of an animation.", show_default="circle"
         ),
     ] = None
+    rack: Annotated[
+        tuple[float, float] | None,
+        typer.Option(
+            metavar="FROM TO", help="Focus disparities of the motion rack.", show_default="the nearest and the farthest"
+        ),
+    ] = None
     frames: Annotated[
         int | None,
         typer.Option(

@@ -171,6 +171,7 @@ COMMANDS: tuple[Command, ...] = (
         "Motion: pause or resume", lambda state: do(viewpoint.pause, not state.motion.is_paused), (Chord("space"),)
     ),
     Command("Motion: stop", _always(do(viewpoint.set_loop, None))),
+    Command("Rack focus", _always(do(viewpoint.rack_focus)), (Chord("x"),)),
     Command("Step forward", _always(do(viewpoint.move_camera, forward=CAMERA_STEP)), (Chord("w"),), repeats=True),
     Command("Step back", _always(do(viewpoint.move_camera, forward=-CAMERA_STEP)), (Chord("s"),), repeats=True),
     Command("Look up", _always(do(viewpoint.move_camera, down=-CAMERA_STEP)), (Chord("w", shift=True),), repeats=True),

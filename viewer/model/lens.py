@@ -52,6 +52,11 @@ def _still(state: AppState) -> AppState:
     return replace(state, motion=Motion(speed=state.motion.speed))
 
 
+def _without_rack(state: AppState) -> AppState:
+    """Return the state without a motion of the focus."""
+    return _still(state) if state.motion.kind == "rack" else state
+
+
 # Viewpoint
 
 
@@ -72,7 +77,8 @@ def reset(state: AppState) -> AppState:
     """Reset viewpoint, focus, aperture and light; gloss stays."""
     if state.scene is None:
         return state
-    state = replace(_still(state), free_camera=None, tilt_handles=None, has_chosen_aperture=False, chosen_focus=None)
+    state = replace(_still(state), free_camera=None, tilt_handles=None, has_chosen_aperture=False)
+    state = replace(state, chosen_focus=None, focus_before=None)
     return _edited(state, state.scene, Optics(gloss=state.optics.gloss)) if state.scene else state
 
 
@@ -83,21 +89,18 @@ def set_focus(state: AppState, disparity: float) -> AppState:
     """Focus on a field disparity (px per view step) in the middle of the picture."""
     if state.scene is None:
         return state
-    focused = _edited(state, state.scene, replace(state.optics, focus_disparity=disparity))
-    if focused is state:
-        return state
+    focused = _edited(_without_rack(state), state.scene, replace(state.optics, focus_disparity=disparity))
     focused = replace(focused, chosen_focus=focused.optics.focus_disparity, focused_at=None)
     return record_edit(state, _opened(focused, state.scene), "set_focus")
 
 
 def focus_on(state: AppState, place: focal_plane.Place, disparity: float) -> AppState:
     """Focus on what was clicked at a place (-1..1, see `focal_plane`), with its disparity."""
-    if state.scene is None:
+    if state.scene is None or not all(map(math.isfinite, (*place, disparity))):
         return state
-    focused = _edited(state, state.scene, focal_plane.focus_on(state.optics, place, disparity))
-    if focused is state:
-        return state
-    focused = replace(focused, chosen_focus=disparity, focused_at=place)
+    focused = _edited(_without_rack(state), state.scene, focal_plane.focus_on(state.optics, place, disparity))
+    before = state.focus_before if disparity == state.chosen_focus else state.chosen_focus
+    focused = replace(focused, chosen_focus=disparity, focus_before=before, focused_at=place)
     # a click is recorded even if nothing changed: a double click takes it back
     return record_edit(state, _opened(focused, state.scene), "focus_on", always=True)
 

@@ -102,7 +102,8 @@ def show_scene(state: AppState, generation: int, scene: Scene, new_depth: NewDep
         shown_generation=state.generation,
         optics=carried(state.optics),
         history=map_optics(state.history, carried),
-        chosen_focus=_carried_focus(state, carried),
+        chosen_focus=_carried_focus(state.chosen_focus, state.optics, carried),
+        focus_before=_carried_focus(state.focus_before, state.optics, carried),
         inspection=replace(state.inspection, probe=None),
     )
     if old is None or not is_same:
@@ -179,6 +180,7 @@ def _begin_scene(state: AppState, old: Scene | None, scene: Scene) -> AppState:
         hover=None,
         zoom=None,
         chosen_focus=None,
+        focus_before=None,
         has_chosen_aperture=False,
         focused_at=None,
     )
@@ -211,11 +213,11 @@ def _with_settings(state: AppState, settings: SavedSettings) -> AppState:
     return replace(state, optics=optics, notices=notices, motion=Motion(speed=state.motion.speed))
 
 
-def _carried_focus(state: AppState, carried: Callable[[Optics], Optics]) -> float | None:
-    """Return the chosen focus in the disparity of the new scene."""
-    if state.chosen_focus is None:
+def _carried_focus(focus: float | None, optics: Optics, carried: Callable[[Optics], Optics]) -> float | None:
+    """Return a focus in the disparity of the new scene."""
+    if focus is None:
         return None
-    return carried(replace(state.optics, focus_disparity=state.chosen_focus, focus_tilt=(0.0, 0.0))).focus_disparity
+    return carried(replace(optics, focus_disparity=focus, focus_tilt=(0.0, 0.0))).focus_disparity
 
 
 def _with_steady_focus(state: AppState, old: Scene, scene: Scene) -> Scene:

@@ -6,7 +6,7 @@ import math
 from dataclasses import replace
 
 from iibr_core.beyond.optics import CENTRE, Optics
-from iibr_core.exports.loops import LoopKind, point_on_loop
+from iibr_core.exports.loops import LoopKind, ease, point_on_loop
 from iibr_core.scenes.lens_limits import clamp, clamp_optics
 from iibr_core.types import GridShape, ViewOffset
 from viewer.model.history import record_edit
@@ -20,10 +20,15 @@ HOME_S = 0.4
 """Duration of the glide to the middle, in seconds."""
 MAX_STEP_S = 0.1
 """Longest step of a motion, in seconds: after a delay it continues without a jump."""
+RACK_S = 1.6
+"""Duration of a focus rack in the window, in seconds."""
+DURATIONS_S: dict[MotionKind, float] = {"home": HOME_S, "rack": RACK_S}
+"""Durations of the motions that end."""
 EASE_IN_TURNS = 0.2
 """Part of a loop's first turn over which it leaves its starting viewpoint."""
 MIN_ZOOM = 1e-3
 """Smallest scale of a zoom."""
+TWO_CLICKS = "Click two things in the picture first: the focus then glides from one to the other (X)."
 PHOTOS_ONLY = "The free camera needs a photo: a light field holds only the views of its own plane."
 
 
@@ -33,6 +38,24 @@ def return_home(state: AppState, takes_back_click: bool = False) -> AppState:
         return state
     state = replace(_without_click(state) if takes_back_click else state, free_camera=None)
     return record_edit(state, replace(state, motion=_start(state, "home")), "return_home", always=True)
+
+
+def rack_focus(state: AppState) -> AppState:
+    """Let the focus glide from the last click but one to the last click."""
+    if state.scene is None:
+        return state
+    rack = clicked_rack(state)
+    if rack is None:
+        return notify(state, Notice(TWO_CLICKS))
+    motion = replace(_start(state, "rack"), rack=rack)
+    return record_edit(state, replace(state, motion=motion), "rack_focus", always=True)
+
+
+def clicked_rack(state: AppState) -> tuple[float, float] | None:
+    """Return the focus disparities of the last two clicks, None before them."""
+    if state.focus_before is None or state.chosen_focus is None:
+        return None
+    return state.focus_before, state.chosen_focus
 
 
 def set_loop(state: AppState, kind: LoopKind | None) -> AppState:
@@ -94,12 +117,6 @@ def set_zoom(state: AppState, zoom: Zoom | None) -> AppState:
     return replace(state, zoom=Zoom(max(zoom.scale, MIN_ZOOM), (x, y)))
 
 
-def ease(share: float) -> float:
-    """Map 0..1 to 0..1, slow at both ends."""
-    x = clamp(share, 0.0, 1.0)
-    return x * x * (3 - 2 * x)
-
-
 def _start(state: AppState, kind: MotionKind | None) -> Motion:
     return Motion(kind, start=state.optics.eye, start_dolly=state.optics.dolly, speed=state.motion.speed)
 
@@ -115,8 +132,13 @@ def _without_click(state: AppState) -> AppState:
 def _advance(motion: Motion, optics: Optics, grid: GridShape, now_s: float) -> tuple[Motion, Optics]:
     """Return motion and optics at a time on the clock. Glides end where they arrive."""
     step_s = 0.0 if motion.ticked_s is None else clamp(now_s - motion.ticked_s, 0.0, MAX_STEP_S)
-    turns = motion.turns + step_s * (1 / HOME_S if motion.kind == "home" else motion.speed)
+    duration_s = DURATIONS_S.get(motion.kind) if motion.kind is not None else None
+    turns = motion.turns + (step_s * motion.speed if duration_s is None else step_s / duration_s)
     motion = replace(motion, turns=turns, ticked_s=now_s)
+    if motion.kind == "rack":
+        start, end = motion.rack
+        focused = replace(optics, focus_disparity=start + ease(turns) * (end - start))
+        return replace(motion, kind=None) if turns >= 1 else motion, focused
     if motion.kind == "home":
         if turns >= 1:
             return replace(motion, kind=None), replace(optics, eye=CENTRE, dolly=0.0)

@@ -85,6 +85,17 @@ def test_paths_are_closed_and_move(source: ExportSource, motion: str) -> None:
     assert all(0 <= optics.aperture_diameter <= aperture_limit(source.scene.grid) for optics in path)
 
 
+def test_a_rack_rests_on_both_surfaces_and_glides_between_them(source: ExportSource) -> None:
+    far, near = source.scene.disparity_range_px
+    for rack, (start, end) in ((None, (near, far)), ((0.4, -0.1), (0.4, -0.1))):
+        path = path_of(source, motion="rack", rack=rack, frames=20)
+        shares = [(optics.focus_disparity - start) / (end - start) for optics in path]
+        assert shares == pytest.approx([*shares[:11], *shares[9:0:-1]], abs=1e-6), "there and back"
+        assert [shares[k] for k in (0, 2, 5, 8, 10)] == pytest.approx([0, 0, 0.5, 1, 1], abs=1e-6)
+        assert shares[3] == pytest.approx((1 / 6) ** 2 * (3 - 2 / 6), abs=1e-6)
+        assert min(optics.aperture_diameter for optics in path) > 0
+
+
 def test_a_path_goes_through_its_keys(source: ExportSource, tmp_path: Path) -> None:
     keys = tmp_path / "keys.txt"
     keys.write_text("\ufeff# s t focus aperture\n-1 0 0.5 1\n1, 0.5, -0.1, 2\n\n0 -1\n", "utf-8")

@@ -7,7 +7,7 @@ from dataclasses import replace
 from viewer.model.action import ask, do
 from viewer.model.history import undo, undoable
 from viewer.model.state.app_state import AppState
-from viewer.model.state.saving import CopyTask
+from viewer.model.state.depth_models import ListModelsTask
 
 
 @undoable
@@ -28,4 +28,4 @@ def test_steps_of_one_gesture_are_one_edit() -> None:
 
 
 def test_a_task_waits_in_the_state() -> None:
-    assert ask(ask(AppState(), CopyTask()), CopyTask()).tasks == (CopyTask(), CopyTask())
+    assert ask(ask(AppState(), ListModelsTask()), ListModelsTask()).tasks == (ListModelsTask(), ListModelsTask())

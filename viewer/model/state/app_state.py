@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 
 from iibr_core.beyond.optics import Optics
 from iibr_core.depth.editing.edits import Stroke
+from iibr_core.exports.loops import LOOPS
 from iibr_core.scenes.rect import WHOLE, Rect
 from iibr_core.scenes.scene import AS_FOUND, DepthSettings, Progress, Scene, Source
 from iibr_core.scenes.screen_size import ScreenSize
@@ -99,6 +100,7 @@ class AppState:
     last_export: ExportPrompt | None = None
     models: DepthModels = field(default_factory=DepthModels)
     chosen_focus: float | None = None
+    focus_before: float | None = None
     has_chosen_aperture: bool = False
     focused_at: tuple[float, float] | None = None
     has_dialogs: bool = False
@@ -114,7 +116,7 @@ class AppState:
     def at_rest(self) -> AppState:
         """The state that a viewpoint which moves by itself has left: what the user decided."""
         motion = self.motion
-        if motion.kind is None or motion.kind == "home" or motion.is_paused:
+        if motion.kind not in LOOPS or motion.is_paused:
             return self
         return replace(self, optics=replace(self.optics, eye=motion.start), motion=Motion(speed=motion.speed))
 

@@ -9,8 +9,8 @@ from iibr_core.beyond.optics import CENTRE
 from iibr_core.exports.loops import LoopKind
 from iibr_core.types import ViewOffset
 
-MotionKind = LoopKind | Literal["home"]
-"""home: a glide to the middle."""
+MotionKind = LoopKind | Literal["home", "rack"]
+"""home: a glide to the middle. rack: a glide of the focus from one surface to another."""
 
 MAX_ASIDE = 0.3
 """Largest turn of the free camera to each side, in halves of the picture: 15 % of the view lies beyond the photo."""
@@ -22,8 +22,9 @@ FORWARD_LIMITS = -0.1, 0.6
 class Motion:
     """A viewpoint that moves by itself.
 
-    kind: None at rest. turns: progress on the path since it began at the viewpoint `start` (and its dolly). ticked_s:
-    clock at the last step, None before the first. speed: turns per second; it and is_paused outlast a change of kind.
+    kind: None at rest. turns: progress on the path since it began at the viewpoint `start` (and its dolly). rack: first
+    and last focus disparity of a rack. ticked_s: clock at the last step, None before the first. speed: turns per
+    second; it and is_paused outlast a change of kind.
     """
 
     kind: MotionKind | None = None
@@ -31,6 +32,7 @@ class Motion:
     ticked_s: float | None = None
     start: ViewOffset = CENTRE
     start_dolly: float = 0.0
+    rack: tuple[float, float] = (0.0, 0.0)
     speed: float = 0.25
     is_paused: bool = False
 

@@ -53,6 +53,7 @@ MOTION_TIPS: dict[AnimationKind, str] = {
     "eight": "The viewpoint moves along a lying eight.",
     "swing": "The viewpoint swings from left to right and back.",
     "focus": "The focus moves from near to far and back.",
+    "rack": "The focus glides from your last click but one to your last click, and back.",
     "aperture": "The aperture closes and opens again.",
 }
 

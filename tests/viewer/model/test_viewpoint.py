@@ -1,0 +1,221 @@
+"""Verbs of the viewpoint: loops and glides as functions of time, the focus rack, the free camera, and zoom."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import replace
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from iibr_core.beyond.optics import CENTRE
+from iibr_core.exports.loops import LOOPS, LoopKind, ease, point_on_loop
+from iibr_core.scenes.scene import Source
+from iibr_core.scenes.screen_size import ScreenSize
+from iibr_core.types import GridShape, ViewOffset
+from tests.viewer.model.test_reducers import plan_of, scene_of, state_with
+from viewer.app.keys import Keys, actions_from_keys
+from viewer.model import gesture, history, lens, opening, saving, viewpoint
+from viewer.model.action import Action, do
+from viewer.model.state.app_state import AppState
+from viewer.model.state.prompts import SavePrompt
+from viewer.model.state.viewpoint import FORWARD_LIMITS, MAX_ASIDE, FreeCamera
+from viewer.model.viewpoint import HOME_S, MAX_STEP_S, RACK_S
+from viewer.model.window_limits import SPEED_LIMITS
+
+grids = st.builds(GridShape, st.integers(1, 17), st.integers(1, 17))
+NINE = GridShape(9, 9)
+
+
+def photo() -> AppState:
+    return state_with(scene_of(plan=plan_of(NINE)))
+
+
+def ticked(state: AppState, seconds: float, start: float = 100.0, step: float = 1 / 60) -> list[AppState]:
+    """Return the states while the clock runs."""
+    states = []
+    for i in range(round(seconds / step) + 1):
+        state = viewpoint.tick(state, start + i * step)
+        states.append(state)
+    return states
+
+
+# Loops and glides
+
+
+@given(grids, st.sampled_from(LOOPS), st.floats(0, 50))
+def test_loops_stay_between_the_stored_views_and_close(grid: GridShape, kind: LoopKind, turns: float) -> None:
+    eye = point_on_loop(kind, turns, grid)
+    for value, views in zip(eye, grid):
+        assert -(views // 2) <= value <= views - 1 - views // 2
+    assert point_on_loop(kind, turns + 1, grid) == pytest.approx(eye, abs=1e-9)
+
+
+def test_the_shapes_of_the_loops() -> None:
+    quarters = [point_on_loop("circle", quarter / 4, NINE) for quarter in range(4)]
+    assert quarters == [pytest.approx(eye, abs=1e-9) for eye in ((-3.2, 0), (0, 3.2), (3.2, 0), (0, -3.2))]
+    assert point_on_loop("eight", 0.0, NINE) == pytest.approx((0, 0))
+    assert point_on_loop("eight", 0.125, NINE) == pytest.approx((1.6, 3.2 * math.sqrt(0.5)))
+    assert point_on_loop("swing", 0.25, NINE) == pytest.approx((0, 3.2))
+
+
+@pytest.mark.parametrize("kind", LOOPS)
+def test_a_loop_begins_where_the_eye_is_and_goes_without_leaps(kind: LoopKind) -> None:
+    start = lens.move_eye(photo(), ViewOffset(2, -3))
+    states = ticked(viewpoint.set_loop(start, kind), seconds=4)
+    eyes = [state.optics.eye for state in states]
+    assert eyes[0] == ViewOffset(2, -3)
+    assert max(math.dist(a, b) for a, b in itertools.pairwise(eyes)) < 0.5
+    assert states[-1].motion.turns == pytest.approx(4 * 0.25, abs=0.01)
+    assert eyes[-1] == pytest.approx(point_on_loop(kind, states[-1].motion.turns, NINE))
+    undone = history.undo(states[-1])
+    assert (undone.optics, undone.motion.is_running) == (start.optics, False)
+
+
+def test_the_glide_home_is_short_monotone_and_ends_exactly_there() -> None:
+    start = lens.set_dolly(lens.move_eye(photo(), ViewOffset(2, -3)), 1.5)
+    states = ticked(viewpoint.return_home(start), HOME_S + 0.1)
+    distances = [math.hypot(*state.optics.eye) for state in states]
+    assert distances[0] == math.hypot(2, 3)
+    assert all(a >= b for a, b in itertools.pairwise(distances))
+    assert (states[-1].optics.eye, states[-1].optics.dolly) == (ViewOffset(0, 0), 0.0)
+    assert not states[-1].motion.is_running
+
+
+def test_a_double_click_takes_back_the_focus_of_its_first_click_and_no_earlier_one() -> None:
+    start = lens.move_eye(lens.set_focus(photo(), 1.0), ViewOffset(1, 2))
+    clicked = lens.focus_on(start, (0.0, 0.0), -1.0)
+    home = ticked(viewpoint.return_home(clicked, takes_back_click=True), 1.0)[-1]
+    assert (home.optics.eye, home.optics.focus_disparity) == (CENTRE, 1.0)
+    assert history.undo(home).optics == start.optics
+    twice = viewpoint.return_home(lens.focus_on(gesture.end_gesture(clicked), (0.0, 0.0), -1.0), True)
+    assert twice.optics.focus_disparity == -1.0, "it was sharp before"
+    assert viewpoint.return_home(clicked).optics.focus_disparity == -1.0, "by its key"
+
+
+def test_a_delay_is_no_leap_and_a_pause_holds() -> None:
+    state = viewpoint.tick(viewpoint.set_loop(photo(), "circle"), 0.0)
+    assert viewpoint.tick(state, 1000.0).motion.turns == pytest.approx(MAX_STEP_S * state.motion.speed)
+    assert viewpoint.tick(state, -5.0).motion.turns == 0, "a clock that goes back"
+    assert viewpoint.tick(state, math.nan) == state
+    running = ticked(viewpoint.set_loop(photo(), "eight"), 1.0)[-1]
+    paused = viewpoint.pause(running, True)
+    assert ticked(paused, 1.0, start=500.0)[-1].optics == running.optics
+    resumed = ticked(viewpoint.pause(paused, False), 0.0, start=900.0)[-1]
+    assert resumed.optics.eye == pytest.approx(running.optics.eye)
+    faster = viewpoint.set_speed(running, 99.0)
+    assert (faster.motion.speed, faster.motion.turns) == (SPEED_LIMITS[1], running.motion.turns)
+    assert viewpoint.set_speed(running, math.inf) == running
+
+
+@pytest.mark.parametrize(
+    "action",
+    [do(lens.move_eye, ViewOffset(1, 1)), do(lens.set_dolly, 1.0), do(lens.reset), do(viewpoint.set_loop, None)],
+)
+def test_a_hand_on_the_viewpoint_stops_the_motion_and_keeps_its_speed(action: Action) -> None:
+    state = action.apply(viewpoint.set_loop(viewpoint.set_speed(photo(), 0.5), "circle"))
+    assert (state.motion.is_running, state.motion.speed) == (False, 0.5)
+
+
+def test_easing_is_flat_at_both_ends_and_clamped() -> None:
+    assert [ease(x) for x in (-1, 0, 0.25, 0.5, 1, 2)] == [0, 0, 0.15625, 0.5, 1, 1]
+
+
+# The focus rack
+
+
+def test_a_rack_glides_from_the_last_click_but_one_to_the_last_and_can_be_undone() -> None:
+    state = lens.focus_on(photo(), (0.0, 0.0), 2.5)
+    assert "two things" in viewpoint.rack_focus(state).notices[-1].text
+    state = lens.focus_on(state, (0.5, 0.5), -1.0)
+    states = ticked(viewpoint.rack_focus(state), RACK_S + 0.1)
+    focuses = [state.optics.focus_disparity for state in states]
+    assert (focuses[0], focuses[-1]) == (2.5, -1.0)
+    assert all(a >= b for a, b in itertools.pairwise(focuses))
+    assert focuses[round(RACK_S / 2 * 60)] == pytest.approx(0.75, abs=0.05)
+    assert not states[-1].motion.is_running
+    held = lens.focus_on(states[40], (0.0, 0.0), 1.0)
+    assert (held.motion.is_running, held.optics.focus_disparity) == (False, pytest.approx(1.0)), "a click takes over"
+    again = lens.focus_on(state, (0.5, 0.5), -1.0)
+    assert viewpoint.clicked_rack(again) == (2.5, -1.0), "a second click on the same surface counts once"
+
+
+def test_a_rack_holds_its_surfaces_in_another_plan_and_ends_with_the_photo() -> None:
+    state = lens.focus_on(lens.focus_on(photo(), (0.0, 0.0), 2.0), (0.0, 0.0), -1.0)
+    other = opening.show_scene(state, 1, scene_of(plan=plan_of(NINE, scale=0.5)))
+    assert viewpoint.clicked_rack(other) == (1.0, -0.5)
+    asked = opening.open_source(state, Source("b.png"))
+    opened = opening.show_scene(asked, asked.generation, scene_of(source=asked.source, plan=plan_of(NINE)))
+    assert viewpoint.clicked_rack(opened) is None
+
+
+# The free camera
+
+
+@pytest.mark.parametrize(
+    ("step", "end"),
+    [
+        ((0.0, 0.0, 0.05), FreeCamera(forward=FORWARD_LIMITS[1])),
+        ((0.0, 0.0, -0.05), FreeCamera(forward=FORWARD_LIMITS[0])),
+        ((-0.05, 0.05, 0.0), FreeCamera(right=-MAX_ASIDE, down=MAX_ASIDE)),
+        ((1e300, -1e300, 1e300), FreeCamera(MAX_ASIDE, -MAX_ASIDE, FORWARD_LIMITS[1])),
+    ],
+)
+def test_steps_of_the_camera_lead_to_its_limits_and_back(step: tuple[float, float, float], end: FreeCamera) -> None:
+    first = viewpoint.move_camera(photo(), 0.01, 0.02, 0.03).free_camera
+    assert first == FreeCamera(0.01, 0.02, 0.03)
+    assert first is not None
+    assert not first.is_at_end
+    state = photo()
+    for _ in range(40):
+        state = viewpoint.move_camera(state, *step)
+    assert state.free_camera == end
+    assert end.is_at_end
+    assert viewpoint.move_camera(state, *(-part / 2 for part in step)).free_camera != end
+
+
+def test_the_camera_needs_a_photo_and_finite_numbers() -> None:
+    assert viewpoint.move_camera(AppState(), 0.1).free_camera is None
+    for value in (math.inf, math.nan):
+        assert viewpoint.move_camera(photo(), value, 0.1, 0.1).free_camera is None
+    field = viewpoint.move_camera(state_with(scene_of()), forward=0.1)
+    assert field.free_camera is None
+    assert "needs a photo" in field.notices[-1].text
+
+
+@pytest.mark.parametrize(
+    "action",
+    [
+        do(viewpoint.leave_camera),
+        do(lens.reset),
+        do(viewpoint.return_home),
+        do(opening.open_source, Source("b.png")),
+        *actions_from_keys(Keys(is_escape=True), viewpoint.move_camera(photo(), forward=0.1)),
+    ],
+)
+def test_what_goes_back_to_the_views(action: Action) -> None:
+    assert action.apply(viewpoint.move_camera(photo(), forward=0.1)).free_camera is None
+
+
+def test_the_camera_looks_through_the_same_lens() -> None:
+    for action in (do(lens.move_eye, ViewOffset(1, 0)), do(lens.set_aperture, 2.0), do(lens.set_focus, 0.5)):
+        state = action.apply(viewpoint.move_camera(photo(), forward=0.1))
+        assert state.free_camera == FreeCamera(forward=0.1)
+        assert state.optics == action.apply(photo()).optics
+
+
+def test_its_picture_is_saved_at_the_size_of_the_views() -> None:
+    state = photo()
+    assert state.scene is not None
+    state = replace(state, scene=replace(state.scene, own_size=ScreenSize(4000, 3000)))
+    for camera, size in ((None, ScreenSize(4000, 3000)), (FreeCamera(forward=0.1), state.scene.size)):
+        prompt = saving.ask_to_save(replace(state, free_camera=camera)).prompt
+        assert isinstance(prompt, SavePrompt)
+        assert prompt.size_px == size
+
+
+def test_nothing_moves_without_a_scene() -> None:
+    for action in (do(viewpoint.set_loop, "circle"), do(viewpoint.return_home), do(viewpoint.tick, 1.0)):
+        assert action.apply(AppState()) == AppState()
