@@ -58,6 +58,8 @@ def _escape_actions(state: AppState) -> list[Action]:
         return [do(selection.deselect)]
     if state.brush.is_on:
         return [do(depth.set_brush, replace(state.brush, is_on=False))]
+    if state.tilt_handles is not None:
+        return [do(lens.show_tilt_handles, False)]
     if state.inspection.comparison is not None:
         return [do(inspection.compare, None)]
     if state.inspection.overlay is not None:

@@ -219,7 +219,9 @@ class App:
             actions += self.inspection_view.take_entropy(result)
         while (found := self._surfaces.next_result()) is not None:
             actions += self.inspection_view.take_surface(found)
-        actions += self._notice_clock.expire(self.state, self._pace.stepped_at)
+        pointer = self._pointer
+        is_on_notice = pointer.is_over_panel and not self.layout().panel.contains(pointer.x, pointer.y)
+        actions += self._notice_clock.expire(self.state, self._pace.stepped_at, is_on_notice)
         if self.state.motion.is_running:
             actions.append(do(viewpoint.tick, self._pace.stepped_at))
         actions += self._place_window()

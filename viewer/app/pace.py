@@ -63,10 +63,10 @@ class NoticeClock:
         self._shown: Notice | None = None
         self._shown_at = 0.0
 
-    def expire(self, state: AppState, now_s: float) -> list[Action]:
-        """Dismiss the newest notice once its time is over."""
+    def expire(self, state: AppState, now_s: float, is_held: bool) -> list[Action]:
+        """Dismiss the newest notice once its time is over. is_held: the pointer rests on it: its time begins again."""
         notice = state.notices[-1] if state.notices else None
-        if notice is not self._shown:
+        if notice is not self._shown or is_held:
             self._shown, self._shown_at = notice, now_s
         is_over = notice is not None and now_s - self._shown_at > notice.seconds
         return [do(messages.dismiss, notice)] if notice is not None and is_over else []

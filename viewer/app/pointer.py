@@ -43,7 +43,8 @@ class Pointer:
 
     drag_distance: the farthest from where it was pressed, the frame of its release included. becomes_drag: whether it
     has been no drag before this frame. pulls: the middle button is down: the drag moves the picture. holds_ctrl:
-    Ctrl is down, or was at the frame's beginning.
+    Ctrl is down, or was at the frame's beginning. holds_panel: whether the press that is held was on a panel.
+    panel_press: place and time (seconds) of the last press on a panel.
     """
 
     x: float = 0.0
@@ -60,6 +61,8 @@ class Pointer:
     clicks: int = 0
     wheel: float = 0.0
     is_over_panel: bool = False
+    holds_panel: bool = False
+    panel_press: tuple[float, float, float] = (0.0, 0.0, -math.inf)
     holds_ctrl: bool = False
     pulls: bool = False
 

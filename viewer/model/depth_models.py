@@ -80,11 +80,12 @@ def show_offer(state: AppState, is_shown: bool) -> AppState:
 
 
 def give_up(state: AppState) -> AppState:
-    """Keep the depth that the open photo has."""
+    """Keep the depth that the open photo has, and close the offer of a model."""
     scene, models = _open_photo(state), state.models
     if scene is None:
         return state
-    return replace(state, models=replace(models, asked=None, given_up=models.given_up | {scene.source.path}))
+    given_up, dismissed = (paths | {scene.source.path} for paths in (models.given_up, models.dismissed))
+    return replace(state, models=replace(models, asked=None, given_up=given_up, dismissed=dismissed))
 
 
 def take_estimate(state: AppState, model: str) -> AppState:

@@ -36,6 +36,7 @@ def test_keys() -> None:
     ("opens", "closes"),
     [
         ((do(inspection.compare, "photo"),), do(inspection.compare, None)),
+        ((do(lens.show_tilt_handles, True),), do(lens.show_tilt_handles, False)),
         ((do(inspection.set_overlay, "disparity"),), do(inspection.set_overlay, None)),
         ((do(window.set_fullscreen, True), do(inspection.set_overlay, "disparity")), do(inspection.set_overlay, None)),
         ((do(window.set_fullscreen, True),), do(window.set_fullscreen, False)),

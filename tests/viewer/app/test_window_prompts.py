@@ -188,6 +188,28 @@ def test_results_go_by_themselves_and_errors_stay_until_they_are_closed(
     assert viewer.app.state.notices == (error,)
 
 
+def test_a_double_click_on_a_message_never_reaches_the_picture(viewer: Driver) -> None:
+    viewer.app.do(do(messages.notify, Notice("A message that goes with the first click.")))
+    viewer.until_idle()
+    viewer.find("×", "notices")
+    viewer.send("click", "--repeat", 2, "--delay", 200, 1)
+    viewer.until(lambda app: not app.state.notices)
+    viewer.until_idle()
+    assert viewer.app.state.focused_at is None
+    assert not viewer.app.state.history.past
+
+
+def test_a_message_does_not_go_while_the_pointer_rests_on_it(viewer: Driver, monkeypatch: pytest.MonkeyPatch) -> None:
+    viewer.app.do(do(messages.notify, Notice("Saved a.png", is_result=True, path="a.png")))
+    viewer.until_idle()
+    viewer.find("Open##0", "notices")
+    monkeypatch.setattr("viewer.model.state.notices.RESULT_S", 0.0)
+    viewer.until_idle()
+    assert viewer.app.state.notices
+    viewer.send("mousemove", *viewer.position(0.1, 0.1))
+    viewer.until(lambda app: not app.state.notices)
+
+
 def test_a_map_or_a_model_of_ones_own_is_opened(open_window: Opener, tmp_path: Path) -> None:
     write_image(tmp_path / "alone.png", np.full((64, 96, 3), 100, np.uint8))
     driver = open_window(tmp_path / "alone.png", grid=GridShape(3, 3))

@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from imgui_bundle import imgui
-from viewer.ui.overlays.progress_rows import job_text
 
 from iibr_core.beyond.optics import (
     APERTURE_KINDS,
@@ -28,6 +27,7 @@ from viewer.model.state.notices import Notice
 from viewer.model.state.preferences import SECTIONS, Section, with_sections
 from viewer.model.state.prompts import PalettePrompt, PathPrompt
 from viewer.model.state.saving import SavedSettings
+from viewer.ui.overlays.notice_corner import job_text
 from viewer.ui.style import DARK, LIGHT
 
 SIZE = 640, 1400
