@@ -30,22 +30,15 @@ def test_what_was_saved_or_exported_of_a_photo_is_none_of_its_folder(tmp_path: P
 
 @pytest.mark.parametrize("inside", ["", "views"])
 def test_a_light_field_is_no_folder_of_photos_also_in_views(tmp_path: Path, inside: str) -> None:
-    folder = tmp_path / inside
-    folder.mkdir(exist_ok=True)
-    for v in range(2):
-        for u in range(2):
-            write_image(folder / f"v{v:02d}_u{u:02d}.png", GREY)
+    assert first_photo(tmp_path) is None
+    (tmp_path / inside).mkdir(exist_ok=True)
+    for v, u in np.ndindex(2, 2):
+        write_image(tmp_path / inside / f"v{v:02d}_u{u:02d}.png", GREY)
     assert first_photo(tmp_path) is None
 
 
-def test_pictures_of_a_camera_are_photos_even_where_their_number_is_a_square(tmp_path: Path) -> None:
-    for i in range(4):
-        Image.fromarray(GREY).save(tmp_path / f"DSC_{i:04d}.jpg")
-    assert first_photo(tmp_path) == tmp_path / "DSC_0000.jpg"
-
-
-def test_other_pictures_are_photos_where_they_are_no_light_field(tmp_path: Path) -> None:
-    assert first_photo(tmp_path) is None
-    for name in ("sea.png", "beach.png", "view.png"):
-        write_image(tmp_path / name, GREY)
-    assert first_photo(tmp_path) == tmp_path / "beach.png"
+@pytest.mark.parametrize("names", [[f"DSC_{i:04d}.jpg" for i in range(4)], ["beach.png", "sea.png", "view.png"]])
+def test_pictures_of_a_camera_and_others_that_are_no_grid_are_photos(tmp_path: Path, names: list[str]) -> None:
+    for name in names:
+        Image.fromarray(GREY).save(tmp_path / name)
+    assert first_photo(tmp_path) == tmp_path / names[0]

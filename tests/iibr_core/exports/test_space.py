@@ -173,17 +173,6 @@ def test_epi_has_a_line_a_view(source: ExportSource, tmp_path: Path) -> None:
         exported(source, "epi", tmp_path / "c.png", row=64)
 
 
-def test_the_static_disparity_changes_neither_distances_nor_places(source: ExportSource) -> None:
-    straight = cameras_of(source)
-    for zero in (-0.7, 0.0, 0.4):
-        cameras = cameras_of(replace(source, scene=replace(source.scene, plan=source.plan(zero))))
-        assert cameras.at_infinity - straight.at_infinity == pytest.approx(
-            (source.plan().disparity_zero - zero) * source.plan().disparity_scale
-        )
-        assert cameras.depth_range == pytest.approx(straight.depth_range)
-        assert cameras.step == pytest.approx(straight.step)
-
-
 @pytest.mark.parametrize("span", [4.0, 0.25, 0.0])
 def test_depth_beside_a_picture_is_even_from_the_farthest_to_the_nearest(
     source: ExportSource, tmp_path: Path, span: float

@@ -100,14 +100,6 @@ def test_ordinary_photos_are_not_cut_whatever_their_name(tmp_path: Path, name: s
     )
 
 
-def test_the_ending_that_the_note_recommends_is_heeded(tmp_path: Path) -> None:
-    """The halves differ, but no other picture has such a name."""
-    Image.fromarray(photo()).save(tmp_path / "a.top-bottom.jpg", quality=95)
-    shown = read_photo(tmp_path / "a.top-bottom.jpg")
-    assert shown.size == (48, 128)
-    assert "though its halves differ" in shown.notes[0]
-
-
 def write_jps(path: Path, picture: NDArray[np.uint8], layout: int, flags: int, kind: int = 1) -> None:
     """A JPEG with VRex's descriptor behind its first segment, as cameras write it."""
     stored = BytesIO()

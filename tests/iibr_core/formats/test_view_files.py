@@ -134,19 +134,6 @@ def test_stereo_photos_have_two_views_and_show_the_left_one(tmp_path: Path, kind
     np.testing.assert_allclose(photo.pixels * 255, views[0, 0], atol=0.51)
 
 
-@pytest.mark.parametrize("kind", ["spatial", "mpo", "stereo jpeg", "lif", "full"])
-@pytest.mark.parametrize("share", [0.9, 0.3])
-def test_cut_stereo_photos_are_refused_in_a_line_or_read_as_photos(tmp_path: Path, kind: str, share: float) -> None:
-    name, write, _ = STEREO[kind]
-    path = tmp_path / name
-    write(path, smooth(), smooth(shift=4))
-    path.write_bytes(path.read_bytes()[: int(share * path.stat().st_size)])
-    if kind == "stereo jpeg" and find_light_field(path) is None:
-        return  # no longer marked as stereo
-    with pytest.raises(InputError, match=rf"^{path}: [^\n]*$"):
-        read_back(path)
-
-
 def test_jpegs_with_other_pictures_are_no_stereo(tmp_path: Path) -> None:
     """Gain maps and previews are stored the same way."""
     write_mpo(tmp_path / "phone.jpg", smooth(), smooth(24, 32))

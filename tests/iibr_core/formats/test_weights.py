@@ -1,7 +1,6 @@
 """Weights on disk: the round trip, and files that are damaged or belong to another model."""
 
 import re
-from contextlib import suppress
 
 import numpy as np
 import pytest
@@ -29,17 +28,11 @@ def test_round_trip_with_metadata_and_the_file_may_be_replaced_while_its_weights
     assert all(np.array_equal(arrays[name], before[name]) for name in arrays)
 
 
-def test_truncated_files_are_refused_and_flipped_bits_are_harmless(path):
+def test_truncated_files_are_refused(path):
     data = path.read_bytes()
     for length in range(1, len(data), 7):
         path.write_bytes(data[:length])
         with pytest.raises(InputError, match=rf"^{path}: is not a safetensors file, or is damaged .*$"):
-            read_weights(path)
-    for position in range(8 + int.from_bytes(data[:8], "little")):
-        broken = bytearray(data)
-        broken[position] ^= 1 << position % 8
-        path.write_bytes(broken)
-        with suppress(InputError):
             read_weights(path)
 
 

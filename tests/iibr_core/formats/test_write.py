@@ -15,7 +15,6 @@ from iibr_core.formats.images.metadata import (
     SETTINGS_KEY,
     PictureMetadata,
     camera_facts,
-    exif_for,
     read_caption,
     read_metadata,
     settings_text_in,
@@ -23,8 +22,7 @@ from iibr_core.formats.images.metadata import (
 from iibr_core.formats.images.photo import read_photo
 from iibr_core.formats.images.picture_kinds import KINDS, PictureFormat
 from iibr_core.formats.images.write import write_image, write_picture
-from iibr_core.formats.images.xmp import xmp_for
-from iibr_core.types import DISPLAY_P3, SRGB, ImageSize
+from iibr_core.types import DISPLAY_P3, SRGB
 from tests.iibr_core.formats.test_color_profile import profile_bytes
 
 PATCHES = ((200, 80, 60), (255, 0, 0), (0, 255, 0), (20, 30, 250), (128, 128, 128), (255, 255, 255), (3, 2, 1))
@@ -164,23 +162,6 @@ def test_long_texts_are_packed(tmp_path, ending):
     assert len(text) > 100_000
     write_picture(tmp_path / f"a{ending}", patches(), metadata=PictureMetadata(texts={SETTINGS_KEY: text}))
     assert settings_text_in(tmp_path / f"a{ending}") == text
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_damaged_metadata_costs_no_picture(tmp_path, seed):
-    rng = np.random.default_rng(seed)
-    exif = bytearray(camera_exif().tobytes())
-    for at in rng.integers(0, len(exif), 6):
-        exif[at] = rng.integers(0, 256)
-    xmp = bytearray(XMP)
-    xmp[rng.integers(0, len(xmp))] = 0x3C
-    kept = exif_for(bytes(exif), ImageSize(4, 4), SRGB, keeps_position=True)
-    assert len(kept.tobytes()) < 65_000
-    assert all("\n" not in name + fact for name, fact in camera_facts(PictureMetadata(bytes(exif))))
-    write_picture(tmp_path / "a.jpg", patches(), PictureFormat(), PictureMetadata(bytes(exif), bytes(xmp)))
-    write_picture(tmp_path / "a.tif", patches(), PictureFormat(), PictureMetadata(bytes(exif), bytes(xmp)))
-    assert read_photo(tmp_path / "a.tif").size == (SIDE, SIDE * len(PATCHES))
-    xmp_for(bytes(xmp), {})
 
 
 def test_camera_facts_are_short_texts_for_people(tmp_path):

@@ -64,12 +64,6 @@ def test_no_more_light_leaves_than_came(roughness, polar_deg):
     assert 0 < total / (pi * disc * cos(radians(polar_deg))) <= 1.02
 
 
-def test_nothing_is_brighter_than_the_light_even_grazing():
-    gloss = Gloss(roughness=0.15, reflectance=1.0, light=GlossLight(radius_deg=20.0))
-    for polar in (0, 80, 89.9, 89.9999):
-        assert 0 <= share(gloss, UP, direction(polar), direction(polar, 180)) <= 1
-
-
 @pytest.mark.parametrize(
     ("v", "light"), [((30, 0), (91, 180)), ((91, 0), (30, 180)), ((120, 0), (120, 180)), ((0, 0), (180, 0))]
 )

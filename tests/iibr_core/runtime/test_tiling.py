@@ -12,7 +12,6 @@ from iibr_core.depth.guess import guess_depth
 from iibr_core.inpainting import background
 from iibr_core.inpainting.background import fill_background
 from iibr_core.inpainting.disparity_holes import fill_disparity_holes
-from iibr_core.method.light_field import generate
 from iibr_core.method.mixed_pixels import split_mixed_pixels
 from iibr_core.method.occlusion import view_entropy
 from iibr_core.method.ray_transformer import shipped_transformer
@@ -22,7 +21,6 @@ from iibr_core.runtime import tiling
 from iibr_core.runtime.tiling import in_bands, in_pieces, side_by_side
 from iibr_core.runtime.work import Cancelled, raise_if_stopped, stoppable
 from iibr_core.types import ImageSize, Photo, ViewOffset
-from tests.iibr_core.scenes import literal_plan, square_before_wall
 
 RANDOM = np.random.default_rng(5)
 SIZE = ImageSize(83, 67)
@@ -95,21 +93,6 @@ def test_a_stage_asks_for_every_band_and_ends_wherever_it_is_told_to(name):
     for n in (1, watch.asked // 2, watch.asked):
         with pytest.raises(Cancelled), stoppable(StopAt(n)):
             STAGES[name]()
-
-
-@pytest.mark.usefixtures("narrow")
-def test_a_field_ends_wherever_it_is_told_to():
-    photo, disparity = square_before_wall()
-    plan, watch = literal_plan(photo, disparity, 3), StopAt()
-
-    def count(stop):
-        with stoppable(stop):
-            return len(list(generate(photo, disparity, plan)))
-
-    assert count(watch) == 9
-    counts = [count(StopAt(n)) for n in np.linspace(1, watch.asked, 7).astype(int)]
-    assert counts[0] == 0
-    assert counts[-1] < 9
 
 
 @pytest.mark.parametrize("threads", [1, 3])
