@@ -37,7 +37,7 @@ from viewer.background.surface import find_surface
 from viewer.display.filmstrip_view import FilmstripView
 from viewer.display.inspection_view import InspectionView
 from viewer.display.scene_view import VIEW_REFRESH_S, SceneView
-from viewer.gpu.glfw_context import create_for_window
+from viewer.gpu.context import create_for_window
 from viewer.model import inspection, opening, preferences, saving, viewpoint, window
 from viewer.model.action import Action, do
 from viewer.model.inspection import NO_INSPECTION_TEXTURES, InspectionTextures, beside_of

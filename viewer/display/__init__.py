@@ -1,1 +1,1 @@
-"""What stands on the screen: pictures of the scene, and of what is inspected."""
+"""Pictures of the open scene, of its inspection and of its folder, for the screen and for files."""

@@ -1,6 +1,6 @@
-"""Shows what is being done to the depth at once: the photo, warped by the edited disparity, in place of its views.
+"""Previews edits of the depth: the photo, warped by the edited disparity, in place of its views.
 
-Which edits the views on the screen were made with is compared with those the state wants; that decides everything.
+A preview is drawn if the edits of the state differ from those of the views on the screen.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ from viewer.model.state.app_state import AppState
 if TYPE_CHECKING:
     from iibr_core.depth.editing.canvas import DepthCanvas
 
-MOST_STROKES = 8
-"""That the drawing thread paints for one frame."""
+MAX_STROKES = 8
+"""Largest number of strokes that the window's thread paints for a frame."""
 
 
 class DepthPreview:
-    """Keeps a canvas of its own, of the scene on the stage; called from the one GL thread."""
+    """Keeps a canvas of the open photo. Call it only from the thread of the GL context."""
 
     def __init__(self, scene_view: SceneView) -> None:
         self._scene_view = scene_view
@@ -34,11 +34,11 @@ class DepthPreview:
         self._still: tuple[DepthEdits, float] | None = None
 
     def forget(self) -> None:
-        """Free the canvas: another photo is open."""
+        """Free the canvas, because another photo is open."""
         self._loaded = self._canvas = self._still = None
 
     def update(self, state: AppState) -> None:
-        """Show the edits this state wants, if the screen shows others. Raises InputError where they make no sense."""
+        """Show the edits of this state if the screen shows others. Raises InputError if they make no sense."""
         loaded, scene = self._scene_view.loaded, state.scene
         if loaded is None or scene is None or scene.plan is None or self._scene_view.generation > state.generation:
             return
@@ -52,21 +52,21 @@ class DepthPreview:
             self._shown = wanted
 
     def _is_quick(self, edits: DepthEdits, loaded: LoadedPhoto) -> bool:
-        """Whether a frame may wait for them; else they are seen when the worker has painted them."""
+        """Return whether a frame may wait for these edits; otherwise they show once the worker has painted them."""
         from iibr_core.depth.editing.canvas import DepthCanvas
 
         self._canvas = self._canvas or DepthCanvas(loaded.photo.pixels, loaded.refined.values)
-        if self._canvas.strokes_ahead(edits) > MOST_STROKES and self._resumed is not loaded:
+        if self._canvas.strokes_ahead(edits) > MAX_STROKES and self._resumed is not loaded:
             self._canvas.resume(loaded.depth_settings.edits, loaded.disparity.values)
             self._resumed = loaded
-        return self._canvas.strokes_ahead(edits) <= MOST_STROKES
+        return self._canvas.strokes_ahead(edits) <= MAX_STROKES
 
     def _field_disparity(self, edits: DepthEdits, scene: Scene, loaded: LoadedPhoto) -> np.ndarray:
-        """In px per view step of the plan that the views before were made with."""
+        """Return the edited disparity in px per view step of the plan of the last views."""
         assert self._canvas is not None
         assert scene.plan is not None
         values = self._canvas.apply(edits)
         if self._still is None or self._still[0] != edits.tone:
             self._still = edits.tone, still_disparity(scene.source, self._canvas.without_strokes(edits))
-        scale = scene.plan.disparity_scale or 1.0  # a flat scene that is being painted on has none yet
+        scale = scene.plan.disparity_scale or 1.0  # a flat scene has none yet
         return (values - np.float32(self._still[1])) * np.float32(scale)

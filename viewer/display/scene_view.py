@@ -1,6 +1,6 @@
-"""The light field as it is on the graphics card, and the last picture drawn from it, with a window or headless.
+"""The views of the open scene on the graphics card, and the last picture of them, in the window and off screen.
 
-Views wait here until there is time to upload them; everything is called from the one GL thread.
+Views wait here until there is time to upload them. Everything is called from the thread of the GL context.
 """
 
 from __future__ import annotations
@@ -17,13 +17,7 @@ from iibr_core.scenes.rect import WHOLE, Rect
 from iibr_core.scenes.scene import LoadedPhoto, Scene, SceneReady
 from iibr_core.scenes.scene_gloss import GlossRequest, gloss_request
 from iibr_core.scenes.screen_size import ScreenSize
-from iibr_core.types import (
-    FloatImage,
-    GridShape,
-    InputError,
-    ViewOffset,
-    ViewUpdate,
-)
+from iibr_core.types import FloatImage, GridShape, InputError, ViewOffset, ViewUpdate
 from viewer.display.picking import is_kept_for_picking, pick_disparity
 from viewer.display.snapshot import SceneSnapshot
 from viewer.gpu.context import GLContext
@@ -35,24 +29,27 @@ if TYPE_CHECKING:
     from iibr_core.gloss.shading import GlossMaps
 
 VIEW_REFRESH_S = 0.25
-"""While nothing else changes, new views are shown this often: drawing each as it comes would slow the hand."""
+"""Seconds between pictures that only new views change: a picture for each view would delay the hand."""
 
 STILL_BUDGET_S = 0.08
-"""For a picture that only new views change: no hand waits for it, and it is seen longer."""
+"""Time for a picture that only new views change, in seconds: no hand waits for it, and it is shown longer."""
 
 NO_MORE_VIEWS_S = 2.0
-"""After so long without a new view none is thought to be on its way."""
+"""Seconds without a new view after which no view is expected."""
 
 WAITING_VIEWS = 4
+"""Number of waiting views at which the worker pauses."""
+
 PREVIEW_GRID = GridShape(1, 1)
+"""Grid of the field that holds the centre view until the second view comes."""
 
 
 class SceneView:
-    """Holds the renderer and the views of the scene that is shown.
+    """Holds the renderer and the views of the open scene.
 
-    generation: whose views these are. previews: of edited depth, gloss, free cameras, shown so far. views_uploaded: so
-    far, those that came twice counted twice. pictures_drawn: how often the picture was drawn. picture_drawn: the record
-    of the last, None before the first. centre: the centre view as it came, None before anything is open.
+    generation: number of the worker's job that made the views. previews: number of changes by edited depth, gloss and
+    free cameras. views_uploaded: number of uploads. pictures_drawn: number of pictures. picture_drawn: record of the
+    last picture, None before the first. centre: the centre view, None before anything is open.
     """
 
     def __init__(self, gl: GLContext) -> None:
@@ -77,9 +74,9 @@ class SceneView:
         self._view_came_at = 0.0
 
     def open(self, ready: SceneReady) -> None:
-        """Show this scene from now on. Raises InputError where it does not fit the graphics card; the old one stays.
+        """Show this scene from now on. Raises InputError if it does not fit the graphics card; the old scene stays.
 
-        Its first view is shown in a field of its own until the second comes: making room for all takes a while.
+        The first view has a field of its own until the second comes, because allocating a whole field takes a while.
         """
         scene = ready.scene
         self.show_fallback(None)
@@ -98,9 +95,9 @@ class SceneView:
         self._keep_for_picking(scene, ready.centre)
 
     def show_disparity(self, disparity: FloatImage) -> None:
-        """Show the photo warped by this field disparity (H, W) in place of its views, until those of a new plan come.
+        """Show the photo warped by this field disparity (H, W) in place of its views, until views of a new plan come.
 
-        Raises InputError where the graphics card has no room.
+        Raises InputError if the graphics card has no room.
         """
         scene, centre, field = self._scene, self.centre, self.renderer.field
         assert scene is not None
@@ -121,7 +118,7 @@ class SceneView:
         self.previews += 1
 
     def show_fallback(self, view: ViewUpdate | None) -> None:
-        """Show this view, which has a disparity, in place of the scene's, through the same lens; None: those again."""
+        """Show this view, which has a disparity, in place of the scene's views; None shows these again."""
         if view is not None or self._fallback_view is not None:
             self._fallback_view = view
             self.renderer.show_fallback(view)
@@ -141,12 +138,12 @@ class SceneView:
             self.previews += 1
 
     def add(self, view: ViewUpdate) -> None:
-        """Take a view of the present scene; it is uploaded later. Raises InputError where they do not fit all."""
+        """Take a view of the open scene, to be uploaded later. Raises InputError if there is no room for all views."""
         scene = self._scene
         assert scene is not None
         if (view.row, view.column) == scene.grid.centre:
             self._is_final[scene.grid.centre] = view.is_final
-            return  # there since the scene was opened
+            return  # uploaded when the scene was opened
         if self._is_preview and self.centre is not None:
             self._open_field(scene, scene.grid)
             self.renderer.upload_view(*scene.grid.centre, self.centre.colors, self.centre.disparity)
@@ -157,13 +154,13 @@ class SceneView:
 
     @property
     def has_room(self) -> bool:
-        """Whether more views may come; else they wait at the worker, who then pauses."""
+        """Whether more views may come; otherwise the worker pauses."""
         return len(self._waiting) < WAITING_VIEWS
 
     def upload(self, budget_s: float) -> bool:
-        """Upload waiting views until the time is spent. True where some still wait.
+        """Upload waiting views until the time is spent; return whether some still wait.
 
-        A view that is there is not replaced while somebody else holds the views, to draw a picture of them.
+        A present view is not replaced while another holder draws a picture of the views.
         """
         end = time.perf_counter() + budget_s
         while self._waiting and time.perf_counter() < end:
@@ -182,14 +179,15 @@ class SceneView:
             pass
 
     def pick(self, eye: ViewOffset, x_px: float, y_px: float) -> float | None:
-        """Disparity seen at a pixel of the picture; None where the scene has none."""
+        """Return the disparity seen at a pixel of the picture, None if the scene has none."""
         if self._fallback_view is not None and self._fallback_view.disparity is not None:
             return pick_disparity({CENTRE: self._fallback_view.disparity}, eye, x_px, y_px)
         return pick_disparity(self._disparities, eye, x_px, y_px)
 
     def draw(self, state: AppState, size_px: ScreenSize, part: Rect = WHOLE) -> Picture | None:
-        """Draw the picture this state asks for, or a part of it, stretched to size_px, unless it already exists;
-        return its record, None without views.
+        """Draw the picture of this state, or a part of it, stretched to size_px, if it has changed, or refine it.
+
+        Returns its record, None without views.
         """
         if self.views_uploaded == 0:
             return None
@@ -201,7 +199,7 @@ class SceneView:
             wanted = self.picture_drawn
         if self.picture_drawn is None or (not self._is_same(wanted) and not self._can_wait(wanted)):
             is_still = self._differs_by_views_only(wanted)
-            if is_still and self.renderer.passes_shown:  # it is seen on, and must not become softer
+            if is_still and self.renderer.passes_shown:  # the shown picture must not become softer
                 self.renderer.renew(wanted.optics, wanted.size_px, part)
             else:
                 budget_s = STILL_BUDGET_S if is_still else budget_s
@@ -222,33 +220,28 @@ class SceneView:
         return DrawReport(renderer.samples, renderer.samples_converged, 1e3 * renderer.draw_s)
 
     def converge(self, state: AppState, size_px: ScreenSize, part: Rect = WHOLE) -> Picture | None:
-        """Like `draw`, with every sample the picture will ever get, however long that takes."""
+        """Draw the picture with all its samples, however long that takes; return its record as `draw` does."""
         if self.draw(state, size_px, part) is not None:
             self.renderer.refine()
         return self.picture_drawn
 
     @property
     def is_whole(self) -> bool:
-        """Whether every view of the scene is there as it will stay, and no edit of its depth is shown in advance."""
+        """Whether every view is present and final, and no edit of the depth is previewed."""
         scene = self._scene
         if scene is None or scene.is_sketch or self._is_edited:
             return False
         return sum(self._is_final.values()) == scene.grid.rows * scene.grid.columns
 
     def snapshot(self) -> SceneSnapshot | None:
-        """What is shown now, to be released; None before anything is open."""
+        """Return a snapshot of the shown views, to be released; None before anything is open."""
         if self._scene is None or self.centre is None:
             return None
         is_free, field = self._fallback_view is not None, self.renderer.drawn_field.share()
         return SceneSnapshot(self._scene, self.loaded, self.centre, field, self._gloss, is_free)
 
-    def is_shown(self, snapshot: SceneSnapshot) -> bool:
-        """Whether these are the views on the screen: then they take no memory of their own."""
-        field = self.renderer.field
-        return field is not None and field.colors is snapshot.field.colors
-
     def shows_all_views(self) -> bool:
-        """Whether the picture last drawn knows every view uploaded, or they change nothing in it."""
+        """Return whether the last picture shows every uploaded view, or would not change by those missing."""
         drawn = self.picture_drawn
         return drawn is None or self._shows_one_view or drawn.views_uploaded == self.views_uploaded
 
@@ -264,7 +257,7 @@ class SceneView:
             self._disparities[scene.grid.offset(view.row, view.column)] = view.disparity
 
     def _can_wait(self, wanted: Picture) -> bool:
-        """Whether only views are new, and the picture is too, or not yet all of it."""
+        """Return whether only views have changed since a picture that is recent or not finished."""
         is_new = self.renderer.is_renewing or time.perf_counter() - self._drawn_at < VIEW_REFRESH_S
         return is_new and self._differs_by_views_only(wanted)
 
@@ -273,19 +266,19 @@ class SceneView:
         return drawn is not None and self._is_same(replace(wanted, views_uploaded=drawn.views_uploaded))
 
     def _is_one_view(self, optics: Optics) -> bool:
-        """Whether this picture is one view, there as it will stay: those that still come change nothing."""
+        """Return whether this picture is one final view, so that views to come do not change it."""
         if self._scene is None or self._fallback_view is not None or optics.aperture_diameter > 1 or optics.dolly != 0:
             return False
         (v, u), (t, s) = self._scene.grid.centre, map(round, optics.eye)
         return (t, s) == optics.eye and self._is_final.get((v + t, u + s), False)
 
     def _is_same(self, wanted: Picture) -> bool:
-        """Whether the picture drawn last is this one, however far it has come."""
+        """Return whether the last picture is this one, at any number of samples."""
         drawn = self.picture_drawn
         return drawn is not None and replace(wanted, samples=drawn.samples) == drawn
 
     def _refines(self) -> bool:
-        """Whether there is more to draw, and time for it: while views are being made, the processor has none."""
+        """Return whether there is more to draw, and time for it: the processor has none while it makes views."""
         if self.renderer.is_converged:
             return False
         scene = self._scene

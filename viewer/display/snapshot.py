@@ -1,4 +1,4 @@
-"""A scene as it was at one moment, kept for jobs that outlive it: the window may show another scene by then."""
+"""A scene at one moment, for jobs that outlive it: the window may show another scene by then."""
 
 from __future__ import annotations
 

@@ -1,9 +1,12 @@
-"""OpenGL 3.3 core contexts: without a window here, of windows and of OSMesa in `glfw_context`."""
+"""OpenGL 3.3 core contexts: of a GLFW window, and without a window by EGL, OSMesa or the system."""
 
 from __future__ import annotations
 
+import ctypes
 import sys
+import warnings
 from collections.abc import Callable
+from functools import partial
 from typing import Any, Literal
 
 import moderngl
@@ -83,7 +86,95 @@ def _create(name: str) -> GLContext:
     return GLContext(ctx, name)
 
 
-def _create_osmesa() -> GLContext:
-    from viewer.gpu.glfw_context import create_osmesa  # GLFW loads slowly, and EGL does not need it
+def create_for_window(window: Any) -> GLContext:
+    """Return the GL context of a GLFW window made for OpenGL 3.3 core, made current; the caller keeps the window.
 
-    return create_osmesa()
+    Raises InputError if the driver offers less than OpenGL 3.3.
+    """
+    try:
+        return GLContext(_context_of(window), "window")
+    except (ValueError, moderngl.Error) as error:
+        raise InputError(f"this display's driver offers no OpenGL 3.3 ({error}): try `iibr screenshot`") from error
+
+
+def _create_osmesa() -> GLContext:
+    """Return a context of the software renderer OSMesa on GLFW's null platform."""
+    with warnings.catch_warnings(action="ignore"):  # GLFW reports failures as warnings
+        window = _null_window()
+    try:
+        if window is None:
+            raise InputError("osmesa: libOSMesa not found or too old (install libosmesa6)")
+        return GLContext(_context_of(window), "osmesa", partial(_close_null_window, window))
+    except (InputError, ValueError, moderngl.Error) as error:
+        _close_null_window(window)
+        raise error if isinstance(error, InputError) else InputError(f"osmesa: {error}") from error
+
+
+def _null_window() -> Any | None:
+    """Return an OSMesa window of GLFW's null platform, or of the platform in use; None if there is none."""
+    glfw = _glfw()
+    glfw.init_hint(glfw.PLATFORM, glfw.PLATFORM_NULL)
+    is_ready = glfw.init()
+    glfw.init_hint(glfw.PLATFORM, glfw.ANY_PLATFORM)
+    if not is_ready:
+        return None
+    glfw.default_window_hints()
+    glfw.window_hint(glfw.CONTEXT_CREATION_API, glfw.OSMESA_CONTEXT_API)
+    glfw.window_hint(glfw.CONTEXT_VERSION_MAJOR, 3)
+    glfw.window_hint(glfw.CONTEXT_VERSION_MINOR, 3)
+    glfw.window_hint(glfw.OPENGL_PROFILE, glfw.OPENGL_CORE_PROFILE)
+    glfw.window_hint(glfw.VISIBLE, glfw.FALSE)
+    window = glfw.create_window(16, 16, "iibr", None, None)
+    glfw.default_window_hints()
+    return window or None
+
+
+def _close_null_window(window: Any | None) -> None:
+    """Destroy the window and end the null platform, so that a real display can be opened later."""
+    glfw = _glfw()
+    if window is not None:
+        glfw.destroy_window(window)
+    if glfw.get_platform() == glfw.PLATFORM_NULL:
+        glfw.terminate()
+
+
+def _context_of(window: Any) -> moderngl.Context:
+    settings: dict[str, Any] = {"context": GlfwLoader(window)}
+    return moderngl.create_context(require=330, **settings)
+
+
+class GlfwLoader:
+    """Finds the GL functions of a GLFW window for moderngl: for GLX, EGL, OSMesa, Cocoa and WGL alike."""
+
+    def __init__(self, window: Any) -> None:
+        """Make its context current."""
+        self._glfw, self._window = _glfw(), window
+        self._glfw.make_context_current(window)
+
+    def load_opengl_function(self, name: str) -> int:
+        """Return the address of a GL function, 0 if the driver lacks it."""
+        return ctypes.cast(self._glfw.get_proc_address(name), ctypes.c_void_p).value or 0
+
+    load = load_opengl_function
+
+    def __enter__(self) -> GlfwLoader:
+        self._glfw.make_context_current(self._window)
+        return self
+
+    def __exit__(self, *_exception: object) -> None:
+        """Leave the context current: the next context that is entered replaces it."""
+
+    def release(self) -> None:
+        """Do nothing: the context ends with its window."""
+
+
+def _glfw() -> Any:
+    """Return glfw. It loads slowly, and EGL does not need it.
+
+    imgui_bundle comes first because it brings the GLFW library that both must share: two copies of the library do not
+    know each other's windows.
+    """
+    import imgui_bundle  # noqa: F401, I001  (before glfw, see above)
+    import glfw
+
+    return glfw

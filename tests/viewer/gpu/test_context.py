@@ -53,7 +53,7 @@ def test_failure_names_what_was_tried(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_one_glfw_library_is_loaded() -> None:
     """Two copies would not know of each other's windows. In a fresh process: other tests load what they like."""
     code = (
-        "import viewer.gpu.glfw_context\n"
+        "import viewer.app.window\n"
         "paths = {line.split()[-1] for line in open('/proc/self/maps') if 'libglfw' in line}\n"
         "assert len(paths) == 1 and 'imgui_bundle' in paths.pop(), paths\n"
     )

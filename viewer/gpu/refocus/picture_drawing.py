@@ -20,7 +20,7 @@ from viewer.gpu.refocus.accumulation import Accumulator, ProgressiveAccumulation
 from viewer.gpu.render_targets import PictureTargets
 
 STEP_S = 0.005
-"""Time of a step in seconds; whoever drags waits for one step at most."""
+"""Time of a step in seconds; a drag waits for one step at most."""
 
 MAX_TILE_PX = 2048
 """Largest side of a tile in pixels; its targets take at most 32 bytes a pixel."""

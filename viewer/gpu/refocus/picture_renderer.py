@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 class Renderer:
     """Draws one light field at a time. Call it only from the thread its context belongs to.
 
-    field: None before the first. passes_shown: number of passes of the best picture in what is shown, 0 for a softer
+    field: None before the first. passes_shown: number of passes of the best picture on the screen, 0 for a softer
     picture. samples, samples_converged, draw_s: cameras of the last picture so far and in all, and the time of the
     last drawing in seconds.
     """
