@@ -116,11 +116,13 @@ def _open_smaller(scratch: Path) -> None:
     _open(replace(_photo(scratch), max_pixels=160 * 200 // 2))
 
 
-def _open_with_small_map(scratch: Path) -> None:
+def _open_with_small_maps(scratch: Path) -> None:
+    """Open a photo with a small exact map, then with a soft one, as networks and phones make them."""
     source = _photo(scratch)
-    disparity = read_map(scratch / "photo_disparity.pfm")
-    write_map(scratch / "photo_disparity.pfm", np.nan_to_num(disparity, nan=0.0)[::4, ::4] / np.float32(4))
-    _open(source)
+    disparity = np.nan_to_num(read_map(scratch / "photo_disparity.pfm"), nan=0.0) / np.float32(4)
+    for small in (disparity[::4, ::4], disparity.reshape(40, 4, 50, 4).mean(axis=(1, 3))):
+        write_map(scratch / "photo_disparity.pfm", np.ascontiguousarray(small))
+        _open(source)
 
 
 def _open_guessed(scratch: Path) -> None:
@@ -184,7 +186,7 @@ STEPS: tuple[Callable[[Path], None], ...] = (
     _find_gloss,
     _open_guessed,
     _open_smaller,
-    _open_with_small_map,
+    _open_with_small_maps,
     _open_hdr,
     _draw_at_own_size,
 )

@@ -1,19 +1,17 @@
-"""Downloads of a model from a hub on this machine, by `iibr models get` in a process, as users run it."""
+"""Downloads of a model from a hub on this machine: resumed, and compared with what the hub states."""
 
 from __future__ import annotations
 
-import os
-import signal
-import subprocess
-import sys
-import time
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
-from iibr_core.depth.models.catalog import known_model
+from iibr_core.depth.models.catalog import fetch, known_model
+from iibr_core.depth.models.download import local_folder
 from iibr_core.depth.models.known import USUAL_MODEL
+from iibr_core.runtime.work import Cancelled, stoppable
+from iibr_core.types import InputError
 from tests.local_hub import Hub, local_hub
 
 MODEL = known_model(USUAL_MODEL)
@@ -29,64 +27,50 @@ PUBLISHED = {
 
 
 @pytest.fixture
-def hub() -> Iterator[Hub]:
-    with local_hub(MODEL.commit, PUBLISHED) as hub:
-        yield hub
+def hub(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Hub]:
+    with local_hub(MODEL.commit, PUBLISHED) as server:
+        # The library reads its variables once, at its import.
+        monkeypatch.setattr("huggingface_hub.constants.ENDPOINT", server.address)
+        template = f"{server.address}/{{repo_id}}/resolve/{{revision}}/{{filename}}"
+        monkeypatch.setattr("huggingface_hub.constants.HUGGINGFACE_CO_URL_TEMPLATE", template)
+        monkeypatch.setattr("huggingface_hub.constants.HF_HUB_CACHE", str(tmp_path))
+        yield server
 
 
-def start(hub: Hub, home: Path) -> subprocess.Popen[str]:
-    """Start a download. The hub's library reads its address once, at its import."""
-    command = [sys.executable, "-P", "-m", "viewer", "models", "get", MODEL.name, "--yes"]
-    environment = {**os.environ, "HF_ENDPOINT": hub.address, "HF_HOME": str(home), "XDG_DATA_HOME": str(home)}
-    return subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-
-
-def error_of(hub: Hub, home: Path) -> str:
-    """Return the last line of a download that fails."""
-    process = start(hub, home)
-    _, errors = process.communicate(timeout=100)
-    assert process.returncode == 2
-    return errors.splitlines()[-1]
-
-
-def require_whole(hub: Hub, home: Path) -> None:
+def require_whole() -> None:
     """A download succeeds, and nothing lies there but what was published and asked for."""
-    process = start(hub, home)
-    output, errors = process.communicate(timeout=100)
-    assert process.returncode == 0, errors
-    assert MODEL.commit in output
-    (folder,) = home.rglob(f"snapshots/{MODEL.commit}")
-    found = {path.relative_to(folder).as_posix(): path for path in folder.rglob("*") if path.is_file()}
-    assert {name: path.read_bytes() for name, path in found.items()} == {
-        name: data for name, data in PUBLISHED.items() if name != "README.md"
-    }
+    folder = fetch(MODEL).folder
+    found = {path.relative_to(folder).as_posix(): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+    assert found == {name: data for name, data in PUBLISHED.items() if name != "README.md"}
 
 
-def test_an_interrupted_download_is_resumed(hub: Hub, tmp_path: Path) -> None:
+def test_a_stopped_download_is_resumed(hub: Hub) -> None:
     hub.may_finish.clear()
-    process = start(hub, tmp_path)
-    end = time.monotonic() + 60
-    while sum(part.stat().st_size for part in tmp_path.rglob("model.onnx.part")) < PIECE and time.monotonic() < end:
-        time.sleep(0.05)
-    process.send_signal(signal.SIGINT)
-    process.communicate(timeout=30)
-    assert not list(tmp_path.rglob("model.onnx"))
+    part = local_folder(MODEL) / f"{WEIGHTS}.part"
+    with pytest.raises(Cancelled), stoppable(lambda: part.is_file() and part.stat().st_size >= PIECE):
+        fetch(MODEL)
+    assert not part.with_name("model.onnx").exists()
     hub.may_finish.set()
-    require_whole(hub, tmp_path)
+    require_whole()
     assert hub.begins == [0, PIECE]
 
 
-def test_other_bytes_than_the_hub_states_are_refused(hub: Hub, tmp_path: Path) -> None:
+def test_a_connection_that_breaks_is_resumed(hub: Hub) -> None:
+    hub.is_cut = True
+    require_whole()
+    assert hub.begins == [0, PIECE]
+
+
+def test_other_bytes_than_the_hub_states_are_refused(hub: Hub) -> None:
     hub.files[WEIGHTS] = PUBLISHED[WEIGHTS][::-1]
-    assert f"{WEIGHTS} is not what the hub states" in error_of(hub, tmp_path)
-    assert not list(tmp_path.rglob("model.onnx*"))
+    with pytest.raises(InputError, match=f"{WEIGHTS} is not what the hub states"):
+        fetch(MODEL)
+    assert not list(local_folder(MODEL).rglob("model.onnx*"))
     hub.files[WEIGHTS] = PUBLISHED[WEIGHTS]
-    require_whole(hub, tmp_path)
+    require_whole()
 
 
-def test_a_hub_without_the_model_is_one_line(hub: Hub, tmp_path: Path) -> None:
+def test_a_hub_without_the_model_is_one_line(hub: Hub) -> None:
     hub.commit = "f" * 40
-    error = error_of(hub, tmp_path)
-    assert error.startswith(f"iibr: {MODEL.repository} cannot be downloaded (404")
-    assert "HF_ENDPOINT" in error
-    assert "an ONNX file of your own" in error
+    with pytest.raises(InputError, match=rf"^{MODEL.repository} cannot be downloaded \(404[^\n]*$"):
+        fetch(MODEL)

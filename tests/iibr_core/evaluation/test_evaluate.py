@@ -132,7 +132,7 @@ def test_views_of_one_pixel(tmp_path: Path) -> None:
 
 
 def test_refocus_and_lpips_of_a_rendered_scene(networks: Path) -> None:  # noqa: F811
-    result = evaluate(scene_of(FOLDER / "fence"), Options(choice=UNREFINED, lpips=networks, max_pixels=20_000))[0]
+    result = evaluate(scene_of(FOLDER / "fence"), Options(choice=UNREFINED, lpips=networks, max_pixels=10_000))[0]
     photo, *_, ours = result.rows
     assert list(ours.refocus_db) == ["near", "middle", "far"]
     assert all(ours.refocus_db[name] > photo.refocus_db[name] + 3 for name in ours.refocus_db)

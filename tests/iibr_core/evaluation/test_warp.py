@@ -99,7 +99,7 @@ def fit_of(photo: FloatImage, views: Sequence[tuple[ViewOffset, FloatImage]]) ->
 def test_a_known_scale_and_shift_are_found(scale: float, shift: float) -> None:
     truth = disparity_of_square()
     estimate = (truth * np.float32(scale) + np.float32(shift)).astype(np.float32)
-    views = [(ViewOffset(t, s), view_of_square(ViewOffset(t, s))) for t in (-1.0, 1.0) for s in (-1.0, 1.0)]
+    views = [(ViewOffset(t, s), view_of_square(ViewOffset(t, s))) for t, s in ((-1.0, 1.0), (1.0, -1.0))]
     fitted = fit_of(view_of_square(CENTRE), views).fitted(estimate)
     assert np.abs(fitted - truth).max() < 0.2
 

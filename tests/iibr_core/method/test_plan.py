@@ -1,10 +1,18 @@
 """Which views a scene needs, and why."""
 
+import numpy as np
 import pytest
 
 from iibr_core.method import memory
 from iibr_core.method.memory import scene_bytes
-from iibr_core.method.plan import MAX_VIEWS_A_SIDE, STEP_PX, PlanOverrides, plan_for_viewing, plan_literal
+from iibr_core.method.plan import (
+    EDGE_REACH_PX,
+    MAX_VIEWS_A_SIDE,
+    STEP_PX,
+    PlanOverrides,
+    plan_for_viewing,
+    plan_literal,
+)
 from iibr_core.types import TOTAL_PARALLAX, GridShape, InputError
 from tests.iibr_core.scenes import disparity_of, square_before_wall
 
@@ -48,6 +56,15 @@ def test_literal_takes_disparity_as_it_is():
 def test_depth_edges_are_steps_of_one_and_a_half_pixels_in_the_outermost_view(step_px, is_edge):
     photo, disparity = square_before_wall(foreground=step_px / 2)
     assert (plan_literal(photo, disparity, GridShape(5, 3)).edge_fraction > 0) == is_edge
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize("axis", [0, 1])
+def test_pixels_near_a_step_up_or_down_either_way_count(axis, sign):
+    photo, disparity = square_before_wall()
+    values = sign * 2.0 * (np.indices(disparity.values.shape)[axis] >= 30)
+    plan = plan_literal(photo, disparity_of(values), GridShape(3, 3))
+    assert plan.edge_fraction == pytest.approx((2 * EDGE_REACH_PX + 1) / values.shape[axis])
 
 
 def test_less_memory_gives_fewer_views(monkeypatch):
