@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+from imgui_bundle import imgui
+
 from iibr_core.beyond.optics import CENTRE
 from iibr_core.types import ViewOffset
 from viewer.app.pointer import is_marking_gloss
@@ -58,8 +60,6 @@ def _escape_actions(state: AppState) -> list[Action]:
         return [do(selection.deselect)]
     if state.brush.is_on:
         return [do(depth.set_brush, replace(state.brush, is_on=False))]
-    if state.tilt_handles is not None:
-        return [do(lens.show_tilt_handles, False)]
     if state.inspection.comparison is not None:
         return [do(inspection.compare, None)]
     if state.inspection.overlay is not None:
@@ -69,8 +69,6 @@ def _escape_actions(state: AppState) -> list[Action]:
 
 def read_keys() -> Keys:
     """Return the keys pressed in this ImGui frame; none while a text field has the keyboard."""
-    from imgui_bundle import imgui
-
     io = imgui.get_io()
     if io.want_text_input:
         return Keys()

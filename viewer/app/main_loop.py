@@ -22,8 +22,8 @@ from viewer.app.pointer import (
     actions_from_pointer,
     gesture_end,
     gesture_start,
+    read_pointer,
 )
-from viewer.app.pointer_reading import read_pointer
 from viewer.app.preferences_store import PreferencesKeeper, load_preferences
 from viewer.app.scene_loader import SceneLoader
 from viewer.app.session_store import SessionStore

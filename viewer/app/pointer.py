@@ -1,10 +1,13 @@
-"""The mouse -> actions, by pure functions."""
+"""The mouse -> actions: one function reads it from ImGui, pure functions map it to actions."""
 
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+
+from imgui_bundle import imgui
 
 from iibr_core.scenes.lens_limits import focus_limits
 from iibr_core.scenes.rect import Rect
@@ -19,32 +22,29 @@ from viewer.model.state.app_state import AppState, Hover
 from viewer.model.state.depth import DepthSample
 
 DRAG_THRESHOLD = 4.0
-"""A press that moved farther than this (window units) is a drag, not a click."""
-
+"""Distance, in window units, from which on a press is a drag and no click."""
 DRAG_ACROSS_GRID = 0.6
-"""The share of the picture's width that a drag takes from one side of the grid to the other, at least."""
-
+"""Shortest drag from one side of the grid to the other, as a share of the visible width."""
 FOCUS_STEPS = 40
 """Notches of the wheel from the nearest focus to the farthest."""
-
 BRUSH_NOTCH = 1.15
-"""A notch of the wheel makes the brush so many times as large."""
-
+"""Factor of the brush's size for a notch of the wheel."""
 HANDLE_REACH = 14.0
-"""A press this close to a tilt handle (window units at usual size) takes it."""
-
+"""Largest distance at which a press takes a tilt handle, in window units at usual size."""
 DIVIDER_REACH = 8.0
-"""A press this close to the divider takes it."""
+"""Largest distance at which a press takes the divider, in window units at usual size."""
+PANEL_CLICK_S, PANEL_REACH = 0.6, 8.0
+"""Time and distance (window units) within which a second press belongs to the panel of the first, which may be gone."""
 
 
 @dataclass(frozen=True)
 class Pointer:
-    """The mouse as seen in one frame, in window units; steps are how far it moved since the frame before.
+    """The mouse in one frame, in window units. step_x, step_y: movement since the previous frame.
 
-    drag_distance: the farthest from where it was pressed, the frame of its release included. becomes_drag: whether it
-    has been no drag before this frame. pulls: the middle button is down: the drag moves the picture. holds_ctrl:
-    Ctrl is down, or was at the frame's beginning. holds_panel: whether the press that is held was on a panel.
-    panel_press: place and time (seconds) of the last press on a panel.
+    drag_distance: largest distance from the press, the frame of the release included. becomes_drag: whether this frame
+    makes it a drag. pulls: the middle button is down, so the drag moves the picture. holds_ctrl: Ctrl is down, or was
+    at the beginning. holds_panel: the press that is held was on a panel. panel_press: place and time (seconds) of
+    the last press on a panel.
     """
 
     x: float = 0.0
@@ -61,80 +61,151 @@ class Pointer:
     clicks: int = 0
     wheel: float = 0.0
     is_over_panel: bool = False
-    holds_panel: bool = False
-    panel_press: tuple[float, float, float] = (0.0, 0.0, -math.inf)
     holds_ctrl: bool = False
     pulls: bool = False
+    holds_panel: bool = False
+    panel_press: tuple[float, float, float] = (0.0, 0.0, -math.inf)
+
+    @property
+    def is_held(self) -> bool:
+        """Whether the left button is down, or was released in this frame."""
+        return self.is_down or self.is_released
+
+    @property
+    def is_drag(self) -> bool:
+        """Whether the press moved too far for a click."""
+        return self.drag_distance > DRAG_THRESHOLD
 
 
 NO_POINTER = Pointer()
-
-
 Pick = Callable[[float, float], float | None]
-"""Disparity at a pixel of the picture, or None."""
+"""Function that returns the disparity at a pixel of the picture, None if it is unknown."""
+
+
+@dataclass(frozen=True)
+class _Hand:
+    """The pointer over a picture. frame: the visible part of the picture."""
+
+    pointer: Pointer
+    layout: Layout
+    state: AppState
+    scene: Scene
+    picture: Rect
+    frame: Rect
+    pick: Pick
+
+    @property
+    def is_over_frame(self) -> bool:
+        """Whether the pointer is over the visible picture."""
+        return self.frame.contains(self.pointer.x, self.pointer.y)
+
+    @property
+    def began_in_frame(self) -> bool:
+        """Whether the press was in the visible picture."""
+        return self.frame.contains(self.pointer.pressed_x, self.pointer.pressed_y)
+
+    @property
+    def pixel(self) -> tuple[float, float]:
+        """Pixel (x, y) of the picture under the pointer."""
+        return pixel_at(self.picture, self.scene.size, self.pointer.x, self.pointer.y)
+
+    def place_in_photo(self) -> tuple[tuple[float, float], float]:
+        """Return where the photo shows the surface under the pointer, in shares of its size, and its disparity."""
+        x_px, y_px = self.pixel
+        disparity, eye = self.pick(x_px, y_px) or 0.0, self.state.optics.eye
+        x_px, y_px = x_px + disparity * eye.s, y_px + disparity * eye.t
+        return ((x_px + 0.5) / self.scene.width, (y_px + 0.5) / self.scene.height), disparity
+
+
+def read_pointer(before: Pointer = NO_POINTER) -> Pointer:
+    """Return the mouse in this ImGui frame. before: the mouse in the previous frame."""
+    io = imgui.get_io()
+    moved = imgui.get_mouse_drag_delta(imgui.MouseButton_.left, 0.0)
+    # ImGui leaves out the frame of the release, which may hold all of a quick drag.
+    drag_distance = max(float(io.mouse_drag_max_distance_sqr[0]) ** 0.5, math.hypot(moved.x, moved.y))
+    was_drag = before.is_down and not io.mouse_clicked[0] and before.is_drag
+    ctrl_keys = imgui.Key.left_ctrl, imgui.Key.right_ctrl, imgui.Key.left_super, imgui.Key.right_super
+    middle = imgui.MouseButton_.middle
+    # In the frame of the press, the step led to the place of the press.
+    step = imgui.ImVec2(0.0, 0.0) if io.mouse_clicked[middle] else io.mouse_delta
+    now_s, is_pressed, is_over_panel = time.perf_counter(), bool(io.mouse_clicked[0]), bool(io.want_capture_mouse)
+    if is_pressed:
+        x, y, pressed_s = before.panel_press
+        is_close = math.hypot(io.mouse_pos.x - x, io.mouse_pos.y - y) < PANEL_REACH
+        is_over_panel |= is_close and now_s - pressed_s < PANEL_CLICK_S
+    is_held = is_pressed or bool(io.mouse_down[0] or io.mouse_released[0])
+    holds_panel = is_over_panel if is_pressed else before.holds_panel and is_held
+    return Pointer(
+        x=io.mouse_pos.x,
+        y=io.mouse_pos.y,
+        step_x=step.x,
+        step_y=step.y,
+        drag_distance=drag_distance,
+        becomes_drag=drag_distance > DRAG_THRESHOLD and not was_drag,
+        pressed_x=io.mouse_pos.x - moved.x,
+        pressed_y=io.mouse_pos.y - moved.y,
+        is_down=bool(io.mouse_down[0]),
+        is_pressed=is_pressed,
+        is_released=bool(io.mouse_released[0]),
+        clicks=int(io.mouse_clicked_last_count[0]),
+        wheel=io.mouse_wheel,
+        is_over_panel=is_over_panel or holds_panel,
+        # The wheel may have turned in the frame in which Ctrl was released.
+        holds_ctrl=any(imgui.is_key_down(key) or imgui.is_key_released(key) for key in ctrl_keys),
+        pulls=imgui.is_mouse_down(middle) or imgui.is_mouse_released(middle),
+        holds_panel=holds_panel,
+        panel_press=(io.mouse_pos.x, io.mouse_pos.y, now_s) if is_pressed and is_over_panel else before.panel_press,
+    )
 
 
 def actions_from_pointer(pointer: Pointer, layout: Layout, state: AppState, pick: Pick) -> list[Action]:
-    """What the mouse asks for. Drags and clicks count where they began in the picture; the panel's never arrive."""
+    """Return the actions of the mouse. Drags and clicks count if they began in the picture."""
     scene, picture = state.scene, layout.picture
     if scene is None or picture is None or pointer.is_over_panel:
         return []
-    frame = layout.frame or picture
+    hand = _Hand(pointer, layout, state, scene, picture, layout.frame or picture, pick)
     if state.inspection.shows_views:
-        return _on_sheet(pointer, layout, scene, frame)
-    if pointer.pulls or _zooms(pointer, layout, frame):
-        return _zoom_actions(pointer, layout, frame)
+        return _on_sheet(hand)
+    if pointer.pulls or _zooms(hand):
+        return _zoom_actions(hand)
     if is_marking_gloss(state):
-        return _gloss_actions(pointer, layout, state, scene, picture, pick)
+        return _gloss_actions(hand)
     if is_brushing(state):
-        return _paint_actions(pointer, layout, state, scene, picture, pick)
-    if pointer.wheel and frame.contains(pointer.x, pointer.y):
+        return _paint_actions(hand)
+    if pointer.wheel and hand.is_over_frame:
         low, high = focus_limits(scene)
         return [do(lens.set_focus, state.optics.focus_disparity + pointer.wheel * (high - low) / FOCUS_STEPS)]
-    if not frame.contains(pointer.pressed_x, pointer.pressed_y):
+    if not hand.began_in_frame:
         return []
-    if (pointer.is_down or pointer.is_released) and pointer.drag_distance > DRAG_THRESHOLD:
-        return _drag(pointer, layout, state, scene, picture, pick)
-    if pointer.is_released and pointer.drag_distance <= DRAG_THRESHOLD:
-        if _grabs_divider(pointer, layout, state, frame):
-            return []
-        if pointer.clicks > 1:
-            return [do(viewpoint.return_home, takes_back_click=True)]
-        at = pixel_at(picture, scene.size, pointer.x, pointer.y)
-        picked = pick(*at)
-        return [] if picked is None else [do(lens.focus_on, place_of(*at, scene), picked)]
-    return []
+    if pointer.is_held and pointer.is_drag:
+        return _drag(hand)
+    return _click(hand) if pointer.is_released else []
 
 
 def gesture_start(pointer: Pointer, state: AppState) -> list[Action]:
-    """What a press ends: more of the same kind is another edit from here on. Goes before the frame's edits."""
+    """Return the end of a gesture that a press ends; it goes before the frame's edits."""
     return [do(gesture.end_gesture)] if pointer.is_pressed and state.history.gesture else []
 
 
 def gesture_end(pointer: Pointer) -> list[Action]:
-    """What letting go ends. Goes after the frame's edits."""
+    """Return the end of a gesture that a release ends; it goes after the frame's edits."""
     return [do(gesture.end_gesture)] if pointer.is_released else []
 
 
 def actions_from_hover(pointer: Pointer, layout: Layout, state: AppState, pick: Pick) -> list[Action]:
-    """Tell where the pointer is in the picture, if that is news. While it drags it points at nothing."""
-    scene, picture = state.scene, layout.picture
-    hover, paints = None, is_brushing(state) or is_marking_gloss(state)
-    is_pointing = (
-        not pointer.is_over_panel
-        and not state.inspection.shows_views
-        and not (pointer.pulls or _is_on_minimap(layout, pointer.x, pointer.y))
-        and (paints or not (pointer.is_down and pointer.drag_distance > DRAG_THRESHOLD))
-    )
-    frame = layout.frame
+    """Return the place of the pointer in the picture if it is new. A pointer that drags has no place."""
+    scene, picture, frame, hover = state.scene, layout.picture, layout.frame, None
+    paints = is_brushing(state) or is_marking_gloss(state)
+    is_busy = pointer.pulls or _is_on_minimap(layout, pointer.x, pointer.y) or state.inspection.shows_views
+    is_pointing = not (pointer.is_over_panel or is_busy) and (paints or not (pointer.is_down and pointer.is_drag))
     if scene is not None and picture and frame and is_pointing and frame.contains(pointer.x, pointer.y):
-        x_px, y_px = pixel_at(picture, scene.size, pointer.x, pointer.y)
-        hover = Hover(x_px, y_px, pick(x_px, y_px))
+        pixel = pixel_at(picture, scene.size, pointer.x, pointer.y)
+        hover = Hover(*pixel, pick(*pixel))
     return [do(inspection.set_hover, hover)] if hover != state.hover else []
 
 
 def is_brushing(state: AppState) -> bool:
-    """Whether dragging over the picture paints."""
+    """Return whether dragging over the picture paints depth."""
     scene = state.scene
     return state.brush.is_on and scene is not None and scene.plan is not None and not scene.is_sketch
 
@@ -144,23 +215,34 @@ def is_marking_gloss(state: AppState) -> bool:
     return state.gloss_brush.is_on and state.optics.gloss is not None and state.scene is not None
 
 
-def _zooms(pointer: Pointer, layout: Layout, frame: Rect) -> bool:
-    """Whether the wheel zooms, or the press was on the small picture."""
+def units_per_view(layout: Layout, scene: Scene) -> float:
+    """Return the window units of drag for one view step.
+
+    The nearest surface sticks to the pointer, unless its parallax is so small that the viewpoint would be too touchy:
+    a drag across the grid takes at least `DRAG_ACROSS_GRID` of the visible width.
+    """
+    assert layout.picture is not None
+    assert layout.frame is not None
+    nearest = scene.disparity_range_px[1] * layout.picture.width / scene.width
+    return max(nearest, DRAG_ACROSS_GRID * layout.frame.width / max(scene.grid.columns - 1, 1))
+
+
+def _zooms(hand: _Hand) -> bool:
+    """Return whether the wheel zooms, or the press was on the small picture."""
+    pointer = hand.pointer
     if pointer.wheel and pointer.holds_ctrl:
-        return frame.contains(pointer.x, pointer.y)
-    is_held = pointer.is_down or pointer.is_released
-    return is_held and _is_on_minimap(layout, pointer.pressed_x, pointer.pressed_y)
+        return hand.is_over_frame
+    return pointer.is_held and _is_on_minimap(hand.layout, pointer.pressed_x, pointer.pressed_y)
 
 
 def _is_on_minimap(layout: Layout, x: float, y: float) -> bool:
     return layout.minimap is not None and layout.minimap.contains(x, y)
 
 
-def _zoom_actions(pointer: Pointer, layout: Layout, frame: Rect) -> list[Action]:
-    """Larger or smaller about the pointer; else the picture follows the hand, or shows what is under it on the small
-    picture.
-    """
-    if pointer.wheel and pointer.holds_ctrl and frame.contains(pointer.x, pointer.y):
+def _zoom_actions(hand: _Hand) -> list[Action]:
+    """Zoom about the pointer, show a place of the small picture, or pull the picture."""
+    pointer, layout = hand.pointer, hand.layout
+    if pointer.wheel and pointer.holds_ctrl and hand.is_over_frame:
         return [do(viewpoint.set_zoom, layout.zoomed(pointer.wheel, pointer.x, pointer.y))]
     if not pointer.pulls:
         return [do(viewpoint.set_zoom, layout.shown_on_minimap(pointer.x, pointer.y))]
@@ -169,114 +251,97 @@ def _zoom_actions(pointer: Pointer, layout: Layout, frame: Rect) -> list[Action]
     return [do(viewpoint.set_zoom, layout.pulled(pointer.step_x, pointer.step_y))]
 
 
-def _paint_actions(
-    pointer: Pointer, layout: Layout, state: AppState, scene: Scene, picture: Rect, pick: Pick
-) -> list[Action]:
+def _paint_actions(hand: _Hand) -> list[Action]:
     """Return the actions of a tool: it paints on the surface under the pointer, picks its depth (Ctrl), or selects it.
     The wheel sets the size of the brush, or the tolerance of the selection.
     """
-    frame = layout.frame or picture
-    brush = state.brush
-    if pointer.wheel and frame.contains(pointer.x, pointer.y):
+    pointer, stroke, brush = hand.pointer, hand.state.stroke, hand.state.brush
+    if pointer.wheel and hand.is_over_frame:
         factor = BRUSH_NOTCH**pointer.wheel
         if brush.tool == "select":
             return [do(depth.set_brush, replace(brush, tolerance=brush.tolerance * factor))]
         return [do(depth.set_brush, replace(brush, radius=brush.radius * factor))]
-    begins = pointer.is_pressed and frame.contains(pointer.pressed_x, pointer.pressed_y)
-    if not pointer.is_down or not (begins or state.stroke is not None):
+    begins = pointer.is_pressed and hand.began_in_frame
+    if not pointer.is_down or not (begins or stroke is not None):
         return []
-    place, disparity = _place_in_photo(pointer, state, scene, picture, pick)
+    place, disparity = hand.place_in_photo()
     if brush.tool == "select":
         return [do(selection.select, place)] if begins else []
-    if state.stroke is None and pointer.holds_ctrl:
+    if stroke is None and pointer.holds_ctrl:
         return [do(depth.pick, DepthSample(place, disparity))]
     return [do(depth.paint, place)]
 
 
-def _place_in_photo(
-    pointer: Pointer, state: AppState, scene: Scene, picture: Rect, pick: Pick
-) -> tuple[tuple[float, float], float]:
-    """Return where the photo shows the surface under the pointer, in shares of its size, and its disparity."""
-    x_px, y_px = pixel_at(picture, scene.size, pointer.x, pointer.y)
-    disparity, eye = pick(x_px, y_px) or 0.0, state.optics.eye
-    x_px, y_px = x_px + disparity * eye.s, y_px + disparity * eye.t
-    return ((x_px + 0.5) / scene.width, (y_px + 0.5) / scene.height), disparity
-
-
-def _gloss_actions(
-    pointer: Pointer, layout: Layout, state: AppState, scene: Scene, picture: Rect, pick: Pick
-) -> list[Action]:
-    """Mark the surface under the pointer; the wheel makes the brush larger."""
-    frame, brush = layout.frame or picture, state.gloss_brush
-    if pointer.wheel and frame.contains(pointer.x, pointer.y):
+def _gloss_actions(hand: _Hand) -> list[Action]:
+    """Mark the surface under the pointer; the wheel changes the brush's size."""
+    pointer, brush = hand.pointer, hand.state.gloss_brush
+    if pointer.wheel and hand.is_over_frame:
         return [do(lens.take_gloss_brush, replace(brush, radius=brush.radius * BRUSH_NOTCH**pointer.wheel))]
-    if not pointer.is_down or not frame.contains(pointer.pressed_x, pointer.pressed_y):
+    if not pointer.is_down or not hand.began_in_frame:
         return []
-    place, _ = _place_in_photo(pointer, state, scene, picture, pick)
+    place, _ = hand.place_in_photo()
     return [do(lens.paint_gloss, place, brush, begins=pointer.is_pressed)]
 
 
-def _drag(pointer: Pointer, layout: Layout, state: AppState, scene: Scene, picture: Rect, pick: Pick) -> list[Action]:
-    """The divider or a tilt handle where one was taken, else the viewpoint."""
-    frame = layout.frame or picture
-    if _grabs_divider(pointer, layout, state, frame):
-        return [do(inspection.move_divider, (pointer.x - frame.x) / frame.width)]
-    index = _grabbed_handle(pointer, layout, state, picture)
-    if index is not None:
-        at = pixel_at(picture, scene.size, pointer.x, pointer.y)
-        return [do(lens.move_tilt_handle, index, place_of(*at, scene), pick(*at))]
-    return _eye_drag(pointer, layout, scene, state.optics.eye)
+def _on_sheet(hand: _Hand) -> list[Action]:
+    """Go to the view that was clicked."""
+    pointer, grid = hand.pointer, hand.scene.grid
+    if not pointer.is_released or pointer.is_drag:
+        return []
+    view = view_at(hand.frame, grid, hand.layout.ui_scale, pointer.x, pointer.y)
+    return [] if view is None else [do(lens.move_eye, grid.offset(*view))]
 
 
-def _grabs_divider(pointer: Pointer, layout: Layout, state: AppState, frame: Rect) -> bool:
-    """Whether the press was close to the divider, or it is dragged already."""
-    shown = state.inspection
+def _click(hand: _Hand) -> list[Action]:
+    """Focus on the surface under the pointer; a double click returns to the middle."""
+    if _grabs_divider(hand):
+        return []
+    if hand.pointer.clicks > 1:
+        return [do(viewpoint.return_home, takes_back_click=True)]
+    disparity = hand.pick(*hand.pixel)
+    return [] if disparity is None else [do(lens.focus_on, place_of(*hand.pixel, hand.scene), disparity)]
+
+
+def _drag(hand: _Hand) -> list[Action]:
+    """Drag the divider, a tilt handle, or the viewpoint."""
+    if _grabs_divider(hand):
+        return [do(inspection.move_divider, (hand.pointer.x - hand.frame.x) / hand.frame.width)]
+    index = _grabbed_handle(hand)
+    if index is None:
+        return _eye_drag(hand)
+    return [do(lens.move_tilt_handle, index, place_of(*hand.pixel, hand.scene), hand.pick(*hand.pixel))]
+
+
+def _grabs_divider(hand: _Hand) -> bool:
+    """Return whether the press was close to the divider, or it is being dragged."""
+    shown = hand.state.inspection
     if shown.comparison is None:
         return False
-    x = frame.x + shown.divider * frame.width
-    return shown.divider_taken or abs(pointer.pressed_x - x) <= DIVIDER_REACH * layout.ui_scale
+    x = hand.frame.x + shown.divider * hand.frame.width
+    return shown.divider_taken or abs(hand.pointer.pressed_x - x) <= DIVIDER_REACH * hand.layout.ui_scale
 
 
-def _on_sheet(pointer: Pointer, layout: Layout, scene: Scene, frame: Rect) -> list[Action]:
-    """Go to the view that was clicked."""
-    is_click = pointer.is_released and pointer.drag_distance <= DRAG_THRESHOLD
-    view = view_at(frame, scene.grid, layout.ui_scale, pointer.x, pointer.y) if is_click else None
-    return [] if view is None else [do(lens.move_eye, scene.grid.offset(*view))]
-
-
-def _grabbed_handle(pointer: Pointer, layout: Layout, state: AppState, picture: Rect) -> int | None:
-    """Which tilt handle is dragged: the one taken already, else the nearer one the press was close to."""
-    handles = state.tilt_handles
-    if handles is None:
-        return None
-    if handles.taken is not None:
-        return handles.taken
-    distances = [math.hypot(x - pointer.pressed_x, y - pointer.pressed_y) for x, y in handle_points(handles, picture)]
+def _grabbed_handle(hand: _Hand) -> int | None:
+    """Return the index of the tilt handle that is dragged: the one taken, else the nearest one within reach."""
+    handles, pointer = hand.state.tilt_handles, hand.pointer
+    if handles is None or handles.taken is not None:
+        return None if handles is None else handles.taken
+    points = handle_points(handles, hand.picture)
+    distances = [math.hypot(x - pointer.pressed_x, y - pointer.pressed_y) for x, y in points]
     nearest = distances.index(min(distances))
-    return nearest if distances[nearest] <= HANDLE_REACH * layout.ui_scale else None
+    return nearest if distances[nearest] <= HANDLE_REACH * hand.layout.ui_scale else None
 
 
-def _eye_drag(pointer: Pointer, layout: Layout, scene: Scene, eye: ViewOffset) -> list[Action]:
-    """Content follows the hand: a point of disparity d goes d px left for a step right, so the eye goes against it.
+def _eye_drag(hand: _Hand) -> list[Action]:
+    """Move the viewpoint against the drag, so that near surfaces follow the hand.
 
-    What it moved before it counted as a drag is caught up, and what it moved in the frame of its release counts.
+    The first step of a drag includes the movement before it counted as one.
     """
+    pointer, eye = hand.pointer, hand.state.optics.eye
     step_x, step_y = pointer.step_x, pointer.step_y
     if pointer.becomes_drag:
         step_x, step_y = pointer.x - pointer.pressed_x, pointer.y - pointer.pressed_y
     if not (step_x or step_y):
         return []
-    per_view = units_per_view(layout, scene)
+    per_view = units_per_view(hand.layout, hand.scene)
     return [do(lens.move_eye, ViewOffset(eye.t - step_y / per_view, eye.s - step_x / per_view))]
-
-
-def units_per_view(layout: Layout, scene: Scene) -> float:
-    """Window units of drag for one view step.
-
-    As far as the nearest surface moves on screen, so that it sticks to the pointer; but no finer than crosses the grid
-    in `DRAG_ACROSS_GRID` of what is seen of the picture, or scenes of little parallax would be too touchy.
-    """
-    assert layout.picture is not None
-    assert layout.frame is not None
-    nearest = scene.disparity_range_px[1] * layout.picture.width / scene.width
-    return max(nearest, DRAG_ACROSS_GRID * layout.frame.width / max(scene.grid.columns - 1, 1))

@@ -1,6 +1,6 @@
 """Draws the visible part of the picture from the photo at its own size while nothing moves.
 
-It replaces the picture drawn from the views as soon as it is ready, until anything changes.
+It replaces the picture from the views once it is ready, until anything changes.
 """
 
 from __future__ import annotations

@@ -10,7 +10,7 @@ from viewer.model.state.app_state import AppState
 
 
 def end_gesture(state: AppState) -> AppState:
-    """Let go of what is held: the next step is another edit, for undo."""
+    """Release handles, divider and stroke: the next step is another edit, for undo."""
     state = release_divider(end_stroke(state))
     if state.tilt_handles is not None and state.tilt_handles.taken is not None:
         state = replace(state, tilt_handles=replace(state.tilt_handles, taken=None))

@@ -1,7 +1,7 @@
-"""Disparity and aperture in a photographer's words: relative distance and f-number.
+"""Disparity and aperture in a photographer's units: relative distance and f-number.
 
-Both need a photo whose focal length is known and whose given disparity is 0 at infinity. Distances count from 1 at the
-plane that stays still; one photo does not tell how far away that is in metres, so the f-number assumes a distance.
+Both need a photo whose focal length is known and whose given disparity is 0 at infinity. The plane that stays still has
+the relative distance 1; its distance in metres is not known from one photo, so the f-number assumes one.
 """
 
 from __future__ import annotations
@@ -12,23 +12,23 @@ from iibr_core.scenes.lens_limits import focus_limits
 from iibr_core.scenes.scene import Scene
 
 ASSUMED_DISTANCE_M = 2.0
-"""Of the plane that stays still; f-numbers are those of a lens on full frame focused there."""
+"""Assumed distance of the plane that stays still, at which the full-frame lens of an f-number is focused."""
 
 FULL_FRAME_WIDTH_M = 0.036
 EQUIVALENT_FOCAL_M = 0.085
 FARTHEST_M = 1000.0
-"""What is farther is as good as at infinity."""
+"""Distance from which on a surface counts as infinitely far."""
 
 
 def relative_distance(scene: Scene, disparity: float) -> float | None:
-    """Distance of a field disparity, 1 = the plane that stays still; None where not known or beyond infinity."""
+    """Return the distance of a field disparity, 1 for the plane that stays still; None if unknown or infinite."""
     given = _disparity_as_given(scene, disparity)
     still = _disparity_as_given(scene, 0.0)
     return still / given if given is not None and still is not None and given > 0 and still > 0 else None
 
 
 def disparity_at(scene: Scene, distance: float) -> float | None:
-    """The inverse of `relative_distance`."""
+    """Return the field disparity of a relative distance, the inverse of `relative_distance`."""
     still = _disparity_as_given(scene, 0.0)
     if still is None or scene.plan is None or still <= 0 or distance <= 0:
         return None
@@ -36,14 +36,14 @@ def disparity_at(scene: Scene, distance: float) -> float | None:
 
 
 def distance_limits(scene: Scene) -> tuple[float, float] | None:
-    """Relative distance of the nearest and the farthest surface; None where either is not known."""
+    """Return the relative distances of the nearest and the farthest surface, None if one is unknown."""
     far, near = scene.disparity_range_px
     ends = relative_distance(scene, near), relative_distance(scene, far)
     return (ends[0], ends[1]) if ends[0] is not None and ends[1] is not None and ends[0] < ends[1] else None
 
 
 def f_number(scene: Scene, aperture_diameter: float) -> float | None:
-    """The f-number of an aperture in view steps; None where not known, and for a pinhole."""
+    """Return the f-number of an aperture in view steps, None if unknown and for a pinhole."""
     still = _disparity_as_given(scene, 0.0)
     if still is None or scene.plan is None or scene.focal_px is None or still <= 0 or aperture_diameter <= 0:
         return None
@@ -53,10 +53,10 @@ def f_number(scene: Scene, aperture_diameter: float) -> float | None:
 
 
 def equivalent_f_number(scene: Scene, aperture_diameter: float) -> float | None:
-    """The f-number of a full-frame lens that blurs alike, where `f_number` is not known; None for a pinhole.
+    """Return the f-number of a full-frame portrait lens that blurs as much; None for a pinhole.
 
-    It is a portrait lens, focused at `ASSUMED_DISTANCE_M` on the nearest surface, with the farthest one at infinity:
-    those that were found, for painted depth is no other lens.
+    That lens is focused at `ASSUMED_DISTANCE_M` on the nearest surface, with the farthest one at infinity. Painted
+    depth does not count, as it does not change the lens.
     """
     far, near = scene.disparity_range_px
     blur_px = aperture_diameter * (near - far if scene.found_span_px is None else scene.found_span_px)
@@ -66,7 +66,7 @@ def equivalent_f_number(scene: Scene, aperture_diameter: float) -> float | None:
 
 
 def f_number_text(scene: Scene, aperture_diameter: float) -> str:
-    """The aperture in a photographer's words: "f/2.8", "≈ f/2.8" where it is an equivalent, "pinhole"."""
+    """Return the aperture as text: "f/2.8", "≈ f/2.8" for an equivalent, "pinhole"."""
     stop = f_number(scene, aperture_diameter)
     if stop is not None:
         return f"f/{stop:.1f}"
@@ -75,7 +75,7 @@ def f_number_text(scene: Scene, aperture_diameter: float) -> str:
 
 
 def metres(scene: Scene, disparity: float) -> float | None:
-    """Distance of a field disparity in metres, infinite beyond what any distance has; None where it is not known."""
+    """Return the distance of a field disparity in metres, infinity beyond `FARTHEST_M`, None if unknown."""
     plan = scene.plan
     if scene.inverse_metres is None or plan is None or plan.disparity_scale == 0:
         return None
@@ -85,26 +85,26 @@ def metres(scene: Scene, disparity: float) -> float | None:
 
 
 def metres_text(distance_m: float) -> str:
-    """For people: "0.42 m", "12 m", "∞"."""
+    """Return a distance as text: "0.42 m", "12 m", "∞"."""
     if math.isinf(distance_m):
         return "∞"
     return f"{distance_m:.2f} m" if distance_m < 10 else f"{distance_m:.0f} m"
 
 
 def far_percent(scene: Scene, disparity: float) -> float:
-    """How far away a field disparity is: 0 the nearest that can be focused, 100 the farthest."""
+    """Return the position of a field disparity from 0, the nearest possible focus, to 100, the farthest."""
     low, high = focus_limits(scene)
     return 100 * (high - disparity) / (high - low)
 
 
 def disparity_at_percent(scene: Scene, percent: float) -> float:
-    """The inverse of `far_percent`."""
+    """Return the field disparity of a position, the inverse of `far_percent`."""
     low, high = focus_limits(scene)
     return high - percent / 100 * (high - low)
 
 
 def _disparity_as_given(scene: Scene, disparity: float) -> float | None:
-    """The disparity as given, before the plan; None where that tells no distance."""
+    """Return the disparity as given, before the plan; None if no distance follows from it."""
     plan = scene.plan
     if scene.focal_px is None or plan is None or plan.disparity_scale == 0:
         return None

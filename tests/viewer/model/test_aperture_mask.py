@@ -9,7 +9,7 @@ import OpenImageIO as oiio
 import pytest
 
 from iibr_core.types import InputError
-from viewer.model.aperture_mask import LARGEST_SIDE, read_mask
+from viewer.model.aperture_mask import MAX_SIDE, read_mask
 
 
 def write(path: Path, pixels: np.ndarray, kind: str = "uint8") -> Path:
@@ -38,7 +38,7 @@ def test_large_images_are_averaged(tmp_path: Path) -> None:
     pixels = np.zeros((150, 201, 1), np.uint8)
     pixels[:75] = 200
     values = values_of(write(tmp_path / "m.png", pixels))
-    assert values.shape == (LARGEST_SIDE, LARGEST_SIDE)
+    assert values.shape == (MAX_SIDE, MAX_SIDE)
     assert (values[:31] == 255).all()
     assert (values[33:] == 0).all()
 

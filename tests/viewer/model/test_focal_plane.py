@@ -13,7 +13,7 @@ from iibr_core.scenes.rect import Rect
 from iibr_core.types import GridShape
 from tests.viewer.model.test_reducers import scene_of
 from viewer.model.focal_plane import (
-    CLOSEST_HANDLES,
+    MIN_HANDLE_DISTANCE,
     focus_on,
     handle_points,
     place_of,
@@ -37,7 +37,7 @@ def test_the_plane_runs_through_both_handles_and_is_level_across_them(
     aspect: float,
 ) -> None:
     line = moved[0] - kept[0], (moved[1] - kept[1]) * aspect
-    assume(math.hypot(*line) >= CLOSEST_HANDLES)
+    assume(math.hypot(*line) >= MIN_HANDLE_DISTANCE)
     before = Optics(focus_disparity=focus, focus_tilt=tilt)
     after = tilt_through(before, moved, there, kept, aspect)
     assert sharp_disparity(after, moved) == pytest.approx(there, abs=1e-6)

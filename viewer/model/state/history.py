@@ -10,7 +10,7 @@ from iibr_core.scenes.scene import AS_FOUND, DepthSettings
 
 @dataclass(frozen=True)
 class Edit:
-    """What undo brings back."""
+    """The part of the state that undo restores."""
 
     optics: Optics
     depth_strength: float
@@ -19,10 +19,10 @@ class Edit:
 
 @dataclass(frozen=True)
 class History:
-    """Edits to go back to (the latest last) and forth to (the nearest first), in the units of the open scene.
+    """Edits to undo (the latest last) and to redo (the next first), in the units of the open scene.
 
-    last: the kind of the latest edit. gesture: that kind too while it is under way, "" after: more of the same belongs
-    to it until the pointer goes down or up.
+    last: kind of the latest edit. gesture: that kind while its gesture lasts, "" after: more edits of this kind
+    belong to it until the pointer goes down or up.
     """
 
     past: tuple[Edit, ...] = ()

@@ -1,4 +1,4 @@
-"""The small picture in a corner while the picture is zoomed: what of it is seen, and how large."""
+"""The small picture in a corner while the picture is zoomed: the visible part and the scale."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from viewer.ui.style import DARK, corners, pack_color
 
 
 def draw_minimap(layout: Layout, texture: int) -> None:
-    """Draw it. texture: GL name of the whole picture, row 0 first. Colours do not follow the theme."""
+    """Draw the small picture. texture: GL name of the whole picture, row 0 first. Colours do not follow the theme."""
     at, picture, frame, draw = layout.minimap, layout.picture, layout.frame, imgui.get_background_draw_list()
     if at is None or picture is None or frame is None:
         return

@@ -1,4 +1,4 @@
-"""What is drawn over the picture: the reticle under the pointer and the handles of the tilted plane of focus."""
+"""Overlays of the picture: the reticle under the pointer, brushes, and the handles of the tilted plane of focus."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ WORD_GAP = "  ·  "
 RETICLE_RADIUS = 11.0
 HANDLE_RADIUS = 8.0
 SAMPLE_RADIUS = 6.0
-SHARP_WITHIN = 0.04
-"""Of the scene's disparity: what lies this close to the plane of focus is called sharp."""
+SHARP_SHARE = 0.04
+"""Distance from the plane of focus up to which a surface is called sharp, as a share of the scene's disparity."""
 
 
 def overlays(state: AppState, layout: Layout) -> None:
-    """Draw everything that lies over the picture. Colours do not follow the theme: what is below is a photo."""
+    """Draw all overlays. Their colours do not follow the theme, as they lie on a photo."""
     scene, picture, frame = state.scene, layout.picture, layout.frame
     if scene is None or picture is None or frame is None:
         return
@@ -50,31 +50,26 @@ def overlays(state: AppState, layout: Layout) -> None:
 
 
 def hover_text(optics: Optics, scene: Scene, hover: Hover, units: Units = "photographic") -> str:
-    """What lies under the pointer and how it stands to the focus: "1.62 m · 0.38 m in front", "12 % in front", "sharp";
-    in a light field's units "1.24 px · × 0.80 · 0.36 in front".
+    """Describe the surface under the pointer and its distance from the focus.
+
+    "1.62 m · 0.38 m in front", "12 % in front", "sharp"; in units of light fields "1.24 px · × 0.80 · 0.36 in front".
     """
     assert hover.disparity is not None
     sharp = sharp_disparity(optics, place_of(hover.x_px, hover.y_px, scene))
-    ahead = hover.disparity - sharp
-    far, near = scene.disparity_range_px
+    ahead, (far, near) = hover.disparity - sharp, scene.disparity_range_px
+    is_sharp = abs(ahead) <= max(optics.focus_range, SHARP_SHARE * (near - far))
+    side = "in front" if ahead > 0 else "behind"
     if units == "photographic":
-        is_sharp = abs(ahead) <= max(optics.focus_range, SHARP_WITHIN * (near - far))
-        return _distance_words(scene, hover.disparity, sharp, is_sharp)
-    words = [f"{hover.disparity:.2f} px"]
-    distance = relative_distance(scene, hover.disparity)
-    if distance is not None:
-        words.append(f"× {distance:.2f}")
-    if abs(ahead) <= max(optics.focus_range, SHARP_WITHIN * (near - far)):
-        words.append("sharp")
-    else:
-        words.append(f"{abs(ahead):.2f} {'in front' if ahead > 0 else 'behind'}")
+        return _distance_words(scene, hover.disparity, sharp, is_sharp, side)
+    words, distance = [f"{hover.disparity:.2f} px"], relative_distance(scene, hover.disparity)
+    words += [] if distance is None else [f"× {distance:.2f}"]
+    words.append("sharp" if is_sharp else f"{abs(ahead):.2f} {side}")
     return WORD_GAP.join(words).replace("-", "−")
 
 
-def _distance_words(scene: Scene, disparity: float, sharp: float, is_sharp: bool) -> str:
-    """How far away, and how far before or behind what is sharp: in metres, or of the way from near to far."""
+def _distance_words(scene: Scene, disparity: float, sharp: float, is_sharp: bool, side: str) -> str:
+    """Return the distance and its difference from the focus, in metres or in per cent of the range from near to far."""
     here, focus = metres(scene, disparity), metres(scene, sharp)
-    side = "in front" if disparity > sharp else "behind"
     if here is None or focus is None:
         percent = abs(far_percent(scene, disparity) - far_percent(scene, sharp))
         return "sharp" if is_sharp else f"{percent:.0f} % {side}"
@@ -85,7 +80,7 @@ def _distance_words(scene: Scene, disparity: float, sharp: float, is_sharp: bool
 
 
 def _draw_reticle(state: AppState, scene: Scene, hover: Hover, layout: Layout, picture: Rect) -> None:
-    """A ring where a click would focus, and words beside it that stay within the picture."""
+    """Draw a ring where a click would focus, with words beside it, within the picture."""
     draw, scale = imgui.get_background_draw_list(), layout.ui_scale
     x, y = _pointed_at(hover, scene, picture)
     radius, frame = RETICLE_RADIUS * scale, layout.frame or picture
@@ -101,20 +96,20 @@ def _draw_reticle(state: AppState, scene: Scene, hover: Hover, layout: Layout, p
 
 
 def _pointed_at(hover: Hover, scene: Scene, picture: Rect) -> tuple[float, float]:
-    """In the window."""
+    """Return the place of the pointer in the window."""
     x = picture.x + (hover.x_px + 0.5) / scene.width * picture.width
     return x, picture.y + (hover.y_px + 0.5) / scene.height * picture.height
 
 
 def _draw_brush(radius: float, scene: Scene, hover: Hover, layout: Layout, picture: Rect, color: Color) -> None:
-    """How far the brush reaches about the pointer. radius: of the photo's width."""
+    """Draw the reach of a brush around the pointer. radius: as a share of the photo's width."""
     draw, scale = imgui.get_background_draw_list(), layout.ui_scale
     place = _pointed_at(hover, scene, picture)
     _ring(draw, *place, max(radius * picture.width, 2 * scale), scale, pack_color(color))
 
 
 def _draw_direction(tool: Tool, scene: Scene, hover: Hover, layout: Layout, picture: Rect) -> None:
-    """Plus or minus, for what brings nearer or pushes away."""
+    """Draw a plus or a minus for a brush that brings nearer or pushes away."""
     draw, scale, (x, y) = imgui.get_background_draw_list(), layout.ui_scale, _pointed_at(hover, scene, picture)
     arm, color = 4 * scale, pack_color(DARK.text)
     if tool in ("nearer", "farther"):
@@ -124,7 +119,7 @@ def _draw_direction(tool: Tool, scene: Scene, hover: Hover, layout: Layout, pict
 
 
 def _draw_sample(state: AppState, layout: Layout, picture: Rect) -> None:
-    """A small ring where the brush takes its depth from; it moves with what lies there."""
+    """Draw a small ring where the brush takes its depth from; it moves with the surface there."""
     sample, eye, scene = state.brush.sample, state.optics.eye, state.scene
     if sample is None or scene is None or state.brush.tool not in DEPTH_TOOLS:
         return
@@ -135,7 +130,7 @@ def _draw_sample(state: AppState, layout: Layout, picture: Rect) -> None:
 
 
 def _draw_handles(handles: TiltHandles, layout: Layout, picture: Rect) -> None:
-    """A line between two knobs: the focus changes along it."""
+    """Draw a line between two knobs, along which the focus changes."""
     draw, scale = imgui.get_background_draw_list(), layout.ui_scale
     first, second = (imgui.ImVec2(*point) for point in handle_points(handles, picture))
     draw.add_line(first, second, pack_color((0, 0, 0, 1), 0.45), 4 * scale)
@@ -147,7 +142,7 @@ def _draw_handles(handles: TiltHandles, layout: Layout, picture: Rect) -> None:
 
 
 def _ring(draw: imgui.ImDrawList, x: float, y: float, radius: float, scale: float, color: int) -> None:
-    """Legible on any ground: a light ring in a dark one."""
+    """Draw a light ring in a dark one, which is visible on any background."""
     draw.add_circle(imgui.ImVec2(x, y), radius, pack_color((0, 0, 0, 1), 0.5), 0, 3.5 * scale)
     draw.add_circle(imgui.ImVec2(x, y), radius, color, 0, 1.5 * scale)
     draw.add_circle_filled(imgui.ImVec2(x, y), 1.5 * scale, color)

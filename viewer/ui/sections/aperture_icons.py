@@ -1,4 +1,4 @@
-"""Small drawings of the aperture shapes, as they open."""
+"""Small drawings of the aperture shapes."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ MASK_CELLS = 6
 
 
 def draw_shape(shape: ApertureShape, middle: tuple[float, float], radius: float, palette: Palette) -> None:
-    """Draw the opening into the present window around a point (window units)."""
+    """Draw the opening into the current window around a point (window units)."""
     draw = imgui.get_window_draw_list()
     color = pack_color(palette.text, 0.85)
     centre = imgui.ImVec2(*middle)
@@ -34,14 +34,14 @@ def draw_shape(shape: ApertureShape, middle: tuple[float, float], radius: float,
 
 
 def _corners(shape: ApertureShape, middle: tuple[float, float], radius: float) -> list[Any]:
-    """The polygon's corners, the first on top, turned clockwise."""
+    """Return the polygon's corners, clockwise from the top."""
     turn = math.radians(shape.rotation_deg)
     angles = [turn + 2 * math.pi * i / shape.blades for i in range(shape.blades)]
     return [imgui.ImVec2(middle[0] + radius * math.sin(a), middle[1] - radius * math.cos(a)) for a in angles]
 
 
 def _lens(middle: tuple[float, float], radius: float, cut: float) -> list[Any]:
-    """Where two discs overlap, leaning like the upper right corner's cat's eye."""
+    """Return the outline of two overlapping discs, leaning like the cat's eye in the upper right corner."""
     half = math.acos(cut)
     arcs = [(a, 0.0) for a in _steps(-half, half)] + [(a, math.pi) for a in _steps(-half, half)]
     points = []
@@ -59,7 +59,7 @@ def _steps(low: float, high: float) -> list[float]:
 def _draw_mask(
     draw: imgui.ImDrawList, shape: ApertureShape, middle: tuple[float, float], radius: float, palette: Palette
 ) -> None:
-    """The mask in coarse cells; a plus where there is none yet."""
+    """Draw the mask in coarse cells, or a plus without a mask."""
     left, top, cell = middle[0] - radius, middle[1] - radius, 2 * radius / MASK_CELLS
     mask = shape.mask
     if mask is None:

@@ -1,4 +1,4 @@
-"""What the panel always shows of an open picture: presets, aperture, focus, depth strength, and loops."""
+"""Rows that the panel always shows for an open picture: presets, aperture, focus, depth strength, loops."""
 
 from __future__ import annotations
 
@@ -18,23 +18,21 @@ from viewer.ui.sections.lens_section import aperture_slider, focus_slider
 from viewer.ui.widgets import choice, in_row, label, slider
 
 PRESET_TIPS: dict[PresetName, str] = {
-    "portrait": "What you clicked last is sharp, and all else soft. Before a click: what is most likely the subject.",
-    "macro": "What is nearest is sharp, and all behind it as soft as the picture allows.",
-    "everything sharp": "No blur: all of the picture as sharp as the photo is.",
+    "portrait": "A sharp subject before a soft background. The subject is what you clicked last.",
+    "macro": "The nearest object is sharp, and all behind it is soft.",
+    "everything sharp": "No blur: as sharp as the photo.",
 }
-STRENGTH_TIP = (
-    "How far near and far things are apart: more of it moves and blurs them more. Takes effect when you let go."
-)
+STRENGTH_TIP = "Depth of the scene: more depth moves and blurs near and far objects more. Release to apply."
 MOVE_WORDS: dict[LoopKind, str] = {"circle": "Circle", "eight": "Eight", "swing": "Swing"}
 MOVE_TIPS: dict[LoopKind, str] = {
-    "circle": "Let the viewpoint go round in a circle, over and over. Press again to stop.",
-    "eight": "Let the viewpoint go along a lying eight, over and over. Press again to stop.",
-    "swing": "Let the viewpoint swing from left to right and back, over and over. Press again to stop.",
+    "circle": "Moves the viewpoint in a circle. Press again to stop.",
+    "eight": "Moves the viewpoint along a lying eight. Press again to stop.",
+    "swing": "Swings the viewpoint from left to right and back. Press again to stop.",
 }
 
 
 def essentials(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
-    """Build the rows. Of one view alone, neither focus nor aperture nor a loop changes anything."""
+    """Build the rows. A single view has no focus, aperture or loop."""
     has_views = bool(aperture_limit(scene.grid))
     actions: list[Action] = []
     if has_views:
@@ -65,7 +63,7 @@ def _presets(active: PresetName | None, layout: Layout) -> list[Action]:
 
 
 def _depth_strength(state: AppState, layout: Layout) -> list[Action]:
-    """It tells when an edit ends, because that costs a new light field."""
+    """Build the slider. The end of an edit makes a new light field."""
     limits = (0.0, DEPTH_STRENGTH_LIMIT)
     strength = slider("Depth strength", state.depth_strength, limits, "× %.2f", layout, STRENGTH_TIP)
     is_finished = imgui.is_item_deactivated_after_edit()
@@ -75,7 +73,7 @@ def _depth_strength(state: AppState, layout: Layout) -> list[Action]:
 
 
 def _move(state: AppState, layout: Layout) -> list[Action]:
-    """A button a loop; the one that runs is lit, and pressing it again stops it."""
+    """Build a button per loop; the running loop is lit, and pressing it again stops it."""
     actions: list[Action] = []
     label("Move", layout)
     for kind, width in in_row(LOOPS, layout):

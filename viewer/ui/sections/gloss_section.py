@@ -31,16 +31,16 @@ BALL_RINGS = 24
 MIN_TOWARDS = 0.05
 """Smallest z of the light's direction towards the viewer, so that it stays on the ball's near side."""
 MAX_BRIGHTNESS = 10.0
-GLOSS_TIP = "Makes a surface glossy: highlights run over it as the viewpoint moves."
+GLOSS_TIP = "Makes a surface glossy. Highlights move over it with the viewpoint."
 FAR_TIP = "Farther surfaces stay matt."
 NEAR_TIP = "Nearer surfaces stay matt."
 ROUGH_TIP = "From a mirror to a dull sheen."
-REFLECTS_TIP = "How much of the light is reflected: 4 % for plastics and varnish, 50 % and more for metals."
-BALL_TIP = "Drag to move the light about the scene."
-BRIGHT_TIP = "× 1 makes white paper that faces the light as bright as the photo's white."
-MARK_TIP = "Drag over the picture to make more of it glossy (Esc puts the brush away)."
-ERASE_TIP = "Drag over the picture to keep parts of it matt (Esc puts the brush away)."
-ONLY_TIP = "Only the strokes of the brush are glossy."
+REFLECTS_TIP = "Share of the light that is reflected: 4 % for plastics and varnish, 50 % and more for metals."
+BALL_TIP = "Drag to move the light around the scene."
+BRIGHT_TIP = "At × 1, white paper that faces the light is as bright as the photo's white."
+MARK_TIP = "Drag over the picture to make surfaces glossy. Esc puts the brush away."
+ERASE_TIP = "Drag over the picture to keep surfaces matt. Esc puts the brush away."
+ONLY_TIP = "Only surfaces under the brush strokes are glossy."
 
 
 def gloss_section(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
@@ -158,9 +158,9 @@ def _brush(brush: GlossBrush, gloss: Gloss, layout: Layout) -> list[Action]:
         if choice(label, is_in_hand, layout, (width, 0), tip):
             actions.append(do(lens.take_gloss_brush, replace(brush, erases=erases, is_on=not is_in_hand)))
         imgui.same_line(0, spacing)
-    if button("Wipe", layout, "Take all strokes away.", bool(gloss.surface.strokes), width):
+    if button("Wipe", layout, "Remove all strokes.", bool(gloss.surface.strokes), width):
         actions.append(do(lens.set_gloss, replace(gloss, surface=replace(gloss.surface, strokes=()))))
     limits = (100 * STROKE_RADIUS_LIMITS[0], 100 * STROKE_RADIUS_LIMITS[1])
-    tip = "How wide it paints, as a share of the photo's width (wheel over the picture)."
+    tip = "Radius of the brush as a share of the photo's width. The wheel over the picture changes it, too."
     size = slider("Brush size", 100 * brush.radius, limits, "%.1f %%", layout, tip, True, brush.is_on)
     return actions + ([] if size is None else [do(lens.take_gloss_brush, replace(brush, radius=size / 100))])

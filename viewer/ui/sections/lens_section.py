@@ -1,11 +1,9 @@
-"""The sliders of focus and aperture, and the panel's sections for the rest of them and for light."""
+"""The sliders of focus and aperture, and the panel's sections for focus, aperture and light."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import cast
 
 from imgui_bundle import imgui
 
@@ -39,90 +37,86 @@ from viewer.ui.sections.aperture_icons import draw_shape
 from viewer.ui.style import Palette, palette_of
 from viewer.ui.widgets import button, checkbox, choice, end_words, percent_slider, quiet, slider, whole_slider
 
-FOCUS_TIP = "What is sharp, from near to far. Click in the picture, or turn the wheel."
-FOCUS_DISPARITY_TIP = "Disparity that is sharp, px per view step: larger is closer."
-DISTANCE_TIP = "Distance that is sharp; 1 is the plane that stays still when the viewpoint moves."
-RANGE_TIP = "How much before and behind the focus is sharp, too."
-APERTURE_TIP = "How wide the lens is open: wider blurs more of what is out of focus."
-F_NUMBER_TIP = " The f-number is that of a full-frame lens focused at {:.0f} m."
-EQUIVALENT_TIP = " ≈ is the 85 mm lens on full frame, focused at 2 m, that would blur the background as much."
+FOCUS_TIP = "Distance that is sharp, from near to far. You can also click in the picture or turn the wheel."
+FOCUS_DISPARITY_TIP = "Disparity that is sharp, in pixels per view step. Larger is closer."
+DISTANCE_TIP = "Distance that is sharp. 1 is the plane that stays still while the viewpoint moves."
+RANGE_TIP = "Depth before and behind the focus that is also sharp."
+APERTURE_TIP = "Opening of the lens. A wider opening blurs everything out of focus more."
+F_NUMBER_TIP = " The f-number is that of a full-frame lens that is focused at {:.0f} m."
+EQUIVALENT_TIP = " ≈ f/2 means: an 85 mm full-frame lens, focused at 2 m, blurs the background as much at f/2."
 ALL_SHARP = "all sharp"
-"""Of an aperture that is a pinhole."""
+"""F-number of a pinhole."""
 
 PROVISIONAL = "f/…"
 """F-number while the depth that it follows from is not known yet."""
 CLOSED_STOPS = 6.0
-"""From the widest aperture to where its slider ends: a pinhole."""
-TILT_TIP = "Two handles appear in the picture: drag them onto two things, and both are sharp, with all between them."
-HIGHLIGHT_TIP = "Bright spots, such as lamps, glow where they are out of focus."
+"""Length of the aperture's slider in stops, from the widest to a pinhole."""
+TILT_TIP = "Shows two handles in the picture. Drag them onto two objects to make both sharp, and all between."
+HIGHLIGHT_TIP = "Glow of bright spots, such as lamps, that are out of focus."
 KIND_TIPS: dict[ApertureKind, str] = {
     "disc": "Disc",
     "polygon": "Blades",
-    "ring": "Ring, as of a mirror lens",
-    "cat_eye": "Cat's eye: cut off toward the corners",
-    "mask": "A grey image of your own",
+    "ring": "Ring, like a mirror lens",
+    "cat_eye": "Cat's eye: cut off toward the picture's corners",
+    "mask": "Your own grey image",
 }
 
 
 def focus_section(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
-    """Build the section: the focus as a distance where that is known, range, tilt."""
+    """Build the section: the focus as a distance if it is known, range, tilt."""
     optics = state.optics
     actions = _distance(state, scene, layout) if state.preferences.units == "light field" else []
     span, unit = focus_span(scene), _unit_of_focus(state, scene)
     form = f"± {unit.form}" if optics.focus_range else "none"
     new = slider("Range", optics.focus_range / unit.size, (0.0, span / unit.size), form, layout, RANGE_TIP)
-    _add(actions, lambda value: do(lens.set_focus_range, value * unit.size), new)
+    actions += [] if new is None else [do(lens.set_focus_range, new * unit.size)]
     shown = checkbox("Tilt", state.tilt_handles is not None or any(optics.focus_tilt), layout, TILT_TIP)
     if shown is not None:
-        actions += (
-            [do(lens.show_tilt_handles, shown)]
-            if shown
-            else [do(lens.show_tilt_handles, False), do(lens.set_focus_tilt, (0.0, 0.0))]
-        )
+        actions += [do(lens.show_tilt_handles, shown)] + ([] if shown else [do(lens.set_focus_tilt, (0.0, 0.0))])
     is_tilted = state.tilt_handles is not None or any(optics.focus_tilt)
     right, down = optics.focus_tilt
     limits = (-span / unit.size, span / unit.size)
     form = unit.form.replace("%", "%+", 1)
-    new = slider("to the right", right / unit.size, limits, form, layout, is_enabled=is_tilted)
-    _add(actions, lambda value: do(lens.set_focus_tilt, (value * unit.size, down)), new)
-    new = slider("downward", down / unit.size, limits, form, layout, is_enabled=is_tilted)
-    _add(actions, lambda value: do(lens.set_focus_tilt, (right, value * unit.size)), new)
+    new = slider("Tilt right", right / unit.size, limits, form, layout, is_enabled=is_tilted)
+    actions += [] if new is None else [do(lens.set_focus_tilt, (new * unit.size, down))]
+    new = slider("Tilt down", down / unit.size, limits, form, layout, is_enabled=is_tilted)
+    actions += [] if new is None else [do(lens.set_focus_tilt, (right, new * unit.size))]
     return actions
 
 
 @dataclass(frozen=True)
 class _Unit:
-    """size: in px per view step. form: printf-like."""
+    """A unit of disparity differences. size: in px per view step. form: printf-like."""
 
     size: float
     form: str
 
 
 def _unit_of_focus(state: AppState, scene: Scene) -> _Unit:
-    """Of differences: per cent of the way from near to far, or disparity."""
+    """Return the unit of differences: a hundredth of the range from near to far, or disparity."""
     if state.preferences.units == "light field":
         return _Unit(1.0, "%.2f px")
     return _Unit(focus_span(scene) / 100, "%.0f %%")
 
 
 def focus_slider(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
-    """Where the focus is: from near to far, in metres where they are known; or as disparity."""
+    """Build the focus slider: from near to far, in metres if they are known; or as disparity."""
     actions: list[Action] = []
     disparity = state.optics.focus_disparity
     if state.preferences.units == "light field" or not scene.has_view_disparity:  # else nothing is near or far yet
         new = slider("Focus", disparity, focus_limits(scene), "%.2f px", layout, FOCUS_DISPARITY_TIP)
-        _add(actions, lambda disparity: do(lens.set_focus, disparity), new)
+        actions += [] if new is None else [do(lens.set_focus, new)]
         return actions
     distance = metres(scene, disparity)
     form = "%.0f %%" if distance is None else metres_text(distance)
     new = slider("Focus", far_percent(scene, disparity), (0.0, 100.0), form, layout, FOCUS_TIP)
     end_words("near", "far", layout)
-    _add(actions, lambda percent: do(lens.set_focus, disparity_at_percent(scene, percent)), new)
+    actions += [] if new is None else [do(lens.set_focus, disparity_at_percent(scene, new))]
     return actions
 
 
 def _distance(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
-    """The focus as a distance, where that is known."""
+    """Build the slider of the focus as a distance, if that is known."""
     limits = distance_limits(scene)
     distance = relative_distance(scene, state.optics.focus_disparity)
     if limits is None:
@@ -134,7 +128,7 @@ def _distance(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
 
 
 def aperture_slider(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
-    """How wide the lens is open."""
+    """Build the aperture slider."""
     diameter, widest = state.optics.aperture_diameter, aperture_limit(scene.grid)
     words, is_exact = f_number_text(scene, diameter), f_number(scene, widest) is not None
     if diameter > 0 and (scene.is_sketch or not scene.has_view_disparity):
@@ -148,7 +142,7 @@ def aperture_slider(state: AppState, scene: Scene, layout: Layout) -> list[Actio
 
 
 def aperture_section(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
-    """Build the section: the opening's shape, and what that asks for."""
+    """Build the section: the opening's shape and its numbers."""
     shape = state.optics.aperture_shape
     actions = _kinds(shape, layout, palette_of(state.preferences.theme))
     if shape.kind == "mask":
@@ -157,7 +151,7 @@ def aperture_section(state: AppState, scene: Scene, layout: Layout) -> list[Acti
 
 
 def _stops(diameter: float, widest: float, words: str, layout: Layout, tip: str) -> list[Action]:
-    """The aperture in stops, as rings of lenses count: wide open at the right, a pinhole at the left."""
+    """Build the aperture slider in stops, like the ring of a lens: a pinhole at the left, wide open at the right."""
     closed = CLOSED_STOPS if diameter == 0 else min(math.log2(widest / diameter), CLOSED_STOPS)
     stops = slider("Aperture", CLOSED_STOPS - closed, (0.0, CLOSED_STOPS), words, layout, tip)
     if stops is None:
@@ -166,7 +160,7 @@ def _stops(diameter: float, widest: float, words: str, layout: Layout, tip: str)
 
 
 def _kinds(shape: ApertureShape, layout: Layout, palette: Palette) -> list[Action]:
-    """A row of buttons that show the shapes. Choosing the mask without one asks for an image."""
+    """Build a row of buttons that show the shapes. The mask without an image opens a dialog."""
     actions: list[Action] = []
     spacing = imgui.get_style().item_spacing.x
     width = (imgui.get_content_region_avail().x - spacing * (len(APERTURE_KINDS) - 1)) / len(APERTURE_KINDS)
@@ -186,7 +180,7 @@ def _kinds(shape: ApertureShape, layout: Layout, palette: Palette) -> list[Actio
 
 
 def _shape_edits(shape: ApertureShape, layout: Layout) -> list[ApertureShape]:
-    """Two rows with every shape, the mask's button among them: nothing below moves under a click."""
+    """Build two rows for every shape, so that nothing below moves under a click."""
     edits: list[ApertureShape | None] = []
     if shape.kind in ("disc", "polygon"):
         blades = whole_slider("Blades", shape.blades, BLADES_LIMITS, layout, is_enabled=shape.kind == "polygon")
@@ -205,7 +199,7 @@ def _shape_edits(shape: ApertureShape, layout: Layout) -> list[ApertureShape]:
 
 def _mask_row(shape: ApertureShape, layout: Layout) -> list[Action]:
     actions: list[Action] = []
-    if button("Image…", layout, "Choose a small grey image; white lets light through."):
+    if button("Image…", layout, "Choose a small grey image. White lets light through."):
         actions.append(do(ask, ChooseTask("mask")))
     if shape.mask is not None:
         imgui.same_line()
@@ -220,12 +214,7 @@ def light_section(state: AppState, scene: Scene, layout: Layout) -> list[Action]
     actions: list[Action] = []
     limits = (-EXPOSURE_LIMIT_STOPS, EXPOSURE_LIMIT_STOPS)
     new = slider("Exposure", optics.exposure_stops, limits, "%+.1f stops", layout)
-    _add(actions, lambda stops: do(lens.set_exposure, stops), new)
+    actions += [] if new is None else [do(lens.set_exposure, new)]
     new = percent_slider("Highlights", optics.highlight_recovery, layout, HIGHLIGHT_TIP)
-    _add(actions, lambda share: do(lens.set_highlights, share), new)
+    actions += [] if new is None else [do(lens.set_highlights, new)]
     return actions
-
-
-def _add(actions: list[Action], action: Callable[[float], object], value: float | None) -> None:
-    if value is not None:
-        actions.append(cast(Action, action(value)))

@@ -1,4 +1,4 @@
-"""The panel's section for the viewpoint: the pad, and beside and below it how fast loops go, and dolly."""
+"""The panel's section for the viewpoint: the pad, buttons beside it, speed of loops, and dolly."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from viewer.model.window_limits import SPEED_LIMITS
 from viewer.ui.sections.viewpoint_pad import pad
 from viewer.ui.widgets import button, slider, tooltip
 
-PAD_TIP = "Drag to move the viewpoint. Dots are views, faint ones still to be made; beyond the light area is a guess."
-RECENTER_TIP = "Glide back to the photo's own viewpoint (double click, or C)."
-PAUSE_TIP = "Hold the motion where it is, or let it run again (Space)."
-SPEED_TIP = "How fast a motion goes round."
+PAD_TIP = "Drag to move the viewpoint. Dots are views; faint dots are views that are still being made."
+RECENTER_TIP = "Return to the photo's viewpoint (double click, or C)."
+PAUSE_TIP = "Pause or resume the motion (Space)."
+SPEED_TIP = "Speed of a motion."
 
 
 def view_section(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
@@ -34,14 +34,14 @@ def view_section(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
     speed = slider("Speed", state.motion.speed, SPEED_LIMITS, "%.2f turns/s", layout, SPEED_TIP, is_logarithmic=True)
     actions += [] if speed is None else [do(viewpoint.set_speed, speed)]
     if farthest := dolly_limit(scene.grid):
-        tip = "Step into the picture, or back out of it. The end of the slider is as far as the views reach."
+        tip = "Step into the picture or back, as far as the views reach."
         dolly = slider("Dolly", state.optics.dolly, (-farthest, farthest), "%+.2f views", layout, tip)
         actions += [] if dolly is None else [do(lens.set_dolly, dolly)]
     return actions
 
 
 def _beside_pad(state: AppState, layout: Layout) -> list[Action]:
-    """Back to the photo's own viewpoint, and a loop held."""
+    """Build the buttons beside the pad."""
     actions: list[Action] = []
     width = imgui.get_content_region_avail().x
     if button("Recenter", layout, RECENTER_TIP, width=width):
@@ -53,7 +53,7 @@ def _beside_pad(state: AppState, layout: Layout) -> list[Action]:
 
 
 def _place(state: AppState) -> None:
-    """Where the viewpoint is, in one line that never wraps."""
+    """Show the viewpoint in one line that never wraps."""
     eye = state.optics.eye
     s, t = (round(value, 1) + 0.0 for value in (eye.s, eye.t))  # + 0.0 takes the sign of -0.0 away
     imgui.text_disabled(f"{abs(s):.1f} {'←' if s < 0 else '→'}  {abs(t):.1f} {'↑' if t < 0 else '↓'}")

@@ -1,4 +1,4 @@
-"""The joystick: the grid of views from above, which of them are there, and the viewpoint to be dragged about."""
+"""The viewpoint pad: a map of the grid of views, with a knob to drag."""
 
 from __future__ import annotations
 
@@ -18,30 +18,30 @@ from viewer.ui.style import Palette, corners, pack_color, palette_of
 
 PAD_SIDE = 136.0
 EDGE = 7.0
-MOST_ROUND_DOTS = 500
+"""Margin around the map, in window units at usual size."""
 
 
 @dataclass(frozen=True)
 class PadMap:
-    """Between view offsets and window units: the pad's middle, and units per view step."""
+    """Map between view offsets and window units. middle: view offset at the pad's middle."""
 
     rect: Rect
     middle: ViewOffset
     units_per_view: float
 
     def point(self, eye: ViewOffset) -> tuple[float, float]:
-        """Where a view offset lies on the pad."""
+        """Return the place of a view offset on the pad."""
         x = self.rect.x + self.rect.width / 2 + (eye.s - self.middle.s) * self.units_per_view
         return x, self.rect.y + self.rect.height / 2 + (eye.t - self.middle.t) * self.units_per_view
 
     def eye(self, x: float, y: float) -> ViewOffset:
-        """The inverse of `point`."""
+        """Return the view offset at a place; the inverse of `point`."""
         s = self.middle.s + (x - self.rect.x - self.rect.width / 2) / self.units_per_view
         return ViewOffset(self.middle.t + (y - self.rect.y - self.rect.height / 2) / self.units_per_view, s)
 
 
 def pad_map(rect: Rect, grid: GridShape, edge: float) -> PadMap:
-    """The map that lets every viewpoint allowed lie within the pad; square steps."""
+    """Return the map that shows every allowed viewpoint, with square steps."""
     (top, bottom), (left, right) = eye_limits(grid.rows), eye_limits(grid.columns)
     widest = max(bottom - top, right - left)
     return PadMap(rect, ViewOffset((top + bottom) / 2, (left + right) / 2), (rect.width - 2 * edge) / widest)
@@ -74,7 +74,7 @@ def _draw(state: AppState, grid: GridShape, chart: PadMap, scale: float) -> None
 
 
 def _draw_stored(draw: imgui.ImDrawList, grid: GridShape, chart: PadMap, scale: float, palette: Palette) -> None:
-    """The area between the outermost views."""
+    """Draw the area between the outermost views."""
     left, top = chart.point(grid.offset(0, 0))
     right, bottom = chart.point(grid.offset(grid.rows - 1, grid.columns - 1))
     room = 4 * scale
@@ -90,15 +90,11 @@ def _draw_views(
     scale: float,
     palette: Palette,
 ) -> None:
-    """A dot for every view; faint where it has not come yet."""
+    """Draw a dot for every view, faint until it is made."""
     radius = min(max(0.16 * chart.units_per_view, 0.75 * scale), 2.5 * scale)
     known, missing = pack_color(palette.quiet), pack_color(palette.quiet, 0.28)
-    as_circles = grid.rows * grid.columns <= MOST_ROUND_DOTS
     for row in range(grid.rows):
         for column in range(grid.columns):
             x, y = chart.point(grid.offset(row, column))
             color = known if (row, column) in there else missing
-            if as_circles:
-                draw.add_circle_filled(imgui.ImVec2(x, y), radius, color, 8)
-            else:
-                draw.add_rect_filled(imgui.ImVec2(x - radius, y - radius), imgui.ImVec2(x + radius, y + radius), color)
+            draw.add_circle_filled(imgui.ImVec2(x, y), radius, color, 8)
