@@ -16,6 +16,8 @@ class Remedy(Enum):
     """Make fewer or smaller views."""
     DEPTH = auto()
     """Give a depth map, or get a depth model."""
+    DOWNLOAD = auto()
+    """Download again, from the same place or another, or give a model file."""
     STRETCH = auto()
     """Stretch a depth map to the shape of the photo."""
 

@@ -8,19 +8,21 @@ from dataclasses import dataclass, replace
 from urllib.parse import urlsplit
 
 from iibr_core.depth.models.catalog import fetch, known_model, model_here
+from iibr_core.depth.models.download import NoConnectionError
 from iibr_core.depth.models.known import KNOWN_MODELS, KnownModel, missing_package
 from iibr_core.runtime.work import Cancelled, watched
 from iibr_core.scenes.scene import LoadedPhoto, Source
-from iibr_core.types import FloatImage
+from iibr_core.types import FloatImage, InputError
 from viewer.background.newest import Failed, Newest, Post
 from viewer.model import depth_models, messages
 from viewer.model.action import Action, do
-from viewer.model.remedies import DEPTH_COMMANDS
+from viewer.model.remedies import DEPTH_COMMANDS, words_of
 from viewer.model.state.app_state import AppState
 from viewer.model.state.depth_models import Downloading, ModelOffer
 from viewer.model.state.notices import Notice
 
 MEGABYTE = 1e6
+OFFLINE = "No internet connection. Nothing is lost."
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,13 +101,24 @@ def download(name: str, post: Post[Action]) -> None:
             post(do(depth_models.set_downloading, latest))
 
     with suppress(Cancelled), watched(report):
-        fetch(model)
+        try:
+            fetch(model)
+        except InputError as error:
+            post(do(depth_models.set_downloading, None))
+            post(do(messages.notify, _failure_notice(error, name)))
+            return
         models = list_models()
         post(do(depth_models.set_known, models))
         post(do(depth_models.set_downloading, None))
         (offer,) = (offer for offer in models if offer.name == name)
         if offer.lacks:
             post(do(messages.notify, Notice(f"{offer.title} is here. It {offer.lacks}.")))
+
+
+def _failure_notice(error: InputError, name: str) -> Notice:
+    if isinstance(error, NoConnectionError):
+        return Notice(OFFLINE, is_error=True, details=f"({error})", failed_model=name)
+    return Notice(words_of(error), is_error=True, failed_model=name)
 
 
 def actions_of_download(result: Action | Failed[str]) -> list[Action]:

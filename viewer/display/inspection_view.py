@@ -35,8 +35,9 @@ from viewer.model.state.app_state import AppState, Hover
 from viewer.model.state.inspection import Origin, OverlayKind, Probe, ViewIndex
 from viewer.model.state.notices import Notice
 
-MASK_COLORS = {"inpainted": (255, 184, 60), "surface": (64, 160, 255)}
+MASK_COLORS = {"inpainted": (255, 184, 60), "surface": (80, 240, 220)}
 """Colours (sRGB bytes) of overlays that are masks."""
+SURFACE_OPACITY = 0.6
 MAX_BRUSH_OPACITY = 0.5
 """Largest opacity of overlays while a brush is in hand."""
 SNAPSHOT_BUDGET_S = 0.025
@@ -228,8 +229,8 @@ class InspectionView:
             return None
         optics, size_px, part = state.optics, layout.frame_px.size, layout.part
         opacity = state.inspection.opacity
-        if found.kind == "surface" or state.brush.is_on:  # the photo must be seen, to paint on it
-            opacity = min(opacity, MAX_BRUSH_OPACITY)
+        if state.brush.is_on:  # the photo must be seen
+            opacity = SURFACE_OPACITY if found.kind == "surface" else min(opacity, MAX_BRUSH_OPACITY)
         ends = scene.disparity_range_px if found.kind == "disparity" else (0.0, 1.0)
         ends = ends if ends[1] > ends[0] else (ends[0] - 0.5, ends[0] + 0.5)
         color = MASK_COLORS.get(found.kind)

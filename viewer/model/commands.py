@@ -189,7 +189,7 @@ COMMANDS: tuple[Command, ...] = (
     Command("Invert depth", _invert_depth),
     Command("Reset depth edits", _always(do(depth.reset))),
     Command("Open a depth map…", _always(do(ask, ChooseTask("map")))),
-    Command("Get true depth", _always(do(depth_models.get_depth))),
+    Command("Get better depth", _always(do(depth_models.get_depth))),
     Command("Depth models…", _always(do(messages.show_prompt, ModelsPrompt()))),
     Command("Save the depth map…", _always(do(saving.ask_to_save, "map"))),
     Command("EPI strips", lambda s: do(inspection.show_epis, not s.inspection.shows_epis), (Chord("e"),)),

@@ -64,6 +64,8 @@ def use_model(state: AppState, model: str) -> AppState:
     scene, models = _open_photo(state), state.models
     if scene is None:
         return state
+    if models.recommended is not None and model == models.recommended.name and not models.recommended.is_here:
+        return get_depth(state)
     state = replace(state, models=replace(models, asked=model, given_up=models.given_up - {scene.source.path}))
     return state.with_task(GetModelTask(model)) if _is_elsewhere(model, models) else state
 

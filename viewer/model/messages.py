@@ -23,6 +23,12 @@ def dismiss(state: AppState, notice: Notice | None = None) -> AppState:
     return replace(state, notices=() if notice is None else tuple(other for other in state.notices if other != notice))
 
 
+def show_details(state: AppState, notice: Notice) -> AppState:
+    """Show the details of a notice in its text."""
+    detailed = replace(notice, text=f"{notice.text} {notice.details}", details="")
+    return replace(state, notices=tuple(detailed if other == notice else other for other in state.notices))
+
+
 def show_prompt(state: AppState, prompt: Prompt | None) -> AppState:
     """Show a prompt in place of any other, or as the user has edited it; None closes it."""
     return replace(state, prompt=prompt)

@@ -11,6 +11,7 @@ WORDS = {
     Remedy.REPLACE: "choose another name",
     Remedy.SMALLER: "open a smaller copy of the photo",
     Remedy.DEPTH: "get it, or open a depth map",
+    Remedy.DOWNLOAD: "try again later, or choose a model file",
     Remedy.STRETCH: "or open it as a depth map if it shows the whole photo",
 }
 

@@ -7,6 +7,7 @@ deletes what came of a file when it is stopped, so `http_get` is asked to resume
 from __future__ import annotations
 
 import hashlib
+import socket
 import threading
 from concurrent.futures import Future
 from contextlib import nullcontext
@@ -15,8 +16,13 @@ from typing import Any, cast
 
 from iibr_core.depth.models.known import KnownModel
 from iibr_core.formats.files import reason_of
+from iibr_core.remedies import FixableError, Remedy
 from iibr_core.runtime.work import Cancelled, in_this_job, raise_if_stopped, report_progress, wait_unless_stopped
 from iibr_core.types import InputError
+
+
+class NoConnectionError(FixableError):
+    """The hub cannot be reached."""
 
 
 def local_folder(model: KnownModel) -> Path:
@@ -49,10 +55,18 @@ def download(model: KnownModel) -> None:
     except (Cancelled, InputError):
         raise
     except Exception as error:  # whatever the library's clients raise: they change with its versions
-        raise InputError(
-            f"{model.repository} cannot be downloaded ({reason_of(error)[:120]}); what has come is kept: check the"
-            " network and try again, name a mirror in HF_ENDPOINT, or use an ONNX file of your own"
-        ) from error
+        kind = NoConnectionError if _is_offline(error) else FixableError
+        message = f"{model.repository} cannot be downloaded ({reason_of(error)[:120]}); what has come is kept"
+        raise kind(message, Remedy.DOWNLOAD) from error
+
+
+def _is_offline(error: BaseException | None) -> bool:
+    """Return whether an error came of a connection that could not be made."""
+    while error is not None:
+        if isinstance(error, ConnectionError | socket.gaierror | TimeoutError):
+            return True
+        error = error.__cause__ or error.__context__
+    return False
 
 
 def _fetch(model: KnownModel, name: str, place: Path) -> None:

@@ -17,6 +17,7 @@ class Notice:
 
     offer: settings that a button takes over. commands: names of commands that help, a button each. is_result: whether
     it tells the result of a request, and stays when another photo is opened. path: file or folder that was written.
+    details: text behind a button. failed_model: name of a model that could not be downloaded, for buttons that help.
     """
 
     text: str
@@ -25,6 +26,8 @@ class Notice:
     commands: tuple[str, ...] = ()
     is_result: bool = False
     path: str = ""
+    details: str = ""
+    failed_model: str = ""
 
     @property
     def seconds(self) -> float:

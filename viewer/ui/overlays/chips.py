@@ -37,9 +37,17 @@ def chips(state: AppState, layout: Layout) -> list[Action]:
             words = SHORT
         if _chip(CHIP, f"{icons.ICON_FA_VIDEO}  {words}###leave", layout, is_right=True):
             actions.append(do(viewpoint.leave_camera))
-    elif scene.is_guessed and imgui.calc_text_size(BADGE).x + 4 * GAP * layout.ui_scale <= frame.width:
+    elif has_guess_badge(state, layout):
         actions += [do(depth_models.show_offer, True)] if _chip(BADGE, BADGE, layout, GUESS_TIP) else []
     return actions
+
+
+def has_guess_badge(state: AppState, layout: Layout) -> bool:
+    """Return whether the chip of guessed depth stands in the left upper corner."""
+    scene, frame = state.scene, layout.frame
+    if scene is None or frame is None or state.free_camera is not None or state.shows_before:
+        return False
+    return scene.is_guessed and imgui.calc_text_size(BADGE).x + 4 * GAP * layout.ui_scale <= frame.width
 
 
 def panel_handle(state: AppState, layout: Layout) -> list[Action]:

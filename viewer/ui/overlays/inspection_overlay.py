@@ -13,6 +13,7 @@ from viewer.model.layout import Layout
 from viewer.model.state.app_state import AppState, Hover
 from viewer.model.state.inspection import Comparison, Probe
 from viewer.model.units import metres, metres_text
+from viewer.ui.overlays.chips import has_guess_badge
 from viewer.ui.overlays.reticle import WORD_GAP, hover_text
 from viewer.ui.style import DARK, Color, corners, pack_color, palette_of
 
@@ -84,8 +85,10 @@ def _draw_legend(state: AppState, scene: Scene, layout: Layout, frame: Rect) -> 
     """Draw the colors with their values, and a mark for the value under the pointer."""
     kind, scale = state.inspection.overlay, layout.ui_scale
     x, y, room = frame.x + 8 * scale, frame.y + 8 * scale, 5 * scale
-    if kind == "inpainted":
-        _words("inpainting", x, y, scale)
+    if has_guess_badge(state, layout):
+        y += imgui.get_frame_height() + 8 * scale
+    if kind == "inpainted" or state.selection is not None:
+        _words("inpainting" if state.selection is None else "selected surface", x, y, scale)
         return
     draw, line = imgui.get_background_draw_list(), imgui.get_text_line_height()
     width, height = LEGEND_WIDTH * scale, LEGEND_HEIGHT * scale

@@ -44,8 +44,7 @@ def _buttons(state: AppState, model: ModelOffer | None) -> list[tuple[str, Actio
     buttons: list[tuple[str, Action]] = []
     if model is not None and not (model.is_here and model.lacks):
         word = "Use this model" if model.is_here else f"Download ({model.megabytes:,} MB)"
-        is_usual = model.is_recommended and not model.is_here
-        buttons.append((word, do(depth_models.get_depth) if is_usual else do(depth_models.use_model, model.name)))
+        buttons.append((word, do(depth_models.use_model, model.name)))
     buttons.append(("Choose a file…", do(ask, ChooseTask("model"))))
     if state.has_dialogs:  # a path that is typed may be either
         buttons.append(("Choose a folder…", do(ask, ChooseTask("model folder"))))

@@ -16,7 +16,7 @@ from viewer.model.state.app_state import AppState
 from viewer.model.state.depth_models import CancelGetTask, ModelOffer
 from viewer.model.state.jobs import WRITING, JobKind, JobProgress
 from viewer.model.state.notices import Notice
-from viewer.model.state.tasks import CancelJobTask
+from viewer.model.state.tasks import CancelJobTask, ChooseTask
 from viewer.ui.overlays.prompt_rows import CARD_FLAGS, button_rows, file_offers
 from viewer.ui.style import palette_of
 from viewer.ui.widgets import colored, gap, last_part, quiet, tooltip
@@ -83,6 +83,10 @@ def _notice(notice: Notice, state: AppState) -> list[Action]:
     imgui.align_text_to_frame_padding()
     colored(notice.text, imgui.ImVec4(*(palette.error if notice.is_error else palette.text)))
     offers: list[tuple[str, Action]] = [(name, BY_NAME[name].action(state)) for name in notice.commands]
+    if notice.failed_model:
+        offers.append(("Try again", do(depth_models.use_model, notice.failed_model)))
+        offers.append(("Choose a model file…", do(ask, ChooseTask("model"))))
+    offers += [("Details", do(messages.show_details, notice))] if notice.details else []
     offers += file_offers(notice.path) if notice.path else []
     offers += [("Use its settings", do(opening.take_settings, notice.offer))] if notice.offer is not None else []
     offers += [(f"Close all ({others + 1})", do(messages.dismiss))] if others else []

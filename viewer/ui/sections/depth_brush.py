@@ -44,7 +44,6 @@ def brush_rows(state: AppState, layout: Layout) -> list[Action]:
         if choice(BRUSH_WORDS[tool], is_in_hand, layout, (width, 0), TOOL_TIPS[tool] + PUT_AWAY):
             actions.append(do(depth.set_brush, replace(brush, tool=tool, is_on=not is_in_hand)))
     actions += [do(depth.set_brush, changed) for changed in _settings(brush, layout)]
-    _scroll_here_when_taken(brush.is_on)
     return actions
 
 
@@ -79,6 +78,7 @@ def selection_rows(state: AppState, layout: Layout) -> list[Action]:
     for (word, tip, action), width in in_row(buttons, layout):
         if button(word, layout, tip, is_found, width):
             actions.append(action)
+    _scroll_here_when_taken(state.brush.is_on)
     return actions
 
 
