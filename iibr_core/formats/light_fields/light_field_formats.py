@@ -1,6 +1,6 @@
 """Open light fields of every layout. The viewer, `generate` and `evaluate` ask here.
 
-A new layout is a module with a reader and one line here. Readers are imported on use, which keeps `--help` quick. Every
+A new layout is a reader and one line here. Readers are imported on use, which keeps `--help` quick. Every
 reader returns None for other layouts, and raises InputError with the file's name for damaged data.
 """
 

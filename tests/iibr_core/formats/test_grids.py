@@ -73,6 +73,11 @@ def test_a_few_numbered_photos_are_no_light_field(tmp_path: Path, count: int) ->
     assert open_light_field(tmp_path).grid == (1, count)
 
 
+def test_views_of_which_every_third_was_kept_stand_on_a_square(tmp_path: Path) -> None:
+    write_flat(tmp_path, [f"input_Cam{3 * k:03d}.png" for k in range(9)])
+    assert open_light_field(tmp_path).grid == (3, 3)
+
+
 def test_photos_numbered_by_date_and_time_are_no_light_field(tmp_path: Path) -> None:
     write_flat(tmp_path, [f"IMG_202307{day}_1{day}{k}.png" for day in (11, 14) for k in range(3)])
     assert find_light_field(tmp_path) is None
