@@ -1,4 +1,4 @@
-"""The window's loop, and nothing else: poll, drain results, panels and input, apply actions, draw if changed, sleep."""
+"""The window's loop: poll, take results, build panels, apply actions, draw if something changed, sleep."""
 
 from __future__ import annotations
 
@@ -49,16 +49,16 @@ from viewer.ui.screen import build_screen
 from viewer.ui.style import Look
 
 VIEWS_BUDGET_S = 0.006
-"""A turn: making room for a scene, and then for all its views, is enough for one frame."""
+"""Time for uploading views in a turn of the loop, in seconds."""
 
 SAVE_BUDGET_S = 0.025
-"""A turn, for a picture that is being saved: about as long as a frame, so that whoever drags gets every other turn."""
+"""Time for drawing a picture that is being saved in a turn of the loop, in seconds: about as long as a frame."""
 
 
 @dataclass(frozen=True)
 class Frame:
-    """Everything the window shows: picture and what inspection adds, panels (as a digest), where they lie, their look,
-    repairs asked for. sharp: GL name of what stands in the picture's place, None without.
+    """Everything that the window shows. panels: digest. damages: number of redraws that the system asked for. sharp: GL
+    name of the texture in place of the picture, None without.
     """
 
     picture: Picture | None
@@ -71,13 +71,10 @@ class Frame:
 
 
 class App:
-    """The viewer: one window, one worker. state changes only through `reduce`; frames_shown counts what was shown."""
+    """The viewer with one window. `do` is the only place where the state changes."""
 
     def __init__(self, state: AppState | None = None, kept_in: Path | None = None) -> None:
-        """Open the window. kept_in: folder of preferences and recent files; None keeps nothing.
-
-        Raises InputError where no window can be opened.
-        """
+        """Open the window. kept_in: folder of preferences and sessions; None keeps nothing. Raises InputError."""
         state = state or AppState()
         self.state = replace(load_preferences(state, kept_in) if kept_in else state, has_dialogs=has_dialogs())
         self.frames_shown = 0
@@ -111,7 +108,7 @@ class App:
             self.step()
 
     def step(self) -> None:
-        """One turn of the loop; sleeps first where nothing was going on in the last ones."""
+        """Take one turn of the loop; it sleeps first if nothing was going on in the last ones."""
         self.window.poll(self.wait_s)
         start = time.perf_counter()
         views_end = start + VIEWS_BUDGET_S
@@ -150,7 +147,7 @@ class App:
 
     @property
     def _is_resting(self) -> bool:
-        """Whether nothing moves, every view is there and nothing is being drawn for a file."""
+        """Whether nothing moves, all views are there and nothing is being drawn for a file."""
         state, is_made = self.state, self.state.progress.is_complete or self.state.stopped == self.state.generation
         is_shown = self.scene_view.generation == state.generation and self.scene_view.renderer.is_converged
         is_edited = state.motion.is_running or state.stroke is not None
@@ -158,7 +155,7 @@ class App:
 
     @property
     def wait_s(self) -> float:
-        """How long the next turn may sleep before it looks."""
+        """Time that the next turn may sleep, in seconds."""
         is_behind = self.scene_loader.holds_progress or not self.scene_view.shows_all_views()
         idle_s = VIEW_REFRESH_S if is_behind else IDLE_WAIT_S
         idle_s = DIALOG_LOOK_S if self._side_effects.is_waiting else idle_s
@@ -166,7 +163,7 @@ class App:
         return self._pace.wait_s(is_moving, is_over_panel, idle_s)
 
     def layout(self) -> Layout:
-        """Where things lie in the window as it is now."""
+        """Return the layout of the window."""
         scene = self.state.scene
         ratio, scale = self.window.pixel_ratio, self.look().ui_scale
         return layout_of(
@@ -181,11 +178,11 @@ class App:
         )
 
     def look(self) -> Look:
-        """Theme, and size of text and widgets on this display."""
+        """Return the theme, and the scale of text and widgets on this display."""
         return Look(self.window.ui_scale * self.state.preferences.font_scale, self.state.preferences.theme)
 
     def close(self) -> None:
-        """Stop the worker, keep what is kept, and free everything. A file that is being written is finished first."""
+        """Finish files that are being written, keep preferences and session, stop all threads, and free everything."""
         self.window.hide()
         self.scene_loader.close()
         self._entropy.close()
@@ -204,7 +201,7 @@ class App:
         self.window.close()
 
     def do(self, *actions: Action) -> None:
-        """Change the state. What follows from it may take a few frames to be seen, see SETTLING_FRAMES."""
+        """Apply actions to the state."""
         if actions:
             self._pace.same_frames = 0
         for action in actions:
@@ -212,7 +209,7 @@ class App:
         self.scene_loader.look_from(self.state.optics.eye)
 
     def _take_events(self) -> list[Action]:
-        """What neither user nor worker says: the clock, side effects done, the window moved, the worker lost."""
+        """Return actions that come from side effects, sessions, other threads, the clock and the window."""
         self._pace.stepped_at = time.perf_counter()
         actions = self._side_effects.run(self.state) + self._sessions.run(self.state)
         while (result := self._entropy.next_result()) is not None:
@@ -274,7 +271,7 @@ class App:
 
 
 def run(state: AppState, kept_in: Path | None = None) -> None:
-    """Open the window on this state and show it until the user quits. Raises InputError where none can be opened."""
+    """Open the window on this state and show it until the user quits. Raises InputError."""
     with closing(App(state, kept_in)) as app:
         app.run()
 

@@ -1,4 +1,4 @@
-"""Time in the window's loop: how long it may sleep before it looks again, how long notices are read."""
+"""Time in the window's loop: how long a turn may sleep, and how long notices stay."""
 
 from __future__ import annotations
 
@@ -12,28 +12,26 @@ from viewer.model.state.app_state import AppState
 from viewer.model.state.notices import Notice
 
 IDLE_WAIT_S = 1.0
-"""Nothing is expected to happen unannounced; this only bounds the harm of a lost wake-up."""
+"""Longest sleep in seconds; it only bounds the harm of a lost wake-up."""
 
 TOOLTIP_LOOK_S, TOOLTIP_S = 0.08, 0.5
-"""How often, and for how long, a pointer that rests on the panel is looked at: ImGui tells what it points at after
-0.15 s, counted in frames, and needs one to measure the words.
-"""
+"""Sleep, and its total time, in seconds, while a pointer rests on the panel: a tooltip needs frames to appear."""
 
 MOTION_FRAME_S = 1 / 60
 DIALOG_LOOK_S = 0.1
-"""How often an open file dialog is asked for its answer."""
+"""Sleep while a file dialog is open, in seconds."""
 
 FRAMES_OF_A_CLICK = 3
-"""A press and its release, and the next press, are heard of in as many frames."""
+"""Number of frames in which a press, its release and the next press arrive."""
 
 SETTLING_FRAMES = 3
-"""ImGui hands out quick events over several frames and lays out in two: so many must look the same before a sleep."""
+"""Number of equal frames before a sleep: ImGui spreads quick events over several frames and lays out in two."""
 
 
 @dataclass
 class Pace:
-    """What the last turns of the loop were about. stepped_at, pointer_moved_at: on the clock. same_frames: that looked
-    the same. took_s: the last turns.
+    """Record of the last turns of the loop. stepped_at, pointer_moved_at: times on the clock. same_frames: number of
+    equal frames. took_s: durations of the last turns.
     """
 
     is_busy: bool = True
@@ -43,8 +41,8 @@ class Pace:
     took_s: deque[float] = field(default_factory=lambda: deque(maxlen=FRAMES_OF_A_CLICK))
 
     def wait_s(self, is_moving: bool, is_over_panel: bool, idle_s: float) -> float:
-        """How long the next turn may sleep. is_moving: the picture, by itself. is_over_panel: the pointer.
-        idle_s: where nothing is going on.
+        """Return how long the next turn may sleep. is_moving: whether the viewpoint moves by itself. is_over_panel:
+        whether the pointer is. idle_s: sleep if nothing is going on.
         """
         now = time.perf_counter()
         if is_moving:
@@ -57,7 +55,7 @@ class Pace:
 
 
 class NoticeClock:
-    """Says when the newest notice was read: the others' time begins when they are the newest."""
+    """Clock of the newest notice: each notice's time begins when it is the newest."""
 
     def __init__(self) -> None:
         self._shown: Notice | None = None

@@ -1,4 +1,4 @@
-"""Loads scenes: submits what the state asks for, takes in the results, and reads ahead what is likely to follow."""
+"""Loads scenes: submits what the state asks for, takes in the results, and reads the next photos ahead."""
 
 from __future__ import annotations
 
@@ -110,7 +110,7 @@ class SceneLoader:
         return []
 
     def advance(self, state: AppState) -> None:
-        """Submit what the state asks for, and what is likely to be wanted next."""
+        """Submit the source that the state asks for, and read the next photos."""
         self._cancel(state)
         self._read_sketches(state)
         is_wanted = state.generation not in (self._submitted, state.stopped)
@@ -231,7 +231,7 @@ class SceneLoader:
             self.ahead.keep(WantedPhoto(scene.source, state.depth_strength), left)
 
     def _read_sketches(self, state: AppState) -> None:
-        """Read sketches of what is asked for and of the next photos, but not while views are made."""
+        """Read sketches of this and the next photos, but not while views are made."""
         if _is_whole(state) and not state.progress.is_complete:
             return
         self.sketches.want(_photos_to_sketch(state) if state.stopped != state.generation else ())
@@ -270,7 +270,7 @@ def _prepare_brush(request: None, post: Post[None]) -> None:
 
 
 def _is_whole(state: AppState) -> bool:
-    """Return whether all of what is asked for is read and shown."""
+    """Return whether the source that is asked for is read whole and shown."""
     scene = state.scene
     return scene is not None and scene.source is state.source and not scene.is_sketch
 

@@ -65,7 +65,7 @@ class SessionStore:
         return []
 
     def close(self, state: AppState) -> None:
-        """Write what is there now, and wait until it is written."""
+        """Write the session of the open photo, and wait for it."""
         if self._search is None and self._scene is not None and state.source is self._scene.source:
             self._latest = settings_of(state.at_rest, self._scene.size)
         self._save()

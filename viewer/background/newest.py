@@ -106,6 +106,6 @@ class Newest(Generic[Request, Result]):
 
 
 def message_of(error: Exception) -> str:
-    """Return an error as one line for people: an input error as it is, any other with its kind."""
+    """Return an error as one line for people, with its kind unless it is an input error."""
     text = " ".join(words_of(error).split())
     return text if isinstance(error, InputError) else f"{type(error).__name__}: {text or 'no message'}"

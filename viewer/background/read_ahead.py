@@ -87,7 +87,7 @@ class ReadAhead(Generic[Read]):
         return self._known.get(photo)
 
     def keep(self, photo: WantedPhoto, read: Read) -> None:
-        """Keep a photo that was read elsewhere as long as it is wanted."""
+        """Keep a photo that was read elsewhere while it is wanted."""
         self._known[photo] = read
 
     def close(self) -> None:

@@ -1,4 +1,4 @@
-"""What jobs in other threads have done by the thread of the window: a step at a time, between its frames."""
+"""Work that other threads hand to the window's thread, which does it in steps between its frames."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from typing import Any, TypeVar
 from iibr_core.runtime.work import ShouldStop, in_this_job, is_stopped, raise_if_stopped
 
 LOOK_S = 0.05
-"""How often a thread that waits looks whether its job is still wanted."""
+"""Time between two looks of a waiting thread whether its job was stopped, in seconds."""
 
 Result = TypeVar("Result")
 Steps = Generator[None, None, Result]
-"""Work in steps: what it returns at the end is its result."""
+"""Work in steps; the generator returns the result."""
 
 
 @dataclass(eq=False)
 class _Asked:
-    """steps: made by another thread, run by the window's. error: what they raised."""
+    """Steps from another thread, and their result or the error that they raised."""
 
     steps: Steps[Any]
     should_stop: ShouldStop
@@ -46,8 +46,9 @@ class WindowWork:
         return bool(self._asked) or not self._new.empty()
 
     def run(self, steps: Steps[Result], is_urgent: bool = False) -> Result:
-        """Have this done, and wait. is_urgent: before what is not. Raises what the steps raise, and Cancelled once the
-        job is stopped.
+        """Wait until the window's thread has taken all steps; return their result.
+
+        is_urgent: whether they come before others. Raises what the steps raise, and Cancelled once the job is stopped.
         """
         asked = _Asked(steps, in_this_job(is_stopped), is_urgent)
         self._new.put(asked)
@@ -69,7 +70,7 @@ class WindowWork:
                 return
 
     def forget_stopped(self) -> None:
-        """Take no more steps for jobs that should stop, and free what they hold."""
+        """Close the steps of jobs that should stop."""
         while not self._new.empty():
             self._asked.append(self._new.get())
         for stopped in [asked for asked in self._asked if asked.should_stop()]:
@@ -82,7 +83,7 @@ class WindowWork:
             return
         except StopIteration as end:
             asked.result = end.value
-        except Exception as error:  # the thread that asked says so
+        except Exception as error:  # raised in the thread that asked
             asked.error = error
         self._asked.remove(asked)
         asked.is_done.set()

@@ -67,7 +67,7 @@ def set_progress(state: AppState, generation: int, progress: Progress, view: tup
 
 
 def report_failure(state: AppState, generation: int, message: str) -> AppState:
-    """Say why a source did not open, and return to the open scene. Steps pass such a photo by."""
+    """Show why a source did not open, and return to the open scene. Steps pass such a photo by."""
     if generation != state.generation:
         return state
     source, folder = state.source, state.folder
@@ -245,7 +245,7 @@ def _with_left_focus(state: AppState) -> AppState:
 
 
 def _first_progress(state: AppState, scene: Scene) -> Progress:
-    """Return what is shown until the worker reports: a light field is shown several times and keeps its progress."""
+    """Return the progress before the first report. A light field is shown several times and keeps its progress."""
     if scene.plan is None and state.progress.share > 0 and not state.progress.is_complete:
         return state.progress
     return Progress(doing=f"reading {scene.name}" if scene.is_sketch else "making views")

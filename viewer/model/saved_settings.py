@@ -1,43 +1,40 @@
 """Settings inside a saved picture, as JSON in its metadata: enough to take the same picture of the same photo again.
 
-A stranger may have written such a text: it names no file.
+Anybody may have written such a text, so it names no files.
 
-Whoever needs this module imports it late: msgspec would cost the window 10 to 40 ms before its first frame.
+Import this module late: msgspec takes 10 to 40 ms, which the window's first frame need not wait for.
 """
 
 from __future__ import annotations
 
-import base64
 import dataclasses
-import json
-from collections.abc import Collection, Iterator
+from collections.abc import Collection
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import msgspec
 
 from iibr_core.beyond.optics import ApertureShape, Optics
 from iibr_core.depth.editing.edits import UNEDITED, DepthEdits, require_sound
-from iibr_core.formats.files import printable
 from iibr_core.formats.images.metadata import settings_text_in
 from iibr_core.scenes.lens_limits import BLADES_LIMITS
 from iibr_core.scenes.scene import Source
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, InputError
-from viewer.model.gloss_bounds import GlossBounds
+from viewer.model.gloss_file import GlossBounds, unknown_fields
 from viewer.model.state.saving import SavedSettings
 
 FORMAT = 1
-MOST_CHARACTERS = 16_000_000
-"""A thousand strokes take 1.3 million."""
+MAX_CHARACTERS = 16_000_000
+"""Largest length of the text; a thousand strokes take 1.3 million."""
 MASK_LIMITS = (1, 4096)
 FORMER_SETTINGS = ("source.max_pixels", "source.memory_bytes", "source.quality")
 """Settings that earlier versions wrote; they are ignored."""
 NAMED_FIELDS = 3
-"""Unknown fields that a message names."""
+"""Largest number of unknown fields that a message names."""
 
-MOST_SIDE_PX, MOST_PIXELS = 16_384, 100_000_000
-"""Largest picture that a file may ask for."""
+MAX_SIDE_PX, MAX_PIXELS = 16_384, 100_000_000
+"""Largest side and largest area of a picture that a file may ask for."""
 
 MAX_STROKES = 10_000
 """Largest number of strokes in a file from elsewhere: as many as days of work."""
@@ -56,17 +53,17 @@ class SourceText(msgspec.Struct, frozen=True, kw_only=True):
     grid: tuple[Views, Views] | None = None
     focus_disparity: float | None = None
     refine: bool | float = True
-    """Earlier programs wrote a strength, 0 to 1."""
+    """Earlier versions wrote a strength, 0 to 1."""
 
 
 class FormatText(msgspec.Struct, frozen=True, kw_only=True):
-    """The number of the format, which tells this program if it can read the rest."""
+    """The number of the format: this program reads only its own."""
 
     format: int
 
 
-class SettingsText(FormatText, frozen=True, kw_only=True):
-    """The whole text; `SavedSettings` says what each means. What later programs add comes with a default."""
+class SettingsText(FormatText, frozen=True, kw_only=True, omit_defaults=True):
+    """The whole text, see `SavedSettings`. Fields that later versions add have defaults."""
 
     optics: Optics
     depth_strength: float
@@ -79,32 +76,27 @@ class SettingsText(FormatText, frozen=True, kw_only=True):
 
 def settings_text(settings: SavedSettings) -> str:
     """Return the settings as JSON."""
-    whole = {
-        "format": FORMAT,
-        "optics": _text_of_optics(settings.optics),
-        "depth_strength": settings.depth_strength,
-        "source": _text_of_source(settings.source),
-        "size_px": settings.size_px,
-    }
-    if settings.depth_edits != UNEDITED:
-        whole["depth_edits"] = settings.depth_edits
-    if settings.has_model_depth:
-        whole["has_model_depth"] = True
-    if settings.view_width is not None:
-        whole["view_width"] = settings.view_width
-    # not by msgspec, which refuses numpy's numbers
-    return json.dumps(whole, separators=(",", ":"), allow_nan=False, default=_json_value)
+    text = SettingsText(
+        format=FORMAT,
+        optics=settings.optics,
+        depth_strength=settings.depth_strength,
+        source=_text_of_source(settings.source),
+        size_px=settings.size_px,
+        depth_edits=settings.depth_edits,
+        has_model_depth=settings.has_model_depth,
+        view_width=settings.view_width,
+    )
+    return msgspec.json.encode(text, enc_hook=lambda number: number.item()).decode()  # numpy's numbers
 
 
 def settings_from_text(text: str, name: str, is_own: bool = False) -> SavedSettings:
     """Return the settings of a text, the inverse of `settings_text`.
 
-    name: of the picture, for the message. is_own: kept by this program for its user, who may have painted as long as
-    they liked. Unknown fields are left out and named in the result. Raises InputError, which names the field, if the
-    text is damaged or of a newer program.
+    name: of the picture, for the message. is_own: whether this program wrote it for this user, with any number of
+    strokes. Unknown fields are left out and named in the result. Raises InputError, which names the field.
     """
     try:
-        whole = msgspec.json.decode(text if len(text) <= MOST_CHARACTERS else "")
+        whole = msgspec.json.decode(text if len(text) <= MAX_CHARACTERS else "")
         number = msgspec.convert(whole, FormatText).format
         if number != FORMAT:
             raise ValueError(f"format {number}, this program reads {FORMAT}")
@@ -131,7 +123,7 @@ def settings_from_text(text: str, name: str, is_own: bool = False) -> SavedSetti
 
 
 def read_settings(path: Path) -> SavedSettings:
-    """The settings a picture was saved with. Raises InputError where there are none, or damaged ones."""
+    """Return the settings that a picture was saved with. Raises InputError if there are none, or damaged ones."""
     text = settings_text_in(path)
     if not text:
         raise InputError(f"{path}: holds no settings of iibr; give a picture saved with Ctrl+S or `iibr screenshot`")
@@ -139,16 +131,16 @@ def read_settings(path: Path) -> SavedSettings:
 
 
 def require_saved_size(saved: SavedSettings, path: Path) -> None:
-    """Raise InputError where the picture asks for one that is larger than this program draws."""
+    """Raise InputError if the settings ask for a larger picture than this program draws."""
     width, height = saved.size_px
-    if max(width, height) > MOST_SIDE_PX or width * height > MOST_PIXELS:
+    if max(width, height) > MAX_SIDE_PX or width * height > MAX_PIXELS:
         raise InputError(
             f"{path}: its settings ask for a picture of {width}x{height} px, which is too large; give a smaller size"
         )
 
 
 def source_like(source: Source, saved: SavedSettings, given: Collection[str]) -> Source:
-    """The source with what was decided for the saved picture, but for what is named in `given`, as in `SourceText`."""
+    """Return the source with the decisions of a saved picture, except for the fields of `SourceText` in `given`."""
     decided = msgspec.structs.asdict(_text_of_source(saved.source))
     taken = {name: value for name, value in decided.items() if name not in given}
     return _source_from_text(source, msgspec.structs.replace(_text_of_source(source), **taken))
@@ -160,19 +152,7 @@ def left_out_note(settings: SavedSettings) -> str:
     if not names:
         return ""
     more = f" and {len(names) - NAMED_FIELDS} more" if len(names) > NAMED_FIELDS else ""
-    return f"Its settings hold what this program does not know and leaves out: {', '.join(names[:NAMED_FIELDS])}{more}."
-
-
-def _text_of_optics(optics: Optics) -> dict[str, Any]:
-    """Return the optics by field; a gloss only if there is one."""
-    fields = {field.name: getattr(optics, field.name) for field in dataclasses.fields(optics)}
-    return {name: value for name, value in fields.items() if name != "gloss" or value is not None}
-
-
-def _json_value(value: Any) -> Any:
-    if isinstance(value, bytes):
-        return base64.b64encode(value).decode("ascii")
-    return msgspec.structs.asdict(value) if isinstance(value, msgspec.Struct) else dataclasses.asdict(value)
+    return f"Settings that this version does not know are left out: {', '.join(names[:NAMED_FIELDS])}{more}."
 
 
 def _text_of_source(source: Source) -> SourceText:
@@ -188,7 +168,7 @@ def _text_of_source(source: Source) -> SourceText:
 
 
 def _source_from_text(source: Source, text: SourceText) -> Source:
-    """The source with what the text says; its paths, where depth is looked for, and the machine's limits stay."""
+    """Return the source with the fields of a text; its paths and the search for depth stay."""
     return dataclasses.replace(
         source,
         depth=dataclasses.replace(
@@ -205,7 +185,7 @@ def _source_from_text(source: Source, text: SourceText) -> Source:
 
 
 def _require_sound_shape(shape: ApertureShape) -> None:
-    """Raise ValueError where numbers of the opening lie outside what a type can say."""
+    """Raise ValueError for an aperture whose numbers are out of range."""
     _require_within("blades", shape.blades, BLADES_LIMITS)
     mask = shape.mask
     if mask is None:
@@ -220,19 +200,3 @@ def _require_within(name: str, value: int, limits: tuple[int, int]) -> None:
     low, high = limits
     if not low <= value <= high:
         raise ValueError(f"optics.aperture_shape.{name}: {value} is not from {low} to {high}")
-
-
-def unknown_fields(raw: Any, known: Any, within: str = "") -> Iterator[str]:
-    """Yield the names, with dots, of fields that are in the text but not in what was read from it.
-
-    Fields that are false or "" are left out: earlier programs wrote them for what a picture does not have.
-    """
-    if isinstance(raw, dict) and isinstance(known, dict):
-        for name, value in raw.items():
-            if name in known:
-                yield from unknown_fields(value, known[name], f"{within}{name}.")
-            elif value is not False and value != "":
-                yield within + printable(" ".join(name.split())[:40])
-    elif isinstance(raw, list) and isinstance(known, list | tuple):
-        for value, known_value in zip(raw, known):
-            yield from unknown_fields(value, known_value, within)

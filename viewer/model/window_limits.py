@@ -4,4 +4,4 @@ DEPTH_STRENGTH_LIMIT = 4.0
 SPEED_LIMITS = (0.05, 1.0)
 FONT_SCALE_LIMITS = (0.6, 2.5)
 LARGEST_SIDE_PX = 65536
-"""Of a picture that is asked for in the window."""
+"""Largest side of a picture that is asked for in the window, in pixels."""

@@ -33,8 +33,8 @@ def build_screen(
     textures: InspectionTextures = NO_INSPECTION_TEXTURES,
     thumbnails: Mapping[str, Thumbnail | None] = NO_THUMBNAILS,
 ) -> list[Action]:
-    """Build everything; edits come back as actions. picture_texture: GL name of the picture, rows bottom-up. textures:
-    what inspection shows. thumbnails: of the filmstrip, by path.
+    """Build everything; return edits as actions. picture_texture: GL name of the picture, rows bottom-up. textures: of
+    inspection. thumbnails: of the filmstrip, by path.
     """
     window, palette = layout.window, palette_of(state.preferences.theme)
     corner = imgui.ImVec2(window.width, window.height)
@@ -53,7 +53,7 @@ def build_screen(
 
 
 def _picture(layout: Layout, texture: int) -> None:
-    """Pixel for pixel: the rectangle is the one whose pixels were drawn."""
+    """Draw the picture pixel for pixel."""
     assert layout.frame_px is not None
     x, y, width, height = (value / layout.pixel_ratio for value in layout.frame_px)
     imgui.get_background_draw_list().add_image(

@@ -18,7 +18,7 @@ from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import Driver, Opener, rests, write_scene
 from viewer.app.preferences_store import load_preferences
 from viewer.display.offscreen import OffscreenScene
-from viewer.model import lens, messages, opening
+from viewer.model import lens, opening
 from viewer.model.action import ask, do
 from viewer.model.saved_settings import read_settings
 from viewer.model.state.app_state import AppState
@@ -80,22 +80,6 @@ def test_a_picture_with_damaged_settings_opens_as_a_photo_with_a_notice(viewer: 
     assert [notice.is_error for notice in viewer.app.state.notices if "settings" in notice.text] == [True]
 
 
-@pytest.mark.parametrize("contents", [b"", b"no picture", None])
-def test_a_mask_that_lets_no_light_through_changes_nothing(
-    viewer: Driver, tmp_path: Path, contents: bytes | None
-) -> None:
-    mask = tmp_path / "mask.png"
-    if contents is None:
-        write_image(mask, np.zeros((8, 8), np.uint8))
-    else:
-        mask.write_bytes(contents)
-    before = viewer.app.state.optics
-    viewer.app.do(do(ask, ReadMaskTask(str(mask))))
-    viewer.until(lambda app: bool(app.state.notices))
-    assert "mask.png" in viewer.app.state.notices[-1].text
-    assert viewer.app.state.optics == before
-
-
 def test_a_mask_is_asked_for_read_and_shapes_the_aperture(viewer: Driver, tmp_path: Path) -> None:
     mask = tmp_path / "star.png"
     write_image(mask, np.eye(9, dtype=np.uint8) * 200)
@@ -122,76 +106,6 @@ def test_a_path_can_be_typed_where_there_is_no_dialog(viewer: Driver, tmp_path: 
     assert viewer.app.state.recent == (str(other), str(tmp_path / "scene.png"))
 
 
-def test_f1_shows_the_map_and_escape_closes_it(viewer: Driver) -> None:
-    viewer.send("key", "F1")
-    viewer.until(lambda app: app.state.prompt == "help")
-    viewer.until_idle()
-    assert imgui.internal.find_window_by_name("prompt str").size.y > 300
-    viewer.send("key", "Escape")
-    viewer.until(lambda app: app.state.prompt is None)
-    assert not viewer.app.state.should_quit
-
-
-def test_a_prompt_comes_up_at_once_not_at_the_next_move(viewer: Driver) -> None:
-    """An ImGui window is laid out for a frame before it shows: the loop must not fall asleep in between."""
-    shown = viewer.app.frames_shown
-    viewer.app.do(do(messages.show_prompt, "help"))
-    while viewer.app.wait_s == 0:
-        viewer.app.step()
-    assert viewer.app.frames_shown > shown
-
-
-def test_ctrl_counts_where_it_was_held_when_the_key_was_pressed(viewer: Driver) -> None:
-    """However much happens within a frame."""
-    viewer.send("keydown", "ctrl")
-    viewer.until(lambda app: imgui.get_io().key_ctrl)
-    viewer.send("keydown", "e", "keyup", "ctrl", "keyup", "e")
-    viewer.until(lambda app: isinstance(app.state.prompt, ExportPrompt))
-    assert not viewer.app.state.inspection.shows_epis
-    viewer.app.do(do(messages.show_prompt, None))
-    viewer.until_idle()
-    viewer.send("keydown", "ctrl")
-    viewer.until(lambda app: imgui.get_io().key_ctrl)
-    viewer.send("keyup", "ctrl", "keydown", "e", "keyup", "e")
-    viewer.until(lambda app: app.state.inspection.shows_epis)
-    assert viewer.app.state.prompt is None
-
-
-def test_before_and_after_stays_while_its_key_is_held(viewer: Driver) -> None:
-    """However often the keyboard repeats it."""
-    io = imgui.get_io()
-    viewer.send("keydown", "backslash")
-    viewer.until(lambda app: app.state.shows_before)
-    end = imgui.get_time() + 2 * io.key_repeat_delay
-    while imgui.get_time() < end:
-        viewer.app.step()
-        assert viewer.app.state.shows_before
-    viewer.send("keyup", "backslash")
-    viewer.until_idle()
-    assert viewer.app.state.shows_before
-    viewer.send("key", "backslash")
-    viewer.until(lambda app: not app.state.shows_before)
-
-
-def test_the_palette_runs_what_was_typed(viewer: Driver) -> None:
-    viewer.send("key", "ctrl+p")
-    viewer.until(lambda app: isinstance(app.state.prompt, PalettePrompt))
-    viewer.until_idle()
-    viewer.send("type", "--delay", 20, "light or")
-    viewer.until(lambda app: app.state.prompt == PalettePrompt("light or"))
-    viewer.send("key", "Return")
-    viewer.until(lambda app: app.state.preferences.theme == "light")
-    assert viewer.app.state.prompt is None
-
-
-def test_text_grows_and_shrinks_with_the_whole_panel(viewer: Driver) -> None:
-    before = viewer.app.layout().panel.width
-    viewer.send("key", "ctrl+equal", "key", "ctrl+equal")
-    viewer.until(lambda app: app.layout().panel.width > 1.2 * before)
-    viewer.send("key", "ctrl+minus", "key", "ctrl+0")
-    viewer.until(lambda app: app.layout().panel.width == before)
-
-
 def test_what_was_chosen_is_there_again_the_next_time(open_window: Opener, photo_path: Path, tmp_path: Path) -> None:
     kept = tmp_path / "kept"
     first = open_window(photo_path, kept_in=kept, grid=GridShape(1, 1))
@@ -208,16 +122,6 @@ def test_what_was_chosen_is_there_again_the_next_time(open_window: Opener, photo
     assert second.app.state.recent == (str(photo_path),)
 
 
-def test_damaged_preferences_are_told_and_do_not_keep_the_window_from_opening(
-    open_window: Opener, tmp_path: Path
-) -> None:
-    (tmp_path / "preferences.json").write_text("{")
-    (tmp_path / "recent.json").write_text("[3]")
-    driver = open_window(None, kept_in=tmp_path)
-    driver.until(lambda app: app.frames_shown > 0)
-    assert len(driver.app.state.notices) == 2
-
-
 def test_stopping_keeps_the_views_that_are_there(open_window: Opener, photo_path: Path) -> None:
     driver = open_window(photo_path, grid=GridShape(41, 41))
     driver.until(lambda app: app.state.progress.done > 3)
@@ -227,13 +131,6 @@ def test_stopping_keeps_the_views_that_are_there(open_window: Opener, photo_path
     assert 3 < made < 41 * 41
     assert driver.app.scene_view.renderer.field.present.sum() == made == len(driver.app.state.views_there)
     assert "stopped at" in driver.app.state.progress.doing
-
-
-def test_the_state_that_asks_for_a_path_knows_what_for() -> None:
-    from tests.viewer.conftest import reduce
-    from viewer.model.state.prompts import PathPrompt
-
-    assert reduce(AppState(), do(messages.show_prompt, PathPrompt("mask"))).prompt == PathPrompt("mask")
 
 
 def test_the_panel_says_how_the_photo_was_taken(open_window: Opener, tmp_path: Path) -> None:
@@ -246,3 +143,39 @@ def test_the_panel_says_how_the_photo_was_taken(open_window: Opener, tmp_path: P
     driver = open_window(tmp_path / "a.jpg", grid=GridShape(1, 1))
     driver.until(lambda app: app.state.facts.path == str(tmp_path / "a.jpg"))
     assert driver.app.state.facts.facts == (("Camera", "Maker"), ("Exposure", "1/60 s, ISO 200"))
+
+
+def test_keys_for_help_palette_text_size_and_exports(viewer: Driver) -> None:
+    viewer.send("key", "F1")
+    viewer.until(lambda app: app.state.prompt == "help")
+    viewer.until_idle()
+    viewer.send("key", "Escape")
+    viewer.until(lambda app: app.state.prompt is None)
+    assert not viewer.app.state.should_quit
+    viewer.send("key", "ctrl+p")
+    viewer.until(lambda app: isinstance(app.state.prompt, PalettePrompt))
+    viewer.until_idle()
+    viewer.send("type", "--delay", 20, "light or")
+    viewer.until(lambda app: app.state.prompt == PalettePrompt("light or"))
+    viewer.send("key", "Return")
+    viewer.until(lambda app: app.state.preferences.theme == "light")
+    assert viewer.app.state.prompt is None
+    before = viewer.app.layout().panel.width
+    viewer.send("key", "ctrl+equal", "key", "ctrl+equal")
+    viewer.until(lambda app: app.layout().panel.width > 1.2 * before)
+    viewer.send("key", "ctrl+minus", "key", "ctrl+0")
+    viewer.until(lambda app: app.layout().panel.width == before)
+    viewer.send("keydown", "ctrl")
+    viewer.until(lambda app: imgui.get_io().key_ctrl)
+    viewer.send("keydown", "e", "keyup", "e", "keyup", "ctrl")
+    viewer.until(lambda app: isinstance(app.state.prompt, ExportPrompt))
+    assert not viewer.app.state.inspection.shows_epis
+
+
+def test_a_mask_without_light_changes_nothing(viewer: Driver, tmp_path: Path) -> None:
+    write_image(tmp_path / "mask.png", np.zeros((8, 8), np.uint8))
+    before = viewer.app.state.optics
+    viewer.app.do(do(ask, ReadMaskTask(str(tmp_path / "mask.png"))))
+    viewer.until(lambda app: bool(app.state.notices))
+    assert "mask.png" in viewer.app.state.notices[-1].text
+    assert viewer.app.state.optics == before

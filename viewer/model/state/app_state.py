@@ -30,7 +30,7 @@ from viewer.model.state.viewpoint import FreeCamera, Motion, Zoom
 
 @dataclass(frozen=True)
 class Hover:
-    """Where the pointer is in the picture: pixels of it, and the disparity seen there (None where not known)."""
+    """Pointer in the picture: its place in pixels, and the disparity there, None if it is not known."""
 
     x_px: float
     y_px: float
@@ -39,10 +39,7 @@ class Hover:
 
 @dataclass(frozen=True)
 class DrawReport:
-    """What is known of the picture drawn last.
-
-    samples: drawn so far, of samples_converged. draw_ms: what the last drawing took.
-    """
+    """Report of the last drawing: samples drawn so far, samples of the converged picture, and time in milliseconds."""
 
     samples: int = 0
     samples_converged: int = 0
@@ -51,19 +48,15 @@ class DrawReport:
 
 @dataclass(frozen=True)
 class AppState:
-    """Everything. source is what was asked for last, scene what is open; generation numbers the worker's jobs.
+    """The viewer's state.
 
-    views_there: indices (row, column) of views made. stopped: the generation the user stopped. tilt_handles: None while
-    they are hidden. tasks: not yet taken up. recent: paths opened, the latest first. report: None without a window.
-    zoom: None where the whole picture is seen. free_camera: None on the plane of the views;
-    free_progress: how much is done of what its views are made of, None when that is there. depth: what is made of the
-    scene's depth; stroke: of the brush, while it is drawn. jobs: saves, copies and exports under way; quits_when_done:
-    the window closes once there are none. has_chosen_focus, has_chosen_aperture: whether the user said in this scene
-    what is sharp, and how wide the aperture is. has_dialogs: whether the system has file dialogs. shown_generation:
-    whose views are shown. folder: the photos beside the one that is open, None before they are known. facts: what a
-    photo's file says of it, perhaps of the one before. is_fullscreen, hides_panel: of the window, None: where that
-    is_narrow, see `layout`; shows_before: the photo as it was taken stands in place of the picture. models: of depth.
-    focused_at: the place (see focal_plane) that was clicked last to be sharp, None where the focus was set otherwise.
+    source was asked for last, scene is open; generation numbers the requests, shown_generation is that of the scene.
+    views_there: (row, column) of views that were made. stopped: generation that the user stopped. tilt_handles: None
+    while hidden. recent: paths, the latest first. report: None without a window. zoom: None for the whole picture.
+    free_camera: None in the plane of the views; free_progress: share of its preparation, None once done. depth:
+    refinement and edits; stroke: of the brush while it is drawn. chosen_focus: disparity that the user chose for this
+    scene, focused_at: place that was clicked for it (see focal_plane), None without. facts: of a photo's file, perhaps
+    of the one before. hides_panel: None to follow is_narrow. shows_before: whether the unchanged photo is shown.
     """
 
     optics: Optics = field(default_factory=Optics)
@@ -114,7 +107,7 @@ class AppState:
 
     @property
     def at_rest(self) -> AppState:
-        """The state that a viewpoint which moves by itself has left: what the user decided."""
+        """The state without a motion that runs by itself: what the user decided."""
         motion = self.motion
         if motion.kind not in LOOPS or motion.is_paused:
             return self
@@ -122,12 +115,12 @@ class AppState:
 
     @property
     def shown_optics(self) -> Optics:
-        """What the picture on the screen is drawn with."""
+        """Optics of the picture on the screen."""
         return Optics() if self.shows_before else self.optics
 
     @property
     def is_panel_hidden(self) -> bool:
-        """As the user wants it; else it gives way to the picture in a narrow window."""
+        """Whether the panel is hidden: by the user, or because the window is narrow."""
         return self.is_narrow if self.hides_panel is None else self.hides_panel
 
     def with_task(self, task: Task) -> AppState:
@@ -137,11 +130,10 @@ class AppState:
 
 @dataclass(frozen=True)
 class Picture:
-    """Everything the picture depends on: the scene's generation, how many views were uploaded, the optics, its size in
-    pixels.
+    """Everything that the picture depends on.
 
-    samples: how far it has come on its way to the converged picture. previews: of edited depth, and of gloss,
-    shown so far. part: what is drawn of it, as a share of it.
+    generation: of the scene. views_uploaded, previews: numbers of views, and of previews of edited depth and gloss, so
+    far. samples: drawn so far. part: the part of the picture that is drawn, as a share of it.
     """
 
     generation: int

@@ -50,9 +50,11 @@ def _with_parents(section: Section) -> tuple[Section, ...]:
 
 @dataclass(frozen=True)
 class Preferences:
-    """What outlasts the program. window: x, y, width, height in screen units, None before the first; is_maximized:
-    whether it filled the screen then. last_folder: where a picture or an export was put last, "" before the first.
-    estimates_depth: photos without depth get it from the recommended model, without a question, once it is here.
+    """Preferences, which outlast the program.
+
+    window: x, y, width, height in screen units, None before the first one; is_maximized: whether it filled the screen.
+    last_folder: of the last saved or exported file, "" before the first. estimates_depth: whether photos without depth
+    get it from the recommended model once that is downloaded.
     """
 
     theme: Theme = "dark"

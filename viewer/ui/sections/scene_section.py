@@ -1,6 +1,4 @@
-"""The panel's section for the scene: what its file says of it, where its depth is from, what the plan chose
-and why, and what reading it changed.
-"""
+"""The panel's section for the scene: facts of its file, its depth, the plan and its reasons, and notes."""
 
 from __future__ import annotations
 
