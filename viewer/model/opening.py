@@ -150,12 +150,13 @@ def other_recent(state: AppState) -> tuple[str, ...]:
 
 
 def names_of(paths: Sequence[str]) -> list[str]:
-    """Return a short name for each path: its last part, with the folder if two are alike."""
-    parts = [path.replace("\\", "/").rstrip("/").split("/") for path in paths]
+    """Return a short name for each path: its last part, with the folder if two are alike; of the views of a light field
+    the light field's.
+    """
+    parts = [path.replace("\\", "/").rstrip("/").removesuffix("/views").split("/") for path in paths]
     names = [part[-1] for part in parts]
-    return [
-        f"{name} ({part[-2]})" if names.count(name) > 1 and any(part[:-1]) else name for name, part in zip(names, parts)
-    ]
+    has_twin = [names.count(name) > 1 and any(part[:-1]) for name, part in zip(names, parts)]
+    return [f"{part[-1]} ({part[-2]})" if twin else part[-1] for twin, part in zip(has_twin, parts)]
 
 
 def _begin_scene(state: AppState, old: Scene | None, scene: Scene) -> AppState:

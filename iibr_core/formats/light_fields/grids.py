@@ -156,9 +156,10 @@ def _grid_scene(folder: Path, layout: str, grid: GridShape, paths: Mapping[GridI
         for v, u in places
     )
     parameters = read_parameters(folder)
+    whole = folder.resolve()
     low, high = (parameters.get(name, math.nan) for name in ("disp_min", "disp_max"))
     return MultiView(
-        folder.resolve().name,
+        whole.parent.name if whole.name == "views" else whole.name,
         layout,
         views,
         {places.index(at): known for at, known in _maps(folder, grid).items()},

@@ -53,6 +53,13 @@ def test_grids_under_any_numbering(tmp_path: Path, name: str) -> None:
     assert list(scene.disparity) == [scene.centre]
 
 
+def test_a_light_field_has_the_name_of_its_folder_not_of_the_views_in_it(tmp_path: Path) -> None:
+    (tmp_path / "boxes").mkdir()
+    write_flat(tmp_path / "boxes" / "views", [f"v{v}_u{u}.png" for v, u in np.ndindex(2, 2)])
+    for folder in (tmp_path / "boxes", tmp_path / "boxes" / "views"):
+        assert open_light_field(folder).name == "boxes"
+
+
 def test_jpeg_pleno_counts_columns_first(tmp_path: Path) -> None:
     for row, column in np.ndindex(3, 4):
         Image.new("RGB", (4, 4)).save(tmp_path / f"{column + 1:03d}_{row + 1:03d}.ppm")

@@ -151,8 +151,8 @@ def test_recent_files_are_listed_once_the_latest_first() -> None:
 
 
 def test_recent_files_of_one_name_are_told_apart_by_their_folders() -> None:
-    paths = ("/a/x/boxes", "C:\\photos\\tree.jpg", "/a/y/boxes/", "/boxes")
-    assert opening.names_of(paths) == ["boxes (x)", "tree.jpg", "boxes (y)", "boxes"]
+    paths = ("/a/x/boxes", "C:\\photos\\tree.jpg", "/a/y/boxes/views", "/boxes", "/b/field/views")
+    assert opening.names_of(paths) == ["boxes (x)", "tree.jpg", "boxes (y)", "boxes", "field"]
 
 
 @pytest.mark.parametrize(
