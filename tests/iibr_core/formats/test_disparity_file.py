@@ -4,10 +4,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from iibr_core.formats.images.write import write_image_file
 from iibr_core.formats.maps.disparity_file import read_disparity
 from iibr_core.formats.maps.pfm import write_pfm
+from iibr_core.formats.maps.reader import read_map, read_map_file
 from iibr_core.formats.maps.resample import SURFACE_SHARE, resample_surfaces
 from iibr_core.types import FloatImage, ImageSize, InputError
 
@@ -64,6 +66,23 @@ def test_every_kind_of_file_gives_the_same_values(tmp_path: Path, name: str) -> 
     assert found.values.dtype == np.float32
     assert np.array_equal(found.values, whole / 2)
     assert (found.source, found.notes) == (path.name, ())
+
+
+@pytest.mark.parametrize("shape", [(1, 4, 5), (4, 5, 1), (1, 4, 5, 1), (1, 1, 4, 5)])
+def test_axes_of_length_1_beside_a_map_do_not_matter(tmp_path: Path, shape: tuple[int, ...]) -> None:
+    np.save(tmp_path / "a.npy", np.arange(1.0, 21).reshape(shape))
+    np.testing.assert_array_equal(read_map(tmp_path / "a.npy"), np.arange(1.0, 21).reshape(4, 5))
+    np.save(tmp_path / "a.npy", np.zeros((2, *shape)))
+    with pytest.raises(InputError, match="an array of numbers with shape"):
+        read_map(tmp_path / "a.npy")
+
+
+@pytest.mark.parametrize(("orientation", "expected"), [(1, [[1, 2, 3]]), (2, [[3, 2, 1]]), (6, [[1], [2], [3]])])
+def test_a_map_is_turned_upright_with_a_note(tmp_path: Path, orientation: int, expected: list[list[int]]) -> None:
+    Image.fromarray(np.array([[1, 2, 3]], np.uint8)).save(tmp_path / "a.tif", tiffinfo={0x0112: orientation})
+    found = read_map_file(tmp_path / "a.tif")
+    assert found.values.tolist() == expected
+    assert found.notes == (("a.tif was turned upright, as its Exif says.",) if orientation > 1 else ())
 
 
 def test_unknown_values_are_filled(tmp_path: Path) -> None:
