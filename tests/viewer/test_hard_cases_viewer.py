@@ -1,13 +1,11 @@
 """Hard cases and faults seen from the viewer: each ends in a scene or in one line, and the viewer goes on.
 
-Beside these: a worker that is lost (test_worker.py, test_window_everyday.py), preferences that cannot be kept
-(test_kept.py), memory of the graphics card (gpu/test_light_field_texture.py), contexts (gpu/test_context.py).
+See also test_preferences_store.py, gpu/test_light_field_texture.py and gpu/test_context.py.
 """
 
 from __future__ import annotations
 
 import os
-import re
 import resource
 import subprocess
 import sys
@@ -36,7 +34,7 @@ from tests.viewer.background.test_scene_worker import Desk
 from tests.viewer.conftest import write_scene
 from viewer.app.picture_files import export_picture, shot_of
 from viewer.app.preferences_store import load_preferences, store_preferences
-from viewer.background.job_threads import Failed
+from viewer.background.newest import Failed
 from viewer.display.offscreen import OffscreenScene
 from viewer.model import lens
 from viewer.model.action import do
@@ -61,12 +59,12 @@ def full_disk(room: int) -> Iterator[None]:
 def desk() -> Iterator[Desk]:
     made = Desk()
     yield made
-    made.worker.close()
+    made.thread.close()
 
 
 def failure(desk: Desk, request: SceneRequest) -> str:
     """What the worker says of a job that must fail; then it carries out another."""
-    desk.worker.submit(request)
+    desk.thread.submit(request)
     while not isinstance(result := desk.next(), Failed):
         assert not isinstance(result, SceneReady | ViewReady)
     assert "\n" not in result.message
@@ -76,7 +74,7 @@ def failure(desk: Desk, request: SceneRequest) -> str:
 def goes_on(desk: Desk, folder: Path, generation: int) -> None:
     """The worker makes a whole field of a good photo."""
     photo = write_scene(folder, "good")
-    desk.worker.submit(SceneRequest(generation, Source(str(photo), grid=GridShape(1, 2))))
+    desk.thread.submit(SceneRequest(generation, Source(str(photo), grid=GridShape(1, 2))))
     while not (isinstance(result := desk.next(), ViewReady) and result.progress.done == 2):
         assert not isinstance(result, Failed)
 
@@ -106,35 +104,24 @@ def test_a_photo_that_went_bad_is_one_line_and_the_worker_goes_on(
     goes_on(desk, tmp_path, 2)
 
 
-def test_too_little_memory_is_one_line_and_the_worker_goes_on(
+def test_memory_that_runs_out_is_one_line_and_the_worker_goes_on(
     desk: Desk, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    with monkeypatch.context() as small:
-        small.setattr("iibr_core.method.memory.free_memory_bytes", lambda: 20_000)
-        message = failure(desk, SceneRequest(1, Source(str(write_scene(tmp_path)))))
-    assert re.search(r"takes \d+ MiB, half of the free memory is 1 MiB", message)
-    goes_on(desk, tmp_path, 2)
+    """An array that no machine has room for, in the midst of the views."""
 
-
-def test_memory_that_runs_out_is_one_line_and_the_worker_goes_on(tmp_path: Path) -> None:
-    """Truly, not by a budget: an array that no machine has room for, in the midst of the views."""
-
-    def work(request: SceneRequest, eye: Callable[[], ViewOffset]) -> Iterator[ViewReady]:
+    def exhaust(request: SceneRequest, eye: Callable[[], ViewOffset]) -> Iterator[SceneReady | ViewReady]:
         for result in results_of(request, eye):
-            yield result  # type: ignore[misc]
-            if request.generation == 1 and isinstance(result, ViewReady):
-                np.zeros(1 << 56, np.uint8)
+            yield result
+            np.zeros(1 << 56, np.uint8)
 
-    desk = Desk(work)
-    try:
-        desk.worker.submit(SceneRequest(1, Source(str(write_scene(tmp_path)), grid=GRID)))
+    with monkeypatch.context() as small:
+        small.setattr("iibr_core.scenes.opening.results_of", exhaust)
+        desk.thread.submit(SceneRequest(1, Source(str(write_scene(tmp_path)), grid=GRID)))
         while not isinstance(result := desk.next(), Failed):
             pass
-        assert "MemoryError" in result.message
-        assert "\n" not in result.message
-        goes_on(desk, tmp_path, 2)
-    finally:
-        desk.worker.close()
+    assert "MemoryError" in result.message
+    assert "\n" not in result.message
+    goes_on(desk, tmp_path, 2)
 
 
 def test_a_view_deleted_while_the_light_field_opens(desk: Desk, tmp_path: Path) -> None:
