@@ -117,8 +117,9 @@ def write_jps(path: Path, picture: NDArray[np.uint8], layout: int, flags: int, k
         (np.hstack([squeezed(RIGHT, 1), squeezed(LEFT, 1)]), 2, 2),
         (np.vstack([RIGHT, LEFT]), 3, 0),
         (np.vstack([squeezed(LEFT, 0), squeezed(RIGHT, 0)]), 3, 5),
+        (np.vstack([squeezed(RIGHT, 0), squeezed(LEFT, 0)]), 3, 1),
     ],
-    ids=["crossed", "left first", "half width", "over", "half height, left first"],
+    ids=["crossed", "left first", "half width", "over", "half height, left first", "half height"],
 )
 def test_the_descriptor_of_a_jps_states_its_arrangement(
     tmp_path: Path, picture: NDArray[np.uint8], layout: int, flags: int
