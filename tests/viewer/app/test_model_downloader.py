@@ -206,6 +206,8 @@ def test_a_running_estimate_is_given_up_by_one_click(
         viewer.press(ESTIMATE, "notices")
         viewer.until(lambda app: is_running.is_set())
         viewer.press("Cancel##estimate", "notices")
+        viewer.until(lambda app: depth_models.wanted_model(app.state) is None)
+        viewer.press("Depth guessed", "Depth guessed")
         with_offer(viewer)
     assert depth_kind(viewer.app) == "rough"
     assert not viewer.app.state.notices

@@ -36,7 +36,7 @@ from viewer.model.state.app_state import AppState
 from viewer.model.state.preferences import is_seen_open
 from viewer.model.state.prompts import ExportPrompt
 from viewer.model.state.tasks import ExportTask
-from viewer.ui.overlays.prompt_rows import choice_row, place_actions, place_row, size_rows, text_field
+from viewer.ui.overlays.prompt_rows import choice_row, place_actions, place_row, size_row, text_field
 from viewer.ui.widgets import checkbox, choice, gap, in_row, label, quiet, slider, whole_slider
 
 ADVANCED_ROWS = ("keys",)
@@ -174,7 +174,7 @@ def _row(options: ExportOptions, shown: _Shown) -> ExportOptions:
 
 
 def _size(options: ExportOptions, shown: _Shown) -> ExportOptions:
-    width = size_rows(shown.options.size, shown.layout)
+    width = size_row(shown.options.size, shown.layout)
     return options if width is None else replace(options, size=size_of_width(shown.kind, shown.aspect, width))
 
 

@@ -34,7 +34,7 @@ from viewer.ui.overlays.save_prompt import save_prompt
 from viewer.ui.widgets import button, gap, last_part, quiet
 
 PROMPT_WIDTH = 460.0
-PROMPT_TOP = 0.12
+PROMPT_TOP = 0.05
 """Top of a prompt, as a share of the window's height: it grows downwards, so nothing above moves."""
 KEYS_WIDTH = 112.0
 MAX_ROWS = 12

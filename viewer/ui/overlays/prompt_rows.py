@@ -31,6 +31,8 @@ PROMPT_FLAGS = (
 CARD_FLAGS = PROMPT_FLAGS | imgui.WindowFlags_.no_nav | imgui.WindowFlags_.no_focus_on_appearing
 """Flags of a card that stands by itself over the picture."""
 BROWSE = "Browse…"
+WIDTH_FIELD = 80.0
+"""Width of the field for the width of a picture."""
 FILE_EXISTS = "A file with this name exists. Replace it?"
 PROBLEM_LINES = 2
 """Lines kept free for a problem, so that no button moves when one appears."""
@@ -164,13 +166,13 @@ def choice_row(name: str, chosen: Choice, entries: Mapping[Choice, tuple[str, st
     return chosen if picked is None else tuple(entries)[picked]
 
 
-def size_rows(size_px: tuple[int, int], layout: Layout) -> int | None:
+def size_row(size_px: tuple[int, int], layout: Layout) -> int | None:
     """Draw width and height; return the new width if the user changed it."""
-    label("Width", layout, "Width in pixels; the height follows.")
+    label("Size", layout, "Width and height in pixels; the height follows the width.")
+    imgui.set_next_item_width(WIDTH_FIELD * layout.ui_scale)
     changed, width = imgui.input_int("##width", size_px[0], 0, 0)
-    label("Height", layout)
-    imgui.align_text_to_frame_padding()
-    imgui.text(str(size_px[1]))
+    imgui.same_line()
+    imgui.text(f"x {size_px[1]} pixels")
     return min(max(width, 1), LARGEST_SIDE_PX) if changed else None
 
 

@@ -18,12 +18,12 @@ from viewer.model.layout import Layout
 from viewer.model.state.app_state import AppState
 from viewer.model.state.prompts import SavePrompt
 from viewer.model.state.tasks import SaveTask
-from viewer.ui.overlays.prompt_rows import place_actions, place_row, size_rows
+from viewer.ui.overlays.prompt_rows import place_actions, place_row, size_row
 from viewer.ui.widgets import gap, label, quiet
 
 Option = TypeVar("Option")
-PICTURE_ENDINGS = "The ending of the name sets the format: .png, .jpg, .tif, .webp, .avif, or .exr (HDR)."
-MAP_ENDINGS = "The ending of the name sets the format: .pfm, .exr, .npy, .tif, or .png (16 bits, scaled)."
+PICTURE_ENDINGS = "The ending of the name sets the format: png, jpg, tif, webp, avif or exr (HDR)."
+MAP_ENDINGS = "The ending of the name sets the format: pfm, exr, npy, tif or png (16 bits, scaled)."
 
 
 def save_prompt(prompt: SavePrompt, state: AppState, layout: Layout) -> list[Action]:
@@ -33,14 +33,14 @@ def save_prompt(prompt: SavePrompt, state: AppState, layout: Layout) -> list[Act
     gap(layout, 2)
     row, edited = place_row("File", prompt.path, state, layout), prompt
     if not is_map and state.scene is not None:
-        edited = _form_rows(_size_rows(prompt, state.scene, layout), state.scene, layout)
+        edited = _form_rows(_with_size(prompt, state.scene, layout), state.scene, layout)
     quiet(MAP_ENDINGS if is_map else PICTURE_ENDINGS)
     return place_actions(prompt, edited, row, SaveTask, "Save", state, layout)
 
 
-def _size_rows(prompt: SavePrompt, scene: Scene, layout: Layout) -> SavePrompt:
+def _with_size(prompt: SavePrompt, scene: Scene, layout: Layout) -> SavePrompt:
     """Draw width and height; the picture keeps its shape."""
-    width = size_rows(prompt.size_px, layout)
+    width = size_row(prompt.size_px, layout)
     if width is None:
         return prompt
     return replace(prompt, size_px=ScreenSize(width, max(round(width * scene.height / scene.width), 1)))
