@@ -27,7 +27,7 @@ OFFLINE = "No internet connection. Nothing is lost."
 
 @dataclass(frozen=True, eq=False)
 class EstimateRequest:
-    """A photo as it is open, a model's name or path, and whether edges are refined."""
+    """The open photo, the name or path of a model, and whether edges are refined."""
 
     source: Source
     loaded: LoadedPhoto

@@ -16,7 +16,7 @@ VIRIDIS: tuple[tuple[float, float, float], ...] = tuple(
 
 
 def map_color(share: float) -> tuple[float, float, float]:
-    """The colour (sRGB, 0..1) at a share of the map, 0 dark, 1 light; beyond the ends the nearest."""
+    """Return the colour (sRGB, 0..1) at a share of the map, 0 dark, 1 light; beyond the ends the nearest."""
     place = min(max(share, 0.0), 1.0) * (len(VIRIDIS) - 1)
     first = min(int(place), len(VIRIDIS) - 2)
     low, high = VIRIDIS[first], VIRIDIS[first + 1]

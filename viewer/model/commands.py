@@ -1,7 +1,4 @@
-"""Everything that can be done by name or key: what the keyboard, the map on F1 and the command palette read.
-
-And what becomes of a path that the user chose, in a dialog or by typing it.
-"""
+"""The commands, by name and key, for the keyboard, the map on F1 and the palette; the action for a chosen path."""
 
 from __future__ import annotations
 
@@ -51,7 +48,7 @@ KEY_WORDS = {
     "tab": "Tab",
     "backslash": "\\",
 }
-"""Of ImGui's names for keys, those that people write otherwise."""
+"""Names of keys for people, by ImGui's names."""
 COMPARE_WORDS: dict[Comparison, str] = {
     "photo": "Compare with the photo",
     "snapshot": inspection.COMPARE_SNAPSHOT,
@@ -70,7 +67,7 @@ LOOP_WORDS: dict[LoopKind, str] = {"circle": "Circle", "eight": "Figure of eight
 
 @dataclass(frozen=True)
 class Chord:
-    """A key by ImGui's name for it, and what is held down with it."""
+    """A key, by ImGui's name, with modifiers."""
 
     key: str
     ctrl: bool = False
@@ -78,7 +75,7 @@ class Chord:
 
     @property
     def words(self) -> str:
-        """As people write it: "Ctrl+Shift+Z"."""
+        """The chord for people: "Ctrl+Shift+Z"."""
         key = KEY_WORDS.get(self.key, self.key.upper())
         return "Ctrl+" * self.ctrl + "Shift+" * self.shift + key
 
@@ -125,7 +122,7 @@ def _toggle_brush(state: AppState) -> Action:
 
 
 def _own_pixels(state: AppState) -> Action:
-    """About the pointer, where it is over the picture, else about what is in the middle."""
+    """Return the zoom to 1:1 about the pointer if it is over the picture, else about the middle."""
     scene, hover, centre = state.scene, state.hover, (0.5, 0.5) if state.zoom is None else state.zoom.centre
     if scene is not None and hover is not None and state.zoom is None:
         centre = (hover.x_px + 0.5) / scene.width, (hover.y_px + 0.5) / scene.height
@@ -238,7 +235,7 @@ BY_NAME = {command.name: command for command in COMMANDS}
 
 
 def commands_matching(text: str, recent: tuple[Command, ...] = ()) -> tuple[Command, ...]:
-    """Commands whose names hold every word typed; recent: what comes first."""
+    """Return the commands whose names hold all words of a text, recent commands first."""
     words = text.lower().split()
     return tuple(command for command in (*recent, *COMMANDS) if all(word in command.name.lower() for word in words))
 
@@ -253,7 +250,7 @@ def recent_commands(state: AppState) -> tuple[Command, ...]:
 
 
 def action_for_path(what: ChoiceOf, path: str, state: AppState) -> Action:
-    """What a path that the user chose is for."""
+    """Return the action for a path that the user chose."""
     match what:
         case "mask":
             return do(ask, ReadMaskTask(path))

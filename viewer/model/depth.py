@@ -104,7 +104,7 @@ def pick(state: AppState, sample: DepthSample) -> AppState:
 
 
 def drop_stroke(state: AppState) -> AppState:
-    """Take the unfinished stroke back; the worker, which stopped for it, goes on."""
+    """Take the unfinished stroke back and let the worker continue."""
     return state if state.stroke is None else replace(state, stroke=None, generation=state.generation + 1)
 
 

@@ -89,7 +89,7 @@ def compare(state: AppState, kind: Comparison | None) -> AppState:
 
 
 def take_snapshot(state: AppState) -> AppState:
-    """Remember the lens as it is, to compare with later."""
+    """Remember the present lens, to compare with later."""
     if state.scene is None:
         return state
     taken = replace(state, inspection=replace(state.inspection, snapshot=state.optics))
@@ -131,7 +131,7 @@ def obstacle_to_overlay(scene: Scene, kind: OverlayKind) -> str:
 
 
 def beside_of(state: AppState) -> Beside:
-    """Return what is shown beside the picture."""
+    """Return the things that are shown beside the picture."""
     scene, inspection = state.scene, state.inspection
     has_filmstrip = state.preferences.shows_filmstrip and state.folder is not None and len(state.folder.photos) > 1
     if scene is None:

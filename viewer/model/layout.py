@@ -1,4 +1,4 @@
-"""Where things lie in the window: the picture, letterboxed, beside the panel. The one map between the two.
+"""Rectangles of the window: the picture, letterboxed, beside the panel; the one map between window and picture.
 
 Window units are GLFW's screen coordinates (ImGui's too), y down; a framebuffer pixel may be smaller (HiDPI).
 """
@@ -13,11 +13,11 @@ from iibr_core.scenes.screen_size import ScreenSize
 from viewer.model.state.viewpoint import Zoom
 
 BACKGROUND = 0.07, 0.07, 0.08, 1.0
-"""Behind the picture, where the theme is dark."""
+"""Colour behind the picture in the dark theme, 0..1."""
 PANEL_WIDTH = 300.0
 MARGIN = 12.0
 NARROW_WIDTH = 720.0
-"""A window narrower than this, at usual size, leaves the picture little more room than the panel takes."""
+"""Width of the window, at usual size, below which the panel folds away."""
 
 
 class PixelRect(NamedTuple):
@@ -30,25 +30,24 @@ class PixelRect(NamedTuple):
 
     @property
     def size(self) -> ScreenSize:
-        """Of the part."""
+        """Width and height."""
         return ScreenSize(self.width, self.height)
 
 
 MINIMAP_SIDE = 150.0
-"""The longer side of the small picture that says which part is seen."""
+"""Longer side of the minimap, in window units at usual size."""
 
 MAX_ZOOM = 4.0
 """Largest zoom: this many times the photo's own size, or what fits where that is larger."""
 ZOOM_NOTCH = 1.25
-"""A notch of the wheel makes the picture so many times as large."""
+"""Factor of the zoom for one notch of the wheel."""
 
 NEAR_FIT = 1.02
-"""What is only so much larger or smaller than fits, fits."""
-
+"""Factor of the fitting size within which the zoom snaps to fit."""
 
 STRIP_UNITS_PER_VIEW = 9.0
 LEAST_STRIP, MOST_STRIP = 45.0, 130.0
-"""EPI strips are this thick at usual size, however few or many views there are."""
+"""Limits of the thickness of EPI strips at usual size."""
 
 STRIP_GAP = 6.0
 STATUS_HEIGHT = 26.0
@@ -57,7 +56,7 @@ FILMSTRIP_HEIGHT = 84.0
 
 @dataclass(frozen=True)
 class Beside:
-    """What takes room beside the picture. epi_views: numbers of views in the EPIs (down, across), None without them."""
+    """Things beside the picture. epi_views: numbers of views in the EPIs (down, across), None without EPIs."""
 
     epi_views: tuple[int, int] | None = None
     has_status: bool = False
@@ -71,10 +70,11 @@ NOTHING_BESIDE = Beside()
 class Layout:
     """Rectangles in window units; pixel_ratio: framebuffer pixels per window unit; ui_scale: size of text and widgets.
 
-    picture: where all of it lies, None where no picture is open or no room is left for it. room: there is for it, None:
-    all it takes. is_zoomed: whether it is another size than fits, cut to its room. scale: pixels of the screen a pixel
-    of the photo; fit: as much as fits. strip_across, strip_down: the EPIs, as wide and as high as what is seen of the
-    picture; status: a line below; filmstrip: a row of small pictures at the bottom. None where they are not shown.
+    picture: the whole picture, None where none is open or no room is left. room: room for the picture, None: as large
+    as the picture. is_zoomed: whether the picture has another size than fits, and is cut to its room. scale: pixels of
+    the screen for one pixel of the photo; fit: the scale at which the picture fits. strip_across, strip_down: the EPIs,
+    as wide and as high as the seen part of the picture; status: a line below; filmstrip: a row of thumbnails at the
+    bottom; each None where it is not shown.
     """
 
     window: Rect
@@ -93,19 +93,19 @@ class Layout:
 
     @property
     def frame(self) -> Rect | None:
-        """What is seen of the picture."""
+        """The seen part of the picture."""
         if self.picture is None or self.room is None or not self.is_zoomed:
             return self.picture
         return self.picture.within(self.room)
 
     @property
     def frame_px(self) -> PixelRect | None:
-        """The same in framebuffer pixels, y counted from the top."""
+        """The seen part in framebuffer pixels, y counted from the top."""
         return None if self.frame is None else self.in_pixels(self.frame)
 
     @property
     def part(self) -> Rect:
-        """The part of the picture that these pixels hold, as a share of it."""
+        """The seen part as a share of the picture."""
         if self.picture is None or self.frame_px is None or not self.is_zoomed:
             return WHOLE
         x, y, width, height = (value / self.pixel_ratio for value in self.frame_px)
@@ -115,7 +115,7 @@ class Layout:
 
     @property
     def minimap(self) -> Rect | None:
-        """The small picture in the lower right corner that says which part is seen; None where all is, or no room."""
+        """The minimap in the lower right corner; None where the whole picture is seen, or without room."""
         frame = self.frame
         if self.picture is None or frame is None or frame == self.picture:
             return None
@@ -126,7 +126,7 @@ class Layout:
         return Rect(frame.x + frame.width - width - gap, frame.y + frame.height - height - gap, width, height)
 
     def zoomed(self, notches: float, x: float, y: float) -> Zoom | None:
-        """The zoom after so many notches of the wheel: what lies at (x, y) stays there. None: it fits."""
+        """Return the zoom after notches of the wheel about (x, y); None: the picture fits."""
         low, high = min(self.fit, 1.0), MAX_ZOOM * max(self.fit, 1.0)
         scale = min(max(self.scale * ZOOM_NOTCH**notches, low), high)
         passes_fit = (scale - self.fit) * (self.scale - self.fit) < 0
@@ -136,20 +136,20 @@ class Layout:
         return self._zoom_to(scale, x + (self.picture.x - x) * larger, y + (self.picture.y - y) * larger, larger)
 
     def pulled(self, step_x: float, step_y: float) -> Zoom | None:
-        """The zoom after the picture was pulled so far; None where it fits."""
+        """Return the zoom after the picture was pulled; None where it fits."""
         if self.picture is None or not self.is_zoomed:
             return None
         return self._zoom_to(self.scale, self.picture.x + step_x, self.picture.y + step_y, 1.0)
 
     def shown_on_minimap(self, x: float, y: float) -> Zoom | None:
-        """The zoom that shows what lies at (x, y) on the small picture; None without it."""
+        """Return the zoom that centres a place (x, y) on the minimap; None without a minimap."""
         at = self.minimap
         if at is None:
             return None
         return Zoom(self.scale, ((x - at.x) / at.width, (y - at.y) / at.height))
 
     def _zoom_to(self, scale: float, left: float, top: float, larger: float) -> Zoom:
-        """With the picture's corner there, and so many times as large as it is."""
+        """Return the zoom with the picture's corner at (left, top), and `larger` times as large as it is."""
         assert self.picture is not None
         room = self.room or self.picture
         x = (room.x + room.width / 2 - left) / (self.picture.width * larger)
@@ -157,20 +157,20 @@ class Layout:
         return Zoom(scale, (x, y))
 
     def in_pixels(self, rect: Rect) -> PixelRect:
-        """A rectangle in framebuffer pixels, at least one each way."""
+        """Return a rectangle in framebuffer pixels, at least one pixel wide and high."""
         x, y = round(rect.x * self.pixel_ratio), round(rect.y * self.pixel_ratio)
         width, height = round(rect.width * self.pixel_ratio), round(rect.height * self.pixel_ratio)
         return PixelRect(x, y, max(width, 1), max(height, 1))
 
 
 def whole_pixels(rect: Rect) -> PixelRect:
-    """A rectangle in pixels, rounded so that neighbours still touch, at least one pixel each way."""
+    """Return a rectangle in pixels, rounded so that neighbours still touch, at least one pixel wide and high."""
     left, top = round(rect.x), round(rect.y)
     return PixelRect(left, top, max(round(rect.x + rect.width) - left, 1), max(round(rect.y + rect.height) - top, 1))
 
 
 def is_narrow(window_size: ScreenSize, ui_scale: float) -> bool:
-    """Whether the panel folds away by itself. ui_scale: of the display; larger text alone folds nothing away."""
+    """Return whether the panel folds away. ui_scale: of the display; larger text alone folds nothing away."""
     return window_size[0] < NARROW_WIDTH * ui_scale
 
 
@@ -184,9 +184,9 @@ def layout_of(
     zoom: Zoom | None = None,
     own_width: int | None = None,
 ) -> Layout:
-    """Panel at the right, picture as large as it fits beside it and what is beside it. Sizes are (width, height).
+    """Return the layout: the panel at the right, the picture as large as fits in the rest. Sizes are (width, height).
 
-    zoom: a part of the picture that is seen in its place. own_width: of the photo, where the picture is a smaller one.
+    zoom: seen part of the picture. own_width: width of the photo, if the picture is smaller.
     """
     width, window_height = window_size
     filmstrip_height = FILMSTRIP_HEIGHT * ui_scale if beside.has_filmstrip else 0.0
@@ -228,12 +228,12 @@ def layout_of(
 
 
 def _thickness(views: int, ui_scale: float) -> float:
-    """Of an EPI strip: every view several pixels, within limits; none without views."""
+    """Return the thickness of an EPI strip; 0 without views."""
     return min(max(views * STRIP_UNITS_PER_VIEW, LEAST_STRIP), MOST_STRIP) * ui_scale if views else 0.0
 
 
 def letterbox(room: Rect, picture_size: ScreenSize) -> Rect | None:
-    """The largest rectangle of the picture's shape centred in the room; None where there is no room."""
+    """Return the largest rectangle of the picture's shape, centred in the room; None where there is no room."""
     width, height = picture_size
     scale = min(room.width / width, room.height / height)
     if scale <= 0:
@@ -244,7 +244,7 @@ def letterbox(room: Rect, picture_size: ScreenSize) -> Rect | None:
 
 
 def _zoomed(fitting: Rect, zoom: Zoom, fit: float, room: Rect, pixel_ratio: float) -> Rect:
-    """Where all of the picture lies, on whole pixels: it fills the room where it is larger, else is in its middle."""
+    """Return the rectangle of the zoomed picture on whole pixels; it is centred unless it fills the room."""
     larger = zoom.scale / fit
     width, height = fitting.width * larger, fitting.height * larger
 
@@ -258,6 +258,6 @@ def _zoomed(fitting: Rect, zoom: Zoom, fit: float, room: Rect, pixel_ratio: floa
 
 
 def pixel_at(picture: Rect, picture_size: ScreenSize, x: float, y: float) -> tuple[float, float]:
-    """Pixel coordinates in the picture (centres at integers) of a window position. picture_size is (width, height)."""
+    """Return the pixel (x, y) of the picture, centres at integers, at a window position."""
     width, height = picture_size
     return (x - picture.x) / picture.width * width - 0.5, (y - picture.y) / picture.height * height - 0.5

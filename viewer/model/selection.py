@@ -42,8 +42,8 @@ def move(state: AppState, is_forward: bool) -> AppState:
     """Move the selected surface nearer or farther by MOVE_SHARE of the range of depth."""
     if state.selection is None or state.stroke is not None:
         return state
-    edits, tool = state.depth.edits, "forward" if is_forward else "back"
-    stroke = surface_stroke(tool, state.selection.place, state.brush.tolerance)
+    edits = state.depth.edits
+    stroke = surface_stroke("forward" if is_forward else "back", state.selection.place, state.brush.tolerance)
     depth = replace(state.depth, edits=replace(edits, strokes=(*edits.strokes, stroke)))
     return replace(state, depth=depth, generation=state.generation + 1)
 

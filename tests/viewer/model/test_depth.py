@@ -1,4 +1,4 @@
-"""What is done to the depth: actions as pure functions, what they cost, undo, and the map the worker makes of it."""
+"""Editing of depth: verbs, undo, and the map that the worker makes of the edits."""
 
 from __future__ import annotations
 
@@ -10,22 +10,12 @@ import pytest
 
 from iibr_core.beyond.optics import Optics
 from iibr_core.depth.choice import DepthChoice, DepthOrigin
-from iibr_core.depth.editing.edits import (
-    DEPTH_TOOLS,
-    GAMMA_LIMITS,
-    RADIUS_LIMITS,
-    UNEDITED,
-    BrushTool,
-    DepthEdits,
-    Stroke,
-)
-from iibr_core.scenes.opening import results_of
+from iibr_core.depth.editing.edits import DEPTH_TOOLS, GAMMA_LIMITS, RADIUS_LIMITS, BrushTool, DepthEdits, Stroke
 from iibr_core.scenes.photo import apply_depth_settings, load_photo, make_plan
-from iibr_core.scenes.scene import DepthSettings, SceneRequest, Source
+from iibr_core.scenes.scene import DepthSettings, Source
 from iibr_core.training.degradation import blur
 from iibr_core.types import GridShape
 from tests.viewer.conftest import FAR, HEIGHT, NEAR, WIDTH, reduce, write_scene
-from tests.viewer.model.test_history import after
 from tests.viewer.model.test_reducers import plan_of, scene_of, state_with
 from viewer.app.dropped_files import actions_from_drop
 from viewer.app.pointer import Pointer, actions_from_pointer
@@ -33,9 +23,6 @@ from viewer.model import depth, gesture, history, inspection, lens, opening, sav
 from viewer.model.action import do
 from viewer.model.carried_optics import NewDepth
 from viewer.model.commands import action_for_path
-from viewer.model.depth import (
-    settings_for_worker,
-)
 from viewer.model.layout import layout_of
 from viewer.model.saved_settings import settings_from_text, settings_text
 from viewer.model.saving import settings_of
@@ -58,129 +45,98 @@ def opened(source: Source | None = None) -> AppState:
 
 
 def test_clips_do_not_cross_and_values_are_clamped() -> None:
-    state = reduce(opened(), do(depth.set_tone, DepthEdits(far_clip=0.3, near_clip=0.6), True))
-    pushed = reduce(state, do(depth.set_tone, DepthEdits(far_clip=0.9, near_clip=0.6), True)).depth.edits
+    state = depth.set_tone(opened(), DepthEdits(far_clip=0.3, near_clip=0.6), True)
+    pushed = depth.set_tone(state, DepthEdits(far_clip=0.9, near_clip=0.6), True).depth.edits
     assert pushed.far_clip < pushed.near_clip == 0.6
-    pulled = reduce(state, do(depth.set_tone, DepthEdits(far_clip=0.3, near_clip=0.1), True)).depth.edits
+    pulled = depth.set_tone(state, DepthEdits(far_clip=0.3, near_clip=0.1), True).depth.edits
     assert 0.3 == pulled.far_clip < pulled.near_clip
-    wild = reduce(opened(), do(depth.set_tone, DepthEdits(far_clip=-3, near_clip=7, gamma=1e9), True)).depth.edits
+    wild = depth.set_tone(opened(), DepthEdits(far_clip=-3, near_clip=7, gamma=1e9), True).depth.edits
     assert (wild.far_clip, wild.near_clip, wild.gamma) == (0, 1, GAMMA_LIMITS[1])
-    brush = reduce(opened(), do(depth.set_brush, Brush(radius=9, strength=9))).brush
-    assert (brush.radius, brush.strength) == (RADIUS_LIMITS[1], 1)
-
-
-def test_values_that_are_not_finite_change_nothing() -> None:
+    brush = depth.set_brush(opened(), Brush(radius=9, strength=9, tolerance=0)).brush
+    assert (brush.radius, brush.strength, brush.tolerance) == (RADIUS_LIMITS[1], 1, 0.25)
     nan, state = float("nan"), opened()
-    for action in (
-        do(depth.set_tone, DepthEdits(gamma=nan), True),
-        do(depth.set_brush, Brush(radius=nan)),
-        do(depth.paint, (nan, 0.0)),
-    ):
-        assert reduce(state, action) == state
-    assert reduce(state, do(depth.pick, DepthSample((0.5, 0.5), float("inf")))) == state
+    assert depth.set_tone(state, DepthEdits(gamma=nan), True) == state
+    assert depth.set_brush(state, Brush(radius=nan)) == depth.paint(state, (nan, 0.0)) == state
+    assert depth.pick(state, DepthSample((0.5, 0.5), float("inf"))) == state
 
 
 def test_a_stroke_keeps_points_that_lie_apart() -> None:
-    drawn = after(
-        opened(),
-        do(depth.paint, (0.1, 0.1)),
-        do(depth.paint, (0.101, 0.1)),
-        do(depth.paint, (0.3, 0.1)),
-        do(gesture.end_gesture),
-    )
+    state = opened()
+    for place in ((0.1, 0.1), (0.101, 0.1), (0.3, 0.1)):
+        state = depth.paint(state, place)
+    drawn = gesture.end_gesture(state)
     assert drawn.depth.edits.strokes == (Stroke("nearer", ((0.1, 0.1), (0.3, 0.1)), 0.06, Brush().strength),)
 
 
 @pytest.mark.parametrize("tool", DEPTH_TOOLS)
 def test_level_and_bucket_give_the_picked_depth_wholly_until_another_photo_opens(tool: BrushTool) -> None:
-    start = reduce(opened(), do(depth.set_brush, Brush(tool, strength=0.2, is_on=True)))
-    picked = reduce(start, do(depth.pick, SAMPLE))
+    start = depth.set_brush(opened(), Brush(tool, strength=0.2, is_on=True))
+    picked = depth.pick(start, SAMPLE)
     for state, taken_from in ((start, None), (picked, SAMPLE.place)):
-        stroke = reduce(state, do(depth.paint, (0.1, 0.1))).stroke
-        assert stroke == Stroke(tool, ((0.1, 0.1),), stroke.radius if stroke else 0, 1.0, taken_from)
-    elsewhere = reduce(picked, do(opening.show_scene, picked.generation, scene_of(GRID, source=Source("b.png"))))
-    assert elsewhere.brush.sample is None
+        assert depth.paint(state, (0.1, 0.1)).stroke == Stroke(tool, ((0.1, 0.1),), 0.03, 1.0, taken_from)
+    assert opening.show_scene(picked, 1, scene_of(GRID, source=Source("b.png"))).brush.sample is None
 
 
 def test_the_depth_of_a_light_field_is_left_alone() -> None:
     start = state_with(scene_of())
-    assert reduce(start, do(depth.set_tone, TONE, True)) == start
-    told = reduce(start, do(depth.set_brush, Brush(is_on=True)))
-    assert not told.brush.is_on
-    assert "cannot be edited" in told.notices[-1].text
+    assert depth.set_tone(start, TONE, True) == start
+    refused = depth.set_brush(start, Brush(is_on=True))
+    assert not refused.brush.is_on
+    assert "cannot be edited" in refused.notices[-1].text
 
 
 def test_another_photo_begins_with_its_own_depth_and_a_failed_one_gives_the_old_back() -> None:
-    edited = after(opened(), do(depth.set_tone, TONE, True), do(depth.set_refine, False))
+    edited = depth.set_refine(depth.set_tone(opened(), TONE, True), False)
     source = Source("b.png", DepthChoice(refine=False))
-    asked = reduce(edited, do(opening.open_source, source))
-    assert settings_for_worker(asked) == DepthSettings(False)
-    failed = reduce(asked, do(opening.report_failure, asked.generation, "gone"))
-    assert settings_for_worker(failed) == edited.depth
+    asked = opening.open_source(edited, source)
+    assert depth.settings_for_worker(asked) == DepthSettings(False)
+    assert depth.settings_for_worker(opening.report_failure(asked, asked.generation, "gone")) == edited.depth
     scene = scene_of(GRID, source=source, plan=plan_of(GRID))
-    assert reduce(asked, do(opening.show_scene, asked.generation, scene)).depth == DepthSettings(False)
+    assert opening.show_scene(asked, asked.generation, scene).depth == DepthSettings(False)
 
 
-def test_the_same_scene_planned_anew_keeps_its_edits_and_its_history() -> None:
-    edited = after(opened(), do(depth.set_tone, TONE, True), do(gesture.end_gesture))
+def test_the_same_scene_planned_anew_keeps_its_edits_until_they_are_undone_or_reset() -> None:
+    edited = gesture.end_gesture(depth.set_tone(opened(), TONE, True))
     assert edited.scene is not None
-    state = reduce(
-        edited, do(opening.show_scene, edited.generation, replace(edited.scene, plan=plan_of(GRID, scale=0.5)))
-    )
+    again = replace(edited.scene, plan=plan_of(GRID, scale=0.5))
+    state = opening.show_scene(edited, edited.generation, again)
     assert state.depth == edited.depth
-    assert reduce(state, do(history.undo)).depth == DepthSettings()
+    assert history.undo(state).depth == depth.reset(state).depth == DepthSettings()
 
 
-def test_reset_takes_everything_back_at_once() -> None:
-    state = after(
-        opened(Source("a.png", DepthChoice(refine=False))),
-        do(depth.set_tone, TONE, True),
-        do(depth.set_refine, True),
-        do(depth.reset),
-    )
-    assert state.depth == DepthSettings(False)
-
-
-DECIDED = Source(
-    "a.png",
-    DepthChoice("model", file="a.pfm", file_scale=2.0, model="midas", refine=False),
-    grid=GRID,
-    focus_disparity=1.0,
-)
-
-
-def test_another_photo_keeps_what_was_decided_about_depth_and_a_map_is_for_the_photo_that_is_open() -> None:
-    depth = DepthChoice("model", model="midas", refine=False)
-    photo = do(opening.open_source, replace(DECIDED, path="b.png", depth=depth, focus_disparity=None))
-    given = replace(depth, start="auto", file="b.pfm", stretches=True)
-    a_map = do(opening.open_source, replace(DECIDED, depth=given, focus_disparity=None))
+def test_a_map_is_for_the_photo_that_is_open_and_another_photo_keeps_the_choice_of_depth() -> None:
+    choice = DepthChoice("model", file="a.pfm", file_scale=2.0, model="midas", refine=False)
+    source = Source("a.png", choice, grid=GRID, focus_disparity=1.0)
+    kept = DepthChoice("model", model="midas", refine=False)
+    photo = do(opening.open_source, replace(source, path="b.png", depth=kept, focus_disparity=None))
+    given = replace(kept, start="auto", file="b.pfm", stretches=True)
+    a_map = do(opening.open_source, replace(source, depth=given, focus_disparity=None))
     for kind, path, action in (("photo", "b.png", photo), ("map", "b.pfm", a_map)):
-        assert action_for_path(kind, path, opened(DECIDED)) == action  # type: ignore[arg-type]
-        assert actions_from_drop([path], opened(DECIDED)) == [action]
-
-
-def pointer_at(share_x: float, share_y: float, **more: object) -> tuple[Pointer, object]:
-    layout = layout_of((1000, 800), (96, 64))
-    assert layout.picture is not None
-    x, y = layout.picture.x + share_x * layout.picture.width, layout.picture.y + share_y * layout.picture.height
-    return Pointer(x, y, pressed_x=x, pressed_y=y, **more), layout  # type: ignore[arg-type]
+        assert action_for_path(kind, path, opened(source)) == action  # type: ignore[arg-type]
+        assert actions_from_drop([path], opened(source)) == [action]
 
 
 def test_the_brush_paints_on_the_surface_seen_under_it() -> None:
     state = opened()
     assert state.scene is not None
-    state = reduce(
-        replace(state, scene=replace(state.scene, width=96, height=64)), do(lens.move_eye, GRID.offset(0, 2))
-    )
-    pointer, layout = pointer_at(0.5, 0.25, is_down=True, is_pressed=True)
-    (paint,) = actions_from_pointer(pointer, layout, state, lambda x, y: 3.0)  # type: ignore[arg-type]
+    state = lens.move_eye(replace(state, scene=replace(state.scene, width=96, height=64)), GRID.offset(0, 2))
+    layout = layout_of((1000, 800), (96, 64))
+    assert layout.picture is not None
+    x, y = layout.picture.x + 0.5 * layout.picture.width, layout.picture.y + 0.25 * layout.picture.height
+    at = Pointer(x, y, pressed_x=x, pressed_y=y)
+    pressed = replace(at, is_down=True, is_pressed=True)
+    (paint,) = actions_from_pointer(pressed, layout, state, lambda x, y: 3.0)
     assert paint.verb is depth.paint
     assert paint.args[0] == pytest.approx((0.5 + 3 / 96, 0.25 - 3 / 64))
-    wheel, layout = pointer_at(0.5, 0.5, wheel=1.0)
-    (larger,) = actions_from_pointer(wheel, layout, state, lambda x, y: None)  # type: ignore[arg-type]
+    (larger,) = actions_from_pointer(replace(at, wheel=1.0), layout, state, lambda x, y: None)
     assert reduce(state, larger).brush.radius > state.brush.radius
-    drag, layout = pointer_at(0.5, 0.5, is_down=True, drag_distance=50.0)
-    assert actions_from_pointer(drag, layout, state, lambda x, y: 0.0) == [], "it began elsewhere"  # type: ignore[arg-type]
+    drag = replace(at, is_down=True, drag_distance=50.0)
+    assert actions_from_pointer(drag, layout, state, lambda x, y: 0.0) == [], "it began elsewhere"
+    selecting = replace(state, brush=replace(state.brush, tool="select"))
+    (select,) = actions_from_pointer(pressed, layout, selecting, lambda x, y: 3.0)
+    assert (select.verb, select.args) == (selection.select, paint.args)
+    (wider,) = actions_from_pointer(replace(at, wheel=1.0), layout, selecting, lambda x, y: None)
+    assert reduce(selecting, wider).brush.tolerance > 1
 
 
 @pytest.mark.parametrize(("given", "proposed"), [("", "_disparity.pfm"), ("a_disparity.pfm", "-edited.pfm")])
@@ -188,17 +144,16 @@ def test_a_map_is_saved_where_it_is_found_again_but_not_over_a_given_one(given: 
     state = opened()
     assert state.scene is not None
     state = replace(state, scene=replace(state.scene, depth_origin=DepthOrigin("file", given) if given else None))
-    asked = reduce(state, do(saving.ask_to_save, "map"))
+    asked = saving.ask_to_save(state, "map")
     assert isinstance(asked.prompt, SavePrompt)
     assert asked.prompt.path.endswith(proposed)
 
 
-@pytest.mark.parametrize("edits", [UNEDITED, replace(TONE, strokes=(STROKE, replace(STROKE, taken_from=(0.7, 0.2))))])
-def test_settings_bring_the_edits_along(edits: DepthEdits) -> None:
+def test_settings_bring_the_edits_along() -> None:
+    edits = replace(TONE, strokes=(STROKE, Stroke("back", ((0.1, 0.2),), 0.03, 0.1, (0.7, 0.2), tolerance=2.0)))
     text = settings_text(settings_of(replace(opened(), depth=DepthSettings(False, edits)), (96, 64)))
     again = settings_from_text(text, "a.png")
-    assert again.depth_edits == edits
-    assert not again.source.depth.refine
+    assert (again.depth_edits, again.source.depth.refine) == (edits, False)
 
 
 def test_clips_keep_the_parallax_of_what_they_leave(photo_path: Path) -> None:
@@ -215,34 +170,37 @@ def test_refining_is_from_what_was_found_each_time(tmp_path: Path) -> None:
     soft = blur(np.load(tmp_path / "scene_disparity.npy"), 2.0)
     np.save(tmp_path / "scene_disparity.npy", soft)
     loaded = load_photo(Source(str(path), DepthChoice(refine=False)))
-    np.testing.assert_array_equal(loaded.disparity.values, soft)
     full = apply_depth_settings(loaded, DepthSettings(True))
     assert not np.array_equal(full.disparity.values, soft)
-    np.testing.assert_array_equal(
-        full.disparity.values, load_photo(Source(str(path), DepthChoice(refine=True))).disparity.values
-    )
     np.testing.assert_array_equal(apply_depth_settings(full, DepthSettings(False)).disparity.values, soft)
 
 
 def test_a_flat_photo_can_be_painted_on(tmp_path: Path) -> None:
     path = write_scene(tmp_path)
     np.save(tmp_path / "scene_disparity.npy", np.zeros((HEIGHT, WIDTH), np.float32))
-    source = Source(str(path))
     edits = DepthEdits(strokes=(replace(STROKE, strength=1.0, radius=0.2),))
-    painted = apply_depth_settings(load_photo(source), DepthSettings(edits=edits))
-    assert make_plan(source, painted, 1.0).disparity_range_px[1] > 0
+    painted = apply_depth_settings(load_photo(Source(str(path))), DepthSettings(edits=edits))
+    assert make_plan(Source(str(path)), painted, 1.0).disparity_range_px[1] > 0
 
 
-def test_the_histogram_turns_with_the_map_and_the_focus_stays_on_its_surface(photo_path: Path) -> None:
+def test_the_histogram_turns_with_the_map_follows_strokes_and_marks_the_focus(photo_path: Path) -> None:
     source = Source(str(photo_path), grid=GRID)
-    ready = next(results_of(SceneRequest(1, source), lambda: GRID.offset(1, 1)))
-    levels, scene = ready.scene.levels, ready.scene
-    heights = bar_heights(levels, False)
-    assert bar_heights(levels, True) == heights[::-1]
+    loaded = load_photo(source)
+    heights = bar_heights(loaded.levels, False)
+    assert bar_heights(loaded.levels, True) == heights[::-1]
     assert (heights[0], max(heights), heights[-1] > 0) == (1.0, 1.0, True)
-    state = replace(AppState(source=source), scene=scene)
-    near = (NEAR - scene.plan.disparity_zero) * scene.plan.disparity_scale
-    assert focus_share(reduce(state, do(lens.set_focus, near)), scene, levels) == pytest.approx(1.0)
+    plan = make_plan(source, loaded, 1.0)
+    state = state_with(scene_of(GRID, source=source, plan=plan, disparity_range_px=plan.disparity_range_px))
+    near = (NEAR - plan.disparity_zero) * plan.disparity_scale
+    focused = lens.set_focus(state, near)
+    assert focused.scene is not None
+    assert focus_share(focused, focused.scene, loaded.levels) == pytest.approx(1.0)
+    pushed = Stroke("back", ((0.5, 0.5),), 0.02, 0.5)
+    for is_inverted, place in ((False, 0.5), (True, 1.0)):  # 1.0: values beyond count at the ends
+        edits = DepthEdits(is_inverted, strokes=(pushed,))
+        counts = apply_depth_settings(loaded, DepthSettings(loaded.depth_settings.refine, edits)).levels.counts
+        first = round(place * len(counts)) - 1
+        assert sum(counts[max(first - 1, 0) : first + 2]) > 1000, "the square lies there now"
 
 
 @pytest.mark.parametrize(
@@ -254,15 +212,12 @@ def test_the_histogram_turns_with_the_map_and_the_focus_stays_on_its_surface(pho
     ],
 )
 def test_new_depth_keeps_the_focus_where_it_was(
-    focus: float,
-    focused_at: tuple[float, float] | None,
-    in_focus: tuple[float, float] | None,
-    expected: float,
+    focus: float, focused_at: tuple[float, float] | None, in_focus: tuple[float, float] | None, expected: float
 ) -> None:
     state = replace(opened(), optics=Optics(focus_disparity=focus, focus_range=0.5), focused_at=focused_at)
     assert state.scene is not None
     deeper = replace(state.scene, plan=plan_of(GRID, scale=2.0), disparity_range_px=(-4.0, 4.0))
-    now = reduce(state, do(opening.show_scene, state.generation, deeper, NewDepth(in_focus))).optics
+    now = opening.show_scene(state, state.generation, deeper, NewDepth(in_focus)).optics
     assert (now.focus_disparity, now.focus_range) == (pytest.approx(expected), pytest.approx(0.8))
 
 
@@ -284,8 +239,7 @@ def test_a_brush_that_paints_brings_the_depth_overlay_and_takes_it_away() -> Non
     start = replace(opened(), brush=Brush())
     taken = depth.set_brush(start, Brush("nearer", is_on=True))
     assert taken.inspection.overlay == "disparity"
-    selecting = depth.set_brush(taken, replace(taken.brush, tool="select"))
-    assert selecting.inspection.overlay is None
+    assert depth.set_brush(taken, replace(taken.brush, tool="select")).inspection.overlay is None
     assert depth.set_brush(taken, replace(taken.brush, is_on=False)).inspection.overlay is None
     own = depth.set_brush(inspection.set_overlay(start, "inpainted"), Brush(is_on=True))
     assert depth.set_brush(own, replace(own.brush, is_on=False)).inspection.overlay == "inpainted"

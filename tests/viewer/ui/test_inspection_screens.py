@@ -50,8 +50,7 @@ def part(screen: np.ndarray, rect: Rect | None) -> np.ndarray:
     return screen[top : top + round(rect.height), left : left + round(rect.width)]
 
 
-@pytest.mark.parametrize("theme", ["dark", "light"])
-@pytest.mark.parametrize("scale", [1.0, 1.5])
+@pytest.mark.parametrize(("theme", "scale"), [("dark", 1.0), ("light", 1.5)])
 def test_the_whole_section_is_seen_at_any_size_of_text(viewer: OffscreenScene, theme: Theme, scale: float) -> None:
     size = round(SIZE[0] * scale), round(SIZE[1] * scale)
     viewer.do(
@@ -67,13 +66,8 @@ def test_the_whole_section_is_seen_at_any_size_of_text(viewer: OffscreenScene, t
     assert not panel[-round(8 * scale) :].any(), "clipped below"
 
 
-@pytest.mark.parametrize("theme", ["dark", "light"])
-def test_epis_lie_beside_the_picture_and_go_through_the_pointer(viewer: OffscreenScene, theme: Theme) -> None:
-    viewer.do(
-        do(preferences.set_theme, theme),
-        do(inspection.set_hover, replace(HOVER, disparity=None)),
-        do(inspection.show_epis, True),
-    )
+def test_epis_lie_beside_the_picture_and_go_through_the_pointer(viewer: OffscreenScene) -> None:
+    viewer.do(do(inspection.set_hover, replace(HOVER, disparity=None)), do(inspection.show_epis, True))
     screen, layout = viewer.screen(SIZE).astype(int), layout_now(viewer)
     across, down = part(screen, layout.strip_across), part(screen, layout.strip_down)
     row, column = part(screen, layout.picture)[:, 100], part(screen, layout.picture)[100]
@@ -88,12 +82,6 @@ def test_epis_lie_beside_the_picture_and_go_through_the_pointer(viewer: Offscree
     is_marked = np.abs(np.arange(own.shape[0]) - (HOVER.x_px + 0.5) / WIDTH * own.shape[0]) < 4
     near = np.abs(own - picture[y]).max(axis=1)[~is_marked]
     assert np.median(near) <= 6
-
-
-def test_the_middle_of_the_epi_moves_with_the_eye(viewer: OffscreenScene) -> None:
-    viewer.do(do(inspection.show_epis, True))
-    changed = changed_after(viewer, do(lens.move_eye, ViewOffset(0, 1)))
-    assert part(changed, layout_now(viewer).strip_across).sum() > ENOUGH_PIXELS
 
 
 @pytest.mark.parametrize("kind", OVERLAYS)

@@ -9,7 +9,7 @@ from iibr_core.beyond.optics import Optics
 
 @dataclass(frozen=True)
 class ModelOffer:
-    """A depth model that can be had. host: source of its download. words: one line about it. is_here: whether it is on
+    """A known depth model. host: source of its download. words: one line about it. is_here: whether it is on
     this machine. lacks: end of a sentence that names what is missing to run it, "" where nothing is.
     """
 
@@ -47,11 +47,11 @@ class Downloading:
 
 @dataclass(frozen=True)
 class DepthModels:
-    """Depth models that can be had, and the choice of the user.
+    """Known depth models, and the choice of the user.
 
-    known: () before they were listed. asked: name or path of the model for the open photo, None where nobody chose.
-    dismissed: paths of photos whose offer was closed in this run. given_up: paths of photos whose estimate was stopped
-    or failed. left_focus: focus of the session, where it belongs to the depth that is still to be estimated.
+    known: () before they were listed. asked: name or path of the model that was chosen for the open photo, None
+    without. dismissed: paths of photos whose offer was closed in this run. given_up: paths of photos whose estimate
+    was stopped or failed. left_focus: focus of the session, if it belongs to the depth that is still to be estimated.
     """
 
     known: tuple[ModelOffer, ...] = ()

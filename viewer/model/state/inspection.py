@@ -1,4 +1,4 @@
-"""Records of what is looked at beside the picture; `viewer.model.inspection` has the verbs."""
+"""Records of inspection; `viewer.model.inspection` has the verbs."""
 
 from __future__ import annotations
 

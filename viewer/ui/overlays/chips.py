@@ -43,7 +43,7 @@ def chips(state: AppState, layout: Layout) -> list[Action]:
 
 
 def has_guess_badge(state: AppState, layout: Layout) -> bool:
-    """Return whether the chip of guessed depth stands in the left upper corner."""
+    """Return whether the left upper corner has the chip of guessed depth."""
     scene, frame = state.scene, layout.frame
     if scene is None or frame is None or state.free_camera is not None or state.shows_before:
         return False

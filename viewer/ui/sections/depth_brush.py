@@ -56,7 +56,10 @@ def _settings(brush: Brush, layout: Layout) -> list[Brush]:
     changed += [] if size is None else [replace(brush, radius=size / 100)]
     strength = percent_slider("Strength", brush.strength, layout, STRENGTH_TIP, paints and not is_depth_tool)
     changed += [] if strength is None else [replace(brush, strength=strength)]
-    floods, limits = brush.is_on and brush.tool in ("fill", "select"), tuple(100 * end for end in TOLERANCE_LIMITS)
+    floods, limits = (
+        brush.is_on and brush.tool in ("fill", "select"),
+        (100 * TOLERANCE_LIMITS[0], 100 * TOLERANCE_LIMITS[1]),
+    )
     share = slider("Tolerance", 100 * brush.tolerance, limits, "%.0f %%", layout, TOLERANCE_TIP, True, floods)
     changed += [] if share is None else [replace(brush, tolerance=share / 100)]
     has_sample = paints and is_depth_tool and brush.sample is not None

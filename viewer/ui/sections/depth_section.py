@@ -1,4 +1,4 @@
-"""The panel's section for depth: its source, tone and files; the brush stands in `depth_brush`."""
+"""The panel's section for depth: source, tone and files. `depth_brush` has the rows of the brush."""
 
 from __future__ import annotations
 
