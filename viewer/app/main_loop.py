@@ -142,7 +142,7 @@ class App:
         self._pace.is_busy |= bool(actions) or self._side_effects.is_drawing or self.sharpener.is_drawing
         self._pace.is_busy |= self.inspection_view.is_drawing
         self.scene_loader.advance(self.state)
-        self.do(*self._preferences.keep_news(self.state))
+        self.do(*self._preferences.keep(self.state))
         self._pace.took_s.append(time.perf_counter() - start)
 
     @property
@@ -188,7 +188,7 @@ class App:
         self._entropy.close()
         self._surfaces.close()
         self.gloss_finder.close()
-        self._preferences.keep(self.state)
+        self._preferences.keep(self.state, is_closing=True)
         self._sessions.close(self.state)
         self._side_effects.close()
         self._ui.release()

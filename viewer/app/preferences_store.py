@@ -78,18 +78,13 @@ class PreferencesKeeper:
         """folder: None keeps nothing. state: as it was read from there."""
         self._folder, self._kept = folder, _without_place(state)
 
-    def keep_news(self, state: AppState) -> list[Action]:
-        """Write them if they changed; return a notice if that fails."""
-        if _without_place(state) == self._kept:
+    def keep(self, state: AppState, is_closing: bool = False) -> list[Action]:
+        """Write them if they changed, or if the window closes; return a notice if that fails."""
+        if self._folder is None or (_without_place(state) == self._kept and not is_closing):
             return []
         self._kept = _without_place(state)
-        return self.keep(state)
-
-    def keep(self, state: AppState) -> list[Action]:
-        """Write them; return a notice if that fails."""
         try:
-            if self._folder is not None:
-                store_preferences(state, self._folder)
+            store_preferences(state, self._folder)
         except InputError as error:
             return [do(messages.notify, Notice(str(error), is_error=True))]
         return []

@@ -77,11 +77,6 @@ def test_photos_are_read_in_their_order_and_once_and_forgotten_when_wanted_no_mo
     assert not shelf.ahead.is_done(A)
 
 
-def test_what_was_planned_with_another_strength_is_another_photo(shelf: Shelf) -> None:
-    shelf.want_until_done(A, photo("a", 0.5))
-    assert (shelf.ahead.get(A), shelf.ahead.get(photo("a", 0.5))) == ("a 1", "a 0.5")
-
-
 def test_what_cannot_be_read_is_done_and_not_tried_again(shelf: Shelf) -> None:
     shelf.want_until_done(BAD, A)
     shelf.want_until_done(A, BAD)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import combinations
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -13,7 +12,6 @@ from imgui_bundle import imgui
 
 from iibr_core.beyond.optics import APERTURE_KINDS, ApertureShape
 from iibr_core.depth.editing.edits import DepthEdits
-from iibr_core.exports.kinds import ANIMATIONS
 from iibr_core.scenes.scene import DepthSettings
 from iibr_core.scenes.screen_size import ScreenSize
 from tests.viewer.conftest import headless_with_scene
@@ -28,8 +26,6 @@ from viewer.model.state.depth_models import ModelsPrompt
 from viewer.model.state.jobs import JobProgress
 from viewer.model.state.preferences import SECTIONS, Theme, Units
 from viewer.model.state.prompts import ExportPrompt, PalettePrompt, PathPrompt, Prompt, SavePrompt
-from viewer.ui.overlays.export_prompt import MOTION_TIPS
-from viewer.ui.sections.depth_section import START_TIPS, START_WORDS
 from viewer.ui.style import Color, Look, apply_style, palette_of
 from viewer.ui.widgets import GRIP_HEIGHT
 
@@ -171,13 +167,6 @@ def test_prompts_fit_the_window_and_their_words_fit_them(
         assert item.kind not in WORDS_INSIDE or item.words_width <= item.right - item.left + SLACK_PX, item
 
 
-def test_widgets_are_watched(items: list[Item], tmp_path: Path) -> None:
-    with headless_with_scene(tmp_path) as viewer:
-        viewer.screen(ScreenSize(400, 300))
-        assert any(item.kind == "button" and item.words_width > 0 for item in items)
-        assert {item.kind for item in items} >= {"text", "button", "slider_float", "checkbox"}
-
-
 def contrast(one: Color, other: Color) -> float:
     """Of two sRGB colours, as the Web Content Accessibility Guidelines have it: 1 to 21."""
 
@@ -218,8 +207,3 @@ def test_an_entry_under_the_pointer_stands_out_from_its_list(theme: Theme) -> No
     finally:
         imgui.destroy_context(context)
     assert contrast(hovered, ground) > LEAST_HOVER_CONTRAST
-
-
-def test_every_entry_of_a_list_says_what_it_means() -> None:
-    assert set(START_TIPS) == set(START_WORDS)
-    assert set(MOTION_TIPS) == set(ANIMATIONS)
