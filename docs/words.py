@@ -18,7 +18,7 @@ ROOT = Path(__file__).parents[1]
 PACKAGES = "iibr_core", "viewer"
 LABELS = "viewer/ui/", "viewer/model/commands.py", "viewer/model/layout.py", "iibr_core/exports/kinds.py"
 """Sources whose single words are labels."""
-PROGRAM_TEXT = re.compile(r"[\\<>;#]|^%|^\W*$|^[a-z]+$|^[a-z_]*[_:/][a-z_]*$")
+PROGRAM_TEXT = re.compile(r"[\\<>#]|;\s*$|^%|^\W*$|^[a-z]+$|^[a-z_]*[_:/][a-z_]*$")
 """Regular expressions, XML, shaders, identifiers."""
 COMMAND_HELP = "Example: iibr"
 
@@ -47,7 +47,7 @@ def texts_of(path: Path) -> Iterator[tuple[int, str]]:
 
 
 def text_of(node: ast.expr) -> str:
-    """Return a string as it is written, with the expressions in braces; "" for anything else."""
+    """Return a string with its expressions in braces; "" for anything else."""
     if isinstance(node, ast.JoinedStr):
         parts = (part.value if isinstance(part, ast.Constant) else ast.unparse(part) for part in node.values)
         return "".join(map(str, parts))

@@ -1,4 +1,4 @@
-"""`iibr` in a fork of a process that has imported it: as in a process of its own, but it starts at once."""
+"""Run `iibr` in a fork of a process that has imported it: like a process of its own, but it starts at once."""
 
 from __future__ import annotations
 
@@ -22,16 +22,20 @@ NO_WINDOWS = ("DISPLAY", "WAYLAND_DISPLAY")
 
 
 def run_forked(
-    *words: object, cwd: Path, most_bytes: int | None = None, **environment: str
+    *words: object, cwd: Path, max_bytes: int | None = None, typed: str = "", **environment: str
 ) -> subprocess.CompletedProcess[str]:
-    """Run `iibr` without a display. most_bytes: of a file that it writes, as on a full disk."""
+    """Run `iibr` without a display.
+
+    max_bytes: largest file that it can write, as on a full disk. typed: text on its standard input.
+    """
     clean = {name: value for name, value in os.environ.items() if name not in NO_WINDOWS}
     arguments = [str(word) for word in words]
     forks = multiprocessing.get_context("forkserver")
     forks.set_forkserver_preload(list(PRELOADED))
     with tempfile.TemporaryDirectory() as folder:
+        (Path(folder) / "input").write_text(typed)
         process = forks.Process(
-            target=_become_iibr, args=(arguments, cwd, {**clean, **environment}, Path(folder), most_bytes), daemon=True
+            target=_become_iibr, args=(arguments, cwd, {**clean, **environment}, Path(folder), max_bytes), daemon=False
         )
         process.start()
         process.join(DEADLINE_S)
@@ -43,22 +47,22 @@ def run_forked(
 
 
 def _become_iibr(
-    arguments: list[str], cwd: Path, environment: dict[str, str], folder: Path, most_bytes: int | None
+    arguments: list[str], cwd: Path, environment: dict[str, str], folder: Path, max_bytes: int | None
 ) -> None:
     for descriptor, name in ((1, folder / "output"), (2, folder / "errors")):
         os.dup2(os.open(name, os.O_WRONLY | os.O_CREAT), descriptor)
-    os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
+    os.dup2(os.open(folder / "input", os.O_RDONLY), 0)
     sys.stdin = os.fdopen(0, closefd=False)
     sys.stdout, sys.stderr = (os.fdopen(descriptor, "w", encoding="utf-8", closefd=False) for descriptor in (1, 2))
     os.environ.clear()
     os.environ.update(environment)
     os.chdir(cwd)
     signal.signal(signal.SIGINT, signal.default_int_handler)
-    if most_bytes is not None:
+    if max_bytes is not None:
         import resource
 
         sys.dont_write_bytecode = True  # modules that are cut off would be kept
-        resource.setrlimit(resource.RLIMIT_FSIZE, (most_bytes, most_bytes))
+        resource.setrlimit(resource.RLIMIT_FSIZE, (max_bytes, max_bytes))
     sys.argv = ["iibr", *arguments]
     from viewer.entry import command
 

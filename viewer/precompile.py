@@ -2,22 +2,19 @@
 
     python -P -m viewer.precompile iibr_core/_kernels
 
-It does the real work on small photos, from reading to the last view: only so are kernels compiled for just those arrays
-that they will meet. What training and evaluation need beside is compiled where it is used.
+Opens small photos in every way: only so are kernels compiled for the arrays that they meet. Kernels of training and
+evaluation are compiled when they are used.
 """
 
 from __future__ import annotations
 
 import os
-import shutil
 import sys
 import tempfile
-from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from multiprocessing import get_context
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -38,82 +35,49 @@ from iibr_core.scenes.photo import load_photo, make_plan, prepare_brush
 from iibr_core.scenes.scene import SceneReady, SceneRequest, Source
 from iibr_core.scenes.scene_gloss import GlossRequest, make_maps
 from iibr_core.scenes.screen_size import ScreenSize
-from iibr_core.types import Camera, InputError
+from iibr_core.types import Camera
 from viewer.model.demo_photo import demo_photo
 
-if TYPE_CHECKING:
-    from iibr_core.scenes.scene import Source
-
 PART = (slice(150, 310), slice(200, 400))
-"""Part of the demo photo with edges, wires and slopes of every kind; small: nearly all the work is compiling."""
+"""Part of the demo photo with edges, wires and slopes of every kind."""
 GLOSSY_PIXELS = 250_000
-"""Pixels of a photo whose disparity is smoothed for its normals, as in large photos."""
-KERNEL_FILES = (".nbi", ".nbc")
+"""Number of pixels of a photo whose disparity is smoothed for its normals, as in large photos."""
 
 
 def main() -> None:
-    """Fill the folder named on the command line with compiled kernels. Raises SystemExit."""
-    try:
-        write_kernels(Path(sys.argv[1]).absolute())
-    except InputError as error:
-        print(f"iibr: {error}", file=sys.stderr)
-        sys.exit(2)
-
-
-def write_kernels(folder: Path) -> None:
-    """Compile all kernels into a fresh folder, with as many processes as there are cores, and put it in the place of
-    `folder`.
-
-    Raises InputError where that holds files that are no kernels.
-    """
-    other = next((path for path in folder.rglob("*") if path.is_file() and path.suffix not in KERNEL_FILES), None)
-    if other is not None:
-        raise InputError(f"{folder}: holds other files ({other.name}); give an empty folder")
+    """Replace the kernels in the folder named on the command line, with one process per core."""
+    folder = Path(sys.argv[1]).absolute()
     print(COMPILING, file=sys.stderr)
-    with tempfile.TemporaryDirectory(dir=folder.parent) as scratch:
-        fresh = Path(scratch) / "kernels"
-        os.environ[FOLDER_VARIABLE] = str(fresh)
-        with ProcessPoolExecutor(core_count(), get_context("spawn")) as processes:
-            list(processes.map(_take, STEPS))
-        shutil.rmtree(folder, ignore_errors=True)
-        fresh.rename(folder)
+    for path in folder.rglob("*.nb[ic]"):
+        path.unlink()
+    os.environ[FOLDER_VARIABLE] = str(folder)
+    with ProcessPoolExecutor(core_count(), get_context("spawn")) as processes:
+        list(processes.map(_run, STEPS))
 
 
-def _take(step: Callable[[Path], None]) -> None:
+def _run(step: str) -> None:
     with tempfile.TemporaryDirectory() as scratch:
-        step(Path(scratch))
+        STEPS[step](Path(scratch))
 
 
 def _photo(scratch: Path, is_mapped: bool = True, is_hdr: bool = False) -> Source:
-    """A part of the demo photo as a file."""
+    """Write a part of the demo photo to a file."""
     photo = scratch / ("photo.exr" if is_hdr else "photo.png")
     colors = read_photo(demo_photo()).pixels[PART]
     write_image(photo, 4 * colors if is_hdr else np.round(255 * colors).astype(np.uint8))
     if is_mapped:
-        # A pixel beside the photo, and with a hole: edge bands of measured maps are moved to it.
+        # The map has a hole, and lies one pixel beside the photo: edge bands of measured maps are moved to it.
         disparity = np.roll(read_map(demo_photo().with_name("motorcycle_disparity.pfm"))[PART], 1, axis=1)
         disparity[:4, :4] = np.nan
         write_map(scratch / "photo_disparity.pfm", disparity)
     return Source(str(photo))
 
 
-def _open(source: Source) -> None:
-    """All that the window's worker does with a photo."""
-    for _ in results_of(SceneRequest(0, source), lambda: CENTRE):
-        pass
-
-
-def _show_first_picture(scratch: Path) -> None:
-    next(results_of(SceneRequest(0, _photo(scratch)), lambda: CENTRE))
-
-
-def _make_views(scratch: Path) -> None:
-    """Make the views, without what comes before the first picture."""
-    _open(replace(_photo(scratch), depth=DepthChoice(refine=False)))
-
-
-def _open_smaller(scratch: Path) -> None:
-    _open(replace(_photo(scratch), max_pixels=160 * 200 // 2))
+def _open(source: Source) -> SceneReady:
+    """Open a photo as the window does and make its views."""
+    ready, *_ = results_of(SceneRequest(0, source), lambda: CENTRE)
+    assert isinstance(ready, SceneReady)
+    return ready
 
 
 def _open_with_small_maps(scratch: Path) -> None:
@@ -123,19 +87,6 @@ def _open_with_small_maps(scratch: Path) -> None:
     for small in (disparity[::4, ::4], disparity.reshape(40, 4, 50, 4).mean(axis=(1, 3))):
         write_map(scratch / "photo_disparity.pfm", np.ascontiguousarray(small))
         _open(source)
-
-
-def _open_guessed(scratch: Path) -> None:
-    _open(replace(_photo(scratch, is_mapped=False), depth=DepthChoice(start="rough")))
-
-
-def _open_hdr(scratch: Path) -> None:
-    _open(_photo(scratch, is_hdr=True))
-
-
-def _paint(scratch: Path) -> None:
-    """Prepare the first stroke of the depth brush."""
-    prepare_brush()
 
 
 def _look_around(scratch: Path) -> None:
@@ -149,47 +100,42 @@ def _look_around(scratch: Path) -> None:
 
 def _find_gloss(scratch: Path) -> None:
     """Find the normals of a glossy surface."""
-    large = Source(str(demo_photo()), max_pixels=GLOSSY_PIXELS)
-    ready = next(results_of(SceneRequest(0, large), lambda: CENTRE))
+    ready = next(results_of(SceneRequest(0, Source(str(demo_photo()), max_pixels=GLOSSY_PIXELS)), lambda: CENTRE))
     assert isinstance(ready, SceneReady)
     make_maps(GlossRequest(GlossSurface(), ready.scene, ready.centre))
 
 
 def _draw_at_own_size(scratch: Path) -> None:
-    """Draw a picture at the photo's own size, with inpainted background, through a lens."""
+    """Draw a picture through a lens at the photo's own size, with inpainted background."""
     small = replace(_photo(scratch), max_pixels=16_000)
     loaded = load_photo(small)
     plan = make_plan(small, loaded, 1.0)
-    ready = next(results_of(SceneRequest(0, small, loaded=loaded, plan=plan), lambda: CENTRE))
-    assert isinstance(ready, SceneReady)
     height, width = loaded.photo.size
-    full = FullPicture(ready.scene, plan, loaded, Optics(aperture_diameter=3.0), ScreenSize(width, height))
+    full = FullPicture(_open(small).scene, plan, loaded, Optics(aperture_diameter=3.0), ScreenSize(width, height))
     draw_full(full, lambda settings: np.zeros((settings.size_px.height, settings.size_px.width, 3), np.float32))
 
 
 def _search_views(scratch: Path) -> None:
-    """A light field without disparity: `iibr depth` looks for it in the same way."""
-    folder = scratch / "field"
-    folder.mkdir()
+    """Open a light field without disparity."""
     texture = np.random.default_rng(0).integers(0, 255, (96, 96, 3), np.uint8)
     for row, column in np.ndindex(3, 3):
-        write_image(folder / f"v{row}_u{column}.png", np.roll(texture, (row, column), (0, 1)))
-    _open(Source(str(folder)))
+        write_image(scratch / f"v{row}_u{column}.png", np.roll(texture, (row, column), (0, 1)))
+    _open(Source(str(scratch)))
 
 
-STEPS: tuple[Callable[[Path], None], ...] = (
-    _show_first_picture,
-    _make_views,
-    _search_views,
-    _paint,
-    _look_around,
-    _find_gloss,
-    _open_guessed,
-    _open_smaller,
-    _open_with_small_maps,
-    _open_hdr,
-    _draw_at_own_size,
-)
+STEPS = {
+    "photo": lambda scratch: _open(_photo(scratch)),
+    "views": lambda scratch: _open(replace(_photo(scratch), depth=DepthChoice(refine=False))),
+    "light field": _search_views,
+    "brush": lambda scratch: prepare_brush(),
+    "camera": _look_around,
+    "gloss": _find_gloss,
+    "guess": lambda scratch: _open(replace(_photo(scratch, is_mapped=False), depth=DepthChoice(start="rough"))),
+    "smaller": lambda scratch: _open(replace(_photo(scratch), max_pixels=160 * 200 // 2)),
+    "small maps": _open_with_small_maps,
+    "hdr": lambda scratch: _open(_photo(scratch, is_hdr=True)),
+    "own size": _draw_at_own_size,
+}
 
 
 if __name__ == "__main__":

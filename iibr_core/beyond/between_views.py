@@ -60,7 +60,7 @@ def read_given_views(scene: MultiView) -> list[GivenView]:
     Raises InputError if a file cannot be read, no disparity can be found, or memory does not suffice.
     """
     grid, (size, views) = grid_of(scene), read_views(scene)
-    what = f"making views between {grid.columns} x {grid.rows} of {scene.name} ({size})"
+    what = f"making views between {grid.columns}x{grid.rows} of {scene.name} ({size})"
     require_memory(math.prod(size) * math.prod(grid) * VIEW_BYTES, what)
     read: list[ViewUpdate] = []
     for view in views:

@@ -147,7 +147,9 @@ def fitted_cameras(cameras: Sequence[Camera], given: int, size: ImageSize) -> li
     """
     scale = size.width / cameras[given].size.width
     if abs(size.height / (cameras[given].size.height * scale) - 1) > MAX_SHAPE_DIFFERENCE:
-        raise InputError(f"{cameras[given].source}: is of pictures of {cameras[given].size}, the photo is {size}")
+        raise InputError(
+            f"{cameras[given].source}: its pictures are {cameras[given].size}, the photo is {size}; give its poses"
+        )
     sizes = [ImageSize(*(max(round(side * scale), 1) for side in camera.size)) for camera in cameras]
     sizes[given] = size
     return [camera.resized(scaled) for camera, scaled in zip(cameras, sizes)]

@@ -112,7 +112,7 @@ def photos_in(folders: Sequence[Path]) -> list[tuple[Path, str]]:
     tops = [folder.absolute().name if len(folders) > 1 else "" for folder in folders]
     top, count = Counter(tops).most_common(1)[0]
     if count > 1:
-        raise InputError(f"{top}: two folders of this name would become one; give them one after the other")
+        raise InputError(f"{top}: two folders have this name; export them one after the other")
     return [photo for folder, top in zip(folders, tops) for photo in _photos_below(folder, top)]
 
 

@@ -42,7 +42,7 @@ def _given_infinity(source: ExportSource) -> float:
     """Return the disparity (as given) of a point at infinity, which is known if distances are known in metres."""
     plan = source.plan()
     if plan.disparity_scale <= 0:
-        raise InputError(f"{source.scene.name}: is flat or inverted; give it depth")
+        raise InputError(f"{source.scene.name}: its depth is flat or inverted; open it with a depth map")
     low, high = (value / plan.disparity_scale + plan.disparity_zero for value in plan.disparity_range_px)
     return infinity_of(low, high, source.scene.inverse_metres)
 

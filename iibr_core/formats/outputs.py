@@ -66,7 +66,7 @@ def check_output_folder(
     _require_outside(folder, real, inputs)
     for read in inputs:
         if real in _resolve(read).parents:
-            raise InputError(f"{folder}: holds {read}, which is read, and no input is overwritten; choose another")
+            raise InputError(f"{folder}: holds the input {read}, which is never overwritten; choose another folder")
     if real.is_dir() and not may_replace and any(real.iterdir()):
         raise AlreadyThereError(f"{folder}: already exists")
     if own_files is not None and real.is_dir():
@@ -158,11 +158,9 @@ def _require_outside(path: Path, real: Path, inputs: Iterable[Path]) -> None:
     """Raise InputError where a place is an input, or lies in one."""
     for read in inputs:
         if read.exists() and real.exists() and real.samefile(read):
-            raise InputError(f"{path}: is read here ({read}), and no input is overwritten; choose another name")
+            raise InputError(f"{path}: is an input ({read}), which is never overwritten; choose another name")
         if read.is_dir() and _resolve(read) in (real, *real.parents):
-            raise InputError(
-                f"{path}: lies in {read}, which is read, and nothing is written there; choose another place"
-            )
+            raise InputError(f"{path}: lies in the input {read}, where nothing is written; choose another place")
 
 
 def _require_own_files(folder: Path, real: Path, own_files: str) -> None:

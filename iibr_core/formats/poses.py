@@ -11,7 +11,6 @@ from typing import Any
 import msgspec
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from iibr_core.formats.files import printable, read_text, reason_of, stays_within
 from iibr_core.formats.images.decode import read_size
@@ -162,10 +161,18 @@ def _colmap_camera(kind: list[str], picture: list[str], model: Path) -> Camera:
     if kind[1] not in ("PINHOLE", "SIMPLE_PINHOLE"):
         raise InputError(f"{source}: its camera is a {kind[1]}; undistort the pictures, which makes PINHOLE of it")
     focal_x, focal_y, x, y = numbers if kind[1] == "PINHOLE" else (numbers[0], *numbers)
-    w, *xyz = (float(word) for word in picture[1:5])
-    rotation = Rotation.from_quat([*xyz, w]).as_matrix()  # from the world to the camera
+    rotation = _rotation(*(float(word) for word in picture[1:5]))  # from the world to the camera
     position = -rotation.T @ [float(word) for word in picture[5:8]]
     return Camera(rotation.T, position, size, (focal_x, focal_y), (x - 0.5, y - 0.5), source)
+
+
+def _rotation(w: float, x: float, y: float, z: float) -> Doubles:
+    """Return the rotation (3, 3) of a quaternion; NaN if its length is 0. SciPy is not in a plain installation."""
+    with np.errstate(invalid="ignore"):
+        w, x, y, z = np.array([w, x, y, z]) / np.linalg.norm([w, x, y, z])
+    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    rotation: Doubles = np.eye(3) + 2 * w * cross + 2 * cross @ cross
+    return rotation
 
 
 def _require_count(path: Path, count: int) -> None:

@@ -9,16 +9,15 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from iibr_core.exports.kinds import EXPORTS
+from iibr_core.exports.batch import FAILURES, BatchSettings, check_batch_folder, photos_in, run_batch
 from iibr_core.runtime.extras import require_extra
 from iibr_core.types import InputError
 from viewer.cli.export_options import KindOptions, To, require_kind
-from viewer.cli.lens_options import Aperture, Focus, GlossFile
+from viewer.cli.lens_options import LensOptions
 from viewer.cli.option_records import with_option_records
+from viewer.cli.options import Force, Grid, LiteralDisparity, PhotoOptions, require_model
+from viewer.cli.progress import show_progress
 from viewer.cli.remedies import BETTER_DEPTH
-from viewer.cli.scene_options import PhotoOptions
-from viewer.cli.shared_options import Force, Grid, Literal, require_model
-from viewer.cli.terminal import show_progress
 
 if TYPE_CHECKING:
     from iibr_core.exports.source import OpenDrawn
@@ -32,13 +31,13 @@ def batch(
     folders: Annotated[list[Path], typer.Argument(help="Folders of photos.", show_default=False)],
     to: To,
     output: Annotated[Path, typer.Option("--output", "-o", metavar="DIR", help="Folder of all exports.")],
-    focus: Focus = None,
-    aperture: Aperture = None,
-    gloss: GlossFile = None,
+    lens: LensOptions,
     *,
     workers: Annotated[
         int | None,
-        typer.Option(min=1, max=MAX_WORKERS, help="Number of processes on this machine.", show_default="one a core"),
+        typer.Option(
+            min=1, max=MAX_WORKERS, metavar="N", help="Number of processes on this machine.", show_default="1 per core"
+        ),
     ] = None,
     dask: Annotated[
         str,
@@ -51,30 +50,25 @@ def batch(
     ] = "",
     kind_options: KindOptions,
     photo: PhotoOptions,
-    literal: Literal = False,
+    literal: LiteralDisparity = False,
     grid: Grid = None,
     force: Force = False,
 ) -> None:
-    """Export every photo of some folders. The same command again makes only what is missing or older than its photo.
+    """Export every photo of some folders. The same command again makes missing and outdated exports only.
 
     Example: iibr batch photos --to depth -o depths
     """
-    require_kind(context, to)
+    kind = require_kind(context, to)
     if dask:
         if workers is not None:
-            raise InputError("--workers starts processes here, --dask uses those elsewhere: leave one out")
+            raise InputError("--workers starts processes here, --dask uses other machines: leave out one of both")
         require_extra("batch", "distributed")
     source = photo.source("", grid, is_literal=literal)
     require_model(source.depth)
-    from iibr_core.exports.batch import FAILURES, BatchSettings, check_batch_folder, photos_in, run_batch
-    from iibr_core.scenes.lens_limits import LensChoice
-
-    name = next(name for name, kind in EXPORTS.items() if kind is to)
-    lens = LensChoice(None, focus, aperture, gloss.gloss if gloss else None)
     open_drawn: OpenDrawn | None = None
-    if to.is_drawn:
+    if kind.is_drawn:
         from viewer.display.offscreen import open_drawn
-    settings = BatchSettings(name, source, photo.depth_strength, kind_options.options(), lens, open_drawn)
+    settings = BatchSettings(to, source, photo.depth_strength, kind_options.options(), lens.choice(), open_drawn)
     photos = photos_in(folders)
     if not photos:
         raise InputError(f"{' and '.join(map(str, folders))}: no photos in it")

@@ -2,35 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from iibr_core.exports.animation import read_keys
 from iibr_core.exports.kinds import export_path, require_ending, require_export_place
+from iibr_core.exports.source import open_for_export, write_export
 from viewer.cli.export_options import KindOptions, To, require_kind
 from viewer.cli.lens_options import LensOptions
 from viewer.cli.option_records import with_option_records
-from viewer.cli.scene_options import SceneOptions, require_heeded
-from viewer.cli.shared_options import (
-    MOST,
+from viewer.cli.options import (
     FocusDisparity,
     Force,
     Grid,
-    Literal,
+    LiteralDisparity,
+    SceneOptions,
     ScenePath,
     inputs_of_command,
-    require_existing,
-    require_model,
+    require_heeded,
+    require_source,
 )
-from viewer.cli.terminal import print_depth, print_notes, show_progress
+from viewer.cli.progress import print_notes, show_progress
 
 if TYPE_CHECKING:
-    from iibr_core.exports.kinds import ExportKind, ExportOptions
-    from iibr_core.exports.source import ExportSource, OpenDrawn
-    from iibr_core.scenes.scene import Scene, Source
+    from iibr_core.exports.source import OpenDrawn
+    from iibr_core.scenes.scene import Scene
 
 
 @with_option_records
@@ -46,19 +45,19 @@ def export(
         typer.Option(
             "--path",
             metavar="FILE",
-            help="File with a camera path, one key a line: s t, s t focus, or s t focus aperture.",
+            help="File with a camera path, one key per line: s t, s t focus, or s t focus aperture.",
         ),
     ] = None,
     row: Annotated[
         int | None,
-        typer.Option(min=0, max=MOST, help="Row of an epipolar plane image.", show_default="the middle"),
+        typer.Option(min=0, metavar="N", help="Row of an epipolar plane image.", show_default="the middle"),
     ] = None,
     show: Annotated[
         bool, typer.Option("--show", help="Show the quilt on the connected Looking Glass display, by its Bridge.")
     ] = False,
     *,
     scene: SceneOptions,
-    literal: Literal = False,
+    literal: LiteralDisparity = False,
     focus_disparity: FocusDisparity = None,
     grid: Grid = None,
     force: Force = False,
@@ -67,54 +66,37 @@ def export(
 
     Example: iibr export photo.png --to quilt --device portrait -o photo.png
     """
-    require_kind(context, to)
+    kind = require_kind(context, to)
     source = scene.source(path, grid, focus_disparity, literal)
     require_heeded(context, path)
-    require_existing(source)
-    require_ending(to, output)
+    require_ending(kind, output)
     inputs = inputs_of_command(context, source)
     if keys is not None:
-        from iibr_core.exports.animation import read_keys
-
         read_keys(keys)
-    if not to.path:
-        require_export_place(to, output, inputs, force)
-    require_model(source.depth)
-    options = kind_options.options(keys, row, show)
-    target = output
+    if not kind.path:
+        require_export_place(kind, output, inputs, force)
+    require_source(source)
+    options, target = kind_options.options(keys, row, show), output
 
-    def require_place(ready: Scene) -> None:
+    def require_place(opened: Scene) -> None:
         nonlocal target
-        if to.is_drawn:
-            lens.require_within(ready)
-        target = export_path(to, output, ready, options)
-        require_export_place(to, target, inputs, force)
+        if kind.is_drawn:
+            lens.require_within(opened)
+        target = export_path(kind, output, opened, options)
+        require_export_place(kind, target, inputs, force)
 
-    opened, message = _carry_out(to, source, scene.depth_strength, lens, require_place, lambda: target, options)
-    print(target)
-    print_depth(opened.scene.depth_origin)
-    print_notes(opened.scene.notes + lens.notes(opened.optics) + ((message,) if message else ()))
-
-
-def _carry_out(
-    kind: ExportKind,
-    source: Source,
-    depth_strength: float,
-    lens: LensOptions,
-    on_ready: Callable[[Scene], None],
-    target: Callable[[], Path],
-    options: ExportOptions,
-) -> tuple[ExportSource, str | None]:
-    """Open the scene and write the export. target: returns its path, which `on_ready` determines."""
-    from iibr_core.exports.source import open_for_export, write_export
-
-    open_drawn: OpenDrawn | None = None
     with ExitStack() as stack:
+        open_drawn: OpenDrawn | None = None
         if kind.is_drawn:
             from viewer.display.offscreen import OffscreenScene
 
             open_drawn = stack.enter_context(OffscreenScene()).open_for_export
         with show_progress("reading"):
-            opened = open_for_export(kind, options, source, depth_strength, lens.choice, on_ready, open_drawn)
+            opened = open_for_export(
+                kind, options, source, scene.depth_strength, lens.choice(), require_place, open_drawn
+            )
         with show_progress("exporting"):
-            return opened, write_export(kind, target(), opened, options)
+            message = write_export(kind, target, opened, options)
+    print(target)
+    notes = (*opened.scene.notes, *lens.notes(opened.optics), *filter(None, (message,)))
+    print_notes(notes, opened.scene.depth_origin)

@@ -1,31 +1,44 @@
-"""The `iibr` command: which commands there are. Heavy imports wait."""
+"""The `iibr` command and its subcommands. Heavy modules are imported when a command runs."""
 
 from __future__ import annotations
 
-from typing import Annotated
+import os
+from importlib.metadata import version
+from pathlib import Path
+from typing import Annotated, Any
 
 import typer
+from typer.core import TyperGroup
 
 from iibr_core.types import InputError
 from viewer.cli.batch import batch
-from viewer.cli.demo_command import demo
-from viewer.cli.depth_command import depth
+from viewer.cli.depth import depth
 from viewer.cli.evaluate import evaluate
 from viewer.cli.export import export
 from viewer.cli.generate import generate
 from viewer.cli.models import models
-from viewer.cli.plan_command import plan
+from viewer.cli.plan import plan
+from viewer.cli.progress import print_notes
 from viewer.cli.screenshot import screenshot
-from viewer.cli.terminal import Commands, print_notes
 from viewer.cli.train import train
-from viewer.cli.view_command import open_window, view
+from viewer.cli.view import demo, open_last_scene, view
+
+
+class Commands(TyperGroup):
+    """The subcommands. A path in place of a subcommand is viewed."""
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """Return the name, the command and its arguments."""
+        word = args[0]
+        is_path = os.path.exists(word) or bool(Path(word).suffix) or Path(word).name != word
+        return super().resolve_command(ctx, ["view", *args] if word not in self.commands and is_path else args)
+
 
 app = typer.Typer(
     name="iibr",
     cls=Commands,
     invoke_without_command=True,
     context_settings={"help_option_names": ["-h", "--help"]},
-    add_completion=True,
     pretty_exceptions_enable=False,
     rich_markup_mode="rich",
 )
@@ -34,10 +47,9 @@ for command in (view, export, screenshot, generate, depth, batch, plan, demo, ev
 app.add_typer(models, name="models")
 
 
-def _print_version(wanted: bool) -> None:
-    if wanted:
-        from importlib.metadata import version
-
+def print_version(is_wanted: bool) -> None:
+    """Print the version and end the program if that is wanted."""
+    if is_wanted:
         print(f"iibr {version('iibr')}")
         raise typer.Exit
 
@@ -46,26 +58,17 @@ def _print_version(wanted: bool) -> None:
 def iibr(
     context: typer.Context,
     version: Annotated[
-        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Show it.")
+        bool, typer.Option("--version", callback=print_version, is_eager=True, help="Show the version.")
     ] = False,
 ) -> None:
     """One photo becomes a light field you can hold: drag the viewpoint, click to refocus, open the aperture.
 
-    `iibr photo.jpg` opens it, `iibr` what was open last.
+    `iibr photo.jpg` opens a photo, `iibr` alone the last scene.
     """
     if context.invoked_subcommand is not None:
         return
     try:
-        open_window()
+        open_last_scene()
     except InputError as error:
         print(context.get_help())
         print_notes((str(error),))
-
-
-@app.command(hidden=True, context_settings={"allow_extra_args": True, "ignore_unknown_options": True})
-def bench() -> None:
-    """Measure the program itself: no longer a command, but part of the source.
-
-    Example: make bench
-    """
-    raise InputError("bench measures the program itself; in its source, run: make bench DATA=FOLDER OUT=FOLDER")

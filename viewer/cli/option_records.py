@@ -1,4 +1,4 @@
-"""Options that several commands share, as records: a parameter that is a dataclass stands for its fields."""
+"""Records of options: a parameter of a command that is a dataclass stands for an option of each of its fields."""
 
 from __future__ import annotations
 
@@ -10,24 +10,24 @@ from typing import Any, get_type_hints
 
 
 def with_option_records(command: Callable[..., None]) -> Callable[..., None]:
-    """The command as typer is to see it: the fields of its records are options of their own, in their place."""
-    asked = signature(command, eval_str=True).parameters.values()
-    parameters = [parameter for each in asked for parameter in _parameters_of(each)]
-    records: dict[str, Any] = {each.name: each.annotation for each in asked if is_dataclass(each.annotation)}
+    """Return the command for Typer, with an option for each field of its records."""
+    parameters = signature(command, eval_str=True).parameters.values()
+    options = [option for parameter in parameters for option in _options_of(parameter)]
+    records: dict[str, Any] = {each.name: each.annotation for each in parameters if is_dataclass(each.annotation)}
 
     @wraps(command)
-    def called(**given: Any) -> None:
+    def run(**values: Any) -> None:
         for name, record in records.items():
-            given[name] = record(**{field.name: given.pop(field.name) for field in fields(record)})
-        command(**given)
+            values[name] = record(**{field.name: values.pop(field.name) for field in fields(record)})
+        command(**values)
 
-    called.__signature__ = Signature(parameters)  # type: ignore[attr-defined]
-    called.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
-    return called
+    run.__signature__ = Signature(options)  # type: ignore[attr-defined]
+    run.__annotations__ = {option.name: option.annotation for option in options}
+    return run
 
 
-def _parameters_of(parameter: Parameter) -> Iterator[Parameter]:
-    """The parameter, or one for each field of the record that it is."""
+def _options_of(parameter: Parameter) -> Iterator[Parameter]:
+    """Yield the parameter, or one for each field of the record that it is."""
     if not is_dataclass(parameter.annotation):
         yield parameter.replace(kind=Parameter.KEYWORD_ONLY)
         return

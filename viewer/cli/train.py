@@ -1,4 +1,4 @@
-"""`iibr train`: train the ray transformer. Torch is imported only when the command runs."""
+"""`iibr train`: train the ray transformer. Torch is imported when the command runs."""
 
 from __future__ import annotations
 
@@ -11,24 +11,25 @@ from typing import Annotated
 import typer
 
 from iibr_core.runtime.extras import require_extra
-from viewer.cli.shared_options import Force
-from viewer.cli.terminal import show_progress
+from viewer.cli.options import Force
+from viewer.cli.progress import print_notes, show_progress
 
 ENTROPY_WEIGHT = 0.01
 """Weight of the entropy loss. The paper's 1 outweighs the colours where hypotheses share a pixel: edges get ragged."""
-EXIT_INTERRUPTED = 130
 
 
 def train(
-    steps: Annotated[int, typer.Option(min=1, max=10**9, help="Number of batches of rays.")],
-    out: Annotated[Path, typer.Option("--output", "-o", metavar="FILE", help="Weights to write (.safetensors).")],
-    seed: Annotated[int, typer.Option(min=0, max=2**32 - 1, help="The same seed gives the same scenes.")] = 0,
+    steps: Annotated[int, typer.Option(min=1, metavar="N", help="Number of batches of rays.")],
+    output: Annotated[Path, typer.Option("--output", "-o", metavar="FILE", help="Weights to write (.safetensors).")],
+    seed: Annotated[int, typer.Option(min=0, metavar="N", help="Seed of the scenes.")] = 0,
     learning_rate: Annotated[
-        float, typer.Option(min=1e-9, max=1.0, help="Learning rate of the first step; it falls to 0.")
+        float, typer.Option(min=1e-9, max=1.0, metavar="X", help="Learning rate of the first step; it falls to 0.")
     ] = 1e-4,
     device: Annotated[str, typer.Option(metavar="NAME", help="auto, cpu, cuda, cuda:1 or mps.")] = "auto",
     resume: Annotated[bool, typer.Option("--resume", help="Continue from the checkpoint beside the weights.")] = False,
-    checkpoint_every: Annotated[int, typer.Option(min=1, help="Number of steps between checkpoints.")] = 500,
+    checkpoint_every: Annotated[
+        int, typer.Option(min=1, metavar="N", help="Number of steps between checkpoints.")
+    ] = 500,
     force: Force = False,
 ) -> None:
     """Train the ray transformer on procedural scenes. Ctrl-C saves, --resume continues; a log lies beside the weights.
@@ -53,13 +54,12 @@ def train(
                 RayTransformer(),
                 partial(batches.training_batch, seed=seed),
                 config,
-                out,
+                output,
                 resume=resume,
                 may_replace=force,
-                metadata={"command": command.replace(str(out), out.name)},  # without the user's folders
+                metadata={"command": command.replace(str(output), output.name)},  # without the user's folders
             )
     except KeyboardInterrupt:
-        again = command if resume else f"{command} --resume"
-        print(f"iibr: interrupted; the training so far is saved, continue with: {again}", file=sys.stderr)
-        raise typer.Exit(EXIT_INTERRUPTED) from None
-    print(f"{out}: {out.stat().st_size / 1000:.1f} kB after {steps} steps")
+        print_notes((f"The training so far is saved; continue with: {command}{'' if resume else ' --resume'}",))
+        raise
+    print(f"{output}: {output.stat().st_size / 1000:.1f} kB after {steps} steps")

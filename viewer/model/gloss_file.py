@@ -81,7 +81,7 @@ def read_gloss(path: Path) -> Gloss:
         return msgspec.convert(whole, Gloss)
     except (ValueError, RecursionError) as error:
         reason = " ".join(str(error).replace("- at `$.", "at `").split())[:120]
-        raise InputError(f"{path}: is no gloss ({reason}); correct it") from error
+        raise InputError(f"{path}: is not a gloss file ({reason}); correct it") from error
 
 
 def unknown_fields(raw: Any, known: Any, within: str = "") -> Iterator[str]:

@@ -56,7 +56,7 @@ def download(model: KnownModel) -> None:
         raise
     except Exception as error:  # whatever the library's clients raise: they change with its versions
         kind = NoConnectionError if _is_offline(error) else FixableError
-        message = f"{model.repository} cannot be downloaded ({reason_of(error)[:120]}); what has come is kept"
+        message = f"{model.repository} cannot be downloaded ({reason_of(error)[:120]}); what has arrived is kept"
         raise kind(message, Remedy.DOWNLOAD) from error
 
 

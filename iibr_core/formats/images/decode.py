@@ -218,7 +218,7 @@ def _open(path: Path) -> Any:
         raise InputError(f"{path}: cannot be read as a picture ({_reason(complaint, path)})")
     spec = source.spec()
     if spec.depth > 1 or spec.deep:
-        raise InputError(f"{path}: {spec.width}x{spec.height}x{spec.depth} is no flat picture")
+        raise InputError(f"{path}: {spec.width}x{spec.height}x{spec.depth} is not a flat picture")
     require_sound_size(path, spec.width, spec.height, spec.image_bytes())
     return source
 

@@ -69,7 +69,7 @@ def read_heic_depth(path: Path) -> tuple[FloatImage, dict[str, Any]] | None:
         return None
     width, height = maps[0].size
     if width < 1 or height < 1 or width * height > MAX_FILE_PIXELS:
-        raise InputError(f"{path}: its depth map of {width}x{height} pixels is absurd")
+        raise InputError(f"{path}: its depth map of {width}x{height} pixels is too large")
     pixels = _pixels(path, maps[0])
     scale = np.float32(1 / np.iinfo(pixels.dtype).max)
     return np.ascontiguousarray(pixels[..., 0]) * scale, dict(maps[0].info.get("metadata") or {})

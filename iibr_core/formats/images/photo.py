@@ -24,11 +24,10 @@ from iibr_core.formats.images.side_by_side import left_picture
 from iibr_core.formats.images.stereo_jpeg import is_jpeg
 from iibr_core.runtime.kernels import kernel
 from iibr_core.runtime.work import raise_if_stopped
-from iibr_core.types import SRGB, FloatImage, ImageSize, InputError, Photo
+from iibr_core.types import SRGB, FloatImage, ImageSize, InputError, Photo, image_size
 
 DEFAULT_MAX_PIXELS = 2_000_000
 DEFAULT_FOV_DEG = 50.0
-MADE_SMALLER = "Made smaller by area averaging"
 MAX_BAND_ROWS = 32
 MAX_BAND_PIXELS = 1 << 20
 """Largest number of stored pixels that are averaged at a time: as floats they take 12 bytes each, or more."""
@@ -80,13 +79,19 @@ def read_picture(
     notes: tuple[str, ...] = (note,) if note else ()
     if picture.alpha is not None:
         notes += ("Transparency was dropped: the photo is laid over black.",)
-    if is_smaller:
-        notes += (f"{MADE_SMALLER}, from {stored_size} to {size} (max pixels: {max_pixels}).",)
     pixels = upright(encoded, picture.orientation)
+    if is_smaller:
+        own_size = stored_size if image_size(pixels) == size else ImageSize(stored_size.width, stored_size.height)
+        notes += (smaller_note(own_size, image_size(pixels)),)
     focal_px = focal_px_from_fov(pixels.shape[1], fov_deg)
     if picture.focal_px > 0:
         focal_px = picture.focal_px * math.sqrt(math.prod(size) / math.prod(stored_size))
     return Photo(pixels, focal_px, source.path.stem, bool(pixels.max() > 1), notes + finite_notes, space)
+
+
+def smaller_note(own_size: ImageSize, size: ImageSize) -> str:
+    """Return the note of a photo that was read at a smaller size than its own, both upright."""
+    return f"Made smaller by area averaging, from {own_size} to {size}."
 
 
 def encoded_colors(picture: Picture) -> FloatImage:

@@ -108,7 +108,7 @@ def _stated_pair(path: Path, modified_ns: int) -> tuple[Eyes | None, str]:
     size = upright_size(path)
     parts, shown = layout.eyes(size)
     if min(parts[0].size) < 1 and layout.is_plain:
-        raise InputError(f"{path}: of {size} pixels there are none for each eye; is its name right?")
+        raise InputError(f"{path}: {size} pixels cannot be split between two eyes; is its name right?")
     left, right = (PictureSource(path, part=part, shown_size=shown) for part in parts)
     is_alike = min(parts[0].size) > 0 and _is_one_scene(path, layout)
     is_pair = is_alike or layout.is_plain

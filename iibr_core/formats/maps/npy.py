@@ -22,7 +22,7 @@ def read_array(path: Path, max_values: int) -> NDArray[Any]:
     except InputError:
         raise
     except PARSE_ERRORS as error:
-        raise InputError(f"{path}: is no whole array ({reason_of(error)}); get the file again") from error
+        raise InputError(f"{path}: is not a complete array ({reason_of(error)}); get the file again") from error
     if array.dtype.kind not in "fiu":
         raise InputError(f"{path}: holds {array.dtype} of shape {array.shape}; an array of numbers is expected")
     if array.size > max_values:

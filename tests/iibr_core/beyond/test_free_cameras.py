@@ -74,7 +74,7 @@ def test_cameras_are_made_to_fit_a_smaller_photo_of_the_same_shape():
     assert first.focal_px[0] == pytest.approx(150)
     assert second.focal_px == (pytest.approx(90), pytest.approx(90))
     for height in (97, 103):
-        with pytest.raises(InputError, match="is of pictures of 1200x1000, the photo is 120x"):
+        with pytest.raises(InputError, match="its pictures are 1200x1000, the photo is 120x"):
             fitted_cameras([given, other], 0, ImageSize(height, 120))
 
 

@@ -154,6 +154,6 @@ def test_outputs_go_into_an_empty_folder_or_one_of_a_batch_unless_forced(archive
     (tmp_path / "out" / "mine.txt").touch()
     with pytest.raises(InputError, match="already exists"):
         export(archive)
-    with pytest.raises(InputError, match="is read"):
+    with pytest.raises(InputError, match="in the input"):
         check_batch_folder(archive / "out", [archive], force=True)
     assert export(archive, force=True).written == 2

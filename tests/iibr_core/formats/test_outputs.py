@@ -25,15 +25,15 @@ def photo(tmp_path: Path) -> Path:
 
 @pytest.mark.parametrize("name", ["in/photo.png", "link.png", "folder/photo.png", "hard.png", "in/../in/photo.png"])
 def test_no_input_is_overwritten_whatever_its_name(photo: Path, tmp_path: Path, name: str) -> None:
-    with pytest.raises(InputError, match="no input is overwritten"):
+    with pytest.raises(InputError, match="never overwritten"):
         check_output(tmp_path / name, [photo], may_replace=True)
 
 
 @pytest.mark.parametrize("name", ["in/new.png", "folder/new.png"])
 def test_nothing_is_written_into_a_folder_that_is_read(photo: Path, tmp_path: Path, name: str) -> None:
-    with pytest.raises(InputError, match="which is read"):
+    with pytest.raises(InputError, match="input"):
         check_output(tmp_path / name, [photo.parent])
-    with pytest.raises(InputError, match="which is read"):
+    with pytest.raises(InputError, match="input"):
         check_output_folder(tmp_path / name, [photo.parent])
 
 

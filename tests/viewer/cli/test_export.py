@@ -1,4 +1,4 @@
-"""`iibr export`, as a user runs it: what it writes, what it says, what it refuses."""
+"""`iibr export`, as a person runs it: files, messages, refusals. Gloss, too."""
 
 from __future__ import annotations
 
@@ -12,85 +12,113 @@ from PIL import Image
 from iibr_core.formats.images.color_profile import icc_profile
 from iibr_core.formats.maps.pfm import read_pfm
 from iibr_core.types import DISPLAY_P3, SRGB
-from tests.viewer.cli.test_cli import run
+from tests.viewer.cli.conftest import Iibr, output_of, refusal_of
+
+GLOSS = "roughness = 0.5\nreflectance = 0.5\n[light]\ndirection = [0, 0, -1]\n"
 
 
-def test_a_drawn_kind(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], photo_path: Path, tmp_path: Path
-) -> None:
-    out = tmp_path / "a.gif"
-    words = ("--to", "gif", "-o", out, "--grid", 3, "--frames", 3, "--motion", "swing", "--size", "30x20")
-    assert run(monkeypatch, "export", photo_path, *words) == 0
-    assert capsys.readouterr().out.splitlines() == [str(out)]
-    with Image.open(out) as image:
+@pytest.fixture
+def photo(photo_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A photo in the working folder, with a gloss."""
+    monkeypatch.chdir(photo_path.parent)
+    Path("gloss.toml").write_text(GLOSS)
+    return photo_path
+
+
+def views_of(folder: str) -> np.ndarray:
+    return np.stack([np.asarray(Image.open(path)) for path in sorted(Path(folder).glob("input_Cam*.png"))]).astype(int)
+
+
+def test_a_drawn_kind(iibr: Iibr, photo: Path) -> None:
+    words = ("--to", "gif", "-o", "a.gif", "--grid", 3, "--frames", 3, "--motion", "swing", "--size", "30x20")
+    assert output_of(iibr("export", photo, *words)) == "a.gif\n"
+    with Image.open("a.gif") as image:
         assert (image.size, image.n_frames) == ((30, 20), 3)  # type: ignore[attr-defined]
 
 
-def test_the_name_that_is_written_is_the_one_that_must_not_be_there(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], photo_path: Path, tmp_path: Path
-) -> None:
-    out = tmp_path / "new"
-    out.mkdir()
-    words = ("export", photo_path, "--to", "half-sbs", "-o", out / "a.png", "--grid", 3)
-    assert run(monkeypatch, *words) == 0
-    assert capsys.readouterr().out.splitlines() == [str(out / "a_LRF_Half_SBS.png")]
-    before = (out / "a_LRF_Half_SBS.png").read_bytes()
-    assert run(monkeypatch, *words) == 2
-    assert "--force" in capsys.readouterr().err
-    assert [(path.name, path.read_bytes()) for path in out.iterdir()] == [("a_LRF_Half_SBS.png", before)]
+def test_the_name_with_its_tag_must_not_exist(iibr: Iibr, photo: Path) -> None:
+    words = ("export", photo, "--to", "half-sbs", "-o", "a.png", "--grid", 3)
+    assert output_of(iibr(*words)) == "a_LRF_Half_SBS.png\n"
+    before = Path("a_LRF_Half_SBS.png").read_bytes()
+    assert "--force" in refusal_of(iibr(*words))
+    assert Path("a_LRF_Half_SBS.png").read_bytes() == before
+    assert not Path("a.png").exists()
 
 
-def test_a_light_field_of_disparity_as_given(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], photo_path: Path, tmp_path: Path
-) -> None:
-    out = tmp_path / "field"
-    words = ("export", photo_path, "--to", "hci", "-o", out, "--literal")
-    assert run(monkeypatch, *words) == 2
-    assert "--grid" in capsys.readouterr().err
-    assert run(monkeypatch, *words, "--grid", 5) == 0
-    shown = capsys.readouterr()
-    assert shown.out.splitlines() == [str(out)]
-    assert "In the window it is 4%" in shown.err
-    assert len(list(out.glob("input_Cam*.png"))) == 25
-    assert run(monkeypatch, "export", out, "--to", "eslf", "-o", tmp_path / "a_eslf.png") == 0
-    with Image.open(tmp_path / "a_eslf.png") as image:
+def test_a_light_field_of_disparity_as_given(iibr: Iibr, photo: Path) -> None:
+    words = ("export", photo, "--to", "hci", "-o", "field", "--literal")
+    assert "--grid" in refusal_of(iibr(*words))
+    done = iibr(*words, "--grid", 5)
+    assert output_of(done) == "field\n"
+    assert "In the window it is 4%" in done.stderr
+    assert len(views_of("field")) == 25
+    output_of(iibr("export", "field", "--to", "eslf", "-o", "a_eslf.png"))
+    with Image.open("a_eslf.png") as image:
         assert image.size == (5 * 96, 5 * 64)
 
 
-def test_disparity_is_found_where_a_light_field_brings_none(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], photo_path: Path, tmp_path: Path
-) -> None:
-    field = tmp_path / "field"
-    words = ("generate", photo_path, "--grid", 3, "--literal", "--out", field)
-    assert run(monkeypatch, *words) == 0
-    given = read_pfm(field / "gt_disp_lowres.pfm")
-    for path in field.glob("*.pfm"):
+def test_disparity_is_found_for_a_light_field_without_it(iibr: Iibr, photo: Path) -> None:
+    output_of(iibr("generate", photo, "--grid", 3, "--literal", "-o", "field"))
+    given = read_pfm(Path("field/gt_disp_lowres.pfm"))
+    for path in (*Path("field").glob("*.pfm"), Path("field/parameters.cfg")):
         path.unlink()
-    (field / "parameters.cfg").unlink()
-    assert run(monkeypatch, "export", field, "--to", "disparity", "-o", tmp_path / "a.pfm") == 0
-    assert np.median(np.abs(read_pfm(tmp_path / "a.pfm") - given)) < 0.3
-    assert run(monkeypatch, "export", field, "--to", "hci", "-o", tmp_path / "hci") == 0
-    assert sorted(path.suffix for path in (tmp_path / "hci").iterdir()) == [".cfg"] + 9 * [".png"]
+    output_of(iibr("export", "field", "--to", "disparity", "-o", "a.pfm"))
+    assert np.median(np.abs(read_pfm(Path("a.pfm")) - given)) < 0.3
+    output_of(iibr("export", "field", "--to", "hci", "-o", "hci"))
+    assert sorted(path.suffix for path in Path("hci").iterdir()) == [".cfg"] + 9 * [".png"]
 
 
 @pytest.mark.parametrize("kind", ["cross-eyed", "focal-stack", "quilt", "rgbd"])
-def test_pictures_have_the_photos_colours_and_words(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, kind: str) -> None:
-    """A Display P3 photo is exported in Display P3, unless displays ignore profiles; its place is never written."""
-    photo, out = tmp_path / "photo.jpg", tmp_path / ("out" if kind.startswith("focal") else "out.png")
+def test_pictures_have_the_photos_colours_and_metadata(
+    iibr: Iibr, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, kind: str
+) -> None:
+    """A Display P3 photo is exported in Display P3, unless displays ignore profiles; its GPS position never is."""
+    monkeypatch.chdir(tmp_path)
     exif = Image.Exif()
     exif[0x010F] = "Maker"
     exif.get_ifd(0x8825).update({1: "N", 2: (1.0, 2.0, 3.0)})
     plain = Image.new("RGB", (48, 32), (200, 80, 60))
-    plain.save(photo, exif=exif, icc_profile=icc_profile(DISPLAY_P3), quality=100, subsampling=0)
-    words = ("export", photo, "--to", kind, "-o", out, "--grid", 3, "--depth", "flat")
-    assert run(monkeypatch, *words, *(("--bits", 16) if kind.startswith("focal") else ())) == 0
-    picture = out / "all_in_focus.png" if kind.startswith("focal") else next(tmp_path.glob("out*.png"))
+    plain.save("photo.jpg", exif=exif, icc_profile=icc_profile(DISPLAY_P3), quality=100, subsampling=0)
+    is_stack = kind == "focal-stack"
+    words = ("export", "photo.jpg", "--to", kind, "-o", "out" if is_stack else "out.png", "--grid", 3)
+    output_of(iibr(*words, "--depth", "flat", *(("--bits", 16) if is_stack else ())))
+    picture = Path("out/all_in_focus.png") if is_stack else next(Path().glob("out*.png"))
     with Image.open(picture) as image:
-        said = image.getexif()
-        profile = image.info["icc_profile"]
-    assert said[0x010F] == "Maker"
-    assert not said.get_ifd(0x8825)
+        metadata, profile = image.getexif(), image.info["icc_profile"]
+    assert metadata[0x010F] == "Maker"
+    assert not metadata.get_ifd(0x8825)
     is_wide = kind in ("cross-eyed", "focal-stack")
     assert profile == icc_profile(DISPLAY_P3 if is_wide else SRGB)
     pixels = oiio.ImageBuf(str(picture)).get_pixels(oiio.FLOAT) * 255
     np.testing.assert_allclose(pixels[16, 4], (200, 80, 60) if is_wide else (216, 69, 50), atol=2.5)
+
+
+def test_gloss_is_the_same_in_all_outputs(iibr: Iibr, photo: Path) -> None:
+    words = ("--grid", 3, "--gloss", "gloss.toml")
+    output_of(iibr("generate", photo, "--grid", 3, "-o", "plain"))
+    output_of(iibr("generate", photo, *words, "-o", "glossy"))
+    output_of(iibr("export", photo, "--to", "hci", *words, "-o", "exported"))
+    gained = views_of("glossy") - views_of("plain")
+    assert gained.min() >= 0
+    assert (gained.mean(axis=(1, 2, 3)) > 5).all()
+    assert np.array_equal(views_of("glossy"), views_of("exported"))
+    output_of(iibr("screenshot", photo, *words, "--view", "1,0", "-o", "shot.png"))
+    drawn = np.asarray(Image.open("shot.png")).astype(int)
+    assert np.abs(drawn - views_of("glossy")[5]).mean() < 2
+    output_of(iibr("screenshot", photo, "--grid", 3, "--like", "shot.png", "-o", "again.png"))
+    assert np.array_equal(np.asarray(Image.open("again.png")), drawn)
+
+
+def test_views_from_disk_take_gloss_if_their_disparity_is_negative(iibr: Iibr, photo: Path) -> None:
+    output_of(iibr("generate", photo, "--grid", 3, "-o", "field", "--with-disparity"))
+    output_of(iibr("screenshot", "field", "-o", "plain.png"))
+    output_of(iibr("screenshot", "field", "--gloss", "gloss.toml", "-o", "glossy.png"))
+    gained = np.asarray(Image.open("glossy.png")).astype(int) - np.asarray(Image.open("plain.png"))
+    assert gained.min() >= -2
+    assert gained.mean() > 5
+
+
+def test_an_unknown_setting_of_a_gloss_is_named(iibr: Iibr, photo: Path) -> None:
+    Path("gloss.toml").write_text('environment = "room.exr"')
+    assert "environment" in refusal_of(iibr("generate", photo, "--grid", 3, "-o", "new", "--gloss", "gloss.toml"))
+    assert not Path("new").exists()

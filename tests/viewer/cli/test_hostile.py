@@ -1,5 +1,6 @@
-"""What goes wrong for people: wrong files, absurd options, full disks, programs that are stopped. One line, a code that
-says so, nothing half-written, and what was there is as it was.
+"""Mistakes of people: wrong files, absurd options, full disks, programs that are stopped.
+
+Each is one line and exit code 2 (130 for Ctrl-C), nothing is half-written, and what was there is as it was.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from PIL import Image
 from iibr_core.formats.light_fields.light_field_formats import open_light_field
 from iibr_core.formats.light_fields.views import read_views
 from tests.forked_iibr import run_forked
+from tests.viewer.cli.conftest import Iibr, contents, output_of, refusal_of
 from tests.viewer.conftest import HEIGHT, WIDTH
 
 ROOT = Path(__file__).parents[3]
@@ -38,9 +40,10 @@ def bomb(width: int, height: int) -> bytes:
 
 
 @pytest.fixture
-def folder(photo_path: Path) -> Path:
-    """A photo with its map, and everything that people point at by mistake."""
+def folder(photo_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The working folder: a photo with its map, and everything that people point at by mistake."""
     folder = photo_path.parent
+    monkeypatch.chdir(folder)
     noise = np.random.default_rng(0).integers(0, 256, (HEIGHT, WIDTH, 3), np.uint8)
     Image.fromarray(noise).save(folder / "whole.jpg")
     jpeg, png = (folder / "whole.jpg").read_bytes(), photo_path.read_bytes()
@@ -74,19 +77,6 @@ def folder(photo_path: Path) -> Path:
     return folder
 
 
-def contents(folder: Path) -> dict[str, bytes | None]:
-    """Everything below a folder, hidden things too."""
-    return {str(p.relative_to(folder)): p.read_bytes() if p.is_file() else None for p in folder.rglob("*")}
-
-
-def assert_refused(done: subprocess.CompletedProcess[str], named: str, code: int = 2) -> None:
-    assert done.returncode == code, done.stderr
-    (line,) = [line for line in done.stderr.splitlines() if not line.startswith("libpng ")]  # says so by itself
-    assert line.startswith("iibr: ")
-    assert named in line
-    assert done.stdout == ""
-
-
 PHOTOS = {
     "gone.png": "gone.png: no such file",
     "gone/a.png": "no such file",
@@ -105,49 +95,26 @@ PHOTOS = {
     "bomb.ppm": "bomb.ppm: ",
     "empty": "empty: ",
 }
-
-
-@pytest.mark.parametrize("name", PHOTOS)
-def test_what_is_no_photo_is_refused_in_a_line_that_says_what_it_is(folder: Path, name: str) -> None:
-    before = contents(folder)
-    assert_refused(run_forked("screenshot", name, "-o", "o.png", cwd=folder), PHOTOS[name])
-    assert contents(folder) == before
-
-
-MAPS = {
-    "gone.pfm": "gone.pfm: no such file",
-    "shape.npy": "shape.npy: ",
-    "line.npy": "line.npy: ",
-    "nan.npy": "nan.npy: ",
-    "cut.npy": "cut.npy: ",
-    "text.npy": "text.npy: ",
-    "text.jpg": "text.jpg: ",
-    "empty": "empty: ",
-}
-
-
-@pytest.mark.parametrize("name", MAPS)
-def test_what_is_no_map_of_the_photo_is_refused(folder: Path, name: str) -> None:
-    before = contents(folder)
-    words = ("generate", "scene.png", "--disparity", name, "--grid", 3, "--out", "o")
-    assert_refused(run_forked(*words, cwd=folder), MAPS[name])
-    assert contents(folder) == before
-
-
-OPTIONS = {
-    "generate scene.png --out o --grid 0": "--grid",
-    "generate scene.png --out o --grid x": "--grid",
-    "generate scene.png --out o --grid 100001": "100001",
-    "generate scene.png --out o --max-pixels 0": "--max-pixels",
-    "generate scene.png --out o --disparity-scale nan": "--disparity-scale",
-    "generate scene.png --out o --depth-strength inf": "--depth-strength",
-    "generate scene.png --out o --format mp4": "'mp4' is not a layout that can be written: give hci",
-    "generate scene.png --grid 3": "--out",
-    "generate scene.png --grid 3 --out file": "file: ",
-    "generate scene.png --grid 3 --out file/o": "file",
-    "generate scene.png --grid 3 --out .": "holds scene.png, which is read",
-    "generate scene.png --grid 3 --out full --force": "holds other files",
-    "generate scene.png --grid 3 --out /proc/o": "/proc/o: ",
+MAPS = ("gone.pfm: no such file", "shape.npy", "line.npy", "nan.npy", "cut.npy", "text.npy", "text.jpg", "empty")
+COMMANDS = {
+    **{f"screenshot {name} -o o.png": message for name, message in PHOTOS.items()},
+    **{f"generate scene.png --disparity {m.partition(':')[0]} --grid 3 -o o": m for m in MAPS},
+    "generate scene.png -o o --grid 0": "--grid",
+    "generate scene.png -o o --grid x": "--grid",
+    "generate scene.png -o o --grid 100001": "100001",
+    "generate scene.png -o o --grid 3 --max-pixels 0": "--max-pixels",
+    "generate scene.png --disparity one.npy --grid 3 -o o --disparity-scale nan": "disparity scale nan",
+    "generate scene.png -o o --grid 3 --depth-strength inf": "depth strength inf",
+    "generate scene.png -o o --format mp4": "'mp4' is not known: give hci",
+    "generate scene.png -o o": "--grid",
+    "generate scene.png --grid 3": "--output",
+    "generate scene.png --grid 3 -o file": "file: ",
+    "generate scene.png --grid 3 -o file/o": "file",
+    "generate scene.png --grid 3 -o .": "holds the input scene.png",
+    "generate scene.png --grid 3 -o full --force": "holds other files",
+    "generate scene.png --grid 3 -o /proc/o": "/proc/o: ",
+    "generate scene.png --poses . -o o --grid 3": "--grid: for light fields only",
+    "generate scene.png --grid 3 --photo-pose 1 -o o": "--poses",
     "screenshot scene.png -o o.png --size 0x5": "--size",
     "screenshot scene.png -o o.png --size 12": "--size",
     "screenshot scene.png -o o.png --size 99999x99999": "99999",
@@ -155,13 +122,17 @@ OPTIONS = {
     "screenshot scene.png -o o.png --view 1": "--view",
     "screenshot scene.png -o o.png --aperture=-1": "--aperture",
     "screenshot scene.png -o o.png --focus nan": "--focus",
+    "screenshot scene.png -o o.png --depth foggy": "'foggy' is not one of 'auto'",
+    "screenshot scene.png -o o.png --depth flat --depth-model a": "leave out --depth-model",
     "screenshot scene.png -o none/o.png": "none",
     "screenshot scene.png -o /proc/o.png": "/proc/o.png: ",
     "screenshot scene.png -o o.bmp": "o.bmp: can be written as .png",
     "screenshot scene.png -o empty": "empty",
-    "export scene.png --to nothing -o o.png": "nothing",
-    "depth scene.png -o o.txt": "o.txt: ",
     "screenshot scene.png --like whole.jpg -o o.png": "whole.jpg: ",
+    "export scene.png --to nothing -o o.png": "'nothing' is not known: give quilt, ",
+    "export scene.png --to depth --frames 3 -o o.pfm": "--frames: not for --to depth",
+    "export scene.png --to web --budget 0MB -o o.html": "is not the size of a file",
+    "depth scene.png -o o.txt": "o.txt: ",
     "view gone.png": "gone.png: no such file",
     "view scene.png --disparity gone.pfm": "gone.pfm: no such file",
     "plan scene.png --fly": "--fly",
@@ -169,16 +140,16 @@ OPTIONS = {
 }
 
 
-@pytest.mark.parametrize("words", OPTIONS)
-def test_absurd_options_are_refused_before_anything_is_written(folder: Path, words: str) -> None:
+@pytest.mark.parametrize("words", COMMANDS)
+def test_mistakes_are_refused_in_a_line_before_anything_is_written(iibr: Iibr, folder: Path, words: str) -> None:
     before = contents(folder)
-    assert_refused(run_forked(*words.split(), cwd=folder), OPTIONS[words])
+    assert COMMANDS[words] in refusal_of(iibr(*words.split()))
     assert contents(folder) == before
 
 
 WRITERS = {
     "screenshot": ("screenshot", "scene.png", "--grid", 1, "-o", "o.png"),
-    "generate": ("generate", "scene.png", "--grid", 1, "--out", "o"),
+    "generate": ("generate", "scene.png", "--grid", 1, "-o", "o"),
     "depth": ("depth", "scene.png", "-o", "o.pfm"),
     "export": ("export", "scene.png", "--grid", 3, "--to", "sbs", "-o", "o.png"),
     "web": ("export", "scene.png", "--grid", 3, "--to", "web", "-o", "o.html"),
@@ -186,44 +157,30 @@ WRITERS = {
 
 
 @pytest.mark.parametrize("words", WRITERS.values(), ids=WRITERS)
-def test_a_full_disk_and_what_is_there_already(folder: Path, words: tuple[object, ...]) -> None:
-    """A disk that fills up leaves nothing, or what was there; what was there is replaced by --force only."""
+def test_a_full_disk_leaves_what_was_there(iibr: Iibr, folder: Path, words: tuple[object, ...]) -> None:
+    """What was there is replaced with --force only."""
     before = contents(folder)
-    assert_refused(run_forked(*words, cwd=folder, most_bytes=2000), "cannot be written")
+    assert "cannot be written" in refusal_of(run_forked(*words, cwd=folder, max_bytes=2000))
     assert contents(folder) == before
-    assert run_forked(*words, cwd=folder).returncode == 0
+    output_of(iibr(*words))
     before = contents(folder)
-    assert_refused(run_forked(*words, cwd=folder), "already exists; give --force")
-    assert_refused(run_forked(*words, "--force", cwd=folder, most_bytes=2000), "cannot be written")
-    assert contents(folder) == before
-
-
-def test_a_full_disk_is_told_of_the_folder_that_was_asked_for(folder: Path) -> None:
-    assert_refused(run_forked(*WRITERS["generate"], cwd=folder, most_bytes=2000), "iibr: o")
-
-
-@pytest.mark.parametrize("name", ["screenshot", "generate", "depth"])
-def test_the_photo_is_never_written_onto(folder: Path, name: str) -> None:
-    before = contents(folder)
-    command, photo, *options = WRITERS[name]
-    assert_refused(run_forked(command, photo, *options[:-1], "scene.png", "--force", cwd=folder), "scene.png")
+    assert "already exists; give --force" in refusal_of(iibr(*words))
+    assert "cannot be written" in refusal_of(run_forked(*words, "--force", cwd=folder, max_bytes=2000))
     assert contents(folder) == before
 
 
 @pytest.mark.parametrize("name", ["pixel.png", "scene.png"])
-def test_a_photo_of_one_pixel_and_a_map_of_one_value_are_flat(folder: Path, name: str) -> None:
-    """No error: every view is the photo."""
+def test_a_photo_of_one_pixel_and_a_map_of_one_value_are_flat(iibr: Iibr, folder: Path, name: str) -> None:
     (folder / "one.npy").replace(folder / "scene_disparity.npy")
-    done = run_forked("generate", name, "--grid", 3, "--out", "o", cwd=folder)
-    assert (done.returncode, "Traceback" in done.stderr) == (0, False), done.stderr
+    output_of(iibr("generate", name, "--grid", 3, "-o", "o"))
     photo = np.asarray(Image.open(folder / name).convert("RGB"))
     for view in (folder / "o").glob("input_Cam*.png"):
         np.testing.assert_array_equal(np.asarray(Image.open(view)), photo)
 
 
 def generating(folder: Path, *options: object) -> subprocess.Popen[str]:
-    """`iibr generate` in a process of its own, in the midst of its views."""
-    words = ["generate", "whole.jpg", "--grid", 61, "--out", "field", "--depth", "flat", *options]
+    """Start `iibr generate` in a process of its own and wait until it has written views."""
+    words = ["generate", "whole.jpg", "--grid", 61, "-o", "field", "--depth", "flat", *options]
     process = subprocess.Popen(
         [sys.executable, "-P", "-m", "viewer", *map(str, words)],
         cwd=folder,
@@ -243,20 +200,20 @@ def test_a_program_that_is_asked_to_end_leaves_nothing(folder: Path, number: sig
     before = contents(folder)
     process = generating(folder)
     process.send_signal(number)
-    said = process.communicate(timeout=DEADLINE_S)[1]
-    assert (process.returncode, said) == (130, "iibr: interrupted\n")
+    errors = process.communicate(timeout=DEADLINE_S)[1]
+    assert (process.returncode, errors) == (130, "iibr: interrupted\n")
     assert contents(folder) == before
 
 
-def test_a_program_that_is_killed_leaves_what_was_there_and_runs_again(folder: Path) -> None:
-    small = ("generate", "scene.png", "--grid", 1, "--out", "field")
-    assert run_forked(*small, cwd=folder).returncode == 0
+def test_a_killed_program_leaves_what_was_there_and_runs_again(iibr: Iibr, folder: Path) -> None:
+    small = ("generate", "scene.png", "--grid", 1, "-o", "field")
+    output_of(iibr(*small))
     before = contents(folder / "field")
     process = generating(folder, "--force")
     process.kill()
     process.communicate()
     assert contents(folder / "field") == before
     assert len(list(read_views(open_light_field(folder / "field"))[1])) == 1
-    assert run_forked(*small, "--force", cwd=folder).returncode == 0
-    assert not list(folder.glob(".iibr-*")), "the next run removes what the killed one left"
+    output_of(iibr(*small, "--force"))
     assert contents(folder / "field").keys() == before.keys()
+    assert not list(folder.glob(".iibr-*")), "the next run removes what the killed one left"

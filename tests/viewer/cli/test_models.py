@@ -1,10 +1,7 @@
-"""`iibr models`, the options about depth, and what commands and worker say about where depth comes from."""
+"""`iibr models`, and messages about the origin of depth."""
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -12,38 +9,19 @@ import pytest
 
 from iibr_core.depth.models.known import KNOWN_MODELS
 from iibr_core.formats.images.write import write_image
+from tests.forked_iibr import run_forked
 from tests.iibr_core.depth.onnx_graphs import of_channels
-from tests.viewer.cli.test_cli import run
-from tests.viewer.conftest import write_scene
+from tests.viewer.cli.conftest import Done, Iibr, output_of, refusal_of
 
 
-def run_models(
-    home: Path, *words: str, typed: str = "", endpoint: str = "http://127.0.0.1:9"
-) -> subprocess.CompletedProcess[str]:
-    """`iibr models`, with nobody who listens at the hub's usual address."""
-    return run_iibr(home, "models", *words, typed=typed, endpoint=endpoint)
-
-
-def run_iibr(
-    home: Path, *words: object, typed: str = "", endpoint: str = "http://127.0.0.1:9"
-) -> subprocess.CompletedProcess[str]:
-    """Any command in a process of its own: the hub library reads its address once."""
+def run_models(home: Path, *words: object, typed: str = "") -> Done:
+    """Run a command in a process of its own, because the hub's library reads its address once; nobody listens there."""
     folders = dict.fromkeys(("HF_HOME", "XDG_CACHE_HOME", "XDG_DATA_HOME"), str(home))
-    environment = {**os.environ, "HF_ENDPOINT": endpoint, **folders}
-    return subprocess.run(
-        [sys.executable, "-P", "-m", "viewer", *map(str, words)],
-        env=environment,
-        input=typed,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    return run_forked(*words, cwd=home, typed=typed, HF_ENDPOINT="http://127.0.0.1:9", **folders)
 
 
 def test_the_list_names_every_model_with_size_and_licence(tmp_path: Path) -> None:
-    done = run_models(tmp_path)
-    assert done.returncode == 0
-    *lines, getting, using = done.stdout.splitlines()
+    *lines, getting, using = output_of(run_models(tmp_path, "models")).splitlines()
     for model, line in zip(KNOWN_MODELS, (line for line in lines if not line.startswith(" ")), strict=True):
         assert line.startswith(model.name + " ")
         assert f"{model.megabytes:,} MB" in line
@@ -57,22 +35,21 @@ def test_the_list_names_every_model_with_size_and_licence(tmp_path: Path) -> Non
 
 
 def test_a_file_of_ones_own_is_copied_listed_and_found_by_name(tmp_path: Path) -> None:
-    home, photo, out = tmp_path / "home", tmp_path / "photo.png", tmp_path / "map.npy"
     file = of_channels(tmp_path / "metres.onnx", farness=True)
-    done = run_models(home, "get", str(file))
-    assert (done.returncode, done.stderr) == (0, "")
-    assert done.stdout.splitlines()[-1] == "Use it: iibr view PHOTO --depth-model metres"
+    copied = output_of(run_models(tmp_path, "models", "get", file)).splitlines()
+    assert copied[-1] == "Use it: iibr view PHOTO --depth-model metres"
     file.unlink()
-    assert any(line.startswith("metres ") and "your own" in line for line in run_models(home).stdout.splitlines())
-    write_image(photo, np.tile(np.linspace(0.2, 0.9, 60, dtype=np.float32)[:, None, None], (1, 80, 3)))
-    used = run_iibr(home, "export", photo, "--to", "disparity", "--depth-model", "metres", "--metric", "-o", out)
-    assert used.returncode == 0, used.stderr
-    disparity = np.load(out)
+    listed = output_of(run_models(tmp_path, "models")).splitlines()
+    assert any(line.startswith("metres ") and "your own" in line for line in listed)
+    write_image(tmp_path / "photo.png", np.tile(np.linspace(0.2, 0.9, 60, dtype=np.float32)[:, None, None], (1, 80, 3)))
+    words = ("export", "photo.png", "--to", "disparity", "--depth-model", "metres", "--metric", "-o", "map.npy")
+    output_of(run_models(tmp_path, *words))
+    disparity = np.load(tmp_path / "map.npy")
     assert disparity[-9].mean() > disparity[9].mean(), "300 less red are the metres"
 
 
 def test_without_a_network_get_is_one_line(tmp_path: Path) -> None:
-    done = run_models(tmp_path, "get", "depth-anything-v2-small", "--yes")
+    done = run_models(tmp_path, "models", "get", "depth-anything-v2-small", "--yes")
     assert done.returncode == 2
     about, error = done.stderr.splitlines()
     assert "99 MB" in about
@@ -82,43 +59,24 @@ def test_without_a_network_get_is_one_line(tmp_path: Path) -> None:
     assert not list(tmp_path.rglob("*.safetensors"))
 
 
-def test_nothing_is_fetched_unless_the_user_says_yes(tmp_path: Path) -> None:
-    done = run_models(tmp_path, "get", "depth-pro", typed="\n")
-    assert done.returncode == 1
-    assert "Nothing was downloaded" in done.stderr
+@pytest.mark.parametrize(("typed", "code", "message"), [("\n", 1, "Nothing was downloaded"), ("", 130, "interrupted")])
+def test_nothing_is_fetched_unless_the_user_says_yes(tmp_path: Path, typed: str, code: int, message: str) -> None:
+    done = run_models(tmp_path, "models", "get", "depth-anything-v2-small", typed=typed)
+    assert done.returncode == code
+    assert message in done.stderr
     assert "cannot be downloaded" not in done.stderr
 
 
-def test_an_unknown_model_is_one_line_with_those_known(tmp_path: Path) -> None:
-    done = run_models(tmp_path, "get", "depth-nothing")
-    assert done.returncode == 2
-    (line,) = done.stderr.splitlines()
+def test_an_unknown_model_is_one_line_with_those_known(iibr: Iibr) -> None:
+    line = refusal_of(iibr("models", "get", "depth-nothing"))
     assert all(model.name in line for model in KNOWN_MODELS)
 
 
-def test_generate_says_where_depth_came_from(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
-    photo = write_scene(tmp_path)
-    words = ("generate", photo, "--grid", 1, "--out")
-    assert run(monkeypatch, *words, tmp_path / "a") == 0
-    assert "note: Depth: scene_disparity.npy." in capsys.readouterr().err
-    assert run(monkeypatch, *words, tmp_path / "b", "--depth", "rough", "--refine", "off") == 0
-    said = capsys.readouterr().err
-    assert said.count("Depth: rough") == 1
-    assert "iibr models" in said
-    # A bad model that was asked for is an error, and nothing is made.
+def test_commands_name_the_origin_of_depth_and_refuse_a_bad_model(iibr: Iibr, photo_path: Path, tmp_path: Path) -> None:
+    words = ("generate", photo_path, "--grid", 1, "-o")
+    assert "note: Depth: scene_disparity.npy." in iibr(*words, tmp_path / "a").stderr
     (model := tmp_path / "model").mkdir()
-    assert run(monkeypatch, *words, tmp_path / "c", "--depth", "model", "--depth-model", model) == 2
-    (line,) = filter(None, capsys.readouterr().err.splitlines())
-    assert "config.json" in line
+    assert "config.json" in refusal_of(iibr(*words, tmp_path / "c", "--depth", "model", "--depth-model", model))
     assert not (tmp_path / "c").exists()
-
-
-def test_a_bad_map_beside_the_photo_is_told_and_done_without(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
-    photo = write_scene(tmp_path)
-    np.save(tmp_path / "scene_disparity.npy", np.full((5, 5), np.nan))
-    assert run(monkeypatch, "generate", photo, "--grid", 1, "--out", tmp_path / "a") == 0
-    assert "The map beside the photo was not used" in capsys.readouterr().err
+    missing = refusal_of(iibr("plan", photo_path, "--depth-model", "depth-anything-v2-base"))
+    assert "depth-anything-v2-base" in missing

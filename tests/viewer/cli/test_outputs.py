@@ -1,4 +1,4 @@
-"""What commands write: never onto what they read, over other things by --force only; refused before any work."""
+"""Outputs of commands: inputs are never overwritten, other files with --force only; refused before any work."""
 
 from __future__ import annotations
 
@@ -9,157 +9,114 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.forked_iibr import run_forked
-from tests.viewer.cli.test_cli import run
+from tests.viewer.cli.conftest import Iibr, contents, output_of, refusal_of
 
-INPUTS = (
-    "{dir}/field/input_Cam000.png",
-    "{dir}/link.png",
-    "{dir}/hard.png",
-    "{dir}/../{dir.name}/field/input_Cam000.png",
-)
+VIEW, LINK, HARD, ROUND = "field/input_Cam000.png", "link.png", "hard.png", "../{name}/field/input_Cam000.png"
+"""Names of one view of a light field."""
 
 
 @pytest.fixture
-def folder(photo_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A light field whose first view has two more names, a picture of this program, a map, a model's folder."""
+def folder(iibr: Iibr, photo_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The working folder: a light field, more names of its first view, a picture of this program, a map, a model."""
     folder = photo_path.parent
-    assert run(monkeypatch, "generate", photo_path, "--grid", 1, "--out", folder / "field") == 0
-    assert run(monkeypatch, "screenshot", photo_path, "--grid", 1, "-o", folder / "saved.png") == 0
-    view = folder / "field" / "input_Cam000.png"
-    (folder / "link.png").symlink_to(view)
-    (folder / "hard.png").hardlink_to(view)
-    (folder / "linked-field").symlink_to("field")
-    (folder / "map.png").write_bytes(view.read_bytes())
-    (folder / "scene_depth.png").write_bytes(view.read_bytes())
-    (folder / "model").mkdir()
-    (folder / "gloss.png").write_text("roughness = 0.3")
-    (folder / "keys.gif").write_text("0 0\n1 0\n")
+    monkeypatch.chdir(folder)
+    output_of(iibr("generate", photo_path, "--grid", 1, "-o", "field"))
+    output_of(iibr("screenshot", photo_path, "--grid", 1, "-o", "saved.png"))
+    Path(LINK).symlink_to(VIEW)
+    Path(HARD).hardlink_to(VIEW)
+    Path("linked-field").symlink_to("field")
+    for name in ("map.png", "scene_depth.png"):
+        Path(name).write_bytes(Path(VIEW).read_bytes())
+    Path("model").mkdir()
+    Path("gloss.png").write_text("roughness = 0.3")
+    Path("field/gloss.toml").write_text("roughness = 0.3")
+    Path("keys.gif").write_text("0 0\n1 0\n")
     frame = {"transform_matrix": np.eye(4).tolist(), "w": 32, "h": 24, "fl_x": 50.0}
-    (folder / "cameras").mkdir()
-    (folder / "cameras" / "transforms.json").write_text(json.dumps({"frames": [frame]}))
+    Path("cameras").mkdir()
+    Path("cameras/transforms.json").write_text(json.dumps({"frames": [frame]}))
     return folder
 
 
-@pytest.mark.parametrize(
-    "words",
-    [
-        *(("screenshot", INPUTS[0], "-o", target) for target in INPUTS),
-        ("screenshot", INPUTS[1], "-o", INPUTS[2]),
-        ("screenshot", "{dir}/field", "-o", "{dir}/field/new.png"),
-        ("screenshot", "{dir}/linked-field", "-o", "{dir}/field/input_Cam000.png"),
-        ("screenshot", "{photo}", "--like", "{dir}/saved.png", "-o", "{dir}/saved.png"),
-        ("screenshot", "{photo}", "--disparity", "{dir}/map.png", "-o", "{dir}/map.png"),
-        ("screenshot", "{photo}", "--depth-model", "{dir}/model", "-o", "{dir}/model/new.png"),
-        ("generate", INPUTS[1], "--grid", "1", "--out", "{dir}/field"),
-        ("generate", "{photo}", "--disparity", "{dir}/field/gt_disp_lowres.pfm", "--grid", "1", "--out", "{dir}/field"),
-        ("generate", "{dir}/link.png", "--grid", "1", "--out", "{dir}/linked-field"),
-        ("screenshot", "{photo}", "--gloss", "{dir}/gloss.png", "-o", "{dir}/gloss.png"),
-        ("screenshot", "{photo}", "--inpaint", "diffusion:{dir}/model", "-o", "{dir}/model/new.png"),
-        ("export", "{photo}", "--to", "anaglyph", "--gloss", "{dir}/gloss.png", "-o", "{dir}/gloss.png"),
-        ("export", "{photo}", "--to", "gif", "--path", "{dir}/keys.gif", "-o", "{dir}/keys.gif"),
-        ("generate", "{photo}", "--grid", "1", "--gloss", "{dir}/field/gloss.toml", "--out", "{dir}/field"),
-        ("generate", "{photo}", "--poses", "{dir}/cameras/transforms.json", "--out", "{dir}/cameras"),
-        ("depth", "{dir}/field", "-o", "{dir}/field/gt_disp_lowres.pfm"),
-        ("evaluate", "{dir}/field", "--lpips", "{dir}/model", "--out", "{dir}/model"),
-        ("evaluate", "{dir}/field", "--out", "{dir}/field"),
-        ("evaluate", "{dir}/linked-field", "--out", "{dir}/field/report"),
-        ("evaluate", "{dir}/field", "--out", "{dir}"),
-        ("evaluate", "{dir}/field", "--disparity", "{dir}/link.png", "--out", "{dir}/linked-field"),
-    ],
-)
-def test_no_command_writes_onto_what_it_reads(
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-    photo_path: Path,
-    folder: Path,
-    words: tuple[str, ...],
-) -> None:
-    if "field/gloss.toml" in str(words):
-        (folder / "field" / "gloss.toml").write_text("roughness = 0.3")
-    before = {path: path.is_file() and path.read_bytes() for path in folder.rglob("*")}
-    capsys.readouterr()
-    assert run(monkeypatch, *(word.format(dir=folder, photo=photo_path) for word in words), "--force") == 2
-    (line,) = capsys.readouterr().err.splitlines()
-    assert line.startswith("iibr: ")
-    assert re.search("is read|are read|holds other files", line)
-    assert {path: path.is_file() and path.read_bytes() for path in folder.rglob("*")} == before
+def test_no_command_writes_onto_what_it_reads(iibr: Iibr, folder: Path) -> None:
+    commands = [
+        *(f"screenshot {VIEW} -o {target}" for target in (VIEW, LINK, HARD, ROUND.format(name=folder.name))),
+        f"screenshot {LINK} -o {HARD}",
+        "screenshot field -o field/new.png",
+        f"screenshot linked-field -o {VIEW}",
+        "screenshot scene.png --like saved.png -o saved.png",
+        "screenshot scene.png --disparity map.png -o map.png",
+        "screenshot scene.png --depth-model model -o model/new.png",
+        f"generate {LINK} --grid 1 -o field",
+        "generate scene.png --disparity field/gt_disp_lowres.pfm --grid 1 -o field",
+        f"generate {LINK} --grid 1 -o linked-field",
+        "screenshot scene.png --gloss gloss.png -o gloss.png",
+        "screenshot scene.png --inpaint diffusion:model -o model/new.png",
+        "export scene.png --to anaglyph --gloss gloss.png -o gloss.png",
+        "export scene.png --to gif --path keys.gif -o keys.gif",
+        "generate scene.png --grid 1 --gloss field/gloss.toml -o field",
+        "generate scene.png --poses cameras/transforms.json -o cameras",
+        "depth field -o field/gt_disp_lowres.pfm",
+        "evaluate field --lpips model -o model",
+        "evaluate field -o field",
+        "evaluate linked-field -o field/report",
+        "evaluate field -o .",
+        f"evaluate field --disparity {LINK} -o linked-field",
+    ]
+    before = contents(folder)
+    for command in commands:
+        line = refusal_of(iibr(*command.split(), "--force"))
+        assert re.search("never overwritten|nothing is written|holds other files", line), command
+        assert contents(folder) == before, command
 
 
-def test_the_map_beside_the_photo_is_read_too(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], photo_path: Path, folder: Path
-) -> None:
+def test_the_map_beside_the_photo_is_an_input_too(iibr: Iibr, folder: Path) -> None:
     (folder / "scene_disparity.npy").unlink()
-    assert run(monkeypatch, "screenshot", photo_path, "-o", folder / "scene_depth.png", "--force") == 2
-    assert "is read here" in capsys.readouterr().err
+    assert "is an input" in refusal_of(iibr("screenshot", "scene.png", "-o", "scene_depth.png", "--force"))
 
 
-def test_an_empty_folder_and_links_are_written_to(
-    monkeypatch: pytest.MonkeyPatch, photo_path: Path, tmp_path: Path
-) -> None:
+def test_an_empty_folder_and_links_are_written_to(iibr: Iibr, photo_path: Path, tmp_path: Path) -> None:
     (tmp_path / "disk" / "empty").mkdir(parents=True)
     for name in ("empty", "dangling", "picture.png"):
         (tmp_path / name).symlink_to(Path("disk") / name)
     for name in ("empty", "dangling"):
-        assert run(monkeypatch, "generate", photo_path, "--grid", 1, "--out", tmp_path / name) == 0
-    assert run(monkeypatch, "screenshot", photo_path, "--grid", 1, "-o", tmp_path / "picture.png") == 0
+        output_of(iibr("generate", photo_path, "--grid", 1, "-o", tmp_path / name))
+    output_of(iibr("screenshot", photo_path, "--grid", 1, "-o", tmp_path / "picture.png"))
     assert sorted(path.name for path in (tmp_path / "disk").iterdir()) == ["dangling", "empty", "picture.png"]
     assert all((tmp_path / name).is_symlink() for name in ("empty", "dangling", "picture.png"))
     assert not list(tmp_path.glob(".*"))
 
 
 @pytest.mark.parametrize(
-    ("words", "named"),
+    ("words", "message"),
     [
-        (
-            ("screenshot", "-o", "o.gif"),
-            "o.gif: can be written as .png, .jpg, .jpeg, .tif, .tiff, .exr, .webp, .avif only",
-        ),
-        (("screenshot", "-o", "o.jpg", "--bits", "16"), "o.jpg: JPEG is written with 8 bits a channel, not 16"),
-        (("screenshot", "-o", "none/o.png"), "the folder none does not exist"),
-        (("screenshot", "-o", "o.png", "--size", "16384x16384"), "16384x16384 px"),
-        (("screenshot", "-o", "{long}.png"), "File name too long"),
-        (("generate", "--grid", "3", "--out", "{long}"), "File name too long"),
-        (("generate", "--grid", "3", "--out", "file/field"), "file is a file"),
-        (("generate", "--grid", "3", "--out", "."), "holds photo.png"),
+        ("screenshot -o o.gif", "o.gif: can be written as .png, .jpg, .jpeg, .tif, .tiff, .exr, .webp, .avif only"),
+        ("screenshot -o o.jpg --bits 16", "o.jpg: JPEG is written with 8 bits a channel, not 16"),
+        ("screenshot -o none/o.png", "the folder none does not exist"),
+        ("screenshot -o o.png --size 16384x16384", "16384x16384 px"),
+        ("screenshot -o {long}.png", "File name too long"),
+        ("generate --grid 3 -o {long}", "File name too long"),
+        ("generate --grid 3 -o file/field", "file is a file"),
+        ("generate --grid 3 -o .", "holds photo.png"),
     ],
 )
-def test_what_can_be_refused_is_refused_before_the_photo_is_read(
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-    tmp_path: Path,
-    words: tuple[str, ...],
-    named: str,
+def test_outputs_are_refused_before_the_photo_is_read(
+    iibr: Iibr, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, words: str, message: str
 ) -> None:
-    """It is none, which nobody finds out."""
     monkeypatch.chdir(tmp_path)
-    Path("photo.png").write_text("no photo")
+    Path("photo.png").write_text("not a photo")
     Path("file").touch()
-    command, *options = (word.format(long="n" * 299) for word in words)
-    assert run(monkeypatch, command, "photo.png", *options) == 2
-    (line,) = capsys.readouterr().err.splitlines()
-    assert named in line
+    command, *options = words.format(long="n" * 299).split()
+    assert message in refusal_of(iibr(command, "photo.png", *options))
 
 
-@pytest.mark.parametrize("is_file", [True, False])
-def test_demo_says_in_one_line_where_it_cannot_write(tmp_path: Path, is_file: bool) -> None:
-    if is_file:
-        (tmp_path / "out").touch()
-    else:
-        (tmp_path / "out").symlink_to("gone/out")
-    done = run_forked("demo", cwd=tmp_path)
-    assert (done.returncode, done.stdout, len(done.stderr.splitlines())) == (2, "", 1)
-    assert done.stderr.startswith("iibr: out: ")
-
-
-def test_notes_come_after_the_result_or_not_at_all(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], photo_path: Path, tmp_path: Path
+def test_notes_come_after_the_result_and_not_with_an_error(
+    iibr: Iibr, monkeypatch: pytest.MonkeyPatch, photo_path: Path, tmp_path: Path
 ) -> None:
-    words = ("--grid", 3, "--depth", "rough", "--refine", "off")
+    words = ("generate", photo_path, "--grid", 3, "--depth", "rough", "--refine", "off", "-o", tmp_path / "field")
     with monkeypatch.context() as small:
         small.setattr("iibr_core.method.memory.free_memory_bytes", lambda: 10**5)
-        assert run(monkeypatch, "generate", photo_path, *words, "--out", tmp_path / "f") == 2
-    (line,) = capsys.readouterr().err.splitlines()
-    assert "lower --grid" in line
-    assert run(monkeypatch, "generate", photo_path, *words, "--out", tmp_path / "f") == 0
-    assert all(line.startswith("note: ") for line in capsys.readouterr().err.splitlines())
+        assert refusal_of(iibr(*words)).endswith("lower --grid or --max-pixels")
+    done = iibr(*words)
+    output_of(done)
+    assert all(line.startswith("note: ") for line in done.stderr.splitlines())
+    assert "note: Depth: rough, guessed without a model. Better: " in done.stderr

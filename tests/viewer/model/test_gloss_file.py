@@ -82,7 +82,9 @@ def test_what_makes_no_sense_is_named_in_one_line(tmp_path: Path, text: str, nam
     assert "\n" not in str(refused.value)
 
 
-@pytest.mark.parametrize(("content", "says"), [(b"\xff\xfe\x00", "is no gloss"), (b"a" * 2_000_000, "is larger than")])
+@pytest.mark.parametrize(
+    ("content", "says"), [(b"\xff\xfe\x00", "is not a gloss file"), (b"a" * 2_000_000, "is larger than")]
+)
 def test_files_that_are_no_text_or_too_large(tmp_path: Path, content: bytes, says: str) -> None:
     path = tmp_path / "gloss.toml"
     path.write_bytes(content)

@@ -1,0 +1,226 @@
+"""Unusual photos, files of several views, models and poses, opened by the commands that take them."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+from scipy.ndimage import uniform_filter
+
+import iibr_core
+from iibr_core.formats.images.photo import read_photo
+from iibr_core.formats.images.write import write_image
+from iibr_core.formats.light_fields.light_field_formats import open_light_field
+from iibr_core.formats.maps.pfm import read_pfm
+from iibr_core.types import GridShape, ViewOffset
+from tests.iibr_core.depth.onnx_graphs import of_channels
+from tests.iibr_core.formats.test_hdr import PQ, encoded, write_heic, write_png
+from tests.iibr_core.formats.test_side_by_side import LEFT, RIGHT
+from tests.iibr_core.formats.test_side_by_side import photo as picture
+from tests.iibr_core.known_scenes import FOREGROUND, WALL, disparity_of_square, view_of_square, view_of_wall
+from tests.viewer.cli.conftest import Iibr, output_of, refusal_of
+from tests.viewer.conftest import FAR, HEIGHT, NEAR, WIDTH
+
+SQUARE, BACK, FLOOR = np.s_[20:44, 36:60], np.s_[2:10, 2:90], np.s_[56:, :]
+"""Parts of `write_scene`: the near square, the wall above it, and a floor between both, added here."""
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The working folder, without depth models on this machine."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def write_pair(name: str, apart: float = 3.0) -> None:
+    """Write a wall for two eyes side by side, at WALL px for each of `apart` steps between them."""
+    eyes = [view_of_wall(ViewOffset(0, s), size=(64, 80)) for s in (0.0, apart)]
+    Image.fromarray(np.rint(np.hstack(eyes) * 255).astype(np.uint8)).save(name)
+
+
+def test_a_pair_is_matched_and_reported_as_cut(iibr: Iibr, folder: Path) -> None:
+    Image.fromarray(np.hstack([RIGHT, LEFT])).save("a.jps", "JPEG", quality=95)
+    out = output_of(iibr("plan", "a.jps"))
+    assert "80x60 px, disparity from the photo's two views (side-by-side stereo)" in out
+    assert "- Taken for a stereo pair, side by side, because of its " in out
+
+
+@pytest.mark.parametrize("name", ["pq.png", "pq.heic"])
+def test_an_hdr_photo_is_drawn_as_an_ordinary_one(iibr: Iibr, folder: Path, name: str) -> None:
+    expected = picture(64, 80) // 2 + 60
+    linear = ((expected / 255 + 0.055) / 1.055) ** 2.4
+    (write_png if name == "pq.png" else write_heic)(folder / name, encoded(linear, PQ), PQ)
+    done = iibr("screenshot", name, "--depth", "flat", "--view", "0,0", "--size", "80x64", "-o", "out.png")
+    output_of(done)
+    assert "HDR photo (PQ): its highlights are compressed" in done.stderr
+    drawn = np.asarray(Image.open("out.png").convert("RGB")).astype(float)
+    assert np.abs(drawn - expected).mean() < 6
+
+
+def test_a_quilt_of_ours_is_a_light_field_again(iibr: Iibr, photo_path: Path, folder: Path) -> None:
+    quilt = Path(output_of(iibr("export", photo_path, "--to", "quilt", "-o", "a.png", "--grid", 3)).strip())
+    assert open_light_field(quilt).grid == GridShape(1, 48)
+    output_of(iibr("export", quilt, "--to", "hci", "-o", "views"))
+    assert len(list(Path("views").glob("input_Cam*.png"))) == 48
+    whole, first = np.asarray(Image.open(quilt).convert("RGB")), np.asarray(Image.open("views/input_Cam000.png"))
+    height, width = first.shape[:2]
+    assert np.array_equal(whole[-height:, :width], first)
+    assert "--grid: a_qs" in refusal_of(iibr("export", quilt, "--to", "hci", "-o", "new", "--grid", 3))
+
+
+def test_a_stereo_photo_has_the_depth_of_its_two_views(iibr: Iibr, folder: Path) -> None:
+    write_pair("wall_SBS.png")
+    done = iibr("generate", "wall_SBS.png", "--grid", 3, "-o", "field", "--literal", "--with-disparity")
+    output_of(done)
+    assert "two views (side-by-side stereo)" in done.stderr
+    values = read_pfm(Path("field/disp_Cam004.pfm"))
+    assert values.shape == (64, 80)
+    assert np.median(values) == pytest.approx(3 * WALL, abs=0.1)
+
+
+def test_depth_of_a_pair_is_the_left_views(iibr: Iibr, folder: Path) -> None:
+    eyes = [np.rint(view_of_square(ViewOffset(0, s)) * 255).astype(np.uint8) for s in (0.0, 2.0)]
+    Image.fromarray(np.hstack(eyes)).save("square_SBS.png")
+    output_of(iibr("depth", "square_SBS.png", "-o", "a.pfm"))
+    error = np.abs(read_pfm(Path("a.pfm")) / 2 - disparity_of_square())[4:-4, 4:-4]
+    assert np.mean(error < 0.2 * (FOREGROUND - WALL)) > 0.7
+
+
+def test_metres_reach_exports(iibr: Iibr, folder: Path) -> None:
+    Image.fromarray(np.rint(view_of_square(ViewOffset(0, 0)) * 255).astype(np.uint8)).save("square.png")
+    metres = np.where(disparity_of_square() > WALL, 1.5, 6.0).astype(np.float32)
+    np.save("square_depth.npy", metres)
+    output_of(iibr("export", "square.png", "--metric", "--to", "depth", "-o", "out_depth.npy"))
+    assert np.mean(np.abs(np.load("out_depth.npy") - metres) < 0.1) > 0.9
+
+
+@pytest.mark.parametrize(
+    ("options", "is_nearer_below"),
+    [
+        ([], True),
+        (["--depth", "rough", "--invert-depth"], False),
+        (["--depth-model", "red.onnx"], True),
+        (["--depth-model", "red.onnx", "--metric"], False),
+    ],
+)
+def test_a_photo_without_depth_gets_a_guess_or_a_models(
+    iibr: Iibr, folder: Path, options: list[str], is_nearer_below: bool
+) -> None:
+    """The photo is redder further down."""
+    write_image(Path("photo.png"), np.tile(np.linspace(0.2, 0.9, 60, dtype=np.float32)[:, None, None], (1, 80, 3)))
+    of_channels(Path("red.onnx"))
+    output_of(iibr("depth", "photo.png", *options, "-o", "map.npy"))
+    disparity = np.load("map.npy")
+    assert disparity.shape == (60, 80)
+    assert (np.median(disparity[-12:]) > np.median(disparity[:12])) == is_nearer_below
+
+
+def test_a_pair_is_estimated_by_the_model_that_is_named(iibr: Iibr, folder: Path) -> None:
+    write_pair("a_2x1.png")
+    output_of(iibr("depth", "a_2x1.png", "-o", "map.npy"))
+    assert np.median(np.load("map.npy")) == pytest.approx(3 * WALL, abs=0.5)
+    of_channels(Path("red.onnx"))
+    done = iibr("depth", "a_2x1.png", "--depth-model", "red.onnx", "--force", "-o", "map.npy")
+    assert "estimated by the model red.onnx" in done.stderr
+
+
+def test_a_bad_map_beside_the_photo_is_reported_and_not_used(iibr: Iibr, photo_path: Path, folder: Path) -> None:
+    np.save("scene_disparity.npy", np.full((5, 5), np.nan))
+    done = iibr("generate", photo_path, "--grid", 1, "-o", "a")
+    output_of(done)
+    assert "The map beside the photo was not used" in done.stderr
+
+
+def write_map(photo: Path, kind: str) -> None:
+    """Write a map of this kind beside the photo; a depth in metres is 1 / (a + b * disparity)."""
+    given = photo.with_name("scene_disparity.npy")
+    disparity = uniform_filter(np.load(given), 5)  # so that its edges are refined
+    disparity[FLOOR] = (NEAR + FAR) / 2
+    np.save(given, disparity)
+    if kind != "disparity":
+        given.unlink()
+    if kind == "depth":
+        np.save(photo.with_name("scene_depth.npy"), (1.0 / (0.1 + 0.3 * (disparity - FAR))).astype(np.float32))
+    elif kind == "depth picture":  # white is near
+        near = (255 * (disparity - FAR) / (NEAR - FAR)).astype(np.uint8)
+        Image.fromarray(near).save(photo.with_name("scene_depth.png"))
+
+
+@pytest.mark.parametrize("kind", ["disparity", "depth", "depth picture"])
+def test_python_and_commands_give_the_same_numbers(iibr: Iibr, photo_path: Path, folder: Path, kind: str) -> None:
+    write_map(photo_path, kind)
+    field = iibr_core.open(photo_path).light_field(3)
+    output_of(iibr("generate", photo_path, "--grid", 3, "-o", "field", "--with-disparity"))
+    written = iibr_core.open("field").light_field()
+    np.testing.assert_array_equal(written.views, field.views)
+    assert written.disparity is not None
+    assert field.disparity is not None
+    np.testing.assert_array_equal(written.disparity, field.disparity)
+    near, far = (np.median(field.disparity[1, 1][part]) for part in (SQUARE, BACK))
+    assert near > far + 0.5, "what is near moves most"
+    disparity = iibr_core.open(photo_path, refine=False).disparity
+    output_of(iibr("depth", photo_path, "--refine", "off", "-o", "map.npy"))
+    np.testing.assert_allclose(np.load("map.npy"), disparity, rtol=1e-5)
+    near, far, between = (np.median(disparity[part]) for part in (SQUARE, BACK, FLOOR))
+    assert (between - far) / (near - far) == pytest.approx(0.5, abs=0.03)
+
+
+@pytest.mark.parametrize("is_metric", [False, True])
+def test_a_models_depth_is_the_same_in_python(iibr: Iibr, photo_path: Path, folder: Path, is_metric: bool) -> None:
+    """The model gives the redness of a pixel: nearness, or a distance."""
+    red = np.full((64, 96, 3), 60, np.uint8)
+    red[SQUARE] = (220, 60, 60)
+    Image.fromarray(red).save(photo_path)
+    model = of_channels(Path("red.onnx"), as_bytes=True)
+    if is_metric:
+        Path("config.json").write_text('{"depth_estimation_type": "metric"}')
+    inverse = iibr_core.estimate_depth(photo_path, model)
+    output_of(iibr("depth", photo_path, "--depth-model", model, "--refine", "off", "-o", "map.npy"))
+    assert np.corrcoef(inverse.ravel(), np.load("map.npy").ravel())[0, 1] > 0.999
+    square, wall = (np.median(inverse[part]) for part in (SQUARE, BACK))
+    assert square / wall == pytest.approx(60 / 220 if is_metric else 220 / 60, rel=0.05)
+
+
+def pixels_of(path: Path) -> np.ndarray:
+    return read_photo(path, 10**9).pixels
+
+
+def write_poses(*places: tuple[float, float, float]) -> str:
+    """Write transforms.json with cameras that look ahead: y up, z backwards."""
+    matrices = [np.block([[np.eye(3), np.array(place)[:, None]], [0, 0, 0, 1]]) for place in places]
+    frames = [{"transform_matrix": matrix.tolist()} for matrix in matrices]
+    Path("poses.json").write_text(json.dumps({"w": WIDTH, "h": HEIGHT, "fl_x": 1.2 * WIDTH, "frames": frames}))
+    return "poses.json"
+
+
+@pytest.mark.parametrize("kind", ["nerfstudio", "llff", "colmap"])
+def test_the_cameras_of_a_light_field_see_its_views(iibr: Iibr, photo_path: Path, folder: Path, kind: str) -> None:
+    output_of(iibr("export", photo_path, "--to", kind, "--grid", "3", "-o", "field"))
+    output_of(iibr("generate", photo_path, "--poses", "field", "-o", "new"))
+    views, known = sorted(Path("new").iterdir()), sorted(Path("field/images").iterdir())
+    assert [path.name for path in views] == [f"view_{number:04d}.png" for number in range(1, 10)]
+    for view, other in zip(views, known):
+        assert np.sqrt(np.mean((pixels_of(view) - pixels_of(other)) ** 2)) < 0.02
+
+
+def test_a_step_forward_makes_the_photo_larger(iibr: Iibr, photo_path: Path, folder: Path) -> None:
+    poses = write_poses((0, 0, 0), (0, 0, -0.25))
+    output_of(iibr("generate", photo_path, "--poses", poses, "--photo-pose", "1", "-o", "new"))
+    still, forward = (pixels_of(path) for path in sorted(Path("new").iterdir()))
+    np.testing.assert_array_equal(still, pixels_of(photo_path))
+    red = [(image[..., 0] > image[..., 1] + 0.2).sum() for image in (still, forward)]
+    assert red[1] / red[0] == pytest.approx(1 / 0.75**2, rel=0.1)
+
+
+def test_poses_that_show_mostly_inpainted_areas_are_named(iibr: Iibr, photo_path: Path, folder: Path) -> None:
+    words = ("generate", photo_path, "--poses", write_poses((0, 0, 0), (0, 0, 20)), "--photo-pose", "1", "-o", "new")
+    done = iibr(*words)
+    output_of(done)
+    assert "show mostly inpainted areas, which the photo does not show: 2 (" in done.stderr
+    assert "already exists" in refusal_of(iibr(*words))
+    output_of(iibr(*words, "--force"))
+    assert "poses.json has 2 poses" in refusal_of(iibr(*words[:-3], "3", "-o", "o"))

@@ -1,0 +1,54 @@
+"""`iibr depth`: write the disparity of a light field, a stereo photo or a photo."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from iibr_core.formats.light_fields.light_field_formats import find_light_field, open_light_field
+from iibr_core.formats.outputs import check_output
+from iibr_core.scenes.scene import Source
+from viewer.cli.option_records import with_option_records
+from viewer.cli.options import DepthOptions, Force, inputs_of_command, require_heeded, require_model
+from viewer.cli.progress import print_notes, show_progress
+
+
+@with_option_records
+def depth(
+    context: typer.Context,
+    path: Annotated[Path, typer.Argument(help="A light field, a stereo photo, or any photo.")],
+    output: Annotated[Path, typer.Option("--output", "-o", metavar="FILE", help="Map to write: PFM, EXR, NPY or PNG.")],
+    options: DepthOptions,
+    force: Force = False,
+) -> None:
+    """Write the disparity of the centre view, in pixels per view step; of a stereo photo, that of the left view.
+
+    Light fields and stereo photos: it is found from all views. Photos, and stereo photos with --depth or --depth-model:
+    a map beside the photo, one in it, a model's estimate, or a guess.
+
+    Example: iibr depth photo.jpg -o photo_disparity.png
+    """
+    source = Source(str(path), options.choice)
+    require_heeded(context, path)
+    check_output(output, inputs_of_command(context, source), force)
+    require_model(source.depth)
+    from iibr_core.formats.maps.writer import write_map
+    from iibr_core.scenes.light_fields import find_disparity
+    from iibr_core.scenes.photo import load_photo
+
+    notes: tuple[str, ...] = ()
+    origin = None
+    with show_progress("reading"):
+        if path.is_file() and (source.depth.start != "auto" or find_light_field(path) is None):
+            loaded = load_photo(source)
+            name, values, notes, origin = (
+                loaded.photo.name, loaded.disparity.values, loaded.disparity.notes, loaded.origin,
+            )  # fmt: skip
+        else:
+            field = open_light_field(path)
+            name, values = field.name, find_disparity(field)
+    note = write_map(output, values)
+    print(f"{name}: disparity {values.min():.2f} to {values.max():.2f} px per view step: {output}")
+    print_notes((*notes, *filter(None, (note,))), origin)

@@ -1,0 +1,244 @@
+"""Options that commands share: their values from text, and the records that hold them."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Collection, Set
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+from iibr_core.depth.choice import DepthChoice, DepthStart
+from iibr_core.formats.light_fields.light_field_formats import is_light_field
+from iibr_core.inpainting.registry import DEFAULT_INPAINTER, INPAINTER_FORMS, require_inpainter
+from iibr_core.scenes.inputs import inputs_of
+from iibr_core.scenes.scene import Source
+from iibr_core.scenes.screen_size import ScreenSize
+from iibr_core.types import GridShape, InputError, ViewOffset
+
+MAX_GRID = 99
+"""Largest number of views in a row or column."""
+MAX_SIDE_PX = 16384
+
+
+def grid_from_text(text: str) -> GridShape:
+    """Return a grid of views: "9" is 9x9, "3x9" is 3 rows of 9. Raises BadParameter."""
+    match = re.fullmatch(r"(\d{1,4})(?:x(\d{1,4}))?", text.strip())
+    grid = GridShape(int(match[1]), int(match[2] or match[1])) if match else GridShape(0, 0)
+    if not (1 <= grid.rows <= MAX_GRID and 1 <= grid.columns <= MAX_GRID):
+        raise typer.BadParameter(f"{text!r} is not a grid: give 1 to {MAX_GRID}, such as 9 or 3x9")
+    return grid
+
+
+def size_from_text(text: str) -> ScreenSize:
+    """Return a size from "1280x800". Raises BadParameter."""
+    match = re.fullmatch(r"(\d{1,6})x(\d{1,6})", text.strip())
+    size = ScreenSize(int(match[1]), int(match[2])) if match else ScreenSize(0, 0)
+    if not all(1 <= side <= MAX_SIDE_PX for side in size):
+        raise typer.BadParameter(f"{text!r} is not a size: give width x height in pixels, such as 1280x800")
+    return size
+
+
+def view_from_text(text: str) -> ViewOffset:
+    """Return a view offset from "S,T": steps to the right, then down. Raises BadParameter."""
+    try:
+        s, t = map(number_from_text, text.split(","))
+    except (ValueError, typer.BadParameter):
+        raise typer.BadParameter(f"{text!r} is not a viewpoint: give S,T in view steps, such as 2,-1.5") from None
+    return ViewOffset(t, s)
+
+
+def number_from_text(text: str) -> float:
+    """Return a finite number. Raises ValueError and BadParameter."""
+    value = float(text)
+    if not math.isfinite(value):
+        raise typer.BadParameter(f"{text!r} is not a finite number")
+    return value
+
+
+def name_in(names: Collection[str]) -> Callable[[str], str]:
+    """Return a parser of an option whose values are names in a table."""
+
+    def name_from_text(text: str) -> str:
+        if text not in names:
+            raise typer.BadParameter(f"{text!r} is not known: give {', '.join(names)}")
+        return text
+
+    return name_from_text
+
+
+def inpainter_from_text(text: str) -> str:
+    """Return the name of an inpainter, with its folder if it has one. Raises BadParameter."""
+    try:
+        require_inpainter(text)
+    except InputError as error:
+        raise typer.BadParameter(str(error)) from None
+    return text
+
+
+SCENE_HELP = "A photo, a stereo photo, or a light field: a folder of views, a quilt, a lenslet image."
+ScenePath = Annotated[Path, typer.Argument(help=SCENE_HELP, show_default=False)]
+Force = Annotated[bool, typer.Option("--force", help="Replace an existing output. Inputs are never replaced.")]
+Grid = Annotated[
+    GridShape | None,
+    typer.Option(
+        parser=grid_from_text, metavar="N|RxC", help="Grid of views: 9 is 9x9.", show_default="chosen by the plan"
+    ),
+]
+FocusDisparity = Annotated[
+    float | None,
+    typer.Option(
+        parser=number_from_text,
+        metavar="X",
+        help="Disparity, as given, of the plane that stays still.",
+    ),
+]
+LiteralDisparity = Annotated[
+    bool,
+    typer.Option("--literal", help="Take disparity as given, in px per view step; the plan does not scale it."),
+]
+DepthModel = Annotated[
+    str | None,
+    typer.Option(
+        metavar="FOLDER|FILE.onnx|NAME",
+        help="Depth model for photos without depth, see `iibr models`.",
+        show_default="the recommended one, if it is there",
+    ),
+]
+Refine = Annotated[Literal["on", "off"], typer.Option(help="Move edges of the disparity to edges of the photo.")]
+MaxPixels = Annotated[
+    int | None,
+    typer.Option(min=1, metavar="N", help="Reduce larger photos to this number of pixels.", show_default="2000000"),
+]
+
+
+@dataclass(frozen=True)
+class DepthOptions:
+    """Options of commands that find the depth of photos."""
+
+    depth: Annotated[
+        DepthStart,
+        typer.Option(help="First source of depth: a map's file (auto), the photo's own, a model, a guess, or none."),
+    ] = "auto"
+    depth_model: DepthModel = None
+    refine: Refine = "on"
+    invert_depth: Annotated[bool, typer.Option("--invert-depth", help="Swap near and far.")] = False
+    metric: Annotated[bool, typer.Option("--metric", help="The map or the model gives distances.")] = False
+    stretch: Annotated[bool, typer.Option("--stretch", help="Stretch a map of another shape to the photo.")] = False
+
+    @property
+    def choice(self) -> DepthChoice:
+        """Return the same for the core. Raises InputError if the options contradict each other."""
+        if self.depth_model is not None and self.depth not in ("auto", "model"):
+            raise InputError(f"--depth {self.depth} asks no model: leave out --depth-model")
+        return DepthChoice(
+            self.depth if self.depth_model is None else "model",
+            inverts=self.invert_depth,
+            is_metric=self.metric,
+            stretches=self.stretch,
+            model=self.depth_model,
+            refine=self.refine == "on",
+        )
+
+
+@dataclass(frozen=True)
+class PhotoOptions(DepthOptions):
+    """Options of commands that make views of photos."""
+
+    depth_strength: Annotated[float, typer.Option(metavar="X", help="Multiply the parallax that the plan chose.")] = 1.0
+    max_pixels: MaxPixels = None
+    inpaint: Annotated[
+        str,
+        typer.Option(
+            parser=inpainter_from_text,
+            metavar="|".join(INPAINTER_FORMS),
+            help="Method that fills areas which the photo does not show.",
+        ),
+    ] = DEFAULT_INPAINTER
+
+    def source(
+        self, path: Path | str, grid: GridShape | None, focus_disparity: float | None = None, is_literal: bool = False
+    ) -> Source:
+        """Return the source to open. Raises InputError if the options contradict each other."""
+        if is_literal and grid is None:
+            raise InputError("--literal takes disparity in px per view step: give the number of views with --grid")
+        if is_literal and (focus_disparity is not None or self.depth_strength != 1):
+            raise InputError("--literal takes disparity as given: leave out --depth-strength and --focus-disparity")
+        return Source(str(path), self.choice, grid, focus_disparity, self.max_pixels, self.inpaint, is_literal)
+
+
+@dataclass(frozen=True)
+class SceneOptions(PhotoOptions):
+    """Options of commands that open one photo or light field."""
+
+    disparity: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="Depth map. PFM, EXR, NPY: disparity in px per view step. PNG, JPEG, WebP: white is near, unless the"
+            " photo shows otherwise.",
+            show_default=False,
+        ),
+    ] = None
+    disparity_scale: Annotated[
+        float | None,
+        typer.Option(metavar="X", help="Factor from the map's values to px per view step; -1: black is near."),
+    ] = None
+
+    @property
+    def choice(self) -> DepthChoice:
+        """See `DepthOptions.choice`."""
+        if self.disparity is not None and (self.depth != "auto" or self.depth_model is not None):
+            raise InputError("--disparity gives the depth: leave out --depth and --depth-model")
+        file = None if self.disparity is None else str(self.disparity)
+        return replace(super().choice, file=file, file_scale=self.disparity_scale)
+
+
+NOT_FOR_LIGHT_FIELDS = {field.name for field in fields(PhotoOptions)} | {"focus_disparity", "grid"}
+"""Options about how views are made: a light field brings its views. The disparity of its centre view may be given."""
+
+
+def given_options(context: typer.Context) -> set[str]:
+    """Return the names of the options that were given, not left at their defaults."""
+    sources = {name: context.get_parameter_source(name) for name in context.params}
+    return {name for name, source in sources.items() if source is not None and source.name != "DEFAULT"}
+
+
+def words_of_options(context: typer.Context, names: Set[str]) -> str:
+    """Return options as they are typed: "--grid and --stretch"."""
+    return " and ".join(option.opts[0] for option in context.command.params if option.name in names)
+
+
+def require_heeded(context: typer.Context, path: Path, unheeded: Set[str] = NOT_FOR_LIGHT_FIELDS) -> None:
+    """Raise InputError if options were given that a light field at `path` would ignore."""
+    given = given_options(context)
+    ignored = given & (unheeded if "disparity" in given else unheeded | {"disparity_scale"})
+    if ignored and is_light_field(path):
+        options = words_of_options(context, ignored)
+        raise InputError(f"{options}: {path} is a light field, whose views are taken as they are; leave it out")
+
+
+def require_source(source: Source) -> None:
+    """Raise InputError if a file that is opened does not exist, or a model that is asked for cannot be used."""
+    for path in (source.path, source.depth.file):
+        if path is not None and not Path(path).exists():
+            raise InputError(f"{path}: no such file")
+    require_model(source.depth)
+
+
+def require_model(choice: DepthChoice) -> None:
+    """Raise InputError if a depth model is asked for that cannot be used."""
+    if choice.asks_for_model:
+        from iibr_core.depth.models.catalog import model_to_use
+
+        model_to_use(choice)
+
+
+def inputs_of_command(context: typer.Context, source: Source | None = None) -> tuple[Path, ...]:
+    """Return what a command reads and must not overwrite: every path except its output, and the inputs of a source."""
+    values = [value for name, value in context.params.items() if name != "output"]
+    named = [path for value in values for path in (value if isinstance(value, list) else [value])]
+    return (*(path for path in named if isinstance(path, Path)), *(() if source is None else inputs_of(source)))

@@ -1,0 +1,48 @@
+"""Messages of commands on stderr: a progress bar during work, notes after success. An error stays the only line."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from iibr_core.depth.choice import DepthOrigin
+from iibr_core.runtime.compiling import watch_compiling
+from iibr_core.runtime.time_left import TimeLeft, about_left
+from iibr_core.runtime.work import watched
+from viewer.cli.remedies import BETTER_DEPTH
+
+
+def print_notes(notes: tuple[str, ...], origin: DepthOrigin | None = None) -> None:
+    """Print a line for each note and one for the origin of depth, after the results on stdout."""
+    if origin is not None:
+        notes += (f"{origin.line} {BETTER_DEPTH}" if origin.is_poor else origin.line,)
+    sys.stdout.flush()
+    for note in notes:
+        print(f"note: {note}", file=sys.stderr)
+
+
+@contextmanager
+def show_progress(doing: str, counts: bool = False) -> Iterator[None]:
+    """Show the progress that the block reports, see `report_progress`, as a bar. counts: with numbers."""
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TaskProgressColumn
+
+    console = Console(stderr=True)
+    if not console.is_terminal:  # a bar would leave empty lines
+        yield
+        return
+    columns = ("{task.description}", BarColumn(), TaskProgressColumn(), "{task.fields[details]}")
+    time_left = TimeLeft()
+    with Progress(*columns, console=console, transient=True) as bar:
+        task = bar.add_task(doing, total=None, details="")
+
+        def show(done: float, total: float, now: str = "") -> None:
+            left_s = time_left.update(done, total, now)
+            numbers = f"{done:.0f} of {total:.0f}" if counts and total else ""
+            details = ", ".join(filter(None, (numbers, about_left(left_s) if left_s else "")))
+            length = 1.0 if total else None
+            bar.update(task, completed=time_left.share, total=length, description=now or doing, details=details)
+
+        with watch_compiling(lambda message: show(0, 0, message)), watched(show):
+            yield

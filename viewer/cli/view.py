@@ -1,0 +1,56 @@
+"""`iibr`, `iibr view` and `iibr demo`: the window."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from iibr_core.scenes.scene import Source
+from viewer.app.preferences_store import last_opened, user_folder
+from viewer.cli.option_records import with_option_records
+from viewer.cli.options import SCENE_HELP, FocusDisparity, Grid, SceneOptions, require_heeded, require_source
+from viewer.model.demo_photo import demo_photo
+from viewer.model.state.app_state import AppState
+
+
+@with_option_records
+def view(
+    context: typer.Context,
+    path: Annotated[Path | None, typer.Argument(help=SCENE_HELP, show_default="the demo photo")] = None,
+    *,
+    scene: SceneOptions,
+    focus_disparity: FocusDisparity = None,
+    grid: Grid = None,
+) -> None:
+    """Open the viewer.
+
+    Example: iibr view holiday.jpg --disparity holiday.pfm
+    """
+    path = path.absolute() if path else demo_photo()
+    source = scene.source(path, grid, focus_disparity)
+    require_heeded(context, path)
+    require_source(source)
+    open_window(source, scene.depth_strength)
+
+
+def demo() -> None:
+    """Open the viewer on the demo photo.
+
+    Example: iibr demo
+    """
+    open_window(Source(str(demo_photo())))
+
+
+def open_last_scene() -> None:
+    """Open the window on the last scene if it still exists. Raises InputError if no window can be opened."""
+    last = last_opened(user_folder())
+    open_window(None if last is None else Source(last))
+
+
+def open_window(source: Source | None, depth_strength: float = 1.0) -> None:
+    """Run the window until it is closed. Raises InputError if it cannot be opened."""
+    from viewer.app.main_loop import initial_state, run
+
+    run(AppState() if source is None else initial_state(source, depth_strength), user_folder())
