@@ -6,12 +6,11 @@ from pathlib import Path
 
 from iibr_core.color import stored_from_encoded
 from iibr_core.depth.estimate import DepthEstimate
-from iibr_core.depth.multi_view.estimate import estimate_coarse, estimate_disparity, sweep_bytes
+from iibr_core.depth.multi_view.estimate import estimate_coarse, estimate_disparity
 from iibr_core.depth.multi_view.matching import FINDING
 from iibr_core.formats.images.photo import read_picture
 from iibr_core.formats.images.side_by_side import left_picture
 from iibr_core.formats.light_fields.view_files import read_stereo_file
-from iibr_core.runtime.machine import free_memory_bytes
 from iibr_core.runtime.work import report_progress
 from iibr_core.types import InputError, image_size
 
@@ -23,7 +22,7 @@ def estimate_from_pair(path: Path) -> tuple[DepthEstimate, str] | None:
     """Return the disparity of the picture that a stereo photo shows, in px from eye to eye, and the kind of file.
 
     None if the file is no stereo photo or shows another picture than these two. Raises InputError if it is damaged,
-    its views differ in size or are too small, or memory does not suffice.
+    or its views differ in size or are too small.
     """
     scene, shown = read_stereo_file(path), left_picture(path)
     pictures = [view.picture for view in scene.views] if scene is not None else []
@@ -36,6 +35,4 @@ def estimate_from_pair(path: Path) -> tuple[DepthEstimate, str] | None:
         raise InputError(f"{path}: its two views differ in shape ({sizes} after reading)")
     offsets, reference = [view.offset for view in scene.views], pictures.index(shown)
     coarse = estimate_coarse(views, offsets, reference)
-    if sweep_bytes(image_size(coarse.values), coarse.range_px, reach=1.0) > free_memory_bytes():
-        raise InputError(f"{path}: matching its two views takes more memory than there is")
     return DepthEstimate(estimate_disparity(views, offsets, reference, coarse.range_px), "disparity"), scene.layout

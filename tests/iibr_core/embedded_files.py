@@ -112,7 +112,7 @@ def dynamic_depth_jpeg(
         ("1.0/container/", "1.0/container/item/") if shared_container else ("dd/1.0/container/", "dd/1.0/item/")
     )
     entries = [
-        ("image/jpeg", "Primary", 0, "primary"),
+        ("image/jpeg", "Primary", len(photo) if shared_container else 0, "primary"),
         ("image/png", "Depth", length or len(depth), "android/depthmap"),
     ]
     if before:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from iibr_core.beyond.aperture_sampling import aperture_points, fractions, open_area
+from iibr_core.beyond.aperture_sampling import aperture_points, open_area
 from iibr_core.beyond.optics import ApertureMask, ApertureShape
 
 CROSS = ApertureShape("mask", mask=ApertureMask("cross", 3, 3, bytes([0, 255, 0, 255, 255, 255, 0, 255, 0])))
@@ -87,13 +87,3 @@ def test_cameras_lie_all_over_the_opening(count: int) -> None:
     """Cameras of one pass, and of all; random ones would leave gaps of 1.7."""
     assert max(gap(aperture_points(DISC, 2.0, UNLIMITED, count, k)) for k in range(8)) < 1.15
     assert gap(union(DISC, 2.0, count, 12)) < 2.0
-
-
-def test_sequences_are_even_and_go_on_from_any_number() -> None:
-    steps = (0.41421356237309515, 0.7320508075688772)
-    whole = fractions(0, 64, steps)
-    assert np.array_equal(whole[0], [0.5, 0.5])
-    assert fractions(20, 5, steps) == pytest.approx(whole[20:25])
-    counts, _, _ = np.histogram2d(*whole.T, bins=4, range=[[0, 1]] * 2)
-    assert counts.min() >= 2
-    assert counts.max() <= 7

@@ -52,21 +52,6 @@ def test_views_between_are_better_than_from_the_centre_alone_and_given_ones_come
     assert np.mean(gains) > 3
 
 
-def test_what_only_views_a_whole_step_away_see_is_not_inpainted():
-    """A slit in a panel that hides what lies behind it from views beside; those below see some of it, past its end."""
-    wall, given = bytes_from_encoded(smooth_texture(48, 80)), []
-    for row, column in np.ndindex(2, 2):
-        y, x = np.mgrid[:48, :80]
-        panel_y, panel_x = y + 8 * row, x + 8 * (column - 0.5)
-        is_panel = (panel_x >= 20) & (panel_x < 60) & (panel_y < 40) & ~((panel_x >= 38) & (panel_x < 42))
-        colors = np.where(is_panel[..., None], np.uint8([200, 30, 30]), wall)
-        given.append(GivenView(row, column, colors, np.where(is_panel, np.float32(8), np.float32(0))))
-    between = by_index(list(densify(given, GridShape(2, 2), GridShape(3, 3))))[0, 1]
-    assert between.inpainted[10:28, 39:41].all()
-    assert not between.inpainted[34:39, 39:41].any()
-    assert np.abs(between.colors[34:39, 39:41].astype(int) - wall[34:39, 39:41]).max() < 12
-
-
 def test_what_no_given_view_shows_is_inpainted_once_and_shared():
     # A panel before a wall, with a slit through which every view sees another part of the wall.
     wall = bytes_from_encoded(smooth_texture(40, 64))

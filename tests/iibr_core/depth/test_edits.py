@@ -23,7 +23,7 @@ shares = st.floats(0, 1)
 tones = st.builds(
     lambda inverted, clips, gamma: DepthEdits(inverted, min(clips), max(clips), gamma),
     st.booleans(),
-    st.tuples(shares, shares),
+    st.just((0.0, 1.0)) | st.tuples(shares, shares),
     st.floats(0.25, 4),
 )
 

@@ -128,19 +128,3 @@ def test_a_view_that_is_all_hole_stays_and_stays_finite():
     fill_background(colors, disparity, np.ones((5, 6), bool), disparity, ViewOffset(50.0, 50.0))
     assert colors.max() == 0
     assert np.isfinite(disparity).all()
-
-
-def test_holes_get_the_texture_of_what_lies_behind_and_none_where_that_is_smooth():
-    disparity = np.zeros((40, 60), np.float32)
-    photo_disparity = disparity.copy()
-    disparity[:, 20:30] = photo_disparity[:, 30:40] = 10.0
-    hole = np.zeros((40, 60), bool)
-    hole[:, 30:40] = True
-    smooth = np.full((40, 60, 3), 0.4, np.float32)
-    rough = smooth + np.random.default_rng(1).uniform(-0.05, 0.05, smooth.shape).astype(np.float32)
-    rough[:, 20:30] = np.random.default_rng(2).uniform(0, 1, (40, 10, 3))
-    truth = np.abs(np.diff(rough[:, 42:], axis=1)).mean()
-    for colors in (smooth, rough):
-        fill_background(colors, disparity, hole, photo_disparity, ViewOffset(0.0, 1.0))
-    assert smooth[hole] == pytest.approx(0.4, abs=1e-5)
-    assert 0.7 * truth < np.abs(np.diff(rough[:, 31:39], axis=1)).mean() < 1.2 * truth

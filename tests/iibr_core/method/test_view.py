@@ -15,7 +15,7 @@ from iibr_core.method.rays import MIN_STEP_PX, rays_of_photo
 from iibr_core.method.update_loop import update
 from iibr_core.method.view import Renderer
 from iibr_core.surfaces import EDGE_PX
-from iibr_core.types import GridShape, ImageSize, ViewOffset
+from iibr_core.types import GridShape, ImageSize, Margins, ViewOffset
 from tests.iibr_core.method.filled_rays import filled_rays
 from tests.iibr_core.red_inpainter import paint_red
 from tests.iibr_core.scenes import smooth_texture
@@ -30,14 +30,21 @@ def mixed(share):
     return srgb_from_linear(share * linear_from_srgb(FOREGROUND) + (1 - share) * linear_from_srgb(WALL))
 
 
-def bar(share):
-    """Return the rays of a plain bar before a plain wall; it covers `share` of the column beside it on either side."""
+def bar_photo(share):
+    """Return colours and disparity of a plain bar before a plain wall.
+
+    It covers `share` of the column beside it on either side.
+    """
     colors = np.tile(WALL, (HEIGHT, WIDTH, 1))
     colors[:, FIRST:LAST] = FOREGROUND
     colors[:, [FIRST - 1, LAST]] = mixed(share)
     disparity = np.zeros((HEIGHT, WIDTH), np.float32)
     disparity[:, FIRST:LAST] = 6.0
-    return rays_of_photo(colors, disparity, 1.0, 2)
+    return colors, disparity
+
+
+def bar(share):
+    return rays_of_photo(*bar_photo(share), 1.0, 2)
 
 
 @pytest.mark.parametrize("share", [0.15, 0.3, 0.45, 0.55])
@@ -62,6 +69,15 @@ def test_what_is_inpainted_shows_beside_the_edge_and_joins_without_what_comes_ov
     light = 0.3 * linear_from_srgb(FOREGROUND) + 0.7 * linear_from_srgb(np.float32([1, 0, 0]))
     assert view.colors[HEIGHT // 2, LAST - 6] == pytest.approx(srgb_from_linear(light), abs=5e-3)
     assert (rays.arrays.colors[-1][rays.arrays.coverage[-1] > 0] == (1, 0, 0)).all()
+
+
+@pytest.mark.parametrize("is_upright", [True, False])
+def test_both_margins_alike_continue_edges_beyond_the_frame(is_upright):
+    turned = [part if is_upright else np.ascontiguousarray(part.swapaxes(0, 1)) for part in bar_photo(0.3)]
+    rays = rays_of_photo(*turned, 1.0, 2, margins=Margins(8, 8, 0, 0) if is_upright else Margins(0, 0, 8, 8))
+    offsets = [ViewOffset(along, 1.0) if is_upright else ViewOffset(1.0, along) for along in (-1.0, 1.0)]
+    one, other = (Renderer().render(rays, offset).colors for offset in offsets)
+    assert np.flip(other, 0 if is_upright else 1) == pytest.approx(one, abs=0.2), "but for what is inpainted"
 
 
 GRID, FARTHEST = GridShape(5, 5), 2.0

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from iibr_core.training.scenes.primitives import BOX, PLANE, PRIMITIVE, WIRE
-from iibr_core.training.scenes.random_scene import RaycastScene, cast, disparity_at, random_scene, render, sample_places
+from iibr_core.training.scenes.random_scene import RaycastScene, cast, disparity_at, random_scene, render
 from iibr_core.types import ImageSize, ViewOffset
 
 CENTRE = ViewOffset(0.0, 0.0)
@@ -109,21 +109,6 @@ def test_the_disparity_does_not_depend_on_samples_or_blur():
     exact = render(scene, SIZE, offset, samples=1)[1]
     for samples, blur_px in ((2, 0.0), (3, 0.5), (4, 0.0)):
         assert (render(scene, SIZE, offset, samples, blur_px)[1] == exact).all()
-
-
-@pytest.mark.parametrize("samples", [1, 2, 3, 4])
-def test_samples_differ_in_rows_and_columns_and_are_centred(samples):
-    places, weights = sample_places(samples)
-    used = places[weights > 0]
-    assert weights.sum() == pytest.approx(1)
-    assert (places[0] == 0).all()
-    assert len(used) == samples**2
-    for axis in (0, 1):
-        assert len(np.unique(used[:, axis].round(9))) == samples**2
-        assert weights @ places[:, axis] == pytest.approx(0, abs=1e-12)
-    assert np.abs(used).max() < 0.5
-    wide, weights = sample_places(samples, blur_px=0.5)
-    assert samples == 1 or (weights @ wide**2 > 2 * (weights @ places**2)).all()
 
 
 @pytest.mark.parametrize("size", [(1, 1), (1, 17), (31, 37)])
