@@ -149,7 +149,7 @@ class Layout:
         return Zoom(self.scale, ((x - at.x) / at.width, (y - at.y) / at.height))
 
     def _zoom_to(self, scale: float, left: float, top: float, larger: float) -> Zoom:
-        """Return the zoom with the picture's corner at (left, top), and `larger` times as large as it is."""
+        """Return the zoom with the picture's corner at (left, top), enlarged by a factor."""
         assert self.picture is not None
         room = self.room or self.picture
         x = (room.x + room.width / 2 - left) / (self.picture.width * larger)

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from iibr_core.depth.choice import DepthOrigin
 from iibr_core.scenes.rect import Rect
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import HEIGHT, WIDTH, headless_with_scene
@@ -101,11 +102,16 @@ def test_overlays_cover_the_picture_as_much_as_they_are_opaque(viewer: Offscreen
         assert differs.mean() < 0.3, "only what the photo does not show"
 
 
-def test_the_legend_marks_the_value_under_the_pointer(viewer: OffscreenScene) -> None:
+@pytest.mark.parametrize(("is_guessed", "rows"), [(False, np.s_[:40]), (True, np.s_[36:76])])
+def test_the_legend_marks_the_value_under_the_pointer_below_the_badge_of_guessed_depth(
+    viewer: OffscreenScene, is_guessed: bool, rows: slice
+) -> None:
     viewer.do(do(inspection.set_overlay, "disparity"), do(inspection.set_hover, HOVER))
+    origin = DepthOrigin("rough", "guessed") if is_guessed else None
+    viewer.state = replace(viewer.state, scene=replace(viewer.scene, depth_origin=origin))
     changed = changed_after(viewer, do(inspection.set_hover, replace(HOVER, disparity=-0.5)))
-    legend = part(changed, layout_now(viewer).picture)[:40, :180]
-    assert 10 < legend.sum() < 800
+    legend = part(changed, layout_now(viewer).picture)[:80, :180]
+    assert 10 < legend[rows].sum() == legend.sum() < 800
 
 
 def test_photo_and_result_on_the_two_sides_of_the_divider(viewer: OffscreenScene) -> None:

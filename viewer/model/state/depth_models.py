@@ -9,8 +9,8 @@ from iibr_core.beyond.optics import Optics
 
 @dataclass(frozen=True)
 class ModelOffer:
-    """A known depth model. host: source of its download. words: one line about it. is_here: whether it is on
-    this machine. lacks: end of a sentence that names what is missing to run it, "" where nothing is.
+    """A known depth model. host: source of its download. words: one line about it. is_here: whether it is on this
+    machine. lacks: end of a sentence that names a missing package, "" where none is missing.
     """
 
     name: str
