@@ -7,14 +7,9 @@ from pathlib import Path
 import pytest
 
 from iibr_core.beyond.optics import Optics
-from iibr_core.formats.light_fields.write import write_light_field
-from iibr_core.method.light_field import generate
-from iibr_core.method.plan import plan_literal
-from iibr_core.scenes.photo import load_photo
-from iibr_core.scenes.scene import Source
 from iibr_core.types import GridShape, ViewOffset
-from tests.viewer.conftest import Driver, Opener, write_scene
-from viewer.model import inspection, lens, opening, preferences
+from tests.viewer.conftest import Driver, Opener
+from viewer.model import inspection, lens, preferences
 from viewer.model.action import do
 from viewer.model.inspection import sheet_cells
 
@@ -91,7 +86,7 @@ def test_the_divider_is_dragged_and_the_viewpoint_stays(viewer: Driver) -> None:
 def test_buttons_of_the_section_and_the_values_under_the_pointer(viewer: Driver) -> None:
     viewer.app.do(
         *(do(preferences.toggle_section, section) for section in ("view", "focus", "aperture", "light", "inspect"))
-    )  # type: ignore[arg-type]
+    )
     viewer.until_idle()
     viewer.press("Values")
     viewer.until(lambda app: app.layout().status is not None)
@@ -110,24 +105,6 @@ def test_buttons_of_the_section_and_the_values_under_the_pointer(viewer: Driver)
     assert probe.origin == "photo"
     viewer.send("mousemove", round(viewer.app.layout().panel.x + 30), 500)
     viewer.until(lambda app: app.state.inspection.probe is None)
-
-
-def test_a_light_field_from_disk_has_epis_but_no_inpainting(
-    open_window: Opener, photo_path: Path, tmp_path: Path
-) -> None:
-    loaded = load_photo(Source(str(photo_path)))
-    plan = plan_literal(loaded.photo, loaded.disparity, GRID)
-    views = generate(loaded.photo, plan.field_disparity(loaded.disparity), plan)
-    write_light_field(tmp_path / "field", "hci", GRID, views, 100.0, "field")
-    driver = open_window(tmp_path / "field")
-    driver.until_idle()
-    app = driver.app
-    app.do(do(inspection.show_epis, True), do(inspection.set_overlay, "inpainted"))
-    assert app.state.inspection.overlay is None
-    assert "from disk" in app.state.notices[-1].text
-    app.do(do(opening.open_source, Source(str(write_scene(tmp_path, "other", seed=3)))))
-    driver.until(lambda app: app.state.scene is not None and app.state.scene.name == "other")
-    assert app.state.inspection.shows_epis
 
 
 def test_a_snapshot_is_drawn_over_several_turns(viewer: Driver) -> None:
