@@ -64,6 +64,7 @@ def test_there_are_few_controls_at_the_first_start(
     first.screen(WINDOW)
     assert any("section More" in words for words in controls)
     assert len(controls) <= MAX_CONTROLS, controls
+    assert {"Undo", "Redo", "Mouse and keys"} <= {words.partition("##")[2] for words in controls}
     assert ("Cancel" in controls) is is_working
 
 
