@@ -72,7 +72,7 @@ def test_dragging_the_light_finds_nothing_out_anew(viewer: Driver) -> None:
 
 def test_the_brush_marks_what_it_runs_over_and_esc_puts_it_away(viewer: Driver) -> None:
     make_glossy(viewer)
-    viewer.press("Only what is painted")
+    viewer.press("Only brush strokes")
     viewer.press("Mark")
     viewer.until_idle()
     eye = viewer.app.state.optics.eye

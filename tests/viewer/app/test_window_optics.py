@@ -1,15 +1,15 @@
-"""The optics in a real window: pad, loops, tilt handles, aperture shapes, presets, undo; and what each edit costs."""
+"""The lens in a real window: viewpoint, clicks, tilt handles, racks, presets and undo; and what each edit costs."""
 
 from __future__ import annotations
 
-import dataclasses
-
 import pytest
+from imgui_bundle import imgui
 
 from iibr_core.beyond.optics import ApertureShape, Optics
 from iibr_core.gloss.settings import Gloss
-from iibr_core.types import GridShape, ViewOffset
+from iibr_core.types import ViewOffset
 from tests.viewer.conftest import FAR, NEAR, Driver
+from viewer.app.main_loop import App
 from viewer.model import lens, messages, preferences
 from viewer.model.action import Action, do
 from viewer.model.focal_plane import handle_points, sharp_disparity
@@ -17,63 +17,59 @@ from viewer.model.state.lens import TiltHandles
 from viewer.model.state.notices import Notice
 
 
-@pytest.fixture
-def grid() -> GridShape:
-    return GridShape(5, 5)
+def field_disparity(app: App, given: float) -> float:
+    assert app.state.scene is not None
+    plan = app.state.scene.plan
+    assert plan is not None
+    return (given - plan.disparity_zero) * plan.disparity_scale
 
 
-def test_the_pad_moves_the_viewpoint_as_far_as_there_are_views(viewer: Driver) -> None:
+def test_pad_loop_and_double_click_move_the_viewpoint(viewer: Driver) -> None:
+    app, io = viewer.app, imgui.get_io()
+    # a busy machine may draw for longer than the usual 0.3 s between the two clicks
+    io.mouse_double_click_time, io.mouse_single_click_delay = 60.0, 61.0
     x, y = viewer.find("pad")
-    for step in (-200, 200):
+    for step, end in ((-200, -1.0), (200, 1.0)):
         viewer.send("mousemove", x, y, "mousedown", 1)
         viewer.send("mousemove", x + step, y)
-        end = 2.0 if step > 0 else -2.0
         viewer.until(lambda app, end=end: app.state.optics.eye.s == end)  # type: ignore[misc]
         viewer.send("mouseup", 1)
         viewer.until_idle()
-    assert len(viewer.app.state.history.past) == 2
-
-
-def test_a_loop_draws_while_it_runs_and_nothing_while_it_rests(viewer: Driver) -> None:
-    app = viewer.app
+    assert len(app.state.history.past) == 2
     viewer.press("Circle")
     drawn = app.scene_view.pictures_drawn
     viewer.until(lambda app: app.scene_view.pictures_drawn >= drawn + 5)
-    assert app.state.motion.is_running
-    assert len({app.state.optics.eye, ViewOffset(0, 0)}) == 2
     viewer.send("key", "space")
     viewer.until(lambda app: app.state.motion.is_paused)
     viewer.until_idle()
-    shown, drawn, eye = app.frames_shown, app.scene_view.pictures_drawn, app.state.optics.eye
-    for _ in range(3):
-        app.step()
-    assert (app.frames_shown, app.scene_view.pictures_drawn, app.state.optics.eye) == (shown, drawn, eye)
+    drawn, eye = app.scene_view.pictures_drawn, app.state.optics.eye
+    app.step()
+    assert (app.scene_view.pictures_drawn, app.state.optics.eye) == (drawn, eye), "nothing moves in a pause"
     viewer.press("Circle")
     viewer.until(lambda app: app.state.motion.kind is None)
-
-
-def test_a_double_click_glides_home_and_keeps_focus_and_aperture(viewer: Driver) -> None:
-    from imgui_bundle import imgui
-
-    io = imgui.get_io()  # a busy machine may draw for longer than the usual 0.3 s between the two clicks
-    io.mouse_double_click_time, io.mouse_single_click_delay = 60.0, 61.0
-    viewer.slide("##Aperture", 0.5)
-    viewer.send("mousemove", *viewer.position(0.5, 0.5), "click", 1)
-    viewer.until(lambda app: app.state.optics.focus_disparity != 0)
-    kept = viewer.app.state.optics
-    viewer.until_idle()
-    viewer.send("key", "Right", "key", "Right")
-    viewer.until(lambda app: app.state.optics.eye == ViewOffset(0, 1))
+    kept = app.state.optics
     viewer.send("mousemove", *viewer.position(0.1, 0.1), "click", "--repeat", 2, "--delay", 40, 1)
     viewer.until(lambda app: app.state.optics.eye == ViewOffset(0, 0))
     viewer.until_idle()
-    assert viewer.app.state.optics == kept
+    assert app.state.optics.focus_disparity == kept.focus_disparity, "the first click is taken back"
+
+
+def test_two_clicks_are_racked_between_by_a_key(viewer: Driver) -> None:
+    app = viewer.app
+    near, far = (pytest.approx(field_disparity(app, given), abs=1e-3) for given in (NEAR, FAR))
+    for place, wanted in (((0.5, 0.5), near), ((0.15, 0.15), far)):
+        viewer.send("mousemove", *viewer.position(*place))
+        viewer.until(lambda app, w=wanted: app.state.hover is not None and app.state.hover.disparity == w)  # type: ignore[misc]
+        viewer.send("click", 1)
+        viewer.until(lambda app, w=wanted: app.state.optics.focus_disparity == w)  # type: ignore[misc]
+        viewer.until_idle()
+    viewer.send("key", "x")
+    viewer.until(lambda app: app.state.motion.kind == "rack" and app.state.optics.focus_disparity == near)
+    viewer.until(lambda app: app.state.motion.kind is None)
+    assert app.state.optics.focus_disparity == far
 
 
 def test_a_tilt_handle_is_dragged_onto_what_shall_be_sharp(viewer: Driver) -> None:
-    scene = viewer.app.state.scene
-    assert scene is not None
-    assert scene.plan is not None
     viewer.send("key", "t")
     viewer.until(lambda app: app.state.tilt_handles is not None)
     picture = viewer.app.layout().picture
@@ -82,60 +78,34 @@ def test_a_tilt_handle_is_dragged_onto_what_shall_be_sharp(viewer: Driver) -> No
     viewer.send("mousemove", round(x), round(y), "mousedown", 1)
     viewer.send("mousemove", round(x) + 20, round(y))
     viewer.send("mousemove", *viewer.position(0.5, 0.5))
-    near = (NEAR - scene.plan.disparity_zero) * scene.plan.disparity_scale
+    near = field_disparity(viewer.app, NEAR)
     viewer.until(lambda app: sharp_disparity(app.state.optics, (0, 0)) == pytest.approx(near, abs=1e-3))
     viewer.send("mouseup", 1)
     viewer.until_idle()
-    state = viewer.app.state
-    assert state.optics.eye == ViewOffset(0, 0)
-    assert any(state.optics.focus_tilt)
-    assert sharp_disparity(state.optics, TiltHandles().second) == pytest.approx(0, abs=1e-3), "the other one held"
+    optics = viewer.app.state.optics
+    assert optics.eye == ViewOffset(0, 0)
+    assert sharp_disparity(optics, TiltHandles().second) == pytest.approx(0, abs=1e-3), "the other one held"
+    viewer.send("key", "Escape")
+    viewer.until(lambda app: app.state.tilt_handles is None)
     viewer.send("key", "ctrl+z")
     viewer.until(lambda app: app.state.optics == Optics())
 
 
-def test_the_aperture_takes_the_shape_that_was_chosen(viewer: Driver) -> None:
+def test_presets_undo_and_shapes_by_button_and_key(viewer: Driver) -> None:
+    viewer.press("Macro")
+    viewer.until(lambda app: app.state.optics.aperture_diameter == 3)
+    viewer.press("Portrait")
+    viewer.until(lambda app: app.state.optics.focus_range > 0)
+    viewer.send("key", "ctrl+z")
+    viewer.until(lambda app: app.state.optics.focus_range == 0)
+    viewer.send("key", "ctrl+shift+z")
+    viewer.until(lambda app: app.state.optics.focus_range > 0)
     viewer.slide("##Aperture", 0.9)
     viewer.press("##polygon")
     viewer.slide("##Blades", 0.0)
     viewer.slide("##Rotation", 0.5)
     shape = viewer.app.state.optics.aperture_shape
-    assert (shape.kind, shape.blades) == ("polygon", 3)
-    assert 100 < shape.rotation_deg < 260
-    viewer.press("##ring")
-    viewer.slide("##Blocked", 0.5)
-    assert viewer.app.state.optics.aperture_shape.kind == "ring"
-
-
-def test_presets_and_undo_by_button_and_key(viewer: Driver) -> None:
-    viewer.press("Macro")
-    viewer.until(lambda app: app.state.optics.aperture_diameter == 5)
-    viewer.press("Portrait")
-    viewer.until(lambda app: app.state.optics.focus_range > 0)
-    viewer.send("key", "ctrl+z")
-    viewer.until(lambda app: app.state.optics.aperture_diameter == 5)
-    viewer.send("key", "ctrl+z")
-    viewer.until(lambda app: app.state.optics == Optics())
-    viewer.send("key", "ctrl+shift+z")
-    viewer.until(lambda app: app.state.optics.aperture_diameter == 5)
-
-
-def test_the_reticle_follows_the_pointer_and_costs_no_picture(viewer: Driver) -> None:
-    app = viewer.app
-    scene = app.state.scene
-    assert scene is not None
-    assert scene.plan is not None
-    drawn = app.scene_view.pictures_drawn
-    for place, given in (((0.5, 0.5), NEAR), ((0.15, 0.15), FAR)):
-        wanted = pytest.approx((given - scene.plan.disparity_zero) * scene.plan.disparity_scale, abs=1e-3)
-        shown = app.frames_shown
-        viewer.send("mousemove", *viewer.position(*place))
-        viewer.until(lambda app, w=wanted: app.state.hover is not None and app.state.hover.disparity == w)  # type: ignore[misc]
-        viewer.until_idle()
-        assert app.frames_shown > shown
-    viewer.send("mousemove", round(app.layout().panel.x + 20), 300)
-    viewer.until(lambda app: app.state.hover is None)
-    assert app.scene_view.pictures_drawn == drawn
+    assert (shape.kind, shape.blades, 100 < shape.rotation_deg < 260) == ("polygon", 3, True)
 
 
 DRAWS = (
@@ -153,7 +123,6 @@ ONLY_PANELS = (
     do(messages.notify, Notice("hello")),
     do(messages.show_prompt, "help"),
     do(preferences.set_theme, "light"),
-    do(lens.show_tilt_handles, False),
 )
 
 
@@ -162,29 +131,25 @@ def test_what_each_edit_rebuilds(viewer: Driver, monkeypatch: pytest.MonkeyPatch
     app = viewer.app
     uploads = count_calls(monkeypatch, app.scene_view.renderer, "upload_view")
 
-    def cost_of(action: Action) -> tuple[bool, bool, bool, bool]:
+    def cost_of(action: Action) -> tuple[bool, ...]:
         before = app.scene_view.pictures_drawn, app.frames_shown, len(uploads), app.scene_view.generation
         app.do(action)
         viewer.until(lambda app: app.scene_view.generation == app.state.generation)
         viewer.until_idle()
         after = app.scene_view.pictures_drawn, app.frames_shown, len(uploads), app.scene_view.generation
-        drawn, shown, uploaded, generation = (a != b for a, b in zip(before, after))
-        return drawn, shown, uploaded, generation
+        return tuple(a != b for a, b in zip(before, after))
 
     for action in DRAWS:
         assert cost_of(action) == (True, True, False, False), action
+    assert cost_of(DRAWS[-1]) == (False, False, False, False), "the same again"
     for action in ONLY_PANELS:
         assert cost_of(action) == (False, True, False, False), action
-    assert cost_of(DRAWS[-1]) == (False, False, False, False), "the same again"
-    assert cost_of(do(lens.set_depth_strength, 2.0, is_finished=False)) == (False, True, False, False), (
-        "its slider moves"
-    )
+    assert cost_of(do(lens.set_depth_strength, 2.0, is_finished=False)) == (False, True, False, False)
     assert cost_of(do(lens.set_depth_strength, 2.0, is_finished=True)) == (True, True, True, True)
-    assert cost_of(do(preferences.set_font_scale, 1.3))[2:] == (False, False)
 
 
 def count_calls(monkeypatch: pytest.MonkeyPatch, owner: object, name: str) -> list[object]:
-    """A list that grows with every call of this method, which still does what it did."""
+    """Return a list that grows with every call of a method."""
     calls: list[object] = []
     original = getattr(owner, name)
 
@@ -194,19 +159,3 @@ def count_calls(monkeypatch: pytest.MonkeyPatch, owner: object, name: str) -> li
 
     monkeypatch.setattr(owner, name, counted)
     return calls
-
-
-def test_optics_name_every_field_that_an_edit_can_change() -> None:
-    """So that a new field is not forgotten in DRAWS: each edit above changes other fields than the rest."""
-    assert {field.name for field in dataclasses.fields(Optics)} == {
-        "eye",
-        "dolly",
-        "focus_disparity",
-        "focus_range",
-        "focus_tilt",
-        "aperture_diameter",
-        "aperture_shape",
-        "highlight_recovery",
-        "exposure_stops",
-        "gloss",
-    }

@@ -6,12 +6,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from iibr_core.beyond.optics import Optics
 from iibr_core.scenes.scene import Source
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import reduce
 from tests.viewer.model.test_reducers import plan_of, scene_of, state_with
-from viewer.model import gesture, history, lens, opening, viewpoint
+from viewer.model import gesture, history, lens, opening
 from viewer.model.action import Action, do
 from viewer.model.history import MAX_EDITS
 from viewer.model.state.app_state import AppState
@@ -85,85 +84,6 @@ def test_the_history_is_bounded() -> None:
     for i in range(MAX_EDITS + 10):
         state = after(state, do(lens.set_focus, 0.001 * i), do(gesture.end_gesture))
     assert len(state.history.past) == MAX_EDITS
-
-
-def test_a_double_click_takes_back_the_focus_its_first_click_set() -> None:
-    start = after(
-        state_with(scene_of()),
-        do(lens.set_focus, 1),
-        do(gesture.end_gesture),
-        do(lens.move_eye, ViewOffset(1, 2)),
-        do(gesture.end_gesture),
-    )
-    click = do(lens.focus_on, (0.0, 0.0), -1.0)
-    clicked = after(start, click, do(gesture.end_gesture))
-    assert clicked.optics.focus_disparity == -1
-    state = after(
-        clicked,
-        do(viewpoint.return_home, takes_back_click=True),
-        do(viewpoint.tick, 0.0),
-        *(do(viewpoint.tick, 0.05 * i) for i in range(1, 20)),
-    )
-    assert state.optics.eye == ViewOffset(0, 0)
-    assert state.optics.focus_disparity == 1
-    assert not state.motion.is_running
-    undone = reduce(state, do(history.undo))
-    assert undone.optics == start.optics
-
-
-def test_a_double_click_on_what_is_sharp_already_keeps_an_earlier_click() -> None:
-    click = do(lens.focus_on, (0.0, 0.0), -1.0)
-    state = after(
-        state_with(scene_of()),
-        click,
-        do(gesture.end_gesture),
-        click,
-        do(gesture.end_gesture),
-        do(viewpoint.return_home, True),
-    )
-    assert state.optics.focus_disparity == -1
-
-
-def test_going_home_by_its_key_keeps_what_was_clicked_before() -> None:
-    clicked = after(state_with(scene_of()), do(lens.focus_on, (0.0, 0.0), -1.0), do(gesture.end_gesture))
-    home = after(clicked, do(viewpoint.return_home))
-    assert home.optics.focus_disparity == -1
-    assert after(home, do(history.undo), do(history.undo)).optics.focus_disparity == 0
-
-
-def test_reset_takes_all_of_the_lens_back_in_one_step() -> None:
-    edits = (
-        do(lens.set_focus, 1.0),
-        do(lens.set_aperture, 2.0),
-        do(lens.set_focus_range, 0.2),
-        do(lens.show_tilt_handles, True),
-        do(lens.set_focus_tilt, (0.5, -0.25)),
-    )
-    state = after(state_with(scene_of()), *(action for edit in edits for action in (edit, do(gesture.end_gesture))))
-    reset = after(state, do(lens.reset))
-    assert reset.optics == Optics()
-    assert reset.tilt_handles is None
-    assert after(reset, do(history.undo)).optics == state.optics
-
-
-def test_a_preset_without_tilt_has_no_handles() -> None:
-    state = after(
-        state_with(scene_of()),
-        do(lens.show_tilt_handles, True),
-        do(lens.set_focus_tilt, (0.5, 0.0)),
-        do(lens.apply_preset, "macro"),
-    )
-    assert state.optics.focus_tilt == (0.0, 0.0)
-    assert state.tilt_handles is None
-
-
-def test_undo_after_a_loop_returns_to_where_it_began() -> None:
-    start = reduce(state_with(scene_of()), do(lens.move_eye, ViewOffset(1, 1)))
-    state = after(start, do(viewpoint.set_loop, "circle"), *(do(viewpoint.tick, 0.1 * i) for i in range(30)))
-    assert state.optics.eye != start.optics.eye
-    state = reduce(state, do(history.undo))
-    assert state.optics == start.optics
-    assert not state.motion.is_running
 
 
 def test_undoing_depth_strength_makes_the_field_anew() -> None:

@@ -121,7 +121,7 @@ def _reflection(gloss: Gloss, layout: Layout) -> Gloss:
 def _surface(surface: GlossSurface, layout: Layout) -> GlossSurface:
     """Build the controls for depth and colour; return the edited surface."""
     gap(layout, 2)
-    only = checkbox("Only what is painted", surface.strokes_only, layout, ONLY_TIP)
+    only = checkbox("Only brush strokes", surface.strokes_only, layout, ONLY_TIP)
     imgui.begin_disabled(surface.strokes_only)
     far = percent_slider("From far", surface.farthest, layout, FAR_TIP)
     if far is not None:
