@@ -16,6 +16,8 @@ ASSUMED_DISTANCE_M = 2.0
 
 FULL_FRAME_WIDTH_M = 0.036
 EQUIVALENT_FOCAL_M = 0.085
+PROVISIONAL = "f/…"
+"""Text of an f-number while the depth that it follows from is not known yet."""
 FARTHEST_M = 1000.0
 """Distance from which on a surface counts as infinitely far."""
 
@@ -66,7 +68,9 @@ def equivalent_f_number(scene: Scene, aperture_diameter: float) -> float | None:
 
 
 def f_number_text(scene: Scene, aperture_diameter: float) -> str:
-    """Return the aperture as text: "f/2.8", "≈ f/2.8" for an equivalent, "pinhole"."""
+    """Return the aperture as text: "f/2.8", "≈ f/2.8" for an equivalent, "pinhole"; "f/…" while depth is unknown."""
+    if aperture_diameter > 0 and (scene.is_sketch or not scene.has_view_disparity):
+        return PROVISIONAL
     stop = f_number(scene, aperture_diameter)
     if stop is not None:
         return f"f/{stop:.1f}"

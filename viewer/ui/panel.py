@@ -204,7 +204,7 @@ def _more(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
     return _tools(MORE_TOOLS, state, layout) + _recent(state, layout)
 
 
-def _is_final(state: AppState) -> bool:
+def is_final(state: AppState) -> bool:
     """Return whether no further view can change the picture."""
     is_shown = state.shown_generation == state.generation and state.free_progress is None
     return is_shown and state.progress.is_complete
@@ -214,7 +214,7 @@ def _figures(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
     """Build how the views are made and drawn, and what else is known of the scene."""
     quiet(size_text(scene))
     quiet(progress_text(state.progress) or "No views asked for.")
-    quiet("" if state.report is None else report_text(state.report, _is_final(state)))
+    quiet("" if state.report is None else report_text(state.report, is_final(state)))
     scene_section(state, scene, layout)
     return []
 

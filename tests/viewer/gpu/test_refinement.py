@@ -134,3 +134,15 @@ def test_views_too_large_for_the_driver_leave_the_old_field(renderer: Renderer, 
     with pytest.raises(InputError, match=r"px exceed"):
         renderer.open_field(GRID, gl.max_texture_size + 1, 4, hdr=False, with_disparity=False)
     assert np.array_equal(converged(renderer, WIDE), before)
+
+
+@pytest.mark.parametrize("optics", [WIDE, Optics()], ids=("open", "pinhole"))
+def test_a_draft_is_never_reported_as_final(renderer: Renderer, optics: Optics) -> None:
+    """A pinhole needs one sample: the smaller picture of a moment without time has that many, too."""
+    SCENE.fill(renderer, GRID)
+    for _ in range(3):
+        renderer.render_in_time(optics, SIZE, 1e-6)
+        assert not renderer.is_converged
+        assert renderer.samples < renderer.samples_converged
+    renderer.refine()
+    assert renderer.samples >= renderer.samples_converged

@@ -105,6 +105,11 @@ def test_there_is_always_an_f_number_that_falls_as_the_aperture_opens(scene: Sce
     assert f_number_text(scene_at(still_m=2.0), 2.0).startswith("f/")
 
 
+def test_the_f_number_waits_for_the_depth_that_it_follows_from() -> None:
+    for early in (scene_of(has_view_disparity=False), scene_of(is_sketch=True)):
+        assert (f_number_text(early, 2.0), f_number_text(early, 0.0)) == ("f/…", "pinhole")
+
+
 def test_a_flat_scene_blurs_nothing_and_is_a_pinhole_whatever_the_aperture() -> None:
     assert f_number_text(scene_of(disparity_range_px=(0.0, 0.0)), 3.0) == "pinhole"
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from iibr_core.scenes.scene import Progress, Scene, Source
 from iibr_core.types import GridShape
-from viewer.model.state.app_state import DrawReport
-from viewer.ui.panel import progress_text, report_text, size_text
+from viewer.model.state.app_state import AppState, DrawReport
+from viewer.ui.panel import is_final, progress_text, report_text, size_text
 
 
 @pytest.mark.parametrize(
@@ -44,3 +46,11 @@ def test_the_size_in_words() -> None:
     assert size_text(Scene(Source("a.png"), "a", 60, 40, GridShape(3, 9), (-2.0, 3.0), "a.pfm")) == (
         "60 x 40 px, 3 x 9 views"
     )
+
+
+def test_a_picture_is_final_once_no_view_can_change_it() -> None:
+    whole = AppState(generation=1, shown_generation=1, progress=Progress(9, 9, 1.0, share=1.0))
+    assert is_final(whole)
+    assert not is_final(replace(whole, generation=2)), "other views are asked for"
+    assert not is_final(replace(whole, progress=Progress(8, 9, 1.0, share=0.9)))
+    assert not is_final(replace(whole, free_progress=0.5)), "the free camera shows a draft"

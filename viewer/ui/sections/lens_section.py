@@ -47,8 +47,6 @@ EQUIVALENT_TIP = " ≈ f/2 means: an 85 mm full-frame lens, focused at 2 m, blur
 ALL_SHARP = "all sharp"
 """F-number of a pinhole."""
 
-PROVISIONAL = "f/…"
-"""F-number while the depth that it follows from is not known yet."""
 CLOSED_STOPS = 6.0
 """Length of the aperture's slider in stops, from the widest to a pinhole."""
 TILT_TIP = "Shows two handles in the picture. Drag them onto two objects to make both sharp, and all between."
@@ -131,8 +129,6 @@ def aperture_slider(state: AppState, scene: Scene, layout: Layout) -> list[Actio
     """Build the aperture slider."""
     diameter, widest = state.optics.aperture_diameter, aperture_limit(scene.grid)
     words, is_exact = f_number_text(scene, diameter), f_number(scene, widest) is not None
-    if diameter > 0 and (scene.is_sketch or not scene.has_view_disparity):
-        words = PROVISIONAL
     tip = APERTURE_TIP + (F_NUMBER_TIP.format(ASSUMED_DISTANCE_M) if is_exact else EQUIVALENT_TIP)
     if state.preferences.units == "light field":
         form = ALL_SHARP if diameter == 0 else f"%.1f views  ·  {words}"
