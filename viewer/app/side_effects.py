@@ -168,7 +168,7 @@ class SideEffects:
 
 
 def _take_path(prompt: PathPrompt, state: AppState) -> list[Action]:
-    """Use a typed path; if nothing lies there, keep the prompt and say so."""
+    """Use a typed path; if nothing lies there, keep the prompt and state the problem."""
     path = prompt.path.strip()
     if not os.path.exists(os.path.expanduser(path)):
         problem = f"There is no file or folder {path}." if path else "Type a path."

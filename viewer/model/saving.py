@@ -55,14 +55,14 @@ def begin_job(state: AppState, path: Path, prompt: ExportPrompt | None = None) -
 
 
 def finish_job(state: AppState, path: Path, message: str = "", prompt: ExportPrompt | None = None) -> AppState:
-    """Tell that a file was written; an export enters the list of exports. message: more about the file."""
+    """Notify that a file was written; an export enters the list of exports. message: more about the file."""
     verb = "Saved" if prompt is None else "Exported"
     notice = Notice(f"{verb} {path}. {message}" if message else f"{verb} {path}", is_result=True, path=str(path))
     return _with_finished(notify(state, notice), path, prompt)
 
 
 def fail_job(state: AppState, path: Path, problem: str, prompt: ExportPrompt | None = None) -> AppState:
-    """Tell that a file was not written, and why."""
+    """Notify that a file was not written, with the reason."""
     return _with_finished(notify(state, Notice(problem, is_error=True, is_result=True)), path, prompt, problem)
 
 

@@ -13,9 +13,8 @@ from PIL import Image
 from iibr_core.types import GridShape, InputError
 from tests.viewer.conftest import Driver, Opener, write_scene
 from viewer.app.clipboard import MAX_PASTED, paste_picture
-from viewer.model import lens, messages
-from viewer.model.action import ask, do
-from viewer.model.state.tasks import CopyTask, PasteTask
+from viewer.model import lens
+from viewer.model.action import do
 
 CLIPBOARD = ["xclip", "-selection", "clipboard"]
 
@@ -91,23 +90,8 @@ def test_damaged_pictures_are_one_line(display: str, data: bytes) -> None:
         paste_picture("/no/such/file")
 
 
-def test_what_is_lacking_is_named(viewer: Driver, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("PATH", str(tmp_path))
-    for task in (CopyTask(), PasteTask()):
-        viewer.app.do(do(messages.dismiss), do(ask, task))
-        says(viewer, "Install xclip")
-
-
 def test_old_pasted_pictures_go(display: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     put(a_picture(), "image/png")
     pasted = [paste_picture("") for _ in range(MAX_PASTED + 2)]
     assert [Path(path).exists() for path in pasted] == [False] * 2 + [True] * MAX_PASTED
-
-
-def test_a_cache_that_cannot_be_written_is_told(display: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
-    (tmp_path / "file").write_text("in the way")
-    put(a_picture(), "image/png")
-    with pytest.raises(InputError, match="cannot be created"):
-        paste_picture("")

@@ -193,15 +193,6 @@ def test_an_export_asked_for_before_its_views_are_there_outlives_its_photo(
     assert bytes_of(early) == bytes_of(late)
 
 
-def test_views_are_given_back_when_all_is_done(viewer: Driver, tmp_path: Path) -> None:
-    start(viewer, tmp_path / "a.gif")
-    viewer.app.do(export("gif", tmp_path / "b.gif"), other_photo(tmp_path))
-    viewer.until(lambda app: not app.state.jobs and app.state.progress.is_complete)
-    field = viewer.app.scene_view.renderer.field
-    assert field is not None
-    assert not field.is_shared
-
-
 def test_the_list_of_exports_cancels_each_and_repeats_one(
     viewer: Driver, tmp_path: Path, gate: threading.Event
 ) -> None:

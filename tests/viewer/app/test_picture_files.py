@@ -90,17 +90,6 @@ def test_pictures_beyond_the_graphics_cards_limit_are_drawn_in_parts(
     assert np.mean(np.abs(in_parts - at_once).max(-1) > 3) < 0.005
 
 
-def test_the_window_keeps_its_own_picture(opened: OffscreenScene) -> None:
-    scene_view, size_px = opened.view, (WIDTH, HEIGHT)
-    scene_view.converge(opened.state, size_px)
-    shown, drawn = scene_view.renderer.read_image(), scene_view.pictures_drawn
-    scene_view.renderer.converged_picture(RenderSettings(opened.state.optics, (40, 30)))
-    assert np.array_equal(scene_view.renderer.read_image(), shown)
-    scene_view.converge(opened.state, size_px)
-    assert scene_view.pictures_drawn == drawn
-    assert np.array_equal(scene_view.renderer.read_image(), shown)
-
-
 def test_a_picture_is_as_it_was_when_edited_depth_is_shown_meanwhile(tmp_path: Path) -> None:
     out = tmp_path / "out.png"
     with headless_with_scene(tmp_path) as viewer:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import shutil
 import threading
-import time
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -14,10 +13,8 @@ import pytest
 
 from iibr_core.beyond.resized_light import mean_of_areas
 from iibr_core.color import linear_from_srgb, srgb_from_linear
-from iibr_core.exports.full_picture import FullPicture
 from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.formats.images.photo import read_photo
-from iibr_core.runtime.work import Cancelled, is_stopped
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, InputError, ViewOffset, image_size
 from tests.viewer.conftest import HEIGHT, WIDTH, Driver, Opener, write_scene
@@ -29,7 +26,7 @@ from viewer.model.action import Action, ask, do
 from viewer.model.saved_settings import read_settings
 from viewer.model.state.jobs import WAITING_FOR_VIEWS, WRITING
 from viewer.model.state.prompts import Saved, SavePrompt
-from viewer.model.state.tasks import CancelJobTask, ReadMaskTask, SaveTask
+from viewer.model.state.tasks import ReadMaskTask, SaveTask
 
 SIZE = ScreenSize(150, 100)
 LARGE = ScreenSize(1500, 1000)
@@ -98,16 +95,6 @@ def test_cancel_leaves_nothing_behind_and_the_next_is_saved(viewer: Driver, tmp_
     viewer.until(lambda app: not app.state.jobs)
     assert texts(viewer) == [f"Saved {tmp_path / 'next.png'}"]
     assert set(tmp_path.iterdir()) - before == {tmp_path / "next.png"}
-
-
-def test_pictures_are_saved_in_the_order_in_which_they_were_asked_for(viewer: Driver, tmp_path: Path) -> None:
-    eyes = [ViewOffset(0.0, s) for s in (-1.0, 0.0, 1.0)]
-    for i, eye in enumerate(eyes):
-        viewer.app.do(do(lens.move_eye, eye), save(tmp_path / f"{i}.png"))
-        viewer.app.step()
-    viewer.until(lambda app: len(app.state.notices) == 3 and not app.state.jobs)
-    assert texts(viewer) == [f"Saved {tmp_path / f'{i}.png'}" for i in range(3)]
-    assert [read_settings(tmp_path / f"{i}.png").optics.eye for i in range(3)] == eyes
 
 
 def test_a_file_that_waits_to_be_written_is_replaced_only_when_that_is_said(viewer: Driver, tmp_path: Path) -> None:
@@ -182,13 +169,6 @@ def test_a_picture_waits_for_the_views(open_window: Opener, photo_path: Path, tm
     np.testing.assert_array_equal(np.rint(read_photo(out).pixels * 255), expected)
 
 
-def test_closing_the_window_cancels_what_is_being_drawn(viewer: Driver, tmp_path: Path) -> None:
-    before = set(tmp_path.iterdir())
-    start(viewer, tmp_path / "large.png")
-    viewer.close()
-    assert set(tmp_path.iterdir()) == before
-
-
 def test_closing_the_window_waits_for_what_is_being_written(
     viewer: Driver, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -256,26 +236,6 @@ def test_a_picture_is_saved_at_the_photos_own_size(
     shown = linear_from_srgb(shown / np.float32(255))
     smaller = mean_of_areas(linear_from_srgb(saved), image_size(shown))
     assert np.abs(smaller - shown).mean() < 0.01
-
-
-def test_a_picture_at_the_photos_own_size_can_be_cancelled(
-    large: Driver, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    begun, before = threading.Event(), set(tmp_path.iterdir())
-
-    def draw_full(picture: FullPicture, draw: object) -> None:
-        begun.set()
-        while not is_stopped():
-            time.sleep(0.001)
-        raise Cancelled
-
-    with monkeypatch.context() as endless:
-        endless.setattr("iibr_core.exports.full_drawing.draw_full", draw_full)
-        large.app.do(save(tmp_path / "out.png", ScreenSize(WIDTH, HEIGHT)))
-        large.until(lambda app: begun.is_set() and bool(app.state.jobs))
-        large.app.do(do(ask, CancelJobTask(large.app.state.jobs[0].id)), save(tmp_path / "next.png"))
-        large.until(lambda app: f"Saved {tmp_path / 'next.png'}" in texts(large))
-    assert set(tmp_path.iterdir()) - before == {tmp_path / "next.png"}
 
 
 def test_a_photo_that_was_replaced_meanwhile_is_noticed(large: Driver, photo_path: Path, tmp_path: Path) -> None:

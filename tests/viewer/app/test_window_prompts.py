@@ -10,16 +10,12 @@ import pytest
 from imgui_bundle import imgui
 
 from iibr_core.formats.images.write import write_image
-from iibr_core.scenes.scene import Source
 from iibr_core.scenes.screen_size import ScreenSize
-from iibr_core.types import GridShape
-from tests.viewer.conftest import Driver, Opener
-from viewer.app.main_loop import App
-from viewer.model import messages, opening, preferences, saving
+from tests.viewer.conftest import Driver
+from viewer.model import messages, preferences, saving
 from viewer.model.action import do
 from viewer.model.commands import BY_NAME, COMMANDS
 from viewer.model.layout import PANEL_WIDTH
-from viewer.model.state.depth_models import ModelsPrompt
 from viewer.model.state.notices import Notice
 from viewer.model.state.prompts import ExportPrompt, PalettePrompt, PathPrompt, SavePrompt
 
@@ -96,18 +92,6 @@ def test_tooltips_of_a_prompt_leave_it_to_be_seen(viewer: Driver, scale: float) 
     assert 0 <= tip.pos.x <= viewer.app.layout().window.width - tip.size.x
 
 
-def test_up_stays_at_the_first_command_and_typing_begins_there_again(viewer: Driver) -> None:
-    viewer.app.do(do(messages.show_prompt, PalettePrompt()))
-    viewer.until_idle()
-    viewer.send("key", "Down", "key", "Down")
-    viewer.until(lambda app: app.state.prompt == PalettePrompt("", 2))
-    viewer.send("type", "text")
-    viewer.until(lambda app: app.state.prompt == PalettePrompt("text", 0))
-    viewer.send("key", "Up")
-    viewer.until_idle()
-    assert viewer.app.state.prompt == PalettePrompt("text", 0)
-
-
 def test_escape_closes_a_drop_down_and_then_the_prompt_under_it(viewer: Driver) -> None:
     viewer.app.do(do(saving.ask_to_export))
     viewer.until_idle()
@@ -125,17 +109,6 @@ def is_menu_open() -> bool:
     return bool(imgui.is_popup_open("", imgui.PopupFlags_.any_popup))
 
 
-def test_tab_goes_on_from_the_name_to_the_width(viewer: Driver, tmp_path: Path) -> None:
-    viewer.app.do(do(saving.ask_to_save))
-    viewer.until_idle()
-    viewer.type(str(tmp_path / "a.png"))
-    viewer.send("key", "Tab")
-    viewer.until_idle()
-    viewer.type("48")
-    viewer.send("key", "Return")
-    viewer.until(lambda app: isinstance(app.state.prompt, SavePrompt) and app.state.prompt.size_px == (48, 32))
-
-
 def test_a_wrong_ending_keeps_what_was_typed_and_says_what_is_possible(viewer: Driver, tmp_path: Path) -> None:
     viewer.app.do(do(saving.ask_to_save))
     viewer.until_idle()
@@ -149,20 +122,6 @@ def test_a_wrong_ending_keeps_what_was_typed_and_says_what_is_possible(viewer: D
     viewer.until_idle()
     viewer.send("key", "Escape")
     viewer.until(lambda app: app.state.prompt is None)
-
-
-def test_the_open_photo_is_whole_again_after_a_file_that_does_not_open(viewer: Driver, tmp_path: Path) -> None:
-    before = viewer.app.state.optics
-    broken = tmp_path / "broken.jpg"
-    broken.write_bytes(b"no picture")
-    viewer.app.window.on_drop(None, [str(broken)])
-    viewer.until(lambda app: bool(app.state.notices) and "broken.jpg" in app.state.notices[-1].text)
-    viewer.until_idle()
-    viewer.app.do(do(opening.open_source, Source(str(tmp_path / "scene.png"))), do(opening.stop))
-    viewer.until_idle()
-    assert viewer.app.state.progress.is_complete
-    assert viewer.app.scene_view.is_whole
-    assert viewer.app.state.optics == before
 
 
 def test_one_notice_is_shown_at_a_time_and_all_are_closed_at_once(viewer: Driver) -> None:
@@ -208,25 +167,6 @@ def test_a_message_does_not_go_while_the_pointer_rests_on_it(viewer: Driver, mon
     assert viewer.app.state.notices
     viewer.send("mousemove", *viewer.position(0.1, 0.1))
     viewer.until(lambda app: not app.state.notices)
-
-
-def test_a_map_or_a_model_of_ones_own_is_opened(open_window: Opener, tmp_path: Path) -> None:
-    write_image(tmp_path / "alone.png", np.full((64, 96, 3), 100, np.uint8))
-    driver = open_window(tmp_path / "alone.png", grid=GridShape(3, 3))
-    driver.app.do(do(preferences.toggle_section, "depth"))
-    driver.until_idle()
-    driver.press("Open map…")
-    driver.until(lambda app: asks_for(app, "map"))
-    driver.send("key", "Escape")
-    driver.until(lambda app: app.state.prompt is None)
-    driver.app.do(BY_NAME["Depth models…"].action(driver.app.state))
-    driver.until(lambda app: isinstance(app.state.prompt, ModelsPrompt))
-    driver.press("Choose a file…", "prompt ModelsPrompt")
-    driver.until(lambda app: asks_for(app, "model"))
-
-
-def asks_for(app: App, what: str) -> bool:
-    return isinstance(app.state.prompt, PathPrompt) and app.state.prompt.what == what
 
 
 def test_a_typed_path_opens_and_a_typo_keeps_the_prompt(viewer: Driver, tmp_path: Path) -> None:

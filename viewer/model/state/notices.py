@@ -16,7 +16,7 @@ class Notice:
     """A message that the user can close.
 
     offer: settings that a button takes over. commands: names of commands that help, a button each. is_result: whether
-    it tells the result of a request, and stays when another photo is opened. path: file or folder that was written.
+    it is the result of a request, and stays when another photo is opened. path: file or folder that was written.
     details: text behind a button. failed_model: name of a model that could not be downloaded, for buttons that help.
     """
 

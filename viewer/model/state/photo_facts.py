@@ -1,4 +1,4 @@
-"""What is known about the photo that is open, beside what it shows: asked of the outside world, shown in the panel."""
+"""Facts that a photo's file states, such as camera and exposure."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class ReadFactsTask:
-    """Read what this photo's file says about it."""
+    """Read the facts that a photo's file states."""
 
     path: str
 
 
 @dataclass(frozen=True)
 class PhotoFacts:
-    """What the photo's file says: (what, value), for people."""
+    """Facts of a photo, (name, value), in words."""
 
     path: str
     facts: tuple[tuple[str, str], ...] = ()

@@ -77,6 +77,10 @@ def export_prompt(prompt: ExportPrompt, state: AppState, layout: Layout) -> list
     """Draw the prompt; return the actions of the user."""
     assert state.scene is not None
     imgui.text("Share or export")
+    if state.exports or state.jobs:
+        imgui.same_line()
+        if imgui.small_button("Exports…"):
+            return [do(messages.show_prompt, "exports")]
     gap(layout, 2)
     purpose = _purpose_row(EXPORTS[prompt.kind].purpose, layout)
     label("As", layout)

@@ -199,7 +199,7 @@ def button_rows(offers: list[tuple[str, Action]]) -> list[Action]:
 
 
 def file_offers(path: str, number: int = 0) -> list[tuple[str, Action]]:
-    """Return buttons that show a written file. number: tells the buttons of several files apart."""
+    """Return buttons that show a written file. number: index of the file, for names of the buttons."""
     return [
         (f"Show in folder##{number}", do(ask, ShowFileTask(path, in_folder=True))),
         (f"Open##{number}", do(ask, ShowFileTask(path))),
