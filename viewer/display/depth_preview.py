@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from iibr_core.depth.editing.edits import DepthEdits
-from iibr_core.scenes.scene import LoadedPhoto, Scene, still_disparity
+from iibr_core.method.plan import ScenePlan
+from iibr_core.scenes.scene import LoadedPhoto, Source, still_disparity
+from iibr_core.types import FloatImage
 from viewer.display.scene_view import SceneView
 from viewer.model.depth import current_settings
 from viewer.model.state.app_state import AppState
@@ -46,27 +48,27 @@ class DepthPreview:
             if self._loaded is None or loaded.refined is not self._loaded.refined:
                 self._canvas = self._still = None
             self._loaded, self._shown = loaded, loaded.depth_settings.edits
-        wanted = current_settings(state).edits
-        if wanted != self._shown and scene.source is state.source and self._is_quick(wanted, loaded):
-            self._scene_view.show_disparity(self._field_disparity(wanted, scene, loaded))
-            self._shown = wanted
+        edits = current_settings(state).edits
+        if edits == self._shown or scene.source is not state.source:
+            return
+        canvas = self._canvas_for(edits, loaded)
+        if canvas.strokes_ahead(edits) <= MAX_STROKES:  # otherwise they show once the worker has painted them
+            self._scene_view.show_disparity(self._field_disparity(canvas, edits, scene.source, scene.plan))
+            self._shown = edits
 
-    def _is_quick(self, edits: DepthEdits, loaded: LoadedPhoto) -> bool:
-        """Return whether a frame may wait for these edits; otherwise they show once the worker has painted them."""
+    def _canvas_for(self, edits: DepthEdits, loaded: LoadedPhoto) -> DepthCanvas:
         from iibr_core.depth.editing.canvas import DepthCanvas
 
         self._canvas = self._canvas or DepthCanvas(loaded.photo.pixels, loaded.refined.values)
         if self._canvas.strokes_ahead(edits) > MAX_STROKES and self._resumed is not loaded:
             self._canvas.resume(loaded.depth_settings.edits, loaded.disparity.values)
             self._resumed = loaded
-        return self._canvas.strokes_ahead(edits) <= MAX_STROKES
+        return self._canvas
 
-    def _field_disparity(self, edits: DepthEdits, scene: Scene, loaded: LoadedPhoto) -> np.ndarray:
+    def _field_disparity(self, canvas: DepthCanvas, edits: DepthEdits, source: Source, plan: ScenePlan) -> FloatImage:
         """Return the edited disparity in px per view step of the plan of the last views."""
-        assert self._canvas is not None
-        assert scene.plan is not None
-        values = self._canvas.apply(edits)
+        values = canvas.apply(edits)
         if self._still is None or self._still[0] != edits.tone:
-            self._still = edits.tone, still_disparity(scene.source, self._canvas.without_strokes(edits))
-        scale = scene.plan.disparity_scale or 1.0  # a flat scene has none yet
+            self._still = edits.tone, still_disparity(source, canvas.without_strokes(edits))
+        scale = plan.disparity_scale or 1.0  # a flat scene has none yet
         return (values - np.float32(self._still[1])) * np.float32(scale)

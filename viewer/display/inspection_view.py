@@ -6,7 +6,6 @@ Called from the thread of the window only.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
 from typing import Any, Literal, NamedTuple
 
@@ -16,7 +15,8 @@ from numpy.typing import NDArray
 from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.scenes.rect import WHOLE, Rect
 from iibr_core.scenes.scene import LoadedPhoto, Scene
-from iibr_core.types import ViewUpdate
+from iibr_core.scenes.screen_size import ScreenSize
+from iibr_core.types import ViewOffset, ViewUpdate
 from viewer.background.entropy import Entropy, EntropyRequest
 from viewer.background.newest import Failed
 from viewer.background.surface import Surface, SurfaceRequest
@@ -44,16 +44,17 @@ SNAPSHOT_BUDGET_S = 0.025
 """Seconds per turn for drawing the snapshot's picture."""
 
 
-@dataclass(frozen=True)
-class _ViewImage:
-    """Everything that an image of views depends on. views: number of uploads. exposure: factor of brightness. previews:
-    number of previews of edited depth.
-    """
+class _Frame(NamedTuple):
+    """Everything that the images of a frame are drawn from. views: record of the stored views."""
 
-    generation: int
-    views: int
+    state: AppState
+    scene: Scene
+    field: LightFieldTexture
+    layout: Layout
+    size_px: ScreenSize
     exposure: float
-    previews: int
+    generation: int
+    views: tuple[int, ...]
 
 
 class _OverlayValues(NamedTuple):
@@ -70,8 +71,8 @@ class InspectionView:
     def __init__(self, gl: GLContext, scene_view: SceneView) -> None:
         self._scene_view = scene_view
         self._passes = InspectionPasses(gl.ctx, scene_view.renderer.programs)
-        self._drawn: dict[str, tuple[object, int]] = {}
-        self._on_sheet: frozenset[tuple[ViewIndex, int]] = frozenset()
+        self._drawn: dict[str, tuple[Any, int]] = {}
+        self._on_sheet = np.zeros((0, 0), int)
         self._inpainted: dict[ViewIndex, NDArray[np.uint8]] = {}
         self._entropy: Entropy | None = None
         self._entropy_asked: tuple[int, ViewIndex] | None = None
@@ -99,18 +100,17 @@ class InspectionView:
 
     def draw(self, state: AppState, layout: Layout) -> InspectionTextures:
         """Draw the images that changed and return the names of all."""
-        scene, field = state.scene, self._scene_view.renderer.field
+        view, scene, field = self._scene_view, state.scene, self._scene_view.renderer.field
         if scene is None or field is None or layout.frame_px is None or not field.present.any():
             return NO_INSPECTION_TEXTURES
-        view = self._scene_view
-        base = _ViewImage(view.generation, view.views_uploaded, 2.0**state.optics.exposure_stops, view.previews)
-        names = {"overlay": self._overlay(state, scene, field, layout, base)}
-        names["minimap"] = self._minimap(field, layout, base)
+        views, exposure = (view.generation, view.views_uploaded, view.previews), 2.0**state.optics.exposure_stops
+        frame = _Frame(state, scene, field, layout, layout.frame_px.size, exposure, view.generation, views)
+        names = {"overlay": self._overlay(frame), "minimap": self._minimap(frame)}
         if field.grid == scene.grid:  # else: only the photo is there, or a preview of its depth
-            names |= self._strips(state, scene, field, layout, base)
-            names["sheet"] = self._sheet(field, layout, base) if state.inspection.shows_views else None
-            names["compared"] = self._compared(state, scene, field, layout, base)
-        return self._textures(names)
+            names |= self._strips(frame)
+            names["sheet"] = self._sheet(frame) if state.inspection.shows_views else None
+            names["compared"] = self._compared(frame)
+        return InspectionTextures(**names, shown=tuple(self._drawn[name][0] for name in names if names[name]))
 
     def probe(self, state: AppState) -> Probe | None:
         """Return the values under the pointer; None where they are not asked for."""
@@ -120,7 +120,10 @@ class InspectionView:
         view = self._scene_view
         asked = hover, state.optics, view.generation, view.views_uploaded, view.renderer.samples
         if self._probed[0] != asked:
-            self._probed = asked, self._probe_at(hover, state, scene, field)
+            part = view.picture_drawn.part if view.picture_drawn is not None else WHOLE
+            at = (hover.x_px + 0.5) / scene.width, (hover.y_px + 0.5) / scene.height
+            rgb = view.renderer.read_pixel((at[0] - part.x) / part.width, (at[1] - part.y) / part.height)
+            self._probed = asked, Probe(rgb, self._origin(hover, state.optics.eye, scene, field))
         return self._probed[1]
 
     def entropy_request(self, state: AppState) -> EntropyRequest | None:
@@ -166,130 +169,107 @@ class InspectionView:
         self._stop_snapshot()
         self._passes.release()
 
-    def _textures(self, names: dict[str, int | None]) -> InspectionTextures:
-        return InspectionTextures(**names, shown=tuple(self._drawn[name][0] for name in names if names[name]))
-
-    def _minimap(self, field: LightFieldTexture, layout: Layout, base: _ViewImage) -> int | None:
-        """Return the photo at a small size."""
-        row, column = field.grid.centre
-        if layout.minimap is None or not field.present[row, column]:
-            return None
-        size_px = layout.in_pixels(layout.minimap).size
-        draw = partial(self._passes.draw_view, field, row, column, "minimap", base.exposure, size_px)
-        return self._once("minimap", (base.generation, base.exposure, size_px), draw)
-
     def _once(self, name: str, record: object, draw: Callable[[], int]) -> int:
         """Return the image of this name, drawn again only if its record changed."""
         if name not in self._drawn or self._drawn[name][0] != record:
             self._drawn[name] = record, draw()
         return self._drawn[name][1]
 
-    def _strips(
-        self, state: AppState, scene: Scene, field: LightFieldTexture, layout: Layout, base: _ViewImage
-    ) -> dict[str, int | None]:
-        names: dict[str, int | None] = {"strip_across": None, "strip_down": None}
+    def _minimap(self, frame: _Frame) -> int | None:
+        """Return the photo at a small size."""
+        field, centre, rect = frame.field, frame.field.grid.centre, frame.layout.minimap
+        if rect is None or not field.present[centre]:
+            return None
+        size_px = frame.layout.in_pixels(rect).size
+        draw = partial(self._passes.draw_view, field, *centre, "minimap", frame.exposure, size_px)
+        return self._once("minimap", (frame.generation, frame.exposure, size_px), draw)
+
+    def _strips(self, frame: _Frame) -> dict[str, int | None]:
+        state, scene, layout, part = frame.state, frame.scene, frame.layout, frame.layout.part
         x, y = state.inspection.place or ((scene.width - 1) / 2, (scene.height - 1) / 2)
         row, column = view_near(state.optics.eye, scene.grid)
-        part = layout.part
         across = Line(row, (y + 0.5) / scene.height, span=(part.x, part.width))
         down = Line(column, (x + 0.5) / scene.width, is_upright=True, span=(part.y, part.height))
-        lines = (("strip_across", layout.strip_across, across), ("strip_down", layout.strip_down, down))
-        for name, rect, line in lines:
+        names: dict[str, int | None] = {}
+        for name, rect, line in (
+            ("strip_across", layout.strip_across, across),
+            ("strip_down", layout.strip_down, down),
+        ):
             if rect is not None:
-                size_px = layout.in_pixels(rect).size
-                draw = partial(self._passes.draw_epi, field, line, size_px, base.exposure, state.optics.gloss)
-                names[name] = self._once(name, (base, line, size_px, state.optics.gloss), draw)
+                drawn = line, layout.in_pixels(rect).size, frame.exposure, state.optics.gloss
+                draw = partial(self._passes.draw_epi, frame.field, *drawn)
+                names[name] = self._once(name, (frame.views, drawn), draw)
         return names
 
-    def _sheet(self, field: LightFieldTexture, layout: Layout, base: _ViewImage) -> int:
+    def _sheet(self, frame: _Frame) -> int:
         """Return the sheet of all views; only views that are new are drawn."""
-        assert layout.frame_px is not None
-        size_px = layout.frame_px.size
-        record = base.generation, base.exposure, size_px
-        there = frozenset((view, int(uploads)) for view, uploads in np.ndenumerate(field.uploads) if uploads)
-        old = self._drawn.get("sheet")
-        is_new = old is None or old[0] != (record, self._on_sheet)
-        name = self._passes.start_sheet(size_px) if is_new or old is None else old[1]
-        cells = sheet_cells(Rect(0, 0, *size_px), field.grid, layout.ui_scale * layout.pixel_ratio)
-        for i, cell in enumerate(cells):
-            view = divmod(i, field.grid.columns)
-            upload = view, int(field.uploads[view])
-            if is_new or (upload in there and upload not in self._on_sheet):
-                self._passes.draw_on_sheet(field, *view, whole_pixels(cell), base.exposure)
-        self._on_sheet = there
-        self._drawn["sheet"] = (record, there), name
+        field, layout, uploads = frame.field, frame.layout, frame.field.uploads.copy()
+        record = frame.generation, frame.exposure, frame.size_px
+        is_new = "sheet" not in self._drawn or self._drawn["sheet"][0][0] != record
+        name = self._passes.start_sheet(frame.size_px) if is_new else self._drawn["sheet"][1]
+        cells = sheet_cells(Rect(0, 0, *frame.size_px), field.grid, layout.ui_scale * layout.pixel_ratio)
+        for (row, column), cell in zip(np.ndindex(*field.grid), cells):
+            if is_new or uploads[row, column] != self._on_sheet[row, column]:
+                self._passes.draw_on_sheet(field, row, column, whole_pixels(cell), frame.exposure)
+        self._on_sheet = uploads
+        self._drawn["sheet"] = (record, uploads.tobytes()), name
         return name
 
-    def _overlay(
-        self, state: AppState, scene: Scene, field: LightFieldTexture, layout: Layout, base: _ViewImage
-    ) -> int | None:
+    def _overlay(self, frame: _Frame) -> int | None:
         """Return the map over the picture: of the selected surface, or the overlay that was chosen."""
-        found = self._overlay_values(state, scene, field)
-        if found is None or layout.frame_px is None or not field.has_disparity[found.view]:
+        found = self._overlay_values(frame)
+        if found is None or not frame.field.has_disparity[found.view]:
             return None
-        optics, size_px, part = state.optics, layout.frame_px.size, layout.part
+        state, part = frame.state, frame.layout.part
         opacity = state.inspection.opacity
         if state.brush.is_on:  # the photo must be seen
             opacity = SURFACE_OPACITY if found.kind == "surface" else min(opacity, MAX_BRUSH_OPACITY)
-        ends = scene.disparity_range_px if found.kind == "disparity" else (0.0, 1.0)
+        ends = frame.scene.disparity_range_px if found.kind == "disparity" else (0.0, 1.0)
         ends = ends if ends[1] > ends[0] else (ends[0] - 0.5, ends[0] + 0.5)
         color = MASK_COLORS.get(found.kind)
         style = OverlayStyle((color,) * len(VIRIDIS) if color else VIRIDIS, ends, opacity, is_mask=color is not None)
-        record = (
-            base,
-            found.kind,
-            found.view,
-            self._entropy,
-            self._surface,
-            optics.eye,
-            optics.dolly,
-            size_px,
-            part,
-            style,
-        )
-        draw = partial(self._passes.draw_overlay, field, optics, found.view, size_px, style, found.values, part)
-        return self._once("overlay", record, draw)
+        lens, maps = (state.optics.eye, state.optics.dolly), (found.kind, found.view, self._entropy, self._surface)
+        arguments = state.optics, found.view, frame.size_px, style, found.values, part
+        draw = partial(self._passes.draw_overlay, frame.field, *arguments)
+        return self._once("overlay", (frame.views, lens, maps, frame.size_px, part, style), draw)
 
-    def _overlay_values(self, state: AppState, scene: Scene, field: LightFieldTexture) -> _OverlayValues | None:
+    def _overlay_values(self, frame: _Frame) -> _OverlayValues | None:
         """Return the map to be shown; None if there is none, or not yet."""
-        kind = state.inspection.overlay
-        if state.selection is not None and self._surface is not None:
+        kind, field, entropy = frame.state.inspection.overlay, frame.field, self._entropy
+        if frame.state.selection is not None and self._surface is not None:
             return _OverlayValues("surface", field.grid.centre, self._surface.mask)
-        if kind is None or (kind != "disparity" and field.grid != scene.grid):
+        if kind is None or (kind != "disparity" and field.grid != frame.scene.grid):
             return None
         if kind == "entropy":
-            entropy = self._entropy
-            is_known = entropy is not None and entropy.generation == self._scene_view.generation
-            return _OverlayValues("entropy", entropy.view, entropy.values) if entropy is not None and is_known else None
-        view: ViewIndex = tuple(nearest_present(field.present)[view_near(state.optics.eye, field.grid)].tolist())
-        return _OverlayValues(kind, view, self._mask_of(view, field) if kind == "inpainted" else None)
+            if entropy is None or entropy.generation != frame.generation:
+                return None
+            return _OverlayValues("entropy", entropy.view, entropy.values)
+        view = _nearest_view(field, frame.state.optics.eye)
+        if kind == "disparity":
+            return _OverlayValues(kind, view, None)
+        if view not in self._inpainted:
+            return _OverlayValues(kind, view, np.zeros((field.height, field.width), np.uint8))
+        mask = np.unpackbits(self._inpainted[view], axis=1, count=field.width)
+        return _OverlayValues(kind, view, mask * np.uint8(255))
 
-    def _mask_of(self, view: ViewIndex, field: LightFieldTexture) -> NDArray[np.uint8]:
-        packed = self._inpainted.get(view)
-        if packed is None:
-            return np.zeros((field.height, field.width), np.uint8)
-        return np.unpackbits(packed, axis=1, count=field.width) * np.uint8(255)
-
-    def _compared(
-        self, state: AppState, scene: Scene, field: LightFieldTexture, layout: Layout, base: _ViewImage
-    ) -> int | None:
+    def _compared(self, frame: _Frame) -> int | None:
         """Return the left image of the comparison: the photo, or the picture of the snapshot once it is drawn."""
-        kind, optics = state.inspection.comparison, state.inspection.snapshot
+        kind, optics = frame.state.inspection.comparison, frame.state.inspection.snapshot
         if kind == "photo":
-            draw = partial(self._passes.draw_view, field, *scene.grid.centre, "photo", base.exposure)
-            return self._once("compared", (base.generation, base.exposure), draw)
-        if kind is None or optics is None or layout.frame_px is None:
+            draw = partial(self._passes.draw_view, frame.field, *frame.scene.grid.centre, "photo", frame.exposure)
+            return self._once("compared", (frame.generation, frame.exposure), draw)
+        if kind is None or optics is None:
             if self.is_drawing:
                 self._stop_snapshot()
             return None
-        record = base.generation, base.views, base.previews, optics, layout.frame_px.size, layout.part
-        pixels = self._draw_snapshot(record, RenderSettings(optics, layout.frame_px.size, layout.part))
-        if pixels is None:
+        settings = RenderSettings(optics, frame.size_px, frame.layout.part)
+        drawing = self._draw_snapshot((frame.views, settings), settings)
+        if not drawing.is_done:
             return None
-        return self._once("compared", record, lambda: self._passes.show("snapshot", pixels))
+        return self._once("compared", (frame.views, settings), lambda: self._passes.show("snapshot", drawing.image))
 
-    def _draw_snapshot(self, record: object, settings: RenderSettings) -> NDArray[Any] | None:
-        """Draw the snapshot's picture for about SNAPSHOT_BUDGET_S; None until it is finished."""
+    def _draw_snapshot(self, record: object, settings: RenderSettings) -> PictureDrawing:
+        """Draw the snapshot's picture for about SNAPSHOT_BUDGET_S."""
         if self._snapshot is None or self._snapshot[0] != record:
             self._stop_snapshot()
             self._snapshot = record, self._scene_view.renderer.start_picture(settings)
@@ -298,31 +278,28 @@ class InspectionView:
             drawing.advance(SNAPSHOT_BUDGET_S)
             if drawing.is_done:
                 drawing.stop()
-        return drawing.image if drawing.is_done else None
+        return drawing
 
     def _stop_snapshot(self) -> None:
         if self._snapshot is not None:
             self._snapshot[1].stop()
             self._snapshot = None
 
-    def _probe_at(self, hover: Hover, state: AppState, scene: Scene, field: LightFieldTexture) -> Probe:
-        at = (hover.x_px + 0.5) / scene.width, (hover.y_px + 0.5) / scene.height
-        drawn = self._scene_view.picture_drawn
-        part = drawn.part if drawn is not None else WHOLE
-        rgb = self._scene_view.renderer.read_pixel((at[0] - part.x) / part.width, (at[1] - part.y) / part.height)
-        return Probe(rgb, self._origin(hover, state, scene, field))
-
-    def _origin(self, hover: Hover, state: AppState, scene: Scene, field: LightFieldTexture) -> Origin:
+    def _origin(self, hover: Hover, eye: ViewOffset, scene: Scene, field: LightFieldTexture) -> Origin:
         """Return the origin of the surface under the pointer, by the view nearest to the eye."""
         if scene.plan is None:
             return "from disk"
-        eye = state.optics.eye
-        view: ViewIndex = tuple(nearest_present(field.present)[view_near(eye, field.grid)].tolist())
+        view = _nearest_view(field, eye)
         packed = self._inpainted.get(view)
         if packed is not None and hover.disparity is not None:
             t, s = scene.grid.offset(*view)
-            x = round(hover.x_px - hover.disparity * (s - eye.s))
-            y = round(hover.y_px - hover.disparity * (t - eye.t))
+            x, y = round(hover.x_px - hover.disparity * (s - eye.s)), round(hover.y_px - hover.disparity * (t - eye.t))
             if 0 <= x < scene.width and 0 <= y < scene.height and packed[y, x // 8] >> (7 - x % 8) & 1:
                 return "inpainted"
         return "photo" if eye == scene.grid.offset(*scene.grid.centre) else "generated"
+
+
+def _nearest_view(field: LightFieldTexture, eye: ViewOffset) -> ViewIndex:
+    """Return the present view nearest to the eye."""
+    row, column = nearest_present(field.present)[view_near(eye, field.grid)].tolist()
+    return row, column

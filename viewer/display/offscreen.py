@@ -28,7 +28,7 @@ from iibr_core.scenes.opening import results_of
 from iibr_core.scenes.scene import MAKING, DepthSettings, Scene, SceneReady, SceneRequest, Source, ViewReady
 from iibr_core.scenes.scene_gloss import make_maps
 from iibr_core.scenes.screen_size import ScreenSize
-from iibr_core.types import SRGB, ColorSpace, FloatImage, ViewOffset
+from iibr_core.types import SRGB, ColorSpace, ViewOffset
 from viewer.background.entropy import Entropy, EntropyWork
 from viewer.display.inspection_view import InspectionView
 from viewer.display.scene_view import SceneView
@@ -36,18 +36,12 @@ from viewer.gpu.context import Backend, create_headless
 from viewer.gpu.refocus.views_seen import views_seen_by
 from viewer.model import opening, window
 from viewer.model.action import Action, do
-from viewer.model.inspection import (
-    NO_INSPECTION_TEXTURES,
-    InspectionTextures,
-    beside_of,
-    set_probe,
-)
+from viewer.model.inspection import NO_INSPECTION_TEXTURES, InspectionTextures, beside_of, set_probe
 from viewer.model.layout import BACKGROUND, Layout, is_narrow, layout_of
 from viewer.model.state.app_state import AppState
 
 LAYOUT_FRAMES = 3
 """Number of frames until the layout is settled: ImGui knows the size of a text once it was built."""
-
 PicturesOf = Callable[[Scene], Iterable[Optics] | None]
 """Function from a scene to the optics of the pictures that will be drawn of it, None if any may be."""
 
@@ -178,25 +172,19 @@ class OffscreenScene:
         It is uint8, encoded by sRGB's curve, or float32 linear light with 1 = white. Raises InputError for sizes out of
         range, and if the photo cannot be read again at its own size.
         """
-        frame = ScreenSize(*(size or self.scene.size))
+        frame, optics, loaded = ScreenSize(*(size or self.scene.size)), self.state.optics, self.view.loaded
         box_size = size_in_frame(self.scene, frame)
-        optics = self.state.optics
         require_size(box_size)
-        if is_full(self.scene, optics, box_size):
-            light = self._full_picture(optics, box_size)
+        if is_full(self.scene, optics, box_size) and self.scene.plan is not None and loaded is not None:
+            from iibr_core.exports.full_drawing import draw_full
+
+            request = FullPicture(self.scene, self.scene.plan, loaded, optics, box_size)
+            light = draw_full(request, self.view.renderer.converged_picture)
             pixels = encode_light(light, is_linear, color_space, self.scene.color_space)
         else:
             pixels = self.draw(RenderSettings(optics, box_size, is_linear=is_linear, color_space=color_space))
         background = np.array(BACKGROUND[:3])
         return centred(pixels, frame, linear_from_srgb(background) if is_linear else np.round(background * 255))
-
-    def _full_picture(self, optics: Optics, size: ScreenSize) -> FloatImage:
-        from iibr_core.exports.full_drawing import draw_full
-
-        loaded, plan = self.view.loaded, self.scene.plan
-        assert loaded is not None
-        assert plan is not None
-        return draw_full(FullPicture(self.scene, plan, loaded, optics, size), self.view.renderer.converged_picture)
 
     def screen(self, size: ScreenSize) -> NDArray[np.uint8]:
         """Return the whole window of this size, (height, width, 3). Not for OSMesa, in which ImGui finds no OpenGL."""
@@ -207,7 +195,16 @@ class OffscreenScene:
         preferences = self.state.preferences
         look = Look(preferences.font_scale, preferences.theme)
         self.do(do(window.set_narrow, is_narrow(size, 1.0)))
-        layout = self._layout(size, look.ui_scale)
+        state, scene = self.state, self.state.scene
+        layout = layout_of(
+            size,
+            scene.size if scene else None,
+            ui_scale=look.ui_scale,
+            beside=beside_of(state),
+            has_panel=not state.is_panel_hidden,
+            zoom=state.zoom,
+            own_width=scene.own_size.width if scene and scene.own_size else None,
+        )
         texture, textures = self._draw_textures(layout)
         target = self.gl.ctx.simple_framebuffer(size, 4)
         ui = UiHost(look)
@@ -224,18 +221,6 @@ class OffscreenScene:
             target.release()
         return rows.reshape(size[1], size[0], 3)[::-1]
 
-    def _layout(self, size: ScreenSize, ui_scale: float) -> Layout:
-        state, scene = self.state, self.state.scene
-        return layout_of(
-            size,
-            scene.size if scene else None,
-            ui_scale=ui_scale,
-            beside=beside_of(state),
-            has_panel=not state.is_panel_hidden,
-            zoom=state.zoom,
-            own_width=(scene.own_size or scene.size).width if scene else None,
-        )
-
     def _draw_textures(self, layout: Layout) -> tuple[int | None, InspectionTextures]:
         """Draw the picture and what inspection shows to the end; return their textures."""
         self._prepare_gloss(self.state.optics.gloss)
@@ -245,8 +230,7 @@ class OffscreenScene:
         if request is not None:
             results: list[Entropy] = []
             EntropyWork()(request, results.append)
-            for result in results:
-                self.inspection.take_entropy(result)
+            self.inspection.take_entropy(results[0])
         self.do(do(set_probe, self.inspection.probe(self.state)))
         textures = self.inspection.draw(self.state, layout)
         while self.inspection.is_drawing:

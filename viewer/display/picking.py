@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
+from numpy.typing import NDArray
 
 from iibr_core.types import FloatImage, GridShape, ViewOffset
 
@@ -27,27 +28,17 @@ def pick_disparity(maps: Mapping[ViewOffset, FloatImage], eye: ViewOffset, x_px:
     if not maps:
         return None
     offset = min(maps, key=lambda o: (o.t - eye.t) ** 2 + (o.s - eye.s) ** 2)
-    step = ViewOffset(eye.t - offset.t, eye.s - offset.s)
-    return _disparity_at(maps[offset], step, x_px, y_px)
-
-
-def _disparity_at(disparity: FloatImage, step: ViewOffset, x_px: float, y_px: float) -> float:
-    rows, columns = _landing_area(disparity, step, x_px, y_px)
+    disparity, (t, s) = maps[offset], (eye.t - offset.t, eye.s - offset.s)
+    # Only this part of the view, from the smallest to the largest shift, may land at the pointer.
+    range_px = np.array([disparity.min(), disparity.max()], np.float64)
+    rows, columns = (_span(at, n) for at, n in zip((y_px + range_px * t, x_px + range_px * s), disparity.shape))
     values = disparity[rows, columns]
     y, x = np.mgrid[rows, columns]
-    distance = np.hypot(x - values * step.s - x_px, y - values * step.t - y_px)
+    distance = np.hypot(x - values * s - x_px, y - values * t - y_px)
     under = distance <= LANDING_RADIUS_PX
     return float(values[under].max() if under.any() else values.flat[distance.argmin()])
 
 
-def _landing_area(disparity: FloatImage, step: ViewOffset, x_px: float, y_px: float) -> tuple[slice, slice]:
-    """Return the part of the view that may land at the pointer, from the smallest to the largest shift."""
-    range_px = np.array([disparity.min(), disparity.max()], np.float64)
-    height, width = disparity.shape
-    return _span(y_px + range_px * step.t, height), _span(x_px + range_px * step.s, width)
-
-
-def _span(ends: np.ndarray, size: int) -> slice:
-    low = int(np.clip(np.floor(ends.min()) - 1, 0, size - 1))
-    high = int(np.clip(np.ceil(ends.max()) + 1, 0, size - 1))
+def _span(ends: NDArray[np.float64], size: int) -> slice:
+    low, high = np.clip([np.floor(ends.min()) - 1, np.ceil(ends.max()) + 1], 0, size - 1).astype(int)
     return slice(low, high + 1)

@@ -17,7 +17,7 @@ from iibr_core.scenes.rect import WHOLE, Rect
 from iibr_core.scenes.scene import LoadedPhoto, Scene, SceneReady
 from iibr_core.scenes.scene_gloss import GlossRequest, gloss_request
 from iibr_core.scenes.screen_size import ScreenSize
-from iibr_core.types import FloatImage, GridShape, InputError, ViewOffset, ViewUpdate
+from iibr_core.types import FloatImage, GridShape, ViewOffset, ViewUpdate
 from viewer.display.picking import is_kept_for_picking, pick_disparity
 from viewer.display.snapshot import SceneSnapshot
 from viewer.gpu.context import GLContext
@@ -33,13 +33,10 @@ VIEW_REFRESH_S = 0.25
 
 STILL_BUDGET_S = 0.08
 """Time for a picture that only new views change, in seconds: no hand waits for it, and it is shown longer."""
-
 NO_MORE_VIEWS_S = 2.0
 """Seconds without a new view after which no view is expected."""
-
 WAITING_VIEWS = 4
 """Number of waiting views at which the worker pauses."""
-
 PREVIEW_GRID = GridShape(1, 1)
 """Grid of the field that holds the centre view until the second view comes."""
 
@@ -55,44 +52,31 @@ class SceneView:
     def __init__(self, gl: GLContext) -> None:
         self._gl = gl
         self.renderer = Renderer(gl)
-        self.generation = 0
+        self.generation = self.views_uploaded = self.pictures_drawn = self.previews = 0
         self.loaded: LoadedPhoto | None = None
-        self.views_uploaded = 0
-        self.pictures_drawn = 0
-        self.previews = 0
-        self._scene: Scene | None = None
         self.centre: ViewUpdate | None = None
+        self.picture_drawn: Picture | None = None
+        self._scene: Scene | None = None
         self._fallback_view: ViewUpdate | None = None
         self._gloss: GlossMaps | None = None
-        self._is_preview = self._is_edited = False
+        self._is_preview = self._is_edited = self._shows_one_view = False
         self._waiting: deque[ViewUpdate] = deque()
         self._is_final: dict[tuple[int, int], bool] = {}
         self._disparities: dict[ViewOffset, FloatImage] = {}
-        self.picture_drawn: Picture | None = None
-        self._drawn_at = 0.0
-        self._shows_one_view = False
-        self._view_came_at = 0.0
+        self._drawn_at = self._view_came_at = 0.0
 
     def open(self, ready: SceneReady) -> None:
         """Show this scene from now on. Raises InputError if it does not fit the graphics card; the old scene stays.
 
         The first view has a field of its own until the second comes, because allocating a whole field takes a while.
         """
-        scene = ready.scene
+        scene, centre = ready.scene, ready.centre
         self.show_fallback(None)
-        known, self._gloss = self._gloss, None
-        try:
-            self._open_field(scene, PREVIEW_GRID)
-        except InputError:
-            self._gloss = known
-            raise
-        self.renderer.upload_view(0, 0, ready.centre.colors, ready.centre.disparity)
-        self.generation, self.loaded, self._scene, self.centre = ready.generation, ready.loaded, scene, ready.centre
-        self._is_preview, self._is_edited = True, False
-        self.views_uploaded, self._is_final = 1, {scene.grid.centre: ready.centre.is_final}
-        self._waiting.clear()
+        self._show_alone(scene, centre, centre.disparity, None)
+        self.generation, self.loaded, self._scene, self.centre = ready.generation, ready.loaded, scene, centre
+        self._gloss, self._is_edited = None, False
         self._disparities.clear()
-        self._keep_for_picking(scene, ready.centre)
+        self._keep_for_picking(scene, centre)
 
     def show_disparity(self, disparity: FloatImage) -> None:
         """Show the photo warped by this field disparity (H, W) in place of its views, until views of a new plan come.
@@ -107,11 +91,7 @@ class SceneView:
         differs = None if shown is None else shown != disparity
         self._is_edited = True
         if differs is None or field.is_shared or _is_beyond(disparity[differs], field.range_px):
-            self._open_field(scene, PREVIEW_GRID)
-            self.views_uploaded, self._is_final = 1, {scene.grid.centre: True}
-            self._is_preview = True
-            self._waiting.clear()
-            self.renderer.upload_view(0, 0, centre.colors, disparity)
+            self._show_alone(scene, replace(centre, is_final=True), disparity, self._gloss)
         elif differs.any():
             self.renderer.change_disparity(0, 0, disparity, box_around(differs))
         self._disparities = {CENTRE: disparity}
@@ -139,14 +119,15 @@ class SceneView:
 
     def add(self, view: ViewUpdate) -> None:
         """Take a view of the open scene, to be uploaded later. Raises InputError if there is no room for all views."""
-        scene = self._scene
+        scene, centre = self._scene, self.centre
         assert scene is not None
+        assert centre is not None
         if (view.row, view.column) == scene.grid.centre:
             self._is_final[scene.grid.centre] = view.is_final
             return  # uploaded when the scene was opened
-        if self._is_preview and self.centre is not None:
-            self._open_field(scene, scene.grid)
-            self.renderer.upload_view(*scene.grid.centre, self.centre.colors, self.centre.disparity)
+        if self._is_preview:
+            self._open_field(scene, scene.grid, self._gloss)
+            self.renderer.upload_view(*scene.grid.centre, centre.colors, centre.disparity)
             self._is_preview = False
         self._waiting.append(view)
         self._view_came_at = time.perf_counter()
@@ -162,12 +143,12 @@ class SceneView:
 
         A present view is not replaced while another holder draws a picture of the views.
         """
-        end = time.perf_counter() + budget_s
+        end, field = time.perf_counter() + budget_s, self.renderer.field
         while self._waiting and time.perf_counter() < end:
-            field, view = self.renderer.field, self._waiting[0]
+            view = self._waiting[0]
             if (view.row, view.column) in self._is_final and field is not None and field.is_shared:
                 break
-            view = self._waiting.popleft()
+            self._waiting.popleft()
             self.renderer.upload_view(view.row, view.column, view.colors, view.disparity)
             self.views_uploaded += 1
             self._is_final[view.row, view.column] = view.is_final
@@ -175,8 +156,7 @@ class SceneView:
 
     def upload_all(self) -> None:
         """Upload every waiting view."""
-        while self.upload(math.inf):
-            pass
+        self.upload(math.inf)
 
     def pick(self, eye: ViewOffset, x_px: float, y_px: float) -> float | None:
         """Return the disparity seen at a pixel of the picture, None if the scene has none."""
@@ -191,26 +171,26 @@ class SceneView:
         """
         if self.views_uploaded == 0:
             return None
-        wanted = Picture(
-            self.generation, self.views_uploaded, state.shown_optics, size_px, previews=self.previews, part=part
-        )
-        budget_s = self._gl.frame_budget_s
-        if self.picture_drawn is not None and self._shows_one_view and self._differs_by_views_only(wanted):
-            wanted = self.picture_drawn
-        if self.picture_drawn is None or (not self._is_same(wanted) and not self._can_wait(wanted)):
-            is_still = self._differs_by_views_only(wanted)
-            if is_still and self.renderer.passes_shown:  # the shown picture must not become softer
-                self.renderer.renew(wanted.optics, wanted.size_px, part)
+        optics, drawn, budget_s = state.shown_optics, self.picture_drawn, self._gl.frame_budget_s
+        picture = Picture(self.generation, self.views_uploaded, optics, size_px, previews=self.previews, part=part)
+        if drawn is not None and drawn == replace(picture, views_uploaded=drawn.views_uploaded, samples=drawn.samples):
+            is_same = self.shows_all_views()
+            if self.renderer.is_renewing or (is_same and self._refines()):
+                self.renderer.refine(budget_s)
+                self.picture_drawn = replace(drawn, samples=drawn.samples + 1)
+                return self.picture_drawn
+            if is_same or time.perf_counter() - self._drawn_at < VIEW_REFRESH_S:
+                return drawn
+            if self.renderer.passes_shown:  # the shown picture must not become softer
+                self.renderer.renew(optics, size_px, part)
             else:
-                budget_s = STILL_BUDGET_S if is_still else budget_s
-                self.renderer.render_in_time(wanted.optics, wanted.size_px, budget_s, part)
-            self._drawn_at = time.perf_counter()
-            self.pictures_drawn += 1
-            self._shows_one_view = self._is_one_view(wanted.optics)
-            self.picture_drawn = replace(wanted, samples=self.renderer.samples)
-        elif self.renderer.is_renewing or (self._is_same(wanted) and self._refines()):
-            self.renderer.refine(budget_s)
-            self.picture_drawn = replace(self.picture_drawn, samples=self.picture_drawn.samples + 1)
+                self.renderer.render_in_time(optics, size_px, STILL_BUDGET_S, part)
+        else:
+            self.renderer.render_in_time(optics, size_px, budget_s, part)
+        self._drawn_at = time.perf_counter()
+        self.pictures_drawn += 1
+        self._shows_one_view = self._is_one_view(optics)
+        self.picture_drawn = replace(picture, samples=self.renderer.samples)
         return self.picture_drawn
 
     @property
@@ -228,10 +208,7 @@ class SceneView:
     @property
     def is_whole(self) -> bool:
         """Whether every view is present and final, and no edit of the depth is previewed."""
-        scene = self._scene
-        if scene is None or scene.is_sketch or self._is_edited:
-            return False
-        return sum(self._is_final.values()) == scene.grid.rows * scene.grid.columns
+        return self._scene is not None and not self._scene.is_sketch and not self._is_edited and self._has_all_views
 
     def snapshot(self) -> SceneSnapshot | None:
         """Return a snapshot of the shown views, to be released; None before anything is open."""
@@ -245,25 +222,29 @@ class SceneView:
         drawn = self.picture_drawn
         return drawn is None or self._shows_one_view or drawn.views_uploaded == self.views_uploaded
 
-    def _open_field(self, scene: Scene, grid: GridShape) -> None:
+    def release(self) -> None:
+        """Free the GL objects."""
+        self.renderer.release()
+
+    def _show_alone(
+        self, scene: Scene, centre: ViewUpdate, disparity: FloatImage | None, gloss: GlossMaps | None
+    ) -> None:
+        """Show the centre view in a field of one view."""
+        self._open_field(scene, PREVIEW_GRID, gloss)
+        self.renderer.upload_view(0, 0, centre.colors, disparity)
+        self.views_uploaded, self._is_final = 1, {scene.grid.centre: centre.is_final}
+        self._is_preview = True
+        self._waiting.clear()
+
+    def _open_field(self, scene: Scene, grid: GridShape, gloss: GlossMaps | None) -> None:
         self.renderer.open_field(
             grid, scene.width, scene.height, scene.is_hdr, scene.has_view_disparity, scene.color_space
         )
-        if self._gloss is not None:
-            self.renderer.set_gloss(self._gloss)
+        self.renderer.set_gloss(gloss)
 
     def _keep_for_picking(self, scene: Scene, view: ViewUpdate) -> None:
         if view.disparity is not None and is_kept_for_picking(scene.grid, view.row, view.column):
             self._disparities[scene.grid.offset(view.row, view.column)] = view.disparity
-
-    def _can_wait(self, wanted: Picture) -> bool:
-        """Return whether only views have changed since a picture that is recent or not finished."""
-        is_new = self.renderer.is_renewing or time.perf_counter() - self._drawn_at < VIEW_REFRESH_S
-        return is_new and self._differs_by_views_only(wanted)
-
-    def _differs_by_views_only(self, wanted: Picture) -> bool:
-        drawn = self.picture_drawn
-        return drawn is not None and self._is_same(replace(wanted, views_uploaded=drawn.views_uploaded))
 
     def _is_one_view(self, optics: Optics) -> bool:
         """Return whether this picture is one final view, so that views to come do not change it."""
@@ -272,23 +253,15 @@ class SceneView:
         (v, u), (t, s) = self._scene.grid.centre, map(round, optics.eye)
         return (t, s) == optics.eye and self._is_final.get((v + t, u + s), False)
 
-    def _is_same(self, wanted: Picture) -> bool:
-        """Return whether the last picture is this one, at any number of samples."""
-        drawn = self.picture_drawn
-        return drawn is not None and replace(wanted, samples=drawn.samples) == drawn
+    @property
+    def _has_all_views(self) -> bool:
+        return self._scene is not None and sum(self._is_final.values()) == math.prod(self._scene.grid)
 
     def _refines(self) -> bool:
         """Return whether there is more to draw, and time for it: the processor has none while it makes views."""
-        if self.renderer.is_converged:
-            return False
-        scene = self._scene
-        views_final = sum(self._is_final.values())
-        has_all = scene is not None and views_final == scene.grid.rows * scene.grid.columns
-        return has_all or self._shows_one_view or time.perf_counter() - self._view_came_at > NO_MORE_VIEWS_S
-
-    def release(self) -> None:
-        """Free the GL objects."""
-        self.renderer.release()
+        is_quiet = self._has_all_views or self._shows_one_view
+        is_quiet = is_quiet or time.perf_counter() - self._view_came_at > NO_MORE_VIEWS_S
+        return not self.renderer.is_converged and is_quiet
 
 
 def _is_beyond(values: FloatImage, range_px: tuple[float, float]) -> bool:

@@ -16,8 +16,10 @@ if TYPE_CHECKING:
 
 @dataclass(eq=False)
 class SceneSnapshot:
-    """loaded: None for a light field from disk. field: its views, held until `release`. gloss: maps of its
-    glossy surface, None if not known. is_free_view: the field is the view of a free camera.
+    """A scene and its views.
+
+    loaded: None for a light field from disk. field: the views, held until `release`, which is for the window's thread.
+    gloss: maps of the glossy surface, None if not known. is_free_view: the field is the view of a free camera.
     """
 
     scene: Scene
@@ -33,7 +35,7 @@ class SceneSnapshot:
         self.gloss = maps
 
     def release(self) -> None:
-        """Release the views. Only in the thread of the window."""
+        """Release the views."""
         self.field.release()
 
 
@@ -43,8 +45,8 @@ def snapshot_of(gl: GLContext, ready: SceneReady) -> SceneSnapshot:
     Raises InputError if it does not fit the graphics card.
     """
     scene, centre = ready.scene, ready.centre
-    size = scene.width, scene.height, scene.is_hdr, scene.has_view_disparity
-    field = LightFieldTexture(gl.ctx, scene.grid, *size)
-    field.color_space = scene.color_space
+    field = LightFieldTexture(
+        gl.ctx, scene.grid, scene.width, scene.height, scene.is_hdr, scene.has_view_disparity, scene.color_space
+    )
     field.upload(*scene.grid.centre, centre.colors, centre.disparity)
     return SceneSnapshot(scene, ready.loaded, centre, field)

@@ -79,11 +79,10 @@ def _create(name: str) -> GLContext:
     settings: dict[str, Any] = {"backend": "egl"} if name == "egl" else {}
     remedy = "install libegl1 and libgl1-mesa-dri" if name == "egl" else "install the driver of the graphics card"
     try:
-        ctx = moderngl.create_context(require=330, standalone=True, **settings)
+        return GLContext(moderngl.create_context(require=330, standalone=True, **settings), name)
     except Exception as error:  # the loader raises plain Exception for every failure
         reason = str(error).partition("\n")[0]
         raise InputError(f"{name}: {reason} ({remedy})") from error
-    return GLContext(ctx, name)
 
 
 def create_for_window(window: Any) -> GLContext:
@@ -103,11 +102,11 @@ def _create_osmesa() -> GLContext:
         window = _null_window()
     try:
         if window is None:
-            raise InputError("osmesa: libOSMesa not found or too old (install libosmesa6)")
+            raise ValueError("libOSMesa not found or too old (install libosmesa6)")
         return GLContext(_context_of(window), "osmesa", partial(_close_null_window, window))
-    except (InputError, ValueError, moderngl.Error) as error:
+    except (ValueError, moderngl.Error) as error:
         _close_null_window(window)
-        raise error if isinstance(error, InputError) else InputError(f"osmesa: {error}") from error
+        raise InputError(f"osmesa: {error}") from error
 
 
 def _null_window() -> Any | None:
@@ -119,11 +118,14 @@ def _null_window() -> Any | None:
     if not is_ready:
         return None
     glfw.default_window_hints()
-    glfw.window_hint(glfw.CONTEXT_CREATION_API, glfw.OSMESA_CONTEXT_API)
-    glfw.window_hint(glfw.CONTEXT_VERSION_MAJOR, 3)
-    glfw.window_hint(glfw.CONTEXT_VERSION_MINOR, 3)
-    glfw.window_hint(glfw.OPENGL_PROFILE, glfw.OPENGL_CORE_PROFILE)
-    glfw.window_hint(glfw.VISIBLE, glfw.FALSE)
+    for hint, value in (
+        (glfw.CONTEXT_CREATION_API, glfw.OSMESA_CONTEXT_API),
+        (glfw.CONTEXT_VERSION_MAJOR, 3),
+        (glfw.CONTEXT_VERSION_MINOR, 3),
+        (glfw.OPENGL_PROFILE, glfw.OPENGL_CORE_PROFILE),
+        (glfw.VISIBLE, glfw.FALSE),
+    ):
+        glfw.window_hint(hint, value)
     window = glfw.create_window(16, 16, "iibr", None, None)
     glfw.default_window_hints()
     return window or None

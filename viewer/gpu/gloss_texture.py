@@ -1,14 +1,13 @@
-"""Maps of a glossy surface on the graphics card. Light, roughness and reflectance are uniforms."""
+"""Maps of a glossy surface on the graphics card, and GL objects that several holders share."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import moderngl
 
 from iibr_core.gloss.settings import Gloss
 from viewer.gpu.programs import Program
-from viewer.gpu.shared import Holders
 
 if TYPE_CHECKING:
     from iibr_core.gloss.shading import GlossMaps
@@ -17,8 +16,31 @@ UNIT = 8
 """Texture unit; the passes use smaller numbers."""
 
 
-class GlossTexture:
-    """A glossy surface as a texture; see shaders/include/gloss.glsl."""
+class Shared:
+    """GL objects with several holders, each of which calls `release` once; the last call frees them."""
+
+    def __init__(self, *objects: Any) -> None:
+        self._objects, self._holders = objects, 1
+
+    @property
+    def is_shared(self) -> bool:
+        """Whether there are several holders."""
+        return self._holders > 1
+
+    def hold(self) -> None:
+        """Count a holder."""
+        self._holders += 1
+
+    def release(self) -> None:
+        """Count a holder less."""
+        self._holders -= 1
+        if self._holders == 0:
+            for gl_object in self._objects:
+                gl_object.release()
+
+
+class GlossTexture(Shared):
+    """A glossy surface as a texture, see shaders/include/gloss.glsl. Light and roughness are uniforms."""
 
     def __init__(self, ctx: moderngl.Context, maps: GlossMaps) -> None:
         """maps: of the field's size."""
@@ -27,7 +49,7 @@ class GlossTexture:
         self._texture = ctx.texture((width, height), channels, maps.packed.tobytes(), dtype="f4", alignment=1)
         self._texture.filter = moderngl.LINEAR, moderngl.LINEAR
         self._texture.repeat_x = self._texture.repeat_y = False
-        self._holders = Holders(self._texture.release)
+        super().__init__(self._texture)
 
     def use(self, program: Program, gloss: Gloss, eye: tuple[float, float]) -> None:
         """Bind the texture and set the uniforms of a program with GLOSS. eye: (s, t) in view steps."""
@@ -42,12 +64,3 @@ class GlossTexture:
             gloss_radiance=gloss.light.radiance,
             gloss_lobe=gloss.lobe,
         )
-
-    def share(self) -> GlossTexture:
-        """Return the same texture for another holder, who must release it too."""
-        self._holders.add()
-        return self
-
-    def release(self) -> None:
-        """Free the texture, unless another holder needs it."""
-        self._holders.release()

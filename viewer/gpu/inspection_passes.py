@@ -20,7 +20,6 @@ from viewer.gpu.render_targets import RenderTarget
 
 MAX_VIEWS = 128
 """Largest number of views of a row or column of the grid, as in shaders/epi.frag."""
-
 MAX_TAPS = 3
 """Largest number of places, in each direction, that a pixel of a view drawn smaller averages."""
 
@@ -51,17 +50,14 @@ class InspectionPasses:
     """Draws images; each method returns the GL name of a texture, which its next call may change."""
 
     def __init__(self, ctx: moderngl.Context, programs: ProgramCache) -> None:
-        self._ctx = ctx
-        self._programs = programs
+        self._ctx, self._programs = ctx, programs
         self._images: dict[str, RenderTarget] = {}
         self._textures: dict[str, moderngl.Texture] = {}
 
     def release(self) -> None:
         """Free every GL object."""
-        for image in self._images.values():
-            image.release()
-        for texture in self._textures.values():
-            texture.release()
+        for held in (*self._images.values(), *self._textures.values()):
+            held.release()
         self._images.clear()
         self._textures.clear()
 
@@ -73,9 +69,9 @@ class InspectionPasses:
         program = self._programs.get("epi.frag", switches | _conversion(field))
         views = np.s_[:MAX_VIEWS, line.view] if line.is_upright else np.s_[line.view, :MAX_VIEWS]
         layers = np.where(field.present, field.layers, -1)[views].tolist()
-        self._use_colors(program, field, exposure)
-        program.set_uniforms(layers=layers + [-1] * (MAX_VIEWS - len(layers)), view_count=len(layers))
-        program.set_uniforms(line=line.at, span=line.span)
+        _use_colors(program, field, exposure)
+        padded = layers + [-1] * (MAX_VIEWS - len(layers))
+        program.set_uniforms(layers=padded, view_count=len(layers), line=line.at, span=line.span)
         if gloss is not None and field.gloss is not None:
             first = field.grid.offset(0, line.view) if line.is_upright else field.grid.offset(line.view, 0)
             far, near = field.range_px
@@ -167,16 +163,11 @@ class InspectionPasses:
     ) -> None:
         program = self._programs.get("stored_view.frag", _conversion(field))
         self._ctx.disable(moderngl.BLEND)
-        self._use_colors(program, field, exposure)
+        _use_colors(program, field, exposure)
         taps = min(math.ceil(max(field.width / size_px[0], field.height / size_px[1])), MAX_TAPS)
         layer = float(field.layers[view]) if field.present[view] else -1.0
         program.set_uniforms(layer=layer, taps=max(taps, 1), pixel=(1 / size_px[0], 1 / size_px[1]))
         program.draw()
-
-    def _use_colors(self, program: Program, field: LightFieldTexture, exposure: float) -> None:
-        field.colors.use(0)
-        program.set_uniforms(colors=0, exposure=exposure)
-        program.set_primaries(SRGB, field.color_space)
 
     def _use_image(self, name: str, size_px: ScreenSize) -> int:
         """Draw into this image from now on; return its texture. Another size replaces it."""
@@ -205,3 +196,9 @@ class InspectionPasses:
 def _conversion(field: LightFieldTexture) -> dict[str, bool]:
     """Return the switch for the conversion to the screen's sRGB."""
     return {"OTHER_PRIMARIES": field.color_space != SRGB}
+
+
+def _use_colors(program: Program, field: LightFieldTexture, exposure: float) -> None:
+    field.colors.use(0)
+    program.set_uniforms(colors=0, exposure=exposure)
+    program.set_primaries(SRGB, field.color_space)

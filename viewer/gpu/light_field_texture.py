@@ -16,9 +16,8 @@ from numpy.typing import NDArray
 
 from iibr_core.color import encoded_from_stored, linear_from_srgb
 from iibr_core.remedies import FixableError, Remedy
-from iibr_core.types import SRGB, FloatImage, GridShape, InputError, StoredColors
-from viewer.gpu.gloss_texture import GlossTexture
-from viewer.gpu.shared import Holders
+from iibr_core.types import SRGB, ColorSpace, FloatImage, GridShape, InputError, StoredColors
+from viewer.gpu.gloss_texture import GlossTexture, Shared
 
 if TYPE_CHECKING:
     from iibr_core.gloss.shading import GlossMaps
@@ -51,6 +50,7 @@ class LightFieldTexture:
         height: int,
         hdr: bool,
         with_disparity: bool,
+        color_space: ColorSpace = SRGB,
         is_single: bool = False,
     ) -> None:
         """Allocate the arrays. is_single: there is room for one view only.
@@ -60,20 +60,17 @@ class LightFieldTexture:
         count = 1 if is_single else math.prod(grid)
         check_fits(ctx, GridShape(1, 1) if is_single else grid, width, height)
         self._ctx = ctx
-        self.grid, self.width, self.height, self.hdr = grid, width, height, hdr
+        self.grid, self.width, self.height, self.hdr, self.color_space = grid, width, height, hdr, color_space
         self.layers = np.arange(math.prod(grid)).reshape(grid) * (not is_single)
-        self.present = np.zeros(grid, bool)
-        self.has_disparity = np.zeros(grid, bool)
-        self.uploads = np.zeros(grid, int)
+        self.present, self.has_disparity, self.uploads = np.zeros(grid, bool), np.zeros(grid, bool), np.zeros(grid, int)
         self.range_px = (0.0, 0.0)
-        self.color_space = SRGB
         self.gloss: GlossTexture | None = None
         self.colors = _allocate(ctx, (width, height, count), 4, "f2" if hdr else "f1")
         self.colors.filter = (moderngl.LINEAR, moderngl.LINEAR)
         self.disparities = _allocate(ctx, (width, height, count) if with_disparity else (1, 1, 1), 1, "f2")
         self.disparities.filter = (moderngl.NEAREST, moderngl.NEAREST)
         self._texels = np.zeros((height, width, 4), np.float16 if hdr else np.uint8)
-        self._holders = Holders(self._free)
+        self._arrays = Shared(self.colors, self.disparities)
 
     def upload(self, row: int, column: int, colors: StoredColors, disparity: FloatImage | None) -> None:
         """Store the view at index (row, column).
@@ -84,7 +81,7 @@ class LightFieldTexture:
         if disparity is not None and keeps_disparity:
             if not self.has_disparity.any():
                 self.range_px = _range_of(_finite_half(disparity))
-            self._store_disparity(row, column, disparity, (slice(0, self.height), slice(0, self.width)))
+            self._store_disparity(row, column, disparity, np.s_[0 : self.height, 0 : self.width])
         else:
             self._texels[..., 3] = 0
         np.copyto(self._texels[..., :3], _root_of_linear(colors, self.hdr), casting="same_kind")
@@ -120,24 +117,21 @@ class LightFieldTexture:
         """
         shared = copy(self)
         shared.present, shared.has_disparity = self.present.copy(), self.has_disparity.copy()
-        shared.gloss = None if self.gloss is None else self.gloss.share()
-        self._holders.add()
+        if self.gloss is not None:
+            self.gloss.hold()
+        self._arrays.hold()
         return shared
 
     @property
     def is_shared(self) -> bool:
         """Whether the arrays have other holders."""
-        return self._holders.is_shared
+        return self._arrays.is_shared
 
     def release(self) -> None:
         """Free the arrays, unless another holder needs them."""
         if self.gloss is not None:
             self.gloss.release()
-        self._holders.release()
-
-    def _free(self) -> None:
-        self.colors.release()
-        self.disparities.release()
+        self._arrays.release()
 
     def _viewport(self, row: int, column: int, box: Box) -> tuple[int, int, int, int, int, int]:
         rows, columns = box
@@ -166,22 +160,21 @@ def check_fits(ctx: moderngl.Context, grid: GridShape, width: int, height: int) 
 
 def _allocate(ctx: moderngl.Context, size: tuple[int, int, int], components: int, dtype: str) -> moderngl.TextureArray:
     ctx.error  # noqa: B018  (reading it clears errors of earlier calls)
+    texture = None
     try:
         texture = ctx.texture_array(size, components, dtype=dtype)
         problem = ctx.error
     except moderngl.Error as error:
-        raise FixableError(_no_memory(size, components, dtype, str(error)), Remedy.SMALLER) from error
-    if problem != "GL_NO_ERROR":
-        texture.release()
-        raise FixableError(_no_memory(size, components, dtype, problem), Remedy.SMALLER)
+        problem = str(error)
+    if texture is None or problem != "GL_NO_ERROR":
+        if texture is not None:
+            texture.release()
+        width, height, layers = size
+        mebibytes = width * height * layers * components * (2 if dtype == "f2" else 1) // 2**20
+        message = f"no room for {layers} views of {width}x{height} ({mebibytes} MiB, {problem})"
+        raise FixableError(message, Remedy.SMALLER)
     texture.repeat_x = texture.repeat_y = False
     return texture
-
-
-def _no_memory(size: tuple[int, int, int], components: int, dtype: str, problem: str) -> str:
-    width, height, layers = size
-    mebibytes = width * height * layers * components * (2 if dtype == "f2" else 1) // 2**20
-    return f"no room for {layers} views of {width}x{height} ({mebibytes} MiB, {problem})"
 
 
 def _root_of_linear(colors: StoredColors, hdr: bool) -> StoredColors:

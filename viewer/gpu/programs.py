@@ -34,7 +34,7 @@ class Program:
         folder, defines = folder or resource_folder("shaders"), dict.fromkeys(switches, 1)
         vertex, source = (flatten(folder / name, defines) for name in ("fullscreen.vert", fragment))
         try:
-            self._program = ctx.program(vertex_shader=vertex.text, fragment_shader=source.text)
+            self._program: Any = ctx.program(vertex_shader=vertex.text, fragment_shader=source.text)
         except moderngl.Error as error:
             stage = vertex if "vertex_shader" in str(error) else source
             raise ShaderError(_with_places(str(error), stage, fragment)) from error
@@ -52,8 +52,7 @@ class Program:
                 similar = difflib.get_close_matches(name, self._declared, n=1)
                 hint = f"; did you mean {similar[0]}?" if similar else ""
                 raise KeyError(f"{self._name} declares no uniform {name}{hint}")
-            member: Any = self._program.get(name, None)
-            if member is not None:
+            if (member := self._program.get(name, None)) is not None:
                 member.value = value
 
     def set_primaries(self, target: ColorSpace, source: ColorSpace) -> None:
@@ -63,8 +62,7 @@ class Program:
     def use_block(self, name: str, buffer: moderngl.Buffer) -> None:
         """Use a buffer as the uniform block of this name."""
         buffer.bind_to_uniform_block(0)
-        block: Any = self._program.get(name, None)
-        if block is not None:
+        if (block := self._program.get(name, None)) is not None:
             block.binding = 0
 
     def draw(self) -> None:
@@ -98,7 +96,7 @@ class ProgramCache:
 
     def __init__(self, ctx: moderngl.Context) -> None:
         self._ctx = ctx
-        self._programs: dict[tuple[str, tuple[str, ...]], Program] = {}
+        self._programs: dict[tuple[str, ...], Program] = {}
 
     def __len__(self) -> int:
         """Return the number of programs compiled so far."""
@@ -106,10 +104,10 @@ class ProgramCache:
 
     def get(self, fragment: str, switches: Mapping[str, bool] | None = None) -> Program:
         """Return the program of a fragment shader with those switches that are on. Raises ShaderError."""
-        names = tuple(name for name, is_on in (switches or {}).items() if is_on)
-        if (fragment, names) not in self._programs:
-            self._programs[fragment, names] = Program(self._ctx, fragment, names)
-        return self._programs[fragment, names]
+        key = fragment, *(name for name, is_on in (switches or {}).items() if is_on)
+        if key not in self._programs:
+            self._programs[key] = Program(self._ctx, fragment, key[1:])
+        return self._programs[key]
 
     def release(self) -> None:
         """Free every program."""

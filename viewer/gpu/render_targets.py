@@ -10,17 +10,19 @@ from numpy.typing import NDArray
 
 from iibr_core.scenes.screen_size import ScreenSize
 
+KEPT_SIZES = 2
+"""Number of picture sizes whose targets are kept: a picture drawn quickly is smaller than the next."""
+
 
 class RenderTarget:
     """An RGBA texture of a size and its framebuffer. dtype: "f1" for bytes, "f4" for floats."""
 
     def __init__(self, ctx: moderngl.Context, size_px: ScreenSize, dtype: str) -> None:
-        self._ctx = ctx
+        self._ctx, self._dtype = ctx, dtype
         self.size_px = ScreenSize(*size_px)
         self.texture = ctx.texture(size_px, 4, dtype=dtype)
         self.texture.repeat_x = self.texture.repeat_y = False
         self.framebuffer = ctx.framebuffer([self.texture])
-        self._dtype = dtype
 
     def read(self) -> NDArray[Any]:
         """Return the colours of a picture drawn bottom-up, (H, W, 3), bytes or floats, row 0 at the top."""
@@ -48,3 +50,30 @@ class PictureTargets:
         """Free both."""
         self.image.release()
         self.light.release()
+
+
+class TargetCache:
+    """Targets of the last sizes. shown: the targets whose image is on the screen, None before the first picture."""
+
+    def __init__(self, ctx: moderngl.Context) -> None:
+        self._ctx = ctx
+        self._targets: dict[ScreenSize, PictureTargets] = {}
+        self.shown: PictureTargets | None = None
+
+    def get(self, size_px: ScreenSize) -> PictureTargets:
+        """Return the targets of this size; those of the size used longest ago are freed."""
+        targets = self._targets.pop(size_px, None) or PictureTargets(self._ctx, size_px)
+        while len(self._targets) >= KEPT_SIZES:
+            self._forget_oldest()
+        self._targets[size_px] = targets
+        return targets
+
+    def release(self) -> None:
+        """Free every GL object."""
+        while self._targets:
+            self._forget_oldest()
+
+    def _forget_oldest(self) -> None:
+        oldest = self._targets.pop(next(iter(self._targets)))
+        self.shown = None if self.shown is oldest else self.shown
+        oldest.release()

@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.scenes.scene import SceneReady
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import ViewOffset
@@ -105,15 +104,3 @@ def test_a_view_stands_in_before_the_second_view_of_the_scene_has_come(opened: O
     view.upload_all()
     view.converge(opened.state, SIZE)
     assert view.renderer.read_image().min() == 255
-
-
-def test_a_picture_of_one_view_drawn_in_a_hurry_becomes_whole_though_views_come(opened: OffscreenScene) -> None:
-    view = opened.view
-    opened.do(do(lens.set_aperture, 0.0))
-    view.draw(opened.state, SIZE)
-    assert view.renderer.passes_shown == 0, "softer than it will be"
-    a_view_comes(view)
-    view.converge(opened.state, SIZE)
-    assert view.renderer.passes_shown > 0
-    whole = view.renderer.converged_picture(RenderSettings(opened.state.optics, SIZE))
-    assert np.array_equal(view.renderer.read_image(), whole)

@@ -60,9 +60,8 @@ class TwoPlanes:
     def fill(self, renderer: Renderer, grid: GridShape, with_disparity: bool = True) -> None:
         """Open the field and upload every view."""
         self.open(renderer, grid, with_disparity)
-        for row in range(grid.rows):
-            for column in range(grid.columns):
-                self.upload(renderer, grid, row, column, with_disparity)
+        for at in np.ndindex(*grid):
+            self.upload(renderer, grid, *at, with_disparity)
 
 
 class PhotoLike(TwoPlanes):
@@ -139,6 +138,14 @@ def first_frame(renderer: Renderer, optics: Optics, scene: TwoPlanes) -> NDArray
     """The picture that is drawn at once."""
     renderer.render(optics, ScreenSize(scene.width, scene.height))
     return renderer.read_image()
+
+
+def open_views(renderer: Renderer, grid: GridShape, colors: NDArray[np.uint8], disparity: Numbers) -> None:
+    """Open a field whose views all have these colours (H, W, 3) and this disparity."""
+    height, width = colors.shape[:2]
+    renderer.open_field(grid, width, height, hdr=False, with_disparity=True)
+    for at in np.ndindex(*grid):
+        renderer.upload_view(*at, colors, np.full((height, width), disparity, np.float32))
 
 
 def rms(image: NDArray[np.uint8], expected: NDArray[np.uint8], border: int = 8) -> float:

@@ -4,19 +4,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from iibr_core.beyond.picture_quality import QUALITY_LEVELS, QualityLevel
-from viewer.gpu.refocus.frame_budget import (
-    OVERHEAD_S,
-    DrawCost,
-    FrameTimeModel,
-    choose_quality_level,
-    stretch_image,
-)
+from viewer.gpu.refocus.frame_budget import OVERHEAD_S, DrawCost, FrameTimeModel, choose_quality_level
 
 PIXELS = 400_000
 LENS = DrawCost(samples=12, warps=True, pixels=PIXELS)
@@ -55,22 +46,3 @@ def test_a_picture_near_the_limit_does_not_change_back_and_forth() -> None:
     assert worse > 3
     assert choose_quality_level(work_in, frame_time, budget_s, worse) == worse, "barely enough time: it stays"
     assert choose_quality_level(work_in, frame_time, 1.3 * budget_s, worse) <= 3, "time to spare: it becomes better"
-
-
-@given(
-    width=st.integers(1, 9),
-    height=st.integers(1, 9),
-    to=st.tuples(st.integers(1, 30), st.integers(1, 30)),
-    seed=st.integers(0, 99),
-)
-def test_stretched_against_plain_interpolation(width: int, height: int, to: tuple[int, int], seed: int) -> None:
-    image = np.random.default_rng(seed).integers(0, 256, (height, width, 3), dtype=np.uint8)
-
-    def along(values: np.ndarray, length: int) -> np.ndarray:
-        at = (np.arange(length) + 0.5) * len(values) / length - 0.5
-        columns = [np.interp(at, np.arange(len(values)), column) for column in values.reshape(len(values), -1).T]
-        return np.stack(columns, -1).reshape(length, *values.shape[1:])
-
-    expected = along(along(image.astype(float), to[1]).swapaxes(0, 1), to[0]).swapaxes(0, 1)
-    assert stretch_image(image, to).shape == (to[1], to[0], 3)
-    assert np.abs(stretch_image(image, to) - expected).max() <= 0.51

@@ -5,6 +5,7 @@ Expected everywhere: no GL error (the `gl` fixture looks), and a picture within 
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import replace
 from pathlib import Path
@@ -20,7 +21,7 @@ from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.scenes.lens_limits import eye_limits
 from iibr_core.types import GridShape, ViewOffset
 from tests.image_compare import ROUNDING, assert_close
-from tests.viewer.gpu.scenes import TwoPlanes, rms
+from tests.viewer.gpu.scenes import TwoPlanes, open_views, rms
 from viewer.gpu.refocus.picture_renderer import Renderer
 
 SCENE = TwoPlanes(width=48, height=32, radius_px=8.0)
@@ -34,15 +35,11 @@ def picture(renderer: Renderer, optics: Optics, size: tuple[int, int] = SIZE) ->
     return renderer.read_image().astype(int)
 
 
-def open_constant(renderer: Renderer, grid: GridShape, disparity: float, size: tuple[int, int] = SIZE) -> None:
+def open_constant(renderer: Renderer, disparity: float, size: tuple[int, int] = SIZE) -> None:
     """A field of one colour whose half is near, the other far."""
     width, height = size
-    renderer.open_field(grid, width, height, hdr=False, with_disparity=True)
-    values = np.where(np.arange(width) < width // 2, disparity, -disparity) * np.ones((height, 1))
-    for row in range(grid.rows):
-        for column in range(grid.columns):
-            colors = np.full((height, width, 3), COLOR, np.uint8)
-            renderer.upload_view(row, column, colors, values.astype(np.float32))
+    values = np.where(np.arange(width) < width // 2, disparity, -disparity)
+    open_views(renderer, GRID, np.full((height, width, 3), COLOR, np.uint8), values)
 
 
 def test_aperture_0_is_the_pinhole_picture(renderer: Renderer, tmp_path: Path) -> None:
@@ -63,32 +60,30 @@ def test_an_aperture_larger_than_the_grid_sees_all_views(renderer: Renderer) -> 
         assert rms(image.astype(np.uint8), pictures[0].astype(np.uint8), border=4) < 0.05
 
 
-@pytest.mark.parametrize("far", [1e2, 1e6, 1e30, 3e38])
+@pytest.mark.parametrize("far", [1e2, 3e38])
 def test_view_offset_far_outside_the_grid(renderer: Renderer, far: float) -> None:
     """Colours of the scene are shown: the stored views end, so their edges are continued."""
-    open_constant(renderer, GRID, 1.5)
+    open_constant(renderer, 1.5)
     for optics in (Optics(ViewOffset(far, -far)), Optics(ViewOffset(-far, 0.0), aperture_diameter=2.0)):
         assert np.abs(picture(renderer, optics) - COLOR).max() <= 1
 
 
-@pytest.mark.parametrize("disparity", [0.0, 1e-6, 500.0, 1e6, 3e38])
+@pytest.mark.parametrize("disparity", [0.0, 500.0, 3e38])
 def test_disparities_of_any_size(renderer: Renderer, disparity: float) -> None:
     """All equal (0), larger than the image, beyond half floats: through a pinhole one colour stays one colour.
 
     Through a lens too, up to some 2000 px of defocus a view step; half floats then lose light of what is behind.
     """
-    open_constant(renderer, GRID, disparity)
-    apertures = (0.0, 2.5) if disparity <= 500 else (0.0,)
-    for focus in (0.0, disparity, -1000.0):
-        for diameter in apertures:
-            optics = Optics(ViewOffset(0.3, -0.6), focus_disparity=focus, aperture_diameter=diameter)
-            assert np.abs(picture(renderer, optics) - COLOR).max() <= 1, optics
+    open_constant(renderer, disparity)
+    for focus, diameter in itertools.product((0.0, disparity), (0.0, 2.5) if disparity <= 500 else (0.0,)):
+        optics = Optics(ViewOffset(0.3, -0.6), focus_disparity=focus, aperture_diameter=diameter)
+        assert np.abs(picture(renderer, optics) - COLOR).max() <= 1, optics
 
 
 eyes = st.floats(*eye_limits(3))
 
 
-@settings(max_examples=30, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=12, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     st.builds(
         Optics,
@@ -104,13 +99,13 @@ eyes = st.floats(*eye_limits(3))
 def test_refocus_of_a_constant_photo_is_constant(renderer: Renderer, optics: Optics) -> None:
     """Whatever the eye, dolly, focus, tilt, range and aperture that the viewer allows: weights are weights."""
     if renderer.field is None:
-        open_constant(renderer, GRID, 4.0)
+        open_constant(renderer, 4.0)
     assert np.abs(picture(renderer, optics) - COLOR).max() <= 1
 
 
-@pytest.mark.parametrize("size", [(1, 1), (1, 13), (11, 1), (7, 13), (17, 16)])
+@pytest.mark.parametrize("size", [(1, 1), (1, 13), (7, 13)])
 def test_tiny_thin_and_prime_sized_views(renderer: Renderer, size: tuple[int, int]) -> None:
-    open_constant(renderer, GRID, 2.0, size)
+    open_constant(renderer, 2.0, size)
     for optics in (Optics(ViewOffset(0.5, -0.5)), Optics(aperture_diameter=3.0, focus_disparity=1.0)):
         for drawn in (size, (5, 3), (64, 40)):
             assert np.abs(picture(renderer, optics, drawn) - COLOR).max() <= 1
@@ -121,9 +116,8 @@ def test_float16_sums_of_289_views(renderer: Renderer) -> None:
     grid, light = GridShape(17, 17), 3.0
     renderer.open_field(grid, 8, 6, hdr=True, with_disparity=False)
     encoded = srgb_from_linear(np.full((6, 8, 3), light)).astype(np.float16)
-    for row in range(17):
-        for column in range(17):
-            renderer.upload_view(row, column, encoded, None)
+    for at in np.ndindex(17, 17):
+        renderer.upload_view(*at, encoded, None)
     optics = Optics(aperture_diameter=40.0, exposure_stops=math.log2(0.5 / light))
     expected = 255 * srgb_from_linear(np.array(0.5))
     assert np.abs(picture(renderer, optics, (8, 6)) - expected).max() <= 2
@@ -142,28 +136,15 @@ def test_a_grid_of_1x1(renderer: Renderer, tmp_path: Path, with_disparity: bool)
     assert light == pytest.approx(1, abs=0.05)
 
 
-def test_two_surfaces_1e_4_apart(renderer: Renderer) -> None:
-    """No seam between them."""
-    scene = replace(SCENE, background=1.0, foreground=1.0001)
-    scene.fill(renderer, GRID)
-    eye = ViewOffset(0.5, 0.5)
-    truth = scene.view(eye)[0].astype(int)
-    difference = np.abs(picture(renderer, Optics(eye)) - truth).max(axis=2)[4:-4, 4:-4]
-    y, x = np.indices(truth.shape[:2])
-    edge = np.abs(np.hypot(x - scene.width / 2 + 0.5, y - scene.height / 2 + 0.5) - scene.radius_px) < 2
-    assert difference[~edge[4:-4, 4:-4]].max() <= 4
-
-
 def test_a_one_pixel_wire(renderer: Renderer) -> None:
     """Between stored views it is still there, about as bright and as wide as it is."""
     width, height, foreground = 40, 24, 3.0
     renderer.open_field(GRID, width, height, hdr=False, with_disparity=True)
-    for row in range(3):
-        for column in range(3):
-            at = round(20 - foreground * (column - 1))
-            colors, disparity = np.full((height, width, 3), 30, np.uint8), np.zeros((height, width), np.float32)
-            colors[:, at], disparity[:, at] = 220, foreground
-            renderer.upload_view(row, column, colors, disparity)
+    for row, column in np.ndindex(3, 3):
+        at = round(20 - foreground * (column - 1))
+        colors, disparity = np.full((height, width, 3), 30, np.uint8), np.zeros((height, width), np.float32)
+        colors[:, at], disparity[:, at] = 220, foreground
+        renderer.upload_view(row, column, colors, disparity)
     for s in (0.0, 1.0, 1 / 3):
         row = picture(renderer, Optics(ViewOffset(0.0, s)), (width, height))[12, :, 0]
         assert row[round(20 - foreground * s)] > 180, s

@@ -51,8 +51,9 @@ def test_a_view_that_comes_again_takes_the_place_of_its_draft(gl: GLContext) -> 
     once.release()
 
 
-@pytest.mark.parametrize("hdr", [False, True])
-@pytest.mark.parametrize("box", [np.s_[0:37, 0:53], np.s_[5:6, 7:8], np.s_[15:33, 20:53], np.s_[36:37, 30:49]])
+@pytest.mark.parametrize(
+    ("box", "hdr"), [(np.s_[0:37, 0:53], True), (np.s_[5:6, 7:8], False), (np.s_[15:33, 20:53], False)]
+)
 def test_a_part_with_other_disparity_leaves_what_all_of_it_anew_would(gl: GLContext, box: Box, hdr: bool) -> None:
     random = np.random.default_rng(0)
     colors = random.integers(0, 255, (37, 53, 3)).astype(np.float16 if hdr else np.uint8)
@@ -71,18 +72,8 @@ def test_a_part_with_other_disparity_leaves_what_all_of_it_anew_would(gl: GLCont
     again.release()
 
 
-def test_stray_disparities_do_not_stretch_the_range(gl: GLContext) -> None:
-    field = LightFieldTexture(gl.ctx, GRID, 100, 100, hdr=False, with_disparity=True)
-    disparity = np.linspace(0, 1, 10_000, dtype=np.float32).reshape(100, 100)
-    disparity[50, 50] = 1e6
-    field.upload(0, 0, np.zeros((100, 100, 3), np.uint8), disparity)
-    assert field.range_px[1] < 2
-    field.release()
-
-
 @pytest.mark.filterwarnings("error::RuntimeWarning")
-@pytest.mark.parametrize("hdr", [False, True])
-@pytest.mark.parametrize("wild", [-3e38, 3.4e38])
+@pytest.mark.parametrize(("wild", "hdr"), [(-3e38, False), (3.4e38, True)])
 def test_the_largest_disparities_stay_finite(gl: GLContext, wild: float, hdr: bool) -> None:
     field = LightFieldTexture(gl.ctx, GRID, 8, 4, hdr, with_disparity=True)
     colors = np.zeros((4, 8, 3), np.float16 if hdr else np.uint8)
@@ -116,16 +107,8 @@ def test_too_many_views_say_what_fits(gl: GLContext) -> None:
         LightFieldTexture(gl.ctx, GridShape(side, side), 4, 4, hdr=False, with_disparity=False)
 
 
-def test_no_memory_is_an_error_in_words(gl: GLContext) -> None:
-    """GL itself only sets a flag; this field is far larger than software GL accepts."""
-    with pytest.raises(InputError, match=r"no room for 1936 views of 16384x16384 "):
-        LightFieldTexture(gl.ctx, GridShape(44, 44), 16384, 16384, hdr=True, with_disparity=False)
-    assert gl.ctx.error == "GL_NO_ERROR"
-
-
-@pytest.mark.parametrize("size", [(2, 20_000), (40_000, 30)])
-def test_views_longer_than_the_driver_allows_are_told_the_size_that_fits(gl: GLContext, size: tuple[int, int]) -> None:
-    width, height = (side * gl.max_texture_size // 16_384 for side in size)
+def test_views_longer_than_the_driver_allows_are_told_the_size_that_fits(gl: GLContext) -> None:
+    width, height = 5 * gl.max_texture_size // 2, 30
     with pytest.raises(InputError, match=r"the largest photo has \d+ pixels$") as error:
         check_fits(gl.ctx, GridShape(3, 3), width, height)
     fitting = size_within(ImageSize(height, width), int(str(error.value).split()[-2]))

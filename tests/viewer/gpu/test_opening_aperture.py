@@ -14,14 +14,13 @@ from iibr_core.beyond.picture_quality import QualityLevel
 from iibr_core.color import linear_from_srgb, srgb_from_linear, stored_from_encoded
 from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.types import GridShape, ViewOffset
-from tests.viewer.gpu.scenes import PhotoLike, TwoPlanes, first_frame, psnr, rms, settled, sharpness
+from tests.viewer.gpu.scenes import PhotoLike, TwoPlanes, first_frame, psnr, settled, sharpness
 from viewer.gpu.refocus.picture_renderer import Renderer
 
 GRID = GridShape(5, 5)
 BETWEEN = ViewOffset(0.3, 0.2)
 PHOTO = PhotoLike(width=160, height=120, background=-4.0, foreground=3.0, radius_px=30.0)
 ON_DISC, ON_WALL = Optics(focus_disparity=3.0), Optics(BETWEEN, focus_disparity=-4.0)
-DIAMETERS = [0.8, 3.0]
 Drawn = Callable[[Renderer, Optics, TwoPlanes], np.ndarray]
 
 
@@ -32,19 +31,12 @@ def opened(renderer: Renderer, optics: Optics, draw: Drawn, diameters: np.ndarra
 
 @pytest.mark.parametrize(("optics", "draw"), [(ON_DISC, first_frame), (ON_WALL, settled)])
 def test_what_is_out_of_focus_becomes_softer_and_softer(renderer: Renderer, optics: Optics, draw: Drawn) -> None:
-    steps = [sharpness(image) for image in opened(renderer, optics, draw, np.linspace(0, 5, 9))]
+    steps = [sharpness(image) for image in opened(renderer, optics, draw, np.linspace(0, 5, 6))]
     assert max(after / before for before, after in pairwise(steps)) < 1.01
     assert steps[-1] < 0.8 * steps[0]
 
 
-def test_nothing_jumps_where_the_lens_reaches_the_next_views(renderer: Renderer) -> None:
-    images = opened(renderer, ON_WALL, first_frame, np.linspace(0.95, 1.05, 7))
-    assert max(rms(before, after) for before, after in pairwise(images)) < 0.006
-    assert rms(images[0], images[-1]) > 0.001, "it does open"
-
-
-@pytest.mark.parametrize("optics", [ON_DISC, ON_WALL])
-@pytest.mark.parametrize("diameter", DIAMETERS)
+@pytest.mark.parametrize(("optics", "diameter"), [(ON_DISC, 3.0), (ON_WALL, 0.8)])
 def test_the_first_frame_is_near_the_settled_picture(renderer: Renderer, optics: Optics, diameter: float) -> None:
     PHOTO.fill(renderer, GRID)
     optics = replace(optics, aperture_diameter=diameter)
@@ -56,7 +48,7 @@ def test_the_first_frame_is_near_the_settled_picture(renderer: Renderer, optics:
 
 def test_a_pinhole_between_views_is_as_sharp_as_at_them(renderer: Renderer) -> None:
     PHOTO.fill(renderer, GRID)
-    for eye in (CENTRE, BETWEEN, ViewOffset(0.5, 0.0), ViewOffset(0.5, 0.5), ViewOffset(-1.1, 1.0)):
+    for eye in (CENTRE, BETWEEN, ViewOffset(0.5, 0.5)):
         truth = sharpness(PHOTO.view(eye)[0])
         assert sharpness(first_frame(renderer, Optics(eye), PHOTO)) == pytest.approx(truth, rel=0.03), eye
 
@@ -81,8 +73,7 @@ def width_of_spot(renderer: Renderer, optics: Optics, level: QualityLevel | None
     return float((in_all_px - own_px**2) / px_per_view**2)
 
 
-@pytest.mark.parametrize("level", [None, QualityLevel(0.25)])
-@pytest.mark.parametrize("radius", [0.75, 3.0])
+@pytest.mark.parametrize(("radius", "level"), [(0.75, None), (3.0, QualityLevel(0.25))])
 def test_a_spot_of_light_is_as_wide_as_the_lens_has_it(
     renderer: Renderer, radius: float, level: QualityLevel | None
 ) -> None:

@@ -7,17 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from iibr_core.beyond.optics import (
-    CENTRE,
-    HIGHLIGHT_GAIN,
-    ApertureMask,
-    ApertureShape,
-    Optics,
-)
+from iibr_core.beyond.optics import CENTRE, HIGHLIGHT_GAIN, ApertureMask, ApertureShape, Optics
 from iibr_core.color import linear_from_srgb
 from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.types import GridShape, ViewOffset
-from tests.viewer.gpu.scenes import TwoPlanes, eyes_of_pixels, first_frame, rms, settled, through_lens
+from tests.viewer.gpu.scenes import TwoPlanes, eyes_of_pixels, first_frame, open_views, rms, settled, through_lens
 from viewer.gpu.refocus.picture_renderer import Renderer
 
 GRID = GridShape(5, 5)
@@ -30,9 +24,7 @@ FAR_OFF = Optics(focus_disparity=3.0, aperture_diameter=4.0)
 CORNER = ApertureMask("corner", 2, 2, bytes([255, 255, 255, 0]))
 SHAPES = [
     ApertureShape("polygon", blades=3, rotation_deg=30.0),
-    ApertureShape("polygon", blades=4),
     ApertureShape("ring", ring_inner=0.6),
-    ApertureShape("mask", mask=CORNER),
     ApertureShape("mask", mask=CORNER, rotation_deg=60.0),
     ApertureShape("cat_eye", cat_eye=1.0),
 ]
@@ -87,17 +79,14 @@ def test_focus_range_leaves_what_is_beyond_it_less_defocused(renderer: Renderer)
     assert rms(ranged, through_lens(WALL, Optics(focus_disparity=1.5, aperture_diameter=3.0), GRID)) > 0.008
 
 
-@pytest.mark.parametrize("recovery", [0.5, 1.0])
-def test_highlights_count_for_more(renderer: Renderer, recovery: float) -> None:
+def test_highlights_count_for_more(renderer: Renderer) -> None:
     """A white square far out of focus: all its light in the picture, against the formula. Its borders, where pixels are
     interpolated with dark ones, are no highlights.
     """
-    grid, size, side_px = GridShape(3, 3), (64, 48), 12
+    grid, size, side_px, recovery = GridShape(3, 3), (64, 48), 12, 0.5
     colors = np.full((48, 64, 3), 60, np.uint8)
     colors[20 : 20 + side_px, 26 : 26 + side_px] = 255
-    renderer.open_field(grid, *size, hdr=False, with_disparity=True)
-    for row, column in np.ndindex(*grid):
-        renderer.upload_view(row, column, colors, np.zeros((48, 64), np.float32))
+    open_views(renderer, grid, colors, 0.0)
     optics = Optics(focus_disparity=4.0, aperture_diameter=3.0, highlight_recovery=recovery)
     dark = float(linear_from_srgb(np.array(60 / 255)))
     light = renderer.converged_picture(RenderSettings(optics, size, is_linear=True))[..., 0].astype(float)
@@ -108,23 +97,18 @@ def test_highlights_count_for_more(renderer: Renderer, recovery: float) -> None:
 
 def test_saturated_colours_are_no_highlights(renderer: Renderer) -> None:
     """A red wall whose red clips here and there: it shows the same with highlights recovered as without."""
-    grid, size = GridShape(3, 3), (40, 30)
-    renderer.open_field(grid, *size, hdr=False, with_disparity=True)
     colors = np.full((30, 40, 3), (250, 90, 10), np.uint8)
     colors[::3, ::4, 0] = 255
-    for row, column in np.ndindex(*grid):
-        renderer.upload_view(row, column, colors, np.zeros((30, 40), np.float32))
-    plain, recovered = (
-        first_frame(renderer, replace(FAR_OFF, highlight_recovery=recovery), TwoPlanes(*size)) for recovery in (0, 1)
-    )
+    open_views(renderer, GridShape(3, 3), colors, 0.0)
+    optics = [replace(FAR_OFF, highlight_recovery=recovery) for recovery in (0, 1)]
+    plain, recovered = (first_frame(renderer, each, TwoPlanes(40, 30)) for each in optics)
     assert np.abs(plain.astype(int) - recovered).max() <= 2
 
 
-@pytest.mark.parametrize("dolly", [-2.0, 6.0])
-def test_dolly_through_a_pinhole_against_the_scene(renderer: Renderer, dolly: float) -> None:
+def test_dolly_through_a_pinhole_against_the_scene(renderer: Renderer) -> None:
     """The scene itself seen along each pixel's own ray, also where that crosses beside the grid."""
     SCENE.fill(renderer, GRID)
-    optics = Optics(ViewOffset(0.25, -0.5), dolly=dolly)
+    optics = Optics(ViewOffset(0.25, -0.5), dolly=6.0)
     truth, _ = SCENE.view(ViewOffset(*eyes_of_pixels(optics, SCENE)))  # type: ignore[arg-type]
     image = settled(renderer, optics, SCENE)
     assert np.median(np.abs(image.astype(int) - truth)[BAND, BAND]) <= 1

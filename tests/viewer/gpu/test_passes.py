@@ -49,10 +49,7 @@ def test_outside_all_views_mirror_images_stand_in(renderer: Renderer) -> None:
     scene = TwoPlanes(width=96, height=64, background=6.0, foreground=6.0)
     grid = GridShape(3, 3)
     scene.fill(renderer, grid)
-    eye = ViewOffset(0.0, 3.0)
-    renderer.render(Optics(eye), (96, 64))
-    image = renderer.read_image()
+    renderer.render(Optics(ViewOffset(0.0, 3.0)), (96, 64))
     photo = scene.view(ViewOffset(0.0, 1.0))[0]
-    moved = round(6.0 * (eye.s - 1.0))
-    mirrored = np.concatenate([photo, photo[:, ::-1]], axis=1)[:, moved : moved + 96]
-    assert rms(image, mirrored, border=2) < 0.01
+    mirrored = np.concatenate([photo, photo[:, ::-1]], axis=1)[:, 12 : 12 + 96]
+    assert rms(renderer.read_image(), mirrored, border=2) < 0.01

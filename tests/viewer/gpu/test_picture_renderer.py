@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from iibr_core.beyond.optics import Optics
-from iibr_core.beyond.picture_quality import QUALITY_LEVELS, QualityLevel
+from iibr_core.beyond.picture_quality import QUALITY_LEVELS
 from iibr_core.color import linear_from_srgb, srgb_from_linear
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, ViewOffset
@@ -41,48 +41,18 @@ def test_centre_through_a_pinhole_is_the_photo(renderer: Renderer, tmp_path: Pat
 @pytest.mark.parametrize("with_disparity", [True, False])
 def test_pinhole_at_stored_views_is_those_views(renderer: Renderer, tmp_path: Path, with_disparity: bool) -> None:
     SCENE.fill(renderer, GRID, with_disparity)
-    for row, column in [(0, 0), (2, 2), (4, 1)]:
+    for row, column in [(0, 0), (4, 1)]:
         eye = GRID.offset(row, column)
         assert_close(picture(renderer, eye=eye), SCENE.view(eye)[0], ROUNDING, tmp_path, f"view_{row}_{column}")
 
 
 def test_pinhole_between_views_against_the_scene(renderer: Renderer) -> None:
     SCENE.fill(renderer, GRID)
-    for eye in (ViewOffset(0.5, 0.5), ViewOffset(-1.3, 0.2), ViewOffset(1.9, -1.7)):
+    for eye in (ViewOffset(0.5, 0.5), ViewOffset(1.9, -1.7)):
         truth = SCENE.view(eye)[0]
-        assert rms(picture(renderer, eye=eye), truth) < 0.025, "depth edges within a pixel, all else sharp"
-        assert np.median(np.abs(picture(renderer, eye=eye).astype(int) - truth)) <= 1
-
-
-def test_preview_from_one_view_against_the_scene(renderer: Renderer) -> None:
-    """A surface is right wherever the photo saw it; the hole beside the disc shows background, not a stretched disc."""
-    scene = replace(SCENE, contrast=0.03)
-    scene.open(renderer, GRID)
-    scene.upload(renderer, GRID, 2, 2)
-    eye = ViewOffset(0.0, 2.0)
-    image = picture(renderer, scene, eye=eye).astype(int)
-    truth, disparity = scene.view(eye)
-    y, x = np.indices(disparity.shape)
-    inner = np.abs(x - scene.width / 2) < 40
-    disc = disparity == scene.foreground
-    x_of_hidden = scene.width / 2 - scene.background * eye.s  # where the disc of the photo covers the background
-    hidden = ~disc & (np.hypot(x - x_of_hidden, y - scene.height / 2) < scene.radius_px)
-    near_hidden = np.hypot(x - x_of_hidden, y - scene.height / 2) < scene.radius_px + 3
-    edge = (
-        np.abs(np.hypot(x - scene.width / 2 + scene.foreground * eye.s, y - scene.height / 2) - scene.radius_px) < 1.5
-    )
-    assert hidden.sum() > 50
-    assert np.abs(image - truth)[(disc | ~near_hidden) & ~edge & inner].max() <= 3
-    to_background = np.linalg.norm(image - truth[~disc].mean(0), axis=-1)
-    to_disc = np.linalg.norm(image - truth[disc].mean(0), axis=-1)
-    assert np.mean((to_background < to_disc)[hidden & ~edge]) > 0.98
-
-
-def test_far_outside_the_grid_stays_finite_and_close(renderer: Renderer) -> None:
-    SCENE.fill(renderer, GRID)
-    eye = ViewOffset(0.0, 4.0)
-    assert rms(picture(renderer, eye=eye), SCENE.view(eye)[0], border=14) < 0.06
-    picture(renderer, eye=ViewOffset(1e4, -1e4))
+        image = picture(renderer, eye=eye)
+        assert rms(image, truth) < 0.025, "depth edges within a pixel, all else sharp"
+        assert np.median(np.abs(image.astype(int) - truth)) <= 1
 
 
 def test_the_lens_is_not_cut_off_where_the_stored_views_end(renderer: Renderer) -> None:
@@ -93,8 +63,7 @@ def test_the_lens_is_not_cut_off_where_the_stored_views_end(renderer: Renderer) 
     assert rms(settled(renderer, optics, scene), truth, border=14) < 0.01
 
 
-@pytest.mark.parametrize("focus", [-1.0, 2.0])
-@pytest.mark.parametrize("diameter", [2.0, 8.0])
+@pytest.mark.parametrize(("focus", "diameter"), [(-1.0, 2.0), (2.0, 8.0)])
 def test_lens_against_brute_force(renderer: Renderer, focus: float, diameter: float) -> None:
     SCENE.fill(renderer, GRID)
     optics = Optics(focus_disparity=focus, aperture_diameter=diameter)
@@ -111,23 +80,13 @@ def test_what_is_in_focus_stays_as_it_is(renderer: Renderer) -> None:
     photo, _ = scene.view(CENTRE)
     y, x = np.indices(photo.shape[:2])
     disc = np.hypot(x - scene.width / 2, y - scene.height / 2) < scene.radius_px - 2
-    for image in (
-        picture(renderer, scene, aperture_diameter=3.0),
-        settled(renderer, Optics(aperture_diameter=3.0), scene),
-    ):
-        assert np.abs(image.astype(int) - photo)[disc].max() <= 2
+    image = settled(renderer, Optics(aperture_diameter=3.0), scene)
+    assert np.abs(image.astype(int) - photo)[disc].max() <= 2
 
 
-@pytest.mark.parametrize(
-    "optics",
-    [
-        Optics(ViewOffset(1.2, -0.6)),
-        Optics(ViewOffset(0.4, 0.3), focus_disparity=-1.0, aperture_diameter=5.0),
-    ],
-)
-def test_error_never_grows_while_the_field_fills(renderer: Renderer, optics: Optics) -> None:
+def test_error_never_grows_while_the_field_fills(renderer: Renderer) -> None:
     SCENE.fill(renderer, GRID)
-    size = SCENE.width, SCENE.height
+    optics, size = Optics(ViewOffset(1.2, -0.6)), (SCENE.width, SCENE.height)
     renderer.render(optics, size)
     final = renderer.read_image()
     SCENE.open(renderer, GRID)
@@ -141,8 +100,7 @@ def test_error_never_grows_while_the_field_fills(renderer: Renderer, optics: Opt
         errors.append(rms(renderer.read_image(), final, border=1))
     assert errors[-1] == 0
     assert errors[0] < 0.12
-    worst_growth = max(after - min(errors[: k + 1]) for k, after in enumerate(errors))
-    assert worst_growth < GROWTH, errors
+    assert max(after - min(errors[: k + 1]) for k, after in enumerate(errors)) < GROWTH, errors
 
 
 def test_views_without_disparity_are_sheared_to_the_focus(renderer: Renderer, tmp_path: Path) -> None:
@@ -166,21 +124,9 @@ def test_exposure_and_srgb_of_hdr(renderer: Renderer) -> None:
         assert np.abs(renderer.read_image()[2, :, 0] - expected).max() <= 1
 
 
-def test_row_zero_is_the_top(renderer: Renderer) -> None:
-    colors = np.zeros((4, 6, 3), np.uint8)
-    colors[0], colors[:, 0] = (255, 0, 0), (0, 255, 0)
-    renderer.open_field(GridShape(1, 1), 6, 4, hdr=False, with_disparity=False)
-    renderer.upload_view(0, 0, colors, None)
-    renderer.render(Optics(), (6, 4))
-    assert np.array_equal(renderer.read_image(), colors)
-
-
-@pytest.mark.parametrize("level", QUALITY_LEVELS[-2:])
-def test_what_is_in_focus_is_never_black_however_few_samples_the_lens_has(
-    renderer: Renderer, level: QualityLevel
-) -> None:
+def test_what_is_in_focus_is_never_black_however_few_samples_the_lens_has(renderer: Renderer) -> None:
     """At this eye and aperture none of the few samples is one of every other."""
     scene = TwoPlanes(width=192, height=144, background=0.0, foreground=8.0)
     scene.fill(renderer, GridShape(5, 5))
-    renderer.render(Optics(ViewOffset(-1.25, 1.0), aperture_diameter=2.0), ScreenSize(384, 288), level)
+    renderer.render(Optics(ViewOffset(-1.25, 1.0), aperture_diameter=2.0), ScreenSize(384, 288), QUALITY_LEVELS[-1])
     assert renderer.read_image().min() > 0

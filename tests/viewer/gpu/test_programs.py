@@ -36,18 +36,6 @@ def write(folder: Path, **files: str) -> Path:
     return folder
 
 
-def test_include_comes_once_and_defines_follow_the_version(tmp_path: Path) -> None:
-    folder = write(
-        tmp_path,
-        pass_='#version 330 core\n#include "part_a.glsl"\n#include "part_b.glsl"\nvoid main() {}\n',
-        part_a='#include "part_b.glsl"\nfloat a;\n',
-        part_b="float b;\n",
-    )
-    flat = flatten(folder / "pass_.frag", {"SIZE": 3})
-    assert flat.text.splitlines() == ["#version 330 core", "#define SIZE 3", "float b;", "float a;", "void main() {}"]
-    assert [flat.locate(line) for line in (3, 4, 5)] == ["part_b.glsl:1", "part_a.glsl:2", "pass_.frag:4"]
-
-
 @pytest.mark.parametrize(
     ("source", "part_a", "place"),
     [

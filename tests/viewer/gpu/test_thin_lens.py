@@ -15,10 +15,7 @@ from iibr_core.beyond.optics import Optics
 from iibr_core.color import stored_from_encoded
 from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.method.light_field import generate
-from iibr_core.types import (
-    Disparity,
-    ViewUpdate,
-)
+from iibr_core.types import ViewUpdate
 from tests.iibr_core.lens_scenes import GRID, NAMES, LensScene, lens_scene
 from tests.iibr_core.scenes import by_index, literal_plan
 from viewer.gpu.refocus.picture_renderer import Renderer
@@ -34,20 +31,13 @@ def scene(request: pytest.FixtureRequest) -> LensScene:
 
 @pytest.fixture(scope="module")
 def field(scene: LensScene) -> Field:
-    return made_of(scene, scene.disparity)
+    plan = literal_plan(scene.photo, scene.disparity, *GRID)
+    return by_index(list(generate(scene.photo, scene.disparity, plan)))
 
 
-def made_of(scene: LensScene, disparity: Disparity) -> Field:
-    plan = literal_plan(scene.photo, disparity, *GRID)
-    return by_index(list(generate(scene.photo, disparity, plan)))
-
-
-def optics_of(scene: LensScene) -> Optics:
-    return Optics(focus_disparity=scene.lens.focus_disparity, aperture_diameter=2 * scene.lens.radius_views)
-
-
-def drawn_db(renderer: Renderer, scene: LensScene, field: Field, optics: Optics) -> float:
+def drawn_db(renderer: Renderer, scene: LensScene, field: Field) -> float:
     """The converged picture against the lens's."""
+    optics = Optics(focus_disparity=scene.lens.focus_disparity, aperture_diameter=2 * scene.lens.radius_views)
     height, width = scene.photo.size
     renderer.open_field(GRID, width, height, hdr=False, with_disparity=field[0, 0].disparity is not None)
     for update in field.values():
@@ -56,16 +46,15 @@ def drawn_db(renderer: Renderer, scene: LensScene, field: Field, optics: Optics)
     return scene.lens_db(picture.astype(np.float32) / np.float32(255))
 
 
-def test_a_photo_refocuses_as_the_lens_does(renderer: Renderer, scene: LensScene, field: Field) -> None:
-    made = drawn_db(renderer, scene, field, optics_of(scene))
-    assert made > LEAST_DB[scene.scene.name]
-    assert made > scene.lens_db(scene.photo.pixels) + 8
-
-
-def test_true_views_are_the_upper_reference(renderer: Renderer, scene: LensScene, field: Field) -> None:
+def test_a_photo_refocuses_as_the_lens_does_and_true_views_are_the_upper_reference(
+    renderer: Renderer, scene: LensScene, field: Field
+) -> None:
+    generated_db = drawn_db(renderer, scene, field)
+    assert generated_db > LEAST_DB[scene.scene.name]
+    assert generated_db > scene.lens_db(scene.photo.pixels) + 8
     views = {
         (row, column): ViewUpdate(row, column, stored_from_encoded(pixels, False), None)
         for (row, column), pixels in scene.views.items()
     }
-    true = drawn_db(renderer, scene, views, optics_of(scene))
-    assert true - 5 < drawn_db(renderer, scene, field, optics_of(scene)) < true
+    true_db = drawn_db(renderer, scene, views)
+    assert true_db - 5 < generated_db < true_db

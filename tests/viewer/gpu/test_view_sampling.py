@@ -8,14 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from iibr_core.types import GridShape, ViewOffset
-from viewer.gpu.refocus.view_sampling import (
-    Samples,
-    answered_samples,
-    blended_samples,
-    nearest_present,
-    pinhole_samples,
-    pinhole_sources,
-)
+from viewer.gpu.refocus import view_sampling
+from viewer.gpu.refocus.view_sampling import Samples, answered_samples, pinhole_sources
 
 GRID = GridShape(5, 5)
 FULL = np.ones(GRID, bool)
@@ -45,12 +39,6 @@ def spread_points(count: int, radius: float) -> np.ndarray:
     return np.random.default_rng(1).uniform(-radius, radius, (count, 2))
 
 
-def test_full_field_is_bilinear() -> None:
-    weights = weights_by_view(pinhole_sources(ViewOffset(0.25, -0.5), GRID, FULL))
-    assert weights[2, 1:3] == pytest.approx([0.375, 0.375])
-    assert weights[3, 1:3] == pytest.approx([0.125, 0.125])
-
-
 @given(eye=places, seed=st.integers(0, 50))
 def test_pinhole_weights_sum_to_one_over_present_views(eye: ViewOffset, seed: int) -> None:
     present = some_views(seed)
@@ -58,7 +46,7 @@ def test_pinhole_weights_sum_to_one_over_present_views(eye: ViewOffset, seed: in
     assert sum(source.weight for source in sources) == pytest.approx(1, abs=1e-4)
     assert len(sources) <= 4
     assert all(present[source.row, source.column] and source.weight > 0 for source in sources)
-    assert pinhole_samples(sources[:2]).weights.sum() == pytest.approx(1)
+    assert view_sampling.pinhole_samples(sources[:2]).weights.sum() == pytest.approx(1)
 
 
 @given(eye=st.builds(ViewOffset, st.floats(-2, 2), st.floats(-2, 2)))
@@ -77,21 +65,10 @@ def test_a_stored_view_alone_shows_its_own_place() -> None:
         assert weights[row, column] == pytest.approx(1, abs=1e-4)
 
 
-@given(eye=places, first=st.integers(0, 1000))
-def test_a_camera_is_answered_by_a_corner_of_its_cell(eye: ViewOffset, first: int) -> None:
-    points = spread_points(40, 3.0)
-    samples = answered_samples(points, first, eye, GRID, FULL)
-    assert np.array_equal(samples.cameras, points)
-    assert samples.weights == pytest.approx(np.ones(40))
-    beside = np.clip(np.array(eye) + GRID.centre + points, 0, 4) - samples.views
-    assert np.abs(beside).max() < 1 + 1e-9
-
-
 @pytest.mark.parametrize("eye", [ViewOffset(0.25, -0.5), ViewOffset(-1.9, 1.2), ViewOffset(3.0, 0.1)])
 def test_cameras_together_blend_views_as_a_pinhole_does(eye: ViewOffset) -> None:
     """And in passes as at once: each goes on in the sequence."""
-    count = 600
-    samples = answered_samples(np.zeros((count, 2)), 0, eye, GRID, FULL)
+    samples = answered_samples(np.zeros((600, 2)), 0, eye, GRID, FULL)
     assert shares_of_views(samples) == pytest.approx(weights_by_view(pinhole_sources(eye, GRID, FULL)), abs=0.01)
     later = answered_samples(np.zeros((20, 2)), 100, eye, GRID, FULL)
     assert np.array_equal(later.views, samples.views[100:120])
@@ -103,12 +80,12 @@ def test_blended_views_weigh_what_the_points_ask_of_them() -> None:
     expected = np.mean(
         [weights_by_view(pinhole_sources(ViewOffset(*(point + eye)), GRID, FULL)) for point in points], axis=0
     )
-    assert shares_of_views(blended_samples(points, eye, GRID, FULL)) == pytest.approx(expected, abs=1e-3)
+    assert shares_of_views(view_sampling.blended_samples(points, eye, GRID, FULL)) == pytest.approx(expected, abs=1e-3)
 
 
 def test_nearest_present_against_a_plain_search() -> None:
     present = some_views(7)
-    for (row, column), answer in zip(np.ndindex(*GRID), nearest_present(present).reshape(-1, 2)):
+    for (row, column), answer in zip(np.ndindex(*GRID), view_sampling.nearest_present(present).reshape(-1, 2)):
         least = min(np.hypot(row - r, column - c) for r, c in np.argwhere(present))
         assert np.hypot(row - answer[0], column - answer[1]) == least
         assert present[tuple(answer)]

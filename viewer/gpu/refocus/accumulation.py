@@ -11,7 +11,6 @@ import moderngl
 
 from iibr_core.beyond.picture_quality import MAX_SAMPLES
 from iibr_core.scenes.screen_size import ScreenSize
-from iibr_core.types import SRGB, ColorSpace
 from viewer.gpu.light_field_texture import LightFieldTexture
 from viewer.gpu.programs import ProgramCache
 from viewer.gpu.refocus.passes import Passes, Rows
@@ -45,15 +44,15 @@ class ProgressiveAccumulation:
 
 
 class Accumulator:
-    """Sums light of a field into targets."""
+    """Sums light of a field into targets. passes: draw the parts."""
 
     def __init__(self, ctx: moderngl.Context, programs: ProgramCache) -> None:
         self._ctx = ctx
-        self._passes = Passes(ctx, programs)
+        self.passes = Passes(ctx, programs)
 
     def release(self) -> None:
         """Free every GL object but the programs."""
-        self._passes.release()
+        self.passes.release()
 
     def sum_up(
         self,
@@ -93,16 +92,6 @@ class Accumulator:
         while not accumulation.is_complete:
             yield from self._draw_batch(field, accumulation, targets, MAX_SAMPLES, pixels_per_step)
 
-    def finish(
-        self,
-        accumulation: ProgressiveAccumulation,
-        targets: PictureTargets,
-        is_linear: bool = False,
-        color_space: ColorSpace = SRGB,
-    ) -> None:
-        """Write the sum to the image, see `Passes.present`."""
-        self._passes.present(accumulation.lens, targets.light, targets.image, is_linear, color_space)
-
     def _draw_batch(
         self,
         field: LightFieldTexture,
@@ -121,7 +110,7 @@ class Accumulator:
         if at == 0:
             accumulation.samples = lens.samples(field, accumulation.pass_index)
             if accumulation.pass_index == 0 and lens.has_dolly:
-                self._passes.update_nearest_views(field)
+                self.passes.update_nearest_views(field)
         samples = accumulation.samples
         assert samples is not None
         # The views that answer a pinhole are blended: none is shown alone.
@@ -129,7 +118,7 @@ class Accumulator:
         cell = lens.cell(accumulation.pass_index)
         for rows in _row_bands(targets.size_px, pixels_per_step / len(batch)):
             self._ctx.disable(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
-            self._passes.draw_lens(field, lens, batch, accumulation.done, cell, targets, rows)
+            self.passes.draw_lens(field, lens, batch, accumulation.done, cell, targets, rows)
             yield
         accumulation.at, accumulation.done = at + len(batch), accumulation.done + len(batch)
         if accumulation.at >= len(samples):

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from PIL import Image
 
 from iibr_core.beyond.picture_quality import QUALITY_LEVELS, QualityLevel
 from iibr_core.scenes.screen_size import ScreenSize
@@ -22,10 +23,8 @@ UNMEASURED = 2.0
 """Factor on the guess for work that was not drawn yet: the first frame of a drag must not stall."""
 OVERHEAD_S = 0.003
 """Time of a picture without pixels."""
-
 BETTER_ONLY_WITHIN = 0.85
 """Share of the time that a better level may take; otherwise a picture near the limit changes back and forth."""
-
 NEW_SHARE = 0.4
 """Weight of a new measurement against earlier ones."""
 
@@ -38,18 +37,7 @@ def scale_size(size_px: ScreenSize, scale: float) -> ScreenSize:
 
 def stretch_image(image: NDArray[np.uint8], size_px: ScreenSize) -> NDArray[np.uint8]:
     """Return a picture (H, W, 3) at (width, height), interpolated linearly as on the screen."""
-    rows, columns = (_taps(new, old) for new, old in zip(size_px[::-1], image.shape))
-    light = image.astype(np.float32)
-    light = light[rows[0]] + rows[2][:, None, None] * (light[rows[1]] - light[rows[0]])
-    light = light[:, columns[0]] + columns[2][:, None] * (light[:, columns[1]] - light[:, columns[0]])
-    return np.rint(light).astype(np.uint8)
-
-
-def _taps(new: int, old: int) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.float32]]:
-    """Return, for each of `new` pixels, the two of `old` pixels around it and the weight of the second."""
-    places = np.clip((np.arange(new) + 0.5) * (old / new) - 0.5, 0, old - 1)
-    low = places.astype(np.intp)
-    return low, np.minimum(low + 1, old - 1), (places - low).astype(np.float32)
+    return np.asarray(Image.fromarray(image).resize(size_px, Image.Resampling.BILINEAR))
 
 
 @dataclass(frozen=True)

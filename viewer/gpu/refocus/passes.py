@@ -13,7 +13,7 @@ from viewer.gpu.light_field_texture import LightFieldTexture
 from viewer.gpu.programs import Program, ProgramCache
 from viewer.gpu.refocus.picture_lens import BARREL_EDGE, Lens
 from viewer.gpu.refocus.view_sampling import Samples, nearest_present
-from viewer.gpu.render_targets import PictureTargets, RenderTarget
+from viewer.gpu.render_targets import PictureTargets
 
 COLORS, DISPARITIES, NEAREST_VIEWS = range(3)
 """Texture units."""
@@ -81,31 +81,26 @@ class Passes:
         framebuffer.scissor = 0, 0, width, height
 
     def present(
-        self, lens: Lens, light: RenderTarget, image: RenderTarget, is_linear: bool, color_space: ColorSpace = SRGB
+        self, lens: Lens, targets: PictureTargets, is_linear: bool = False, color_space: ColorSpace = SRGB
     ) -> None:
         """Write the finished picture. is_linear: as unclipped light, not encoded. color_space: of the result."""
-        image.framebuffer.use()
+        targets.image.framebuffer.use()
         self._ctx.disable(moderngl.DEPTH_TEST | moderngl.CULL_FACE | moderngl.BLEND)
         switches = {"LINEAR": is_linear, "OTHER_PRIMARIES": lens.color_space != color_space}
         program = self._programs.get("present.frag", switches)
         program.set_primaries(color_space, lens.color_space)
-        light.texture.use(0)
-        program.set_uniforms(light_sum=0, exposure=lens.exposure)
+        targets.light.texture.use(0)
+        program.set_uniforms(light_sum=0, exposure=2.0**lens.optics.exposure_stops)
         program.draw()
 
     def update_nearest_views(self, field: LightFieldTexture) -> None:
         """Upload the table of present views, which dolly needs."""
-        rows, columns = field.grid
-        table = np.zeros((rows, columns, 4), np.float32)
-        nearest = nearest_present(field.present)
-        at = nearest[..., 0], nearest[..., 1]
-        table[..., :2] = nearest[..., ::-1]
-        table[..., 2], table[..., 3] = field.has_disparity[at], field.layers[at]
-        if self._nearest_views is None or self._nearest_views.size != (columns, rows):
-            if self._nearest_views is not None:
-                self._nearest_views.release()
-            self._nearest_views = self._ctx.texture((columns, rows), 4, dtype="f4")
-        self._nearest_views.write(table.tobytes())
+        rows, columns = np.moveaxis(nearest_present(field.present), -1, 0)
+        table = np.stack([columns, rows, field.has_disparity[rows, columns], field.layers[rows, columns]], -1)
+        if self._nearest_views is not None:
+            self._nearest_views.release()
+        data = table.astype(np.float32).tobytes()
+        self._nearest_views = self._ctx.texture(field.grid[::-1], 4, data, dtype="f4")
 
     def _set_field(self, program: Program, field: LightFieldTexture, lens: Lens) -> None:
         field.colors.use(COLORS)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import time
 from collections.abc import Generator, Sequence
@@ -45,27 +46,19 @@ class PictureTile:
 def picture_tiles(size_px: ScreenSize, max_px: int) -> list[PictureTile]:
     """Return tiles that together are the whole picture, at most max_px wide and high. size_px: (width, height)."""
     width, height = size_px
-    side = min(MAX_TILE_PX, max_px)
-    return [
-        PictureTile(
-            Rect(left / width, top / height, (right - left) / width, (bottom - top) / height),
-            slice(top, bottom),
-            slice(left, right),
-        )
-        for top, bottom in _spans(height, side)
-        for left, right in _spans(width, side)
-    ]
-
-
-def _spans(length: int, side: int) -> list[tuple[int, int]]:
-    return [(first, min(first + side, length)) for first in range(0, length, side)]
+    side, tiles = min(MAX_TILE_PX, max_px), []
+    for top, left in itertools.product(range(0, height, side), range(0, width, side)):
+        rows, columns = min(side, height - top), min(side, width - left)
+        window = Rect(left / width, top / height, columns / width, rows / height)
+        tiles.append(PictureTile(window, slice(top, top + rows), slice(left, left + columns)))
+    return tiles
 
 
 class PictureDrawing:
     """Draws a picture tile by tile into targets of its own. Call it only from the thread of its context.
 
     image: (height, width, 3), float32 linear light, unclipped, or uint8, encoded by sRGB's curve; complete once
-    `is_done`. is_stopped: whether `stop` came before.
+    `is_done`.
     """
 
     def __init__(
@@ -85,16 +78,14 @@ class PictureDrawing:
         """
         width, height = whole.size_px
         self.image: Pixels = np.empty((height, width, 3), np.float32 if is_linear else np.uint8)
-        self.is_done = self.is_stopped = self._is_released = False
+        self.is_done = self._is_released = self._is_in_steps = False
         self._gl = gl
         self._accumulator = Accumulator(gl.ctx, programs)
         self._field = field.share()
-        self._whole, self._views = whole, views
-        self._is_linear, self._color_space = is_linear, color_space
+        self._whole, self._views, self._is_linear, self._color_space = whole, views, is_linear, color_space
         self._tiles = picture_tiles(whole.size_px, gl.max_texture_size)
         self._tiles_done = 0
         self._current: ProgressiveAccumulation | None = None
-        self._is_in_steps = False
         self._steps = self._draw()
 
     @property
@@ -117,7 +108,7 @@ class PictureDrawing:
     def stop(self) -> None:
         """Free every GL object; the image stays. To be called in any case."""
         if not self._is_released:
-            self._is_released, self.is_stopped = True, not self.is_done
+            self._is_released = True
             self._steps.close()
             self._accumulator.release()
             self._field.release()
@@ -141,6 +132,6 @@ class PictureDrawing:
         self._current = accumulation = replace(self._whole, lens=lens, size_px=tile.size_px)
         pixels = STEP_S / self._gl.seconds_per_fetch if self._is_in_steps else math.inf
         yield from self._accumulator.sum_up_in_steps(self._field, accumulation, targets, pixels)
-        self._accumulator.finish(accumulation, targets, self._is_linear, self._color_space)
+        self._accumulator.passes.present(lens, targets, self._is_linear, self._color_space)
         yield
         self.image[tile.rows, tile.columns] = targets.image.read()

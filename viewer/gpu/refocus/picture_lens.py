@@ -22,14 +22,8 @@ from iibr_core.beyond.picture_quality import (
 from iibr_core.scenes.rect import WHOLE, Rect
 from iibr_core.types import SRGB, ColorSpace, ViewOffset
 from viewer.gpu.light_field_texture import LightFieldTexture
-from viewer.gpu.refocus.view_sampling import (
-    Samples,
-    answered_samples,
-    blended_samples,
-    every_corner,
-    pinhole_samples,
-    pinhole_sources,
-)
+from viewer.gpu.refocus import view_sampling
+from viewer.gpu.refocus.view_sampling import Samples
 
 BARREL_EDGE = 1 / 16
 """Width of the edge of a cat's-eye, as a share of the aperture's diameter."""
@@ -65,11 +59,6 @@ class Lens:
     def has_dolly(self) -> bool:
         """Whether rays of different pixels cross the grid at different places."""
         return self.dolly != (0.0, 0.0)
-
-    @property
-    def exposure(self) -> float:
-        """Factor on light."""
-        return float(2.0**self.optics.exposure_stops)
 
     def barrel(self, aspect: float) -> tuple[float, float, float]:
         """Return the motion of the barrel's opening across the picture (s, t) and its radius, view steps.
@@ -108,16 +97,17 @@ class Lens:
         """Return the cameras of a pass and the views that answer them. field: has views."""
         grid, present = field.grid, field.present
         if self.diameter == 0 and self.has_dolly:
-            return every_corner()
+            return view_sampling.every_corner()
         if self.diameter == 0:
-            return pinhole_samples(pinhole_sources(self.eye, grid, present)[: self.level.sources])
+            sources = view_sampling.pinhole_sources(self.eye, grid, present)
+            return view_sampling.pinhole_samples(sources[: self.level.sources])
         is_blend = not (field.has_disparity.any() or self.has_dolly)
         count = BLEND_POINTS if is_blend else self.cameras_per_pass
         cell = 0.0 if is_blend else self.cell(pass_index)
         points = aperture_points(self.optics.aperture_shape, self.diameter, self.widest, count, pass_index, cell)
         if is_blend:
-            return blended_samples(points, self.eye, grid, present)
-        return answered_samples(points, pass_index * count, self.eye, grid, present)
+            return view_sampling.blended_samples(points, self.eye, grid, present)
+        return view_sampling.answered_samples(points, pass_index * count, self.eye, grid, present)
 
     def cell(self, pass_index: int) -> float:
         """Return the side, in view steps, of the square of the aperture around each camera of a pass.

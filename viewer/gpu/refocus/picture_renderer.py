@@ -24,16 +24,10 @@ from viewer.gpu.context import GLContext
 from viewer.gpu.light_field_texture import Box, LightFieldTexture
 from viewer.gpu.programs import ProgramCache
 from viewer.gpu.refocus.accumulation import Accumulator, ProgressiveAccumulation
-from viewer.gpu.refocus.frame_budget import (
-    DrawCost,
-    FrameTimeModel,
-    choose_quality_level,
-    scale_size,
-    stretch_image,
-)
+from viewer.gpu.refocus.frame_budget import DrawCost, FrameTimeModel, choose_quality_level, scale_size, stretch_image
 from viewer.gpu.refocus.picture_drawing import PictureDrawing
 from viewer.gpu.refocus.picture_lens import lens_of
-from viewer.gpu.refocus.screen_image import ScreenImage
+from viewer.gpu.render_targets import PictureTargets, TargetCache
 
 if TYPE_CHECKING:
     from iibr_core.gloss.shading import GlossMaps
@@ -48,21 +42,18 @@ class Renderer:
     """
 
     def __init__(self, gl: GLContext) -> None:
-        self.gl = gl
-        self.ctx = gl.ctx
+        self.gl, self.ctx = gl, gl.ctx
         self.field: LightFieldTexture | None = None
-        self.passes_shown = 0
-        self.samples = self.samples_converged = 0
+        self.passes_shown = self.samples = self.samples_converged = 0
         self.draw_s = 0.0
         self.programs = ProgramCache(self.ctx)
         self._accumulator = Accumulator(self.ctx, self.programs)
         self._fallback_view: LightFieldTexture | None = None
-        self._screen = ScreenImage(self.ctx)
+        self._targets = TargetCache(self.ctx)
         self._accumulation: ProgressiveAccumulation | None = None
-        self._shown_from_pass = 0
+        self._shown_from_pass = self._level = 0
         self._frame_time = FrameTimeModel(gl.seconds_per_fetch)
         self._refining_s = 4 * gl.seconds_per_fetch
-        self._level = 0
 
     @property
     def drawn_field(self) -> LightFieldTexture:
@@ -88,10 +79,9 @@ class Renderer:
 
         Raises InputError if the graphics driver cannot hold it; the field before then stays.
         """
-        field = LightFieldTexture(self.ctx, grid, width, height, hdr, with_disparity)
+        field = LightFieldTexture(self.ctx, grid, width, height, hdr, with_disparity, color_space)
         if self.field is not None:
             self.field.release()
-        field.color_space = color_space
         self.field = field
         self._accumulation = None
 
@@ -151,7 +141,7 @@ class Renderer:
         seconds = time.perf_counter() - start
         if len(self.programs) == programs:  # compiling says nothing about drawing
             self._frame_time.learn(cost_of(level), seconds)
-        drawn = self._current()
+        drawn = self._current
         self._refining_s = seconds / max(drawn.done, 1) / math.prod(drawn.size_px)
         if level != BEST_QUALITY:
             self._accumulation = self._accumulation_of(optics, size_px, BEST_QUALITY, part)
@@ -171,8 +161,8 @@ class Renderer:
         """Draw more samples of the same picture, for about that long; the image changes after each pass."""
         if self.is_converged:
             return
-        accumulation, programs = self._current(), len(self.programs)
-        pass_before, done_before, start = accumulation.pass_index, accumulation.done, time.perf_counter()
+        accumulation, programs, start = self._current, len(self.programs), time.perf_counter()
+        pass_before, done_before = accumulation.pass_index, accumulation.done
         self._draw(budget_s, accumulation.passes)
         if accumulation.pass_index > pass_before and not self.is_renewing:
             self._finish()
@@ -198,8 +188,7 @@ class Renderer:
         """Return a picture of the tile's own views."""
         first, *others = tile.views
         height, width = first.colors.shape[:2]
-        field = LightFieldTexture(self.ctx, tile.grid, width, height, hdr=True, with_disparity=True)
-        field.color_space = settings.color_space
+        field = LightFieldTexture(self.ctx, tile.grid, width, height, True, True, settings.color_space)
         field.upload(first.row, first.column, first.colors, first.disparity)
         whole_width_px = settings.size_px.width / settings.part.width
         lens = replace(
@@ -233,30 +222,38 @@ class Renderer:
     @property
     def image_texture(self) -> int:
         """GL name of the shown image (RGBA8, rows bottom-up). Another picture may change it."""
-        return self._screen.shown.image.texture.glo
+        return self._shown.image.texture.glo
 
     def read_image(self) -> NDArray[np.uint8]:
         """Return the picture (H, W, 3), sRGB-encoded, row 0 at the top; stretched if it was drawn smaller."""
-        image, drawn_px = self._screen.read(), self._screen.shown.size_px
-        size_px = self._accumulation.size_px if self._accumulation else drawn_px
-        return image if drawn_px == size_px else stretch_image(image, size_px)
+        image, size_px = self._shown.image.read(), self._shown.size_px
+        wanted_px = self._accumulation.size_px if self._accumulation else size_px
+        return image if size_px == wanted_px else stretch_image(image, wanted_px)
 
     def read_pixel(self, u: float, v: float) -> tuple[int, int, int]:
         """Return the picture's colour at texture coordinates (0..1, row 0 at the top), sRGB bytes."""
-        return self._screen.read_pixel(u, v)
+        x, y = (min(max(int(at * size), 0), size - 1) for at, size in zip((u, 1 - v), self._shown.size_px))
+        red, green, blue = self._shown.image.framebuffer.read((x, y, 1, 1), components=3, alignment=1)
+        return red, green, blue
 
     def release(self) -> None:
         """Free every GL object."""
         self.programs.release()
         self._accumulator.release()
-        self._screen.release()
+        self._targets.release()
         for field in (self.field, self._fallback_view):
             if field is not None:
                 field.release()
 
+    @property
     def _current(self) -> ProgressiveAccumulation:
         assert self._accumulation is not None, "render first"
         return self._accumulation
+
+    @property
+    def _shown(self) -> PictureTargets:
+        assert self._targets.shown is not None, "render first"
+        return self._targets.shown
 
     def _accumulation_of(
         self,
@@ -271,15 +268,15 @@ class Renderer:
         return ProgressiveAccumulation(lens, size_px, lens.pass_count(field))
 
     def _draw(self, budget_s: float, passes: int) -> None:
-        accumulation = self._current()
+        accumulation = self._current
         sample_s = self._refining_s * math.prod(accumulation.size_px)
-        targets = self._screen.targets_of(accumulation.size_px)
+        targets = self._targets.get(accumulation.size_px)
         self._accumulator.sum_up(self.drawn_field, accumulation, targets, passes, budget_s, sample_s)
 
     def _finish(self) -> None:
-        self._screen.shown = targets = self._screen.targets_of(self._current().size_px)
-        self._accumulator.finish(self._current(), targets)
-        self.passes_shown = self._current().pass_index
+        self._targets.shown = targets = self._targets.get(self._current.size_px)
+        self._accumulator.passes.present(self._current.lens, targets)
+        self.passes_shown = self._current.pass_index
 
     def _cost(self, optics: Optics, size_px: ScreenSize, part: Rect, level: QualityLevel) -> DrawCost:
         field = self.drawn_field
@@ -289,6 +286,6 @@ class Renderer:
 
     def _report(self, samples: int, seconds: float) -> None:
         """Keep the numbers of the last picture."""
-        self.samples, self.draw_s, accumulation = samples, seconds, self._current()
+        self.samples, self.draw_s, accumulation = samples, seconds, self._current
         in_all = accumulation.lens.sample_count(self.drawn_field) * accumulation.passes
         self.samples_converged = samples if self.is_converged else max(in_all, accumulation.done, samples + 1)

@@ -12,12 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.beyond.aperture_sampling import (
-    SQRT_STEPS,
-    Points,
-    fractions,
-    grid_weights,
-)
+from iibr_core.beyond.aperture_sampling import SQRT_STEPS, Points, fractions, grid_weights
 from iibr_core.beyond.picture_quality import MAX_SOURCES, MIN_WEIGHT
 from iibr_core.scenes.lens_limits import clamp_to_grid
 from iibr_core.types import GridShape, ViewOffset
@@ -71,9 +66,8 @@ def pinhole_samples(sources: list[WeightedView]) -> Samples:
 
 def every_corner() -> Samples:
     """Return a camera at the eye for each corner of a cell; with dolly, cell and weights depend on the pixel."""
-    return Samples(
-        np.zeros((MAX_SOURCES, 2)), np.zeros((MAX_SOURCES, 2), np.intp), np.full(MAX_SOURCES, 1 / MAX_SOURCES)
-    )
+    zeros = np.zeros((MAX_SOURCES, 2))
+    return Samples(zeros, zeros.astype(np.intp), np.full(MAX_SOURCES, 1 / MAX_SOURCES))
 
 
 def _cell_corners(eye: ViewOffset, grid: GridShape, present: NDArray[np.bool_]) -> list[WeightedView]:
