@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import moderngl
 import numpy as np
@@ -56,8 +56,10 @@ class InspectionPasses:
 
     def release(self) -> None:
         """Free every GL object."""
-        for held in (*self._images.values(), *self._textures.values()):
-            held.release()
+        for image in self._images.values():
+            image.release()
+        for texture in self._textures.values():
+            texture.release()
         self._images.clear()
         self._textures.clear()
 
@@ -148,7 +150,7 @@ class InspectionPasses:
         program.draw()
         return texture
 
-    def show(self, name: str, pixels: NDArray[np.uint8]) -> int:
+    def show(self, name: str, pixels: NDArray[Any]) -> int:
         """Upload an image (H, W, 3) under this name."""
         return self._texture(name, pixels).glo
 
@@ -180,7 +182,7 @@ class InspectionPasses:
         self._ctx.disable(moderngl.DEPTH_TEST | moderngl.CULL_FACE | moderngl.BLEND)
         return image.texture.glo
 
-    def _texture(self, name: str, pixels: NDArray[np.uint8]) -> moderngl.Texture:
+    def _texture(self, name: str, pixels: NDArray[Any]) -> moderngl.Texture:
         """Return a texture with these (H, W, C) pixels."""
         height, width, components = pixels.shape
         texture = self._textures.get(name)
