@@ -11,7 +11,6 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -24,22 +23,15 @@ from iibr_core.formats.images.write import write_image
 from iibr_core.formats.light_fields.write import write_light_field
 from iibr_core.scenes.opening import results_of
 from iibr_core.scenes.scene import SceneReady, SceneRequest, Source, ViewReady
-from iibr_core.types import (
-    GridShape,
-    InputError,
-    ViewOffset,
-    ViewUpdate,
-)
+from iibr_core.types import GridShape, InputError, ViewOffset, ViewUpdate
 from tests.viewer.background.test_scene_worker import Desk
 from tests.viewer.conftest import write_scene
 from viewer.app.picture_files import export_picture, shot_of
-from viewer.app.preferences_store import load_preferences, store_preferences
 from viewer.background.newest import Failed
 from viewer.display.offscreen import OffscreenScene
 from viewer.model import lens
 from viewer.model.action import do
 from viewer.model.saved_settings import read_settings
-from viewer.model.state.app_state import AppState
 
 GRID = GridShape(3, 3)
 
@@ -79,19 +71,13 @@ def goes_on(desk: Desk, folder: Path, generation: int) -> None:
         assert not isinstance(result, Failed)
 
 
-def garbage(path: Path) -> None:
-    path.write_bytes(b"\x89PNG\r\n\x1a\n" + bytes(range(256)))
-
-
 @pytest.mark.parametrize(
     ("damage", "reason"),
     [
         (Path.unlink, "no such file"),
-        (lambda path: path.write_bytes(b""), "empty"),
-        (garbage, "cannot be read"),
         (lambda path: path.write_bytes(path.read_bytes()[:-40]), "cut off"),
     ],
-    ids=["deleted", "emptied", "garbage", "cut off"],
+    ids=["deleted", "cut off"],
 )
 def test_a_photo_that_went_bad_is_one_line_and_the_worker_goes_on(
     desk: Desk, tmp_path: Path, damage: Callable[[Path], None], reason: str
@@ -139,7 +125,7 @@ def test_a_view_deleted_while_the_light_field_opens(desk: Desk, tmp_path: Path) 
     goes_on(desk, tmp_path, 3)
 
 
-@pytest.mark.parametrize("size", [(1, 1), (1, 9), (7, 1), (5, 13)])
+@pytest.mark.parametrize("size", [(1, 1), (5, 13)])
 def test_photos_of_any_size_and_depth_become_scenes(tmp_path: Path, size: tuple[int, int]) -> None:
     """With a map of NaN, infinity, an outlier and negative values beside them."""
     random = np.random.default_rng(0)
@@ -165,7 +151,7 @@ def viewer(tmp_path: Path) -> Iterator[OffscreenScene]:
         yield made
 
 
-@pytest.mark.parametrize("name", ["a.png", "a.exr", "a.jpg", "a.tif"])
+@pytest.mark.parametrize("name", ["a.png", "a.exr"])
 def test_a_full_disk_while_a_picture_is_saved(viewer: OffscreenScene, tmp_path: Path, name: str) -> None:
     """One line, nothing half-written, what was there stays; with room again the same picture is saved."""
     path = tmp_path / name
@@ -191,15 +177,6 @@ def test_the_photo_may_go_once_it_is_open(viewer: OffscreenScene, tmp_path: Path
         viewer.open(Source(str(tmp_path / "scene.png")))
 
 
-def test_preferences_on_a_full_disk_keep_the_old_ones(tmp_path: Path) -> None:
-    state = replace(AppState(), recent=("/a.png",))
-    store_preferences(state, tmp_path)
-    with full_disk(10), pytest.raises(InputError, match="cannot be written"):
-        store_preferences(replace(state, recent=("/b.png",)), tmp_path)
-    assert load_preferences(AppState(), tmp_path).recent == ("/a.png",)
-    assert len(list(tmp_path.iterdir())) == 2
-
-
 def test_settings_that_are_no_text(tmp_path: Path) -> None:
     """Found by fuzzing: bytes that are no UTF-8 where the settings stand."""
     write_image(tmp_path / "a.exr", np.zeros((4, 4, 3), np.uint8), {"iibr:settings": "{some text}"})
@@ -212,19 +189,8 @@ def test_settings_that_are_no_text(tmp_path: Path) -> None:
 
 def test_a_refused_gl_context_is_one_line(tmp_path: Path) -> None:
     """EGL without any driver."""
-    photo = write_scene(tmp_path)
-    command = [
-        sys.executable,
-        "-P",
-        "-m",
-        "viewer",
-        "screenshot",
-        str(photo),
-        "--backend",
-        "egl",
-        "-o",
-        str(tmp_path / "o.png"),
-    ]
+    photo, out = str(write_scene(tmp_path)), str(tmp_path / "o.png")
+    command = [sys.executable, "-P", "-m", "viewer", "screenshot", photo, "--backend", "egl", "-o", out]
     nowhere = {"__EGL_VENDOR_LIBRARY_FILENAMES": "/nonexistent.json", "LIBGL_DRIVERS_PATH": "/nonexistent"}
     done = subprocess.run(command, env={**os.environ, **nowhere}, capture_output=True, text=True, check=False)
     assert done.returncode == 2
