@@ -30,10 +30,8 @@ from viewer.app.session_store import SessionStore
 from viewer.app.sharpener import Sharpener
 from viewer.app.side_effects import SideEffects
 from viewer.app.window import Window, wake
-from viewer.background.entropy import EntropyWork
-from viewer.background.gloss_worker import GlossFinder
+from viewer.background.maps import EntropyWork, GlossFinder, find_surface
 from viewer.background.newest import Newest
-from viewer.background.surface import find_surface
 from viewer.display.filmstrip_view import FilmstripView
 from viewer.display.inspection_view import InspectionView
 from viewer.display.scene_view import VIEW_REFRESH_S, SceneView

@@ -43,6 +43,7 @@ class DepthFinder:
         self._newest: Newest[EstimateRequest, LoadedPhoto] = Newest("iibr-depth", _estimate, wake)
         self._asked: EstimateRequest | None = None
         self._found: LoadedPhoto | None = None
+        self.close = self._newest.close
 
     def advance(self, state: AppState, loaded: LoadedPhoto | None) -> list[Action]:
         """Return what came of an estimate, and start the one that is wanted now."""
@@ -64,10 +65,6 @@ class DepthFinder:
             self._found = None
             return loaded
         return found
-
-    def close(self) -> None:
-        """Stop the thread."""
-        self._newest.close()
 
     def _start(self, state: AppState, loaded: LoadedPhoto | None) -> None:
         model, asked = depth_models.wanted_model(state), self._asked

@@ -55,15 +55,15 @@ class ReadAhead(Generic[Read]):
             post((wanted, read(wanted)))
 
         self._thread = Newest(name, work, wake)
-        self._known: dict[WantedPhoto, Read | None] = {}
+        self._photos: dict[WantedPhoto, Read | None] = {}
         self._reading: WantedPhoto | None = None
+        self.close = self._thread.close
 
     def want(self, wanted: Sequence[WantedPhoto]) -> None:
         """Read these photos, the first one at once, even if another one is being read; forget all others."""
-        self._take_results()
-        self._known = {photo: read for photo, read in self._known.items() if photo in wanted}
-        missing = [photo for photo in wanted if photo not in self._known]
-        is_urgent = bool(missing) and missing[0] == wanted[0]
+        self._photos = {photo: read for photo, read in self._known.items() if photo in wanted}
+        missing = [photo for photo in wanted if photo not in self._photos]
+        is_urgent = missing[:1] == list(wanted[:1])
         if self._reading is not None and self._reading not in (missing[:1] if is_urgent else missing):
             self._thread.cancel()
             self._reading = None
@@ -73,29 +73,24 @@ class ReadAhead(Generic[Read]):
 
     def is_done(self, photo: WantedPhoto) -> bool:
         """Return whether a photo was read, or cannot be read."""
-        self._take_results()
         return photo in self._known
 
     def is_reading(self, photo: WantedPhoto) -> bool:
         """Return whether a photo is being read."""
-        self._take_results()
-        return self._reading == photo
+        return photo not in self._known and self._reading == photo
 
     def get(self, photo: WantedPhoto) -> Read | None:
         """Return a photo if it was read."""
-        self._take_results()
         return self._known.get(photo)
 
     def keep(self, photo: WantedPhoto, read: Read) -> None:
         """Keep a photo that was read elsewhere while it is wanted."""
-        self._known[photo] = read
+        self._photos[photo] = read
 
-    def close(self) -> None:
-        """Stop reading."""
-        self._thread.close()
-        self._known.clear()
-
-    def _take_results(self) -> None:
+    @property
+    def _known(self) -> dict[WantedPhoto, Read | None]:
+        """The photos read so far, with the results that have come in; None for a photo that cannot be read."""
         while (result := self._thread.next_result()) is not None:
             photo, read = (result.request, None) if isinstance(result, Failed) else result
-            self._reading, self._known[photo] = None, read
+            self._reading, self._photos[photo] = None, read
+        return self._photos

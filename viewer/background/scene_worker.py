@@ -45,41 +45,29 @@ class SceneWork:
         self.eye = CENTRE
 
     def __call__(self, request: SceneRequest, post: Post[Opened]) -> None:
-        """Post all results of a request."""
+        """Post all results of a request, and reports of the work between them with the count of its views."""
         source = Path(request.source.path)
         if source.is_dir() and (photo := first_photo(source)) is not None:
             post(PhotosFound(request.generation, str(photo)))
             return
         from iibr_core.scenes.opening import results_of
 
-        reports = _Reports(request.generation, post)
-        with watch_compiling(lambda words: reports.report(0, 0, words)), watched(reports.report):
+        views, time_left, posted, posted_s = Progress(), TimeLeft(), "", 0.0
+
+        def report(done: float, total: float, doing: str) -> None:
+            nonlocal posted, posted_s
+            left_s, now_s = time_left.update(done, total, doing), time.perf_counter()
+            if doing == posted and now_s - posted_s < REPORT_INTERVAL_S:
+                return
+            posted, posted_s = doing, now_s
+            words = f"{doing}, {round(100 * done / total)} %" if done and total else doing
+            share = done / total if total else views.share
+            post(WorkReport(request.generation, replace(views, doing=words, share=share, left_s=left_s)))
+
+        with watch_compiling(lambda words: report(0, 0, words)), watched(report):
             for result in results_of(request, lambda: self.eye):
-                reports.take(result)
+                if isinstance(result, ViewReady):
+                    views = result.progress
+                else:
+                    views = Progress(total=result.scene.grid.rows * result.scene.grid.columns)
                 post(result)
-
-
-class _Reports:
-    """Posts what the work is doing between its results, with the count of its views."""
-
-    def __init__(self, generation: int, post: Post[Opened]) -> None:
-        self._generation, self._post = generation, post
-        self._views, self._time_left = Progress(), TimeLeft()
-        self._doing, self._posted_s = "", 0.0
-
-    def take(self, result: SceneReady | ViewReady) -> None:
-        """Note the progress of the views."""
-        if isinstance(result, ViewReady):
-            self._views = result.progress
-        else:
-            self._views = Progress(total=result.scene.grid.rows * result.scene.grid.columns)
-
-    def report(self, done: float, total: float, doing: str) -> None:
-        """Post the progress, unless the same work was reported a moment ago."""
-        left_s, now_s = self._time_left.update(done, total, doing), time.perf_counter()
-        if doing == self._doing and now_s - self._posted_s < REPORT_INTERVAL_S:
-            return
-        self._doing, self._posted_s = doing, now_s
-        words = f"{doing}, {round(100 * done / total)} %" if done and total else doing
-        share = done / total if total else self._views.share
-        self._post(WorkReport(self._generation, replace(self._views, doing=words, share=share, left_s=left_s)))

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import queue
-import threading
 import time
 from collections.abc import Callable, Generator
+from concurrent.futures import Future, wait
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
@@ -21,14 +21,12 @@ Steps = Generator[None, None, Result]
 
 @dataclass(eq=False)
 class _Asked:
-    """Steps from another thread, and their result or the error that they raised."""
+    """Steps from another thread, and what comes of them."""
 
     steps: Steps[Any]
     should_stop: ShouldStop
     is_urgent: bool
-    is_done: threading.Event = field(default_factory=threading.Event)
-    result: Any = None
-    error: Exception | None = None
+    future: Future[Any] = field(default_factory=Future)
 
 
 class WindowWork:
@@ -53,11 +51,9 @@ class WindowWork:
         asked = _Asked(steps, in_this_job(is_stopped), is_urgent)
         self._new.put(asked)
         self._wake()
-        while not asked.is_done.wait(LOOK_S):
+        while not wait([asked.future], LOOK_S).done:
             raise_if_stopped()
-        if asked.error is not None:
-            raise asked.error
-        result: Result = asked.result
+        result: Result = asked.future.result()
         return result
 
     def advance(self, budget_s: float) -> None:
@@ -82,8 +78,7 @@ class WindowWork:
             next(asked.steps)
             return
         except StopIteration as end:
-            asked.result = end.value
+            asked.future.set_result(end.value)
         except Exception as error:  # raised in the thread that asked
-            asked.error = error
+            asked.future.set_exception(error)
         self._asked.remove(asked)
-        asked.is_done.set()

@@ -17,9 +17,8 @@ from iibr_core.scenes.rect import WHOLE, Rect
 from iibr_core.scenes.scene import LoadedPhoto, Scene
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import ViewOffset, ViewUpdate
-from viewer.background.entropy import Entropy, EntropyRequest
+from viewer.background.maps import Entropy, EntropyRequest, Surface, SurfaceRequest
 from viewer.background.newest import Failed
-from viewer.background.surface import Surface, SurfaceRequest
 from viewer.display.scene_view import SceneView
 from viewer.gpu.context import GLContext
 from viewer.gpu.inspection_passes import InspectionPasses, Line, OverlayStyle

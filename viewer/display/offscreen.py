@@ -29,7 +29,7 @@ from iibr_core.scenes.scene import MAKING, DepthSettings, Scene, SceneReady, Sce
 from iibr_core.scenes.scene_gloss import make_maps
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import SRGB, ColorSpace, ViewOffset
-from viewer.background.entropy import Entropy, EntropyWork
+from viewer.background.maps import Entropy, EntropyWork
 from viewer.display.inspection_view import InspectionView
 from viewer.display.scene_view import SceneView
 from viewer.gpu.context import Backend, create_headless

@@ -15,7 +15,7 @@ from iibr_core.method.view import Renderer
 from iibr_core.scenes.photo import load_photo
 from iibr_core.scenes.scene import Source
 from tests.viewer.conftest import write_scene
-from viewer.background.entropy import Entropy, EntropyRequest, EntropyWork
+from viewer.background.maps import Entropy, EntropyRequest, EntropyWork
 
 
 def test_the_map_is_the_entropy_of_the_weights_of_its_view(tmp_path: Path) -> None:
