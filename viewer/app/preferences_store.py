@@ -20,10 +20,10 @@ from iibr_core.types import InputError
 from viewer.model import messages
 from viewer.model.action import Action, do
 from viewer.model.opening import MAX_RECENT
+from viewer.model.preferences import FONT_SCALE_LIMITS
 from viewer.model.state.app_state import AppState
 from viewer.model.state.notices import Notice
 from viewer.model.state.preferences import Preferences
-from viewer.model.window_limits import FONT_SCALE_LIMITS
 
 PREFERENCES_FILE = "preferences.json"
 RECENT_FILE = "recent.json"

@@ -24,7 +24,7 @@ from viewer.display.scene_view import SceneView
 from viewer.model import depth_models, folder, lens, messages, opening
 from viewer.model.action import Action, ask, do, forget_tasks
 from viewer.model.commands import action_for_path
-from viewer.model.photo_facts import set_facts
+from viewer.model.opening import set_facts
 from viewer.model.saving import path_beside
 from viewer.model.state.app_state import AppState
 from viewer.model.state.depth_models import (
@@ -32,9 +32,8 @@ from viewer.model.state.depth_models import (
     GetModelTask,
     ListModelsTask,
 )
-from viewer.model.state.folder import ListFolderTask
+from viewer.model.state.folder import ListFolderTask, PhotoFacts
 from viewer.model.state.notices import Notice
-from viewer.model.state.photo_facts import PhotoFacts, ReadFactsTask
 from viewer.model.state.prompts import PathPrompt
 from viewer.model.state.tasks import (
     CancelJobTask,
@@ -43,6 +42,7 @@ from viewer.model.state.tasks import (
     CopyTask,
     ExportTask,
     PasteTask,
+    ReadFactsTask,
     ReadMaskTask,
     SaveTask,
     ShowFileTask,

@@ -8,5 +8,5 @@ from iibr_core.runtime.resources import resource_folder
 
 
 def demo_photo() -> Path:
-    """Where it lies; its disparity is beside it."""
+    """Return its path; its disparity map lies beside it."""
     return resource_folder("assets") / "motorcycle" / "motorcycle.png"

@@ -1,4 +1,4 @@
-"""A gloss in files: its TOML file, and the bounds of its numbers. The fields are those of `Gloss`, by name.
+"""A gloss in a TOML file; the fields are those of `Gloss`, by name. Limits of its numbers, also for saved settings.
 
 Import this module late: msgspec takes 10 to 40 ms, which the window's first frame need not wait for.
 """
@@ -6,12 +6,11 @@ Import this module late: msgspec takes 10 to 40 ms, which the window's first fra
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Annotated, Any, TypedDict
+from typing import Any
 
 import msgspec
-from msgspec import Meta
 
 from iibr_core.formats.files import printable, read_text
 from iibr_core.gloss.settings import (
@@ -25,49 +24,21 @@ from iibr_core.types import InputError
 
 MAX_BYTES = 1_000_000
 """Largest size of a gloss file, in bytes."""
-
-Share = Annotated[float, Meta(ge=0.0, le=1.0)]
-Place = Annotated[float, Meta(ge=-1.0, le=2.0)]
-Length = Annotated[float, Meta(ge=-1e6, le=1e6)]
-Strength = Annotated[float, Meta(ge=0.0, le=100.0)]
-Tolerance = Annotated[float, Meta(ge=0.0, le=MAX_TOLERANCE)]
-StrokeRadius = Annotated[float, Meta(ge=STROKE_RADIUS_LIMITS[0], le=STROKE_RADIUS_LIMITS[1])]
-LightRadius = Annotated[float, Meta(ge=LIGHT_RADIUS_LIMITS_DEG[0], le=LIGHT_RADIUS_LIMITS_DEG[1])]
-Points = Annotated[tuple[tuple[Place, Place], ...], Meta(min_length=1, max_length=MAX_STROKE_POINTS)]
-
-
-class StrokeBounds(TypedDict, total=False):
-    """Bounds of a `GlossStroke`."""
-
-    points: Points
-    radius: StrokeRadius
-
-
-class SurfaceBounds(TypedDict, total=False):
-    """Bounds of a `GlossSurface`."""
-
-    farthest: Share
-    nearest: Share
-    color: tuple[Share, Share, Share] | None
-    tolerance: Tolerance
-    strokes: tuple[StrokeBounds, ...]
-
-
-class LightBounds(TypedDict, total=False):
-    """Bounds of a `GlossLight`."""
-
-    direction: tuple[Length, Length, Length]
-    color: tuple[Strength, Strength, Strength]
-    radius_deg: LightRadius
-
-
-class GlossBounds(TypedDict, total=False):
-    """Bounds of a `Gloss`."""
-
-    surface: SurfaceBounds
-    roughness: Share
-    reflectance: Share
-    light: LightBounds
+Limits = Mapping[str, tuple[float, float]]
+"""Smallest and largest value of each number, by its name with dots."""
+GLOSS_LIMITS: Limits = {
+    "roughness": (0.0, 1.0),
+    "reflectance": (0.0, 1.0),
+    "surface.farthest": (0.0, 1.0),
+    "surface.nearest": (0.0, 1.0),
+    "surface.color": (0.0, 1.0),
+    "surface.tolerance": (0.0, MAX_TOLERANCE),
+    "surface.strokes.points": (-1.0, 2.0),
+    "surface.strokes.radius": STROKE_RADIUS_LIMITS,
+    "light.direction": (-1e6, 1e6),
+    "light.color": (0.0, 100.0),
+    "light.radius_deg": LIGHT_RADIUS_LIMITS_DEG,
+}
 
 
 def read_gloss(path: Path) -> Gloss:
@@ -77,11 +48,42 @@ def read_gloss(path: Path) -> Gloss:
         whole = tomllib.loads(text)
         for unknown in unknown_fields(whole, msgspec.to_builtins(Gloss())):
             raise ValueError(f"there is no setting {unknown}")
-        msgspec.convert(whole, GlossBounds)
-        return msgspec.convert(whole, Gloss)
+        gloss = msgspec.convert(whole, Gloss)
+        require_within(gloss, GLOSS_LIMITS)
+        require_points(gloss)
     except (ValueError, RecursionError) as error:
-        reason = " ".join(str(error).replace("- at `$.", "at `").split())[:120]
-        raise InputError(f"{path}: is not a gloss file ({reason}); correct it") from error
+        raise InputError(f"{path}: is not a gloss file ({short_reason(error)}); correct it") from error
+    return gloss
+
+
+def require_within(record: object, limits: Limits) -> None:
+    """Raise ValueError, naming the field, if a number of a record or of its parts is out of its limits."""
+    for name, value in _numbers_in(msgspec.to_builtins(record)):
+        if name in limits and not limits[name][0] <= value <= limits[name][1]:
+            raise ValueError("{}: {} is not from {:g} to {:g}".format(name, value, *limits[name]))
+
+
+def require_points(gloss: Gloss) -> None:
+    """Raise ValueError if a stroke has no points or too many."""
+    if not all(1 <= len(stroke.points) <= MAX_STROKE_POINTS for stroke in gloss.surface.strokes):
+        raise ValueError(f"surface.strokes: a stroke has 1 to {MAX_STROKE_POINTS:,} points")
+
+
+def short_reason(error: Exception) -> str:
+    """Return the message of an error in one short line, with the field that msgspec names."""
+    return " ".join(str(error).replace("- at `$.", "at `").split())[:120]
+
+
+def _numbers_in(value: Any, name: str = "") -> Iterator[tuple[str, float]]:
+    """Yield all numbers in dictionaries and lists, with their names; the items of a list have the list's name."""
+    if isinstance(value, dict):
+        for key, part in value.items():
+            yield from _numbers_in(part, f"{name}.{key}".lstrip("."))
+    elif isinstance(value, list | tuple):
+        for part in value:
+            yield from _numbers_in(part, name)
+    elif isinstance(value, int | float):
+        yield name, value
 
 
 def unknown_fields(raw: Any, known: Any, within: str = "") -> Iterator[str]:

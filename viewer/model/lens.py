@@ -22,8 +22,8 @@ from viewer.model.presets import preset_optics, subject_disparity
 from viewer.model.state.app_state import AppState
 from viewer.model.state.lens import GlossBrush, PresetName, TiltHandles
 from viewer.model.state.viewpoint import Motion
-from viewer.model.window_limits import DEPTH_STRENGTH_LIMIT
 
+DEPTH_STRENGTH_LIMIT = 4.0
 POINT_SPACING = 1 / 6
 """Distance between the points of a gloss stroke, as a share of its radius."""
 P = ParamSpec("P")

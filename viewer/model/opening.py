@@ -19,11 +19,11 @@ from viewer.model.messages import MAX_NOTICES, notify
 from viewer.model.remedies import DEPTH_COMMANDS
 from viewer.model.state.app_state import AppState
 from viewer.model.state.depth_models import ListModelsTask
-from viewer.model.state.folder import ListFolderTask
+from viewer.model.state.folder import ListFolderTask, PhotoFacts
 from viewer.model.state.history import History
 from viewer.model.state.notices import Notice
-from viewer.model.state.photo_facts import ReadFactsTask
 from viewer.model.state.saving import SavedSettings
+from viewer.model.state.tasks import ReadFactsTask
 from viewer.model.state.viewpoint import Motion
 
 MAX_RECENT = 8
@@ -137,6 +137,11 @@ def restore_session(state: AppState, settings: SavedSettings) -> AppState:
         restored = replace(restored, depth=depth, depth_strength=settings.depth_strength)
         restored = replace(restored, generation=state.generation + 1)
     return notify(restored, Notice(RESTORED))
+
+
+def set_facts(state: AppState, facts: PhotoFacts) -> AppState:
+    """Show the facts that a photo's file states."""
+    return replace(state, facts=facts)
 
 
 def with_recent(recent: tuple[str, ...], path: str) -> tuple[str, ...]:

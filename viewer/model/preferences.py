@@ -8,7 +8,8 @@ from dataclasses import replace
 from iibr_core.scenes.lens_limits import clamp
 from viewer.model.state.app_state import AppState
 from viewer.model.state.preferences import Section, Theme, Units, is_seen_open, with_sections
-from viewer.model.window_limits import FONT_SCALE_LIMITS
+
+FONT_SCALE_LIMITS = 0.6, 2.5
 
 
 def set_theme(state: AppState, theme: Theme) -> AppState:

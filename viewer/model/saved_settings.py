@@ -10,24 +10,30 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Collection
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import msgspec
 
-from iibr_core.beyond.optics import ApertureShape, Optics
+from iibr_core.beyond.optics import Optics
 from iibr_core.depth.editing.edits import UNEDITED, DepthEdits, require_sound
 from iibr_core.formats.images.metadata import settings_text_in
 from iibr_core.scenes.lens_limits import BLADES_LIMITS
 from iibr_core.scenes.scene import Source
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, InputError
-from viewer.model.gloss_file import GlossBounds, unknown_fields
+from viewer.model.gloss_file import GLOSS_LIMITS, require_points, require_within, short_reason, unknown_fields
 from viewer.model.state.saving import SavedSettings
 
 FORMAT = 1
 MAX_CHARACTERS = 16_000_000
 """Largest length of the text; a thousand strokes take 1.3 million."""
-MASK_LIMITS = (1, 4096)
+OPTICS_LIMITS = {
+    "optics.aperture_shape.blades": BLADES_LIMITS,
+    "optics.aperture_shape.mask.rows": (1, 4096),
+    "optics.aperture_shape.mask.columns": (1, 4096),
+    **{f"optics.gloss.{name}": limits for name, limits in GLOSS_LIMITS.items()},
+}
+"""Limits of numbers that no lens clamps."""
 FORMER_SETTINGS = ("source.max_pixels", "source.memory_bytes", "source.quality")
 """Settings that earlier versions wrote; they are ignored."""
 NAMED_FIELDS = 3
@@ -76,16 +82,9 @@ class SettingsText(FormatText, frozen=True, kw_only=True, omit_defaults=True):
 
 def settings_text(settings: SavedSettings) -> str:
     """Return the settings as JSON."""
-    text = SettingsText(
-        format=FORMAT,
-        optics=settings.optics,
-        depth_strength=settings.depth_strength,
-        source=_text_of_source(settings.source),
-        size_px=settings.size_px,
-        depth_edits=settings.depth_edits,
-        has_model_depth=settings.has_model_depth,
-        view_width=settings.view_width,
-    )
+    fields: dict[str, Any] = {field.name: getattr(settings, field.name) for field in dataclasses.fields(settings)}
+    del fields["unknown_fields"]
+    text = SettingsText(**fields | {"format": FORMAT, "source": _text_of_source(settings.source)})
     return msgspec.json.encode(text, enc_hook=lambda number: number.item()).decode()  # numpy's numbers
 
 
@@ -101,25 +100,24 @@ def settings_from_text(text: str, name: str, is_own: bool = False) -> SavedSetti
         if number != FORMAT:
             raise ValueError(f"format {number}, this program reads {FORMAT}")
         read = msgspec.convert(whole, SettingsText)
-        _require_sound_shape(read.optics.aperture_shape)
+        _require_sound(read.optics)
         require_sound(read.depth_edits)
         gloss = read.optics.gloss
-        if gloss is not None:
-            msgspec.convert(whole["optics"]["gloss"], GlossBounds)
         strokes = len(read.depth_edits.strokes) + (len(gloss.surface.strokes) if gloss is not None else 0)
         if not is_own and strokes > MAX_STROKES:
             raise ValueError(f"{strokes:,} strokes, at most {MAX_STROKES:,} are painted")
     except (ValueError, RecursionError) as error:
-        reason = " ".join(str(error).replace("- at `$.", "at `").split())[:120]
         raise InputError(
-            f"{name}: its settings are damaged or of another program ({reason}); set them by hand"
+            f"{name}: its settings are damaged or of another program ({short_reason(error)}); set them by hand"
         ) from error
     named = dict.fromkeys(unknown_fields(whole, msgspec.to_builtins(read)))
-    unknown = tuple(field for field in named if field not in FORMER_SETTINGS)
-    source = _source_from_text(Source(""), read.source)
-    size = ScreenSize(*read.size_px)
-    edits, has_model = read.depth_edits, read.has_model_depth
-    return SavedSettings(read.optics, read.depth_strength, source, size, edits, unknown, has_model, read.view_width)
+    fields = msgspec.structs.asdict(read) | {
+        "source": _source_from_text(Source(""), read.source),
+        "size_px": ScreenSize(*read.size_px),
+        "unknown_fields": tuple(field for field in named if field not in FORMER_SETTINGS),
+    }
+    del fields["format"]
+    return SavedSettings(**fields)
 
 
 def read_settings(path: Path) -> SavedSettings:
@@ -184,19 +182,11 @@ def _source_from_text(source: Source, text: SourceText) -> Source:
     )
 
 
-def _require_sound_shape(shape: ApertureShape) -> None:
-    """Raise ValueError for an aperture whose numbers are out of range."""
-    _require_within("blades", shape.blades, BLADES_LIMITS)
-    mask = shape.mask
-    if mask is None:
-        return
-    for side, count in (("rows", mask.rows), ("columns", mask.columns)):
-        _require_within(f"mask.{side}", count, MASK_LIMITS)
-    if len(mask.values) != mask.rows * mask.columns or not any(mask.values):
+def _require_sound(optics: Optics) -> None:
+    """Raise ValueError for numbers out of range, and for a mask that is empty or of another size."""
+    require_within({"optics": optics}, OPTICS_LIMITS)
+    mask = optics.aperture_shape.mask
+    if mask is not None and (len(mask.values) != mask.rows * mask.columns or not any(mask.values)):
         raise ValueError("optics.aperture_shape.mask is empty or of another size")
-
-
-def _require_within(name: str, value: int, limits: tuple[int, int]) -> None:
-    low, high = limits
-    if not low <= value <= high:
-        raise ValueError(f"optics.aperture_shape.{name}: {value} is not from {low} to {high}")
+    if optics.gloss is not None:
+        require_points(optics.gloss)

@@ -14,8 +14,9 @@ from viewer.model.messages import notify
 from viewer.model.state.app_state import AppState
 from viewer.model.state.notices import Notice
 from viewer.model.state.viewpoint import FORWARD_LIMITS, MAX_ASIDE, FreeCamera, Motion, MotionKind, Zoom
-from viewer.model.window_limits import SPEED_LIMITS
 
+SPEED_LIMITS = 0.05, 1.0
+"""Slowest and fastest motion, in turns per second."""
 HOME_S = 0.4
 """Duration of the glide to the middle, in seconds."""
 MAX_STEP_S = 0.1

@@ -13,9 +13,9 @@ from tests.viewer.conftest import reduce
 from viewer.app.preferences_store import PREFERENCES_FILE, RECENT_FILE, last_opened, load_preferences, store_preferences
 from viewer.model import preferences
 from viewer.model.action import do
+from viewer.model.preferences import FONT_SCALE_LIMITS
 from viewer.model.state.app_state import AppState
 from viewer.model.state.preferences import Preferences
-from viewer.model.window_limits import FONT_SCALE_LIMITS
 
 
 def test_kept_values_come_back(tmp_path: Path) -> None:

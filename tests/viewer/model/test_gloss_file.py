@@ -35,16 +35,13 @@ def test_a_file_says_everything(tmp_path: Path) -> None:
     assert read_gloss(path) == Gloss(surface, 0, 0.5, light)
 
 
-def test_what_a_file_leaves_out_is_as_usual(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("text", "gloss"), [("# nothing", Gloss()), ("\ufeffroughness = 0.5", Gloss(roughness=0.5))], ids=["usual", "bom"]
+)
+def test_what_a_file_leaves_out_is_as_usual(tmp_path: Path, text: str, gloss: Gloss) -> None:
     path = tmp_path / "gloss.toml"
-    path.write_text("# nothing")
-    assert read_gloss(path) == Gloss()
-
-
-def test_a_byte_order_mark_is_no_part_of_the_text(tmp_path: Path) -> None:
-    path = tmp_path / "gloss.toml"
-    path.write_text("\ufeffroughness = 0.5", "utf-8")
-    assert read_gloss(path) == Gloss(roughness=0.5)
+    path.write_text(text, "utf-8")
+    assert read_gloss(path) == gloss
 
 
 @pytest.mark.parametrize(
@@ -56,21 +53,18 @@ def test_a_byte_order_mark_is_no_part_of_the_text(tmp_path: Path) -> None:
         ("reflectance = 1.5", "reflectance"),
         ("rough = 0.5", "rough"),
         ("photo_shines = true", "photo_shines"),
-        ('environment = "room.exr"', "environment"),
         ("[surface]\ncolor = [0, 0, 2]", "surface.color"),
         ("[surface]\nstrokes = [{points = [], radius = 0.1}]", "surface.strokes"),
         ("[surface]\nstrokes = [{points = [[0.5, nan]], radius = 0.1}]", "points"),
         ("[light]\nradius_deg = 0", "light.radius_deg"),
         ("[light]\ncolor = [1, inf, 1]", "light.color"),
         ("[light]\ndirection = [0, nan, 1]", "light.direction"),
-        ("[light]\ncolour = [1, 1, 1]", "light.colour"),
         ("[light]\ndirection = [1, 1]", "direction"),
         ("[light]\ndirection = [0, 0, 0]", "direction"),
         ("light = 3", "light"),
-        ("[[surface]]", "surface"),
-        ("= 3", "no gloss"),
-        ("\x00", "no gloss"),
-        ("a = " + "[" * 5000, "no gloss"),
+        ("= 3", "not a gloss"),
+        ("a = " + "[" * 5000, "not a gloss"),
+        ("a" * 2_000_000, "is larger than"),
     ],
 )
 def test_what_makes_no_sense_is_named_in_one_line(tmp_path: Path, text: str, named: str) -> None:
@@ -80,13 +74,3 @@ def test_what_makes_no_sense_is_named_in_one_line(tmp_path: Path, text: str, nam
         read_gloss(path)
     assert str(path) in str(refused.value)
     assert "\n" not in str(refused.value)
-
-
-@pytest.mark.parametrize(
-    ("content", "says"), [(b"\xff\xfe\x00", "is not a gloss file"), (b"a" * 2_000_000, "is larger than")]
-)
-def test_files_that_are_no_text_or_too_large(tmp_path: Path, content: bytes, says: str) -> None:
-    path = tmp_path / "gloss.toml"
-    path.write_bytes(content)
-    with pytest.raises(InputError, match=says):
-        read_gloss(path)

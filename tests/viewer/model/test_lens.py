@@ -19,11 +19,11 @@ from viewer.model import gesture, history, lens, opening
 from viewer.model.action import Action, do
 from viewer.model.carried_optics import carry_optics
 from viewer.model.focal_plane import sharp_disparity
+from viewer.model.lens import DEPTH_STRENGTH_LIMIT
 from viewer.model.presets import active_preset
 from viewer.model.state.app_state import AppState
 from viewer.model.state.depth import Brush
 from viewer.model.state.lens import FIRST_GLOSS, PRESETS, GlossBrush, PresetName, TiltHandles
-from viewer.model.window_limits import DEPTH_STRENGTH_LIMIT
 
 floats = st.floats(allow_nan=True, allow_infinity=True)
 grids = st.builds(GridShape, st.integers(1, 17), st.integers(1, 17))

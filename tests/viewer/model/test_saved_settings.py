@@ -12,15 +12,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from iibr_core.beyond.optics import (
-    APERTURE_KINDS,
-    ApertureMask,
-    ApertureShape,
-    Optics,
-)
+from iibr_core.beyond.optics import APERTURE_KINDS, ApertureMask, ApertureShape, Optics
 from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.editing.edits import BRUSH_TOOLS, DepthEdits, Stroke
-from iibr_core.formats.images.metadata import SETTINGS_KEY, settings_text_in
+from iibr_core.formats.images.metadata import SETTINGS_KEY
 from iibr_core.formats.images.write import write_image
 from iibr_core.gloss.settings import Gloss, GlossLight, GlossSurface
 from iibr_core.scenes.scene import Source
@@ -44,19 +39,10 @@ masks = st.builds(lambda n: ApertureMask("ünïcode “mask”.png", 2, n, bytes
 shapes = st.builds(
     ApertureShape, st.sampled_from(APERTURE_KINDS), st.integers(3, 11), numbers, numbers, numbers, st.none() | masks
 )
-optics = st.builds(
-    Optics,
-    st.builds(ViewOffset, numbers, numbers),
-    numbers,
-    numbers,
-    numbers,
-    st.tuples(numbers, numbers),
-    numbers,
-    shapes,
-    numbers,
-    numbers,
-    st.none() | st.just(Gloss(GlossSurface(0.2, 0.9, (0.5, 0.25, 1.0)), 0.1, light=GlossLight((0, 1, -2)))),
-)
+glosses = st.none() | st.just(Gloss(GlossSurface(0.2, 0.9, (0.5, 0.25, 1.0)), 0.1, light=GlossLight((0, 1, -2))))
+pairs = st.tuples(numbers, numbers)
+eyes = st.builds(ViewOffset, numbers, numbers)
+optics = st.builds(Optics, eyes, numbers, numbers, numbers, pairs, numbers, shapes, numbers, numbers, glosses)
 sources = st.builds(
     Source,
     st.just(""),
@@ -101,9 +87,6 @@ def changed(**changes: Any) -> str:
     return json.dumps(whole)
 
 
-SMOOTH = {"tool": "smooth", "points": [[0.5, 0.5]], "radius": 0.25, "strength": 1.0}
-
-
 @pytest.mark.parametrize(
     ("text", "named"),
     [
@@ -113,7 +96,6 @@ SMOOTH = {"tool": "smooth", "points": [[0.5, 0.5]], "radius": 0.25, "strength": 
         (settings_text(ONE)[:-20], ""),
         ("[" * 100_000, ""),
         (" " * (MAX_CHARACTERS + 1), ""),
-        (changed(depth_edits={"strokes": [SMOOTH] * 11_000}), "11,000 strokes"),
         (changed(format=2), "format 2"),
         (changed(depth_strength=float("nan")), ""),
         (changed(depth_strength=10**400), "depth_strength"),
@@ -128,7 +110,7 @@ SMOOTH = {"tool": "smooth", "points": [[0.5, 0.5]], "radius": 0.25, "strength": 
         (changed(depth_edits={"gamma": 0.0}), "gamma"),
         (changed(size_px=[0, 10]), "size_px"),
     ],
-    ids=range(20),
+    ids=range(19),
 )
 def test_damaged_settings_are_one_line_that_names_the_field(text: str, named: str) -> None:
     with pytest.raises(InputError, match=r"^a\.png: ") as error:
@@ -188,10 +170,8 @@ def test_a_strength_of_refinement_is_read_as_a_switch(text: str, is_on: bool) ->
 
 
 def test_numbers_of_numpy_are_written_like_any() -> None:
-    optics = Optics(focus_disparity=np.float64(0.1))
-    assert settings_text(replace(SAVED, optics=optics)) == settings_text(
-        replace(SAVED, optics=Optics(focus_disparity=0.1))
-    )
+    plain, numpy = (replace(SAVED, optics=Optics(focus_disparity=kind(0.1))) for kind in (float, np.float64))
+    assert settings_text(numpy) == settings_text(plain)
 
 
 def test_what_a_later_program_added_is_named_and_the_rest_counts() -> None:
@@ -207,25 +187,21 @@ def test_what_a_later_program_added_is_named_and_the_rest_counts() -> None:
     assert "film" not in settings_text(notice.offer)
 
 
-def test_pictures_without_settings_and_other_files(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("name", "reason"), [("plain.png", "no settings"), ("text.png", "not a picture"), ("gone.png", "no such file")]
+)
+def test_pictures_without_settings_and_other_files(tmp_path: Path, name: str, reason: str) -> None:
     write_image(tmp_path / "plain.png", np.zeros((4, 4, 3), np.uint8))
     (tmp_path / "text.png").write_text("this is no picture")
-    assert settings_text_in(tmp_path / "plain.png") == ""
-    for name, reason in (("plain.png", "no settings"), ("text.png", "not a picture"), ("gone.png", "no such file")):
-        with pytest.raises(InputError, match=reason) as error:
-            read_settings(tmp_path / name)
-        assert "\n" not in str(error.value)
-        assert name in str(error.value)
+    with pytest.raises(InputError, match=reason) as error:
+        read_settings(tmp_path / name)
+    assert name in str(error.value)
 
 
-def test_a_long_day_of_painting_is_no_attack() -> None:
-    """What is kept for its user has no limit; elsewhere there is room for far more than a thousand strokes."""
-    rng = np.random.default_rng(0)
-    path = tuple(map(tuple, (0.5 + 0.1 * rng.standard_normal((30, 2))).tolist()))
-    strokes = tuple(Stroke(BRUSH_TOOLS[k % 3], path, 0.03, 0.25) for k in range(2000))
-    saved = replace(SAVED, depth_edits=DepthEdits(strokes=strokes))
+def test_strokes_are_limited_only_in_files_from_elsewhere() -> None:
+    strokes = tuple(Stroke(BRUSH_TOOLS[k % 3], ((0.5, 0.5),), 0.03, 0.25) for k in range(2000))
+    saved, longer = (replace(SAVED, depth_edits=DepthEdits(strokes=strokes * count)) for count in (1, 6))
     assert settings_from_text(settings_text(saved), "a.png") == saved
-    longer = replace(SAVED, depth_edits=DepthEdits(strokes=strokes * 6))
     with pytest.raises(InputError, match=r"12,000 strokes"):
         settings_from_text(settings_text(longer), "a.png")
     assert settings_from_text(settings_text(longer), "a.png", is_own=True) == longer

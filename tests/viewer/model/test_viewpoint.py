@@ -22,8 +22,7 @@ from viewer.model.action import Action, do
 from viewer.model.state.app_state import AppState
 from viewer.model.state.prompts import SavePrompt
 from viewer.model.state.viewpoint import FORWARD_LIMITS, MAX_ASIDE, FreeCamera
-from viewer.model.viewpoint import HOME_S, MAX_STEP_S, RACK_S
-from viewer.model.window_limits import SPEED_LIMITS
+from viewer.model.viewpoint import HOME_S, MAX_STEP_S, RACK_S, SPEED_LIMITS
 
 grids = st.builds(GridShape, st.integers(1, 17), st.integers(1, 17))
 NINE = GridShape(9, 9)

@@ -15,13 +15,12 @@ from iibr_core.scenes.scene import AS_FOUND, DepthSettings, Progress, Scene, Sou
 from iibr_core.scenes.screen_size import ScreenSize
 from viewer.model.state.depth import Brush, Selection
 from viewer.model.state.depth_models import DepthModels
-from viewer.model.state.folder import PhotoFolder
+from viewer.model.state.folder import PhotoFacts, PhotoFolder
 from viewer.model.state.history import History
 from viewer.model.state.inspection import Inspection
 from viewer.model.state.jobs import FinishedExport, JobProgress
 from viewer.model.state.lens import GlossBrush, TiltHandles
 from viewer.model.state.notices import Notice
-from viewer.model.state.photo_facts import NO_FACTS, PhotoFacts
 from viewer.model.state.preferences import Preferences
 from viewer.model.state.prompts import ExportPrompt, Prompt
 from viewer.model.state.tasks import Task
@@ -99,7 +98,7 @@ class AppState:
     has_dialogs: bool = False
     shown_generation: int = 0
     folder: PhotoFolder | None = None
-    facts: PhotoFacts = NO_FACTS
+    facts: PhotoFacts = field(default_factory=lambda: PhotoFacts(""))
     is_fullscreen: bool = False
     hides_panel: bool | None = None
     is_narrow: bool = False

@@ -1,4 +1,4 @@
-"""The photos beside the open one."""
+"""Records of the open photo's file and of the photos beside it."""
 
 from __future__ import annotations
 
@@ -28,6 +28,14 @@ class PhotoFolder:
     def is_stepped_to(self, source: Source) -> bool:
         """Return whether the last step asked for this source."""
         return str(PurePath(self.path) / self.stepped_to) == source.path
+
+
+@dataclass(frozen=True)
+class PhotoFacts:
+    """Facts that the file of a photo states, as (name, value), for people."""
+
+    path: str
+    facts: tuple[tuple[str, str], ...] = ()
 
 
 @dataclass(frozen=True)

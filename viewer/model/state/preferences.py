@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 from iibr_core.exports.photo_folder import FolderOrder
 
@@ -11,21 +11,11 @@ Theme = Literal["dark", "light"]
 Units = Literal["photographic", "light field"]
 """Units of distances and apertures: near to far and f-numbers, or pixels per view step and view steps."""
 
-Section = Literal[
-    "more", "view", "focus", "aperture", "light", "gloss", "depth", "advanced", "inspect", "scene"
-]  # fmt: skip
-SECTIONS: tuple[Section, ...] = (
-    "more", "view", "focus", "aperture", "light", "gloss", "depth", "advanced", "inspect", "scene",
-)  # fmt: skip
+Section = Literal["more", "view", "focus", "aperture", "light", "gloss", "depth", "advanced", "inspect", "scene"]
+SECTIONS: tuple[Section, ...] = get_args(Section)
 """Sections of the panel, from top to bottom."""
 PARENT_SECTION: dict[Section, Section] = {
-    "view": "more",
-    "focus": "more",
-    "aperture": "more",
-    "light": "more",
-    "gloss": "more",
-    "depth": "more",
-    "advanced": "more",
+    **dict.fromkeys(SECTIONS[1:8], "more"),
     "inspect": "advanced",
     "scene": "advanced",
 }

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 from viewer.model.state.depth_models import CancelGetTask, GetModelTask, ListModelsTask
 from viewer.model.state.folder import ListFolderTask
-from viewer.model.state.photo_facts import ReadFactsTask
 from viewer.model.state.prompts import ChoiceOf, ExportPrompt, PathPrompt, SavePrompt
 
 
@@ -70,6 +69,13 @@ class CopyTask:
 @dataclass(frozen=True)
 class PasteTask:
     """Open the picture that is in the system's clipboard, or the path of one."""
+
+
+@dataclass(frozen=True)
+class ReadFactsTask:
+    """Read the facts that this photo's file states."""
+
+    path: str
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,6 @@ from viewer.model.layout import Layout
 from viewer.model.state.app_state import AppState
 from viewer.model.state.prompts import ExportPrompt, Prompt, SavePrompt
 from viewer.model.state.tasks import ChoosePlaceTask, ExportTask, SaveTask, ShowFileTask
-from viewer.model.window_limits import LARGEST_SIDE_PX
 from viewer.ui.style import palette_of
 from viewer.ui.widgets import button, colored, combo, gap, label
 
@@ -31,6 +30,8 @@ PROMPT_FLAGS = (
 CARD_FLAGS = PROMPT_FLAGS | imgui.WindowFlags_.no_nav | imgui.WindowFlags_.no_focus_on_appearing
 """Flags of a card that stands by itself over the picture."""
 BROWSE = "Browse…"
+LARGEST_SIDE_PX = 65536
+"""Largest side of a picture that is asked for in the window, in pixels."""
 WIDTH_FIELD = 80.0
 """Width of the field for the width of a picture."""
 FILE_EXISTS = "A file with this name exists. Replace it?"

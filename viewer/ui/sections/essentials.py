@@ -10,10 +10,10 @@ from iibr_core.scenes.scene import Scene
 from viewer.model import lens, viewpoint
 from viewer.model.action import Action, do
 from viewer.model.layout import Layout
+from viewer.model.lens import DEPTH_STRENGTH_LIMIT
 from viewer.model.presets import active_preset
 from viewer.model.state.app_state import AppState
 from viewer.model.state.lens import PRESETS, PresetName
-from viewer.model.window_limits import DEPTH_STRENGTH_LIMIT
 from viewer.ui.sections.lens_section import aperture_slider, focus_slider
 from viewer.ui.widgets import choice, in_row, label, slider
 

@@ -11,7 +11,7 @@ from viewer.model import lens, viewpoint
 from viewer.model.action import Action, do
 from viewer.model.layout import Layout
 from viewer.model.state.app_state import AppState
-from viewer.model.window_limits import SPEED_LIMITS
+from viewer.model.viewpoint import SPEED_LIMITS
 from viewer.ui.sections.viewpoint_pad import pad
 from viewer.ui.widgets import button, slider, tooltip
 
