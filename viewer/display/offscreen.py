@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Iterable
+from contextlib import ExitStack
 from dataclasses import replace
-from types import TracebackType
 from typing import Any
 
 import numpy as np
@@ -62,8 +62,8 @@ def open_drawn(
     return scene.open_for_export(source, depth_strength, lens, on_ready, optics_of)
 
 
-class OffscreenScene:
-    """Open one scene at a time and draw it. Use as a context manager.
+class OffscreenScene(ExitStack):
+    """Open one scene at a time and draw it. Use as a context manager, which frees every GL object.
 
     state: as in the window; it may be replaced between pictures. gl: the GL context, which has no window. view,
     inspection: the views and the inspection's images on the graphics card.
@@ -71,20 +71,13 @@ class OffscreenScene:
 
     def __init__(self, backend: Backend = "auto") -> None:
         """Create a GL context. Raises InputError if there is none."""
+        super().__init__()
         self.state = AppState()
         self.gl = create_headless(backend)
         self.view = SceneView(self.gl)
         self.inspection = InspectionView(self.gl, self.view)
-
-    def __enter__(self) -> OffscreenScene:
-        """Return the scene."""
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
-        """Free every GL object."""
-        self.inspection.release()
-        self.view.release()
-        self.gl.release()
+        for part in (self.gl, self.view, self.inspection):
+            self.callback(part.release)
 
     def open(
         self,

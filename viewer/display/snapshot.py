@@ -45,8 +45,8 @@ def snapshot_of(gl: GLContext, ready: SceneReady) -> SceneSnapshot:
     Raises InputError if it does not fit the graphics card.
     """
     scene, centre = ready.scene, ready.centre
-    field = LightFieldTexture(
-        gl.ctx, scene.grid, scene.width, scene.height, scene.is_hdr, scene.has_view_disparity, scene.color_space
-    )
+    size = scene.width, scene.height, scene.is_hdr, scene.has_view_disparity
+    field = LightFieldTexture(gl.ctx, scene.grid, *size)
+    field.color_space = scene.color_space
     field.upload(*scene.grid.centre, centre.colors, centre.disparity)
     return SceneSnapshot(scene, ready.loaded, centre, field)

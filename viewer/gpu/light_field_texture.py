@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from iibr_core.color import encoded_from_stored, linear_from_srgb
 from iibr_core.remedies import FixableError, Remedy
-from iibr_core.types import SRGB, ColorSpace, FloatImage, GridShape, InputError, StoredColors
+from iibr_core.types import SRGB, FloatImage, GridShape, InputError, StoredColors
 from viewer.gpu.gloss_texture import GlossTexture, Shared
 
 if TYPE_CHECKING:
@@ -50,7 +50,6 @@ class LightFieldTexture:
         height: int,
         hdr: bool,
         with_disparity: bool,
-        color_space: ColorSpace = SRGB,
         is_single: bool = False,
     ) -> None:
         """Allocate the arrays. is_single: there is room for one view only.
@@ -60,7 +59,7 @@ class LightFieldTexture:
         count = 1 if is_single else math.prod(grid)
         check_fits(ctx, GridShape(1, 1) if is_single else grid, width, height)
         self._ctx = ctx
-        self.grid, self.width, self.height, self.hdr, self.color_space = grid, width, height, hdr, color_space
+        self.grid, self.width, self.height, self.hdr, self.color_space = grid, width, height, hdr, SRGB
         self.layers = np.arange(math.prod(grid)).reshape(grid) * (not is_single)
         self.present, self.has_disparity, self.uploads = np.zeros(grid, bool), np.zeros(grid, bool), np.zeros(grid, int)
         self.range_px = (0.0, 0.0)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import re
 from collections.abc import Mapping
 from pathlib import Path
@@ -45,13 +44,11 @@ class Program:
     def set_uniforms(self, **values: Any) -> None:
         """Set uniforms; those that the compiler optimised out are skipped.
 
-        Raises KeyError for a name that the sources do not declare, with the most similar name.
+        Raises KeyError for a name that the sources do not declare.
         """
         for name, value in values.items():
             if name not in self._declared:
-                similar = difflib.get_close_matches(name, self._declared, n=1)
-                hint = f"; did you mean {similar[0]}?" if similar else ""
-                raise KeyError(f"{self._name} declares no uniform {name}{hint}")
+                raise KeyError(f"{self._name} declares no uniform {name}")
             if (member := self._program.get(name, None)) is not None:
                 member.value = value
 

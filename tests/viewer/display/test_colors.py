@@ -50,12 +50,7 @@ def test_wide_colours_keep_their_numbers_and_are_shown_as_srgb(tmp_path):
         passes.draw_view(viewer.view.renderer.field, 0, 0, "stored", 1.0)
         assert np.abs(middles(passes.read("stored")[..., :3]) - IN_SRGB).max() <= 3
         passes.release()
-
-
-def test_wide_colours_keep_their_numbers_at_the_photos_own_size(tmp_path):
-    photo = photo_of_patches(tmp_path / "p3.png", icc_profile=profile_bytes())
-    with OffscreenScene() as viewer:
-        viewer.open(replace(photo, max_pixels=SIDE * SIDE))
+        viewer.open(replace(viewer.scene.source, max_pixels=SIDE * SIDE))
         assert viewer.draws_own_pixels(viewer.scene.own_size)
         assert np.abs(middles(viewer.picture(viewer.scene.own_size, color_space=DISPLAY_P3)) - PATCHES).max() <= 1
 

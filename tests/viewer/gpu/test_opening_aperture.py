@@ -10,9 +10,7 @@ import numpy as np
 import pytest
 
 from iibr_core.beyond.optics import CENTRE, Optics
-from iibr_core.beyond.picture_quality import QualityLevel
-from iibr_core.color import linear_from_srgb, srgb_from_linear, stored_from_encoded
-from iibr_core.exports.render_settings import RenderSettings
+from iibr_core.color import linear_from_srgb
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.gpu.scenes import PhotoLike, TwoPlanes, first_frame, psnr, settled, sharpness
 from viewer.gpu.refocus.picture_renderer import Renderer
@@ -51,32 +49,3 @@ def test_a_pinhole_between_views_is_as_sharp_as_at_them(renderer: Renderer) -> N
     for eye in (CENTRE, BETWEEN, ViewOffset(0.5, 0.5)):
         truth = sharpness(PHOTO.view(eye)[0])
         assert sharpness(first_frame(renderer, Optics(eye), PHOTO)) == pytest.approx(truth, rel=0.03), eye
-
-
-def width_of_spot(renderer: Renderer, optics: Optics, level: QualityLevel | None) -> float:
-    """Second moment per axis by which a soft spot out of focus grows, view steps. level: None = converged."""
-    grid, size, px_per_view, own_px = GridShape(9, 9), (128, 128), 8.0, 4.0
-    y, x = np.indices(size)
-    renderer.open_field(grid, *size, hdr=True, with_disparity=True)
-    for row, column in np.ndindex(*grid):
-        t, s = grid.offset(row, column)
-        spot = np.exp(-((y - 64 + px_per_view * t) ** 2 + (x - 64 + px_per_view * s) ** 2) / 2 / own_px**2)
-        encoded = srgb_from_linear(2 * spot[..., None].repeat(3, axis=2))
-        renderer.upload_view(row, column, stored_from_encoded(encoded, True), np.full(size, px_per_view, np.float32))
-    if level is None:
-        light = renderer.converged_picture(RenderSettings(optics, size, is_linear=True))[..., 0].astype(float)
-    else:
-        darker = replace(optics, exposure_stops=-2.0)
-        renderer.render(darker, size, level=level)
-        light = linear_from_srgb(renderer.read_image()[..., 0] / 255).astype(float)
-    in_all_px = (light * ((x - 64) ** 2 + (y - 64) ** 2)).sum() / light.sum() / 2
-    return float((in_all_px - own_px**2) / px_per_view**2)
-
-
-@pytest.mark.parametrize(("radius", "level"), [(0.75, None), (3.0, QualityLevel(0.25))])
-def test_a_spot_of_light_is_as_wide_as_the_lens_has_it(
-    renderer: Renderer, radius: float, level: QualityLevel | None
-) -> None:
-    """However few cameras there are."""
-    width = width_of_spot(renderer, Optics(aperture_diameter=2 * radius), level)
-    assert width == pytest.approx(radius**2 / 4, rel=0.05)

@@ -58,18 +58,6 @@ def test_tilt_against_brute_force(renderer: Renderer) -> None:
         assert rms(image, through_lens(WALL, replace(optics, focus_tilt=wrong), GRID)) > 0.008
 
 
-def test_everything_within_the_focus_range_is_as_sharp_as_through_a_pinhole(renderer: Renderer) -> None:
-    scene = TwoPlanes(background=-3.0, foreground=4.0)
-    scene.fill(renderer, GRID)
-    eye = ViewOffset(0.2, -0.3)
-    truth = scene.view(eye)[0]
-    wide = Optics(eye, focus_disparity=0.5, aperture_diameter=4.0)
-    sharp = settled(renderer, replace(wide, focus_range=4.0), scene)
-    assert rms(sharp, truth, border=10) < 0.025, "depth edges within a pixel"
-    assert np.median(np.abs(sharp.astype(int) - truth)) <= 1
-    assert rms(settled(renderer, wide, scene), truth, border=10) > 0.08
-
-
 def test_focus_range_leaves_what_is_beyond_it_less_defocused(renderer: Renderer) -> None:
     """Half a range from the focus to the wall leaves the other half as blur: like a lens half as wide."""
     WALL.fill(renderer, GRID)

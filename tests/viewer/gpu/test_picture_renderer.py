@@ -74,16 +74,6 @@ def test_lens_against_brute_force(renderer: Renderer, focus: float, diameter: fl
         assert psnr(image, through_lens(SCENE, wrong, GRID), border=14) < likeness - 3
 
 
-def test_what_is_in_focus_stays_as_it_is(renderer: Renderer) -> None:
-    scene = TwoPlanes(background=-8.0, foreground=0.0)
-    scene.fill(renderer, GridShape(3, 3))
-    photo, _ = scene.view(CENTRE)
-    y, x = np.indices(photo.shape[:2])
-    disc = np.hypot(x - scene.width / 2, y - scene.height / 2) < scene.radius_px - 2
-    image = settled(renderer, Optics(aperture_diameter=3.0), scene)
-    assert np.abs(image.astype(int) - photo)[disc].max() <= 2
-
-
 def test_error_never_grows_while_the_field_fills(renderer: Renderer) -> None:
     SCENE.fill(renderer, GRID)
     optics, size = Optics(ViewOffset(1.2, -0.6)), (SCENE.width, SCENE.height)

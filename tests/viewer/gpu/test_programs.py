@@ -11,7 +11,7 @@ import pytest
 from iibr_core.runtime.resources import resource_folder
 from iibr_core.runtime.shader_sources import ShaderError, flatten
 from viewer.gpu.context import GLContext
-from viewer.gpu.programs import Program, declared_uniforms
+from viewer.gpu.programs import Program
 
 VERTEX = "#version 330 core\nuniform vec4 part;\nvoid main() { gl_Position = part; }\n"
 FRAGMENTS = sorted(path.name for path in resource_folder("shaders").glob("*.frag"))
@@ -59,16 +59,9 @@ def test_unused_uniform_is_skipped_and_misspelt_one_raises(gl: GLContext, tmp_pa
     target = gl.ctx.simple_framebuffer((1, 1))
     target.use()
     program.set_uniforms(used=0.5, unused=0.5, part=(-1.0, -1.0, 2.0, 2.0))
-    with pytest.raises(KeyError, match=r"no uniform usde; did you mean used\?"):
+    with pytest.raises(KeyError, match="no uniform usde"):
         program.set_uniforms(usde=0.5)
     with pytest.raises(KeyError, match="commented"):
         program.set_uniforms(commented=0.5)
     program.release()
     target.release()
-
-
-def test_declared_uniforms_of_lists_and_arrays() -> None:
-    source = (
-        "uniform vec4 a[4];\n/* uniform int no; */\n  uniform sampler2D b, c;\nlayout(std140) uniform B { vec4 d; };\n"
-    )
-    assert declared_uniforms(source) == {"a", "b", "c"}

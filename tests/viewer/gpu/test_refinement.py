@@ -8,7 +8,7 @@ import moderngl
 import numpy as np
 import pytest
 
-from iibr_core.beyond.optics import CENTRE, Optics
+from iibr_core.beyond.optics import Optics
 from iibr_core.beyond.picture_quality import EDGE_PASSES, MAX_SOURCES, QualityLevel
 from iibr_core.types import GridShape, InputError, ViewOffset
 from tests.viewer.gpu.scenes import TwoPlanes, psnr, through_lens
@@ -56,32 +56,6 @@ def test_small_steps_end_at_the_same_picture_as_one_large(renderer: Renderer) ->
     assert renderer.samples == samples[-1], "nothing is drawn once it has converged"
 
 
-def test_a_picture_that_views_change_stays_until_the_new_one_has_as_many_passes(renderer: Renderer) -> None:
-    """A sample of it is drawn at once, not all of them: the hand must not wait."""
-    SCENE.fill(renderer, GRID)
-    before = converged(renderer, WIDE)
-    passes, samples, sample_s = renderer.passes_shown, renderer.samples, renderer._refining_s
-    assert passes > 1
-    white, disparity = np.full((SCENE.height, SCENE.width, 3), 255, np.uint8), SCENE.view(CENTRE)[1]
-    renderer.upload_view(2, 3, white, disparity)
-    renderer.renew(WIDE, SIZE)
-    steps = 0
-    while renderer.is_renewing:
-        assert np.array_equal(renderer.read_image(), before)
-        assert renderer.passes_shown == passes
-        if steps == samples // 2:
-            renderer.upload_view(2, 2, white, disparity)  # it does not put off what is on its way
-        renderer._refining_s = sample_s
-        renderer.refine(1e-9)
-        steps += 1
-    assert steps == samples
-    assert renderer.passes_shown == passes
-    assert renderer.read_image().mean() > before.mean()
-    renderer.renew(WIDE, SIZE)
-    renderer.refine()
-    assert np.abs(renderer.read_image().astype(int) - converged(renderer, WIDE)).max() <= 1
-
-
 def test_edges_of_a_warped_view_become_smooth_and_stored_views_stay(renderer: Renderer) -> None:
     """A hard edge between two colours takes colours in between, as in a finely sampled picture."""
     scene = TwoPlanes(contrast=0.0)
@@ -95,13 +69,6 @@ def test_edges_of_a_warped_view_become_smooth_and_stored_views_stay(renderer: Re
     renderer.render(Optics(ViewOffset(1.0, -2.0)), size)
     assert renderer.is_converged
     assert np.abs(renderer.read_image().astype(int) - scene.view(ViewOffset(1.0, -2.0))[0]).max() <= 1
-
-
-def test_an_empty_field_is_black_and_done(renderer: Renderer) -> None:
-    SCENE.open(renderer, GRID)
-    renderer.render_in_time(WIDE, SIZE, 0.01)
-    assert renderer.is_converged
-    assert renderer.read_image().max() == 0
 
 
 def test_switching_scenes_sizes_and_apertures_leaves_no_gl_objects(renderer: Renderer) -> None:

@@ -6,7 +6,6 @@ Costs are counted in fetches of a texel; the time of a fetch is measured while d
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,47 +39,36 @@ def stretch_image(image: NDArray[np.uint8], size_px: ScreenSize) -> NDArray[np.u
     return np.asarray(Image.fromarray(image).resize(size_px, Image.Resampling.BILINEAR))
 
 
-@dataclass(frozen=True)
-class DrawCost:
-    """Cost of a picture. samples: number of cameras, of a pinhole: of views. warps: whether views are warped."""
-
-    samples: int
-    warps: bool
-    pixels: int
-
-    @property
-    def fetches(self) -> float:
-        """Number of fetches of a texel."""
-        return self.pixels * (PICTURE_FETCHES + self.samples * (COLOR_FETCHES + WARP_FETCHES * self.warps))
+def fetches_of(samples: int, pixels: int, warps: bool) -> float:
+    """Return the cost of a picture in fetches. samples: number of cameras, of a pinhole: of views."""
+    return pixels * (PICTURE_FETCHES + samples * (COLOR_FETCHES + WARP_FETCHES * warps))
 
 
 class FrameTimeModel:
-    """Measured speed of this machine, with warps and without. seconds_per_fetch: a first guess."""
+    """Measured speed of this machine. seconds_per_fetch: a first guess."""
 
     def __init__(self, seconds_per_fetch: float) -> None:
-        self._guess = seconds_per_fetch
-        self._measured: dict[bool, float] = {}
+        self._seconds_per_fetch, self._is_measured = UNMEASURED * seconds_per_fetch, False
 
-    def seconds(self, cost: DrawCost) -> float:
-        """Return the expected time. Work that was not drawn yet takes no less a fetch than other work."""
-        unmeasured = max(UNMEASURED * self._guess, *self._measured.values(), 0.0)
-        return OVERHEAD_S + self._measured.get(cost.warps, unmeasured) * cost.fetches
+    def seconds(self, fetches: float) -> float:
+        """Return the expected time."""
+        return OVERHEAD_S + self._seconds_per_fetch * fetches
 
-    def learn(self, cost: DrawCost, seconds: float) -> None:
+    def learn(self, fetches: float, seconds: float) -> None:
         """Take a measured time into account."""
-        before = self._measured.get(cost.warps)
-        latest = max(seconds - OVERHEAD_S, 0.2 * seconds) / cost.fetches
-        self._measured[cost.warps] = latest if before is None else before + NEW_SHARE * (latest - before)
+        latest = max(seconds - OVERHEAD_S, 0.2 * seconds) / fetches
+        self._seconds_per_fetch += (NEW_SHARE if self._is_measured else 1.0) * (latest - self._seconds_per_fetch)
+        self._is_measured = True
 
 
 def choose_quality_level(
-    cost_of: Callable[[QualityLevel], DrawCost], frame_time: FrameTimeModel, budget_s: float, before: int
+    fetches: Callable[[QualityLevel], float], frame_time: FrameTimeModel, budget_s: float, before: int
 ) -> int:
     """Return the index of the best of QUALITY_LEVELS for which there is time, or of the last.
 
     before: index for the picture before; a better level needs time to spare.
     """
     for index, level in enumerate(QUALITY_LEVELS):
-        if frame_time.seconds(cost_of(level)) <= budget_s * (BETTER_ONLY_WITHIN if index < before else 1.0):
+        if frame_time.seconds(fetches(level)) <= budget_s * (BETTER_ONLY_WITHIN if index < before else 1.0):
             return index
     return len(QUALITY_LEVELS) - 1

@@ -24,7 +24,7 @@ from viewer.gpu.context import GLContext
 from viewer.gpu.light_field_texture import Box, LightFieldTexture
 from viewer.gpu.programs import ProgramCache
 from viewer.gpu.refocus.accumulation import Accumulator, ProgressiveAccumulation
-from viewer.gpu.refocus.frame_budget import DrawCost, FrameTimeModel, choose_quality_level, scale_size, stretch_image
+from viewer.gpu.refocus.frame_budget import FrameTimeModel, choose_quality_level, fetches_of, scale_size, stretch_image
 from viewer.gpu.refocus.picture_drawing import PictureDrawing
 from viewer.gpu.refocus.picture_lens import lens_of
 from viewer.gpu.render_targets import PictureTargets, TargetCache
@@ -79,7 +79,8 @@ class Renderer:
 
         Raises InputError if the graphics driver cannot hold it; the field before then stays.
         """
-        field = LightFieldTexture(self.ctx, grid, width, height, hdr, with_disparity, color_space)
+        field = LightFieldTexture(self.ctx, grid, width, height, hdr, with_disparity)
+        field.color_space = color_space
         if self.field is not None:
             self.field.release()
         self.field = field
@@ -133,14 +134,14 @@ class Renderer:
         The image may be smaller than size_px. part: part of the picture, stretched to size_px.
         """
         start, programs = time.perf_counter(), len(self.programs)
-        cost_of = partial(self._cost, optics, size_px, part)
-        self._level = choose_quality_level(cost_of, self._frame_time, budget_s, self._level)
+        fetches = partial(self._fetches, optics, size_px, part)
+        self._level = choose_quality_level(fetches, self._frame_time, budget_s, self._level)
         level = QUALITY_LEVELS[self._level]
         self.render(optics, scale_size(size_px, level.scale), level, part)
         self.ctx.finish()
         seconds = time.perf_counter() - start
         if len(self.programs) == programs:  # compiling says nothing about drawing
-            self._frame_time.learn(cost_of(level), seconds)
+            self._frame_time.learn(fetches(level), seconds)
         drawn = self._current
         self._refining_s = seconds / max(drawn.done, 1) / math.prod(drawn.size_px)
         if level != BEST_QUALITY:
@@ -188,7 +189,8 @@ class Renderer:
         """Return a picture of the tile's own views."""
         first, *others = tile.views
         height, width = first.colors.shape[:2]
-        field = LightFieldTexture(self.ctx, tile.grid, width, height, True, True, settings.color_space)
+        field = LightFieldTexture(self.ctx, tile.grid, width, height, hdr=True, with_disparity=True)
+        field.color_space = settings.color_space
         field.upload(first.row, first.column, first.colors, first.disparity)
         whole_width_px = settings.size_px.width / settings.part.width
         lens = replace(
@@ -278,11 +280,11 @@ class Renderer:
         self._accumulator.passes.present(self._current.lens, targets)
         self.passes_shown = self._current.pass_index
 
-    def _cost(self, optics: Optics, size_px: ScreenSize, part: Rect, level: QualityLevel) -> DrawCost:
+    def _fetches(self, optics: Optics, size_px: ScreenSize, part: Rect, level: QualityLevel) -> float:
         field = self.drawn_field
         lens = lens_of(optics, field, round(size_px[0] / part.width * level.scale), level)
         pixels = math.prod(scale_size(size_px, level.scale))
-        return DrawCost(lens.sample_count(field), bool(field.has_disparity.any()), pixels)
+        return fetches_of(lens.sample_count(field), pixels, bool(field.has_disparity.any()))
 
     def _report(self, samples: int, seconds: float) -> None:
         """Keep the numbers of the last picture."""
