@@ -194,5 +194,7 @@ def test_a_refused_gl_context_is_one_line(tmp_path: Path) -> None:
     nowhere = {"__EGL_VENDOR_LIBRARY_FILENAMES": "/nonexistent.json", "LIBGL_DRIVERS_PATH": "/nonexistent"}
     done = subprocess.run(command, env={**os.environ, **nowhere}, capture_output=True, text=True, check=False)
     assert done.returncode == 2
-    assert done.stderr.strip().splitlines()[-1].startswith("iibr: no OpenGL 3.3 without a display: egl")
+    line = done.stderr.strip().splitlines()[-1]
+    assert line.startswith("iibr: no OpenGL 3.3 without a display: egl")
+    assert "(install libegl1" in line
     assert not (tmp_path / "o.png").exists()

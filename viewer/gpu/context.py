@@ -21,7 +21,7 @@ class GLContext:
     """A GL context and its limits.
 
     ctx: the moderngl context. backend: "window", "egl", "osmesa" or "system". renderer: name that the driver reports.
-    max_layers, max_texture_size: limits of texture arrays, in layers and pixels.
+    max_texture_size: largest side of a texture in pixels.
     """
 
     def __init__(self, ctx: moderngl.Context, backend: str, close: Callable[[], None] = lambda: None) -> None:
@@ -29,7 +29,6 @@ class GLContext:
         self.ctx: Any = ctx
         self.backend = backend
         self.renderer: str = ctx.info["GL_RENDERER"]
-        self.max_layers: int = ctx.info["GL_MAX_ARRAY_TEXTURE_LAYERS"]
         self.max_texture_size: int = ctx.info["GL_MAX_TEXTURE_SIZE"]
         self._close = close
 

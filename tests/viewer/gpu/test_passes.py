@@ -8,7 +8,7 @@ import pytest
 from iibr_core.beyond.optics import Optics
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.gpu.scenes import TwoPlanes, rms, settled
-from viewer.gpu.refocus import accumulation, passes
+from viewer.gpu.refocus import passes
 from viewer.gpu.refocus.picture_renderer import Renderer
 
 GRID = GridShape(5, 5)
@@ -32,16 +32,6 @@ def test_three_steps_find_the_same_surfaces_as_the_whole_search(
     assert programs[0] < programs[1], "another program has drawn it"
     assert np.mean(np.abs(images[0].astype(int) - images[1]).max(-1) > 2) < 0.04
     assert rms(images[0], images[1]) < 0.006
-
-
-def test_a_pass_drawn_in_parts_is_the_same(renderer: Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
-    """More cameras than a draw holds, in bands of few rows."""
-    SCENE.fill(renderer, GRID)
-    optics = Optics(ViewOffset(0.3, 0.1), aperture_diameter=4.0)
-    whole = settled(renderer, optics, SCENE)
-    monkeypatch.setattr(accumulation, "MAX_SAMPLES", 3)
-    monkeypatch.setattr(accumulation, "_row_bands", lambda size, _: [(0, 20), (20, 21), (21, size[1])])
-    assert np.abs(settled(renderer, optics, SCENE).astype(int) - whole).max() <= 1
 
 
 def test_outside_all_views_mirror_images_stand_in(renderer: Renderer) -> None:
