@@ -27,23 +27,15 @@ from viewer.model.commands import action_for_path
 from viewer.model.opening import set_facts
 from viewer.model.saving import path_beside
 from viewer.model.state.app_state import AppState
-from viewer.model.state.depth_models import (
-    CancelGetTask,
-    GetModelTask,
-    ListModelsTask,
-)
-from viewer.model.state.folder import ListFolderTask, PhotoFacts
+from viewer.model.state.folder import PhotoFacts
 from viewer.model.state.notices import Notice
 from viewer.model.state.prompts import PathPrompt
 from viewer.model.state.tasks import (
     CancelJobTask,
     ChoosePlaceTask,
     ChooseTask,
-    CopyTask,
     ExportTask,
-    PasteTask,
-    ReadFactsTask,
-    ReadMaskTask,
+    PlainTask,
     SaveTask,
     ShowFileTask,
     TakePathTask,
@@ -105,12 +97,12 @@ class SideEffects:
                 return _take_path(prompt, state)
             case ChoosePlaceTask(prompt):
                 self._dialog = self._dialog or ask_for_place(prompt)
-            case ReadMaskTask(path):
+            case PlainTask("read mask", path):
                 self._masks.append(Path(os.path.expanduser(path)))
                 self._submit(partial(_read_mask, self._masks[-1]))
-            case ReadFactsTask(path):
+            case PlainTask("read facts", path):
                 self._submit(partial(_read_facts, path))
-            case ListFolderTask(path):
+            case PlainTask("list folder", path):
                 self._submit(lambda: do(folder.set_photos, path, list_photos(path)))
             case SaveTask():
                 return add_save(task, state, self._inputs(state), self._jobs)
@@ -120,18 +112,18 @@ class SideEffects:
                 self._jobs.cancel(id_)
             case ShowFileTask(path, in_folder):
                 typer.launch(path, locate=in_folder)
-            case ListModelsTask():
+            case PlainTask("list models"):
                 self._submit(lambda: do(depth_models.set_known, list_models()))
-            case GetModelTask(name):
+            case PlainTask("download model", name):
                 self._downloads.submit(name)
-            case CancelGetTask():
+            case PlainTask("stop download"):
                 self._downloads.cancel()
                 return [do(depth_models.set_downloading, None)]
-            case CopyTask():
+            case PlainTask("copy"):
                 return add_copy(state, self._jobs)
-            case PasteTask() if self._jobs.is_copying:
+            case PlainTask("paste") if self._jobs.is_copying:
                 return [do(ask, task)]  # the copy is not in the clipboard yet
-            case PasteTask():
+            case PlainTask("paste"):
                 self._submit(lambda: do(_open, paste_picture(self._clipboard_text())))
         return []
 

@@ -32,7 +32,7 @@ def do(verb: Callable[Concatenate[AppState, P], AppState], *args: P.args, **kwar
 
 def ask(state: AppState, task: Task) -> AppState:
     """Ask the outside world to carry out a task; the loop takes it up in its next turn."""
-    return state.with_task(task)
+    return state.with_tasks(task)
 
 
 def forget_tasks(state: AppState) -> AppState:

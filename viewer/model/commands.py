@@ -31,7 +31,7 @@ from viewer.model.state.inspection import COMPARISONS, OVERLAYS, Comparison, Ove
 from viewer.model.state.lens import PRESETS
 from viewer.model.state.preferences import SECTIONS
 from viewer.model.state.prompts import ChoiceOf, PalettePrompt
-from viewer.model.state.tasks import ChooseTask, CopyTask, PasteTask, ReadMaskTask
+from viewer.model.state.tasks import ChooseTask, PlainTask
 from viewer.model.state.viewpoint import Zoom
 
 FONT_STEP = 1.1
@@ -143,8 +143,8 @@ COMMANDS: tuple[Command, ...] = (
     Command("Open a folder…", _always(do(ask, ChooseTask("folder"))), (Chord("o", ctrl=True, shift=True),)),
     Command("See the demo", lambda state: do(opening.open_source, Source(str(demo_photo())))),
     Command("Save the picture…", _always(do(saving.ask_to_save)), (Chord("s", ctrl=True),)),
-    Command("Copy the picture", _always(do(ask, CopyTask())), (Chord("c", ctrl=True),)),
-    Command("Paste a picture, or the path of one", _always(do(ask, PasteTask())), (Chord("v", ctrl=True),)),
+    Command("Copy the picture", _always(do(ask, PlainTask("copy"))), (Chord("c", ctrl=True),)),
+    Command("Paste a picture, or the path of one", _always(do(ask, PlainTask("paste"))), (Chord("v", ctrl=True),)),
     Command("Next photo of the folder", _always(do(folder.step, 1)), (Chord("page_down"),), repeats=True),
     Command("Previous photo of the folder", _always(do(folder.step, -1)), (Chord("page_up"),), repeats=True),
     Command(
@@ -253,7 +253,7 @@ def action_for_path(what: ChoiceOf, path: str, state: AppState) -> Action:
     """Return the action for a path that the user chose."""
     match what:
         case "mask":
-            return do(ask, ReadMaskTask(path))
+            return do(ask, PlainTask("read mask", path))
         case "map" if state.source is not None:
             return do(opening.open_source, source_with_map(state.source, path))
         case "model" | "model folder" if state.source is not None:

@@ -6,7 +6,8 @@ from dataclasses import replace
 
 from iibr_core.scenes.scene import Scene, source_with_depth
 from viewer.model.state.app_state import AppState
-from viewer.model.state.depth_models import DepthModels, Downloading, GetModelTask, ModelOffer
+from viewer.model.state.depth_models import DepthModels, Downloading, ModelOffer
+from viewer.model.state.tasks import PlainTask
 
 
 def wanted_model(state: AppState) -> str | None:
@@ -56,7 +57,7 @@ def get_depth(state: AppState) -> AppState:
         asked = offer.name if not scene.is_guessed else models.asked
         models = replace(models, asked=asked, given_up=models.given_up - {scene.source.path})
     state = replace(state, models=models)
-    return state if offer.is_here else state.with_task(GetModelTask(offer.name))
+    return state if offer.is_here else state.with_tasks(PlainTask("download model", offer.name))
 
 
 def use_model(state: AppState, model: str) -> AppState:
@@ -67,7 +68,7 @@ def use_model(state: AppState, model: str) -> AppState:
     if models.recommended is not None and model == models.recommended.name and not models.recommended.is_here:
         return get_depth(state)
     state = replace(state, models=replace(models, asked=model, given_up=models.given_up - {scene.source.path}))
-    return state.with_task(GetModelTask(model)) if _is_elsewhere(model, models) else state
+    return state.with_tasks(PlainTask("download model", model)) if _is_elsewhere(model, models) else state
 
 
 def show_offer(state: AppState, is_shown: bool) -> AppState:

@@ -18,12 +18,11 @@ from viewer.model.history import map_optics, undoable
 from viewer.model.messages import MAX_NOTICES, notify
 from viewer.model.remedies import DEPTH_COMMANDS
 from viewer.model.state.app_state import AppState
-from viewer.model.state.depth_models import ListModelsTask
-from viewer.model.state.folder import ListFolderTask, PhotoFacts
+from viewer.model.state.folder import PhotoFacts
 from viewer.model.state.history import History
 from viewer.model.state.notices import Notice
 from viewer.model.state.saving import SavedSettings
-from viewer.model.state.tasks import ReadFactsTask
+from viewer.model.state.tasks import PlainTask
 from viewer.model.state.viewpoint import Motion
 
 MAX_RECENT = 8
@@ -74,7 +73,7 @@ def report_failure(state: AppState, generation: int, message: str) -> AppState:
     asks_for_model = source is not None and source.depth.asks_for_model
     state = notify(state, Notice(message, is_error=True, commands=DEPTH_COMMANDS if asks_for_model else ()))
     if source is not None and state.scene is None:  # one may go on to the photos beside it
-        state = state.with_task(ListFolderTask(str(PurePath(source.path).parent)))
+        state = state.with_tasks(PlainTask("list folder", str(PurePath(source.path).parent)))
     elif source is not None and folder is not None and folder.is_stepped_to(source):
         state = replace(state, folder=replace(folder, unreadable=folder.unreadable | {folder.stepped_to}))
     return _leave_source(state)
@@ -193,9 +192,8 @@ def _begin_scene(state: AppState, old: Scene | None, scene: Scene) -> AppState:
     state = _add_notices(state, scene)
     if scene.plan is None:
         return state
-    return replace(
-        state, tasks=(*state.tasks, ListFolderTask(folder), ReadFactsTask(scene.source.path), ListModelsTask())
-    )
+    facts = PlainTask("read facts", scene.source.path)
+    return state.with_tasks(PlainTask("list folder", folder), facts, PlainTask("list models"))
 
 
 def _add_notices(state: AppState, scene: Scene) -> AppState:

@@ -26,7 +26,7 @@ from viewer.model.action import Action, ask, do
 from viewer.model.saved_settings import read_settings
 from viewer.model.state.jobs import WAITING_FOR_VIEWS, WRITING
 from viewer.model.state.prompts import Saved, SavePrompt
-from viewer.model.state.tasks import ReadMaskTask, SaveTask
+from viewer.model.state.tasks import PlainTask, SaveTask
 
 SIZE = ScreenSize(150, 100)
 LARGE = ScreenSize(1500, 1000)
@@ -125,7 +125,7 @@ def test_enter_does_not_replace_a_photo_of_the_folder(viewer: Driver, photo_path
 def test_nothing_is_saved_onto_what_the_window_reads(viewer: Driver, photo_path: Path) -> None:
     """The photo, the map beside it, an aperture: a reason, and no question whether to replace it."""
     shutil.copy(photo_path, photo_path.with_name("mask.png"))
-    viewer.app.do(do(ask, ReadMaskTask(str(photo_path.with_name("mask.png")))))
+    viewer.app.do(do(ask, PlainTask("read mask", str(photo_path.with_name("mask.png")))))
     viewer.until(lambda app: app.state.optics.aperture_shape.mask is not None)
     whats: tuple[Saved, ...] = ("picture", "map")
     for what, name in product(whats, ("scene.png", "scene_disparity.npy", "mask.png")):

@@ -23,7 +23,7 @@ from viewer.model.action import ask, do
 from viewer.model.saved_settings import read_settings
 from viewer.model.state.app_state import AppState
 from viewer.model.state.prompts import ExportPrompt, PalettePrompt, SavePrompt
-from viewer.model.state.tasks import ReadMaskTask, SaveTask
+from viewer.model.state.tasks import PlainTask, SaveTask
 
 pytestmark = pytest.mark.usefixtures("no_dialogs")
 
@@ -175,7 +175,7 @@ def test_keys_for_help_palette_text_size_and_exports(viewer: Driver) -> None:
 def test_a_mask_without_light_changes_nothing(viewer: Driver, tmp_path: Path) -> None:
     write_image(tmp_path / "mask.png", np.zeros((8, 8), np.uint8))
     before = viewer.app.state.optics
-    viewer.app.do(do(ask, ReadMaskTask(str(tmp_path / "mask.png"))))
+    viewer.app.do(do(ask, PlainTask("read mask", str(tmp_path / "mask.png"))))
     viewer.until(lambda app: bool(app.state.notices))
     assert "mask.png" in viewer.app.state.notices[-1].text
     assert viewer.app.state.optics == before

@@ -122,9 +122,9 @@ class AppState:
         """Whether the panel is hidden: by the user, or because the window is narrow."""
         return self.is_narrow if self.hides_panel is None else self.hides_panel
 
-    def with_task(self, task: Task) -> AppState:
-        """Return the state with one more task for the outside world."""
-        return replace(self, tasks=(*self.tasks, task))
+    def with_tasks(self, *tasks: Task) -> AppState:
+        """Return the state with more tasks for the outside world."""
+        return replace(self, tasks=(*self.tasks, *tasks))
 
 
 @dataclass(frozen=True)

@@ -65,20 +65,3 @@ class DepthModels:
     def recommended(self) -> ModelOffer | None:
         """The recommended model; None before the models are listed."""
         return next((offer for offer in self.known if offer.is_recommended), None)
-
-
-@dataclass(frozen=True)
-class ListModelsTask:
-    """List the models, and which of them are on this machine."""
-
-
-@dataclass(frozen=True)
-class GetModelTask:
-    """Download the model of this name."""
-
-    name: str
-
-
-@dataclass(frozen=True)
-class CancelGetTask:
-    """Stop the download; the next download continues it."""

@@ -44,10 +44,3 @@ class Thumbnail:
 
     texture: int
     aspect: float
-
-
-@dataclass(frozen=True)
-class ListFolderTask:
-    """List the photos in this folder."""
-
-    path: str

@@ -3,10 +3,25 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
-from viewer.model.state.depth_models import CancelGetTask, GetModelTask, ListModelsTask
-from viewer.model.state.folder import ListFolderTask
 from viewer.model.state.prompts import ChoiceOf, ExportPrompt, PathPrompt, SavePrompt
+
+PlainKind = Literal[
+    "copy", "paste", "read mask", "list folder", "read facts", "list models", "download model", "stop download"
+]
+
+
+@dataclass(frozen=True)
+class PlainTask:
+    """A task without options. about: the path of a mask, folder or photo, or the name of a model, if it needs one.
+
+    copy: put the picture, at the size of the views, into the system's clipboard. paste: open the picture that is there,
+    or the path of one. read facts: those that a photo's file states. A stopped download is continued by the next one.
+    """
+
+    kind: PlainKind
+    about: str = ""
 
 
 @dataclass(frozen=True)
@@ -61,44 +76,4 @@ class ShowFileTask:
     in_folder: bool = False
 
 
-@dataclass(frozen=True)
-class CopyTask:
-    """Put the picture, at the size of the views, into the system's clipboard."""
-
-
-@dataclass(frozen=True)
-class PasteTask:
-    """Open the picture that is in the system's clipboard, or the path of one."""
-
-
-@dataclass(frozen=True)
-class ReadFactsTask:
-    """Read the facts that this photo's file states."""
-
-    path: str
-
-
-@dataclass(frozen=True)
-class ReadMaskTask:
-    """Read an aperture mask."""
-
-    path: str
-
-
-Task = (
-    ChooseTask
-    | TakePathTask
-    | ChoosePlaceTask
-    | SaveTask
-    | ExportTask
-    | CancelJobTask
-    | ShowFileTask
-    | CopyTask
-    | PasteTask
-    | ReadMaskTask
-    | ListFolderTask
-    | ReadFactsTask
-    | ListModelsTask
-    | GetModelTask
-    | CancelGetTask
-)
+Task = PlainTask | ChooseTask | TakePathTask | ChoosePlaceTask | SaveTask | ExportTask | CancelJobTask | ShowFileTask

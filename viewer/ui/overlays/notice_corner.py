@@ -13,10 +13,10 @@ from viewer.model.action import Action, ask, do
 from viewer.model.commands import BY_NAME
 from viewer.model.layout import MARGIN, STRIP_GAP, Layout
 from viewer.model.state.app_state import AppState
-from viewer.model.state.depth_models import CancelGetTask, ModelOffer
+from viewer.model.state.depth_models import ModelOffer
 from viewer.model.state.jobs import WRITING, JobKind, JobProgress
 from viewer.model.state.notices import Notice
-from viewer.model.state.tasks import CancelJobTask, ChooseTask
+from viewer.model.state.tasks import CancelJobTask, ChooseTask, PlainTask
 from viewer.ui.overlays.prompt_rows import CARD_FLAGS, button_rows, file_offers
 from viewer.ui.style import palette_of
 from viewer.ui.widgets import colored, gap, last_part, quiet, tooltip
@@ -182,7 +182,9 @@ def _work_on_views(state: AppState) -> Iterator[ProgressRow]:
     if downloading is not None:
         words = f"{downloading.done:,} of {downloading.total:,} MB"
         share = downloading.done / max(downloading.total, 1)
-        yield ProgressRow("download", f"Downloading {downloading.title}", words, share, do(ask, CancelGetTask()))
+        yield ProgressRow(
+            "download", f"Downloading {downloading.title}", words, share, do(ask, PlainTask("stop download"))
+        )
     if model is not None:
         titles = {offer.name: offer.title for offer in state.models.known}
         words = f"with {titles.get(model, last_part(model))}"
