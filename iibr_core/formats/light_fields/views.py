@@ -17,7 +17,7 @@ def grid_of(scene: MultiView) -> GridShape:
     if scene.grid is None:
         raise InputError(
             f"{scene.place}: the views ({scene.layout}) fill no regular grid,"
-            " so they cannot be shown as a light field; `iibr evaluate` reads them"
+            " so they cannot be shown as a light field; only an evaluation reads them"
         )
     return scene.grid
 

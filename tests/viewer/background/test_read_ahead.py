@@ -75,6 +75,9 @@ def test_photos_are_read_in_their_order_and_once_and_forgotten_when_wanted_no_mo
     shelf.ahead.want([C])
     assert [shelf.ahead.get(wanted) for wanted in (A, B, C)] == [None, None, "c 1"]
     assert not shelf.ahead.is_done(A)
+    shelf.ahead.keep(A, "read elsewhere")
+    shelf.ahead.want([C, A])
+    assert shelf.ahead.get(A) == "read elsewhere"
 
 
 def test_what_cannot_be_read_is_done_and_not_tried_again(shelf: Shelf) -> None:
@@ -104,10 +107,3 @@ def test_what_is_being_read_goes_on_while_the_first_is_there(shelf: Shelf) -> No
     shelf.let_go()
     shelf.want_until_done(A, C, B)
     assert shelf.begun == ["a", "b", "c"]
-
-
-def test_one_that_was_read_elsewhere_is_kept_as_long_as_it_is_wanted(shelf: Shelf) -> None:
-    shelf.ahead.keep(A, "as it was")
-    shelf.want_until_done(A, B)
-    assert shelf.ahead.get(A) == "as it was"
-    assert shelf.begun == ["b"]

@@ -71,6 +71,10 @@ def test_a_photo_comes_with_its_first_view_at_once_and_then_all_of_them(desk: De
 def test_a_folder_of_photos_names_its_first(desk: Desk, photo_path: Path) -> None:
     desk.thread.submit(SceneRequest(1, Source(str(photo_path.parent))))
     assert desk.next() == PhotosFound(1, str(photo_path))
+    desk.thread.submit(SceneRequest(2, Source("gone.png")))
+    failure = desk.next()
+    assert isinstance(failure, Failed)
+    assert "gone.png" in failure.message
 
 
 def test_depth_painted_beyond_its_range_is_no_other_lens(photo_path: Path) -> None:
@@ -93,27 +97,6 @@ def test_depth_painted_beyond_its_range_is_no_other_lens(photo_path: Path) -> No
     assert stops == pytest.approx([stops[0]] * 3)
 
 
-def test_a_missing_file_is_a_failure_with_its_name(desk: Desk) -> None:
-    desk.thread.submit(SceneRequest(1, Source("gone.png")))
-    failure = desk.next()
-    assert isinstance(failure, Failed)
-    assert "gone.png" in failure.message
-
-
-def test_the_place_where_the_user_looks_reaches_the_work(desk: Desk, monkeypatch: pytest.MonkeyPatch) -> None:
-    seen = []
-
-    def results(request: SceneRequest, nearest_to: Callable[[], ViewOffset]) -> Iterator[ViewReady]:
-        seen.append(nearest_to())
-        yield ViewReady(1, VIEW, Progress())
-
-    monkeypatch.setattr("iibr_core.scenes.opening.results_of", results)
-    desk.work.eye = ViewOffset(1, 2)
-    desk.thread.submit(SceneRequest(1, Source("p")))
-    desk.next()
-    assert seen == [ViewOffset(1, 2)]
-
-
 def test_missing_weights_are_a_failure(
     desk: Desk, monkeypatch: pytest.MonkeyPatch, photo_path: Path, tmp_path: Path
 ) -> None:
@@ -128,13 +111,15 @@ def test_missing_weights_are_a_failure(
 
 
 def test_compiling_is_reported_beside_the_count_of_the_views(desk: Desk, monkeypatch: pytest.MonkeyPatch) -> None:
-    def results(*_: object) -> Iterator[ViewReady]:
+    def results(request: SceneRequest, nearest_to: Callable[[], ViewOffset]) -> Iterator[ViewReady]:
+        assert nearest_to() == ViewOffset(1, 2), "the place where the user looks"
         compiling.report_compiling()
         yield ViewReady(1, VIEW, Progress(3, 9, left_s=7.0))
         compiling.report_compiling()
 
     monkeypatch.setattr("iibr_core.scenes.opening.results_of", results)
     monkeypatch.setattr("viewer.background.scene_worker.REPORT_INTERVAL_S", 0.0)
+    desk.work.eye = ViewOffset(1, 2)
     desk.thread.submit(SceneRequest(1, Source("p")))
     reports = [result.progress for _ in range(3) if isinstance(result := desk.next(with_progress=True), WorkReport)]
     assert [(progress.done, progress.total) for progress in reports] == [(0, 0), (3, 9)]

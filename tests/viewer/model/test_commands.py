@@ -16,7 +16,7 @@ from viewer.model.commands import BY_NAME, COMMANDS, Chord, Command, commands_ma
 from viewer.model.demo_photo import demo_photo
 from viewer.model.state.app_state import AppState
 from viewer.model.state.lens import PRESETS
-from viewer.model.state.prompts import ExportPrompt, PalettePrompt, SavePrompt
+from viewer.model.state.prompts import ExportPrompt, SavePrompt
 from viewer.model.state.tasks import ChooseTask
 
 
@@ -33,10 +33,15 @@ def test_every_command_can_be_given_at_any_time(command: Command, state: AppStat
     assert isinstance(reduce(state, command.action(state)), AppState)
 
 
-def test_chords_in_words() -> None:
+def test_chords_in_words_and_what_commands_bring_up() -> None:
     assert Chord("z", ctrl=True, shift=True).words == "Ctrl+Shift+Z"
     assert [c.chords[0].words for c in COMMANDS if "text" in c.name.lower()] == ["Ctrl++", "Ctrl+−", "Ctrl+0"]
-    assert BY_NAME["Mouse and keys"].chords[0].words == "F1"
+    state = state_with(scene_of())
+    asked = reduce(state, BY_NAME["Save the picture…"].action(state))
+    assert asked.prompt == SavePrompt("photo-iibr.png", (60, 40))
+    helped = reduce(state, BY_NAME["Mouse and keys"].action(state))
+    assert (helped.prompt, reduce(helped, BY_NAME["Mouse and keys"].action(helped)).prompt) == ("help", None)
+    assert reduce(state, BY_NAME["Open a photo…"].action(state)).tasks == (ChooseTask("photo"),)
 
 
 def test_the_palette_finds_by_parts_of_words() -> None:
@@ -44,21 +49,6 @@ def test_the_palette_finds_by_parts_of_words() -> None:
     assert [c.name for c in commands_matching("AGAIN larger")] == []
     assert [c.name for c in commands_matching("TEXT lar")] == ["Larger text"]
     assert commands_matching("") == COMMANDS
-
-
-def test_what_the_commands_bring_up() -> None:
-    state = state_with(scene_of())
-    assert reduce(state, BY_NAME["Open a photo…"].action(state)).tasks == (ChooseTask("photo"),)
-    asked = reduce(state, BY_NAME["Save the picture…"].action(state))
-    assert asked.prompt == SavePrompt("photo-iibr.png", (60, 40))
-    helped = reduce(state, BY_NAME["Mouse and keys"].action(state))
-    assert helped.prompt == "help"
-    assert reduce(helped, BY_NAME["Mouse and keys"].action(helped)).prompt is None
-    shown = reduce(AppState(), BY_NAME["See the demo"].action(AppState()))
-    assert shown.source == Source(str(demo_photo()))
-    listed = reduce(state, BY_NAME["All commands"].action(state))
-    assert listed.prompt == PalettePrompt()
-    assert reduce(AppState(), BY_NAME["Save the picture…"].action(AppState())).prompt is None
 
 
 def test_recent_files_come_first_in_the_list_but_for_the_open_one() -> None:

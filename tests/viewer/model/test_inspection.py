@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 
 import numpy as np
@@ -16,11 +15,11 @@ from tests.viewer.conftest import reduce
 from viewer.model import gesture, inspection, opening
 from viewer.model.action import do
 from viewer.model.colormap import VIRIDIS, map_color
-from viewer.model.commands import BY_NAME, OVERLAY_WORDS
+from viewer.model.commands import BY_NAME
 from viewer.model.inspection import beside_of, sheet_cells, view_at, view_near
 from viewer.model.layout import Beside, layout_of
 from viewer.model.state.app_state import AppState, Hover
-from viewer.model.state.inspection import OVERLAYS, Inspection, OverlayKind, Probe
+from viewer.model.state.inspection import Inspection, OverlayKind, Probe
 from viewer.model.state.preferences import Preferences
 from viewer.ui.overlays.inspection_overlay import legend_words, status_text
 from viewer.ui.overlays.reticle import hover_text
@@ -38,11 +37,10 @@ def test_an_overlay_and_a_comparison_take_turns() -> None:
     state = inspection.compare(state, "photo")
     assert (state.inspection.overlay, state.inspection.comparison) == (None, "photo")
     assert replace(state, inspection=OPEN.inspection) == OPEN, "looking costs nothing"
-
-
-@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
-def test_values_that_are_not_finite_change_nothing(value: float) -> None:
-    assert inspection.move_divider(inspection.set_opacity(OPEN, value), value) == OPEN
+    for name in ("Overlay: depth", "Compare with the photo", "EPI strips"):
+        shown = reduce(OPEN, BY_NAME[name].action(OPEN))
+        assert shown.inspection != OPEN.inspection
+        assert reduce(shown, BY_NAME[name].action(shown)).inspection == OPEN.inspection
 
 
 def test_opacity_and_divider_are_held_within_the_picture() -> None:
@@ -89,13 +87,6 @@ def test_the_place_pointed_at_last_stays_and_its_values_go() -> None:
     assert inspection.set_hover(state, Hover(5, 6, 0.5)).inspection.probe == probe, "until the next are known"
     left = inspection.set_hover(state, None).inspection
     assert (left.place, left.probe) == ((3, 4), None)
-
-
-def test_each_kind_has_a_command_that_also_takes_it_away() -> None:
-    for name in (*(f"Overlay: {OVERLAY_WORDS[kind]}" for kind in OVERLAYS), "Compare with the photo", "EPI strips"):
-        state = reduce(OPEN, BY_NAME[name].action(OPEN))
-        assert state.inspection != OPEN.inspection
-        assert reduce(state, BY_NAME[name].action(state)).inspection == OPEN.inspection
 
 
 @pytest.mark.parametrize(

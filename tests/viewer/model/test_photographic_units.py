@@ -58,6 +58,9 @@ def test_the_f_number_gives_the_blur_of_a_thin_lens() -> None:
     field_at_infinity = (0 - FOCAL_PX * STEP_M / ASSUMED_DISTANCE_M) * 0.5
     assert blur_px == pytest.approx(diameter * abs(field_at_infinity))
     assert f_number(scene, 2 * diameter) == pytest.approx(stop / 2)
+    assert f_number(scene, 0.0) is None
+    assert relative_distance(scene, field_at_infinity) is None
+    assert f_number_text(scene_of(disparity_range_px=(0.0, 0.0)), 3.0) == "pinhole", "a flat scene blurs nothing"
 
 
 @pytest.mark.parametrize(
@@ -75,13 +78,6 @@ def test_nothing_is_said_where_nothing_is_known(scene: Scene) -> None:
     assert relative_distance(scene, 1.0) is None
     assert disparity_at(scene, 1.0) is None
     assert distance_limits(scene) is None
-
-
-def test_a_pinhole_has_no_f_number_and_infinity_no_distance() -> None:
-    scene = scene_at(still_m=4.0)
-    assert f_number(scene, 0.0) is None
-    assert relative_distance(scene, -FOCAL_PX * STEP_M / 4.0 * 0.5) is None
-    assert disparity_at(scene, 0.0) is None
 
 
 def test_the_equivalent_is_the_f_number_of_a_portrait_lens_that_blurs_alike() -> None:
@@ -108,10 +104,6 @@ def test_there_is_always_an_f_number_that_falls_as_the_aperture_opens(scene: Sce
 def test_the_f_number_waits_for_the_depth_that_it_follows_from() -> None:
     for early in (scene_of(has_view_disparity=False), scene_of(is_sketch=True)):
         assert (f_number_text(early, 2.0), f_number_text(early, 0.0)) == ("f/…", "pinhole")
-
-
-def test_a_flat_scene_blurs_nothing_and_is_a_pinhole_whatever_the_aperture() -> None:
-    assert f_number_text(scene_of(disparity_range_px=(0.0, 0.0)), 3.0) == "pinhole"
 
 
 def test_metres_follow_from_the_disparity_that_metric_depth_became() -> None:
@@ -146,7 +138,5 @@ def test_the_pointer_says_how_far_before_or_behind_the_focus_things_are(
 ) -> None:
     scene = scene_of(plan=plan_of(GridShape(9, 9)), inverse_metres=inverse_metres)
     assert hover_text(Optics(), scene, Hover(30.0, 20.0, disparity)) == words
-
-
-def test_a_researcher_reads_pixels_per_view_step() -> None:
-    assert hover_text(Optics(), scene_of(), Hover(30.0, 20.0, 1.24), "light field") == "1.24 px  ·  1.24 in front"
+    in_pixels = f"{abs(disparity):.2f} px"
+    assert in_pixels in hover_text(Optics(), scene, Hover(30.0, 20.0, disparity), "light field")

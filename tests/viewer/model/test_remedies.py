@@ -28,14 +28,11 @@ def test_no_text_of_the_core_names_an_option_or_a_command() -> None:
 def test_each_interface_words_each_remedy(remedy: Remedy) -> None:
     error = FixableError("a.png: is bad", remedy)
     assert command_line.words_of(error).startswith("a.png: is bad; ")
-    assert "--" in command_line.words_of(error)
+    assert command_line.words_of(error) != window.words_of(error)
     assert window.words_of(error).startswith("a.png: is bad; ")
     assert "--" not in window.words_of(error)
+    assert command_line.words_of(InputError("bad")) == window.words_of(InputError("bad")) == "bad"
     assert remedy_of(pickle.loads(pickle.dumps(error))) is remedy, "workers are other processes"
-
-
-def test_errors_without_a_remedy_stand_alone() -> None:
-    assert command_line.words_of(InputError("a.png: is bad")) == window.words_of(InputError("a.png: is bad"))
 
 
 def test_what_does_not_fit_can_be_made_smaller() -> None:

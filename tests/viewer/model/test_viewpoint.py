@@ -176,7 +176,8 @@ def test_steps_of_the_camera_lead_to_its_limits_and_back(step: tuple[float, floa
 
 
 def test_the_camera_needs_a_photo_and_finite_numbers() -> None:
-    assert viewpoint.move_camera(AppState(), 0.1).free_camera is None
+    for moved in (do(viewpoint.move_camera, 0.1), do(viewpoint.set_loop, "circle"), do(viewpoint.return_home)):
+        assert moved.apply(AppState()) == AppState()
     for value in (math.inf, math.nan):
         assert viewpoint.move_camera(photo(), value, 0.1, 0.1).free_camera is None
     field = viewpoint.move_camera(state_with(scene_of()), forward=0.1)
@@ -198,13 +199,6 @@ def test_what_goes_back_to_the_views(action: Action) -> None:
     assert action.apply(viewpoint.move_camera(photo(), forward=0.1)).free_camera is None
 
 
-def test_the_camera_looks_through_the_same_lens() -> None:
-    for action in (do(lens.move_eye, ViewOffset(1, 0)), do(lens.set_aperture, 2.0), do(lens.set_focus, 0.5)):
-        state = action.apply(viewpoint.move_camera(photo(), forward=0.1))
-        assert state.free_camera == FreeCamera(forward=0.1)
-        assert state.optics == action.apply(photo()).optics
-
-
 def test_its_picture_is_saved_at_the_size_of_the_views() -> None:
     state = photo()
     assert state.scene is not None
@@ -213,8 +207,3 @@ def test_its_picture_is_saved_at_the_size_of_the_views() -> None:
         prompt = saving.ask_to_save(replace(state, free_camera=camera)).prompt
         assert isinstance(prompt, SavePrompt)
         assert prompt.size_px == size
-
-
-def test_nothing_moves_without_a_scene() -> None:
-    for action in (do(viewpoint.set_loop, "circle"), do(viewpoint.return_home), do(viewpoint.tick, 1.0)):
-        assert action.apply(AppState()) == AppState()

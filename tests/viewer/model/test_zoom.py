@@ -121,11 +121,6 @@ def test_the_small_picture_moves_the_large_one() -> None:
     assert part.y + part.height / 2 == pytest.approx(0.4, abs=0.01)
 
 
-@pytest.mark.parametrize("zoom", [Zoom(float("nan")), Zoom(1.0, (float("inf"), 0.5)), Zoom(float("inf"))])
-def test_a_zoom_that_is_no_number_shows_the_whole_picture(zoom: Zoom) -> None:
-    assert reduce(STATE, do(viewpoint.set_zoom, zoom)).zoom is None
-
-
 @pytest.mark.parametrize("zoom", [Zoom(-3.0), Zoom(0.0, (-7.0, 9.0)), Zoom(1e30, (0.2, 0.2))])
 def test_absurd_zooms_still_show_something(zoom: Zoom) -> None:
     frame_px = laid_out(reduce(STATE, do(viewpoint.set_zoom, zoom)).zoom).frame_px
