@@ -29,7 +29,7 @@ NOTHING = "The clipboard holds neither a picture nor the path of one. Copy one a
 
 def copied_path() -> Path:
     """Return the path of the file that holds a picture to be copied."""
-    return _cache_folder() / "copied.png"
+    return user_cache_path("iibr", appauthor=False) / "clipboard" / "copied.png"
 
 
 def copy_picture(path: Path) -> None:
@@ -49,10 +49,9 @@ def paste_picture(text: str) -> str:
 
     Raises InputError if there is neither.
     """
-    return _path_in(text) or _paste_pixels(_cache_folder() / PASTED_FOLDER)
-
-
-def _paste_pixels(folder: Path) -> str:
+    if found := _path_in(text):
+        return found
+    folder = copied_path().with_name(PASTED_FOLDER)
     try:
         held = ImageGrab.grabclipboard()
     except NotImplementedError as error:
@@ -90,7 +89,3 @@ def _copying_command(path: Path) -> Sequence[str]:
     if sys.platform != "win32" and os.environ.get("DISPLAY") and shutil.which("xclip"):
         return ["xclip", "-selection", "clipboard", "-t", "image/png", "-i"]
     raise InputError("Pictures cannot be copied on Windows. Save it instead." if sys.platform == "win32" else LACKING)
-
-
-def _cache_folder() -> Path:
-    return user_cache_path("iibr", appauthor=False) / "clipboard"

@@ -55,19 +55,15 @@ class FreeView:
     is_draft: bool
 
 
-FreeResult = FreeView | Action
-
-
 @dataclass(frozen=True, eq=False)
 class _Ready:
-    """A photo that is ready to be seen by cameras.
+    """The photo of a request, ready to be seen by cameras.
 
     camera: the photo's. nearest: distance of the nearest surface. far: least inverse depth; low: field disparity there.
     px: field disparity per inverse depth.
     """
 
-    loaded: LoadedPhoto
-    centre: ViewUpdate
+    request: FreeRequest
     views: FreeViews
     camera: Camera
     nearest: float
@@ -86,7 +82,7 @@ class FreeCameraView:
         """wake: called, in the drawing thread, when a view is made."""
         self.shown: FreeRequest | None = None
         self._scene_view = scene_view
-        self._worker: Newest[FreeRequest, FreeResult] = Newest("iibr-free", self._draw, wake)
+        self._worker: Newest[FreeRequest, FreeView | Action] = Newest("iibr-free", self._draw, wake)
         self._asked: FreeRequest | None = None
         self._may_interrupt = True
         self._ready: dict[bool, _Ready] = {}
@@ -131,13 +127,13 @@ class FreeCameraView:
                     actions += [do(viewpoint.report_camera, None), do(messages.notify, Notice(message, is_error=True))]
         return actions
 
-    def _draw(self, request: FreeRequest, post: Post[FreeResult]) -> None:
+    def _draw(self, request: FreeRequest, post: Post[FreeView | Action]) -> None:
         """Post a draft and the view. The prepared photo is kept, so the next view is made at once."""
         kept = self._ready
         has_draft = math.prod(request.loaded.photo.size) > DRAFT_PIXELS
         for is_draft in (True, False) if has_draft else (False,):
             ready = kept.get(is_draft)
-            if ready is None or ready.loaded is not request.loaded or ready.centre is not request.centre:
+            if ready is None or replace(ready.request, camera=request.camera) != request:
                 kept.pop(is_draft, None)  # frees its memory first
                 with watched(lambda done, total, doing: post(do(viewpoint.report_camera, done / total))):
                     ready = kept[is_draft] = _make_ready(request, is_draft)
@@ -157,15 +153,14 @@ def _make_ready(request: FreeRequest, is_draft: bool) -> _Ready:
     inverse_depth, colors = inverse_depth_of(disparity, None), photo.pixels
     (nearest, farthest), span = depths_of(inverse_depth), measure_disparity_range(disparity)
     if is_draft:
-        size = _draft_size(photo.size)
+        smaller = math.sqrt(DRAFT_PIXELS / math.prod(photo.size))
+        size = ImageSize(*(max(round(smaller * side), 1) for side in photo.size))
         colors, inverse_depth, camera = _sampled(colors, size), _sampled(inverse_depth, size), camera.resized(size)
-    asides = (-MAX_ASIDE, MAX_ASIDE)
-    corners = [
-        steered(camera, right, down, step * nearest) for right, down, step in product(asides, asides, FORWARD_LIMITS)
-    ]
+    limits = product((-MAX_ASIDE, MAX_ASIDE), (-MAX_ASIDE, MAX_ASIDE), FORWARD_LIMITS)
+    corners = [steered(camera, right, down, step * nearest) for right, down, step in limits]
     views = FreeViews(colors, inverse_depth, camera, corners, None if is_draft else fill_background)
     px = (span.high - span.low) / (1 / nearest - 1 / farthest) if farthest > nearest else 0.0
-    return _Ready(request.loaded, request.centre, views, camera, nearest, 1 / farthest, span.low, px)
+    return _Ready(request, views, camera, nearest, 1 / farthest, span.low, px)
 
 
 def _view(request: FreeRequest, ready: _Ready) -> ViewUpdate:
@@ -184,11 +179,6 @@ def _view(request: FreeRequest, ready: _Ready) -> ViewUpdate:
         colors = _sampled(colors, size) if is_hdr else stretch_image(colors.astype(np.uint8, copy=False), shown_px)
         disparity = _sampled(disparity, size)
     return replace(centre, colors=colors, disparity=disparity.astype(np.float32))
-
-
-def _draft_size(size: ImageSize) -> ImageSize:
-    smaller = math.sqrt(DRAFT_PIXELS / math.prod(size))
-    return ImageSize(*(max(round(smaller * side), 1) for side in size))
 
 
 def _sampled(image: NDArray[Any], size: ImageSize) -> NDArray[Any]:

@@ -1,7 +1,7 @@
 """Saves, copies and exports beside the window, one picture and one export at a time.
 
-Each shows the scene, its views and the lens as they were when it was asked for. It waits while the window makes the
-views that it needs; where the window leaves the scene before, the job makes them itself.
+Each shows the scene as it was when it was asked for. It waits while the window makes the views that it needs; if the
+window leaves the scene before, the job makes them itself.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from iibr_core.runtime.time_left import TimeLeft
 from iibr_core.runtime.work import Cancelled, raise_if_stopped, report_progress, stoppable, watched
 from iibr_core.scenes.scene import MAKING, Scene, SceneReady, SceneRequest, ViewReady
 from iibr_core.scenes.scene_gloss import gloss_request, make_maps
-from iibr_core.types import ViewOffset, ViewUpdate
+from iibr_core.types import ViewOffset
 from viewer.app.picture_files import inputs_of_scene
 from viewer.background.newest import message_of
 from viewer.background.window_work import Result, Steps, WindowWork
@@ -51,10 +51,9 @@ WAKE_INTERVAL_S = 0.1
 class Job:
     """A save, copy or export.
 
-    state: of the window when it was asked for. work: writes the file, in a thread. needs, pictures: functions of the
-    scene and the optics that find what it needs of the scene and the optics of its pictures.
-    prompt: asks for the same export again. generation: number of the views that it shows. request: makes them again.
-    snapshot: the views, None before it runs.
+    state: of the window when it was asked for. work: writes the file, in a thread. needs, pictures: what it needs of
+    the scene, and the optics of its pictures. prompt: asks for the same export again. generation: number of the views
+    that it shows. request: makes them again. snapshot: the views, None before it runs.
     """
 
     kind: JobKind
@@ -77,6 +76,12 @@ class Job:
         """Return the optics of the job for a scene that may differ from the one it was asked for."""
         asked = self.state.scene
         return self.state.optics if scene == asked else carry_optics(self.state.optics, asked, scene)
+
+    def release(self) -> None:
+        """Release the views."""
+        if self.snapshot is not None:
+            self.snapshot.release()
+            self.snapshot = None
 
     def describe(self, is_waiting_for_views: bool) -> JobProgress:
         """Return the progress for the window; it changes at most a hundred times a stage, and with the seconds left."""
@@ -123,22 +128,25 @@ class Jobs:
         """Return whether a job will write this file or folder."""
         return any(job.path == path for job in self._jobs)
 
-    def add(self, job: Job) -> None:
-        """Add a job after those that wait. Its state has an open scene."""
+    def add(self, job: Job, scene: Scene) -> None:
+        """Add a job after those that wait. scene: the open one, of the job's state."""
         state, view = job.state, self._scene_view
-        assert state.scene is not None
-        assert state.source is not None
-        is_newest = state.scene.source is state.source
-        job.id, job.generation = next(self._ids), state.generation if is_newest else view.generation
-        source = state.source if is_newest else state.scene.source
-        loaded, plan = view.loaded, state.scene.plan
+        job.id = next(self._ids)
+        job.generation = state.generation if scene.source is state.source else view.generation
+        loaded, plan = view.loaded, scene.plan
         if view.generation != job.generation or loaded is None or loaded.depth_settings != state.depth:
             loaded = plan = None  # another photo or other depth than asked for
-        asks = state.scene.depth_model is not None
         job.request = SceneRequest(
-            0, source, state.depth_strength, loaded, state.depth, takes_drafts=False, plan=plan, asks_model=asks
+            0,
+            scene.source,
+            state.depth_strength,
+            loaded,
+            state.depth,
+            takes_drafts=False,
+            plan=plan,
+            asks_model=scene.depth_model is not None,
         )
-        if job.needs(state.scene, state.optics) == "shown":
+        if job.needs(scene, state.optics) == "shown":
             job.snapshot = view.snapshot()
         self._jobs.append(job)
         self._begin(state)
@@ -167,7 +175,7 @@ class Jobs:
         self._executor.shutdown()
         self._window_work.forget_stopped()
         for job in self._jobs:
-            _release(job)
+            job.release()
 
     def _begin(self, state: AppState) -> None:
         """Begin the first picture and the first export whose scene is ready, unless one of the same kind runs."""
@@ -207,10 +215,10 @@ class Jobs:
 
     def _results_of(self, job: Job) -> list[Action]:
         """Remove a job that is done or was cancelled before it began, and return its actions."""
-        if (job.result is None and not job.is_cancelled.is_set()) or (job.result is not None and not job.result.done()):
+        if not (job.result.done() if job.result is not None else job.is_cancelled.is_set()):
             return []
         self._jobs.remove(job)
-        _release(job)
+        job.release()
         if job.result is None:
             return []
         error = job.result.exception()
@@ -227,7 +235,9 @@ class Jobs:
 
         def draw(settings: RenderSettings) -> NDArray[Any]:
             require_size(settings.size_px)
-            self._find_gloss(job, snapshot, settings)
+            request = gloss_request(settings.optics.gloss, snapshot.scene, snapshot.centre, snapshot.gloss)
+            if request is not None and not snapshot.is_free_view:
+                self._run(job, _in_one_step(partial(snapshot.take_gloss, make_maps(request))))
             return self._run(job, self._draw(job, snapshot, settings))
 
         return ExportSource(snapshot.scene, snapshot.loaded, job.optics_on(snapshot.scene), draw, snapshot.centre)
@@ -256,21 +266,16 @@ class Jobs:
             wanted = views_seen_by(job.pictures(scene, optics), scene.grid)
             for made in results:
                 assert isinstance(made, ViewReady)
-                if (made.view.row, made.view.column) != scene.grid.centre:
-                    self._run(job, store_view(snapshot, made.view))
+                view = made.view
+                if (view.row, view.column) != scene.grid.centre:
+                    upload = partial(snapshot.field.upload, view.row, view.column, view.colors, view.disparity)
+                    self._run(job, _in_one_step(upload))
                 report_progress(made.progress.done, made.progress.total, MAKING)
         return snapshot
 
     def _open(self, job: Job, ready: SceneReady) -> SceneSnapshot:
         job.snapshot = snapshot_of(self._scene_view.renderer.gl, ready)
         return job.snapshot
-
-    def _find_gloss(self, job: Job, snapshot: SceneSnapshot, settings: RenderSettings) -> None:
-        """Compute the gloss maps if they are missing."""
-        request = gloss_request(settings.optics.gloss, snapshot.scene, snapshot.centre, snapshot.gloss)
-        if request is not None and not snapshot.is_free_view:
-            maps = make_maps(request)
-            self._run(job, _in_one_step(lambda: snapshot.take_gloss(maps)))
 
     def _draw(self, job: Job, snapshot: SceneSnapshot, settings: RenderSettings) -> Steps[NDArray[Any]]:
         """Draw a picture in the window's thread. Exports count their pictures themselves."""
@@ -290,18 +295,6 @@ class Jobs:
         return self._window_work.run(steps, is_urgent=job.kind != "export")
 
 
-def store_view(snapshot: SceneSnapshot, view: ViewUpdate) -> Steps[None]:
-    """Store a view in a snapshot, in the window's thread."""
-    return _in_one_step(lambda: snapshot.field.upload(view.row, view.column, view.colors, view.disparity))
-
-
 def _in_one_step(work: Callable[[], Result]) -> Steps[Result]:
     yield from ()
     return work()
-
-
-def _release(job: Job) -> None:
-    job.is_cancelled.set()
-    if job.snapshot is not None:
-        job.snapshot.release()
-        job.snapshot = None

@@ -15,15 +15,7 @@ from viewer.app.dropped_files import actions_from_drop
 from viewer.app.free_camera_view import FreeCameraView
 from viewer.app.keys import actions_from_keys, read_keys
 from viewer.app.pace import DIALOG_LOOK_S, IDLE_WAIT_S, NoticeClock, Pace
-from viewer.app.pointer import (
-    NO_POINTER,
-    Pointer,
-    actions_from_hover,
-    actions_from_pointer,
-    gesture_end,
-    gesture_start,
-    read_pointer,
-)
+from viewer.app.pointer import NO_POINTER, Pointer, actions_from_hover, actions_from_pointer, read_pointer
 from viewer.app.preferences_store import PreferencesKeeper, load_preferences
 from viewer.app.scene_loader import SceneLoader
 from viewer.app.session_store import SessionStore
@@ -36,7 +28,7 @@ from viewer.display.filmstrip_view import FilmstripView
 from viewer.display.inspection_view import InspectionView
 from viewer.display.scene_view import VIEW_REFRESH_S, SceneView
 from viewer.gpu.context import create_for_window
-from viewer.model import inspection, opening, preferences, saving, viewpoint, window
+from viewer.model import gesture, inspection, opening, preferences, saving, viewpoint, window
 from viewer.model.action import Action, do
 from viewer.model.inspection import NO_INSPECTION_TEXTURES, InspectionTextures, beside_of
 from viewer.model.layout import Layout, is_narrow, layout_of
@@ -48,7 +40,6 @@ from viewer.ui.style import Look
 
 VIEWS_BUDGET_S = 0.006
 """Time for uploading views in a turn of the loop, in seconds."""
-
 SAVE_BUDGET_S = 0.025
 """Time for drawing a picture that is being saved in a turn of the loop, in seconds: about as long as a frame."""
 
@@ -110,7 +101,7 @@ class App:
         self.window.poll(self.wait_s)
         start = time.perf_counter()
         views_end = start + VIEWS_BUDGET_S
-        news = self.scene_loader.take_results(self.state, views_end) + self._take_dropped() + self._take_events()
+        news = self.scene_loader.take_results(self.state, views_end) + self._take_events()
         self.do(*news)
         self._pace.is_busy = self.scene_view.upload(views_end - time.perf_counter()) or bool(news)
         self.do(*self.scene_loader.preview_depth(self.state))
@@ -124,7 +115,7 @@ class App:
         self._pointer = pointer = read_pointer(self._pointer)
         if pointer.step_x or pointer.step_y:
             self._pace.pointer_moved_at = time.perf_counter()
-        actions = gesture_start(pointer, self.state)
+        actions = [do(gesture.end_gesture)] if pointer.is_pressed and self.state.history.gesture else []
         thumbnails = self._filmstrip.thumbnails(filmstrip_paths(self.state, layout))
         sharp = self.sharpener.texture(picture) if picture else None
         texture = sharp or (self.scene_view.renderer.image_texture if picture else None)
@@ -137,8 +128,8 @@ class App:
         self._inspect()
         self.do(*self.sharpener.advance(picture, self.state, is_still and self._is_resting, SAVE_BUDGET_S))
         self.do(*self.free_camera_view.advance(self.state))
-        self._pace.is_busy |= bool(actions) or self._side_effects.is_drawing or self.sharpener.is_drawing
-        self._pace.is_busy |= self.inspection_view.is_drawing
+        is_drawing = self._side_effects.is_drawing or self.sharpener.is_drawing or self.inspection_view.is_drawing
+        self._pace.is_busy |= bool(actions) or is_drawing
         self.scene_loader.advance(self.state)
         self.do(*self._preferences.keep(self.state))
         self._pace.took_s.append(time.perf_counter() - start)
@@ -146,10 +137,11 @@ class App:
     @property
     def _is_resting(self) -> bool:
         """Whether nothing moves, all views are there and nothing is being drawn for a file."""
-        state, is_made = self.state, self.state.progress.is_complete or self.state.stopped == self.state.generation
-        is_shown = self.scene_view.generation == state.generation and self.scene_view.renderer.is_converged
-        is_edited = state.motion.is_running or state.stroke is not None
-        return is_made and is_shown and not is_edited and not self._side_effects.is_drawing
+        state, view = self.state, self.scene_view
+        is_made = state.progress.is_complete or state.stopped == state.generation
+        is_shown = view.generation == state.generation and view.renderer.is_converged
+        is_moving = state.motion.is_running or state.stroke is not None
+        return is_made and is_shown and not is_moving and not self._side_effects.is_drawing
 
     @property
     def wait_s(self) -> float:
@@ -157,8 +149,7 @@ class App:
         is_behind = self.scene_loader.holds_progress or not self.scene_view.shows_all_views()
         idle_s = VIEW_REFRESH_S if is_behind else IDLE_WAIT_S
         idle_s = DIALOG_LOOK_S if self._side_effects.is_waiting else idle_s
-        is_moving, is_over_panel = self.state.motion.is_running, self._pointer.is_over_panel
-        return self._pace.wait_s(is_moving, is_over_panel, idle_s)
+        return self._pace.wait_s(self.state.motion.is_running, self._pointer.is_over_panel, idle_s)
 
     def layout(self) -> Layout:
         """Return the layout of the window."""
@@ -219,7 +210,7 @@ class App:
         actions += self._notice_clock.expire(self.state, self._pace.stepped_at, is_on_notice)
         if self.state.motion.is_running:
             actions.append(do(viewpoint.tick, self._pace.stepped_at))
-        actions += self._place_window()
+        actions += self._place_window() + actions_from_drop(self.window.take_dropped(), self.state)
         if is_narrow(self.window.size, self.window.ui_scale) != self.state.is_narrow:
             actions.append(do(window.set_narrow, not self.state.is_narrow))
         return actions
@@ -233,16 +224,12 @@ class App:
         is_known = place == before.window and not before.is_maximized
         return [] if is_known else [do(preferences.place_window, place)]
 
-    def _take_dropped(self) -> list[Action]:
-        paths = self.window.take_dropped()
-        return actions_from_drop(paths, self.state) if paths else []
-
     def _input(self, pointer: Pointer, layout: Layout) -> list[Action]:
         pick = partial(self.scene_view.pick, self.state.optics.eye)
         actions = actions_from_pointer(pointer, layout, self.state, pick)
         actions += actions_from_hover(pointer, layout, self.state, pick)
         actions += actions_from_keys(read_keys(), self.state)
-        actions += gesture_end(pointer)
+        actions += [do(gesture.end_gesture)] if pointer.is_released else []  # after the edits of the frame
         return [*actions, do(saving.quit_window)] if self.window.take_closing() else actions
 
     def _inspect(self) -> None:
@@ -250,11 +237,9 @@ class App:
         probe = self.inspection_view.probe(self.state)
         if probe != self.state.inspection.probe:
             self.do(do(inspection.set_probe, probe))
-        request = self.inspection_view.entropy_request(self.state)
-        if request is not None:
-            self._entropy.submit(request)
-        surface = self.inspection_view.surface_request(self.state)
-        if surface is not None:
+        if (entropy := self.inspection_view.entropy_request(self.state)) is not None:
+            self._entropy.submit(entropy)
+        if (surface := self.inspection_view.surface_request(self.state)) is not None:
             self._surfaces.submit(surface)
 
     def _show(self, frame: Frame) -> None:

@@ -13,17 +13,13 @@ from viewer.model.state.notices import Notice
 
 IDLE_WAIT_S = 1.0
 """Longest sleep in seconds; it only bounds the harm of a lost wake-up."""
-
 TOOLTIP_LOOK_S, TOOLTIP_S = 0.08, 0.5
 """Sleep, and its total time, in seconds, while a pointer rests on the panel: a tooltip needs frames to appear."""
-
 MOTION_FRAME_S = 1 / 60
 DIALOG_LOOK_S = 0.1
 """Sleep while a file dialog is open, in seconds."""
-
 FRAMES_OF_A_CLICK = 3
 """Number of frames in which a press, its release and the next press arrive."""
-
 SETTLING_FRAMES = 3
 """Number of equal frames before a sleep: ImGui spreads quick events over several frames and lays out in two."""
 
@@ -49,9 +45,7 @@ class Pace:
             return max(self.stepped_at + MOTION_FRAME_S - now, 0.0)
         if self.is_busy or self.same_frames < SETTLING_FRAMES:
             return 0.0
-        if is_over_panel and now - self.pointer_moved_at < TOOLTIP_S:
-            return TOOLTIP_LOOK_S
-        return idle_s
+        return TOOLTIP_LOOK_S if is_over_panel and now - self.pointer_moved_at < TOOLTIP_S else idle_s
 
 
 class NoticeClock:

@@ -23,10 +23,7 @@ from viewer.model.state.saving import SavedSettings
 
 @dataclass(frozen=True, eq=False)
 class SavedShot:
-    """Contents of a saved picture beside its pixels.
-
-    settings: stored in the file. color_space: of its colours. photo: file whose metadata is copied, None without one.
-    """
+    """Contents of a saved picture beside its pixels. photo: file whose metadata is copied, None without one."""
 
     settings: SavedSettings
     form: PictureFormat
@@ -52,8 +49,7 @@ def export_picture(path: Path, drawn: NDArray[Any], shot: SavedShot) -> Path:
     from viewer.model.saved_settings import settings_text
 
     of_photo = PictureMetadata() if shot.photo is None else read_metadata(shot.photo)
-    texts = {SETTINGS_KEY: settings_text(shot.settings)}
-    metadata = PictureMetadata(of_photo.exif, of_photo.xmp, texts)
+    metadata = PictureMetadata(of_photo.exif, of_photo.xmp, {SETTINGS_KEY: settings_text(shot.settings)})
     write_picture(path, drawn, shot.form, metadata, shot.color_space)
     return path
 
@@ -63,8 +59,8 @@ def inputs_of_scene(state: AppState) -> tuple[Path, ...]:
     sources = [about.source for about in (state, state.scene) if about is not None and about.source is not None]
     is_open = state.scene is not None and state.scene.source == state.source  # then its map is known
     origin = state.scene.depth_origin if state.scene is not None else None
-    found = [path for source in sources for path in (named_by(source) if is_open else inputs_of(source))]
-    return (*found, Path(os.path.expanduser(origin.file))) if origin is not None and origin.file else tuple(found)
+    found = tuple(path for source in sources for path in (named_by(source) if is_open else inputs_of(source)))
+    return (*found, Path(os.path.expanduser(origin.file))) if origin is not None and origin.file else found
 
 
 def require_picture_place(

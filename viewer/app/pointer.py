@@ -13,7 +13,7 @@ from iibr_core.scenes.lens_limits import focus_limits
 from iibr_core.scenes.rect import Rect
 from iibr_core.scenes.scene import Scene
 from iibr_core.types import ViewOffset
-from viewer.model import depth, gesture, inspection, lens, selection, viewpoint
+from viewer.model import depth, inspection, lens, selection, viewpoint
 from viewer.model.action import Action, do
 from viewer.model.focal_plane import handle_points, place_of
 from viewer.model.inspection import view_at
@@ -166,8 +166,8 @@ def actions_from_pointer(pointer: Pointer, layout: Layout, state: AppState, pick
     hand = _Hand(pointer, layout, state, scene, picture, layout.frame or picture, pick)
     if state.inspection.shows_views:
         return _on_sheet(hand)
-    if pointer.pulls or _zooms(hand):
-        return _zoom_actions(hand)
+    if (zoom := _zoom(hand)) is not None:
+        return zoom
     if is_marking_gloss(state):
         return _gloss_actions(hand)
     if is_brushing(state):
@@ -180,16 +180,6 @@ def actions_from_pointer(pointer: Pointer, layout: Layout, state: AppState, pick
     if pointer.is_held and pointer.is_drag:
         return _drag(hand)
     return _click(hand) if pointer.is_released else []
-
-
-def gesture_start(pointer: Pointer, state: AppState) -> list[Action]:
-    """Return the end of a gesture that a press ends; it goes before the frame's edits."""
-    return [do(gesture.end_gesture)] if pointer.is_pressed and state.history.gesture else []
-
-
-def gesture_end(pointer: Pointer) -> list[Action]:
-    """Return the end of a gesture that a release ends; it goes after the frame's edits."""
-    return [do(gesture.end_gesture)] if pointer.is_released else []
 
 
 def actions_from_hover(pointer: Pointer, layout: Layout, state: AppState, pick: Pick) -> list[Action]:
@@ -227,28 +217,21 @@ def units_per_view(layout: Layout, scene: Scene) -> float:
     return max(nearest, DRAG_ACROSS_GRID * layout.frame.width / max(scene.grid.columns - 1, 1))
 
 
-def _zooms(hand: _Hand) -> bool:
-    """Return whether the wheel zooms, or the press was on the small picture."""
-    pointer = hand.pointer
-    if pointer.wheel and pointer.holds_ctrl:
-        return hand.is_over_frame
-    return pointer.is_held and _is_on_minimap(hand.layout, pointer.pressed_x, pointer.pressed_y)
-
-
 def _is_on_minimap(layout: Layout, x: float, y: float) -> bool:
     return layout.minimap is not None and layout.minimap.contains(x, y)
 
 
-def _zoom_actions(hand: _Hand) -> list[Action]:
-    """Zoom about the pointer, show a place of the small picture, or pull the picture."""
+def _zoom(hand: _Hand) -> list[Action] | None:
+    """Zoom about the pointer, pull the picture, or show a place of the minimap; None if the mouse does neither."""
     pointer, layout = hand.pointer, hand.layout
     if pointer.wheel and pointer.holds_ctrl and hand.is_over_frame:
         return [do(viewpoint.set_zoom, layout.zoomed(pointer.wheel, pointer.x, pointer.y))]
-    if not pointer.pulls:
+    if pointer.pulls:
+        is_pulled = layout.is_zoomed and (pointer.step_x or pointer.step_y)
+        return [do(viewpoint.set_zoom, layout.pulled(pointer.step_x, pointer.step_y))] if is_pulled else []
+    if pointer.is_held and _is_on_minimap(layout, pointer.pressed_x, pointer.pressed_y):
         return [do(viewpoint.set_zoom, layout.shown_on_minimap(pointer.x, pointer.y))]
-    if not layout.is_zoomed or not (pointer.step_x or pointer.step_y):
-        return []
-    return [do(viewpoint.set_zoom, layout.pulled(pointer.step_x, pointer.step_y))]
+    return None
 
 
 def _paint_actions(hand: _Hand) -> list[Action]:
@@ -257,10 +240,8 @@ def _paint_actions(hand: _Hand) -> list[Action]:
     """
     pointer, stroke, brush = hand.pointer, hand.state.stroke, hand.state.brush
     if pointer.wheel and hand.is_over_frame:
-        factor = BRUSH_NOTCH**pointer.wheel
-        if brush.tool == "select":
-            return [do(depth.set_brush, replace(brush, tolerance=brush.tolerance * factor))]
-        return [do(depth.set_brush, replace(brush, radius=brush.radius * factor))]
+        name, factor = "tolerance" if brush.tool == "select" else "radius", BRUSH_NOTCH**pointer.wheel
+        return [do(depth.set_brush, replace(brush, **{name: getattr(brush, name) * factor}))]
     begins = pointer.is_pressed and hand.began_in_frame
     if not pointer.is_down or not (begins or stroke is not None):
         return []

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -16,7 +16,7 @@ from iibr_core.exports.full_picture import FullPicture, encode_light, is_full
 from iibr_core.exports.kinds import ExportKind, export_kind, optics_of, require_export_place
 from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.exports.source import ExportSource, write_export
-from iibr_core.formats.images.picture_kinds import AS_USUAL, PictureFormat, is_float
+from iibr_core.formats.images.picture_kinds import AS_USUAL, is_float
 from iibr_core.formats.outputs import AlreadyThereError, check_output, make_folder
 from iibr_core.runtime.extras import require_extra
 from iibr_core.runtime.work import report_progress
@@ -33,33 +33,13 @@ from viewer.model.remedies import words_of
 from viewer.model.state.app_state import AppState
 from viewer.model.state.jobs import WRITING
 from viewer.model.state.notices import Notice
-from viewer.model.state.prompts import ExportPrompt
+from viewer.model.state.prompts import ExportPrompt, SavePrompt
 from viewer.model.state.tasks import ExportTask, SaveTask
 from viewer.model.viewpoint import clicked_rack
 
 OPEN_PHOTO = "This is the open photo. Choose another name."
 NO_MAP = "a light field has no depth map to save"
-
-
-@dataclass(frozen=True, eq=False)
-class _Shot:
-    """A picture as it was asked for."""
-
-    path: Path
-    size: ScreenSize
-    form: PictureFormat
-    state: AppState
-    is_copied: bool = False
-
-    def is_full(self, scene: Scene, optics: Optics) -> bool:
-        """Return whether it is drawn from the photo at its own size, which a free camera cannot do."""
-        return not (self.state.free_camera or self.is_copied) and is_full(scene, optics, self.size)
-
-    def needs(self, scene: Scene, optics: Optics) -> Needs:
-        """Return what it needs of the scene: a copy, and a free camera's picture, show what the window shows."""
-        if self.is_copied or self.state.free_camera:
-            return "shown"
-        return "photo" if self.is_full(scene, optics) else "views"
+PictureNeeds = Callable[[Scene, Optics], Needs]
 
 
 def add_save(task: SaveTask, state: AppState, inputs: Sequence[Path], jobs: Jobs) -> list[Action]:
@@ -67,34 +47,38 @@ def add_save(task: SaveTask, state: AppState, inputs: Sequence[Path], jobs: Jobs
 
     inputs: files that are read.
     """
-    prompt = task.prompt
-    if state.scene is None:
+    prompt, scene = task.prompt, state.scene
+    if scene is None:
         return []
     try:
         path = checked_path(task, inputs)
-        if prompt.what == "map" and state.scene.plan is None:
+        if prompt.what == "map" and scene.plan is None:
             raise InputError(f"{path}: {NO_MAP}")
         if not task.may_replace and jobs.writes(path):
             raise AlreadyThereError(f"{path}: is being written")
-    except AlreadyThereError:
-        return [do(messages.show_prompt, replace(prompt, already_there=True, problem=""))]
     except InputError as error:
-        return [do(messages.show_prompt, replace(prompt, already_there=False, problem=words_of(error)))]
+        return [_ask_again(prompt, error)]
     if prompt.what == "map":
-        jobs.add(Job("map", path, state, partial(_save_map, path), lambda scene, optics: "photo"))
+        jobs.add(Job("map", path, state, partial(_save_map, path), lambda scene, optics: "photo"), scene)
         return [do(messages.show_prompt, None)]
-    shot = _Shot(path, prompt.size_px, prompt.form, state)
-    jobs.add(Job("picture", path, state, partial(_save, shot), shot.needs))
+    shot = shot_of(state, prompt.size_px, prompt.form)
+    needs = partial(_needs, prompt.size_px, state.free_camera is not None)
+    jobs.add(Job("picture", path, state, partial(_save, path, shot, needs), needs), scene)
     return [do(saving.begin_job, Path(os.path.abspath(path)))]
 
 
 def checked_path(task: SaveTask, inputs: Sequence[Path]) -> Path:
-    """Return the path to write. inputs: files that are read, the open photo first.
+    """Return the path to write, with an ending if the typed one has none. inputs: files that are read, the open photo
+    first.
 
     Raises AlreadyThereError, and InputError if it cannot be written.
     """
     prompt = task.prompt
-    path = _with_ending(prompt.path, ".pfm" if prompt.what == "map" else ".png")
+    path = Path(os.path.expanduser(prompt.path.strip()))
+    if not path.name:
+        raise InputError("There is no name yet. Type one, or press Browse…")
+    if not path.suffix:
+        path = path.with_name(f"{path.name}{'.pfm' if prompt.what == 'map' else '.png'}")
     _require_another(path, inputs)
     if prompt.what == "map":
         check_output(path, inputs, task.may_replace)
@@ -107,8 +91,9 @@ def add_copy(state: AppState, jobs: Jobs) -> list[Action]:
     """Put the present picture into the clipboard, at the size of the views."""
     if state.scene is None:
         return [do(messages.notify, Notice("There is no picture to copy yet. Open a photo first."))]
-    shot = _Shot(copied_path(), state.scene.size, AS_USUAL, state, is_copied=True)
-    jobs.add(Job("copy", shot.path, state, partial(_copy, shot), shot.needs))
+    path, shot = copied_path(), shot_of(state, state.scene.size, AS_USUAL)
+    needs = partial(_needs, state.scene.size, True)
+    jobs.add(Job("copy", path, state, partial(_copy, path, shot, needs), needs), state.scene)
     return []
 
 
@@ -117,26 +102,30 @@ def add_export(task: ExportTask, state: AppState, inputs: Sequence[Path], jobs: 
 
     inputs: files that are read.
     """
-    prompt = task.prompt
-    if state.scene is None:
+    prompt, scene = task.prompt, state.scene
+    if scene is None:
         return []
     try:
         kind = export_kind(prompt.kind)
-        path = saving.written_path(kind, os.path.expanduser(prompt.path.strip()), state.scene, prompt.options)
+        path = saving.written_path(kind, os.path.expanduser(prompt.path.strip()), scene, prompt.options)
         _require_another(path, inputs)
         require_export_place(kind, path, inputs, task.may_replace)
         if kind.needs:
             require_extra("export", *kind.needs)
         if jobs.writes(path):
             raise InputError(f"{path} is being written by another export. Choose another name.")
-    except AlreadyThereError:
-        return [do(messages.show_prompt, replace(prompt, already_there=True, problem=""))]
     except InputError as error:
-        return [do(messages.show_prompt, replace(prompt, already_there=False, problem=words_of(error)))]
+        return [_ask_again(prompt, error)]
     prompt = replace(prompt, options=replace(prompt.options, rack=clicked_rack(state)))
     work, pictures = partial(_export, kind, path, prompt), partial(optics_of, kind, prompt.options)
-    jobs.add(Job("export", path, state, work, pictures=pictures, prompt=prompt))
+    jobs.add(Job("export", path, state, work, pictures=pictures, prompt=prompt), scene)
     return [do(saving.begin_job, Path(os.path.abspath(path)), prompt)]
+
+
+def _ask_again(prompt: SavePrompt | ExportPrompt, error: InputError) -> Action:
+    """Return the prompt with what is wrong, or with the question whether to replace the file."""
+    there = isinstance(error, AlreadyThereError)
+    return do(messages.show_prompt, replace(prompt, already_there=there, problem="" if there else words_of(error)))
 
 
 def _require_another(path: Path, inputs: Sequence[Path]) -> None:
@@ -144,19 +133,23 @@ def _require_another(path: Path, inputs: Sequence[Path]) -> None:
         raise InputError(OPEN_PHOTO)
 
 
-def _save(shot: _Shot, source: ExportSource) -> list[Action]:
-    saved = _saved_of(shot, source.optics)
-    pixels = _drawn(shot, saved, source)
-    report_progress(1, 1, WRITING)
-    path = export_picture(shot.path, pixels, saved)
-    return [do(saving.finish_job, path)]
+def _needs(size: ScreenSize, is_as_shown: bool, scene: Scene, optics: Optics) -> Needs:
+    """Return what a picture needs of the scene: a copy, and a free camera's picture, show what the window shows."""
+    if is_as_shown:
+        return "shown"
+    return "photo" if is_full(scene, optics, size) else "views"
 
 
-def _copy(shot: _Shot, source: ExportSource) -> list[Action]:
-    saved = _saved_of(shot, source.optics)
-    pixels = _drawn(shot, saved, source)
-    make_folder(shot.path.parent)
-    copy_picture(export_picture(shot.path, pixels, saved))
+# In the threads of the jobs
+
+
+def _save(path: Path, shot: SavedShot, needs: PictureNeeds, source: ExportSource) -> list[Action]:
+    return [do(saving.finish_job, _write(path, shot, needs, source))]
+
+
+def _copy(path: Path, shot: SavedShot, needs: PictureNeeds, source: ExportSource) -> list[Action]:
+    make_folder(path.parent)
+    copy_picture(_write(path, shot, needs, source))
     return [do(messages.notify, Notice("Copied the picture.", is_result=True))]
 
 
@@ -167,8 +160,7 @@ def _save_map(path: Path, source: ExportSource) -> list[Action]:
     if source.loaded is None:
         raise InputError(f"{path}: {NO_MAP}")
     report_progress(1, 1, WRITING)
-    message = write_map(path, source.loaded.disparity.values)
-    return [do(saving.finish_job, path, message)]
+    return [do(saving.finish_job, path, write_map(path, source.loaded.disparity.values))]
 
 
 def _export(kind: ExportKind, path: Path, prompt: ExportPrompt, source: ExportSource) -> list[Action]:
@@ -176,36 +168,23 @@ def _export(kind: ExportKind, path: Path, prompt: ExportPrompt, source: ExportSo
     return [do(saving.finish_job, path, message or "", prompt)]
 
 
-def _saved_of(shot: _Shot, optics: Optics) -> SavedShot:
-    saved = shot_of(shot.state, shot.size, shot.form)
-    return replace(saved, settings=replace(saved.settings, optics=optics))
-
-
-def _drawn(shot: _Shot, saved: SavedShot, source: ExportSource) -> NDArray[Any]:
-    """Return the picture, (H, W, 3), bytes or linear light. Raises InputError with the file's name."""
-    is_linear, space = is_float(shot.path, shot.form), saved.color_space
+def _write(path: Path, shot: SavedShot, needs: PictureNeeds, source: ExportSource) -> Path:
+    """Draw a picture and write it. Raises InputError with the file's name."""
+    shot = replace(shot, settings=replace(shot.settings, optics=source.optics))
     try:
-        if shot.is_full(source.scene, source.optics):
-            return _drawn_full(shot, source, is_linear, saved)
-        return source.draw(RenderSettings(source.optics, shot.size, is_linear=is_linear, color_space=space))
+        pixels = _draw(shot, is_float(path, shot.form), needs, source)
     except (InputError, MemoryError) as error:
-        raise InputError(f"{shot.path}: not saved. {message_of(error)}") from error
+        raise InputError(f"{path}: not saved. {message_of(error)}") from error
+    report_progress(1, 1, WRITING)
+    return export_picture(path, pixels, shot)
 
 
-def _drawn_full(shot: _Shot, source: ExportSource, is_linear: bool, saved: SavedShot) -> NDArray[Any]:
+def _draw(shot: SavedShot, is_linear: bool, needs: PictureNeeds, source: ExportSource) -> NDArray[Any]:
+    """Return the picture, (H, W, 3), bytes or linear light, drawn from the photo at its own size if it needs that."""
     from iibr_core.exports.full_drawing import draw_full
 
-    scene = source.scene
-    assert scene.plan is not None
-    assert source.loaded is not None
-    full = FullPicture(scene, scene.plan, source.loaded, source.optics, shot.size)
-    light = draw_full(full, source.draw)
-    return encode_light(light, is_linear, saved.color_space, scene.color_space)
-
-
-def _with_ending(typed: str, ending: str) -> Path:
-    """Return the typed path, with an ending if it has none. Raises InputError without a name."""
-    path = Path(os.path.expanduser(typed.strip()))
-    if not path.name:
-        raise InputError("There is no name yet. Type one, or press Browse…")
-    return path if path.suffix else path.with_name(f"{path.name}{ending}")
+    scene, loaded, size, space = source.scene, source.loaded, shot.settings.size_px, shot.color_space
+    if needs(scene, source.optics) != "photo" or scene.plan is None or loaded is None:
+        return source.draw(RenderSettings(source.optics, size, is_linear=is_linear, color_space=space))
+    light = draw_full(FullPicture(scene, scene.plan, loaded, source.optics, size), source.draw)
+    return encode_light(light, is_linear, space, scene.color_space)

@@ -8,8 +8,6 @@ from dataclasses import replace
 
 from iibr_core.scenes.scene import (
     DepthSettings,
-    LoadedPhoto,
-    Scene,
     SceneReady,
     SceneRequest,
     Source,
@@ -39,7 +37,6 @@ SKETCHES_FIRST = 3
 """Number of photos that are read at a small size before the open photo is read whole, so that quick steps show a
 picture. The first photo does not wait for the next ones.
 """
-
 PROGRESS_S = 0.25
 """Time between two updates of the progress, in seconds: each update draws a frame."""
 
@@ -65,11 +62,11 @@ class SceneLoader:
         self._preview = DepthPreview(scene_view)
         self._depth_finder = DepthFinder(wake)
         self._brush_loader = Newest("iibr-brush", _prepare_brush, wake)
-        self._has_brush = False
+        self._is_brush_asked = False
         self._submitted = 0
         self._depth_settings = DepthSettings()
         self._stopped: int | None = None
-        self._room_beside: tuple[Scene, int] | None = None
+        self._room_beside = 0
         self._held: list[Action] = []
         self._is_urgent = False
         self._reported_at = 0.0
@@ -89,9 +86,12 @@ class SceneLoader:
             self._is_urgent |= not (isinstance(result, ViewReady | WorkReport) and not result.progress.is_complete)
             if time.perf_counter() >= until:
                 break
-        self._held += actions
-        self._is_urgent |= bool(actions)
-        return self._take_held()
+        now = time.perf_counter()
+        if not (actions or self._is_urgent) and now - self._reported_at < PROGRESS_S:
+            return []
+        actions, self._held, self._is_urgent = self._held + actions, [], False
+        self._reported_at = now if actions else self._reported_at
+        return actions
 
     @property
     def holds_progress(self) -> bool:
@@ -111,7 +111,9 @@ class SceneLoader:
 
     def advance(self, state: AppState) -> None:
         """Submit the source that the state asks for, and read the next photos."""
-        self._cancel(state)
+        if state.stopped == state.generation != self._stopped:
+            self._worker.cancel()
+            self._stopped = state.stopped
         self._read_sketches(state)
         is_wanted = state.generation not in (self._submitted, state.stopped)
         if is_wanted and state.source is not None and state.stroke is None:
@@ -125,15 +127,6 @@ class SceneLoader:
         self.sketches.close()
         self.ahead.close()
         self._brush_loader.close()
-
-    def _take_held(self) -> list[Action]:
-        """Return the actions that are due: progress alone only now and then."""
-        now = time.perf_counter()
-        if not self._is_urgent and now - self._reported_at < PROGRESS_S:
-            return []
-        actions, self._held, self._is_urgent = self._held, [], False
-        self._reported_at = now if actions else self._reported_at
-        return actions
 
     def _show_sketch(self, state: AppState) -> list[Action]:
         """Show the sketch of the photo that was asked for while nothing else of it is there."""
@@ -149,10 +142,8 @@ class SceneLoader:
             case Failed():
                 return [do(opening.report_failure, result.request.generation, result.message)]
             case PhotosFound():
-                return [
-                    do(opening.open_source, source_beside(state.source, result.path)),
-                    do(preferences.show_filmstrip, True),
-                ]
+                source = source_beside(state.source, result.path)
+                return [do(opening.open_source, source), do(preferences.show_filmstrip, True)]
         try:
             return self._take_views(result, state)
         except InputError as error:  # the graphics card has no room
@@ -163,34 +154,29 @@ class SceneLoader:
         if result.generation < self._scene_view.generation:
             return []  # the sketch of another photo is shown by now
         if isinstance(result, SceneReady):
-            before, centre = self._scene_view.loaded, self._scene_view.centre
-            self._scene_view.open(result)
-            if before is None or result.loaded is None or result.loaded.photo is not before.photo:
-                self._preview.forget()
-            self._inspection_view.open()
-            self._set_title(f"{result.scene.name} - iibr")
-            self._load_brush(result)
-            is_deepened = before is not None and _has_other_depth(before, result.loaded)
-            before_px, now_px = centre.disparity if centre is not None else None, result.centre.disparity
-            new_depth = None
-            if is_deepened and before_px is not None and now_px is not None:
-                new_depth = NewDepth(focus_before_and_now(before_px, now_px, state.focused_at))
-            return [do(opening.show_scene, result.generation, result.scene, new_depth)]
+            return [self._open(result, state)]
         self._scene_view.add(result.view)
         self._inspection_view.add(result.view)
         return [do(opening.set_progress, result.generation, result.progress, (result.view.row, result.view.column))]
 
-    def _load_brush(self, ready: SceneReady) -> None:
-        """Prepare the brush beside the first photo's views, so that the first stroke does not wait."""
-        if not self._has_brush and ready.loaded is not None:
-            self._has_brush = True
+    def _open(self, ready: SceneReady, state: AppState) -> Action:
+        """Show a scene. The brush is prepared beside the first photo's views, so the first stroke does not wait."""
+        before, centre, loaded, new_depth = self._scene_view.loaded, self._scene_view.centre, ready.loaded, None
+        is_same_photo = before is not None and loaded is not None and loaded.photo is before.photo
+        self._scene_view.open(ready)
+        self._inspection_view.open()
+        self._set_title(f"{ready.scene.name} - iibr")
+        self._room_beside = photos_within_budget(ready.scene)
+        if not is_same_photo:
+            self._preview.forget()
+        elif before is not None and loaded is not None and loaded.found is not before.found:
+            before_px, now_px = centre.disparity if centre is not None else None, ready.centre.disparity
+            if before_px is not None and now_px is not None:
+                new_depth = NewDepth(focus_before_and_now(before_px, now_px, state.focused_at))
+        if loaded is not None and not self._is_brush_asked:
+            self._is_brush_asked = True
             self._brush_loader.submit(None)
-
-    def _cancel(self, state: AppState) -> None:
-        """Cancel work that the user stopped."""
-        if state.stopped == state.generation != self._stopped:
-            self._worker.cancel()
-            self._stopped = state.stopped
+        return do(opening.show_scene, ready.generation, ready.scene, new_depth)
 
     def _load(self, state: AppState, source: Source) -> None:
         """Submit a new generation. The photo is read again only if another one was opened."""
@@ -204,17 +190,9 @@ class SceneLoader:
                 return
             loaded, plan = (ahead.loaded, ahead.plan) if ahead is not None else (None, None)
         self._submitted, self._depth_settings = state.generation, settings_for_worker(state)
-        self._worker.submit(
-            SceneRequest(
-                state.generation,
-                source,
-                requested_strength(state),
-                loaded,
-                self._depth_settings,
-                plan=plan,
-                asks_model=False,
-            )
-        )
+        strength, settings = requested_strength(state), self._depth_settings
+        request = SceneRequest(state.generation, source, strength, loaded, settings, plan=plan, asks_model=False)
+        self._worker.submit(request)
 
     def _reuses_photo(self, state: AppState) -> bool:
         """Return whether the photo that is asked for is open, and all of it was read."""
@@ -246,21 +224,10 @@ class SceneLoader:
             return
         photos = _wanted(state, (state.source, *photos_ahead(state, AHEAD)))
         if _is_whole(state):
-            self.ahead.want(photos[1 : 1 + self._photos_beside(state.scene)])
+            self.ahead.want(photos[1 : 1 + self._room_beside])
         else:
             is_begun = self.ahead.is_reading(photos[0])
             self.ahead.want([*photos[:is_begun], *filter(self.ahead.is_done, photos)])
-
-    def _photos_beside(self, scene: Scene) -> int:
-        """Return `photos_within_budget`, computed once a scene: it reads a dozen files of the system."""
-        if self._room_beside is None or self._room_beside[0] is not scene:
-            self._room_beside = scene, photos_within_budget(scene)
-        return self._room_beside[1]
-
-
-def _has_other_depth(before: LoadedPhoto, now: LoadedPhoto | None) -> bool:
-    """Return whether depth of the same photo was found again."""
-    return now is not None and now.photo is before.photo and now.found is not before.found
 
 
 def _prepare_brush(request: None, post: Post[None]) -> None:

@@ -23,7 +23,6 @@ from viewer.model.state.app_state import AppState
 from viewer.model.state.notices import Notice
 from viewer.model.state.saving import SavedSettings
 
-FOLDER = "sessions"
 QUIET_S = 2.0
 """Time without changes after which a session is written, in seconds."""
 MAX_SESSIONS = 1000
@@ -36,7 +35,7 @@ class SessionStore:
 
     def __init__(self, folder: Path | None, wake: Callable[[], None]) -> None:
         """folder: of the user's settings; None keeps nothing. wake: called, in the thread, when a session was read."""
-        self._folder = None if folder is None else folder / FOLDER
+        self._folder = None if folder is None else folder / "sessions"
         self._wake = wake
         self._executor = ThreadPoolExecutor(1, "iibr-sessions")
         self._scene: Scene | None = None
@@ -51,8 +50,7 @@ class SessionStore:
         """Look for the session of a scene that was just opened, and write what was changed a while ago."""
         if self._folder is None:
             return []
-        actions = [*self._take_search(state), *self._report_failure()]
-        scene = state.scene
+        actions, scene = self._take_search(state) + self._report_failure(), state.scene
         if actions or scene is None or scene.is_sketch or scene.source is not state.source:
             return actions
         if self._scene is None or self._scene.source is not scene.source:
@@ -72,9 +70,8 @@ class SessionStore:
         self._executor.shutdown()
 
     def _follow(self, settings: SavedSettings) -> None:
-        if self._saved is None or (
-            self._latest == self._saved and settings.has_model_depth != self._saved.has_model_depth
-        ):
+        saved = self._saved
+        if saved is None or (self._latest == saved and settings.has_model_depth != saved.has_model_depth):
             self._saved = self._latest = settings  # as it was opened: the user has changed nothing
         elif settings != self._latest:
             self._latest, self._changed_at = settings, time.monotonic()
@@ -103,10 +100,9 @@ class SessionStore:
         errors = [write.exception() for write in self._writes if write.done()]
         self._writes = [write for write in self._writes if not write.done()]
         error = next((error for error in errors if error is not None), None)
-        if error is None or self._has_failed:
-            return []
-        self._has_failed = True
-        return [do(messages.notify, Notice(f"{error} Your changes are not kept for the next time."))]
+        is_new, self._has_failed = not self._has_failed, self._has_failed or error is not None
+        text = f"{error} Your changes are not kept for the next time."
+        return [do(messages.notify, Notice(text))] if error is not None and is_new else []
 
 
 def key_of(source: Source) -> str:

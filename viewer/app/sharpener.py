@@ -67,8 +67,7 @@ class Sharpener:
             self._stop()
         if picture is None or state.zoom is None:
             self._kept = None
-        request = self._request_of(picture, state) if picture is not None and is_resting else None
-        if self._wanted is None and request is not None:
+        elif is_resting and self._wanted is None and (request := self._request_of(picture, state)) is not None:
             self._wanted = key
             self._worker.submit(request)
         if is_resting:
@@ -126,9 +125,8 @@ class Sharpener:
         result = self._worker.next_result()
         if isinstance(result, Failed):
             self._refused = self._scene_view.loaded  # it would fail again
-            return [
-                do(messages.notify, Notice(f"The photo's full detail cannot be shown. {result.message}", is_error=True))
-            ]
+            text = f"The photo's full detail cannot be shown. {result.message}"
+            return [do(messages.notify, Notice(text, is_error=True))]
         if result is not None:
             self.pixels = result
             self._texture = self._passes.show("sharp", np.ascontiguousarray(result[::-1]))

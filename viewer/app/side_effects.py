@@ -26,21 +26,11 @@ from viewer.model.action import Action, ask, do, forget_tasks
 from viewer.model.commands import action_for_path
 from viewer.model.opening import set_facts
 from viewer.model.saving import path_beside
+from viewer.model.state import tasks
 from viewer.model.state.app_state import AppState
 from viewer.model.state.folder import PhotoFacts
 from viewer.model.state.notices import Notice
 from viewer.model.state.prompts import PathPrompt
-from viewer.model.state.tasks import (
-    CancelJobTask,
-    ChoosePlaceTask,
-    ChooseTask,
-    ExportTask,
-    PlainTask,
-    SaveTask,
-    ShowFileTask,
-    TakePathTask,
-    Task,
-)
 
 
 class SideEffects:
@@ -69,7 +59,9 @@ class SideEffects:
     def run(self, state: AppState) -> list[Action]:
         """Begin the state's tasks, and return the results of earlier ones."""
         actions: list[Action] = [do(forget_tasks)] if state.tasks else []
-        actions += self._take_results() + self._take_downloads() + self._take_answer(state)
+        actions += self._take_results() + self._take_answer(state)
+        while (result := self._downloads.next_result()) is not None:
+            actions += actions_of_download(result)
         for task in state.tasks:
             actions += self._begin(task, state)
         return actions
@@ -86,44 +78,44 @@ class SideEffects:
         self._downloads.close()
         self._executor.shutdown()
 
-    def _begin(self, task: Task, state: AppState) -> list[Action]:
+    def _begin(self, task: tasks.Task, state: AppState) -> list[Action]:
         match task:
-            case ChooseTask(what) if not has_dialogs():
+            case tasks.ChooseTask(what) if not has_dialogs():
                 return [do(messages.show_prompt, PathPrompt(what, _folder_beside(state)))]
-            case ChooseTask(what):
+            case tasks.ChooseTask(what):
                 beside = state.source.path if state.source else next(iter(state.recent), "")
                 self._dialog = self._dialog or ask_for_path(what, beside)
-            case TakePathTask(prompt):
+            case tasks.TakePathTask(prompt):
                 return _take_path(prompt, state)
-            case ChoosePlaceTask(prompt):
+            case tasks.ChoosePlaceTask(prompt):
                 self._dialog = self._dialog or ask_for_place(prompt)
-            case PlainTask("read mask", path):
+            case tasks.PlainTask("read mask", path):
                 self._masks.append(Path(os.path.expanduser(path)))
                 self._submit(partial(_read_mask, self._masks[-1]))
-            case PlainTask("read facts", path):
+            case tasks.PlainTask("read facts", path):
                 self._submit(partial(_read_facts, path))
-            case PlainTask("list folder", path):
+            case tasks.PlainTask("list folder", path):
                 self._submit(lambda: do(folder.set_photos, path, list_photos(path)))
-            case SaveTask():
+            case tasks.SaveTask():
                 return add_save(task, state, self._inputs(state), self._jobs)
-            case ExportTask():
+            case tasks.ExportTask():
                 return add_export(task, state, self._inputs(state), self._jobs)
-            case CancelJobTask(id_):
+            case tasks.CancelJobTask(id_):
                 self._jobs.cancel(id_)
-            case ShowFileTask(path, in_folder):
+            case tasks.ShowFileTask(path, in_folder):
                 typer.launch(path, locate=in_folder)
-            case PlainTask("list models"):
+            case tasks.PlainTask("list models"):
                 self._submit(lambda: do(depth_models.set_known, list_models()))
-            case PlainTask("download model", name):
+            case tasks.PlainTask("download model", name):
                 self._downloads.submit(name)
-            case PlainTask("stop download"):
+            case tasks.PlainTask("stop download"):
                 self._downloads.cancel()
                 return [do(depth_models.set_downloading, None)]
-            case PlainTask("copy"):
+            case tasks.PlainTask("copy"):
                 return add_copy(state, self._jobs)
-            case PlainTask("paste") if self._jobs.is_copying:
+            case tasks.PlainTask("paste") if self._jobs.is_copying:
                 return [do(ask, task)]  # the copy is not in the clipboard yet
-            case PlainTask("paste"):
+            case tasks.PlainTask("paste"):
                 self._submit(lambda: do(_open, paste_picture(self._clipboard_text())))
         return []
 
@@ -138,12 +130,6 @@ class SideEffects:
         done = [result for result in self._results if result.done()]
         self._results = [result for result in self._results if result not in done]
         return [_action_of(result) for result in done]
-
-    def _take_downloads(self) -> list[Action]:
-        actions: list[Action] = []
-        while (result := self._downloads.next_result()) is not None:
-            actions += actions_of_download(result)
-        return actions
 
     def _take_answer(self, state: AppState) -> list[Action]:
         """Use the answer of the dialog once it is closed."""

@@ -128,12 +128,6 @@ class Window:
         """Take the paths of dropped files. GLFW calls this."""
         self._dropped.extend(paths)
 
-    @property
-    def pointer(self) -> tuple[float, float]:
-        """Pointer (x, y) in window units, also while files are dragged."""
-        x, y = glfw.get_cursor_pos(self.handle)
-        return float(x), float(y)
-
     def take_dropped(self) -> list[str]:
         """Return the paths of the files dropped on the window since the last call."""
         dropped, self._dropped = self._dropped, []

@@ -16,16 +16,13 @@ from viewer.app.pointer import (
     Pointer,
     actions_from_hover,
     actions_from_pointer,
-    gesture_end,
-    gesture_start,
     units_per_view,
 )
-from viewer.model import gesture, inspection, lens, viewpoint
+from viewer.model import inspection, lens, viewpoint
 from viewer.model.action import do
 from viewer.model.focal_plane import handle_points
 from viewer.model.layout import Layout, layout_of, letterbox, pixel_at
 from viewer.model.state.app_state import AppState, Hover
-from viewer.model.state.history import History
 from viewer.model.state.lens import TiltHandles
 from viewer.model.state.viewpoint import Zoom
 
@@ -178,15 +175,6 @@ def test_the_pointer_says_once_where_it_is_and_once_that_it_left() -> None:
     for pointer in outside:
         assert hovered(pointer, there) == [do(inspection.set_hover, None)]
         assert hovered(pointer) == []
-
-
-def test_presses_and_releases_part_the_edits() -> None:
-    under_way = replace(STATE, history=History(gesture="SetFocus"))
-    pressed, released = replace(OVER_PICTURE, is_pressed=True), replace(OVER_PICTURE, is_released=True)
-    assert gesture_start(pressed, under_way) == [do(gesture.end_gesture)]
-    assert gesture_start(pressed, STATE) == gesture_start(released, under_way) == []
-    assert gesture_end(released) == [do(gesture.end_gesture)]
-    assert gesture_end(pressed) == []
 
 
 @pytest.mark.parametrize("window", [(1280, 800), (500, 900), (2000, 400)])
