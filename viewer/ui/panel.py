@@ -16,14 +16,8 @@ from viewer.model.commands import BY_NAME
 from viewer.model.layout import Layout
 from viewer.model.state.app_state import AppState, DrawReport
 from viewer.model.state.preferences import PARENT_SECTION, SECTIONS, Section, is_seen_open
-from viewer.ui.sections.depth_section import depth_line, depth_section
-from viewer.ui.sections.essentials import essentials
-from viewer.ui.sections.gloss_section import gloss_section
-from viewer.ui.sections.inspect import inspect_section
-from viewer.ui.sections.lens_section import aperture_section, focus_section, light_section
-from viewer.ui.sections.scene_section import scene_section
-from viewer.ui.sections.view_section import view_section
-from viewer.ui.widgets import button, gap, heading, in_row, quiet, tooltip
+from viewer.ui.sections import depth_section, essentials, gloss_section, inspect, lens_section, view_section
+from viewer.ui.widgets import button, gap, heading, in_row, label, quiet, scale, tooltip
 
 TOOLS = (
     (f"{icons.ICON_FA_IMAGE}  Open", "Open a photo…"),
@@ -62,29 +56,29 @@ def panel(state: AppState, layout: Layout) -> list[Action]:
     imgui.set_next_window_pos(imgui.ImVec2(rect.x, rect.y))
     imgui.set_next_window_size(imgui.ImVec2(rect.width, rect.height))
     imgui.begin("panel", None, _FIXED)
-    actions = _tools(TOOLS, state, layout)
+    actions = _tools(TOOLS, state)
     if state.scene is not None:
-        actions += _picture(state, state.scene, layout)
+        actions += _picture(state, state.scene)
     elif progress_text(state.progress):
-        actions += _progress(state, layout)
+        actions += _progress(state)
     else:
-        actions += _tools(MORE_TOOLS, state, layout) + _recent(state, layout)
+        actions += _tools(MORE_TOOLS, state) + _recent(state)
     imgui.end()
     return actions
 
 
-def _picture(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
-    gap(layout, 2)
+def _picture(state: AppState, scene: Scene) -> list[Action]:
+    gap()
     imgui.text_wrapped(scene.name)
-    depth_line(scene, layout)
-    actions = _progress(state, layout)
-    gap(layout, 2)
-    actions += essentials(state, scene, layout)
-    gap(layout, 2)
+    depth_section.depth_line(scene)
+    actions = _progress(state)
+    gap()
+    actions += essentials.essentials(state, scene)
+    gap()
     quiet(HINT if aperture_limit(scene.grid) else FLAT_HINT)
-    gap(layout, 2)
+    gap()
     for section in SECTIONS:
-        actions += _section(section, state, scene, layout)
+        actions += _section(section, state, scene)
     return actions
 
 
@@ -107,6 +101,12 @@ def report_text(report: DrawReport, has_all_views: bool) -> str:
     return f"{words}, final" if has_all_views else words
 
 
+def is_final(state: AppState) -> bool:
+    """Return whether no further view can change the picture."""
+    is_shown = state.shown_generation == state.generation and state.free_progress is None
+    return is_shown and state.progress.is_complete
+
+
 def time_text(seconds: float) -> str:
     """Return a duration for people: "0.2 s", "12 s", "3 min"."""
     if seconds >= 100:
@@ -124,61 +124,53 @@ def size_text(scene: Scene) -> str:
     return f"{scene.width} x {scene.height} px, {scene.grid.rows} x {scene.grid.columns} views"
 
 
-def _tools(tools: tuple[tuple[str, str], ...], state: AppState, layout: Layout) -> list[Action]:
+def _tools(tools: tuple[tuple[str, str], ...], state: AppState) -> list[Action]:
     """Build rows of buttons for commands; a command that cannot be used now is grey."""
     actions: list[Action] = []
-    for (words, name), width in in_row(tools, layout, min(len(tools), TOOLS_IN_ROW)):
+    has_scene = state.scene is not None
+    is_possible = {"Undo": bool(state.history.past), "Redo": bool(state.history.future)}
+    is_possible |= {"Save the picture…": has_scene, "Share or export…": has_scene}
+    for (words, name), width in in_row(tools, min(len(tools), TOOLS_IN_ROW)):
         chords = BY_NAME[name].chords
         tip = name.rstrip("…") + (f" ({chords[0].words})" if chords else "")
-        if button(f"{words}##{name}", layout, tip, _is_possible(name, state), width):
+        if button(f"{words}##{name}", tip, is_possible.get(name, True), width):
             actions.append(BY_NAME[name].action(state))
     return actions
 
 
-def _is_possible(name: str, state: AppState) -> bool:
-    needs: dict[str, bool] = {
-        "Undo": bool(state.history.past),
-        "Redo": bool(state.history.future),
-        "Save the picture…": state.scene is not None,
-        "Share or export…": state.scene is not None,
-    }
-    return needs.get(name, True)
-
-
-def _recent(state: AppState, layout: Layout) -> list[Action]:
+def _recent(state: AppState) -> list[Action]:
     """List the recent files other than the open one."""
     paths = opening.other_recent(state)
     actions: list[Action] = []
     if paths:
         quiet("Recent")
     for path, name in zip(paths, opening.names_of(paths)):
-        is_chosen, _ = imgui.selectable(f"{name}##{path}", False)
-        tooltip(path, layout)
-        if is_chosen:
+        if imgui.selectable(f"{name}##{path}", False)[0]:
             actions.append(do(opening.open_source, source_beside(state.source, path)))
+        tooltip(path)
     return actions
 
 
-def _progress(state: AppState, layout: Layout) -> list[Action]:
+def _progress(state: AppState) -> list[Action]:
     """Build a bar, which stays when the work is done so that nothing below it jumps, and a button to stop the work."""
     progress = state.progress
     words = READY if progress.is_complete else progress_text(progress)
     if not words:
         return []
-    imgui.progress_bar(progress.share, imgui.ImVec2(-1, 4 * layout.ui_scale), "")
+    imgui.progress_bar(progress.share, imgui.ImVec2(-1, 4 * scale()), "")
     if progress.is_complete or state.stopped == state.generation:
         quiet(words)
         return []
-    return [do(opening.stop)] if _words_and_button(words, "Cancel", CANCEL_TIP, layout) else []
+    return [do(opening.stop)] if _words_and_button(words, "Cancel", CANCEL_TIP) else []
 
 
-def _words_and_button(words: str, text: str, tip: str, layout: Layout) -> bool:
+def _words_and_button(words: str, text: str, tip: str) -> bool:
     """Build quiet words, and a button at the right end of their first line; the words keep clear of it."""
     start, padding = imgui.get_cursor_pos_x(), 2 * imgui.get_style().frame_padding.x
     room = imgui.get_content_region_avail().x - imgui.calc_text_size(text).x - padding
     imgui.set_cursor_pos_x(start + room)
     is_pressed = imgui.small_button(text)
-    tooltip(tip, layout)
+    tooltip(tip)
     imgui.same_line(start)
     imgui.push_text_wrap_pos(start + room - padding / 2)
     imgui.text_colored(imgui.get_style().color_(imgui.Col_.text_disabled), words)
@@ -186,7 +178,7 @@ def _words_and_button(words: str, text: str, tip: str, layout: Layout) -> bool:
     return bool(is_pressed)
 
 
-def _section(section: Section, state: AppState, scene: Scene, layout: Layout) -> list[Action]:
+def _section(section: Section, state: AppState, scene: Scene) -> list[Action]:
     """Build a section's heading, and its content if it is open. A scene of one view has no lens to set."""
     sections = state.preferences.open_sections
     if section in PARENT_SECTION and not is_seen_open(PARENT_SECTION[section], sections):
@@ -194,41 +186,47 @@ def _section(section: Section, state: AppState, scene: Scene, layout: Layout) ->
     if section in ("focus", "aperture", "view") and not aperture_limit(scene.grid):
         return []
     is_open = section in sections
-    is_toggled = heading(section.capitalize(), is_open, layout)
+    is_toggled = heading(section.capitalize(), is_open)
     toggled: list[Action] = [do(preferences.toggle_section, section)] if is_toggled else []
-    return toggled + (BUILDERS[section](state, scene, layout) if is_open else [])
+    return toggled + (BUILDERS[section](state, scene) if is_open else [])
 
 
-def _more(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
+def _more(state: AppState, scene: Scene) -> list[Action]:
     """Build what stands before the sections under "More": tools and recent files."""
-    return _tools(MORE_TOOLS, state, layout) + _recent(state, layout)
+    return _tools(MORE_TOOLS, state) + _recent(state)
 
 
-def is_final(state: AppState) -> bool:
-    """Return whether no further view can change the picture."""
-    is_shown = state.shown_generation == state.generation and state.free_progress is None
-    return is_shown and state.progress.is_complete
-
-
-def _figures(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
-    """Build how the views are made and drawn, and what else is known of the scene."""
+def _scene(state: AppState, scene: Scene) -> list[Action]:
+    """Build how the views are made and drawn, facts of the file, the plan with its reasons, and notes."""
     quiet(size_text(scene))
     quiet(progress_text(state.progress) or "No views asked for.")
     quiet("" if state.report is None else report_text(state.report, is_final(state)))
-    scene_section(state, scene, layout)
+    gap()
+    facts = state.facts.facts if state.facts.path == scene.source.path else ()
+    width, height = scene.own_size or scene.size
+    shown = "" if (width, height) == scene.size else f", shown at {scene.width} x {scene.height}"
+    size = ("Size", f"{width} x {height}{shown}")
+    for what, value in (*facts, size, ("Colours", scene.color_space.name), ("Depth", scene.depth_source)):
+        label(what)
+        quiet(value)
+    gap()
+    for reason in scene.plan.reasons if scene.plan else ("A light field from disk: its views are shown as they are.",):
+        quiet(reason)
+    for note in scene.notes:
+        quiet(note)
     return []
 
 
-BUILDERS: dict[Section, Callable[[AppState, Scene, Layout], list[Action]]] = {
+BUILDERS: dict[Section, Callable[[AppState, Scene], list[Action]]] = {
     "more": _more,
-    "view": view_section,
-    "focus": focus_section,
-    "aperture": aperture_section,
-    "light": light_section,
-    "gloss": gloss_section,
-    "depth": depth_section,
-    "advanced": lambda state, scene, layout: [],
-    "inspect": inspect_section,
-    "scene": _figures,
+    "view": view_section.view_section,
+    "focus": lens_section.focus_section,
+    "aperture": lens_section.aperture_section,
+    "light": lens_section.light_section,
+    "gloss": gloss_section.gloss_section,
+    "depth": depth_section.depth_section,
+    "advanced": lambda state, scene: [],
+    "inspect": inspect.inspect_section,
+    "scene": _scene,
 }
 """Functions that build what each section shows before the sections in it."""

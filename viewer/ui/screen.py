@@ -14,11 +14,11 @@ from viewer.model.state.app_state import AppState
 from viewer.model.state.folder import Thumbnail
 from viewer.ui.overlays.chips import chips, panel_handle
 from viewer.ui.overlays.filmstrip import filmstrip
-from viewer.ui.overlays.inspection_overlay import draw_beside_picture, draw_over_picture
+from viewer.ui.overlays.inspection_overlay import draw_inspection
 from viewer.ui.overlays.minimap import draw_minimap
 from viewer.ui.overlays.notice_corner import notices
 from viewer.ui.overlays.prompt_overlay import prompts
-from viewer.ui.overlays.reticle import overlays
+from viewer.ui.overlays.reticle import draw_marks
 from viewer.ui.overlays.welcome import welcome
 from viewer.ui.panel import panel
 from viewer.ui.style import pack_color, palette_of
@@ -39,12 +39,12 @@ def build_screen(
     window, palette = layout.window, palette_of(state.preferences.theme)
     corner = imgui.ImVec2(window.width, window.height)
     imgui.get_background_draw_list().add_rect_filled(imgui.ImVec2(0, 0), corner, pack_color(palette.background))
-    if picture_texture is not None and layout.picture is not None:
+    scene, picture, frame = state.scene, layout.picture, layout.frame
+    if picture_texture is not None and scene is not None and picture is not None and frame is not None:
         _picture(layout, picture_texture)
-        draw_over_picture(state, layout, textures)
-        draw_beside_picture(state, layout, textures)
+        draw_inspection(state, scene, layout, textures)
         if not state.inspection.shows_views:
-            overlays(state, layout)
+            draw_marks(state, scene, layout, picture, frame)
             if textures.minimap is not None:
                 draw_minimap(layout, textures.minimap)
     actions = filmstrip(state, layout, thumbnails)

@@ -13,6 +13,8 @@ from viewer.model.layout import BACKGROUND
 from viewer.model.state.preferences import Theme
 
 FONT_SIZE = 16.0
+WORDS_ROOM = 5.0
+"""Margin of words over the picture, in window units at usual size."""
 Color = tuple[float, float, float, float]
 
 
@@ -84,6 +86,15 @@ def corners(rect: Rect) -> tuple[imgui.ImVec2, imgui.ImVec2]:
     return imgui.ImVec2(rect.x, rect.y), imgui.ImVec2(rect.x + rect.width, rect.y + rect.height)
 
 
+def draw_words(words: str, x: float, y: float, scale: float, align: float = 0.0) -> None:
+    """Draw words on a dark ground, legible over any photo. align: 0 begins at x, 1 ends there."""
+    draw, size, room = imgui.get_background_draw_list(), imgui.calc_text_size(words), WORDS_ROOM * scale
+    left = x - align * (size.x + 2 * room)
+    far = imgui.ImVec2(left + size.x + 2 * room, y + size.y + room)
+    draw.add_rect_filled(imgui.ImVec2(left, y), far, pack_color(DARK.background, 0.72), 4 * scale)
+    draw.add_text(imgui.ImVec2(left + room, y + room / 2), pack_color(DARK.text), words)
+
+
 def load_fonts() -> None:
     """Load the fonts of text and icons; ImGui's bitmap font stays if the bundle lacks them."""
     folder = Path(imgui_bundle.__file__).parent / "assets" / "fonts"
@@ -129,8 +140,8 @@ def _colors(palette: Palette) -> dict[int, Color]:
         c.frame_bg_hovered: palette.frame_hovered,
         c.frame_bg_active: palette.frame_hovered,
         c.check_mark: palette.accent,
-        c.slider_grab: clear,  # `widgets.slider` draws a grip below the value
-        c.slider_grab_active: clear,
+        c.slider_grab: palette.accent_dim,
+        c.slider_grab_active: palette.accent_dim,
         c.plot_histogram: palette.accent,
         c.button: palette.frame,
         c.button_hovered: palette.frame_hovered,

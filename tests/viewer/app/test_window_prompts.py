@@ -88,7 +88,8 @@ def test_tooltips_of_a_prompt_leave_it_to_be_seen(viewer: Driver, scale: float) 
     viewer.until_idle()
     tip, prompt = (imgui.internal.find_window_by_name(name) for name in ("##Tooltip_00", "prompt ExportPrompt"))
     assert tip.active
-    assert tip.pos.y >= prompt.pos.y + prompt.size.y or tip.pos.y + tip.size.y <= prompt.pos.y
+    is_beside = tip.pos.x + tip.size.x <= prompt.pos.x
+    assert is_beside or tip.pos.y >= prompt.pos.y + prompt.size.y or tip.pos.y + tip.size.y <= prompt.pos.y
     assert 0 <= tip.pos.x <= viewer.app.layout().window.width - tip.size.x
 
 

@@ -19,13 +19,12 @@ from viewer.model.action import do
 from viewer.model.commands import BY_NAME
 from viewer.model.state.app_state import AppState
 from viewer.model.state.preferences import PARENT_SECTION, SECTIONS, Preferences, Section, is_seen_open, with_sections
-from viewer.ui.sections.essentials import MOVE_TIPS, PRESET_TIPS
 
 WINDOW = ScreenSize(1280, 800)
 MAX_CONTROLS = 17
 CONTROLS = (
     "button", "small_button", "invisible_button", "checkbox", "radio_button", "slider_float", "slider_int",
-    "begin_combo", "selectable", "input_int", "input_float", "input_text_with_hint", "color_edit3",
+    "begin_combo", "selectable", "tree_node_ex", "input_int", "input_float", "input_text_with_hint", "color_edit3",
 )  # fmt: skip
 
 
@@ -104,11 +103,6 @@ def test_what_is_open_within_a_closed_section_opens_again_with_it() -> None:
     closed = reduce(state, do(preferences.toggle_section, "more"))
     assert not is_seen_open("depth", closed.preferences.open_sections)
     assert reduce(closed, do(preferences.toggle_section, "more")) == state
-
-
-def test_each_preset_and_each_motion_says_what_it_does() -> None:
-    for tips in (PRESET_TIPS, MOVE_TIPS):
-        assert len(set(tips.values())) == len(tips)
 
 
 def test_in_a_narrow_window_the_panel_folds_away_and_comes_back_when_asked_for(

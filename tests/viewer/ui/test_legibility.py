@@ -27,14 +27,23 @@ from viewer.model.state.jobs import JobProgress
 from viewer.model.state.preferences import SECTIONS, Theme, Units
 from viewer.model.state.prompts import ExportPrompt, PalettePrompt, PathPrompt, Prompt, SavePrompt
 from viewer.ui.style import Color, Look, apply_style, palette_of
-from viewer.ui.widgets import GRIP_HEIGHT
 
 WINDOW = ScreenSize(1280, 800)
 LEAST_CONTRAST = 4.5
 LEAST_HOVER_CONTRAST = 1.5
 SCALES = (0.6, 0.8, 1.0, 1.33, 2.0)
 SLACK_PX = 1.0
-WIDGETS = ("text", "text_disabled", "button", "small_button", "checkbox", "slider_float", "slider_int", "begin_combo")
+WIDGETS = (
+    "text",
+    "text_disabled",
+    "button",
+    "small_button",
+    "checkbox",
+    "slider_float",
+    "slider_int",
+    "begin_combo",
+    "tree_node_ex",
+)
 WORDS_INSIDE = ("button", "small_button", "slider_float", "slider_int", "begin_combo")
 
 
@@ -105,16 +114,6 @@ def test_no_widget_is_cut_and_none_lies_over_another(
         across = min(one.right, other.right) - max(one.left, other.left)
         down = min(one.bottom, other.bottom) - max(one.top, other.top)
         assert min(across, down) <= SLACK_PX, f"{one} lies over {other}"
-
-
-@pytest.mark.parametrize("scale", SCALES)
-def test_the_grip_of_a_slider_lies_below_its_value(viewer: OffscreenScene, items: list[Item], scale: float) -> None:
-    viewer.do(do(preferences.set_font_scale, scale))
-    viewer.screen(ScreenSize(round(120 + PANEL_WIDTH * scale), 2600))
-    line = min(item.bottom - item.top for item in items if item.kind == "text")
-    sliders = [item.bottom - item.top for item in items if item.kind == "slider_float"]
-    assert sliders
-    assert (min(sliders) - line) / 2 >= GRIP_HEIGHT * scale - SLACK_PX / 2
 
 
 PROMPTS: dict[str, Prompt] = {

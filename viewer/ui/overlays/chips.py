@@ -60,7 +60,7 @@ def panel_handle(state: AppState, layout: Layout) -> list[Action]:
     icon = icons.ICON_FA_CHEVRON_LEFT if state.is_panel_hidden else icons.ICON_FA_CHEVRON_RIGHT
     width, height = (side * layout.ui_scale for side in HANDLE_SIZE)
     pressed = imgui.button(f"{icon}###panel", imgui.ImVec2(width, height))
-    tooltip("Show the panel (Tab)" if state.is_panel_hidden else "Hide the panel (Tab)", layout)
+    tooltip("Show the panel (Tab)" if state.is_panel_hidden else "Hide the panel (Tab)")
     imgui.end()
     imgui.pop_style_var()
     return [do(window.toggle_panel)] if pressed else []
@@ -79,7 +79,7 @@ def _chip(name: str, words: str, layout: Layout, tip: str = "", is_right: bool =
         imgui.push_style_color(which, imgui.ImVec4(*color))
     pressed = imgui.button(words)
     imgui.pop_style_color(3)
-    tooltip(tip, layout)
+    tooltip(tip)
     imgui.end()
     imgui.pop_style_var()
     return bool(pressed)

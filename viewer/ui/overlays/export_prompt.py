@@ -4,40 +4,26 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
 from imgui_bundle import imgui
 
-from iibr_core.exports.kinds import (
-    ANIMATIONS,
-    DEPTH_LAYOUTS,
-    EXPORTS,
-    MAX_FRAMES,
-    PURPOSES,
-    RATE_LIMITS,
-    STACK_BITS,
-    AnimationKind,
-    ExportKind,
-    ExportOptions,
-    Purpose,
-    picture_aspect,
-    size_of_width,
-    with_defaults,
-)
+from iibr_core.beyond.optics import Optics
+from iibr_core.exports import kinds
+from iibr_core.exports.kinds import EXPORTS, AnimationKind, ExportKind, ExportOptions, Purpose
 from iibr_core.formats.quilts import DEVICES
 from iibr_core.scenes.lens_limits import clamp
 from iibr_core.scenes.scene import Scene
 from iibr_core.types import InputError
 from viewer.model import messages, saving
 from viewer.model.action import Action, do
-from viewer.model.layout import Layout
 from viewer.model.state.app_state import AppState
 from viewer.model.state.preferences import is_seen_open
 from viewer.model.state.prompts import ExportPrompt
 from viewer.model.state.tasks import ExportTask
 from viewer.ui.overlays.prompt_rows import choice_row, place_actions, place_row, size_row, text_field
-from viewer.ui.widgets import checkbox, choice, gap, in_row, label, quiet, slider, whole_slider
+from viewer.ui.widgets import checkbox, choices, gap, label, quiet, slider
 
 ADVANCED_ROWS = ("keys",)
 """Rows that are shown once the panel's advanced section was opened."""
@@ -59,21 +45,19 @@ MOTION_TIPS: dict[AnimationKind, str] = {
 
 
 @dataclass(frozen=True)
-class _Shown:
-    """Data for the rows. options: with the defaults of the kind. aspect: width / height of each picture."""
+class _Export:
+    """Data for the rows."""
 
     kind: ExportKind
     scene: Scene
-    options: ExportOptions
-    aspect: float
-    layout: Layout
+    optics: Optics
 
 
-Row = Callable[[ExportOptions, _Shown], ExportOptions]
+Row = Callable[[ExportOptions, _Export], ExportOptions]
 """Function that draws a row and returns the options as the user changed them."""
 
 
-def export_prompt(prompt: ExportPrompt, state: AppState, layout: Layout) -> list[Action]:
+def export_prompt(prompt: ExportPrompt, state: AppState) -> list[Action]:
     """Draw the prompt; return the actions of the user."""
     assert state.scene is not None
     imgui.text("Share or export")
@@ -81,50 +65,49 @@ def export_prompt(prompt: ExportPrompt, state: AppState, layout: Layout) -> list
         imgui.same_line()
         if imgui.small_button("Exports…"):
             return [do(messages.show_prompt, "exports")]
-    gap(layout, 2)
-    purpose = _purpose_row(EXPORTS[prompt.kind].purpose, layout)
-    label("As", layout)
-    chosen = prompt.kind if purpose == EXPORTS[prompt.kind].purpose else saving.first_kind(purpose)
-    chosen = choice_row("kind", chosen, _entries(purpose), layout)
+    gap()
+    chosen = _kind_rows(prompt.kind)
     if chosen == PICTURE:
         return [do(saving.ask_to_save)]
     if chosen != prompt.kind:
         return [do(messages.show_prompt, saving.as_other_kind(state, prompt, chosen))]
-    kind, options, sections = EXPORTS[chosen], prompt.options, state.preferences.open_sections
-    filled = with_defaults(kind, options, state.scene, state.optics)
-    aspect = picture_aspect(kind, filled.eyes, state.scene, state.optics)
-    shown = _Shown(kind, state.scene, filled, aspect, layout)
-    for name, row in ROWS.items():
-        if name in kind.supports and (name not in ADVANCED_ROWS or is_seen_open("advanced", sections)):
-            options = row(options, shown)
+    kind, scene = EXPORTS[chosen], state.scene
+    is_advanced = is_seen_open("advanced", state.preferences.open_sections)
+    edited = replace(prompt, options=_option_rows(prompt.options, _Export(kind, scene, state.optics), is_advanced))
     if kind.is_light_field:
-        _say_views(state.scene, layout)
-    row_of_path = place_row("File" if kind.endings else "Folder", prompt.path, state, layout)
-    edited = replace(prompt, options=options)
-    written = _written_name(kind, edited, state.scene)
+        label("Views", "Set the number of views with `iibr generate PHOTO --grid`.")
+        imgui.text(f"{scene.grid.rows} x {scene.grid.columns} of {scene.width} x {scene.height} pixels")
+    row_of_path = place_row("File" if kind.endings else "Folder", prompt.path, state)
+    written = _written_name(kind, edited, scene)
     if written and written != Path(prompt.path.strip()).name:
         quiet(f"The file name becomes {written}{', for programs that read it.' if kind.path else '.'}")
-    return place_actions(prompt, edited, row_of_path, ExportTask, "Export", state, layout, written)
+    return place_actions(prompt, edited, row_of_path, ExportTask, "Export", state, written)
 
 
-def _purpose_row(chosen: Purpose, layout: Layout) -> Purpose:
-    """Draw one button per purpose; return the chosen one."""
-    label("For", layout)
-    pressed = chosen
-    for (purpose, words), width in in_row(tuple(PURPOSES.items()), layout):
-        if choice(words, purpose == chosen, layout, (width, 0), PURPOSE_TIPS[purpose]):
-            pressed = purpose
-    return pressed
-
-
-def _entries(purpose: Purpose) -> dict[str, tuple[str, str]]:
-    """Return the kinds for a purpose, and among those to share the picture, which has another prompt."""
-    kinds = {name: (kind.words, _files_of(kind)) for name, kind in saving.kinds_for(purpose).items()}
-    return kinds | ({PICTURE: PICTURE_ENTRY} if purpose == "share" else {})
+def _kind_rows(kind: str) -> str:
+    """Draw one button per purpose, and the list of its kinds; return the chosen kind, or PICTURE for its own prompt."""
+    label("For")
+    usual = EXPORTS[kind].purpose
+    purposes = {purpose: (words, PURPOSE_TIPS[purpose]) for purpose, words in kinds.PURPOSES.items()}
+    purpose = choices(purposes, [usual]) or usual
+    entries = {name: (kind.words, _files_of(kind)) for name, kind in saving.kinds_for(purpose).items()}
+    entries |= {PICTURE: PICTURE_ENTRY} if purpose == "share" else {}
+    label("As")
+    return choice_row("kind", kind if purpose == usual else saving.first_kind(purpose), entries)
 
 
 def _files_of(kind: ExportKind) -> str:
     return f"One file: {', '.join(kind.endings)}" if kind.endings else "A folder of files."
+
+
+def _option_rows(options: ExportOptions, export: _Export, is_advanced: bool) -> ExportOptions:
+    """Draw the rows of the kind; return the options. An option that was not changed keeps following its default."""
+    filled = edited = kinds.with_defaults(export.kind, options, export.scene, export.optics)
+    for name, row in ROWS.items():
+        if name in export.kind.supports and (is_advanced or name not in ADVANCED_ROWS):
+            edited = row(edited, export)
+    values = {field.name: getattr(edited, field.name) for field in fields(edited)}
+    return replace(options, **{name: value for name, value in values.items() if value != getattr(filled, name)})
 
 
 def _written_name(kind: ExportKind, prompt: ExportPrompt, scene: Scene) -> str:
@@ -135,119 +118,109 @@ def _written_name(kind: ExportKind, prompt: ExportPrompt, scene: Scene) -> str:
         return ""
 
 
-def _say_views(scene: Scene, layout: Layout) -> None:
-    label("Views", layout, "Set the number of views with `iibr generate PHOTO --grid`.")
-    imgui.text(f"{scene.grid.rows} x {scene.grid.columns} of {scene.width} x {scene.height} pixels")
-
-
-def _device(options: ExportOptions, shown: _Shown) -> ExportOptions:
-    label("Made for", shown.layout, "The display. For any display, the pictures keep the photo's shape.")
-    chosen = shown.options.device or ANY_DISPLAY
+def _device(options: ExportOptions, export: _Export) -> ExportOptions:
+    label("Made for", "The display. For any display, the pictures keep the photo's shape.")
     entries = {ANY_DISPLAY: (ANY_DISPLAY, "The photo's shape.")}
     for name, quilt in DEVICES.items():
         size = f"{quilt.size.width} x {quilt.size.height} pixels"
         entries[name] = (name, f"{quilt.columns} x {quilt.rows} views in a picture of {size}.")
-    device = choice_row("device", chosen, entries, shown.layout)
+    device = choice_row("device", options.device or ANY_DISPLAY, entries)
     return replace(options, device=None if device == ANY_DISPLAY else device)
 
 
-def _motion(options: ExportOptions, shown: _Shown) -> ExportOptions:
-    label("Motion", shown.layout, "What moves. The end meets the beginning, so it can loop.")
-    entries = {name: (name.capitalize(), MOTION_TIPS[name]) for name in ANIMATIONS}
-    motion = choice_row("motion", shown.options.motion, entries, shown.layout)
-    return options if motion == shown.options.motion else replace(options, motion=motion)
+def _motion(options: ExportOptions, export: _Export) -> ExportOptions:
+    label("Motion", "What moves. The end meets the beginning, so it can loop.")
+    entries = {name: (name.capitalize(), MOTION_TIPS[name]) for name in kinds.ANIMATIONS}
+    return replace(options, motion=choice_row("motion", options.motion, entries))
 
 
-def _keys(options: ExportOptions, shown: _Shown) -> ExportOptions:
-    label("Camera path", shown.layout, "A text file with a line for each place: s t, s t focus, or s t focus aperture.")
+def _keys(options: ExportOptions, export: _Export) -> ExportOptions:
+    label("Camera path", "A text file with a line for each place: s t, s t focus, or s t focus aperture.")
     text, _ = text_field("keys", str(options.keys or ""), "a text file, instead of the motion above")
     return replace(options, keys=Path(text) if text.strip() else None)
 
 
-def _eyes(options: ExportOptions, shown: _Shown) -> ExportOptions:
-    limits = 0.0, float(max(shown.scene.grid.columns - 1, 1))
+def _eyes(options: ExportOptions, export: _Export) -> ExportOptions:
+    limits = 0.0, float(max(export.scene.grid.columns - 1, 1))
     tip = "Distance between the eyes, in views. More looks deeper. What is in focus lies on the screen."
-    eyes = slider("3D strength", shown.options.eyes, limits, "%.1f", shown.layout, tip)
-    return options if eyes is None else replace(options, eyes=eyes)
+    return replace(options, eyes=slider("3D strength", options.eyes, limits, "%.1f", tip))
 
 
-def _row(options: ExportOptions, shown: _Shown) -> ExportOptions:
-    tip = "Row of the picture, counted from the top."
-    row = whole_slider("Row", shown.options.row, (0, shown.scene.height - 1), shown.layout, tip)
-    return options if row is None else replace(options, row=row)
+def _row(options: ExportOptions, export: _Export) -> ExportOptions:
+    limits = 0, export.scene.height - 1
+    return replace(
+        options, row=round(slider("Row", options.row, limits, "%.0f", "Row of the picture, counted from the top."))
+    )
 
 
-def _size(options: ExportOptions, shown: _Shown) -> ExportOptions:
-    width = size_row(shown.options.size, shown.layout)
-    return options if width is None else replace(options, size=size_of_width(shown.kind, shown.aspect, width))
+def _size(options: ExportOptions, export: _Export) -> ExportOptions:
+    width = size_row(options.size)
+    aspect = kinds.picture_aspect(export.kind, options.eyes, export.scene, export.optics)
+    return options if width is None else replace(options, size=kinds.size_of_width(export.kind, aspect, width))
 
 
-def _frames(options: ExportOptions, shown: _Shown) -> ExportOptions:
+def _frames(options: ExportOptions, export: _Export) -> ExportOptions:
     """Draw the number of pictures, or the length of an animation in seconds."""
-    if shown.kind.rate:
-        label("Length", shown.layout, "Time until it begins again.")
-        form = "%.4g s"
-        changed, seconds = imgui.input_float("##seconds", shown.options.frames / shown.options.rate, 0, 0, form)
-        return replace(options, frames=_frames_in(seconds, shown.options.rate)) if changed else options
-    label("Pictures", shown.layout, "Number of pictures from near to far.")
-    changed, frames = imgui.input_int("##frames", shown.options.frames, 0, 0)
-    return replace(options, frames=min(max(frames, 1), MAX_FRAMES)) if changed else options
+    if export.kind.rate:
+        label("Length", "Time until it begins again.")
+        changed, seconds = imgui.input_float("##seconds", options.frames / options.rate, 0, 0, "%.4g s")
+        return replace(options, frames=_frames_in(seconds, options.rate)) if changed else options
+    label("Pictures", "Number of pictures from near to far.")
+    changed, frames = imgui.input_int("##frames", options.frames, 0, 0)
+    return replace(options, frames=min(max(frames, 1), kinds.MAX_FRAMES)) if changed else options
 
 
-def _rate(options: ExportOptions, shown: _Shown) -> ExportOptions:
+def _rate(options: ExportOptions, export: _Export) -> ExportOptions:
     """Draw the frame rate. A higher rate keeps the length and raises the number of frames."""
-    label("Frame rate", shown.layout, f"Frames per second; {shown.options.frames} frames in all.")
-    changed, rate = imgui.input_float("##rate", shown.options.rate, 0, 0, "%.4g fps")
-    if not changed:
+    label("Frame rate", f"Frames per second; {options.frames} frames in all.")
+    changed, rate = imgui.input_float("##rate", options.rate, 0, 0, "%.4g fps")
+    if not changed or not math.isfinite(rate):
         return options
-    rate = clamp(rate, *RATE_LIMITS) if math.isfinite(rate) else shown.options.rate
-    frames = _frames_in(shown.options.frames / shown.options.rate, rate)
-    return replace(options, rate=rate, frames=frames if options.frames else 0)
+    rate = clamp(rate, *kinds.RATE_LIMITS)
+    return replace(options, rate=rate, frames=_frames_in(options.frames / options.rate, rate))
 
 
 def _frames_in(seconds: float, rate: float) -> int:
     """Return the number of frames, at least two so that something moves."""
-    return round(clamp(seconds * rate if math.isfinite(seconds) else 0.0, 2, MAX_FRAMES))
+    return round(clamp(seconds * rate if math.isfinite(seconds) else 0.0, 2, kinds.MAX_FRAMES))
 
 
-def _layout(options: ExportOptions, shown: _Shown) -> ExportOptions:
-    label("Depth", shown.layout, "Place of the depth beside the picture.")
-    layout = choice_row("layout", options.layout, {n: (n.capitalize(), "") for n in DEPTH_LAYOUTS}, shown.layout)
-    return options if layout == options.layout else replace(options, layout=layout)
+def _layout(options: ExportOptions, export: _Export) -> ExportOptions:
+    label("Depth", "Place of the depth beside the picture.")
+    return replace(
+        options, layout=choice_row("layout", options.layout, {n: (n.capitalize(), "") for n in kinds.DEPTH_LAYOUTS})
+    )
 
 
-def _bits(options: ExportOptions, shown: _Shown) -> ExportOptions:
-    label("Bits", shown.layout, "Bits per colour channel. 16 keep fine gradients for editing.")
-    bits = choice_row("bits", str(options.bits), {str(bits): (f"{bits} bits", "") for bits in STACK_BITS}, shown.layout)
-    return options if bits == str(options.bits) else replace(options, bits=int(bits))
+def _bits(options: ExportOptions, export: _Export) -> ExportOptions:
+    label("Bits", "Bits per colour channel. 16 keep fine gradients for editing.")
+    entries = {str(bits): (f"{bits} bits", "") for bits in kinds.STACK_BITS}
+    return replace(options, bits=int(choice_row("bits", str(options.bits), entries)))
 
 
-def _show(options: ExportOptions, shown: _Shown) -> ExportOptions:
-    label("Display", shown.layout)
+def _show(options: ExportOptions, export: _Export) -> ExportOptions:
+    label("Display")
     tip = "Needs Looking Glass Bridge, the display's program."
-    show = checkbox("show it there when it is written", options.show, shown.layout, tip)
-    return options if show is None else replace(options, show=show)
+    return replace(options, show=checkbox("show it there when it is written", options.show, tip))
 
 
-def _budget(options: ExportOptions, shown: _Shown) -> ExportOptions:
-    label("Size limit", shown.layout, "Largest file size. Pictures lose detail or views are left out. 0 for no limit.")
+def _budget(options: ExportOptions, export: _Export) -> ExportOptions:
+    label("Size limit", "Largest file size. Pictures lose detail or views are left out. 0 for no limit.")
     form = "%.4g MB" if options.budget else "none"
     changed, megabytes = imgui.input_float("##budget", (options.budget or 0) / 1e6, 0, 0, form)
     return replace(options, budget=int(clamp(megabytes, 0, 1000) * 1e6) or None) if changed else options
 
 
-def _credit(options: ExportOptions, shown: _Shown) -> ExportOptions:
-    label("Metadata", shown.layout)
+def _credit(options: ExportOptions, export: _Export) -> ExportOptions:
+    label("Metadata")
     tip = "As the photo's file states them. The location is left out."
-    credit = checkbox("title, author, copyright", options.credit, shown.layout, tip)
-    return options if credit is None else replace(options, credit=credit)
+    return replace(options, credit=checkbox("title, author, copyright", options.credit, tip))
 
 
-def _stills(options: ExportOptions, shown: _Shown) -> ExportOptions:
-    label("Safari", shown.layout)
+def _stills(options: ExportOptions, export: _Export) -> ExportOptions:
+    label("Safari")
     tip = "Stores each view as a picture of its own, which Safari needs. The file is several times as large."
-    stills = checkbox("all views in Safari, too", options.stills, shown.layout, tip)
-    return options if stills is None else replace(options, stills=stills)
+    return replace(options, stills=checkbox("all views in Safari, too", options.stills, tip))
 
 
 ROWS: dict[str, Row] = {

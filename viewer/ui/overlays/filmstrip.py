@@ -104,5 +104,5 @@ def _photo(cell: Rect, name: str, thumbnail: Thumbnail | None, is_open: bool, st
     if is_open or is_hovered:
         color = pack_color(palette.accent if is_open else palette.quiet)
         draw.add_rect(corner, far, color, 3 * scale, (3 if is_open else 1.5) * scale)
-    tooltip(name, layout)
+    tooltip(name)
     return bool(is_pressed)

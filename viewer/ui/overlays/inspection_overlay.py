@@ -2,54 +2,45 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 from imgui_bundle import imgui
 
+from iibr_core.scenes.lens_limits import clamp
 from iibr_core.scenes.rect import Rect
 from iibr_core.scenes.scene import Scene
-from iibr_core.types import ViewOffset
 from viewer.model.colormap import VIRIDIS, map_color
 from viewer.model.inspection import InspectionTextures, sheet_cells, view_near
 from viewer.model.layout import Layout
 from viewer.model.state.app_state import AppState, Hover
-from viewer.model.state.inspection import Comparison, Probe
+from viewer.model.state.inspection import Probe
 from viewer.model.units import metres, metres_text
 from viewer.ui.overlays.chips import has_guess_badge
 from viewer.ui.overlays.reticle import WORD_GAP, hover_text
-from viewer.ui.style import DARK, Color, corners, pack_color, palette_of
+from viewer.ui.style import DARK, Color, corners, draw_words, pack_color, palette_of
 
 LEGEND_WIDTH, LEGEND_HEIGHT = 150.0, 10.0
-SIDES: dict[Comparison, tuple[str, str]] = {
-    "photo": ("photo", "picture"),
-    "snapshot": ("snapshot", "picture"),
-}
 BLACK: Color = (0.0, 0.0, 0.0, 1.0)
 
 
-def draw_over_picture(state: AppState, layout: Layout, textures: InspectionTextures) -> None:
-    """Draw overlay, comparison and sheet over the picture. Colours do not follow the theme: below is a photo."""
-    scene, frame = state.scene, layout.frame
-    if scene is None or frame is None:
+def draw_inspection(state: AppState, scene: Scene, layout: Layout, textures: InspectionTextures) -> None:
+    """Draw overlay, comparison and sheet over the picture, in colours of no theme, and EPIs and status beside it."""
+    picture, frame, scale = layout.picture, layout.frame, layout.ui_scale
+    if picture is None or frame is None:
         return
     if textures.overlay is not None:
         _image(textures.overlay, frame)
         _draw_legend(state, scene, layout, frame)
     if state.shows_before:
-        _words("before", frame.x + 8 * layout.ui_scale, frame.y + 8 * layout.ui_scale, layout.ui_scale)
+        draw_words("before", frame.x + 8 * scale, frame.y + 8 * scale, scale)
     if textures.compared is not None:
-        _draw_comparison(state, layout, frame, textures.compared)
+        _draw_comparison(state, scale, picture, frame, textures.compared)
     if textures.sheet is not None:
-        _draw_sheet(state, scene, layout, frame, textures.sheet)
-
-
-def draw_beside_picture(state: AppState, layout: Layout, textures: InspectionTextures) -> None:
-    """Draw EPIs and status line."""
-    scene, picture = state.scene, layout.picture
-    if scene is None or picture is None:
-        return
+        _draw_sheet(state, scene, scale, frame, textures.sheet)
     if layout.strip_across is not None and layout.strip_down is not None:
-        _draw_strips(state, scene, layout, picture, textures)
+        _draw_strips(state, scene, layout, layout.strip_across, layout.strip_down, textures)
     if layout.status is not None:
-        _draw_status(state, scene, layout, layout.status)
+        _draw_status(state, scene, scale, layout.status)
 
 
 def status_text(state: AppState, scene: Scene, hover: Hover, probe: Probe | None) -> list[str]:
@@ -72,47 +63,32 @@ def _line(x0: float, y0: float, x1: float, y1: float, color: int, width: float) 
     draw.add_line(*ends, color, width)
 
 
-def _words(words: str, x: float, y: float, scale: float, align: float = 0.0) -> None:
-    """Draw words on a dark ground. align: 0 begins at x, 1 ends there."""
-    draw, size, room = imgui.get_background_draw_list(), imgui.calc_text_size(words), 5 * scale
-    left = x - align * (size.x + 2 * room)
-    corners = imgui.ImVec2(left, y), imgui.ImVec2(left + size.x + 2 * room, y + size.y + room)
-    draw.add_rect_filled(*corners, pack_color(DARK.background, 0.72), 4 * scale)
-    draw.add_text(imgui.ImVec2(left + room, y + room / 2), pack_color(DARK.text), words)
-
-
 def _draw_legend(state: AppState, scene: Scene, layout: Layout, frame: Rect) -> None:
-    """Draw the colors with their values, and a mark for the value under the pointer."""
-    kind, scale = state.inspection.overlay, layout.ui_scale
+    """Draw the colours with their values, and a mark for the value under the pointer."""
+    kind, scale, hover = state.inspection.overlay, layout.ui_scale, state.hover
     x, y, room = frame.x + 8 * scale, frame.y + 8 * scale, 5 * scale
     if has_guess_badge(state, layout):
         y += imgui.get_frame_height() + 8 * scale
     if kind == "inpainted" or state.selection is not None:
-        _words("inpainting" if state.selection is None else "selected surface", x, y, scale)
+        draw_words("inpainting" if state.selection is None else "selected surface", x, y, scale)
         return
     draw, line = imgui.get_background_draw_list(), imgui.get_text_line_height()
-    width, height = LEGEND_WIDTH * scale, LEGEND_HEIGHT * scale
-    ends = scene.disparity_range_px if kind == "disparity" else (0.0, 1.0)
-    name, labels = legend_words(state, scene, ends)
-    far = imgui.ImVec2(x + width + 2 * room, y + height + line + 2.5 * room)
-    draw.add_rect_filled(imgui.ImVec2(x, y), far, pack_color(DARK.background, 0.72), 4 * scale)
-    left, top = x + room, y + room
-    step = width / (len(VIRIDIS) - 1)
-    for i in range(len(VIRIDIS) - 1):
-        low, high = (pack_color((*map_color(j / (len(VIRIDIS) - 1)), 1.0)) for j in (i, i + 1))
-        corner, end = imgui.ImVec2(left + i * step, top), imgui.ImVec2(left + (i + 1) * step, top + height)
-        draw.add_rect_filled_multi_color(corner, end, low, high, high, low)
-    below = top + height + room / 2
-    draw.add_text(imgui.ImVec2(left, below), pack_color(DARK.text), labels[0])
-    draw.add_text(
-        imgui.ImVec2(left + width - imgui.calc_text_size(labels[1]).x, below), pack_color(DARK.text), labels[1]
-    )
-    middle = left + (width - imgui.calc_text_size(name).x) / 2
-    draw.add_text(imgui.ImVec2(middle, below), pack_color(DARK.quiet), name)
-    if kind == "disparity" and state.hover is not None and state.hover.disparity is not None and ends[1] > ends[0]:
-        share = min(max((state.hover.disparity - ends[0]) / (ends[1] - ends[0]), 0.0), 1.0)
-        at = left + share * width
-        _line(at, top - 2 * scale, at, top + height + 2 * scale, pack_color(DARK.text), 1.5 * scale)
+    bar = Rect(x + room, y + room, LEGEND_WIDTH * scale, LEGEND_HEIGHT * scale)
+    low, high = scene.disparity_range_px if kind == "disparity" else (0.0, 1.0)
+    ground = Rect(x, y, bar.width + 2 * room, bar.height + line + 2.5 * room)
+    draw.add_rect_filled(*corners(ground), pack_color(DARK.background, 0.72), 4 * scale)
+    steps = len(VIRIDIS) - 1
+    colors = [pack_color((*map_color(i / steps), 1.0)) for i in range(steps + 1)]
+    for i, (left, right) in enumerate(pairwise(colors)):
+        cell = Rect(bar.x + i * bar.width / steps, bar.y, bar.width / steps, bar.height)
+        draw.add_rect_filled_multi_color(*corners(cell), left, right, right, left)
+    name, labels = legend_words(state, scene, (low, high))
+    for words, align, color in ((labels[0], 0.0, DARK.text), (name, 0.5, DARK.quiet), (labels[1], 1.0, DARK.text)):
+        place = imgui.ImVec2(bar.x + align * (bar.width - imgui.calc_text_size(words).x), bar.y + bar.height + room / 2)
+        draw.add_text(place, pack_color(color), words)
+    if kind == "disparity" and hover is not None and hover.disparity is not None and high > low:
+        at = bar.x + clamp((hover.disparity - low) / (high - low), 0.0, 1.0) * bar.width
+        _line(at, bar.y - 2 * scale, at, bar.y + bar.height + 2 * scale, pack_color(DARK.text), 1.5 * scale)
 
 
 def legend_words(state: AppState, scene: Scene, ends: tuple[float, float]) -> tuple[str, list[str]]:
@@ -126,21 +102,18 @@ def legend_words(state: AppState, scene: Scene, ends: tuple[float, float]) -> tu
     return "distance", [name if m is None else metres_text(m) for name, m in zip(("far", "near"), distances)]
 
 
-def _draw_comparison(state: AppState, layout: Layout, frame: Rect, texture: int) -> None:
+def _draw_comparison(state: AppState, scale: float, picture: Rect, frame: Rect, texture: int) -> None:
     """Draw the compared image left of the divider, the divider, and the names of both sides."""
-    kind, scale, draw = state.inspection.comparison, layout.ui_scale, imgui.get_background_draw_list()
-    if kind is None or layout.picture is None:
-        return
+    kind, draw, top = state.inspection.comparison or "photo", imgui.get_background_draw_list(), frame.y + 8 * scale
     x, bottom = frame.x + state.inspection.divider * frame.width, frame.y + frame.height
     draw.push_clip_rect(imgui.ImVec2(frame.x, frame.y), imgui.ImVec2(x, bottom), True)
-    _image(texture, layout.picture if kind == "photo" else frame)
+    _image(texture, picture if kind == "photo" else frame)
     draw.pop_clip_rect()
     _line(x, frame.y, x, bottom, pack_color(DARK.text), 1.5 * scale)
     _draw_knob(x, frame.y + frame.height / 2, scale)
-    names, top = SIDES[kind], frame.y + 8 * scale
     draw.push_clip_rect(*corners(frame), True)
-    _words(names[0], x - 10 * scale, top, scale, align=1.0)
-    _words(names[1], x + 10 * scale, top, scale)
+    draw_words(kind, x - 10 * scale, top, scale, align=1.0)
+    draw_words("picture", x + 10 * scale, top, scale)
     draw.pop_clip_rect()
 
 
@@ -155,47 +128,40 @@ def _draw_knob(x: float, y: float, scale: float) -> None:
         draw.add_triangle_filled(imgui.ImVec2(tip, y), *base, pack_color(DARK.background))
 
 
-def _draw_sheet(state: AppState, scene: Scene, layout: Layout, frame: Rect, texture: int) -> None:
+def _draw_sheet(state: AppState, scene: Scene, scale: float, frame: Rect, texture: int) -> None:
     """Draw all views, with a frame around the nearest view and a finer frame around the view under the pointer."""
-    draw, scale = imgui.get_background_draw_list(), layout.ui_scale
     _image(texture, frame)
-    cells = sheet_cells(frame, scene.grid, scale)
     row, column = view_near(state.optics.eye, scene.grid)
-    mouse = imgui.get_io().mouse_pos
-    for i, cell in enumerate(cells):
+    mouse, room = imgui.get_io().mouse_pos, 1.5 * scale
+    for i, cell in enumerate(sheet_cells(frame, scene.grid, scale)):
         is_current = i == row * scene.grid.columns + column
         if is_current or cell.contains(mouse.x, mouse.y):
-            room = 1.5 * scale
-            corner = imgui.ImVec2(cell.x - room, cell.y - room)
-            far = imgui.ImVec2(cell.x + cell.width + room, cell.y + cell.height + room)
-            color = pack_color(DARK.accent if is_current else DARK.text)
-            draw.add_rect(corner, far, color, 2 * scale, 3 * scale if is_current else 1.5 * scale)
+            border = Rect(cell.x - room, cell.y - room, cell.width + 2 * room, cell.height + 2 * room)
+            color, width = pack_color(DARK.accent if is_current else DARK.text), (2 if is_current else 1) * room
+            imgui.get_background_draw_list().add_rect(*corners(border), color, 2 * scale, width)
 
 
-def _draw_strips(state: AppState, scene: Scene, layout: Layout, picture: Rect, textures: InspectionTextures) -> None:
+def _draw_strips(
+    state: AppState, scene: Scene, layout: Layout, across: Rect, down: Rect, textures: InspectionTextures
+) -> None:
     """Draw the EPIs with the place of the eye, and the pointer's column and row."""
-    across, down, scale = layout.strip_across, layout.strip_down, layout.ui_scale
-    assert across is not None
-    assert down is not None
+    draw, place = imgui.get_background_draw_list(), state.inspection.place
+    x, y = place or ((scene.width - 1) / 2, (scene.height - 1) / 2)
     for texture, rect in ((textures.strip_across, across), (textures.strip_down, down)):
         if texture is not None:
             _image(texture, rect)
-    draw = imgui.get_background_draw_list()
-    for rect in (across, down):
         draw.push_clip_rect(*corners(rect), True)
-        _draw_marks(state, scene, rect, layout, is_upright=rect is down)
+        _draw_marks(state, scene, rect, layout, (x, y), is_upright=rect is down)
         draw.pop_clip_rect()
-    x, y = state.inspection.place or ((scene.width - 1) / 2, (scene.height - 1) / 2)
-    quiet = pack_color(palette_of(state.preferences.theme).quiet)
-    text, line = imgui.ImVec2(down.x + 2 * scale, across.y + 2 * scale), imgui.get_text_line_height()
-    for i, words in enumerate((f"x {x:.0f}", f"y {y:.0f}")):
-        draw.add_text(imgui.ImVec2(text.x, text.y + i * line), quiet, words)
+    text, quiet = f"x {x:.0f}\ny {y:.0f}", pack_color(palette_of(state.preferences.theme).quiet)
+    draw.add_text(imgui.ImVec2(down.x + 2 * layout.ui_scale, across.y + 2 * layout.ui_scale), quiet, text)
 
 
-def _draw_marks(state: AppState, scene: Scene, rect: Rect, layout: Layout, is_upright: bool) -> None:
+def _draw_marks(
+    state: AppState, scene: Scene, rect: Rect, layout: Layout, place: tuple[float, float], is_upright: bool
+) -> None:
     """Draw a line at the viewpoint, a line at the pointer, and the slope of the surface there."""
-    x_px, y_px = state.inspection.place or ((scene.width - 1) / 2, (scene.height - 1) / 2)
-    eye: ViewOffset = state.optics.eye
+    (x_px, y_px), eye = place, state.optics.eye
     part, scale = layout.part, layout.ui_scale
     if is_upright:
         views, at_view, size, pixel = scene.grid.rows, eye.t, scene.height, y_px
@@ -221,24 +187,21 @@ def _draw_marks(state: AppState, scene: Scene, rect: Rect, layout: Layout, is_up
         line(ends[0], 0, ends[1], short_side, pack_color(DARK.warning, 0.9), 1.5 * scale)
 
 
-def _draw_status(state: AppState, scene: Scene, layout: Layout, rect: Rect) -> None:
+def _draw_status(state: AppState, scene: Scene, scale: float, rect: Rect) -> None:
     """Draw one line of values; the last values are left out where they do not fit."""
-    draw, palette, scale = imgui.get_background_draw_list(), palette_of(state.preferences.theme), layout.ui_scale
-    hover, probe = state.hover, state.inspection.probe
-    y = rect.y + rect.height - imgui.get_text_line_height()
-    if hover is None:
-        draw.add_text(imgui.ImVec2(rect.x, y), pack_color(palette.quiet), "Point at the picture to see its values.")
+    draw, palette = imgui.get_background_draw_list(), palette_of(state.preferences.theme)
+    line = imgui.get_text_line_height()
+    probe, x, y = state.inspection.probe, rect.x, rect.y + rect.height - line
+    if state.hover is None:
+        draw.add_text(imgui.ImVec2(x, y), pack_color(palette.quiet), "Point at the picture to see its values.")
         return
-    x, gap = rect.x, 18 * scale
-    for words in status_text(state, scene, hover, probe):
-        is_color = words.startswith("RGB")
-        swatch = imgui.get_text_line_height() if is_color else 0.0
-        width = imgui.calc_text_size(words).x + (swatch + 5 * scale if swatch else 0)
+    for words in status_text(state, scene, state.hover, probe):
+        swatch = line + 5 * scale if words.startswith("RGB") else 0.0
+        width = swatch + imgui.calc_text_size(words).x
         if x + width > rect.x + rect.width:
             return
-        if is_color and probe is not None:
+        if swatch and probe is not None:
             red, green, blue = (value / 255 for value in probe.rgb)
-            draw.add_rect_filled(*corners(Rect(x, y, swatch, swatch)), pack_color((red, green, blue, 1.0)), 3 * scale)
-            x, width = x + swatch + 5 * scale, width - swatch - 5 * scale
-        draw.add_text(imgui.ImVec2(x, y), pack_color(palette.text), words)
-        x += width + gap
+            draw.add_rect_filled(*corners(Rect(x, y, line, line)), pack_color((red, green, blue, 1.0)), 3 * scale)
+        draw.add_text(imgui.ImVec2(x + swatch, y), pack_color(palette.text), words)
+        x += width + 18 * scale

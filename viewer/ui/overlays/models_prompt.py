@@ -8,7 +8,6 @@ from imgui_bundle import imgui
 
 from viewer.model import depth_models, messages
 from viewer.model.action import Action, ask, do
-from viewer.model.layout import Layout
 from viewer.model.state.app_state import AppState
 from viewer.model.state.depth_models import ModelOffer, ModelsPrompt
 from viewer.model.state.tasks import ChooseTask
@@ -19,17 +18,17 @@ MAX_LIST_SHARE = 0.55
 """Largest height of the list as a share of the window; longer lists scroll."""
 
 
-def models_prompt(prompt: ModelsPrompt, state: AppState, layout: Layout) -> list[Action]:
+def models_prompt(prompt: ModelsPrompt, state: AppState) -> list[Action]:
     """Build a row for each model, and buttons for the selected model."""
     models = state.models.known
     imgui.text("Depth models")
-    gap(layout, 2)
+    gap()
     if not models:
         quiet("Looking for models…")
     recommended = next((i for i, model in enumerate(models) if model.is_recommended), 0)
     selected = recommended if prompt.selected is None else prompt.selected
-    pressed = _rows(models, selected, layout)
-    gap(layout, 2)
+    pressed = _rows(models, selected)
+    gap()
     close = do(messages.show_prompt, None)
     taken = button_rows([*_buttons(state, models[selected] if models else None), ("Cancel", close)])
     if taken:
@@ -51,13 +50,13 @@ def _buttons(state: AppState, model: ModelOffer | None) -> list[tuple[str, Actio
     return buttons
 
 
-def _rows(models: tuple[ModelOffer, ...], selected: int, layout: Layout) -> int | None:
+def _rows(models: tuple[ModelOffer, ...], selected: int) -> int | None:
     """Build the rows and return the index of the row that was pressed."""
     style, pressed = imgui.get_style(), None
     width = imgui.get_content_region_avail().x - style.scrollbar_size - style.item_spacing.x
     line, padding = imgui.get_text_line_height(), style.item_inner_spacing.y
     heights = [line + imgui.calc_text_size(model.words, False, width).y + 2 * padding for model in models]
-    height = min(sum(heights) + style.item_spacing.y * len(models), MAX_LIST_SHARE * layout.window.height)
+    height = min(sum(heights) + style.item_spacing.y * len(models), MAX_LIST_SHARE * imgui.get_io().display_size.y)
     imgui.begin_child("models", imgui.ImVec2(0, max(height, 1)))
     for i, (model, row) in enumerate(zip(models, heights)):
         start = imgui.get_cursor_pos()

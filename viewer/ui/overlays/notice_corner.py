@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from imgui_bundle import imgui
 
@@ -19,16 +19,14 @@ from viewer.model.state.notices import Notice
 from viewer.model.state.tasks import CancelJobTask, ChooseTask, PlainTask
 from viewer.ui.overlays.prompt_rows import CARD_FLAGS, button_rows, file_offers
 from viewer.ui.style import palette_of
-from viewer.ui.widgets import colored, gap, last_part, quiet, tooltip
+from viewer.ui.widgets import button, colored, gap, last_part, quiet, scale, tooltip
 
 NOTICE_WIDTH = 420.0
 MIN_WIDTH, MIN_HEIGHT = 160.0, 40.0
 VERBS: dict[JobKind, str] = {"picture": "Saving", "map": "Saving", "copy": "Copying", "export": "Exporting"}
-WAITING = "waiting for its turn"
 
 
-@dataclass(frozen=True)
-class ProgressRow:
+class ProgressRow(NamedTuple):
     """Work in progress. key: identifies its button. done: share, 0..1. cancel: None while it cannot be cancelled."""
 
     key: str
@@ -40,13 +38,13 @@ class ProgressRow:
 
 def notices(state: AppState, layout: Layout) -> list[Action]:
     """Draw the corner; return the actions of the buttons that were pressed."""
-    rows, offer = progress_rows(state), depth_models.offered_model(state)
+    rows, offer = [*_work_on_views(state), *job_rows(state.jobs)], depth_models.offered_model(state)
     if not (state.notices or rows or offer) or not _place(layout):
         return []
     imgui.begin("notices", None, CARD_FLAGS)
     if state.prompt is not None:  # the buttons of a prompt must be seen
         imgui.internal.bring_window_to_display_back(imgui.internal.get_current_window())
-    actions = build_rows(rows, layout)
+    actions = build_rows(rows)
     if state.notices:
         actions += _notice(state.notices[-1], state)
     if offer is not None:
@@ -91,25 +89,22 @@ def _notice(notice: Notice, state: AppState) -> list[Action]:
     offers += [("Use its settings", do(opening.take_settings, notice.offer))] if notice.offer is not None else []
     offers += [(f"Close all ({others + 1})", do(messages.dismiss))] if others else []
     actions += button_rows(offers)
-    if notice.path and _beside_last("Copy path"):
-        imgui.set_clipboard_text(notice.path)
+    if notice.path:
+        imgui.same_line()
+        if imgui.button("Copy path"):
+            imgui.set_clipboard_text(notice.path)
     imgui.end_group()
     return actions
 
 
-def _beside_last(words: str) -> bool:
-    imgui.same_line()
-    return bool(imgui.button(words))
-
-
 def _offer(model: ModelOffer) -> list[Action]:
     """Draw the offer of better depth in place of a guess."""
-    words, button = f"{model.title} is on this machine and estimates it better.", "Estimate depth"
+    words, verb = f"{model.title} is on this machine and estimates it better.", "Estimate depth"
     if model.lacks:
         words = f"{model.title}: {model.lacks}"
     elif not model.is_here:
         words = f"{model.title} estimates it better: {model.megabytes:,} MB, {model.licence}, from {model.host}."
-        button = "Get better depth"
+        verb = "Get better depth"
     actions: list[Action] = [do(depth_models.show_offer, False)] if imgui.button("×##offer") else []
     imgui.same_line()
     imgui.begin_group()
@@ -117,12 +112,12 @@ def _offer(model: ModelOffer) -> list[Action]:
     imgui.text_wrapped("Depth is guessed: near and far may be wrong.")
     quiet(words)
     if not model.lacks:
-        actions += button_rows([(button, do(depth_models.get_depth))])
+        actions += button_rows([(verb, do(depth_models.get_depth))])
     imgui.end_group()
     return actions
 
 
-def build_rows(rows: Sequence[ProgressRow], layout: Layout) -> list[Action]:
+def build_rows(rows: Sequence[ProgressRow]) -> list[Action]:
     """Draw work in progress; return the actions of the buttons that were pressed.
 
     All rows have the same height, so that no button moves while the words change.
@@ -130,43 +125,31 @@ def build_rows(rows: Sequence[ProgressRow], layout: Layout) -> list[Action]:
     actions: list[Action] = []
     for number, row in enumerate(rows):
         if number:
-            gap(layout, 2)
-        imgui.progress_bar(row.done, imgui.ImVec2(-1, 4 * layout.ui_scale), "")
-        imgui.begin_disabled(row.cancel is None)
-        if imgui.button(f"Cancel##{row.key}") and row.cancel is not None:
+            gap()
+        imgui.progress_bar(row.done, imgui.ImVec2(-1, 4 * scale()), "")
+        if button(f"Cancel##{row.key}", is_enabled=row.cancel is not None) and row.cancel is not None:
             actions.append(row.cancel)
-        imgui.end_disabled()
         imgui.same_line()
         imgui.align_text_to_frame_padding()
         imgui.text(row.name)
         right = imgui.get_window_pos().x + imgui.get_window_size().x - imgui.get_style().window_padding.x
-        tooltip(row.name if imgui.get_item_rect_max().x > right else "", layout)
+        tooltip(row.name if imgui.get_item_rect_max().x > right else "")
         imgui.text_disabled(row.words)
     return actions
 
 
-def progress_rows(state: AppState) -> list[ProgressRow]:
-    """Return the rows of all work in progress."""
-    return [*_work_on_views(state), *job_rows(state.jobs)]
-
-
 def job_rows(jobs: Sequence[JobProgress]) -> list[ProgressRow]:
     """Return the rows of saves, copies and exports."""
-    return [
-        ProgressRow(
-            f"job {job.id}",
-            f"{VERBS[job.kind]} {job.name}",
-            job_text(job),
-            job.done,
-            do(ask, CancelJobTask(job.id)) if job.can_be_cancelled else None,
-        )
-        for job in jobs
-    ]
+    rows = []
+    for job in jobs:
+        cancel = do(ask, CancelJobTask(job.id)) if job.can_be_cancelled else None
+        rows.append(ProgressRow(f"job {job.id}", f"{VERBS[job.kind]} {job.name}", job_text(job), job.done, cancel))
+    return rows
 
 
 def job_text(job: JobProgress) -> str:
     """Return the progress in words: "drawing, 23 %, about 8 s left"."""
-    words = job.doing or WAITING
+    words = job.doing or "waiting for its turn"
     if job.doing == WRITING:
         return words
     words += f", {round(100 * job.done)} %" if job.done else ""

@@ -16,22 +16,12 @@ from viewer.model.state.depth_models import ModelsPrompt
 from viewer.model.state.jobs import FinishedExport, JobProgress
 from viewer.model.state.prompts import ChoiceOf, ExportPrompt, PalettePrompt, PathPrompt, Prompt, SavePrompt
 from viewer.model.state.tasks import TakePathTask
+from viewer.ui.overlays import prompt_rows as rows
 from viewer.ui.overlays.export_prompt import export_prompt
 from viewer.ui.overlays.models_prompt import models_prompt
 from viewer.ui.overlays.notice_corner import build_rows, job_rows
-from viewer.ui.overlays.prompt_rows import (
-    PROMPT_FLAGS,
-    button_rows,
-    file_offers,
-    focus_on_appearing,
-    place_row,
-    prompt_actions,
-    prompt_buttons,
-    say_problem,
-    search_field,
-)
 from viewer.ui.overlays.save_prompt import save_prompt
-from viewer.ui.widgets import button, gap, last_part, quiet
+from viewer.ui.widgets import button, gap, last_part, quiet, scale
 
 PROMPT_WIDTH = 460.0
 PROMPT_TOP = 0.05
@@ -69,74 +59,74 @@ def prompts(state: AppState, layout: Layout) -> list[Action]:
     if prompt is None:
         return []
     _place(prompt, layout)
-    imgui.begin(f"prompt {type(prompt).__name__}", None, PROMPT_FLAGS)
+    imgui.begin(f"prompt {type(prompt).__name__}", None, rows.PROMPT_FLAGS)
     # A text field takes Esc for itself; one Esc closes the prompt.
     is_left = imgui.get_io().want_text_input and imgui.is_key_pressed(imgui.Key.escape, False)
-    actions = _contents(prompt, state, layout)
+    actions = _contents(prompt, state)
     imgui.end()
     return [do(messages.show_prompt, None)] if is_left else actions
 
 
 def _place(prompt: Prompt, layout: Layout) -> None:
     """Place a prompt over the picture; the help in the panel's place, so that it can be read while the hand tries."""
-    scale, window = layout.ui_scale, layout.window
+    window = layout.window
     if prompt == "help":
         imgui.set_next_window_pos(imgui.ImVec2(window.width, 0), 0, imgui.ImVec2(1, 0))
-        width = min(PANEL_WIDTH * scale, window.width)
+        width = min(PANEL_WIDTH * scale(), window.width)
         imgui.set_next_window_size_constraints(imgui.ImVec2(width, window.height), imgui.ImVec2(width, window.height))
         return
-    width, top = min(PROMPT_WIDTH * scale, window.width), PROMPT_TOP * window.height
+    width, top = min(PROMPT_WIDTH * scale(), window.width), PROMPT_TOP * window.height
     imgui.set_next_window_pos(imgui.ImVec2(max(layout.panel.x, width) / 2, top), 0, imgui.ImVec2(0.5, 0))
     imgui.set_next_window_size_constraints(imgui.ImVec2(width, 0), imgui.ImVec2(width, window.height - top))
 
 
-def _contents(prompt: Prompt, state: AppState, layout: Layout) -> list[Action]:
+def _contents(prompt: Prompt, state: AppState) -> list[Action]:
     match prompt:
         case SavePrompt():
-            return save_prompt(prompt, state, layout)
+            return save_prompt(prompt, state)
         case ExportPrompt():
-            return export_prompt(prompt, state, layout)
+            return export_prompt(prompt, state)
         case PathPrompt():
-            return _path(prompt, state, layout)
+            return _path(prompt, state)
         case ModelsPrompt():
-            return models_prompt(prompt, state, layout)
+            return models_prompt(prompt, state)
         case PalettePrompt():
-            return _palette(prompt, state, layout)
+            return _palette(prompt, state)
         case "exports":
-            return _exports(state, layout)
+            return _exports(state)
         case "quit":
-            return _quit(state, layout)
+            return _quit(state)
         case "help":
             keys = ((", ".join(chord.words for chord in c.chords), c.name) for c in COMMANDS if c.chords)
-            return _help(layout, [*MOUSE, *keys])
+            return _help([*MOUSE, *keys])
 
 
-def _path(prompt: PathPrompt, state: AppState, layout: Layout) -> list[Action]:
+def _path(prompt: PathPrompt, state: AppState) -> list[Action]:
     """Draw a field for the path of a file or folder."""
     imgui.text(PATH_WORDS[prompt.what])
-    gap(layout, 2)
-    row = place_row("Path", prompt.path, replace(state, has_dialogs=False), layout)
+    gap()
+    row = rows.place_row("Path", prompt.path, replace(state, has_dialogs=False))
     edited = prompt if row.path == prompt.path else replace(prompt, path=row.path, problem="")
-    say_problem(edited.problem, state)
-    pressed, closed = prompt_buttons("Open", layout)
+    rows.say_problem(edited.problem, state)
+    pressed, closed = rows.prompt_buttons("Open")
     if pressed or row.entered:
         return [do(messages.show_prompt, edited), do(ask, TakePathTask(edited))]
-    return prompt_actions(closed, edited, prompt)
+    return rows.prompt_actions(closed, edited, prompt)
 
 
-def _exports(state: AppState, layout: Layout) -> list[Action]:
+def _exports(state: AppState) -> list[Action]:
     """Draw the exports that run and those that are done."""
     imgui.text("Exports")
-    gap(layout, 2)
+    gap()
     running = job_rows([job for job in state.jobs if job.kind == "export"])
     if not running and not state.exports:
         quiet("Nothing was exported yet.")
-    actions = build_rows(running, layout)
+    actions = build_rows(running)
     for number, finished in enumerate(state.exports):
-        gap(layout, 2)
+        gap()
         actions += _finished(finished, number)
-    gap(layout, 2)
-    return [*actions, *button_rows([("Close", do(messages.show_prompt, None))])]
+    gap()
+    return [*actions, *rows.button_rows([("Close", do(messages.show_prompt, None))])]
 
 
 def _finished(finished: FinishedExport, number: int) -> list[Action]:
@@ -144,15 +134,15 @@ def _finished(finished: FinishedExport, number: int) -> list[Action]:
     if finished.problem:
         quiet(finished.problem)
     again = do(messages.show_prompt, replace(finished.prompt, already_there=False, problem=""))
-    offers: list[tuple[str, Action]] = [] if finished.problem else file_offers(finished.path, number)
-    return button_rows([*offers, (f"Again…##{number}", again)])
+    offers: list[tuple[str, Action]] = [] if finished.problem else rows.file_offers(finished.path, number)
+    return rows.button_rows([*offers, (f"Again…##{number}", again)])
 
 
-def _palette(prompt: PalettePrompt, state: AppState, layout: Layout) -> list[Action]:
+def _palette(prompt: PalettePrompt, state: AppState) -> list[Action]:
     """Draw the commands that match the typed text; the arrow keys select one, Enter runs it."""
-    focus_on_appearing()
+    rows.focus_on_appearing()
     imgui.set_next_item_width(-1)
-    text, entered = search_field("command", prompt.text, "Type a command")
+    text, entered = rows.search_field("command", prompt.text, "Type a command")
     matching = commands_matching(text, recent_commands(state))
     steps = imgui.is_key_pressed(imgui.Key.down_arrow) - imgui.is_key_pressed(imgui.Key.up_arrow)
     selected = min(max((prompt.selected if text == prompt.text else 0) + steps, 0), max(len(matching) - 1, 0))
@@ -162,7 +152,7 @@ def _palette(prompt: PalettePrompt, state: AppState, layout: Layout) -> list[Act
     chosen = pressed or (matching[selected] if entered and matching else None)
     if chosen is not None:
         return [do(messages.show_prompt, None), chosen.action(replace(state, prompt=None))]
-    return prompt_actions(False, PalettePrompt(text, selected), prompt)
+    return rows.prompt_actions(False, PalettePrompt(text, selected), prompt)
 
 
 def _command_rows(commands: Sequence[Command], selected: int, has_moved: bool) -> Command | None:
@@ -184,19 +174,19 @@ def _command_rows(commands: Sequence[Command], selected: int, has_moved: bool) -
     return pressed
 
 
-def _help(layout: Layout, rows: list[tuple[str, str]]) -> list[Action]:
+def _help(keys: list[tuple[str, str]]) -> list[Action]:
     """Draw the map of mouse and keys; the button stays in sight while the rows scroll."""
     style = imgui.get_style()
     button_width = imgui.calc_text_size("Close").x + 2 * style.frame_padding.x
     imgui.align_text_to_frame_padding()
     imgui.text("Mouse and keys")
     imgui.same_line(imgui.get_window_width() - style.window_padding.x - button_width)
-    is_closed = button("Close", layout)
-    gap(layout, 2)
+    is_closed = button("Close")
+    gap()
     if imgui.begin_table("keys", 2, imgui.TableFlags_.scroll_y):
-        imgui.table_setup_column("what", imgui.TableColumnFlags_.width_fixed, KEYS_WIDTH * layout.ui_scale)
+        imgui.table_setup_column("what", imgui.TableColumnFlags_.width_fixed, KEYS_WIDTH * scale())
         imgui.table_setup_column("meaning", imgui.TableColumnFlags_.width_stretch)
-        for what, meaning in rows:
+        for what, meaning in keys:
             imgui.table_next_column()
             quiet(what)
             imgui.table_next_column()
@@ -205,16 +195,16 @@ def _help(layout: Layout, rows: list[tuple[str, str]]) -> list[Action]:
     return [do(messages.show_prompt, None)] if is_closed else []
 
 
-def _quit(state: AppState, layout: Layout) -> list[Action]:
+def _quit(state: AppState) -> list[Action]:
     """Draw the jobs that quitting would cancel, and the choices. Jobs may end while it is asked."""
     offers: list[tuple[str, Action]] = []
     if state.jobs:
         imgui.text(f"{jobs_text(state.jobs)} in progress.")
         offers.append(("Wait, then quit", do(saving.quit_when_done)))
-    gap(layout, 2)
+    gap()
     words = "Cancel them and quit" if state.jobs else "Quit"
     sure = do(saving.quit_window, is_sure=True)
-    return button_rows([*offers, (words, sure), ("Cancel", do(messages.show_prompt, None))])
+    return rows.button_rows([*offers, (words, sure), ("Cancel", do(messages.show_prompt, None))])
 
 
 def jobs_text(jobs: Sequence[JobProgress]) -> str:

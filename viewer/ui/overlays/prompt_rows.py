@@ -11,12 +11,11 @@ from imgui_bundle import imgui
 
 from viewer.model import messages
 from viewer.model.action import Action, ask, do
-from viewer.model.layout import Layout
 from viewer.model.state.app_state import AppState
 from viewer.model.state.prompts import ExportPrompt, Prompt, SavePrompt
 from viewer.model.state.tasks import ChoosePlaceTask, ExportTask, SaveTask, ShowFileTask
 from viewer.ui.style import palette_of
-from viewer.ui.widgets import button, colored, combo, gap, label
+from viewer.ui.widgets import button, colored, combo, gap, label, scale
 
 Choice = TypeVar("Choice", bound=str)
 PlacePrompt = TypeVar("PlacePrompt", SavePrompt, ExportPrompt)
@@ -55,18 +54,18 @@ class PlaceRow:
     browses: bool
 
 
-def place_row(text: str, path: str, state: AppState, layout: Layout) -> PlaceRow:
+def place_row(text: str, path: str, state: AppState) -> PlaceRow:
     """Draw a row for a path, which shows its end if it is long; with a button where the system has dialogs."""
     style = imgui.get_style()
     width = imgui.calc_text_size(BROWSE).x + 2 * style.frame_padding.x + style.item_spacing.x
     focus_on_appearing()
-    label(text, layout)
+    label(text)
     imgui.set_next_item_width(-width if state.has_dialogs else -1)
     new, is_entered = text_field("path", path, flags=imgui.InputTextFlags_.elide_left)
     if not state.has_dialogs:
         return PlaceRow(new, is_entered, False)
     imgui.same_line()
-    return PlaceRow(new, is_entered, button(BROWSE, layout))
+    return PlaceRow(new, is_entered, button(BROWSE))
 
 
 def place_actions(
@@ -76,7 +75,6 @@ def place_actions(
     task: Callable[[PlacePrompt, bool], SaveTask | ExportTask],
     word: str,
     state: AppState,
-    layout: Layout,
     written: str = "",
 ) -> list[Action]:
     """Draw the problem and the buttons of a prompt to save or export; return its actions.
@@ -88,9 +86,9 @@ def place_actions(
     if edited != prompt:
         edited = replace(edited, already_there=False, problem="")
     if edited.already_there:
-        return _ask_to_replace(edited, row, task, written or PurePath(edited.path.strip()).name, state, layout)
+        return _ask_to_replace(edited, row, task, written or PurePath(edited.path.strip()).name, state)
     say_problem(edited.problem, state)
-    pressed, closed = prompt_buttons(word, layout)
+    pressed, closed = prompt_buttons(word)
     if row.browses:
         return [do(messages.show_prompt, edited), do(ask, ChoosePlaceTask(edited))]
     if pressed or row.entered:
@@ -104,26 +102,25 @@ def _ask_to_replace(
     task: Callable[[PlacePrompt, bool], SaveTask | ExportTask],
     name: str,
     state: AppState,
-    layout: Layout,
 ) -> list[Action]:
     """Ask whether to replace a file that exists. Enter cancels, and goes back to the prompt."""
     place, folder = Path(prompt.path.strip()).expanduser().parent, state.folder
     is_photo = folder is not None and place == Path(folder.path) and name in [photo.name for photo in folder.photos]
     say_problem(f"{name} is a photo of the open folder. Replace it?" if is_photo else FILE_EXISTS, state)
-    gap(layout, 2)
-    cancelled = button("Cancel", layout) or is_enter_free() or row.entered
+    gap()
+    cancelled = button("Cancel") or is_enter_free() or row.entered
     imgui.same_line()
-    if button(f"Replace {name}", layout):
+    if button(f"Replace {name}"):
         return [do(ask, task(prompt, True))]
     return [do(messages.show_prompt, replace(prompt, already_there=False))] if cancelled else []
 
 
-def prompt_buttons(word: str, layout: Layout) -> tuple[bool, bool]:
+def prompt_buttons(word: str) -> tuple[bool, bool]:
     """Draw the buttons of a prompt; return (whether it was confirmed, by Enter too, whether it was cancelled)."""
-    gap(layout, 2)
-    pressed = button(word, layout)
+    gap()
+    pressed = button(word)
     imgui.same_line()
-    return pressed or is_enter_free(), button("Cancel", layout)
+    return pressed or is_enter_free(), button("Cancel")
 
 
 def is_enter_free() -> bool:
@@ -161,16 +158,16 @@ def focus_on_appearing() -> None:
         imgui.set_keyboard_focus_here(0)
 
 
-def choice_row(name: str, chosen: Choice, entries: Mapping[Choice, tuple[str, str]], layout: Layout) -> Choice:
+def choice_row(name: str, chosen: Choice, entries: Mapping[Choice, tuple[str, str]]) -> Choice:
     """Draw a list of (words, meaning); return the chosen entry."""
-    picked = combo(name, entries[chosen][0], tuple(entries.values()), layout)
+    picked = combo(name, entries[chosen][0], tuple(entries.values()))
     return chosen if picked is None else tuple(entries)[picked]
 
 
-def size_row(size_px: tuple[int, int], layout: Layout) -> int | None:
+def size_row(size_px: tuple[int, int]) -> int | None:
     """Draw width and height; return the new width if the user changed it."""
-    label("Size", layout, "Width and height in pixels; the height follows the width.")
-    imgui.set_next_item_width(WIDTH_FIELD * layout.ui_scale)
+    label("Size", "Width and height in pixels; the height follows the width.")
+    imgui.set_next_item_width(WIDTH_FIELD * scale())
     changed, width = imgui.input_int("##width", size_px[0], 0, 0)
     imgui.same_line()
     imgui.text(f"x {size_px[1]} pixels")

@@ -8,6 +8,7 @@ from imgui_bundle import imgui
 
 from iibr_core.beyond.optics import Optics
 from iibr_core.depth.editing.edits import DEPTH_TOOLS
+from iibr_core.scenes.lens_limits import clamp
 from iibr_core.scenes.rect import Rect
 from iibr_core.scenes.scene import Scene
 from viewer.model.focal_plane import handle_points, place_of, sharp_disparity
@@ -17,7 +18,7 @@ from viewer.model.state.depth import Tool
 from viewer.model.state.lens import TiltHandles
 from viewer.model.state.preferences import Units
 from viewer.model.units import far_percent, metres, metres_text, relative_distance
-from viewer.ui.style import DARK, Color, corners, pack_color
+from viewer.ui.style import DARK, WORDS_ROOM, Color, corners, draw_words, pack_color
 
 WORD_GAP = "  ·  "
 RETICLE_RADIUS = 11.0
@@ -27,25 +28,23 @@ SHARP_SHARE = 0.04
 """Distance from the plane of focus up to which a surface is called sharp, as a share of the scene's disparity."""
 
 
-def overlays(state: AppState, layout: Layout) -> None:
-    """Draw all overlays. Their colours do not follow the theme, as they lie on a photo."""
-    scene, picture, frame = state.scene, layout.picture, layout.frame
-    if scene is None or picture is None or frame is None:
-        return
-    draw = imgui.get_background_draw_list()
+def draw_marks(state: AppState, scene: Scene, layout: Layout, picture: Rect, frame: Rect) -> None:
+    """Draw the marks over the picture. Their colours do not follow the theme, as they lie on a photo."""
+    draw, hover, brush, scale = imgui.get_background_draw_list(), state.hover, state.brush, layout.ui_scale
     draw.push_clip_rect(*corners(frame), True)
     if state.tilt_handles is not None:
-        _draw_handles(state.tilt_handles, layout, picture)
-    if state.brush.is_on and state.brush.tool != "select" and scene.plan is not None:
-        _draw_sample(state, layout, picture)
-        if state.hover is not None:
-            _draw_brush(state.brush.radius, scene, state.hover, layout, picture, DARK.text)
-            _draw_direction(state.brush.tool, scene, state.hover, layout, picture)
-    elif state.gloss_brush.is_on and state.optics.gloss is not None and state.hover is not None:
-        color = DARK.warning if state.gloss_brush.erases else DARK.text
-        _draw_brush(state.gloss_brush.radius, scene, state.hover, layout, picture, color)
-    elif state.hover is not None and state.hover.disparity is not None:
-        _draw_reticle(state, scene, state.hover, layout, picture)
+        _draw_handles(state.tilt_handles, scale, picture)
+    if brush.is_on and brush.tool != "select" and scene.plan is not None:
+        _draw_sample(state, scene, scale, picture)
+        if hover is not None:
+            x, y = _pointed_at(hover, scene, picture)
+            _ring(x, y, max(brush.radius * picture.width, 2 * scale), scale, DARK.text)
+            _draw_direction(brush.tool, x, y, scale)
+    elif state.gloss_brush.is_on and state.optics.gloss is not None and hover is not None:
+        color, radius = DARK.warning if state.gloss_brush.erases else DARK.text, state.gloss_brush.radius
+        _ring(*_pointed_at(hover, scene, picture), max(radius * picture.width, 2 * scale), scale, color)
+    elif hover is not None and hover.disparity is not None:
+        _draw_reticle(state, scene, hover, scale, picture, frame)
     draw.pop_clip_rect()
 
 
@@ -79,20 +78,16 @@ def _distance_words(scene: Scene, disparity: float, sharp: float, is_sharp: bool
     return f"{metres_text(here)}{WORD_GAP}{away} {side}"
 
 
-def _draw_reticle(state: AppState, scene: Scene, hover: Hover, layout: Layout, picture: Rect) -> None:
+def _draw_reticle(state: AppState, scene: Scene, hover: Hover, scale: float, picture: Rect, frame: Rect) -> None:
     """Draw a ring where a click would focus, with words beside it, within the picture."""
-    draw, scale = imgui.get_background_draw_list(), layout.ui_scale
     x, y = _pointed_at(hover, scene, picture)
-    radius, frame = RETICLE_RADIUS * scale, layout.frame or picture
-    _ring(draw, x, y, radius, scale, pack_color(DARK.text))
+    radius, line, room = RETICLE_RADIUS * scale, imgui.get_text_line_height(), 6 * scale
+    _ring(x, y, radius, scale, DARK.text)
     words = hover_text(state.optics, scene, hover, state.preferences.units)
-    size, room = imgui.calc_text_size(words), 6 * scale
-    left = x + radius + room if x + radius + 3 * room + size.x <= frame.x + frame.width else x - radius - size.x
-    left = max(left - (room if left < x else 0), frame.x + room)
-    top = min(max(y - size.y / 2, frame.y + room), frame.y + frame.height - size.y - room)
-    corners = imgui.ImVec2(left - room, top - room / 2), imgui.ImVec2(left + size.x + room, top + size.y + room / 2)
-    draw.add_rect_filled(*corners, pack_color(DARK.background, 0.72), 4 * scale)
-    draw.add_text(imgui.ImVec2(left, top), pack_color(DARK.text), words)
+    width = imgui.calc_text_size(words).x + 2 * WORDS_ROOM * scale
+    is_right = x + radius + 2 * room + width <= frame.x + frame.width
+    left = x + radius + room if is_right else max(x - radius - room - width, frame.x + room)
+    draw_words(words, left, clamp(y - line / 2, frame.y, frame.y + frame.height - line - room), scale)
 
 
 def _pointed_at(hover: Hover, scene: Scene, picture: Rect) -> tuple[float, float]:
@@ -101,48 +96,39 @@ def _pointed_at(hover: Hover, scene: Scene, picture: Rect) -> tuple[float, float
     return x, picture.y + (hover.y_px + 0.5) / scene.height * picture.height
 
 
-def _draw_brush(radius: float, scene: Scene, hover: Hover, layout: Layout, picture: Rect, color: Color) -> None:
-    """Draw the reach of a brush around the pointer. radius: as a share of the photo's width."""
-    draw, scale = imgui.get_background_draw_list(), layout.ui_scale
-    place = _pointed_at(hover, scene, picture)
-    _ring(draw, *place, max(radius * picture.width, 2 * scale), scale, pack_color(color))
-
-
-def _draw_direction(tool: Tool, scene: Scene, hover: Hover, layout: Layout, picture: Rect) -> None:
+def _draw_direction(tool: Tool, x: float, y: float, scale: float) -> None:
     """Draw a plus or a minus for a brush that brings nearer or pushes away."""
-    draw, scale, (x, y) = imgui.get_background_draw_list(), layout.ui_scale, _pointed_at(hover, scene, picture)
-    arm, color = 4 * scale, pack_color(DARK.text)
+    draw, arm, color = imgui.get_background_draw_list(), 4 * scale, pack_color(DARK.text)
     if tool in ("nearer", "farther"):
         draw.add_line(imgui.ImVec2(x - arm, y), imgui.ImVec2(x + arm, y), color, 1.5 * scale)
     if tool == "nearer":
         draw.add_line(imgui.ImVec2(x, y - arm), imgui.ImVec2(x, y + arm), color, 1.5 * scale)
 
 
-def _draw_sample(state: AppState, layout: Layout, picture: Rect) -> None:
+def _draw_sample(state: AppState, scene: Scene, scale: float, picture: Rect) -> None:
     """Draw a small ring where the brush takes its depth from; it moves with the surface there."""
-    sample, eye, scene = state.brush.sample, state.optics.eye, state.scene
-    if sample is None or scene is None or state.brush.tool not in DEPTH_TOOLS:
+    sample, eye = state.brush.sample, state.optics.eye
+    if sample is None or state.brush.tool not in DEPTH_TOOLS:
         return
     x = picture.x + (sample.place[0] - sample.disparity * eye.s / scene.width) * picture.width
     y = picture.y + (sample.place[1] - sample.disparity * eye.t / scene.height) * picture.height
-    draw, scale = imgui.get_background_draw_list(), layout.ui_scale
-    _ring(draw, x, y, SAMPLE_RADIUS * scale, scale, pack_color(DARK.accent))
+    _ring(x, y, SAMPLE_RADIUS * scale, scale, DARK.accent)
 
 
-def _draw_handles(handles: TiltHandles, layout: Layout, picture: Rect) -> None:
+def _draw_handles(handles: TiltHandles, scale: float, picture: Rect) -> None:
     """Draw a line between two knobs, along which the focus changes."""
-    draw, scale = imgui.get_background_draw_list(), layout.ui_scale
-    first, second = (imgui.ImVec2(*point) for point in handle_points(handles, picture))
-    draw.add_line(first, second, pack_color((0, 0, 0, 1), 0.45), 4 * scale)
-    draw.add_line(first, second, pack_color(DARK.text, 0.9), 1.5 * scale)
-    for point in (first, second):
+    draw, ends = imgui.get_background_draw_list(), [imgui.ImVec2(*point) for point in handle_points(handles, picture)]
+    draw.add_line(ends[0], ends[1], pack_color((0, 0, 0, 1), 0.45), 4 * scale)
+    draw.add_line(ends[0], ends[1], pack_color(DARK.text, 0.9), 1.5 * scale)
+    for point in ends:
         draw.add_circle_filled(point, HANDLE_RADIUS * scale, pack_color((0, 0, 0, 1), 0.45))
         draw.add_circle_filled(point, (HANDLE_RADIUS - 1.5) * scale, pack_color(DARK.text))
         draw.add_circle_filled(point, (HANDLE_RADIUS - 4) * scale, pack_color(DARK.accent))
 
 
-def _ring(draw: imgui.ImDrawList, x: float, y: float, radius: float, scale: float, color: int) -> None:
+def _ring(x: float, y: float, radius: float, scale: float, color: Color) -> None:
     """Draw a light ring in a dark one, which is visible on any background."""
-    draw.add_circle(imgui.ImVec2(x, y), radius, pack_color((0, 0, 0, 1), 0.5), 0, 3.5 * scale)
-    draw.add_circle(imgui.ImVec2(x, y), radius, color, 0, 1.5 * scale)
-    draw.add_circle_filled(imgui.ImVec2(x, y), 1.5 * scale, color)
+    draw, middle = imgui.get_background_draw_list(), imgui.ImVec2(x, y)
+    draw.add_circle(middle, radius, pack_color((0, 0, 0, 1), 0.5), 0, 3.5 * scale)
+    draw.add_circle(middle, radius, pack_color(color), 0, 1.5 * scale)
+    draw.add_circle_filled(middle, 1.5 * scale, pack_color(color))

@@ -14,7 +14,6 @@ from iibr_core.scenes.scene import Scene
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import SRGB
 from viewer.model.action import Action
-from viewer.model.layout import Layout
 from viewer.model.state.app_state import AppState
 from viewer.model.state.prompts import SavePrompt
 from viewer.model.state.tasks import SaveTask
@@ -26,27 +25,27 @@ PICTURE_ENDINGS = "The ending of the name sets the format: png, jpg, tif, webp, 
 MAP_ENDINGS = "The ending of the name sets the format: pfm, exr, npy, tif or png (16 bits, scaled)."
 
 
-def save_prompt(prompt: SavePrompt, state: AppState, layout: Layout) -> list[Action]:
+def save_prompt(prompt: SavePrompt, state: AppState) -> list[Action]:
     """Draw the prompt; return the actions of the user."""
     is_map = prompt.what == "map"
     imgui.text("Save the depth map" if is_map else "Save the picture")
-    gap(layout, 2)
-    row, edited = place_row("File", prompt.path, state, layout), prompt
+    gap()
+    row, edited = place_row("File", prompt.path, state), prompt
     if not is_map and state.scene is not None:
-        edited = _form_rows(_with_size(prompt, state.scene, layout), state.scene, layout)
+        edited = _form_rows(_with_size(prompt, state.scene), state.scene)
     quiet(MAP_ENDINGS if is_map else PICTURE_ENDINGS)
-    return place_actions(prompt, edited, row, SaveTask, "Save", state, layout)
+    return place_actions(prompt, edited, row, SaveTask, "Save", state)
 
 
-def _with_size(prompt: SavePrompt, scene: Scene, layout: Layout) -> SavePrompt:
+def _with_size(prompt: SavePrompt, scene: Scene) -> SavePrompt:
     """Draw width and height; the picture keeps its shape."""
-    width = size_row(prompt.size_px, layout)
+    width = size_row(prompt.size_px)
     if width is None:
         return prompt
     return replace(prompt, size_px=ScreenSize(width, max(round(width * scene.height / scene.width), 1)))
 
 
-def _form_rows(prompt: SavePrompt, scene: Scene, layout: Layout) -> SavePrompt:
+def _form_rows(prompt: SavePrompt, scene: Scene) -> SavePrompt:
     """Draw the options of the typed format."""
     kind, form = KINDS.get(PurePath(prompt.path).suffix.lower()), prompt.form
     if kind is None:
@@ -54,19 +53,19 @@ def _form_rows(prompt: SavePrompt, scene: Scene, layout: Layout) -> SavePrompt:
     if form.bits not in kind.bits:
         form = replace(form, bits=None)  # of another format, typed before
     if kind.has_quality:
-        label("Quality", layout, "Lower quality makes a smaller file with less detail.")
+        label("Quality", "Lower quality makes a smaller file with less detail.")
         form = replace(form, quality=imgui.slider_int("##quality", form.quality, 1, BEST_QUALITY)[1])
     if len(kind.bits) > 1:
-        label("Bits", layout, "Bits per colour channel. 16 keep smooth skies smooth in later edits.")
+        label("Bits", "Bits per colour channel. 16 keep smooth skies smooth in later edits.")
         usual = form.bits or kind.bits[0]
         chosen = _radio({str(bits): bits for bits in sorted(kind.bits)}, usual)
         form = form if chosen == usual else replace(form, bits=chosen)
     if scene.color_space != SRGB or form.color_space is not None:
-        label("Colours", layout, "Display P3 keeps more of this photo's colours; every program shows sRGB.")
+        label("Colours", "Display P3 keeps more of this photo's colours; every program shows sRGB.")
         space = form.space_for(scene.color_space)
         chosen_space = _radio({profile.name: profile for profile in PROFILES.values()}, space)
         form = form if chosen_space == space else replace(form, color_space=chosen_space)
-    label("Location", layout, "The place where the photo was taken, if its file states it.")
+    label("Location", "The place where the photo was taken, if its file states it.")
     form = replace(form, keeps_position=imgui.checkbox("keep GPS data", form.keeps_position)[1])
     return prompt if form == prompt.form else replace(prompt, form=form)
 

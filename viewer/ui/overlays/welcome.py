@@ -28,7 +28,7 @@ def welcome(state: AppState, layout: Layout) -> list[Action]:
     imgui.begin("welcome", None, CARD_FLAGS)
     imgui.text_wrapped("Drop a photo here")
     quiet("or a folder of photos, or a light field.")
-    gap(layout, 2)
+    gap()
     actions = button_rows([(name, BY_NAME[name].action(state)) for name in OFFERS])
     imgui.end()
     return actions

@@ -10,10 +10,9 @@ from iibr_core.depth.editing.edits import DEPTH_TOOLS, RADIUS_LIMITS, TOLERANCE_
 from viewer.model import depth, selection
 from viewer.model.action import Action, do
 from viewer.model.commands import BRUSH_WORDS
-from viewer.model.layout import Layout
 from viewer.model.state.app_state import AppState
-from viewer.model.state.depth import TOOLS, Brush, Tool
-from viewer.ui.widgets import button, choice, in_row, percent_slider, slider
+from viewer.model.state.depth import Brush, Tool
+from viewer.ui.widgets import button, choices, edit, in_row, percent_slider
 
 TOOL_TIPS: dict[Tool, str] = {
     "nearer": "Drag over the picture to bring it nearer. Strokes end at the photo's edges.",
@@ -23,63 +22,57 @@ TOOL_TIPS: dict[Tool, str] = {
     "fill": "Click a surface to give it one depth, up to edges of the photo and of depth.",
     "select": "Click a subject to select its surface. Then move it nearer or farther, or keep it sharp.",
 }
-PUT_AWAY = " B or Esc puts the tool away."
+TOOLS = {tool: (BRUSH_WORDS[tool], f"{tip} B or Esc puts the tool away.") for tool, tip in TOOL_TIPS.items()}
+TOOLS_A_ROW = 3
 SIZE_TIP = "Width of the brush as a share of the photo's width (wheel over the picture)."
 STRENGTH_TIP = "Change of depth by one stroke. Level and Bucket always give the whole depth."
 TOLERANCE_TIP = "Contrast that ends a surface: higher values select more (wheel over the picture)."
 SAMPLE_TIP = "Level and Bucket paint the depth where you press. Ctrl+click picks another depth; this forgets it."
-FORWARD_TIP = "Bring the selected surface nearer by a tenth of the depth."
-BACK_TIP = "Push the selected surface back by a tenth of the depth."
-SHARP_TIP = "Focus on the selected surface, and widen the focus until all of it is sharp."
-TOOLS_A_ROW = 3
+SURFACE_BUTTONS = (
+    ("Nearer##surface", "Bring the selected surface nearer by a tenth of the depth.", do(selection.move, True)),
+    ("Farther##surface", "Push the selected surface back by a tenth of the depth.", do(selection.move, False)),
+    (
+        "Keep sharp",
+        "Focus on the selected surface, and widen the focus until all of it is sharp.",
+        do(selection.keep_sharp),
+    ),
+)
 
 
-def brush_rows(state: AppState, layout: Layout) -> list[Action]:
+def brush_rows(state: AppState) -> list[Action]:
     """Build a button for each tool and the settings of the brush. Pressing the lit tool puts it away."""
     brush = state.brush
-    actions: list[Action] = []
     imgui.text("Brush")
-    for tool, width in in_row(TOOLS, layout, TOOLS_A_ROW):
-        is_in_hand = brush.is_on and brush.tool == tool
-        if choice(BRUSH_WORDS[tool], is_in_hand, layout, (width, 0), TOOL_TIPS[tool] + PUT_AWAY):
-            actions.append(do(depth.set_brush, replace(brush, tool=tool, is_on=not is_in_hand)))
-    actions += [do(depth.set_brush, changed) for changed in _settings(brush, layout)]
-    return actions
+    tool = choices(TOOLS, [brush.tool] if brush.is_on else [], TOOLS_A_ROW)
+    edited = _settings(brush)
+    if tool is not None:
+        edited = replace(edited, tool=tool, is_on=not (brush.is_on and brush.tool == tool))
+    return edit(depth.set_brush, brush, edited)
 
 
-def _settings(brush: Brush, layout: Layout) -> list[Brush]:
-    """Build the settings; return the brushes that they ask for."""
+def _settings(brush: Brush) -> Brush:
+    """Build the settings; return the edited brush."""
     paints, is_depth_tool = brush.is_on and brush.tool != "select", brush.tool in DEPTH_TOOLS
-    changed: list[Brush] = []
-    limits = 100 * RADIUS_LIMITS[0], 100 * RADIUS_LIMITS[1]
-    size = slider("Size", 100 * brush.radius, limits, "%.1f %%", layout, SIZE_TIP, True, paints)
-    changed += [] if size is None else [replace(brush, radius=size / 100)]
-    strength = percent_slider("Strength", brush.strength, layout, STRENGTH_TIP, paints and not is_depth_tool)
-    changed += [] if strength is None else [replace(brush, strength=strength)]
-    floods, limits = (
-        brush.is_on and brush.tool in ("fill", "select"),
-        (100 * TOLERANCE_LIMITS[0], 100 * TOLERANCE_LIMITS[1]),
+    floods = brush.is_on and brush.tool in ("fill", "select")
+    edited = replace(
+        brush,
+        radius=percent_slider("Size", brush.radius, SIZE_TIP, paints, RADIUS_LIMITS, "%.1f %%", True),
+        strength=percent_slider("Strength", brush.strength, STRENGTH_TIP, paints and not is_depth_tool),
+        tolerance=percent_slider(
+            "Tolerance", brush.tolerance, TOLERANCE_TIP, floods, TOLERANCE_LIMITS, is_logarithmic=True
+        ),
     )
-    share = slider("Tolerance", 100 * brush.tolerance, limits, "%.0f %%", layout, TOLERANCE_TIP, True, floods)
-    changed += [] if share is None else [replace(brush, tolerance=share / 100)]
     has_sample = paints and is_depth_tool and brush.sample is not None
-    if button("Forget the picked depth", layout, SAMPLE_TIP, has_sample):
-        changed.append(replace(brush, sample=None))
-    return changed
+    return replace(edited, sample=None) if button("Forget the picked depth", SAMPLE_TIP, has_sample) else edited
 
 
-def selection_rows(state: AppState, layout: Layout) -> list[Action]:
+def selection_rows(state: AppState) -> list[Action]:
     """Build the buttons for the selected surface."""
     imgui.text("Selected surface")
     is_found = state.selection is not None and state.selection.range_px is not None
-    buttons = (
-        ("Nearer##surface", FORWARD_TIP, do(selection.move, is_forward=True)),
-        ("Farther##surface", BACK_TIP, do(selection.move, is_forward=False)),
-        ("Keep sharp", SHARP_TIP, do(selection.keep_sharp)),
-    )
     actions: list[Action] = []
-    for (word, tip, action), width in in_row(buttons, layout):
-        if button(word, layout, tip, is_found, width):
+    for (words, tip, action), width in in_row(SURFACE_BUTTONS):
+        if button(words, tip, is_found, width):
             actions.append(action)
     _scroll_here_when_taken(state.brush.is_on)
     return actions

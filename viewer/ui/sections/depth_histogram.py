@@ -7,19 +7,21 @@ from dataclasses import replace
 from imgui_bundle import imgui
 
 from iibr_core.depth.editing.edits import DepthEdits, Levels, invert_tone_curve, tone_curve
+from iibr_core.scenes.lens_limits import clamp
 from iibr_core.scenes.rect import Rect
 from iibr_core.scenes.scene import Scene
 from viewer.model import depth
 from viewer.model.action import Action, do
 from viewer.model.colormap import map_color
-from viewer.model.layout import Layout
 from viewer.model.state.app_state import AppState
-from viewer.ui.style import corners, pack_color, palette_of
-from viewer.ui.widgets import tooltip
+from viewer.ui.style import Palette, corners, pack_color, palette_of
+from viewer.ui.widgets import scale, tooltip
 
 HEIGHT = 56.0
 """Height of the bars in window units at usual size."""
 HANDLE_WIDTH = 12.0
+BELOW = 4.0
+"""Length of a handle below the bars, in window units at usual size."""
 CLIPPED_OPACITY = 0.3
 TIP = (
     "Share of the picture at each depth: far at the left, near at the right. The line is the focus; the handles limit"
@@ -27,27 +29,26 @@ TIP = (
 )
 
 
-def depth_histogram(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
+def depth_histogram(state: AppState, scene: Scene) -> list[Action]:
     """Build the histogram. Places are before clips and gamma, colours after."""
-    levels = scene.levels
+    levels, edits = scene.levels, state.depth.edits
     if levels is None:
         return []
-    scale, corner = layout.ui_scale, imgui.get_cursor_screen_pos()
-    margin = HANDLE_WIDTH * scale / 2
-    rect = Rect(corner.x + margin, corner.y, imgui.get_content_region_avail().x - 2 * margin, HEIGHT * scale)
-    _draw_bars(levels, state.depth.edits, rect)
-    _draw_focus(state, scene, levels, rect, scale)
-    edits, actions = state.depth.edits, list[Action]()
-    far, is_finished = _handle("far_clip", edits.far_clip, rect, state, scale)
-    if far is not None:
-        actions.append(do(depth.set_tone, replace(edits, far_clip=far), is_finished))
-    near, is_finished = _handle("near_clip", edits.near_clip, rect, state, scale)
-    if near is not None:
-        actions.append(do(depth.set_tone, replace(edits, near_clip=near), is_finished))
+    corner, margin, height = imgui.get_cursor_screen_pos(), HANDLE_WIDTH * scale() / 2, HEIGHT * scale()
+    rect = Rect(corner.x + margin, corner.y, imgui.get_content_region_avail().x - 2 * margin, height)
+    _draw_bars(levels, edits, rect)
+    focus = focus_share(state, scene, levels)
+    palette = palette_of(state.preferences.theme)
+    if focus is not None:
+        _draw_line(rect, focus, pack_color(palette.accent), 1.5 * scale())
+    far, has_ended = _handle("far_clip", edits.far_clip, rect, palette)
+    near, near_has_ended = _handle("near_clip", edits.near_clip, rect, palette)
+    has_ended |= near_has_ended
     imgui.set_cursor_screen_pos(corner)
-    imgui.dummy(imgui.ImVec2(rect.width + 2 * margin, rect.height + 4 * scale))
-    tooltip(TIP, layout)
-    return actions
+    imgui.dummy(imgui.ImVec2(rect.width + 2 * margin, height + BELOW * scale()))
+    tooltip(TIP)
+    edited = replace(edits, far_clip=far, near_clip=near)
+    return [do(depth.set_tone, edited, has_ended)] if edited != edits or has_ended else []
 
 
 def bar_heights(levels: Levels, is_inverted: bool) -> list[float]:
@@ -82,28 +83,24 @@ def _draw_bars(levels: Levels, edits: DepthEdits, rect: Rect) -> None:
         draw.add_rect_filled(corner, imgui.ImVec2(left + (i + 1) * step, top + height), color)
 
 
-def _draw_focus(state: AppState, scene: Scene, levels: Levels, rect: Rect, scale: float) -> None:
-    share = focus_share(state, scene, levels)
-    if share is not None:
-        x, color = rect.x + share * rect.width, pack_color(palette_of(state.preferences.theme).accent)
-        draw = imgui.get_window_draw_list()
-        draw.add_line(imgui.ImVec2(x, rect.y), imgui.ImVec2(x, rect.y + rect.height), color, 1.5 * scale)
+def _draw_line(rect: Rect, share: float, color: int, width: float) -> None:
+    """Draw a line over the bars."""
+    x, draw = rect.x + share * rect.width, imgui.get_window_draw_list()
+    draw.add_line(imgui.ImVec2(x, rect.y), imgui.ImVec2(x, rect.y + rect.height), color, width)
 
 
-def _handle(name: str, value: float, rect: Rect, state: AppState, scale: float) -> tuple[float | None, bool]:
-    """Build a line over the bars with a grip; return its new value if it is dragged, and whether it was let go."""
-    palette, (left, top, width, height) = palette_of(state.preferences.theme), rect
-    x, grip = left + value * width, HANDLE_WIDTH * scale
-    imgui.set_cursor_screen_pos(imgui.ImVec2(x - grip / 2, top))
+def _handle(name: str, value: float, rect: Rect, palette: Palette) -> tuple[float, bool]:
+    """Build a line over the bars with a grip; return its value, and whether a drag has ended."""
+    side, below = HANDLE_WIDTH * scale() / 2, BELOW * scale()
+    x, bottom = rect.x + value * rect.width, rect.y + rect.height
+    imgui.set_cursor_screen_pos(imgui.ImVec2(x - side, rect.y))
     imgui.set_next_item_allow_overlap()
-    imgui.invisible_button(f"handle {name}", imgui.ImVec2(grip, height + 4 * scale))
-    is_held, is_released = imgui.is_item_active(), imgui.is_item_deactivated()
+    imgui.invisible_button(f"handle {name}", imgui.ImVec2(2 * side, rect.height + below))
+    is_held, is_released = imgui.is_item_active(), bool(imgui.is_item_deactivated())
     color = pack_color(palette.accent if is_held or imgui.is_item_hovered() else palette.text)
-    draw, bottom = imgui.get_window_draw_list(), top + height
-    draw.add_line(imgui.ImVec2(x, top), imgui.ImVec2(x, bottom), color, scale)
-    side, tip = grip / 2, imgui.ImVec2(x, bottom - 3 * scale)
-    low = imgui.ImVec2(x - side, bottom + 4 * scale), imgui.ImVec2(x + side, bottom + 4 * scale)
-    draw.add_triangle_filled(tip, *low, color)
-    if not (is_held or is_released):
-        return None, False
-    return min(max((imgui.get_io().mouse_pos.x - left) / width, 0.0), 1.0), bool(is_released)
+    _draw_line(rect, value, color, scale())
+    ends = imgui.ImVec2(x - side, bottom + below), imgui.ImVec2(x + side, bottom + below)
+    imgui.get_window_draw_list().add_triangle_filled(imgui.ImVec2(x, bottom - 3 * scale()), *ends, color)
+    if is_held or is_released:
+        value = clamp((imgui.get_io().mouse_pos.x - rect.x) / rect.width, 0.0, 1.0)
+    return value, is_released

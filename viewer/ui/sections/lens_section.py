@@ -3,39 +3,20 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from imgui_bundle import imgui
 
-from iibr_core.beyond.optics import (
-    APERTURE_KINDS,
-    EXPOSURE_LIMIT_STOPS,
-    RING_INNER_LIMIT,
-    ApertureKind,
-    ApertureShape,
-)
-from iibr_core.scenes.lens_limits import BLADES_LIMITS, aperture_limit, focus_limits, focus_span
+from iibr_core.beyond.optics import EXPOSURE_LIMIT_STOPS, RING_INNER_LIMIT, ApertureKind, ApertureShape
+from iibr_core.scenes.lens_limits import BLADES_LIMITS, aperture_limit, clamp, focus_limits, focus_span
 from iibr_core.scenes.scene import Scene
-from viewer.model import lens
+from viewer.model import lens, units
 from viewer.model.action import Action, ask, do
-from viewer.model.layout import Layout
 from viewer.model.state.app_state import AppState
 from viewer.model.state.tasks import ChooseTask
-from viewer.model.units import (
-    ASSUMED_DISTANCE_M,
-    disparity_at,
-    disparity_at_percent,
-    distance_limits,
-    f_number,
-    f_number_text,
-    far_percent,
-    metres,
-    metres_text,
-    relative_distance,
-)
 from viewer.ui.sections.aperture_icons import draw_shape
 from viewer.ui.style import Palette, palette_of
-from viewer.ui.widgets import button, checkbox, choice, end_words, percent_slider, quiet, slider, whole_slider
+from viewer.ui.widgets import button, checkbox, choice, edit, in_row, percent_slider, quiet, scale, slider
 
 FOCUS_TIP = "Distance that is sharp, from near to far. You can also click in the picture or turn the wheel."
 FOCUS_DISPARITY_TIP = "Disparity that is sharp, in pixels per view step. Larger is closer."
@@ -46,7 +27,8 @@ F_NUMBER_TIP = " The f-number is that of a full-frame lens that is focused at {:
 EQUIVALENT_TIP = " ≈ f/2 means: an 85 mm full-frame lens, focused at 2 m, blurs the background as much at f/2."
 ALL_SHARP = "all sharp"
 """F-number of a pinhole."""
-
+SHAPE_HEIGHT = 32.0
+"""Height of the buttons of aperture shapes, in window units at usual size."""
 CLOSED_STOPS = 6.0
 """Length of the aperture's slider in stops, from the widest to a pinhole."""
 TILT_TIP = "Shows two handles in the picture. Drag them onto two objects to make both sharp, and all between."
@@ -60,157 +42,120 @@ KIND_TIPS: dict[ApertureKind, str] = {
 }
 
 
-def focus_section(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
+def focus_section(state: AppState, scene: Scene) -> list[Action]:
     """Build the section: the focus as a distance if it is known, range, tilt."""
-    optics = state.optics
-    actions = _distance(state, scene, layout) if state.preferences.units == "light field" else []
-    span, unit = focus_span(scene), _unit_of_focus(state, scene)
-    form = f"± {unit.form}" if optics.focus_range else "none"
-    new = slider("Range", optics.focus_range / unit.size, (0.0, span / unit.size), form, layout, RANGE_TIP)
-    actions += [] if new is None else [do(lens.set_focus_range, new * unit.size)]
-    shown = checkbox("Tilt", state.tilt_handles is not None or any(optics.focus_tilt), layout, TILT_TIP)
-    if shown is not None:
-        actions += [do(lens.show_tilt_handles, shown)] + ([] if shown else [do(lens.set_focus_tilt, (0.0, 0.0))])
-    is_tilted = state.tilt_handles is not None or any(optics.focus_tilt)
-    right, down = optics.focus_tilt
-    limits = (-span / unit.size, span / unit.size)
-    form = unit.form.replace("%", "%+", 1)
-    new = slider("Tilt right", right / unit.size, limits, form, layout, is_enabled=is_tilted)
-    actions += [] if new is None else [do(lens.set_focus_tilt, (new * unit.size, down))]
-    new = slider("Tilt down", down / unit.size, limits, form, layout, is_enabled=is_tilted)
-    actions += [] if new is None else [do(lens.set_focus_tilt, (right, new * unit.size))]
-    return actions
+    optics, span = state.optics, focus_span(scene)
+    (right, down), is_tilted = optics.focus_tilt, state.tilt_handles is not None or any(optics.focus_tilt)
+    is_in_px = state.preferences.units == "light field"
+    actions = _distance(state, scene) if is_in_px else []
+    size, form = (1.0, "%.2f px") if is_in_px else (span / 100, "%.0f %%")
+
+    def difference(text: str, value: float, low: float, form: str, tip: str = "", is_enabled: bool = True) -> float:
+        """Build a slider for a difference in px per view step, which is shown in units of `size`."""
+        shown = slider(text, value / size, (low / size, span / size), form, tip, is_enabled=is_enabled)
+        return value if shown == value / size else shown * size
+
+    focus_range = difference("Range", optics.focus_range, 0.0, f"± {form}" if optics.focus_range else "none", RANGE_TIP)
+    actions += edit(lens.set_focus_range, optics.focus_range, focus_range)
+    if checkbox("Tilt", is_tilted, TILT_TIP) != is_tilted:
+        actions.append(do(lens.show_tilt_handles, not is_tilted))
+        actions += [do(lens.set_focus_tilt, (0.0, 0.0))] if is_tilted else []
+    signed = form.replace("%", "%+", 1)
+    tilt = (
+        difference("Tilt right", right, -span, signed, is_enabled=is_tilted),
+        difference("Tilt down", down, -span, signed, is_enabled=is_tilted),
+    )
+    return actions + edit(lens.set_focus_tilt, optics.focus_tilt, tilt)
 
 
-@dataclass(frozen=True)
-class _Unit:
-    """A unit of disparity differences. size: in px per view step. form: printf-like."""
-
-    size: float
-    form: str
-
-
-def _unit_of_focus(state: AppState, scene: Scene) -> _Unit:
-    """Return the unit of differences: a hundredth of the range from near to far, or disparity."""
-    if state.preferences.units == "light field":
-        return _Unit(1.0, "%.2f px")
-    return _Unit(focus_span(scene) / 100, "%.0f %%")
-
-
-def focus_slider(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
+def focus_slider(state: AppState, scene: Scene) -> list[Action]:
     """Build the focus slider: from near to far, in metres if they are known; or as disparity."""
-    actions: list[Action] = []
     disparity = state.optics.focus_disparity
     if state.preferences.units == "light field" or not scene.has_view_disparity:  # else nothing is near or far yet
-        new = slider("Focus", disparity, focus_limits(scene), "%.2f px", layout, FOCUS_DISPARITY_TIP)
-        actions += [] if new is None else [do(lens.set_focus, new)]
-        return actions
-    distance = metres(scene, disparity)
-    form = "%.0f %%" if distance is None else metres_text(distance)
-    new = slider("Focus", far_percent(scene, disparity), (0.0, 100.0), form, layout, FOCUS_TIP)
-    end_words("near", "far", layout)
-    actions += [] if new is None else [do(lens.set_focus, disparity_at_percent(scene, new))]
-    return actions
+        edited = slider("Focus", disparity, focus_limits(scene), "%.2f px", FOCUS_DISPARITY_TIP)
+        return edit(lens.set_focus, disparity, edited)
+    distance, percent = units.metres(scene, disparity), units.far_percent(scene, disparity)
+    form = "%.0f %%" if distance is None else units.metres_text(distance)
+    new = slider("Focus", percent, (0.0, 100.0), f"near  ·  {form}  ·  far", FOCUS_TIP)
+    return [] if new == percent else [do(lens.set_focus, units.disparity_at_percent(scene, new))]
 
 
-def _distance(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
+def _distance(state: AppState, scene: Scene) -> list[Action]:
     """Build the slider of the focus as a distance, if that is known."""
-    limits = distance_limits(scene)
-    distance = relative_distance(scene, state.optics.focus_disparity)
+    limits = units.distance_limits(scene)
+    distance = units.relative_distance(scene, state.optics.focus_disparity)
     if limits is None:
         return []
-    shown = min(max(distance if distance is not None else limits[1], limits[0]), limits[1])
-    new = slider("Distance", shown, limits, "× %.2f", layout, DISTANCE_TIP, is_logarithmic=True)
-    disparity = None if new is None else disparity_at(scene, new)
+    shown = limits[1] if distance is None else clamp(distance, *limits)
+    new = slider("Distance", shown, limits, "× %.2f", DISTANCE_TIP, is_logarithmic=True)
+    disparity = None if new == shown else units.disparity_at(scene, new)
     return [] if disparity is None else [do(lens.set_focus, disparity)]
 
 
-def aperture_slider(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
-    """Build the aperture slider."""
+def aperture_slider(state: AppState, scene: Scene) -> list[Action]:
+    """Build the aperture slider, in stops like the ring of a lens: a pinhole at the left, wide open at the right."""
     diameter, widest = state.optics.aperture_diameter, aperture_limit(scene.grid)
-    words, is_exact = f_number_text(scene, diameter), f_number(scene, widest) is not None
-    tip = APERTURE_TIP + (F_NUMBER_TIP.format(ASSUMED_DISTANCE_M) if is_exact else EQUIVALENT_TIP)
+    words, is_exact = units.f_number_text(scene, diameter), units.f_number(scene, widest) is not None
+    tip = APERTURE_TIP + (F_NUMBER_TIP.format(units.ASSUMED_DISTANCE_M) if is_exact else EQUIVALENT_TIP)
     if state.preferences.units == "light field":
         form = ALL_SHARP if diameter == 0 else f"%.1f views  ·  {words}"
-        new = slider("Aperture", diameter, (0.0, widest), form, layout, tip)
-        return [] if new is None else [do(lens.set_aperture, new)]
-    return _stops(diameter, widest, ALL_SHARP if diameter == 0 else words, layout, tip)
-
-
-def aperture_section(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
-    """Build the section: the opening's shape and its numbers."""
-    shape = state.optics.aperture_shape
-    actions = _kinds(shape, layout, palette_of(state.preferences.theme))
-    if shape.kind == "mask":
-        actions += _mask_row(shape, layout)
-    return actions + [do(lens.set_aperture_shape, new) for new in _shape_edits(shape, layout)]
-
-
-def _stops(diameter: float, widest: float, words: str, layout: Layout, tip: str) -> list[Action]:
-    """Build the aperture slider in stops, like the ring of a lens: a pinhole at the left, wide open at the right."""
-    closed = CLOSED_STOPS if diameter == 0 else min(math.log2(widest / diameter), CLOSED_STOPS)
-    stops = slider("Aperture", CLOSED_STOPS - closed, (0.0, CLOSED_STOPS), words, layout, tip)
-    if stops is None:
+        return edit(lens.set_aperture, diameter, slider("Aperture", diameter, (0.0, widest), form, tip))
+    opened = 0.0 if diameter == 0 else max(CLOSED_STOPS - math.log2(widest / diameter), 0.0)
+    stops = slider("Aperture", opened, (0.0, CLOSED_STOPS), ALL_SHARP if diameter == 0 else words, tip)
+    if stops == opened:
         return []
     return [do(lens.set_aperture, widest * 2.0 ** (stops - CLOSED_STOPS) if stops > 0 else 0.0)]
 
 
-def _kinds(shape: ApertureShape, layout: Layout, palette: Palette) -> list[Action]:
+def aperture_section(state: AppState, scene: Scene) -> list[Action]:
+    """Build the section: the opening's shape and its numbers."""
+    shape = state.optics.aperture_shape
+    actions = _kinds(shape, palette_of(state.preferences.theme))
+    if shape.kind == "mask":
+        if button("Image…", "Choose a small grey image. White lets light through."):
+            actions.append(do(ask, ChooseTask("mask")))
+        if shape.mask is not None:
+            imgui.same_line()
+            imgui.align_text_to_frame_padding()
+            quiet(shape.mask.name)
+    return actions + edit(lens.set_aperture_shape, shape, _shape_rows(shape))
+
+
+def _kinds(shape: ApertureShape, palette: Palette) -> list[Action]:
     """Build a row of buttons that show the shapes. The mask without an image opens a dialog."""
     actions: list[Action] = []
-    spacing = imgui.get_style().item_spacing.x
-    width = (imgui.get_content_region_avail().x - spacing * (len(APERTURE_KINDS) - 1)) / len(APERTURE_KINDS)
-    height = 32 * layout.ui_scale
-    for kind in APERTURE_KINDS:
+    height = SHAPE_HEIGHT * scale()
+    for (kind, tip), width in in_row(tuple(KIND_TIPS.items())):
         corner = imgui.get_cursor_screen_pos()
-        if choice(f"##{kind}", shape.kind == kind, layout, (width, height), KIND_TIPS[kind]):
+        if choice(f"##{kind}", shape.kind == kind, (width, height), tip):
             needs_image = kind == "mask" and shape.mask is None
-            actions.append(
-                do(ask, ChooseTask("mask")) if needs_image else do(lens.set_aperture_shape, replace(shape, kind=kind))
-            )
+            chosen = do(lens.set_aperture_shape, replace(shape, kind=kind))
+            actions.append(do(ask, ChooseTask("mask")) if needs_image else chosen)
         middle = corner.x + width / 2, corner.y + height / 2
         draw_shape(replace(shape, kind=kind), middle, 0.32 * height, palette)
-        imgui.same_line()
-    imgui.new_line()
     return actions
 
 
-def _shape_edits(shape: ApertureShape, layout: Layout) -> list[ApertureShape]:
-    """Build two rows for every shape, so that nothing below moves under a click."""
-    edits: list[ApertureShape | None] = []
+def _shape_rows(shape: ApertureShape) -> ApertureShape:
+    """Build two rows for every shape, so that nothing below moves under a click; return the edited shape."""
+    edited = shape
     if shape.kind in ("disc", "polygon"):
-        blades = whole_slider("Blades", shape.blades, BLADES_LIMITS, layout, is_enabled=shape.kind == "polygon")
-        edits.append(None if blades is None else replace(shape, blades=blades))
+        blades = slider("Blades", shape.blades, BLADES_LIMITS, "%.0f", is_enabled=shape.kind == "polygon")
+        edited = replace(shape, blades=round(blades))
     if shape.kind == "ring":
-        inner = slider("Blocked", shape.ring_inner, (0.0, RING_INNER_LIMIT), "%.2f of the radius", layout)
-        edits.append(None if inner is None else replace(shape, ring_inner=inner))
+        blocked = slider("Blocked", shape.ring_inner, (0.0, RING_INNER_LIMIT), "%.2f of the radius")
+        edited = replace(shape, ring_inner=blocked)
     if shape.kind == "cat_eye":
-        cut = slider("Cut off", shape.cat_eye, (0.0, 1.0), "%.2f", layout)
-        edits.append(None if cut is None else replace(shape, cat_eye=cut))
+        edited = replace(shape, cat_eye=slider("Cut off", shape.cat_eye, (0.0, 1.0), "%.2f"))
     can_turn = shape.kind in ("polygon", "mask")
-    turned = slider("Rotation", shape.rotation_deg, (0.0, 359.0), "%.0f°", layout, is_enabled=can_turn)
-    edits.append(None if turned is None else replace(shape, rotation_deg=turned))
-    return [edit for edit in edits if edit is not None]
+    return replace(
+        edited, rotation_deg=slider("Rotation", shape.rotation_deg, (0.0, 359.0), "%.0f°", "", False, can_turn)
+    )
 
 
-def _mask_row(shape: ApertureShape, layout: Layout) -> list[Action]:
-    actions: list[Action] = []
-    if button("Image…", layout, "Choose a small grey image. White lets light through."):
-        actions.append(do(ask, ChooseTask("mask")))
-    if shape.mask is not None:
-        imgui.same_line()
-        imgui.align_text_to_frame_padding()
-        quiet(shape.mask.name)
-    return actions
-
-
-def light_section(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
+def light_section(state: AppState, scene: Scene) -> list[Action]:
     """Build the section: exposure and highlights."""
-    optics = state.optics
-    actions: list[Action] = []
-    limits = (-EXPOSURE_LIMIT_STOPS, EXPOSURE_LIMIT_STOPS)
-    new = slider("Exposure", optics.exposure_stops, limits, "%+.1f stops", layout)
-    actions += [] if new is None else [do(lens.set_exposure, new)]
-    new = percent_slider("Highlights", optics.highlight_recovery, layout, HIGHLIGHT_TIP)
-    actions += [] if new is None else [do(lens.set_highlights, new)]
-    return actions
+    stops, share = state.optics.exposure_stops, state.optics.highlight_recovery
+    exposure = slider("Exposure", stops, (-EXPOSURE_LIMIT_STOPS, EXPOSURE_LIMIT_STOPS), "%+.1f stops")
+    highlights = percent_slider("Highlights", share, HIGHLIGHT_TIP)
+    return edit(lens.set_exposure, stops, exposure) + edit(lens.set_highlights, share, highlights)

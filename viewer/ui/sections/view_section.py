@@ -9,51 +9,45 @@ from iibr_core.scenes.lens_limits import dolly_limit
 from iibr_core.scenes.scene import Scene
 from viewer.model import lens, viewpoint
 from viewer.model.action import Action, do
-from viewer.model.layout import Layout
 from viewer.model.state.app_state import AppState
 from viewer.model.viewpoint import SPEED_LIMITS
 from viewer.ui.sections.viewpoint_pad import pad
-from viewer.ui.widgets import button, slider, tooltip
+from viewer.ui.widgets import button, edit, slider, tooltip
 
 PAD_TIP = "Drag to move the viewpoint. Dots are views; faint dots are views that are still being made."
 RECENTER_TIP = "Return to the photo's viewpoint (double click, or C)."
 PAUSE_TIP = "Pause or resume the motion (Space)."
 SPEED_TIP = "Speed of a motion."
+DOLLY_TIP = "Step into the picture or back, as far as the views reach."
 
 
-def view_section(state: AppState, scene: Scene, layout: Layout) -> list[Action]:
+def view_section(state: AppState, scene: Scene) -> list[Action]:
     """Build the section."""
-    actions = pad(state, scene, layout)
-    if not state.motion.is_running:
-        tooltip("" if imgui.is_item_active() else PAD_TIP, layout)
+    motion, dolly = state.motion, state.optics.dolly
+    actions = pad(state, scene)
+    if not motion.is_running:
+        tooltip("" if imgui.is_item_active() else PAD_TIP)
     imgui.same_line()
     imgui.begin_group()
-    actions += _beside_pad(state, layout)
-    _place(state)
+    actions += _beside_pad(state)
     imgui.end_group()
-    speed = slider("Speed", state.motion.speed, SPEED_LIMITS, "%.2f turns/s", layout, SPEED_TIP, is_logarithmic=True)
-    actions += [] if speed is None else [do(viewpoint.set_speed, speed)]
+    speed = slider("Speed", motion.speed, SPEED_LIMITS, "%.2f turns/s", SPEED_TIP, is_logarithmic=True)
+    actions += edit(viewpoint.set_speed, motion.speed, speed)
     if farthest := dolly_limit(scene.grid):
-        tip = "Step into the picture or back, as far as the views reach."
-        dolly = slider("Dolly", state.optics.dolly, (-farthest, farthest), "%+.2f views", layout, tip)
-        actions += [] if dolly is None else [do(lens.set_dolly, dolly)]
+        edited = slider("Dolly", dolly, (-farthest, farthest), "%+.2f views", DOLLY_TIP)
+        actions += edit(lens.set_dolly, dolly, edited)
     return actions
 
 
-def _beside_pad(state: AppState, layout: Layout) -> list[Action]:
-    """Build the buttons beside the pad."""
+def _beside_pad(state: AppState) -> list[Action]:
+    """Build the buttons beside the pad, and the viewpoint in one line that never wraps."""
     actions: list[Action] = []
-    width = imgui.get_content_region_avail().x
-    if button("Recenter", layout, RECENTER_TIP, width=width):
+    width, eye = imgui.get_content_region_avail().x, state.optics.eye
+    if button("Recenter", RECENTER_TIP, width=width):
         actions.append(do(viewpoint.return_home))
     word = "Resume" if state.motion.is_paused else "Pause"
-    if button(f"{word}##motion", layout, PAUSE_TIP, state.motion.kind in LOOPS, width):
+    if button(f"{word}##motion", PAUSE_TIP, state.motion.kind in LOOPS, width):
         actions.append(do(viewpoint.pause, not state.motion.is_paused))
-    return actions
-
-
-def _place(state: AppState) -> None:
-    """Show the viewpoint in one line that never wraps."""
-    eye = state.optics.eye
     s, t = (round(value, 1) + 0.0 for value in (eye.s, eye.t))  # + 0.0 takes the sign of -0.0 away
     imgui.text_disabled(f"{abs(s):.1f} {'←' if s < 0 else '→'}  {abs(t):.1f} {'↑' if t < 0 else '↓'}")
+    return actions
