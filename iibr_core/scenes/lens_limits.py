@@ -21,8 +21,8 @@ STEEPEST_TILT = 4.0
 
 
 def clamp(value: float, low: float, high: float) -> float:
-    """Return the nearest value from low to high."""
-    return float(min(max(value, low), high))
+    """Return the nearest value from low to high; low for a value that is not a number."""
+    return float(min(max(low, value), high))
 
 
 def eye_limits(views: int) -> tuple[float, float]:

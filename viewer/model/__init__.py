@@ -1,1 +1,1 @@
-"""What the program knows and how it changes: no GL, no ImGui, no threads."""
+"""The state of the window and the verbs that change it: no GL, no ImGui, no threads."""

@@ -1,4 +1,4 @@
-"""Editing of depth: verbs, and what follows from the state. Values that are not finite change nothing."""
+"""Editing of depth: verbs, and what follows from the state."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def set_refine(state: AppState, is_on: bool) -> AppState:
 @undoable
 def set_tone(state: AppState, tone: DepthEdits, is_finished: bool) -> AppState:
     """Invert, clip and bend the disparity; strokes of `tone` do not count. Only the preview shows unfinished edits."""
-    if not (_is_editable(state) and all(map(isfinite, (tone.far_clip, tone.near_clip, tone.gamma)))):
+    if not _is_editable(state):
         return state
     edits = replace(_clamp_tone(tone, state.depth.edits), strokes=state.depth.edits.strokes)
     return _with_settings(state, replace(state.depth, edits=edits), is_finished)
@@ -56,8 +56,6 @@ def reset(state: AppState) -> AppState:
 
 def set_brush(state: AppState, brush: Brush) -> AppState:
     """Take this brush or put it away. Taking it opens the section with its settings."""
-    if not all(map(isfinite, (brush.radius, brush.strength, brush.tolerance))):
-        return state
     if not _is_editable(state):
         is_refused = brush.is_on and state.scene is not None
         return notify(state, Notice(NO_DEPTH_HERE)) if is_refused else state
@@ -82,7 +80,7 @@ def _with_brush_overlay(state: AppState, brush: Brush) -> AppState:
 
 def paint(state: AppState, place: tuple[float, float]) -> AppState:
     """Begin or continue a stroke at a place, (x, y) as shares of the photo's width and height."""
-    if state.scene is None or not (_is_editable(state) and all(map(isfinite, place))):
+    if state.scene is None or not _is_editable(state):
         return state
     if state.stroke is None:
         stroke = _first_stroke(state.brush, place)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 
 from iibr_core.scenes.lens_limits import clamp
@@ -73,8 +72,6 @@ def set_overlay(state: AppState, kind: OverlayKind | None) -> AppState:
 
 def set_opacity(state: AppState, opacity: float) -> AppState:
     """Set the opacity of overlays, 0..1."""
-    if not math.isfinite(opacity):
-        return state
     return replace(state, inspection=replace(state.inspection, opacity=clamp(opacity, 0.0, 1.0)))
 
 
@@ -98,8 +95,6 @@ def take_snapshot(state: AppState) -> AppState:
 
 def move_divider(state: AppState, place: float) -> AppState:
     """Drag the divider to a place, 0..1 from the left border."""
-    if not math.isfinite(place):
-        return state
     divider = clamp(place, DIVIDER_MARGIN, 1 - DIVIDER_MARGIN)
     return replace(state, inspection=replace(state.inspection, divider=divider, divider_taken=True))
 

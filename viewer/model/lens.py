@@ -191,8 +191,6 @@ def show_before(state: AppState, is_shown: bool) -> AppState:
 @undoable
 def set_depth_strength(state: AppState, strength: float, is_finished: bool) -> AppState:
     """Multiply the planned parallax. is_finished: the edit is over, so the field is made again."""
-    if not math.isfinite(strength):
-        return state
     restarts = is_finished and state.source is not None
     generation = state.generation + 1 if restarts else state.generation
     return replace(state, depth_strength=clamp(strength, 0.0, DEPTH_STRENGTH_LIMIT), generation=generation)
@@ -224,7 +222,7 @@ def take_gloss_brush(state: AppState, brush: GlossBrush) -> AppState:
 def paint_gloss(state: AppState, place: tuple[float, float], brush: GlossBrush, begins: bool) -> AppState:
     """Begin a stroke of the gloss brush at a place (x, y), in shares of the photo's size, or continue the last one."""
     gloss, scene = state.optics.gloss, state.scene
-    if gloss is None or scene is None or not all(map(math.isfinite, place)):
+    if gloss is None or scene is None:
         return state
     strokes, place = gloss.surface.strokes, (clamp(place[0], -1.0, 2.0), clamp(place[1], -1.0, 2.0))
     stroke = GlossStroke((place,), brush.radius, brush.erases)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 
 from iibr_core.scenes.lens_limits import clamp
@@ -18,9 +17,7 @@ def set_theme(state: AppState, theme: Theme) -> AppState:
 
 
 def set_font_scale(state: AppState, scale: float) -> AppState:
-    """Scale text and widgets by a finite factor."""
-    if not math.isfinite(scale):
-        return state
+    """Scale text and widgets by a factor."""
     return replace(state, preferences=replace(state.preferences, font_scale=clamp(scale, *FONT_SCALE_LIMITS)))
 
 

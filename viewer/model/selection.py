@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from math import isfinite
 
 from iibr_core.depth.editing.edits import BrushTool, Stroke
 from viewer.model import lens
@@ -19,7 +18,7 @@ HOLE_RADIUS = 0.03
 
 def select(state: AppState, place: tuple[float, float]) -> AppState:
     """Select the surface at a place, (x, y) as shares of the photo's width and height."""
-    return replace(state, selection=Selection(place)) if all(map(isfinite, place)) else state
+    return replace(state, selection=Selection(place))
 
 
 def deselect(state: AppState) -> AppState:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 
 from iibr_core.beyond.optics import CENTRE, Optics
@@ -68,8 +67,6 @@ def set_loop(state: AppState, kind: LoopKind | None) -> AppState:
 
 def set_speed(state: AppState, turns_per_second: float) -> AppState:
     """Set the speed of loops."""
-    if not math.isfinite(turns_per_second):
-        return state
     return replace(state, motion=replace(state.motion, speed=clamp(turns_per_second, *SPEED_LIMITS)))
 
 
@@ -80,7 +77,7 @@ def pause(state: AppState, is_paused: bool) -> AppState:
 
 def tick(state: AppState, now_s: float) -> AppState:
     """Continue the motion up to a time on the clock, in seconds."""
-    if state.scene is None or not state.motion.is_running or not math.isfinite(now_s):
+    if state.scene is None or not state.motion.is_running:
         return state
     motion, optics = _advance(state.motion, state.optics, state.scene.grid, now_s)
     return replace(state, motion=motion, optics=clamp_optics(optics, state.scene))
@@ -94,8 +91,6 @@ def move_camera(state: AppState, right: float = 0.0, down: float = 0.0, forward:
         return notify(state, Notice(PHOTOS_ONLY))
     camera = state.free_camera or FreeCamera()
     right, down, forward = camera.right + right, camera.down + down, camera.forward + forward
-    if not all(map(math.isfinite, (right, down, forward))):
-        return state
     right, down = (clamp(turn, -MAX_ASIDE, MAX_ASIDE) for turn in (right, down))
     return replace(state, free_camera=FreeCamera(right, down, clamp(forward, *FORWARD_LIMITS)))
 
@@ -111,8 +106,8 @@ def report_camera(state: AppState, done: float | None) -> AppState:
 
 
 def set_zoom(state: AppState, zoom: Zoom | None) -> AppState:
-    """Show a part of the picture; None, or numbers that are not finite: the whole picture."""
-    if zoom is None or state.scene is None or not all(map(math.isfinite, (zoom.scale, *zoom.centre))):
+    """Show a part of the picture; None: the whole picture."""
+    if zoom is None or state.scene is None:
         return replace(state, zoom=None)
     x, y = (clamp(at, 0.0, 1.0) for at in zoom.centre)
     return replace(state, zoom=Zoom(max(zoom.scale, MIN_ZOOM), (x, y)))

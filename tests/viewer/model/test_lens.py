@@ -191,7 +191,6 @@ def test_dragging_a_handle_is_one_edit_and_lets_go_at_the_end() -> None:
     assert state.tilt_handles is not None
     assert state.tilt_handles.taken is None
     assert len(state.history.past) == 1
-    assert lens.move_tilt_handle(state, 1, (math.nan, 0.0), 1.0) == state
     clicked = lens.focus_on(state, (0.9, 0.9), 0.3)
     assert sharp_disparity(clicked.optics, (0.9, 0.9)) == pytest.approx(0.3)
 

@@ -98,7 +98,6 @@ def test_a_delay_is_no_leap_and_a_pause_holds() -> None:
     state = viewpoint.tick(viewpoint.set_loop(photo(), "circle"), 0.0)
     assert viewpoint.tick(state, 1000.0).motion.turns == pytest.approx(MAX_STEP_S * state.motion.speed)
     assert viewpoint.tick(state, -5.0).motion.turns == 0, "a clock that goes back"
-    assert viewpoint.tick(state, math.nan) == state
     running = ticked(viewpoint.set_loop(photo(), "eight"), 1.0)[-1]
     paused = viewpoint.pause(running, True)
     assert ticked(paused, 1.0, start=500.0)[-1].optics == running.optics
@@ -106,7 +105,6 @@ def test_a_delay_is_no_leap_and_a_pause_holds() -> None:
     assert resumed.optics.eye == pytest.approx(running.optics.eye)
     faster = viewpoint.set_speed(running, 99.0)
     assert (faster.motion.speed, faster.motion.turns) == (SPEED_LIMITS[1], running.motion.turns)
-    assert viewpoint.set_speed(running, math.inf) == running
 
 
 @pytest.mark.parametrize(
@@ -175,11 +173,9 @@ def test_steps_of_the_camera_lead_to_its_limits_and_back(step: tuple[float, floa
     assert viewpoint.move_camera(state, *(-part / 2 for part in step)).free_camera != end
 
 
-def test_the_camera_needs_a_photo_and_finite_numbers() -> None:
+def test_the_camera_needs_a_photo() -> None:
     for moved in (do(viewpoint.move_camera, 0.1), do(viewpoint.set_loop, "circle"), do(viewpoint.return_home)):
         assert moved.apply(AppState()) == AppState()
-    for value in (math.inf, math.nan):
-        assert viewpoint.move_camera(photo(), value, 0.1, 0.1).free_camera is None
     field = viewpoint.move_camera(state_with(scene_of()), forward=0.1)
     assert field.free_camera is None
     assert "needs a photo" in field.notices[-1].text
