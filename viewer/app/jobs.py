@@ -37,8 +37,7 @@ from viewer.model import saving
 from viewer.model.action import Action, do
 from viewer.model.carried_optics import carry_optics
 from viewer.model.state.app_state import AppState
-from viewer.model.state.jobs import STOPPING, WAITING_FOR_VIEWS, JobKind, JobProgress
-from viewer.model.state.prompts import ExportPrompt
+from viewer.model.state.prompts import STOPPING, WAITING_FOR_VIEWS, ExportPrompt, JobKind, JobProgress
 
 Needs = Literal["shown", "photo", "views"]
 """The part of the scene that a job needs: what the window shows now, the photo and its plan, or all its views."""

@@ -31,9 +31,8 @@ from viewer.model import messages, saving
 from viewer.model.action import Action, do
 from viewer.model.remedies import words_of
 from viewer.model.state.app_state import AppState
-from viewer.model.state.jobs import WRITING
 from viewer.model.state.notices import Notice
-from viewer.model.state.prompts import ExportPrompt, SavePrompt
+from viewer.model.state.prompts import WRITING, ExportPrompt, SavePrompt
 from viewer.model.state.tasks import ExportTask, SaveTask
 from viewer.model.viewpoint import clicked_rack
 

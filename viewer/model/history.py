@@ -8,8 +8,7 @@ from functools import wraps
 from typing import Concatenate, ParamSpec
 
 from iibr_core.beyond.optics import Optics
-from viewer.model.state.app_state import AppState
-from viewer.model.state.history import Edit, History
+from viewer.model.state.app_state import AppState, Edit, History
 from viewer.model.state.viewpoint import Motion
 
 MAX_EDITS = 200

@@ -17,9 +17,8 @@ from viewer.model.carried_optics import NewDepth, carry_optics, carry_to_depth, 
 from viewer.model.history import map_optics, undoable
 from viewer.model.messages import MAX_NOTICES, notify
 from viewer.model.remedies import DEPTH_COMMANDS
-from viewer.model.state.app_state import AppState
+from viewer.model.state.app_state import AppState, History
 from viewer.model.state.folder import PhotoFacts
-from viewer.model.state.history import History
 from viewer.model.state.notices import Notice
 from viewer.model.state.saving import SavedSettings
 from viewer.model.state.tasks import PlainTask

@@ -12,9 +12,8 @@ from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import InputError
 from viewer.model.messages import notify
 from viewer.model.state.app_state import AppState
-from viewer.model.state.jobs import FinishedExport, JobProgress
 from viewer.model.state.notices import Notice
-from viewer.model.state.prompts import ExportPrompt, Saved, SavePrompt
+from viewer.model.state.prompts import ExportPrompt, FinishedExport, JobProgress, Saved, SavePrompt
 from viewer.model.state.saving import SavedSettings
 
 MAX_FINISHED = 8

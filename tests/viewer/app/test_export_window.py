@@ -25,8 +25,7 @@ from tests.viewer.conftest import Driver, Opener, write_scene
 from viewer.app.main_loop import App
 from viewer.model import depth, gesture, lens, messages, opening, saving
 from viewer.model.action import Action, ask, do
-from viewer.model.state.jobs import WAITING_FOR_VIEWS
-from viewer.model.state.prompts import ExportPrompt, SavePrompt
+from viewer.model.state.prompts import WAITING_FOR_VIEWS, ExportPrompt, SavePrompt
 from viewer.model.state.tasks import CancelJobTask, ExportTask, SaveTask
 
 SMALL = ExportOptions(size=ScreenSize(96, 64), frames=4)

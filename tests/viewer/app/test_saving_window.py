@@ -24,8 +24,7 @@ from viewer.app.saving import OPEN_PHOTO
 from viewer.model import lens, messages, saving
 from viewer.model.action import Action, ask, do
 from viewer.model.saved_settings import read_settings
-from viewer.model.state.jobs import WAITING_FOR_VIEWS, WRITING
-from viewer.model.state.prompts import Saved, SavePrompt
+from viewer.model.state.prompts import WAITING_FOR_VIEWS, WRITING, Saved, SavePrompt
 from viewer.model.state.tasks import PlainTask, SaveTask
 
 SIZE = ScreenSize(150, 100)

@@ -19,8 +19,8 @@ from viewer.model.action import do
 from viewer.model.messages import MAX_NOTICES
 from viewer.model.remedies import DEPTH_COMMANDS
 from viewer.model.state.app_state import AppState, Hover, Picture
-from viewer.model.state.jobs import JobProgress
 from viewer.model.state.notices import Notice
+from viewer.model.state.prompts import JobProgress
 from viewer.model.state.saving import SavedSettings
 
 SOURCE = Source("photo.png")

@@ -23,9 +23,8 @@ from viewer.model.action import do
 from viewer.model.layout import PANEL_WIDTH
 from viewer.model.state.app_state import AppState
 from viewer.model.state.depth_models import ModelsPrompt
-from viewer.model.state.jobs import JobProgress
 from viewer.model.state.preferences import SECTIONS, Theme, Units
-from viewer.model.state.prompts import ExportPrompt, PalettePrompt, PathPrompt, Prompt, SavePrompt
+from viewer.model.state.prompts import ExportPrompt, JobProgress, PalettePrompt, PathPrompt, Prompt, SavePrompt
 from viewer.ui.style import Color, Look, apply_style, palette_of
 
 WINDOW = ScreenSize(1280, 800)

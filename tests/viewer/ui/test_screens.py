@@ -22,10 +22,9 @@ from viewer.model import inspection, lens, messages, opening, preferences, savin
 from viewer.model.action import Action, do
 from viewer.model.layout import PANEL_WIDTH, layout_of
 from viewer.model.state.app_state import AppState, DrawReport, Hover
-from viewer.model.state.jobs import WRITING, JobProgress
 from viewer.model.state.notices import Notice
 from viewer.model.state.preferences import SECTIONS, Section, with_sections
-from viewer.model.state.prompts import PalettePrompt, PathPrompt
+from viewer.model.state.prompts import WRITING, JobProgress, PalettePrompt, PathPrompt
 from viewer.model.state.saving import SavedSettings
 from viewer.ui.overlays.notice_corner import job_text
 from viewer.ui.style import DARK, LIGHT

@@ -16,15 +16,36 @@ from iibr_core.scenes.screen_size import ScreenSize
 from viewer.model.state.depth import Brush, Selection
 from viewer.model.state.depth_models import DepthModels
 from viewer.model.state.folder import PhotoFacts, PhotoFolder
-from viewer.model.state.history import History
 from viewer.model.state.inspection import Inspection
-from viewer.model.state.jobs import FinishedExport, JobProgress
 from viewer.model.state.lens import GlossBrush, TiltHandles
 from viewer.model.state.notices import Notice
 from viewer.model.state.preferences import Preferences
-from viewer.model.state.prompts import ExportPrompt, Prompt
+from viewer.model.state.prompts import ExportPrompt, FinishedExport, JobProgress, Prompt
 from viewer.model.state.tasks import Task
 from viewer.model.state.viewpoint import FreeCamera, Motion, Zoom
+
+
+@dataclass(frozen=True)
+class Edit:
+    """The part of the state that undo restores."""
+
+    optics: Optics
+    depth_strength: float
+    depth: DepthSettings = AS_FOUND
+
+
+@dataclass(frozen=True)
+class History:
+    """Edits to undo (the latest last) and to redo (the next first), in the units of the open scene.
+
+    last: kind of the latest edit. gesture: that kind while its gesture lasts, "" after: more edits of this kind
+    belong to it until the pointer goes down or up.
+    """
+
+    past: tuple[Edit, ...] = ()
+    future: tuple[Edit, ...] = ()
+    last: str = ""
+    gesture: str = ""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Questions to the user, one at a time, over everything else."""
+"""Questions to the user, one at a time, over everything else; saves and exports that follow from them."""
 
 from __future__ import annotations
 
@@ -66,3 +66,39 @@ class PalettePrompt:
 
 Prompt = PathPrompt | SavePrompt | ExportPrompt | ModelsPrompt | PalettePrompt | Literal["help", "quit", "exports"]
 """quit: whether to close although jobs are under way. exports: the list of exports."""
+
+JobKind = Literal["picture", "map", "copy", "export"]
+
+WAITING_FOR_VIEWS = "waiting for the views"
+WRITING = "writing the file"
+STOPPING = "stopping"
+
+
+@dataclass(frozen=True)
+class JobProgress:
+    """A job that waits or runs.
+
+    name: of its file or folder. doing: its present step, "" while it waits for its turn. done: share of this step,
+    0..1. left_s: seconds that the step still takes, None if not known.
+    """
+
+    id: int
+    kind: JobKind
+    name: str
+    doing: str = ""
+    done: float = 0.0
+    left_s: float | None = None
+
+    @property
+    def can_be_cancelled(self) -> bool:
+        """Whether it has not come to writing its file."""
+        return self.doing not in (WRITING, STOPPING)
+
+
+@dataclass(frozen=True)
+class FinishedExport:
+    """An export that was written or failed. prompt: asks for the same again. problem: why it failed."""
+
+    path: str
+    prompt: ExportPrompt
+    problem: str = ""

@@ -14,8 +14,8 @@ from viewer.model.commands import BY_NAME
 from viewer.model.layout import MARGIN, STRIP_GAP, Layout
 from viewer.model.state.app_state import AppState
 from viewer.model.state.depth_models import ModelOffer
-from viewer.model.state.jobs import WRITING, JobKind, JobProgress
 from viewer.model.state.notices import Notice
+from viewer.model.state.prompts import WRITING, JobKind, JobProgress
 from viewer.model.state.tasks import CancelJobTask, ChooseTask, PlainTask
 from viewer.ui.overlays.prompt_rows import CARD_FLAGS, button_rows, file_offers
 from viewer.ui.style import palette_of

@@ -13,8 +13,16 @@ from viewer.model.commands import COMMANDS, Command, commands_matching, recent_c
 from viewer.model.layout import PANEL_WIDTH, Layout
 from viewer.model.state.app_state import AppState
 from viewer.model.state.depth_models import ModelsPrompt
-from viewer.model.state.jobs import FinishedExport, JobProgress
-from viewer.model.state.prompts import ChoiceOf, ExportPrompt, PalettePrompt, PathPrompt, Prompt, SavePrompt
+from viewer.model.state.prompts import (
+    ChoiceOf,
+    ExportPrompt,
+    FinishedExport,
+    JobProgress,
+    PalettePrompt,
+    PathPrompt,
+    Prompt,
+    SavePrompt,
+)
 from viewer.model.state.tasks import TakePathTask
 from viewer.ui.overlays import prompt_rows as rows
 from viewer.ui.overlays.export_prompt import export_prompt
