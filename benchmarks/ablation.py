@@ -36,7 +36,7 @@ from iibr_core.training.losses import LossWeights
 from iibr_core.training.model import RayTransformer
 from iibr_core.training.trainer import TrainConfig, TrainingRun
 from iibr_core.types import FloatImage
-from viewer.cli.progress import show_progress
+from viewer.cli.messages import show_progress
 from viewer.cli.train import ENTROPY_WEIGHT
 
 SEED, LEARNING_RATE = 0, 3e-3

@@ -62,7 +62,7 @@ def _report(error: Exception) -> int:
     import typer
 
     from iibr_core.types import InputError
-    from viewer.cli.remedies import words_of
+    from viewer.cli.messages import words_of
 
     if isinstance(error, typer.Abort) and isinstance(error.__cause__, EOFError):
         error = error.__cause__  # Typer takes the end of any file for an interruption

@@ -5,49 +5,38 @@ from __future__ import annotations
 import os
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from iibr_core.exports.batch import FAILURES, BatchSettings, check_batch_folder, photos_in, run_batch
+from iibr_core.exports.source import OpenDrawn
 from iibr_core.runtime.extras import require_extra
 from iibr_core.types import InputError
 from viewer.cli.export_options import KindOptions, To, require_kind
-from viewer.cli.lens_options import LensOptions
-from viewer.cli.option_records import with_option_records
-from viewer.cli.options import Force, Grid, LiteralDisparity, PhotoOptions, require_model
-from viewer.cli.progress import show_progress
-from viewer.cli.remedies import BETTER_DEPTH
-
-if TYPE_CHECKING:
-    from iibr_core.exports.source import OpenDrawn
+from viewer.cli.messages import BETTER_DEPTH, show_progress
+from viewer.cli.option_records import option, output_option, with_option_records
+from viewer.cli.options import Force, Grid, LensOptions, LiteralDisparity, PhotoOptions, require_model
 
 MAX_WORKERS = 1024
+DASK = (
+    "Dask scheduler (tcp://HOST:PORT or tls://HOST:PORT) whose workers are used instead. [bold]Whoever can reach a"
+    " scheduler can run code as you[/bold]: use TLS outside a network that you trust."
+)
 
 
 @with_option_records
 def batch(
     context: typer.Context,
-    folders: Annotated[list[Path], typer.Argument(help="Folders of photos.", show_default=False)],
+    folders: Annotated[list[Path], typer.Argument(metavar="FOLDER...", help="Folders of photos.")],
     to: To,
-    output: Annotated[Path, typer.Option("--output", "-o", metavar="DIR", help="Folder of all exports.")],
+    output: Annotated[Path, output_option("Folder of all exports.", "DIR")],
     lens: LensOptions,
     *,
     workers: Annotated[
-        int | None,
-        typer.Option(
-            min=1, max=MAX_WORKERS, metavar="N", help="Number of processes on this machine.", show_default="1 per core"
-        ),
+        int | None, option("Number of processes on this machine.", "N", "1 per core", min=1, max=MAX_WORKERS)
     ] = None,
-    dask: Annotated[
-        str,
-        typer.Option(
-            metavar="ADDRESS",
-            help="Dask scheduler (tcp://HOST:PORT or tls://HOST:PORT) whose workers are used instead. [bold]Whoever can"
-            " reach a scheduler can run code as you[/bold]: use TLS outside a network that you trust.",
-            show_default=False,
-        ),
-    ] = "",
+    dask: Annotated[str | None, option(DASK, "ADDRESS")] = None,
     kind_options: KindOptions,
     photo: PhotoOptions,
     literal: LiteralDisparity = False,
@@ -78,7 +67,7 @@ def batch(
     # Processes write nothing to the terminal and import nothing from the working folder.
     os.environ.update(PYTHONWARNINGS="ignore", PYTHONSAFEPATH="1")
     with show_progress("looking", counts=True):
-        count = run_batch(photos, settings, output, folders, workers=workers, dask=dask, force=force)
+        count = run_batch(photos, settings, output, folders, workers=workers, dask=dask or "", force=force)
     print(f"{output}: {count.written} written, {count.there_before} there before, {count.failed} failed")
     if count.guessed:
         print(f"{count.guessed} of {count.written} written have guessed depth. {BETTER_DEPTH}")

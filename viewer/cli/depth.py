@@ -10,23 +10,23 @@ import typer
 from iibr_core.formats.light_fields.light_field_formats import find_light_field, open_light_field
 from iibr_core.formats.outputs import check_output
 from iibr_core.scenes.scene import Source
-from viewer.cli.option_records import with_option_records
+from viewer.cli.messages import print_notes, show_progress
+from viewer.cli.option_records import output_option, with_option_records
 from viewer.cli.options import DepthOptions, Force, inputs_of_command, require_heeded, require_model
-from viewer.cli.progress import print_notes, show_progress
 
 
 @with_option_records
 def depth(
     context: typer.Context,
-    path: Annotated[Path, typer.Argument(help="A light field, a stereo photo, or any photo.")],
-    output: Annotated[Path, typer.Option("--output", "-o", metavar="FILE", help="Map to write: PFM, EXR, NPY or PNG.")],
+    path: Annotated[Path, typer.Argument(metavar="PATH", help="A light field, a stereo photo, or any photo.")],
+    output: Annotated[Path, output_option("Map to write: PFM, EXR, NPY or PNG.")],
     options: DepthOptions,
     force: Force = False,
 ) -> None:
     """Write the disparity of the centre view, in pixels per view step; of a stereo photo, that of the left view.
 
-    Light fields and stereo photos: it is found from all views. Photos, and stereo photos with --depth or --depth-model:
-    a map beside the photo, one in it, a model's estimate, or a guess.
+    For light fields and stereo photos, it is found from all views. For photos, and stereo photos with --depth or
+    --depth-model, it is that of a map beside the photo, one in it, a model's estimate, or a guess.
 
     Example: iibr depth photo.jpg -o photo_disparity.png
     """
@@ -43,12 +43,11 @@ def depth(
     with show_progress("reading"):
         if path.is_file() and (source.depth.start != "auto" or find_light_field(path) is None):
             loaded = load_photo(source)
-            name, values, notes, origin = (
-                loaded.photo.name, loaded.disparity.values, loaded.disparity.notes, loaded.origin,
-            )  # fmt: skip
+            name, origin = loaded.photo.name, loaded.origin
+            values, notes = loaded.disparity.values, loaded.disparity.notes
         else:
             field = open_light_field(path)
             name, values = field.name, find_disparity(field)
     note = write_map(output, values)
     print(f"{name}: disparity {values.min():.2f} to {values.max():.2f} px per view step: {output}")
-    print_notes((*notes, *filter(None, (note,))), origin)
+    print_notes(*notes, note, origin=origin)

@@ -7,7 +7,7 @@ import shlex
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -17,77 +17,52 @@ from iibr_core.runtime.extras import require_extra
 from iibr_core.runtime.work import part_of_job
 from iibr_core.stages import STAGE_NAMES, stages_without
 from iibr_core.types import InputError
-from viewer.cli.option_records import with_option_records
+from viewer.cli.messages import print_notes, show_progress
+from viewer.cli.option_records import option, output_option, with_option_records
 from viewer.cli.options import DepthModel, Force, MaxPixels, Refine, inputs_of_command, require_model
-from viewer.cli.progress import print_notes, show_progress
 
-if TYPE_CHECKING:
-    from iibr_core.evaluation.scenes import DisparityFrom
+DISPARITY = (
+    "Disparity of the middle view: the scene's map, an estimate from the photo alone, or a file (px per view step;"
+    " LLFF: per mean distance of neighbours)."
+)
+DATASETS = "Folders: HCI, Stanford archive, LLFF, Middlebury, views/v00_u00.png ..., or of such folders."
+LPIPS = "Add LPIPS, with its alex.pth and torchvision's alexnet-*.pth from a folder."
+WITHOUT = f"Leave out a stage between map and view; repeat it for more: {', '.join(STAGE_NAMES)}."
 
 
 @dataclass(frozen=True)
 class ComparisonOptions:
     """Options of a comparison."""
 
-    disparity: Annotated[
-        str,
-        typer.Option(
-            metavar="given|estimate|FILE",
-            help="Disparity of the middle view: the scene's map, an estimate from the photo alone, or a file (px per"
-            " view step; LLFF: per mean distance of neighbours).",
-        ),
-    ] = "given"
+    disparity: Annotated[str, option(DISPARITY, "given|estimate|FILE")] = "given"
     depth_model: DepthModel = None
     refine: Refine = "on"
-    views: Annotated[
-        int | None, typer.Option(min=1, metavar="N", help="Compare at most N views of a scene.", show_default="all")
-    ] = None
+    views: Annotated[int | None, option("Compare at most N views of a scene.", "N", "all", min=1)] = None
     max_pixels: MaxPixels = None
-    lpips: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="DIR",
-            help="Add LPIPS, with its alex.pth and torchvision's alexnet-*.pth from a folder.",
-            show_default=False,
-        ),
-    ] = None
-    without: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="STAGE",
-            help=f"Leave out a stage between map and view; repeat it for more: {', '.join(STAGE_NAMES)}.",
-            show_default=False,
-        ),
-    ] = None
+    lpips: Annotated[Path | None, option(LPIPS, "DIR")] = None
+    without: Annotated[list[str] | None, option(WITHOUT, "STAGE")] = None
 
     def inputs(self) -> tuple[Path, ...]:
         """Return the files and folders that are named as text."""
         named = (os.path.expanduser(name) for name in (self.disparity, self.depth_model) if name is not None)
         return tuple(Path(name) for name in named if os.path.lexists(name))
 
-    def source(self) -> DisparityFrom | Path:
+    def source(self) -> Literal["given", "estimate"] | Path:
         """Return the origin of disparity. Raises InputError if the map does not exist."""
-        origins: dict[str, DisparityFrom] = {"given": "given", "estimate": "estimate"}
-        source = origins.get(self.disparity, Path(self.disparity))
-        if isinstance(source, Path) and not source.is_file():
+        if self.disparity == "given":
+            return "given"
+        if self.disparity == "estimate":
+            return "estimate"
+        if not Path(self.disparity).is_file():
             raise InputError(f"--disparity {self.disparity}: no such file; give a map, given or estimate")
-        return source
+        return Path(self.disparity)
 
 
 @with_option_records
 def evaluate(
     context: typer.Context,
-    datasets: Annotated[
-        list[Path],
-        typer.Argument(
-            metavar="DATASET...",
-            help="Folders: HCI, Stanford archive, LLFF, Middlebury, views/v00_u00.png ..., or of such folders.",
-            show_default=False,
-        ),
-    ],
-    output: Annotated[
-        Path, typer.Option("--output", "-o", metavar="DIR", help="Folder for the report (JSON, Markdown, HTML).")
-    ],
+    datasets: Annotated[list[Path], typer.Argument(metavar="DATASET...", help=DATASETS)],
+    output: Annotated[Path, output_option("Folder for the report (JSON, Markdown, HTML).", "DIR")],
     comparison: ComparisonOptions,
     force: Force = False,
 ) -> None:
@@ -100,8 +75,7 @@ def evaluate(
         require_extra("train", "torch")
     check_output_folder(output, inputs_of_command(context) + comparison.inputs(), force)
 
-    from iibr_core.evaluation.evaluate import Options
-    from iibr_core.evaluation.evaluate import evaluate as evaluate_scene
+    from iibr_core.evaluation import evaluate as evaluation
     from iibr_core.evaluation.report import summary_lines, write_report
     from iibr_core.evaluation.scenes import find_scenes
     from iibr_core.formats.images.photo import DEFAULT_MAX_PIXELS
@@ -109,15 +83,15 @@ def evaluate(
     choice = DepthChoice(model=comparison.depth_model, refine=comparison.refine == "on")
     require_model(choice)
     max_pixels, stages = comparison.max_pixels or DEFAULT_MAX_PIXELS, stages_without(comparison.without or [])
-    options = Options(comparison.source(), choice, max_pixels, comparison.views, comparison.lpips, stages)
+    options = evaluation.Options(comparison.source(), choice, max_pixels, comparison.views, comparison.lpips, stages)
     scenes = [scene for folder in datasets for scene in find_scenes(folder)]
     results = []
     with show_progress("reading"):
         for number, scene in enumerate(scenes):
             with part_of_job(number, 1, len(scenes)):
-                results += evaluate_scene(scene, options)
+                results += evaluation.evaluate(scene, options)
     write_report(output, results, shlex.join(["iibr", *sys.argv[1:]]))
     for result in results:
         print(summary_lines(result))
     print(output / "index.html")
-    print_notes(tuple(f"{result.scene}: {note}" for result in results for note in result.notes))
+    print_notes(*(f"{result.scene}: {note}" for result in results for note in result.notes))

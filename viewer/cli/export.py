@@ -4,63 +4,44 @@ from __future__ import annotations
 
 from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
+from iibr_core.exports import kinds
 from iibr_core.exports.animation import read_keys
-from iibr_core.exports.kinds import export_path, require_ending, require_export_place
-from iibr_core.exports.source import open_for_export, write_export
+from iibr_core.exports.source import OpenDrawn, open_for_export, write_export
+from iibr_core.scenes.scene import Scene
+from viewer.cli import options as shared
 from viewer.cli.export_options import KindOptions, To, require_kind
-from viewer.cli.lens_options import LensOptions
-from viewer.cli.option_records import with_option_records
-from viewer.cli.options import (
-    FocusDisparity,
-    Force,
-    Grid,
-    LiteralDisparity,
-    SceneOptions,
-    ScenePath,
-    inputs_of_command,
-    require_heeded,
-    require_source,
-)
-from viewer.cli.progress import print_notes, show_progress
-
-if TYPE_CHECKING:
-    from iibr_core.exports.source import OpenDrawn
-    from iibr_core.scenes.scene import Scene
+from viewer.cli.messages import print_notes, show_progress
+from viewer.cli.option_records import flag, option, output_option, with_option_records
 
 
 @with_option_records
 def export(
     context: typer.Context,
-    path: ScenePath,
+    path: shared.ScenePath,
     to: To,
-    output: Annotated[Path, typer.Option("--output", "-o", metavar="PATH", help="File or folder to write.")],
-    lens: LensOptions,
+    output: Annotated[Path, output_option("File or folder to write.", "PATH")],
+    lens: shared.LensOptions,
     kind_options: KindOptions,
     keys: Annotated[
         Path | None,
-        typer.Option(
-            "--path",
-            metavar="FILE",
-            help="File with a camera path, one key per line: s t, s t focus, or s t focus aperture.",
+        option(
+            "File with a camera path, one key per line: s t, s t focus, or s t focus aperture.", "FILE", "", "--path"
         ),
     ] = None,
-    row: Annotated[
-        int | None,
-        typer.Option(min=0, metavar="N", help="Row of an epipolar plane image.", show_default="the middle"),
-    ] = None,
+    row: Annotated[int | None, option("Row of an epipolar plane image.", "N", "the middle", min=0)] = None,
     show: Annotated[
-        bool, typer.Option("--show", help="Show the quilt on the connected Looking Glass display, by its Bridge.")
+        bool, flag("--show", "Show the quilt on the connected Looking Glass display, by its Bridge.")
     ] = False,
     *,
-    scene: SceneOptions,
-    literal: LiteralDisparity = False,
-    focus_disparity: FocusDisparity = None,
-    grid: Grid = None,
-    force: Force = False,
+    scene: shared.SceneOptions,
+    literal: shared.LiteralDisparity = False,
+    focus_disparity: shared.FocusDisparity = None,
+    grid: shared.Grid = None,
+    force: shared.Force = False,
 ) -> None:
     """Write a scene, as the window shows it, in a format for displays, browsers or other programs.
 
@@ -68,22 +49,22 @@ def export(
     """
     kind = require_kind(context, to)
     source = scene.source(path, grid, focus_disparity, literal)
-    require_heeded(context, path)
-    require_ending(kind, output)
-    inputs = inputs_of_command(context, source)
+    shared.require_heeded(context, path)
+    kinds.require_ending(kind, output)
+    inputs = shared.inputs_of_command(context, source)
     if keys is not None:
         read_keys(keys)
     if not kind.path:
-        require_export_place(kind, output, inputs, force)
-    require_source(source)
+        kinds.require_export_place(kind, output, inputs, force)
+    shared.require_source(source)
     options, target = kind_options.options(keys, row, show), output
 
     def require_place(opened: Scene) -> None:
         nonlocal target
         if kind.is_drawn:
             lens.require_within(opened)
-        target = export_path(kind, output, opened, options)
-        require_export_place(kind, target, inputs, force)
+        target = kinds.export_path(kind, output, opened, options)
+        kinds.require_export_place(kind, target, inputs, force)
 
     with ExitStack() as stack:
         open_drawn: OpenDrawn | None = None
@@ -98,5 +79,4 @@ def export(
         with show_progress("exporting"):
             message = write_export(kind, target, opened, options)
     print(target)
-    notes = (*opened.scene.notes, *lens.notes(opened.optics), *filter(None, (message,)))
-    print_notes(notes, opened.scene.depth_origin)
+    print_notes(*opened.scene.notes, *lens.notes(opened.optics), message, origin=opened.scene.depth_origin)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from functools import partial
 from pathlib import Path
 from typing import Annotated
@@ -11,26 +12,14 @@ import typer
 from iibr_core.formats.light_fields.light_field_formats import is_light_field
 from iibr_core.formats.light_fields.write import WRITERS, check_light_field, write_light_field
 from iibr_core.formats.outputs import check_output_folder
-from iibr_core.scenes.scene import Source
 from iibr_core.types import GridShape, InputError
-from viewer.cli.lens_options import GlossFile, gloss_of
-from viewer.cli.option_records import with_option_records
-from viewer.cli.options import (
-    NOT_FOR_LIGHT_FIELDS,
-    Force,
-    SceneOptions,
-    ScenePath,
-    given_options,
-    grid_from_text,
-    inputs_of_command,
-    name_in,
-    require_heeded,
-    require_source,
-    words_of_options,
-)
-from viewer.cli.progress import print_notes, show_progress
+from viewer.cli import options
+from viewer.cli.messages import print_notes, show_progress
+from viewer.cli.option_records import flag, option, output_option, with_option_records
 
-NOT_FOR_DENSE_FIELDS = NOT_FOR_LIGHT_FIELDS - {"grid", "inpaint"} | {"disparity", "disparity_scale", "literal", "gloss"}
+NOT_FOR_DENSE_FIELDS = options.NOT_FOR_LIGHT_FIELDS - {"grid", "inpaint"} | {
+    "disparity", "disparity_scale", "literal", "gloss",
+}  # fmt: skip
 """Options that have no meaning for views between those of a light field."""
 NOT_FOR_POSES = {"grid", "format", "depth_strength", "with_disparity", "gloss"}
 """Options that have a meaning for light fields only."""
@@ -41,89 +30,70 @@ VIEW_FILES = r"view_\d{4,5}\.(png|exr)"
 @with_option_records
 def generate(
     context: typer.Context,
-    path: ScenePath,
-    output: Annotated[Path, typer.Option("--output", "-o", metavar="DIR", help="Folder to write.")],
-    scene: SceneOptions,
+    path: options.ScenePath,
+    output: Annotated[Path, output_option("Folder to write.", "DIR")],
+    scene: options.SceneOptions,
     grid: Annotated[
-        GridShape | None,
-        typer.Option(parser=grid_from_text, metavar="N|RxC", help="Grid of views: 9 is 9x9.", show_default=False),
+        GridShape | None, option("Grid of views: 9 is 9x9.", "N|RxC", parser=options.grid_from_text)
     ] = None,
     poses: Annotated[
         Path | None,
-        typer.Option(
-            metavar="FILE",
-            help="Cameras that see the photo: poses_bounds.npy, transforms.json or COLMAP's folder.",
-            show_default=False,
-        ),
+        option("Cameras that see the photo: poses_bounds.npy, transforms.json or COLMAP's folder.", "FILE"),
     ] = None,
-    photo_pose: Annotated[
-        int | None,
-        typer.Option(min=1, metavar="N", help="Number of the photo's pose.", show_default="the middle one"),
-    ] = None,
+    photo_pose: Annotated[int | None, option("Number of the photo's pose.", "N", "the middle one", min=1)] = None,
     format: Annotated[
-        str, typer.Option(parser=name_in(WRITERS), metavar="|".join(WRITERS), help="Layout of the light field.")
+        str, option("Layout of the light field.", "|".join(WRITERS), parser=options.name_in(WRITERS))
     ] = "hci",
-    gloss: GlossFile = None,
+    gloss: options.GlossFile = None,
     literal: Annotated[
         bool | None,
-        typer.Option(
+        option(
+            "Take disparity as given, in px per view step, or scale it as the window does.",
+            "",
+            "literal with --disparity",
             "--literal/--planned",
-            help="Take disparity as given, in px per view step, or scale it as the window does.",
-            show_default="literal with --disparity",
         ),
     ] = None,
-    with_disparity: Annotated[
-        bool, typer.Option("--with-disparity", help="Write a disparity map for every view.")
-    ] = False,
-    force: Force = False,
+    with_disparity: Annotated[bool, flag("--with-disparity", "Write a disparity map for every view.")] = False,
+    force: options.Force = False,
 ) -> None:
     """Write the light field of a photo, or a denser grid of a light field.
 
-    A map given by --disparity is used unchanged, in px per view step. Other depth gets the parallax that the window
-    shows.
+    A map from --disparity is taken as given, in px per view step; other depth gets the parallax of the window.
 
     Example: iibr generate photo.png --disparity photo.pfm --grid 9 -o field --format hci
 
     Example: iibr generate photo.png --grid 9 --gloss gloss.toml -o shiny
 
-    With --poses: pictures of any cameras. The photo's depth is fitted to the depths of its pose; without these, the
-    nearest point is 1 away. With --literal, disparity is in px per unit of length.
+    With --poses: pictures of any cameras. The photo's depth is fitted to the depths in its pose, if there are any;
+    otherwise the nearest point is 1 away. With --literal, disparity is in px per unit of length.
 
     Example: iibr generate photo.png --poses transforms.json -o pictures
     """
-    from viewer.cli.views_on_disk import write_dense_field, write_field, write_free_views
+    from viewer.cli import views_on_disk
 
     if poses is not None:
-        source = _source_of_poses(context, scene, path, output, force)
-        with show_progress("reading"):
-            written = write_free_views(source, poses, photo_pose, bool(literal), output)
+        options.require_not_given(context, NOT_FOR_POSES, "for light fields only, not for --poses")
+        source = scene.source(path, None)
+        check_output_folder(output, options.inputs_of_command(context, source), force, VIEW_FILES)
+        write = partial(views_on_disk.write_free_views, source, poses, photo_pose, bool(literal), output)
     else:
         if grid is None or photo_pose is not None:
             raise InputError("give --grid for a light field, or --poses for pictures of any cameras")
         is_dense = is_light_field(path)
         if is_dense:
-            require_heeded(context, path, NOT_FOR_DENSE_FIELDS)
+            options.require_heeded(context, path, NOT_FOR_DENSE_FIELDS)
         source = scene.source(path, grid, is_literal=scene.disparity is not None if literal is None else literal)
-        check_light_field(output, format, inputs_of_command(context, source), force)
-        require_source(source)
-        write = partial(write_light_field, output, format, grid, with_disparity=with_disparity)
-        with show_progress("reading"):
-            if is_dense:
-                written = write_dense_field(source, grid, write)
-            else:
-                written = write_field(source, write, scene.depth_strength, gloss_of(gloss))
-    print(f"{written.summary}: {output}")
-    print_notes(written.notes, written.origin)
-
-
-def _source_of_poses(
-    context: typer.Context, scene: SceneOptions, path: Path, folder: Path, may_replace: bool
-) -> Source:
-    """Return the photo of poses. Raises InputError if an option has no meaning for them, or the folder is refused."""
-    unused = given_options(context) & NOT_FOR_POSES
-    if unused:
-        raise InputError(f"{words_of_options(context, unused)}: for light fields only; leave it out with --poses")
-    source = scene.source(path, None)
-    check_output_folder(folder, inputs_of_command(context, source), may_replace, VIEW_FILES)
-    require_source(source)
-    return source
+        check_light_field(output, format, options.inputs_of_command(context, source), force)
+        write_views = partial(write_light_field, output, format, grid, with_disparity=with_disparity)
+        write = (
+            partial(views_on_disk.write_dense_field, source, grid, write_views)
+            if is_dense
+            else partial(views_on_disk.write_field, source, write_views, scene.depth_strength, options.gloss_of(gloss))
+        )
+    options.require_source(source)
+    start = time.perf_counter()
+    with show_progress("reading"):
+        written = write()
+    print(f"{written.views} in {time.perf_counter() - start:.1f} s: {output}")
+    print_notes(*written.notes, origin=written.origin)

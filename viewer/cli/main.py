@@ -16,9 +16,9 @@ from viewer.cli.depth import depth
 from viewer.cli.evaluate import evaluate
 from viewer.cli.export import export
 from viewer.cli.generate import generate
+from viewer.cli.messages import print_notes
 from viewer.cli.models import models
 from viewer.cli.plan import plan
-from viewer.cli.progress import print_notes
 from viewer.cli.screenshot import screenshot
 from viewer.cli.train import train
 from viewer.cli.view import demo, open_last_scene, view
@@ -58,7 +58,7 @@ def print_version(is_wanted: bool) -> None:
 def iibr(
     context: typer.Context,
     version: Annotated[
-        bool, typer.Option("--version", callback=print_version, is_eager=True, help="Show the version.")
+        bool, typer.Option("--version", metavar="", callback=print_version, is_eager=True, help="Show the version.")
     ] = False,
 ) -> None:
     """One photo becomes a light field you can hold: drag the viewpoint, click to refocus, open the aperture.
@@ -71,4 +71,4 @@ def iibr(
         open_last_scene()
     except InputError as error:
         print(context.get_help())
-        print_notes((str(error),))
+        print_notes(str(error))

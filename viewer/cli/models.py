@@ -8,7 +8,8 @@ from typing import Annotated
 
 import typer
 
-from viewer.cli.progress import show_progress
+from viewer.cli.messages import show_progress
+from viewer.cli.option_records import flag
 
 EXIT_DECLINED = 1
 
@@ -40,8 +41,10 @@ def list_models(context: typer.Context) -> None:
 
 @models.command()
 def get(
-    name: Annotated[str, typer.Argument(help="Name in the list of `iibr models`, or an ONNX file of your own.")],
-    yes: Annotated[bool, typer.Option("--yes", help="Do not ask.")] = False,
+    name: Annotated[
+        str, typer.Argument(metavar="NAME", help="Name in the list of `iibr models`, or an ONNX file of your own.")
+    ],
+    yes: Annotated[bool, flag("--yes", "Do not ask.")] = False,
 ) -> None:
     """Download a depth model, after showing its size and licence; an ONNX file is copied to your own models.
 

@@ -11,13 +11,17 @@ from typing import Annotated, Literal
 
 import typer
 
+from iibr_core.beyond.optics import Optics
 from iibr_core.depth.choice import DepthChoice, DepthStart
 from iibr_core.formats.light_fields.light_field_formats import is_light_field
+from iibr_core.gloss.settings import Gloss
 from iibr_core.inpainting.registry import DEFAULT_INPAINTER, INPAINTER_FORMS, require_inpainter
 from iibr_core.scenes.inputs import inputs_of
-from iibr_core.scenes.scene import Source
+from iibr_core.scenes.lens_limits import LensChoice, eye_limits
+from iibr_core.scenes.scene import Scene, Source
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, InputError, ViewOffset
+from viewer.cli.option_records import flag, option
 
 MAX_GRID = 99
 """Largest number of views in a row or column."""
@@ -28,7 +32,7 @@ def grid_from_text(text: str) -> GridShape:
     """Return a grid of views: "9" is 9x9, "3x9" is 3 rows of 9. Raises BadParameter."""
     match = re.fullmatch(r"(\d{1,4})(?:x(\d{1,4}))?", text.strip())
     grid = GridShape(int(match[1]), int(match[2] or match[1])) if match else GridShape(0, 0)
-    if not (1 <= grid.rows <= MAX_GRID and 1 <= grid.columns <= MAX_GRID):
+    if not all(1 <= count <= MAX_GRID for count in grid):
         raise typer.BadParameter(f"{text!r} is not a grid: give 1 to {MAX_GRID}, such as 9 or 3x9")
     return grid
 
@@ -79,40 +83,28 @@ def inpainter_from_text(text: str) -> str:
     return text
 
 
-SCENE_HELP = "A photo, a stereo photo, or a light field: a folder of views, a quilt, a lenslet image."
-ScenePath = Annotated[Path, typer.Argument(help=SCENE_HELP, show_default=False)]
-Force = Annotated[bool, typer.Option("--force", help="Replace an existing output. Inputs are never replaced.")]
+SCENE = "A photo, a stereo photo, or a light field: a folder of views, a quilt, a lenslet image."
+ScenePath = Annotated[Path, typer.Argument(metavar="PATH", help=SCENE)]
+Force = Annotated[bool, flag("--force", "Replace an existing output. Inputs are never replaced.")]
 Grid = Annotated[
-    GridShape | None,
-    typer.Option(
-        parser=grid_from_text, metavar="N|RxC", help="Grid of views: 9 is 9x9.", show_default="chosen by the plan"
-    ),
+    GridShape | None, option("Grid of views: 9 is 9x9.", "N|RxC", "chosen by the plan", parser=grid_from_text)
 ]
 FocusDisparity = Annotated[
-    float | None,
-    typer.Option(
-        parser=number_from_text,
-        metavar="X",
-        help="Disparity, as given, of the plane that stays still.",
-    ),
+    float | None, option("Disparity, as given, of the plane that stays still.", "X", parser=number_from_text)
 ]
 LiteralDisparity = Annotated[
-    bool,
-    typer.Option("--literal", help="Take disparity as given, in px per view step; the plan does not scale it."),
+    bool, flag("--literal", "Take disparity as given, in px per view step; the plan does not scale it.")
 ]
 DepthModel = Annotated[
     str | None,
-    typer.Option(
-        metavar="FOLDER|FILE.onnx|NAME",
-        help="Depth model for photos without depth, see `iibr models`.",
-        show_default="the recommended one, if it is there",
+    option(
+        "Depth model for photos without depth, see `iibr models`.",
+        "NAME|FOLDER|FILE.onnx",
+        "the recommended one, if it is there",
     ),
 ]
-Refine = Annotated[Literal["on", "off"], typer.Option(help="Move edges of the disparity to edges of the photo.")]
-MaxPixels = Annotated[
-    int | None,
-    typer.Option(min=1, metavar="N", help="Reduce larger photos to this number of pixels.", show_default="2000000"),
-]
+Refine = Annotated[Literal["on", "off"], option("Move edges of the disparity to edges of the photo.")]
+MaxPixels = Annotated[int | None, option("Reduce larger photos to this number of pixels.", "N", "2 million", min=1)]
 
 
 @dataclass(frozen=True)
@@ -120,14 +112,13 @@ class DepthOptions:
     """Options of commands that find the depth of photos."""
 
     depth: Annotated[
-        DepthStart,
-        typer.Option(help="First source of depth: a map's file (auto), the photo's own, a model, a guess, or none."),
+        DepthStart, option("First source of depth: a map's file (auto), the photo's own, a model, a guess, or none.")
     ] = "auto"
     depth_model: DepthModel = None
     refine: Refine = "on"
-    invert_depth: Annotated[bool, typer.Option("--invert-depth", help="Swap near and far.")] = False
-    metric: Annotated[bool, typer.Option("--metric", help="The map or the model gives distances.")] = False
-    stretch: Annotated[bool, typer.Option("--stretch", help="Stretch a map of another shape to the photo.")] = False
+    invert_depth: Annotated[bool, flag("--invert-depth", "Swap near and far.")] = False
+    metric: Annotated[bool, flag("--metric", "The map or the model gives distances.")] = False
+    stretch: Annotated[bool, flag("--stretch", "Stretch a map of another shape to the photo.")] = False
 
     @property
     def choice(self) -> DepthChoice:
@@ -148,14 +139,14 @@ class DepthOptions:
 class PhotoOptions(DepthOptions):
     """Options of commands that make views of photos."""
 
-    depth_strength: Annotated[float, typer.Option(metavar="X", help="Multiply the parallax that the plan chose.")] = 1.0
+    depth_strength: Annotated[float, option("Multiply the parallax that the plan chose.", "X")] = 1.0
     max_pixels: MaxPixels = None
     inpaint: Annotated[
         str,
-        typer.Option(
+        option(
+            "Method that fills areas which the photo does not show.",
+            "|".join(INPAINTER_FORMS),
             parser=inpainter_from_text,
-            metavar="|".join(INPAINTER_FORMS),
-            help="Method that fills areas which the photo does not show.",
         ),
     ] = DEFAULT_INPAINTER
 
@@ -176,16 +167,14 @@ class SceneOptions(PhotoOptions):
 
     disparity: Annotated[
         Path | None,
-        typer.Option(
-            metavar="FILE",
-            help="Depth map. PFM, EXR, NPY: disparity in px per view step. PNG, JPEG, WebP: white is near, unless the"
+        option(
+            "Depth map. PFM, EXR, NPY: disparity in px per view step. PNG, JPEG, WebP: white is near, unless the"
             " photo shows otherwise.",
-            show_default=False,
+            "FILE",
         ),
     ] = None
     disparity_scale: Annotated[
-        float | None,
-        typer.Option(metavar="X", help="Factor from the map's values to px per view step; -1: black is near."),
+        float | None, option("Factor from the map's values to px per view step; -1: black is near.", "X")
     ] = None
 
     @property
@@ -195,6 +184,65 @@ class SceneOptions(PhotoOptions):
             raise InputError("--disparity gives the depth: leave out --depth and --depth-model")
         file = None if self.disparity is None else str(self.disparity)
         return replace(super().choice, file=file, file_scale=self.disparity_scale)
+
+
+GlossFile = Annotated[
+    Path | None,
+    option("Make a surface glossy: a TOML file with roughness, reflectance, \\[surface] and \\[light].", "FILE"),
+]
+
+
+@dataclass(frozen=True)
+class LensOptions:
+    """Values of the options of the lens, None if an option is not given."""
+
+    view: Annotated[
+        ViewOffset | None, option("Viewpoint in view steps, right and down.", "S,T", "0,0", parser=view_from_text)
+    ] = None
+    focus: Annotated[
+        float | None,
+        option(
+            "Disparity in focus, px per view step (Focus in the panel); it lies in the plane of a 3D display.",
+            "X",
+            parser=number_from_text,
+        ),
+    ] = None
+    aperture: Annotated[float | None, option("Aperture diameter in view steps.", "X", min=0)] = None
+    gloss: GlossFile = None
+
+    def choice(self) -> LensChoice:
+        """Return the same for the core. Raises InputError if the gloss cannot be read."""
+        return LensChoice(self.view, self.focus, self.aperture, gloss_of(self.gloss))
+
+    def require_within(self, scene: Scene) -> None:
+        """Raise InputError for a viewpoint outside the scene's views; a single view shows every viewpoint."""
+        if self.view is None or scene.grid == (1, 1):
+            return
+        for axis, value, views in (("S", self.view.s, scene.grid.columns), ("T", self.view.t, scene.grid.rows)):
+            low, high = eye_limits(views)
+            if not low <= value <= high:
+                raise InputError(f"--view: {axis} is {value:g}; {scene.name} has {low:g} to {high:g}")
+
+    def notes(self, optics: Optics) -> tuple[str, ...]:
+        """Return a note for each value that the scene limits."""
+        pairs = {
+            "--focus": (self.focus, optics.focus_disparity),
+            "--aperture": (self.aperture, optics.aperture_diameter),
+        }
+        return tuple(
+            f"{name} {value:g} exceeds what the scene has; {used:g} is used."
+            for name, (value, used) in pairs.items()
+            if value not in (None, used)
+        )
+
+
+def gloss_of(path: Path | None) -> Gloss | None:
+    """Return the gloss in a file. Raises InputError."""
+    if path is None:
+        return None
+    from viewer.model.gloss_file import read_gloss  # imports msgspec
+
+    return read_gloss(path)
 
 
 NOT_FOR_LIGHT_FIELDS = {field.name for field in fields(PhotoOptions)} | {"focus_disparity", "grid"}
@@ -207,18 +255,19 @@ def given_options(context: typer.Context) -> set[str]:
     return {name for name, source in sources.items() if source is not None and source.name != "DEFAULT"}
 
 
-def words_of_options(context: typer.Context, names: Set[str]) -> str:
-    """Return options as they are typed: "--grid and --stretch"."""
-    return " and ".join(option.opts[0] for option in context.command.params if option.name in names)
+def require_not_given(context: typer.Context, names: Set[str], reason: str) -> None:
+    """Raise InputError if any of these options was given."""
+    typed = [each.opts[0] for each in context.command.params if each.name in given_options(context) & names]
+    if typed:
+        raise InputError(f"{' and '.join(typed)}: {reason}; leave it out")
 
 
 def require_heeded(context: typer.Context, path: Path, unheeded: Set[str] = NOT_FOR_LIGHT_FIELDS) -> None:
     """Raise InputError if options were given that a light field at `path` would ignore."""
-    given = given_options(context)
-    ignored = given & (unheeded if "disparity" in given else unheeded | {"disparity_scale"})
-    if ignored and is_light_field(path):
-        options = words_of_options(context, ignored)
-        raise InputError(f"{options}: {path} is a light field, whose views are taken as they are; leave it out")
+    if context.params.get("disparity") is None:
+        unheeded = unheeded | {"disparity_scale"}
+    if given_options(context) & unheeded and is_light_field(path):
+        require_not_given(context, unheeded, f"{path} is a light field, whose views are taken as they are")
 
 
 def require_source(source: Source) -> None:

@@ -13,7 +13,7 @@ from viewer.cli.options import FocusDisparity, Grid, SceneOptions
 
 @with_option_records
 def plan(
-    photo: Annotated[Path, typer.Argument(help="A photo (JPEG, PNG, TIFF, EXR, WebP, HEIC, AVIF).")],
+    photo: Annotated[Path, typer.Argument(metavar="PHOTO", help="A photo (JPEG, PNG, TIFF, EXR, WebP, HEIC, AVIF).")],
     scene: SceneOptions,
     focus_disparity: FocusDisparity = None,
     grid: Grid = None,

@@ -18,51 +18,36 @@ from iibr_core.scenes.scene import Scene
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import ImageSize, InputError
 from viewer.app.picture_files import export_picture, require_picture_place, shot_of
-from viewer.cli.lens_options import LensOptions
-from viewer.cli.option_records import with_option_records
-from viewer.cli.options import (
-    FocusDisparity,
-    Force,
-    Grid,
-    SceneOptions,
-    ScenePath,
-    given_options,
-    inputs_of_command,
-    name_in,
-    require_heeded,
-    require_source,
-    size_from_text,
-)
-from viewer.cli.progress import print_notes, show_progress
+from viewer.cli import options as shared
+from viewer.cli.messages import print_notes, show_progress
+from viewer.cli.option_records import flag, option, output_option, with_option_records
 from viewer.model import lens as lens_verbs
 from viewer.model import opening
 from viewer.model.state.app_state import AppState
+from viewer.model.state.saving import SavedSettings
 
 if TYPE_CHECKING:
     from viewer.display.offscreen import OffscreenScene
-    from viewer.model.state.saving import SavedSettings
 
 
 @dataclass(frozen=True)
 class FileOptions:
     """Options of the picture's file."""
 
-    bits: Annotated[
-        int | None, typer.Option(metavar="N", help="Bits per channel: 16 for .png, .tif, .exr.", show_default="8")
-    ] = None
-    picture_quality: Annotated[
-        int, typer.Option(min=1, max=BEST_QUALITY, metavar="N", help="Quality of .jpg, .webp and .avif.")
-    ] = AS_USUAL.quality
+    bits: Annotated[int | None, option("Bits per channel: 16 for .png, .tif, .exr.", "N", "8")] = None
+    picture_quality: Annotated[int, option("Quality of .jpg, .webp and .avif.", "N", min=1, max=BEST_QUALITY)] = (
+        AS_USUAL.quality
+    )
     profile: Annotated[
         str | None,
-        typer.Option(
-            parser=name_in(PROFILES),
-            metavar="|".join(PROFILES),
-            help="Colour profile: sRGB or Display P3.",
-            show_default="p3 for photos with more colours than sRGB",
+        option(
+            "Colour profile: sRGB or Display P3.",
+            "|".join(PROFILES),
+            "p3 for photos with more colours than sRGB",
+            parser=shared.name_in(PROFILES),
         ),
     ] = None
-    gps: Annotated[bool, typer.Option("--gps", help="Keep the photo's GPS position.")] = False
+    gps: Annotated[bool, flag("--gps", "Keep the photo's GPS position.")] = False
 
     @property
     def format(self) -> PictureFormat:
@@ -74,55 +59,48 @@ class FileOptions:
 @with_option_records
 def screenshot(
     context: typer.Context,
-    path: ScenePath,
-    output: Annotated[Path, typer.Option("--output", "-o", metavar="FILE", help=f"File to write: {', '.join(KINDS)}.")],
+    path: shared.ScenePath,
+    output: Annotated[Path, output_option(f"File to write: {', '.join(KINDS)}.")],
     like: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE",
-            help="Saved picture whose settings are used, except for options given here.",
-            show_default=False,
-        ),
+        Path | None, option("Saved picture whose settings are used, except for options given here.", "FILE")
     ] = None,
     *,
-    lens: LensOptions,
+    lens: shared.LensOptions,
     size: Annotated[
         ScreenSize | None,
-        typer.Option(
-            parser=size_from_text, metavar="WxH", help="Size of the picture in pixels.", show_default="that of a view"
-        ),
+        option("Size of the picture in pixels.", "WxH", "that of a view", parser=shared.size_from_text),
     ] = None,
-    full: Annotated[bool, typer.Option("--full", help="Draw at the photo's own size, from all its pixels.")] = False,
+    full: Annotated[bool, flag("--full", "Draw at the photo's own size, from all its pixels.")] = False,
     file: FileOptions,
-    backend: Annotated[Literal["auto", "egl", "osmesa"], typer.Option(help="Source of OpenGL.")] = "auto",
-    scene: SceneOptions,
-    focus_disparity: FocusDisparity = None,
-    grid: Grid = None,
-    force: Force = False,
+    backend: Annotated[Literal["auto", "egl", "osmesa"], option("Source of OpenGL.")] = "auto",
+    scene: shared.SceneOptions,
+    focus_disparity: shared.FocusDisparity = None,
+    grid: shared.Grid = None,
+    force: shared.Force = False,
 ) -> None:
     """Draw one picture without a display; its settings are saved in it.
 
-    Up to the photo's own size (--size, --full), all pixels of the photo are used, even if views are smaller
-    (--max-pixels).
+    Pictures up to the photo's own size (--size, --full) use all of its pixels, even if views are smaller.
 
     Example: iibr screenshot photo.png --view 2,-1 --focus 0.5 --aperture 4 -o out.png
     """
     source, depth_strength = scene.source(path, grid, focus_disparity), scene.depth_strength
-    require_heeded(context, path)
+    shared.require_heeded(context, path)
     if full and size is not None:
         raise InputError("--full sets the size of the picture: leave out --size")
-    settings = None if like is None else _read_settings(like, size)
-    notes: tuple[str, ...] = ()
-    if settings is not None:
-        from viewer.model.saved_settings import left_out_note, source_like
+    settings, note = None, ""
+    if like is not None:
+        from viewer.model import saved_settings
 
-        given = given_options(context)
-        source = source_like(source, settings, given)
+        settings, given = saved_settings.read_settings(like), shared.given_options(context)
+        if size is None:
+            saved_settings.require_saved_size(settings, like)
+            size = ScreenSize(*settings.size_px)
+        source = saved_settings.source_like(source, settings, given)
         depth_strength = depth_strength if "depth_strength" in given else settings.depth_strength
-        size = size or ScreenSize(*settings.size_px)
-        notes = tuple(filter(None, [left_out_note(settings)]))
-    require_picture_place(output, size, inputs_of_command(context, source), force, file.format)
-    require_source(source)
+        note = saved_settings.left_out_note(settings)
+    require_picture_place(output, size, shared.inputs_of_command(context, source), force, file.format)
+    shared.require_source(source)
     choice = lens.choice()
     from iibr_core.formats.images.photo import smaller_note
     from viewer.display.offscreen import OffscreenScene
@@ -145,18 +123,8 @@ def screenshot(
     print(output)
     own_size, view_size = (ImageSize(size.height, size.width) for size in (opened.own_size or opened.size, opened.size))
     unimportant = smaller_note(own_size, view_size) if draws_own else ""
-    notes += tuple(note for note in opened.notes if note != unimportant)
-    print_notes(notes + lens.notes(optics), opened.depth_origin)
-
-
-def _read_settings(path: Path, size: ScreenSize | None) -> SavedSettings:
-    """Return the settings of a saved picture. Raises InputError if there are none, or their size is too large."""
-    from viewer.model.saved_settings import read_settings, require_saved_size
-
-    settings = read_settings(path)
-    if size is None:
-        require_saved_size(settings, path)
-    return settings
+    notes = (each for each in opened.notes if each != unimportant)
+    print_notes(note, *notes, *lens.notes(optics), origin=opened.depth_origin)
 
 
 def _with_lens(state: AppState, settings: SavedSettings | None, choice: LensChoice) -> AppState:

@@ -8,28 +8,25 @@ from functools import partial
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
 from iibr_core.runtime.extras import require_extra
+from viewer.cli.messages import print_notes, show_progress
+from viewer.cli.option_records import flag, option, output_option
 from viewer.cli.options import Force
-from viewer.cli.progress import print_notes, show_progress
 
 ENTROPY_WEIGHT = 0.01
 """Weight of the entropy loss. The paper's 1 outweighs the colours where hypotheses share a pixel: edges get ragged."""
 
 
 def train(
-    steps: Annotated[int, typer.Option(min=1, metavar="N", help="Number of batches of rays.")],
-    output: Annotated[Path, typer.Option("--output", "-o", metavar="FILE", help="Weights to write (.safetensors).")],
-    seed: Annotated[int, typer.Option(min=0, metavar="N", help="Seed of the scenes.")] = 0,
+    steps: Annotated[int, option("Number of batches of rays.", "N", min=1)],
+    output: Annotated[Path, output_option("Weights to write (.safetensors).")],
+    seed: Annotated[int, option("Seed of the scenes.", "N", min=0)] = 0,
     learning_rate: Annotated[
-        float, typer.Option(min=1e-9, max=1.0, metavar="X", help="Learning rate of the first step; it falls to 0.")
+        float, option("Learning rate of the first step; it falls to 0.", "X", min=1e-9, max=1.0)
     ] = 1e-4,
-    device: Annotated[str, typer.Option(metavar="NAME", help="auto, cpu, cuda, cuda:1 or mps.")] = "auto",
-    resume: Annotated[bool, typer.Option("--resume", help="Continue from the checkpoint beside the weights.")] = False,
-    checkpoint_every: Annotated[
-        int, typer.Option(min=1, metavar="N", help="Number of steps between checkpoints.")
-    ] = 500,
+    device: Annotated[str, option("auto, cpu, cuda, cuda:1 or mps.", "NAME")] = "auto",
+    resume: Annotated[bool, flag("--resume", "Continue from the checkpoint beside the weights.")] = False,
+    checkpoint_every: Annotated[int, option("Number of steps between checkpoints.", "N", min=1)] = 500,
     force: Force = False,
 ) -> None:
     """Train the ray transformer on procedural scenes. Ctrl-C saves, --resume continues; a log lies beside the weights.
@@ -60,6 +57,6 @@ def train(
                 metadata={"command": command.replace(str(output), output.name)},  # without the user's folders
             )
     except KeyboardInterrupt:
-        print_notes((f"The training so far is saved; continue with: {command}{'' if resume else ' --resume'}",))
+        print_notes(f"The training so far is saved; continue with: {command}{'' if resume else ' --resume'}")
         raise
     print(f"{output}: {output.stat().st_size / 1000:.1f} kB after {steps} steps")

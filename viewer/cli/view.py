@@ -10,7 +10,7 @@ import typer
 from iibr_core.scenes.scene import Source
 from viewer.app.preferences_store import last_opened, user_folder
 from viewer.cli.option_records import with_option_records
-from viewer.cli.options import SCENE_HELP, FocusDisparity, Grid, SceneOptions, require_heeded, require_source
+from viewer.cli.options import SCENE, FocusDisparity, Grid, SceneOptions, require_heeded, require_source
 from viewer.model.demo_photo import demo_photo
 from viewer.model.state.app_state import AppState
 
@@ -18,7 +18,7 @@ from viewer.model.state.app_state import AppState
 @with_option_records
 def view(
     context: typer.Context,
-    path: Annotated[Path | None, typer.Argument(help=SCENE_HELP, show_default="the demo photo")] = None,
+    path: Annotated[Path | None, typer.Argument(metavar="[PATH]", help=SCENE, show_default="the demo photo")] = None,
     *,
     scene: SceneOptions,
     focus_disparity: FocusDisparity = None,

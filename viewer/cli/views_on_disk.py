@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import math
-import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import closing
-from functools import partial
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 from iibr_core.beyond.free_cameras import FreeViews, depths_of, fitted_cameras, inverse_depth_of, reach_of
 from iibr_core.color import photo_in_srgb
@@ -22,38 +20,47 @@ from iibr_core.inpainting.registry import load_inpainter
 from iibr_core.method.light_field import encode_for_storage
 from iibr_core.method.memory import MAKING_BYTES, require_memory
 from iibr_core.runtime.work import report_progress
+from iibr_core.scenes import photo as photos
 from iibr_core.scenes.light_fields import read_dense
 from iibr_core.scenes.opening import scene_of_photo
-from iibr_core.scenes.photo import depth_estimator, load_photo, make_plan, views_of_photo
 from iibr_core.scenes.scene import MAKING, LoadedPhoto, Source
 from iibr_core.scenes.scene_gloss import add_gloss
-from iibr_core.types import Camera, FloatImage, GridShape, ImageSize, InputError, ViewUpdate, image_size
+from iibr_core.types import Camera, FloatImage, GridShape, InputError, image_size
 
 MAX_INPAINTED = 0.5
 """Share of a picture; poses with a larger inpainted share are named."""
 MAX_NAMED = 5
+"""Largest number of poses that are named."""
 
+View = TypeVar("View")
 WriteField = Callable[..., None]
 """`write_light_field` without views, focal length and name."""
 
 
 class Written(NamedTuple):
-    """Report on written views. summary: their number, size and time. origin: origin of depth, None for light fields."""
+    """Report on written views. views: their number and size. origin: origin of depth, None for light fields."""
 
-    summary: str
+    views: str
     notes: tuple[str, ...]
     origin: DepthOrigin | None = None
 
 
+def _reported(views: Iterable[View], count: int) -> Iterator[View]:
+    """Yield the views and report progress."""
+    for done, view in enumerate(views, 1):
+        yield view
+        report_progress(done, count, MAKING)
+
+
 def write_field(source: Source, write: WriteField, depth_strength: float, gloss: Gloss | None) -> Written:
     """Write the light field of a photo. Raises InputError."""
-    loaded = load_photo(source)
-    photo, plan = loaded.photo, make_plan(source, loaded, depth_strength, keeps_views=False)
-    with closing(views_of_photo(source, loaded, plan)) as plain:
+    loaded = photos.load_photo(source)
+    photo, plan = loaded.photo, photos.make_plan(source, loaded, depth_strength, keeps_views=False)
+    count = math.prod(plan.grid)
+    with closing(photos.views_of_photo(source, loaded, plan)) as plain:
         views = add_gloss(plain, gloss, scene_of_photo(source, loaded, plan))
-        named = partial(write, focal_px=photo.focal_px, name=photo.name)
-        summary = _write_views(views, math.prod(plan.grid), photo.size, named)
-    return Written(summary, photo.notes + loaded.disparity.notes + plan.notes, loaded.origin)
+        write(_reported(views, count), focal_px=photo.focal_px, name=photo.name)
+    return Written(f"{count} views of {photo.size}", photo.notes + loaded.disparity.notes + plan.notes, loaded.origin)
 
 
 def write_dense_field(source: Source, grid: GridShape, write: WriteField) -> Written:
@@ -61,28 +68,10 @@ def write_dense_field(source: Source, grid: GridShape, write: WriteField) -> Wri
     field = open_light_field(Path(source.path))
     given, _, all_views = read_dense(field, grid, source.inpaint)
     size = image_size(given[0].colors)
+    count = math.prod(grid)
     with closing(all_views) as views:
-        named = partial(write, focal_px=field.focal_px or float(size.width), name=field.name)
-        return Written(_write_views(views, math.prod(grid), size, named), field.notes)
-
-
-def _write_views(
-    views: Iterator[ViewUpdate], count: int, size: ImageSize, write: Callable[[Iterator[ViewUpdate]], None]
-) -> str:
-    """Write views and return a sentence about them and the time that making them took."""
-    seconds = 0.0
-
-    def timed() -> Iterator[ViewUpdate]:
-        nonlocal seconds
-        start = time.perf_counter()
-        for done, view in enumerate(views, 1):
-            seconds += time.perf_counter() - start
-            yield view
-            report_progress(done, count, MAKING)
-            start = time.perf_counter()
-
-    write(timed())
-    return f"{count} views of {size} in {seconds:.2f} s ({1000 * seconds / count:.1f} ms per view)"
+        write(_reported(views, count), focal_px=field.focal_px or float(size.width), name=field.name)
+    return Written(f"{count} views of {size}", field.notes)
 
 
 def write_free_views(source: Source, poses: Path, photo_pose: int | None, is_literal: bool, folder: Path) -> Written:
@@ -95,16 +84,19 @@ def write_free_views(source: Source, poses: Path, photo_pose: int | None, is_lit
     if photo_pose is not None and photo_pose > len(known):
         raise InputError(f"--photo-pose {photo_pose}: {poses} has {len(known)} poses")
     given = central_camera(known) if photo_pose is None else photo_pose - 1
-    loaded = load_photo(source)
-    cameras = fitted_cameras(known, given, loaded.photo.size)
-    start = time.perf_counter()
+    loaded = photos.load_photo(source)
+    photo = loaded.photo
+    cameras = fitted_cameras(known, given, photo.size)
     views = _free_views(source, loaded, is_literal, cameras, given)
-    inpainted = _write_pictures(folder, views, cameras, loaded.photo.is_hdr)
-    seconds = time.perf_counter() - start
-    summary = f"{len(cameras)} views in {seconds:.2f} s ({1000 * seconds / len(cameras):.1f} ms per view)"
+    shares = []
+    with write_folder(folder) as unfinished:
+        for number, view in enumerate(_reported(map(views.view, cameras), len(cameras)), 1):
+            name = f"view_{number:04d}{'.exr' if photo.is_hdr else '.png'}"
+            write_image(unfinished / name, encode_for_storage(view.colors, photo.is_hdr))
+            shares.append(float(view.inpainted.mean()))
     place = f"The photo's pose is {cameras[given].source}."
-    notes = (*loaded.photo.notes, *loaded.disparity.notes, place, *_inpainted_notes(inpainted))
-    return Written(summary, notes, loaded.origin)
+    notes = (*photo.notes, *loaded.disparity.notes, place, *_inpainted_notes(shares))
+    return Written(f"{len(cameras)} views", notes, loaded.origin)
 
 
 def _free_views(
@@ -113,21 +105,8 @@ def _free_views(
     photo, inverse_depth = photo_in_srgb(loaded.photo), _inverse_depth(loaded, is_literal, cameras[given])
     canvas = reach_of(cameras[given], cameras, depths_of(inverse_depth)).margins.around(photo.size)
     require_memory(math.prod(canvas) * MAKING_BYTES, f"making views from a canvas of {canvas} px")
-    inpainter = load_inpainter(source.inpaint, depth_estimator(source, loaded))
+    inpainter = load_inpainter(source.inpaint, photos.depth_estimator(source, loaded))
     return FreeViews(photo.pixels, inverse_depth, cameras[given], cameras, inpainter=inpainter)
-
-
-def _write_pictures(folder: Path, views: FreeViews, cameras: Sequence[Camera], is_hdr: bool) -> list[float]:
-    """Write the views to a folder. Return the inpainted share of each."""
-    shares = []
-    with write_folder(folder) as unfinished:
-        for number, camera in enumerate(cameras, 1):
-            view = views.view(camera)
-            name = f"view_{number:04d}{'.exr' if is_hdr else '.png'}"
-            write_image(unfinished / name, encode_for_storage(view.colors, is_hdr))
-            shares.append(float(view.inpainted.mean()))
-            report_progress(number, len(cameras), MAKING)
-    return shares
 
 
 def _inverse_depth(loaded: LoadedPhoto, is_literal: bool, camera: Camera) -> FloatImage:

@@ -19,7 +19,7 @@ import pytest
 from PIL import Image
 
 from tests.viewer.cli.conftest import Iibr
-from viewer.cli.remedies import BETTER_DEPTH
+from viewer.cli.messages import BETTER_DEPTH
 
 needs_process_groups = pytest.mark.skipif(os.name != "posix", reason="process groups")
 

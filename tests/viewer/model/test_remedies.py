@@ -13,7 +13,7 @@ from docs.words import texts_of
 from iibr_core.method.memory import require_memory
 from iibr_core.remedies import FixableError, Remedy, remedy_of
 from iibr_core.types import InputError
-from viewer.cli import remedies as command_line
+from viewer.cli import messages as command_line
 from viewer.model import remedies as window
 from viewer.model.commands import BY_NAME
 

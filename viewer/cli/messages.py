@@ -7,19 +7,38 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 from iibr_core.depth.choice import DepthOrigin
+from iibr_core.remedies import Remedy, remedy_of
 from iibr_core.runtime.compiling import watch_compiling
 from iibr_core.runtime.time_left import TimeLeft, about_left
 from iibr_core.runtime.work import watched
-from viewer.cli.remedies import BETTER_DEPTH
+
+BETTER_DEPTH = (
+    "Better: give a depth map with --disparity FILE, or a trained model with --depth-model (`iibr models` lists what is"
+    " there)."
+)
+REMEDIES = {
+    Remedy.REPLACE: "give --force to replace it, or choose another name",
+    Remedy.SMALLER: "lower --grid or --max-pixels",
+    Remedy.DEPTH: "get it with `iibr models get NAME`, or give a depth map with --disparity FILE",
+    Remedy.DOWNLOAD: "check the network and try again, name a mirror in HF_ENDPOINT, or use an ONNX file of your own",
+    Remedy.STRETCH: "or add --stretch if it shows the whole photo",
+}
 
 
-def print_notes(notes: tuple[str, ...], origin: DepthOrigin | None = None) -> None:
+def words_of(error: Exception) -> str:
+    """Return the message of an error, with its remedy."""
+    remedy = remedy_of(error)
+    return str(error) if remedy is None else f"{error}; {REMEDIES[remedy]}"
+
+
+def print_notes(*notes: str | None, origin: DepthOrigin | None = None) -> None:
     """Print a line for each note and one for the origin of depth, after the results on stdout."""
-    if origin is not None:
-        notes += (f"{origin.line} {BETTER_DEPTH}" if origin.is_poor else origin.line,)
+    better = BETTER_DEPTH if origin is not None and origin.is_poor else None
     sys.stdout.flush()
-    for note in notes:
+    for note in filter(None, notes):
         print(f"note: {note}", file=sys.stderr)
+    if origin is not None:
+        print(*filter(None, ("note:", origin.line, better)), file=sys.stderr)
 
 
 @contextmanager
