@@ -22,11 +22,8 @@ def in_shell(line: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(["bash", "-c", script], env=env, capture_output=True, text=True, timeout=120)
 
 
-def test_a_full_disk_behind_standard_output_is_one_line() -> None:
+def test_output_that_cannot_be_written_is_one_line_and_a_reader_that_ends_is_no_error() -> None:
     assert "No space left" in refusal_of(in_shell("iibr --version > /dev/full"))
-
-
-def test_a_reader_that_stops_reading_is_no_error_to_report() -> None:
     assert in_shell("iibr models | head -0").stderr == ""
 
 
@@ -39,15 +36,10 @@ def test_a_reader_that_stops_reading_is_no_error_to_report() -> None:
         (MemoryError("z"), 2, "out of memory (z)"),
         (KeyboardInterrupt(), 130, "interrupted"),
     ],
-    ids=lambda value: type(value).__name__ if isinstance(value, BaseException) else "",
+    ids=repr,
 )
 def test_errors_are_one_line_and_unexpected_ones_are_logged(
-    iibr: Iibr,
-    monkeypatch: pytest.MonkeyPatch,
-    tmp_path: Path,
-    failure: BaseException,
-    code: int,
-    message: str,
+    iibr: Iibr, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, failure: BaseException, code: int, message: str
 ) -> None:
     def load_photo(*_: object) -> None:
         raise failure

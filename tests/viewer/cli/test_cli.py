@@ -45,12 +45,6 @@ def test_help_describes_every_option_without_absurd_limits(iibr: Iibr, command: 
         assert len(line.split()) > 2, f"no help: {line}"
 
 
-def test_help_names_the_commands_in_the_order_in_which_people_use_them(iibr: Iibr) -> None:
-    names = re.findall(r"(?m)^│ ([a-z]+) ", output_of(iibr("-h")))
-    assert names == ["view", "export", "screenshot", "generate", "depth", "batch", "plan", "demo", "evaluate", "train",
-                     "models"]  # fmt: skip
-
-
 def test_without_a_display_help_comes_with_the_reason(tmp_path: Path) -> None:
     done = run_forked(cwd=tmp_path, XDG_CONFIG_HOME=str(tmp_path))
     assert "Usage: " in output_of(done)
@@ -92,7 +86,7 @@ def test_generate_writes_a_light_field_that_opens(iibr: Iibr, photo_path: Path, 
     out, disparity = tmp_path / "field", photo_path.with_name("scene_disparity.npy")
     words = ("generate", photo_path, "--disparity", disparity, "--grid", 3, "-o", out, "--with-disparity")
     (line,) = output_of(iibr(*words)).splitlines()
-    assert re.fullmatch(rf"9 views of 96x64 in [\d.]+ s \([\d.]+ ms per view\): {re.escape(str(out))}", line)
+    assert re.fullmatch(rf"9 views of 96x64 in [\d.]+ s: {re.escape(str(out))}", line)
     assert len(list(out.glob("input_Cam*.png"))) == len(list(out.glob("disp_Cam*.pfm"))) == 9
     output_of(iibr("screenshot", out, "-o", tmp_path / "field.png", "--view", "-1,1"))
 

@@ -61,12 +61,6 @@ def test_a_map_is_compared_at_two_scales(iibr: Iibr, data: Path) -> None:
     assert figures["plain warp, given map, fitted"] == figures["one plane"] > figures["unchanged photo"]
 
 
-def test_an_estimate_is_compared_with_a_guess_and_the_true_map(iibr: Iibr, data: Path) -> None:
-    out = output_of(iibr("evaluate", data / "row", "-o", "report", "--disparity", "estimate", "--views", 1))
-    for name in ("one plane", "iibr, guess", "iibr, guess, fitted", "iibr, true map"):
-        assert re.search(rf"(?m) dB  {name}$", out)
-
-
 @pytest.mark.parametrize(
     ("words", "message"),
     [

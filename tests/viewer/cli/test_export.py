@@ -68,7 +68,7 @@ def test_disparity_is_found_for_a_light_field_without_it(iibr: Iibr, photo: Path
     assert sorted(path.suffix for path in Path("hci").iterdir()) == [".cfg"] + 9 * [".png"]
 
 
-@pytest.mark.parametrize("kind", ["cross-eyed", "focal-stack", "quilt", "rgbd"])
+@pytest.mark.parametrize("kind", ["cross-eyed", "focal-stack", "quilt"])
 def test_pictures_have_the_photos_colours_and_metadata(
     iibr: Iibr, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, kind: str
 ) -> None:
@@ -116,9 +116,3 @@ def test_views_from_disk_take_gloss_if_their_disparity_is_negative(iibr: Iibr, p
     gained = np.asarray(Image.open("glossy.png")).astype(int) - np.asarray(Image.open("plain.png"))
     assert gained.min() >= -2
     assert gained.mean() > 5
-
-
-def test_an_unknown_setting_of_a_gloss_is_named(iibr: Iibr, photo: Path) -> None:
-    Path("gloss.toml").write_text('environment = "room.exr"')
-    assert "environment" in refusal_of(iibr("generate", photo, "--grid", 3, "-o", "new", "--gloss", "gloss.toml"))
-    assert not Path("new").exists()

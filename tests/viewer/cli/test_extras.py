@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-import tomllib
 from pathlib import Path
 
 import pytest
@@ -26,8 +25,6 @@ def run_plain(*words: object) -> subprocess.CompletedProcess[str]:
 
 
 def test_viewing_needs_no_extra(photo_path: Path, tmp_path: Path) -> None:
-    """A batch opens photos and makes views like all commands, in processes that import everything anew."""
-    output_of(run_plain("generate", photo_path, "--grid", 3, "-o", tmp_path / "field"))
     output_of(run_plain("screenshot", photo_path, "--view", "1,0", "--size", "96x64", "-o", tmp_path / "picture.png"))
 
 
@@ -48,9 +45,3 @@ def test_a_missing_package_is_named_in_one_line(
     before = contents(Path())
     assert message in refusal_of(iibr(*words.split()))
     assert contents(Path()) == before
-
-
-def test_the_extras_are_no_dependencies() -> None:
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
-    assert not [need for need in project["dependencies"] if need.startswith(EXTRAS)]
-    assert {"depth", "train", "evaluate"} <= set(project["optional-dependencies"])

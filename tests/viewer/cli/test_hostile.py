@@ -7,11 +7,9 @@ from __future__ import annotations
 
 import os
 import signal
-import struct
 import subprocess
 import sys
 import time
-import zlib
 from pathlib import Path
 
 import numpy as np
@@ -28,52 +26,35 @@ ROOT = Path(__file__).parents[3]
 DEADLINE_S = 120.0
 
 
-def chunk(kind: bytes, data: bytes) -> bytes:
-    return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
-
-
-def bomb(width: int, height: int) -> bytes:
-    """A PNG of a few hundred bytes that claims to be this large."""
-    header = struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)
-    data = zlib.compress(bytes(100_000))
-    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", data) + chunk(b"IEND", b"")
-
-
 @pytest.fixture
 def folder(photo_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """The working folder: a photo with its map, and everything that people point at by mistake."""
     folder = photo_path.parent
     monkeypatch.chdir(folder)
     noise = np.random.default_rng(0).integers(0, 256, (HEIGHT, WIDTH, 3), np.uint8)
-    Image.fromarray(noise).save(folder / "whole.jpg")
-    jpeg, png = (folder / "whole.jpg").read_bytes(), photo_path.read_bytes()
+    Image.fromarray(noise).save("whole.jpg")
+    jpeg, png, disparity = (Path(name).read_bytes() for name in ("whole.jpg", "scene.png", "scene_disparity.npy"))
     for name, content in {
         "text.jpg": b"this is no picture",
         "empty.jpg": b"",
         "page.jpg": b"<!DOCTYPE html><html>404</html>",
-        "drawing.svg": b"<svg xmlns='x'/>",
         "film.mp4": b"\0\0\0\x20ftypisom" + bytes(60),
-        "film.jpg": b"\0\0\0\x20ftypisom" + bytes(60),
         "raw.dng": b"II*\0\x08\0\0\0" + bytes(60),
-        "paper.pdf": b"%PDF-1.7\n" + bytes(60),
         "cut.jpg": jpeg[: len(jpeg) // 2],
         "cut.png": png[: len(png) // 2],
-        "bomb.png": bomb(19_000, 20_000),
-        "huge.png": bomb(60_000, 60_000),
         "bomb.ppm": b"P6 60000 60000 255\n" + bytes(9),
         "file": b"in the way",
-        "cut.npy": (folder / "scene_disparity.npy").read_bytes()[:300],
+        "cut.npy": disparity[:300],
         "text.npy": b"no map",
     }.items():
-        (folder / name).write_bytes(content)
-    np.save(folder / "shape.npy", np.zeros((HEIGHT, 3 * WIDTH), np.float32))
-    np.save(folder / "nan.npy", np.full((HEIGHT, WIDTH), np.nan, np.float32))
-    np.save(folder / "one.npy", np.full((HEIGHT, WIDTH), 3.0, np.float32))
-    np.save(folder / "line.npy", np.zeros(WIDTH, np.float32))
-    Image.new("RGB", (1, 1), (200, 100, 50)).save(folder / "pixel.png")
-    (folder / "empty").mkdir()
-    (folder / "full").mkdir()
-    (folder / "full" / "notes.txt").touch()
+        Path(name).write_bytes(content)
+    np.save("shape.npy", np.zeros((HEIGHT, 3 * WIDTH), np.float32))
+    np.save("nan.npy", np.full((HEIGHT, WIDTH), np.nan, np.float32))
+    np.save("one.npy", np.full((HEIGHT, WIDTH), 3.0, np.float32))
+    np.save("line.npy", np.zeros(WIDTH, np.float32))
+    Path("empty").mkdir()
+    Path("full").mkdir()
+    Path("full/notes.txt").touch()
     return folder
 
 
@@ -83,15 +64,10 @@ PHOTOS = {
     "text.jpg": "text.jpg: ",
     "empty.jpg": "the file is empty (0 bytes)",
     "page.jpg": "is a web page, not a picture; download the picture itself",
-    "drawing.svg": "is a drawing (SVG); save it as PNG",
     "film.mp4": "is a video; save one of its frames as PNG or JPEG",
-    "film.jpg": "is a video",
     "raw.dng": "is a camera's RAW file; develop it and save it as TIFF or JPEG",
-    "paper.pdf": "paper.pdf: ",
     "cut.jpg": "cut.jpg: ",
     "cut.png": "cut.png: ",
-    "bomb.png": "bomb.png: ",
-    "huge.png": "huge.png: ",
     "bomb.ppm": "bomb.ppm: ",
     "empty": "empty: ",
 }
@@ -150,8 +126,6 @@ def test_mistakes_are_refused_in_a_line_before_anything_is_written(iibr: Iibr, f
 WRITERS = {
     "screenshot": ("screenshot", "scene.png", "--grid", 1, "-o", "o.png"),
     "generate": ("generate", "scene.png", "--grid", 1, "-o", "o"),
-    "depth": ("depth", "scene.png", "-o", "o.pfm"),
-    "export": ("export", "scene.png", "--grid", 3, "--to", "sbs", "-o", "o.png"),
     "web": ("export", "scene.png", "--grid", 3, "--to", "web", "-o", "o.html"),
 }
 
@@ -167,15 +141,6 @@ def test_a_full_disk_leaves_what_was_there(iibr: Iibr, folder: Path, words: tupl
     assert "already exists; give --force" in refusal_of(iibr(*words))
     assert "cannot be written" in refusal_of(run_forked(*words, "--force", cwd=folder, max_bytes=2000))
     assert contents(folder) == before
-
-
-@pytest.mark.parametrize("name", ["pixel.png", "scene.png"])
-def test_a_photo_of_one_pixel_and_a_map_of_one_value_are_flat(iibr: Iibr, folder: Path, name: str) -> None:
-    (folder / "one.npy").replace(folder / "scene_disparity.npy")
-    output_of(iibr("generate", name, "--grid", 3, "-o", "o"))
-    photo = np.asarray(Image.open(folder / name).convert("RGB"))
-    for view in (folder / "o").glob("input_Cam*.png"):
-        np.testing.assert_array_equal(np.asarray(Image.open(view)), photo)
 
 
 def generating(folder: Path, *options: object) -> subprocess.Popen[str]:
@@ -195,11 +160,10 @@ def generating(folder: Path, *options: object) -> subprocess.Popen[str]:
     return process
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_program_that_is_asked_to_end_leaves_nothing(folder: Path, number: signal.Signals) -> None:
+def test_a_program_that_is_asked_to_end_leaves_nothing(folder: Path) -> None:
     before = contents(folder)
     process = generating(folder)
-    process.send_signal(number)
+    process.send_signal(signal.SIGTERM)
     errors = process.communicate(timeout=DEADLINE_S)[1]
     assert (process.returncode, errors) == (130, "iibr: interrupted\n")
     assert contents(folder) == before

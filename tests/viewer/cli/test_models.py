@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from iibr_core.depth.models.known import KNOWN_MODELS
-from iibr_core.formats.images.write import write_image
 from tests.forked_iibr import run_forked
 from tests.iibr_core.depth.onnx_graphs import of_channels
 from tests.viewer.cli.conftest import Done, Iibr, output_of, refusal_of
@@ -20,40 +18,27 @@ def run_models(home: Path, *words: object, typed: str = "") -> Done:
     return run_forked(*words, cwd=home, typed=typed, HF_ENDPOINT="http://127.0.0.1:9", **folders)
 
 
-def test_the_list_names_every_model_with_size_and_licence(tmp_path: Path) -> None:
-    *lines, getting, using = output_of(run_models(tmp_path, "models")).splitlines()
-    for model, line in zip(KNOWN_MODELS, (line for line in lines if not line.startswith(" ")), strict=True):
-        assert line.startswith(model.name + " ")
-        assert f"{model.megabytes:,} MB" in line
-        assert model.licence in line
-        assert "not here" in line
-        below = lines[lines.index(line) + 1].strip()
-        assert below.startswith(f"Good for {model.good_for}.")
-        assert ("Recommended." in below) == model.is_recommended
-    assert "iibr models get" in getting
-    assert "--depth-model NAME" in using
-
-
-def test_a_file_of_ones_own_is_copied_listed_and_found_by_name(tmp_path: Path) -> None:
+def test_models_are_listed_with_size_and_licence_and_a_file_of_ones_own_is_added(
+    photo_path: Path, tmp_path: Path
+) -> None:
     file = of_channels(tmp_path / "metres.onnx", farness=True)
     copied = output_of(run_models(tmp_path, "models", "get", file)).splitlines()
     assert copied[-1] == "Use it: iibr view PHOTO --depth-model metres"
     file.unlink()
-    listed = output_of(run_models(tmp_path, "models")).splitlines()
-    assert any(line.startswith("metres ") and "your own" in line for line in listed)
-    write_image(tmp_path / "photo.png", np.tile(np.linspace(0.2, 0.9, 60, dtype=np.float32)[:, None, None], (1, 80, 3)))
-    words = ("export", "photo.png", "--to", "disparity", "--depth-model", "metres", "--metric", "-o", "map.npy")
-    output_of(run_models(tmp_path, *words))
-    disparity = np.load(tmp_path / "map.npy")
-    assert disparity[-9].mean() > disparity[9].mean(), "300 less red are the metres"
+    *lines, _, _ = output_of(run_models(tmp_path, "models")).splitlines()
+    *known, own = (line for line in lines if not line.startswith(" "))
+    for model, line in zip(KNOWN_MODELS, known, strict=True):
+        assert all(part in line for part in (f"{model.name} ", f"{model.megabytes:,} MB", model.licence, "not here"))
+        assert f"Good for {model.good_for}." in lines[lines.index(line) + 1]
+    assert own.startswith("metres ")
+    output_of(run_models(tmp_path, "depth", photo_path, "--depth-model", "metres", "-o", "map.npy"))
 
 
 def test_without_a_network_get_is_one_line(tmp_path: Path) -> None:
     done = run_models(tmp_path, "models", "get", "depth-anything-v2-small", "--yes")
-    assert done.returncode == 2
     about, error = done.stderr.splitlines()
-    assert "99 MB" in about
-    assert "Apache-2.0" in about
+    assert done.returncode == 2
+    assert "99 MB, Apache-2.0" in about
     assert error.startswith("iibr: onnx-community/depth-anything-v2-small cannot be downloaded")
     assert "network" in error
     assert not list(tmp_path.rglob("*.safetensors"))
@@ -77,6 +62,4 @@ def test_commands_name_the_origin_of_depth_and_refuse_a_bad_model(iibr: Iibr, ph
     assert "note: Depth: scene_disparity.npy." in iibr(*words, tmp_path / "a").stderr
     (model := tmp_path / "model").mkdir()
     assert "config.json" in refusal_of(iibr(*words, tmp_path / "c", "--depth", "model", "--depth-model", model))
-    assert not (tmp_path / "c").exists()
-    missing = refusal_of(iibr("plan", photo_path, "--depth-model", "depth-anything-v2-base"))
-    assert "depth-anything-v2-base" in missing
+    assert "depth-anything-v2-base" in refusal_of(iibr("plan", photo_path, "--depth-model", "depth-anything-v2-base"))

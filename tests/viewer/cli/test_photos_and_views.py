@@ -13,14 +13,10 @@ from scipy.ndimage import uniform_filter
 import iibr_core
 from iibr_core.formats.images.photo import read_photo
 from iibr_core.formats.images.write import write_image
-from iibr_core.formats.light_fields.light_field_formats import open_light_field
 from iibr_core.formats.maps.pfm import read_pfm
-from iibr_core.types import GridShape, ViewOffset
+from iibr_core.types import ViewOffset
 from tests.iibr_core.depth.onnx_graphs import of_channels
-from tests.iibr_core.formats.test_hdr import PQ, encoded, write_heic, write_png
-from tests.iibr_core.formats.test_side_by_side import LEFT, RIGHT
-from tests.iibr_core.formats.test_side_by_side import photo as picture
-from tests.iibr_core.known_scenes import FOREGROUND, WALL, disparity_of_square, view_of_square, view_of_wall
+from tests.iibr_core.known_scenes import FOREGROUND, WALL, disparity_of_square, view_of_square
 from tests.viewer.cli.conftest import Iibr, output_of, refusal_of
 from tests.viewer.conftest import FAR, HEIGHT, NEAR, WIDTH
 
@@ -36,66 +32,12 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def write_pair(name: str, apart: float = 3.0) -> None:
-    """Write a wall for two eyes side by side, at WALL px for each of `apart` steps between them."""
-    eyes = [view_of_wall(ViewOffset(0, s), size=(64, 80)) for s in (0.0, apart)]
-    Image.fromarray(np.rint(np.hstack(eyes) * 255).astype(np.uint8)).save(name)
-
-
-def test_a_pair_is_matched_and_reported_as_cut(iibr: Iibr, folder: Path) -> None:
-    Image.fromarray(np.hstack([RIGHT, LEFT])).save("a.jps", "JPEG", quality=95)
-    out = output_of(iibr("plan", "a.jps"))
-    assert "80x60 px, disparity from the photo's two views (side-by-side stereo)" in out
-    assert "- Taken for a stereo pair, side by side, because of its " in out
-
-
-@pytest.mark.parametrize("name", ["pq.png", "pq.heic"])
-def test_an_hdr_photo_is_drawn_as_an_ordinary_one(iibr: Iibr, folder: Path, name: str) -> None:
-    expected = picture(64, 80) // 2 + 60
-    linear = ((expected / 255 + 0.055) / 1.055) ** 2.4
-    (write_png if name == "pq.png" else write_heic)(folder / name, encoded(linear, PQ), PQ)
-    done = iibr("screenshot", name, "--depth", "flat", "--view", "0,0", "--size", "80x64", "-o", "out.png")
-    output_of(done)
-    assert "HDR photo (PQ): its highlights are compressed" in done.stderr
-    drawn = np.asarray(Image.open("out.png").convert("RGB")).astype(float)
-    assert np.abs(drawn - expected).mean() < 6
-
-
-def test_a_quilt_of_ours_is_a_light_field_again(iibr: Iibr, photo_path: Path, folder: Path) -> None:
-    quilt = Path(output_of(iibr("export", photo_path, "--to", "quilt", "-o", "a.png", "--grid", 3)).strip())
-    assert open_light_field(quilt).grid == GridShape(1, 48)
-    output_of(iibr("export", quilt, "--to", "hci", "-o", "views"))
-    assert len(list(Path("views").glob("input_Cam*.png"))) == 48
-    whole, first = np.asarray(Image.open(quilt).convert("RGB")), np.asarray(Image.open("views/input_Cam000.png"))
-    height, width = first.shape[:2]
-    assert np.array_equal(whole[-height:, :width], first)
-    assert "--grid: a_qs" in refusal_of(iibr("export", quilt, "--to", "hci", "-o", "new", "--grid", 3))
-
-
-def test_a_stereo_photo_has_the_depth_of_its_two_views(iibr: Iibr, folder: Path) -> None:
-    write_pair("wall_SBS.png")
-    done = iibr("generate", "wall_SBS.png", "--grid", 3, "-o", "field", "--literal", "--with-disparity")
-    output_of(done)
-    assert "two views (side-by-side stereo)" in done.stderr
-    values = read_pfm(Path("field/disp_Cam004.pfm"))
-    assert values.shape == (64, 80)
-    assert np.median(values) == pytest.approx(3 * WALL, abs=0.1)
-
-
 def test_depth_of_a_pair_is_the_left_views(iibr: Iibr, folder: Path) -> None:
     eyes = [np.rint(view_of_square(ViewOffset(0, s)) * 255).astype(np.uint8) for s in (0.0, 2.0)]
     Image.fromarray(np.hstack(eyes)).save("square_SBS.png")
     output_of(iibr("depth", "square_SBS.png", "-o", "a.pfm"))
     error = np.abs(read_pfm(Path("a.pfm")) / 2 - disparity_of_square())[4:-4, 4:-4]
     assert np.mean(error < 0.2 * (FOREGROUND - WALL)) > 0.7
-
-
-def test_metres_reach_exports(iibr: Iibr, folder: Path) -> None:
-    Image.fromarray(np.rint(view_of_square(ViewOffset(0, 0)) * 255).astype(np.uint8)).save("square.png")
-    metres = np.where(disparity_of_square() > WALL, 1.5, 6.0).astype(np.float32)
-    np.save("square_depth.npy", metres)
-    output_of(iibr("export", "square.png", "--metric", "--to", "depth", "-o", "out_depth.npy"))
-    assert np.mean(np.abs(np.load("out_depth.npy") - metres) < 0.1) > 0.9
 
 
 @pytest.mark.parametrize(
@@ -117,22 +59,6 @@ def test_a_photo_without_depth_gets_a_guess_or_a_models(
     disparity = np.load("map.npy")
     assert disparity.shape == (60, 80)
     assert (np.median(disparity[-12:]) > np.median(disparity[:12])) == is_nearer_below
-
-
-def test_a_pair_is_estimated_by_the_model_that_is_named(iibr: Iibr, folder: Path) -> None:
-    write_pair("a_2x1.png")
-    output_of(iibr("depth", "a_2x1.png", "-o", "map.npy"))
-    assert np.median(np.load("map.npy")) == pytest.approx(3 * WALL, abs=0.5)
-    of_channels(Path("red.onnx"))
-    done = iibr("depth", "a_2x1.png", "--depth-model", "red.onnx", "--force", "-o", "map.npy")
-    assert "estimated by the model red.onnx" in done.stderr
-
-
-def test_a_bad_map_beside_the_photo_is_reported_and_not_used(iibr: Iibr, photo_path: Path, folder: Path) -> None:
-    np.save("scene_disparity.npy", np.full((5, 5), np.nan))
-    done = iibr("generate", photo_path, "--grid", 1, "-o", "a")
-    output_of(done)
-    assert "The map beside the photo was not used" in done.stderr
 
 
 def write_map(photo: Path, kind: str) -> None:
