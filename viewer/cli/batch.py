@@ -28,7 +28,7 @@ DASK = (
 @with_option_records
 def batch(
     context: typer.Context,
-    folders: Annotated[list[Path], typer.Argument(metavar="FOLDER...", help="Folders of photos.")],
+    folders: Annotated[list[Path], typer.Argument(metavar="FOLDER", help="Folders of photos.")],
     to: To,
     output: Annotated[Path, output_option("Folder of all exports.", "DIR")],
     lens: LensOptions,

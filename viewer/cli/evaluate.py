@@ -61,7 +61,7 @@ class ComparisonOptions:
 @with_option_records
 def evaluate(
     context: typer.Context,
-    datasets: Annotated[list[Path], typer.Argument(metavar="DATASET...", help=DATASETS)],
+    datasets: Annotated[list[Path], typer.Argument(metavar="DATASET", help=DATASETS)],
     output: Annotated[Path, output_option("Folder for the report (JSON, Markdown, HTML).", "DIR")],
     comparison: ComparisonOptions,
     force: Force = False,

@@ -22,7 +22,7 @@ def train(
     output: Annotated[Path, output_option("Weights to write (.safetensors).")],
     seed: Annotated[int, option("Seed of the scenes.", "N", min=0)] = 0,
     learning_rate: Annotated[
-        float, option("Learning rate of the first step; it falls to 0.", "X", min=1e-9, max=1.0)
+        float, option("Learning rate of the first step; it falls to 0.", "X", min=1e-6, max=1.0)
     ] = 1e-4,
     device: Annotated[str, option("auto, cpu, cuda, cuda:1 or mps.", "NAME")] = "auto",
     resume: Annotated[bool, flag("--resume", "Continue from the checkpoint beside the weights.")] = False,

@@ -18,7 +18,7 @@ from viewer.model.state.app_state import AppState
 @with_option_records
 def view(
     context: typer.Context,
-    path: Annotated[Path | None, typer.Argument(metavar="[PATH]", help=SCENE, show_default="the demo photo")] = None,
+    path: Annotated[Path | None, typer.Argument(metavar="PATH", help=SCENE, show_default="the demo photo")] = None,
     *,
     scene: SceneOptions,
     focus_disparity: FocusDisparity = None,
