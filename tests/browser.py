@@ -5,7 +5,6 @@ https://chromedevtools.github.io/devtools-protocol; messages end with a zero byt
 
 from __future__ import annotations
 
-import base64
 import json
 import os
 import shutil
@@ -19,18 +18,10 @@ from typing import IO, Any
 
 NAMES = ("chromium", "chromium-browser", "google-chrome")
 USUAL_FLAGS = (
-    "--headless=new",
-    "--no-sandbox",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-default-apps",
-    "--disable-extensions",
-    "--disable-sync",
-    "--hide-scrollbars",
-    "--mute-audio",
+    "--headless=new", "--no-sandbox", "--no-first-run", "--disable-background-networking", "--disable-component-update",
+    "--disable-default-apps", "--disable-extensions", "--disable-sync", "--hide-scrollbars", "--mute-audio",
     "--force-color-profile=srgb",
-)
+)  # fmt: skip
 DEADLINE_S = 100.0
 """For a condition that always comes true."""
 SOFTWARE = ("--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
@@ -105,32 +96,27 @@ class Tab:
 
     def prefer(self, **features: str) -> None:
         """Media features, as prefers_color_scheme="dark"."""
-        told = [{"name": name.replace("_", "-"), "value": value} for name, value in features.items()]
-        self.call("Emulation.setEmulatedMedia", features=told)
-
-    def screenshot(self) -> bytes:
-        """What is seen, a PNG."""
-        return base64.b64decode(self.call("Page.captureScreenshot", format="png")["data"])
+        media = [{"name": name.replace("_", "-"), "value": value} for name, value in features.items()]
+        self.call("Emulation.setEmulatedMedia", features=media)
 
     @property
     def requests(self) -> list[str]:
         """The addresses of all that was asked for since the page was opened, but for the page, what it holds, and what
         its policy stopped before it left.
         """
-        stopped = {told["requestId"] for name, told in self.events if told.get("blockedReason") == "csp"}
-        asked = [told for name, told in self.events if name == "Network.requestWillBeSent"]
-        urls = [told["request"]["url"] for told in asked[1:] if told["requestId"] not in stopped]
+        stopped = {event["requestId"] for _, event in self.events if event.get("blockedReason") == "csp"}
+        asked = [event for name, event in self.events if name == "Network.requestWillBeSent"]
+        urls = [event["request"]["url"] for event in asked[1:] if event["requestId"] not in stopped]
         return [url for url in urls if not url.startswith(("data:", "blob:"))]
 
     @property
     def complaints(self) -> list[str]:
         """Errors on the console, exceptions that nobody caught, and what the policy forbade."""
-        said = [told["exceptionDetails"] for name, told in self.events if name == "Runtime.exceptionThrown"]
-        logged = [told["entry"] for name, told in self.events if name == "Log.entryAdded"]
-        return [json.dumps(one) for one in said] + [one["text"] for one in logged if one["level"] == "error"]
+        thrown = [event["exceptionDetails"] for name, event in self.events if name == "Runtime.exceptionThrown"]
+        logged = [event["entry"] for name, event in self.events if name == "Log.entryAdded"]
+        return [*map(json.dumps, thrown), *(entry["text"] for entry in logged if entry["level"] == "error")]
 
     def close(self) -> None:
-        """End the page."""
         with suppress(PageError):
             self.call("Page.close")
         self._pipe.tabs.pop(self._session, None)
@@ -139,14 +125,12 @@ class Tab:
 class Pipe:
     """The browser's end of the protocol."""
 
-    def __init__(self, to: IO[bytes], answers: IO[bytes], process_id: int) -> None:
-        self.process_id = process_id
+    def __init__(self, to: IO[bytes], answers: IO[bytes]) -> None:
         self._to, self._answers, self._count, self._rest = to, answers, 0, b""
         self._done: dict[int, dict[str, Any]] = {}
         self.tabs: dict[str, Tab] = {}
 
     def call(self, method: str, parameters: dict[str, Any], session: str | None = None) -> dict[str, Any]:
-        """A command's result."""
         self._count += 1
         number = self._count
         message = {"id": number, "method": method, "params": parameters} | ({"sessionId": session} if session else {})
@@ -157,11 +141,9 @@ class Pipe:
         answer = self._done.pop(number)
         if "error" in answer:
             raise PageError(f"{method}: {answer['error']['message']}")
-        result: dict[str, Any] = answer["result"]
-        return result
+        return answer["result"]
 
     def read(self) -> None:
-        """Take the next message."""
         while b"\0" not in self._rest:
             data = os.read(self._answers.fileno(), 1 << 20)
             if not data:
@@ -198,7 +180,7 @@ def open_browser(*flags: str) -> Iterator[Pipe]:
         os.close(their_read)
         os.close(their_write)
         with os.fdopen(write, "wb") as to, os.fdopen(read, "rb", buffering=0) as answers:
-            pipe = Pipe(to, answers, process.pid)
+            pipe = Pipe(to, answers)
             try:
                 yield pipe
             finally:

@@ -1,7 +1,5 @@
 """Options all tests share."""
 
-from __future__ import annotations
-
 import os
 import signal
 from pathlib import Path
@@ -52,7 +50,6 @@ def regenerate_golden(request: pytest.FixtureRequest) -> bool:
 
 @pytest.fixture
 def photo_path(tmp_path: Path) -> Path:
-    """A photo with its map, see `write_scene`."""
     from tests.viewer.conftest import write_scene
 
     return write_scene(tmp_path)

@@ -1,7 +1,5 @@
 """Run `iibr` in a fork of a process that has imported it: like a process of its own, but it starts at once."""
 
-from __future__ import annotations
-
 import multiprocessing
 import os
 import signal

@@ -4,8 +4,6 @@ A tolerance has three parts, as image test suites of renderers do it: how far a 
 be farther off than that, and how far at most.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -43,9 +41,7 @@ def problem_with(image: NDArray[np.uint8], expected: NDArray[np.uint8], toleranc
     return None
 
 
-def assert_close(
-    image: NDArray[np.uint8], expected: NDArray[np.uint8], tolerance: Tolerance, folder: Path, name: str = "image"
-) -> None:
+def assert_close(image, expected, tolerance, folder, name="image"):
     """Fail where the images differ; `folder/name-diff.png` then shows image, expected and 8 times their difference."""
     problem = problem_with(image, expected, tolerance)
     if problem is None:
@@ -60,7 +56,6 @@ def assert_close(
 
 
 def write_png(path: Path, image: NDArray[np.uint8]) -> None:
-    """Write an (H, W, 3) uint8 picture."""
     path.parent.mkdir(parents=True, exist_ok=True)
     height, width, channels = image.shape
     buffer = oiio.ImageBuf(oiio.ImageSpec(width, height, channels, oiio.UINT8))
@@ -69,5 +64,4 @@ def write_png(path: Path, image: NDArray[np.uint8]) -> None:
 
 
 def read_png(path: Path) -> NDArray[np.uint8]:
-    """Read a picture as (H, W, 3) uint8."""
     return np.asarray(oiio.ImageBuf(str(path)).get_pixels(oiio.UINT8))[..., :3]

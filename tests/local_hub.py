@@ -1,7 +1,5 @@
 """A hub on this machine that answers as the Hugging Face hub does when files of one commit are downloaded."""
 
-from __future__ import annotations
-
 import hashlib
 import threading
 from collections.abc import Iterator, Mapping
@@ -88,7 +86,6 @@ class _Answer(BaseHTTPRequestHandler):
 
 @contextmanager
 def local_hub(commit: str, files: Mapping[str, bytes]) -> Iterator[Hub]:
-    """Run a hub until the block ends."""
     with Hub(commit, files) as hub:
         threading.Thread(target=hub.serve_forever).start()
         yield hub

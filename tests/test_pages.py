@@ -1,7 +1,3 @@
-"""Pages: links lead somewhere, names and options exist, no page is long, the site builds without a warning."""
-
-from __future__ import annotations
-
 import re
 import shlex
 from collections.abc import Iterator
@@ -38,7 +34,7 @@ def anchors(page: Path) -> set[str]:
 
 
 @pytest.mark.parametrize("page", PAGES, ids=name_of)
-def test_links_lead_somewhere(page: Path) -> None:
+def test_links_lead_somewhere(page) -> None:
     for target in LINK.findall(prose(page)):
         if not target.startswith("https://"):
             path, _, anchor = target.partition("#")
@@ -49,7 +45,7 @@ def test_links_lead_somewhere(page: Path) -> None:
 
 
 @pytest.mark.parametrize("page", PAGES, ids=name_of)
-def test_a_page_can_be_read_at_one_go(page: Path) -> None:
+def test_a_page_can_be_read_at_one_go(page) -> None:
     assert len(page.read_text("utf-8").splitlines()) <= MAX_LINES.get(name_of(page), 150)
 
 
@@ -59,7 +55,7 @@ def test_every_picture_is_shown() -> None:
 
 
 @pytest.mark.parametrize("page", ["CONTRIBUTING.md", "docs/architecture.md"])
-def test_files_and_names_that_developers_read_of_exist(page: str) -> None:
+def test_files_and_names_that_developers_read_of_exist(page) -> None:
     """A file name without a folder lies in the folder of the file named before it, or in `iibr_core/`."""
     sources = "".join(
         path.read_text("utf-8") for room in ("iibr_core", "viewer") for path in ROOT.joinpath(room).rglob("*.py")
@@ -87,7 +83,7 @@ def commands_of(page: Path) -> Iterator[list[str]]:
 
 
 @pytest.mark.parametrize("page", [page for page in PAGES if list(commands_of(page))], ids=name_of)
-def test_commands_of_a_page_know_their_options(page: Path) -> None:
+def test_commands_of_a_page_know_their_options(page) -> None:
     commands = cast(Any, typer.main.get_command(app)).commands
     for words in commands_of(page):
         command = commands.get(words[1] if len(words) > 1 else "view", commands["view"])

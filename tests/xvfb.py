@@ -1,7 +1,5 @@
 """A private X server for tests and benchmarks of the real window."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess

@@ -1,25 +1,26 @@
-"""`make figures`: programs fill the marks of pages, and what people wrote around them stays."""
-
-from __future__ import annotations
-
 import shlex
 from pathlib import Path
 
+import numpy as np
 import pytest
+from PIL import Image
 
 from benchmarks import __main__ as dispatch
 from benchmarks.compare import command_line
+from benchmarks.fuzz import fault_of, fuzz, samples
+from benchmarks.method_figures import main
 from benchmarks.report import ROOT, git
 from benchmarks.scenes import MAPS
 from benchmarks.tables import NEEDS, TABLES, Table, old_tables, put_between, write_table
 from benchmarks.ways import chosen_ways
+from iibr_core.types import InputError
 
 PAGE = (
     "# A page\n\nPeople wrote this.\n\n<!-- times -->\nMade by `x` at commit 0123456.\n<!-- /times -->\n\nAnd this.\n"
 )
 
 
-def test_a_table_is_put_between_its_marks(tmp_path: Path) -> None:
+def test_a_table_is_put_between_its_marks(tmp_path) -> None:
     (tmp_path / "page.md").write_text(PAGE)
     assert write_table(Table("times", "page.md", "tables --list --only window", 1), {}, tmp_path)
     text = (tmp_path / "page.md").read_text()
@@ -29,7 +30,7 @@ def test_a_table_is_put_between_its_marks(tmp_path: Path) -> None:
     assert text.startswith("# A page\n\nPeople wrote this.\n")
 
 
-def test_a_program_that_fails_leaves_the_page(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_program_that_fails_leaves_the_page(tmp_path, capsys) -> None:
     (tmp_path / "page.md").write_text(PAGE)
     assert not write_table(Table("times", "page.md", "nothing", 1), {}, tmp_path)
     assert not write_table(Table("absent", "page.md", "tables --list", 1), {}, tmp_path)
@@ -41,7 +42,7 @@ def test_a_program_that_fails_leaves_the_page(tmp_path: Path, capsys: pytest.Cap
     assert not write_table(Table("times", "page.md", "tables --list", 1), {}, tmp_path), "its marks stand twice"
 
 
-def test_old_tables_are_listed(tmp_path: Path) -> None:
+def test_old_tables_are_listed(tmp_path) -> None:
     table, page = Table("times", "page.md", "guess", 1), tmp_path / "page.md"
     for commit, words in (("nothing", ["names no commit"]), ("0123456", ["an unknown number"]), ("HEAD", [])):
         text = "" if commit == "nothing" else f"Made by `x` at commit {commit}."
@@ -66,3 +67,53 @@ def test_the_list_names_programs_that_are_there() -> None:
     assert sum(table.minutes for table in TABLES) <= 40
     page = (ROOT / "benchmarks" / "README.md").read_text("utf-8")
     assert all(f"| `{name.replace('_', '-')}" in page for name in dispatch.programs())
+
+
+def test_every_figure_is_drawn(tmp_path) -> None:
+    main([str(tmp_path), "--max-pixels", "30000"])
+    assert {path.name for path in tmp_path.iterdir()} == {
+        path.name for path in (ROOT / "docs" / "method").glob("*.png")
+    }
+    for path in tmp_path.iterdir():
+        with Image.open(path) as picture:
+            assert picture.width > 500
+            assert len(np.unique(np.asarray(picture))) > 20
+
+
+def test_every_valid_file_is_read_and_some_copies_are_refused(tmp_path) -> None:
+    readers = samples(tmp_path / "now")
+    assert len(readers) > 25
+    for path, read in readers.items():
+        assert fault_of(read, path) == "", path.name
+    assert list(fuzz(readers, 2, 0, tmp_path)) == []
+
+
+def test_a_planted_crash_is_found_and_kept(tmp_path) -> None:
+    path = tmp_path / "now.txt"
+    path.write_bytes(b"1 2 3 " * 50)
+
+    def read(file: Path) -> list[np.ndarray]:
+        if len(file.read_bytes()) < 100:
+            raise IndexError("short")
+        return [np.array([1.0])]
+
+    findings = list(fuzz({path: read}, 60, 1, tmp_path))
+    assert findings
+    assert all("IndexError in test_tables.py, read: 'short'" in line for line in findings)
+    kept = tmp_path / findings[0].split(":")[0]
+    assert len(kept.read_bytes()) < 100
+    assert path.read_bytes() == b"1 2 3 " * 50
+
+
+@pytest.mark.parametrize(
+    ("message", "result", "fault"),
+    [("one line", None, ""), ("two\nlines", None, "several"), ("", [np.array([np.nan])], "not finite")],
+)
+def test_faults_are_told_from_refusals(message, result, fault) -> None:
+    def read(path: Path) -> list[np.ndarray] | None:
+        if message:
+            raise InputError(message)
+        return result
+
+    assert fault in fault_of(read, Path("a"))
+    assert bool(fault) == bool(fault_of(read, Path("a")))

@@ -1,7 +1,5 @@
 """Writes small photos that carry depth, in each container that the parsers read: what the tests know, they wrote."""
 
-from __future__ import annotations
-
 import base64
 import hashlib
 import io
@@ -25,8 +23,8 @@ def picture(pixels: np.ndarray, kind: str = "JPEG", orientation: int = 1) -> byt
     return file.getvalue()
 
 
-def grey_photo(size: tuple[int, int], orientation: int = 1) -> bytes:
-    return picture(np.full((*size, 3), 128, np.uint8), orientation=orientation)
+def grey_photo(size: tuple[int, int]) -> bytes:
+    return picture(np.full((*size, 3), 128, np.uint8))
 
 
 def with_segments(jpeg: bytes, contents: list[bytes]) -> bytes:
@@ -51,12 +49,8 @@ def packet(attributes: dict[str, str], children: str = "", prolog: str = "") -> 
 def extended_parts(extended: bytes, part_bytes: int) -> tuple[str, list[bytes]]:
     """The GUID of an extended packet, and the contents of the segments that hold its parts."""
     guid = hashlib.md5(extended).hexdigest().upper()
-    starts = range(0, len(extended), part_bytes)
-    parts = [
-        EXTENDED + guid.encode() + struct.pack(">II", len(extended), at) + extended[at : at + part_bytes]
-        for at in starts
-    ]
-    return guid, parts
+    head, starts = EXTENDED + guid.encode(), range(0, len(extended), part_bytes)
+    return guid, [head + struct.pack(">II", len(extended), at) + extended[at : at + part_bytes] for at in starts]
 
 
 GDEPTH, GIMAGE = "http://ns.google.com/photos/1.0/depthmap/", "http://ns.google.com/photos/1.0/image/"
@@ -64,16 +58,8 @@ NOTE = "http://ns.adobe.com/xmp/note/"
 
 
 def gdepth_segments(
-    depth: bytes,
-    *,
-    near: object = 2.0,
-    far: object = 10.0,
-    kind: str = "RangeInverse",
-    confidence: bytes | None = None,
-    sharp: bytes | None = None,
-    units: str = "",
-    part_bytes: int | None = None,
-) -> list[bytes]:
+    depth, *, near=2.0, far=10.0, kind="RangeInverse", confidence=None, sharp=None, units="", part_bytes=None
+):
     """APP1 contents of GDepth: all in one packet, or the data in an extended packet cut into parts."""
     about = {f"{GDEPTH} Format": kind, f"{GDEPTH} Near": str(near), f"{GDEPTH} Far": str(far)}
     if units:
@@ -89,34 +75,17 @@ def gdepth_segments(
     return [STANDARD + packet(about | {f"{NOTE} HasExtendedXMP": guid}), *parts]
 
 
-def dynamic_depth_jpeg(
-    photo: bytes,
-    depth: bytes,
-    *,
-    near: object = 2.0,
-    far: object = 10.0,
-    length: object = None,
-    before: bytes = b"",
-    between: bytes = b"",
-    behind: bytes = b"",
-    shared_container: bool = False,
-    kind: str = "RangeInverse",
-) -> bytes:
-    """A Dynamic Depth 1.0 photo.
+def dynamic_depth_jpeg(photo, depth, *, before=b"", between=b"", behind=b"", shared_container=False):
+    """Return a Dynamic Depth 1.0 photo.
 
-    before: another item that precedes the depth map. between: a trailer of somebody else's between photo and items.
-    behind: one behind all.
+    before: an item that precedes the depth map. between: a trailer between photo and items. behind: one behind all.
     """
     root = "http://ns.google.com/photos/"
-    container, item = (
-        ("1.0/container/", "1.0/container/item/") if shared_container else ("dd/1.0/container/", "dd/1.0/item/")
-    )
-    entries = [
-        ("image/jpeg", "Primary", len(photo) if shared_container else 0, "primary"),
-        ("image/png", "Depth", length or len(depth), "android/depthmap"),
-    ]
-    if before:
-        entries.insert(1, ("image/jpeg", "GainMap", len(before), "gain"))
+    container = "1.0/container/" if shared_container else "dd/1.0/container/"
+    item = "1.0/container/item/" if shared_container else "dd/1.0/item/"
+    entries = [("image/jpeg", "Primary", len(photo) if shared_container else 0, "primary")]
+    entries += [("image/jpeg", "GainMap", len(before), "gain")] if before else []
+    entries += [("image/png", "Depth", len(depth), "android/depthmap")]
     listed = "".join(
         f'<rdf:li rdf:parseType="Resource"><C:Item I:Mime="{mime}" I:Semantic="{semantic}" I:Length="{size}"'
         f' I:DataURI="{uri}"/></rdf:li>'
@@ -127,8 +96,8 @@ def dynamic_depth_jpeg(
         f'<C:Directory xmlns:C="{root}{container}" xmlns:I="{root}{item}"><rdf:Seq>{listed}</rdf:Seq></C:Directory>'
         f'<D:Cameras xmlns:D="{root}dd/1.0/device/" xmlns:K="{root}dd/1.0/camera/" xmlns:M="{root}dd/1.0/depthmap/">'
         f'<rdf:Seq><rdf:li rdf:parseType="Resource"><D:Camera><K:DepthMap rdf:parseType="Resource">'
-        f"<M:Format>{kind}</M:Format><M:Near>{near}</M:Near><M:Far>{far}</M:Far><M:Units>Meters</M:Units>"
-        f"<M:DepthURI>android/depthmap</M:DepthURI></K:DepthMap></D:Camera></rdf:li></rdf:Seq></D:Cameras>",
+        "<M:Format>RangeInverse</M:Format><M:Near>2.0</M:Near><M:Far>10.0</M:Far><M:Units>Meters</M:Units>"
+        "<M:DepthURI>android/depthmap</M:DepthURI></K:DepthMap></D:Camera></rdf:li></rdf:Seq></D:Cameras>",
     )
     return with_segments(photo, [STANDARD + xmp]) + between + before + depth + behind
 
@@ -136,18 +105,14 @@ def dynamic_depth_jpeg(
 def apple_jpeg(photo: bytes, depth: np.ndarray, low: object, high: object, kind: str = "disparity") -> bytes:
     """A portrait as iPhones save it as JPEG: depth in a second JPEG behind the photo."""
     space = "http://ns.apple.com/pixeldatainfo/1.0/"
-    about = {
-        f"{space} AuxiliaryImageType": kind,
-        f"{space} FloatMinValue": str(low),
-        f"{space} FloatMaxValue": str(high),
-    }
+    values = {"AuxiliaryImageType": kind, "FloatMinValue": str(low), "FloatMaxValue": str(high)}
+    about = {f"{space} {name}": value for name, value in values.items()}
     return photo + with_segments(picture(depth), [STANDARD + packet(about)])
 
 
-def samsung_jpeg(photo: bytes, depth: np.ndarray, size: tuple[int, int] | None = None, audio: bool = False) -> bytes:
-    """A "Live focus" photo with Samsung's trailer; depth (H, W) uint8, dark is near. size: (width, height) as told."""
-    width, height = size or (depth.shape[1], depth.shape[0])
-    extra = bytes(32) + b"\x03\0\xff\xff" + struct.pack("<II", width, height) + bytes(64)
+def samsung_jpeg(photo: bytes, depth: np.ndarray, audio: bool = False) -> bytes:
+    """Return a "Live focus" photo with Samsung's trailer; depth (H, W) uint8, dark is near."""
+    extra = bytes(32) + b"\x03\0\xff\xff" + struct.pack("<II", *depth.shape[::-1]) + bytes(64)
     blocks = [
         (0x0A01, b"Image_UTC_Data", b"1234567890123"),
         (0x0AB1, b"DualShot_DepthMap_1", depth.tobytes()),
@@ -170,12 +135,7 @@ def samsung_jpeg(photo: bytes, depth: np.ndarray, size: tuple[int, int] | None =
 HEIC_DEPTH = b"urn:mpeg:hevc:2015:auxid:2"
 
 
-def heic(
-    pixels: np.ndarray,
-    depth: np.ndarray | None = None,
-    exif: bytes | None = None,
-    auxiliary: bytes = HEIC_DEPTH,
-) -> bytes:
+def heic(pixels, depth=None, auxiliary=HEIC_DEPTH):
     """A HEIC photo, with an auxiliary picture if asked: the second picture of a file of two, made one by hand.
 
     auxiliary: its type, depth or another one.
@@ -186,7 +146,7 @@ def heic(
     if depth is not None:
         file.add_frombytes("L", (depth.shape[1], depth.shape[0]), depth.tobytes())
     whole = io.BytesIO()
-    file.save(whole, format="HEIF", quality=-1, **({"exif": exif} if exif else {}))
+    file.save(whole, format="HEIF", quality=-1)
     return whole.getvalue() if depth is None else _with_second_as(bytearray(whole.getvalue()), auxiliary)
 
 
@@ -249,7 +209,6 @@ def avif(pixels: np.ndarray, depth: np.ndarray, orientation: int = 1) -> bytes:
 
 
 def lytro_file(text: dict[str, object], chunks: dict[str, bytes]) -> bytes:
-    """A Lytro file of a JSON and named chunks."""
     sections = [(b"M", "json", json.dumps(text).encode()), *((b"C", name, chunks[name]) for name in chunks)]
     data = b"\x89LFP\r\n\x1a\n" + struct.pack(">II", 1, 0)
     for kind, name, content in sections:

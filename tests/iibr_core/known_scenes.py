@@ -1,7 +1,5 @@
 """Light fields whose every view is known, written to disk in the layouts of data sets."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
@@ -44,7 +42,6 @@ def view_of_square(offset: ViewOffset) -> np.ndarray:
 
 
 def disparity_of_square() -> np.ndarray:
-    """(H, W) of the centre view of `view_of_square`."""
     disparity = np.full((HEIGHT, WIDTH), WALL, np.float32)
     top, left = round(HEIGHT / 3), round(WIDTH / 3)
     disparity[top : top + HEIGHT // 3, left : left + WIDTH // 3] = FOREGROUND
@@ -53,9 +50,7 @@ def disparity_of_square() -> np.ndarray:
 
 def offsets_of(rows: int, columns: int) -> dict[tuple[int, int], ViewOffset]:
     """Offsets by (v, u), from the centre view."""
-    return {
-        (v, u): ViewOffset(float(v - rows // 2), float(u - columns // 2)) for v in range(rows) for u in range(columns)
-    }
+    return {(v, u): ViewOffset(float(v - rows // 2), float(u - columns // 2)) for v, u in np.ndindex(rows, columns)}
 
 
 def write_grid(folder: Path, side: int = 3) -> Path:
@@ -78,7 +73,6 @@ def write_hci(folder: Path, rows: int = 3, columns: int = 3) -> Path:
 
 
 def write_numbered(folder: Path, names: dict[str, ViewOffset], size: tuple[int, int] = (8, 8)) -> Path:
-    """Small pictures of the wall under any names."""
     folder.mkdir(parents=True, exist_ok=True)
     for name, offset in names.items():
         write_image(folder / name, view_of_wall(offset, size=size))
@@ -95,14 +89,12 @@ def write_stanford(folder: Path, rows: int, columns: int) -> Path:
 
 
 def write_stereo_pair(folder: Path) -> Path:
-    """Middlebury's im0.png, im1.png and disp0.pfm."""
     write_numbered(folder, {f"im{n}.png": ViewOffset(0, n) for n in (0, 1)}, (HEIGHT, WIDTH))
     write_pfm(folder / "disp0.pfm", np.full((HEIGHT, WIDTH), 7.5, np.float32))
     return folder
 
 
 def write_llff_row(folder: Path) -> Path:
-    """Three photos from left to right and their poses_bounds.npy."""
     write_numbered(folder / "images", {f"IMG_{n}.png": ViewOffset(0, n) for n in range(3)}, (HEIGHT, WIDTH))
     down, right, back = np.eye(3)[[1, 0, 2]] * [[1], [1], [-1]]
     poses = [np.column_stack([down, right, back, [n, 0, 0], [HEIGHT, WIDTH, 50]]).ravel() for n in range(3)]

@@ -1,7 +1,5 @@
 """The scenes that were path-traced through a thin lens, see tests/data/thin_lens/README.md."""
 
-from __future__ import annotations
-
 import json
 import math
 from dataclasses import dataclass
@@ -50,9 +48,7 @@ class LensScene:
 
 
 def lens_scene(name: str) -> LensScene:
-    """Return one of NAMES."""
     scene = read_scene(FOLDER / name)
-    assert scene is not None
     stated = json.loads((FOLDER / name / "lens.json").read_text())
     picture = np.clip(read_photo(FOLDER / name / "lens.png").pixels, 0, 1)
     photo = read_photo(scene.views[scene.centre].path)

@@ -4,5 +4,4 @@ ENTRY = f"{__name__}:paint_red"
 
 
 def paint_red(colors, disparity, hole, photo_disparity, offset, threads):
-    """Everything red, far behind."""
     colors[hole], disparity[hole] = (1.0, 0.0, 0.0), -9.0

@@ -1,10 +1,3 @@
-"""Hard cases of a photo's map, the whole way: photo, disparity, plan, every view of the field.
-
-What single steps do with them (readers, candidates, weights, fills) is tested beside those steps. Apertures and far
-offsets on the graphics card are in tests/viewer/gpu/test_hard_cases_gpu.py, the viewer and its commands in
-tests/viewer/test_hard_cases_viewer.py.
-"""
-
 from dataclasses import replace
 
 import numpy as np
@@ -49,7 +42,6 @@ def plain_photo():
 
 
 def test_disparity_all_equal():
-    """Every view is the photo moved as one, what it does not show is inpainted; for viewing it takes a single view."""
     photo, disparity = plain_photo(), disparity_of(np.full((HEIGHT, WIDTH), 2.0))
     for (row, column), view in field_of(photo, disparity).items():
         shift = -2 * (row - 1), -2 * (column - 1)
@@ -78,7 +70,6 @@ def test_unknown_disparity_of_a_file_is_filled_from_behind_with_a_note(tmp_path,
 
 
 def test_disparity_with_one_outlier_at_1e6(tmp_path):
-    """In a file it counts as unknown. As it is, its ray lands nowhere: the views change only around that pixel."""
     photo, values = plain_photo(), np.zeros((HEIGHT, WIDTH), np.float32)
     values[8, 9] = 1e6
     np.save(tmp_path / "map.npy", values)
@@ -95,14 +86,12 @@ def test_disparity_with_one_outlier_at_1e6(tmp_path):
 
 
 def test_disparity_larger_than_the_image():
-    """Nothing of the photo is seen from elsewhere: such views are all hole, and stay black."""
     views = field_of(plain_photo(), disparity_of(np.full((HEIGHT, WIDTH), 500.0)))
     del views[GRID.centre]
     assert all(view.inpainted.all() and (view.colors == 0).all() for view in views.values())
 
 
 def test_depth_of_0(tmp_path):
-    """No distance at all: unknown, filled from behind. Where every depth is 0 the file is refused by name."""
     depth = np.full((HEIGHT, WIDTH), 4.0, np.float32)
     depth[:, :9], depth[6:9, 6:9] = 1.0, 0.0
     write_image(tmp_path / "photo.png", plain_photo().pixels)
@@ -118,7 +107,6 @@ def test_depth_of_0(tmp_path):
 
 @pytest.mark.parametrize("size", [(1, 1), (1, 13), (11, 1), (2, 2), (7, 13)])
 def test_tiny_thin_and_prime_sized_images(size):
-    """Every size has all its views, and the centre view is the photo."""
     photo = photo_of(np.random.default_rng(0).uniform(0, 1, (*size, 3)))
     disparity = disparity_of(np.random.default_rng(1).uniform(-2, 2, size))
     assert field_of(photo, disparity)[GRID.centre].colors == pytest.approx(photo.pixels, abs=1e-3)
@@ -134,7 +122,6 @@ def test_entropy_is_0_where_one_surface_shows_and_1_where_none_does():
 
 @pytest.mark.parametrize("far", [1e2, 1e30])
 def test_view_offset_far_outside_the_grid(far):
-    """What does not move is still there, what moved away is filled: never a number that is none."""
     photo, disparity = square_before_wall(HEIGHT, WIDTH)
     rays, square = rays_of_photo(photo.pixels, disparity.values, 1.0, 0), disparity.values > 0
     for offset in (ViewOffset(far, -far), ViewOffset(0.0, far)):
@@ -158,7 +145,6 @@ def test_a_hole_that_covers_the_whole_frame_border_is_filled_from_inside():
 
 @pytest.mark.parametrize("upright", [True, False])
 def test_a_one_pixel_wire(upright):
-    """It stays one pixel wide, of its own colour, wherever it moves; what it hid is filled with the wall."""
     values, pixels = np.zeros((24, 30)), np.full((24, 30, 3), 0.1)
     at = np.s_[:, 15] if upright else np.s_[12]
     values[at], pixels[at] = 3.0, 0.9

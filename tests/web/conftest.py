@@ -1,7 +1,5 @@
 """A small scene as a page, a browser that shows it, and the desktop's pictures of the same."""
 
-from __future__ import annotations
-
 import base64
 from collections.abc import Callable, Iterator
 from io import BytesIO
@@ -20,7 +18,6 @@ OpenPage = Callable[..., Tab]
 
 
 def export(scene: Path, *words: str, grid: str = "3") -> Path:
-    """A page of a scene, by the command."""
     page = scene.with_suffix(".html")
     app(
         ["export", str(scene), "--to", "web", "--grid", grid, "-o", str(page), "--force", *words], standalone_mode=False
@@ -35,7 +32,7 @@ def browser() -> Iterator[Pipe]:
 
 
 @pytest.fixture
-def tab(browser: Pipe) -> Iterator[Tab]:
+def tab(browser) -> Iterator[Tab]:
     tab = browser.new_tab()
     tab.prefer(prefers_reduced_motion="reduce")
     yield tab
@@ -43,7 +40,6 @@ def tab(browser: Pipe) -> Iterator[Tab]:
 
 
 def wait_until_still(tab: Tab) -> None:
-    """All views are there, and the picture is drawn to its best."""
     tab.wait_until(STILL)
     assert tab.complaints == []
 
@@ -55,7 +51,6 @@ def press(tab: Tab, key: str, times: int = 1) -> None:
 
 
 def slide(tab: Tab, name: str, value: float) -> None:
-    """Move a slider as a hand does."""
     tab.evaluate(
         f"(slider => {{ slider.value = {value}; slider.dispatchEvent(new Event('input')) }})"
         f"(document.getElementById('{name}'))"
@@ -72,7 +67,6 @@ def set_lens(tab: Tab, s: float, t: float, focus: float, aperture: float) -> Non
 
 
 def canvas(tab: Tab) -> np.ndarray:
-    """Return what is drawn, (H, W, 3) uint8."""
     url = tab.evaluate("document.getElementById('view').toDataURL()")
     with Image.open(BytesIO(base64.b64decode(url.partition(",")[2]))) as image:
         return np.asarray(image.convert("RGB"))

@@ -1,7 +1,3 @@
-"""Web pages in a real browser: the same picture as the desktop's, by hand, cut off, without WebGL, of hostile names."""
-
-from __future__ import annotations
-
 import json
 from itertools import combinations
 from pathlib import Path
@@ -11,19 +7,14 @@ import pytest
 
 from iibr_core.scenes.scene import Source
 from iibr_core.types import GridShape, ViewOffset
-from tests.browser import Pipe, Tab, open_browser
+from tests.browser import Tab, open_browser
 from tests.viewer.conftest import HEIGHT, WIDTH, write_scene
 from tests.web.conftest import canvas, export, press, set_lens, slide, wait_until_still
 from viewer.display.offscreen import OffscreenScene
 from viewer.model import lens
 from viewer.model.action import do
 
-SETTINGS = (
-    (0.0, 0.0, 0.0, 0.0),
-    (0.5, -0.25, 0.0, 0.0),
-    (-0.5, 0.25, 0.4, 1.2),
-    (0.5, 0.5, -0.2, 3.0),
-)
+SETTINGS = ((0.0, 0.0, 0.0, 0.0), (0.5, -0.25, 0.0, 0.0), (-0.5, 0.25, 0.4, 1.2), (0.5, 0.5, -0.2, 3.0))
 """s, t, focus, aperture."""
 LEAST_PSNR_DB, LEAST_WITH_APERTURE_DB = 46.0, 48.0
 """The page is no nearer to the desktop than its compressed views are; an aperture averages over them."""
@@ -32,17 +23,17 @@ BLOCK_PX, MOST_IN_BLOCK = 8, 8.0
 
 
 @pytest.fixture(scope="module")
-def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def scene(tmp_path_factory) -> Path:
     return write_scene(tmp_path_factory.mktemp("scene"))
 
 
 @pytest.fixture(scope="module")
-def page(scene: Path) -> Path:
+def page(scene) -> Path:
     return export(scene)
 
 
 @pytest.fixture
-def shown(tab: Tab, page: Path) -> Tab:
+def shown(tab, page) -> Tab:
     tab.resize(WIDTH, HEIGHT)
     tab.open(page.as_uri())
     wait_until_still(tab)
@@ -53,7 +44,7 @@ def psnr(one: np.ndarray, other: np.ndarray) -> float:
     return float(10 * np.log10(255**2 / max(np.mean((one.astype(float) - other) ** 2), 1e-9)))
 
 
-def test_the_canvas_is_the_desktops_picture(shown: Tab, scene: Path) -> None:
+def test_the_canvas_is_the_desktops_picture(shown, scene) -> None:
     with OffscreenScene("egl") as viewer:
         viewer.open(Source(str(scene), grid=GridShape(3, 3)))
         for s, t, focus, aperture in SETTINGS:
@@ -66,7 +57,7 @@ def test_the_canvas_is_the_desktops_picture(shown: Tab, scene: Path) -> None:
             assert psnr(drawn, viewer.picture()) >= least, (s, t, focus, aperture)
 
 
-def test_between_views_there_is_no_seam_that_the_desktop_has_not(shown: Tab, scene: Path) -> None:
+def test_between_views_there_is_no_seam_that_the_desktop_has_not(shown, scene) -> None:
     with OffscreenScene("egl") as viewer:
         viewer.open(Source(str(scene), grid=GridShape(3, 3)))
         for s in np.linspace(0, 1, 5):
@@ -78,14 +69,14 @@ def test_between_views_there_is_no_seam_that_the_desktop_has_not(shown: Tab, sce
             assert blocks.max() <= MOST_IN_BLOCK, s
 
 
-def test_it_shows_in_a_frame_that_may_do_next_to_nothing(tab: Tab, page: Path, tmp_path: Path) -> None:
+def test_it_shows_in_a_frame_that_may_do_next_to_nothing(tab, page, tmp_path) -> None:
     (tmp_path / "frame.html").write_text(f'<iframe sandbox="allow-scripts" src="{page.as_uri()}"></iframe>', "utf-8")
     tab.open((tmp_path / "frame.html").as_uri())
     assert tab.complaints == []
     assert len(tab.requests) <= 1, "the frame's page"
 
 
-def test_a_tap_focuses_where_it_lands_and_r_resets(shown: Tab) -> None:
+def test_a_tap_focuses_where_it_lands_and_r_resets(shown) -> None:
     shown.resize(480, 640)  # the bar lies below the picture
     wait_until_still(shown)
     top = (640 - 480 * HEIGHT / WIDTH) / 2
@@ -102,7 +93,7 @@ def test_a_tap_focuses_where_it_lands_and_r_resets(shown: Tab) -> None:
     assert shown.evaluate(lens)[1] == 0
 
 
-def test_fingers_on_a_phone_move_the_viewpoint_and_zoom(tab: Tab, page: Path) -> None:
+def test_fingers_on_a_phone_move_the_viewpoint_and_zoom(tab, page) -> None:
     tab.resize(390, 844, ratio=2, is_phone=True)
     tab.open(page.as_uri())
     wait_until_still(tab)
@@ -128,7 +119,7 @@ def test_fingers_on_a_phone_move_the_viewpoint_and_zoom(tab: Tab, page: Path) ->
     assert psnr(canvas(tab), moved) < 25
 
 
-def test_a_page_cut_off_in_its_data_says_so(tab: Tab, page: Path, tmp_path: Path) -> None:
+def test_a_page_cut_off_in_its_data_says_so(tab, page, tmp_path) -> None:
     whole = page.read_bytes()
     for share in (0.97, 0.9):
         (tmp_path / "cut.html").write_bytes(whole[: int(share * len(whole))])
@@ -136,7 +127,7 @@ def test_a_page_cut_off_in_its_data_says_so(tab: Tab, page: Path, tmp_path: Path
         assert "cut off" in tab.evaluate("document.getElementById('said').textContent")
 
 
-def test_without_webgl_the_middle_picture_shows(page: Path) -> None:
+def test_without_webgl_the_middle_picture_shows(page) -> None:
     with open_browser("--disable-gpu", "--disable-3d-apis", "--disable-software-rasterizer") as plain:
         tab = plain.new_tab()
         tab.open(page.as_uri())
@@ -145,7 +136,7 @@ def test_without_webgl_the_middle_picture_shows(page: Path) -> None:
         assert tab.evaluate("document.getElementById('view').hidden")
 
 
-def test_it_swings_until_touched_unless_that_is_unwanted(tab: Tab, page: Path) -> None:
+def test_it_swings_until_touched_unless_that_is_unwanted(tab, page) -> None:
     tab.prefer(prefers_reduced_motion="no-preference")
     tab.resize(WIDTH, HEIGHT)
     tab.open(page.as_uri())
@@ -163,7 +154,7 @@ def test_it_swings_until_touched_unless_that_is_unwanted(tab: Tab, page: Path) -
 @pytest.mark.parametrize(
     "name", ["<script>document.title='ran'</script>", '" onerror="document.title=1 a&amp;b ünï 光']
 )
-def test_names_are_words(tab: Tab, tmp_path: Path, name: str) -> None:
+def test_names_are_words(tab, tmp_path, name) -> None:
     photo = write_scene(tmp_path, name.replace("/", "∕"))
     tab.open(export(photo).as_uri())
     wait_until_still(tab)
@@ -171,21 +162,21 @@ def test_names_are_words(tab: Tab, tmp_path: Path, name: str) -> None:
     assert photo.stem in tab.evaluate("document.getElementById('view').getAttribute('aria-label')")
 
 
-def test_the_policy_lets_nothing_else_run(shown: Tab) -> None:
+def test_the_policy_lets_nothing_else_run(shown) -> None:
     shown.evaluate("document.body.insertAdjacentHTML('beforeend', '<img src=x onerror=\"document.title=1\">')")
     shown.evaluate("fetch('https://example.org').catch(() => 0)")
     assert shown.evaluate("document.title") == "scene"
     assert shown.requests == []
 
 
-def test_readers_of_screens_find_words(shown: Tab) -> None:
+def test_readers_of_screens_find_words(shown) -> None:
     tree = shown.call("Accessibility.getFullAXTree")["nodes"]
     named = {(node["role"]["value"], node["name"]["value"]) for node in tree if node.get("name", {}).get("value")}
     assert ("image", "Light field: scene") in named
     assert {("slider", "Focus"), ("slider", "Aperture"), ("button", "Reset")} <= named
 
 
-def test_stills_show_the_same(tab: Tab, tmp_path: Path) -> None:
+def test_stills_show_the_same(tab, tmp_path) -> None:
     tab.resize(WIDTH, HEIGHT)
     tab.open(export(write_scene(tmp_path), "--stills").as_uri())
     wait_until_still(tab)
@@ -193,7 +184,7 @@ def test_stills_show_the_same(tab: Tab, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("size", [(1, 7), (211, 97)])
-def test_odd_sizes_open(browser: Pipe, tab: Tab, tmp_path: Path, size: tuple[int, int]) -> None:
+def test_odd_sizes_open(browser, tab, tmp_path, size) -> None:
     from iibr_core.formats.images.write import write_image
 
     height, width = size
@@ -203,7 +194,7 @@ def test_odd_sizes_open(browser: Pipe, tab: Tab, tmp_path: Path, size: tuple[int
     wait_until_still(tab)
 
 
-def test_the_page_tells_json_and_no_tags(page: Path) -> None:
+def test_the_page_tells_json_and_no_tags(page) -> None:
     field = page.read_text("utf-8").partition('id="field">')[2].partition("</script>")[0]
     assert json.loads(field)["order"][0] == {"t": 0, "s": 0}
     assert "<" not in field

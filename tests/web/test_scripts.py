@@ -1,11 +1,6 @@
-"""The page's scripts by themselves: their syntax, and their numbers against the desktop's, in node."""
-
-from __future__ import annotations
-
 import json
 import shutil
 import subprocess
-from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -20,7 +15,7 @@ from iibr_core.runtime.resources import resource_folder
 from iibr_core.types import SRGB, GridShape, ViewOffset
 from viewer.gpu.light_field_texture import LightFieldTexture
 from viewer.gpu.refocus.picture_lens import lens_of
-from viewer.gpu.refocus.view_sampling import Samples, answered_samples, blended_samples, pinhole_sources
+from viewer.gpu.refocus.view_sampling import Samples, answered_samples, blended_samples
 
 WEB = resource_folder("web")
 GRID = GridShape(5, 7)
@@ -62,7 +57,6 @@ def node(code: str, given: Any = None) -> Any:
 
 
 def told(offset: ViewOffset) -> dict[str, float]:
-    """Return an offset as the page has it."""
     return {"t": offset.t, "s": offset.s}
 
 
@@ -101,27 +95,11 @@ def test_halves_are_rounded_as_in_python() -> None:
     assert node("given.map(renderer.rounded)", halves) == list(map(round, halves))
 
 
-def test_pinhole_views_are_the_desktops() -> None:
-    found = node("given.map(eye => renderer.pinholeSources(eye, field))", list(map(told, EYES)))
-    for eye, sources in zip(EYES, found):
-        wanted = {GRID.offset(row, column): weight for row, column, weight in pinhole_sources(eye, GRID, PRESENT)}
-        assert {(one["t"], one["s"]): one["weight"] for one in sources} == pytest.approx(wanted)
-
-
-@pytest.mark.parametrize("diameter", DIAMETERS)
-def test_points_of_the_aperture_are_the_desktops(diameter: float) -> None:
-    asked = [(count, index, cell) for count, cell in ((1, 0.0), (5, 0.3), (12, 0.7)) for index in range(8)]
-    found = node("given.map(numbers => renderer.aperturePoints(...numbers))", [(diameter, 7, *one) for one in asked])
-    for one, points in zip(asked, found):
-        wanted = aperture_points(ApertureShape(), diameter, 7.0, *one)
-        assert pairs(points) == pytest.approx(wanted, abs=1e-9), one
-
-
 @pytest.mark.parametrize(
     ("name", "samples_of"), [("answeredSamples", answered_samples), ("blendedSamples", blended_samples)]
 )
 @pytest.mark.parametrize("step", [1, 2, 1000])
-def test_views_that_answer_are_the_desktops(name: str, samples_of: Callable[..., Samples], step: int) -> None:
+def test_views_that_answer_are_the_desktops(name, samples_of, step) -> None:
     """The desktop is told that the views that are there are a whole grid: its view step is `step` of the page's."""
     grid = GridShape(*(2 * (middle // step) + 1 for middle in GRID.centre))
     points = aperture_points(ApertureShape(), 5.0, 7.0, 100, 3)
@@ -139,7 +117,7 @@ def test_views_that_answer_are_the_desktops(name: str, samples_of: Callable[...,
 
 @pytest.mark.parametrize("has_disparity", [True, False])
 @pytest.mark.parametrize("diameter", [0.0, *DIAMETERS])
-def test_a_lens_is_the_desktops(diameter: float, has_disparity: bool) -> None:
+def test_a_lens_is_the_desktops(diameter, has_disparity) -> None:
     code = """given.map(({ eye, aperture, widthPx, level, passIndex, hasDisparity }) => {
         const places = Array.from({ length: 35 }, (_, i) => [`${Math.floor(i / 7) - 2},${i % 7 - 3}`, i]);
         const there = { ...field, hasDisparity, layers: new Map(places) };

@@ -1,19 +1,14 @@
-"""Views of free cameras: against the views of the plane, and what is known of simple scenes."""
-
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from iibr_core.beyond import free_view
-from iibr_core.beyond.free_cameras import FreeViews
+from iibr_core.beyond import free_cameras, free_view
 from iibr_core.beyond.free_view import render_free_view, target_from_photo
-from iibr_core.beyond.landed_squares import SAMPLES
+from iibr_core.beyond.landed_squares import CORNERS, SAMPLES, draw_rays, rows_landed_on
 from iibr_core.method.rays import NO_MARGINS, rays_of_photo
 from iibr_core.method.view import Renderer
-from iibr_core.types import Camera, ImageSize, ViewOffset
+from iibr_core.types import Camera, ImageSize, InputError, ViewOffset
 from tests.iibr_core.scenes import smooth_texture, square_before_wall
 
 
@@ -36,21 +31,13 @@ def about(axis, degrees):
 def view_of(pixels, inverse_depth, target, photo=None):
     pixels, inverse_depth = np.asarray(pixels, np.float32), np.asarray(inverse_depth, np.float32)
     photo = photo or camera(*inverse_depth.shape)
-    return FreeViews(pixels, inverse_depth, photo, [target]).view(target)
+    return free_cameras.FreeViews(pixels, inverse_depth, photo, [target]).view(target)
 
 
 def square_scene(height=40, width=48):
     """Return colours and 1 / depth of a square at 1 before a wall at 3."""
     photo, disparity = square_before_wall(height, width, foreground=1.0, background=1 / 3)
     return photo.pixels, disparity.values
-
-
-def test_the_photos_own_camera_gives_the_photo():
-    pixels, inverse_depth = square_scene()
-    view = view_of(pixels, inverse_depth, camera(40, 48))
-    np.testing.assert_allclose(view.colors, pixels, atol=2e-6)
-    assert not view.occluded.any()
-    assert not view.inpainted.any()
 
 
 def test_a_camera_beside_sees_the_fields_view():
@@ -67,25 +54,11 @@ def test_a_camera_beside_sees_the_fields_view():
     assert abs(view.occluded.mean() - known.occluded.mean()) < 0.01
 
 
-def test_depth_edges_are_looked_up_as_anything_where_the_camera_only_turns():
-    """Also in a ray set that is made for other cameras, which move."""
-    rough = smooth_texture(48, 48) + np.random.default_rng(2).uniform(-0.15, 0.15, (48, 48, 3)).astype(np.float32)
-    taken, beside = camera(48, 48), camera(48, 48, place=(0.3, 0.2, 0.0))
-    turned = camera(48, 48, turned=about(2, 10.0) @ about(1, 2.0))
-    scenes = np.full((48, 48), 0.5, np.float32), square_scene(48, 48)[1]
-    flat, square = (FreeViews(rough, inverse, taken, [turned, beside]).view(turned) for inverse in scenes)
-    apart = np.abs(flat.colors - square.colors).max(axis=2)[~(flat.inpainted | square.inpainted)]
-    # Pixels around the square are split, and looked up in two parts.
-    assert apart.max() < 0.05
-    assert (apart > 1e-3).mean() < 0.15
-
-
 def test_a_rough_surface_stays_closed_before_a_camera_that_hardly_moves():
-    """Also in a ray set that is made for other cameras, which move far."""
     rough = 0.7 + np.random.default_rng(0).uniform(-0.04, 0.04, (40, 48)).astype(np.float32)
     rough[:, :5] = 0.2
     taken, near, far = (camera(40, 48, place=(step, 0.0, 0.0)) for step in (0.0, 0.1, 1.0))
-    view = FreeViews(smooth_texture(40, 48), rough, taken, [near, far]).view(near)
+    view = free_cameras.FreeViews(smooth_texture(40, 48), rough, taken, [near, far]).view(near)
     assert not view.inpainted[5:35, 10:40].any()
 
 
@@ -101,7 +74,7 @@ def test_what_is_made_up_never_hides_what_the_photo_shows():
     pixels, inverse_depth = square_scene()
     inverse_depth[20, 10] = 0.2  # a hole in the wall: filled, in views from beside, by the wall
     here, beside = camera(40, 48), [camera(40, 48, place=(x, y, 0.0)) for x in (-0.2, 0.2) for y in (-0.2, 0.2)]
-    view = FreeViews(pixels, inverse_depth, here, [here, *beside]).view(here)
+    view = free_cameras.FreeViews(pixels, inverse_depth, here, [here, *beside]).view(here)
     np.testing.assert_allclose(view.colors[15:25, 5:15], pixels[15:25, 5:15], atol=2e-6)
     assert not view.inpainted.any()
 
@@ -130,3 +103,149 @@ def test_bands_do_not_show(monkeypatch):
     monkeypatch.setattr(free_view, "MOST_BAND_PIXELS", 48 * SAMPLES**2 * 3)
     banded = view_of(pixels, inverse_depth, target)
     np.testing.assert_array_equal(whole.colors, banded.colors)
+
+
+def test_depths_that_are_known_are_those_of_the_range():
+    given = np.tile(np.linspace(5.0, 9.0, 50, dtype=np.float32), (40, 1))
+    inverse_depth = free_cameras.inverse_depth_of(given, (2.0, 10.0))
+    assert (inverse_depth.min(), inverse_depth.max()) == (pytest.approx(0.1), pytest.approx(0.5))
+    steps = np.diff(inverse_depth[0, 5:-5])  # lone pixels at both ends do not count
+    np.testing.assert_allclose(steps, steps[0], rtol=1e-4)
+
+
+def test_else_the_nearest_is_one_away():
+    given = np.repeat(np.float32([1.0, 2.0]), 30).reshape(6, 10)
+    np.testing.assert_allclose(free_cameras.inverse_depth_of(given, None), given / 2)
+    below_zero = free_cameras.inverse_depth_of(2 * given - 3, None)
+    assert below_zero.max() == 1.0
+    assert below_zero.min() == pytest.approx(1 / 20, rel=1e-4)
+
+
+@pytest.mark.parametrize("depths", [None, (2.0, 10.0)])
+@pytest.mark.parametrize("value", [0.0, -3.0, 1e30])
+def test_what_is_flat_is_at_a_sensible_depth(value, depths):
+    inverse_depth = free_cameras.inverse_depth_of(np.full((3, 4), value, np.float32), depths)
+    assert (inverse_depth > 0).all()
+    assert np.isfinite(inverse_depth).all()
+
+
+def test_the_plane_is_looked_through_as_far_as_cameras_stand_beside():
+    photo, beside = camera(40, 48), camera(40, 48, place=(0.2, -0.1, 0.0))
+    reach = free_cameras.reach_of(photo, [photo, beside], (1.0, 3.0))
+    assert reach.step == pytest.approx(0.2 / free_cameras.FARTHEST_STEPS)
+    assert {(round(at.t, 6), round(at.s, 6)) for at in reach.outer} >= {(-2.0, 4.0), (-2.0, 0.0), (0.0, 4.0)}
+
+
+def test_a_camera_far_beside_asks_for_half_a_picture_of_parallax_at_most():
+    photo, beside = camera(40, 48), camera(40, 48, place=(0.9, 0.0, 0.0))
+    reach = free_cameras.reach_of(photo, [photo, beside], (1.0, 3.0))
+    # From 1 to 3 units away, a unit's move is 60 (1 - 1/3) px.
+    assert 40 * free_cameras.FARTHEST_STEPS * reach.step == pytest.approx(free_cameras.MAX_PARALLAX * 48)
+    assert max(at.s for at in reach.outer) == pytest.approx(free_cameras.FARTHEST_STEPS)
+
+
+def test_a_turned_camera_asks_for_what_lies_beyond_the_frame():
+    photo = camera(40, 48)
+    margins = free_cameras.reach_of(photo, [camera(40, 48, turned=about(1, 10.0))], (1.0, 3.0)).margins
+    assert margins.right >= 60 * np.tan(np.radians(10.0)) > 0 == margins.left
+    wide = free_cameras.reach_of(photo, [camera(40, 48, 2.0)], (1.0, 3.0)).margins
+    assert tuple(wide) == (free_cameras.MAX_BEYOND * 40,) * 2 + (free_cameras.MAX_BEYOND * 48,) * 2
+
+
+def test_cameras_are_made_to_fit_a_smaller_photo_of_the_same_shape():
+    given, other = camera(1000, 1200, focal=1500.0), camera(500, 800, focal=900.0)
+    first, second = free_cameras.fitted_cameras([given, other], 0, ImageSize(101, 120))
+    assert (first.size, second.size) == ((101, 120), (50, 80))
+    assert first.focal_px[0] == pytest.approx(150)
+    assert second.focal_px == (pytest.approx(90), pytest.approx(90))
+    for height in (97, 103):
+        with pytest.raises(InputError, match="its pictures are 1200x1000, the photo is 120x"):
+            free_cameras.fitted_cameras([given, other], 0, ImageSize(height, 120))
+
+
+@pytest.mark.parametrize(("right", "down"), [(0.6, 0.0), (-1.0, 0.0), (0.0, 0.7), (0.5, -0.8)])
+def test_a_steered_camera_looks_where_it_is_told_and_stays_level(right, down):
+    given = camera(40, 48, place=(1.0, 2.0, 3.0), turned=about(2, 20.0))
+    found = free_cameras.steered(given, right, down, 0.5)
+    np.testing.assert_allclose(found.position - given.position, given.world_from_camera @ (0, 0, 0.5), atol=1e-12)
+    to_right, _, ahead = (given.world_from_camera.T @ found.world_from_camera).T
+    assert to_right[1] == pytest.approx(0), "level"
+    assert ahead[0] / ahead[2] == pytest.approx(right * 24 / 60)
+    assert ahead[1] / np.hypot(ahead[0], ahead[2]) == pytest.approx(down * 20 / 60)
+
+
+@pytest.mark.parametrize(
+    "target",
+    [camera(40, 48, turned=about(1, 180.0)), camera(40, 48, turned=about(0, 90.0)),
+     camera(40, 48, place=(0.0, 0.0, 5.0)), camera(40, 48, place=(100.0, 0.0, 0.0)),
+     camera(40, 48, place=(0.0, 0.0, 3.0))],
+)  # fmt: skip
+def test_a_camera_that_sees_nothing_of_the_photo_is_refused(target):
+    pixels, inverse_depth = square_scene()
+    with pytest.raises(InputError, match="test: sees nothing of the photo"):
+        free_cameras.FreeViews(pixels, inverse_depth, camera(40, 48), [camera(40, 48), target])
+
+
+def sealed_step(matrix, x, y, d):
+    """Return the step of disparity that moves where a pixel lands by three quarters of the size it lands at."""
+
+    def landed(x, y, d):
+        place = matrix @ (x, y, 1.0, d)
+        return place[:2] / place[2]
+
+    here, little = landed(x, y, d), 1e-6
+    moved = np.abs(landed(x, y, d + little) - here).max()
+    return 0.75 * max(np.abs(landed(x + i, y + j, d) - here).max() for i, j in ((little, 0), (0, little))) / moved
+
+
+def drawn_slowly(disparity, matrix, size, rounding):
+    """Return what `draw_rays` gives for one image: every sample asks every square of every pixel.
+
+    rounding: so large steps are none.
+    """
+    height, width = disparity.shape
+    nearest = np.full((SAMPLES * size.height, SAMPLES * size.width), -np.inf)
+    at = (np.arange(SAMPLES * max(size)) + 0.5) / SAMPLES - 0.5
+    for y, x in np.ndindex(height, width):
+        corners, one_surface = [], max(sealed_step(matrix, x, y, disparity[y, x]), rounding)
+        for j, i in CORNERS:
+            # The pixels around the corner that steps below one_surface lead to from this one.
+            alike, ways = {(y, x)}, [(y, x)]
+            while ways:
+                v, u = ways.pop()
+                for next_v, next_u in ((y + j if v == y else y, u), (v, x + i if u == x else x)):
+                    inside = 0 <= next_v < height and 0 <= next_u < width and (next_v, next_u) not in alike
+                    if inside and abs(disparity[next_v, next_u] - disparity[v, u]) <= one_surface:
+                        alike.add((next_v, next_u))
+                        ways.append((next_v, next_u))
+            mean = np.mean([disparity[place] for place in alike])
+            landed = matrix @ (x + 0.5 * i, y + 0.5 * j, 1.0, mean)
+            corners.append(landed[[0, 1, 3]] / landed[2])
+        for b in (1, 2):
+            triangle = np.array([corners[0], corners[b], corners[b + 1]])
+            basis = np.vstack([triangle[:, :2].T, np.ones(3)])
+            if np.linalg.det(basis) < 1e-9:
+                continue
+            for v, u in np.ndindex(nearest.shape):
+                share = np.linalg.solve(basis, (at[u], at[v], 1.0))
+                if share.min() >= -1e-6:
+                    nearest[v, u] = max(nearest[v, u], share @ triangle[:, 2])
+    return nearest
+
+
+@pytest.mark.parametrize(("turn", "rounding"), [(about(2, 30.0), 0.0), (about(1, -8.0) @ about(0, 5.0), 0.9)])
+def test_samples_see_what_a_slow_twin_sees(turn, rounding):
+    rng = np.random.default_rng(1)
+    disparity = np.where(rng.random((6, 7)) < 0.3, 2.0, 1.0) + rng.uniform(0, 0.3, (6, 7))
+    photo = camera(6, 7, 8.0)
+    target = camera(4, 5, 6.0, (0.2, -0.1, 0.15), turn)
+    matrix = target_from_photo(photo, target, 8.0)
+    rays = rays_of_photo(np.zeros((6, 7, 3), np.float32), disparity.astype(np.float32), 1.0, 0)
+    flat = tuple(map(float, matrix.ravel()))
+    landing = [rows_landed_on(rays, 0, matrix)]
+    nearest, source = draw_rays(rays, [flat], landing, 0.5, rounding, (0, 4), 5)
+    slow = drawn_slowly(rays.arrays.disparity[0], matrix, target.size, rounding)
+    # Samples on the very side of a triangle belong to either.
+    differ = ~np.isclose(nearest, slow, atol=1e-4)
+    assert differ.mean() < 0.01
+    np.testing.assert_array_equal(source == 0, np.isneginf(nearest))

@@ -1,7 +1,3 @@
-"""Views of a photo at its own size, tile by tile, and light made smaller."""
-
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy import ndimage
@@ -32,7 +28,7 @@ def test_tiles_cover_a_part_once() -> None:
 
 
 @pytest.mark.parametrize("side", [24, 40])
-def test_a_view_in_tiles_is_the_view_made_at_once(side: int) -> None:
+def test_a_view_in_tiles_is_the_view_made_at_once(side) -> None:
     photo = large()
     renderer, rays = Renderer(), rays_of_photo(photo.pixels, photo.disparity, 1.5, 0)
     expected = finish(rays, OFFSET, renderer.render(rays, OFFSET))

@@ -1,16 +1,13 @@
-"""The definition of the lens against slow twins: what a camera sees where, and what a picture of many of them is."""
-
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
-from iibr_core.beyond.aperture_sampling import aperture_points, grid_weights
+from iibr_core.beyond.aperture_sampling import aperture_points, grid_weights, open_area
 from iibr_core.beyond.lens import LensSum
-from iibr_core.beyond.optics import CENTRE, HIGHLIGHT_GAIN, ApertureShape, Optics
+from iibr_core.beyond.optics import CENTRE, HIGHLIGHT_GAIN, ApertureMask, ApertureShape, Optics
 from iibr_core.color import linear_from_srgb
 from iibr_core.types import FloatImage, GridShape, ImageSize, ViewOffset
 from tests.iibr_core.scenes import smooth_texture
@@ -45,7 +42,7 @@ def focus_of(optics: Optics) -> FloatImage:
 
 
 @pytest.mark.parametrize("tilt", [(0.0, 0.0), (1.5, 0.0), (0.0, -1.0), (0.5, 1.0)])
-def test_a_camera_is_sheared_to_the_focus(tilt: tuple[float, float]) -> None:
+def test_a_camera_is_sheared_to_the_focus(tilt) -> None:
     optics, view = Optics(EYE, focus_disparity=1.3, focus_tilt=tilt), smooth_texture(*SIZE)
     expected = sheared(view, focus_of(optics), (CAMERA.t - EYE.t, CAMERA.s - EYE.s))
     np.testing.assert_allclose(light_of(optics, (CAMERA, view))[INSIDE], expected[INSIDE], atol=0.01)
@@ -63,7 +60,7 @@ def test_within_the_focus_range_content_stays_where_the_eye_sees_it() -> None:
 
 
 @pytest.mark.parametrize("ratio", [-1.0, -0.5, 2.0])
-def test_what_is_within_the_range_stays_so_where_all_disparities_are_scaled(ratio: float) -> None:
+def test_what_is_within_the_range_stays_so_where_all_disparities_are_scaled(ratio) -> None:
     """Also where depth is turned inside out."""
     view, wall = smooth_texture(*SIZE), np.full(SIZE, 1.2 * ratio, np.float32)
     optics = Optics(focus_disparity=0.5, focus_range=1.0).with_focus_scaled(ratio)
@@ -113,3 +110,74 @@ def test_views_share_a_camera_bilinearly() -> None:
     expected[2, 4] += 1  # beyond the grid its corner answers
     np.testing.assert_allclose(weights, expected)
     assert grid_weights(np.zeros((4, 2)), CENTRE, GridShape(1, 1)).tolist() == [[4.0]]
+
+
+CROSS = ApertureShape("mask", mask=ApertureMask("cross", 3, 3, bytes([0, 255, 0, 255, 255, 255, 0, 255, 0])))
+CORNER = ApertureShape("mask", mask=ApertureMask("corner", 2, 2, bytes([255, 255, 255, 0])))
+DISC = ApertureShape()
+FROM_GEOMETRY = [
+    (DISC, (0.0, 0.0), 1 / 4, np.pi),
+    (ApertureShape("polygon", blades=6), (0.0, 0.0), (2 + np.cos(2 * np.pi / 6)) / 12, 3 * np.sin(2 * np.pi / 6)),
+    (ApertureShape("polygon", blades=3), (0.0, 0.0), (2 + np.cos(2 * np.pi / 3)) / 12, 1.5 * np.sin(2 * np.pi / 3)),
+    (ApertureShape("ring", ring_inner=0.5), (0.0, 0.0), (1 + 0.5**2) / 4, np.pi * 0.75),
+    (CROSS, (0.0, 0.0), (2 / 3) ** 2 * (1 / 12 + 2 / 5), 4 * 5 / 9),
+    (CORNER, (-1 / 6, -1 / 6), 1 / 3 - 1 / 36, 3.0),
+]
+"""Shape; for a radius of 1: centre (t, s), second moment about it per axis, and area."""
+UNLIMITED = 99.0
+
+
+def union(shape: ApertureShape, diameter: float, count: int, passes: int) -> NDArray[np.float64]:
+    return np.concatenate([aperture_points(shape, diameter, UNLIMITED, count, k) for k in range(passes)])
+
+
+@pytest.mark.parametrize("case", FROM_GEOMETRY)
+@pytest.mark.parametrize("diameter", [0.3, 3.0])
+@pytest.mark.parametrize("count", [4, 12, 64])
+@pytest.mark.parametrize("passes", [1, 5])
+def test_cameras_have_centre_and_width_of_the_opening(case, diameter, count, passes) -> None:
+    shape, centre, moment, area = case
+    points, radius = union(shape, diameter, count, passes), diameter / 2
+    # The first pass has them exactly, and with those that follow them the more cameras there are.
+    slack = 0.0 if passes == 1 else 0.6 / count
+    assert points.mean(0) == pytest.approx(radius * np.array(centre), abs=(0.01 + slack) * radius)
+    tolerance = 0.02 + 2 * slack
+    assert np.mean((points - points.mean(0)) ** 2) == pytest.approx(radius**2 * moment, rel=tolerance)
+    assert open_area(shape, diameter, UNLIMITED) == pytest.approx(radius**2 * area, rel=0.03)
+
+
+def test_each_camera_may_be_blurred_by_its_share() -> None:
+    for cell in (0.0, 0.5, 1.0):
+        points = aperture_points(DISC, 3.0, UNLIMITED, 12, 0, cell)
+        assert np.mean(points**2) + cell**2 / 12 == pytest.approx(1.5**2 / 4, rel=0.01)
+    assert np.abs(aperture_points(DISC, 3.0, UNLIMITED, 12, 0, 99.0)).max() < 1e-9, "never wider than all of it"
+
+
+def test_an_empty_mask_is_a_pinhole_in_the_middle() -> None:
+    closed = ApertureShape("mask", mask=ApertureMask("closed", 2, 2, bytes(4)))
+    assert np.array_equal(aperture_points(closed, 3.0, UNLIMITED, 20, 1, 0.3), np.zeros((1, 2)))
+    assert open_area(closed, 3.0, UNLIMITED) == 0
+
+
+@pytest.mark.parametrize("diameter", [7.5, 20.0, 99.0, 1e30])
+def test_an_aperture_beyond_the_grid_is_the_grids_square(diameter) -> None:
+    points = np.concatenate([aperture_points(DISC, diameter, 5.0, 64, k) for k in range(4)])
+    assert np.mean(points**2) == pytest.approx(5**2 / 12, rel=0.02)
+    assert np.abs(points).max() < 2.5 + 0.15
+    assert open_area(DISC, diameter, 5.0) == pytest.approx(25, rel=0.02)
+
+
+def gap(points: NDArray[np.float64]) -> float:
+    """Distance from the place in the disc of radius 1 that is farthest from any point, over that between points of a
+    square lattice as dense.
+    """
+    places = (np.arange(80) + 0.5) / 40 - 1
+    every = np.stack(np.meshgrid(places, places), -1).reshape(-1, 2)
+    inside = every[np.hypot(*every.T) < 1]
+    return float(np.hypot(*(inside[:, None] - points).T).min(0).max() / np.sqrt(np.pi / len(points)))
+
+
+@pytest.mark.parametrize("count", [4, 6, 8, 12, 32])
+def test_cameras_lie_all_over_the_opening(count) -> None:
+    assert max(gap(aperture_points(DISC, 2.0, UNLIMITED, count, k)) for k in range(8)) < 1.15
+    assert gap(union(DISC, 2.0, count, 12)) < 2.0

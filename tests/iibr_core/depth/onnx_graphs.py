@@ -1,7 +1,5 @@
 """ONNX models whose output is a known function of their input."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any
@@ -49,15 +47,7 @@ def published(folder: Path) -> dict[str, bytes]:
     }
 
 
-def of_channels(
-    file: Path,
-    last: bool = False,
-    as_bytes: bool = False,
-    extra: str = "",
-    rank: int = 3,
-    farness: bool = False,
-    size: int = 112,
-) -> Path:
+def of_channels(file, last=False, as_bytes=False, extra="", rank=3, farness=False, size=112):
     """A network that gives red, or, with `farness`, 300 less red. last: channels; as_bytes: uint8 input; rank: of the
     depth; extra: name of an output before it that holds the input.
     """

@@ -1,7 +1,5 @@
 """Networks of depth models with random weights, as transformers builds and saves them."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any
@@ -33,13 +31,9 @@ def saved(network: Any, folder: Path, **preparation: object) -> LocalModel:
 def depth_anything(folder: Path, kind: str = "relative") -> LocalModel:
     backbone = {**LAYERS, "model_type": "dinov2", "image_size": 56, "patch_size": 14, "reshape_hidden_states": False}
     config = transformers.DepthAnythingConfig(
-        backbone_config={**backbone, "out_indices": [1, 2, 3, 4]},
-        reassemble_hidden_size=32,
-        head_hidden_size=8,
-        depth_estimation_type=kind,
-        max_depth=20,
-        **HEAD,
-    )
+        backbone_config={**backbone, "out_indices": [1, 2, 3, 4]}, reassemble_hidden_size=32, head_hidden_size=8,
+        depth_estimation_type=kind, max_depth=20, **HEAD,
+    )  # fmt: skip
     network = transformers.DepthAnythingForDepthEstimation(config)
     with torch.no_grad():  # random weights rarely reach beyond the last rectifier
         network.head.conv3.bias += 1
@@ -51,12 +45,8 @@ def zoedepth(folder: Path) -> LocalModel:
     stages = [f"stage{n}" for n in range(1, 5)]
     config = transformers.ZoeDepthConfig(
         backbone_config={**backbone, "out_features": stages, "use_relative_position_bias": True},
-        bottleneck_features=8,
-        num_relative_features=8,
-        bin_embedding_dim=8,
-        num_attractors=[4, 2, 2, 1],
-        **HEAD,
-    )
+        bottleneck_features=8, num_relative_features=8, bin_embedding_dim=8, num_attractors=[4, 2, 2, 1], **HEAD,
+    )  # fmt: skip
     network = transformers.ZoeDepthForDepthEstimation(config)
     return saved(network, folder, size={"height": 64, "width": 64}, keep_aspect_ratio=True, ensure_multiple_of=32)
 
@@ -64,16 +54,10 @@ def zoedepth(folder: Path) -> LocalModel:
 def depth_pro(folder: Path) -> LocalModel:
     part = {**LAYERS, "image_size": 32, "patch_size": 8, "model_type": "dinov2"}
     config = transformers.DepthProConfig(
-        patch_size=32,
-        fusion_hidden_size=8,
-        intermediate_hook_ids=[2, 0],
-        intermediate_feature_dims=[8, 8],
-        scaled_images_feature_dims=[8, 8, 8],
-        image_model_config=part,
-        patch_model_config=part,
-        fov_model_config=part,
+        patch_size=32, fusion_hidden_size=8, intermediate_hook_ids=[2, 0], intermediate_feature_dims=[8, 8],
+        scaled_images_feature_dims=[8, 8, 8], image_model_config=part, patch_model_config=part, fov_model_config=part,
         use_fov_model=True,
-    )
+    )  # fmt: skip
     network = transformers.DepthProForDepthEstimation(config)
     with torch.no_grad():
         list(network.fov_model.parameters())[-1].fill_(60.0)

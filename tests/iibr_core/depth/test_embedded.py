@@ -1,9 +1,4 @@
-"""Depth within photos: every container read back from files written here, and every way such a file can be wrong."""
-
-from __future__ import annotations
-
 import random
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -32,12 +27,11 @@ def inverse_of(stored: np.ndarray, kind: str = "RangeInverse", near: float = NEA
 
 def gdepth(depth: bytes | None = None, **options: object) -> bytes:
     depth = files.picture(STORED, "PNG") if depth is None else depth
-    return files.with_segments(files.grey_photo(SIZE), files.gdepth_segments(depth, **options))  # type: ignore[arg-type]
+    return files.with_segments(files.grey_photo(SIZE), files.gdepth_segments(depth, **options))
 
 
 def relative(data: bytes) -> np.ndarray:
     found = embedded_in_jpeg(data)
-    assert found is not None
     assert found.estimate.meaning == "inverse depth"
     assert found.estimate.values.dtype == np.float32
     return found.estimate.values
@@ -49,15 +43,14 @@ def relative(data: bytes) -> np.ndarray:
 @pytest.mark.parametrize("part_bytes", [None, 100])
 @pytest.mark.parametrize("kind", ["RangeInverse", "RangeLinear"])
 @pytest.mark.parametrize("stored", [STORED, DEEP])
-def test_gdepth_is_read_by_its_formula(stored: np.ndarray, kind: str, part_bytes: int | None) -> None:
+def test_gdepth_is_read_by_its_formula(stored, kind, part_bytes) -> None:
     found = relative(gdepth(files.picture(stored, "PNG"), kind=kind, part_bytes=part_bytes))
     np.testing.assert_allclose(found, inverse_of(stored, kind), rtol=1e-5)
 
 
 @pytest.mark.parametrize(("units", "scale"), [("m", 1.0), ("Meters", 1.0), ("mm", 1e-3), ("furlongs", None)])
-def test_units_tell_metres_from_a_mere_scale(units: str, scale: float | None) -> None:
+def test_units_tell_metres_from_a_mere_scale(units, scale) -> None:
     found = embedded_in_jpeg(gdepth(units=units))
-    assert found is not None
     assert found.estimate.meaning == ("metres" if scale else "inverse depth")
     if scale:
         np.testing.assert_allclose(found.estimate.values, scale / inverse_of(STORED), rtol=1e-5)
@@ -66,7 +59,6 @@ def test_units_tell_metres_from_a_mere_scale(units: str, scale: float | None) ->
 def test_an_inverse_range_may_reach_to_infinity() -> None:
     np.testing.assert_allclose(relative(gdepth(far="Infinity")), (1 - STORED / 255) / NEAR, atol=1e-6)
     metric = embedded_in_jpeg(gdepth(far="inf", units="m"))
-    assert metric is not None
     assert np.isfinite(metric.estimate.values).all()
 
 
@@ -90,12 +82,11 @@ def test_a_lost_part_is_reported() -> None:
 
 @pytest.mark.parametrize("shared_container", [False, True])
 @pytest.mark.parametrize("trailers", [{}, {"between": b"other"}, {"before": files.grey_photo((3, 4)), "behind": b"."}])
-def test_dynamic_depth_is_found_among_trailers(trailers: dict[str, bytes], shared_container: bool) -> None:
+def test_dynamic_depth_is_found_among_trailers(trailers, shared_container) -> None:
     data = files.dynamic_depth_jpeg(
         files.grey_photo(SIZE), files.picture(STORED, "PNG"), shared_container=shared_container, **trailers
     )
     found = embedded_in_jpeg(data)
-    assert found is not None
     assert found.estimate.meaning == "metres"
     assert found.format == "Dynamic Depth"
     np.testing.assert_allclose(1 / found.estimate.values, inverse_of(STORED), rtol=1e-5)
@@ -105,7 +96,7 @@ def test_dynamic_depth_is_found_among_trailers(trailers: dict[str, bytes], share
 
 
 @pytest.mark.parametrize("kind", ["disparity", "depth"])
-def test_a_portrait_saved_as_jpeg(kind: str) -> None:
+def test_a_portrait_saved_as_jpeg(kind) -> None:
     smooth = np.tile(np.linspace(0, 255, SIZE[1]).astype(np.uint8), (SIZE[0], 1))
     found = relative(files.apple_jpeg(files.grey_photo(SIZE) + b"padding", smooth, 0.5, 2.5, kind))
     linear = 0.5 + smooth / 255 * 2.0
@@ -122,13 +113,13 @@ def test_a_portrait_saved_as_jpeg(kind: str) -> None:
         ({"representation_type": 2, "z_near": 1.0, "z_far": 3.0}, [1.0, 0.5, 1 / 3]),
     ],
 )
-def test_the_ranges_of_a_heic(metadata: dict[str, float], expected: list[float]) -> None:
+def test_the_ranges_of_a_heic(metadata, expected) -> None:
     found = heic_estimate(np.array([[0, 0.5, 1]], np.float32), metadata)
     np.testing.assert_allclose(found.values, [expected], rtol=1e-6)
 
 
 @pytest.mark.parametrize("audio", [False, True])
-def test_samsung_live_focus(audio: bool) -> None:
+def test_samsung_live_focus(audio) -> None:
     found = relative(files.samsung_jpeg(files.grey_photo(SIZE), STORED, audio=audio))
     np.testing.assert_allclose(found, 1 - STORED / 255, atol=1e-6)
 
@@ -149,17 +140,15 @@ PNG = files.picture(STORED, "PNG")
         PNG[:16] + b"\x7f\xff\xff\xff" * 2 + PNG[24:],
     ],
 )
-def test_depth_pictures_that_are_none(depth: bytes) -> None:
-    """They do not hide depth in another format."""
+def test_depth_pictures_that_are_none(depth) -> None:
     with pytest.raises(InputError):
         embedded_in_jpeg(gdepth(depth))
     found = embedded_in_jpeg(files.samsung_jpeg(gdepth(depth), STORED))
-    assert found is not None
     assert found.format == "Samsung Live focus"
 
 
 @pytest.mark.parametrize("prolog", ['<!DOCTYPE a [<!ENTITY i "1">]>', '<!DOCTYPE x SYSTEM "file:///etc/passwd">'])
-def test_entities_are_never_expanded(prolog: str) -> None:
+def test_entities_are_never_expanded(prolog) -> None:
     xmp = files.STANDARD + files.packet({f"{files.GDEPTH} Near": "1"}, "&i;", prolog)
     with pytest.raises(InputError, match="document type"):
         embedded_in_jpeg(files.with_segments(files.grey_photo(SIZE), [xmp]))
@@ -187,7 +176,7 @@ def damage(data: bytes, rng: random.Random) -> bytes:
 
 
 @pytest.mark.parametrize("name", FUZZED)
-def test_damaged_files_give_depth_or_one_line(tmp_path: Path, name: str) -> None:
+def test_damaged_files_give_depth_or_one_line(tmp_path, name) -> None:
     rng, path, outcomes = random.Random(name), tmp_path / name, set()
     for _ in range(60):
         path.write_bytes(damage(FUZZED[name], rng))

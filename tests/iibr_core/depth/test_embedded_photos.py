@@ -1,7 +1,3 @@
-"""Depth within photos as people open it: trailers of phones, AVIF, HEIC of other makers, Lytro; what is not read."""
-
-from __future__ import annotations
-
 import io
 from pathlib import Path
 
@@ -37,16 +33,10 @@ def assert_disc_is_nearest(found: PhotoWithDepth) -> None:
 
 @pytest.mark.parametrize(
     ("kind", "near", "far"),
-    [
-        ("", 5, 3),
-        ("RangeInverse", 0, 0),
-        ("RangeInverse", -1, 3),
-        ("RangeInverse", "nan", "inf"),
-        ("RangeLinear", 1, "inf"),
-        ("RangeInverse", "", ""),
-    ],
-)
-def test_a_senseless_range_is_told_and_dark_is_near(tmp_path: Path, kind: str, near: object, far: object) -> None:
+    [("", 5, 3), ("RangeInverse", 0, 0), ("RangeInverse", -1, 3), ("RangeInverse", "nan", "inf"),
+     ("RangeLinear", 1, "inf"), ("RangeInverse", "", "")],
+)  # fmt: skip
+def test_a_senseless_range_is_told_and_dark_is_near(tmp_path, kind, near, far) -> None:
     segments = files.gdepth_segments(files.picture(255 - SMALL, "PNG"), kind=kind, near=near, far=far)
     found = opened(tmp_path, "a.jpg", files.with_segments(PHOTO, segments))
     assert_disc_is_nearest(found)
@@ -54,7 +44,7 @@ def test_a_senseless_range_is_told_and_dark_is_near(tmp_path: Path, kind: str, n
 
 
 @pytest.mark.parametrize("kind", ["PNG", "WEBP", "AVIF"])
-def test_gdepth_in_other_kinds_of_files(tmp_path: Path, kind: str) -> None:
+def test_gdepth_in_other_kinds_of_files(tmp_path, kind) -> None:
     xmp = files.gdepth_segments(files.picture(255 - SMALL, "PNG"))[0].removeprefix(files.STANDARD)
     file, info = io.BytesIO(), PngInfo()
     info.add_itxt("XML:com.adobe.xmp", xmp.decode())
@@ -68,17 +58,9 @@ def test_gdepth_in_other_kinds_of_files(tmp_path: Path, kind: str) -> None:
 @pytest.mark.parametrize("white_is_near", [True, False])
 @pytest.mark.parametrize(
     ("orientation", "stored"),
-    [
-        (0, SMALL[:, ::-1]),
-        (0x10, SMALL[::-1]),
-        (0x12, SMALL[:, ::-1]),
-        (0x13, SMALL.T),
-        (0x11, SMALL.T[::-1, ::-1]),
-    ],
+    [(0, SMALL[:, ::-1]), (0x10, SMALL[::-1]), (0x12, SMALL[:, ::-1]), (0x13, SMALL.T), (0x11, SMALL.T[::-1, ::-1])],
 )
-def test_huawei_maps_lie_as_the_phone_was_held(
-    tmp_path: Path, orientation: int, stored: np.ndarray, white_is_near: bool
-) -> None:
+def test_huawei_maps_lie_as_the_phone_was_held(tmp_path, orientation, stored, white_is_near) -> None:
     stored = stored if white_is_near else 255 - stored
     found = opened(tmp_path, "a.jpg", files.huawei_jpeg(PHOTO, stored, orientation))
     assert_disc_is_nearest(found)
@@ -86,7 +68,7 @@ def test_huawei_maps_lie_as_the_phone_was_held(
 
 
 @pytest.mark.parametrize("white_is_near", [True, False])
-def test_a_grey_picture_behind_a_photo_is_its_map(tmp_path: Path, white_is_near: bool) -> None:
+def test_a_grey_picture_behind_a_photo_is_its_map(tmp_path, white_is_near) -> None:
     found = opened(tmp_path, "a.jpg", PHOTO + files.picture(SMALL if white_is_near else 255 - SMALL))
     assert_disc_is_nearest(found)
     assert any("counts as near" in note for note in found.disparity.notes)
@@ -106,7 +88,7 @@ def test_copies_gain_maps_and_pictures_of_other_shapes_are_no_maps() -> None:
 
 @pytest.mark.parametrize("orientation", [1, 6])
 @pytest.mark.parametrize("white_is_near", [True, False])
-def test_the_depth_of_an_avif(tmp_path: Path, orientation: int, white_is_near: bool) -> None:
+def test_the_depth_of_an_avif(tmp_path, orientation, white_is_near) -> None:
     turns = 1 if orientation == 6 else 0  # stored a quarter turn counter-clockwise
     depth = DEPTH if white_is_near else 255 - DEPTH
     data = files.avif(np.rot90(PIXELS, turns), np.rot90(depth, turns), orientation)
@@ -115,18 +97,18 @@ def test_the_depth_of_an_avif(tmp_path: Path, orientation: int, white_is_near: b
     assert_disc_is_nearest(found)
 
 
-def test_an_apple_portrait_in_a_heic(tmp_path: Path) -> None:
+def test_an_apple_portrait_in_a_heic(tmp_path) -> None:
     found = opened(tmp_path, "a.heic", files.heic(PIXELS, SMALL))
     assert_disc_is_nearest(found)
     assert found.origin.words == "the photo itself (Apple portrait)"
 
 
-def test_a_samsung_heic(tmp_path: Path) -> None:
+def test_a_samsung_heic(tmp_path) -> None:
     data = files.samsung_jpeg(files.heic(PIXELS), 255 - SMALL)
     assert_disc_is_nearest(opened(tmp_path, "a.heic", data))
 
 
-def test_mattes_of_a_heic_are_named_and_not_taken_for_depth(tmp_path: Path) -> None:
+def test_mattes_of_a_heic_are_named_and_not_taken_for_depth(tmp_path) -> None:
     kind = b"urn:com:apple:photo:2018:aux:portraiteffectsmatte"
     found = opened(tmp_path, "a.heic", files.heic(PIXELS, SMALL, auxiliary=kind))
     assert found.origin.kind == "rough"
@@ -137,7 +119,7 @@ def test_mattes_of_a_heic_are_named_and_not_taken_for_depth(tmp_path: Path) -> N
 # ---- what is not read
 
 
-def test_what_is_behind_a_photo_and_not_read_is_named(tmp_path: Path) -> None:
+def test_what_is_behind_a_photo_and_not_read_is_named(tmp_path) -> None:
     grey = files.picture(np.asarray(Image.fromarray(PIXELS).convert("L").resize((64, 48))))
     matte = files.apple_jpeg(b"", SMALL, 0, 1, "urn:com:apple:photo:2019:aux:semanticskinmatte")
     mask = files.picture(np.where(SMALL > 200, 255, 0).astype(np.uint8))
@@ -154,7 +136,7 @@ def test_what_is_behind_a_photo_and_not_read_is_named(tmp_path: Path) -> None:
         assert f"a.jpg holds {words}; this is not read." in found.disparity.notes
 
 
-def test_gain_maps_previews_and_plain_photos_need_no_words(tmp_path: Path) -> None:
+def test_gain_maps_previews_and_plain_photos_need_no_words(tmp_path) -> None:
     path = tmp_path / "a.jpg"
     gain = files.with_segments(files.picture(SMALL), [files.STANDARD + b"<x hdrgm:Version='1.0'/>"])
     listed = PHOTO[:2] + b"\xff\xe2\0\x0aMPF\0\0\0\0\0" + PHOTO[2:] + PHOTO
@@ -178,7 +160,7 @@ def stack(is_illum: bool) -> bytes:
 
 @pytest.mark.parametrize("is_illum", [True, False])
 @pytest.mark.parametrize("name", ["IMG_0001-stk.lfp", "a.LFP", "a.jpg"])
-def test_a_processed_lytro_file_opens_with_its_depth(tmp_path: Path, name: str, is_illum: bool) -> None:
+def test_a_processed_lytro_file_opens_with_its_depth(tmp_path, name, is_illum) -> None:
     found = opened(tmp_path, name, stack(is_illum))
     assert found.origin.line == "Depth: the photo itself (Lytro)."
     assert found.disparity.values[60, 60] > found.disparity.values[4, 10]
@@ -187,7 +169,7 @@ def test_a_processed_lytro_file_opens_with_its_depth(tmp_path: Path, name: str, 
 
 
 @pytest.mark.parametrize("cut", [0.1, 0.5, 0.95])
-def test_damaged_lytro_files_are_refused_in_a_line(tmp_path: Path, cut: float) -> None:
+def test_damaged_lytro_files_are_refused_in_a_line(tmp_path, cut) -> None:
     data = stack(True)
     (tmp_path / "a.lfp").write_bytes(data[: int(cut * len(data))])
     with pytest.raises(InputError, match=r"^[^\n]*a\.lfp: [^\n]*$"):

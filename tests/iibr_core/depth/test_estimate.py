@@ -1,7 +1,3 @@
-"""Disparity from estimates of three meanings: ranges, true scale, and values that are missing or wild."""
-
-from __future__ import annotations
-
 from typing import get_args
 
 import numpy as np
@@ -9,9 +5,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
+from PIL import Image
 
 from iibr_core.depth.estimate import OUTLIER_SPANS, DepthEstimate, Meaning, disparity_from
-from iibr_core.types import TOTAL_PARALLAX, FloatImage, GridShape, InputError
+from iibr_core.depth.stereo_pair import estimate_from_pair
+from iibr_core.types import TOTAL_PARALLAX, FloatImage, GridShape, InputError, ViewOffset
+from tests.iibr_core.formats.test_view_files import leia_image
+from tests.iibr_core.known_scenes import view_of_wall
 
 GRID = GridShape(9, 9)
 RAMP = np.linspace(0, 1, 2000, dtype=np.float32).reshape(40, 50)
@@ -22,12 +22,12 @@ def disparity(values: FloatImage, meaning: Meaning = "inverse depth", grid: Grid
 
 
 @pytest.mark.parametrize(("scale", "offset"), [(1e-6, 3e-6), (1e6, -1e5), (500.0, 17.0)])
-def test_scale_and_offset_of_relative_depth_do_not_matter(scale: float, offset: float) -> None:
+def test_scale_and_offset_of_relative_depth_do_not_matter(scale, offset) -> None:
     np.testing.assert_allclose(disparity(RAMP * scale + offset), disparity(RAMP), atol=1e-4)
 
 
 @pytest.mark.parametrize("grid", [GRID, GridShape(1, 5), GridShape(3, 1), GridShape(17, 17)])
-def test_the_range_suits_the_grid(grid: GridShape) -> None:
+def test_the_range_suits_the_grid(grid) -> None:
     values = disparity(RAMP, grid=grid)
     low, high = np.percentile(values, [1, 99])
     assert (high - low) * (max(grid) - 1) == pytest.approx(TOTAL_PARALLAX * 50, rel=1e-4)
@@ -66,7 +66,7 @@ def test_a_wild_value_changes_no_other() -> None:
 
 
 @pytest.mark.parametrize("value", [0.0, 1.0, -1e30, 3e38])
-def test_a_constant_map_is_flat_and_so_is_rounding(value: float) -> None:
+def test_a_constant_map_is_flat_and_so_is_rounding(value) -> None:
     values = np.full((5, 6), value, np.float32)
     values[0, 0] = np.nan
     found = disparity(values)
@@ -80,7 +80,7 @@ def test_a_constant_map_is_flat_and_so_is_rounding(value: float) -> None:
     hnp.arrays(np.float32, st.tuples(st.integers(0, 8), st.integers(1, 8)), elements=st.floats(width=32)),
     st.sampled_from(get_args(Meaning)),
 )
-def test_never_infinite_and_never_wholly_unknown(values: FloatImage, meaning: Meaning) -> None:
+def test_never_infinite_and_never_wholly_unknown(values, meaning) -> None:
     known = values > 0 if meaning == "metres" else np.isfinite(values)
     if not known.any():
         with pytest.raises(InputError, match="no known value"):
@@ -90,3 +90,33 @@ def test_never_infinite_and_never_wholly_unknown(values: FloatImage, meaning: Me
     assert found.dtype == np.float32
     assert not np.isinf(found).any()
     assert not np.isnan(found).all()
+
+
+DISPARITY = 2.0
+
+
+def eye(s: float) -> np.ndarray:
+    return np.rint(view_of_wall(ViewOffset(0, s), DISPARITY, (60, 80)) * 255).astype(np.uint8)
+
+
+def test_a_pair_side_by_side_tells_the_disparity_from_eye_to_eye(tmp_path) -> None:
+    path = tmp_path / "wall_SBS.png"
+    Image.fromarray(np.hstack([eye(0), eye(1)])).save(path)
+    found = estimate_from_pair(path)
+    assert found[1] == "side-by-side stereo"
+    assert found[0].values.shape == (60, 80)
+    assert np.median(np.abs(found[0].values - DISPARITY)) < 0.25  # a smooth wall, half a pixel a step
+
+
+def test_files_without_a_pair_or_that_show_another_picture_tell_nothing(tmp_path) -> None:
+    Image.fromarray(eye(0)).save(tmp_path / "a.png")
+    assert estimate_from_pair(tmp_path / "a.png") is None
+    (tmp_path / "a.lif").write_bytes(leia_image(eye(0), eye(1)).replace(b'"blob_id": -1', b'"blob_id": 10'))
+    assert estimate_from_pair(tmp_path / "a.lif") is None
+
+
+def test_views_of_two_shapes_are_refused(tmp_path) -> None:
+    narrow = Image.fromarray(eye(1)[:, :50])
+    Image.fromarray(eye(0)).save(tmp_path / "a.mpo", "MPO", save_all=True, append_images=[narrow])
+    with pytest.raises(InputError, match=r"a\.mpo: .*80x60 and 50x60"):
+        estimate_from_pair(tmp_path / "a.mpo")

@@ -1,20 +1,17 @@
-"""The guess at depth without a model: its pieces against slow twins, and pictures that give it little."""
-
-from __future__ import annotations
-
 import heapq
 
 import numpy as np
+import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from iibr_core.depth.geodesic import spread_distances
 from iibr_core.depth.guess import PIXEL_COST, box_filter, guess_depth
+from iibr_core.depth.subject import subject_disparity
 from tests.iibr_core.scenes import photo_of, square_before_wall
 
 
 def slow_paths(image: np.ndarray) -> np.ndarray:
-    """Dijkstra from the upper border."""
     height, width = image.shape[:2]
     way = np.full((height, width), np.inf)
     queue = [(0.0, 0, x) for x in range(width)]
@@ -59,9 +56,39 @@ def test_what_stands_out_before_a_wall_is_closer_than_the_wall_beside_it() -> No
 @example(1, 500, 1.0, 0)
 @example(500, 1, 1.0, 0)
 @given(st.integers(1, 30), st.integers(1, 30), st.sampled_from([0.0, 1.0, 60000.0]), st.integers(0, 9))
-def test_any_photo_gives_a_finite_map_of_its_size(height: int, width: int, brightest: float, seed: int) -> None:
+def test_any_photo_gives_a_finite_map_of_its_size(height, width, brightest, seed) -> None:
     pixels = np.random.default_rng(seed).random((height, width, 3)) * brightest
     values = guess_depth(photo_of(pixels, is_hdr=brightest > 1)).values
     assert values.shape == (height, width)
     assert values.dtype == np.float32
     assert np.isfinite(values).all()
+
+
+FAR, NEAR = 1.5, 2.7
+
+
+def wall(seed: int = 0) -> np.ndarray:
+    noise = np.random.default_rng(seed).normal(0, 0.02, (60, 80))
+    return (FAR + np.linspace(0, 0.3, 60)[:, None] + noise).astype(np.float32)
+
+
+def test_a_dog_that_fills_a_fifth_of_the_middle_is_the_subject_and_not_the_wall_behind_it() -> None:
+    disparity = wall()
+    disparity[30:, 25:45] = NEAR
+    disparity[50:] = 4.3  # the basket, in front but not in the middle
+    assert subject_disparity(disparity) == pytest.approx(NEAR)
+
+
+def test_a_floor_and_a_wall_behind_a_twig_are_focused_on_in_their_middle() -> None:
+    floor = np.linspace(0, 4, 61, dtype=np.float32)[:, None].repeat(80, 1)
+    assert subject_disparity(floor) == pytest.approx(4 * 0.46, abs=0.1)
+    disparity = wall()
+    assert subject_disparity(disparity) == pytest.approx(FAR + 0.14, abs=0.05)
+    disparity[:, 40:42] = 6.0
+    assert subject_disparity(disparity) < FAR + 0.3
+
+
+@pytest.mark.parametrize("size", [(1, 1), (1, 9), (2, 3)])
+def test_the_smallest_pictures_have_one_too(size) -> None:
+    assert subject_disparity(np.full(size, NEAR, np.float32)) == pytest.approx(NEAR)
+    assert subject_disparity(np.full(size, np.nan, np.float32)) == 0.0

@@ -1,7 +1,3 @@
-"""Depth by ONNX Runtime: graphs whose output is a known function of the input, and files as people have them."""
-
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any
@@ -28,7 +24,7 @@ MAP = np.arange(56 * 84, dtype=np.float32)
 
 
 @pytest.fixture(autouse=True)
-def cache_here(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def cache_here(monkeypatch, tmp_path) -> None:
     monkeypatch.setattr(cache, "cache_folder", lambda: tmp_path / "cache")
 
 
@@ -50,7 +46,7 @@ def values_of(file: Path, photo: Photo) -> FloatImage:
 
 
 @pytest.mark.parametrize("channel", [0, 2])
-def test_orientation_order_of_colours_and_normalisation(tmp_path: Path, channel: int) -> None:
+def test_orientation_order_of_colours_and_normalisation(tmp_path, channel) -> None:
     weights = tuple(float(c == channel) for c in range(3))
     photo = photo_of(518, 518)  # the size of the input: nothing is resized
     found = model_of(weighing(tmp_path / "model.onnx", weights)).estimate(photo)
@@ -60,7 +56,7 @@ def test_orientation_order_of_colours_and_normalisation(tmp_path: Path, channel:
 
 
 @pytest.mark.parametrize(("height", "width"), [(700, 900), (900, 700), (90, 200), (1, 1), (518, 5000), (5000, 518)])
-def test_the_input_has_the_photos_aspect_in_multiples_of_14(height: int, width: int) -> None:
+def test_the_input_has_the_photos_aspect_in_multiples_of_14(height, width) -> None:
     size = USUAL_PREPARATION.size_for(ImageSize(height, width))
     assert all(side % 14 == 0 and side >= 28 for side in size)
     assert size.height * size.width <= 2.5 * 518 * 518
@@ -71,9 +67,9 @@ def test_the_input_has_the_photos_aspect_in_multiples_of_14(height: int, width: 
 @pytest.mark.parametrize(
     "layout", [{"last": True}, {"as_bytes": True}, {"last": True, "as_bytes": True}, {"extra": "feature"}, {"rank": 4}]
 )
-def test_other_layouts_are_read_alike(tmp_path: Path, layout: dict[str, object]) -> None:
+def test_other_layouts_are_read_alike(tmp_path, layout) -> None:
     photo = photo_of(112, 112)
-    found = values_of(of_channels(tmp_path / "model.onnx", **layout), photo)  # type: ignore[arg-type]
+    found = values_of(of_channels(tmp_path / "model.onnx", **layout), photo)
     columns = np.interp(np.linspace(0, 111, found.shape[1]), np.arange(112), photo.pixels[0, :, 0])
     assert np.corrcoef(found.ravel(), np.tile(columns, found.shape[0]))[0, 1] > 0.999
 
@@ -88,9 +84,7 @@ def test_other_layouts_are_read_alike(tmp_path: Path, layout: dict[str, object])
         ({"image_mean": 0, "image_std": [1, 1, 1], "rescale_factor": 2 / 255}, 0.0, 2.0),
     ],
 )
-def test_settings_beside_a_file_state_the_colours(
-    tmp_path: Path, settings: dict[str, object], black: float, white: float
-) -> None:
+def test_settings_beside_a_file_state_the_colours(tmp_path, settings, black, white) -> None:
     (tmp_path / "preprocessor_config.json").write_text(json.dumps(settings))
     prepared = read_preparation(tmp_path)
     for value, expected in ((0.0, black), (1.0, white)):
@@ -98,7 +92,7 @@ def test_settings_beside_a_file_state_the_colours(
 
 
 @pytest.mark.parametrize("extra", ["", "focallength_px", "predicted_normal"])
-def test_metric_files_are_known_by_their_settings_or_outputs(tmp_path: Path, extra: str) -> None:
+def test_metric_files_are_known_by_their_settings_or_outputs(tmp_path, extra) -> None:
     """Taken for inverse depth, near and far would be swapped. What is 0 or less is unknown then."""
     if not extra:
         (tmp_path / "config.json").write_text('{"depth_estimation_type": "metric"}')
@@ -106,7 +100,6 @@ def test_metric_files_are_known_by_their_settings_or_outputs(tmp_path: Path, ext
     assert model_of(file).estimate(photo_of(60, 90)).meaning == "metres"
     write_image(tmp_path / "photo.png", photo_of(60, 90).pixels)
     found = open_with_depth(tmp_path / "photo.png", DepthChoice(model=str(file), is_metric=True)).disparity
-    assert found.unknown is not None
     assert found.unknown[:, :20].all()
     assert not found.unknown[:, -20:].any()
     with pytest.raises(InputError, match="gave no distance above 0"):
@@ -114,7 +107,7 @@ def test_metric_files_are_known_by_their_settings_or_outputs(tmp_path: Path, ext
 
 
 @pytest.mark.parametrize(("farness", "config"), [(False, ""), (True, ""), (False, "metric"), (True, "metric")])
-def test_the_photo_shows_which_end_of_a_file_is_near(tmp_path: Path, farness: bool, config: str) -> None:
+def test_the_photo_shows_which_end_of_a_file_is_near(tmp_path, farness, config) -> None:
     """Red grows downwards in this photo, where things are nearer; with or without a config, true or not."""
     file = of_channels(tmp_path / "model.onnx", farness=farness)
     if config:
@@ -137,7 +130,7 @@ def test_the_photo_shows_which_end_of_a_file_is_near(tmp_path: Path, farness: bo
         ({"other": MAP.reshape(1, 56, 84)}, "metric_depth"),
     ],
 )
-def test_of_several_outputs_the_map_of_depth_is_chosen(others: dict[str, np.ndarray], name: str) -> None:
+def test_of_several_outputs_the_map_of_depth_is_chosen(others, name) -> None:
     depth = (MAP + 7).reshape(1, 56, 84)
     found = depth_output(Path("model.onnx"), {**others, name: depth}, ImageSize(56, 84))
     np.testing.assert_array_equal(found, depth[0])
@@ -147,7 +140,7 @@ def test_of_several_outputs_the_map_of_depth_is_chosen(others: dict[str, np.ndar
 
 
 @pytest.mark.parametrize(("weights", "message"), [(np.nan, "gave NaN"), (0.0, "gave the same depth everywhere")])
-def test_results_that_say_nothing_are_refused_and_not_kept(tmp_path: Path, weights: float, message: str) -> None:
+def test_results_that_say_nothing_are_refused_and_not_kept(tmp_path, weights, message) -> None:
     with pytest.raises(InputError, match=f"the model model.onnx {message}"):
         values_of(weighing(tmp_path / "model.onnx", (weights, 0, 0)), photo_of(60, 90))
     assert not (tmp_path / "cache").exists()
@@ -155,16 +148,11 @@ def test_results_that_say_nothing_are_refused_and_not_kept(tmp_path: Path, weigh
 
 @pytest.mark.parametrize(
     ("name", "content"),
-    [
-        ("model.onnx", ""),
-        ("model.onnx", "no model"),
-        ("preprocessor_config.json", "{"),
-        ("preprocessor_config.json", '{"size": "big"}'),
-        ("preprocessor_config.json", '{"image_std": [0, 1, 1]}'),
-        ("preprocessor_config.json", '{"size": 1e9}'),
-    ],
-)
-def test_damaged_files_are_one_line(tmp_path: Path, name: str, content: str) -> None:
+    [("model.onnx", ""), ("model.onnx", "no model"), ("preprocessor_config.json", "{"),
+     ("preprocessor_config.json", '{"size": "big"}'), ("preprocessor_config.json", '{"image_std": [0, 1, 1]}'),
+     ("preprocessor_config.json", '{"size": 1e9}')],
+)  # fmt: skip
+def test_damaged_files_are_one_line(tmp_path, name, content) -> None:
     weighing(tmp_path / "model.onnx", (1, 0, 0))
     (tmp_path / name).write_text(content)
     with pytest.raises(InputError, match=rf"^[^\n]*{name}[^\n]*$"):
@@ -181,7 +169,7 @@ def with_external_weights(file: Path, weights: tuple[float, float, float] = (1.0
     return file
 
 
-def test_an_estimate_is_kept_until_the_photo_or_a_file_of_the_model_changes(tmp_path: Path) -> None:
+def test_an_estimate_is_kept_until_the_photo_or_a_file_of_the_model_changes(tmp_path) -> None:
     file, photo = with_external_weights(tmp_path / "model.onnx"), photo_of(60, 90)
     first = values_of(file, photo)
     assert values_of(file, photo).tolist() == first.tolist()
@@ -211,7 +199,7 @@ def halving(file: Path, stride: int) -> Path:
     return save_graph(file, nodes, {"red": [0], "scales": np.float32([1, 1, stride, stride])}, takes, "depth")
 
 
-def test_networks_of_other_strides_get_sides_that_suit_them(tmp_path: Path) -> None:
+def test_networks_of_other_strides_get_sides_that_suit_them(tmp_path) -> None:
     found = values_of(halving(tmp_path / "unet.onnx", 32), photo_of(480, 640))
     assert found.shape[0] % 32 == found.shape[1] % 32 == 0
     assert found[:, -1].mean() > found[:, 0].mean()
@@ -222,7 +210,7 @@ def test_networks_of_other_strides_get_sides_that_suit_them(tmp_path: Path) -> N
     assert values_of(file, photo_of(480, 640)).shape[0] % 45 == 0
 
 
-def test_a_running_estimate_can_be_stopped(tmp_path: Path) -> None:
+def test_a_running_estimate_can_be_stopped(tmp_path) -> None:
     """The graph loops practically for ever: only stopping ends it."""
 
     def value(name: str, kind: int = TensorProto.FLOAT, shape: list[object] | None = None) -> Any:

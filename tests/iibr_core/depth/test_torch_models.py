@@ -1,7 +1,3 @@
-"""Depth by torch, on tiny checkpoints with random weights that transformers saves."""
-
-from __future__ import annotations
-
 import dataclasses
 import json
 import sys
@@ -14,9 +10,8 @@ import torch
 import transformers
 
 from iibr_core.depth.choice import DepthChoice
-from iibr_core.depth.estimate import Meaning
 from iibr_core.depth.models import cache
-from iibr_core.depth.models.catalog import LocalModel, model_to_use
+from iibr_core.depth.models.catalog import model_to_use
 from iibr_core.depth.models.preparation import network_input, read_preparation
 from iibr_core.depth.models.torch_models import PREPARATIONS
 from iibr_core.types import InputError, Photo
@@ -27,21 +22,16 @@ PHOTO = Photo(RNG.random((40, 60, 3)).astype(np.float32), 50.0, "photo")
 
 
 @pytest.fixture(autouse=True)
-def cache_here(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def cache_here(monkeypatch, tmp_path) -> None:
     monkeypatch.setattr(cache, "cache_folder", lambda: tmp_path / "cache")
 
 
 @pytest.mark.parametrize(
     ("make", "meaning"),
-    [
-        (depth_anything, "inverse depth"),
-        (lambda folder: depth_anything(folder, "metric"), "metres"),
-        (zoedepth, "metres"),
-    ],
-)
-def test_each_kind_of_network_gives_depth_of_its_meaning(
-    make: Callable[[Path], LocalModel], meaning: Meaning, tmp_path: Path
-) -> None:
+    [(depth_anything, "inverse depth"), (lambda folder: depth_anything(folder, "metric"), "metres"),
+     (zoedepth, "metres")],
+)  # fmt: skip
+def test_each_kind_of_network_gives_depth_of_its_meaning(make, meaning, tmp_path) -> None:
     found = make(tmp_path / "model").estimate(PHOTO)
     assert found.meaning == meaning
     assert found.values.dtype == np.float32
@@ -50,7 +40,7 @@ def test_each_kind_of_network_gives_depth_of_its_meaning(
         assert found.values.shape == PHOTO.size, "its borders are gone"
 
 
-def test_the_input_is_as_transformers_prepares_it(tmp_path: Path) -> None:
+def test_the_input_is_as_transformers_prepares_it(tmp_path) -> None:
     """The same as its image processor's but for rounding to bytes, and its network gives the same of it."""
     model = depth_anything(tmp_path / "model")
     config = json.loads((model.folder / "preprocessor_config.json").read_text())
@@ -68,7 +58,7 @@ def test_the_input_is_as_transformers_prepares_it(tmp_path: Path) -> None:
     np.testing.assert_allclose(found, depth, rtol=1e-3)
 
 
-def test_the_field_of_view_gives_depth_pros_metres(tmp_path: Path) -> None:
+def test_the_field_of_view_gives_depth_pros_metres(tmp_path) -> None:
     """As its authors have it: inverse distance = output * width / focal length."""
     model = depth_pro(tmp_path / "model")
     photo = dataclasses.replace(PHOTO, pixels=RNG.random((128, 128, 3)).astype(np.float32))
@@ -98,13 +88,11 @@ def with_settings(**settings: object) -> Callable[[Path], object]:
         ("model.safetensors", lambda path: path.write_bytes(path.read_bytes()[:-100]), "cannot be used"),
     ],
 )
-def test_damaged_folders_are_one_line(
-    name: str, damage: Callable[[Path], object], message: str, tmp_path: Path
-) -> None:
+def test_damaged_folders_are_one_line(name, damage, message, tmp_path) -> None:
     folder = depth_anything(tmp_path / "model").folder
     damage(folder / name)
     with pytest.raises(InputError, match=rf"^[^\n]*{message}[^\n]*$"):
-        model_to_use(DepthChoice(model=str(folder))).estimate(PHOTO)  # type: ignore[union-attr]
+        model_to_use(DepthChoice(model=str(folder))).estimate(PHOTO)
     assert not list((tmp_path / "cache").glob("*")), "nothing of that is kept"
 
 
@@ -122,7 +110,7 @@ class UniDepthV2:
 """
 
 
-def test_unidepth_is_called_as_its_package_documents(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_unidepth_is_called_as_its_package_documents(monkeypatch, tmp_path) -> None:
     """A stand-in: the package is not in any registry. What it gives passes through with its unknowns."""
     folder = tmp_path / "weights"
     for made in (tmp_path / "unidepth", folder):
@@ -134,7 +122,7 @@ def test_unidepth_is_called_as_its_package_documents(monkeypatch: pytest.MonkeyP
     (tmp_path / "unidepth" / "__init__.py").touch()
     (tmp_path / "unidepth" / "models.py").write_text(UNIDEPTH)
     monkeypatch.syspath_prepend(str(tmp_path))
-    found = model_to_use(DepthChoice(model=str(folder))).estimate(PHOTO)  # type: ignore[union-attr]
+    found = model_to_use(DepthChoice(model=str(folder))).estimate(PHOTO)
     assert found.meaning == "metres"
     assert np.argwhere(np.isnan(found.values)).tolist() == [[0, 0]]
     for name in [name for name in sys.modules if name.startswith("unidepth")]:

@@ -1,8 +1,3 @@
-"""Scenes on small folders: viewpoints, trials, the disparity they start from, and one clear line for damage."""
-
-from __future__ import annotations
-
-from collections.abc import Callable
 from pathlib import Path
 
 import cv2
@@ -64,14 +59,11 @@ def seen_wall(position: np.ndarray, camera: np.ndarray, focal: float, depth: flo
     return (0.5 + 0.3 * np.stack(waves, -1)).astype(np.float32)
 
 
-def test_views_of_turned_cameras_are_compared_as_they_are(tmp_path: Path) -> None:
+def test_views_of_turned_cameras_are_compared_as_they_are(tmp_path) -> None:
     """A wall at depth 10, seen by cameras that are turned and stand before and behind the plane."""
     focal = 60.0
-    cameras = [
-        ((0.0, 0.0, 0.0), np.eye(3)),
-        ((1.0, 0.0, 0.8), rotation("y", 4)),
-        ((-1.0, 0.0, -0.8), rotation("z", -5)),
-    ]
+    places = ((0.0, 0.0, 0.0), (1.0, 0.0, 0.8), (-1.0, 0.0, -0.8))
+    cameras = list(zip(places, (np.eye(3), rotation("y", 4), rotation("z", -5))))
     scene = scene_of(write_llff(tmp_path / "fern", cameras, focal))
     assert offset_by_file(scene) == {"IMG_00": (0, 0), "IMG_01": (0, 1), "IMG_02": (0, -1)}
     np.save(tmp_path / "wall.npy", np.full((HEIGHT, WIDTH), focal / 10.0, np.float32))
@@ -82,14 +74,14 @@ def test_views_of_turned_cameras_are_compared_as_they_are(tmp_path: Path) -> Non
     assert rows["one plane"].full_db > 30
 
 
-def test_few_views_are_spread_and_hold_the_farthest(tmp_path: Path) -> None:
+def test_few_views_are_spread_and_hold_the_farthest(tmp_path) -> None:
     centre, corner = trials_of(scene_of(write_grid(tmp_path / "square")), "given", 3)
     assert len(centre.judged) == 3
     assert (-1.0, -1.0) in [centre.offset(index) for index in centre.judged]
     assert [corner.offset(index) for index in corner.judged] == [(-2.0, 0.0)]
 
 
-def test_a_true_map_comes_alone_and_another_one_also_fitted(tmp_path: Path) -> None:
+def test_a_true_map_comes_alone_and_another_one_also_fitted(tmp_path) -> None:
     folder = write_grid(tmp_path / "scene")
     trial = trials_of(scene_of(folder), "given")[0]
     assert list(trial_input(trial, "given", UNREFINED, 10**6).maps) == ["true map"]
@@ -103,7 +95,7 @@ def test_a_true_map_comes_alone_and_another_one_also_fitted(tmp_path: Path) -> N
         trial_input(trials_of(scene_of(folder), "given")[0], "given", UNREFINED, 10**6)
 
 
-def test_a_map_is_carried_to_the_corner(tmp_path: Path) -> None:
+def test_a_map_is_carried_to_the_corner(tmp_path) -> None:
     corner = trials_of(scene_of(write_grid(tmp_path / "square")), "given")[1]
     assert trial_input(corner, "given", UNREFINED, 10**6).judge.source == "gt_disp_u01_v01.npy, carried over"
     wanted = np.full((HEIGHT, WIDTH), WALL, np.float32)
@@ -120,7 +112,7 @@ def test_a_map_is_carried_to_the_corner(tmp_path: Path) -> None:
         (lambda f: np.save(f / "poses_bounds.npy", np.zeros((3, 16))), "17 numbers"),
     ],
 )
-def test_a_damaged_scene_is_one_clear_line(tmp_path: Path, damage: Callable[[Path], object], named: str) -> None:
+def test_a_damaged_scene_is_one_clear_line(tmp_path, damage, named) -> None:
     if named == "same view":
         write_grid(tmp_path / "scene")
     else:
@@ -130,7 +122,7 @@ def test_a_damaged_scene_is_one_clear_line(tmp_path: Path, damage: Callable[[Pat
         list(find_scenes(tmp_path / "scene"))
 
 
-def test_a_folder_without_scenes_is_named(tmp_path: Path) -> None:
+def test_a_folder_without_scenes_is_named(tmp_path) -> None:
     (tmp_path / "photo.png").touch()
     for path in (tmp_path, tmp_path / "gone", tmp_path / "photo.png"):
         with pytest.raises(InputError, match="HCI, Stanford"):

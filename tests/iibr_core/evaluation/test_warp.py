@@ -1,18 +1,13 @@
-"""The plain warp against slow loops; the best plane, scale and shift; consistency of views."""
-
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.ndimage import gaussian_filter, map_coordinates
+from scipy.ndimage import map_coordinates
 
 from iibr_core.evaluation.alignment import ViewFit, Warp
 from iibr_core.evaluation.consistency import consistency, disagreement
-from iibr_core.evaluation.metrics import psnr
 from iibr_core.evaluation.warp import SAMPLES, reference_warp, reference_warp_to
 from iibr_core.method.view import View
 from iibr_core.types import FloatImage, ImageSize, ViewOffset
@@ -40,7 +35,7 @@ def slow_splat(disparity: np.ndarray, offset: ViewOffset) -> np.ndarray:
 
 
 @pytest.mark.parametrize("offset", [ViewOffset(0.0, 1.0), ViewOffset(-2.0, 1.5), ViewOffset(0.7, -3.0)])
-def test_the_warp_is_its_slow_twin(offset: ViewOffset) -> None:
+def test_the_warp_is_its_slow_twin(offset) -> None:
     photo, disparity = smooth_texture(14, 17), np.full((14, 17), 0.5, np.float32)
     disparity[4:9, 5:11] = 2.0
     warped = reference_warp(photo, disparity, offset)
@@ -81,7 +76,7 @@ def test_holes_are_filled_from_behind_and_one_pixel_around_them_is_not_visible()
 
 @pytest.mark.parametrize("shape", [(1, 1), (1, 9), (7, 1)])
 @pytest.mark.parametrize("value", [np.nan, np.inf, 1e6, -1e6, 0.0])
-def test_odd_disparities_give_finite_pictures(shape: tuple[int, int], value: float) -> None:
+def test_odd_disparities_give_finite_pictures(shape, value) -> None:
     photo = np.full((*shape, 3), 0.5, np.float32)
     warped = reference_warp(photo, np.full(shape, value, np.float32), ViewOffset(1.0, -1.0))
     assert np.isfinite(warped.colors).all()
@@ -96,7 +91,7 @@ def fit_of(photo: FloatImage, views: Sequence[tuple[ViewOffset, FloatImage]]) ->
 
 
 @pytest.mark.parametrize(("scale", "shift"), [(10.0, -3.0), (-4.0, 1.0)])
-def test_a_known_scale_and_shift_are_found(scale: float, shift: float) -> None:
+def test_a_known_scale_and_shift_are_found(scale, shift) -> None:
     truth = disparity_of_square()
     estimate = (truth * np.float32(scale) + np.float32(shift)).astype(np.float32)
     views = [(ViewOffset(t, s), view_of_square(ViewOffset(t, s))) for t, s in ((-1.0, 1.0), (1.0, -1.0))]
@@ -105,30 +100,14 @@ def test_a_known_scale_and_shift_are_found(scale: float, shift: float) -> None:
 
 
 @pytest.mark.parametrize("disparity", [WALL, -1.7])
-def test_the_plane_of_a_wall_is_found(disparity: float) -> None:
+def test_the_plane_of_a_wall_is_found(disparity) -> None:
     views = [(at, view_of_wall(at, disparity)) for at in (ViewOffset(0.0, 2.0), ViewOffset(-2.0, 0.0))]
     fit = fit_of(view_of_wall(CENTRE), views)
     assert fit.plane == pytest.approx(disparity, abs=0.02)
     np.testing.assert_allclose(fit.fitted(np.full((HEIGHT, WIDTH), 7, np.float32)), fit.plane)
 
 
-@pytest.mark.parametrize("blur", [0.0, 2.0])
-def test_a_fit_never_takes_views_farther_from_the_true_ones(blur: float) -> None:
-    """Small copies of sharp pictures, which the fit is found on, may be misleading."""
-    photo = np.random.default_rng(2).random((120, 160, 3)).astype(np.float32)
-    truth = np.full((120, 160), 1.0, np.float32)
-    truth[30:90, 50:110] = 4.0
-    views = [(at, reference_warp(photo, truth, at).colors) for at in (ViewOffset(0.0, 2.0), ViewOffset(0.0, -2.0))]
-    estimate = gaussian_filter(truth, blur)
-    before, after = (
-        np.mean([psnr(reference_warp(photo, disparity, at).colors, view) for at, view in views])
-        for disparity in (estimate, fit_of(photo, views).fitted(estimate))
-    )
-    assert after >= before
-
-
 def rendered(offset: ViewOffset, is_inpainted: bool = True) -> View:
-    """Return the wall, perfectly seen."""
     everywhere = np.full((HEIGHT, WIDTH), is_inpainted)
     return View(view_of_wall(offset), np.full((HEIGHT, WIDTH), WALL, np.float32), everywhere, everywhere)
 

@@ -17,7 +17,7 @@ from viewer.display.offscreen import OffscreenScene
 
 
 @pytest.fixture(scope="package")
-def opened(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ExportSource]:
+def opened(tmp_path_factory) -> Iterator[ExportSource]:
     source = Source(str(write_scene(tmp_path_factory.mktemp("exports"))), grid=GridShape(3, 3))
     with OffscreenScene() as drawer:
         try:
@@ -28,13 +28,12 @@ def opened(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ExportSource]:
 
 
 @pytest.fixture
-def source(opened: ExportSource) -> ExportSource:
+def source(opened) -> ExportSource:
     """The opened scene: 3x3 views of 96x64, a near square before a far wall."""
     return replace(opened, centre=None)
 
 
 def exported(source: ExportSource, kind: str, path: Path, optics: dict[str, Any] | None = None, **options: Any) -> Path:
-    """Write an export; return its path."""
     source = replace(source, optics=replace(source.optics, **optics or {}))
     chosen = ExportOptions(**options)
     target = export_path(export_kind(kind), path, source.scene, chosen)

@@ -1,19 +1,21 @@
-"""Animations, read by PyAV and Pillow: every frame is what the renderer shows, and the last leads to the first."""
-
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import OpenImageIO as oiio
 import pytest
 from PIL import Image, ImageSequence
 
 from iibr_core.beyond.optics import Optics
+from iibr_core.color import srgb_from_linear
 from iibr_core.exports.animation import optics_on_path
 from iibr_core.exports.kinds import ANIMATIONS, EXPORTS, ExportOptions, with_defaults
 from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.exports.source import ExportSource
+from iibr_core.exports.stack import focal_stack
+from iibr_core.formats.maps.pfm import read_pfm
+from iibr_core.runtime.work import Cancelled, stoppable
 from iibr_core.scenes.lens_limits import aperture_limit
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import InputError, ViewOffset
@@ -45,7 +47,7 @@ def video_frames(path: Path) -> tuple[list[np.ndarray], float, str]:
 
 
 @pytest.mark.parametrize("kind", ["mp4", "webm"])
-def test_videos_show_what_the_renderer_shows(source: ExportSource, tmp_path: Path, kind: str) -> None:
+def test_videos_show_what_the_renderer_shows(source, tmp_path, kind) -> None:
     pytest.importorskip("av")
     frames, rate, pixels = video_frames(exported(source, kind, tmp_path / f"a.{kind}", frames=COUNT, rate=12.5))
     assert (len(frames), rate, pixels) == (COUNT, pytest.approx(12.5), "yuv420p")
@@ -56,27 +58,21 @@ def test_videos_show_what_the_renderer_shows(source: ExportSource, tmp_path: Pat
 
 
 @pytest.mark.parametrize(("kind", "tolerance"), [("gif", 12), ("webp", 10)])
-def test_animated_images_show_what_the_renderer_shows(
-    source: ExportSource, tmp_path: Path, kind: str, tolerance: float
-) -> None:
+def test_animated_images_show_what_the_renderer_shows(source, tmp_path, kind, tolerance) -> None:
     out = exported(source, kind, tmp_path / f"a.{kind}", frames=COUNT, rate=8.0)
     with Image.open(out) as image:
         assert image.info["loop"] == 0
-        frames = [(np.asarray(frame.convert("RGB")).astype(int), frame.info["duration"]) for frame in _frames(image)]
-    assert len(frames) == COUNT
-    assert sum(duration for _, duration in frames) == pytest.approx(1000 * COUNT / 8.0, abs=10)
-    for (frame, _), expected in zip(frames, expected_frames(source)):
+        frames, duration = [], 0
+        for frame in ImageSequence.Iterator(image):
+            frames.append(np.asarray(frame.convert("RGB")).astype(int))
+            duration += frame.info["duration"]
+    assert (len(frames), duration) == (COUNT, pytest.approx(1000 * COUNT / 8.0, abs=10))
+    for frame, expected in zip(frames, expected_frames(source), strict=True):
         assert np.abs(frame - expected).mean() <= tolerance
 
 
-def _frames(image: Image.Image) -> Iterator[Image.Image]:
-    for frame in ImageSequence.Iterator(image):
-        frame.load()  # reads its duration
-        yield frame
-
-
 @pytest.mark.parametrize("motion", ANIMATIONS)
-def test_paths_are_closed_and_move(source: ExportSource, motion: str) -> None:
+def test_paths_are_closed_and_move(source, motion) -> None:
     path = path_of(source, motion=motion, frames=24)
     around = np.array([(*optics.eye, optics.focus_disparity, optics.aperture_diameter) for optics in path])
     steps = np.linalg.norm(np.diff(around, axis=0, append=around[:1]), axis=1)
@@ -85,7 +81,7 @@ def test_paths_are_closed_and_move(source: ExportSource, motion: str) -> None:
     assert all(0 <= optics.aperture_diameter <= aperture_limit(source.scene.grid) for optics in path)
 
 
-def test_a_rack_rests_on_both_surfaces_and_glides_between_them(source: ExportSource) -> None:
+def test_a_rack_rests_on_both_surfaces_and_glides_between_them(source) -> None:
     far, near = source.scene.disparity_range_px
     for rack, (start, end) in ((None, (near, far)), ((0.4, -0.1), (0.4, -0.1))):
         path = path_of(source, motion="rack", rack=rack, frames=20)
@@ -96,7 +92,7 @@ def test_a_rack_rests_on_both_surfaces_and_glides_between_them(source: ExportSou
         assert min(optics.aperture_diameter for optics in path) > 0
 
 
-def test_a_path_goes_through_its_keys(source: ExportSource, tmp_path: Path) -> None:
+def test_a_path_goes_through_its_keys(source, tmp_path) -> None:
     keys = tmp_path / "keys.txt"
     keys.write_text("\ufeff# s t focus aperture\n-1 0 0.5 1\n1, 0.5, -0.1, 2\n\n0 -1\n", "utf-8")
     path = path_of(replace(source, optics=replace(source.optics, aperture_diameter=1.5)), keys=keys, frames=6)
@@ -106,7 +102,7 @@ def test_a_path_goes_through_its_keys(source: ExportSource, tmp_path: Path) -> N
 
 
 @pytest.mark.parametrize("text", ["", "1", "1 2 3 4 5", "a b", "nan 0", "900 0", "0 0 500"])
-def test_keys_that_mean_nothing_are_refused(source: ExportSource, tmp_path: Path, text: str) -> None:
+def test_keys_that_mean_nothing_are_refused(source, tmp_path, text) -> None:
     keys = tmp_path / "keys.txt"
     keys.write_text(text or "\n")
     with pytest.raises(InputError, match="keys"):
@@ -114,7 +110,49 @@ def test_keys_that_mean_nothing_are_refused(source: ExportSource, tmp_path: Path
 
 
 @pytest.mark.parametrize("name", ["a.mp4", "a.webm"])
-def test_videos_have_even_sizes(source: ExportSource, tmp_path: Path, name: str) -> None:
+def test_videos_have_even_sizes(source, tmp_path, name) -> None:
     with pytest.raises(InputError, match="give 96x64"):
         exported(source, name[2:], tmp_path / name, size=ScreenSize(97, 65))
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_folder(source, tmp_path) -> None:
+    folder = exported(source, "focal-stack", tmp_path / "stack", {"focus_disparity": 0.2}, frames=3)
+    stack = focal_stack(source.scene, Optics(focus_disparity=0.2), 3)
+    assert stack["all_in_focus"] == Optics(focus_disparity=0.2)
+    assert {path.name for path in folder.iterdir()} == {"disparity.pfm", *(f"{name}.png" for name in stack)}
+    for name, optics in stack.items():
+        assert np.array_equal(np.asarray(Image.open(folder / f"{name}.png")), source.draw(RenderSettings(optics, SIZE)))
+    disparity = read_pfm(folder / "disparity.pfm")
+    low, high = source.scene.disparity_range_px
+    assert (disparity.min(), disparity.max()) == (pytest.approx(low), pytest.approx(high))
+
+
+def test_sixteen_bits(source, tmp_path) -> None:
+    folder = exported(source, "focal-stack", tmp_path / "stack", frames=2, bits=16)
+    for name, optics in focal_stack(source.scene, Optics(), 2).items():
+        pixels = oiio.ImageBuf(str(folder / f"{name}.png")).get_pixels(oiio.UINT16)
+        expected = srgb_from_linear(source.draw(RenderSettings(optics, SIZE, is_linear=True))) * 65535
+        np.testing.assert_allclose(pixels, expected, atol=1)
+    with pytest.raises(InputError, match="8 or 16"):
+        exported(source, "focal-stack", tmp_path / "other", frames=2, bits=12)
+
+
+def test_a_focal_stack_goes_from_far_to_near_with_an_open_aperture(source) -> None:
+    *stack, sharp = focal_stack(source.scene, Optics(), 5).values()
+    focuses = [optics.focus_disparity for optics in stack]
+    assert (focuses[0], focuses[-1]) == source.scene.disparity_range_px
+    assert focuses == sorted(focuses)
+    assert all(optics.aperture_diameter > 0 for optics in stack)
+    assert sharp.aperture_diameter == 0
+    assert focal_stack(source.scene, Optics(aperture_diameter=1.5), 1)["focus_000"].aperture_diameter == 1.5
+
+
+@pytest.mark.parametrize(
+    ("kind", "name"), [("focal-stack", "stack"), ("gif", "a.gif"), ("quilt", "a.png"), ("hci", "field")]
+)
+def test_what_is_stopped_leaves_nothing(source, tmp_path, kind, name) -> None:
+    steps = iter(range(1000))
+    with pytest.raises(Cancelled), stoppable(lambda: next(steps) > 2):
+        exported(source, kind, tmp_path / name)
     assert list(tmp_path.iterdir()) == []

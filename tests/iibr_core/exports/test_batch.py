@@ -1,9 +1,6 @@
-"""Batches in this process: which photos are exported, skipped and listed as failed. Nothing is written to inputs."""
-
 import csv
 import os
-from concurrent.futures import Future, ThreadPoolExecutor
-from concurrent.futures.process import BrokenProcessPool
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -13,39 +10,23 @@ from PIL import Image
 
 from iibr_core.exports import batch
 from iibr_core.exports.batch import BatchCount, BatchSettings, check_batch_folder, photos_in, run_batch
+from iibr_core.exports.photo_folder import first_photo, list_photos
+from iibr_core.formats.images.write import write_image
 from iibr_core.scenes.scene import Source
 from iibr_core.types import InputError
 
 DEPTH, RGBD = BatchSettings("depth", Source("")), BatchSettings("rgbd", Source(""))
 
 
-class OneThread(ThreadPoolExecutor):
-    """Runs tasks in this process. A photo named "killer" breaks the pool, as a killed process does."""
-
-    def __init__(self, *_: Any) -> None:
-        super().__init__(1)
-        self.is_broken = False
-
-    def submit(self, work: Any, /, *arguments: Any, **options: Any) -> Any:
-        if self.is_broken:
-            raise BrokenProcessPool
-        if arguments[0].photo.stem != "killer":
-            return super().submit(work, *arguments)
-        self.is_broken = True
-        future: Future[Any] = Future()
-        future.set_exception(BrokenProcessPool())
-        return future
-
-
 @pytest.fixture(autouse=True)
-def in_this_process(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(batch, "ProcessPoolExecutor", OneThread)
+def in_this_process(monkeypatch) -> None:
+    monkeypatch.setattr(batch, "ProcessPoolExecutor", lambda *_: ThreadPoolExecutor(1))
     for variable in ("IIBR_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
         monkeypatch.setenv(variable, "2")
 
 
 @pytest.fixture
-def archive(tmp_path: Path) -> Path:
+def archive(tmp_path) -> Path:
     folder = tmp_path / "photos"
     write_photos(folder, "a.png", "sub/b.png")
     return folder
@@ -77,7 +58,7 @@ def files(folder: Path) -> set[str]:
     return {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
 
 
-def test_a_second_run_exports_what_is_missing_or_older_than_its_photo_or_map(archive: Path, tmp_path: Path) -> None:
+def test_a_second_run_exports_what_is_missing_or_older_than_its_photo_or_map(archive, tmp_path) -> None:
     out = tmp_path / "out"
     assert export(archive) == BatchCount(written=2, guessed=2)
     assert files(out) == {"a_depth.pfm", "sub/b_depth.pfm", "failures.csv"}
@@ -91,8 +72,7 @@ def test_a_second_run_exports_what_is_missing_or_older_than_its_photo_or_map(arc
     assert export(archive, force=True) == BatchCount(written=2, guessed=1)
 
 
-def test_every_photo_of_a_mixed_folder_is_exported_and_no_map(archive: Path, tmp_path: Path) -> None:
-    """Photos named like maps are exported, and photos that share a name get names of their own."""
+def test_every_photo_of_a_mixed_folder_is_exported_and_no_map(archive, tmp_path) -> None:
     write_photos(archive, "b.jpg", "b.png", "c.jpg", "shallow_depth.jpg")
     write_map(archive / "c_depth.jpg")
     (archive / "broken.jpg").write_bytes(b"\xff\xd8\xff\xe0oops")
@@ -103,7 +83,7 @@ def test_every_photo_of_a_mixed_folder_is_exported_and_no_map(archive: Path, tmp
     assert list(failures(tmp_path / "out")) == ["broken.jpg"]
 
 
-def test_names_of_outputs_repeat_subfolders_and_differ(tmp_path: Path) -> None:
+def test_names_of_outputs_repeat_subfolders_and_differ(tmp_path) -> None:
     one, two = tmp_path / "one", tmp_path / "two"
     write_photos(one, "a.jpg", "A.tif", "c.png", "c.png.png", "d.x.png", ".hidden.png", ".h/x.png")
     write_photos(two, "sub/a.png")
@@ -118,9 +98,7 @@ def test_names_of_outputs_repeat_subfolders_and_differ(tmp_path: Path) -> None:
             photos_in(folders)
 
 
-def test_an_unexpected_error_fails_its_photo_and_leaves_a_traceback(
-    monkeypatch: pytest.MonkeyPatch, archive: Path, tmp_path: Path
-) -> None:
+def test_an_unexpected_error_fails_its_photo_and_leaves_a_traceback(monkeypatch, archive, tmp_path) -> None:
     open_for_export = batch.open_for_export
 
     def fail(kind: Any, options: Any, source: Source, *arguments: Any) -> Any:
@@ -139,7 +117,7 @@ def test_an_unexpected_error_fails_its_photo_and_leaves_a_traceback(
 
 
 @pytest.mark.parametrize("force", [False, True])
-def test_photos_are_not_overwritten_through_links(archive: Path, tmp_path: Path, force: bool) -> None:
+def test_photos_are_not_overwritten_through_links(archive, tmp_path, force) -> None:
     before = {name: (archive / name).read_bytes() for name in files(archive)}
     (tmp_path / "out").mkdir()
     for name, photo in (("failures.csv", "a.png"), ("a_depth.pfm", "sub/b.png"), ("sub", "sub")):
@@ -149,7 +127,7 @@ def test_photos_are_not_overwritten_through_links(archive: Path, tmp_path: Path,
     assert {name: (archive / name).read_bytes() for name in files(archive)} == before
 
 
-def test_outputs_go_into_an_empty_folder_or_one_of_a_batch_unless_forced(archive: Path, tmp_path: Path) -> None:
+def test_outputs_go_into_an_empty_folder_or_one_of_a_batch_unless_forced(archive, tmp_path) -> None:
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "mine.txt").touch()
     with pytest.raises(InputError, match="already exists"):
@@ -157,3 +135,38 @@ def test_outputs_go_into_an_empty_folder_or_one_of_a_batch_unless_forced(archive
     with pytest.raises(InputError, match="in the input"):
         check_batch_folder(archive / "out", [archive], force=True)
     assert export(archive, force=True).written == 2
+
+
+GREY = np.full((4, 6, 3), 100, np.uint8)
+
+
+def test_maps_hidden_files_and_others_are_no_photos(tmp_path) -> None:
+    for name in ("b.JPG", "a.png", "a_disparity.png", "a_depth.exr", "b_depth.jpg", ".c.png", "d.txt", "low_depth.jpg"):
+        (tmp_path / name).write_bytes(b"-")
+    (tmp_path / "folder.jpg").mkdir()
+    assert {photo.name for photo in list_photos(str(tmp_path))} == {"b.JPG", "a.png", "low_depth.jpg"}
+    assert list_photos(str(tmp_path / "gone")) == ()
+
+
+def test_what_was_saved_or_exported_of_a_photo_is_none_of_its_folder(tmp_path) -> None:
+    made = ("a-iibr.png", "a-quilt_qs8x6a1.482.png", "a-sbs_2x1.png", "a-rgbd.jpg", "a-b-anaglyph.jpg")
+    kept = ("a.jpg", "a-b.png", "gone-iibr.png", "a-iibre.png", "a-quilted.png", "iibr-quilt.png", "-iibr.png")
+    for name in (*made, *kept):
+        (tmp_path / name).write_bytes(b"-")
+    assert {photo.name for photo in list_photos(str(tmp_path))} == set(kept)
+
+
+@pytest.mark.parametrize("inside", ["", "views"])
+def test_a_light_field_is_no_folder_of_photos_also_in_views(tmp_path, inside) -> None:
+    assert first_photo(tmp_path) is None
+    (tmp_path / inside).mkdir(exist_ok=True)
+    for v, u in np.ndindex(2, 2):
+        write_image(tmp_path / inside / f"v{v:02d}_u{u:02d}.png", GREY)
+    assert first_photo(tmp_path) is None
+
+
+@pytest.mark.parametrize("names", [[f"DSC_{i:04d}.jpg" for i in range(4)], ["beach.png", "sea.png", "view.png"]])
+def test_pictures_of_a_camera_and_others_that_are_no_grid_are_photos(tmp_path, names) -> None:
+    for name in names:
+        Image.fromarray(GREY).save(tmp_path / name)
+    assert first_photo(tmp_path) == tmp_path / names[0]

@@ -1,12 +1,7 @@
-"""The table of kinds: defaults of the options, and places where exports may be written."""
-
-from pathlib import Path
-
 import pytest
 
 from iibr_core.beyond.optics import Optics
 from iibr_core.exports.kinds import EXPORTS, ExportOptions, require_export_place, with_defaults
-from iibr_core.exports.source import ExportSource
 from iibr_core.formats.outputs import AlreadyThereError
 from iibr_core.scenes.scene import Scene, Source
 from iibr_core.types import GridShape, InputError
@@ -19,20 +14,16 @@ SHARP_NEAR = Optics(focus_disparity=10.0)
 
 @pytest.mark.parametrize(
     ("kind", "size", "frames", "rate"),
-    [
-        ("mp4", (740, 500), 120, 30),
-        ("gif", (480, 324), 60, 15),
-        ("webp", (741, 500), 100, 25),
-        ("focal-stack", (741, 500), 16, 0),
-    ],
-)
-def test_defaults(kind: str, size: tuple[int, int], frames: int, rate: float) -> None:
+    [("mp4", (740, 500), 120, 30), ("gif", (480, 324), 60, 15), ("webp", (741, 500), 100, 25),
+     ("focal-stack", (741, 500), 16, 0)],
+)  # fmt: skip
+def test_defaults(kind, size, frames, rate) -> None:
     options = with_defaults(EXPORTS[kind], ExportOptions(), SCENE, SHARP_NEAR)
     assert (options.size, options.frames, options.rate, options.eyes, options.row) == (size, frames, rate, 3, 250)
 
 
 @pytest.mark.parametrize("name", FOLDERS)
-def test_a_folder_of_other_files_is_never_replaced(source: ExportSource, tmp_path: Path, name: str) -> None:
+def test_a_folder_of_other_files_is_never_replaced(source, tmp_path, name) -> None:
     kind, folder = EXPORTS[name], tmp_path / "out"
     require_export_place(kind, folder, (), False)
     exported(source, name, folder, **({"frames": 1} if "frames" in kind.supports else {}))

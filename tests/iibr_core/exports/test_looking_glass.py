@@ -1,5 +1,3 @@
-"""Quilts shown by Looking Glass Bridge: against an HTTP server that answers as Bridge does."""
-
 import json
 import threading
 from collections.abc import Iterator
@@ -11,7 +9,7 @@ import pytest
 
 from iibr_core.exports import quilt
 from iibr_core.exports.kinds import EXPORTS, ExportOptions
-from iibr_core.exports.source import ExportSource, write_export
+from iibr_core.exports.source import write_export
 from iibr_core.types import InputError
 from tests.iibr_core.exports.conftest import exported
 
@@ -55,7 +53,7 @@ class Handler(BaseHTTPRequestHandler):
 
 
 @pytest.fixture
-def bridge(monkeypatch: pytest.MonkeyPatch) -> Iterator[FakeBridge]:
+def bridge(monkeypatch) -> Iterator[FakeBridge]:
     monkeypatch.setenv("http_proxy", "http://localhost:1")  # must not be used for this machine
     with FakeBridge() as server:
         thread = threading.Thread(target=server.serve_forever, args=(0.02,))
@@ -66,9 +64,7 @@ def bridge(monkeypatch: pytest.MonkeyPatch) -> Iterator[FakeBridge]:
         thread.join()
 
 
-def test_a_quilt_is_shown(
-    bridge: FakeBridge, source: ExportSource, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_quilt_is_shown(bridge, source, tmp_path, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
     options = ExportOptions(show=True)
     assert write_export(EXPORTS["quilt"], Path("a_qs8x6a1.5.png"), source, options) == "It is shown on the display."
@@ -91,9 +87,7 @@ TROUBLE = {
 
 
 @pytest.mark.parametrize("trouble", TROUBLE)
-def test_failures_are_one_line(
-    bridge: FakeBridge, source: ExportSource, tmp_path: Path, trouble: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_failures_are_one_line(bridge, source, tmp_path, trouble, monkeypatch) -> None:
     changes, message = TROUBLE[trouble]
     for name, value in changes.items():
         setattr(bridge, name, value)

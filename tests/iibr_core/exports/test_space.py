@@ -1,5 +1,3 @@
-"""Cameras, points and maps, read by plyfile, OpenImageIO and our own readers: all agree on where things are."""
-
 import json
 import math
 from dataclasses import replace
@@ -41,7 +39,7 @@ def colmap_model(folder: Path) -> tuple[dict[str, np.ndarray], dict[str, np.ndar
     return projections, places, points
 
 
-def test_colmap_points_lie_on_their_colours_in_every_view(source: ExportSource, tmp_path: Path) -> None:
+def test_colmap_points_lie_on_their_colours_in_every_view(source, tmp_path) -> None:
     """The near square's points are red; where they are seen in other views, these are red too."""
     folder = exported(source, "colmap", tmp_path / "scene")
     projections, _, points = colmap_model(folder)
@@ -56,7 +54,7 @@ def test_colmap_points_lie_on_their_colours_in_every_view(source: ExportSource, 
         assert (seen[:, 0] - seen[:, 2] > 80).mean() > 0.98
 
 
-def test_the_three_layouts_say_the_same(source: ExportSource, tmp_path: Path) -> None:
+def test_the_three_layouts_say_the_same(source, tmp_path) -> None:
     folders = {kind: exported(source, kind, tmp_path / kind) for kind in ("llff", "nerfstudio", "colmap")}
     _, colmap, _ = colmap_model(folders["colmap"])
     whole = json.loads((folders["nerfstudio"] / "transforms.json").read_text())
@@ -76,7 +74,7 @@ def test_the_three_layouts_say_the_same(source: ExportSource, tmp_path: Path) ->
         np.testing.assert_array_equal(matrix[:, 0], [0, -1, 0], "down, where y is up")
 
 
-def test_splats_are_the_photo_with_something_behind_it(source: ExportSource, tmp_path: Path) -> None:
+def test_splats_are_the_photo_with_something_behind_it(source, tmp_path) -> None:
     vertex = PlyData.read(str(exported(source, "splats", tmp_path / "a.ply")))["vertex"]
     count = 96 * 64
     assert len(vertex) > count, "behind the square"
@@ -110,9 +108,7 @@ def with_metres(source: ExportSource, nearest: float, farthest: float) -> Export
 
 
 @pytest.mark.parametrize(("nearest", "farthest"), [(1.02, 3.9), (0.5, 200.0)])
-def test_distances_known_in_metres_are_written_in_metres(
-    source: ExportSource, tmp_path: Path, nearest: float, farthest: float
-) -> None:
+def test_distances_known_in_metres_are_written_in_metres(source, tmp_path, nearest, farthest) -> None:
     known = with_metres(source, nearest, farthest)
     depth = np.load(exported(known, "depth", tmp_path / "a.npy"))
     assert (depth.min(), depth.max()) == pytest.approx((nearest, farthest), rel=1e-3)
@@ -122,20 +118,18 @@ def test_distances_known_in_metres_are_written_in_metres(
 
 
 @pytest.mark.parametrize("farthest", [1e9, math.inf, -50.0])
-def test_a_sky_at_infinity_is_far_but_not_infinitely(source: ExportSource, farthest: float) -> None:
-    """Also where the map's edges were drawn a little beyond infinity."""
+def test_a_sky_at_infinity_is_far_but_not_infinitely(source, farthest) -> None:
     assert cameras_of(with_metres(source, 2.0, farthest)).depth_range == pytest.approx((1, 1000), rel=1e-3)
 
 
-def test_maps(source: ExportSource, tmp_path: Path) -> None:
+def test_maps(source, tmp_path) -> None:
     disparity = read_pfm(exported(source, "disparity", tmp_path / "a.pfm"))
     out = exported(source, "depth", tmp_path / "a.exr")
     assert out.name == "a_depth.exr"
     depth = np.asarray(oiio.ImageBuf(str(out)).get_pixels(oiio.FLOAT))[..., 0]
     cameras = cameras_of(source)
-    np.testing.assert_allclose(
-        depth, (cameras.range_px[1] - cameras.at_infinity) / (disparity - cameras.at_infinity), rtol=1e-5
-    )
+    expected = (cameras.range_px[1] - cameras.at_infinity) / (disparity - cameras.at_infinity)
+    np.testing.assert_allclose(depth, expected, rtol=1e-5)
     assert (disparity.min(), disparity.max()) == pytest.approx(source.scene.disparity_range_px)
     stored = np.asarray(Image.open(exported(source, "depth", tmp_path / "b.png"))).astype(float)
     assert np.corrcoef(stored.ravel(), depth.ravel())[0, 1] > 0.9999
@@ -143,15 +137,10 @@ def test_maps(source: ExportSource, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("layout", "picture", "depth"),
-    [
-        ("right", np.s_[:, :96], np.s_[:, 96:]),
-        ("left", np.s_[:, 96:], np.s_[:, :96]),
-        ("below", np.s_[:64], np.s_[64:]),
-    ],
-)
-def test_a_picture_with_its_depth_beside_it(
-    source: ExportSource, tmp_path: Path, layout: str, picture: tuple[slice, ...], depth: tuple[slice, ...]
-) -> None:
+    [("right", np.s_[:, :96], np.s_[:, 96:]), ("left", np.s_[:, 96:], np.s_[:, :96]),
+     ("below", np.s_[:64], np.s_[64:])],
+)  # fmt: skip
+def test_a_picture_with_its_depth_beside_it(source, tmp_path, layout, picture, depth) -> None:
     pixels = np.asarray(Image.open(exported(source, "rgbd", tmp_path / "a.png", layout=layout)))
     assert np.abs(pixels[picture].astype(int) - source.draw(RenderSettings(Optics(), ScreenSize(96, 64)))).max() <= 1
     assert (pixels[depth].min(), pixels[depth].max()) == (0, 255)
@@ -161,7 +150,7 @@ def test_a_picture_with_its_depth_beside_it(
     assert np.abs(pixels[depth] - expected[..., None]).max() <= 0.51
 
 
-def test_epi_has_a_line_a_view(source: ExportSource, tmp_path: Path) -> None:
+def test_epi_has_a_line_a_view(source, tmp_path) -> None:
     epi = np.asarray(Image.open(exported(source, "epi", tmp_path / "a.png", row=32))).astype(int)
     assert epi.shape == (3, 96, 3)
     for line, s in zip(epi, (-1.0, 0.0, 1.0)):
@@ -174,9 +163,7 @@ def test_epi_has_a_line_a_view(source: ExportSource, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("span", [4.0, 0.25, 0.0])
-def test_depth_beside_a_picture_is_even_from_the_farthest_to_the_nearest(
-    source: ExportSource, tmp_path: Path, span: float
-) -> None:
+def test_depth_beside_a_picture_is_even_from_the_farthest_to_the_nearest(source, tmp_path, span) -> None:
     disparity = np.tile(np.linspace(-1, span - 1, 96, dtype=np.float32), (64, 1))
     centre = ViewUpdate(1, 1, np.zeros((64, 96, 3), np.uint8), disparity)
     out = exported(replace(source, loaded=None, centre=centre), "rgbd", tmp_path / "a.png")

@@ -1,11 +1,8 @@
-"""Web pages as text: what they carry, within a budget, with the photo's words; and their index. Browsers: tests/web."""
-
 import base64
 import json
 import re
 from dataclasses import replace
 from io import BytesIO
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -32,7 +29,7 @@ XMP = """<x:xmpmeta xmlns:x="adobe:ns:meta/"><rdf:RDF xmlns:rdf="http://www.w3.o
 
 
 @pytest.fixture(scope="module")
-def opened(tmp_path_factory: pytest.TempPathFactory):
+def opened(tmp_path_factory):
     source = Source(str(write_scene(tmp_path_factory.mktemp("scene"))), grid=GridShape(5, 5))
     return open_for_export(KIND, ExportOptions(), source, 1.0, LensChoice(), lambda scene: None, None)
 
@@ -44,7 +41,6 @@ def page_of(opened, **options) -> tuple[str, dict]:
 
 
 def test_a_budget_takes_quality_then_views_then_size(opened) -> None:
-    """Each budget is a little less than the page before."""
     budget, forms = None, []
     for _ in range(5):
         page, views = make_page(opened, ExportOptions(budget=budget))
@@ -57,7 +53,7 @@ def test_a_budget_takes_quality_then_views_then_size(opened) -> None:
         page_of(opened, budget=10_000)
 
 
-def test_words_of_the_photo_come_only_if_asked(opened, tmp_path: Path) -> None:
+def test_words_of_the_photo_come_only_if_asked(opened, tmp_path) -> None:
     photo = tmp_path / "photo.jpg"
     exif = Image.Exif()
     exif[0x010E], exif[0x013B], exif[0x8298] = "A <i>bridge</i>", 'Ann "A" O\'Neil', "(c) <Ann>"
@@ -73,7 +69,7 @@ def test_words_of_the_photo_come_only_if_asked(opened, tmp_path: Path) -> None:
     assert "(c) &lt;Ann&gt;" in credited
 
 
-def test_the_gallery_lists_pages_and_is_replaced(opened, tmp_path: Path) -> None:
+def test_the_gallery_lists_pages_and_is_replaced(opened, tmp_path) -> None:
     text, _ = page_of(opened)
     for name in ("a#1.html", "<b>.html", "index.html"):
         (tmp_path / name).write_text(text.replace("<title>scene", f"<title>{name.replace('<', '&lt;')}"), "utf-8")
@@ -114,7 +110,7 @@ def test_moving_pictures_are_of_limited_range_and_the_first_shows_the_middle(ope
         assert set(ranges) == {b"\0"}
 
 
-def test_wide_colours_keep_their_numbers(tmp_path: Path) -> None:
+def test_wide_colours_keep_their_numbers(tmp_path) -> None:
     photo = tmp_path / "photo.png"
     Image.new("RGB", (48, 32), (200, 80, 60)).save(photo, icc_profile=icc_profile(DISPLAY_P3))
     source = Source(str(photo), grid=GridShape(3, 3), depth=DepthChoice(start="flat"))

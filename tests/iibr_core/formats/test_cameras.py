@@ -1,10 +1,19 @@
-"""Cameras of a field: where points lie, what is infinitely far, and numbers that make no cameras."""
+import json
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from iibr_core.formats.cameras import MAX_DEPTH_RATIO, FieldCameras, infinity_of
-from iibr_core.types import GridShape, ImageSize, ViewOffset
+from iibr_core.formats.cameras import (
+    MAX_DEPTH_RATIO,
+    FieldCameras,
+    infinity_of,
+    write_colmap,
+    write_llff,
+    write_nerfstudio,
+)
+from iibr_core.formats.poses import read_poses
+from iibr_core.types import GridShape, ImageSize, InputError, ViewOffset
 
 GRID, SIZE = GridShape(3, 3), ImageSize(64, 96)
 
@@ -27,7 +36,7 @@ def test_points_of_a_view_are_projected_to_where_other_views_see_them() -> None:
 @pytest.mark.parametrize(
     ("low", "high"), [(1.0, 5.0), (1.0, 20.0), (-3.0, 3.0), (0.001, 9.0), (2.0, 2.0), (0.0, 0.0), (-2.0, -2.0)]
 )
-def test_infinity_lies_beyond_all_at_a_sensible_ratio_of_depths(low: float, high: float) -> None:
+def test_infinity_lies_beyond_all_at_a_sensible_ratio_of_depths(low, high) -> None:
     infinity = infinity_of(low, high)
     assert infinity < low
     assert (high - infinity) / (low - infinity) <= 1.00005 * MAX_DEPTH_RATIO
@@ -35,7 +44,102 @@ def test_infinity_lies_beyond_all_at_a_sensible_ratio_of_depths(low: float, high
 
 
 @pytest.mark.parametrize(("inverse_metres", "infinity"), [((0.5, -1.0), 2.0), ((0.0, 1.0), 0.0), ((0.5, -5.0), 0.0)])
-def test_infinity_is_known_with_metres_unless_everything_would_lie_beyond(
-    inverse_metres: tuple[float, float], infinity: float
-) -> None:
+def test_infinity_is_known_with_metres_unless_everything_would_lie_beyond(inverse_metres, infinity) -> None:
     assert infinity_of(1.0, 9.0, inverse_metres) == infinity
+
+
+FIELD, FIELD_SIZE = GridShape(2, 3), ImageSize(40, 48)
+VIEWS = {f"v{v:02d}_u{u:02d}.png": FIELD.offset(v, u) for v, u in np.ndindex(*FIELD)}
+FORWARD = np.eye(3)[:, [1, 0, 2]] * [1, 1, -1]
+"""LLFF's rotation (columns down, right, backwards) of a camera that looks along z."""
+
+
+def write_field(folder: Path, kind: str, at_infinity=0.0):
+    cameras = FieldCameras(FIELD, FIELD_SIZE, 50.0, (1.0, 4.0), at_infinity)
+    if kind == "colmap":
+        write_colmap(folder, cameras, VIEWS, np.zeros((1, 3), np.float32), np.zeros((1, 3), np.uint8))
+    else:
+        {"llff": write_llff, "nerfstudio": write_nerfstudio}[kind](folder, cameras, VIEWS)
+    return cameras
+
+
+def read_transforms(folder, **changes):
+    """Read a file of one frame. changes: values of the file; None removes one."""
+    frame = {"file_path": "a.png", "transform_matrix": np.eye(4).tolist()}
+    content = {"w": 48, "h": 40, "fl_x": 50.0, "frames": [frame], **changes}
+    text = json.dumps({name: value for name, value in content.items() if value is not None})
+    (folder / "transforms.json").write_text(f"\ufeff{text}", "utf-8")
+    return read_poses(folder)
+
+
+def require_refusal(match, read, *args, **options):
+    with pytest.raises(InputError, match=match) as caught:
+        read(*args, **options)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("kind", "at_infinity"),
+    [("llff", 0.0), ("nerfstudio", 0.0), ("nerfstudio", 0.5), ("colmap", 0.0), ("colmap", -0.5)],
+)
+def test_round_trip(tmp_path, kind, at_infinity):
+    written, read = write_field(tmp_path, kind, at_infinity), read_poses(tmp_path)
+    first = read[0].world_from_camera
+    assert len(read) == 6
+    for camera, (_, offset) in zip(read, sorted(VIEWS.items())):
+        np.testing.assert_allclose(first.T @ camera.world_from_camera, np.eye(3), atol=1e-12)
+        place = first.T @ (camera.position - read[0].position)
+        expected = np.subtract(written.place(offset), written.place(FIELD.offset(0, 0)))
+        np.testing.assert_allclose(place, expected, atol=1e-12)
+        np.testing.assert_allclose(np.add(camera.centre_px, 0.5), written.principal_point(offset))
+        assert (camera.size, camera.focal_px) == (FIELD_SIZE, (50.0, 50.0))
+        assert camera.depth_range == (pytest.approx(written.depth_range) if kind == "llff" else None)
+
+
+def test_opengls_axes_are_turned(tmp_path):
+    (camera,) = read_transforms(tmp_path)
+    np.testing.assert_array_equal(camera.world_from_camera @ (0.0, 1.0, 1.0), (0.0, -1.0, -1.0))
+    assert (camera.focal_px, camera.centre_px) == ((50.0, 50.0), (23.5, 19.5))
+
+
+@pytest.mark.parametrize(("angle", "focal_px"), [(np.pi / 2, 24.0), (np.pi / 3, 24.0 * np.sqrt(3))])
+def test_an_angle_gives_the_focal_length_and_frames_override_the_file(tmp_path, angle, focal_px):
+    frame = {"transform_matrix": np.eye(4)[:3].tolist(), "camera_angle_x": angle, "cy": 7.5}
+    (camera,) = read_transforms(tmp_path, fl_x=None, camera_angle_x=1.0, cy=1.0, frames=[frame])
+    assert camera.focal_px[0] == pytest.approx(focal_px)
+    assert camera.centre_px == (23.5, 7.0)
+
+
+def test_colmaps_quaternion_is_from_the_world(tmp_path):
+    write_field(tmp_path, "colmap")
+    half = np.sqrt(0.5)
+    line = f"\ufeff1 {half} 0 0 {half} 1 2 3 1 a b.png\n\n"  # a quarter turn about z
+    (tmp_path / "sparse/0/images.txt").write_text(line, "utf-8")
+    (camera,) = read_poses(tmp_path)
+    np.testing.assert_allclose(camera.world_from_camera.T @ (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), atol=1e-12)
+    np.testing.assert_allclose(camera.world_from_camera.T @ -camera.position, (1.0, 2.0, 3.0), atol=1e-12)
+    assert camera.source.endswith("a b.png")
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"fl_x": float("nan")}, "transforms.json"),
+        ({"fl_x": None}, "focal length"),
+        ({"w": 0}, "pixels"),
+        ({"frames": []}, "0 poses"),
+        ({"frames": [{"transform_matrix": np.zeros((4, 4)).tolist()}]}, "rotation"),
+        ({"frames": [{"file_path": "a.png"}]}, "4x4"),
+        ({"w": None}, "pose 1 states no size.*a.png"),
+    ],
+)
+def test_invalid_cameras_are_refused(tmp_path, changes, message):
+    require_refusal(message, read_transforms, tmp_path, **changes)
+
+
+@pytest.mark.parametrize("name", ["/etc/passwd", "a/../../a.png", "..\\a.png"])
+def test_a_picture_elsewhere_is_never_opened(tmp_path, name):
+    frame = {"file_path": name, "transform_matrix": np.eye(4).tolist()}
+    require_refusal(
+        "pose 1: its picture .* does not lie beside the file", read_transforms, tmp_path, w=None, frames=[frame]
+    )

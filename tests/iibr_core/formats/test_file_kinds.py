@@ -1,5 +1,3 @@
-"""Files of every kind that people open as photos: read whatever their ending, or refused with the way out."""
-
 import shutil
 import struct
 from pathlib import Path
@@ -9,8 +7,10 @@ import OpenImageIO as oiio
 import pillow_heif
 import pytest
 from PIL import Image
+from PIL.PngImagePlugin import PngInfo
 
 from iibr_core.formats.images.file_kinds import raw_kind
+from iibr_core.formats.images.file_notes import file_notes
 from iibr_core.formats.images.photo import read_photo
 from iibr_core.types import InputError
 
@@ -42,7 +42,7 @@ REFUSED: dict[str, tuple[bytes, str]] = {
 
 
 @pytest.mark.parametrize("name", REFUSED)
-def test_other_kinds_of_files_are_named_with_the_way_out(tmp_path: Path, name: str) -> None:
+def test_other_kinds_of_files_are_named_with_the_way_out(tmp_path, name) -> None:
     content, expected = REFUSED[name]
     path = tmp_path / name
     path.write_bytes(content)
@@ -50,8 +50,7 @@ def test_other_kinds_of_files_are_named_with_the_way_out(tmp_path: Path, name: s
         read_photo(path)
 
 
-def test_a_raw_file_is_refused_though_its_preview_can_be_read(tmp_path: Path) -> None:
-    """Most are TIFF files whose first picture is a thumbnail."""
+def test_a_raw_file_is_refused_though_its_preview_can_be_read(tmp_path) -> None:
     PICTURE.resize((16, 12)).save(tmp_path / "a.tif")
     shutil.copy(tmp_path / "a.tif", tmp_path / "a.dng")
     assert read_photo(tmp_path / "a.tif").size == (12, 16)
@@ -66,7 +65,7 @@ WRONG_ENDINGS = {"png.jpg": "PNG", "avif.jpg": "AVIF", "jpeg.heic": "JPEG", "noe
 
 
 @pytest.mark.parametrize("name", [*WRONG_ENDINGS, "heic.jpg"])
-def test_pictures_open_whatever_their_ending(tmp_path: Path, name: str) -> None:
+def test_pictures_open_whatever_their_ending(tmp_path, name) -> None:
     if name == "heic.jpg":
         pillow_heif.from_pillow(PICTURE).save(tmp_path / name, quality=95)
     else:
@@ -77,7 +76,7 @@ def test_pictures_open_whatever_their_ending(tmp_path: Path, name: str) -> None:
 
 
 @pytest.mark.parametrize("ending", ["bmp", "tga", "jp2", "gif", "jxl", "psd"])
-def test_other_kinds_of_pictures_open(tmp_path: Path, ending: str) -> None:
+def test_other_kinds_of_pictures_open(tmp_path, ending) -> None:
     path = tmp_path / f"a.{ending}"
     if ending == "jxl":
         output = oiio.ImageOutput.create(str(path))
@@ -102,10 +101,70 @@ def test_other_kinds_of_pictures_open(tmp_path: Path, ending: str) -> None:
         ("grey.jpg", "L", ""), ("palette.png", "P", ""),
     ],
 )  # fmt: skip
-def test_pictures_of_other_colours_open(tmp_path: Path, name: str, mode: str, note: str) -> None:
+def test_pictures_of_other_colours_open(tmp_path, name, mode, note) -> None:
     PICTURE.convert(mode).save(tmp_path / name)
     photo = read_photo(tmp_path / name)
     assert photo.size == (48, 64)
     assert photo.notes == ((note,) if note else ())
     expected = np.asarray(PICTURE.convert(mode).convert("RGB"))
     assert np.abs(255 * photo.pixels - expected).mean() < 6
+
+
+XMP_TAG = 700
+GPANO = "http://ns.google.com/photos/1.0/panorama/"
+GIMAGE = "http://ns.google.com/photos/1.0/image/"
+
+
+def xmp(attributes: str = "") -> str:
+    return (
+        '<x:xmpmeta xmlns:x="adobe:ns:meta/"><rdf:RDF xmlns:rdf="http://www.w3.org/1999/02/22-rdf-syntax-ns#">'
+        f'<rdf:Description rdf:about="" xmlns:GPano="{GPANO}" xmlns:GImage="{GIMAGE}" {attributes}>'
+        "</rdf:Description></rdf:RDF></x:xmpmeta>"
+    )
+
+
+def save(path: Path, packet: str) -> Path:
+    if path.suffix == ".png":
+        info = PngInfo()
+        info.add_itxt("XML:com.adobe.xmp", packet)
+        PICTURE.save(path, pnginfo=info)
+    elif path.suffix == ".tif":
+        PICTURE.save(path, tiffinfo={XMP_TAG: packet.encode()})
+    elif path.suffix == ".heic":
+        file = pillow_heif.from_pillow(PICTURE)
+        file.info["xmp"] = packet.encode()
+        file.save(path, quality=90)
+    else:
+        PICTURE.save(path, xmp=packet.encode())
+    return path
+
+
+@pytest.mark.parametrize("name", ["a.jpg", "a.png", "a.tif", "a.heic"])
+def test_panoramas_are_shown_flat_with_a_note(tmp_path, name) -> None:
+    photo = read_photo(save(tmp_path / name, xmp('GPano:ProjectionType="equirectangular"')))
+    assert photo.size == (48, 64)
+    note = "Panorama (equirectangular): shown flat, as if it were an ordinary photo, so straight lines look bent."
+    assert photo.notes == (note,)
+
+
+@pytest.mark.parametrize("packet", [xmp(), xmp('GPano:SourcePhotosCount="1"'), f"<broken {GPANO}", ""])
+def test_other_photos_have_no_notes(tmp_path, packet) -> None:
+    assert file_notes(save(tmp_path / "a.jpg", packet)) == ()
+
+
+def test_a_right_eye_that_is_not_used_is_named(tmp_path) -> None:
+    packet = xmp('GPano:FullPanoWidthPixels="8192" GImage:Mime="image/jpeg"')
+    panorama, right_eye = file_notes(save(tmp_path / "a.vr.jpg", packet))
+    assert panorama.startswith("Panorama")
+    assert right_eye == "The right eye's picture in it (Cardboard Camera, VR180) is not used."
+
+
+@pytest.mark.parametrize("name", ["a.gif", "a.webp", "a.png", "a.avif", "webp.jpg"])
+def test_the_first_picture_of_an_animation_is_used(tmp_path, name) -> None:
+    others = [PICTURE.rotate(90), PICTURE.rotate(180)]
+    kind = {"webp.jpg": "WEBP"}.get(name)
+    options = {"lossless": True} if "webp" in name else {}
+    PICTURE.save(tmp_path / name, kind, save_all=True, append_images=others, duration=100, **options)
+    photo = read_photo(tmp_path / name)
+    assert photo.notes == ("Animation: the first of its 3 pictures is used.",)
+    assert np.abs(255 * photo.pixels - np.asarray(PICTURE)).mean() < 8

@@ -1,5 +1,3 @@
-"""Folders of views on a grid: which view stands where, and which folders are refused or are none."""
-
 from pathlib import Path
 
 import numpy as np
@@ -8,15 +6,24 @@ from PIL import Image
 
 from iibr_core.formats.images.write import write_image
 from iibr_core.formats.light_fields.light_field_formats import find_light_field, open_light_field
+from iibr_core.formats.light_fields.multi_view_scene import MultiView
 from iibr_core.formats.light_fields.views import read_views
+from iibr_core.formats.maps.disparity_file import read_disparity
 from iibr_core.formats.maps.pfm import write_pfm
-from iibr_core.types import GridShape, InputError
-from tests.iibr_core.evaluation.test_scenes import offset_by_file
-from tests.iibr_core.known_scenes import disparity_of_square, offsets_of, write_grid, write_hci
+from iibr_core.types import GridShape, ImageSize, InputError, ViewOffset
+from tests.iibr_core.evaluation.test_scenes import offset_by_file, scene_of, write_picture
+from tests.iibr_core.known_scenes import (
+    HEIGHT,
+    WIDTH,
+    disparity_of_square,
+    offsets_of,
+    write_grid,
+    write_hci,
+    write_numbered,
+)
 
 
 def write_flat(folder: Path, names: list[str]) -> Path:
-    """Write small grey pictures of 0, 1, 2, ..."""
     folder.mkdir(exist_ok=True)
     for k, name in enumerate(names):
         write_image(folder / name, np.full((2, 3, 3), k, np.uint8))
@@ -24,7 +31,7 @@ def write_flat(folder: Path, names: list[str]) -> Path:
 
 
 @pytest.mark.parametrize(("rows", "columns"), [(3, 3), (1, 3), (3, 5)])
-def test_hci_names_count_row_by_row(tmp_path: Path, rows: int, columns: int) -> None:
+def test_hci_names_count_row_by_row(tmp_path, rows, columns) -> None:
     folder = write_hci(tmp_path / "dino", rows, columns)
     write_image(folder / "objectids_highres.png", np.zeros((9, 9, 3), np.uint8))  # comes with the data set
     scene = open_light_field(folder)
@@ -38,7 +45,7 @@ def test_hci_names_count_row_by_row(tmp_path: Path, rows: int, columns: int) -> 
 @pytest.mark.parametrize(
     "name", ["v{v:02d}_u{u:02d}.png", "scene7_{v1}_{u1}.png", "{k:03d}.png", "img-{k1}.png", "lf_{v}_{u}.jpg"]
 )
-def test_grids_under_any_numbering(tmp_path: Path, name: str) -> None:
+def test_grids_under_any_numbering(tmp_path, name) -> None:
     """By row and column or row by row, counted from 0 or from 1; the map without a number is the centre view's."""
     names = {
         name.format(v=v, u=u, v1=v + 1, u1=u + 1, k=v * 11 + u, k1=v * 11 + u + 1): at
@@ -53,14 +60,14 @@ def test_grids_under_any_numbering(tmp_path: Path, name: str) -> None:
     assert list(scene.disparity) == [scene.centre]
 
 
-def test_a_light_field_has_the_name_of_its_folder_not_of_the_views_in_it(tmp_path: Path) -> None:
+def test_a_light_field_has_the_name_of_its_folder_not_of_the_views_in_it(tmp_path) -> None:
     (tmp_path / "boxes").mkdir()
     write_flat(tmp_path / "boxes" / "views", [f"v{v}_u{u}.png" for v, u in np.ndindex(2, 2)])
     for folder in (tmp_path / "boxes", tmp_path / "boxes" / "views"):
         assert open_light_field(folder).name == "boxes"
 
 
-def test_jpeg_pleno_counts_columns_first(tmp_path: Path) -> None:
+def test_jpeg_pleno_counts_columns_first(tmp_path) -> None:
     for row, column in np.ndindex(3, 4):
         Image.new("RGB", (4, 4)).save(tmp_path / f"{column + 1:03d}_{row + 1:03d}.ppm")
     scene = open_light_field(tmp_path)
@@ -72,7 +79,7 @@ def test_jpeg_pleno_counts_columns_first(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("count", [4, 9, 16, 25])
-def test_a_few_numbered_photos_are_no_light_field(tmp_path: Path, count: int) -> None:
+def test_a_few_numbered_photos_are_no_light_field(tmp_path, count) -> None:
     write_flat(tmp_path, [f"beach {n + 1}.png" for n in range(count)])
     with pytest.raises(InputError, match="holds no light field"):
         open_light_field(tmp_path)
@@ -80,17 +87,17 @@ def test_a_few_numbered_photos_are_no_light_field(tmp_path: Path, count: int) ->
     assert open_light_field(tmp_path).grid == (1, count)
 
 
-def test_views_of_which_every_third_was_kept_stand_on_a_square(tmp_path: Path) -> None:
+def test_views_of_which_every_third_was_kept_stand_on_a_square(tmp_path) -> None:
     write_flat(tmp_path, [f"input_Cam{3 * k:03d}.png" for k in range(9)])
     assert open_light_field(tmp_path).grid == (3, 3)
 
 
-def test_photos_numbered_by_date_and_time_are_no_light_field(tmp_path: Path) -> None:
+def test_photos_numbered_by_date_and_time_are_no_light_field(tmp_path) -> None:
     write_flat(tmp_path, [f"IMG_202307{day}_1{day}{k}.png" for day in (11, 14) for k in range(3)])
     assert find_light_field(tmp_path) is None
 
 
-def test_maps_of_places_and_truth_before_estimates(tmp_path: Path) -> None:
+def test_maps_of_places_and_truth_before_estimates(tmp_path) -> None:
     grid = write_grid(tmp_path / "grid")
     np.save(grid / "disp_est_u02_v00.npy", disparity_of_square())
     scene = open_light_field(grid)
@@ -103,7 +110,7 @@ def test_maps_of_places_and_truth_before_estimates(tmp_path: Path) -> None:
     assert open_light_field(hci).disparity[2].is_truth
 
 
-def test_missing_odd_and_damaged_views_are_named(tmp_path: Path) -> None:
+def test_missing_odd_and_damaged_views_are_named(tmp_path) -> None:
     folder = write_hci(tmp_path / "lf")
     view = folder / "input_Cam004.png"
     whole = view.read_bytes()
@@ -123,3 +130,95 @@ def test_missing_odd_and_damaged_views_are_named(tmp_path: Path) -> None:
     write_flat(places, ["v9999_u9999.png"])
     with pytest.raises(InputError, match="10000x10000"):
         open_light_field(places)
+
+
+def write_archive(folder: Path, positions: dict[tuple[int, int], tuple[float, float]]) -> MultiView:
+    """Write and read a Stanford folder. positions: (y, x) by (row, column)."""
+    names = {
+        f"out_{row:02d}_{column:02d}_{y:.6f}_{x:.6f}_.png": ViewOffset(0, 0)
+        for (row, column), (y, x) in positions.items()
+    }
+    write_numbered(folder, names)
+    return scene_of(folder)
+
+
+def offsets_by_index(scene: MultiView) -> dict[tuple[int, int], np.ndarray]:
+    """Viewpoints (t, s) from that of row 0 and column 0, by row and column in the names."""
+    by_index = {tuple(map(int, view.path.stem.split("_")[1:3])): np.array(view.offset) for view in scene.views}
+    return {index: offset - by_index[0, 0] for index, offset in by_index.items()}
+
+
+@pytest.mark.parametrize("jitter", [0.0, 0.1])
+def test_stanford_viewpoints_are_the_cameras_positions(tmp_path, jitter) -> None:
+    """Rows are counted upwards and columns leftwards; positions are in millimetres, slightly off the grid."""
+    rng = np.random.default_rng(3)
+    steps = {at: -np.array(at) + rng.uniform(-jitter, jitter, 2) for at in np.ndindex(5, 4)}
+    scene = write_archive(tmp_path / "rectified", {at: (100 + 30 * t, 30 * s) for at, (t, s) in steps.items()})
+    scene = scene_of(tmp_path)
+    assert (scene.layout, scene.grid) == ("Stanford archive, 4x5", (5, 4))
+    for at, offset in offsets_by_index(scene).items():
+        np.testing.assert_allclose(offset, steps[at] - steps[0, 0], atol=2 * jitter + 1e-6)
+    assert {view.path.stem[:9]: view.place for view in scene.views}["out_04_03"] == (0, 0)
+    assert ("stand up to" in scene.notes[0]) == (jitter > 0)
+
+
+@pytest.mark.parametrize(("rows", "columns", "step"), [(3, 3, 20.0), (3, 1, 45.0), (1, 3, 20.0)])
+def test_a_step_of_stanford_is_the_spacing_of_columns_else_of_rows(tmp_path, rows, columns, step) -> None:
+    positions = {at: (300 + 45.0 * at[0], -700 + 20.0 * at[1]) for at in np.ndindex(rows, columns)}
+    scene = write_archive(tmp_path, positions)
+    assert scene.grid == GridShape(rows, columns)
+    for at, offset in offsets_by_index(scene).items():
+        np.testing.assert_allclose(offset, np.subtract(positions[at], positions[0, 0]) / step)
+    assert scene.notes == ("Viewpoints from the names.",)
+
+
+def test_middlebury_pair_from_the_left(tmp_path) -> None:
+    folder = write_numbered(tmp_path / "pair", {f"im{n}.png": ViewOffset(0, n) for n in (0, 1)}, (HEIGHT, WIDTH))
+    disparity = np.full((HEIGHT, WIDTH), 7.5, np.float32)
+    disparity[0, 0] = np.inf
+    write_pfm(folder / "disp0.pfm", disparity)
+    scene = scene_of(folder)
+    assert (scene.layout, scene.centre) == ("Middlebury pair", 0)
+    assert offset_by_file(scene) == {"im0": (0, 0), "im1": (0, 1)}
+    known = read_disparity(scene.disparity[0].path, ImageSize(HEIGHT, WIDTH), scene.disparity[0].scale)
+    assert known.values[1, 1] == 7.5
+    assert np.isfinite(known.values).all()
+
+
+@pytest.mark.parametrize(
+    ("kind", "count", "truths", "extension", "width", "factor"),
+    [
+        ("im", 9, (2, 6), ".png", 450, 4.0),  # 2003, quarter size
+        ("im", 9, (2, 6), ".ppm", 434, 8.0),  # 2001
+        ("view", 7, (1, 5), ".png", 463, 3.0),  # 2005, third size
+    ],
+)
+def test_middlebury_rows_store_four_steps_times_a_factor(
+    tmp_path, kind, count, truths, extension, width, factor
+) -> None:
+    for n in range(count):
+        write_picture(tmp_path / f"{kind}{n}{extension}", np.zeros((4, width, 3), np.uint8))
+    for n in truths:
+        stored = np.full((4, width), 120, np.uint8)
+        stored[0, 0] = 0  # unknown
+        write_picture(tmp_path / f"disp{n}.png", stored)
+    scene = scene_of(tmp_path)
+    assert [view.offset.s for view in scene.views] == list(range(count))
+    assert list(scene.disparity) == list(truths)
+    for known in scene.disparity.values():
+        values = read_disparity(known.path, ImageSize(4, width), known.scale).values
+        np.testing.assert_allclose(values, 120 / factor / 4, rtol=1e-5)
+
+
+def test_llff_counts_in_steps_between_neighbours_across_the_viewing_direction(tmp_path) -> None:
+    """Cameras are half a unit apart and some nearer; bounds are depths, so disparity is focal length x step / depth."""
+    write_numbered(tmp_path / "images", {f"IMG_{n}.png": ViewOffset(0, n) for n in range(3)}, (HEIGHT, WIDTH))
+    down, right, back = np.eye(3)[[1, 0, 2]] * [[1], [1], [-1]]
+    places = [(-0.5, 0.0, 0.3), (0.0, 0.0, 0.0), (0.0, 0.5, 0.1)]
+    poses = [np.column_stack([down, right, back, place, [HEIGHT, WIDTH, 50]]).ravel() for place in places]
+    np.save(tmp_path / "poses_bounds.npy", np.array([[*pose, 5.0, 40.0] for pose in poses]))
+    scene = open_light_field(tmp_path)
+    np.testing.assert_allclose([view.offset for view in scene.views], [(0, -1), (0, 0), (1, 0)], atol=1e-12)
+    assert scene.range_px == pytest.approx((50 * 0.5 / 40, 50 * 0.5 / 5))
+    assert scene.focal_px == 50
+    assert "up to 0.6 view steps before or behind" in scene.notes[0]

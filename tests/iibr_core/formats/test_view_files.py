@@ -1,5 +1,3 @@
-"""Light fields in one file: quilts, lenslet images, and all kinds of stereo photos."""
-
 import json
 import struct
 from collections.abc import Callable
@@ -17,7 +15,7 @@ from iibr_core.formats.images.spatial_photo import write_spatial_photo
 from iibr_core.formats.light_fields import views as views_module
 from iibr_core.formats.light_fields.light_field_formats import find_light_field, is_light_field, open_light_field
 from iibr_core.formats.light_fields.views import read_views
-from iibr_core.formats.quilts import Quilt, lay_out
+from iibr_core.formats.quilts import MAX_USUAL_SIDE_PX, Quilt, lay_out, quilt_for, quilt_named, tagged
 from iibr_core.types import GridShape, ImageSize, InputError
 
 HEIGHT, WIDTH = 6, 9
@@ -41,7 +39,7 @@ def write_quilt(folder: Path, quilt: Quilt, tiles: list[np.ndarray]) -> Path:
     return path
 
 
-def test_quilts_are_read_as_they_are_written_and_decoded_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_quilts_are_read_as_they_are_written_and_decoded_once(tmp_path, monkeypatch) -> None:
     quilt, tiles = Quilt(3, 2, ImageSize(2 * HEIGHT + 1, 3 * WIDTH + 2), WIDTH / HEIGHT), pictures(6)
     path = write_quilt(tmp_path, quilt, tiles)
     assert is_light_field(path)
@@ -55,7 +53,7 @@ def test_quilts_are_read_as_they_are_written_and_decoded_once(tmp_path: Path, mo
     assert decoded == [PictureSource(path)]
 
 
-def test_the_inner_views_of_a_lytros_lenslet_image_are_read(tmp_path: Path) -> None:
+def test_the_inner_views_of_a_lytros_lenslet_image_are_read(tmp_path) -> None:
     whole = RNG.integers(0, 256, (14 * 3, 14 * 5, 3), np.uint8)
     Image.fromarray(whole).save(tmp_path / "img_1_eslf.png")
     views = read_back(tmp_path / "img_1_eslf.png")
@@ -65,7 +63,6 @@ def test_the_inner_views_of_a_lytros_lenslet_image_are_read(tmp_path: Path) -> N
 
 
 def smooth(height: int = 48, width: int = 64, shift: int = 0) -> np.ndarray:
-    """Return a picture that lossy formats keep."""
     y, x = np.mgrid[0:height, 0:width]
     return np.stack([127 + 100 * np.sin((x + shift) / 9), 2.0 * y, x + 0.0 * y], -1).astype(np.uint8)
 
@@ -108,17 +105,11 @@ STEREO: dict[str, tuple[str, Callable[..., object], str]] = {
     "stereo jpeg": ("a.jpg", write_stereo_jpeg, "MPO stereo"),
     "leia": ("a.jpg", lambda path, *eyes: path.write_bytes(leia_image(*eyes)), "Leia stereo"),
     "lif": ("a.lif", lambda path, *eyes: path.write_bytes(leia_image(*eyes)), "Leia stereo"),
-    "full": (
-        "a_LRF_Full_SBS.png",
-        lambda path, *eyes: Image.fromarray(np.hstack(eyes)).save(path),
-        "side-by-side stereo",
-    ),
-    "over": ("a_TB.png", lambda path, *eyes: Image.fromarray(np.vstack(eyes)).save(path), "side-by-side stereo"),
 }
 
 
 @pytest.mark.parametrize("kind", STEREO)
-def test_stereo_photos_have_two_views_and_show_the_left_one(tmp_path: Path, kind: str) -> None:
+def test_stereo_photos_have_two_views_and_show_the_left_one(tmp_path, kind) -> None:
     name, write, layout = STEREO[kind]
     left, right = smooth(), smooth(shift=4)
     path = tmp_path / name
@@ -134,7 +125,7 @@ def test_stereo_photos_have_two_views_and_show_the_left_one(tmp_path: Path, kind
     np.testing.assert_allclose(photo.pixels * 255, views[0, 0], atol=0.51)
 
 
-def test_jpegs_with_other_pictures_are_no_stereo(tmp_path: Path) -> None:
+def test_jpegs_with_other_pictures_are_no_stereo(tmp_path) -> None:
     """Gain maps and previews are stored the same way."""
     write_mpo(tmp_path / "phone.jpg", smooth(), smooth(24, 32))
     assert find_light_field(tmp_path / "phone.jpg") is None
@@ -143,7 +134,7 @@ def test_jpegs_with_other_pictures_are_no_stereo(tmp_path: Path) -> None:
         find_light_field(tmp_path / "single.mpo")
 
 
-def test_raw_light_fields_are_refused_with_programs_that_decode_them(tmp_path: Path) -> None:
+def test_raw_light_fields_are_refused_with_programs_that_decode_them(tmp_path) -> None:
     path = tmp_path / "IMG_0001.lfr"
     path.write_bytes(b"\x89LFP\r\n\x1a\n" + bytes(100))
     for read in (open_light_field, read_photo):
@@ -151,16 +142,44 @@ def test_raw_light_fields_are_refused_with_programs_that_decode_them(tmp_path: P
             read(path)
 
 
-def test_a_leia_image_contains_inverse_depth(tmp_path: Path) -> None:
+def test_a_leia_image_contains_inverse_depth(tmp_path) -> None:
     """White is near; a single view is a photo with depth."""
     grey = np.tile(np.arange(64, dtype=np.uint8) * 3, (48, 1))
     inner = {"inv_z_map": {"blob_id": 11, "min": 0.4, "max": 0.01}}
     path = tmp_path / "a.jpg"
     path.write_bytes(leia_image(smooth(), smooth(shift=4), (11, jpeg(grey)), **inner))
     depth = read_embedded(path)
-    assert depth is not None
     assert depth.format == "Leia"
     assert depth.estimate.meaning == "inverse depth"
     np.testing.assert_allclose(depth.estimate.values, grey / 255, atol=0.02)
     path.write_bytes(leia_image(smooth(), smooth(shift=4)))
     assert read_embedded(path) is None
+
+
+@pytest.mark.parametrize("view", [ImageSize(64, 96), ImageSize(3000, 4000), ImageSize(5000, 300), ImageSize(900, 9)])
+def test_for_any_display_views_keep_their_shape_and_are_never_larger(view) -> None:
+    quilt = quilt_for(None, view)
+    assert (quilt.aspect, quilt.views) == (view.width / view.height, 48)
+    assert max(quilt.size) <= MAX_USUAL_SIDE_PX + 8
+    assert all(1 <= side <= full for side, full in zip(quilt.tile, view))
+    if view.width > 900:
+        assert quilt.tile.width / quilt.tile.height == pytest.approx(quilt.aspect, rel=0.03)
+
+
+def test_views_are_laid_out_from_the_lower_left_and_the_remainder_stays_black() -> None:
+    quilt = Quilt(3, 2, ImageSize(9, 13), 1.0)
+    whole = lay_out(quilt, [np.full((4, 4, 3), 10 * (view + 1), np.uint8) for view in range(6)])
+    assert (whole[8, 0, 0], whole[8, 11, 0], whole[1, 0, 0]) == (10, 30, 40)
+    assert not whole[0].any()
+    assert not whole[:, 12].any()
+    with pytest.raises(ValueError, match="zip"):
+        lay_out(quilt, [np.zeros((4, 4, 3), np.uint8)] * 5)
+
+
+def test_a_name_states_the_quilt_and_gets_one_tag() -> None:
+    quilt = quilt_named(Path("a_qs8x6a0.75.png"), ImageSize(60, 80))
+    assert quilt == Quilt(8, 6, ImageSize(60, 80), 0.75)
+    assert tagged(tagged(Path("b/a.png"), quilt.tag), quilt.tag) == Path("b/a_qs8x6a0.75.png")
+    assert quilt_named(Path("a.png"), ImageSize(60, 80)) is None
+    with pytest.raises(InputError, match="too few"):
+        quilt_named(Path("a_qs8x6a0.75.png"), ImageSize(5, 8))

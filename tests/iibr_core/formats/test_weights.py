@@ -1,5 +1,3 @@
-"""Weights on disk: the round trip, and files that are damaged or belong to another model."""
-
 import re
 
 import numpy as np

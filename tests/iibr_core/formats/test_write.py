@@ -1,5 +1,3 @@
-"""Saved pictures: colours, bits, Exif, XMP and settings come back; a full disk leaves the old file."""
-
 import struct
 from io import BytesIO
 
@@ -21,7 +19,7 @@ from iibr_core.formats.images.metadata import (
 )
 from iibr_core.formats.images.photo import read_photo
 from iibr_core.formats.images.picture_kinds import KINDS, PictureFormat
-from iibr_core.formats.images.write import write_image, write_picture
+from iibr_core.formats.images.write import write_picture
 from iibr_core.types import DISPLAY_P3, SRGB
 from tests.iibr_core.formats.test_color_profile import profile_bytes
 
@@ -187,16 +185,6 @@ def test_the_rating_of_a_photo_is_kept_and_places_in_its_file_are_not(tmp_path):
     with Image.open(tmp_path / "b.jpg") as image:
         kept = image.getexif()
     assert (kept.get(0x4746), kept.get(0x4749), kept.get(0x0111)) == (4, 75, None)
-
-
-@pytest.mark.parametrize("shape", [(5, 7, 3), (5, 7), (1, 1, 3)])
-def test_views_come_back_from_png(tmp_path, shape):
-    pixels = np.random.default_rng(1).integers(0, 256, shape, dtype=np.uint8)
-    for values in (pixels, pixels.astype(np.float32) / 255):
-        write_image(tmp_path / "a.png", values, {"Software": "iibr"})
-        with Image.open(tmp_path / "a.png") as image:
-            assert np.array_equal(np.asarray(image), pixels)
-            assert image.text["Software"] == "iibr"
 
 
 def test_exif_of_photos_of_200_megapixels_is_read(tmp_path):

@@ -1,5 +1,3 @@
-"""Large gaps painted by a pipeline from a folder: a tiny random one, saved by the library that reads it."""
-
 import json
 import shutil
 from pathlib import Path

@@ -1,5 +1,3 @@
-"""The photo beyond its frame: continued once, for all views alike."""
-
 import numpy as np
 import pytest
 
@@ -22,7 +20,7 @@ from iibr_core.method.view import Renderer
 from iibr_core.types import GridShape, ImageSize, Margins, ViewOffset
 from tests.iibr_core.scenes import smooth_texture
 
-SIZE = ImageSize(24, 36)
+SIZE = ImageSize(16, 24)
 MARGINS = Margins(2, 5, 3, 4)
 
 
@@ -50,13 +48,11 @@ def line_slowly(colors, pixel):
 
 
 def along_line(line, way):
-    """Return how well a way (x, y) runs along it."""
     angle = np.arctan2(way[1], way[0]) - np.arctan2(line[1], line[0]) / 2
     return np.hypot(*line) ** STRENGTH_POWER * np.cos(angle) ** ANGLE_POWER
 
 
 def extend_slowly(colors, disparity, margins):
-    """Do the same pixel by pixel, from the definitions."""
     height, width = disparity.shape
     places = [(0, x) for x in range(width)] + [(y, width - 1) for y in range(1, height)]
     places += [(height - 1, x) for x in range(width - 2, -1, -1)] + [(y, 0) for y in range(height - 2, 0, -1)]

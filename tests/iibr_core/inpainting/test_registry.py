@@ -1,12 +1,9 @@
-"""What every way of inpainting must do, and where they are found by name."""
-
 import numpy as np
 import pytest
 
 from iibr_core.inpainting.registry import DEFAULT_INPAINTER, INPAINTERS, MODEL_INPAINTERS, load_inpainter
 from iibr_core.method.rays import rays_of_photo
 from iibr_core.method.view import Renderer
-from iibr_core.runtime.work import Cancelled, stoppable
 from iibr_core.types import InputError, ViewOffset
 from tests.iibr_core.scenes import square_before_wall
 
@@ -15,7 +12,6 @@ FORE_PX = 3.0
 
 
 def view_with_holes():
-    """Return what the renderer gives an inpainter, nonsense in the holes."""
     photo, disparity = square_before_wall(60, 80, FORE_PX)
     view = Renderer().render(rays_of_photo(photo.pixels, disparity.values, 2.0, 0), OFFSET)
     view.colors[view.occluded], view.disparity[view.occluded] = np.nan, np.nan
@@ -48,10 +44,3 @@ def test_holes_are_filled_and_nothing_else_changes(name):
     # The square hid what was disoccluded beside it; beyond the frame anything may go on.
     inside = np.s_[15:45, 20:60]
     assert (disparity[inside][hole[inside]] < FORE_PX / 2).all()
-
-
-@pytest.mark.parametrize("name", INPAINTERS)
-def test_a_stop_is_heard(name):
-    colors, disparity, hole, photo_disparity = view_with_holes()
-    with pytest.raises(Cancelled), stoppable(lambda: True):
-        load_inpainter(name)(colors, disparity, hole, photo_disparity, OFFSET)

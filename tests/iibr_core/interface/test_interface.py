@@ -1,5 +1,3 @@
-"""The public Python interface: its examples run, and its numbers are those of the parts behind it."""
-
 import re
 import subprocess
 import sys
@@ -27,7 +25,7 @@ EXAMPLES = [
 
 
 @pytest.fixture
-def photo_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def photo_folder(tmp_path, monkeypatch) -> Path:
     photo, disparity = square_before_wall(60, 80)
     write_image(tmp_path / "photo.png", np.round(255 * photo.pixels).astype(np.uint8))
     write_pfm(tmp_path / "photo_disparity.pfm", disparity.values)
@@ -41,7 +39,7 @@ def square_scene() -> tuple[np.ndarray, np.ndarray]:
 
 
 @pytest.mark.parametrize("example", EXAMPLES, ids=range(len(EXAMPLES)))
-def test_the_examples_of_the_page_run(example: str, photo_folder: Path) -> None:
+def test_the_examples_of_the_page_run(example, photo_folder) -> None:
     exec(compile(example, str(PAGE), "exec"), {})
 
 
@@ -105,7 +103,7 @@ def test_refocusing_is_the_mean_of_the_views_inside_the_aperture() -> None:
     ("disparity", "aperture", "count"),
     [(None, 1.0, 256), (6.0, 0.5, 16), (6.0, 2.0, 40), (6.0, 9.0, 60), (99.0, 2.0, 256)],
 )
-def test_a_wider_blur_takes_more_views(disparity: float | None, aperture: float, count: int) -> None:
+def test_a_wider_blur_takes_more_views(disparity, aperture, count) -> None:
     """4 for each pixel of blur of the middle view, 16 to 256; the aperture ends at the grid's border."""
     made = []
 
@@ -124,7 +122,7 @@ def test_a_wider_blur_takes_more_views(disparity: float | None, aperture: float,
 
 
 @pytest.mark.parametrize("format", iibr.FORMATS)
-def test_saved_fields_open_again_and_are_refocused_from_their_stored_views(format: str, tmp_path: Path) -> None:
+def test_saved_fields_open_again_and_are_refocused_from_their_stored_views(format, tmp_path) -> None:
     pixels, values = square_scene()
     made = iibr.from_arrays(pixels, values).light_field(5, parallax="literal")
     path = tmp_path / ("a_eslf.png" if format == "eslf" else "a")
@@ -161,10 +159,8 @@ def test_views_come_once_the_middle_one_first() -> None:
 
 def test_pictures_of_all_kinds_of_numbers_are_taken() -> None:
     pixels, values = square_scene()
-    one, other = (
-        iibr.from_arrays(pixels, values),
-        iibr.from_arrays((255 * pixels).round().astype("u1"), values, 70.0, "b"),
-    )
+    one = iibr.from_arrays(pixels, values)
+    other = iibr.from_arrays((255 * pixels).round().astype("u1"), values, 70.0, "b")
     np.testing.assert_allclose(one.photo, other.photo, atol=0.51 / 255)
     assert (other.focal_px, other.name) == (70, "b")
     assert one.focal_px == pytest.approx(80 / 2 / np.tan(np.deg2rad(25)))
@@ -204,13 +200,13 @@ def test_what_means_nothing_is_refused_in_one_line(call, tmp_path, monkeypatch) 
 
 
 @pytest.mark.parametrize("size", [(1, 1), (1, 9), (9, 1)])
-def test_the_smallest_photos(size: tuple[int, int]) -> None:
+def test_the_smallest_photos(size) -> None:
     field = iibr.from_arrays(np.full((*size, 3), 0.5), np.zeros(size)).light_field(3)
     assert field.views.shape == (3, 3, *size, 3)
     assert np.isfinite(field.refocus(3.0, 2.0)).all()
 
 
-def test_stopping_raises_cancelled(tmp_path: Path) -> None:
+def test_stopping_raises_cancelled(tmp_path) -> None:
     scene, made = iibr.from_arrays(*square_scene()), 0
     with pytest.raises(iibr.Cancelled):
         scene.light_field(3, should_stop=lambda: True)

@@ -1,21 +1,15 @@
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as stn
 
-from iibr_core.method.candidates import CLOSED_GAP_PX, SEALED_GAP_PX, SLOTS, find_candidates
-from iibr_core.method.rays import RaySet
+from iibr_core.method.candidates import CLOSED_GAP_PX, SEALED_GAP_PX, SLOTS, Candidates, find_candidates
+from iibr_core.method.closed_form import closed_form
+from iibr_core.method.occlusion import entropy
 from iibr_core.surfaces import SAME_SURFACE_PX
-from iibr_core.types import ViewOffset, image_size
-
-FARTHEST = 3.0
-
-
-def ray_set(*disparities, coverage=None):
-    disparities = [np.asarray(d, np.float32) for d in disparities]
-    rays = RaySet(len(disparities), image_size(disparities[0]), FARTHEST)
-    for d in disparities:
-        colors = np.zeros((*d.shape, 3), np.float32)
-        rays.add(ViewOffset(0.0, 0.0), colors, d, np.ones_like(d) if coverage is None else coverage)
-    return rays
+from iibr_core.types import ViewOffset
+from tests.iibr_core.method.ray_sets import ray_set
 
 
 def footprints_slowly(disparity, offset):
@@ -42,7 +36,6 @@ def footprints_slowly(disparity, offset):
 
 
 def total_coverage_slowly(disparity, offset):
-    """Return the area of every target pixel that any footprint covers, counted as often as it is covered."""
     height, width = disparity.shape
     total = np.zeros((height, width))
     for _, left, right, top, bottom in footprints_slowly(disparity, offset):
@@ -56,7 +49,6 @@ def total_coverage_slowly(disparity, offset):
 
 
 def used(candidates, values):
-    """Return the values of used slots, 0 elsewhere."""
     slots = np.arange(values.shape[0])[:, None, None]
     return np.where(slots < candidates.number, values, 0)
 
@@ -66,7 +58,7 @@ def used(candidates, values):
 )
 def test_coverage_agrees_with_a_slow_twin(offset):
     disparity = np.random.default_rng(3).uniform(-0.6, 0.6, (9, 11)).astype(np.float32)
-    found = find_candidates(ray_set(disparity), offset, (0, 9))
+    found = find_candidates(ray_set(disparity, farthest=3.0), offset, (0, 9))
     has_room = found.number < SLOTS
     total = used(found, found.coverage).sum(axis=0)
     assert total[has_room] == pytest.approx(total_coverage_slowly(disparity, offset)[has_room], abs=2e-3)
@@ -74,7 +66,7 @@ def test_coverage_agrees_with_a_slow_twin(offset):
 
 
 def test_a_constant_surface_covers_every_pixel_once():
-    found = find_candidates(ray_set(np.full((8, 9), 0.37)), ViewOffset(1.1, -2.3), (0, 8))
+    found = find_candidates(ray_set(np.full((8, 9), 0.37), farthest=3.0), ViewOffset(1.1, -2.3), (0, 8))
     inside = np.s_[2:6, 2:7]
     assert (found.number[inside] == 1).all()
     assert found.coverage[0][inside] == pytest.approx(1, abs=1e-5)
@@ -83,7 +75,7 @@ def test_a_constant_surface_covers_every_pixel_once():
 
 def test_a_narrow_gap_shows_the_farther_of_both_surfaces_and_nothing_behind_them():
     surfaces = np.tile(np.where(np.arange(12) < 5, 2.0, 1.0), (6, 1))
-    closed, opened = (find_candidates(ray_set(surfaces), ViewOffset(0, s), (0, 6)) for s in (1.0, 2.0))
+    closed, opened = (find_candidates(ray_set(surfaces, farthest=3.0), ViewOffset(0, s), (0, 6)) for s in (1.0, 2.0))
     # The nearer one's last ray lands at 4 - 2 s, the other's first at 5 - s.
     assert used(closed, closed.coverage).sum(axis=0)[:, :7] == pytest.approx(1, abs=1e-5)
     assert (closed.disparity[0, :, 3] == 1.0).all()
@@ -92,14 +84,14 @@ def test_a_narrow_gap_shows_the_farther_of_both_surfaces_and_nothing_behind_them
 
 def test_two_surfaces_make_two_candidates_however_many_rays_land():
     foreground, background = np.full((6, 10), 2.0), np.full((6, 10), 0.25)
-    found = find_candidates(ray_set(background, foreground), ViewOffset(0.0, 1.0), (0, 6))
+    found = find_candidates(ray_set(background, foreground, farthest=3.0), ViewOffset(0.0, 1.0), (0, 6))
     assert (found.number[:, :7] == 2).all()
     assert {*found.source[:2, 3, 3]} == {0, 1}
 
 
 def test_behind_what_the_photo_shows_and_covers_nothing_else_lands():
     foreground, background = np.full((6, 10), 2.0), np.full((6, 10), 0.25)
-    found = find_candidates(ray_set(foreground, background), ViewOffset(0.0, 1.0), (0, 6))
+    found = find_candidates(ray_set(foreground, background, farthest=3.0), ViewOffset(0.0, 1.0), (0, 6))
     assert (found.source[0, :, :7] == 0).all()
     assert (found.number[:, :7] == 1).all()
     assert (found.source[0, :, 8] == 1).all(), "the foreground has moved away"
@@ -108,19 +100,19 @@ def test_behind_what_the_photo_shows_and_covers_nothing_else_lands():
 def test_surfaces_closer_than_the_tolerance_are_one():
     columns = np.arange(8)
     for near in (np.where(columns % 2, 1.0, 1.0 + 0.9 * SAME_SURFACE_PX / 2), np.where(columns < 4, 1.0, 1.0001)):
-        found = find_candidates(ray_set(np.tile(near, (4, 1))), ViewOffset(0.0, 2.0), (0, 4))
+        found = find_candidates(ray_set(np.tile(near, (4, 1)), farthest=3.0), ViewOffset(0.0, 2.0), (0, 4))
         assert (found.number[:, :5] == 1).all()
 
 
 def test_the_rearmost_gives_way_where_slots_run_out():
     layers = [np.full((3, 12), float(d)) for d in range(SLOTS + 2)]
-    found = find_candidates(ray_set(*layers), ViewOffset(0.0, 1.0), (0, 3))
+    found = find_candidates(ray_set(*layers, farthest=3.0), ViewOffset(0.0, 1.0), (0, 3))
     assert sorted(found.disparity[:, 1, 4]) == [*range(2, SLOTS + 2)]
 
 
 def test_bands_do_not_change_what_is_found():
     disparity = (np.arange(20)[:, None] * -0.4 + np.random.default_rng(1).uniform(-2, 2, (20, 15))).astype(np.float32)
-    rays, offset = ray_set(disparity), ViewOffset(1.7, -0.4)
+    rays, offset = ray_set(disparity, farthest=3.0), ViewOffset(1.7, -0.4)
     whole = find_candidates(rays, offset, (0, 20))
     for first, last in ((0, 7), (7, 20), *((row, row + 1) for row in range(20))):
         band = find_candidates(rays, offset, (first, last))
@@ -133,7 +125,7 @@ def test_bands_do_not_change_what_is_found():
 def test_wild_disparity_lands_nowhere_and_harms_nothing(wild):
     disparity = np.zeros((6, 7), np.float32)
     disparity[2, 3] = wild
-    found = find_candidates(ray_set(disparity), ViewOffset(2.0, -1.0), (0, 6))
+    found = find_candidates(ray_set(disparity, farthest=3.0), ViewOffset(2.0, -1.0), (0, 6))
     coverage = used(found, found.coverage).sum(axis=0)
     assert np.isfinite(coverage).all()
     assert coverage[2, 3] < 1e-3
@@ -143,6 +135,50 @@ def test_wild_disparity_lands_nowhere_and_harms_nothing(wild):
 def test_rays_without_coverage_do_not_land():
     coverage = np.zeros((5, 5), np.float32)
     coverage[2, 2] = 0.25
-    found = find_candidates(ray_set(np.zeros((5, 5)), coverage=coverage), ViewOffset(0.0, 1.0), (0, 5))
+    found = find_candidates(ray_set(np.zeros((5, 5)), coverage=coverage, farthest=3.0), ViewOffset(0.0, 1.0), (0, 5))
     assert found.number.sum() == 1
     assert found.coverage[0, 2, 2] == pytest.approx(0.25)
+
+
+def one_ray(pairs):
+    """Return the candidates of a single target ray from (coverage, disparity) pairs."""
+    shape = (SLOTS, 1, 1)
+    coverage, disparity = np.zeros(shape, np.float32), np.zeros(shape, np.float32)
+    for k, (c, d) in enumerate(pairs):
+        coverage[k], disparity[k] = c, d
+    number, source = np.full((1, 1), len(pairs), np.uint8), np.zeros(shape, np.uint8)
+    return Candidates(ViewOffset(0.0, 1.0), 0, number, coverage, disparity, source, np.zeros((1, 1), np.bool_))
+
+
+def weights_slowly(pairs):
+    """Front to back, each surface takes what is left of the pixel."""
+    left, weights = 1.0, [0.0] * len(pairs)
+    for k in sorted(range(len(pairs)), key=lambda k: (-pairs[k][1], k)):
+        weights[k] = min(pairs[k][0], left)
+        left -= weights[k]
+    return weights
+
+
+@given(st.lists(st.tuples(st.floats(2**-10, 3, width=32), st.floats(-100, 100, width=32)), min_size=0, max_size=SLOTS))
+def test_weights_and_their_sum_agree_with_a_slow_twin(pairs):
+    weights, covered = closed_form(one_ray(pairs))
+    assert weights[: len(pairs), 0, 0] == pytest.approx(weights_slowly(pairs), abs=1e-5)
+    assert weights.min() >= 0
+    assert covered[0, 0] == pytest.approx(min(weights.sum(), 1), abs=1e-5)
+
+
+def entropy_in_doubles(weights):
+    weights = weights.astype(np.float64)
+    shares = weights + (1 - np.minimum(weights.sum(axis=0), 1)) / len(weights)
+    return -np.where(shares > 0, shares * np.log(np.maximum(shares, 1e-300)), 0).sum(axis=0) / np.log(len(weights))
+
+
+@given(stn.arrays(np.float32, st.tuples(st.integers(2, 9), st.just(2), st.just(3)), elements=st.floats(0, 1, width=32)))
+def test_entropy_is_from_0_to_1_and_that_of_doubles(weights):
+    """Also of denormal weights, and of sums that rounding carries beyond one."""
+    weights = weights / np.maximum(weights.sum(axis=0, dtype=np.float64), 1).astype(np.float32)
+    assert np.abs(entropy(weights) - entropy_in_doubles(weights)).max() <= 1e-6
+    for factor in (1 + 1e-6, 1e-42):
+        values = entropy(weights * np.float32(factor))
+        assert (values >= 0).all()
+        assert (values <= 1).all()

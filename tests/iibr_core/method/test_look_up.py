@@ -7,13 +7,8 @@ from iibr_core.method.closed_form import closed_form
 from iibr_core.method.look_up import KEYS_A, MIN_TAP_WEIGHT, cubic_on_surface, look_up
 from iibr_core.method.rays import RaySet
 from iibr_core.surfaces import SAME_SURFACE_PX
-from iibr_core.types import ImageSize, ViewOffset, image_size
-
-
-def rays_of(colors, disparity):
-    rays = RaySet(1, image_size(disparity))
-    rays.add(ViewOffset(0.0, 0.0), colors, disparity.astype(np.float32), np.ones(disparity.shape, np.float32))
-    return rays
+from iibr_core.types import ImageSize, ViewOffset
+from tests.iibr_core.method.ray_sets import ray_set
 
 
 def keys_slowly(distance):
@@ -62,7 +57,7 @@ def test_near_edges_pixels_of_the_own_surface_count_as_a_slow_twin_says(share):
 @pytest.mark.parametrize("offset", [ViewOffset(0.0, 0.4), ViewOffset(-1.3, 2.2)])
 def test_one_surface_is_looked_up_by_keys_cubic(offset):
     image = np.random.default_rng(5).uniform(0.3, 0.7, (12, 14, 3)).astype(np.float32)
-    rays = rays_of(image, np.full((12, 14), 0.9))
+    rays = ray_set(np.full((12, 14), 0.9), colors=image)
     candidates = find_candidates(rays, offset, (0, 12))
     colors, disparity, _ = look_up(rays, candidates, closed_form(candidates)[0])
     for y, x in ((4, 4), (6, 7), (8, 9)):
@@ -74,35 +69,21 @@ def test_one_surface_is_looked_up_by_keys_cubic(offset):
 def test_surfaces_that_share_a_pixel_blend_in_linear_light():
     red, blue = np.float32([0.9, 0.1, 0.1]), np.float32([0.1, 0.1, 0.9])
     rays = RaySet(2, ImageSize(3, 3))
+    full = np.ones((3, 3), np.float32)
     for color, disparity in ((red, 1.0), (blue, 0.0)):
-        rays.add(
-            ViewOffset(0.0, 0.0),
-            np.tile(color, (3, 3, 1)),
-            np.full((3, 3), disparity, np.float32),
-            np.ones((3, 3), np.float32),
-        )
-    half = np.full((2, 1, 3), 0.5, np.float32)
-    slots = np.broadcast_to(np.uint8([[[0]], [[1]]]), (2, 1, 3)).copy()
-    candidates = Candidates(
-        ViewOffset(0.0, 0.0),
-        1,
-        np.full((1, 3), 2, np.uint8),
-        half,
-        np.float32(slots == 0),
-        slots,
-        np.zeros((1, 1), np.bool_),
-    )
-    colors, _, _ = look_up(rays, candidates, half)
-    assert colors[0, 1] == pytest.approx(
-        srgb_from_linear((linear_from_srgb(red) + linear_from_srgb(blue)) / 2), abs=1e-5
-    )
+        rays.add(ViewOffset(0.0, 0.0), np.tile(color, (3, 3, 1)), np.float32(disparity) * full, full)
+    half, slots = np.full((2, 1, 3), 0.5, np.float32), np.tile(np.uint8([[[0]], [[1]]]), (1, 1, 3))
+    number, smooth = np.full((1, 3), 2, np.uint8), np.zeros((1, 1), np.bool_)
+    candidates = Candidates(ViewOffset(0.0, 0.0), 1, number, half, np.float32(slots == 0), slots, smooth)
+    light = (linear_from_srgb(red) + linear_from_srgb(blue)) / 2
+    assert look_up(rays, candidates, half)[0][0, 1] == pytest.approx(srgb_from_linear(light), abs=1e-5)
 
 
 def test_no_colour_crosses_a_depth_edge():
     image = np.zeros((8, 12, 3), np.float32)
     image[:, 6:] = 1.0
     disparity = np.where(np.arange(12) < 6, 0.0, 3.0) * np.ones((8, 1))
-    rays = rays_of(image, disparity)
+    rays = ray_set(disparity, colors=image)
     candidates = find_candidates(rays, ViewOffset(0.0, 0.5), (0, 8))
     colors, found, _ = look_up(rays, candidates, closed_form(candidates)[0])
     sole = closed_form(candidates)[0].max(axis=0) > 0.999

@@ -1,7 +1,3 @@
-"""Hard cases at depth edges, each with a bound: views of a foreground before a wall, known from every viewpoint."""
-
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import cache
 
@@ -60,9 +56,7 @@ MAPS: dict[str, Callable[[FloatImage], FloatImage]] = {
 
 CASES = [
     ("disc", "exact", 42.1),
-    ("disc", "blurred", 41.1),
     ("ridge of one pixel", "exact", 46.7),
-    ("ridge of one pixel", "half", 32.7),
     ("mesh", "60 levels", 33.3),
     ("hair", "noise", 35.9),
     ("hair", "blurred", 20.7),
@@ -96,7 +90,7 @@ def view_of(outline: str, offset: ViewOffset) -> FloatImage:
 
 
 @pytest.mark.parametrize(("outline", "given", "least"), CASES)
-def test_views_of_hard_edges_stay_within_bounds(outline: str, given: str, least: float) -> None:
+def test_views_of_hard_edges_stay_within_bounds(outline, given, least) -> None:
     photo, (y, x) = view_of(outline, ViewOffset(0.0, 0.0)), np.indices((HEIGHT, WIDTH))
     exact = np.where(OUTLINES[outline](y, x) > 0, FOREGROUND, SLANT * (x - WIDTH / 2))
     disparity = np.asarray(MAPS[given](exact), np.float32)

@@ -1,9 +1,18 @@
-"""Which views a scene needs, and why."""
+from itertools import product
 
 import numpy as np
 import pytest
 
 from iibr_core.method import memory
+from iibr_core.method.disparity_range import DisparityRange, measure_disparity_range, rounding_step
+from iibr_core.method.farthest_views import (
+    LOOKUP_MARGIN_PX,
+    MAX_MARGIN,
+    farthest_views,
+    outer_views,
+    outer_views_of_grid,
+    outpainting_margins,
+)
 from iibr_core.method.memory import scene_bytes
 from iibr_core.method.plan import (
     EDGE_REACH_PX,
@@ -13,8 +22,8 @@ from iibr_core.method.plan import (
     plan_for_viewing,
     plan_literal,
 )
-from iibr_core.types import TOTAL_PARALLAX, GridShape, InputError
-from tests.iibr_core.scenes import disparity_of, square_before_wall
+from iibr_core.types import TOTAL_PARALLAX, GridShape, InputError, ViewOffset
+from tests.iibr_core.scenes import disparity_of, photo_of, smooth_texture, square_before_wall
 
 
 @pytest.mark.parametrize("scale", [1e-3, 1.0, 1e3])
@@ -80,13 +89,148 @@ def test_less_memory_gives_fewer_views(monkeypatch):
         plan_for_viewing(photo, disparity)
 
 
-def test_a_grid_of_no_views_is_refused_in_one_line():
-    with pytest.raises(InputError, match="grid 3x0") as error:
-        plan_literal(*square_before_wall(), GridShape(0, 3))
-    assert "\n" not in str(error.value)
-
-
 @pytest.mark.parametrize("strength", [float("nan"), float("inf")])
 def test_depth_strength_must_be_finite(strength):
     with pytest.raises(InputError, match="depth strength"):
         plan_for_viewing(*square_before_wall(), PlanOverrides(depth_strength=strength))
+
+
+HEIGHT, WIDTH = 240, 320
+
+
+def wall(noise=0.0, at=0.0):
+    return at + noise * np.random.default_rng(0).normal(size=(HEIGHT, WIDTH)).astype(np.float32)
+
+
+def bird(noise, share=0.008):
+    """Return a wall with something 3 px in front of it that takes this share of the picture."""
+    values = wall(noise)
+    side = round((share * values.size) ** 0.5)
+    values[50 : 50 + side, 200 : 200 + side] += 3.0
+    return values.astype(np.float32)
+
+
+def planned(values, **overrides):
+    return plan_for_viewing(photo_of(smooth_texture(*values.shape)), disparity_of(values), PlanOverrides(**overrides))
+
+
+def drawn_px(values, **overrides):
+    """Return how far the nearest moves against the farthest from the first view to the last, as the field has it."""
+    plan = planned(values, **overrides)
+    field = plan.field_disparity(disparity_of(values)).values
+    return float(field.max() - field.min()) * (max(plan.grid) - 1)
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-4, 0.05])
+@pytest.mark.parametrize("share", [0.001, 0.008, 0.3])
+def test_a_bird_before_a_wall_moves_as_far_as_planned(noise, share):
+    assert drawn_px(bird(noise, share)) == pytest.approx(TOTAL_PARALLAX * WIDTH, rel=1e-3)
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-6, 1e-4, 1e-2])
+@pytest.mark.parametrize("at", [0.0, 5.0, -300.0])
+def test_a_noisy_wall_is_one_view(noise, at):
+    plan = planned(wall(noise, at).astype(np.float32))
+    assert plan.grid == (1, 1)
+    assert plan.disparity_range_px == (0.0, 0.0)
+
+
+def test_slats_are_no_noise():
+    slats = np.tile(np.float32([0, 0, 0, 3, 3, 3]), (HEIGHT, WIDTH // 6))
+    for values in (slats, np.ascontiguousarray(slats.T)):
+        assert measure_disparity_range(values) == DisparityRange(0.0, 3.0, 0.0)
+
+
+@pytest.mark.parametrize("wild", [1e6, -1e6, 50.0])
+@pytest.mark.parametrize("count", [1, 30])
+def test_lone_wild_pixels_neither_set_the_range_nor_move_beyond_it(wild, count):
+    values = bird(0.01)
+    expected = planned(values)
+    places = np.random.default_rng(1).integers(0, values.size, count)
+    values.flat[places] = wild
+    assert planned(values).disparity_scale == pytest.approx(expected.disparity_scale, rel=0.02)
+    assert drawn_px(values) == pytest.approx(TOTAL_PARALLAX * WIDTH, rel=1e-3)
+    assert [reason for reason in planned(values).reasons if f"{len(set(places))} pixels lie far beyond" in reason]
+    assert not [reason for reason in expected.reasons if "beyond" in reason]
+
+
+def test_a_range_that_is_hardly_more_than_noise_moves_less():
+    values = wall(0.1)
+    values[:, WIDTH // 2 :] += 1.0
+    plan = planned(values.astype(np.float32), grid=GridShape(5, 5))
+    assert 0.1 * plan.disparity_scale * 4 == pytest.approx(1.0, rel=0.05)
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (1, 9), (9, 1), (2, 2), (3, 3), (2, 400)])
+def test_small_maps(shape):
+    ramp = np.arange(shape[0] * shape[1], dtype=np.float32).reshape(shape)
+    span = measure_disparity_range(ramp)
+    assert ramp.min() <= span.low <= span.high <= ramp.max()
+    assert span.noise >= 0
+    assert measure_disparity_range(np.full(shape, 7.0, np.float32)) == DisparityRange(7.0, 7.0, 0.0)
+
+
+def test_planes_have_no_noise_and_keep_their_range():
+    y, x = np.mgrid[:HEIGHT, :WIDTH].astype(np.float32)
+    span = measure_disparity_range(0.25 * x - 0.5 * y)
+    assert span.noise == pytest.approx(0, abs=1e-5)
+    assert span.range == pytest.approx(0.25 * WIDTH + 0.5 * HEIGHT, rel=0.05)
+
+
+@pytest.mark.parametrize("steps", [40, 64, 255])
+def test_what_a_map_is_rounded_to_is_found(steps):
+    y, x = np.indices((HEIGHT, WIDTH))
+    smooth = np.hypot(y - 100, x - 150) / 260
+    assert rounding_step(np.round(smooth * steps).astype(np.float32) / steps) == pytest.approx(1 / steps)
+
+
+@pytest.mark.parametrize("values", [wall(), bird(0.0), np.ones((1, 1), np.float32)])
+def test_edges_are_no_rounding(values):
+    assert rounding_step(values) == 0
+
+
+UPPER_LEFT, LOWER_RIGHT = ViewOffset(-2.0, -1.0), ViewOffset(1.0, 3.0)
+
+
+def test_they_are_the_corners_around_all_viewpoints_opposite_ones_in_pairs():
+    found = outer_views([ViewOffset(0.5, -1.0), UPPER_LEFT, ViewOffset(0.0, 2.0), LOWER_RIGHT])
+    assert found == [(-2, -1), (1, 3), (-2, 3), (1, -1)]
+    assert farthest_views(found) == 3
+    assert outer_views([]) == []
+    assert outer_views([ViewOffset(0.0, 2.0)]) == [(0, 2)]
+    assert farthest_views([]) == farthest_views([ViewOffset(0.0, -0.5)]) == 1
+
+
+@pytest.mark.parametrize("grid", [GridShape(*at) for at in product((1, 2, 3, 4, 9), repeat=2)], ids=str)
+def test_those_of_a_grid_are_views_of_it_each_once_and_never_the_photo_s(grid):
+    bottom, right = grid.rows - 1, grid.columns - 1
+    indices = dict.fromkeys([(0, 0), (bottom, right), (0, right), (bottom, 0)])
+    expected = [grid.offset(*index) for index in indices if index != grid.centre]
+    every = [grid.offset(*index) for index in np.ndindex(*grid)]
+    assert outer_views_of_grid(grid) == outer_views(every) == expected
+    assert farthest_views(expected) == max(1.0, *(abs(part) for offset in every for part in offset))
+
+
+@pytest.mark.parametrize("disparity", [1.5, -1.5])
+def test_margins_are_what_views_see_beyond_the_frame(disparity):
+    """The view at (t, s) shows at y what the photo would show at y + d t."""
+    margins = outpainting_margins(np.full((80, 90), disparity, np.float32), [UPPER_LEFT, LOWER_RIGHT])
+    far = {"top": 3.0, "bottom": 1.5, "left": 1.5, "right": 4.5}
+    if disparity < 0:
+        far = {"top": 1.5, "bottom": 3.0, "left": 4.5, "right": 1.5}
+    assert margins._asdict() == {side: int(np.ceil(reach)) + LOOKUP_MARGIN_PX for side, reach in far.items()}
+
+
+def test_each_side_s_own_disparity_counts_and_nothing_where_no_view_looks_out():
+    disparity = np.zeros((40, 400), np.float32)
+    disparity[:, -1] = 2.0
+    assert outpainting_margins(disparity, [UPPER_LEFT, LOWER_RIGHT]) == (0, 0, 0, 6 + LOOKUP_MARGIN_PX)
+    assert outpainting_margins(disparity, [ViewOffset(0.0, -3.0)]) == (0, 0, 0, 0)
+
+
+def test_margins_are_bounded_and_wild_pixels_do_not_count():
+    wide = outpainting_margins(np.full((80, 120), 50.0, np.float32), [UPPER_LEFT, LOWER_RIGHT])
+    assert wide == (MAX_MARGIN * 80, MAX_MARGIN * 80, MAX_MARGIN * 120, MAX_MARGIN * 120)
+    disparity = np.zeros((400, 400), np.float32)
+    disparity[0, :3] = 9.0
+    assert outpainting_margins(disparity, [UPPER_LEFT, LOWER_RIGHT]).top == 0

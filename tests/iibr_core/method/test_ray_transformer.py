@@ -1,5 +1,3 @@
-"""The transformer: its arithmetic against torch, and what the shipped weights are worth for each kind of edge."""
-
 from collections import defaultdict
 
 import numpy as np
@@ -12,7 +10,6 @@ from iibr_core.method.ambiguous_rays import (
     FAINT_WEIGHT,
     FEATURES,
     HYPOTHESES,
-    SHARE,
     AmbiguousRays,
     blend,
     find_ambiguous_rays,
@@ -26,7 +23,7 @@ from iibr_core.method.ray_transformer import TrainedWeights, shipped_transformer
 from iibr_core.method.rays import rays_of_photo
 from iibr_core.method.update_loop import update
 from iibr_core.method.view import Renderer
-from iibr_core.training.degradation import blur, degrade
+from iibr_core.training.degradation import degrade
 from iibr_core.training.model import RayTransformer
 from iibr_core.training.scenes.random_scene import random_scene
 from iibr_core.training.scenes.raycast import cast, render
@@ -39,7 +36,6 @@ OFFSETS = [ViewOffset(0.0, 4.0), ViewOffset(-3.0, -2.0)]
 CORNERS = [ViewOffset(-4.0, -4.0), ViewOffset(4.0, 4.0)]
 MAPS = {
     "exact": lambda photo, d, rng: d,
-    "blurred": lambda photo, d, rng: refine(photo, blur(d, 2.0)),
     "degraded": lambda photo, d, rng: refine(photo, degrade(d, rng, RADIUS)),
 }
 LEAST_GAIN = {
@@ -47,9 +43,6 @@ LEAST_GAIN = {
     ("exact", "covered in part"): 0.2,
     ("exact", "beside what is inpainted"): 0.6,
     ("exact", "between surfaces"): 0.5,
-    ("blurred", "all"): 0.25,
-    ("blurred", "covered in part"): 0.3,
-    ("blurred", "between surfaces"): 0.3,
     ("degraded", "all"): 0.6,
     ("degraded", "beside what is inpainted"): 0.8,
     ("degraded", "between surfaces"): 0.6,
@@ -87,7 +80,6 @@ def squared_errors(seed, spoil):
 
 @pytest.fixture(scope="module")
 def gains():
-    """Return the dB that T gains over the closed form, by map and kind of ray."""
     gains = {}
     for name, spoil in MAPS.items():
         sums = defaultdict(lambda: np.zeros(2))
@@ -118,7 +110,6 @@ def random_ambiguous(rays=200, seed=0):
 
 @pytest.fixture
 def model():
-    """Return T with random weights all through, as if trained."""
     torch.manual_seed(0)
     model = RayTransformer().eval()
     for parameter in model.parameters():
@@ -139,7 +130,6 @@ def weights_of(model, ambiguous, order=slice(None)):
 
 @pytest.mark.parametrize("rays", [1, 63, 64, 200])
 def test_compiled_weights_are_those_of_the_model_and_sum_to_one(model, compiled, rays):
-    """For numbers of rays that fill blocks and do not."""
     ambiguous = random_ambiguous(rays)
     weights = compiled(ambiguous)
     assert weights == pytest.approx(weights_of(model, ambiguous), abs=1e-5)
@@ -148,7 +138,7 @@ def test_compiled_weights_are_those_of_the_model_and_sum_to_one(model, compiled,
     assert weights.min() >= 0
 
 
-@pytest.mark.parametrize("factor", [1e4, 1e30, -1e30])
+@pytest.mark.parametrize("factor", [1e30, -1e30])
 def test_weights_stay_weights_however_large_the_scores_are(model, tmp_path, factor):
     with torch.no_grad():
         model.score.weight *= factor
@@ -164,9 +154,3 @@ def test_weights_of_a_ray_do_not_depend_on_the_others_nor_on_the_order_of_hypoth
     ambiguous, order = random_ambiguous(), np.array([3, 0, 4, 1, 5, 2])
     assert (compiled(ambiguous)[37:] == compiled(ambiguous.chosen(np.arange(37, 200)))).all()
     assert weights_of(model, ambiguous, order) == pytest.approx(weights_of(model, ambiguous)[:, order], abs=1e-5)
-
-
-def test_untrained_it_is_the_closed_form():
-    ambiguous = random_ambiguous()
-    ambiguous.features[..., SHARE] = np.eye(HYPOTHESES)[0]
-    assert weights_of(RayTransformer(), ambiguous)[:, 0].min() > 0.9

@@ -1,11 +1,14 @@
-"""What a ray set keeps beside its rays, against slow twins."""
-
 import numpy as np
 import pytest
 
-from iibr_core.method.rays import CELL_PX, GUARD_BAND_PX, RaysBehind, RaySet
+from iibr_core.method.rays import CELL_PX, GUARD_BAND_PX, RaysBehind, RaySet, rays_of_photo
+from iibr_core.method.update_loop import update
+from iibr_core.method.view import Renderer
 from iibr_core.surfaces import EDGE_PX, SAME_SURFACE_PX, SMOOTH_SHARE
 from iibr_core.types import ImageSize, Margins, ViewOffset
+from tests.iibr_core.method.ray_sets import filled_rays
+from tests.iibr_core.red_inpainter import paint_red
+from tests.iibr_core.scenes import square_before_wall
 
 FARTHEST, CENTRE = 2.0, ViewOffset(0.0, 0.0)
 SURFACE_STEP = SAME_SURFACE_PX / FARTHEST
@@ -27,13 +30,8 @@ def slow_near_edge(disparity):
 
 def slow_cells(values, of_cell):
     """Return what of_cell makes of the pixels of each cell."""
-    height, width = values.shape
-    return np.array(
-        [
-            [of_cell(values[y : y + CELL_PX, x : x + CELL_PX]) for x in range(0, width, CELL_PX)]
-            for y in range(0, height, CELL_PX)
-        ]
-    )
+    rows, columns = (range(0, side, CELL_PX) for side in values.shape)
+    return np.array([[of_cell(values[y : y + CELL_PX, x : x + CELL_PX]) for x in columns] for y in rows])
 
 
 def slow_steps(disparity):
@@ -79,13 +77,11 @@ def test_what_was_made_up_in_front_of_what_the_photo_shows_is_left_out_and_what_
         d = made_up[y, x]
         v, u = round(y + d * offset.t), round(x + d * offset.s)
         if v in range(20) and u in range(24) and d > photo[v, u] + EDGE_PX / FARTHEST:
-            expected[
-                max(y - GUARD_BAND_PX, 0) : y + GUARD_BAND_PX + 1, max(x - GUARD_BAND_PX, 0) : x + GUARD_BAND_PX + 1
-            ] = 0
+            top, left = max(y - GUARD_BAND_PX, 0), max(x - GUARD_BAND_PX, 0)
+            expected[top : y + GUARD_BAND_PX + 1, left : x + GUARD_BAND_PX + 1] = 0
     np.testing.assert_array_equal(rays.arrays.coverage, [np.ones(size), coverage, expected])
-    np.testing.assert_array_equal(
-        rays.cells.high[2], slow_cells(np.where(expected > 0, made_up, np.float32(-np.inf)), np.max)
-    )
+    seen = np.where(expected > 0, made_up, np.float32(-np.inf))
+    np.testing.assert_array_equal(rays.cells.high[2], slow_cells(seen, np.max))
     assert 0 < expected.sum() < coverage.sum()
 
 
@@ -112,3 +108,53 @@ def test_what_was_filled_in_a_view_joins_within_the_margins_with_what_lies_behin
         rays.in_view(expected)[:] = shown
         np.testing.assert_array_equal(image, expected)
     assert (rays.photo_disparity == np.full(view, 9)).all()
+
+
+LEFT, RIGHT = ViewOffset(0.0, -2.0), ViewOffset(0.0, 2.0)
+
+
+@pytest.fixture
+def rays():
+    photo, disparity = square_before_wall(30, 40, 3.0)
+    return rays_of_photo(photo.pixels, disparity.values, 2.0, 2)
+
+
+def test_what_a_view_disoccluded_has_joined_the_rays_when_it_is_yielded(rays):
+    photo_images, renderer = len(rays), Renderer()
+    expected = renderer.render(rays, LEFT)
+    for count, (offset, view) in enumerate(update(rays, [LEFT, RIGHT], renderer), 1):
+        assert len(rays) == photo_images + count
+        if offset == LEFT:
+            np.testing.assert_array_equal(view.colors, expected.colors)
+            added = rays.arrays.colors[-1], rays.arrays.disparity[-1], rays.arrays.coverage[-1]
+            for one, filled in zip(added, filled_rays(view)):
+                np.testing.assert_array_equal(one, filled)
+            assert (added[2] > 0)[view.occluded].all()
+    again = renderer.render(rays, LEFT)
+    assert expected.occluded.any()
+    assert not again.occluded.any(), "a hole that was inpainted is none any more"
+    assert again.inpainted[expected.occluded].all()
+
+
+def test_the_inpainter_decides_what_joins(rays):
+    ((_, view),) = update(rays, [LEFT], Renderer(inpaint=paint_red))
+    colors, disparity, filled = filled_rays(view)
+    assert (filled[view.occluded] == 1).all()
+    assert (colors[filled == 1] == (1, 0, 0)).all()
+    assert (disparity[filled == 1] == -9).all()
+    np.testing.assert_array_equal(rays.arrays.disparity[-1] == -9, filled)
+
+
+def test_what_was_inpainted_farther_back_does_not_show_through_a_hole_in_the_photos_surface():
+    disparity = np.full((30, 40), 3.0, np.float32)
+    disparity[:, 18:26] = 6.0
+    card, pole, wall = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+    colors = np.where(disparity[..., None] > 3, np.float32(pole), np.float32(card))
+    rays, renderer = rays_of_photo(colors, disparity, 2.0, 2), Renderer()
+    everywhere = np.ones_like(disparity)
+    rays.add(LEFT, everywhere[..., None] * np.float32(wall), 0 * everywhere, everywhere)
+    assert (renderer.render(rays, RIGHT).colors[15, 15:19] == wall).all()
+    ((_, view),) = update(rays, [RIGHT], renderer)
+    assert (view.occluded & view.inpainted)[15, 15:19].all()
+    np.testing.assert_allclose(view.colors[15, 15:19], np.tile(np.float32(card), (4, 1)), atol=1e-5)
+    np.testing.assert_array_equal(renderer.render(rays, RIGHT).colors[15, 15:19], view.colors[15, 15:19])

@@ -5,9 +5,12 @@ from iibr_core.method import candidates as candidates_module
 from iibr_core.method.candidates import find_candidates
 from iibr_core.method.closed_form import closed_form
 from iibr_core.method.look_up import look_up
-from iibr_core.method.rays import CELL_PX, RaySet
+from iibr_core.method.rays import CELL_PX
 from iibr_core.method.smooth_cells import find_smooth_cells
-from iibr_core.types import ImageSize, ViewOffset, image_size
+from iibr_core.method.steep_surfaces import BELOW, MIN_RUN, RIGHT, STEEP_SHARE, is_joined, join_steep_rays
+from iibr_core.surfaces import SLOPE_SHARE
+from iibr_core.types import ImageSize, ViewOffset
+from tests.iibr_core.method.ray_sets import ray_set
 from tests.iibr_core.scenes import smooth_texture
 
 SIZE = ImageSize(48, 64)
@@ -18,19 +21,12 @@ STEP = np.where(X < 30, 0.0, 2.0).astype(np.float32) + 0.01 * Y
 OFFSETS = [ViewOffset(0.0, 1.0), ViewOffset(-1.3, 0.4), ViewOffset(2.0, -2.0)]
 
 
-def ray_set(disparity):
-    rays = RaySet(2, image_size(disparity), 2.0)
-    rays.add(
-        ViewOffset(0.0, 0.0), smooth_texture(*disparity.shape), disparity.astype(np.float32), np.ones_like(disparity)
-    )
-    return rays
+def textured(disparity):
+    return ray_set(disparity, colors=smooth_texture(*SIZE), farthest=2.0, room=1)
 
 
-def by_pixel(cells, rows):
-    """Return (N, W) from cells, of target rows [first, last)."""
-    grown = cells.repeat(CELL_PX, axis=0).repeat(CELL_PX, axis=1)
-    first = rows[0] % CELL_PX
-    return grown[first : first + rows[1] - rows[0], : SIZE[1]]
+def by_pixel(cells):
+    return cells.repeat(CELL_PX, axis=0).repeat(CELL_PX, axis=1)[: SIZE[0], : SIZE[1]]
 
 
 def nowhere_smooth(rays, offset, rows, columns):
@@ -51,9 +47,9 @@ def both_ways(monkeypatch, rays, offset):
 
 @pytest.mark.parametrize("offset", OFFSETS)
 def test_on_a_plane_every_ray_is_followed_to_its_exact_disparity(offset):
-    rays = ray_set(SLOPE)
+    rays = textured(SLOPE)
     candidates = find_candidates(rays, offset, (0, SIZE[0]))
-    smooth = by_pixel(candidates.smooth, (0, SIZE[0]))
+    smooth = by_pixel(candidates.smooth)
     # d = a + b x + c y on the surface, seen at (x + d s, y + d t): d (1 - b s - c t) = a + b x + c y
     exact = SLOPE / (1 - 0.02 * offset.s + 0.01 * offset.t)
     assert smooth.mean() > 0.4  # the border takes the rest of so small a picture
@@ -65,8 +61,8 @@ def test_on_a_plane_every_ray_is_followed_to_its_exact_disparity(offset):
 @pytest.mark.parametrize("disparity", [SLOPE, BUMPS, STEP], ids=["slope", "bumps", "step"])
 @pytest.mark.parametrize("offset", OFFSETS)
 def test_following_back_gives_what_landing_gives(disparity, offset, monkeypatch):
-    (own, colors), (landed, expected) = both_ways(monkeypatch, ray_set(disparity), offset)
-    smooth = by_pixel(own.smooth, (0, SIZE[0]))
+    (own, colors), (landed, expected) = both_ways(monkeypatch, textured(disparity), offset)
+    smooth = by_pixel(own.smooth)
     assert smooth.any()
     assert not landed.smooth.any()
     assert (landed.number[smooth] == 1).all()
@@ -81,19 +77,77 @@ def test_following_back_gives_what_landing_gives(disparity, offset, monkeypatch)
 def test_inpainted_rays_matter_only_in_front(disparity, is_smooth):
     photo, at = np.zeros(SIZE, np.float32), ViewOffset(0.0, 1.0)
     photo[:, 32:36] = 20  # hides from the photo what is in front of its wall there
-    rays = ray_set(photo)
+    rays = textured(photo)
     filled = np.zeros(SIZE, np.float32)
     filled[20:24, 20:24] = 1
     rays.add(at, np.zeros((*SIZE, 3), np.float32), np.full(SIZE, disparity, np.float32), filled)
     smooth, _ = find_smooth_cells(rays, at, (0, SIZE[0]))
-    assert by_pixel(smooth, (0, SIZE[0]))[20:24, 20:24].all() == is_smooth
-    assert by_pixel(smooth, (0, SIZE[0]))[8:12, 48:52].all()
+    assert by_pixel(smooth)[20:24, 20:24].all() == is_smooth
+    assert by_pixel(smooth)[8:12, 48:52].all()
 
 
-@pytest.mark.parametrize("rows", [(0, 5), (3, 4), (17, 48)])
-def test_bands_do_not_change_what_is_followed(rows):
-    rays, offset = ray_set(BUMPS), ViewOffset(-1.3, 0.4)
-    whole, band = find_candidates(rays, offset, (0, SIZE[0])), find_candidates(rays, offset, rows)
-    inner = slice(*rows)
-    assert (by_pixel(band.smooth, rows) == by_pixel(whole.smooth, (0, SIZE[0]))[inner]).all()
-    assert (band.disparity[0] == whole.disparity[0][inner])[band.number > 0].all()
+STEEP_STEP = 0.5
+
+
+def join_slowly(disparity):
+    """Line by line: a step is a surface's if MIN_RUN steps on one side follow it, each as large as the last."""
+    connected = np.zeros(disparity.shape, np.uint8)
+    for bit, lines, marked in ((RIGHT, disparity, connected), (BELOW, disparity.T, connected.T)):
+        for line, marks in zip(lines, marked):
+            steps = np.diff(line)
+            for x, own in enumerate(steps):
+                for side in (steps[x : x + MIN_RUN + 1], steps[max(x - MIN_RUN, 0) : x + 1]):
+                    sizes = np.abs(side)
+                    alike = np.abs(np.diff(side)) <= SLOPE_SHARE * np.maximum(sizes[1:], sizes[:-1])
+                    if abs(own) > STEEP_SHARE * STEEP_STEP and len(side) > MIN_RUN and alike.all():
+                        marks[x] |= bit
+    return connected
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.05, 0.5])
+@pytest.mark.parametrize("unknown", [0.0, 0.03])
+def test_joined_rays_against_a_slow_twin(noise, unknown):
+    random = np.random.default_rng(2)
+    y, x = np.mgrid[:24, :31]
+    disparity = (0.4 * x - 0.7 * y + noise * random.normal(size=y.shape)).astype(np.float32)
+    disparity[:, 20:] += 6
+    disparity[random.random(disparity.shape) < unknown] = np.nan
+    connected = join_steep_rays(disparity, STEEP_STEP)
+    assert (connected == join_slowly(disparity)).all()
+    assert (connected > 0).mean() > 0.8 or noise > 0
+    either = is_joined(connected)
+    assert either[1:, 1:].sum() == sum(
+        bool(connected[y, x] or connected[y, x - 1] & RIGHT or connected[y - 1, x] & BELOW)
+        for y in range(1, 24)
+        for x in range(1, 31)
+    )
+
+
+@pytest.mark.parametrize("slope", [-3.0, -0.9, -0.6, -0.3, 0.3, 0.6, 0.8])
+@pytest.mark.parametrize("along", ["rows", "columns"])
+def test_a_steep_plane_is_one_closed_surface_of_exact_disparity(slope, along):
+    disparity = np.tile(slope * (np.arange(60, dtype=np.float32) - 30), (60, 1))
+    offset, turn = (ViewOffset(0.0, 1.0), np.array) if along == "rows" else (ViewOffset(1.0, 0.0), np.transpose)
+    found = find_candidates(ray_set(np.ascontiguousarray(turn(disparity))), offset, (0, 60))
+    # d = slope (x + d - 30), seen at x
+    x = np.arange(60)
+    exact = slope * (x - 30) / (1 - slope)
+    source = x + exact
+    inside = (source > 4) & (source < 55) & (x > 2) & (x < 57)
+    assert inside.sum() > 8
+    count, disparities = turn(found.number), turn(found.disparity[0])
+    weights = turn(closed_form(found)[1])
+    assert (count[20:40, inside] == 1).all()
+    assert weights[20:40, inside] == pytest.approx(1, abs=1e-3)
+    assert disparities[20:40, inside] == pytest.approx(np.broadcast_to(exact[inside], (20, inside.sum())), abs=0.02)
+
+
+def test_a_steep_surface_is_torn_where_it_ends():
+    """Behind a steep slope's last ray lies the wall: between both nothing is known."""
+    x = np.arange(80, dtype=np.float32)
+    disparity = np.tile(np.where(x < 40, 0.8 * (40 - x), -9.0), (12, 1)).astype(np.float32)
+    found = find_candidates(ray_set(disparity), ViewOffset(0.0, 1.0), (0, 12))
+    shown = closed_form(found)[1][6]
+    # The slope's last ray, 39, lands on 38.2; the wall's first on 49.
+    assert shown[41:48] == pytest.approx(0)
+    assert shown[20:38] == pytest.approx(1, abs=1e-3)

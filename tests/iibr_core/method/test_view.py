@@ -1,5 +1,3 @@
-"""One view: what covers a pixel in part, what is inpainted, and properties that hold for every photo and disparity."""
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -16,8 +14,7 @@ from iibr_core.method.update_loop import update
 from iibr_core.method.view import Renderer
 from iibr_core.surfaces import EDGE_PX
 from iibr_core.types import GridShape, ImageSize, Margins, ViewOffset
-from tests.iibr_core.method.filled_rays import filled_rays
-from tests.iibr_core.red_inpainter import paint_red
+from tests.iibr_core.method.ray_sets import filled_rays
 from tests.iibr_core.scenes import smooth_texture
 
 FOREGROUND, WALL = np.float32([0.9, 0.6, 0.3]), np.float32([0.1, 0.2, 0.5])
@@ -61,14 +58,6 @@ def test_an_edge_beside_a_gap_is_the_front_over_what_was_inpainted(share, offset
     assert view.inpainted[beside_gap] == (share < 0.5)
     rest = np.r_[8 : FIRST - 1 + moved, LAST + 1 + moved : WIDTH - 8]
     assert row[rest] == pytest.approx(np.tile(WALL, (len(rest), 1)), abs=5e-3), "nothing of the foreground stays behind"
-
-
-def test_what_is_inpainted_shows_beside_the_edge_and_joins_without_what_comes_over_it():
-    rays = bar(0.3)
-    ((_, view),) = update(rays, [RIGHT], Renderer(inpaint=paint_red))
-    light = 0.3 * linear_from_srgb(FOREGROUND) + 0.7 * linear_from_srgb(np.float32([1, 0, 0]))
-    assert view.colors[HEIGHT // 2, LAST - 6] == pytest.approx(srgb_from_linear(light), abs=5e-3)
-    assert (rays.arrays.colors[-1][rays.arrays.coverage[-1] > 0] == (1, 0, 0)).all()
 
 
 @pytest.mark.parametrize("is_upright", [True, False])

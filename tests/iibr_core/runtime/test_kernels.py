@@ -1,5 +1,3 @@
-"""Compiled kernels on disk, in a small copy of the package whose files are edited between two processes."""
-
 import os
 import shutil
 import subprocess
@@ -38,7 +36,7 @@ UNPRIVILEGED = ("setpriv", "--bounding-set=-all", "--inh-caps=-all") if os.geteu
 
 
 @pytest.fixture
-def package(tmp_path: Path) -> Path:
+def package(tmp_path) -> Path:
     """A copy of the package with what kernels need, and one kernel that uses things of other files."""
     source, copy = Path(iibr_core.__file__).parent, tmp_path / "iibr_core"
     for name in ("__init__", "runtime/__init__", "runtime/compiling", "runtime/kernels", "runtime/scalars"):
@@ -52,13 +50,9 @@ def package(tmp_path: Path) -> Path:
 def encode(package: Path, *before: str, **environment: str) -> tuple[float, bool]:
     """Run the kernel in a new process: its value, and whether it was compiled. before: words that start Python."""
     clean = {name: value for name, value in os.environ.items() if not name.startswith(("NUMBA_", "IIBR_"))}
-    done = subprocess.run(
-        [*before, sys.executable, "-B", "-c", CALL],
-        env={**clean, "PYTHONPATH": str(package.parent), **environment},
-        cwd=package.parent,
-        capture_output=True,
-        text=True,
-    )
+    command, here = [*before, sys.executable, "-B", "-c", CALL], package.parent
+    environment = {**clean, "PYTHONPATH": str(here), **environment}
+    done = subprocess.run(command, env=environment, cwd=here, capture_output=True, text=True)
     assert (done.returncode, done.stderr) == (0, "")
     value, *messages = done.stdout.strip().split("|")
     assert set(messages) <= {COMPILING}
@@ -69,7 +63,7 @@ def kernels_in(folder: Path) -> dict[str, bytes]:
     return {path.name: path.read_bytes() for path in folder.rglob("*.nb?")}
 
 
-def test_kernels_are_kept_and_compiled_again_where_an_inlined_file_is_edited(package: Path) -> None:
+def test_kernels_are_kept_and_compiled_again_where_an_inlined_file_is_edited(package) -> None:
     assert encode(package) == (0.01292, True)
     files = kernels_in(package / "_kernels").keys()
     (package / "other.py").write_text("GAIN = 3.0\n")

@@ -1,6 +1,4 @@
-"""Work in bands: everything is done once, in any number of bands alike, and it ends soon after it is told to."""
-
-import math
+import itertools
 import threading
 
 import numpy as np
@@ -72,26 +70,17 @@ def test_the_number_of_bands_changes_no_bit(name, request):
         np.testing.assert_array_equal(part, expected)
 
 
-class StopAt:
-    """A should_stop that is true from the n-th question on; counts them."""
-
-    def __init__(self, n=math.inf):
-        self.n, self.asked = n, 0
-
-    def __call__(self):
-        self.asked += 1
-        return self.asked >= self.n
-
-
 @pytest.mark.usefixtures("narrow")
 @pytest.mark.parametrize("name", STAGES)
 def test_a_stage_asks_for_every_band_and_ends_wherever_it_is_told_to(name):
-    watch = StopAt()
-    with stoppable(watch):
+    questions = itertools.count()
+    with stoppable(lambda: next(questions) < 0):
         STAGES[name]()
-    assert watch.asked >= (3 if name == "unknown depth" else SIZE[0] // 7)
-    for n in (1, watch.asked // 2, watch.asked):
-        with pytest.raises(Cancelled), stoppable(StopAt(n)):
+    asked = next(questions)
+    assert asked >= (3 if name == "unknown depth" else SIZE[0] // 7)
+    for last in (1, asked // 2, asked):
+        questions = itertools.count(1)
+        with pytest.raises(Cancelled), stoppable(lambda last=last, questions=questions: next(questions) >= last):
             STAGES[name]()
 
 
@@ -128,7 +117,6 @@ def test_results_come_in_order_and_errors_come_through(threads):
 
 @pytest.mark.usefixtures("narrow")
 def test_views_under_way_end_with_those_who_take_them():
-    """As after Ctrl-C, though nobody said stop."""
     began, ended = threading.Event(), []
 
     def view(number):

@@ -24,9 +24,7 @@ def disparity_of(values: np.ndarray) -> Disparity:
     return Disparity(np.asarray(values, np.float32), "test")
 
 
-def square_before_wall(
-    height: int = 60, width: int = 80, foreground: float = 2.0, background: float = 0.0
-) -> tuple[Photo, Disparity]:
+def square_before_wall(height=60, width=80, foreground=2.0, background=0.0):
     """A reddish square in front of a bluish, smoothly textured wall; no mixed pixels."""
     pixels = smooth_texture(height, width) * np.float32([0.3, 0.5, 1.0])
     disparity = np.full((height, width), background, np.float32)

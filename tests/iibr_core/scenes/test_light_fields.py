@@ -1,5 +1,3 @@
-"""Light fields from disk: shown as read, and with disparity found from their views where they bring none."""
-
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -15,7 +13,7 @@ from iibr_core.runtime.work import Cancelled, stoppable, watched
 from iibr_core.scenes.lens_limits import focus_limits
 from iibr_core.scenes.light_fields import FROM_VIEWS
 from iibr_core.scenes.opening import results_of
-from iibr_core.scenes.scene import Scene, SceneReady, SceneRequest, Source, ViewReady
+from iibr_core.scenes.scene import SceneReady, SceneRequest, Source, ViewReady
 from tests.viewer.conftest import reduce
 from viewer.model import lens, opening
 from viewer.model.action import do
@@ -24,8 +22,7 @@ from viewer.model.state.app_state import AppState
 WALL_PX, SQUARE_PX = -0.5, 1.25
 
 
-def test_a_light_field_without_disparity_finds_its_own(tmp_path: Path) -> None:
-    """Shown as read, then with a coarse map, then with the final one, which knows how far both surfaces are."""
+def test_a_light_field_without_disparity_finds_its_own(tmp_path) -> None:
     folder = write_two_planes(tmp_path / "field")
     as_read, coarse, final = showings(results_of(SceneRequest(1, Source(str(folder))), lambda: CENTRE))
     assert [ready.scene.has_view_disparity for ready, _ in (as_read, coarse, final)] == [False, True, True]
@@ -33,19 +30,18 @@ def test_a_light_field_without_disparity_finds_its_own(tmp_path: Path) -> None:
     assert final[0].scene.depth_source == FROM_VIEWS
     assert final[0].scene.disparity_range_px == pytest.approx((WALL_PX, SQUARE_PX), abs=0.15)
     for view in (result.view for result in final[1]):
-        assert view.disparity is not None
         assert view.disparity[48, 48] == pytest.approx(SQUARE_PX, abs=0.1)
         assert view.disparity[8, 8] == pytest.approx(WALL_PX, abs=0.1)
 
 
-def test_without_a_window_it_is_shown_once_when_all_is_known(tmp_path: Path) -> None:
+def test_without_a_window_it_is_shown_once_when_all_is_known(tmp_path) -> None:
     request = SceneRequest(1, Source(str(write_two_planes(tmp_path / "field"))), takes_drafts=False)
     ((ready, views),) = showings(results_of(request, lambda: CENTRE))
     assert ready.scene.has_view_disparity
     assert {view.view.is_final for view in views} == {True}
 
 
-def test_the_centre_views_disparity_may_be_given(tmp_path: Path) -> None:
+def test_the_centre_views_disparity_may_be_given(tmp_path) -> None:
     folder, given = write_two_planes(tmp_path / "field"), tmp_path / "given.npy"
     np.save(given, np.full((96, 96), 0.25, np.float32))
     request = SceneRequest(1, Source(str(folder), DepthChoice(file=str(given), file_scale=2.0)), takes_drafts=False)
@@ -54,8 +50,7 @@ def test_the_centre_views_disparity_may_be_given(tmp_path: Path) -> None:
     assert all(view.view.disparity is not None and (view.view.disparity == 0.5).all() for view in views)
 
 
-def test_views_that_tell_nothing_are_shown_as_they_are(tmp_path: Path) -> None:
-    """Too small to be matched: a note says so, and they stay."""
+def test_views_that_tell_nothing_are_shown_as_they_are(tmp_path) -> None:
     folder = tmp_path / "field"
     (folder / "views").mkdir(parents=True)
     for row, column in np.ndindex(2, 3):
@@ -66,31 +61,22 @@ def test_views_that_tell_nothing_are_shown_as_they_are(tmp_path: Path) -> None:
     assert len(views) == 6
 
 
-def test_focus_that_is_set_while_it_loads_stays(tmp_path: Path) -> None:
+def test_focus_that_is_set_while_it_loads_stays(tmp_path) -> None:
     source = Source(str(write_two_planes(tmp_path / "field")))
     state = reduce(AppState(), do(opening.open_source, source))
     results = results_of(SceneRequest(1, source), lambda: CENTRE)
-    state = reduce(state, do(opening.show_scene, 1, first_scene(results)))
+    state = reduce(state, do(opening.show_scene, 1, next(results).scene))
     state = reduce(reduce(state, do(lens.set_aperture, 2.0)), do(lens.set_focus, 3.5))
     for result in results:
         if isinstance(result, SceneReady):
             state = reduce(state, do(opening.show_scene, 1, result.scene))
-            state = reduce(
-                state, do(lens.set_aperture, state.optics.aperture_diameter + 0.1)
-            )  # which checks all limits
+            # A new aperture checks all limits.
+            state = reduce(state, do(lens.set_aperture, state.optics.aperture_diameter + 0.1))
     assert state.optics.focus_disparity == 3.5
     assert focus_limits(state.scene)[1] >= 3.5
 
 
-def first_scene(results: Iterator[SceneReady | ViewReady]) -> Scene:
-    """What is opened first."""
-    ready = next(results)
-    assert isinstance(ready, SceneReady)
-    return ready.scene
-
-
 def showings(results: Iterator[SceneReady | ViewReady]) -> Iterator[tuple[SceneReady, list[ViewReady]]]:
-    """Each scene with the views that follow it."""
     ready: SceneReady | None = None
     views: list[ViewReady] = []
     for result in results:
@@ -120,15 +106,13 @@ def write_two_planes(folder: Path) -> Path:
 
 
 def bilinear(image: np.ndarray, y: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """Values (H, W) between the pixels."""
     y0, x0 = y.astype(int), x.astype(int)
     top = image[y0, x0] * (1 - x + x0) + image[y0, x0 + 1] * (x - x0)
     bottom = image[y0 + 1, x0] * (1 - x + x0) + image[y0 + 1, x0 + 1] * (x - x0)
     return top * (1 - y + y0) + bottom * (y - y0)
 
 
-def test_finding_disparity_can_be_stopped(tmp_path: Path) -> None:
-    """Asked to stop once it has begun."""
+def test_finding_disparity_can_be_stopped(tmp_path) -> None:
     said: list[str] = []
     request = SceneRequest(1, Source(str(write_two_planes(tmp_path / "field"))))
     with pytest.raises(Cancelled), stoppable(lambda: FINDING in said), watched(lambda *now: said.append(now[2])):

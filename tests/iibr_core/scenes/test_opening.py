@@ -1,5 +1,3 @@
-"""Opening of a scene, in order: the scene, its first view, every other; what stops it, what it refuses."""
-
 from dataclasses import replace
 from pathlib import Path
 
@@ -8,6 +6,7 @@ import pytest
 from PIL import Image
 
 from iibr_core.beyond.optics import CENTRE
+from iibr_core.depth.choice import DepthChoice
 from iibr_core.depth.editing.edits import DepthEdits, Stroke
 from iibr_core.formats.images.photo import focal_px_from_fov, read_photo
 from iibr_core.formats.images.write import write_image
@@ -15,6 +14,7 @@ from iibr_core.formats.light_fields.write import write_light_field
 from iibr_core.gloss.settings import Gloss, GlossSurface
 from iibr_core.method.plan import MOST_STRENGTH
 from iibr_core.runtime.work import Cancelled, stoppable
+from iibr_core.scenes.large_photo import load_large
 from iibr_core.scenes.opening import results_of, scene_of_photo, sketch_of
 from iibr_core.scenes.photo import apply_depth_settings, load_photo, make_plan, photo_of_arrays, sketch_photo
 from iibr_core.scenes.scene import DepthSettings, SceneReady, SceneRequest, Source, ViewReady, WantedPhoto
@@ -22,19 +22,18 @@ from iibr_core.scenes.scene_gloss import add_gloss, gloss_request, make_maps
 from iibr_core.types import GridShape, ImageSize, InputError, ViewOffset, ViewUpdate
 from tests.iibr_core.scenes import square_before_wall
 from tests.iibr_core.scenes.test_light_fields import showings
+from tests.viewer.conftest import HEIGHT, WIDTH
 
 GRID = GridShape(3, 3)
 
 
 def opened(source: Source, **changes: object) -> SceneReady:
-    """The scene and its centre view."""
-    ready = next(results_of(SceneRequest(1, source, **changes), lambda: CENTRE))  # type: ignore[arg-type]
+    ready = next(results_of(SceneRequest(1, source, **changes), lambda: CENTRE))
     assert isinstance(ready, SceneReady)
     return ready
 
 
 def write_large_photo(folder: Path, name: str = "large", ending: str = "jpg") -> Path:
-    """A photo that takes a while to read."""
     rows, columns = np.mgrid[:1200, :1600]
     pixels = np.stack([rows % 256, columns % 256, (rows // 100 + columns // 100) % 2 * 200], axis=2)
     path = folder / f"{name}.{ending}"
@@ -42,21 +41,20 @@ def write_large_photo(folder: Path, name: str = "large", ending: str = "jpg") ->
     return path
 
 
-def test_a_large_photo_has_a_sketch(tmp_path: Path) -> None:
+def test_a_large_photo_has_a_sketch(tmp_path) -> None:
     source = Source(str(write_large_photo(tmp_path)), grid=GRID)
     sketch = sketch_of(WantedPhoto(source, 1.0))
     whole = opened(source)
-    assert sketch is not None
     assert (sketch.scene.size, sketch.scene.own_size) == ((480, 360), (1600, 1200))
     assert (sketch.scene.is_sketch, sketch.loaded, sketch.scene.name) == (True, None, whole.scene.name)
     assert sketch.centre.colors.shape == (360, 480, 3)
     assert (whole.scene.size, whole.scene.is_sketch) == ((1600, 1200), False)
     for changes in ({"max_pixels": 1_499_999}, {"is_literal": True}):
-        assert sketch_photo(replace(source, **changes)) is None  # type: ignore[arg-type]
+        assert sketch_photo(replace(source, **changes)) is None
     assert sketch_photo(replace(source, max_pixels=1_500_000)) is not None
 
 
-def test_a_cut_jpeg_has_no_sketch_and_fails_as_it_did_without(tmp_path: Path) -> None:
+def test_a_cut_jpeg_has_no_sketch_and_fails_as_it_did_without(tmp_path) -> None:
     path = write_large_photo(tmp_path)
     path.write_bytes(path.read_bytes()[:20_000])
     assert sketch_of(WantedPhoto(Source(str(path)), 1.0)) is None
@@ -64,24 +62,21 @@ def test_a_cut_jpeg_has_no_sketch_and_fails_as_it_did_without(tmp_path: Path) ->
         opened(Source(str(path)))
 
 
-def test_progress_counts_every_view_once(photo_path: Path) -> None:
+def test_progress_counts_every_view_once(photo_path) -> None:
     request = SceneRequest(1, Source(str(photo_path), grid=GRID))
     ready, *results = results_of(request, lambda: CENTRE)
     views = [result for result in results if isinstance(result, ViewReady)]
     assert isinstance(ready, SceneReady)
-    assert [(view.progress.done, view.progress.total, view.progress.doing) for view in views] == [
-        (done, 9, "") for done in range(1, 10)
-    ]
-    assert [view.progress.share for view in views] == [done / 9 for done in range(1, 10)]
-    assert [view.progress.is_complete for view in views] == [False] * 8 + [True]
+    progress = [view.progress for view in views]
+    assert [(now.done, now.total, now.doing) for now in progress] == [(done, 9, "") for done in range(1, 10)]
+    assert [(now.share, now.is_complete) for now in progress] == [(done / 9, done == 9) for done in range(1, 10)]
     assert all(view.view.is_final for view in views)
-    seconds = [view.progress.seconds for view in views]
-    assert 0 < seconds[0] <= seconds[-1] < 600
+    assert 0 < progress[0].seconds <= progress[-1].seconds < 600
     few = list(results_of(request, lambda: CENTRE, lambda: [ViewOffset(1.0, 1.0)]))[1:]
     assert [(view.view.row, view.view.column, view.progress.total) for view in few] == [(1, 1, 2), (2, 2, 2)]
 
 
-def test_a_photo_states_its_focal_length_only_where_it_is_known_and_its_size_upright(tmp_path: Path) -> None:
+def test_a_photo_states_its_focal_length_only_where_it_is_known_and_its_size_upright(tmp_path) -> None:
     path = tmp_path / "a.jpg"
     exif = Image.Exif()
     exif[0x0112] = 6  # stored lying on its side
@@ -110,7 +105,7 @@ def test_a_scene_states_its_range_its_infinity_and_its_subject() -> None:
 
 @pytest.mark.parametrize("static", [None, 0.5])
 @pytest.mark.parametrize("strength", [1.0, -0.5])
-def test_edits_change_no_parallax_elsewhere(static: float | None, strength: float) -> None:
+def test_edits_change_no_parallax_elsewhere(static, strength) -> None:
     loaded = photo_of_arrays(*square_before_wall())
     source = Source("", grid=GRID, focus_disparity=static)
     stroke = DepthEdits(strokes=(Stroke("nearer", ((0.5, 0.5),), 0.1, 1.0),))
@@ -129,11 +124,10 @@ def test_edits_change_no_parallax_elsewhere(static: float | None, strength: floa
     assert make_plan(source, edited, MOST_STRENGTH).disparity_scale > 0
 
 
-def test_gloss_maps_are_made_once_for_a_surface(photo_path: Path) -> None:
+def test_gloss_maps_are_made_once_for_a_surface(photo_path) -> None:
     ready, gloss = opened(Source(str(photo_path), grid=GRID)), Gloss(reflectance=1.0, roughness=1.0)
     scene, centre = ready.scene, ready.centre
     request = gloss_request(gloss, scene, centre)
-    assert request is not None
     maps = make_maps(request)
     assert maps.geometry == (focal_px_from_fov(scene.width), scene.infinity_px)
     of_field = make_maps(replace(request, scene=replace(scene, plan=None, focal_px=50.0)))
@@ -143,7 +137,6 @@ def test_gloss_maps_are_made_once_for_a_surface(photo_path: Path) -> None:
     assert gloss_request(None, scene, centre) is None
     assert gloss_request(gloss, scene, replace(centre, disparity=None)) is None
     again = gloss_request(replace(gloss, surface=GlossSurface(0.5)), scene, centre, maps)
-    assert again is not None
     assert again.normals is maps.normals
     assert request.is_like(gloss_request(gloss, scene, centre))
     assert not request.is_like(again)
@@ -152,7 +145,7 @@ def test_gloss_maps_are_made_once_for_a_surface(photo_path: Path) -> None:
     assert any((shown.colors != view.colors).any() for shown, view in zip(add_gloss(iter(views), gloss, scene), views))
 
 
-def test_a_loaded_photo_is_not_read_again(photo_path: Path) -> None:
+def test_a_loaded_photo_is_not_read_again(photo_path) -> None:
     source = Source(str(photo_path), grid=GridShape(1, 1))
     first = opened(source)
     assert first.scene.subject_disparity_px == first.scene.disparity_range_px[1], "the near square fills the middle"
@@ -163,7 +156,7 @@ def test_a_loaded_photo_is_not_read_again(photo_path: Path) -> None:
 
 
 @pytest.mark.parametrize("with_disparity", [True, False])
-def test_a_light_field_folder_goes_the_same_way(tmp_path: Path, photo_path: Path, with_disparity: bool) -> None:
+def test_a_light_field_folder_goes_the_same_way(tmp_path, photo_path, with_disparity) -> None:
     made = list(results_of(SceneRequest(1, Source(str(photo_path), grid=GRID)), lambda: CENTRE))
     views = (result.view for result in made if isinstance(result, ViewReady))
     write_light_field(tmp_path / "field", "hci", GRID, views, 100.0, "field", with_disparity)
@@ -174,7 +167,7 @@ def test_a_light_field_folder_goes_the_same_way(tmp_path: Path, photo_path: Path
     assert len(views) == 9
 
 
-def test_a_folder_without_views_is_refused_with_what_would_be_some(tmp_path: Path) -> None:
+def test_a_folder_without_views_is_refused_with_what_would_be_some(tmp_path) -> None:
     with pytest.raises(InputError, match="no photos in it"):
         opened(Source(str(tmp_path)))
     (tmp_path / "notes.txt").touch()
@@ -182,7 +175,7 @@ def test_a_folder_without_views_is_refused_with_what_would_be_some(tmp_path: Pat
         opened(Source(str(tmp_path)))
 
 
-def test_generating_stops_between_row_bands_and_reading_too(photo_path: Path) -> None:
+def test_generating_stops_between_row_bands_and_reading_too(photo_path) -> None:
     kinds: list[type] = []
     request = SceneRequest(1, Source(str(photo_path), grid=GRID))
     with stoppable(lambda: bool(kinds)):
@@ -194,8 +187,48 @@ def test_generating_stops_between_row_bands_and_reading_too(photo_path: Path) ->
         next(results_of(request, lambda: CENTRE))
 
 
-def test_an_avif_photo_opens(tmp_path: Path) -> None:
-    """It is read by another library than the settings in saved pictures."""
+def test_an_avif_photo_opens(tmp_path) -> None:
     Image.new("RGB", (48, 32), (200, 80, 60)).save(tmp_path / "a.avif")
     loaded = load_photo(Source(str(tmp_path / "a.avif")))
     assert (loaded.photo.size, loaded.settings, loaded.own_size) == ((32, 48), "", ImageSize(32, 48))
+
+
+SMALLER = 4
+MOST = 10**6
+STROKE = DepthEdits(strokes=(Stroke("nearer", ((0.2, 0.2),), 0.1, 0.5),))
+
+
+def source_of(photo: Path, **changes: object) -> Source:
+    return Source(str(photo), grid=GridShape(3, 3), max_pixels=HEIGHT * WIDTH // SMALLER**2, **changes)
+
+
+@pytest.mark.parametrize("edits", [DepthEdits(), STROKE], ids=["as found", "with a stroke"])
+@pytest.mark.parametrize("stored", ["larger", "smaller", "guess"])
+def test_disparity_grows_with_the_pixels(photo_path, stored, edits) -> None:
+    """Whether the map's file holds more than the light field's views do, less, or there is none."""
+    map_path = photo_path.with_name("scene_disparity.npy")
+    if stored == "smaller":
+        np.save(map_path, np.load(map_path)[::8, ::8])
+    elif stored == "guess":
+        map_path.unlink()
+    source = source_of(photo_path, depth=DepthChoice(start="rough" if stored == "guess" else "auto"))
+    loaded = load_photo(source, depth_settings=DepthSettings(0.0, edits))
+    assert loaded.photo.size == (HEIGHT // SMALLER, WIDTH // SMALLER)
+    plan = make_plan(source, loaded, 1.0)
+    small = plan.field_disparity(loaded.disparity).values
+    large = load_large(source, loaded, plan, MOST)
+    assert large.size == (HEIGHT, WIDTH)
+    middles = large.disparity[SMALLER // 2 :: SMALLER, SMALLER // 2 :: SMALLER]
+    assert np.ptp(small) > 0.1
+    assert np.median(np.abs(middles / SMALLER - small)) < 0.03 * np.ptp(small)
+    for share in (1, 50, 99):
+        grown, expected = (np.percentile(values, share) for values in (large.disparity, small))
+        assert grown == pytest.approx(SMALLER * expected, abs=SMALLER * 0.06 * float(np.ptp(small)))
+
+
+def test_a_photo_that_another_one_took_the_place_of_is_refused(photo_path) -> None:
+    source = source_of(photo_path)
+    loaded = load_photo(source)
+    Image.new("RGB", (WIDTH, HEIGHT)).save(photo_path)
+    with pytest.raises(InputError, match=r"scene\.png: was changed since it was opened; open it again"):
+        load_large(source, loaded, make_plan(source, loaded, 1.0), MOST)

@@ -3,9 +3,14 @@ from math import ceil, exp, log
 import numpy as np
 import pytest
 import torch
+from scipy.ndimage import correlate1d
 
+from iibr_core.method.ambiguous_rays import FEATURES, HYPOTHESES
+from iibr_core.training import batches
+from iibr_core.training.batches import training_batch
 from iibr_core.training.epi_loss import DERIVATIVE_SIGMA, TRUNCATE_SIGMAS, WINDOW_SIGMA, epi_loss
 from iibr_core.training.losses import LossWeights, color_loss, entropy_loss, total_loss
+from iibr_core.types import ImageSize
 
 
 def random(*shape, seed=0):
@@ -20,19 +25,11 @@ def slow_taps(sigma, derivative):
     reach = ceil(TRUNCATE_SIGMAS * sigma)
     taps = {i: exp(-(i**2) / (2 * sigma**2)) * (i if derivative else 1) for i in range(-reach, reach + 1)}
     total = sum(i * tap for i, tap in taps.items()) if derivative else sum(taps.values())
-    return {i: tap / total for i, tap in taps.items()}
+    return [tap / total for tap in taps.values()]
 
 
 def slow_filter(image, taps_v, taps_w):
-    views, width = image.shape
-    result = np.zeros_like(image)
-    for v in range(views):
-        for w in range(width):
-            for i, tap_v in taps_v.items():
-                for j, tap_w in taps_w.items():
-                    sample = image[min(max(v + i, 0), views - 1), min(max(w + j, 0), width - 1)]
-                    result[v, w] += tap_v * tap_w * sample
-    return result
+    return correlate1d(correlate1d(image, taps_v, 0, mode="nearest"), taps_w, 1, mode="nearest")
 
 
 def slow_structure_tensor(epi):
@@ -80,3 +77,36 @@ def test_total_is_the_weighted_sum_over_the_first_rays_as_epis():
     assert losses.epi == epi_loss(*map(torch.from_numpy, epis))
     expected = 5 * color_loss(rendered, truth) + 7 * entropy_loss(weights) + 11 * losses.epi
     assert losses.total.item() == pytest.approx(expected.item(), rel=1e-12)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def small_scenes():
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(batches, "SIZE", ImageSize(48, 72))
+        patch.setattr(batches, "RAYS_PER_VIEW", 300)
+        yield
+
+
+def test_a_batch_repeats_and_differs_from_others():
+    one, same, other = training_batch(3, seed=1), training_batch(3, seed=1), training_batch(4, seed=1)
+    assert torch.equal(one.features, same.features)
+    assert torch.equal(one.truth, same.truth)
+    assert one.features.shape != other.features.shape or not torch.equal(one.features, other.features)
+
+
+@pytest.mark.parametrize("step", range(1, 4))
+def test_batches_are_finite_and_whole(step):
+    batch = training_batch(step, seed=0)
+    rays = len(batch.truth)
+    assert batch.features.shape == (rays, HYPOTHESES, FEATURES)
+    assert all(torch.isfinite(t).all() for t in (batch.features, batch.colors, batch.truth))
+    assert batch.mask.any(dim=1).all()
+    assert batch.epi_shape is None or np.prod(batch.epi_shape) <= rays
+
+
+def test_truth_lies_within_reach_of_the_hypotheses():
+    """Some hypothesis comes far closer to the truth than chance: rays, colours and truth belong together."""
+    batch = training_batch(2, seed=5)
+    distance = (batch.colors - batch.truth[:, None]).abs().sum(dim=-1).masked_fill(~batch.mask, torch.inf)
+    by_chance = (batch.colors - batch.truth.roll(37, 0)[:, None]).abs().sum(dim=-1).masked_fill(~batch.mask, torch.inf)
+    assert distance.min(dim=1).values.median() < 0.3 * by_chance.min(dim=1).values.median()

@@ -1,6 +1,8 @@
 import numpy as np
 import pytest
+from scipy.ndimage import gaussian_filter
 
+from iibr_core.training.degradation import blur, coarsen, degrade, misalign
 from iibr_core.training.scenes.primitives import BOX, PLANE, PRIMITIVE, WIRE
 from iibr_core.training.scenes.random_scene import RaycastScene, cast, disparity_at, random_scene, render
 from iibr_core.types import ImageSize, ViewOffset
@@ -24,19 +26,8 @@ def primitive(shape, centre, half, axes=None, color=(0.5, 0.5, 0.5)):
 
 def scene_of(*primitives, background=(0.1, 0.1, 0.1)):
     last = primitive(PLANE, (0, 0, GREATEST_Z), (ENDLESS, ENDLESS, 0), color=background)
-    return RaycastScene(
-        primitives=np.array([*primitives, last], PRIMITIVE),
-        centre_px=(31.5, 23.5),
-        focal_px=FOCAL,
-        infinity_px=INFINITY,
-        depths=(5.0, GREATEST_Z),
-        light=(0.0, 0.0, -1.0),
-        ambient=1.0,
-    )
-
-
-def wavy(seed=3, largest=2.0):
-    return random_scene(np.random.default_rng(seed), SIZE, largest)
+    camera, light = ((31.5, 23.5), FOCAL, INFINITY, (5.0, GREATEST_Z)), (0.0, 0.0, -1.0)
+    return RaycastScene(np.array([*primitives, last], PRIMITIVE), *camera, light, ambient=1.0)
 
 
 def depth_at(disparity):
@@ -44,7 +35,6 @@ def depth_at(disparity):
 
 
 def world(x, y, d):
-    """The point that the centre view sees at (x, y)."""
     z = depth_at(d)
     return np.stack([(x - 31.5) * z / FOCAL, (y - 23.5) * z / FOCAL, z + 0 * x], axis=-1)
 
@@ -88,7 +78,7 @@ def test_box_and_wire_against_small_steps_along_the_ray():
 def test_epi_lines_are_straight(largest):
     """A surface point of the centre view is seen in every view where x - d s says, to 1e-4 px, or is hidden there."""
     tracked = 0
-    for seed in range(4):
+    for seed in range(2):
         scene = random_scene(np.random.default_rng(seed), SIZE, largest)
         y, x = (a.ravel() for a in np.indices(SIZE))
         color, d = (a.astype(np.float64) for a in cast(scene, x, y, CENTRE, samples=1))
@@ -101,11 +91,11 @@ def test_epi_lines_are_straight(largest):
             assert np.median(np.abs(there[1] - d)[shown]) < 1e-5
             assert np.quantile(np.abs(there[0] - color)[shown].max(-1), 0.99) < 2e-3, "matt: of one colour everywhere"
             tracked += shown.sum()
-    assert tracked > 4 * 3 * 48 * 64 * 0.3
+    assert tracked > 2 * 3 * 48 * 64 * 0.3
 
 
 def test_the_disparity_does_not_depend_on_samples_or_blur():
-    scene, offset = wavy(), ViewOffset(-2.0, 1.0)
+    scene, offset = random_scene(np.random.default_rng(3), SIZE, 2.0), ViewOffset(-2.0, 1.0)
     exact = render(scene, SIZE, offset, samples=1)[1]
     for samples, blur_px in ((2, 0.0), (3, 0.5), (4, 0.0)):
         assert (render(scene, SIZE, offset, samples, blur_px)[1] == exact).all()
@@ -123,3 +113,41 @@ def test_every_size_and_range_is_finite_and_within_its_range(size, largest):
             assert (colors >= 0).all()
             assert (colors <= 1 + 1e-6).all()
             assert (np.abs(disparity) <= largest * (1 + 1e-5) + 1e-9).all()
+
+
+def rough(shape=(31, 37), seed=0):
+    return np.random.default_rng(seed).normal(0, 2, shape).astype(np.float32)
+
+
+@pytest.mark.parametrize("sigma", [0.5, 1.3, 4.0])
+def test_blur_against_the_sum_over_all_pixels(sigma):
+    d = rough((6, 9))
+    expected = gaussian_filter(d.astype(np.float64), sigma, mode="nearest", truncate=10)
+    np.testing.assert_allclose(blur(d, sigma), expected, atol=5e-3)
+    assert (blur(d, 0.0) == d).all()
+
+
+def test_coarse_averages_squares_and_keeps_slopes():
+    y, x = np.mgrid[0:24, 0:30].astype(np.float32)
+    slope = 0.3 * x - 0.2 * y
+    assert coarsen(slope, 4)[2:-2, 2:-4] == pytest.approx(slope[2:-2, 2:-4], abs=1e-4)
+    d = rough((9, 12))
+    assert coarsen(d, 3)[4, 7] == pytest.approx(d[3:6, 6:9].mean(), abs=1e-5)
+
+
+def test_misalignment_moves_down_and_right():
+    d = rough()
+    assert misalign(d, 2.0, 3.0)[2:, 3:] == pytest.approx(d[:-2, :-3], abs=1e-4)
+    assert misalign(d, 0.0, -0.25)[:, :-1] == pytest.approx(0.75 * d[:, :-1] + 0.25 * d[:, 1:], abs=1e-4)
+
+
+def test_degrade_repeats_by_seed_and_leaves_its_input_alone():
+    d = rough()
+    before = d.copy()
+    for seed in range(30):
+        out, again = (degrade(d, np.random.default_rng(seed), 4.0) for _ in range(2))
+        assert out.shape == d.shape
+        assert out.dtype == np.float32
+        assert np.isfinite(out).all()
+        assert (out == again).all()
+    assert (d == before).all()

@@ -44,10 +44,6 @@ def batches(step, seed=5):
     return Batch(features, mask, colors, truth, (EPIS, VIEWS, WIDTH))
 
 
-def state(model):
-    return {name: tensor.clone() for name, tensor in model.state_dict().items()}
-
-
 def is_close(one, other):
     return one.keys() == other.keys() and all(np.allclose(one[name], other[name], atol=1e-5) for name in one)
 
@@ -57,15 +53,6 @@ def log_rows(out):
         reader = csv.DictReader(file)
         assert tuple(reader.fieldnames) == LogRow._fields
         return list(reader)
-
-
-def interrupt_at(step):
-    def give(now):
-        if now == step:
-            raise KeyboardInterrupt
-        return batches(now)
-
-    return give
 
 
 @pytest.fixture
@@ -80,7 +67,7 @@ def test_weights_checkpoint_and_log_are_written(out):
         train(model, batches, CONFIG, out, metadata={"commit": "abc"})
     assert {path.name for path in out.parent.iterdir()} == {out.name, checkpoint_path(out).name, log_path(out).name}
     tensors, metadata = read_weights(out)
-    assert is_close(tensors, state(model))
+    assert is_close(tensors, model.state_dict())
     assert metadata["commit"] == "abc"
     assert json.loads(metadata["training"])["learning_rate"] == CONFIG.learning_rate
     rows = log_rows(out)
@@ -113,9 +100,15 @@ def test_the_first_step_against_adam_by_hand(out):
 
 def test_an_interrupted_training_continues_from_its_checkpoint(tmp_path):
     whole, parts = tmp_path / "whole.safetensors", tmp_path / "parts.safetensors"
+
+    def interrupted(step):
+        if step == 8:
+            raise KeyboardInterrupt
+        return batches(step)
+
     train(Scorer(), batches, CONFIG, whole)
     with pytest.raises(KeyboardInterrupt):
-        train(Scorer(), interrupt_at(8), CONFIG, parts)
+        train(Scorer(), interrupted, CONFIG, parts)
     assert not parts.exists()
     train(Scorer(seed=123), batches, CONFIG, parts, resume=True)
     assert is_close(read_weights(whole)[0], read_weights(parts)[0])

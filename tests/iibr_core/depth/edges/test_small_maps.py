@@ -1,7 +1,3 @@
-"""Maps that are smaller than their photo: soft ones are enlarged smoothly and sharpened, exact ones by surfaces."""
-
-from __future__ import annotations
-
 import cv2
 import numpy as np
 import pytest
@@ -19,7 +15,6 @@ SMALL = (107, 80)
 
 
 def drawn(seed: int) -> tuple[FloatImage, FloatImage]:
-    """A photo and its exact disparity."""
     photo, exact = render(random_scene(np.random.default_rng(seed), SIZE, 2.0), SIZE, ViewOffset(0, 0))
     return np.ascontiguousarray(photo, np.float32), exact
 
@@ -30,7 +25,7 @@ def soft(exact: FloatImage) -> FloatImage:
 
 
 @pytest.mark.parametrize("seed", range(2))
-def test_soft_and_exact_maps_are_told_apart(seed: int) -> None:
+def test_soft_and_exact_maps_are_told_apart(seed) -> None:
     exact = drawn(seed)[1]
     assert has_soft_edges(soft(exact))
     assert has_soft_edges(cv2.resize(exact, SMALL, interpolation=cv2.INTER_AREA))
@@ -49,7 +44,7 @@ def test_a_soft_map_becomes_a_ramp_and_an_exact_one_stays_a_step() -> None:
 
 
 @pytest.mark.parametrize("seed", [1, 2])
-def test_maps_made_by_leaving_out_pixels_lie_at_corners_and_others_do_not(seed: int) -> None:
+def test_maps_made_by_leaving_out_pixels_lie_at_corners_and_others_do_not(seed) -> None:
     photo, exact = drawn(seed)
     assert lies_at_corners(photo, cv2.resize(exact, SMALL, interpolation=cv2.INTER_NEAREST))
     for kind in (cv2.INTER_AREA, cv2.INTER_NEAREST_EXACT):
@@ -60,7 +55,6 @@ def test_maps_made_by_leaving_out_pixels_lie_at_corners_and_others_do_not(seed: 
 
 @pytest.mark.parametrize("make", [soft, lambda exact: network_like(exact, 1)])
 def test_refining_brings_small_maps_nearer_to_the_truth(make) -> None:
-    """Over some scenes together: errors of more than a tenth of the range become much fewer."""
     before = after = 0.0
     for seed in range(2):
         photo, exact = drawn(seed)

@@ -1,4 +1,4 @@
-"""Costs of disparities against slow and plain definitions."""
+from itertools import product
 
 import numpy as np
 import pytest
@@ -6,6 +6,8 @@ from scipy.ndimage import map_coordinates
 
 from iibr_core.depth.guided_filter import GuidedFilter
 from iibr_core.depth.multi_view.matching import HIDDEN_FACTOR, MAX_DIFFERENCE, MIN_SEEN_SHARE, _match, _store_costs
+from iibr_core.depth.multi_view.refinement import _apply, _diagonal, _measure, _smooth
+from iibr_core.depth.multi_view.semi_global import EDGE_LUMA, JUMP_COST, STEP_COST, choose_disparity
 from tests.iibr_core.scenes import smooth_texture
 
 
@@ -59,3 +61,89 @@ def test_views_are_hidden_where_the_other_half_matches_much_better():
     cost = np.minimum(parts[4], HIDDEN_FACTOR * parts[:4].min(axis=0))
     assert (cost < parts[4]).any()
     np.testing.assert_allclose(found, 255 * np.minimum(np.sqrt(cost) / MAX_DIFFERENCE, 1), atol=1.01)
+
+
+def slow_sums(costs, luma):
+    """Return the sums of all paths (equation 13), rounded as they are stored."""
+    height, width, count = costs.shape
+    sums = np.zeros(costs.shape)
+    for down, across in (at for at in product((-1, 0, 1), repeat=2) if any(at)):
+        paths = np.zeros(costs.shape)
+        rows = range(height) if down >= 0 else range(height - 1, -1, -1)
+        columns = range(width) if across >= 0 else range(width - 1, -1, -1)
+        for y in rows:
+            for x in columns:
+                paths[y, x] = costs[y, x]
+                v, u = y - down, x - across
+                if not (0 <= v < height and 0 <= u < width):
+                    continue
+                lowest = paths[v, u].min()
+                jump = max(STEP_COST, JUMP_COST * np.exp(-abs(luma[y, x] - luma[v, u]) / EDGE_LUMA))
+                for d in range(count):
+                    beside = [paths[v, u, e] + STEP_COST for e in (d - 1, d + 1) if 0 <= e < count]
+                    paths[y, x, d] += min(paths[v, u, d], *beside, lowest + jump) - lowest
+        sums += np.floor(paths + 0.5)
+    return sums
+
+
+def test_disparities_are_the_cheapest_of_all_paths_and_lie_between_steps():
+    rng = np.random.default_rng(4)
+    costs = rng.integers(0, 256, (7, 9, 6)).astype(np.uint8)
+    luma = (0.1 * rng.random((7, 9))).astype(np.float32)
+    disparities = np.linspace(-1.0, 1.5, 6).astype(np.float32)
+    values, sureness = choose_disparity(costs, luma, disparities)
+    sums = slow_sums(costs.astype(float), luma.astype(float))
+    inner = 0
+    for y, x in np.ndindex(7, 9):
+        best = int(np.argmin(sums[y, x]))
+        expected = disparities[best]
+        if 0 < best < 5:
+            below, least, above = sums[y, x, best - 1 : best + 2]
+            # The lowest point of the parabola through three sums.
+            a, b, _ = np.polyfit([-1, 0, 1], [below, least, above], 2)
+            expected, inner = expected - 0.5 * b / (2 * a) if a > 0 else expected, inner + 1
+        # A sum that float32 rounds the other way is one of hundreds.
+        assert abs(values[y, x] - expected) < 0.02
+        mean = costs[y, x].mean()
+        assert abs(sureness[y, x] - max(mean - costs[y, x, best], 0) / max(mean, 1)) < 1e-5
+    assert inner > 20
+
+
+SIZE = 6, 7
+
+
+def dense(curvature, across, down):
+    """(N, N): curvature and the squares of weighted second differences along rows and columns."""
+    matrix = np.diag(curvature.ravel().astype(float))
+    number = np.arange(curvature.size).reshape(SIZE)
+    for weights, numbers in ((across, number), (down.T, number.T)):
+        for (y, x), weight in np.ndenumerate(weights):
+            if 0 < x < weights.shape[1] - 1:
+                row = np.zeros(curvature.size)
+                row[numbers[y, x - 1 : x + 2]] = 1, -2, 1
+                matrix += weight * np.outer(row, row)
+    return matrix
+
+
+def test_smoothing_solves_the_equations():
+    parts = np.random.default_rng(2).random((3, *SIZE)).astype(np.float32)
+    parts[1, :, [0, -1]] = parts[2, [0, -1]] = 0
+    values, product = np.random.default_rng(1).normal(0, 1, SIZE).astype(np.float32), np.empty(SIZE, np.float32)
+    _apply(values, *parts, product)
+    np.testing.assert_allclose(product.ravel(), dense(*parts) @ values.ravel(), rtol=1e-4, atol=1e-5)
+    np.testing.assert_allclose(_diagonal(*parts).ravel(), np.diag(dense(*parts)), rtol=1e-5)
+    found = _smooth(np.zeros(SIZE, np.float32), values, *parts)
+    expected = np.linalg.solve(dense(*parts), (parts[0] * values).ravel())
+    np.testing.assert_allclose(found.ravel(), expected, atol=2e-3)
+
+
+def test_curvature_and_pull_lead_to_the_disparity_at_which_views_agree():
+    """Views of a texture that is linear: one step of Newton's is exact, however the views are placed."""
+    y, x = np.mgrid[:12, :14].astype(np.float32)
+    offsets = np.float32([(0, 0), (0, 1), (1, 0), (-1, 2), (1, 1)])
+    truth, start = 0.3, np.full((12, 14), 0.25, np.float32)
+    textures = np.stack([0.002 * (x + truth * s) - 0.001 * (y + truth * t) for t, s in offsets]).astype(np.float32)
+    curvature, pull = np.empty((12, 14), np.float32), np.empty((12, 14), np.float32)
+    _measure(textures, offsets, start, 0, 12, curvature, pull)
+    inside = np.s_[2:-2, 2:-2]
+    np.testing.assert_allclose(start[inside] - pull[inside] / curvature[inside], truth, atol=2e-3)

@@ -1,11 +1,61 @@
-"""Unknown disparity goes with what looks like it."""
+import math
 
 import numpy as np
 import pytest
 
 from iibr_core.inpainting import disparity_by_color
 from iibr_core.inpainting.disparity_by_color import fill_disparity_by_color
-from iibr_core.runtime.work import Cancelled, stoppable
+from iibr_core.inpainting.disparity_holes import OPEN_LINE, SHORTNESS, STEP_LENGTHS, fill_disparity_holes
+
+LINES = ((0, 1), (1, 0), (1, 1), (1, -1))
+"""Horizontal, vertical, falling diagonal, rising diagonal: (down, right)."""
+
+
+def slow_fill(values):
+    filled = values.copy()
+    height, width = values.shape
+    for y, x in np.argwhere(np.isnan(values)):
+        total = weights = 0.0
+        found = []
+        for (down, right), length in zip(LINES, STEP_LENGTHS):
+            ends = []
+            for side in (-1, 1):
+                for far in range(1, height + width):
+                    v, u = y + side * far * down, x + side * far * right
+                    if not (0 <= v < height and 0 <= u < width):
+                        break
+                    if not math.isnan(values[v, u]):
+                        ends.append((values[v, u], far))
+                        break
+            if len(ends) == 2:
+                found.append((min(end for end, _ in ends), length * sum(far for _, far in ends)))
+            elif ends:
+                found.append((ends[0][0], OPEN_LINE * length * ends[0][1]))
+        for value, span in found:
+            total, weights = total + value / span**SHORTNESS, weights + 1 / span**SHORTNESS
+        filled[y, x] = total / weights if found else np.nan
+    return filled
+
+
+@pytest.mark.parametrize("share", [0.3, 0.8])
+def test_the_farther_end_of_the_shortest_way_across_counts(share):
+    rng = np.random.default_rng(6)
+    values = rng.uniform(1, 5, (13, 17)).astype(np.float32)
+    values[rng.random(values.shape) < share] = np.nan
+    values[4:9, 6:12] = np.nan
+    filled, expected = fill_disparity_holes(values), slow_fill(values.astype(float))
+    reached = ~np.isnan(expected)
+    np.testing.assert_allclose(filled[reached], expected[reached], rtol=1e-5)
+    known = ~np.isnan(values)
+    np.testing.assert_array_equal(filled[known], values[known])
+    assert np.isfinite(filled).all()
+
+
+def test_what_no_line_reaches_is_reached_in_a_second_round():
+    values = np.full((9, 9), np.nan, np.float32)
+    values[0, 0] = 3.0
+    assert (fill_disparity_holes(values) == 3.0).all()
+
 
 RED, BLUE = np.float32([0.8, 0.1, 0.1]), np.float32([0.1, 0.2, 0.8])
 
@@ -65,13 +115,3 @@ def test_what_is_far_from_all_that_is_known_comes_from_the_background(monkeypatc
     filled = fill_disparity_by_color(np.full((9, 40, 3), 0.5, np.float32), values)
     assert (filled[:, :3] == 3).all()
     assert filled[:, 8:] == pytest.approx(1, abs=1e-3), "though the left end is nearer to most of them"
-
-
-def test_bad_arguments_and_a_stop_are_told():
-    photo, truth = cable_before_wall()
-    with pytest.raises(ValueError, match="no known value"):
-        fill_disparity_by_color(photo, np.full_like(truth, np.nan))
-    values = truth.copy()
-    values[3, 3] = np.nan
-    with pytest.raises(Cancelled), stoppable(lambda: True):
-        fill_disparity_by_color(photo, values)

@@ -1,16 +1,18 @@
-"""Disparity from files: kinds of files, unknown values, and other sizes."""
-
-from pathlib import Path
+import struct
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
 from PIL import Image
 
 from iibr_core.formats.images.write import write_image_file
 from iibr_core.formats.maps.disparity_file import read_disparity
-from iibr_core.formats.maps.pfm import write_pfm
+from iibr_core.formats.maps.pfm import read_pfm, write_pfm
 from iibr_core.formats.maps.reader import read_map, read_map_file
 from iibr_core.formats.maps.resample import SURFACE_SHARE, resample_surfaces
+from iibr_core.formats.maps.writer import MAX_PNG_VALUE, write_map
 from iibr_core.types import FloatImage, ImageSize, InputError
 
 RNG = np.random.default_rng(3)
@@ -41,7 +43,7 @@ def resample_slowly(values: FloatImage, size: ImageSize) -> FloatImage:
 
 
 @pytest.mark.parametrize("size", [(29, 37), (7, 11), (13, 31), (40, 5), (1, 1), (1, 23)])
-def test_resampling_agrees_with_its_slow_twin(size: tuple[int, int]) -> None:
+def test_resampling_agrees_with_its_slow_twin(size) -> None:
     # Values and sizes where no vote is a tie, which rounding would decide.
     rng = np.random.default_rng(3)
     values = rng.uniform(0, 10, (13, 17)).astype(np.float32)
@@ -51,7 +53,7 @@ def test_resampling_agrees_with_its_slow_twin(size: tuple[int, int]) -> None:
 
 
 @pytest.mark.parametrize("name", ["a.pfm", "a.npy", "a.npz", "a.exr", "a.tif", "a.png"])
-def test_every_kind_of_file_gives_the_same_values(tmp_path: Path, name: str) -> None:
+def test_every_kind_of_file_gives_the_same_values(tmp_path, name) -> None:
     whole, path = RNG.integers(1, 20, (6, 8)), tmp_path / name
     if path.suffix == ".pfm":
         write_pfm(path, whole.astype(np.float32))
@@ -69,7 +71,7 @@ def test_every_kind_of_file_gives_the_same_values(tmp_path: Path, name: str) -> 
 
 
 @pytest.mark.parametrize("shape", [(1, 4, 5), (4, 5, 1), (1, 4, 5, 1), (1, 1, 4, 5)])
-def test_axes_of_length_1_beside_a_map_do_not_matter(tmp_path: Path, shape: tuple[int, ...]) -> None:
+def test_axes_of_length_1_beside_a_map_do_not_matter(tmp_path, shape) -> None:
     np.save(tmp_path / "a.npy", np.arange(1.0, 21).reshape(shape))
     np.testing.assert_array_equal(read_map(tmp_path / "a.npy"), np.arange(1.0, 21).reshape(4, 5))
     np.save(tmp_path / "a.npy", np.zeros((2, *shape)))
@@ -78,14 +80,14 @@ def test_axes_of_length_1_beside_a_map_do_not_matter(tmp_path: Path, shape: tupl
 
 
 @pytest.mark.parametrize(("orientation", "expected"), [(1, [[1, 2, 3]]), (2, [[3, 2, 1]]), (6, [[1], [2], [3]])])
-def test_a_map_is_turned_upright_with_a_note(tmp_path: Path, orientation: int, expected: list[list[int]]) -> None:
+def test_a_map_is_turned_upright_with_a_note(tmp_path, orientation, expected) -> None:
     Image.fromarray(np.array([[1, 2, 3]], np.uint8)).save(tmp_path / "a.tif", tiffinfo={0x0112: orientation})
     found = read_map_file(tmp_path / "a.tif")
     assert found.values.tolist() == expected
     assert found.notes == (("a.tif was turned upright, as its Exif says.",) if orientation > 1 else ())
 
 
-def test_unknown_values_are_filled(tmp_path: Path) -> None:
+def test_unknown_values_are_filled(tmp_path) -> None:
     values = np.full((5, 6), 3.0, np.float32)
     values[0, 0], values[1, 1], values[2, 2], values[3, 3] = np.nan, np.inf, -np.inf, 1e9
     np.save(tmp_path / "a.npy", values)
@@ -102,7 +104,7 @@ def test_unknown_values_are_filled(tmp_path: Path) -> None:
     assert "filled" in found.notes[0]
 
 
-def test_another_size_scales_the_values_by_the_width(tmp_path: Path) -> None:
+def test_another_size_scales_the_values_by_the_width(tmp_path) -> None:
     values = np.full((20, 30), 1.0, np.float32)
     values[:, 15:] = 6.0
     np.save(tmp_path / "a.npy", values)
@@ -112,17 +114,16 @@ def test_another_size_scales_the_values_by_the_width(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("value", "message"),
-    [(np.nan, "no value is known"), (np.inf, "no value is known"), (6e4, "disparity scale")],
+    ("value", "message"), [(np.nan, "no value is known"), (np.inf, "no value is known"), (6e4, "disparity scale")]
 )
-def test_a_map_without_known_values_is_refused(tmp_path: Path, value: float, message: str) -> None:
+def test_a_map_without_known_values_is_refused(tmp_path, value, message) -> None:
     np.save(tmp_path / "a.npy", np.full((3, 4), value))
     with pytest.raises(InputError, match=message):
         read_disparity(tmp_path / "a.npy", ImageSize(3, 4))
 
 
 @pytest.mark.parametrize("size", [(4, 6), (40, 60), (33, 50), (80, 120)])
-def test_every_known_value_of_a_sparse_map_counts(tmp_path: Path, size: tuple[int, int]) -> None:
+def test_every_known_value_of_a_sparse_map_counts(tmp_path, size) -> None:
     values = np.full((40, 60), np.nan, np.float32)
     values[::6, ::6] = 2.0
     values[12:30:6, 18:42:6] = 5.0
@@ -132,3 +133,71 @@ def test_every_known_value_of_a_sparse_map_counts(tmp_path: Path, size: tuple[in
     assert found.values.min() == pytest.approx(2 * ratio)
     assert found.values.max() == pytest.approx(5 * ratio)
     assert sum("was filled" in note for note in found.notes) == 1
+
+
+def some_map() -> np.ndarray:
+    return np.random.default_rng(0).normal(0, 5, (13, 17)).astype(np.float32)
+
+
+@pytest.mark.parametrize("suffix", [".pfm", ".npy", ".exr", ".EXR", ".tif"])
+def test_floating_point_maps_come_back_exactly(tmp_path, suffix) -> None:
+    path = tmp_path / f"map{suffix}"
+    assert write_map(path, some_map()) == ""
+    np.testing.assert_array_equal(read_map(path), some_map())
+    assert [other.name for other in tmp_path.iterdir()] == [path.name]
+
+
+@pytest.mark.parametrize("name", ["map.jpg", "map", "map_depth.pfm"])
+def test_names_that_would_be_read_as_something_else_are_refused(tmp_path, name) -> None:
+    with pytest.raises(InputError, match=name):
+        write_map(tmp_path / name, some_map())
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_png_says_how_its_values_were_scaled(tmp_path) -> None:
+    path, wanted = tmp_path / "map.png", some_map()
+    step = (wanted.max() - wanted.min()) / (MAX_PNG_VALUE - 1)
+    assert f"{step:.6g}" in write_map(path, wanted)
+    np.testing.assert_allclose(read_map(path), wanted, atol=step)
+    write_map(path, np.full((4, 5), -3.0, np.float32))
+    np.testing.assert_allclose(read_map(path), -3.0)
+
+
+SHAPES = hnp.array_shapes(min_dims=2, max_dims=2, max_side=9)
+
+
+@given(hnp.arrays(np.float32, SHAPES, elements=st.floats(width=32)))
+def test_round_trip_keeps_every_bit_pattern(tmp_path_factory, values):
+    path = tmp_path_factory.getbasetemp() / "round_trip.pfm"
+    write_pfm(path, values)
+    found = read_pfm(path)
+    assert found.dtype == np.float32
+    assert np.array_equal(found, values, equal_nan=True)
+
+
+@pytest.mark.parametrize(("order", "scale"), [("<", "-1.0"), (">", "1"), ("<", "-0.003922"), (">", "1e3")])
+def test_rows_go_up_and_the_sign_gives_the_byte_order(tmp_path, order, scale):
+    path = tmp_path / "a.pfm"
+    path.write_bytes(f"Pf\n2 3\n{scale}\n".encode() + struct.pack(order + "6f", 5, 6, 3, 4, 1, 2))
+    assert read_pfm(path).tolist() == [[1, 2], [3, 4], [5, 6]]
+
+
+@pytest.mark.parametrize("header", [b"Pf 2 1 -1 ", b"Pf\r\n2 1\r\n-1.0\r\n", b"Pf\n2\n1\n-1.000000\n"])
+def test_white_space_in_the_header(tmp_path, header):
+    (tmp_path / "a.pfm").write_bytes(header + struct.pack("<2f", 10.0, 2.0))
+    assert read_pfm(tmp_path / "a.pfm").tolist() == [[10, 2]]
+
+
+@pytest.mark.parametrize(
+    ("content", "reason"),
+    [(b"", "empty"), (b"P6 2 2 255\n" + b"\0" * 40, "not a PFM"), (b"PF 1 1 -1\n" + b"\0" * 12, "colour"),
+     (b"Pf 2 2 -1\n" + b"\0" * 15, "1 bytes are missing"),
+     (b"Pf 999999999 999999999 -1\n" + b"\0" * 15, "999999999x999999999"), (b"Pf 0 5 -1\n", "0x5"),
+     (b"Pf" + b" " * 5000 + b"1 1 -1\n" + b"\0" * 4, "not a PFM")],
+)  # fmt: skip
+def test_bad_files(tmp_path, content, reason):
+    path = tmp_path / "a.pfm"
+    path.write_bytes(content)
+    with pytest.raises(InputError, match=reason) as caught:
+        read_pfm(path)
+    assert str(path) in str(caught.value)

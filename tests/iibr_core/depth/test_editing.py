@@ -1,0 +1,309 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy import ndimage
+
+from iibr_core.depth.editing.bucket import surface_at
+from iibr_core.depth.editing.canvas import DepthCanvas, apply_edits
+from iibr_core.depth.editing.edits import (
+    BRUSH_TOOLS,
+    DEPTH_TOOLS,
+    HISTOGRAM_BINS,
+    UNEDITED,
+    DepthEdits,
+    Stroke,
+    apply_tone,
+    extent_of,
+    levels_of,
+    require_sound,
+)
+from iibr_core.types import InputError
+
+shares = st.floats(0, 1)
+tones = st.builds(
+    lambda inverted, clips, gamma: DepthEdits(inverted, min(clips), max(clips), gamma),
+    st.booleans(),
+    st.just((0.0, 1.0)) | st.tuples(shares, shares),
+    st.floats(0.25, 4),
+)
+
+
+def slow_toned(value: float, low: float, high: float, edits: DepthEdits) -> float:
+    share = (value - low) / (high - low)
+    if edits.is_inverted:
+        share = 1 - share
+    if edits.far_clip > 0:
+        share = max(share, edits.far_clip)
+    if edits.near_clip < 1:
+        share = min(share, edits.near_clip)
+    if 0 <= share <= 1:
+        share = share**edits.gamma
+    elif share > 1:
+        share = 1 + edits.gamma * (share - 1)
+    return low + share * (high - low)
+
+
+@given(tones, st.integers(0, 1000))
+def test_tone_is_its_slow_twin_at_every_pixel(edits, seed) -> None:
+    disparity = np.random.default_rng(seed).normal(0, 3, (7, 9)).astype(np.float32)
+    low, high = extent_of(disparity)
+    wanted = [slow_toned(float(value), low, high, edits) for value in disparity.flat]
+    np.testing.assert_allclose(apply_tone(disparity, edits).flat, wanted, rtol=1e-5, atol=1e-5)
+
+
+@pytest.mark.parametrize("edits", [UNEDITED, DepthEdits(True, 0.2, 0.8, 2.0), DepthEdits(gamma=0.25)])
+@pytest.mark.parametrize(
+    "values",
+    [[np.nan, 1, 2], [np.inf, -np.inf, 1], [3e38, -3e38, 0], [1e-40, 2e-40, 0], [5, 5, 5], [0, 0, 1e6], [7]],
+    ids=str,
+)
+def test_hard_maps_stay_finite(values, edits) -> None:
+    result = apply_tone(np.array([values], np.float32), edits)
+    assert result.shape == (1, len(values))
+    assert np.isfinite(result).all()
+
+
+@pytest.mark.parametrize("shape", [(0, 0), (0, 5), (2, 3)])
+def test_a_map_that_knows_nothing_is_an_error(shape) -> None:
+    with pytest.raises(InputError, match="no disparity is known"):
+        extent_of(np.full(shape, np.nan, np.float32))
+
+
+def test_the_extent_leaves_wild_values_out_and_a_flat_map_has_one_too() -> None:
+    disparity = np.random.default_rng(0).uniform(-1, 1, (100, 100)).astype(np.float32)
+    disparity[3, 3] = 1e6
+    low, high = extent_of(disparity)
+    assert -1 <= low < high <= 1
+    low, high = extent_of(np.full((10, 200), 3.0, np.float32))
+    assert (low, high) == (2.0, 4.0)
+
+
+def test_levels_count_every_pixel_once() -> None:
+    disparity = np.random.default_rng(0).normal(size=(40, 50)).astype(np.float32)
+    disparity[0, :3] = np.nan
+    levels = levels_of(disparity)
+    assert len(levels.counts) == HISTOGRAM_BINS
+    assert sum(levels.counts) == 40 * 50 - 3
+    inside = np.mean((disparity > levels.low) & (disparity < (levels.low + levels.high) / 2))
+    assert sum(levels.counts[: HISTOGRAM_BINS // 2]) / sum(levels.counts) == pytest.approx(inside, abs=0.01)
+
+
+@pytest.mark.parametrize(
+    "edits",
+    [
+        DepthEdits(gamma=np.nan),
+        DepthEdits(far_clip=0.6, near_clip=0.5),
+        DepthEdits(strokes=(Stroke("nearer", (), 0.1, 0.5),)),
+        DepthEdits(strokes=(Stroke("carve", ((0.5, 0.5),), 0.1, 0.5),)),
+        DepthEdits(strokes=(Stroke("nearer", ((0.5, np.inf),), 0.1, 0.5),)),
+    ],
+)
+def test_edits_that_make_no_sense_are_refused(edits) -> None:
+    with pytest.raises(InputError, match="depth edits"):
+        require_sound(edits)
+
+
+HEIGHT, WIDTH = 30, 40
+
+
+def plain_photo(left: float = 0.3, right: float = 0.7) -> np.ndarray:
+    photo = np.full((HEIGHT, WIDTH, 3), left, np.float32)
+    photo[:, WIDTH // 2 :] = right
+    return photo
+
+
+def plane() -> np.ndarray:
+    """A disparity that rises from left to right, 0 to 1."""
+    return np.tile(np.linspace(0, 1, WIDTH, dtype=np.float32), (HEIGHT, 1))
+
+
+def dab(tool="nearer", x=0.4, y=0.5, radius=0.2, strength=0.5):
+    return Stroke(tool, ((x, y),), radius, strength)
+
+
+@pytest.mark.parametrize(("tool", "sign"), [("nearer", 1), ("farther", -1)])
+def test_a_dab_moves_its_middle_by_its_strength_and_ends_at_its_radius(tool, sign) -> None:
+    photo, disparity = np.full((61, 81, 3), 0.5, np.float32), np.linspace(0, 10, 61 * 81, dtype=np.float32)
+    edits = DepthEdits(strokes=(dab(tool, 0.5, 0.5, 10 / 81, 0.25),))
+    change = sign * (apply_edits(photo, disparity.reshape(61, 81), edits) - disparity.reshape(61, 81))
+    assert change[30, 40] == pytest.approx(0.25 * 10, rel=0.01)
+    y, x = np.mgrid[:61, :81]
+    away = np.hypot(x - 40, y - 30)
+    assert not change[away > 11].any()
+    assert (change[away < 8] > 0).all()
+
+
+@pytest.mark.parametrize("tool", BRUSH_TOOLS)
+def test_a_stroke_does_not_cross_a_contour_and_changes_nothing_outside_the_photo(tool) -> None:
+    photo, disparity = plain_photo(), plane()
+    disparity[:, WIDTH // 2 :] += 3
+    disparity[::2, : WIDTH // 2] += 0.5
+    painted = apply_edits(photo, disparity, DepthEdits(strokes=(dab(tool, x=0.45),)))
+    change = np.abs(painted - disparity)
+    assert change[:, : WIDTH // 2].max() > 0.1
+    assert not change[:, WIDTH // 2 :].any()
+    if tool == "smooth":
+        assert np.abs(np.diff(painted[10:20, 18], axis=0)).mean() < 0.4, "rows differ by 0.5"
+    outside = tuple(dab(tool, *place) for place in ((-5.0, 0.5), (1e30, -1e30), (0.5, 40.0)))
+    np.testing.assert_array_equal(apply_edits(photo, disparity, DepthEdits(strokes=outside)), disparity)
+
+
+@pytest.mark.parametrize("tool", DEPTH_TOOLS)
+def test_level_and_bucket_paint_the_depth_where_they_begin_or_another_place(tool) -> None:
+    photo, disparity = plain_photo(), plane()
+    for taken_from, at in ((None, int(0.3 * WIDTH)), ((0.9, 0.1), int(0.9 * WIDTH)), ((7.0, -2.0), WIDTH - 1)):
+        stroke = replace(dab(tool, x=0.3, strength=1.0), taken_from=taken_from)
+        result = apply_edits(photo, disparity, DepthEdits(strokes=(stroke,)))
+        assert result[HEIGHT // 2, int(0.3 * WIDTH)] == pytest.approx(disparity[0, at], abs=0.02)
+        np.testing.assert_array_equal(result[:, WIDTH // 2 :], disparity[:, WIDTH // 2 :])
+
+
+places = st.tuples(st.floats(-0.2, 1.2), st.floats(-0.2, 1.2))
+strokes = st.builds(
+    Stroke,
+    st.sampled_from(BRUSH_TOOLS),
+    st.lists(places, min_size=1, max_size=4).map(tuple),
+    st.floats(0.01, 0.25),
+    st.floats(0, 1),
+    st.none() | places,
+)
+edits = st.builds(
+    lambda inverted, gamma, strokes: DepthEdits(inverted, gamma=gamma, strokes=tuple(strokes)),
+    st.booleans(),
+    st.sampled_from((0.5, 1.0)),
+    st.lists(strokes, max_size=12),
+)
+
+
+@settings(max_examples=8)
+@given(st.lists(edits, min_size=1, max_size=4))
+def test_a_canvas_shows_the_same_whatever_it_showed_before(wanted) -> None:
+    tiles = np.random.default_rng(0).uniform(0, 0.3, (HEIGHT // 5, WIDTH // 5, 3)).astype(np.float32)
+    photo, last = tiles.repeat(5, 0).repeat(5, 1), UNEDITED
+    canvas = DepthCanvas(photo, plane())
+    for edit in wanted:
+        *before, newest = edit.strokes or (dab(),)
+        drawn = [replace(edit, strokes=(*before, replace(newest, points=newest.points[:n]))) for n in (1, 2)]
+        for step in (*drawn, edit, replace(edit, strokes=tuple(before)), last):
+            shown = canvas.apply(step)
+            kept = shown.copy()
+            np.testing.assert_array_equal(shown, apply_edits(photo, plane(), step))
+            canvas.apply(edit)
+            np.testing.assert_array_equal(shown, kept, "maps handed out must not change")
+        last = edit
+
+
+def test_a_canvas_continues_from_a_map_that_another_painted() -> None:
+    photo, disparity = plain_photo(), plane()
+    strokes = tuple(replace(dab(), points=((0.1 * k, 0.5),)) for k in range(1, 9))
+    whole, part, other = (DepthEdits(gamma=2.0, strokes=strokes[:count]) for count in (8, 6, 5))
+    canvas = DepthCanvas(photo, disparity)
+    canvas.resume(part, apply_edits(photo, disparity, part))
+    assert [canvas.strokes_ahead(edits) for edits in (whole, part, other)] == [2, 0, 5]
+    assert canvas.strokes_ahead(replace(whole, gamma=1.0)) == 8
+    for edits in (whole, other):
+        np.testing.assert_array_equal(canvas.apply(edits), apply_edits(photo, disparity, edits))
+
+
+@pytest.mark.parametrize("tool", BRUSH_TOOLS)
+@pytest.mark.parametrize("shape", [(1, 1), (7, 1), (HEIGHT, WIDTH)])
+@pytest.mark.parametrize("wild", [0.0, np.nan, 3e38])
+def test_tiny_photos_and_wild_values_stay_finite(shape, tool, wild) -> None:
+    photo, disparity = np.full((*shape, 3), 0.5, np.float32), np.zeros(shape, np.float32)
+    disparity[1:20, 1:] = wild
+    stroke = Stroke(tool, ((0.1, 0.1), (0.5, 0.5), (0.9, 0.9)), 0.25, 1.0)
+    result = apply_edits(photo, disparity, DepthEdits(strokes=(stroke, stroke)))
+    assert np.isfinite(result).all()
+    assert wild or tool in ("smooth", *DEPTH_TOOLS) or result.any()
+
+
+@pytest.mark.parametrize(("tool", "change"), [("forward", 0.3), ("back", -0.3)])
+def test_a_surface_moves_as_a_whole_by_a_share_of_the_range(tool, change) -> None:
+    photo, disparity = np.full((40, 60, 3), 0.3, np.float32), np.zeros((40, 60), np.float32)
+    photo[10:30, 20:40] = 0.8
+    disparity[10:30, 20:40] = np.linspace(4.0, 5.0, 20)
+    disparity[:, 50:] = 10.0
+    moved = apply_edits(photo, disparity, DepthEdits(strokes=(Stroke(tool, ((0.5, 0.5),), 0.02, 0.3),)))
+    expected = disparity.copy()
+    expected[10:30, 20:40] += 10 * change
+    differs = np.abs(moved - expected) > 1e-5
+    assert differs.sum() <= 4, "only its corners may belong to either side"
+
+
+ROWS, COLUMNS = 60, 80
+
+
+def grey_photo(color: float = 0.4) -> np.ndarray:
+    return np.full((ROWS, COLUMNS, 3), color, np.float32)
+
+
+def filled(photo, x=0.1, y=0.5, radius=0.03, disparity=None):
+    disparity = np.zeros(photo.shape[:2], np.float32) if disparity is None else disparity
+    return surface_at(photo, disparity, Stroke("fill", ((x, y),), radius, 1.0), 0, (0.0, 1.0))
+
+
+def test_an_edge_of_the_photo_or_of_the_map_ends_it() -> None:
+    photo, left = grey_photo(), np.zeros((ROWS, COLUMNS), bool)
+    left[:, :50] = True
+    photo[~left] = 0.8
+    np.testing.assert_array_equal(filled(photo), left)
+    np.testing.assert_array_equal(filled(photo, x=0.9), ~left)
+    np.testing.assert_array_equal(filled(grey_photo(), disparity=np.where(left, 0, 0.5).astype(np.float32)), left)
+    soft = ndimage.gaussian_filter(photo, (0, 1, 0))
+    assert (filled(soft) ^ filled(soft, x=0.9)).all(), "a blurred edge belongs half to each side"
+
+
+def test_soft_shades_are_one_until_they_turn_into_another_colour() -> None:
+    shade = np.linspace(0.1, 0.9, COLUMNS, dtype=np.float32)
+    photo = np.broadcast_to(shade[:, None], (ROWS, COLUMNS, 3))
+    assert filled(0.3 + photo / 4, disparity=np.tile(shade, (ROWS, 1))).all()
+    mask = filled(photo.copy())
+    assert mask[:, :10].all()
+    assert not mask[:, COLUMNS // 2 :].any()
+
+
+def test_it_does_not_run_out_through_a_gap() -> None:
+    photo = grey_photo()
+    photo[:, 38:42] = 0.9
+    photo[30:33, 38:42] = 0.4
+    mask = filled(photo)
+    assert mask[:, :34].all(), "its mouth is as near to edges as the gap itself"
+    assert not mask[:, 42:].any()
+
+
+def test_texture_under_the_brush_is_no_edge() -> None:
+    photo = grey_photo(0.3)
+    photo[:, ::2] = 0.6
+    photo[:, 60:] = [0.1, 0.9, 0.1]
+    assert filled(photo, radius=0.1)[:, :58].all()
+    assert not filled(photo, radius=0.1)[:, 60:].any()
+
+
+def test_holes_smaller_than_the_brush_are_filled_and_larger_ones_are_not() -> None:
+    photo = grey_photo()
+    photo[10:13, 40:43] = 0.9
+    photo[30:45, 40:60] = 0.9
+    mask = filled(photo)
+    assert mask[:25].all()
+    assert not mask[32:43, 42:58].any()
+
+
+def test_thin_surfaces_and_clicks_on_edges_give_something_and_clicks_outside_nothing() -> None:
+    photo = grey_photo()
+    photo[:, 40:43] = 0.9
+    assert all(filled(photo, *place).any() for place in ((0.5, 0.5), (0.51, 0.1)))
+    assert not any(filled(photo, *place).any() for place in ((-0.1, 0.5), (0.5, 1.0), (1e30, 0.5)))
+
+
+@pytest.mark.parametrize(("tolerance", "columns"), [(0.25, 20), (1.0, 50), (4.0, 80)])
+def test_tolerance_is_the_contrast_that_ends_the_surface(tolerance, columns) -> None:
+    photo = grey_photo()
+    photo[:, 20:] += 0.06
+    photo[:, 50:] += 0.2
+    stroke = Stroke("fill", ((0.1, 0.5),), 0.02, 1.0, tolerance=tolerance)
+    mask = surface_at(photo, np.zeros((ROWS, COLUMNS), np.float32), stroke, 0, (0.0, 1.0))
+    assert mask[:, : columns - 2].all()
+    assert not mask[:, columns + 2 :].any()

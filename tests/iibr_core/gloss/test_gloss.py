@@ -1,0 +1,286 @@
+from dataclasses import replace
+from itertools import product
+from math import cos, pi, radians, sin, sqrt
+
+import numpy as np
+import pytest
+
+from iibr_core.color import linear_from_srgb, srgb_from_linear
+from iibr_core.gloss.geometry import SceneGeometry
+from iibr_core.gloss.microfacet import reflected_share
+from iibr_core.gloss.normals import fit_normals
+from iibr_core.gloss.settings import Gloss, GlossLight, GlossStroke, GlossSurface
+from iibr_core.gloss.shading import make_gloss_maps, shade, shade_views
+from iibr_core.gloss.surface_mask import surface_mask
+from iibr_core.types import GridShape, ViewOffset, ViewUpdate
+
+SIZE = 60, 80
+GEOMETRY = SceneGeometry(focal_px=90.0, infinity=-1.5)
+
+
+def rays(size=SIZE, geometry=GEOMETRY):
+    y, x = np.mgrid[: size[0], : size[1]].astype(np.float64)
+    return np.stack(
+        [(x - (size[1] - 1) / 2) / geometry.focal_px, (y - (size[0] - 1) / 2) / geometry.focal_px, np.ones(size)], -1
+    )
+
+
+def disparity_of(depth, geometry=GEOMETRY):
+    return (geometry.focal_px / depth + geometry.infinity).astype(np.float32)
+
+
+def sphere(centre=(0, 0, 40.0), radius=12.0, behind=60.0):
+    """(disparity, normals, hit) of a sphere before a wall."""
+    direction, centre = rays(), np.array(centre)
+    a, b, c = (direction**2).sum(-1), direction @ centre, centre @ centre - radius**2
+    root = b * b - a * c
+    hit = root > 0
+    depth = np.where(hit, (b - np.sqrt(np.maximum(root, 0))) / a, behind)
+    normals = np.where(hit[..., None], (direction * depth[..., None] - centre) / radius, [0, 0, -1.0])
+    return disparity_of(depth), normals.astype(np.float32), hit
+
+
+def plane(normal=(0.3, -0.4, -1.0), distance=40.0):
+    """(disparity, normal) of a plane through (0, 0, distance)."""
+    normal = np.array(normal) / np.linalg.norm(normal)
+    depth = distance * normal[2] / (rays() @ normal)
+    return disparity_of(depth), normal.astype(np.float32)
+
+
+UP = np.array([0.0, 0.0, 1.0])
+
+
+def direction(polar_deg, azimuth_deg=0.0):
+    polar, azimuth = radians(polar_deg), radians(azimuth_deg)
+    return np.array([sin(polar) * cos(azimuth), sin(polar) * sin(azimuth), cos(polar)])
+
+
+def share(gloss, n, v, light):
+    return reflected_share(tuple(n), tuple(v), tuple(light), gloss.lobe)
+
+
+def textbook(gloss, n, v, light):
+    """D G F / (4 n.l n.v) times the irradiance of a disc of radiance 1; Walter et al. 2007, Heitz 2014."""
+    width2, disc, _ = gloss.lobe
+    h = (v + light) / np.linalg.norm(v + light)
+    n_l, n_v, n_h, v_h = n @ light, n @ v, n @ h, v @ h
+    d = width2 / (pi * (n_h**2 * (width2 - 1) + 1) ** 2)
+
+    def smith_lambda(cosine):
+        return (-1 + sqrt(1 + width2 * (1 / cosine**2 - 1))) / 2
+
+    g = 1 / (1 + smith_lambda(n_l) + smith_lambda(n_v))
+    f = gloss.reflectance + (1 - gloss.reflectance) * (1 - v_h) ** 5
+    return f * min(d * g / (4 * n_l * n_v) * n_l * pi * disc, 1.0)
+
+
+@pytest.mark.parametrize("roughness", [0.1, 0.3, 0.7, 1.0])
+def test_it_is_the_textbooks_lobe(roughness):
+    gloss = Gloss(roughness=roughness, reflectance=0.08)
+    rng = np.random.default_rng(1)
+    for _ in range(50):
+        v, light = direction(*rng.uniform((0, 0), (85, 360))), direction(*rng.uniform((0, 0), (85, 360)))
+        assert share(gloss, UP, v, light) == pytest.approx(textbook(gloss, UP, v, light), rel=1e-6, abs=1e-12)
+
+
+def test_a_mirror_shows_the_light_itself_and_nothing_beside_it():
+    mirror = Gloss(roughness=0.0, reflectance=1.0, light=GlossLight(radius_deg=2.0))
+    v = direction(30)
+    assert share(mirror, UP, v, direction(30, 180)) == pytest.approx(1.0, rel=0.01)
+    assert share(mirror, UP, v, direction(45, 180)) < 0.01
+
+
+@pytest.mark.parametrize("roughness", [0.35, 1.0])
+@pytest.mark.parametrize("polar_deg", [0, 75, 88])
+def test_no_more_light_leaves_than_came(roughness, polar_deg):
+    """Over all directions of the eye, a light of irradiance 1 gives at most 1, whatever the surface."""
+    gloss = Gloss(roughness=roughness, reflectance=1.0, light=GlossLight(radius_deg=1.0))
+    disc, light, count, total = gloss.lobe[1], direction(polar_deg), 100, 0.0
+    for p, a in product((np.arange(count) + 0.5) / count * pi / 2, (np.arange(count) + 0.5) / count * pi):
+        total += share(gloss, UP, (sin(p) * cos(a), sin(p) * sin(a), cos(p)), light) * cos(p) * sin(p)
+    total *= (pi / 2 / count) * (2 * pi / count)
+    assert 0 < total / (pi * disc * cos(radians(polar_deg))) <= 1.02
+
+
+@pytest.mark.parametrize(
+    ("v", "light"), [((30, 0), (91, 180)), ((91, 0), (30, 180)), ((120, 0), (120, 180)), ((0, 0), (180, 0))]
+)
+def test_light_or_eye_behind_the_surface_gives_nothing(v, light):
+    assert share(Gloss(), UP, direction(*v), direction(*light)) == 0
+
+
+def degrees_apart(a, b):
+    return np.degrees(np.arccos(np.clip((a * b).sum(-1), -1, 1)))
+
+
+def test_normals_of_a_plane_are_exact_up_to_the_border():
+    disparity, normal = plane()
+    assert degrees_apart(fit_normals(disparity, GEOMETRY), normal).max() < 0.2
+
+
+def test_normals_of_a_sphere_come_close_and_the_wall_behind_it_stays_flat():
+    disparity, normals, hit = sphere()
+    apart = degrees_apart(fit_normals(disparity, GEOMETRY), normals)
+    assert np.median(apart[hit]) < 1
+    assert np.percentile(apart[hit], 90) < 5
+    assert np.percentile(apart[~hit], 99) < 1
+    step = (disparity.max() - disparity.min()) / 255
+    apart = degrees_apart(fit_normals(np.round(disparity / step) * step, GEOMETRY), normals)
+    assert np.median(apart[hit]) < 4, "also of a map in steps"
+
+
+def test_a_depth_edge_between_two_planes_bends_neither():
+    depth = np.full(SIZE, 60.0)
+    depth[:, 40:] = 30.0
+    facing = np.array([0, 0, -1], np.float32)
+    assert degrees_apart(fit_normals(disparity_of(depth), GEOMETRY), facing).max() < 0.1
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (1, 7), (5, 1), (2, 2)])
+@pytest.mark.parametrize("value", [0.0, 3.0, -1.5])
+def test_flat_maps_of_any_size_face_the_camera(shape, value):
+    normals = fit_normals(np.full(shape, value, np.float32), GEOMETRY)
+    assert np.allclose(normals, [0, 0, -1], atol=1e-3)
+
+
+def test_rounding_from_pixel_to_pixel_does_not_show_in_the_normals_of_a_large_map():
+    """Taps of large maps lie apart; a map that alternates must not have normals that do."""
+    y, x = np.mgrid[:300, :700]
+    rounded = (5 + 0.004 * x + 0.02 * ((x + y) % 2)).astype(np.float32)
+    normals = fit_normals(rounded, SceneGeometry(600.0, 0.0))[40:-40, 40:-40]
+    assert np.abs(np.diff(normals[..., 0], axis=1)).max() < 0.01
+
+
+def test_depth_and_colour_choose_the_surface():
+    disparity = np.tile(np.linspace(0, 10, 11, dtype=np.float32), (3, 1))
+    photo = np.zeros((3, 11, 3), np.float32)
+    photo[1] = (1, 0, 0)
+    near_red = GlossSurface(farthest=0.55, color=(1, 0, 0), tolerance=0.1)
+    mask = surface_mask(near_red, photo, disparity)
+    assert mask[1].tolist() == [0] * 6 + [1] * 5
+    assert not mask[[0, 2]].any()
+
+
+def test_strokes_mark_and_erase_in_their_order():
+    flat, photo = np.zeros((20, 40), np.float32), np.zeros((20, 40, 3), np.float32)
+    across = GlossStroke(((0.25, 0.5), (0.75, 0.5)), 0.05)
+    middle = GlossStroke(((0.5, 0.5),), 0.05, erases=True)
+    mask = surface_mask(GlossSurface(strokes=(across, middle), strokes_only=True), photo, flat)
+    y, x = np.mgrid[:20, :40]
+    path = np.abs(y - 9.5) ** 2 + np.maximum(np.abs(x - 19.5) - 10, 0) ** 2 <= 4
+    hole = (y - 9.5) ** 2 + (x - 19.5) ** 2 <= 4
+    assert np.array_equal(mask > 0, path & ~hole)
+
+
+def test_strokes_beyond_the_picture_mark_what_of_it_they_reach():
+    flat, photo = np.zeros((10, 10), np.float32), np.zeros((10, 10, 3), np.float32)
+    far = GlossStroke(((-0.9, -0.9),), 0.01)
+    corner = GlossStroke(((-0.05, 0.05),), 0.2)
+    mask = surface_mask(GlossSurface(strokes=(far, corner), strokes_only=True), photo, flat)
+    assert mask[0, 0] == 1
+    assert mask.sum() < 10
+
+
+GREY = np.full((*SIZE, 3), 0.4, np.float32)
+GLOSS = Gloss(roughness=0.35, light=GlossLight((-0.3, -0.3, -1)))
+
+
+def maps_of(gloss, disparity, geometry=GEOMETRY, normals=None, photo=GREY):
+    return make_gloss_maps(gloss.surface, photo, disparity, geometry, normals)
+
+
+def shaded(gloss, maps, offset, disparity=None, photo=GREY):
+    colors = photo.copy()
+    shade(colors, maps.disparity if disparity is None else disparity, ViewOffset(*offset), gloss, maps)
+    return colors
+
+
+def plainly_shaded(gloss, maps, offset, photo):
+    """The same of a flat map, whose disparity is known at every place: pixel by pixel, by the docstrings' formulas."""
+    height, width = maps.mask.shape
+    result = linear_from_srgb(photo)
+    light, focal = gloss.light.unit_direction, maps.geometry.focal_px
+    for y, x in np.ndindex(height, width):
+        d = maps.disparity[y, x]
+        v, u = y + d * offset[0], x + d * offset[1]
+        if not (0 <= v <= height - 1 and 0 <= u <= width - 1):
+            continue
+        near = d - maps.geometry.infinity
+        point = np.array([(u - (width - 1) / 2) / near, (v - (height - 1) / 2) / near, focal / near])
+        eye = np.array([offset[1], offset[0], 0]) - point
+        eye /= np.linalg.norm(eye)
+        normal = maps.normals[round(v), round(u)]
+        share = reflected_share(tuple(normal), tuple(eye), light, gloss.lobe)
+        for c in range(3):
+            result[y, x, c] += share * (gloss.light.radiance[c] - result[y, x, c])
+    return srgb_from_linear(result)
+
+
+@pytest.mark.parametrize("offset", [(0, 0), (1, -2)])
+def test_it_is_the_lobe_at_every_pixel(offset):
+    flat = np.full(SIZE, 0.75, np.float32)
+    maps = maps_of(GLOSS, flat)
+    inner = slice(4, -4), slice(4, -4)
+    assert np.allclose(shaded(GLOSS, maps, offset)[inner], plainly_shaded(GLOSS, maps, offset, GREY)[inner], atol=1e-4)
+
+
+def test_on_a_plane_the_highlight_of_a_far_light_stays_in_the_frame_of_what_is_far():
+    """Its virtual image is infinitely far: it moves by the disparity of infinity, not by the surface's."""
+    disparity, _ = plane((0, 0, -1))
+    gloss = replace(GLOSS, light=GlossLight((0.05, 0, -1)))
+    maps = maps_of(gloss, disparity)
+    places = [shaded(gloss, maps, (0, s)).sum(-1).argmax() % SIZE[1] for s in (-2, 0, 2)]
+    assert places[0] - places[1] == pytest.approx(2 * GEOMETRY.infinity, abs=1)
+    assert places[1] - places[2] == pytest.approx(2 * GEOMETRY.infinity, abs=1)
+
+
+@pytest.mark.parametrize("roughness", [0.0, 1.0])
+@pytest.mark.parametrize("shape", [(1, 1), (1, 9), (9, 1), (6, 7)])
+def test_mirrors_and_dull_surfaces_of_any_size_are_finite(roughness, shape):
+    photo = np.random.default_rng(0).uniform(0, 1, (*shape, 3)).astype(np.float32)
+    disparity = np.random.default_rng(1).uniform(-1, 3, shape).astype(np.float32)
+    gloss = Gloss(roughness=roughness)
+    maps = maps_of(gloss, disparity, SceneGeometry(8.0, 0.0), photo=photo)
+    assert np.isfinite(shaded(gloss, maps, (1.5, -100.0), photo=photo)).all()
+
+
+@pytest.mark.parametrize("roughness", [0.0, 1.0])
+def test_a_plane_seen_edge_on_is_no_brighter_than_the_light(roughness):
+    """Grazing, everything is a mirror: what is reflected replaces the paint."""
+    grazing = 1.45
+    disparity, normal = plane((0, -np.sin(grazing), -np.cos(grazing)))
+    towards = np.array([0, -np.sin(0.2), np.cos(0.2)])
+    gloss = Gloss(roughness=roughness, light=GlossLight(tuple(towards), (0.002, 0.002, 0.002), radius_deg=3.0))
+    maps = maps_of(gloss, disparity, normals=np.broadcast_to(normal, (*SIZE, 3)).copy())
+    light = linear_from_srgb(shaded(gloss, maps, (0, 1)))
+    assert light.min() >= linear_from_srgb(GREY).min() - 1e-4
+    assert light.max() <= max(gloss.light.radiance) + 1e-3
+
+
+def test_what_shows_beside_a_surface_in_other_views_gets_none_of_its_gloss():
+    disparity, _, hit = sphere()
+    gloss = replace(GLOSS, surface=GlossSurface(farthest=0.1), reflectance=1.0)
+    maps = maps_of(gloss, disparity)
+    wall = np.full(SIZE, disparity[~hit].max(), np.float32)
+    assert np.array_equal(shaded(gloss, maps, (0, 3), disparity=wall), GREY)
+
+
+@pytest.mark.parametrize("is_marked", [True, False])
+def test_views_keep_their_kind_and_those_without_disparity_or_surface_stay(is_marked):
+    flat = np.full(SIZE, 0.75, np.float32)
+    given = [ViewUpdate(1, 1, (GREY * 255).astype(np.uint8), flat), ViewUpdate(1, 0, GREY.astype(np.float16), None)]
+    gloss = replace(GLOSS, surface=GlossSurface(strokes_only=not is_marked))
+    first, second = shade_views(iter(given), gloss, maps_of(gloss, flat), GridShape(3, 3))
+    assert second is given[1]
+    if is_marked:
+        assert first.colors.dtype == np.uint8
+        assert first.colors.max() > given[0].colors.max()
+    else:
+        assert first is given[0]
+
+
+def test_a_smaller_light_of_the_same_strength_is_brighter_and_needs_a_direction():
+    wide = GlossLight(radius_deg=4.0)
+    assert replace(wide, radius_deg=2.0).radiance[0] == pytest.approx(4 * wide.radiance[0], rel=0.01)
+    with pytest.raises(ValueError, match="direction"):
+        GlossLight(direction=(0.0, 0.0, 0.0))
