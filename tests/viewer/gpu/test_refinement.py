@@ -39,10 +39,14 @@ def test_refining_comes_nearer_to_brute_force(renderer: Renderer) -> None:
     assert likeness[-1] > likeness[0] + 6
 
 
-def test_small_steps_end_at_the_same_picture_as_one_large(renderer: Renderer) -> None:
+@pytest.mark.parametrize(
+    "optics", [WIDE, Optics(ViewOffset(0.0, 2.0), aperture_diameter=3.0)], ids=["inside", "border"]
+)
+def test_small_steps_end_at_the_same_picture_as_one_large(renderer: Renderer, optics: Optics) -> None:
+    """At the border only some cameras are near stored views; the size of the steps must not choose the search."""
     SCENE.fill(renderer, GRID)
-    at_once = converged(renderer, WIDE)
-    renderer.render_in_time(WIDE, SIZE, 1e-6)
+    at_once = converged(renderer, optics)
+    renderer.render_in_time(optics, SIZE, 1e-6)
     samples = [renderer.samples]
     while not renderer.is_converged:
         renderer.refine(1e-6)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import moderngl
 
@@ -13,34 +12,11 @@ from iibr_core.beyond.picture_quality import MAX_SAMPLES
 from iibr_core.scenes.screen_size import ScreenSize
 from viewer.gpu.light_field_texture import LightFieldTexture
 from viewer.gpu.programs import ProgramCache
-from viewer.gpu.refocus.passes import Passes, Rows
-from viewer.gpu.refocus.picture_lens import Lens
-from viewer.gpu.refocus.view_sampling import Samples
+from viewer.gpu.refocus.passes import Passes, ProgressiveAccumulation, Rows
 from viewer.gpu.render_targets import PictureTargets
 
 MIN_ROWS = 16
 """Smallest number of rows of a step: fewer rows save no time, because a draw has a cost of its own."""
-
-
-@dataclass
-class ProgressiveAccumulation:
-    """A picture being summed up: cameras before camera `at` of pass `pass_index` are drawn, out of `passes` passes.
-
-    samples: cameras of this pass. done: number of cameras drawn in all passes.
-    """
-
-    lens: Lens
-    size_px: ScreenSize
-    passes: int
-    samples: Samples | None = None
-    pass_index: int = 0
-    at: int = 0
-    done: int = 0
-
-    @property
-    def is_complete(self) -> bool:
-        """Whether every pass is drawn."""
-        return self.pass_index == self.passes
 
 
 class Accumulator:
@@ -115,10 +91,9 @@ class Accumulator:
         assert samples is not None
         # The views that answer a pinhole are blended: none is shown alone.
         batch = samples if lens.diameter == 0 else samples.part(at, at + count)
-        cell = lens.cell(accumulation.pass_index)
         for rows in _row_bands(targets.size_px, pixels_per_step / len(batch)):
             self._ctx.disable(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
-            self.passes.draw_lens(field, lens, batch, accumulation.done, cell, targets, rows)
+            self.passes.draw_lens(field, accumulation, batch, targets, rows)
             yield
         accumulation.at, accumulation.done = at + len(batch), accumulation.done + len(batch)
         if accumulation.at >= len(samples):

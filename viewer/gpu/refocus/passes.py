@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.beyond.aperture_sampling import SQRT_STEPS, fractions
 from iibr_core.beyond.picture_quality import ALONE_NEAR_PX, MAX_SAMPLES, NEAR_PX, OFF_BORDER_PX
+from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import SRGB, ColorSpace
 from viewer.gpu.light_field_texture import LightFieldTexture
 from viewer.gpu.programs import Program, ProgramCache
@@ -22,6 +25,27 @@ CORNERS = np.array([(0, 0), (1, 1), (1, 0), (0, 1)], np.float32)
 
 Rows = tuple[int, int]
 """First row of a target, and the row after the last."""
+
+
+@dataclass
+class ProgressiveAccumulation:
+    """A picture being summed up: cameras before camera `at` of pass `pass_index` are drawn, out of `passes` passes.
+
+    samples: cameras of this pass. done: number of cameras drawn in all passes.
+    """
+
+    lens: Lens
+    size_px: ScreenSize
+    passes: int
+    samples: Samples | None = None
+    pass_index: int = 0
+    at: int = 0
+    done: int = 0
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether every pass is drawn."""
+        return self.pass_index == self.passes
 
 
 class Passes:
@@ -42,17 +66,17 @@ class Passes:
     def draw_lens(
         self,
         field: LightFieldTexture,
-        lens: Lens,
-        samples: Samples,
-        first: int,
-        cell: float,
+        accumulation: ProgressiveAccumulation,
+        batch: Samples,
         targets: PictureTargets,
         rows: Rows,
     ) -> None:
-        """Add the light of at most MAX_SAMPLES cameras to some rows of the target.
+        """Add the light of at most MAX_SAMPLES cameras of a pass to some rows of the target.
 
-        first: number of the first camera. cell: side of the square of the aperture around a camera, view steps.
+        The search for surfaces depends on all cameras of the pass, so the picture does not depend on the batches.
         """
+        lens, samples = accumulation.lens, accumulation.samples
+        assert samples is not None
         has_views_to_warp = bool(field.has_disparity.any())
         program = self._programs.get(
             "lens.frag",
@@ -69,7 +93,8 @@ class Passes:
         width, height = targets.size_px
         across, down = lens.part.width / lens.field_part.width, lens.part.height / lens.field_part.height
         self._set_field(program, field, lens)
-        self._set_samples(program, field, lens, samples, first)
+        self._set_samples(program, field, lens, batch, accumulation.done)
+        cell = lens.cell(accumulation.pass_index)
         program.set_uniforms(cell_views=cell, pixel_uv=(across / width, down / height), field_part=lens.field_part)
         framebuffer = targets.light.framebuffer
         framebuffer.scissor = 0, rows[0], width, rows[1] - rows[0]

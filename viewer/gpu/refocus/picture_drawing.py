@@ -17,7 +17,8 @@ from iibr_core.types import ColorSpace, ViewUpdate
 from viewer.gpu.context import GLContext
 from viewer.gpu.light_field_texture import LightFieldTexture
 from viewer.gpu.programs import ProgramCache
-from viewer.gpu.refocus.accumulation import Accumulator, ProgressiveAccumulation
+from viewer.gpu.refocus.accumulation import Accumulator
+from viewer.gpu.refocus.passes import ProgressiveAccumulation
 from viewer.gpu.render_targets import PictureTargets
 
 STEP_S = 0.005

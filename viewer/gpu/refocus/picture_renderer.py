@@ -23,8 +23,9 @@ from iibr_core.types import SRGB, ColorSpace, FloatImage, GridShape, StoredColor
 from viewer.gpu.context import GLContext
 from viewer.gpu.light_field_texture import Box, LightFieldTexture
 from viewer.gpu.programs import ProgramCache
-from viewer.gpu.refocus.accumulation import Accumulator, ProgressiveAccumulation
+from viewer.gpu.refocus.accumulation import Accumulator
 from viewer.gpu.refocus.frame_budget import FrameTimeModel, choose_quality_level, fetches_of, scale_size, stretch_image
+from viewer.gpu.refocus.passes import ProgressiveAccumulation
 from viewer.gpu.refocus.picture_drawing import PictureDrawing
 from viewer.gpu.refocus.picture_lens import lens_of
 from viewer.gpu.render_targets import PictureTargets, TargetCache
