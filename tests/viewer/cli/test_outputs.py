@@ -77,7 +77,7 @@ def test_the_map_beside_the_photo_is_an_input_too(iibr: Iibr, folder: Path) -> N
         ("screenshot -o {long}.png", "File name too long"),
         ("generate --grid 3 -o {long}", "File name too long"),
         ("generate --grid 3 -o file/field", "file is a file"),
-        ("generate --grid 3 -o .", "holds photo.png"),
+        ("generate --grid 3 -o .", "holds the input photo.png"),
     ],
 )
 def test_outputs_are_refused_before_the_photo_is_read(
