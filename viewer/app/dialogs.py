@@ -9,25 +9,22 @@ from dataclasses import dataclass
 from typing import Any
 
 from iibr_core.exports.kinds import export_kind
-from viewer.model.state.prompts import FOLDER_CHOICES, ChoiceOf, ExportPrompt, SavePrompt
+from viewer.model.state.prompts import ChoiceOf, ExportPrompt, SavePrompt
 
 UNIX_HELPERS = ("zenity", "kdialog", "matedialog", "qarma")
 """Programs that show the dialog on Unix; the bundle calls the first that it finds."""
-FILE_KINDS: dict[ChoiceOf, str] = {
-    "photo": "jpg jpeg png tif tiff exr hdr webp bmp heic heif hif avif mpo lif",
-    "mask": "png jpg jpeg tif tiff bmp exr",
-    "map": "pfm exr npy png tif tiff",
-    "model": "onnx",
+CHOICES: dict[ChoiceOf, tuple[str, str]] = {
+    "photo": (
+        "Open a photo, a stereo photo or a quilt",
+        "jpg jpeg png tif tiff exr hdr webp bmp heic heif hif avif mpo lif",
+    ),
+    "folder": ("Open a folder of photos or views", ""),
+    "mask": ("Open a picture as the shape of the aperture", "png jpg jpeg tif tiff bmp exr"),
+    "map": ("Open a depth map for this photo", "pfm exr npy png tif tiff"),
+    "model": ("Open a depth model (ONNX file)", "onnx"),
+    "model folder": ("Open the folder of a depth model", ""),
 }
-"""Endings of files that can be chosen."""
-DIALOG_TITLES: dict[ChoiceOf, str] = {
-    "photo": "Open a photo, a stereo photo or a quilt",
-    "folder": "Open a folder of photos or views",
-    "mask": "Open a picture as the shape of the aperture",
-    "map": "Open a depth map for this photo",
-    "model": "Open a depth model (ONNX file)",
-    "model folder": "Open the folder of a depth model",
-}
+"""Title of the dialog, and endings of the files that can be chosen; none for folders."""
 
 
 @dataclass(frozen=True)
@@ -61,12 +58,12 @@ def ask_for_path(what: ChoiceOf, beside: str = "") -> Dialog:
     from imgui_bundle import portable_file_dialogs as dialogs
 
     start = os.path.join(os.path.dirname(os.path.abspath(beside)), "") if beside else ""
-    if what in FOLDER_CHOICES:
-        return Dialog(what, dialogs.select_folder(DIALOG_TITLES[what], start))
-    endings = FILE_KINDS[what].split()
+    title, endings = CHOICES[what][0], CHOICES[what][1].split()
+    if not endings:
+        return Dialog(what, dialogs.select_folder(title, start))
     patterns = " ".join(f"*.{ending}" for ending in (*endings, *map(str.upper, endings)))
     filters = ["Models" if what == "model" else "Images", patterns, "All files", "*"]
-    return Dialog(what, dialogs.open_file(DIALOG_TITLES[what], start, filters))
+    return Dialog(what, dialogs.open_file(title, start, filters))
 
 
 def ask_for_place(prompt: SavePrompt | ExportPrompt) -> Dialog:

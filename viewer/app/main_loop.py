@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from contextlib import closing
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -30,9 +30,9 @@ from viewer.display.scene_view import VIEW_REFRESH_S, SceneView
 from viewer.gpu.context import create_for_window
 from viewer.model import gesture, inspection, opening, preferences, saving, viewpoint, window
 from viewer.model.action import Action, do
-from viewer.model.inspection import NO_INSPECTION_TEXTURES, InspectionTextures, beside_of
+from viewer.model.inspection import NO_INSPECTION_TEXTURES, beside_of
 from viewer.model.layout import Layout, is_narrow, layout_of
-from viewer.model.state.app_state import AppState, Picture
+from viewer.model.state.app_state import AppState
 from viewer.ui.host import UiHost
 from viewer.ui.overlays.filmstrip import filmstrip_paths
 from viewer.ui.screen import build_screen
@@ -42,21 +42,6 @@ VIEWS_BUDGET_S = 0.006
 """Time for uploading views in a turn of the loop, in seconds."""
 SAVE_BUDGET_S = 0.025
 """Time for drawing a picture that is being saved in a turn of the loop, in seconds: about as long as a frame."""
-
-
-@dataclass(frozen=True)
-class Frame:
-    """Everything that the window shows. panels: digest. damages: number of redraws that the system asked for. sharp: GL
-    name of the texture in place of the picture, None without.
-    """
-
-    picture: Picture | None
-    textures: InspectionTextures
-    panels: bytes
-    layout: Layout
-    look: Look
-    damages: int
-    sharp: int | None = None
 
 
 class App:
@@ -87,7 +72,7 @@ class App:
         self._sessions = SessionStore(kept_in, wake)
         self._preferences = PreferencesKeeper(self.state, kept_in)
         self._notice_clock = NoticeClock()
-        self._shown: Frame | None = None
+        self._shown: tuple[object, ...] = ()
         self._pointer = NO_POINTER
         self._pace = Pace()
 
@@ -121,7 +106,7 @@ class App:
         texture = sharp or (self.scene_view.renderer.image_texture if picture else None)
         actions += build_screen(self.state, layout, texture, textures, thumbnails)
         actions += self._input(pointer, layout)
-        self._show(Frame(picture, textures, self._ui.end(), layout, look, self.window.damages, sharp))
+        self._show((picture, textures, self._ui.end(), layout, look, self.window.damages, sharp))
         is_still = not actions and not pointer.is_down and not pointer.pulls
         self.do(*actions)
         self.do(*self._side_effects.draw(self.state, SAVE_BUDGET_S))
@@ -242,7 +227,8 @@ class App:
         if (surface := self.inspection_view.surface_request(self.state)) is not None:
             self._surfaces.submit(surface)
 
-    def _show(self, frame: Frame) -> None:
+    def _show(self, frame: tuple[object, ...]) -> None:
+        """Draw a frame, unless all that the window shows is as in the frame before."""
         if frame == self._shown or not all(self.window.framebuffer_size):
             self._pace.same_frames += 1
             return

@@ -6,10 +6,9 @@ msgspec is imported late: it takes 10 to 40 ms, which a window without preferenc
 from __future__ import annotations
 
 import os
-from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from platformdirs import user_config_path
 
@@ -39,27 +38,17 @@ def user_folder() -> Path:
 
 def load_preferences(state: AppState, folder: Path) -> AppState:
     """Return the state with what was kept. A damaged file gives the usual values and a notice."""
-    preferences, recent, notices = state.preferences, state.recent, list(state.notices)
-    try:
-        preferences = _read(folder / PREFERENCES_FILE, Preferences, preferences)
-    except InputError as error:
-        notices.append(Notice(f"{error}. The usual preferences are used."))
-    try:
-        recent = _read(folder / RECENT_FILE, tuple[str, ...], recent)
-    except InputError as error:
-        notices.append(Notice(f"{error}. The list of recent files is empty."))
-    font_scale = clamp(preferences.font_scale, *FONT_SCALE_LIMITS)
-    last_folder = preferences.last_folder if os.path.isdir(preferences.last_folder) else ""
-    preferences = replace(preferences, font_scale=font_scale, last_folder=last_folder)
-    return replace(state, preferences=preferences, recent=recent[:MAX_RECENT], notices=tuple(notices))
+    kept, damage = _read(folder / PREFERENCES_FILE, state.preferences, "The usual preferences are used.")
+    recent, more = _read(folder / RECENT_FILE, state.recent, "The list of recent files is empty.")
+    last_folder = kept.last_folder if os.path.isdir(kept.last_folder) else ""
+    kept = replace(kept, font_scale=clamp(kept.font_scale, *FONT_SCALE_LIMITS), last_folder=last_folder)
+    return replace(state, preferences=kept, recent=recent[:MAX_RECENT], notices=(*state.notices, *damage, *more))
 
 
 def last_opened(folder: Path) -> str | None:
     """Return the path that was open last, if it still exists."""
-    with suppress(InputError):
-        path = next(iter(_read(folder / RECENT_FILE, tuple[str, ...], ())), None)
-        return path if path is not None and os.path.exists(path) else None
-    return None
+    recent, _ = _read(folder / RECENT_FILE, AppState().recent, "")
+    return recent[0] if recent and os.path.exists(recent[0]) else None
 
 
 def store_preferences(state: AppState, folder: Path) -> None:
@@ -102,13 +91,17 @@ def _write(path: Path, value: object) -> None:
         temporary.write_bytes(msgspec.json.format(msgspec.json.encode(value), indent=1))
 
 
-def _read(path: Path, kind: type[Value], usual: Value) -> Value:
-    """Return the value that the file holds, the usual one without a file. Raises InputError if it is damaged."""
+def _read(path: Path, usual: Value, consequence: str) -> tuple[Value, list[Notice]]:
+    """Return the value that the file holds; the usual one without a file, and with a notice if it is damaged."""
     if not path.exists():
-        return usual
+        return usual, []
     import msgspec
 
+    kind: Any = Preferences if isinstance(usual, Preferences) else tuple[str, ...]
     try:
-        return msgspec.json.decode(read_text(path, MAX_BYTES), type=kind)
+        return msgspec.json.decode(read_text(path, MAX_BYTES), type=kind), []
     except (ValueError, RecursionError) as error:
-        raise InputError(f"{path}: damaged ({' '.join(str(error).split())[:80]})") from error
+        reason = (
+            str(error) if isinstance(error, InputError) else f"{path}: damaged ({' '.join(str(error).split())[:80]})"
+        )
+        return usual, [Notice(f"{reason}. {consequence}")]

@@ -31,8 +31,3 @@ def test_dropped_files(paths: list[str], opened: str, disparity: str | None) -> 
     (action,) = actions_from_drop(paths, STATE)
     choice = DepthChoice(file=disparity, stretches=disparity is not None)
     assert action == do(opening.open_source, Source(opened, choice, max_pixels=7))
-
-
-def test_a_map_dropped_on_nothing_is_tried_as_a_photo() -> None:
-    assert actions_from_drop(["a.pfm"], AppState()) == [do(opening.open_source, Source("a.pfm"))]
-    assert actions_from_drop([], AppState()) == []

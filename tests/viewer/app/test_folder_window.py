@@ -46,16 +46,6 @@ def shows(driver: Driver, name: str) -> None:
     driver.until_idle()
 
 
-def test_a_folder_opens_at_its_first_photo_with_all_of_them_in_small(viewer: Driver) -> None:
-    shows(viewer, "photo0")
-    names = [photo.name for photo in viewer.app.state.folder.photos]  # type: ignore[union-attr]
-    assert names == ["photo0.png", "photo1.png", "photo2.png"]
-    folder = Path(viewer.app.state.folder.path)  # type: ignore[union-attr]
-    paths = tuple(str(folder / name) for name in names)
-    viewer.until(lambda app: len(app._filmstrip.thumbnails(paths)) == 3)
-    assert viewer.app.layout().filmstrip is not None
-
-
 def test_keys_go_to_the_next_photo_and_back_and_it_was_read_before(viewer: Driver, tmp_path: Path) -> None:
     next_photo = WantedPhoto(Source(str(tmp_path / "photo1.png"), grid=GridShape(3, 3)), 1.0)
     viewer.until(lambda app: app.scene_loader.ahead.get(next_photo) is not None)
@@ -69,19 +59,12 @@ def test_keys_go_to_the_next_photo_and_back_and_it_was_read_before(viewer: Drive
     assert viewer.app.state.scene.name == "photo0"  # type: ignore[union-attr]
 
 
-def test_a_large_photo_is_there_in_small_before_it_is_read(open_window: Opener, tmp_path: Path) -> None:
-    driver = open_window(write_large_photo(tmp_path), grid=GridShape(3, 3))
-    driver.until(lambda app: app.state.scene is not None and app.state.scene.is_sketch)
-    driver.until(lambda app: app.scene_view.picture_drawn is not None)
-    driver.until(lambda app: not app.state.scene.is_sketch)
-    driver.until_idle()
-    assert driver.app.scene_view.loaded is not None
-    assert driver.app.state.progress.is_complete
-
-
 def test_the_next_photos_are_there_in_small_before_they_are_asked_for(open_window: Opener, tmp_path: Path) -> None:
     paths = [write_large_photo(tmp_path, f"photo{i}") for i in range(3)]
     driver = open_window(tmp_path, grid=GridShape(3, 3))
+    driver.until(lambda app: app.state.scene is not None and app.state.scene.is_sketch)
+    driver.until(lambda app: app.scene_view.picture_drawn is not None)
+    driver.until(lambda app: not app.state.scene.is_sketch)
     last = WantedPhoto(Source(str(paths[2]), grid=GridShape(3, 3)), 1.0)
     driver.until(lambda app: app.scene_loader.sketches.get(last) is not None)
     for path in paths[1:]:
@@ -122,7 +105,10 @@ def test_one_goes_on_from_a_folder_whose_first_photo_cannot_be_read(open_window:
 
 
 @pytest.mark.usefixtures("wide_window")
-def test_a_click_in_the_filmstrip_opens_that_photo(viewer: Driver) -> None:
+def test_the_filmstrip_shows_all_photos_and_opens_one(viewer: Driver, tmp_path: Path) -> None:
+    paths = tuple(str(tmp_path / f"photo{i}.png") for i in range(3))
+    viewer.until(lambda app: len(app._filmstrip.thumbnails(paths)) == 3)
+    shows(viewer, "photo0")
     viewer.press("photo photo2.png", "filmstrip")
     shows(viewer, "photo2")
     generation = viewer.app.state.generation

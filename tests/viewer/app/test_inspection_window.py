@@ -9,7 +9,7 @@ import pytest
 from iibr_core.beyond.optics import Optics
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import Driver, Opener
-from viewer.model import inspection, lens, preferences
+from viewer.model import preferences
 from viewer.model.action import do
 from viewer.model.inspection import sheet_cells
 
@@ -105,19 +105,3 @@ def test_buttons_of_the_section_and_the_values_under_the_pointer(viewer: Driver)
     assert probe.origin == "photo"
     viewer.send("mousemove", round(viewer.app.layout().panel.x + 30), 500)
     viewer.until(lambda app: app.state.inspection.probe is None)
-
-
-def test_a_snapshot_is_drawn_over_several_turns(viewer: Driver) -> None:
-    """A turn draws for a short time only, so the window answers while a finished picture is drawn."""
-    app = viewer.app
-    app.do(
-        do(lens.move_eye, ViewOffset(0.3, 0.4)),
-        do(lens.set_aperture, 3.0),
-        do(inspection.take_snapshot),
-        do(lens.move_eye, ViewOffset(0, 0)),
-        do(inspection.compare, "snapshot"),
-    )
-    viewer.until(lambda app: app.inspection_view.is_drawing)
-    viewer.until_idle()
-    assert not app.inspection_view.is_drawing
-    assert app.inspection_view.draw(app.state, app.layout()).compared is not None

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -13,19 +12,17 @@ import pytest
 
 from iibr_core.color import srgb_from_linear
 from iibr_core.depth.choice import DepthChoice, DepthOrigin
-from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.formats.images.picture_kinds import KINDS, PictureFormat, is_float
 from iibr_core.formats.outputs import AlreadyThereError
 from iibr_core.scenes.scene import Scene, Source
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, InputError, ViewOffset
-from tests.viewer.conftest import HEIGHT, WIDTH, headless_with_scene, write_scene
-from viewer.app.jobs import Jobs
+from tests.viewer.conftest import HEIGHT, WIDTH, write_scene
 from viewer.app.picture_files import export_picture, inputs_of_scene, shot_of
-from viewer.app.saving import add_save, checked_path
+from viewer.app.saving import checked_path
 from viewer.display.offscreen import OffscreenScene
-from viewer.model import lens, saving
-from viewer.model.action import Action, do
+from viewer.model import lens
+from viewer.model.action import do
 from viewer.model.saved_settings import read_settings
 from viewer.model.state.app_state import AppState
 from viewer.model.state.prompts import Saved, SavePrompt
@@ -88,25 +85,6 @@ def test_pictures_beyond_the_graphics_cards_limit_are_drawn_in_parts(
     in_parts = saved(opened, tmp_path / "parts.png", large) * 255
     assert in_parts.shape == (4 * HEIGHT, 4 * WIDTH, 3)
     assert np.mean(np.abs(in_parts - at_once).max(-1) > 3) < 0.005
-
-
-def test_a_picture_is_as_it_was_when_edited_depth_is_shown_meanwhile(tmp_path: Path) -> None:
-    out = tmp_path / "out.png"
-    with headless_with_scene(tmp_path) as viewer:
-        viewer.do(do(lens.move_eye, ViewOffset(0.3, -0.7)))
-        scene_view, state, woken = viewer.view, viewer.state, threading.Event()
-        settings = RenderSettings(state.optics, ScreenSize(90, 60))
-        expected = scene_view.renderer.converged_picture(settings)
-        jobs, actions = Jobs(scene_view, woken.set), list[Action]()
-        add_save(SaveTask(SavePrompt(str(out), ScreenSize(90, 60))), state, (), jobs)
-        scene_view.show_disparity(np.zeros((HEIGHT, WIDTH), np.float32))
-        assert not np.array_equal(scene_view.renderer.converged_picture(settings), expected)
-        while do(saving.set_jobs, ()) not in actions:
-            actions += jobs.advance(state, 0.0)
-            assert woken.wait(60)
-        jobs.close()
-    assert do(saving.finish_job, out) in actions
-    np.testing.assert_array_equal(oiio.ImageBuf(str(out)).get_pixels(oiio.UINT8), expected)
 
 
 @pytest.mark.parametrize("what", ["picture", "map"])

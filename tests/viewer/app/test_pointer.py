@@ -21,7 +21,7 @@ from viewer.app.pointer import (
 from viewer.model import inspection, lens, viewpoint
 from viewer.model.action import do
 from viewer.model.focal_plane import handle_points
-from viewer.model.layout import Layout, layout_of, letterbox, pixel_at
+from viewer.model.layout import Layout, layout_of, pixel_at
 from viewer.model.state.app_state import AppState, Hover
 from viewer.model.state.lens import TiltHandles
 from viewer.model.state.viewpoint import Zoom
@@ -42,10 +42,11 @@ def asked(pointer: Pointer, state: AppState = STATE, layout: Layout = LAYOUT, pi
 @pytest.mark.parametrize(("step_x", "step_y"), [(10, 0), (-7, 0), (0, 5), (3, -4)])
 def test_near_things_follow_the_hand(step_x: float, step_y: float) -> None:
     """A point of disparity d is seen at x - d * s: for d > 0 it must move the way the pointer moved."""
-    (move,) = asked(replace(OVER_PICTURE, is_down=True, drag_distance=30, step_x=step_x, step_y=step_y))
+    state = replace(STATE, optics=Optics(eye=ViewOffset(1.0, 2.0)))
+    (move,) = asked(replace(OVER_PICTURE, is_down=True, drag_distance=30, step_x=step_x, step_y=step_y), state)
     assert move.verb is lens.move_eye
-    d = SCENE.disparity_range_px[1]
-    for moved, hand in ((-d * move.args[0].s, step_x), (-d * move.args[0].t, step_y)):
+    d, eye = SCENE.disparity_range_px[1], move.args[0]
+    for moved, hand in ((-d * (eye.s - 2.0), step_x), (-d * (eye.t - 1.0), step_y)):
         assert moved * hand >= 0
         assert abs(moved) <= abs(hand)
         assert (moved == 0) == (hand == 0)
@@ -62,14 +63,6 @@ def test_the_nearest_surface_sticks_to_the_pointer_where_parallax_is_large() -> 
 
 def test_a_drag_over_part_of_the_picture_crosses_the_grid() -> None:
     assert units_per_view(LAYOUT, SCENE) * (SCENE.grid.columns - 1) == pytest.approx(DRAG_ACROSS_GRID * PICTURE.width)
-
-
-def test_a_drag_adds_to_the_eye() -> None:
-    state = replace(STATE, optics=Optics(eye=ViewOffset(1.0, 2.0)))
-    (move,) = asked(replace(OVER_PICTURE, is_down=True, drag_distance=30, step_x=0, step_y=1), state)
-    assert move.verb is lens.move_eye
-    assert move.args[0].s == 2.0
-    assert move.args[0].t < 1.0
 
 
 def test_what_moved_before_it_was_a_drag_and_in_the_frame_of_the_release_counts() -> None:
@@ -94,6 +87,7 @@ def test_a_click_focuses_on_what_was_picked_in_picture_pixels() -> None:
     pointer = replace(OVER_PICTURE, is_released=True, clicks=1)
     assert actions_from_pointer(pointer, LAYOUT, STATE, pick) == [do(lens.focus_on, pytest.approx((0, 0)), 0.75)]
     assert seen == [pytest.approx((299.5, 199.5))]
+    assert asked(pointer, picked=None) == [], "nothing is known there"
 
 
 @pytest.mark.parametrize(
@@ -114,10 +108,6 @@ def test_what_does_nothing_or_resets(pointer: Pointer, expected: list[object]) -
     assert asked(pointer) == expected
 
 
-def test_a_click_without_disparity_does_nothing() -> None:
-    assert asked(replace(OVER_PICTURE, is_released=True, clicks=1), picked=None) == []
-
-
 def test_the_wheel_moves_the_focus_nearer_and_farther() -> None:
     (up,), (down,) = (asked(replace(OVER_PICTURE, wheel=wheel)) for wheel in (1.0, -1.0))
     assert up.verb is lens.set_focus
@@ -128,6 +118,7 @@ def test_the_wheel_moves_the_focus_nearer_and_farther() -> None:
 def test_nothing_is_asked_for_without_a_scene_or_room() -> None:
     pointer = replace(OVER_PICTURE, is_released=True, clicks=1)
     assert asked(pointer, AppState()) == []
+    assert layout_of((0, 0), (4, 3)).frame_px is None
     assert asked(pointer, layout=layout_of((200, 100), (600, 400))) == []
 
 
@@ -143,19 +134,11 @@ def test_a_drag_that_begins_on_a_handle_moves_it_onto_what_is_there(index: int) 
     assert asked(pointer, WITH_HANDLES, picked=None) == [do(lens.move_tilt_handle, index, pytest.approx((0, 0)), None)]
     (move,) = asked(pointer)
     assert move.verb is lens.move_eye, "no handles shown"
-
-
-def test_a_handle_that_was_taken_is_kept_wherever_the_drag_leads() -> None:
-    held = replace(STATE, tilt_handles=TiltHandles(taken=1))
     pointer = replace(OVER_PICTURE, is_down=True, drag_distance=300, step_x=3)
-    (move,) = asked(pointer, held)
-    assert move.verb is lens.move_tilt_handle
-    assert move.args[0] == 1
-
-
-def test_a_drag_beside_the_handles_moves_the_viewpoint() -> None:
-    (move,) = asked(replace(OVER_PICTURE, is_down=True, drag_distance=30, step_x=3), WITH_HANDLES)
-    assert move.verb is lens.move_eye
+    (move,) = asked(pointer, WITH_HANDLES)
+    assert move.verb is lens.move_eye, "beside the handles"
+    (move,) = asked(pointer, replace(STATE, tilt_handles=TiltHandles(taken=index)))
+    assert (move.verb, move.args[0]) == (lens.move_tilt_handle, index), "a handle that was taken is kept"
 
 
 def hovered(pointer: Pointer, state: AppState = STATE) -> list[object]:
@@ -189,18 +172,6 @@ def test_the_picture_keeps_its_shape_and_stays_beside_the_panel(window: tuple[in
     assert picture.x + picture.width <= layout.panel.x
     assert picture.y + picture.height <= window[1]
     assert layout.panel.x + layout.panel.width == window[0]
-
-
-def test_pixels_of_a_dense_display() -> None:
-    plain, dense = layout_of((1280, 800), (600, 400)), layout_of((1280, 800), (600, 400), pixel_ratio=2.0)
-    assert plain.picture == dense.picture
-    assert plain.frame_px is not None
-    assert dense.frame_px == pytest.approx([2 * value for value in plain.frame_px], abs=1)
-
-
-def test_no_room_for_the_picture() -> None:
-    assert letterbox(R(0, 0, -5, 10), (4, 3)) is None
-    assert layout_of((0, 0), (4, 3)).frame_px is None
 
 
 def test_picture_corners_are_half_a_pixel_outside_the_first_and_last_pixel() -> None:

