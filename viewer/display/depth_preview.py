@@ -32,6 +32,7 @@ class DepthPreview:
         self._loaded: LoadedPhoto | None = None
         self._resumed: LoadedPhoto | None = None
         self._canvas: DepthCanvas | None = None
+        self._generation = 0
         self._shown: DepthEdits | None = None
         self._still: tuple[DepthEdits, float] | None = None
 
@@ -44,10 +45,11 @@ class DepthPreview:
         loaded, scene = self._scene_view.loaded, state.scene
         if loaded is None or scene is None or scene.plan is None or self._scene_view.generation > state.generation:
             return
-        if loaded is not self._loaded:
+        if loaded is not self._loaded or self._scene_view.generation != self._generation:
             if self._loaded is None or loaded.refined is not self._loaded.refined:
                 self._canvas = self._still = None
-            self._loaded, self._shown = loaded, loaded.depth_settings.edits
+            self._loaded, self._generation = loaded, self._scene_view.generation
+            self._shown = loaded.depth_settings.edits
         edits = current_settings(state).edits
         if edits == self._shown or scene.source is not state.source:
             return
