@@ -122,7 +122,7 @@ def add_export(task: ExportTask, state: AppState, inputs: Sequence[Path], jobs: 
 
 
 def _ask_again(prompt: SavePrompt | ExportPrompt, error: InputError) -> Action:
-    """Return the prompt with what is wrong, or with the question whether to replace the file."""
+    """Return the prompt with the problem, or with the question whether to replace the file."""
     there = isinstance(error, AlreadyThereError)
     return do(messages.show_prompt, replace(prompt, already_there=there, problem="" if there else words_of(error)))
 
