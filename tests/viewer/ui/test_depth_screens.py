@@ -13,11 +13,11 @@ from iibr_core.depth.editing.edits import DepthEdits, Stroke
 from tests.viewer.conftest import headless_with_scene
 from viewer.display.depth_preview import DepthPreview
 from viewer.display.offscreen import OffscreenScene
-from viewer.model import depth, inspection, preferences
+from viewer.model import depth, inspection
 from viewer.model.action import do
 from viewer.model.layout import PANEL_WIDTH
 from viewer.model.state.app_state import Hover
-from viewer.model.state.depth import Brush, DepthSample, Tool
+from viewer.model.state.depth import Brush
 
 SIZE = 640, 800
 PANEL = np.s_[:, -int(PANEL_WIDTH) :]
@@ -59,17 +59,6 @@ def test_the_brush_brings_its_sliders_and_a_ring_over_the_picture(viewer: Offscr
     changed = differs(before, viewer.screen(SIZE))
     assert changed[PANEL].sum() > 500
     assert changed[PICTURE].sum() > 100
-
-
-@pytest.mark.parametrize(("scale", "tool"), [(0.8, "fill"), (2.0, "select")])
-def test_the_panel_ends_at_its_border_at_any_size_of_text(viewer: OffscreenScene, scale: float, tool: Tool) -> None:
-    sample = DepthSample((0.5, 0.5), 1.0)
-    viewer.do(do(preferences.set_font_scale, scale), do(depth.set_brush, Brush(tool, is_on=True, sample=sample)))
-    panel = viewer.screen((900, 2600))[:, -int(PANEL_WIDTH * scale) :]
-    ground = panel[2:-2, 3]
-    assert (ground == ground[0]).all(), "nothing reaches over the left border"
-    margin = panel[40:-40, -8:-4]
-    assert (margin == margin[0, 0]).all(axis=2).mean() > 0.95, "nor over the right one"
 
 
 def test_a_stroke_under_way_is_seen_in_colours(viewer: OffscreenScene) -> None:

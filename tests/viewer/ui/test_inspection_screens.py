@@ -13,14 +13,13 @@ from iibr_core.scenes.rect import Rect
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import HEIGHT, WIDTH, headless_with_scene
 from viewer.display.offscreen import OffscreenScene
-from viewer.model import inspection, lens, messages, preferences
+from viewer.model import inspection, lens, messages
 from viewer.model.action import Action, do
 from viewer.model.inspection import beside_of, sheet_cells
-from viewer.model.layout import PANEL_WIDTH, Layout, layout_of
+from viewer.model.layout import Layout, layout_of
 from viewer.model.state.app_state import Hover
 from viewer.model.state.inspection import OVERLAYS, OverlayKind
 from viewer.model.state.notices import Notice
-from viewer.model.state.preferences import Theme
 
 SIZE = 640, 1000
 GRID = GridShape(3, 3)
@@ -49,22 +48,6 @@ def part(screen: np.ndarray, rect: Rect | None) -> np.ndarray:
     assert rect is not None
     top, left = round(rect.y), round(rect.x)
     return screen[top : top + round(rect.height), left : left + round(rect.width)]
-
-
-@pytest.mark.parametrize(("theme", "scale"), [("dark", 1.0), ("light", 1.5)])
-def test_the_whole_section_is_seen_at_any_size_of_text(viewer: OffscreenScene, theme: Theme, scale: float) -> None:
-    size = round(SIZE[0] * scale), round(SIZE[1] * scale)
-    viewer.do(
-        do(preferences.set_theme, theme), do(preferences.set_font_scale, scale), do(inspection.set_overlay, "disparity")
-    )
-    opened = viewer.screen(size).astype(int)
-    viewer.do(do(preferences.toggle_section, "inspect"))
-    changed = np.abs(viewer.screen(size) - opened).max(axis=2) > 24
-    panel = changed[:, -round(PANEL_WIDTH * scale) :]
-    assert panel.sum() > 20 * ENOUGH_PIXELS
-    assert not changed[:, : -round(PANEL_WIDTH * scale)].any()
-    assert not panel[:, -round(8 * scale) :].any(), "clipped at the right"
-    assert not panel[-round(8 * scale) :].any(), "clipped below"
 
 
 def test_epis_lie_beside_the_picture_and_go_through_the_pointer(viewer: OffscreenScene) -> None:

@@ -1,4 +1,4 @@
-"""The panel's text from 60 % to 200 %: nothing cut, nothing over anything else, contrast of 4.5 : 1 at least."""
+"""The panel's text from 60 % to 200 %: nothing cut or covered, contrast of 4.5 : 1, and controls that stay in place."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from imgui_bundle import imgui
 
-from iibr_core.beyond.optics import APERTURE_KINDS, ApertureShape
+from iibr_core.beyond.optics import APERTURE_KINDS, ApertureMask, ApertureShape
 from iibr_core.depth.editing.edits import DepthEdits
 from iibr_core.scenes.scene import DepthSettings
 from iibr_core.scenes.screen_size import ScreenSize
@@ -18,11 +18,13 @@ from tests.viewer.conftest import headless_with_scene
 from tests.viewer.ui.watched_widgets import watch_widgets
 from viewer.background.depth_models import list_models
 from viewer.display.offscreen import OffscreenScene
-from viewer.model import depth_models, lens, messages, preferences
-from viewer.model.action import do
+from viewer.model import depth, depth_models, inspection, lens, messages, preferences, viewpoint
+from viewer.model.action import Action, do
 from viewer.model.layout import PANEL_WIDTH
 from viewer.model.state.app_state import AppState
+from viewer.model.state.depth import Brush, DepthSample
 from viewer.model.state.depth_models import ModelsPrompt
+from viewer.model.state.lens import FIRST_GLOSS, GlossBrush
 from viewer.model.state.preferences import SECTIONS, Theme, Units
 from viewer.model.state.prompts import ExportPrompt, JobProgress, PalettePrompt, PathPrompt, Prompt, SavePrompt
 from viewer.ui.style import Color, Look, apply_style, palette_of
@@ -30,20 +32,10 @@ from viewer.ui.style import Color, Look, apply_style, palette_of
 WINDOW = ScreenSize(1280, 800)
 LEAST_CONTRAST = 4.5
 LEAST_HOVER_CONTRAST = 1.5
-SCALES = (0.6, 0.8, 1.0, 1.33, 2.0)
+SCALES = (0.6, 1.0, 2.0)
 SLACK_PX = 1.0
-WIDGETS = (
-    "text",
-    "text_disabled",
-    "button",
-    "small_button",
-    "checkbox",
-    "slider_float",
-    "slider_int",
-    "begin_combo",
-    "tree_node_ex",
-)
 WORDS_INSIDE = ("button", "small_button", "slider_float", "slider_int", "begin_combo")
+WIDGETS = (*WORDS_INSIDE, "text", "text_disabled", "checkbox", "tree_node_ex")
 
 
 @dataclass(frozen=True)
@@ -129,7 +121,7 @@ WELCOME = "welcome"
 """No prompt, but alike: what an empty window says."""
 
 
-@pytest.mark.parametrize("scale", [0.6, 1.0, 2.0])
+@pytest.mark.parametrize("scale", [0.6, 2.0])
 @pytest.mark.parametrize("name", [*PROMPTS, WELCOME])
 def test_prompts_fit_the_window_and_their_words_fit_them(
     viewer: OffscreenScene, items: list[Item], monkeypatch: pytest.MonkeyPatch, name: str, scale: float
@@ -205,3 +197,51 @@ def test_an_entry_under_the_pointer_stands_out_from_its_list(theme: Theme) -> No
     finally:
         imgui.destroy_context(context)
     assert contrast(hovered, ground) > LEAST_HOVER_CONTRAST
+
+
+MASK = ApertureMask("star.png", 1, 1, b"\xff")
+GLOSSY = do(lens.set_gloss, FIRST_GLOSS)
+TALL = ScreenSize(900, 2600)
+SWITCHES: dict[str, tuple[Action, ...]] = {
+    "loop": (do(viewpoint.set_loop, "circle"),),
+    "tilt": (do(lens.show_tilt_handles, True),),
+    **{kind: (do(lens.set_aperture_shape, ApertureShape(kind, mask=MASK)),) for kind in APERTURE_KINDS},
+    "gloss": (GLOSSY,),
+    "gloss of strokes": (
+        do(lens.set_gloss, replace(FIRST_GLOSS, surface=replace(FIRST_GLOSS.surface, strokes_only=True))),
+    ),
+    "gloss of a colour": (
+        do(lens.set_gloss, replace(FIRST_GLOSS, surface=replace(FIRST_GLOSS.surface, color=(1, 0, 0)))),
+    ),
+    "gloss brush": (GLOSSY, do(lens.take_gloss_brush, GlossBrush(is_on=True))),
+    "brush": (do(depth.set_brush, Brush("nearer", is_on=True)),),
+    "bucket": (do(depth.set_brush, Brush("fill", is_on=True)), do(depth.pick, DepthSample((0.5, 0.5), 1.0))),
+    "EPIs": (do(inspection.show_epis, True),),
+    "overlay": (do(inspection.set_overlay, "disparity"),),
+    "photo": (do(inspection.compare, "photo"),),
+    "snapshot": (do(inspection.take_snapshot), do(inspection.compare, "snapshot")),
+}
+
+
+@pytest.fixture
+def tops(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, float]]:
+    """The words of each label, button and box of the panel, and the place of its upper border."""
+    found: list[tuple[str, float]] = []
+
+    def record(kind: str, arguments: tuple[Any, ...]) -> None:
+        found.append((arguments[0], imgui.get_item_rect_min().y))
+
+    watch_widgets(monkeypatch, ("text", "button", "checkbox", "invisible_button"), found, record)
+    return found
+
+
+@pytest.mark.parametrize("name", SWITCHES)
+def test_what_is_switched_on_moves_nothing(viewer: OffscreenScene, tops: list[tuple[str, float]], name: str) -> None:
+    viewer.screen(TALL)
+    before = dict(tops)
+    assert len(before) > 40
+    viewer.do(*SWITCHES[name])
+    viewer.screen(TALL)
+    after = dict(tops)
+    assert {words: top for words, top in before.items() if words in after and after[words] != top} == {}
+    assert "Size" in after, "the last section was built"

@@ -9,23 +9,16 @@ import numpy as np
 import pytest
 from imgui_bundle import imgui
 
-from iibr_core.beyond.optics import (
-    APERTURE_KINDS,
-    ApertureKind,
-    ApertureMask,
-    ApertureShape,
-)
 from iibr_core.scenes.scene import Progress, Source
 from tests.viewer.conftest import headless_with_scene, reduce
 from viewer.display.offscreen import OffscreenScene
 from viewer.model import inspection, lens, messages, opening, preferences, saving, viewpoint, window
 from viewer.model.action import Action, do
-from viewer.model.layout import PANEL_WIDTH, layout_of
+from viewer.model.layout import PANEL_WIDTH
 from viewer.model.state.app_state import AppState, DrawReport, Hover
 from viewer.model.state.notices import Notice
 from viewer.model.state.preferences import SECTIONS, Section, with_sections
 from viewer.model.state.prompts import WRITING, JobProgress, PalettePrompt, PathPrompt
-from viewer.model.state.saving import SavedSettings
 from viewer.ui.overlays.notice_corner import job_text
 from viewer.ui.style import DARK, LIGHT
 
@@ -86,15 +79,6 @@ def test_what_lies_over_the_picture_is_seen_and_stays_beside_the_panel(viewer: O
     assert not border.any(), "cut off at the window's border"
 
 
-@pytest.mark.parametrize("kind", APERTURE_KINDS)
-def test_each_aperture_shape_shows_its_own_controls(viewer: OffscreenScene, kind: ApertureKind) -> None:
-    mask = ApertureMask("star.png", 2, 2, bytes([255, 0, 0, 255])) if kind == "mask" else None
-    other: ApertureKind = "ring" if kind == "disc" else "disc"
-    viewer.do(do(lens.set_aperture_shape, ApertureShape(other)))
-    changed = changed_after(viewer, do(lens.set_aperture_shape, ApertureShape(kind, mask=mask)))
-    assert in_panel(changed).sum() > 10 * ENOUGH_PIXELS
-
-
 @pytest.mark.parametrize(
     "action",
     [
@@ -118,45 +102,6 @@ def test_light_and_dark(viewer: OffscreenScene) -> None:
         np.testing.assert_allclose(screen[2, 2], palette.background[:3], atol=0.01)
         text = np.abs(in_panel(screen) - np.array(palette.text[:3])).max(axis=2) < 0.1
         assert text.sum() > 20 * ENOUGH_PIXELS
-
-
-def test_text_twice_as_large_in_a_window_twice_as_large_is_the_same_screen_finer(viewer: OffscreenScene) -> None:
-    viewer.do(
-        do(
-            messages.notify,
-            Notice("A notice that is long enough to be wrapped into a second line of text, at any size."),
-        )
-    )
-    small = viewer.screen(SIZE).astype(float)
-    viewer.do(do(preferences.set_font_scale, 2.0))
-    large = viewer.screen((2 * SIZE[0], 2 * SIZE[1])).astype(float)
-    halved = large.reshape(SIZE[1], 2, SIZE[0], 2, 3).mean(axis=(1, 3))
-    layout = layout_of(SIZE, (96, 64))
-    assert layout.picture is not None
-    beside = small.copy()
-    np.copyto(beside, halved, where=_blurred(np.abs(halved - small).max(axis=2) < 60)[..., None])
-    assert (np.abs(beside - halved).max(axis=2) > 0).mean() < 0.01, "lines broke elsewhere or widgets moved"
-
-
-def _blurred(same: np.ndarray) -> np.ndarray:
-    """True where the pixel or one of its neighbours is the same: glyphs lie up to a pixel elsewhere."""
-    padded = np.pad(same, 1)
-    height, width = same.shape
-    return np.any([padded[y : y + height, x : x + width] for y in range(3) for x in range(3)], axis=0)
-
-
-def test_an_empty_window_lists_recent_files(viewer: OffscreenScene) -> None:
-    viewer.state = replace(AppState(hides_panel=False), recent=())
-    before = viewer.screen(SIZE).astype(int)
-    viewer.state = replace(AppState(hides_panel=False), recent=("/photos/garden.jpg", "/photos/bridge.jpg"))
-    assert (np.abs(viewer.screen(SIZE) - before).max(axis=2) > 24).sum() > 3 * ENOUGH_PIXELS
-
-
-def test_settings_on_offer_have_a_button(viewer: OffscreenScene) -> None:
-    plain = Notice("This picture was saved by iibr.")
-    offer = replace(plain, offer=SavedSettings(viewer.state.optics, 1.0, Source(""), (1, 1)))
-    viewer.do(do(messages.notify, plain))
-    assert changed_after(viewer, do(messages.dismiss, plain), do(messages.notify, offer)).sum() > 5 * ENOUGH_PIXELS
 
 
 def test_what_is_under_way_in_words() -> None:

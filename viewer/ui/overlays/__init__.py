@@ -1,1 +1,1 @@
-"""What is drawn over the picture."""
+"""Drawings and windows over the picture."""

@@ -5,13 +5,14 @@ from __future__ import annotations
 from imgui_bundle import icons_fontawesome_6 as icons
 from imgui_bundle import imgui
 
+from iibr_core.scenes.rect import Rect
 from viewer.model import depth_models, viewpoint, window
 from viewer.model.action import Action, do
 from viewer.model.layout import Layout
 from viewer.model.state.app_state import AppState
 from viewer.ui.overlays.prompt_rows import CARD_FLAGS
 from viewer.ui.style import DARK
-from viewer.ui.widgets import tooltip
+from viewer.ui.widgets import scale, tooltip
 
 CHIP, BADGE = "free camera", "Depth guessed"
 FULL, SHORT = "Free camera: parts are synthesized here. C returns", "Free camera. C returns"
@@ -23,23 +24,21 @@ _BARE = CARD_FLAGS | imgui.WindowFlags_.no_decoration | imgui.WindowFlags_.no_ba
 
 
 def chips(state: AppState, layout: Layout) -> list[Action]:
-    """Build the free camera's chip at the right, which leaves it, and that of guessed depth at the left, which offers
-    better depth.
+    """Build the chip of the free camera at the right, which leaves it, or that of guessed depth at the left, which
+    offers better depth.
     """
-    frame, scene = layout.frame, state.scene
-    if frame is None or scene is None or state.inspection.shows_views or state.shows_before:
+    frame, camera = layout.frame, state.free_camera
+    if frame is None or state.scene is None or state.inspection.shows_views or state.shows_before:
         return []
-    camera = state.free_camera
-    actions: list[Action] = []
-    if camera is not None:
-        words = AT_END if camera.is_at_end else FULL
-        if imgui.calc_text_size(words).x + 6 * GAP * layout.ui_scale > frame.width:
-            words = SHORT
-        if _chip(CHIP, f"{icons.ICON_FA_VIDEO}  {words}###leave", layout, is_right=True):
-            actions.append(do(viewpoint.leave_camera))
-    elif has_guess_badge(state, layout):
-        actions += [do(depth_models.show_offer, True)] if _chip(BADGE, BADGE, layout, GUESS_TIP) else []
-    return actions
+    if has_guess_badge(state, layout):
+        return [do(depth_models.show_offer, True)] if _chip(BADGE, BADGE, frame, GUESS_TIP) else []
+    if camera is None:
+        return []
+    words = AT_END if camera.is_at_end else FULL
+    if imgui.calc_text_size(words).x + 6 * GAP * scale() > frame.width:
+        words = SHORT
+    is_pressed = _chip(CHIP, f"{icons.ICON_FA_VIDEO}  {words}###leave", frame, is_right=True)
+    return [do(viewpoint.leave_camera)] if is_pressed else []
 
 
 def has_guess_badge(state: AppState, layout: Layout) -> bool:
@@ -66,10 +65,9 @@ def panel_handle(state: AppState, layout: Layout) -> list[Action]:
     return [do(window.toggle_panel)] if pressed else []
 
 
-def _chip(name: str, words: str, layout: Layout, tip: str = "", is_right: bool = False) -> bool:
+def _chip(name: str, words: str, frame: Rect, tip: str = "", is_right: bool = False) -> bool:
     """Build a chip in colours that are legible over any photo; return whether it was pressed."""
-    frame, gap = layout.frame, GAP * layout.ui_scale
-    assert frame is not None
+    gap = GAP * scale()
     x = frame.x + frame.width - gap if is_right else frame.x + gap
     imgui.set_next_window_pos(imgui.ImVec2(x, frame.y + gap), 0, imgui.ImVec2(float(is_right), 0))
     imgui.push_style_var(imgui.StyleVar_.window_padding, imgui.ImVec2(0, 0))

@@ -13,8 +13,8 @@ from viewer.model.action import Action, do
 from viewer.model.layout import Layout
 from viewer.model.state.app_state import AppState
 from viewer.model.state.folder import Thumbnail
-from viewer.ui.style import corners, pack_color, palette_of
-from viewer.ui.widgets import tooltip
+from viewer.ui.style import Palette, corners, pack_color, palette_of
+from viewer.ui.widgets import scale, tooltip
 
 CELL_ASPECT = 1.5
 GAP = 6.0
@@ -49,16 +49,16 @@ def filmstrip(state: AppState, layout: Layout, thumbnails: Mapping[str, Thumbnai
     imgui.begin("filmstrip", None, _FLAGS)
     actions: list[Action] = []
     shown, place = folder.filmstrip_range(state, _count(rect, layout)), folder.place_of_photo(photos, state.source)
+    palette = palette_of(state.preferences.theme)
     for i, cell in zip(shown, _cells(rect, len(shown), layout)):
         name = photos.photos[i].name
         path = str(PurePath(photos.path) / name)
         thumbnail, is_readable = thumbnails.get(path), name not in photos.unreadable
-        if _photo(cell, name, thumbnail, i == place, state, layout) and place is not None and is_readable:
+        if _photo(cell, name, thumbnail, i == place, palette) and place is not None and is_readable:
             actions.append(do(folder.step, i - place))
         if thumbnail is None and (path in thumbnails or not is_readable):
-            _write(cell, f"Cannot be read: {name}", state)
-    wheel = imgui.get_io().mouse_wheel if imgui.is_window_hovered() else 0.0
-    if wheel:
+            _write(cell, f"Cannot be read: {name}", palette)
+    if imgui.is_window_hovered() and (wheel := imgui.get_io().mouse_wheel):
         actions.append(do(folder.scroll, -round(wheel) or (-1 if wheel > 0 else 1)))
     imgui.end()
     imgui.pop_style_var()
@@ -67,42 +67,45 @@ def filmstrip(state: AppState, layout: Layout, thumbnails: Mapping[str, Thumbnai
 
 def _cells(rect: Rect, count: int, layout: Layout) -> list[Rect]:
     """Return the places of the photos, in the middle of the row."""
-    gap = GAP * layout.ui_scale
-    height = rect.height - 2 * gap
-    width = height * CELL_ASPECT
+    width, height, gap = _cell_size(rect, layout)
     left = rect.x + (rect.width - count * (width + gap) + gap) / 2
     return [Rect(left + i * (width + gap), rect.y + gap, width, height) for i in range(count)]
 
 
-def _count(rect: Rect, layout: Layout) -> int:
+def _cell_size(rect: Rect, layout: Layout) -> tuple[float, float, float]:
+    """Return width and height of a cell, and the gap between cells."""
     gap = GAP * layout.ui_scale
-    return int((rect.width - gap) // ((rect.height - 2 * gap) * CELL_ASPECT + gap))
+    return (rect.height - 2 * gap) * CELL_ASPECT, rect.height - 2 * gap, gap
 
 
-def _write(cell: Rect, words: str, state: AppState) -> None:
+def _count(rect: Rect, layout: Layout) -> int:
+    width, _, gap = _cell_size(rect, layout)
+    return int((rect.width - gap) // (width + gap))
+
+
+def _write(cell: Rect, words: str, palette: Palette) -> None:
     """Draw words in a cell, as far as they fit."""
     size = WORDS_SIZE * imgui.get_font_size()
     corner, width = imgui.ImVec2(cell.x + size / 3, cell.y + size / 3), cell.width - size * 2 / 3
     ends = imgui.ImVec4(cell.x, cell.y, cell.x + cell.width, cell.y + cell.height)
-    color = pack_color(palette_of(state.preferences.theme).text)
-    imgui.get_window_draw_list().add_text(imgui.get_font(), size, corner, color, words, width, ends)
+    draw, color = imgui.get_window_draw_list(), pack_color(palette.text)
+    draw.add_text(imgui.get_font(), size, corner, color, words, width, ends)
 
 
-def _photo(cell: Rect, name: str, thumbnail: Thumbnail | None, is_open: bool, state: AppState, layout: Layout) -> bool:
+def _photo(cell: Rect, name: str, thumbnail: Thumbnail | None, is_open: bool, palette: Palette) -> bool:
     """Draw a photo as large as it fits; return whether it was clicked."""
-    palette, draw, scale = palette_of(state.preferences.theme), imgui.get_window_draw_list(), layout.ui_scale
+    draw, rounding = imgui.get_window_draw_list(), 3 * scale()
     corner, far = corners(cell)
     imgui.set_cursor_screen_pos(corner)
     is_pressed = imgui.invisible_button(f"photo {name}", imgui.ImVec2(cell.width, cell.height))
-    is_hovered = imgui.is_item_hovered()
-    draw.add_rect_filled(corner, far, pack_color(palette.frame), 3 * scale)
+    draw.add_rect_filled(corner, far, pack_color(palette.frame), rounding)
     if thumbnail is not None:
         width = min(cell.width, cell.height * thumbnail.aspect)
         height = width / thumbnail.aspect
         place = Rect(cell.x + (cell.width - width) / 2, cell.y + (cell.height - height) / 2, width, height)
         draw.add_image(imgui.ImTextureRef(thumbnail.texture), *corners(place))
-    if is_open or is_hovered:
+    if is_open or imgui.is_item_hovered():
         color = pack_color(palette.accent if is_open else palette.quiet)
-        draw.add_rect(corner, far, color, 3 * scale, (3 if is_open else 1.5) * scale)
+        draw.add_rect(corner, far, color, rounding, rounding if is_open else rounding / 2)
     tooltip(name)
     return bool(is_pressed)

@@ -74,6 +74,8 @@ def _draw_legend(state: AppState, scene: Scene, layout: Layout, frame: Rect) -> 
         return
     draw, line = imgui.get_background_draw_list(), imgui.get_text_line_height()
     bar = Rect(x + room, y + room, LEGEND_WIDTH * scale, LEGEND_HEIGHT * scale)
+    if bar.x + bar.width + room > frame.x + frame.width:
+        return
     low, high = scene.disparity_range_px if kind == "disparity" else (0.0, 1.0)
     ground = Rect(x, y, bar.width + 2 * room, bar.height + line + 2.5 * room)
     draw.add_rect_filled(*corners(ground), pack_color(DARK.background, 0.72), 4 * scale)

@@ -64,11 +64,10 @@ def _rows(models: tuple[ModelOffer, ...], selected: int) -> int | None:
             pressed = i
         end = imgui.get_cursor_pos()
         imgui.set_cursor_pos(imgui.ImVec2(start.x + padding, start.y + padding))
-        tags = ", ".join(["recommended"] * model.is_recommended + ["downloaded"] * model.is_here)
-        imgui.text(f"{model.title} ({tags})" if tags else model.title)
+        imgui.text(f"{model.title} (downloaded)" if model.is_here else model.title)
         imgui.set_cursor_pos(imgui.ImVec2(start.x + padding, start.y + padding + line))
         imgui.push_text_wrap_pos(start.x + width)
-        quiet(model.words)
+        (imgui.text_wrapped if i == selected else quiet)(model.words)  # quiet words fade on the selected row's colour
         imgui.pop_text_wrap_pos()
         imgui.set_cursor_pos(end)
     imgui.dummy(imgui.ImVec2(0, 0))

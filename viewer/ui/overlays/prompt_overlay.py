@@ -67,11 +67,13 @@ def prompts(state: AppState, layout: Layout) -> list[Action]:
     if prompt is None:
         return []
     _place(prompt, layout)
+    imgui.push_style_var(imgui.StyleVar_.window_border_size, scale())  # the panel behind has the same colour
     imgui.begin(f"prompt {type(prompt).__name__}", None, rows.PROMPT_FLAGS)
     # A text field takes Esc for itself; one Esc closes the prompt.
     is_left = imgui.get_io().want_text_input and imgui.is_key_pressed(imgui.Key.escape, False)
     actions = _contents(prompt, state)
     imgui.end()
+    imgui.pop_style_var()
     return [do(messages.show_prompt, None)] if is_left else actions
 
 
@@ -84,7 +86,8 @@ def _place(prompt: Prompt, layout: Layout) -> None:
         imgui.set_next_window_size_constraints(imgui.ImVec2(width, window.height), imgui.ImVec2(width, window.height))
         return
     width, top = min(PROMPT_WIDTH * scale(), window.width), PROMPT_TOP * window.height
-    imgui.set_next_window_pos(imgui.ImVec2(max(layout.panel.x, width) / 2, top), 0, imgui.ImVec2(0.5, 0))
+    room = min(max(layout.panel.x, width + 8 * scale()), window.width)
+    imgui.set_next_window_pos(imgui.ImVec2(room / 2, top), 0, imgui.ImVec2(0.5, 0))
     imgui.set_next_window_size_constraints(imgui.ImVec2(width, 0), imgui.ImVec2(width, window.height - top))
 
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path, PurePath
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
 from imgui_bundle import imgui
 
@@ -45,8 +45,7 @@ def prompt_actions(closed: bool, edited: Prompt, prompt: Prompt) -> list[Action]
     return [do(messages.show_prompt, edited)] if edited != prompt else []
 
 
-@dataclass(frozen=True)
-class PlaceRow:
+class PlaceRow(NamedTuple):
     """Answer of the row of a path. entered: whether Enter was pressed in it. browses: whether Browse was pressed."""
 
     path: str
