@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from imgui_bundle import imgui
@@ -11,7 +12,7 @@ from iibr_core.types import ViewOffset
 from viewer.app.pointer import is_marking_gloss
 from viewer.model import depth, inspection, lens, messages, selection, viewpoint, window
 from viewer.model.action import Action, do
-from viewer.model.commands import BY_NAME, COMMANDS
+from viewer.model.commands import BY_NAME, COMMANDS, Chord
 from viewer.model.state.app_state import AppState
 
 ARROW_STEP_VIEWS = 0.5
@@ -67,8 +68,11 @@ def _escape_actions(state: AppState) -> list[Action]:
     return [do(window.set_fullscreen, False)] if state.is_fullscreen else []
 
 
-def read_keys() -> Keys:
-    """Return the keys pressed in this ImGui frame; none while a text field has the keyboard."""
+def read_keys(held_at: Mapping[str, tuple[bool, bool]]) -> Keys:
+    """Return the keys pressed in this ImGui frame; none while a text field has the keyboard.
+
+    held_at: see `Window`. After a long frame a modifier may be up again before ImGui handles the key.
+    """
     io = imgui.get_io()
     if io.want_text_input:
         return Keys()
@@ -77,11 +81,12 @@ def read_keys() -> Keys:
         return imgui.is_key_pressed(getattr(imgui.Key, key), repeats)
 
     held = bool(io.key_ctrl or io.key_super), bool(io.key_shift)
-    commands = tuple(
-        command.name
-        for command in COMMANDS
-        if any((chord.ctrl, chord.shift) == held and is_pressed(chord.key, command.repeats) for chord in command.chords)
-    )
+
+    def is_chord(chord: Chord, repeats: bool) -> bool:
+        modifiers = held_at.get(chord.key.lstrip("_"), held)
+        return modifiers == (chord.ctrl, chord.shift) and is_pressed(chord.key, repeats)
+
+    commands = tuple(c.name for c in COMMANDS if any(is_chord(chord, c.repeats) for chord in c.chords))
     down = is_pressed("down_arrow") - is_pressed("up_arrow")
     right = is_pressed("right_arrow") - is_pressed("left_arrow")
     is_escape = is_pressed("escape", False)

@@ -21,7 +21,7 @@ from viewer.app.scene_loader import SceneLoader
 from viewer.app.session_store import SessionStore
 from viewer.app.sharpener import Sharpener
 from viewer.app.side_effects import SideEffects
-from viewer.app.window import Window, wake
+from viewer.app.window import Window
 from viewer.background.maps import EntropyWork, GlossFinder, find_surface
 from viewer.background.newest import Newest
 from viewer.display.filmstrip_view import FilmstripView
@@ -60,16 +60,16 @@ class App:
             raise
         self.scene_view = SceneView(self._gl)
         self.inspection_view = InspectionView(self._gl, self.scene_view)
-        self.sharpener = Sharpener(self._gl, self.scene_view, wake)
-        self.free_camera_view = FreeCameraView(self.scene_view, wake)
-        self.gloss_finder = GlossFinder(self.scene_view.gloss_request, self.scene_view.take_gloss, wake)
-        self._entropy = Newest("iibr-entropy", EntropyWork(), wake)
-        self._surfaces = Newest("iibr-surface", find_surface, wake)
+        self.sharpener = Sharpener(self._gl, self.scene_view, self.window.wake)
+        self.free_camera_view = FreeCameraView(self.scene_view, self.window.wake)
+        self.gloss_finder = GlossFinder(self.scene_view.gloss_request, self.scene_view.take_gloss, self.window.wake)
+        self._entropy = Newest("iibr-entropy", EntropyWork(), self.window.wake)
+        self._surfaces = Newest("iibr-surface", find_surface, self.window.wake)
         self._ui = UiHost(self.look(), self.window.handle)
-        self._filmstrip = FilmstripView(self._gl, wake)
-        self.scene_loader = SceneLoader(self.scene_view, self.inspection_view, self.window.set_title, wake)
-        self._side_effects = SideEffects(self.scene_view, wake, self.window.clipboard_text)
-        self._sessions = SessionStore(kept_in, wake)
+        self._filmstrip = FilmstripView(self._gl, self.window.wake)
+        self.scene_loader = SceneLoader(self.scene_view, self.inspection_view, self.window.set_title, self.window.wake)
+        self._side_effects = SideEffects(self.scene_view, self.window.wake, self.window.clipboard_text)
+        self._sessions = SessionStore(kept_in, self.window.wake)
         self._preferences = PreferencesKeeper(self.state, kept_in)
         self._notice_clock = NoticeClock()
         self._shown: tuple[object, ...] = ()
@@ -213,7 +213,7 @@ class App:
         pick = partial(self.scene_view.pick, self.state.optics.eye)
         actions = actions_from_pointer(pointer, layout, self.state, pick)
         actions += actions_from_hover(pointer, layout, self.state, pick)
-        actions += actions_from_keys(read_keys(), self.state)
+        actions += actions_from_keys(read_keys(self.window.held_at), self.state)
         actions += [do(gesture.end_gesture)] if pointer.is_released else []  # after the edits of the frame
         return [*actions, do(saving.quit_window)] if self.window.take_closing() else actions
 

@@ -116,7 +116,8 @@ class SideEffects:
             case tasks.PlainTask("paste") if self._jobs.is_copying:
                 return [do(ask, task)]  # the copy is not in the clipboard yet
             case tasks.PlainTask("paste"):
-                self._submit(lambda: do(_open, paste_picture(self._clipboard_text())))
+                text = self._clipboard_text()  # GLFW answers in the window's thread only
+                self._submit(lambda: do(_open, paste_picture(text)))
         return []
 
     def _inputs(self, state: AppState) -> tuple[Path, ...]:

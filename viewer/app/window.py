@@ -6,6 +6,8 @@ The bundle is imported before glfw on purpose: it brings the GLFW library that b
 from __future__ import annotations
 
 import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 # isort: off
@@ -20,16 +22,12 @@ WINDOW_SIZE = (1280, 800)
 SMALLEST_SIZE = (200, 150)
 
 
-def wake() -> None:
-    """Wake the window's loop; may be called in any thread."""
-    glfw.post_empty_event()
-
-
 class Window:
     """A window with an OpenGL 3.3 core context.
 
     handle: GLFW's window. size: in window units; framebuffer_size: in pixels, (0, 0) while minimised; both are updated
-    by `poll`. damages: number of redraws that the system asked for.
+    by `poll`. damages: number of redraws that the system asked for. held_at: modifiers (Ctrl or Super, Shift) that were
+    held when a key was pressed last, by the letter on the key.
     """
 
     def __init__(self, title: str, place: tuple[int, int, int, int] | None = None, is_maximized: bool = False) -> None:
@@ -49,6 +47,8 @@ class Window:
         self.damages = 0
         self._place_before = (0, 0, *WINDOW_SIZE)
         self._dropped: list[str] = []
+        self.held_at: dict[str, tuple[bool, bool]] = {}
+        glfw.set_key_callback(self.handle, self._on_key)  # ImGui's own callback calls it
         glfw.set_drop_callback(self.handle, self.on_drop)  # type: ignore[arg-type]  # the stub is wrong
         glfw.set_window_refresh_callback(self.handle, self._on_damage)
         glfw.make_context_current(self.handle)
@@ -111,18 +111,35 @@ class Window:
 
     def poll(self, wait_s: float) -> None:
         """Handle events; without any, wait for one at most this long."""
-        try:
+        with self._keeping_names():
             if wait_s > 0:
                 glfw.wait_events_timeout(wait_s)
             else:
                 glfw.poll_events()
-        except UnicodeDecodeError as error:  # a dropped name that is not UTF-8 is reported as not found
-            self._dropped.append(error.object.decode(errors="replace"))
         self._take_sizes()
+
+    def wake(self) -> None:
+        """End the wait of `poll`; may be called in any thread."""
+        with self._keeping_names():
+            glfw.post_empty_event()
+
+    @contextmanager
+    def _keeping_names(self) -> Iterator[None]:
+        """Take a dropped name that is not UTF-8, of which any call of GLFW may raise; it is reported as not found."""
+        try:
+            yield
+        except UnicodeDecodeError as error:
+            self._dropped.append(error.object.decode(errors="replace"))
 
     def _take_sizes(self) -> None:
         self.size = ScreenSize(*glfw.get_window_size(self.handle))
         self.framebuffer_size = ScreenSize(*glfw.get_framebuffer_size(self.handle))
+
+    def _on_key(self, _: Any, key: int, scancode: int, action: int, modifiers: int) -> None:
+        name = glfw.get_key_name(key, scancode) if action == glfw.PRESS else None
+        if name:
+            is_ctrl, is_shift = modifiers & (glfw.MOD_CONTROL | glfw.MOD_SUPER), modifiers & glfw.MOD_SHIFT
+            self.held_at[name.lower()] = bool(is_ctrl), bool(is_shift)
 
     def on_drop(self, _: Any, paths: Any) -> None:
         """Take the paths of dropped files. GLFW calls this."""

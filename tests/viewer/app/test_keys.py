@@ -6,11 +6,12 @@ import functools
 from dataclasses import replace
 
 import pytest
+from imgui_bundle import imgui
 
 from iibr_core.scenes.scene import Scene, Source
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import reduce
-from viewer.app.keys import Keys, actions_from_keys
+from viewer.app.keys import Keys, actions_from_keys, read_keys
 from viewer.model import history, inspection, lens, messages, saving, window
 from viewer.model.action import Action, do
 from viewer.model.commands import BY_NAME, COMMANDS
@@ -61,3 +62,14 @@ def test_what_is_switched_is_not_switched_back_while_its_key_is_held() -> None:
         assert name in repeating
     for name in ("Before and after", "Depth brush", "Full screen", "Hide or show the panel", "All views"):
         assert name not in repeating
+
+
+def test_a_key_counts_with_the_modifiers_it_was_pressed_with(monkeypatch: pytest.MonkeyPatch) -> None:
+    """In a long frame Ctrl is up again before ImGui handles the key."""
+    monkeypatch.setattr(imgui, "is_key_pressed", lambda key, repeats=True: key == imgui.Key.p)
+    context = imgui.create_context()
+    try:
+        assert read_keys({}).commands == ("Compare with the photo",)
+        assert read_keys({"p": (True, False)}).commands == ("All commands",)
+    finally:
+        imgui.destroy_context(context)
