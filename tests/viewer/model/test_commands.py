@@ -9,7 +9,7 @@ from imgui_bundle import imgui
 
 from iibr_core.scenes.scene import Source
 from tests.viewer.conftest import reduce
-from tests.viewer.model.test_reducers import scene_of, state_with
+from tests.viewer.model.test_opening import scene_of, state_with
 from viewer.model import saving
 from viewer.model.action import do
 from viewer.model.commands import BY_NAME, COMMANDS, Chord, Command, commands_matching, recent_commands

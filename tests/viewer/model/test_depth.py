@@ -16,7 +16,7 @@ from iibr_core.scenes.scene import DepthSettings, Source
 from iibr_core.training.degradation import blur
 from iibr_core.types import GridShape
 from tests.viewer.conftest import FAR, HEIGHT, NEAR, WIDTH, reduce, write_scene
-from tests.viewer.model.test_reducers import plan_of, scene_of, state_with
+from tests.viewer.model.test_opening import plan_of, scene_of, state_with
 from viewer.app.dropped_files import actions_from_drop
 from viewer.app.pointer import Pointer, actions_from_pointer
 from viewer.model import depth, gesture, history, inspection, lens, opening, saving, selection

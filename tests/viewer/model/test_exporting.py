@@ -11,7 +11,7 @@ from iibr_core.exports.kinds import EXPORTS, PURPOSES, ExportOptions
 from iibr_core.method.plan import ScenePlan
 from iibr_core.scenes.scene import Source
 from iibr_core.types import InputError
-from tests.viewer.model.test_reducers import scene_of, state_with
+from tests.viewer.model.test_opening import scene_of, state_with
 from viewer.model import preferences, saving
 from viewer.model.saving import as_other_kind, first_kind, kinds_for, usual_export_path, written_path
 from viewer.model.state.prompts import ExportPrompt, SavePrompt

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from iibr_core.beyond.optics import Optics
 from iibr_core.scenes.rect import Rect
 from iibr_core.types import GridShape
-from tests.viewer.model.test_reducers import scene_of
+from tests.viewer.model.test_opening import scene_of
 from viewer.model.focal_plane import (
     MIN_HANDLE_DISTANCE,
     focus_on,

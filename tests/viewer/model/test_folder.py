@@ -9,7 +9,7 @@ import pytest
 from iibr_core.exports.photo_folder import FolderPhoto, in_order
 from iibr_core.scenes.scene import Source
 from tests.viewer.conftest import reduce
-from tests.viewer.model.test_reducers import scene_of
+from tests.viewer.model.test_opening import scene_of
 from viewer.model import folder, opening
 from viewer.model.action import do
 from viewer.model.folder import AHEAD, filmstrip_range, photos_ahead

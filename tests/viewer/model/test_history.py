@@ -10,7 +10,7 @@ from iibr_core.beyond.optics import CENTRE
 from iibr_core.scenes.scene import Source
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import reduce
-from tests.viewer.model.test_reducers import plan_of, scene_of, state_with
+from tests.viewer.model.test_opening import plan_of, scene_of, state_with
 from viewer.model import gesture, history, lens, opening
 from viewer.model.action import Action, do
 from viewer.model.state.app_state import AppState

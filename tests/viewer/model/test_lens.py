@@ -14,7 +14,7 @@ from iibr_core.method.plan import ScenePlan
 from iibr_core.scenes.lens_limits import STEEPEST_TILT, aperture_limit, focus_limits, focus_span, is_finite
 from iibr_core.scenes.scene import Source
 from iibr_core.types import GridShape, ViewOffset
-from tests.viewer.model.test_reducers import plan_of, scene_of, state_with
+from tests.viewer.model.test_opening import plan_of, scene_of, state_with
 from viewer.model import gesture, history, lens, opening
 from viewer.model.action import Action, do
 from viewer.model.carried_optics import carry_optics

@@ -11,7 +11,7 @@ from iibr_core.beyond.optics import Optics
 from iibr_core.scenes.lens_limits import focus_limits
 from iibr_core.scenes.scene import Scene
 from iibr_core.types import GridShape
-from tests.viewer.model.test_reducers import plan_of, scene_of
+from tests.viewer.model.test_opening import plan_of, scene_of
 from viewer.model.state.app_state import Hover
 from viewer.model.units import (
     ASSUMED_DISTANCE_M,

@@ -21,7 +21,7 @@ from iibr_core.gloss.settings import Gloss, GlossLight, GlossSurface
 from iibr_core.scenes.scene import Source
 from iibr_core.types import GridShape, InputError, ViewOffset
 from tests.viewer.conftest import reduce
-from tests.viewer.model.test_reducers import scene_of, state_with
+from tests.viewer.model.test_opening import scene_of, state_with
 from viewer.model import opening
 from viewer.model.action import do
 from viewer.model.saved_settings import (

@@ -15,7 +15,7 @@ from iibr_core.exports.loops import LOOPS, LoopKind, ease, point_on_loop
 from iibr_core.scenes.scene import Source
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, ViewOffset
-from tests.viewer.model.test_reducers import plan_of, scene_of, state_with
+from tests.viewer.model.test_opening import plan_of, scene_of, state_with
 from viewer.app.keys import Keys, actions_from_keys
 from viewer.model import gesture, history, lens, opening, saving, viewpoint
 from viewer.model.action import Action, do
