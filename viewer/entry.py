@@ -10,8 +10,8 @@ import traceback
 import warnings
 
 EXIT_UNEXPECTED, EXIT_BAD_INPUT, EXIT_INTERRUPTED = 1, 2, 130
-STDERR = 2
-"""File descriptor of the messages."""
+STDOUT, STDERR = 1, 2
+"""File descriptors of the output and of the messages."""
 GC_THRESHOLDS = 100_000, 20, 100
 """Thresholds of Python's garbage collector. Its usual ones, from 700 objects on, cost 0.3 s during imports."""
 TRACEBACK_VARIABLE = "IIBR_TRACEBACK"
@@ -22,10 +22,20 @@ def command() -> None:
     """Run the command line and end the process."""
     code = run()
     gc.freeze()  # Python ends without examining half a million objects
+    try:
+        if sys.stdout is not None:
+            sys.stdout.flush()
+    except OSError:  # already reported; Python would try once more and change the exit code
+        _discard(STDOUT)
     if sys.stderr is not None:  # OpenImageIO's binding lists the objects that are alive at the end of Python
         sys.stderr.flush()
-        os.dup2(os.open(os.devnull, os.O_WRONLY), STDERR)
+        _discard(STDERR)
     sys.exit(code)
+
+
+def _discard(descriptor: int) -> None:
+    """Write what comes to this file descriptor nowhere."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), descriptor)
 
 
 def run() -> int:
@@ -48,7 +58,6 @@ def run() -> int:
     except KeyboardInterrupt:
         code = EXIT_INTERRUPTED
     except BrokenPipeError:  # the reader ended, as in `iibr models | head -1`
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return EXIT_UNEXPECTED
     except Exception as error:
         return _report(error)
