@@ -27,6 +27,8 @@ def test_a_light_field_without_disparity_finds_its_own(tmp_path) -> None:
     as_read, coarse, final = showings(results_of(SceneRequest(1, Source(str(folder))), lambda: CENTRE))
     assert [ready.scene.has_view_disparity for ready, _ in (as_read, coarse, final)] == [False, True, True]
     assert [{view.view.is_final for view in views} for _, views in (coarse, final)] == [{False}, {True}]
+    for _, views in (coarse, final):
+        assert [view.progress.share for view in views] == [k / len(views) for k in range(1, len(views) + 1)]
     assert final[0].scene.depth_source == FROM_VIEWS
     assert final[0].scene.disparity_range_px == pytest.approx((WALL_PX, SQUARE_PX), abs=0.15)
     for view in (result.view for result in final[1]):
