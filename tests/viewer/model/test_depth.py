@@ -228,6 +228,7 @@ def test_a_selected_surface_moves_and_is_kept_sharp_and_both_are_undone() -> Non
     assert history.undo(moved).depth == state.depth
     sharp = selection.keep_sharp(selection.set_range(state, (1.0, 2.0)))
     assert (sharp.optics.focus_disparity, sharp.optics.focus_range) == (1.5, 0.5)
+    assert sharp.focused_at == (-0.5, 0.5)
     assert history.undo(sharp).optics == state.optics, "one edit"
     assert depth.set_brush(state, replace(state.brush, tool="fill")).selection is None
     assert opening.show_scene(state, 1, scene_of(GRID, source=Source("b.png"))).selection is None
