@@ -23,15 +23,33 @@ from viewer.cli.screenshot import screenshot
 from viewer.cli.train import train
 from viewer.cli.view import demo, open_last_scene, view
 
+FORMER_NAMES = {"--out": "--output"}
+"""Former names of options, which scripts still use."""
+FORMER_OPTIONS = ("--quality", "--memory")
+"""Options of earlier versions, each with a value, which are ignored."""
+
 
 class Commands(TyperGroup):
     """The subcommands. A path in place of a subcommand is viewed."""
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """Return the name, the command and its arguments."""
+        args = _with_present_names(args)
         word = args[0]
         is_path = os.path.exists(word) or bool(Path(word).suffix) or Path(word).name != word
         return super().resolve_command(ctx, ["view", *args] if word not in self.commands and is_path else args)
+
+
+def _with_present_names(words: list[str]) -> list[str]:
+    """Return the words of a command line without former options and with the present names of the others."""
+    found, rest = [], iter(words)
+    for word in rest:
+        name, equals, value = word.partition("=")
+        if name not in FORMER_OPTIONS:
+            found.append(FORMER_NAMES.get(name, name) + equals + value)
+        elif not equals:
+            next(rest, None)
+    return found
 
 
 app = typer.Typer(

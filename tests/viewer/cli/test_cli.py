@@ -91,6 +91,12 @@ def test_generate_writes_a_light_field_that_opens(iibr: Iibr, photo_path: Path, 
     output_of(iibr("screenshot", out, "-o", tmp_path / "field.png", "--view", "-1,1"))
 
 
+def test_options_of_earlier_versions_are_understood_or_ignored(iibr: Iibr, photo_path: Path, tmp_path: Path) -> None:
+    words = ("generate", photo_path, "--grid", 1, "--quality", "fast", "--memory=1GB")
+    assert iibr(*words, "--out", tmp_path / "field").returncode == 0
+    assert (tmp_path / "field").is_dir()
+
+
 @pytest.mark.parametrize(
     ("words", "is_literal"),
     [
