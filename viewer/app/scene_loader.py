@@ -106,7 +106,7 @@ class SceneLoader:
         try:
             self._preview.update(state)
         except InputError as error:
-            return [do(messages.notify, Notice(str(error), is_error=True)), do(depth.drop_stroke)]
+            return [do(messages.notify, Notice(words_of(error), is_error=True)), do(depth.drop_stroke)]
         return []
 
     def advance(self, state: AppState) -> None:
