@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from enum import Enum, auto
 
 from iibr_core.types import InputError
 
 
 class Remedy(Enum):
-    """What a person can do about an error."""
+    """Way for a person to correct an error."""
 
     REPLACE = auto()
     """Replace the output that exists, or choose another name."""
@@ -33,3 +34,9 @@ class FixableError(InputError):
 def remedy_of(error: Exception) -> Remedy | None:
     """Return the remedy of an error, None if none is known."""
     return error.remedy if isinstance(error, FixableError) else None
+
+
+def with_remedy(error: Exception, words: Mapping[Remedy, str]) -> str:
+    """Return the message of an error, followed by the words of an interface for its remedy."""
+    remedy = remedy_of(error)
+    return str(error) if remedy is None else f"{error}; {words[remedy]}"

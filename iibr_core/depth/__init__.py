@@ -1,1 +1,1 @@
-"""Where a photo's disparity comes from."""
+"""Origins of a photo's disparity: maps, files, models, guesses, views, and its edits."""

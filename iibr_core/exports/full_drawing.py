@@ -6,20 +6,23 @@ The views of a tile lie around the eye, only as many as its lens needs; the rend
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from iibr_core.beyond.full_size import LargePhoto, Part, tiles_of, views_of_tile, whole
 from iibr_core.beyond.optics import CENTRE, Optics
 from iibr_core.beyond.resized_light import mean_of_areas
 from iibr_core.color import stored_from_encoded
-from iibr_core.exports.full_picture import MAX_PIXELS, FullPicture
+from iibr_core.exports.full_picture import MAX_PIXELS, FullPicture, encode_light
 from iibr_core.exports.render_settings import LensTile, RenderSettings
 from iibr_core.exports.source import Draw
 from iibr_core.method.view import Renderer
 from iibr_core.runtime.work import raise_if_stopped, report_progress
 from iibr_core.scenes.large_photo import complete_fills, load_large
 from iibr_core.scenes.rect import Rect
+from iibr_core.scenes.scene import LoadedPhoto, Scene
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import FloatImage, GridShape, ImageSize, ViewOffset, ViewUpdate
 
@@ -46,6 +49,13 @@ def draw_full(
     is read, and again once its hidden surfaces are inpainted.
     """
     return _draw_tiles(picture, _read_photo(picture, photo, keep), draw)
+
+
+def draw_picture(scene: Scene, loaded: LoadedPhoto, settings: RenderSettings, draw: Draw) -> NDArray[Any]:
+    """Return the picture of these settings, (height, width, 3), drawn from the photo. draw: draws a tile."""
+    assert scene.plan is not None, "a light field from disk has no photo"
+    light = draw_full(FullPicture(scene, scene.plan, loaded, settings.optics, settings.size_px), draw)
+    return encode_light(light, settings.is_linear, settings.color_space, scene.color_space)
 
 
 def _read_photo(picture: FullPicture, photo: LargePhoto | None, keep: Callable[[LargePhoto], None]) -> LargePhoto:

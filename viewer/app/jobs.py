@@ -279,16 +279,12 @@ class Jobs:
     def _draw(self, job: Job, snapshot: SceneSnapshot, settings: RenderSettings) -> Steps[NDArray[Any]]:
         """Draw a picture in the window's thread. Exports count their pictures themselves."""
         drawing = self._scene_view.renderer.start_picture(settings, snapshot.field)
-        try:
-            while True:
-                drawing.advance(budget_s=0.0)
+        with closing(drawing.steps()) as steps:
+            for share in steps:
                 if job.kind != "export":
-                    job.progress = (drawing.progress, 1.0, DRAWING)
-                if drawing.is_done:
-                    return drawing.image
+                    job.progress = (share, 1.0, DRAWING)
                 yield
-        finally:
-            drawing.stop()
+        return drawing.image
 
     def _run(self, job: Job, steps: Steps[Result]) -> Result:
         return self._window_work.run(steps, is_urgent=job.kind != "export")

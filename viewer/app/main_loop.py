@@ -30,8 +30,8 @@ from viewer.display.scene_view import VIEW_REFRESH_S, SceneView
 from viewer.gpu.context import create_for_window
 from viewer.model import gesture, inspection, opening, preferences, saving, viewpoint, window
 from viewer.model.action import Action, do
-from viewer.model.inspection import NO_INSPECTION_TEXTURES, beside_of
-from viewer.model.layout import Layout, is_narrow, layout_of
+from viewer.model.inspection import NO_INSPECTION_TEXTURES
+from viewer.model.layout import Layout, is_narrow
 from viewer.model.state.app_state import AppState
 from viewer.ui.host import UiHost
 from viewer.ui.overlays.filmstrip import filmstrip_paths
@@ -138,18 +138,7 @@ class App:
 
     def layout(self) -> Layout:
         """Return the layout of the window."""
-        scene = self.state.scene
-        ratio, scale = self.window.pixel_ratio, self.look().ui_scale
-        return layout_of(
-            self.window.size,
-            scene.size if scene else None,
-            ratio,
-            scale,
-            beside_of(self.state),
-            has_panel=not self.state.is_panel_hidden,
-            zoom=self.state.zoom,
-            own_width=scene.own_size.width if scene and scene.own_size else None,
-        )
+        return window.layout_for(self.state, self.window.size, self.window.pixel_ratio, self.look().ui_scale)
 
     def look(self) -> Look:
         """Return the theme, and the scale of text and widgets on this display."""

@@ -12,7 +12,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 from iibr_core.beyond.optics import Optics
-from iibr_core.exports.full_picture import FullPicture, encode_light, is_full
+from iibr_core.exports.full_picture import is_full
 from iibr_core.exports.kinds import ExportKind, export_kind, optics_of, require_export_place
 from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.exports.source import ExportSource, write_export
@@ -75,7 +75,7 @@ def checked_path(task: SaveTask, inputs: Sequence[Path]) -> Path:
     prompt = task.prompt
     path = Path(os.path.expanduser(prompt.path.strip()))
     if not path.name:
-        raise InputError("There is no name yet. Type one, or press Browse…")
+        raise InputError(saving.NO_NAME)
     if not path.suffix:
         path = path.with_name(f"{path.name}{'.pfm' if prompt.what == 'map' else '.png'}")
     _require_another(path, inputs)
@@ -180,10 +180,10 @@ def _write(path: Path, shot: SavedShot, needs: PictureNeeds, source: ExportSourc
 
 def _draw(shot: SavedShot, is_linear: bool, needs: PictureNeeds, source: ExportSource) -> NDArray[Any]:
     """Return the picture, (H, W, 3), bytes or linear light, drawn from the photo at its own size if it needs that."""
-    from iibr_core.exports.full_drawing import draw_full
+    from iibr_core.exports.full_drawing import draw_picture
 
-    scene, loaded, size, space = source.scene, source.loaded, shot.settings.size_px, shot.color_space
+    scene, loaded, size = source.scene, source.loaded, shot.settings.size_px
+    settings = RenderSettings(source.optics, size, is_linear=is_linear, color_space=shot.color_space)
     if needs(scene, source.optics) != "photo" or scene.plan is None or loaded is None:
-        return source.draw(RenderSettings(source.optics, size, is_linear=is_linear, color_space=space))
-    light = draw_full(FullPicture(scene, scene.plan, loaded, source.optics, size), source.draw)
-    return encode_light(light, is_linear, space, scene.color_space)
+        return source.draw(settings)
+    return draw_picture(scene, loaded, settings, source.draw)

@@ -6,6 +6,7 @@ It replaces the picture from the views once it is ready, until anything changes.
 from __future__ import annotations
 
 from collections.abc import Callable, Generator
+from contextlib import closing
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -101,12 +102,9 @@ class Sharpener:
     def _draw(self, settings: RenderSettings) -> Generator[None, None, NDArray[Any]]:
         """Draw a tile, a step at a time."""
         drawing = self._scene_view.renderer.start_picture(settings)
-        try:
-            while not drawing.is_done:
-                drawing.advance(budget_s=0.0)
+        with closing(drawing.steps()) as steps:
+            for _ in steps:
                 yield
-        finally:
-            drawing.stop()
         return drawing.image
 
     def _request_of(self, picture: Picture, state: AppState) -> FullPicture | None:

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 from iibr_core.depth.choice import DepthOrigin
-from iibr_core.remedies import Remedy, remedy_of
+from iibr_core.remedies import Remedy, with_remedy
 from iibr_core.runtime.compiling import watch_compiling
 from iibr_core.runtime.time_left import TimeLeft, about_left
 from iibr_core.runtime.work import watched
@@ -27,8 +27,7 @@ REMEDIES = {
 
 def words_of(error: Exception) -> str:
     """Return the message of an error, with its remedy."""
-    remedy = remedy_of(error)
-    return str(error) if remedy is None else f"{error}; {REMEDIES[remedy]}"
+    return with_remedy(error, REMEDIES)
 
 
 def print_notes(*notes: str | None, origin: DepthOrigin | None = None) -> None:

@@ -18,7 +18,7 @@ from iibr_core.beyond.optics import CENTRE, Optics
 from iibr_core.color import linear_from_srgb
 from iibr_core.depth.editing.edits import UNEDITED, DepthEdits
 from iibr_core.exports.framing import centred, size_in_frame
-from iibr_core.exports.full_picture import FullPicture, encode_light, is_full
+from iibr_core.exports.full_picture import is_full
 from iibr_core.exports.render_settings import RenderSettings, require_size
 from iibr_core.exports.source import ExportSource, OpticsOf
 from iibr_core.gloss.settings import Gloss
@@ -36,8 +36,8 @@ from viewer.gpu.context import Backend, create_headless
 from viewer.gpu.refocus.views_seen import views_seen_by
 from viewer.model import opening, window
 from viewer.model.action import Action, do
-from viewer.model.inspection import NO_INSPECTION_TEXTURES, InspectionTextures, beside_of, set_probe
-from viewer.model.layout import BACKGROUND, Layout, is_narrow, layout_of
+from viewer.model.inspection import NO_INSPECTION_TEXTURES, InspectionTextures, set_probe
+from viewer.model.layout import BACKGROUND, Layout, is_narrow
 from viewer.model.state.app_state import AppState
 
 LAYOUT_FRAMES = 3
@@ -168,14 +168,13 @@ class OffscreenScene(ExitStack):
         frame, optics, loaded = ScreenSize(*(size or self.scene.size)), self.state.optics, self.view.loaded
         box_size = size_in_frame(self.scene, frame)
         require_size(box_size)
+        settings = RenderSettings(optics, box_size, is_linear=is_linear, color_space=color_space)
         if is_full(self.scene, optics, box_size) and self.scene.plan is not None and loaded is not None:
-            from iibr_core.exports.full_drawing import draw_full
+            from iibr_core.exports.full_drawing import draw_picture
 
-            request = FullPicture(self.scene, self.scene.plan, loaded, optics, box_size)
-            light = draw_full(request, self.view.renderer.converged_picture)
-            pixels = encode_light(light, is_linear, color_space, self.scene.color_space)
+            pixels = draw_picture(self.scene, loaded, settings, self.view.renderer.converged_picture)
         else:
-            pixels = self.draw(RenderSettings(optics, box_size, is_linear=is_linear, color_space=color_space))
+            pixels = self.draw(settings)
         background = np.array(BACKGROUND[:3])
         return centred(pixels, frame, linear_from_srgb(background) if is_linear else np.round(background * 255))
 
@@ -188,16 +187,7 @@ class OffscreenScene(ExitStack):
         preferences = self.state.preferences
         look = Look(preferences.font_scale, preferences.theme)
         self.do(do(window.set_narrow, is_narrow(size, 1.0)))
-        state, scene = self.state, self.state.scene
-        layout = layout_of(
-            size,
-            scene.size if scene else None,
-            ui_scale=look.ui_scale,
-            beside=beside_of(state),
-            has_panel=not state.is_panel_hidden,
-            zoom=state.zoom,
-            own_width=scene.own_size.width if scene and scene.own_size else None,
-        )
+        layout = window.layout_for(self.state, size, 1.0, look.ui_scale)
         texture, textures = self._draw_textures(layout)
         target = self.gl.ctx.simple_framebuffer(size, 4)
         ui = UiHost(look)

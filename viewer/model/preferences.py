@@ -36,11 +36,6 @@ def estimate_depth_always(state: AppState, is_wanted: bool) -> AppState:
     return replace(state, preferences=replace(state.preferences, estimates_depth=is_wanted))
 
 
-def set_last_folder(state: AppState, folder: str) -> AppState:
-    """Remember the folder of the last saved or exported file."""
-    return replace(state, preferences=replace(state.preferences, last_folder=folder))
-
-
 def toggle_section(state: AppState, section: Section) -> AppState:
     """Close a section that is seen open; otherwise open it, with those that hold it."""
     sections = state.preferences.open_sections

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from iibr_core.remedies import Remedy, remedy_of
+from iibr_core.remedies import Remedy, with_remedy
 
 DEPTH_COMMANDS = ("Depth models…", "Open a depth map…")
 """Names of commands that give better depth."""
@@ -18,5 +18,4 @@ WORDS = {
 
 def words_of(error: Exception) -> str:
     """Return the message of an error, with its remedy."""
-    remedy = remedy_of(error)
-    return str(error) if remedy is None else f"{error}; {WORDS[remedy]}"
+    return with_remedy(error, WORDS)

@@ -18,6 +18,7 @@ from viewer.model.state.saving import SavedSettings
 
 MAX_FINISHED = 8
 """Number of finished exports in the list."""
+NO_NAME = "There is no name yet. Type one, or press Browse…"
 PASTED_FOLDER = "pasted"
 """Name of the folder that keeps pasted pictures for a while; nothing else is saved there."""
 
@@ -136,7 +137,7 @@ def written_path(kind: ExportKind, typed: str, scene: Scene, options: ExportOpti
     """
     path = Path(typed.strip())
     if not path.name:
-        raise InputError("There is no name yet. Type one, or press Browse…")
+        raise InputError(NO_NAME)
     ending = next(iter(kind.endings), "")
     if not path.suffix and not path.name.endswith(PurePath(ending).stem):
         path = path.with_name(f"{path.name}{ending}")

@@ -1,9 +1,12 @@
-"""Verbs about the window: full screen, the panel, and the report of the last drawing."""
+"""Verbs about the window: full screen, the panel, and the report of the last drawing; its layout."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
+from iibr_core.scenes.screen_size import ScreenSize
+from viewer.model.inspection import beside_of
+from viewer.model.layout import Layout, layout_of
 from viewer.model.state.app_state import AppState, DrawReport
 
 
@@ -26,3 +29,18 @@ def set_narrow(state: AppState, is_narrow: bool) -> AppState:
 def set_report(state: AppState, report: DrawReport | None) -> AppState:
     """Note how the last picture was drawn."""
     return replace(state, report=report)
+
+
+def layout_for(state: AppState, size: ScreenSize, pixel_ratio: float, ui_scale: float) -> Layout:
+    """Return the layout of a window of this size that shows the state. See `layout_of`."""
+    scene = state.scene
+    return layout_of(
+        size,
+        scene.size if scene else None,
+        pixel_ratio,
+        ui_scale,
+        beside_of(state),
+        has_panel=not state.is_panel_hidden,
+        zoom=state.zoom,
+        own_width=scene.own_size.width if scene and scene.own_size else None,
+    )

@@ -12,7 +12,7 @@ from iibr_core.method.plan import ScenePlan
 from iibr_core.scenes.scene import Source
 from iibr_core.types import InputError
 from tests.viewer.model.test_opening import scene_of, state_with
-from viewer.model import preferences, saving
+from viewer.model import saving
 from viewer.model.saving import as_other_kind, first_kind, kinds_for, usual_export_path, written_path
 from viewer.model.state.prompts import ExportPrompt, SavePrompt
 
@@ -35,7 +35,7 @@ def test_the_folder_of_the_last_is_proposed_again() -> None:
     assert STATE.scene is not None
     plan = ScenePlan(STATE.scene.grid, 1.0, 0.0, (-2.0, 3.0), 0.1, True, 0, 0, ())
     photo = replace(STATE, scene=replace(STATE.scene, plan=plan))
-    later = preferences.set_last_folder(photo, "/shared")
+    later = saving.begin_job(photo, Path("/shared/before.png"))
     exported, saved, mapped = saving.ask_to_export(later), saving.ask_to_save(later), saving.ask_to_save(later, "map")
     assert isinstance(exported.prompt, ExportPrompt)
     assert isinstance(saved.prompt, SavePrompt)

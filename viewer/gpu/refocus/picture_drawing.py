@@ -106,6 +106,15 @@ class PictureDrawing:
                 if time.perf_counter() >= end:
                     return
 
+    def steps(self) -> Generator[float]:
+        """Draw a step at a time and yield the drawn share; at the end, or when closed, free every GL object."""
+        try:
+            while not self.is_done:
+                self.advance(budget_s=0.0)
+                yield self.progress
+        finally:
+            self.stop()
+
     def stop(self) -> None:
         """Free every GL object; the image stays. To be called in any case."""
         if not self._is_released:
