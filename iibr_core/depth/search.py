@@ -99,7 +99,8 @@ def find_depth(
         except InputError as error:
             if kind == "model" and choice.asks_for_model:
                 raise
-            failures += (f"{SUBJECTS[kind]} was not used: {error}",)
+            failure = f"{SUBJECTS[kind]} was not used: {error}"
+            failures += () if failure in failures else (failure,)
             continue
         if found is not None:
             return _with_failures(found, failures)

@@ -2,7 +2,7 @@
 
 A Leia image is a JPEG of the first view, followed by a region of numbered fields: the other views' pictures, maps of
 inverse depth, and JSON that describes them. Leia publishes readers, not a description; this follows them, versions 5.1
-to 5.3. The last bytes of the file hold the size of the region. All numbers are big-endian.
+to 5.3, and files of the Lume Pad 2. The last bytes of the file hold the size of the region. All numbers are big-endian.
 """
 
 import json
@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from iibr_core.formats.files import PARSE_ERRORS, open_binary
+from iibr_core.formats.files import PARSE_ERRORS, open_binary, printable
 from iibr_core.formats.images.pillow_reader import open_with_pillow
 from iibr_core.types import InputError
 
@@ -28,6 +28,8 @@ SOURCE_IMAGE = -1
 LIF_ENDING = ".lif"
 NAMES = {"albedo": "image", "disparity": "inv_z_map", "inv_z_dist": "inv_z_map"}
 """Today's names of properties by those of older versions."""
+ADVICE = "save it side by side with Leia's program, under a name that ends in '_2x1', or get the camera's file"
+"""End of errors about files that are whole, but of an unknown version."""
 
 
 @dataclass(frozen=True)
@@ -59,7 +61,7 @@ def read_lif(data: bytes) -> Lif | None:
     fields = _fields(data[len(data) - region : end])
     described = next((fields[number] for number in JSON_FIELDS if number in fields), None)
     if described is None:
-        raise InputError("its Leia fields describe no views; get the whole file again")
+        raise InputError(f"its Leia fields ({printable(str(list(fields)))}) describe no views; {ADVICE}")
     return Lif(fields, _views(described, fields))
 
 
@@ -79,7 +81,7 @@ def lif_bytes(path: Path, number: int) -> bytes:
     """Return the content of a field."""
     lif = open_lif(path)
     if lif is None or number not in lif.fields:
-        raise InputError(f"{path}: has no picture {number}; get the whole file again")
+        raise InputError(f"{path}: no longer has a picture {number}; open it again")
     return lif.fields[number]
 
 
@@ -99,25 +101,35 @@ def _fields(region: bytes) -> dict[int, bytes]:
 
 def _views(text: bytes, fields: Mapping[int, Any]) -> tuple[LifView, ...]:
     try:
-        entries = json.loads(text)["views"]
-        views = [_view({NAMES.get(key, key): value for key, value in entry.items()}) for entry in entries]
+        described = json.loads(text)
     except PARSE_ERRORS as error:
-        reason = type(error).__name__
-        raise InputError(f"its Leia fields cannot be read ({reason}); get the whole file again") from error
-    wanted = {number for view in views for number in (view.image, view.inverse_depth) if number is not None}
-    if not views or not wanted <= {SOURCE_IMAGE, *fields}:
-        raise InputError("its Leia fields lack a picture that they name; get the whole file again")
+        raise InputError("damaged (its Leia fields hold no valid JSON); get the whole file again") from error
+    try:
+        views = [_view(entry) for entry in described["views"]]
+    except PARSE_ERRORS as error:
+        fault = f"no {printable(str(error))}" if isinstance(error, KeyError) else "another structure"
+        raise InputError(f"describes its views in an unknown way ({fault}); {ADVICE}") from error
+    pictures = {number for view in views for number in (view.image, view.inverse_depth) if number is not None}
+    if missing := sorted(pictures - {SOURCE_IMAGE, *fields}):
+        raise InputError(
+            f"its Leia fields lack the pictures {printable(str(missing))}, which they name; get the camera's file"
+        )
+    if not views:
+        raise InputError(f"its Leia fields list no views; {ADVICE}")
     return tuple(sorted(views, key=lambda view: view.x))
 
 
 def _view(entry: Mapping[str, Any]) -> LifView:
+    if "albedoId" in entry:  # Lume Pad 2, where 0 stands for no map
+        depth_field = int(entry.get("disparityId") or entry.get("monodisparityId") or 0)
+        return LifView(int(entry["albedoId"]), depth_field or None, float(entry.get("xLocation", 0.0)))
+    entry = {NAMES.get(key, key): value for key, value in entry.items()}
     inverse_depth = entry.get("inv_z_map")
     position = entry.get("position", entry.get("camera_data", {}).get("position", 0.0))
     if isinstance(position, dict):
         position = position.get("x", 0.0)
     x = position[0] if isinstance(position, list) else position
-    depth_field = None if inverse_depth is None else int(inverse_depth["blob_id"])
-    return LifView(int(entry["image"]["blob_id"]), depth_field, float(x))
+    return LifView(int(entry["image"]["blob_id"]), inverse_depth and int(inverse_depth["blob_id"]), float(x))
 
 
 def is_jpeg(path: Path) -> bool:

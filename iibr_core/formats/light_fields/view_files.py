@@ -1,15 +1,17 @@
 """Light fields in one file: quilts and lenslet images, known by their names, and stereo photos of all kinds."""
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 from iibr_core.formats.images.decode import read_size, read_text
 from iibr_core.formats.images.heic import heic_pair, is_heic
-from iibr_core.formats.images.picture_source import PicturePart, PictureSource, source_size
+from iibr_core.formats.images.picture_source import PicturePart, PictureSource, source_size, upright_size
 from iibr_core.formats.images.side_by_side import refuse_raw_light_field, stated_pair
 from iibr_core.formats.images.stereo_jpeg import SOURCE_IMAGE, is_jpeg, is_stereo_mpo, open_lif
 from iibr_core.formats.light_fields.multi_view_scene import GridIndex, KnownView, MultiView
 from iibr_core.formats.light_fields.write import LENSLET_KEY, LENSLET_TAG
+from iibr_core.formats.maps.disparity_file import has_shape_of
 from iibr_core.formats.quilts import TAG, Quilt, quilt_named
 from iibr_core.types import GridShape, ImageSize, InputError, ViewOffset
 
@@ -94,8 +96,15 @@ def _stereo_pictures(path: Path) -> tuple[str, PictureSource, PictureSource] | N
         return None
     if (leia := open_lif(path)) is not None:
         fields = [0 if view.image == SOURCE_IMAGE else view.image for view in leia.views]
-        return ("Leia stereo", PictureSource(path, fields[0]), PictureSource(path, fields[-1])) if fields[1:] else None
+        return ("Leia stereo", _leia_picture(path, fields[0]), _leia_picture(path, fields[-1])) if fields[1:] else None
     return ("MPO stereo", PictureSource(path, 0), PictureSource(path, 1)) if is_stereo_mpo(path) else None
+
+
+def _leia_picture(path: Path, number: int) -> PictureSource:
+    """Return a picture of a Leia image, at the size of the main one: the Lume Pad 2 stores some smaller."""
+    picture, size = PictureSource(path, number), upright_size(path)
+    stored = source_size(picture)
+    return replace(picture, shown_size=size) if number and stored != size and has_shape_of(stored, size) else picture
 
 
 def _view(name: str, place: GridIndex, picture: PictureSource) -> KnownView:

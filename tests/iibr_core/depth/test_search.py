@@ -12,6 +12,7 @@ from iibr_core.runtime.work import watched
 from iibr_core.types import ImageSize, InputError
 from tests.iibr_core import embedded_files as files
 from tests.iibr_core.depth.onnx_graphs import of_channels
+from tests.iibr_core.formats.test_view_files import lif
 
 SIZE = ImageSize(48, 72)
 DEPTH = np.full(SIZE, 200, np.uint8)
@@ -74,6 +75,13 @@ def test_damaged_depth_is_followed_by_the_next_with_a_note(depth, tmp_path) -> N
     assert failure.startswith("The photo's own depth was not used: ")
     assert "\n" not in failure
     assert failure in found.disparity.notes
+
+
+def test_a_fault_that_two_sources_meet_is_named_once(tmp_path) -> None:
+    """A Leia image is asked for a map, and for a second view."""
+    (tmp_path / "a.jpg").write_bytes(lif(np.full((*SIZE, 3), 60, np.uint8), b'{"views": [{"picture": 1}]}'))
+    (failure,) = open_with_depth(tmp_path / "a.jpg", start_from("auto")).origin.failures
+    assert "describes its views in an unknown way (no 'image')" in failure
 
 
 @pytest.mark.parametrize(

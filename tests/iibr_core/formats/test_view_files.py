@@ -1,4 +1,5 @@
 import json
+import re
 import struct
 from collections.abc import Callable
 from io import BytesIO
@@ -88,15 +89,30 @@ def jpeg(pixels: np.ndarray) -> bytes:
     return stored.getvalue()
 
 
+def lif(left: np.ndarray, described: bytes, *more: tuple[int, bytes]) -> bytes:
+    """Return a Leia image. described: JSON about its views. more: numbered pictures beside the left one."""
+    fields = [(0, b"\0\0\0\4"), (8, described), *more]
+    body = b"".join(struct.pack(">II", number, len(data)) + data for number, data in fields)
+    region = struct.pack(">I", len(fields)) + body
+    return jpeg(left) + region + struct.pack(">I", len(region) + 6) + b"\x1e\x1a"
+
+
 def leia_image(left: np.ndarray, right: np.ndarray, *more: tuple[int, bytes], **inner: object) -> bytes:
     views = [
         {"image": {"blob_id": 10}, "position": {"x": 0.03, "y": 0, "z": 0}},
         {"image": {"blob_id": -1}, "position": {"x": -0.03, "y": 0, "z": 0}, **inner},
     ]
-    fields = [(8, json.dumps({"views": views}).encode()), (10, jpeg(right)), *more]
-    body = b"".join(struct.pack(">II", number, len(data)) + data for number, data in fields)
-    region = struct.pack(">I", len(fields)) + body
-    return jpeg(left) + region + struct.pack(">I", len(region) + 6) + b"\x1e\x1a"
+    return lif(left, json.dumps({"views": views}).encode(), (10, jpeg(right)), *more)
+
+
+def lume_pad_2(left: np.ndarray, right: np.ndarray, *more: tuple[int, bytes]) -> bytes:
+    """Return an image of a Lume Pad 2; more: a map numbered 1000002."""
+    views = [
+        {"albedoId": 1000001, "disparityId": 0, "monodisparityId": 0, "xLocation": 1.0, "yLocation": 0.0},
+        {"albedoId": -1, "disparityId": 1000002 if more else 0, "monodisparityId": 0, "xLocation": 0, "yLocation": 0},
+    ]
+    described = json.dumps({"disparitySource": "LEIA_STEREO", "views": views}).encode()
+    return lif(left, described, (1000001, jpeg(right)), *more)
 
 
 STEREO: dict[str, tuple[str, Callable[..., object], str]] = {
@@ -104,6 +120,7 @@ STEREO: dict[str, tuple[str, Callable[..., object], str]] = {
     "mpo": ("a.mpo", write_mpo, "MPO stereo"),
     "stereo jpeg": ("a.jpg", write_stereo_jpeg, "MPO stereo"),
     "leia": ("a.jpg", lambda path, *eyes: path.write_bytes(leia_image(*eyes)), "Leia stereo"),
+    "lume pad 2": ("a.jpg", lambda path, *eyes: path.write_bytes(lume_pad_2(*eyes)), "Leia stereo"),
     "lif": ("a.lif", lambda path, *eyes: path.write_bytes(leia_image(*eyes)), "Leia stereo"),
 }
 
@@ -142,18 +159,63 @@ def test_raw_light_fields_are_refused_with_programs_that_decode_them(tmp_path) -
             read(path)
 
 
-def test_a_leia_image_contains_inverse_depth(tmp_path) -> None:
-    """White is near; a single view is a photo with depth."""
-    grey = np.tile(np.arange(64, dtype=np.uint8) * 3, (48, 1))
-    inner = {"inv_z_map": {"blob_id": 11, "min": 0.4, "max": 0.01}}
+GREY = np.tile(np.arange(64, dtype=np.uint8) * 3, (48, 1))
+WITH_MAP: dict[str, bytes] = {
+    "5.3": leia_image(smooth(), smooth(shift=4), (11, jpeg(GREY)), inv_z_map={"blob_id": 11, "min": 0.4, "max": 0.01}),
+    "lume pad 2": lume_pad_2(smooth(), smooth(shift=4), (1000002, jpeg(GREY))),
+}
+
+
+@pytest.mark.parametrize("version", WITH_MAP)
+def test_a_leia_image_contains_inverse_depth(tmp_path, version) -> None:
+    """White is near."""
     path = tmp_path / "a.jpg"
-    path.write_bytes(leia_image(smooth(), smooth(shift=4), (11, jpeg(grey)), **inner))
+    path.write_bytes(WITH_MAP[version])
     depth = read_embedded(path)
-    assert depth.format == "Leia"
-    assert depth.estimate.meaning == "inverse depth"
-    np.testing.assert_allclose(depth.estimate.values, grey / 255, atol=0.02)
-    path.write_bytes(leia_image(smooth(), smooth(shift=4)))
+    assert (depth.format, depth.estimate.meaning) == ("Leia", "inverse depth")
+    np.testing.assert_allclose(depth.estimate.values, GREY / 255, atol=0.02)
+    path.write_bytes(lume_pad_2(smooth(), smooth(shift=4)))
     assert read_embedded(path) is None
+
+
+def test_smaller_views_of_a_leia_image_are_enlarged(tmp_path) -> None:
+    path, right = tmp_path / "a.jpg", smooth(shift=4)
+    path.write_bytes(lume_pad_2(smooth(), np.asarray(Image.fromarray(right).resize((32, 24), Image.Resampling.BOX))))
+    views = read_back(path)
+    assert np.abs(views[0, 1].astype(int) - right).mean() < 4
+    path.write_bytes(lume_pad_2(smooth(), right[:24]))
+    with pytest.raises(InputError, match=r"is 64x24, but a\.jpg is 64x48"):
+        read_back(path)
+
+
+UNKNOWN = "save it side by side with Leia's program, under a name that ends in '_2x1'"
+AGAIN = "get the whole file again"
+BAD_LEIA: dict[str, tuple[bytes, str]] = {
+    "unknown keys": (b'{"views": [{"picture": 1}]}', f"in an unknown way (no 'image'); {UNKNOWN}"),
+    "no number": (b'{"views": [{"image": {"file": 1}}]}', f"in an unknown way (no 'blob_id'); {UNKNOWN}"),
+    "another form": (b'{"views": {"left": -1}}', f"in an unknown way (another structure); {UNKNOWN}"),
+    "no views": (b'{"views": []}', f"list no views; {UNKNOWN}"),
+    "missing picture": (b'{"views": [{"albedoId": 7000}]}', "lack the pictures [7000], which they name"),
+    "cut text": (b'{"views": [{"albe', AGAIN),
+}
+
+
+@pytest.mark.parametrize("fault", BAD_LEIA)
+def test_only_damaged_leia_images_are_to_be_fetched_again(tmp_path, fault) -> None:
+    described, advice = BAD_LEIA[fault]
+    path = tmp_path / "a.lif"
+    path.write_bytes(lif(smooth(), described))
+    with pytest.raises(InputError, match=re.escape(advice)) as raised:
+        open_light_field(path)
+    assert (AGAIN in str(raised.value)) == (advice == AGAIN)
+
+
+@pytest.mark.parametrize("cut", ["the end", "the middle"])
+def test_cut_leia_images_are_to_be_fetched_again(tmp_path, cut) -> None:
+    path, stored = tmp_path / "a.lif", lume_pad_2(smooth(), smooth(shift=4))
+    path.write_bytes(stored[:-100] if cut == "the end" else stored[:-600] + stored[-400:])
+    with pytest.raises(InputError, match=AGAIN):
+        open_light_field(path)
 
 
 @pytest.mark.parametrize("view", [ImageSize(64, 96), ImageSize(3000, 4000), ImageSize(5000, 300), ImageSize(900, 9)])
