@@ -12,7 +12,7 @@ from pkgutil import resolve_name
 from typing import Any, Literal
 
 from iibr_core.beyond.optics import Optics
-from iibr_core.formats.animations import VIDEOS, even_size
+from iibr_core.formats.animations import VIDEOS, even_size, video_width
 from iibr_core.formats.light_fields.write import check_light_field
 from iibr_core.formats.outputs import check_output, check_output_folder
 from iibr_core.scenes.scene import Scene
@@ -33,6 +33,8 @@ DEFAULT_SECONDS = 4.0
 MAX_FRAMES = 10_000
 RATE_LIMITS = 0.1, 240.0
 """Lowest and highest frame rate, in frames a second."""
+MAX_PICTURE_RATE = 50.0
+"""Highest frame rate of GIF and WebP: browsers show a frame of less than 20 ms for 100 ms."""
 Purpose = Literal["share", "display", "software"]
 PURPOSES: dict[Purpose, str] = {"share": "Share", "display": "3D displays", "software": "Other software"}
 """Purposes of an export, with their words for the user."""
@@ -82,9 +84,9 @@ class ExportKind:
     functions that several kinds share. optics: function that finds the optics of the drawn pictures, "" if nothing is
     drawn. path: function that completes the file name. own_files: regular expression of the files in a folder that may
     be replaced. needs: packages of the extra `export`. frames: default number of pictures of a stack. rate: default
-    frames a second. max_width_px: largest default width, 0 for any. has_colors: whether gloss is visible in it.
-    is_light_field: whether it is a light field in the layout `variant`. gallery: function that lists the exports of a
-    batch.
+    frames a second. max_rate: highest one, 0 for any. max_width_px: largest default width, 0 for any. has_colors:
+    whether gloss is visible in it. is_light_field: whether it is a light field in the layout `variant`. gallery:
+    function that lists the exports of a batch.
     """
 
     words: str
@@ -98,6 +100,7 @@ class ExportKind:
     needs: tuple[str, ...] = ()
     frames: int = 0
     rate: float = 0.0
+    max_rate: float = 0.0
     max_width_px: int = 0
     has_colors: bool = True
     is_light_field: bool = False
@@ -132,6 +135,7 @@ def _animation(words: str, ending: str, rate: float, max_width_px: int = 0, need
     return ExportKind(
         words, (ending,), "animation:write_motion", supports,
         optics="animation:optics_on_path", needs=needs, rate=rate, max_width_px=max_width_px,
+        max_rate=0 if needs else MAX_PICTURE_RATE,
     )  # fmt: skip
 
 
@@ -198,14 +202,19 @@ def export_kind(name: str) -> ExportKind:
 def with_defaults(kind: ExportKind, options: ExportOptions, scene: Scene, optics: Optics) -> ExportOptions:
     """Return the options with the default of the kind for every choice that is open."""
     rate = options.rate or kind.rate
+    frames = options.frames or kind.frames or max(round(DEFAULT_SECONDS * rate), 2)
+    if 0 < kind.max_rate < rate:  # fewer frames fill the same time
+        shown = max(int(frames * kind.max_rate / rate), 1)
+        frames, rate = shown, rate * shown / frames
     eyes = options.eyes if options.eyes >= 0 else float(scene.grid.columns - 1)
     aspect = picture_aspect(kind, eyes, scene, optics)
-    width = round(aspect * scene.height)
+    widest = video_width(aspect) if VIDEOS.keys() & kind.endings else kind.max_width_px
+    width = min(round(aspect * scene.height), widest or scene.width)
     return replace(
         options,
-        size=options.size if any(options.size) else size_of_width(kind, aspect, min(width, kind.max_width_px or width)),
+        size=options.size if any(options.size) else size_of_width(kind, aspect, width),
         eyes=eyes,
-        frames=options.frames or kind.frames or max(round(DEFAULT_SECONDS * rate), 2),
+        frames=frames,
         rate=rate,
         row=options.row if options.row >= 0 else scene.height // 2,
     )

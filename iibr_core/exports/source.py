@@ -181,6 +181,11 @@ def write_export(kind: ExportKind, path: Path, source: ExportSource, options: Ex
     """Write an export of this kind; return a sentence about it for the user, or None."""
     filled = with_defaults(kind, options, source.scene, source.optics)
     message: str | None = kind.function(kind.write)(path, source, filled)
+    if filled.rate < options.rate:
+        return (
+            f"browsers slow down animations of {options.rate:g} frames a second; "
+            f"the same {filled.frames / filled.rate:.3g} s have {filled.frames} frames instead"
+        )
     return message
 
 

@@ -1,5 +1,6 @@
 """Moving pictures: MP4 and WebM by PyAV, GIF and WebP by Pillow. They repeat for ever where the player can do so."""
 
+import math
 from collections.abc import Iterable, Sequence
 from fractions import Fraction
 from pathlib import Path
@@ -18,6 +19,8 @@ VIDEOS: dict[str, tuple[str, dict[str, str]]] = {
 }
 """Codec and its options, by the ending of the file."""
 BT709, MPEG_RANGE = 1, 1
+MAX_VIDEO_PIXELS, MAX_VIDEO_SIDE_PX = 3840 * 2160, 4096
+"""Largest default size of a video: phones decode H.264 of level 5.1, which has such pictures 30 times a second."""
 PALETTE_COLORS, PALETTE_SAMPLES, PALETTE_SIDE_PX = 255, 8, 128
 """Colours of a GIF, and the number and size of the evenly spread frames that they are chosen from."""
 WEBP_QUALITY = 85
@@ -26,6 +29,11 @@ WEBP_QUALITY = 85
 def even_size(size: ImageSize) -> ImageSize:
     """Return the largest size within `size` that videos can have: two rows and columns share their colours."""
     return ImageSize(*(max(side - side % 2, 2) for side in size))
+
+
+def video_width(aspect: float) -> int:
+    """Return the largest default width of a video of this aspect (width / height), in pixels."""
+    return int(min(math.sqrt(MAX_VIDEO_PIXELS * aspect), MAX_VIDEO_SIDE_PX * min(aspect, 1.0)))
 
 
 def write_animation(path: Path, frames: Iterable[NDArray[np.uint8]], size: ImageSize, rate: float) -> None:
@@ -46,14 +54,16 @@ def write_animation(path: Path, frames: Iterable[NDArray[np.uint8]], size: Image
 def _write_video(
     path: Path, temporary: Path, frames: Iterable[NDArray[np.uint8]], size: ImageSize, rate: float
 ) -> None:
-    """Write 4:2:0 of 8 bits, BT.709, which every player takes."""
+    """Write 4:2:0, 8 bits, BT.709, which every player takes. An MP4 has its index first, so it plays while it loads."""
     import av
     from av.codec.codec import UnknownCodecError
 
     codec, options = VIDEOS[path.suffix.lower()]
+    exact = Fraction(rate).limit_denominator(1001)
+    layout = {"movflags": "+faststart", "movie_timescale": str(exact.numerator)} if codec == "libx264" else {}
     try:
-        with av.open(str(temporary), "w", format=path.suffix[1:].lower()) as container:
-            stream: Any = container.add_stream(codec, rate=Fraction(rate).limit_denominator(1001), options=options)
+        with av.open(str(temporary), "w", format=path.suffix[1:].lower(), options=layout) as container:
+            stream: Any = container.add_stream(codec, rate=exact, options=options)
             stream.width, stream.height, stream.pix_fmt = size.width, size.height, "yuv420p"
             context = stream.codec_context
             context.colorspace = context.color_primaries = context.color_trc = BT709

@@ -14,6 +14,7 @@ from iibr_core.exports.kinds import ANIMATIONS, EXPORTS, ExportOptions, with_def
 from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.exports.source import ExportSource
 from iibr_core.exports.stack import focal_stack
+from iibr_core.formats.images.iso_boxes import boxes
 from iibr_core.formats.maps.pfm import read_pfm
 from iibr_core.runtime.work import Cancelled, stoppable
 from iibr_core.scenes.lens_limits import aperture_limit
@@ -34,7 +35,8 @@ def expected_frames(source: ExportSource) -> list[np.ndarray]:
     return [source.draw(RenderSettings(optics, SIZE)).astype(int) for optics in path_of(source, frames=COUNT)]
 
 
-def video_frames(path: Path) -> tuple[list[np.ndarray], float, str]:
+def video_frames(path: Path) -> tuple[list[np.ndarray], dict[str, Any]]:
+    """Return the frames of a video, and what PyAV says of it."""
     import av
 
     with av.open(str(path)) as container:
@@ -43,18 +45,42 @@ def video_frames(path: Path) -> tuple[list[np.ndarray], float, str]:
             frame.reformat(format="rgb24", src_colorspace="ITU709").to_ndarray().astype(int)
             for frame in container.decode(stream)
         ]
-        return frames, float(stream.average_rate or 0), stream.codec_context.pix_fmt or ""
+        context = stream.codec_context
+        colors = {context.color_primaries, context.color_trc, context.colorspace, context.color_range}
+        facts = {"rate": stream.average_rate, "pixels": context.pix_fmt, "colors": colors}
+        return frames, facts | {"microseconds": container.duration, "tag": context.codec_tag, "profile": stream.profile}
 
 
 @pytest.mark.parametrize("kind", ["mp4", "webm"])
 def test_videos_show_what_the_renderer_shows(source, tmp_path, kind) -> None:
     pytest.importorskip("av")
-    frames, rate, pixels = video_frames(exported(source, kind, tmp_path / f"a.{kind}", frames=COUNT, rate=12.5))
-    assert (len(frames), rate, pixels) == (COUNT, pytest.approx(12.5), "yuv420p")
+    frames, facts = video_frames(exported(source, kind, tmp_path / f"a.{kind}", frames=COUNT, rate=12.5))
+    assert (len(frames), facts["rate"], facts["pixels"]) == (COUNT, 12.5, "yuv420p")
+    assert (facts["microseconds"], facts["colors"]) == (480_000, {1}), "all by BT.709, limited range"
+    if kind == "mp4":
+        assert (facts["tag"], facts["profile"]) == ("avc1", "High")
     for frame, expected in zip(frames, expected_frames(source)):
         # Colours are shared by 2x2 pixels: means over them are compared, which neither hue nor range may move.
         means = [picture.reshape(16, 4, 24, 4, 3).mean(axis=(1, 3)) for picture in (frame, expected)]
         assert np.abs(means[0] - means[1]).mean() < 4
+
+
+def test_the_index_of_an_mp4_comes_before_its_pictures(source, tmp_path) -> None:
+    pytest.importorskip("av")
+    kinds = [kind for kind, _ in boxes(exported(source, "mp4", tmp_path / "a.mp4", frames=2).read_bytes())]
+    assert kinds.index(b"moov") < kinds.index(b"mdat")
+
+
+@pytest.mark.parametrize(
+    ("kind", "rate", "count", "delays"),
+    [("gif", 100.0, 12, {20}), ("gif", 30.0, 12, {30, 40}), ("gif", 120.0, 12, {20}), ("webp", 240.0, 24, {20})],
+)
+def test_no_frame_is_so_short_that_browsers_slow_it_down(source, tmp_path, kind, rate, count, delays) -> None:
+    """They show a frame of less than 20 ms for 100 ms. The whole time stays."""
+    with Image.open(exported(source, kind, tmp_path / f"a.{kind}", frames=count, rate=rate)) as image:
+        durations = [frame.copy().info["duration"] for frame in ImageSequence.Iterator(image)]
+    assert set(durations) == delays
+    assert sum(durations) == pytest.approx(1000 * count / rate, abs=5)
 
 
 @pytest.mark.parametrize(("kind", "tolerance"), [("gif", 12), ("webp", 10)])

@@ -1,3 +1,6 @@
+import math
+from dataclasses import replace
+
 import pytest
 
 from iibr_core.beyond.optics import Optics
@@ -20,6 +23,23 @@ SHARP_NEAR = Optics(focus_disparity=10.0)
 def test_defaults(kind, size, frames, rate) -> None:
     options = with_defaults(EXPORTS[kind], ExportOptions(), SCENE, SHARP_NEAR)
     assert (options.size, options.frames, options.rate, options.eyes, options.row) == (size, frames, rate, 3, 250)
+
+
+@pytest.mark.parametrize(("kind", "rate", "count"), [("gif", 100.0, 200), ("webp", 60.0, 200), ("mp4", 60.0, 240)])
+def test_animated_pictures_have_at_most_fifty_frames_a_second(kind, rate, count) -> None:
+    options = with_defaults(EXPORTS[kind], ExportOptions(rate=rate), SCENE, SHARP_NEAR)
+    assert (options.frames, options.rate) == (count, min(rate, EXPORTS[kind].max_rate or rate))
+
+
+@pytest.mark.parametrize(("height", "width"), [(3000, 4000), (4000, 3000), (9000, 1000), (1000, 9000), (2160, 3840)])
+def test_a_large_video_is_one_that_phones_play(height, width) -> None:
+    scene = replace(SCENE, width=width, height=height)
+    size = with_defaults(EXPORTS["mp4"], ExportOptions(), scene, SHARP_NEAR).size
+    assert max(size) <= 4096
+    macroblocks = math.prod(-(-side // 16) for side in size)
+    assert macroblocks <= 32_768, "30 frames a second of H.264, level 5.1"
+    assert macroblocks > 32_000 or max(size) >= 4090, "no smaller than need be"
+    assert size.width / size.height == pytest.approx(width / height, rel=2e-2)
 
 
 @pytest.mark.parametrize("name", FOLDERS)

@@ -30,8 +30,10 @@ def views_of(folder: str) -> np.ndarray:
 
 
 def test_a_drawn_kind(iibr: Iibr, photo: Path) -> None:
-    words = ("--to", "gif", "-o", "a.gif", "--grid", 3, "--frames", 3, "--motion", "swing", "--size", "30x20")
-    assert output_of(iibr("export", photo, *words)) == "a.gif\n"
+    words = ("--to", "gif", "-o", "a.gif", "--grid", 3, "--frames", 6, "--motion", "swing", "--size", "30x20")
+    done = iibr("export", photo, *words, "--rate", 100)
+    assert output_of(done) == "a.gif\n"
+    assert "animations of 100 frames a second; the same 0.06 s have 3 frames instead" in done.stderr
     with Image.open("a.gif") as image:
         assert (image.size, image.n_frames) == ((30, 20), 3)  # type: ignore[attr-defined]
 
