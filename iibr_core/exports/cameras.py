@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from iibr_core.color import bytes_from_encoded, encoded_from_stored
 from iibr_core.exports.kinds import ExportOptions
 from iibr_core.exports.source import ExportSource
-from iibr_core.formats.cameras import FieldCameras, infinity_of, write_colmap, write_llff, write_nerfstudio
+from iibr_core.formats.cameras import FieldCameras, infinity_of, write_llff, write_nerfstudio
+from iibr_core.formats.colmap import write_colmap
 from iibr_core.formats.images.write import write_image
 from iibr_core.formats.light_fields import write
 from iibr_core.formats.outputs import write_folder

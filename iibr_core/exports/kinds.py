@@ -122,7 +122,7 @@ MAP = (".pfm", ".exr", ".npy", ".png", ".tif")
 PICTURE = (".png", ".jpg", ".jpeg", ".webp", ".avif", ".tif", ".tiff")
 EYES = ("focus", "aperture", "size", "eyes")
 STACK_FILES = r"(focus_\d+|all_in_focus)\.png|disparity\.pfm"
-CAMERA_FILES = r"images/v\d+_u\d+\.png|poses_bounds\.npy|transforms\.json|sparse/0/\w+\.txt"
+CAMERA_FILES = r"images/v\d+_u\d+\.png|poses_bounds\.npy|transforms\.json|sparse/0/\w+\.(txt|bin)"
 
 
 def _stereo(words: str, variant: str, path: str = "stereo:stereo_path") -> ExportKind:

@@ -1,4 +1,4 @@
-"""Cameras of a light field's views, written for reconstruction programs: LLFF, nerfstudio, COLMAP.
+"""Cameras of a light field's views, written for reconstruction programs: LLFF, nerfstudio; see also `colmap.py`.
 
 All cameras look the same way, from a plane. Lengths are in distances of the nearest point: disparity gives depth up to
 its unit. A plane that stands still in the field lies at a finite distance, but moves in cameras that look straight
@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from iibr_core.types import FloatImage, GridShape, ImageSize, InputError, ViewOffset
 
@@ -128,27 +127,3 @@ def write_nerfstudio(folder: Path, cameras: FieldCameras, views: Views) -> None:
     height, width = cameras.size
     lens = {"camera_model": "OPENCV", "w": width, "h": height, "fl_x": cameras.focal_px, "fl_y": cameras.focal_px}
     (folder / "transforms.json").write_text(json.dumps({**lens, "frames": frames}, indent=1), encoding="utf-8")
-
-
-def write_colmap(
-    folder: Path, cameras: FieldCameras, views: Views, points: FloatImage, colors: NDArray[np.uint8]
-) -> None:
-    """Write COLMAP's text model to sparse/0: world to camera, y down and z forward.
-
-    points, colors: (N, 3), points of the scene to start from.
-    """
-    model = folder / "sparse" / "0"
-    model.mkdir(parents=True)
-    (height, width), focal_px = cameras.size, cameras.focal_px
-    lines: dict[str, list[str]] = {"cameras": [], "images": []}
-    for i, name in enumerate(sorted(views), 1):
-        (x, y, z), (centre_x, centre_y) = cameras.place(views[name]), cameras.principal_point(views[name])
-        lines["cameras"].append(f"{i} PINHOLE {width} {height} {focal_px!r} {focal_px!r} {centre_x!r} {centre_y!r}")
-        # The second line of a picture would list the points seen in it.
-        lines["images"] += [f"{i} 1 0 0 0 {-x!r} {-y!r} {-z!r} {i} {name}", ""]
-    lines["points3D"] = [
-        f"{i} {x:.6g} {y:.6g} {z:.6g} {red} {green} {blue} 0"
-        for i, ((x, y, z), (red, green, blue)) in enumerate(zip(points.tolist(), colors.tolist()), 1)
-    ]
-    for name, content in lines.items():
-        (model / f"{name}.txt").write_text("\n".join([*content, ""]), encoding="utf-8")

@@ -1,4 +1,5 @@
 import json
+import struct
 from pathlib import Path
 
 import numpy as np
@@ -8,10 +9,10 @@ from iibr_core.formats.cameras import (
     MAX_DEPTH_RATIO,
     FieldCameras,
     infinity_of,
-    write_colmap,
     write_llff,
     write_nerfstudio,
 )
+from iibr_core.formats.colmap import write_colmap
 from iibr_core.formats.poses import read_poses
 from iibr_core.types import GridShape, ImageSize, InputError, ViewOffset
 
@@ -115,10 +116,99 @@ def test_colmaps_quaternion_is_from_the_world(tmp_path):
     half = np.sqrt(0.5)
     line = f"\ufeff1 {half} 0 0 {half} 1 2 3 1 a b.png\n\n"  # a quarter turn about z
     (tmp_path / "sparse/0/images.txt").write_text(line, "utf-8")
+    (tmp_path / "sparse/0/images.bin").unlink()
     (camera,) = read_poses(tmp_path)
     np.testing.assert_allclose(camera.world_from_camera.T @ (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), atol=1e-12)
     np.testing.assert_allclose(camera.world_from_camera.T @ -camera.position, (1.0, 2.0, 3.0), atol=1e-12)
     assert camera.source.endswith("a b.png")
+
+
+def read_binary(path: Path, record: str) -> list[tuple]:
+    """Return the records of a binary model's file; a name and an observation follow in images.bin."""
+    (count,), data = struct.unpack("<Q", path.read_bytes()[:8]), path.read_bytes()[8:]
+    records = []
+    for _ in range(count):
+        values, data = struct.unpack(record, data[: struct.calcsize(record)]), data[struct.calcsize(record) :]
+        if path.name == "images.bin":
+            name, data = data.split(b"\0", 1)
+            values, data = (*values, name.decode(), *struct.unpack("<QddQ", data[:32])), data[32:]
+        records.append(values)
+    assert not data
+    return records
+
+
+def test_colmaps_binary_model_holds_the_same_as_its_text(tmp_path):
+    """Programs take only the one or the other, and some stop reading text at an empty line."""
+    points, colors = np.float32([[0.5, -2, 4], [1, 2, 3]]), np.uint8([[1, 2, 3], [250, 251, 252]])
+    cameras = FieldCameras(FIELD, FIELD_SIZE, 50.0, (1.0, 4.0), -0.5)
+    write_colmap(tmp_path, cameras, VIEWS, points, colors)
+    model = tmp_path / "sparse" / "0"
+    text = {name: (model / f"{name}.txt").read_text().splitlines() for name in ("cameras", "images", "points3D")}
+    assert all(line for lines in text.values() for line in lines)
+    for line, values in zip(text["cameras"], read_binary(model / "cameras.bin", "<IiQQ4d"), strict=True):
+        assert line.replace(" PINHOLE ", " 1 ") == " ".join(map(str, values))
+    images = read_binary(model / "images.bin", "<I7dI")
+    for line, observed, values in zip(text["images"][::2], text["images"][1::2], images, strict=True):
+        assert line == " ".join(map(str, values[:10]))
+        assert observed == f"{values[-3]} {values[-2]} -1"
+        assert (values[10], values[-1]) == (1, 2**64 - 1), "one observation, of no point"
+    binary = read_binary(model / "points3D.bin", "<Q3d3BdQ")
+    assert [line.split() for line in text["points3D"]] == [[f"{value:g}" for value in row[:-1]] for row in binary]
+    assert [row[-1] for row in binary] == [0, 0], "observed nowhere"
+    text_only = tmp_path / "text"
+    text_only.mkdir()
+    for name in ("cameras.txt", "images.txt"):
+        (model / name).rename(text_only / name)
+    for one, other in zip(read_poses(text_only), read_poses(tmp_path), strict=True):
+        assert (one.size, one.focal_px, one.centre_px) == (other.size, other.focal_px, other.centre_px)
+        np.testing.assert_array_equal(
+            [*one.world_from_camera, one.position], [*other.world_from_camera, other.position]
+        )
+
+
+@pytest.mark.parametrize(
+    ("name", "change", "message"),
+    [
+        ("images", lambda data: data[:-120], "is not a model of COLMAP"),
+        ("images", lambda data: struct.pack("<Q", 2**60) + data[8:], "poses"),
+        ("images", lambda data: data.replace(b"\0v", b"xv").replace(b"png\0", b"png "), "is not a model of COLMAP"),
+        ("images", lambda data: struct.pack("<Q", 1) + data[8:81] + struct.pack("<QQ", 2**63, 5), "not a model"),
+        ("cameras", lambda data: data[:12] + struct.pack("<i", 4) + data[16:] + bytes(32), "is a OPENCV; undistort"),
+        ("cameras", lambda data: data[:12] + struct.pack("<i", 99) + data[16:], "unknown camera model 99"),
+        ("cameras", lambda data: data[:16] + struct.pack("<Q", 2**62) + data[24:], "pixels"),
+        ("cameras", lambda data: data[:8] + struct.pack("<I", 7) + data[12:], "is not a model of COLMAP"),
+    ],
+)
+def test_damaged_and_distorted_binary_models_are_refused(tmp_path, name, change, message):
+    write_field(tmp_path, "colmap")
+    path = tmp_path / f"sparse/0/{name}.bin"
+    path.write_bytes(change(path.read_bytes()))
+    require_refusal(message, read_poses, tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"camera_model": "OPENCV", "k1": -0.35, "k2": 0.12}, "k1 = -0.35, k2 = 0.12.*undistort the pictures"),
+        ({"p2": 0.01}, "p2 = 0.01"),
+        ({"k4": "0.1"}, "k4 = 0.1"),
+        ({"k1": float("inf")}, "transforms.json"),
+        ({"camera_model": "OPENCV_FISHEYE"}, "a OPENCV_FISHEYE.*undistort"),
+        ({"camera_model": "EQUIRECTANGULAR"}, "a EQUIRECTANGULAR"),
+        ({"is_fisheye": True}, "is_fisheye = True"),
+        ({"distortion_params": [0.1, 0]}, "distortion_params"),
+    ],
+)
+@pytest.mark.parametrize("place", ["file", "frame"])
+def test_cameras_that_distort_are_refused(tmp_path, values, message, place):
+    frame = {"file_path": "a.png", "transform_matrix": np.eye(4).tolist()}
+    changes = values if place == "file" else {"frames": [frame, {**frame, **values}]}
+    require_refusal(message, read_transforms, tmp_path, **changes)
+
+
+def test_stated_distortions_of_zero_are_none(tmp_path):
+    none = {"camera_model": "OPENCV", "k1": 0, "k2": 1e-5, "p1": None, "is_fisheye": False}
+    assert read_transforms(tmp_path, **none)[0].focal_px == (50.0, 50.0)
 
 
 @pytest.mark.parametrize(
