@@ -236,9 +236,9 @@ def shear_margin(scene: Scene, optics: Optics, span_views: float) -> float:
 
 
 def size_of_width(kind: ExportKind, aspect: float, width: int) -> ScreenSize:
-    """Return the size of this width (pixels) and about this aspect that the kind can have; sides of videos are even."""
+    """Return the size of this width (pixels) and about this aspect that the kind can have; sides of 4:2:0 are even."""
     size = ImageSize(max(round(width / aspect), 1), width)
-    height, width = even_size(size) if VIDEOS.keys() & kind.endings else size
+    height, width = even_size(size) if {*VIDEOS, ".heic"} & {*kind.endings} else size
     return ScreenSize(width, height)
 
 

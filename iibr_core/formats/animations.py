@@ -27,8 +27,14 @@ WEBP_QUALITY = 85
 
 
 def even_size(size: ImageSize) -> ImageSize:
-    """Return the largest size within `size` that videos can have: two rows and columns share their colours."""
+    """Return the largest size within `size` that 4:2:0 can have: two rows and columns share their colours."""
     return ImageSize(*(max(side - side % 2, 2) for side in size))
+
+
+def require_even(path: Path, size: ImageSize) -> None:
+    """Raise InputError if a file in 4:2:0 cannot have this size."""
+    if size != even_size(size):
+        raise InputError(f"{path}: width and height must be even, not {size}; give {even_size(size)}")
 
 
 def video_width(aspect: float) -> int:
@@ -42,8 +48,8 @@ def write_animation(path: Path, frames: Iterable[NDArray[np.uint8]], size: Image
     frames: (H, W, 3), sRGB-encoded, all of this size. rate: frames a second.
     """
     is_video = path.suffix.lower() in VIDEOS
-    if is_video and size != even_size(size):
-        raise InputError(f"{path}: a video's width and height are even, not {size}; give {even_size(size)}")
+    if is_video:
+        require_even(path, size)
     with write_file(path) as temporary:
         if is_video:
             _write_video(path, temporary, frames, size, rate)

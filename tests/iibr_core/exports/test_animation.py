@@ -135,10 +135,10 @@ def test_keys_that_mean_nothing_are_refused(source, tmp_path, text) -> None:
         path_of(source, keys=keys, frames=4)
 
 
-@pytest.mark.parametrize("name", ["a.mp4", "a.webm"])
-def test_videos_have_even_sizes(source, tmp_path, name) -> None:
+@pytest.mark.parametrize(("kind", "name"), [("mp4", "a.mp4"), ("webm", "a.webm"), ("spatial-photo", "a.heic")])
+def test_videos_and_spatial_photos_have_even_sizes(source, tmp_path, kind, name) -> None:
     with pytest.raises(InputError, match="give 96x64"):
-        exported(source, name[2:], tmp_path / name, size=ScreenSize(97, 65))
+        exported(source, kind, tmp_path / name, size=ScreenSize(97, 65))
     assert list(tmp_path.iterdir()) == []
 
 

@@ -18,7 +18,7 @@ SHARP_NEAR = Optics(focus_disparity=10.0)
 @pytest.mark.parametrize(
     ("kind", "size", "frames", "rate"),
     [("mp4", (740, 500), 120, 30), ("gif", (480, 324), 60, 15), ("webp", (741, 500), 100, 25),
-     ("focal-stack", (741, 500), 16, 0)],
+     ("focal-stack", (741, 500), 16, 0), ("spatial-photo", (700, 500), 2, 0)],
 )  # fmt: skip
 def test_defaults(kind, size, frames, rate) -> None:
     options = with_defaults(EXPORTS[kind], ExportOptions(), SCENE, SHARP_NEAR)

@@ -1,3 +1,4 @@
+import struct
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,6 +10,7 @@ from PIL import Image
 from iibr_core.beyond.optics import Optics
 from iibr_core.exports.framing import side_pictures
 from iibr_core.exports.render_settings import RenderSettings
+from iibr_core.formats.images.iso_boxes import boxes
 from iibr_core.formats.images.photo import read_photo
 from iibr_core.formats.images.spatial_photo import write_spatial_photo
 from iibr_core.scenes.screen_size import ScreenSize
@@ -132,6 +134,26 @@ def test_both_pictures_of_a_spatial_photo_are_what_the_renderer_shows(source, tm
     for picture, s in zip(file, (-1.0, 1.0)):
         assert np.abs(np.asarray(picture).astype(int) - seen(source, s)).mean() < 3
     assert read_photo(path).size == (64, 96), "as an ordinary photo it is the left picture"
+
+
+@pytest.mark.parametrize("size", [(64, 96), (66, 98), (500, 342)])
+def test_boxes_of_a_spatial_photo_are_as_apples(tmp_path, size) -> None:
+    """4:2:0 of the Main Still Picture profile, whole; the left picture is the photo and the first of the pair."""
+    eye = np.random.default_rng(0).integers(0, 256, (*size, 3), np.uint8)
+    write_spatial_photo(tmp_path / "a.heic", eye, 255 - eye, focal_px=90.0)
+    top = list(boxes((tmp_path / "a.heic").read_bytes()))
+    meta = dict(boxes(dict(top)[b"meta"][4:]))
+    properties = list(boxes(dict(boxes(meta[b"iprp"]))[b"ipco"]))
+    kinds = [kind for kind, _ in properties]
+    assert (top[0][0], top[0][1][:4], b"clap" in kinds) == (b"ftyp", b"heic", False)
+    configured = [(content[1] & 31, content[16] & 3) for kind, content in properties if kind == b"hvcC"]
+    assert set(configured) == {(3, 1)}, "profile and chroma format"
+    assert {struct.unpack(">II", content[4:]) for kind, content in properties if kind == b"ispe"} == {size[::-1]}
+    ((group, pair),) = boxes(meta[b"grpl"])
+    _, _, count, left, right = struct.unpack(">IIIII", pair)
+    assert (group, count, left != right, struct.unpack(">H", meta[b"pitm"][4:])) == (b"ster", 2, True, (left,))
+    means = [np.asarray(picture).mean() for picture in pillow_heif.open_heif(tmp_path / "a.heic")]
+    assert means == pytest.approx([eye.mean(), 255 - eye.mean()], abs=2)
 
 
 def test_libheif_knows_the_pair_and_its_cameras(tmp_path) -> None:
