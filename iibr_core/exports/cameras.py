@@ -1,5 +1,6 @@
 """All views: as a light field, or with their cameras for programs that reconstruct scenes (LLFF, COLMAP)."""
 
+import math
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
@@ -7,10 +8,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from iibr_core.beyond.optics import CENTRE
 from iibr_core.color import bytes_from_encoded, encoded_from_stored
 from iibr_core.exports.kinds import ExportOptions
 from iibr_core.exports.source import ExportSource
-from iibr_core.formats.cameras import FieldCameras, infinity_of, write_llff, write_nerfstudio
+from iibr_core.formats.cameras import MAX_OFF_CENTRE_PX, FieldCameras, infinity_of, write_llff, write_nerfstudio
 from iibr_core.formats.colmap import write_colmap
 from iibr_core.formats.images.write import write_image
 from iibr_core.formats.light_fields import write
@@ -19,6 +21,10 @@ from iibr_core.types import ImageSize, InputError, ViewOffset, ViewUpdate
 
 MAX_POINTS = 20_000
 """Largest number of points for COLMAP, about as many as a reconstruction finds."""
+SHIFTED = (
+    "Principal points lie up to {:.0f} px off the middle, as the files state; 3D Gaussian splatting ignores that, and"
+    " cropping the views would take more than a third of them."
+)
 MAX_DEPTH_RATIO = 1000.0
 """Ratio of the farthest distance to the nearest one; anything farther, such as the sky, is put there."""
 
@@ -31,7 +37,9 @@ def cameras_of(source: ExportSource) -> FieldCameras:
         low, high = scene.disparity_range_px
         if scene.depth_source == "none":
             raise InputError(f"{scene.name}: no depth is known; open a photo with a disparity map")
-        return FieldCameras(scene.grid, size, scene.focal_px or float(scene.width), (low, high), infinity_of(low, high))
+        # Infinity is a guess; if it is a whole number, views can be cropped without resampling.
+        at_infinity = float(math.floor(infinity_of(low, high)))
+        return FieldCameras(scene.grid, size, scene.focal_px or float(scene.width), (low, high), at_infinity)
     plan = source.plan()
     at_infinity = (_given_infinity(source) - plan.disparity_zero) * plan.disparity_scale
     low, high = plan.disparity_range_px
@@ -68,23 +76,32 @@ def _straight_cameras(source: ExportSource) -> tuple[FieldCameras, float | None]
     return replace(cameras, range_px=(low, high), at_infinity=0.0), _given_infinity(source)
 
 
-def write_cameras(path: Path, source: ExportSource, options: ExportOptions, variant: str) -> None:
-    """Write all views as images/v00_u00.png ... and their cameras as "llff", "nerfstudio" or "colmap"."""
-    cameras, static_disparity = _straight_cameras(source)
+def write_cameras(path: Path, source: ExportSource, options: ExportOptions, variant: str) -> str | None:
+    """Write all views as images/v00_u00.png ... and their cameras as "llff", "nerfstudio" or "colmap".
+
+    Return a sentence about views that are cropped, or whose principal points move.
+    """
+    whole, static_disparity = _straight_cameras(source)
+    offsets = [whole.grid.offset(row, column) for row, column in np.ndindex(*whole.grid)]
+    cameras = whole.centred(offsets)
     places: dict[str, ViewOffset] = {}
     centre: ViewUpdate | None = None
     with write_folder(path) as folder:
         (folder / "images").mkdir()
         for view in source.views(static_disparity):
-            name = f"v{view.row:02d}_u{view.column:02d}.png"
-            write_image(folder / "images" / name, colors_of(view))
-            places[name] = cameras.grid.offset(view.row, view.column)
+            name, offset = f"v{view.row:02d}_u{view.column:02d}.png", cameras.grid.offset(view.row, view.column)
+            write_image(folder / "images" / name, np.ascontiguousarray(colors_of(view)[cameras.window(offset)]))
+            places[name] = offset
             centre = view if centre is None else centre
         assert centre is not None
         if variant == "colmap":
             write_colmap(folder, cameras, places, *_points_of(centre, cameras))
         else:
             (write_llff if variant == "llff" else write_nerfstudio)(folder, cameras, places)
+    if cameras.size != whole.size:
+        return f"The views are cropped from {whole.size} to {cameras.size}: their principal points lie in the middle."
+    moved_px = cameras.off_centre_px(offsets)
+    return SHIFTED.format(moved_px) if moved_px > MAX_OFF_CENTRE_PX else None
 
 
 def write_light_field(path: Path, source: ExportSource, options: ExportOptions, variant: str) -> None:
@@ -98,9 +115,10 @@ def write_light_field(path: Path, source: ExportSource, options: ExportOptions, 
 def _points_of(centre: ViewUpdate, cameras: FieldCameras) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:
     """Return places and colours (N, 3) of at most MAX_POINTS pixels of the centre view."""
     disparity = centre.disparity if centre.disparity is not None else np.empty((0, 0), np.float32)
-    points = cameras.points(disparity, ViewOffset(0.0, 0.0)).reshape(-1, 3)
+    window = cameras.window(CENTRE)
+    points = cameras.points(disparity[window], CENTRE).reshape(-1, 3)
     chosen = np.linspace(0, len(points) - 1, min(len(points), MAX_POINTS)).astype(int)
-    return points[chosen], colors_of(centre).reshape(-1, 3)[chosen]
+    return points[chosen], colors_of(centre)[window].reshape(-1, 3)[chosen]
 
 
 def colors_of(view: ViewUpdate) -> NDArray[np.uint8]:

@@ -2,12 +2,15 @@
 
 All cameras look the same way, from a plane. Lengths are in distances of the nearest point: disparity gives depth up to
 its unit. A plane that stands still in the field lies at a finite distance, but moves in cameras that look straight
-ahead; therefore their principal points move.
+ahead; therefore their principal points move, unless views are cropped, see `FieldCameras.centred`.
 """
 
+from __future__ import annotations
+
 import json
-from collections.abc import Mapping
-from dataclasses import dataclass
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -16,14 +19,21 @@ from iibr_core.types import FloatImage, GridShape, ImageSize, InputError, ViewOf
 
 MAX_DEPTH_RATIO = 20.0
 """Ratio of the farthest depth to the nearest one where the disparity at infinity is unknown."""
+MIN_BOUNDS_RATIO = 1.1
+"""Smallest ratio of the farthest depth to the nearest one in poses_bounds.npy, for flat scenes."""
+MIN_KEPT = 2 / 3
+"""Smallest share of a view that is left when views are cropped."""
+MAX_OFF_CENTRE_PX = 0.5
+"""Largest distance of a principal point from the middle in files that cannot state it."""
 
 
 @dataclass(frozen=True)
 class FieldCameras:
     """Cameras of a field: x to the right, y down, z forward, the centre view's camera in the origin.
 
-    size: size of a view. focal_px: its focal length in pixels. range_px: least and greatest disparity (px per view
-    step). at_infinity: disparity of infinitely far points, below the least.
+    size: size of a view, without its margins. focal_px: its focal length in pixels. range_px: least and greatest
+    disparity (px per view step). at_infinity: disparity of infinitely far points, below the least. margins: mean number
+    of pixels (y, x) that are cut off at each side, None where views are whole.
     """
 
     grid: GridShape
@@ -31,6 +41,7 @@ class FieldCameras:
     focal_px: float
     range_px: tuple[float, float]
     at_infinity: float
+    margins: tuple[int, int] | None = None
 
     def __post_init__(self) -> None:
         low, high = self.range_px
@@ -56,10 +67,43 @@ class FieldCameras:
 
     def principal_point(self, offset: ViewOffset) -> tuple[float, float]:
         """Return (x, y) in pixels from the picture's upper left corner, not from the middle of its first pixel."""
-        return (
-            self.size.width / 2 - self.at_infinity * offset.s,
-            self.size.height / 2 - self.at_infinity * offset.t,
-        )
+        y, x = (half + shift - cut for half, shift, cut in zip(self._middle, self._shifts(offset), self._cuts(offset)))
+        return x, y
+
+    def window(self, offset: ViewOffset) -> tuple[slice, slice]:
+        """Return the rows and columns of a whole view that are kept."""
+        top, left = (margin + cut for margin, cut in zip(self.margins or (0, 0), self._cuts(offset)))
+        return slice(top, top + self.size.height), slice(left, left + self.size.width)
+
+    def centred(self, offsets: Iterable[ViewOffset]) -> FieldCameras:
+        """Return the cameras with views cropped by whole pixels, so that principal points lie in the middle to half a
+        pixel: 3D Gaussian splatting takes them to lie there. Unchanged if less than MIN_KEPT of a view would be left.
+        """
+        shifts = [self._shifts(offset) for offset in offsets]
+        down, across = (max(abs(round(shift)) for shift in axis) for axis in zip(*shifts))
+        size = ImageSize(self.size.height - 2 * down, self.size.width - 2 * across)
+        if min(size) < 1 or math.prod(size) < MIN_KEPT * math.prod(self.size):
+            return self
+        return replace(self, size=size, margins=(down, across))
+
+    def off_centre_px(self, offsets: Iterable[ViewOffset]) -> float:
+        """Return the largest distance of a principal point from the middle, along x or y."""
+        middle_y, middle_x = self._middle
+        points = [self.principal_point(offset) for offset in offsets]
+        return max(max(abs(x - middle_x), abs(y - middle_y)) for x, y in points)
+
+    @property
+    def _middle(self) -> tuple[float, float]:
+        return self.size.height / 2, self.size.width / 2
+
+    def _shifts(self, offset: ViewOffset) -> tuple[float, float]:
+        """Return (y, x) of the principal point from the middle of a whole view."""
+        return -self.at_infinity * offset.t, -self.at_infinity * offset.s
+
+    def _cuts(self, offset: ViewOffset) -> tuple[int, int]:
+        """Return by how many pixels (y, x) more is cut off at the upper left than the margins."""
+        y, x = self._shifts(offset) if self.margins is not None else (0, 0)
+        return round(y), round(x)
 
     def depth(self, disparity: FloatImage) -> FloatImage:
         """Return the depths of disparities, both of any shape; disparity is limited to range_px."""
@@ -101,18 +145,20 @@ def write_llff(folder: Path, cameras: FieldCameras, views: Views) -> None:
     A row holds a 3x5 matrix (rotation with columns down, right, backwards; position; height, width and focal length),
     then the nearest and farthest depth. Raises InputError if principal points move: the file has no place for them.
     """
-    if cameras.at_infinity != 0:
+    if cameras.off_centre_px(views.values()) > MAX_OFF_CENTRE_PX:
         raise InputError(
             f"{folder.name}: points at rest in these views are not at infinity, which poses_bounds.npy cannot express;"
             " export cameras for nerfstudio or COLMAP"
         )
     axes = np.array([[0, 1, 0], [-1, 0, 0], [0, 0, 1]], float)
     height, width = cameras.size
+    near, far = cameras.depth_range
+    bounds = near, max(far, MIN_BOUNDS_RATIO * near)
     rows = []
     for name in sorted(views):
         x, y, z = cameras.place(views[name])
         pose = np.column_stack([axes, (x, -y, -z), (height, width, cameras.focal_px)])
-        rows.append([*pose.ravel(), *cameras.depth_range])
+        rows.append([*pose.ravel(), *bounds])
     np.save(folder / "poses_bounds.npy", np.array(rows))
 
 

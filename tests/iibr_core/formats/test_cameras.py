@@ -34,6 +34,22 @@ def test_points_of_a_view_are_projected_to_where_other_views_see_them() -> None:
     assert cameras.depth_range == (1.0, pytest.approx(9.0))
 
 
+def test_cropped_views_have_their_principal_points_in_the_middle_to_half_a_pixel() -> None:
+    whole = FieldCameras(GRID, SIZE, 80.0, (-1.5, 2.5), -2.3)
+    offsets = [GRID.offset(row, column) for row, column in np.ndindex(*GRID)]
+    cameras = whole.centred(offsets)
+    assert cameras.size == (60, 92)
+    assert 0.29 < cameras.off_centre_px(offsets) < 0.31 < whole.off_centre_px(offsets)
+    for offset in offsets:
+        rows, columns = cameras.window(offset)
+        assert 0 <= rows.start < rows.stop <= 64
+        assert 0 <= columns.start < columns.stop <= 96
+        x, y = cameras.principal_point(offset)
+        assert (x + columns.start, y + rows.start) == pytest.approx(whole.principal_point(offset))
+    assert FieldCameras(GRID, SIZE, 80.0, (1.0, 2.5), 0.0).centred(offsets).size == SIZE
+    assert FieldCameras(GRID, SIZE, 80.0, (-8.0, 2.5), -9.0).centred(offsets).margins is None
+
+
 @pytest.mark.parametrize(
     ("low", "high"), [(1.0, 5.0), (1.0, 20.0), (-3.0, 3.0), (0.001, 9.0), (2.0, 2.0), (0.0, 0.0), (-2.0, -2.0)]
 )
