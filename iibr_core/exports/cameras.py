@@ -32,19 +32,19 @@ MAX_DEPTH_RATIO = 1000.0
 def cameras_of(source: ExportSource) -> FieldCameras:
     """Return the cameras of the scene's views."""
     scene = source.scene
-    size = ImageSize(scene.height, scene.width)
     if source.loaded is None:
-        low, high = scene.disparity_range_px
         if scene.depth_source == "none":
             raise InputError(f"{scene.name}: no depth is known; open a photo with a disparity map")
-        # Infinity is a guess; if it is a whole number, views can be cropped without resampling.
-        at_infinity = float(math.floor(infinity_of(low, high)))
-        return FieldCameras(scene.grid, size, scene.focal_px or float(scene.width), (low, high), at_infinity)
-    plan = source.plan()
-    at_infinity = (_given_infinity(source) - plan.disparity_zero) * plan.disparity_scale
-    low, high = plan.disparity_range_px
+        (low, high), known = scene.disparity_range_px, scene.infinity_px
+        focal_px = scene.focal_px or float(scene.width)
+        # A whole number lets views be cropped without resampling; mostly it is a guess.
+        at_infinity = float(math.floor(known if known is not None and known < high else infinity_of(low, high)))
+    else:
+        plan, focal_px = source.plan(), source.loaded.photo.focal_px
+        at_infinity = (_given_infinity(source) - plan.disparity_zero) * plan.disparity_scale
+        low, high = plan.disparity_range_px
     low = max(low, at_infinity + (high - at_infinity) / MAX_DEPTH_RATIO)
-    return FieldCameras(scene.grid, size, source.loaded.photo.focal_px, (low, high), at_infinity)
+    return FieldCameras(scene.grid, ImageSize(scene.height, scene.width), focal_px, (low, high), at_infinity)
 
 
 def _given_infinity(source: ExportSource) -> float:

@@ -89,7 +89,7 @@ class ExportSource:
         scene = self.scene
         if static_disparity is not None:
             moved = (self.plan().disparity_zero - static_disparity) * self.plan().disparity_scale
-            scene = replace(scene, infinity_px=scene.infinity_px + moved)
+            scene = replace(scene, infinity_px=(scene.infinity_px or 0.0) + moved)
         total = math.prod(scene.grid) if wanted is None else len({*wanted, CENTRE})
         for done, view in enumerate(add_gloss(views, self.optics.gloss, scene), 1):
             raise_if_stopped()

@@ -16,7 +16,7 @@ from iibr_core.depth.subject import subject_disparity
 from iibr_core.formats.images.photo import focal_px_from_fov
 from iibr_core.formats.light_fields.light_field_formats import open_light_field
 from iibr_core.formats.light_fields.multi_view_scene import MultiView
-from iibr_core.formats.light_fields.views import disparity_range, grid_of, read_views
+from iibr_core.formats.light_fields.views import disparity_range, grid_of, read_views, step_length
 from iibr_core.formats.maps.disparity_file import read_disparity
 from iibr_core.inpainting.registry import load_inpainter
 from iibr_core.method.light_field import generate
@@ -166,6 +166,8 @@ def _scene_as_read(source: Source, field: MultiView, centre: ViewUpdate, range_p
         depth_source="light field" if centre.disparity is not None else "none",
         is_hdr=field.is_hdr,
         notes=field.notes,
+        focal_px=field.focal_px,
+        infinity_px=None if field.infinity_px is None else field.infinity_px * step_length(field),
         has_view_disparity=len(field.disparity) == len(field.views),
         subject_disparity_px=subject_disparity(centre.disparity) if centre.disparity is not None else 0.0,
     )

@@ -74,9 +74,9 @@ class Scene:
     inverse_metres: (slope, offset) of 1 / distance over the disparity as given, None if distances are not known in
     metres. color_space: of its views. own_size: size of the photo in its file, which may exceed that of a view; None
     for light fields.
-    infinity_px: field disparity of infinitely far points of a photo. is_sketch: whether it is a small picture that is
-    shown while the photo is read. found_span_px: range of the field disparity before edits, None if it cannot be
-    edited.
+    infinity_px: field disparity of infinitely far points, None where a light field does not state it. is_sketch:
+    whether it is a small picture that is shown while the photo is read. found_span_px: range of the field disparity
+    before edits, None if it cannot be edited.
     """
 
     source: Source
@@ -101,7 +101,7 @@ class Scene:
     color_space: ColorSpace = SRGB
     own_size: ScreenSize | None = None
     is_sketch: bool = False
-    infinity_px: float = 0.0
+    infinity_px: float | None = None
     found_span_px: float | None = None
 
     @property

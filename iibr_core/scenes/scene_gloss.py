@@ -57,8 +57,9 @@ def make_maps(request: GlossRequest) -> GlossMaps:
 
     scene, disparity = request.scene, request.centre.disparity
     assert disparity is not None
-    is_photo = scene.plan is not None
-    infinity = scene.infinity_px if is_photo else infinity_of(float(disparity.min()), float(disparity.max()))
+    infinity = scene.infinity_px
+    if infinity is None:
+        infinity = infinity_of(float(disparity.min()), float(disparity.max()))
     geometry = SceneGeometry(scene.focal_px or focal_px_from_fov(scene.width), infinity)
     photo = encoded_from_stored(request.centre.colors)
     return make_gloss_maps(request.surface, photo, disparity, geometry, request.normals)

@@ -1,4 +1,4 @@
-"""Folders of data sets whose views are no numbered grid: the Stanford archive, Middlebury stereo, NeRF's LLFF scenes.
+"""Folders of data sets whose views are no numbered grid: the Stanford archive and Middlebury stereo.
 
 Stanford: a folder of out_RR_CC_Y_X.png, with row, column and camera position. Positions count: X grows to the right and
 Y downwards. Rows and columns are counted as the camera moved, which differs from scene to scene. Cameras stand slightly
@@ -7,12 +7,9 @@ off the grid; one view step is the mean spacing of columns.
 Middlebury: pairs of 2014 and 2021 (im0, im1, disp0.pfm) and rows of views of 2001 to 2006 (im0..im8 or view0..view6)
 with ground truth for two of them. Pictures are rectified and evenly spaced, from left to right; one view step is the
 distance of neighbours.
-
-LLFF: poses_bounds.npy beside a folder of photos, taken by hand near a plane, facing forward.
 """
 
 import re
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -27,8 +24,7 @@ from iibr_core.formats.light_fields.multi_view_scene import (
     pictures_in,
     place_on_grid,
 )
-from iibr_core.formats.poses import central_camera, read_llff_poses
-from iibr_core.types import Camera, InputError, ViewOffset
+from iibr_core.types import InputError, ViewOffset
 
 NUMBER = r"[-+]?\d{1,9}(?:\.\d{0,12})?"
 STANFORD_NAME = re.compile(rf"(?:.*_)?(\d{{1,3}})_(\d{{1,3}})_({NUMBER})_({NUMBER})_?$")
@@ -45,8 +41,6 @@ STEPS_BETWEEN_TRUTHS = 4
 SCALE_2001 = 8.0
 MAX_WIDTH_2001 = 440
 QUANTIZED = (".png", ".pgm")
-LLFF_FOLDERS = ("images_8", "images_4", "images")
-"""Folders of pictures, smaller copies first: papers evaluate on them."""
 
 
 def read_stanford(folder: Path) -> MultiView | None:
@@ -126,48 +120,3 @@ def _coded_maps(folder: Path, kind: str, picture: Path) -> dict[int, KnownDispar
             scale = 1 / factor if path.suffix.lower() in QUANTIZED else 1.0
             known[n] = KnownDisparity(path, scale / STEPS_BETWEEN_TRUTHS)
     return known
-
-
-def read_llff(folder: Path) -> MultiView | None:
-    """Return the views of an LLFF scene, None without poses_bounds.npy.
-
-    Viewpoints are positions across the viewing direction of the central camera, in steps of the mean distance of
-    neighbours. The `camera` of each view adds its distance from that plane and its rotation.
-    """
-    path = folder / "poses_bounds.npy"
-    if not path.is_file():
-        return None
-    inside = next((folder / name for name in LLFF_FOLDERS if (folder / name).is_dir()), folder)
-    pictures, cameras = pictures_in(inside), read_llff_poses(path)
-    if len(cameras) != len(pictures) or len(pictures) < 2:
-        raise InputError(f"{path}: {len(cameras)} poses for {len(pictures)} pictures; give both, and at least two")
-    central = central_camera(cameras)
-    cameras, stray = _in_steps(cameras, cameras[central])
-    views = tuple(
-        KnownView(picture.stem, ViewOffset(*map(float, camera.position[1::-1])), PictureSource(picture), camera)
-        for picture, camera in zip(pictures, cameras)
-    )
-    focal_px = cameras[central].resized(read_size(pictures[central])).focal_px[0]
-    near, far = cameras[central].depth_range or (1.0, 1.0)
-    notes = (
-        f"Cameras stand up to {stray:.1f} view steps before or behind the plane of the given one, and are turned"
-        " against it; each view is made for the camera of its photo.",
-        f"Pictures from {inside.name}.",
-    )
-    name, layout = folder.resolve().name, f"LLFF, {len(views)} photos"
-    return MultiView(name, layout, views, {}, (focal_px / far, focal_px / near), notes, central, focal_px=focal_px)
-
-
-def _in_steps(cameras: tuple[Camera, ...], central: Camera) -> tuple[tuple[Camera, ...], float]:
-    """Return the cameras as the central one sees them, in view steps, and their largest distance from its plane."""
-    turned = central.world_from_camera.T
-    positions = np.array([turned @ (camera.position - central.position) for camera in cameras])
-    squared = ((positions[:, None, :2] - positions[None, :, :2]) ** 2).sum(axis=2)
-    np.fill_diagonal(squared, np.inf)
-    step = float(np.sqrt(squared.min(axis=1)).mean()) or 1.0
-    moved = []
-    for camera, position in zip(cameras, positions / step):
-        near, far = camera.depth_range or (1.0, 1.0)
-        rotation, depths = turned @ camera.world_from_camera, (near / step, far / step)
-        moved.append(replace(camera, world_from_camera=rotation, position=position, depth_range=depths))
-    return tuple(moved), float(np.abs(positions[:, 2]).max()) / step

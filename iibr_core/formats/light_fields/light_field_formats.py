@@ -19,12 +19,15 @@ from iibr_core.types import InputError
 if TYPE_CHECKING:
     from iibr_core.formats.light_fields.multi_view_scene import MultiView
 
-FOLDER_READERS = ("data_sets:read_llff", "data_sets:read_stanford", "data_sets:read_middlebury", "grids:read_grid")
+FOLDER_READERS = (
+    "camera_folders:read_llff", "data_sets:read_stanford", "data_sets:read_middlebury", "grids:read_grid",
+    "camera_folders:read_posed",
+)  # fmt: skip
 """Readers of folders, in the order in which they are asked."""
 FILE_READERS = ("view_files:read_quilt", "view_files:read_lenslet_image", "view_files:read_stereo_file")
 """Readers of files, in the order in which they are asked."""
 
-LAYOUTS = "HCI, Stanford archive, JPEG Pleno, LLFF, Middlebury, or views/v00_u00.png ..."
+LAYOUTS = "HCI, Stanford archive, JPEG Pleno, LLFF, nerfstudio, COLMAP, Middlebury, or views/v00_u00.png ..."
 """Layouts of folders, for people."""
 FILES = "give a quilt (..._qs8x6a0.75.png), a lenslet image (..._eslf.png), a stereo photo, or a folder of views"
 

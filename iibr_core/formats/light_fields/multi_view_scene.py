@@ -59,7 +59,8 @@ class MultiView:
     layout: the recognised layout, for people. disparity: maps by index into `views`. range_px: least and greatest
     disparity (px per view step) where the data set states them. notes: sentences for readers of figures. stated_centre:
     index of the central view, None where it follows from the viewpoints. grid: rows and columns that the views fill,
-    None where they fill none. focal_px: focal length in pixels of a view, where the data set states it.
+    None where they fill none. focal_px: focal length in pixels of a view; infinity_px: disparity of infinitely far
+    points, px per view step; both where the data set states them.
     """
 
     name: str
@@ -71,6 +72,7 @@ class MultiView:
     stated_centre: int | None = None
     grid: GridShape | None = None
     focal_px: float | None = None
+    infinity_px: float | None = None
 
     @property
     def centre(self) -> int:

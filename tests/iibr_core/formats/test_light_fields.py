@@ -15,12 +15,12 @@ from iibr_core.formats.maps.pfm import read_pfm
 from iibr_core.types import GridShape, InputError, ViewUpdate
 from tests.iibr_core import known_scenes as known
 
-LAYOUTS: dict[str, tuple[Callable[[Path], Path], str, GridShape | None]] = {
+LAYOUTS: dict[str, tuple[Callable[[Path], Path], str, GridShape]] = {
     "hci": (lambda to: known.write_hci(to, 3, 5), "HCI 4D light field, 5x3", GridShape(3, 5)),
     "views": (known.write_grid, "grid folder, 3x3", GridShape(3, 3)),
     "stanford": (lambda to: known.write_stanford(to, 2, 3), "Stanford archive, 3x2", GridShape(2, 3)),
     "middlebury": (known.write_stereo_pair, "Middlebury pair", GridShape(1, 2)),
-    "llff": (known.write_llff_row, "LLFF, 3 photos", None),
+    "llff": (known.write_llff_row, "LLFF, 3x1", GridShape(1, 3)),
 }
 
 
@@ -31,16 +31,15 @@ def test_the_viewer_and_the_evaluation_open_every_layout(tmp_path, name) -> None
     scene, judged = open_light_field(folder), read_scene(folder)
     assert (scene.name, scene.layout, scene.grid) == ("scene", layout, grid)
     assert [view.path for view in scene.views] == [view.path for view in judged.views]
-    if grid is not None:
-        size, views = read_views(scene)
-        by_place = {(view.row, view.column): view for view in views}
-        assert sorted(by_place) == list(np.ndindex(*grid))
-        distances = [np.hypot(*grid.offset(*place)) for place in by_place]
-        assert distances == sorted(distances)
-        for (row, column), view in by_place.items():
-            assert view.colors.shape == (*size, 3)
-            np.testing.assert_array_equal(view.colors, read_stored_view(scene, row, column))
-        assert sum(view.disparity is not None for view in by_place.values()) == len(scene.disparity)
+    size, views = read_views(scene)
+    by_place = {(view.row, view.column): view for view in views}
+    assert sorted(by_place) == list(np.ndindex(*grid))
+    distances = [np.hypot(*grid.offset(*place)) for place in by_place]
+    assert distances == sorted(distances)
+    for (row, column), view in by_place.items():
+        assert view.colors.shape == (*size, 3)
+        np.testing.assert_array_equal(view.colors, read_stored_view(scene, row, column))
+    assert sum(view.disparity is not None for view in by_place.values()) == len(scene.disparity)
 
 
 def test_the_range_is_stated_or_that_of_the_map_nearest_to_the_centre(tmp_path) -> None:

@@ -1,4 +1,4 @@
-"""Light fields exported with their cameras."""
+"""Light fields exported with their cameras, and opened again."""
 
 from pathlib import Path
 
@@ -44,6 +44,8 @@ def test_views_that_converge_are_cropped_around_their_principal_points(iibr: Iib
         np.testing.assert_allclose(across * camera.focal_px[0], [1.6 * offset.s, 1.6 * offset.t, 0], atol=1e-6)
         expected = view_of_wall(offset, 1.6)[3:-3, 3:-3]
         assert np.abs(np.asarray(Image.open(path)) / 255 - expected).max() < 0.01
+    output_of(iibr("depth", "out", "-o", "found.npy"))
+    assert np.median(np.load("found.npy")) == pytest.approx(1.6, abs=0.05), "it opens again as a light field"
 
 
 def test_principal_points_that_move_far_are_stated_or_refused(iibr: Iibr, folder: Path) -> None:
