@@ -226,9 +226,11 @@ class Program {
 export class Renderer {
     constructor(canvas, shaders, field) {
         const gl = canvas.getContext("webgl2", { alpha: false, antialias: false, preserveDrawingBuffer: true });
-        if (!gl || !gl.getExtension("EXT_color_buffer_float")) throw new Error("no WebGL 2 that draws floats");
+        const extensions = ["EXT_color_buffer_float", "EXT_float_blend", "EXT_color_buffer_half_float"];
+        const [floats, sums, halves] = extensions.map((name) => gl?.getExtension(name));
+        if (!floats && !halves) throw new Error("no WebGL 2 that draws floats");
         Object.assign(this, { gl, canvas, shaders, field, programs: new Map() });
-        this.floats = gl.getExtension("EXT_float_blend") ? gl.RGBA32F : gl.RGBA16F;
+        this.floats = floats && sums ? gl.RGBA32F : gl.RGBA16F;
         if ("drawingBufferColorSpace" in gl) gl.drawingBufferColorSpace = field.colorSpace;
         if (field.order.length > gl.getParameter(gl.MAX_ARRAY_TEXTURE_LAYERS)
             || Math.max(field.width, field.height) > gl.getParameter(gl.MAX_TEXTURE_SIZE)) {
@@ -312,7 +314,11 @@ export class Renderer {
     begin(optics, part, width, height, level = NUMBERS.LEVELS[0]) {
         const { gl, field } = this, lens = lensOf(optics, field, Math.round(width / part.width), level);
         const target = this.targetOf(width, height), passes = passCount(lens, field);
-        this.picture = { lens, part, width, height, target, passes, pass: 0, done: 0 };
+        // Half floats are coarse near 0, where surfaces lie that no view sees, and end at 65504: weights add up to about
+        // half of that. Powers of two keep their sum exact.
+        const cameras = lens.diameter > 0 ? passes * lens.camerasPerPass : passes;
+        const gain = 2 ** (15 - Math.ceil(Math.log2(cameras)));
+        this.picture = { lens, part, width, height, target, passes, gain, pass: 0, done: 0 };
         gl.bindFramebuffer(gl.FRAMEBUFFER, target.framebuffer);
         gl.clear(gl.COLOR_BUFFER_BIT);
     }
@@ -334,14 +340,14 @@ export class Renderer {
 
     setSamples(samples) {
         const { MAX_SAMPLES, OFF_BORDER_PX, SQRT_STEPS } = NUMBERS;
-        const { gl, table, field: { layers, hasDisparity }, picture: { lens, pass, done } } = this;
+        const { gl, table, field: { layers, hasDisparity }, picture: { lens, gain, pass, done } } = this;
         samples.forEach(({ t, s, view, weight }, i) => {
             // All views that answer a pinhole are asked at the same place of the pixel.
             const number = lens.diameter === 0 ? pass : done + i;
             const within = SQRT_STEPS.slice(3).map((step) => fraction(number, step) - 0.5 + OFF_BORDER_PX);
             table.set([s, t, ...within], 4 * i);
             table.set([view.s - lens.eye.s - s, view.t - lens.eye.t - t, 0, 0], 4 * (MAX_SAMPLES + i));
-            table.set([layers.get(hash(view)), Number(hasDisparity), weight, 0], 4 * (2 * MAX_SAMPLES + i));
+            table.set([layers.get(hash(view)), Number(hasDisparity), gain * weight, 0], 4 * (2 * MAX_SAMPLES + i));
         });
         gl.bufferSubData(gl.UNIFORM_BUFFER, 0, table);
     }
