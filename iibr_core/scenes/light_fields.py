@@ -10,8 +10,10 @@ from pathlib import Path
 
 from iibr_core.beyond.between_views import GivenView, densify, read_given_views, require_steps
 from iibr_core.color import encoded_from_stored
-from iibr_core.depth.multi_view.estimate import estimate_coarse, estimate_disparity, sweep_bytes
+from iibr_core.depth.multi_view.estimate import estimate_coarse
 from iibr_core.depth.multi_view.matching import FINDING
+from iibr_core.depth.multi_view.reduced import estimate_within_memory
+from iibr_core.depth.stereo_pair import MATCHED_PIXELS
 from iibr_core.depth.subject import subject_disparity
 from iibr_core.formats.images.photo import focal_px_from_fov
 from iibr_core.formats.light_fields.light_field_formats import open_light_field
@@ -31,7 +33,6 @@ from iibr_core.types import (
     ImageSize,
     InputError,
     Photo,
-    ViewOffset,
     ViewUpdate,
     image_size,
 )
@@ -87,8 +88,10 @@ def load_light_field(source: Source, takes_drafts: bool, known: FloatImage | Non
         yield from _with_found_disparity(scene, read, takes_drafts)
 
 
-def find_disparity(field: MultiView) -> FloatImage:
-    """Return the disparity (H, W) of the centre view, of a pair that of the left one, in pixels per view step."""
+def find_disparity(field: MultiView) -> tuple[FloatImage, tuple[str, ...]]:
+    """Return the disparity (H, W) of the centre view, of a pair that of the left one, in pixels per view step, and
+    notes.
+    """
     grid, (size, views) = grid_of(field), read_views(field)
     _require_field(field.name, size, grid)
     # The centre comes first; of a pair it is the left one.
@@ -96,8 +99,9 @@ def find_disparity(field: MultiView) -> FloatImage:
     colors, offsets = [view.colors for view in read], [grid.offset(view.row, view.column) for view in read]
     report_progress(0, 0, FINDING)
     coarse = estimate_coarse(colors, offsets, 0)
-    _require_matching(field.name, size, coarse.range_px, offsets)
-    return estimate_disparity(colors, offsets, 0, coarse.range_px)
+    max_pixels = MATCHED_PIXELS if field.place.is_file() and len(read) == 2 else None
+    values, note = estimate_within_memory(colors, offsets, 0, coarse.range_px, max_pixels)
+    return values, (note,) if note else ()
 
 
 def read_dense(
@@ -114,19 +118,19 @@ def read_dense(
 
 
 def _with_found_disparity(scene: Scene, views: Sequence[ViewUpdate], takes_drafts: bool) -> Iterator[LoadedField]:
-    """Yield the field with disparity found from its views; without any, and with a note, if memory does not suffice."""
+    """Yield the field with disparity found from its views; without any, and with a note, if they are too small."""
     colors, offsets = [view.colors for view in views], [scene.grid.offset(view.row, view.column) for view in views]
     report_progress(0, 0, FINDING)
     try:
         coarse = estimate_coarse(colors, offsets, 0)
-        _require_matching(scene.name, image_size(coarse.values), coarse.range_px, offsets)
     except InputError as error:
         scene = replace(scene, notes=(*scene.notes, f"{error}."), problems=(f"{error}.",))
         yield LoadedField(scene, iter(views))
         return
     if takes_drafts:
         yield _with_disparity(scene, views, coarse.values, FROM_VIEWS, is_final=False)
-    values = estimate_disparity(colors, offsets, 0, coarse.range_px)
+    values, note = estimate_within_memory(colors, offsets, 0, coarse.range_px)
+    scene = replace(scene, notes=(*scene.notes, note)) if note else scene
     yield _with_disparity(scene, views, values, FROM_VIEWS)
 
 
@@ -184,10 +188,3 @@ def _require_field(name: str, size: ImageSize, grid: GridShape) -> None:
     """Raise InputError if so many views of this (height, width) do not fit into memory."""
     needed = view_bytes(math.prod(size) * math.prod(grid), is_hdr=False)
     require_memory(needed, f"{name}: {grid.columns} x {grid.rows} views of {size}")
-
-
-def _require_matching(name: str, size: ImageSize, range_px: tuple[float, float], offsets: Sequence[ViewOffset]) -> None:
-    """Raise InputError if finding the disparity of the first of these views within a range takes too much memory."""
-    at = offsets[0]
-    reach = max(max(abs(offset.t - at.t), abs(offset.s - at.s)) for offset in offsets)
-    require_memory(sweep_bytes(size, range_px, reach), f"{name}: finding its disparity")

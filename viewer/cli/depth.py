@@ -47,7 +47,7 @@ def depth(
             values, notes = loaded.disparity.values, loaded.disparity.notes
         else:
             field = open_light_field(path)
-            name, values = field.name, find_disparity(field)
+            name, (values, notes) = field.name, find_disparity(field)
     note = write_map(output, values)
     print(f"{name}: disparity {values.min():.2f} to {values.max():.2f} px per view step: {output}")
     print_notes(*notes, note, origin=origin)

@@ -32,11 +32,22 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def test_depth_of_a_pair_is_the_left_views(iibr: Iibr, folder: Path) -> None:
+@pytest.mark.parametrize("reduced_for", ["nothing", "time", "memory"])
+def test_depth_of_a_pair_is_the_left_views(
+    iibr: Iibr, folder: Path, monkeypatch: pytest.MonkeyPatch, reduced_for: str
+) -> None:
+    """Where it is found from smaller copies, it is enlarged again, and its values with it."""
+    times = {"nothing": 1, "time": 2, "memory": 5}[reduced_for]
     eyes = [np.rint(view_of_square(ViewOffset(0, s)) * 255).astype(np.uint8) for s in (0.0, 2.0)]
-    Image.fromarray(np.hstack(eyes)).save("square_SBS.png")
-    output_of(iibr("depth", "square_SBS.png", "-o", "a.pfm"))
-    error = np.abs(read_pfm(Path("a.pfm")) / 2 - disparity_of_square())[4:-4, 4:-4]
+    Image.fromarray(np.kron(np.hstack(eyes), np.ones((times, times, 1), np.uint8))).save("square_SBS.png")
+    if reduced_for == "time":
+        monkeypatch.setattr("iibr_core.scenes.light_fields.MATCHED_PIXELS", eyes[0][..., 0].size)
+    elif reduced_for == "memory":
+        monkeypatch.setattr("iibr_core.method.memory.free_memory_bytes", lambda: 8 * 2**20)
+    done = iibr("depth", "square_SBS.png", "-o", "a.pfm")
+    output_of(done)
+    assert ("note: Found from views reduced to " in done.stderr) == (reduced_for != "nothing")
+    error = np.abs(read_pfm(Path("a.pfm"))[::times, ::times] / (2 * times) - disparity_of_square())[4:-4, 4:-4]
     assert np.mean(error < 0.2 * (FOREGROUND - WALL)) > 0.7
 
 
