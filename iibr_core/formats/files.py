@@ -26,6 +26,8 @@ PARSE_ERRORS = (
     MemoryError, struct.error, zlib.error, zipfile.BadZipFile, tokenize.TokenError,
 )  # fmt: skip
 """Errors of the parsers of other projects, and of ours, for damaged files."""
+COPY = r"(?:(?: ?[-_])? ?\(?(?:copy|kopie|copie|copia)(?: ?\d{1,4})?\)?| ?\(\d{1,4}\))*"
+"""Pattern of what browsers and file managers add to the stem of a copy: " (1)", " - Copy", "_copy"; ignores case."""
 MAX_REASON_CHARACTERS = 200
 MAX_SHOWN_CHARACTERS = 80
 

@@ -13,15 +13,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from iibr_core.formats.files import COPY
 from iibr_core.types import ImageSize, InputError
 
 USUAL_VIEWS = 8, 6
 """Columns and rows of a quilt for any display."""
 MAX_USUAL_SIDE_PX = 4096
-MAX_VIEWS_A_SIDE = 32
+MAX_VIEWS = 1024
 MIN_ASPECT = 0.01
-TAG = re.compile(r"_qs(\d{1,6})x(\d{1,6})a(\d{1,6}(?:\.\d{0,9})?)$", re.IGNORECASE)
-"""End of the stem of a quilt's name: columns, rows and aspect."""
+TAG = re.compile(
+    rf"_qs(\d{{1,6}})x(\d{{1,6}})a(\d{{1,6}}(?:\.\d{{0,9}})?)(?:z[\d.]+)?(?:f-?[\d.]+)?(?:[-_]\d{{1,6}})?{COPY}$",
+    re.IGNORECASE,
+)
+"""End of the stem of a quilt's name: columns, rows and aspect; then zoom, focus, number of a frame or copy."""
 
 
 @dataclass(frozen=True)
@@ -76,8 +80,10 @@ def quilt_named(path: Path, size: ImageSize) -> Quilt | None:
     if match is None:
         return None
     columns, rows, aspect = int(match[1]), int(match[2]), float(match[3])
-    if not (1 <= columns <= min(MAX_VIEWS_A_SIDE, size.width) and 1 <= rows <= min(MAX_VIEWS_A_SIDE, size.height)):
+    if not (1 <= columns <= size.width and 1 <= rows <= size.height):
         raise InputError(f"{path}: {size} pixels are too few for {columns}x{rows} views; is its name right?")
+    if columns * rows > MAX_VIEWS:
+        raise InputError(f"{path}: {columns}x{rows} are more than {MAX_VIEWS} views; is its name right?")
     if not MIN_ASPECT <= aspect <= 1 / MIN_ASPECT:
         raise InputError(f"{path}: a view has no width / height of {aspect:g}; is its name right?")
     return Quilt(columns, rows, size, aspect)

@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.formats.files import require_file
+from iibr_core.formats.files import COPY, require_file
 from iibr_core.formats.images.picture_source import PicturePart, PictureSource, small_picture, upright_size
 from iibr_core.types import ImageSize
 
-TAG = re.compile(r"(?:[_.-]|^)rgbd$", re.IGNORECASE)
+TAG = re.compile(rf"(?:[_.-]|^)rgbd{COPY}$", re.IGNORECASE)
 """Ending of a file's name that states a picture and its map, in any order."""
 MIN_ASPECT = 1.9
 """Smallest ratio of the sides of a picture that holds two without stating it in its name."""

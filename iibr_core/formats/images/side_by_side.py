@@ -10,7 +10,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import BinaryIO, Literal
 
-from iibr_core.formats.files import open_binary, require_file
+from iibr_core.formats.files import COPY, open_binary, require_file
 from iibr_core.formats.images.alike_halves import is_one_scene
 from iibr_core.formats.images.file_kinds import raw_kind
 from iibr_core.formats.images.lfp import open_lfp
@@ -31,7 +31,7 @@ TAG = re.compile(
     r"[-_. (\[](?:(half)[-_. ]?|(h)[-_]?(?=sbs|t|ou)|full[-_. ]?|f(?=sbs|t|ou))?"
     r"(?:sbs|2x1|lr[bpq]?|rl[bpq]?|left-?right|right-?left|side-?by-?side|cross(?:ed)?(?:-?eyed?)?|3dh"
     r"|(tb|bt|tab|ou|abq?|top-?bottom|bottom-?top|top-?and-?bottom|over-?under|above-?below|3dv))"
-    r"[)\]]?(?: ?\(\d+\)| - copy)?$",
+    rf"[)\]]?{COPY}$",
     re.IGNORECASE,
 )
 """Ending of a file's name, without extension, that states a pair. Groups 1 and 2: half size; group 3: one over the

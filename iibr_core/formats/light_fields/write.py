@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from iibr_core.color import bytes_from_encoded, encoded_from_stored
+from iibr_core.formats.files import COPY
 from iibr_core.formats.images.write import write_image  # brings numba, which errors should not wait for
 from iibr_core.formats.maps.pfm import write_pfm
 from iibr_core.formats.outputs import check_output, check_output_folder, write_folder
@@ -18,8 +19,8 @@ from iibr_core.types import GridShape, ImageSize, InputError, ViewUpdate, image_
 PARAMETERS_NAME = "parameters.cfg"
 WRITERS = ("hci", "eslf")
 """Layouts that can be written, by the names that people type."""
-LENSLET_TAG = re.compile(r"_eslf$", re.IGNORECASE)
-"""End of the stem of a lenslet image's name."""
+LENSLET_TAG = re.compile(rf"_eslf(?:[-_]\d{{1,6}})?{COPY}$", re.IGNORECASE)
+"""End of the stem of a lenslet image's name; then the number of a copy."""
 LENSLET_KEY = "iibr:Lenslet"
 """Key in the header of our lenslet images: columns and rows of the pixels under each lens."""
 

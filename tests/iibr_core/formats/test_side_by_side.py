@@ -54,6 +54,8 @@ NAMES = {
     "a_RL.png": ("beside", False, True),
     "a-crosseyed.png": ("beside", False, True),
     "a_TB.png": ("over", False, False),
+    "a.top-bottom (1).png": ("over", False, False),
+    "a_SBS - Copy (2).png": ("beside", False, False),
     "a.bottom-top.png": ("over", False, True),
     "a-htab.png": ("over", True, False),
     "a.jps": ("beside", False, True),

@@ -54,6 +54,29 @@ def test_quilts_are_read_as_they_are_written_and_decoded_once(tmp_path, monkeypa
     assert decoded == [PictureSource(path)]
 
 
+COPIES = ["", " (1)", "(2)", " - Copy", " - Copy (2)", "_copy", " copy 2", "-1", "_0001"]
+"""What browsers, file managers and renderers of animations add to names."""
+
+
+@pytest.mark.parametrize("copy", COPIES)
+def test_copies_of_quilts_and_lenslet_images_open_by_their_names(tmp_path, copy) -> None:
+    tiles = pictures(45)
+    quilt = Quilt(45, 1, ImageSize(HEIGHT, 45 * WIDTH), 0.75)
+    path = write_quilt(tmp_path, quilt, tiles).rename(tmp_path / f"scene{quilt.tag}{copy}.png")
+    scene = open_light_field(path)
+    assert (is_light_field(path), scene.name, scene.grid) == (True, "scene", GridShape(1, 45))
+    lenslet = tmp_path / f"scene_eslf{copy}.png"
+    Image.fromarray(RNG.integers(0, 256, (14 * 3, 14 * 5, 3), np.uint8)).save(lenslet)
+    assert (open_light_field(lenslet).name, open_light_field(lenslet).grid) == ("scene", GridShape(8, 8))
+
+
+@pytest.mark.parametrize(("columns", "rows"), [(45, 1), (1, 45), (100, 1), (8, 6)])
+def test_quilts_may_be_one_row_or_column(tmp_path, columns, rows) -> None:
+    quilt, tiles = Quilt(columns, rows, ImageSize(rows * 6, columns * 9), 1.5), pictures(columns * rows)
+    views = read_back(write_quilt(tmp_path, quilt, tiles))
+    assert all((views[0, k] == tile).all() for k, tile in enumerate(tiles))
+
+
 def test_the_inner_views_of_a_lytros_lenslet_image_are_read(tmp_path) -> None:
     whole = RNG.integers(0, 256, (14 * 3, 14 * 5, 3), np.uint8)
     Image.fromarray(whole).save(tmp_path / "img_1_eslf.png")
@@ -243,5 +266,7 @@ def test_a_name_states_the_quilt_and_gets_one_tag() -> None:
     assert quilt == Quilt(8, 6, ImageSize(60, 80), 0.75)
     assert tagged(tagged(Path("b/a.png"), quilt.tag), quilt.tag) == Path("b/a_qs8x6a0.75.png")
     assert quilt_named(Path("a.png"), ImageSize(60, 80)) is None
-    with pytest.raises(InputError, match="too few"):
-        quilt_named(Path("a_qs8x6a0.75.png"), ImageSize(5, 8))
+    assert quilt_named(Path("a_qs8x6a0.75z1.2f0.0.png"), ImageSize(60, 80)) == quilt
+    for name, fault in (("a_qs8x6a0.75.png", "too few"), ("a_qs5x300a1.png", "more than 1024 views")):
+        with pytest.raises(InputError, match=fault):
+            quilt_named(Path(name), ImageSize(5, 8) if fault == "too few" else ImageSize(900, 900))
