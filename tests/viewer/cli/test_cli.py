@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from iibr_core.beyond.resized_light import mean_of_areas
 from iibr_core.color import linear_from_srgb, srgb_from_linear
@@ -64,7 +65,7 @@ def test_a_command_precedes_a_file_of_its_name_and_a_typo_is_no_path(
 ) -> None:
     monkeypatch.chdir(photo_path.parent)
     Path("plan").write_text("a file")
-    assert "argument 'photo'" in refusal_of(iibr("plan")).lower()
+    assert "argument 'path'" in refusal_of(iibr("plan")).lower()
     assert "Did you mean 'view'" in refusal_of(iibr("veiw"))
 
 
@@ -196,6 +197,47 @@ def test_plan_names_size_depth_and_reasons(iibr: Iibr, photo_path: Path) -> None
     first, *reasons = output_of(iibr("plan", photo_path)).splitlines()
     assert first == "scene: 96x64 px, disparity from scene_disparity.npy"
     assert reasons
+
+
+@pytest.mark.parametrize(
+    ("name", "layout", "views"),
+    [
+        ("field", "grid folder, 3x3, 96x64", "3 rows and 3 columns"),
+        ("a_qs3x2a1.5 (1).png", "quilt, 3x2 views, 96x64", "1 rows and 6 columns"),
+        ("a_eslf.png", "lenslet image, 8x8 of 14x14 views, 12x8", "8 rows and 8 columns"),
+    ],
+)
+def test_plan_names_what_views_are_recognised_as(
+    iibr: Iibr, photo_path: Path, tmp_path: Path, name: str, layout: str, views: str
+) -> None:
+    photo, path = Image.open(photo_path).convert("RGB"), tmp_path / name
+    if name == "field":
+        path.mkdir()
+        for row, column in np.ndindex(3, 3):
+            photo.save(path / f"v{row}_u{column}.png")
+        np.save(path / "disp_est_u01_v01.npy", np.full((64, 96), 1.25, np.float32))
+    else:
+        photo.resize((168, 112) if "eslf" in name else (288, 128)).save(path)
+    first, *reasons = output_of(iibr("plan", path)).splitlines()
+    origin = "the maps of 1 of 9 views" if name == "field" else "the views themselves, when they are opened"
+    assert first.split(": ", 1)[1] == f"{layout} px a view, disparity from {origin}"
+    assert f"- Views in {views}." in reasons
+    assert ("- Disparity goes from 1.25 to 1.25 px per view step." in reasons) == (name == "field")
+    assert "leave it out" in refusal_of(iibr("plan", path, "--grid", 5))
+
+
+CASES = {"pair.jps": 1, "x.left-right.jpg": 1, "x.top-bottom.jpg": 0}
+"""Stereo photos by their names, and the axis that their two pictures lie along."""
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_plan_takes_the_depth_of_stereo_photos_from_their_two_views(
+    iibr: Iibr, photo_path: Path, tmp_path: Path, name: str
+) -> None:
+    photo, path = np.asarray(Image.open(photo_path).convert("RGB")), tmp_path / name
+    eyes = (np.roll(photo, -2, 1), photo) if name.endswith("jps") else (photo, np.roll(photo, -2, 1))
+    Image.fromarray(np.concatenate(eyes, CASES[name])).save(path, "JPEG", quality=95)
+    assert "96x64 px, disparity from the photo's two views (side-by-side stereo)" in output_of(iibr("plan", path))
 
 
 WINDOW_FIRST = """
