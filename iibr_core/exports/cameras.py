@@ -16,14 +16,16 @@ from iibr_core.formats.cameras import MAX_OFF_CENTRE_PX, FieldCameras, infinity_
 from iibr_core.formats.colmap import write_colmap
 from iibr_core.formats.images.write import write_image
 from iibr_core.formats.light_fields import write
+from iibr_core.formats.light_fields.light_field_formats import open_light_field
 from iibr_core.formats.outputs import write_folder
+from iibr_core.scenes.light_fields import find_range
 from iibr_core.types import ImageSize, InputError, ViewOffset, ViewUpdate
 
 MAX_POINTS = 20_000
 """Largest number of points for COLMAP, about as many as a reconstruction finds."""
 SHIFTED = (
     "Principal points lie up to {:.0f} px off the middle, as the files state; 3D Gaussian splatting ignores that, and"
-    " cropping the views would take more than a third of them."
+    " cropping the views would take two fifths of them."
 )
 MAX_DEPTH_RATIO = 1000.0
 """Ratio of the farthest distance to the nearest one; anything farther, such as the sky, is put there."""
@@ -108,8 +110,20 @@ def write_light_field(path: Path, source: ExportSource, options: ExportOptions, 
     """Write all views, with the disparity of every view if the layout has a place for it."""
     scene = source.scene
     focal_px = source.focal_px or float(scene.width)
+    scale = _scale_of(source, focal_px) if variant == "hci" else write.UNKNOWN_SCALE
     with closing(source.views()) as views:
-        write.write_light_field(path, variant, scene.grid, views, focal_px, scene.name, True)
+        write.write_light_field(path, variant, scene.grid, views, focal_px, scene.name, True, scale)
+
+
+def _scale_of(source: ExportSource, focal_px: float) -> write.FieldScale:
+    """Return infinity, range and, where metres are known, the baseline of a scene's views."""
+    scene, metres = source.scene, nearest_metres(source)
+    if scene.depth_source == "none":
+        return write.FieldScale(scene.infinity_px, find_range(open_light_field(Path(scene.source.path))))
+    scale = write.FieldScale(scene.infinity_px, scene.disparity_range_px)
+    if metres is None or scene.infinity_px is None:
+        return scale
+    return scale._replace(baseline_mm=1000 * metres * (scene.disparity_range_px[1] - scene.infinity_px) / focal_px)
 
 
 def _points_of(centre: ViewUpdate, cameras: FieldCameras) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:

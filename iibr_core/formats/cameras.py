@@ -21,7 +21,7 @@ MAX_DEPTH_RATIO = 20.0
 """Ratio of the farthest depth to the nearest one where the disparity at infinity is unknown."""
 MIN_BOUNDS_RATIO = 1.1
 """Smallest ratio of the farthest depth to the nearest one in poses_bounds.npy, for flat scenes."""
-MIN_KEPT = 2 / 3
+MIN_KEPT = 0.6
 """Smallest share of a view that is left when views are cropped."""
 MAX_OFF_CENTRE_PX = 0.5
 """Largest distance of a principal point from the middle in files that cannot state it."""

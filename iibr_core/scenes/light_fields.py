@@ -4,6 +4,7 @@ wide apertures and viewpoints between the views work as with a photo; or with vi
 
 import math
 from collections.abc import Generator, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
@@ -33,6 +34,8 @@ from iibr_core.types import (
     ImageSize,
     InputError,
     Photo,
+    StoredColors,
+    ViewOffset,
     ViewUpdate,
     image_size,
 )
@@ -92,16 +95,28 @@ def find_disparity(field: MultiView) -> tuple[FloatImage, tuple[str, ...]]:
     """Return the disparity (H, W) of the centre view, of a pair that of the left one, in pixels per view step, and
     notes.
     """
-    grid, (size, views) = grid_of(field), read_views(field)
-    _require_field(field.name, size, grid)
-    # The centre comes first; of a pair it is the left one.
-    read = sorted(views, key=lambda view: (view.row, view.column) != field.views[field.centre].place)
-    colors, offsets = [view.colors for view in read], [grid.offset(view.row, view.column) for view in read]
+    colors, offsets = _read_for_matching(field)
     report_progress(0, 0, FINDING)
     coarse = estimate_coarse(colors, offsets, 0)
-    max_pixels = MATCHED_PIXELS if field.place.is_file() and len(read) == 2 else None
+    max_pixels = MATCHED_PIXELS if field.place.is_file() and len(colors) == 2 else None
     values, note = estimate_within_memory(colors, offsets, 0, coarse.range_px, max_pixels)
     return values, (note,) if note else ()
+
+
+def find_range(field: MultiView) -> tuple[float, float] | None:
+    """Return about the least and greatest disparity, in pixels per view step; None if none can be found."""
+    with suppress(InputError):
+        values = estimate_coarse(*_read_for_matching(field), 0).values
+        return float(values.min()), float(values.max())
+    return None
+
+
+def _read_for_matching(field: MultiView) -> tuple[list[StoredColors], list[ViewOffset]]:
+    """Return the colours and viewpoints of all views, the centre first, of a pair the left one."""
+    grid, (size, views) = grid_of(field), read_views(field)
+    _require_field(field.name, size, grid)
+    read = sorted(views, key=lambda view: (view.row, view.column) != field.views[field.centre].place)
+    return [view.colors for view in read], [grid.offset(view.row, view.column) for view in read]
 
 
 def read_dense(

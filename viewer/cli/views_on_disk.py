@@ -13,6 +13,8 @@ from iibr_core.color import photo_in_srgb
 from iibr_core.depth.choice import DepthOrigin
 from iibr_core.formats.images.write import write_image
 from iibr_core.formats.light_fields.light_field_formats import open_light_field
+from iibr_core.formats.light_fields.views import step_length
+from iibr_core.formats.light_fields.write import FieldScale
 from iibr_core.formats.outputs import write_folder
 from iibr_core.formats.poses import central_camera, read_poses
 from iibr_core.gloss.settings import Gloss
@@ -34,7 +36,7 @@ MAX_NAMED = 5
 
 View = TypeVar("View")
 WriteField = Callable[..., None]
-"""`write_light_field` without views, focal length and name."""
+"""`write_light_field` without views, focal length, name and scale."""
 
 
 class Written(NamedTuple):
@@ -58,19 +60,22 @@ def write_field(source: Source, write: WriteField, depth_strength: float, gloss:
     photo, plan = loaded.photo, photos.make_plan(source, loaded, depth_strength, keeps_views=False)
     count = math.prod(plan.grid)
     with closing(photos.views_of_photo(source, loaded, plan)) as plain:
-        views = add_gloss(plain, gloss, scene_of_photo(source, loaded, plan))
-        write(_reported(views, count), focal_px=photo.focal_px, name=photo.name)
+        scene = scene_of_photo(source, loaded, plan)
+        views = _reported(add_gloss(plain, gloss, scene), count)
+        write(views, focal_px=photo.focal_px, name=photo.name, scale=FieldScale(scene.infinity_px))
     return Written(f"{count} views of {photo.size}", photo.notes + loaded.disparity.notes + plan.notes, loaded.origin)
 
 
 def write_dense_field(source: Source, grid: GridShape, write: WriteField) -> Written:
     """Write the views of a light field and those between them. Raises InputError."""
     field = open_light_field(Path(source.path))
-    given, _, all_views = read_dense(field, grid, source.inpaint)
+    given, steps, all_views = read_dense(field, grid, source.inpaint)
     size = image_size(given[0].colors)
     count = math.prod(grid)
     with closing(all_views) as views:
-        write(_reported(views, count), focal_px=field.focal_px or float(size.width), name=field.name)
+        infinity_px = None if field.infinity_px is None else field.infinity_px * step_length(field) / steps
+        scale = FieldScale(infinity_px)
+        write(_reported(views, count), focal_px=field.focal_px or float(size.width), name=field.name, scale=scale)
     return Written(f"{count} views of {size}", field.notes)
 
 

@@ -156,6 +156,7 @@ def _grid_scene(folder: Path, layout: str, grid: GridShape, paths: Mapping[GridI
         for v, u in places
     )
     parameters = read_parameters(folder)
+    focal_px = stated_focal_px(parameters, read_size(views[0].path)) if parameters else None
     whole = folder.resolve()
     low, high = (parameters.get(name, math.nan) for name in ("disp_min", "disp_max"))
     return MultiView(
@@ -165,7 +166,8 @@ def _grid_scene(folder: Path, layout: str, grid: GridShape, paths: Mapping[GridI
         {places.index(at): known for at, known in _maps(folder, grid).items()},
         (low, high) if low <= high else None,
         grid=grid,
-        focal_px=stated_focal_px(parameters, read_size(views[0].path)) if parameters else None,
+        focal_px=focal_px,
+        infinity_px=_stated_infinity_px(parameters, focal_px),
     )
 
 
@@ -214,3 +216,12 @@ def stated_focal_px(parameters: Mapping[str, float], size: ImageSize) -> float |
     if focal_mm > 0 and sensor_mm > 0 and math.isfinite(focal_px := focal_mm / sensor_mm * max(size)):
         return focal_px
     return None
+
+
+def _stated_infinity_px(parameters: Mapping[str, float], focal_px: float | None) -> float | None:
+    """Return the disparity of infinitely far points; None if it is not stated or makes no sense."""
+    baseline_mm, focus_m = parameters.get("baseline_mm", 0.0), parameters.get("focus_distance_m", 0.0)
+    if focal_px is None or baseline_mm <= 0 or focus_m <= 0:
+        return None
+    infinity_px = -focal_px * baseline_mm / (1000 * focus_m)
+    return round(infinity_px, 3) if math.isfinite(infinity_px) else None

@@ -5,10 +5,12 @@ import re
 from collections.abc import Iterable, Iterator
 from functools import partial
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 from iibr_core.color import bytes_from_encoded, encoded_from_stored
+from iibr_core.formats.cameras import infinity_of
 from iibr_core.formats.files import COPY
 from iibr_core.formats.images.write import write_image  # brings numba, which errors should not wait for
 from iibr_core.formats.maps.pfm import write_pfm
@@ -24,6 +26,11 @@ LENSLET_TAG = re.compile(rf"_eslf(?:[-_]\d{{1,6}})?{COPY}$", re.IGNORECASE)
 LENSLET_KEY = "iibr:Lenslet"
 """Key in the header of our lenslet images: columns and rows of the pixels under each lens."""
 
+MIN_OFFSET_PX = 1e-4
+"""Smallest disparity that infinitely far points lack to the focused ones: a focus at infinity cannot be stated."""
+UNKNOWN_RANGE_PX = (-1.0, 1.0)
+MIN_RANGE_PX = 0.01
+
 HCI_FILES = r"input_Cam\d+\.(png|exr)|disp_Cam\d+\.pfm|gt_disp_lowres\.pfm|parameters\.cfg"
 ESLF_ENDING = "_eslf.png"
 SENSOR_SIZE_MM = 36.0
@@ -37,7 +44,7 @@ fstop = 100.0
 [extrinsics]
 num_cams_x = {grid.columns}
 num_cams_y = {grid.rows}
-baseline_mm = 1.0
+baseline_mm = {baseline_mm}
 focus_distance_m = {focus_m}
 center_cam_x_m = 0.0
 center_cam_y_m = 0.0
@@ -54,6 +61,21 @@ disp_min = {low}
 disp_max = {high}
 depth_map_scale = 1.0
 """
+
+
+class FieldScale(NamedTuple):
+    """Geometry that HCI's parameters state.
+
+    infinity_px: disparity of infinitely far points; range_px: least and greatest disparity, for views without it; both
+    in px per view step, None where unknown. baseline_mm: length of a view step; any, where metres are unknown.
+    """
+
+    infinity_px: float | None = None
+    range_px: tuple[float, float] | None = None
+    baseline_mm: float = 1.0
+
+
+UNKNOWN_SCALE = FieldScale()
 
 
 def check_light_field(path: Path, layout: str, inputs: Iterable[Path] = (), force: bool = False) -> None:
@@ -80,17 +102,19 @@ def write_light_field(
     focal_px: float,
     name: str,
     with_disparity: bool = False,
+    scale: FieldScale = UNKNOWN_SCALE,
 ) -> None:
     """Write a light field, whole or not at all, to a path that `check_light_field` admits; an older one is replaced.
 
     layout: one of WRITERS. views: each view of the grid in any order, all of one size. focal_px: focal length in pixels
-    of a view. with_disparity: whether HCI folders hold the disparity of every view, not of the centre view only.
+    of a view. with_disparity: whether HCI folders hold the disparity of every view, not of the centre view only. scale:
+    geometry for HCI folders.
     """
     views = _require_all(path, grid, views)
     if layout == "eslf":
         _write_eslf(path, grid, views)
     else:
-        _write_hci(path, grid, views, focal_px, name, with_disparity)
+        _write_hci(path, grid, views, focal_px, name, with_disparity, scale)
 
 
 def _require_all(path: Path, grid: GridShape, views: Iterable[ViewUpdate]) -> Iterator[ViewUpdate]:
@@ -106,7 +130,13 @@ def _require_all(path: Path, grid: GridShape, views: Iterable[ViewUpdate]) -> It
 
 
 def _write_hci(
-    folder: Path, grid: GridShape, views: Iterable[ViewUpdate], focal_px: float, name: str, with_disparity: bool
+    folder: Path,
+    grid: GridShape,
+    views: Iterable[ViewUpdate],
+    focal_px: float,
+    name: str,
+    with_disparity: bool,
+    scale: FieldScale,
 ) -> None:
     size, low, high = ImageSize(1, 1), math.inf, -math.inf
     with write_folder(folder) as unfinished:
@@ -114,7 +144,8 @@ def _write_hci(
             size = image_size(view.colors)
             if view.disparity is not None:
                 low, high = min(low, float(view.disparity.min())), max(high, float(view.disparity.max()))
-        parameters = _parameters(name, grid, size, focal_px, low, high)
+        scale = scale._replace(range_px=(low, high)) if low <= high else scale
+        parameters = _parameters(name, grid, size, focal_px, scale)
         (unfinished / PARAMETERS_NAME).write_text(parameters, encoding="utf-8")
 
 
@@ -128,16 +159,22 @@ def _write_view(folder: Path, grid: GridShape, with_disparity: bool, view: ViewU
     return view
 
 
-def _parameters(name: str, grid: GridShape, size: ImageSize, focal_px: float, low: float, high: float) -> str:
-    """Return the text of the benchmark's parameters.cfg. The baseline is unknown: 1 mm fixes the scale of depths.
+def _parameters(name: str, grid: GridShape, size: ImageSize, focal_px: float, scale: FieldScale) -> str:
+    """Return the text of the benchmark's parameters.cfg.
 
-    The focus distance puts the farthest point at infinity; 0 stands for cameras that are focused at infinity.
+    Its tools compute disparity as focal length in px * baseline * (1 / depth - 1 / focus distance): points at the focus
+    distance do not move, infinitely far ones move by infinity_px.
     """
-    low, high = (low, high) if math.isfinite(low) else (0.0, 0.0)
+    low, high = scale.range_px or UNKNOWN_RANGE_PX
+    if high - low < MIN_RANGE_PX:
+        low, high = low - MIN_RANGE_PX / 2, high + MIN_RANGE_PX / 2
+    known = scale.infinity_px
+    infinity_px = known if known is not None and known < high else infinity_of(low, high)
     return PARAMETERS.format(
         focal_mm=focal_px * SENSOR_SIZE_MM / max(size),
         sensor_mm=SENSOR_SIZE_MM,
-        focus_m=focal_px / -low / 1000 if low < 0 else 0.0,
+        baseline_mm=scale.baseline_mm,
+        focus_m=focal_px * scale.baseline_mm / max(-infinity_px, MIN_OFFSET_PX) / 1000,
         size=size,
         grid=grid,
         name=" ".join(name.split()),

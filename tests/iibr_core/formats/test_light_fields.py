@@ -1,5 +1,6 @@
 import configparser
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +11,7 @@ from PIL import Image
 from iibr_core.evaluation.scenes import read_scene
 from iibr_core.formats.light_fields.light_field_formats import open_light_field
 from iibr_core.formats.light_fields.views import disparity_range, read_stored_view, read_views
-from iibr_core.formats.light_fields.write import WRITERS, write_light_field
+from iibr_core.formats.light_fields.write import WRITERS, FieldScale, write_light_field
 from iibr_core.formats.maps.pfm import read_pfm
 from iibr_core.types import GridShape, InputError, ViewUpdate
 from tests.iibr_core import known_scenes as known
@@ -109,9 +110,64 @@ def test_hci_files_and_parameters_are_those_of_the_benchmark(tmp_path) -> None:
     assert (parser["extrinsics"]["num_cams_x"], parser["extrinsics"]["num_cams_y"]) == ("5", "3")
     assert parser["intrinsics"]["image_resolution_x_px"] == "9"
     assert parser["meta"]["scene"] == "a scene"
-    # Disparity 0 lies at the focus distance, the least disparity at infinity: d = f * b * (1 / z - 1 / focus).
-    focus_mm = 1000 * float(parser["extrinsics"]["focus_distance_m"])
-    assert 12.5 * 1.0 * -1 / focus_mm == pytest.approx(float(parser["meta"]["disp_min"]))
+
+
+def benchmark_depth(folder: Path, disparity: float) -> float:
+    """Return the distance in mm by the formula of the benchmark's evaluation toolkit."""
+    parser = configparser.ConfigParser()
+    parser.read(folder / "parameters.cfg")
+    lens, cameras = parser["intrinsics"], parser["extrinsics"]
+    pixels = max(int(lens[f"image_resolution_{axis}_px"]) for axis in "xy")
+    beta = float(cameras["baseline_mm"]) * float(lens["focal_length_mm"]) * pixels
+    focus_mm = 1000 * float(cameras["focus_distance_m"])
+    return beta * focus_mm / (disparity * focus_mm * float(lens["sensor_size_mm"]) + beta)
+
+
+@pytest.mark.parametrize(
+    ("scale", "infinity", "step_mm"),
+    [
+        (FieldScale(-6.0), -6.0, 1.0),
+        (FieldScale(-2.5, None, 40.0), -2.5, 40.0),
+        (FieldScale(0.0, (1.0, 4.0)), -1e-4, 1.0),
+        (FieldScale(), -2.1, 1.0),
+        (FieldScale(7.0), -2.1, 1.0),
+    ],
+)
+def test_the_benchmark_computes_the_depths_of_a_field(tmp_path, scale, infinity, step_mm) -> None:
+    """A guess of infinity puts it beyond the least disparity; one among the disparities is none."""
+    views = [ViewUpdate(0, 0, view.colors, np.float32([[-1.9, 1.9]])) for view in make_views(GridShape(1, 1))]
+    if scale.range_px:
+        views = [replace(view, disparity=None) for view in views]
+    path = tmp_path / "field"
+    write_light_field(path, "hci", GridShape(1, 1), views, 12.5, "field", scale=scale)
+    for disparity in scale.range_px or (-1.9, 0.0, 1.9):
+        expected = 12.5 * step_mm / (disparity - infinity)
+        assert benchmark_depth(path, disparity) == pytest.approx(expected, rel=1e-3)
+    again = open_light_field(path)
+    assert again.range_px == pytest.approx(scale.range_px or (-1.9, 1.9))
+    assert again.infinity_px == pytest.approx(infinity, abs=1e-3)
+
+
+def test_ranges_without_disparity_and_of_flat_views_are_ascending(tmp_path) -> None:
+    for k, disparity in enumerate((None, np.full((HEIGHT, WIDTH), 3, np.float32))):
+        views = [replace(view, disparity=disparity) for view in make_views()]
+        (tmp_path / f"{k}").mkdir()
+        low, high = open_light_field(write(tmp_path / f"{k}", views)).range_px
+        assert -2 < low < high < 4
+        assert (
+            benchmark_depth(tmp_path / f"{k}" / "field", low) > benchmark_depth(tmp_path / f"{k}" / "field", high) > 0
+        )
+
+
+def test_the_benchmarks_own_parameters_state_infinity(tmp_path) -> None:
+    """Those of its scene dino, for views of 48 px."""
+    folder = known.write_hci(tmp_path / "dino")
+    lens = "focal_length_mm = 100.0\nsensor_size_mm = 35.0\n"
+    cameras = "num_cams_x = 3\nnum_cams_y = 3\nbaseline_mm = 60.0\nfocus_distance_m = 6.9\n"
+    (folder / "parameters.cfg").write_text(f"[intrinsics]\n{lens}[extrinsics]\n{cameras}")
+    scene = open_light_field(folder)
+    assert scene.focal_px == pytest.approx(100 / 35 * 48)
+    assert scene.infinity_px == pytest.approx(-60 * 100 / 6900 / 35 * 48, abs=1e-3)
 
 
 @pytest.mark.parametrize("dtype", [np.uint8, np.float16])

@@ -7,6 +7,7 @@ import pytest
 from PIL import Image
 
 from iibr_core.formats.images.write import write_image
+from iibr_core.formats.light_fields.light_field_formats import open_light_field
 from iibr_core.formats.poses import read_poses
 from tests.iibr_core.known_scenes import HEIGHT, WIDTH, offsets_of, view_of_wall
 from tests.viewer.cli.conftest import Iibr, output_of, refusal_of
@@ -58,3 +59,14 @@ def test_principal_points_that_move_far_are_stated_or_refused(iibr: Iibr, folder
     assert {camera.centre_px for camera in read_poses(Path("out"))} == {
         (23.5 + 10 * s, 19.5 + 10 * t) for t in (-1, 0, 1) for s in (-1, 0, 1)
     }
+
+
+def test_an_hci_folder_of_views_without_disparity_states_its_range(iibr: Iibr, folder: Path) -> None:
+    (folder / "wall").mkdir()
+    (write_wall(folder / "wall", -1.4) / "gt_disp_u01_v01.npy").unlink()
+    output_of(iibr("export", "wall", "--to", "hci", "-o", "out"))
+    scene = open_light_field(Path("out"))
+    low, high = scene.range_px
+    assert low == pytest.approx(-1.4, abs=0.3)
+    assert low < high < 0.6
+    assert scene.infinity_px < low
