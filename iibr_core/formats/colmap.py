@@ -27,6 +27,8 @@ MODELS = (
 )  # fmt: skip
 """Names of COLMAP's camera models with their numbers of parameters, by the number that binary files store."""
 MAX_NAME_BYTES = 4096
+MIN_QUATERNION = 1e-6
+"""Smallest length of a quaternion, and 1 / the largest: COLMAP writes 1."""
 NO_POINT = -1
 POINT = np.dtype([("id", "<u8"), ("place", "<f8", 3), ("color", "u1", 3), ("error", "<f8"), ("track", "<u8")])
 """A point of points3D.bin that no picture observes."""
@@ -123,6 +125,7 @@ def _unpack(file: BinaryIO, form: str) -> tuple[Any, ...]:
     return struct.unpack(form, file.read(struct.calcsize(form)))
 
 
+@np.errstate(invalid="ignore", over="ignore")  # such cameras are refused
 def _camera(lens: _Lens, picture: _Picture, source: str) -> NamedCamera:
     size = size_of_pictures(lens.height, lens.width, source)
     if lens.model not in PINHOLES:
@@ -135,9 +138,11 @@ def _camera(lens: _Lens, picture: _Picture, source: str) -> NamedCamera:
 
 
 def _rotation(w: float, x: float, y: float, z: float) -> NDArray[np.float64]:
-    """Return the rotation (3, 3) of a quaternion; NaN if its length is 0. SciPy is not in a plain installation."""
-    with np.errstate(invalid="ignore"):
-        w, x, y, z = np.array([w, x, y, z]) / np.linalg.norm([w, x, y, z])
+    """Return the rotation (3, 3) of a quaternion. SciPy is not in a plain installation."""
+    length = np.linalg.norm([w, x, y, z])
+    if not MIN_QUATERNION < length < 1 / MIN_QUATERNION:
+        raise ValueError(f"a quaternion of length {length:g}")
+    w, x, y, z = np.array([w, x, y, z]) / length
     cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
     rotation: NDArray[np.float64] = np.eye(3) + 2 * w * cross + 2 * cross @ cross
     return rotation

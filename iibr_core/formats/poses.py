@@ -102,6 +102,7 @@ def read_llff_poses(path: Path) -> tuple[Camera, ...]:
     return tuple(_llff_camera(row, f"{path}, pose {number}") for number, row in enumerate(stored.astype(float), 1))
 
 
+@np.errstate(invalid="ignore", over="ignore")  # such cameras are refused
 def _llff_camera(row: Doubles, source: str) -> Camera:
     matrix, (near, far) = row[:15].reshape(3, 5), row[15:]
     height, width, focal = (float(value) for value in matrix[:, 4])
@@ -143,6 +144,7 @@ def _is_small(coefficient: object) -> bool:
     return isinstance(coefficient, int | float) and abs(coefficient) <= MAX_DISTORTION
 
 
+@np.errstate(invalid="ignore", over="ignore")
 def _frame_camera(frame: _Frame, path: Path, source: str) -> Camera:
     matrix = np.array(frame.transform_matrix)
     if len(matrix) not in (3, 4):

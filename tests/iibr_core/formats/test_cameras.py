@@ -189,6 +189,12 @@ def test_colmaps_binary_model_holds_the_same_as_its_text(tmp_path):
         ("images", lambda data: struct.pack("<Q", 2**60) + data[8:], "poses"),
         ("images", lambda data: data.replace(b"\0v", b"xv").replace(b"png\0", b"png "), "is not a model of COLMAP"),
         ("images", lambda data: struct.pack("<Q", 1) + data[8:81] + struct.pack("<QQ", 2**63, 5), "not a model"),
+        ("images", lambda data: data[:12] + struct.pack("<4d", 0, 0, 0, 0) + data[44:], "a quaternion of length 0"),
+        (
+            "images",
+            lambda data: data[:12] + struct.pack("<4d", 1e300, 1e300, 0, 0) + data[44:],
+            "a quaternion of length inf",
+        ),
         ("cameras", lambda data: data[:12] + struct.pack("<i", 4) + data[16:] + bytes(32), "is a OPENCV; undistort"),
         ("cameras", lambda data: data[:12] + struct.pack("<i", 99) + data[16:], "unknown camera model 99"),
         ("cameras", lambda data: data[:16] + struct.pack("<Q", 2**62) + data[24:], "pixels"),
