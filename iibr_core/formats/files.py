@@ -1,6 +1,7 @@
 """Look at files and read them, with limits: paths come from people, and contents from anywhere."""
 
 import os
+import re
 import stat
 import struct
 import tokenize
@@ -28,6 +29,9 @@ PARSE_ERRORS = (
 """Errors of the parsers of other projects, and of ours, for damaged files."""
 COPY = r"(?:(?: ?[-_])? ?\(?(?:copy|kopie|copie|copia)(?: ?\d{1,4})?\)?| ?\(\d{1,4}\))*"
 """Pattern of what browsers and file managers add to the stem of a copy: " (1)", " - Copy", "_copy"; ignores case."""
+UNSUPPORTED = re.compile(r"unsupported|not (?:supported|implemented|configured)", re.IGNORECASE)
+"""Words of decoders about files that are whole, but of a kind that they do not know."""
+SAVE_ELSEWHERE = "if another program opens it, save it there as JPEG, PNG or TIFF"
 MAX_REASON_CHARACTERS = 200
 MAX_SHOWN_CHARACTERS = 80
 
@@ -39,6 +43,19 @@ def reason_of(failure: Exception | str) -> str:
     lines = (" ".join(line.split()) for line in str(failure).splitlines())
     name = type(failure).__name__ if isinstance(failure, Exception) else "no reason given"
     return next(filter(None, lines), name)[:MAX_REASON_CHARACTERS]
+
+
+def decoding_fault(failure: Exception | str, is_opened: bool = True) -> str:
+    """Return the end of an error about a picture that a decoder refuses: it is damaged, or of a kind that is not read.
+
+    is_opened: whether the decoder understood the header.
+    """
+    reason = reason_of(failure)
+    if UNSUPPORTED.search(reason):
+        return f"cannot be read as a picture ({reason}); {SAVE_ELSEWHERE}"
+    if is_opened:
+        return f"damaged or cut off ({reason}); get the whole file again"
+    return f"cannot be read as a picture ({reason}); get the whole file again, or, {SAVE_ELSEWHERE}"
 
 
 def printable(text: str) -> str:

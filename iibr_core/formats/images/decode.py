@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from PIL.Image import Image
 
 from iibr_core.color import ROWS_AT_ONCE
-from iibr_core.formats.files import reason_of, require_file
+from iibr_core.formats.files import decoding_fault, require_file
 from iibr_core.formats.images.avif import is_avif, open_avif
 from iibr_core.formats.images.file_kinds import raw_kind, unreadable_kind
 from iibr_core.formats.images.heic import heic_size, is_heic, read_heic
@@ -181,7 +181,7 @@ def _read_rows(path: Path, source: Any, stored: _Stored) -> Iterator[NDArray[Any
             rows = source.read_scanlines(top, bottom, spec.z, 0, stored.channels, oiio_type)
         message = complaint_of(source)
         if rows is None or (message and HARMLESS_MESSAGE not in message):
-            raise InputError(f"{path}: damaged or cut off ({_reason(message, path)}); get the whole file again")
+            raise InputError(f"{path}: {decoding_fault(_without_name(message, path))}")
         yield np.asarray(rows).reshape(bottom - top, spec.width, stored.channels)
 
 
@@ -215,7 +215,7 @@ def _open(path: Path) -> Any:
             raise InputError(f"{path}: is {kind.name}; {kind.way_out}")
         if NO_READER in complaint:
             raise InputError(f"{path}: cannot be read as a picture (of no known kind); save it as JPEG, PNG or TIFF")
-        raise InputError(f"{path}: cannot be read as a picture ({_reason(complaint, path)})")
+        raise InputError(f"{path}: {decoding_fault(_without_name(complaint, path), is_opened=False)}")
     spec = source.spec()
     if spec.depth > 1 or spec.deep:
         raise InputError(f"{path}: {spec.width}x{spec.height}x{spec.depth} is not a flat picture")
@@ -227,7 +227,7 @@ def _stored(path: Path, spec: Any) -> _Stored:
     try:
         names = [name.upper() for name in spec.channelnames]
     except UnicodeDecodeError as error:
-        raise InputError(f"{path}: damaged (its channels have no readable names); get the whole file again") from error
+        raise InputError(f"{path}: the names of its channels are not UTF-8; rename them or save it as RGB") from error
     alpha_at = names.index("A") if "A" in names else -1
     colors = 3 if spec.nchannels - (alpha_at >= 0) >= 3 else 1
     if 0 <= alpha_at < colors:
@@ -239,6 +239,6 @@ def _stored(path: Path, spec: Any) -> _Stored:
     return _Stored(colors, alpha_at, max(colors, alpha_at + 1), dtype)
 
 
-def _reason(complaint: str, path: Path) -> str:
+def _without_name(complaint: str, path: Path) -> str:
     """Return a complaint for a message; some of OpenImageIO's readers repeat the file's name."""
-    return reason_of(re.sub(rf' \("?{re.escape(str(path))}"?\)', "", complaint))
+    return re.sub(rf' \("?{re.escape(str(path))}"?\)', "", complaint)

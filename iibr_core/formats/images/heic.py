@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.formats.files import MAX_FILE_PIXELS, open_binary, require_file
+from iibr_core.formats.files import MAX_FILE_PIXELS, SAVE_ELSEWHERE, open_binary, require_file
 from iibr_core.formats.images.picture import Picture, opaque_as_none, require_sound_size
 from iibr_core.formats.images.pillow_reader import damage_as_input_error, exif_of, facts_of, orientation_in
 from iibr_core.types import FloatImage, ImageSize, InputError, image_size
@@ -49,7 +49,10 @@ def heic_pair(path: Path) -> tuple[int, int] | None:
         return None
     places = [place for place in groups[0].get("images") or () if isinstance(place, int)]
     if len(places) != 2 or places[0] == places[1] or not all(0 <= place < len(file) for place in places):
-        raise InputError(f"{path}: its group of two pictures holds others; get the whole file again")
+        raise InputError(
+            f"{path}: its pair is described in an unknown way ({places} of {len(file)} pictures);"
+            " save both eyes side by side, under a name that ends in '_2x1'"
+        )
     left, right = (_swapped(place, file.primary_index) for place in places)
     return left, right
 
@@ -95,7 +98,10 @@ def _open_file(path: Path) -> Any:
 
     require_file(path)
     with damage_as_input_error(path):
-        return pillow_heif.open_heif(path, convert_hdr_to_8bit=False)
+        file = pillow_heif.open_heif(path, convert_hdr_to_8bit=False)
+    if not len(file):
+        raise InputError(f"{path}: holds no picture of a known codec; {SAVE_ELSEWHERE}")
+    return file
 
 
 def _open(path: Path, number: int = 0) -> Any:

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from iibr_core.formats.files import MAX_FILE_PIXELS, PARSE_ERRORS, open_binary, reason_of
+from iibr_core.formats.files import MAX_FILE_PIXELS, PARSE_ERRORS, decoding_fault, open_binary, printable, reason_of
 from iibr_core.formats.images.picture import Picture
 from iibr_core.formats.images.pillow_reader import open_with_pillow
 from iibr_core.types import FloatImage, ImageSize, InputError
@@ -25,6 +25,7 @@ LFP_START = b"\x89LFP\r\n\x1a\n"
 SECTION_START = b"\x89LF"
 JSON_KIND = b"M"
 HEADER_BYTES, NAME_BYTES, ALIGNMENT = 16, 80, 16
+EXPORT = "export it with Lytro Desktop as a picture"
 MAX_FILE_BYTES, MAX_JSON_BYTES, MAX_PICTURES = 1 << 30, 1 << 24, 64
 
 Chunks = Mapping[str, bytes]
@@ -63,11 +64,15 @@ def open_lfp(path: Path) -> Lfp | None:
     if not is_lfp(path):
         return None
     with open_binary(path) as file:
-        text, chunks = _sections(file.read(MAX_FILE_BYTES))
+        data = file.read(MAX_FILE_BYTES)
+    text, chunks, end = _sections(data)
+    if end > len(data):
+        raise InputError(f"{path}: cut off at {len(data):,} of {end:,} bytes or more; get the whole file again")
     try:
         return _processed(list(_objects(json.loads(text))), chunks) if text else None
     except PARSE_ERRORS as error:
-        raise InputError(f"{path}: damaged or too new ({reason_of(error)}); get the whole file again") from error
+        fault = f"no {printable(str(error))}" if isinstance(error, KeyError) else reason_of(error)
+        raise InputError(f"{path}: describes its pictures in an unknown way ({fault}); {EXPORT}") from error
 
 
 def lfp_size(path: Path) -> ImageSize:
@@ -99,9 +104,9 @@ def _pictures_and_depth(path: Path) -> tuple[LfpPictures, FloatImage | None]:
     return lfp.pictures, lfp.depth
 
 
-def _sections(data: bytes) -> tuple[bytes, dict[str, bytes]]:
-    """Return the first JSON, b"" without, and the named chunks."""
-    text, at = b"", 0
+def _sections(data: bytes) -> tuple[bytes, dict[str, bytes], int]:
+    """Return the first JSON, b"" without, the named chunks, and where the last one ends: beyond the data if cut off."""
+    text, at, end = b"", 0, 0
     chunks: dict[str, bytes] = {}
     while data.startswith(SECTION_START, at):
         first = at + HEADER_BYTES
@@ -113,8 +118,9 @@ def _sections(data: bytes) -> tuple[bytes, dict[str, bytes]]:
                 text = text or data[first : first + min(length, MAX_JSON_BYTES)]
             else:
                 chunks.setdefault(name, data[first : first + length])
-        at = first + length + -(first + length) % ALIGNMENT
-    return text, chunks
+        end = first + length
+        at = end + -end % ALIGNMENT
+    return text, chunks, end
 
 
 def _objects(value: Any) -> Iterator[dict[str, Any]]:
@@ -185,7 +191,7 @@ def _decoded(path: Path, pictures: LfpPictures) -> Iterator[NDArray[np.uint8]]:
         with open_with_pillow(path, ("JPEG", "PNG"), data) as image:
             pixels = np.asarray(image.convert("RGB"))
         if pixels.shape[:2] != pictures.size:
-            raise InputError(f"{path}: its pictures differ in size; get the whole file again")
+            raise InputError(f"{path}: its pictures differ from the stated size, {pictures.size}; {EXPORT}")
         yield pixels
 
 
@@ -204,7 +210,7 @@ def _film(path: Path, pictures: LfpPictures) -> Iterator[NDArray[np.uint8]]:
                 if len(frames) == len(pictures.frames):
                     break
     except (av.error.FFmpegError, ValueError) as error:
-        raise InputError(f"{path}: damaged or cut off ({reason_of(error)}); get the whole file again") from error
+        raise InputError(f"{path}: {decoding_fault(error)}") from error
     for number in pictures.frames:
         if number not in frames or frames[number].shape[:2] != pictures.size:
             raise InputError(f"{path}: damaged or cut off (picture {number} is missing); get the whole file again")

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
-from iibr_core.formats.files import MAX_FILE_PIXELS, PARSE_ERRORS, reason_of
+from iibr_core.formats.files import MAX_FILE_PIXELS, PARSE_ERRORS, decoding_fault, reason_of
 from iibr_core.formats.images.hdr import HLG, PQ
 from iibr_core.formats.images.picture import EXIF_NUMBERS, Picture, exif_focal_px, opaque_as_none, require_sound_size
 from iibr_core.types import ImageSize, InputError
@@ -35,7 +35,7 @@ def open_with_pillow(path: Path, formats: tuple[str, ...], data: bytes | None = 
         image = Image.open(path if data is None else BytesIO(data), formats=formats)
     except DECODE_ERRORS as error:
         reason = reason_of(error).replace(f" {str(path)!r}", "")
-        raise InputError(f"{path}: cannot be read as a picture ({reason})") from error
+        raise InputError(f"{path}: {decoding_fault(reason, is_opened=False)}") from error
     with image, damage_as_input_error(path):
         require_sound_size(path, image.width, image.height, image.width * image.height * 4)
         yield image
@@ -49,7 +49,7 @@ def damage_as_input_error(path: Path) -> Iterator[None]:
     except InputError:
         raise
     except DECODE_ERRORS as error:
-        raise InputError(f"{path}: damaged or cut off ({reason_of(error)}); get the whole file again") from error
+        raise InputError(f"{path}: {decoding_fault(error)}") from error
 
 
 def picture_of(image: Image.Image) -> Picture:

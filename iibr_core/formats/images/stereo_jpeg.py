@@ -154,5 +154,7 @@ def is_stereo_mpo(path: Path) -> bool:
             raise
         return False
     if is_named and count < 2:
-        raise InputError(f"{path}: holds one picture only, not one for each eye; get the whole file again")
+        raise InputError(
+            f"{path}: holds one picture only, not one for each eye; get the camera's file, or rename it to .jpg"
+        )
     return count >= 2 and (is_named or is_disparity)

@@ -169,8 +169,15 @@ def test_a_processed_lytro_file_opens_with_its_depth(tmp_path, name, is_illum) -
 
 
 @pytest.mark.parametrize("cut", [0.1, 0.5, 0.95])
-def test_damaged_lytro_files_are_refused_in_a_line(tmp_path, cut) -> None:
+def test_cut_lytro_files_are_to_be_fetched_again(tmp_path, cut) -> None:
     data = stack(True)
     (tmp_path / "a.lfp").write_bytes(data[: int(cut * len(data))])
-    with pytest.raises(InputError, match=r"^[^\n]*a\.lfp: [^\n]*$"):
+    with pytest.raises(InputError, match=r"^[^\n]*a\.lfp: cut off at [^\n]*; get the whole file again$"):
+        read_photo(tmp_path / "a.lfp")
+
+
+def test_lytro_files_of_an_unknown_version_are_to_be_exported(tmp_path) -> None:
+    entry = {"imageArray": [{"imageRef": "a", "width": 8}]}
+    (tmp_path / "a.lfp").write_bytes(files.lytro_file(entry, {"a": b"x"}))
+    with pytest.raises(InputError, match=r"in an unknown way \(no 'height'\); export it with Lytro Desktop"):
         read_photo(tmp_path / "a.lfp")

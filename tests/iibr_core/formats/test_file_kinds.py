@@ -1,5 +1,6 @@
 import shutil
 import struct
+from io import BytesIO
 from pathlib import Path
 
 import numpy as np
@@ -108,6 +109,50 @@ def test_pictures_of_other_colours_open(tmp_path, name, mode, note) -> None:
     assert photo.notes == ((note,) if note else ())
     expected = np.asarray(PICTURE.convert(mode).convert("RGB"))
     assert np.abs(255 * photo.pixels - expected).mean() < 6
+
+
+AGAIN, ELSEWHERE = "get the whole file again", "if another program opens it, save it there as JPEG, PNG or TIFF"
+
+
+def as_bytes(kind: str) -> bytes:
+    stored = BytesIO()
+    if kind == "HEIC":
+        pillow_heif.from_pillow(PICTURE).save(stored)
+    else:
+        PICTURE.save(stored, kind)
+    return stored.getvalue()
+
+
+def with_compression(code: int) -> bytes:
+    """Return a TIFF that states another compression: tag 259, one short number."""
+    head = struct.pack("<HHI", 259, 3, 1)
+    return as_bytes("TIFF").replace(head + struct.pack("<I", 1), head + struct.pack("<I", code))
+
+
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [
+        ("lerc.tif", with_compression(34887)),
+        ("jpeg_xl.tif", with_compression(50002)),
+        ("twelve_bits.jpg", as_bytes("JPEG").replace(b"\xff\xc0\0\x11\x08", b"\xff\xc1\0\x11\x0c")),
+        ("lossless.jpg", as_bytes("JPEG").replace(b"\xff\xc0\0\x11", b"\xff\xc3\0\x11")),
+        ("vvc.heic", as_bytes("HEIC").replace(b"hvc1", b"vvc1")),
+    ],
+)
+def test_whole_files_of_unread_kinds_are_not_called_damaged(tmp_path, name, content) -> None:
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(InputError, match=ELSEWHERE) as raised:
+        read_photo(tmp_path / name)
+    assert AGAIN not in str(raised.value)
+
+
+@pytest.mark.parametrize("kind", ["JPEG", "PNG", "TIFF", "WEBP", "AVIF", "HEIC"])
+@pytest.mark.parametrize("share", [0.2, 0.8])
+def test_cut_files_are_to_be_fetched_again(tmp_path, kind, share) -> None:
+    path, stored = tmp_path / f"a.{kind.lower()}", as_bytes(kind)
+    path.write_bytes(stored[: int(share * len(stored))])
+    with pytest.raises(InputError, match=AGAIN):
+        read_photo(path)
 
 
 XMP_TAG = 700
