@@ -17,6 +17,8 @@ from iibr_core.formats.colmap import write_colmap
 from iibr_core.formats.images.write import write_image
 from iibr_core.formats.light_fields import write
 from iibr_core.formats.light_fields.light_field_formats import open_light_field
+from iibr_core.formats.light_fields.multi_view_scene import GridIndex
+from iibr_core.formats.light_fields.views import step_length
 from iibr_core.formats.outputs import write_folder
 from iibr_core.scenes.light_fields import find_range
 from iibr_core.types import ImageSize, InputError, ViewOffset, ViewUpdate
@@ -46,7 +48,16 @@ def cameras_of(source: ExportSource) -> FieldCameras:
         at_infinity = (_given_infinity(source) - plan.disparity_zero) * plan.disparity_scale
         low, high = plan.disparity_range_px
     low = max(low, at_infinity + (high - at_infinity) / MAX_DEPTH_RATIO)
-    return FieldCameras(scene.grid, ImageSize(scene.height, scene.width), focal_px, (low, high), at_infinity)
+    size, viewpoints = ImageSize(scene.height, scene.width), {} if source.loaded else _viewpoints(source)
+    return FieldCameras(scene.grid, size, focal_px, (low, high), at_infinity, viewpoints=viewpoints)
+
+
+def _viewpoints(source: ExportSource) -> dict[GridIndex, ViewOffset]:
+    """Return the viewpoints of a light field from disk in steps of its grid, from the centre view's."""
+    field = open_light_field(Path(source.scene.source.path))
+    offsets, step = {view.place: view.offset for view in field.views if view.place is not None}, step_length(field)
+    centre = offsets[source.scene.grid.centre]
+    return {at: ViewOffset((t - centre.t) / step, (s - centre.s) / step) for at, (t, s) in offsets.items()}
 
 
 def _given_infinity(source: ExportSource) -> float:
@@ -84,14 +95,14 @@ def write_cameras(path: Path, source: ExportSource, options: ExportOptions, vari
     Return a sentence about views that are cropped, or whose principal points move.
     """
     whole, static_disparity = _straight_cameras(source)
-    offsets = [whole.grid.offset(row, column) for row, column in np.ndindex(*whole.grid)]
+    offsets = [whole.offset(row, column) for row, column in np.ndindex(*whole.grid)]
     cameras = whole.centred(offsets)
     places: dict[str, ViewOffset] = {}
     centre: ViewUpdate | None = None
     with write_folder(path) as folder:
         (folder / "images").mkdir()
         for view in source.views(static_disparity):
-            name, offset = f"v{view.row:02d}_u{view.column:02d}.png", cameras.grid.offset(view.row, view.column)
+            name, offset = f"v{view.row:02d}_u{view.column:02d}.png", cameras.offset(view.row, view.column)
             write_image(folder / "images" / name, np.ascontiguousarray(colors_of(view)[cameras.window(offset)]))
             places[name] = offset
             centre = view if centre is None else centre
@@ -100,9 +111,10 @@ def write_cameras(path: Path, source: ExportSource, options: ExportOptions, vari
             write_colmap(folder, cameras, places, *_points_of(centre, cameras))
         else:
             (write_llff if variant == "llff" else write_nerfstudio)(folder, cameras, places)
-    if cameras.size != whole.size:
-        return f"The views are cropped from {whole.size} to {cameras.size}: their principal points lie in the middle."
     moved_px = cameras.off_centre_px(offsets)
+    if cameras.size != whole.size:
+        error = f" to {moved_px:.1f} px" if moved_px > 0.05 else ""
+        return f"The views are cropped from {whole.size} to {cameras.size}: principal points lie in the middle{error}."
     return SHIFTED.format(moved_px) if moved_px > MAX_OFF_CENTRE_PX else None
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -33,7 +33,8 @@ class FieldCameras:
 
     size: size of a view, without its margins. focal_px: its focal length in pixels. range_px: least and greatest
     disparity (px per view step). at_infinity: disparity of infinitely far points, below the least. margins: mean number
-    of pixels (y, x) that are cut off at each side, None where views are whole.
+    of pixels (y, x) that are cut off at each side, None where views are whole. viewpoints: those by row and column that
+    are not on the regular grid.
     """
 
     grid: GridShape
@@ -42,6 +43,7 @@ class FieldCameras:
     range_px: tuple[float, float]
     at_infinity: float
     margins: tuple[int, int] | None = None
+    viewpoints: Mapping[tuple[int, int], ViewOffset] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         low, high = self.range_px
@@ -49,6 +51,10 @@ class FieldCameras:
         if not (np.isfinite(numbers).all() and self.focal_px > 0 and self.at_infinity < low <= high):
             values = f"focal length {self.focal_px:g}, disparities {low:g} to {high:g}"
             raise InputError(f"{values}: no cameras can be computed from these")
+
+    def offset(self, row: int, column: int) -> ViewOffset:
+        """Return the viewpoint of a view."""
+        return self.viewpoints.get((row, column)) or self.grid.offset(row, column)
 
     @property
     def step(self) -> float:

@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from iibr_core.formats.cameras import FieldCameras, write_nerfstudio
 from iibr_core.formats.images.write import write_image
 from iibr_core.formats.light_fields.light_field_formats import open_light_field
 from iibr_core.formats.poses import read_poses
+from iibr_core.types import GridShape, ImageSize, ViewOffset
 from tests.iibr_core.known_scenes import HEIGHT, WIDTH, offsets_of, view_of_wall
 from tests.viewer.cli.conftest import Iibr, output_of, refusal_of
 
@@ -47,6 +49,24 @@ def test_views_that_converge_are_cropped_around_their_principal_points(iibr: Iib
         assert np.abs(np.asarray(Image.open(path)) / 255 - expected).max() < 0.01
     output_of(iibr("depth", "out", "-o", "found.npy"))
     assert np.median(np.load("found.npy")) == pytest.approx(1.6, abs=0.05), "it opens again as a light field"
+
+
+def test_rows_closer_than_columns_stay_so(iibr: Iibr, folder: Path) -> None:
+    """A folder with cameras, exported again: rows 0.4 times as far apart."""
+    (folder / "in" / "images").mkdir(parents=True)
+    offsets = {f"{9 - k}.png": ViewOffset(0.4 * t, s) for k, (t, s) in enumerate(offsets_of(3, 3).values())}
+    for name, offset in offsets.items():
+        write_image(folder / "in" / "images" / name, view_of_wall(offset, 1.6))
+    grid = GridShape(3, 3)
+    write_nerfstudio(folder / "in", FieldCameras(grid, ImageSize(HEIGHT, WIDTH), 50.0, (1.0, 1.6), 0.0), offsets)
+    output_of(iibr("export", "in", "--to", "colmap", "-o", "out"))
+    cameras = read_poses(Path("out"))
+    places = np.array([camera.position - cameras[4].position for camera in cameras])
+    step = places[5, 0]
+    np.testing.assert_allclose(places[:, 0], step * np.tile([-1, 0, 1], 3), atol=1e-9)
+    np.testing.assert_allclose(places[:, 1], 0.4 * step * np.repeat([-1, 0, 1], 3), atol=1e-9)
+    assert {camera.focal_px for camera in cameras} == {(50.0, 50.0)}
+    assert {camera.centre_px for camera in cameras} == {(23.5, 19.5)}
 
 
 def test_principal_points_that_move_far_are_stated_or_refused(iibr: Iibr, folder: Path) -> None:
