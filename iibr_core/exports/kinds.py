@@ -182,6 +182,7 @@ EXPORTS = {
         "Depth map", MAP, "maps:write_depth", path="maps:depth_path", has_colors=False, purpose="software"
     ),
     "splats": ExportKind("Gaussian splats", (".ply", ".spz"), "points:write_gaussians", purpose="software"),
+    "mesh": ExportKind("Textured mesh, GLB", (".glb",), "mesh:write_mesh", purpose="software"),
     "point-cloud": ExportKind("Point cloud, PLY", (".ply",), "points:write_point_cloud", purpose="software"),
     "llff": _cameras("Cameras, LLFF", "llff"),
     "nerfstudio": _cameras("Cameras, nerfstudio", "nerfstudio"),

@@ -26,11 +26,8 @@ from iibr_core.scenes.scene import LoadedPhoto, Source
 from iibr_core.types import Disparity, FloatImage, InputError, Photo
 
 
-def load_large(source: Source, loaded: LoadedPhoto, plan: ScenePlan, max_pixels: int) -> LargePhoto:
-    """Return the photo of `source`, which was `loaded` smaller, with at most max_pixels and without `fills`.
-
-    Its disparity is the same, with edges drawn to those of the larger photo.
-    """
+def read_large(source: Source, loaded: LoadedPhoto, max_pixels: int) -> Photo:
+    """Return the photo of `source`, which was `loaded` smaller, in the colours of its file, with at most max_pixels."""
     path = Path(source.path)
     if stamp_of(path) != loaded.stamp:
         raise InputError(f"{path}: was changed since it was opened; open it again")
@@ -38,6 +35,15 @@ def load_large(source: Source, loaded: LoadedPhoto, plan: ScenePlan, max_pixels:
     if loaded.origin.kind == "embedded" and (embedded := read_embedded(path)) is not None:
         photo = photo_in_focus(path, photo, embedded, max_pixels)
     raise_if_stopped()
+    return photo
+
+
+def load_large(source: Source, loaded: LoadedPhoto, plan: ScenePlan, max_pixels: int) -> LargePhoto:
+    """Return the photo of `source`, which was `loaded` smaller, with at most max_pixels and without `fills`.
+
+    Its disparity is the same, with edges drawn to those of the larger photo.
+    """
+    photo = read_large(source, loaded, max_pixels)
     enlarged = photo.size.width / loaded.photo.size.width
     values = _disparity(source, loaded, photo)
     raise_if_stopped()

@@ -1,0 +1,174 @@
+"""Splats as SPZ, read by the format's description, and textured meshes, read by trimesh."""
+
+import gzip
+import math
+import struct
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+import trimesh
+from PIL import Image
+from plyfile import PlyData
+
+from iibr_core.beyond.optics import Optics
+from iibr_core.exports.cameras import cameras_of, nearest_metres
+from iibr_core.exports.kinds import EXPORTS, ExportOptions
+from iibr_core.exports.render_settings import RenderSettings
+from iibr_core.exports.source import open_for_export, write_export
+from iibr_core.exports.triangles import MAX_ERROR_PX, Triangles, triangulate
+from iibr_core.scenes.lens_limits import LensChoice
+from iibr_core.scenes.scene import Source
+from iibr_core.scenes.screen_size import ScreenSize
+from iibr_core.types import GridShape
+from tests.iibr_core.exports.conftest import exported
+from tests.iibr_core.exports.test_space import with_metres
+from tests.viewer.conftest import write_scene
+
+SH_BASIS_0 = 0.28209479177387814
+
+
+def read_spz(path: Path) -> dict[str, np.ndarray]:
+    """Places, colours and opacities (0 to 1), radii and quaternions (x, y, z), by version 2 of the format."""
+    content = gzip.decompress(path.read_bytes())
+    magic, version, count, degree, bits, flags, reserved = struct.unpack_from("<4sIIBBBB", content)
+    assert (magic, version, degree, flags, reserved) == (b"NGSP", 2, 0, 0, 0)
+    parts = np.split(np.frombuffer(content, np.uint8, offset=16), np.cumsum([9, 1, 3, 3, 3])[:-1] * count)
+    places, opacities, colors, radii, rotations = (part.reshape(count, -1).astype(np.int32) for part in parts)
+    low, middle, high = places.reshape(count, 3, 3).transpose(2, 0, 1)
+    fixed = (low | middle << 8 | high << 16) - (high >> 7 << 24)
+    return {
+        "places": fixed / 2**bits,
+        "opacities": opacities[:, 0] / 255,
+        "colors": (colors / 255 - 0.5) / 0.15 * SH_BASIS_0 + 0.5,
+        "radii": np.exp(radii / 16 - 10),
+        "rotations": rotations / 127.5 - 1,
+    }
+
+
+@pytest.mark.parametrize(
+    ("nearest", "farthest", "factor"), [(None, None, 1), (1.02, 3.9, 1), (0.5, 400.0, 1), (0.001, 0.004, 10)]
+)
+def test_splats_as_spz_are_those_of_the_ply_file(source, tmp_path, nearest, farthest, factor) -> None:
+    known = source if nearest is None else with_metres(source, nearest, farthest)
+    ply = PlyData.read(str(exported(known, "splats", tmp_path / "a.ply")))["vertex"]
+    if nearest is not None:
+        assert (ply["z"].min(), ply["z"].max()) == pytest.approx((nearest, farthest), rel=1e-3), "metres"
+    message = write_export(EXPORTS["splats"], tmp_path / "a.spz", known, ExportOptions())
+    assert (message is None) if factor == 1 else (f"{factor} times" in message)
+    spz = read_spz(tmp_path / "a.spz")
+    radii = factor * np.exp(ply["scale_0"])
+    places = factor * np.column_stack([ply["x"], -ply["y"], -ply["z"]])
+    assert (np.abs(spz["places"] - places) < 0.1 * radii[:, None]).all()
+    np.testing.assert_allclose(spz["radii"], np.repeat(radii[:, None], 3, axis=1), rtol=0.033)
+    colors = np.column_stack([ply[f"f_dc_{i}"] for i in range(3)]) * SH_BASIS_0 + 0.5
+    assert np.abs(spz["colors"] - colors).max() < 1 / 255
+    assert spz["opacities"] == pytest.approx(1 / (1 + np.exp(-ply["opacity"])), abs=1 / 255)
+    assert np.abs(spz["rotations"]).max() < 0.005
+    assert (tmp_path / "a.spz").stat().st_size < (tmp_path / "a.ply").stat().st_size / 5
+
+
+def joins_of(nearness: np.ndarray, cut: float) -> tuple[np.ndarray, np.ndarray]:
+    return np.abs(np.diff(nearness, axis=1)) <= cut, np.abs(np.diff(nearness, axis=0)) <= cut
+
+
+def covered_twice(triangles: Triangles) -> np.ndarray:
+    """The sides of triangles that only one triangle has, as rows (x0, y0, x1, y1)."""
+    sides = np.sort(triangles.indices[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    lone, counts = np.unique(sides, axis=0, return_counts=True)
+    assert counts.max() <= 2
+    return triangles.corners[lone[counts == 1]].reshape(-1, 4)
+
+
+@pytest.mark.parametrize("size", [(64, 128), (50, 70), (1, 1), (130, 3)])
+def test_triangles_of_a_slanted_plane_fit_it_without_gaps(size) -> None:
+    height, width = size
+    rows, columns = np.indices(size, np.float32) + 0.5
+    nearness = (5 + 0.01 * columns + 0.004 * rows).astype(np.float32)
+    triangles = triangulate(nearness, np.ones(size, bool), joins_of(nearness, 1.0), 4)
+    x, y = triangles.corners.T
+    inside = (x > 0) & (x < width) & (y > 0) & (y < height)
+    np.testing.assert_allclose(triangles.nearness[inside], (5 + 0.01 * x + 0.004 * y)[inside], rtol=1e-5)
+    assert len(triangles.indices) <= max(0.4 * height * width, 8 * (height + width))
+    a, b, c = triangles.corners[triangles.indices].transpose(1, 0, 2)
+    areas = ((b - a)[:, 1] * (c - a)[:, 0] - (b - a)[:, 0] * (c - a)[:, 1]) / 2
+    assert areas.min() > 0, "counter-clockwise"
+    assert areas.sum() == height * width
+    x0, y0, x1, y1 = covered_twice(triangles).T
+    assert (((x0 == x1) & np.isin(x0, [0, width])) | ((y0 == y1) & np.isin(y0, [0, height]))).all()
+
+
+def test_triangles_follow_a_depth_edge_and_curved_surfaces() -> None:
+    rows, columns = np.indices((96, 96), np.float32) + 0.5
+    disc = np.hypot(rows - 40, columns - 50) < 25
+    nearness = np.where(disc, 9, 5 + np.sin(columns / 15)).astype(np.float32)
+    triangles = triangulate(nearness, np.ones_like(disc), joins_of(nearness, 1.0), 4)
+    corners = triangles.nearness[triangles.indices]
+    assert np.ptp(corners, axis=1).max() < 1, "no triangle joins the disc with what is behind it"
+    middles = triangles.corners[triangles.indices].mean(axis=1)
+    x, y = middles.astype(int).T
+    np.testing.assert_array_equal(corners.mean(axis=1) > 7, disc[y, x])
+    behind = ~disc[y, x]
+    errors = corners.mean(axis=1) - (5 + np.sin(middles[:, 0] / 15))
+    assert np.abs(errors[behind]).max() * 4 < 2.5 * MAX_ERROR_PX
+    assert len(triangles.indices) < 0.7 * disc.size
+
+
+@pytest.fixture(params=[None, (1.02, 3.9)], ids=["relative", "metres"])
+def known(source, request):
+    return source if request.param is None else with_metres(source, *request.param)
+
+
+def meshes_of(path: Path) -> list[trimesh.Trimesh]:
+    return trimesh.load_scene(path, process=False).dump()
+
+
+def test_a_mesh_is_the_photo_from_its_place(known, tmp_path) -> None:
+    photo, *behind = meshes_of(exported(known, "mesh", tmp_path / "a.glb"))
+    cameras, metres = cameras_of(known), nearest_metres(known) or 1.0
+    x, y, z = photo.vertices.T
+    assert -z.max() == pytest.approx(metres, rel=1e-4)
+    u, v = photo.visual.uv.T  # trimesh counts v from below
+    np.testing.assert_allclose(0.5 - x / z * cameras.focal_px / 96, u, atol=1e-5)
+    np.testing.assert_allclose(0.5 - y / z * cameras.focal_px / 64, v, atol=1e-5)
+    depths = -z[photo.faces]
+    assert (np.ptp(depths, axis=1) < 0.05 * depths.min()).all(), "cut at the square's edge"
+    texture = np.asarray(photo.visual.material.baseColorTexture.convert("RGB")).astype(int)
+    shown = known.draw(RenderSettings(Optics(), ScreenSize(96, 64)))
+    assert np.abs(texture - shown).mean() < 2
+    assert len(behind) == 5
+    for mesh in behind:
+        x, y, z = mesh.vertices.T
+        column, row = np.floor(48 - x / z * cameras.focal_px), np.floor(32 + y / z * cameras.focal_px)
+        inside = (column >= 24) & (column < 72) & (row >= 12) & (row < 52)
+        assert -z[inside].min() > 1.2 * metres, "behind the square"
+
+
+def test_a_mesh_has_no_holes_from_the_corner_views(source, tmp_path) -> None:
+    meshes, cameras = meshes_of(exported(source, "mesh", tmp_path / "a.glb")), cameras_of(source)
+    finer = 8
+    for row, column in ((0, 0), (0, 2), (2, 0), (2, 2)):
+        offset = cameras.grid.offset(row, column)
+        (left, top, _), centre = cameras.place(offset), cameras.principal_point(offset)
+        covered = np.zeros((64 * finer, 96 * finer), np.uint8)
+        for mesh in meshes:
+            x, y, z = mesh.vertices.T
+            pixels = np.column_stack([(x - left) / -z, (-y - top) / -z]) * cameras.focal_px + centre
+            for triangle in np.rint(pixels * finer).astype(np.int32)[mesh.faces]:
+                cv2.fillConvexPoly(covered, triangle, 1)
+        assert covered.all()
+
+
+def test_a_mesh_has_the_photos_camera_and_its_picture_at_its_own_size(tmp_path) -> None:
+    photo = Source(str(write_scene(tmp_path)), grid=GridShape(3, 3), max_pixels=48 * 32)
+    kind, options = EXPORTS["mesh"], ExportOptions()
+    source = open_for_export(kind, options, photo, 1.0, LensChoice(), lambda scene: None, None)
+    assert source.scene.size == (48, 32)
+    write_export(kind, tmp_path / "a.glb", source, options)
+    scene = trimesh.load_scene(tmp_path / "a.glb", process=False)
+    vertical = math.radians(scene.camera.fov[1])
+    assert math.tan(vertical / 2) == pytest.approx(16 / cameras_of(source).focal_px)
+    texture = meshes_of(tmp_path / "a.glb")[0].visual.material.baseColorTexture.convert("RGB")
+    assert texture.size == (96, 64)
+    assert np.abs(np.asarray(texture).astype(int) - Image.open(photo.path)).mean() < 2
