@@ -29,6 +29,8 @@ from PIL import Image, PngImagePlugin
 from benchmarks.report import is_wanted
 from iibr_core.beyond.optics import Optics
 from iibr_core.depth.search import open_with_depth
+from iibr_core.formats.cameras import FieldCameras, write_nerfstudio
+from iibr_core.formats.colmap import write_colmap
 from iibr_core.formats.images.photo import read_photo
 from iibr_core.formats.images.write import write_image_file
 from iibr_core.formats.light_fields.light_field_formats import find_light_field
@@ -38,7 +40,7 @@ from iibr_core.formats.maps.writer import write_map
 from iibr_core.method.ray_transformer import TrainedWeights
 from iibr_core.runtime.resources import resource_folder
 from iibr_core.scenes.scene import Source
-from iibr_core.types import ImageSize, InputError
+from iibr_core.types import GridShape, ImageSize, InputError, ViewOffset
 from tests.iibr_core import embedded_files
 from viewer.app.preferences_store import load_preferences
 from viewer.model.aperture_mask import read_mask
@@ -144,6 +146,11 @@ def samples(folder: Path) -> dict[Path, Read]:
     np.save(add("llff/poses_bounds.npy", lambda path: _views(path.parent)), np.array(rows))
     for name in (f"{layout}/input_Cam{number:03d}.png" for layout in ("hci", "llff") for number in range(4)):
         (folder / name).write_bytes(saved("png"))
+    for name in ("colmap/sparse/0/cameras.bin", "colmap/sparse/0/images.bin", "nerfstudio/transforms.json"):
+        root = folder / name.split("/")[0]
+        if not (folder / name).is_file():
+            _write_cameras(root, saved("png"))
+        add(name, lambda path, root=root: _views(root), (folder / name).read_bytes())
     info = PngImagePlugin.PngInfo()
     info.add_text("iibr:settings", settings_text(SavedSettings(Optics(), 1.0, Source(""), (64, 48))))
     add("settings.png", lambda path: read_settings(path) and None, saved("png", pnginfo=info))
@@ -152,6 +159,19 @@ def samples(folder: Path) -> dict[Path, Read]:
     weights = resource_folder("assets") / "weights" / "ray_transformer.safetensors"
     add("a.safetensors", lambda path: TrainedWeights(path) and None, weights.read_bytes())
     return readers
+
+
+def _write_cameras(root: Path, picture: bytes) -> None:
+    """Write two views with their cameras as COLMAP's model, or for nerfstudio."""
+    (root / "images").mkdir(parents=True)
+    offsets = {f"{k}.png": ViewOffset(0.0, float(k)) for k in range(2)}
+    for name in offsets:
+        (root / "images" / name).write_bytes(picture)
+    cameras = FieldCameras(GridShape(1, 2), SIZE, 30.0, (1.0, 2.0), 0.0)
+    if root.name == "colmap":
+        write_colmap(root, cameras, offsets, np.zeros((1, 3), np.float32), np.zeros((1, 3), np.uint8))
+    else:
+        write_nerfstudio(root, cameras, offsets)
 
 
 def _photo(path: Path) -> list[np.ndarray]:

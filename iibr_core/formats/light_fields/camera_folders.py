@@ -4,6 +4,7 @@ Cameras that look the same way from a regular grid make a light field. LLFF's ar
 an evaluation reads those. LLFF's pictures are in the order of their poses, other files name them.
 """
 
+import os
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -79,10 +80,10 @@ def _picture(folder: Path, name: str) -> Path:
     if not name or not stays_within(name):
         raise InputError(f"{folder}: the picture {printable(name)!r} of a camera does not lie in this folder")
     path = Path(name) if Path(name).suffix else Path(f"{name}.png")
-    found = next((place for place in (folder / "images" / path, folder / path) if place.is_file()), None)
-    if found is None:
-        raise InputError(f"{folder / path}: this picture of a camera is missing; get the whole data set")
-    return found
+    for place in (folder / "images" / path, folder / path):
+        if os.path.isfile(place):  # unlike is_file() also for names that are too long
+            return place
+    raise InputError(f"{folder}: the picture {printable(name)} of a camera is missing; get the whole data set")
 
 
 def _field_of(

@@ -116,16 +116,16 @@ def test_the_folder_with_a_picture_for_each_pose_counts(tmp_path) -> None:
 def test_a_missing_picture_is_named(tmp_path, kind) -> None:
     folder = write_scene(tmp_path / "scene", kind, OFFSETS)
     (folder / "images" / "v01_u02.png").unlink()
-    with pytest.raises(InputError, match=r"v01_u02.png: this picture of a camera is missing"):
+    with pytest.raises(InputError, match=r"the picture \S*v01_u02.png of a camera is missing"):
         open_light_field(folder)
 
 
-@pytest.mark.parametrize("name", ["../other.png", "/etc/passwd", "C:\\a.png", ""])
+@pytest.mark.parametrize("name", ["../other.png", "/etc/passwd", "C:\\a.png", "", "a" * 300, "a\0.png"])
 def test_a_picture_elsewhere_is_never_opened(tmp_path, name) -> None:
     folder = write_scene(tmp_path / "scene", "nerfstudio", OFFSETS)
     write_image(tmp_path / "other.png", np.zeros((*SIZE, 3), np.float32))
     content = json.loads((folder / "transforms.json").read_text())
     content["frames"][1]["file_path"] = name
     (folder / "transforms.json").write_text(json.dumps(content))
-    with pytest.raises(InputError, match="of a camera does not lie in this folder"):
+    with pytest.raises(InputError, match=r"of a camera (does not lie in this folder|is missing)"):
         open_light_field(folder)
