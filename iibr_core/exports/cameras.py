@@ -41,8 +41,9 @@ def cameras_of(source: ExportSource) -> FieldCameras:
             raise InputError(f"{scene.name}: no depth is known; open a photo with a disparity map")
         (low, high), known = scene.disparity_range_px, scene.infinity_px
         focal_px = scene.focal_px or float(scene.width)
-        # A whole number lets views be cropped without resampling; mostly it is a guess.
-        at_infinity = float(math.floor(known if known is not None and known < high else infinity_of(low, high)))
+        if known is None or not -scene.width < known < high:
+            known = infinity_of(low, high)
+        at_infinity = float(math.floor(known))  # views are then cropped without resampling
     else:
         plan, focal_px = source.plan(), source.loaded.photo.focal_px
         at_infinity = (_given_infinity(source) - plan.disparity_zero) * plan.disparity_scale

@@ -19,8 +19,8 @@ from iibr_core.formats.light_fields.multi_view_scene import GridIndex, KnownView
 from iibr_core.formats.poses import central_camera, poses_in, read_llff_poses, read_named_poses
 from iibr_core.types import Camera, InputError, ViewOffset
 
-LLFF_FOLDERS = ("images_8", "images_4", "images")
-"""Folders of pictures, smaller copies first: papers evaluate on them."""
+LLFF_FOLDERS = ("images_8", "images_4", "images", "images_2")
+"""Folders of pictures in the order of preference: papers evaluate on small copies."""
 MAX_STRAY = 0.03
 """Largest distance of a camera from its place on a grid, in steps of its rows and columns."""
 MIN_STEP_RATIO = 0.05
