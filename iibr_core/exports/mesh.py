@@ -60,8 +60,9 @@ def write_mesh(path: Path, source: ExportSource, options: ExportOptions) -> None
     cut, behind = step_of(EDGE_PX, views), step_of(BEHIND_PX, views)
     front = _with_mixed_pixels(photo, cut)
     lining = _with_seam(_far_sides(front, views), cut, behind, LINING_PX)
-    hidden = [_moved_behind(lining, photo.disparity, 2 * behind)]
-    hidden += [_moved_behind(_with_seam(part, cut, behind, SEAM_PX), photo.disparity, behind) for part in inpainted]
+    seen = _least_around(photo.disparity)
+    hidden = [_moved_behind(lining, seen, 2 * behind)]
+    hidden += [_moved_behind(_with_seam(part, cut, behind, SEAM_PX), seen, behind) for part in inpainted]
     meshes = [_mesh(front, _own_size(source, photo.colors), cameras, views)]
     meshes += [_mesh(part, _shown(part), cameras, views) for part in hidden if part.mask.any()]
     height, width = cameras.size
@@ -129,16 +130,20 @@ def _with_seam(surfaces: Surfaces, cut: float, slope: float, width_px: int) -> S
     return replace(surfaces, mask=mask, disparity=disparity, colors=colors)
 
 
-def _moved_behind(surfaces: Surfaces, photo: FloatImage, step: float) -> Surfaces:
-    """Return surfaces of which none is seen from the centre: they are a step behind the photo's disparity (H, W)."""
-    (t, s), (height, width), disparity = surfaces.offset, image_size(photo), surfaces.disparity
-    padded = np.pad(photo, 1, mode="edge")
-    farthest = np.lib.stride_tricks.sliding_window_view(padded, (3, 3)).min(axis=(2, 3))
+def _least_around(image: FloatImage) -> FloatImage:
+    """Return the least value (H, W) of each pixel and its eight neighbours."""
+    windows = np.lib.stride_tricks.sliding_window_view(np.pad(image, 1, mode="edge"), (3, 3))
+    return np.asarray(windows.min(axis=(2, 3)))
+
+
+def _moved_behind(surfaces: Surfaces, seen: FloatImage, step: float) -> Surfaces:
+    """Return surfaces a step behind what is seen from the centre, disparities (H, W), where they would be in front."""
+    (t, s), (height, width), disparity = surfaces.offset, image_size(seen), surfaces.disparity
     y, x = np.arange(height)[:, None], np.arange(width)
     v, u = np.rint(y + disparity * t).astype(int), np.rint(x + disparity * s).astype(int)
     is_inside = (v >= 0) & (v < height) & (u >= 0) & (u < width)
-    shown = np.where(is_inside, farthest[np.clip(v, 0, height - 1), np.clip(u, 0, width - 1)], np.float32(np.inf))
-    return replace(surfaces, disparity=np.minimum(disparity, shown) - np.float32(step))
+    nearest = np.where(is_inside, seen[np.clip(v, 0, height - 1), np.clip(u, 0, width - 1)], np.float32(np.inf))
+    return replace(surfaces, disparity=np.minimum(disparity, nearest) - np.float32(step))
 
 
 def _own_size(source: ExportSource, colors: NDArray[np.uint8]) -> NDArray[np.uint8]:

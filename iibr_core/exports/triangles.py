@@ -16,10 +16,12 @@ from iibr_core.types import FloatImage
 
 MAX_ERROR_PX = 0.15
 """Largest error of triangles, in pixels of the outermost view and of the texture."""
+GREATEST_ERROR_PX = 2.0
+"""Error up to which it is raised where there are too many triangles."""
 BLOCK_PX = 64
 """Side of the largest triangles in pixels, a power of two."""
 MAX_TRIANGLES = 600_000
-"""Largest number of triangles of one map, unless its depth edges alone need more."""
+"""Number of triangles of one map above which errors are raised."""
 
 Mask = NDArray[np.bool_]
 
@@ -41,7 +43,7 @@ def triangulate(nearness: FloatImage, mask: Mask, joins: tuple[Mask, Mask], view
 
     nearness: (H, W), positive, the disparity beyond that of infinitely far points, in pixels per view step. mask: (H,
     W). joins: (H, W - 1) and (H - 1, W), whether a pixel and the next one, to the right or below, are on one surface.
-    views: view steps to the outermost view. The error is larger than MAX_ERROR_PX where MAX_TRIANGLES requires it.
+    views: view steps to the outermost view. More than MAX_TRIANGLES raise the error.
     """
     height, width = (-(-side // BLOCK_PX) * BLOCK_PX for side in mask.shape)
     padding = [(1, height + 1 - mask.shape[0]), (1, width + 1 - mask.shape[1])]
@@ -56,7 +58,7 @@ def triangulate(nearness: FloatImage, mask: Mask, joins: tuple[Mask, Mask], view
     is_cut = here.any(axis=0) & ~(here.all(axis=0) & (labels == 0).all(axis=0))
     errors = _errors(np.take_along_axis(heights, first, axis=0)[0], is_cut, views)
     triangles, error = _split(errors, MAX_ERROR_PX), MAX_ERROR_PX
-    while len(triangles) > MAX_TRIANGLES and error < max(mask.shape):
+    while len(triangles) > MAX_TRIANGLES and error < GREATEST_ERROR_PX:
         error *= 2
         triangles = _split(errors, error)
     return _with_vertices(triangles, covered[1:, 1:], labels, heights)
