@@ -137,7 +137,7 @@ def _least_around(image: FloatImage) -> FloatImage:
 
 
 def _moved_behind(surfaces: Surfaces, seen: FloatImage, step: float) -> Surfaces:
-    """Return surfaces a step behind what is seen from the centre, disparities (H, W), where they would be in front."""
+    """Return surfaces a step behind the disparity (H, W) seen from the centre, wherever they would be in front."""
     (t, s), (height, width), disparity = surfaces.offset, image_size(seen), surfaces.disparity
     y, x = np.arange(height)[:, None], np.arange(width)
     v, u = np.rint(y + disparity * t).astype(int), np.rint(x + disparity * s).astype(int)
