@@ -14,6 +14,8 @@ from iibr_core.scenes.lens_limits import focus_limits
 from iibr_core.scenes.light_fields import FROM_VIEWS
 from iibr_core.scenes.opening import results_of
 from iibr_core.scenes.scene import SceneReady, SceneRequest, Source, ViewReady
+from iibr_core.types import ViewOffset
+from tests.iibr_core.known_scenes import FOREGROUND, view_of_square
 from tests.viewer.conftest import reduce
 from viewer.model import lens, opening
 from viewer.model.action import do
@@ -61,6 +63,19 @@ def test_views_that_tell_nothing_are_shown_as_they_are(tmp_path) -> None:
     assert not last.scene.has_view_disparity
     assert any("too small" in note for note in last.scene.problems)
     assert len(views) == 6
+
+
+def test_large_views_are_matched_as_small_as_memory_asks_with_a_note(tmp_path, monkeypatch) -> None:
+    folder = tmp_path / "pair"
+    folder.mkdir()
+    for s in (0, 1):
+        pixels = np.rint(view_of_square(ViewOffset(0, 2 * s)) * 255).astype(np.uint8).repeat(5, 0).repeat(5, 1)
+        write_image_file(folder / f"v0_u{s}.png", pixels, "uint8")
+    monkeypatch.setattr("iibr_core.depth.multi_view.reduced.budget_bytes", lambda: 4 * 2**20)
+    request = SceneRequest(1, Source(str(folder)), takes_drafts=False)
+    ((ready, _),) = showings(results_of(request, lambda: CENTRE))
+    assert any(note.startswith("Found from views reduced to ") for note in ready.scene.notes)
+    assert ready.scene.disparity_range_px[1] == pytest.approx(10 * FOREGROUND, rel=0.2)
 
 
 def test_focus_that_is_set_while_it_loads_stays(tmp_path) -> None:
