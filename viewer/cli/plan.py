@@ -35,6 +35,7 @@ def plan(
 
 
 def _lines_of_photo(source: Source, depth_strength: float) -> list[str]:
+    """Return the name, size and source of depth of a photo, then the reasons of its plan."""
     from iibr_core.scenes.photo import load_photo, make_plan
 
     loaded = load_photo(source)
@@ -44,6 +45,7 @@ def _lines_of_photo(source: Source, depth_strength: float) -> list[str]:
 
 
 def _lines_of_views(source: Source) -> list[str]:
+    """Return the name, layout and source of disparity of a light field, then what is known about its views."""
     from iibr_core.formats.light_fields.light_field_formats import open_light_field
     from iibr_core.formats.light_fields.multi_view_scene import common_size
     from iibr_core.formats.light_fields.views import disparity_range
@@ -54,7 +56,7 @@ def _lines_of_views(source: Source) -> list[str]:
     size, file, count = common_size(field.views), source.depth.file, len(field.views)
     place, range_px = f"{count} views, which fill no regular grid", field.range_px
     if field.grid is not None:
-        place, range_px = "Views in {} rows and {} columns".format(*field.grid), disparity_range(field)
+        place, range_px = f"Views: {field.grid.columns} across, {field.grid.rows} down", disparity_range(field)
     if file is not None:
         values = read_disparity(Path(file), size, source.depth.file_scale or 1.0).values
         origin, range_px = Path(file).name, (float(values.min()), float(values.max()))

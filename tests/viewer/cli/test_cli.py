@@ -202,9 +202,9 @@ def test_plan_names_size_depth_and_reasons(iibr: Iibr, photo_path: Path) -> None
 @pytest.mark.parametrize(
     ("name", "layout", "views"),
     [
-        ("field", "grid folder, 3x3, 96x64", "3 rows and 3 columns"),
-        ("a_qs3x2a1.5 (1).png", "quilt, 3x2 views, 96x64", "1 rows and 6 columns"),
-        ("a_eslf.png", "lenslet image, 8x8 of 14x14 views, 12x8", "8 rows and 8 columns"),
+        ("field", "grid folder, 3x3, 96x64", "3 across, 3 down"),
+        ("a_qs3x2a1.5 (1).png", "quilt, 3x2 views, 96x64", "6 across, 1 down"),
+        ("a_eslf.png", "lenslet image, 8x8 of 14x14 views, 12x8", "8 across, 8 down"),
     ],
 )
 def test_plan_names_what_views_are_recognised_as(
@@ -221,7 +221,7 @@ def test_plan_names_what_views_are_recognised_as(
     first, *reasons = output_of(iibr("plan", path)).splitlines()
     origin = "the maps of 1 of 9 views" if name == "field" else "the views themselves, when they are opened"
     assert first.split(": ", 1)[1] == f"{layout} px a view, disparity from {origin}"
-    assert f"- Views in {views}." in reasons
+    assert f"- Views: {views}." in reasons
     assert ("- Disparity goes from 1.25 to 1.25 px per view step." in reasons) == (name == "field")
     assert "leave it out" in refusal_of(iibr("plan", path, "--grid", 5))
 
