@@ -54,7 +54,7 @@ def _lines_of_views(source: Source) -> list[str]:
 
     field = open_light_field(Path(source.path))
     size, file, count = common_size(field.views), source.depth.file, len(field.views)
-    place, range_px = f"{count} views, which fill no regular grid", field.range_px
+    place, range_px = f"{count} views, which fill no regular grid: only `iibr evaluate` reads them", field.range_px
     if field.grid is not None:
         place, range_px = f"Views: {field.grid.columns} across, {field.grid.rows} down", disparity_range(field)
     if file is not None:
@@ -63,7 +63,7 @@ def _lines_of_views(source: Source) -> list[str]:
     elif field.disparity:
         origin = f"the maps of {len(field.disparity)} of {count} views"
     else:
-        origin = "the views themselves, when they are opened"
+        origin = "the views themselves, when they are opened" if field.grid else "no map"
     lines = [f"{field.name}: {field.layout}, {size} px a view, disparity from {origin}", f"{place}."]
     if range_px is not None:
         lines.append("Disparity goes from {:.2f} to {:.2f} px per view step.".format(*range_px))

@@ -21,6 +21,7 @@ from iibr_core.inpainting.registry import INPAINTERS
 from iibr_core.types import TOTAL_PARALLAX, GridShape, ImageSize, ViewOffset
 from tests.forked_iibr import run_forked
 from tests.iibr_core import red_inpainter
+from tests.iibr_core.known_scenes import write_llff_row
 from tests.viewer.cli.conftest import Iibr, output_of, refusal_of
 from tests.viewer.conftest import HEIGHT, WIDTH
 from viewer.cli.main import app
@@ -224,6 +225,16 @@ def test_plan_names_what_views_are_recognised_as(
     assert f"- Views: {views}." in reasons
     assert ("- Disparity goes from 1.25 to 1.25 px per view step." in reasons) == (name == "field")
     assert "leave it out" in refusal_of(iibr("plan", path, "--grid", 5))
+
+
+def test_plan_says_where_views_fill_no_grid(iibr: Iibr, tmp_path: Path) -> None:
+    folder = write_llff_row(tmp_path / "row")
+    poses = np.load(folder / "poses_bounds.npy")
+    poses[1, 3] += 0.4  # its camera's place
+    np.save(folder / "poses_bounds.npy", poses)
+    first, second, *_ = output_of(iibr("plan", folder)).splitlines()
+    assert first.endswith("disparity from no map")
+    assert second == "- 3 views, which fill no regular grid: only `iibr evaluate` reads them."
 
 
 CASES = {"pair.jps": 1, "x.left-right.jpg": 1, "x.top-bottom.jpg": 0}
