@@ -18,7 +18,8 @@ import numpy as np
 
 from iibr_core.color import encoded_from_stored
 from iibr_core.depth.multi_view.all_views import estimate_all
-from iibr_core.depth.multi_view.estimate import estimate_coarse, sweep_bytes
+from iibr_core.depth.multi_view.estimate import sweep_bytes
+from iibr_core.depth.multi_view.settle import settle
 from iibr_core.formats.light_fields.multi_view_scene import MultiView
 from iibr_core.formats.light_fields.views import grid_of, read_views
 from iibr_core.inpainting.background import fill_background
@@ -68,12 +69,11 @@ def read_given_views(scene: MultiView) -> list[GivenView]:
         read.append(view)
         report_progress(len(read), math.prod(grid), "reading views")
     if any(view.disparity is None for view in read):
-        colors, offsets = [view.colors for view in read], [grid.offset(view.row, view.column) for view in read]
-        # The centre comes first.
-        range_px = estimate_coarse(colors, offsets, 0).range_px
+        settled = settle(replace(scene, numbers=()), read)
+        range_px = settled.coarse.range_px
         require_memory(sweep_bytes(size, range_px, float(max(grid) - 1)), f"{scene.name}: finding its disparity")
-        maps = estimate_all(colors, offsets, range_px)
-        read = [replace(view, disparity=values) for view, values in zip(read, maps)]
+        maps = estimate_all([view.colors for view in settled.views], settled.offsets, range_px)
+        read = [replace(view, disparity=values) for view, values in zip(settled.views, maps)]
     return [
         GivenView(view.row, view.column, view.colors, view.disparity) for view in read if view.disparity is not None
     ]

@@ -16,11 +16,10 @@ from iibr_core.formats.cameras import MAX_OFF_CENTRE_PX, FieldCameras, infinity_
 from iibr_core.formats.colmap import write_colmap
 from iibr_core.formats.images.write import write_image
 from iibr_core.formats.light_fields import write
-from iibr_core.formats.light_fields.light_field_formats import open_light_field
 from iibr_core.formats.light_fields.multi_view_scene import GridIndex
-from iibr_core.formats.light_fields.views import step_length
+from iibr_core.formats.light_fields.views import offsets_by_place
 from iibr_core.formats.outputs import write_folder
-from iibr_core.scenes.light_fields import find_range
+from iibr_core.scenes.light_fields import find_range, open_field
 from iibr_core.types import ImageSize, InputError, ViewOffset, ViewUpdate
 
 MAX_POINTS = 20_000
@@ -55,10 +54,7 @@ def cameras_of(source: ExportSource) -> FieldCameras:
 
 def _viewpoints(source: ExportSource) -> dict[GridIndex, ViewOffset]:
     """Return the viewpoints of a light field from disk in steps of its grid, from the centre view's."""
-    field = open_light_field(Path(source.scene.source.path))
-    offsets, step = {view.place: view.offset for view in field.views if view.place is not None}, step_length(field)
-    centre = offsets[source.scene.grid.centre]
-    return {at: ViewOffset((t - centre.t) / step, (s - centre.s) / step) for at, (t, s) in offsets.items()}
+    return offsets_by_place(open_field(source.field_source))
 
 
 def _given_infinity(source: ExportSource) -> float:
@@ -132,7 +128,7 @@ def _scale_of(source: ExportSource, focal_px: float) -> write.FieldScale:
     """Return infinity, range and, where metres are known, the baseline of a scene's views."""
     scene, metres = source.scene, nearest_metres(source)
     if scene.depth_source == "none":
-        return write.FieldScale(scene.infinity_px, find_range(open_light_field(Path(scene.source.path))))
+        return write.FieldScale(scene.infinity_px, find_range(source.field_source))
     scale = write.FieldScale(scene.infinity_px, scene.disparity_range_px)
     if metres is None or scene.infinity_px is None:
         return scale

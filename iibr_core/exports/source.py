@@ -18,7 +18,7 @@ from iibr_core.exports.kinds import ExportKind, ExportOptions, optics_of, with_d
 from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.formats.images.picture_kinds import AS_USUAL, PictureFormat
 from iibr_core.formats.images.write import write_picture
-from iibr_core.formats.light_fields.light_field_formats import open_light_field
+from iibr_core.formats.light_fields.light_field_formats import is_light_field
 from iibr_core.method.plan import ScenePlan
 from iibr_core.runtime.work import raise_if_stopped, report_progress
 from iibr_core.scenes.lens_limits import LensChoice
@@ -100,14 +100,19 @@ class ExportSource:
     def _views_of_folder(self, with_disparity: bool) -> Iterator[ViewUpdate]:
         """Return the views from disk, with found disparity if the scene has it."""
         from iibr_core.formats.light_fields.views import read_views
-        from iibr_core.scenes.light_fields import load_light_field
+        from iibr_core.scenes.light_fields import load_light_field, open_field
 
         is_as_read = self.scene.plan is None and self.scene.depth_source in ("none", "light field")
         if is_as_read and not with_disparity:
-            return read_views(open_light_field(Path(self.scene.source.path)))[1]
+            return read_views(open_field(self.field_source))[1]
         centre = self._final_centre
         known = None if centre is None else centre.disparity
-        return next(load_light_field(self.scene.source, takes_drafts=False, known=known)).views
+        return next(load_light_field(self.field_source, takes_drafts=False, known=known)).views
+
+    @property
+    def field_source(self) -> Source:
+        """The source of a light field from disk, with the order of its views as it was found."""
+        return replace(self.scene.source, arrangement=self.scene.arrangement)
 
     @property
     def _final_centre(self) -> ViewUpdate | None:
@@ -166,10 +171,12 @@ def open_for_export(
     if kind.is_drawn:
         assert open_drawn is not None
         return open_drawn(source, depth_strength, lens, on_ready, partial(optics_of, kind, options))
+    from iibr_core.scenes.light_fields import is_order_known
     from iibr_core.scenes.opening import results_of
 
-    # A light field from disk is copied without waiting for its disparity.
-    request = SceneRequest(0, source, depth_strength, takes_drafts=kind.is_light_field)
+    # A light field from disk is copied without waiting for its disparity, unless that shows the order of its views.
+    is_copied = kind.is_light_field and not (is_light_field(Path(source.path)) and not is_order_known(source))
+    request = SceneRequest(0, source, depth_strength, takes_drafts=is_copied)
     ready = next(results_of(request, lambda: CENTRE))
     assert isinstance(ready, SceneReady)
     on_ready(ready.scene)

@@ -16,7 +16,7 @@ from iibr_core.depth.choice import DepthChoice, DepthStart
 from iibr_core.depth.guess import guess_depth
 from iibr_core.depth.models.catalog import model_to_use
 from iibr_core.formats.images.photo import DEFAULT_MAX_PIXELS, focal_px_from_fov, read_photo
-from iibr_core.formats.light_fields.light_field_formats import is_light_field, open_light_field
+from iibr_core.formats.light_fields.light_field_formats import is_light_field
 from iibr_core.formats.light_fields.multi_view_scene import MultiView
 from iibr_core.formats.light_fields.views import grid_of, read_stored_view, read_views
 from iibr_core.formats.maps.disparity_file import map_at_size
@@ -34,7 +34,7 @@ from iibr_core.runtime.work import (
     stoppable,
     watched,
 )
-from iibr_core.scenes.light_fields import READING, read_dense
+from iibr_core.scenes.light_fields import READING, open_settled, read_dense
 from iibr_core.scenes.photo import load_photo, make_plan, photo_of_arrays, views_of_photo
 from iibr_core.scenes.scene import MAKING, LoadedPhoto, Source
 from iibr_core.types import Disparity, FloatImage, GridShape, InputError, Photo
@@ -201,7 +201,7 @@ def open(
     """
     path = Path(path)
     if is_light_field(path):
-        return FieldScene(open_light_field(path))
+        return FieldScene(open_settled(Source(str(path)))[0])
     source = Source(str(path), _choice_of(depth, refine), max_pixels=max_pixels)
     with stoppable(should_stop), watched(report_progress):
         return PhotoScene(load_photo(source), source)

@@ -10,31 +10,34 @@ from itertools import chain
 from pathlib import Path
 
 from iibr_core.beyond.between_views import GivenView, densify, read_given_views, require_steps
-from iibr_core.color import encoded_from_stored
+from iibr_core.depth.multi_view.all_views import carry
 from iibr_core.depth.multi_view.estimate import estimate_coarse
 from iibr_core.depth.multi_view.matching import FINDING
 from iibr_core.depth.multi_view.reduced import estimate_within_memory
+from iibr_core.depth.multi_view.settle import Settled, confirm, settle
 from iibr_core.depth.stereo_pair import MATCHED_PIXELS
 from iibr_core.depth.subject import subject_disparity
-from iibr_core.formats.images.photo import focal_px_from_fov
 from iibr_core.formats.light_fields.light_field_formats import open_light_field
 from iibr_core.formats.light_fields.multi_view_scene import MultiView
-from iibr_core.formats.light_fields.views import disparity_range, grid_of, read_views, step_length
+from iibr_core.formats.light_fields.order import UNKNOWN, arranged, possible_arrangements
+from iibr_core.formats.light_fields.views import (
+    disparity_range,
+    grid_of,
+    offsets_by_place,
+    read_views,
+    step_length,
+    view_offsets,
+)
 from iibr_core.formats.maps.disparity_file import read_disparity
 from iibr_core.inpainting.registry import load_inpainter
-from iibr_core.method.light_field import generate
 from iibr_core.method.memory import require_memory, view_bytes
-from iibr_core.method.plan import plan_literal
-from iibr_core.runtime.work import report_progress
+from iibr_core.runtime.work import Cancelled, report_progress
 from iibr_core.scenes.scene import Scene, Source
 from iibr_core.types import (
-    Disparity,
     FloatImage,
     GridShape,
     ImageSize,
     InputError,
-    Photo,
-    StoredColors,
     ViewOffset,
     ViewUpdate,
     image_size,
@@ -64,7 +67,7 @@ def load_light_field(source: Source, takes_drafts: bool, known: FloatImage | Non
     the field comes once, when all is known. known: disparity of the centre view that was found before. The views of a
     field must be taken before the next field is asked for.
     """
-    field = open_light_field(Path(source.path))
+    field = open_field(source)
     grid, (size, views) = grid_of(field), read_views(field)
     _require_field(field.name, size, grid)
     given, map_file = known, source.depth.file
@@ -82,41 +85,85 @@ def load_light_field(source: Source, takes_drafts: bool, known: FloatImage | Non
         for view in chain((centre,), views):
             read.append(view)
             report_progress(len(read), math.prod(grid), READING)
-    if given is not None:
-        origin = Path(map_file).name if map_file else FROM_VIEWS
-        yield _with_disparity(scene, read, given, origin)
-    elif centre.disparity is not None:
-        yield _with_disparity(scene, read, centre.disparity, scene.depth_source)
-    else:
-        yield from _with_found_disparity(scene, read, takes_drafts)
+    if given is None and centre.disparity is None:
+        yield from _with_found_disparity(scene, field, read, takes_drafts)
+        return
+    origin = scene.depth_source if given is None else Path(map_file).name if map_file else FROM_VIEWS
+    values = centre.disparity if given is None else given
+    assert values is not None
+    yield _with_disparity(scene, read, _offsets_of(field, read), values, origin)
 
 
-def find_disparity(field: MultiView) -> tuple[FloatImage, tuple[str, ...]]:
-    """Return the disparity (H, W) of the centre view, of a pair that of the left one, in pixels per view step, and
-    notes.
+def _offsets_of(field: MultiView, views: Sequence[ViewUpdate]) -> list[ViewOffset]:
+    """Return the viewpoints of views from the first of them, in steps of the grid."""
+    offsets = offsets_by_place(field)
+    t, s = offsets[views[0].row, views[0].column]
+    return [ViewOffset(at.t - t, at.s - s) for at in (offsets[view.row, view.column] for view in views)]
+
+
+def open_field(source: Source) -> MultiView:
+    """Return the light field of a source, in the order that is known of it."""
+    field, given = open_light_field(Path(source.path)), source.arrangement
+    possible = [] if given == UNKNOWN else possible_arrangements(field, given)
+    if possible and (given.is_complete or field.disparity or source.depth.file):
+        return arranged(field, replace(given, order=possible[0].order, grid=possible[0].grid))
+    return field
+
+
+def is_order_known(source: Source) -> bool:
+    """Return whether the order of a light field's views needs no test: names, files or the user are sure of it."""
+    field = open_light_field(Path(source.path))
+    return bool(source.arrangement.is_complete or field.disparity or not field.numbers)
+
+
+def open_settled(source: Source) -> tuple[MultiView, tuple[str, ...]]:
+    """Return a light field in its right order, found from its views where it is not known, and notes."""
+    if is_order_known(source):
+        field = open_field(source)
+        return field, field.notes
+    field = open_light_field(Path(source.path))
+    settled = settle(field, _read_all(field), source.arrangement)
+    return settled.field, settled.notes
+
+
+def find_disparity(source: Source) -> tuple[str, FloatImage, tuple[str, ...]]:
+    """Return the name of a light field, the disparity (H, W) of its centre view in pixels per view step, and notes.
+
+    Of a pair it is that of the left view.
     """
-    colors, offsets = _read_for_matching(field)
+    field = open_light_field(Path(source.path))
+    read = _read_all(field)
     report_progress(0, 0, FINDING)
-    coarse = estimate_coarse(colors, offsets, 0)
-    max_pixels = MATCHED_PIXELS if field.place.is_file() and len(colors) == 2 else None
-    values, note = estimate_within_memory(colors, offsets, 0, coarse.range_px, max_pixels)
-    return values, (note,) if note else ()
+    settled, values, note = _with_disparity_of(settle(field, read, source.arrangement, is_left=True))
+    return field.name, values, (*settled.notes, *note)
 
 
-def find_range(field: MultiView) -> tuple[float, float] | None:
+def find_range(source: Source) -> tuple[float, float] | None:
     """Return about the least and greatest disparity, in pixels per view step; None if none can be found."""
+    field = open_field(source)
     with suppress(InputError):
-        values = estimate_coarse(*_read_for_matching(field), 0).values
+        colors = {(view.row, view.column): view.colors for view in _read_all(field)}
+        views = [colors[view.place] for view in field.views if view.place is not None]
+        values = estimate_coarse(views, view_offsets(field), field.centre).values
         return float(values.min()), float(values.max())
     return None
 
 
-def _read_for_matching(field: MultiView) -> tuple[list[StoredColors], list[ViewOffset]]:
-    """Return the colours and viewpoints of all views, the centre first, of a pair the left one."""
+def _read_all(field: MultiView) -> list[ViewUpdate]:
     grid, (size, views) = grid_of(field), read_views(field)
     _require_field(field.name, size, grid)
-    read = sorted(views, key=lambda view: (view.row, view.column) != field.views[field.centre].place)
-    return [view.colors for view in read], [grid.offset(view.row, view.column) for view in read]
+    return list(views)
+
+
+def _with_disparity_of(settled: Settled) -> tuple[Settled, FloatImage, tuple[str, ...]]:
+    """Return a light field, which may prove to be seen from behind, the disparity (H, W) of its centre, and notes."""
+    colors, is_pair = [view.colors for view in settled.views], len(settled.views) == 2
+    max_pixels = MATCHED_PIXELS if is_pair and settled.field.place.is_file() else None
+    values, note = estimate_within_memory(colors, settled.offsets, 0, settled.coarse.range_px, max_pixels)
+    confirmed = confirm(settled, values)
+    if confirmed.arrangement != settled.arrangement:
+        return _with_disparity_of(confirmed)
+    return confirmed, values, (note,) if note else ()
 
 
 def read_dense(
@@ -132,25 +179,45 @@ def read_dense(
     return given, steps, densify(given, sparse, grid, inpainter)
 
 
-def _with_found_disparity(scene: Scene, views: Sequence[ViewUpdate], takes_drafts: bool) -> Iterator[LoadedField]:
-    """Yield the field with disparity found from its views; without any, and with a note, if they are too small."""
-    colors, offsets = [view.colors for view in views], [scene.grid.offset(view.row, view.column) for view in views]
+def _with_found_disparity(
+    scene: Scene, field: MultiView, views: Sequence[ViewUpdate], takes_drafts: bool
+) -> Iterator[LoadedField]:
+    """Yield the field with disparity found from its views, in the order that they show.
+
+    It comes without disparity, and with a note, if no order fits or the views are too small.
+    """
     report_progress(0, 0, FINDING)
     try:
-        coarse = estimate_coarse(colors, offsets, 0)
+        settled = settle(field, views, scene.source.arrangement)
     except InputError as error:
-        scene = replace(scene, notes=(*scene.notes, f"{error}."), problems=(f"{error}.",))
-        yield LoadedField(scene, iter(views))
+        if field.is_guess:
+            raise
+        yield LoadedField(_with_problem(scene, error), iter(views))
         return
     if takes_drafts:
-        yield _with_disparity(scene, views, coarse.values, FROM_VIEWS, is_final=False)
-    values, note = estimate_within_memory(colors, offsets, 0, coarse.range_px)
-    scene = replace(scene, notes=(*scene.notes, note)) if note else scene
-    yield _with_disparity(scene, views, values, FROM_VIEWS)
+        draft = _settled_scene(scene, settled)
+        yield _with_disparity(draft, settled.views, settled.offsets, settled.coarse.values, FROM_VIEWS, is_final=False)
+    settled, values, note = _with_disparity_of(settled)
+    final = _settled_scene(scene, settled)
+    final = replace(final, notes=(*final.notes, *note))
+    yield _with_disparity(final, settled.views, settled.offsets, values, FROM_VIEWS)
+
+
+def _settled_scene(scene: Scene, settled: Settled) -> Scene:
+    return replace(scene, arrangement=settled.arrangement, grid=grid_of(settled.field), notes=settled.notes)
+
+
+def _with_problem(scene: Scene, error: InputError) -> Scene:
+    return replace(scene, notes=(*scene.notes, f"{error}."), problems=(f"{error}.",))
 
 
 def _with_disparity(
-    scene: Scene, views: Sequence[ViewUpdate], values: FloatImage, origin: str, is_final: bool = True
+    scene: Scene,
+    views: Sequence[ViewUpdate],
+    offsets: Sequence[ViewOffset],
+    values: FloatImage,
+    origin: str,
+    is_final: bool = True,
 ) -> LoadedField:
     """Return the field with the disparity (H, W) of its centre view, carried to the others."""
     scene = replace(
@@ -160,17 +227,16 @@ def _with_disparity(
         has_view_disparity=True,
         subject_disparity_px=subject_disparity(values),
     )
-    return LoadedField(scene, _carried(views, values, scene.grid, is_final))
+    return LoadedField(scene, _carried(views, offsets, values, is_final))
 
 
-def _carried(views: Sequence[ViewUpdate], values: FloatImage, grid: GridShape, is_final: bool) -> Iterator[ViewUpdate]:
-    """Yield the views with the disparity of the centre view, the first, warped to each of them."""
-    colors = {(view.row, view.column): view.colors for view in views}
-    centre = encoded_from_stored(views[0].colors)
-    photo = Photo(centre, focal_px_from_fov(centre.shape[1]), "the centre view")
-    disparity = Disparity(values, "the centre view")
-    for made in generate(photo, disparity, plan_literal(photo, disparity, grid)):
-        yield replace(made, colors=colors[made.row, made.column], inpainted=None, is_final=is_final)
+def _carried(
+    views: Sequence[ViewUpdate], offsets: Sequence[ViewOffset], values: FloatImage, is_final: bool
+) -> Iterator[ViewUpdate]:
+    """Yield the views with the disparity of the centre view, the first, carried to each of them."""
+    with suppress(Cancelled):
+        for index, disparity in carry(values, [view.colors for view in views], offsets):
+            yield replace(views[index], disparity=disparity, is_final=is_final)
 
 
 def _scene_as_read(source: Source, field: MultiView, centre: ViewUpdate, range_px: tuple[float, float] | None) -> Scene:
@@ -184,6 +250,7 @@ def _scene_as_read(source: Source, field: MultiView, centre: ViewUpdate, range_p
         disparity_range_px=range_px or UNKNOWN_DISPARITY_RANGE_PX,
         depth_source="light field" if centre.disparity is not None else "none",
         is_hdr=field.is_hdr,
+        arrangement=source.arrangement,
         notes=field.notes,
         focal_px=field.focal_px,
         infinity_px=None if field.infinity_px is None else field.infinity_px * step_length(field),

@@ -9,6 +9,7 @@ import numpy as np
 
 from iibr_core.depth.choice import DepthChoice, DepthOrigin, DepthStart
 from iibr_core.depth.editing.edits import UNEDITED, DepthEdits, Levels
+from iibr_core.formats.light_fields.order import UNKNOWN, Arrangement
 from iibr_core.inpainting.registry import DEFAULT_INPAINTER
 from iibr_core.method.plan import ScenePlan
 from iibr_core.scenes.screen_size import ScreenSize
@@ -28,7 +29,8 @@ class Source:
 
     path: a photo or a light-field folder. focus_disparity: plane that does not move, in the units of the given
     disparity. inpaint: way of filling hidden surfaces, see `load_inpainter`. is_literal: whether the given disparity
-    is px per step of the grid, instead of the plan's parallax. grid: views of a photo.
+    is px per step of the grid, instead of the plan's parallax. grid: views of a photo. arrangement: order of the views
+    of a light field.
     """
 
     path: str
@@ -38,11 +40,12 @@ class Source:
     max_pixels: int | None = None
     inpaint: str = DEFAULT_INPAINTER
     is_literal: bool = False
+    arrangement: Arrangement = UNKNOWN
 
 
 def source_beside(source: Source | None, path: str) -> Source:
     """Return the source of another file, with the decisions about this one but its depth map."""
-    return _with_depth(replace(source or Source(""), path=path), file=None)
+    return _with_depth(replace(source or Source(""), path=path, arrangement=UNKNOWN), file=None)
 
 
 def source_with_map(source: Source, path: str) -> Source:
@@ -76,7 +79,7 @@ class Scene:
     for light fields.
     infinity_px: field disparity of infinitely far points, None where a light field does not state it. is_sketch:
     whether it is a small picture that is shown while the photo is read. found_span_px: range of the field disparity
-    before edits, None if it cannot be edited.
+    before edits, None if it cannot be edited. arrangement: order of the views of a light field, as far as it was found.
     """
 
     source: Source
@@ -103,6 +106,7 @@ class Scene:
     is_sketch: bool = False
     infinity_px: float | None = None
     found_span_px: float | None = None
+    arrangement: Arrangement = UNKNOWN
 
     @property
     def is_guessed(self) -> bool:

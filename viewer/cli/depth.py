@@ -7,12 +7,23 @@ from typing import Annotated
 
 import typer
 
-from iibr_core.formats.light_fields.light_field_formats import find_light_field, open_light_field
+from iibr_core.formats.light_fields.light_field_formats import find_light_field
+from iibr_core.formats.light_fields.order import Arrangement
 from iibr_core.formats.outputs import check_output
 from iibr_core.scenes.scene import Source
 from viewer.cli.messages import print_notes, show_progress
 from viewer.cli.option_records import output_option, with_option_records
-from viewer.cli.options import DepthOptions, Force, inputs_of_command, require_heeded, require_model
+from viewer.cli.options import (
+    DepthOptions,
+    Force,
+    Grid,
+    ViewFlip,
+    ViewOrder,
+    inputs_of_command,
+    require_heeded,
+    require_model,
+    with_arrangement,
+)
 
 
 @with_option_records
@@ -21,6 +32,9 @@ def depth(
     path: Annotated[Path, typer.Argument(metavar="PATH", help="A light field, a stereo photo, or any photo.")],
     output: Annotated[Path, output_option("Map to write: PFM, EXR, NPY or PNG.")],
     options: DepthOptions,
+    order: ViewOrder = None,
+    grid: Grid = None,
+    flip: ViewFlip = None,
     force: Force = False,
 ) -> None:
     """Write the disparity of the centre view, in pixels per view step; of a stereo photo, that of the left view.
@@ -30,7 +44,7 @@ def depth(
 
     Example: iibr depth photo.jpg -o photo_disparity.png
     """
-    source = Source(str(path), options.choice)
+    source = with_arrangement(Source(str(path), options.choice), Arrangement(order, grid, flip))
     require_heeded(context, path)
     check_output(output, inputs_of_command(context, source), force)
     require_model(source.depth)
@@ -46,8 +60,7 @@ def depth(
             name, origin = loaded.photo.name, loaded.origin
             values, notes = loaded.disparity.values, loaded.disparity.notes
         else:
-            field = open_light_field(path)
-            name, (values, notes) = field.name, find_disparity(field)
+            name, values, notes = find_disparity(source)
     note = write_map(output, values)
     print(f"{name}: disparity {values.min():.2f} to {values.max():.2f} px per view step: {output}")
     print_notes(*notes, note, origin=origin)

@@ -83,7 +83,8 @@ def generate(
         is_dense = is_light_field(path)
         if is_dense:
             options.require_heeded(context, path, NOT_FOR_DENSE_FIELDS)
-        source = scene.source(path, grid, is_literal=scene.disparity is not None if literal is None else literal)
+        is_literal = not is_dense and (scene.disparity is not None if literal is None else literal)
+        source = scene.source(path, None if is_dense else grid, is_literal=is_literal)
         check_light_field(output, format, options.inputs_of_command(context, source), force)
         write_views = partial(write_light_field, output, format, grid, with_disparity=with_disparity)
         write = (

@@ -14,6 +14,7 @@ import typer
 from iibr_core.beyond.optics import Optics
 from iibr_core.depth.choice import DepthChoice, DepthStart
 from iibr_core.formats.light_fields.light_field_formats import is_light_field
+from iibr_core.formats.light_fields.order import Arrangement, Flip, Order
 from iibr_core.gloss.settings import Gloss
 from iibr_core.inpainting.registry import DEFAULT_INPAINTER, INPAINTER_FORMS, require_inpainter
 from iibr_core.scenes.inputs import inputs_of
@@ -23,7 +24,7 @@ from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, InputError, ViewOffset
 from viewer.cli.option_records import flag, option
 
-MAX_GRID = 99
+MAX_GRID = 999
 """Largest number of views in a row or column."""
 MAX_SIDE_PX = 16384
 
@@ -87,7 +88,13 @@ SCENE = "A photo, a stereo photo, or a light field: a folder of views, a quilt, 
 ScenePath = Annotated[Path, typer.Argument(metavar="PATH", help=SCENE)]
 Force = Annotated[bool, flag("--force", "Replace an existing output. Inputs are never replaced.")]
 Grid = Annotated[
-    GridShape | None, option("Grid of views: 9 is 9x9.", "N|RxC", "chosen by the plan", parser=grid_from_text)
+    GridShape | None,
+    option(
+        "Grid of views, rows x columns: 9 is 9x9. Of a light field, that of its files.",
+        "N|RxC",
+        "chosen by the plan, or found from the files",
+        parser=grid_from_text,
+    ),
 ]
 FocusDisparity = Annotated[
     float | None, option("Disparity, as given, of the plane that stays still.", "X", parser=number_from_text)
@@ -105,6 +112,22 @@ DepthModel = Annotated[
 ]
 Refine = Annotated[Literal["on", "off"], option("Move edges of the disparity to edges of the photo.")]
 MaxPixels = Annotated[int | None, option("Reduce larger photos to this number of pixels.", "N", "2 million", min=1)]
+
+
+ViewOrder = Annotated[
+    Order | None,
+    option(
+        "Order in which names count the views of a light field: row by row (or the row first), column by column, or"
+        " every other one backwards.",
+        default="found from the views",
+    ),
+]
+ViewFlip = Annotated[
+    Flip | None,
+    option(
+        "Axes along which names count from right to left (x) or from bottom to top (y).", default="found from the views"
+    ),
+]
 
 
 @dataclass(frozen=True)
@@ -176,6 +199,8 @@ class SceneOptions(PhotoOptions):
     disparity_scale: Annotated[
         float | None, option("Factor from the map's values to px per view step; -1: black is near.", "X")
     ] = None
+    order: ViewOrder = None
+    flip: ViewFlip = None
 
     @property
     def choice(self) -> DepthChoice:
@@ -184,6 +209,25 @@ class SceneOptions(PhotoOptions):
             raise InputError("--disparity gives the depth: leave out --depth and --depth-model")
         file = None if self.disparity is None else str(self.disparity)
         return replace(super().choice, file=file, file_scale=self.disparity_scale)
+
+    def source(
+        self, path: Path | str, grid: GridShape | None, focus_disparity: float | None = None, is_literal: bool = False
+    ) -> Source:
+        """Return the source to open; the grid of a light field is that of its views. See `PhotoOptions.source`."""
+        source = super().source(path, grid, focus_disparity, is_literal)
+        return with_arrangement(source, Arrangement(self.order, grid, self.flip))
+
+
+def with_arrangement(source: Source, arrangement: Arrangement) -> Source:
+    """Return the source of a light field with this order of its views; of a photo, unchanged.
+
+    Raises InputError if an order is given for a photo.
+    """
+    if is_light_field(Path(source.path)):
+        return replace(source, arrangement=arrangement, grid=None)
+    if arrangement.order or arrangement.flip:
+        raise InputError(f"--order and --flip are for light fields, which {source.path} is not; leave them out")
+    return source
 
 
 GlossFile = Annotated[
@@ -245,7 +289,7 @@ def gloss_of(path: Path | None) -> Gloss | None:
     return read_gloss(path)
 
 
-NOT_FOR_LIGHT_FIELDS = {field.name for field in fields(PhotoOptions)} | {"focus_disparity", "grid"}
+NOT_FOR_LIGHT_FIELDS = {field.name for field in fields(PhotoOptions)} | {"focus_disparity"}
 """Options about how views are made: a light field brings its views. The disparity of its centre view may be given."""
 
 

@@ -46,13 +46,13 @@ def _lines_of_photo(source: Source, depth_strength: float) -> list[str]:
 
 def _lines_of_views(source: Source) -> list[str]:
     """Return the name, layout and source of disparity of a light field, then what is known about its views."""
-    from iibr_core.formats.light_fields.light_field_formats import open_light_field
     from iibr_core.formats.light_fields.multi_view_scene import common_size
     from iibr_core.formats.light_fields.views import disparity_range
     from iibr_core.formats.maps.disparity_file import read_disparity
     from iibr_core.method.memory import mebibytes, view_bytes
+    from iibr_core.scenes.light_fields import open_settled
 
-    field = open_light_field(Path(source.path))
+    field, notes = open_settled(source)
     size, file, count = common_size(field.views), source.depth.file, len(field.views)
     place, range_px = f"{count} views, which fill no regular grid: only `iibr evaluate` reads them", field.range_px
     if field.grid is not None:
@@ -68,4 +68,4 @@ def _lines_of_views(source: Source) -> list[str]:
     if range_px is not None:
         lines.append("Disparity goes from {:.2f} to {:.2f} px per view step.".format(*range_px))
     memory = mebibytes(view_bytes(math.prod(size) * count, field.is_hdr))
-    return [*lines, f"Memory: {memory} for the views.", *field.notes]
+    return [*lines, f"Memory: {memory} for the views.", *notes]

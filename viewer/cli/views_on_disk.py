@@ -12,7 +12,6 @@ from iibr_core.beyond.free_cameras import FreeViews, depths_of, fitted_cameras, 
 from iibr_core.color import photo_in_srgb
 from iibr_core.depth.choice import DepthOrigin
 from iibr_core.formats.images.write import write_image
-from iibr_core.formats.light_fields.light_field_formats import open_light_field
 from iibr_core.formats.light_fields.views import step_length
 from iibr_core.formats.light_fields.write import FieldScale
 from iibr_core.formats.outputs import write_folder
@@ -23,7 +22,7 @@ from iibr_core.method.light_field import encode_for_storage
 from iibr_core.method.memory import MAKING_BYTES, require_memory
 from iibr_core.runtime.work import report_progress
 from iibr_core.scenes import photo as photos
-from iibr_core.scenes.light_fields import read_dense
+from iibr_core.scenes.light_fields import open_settled, read_dense
 from iibr_core.scenes.opening import scene_of_photo
 from iibr_core.scenes.scene import MAKING, LoadedPhoto, Source
 from iibr_core.scenes.scene_gloss import add_gloss
@@ -68,7 +67,7 @@ def write_field(source: Source, write: WriteField, depth_strength: float, gloss:
 
 def write_dense_field(source: Source, grid: GridShape, write: WriteField) -> Written:
     """Write the views of a light field and those between them. Raises InputError."""
-    field = open_light_field(Path(source.path))
+    field, notes = open_settled(source)
     given, steps, all_views = read_dense(field, grid, source.inpaint)
     size = image_size(given[0].colors)
     count = math.prod(grid)
@@ -76,7 +75,7 @@ def write_dense_field(source: Source, grid: GridShape, write: WriteField) -> Wri
         infinity_px = None if field.infinity_px is None else field.infinity_px * step_length(field) / steps
         scale = FieldScale(infinity_px)
         write(_reported(views, count), focal_px=field.focal_px or float(size.width), name=field.name, scale=scale)
-    return Written(f"{count} views of {size}", field.notes)
+    return Written(f"{count} views of {size}", notes)
 
 
 def write_free_views(source: Source, poses: Path, photo_pose: int | None, is_literal: bool, folder: Path) -> Written:

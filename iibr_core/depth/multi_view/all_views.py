@@ -8,7 +8,7 @@ other map confirms, or that more maps contradict than confirm, are filled by sim
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from math import hypot
 
 import numpy as np
@@ -20,6 +20,7 @@ from iibr_core.depth.multi_view.refinement import refine_by_gradients
 from iibr_core.inpainting.disparity_by_color import fill_disparity_by_color
 from iibr_core.method.rays import rays_of_photo
 from iibr_core.method.view import Renderer
+from iibr_core.runtime.tiling import side_by_side
 from iibr_core.runtime.work import part_of_job, report_progress
 from iibr_core.types import FloatImage, StoredColors, ViewOffset, image_size
 
@@ -73,6 +74,27 @@ def reconcile(
         reconciled.append(values)
         report_progress(len(reconciled), len(maps), FINDING)
     return reconciled
+
+
+def carry(
+    values: FloatImage, views: Sequence[StoredColors], offsets: Sequence[ViewOffset]
+) -> Iterator[tuple[int, FloatImage]]:
+    """Yield the index of each view and the disparity (H, W) that the map of the first one shows in it.
+
+    offsets: viewpoints from the first view. Holes are filled by similar colours around them.
+    """
+    farthest = max(abs(step) for offset in offsets for step in offset)
+    rays = rays_of_photo(encoded_from_stored(views[0]), values, farthest, 0)
+
+    def carry_to(index: int) -> tuple[int, FloatImage]:
+        if index == 0:
+            return index, values
+        view, _ = Renderer().visible(rays, offsets[index])
+        known = np.where(view.occluded, np.float32(np.nan), view.disparity)
+        is_known = not np.isnan(known).all()
+        return index, fill_disparity_by_color(encoded_from_stored(views[index]), known) if is_known else values
+
+    yield from side_by_side(carry_to, range(len(views)))
 
 
 def _warp(

@@ -16,13 +16,12 @@ from threading import Lock
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.color import encoded_from_stored
 from iibr_core.depth.guided_filter import GuidedFilter
 from iibr_core.runtime import tiling
 from iibr_core.runtime.kernels import kernel
 from iibr_core.runtime.tiling import in_pieces
 from iibr_core.runtime.work import report_progress
-from iibr_core.types import FloatImage, InputError, StoredColors, ViewOffset
+from iibr_core.types import FloatImage, InputError, StoredColors, ViewOffset, image_size
 
 FINDING = "finding disparity"
 STEP_PX = 0.5
@@ -35,6 +34,8 @@ LUMA_SHARE = 0.1
 """Share of the luma that is kept beside its texture, for surfaces without texture."""
 WINDOW_RADIUS_PX, WINDOW_SMOOTHNESS = 2, 1e-5
 """Guided filter that averages costs."""
+SAME_LINE = 0.3
+"""Largest distance of views of one row or column along it, in the widest distances of neighbouring views."""
 MAX_DIFFERENCE = 0.03
 """Difference of texture (1 = white) that costs most: larger ones cost the same."""
 HIDDEN_FACTOR = 1.5
@@ -89,23 +90,33 @@ def choose_views(offsets: Sequence[ViewOffset], reference: int) -> list[int]:
 
     All views count if fewer than eight are on the rays. Of too many views, those at even distances are taken.
     """
-
-    def away(index: int) -> tuple[float, float]:
-        return offsets[index].t - offsets[reference].t, offsets[index].s - offsets[reference].s
-
-    others = sorted(set(range(len(offsets))) - {reference}, key=lambda index: hypot(*away(index)))
-    on_rays = [index for index in others if 0 in away(index) or len(set(map(abs, away(index)))) == 1]
+    lines = np.stack([_line_numbers(axis) for axis in np.array(offsets, float).T], axis=1)
+    steps, away = np.abs(lines - lines[reference]), np.array(offsets, float) - offsets[reference]
+    others = sorted(set(range(len(offsets))) - {reference}, key=lambda index: hypot(*away[index]))
+    on_rays = [index for index in others if 0 in steps[index] or steps[index, 0] == steps[index, 1]]
     chosen = on_rays if len(on_rays) >= min(8, len(others)) else others
     kept = np.linspace(0, len(chosen) - 1, min(len(chosen), MAX_VIEWS)).round().astype(int)
     return [reference, *(chosen[index] for index in kept)]
 
 
+def _line_numbers(values: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Return the number of the row or column of each view (N,) along an axis; cameras may stand a little off it."""
+    order = np.argsort(values)
+    gaps = np.diff(values[order], prepend=values[order[0]])
+    numbers = np.empty(len(values), np.int64)
+    numbers[order] = np.cumsum(gaps > SAME_LINE * gaps.max())
+    return numbers
+
+
 def luma_of(colors: StoredColors, shrink: int = 1) -> FloatImage:
     """Return the mean of the channels of a view (H, W, 3), 0 .. 1, over squares of `shrink` pixels."""
-    luma = np.clip(np.nan_to_num(encoded_from_stored(colors), nan=0.0, posinf=1.0, neginf=0.0), 0, 1).mean(axis=-1)
-    rows, columns = (length // shrink for length in luma.shape)
-    squares = luma[: rows * shrink, : columns * shrink].reshape(rows, shrink, columns, shrink)
-    return np.ascontiguousarray(squares.mean(axis=(1, 3)), np.float32)
+    height, width = (length // shrink for length in image_size(colors))
+    is_hdr, sums, values = colors.dtype != np.uint8, np.zeros((height, width), np.float32), colors.astype(np.float32)
+    if is_hdr:
+        values = np.clip(np.nan_to_num(values, nan=0.0, posinf=1.0, neginf=0.0), 0, 1)
+    for y, x, channel in np.ndindex(shrink, shrink, colors.shape[2]):
+        sums += values[y::shrink, x::shrink, channel][:height, :width]
+    return sums / np.float32((1 if is_hdr else 255) * shrink**2 * colors.shape[2])
 
 
 def sweep(views: MatchingViews, disparities: NDArray[np.float32]) -> NDArray[np.uint8]:

@@ -10,6 +10,7 @@ distance of neighbours.
 """
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -27,7 +28,7 @@ from iibr_core.formats.light_fields.multi_view_scene import (
 from iibr_core.types import InputError, ViewOffset
 
 NUMBER = r"[-+]?\d{1,9}(?:\.\d{0,12})?"
-STANFORD_NAME = re.compile(rf"(?:.*_)?(\d{{1,3}})_(\d{{1,3}})_({NUMBER})_({NUMBER})_?$")
+STANFORD_NAME = re.compile(rf"(?:.*_)?(\d{{1,3}})_+(\d{{1,3}})_+({NUMBER})_+({NUMBER})_*$")
 MAX_STRAY = 0.5
 """Largest distance of a camera from its place in the grid, in view steps; beyond it, positions mean something else."""
 MIN_NOTED_STRAY = 0.005
@@ -53,35 +54,40 @@ def read_stanford(folder: Path) -> MultiView | None:
     position = np.array([[float(match[3]), float(match[4])] for _, match in named])
     if len(np.unique(index, axis=0)) < len(index):
         raise InputError(f"{inside}: two pictures have the same row and column; remove one of them")
-    offsets, directions, note = _viewpoints(index, position)
+    offsets, directions, note, are_known = _viewpoints(index, position)
     views = tuple(
         KnownView(f"row {row} column {column}", ViewOffset(float(t), float(s)), PictureSource(path))
         for (path, _), (row, column), (t, s) in zip(named, index, offsets)
     )
     layout = f"Stanford archive, {len(np.unique(index[:, 1]))}x{len(np.unique(index[:, 0]))}"
     scene = MultiView(folder.resolve().name, layout, views, notes=(note,))
-    return place_on_grid(scene, [(int(row), int(column)) for row, column in index * directions])
+    placed = place_on_grid(scene, [(int(row), int(column)) for row, column in index * directions])
+    if are_known or placed.grid is None:
+        return placed
+    ranks = [np.unique(index[:, axis], return_inverse=True)[1] for axis in (0, 1)]
+    return replace(placed, numbers=tuple((int(row), int(column)) for row, column in zip(*ranks)))
 
 
-def _viewpoints(index: np.ndarray, position: np.ndarray) -> tuple[np.ndarray, np.ndarray, str]:
+def _viewpoints(index: np.ndarray, position: np.ndarray) -> tuple[np.ndarray, np.ndarray, str, bool]:
     """Return viewpoints (N, 2), t down and s right, in view steps; directions in which rows and columns are counted,
-    down and right positive; and a note about the positions.
+    down and right positive; a note about the positions; and whether they are known.
 
     index: rows and columns (N, 2). position: Y and X (N, 2) in any unit.
     """
     slopes = np.array([_slope(index[:, axis], position[:, axis]) for axis in (0, 1)])
     step = float(abs(slopes[1] or slopes[0]))
     if step == 0:
-        return index * USUAL_DIRECTIONS, USUAL_DIRECTIONS, "Camera positions are unknown: a regular grid is assumed."
+        note = "Camera positions are unknown: a regular grid is assumed."
+        return index * USUAL_DIRECTIONS, USUAL_DIRECTIONS, note, False
     directions = np.where(slopes != 0, np.sign(slopes).astype(int), USUAL_DIRECTIONS)
     offsets, regular = (position - position.mean(axis=0)) / step, index * directions
     spacing = np.where(slopes != 0, np.abs(slopes) / step, 1.0)
     stray = float(np.abs(offsets - (regular - regular.mean(axis=0)) * spacing).max())
     if stray > MAX_STRAY:
         note = f"Camera positions lie up to {stray:.1f} view steps off the grid: a regular grid is assumed."
-        return index * USUAL_DIRECTIONS, USUAL_DIRECTIONS, note
+        return index * USUAL_DIRECTIONS, USUAL_DIRECTIONS, note, False
     more = f"; cameras stand up to {stray:.2f} view steps off a regular grid" if stray >= MIN_NOTED_STRAY else ""
-    return offsets, directions, f"Viewpoints from the names{more}."
+    return offsets, directions, f"Viewpoints from the names{more}.", True
 
 
 def _slope(x: np.ndarray, y: np.ndarray) -> float:

@@ -11,6 +11,7 @@ import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 
 from iibr_core.formats.files import entries_of, read_text, reason_of
@@ -36,33 +37,52 @@ NAMES = ((HCI_NAME, "input_Cam{:03d}"), (ROW_COLUMN_NAME, "v{:02d}_u{:02d}"))
 PLENO_NAME = re.compile(r"(\d{3})_(\d{3})\.ppm$", re.IGNORECASE)
 MAP_WORDS = re.compile(r"disp|depth|mask|label|normal|edge|reliable", re.IGNORECASE)
 MIN_SIDE = 9
-"""Fewest rows of a square grid that only the number of its pictures suggests: 25 numbered photos are of a holiday."""
+"""Fewest rows of a square that only the number of its pictures suggests: 25 numbered photos may be of a holiday."""
+GUESSED_VIEWS = 3, 1000
+"""Fewest and most pictures of such a folder that may be a light field all the same."""
 
 
 def read_grid(folder: Path) -> MultiView | None:
     """Return the views of a grid folder, None if its pictures are not numbered as a grid."""
     inside = folder / "views" if (folder / "views").is_dir() else folder
-    layout, paths = _lay_out(folder, sorted(preferred_files(pictures_in(inside), PICTURE_EXTENSIONS).values()))
-    if not paths:
+    layout, views, is_guess = _lay_out(sorted(preferred_files(pictures_in(inside), PICTURE_EXTENSIONS).values()))
+    parameters = read_parameters(folder)
+    stated = _stated_grid(parameters)
+    if not views:
         return None
-    grid = GridShape(max(v for v, _ in paths) + 1, max(u for _, u in paths) + 1)
-    _require_fitting(folder, grid, len(paths))
-    missing = [at for at in _places(grid) if at not in paths]
-    if missing:
-        raise _missing_view(next(iter(paths.values())), missing, f"{grid.rows}x{grid.columns}")
-    return _grid_scene(folder, f"{layout}, {grid.columns}x{grid.rows}", grid, paths)
+    if len(next(iter(views))) == 1:
+        if is_guess and stated is None and not _may_be_a_grid(views):
+            return None
+        views, grid = _in_order(folder, views, stated)
+        side = math.isqrt(len(views))
+        is_guess = is_guess and stated is None and (side < MIN_SIDE or side**2 != len(views))
+    else:
+        views = _from_least(views) if is_guess else views
+        grid, is_guess = GridShape(*(max(axis) + 1 for axis in zip(*views))), False
+        _require_fitting(folder, grid, len(views))
+        if missing := [at for at in _places(grid) if at not in views]:
+            raise _missing_view(next(iter(views.values())), missing, f"{grid.rows}x{grid.columns}")
+    scene = _grid_scene(folder, f"{layout}, {grid.columns}x{grid.rows}", grid, sorted(views.items()), parameters)
+    return replace(scene, stated_grid=stated, is_guess=is_guess)
 
 
-def _lay_out(folder: Path, pictures: list[Path]) -> tuple[str, Mapping[GridIndex, Path]]:
-    """Return the name of the layout, and the pictures by row and column: none if their names give no places."""
+Numbered = Mapping[tuple[int, ...], Path]
+"""Pictures by their row and column, or by their number in one order."""
+
+
+def _lay_out(pictures: list[Path]) -> tuple[str, Numbered, bool]:
+    """Return the name of the layout, the pictures by numbers in their names, and whether names of photos may be such.
+
+    There are none if names give no places.
+    """
     if views := _by_numbers((path, match.groups()) for path in pictures if (match := HCI_NAME.match(path.stem))):
-        return "HCI 4D light field", _row_by_row(folder, {number: path for (number,), path in views.items()}, True)
+        return "HCI 4D light field", views, False
     views = _by_numbers((path, match.groups()) for path in pictures if (match := ROW_COLUMN_NAME.match(path.stem)))
     if not views and all(PLENO_NAME.match(path.name) for path in pictures):
         views = _from_least(_by_numbers((path, path.stem.split("_")[::-1]) for path in pictures))
     if views:
-        return "grid folder", {(v, u): path for (v, u), path in views.items()}
-    return "grid folder", _by_any_numbers(folder, [path for path in pictures if not MAP_WORDS.search(path.stem)])
+        return "grid folder", views, False
+    return "grid folder", _by_any_numbers([path for path in pictures if not MAP_WORDS.search(path.stem)]), True
 
 
 def _by_numbers(numbered: Iterable[tuple[Path, Iterable[str]]]) -> dict[tuple[int, ...], Path]:
@@ -81,10 +101,10 @@ def _from_least(views: Mapping[tuple[int, ...], Path]) -> dict[tuple[int, ...], 
     return {tuple(n - first for n, first in zip(numbers, least)): path for numbers, path in views.items()}
 
 
-def _by_any_numbers(folder: Path, pictures: list[Path]) -> Mapping[GridIndex, Path]:
-    """Return pictures by the two numbers that vary among their names; if one number varies, row by row.
+def _by_any_numbers(pictures: list[Path]) -> Numbered:
+    """Return pictures by the one or two numbers that vary among their names.
 
-    Photos that are numbered by date and time fill less than half of such a grid.
+    Photos that are numbered by date and time fill less than half of a grid of rows and columns.
     """
     kinds = {re.sub(r"\d+", "#", path.stem.lower()) for path in pictures}
     digits = {path: re.findall(r"\d{1,9}", path.stem) for path in pictures}
@@ -94,39 +114,41 @@ def _by_any_numbers(folder: Path, pictures: list[Path]) -> Mapping[GridIndex, Pa
     if len(varying) not in (1, 2):
         return {}
     views = _by_numbers((path, [numbers[k] for k in varying]) for path, numbers in digits.items())
-    if len(varying) == 1:
-        return _row_by_row(folder, {number: path for (number,), path in views.items()}, False)
-    views = _from_least(views)
-    rows, columns = (max(axis) + 1 for axis in zip(*views))
-    return {(v, u): path for (v, u), path in views.items()} if rows * columns <= 2 * len(views) else {}
+    sides = [max(axis) - min(axis) + 1 for axis in zip(*views)]
+    return views if len(varying) == 1 or math.prod(sides) <= 2 * len(views) else {}
 
 
-def _row_by_row(folder: Path, pictures: Mapping[int, Path], is_named: bool) -> dict[GridIndex, Path]:
-    """Return pictures that are numbered row by row, on the grid that parameters.cfg states, else on a square one.
+def _may_be_a_grid(views: Numbered) -> bool:
+    """Return whether pictures that are numbered as photos may be a light field: none is missing between them."""
+    numbers = [number for (number,) in views]
+    return GUESSED_VIEWS[0] <= len(views) <= GUESSED_VIEWS[1] and max(numbers) - min(numbers) + 1 == len(views)
 
-    is_named: whether their names are those of a light field; else they must form a large square. Where most numbers are
-    left out, as where every tenth view was kept, no view counts as missing.
+
+def _stated_grid(parameters: Mapping[str, float]) -> GridShape | None:
+    """Return the grid that parameters.cfg states."""
+    grid = GridShape(int(parameters.get("num_cams_y", 0)), int(parameters.get("num_cams_x", 0)))
+    return grid if any(grid) else None
+
+
+def _in_order(folder: Path, views: Numbered, stated: GridShape | None) -> tuple[Numbered, GridShape]:
+    """Return pictures by their place in their order, and their grid: as stated, else a square or a single row.
+
+    Where most numbers are left out, as where every tenth view was kept, no view counts as missing.
     """
-    count, side, parameters = len(pictures), math.isqrt(len(pictures)), read_parameters(folder)
-    cameras = GridShape(int(parameters.get("num_cams_y", 0)), int(parameters.get("num_cams_x", 0)))
-    stated = cameras if any(cameras) else None
-    if stated is None and not is_named and (side < MIN_SIDE or side**2 != count):
-        return {}
-    numbers = sorted(pictures)
+    pictures, count = {number: path for (number,), path in views.items()}, len(views)
     if stated is not None:
         _require_fitting(folder, stated, count)
+    numbers = sorted(pictures)
     span = range(numbers[0], numbers[-1] + 1)
     missing = sorted(set(span) - set(numbers)) if len(span) < 2 * count else []
-    if stated is not None and (missing or count < stated.rows * stated.columns):
-        missing = sorted(set(range(stated.rows * stated.columns)) - set(numbers))
+    if stated is not None and (missing or count < math.prod(stated)):
+        missing = sorted(set(range(math.prod(stated))) - set(numbers))
     if missing:
         total = f"{stated.rows}x{stated.columns}" if stated else f"{count + len(missing)}"
         raise _missing_view(pictures[numbers[0]], [(number,) for number in missing], total)
-    if stated is None and side**2 != count:
-        raise InputError(
-            f"{folder}: {count} views do not form a square grid; state num_cams_x and num_cams_y in parameters.cfg"
-        )
-    return {divmod(k, stated.columns if stated else side): pictures[number] for k, number in enumerate(numbers)}
+    side = math.isqrt(count)
+    square = GridShape(side, side) if side**2 == count else GridShape(1, count)
+    return {(k,): pictures[number] for k, number in enumerate(numbers)}, stated or square
 
 
 def _require_fitting(folder: Path, grid: GridShape, count: int) -> None:
@@ -149,13 +171,18 @@ def _places(grid: GridShape) -> list[GridIndex]:
     return [(v, u) for v in range(grid.rows) for u in range(grid.columns)]
 
 
-def _grid_scene(folder: Path, layout: str, grid: GridShape, paths: Mapping[GridIndex, Path]) -> MultiView:
-    places = _places(grid)
+def _grid_scene(
+    folder: Path,
+    layout: str,
+    grid: GridShape,
+    pictures: Sequence[tuple[tuple[int, ...], Path]],
+    parameters: Mapping[str, float],
+) -> MultiView:
+    places = [(v, u) for v, u in (at if len(at) == 2 else divmod(at[0], grid.columns) for at, _ in pictures)]
     views = tuple(
-        KnownView(f"v{v:02d} u{u:02d}", ViewOffset(float(v), float(u)), PictureSource(paths[v, u]), place=(v, u))
-        for v, u in places
+        KnownView(f"v{v:02d} u{u:02d}", ViewOffset(float(v), float(u)), PictureSource(path), place=(v, u))
+        for (v, u), (_, path) in zip(places, pictures)
     )
-    parameters = read_parameters(folder)
     focal_px = stated_focal_px(parameters, read_size(views[0].path)) if parameters else None
     whole = folder.resolve()
     low, high = (parameters.get(name, math.nan) for name in ("disp_min", "disp_max"))
@@ -168,6 +195,7 @@ def _grid_scene(folder: Path, layout: str, grid: GridShape, paths: Mapping[GridI
         grid=grid,
         focal_px=focal_px,
         infinity_px=_stated_infinity_px(parameters, focal_px),
+        numbers=tuple(at for at, _ in pictures),
     )
 
 

@@ -43,21 +43,26 @@ def is_view_file(path: Path) -> bool:
 
 
 def find_light_field(path: Path) -> MultiView | None:
-    """Return the scene of a folder or file, None if no reader knows its layout."""
-    for entry in FOLDER_READERS if path.is_dir() else FILE_READERS:
-        read: Callable[[Path], MultiView | None] = resolve_name(f"{__package__}.{entry}")
-        if (scene := read(path)) is not None:
-            return scene
-    return None
+    """Return the scene of a folder or file, None if no reader knows its layout, or its pictures may be any photos."""
+    scene = _read(path)
+    return None if scene is None or scene.is_guess else scene
 
 
 def open_light_field(path: Path) -> MultiView:
-    """Return the scene of a folder or file."""
+    """Return the scene of a folder or file; numbered pictures that may be views count, too (`is_guess`)."""
     if not path.is_dir():
         require_file(path)
-    scene = find_light_field(path)
+    scene = _read(path)
     if scene is None:
         if path.is_dir() and not any(path.iterdir()):
             raise InputError(f"{path}: no photos in it")
         raise InputError(f"{path}: holds no light field; {f'laid out as {LAYOUTS}' if path.is_dir() else FILES}")
     return scene
+
+
+def _read(path: Path) -> MultiView | None:
+    for entry in FOLDER_READERS if path.is_dir() else FILE_READERS:
+        read: Callable[[Path], MultiView | None] = resolve_name(f"{__package__}.{entry}")
+        if (scene := read(path)) is not None:
+            return scene
+    return None

@@ -60,7 +60,9 @@ class MultiView:
     disparity (px per view step) where the data set states them. notes: sentences for readers of figures. stated_centre:
     index of the central view, None where it follows from the viewpoints. grid: rows and columns that the views fill,
     None where they fill none. focal_px: focal length in pixels of a view; infinity_px: disparity of infinitely far
-    points, px per view step; both where the data set states them.
+    points, px per view step; both where the data set states them. numbers: row and column in the name of each view, or
+    its number in one order, counted from 0; none where the layout is sure of the places. stated_grid: grid of numbered
+    views that a file states. is_guess: whether they are numbered as photos of a holiday may be.
     """
 
     name: str
@@ -73,6 +75,9 @@ class MultiView:
     grid: GridShape | None = None
     focal_px: float | None = None
     infinity_px: float | None = None
+    numbers: tuple[tuple[int, ...], ...] = ()
+    stated_grid: GridShape | None = None
+    is_guess: bool = False
 
     @property
     def centre(self) -> int:

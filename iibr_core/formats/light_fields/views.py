@@ -9,7 +9,16 @@ from iibr_core.formats.images.picture import Picture
 from iibr_core.formats.images.picture_source import PictureSource, part_of, read_source
 from iibr_core.formats.light_fields.multi_view_scene import GridIndex, MultiView, common_size
 from iibr_core.formats.maps.disparity_file import read_disparity
-from iibr_core.types import FloatImage, GridShape, ImageSize, InputError, StoredColors, ViewUpdate, image_size
+from iibr_core.types import (
+    FloatImage,
+    GridShape,
+    ImageSize,
+    InputError,
+    StoredColors,
+    ViewOffset,
+    ViewUpdate,
+    image_size,
+)
 
 
 def grid_of(scene: MultiView) -> GridShape:
@@ -62,6 +71,17 @@ def step_length(scene: MultiView) -> float:
         return 1.0
     start, end = (scene.views[_indices(scene)[at]].offset for at in ((0, 0), last))
     return math.hypot(end.t - start.t, end.s - start.s) / max(last)
+
+
+def view_offsets(scene: MultiView) -> list[ViewOffset]:
+    """Return the viewpoint of each view from the central one, in steps of the grid, as positions in names have it."""
+    step, (t, s) = step_length(scene), scene.views[scene.centre].offset
+    return [ViewOffset((view.offset.t - t) / step, (view.offset.s - s) / step) for view in scene.views]
+
+
+def offsets_by_place(scene: MultiView) -> dict[GridIndex, ViewOffset]:
+    """Return the same by the row and column of each view."""
+    return {view.place: at for view, at in zip(scene.views, view_offsets(scene)) if view.place is not None}
 
 
 def _nearest_to_centre(grid: GridShape) -> list[GridIndex]:

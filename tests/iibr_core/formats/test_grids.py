@@ -10,6 +10,8 @@ from iibr_core.formats.light_fields.multi_view_scene import MultiView
 from iibr_core.formats.light_fields.views import read_views
 from iibr_core.formats.maps.disparity_file import read_disparity
 from iibr_core.formats.maps.pfm import write_pfm
+from iibr_core.scenes.light_fields import find_disparity
+from iibr_core.scenes.scene import Source
 from iibr_core.types import GridShape, ImageSize, InputError, ViewOffset
 from tests.iibr_core.evaluation.test_scenes import offset_by_file, scene_of, write_picture
 from tests.iibr_core.known_scenes import (
@@ -81,8 +83,9 @@ def test_jpeg_pleno_counts_columns_first(tmp_path) -> None:
 @pytest.mark.parametrize("count", [4, 9, 16, 25])
 def test_a_few_numbered_photos_are_no_light_field(tmp_path, count) -> None:
     write_flat(tmp_path, [f"beach {n + 1}.png" for n in range(count)])
-    with pytest.raises(InputError, match="holds no light field"):
-        open_light_field(tmp_path)
+    assert find_light_field(tmp_path) is None
+    with pytest.raises(InputError, match=f"holds no light field; its {count} numbered.*--order and --grid"):
+        find_disparity(Source(str(tmp_path)))
     (tmp_path / "parameters.cfg").write_text(f"[extrinsics]\nnum_cams_x = {count}\nnum_cams_y = 1\n")
     assert open_light_field(tmp_path).grid == (1, count)
 

@@ -224,7 +224,7 @@ def test_plan_names_what_views_are_recognised_as(
     assert first.split(": ", 1)[1] == f"{layout} px a view, disparity from {origin}"
     assert f"- Views: {views}." in reasons
     assert ("- Disparity goes from 1.25 to 1.25 px per view step." in reasons) == (name == "field")
-    assert "leave it out" in refusal_of(iibr("plan", path, "--grid", 5))
+    assert "do not fill a grid of 5x7" in refusal_of(iibr("plan", path, "--grid", "5x7"))
 
 
 def test_plan_says_where_views_fill_no_grid(iibr: Iibr, tmp_path: Path) -> None:

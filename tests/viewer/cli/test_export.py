@@ -67,7 +67,7 @@ def test_disparity_is_found_for_a_light_field_without_it(iibr: Iibr, photo: Path
     output_of(iibr("export", "field", "--to", "disparity", "-o", "a.pfm"))
     assert np.median(np.abs(read_pfm(Path("a.pfm")) - given)) < 0.3
     output_of(iibr("export", "field", "--to", "hci", "-o", "hci"))
-    assert sorted(path.suffix for path in Path("hci").iterdir()) == [".cfg"] + 9 * [".png"]
+    assert sorted(path.suffix for path in Path("hci").iterdir()) == [".cfg"] + 10 * [".pfm"] + 9 * [".png"]
 
 
 @pytest.mark.parametrize("kind", ["cross-eyed", "focal-stack", "quilt"])

@@ -1,0 +1,58 @@
+"""Which end of the disparities is near: near surfaces hide far ones, which matching alone does not show."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iibr_core.types import FloatImage, ViewOffset
+
+MIN_HIDING_PX = 1.5
+"""Least shift between two surfaces in a view in which one of them hides the other."""
+MAX_DIFFERENCE = 0.1
+"""Difference of luma that counts most: larger ones count the same."""
+MIN_HIDDEN_SHARE = 0.001
+"""Smallest share of all pixels of the views that must be hidden on either assumption."""
+
+
+def nearness_ratio(lumas: Sequence[FloatImage], offsets: Sequence[ViewOffset], values: FloatImage) -> float:
+    """Return how much worse places match that are hidden if larger disparities are nearer than places that are hidden
+    if smaller ones are: above 1 larger ones are nearer, below 1 smaller ones; 1 if too little is hidden.
+
+    lumas: (H, W), 0 .. 1, of small views, the reference first; offsets: their viewpoints from it. values: disparity
+    (H, W) of the reference.
+    """
+    sums, counts, total = np.zeros(2), np.zeros(2), 0
+    for luma, (t, s) in zip(lumas, offsets):
+        if t == s == 0:
+            continue
+        places, is_inside = _places(values, t, s)
+        away = np.minimum(np.abs(luma.ravel()[places] - lumas[0]), MAX_DIFFERENCE)
+        margin = MIN_HIDING_PX / max(abs(t), abs(s))
+        total += int(is_inside.sum())
+        for side, sign in enumerate((1, -1)):
+            is_hidden = is_inside & _hidden(sign * values, places, margin)
+            sums[side] += away[is_hidden].sum()
+            counts[side] += is_hidden.sum()
+    if counts.min() <= MIN_HIDDEN_SHARE * total:
+        return 1.0
+    larger, smaller = sums / counts + 1e-3
+    return float(larger / smaller)
+
+
+def _places(values: FloatImage, t: float, s: float) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    """Return the pixels (H, W) at which a view shows the places of the reference, and whether they lie in it."""
+    height, width = values.shape
+    rows, columns = np.indices(values.shape)
+    y, x = np.rint(rows - values * t).astype(int), np.rint(columns - values * s).astype(int)
+    is_inside = (y >= 0) & (y < height) & (x >= 0) & (x < width)
+    return np.where(is_inside, y * width + x, 0), is_inside
+
+
+def _hidden(values: FloatImage, places: NDArray[np.int64], margin: float) -> NDArray[np.bool_]:
+    """Return which pixels (H, W) another one hides that has a larger value, by more than a margin."""
+    front = np.full(values.size, -np.inf, np.float32)
+    np.maximum.at(front, places.ravel(), values.ravel())
+    return front[places] > values + margin

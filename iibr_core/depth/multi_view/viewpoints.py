@@ -1,0 +1,198 @@
+"""Viewpoints of a light field's views, measured from their parallax.
+
+Points of the reference view are found again in other views. A point of disparity d moves by -d * (s, t) in the view at
+(t, s): the shifts of all points in all views are products of one number a point and one direction a view. Such factors
+are found up to a common factor, of either sign.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise, product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iibr_core.runtime import tiling
+from iibr_core.runtime.kernels import kernel
+from iibr_core.runtime.tiling import in_pieces
+from iibr_core.types import FloatImage
+
+LONGEST_PX = 256
+"""Longer side of the small views in which points are looked for."""
+CELLS = 9, 12
+"""Rows and columns of cells of the reference, in each of which one point is chosen."""
+PATCH_RADIUS_PX = 3
+SEARCH_SHARE = 0.09
+"""Largest shift that is looked for, as a share of the longer side."""
+MIN_CORNER = 5e-5
+"""Smallest gradient across the weaker direction (mean square of luma a pixel) of a point that can be found again."""
+MAX_SECOND = 0.7
+"""Largest ratio of the least difference to that of another place, for a place that is found without doubt."""
+MAX_DIFFERENCE = 0.06
+"""Largest root mean square difference of a patch and its place in another view."""
+MIN_POINTS = 8
+"""Fewest points by which a viewpoint counts as measured."""
+MIN_AGREEING = 0.5
+"""Smallest share of a view's points that must agree with its viewpoint."""
+TOLERANCE_PX = 0.35
+"""Distance of an agreeing point from its predicted place, beside TOLERANCE_SHARE of its shift."""
+TOLERANCE_SHARE = 0.1
+BASES = 3
+"""Number of views from which the factors are looked for."""
+ROUNDS = 12
+
+Doubles = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Viewpoints:
+    """Measured viewpoints. offsets: (N, 2), (t, s) from the reference, up to a common factor of either sign; NaN where
+    a view could not be measured. agreeing: share (N,) of the points that agree with each.
+    """
+
+    offsets: Doubles
+    agreeing: Doubles
+
+    @property
+    def is_measured(self) -> NDArray[np.bool_]:
+        """Which views (N,) are measured."""
+        return np.isfinite(self.offsets[:, 0])
+
+
+def measure_viewpoints(reference: FloatImage, others: Sequence[FloatImage]) -> Viewpoints:
+    """Return the viewpoints of views (H, W), luma of 0 .. 1, that are alike in size."""
+    reference, *others = map(_smooth, (reference, *others))
+    points = find_corners(reference)
+    if len(points) < MIN_POINTS:
+        return Viewpoints(np.full((len(others), 2), np.nan), np.zeros(len(others)))
+    reach = max(round(SEARCH_SHARE * max(reference.shape)), 2)
+
+    def find(other: FloatImage) -> Doubles:
+        found = np.empty((len(points), 2))
+        _find_points(reference, other, points, reach, found)
+        return found
+
+    return factorise(np.stack(in_pieces(find, others, tiling.THREADS)))
+
+
+def _smooth(luma: FloatImage) -> FloatImage:
+    """Return a luma with each pixel's neighbours mixed in: patches that lie between pixels then match, too."""
+    for _ in range(2):
+        padded = np.pad(luma, ((1, 1), (0, 0)), "edge")
+        luma = np.ascontiguousarray((padded[:-2] + 2 * luma + padded[2:]).T / np.float32(4))
+    return luma
+
+
+def find_corners(luma: FloatImage) -> NDArray[np.int64]:
+    """Return places (P, 2), row and column, of points that differ from their neighbours in every direction."""
+    down, across = (np.asarray(slope, np.float32) for slope in np.gradient(luma))
+    radius = PATCH_RADIUS_PX
+    squares = (_box_mean(product, radius) for product in (down * down, across * across, down * across))
+    tt, ss, ts = squares
+    weaker = (tt + ss) / 2 - np.sqrt(((tt - ss) / 2) ** 2 + ts**2)
+    rows, columns = (
+        np.linspace(radius + 1, length - radius - 1, cells + 1).astype(int) for length, cells in zip(luma.shape, CELLS)
+    )
+    found = []
+    for (top, bottom), (left, right) in product(pairwise(rows), pairwise(columns)):
+        cell = weaker[top:bottom, left:right]
+        if cell.size and cell.max() >= MIN_CORNER:
+            y, x = np.unravel_index(cell.argmax(), cell.shape)
+            found.append((top + int(y), left + int(x)))
+    return np.array(found, np.int64).reshape(-1, 2)
+
+
+def _box_mean(values: FloatImage, radius: int) -> Doubles:
+    """Return the mean (H, W) over squares; 0 where a square leaves the image."""
+    side, mean = 2 * radius + 1, np.zeros(values.shape)
+    if min(values.shape) >= side:
+        sums = np.pad(values.astype(float).cumsum(0).cumsum(1), ((1, 0), (1, 0)))
+        inside = sums[side:, side:] - sums[:-side, side:] - sums[side:, :-side] + sums[:-side, :-side]
+        mean[radius : radius + inside.shape[0], radius : radius + inside.shape[1]] = inside / side**2
+    return mean
+
+
+@kernel
+def _find_points(reference, other, points, reach, found):
+    """Fill found with the shift (down, across) of each point, to a part of a pixel; NaN where it is in doubt."""
+    radius, (height, width) = PATCH_RADIUS_PX, reference.shape
+    side = 2 * radius + 1
+    worst, outside = np.float32(side**2 * MAX_DIFFERENCE**2), np.float32(side**2)
+    costs = np.empty((2 * reach + 1, 2 * reach + 1), np.float32)
+    for k in range(len(points)):
+        top, left = points[k, 0] - radius, points[k, 1] - radius
+        found[k] = np.nan
+        costs[:] = outside
+        best, best_y, best_x = outside, 0, 0
+        for y in range(max(top - reach, 0), min(top + reach, height - side) + 1):
+            for x in range(max(left - reach, 0), min(left + reach, width - side) + 1):
+                cost = np.float32(0)
+                for row in range(side):
+                    for column in range(side):
+                        difference = reference[top + row, left + column] - other[y + row, x + column]
+                        cost += difference * difference
+                    if cost > worst:
+                        break
+                costs[y - top + reach, x - left + reach] = cost
+                if cost < best:
+                    best, best_y, best_x = cost, y - top + reach, x - left + reach
+        if not (best <= worst and 0 < best_y < 2 * reach and 0 < best_x < 2 * reach):
+            continue
+        second = outside
+        for row in range(2 * reach + 1):
+            for column in range(2 * reach + 1):
+                if abs(row - best_y) > radius or abs(column - best_x) > radius:
+                    second = min(second, costs[row, column])
+        above, below = costs[best_y - 1, best_x], costs[best_y + 1, best_x]
+        before, after = costs[best_y, best_x - 1], costs[best_y, best_x + 1]
+        bend_y, bend_x = above - 2 * best + below, before - 2 * best + after
+        is_inside = max(max(above, below), max(before, after)) < outside
+        if best <= np.float32(MAX_SECOND) * second and is_inside and bend_y > 0 and bend_x > 0:
+            found[k, 0] = best_y - reach + 0.5 * (above - below) / bend_y
+            found[k, 1] = best_x - reach + 0.5 * (before - after) / bend_x
+
+
+def factorise(shifts: Doubles) -> Viewpoints:
+    """Return the viewpoints (N, 2) of shifts (N, P, 2), down and across, of P points in N views; NaN: not found."""
+    is_found = np.isfinite(shifts[..., 0])
+    best = Viewpoints(np.full((len(shifts), 2), np.nan), np.zeros(len(shifts)))
+    for base in np.argsort(-is_found.sum(axis=1))[:BASES]:
+        disparity = _along(shifts[base])
+        if np.isfinite(disparity).sum() < MIN_POINTS:
+            continue
+        found = _refine(shifts, is_found, disparity)
+        if np.nansum(found.agreeing) > np.nansum(best.agreeing):
+            best = found
+    return best
+
+
+def _along(shifts: Doubles) -> Doubles:
+    """Return how far (P,) points moved along the direction in which most of them moved; NaN for those that did not."""
+    across_down = shifts[:, 1] + 1j * shifts[:, 0]
+    known = across_down[np.isfinite(across_down)]
+    direction = np.exp(0.5j * np.angle((known**2 / np.maximum(np.abs(known), 1e-9)).sum()))
+    turned = across_down / direction
+    agrees = np.abs(turned.imag) < TOLERANCE_PX + TOLERANCE_SHARE * np.abs(turned.real)
+    return np.where(agrees, turned.real, np.nan)
+
+
+def _refine(shifts: Doubles, is_found: NDArray[np.bool_], disparity: Doubles) -> Viewpoints:
+    """Return the viewpoints that agree best with shifts, from a first guess of the disparity (P,) of their points."""
+    shifts, offsets = np.where(is_found[..., None], shifts, 0.0), np.zeros((len(shifts), 2))
+    weights = (is_found & np.isfinite(disparity)).astype(float)
+    disparity = np.nan_to_num(disparity)
+    for _ in range(ROUNDS):
+        # Shifts are -d * offset.
+        power = (weights * disparity**2).sum(axis=1)
+        offsets = -((weights * disparity)[..., None] * shifts).sum(axis=1) / np.maximum(power, 1e-9)[:, None]
+        power = (is_found * weights * (offsets**2).sum(axis=1)[:, None]).sum(axis=0)
+        along = -(weights * np.einsum("npi,ni->np", shifts, offsets)).sum(axis=0)
+        disparity = along / np.maximum(power, 1e-9)
+        away = np.linalg.norm(shifts + disparity[:, None] * offsets[:, None], axis=-1)
+        tolerance = TOLERANCE_PX + TOLERANCE_SHARE * np.linalg.norm(shifts, axis=-1)
+        weights = is_found / (1 + (away / tolerance) ** 2) ** 2
+    agreeing = ((away < tolerance) & is_found).sum(axis=1) / np.maximum(is_found.sum(axis=1), 1)
+    is_measured = (is_found.sum(axis=1) >= MIN_POINTS) & (agreeing >= MIN_AGREEING)
+    return Viewpoints(np.where(is_measured[:, None], offsets, np.nan), np.where(is_measured, agreeing, 0.0))

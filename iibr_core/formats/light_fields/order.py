@@ -1,0 +1,109 @@
+"""The order in which names count the views of a light field, and the places on a grid that it gives them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Literal
+
+from iibr_core.types import GridShape, InputError, ViewOffset
+
+if TYPE_CHECKING:
+    from iibr_core.formats.light_fields.multi_view_scene import GridIndex, MultiView
+
+Order = Literal["rows", "columns", "snake", "snake-columns"]
+ORDERS: tuple[Order, ...] = ("rows", "columns", "snake", "snake-columns")
+"""Row by row, or the row's number first; the same by columns; and both with every other line backwards."""
+Flip = Literal["none", "x", "y", "xy"]
+FLIPS: tuple[Flip, ...] = ("none", "x", "y", "xy")
+"""Axes along which names count from right to left, or from bottom to top; "xy" is a field seen from behind."""
+
+
+@dataclass(frozen=True)
+class Arrangement:
+    """The order of views; None where it is to be found.
+
+    row_step: distance between rows, in distances between columns.
+    """
+
+    order: Order | None = None
+    grid: GridShape | None = None
+    flip: Flip | None = None
+    row_step: float | None = None
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether nothing is left to be found."""
+        return None not in (self.order, self.grid, self.flip, self.row_step)
+
+
+UNKNOWN = Arrangement()
+
+
+def numbers_of(scene: MultiView) -> Sequence[tuple[int, ...]]:
+    """Return the numbers in the names of the views, else their rows and columns; none if they fill no grid."""
+    places = tuple(view.place for view in scene.views if view.place is not None)
+    return scene.numbers or (places if len(places) == len(scene.views) else ())
+
+
+def possible_arrangements(scene: MultiView, given: Arrangement = UNKNOWN) -> list[Arrangement]:
+    """Return the orders and grids that the names admit, the likeliest first, without flips.
+
+    Raises InputError if a grid is given that the views do not fill.
+    """
+    numbers = numbers_of(scene)
+    if not numbers:
+        return []
+    if len(numbers[0]) == 2:
+        rows, columns = (len(set(axis)) for axis in zip(*numbers))
+        shapes = [GridShape(rows, columns), GridShape(columns, rows)]
+        pairs = [(order, shapes["columns" in order]) for order in ORDERS[: 4 if min(rows, columns) > 1 else 2]]
+    else:
+        shapes = [scene.stated_grid] if scene.stated_grid is not None else _shapes(len(numbers))
+        pairs = [(order, shape) for shape in shapes for order in ORDERS[: 4 if min(shape) > 1 else 1]]
+    if given.grid is not None and given.grid not in {shape for _, shape in pairs}:
+        grids = ", ".join(dict.fromkeys(f"{shape.rows}x{shape.columns}" for _, shape in pairs))
+        raise InputError(
+            f"{scene.place}: its {len(numbers)} views do not fill a grid of {given.grid.rows}x{given.grid.columns};"
+            f" give {grids}"
+        )
+    return [
+        Arrangement(order, shape)
+        for order, shape in pairs
+        if given.order in (None, order) and given.grid in (None, shape)
+    ]
+
+
+def _shapes(count: int) -> list[GridShape]:
+    """Return the grids of rows and columns that `count` views fill, squarish ones first."""
+    rows = [number for number in range(1, count + 1) if count % number == 0]
+    shapes = [GridShape(number, count // number) for number in rows]
+    return sorted(shapes, key=lambda shape: (abs(math.log(shape.rows / shape.columns)), shape.rows))
+
+
+def places_in(numbers: Sequence[tuple[int, ...]], arrangement: Arrangement) -> list[GridIndex]:
+    """Return the row and column of each view. numbers: counted from 0 without gaps."""
+    assert arrangement.grid is not None
+    grid, order, flip = arrangement.grid, arrangement.order or "rows", arrangement.flip or "none"
+    lines, places = grid.columns if "columns" not in order else grid.rows, []
+    for number in numbers:
+        line, at = number if len(number) == 2 else divmod(number[0], lines)
+        if "snake" in order and line % 2:
+            at = lines - 1 - at
+        row, column = (at, line) if "columns" in order else (line, at)
+        places.append(
+            (grid.rows - 1 - row if "y" in flip else row, grid.columns - 1 - column if "x" in flip else column)
+        )
+    return places
+
+
+def arranged(scene: MultiView, arrangement: Arrangement) -> MultiView:
+    """Return the scene with its views on the grid of an arrangement, whose order and grid are known."""
+    assert arrangement.grid is not None
+    step = arrangement.row_step or 1.0
+    views = tuple(
+        replace(view, place=place, offset=ViewOffset(place[0] * step, float(place[1])))
+        for view, place in zip(scene.views, places_in(numbers_of(scene), arrangement))
+    )
+    return replace(scene, views=views, grid=arrangement.grid, numbers=(), is_guess=False)
