@@ -1,0 +1,173 @@
+"""The order of a light field's views is found from their parallax, whatever their names say."""
+
+from functools import cache
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+from scipy.ndimage import gaussian_filter, map_coordinates
+
+from iibr_core.depth.multi_view.near_side import nearness_ratio
+from iibr_core.depth.multi_view.viewpoints import measure_viewpoints
+from iibr_core.formats.light_fields.order import Arrangement
+from iibr_core.scenes.light_fields import find_disparity, open_settled
+from iibr_core.scenes.scene import Source
+from iibr_core.types import GridShape, InputError, ViewOffset
+
+HEIGHT, WIDTH = 72, 96
+WALL_PX, SQUARE_PX = -0.5, 2.0
+Names = dict[str, tuple[float, float]]
+"""Viewpoint (t, s) of each view by the stem of its file."""
+
+
+@cache
+def textures() -> np.ndarray:
+    rough = np.random.default_rng(5).normal(size=(2, HEIGHT + 80, WIDTH + 80))
+    return 110 + 300 * np.stack([gaussian_filter(layer, 1.2) for layer in rough])
+
+
+def view_at(t: float, s: float) -> np.ndarray:
+    """(H, W) of a textured square at SQUARE_PX before a textured wall at WALL_PX."""
+    y, x = np.mgrid[:HEIGHT, :WIDTH].astype(float)
+    wall, square = (
+        map_coordinates(texture, [y + d * t + 40, x + d * s + 40], order=1)
+        for texture, d in zip(textures(), (WALL_PX, SQUARE_PX))
+    )
+    inside = (abs(y + SQUARE_PX * t - HEIGHT / 2) < 16) & (abs(x + SQUARE_PX * s - WIDTH / 2) < 18)
+    return np.where(inside, square, wall).clip(0, 255).astype(np.uint8)
+
+
+def write_views(folder: Path, names: Names) -> Path:
+    folder.mkdir()
+    for stem, offset in names.items():
+        Image.fromarray(view_at(*offset)).convert("RGB").save(folder / f"{stem}.png")
+    return folder
+
+
+def grid(rows: int, columns: int) -> list[tuple[int, int]]:
+    return list(product(range(rows), range(columns)))
+
+
+def centred(row: int, column: int, rows: int = 5, columns: int = 5, row_step: float = 1.0) -> tuple[float, float]:
+    return (row - rows // 2) * row_step, float(column - columns // 2)
+
+
+def snake(rows: int, columns: int) -> list[tuple[int, int]]:
+    return [(row, columns - 1 - column if row % 2 else column) for row, column in grid(rows, columns)]
+
+
+FIELDS: dict[str, tuple[Names, str]] = {
+    "as named": ({f"v{r}_u{c}": centred(r, c) for r, c in grid(5, 5)}, ""),
+    "columns first": ({f"lf_{c}_{r}": centred(r, c) for r, c in grid(5, 5)}, "columns are counted before rows."),
+    "columns first, 3 rows of 5": (
+        {f"lf_{c}_{r}": centred(r, c, 3) for r, c in grid(3, 5)},
+        "3 rows of 5, columns are counted before rows.",
+    ),
+    "column by column": (
+        {f"img_{5 * c + r:03d}": centred(r, c) for r, c in grid(5, 5)},
+        "5 rows of 5, columns are counted before rows.",
+    ),
+    "columns mirrored": ({f"v{r}_u{4 - c}": centred(r, c) for r, c in grid(5, 5)}, "columns run from right to left."),
+    "rows mirrored": ({f"v{4 - r}_u{c}": centred(r, c) for r, c in grid(5, 5)}, "rows run from bottom to top."),
+    "from behind": ({f"v{4 - r}_u{4 - c}": centred(r, c) for r, c in grid(5, 5)}, "as seen from behind."),
+    "HCI, from behind": (
+        {f"input_Cam{5 * (4 - r) + 4 - c:03d}": centred(r, c) for r, c in grid(5, 5)},
+        "as seen from behind.",
+    ),
+    "serpentine": (
+        {f"shot{k:02d}": centred(*at) for k, at in enumerate(snake(5, 5))},
+        "5 rows of 5, every other row runs backwards.",
+    ),
+    "serpentine, 4 rows of 6": (
+        {f"shot{k:02d}": centred(*at, 4, 6) for k, at in enumerate(snake(4, 6))},
+        "4 rows of 6, every other row runs backwards.",
+    ),
+    "a row of 16": ({f"DSC_{1000 + k}": (0.0, (k - 8) / 2) for k in range(16)}, "one line of views."),
+    "a row of 25": ({f"DSC_{1000 + k}": (0.0, (k - 12) / 2) for k in range(25)}, "one line of views."),
+    "rows 0.4 apart": (
+        {f"v{r}_u{c}": centred(r, c, row_step=0.4) for r, c in grid(5, 5)},
+        "rows are 0.4 times as far apart as columns.",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", FIELDS)
+def test_views_in_any_order_give_the_same_disparity(tmp_path: Path, name: str) -> None:
+    names, note = FIELDS[name]
+    _, values, notes = find_disparity(Source(str(write_views(tmp_path / "field", names))))
+    step = 0.5 if "row of" in name else 1.0
+    assert np.median(values[28:44, 40:56]) == pytest.approx(SQUARE_PX * step, abs=0.1)
+    assert np.median(values[:, :20]) == pytest.approx(WALL_PX * step, abs=0.1)
+    assert len(notes) == bool(note)
+    assert all(found.endswith(note) for found in notes)
+
+
+def test_a_stated_row_is_a_row(tmp_path: Path) -> None:
+    folder = write_views(tmp_path / "rail", {f"DSC_{1000 + k}": (0.0, (k - 10) / 2) for k in range(21)})
+    (folder / "parameters.cfg").write_text("[extrinsics]\nnum_cams_x = 21\nnum_cams_y = 1\n")
+    _, values, notes = find_disparity(Source(str(folder)))
+    assert np.median(values[28:44, 40:56]) == pytest.approx(SQUARE_PX / 2, abs=0.1)
+    assert notes == ()
+
+
+@pytest.mark.parametrize(("row_step", "jitter", "gap"), [(0.4, 0.0, "_"), (1.0, 0.15, "_"), (1.0, 0.15, "__")])
+def test_positions_in_names_are_used_as_they_are(tmp_path: Path, row_step: float, jitter: float, gap: str) -> None:
+    rng = np.random.default_rng(3)
+    names: Names = {}
+    for row, column in grid(5, 5):
+        t, s = np.array(centred(row, column, row_step=row_step)) + rng.uniform(-jitter, jitter, 2)
+        names[f"out_{row:02d}_{column:02d}{gap}{10 * t:.6f}_{10 * s:.6f}_"] = (t, s)
+    _, values, _ = find_disparity(Source(str(write_views(tmp_path / "field", names))))
+    assert np.median(np.abs(values[28:44, 40:56] - SQUARE_PX)) < 0.1
+    assert np.median(np.abs(values[:, :20] - WALL_PX)) < 0.1
+
+
+def test_what_the_user_says_about_the_order_counts(tmp_path: Path) -> None:
+    folder = write_views(tmp_path / "field", FIELDS["from behind"][0])
+    named = Arrangement("rows", GridShape(5, 5), "none", 1.0)
+    _, values, notes = find_disparity(Source(str(folder), arrangement=Arrangement(flip="none")))
+    assert np.median(values[28:44, 40:56]) == pytest.approx(-SQUARE_PX, abs=0.1)
+    assert notes == ()
+    field, _ = open_settled(Source(str(folder), arrangement=named))
+    assert [view.place for view in field.views] == grid(5, 5)
+    with pytest.raises(InputError, match="its 25 views do not fill a grid of 4x6; give 5x5"):
+        open_settled(Source(str(folder), arrangement=Arrangement(grid=GridShape(4, 6))))
+
+
+def test_views_in_no_order_are_refused(tmp_path: Path) -> None:
+    places = np.random.default_rng(4).permutation(grid(5, 5))
+    folder = write_views(tmp_path / "field", {f"v{k // 5}_u{k % 5}": centred(*at) for k, at in enumerate(places)})
+    with pytest.raises(InputError, match="fits no order that their names suggest; give --order, --grid and --flip"):
+        find_disparity(Source(str(folder)))
+
+
+def test_photos_that_are_no_views_are_no_light_field(tmp_path: Path) -> None:
+    rng, folder = np.random.default_rng(6), tmp_path / "holiday"
+    folder.mkdir()
+    for number in range(12):
+        pixels = gaussian_filter(rng.normal(110, 200, (HEIGHT, WIDTH, 3)), (2, 2, 0)).clip(0, 255).astype(np.uint8)
+        Image.fromarray(pixels).save(folder / f"IMG_{number:04d}.png")
+    with pytest.raises(InputError, match="holds no light field; its 12 numbered pictures"):
+        find_disparity(Source(str(folder)))
+
+
+def test_viewpoints_are_measured_up_to_a_factor() -> None:
+    offsets = [(0.0, 1.0), (1.0, 0.0), (-1.0, 1.0), (0.0, -2.0), (1.0, -3.0), (2.0, 2.0)]
+    reference, *others = (np.float32(view_at(t, s) / 255) for t, s in [(0.0, 0.0), *offsets])
+    found = measure_viewpoints(reference, others)
+    assert found.offsets / found.offsets[0, 1] == pytest.approx(np.array(offsets), abs=0.08)
+    nothing = measure_viewpoints(np.zeros((HEIGHT, WIDTH), np.float32), [np.zeros((HEIGHT, WIDTH), np.float32)])
+    assert not nothing.is_measured.any()
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_hidden_places_show_which_side_is_near(sign: int) -> None:
+    offsets = [ViewOffset(0.0, 0.0), ViewOffset(0.0, 2.0), ViewOffset(-2.0, 0.0), ViewOffset(2.0, -2.0)]
+    truth = np.full((HEIGHT, WIDTH), WALL_PX, np.float32)
+    truth[HEIGHT // 2 - 15 : HEIGHT // 2 + 16, WIDTH // 2 - 17 : WIDTH // 2 + 18] = SQUARE_PX
+    lumas = [np.float32(view_at(*at) / 255) for at in offsets]
+    ratio = nearness_ratio(lumas, [ViewOffset(sign * t, sign * s) for t, s in offsets], sign * truth)
+    assert ratio**sign > 2
+    assert nearness_ratio(lumas, offsets, np.zeros_like(truth)) == 1
