@@ -132,7 +132,7 @@ def _read_transforms(path: Path) -> tuple[NamedCamera, ...]:
 def _require_pinhole(values: Mapping[str, Any], source: str) -> None:
     """Raise InputError for the values of a frame whose camera distorts, or is a fisheye or a panorama."""
     model = str(values.get("camera_model") or "")
-    named = [f"a {printable(model)}"] if model.upper() not in PINHOLE_MODELS else []
+    named = [f"model {printable(model)}"] if model.upper() not in PINHOLE_MODELS else []
     found = {name: value for name in COEFFICIENTS if not _is_small(value := values.get(name) or 0.0)}
     found |= {name: value for name in OTHER_CAMERAS if (value := values.get(name))}
     if named or found:

@@ -13,6 +13,8 @@ MIN_HIDING_PX = 1.5
 """Least shift between two surfaces in a view in which one of them hides the other."""
 MAX_DIFFERENCE = 0.1
 """Difference of luma that counts most: larger ones count the same."""
+MIN_SLOPE = 0.01
+"""Least step of luma from pixel to pixel of a place whose disparity is known."""
 MIN_HIDDEN_SHARE = 0.001
 """Smallest share of all pixels of the views that must be hidden on either assumption."""
 
@@ -25,6 +27,8 @@ def nearness_ratio(lumas: Sequence[FloatImage], offsets: Sequence[ViewOffset], v
     (H, W) of the reference.
     """
     sums, counts, total = np.zeros(2), np.zeros(2), 0
+    slopes = np.gradient(lumas[0])
+    is_textured = np.hypot(*slopes) > MIN_SLOPE
     for luma, (t, s) in zip(lumas, offsets):
         if t == s == 0:
             continue
@@ -33,7 +37,7 @@ def nearness_ratio(lumas: Sequence[FloatImage], offsets: Sequence[ViewOffset], v
         margin = MIN_HIDING_PX / max(abs(t), abs(s))
         total += int(is_inside.sum())
         for side, sign in enumerate((1, -1)):
-            is_hidden = is_inside & _hidden(sign * values, places, margin)
+            is_hidden = is_textured & is_inside & _hidden(sign * values, places, is_textured, margin)
             sums[side] += away[is_hidden].sum()
             counts[side] += is_hidden.sum()
     if counts.min() <= MIN_HIDDEN_SHARE * total:
@@ -51,8 +55,10 @@ def _places(values: FloatImage, t: float, s: float) -> tuple[NDArray[np.int64], 
     return np.where(is_inside, y * width + x, 0), is_inside
 
 
-def _hidden(values: FloatImage, places: NDArray[np.int64], margin: float) -> NDArray[np.bool_]:
-    """Return which pixels (H, W) another one hides that has a larger value, by more than a margin."""
+def _hidden(
+    values: FloatImage, places: NDArray[np.int64], is_textured: NDArray[np.bool_], margin: float
+) -> NDArray[np.bool_]:
+    """Return which pixels (H, W) a textured one hides that has a larger value, by more than a margin."""
     front = np.full(values.size, -np.inf, np.float32)
-    np.maximum.at(front, places.ravel(), values.ravel())
+    np.maximum.at(front, places[is_textured], values[is_textured])
     return front[places] > values + margin

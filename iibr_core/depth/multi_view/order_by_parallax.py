@@ -29,8 +29,10 @@ from iibr_core.types import InputError, StoredColors, image_size
 
 MAX_MEASURED = 16
 """Largest number of views that are measured."""
-MAX_STRAY = 0.25
-"""Largest distance of a measured viewpoint from its place, in steps of the grid."""
+MAX_STRAY, MAX_STRAY_ON_LINE = 0.35, 1.0
+"""Largest distance of a measured viewpoint from its place, in steps, on a grid and in a single row or column: a camera
+on a rail is moved by uneven steps.
+"""
 MIN_FITTING = 0.8
 """Smallest share of the measured views that must lie at their places; the others may be mistaken."""
 ROUNDS = 3
@@ -136,7 +138,9 @@ def _fit(arrangement: Arrangement, places: NDArray[np.float64], found: Viewpoint
     if not (np.abs(along) > 0).all() or (np.abs(across) > MAX_SKEW * np.abs(along)).any():
         return None
     stray = float(np.quantile(away, MIN_FITTING) / np.abs(along).min())
-    return Fit(arrangement, (float(axes[0, 0]), float(axes[1, 1])), stray, len(places)) if stray <= MAX_STRAY else None
+    if stray > (MAX_STRAY if min(arrangement.grid) > 1 else MAX_STRAY_ON_LINE):
+        return None
+    return Fit(arrangement, (float(axes[0, 0]), float(axes[1, 1])), stray, len(places))
 
 
 def _with_flip(fit: Fit, given: Arrangement) -> Fit:

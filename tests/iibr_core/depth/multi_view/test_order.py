@@ -153,6 +153,17 @@ def test_photos_that_are_no_views_are_no_light_field(tmp_path: Path) -> None:
         find_disparity(Source(str(folder)))
 
 
+def test_plain_surfaces_do_not_turn_a_quilt_round(tmp_path: Path) -> None:
+    quilt = np.full((2 * HEIGHT, 6 * WIDTH), 100, np.uint8)
+    for view, (x, y, d, size, light) in product(range(12), ((60, 24, 0.3, 9, 230), (28, 44, 1.2, 14, 150))):
+        row, column = divmod(view, 6)
+        left = column * WIDTH + round(x - d * (view - 6))
+        quilt[(1 - row) * HEIGHT + y :][:size, left : left + size] = light
+    path = tmp_path / "plain_qs6x2a1.333.png"
+    Image.fromarray(quilt).convert("RGB").save(path)
+    assert find_disparity(Source(str(path)))[2] == ()
+
+
 def test_viewpoints_are_measured_up_to_a_factor() -> None:
     offsets = [(0.0, 1.0), (1.0, 0.0), (-1.0, 1.0), (0.0, -2.0), (1.0, -3.0), (2.0, 2.0)]
     reference, *others = (np.float32(view_at(t, s) / 255) for t, s in [(0.0, 0.0), *offsets])
