@@ -129,7 +129,9 @@ def _unpack(file: BinaryIO, form: str) -> tuple[Any, ...]:
 def _camera(lens: _Lens, picture: _Picture, source: str) -> NamedCamera:
     size = size_of_pictures(lens.height, lens.width, source)
     if lens.model not in PINHOLES:
-        raise InputError(f"{source}: its camera model is {lens.model}; undistort the pictures, which makes PINHOLE of it")
+        raise InputError(
+            f"{source}: its camera model is {lens.model}; undistort the pictures, which makes PINHOLE of it"
+        )
     focal_x, focal_y, x, y = lens.numbers if lens.model == "PINHOLE" else (lens.numbers[0], *lens.numbers)
     rotation = _rotation(*picture.pose[:4])  # from the world to the camera
     position = -rotation.T @ picture.pose[4:]
