@@ -19,7 +19,7 @@ from iibr_core.depth.stereo_pair import MATCHED_PIXELS
 from iibr_core.depth.subject import subject_disparity
 from iibr_core.formats.light_fields.light_field_formats import open_light_field
 from iibr_core.formats.light_fields.multi_view_scene import MultiView
-from iibr_core.formats.light_fields.order import UNKNOWN, arranged, possible_arrangements
+from iibr_core.formats.light_fields.order import UNKNOWN, arranged, as_given, numbers_of
 from iibr_core.formats.light_fields.views import (
     disparity_range,
     grid_of,
@@ -104,10 +104,8 @@ def _offsets_of(field: MultiView, views: Sequence[ViewUpdate]) -> list[ViewOffse
 def open_field(source: Source) -> MultiView:
     """Return the light field of a source, in the order that is known of it."""
     field, given = open_light_field(Path(source.path)), source.arrangement
-    possible = [] if given == UNKNOWN else possible_arrangements(field, given)
-    if possible and (given.is_complete or field.disparity or source.depth.file):
-        return arranged(field, replace(given, order=possible[0].order, grid=possible[0].grid))
-    return field
+    is_final = given.is_complete or field.disparity or source.depth.file or not field.numbers
+    return arranged(field, as_given(field, given)) if given != UNKNOWN and is_final and numbers_of(field) else field
 
 
 def is_order_known(source: Source) -> bool:

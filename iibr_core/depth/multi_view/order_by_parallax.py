@@ -1,4 +1,4 @@
-"""The order of a light field's views, tested by their parallax: names of files say little about it.
+"""The order of a light field's views, tested by their parallax: names of files are often wrong.
 
 A few views are measured (`viewpoints.py`). Every order that names admit gives them places on a grid; in the right
 order, their viewpoints lie on a grid along the axes of the picture. It also shows which way rows and columns are
@@ -60,7 +60,7 @@ def find_order(scene: MultiView, views: Sequence[StoredColors], given: Arrangeme
     """Return the arrangement that the parallax of the views shows, None if it shows nothing.
 
     views: colours (H, W, 3) of each view of the scene. given: what the user has decided. Its flip is a first guess: the
-    names' own, or rows from bottom to top. Raises InputError if the views contradict every order.
+    names' own, or rows from bottom to top. Raises InputError if the views contradict every order and none is given.
     """
     possible, numbers = possible_arrangements(scene, given), numbers_of(scene)
     places = [places_in(numbers, arrangement) for arrangement in possible]
@@ -75,7 +75,7 @@ def find_order(scene: MultiView, views: Sequence[StoredColors], given: Arrangeme
     ]
     if fits:
         return _with_flip(min(fits, key=lambda fit: round(fit.stray, 1)), given)
-    if found.is_measured.sum() < min(MIN_MEASURED, len(chosen)):
+    if found.is_measured.sum() < min(MIN_MEASURED, len(chosen)) or given.order is not None:
         return None
     raise InputError(
         f"{scene.place}: the parallax of its views fits no order that their names suggest; give --order, --grid and"

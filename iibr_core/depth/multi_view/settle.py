@@ -13,7 +13,7 @@ from iibr_core.depth.multi_view.matching import luma_of
 from iibr_core.depth.multi_view.near_side import nearness_ratio
 from iibr_core.depth.multi_view.order_by_parallax import find_order, views_around
 from iibr_core.formats.light_fields.multi_view_scene import MultiView
-from iibr_core.formats.light_fields.order import FLIPS, UNKNOWN, Arrangement, Flip, arranged
+from iibr_core.formats.light_fields.order import FLIPS, UNKNOWN, Arrangement, Flip, arranged, as_given
 from iibr_core.formats.light_fields.views import grid_of, view_offsets
 from iibr_core.types import FloatImage, InputError, ViewOffset, ViewUpdate, image_size
 
@@ -55,7 +55,7 @@ class Settled:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Notes of the field, and one about the order where the names say another."""
+        """Notes of the field, and one about the order of its views where names state another."""
         return (*self.field.notes, *_notes_on_order(self))
 
 
@@ -71,20 +71,22 @@ def settle(
     by_place = {(view.row, view.column): view for view in views}
     ordered = [by_place[view.place] for view in field.views if view.place is not None]
     fit = find_order(field, [view.colors for view in ordered], given) if field.numbers or given != UNKNOWN else None
-    if fit is None and field.is_guess:
+    if fit is None and field.is_guess and given.order is None:
         raise InputError(
             f"{field.place}: holds no light field; its {len(views)} numbered pictures do not look like views from a"
             " grid or a row. If they are, give --order and --grid"
         )
     if fit is None:
-        return _placed(field, ordered, UNKNOWN, 0, is_sure=True, is_left=is_left)
+        order = UNKNOWN if given == UNKNOWN else as_given(field, given)
+        return _placed(field, ordered, order, 0, is_sure=True, is_left=is_left)
     settled = _placed(field, ordered, fit.arrangement, fit.measured, is_sure=given.flip is not None)
     return settled if settled.is_sure else _faced(settled, settled.coarse.values, CLEAR_RATIO)
 
 
 def confirm(settled: Settled, values: FloatImage) -> Settled:
-    """Return the field as it is, or turned round if the final disparity (H, W) of its centre shows that it is seen
-    from behind; then its disparity must be found again.
+    """Return the field, turned round if the final disparity (H, W) of its centre shows that it is seen from behind.
+
+    Then its disparity must be found again.
     """
     return settled if settled.is_sure else _faced(settled, values, FINAL_CLEAR_RATIO)
 
@@ -139,7 +141,7 @@ def _turned(arrangement: Arrangement) -> Arrangement:
 
 
 def _notes_on_order(settled: Settled) -> tuple[str, ...]:
-    """Return a sentence about an order, none if it is what the names say."""
+    """Return a sentence about an order, none if it is that of the names."""
     found, named, words = settled.arrangement, settled.named, []
     if found.grid is None:
         return ()

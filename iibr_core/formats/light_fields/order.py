@@ -98,6 +98,12 @@ def places_in(numbers: Sequence[tuple[int, ...]], arrangement: Arrangement) -> l
     return places
 
 
+def as_given(scene: MultiView, given: Arrangement) -> Arrangement:
+    """Return the arrangement with the likeliest order and grid where they are not given. Raises InputError as above."""
+    first = possible_arrangements(scene, given)[0]
+    return replace(given, order=first.order, grid=first.grid)
+
+
 def arranged(scene: MultiView, arrangement: Arrangement) -> MultiView:
     """Return the scene with its views on the grid of an arrangement, whose order and grid are known."""
     assert arrangement.grid is not None

@@ -141,6 +141,8 @@ def test_views_in_no_order_are_refused(tmp_path: Path) -> None:
     folder = write_views(tmp_path / "field", {f"v{k // 5}_u{k % 5}": centred(*at) for k, at in enumerate(places)})
     with pytest.raises(InputError, match="fits no order that their names suggest; give --order, --grid and --flip"):
         find_disparity(Source(str(folder)))
+    field = open_settled(Source(str(folder), arrangement=Arrangement("columns")))[0]
+    assert [view.place for view in field.views] == [(k % 5, k // 5) for k in range(25)]
 
 
 def test_photos_that_are_no_views_are_no_light_field(tmp_path: Path) -> None:
