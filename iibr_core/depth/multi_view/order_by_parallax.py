@@ -66,7 +66,7 @@ def find_order(scene: MultiView, views: Sequence[StoredColors], given: Arrangeme
     places = [places_in(numbers, arrangement) for arrangement in possible]
     reference = scene.centre
     chosen = _views_to_measure(places, reference)
-    shrink = -(-max(image_size(views[reference])) // LONGEST_PX)
+    shrink = max(round(max(image_size(views[reference])) / LONGEST_PX), 1)
     found = measure_viewpoints(luma_of(views[reference], shrink), [luma_of(views[k], shrink) for k in chosen])
     fits = [
         fit

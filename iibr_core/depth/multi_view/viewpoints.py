@@ -20,7 +20,7 @@ from iibr_core.runtime.tiling import in_pieces
 from iibr_core.types import FloatImage
 
 LONGEST_PX = 256
-"""Longer side of the small views in which points are looked for."""
+"""Longer side of the small views in which points are looked for, about."""
 CELLS = 9, 12
 """Rows and columns of cells of the reference, in each of which one point is chosen."""
 PATCH_RADIUS_PX = 3
@@ -42,6 +42,8 @@ TOLERANCE_SHARE = 0.1
 BASES = 3
 """Number of views from which the factors are looked for."""
 ROUNDS = 12
+REFINEMENTS = 5
+"""Number of steps in which a shift is refined."""
 
 Doubles = NDArray[np.float64]
 
@@ -145,13 +147,40 @@ def _find_points(reference, other, points, reach, found):
             for column in range(2 * reach + 1):
                 if abs(row - best_y) > radius or abs(column - best_x) > radius:
                     second = min(second, costs[row, column])
-        above, below = costs[best_y - 1, best_x], costs[best_y + 1, best_x]
-        before, after = costs[best_y, best_x - 1], costs[best_y, best_x + 1]
-        bend_y, bend_x = above - 2 * best + below, before - 2 * best + after
-        is_inside = max(max(above, below), max(before, after)) < outside
-        if best <= np.float32(MAX_SECOND) * second and is_inside and bend_y > 0 and bend_x > 0:
-            found[k, 0] = best_y - reach + 0.5 * (above - below) / bend_y
-            found[k, 1] = best_x - reach + 0.5 * (before - after) / bend_x
+        if best <= np.float32(MAX_SECOND) * second:
+            t, s = _refine_shift(reference, other, top, left, best_y - reach, best_x - reach)
+            found[k, 0], found[k, 1] = t, s
+
+
+@kernel
+def _refine_shift(reference, other, top, left, t, s):
+    """Return the shift of a patch to a part of a pixel, by Gauss-Newton steps from whole pixels; NaN if it strays."""
+    side, (height, width) = 2 * PATCH_RADIUS_PX + 1, reference.shape
+    start_t, start_s, t, s = t, s, np.float64(t), np.float64(s)
+    for _ in range(REFINEMENTS):
+        y, x = top + t, left + s
+        if max(abs(t - start_t), abs(s - start_s)) > 1 or min(y, x) < 0 or y >= height - side or x >= width - side:
+            return np.nan, np.nan
+        row_0, column_0 = int(y), int(x)
+        b, a = np.float32(y - row_0), np.float32(x - column_0)
+        tt = ts = ss = t_error = s_error = np.float32(1e-12)
+        for row in range(side):
+            for column in range(side):
+                r, c, i, j = top + row, left + column, row_0 + row, column_0 + column
+                upper = other[i, j] * (1 - a) + other[i, j + 1] * a
+                lower = other[i + 1, j] * (1 - a) + other[i + 1, j + 1] * a
+                error = upper * (1 - b) + lower * b - reference[r, c]
+                down = (reference[r + 1, c] - reference[r - 1, c]) / 2
+                across = (reference[r, c + 1] - reference[r, c - 1]) / 2
+                tt += down * down
+                ts += down * across
+                ss += across * across
+                t_error += down * error
+                s_error += across * error
+        scale = 1 / (tt * ss - ts * ts)
+        t -= scale * (ss * t_error - ts * s_error)
+        s -= scale * (tt * s_error - ts * t_error)
+    return t, s
 
 
 def factorise(shifts: Doubles) -> Viewpoints:
