@@ -2,7 +2,7 @@
 // An epipolar plane image: one line of the picture over the views of one row or column, each view a band.
 #include "stored_view.glsl"
 #ifdef GLOSS
-uniform vec2 view_size_px;
+uniform vec2 view_size_px, view_step;
 uniform float nearest, farthest;  // range of disparities, px per view step
 #endif
 #include "gloss.glsl"

@@ -58,7 +58,8 @@ Answer answer_of(int i) {
 // become smooth; the colour is that of the pixel's middle, so that nothing else is blurred.
 Surface surface_seen(int i, Answer answer, float focus) {
     vec2 in_view = (uv - field_part.xy) / field_part.zw;
-    Ray ray = Ray(in_view, cameras[i].xy / view_size_px, answer.to_view / view_size_px, answer.layer, focus);
+    vec2 camera = cameras[i].xy * view_step / view_size_px, to_view = answer.to_view * view_step / view_size_px;
+    Ray ray = Ray(in_view, camera, to_view, answer.layer, focus);
 #ifdef WARP
     vec2 within = cameras[i].zw * pixel_uv;
     ray.uv += within;

@@ -23,7 +23,8 @@ vec3 mapped(float value) {
 }
 
 void main() {
-    Surface found = first_hit(Ray(uv, vec2(0.0), (to_view - dolly * (uv - 0.5)) / view_size_px, layer, 0.0));
+    vec2 from_ray = (to_view - dolly * (uv - 0.5)) * view_step / view_size_px;
+    Surface found = first_hit(Ray(uv, vec2(0.0), from_ray, layer, 0.0));
 #ifdef VALUES
     float value = textureLod(values, found.at, 0.0).r;
 #else

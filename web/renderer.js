@@ -68,9 +68,9 @@ export function aperturePoints(diameter, widest, count, passIndex, cell = 0) {
 }
 
 // ---- Which stored views answer the cameras: plain numbers, see view_sampling.py. field: { rows, columns, width,
-// height, range, hasDisparity, step, layers }; step: between views that are there, in view steps, the middle one among
-// them; layers: theirs, by "t,s". Samples are { t, s, view, weight }: a camera's place from the eye, the view that
-// answers it, and how much it counts.
+// height, range, hasDisparity, step, rowStep, layers }; step: between views that are there, in view steps, the middle one
+// among them; rowStep: distance between rows, in distances between columns; layers: theirs, by "t,s". Samples are
+// { t, s, view, weight }: a camera's place from the eye, the view that answers it, and how much it counts.
 
 // The first and the last offset along an axis of so many views, of those that are there.
 const ends = (count, step) => [-(count >> 1), count - 1 - (count >> 1)].map((end) => Math.trunc(end / step) * step);
@@ -170,11 +170,12 @@ export function samplesOf(lens, field, passIndex) {
 // Disparity at a place of the picture (0..1) as the eye sees it: the first surface met in the middle view.
 export function pick(field, middle, eye, u, v) {
     const [far, near] = field.range, { width, height } = field;
-    const steps = 2 * Math.ceil(Math.max(Math.abs(eye.s), Math.abs(eye.t)) * (near - far)) + 1;
+    const across = eye.s, down = field.rowStep * eye.t;
+    const steps = 2 * Math.ceil(Math.max(Math.abs(across), Math.abs(down)) * (near - far)) + 1;
     for (let k = 0; ; k++) {
         const disparity = near - (near - far) * k / steps;
-        const x = clamp(Math.floor(u * width + disparity * eye.s), 0, width - 1);
-        const y = clamp(Math.floor(v * height + disparity * eye.t), 0, height - 1);
+        const x = clamp(Math.floor(u * width + disparity * across), 0, width - 1);
+        const y = clamp(Math.floor(v * height + disparity * down), 0, height - 1);
         const seen = far + (near - far) * middle[y * width + x] / 255;
         if (seen >= disparity || k >= steps) return seen;
     }
@@ -359,13 +360,13 @@ export class Renderer {
         const isNear = samples.every(({ t, s, view }) => {
             const [dt, ds] = [view.t - lens.eye.t - t, view.s - lens.eye.s - s];
             const isInCell = Math.max(Math.abs(dt), Math.abs(ds)) <= field.step;
-            return isInCell && Math.hypot(dt, ds) * (nearest - farthest) <= mostPx;
+            return isInCell && Math.hypot(field.rowStep * dt, ds) * (nearest - farthest) <= mostPx;
         });
         this.draw("lens.frag", [hasDisparity && "WARP", hasDisparity && isNear && "NEAR"], target, {
             sample_count: samples.length, cell_views: cellOf(lens, pass), view_size_px: [field.width, field.height],
             pixel_uv: [part.width / width, part.height / height], farthest, nearest, focus_disparity: lens.focus,
             focus_tilt: [0, 0], focus_range: 0, dolly: [0, 0], part: [part.x, part.y, part.width, part.height],
-            field_part: [0, 0, 1, 1],
+            field_part: [0, 0, 1, 1], view_step: [1, field.rowStep],
         }, { colors: [gl.TEXTURE_2D_ARRAY, this.colors], disparities: [gl.TEXTURE_2D_ARRAY, this.disparities] });
     }
 

@@ -108,12 +108,13 @@ def densify(
     dense: GridShape,
     inpainter: Inpainter = fill_background,
     nearest_to: Callable[[], ViewOffset] = lambda: ViewOffset(0.0, 0.0),
+    row_step: float = 1.0,
 ) -> Generator[ViewUpdate]:
     """Yield every view of the dense grid once: the centre, the given ones unchanged, then those nearest to
     `nearest_to()`.
 
-    given: all views of the sparse grid, of equal size. Disparity is per step of the dense grid. Raises InputError as
-    `require_steps` does.
+    given: all views of the sparse grid, of equal size. row_step: distance between rows, in distances between columns.
+    Disparity is per column of the dense grid. Raises InputError as `require_steps` does.
     """
     steps, is_hdr = require_steps(sparse, dense), given[0].colors.dtype != np.uint8
     places = {(view.row * steps, view.column * steps): view for view in given}
@@ -128,7 +129,7 @@ def densify(
         return ViewUpdate(v + round(offset.t), u + round(offset.s), colors, view.disparity, view.inpainted)
 
     with suppress(Cancelled):
-        views = _ViewsBetween(given, steps, dense, inpainter)
+        views = _ViewsBetween(given, steps, dense, inpainter, row_step)
         for offset in completing[:early]:
             yield stored(offset, views.complete(offset))
         for (row, column), view in sorted(places.items(), key=lambda item: hypot(*dense.offset(*item[0]))):
@@ -142,16 +143,21 @@ def densify(
 class _ViewsBetween:
     """Makes views between given ones, in several threads once the rays are complete."""
 
-    def __init__(self, given: Sequence[GivenView], steps: int, dense: GridShape, inpainter: Inpainter) -> None:
-        self._renderer, self._steps, self._inpainter = Renderer(), steps, inpainter
+    def __init__(
+        self, given: Sequence[GivenView], steps: int, dense: GridShape, inpainter: Inpainter, row_step: float
+    ) -> None:
+        self._renderer, self._steps, self._inpainter, self._row_step = Renderer(), steps, inpainter, row_step
+        farthest = max(row_step, 1.0)
         self._sources: list[tuple[ViewOffset, RaySet]] = [
             (
                 dense.offset(view.row * steps, view.column * steps),
-                rays_of_photo(encoded_from_stored(view.colors), view.disparity / np.float32(steps), steps, 0),
+                rays_of_photo(
+                    encoded_from_stored(view.colors), view.disparity / np.float32(steps), steps * farthest, 0
+                ),
             )
             for view in given
         ]
-        self._farthest = float(max(dense))
+        self._farthest = max(dense) * farthest
         self._inpainted: tuple[ViewOffset, RaySet] | None = None
 
     def complete(self, offset: ViewOffset) -> View:
@@ -162,7 +168,7 @@ class _ViewsBetween:
                 self._inpainted = offset, RaySet(MAX_COMPLETING, image_size(view.disparity), self._farthest)
             origin, rays = self._inpainted
             disparity = np.where(view.occluded, view.disparity, np.float32(np.nan))
-            rays.add(_between(origin, offset), view.colors, disparity, view.occluded)
+            rays.add(self._moved(origin, offset), view.colors, disparity, view.occluded)
         return view
 
     def make(self, offset: ViewOffset) -> View:
@@ -171,13 +177,13 @@ class _ViewsBetween:
         colors, disparity, hole = view.colors, view.disparity, view.occluded
         if hole.any() and self._inpainted is not None:
             origin, rays = self._inpainted
-            filled, _ = self._renderer.visible(rays, _between(origin, offset))
+            filled, _ = self._renderer.visible(rays, self._moved(origin, offset))
             is_filled = hole & ~filled.occluded
             colors[is_filled], disparity[is_filled] = filled.colors[is_filled], filled.disparity[is_filled]
             hole &= filled.occluded
         if hole.any():
-            at, nearest = min(self._sources, key=lambda source: np.hypot(*_between(source[0], offset)))
-            self._inpainter(colors, disparity, hole, nearest.photo_disparity, _between(at, offset))
+            at, nearest = min(self._sources, key=lambda source: hypot(*self._moved(source[0], offset)))
+            self._inpainter(colors, disparity, hole, nearest.photo_disparity, self._moved(at, offset))
         return view
 
     def _merge(self, offset: ViewOffset) -> View:
@@ -186,10 +192,10 @@ class _ViewsBetween:
         colors, disparity = np.zeros((*size, 3), np.float32), np.zeros(size, np.float32)
         total, heaviest = np.zeros(size, np.float32), np.zeros(size, np.float32)
         for at, rays in self._sources:
-            away = _between(at, offset)
+            away = ViewOffset(offset.t - at.t, offset.s - at.s)
             if max(map(abs, away)) > self._steps:
                 continue
-            view, covered = self._renderer.visible(rays, away)
+            view, covered = self._renderer.visible(rays, self._moved(at, offset))
             near = (1 - abs(away.t) / self._steps) * (1 - abs(away.s) / self._steps) + FAR_WEIGHT
             weight = np.where(view.occluded, np.float32(0), np.float32(near) * covered**COVERED_POWER)
             # Encoded, as colours of one surface are interpolated: all views show the same light.
@@ -200,6 +206,10 @@ class _ViewsBetween:
         hole = ~(total > 0)
         colors /= np.where(hole, np.float32(1), total)[..., None]
         return View(colors, disparity, hole, hole.copy())
+
+    def _moved(self, origin: ViewOffset, offset: ViewOffset) -> ViewOffset:
+        """Return the offset from one viewpoint to another, in distances between columns."""
+        return ViewOffset(self._row_step * (offset.t - origin.t), offset.s - origin.s)
 
 
 def _completing_views(sparse: GridShape, dense: GridShape, steps: int) -> list[ViewOffset]:
@@ -213,8 +223,3 @@ def _completing_views(sparse: GridShape, dense: GridShape, steps: int) -> list[V
     )
     places = sorted({*product(rows, columns), dense.centre})
     return sorted((dense.offset(*at) for at in places), key=lambda offset: hypot(*offset))
-
-
-def _between(origin: ViewOffset, offset: ViewOffset) -> ViewOffset:
-    """Return the offset from one viewpoint to another."""
-    return ViewOffset(offset.t - origin.t, offset.s - origin.s)

@@ -115,13 +115,14 @@ def write_cameras(path: Path, source: ExportSource, options: ExportOptions, vari
     return SHIFTED.format(moved_px) if moved_px > MAX_OFF_CENTRE_PX else None
 
 
-def write_light_field(path: Path, source: ExportSource, options: ExportOptions, variant: str) -> None:
-    """Write all views, with the disparity of every view if the layout has a place for it."""
+def write_light_field(path: Path, source: ExportSource, options: ExportOptions, variant: str) -> str | None:
+    """Write all views, with the disparity of every view if the layout has a place for it; return a note on its rows."""
     scene = source.scene
     focal_px = source.focal_px or float(scene.width)
     scale = _scale_of(source, focal_px) if variant == "hci" else write.UNKNOWN_SCALE
     with closing(source.views()) as views:
         write.write_light_field(path, variant, scene.grid, views, focal_px, scene.name, True, scale)
+    return write.note_on_rows(scene.row_step)
 
 
 def _scale_of(source: ExportSource, focal_px: float) -> write.FieldScale:

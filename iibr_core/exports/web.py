@@ -116,6 +116,7 @@ def _field(source: ExportSource, views: WebViews) -> dict[str, Any]:
         "width": views.size.width,
         "height": views.size.height,
         "step": views.form.every,
+        "rowStep": scene.row_step,
         "order": [{"t": place.t, "s": place.s} for place in views.places],
         "type": AVIF,
         "isMoving": len(views.colors) < len(views.places),

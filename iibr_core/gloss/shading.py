@@ -6,7 +6,7 @@ result = matt (1 - a) + light a in linear light, where a is the share that the l
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import sqrt
@@ -23,7 +23,7 @@ from iibr_core.runtime.kernels import kernel
 from iibr_core.runtime.scalars import linear_scalar, nearest_pixel, srgb_scalar
 from iibr_core.runtime.tiling import in_bands
 from iibr_core.surfaces import EDGE_PX
-from iibr_core.types import FloatImage, GridShape, ViewOffset, ViewUpdate, image_size
+from iibr_core.types import FloatImage, ViewOffset, ViewUpdate, image_size
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,15 +63,20 @@ def make_gloss_maps(
     return GlossMaps(surface, geometry, normals, disparity, surface_mask(surface, photo, disparity))
 
 
-def shade_views(views: Iterator[ViewUpdate], gloss: Gloss, maps: GlossMaps, grid: GridShape) -> Iterator[ViewUpdate]:
-    """Yield the views of a grid with their gloss. Views without disparity stay as they are."""
+def shade_views(
+    views: Iterator[ViewUpdate], gloss: Gloss, maps: GlossMaps, offset_of: Callable[[int, int], ViewOffset]
+) -> Iterator[ViewUpdate]:
+    """Yield the views with their gloss. Views without disparity stay as they are.
+
+    offset_of: viewpoint by row and column, in the steps that disparity counts.
+    """
     is_empty = not maps.mask.any()
     for view in views:
         if view.disparity is None or is_empty:
             yield view
             continue
         colors = encoded_from_stored(view.colors)
-        shade(colors, view.disparity, grid.offset(view.row, view.column), gloss, maps)
+        shade(colors, view.disparity, offset_of(view.row, view.column), gloss, maps)
         yield replace(view, colors=stored_from_encoded(colors, view.colors.dtype != np.uint8))
 
 

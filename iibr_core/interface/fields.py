@@ -35,7 +35,8 @@ class LightField:
 
     views: (V, U, H, W, 3), uint8 (255 = white), float16 for HDR photos (1 = white). disparity: (V, U, H, W) float32, px
     from view to view, None if no view has any. inpainted: (V, U, H, W) bool, True where the photo saw nothing; None if
-    it is unknown. focal_px: focal length in px of a view.
+    it is unknown. focal_px: focal length in px of a view. row_step: distance between rows, in distances between
+    columns: from row to row, points move by so many times their disparity.
     """
 
     views: StoredColors
@@ -43,6 +44,7 @@ class LightField:
     inpainted: NDArray[np.bool_] | None
     focal_px: float
     name: str = "field"
+    row_step: float = 1.0
     _view_between: MakeView | None = field(default=None, repr=False)
 
     @property
@@ -94,7 +96,8 @@ class LightField:
             weights = grid_weights(points, CENTRE, self.grid)
             for row, column in np.argwhere(weights > 0):
                 colors = encoded_from_stored(self.views[row, column])
-                yield self.grid.offset(row, column), float(weights[row, column]), colors
+                t, s = self.grid.offset(row, column)
+                yield ViewOffset(self.row_step * t, s), float(weights[row, column]), colors
             return
         count = self._camera_count(focus, min(aperture, widest))
         for t, s in aperture_points(ApertureShape(), aperture, widest, count, 0).tolist():
@@ -122,7 +125,12 @@ class LightField:
 
 
 def gather(
-    views: Iterator[View], grid: GridShape, focal_px: float, name: str, view_between: MakeView | None
+    views: Iterator[View],
+    grid: GridShape,
+    focal_px: float,
+    name: str,
+    row_step: float,
+    view_between: MakeView | None,
 ) -> LightField:
     """Return the light field of all views."""
     first = next(views)
@@ -134,4 +142,4 @@ def gather(
                 array[view.row, view.column] = values
     colors, disparity, inpainted = arrays
     assert colors is not None
-    return LightField(colors, disparity, inpainted, focal_px, name, view_between)
+    return LightField(colors, disparity, inpainted, focal_px, name, row_step, view_between)

@@ -18,7 +18,7 @@ from iibr_core.depth.models.catalog import model_to_use
 from iibr_core.formats.images.photo import DEFAULT_MAX_PIXELS, focal_px_from_fov, read_photo
 from iibr_core.formats.light_fields.light_field_formats import is_light_field
 from iibr_core.formats.light_fields.multi_view_scene import MultiView
-from iibr_core.formats.light_fields.views import grid_of, read_stored_view, read_views
+from iibr_core.formats.light_fields.views import grid_of, read_stored_view, read_views, row_step_of
 from iibr_core.formats.maps.disparity_file import map_at_size
 from iibr_core.inpainting.registry import DEFAULT_INPAINTER
 from iibr_core.interface.fields import LightField, MakeView, View, gather
@@ -56,12 +56,16 @@ class ViewOptions(TypedDict, total=False):
 
 
 class _Making(NamedTuple):
-    """The views of a grid, as they come. view_between: makes views between them, None if nothing does."""
+    """The views of a grid, as they come.
+
+    view_between: makes views between them, None if nothing does. row_step: see `LightField`.
+    """
 
     grid: GridShape
     views: Iterator[View]
     view_between: MakeView | None = None
     doing: str = MAKING
+    row_step: float = 1.0
 
     def watched(self, should_stop: ShouldStop, report_progress: ReportProgress) -> Iterator[View]:
         """Yield the views and report progress. Raises Cancelled once should_stop is true."""
@@ -105,7 +109,7 @@ class Scene(ABC):
         with stoppable(should_stop), watched(report_progress):
             making = self._make(_grid_shape(grid), **options)
         views = making.watched(should_stop, report_progress)
-        return gather(views, making.grid, self.focal_px, self.name, making.view_between)
+        return gather(views, making.grid, self.focal_px, self.name, making.row_step, making.view_between)
 
     def views(
         self,
@@ -172,7 +176,7 @@ class FieldScene(Scene):
     """A light field on disk. Views between its own are made from all of them; their disparity is found if need be."""
 
     def __init__(self, field: MultiView) -> None:
-        self._field, self._grid = field, grid_of(field)
+        self._field, self._grid, self._row_step = field, grid_of(field), row_step_of(field)
         self.photo = encoded_from_stored(read_stored_view(field, *self._grid.centre))
         self.name, self.notes, self.focal_px = field.name, field.notes, field.focal_px or float(self.photo.shape[1])
         self.depth_source = "the light field" if field.disparity else "none"
@@ -181,8 +185,9 @@ class FieldScene(Scene):
         if options.get("parallax", "viewing") != "viewing" or options.get("depth_strength", 1) != 1:
             raise InputError(f"{self.name}: parallax and depth_strength are for photos; leave them out")
         if grid is None or grid == self._grid:
-            return _Making(self._grid, read_views(self._field)[1], doing=READING)
-        return _Making(grid, read_dense(self._field, grid, options.get("inpaint", DEFAULT_INPAINTER))[2])
+            return _Making(self._grid, read_views(self._field)[1], doing=READING, row_step=self._row_step)
+        views = read_dense(self._field, grid, options.get("inpaint", DEFAULT_INPAINTER))[2]
+        return _Making(grid, views, row_step=self._row_step)
 
 
 def open(

@@ -25,6 +25,7 @@ from iibr_core.formats.light_fields.views import (
     grid_of,
     offsets_by_place,
     read_views,
+    row_step_of,
     step_length,
     view_offsets,
 )
@@ -174,7 +175,7 @@ def read_dense(
     sparse = grid_of(field)
     steps, inpainter = require_steps(sparse, grid, field.name), load_inpainter(inpaint)
     given = read_given_views(field)
-    return given, steps, densify(given, sparse, grid, inpainter)
+    return given, steps, densify(given, sparse, grid, inpainter, row_step=row_step_of(field))
 
 
 def _with_found_disparity(
@@ -202,7 +203,13 @@ def _with_found_disparity(
 
 
 def _settled_scene(scene: Scene, settled: Settled) -> Scene:
-    return replace(scene, arrangement=settled.arrangement, grid=grid_of(settled.field), notes=settled.notes)
+    return replace(
+        scene,
+        arrangement=settled.arrangement,
+        grid=grid_of(settled.field),
+        row_step=row_step_of(settled.field),
+        notes=settled.notes,
+    )
 
 
 def _with_problem(scene: Scene, error: InputError) -> Scene:
@@ -245,6 +252,7 @@ def _scene_as_read(source: Source, field: MultiView, centre: ViewUpdate, range_p
         width=width,
         height=height,
         grid=grid_of(field),
+        row_step=row_step_of(field),
         disparity_range_px=range_px or UNKNOWN_DISPARITY_RANGE_PX,
         depth_source="light field" if centre.disparity is not None else "none",
         is_hdr=field.is_hdr,

@@ -13,7 +13,7 @@ from iibr_core.formats.light_fields.order import UNKNOWN, Arrangement
 from iibr_core.inpainting.registry import DEFAULT_INPAINTER
 from iibr_core.method.plan import ScenePlan
 from iibr_core.scenes.screen_size import ScreenSize
-from iibr_core.types import SRGB, ColorSpace, Disparity, FloatImage, GridShape, ImageSize, Photo, ViewUpdate
+from iibr_core.types import SRGB, ColorSpace, Disparity, FloatImage, GridShape, ImageSize, Photo, ViewOffset, ViewUpdate
 
 if TYPE_CHECKING:
     from iibr_core.depth.editing.canvas import DepthCanvas
@@ -80,6 +80,7 @@ class Scene:
     infinity_px: field disparity of infinitely far points, None where a light field does not state it. is_sketch:
     whether it is a small picture that is shown while the photo is read. found_span_px: range of the field disparity
     before edits, None if it cannot be edited. arrangement: order of the views of a light field, as far as it was found.
+    row_step: distance between its rows, in distances between columns.
     """
 
     source: Source
@@ -107,6 +108,7 @@ class Scene:
     infinity_px: float | None = None
     found_span_px: float | None = None
     arrangement: Arrangement = UNKNOWN
+    row_step: float = 1.0
 
     @property
     def is_guessed(self) -> bool:
@@ -122,6 +124,14 @@ class Scene:
     def size(self) -> ScreenSize:
         """Return the size of a view on the screen."""
         return ScreenSize(self.width, self.height)
+
+    def in_columns(self, at: ViewOffset) -> ViewOffset:
+        """Return a viewpoint in distances between columns, as disparity counts, from one in steps of the grid."""
+        return ViewOffset(self.row_step * at.t, at.s)
+
+    def viewpoint(self, row: int, column: int) -> ViewOffset:
+        """Return the viewpoint of a view from the centre view, in distances between columns."""
+        return self.in_columns(self.grid.offset(row, column))
 
 
 @dataclass(frozen=True)

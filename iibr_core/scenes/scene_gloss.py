@@ -75,4 +75,4 @@ def add_gloss(views: Iterator[ViewUpdate], gloss: Gloss | None, scene: Scene) ->
     centre = next(views)
     request = gloss_request(gloss, scene, centre)
     views = chain((centre,), views)
-    yield from views if request is None else shade_views(views, gloss, make_maps(request), scene.grid)
+    yield from views if request is None else shade_views(views, gloss, make_maps(request), scene.viewpoint)

@@ -2,6 +2,7 @@
 uniform sampler2DArray colors;
 uniform sampler2DArray disparities;  // px per view step, nearest texel
 uniform vec2 view_size_px;
+uniform vec2 view_step;              // distances of views across and down, in those of columns: (1, row step)
 uniform float nearest, farthest;     // range of disparities, px per view step
 uniform float focus_disparity;       // in the picture's middle
 uniform vec2 focus_tilt;             // how much it grows to the right and to the lower border

@@ -1,5 +1,5 @@
 // A glossy surface under a far, round light, as in iibr_core/gloss/shading.py and microfacet.py. Needs view_size_px,
-// farthest and nearest, as in field.glsl.
+// view_step, farthest and nearest, as in field.glsl.
 #ifdef GLOSS
 uniform sampler2D gloss_surface;    // of the photo: normal's x and y, share of the surface, disparity (px per view step)
 uniform float gloss_focal;          // px
@@ -24,6 +24,8 @@ float lobe_share(vec3 normal, vec3 to_eye) {
 // Light of what is seen at `at` in the stored view at offset `view`, as an eye on the ray through the grid at `ray` sees
 // it. depth: 0..1 from farthest to nearest.
 vec3 glossy(vec3 light, vec2 at, vec2 view, float depth, vec2 ray) {
+    view *= view_step;
+    ray *= view_step;
     float disparity = mix(farthest, nearest, depth);
     vec2 place = at + disparity * view / view_size_px;
     vec4 surface = textureLod(gloss_surface, place, 0.0);

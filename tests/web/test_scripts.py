@@ -28,6 +28,7 @@ DESKTOP_FIELD = {
     "present": PRESENT,
     "hdr": False,
     "color_space": SRGB,
+    "row_step": 1.0,
 }
 """The field of `node` as the desktop has it."""
 DIAMETERS = (0.3, 3.0, 9.5)
@@ -45,7 +46,8 @@ def node(code: str, given: Any = None) -> Any:
     program = shutil.which("node")
     assert program is not None, "make test installs node"
     field = (
-        "{ rows: 5, columns: 7, width: 96, height: 64, range: [-2, 2], hasDisparity: true, step: 1, layers: new Map() }"
+        "{ rows: 5, columns: 7, width: 96, height: 64, range: [-2, 2], hasDisparity: true, step: 1, rowStep: 1,"
+        " layers: new Map() }"
     )
     text = (
         f"import * as renderer from {json.dumps((WEB / 'renderer.js').as_uri())};\n"

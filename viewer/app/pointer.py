@@ -112,7 +112,7 @@ class _Hand:
     def place_in_photo(self) -> tuple[tuple[float, float], float]:
         """Return where the photo shows the surface under the pointer, in shares of its size, and its disparity."""
         x_px, y_px = self.pixel
-        disparity, eye = self.pick(x_px, y_px) or 0.0, self.state.optics.eye
+        disparity, eye = self.pick(x_px, y_px) or 0.0, self.scene.in_columns(self.state.optics.eye)
         x_px, y_px = x_px + disparity * eye.s, y_px + disparity * eye.t
         return ((x_px + 0.5) / self.scene.width, (y_px + 0.5) / self.scene.height), disparity
 

@@ -12,8 +12,8 @@ from iibr_core.beyond.free_cameras import FreeViews, depths_of, fitted_cameras, 
 from iibr_core.color import photo_in_srgb
 from iibr_core.depth.choice import DepthOrigin
 from iibr_core.formats.images.write import write_image
-from iibr_core.formats.light_fields.views import step_length
-from iibr_core.formats.light_fields.write import FieldScale
+from iibr_core.formats.light_fields.views import row_step_of, step_length
+from iibr_core.formats.light_fields.write import FieldScale, note_on_rows
 from iibr_core.formats.outputs import write_folder
 from iibr_core.formats.poses import central_camera, read_poses
 from iibr_core.gloss.settings import Gloss
@@ -75,7 +75,8 @@ def write_dense_field(source: Source, grid: GridShape, write: WriteField) -> Wri
         infinity_px = None if field.infinity_px is None else field.infinity_px * step_length(field) / steps
         scale = FieldScale(infinity_px)
         write(_reported(views, count), focal_px=field.focal_px or float(size.width), name=field.name, scale=scale)
-    return Written(f"{count} views of {size}", notes)
+    note = note_on_rows(row_step_of(field))
+    return Written(f"{count} views of {size}", (*notes, note) if note else notes)
 
 
 def write_free_views(source: Source, poses: Path, photo_pose: int | None, is_literal: bool, folder: Path) -> Written:

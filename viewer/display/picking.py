@@ -22,8 +22,9 @@ def is_kept_for_picking(grid: GridShape, row: int, column: int) -> bool:
 def pick_disparity(maps: Mapping[ViewOffset, FloatImage], eye: ViewOffset, x_px: float, y_px: float) -> float | None:
     """Return the disparity (px per view step) seen at a pixel of the picture from the eye, None without maps.
 
-    maps: disparity (H, W) by view offset. Each pixel of the view nearest to the eye lands where the eye would see it.
-    The front-most pixel under the pointer counts; in a hole, the pixel that lands nearest.
+    maps: disparity (H, W) by view offset, in distances between columns, as the eye. Each pixel of the view nearest to
+    the eye lands where the eye would see it. The front-most pixel under the pointer counts; in a hole, the pixel that
+    lands nearest.
     """
     if not maps:
         return None

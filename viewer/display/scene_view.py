@@ -162,7 +162,7 @@ class SceneView:
         """Return the disparity seen at a pixel of the picture, None if the scene has none."""
         if self._fallback_view is not None and self._fallback_view.disparity is not None:
             return pick_disparity({CENTRE: self._fallback_view.disparity}, eye, x_px, y_px)
-        return pick_disparity(self._disparities, eye, x_px, y_px)
+        return pick_disparity(self._disparities, self._scene.in_columns(eye) if self._scene else eye, x_px, y_px)
 
     def draw(self, state: AppState, size_px: ScreenSize, part: Rect = WHOLE) -> Picture | None:
         """Draw the picture of this state, or a part of it, stretched to size_px, if it has changed, or refine it.
@@ -237,14 +237,13 @@ class SceneView:
         self._waiting.clear()
 
     def _open_field(self, scene: Scene, grid: GridShape, gloss: GlossMaps | None) -> None:
-        self.renderer.open_field(
-            grid, scene.width, scene.height, scene.is_hdr, scene.has_view_disparity, scene.color_space
-        )
+        size = scene.width, scene.height, scene.is_hdr, scene.has_view_disparity
+        self.renderer.open_field(grid, *size, scene.color_space, scene.row_step)
         self.renderer.set_gloss(gloss)
 
     def _keep_for_picking(self, scene: Scene, view: ViewUpdate) -> None:
         if view.disparity is not None and is_kept_for_picking(scene.grid, view.row, view.column):
-            self._disparities[scene.grid.offset(view.row, view.column)] = view.disparity
+            self._disparities[scene.viewpoint(view.row, view.column)] = view.disparity
 
     def _is_one_view(self, optics: Optics) -> bool:
         """Return whether this picture is one final view, so that views to come do not change it."""

@@ -47,6 +47,6 @@ def snapshot_of(gl: GLContext, ready: SceneReady) -> SceneSnapshot:
     scene, centre = ready.scene, ready.centre
     size = scene.width, scene.height, scene.is_hdr, scene.has_view_disparity
     field = LightFieldTexture(gl.ctx, scene.grid, *size)
-    field.color_space = scene.color_space
+    field.color_space, field.row_step = scene.color_space, scene.row_step
     field.upload(*scene.grid.centre, centre.colors, centre.disparity)
     return SceneSnapshot(scene, ready.loaded, centre, field)

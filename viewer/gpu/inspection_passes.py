@@ -16,6 +16,7 @@ from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import SRGB
 from viewer.gpu.light_field_texture import LightFieldTexture
 from viewer.gpu.programs import Program, ProgramCache
+from viewer.gpu.refocus.picture_lens import dolly_of
 from viewer.gpu.render_targets import RenderTarget
 
 MAX_VIEWS = 128
@@ -78,7 +79,7 @@ class InspectionPasses:
             first = field.grid.offset(0, line.view) if line.is_upright else field.grid.offset(line.view, 0)
             far, near = field.range_px
             field.gloss.use(program, gloss, (first.s, first.t))
-            program.set_uniforms(view_size_px=(field.width, field.height), nearest=near, farthest=far)
+            program.set_uniforms(nearest=near, farthest=far, **_sizes_of(field))
         texture = self._use_image("upright" if line.is_upright else "across", size_px)
         program.draw()
         return texture
@@ -133,9 +134,9 @@ class InspectionPasses:
         at = field.grid.offset(*view)
         far, near = field.range_px
         field.disparities.use(1)
-        program.set_uniforms(disparities=1, view_size_px=(field.width, field.height), nearest=near, farthest=far)
+        program.set_uniforms(disparities=1, nearest=near, farthest=far, **_sizes_of(field))
         program.set_uniforms(
-            dolly=(-2.0 * optics.dolly, -2.0 * optics.dolly * field.height / field.width),
+            dolly=dolly_of(optics, field),
             to_view=(at.s - optics.eye.s, at.t - optics.eye.t),
             layer=float(field.layers[view]),
             color_map=[tuple(value / 255 for value in color) for color in style.color_map],
@@ -198,6 +199,10 @@ class InspectionPasses:
 def _conversion(field: LightFieldTexture) -> dict[str, bool]:
     """Return the switch for the conversion to the screen's sRGB."""
     return {"OTHER_PRIMARIES": field.color_space != SRGB}
+
+
+def _sizes_of(field: LightFieldTexture) -> dict[str, tuple[float, float]]:
+    return {"view_size_px": (field.width, field.height), "view_step": (1.0, field.row_step)}
 
 
 def _use_colors(program: Program, field: LightFieldTexture, exposure: float) -> None:

@@ -38,7 +38,8 @@ class LightFieldTexture:
 
     colors: RGBA8, or RGBA16F for HDR; alpha is the disparity scaled to 0..1 over `range_px`. disparities: R16F, px per
     view step. layers: (V, U), layer of each view. present, has_disparity: (V, U) bool. uploads: (V, U), number of times
-    that a view was stored. color_space: of the light. gloss: maps of a glossy surface, None without. range_px:
+    that a view was stored. color_space: of the light. row_step: distance between rows, in distances between
+    columns. gloss: maps of a glossy surface, None without. range_px:
     (farthest, nearest) disparity, known from the first view that has any.
     """
 
@@ -60,6 +61,7 @@ class LightFieldTexture:
         check_fits(ctx, GridShape(1, 1) if is_single else grid, width, height)
         self._ctx = ctx
         self.grid, self.width, self.height, self.hdr, self.color_space = grid, width, height, hdr, SRGB
+        self.row_step = 1.0
         self.layers = np.arange(math.prod(grid)).reshape(grid) * (not is_single)
         self.present, self.has_disparity, self.uploads = np.zeros(grid, bool), np.zeros(grid, bool), np.zeros(grid, int)
         self.range_px = (0.0, 0.0)

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterator
+from statistics import fmean
 
 from iibr_core.color import stored_from_encoded
 from iibr_core.formats.images.photo import encoded_colors
@@ -19,6 +20,9 @@ from iibr_core.types import (
     ViewUpdate,
     image_size,
 )
+
+EQUAL_STEPS = 0.01
+"""Largest share by which the distances of rows and of columns differ that count as equal."""
 
 
 def grid_of(scene: MultiView) -> GridShape:
@@ -82,6 +86,18 @@ def view_offsets(scene: MultiView) -> list[ViewOffset]:
 def offsets_by_place(scene: MultiView) -> dict[GridIndex, ViewOffset]:
     """Return the same by the row and column of each view."""
     return {view.place: at for view, at in zip(scene.views, view_offsets(scene)) if view.place is not None}
+
+
+def row_step_of(scene: MultiView) -> float:
+    """Return the mean distance between rows, in distances between columns; 1 where there is none to compare."""
+    grid, offsets = grid_of(scene), offsets_by_place(scene)
+    if min(grid) == 1:
+        return 1.0
+    below, right = grid.rows - 1, grid.columns - 1
+    down = fmean(offsets[below, u].t - offsets[0, u].t for u in range(grid.columns)) / below
+    across = fmean(offsets[v, right].s - offsets[v, 0].s for v in range(grid.rows)) / right
+    is_equal = min(down, across) <= 0 or abs(down / across - 1) < EQUAL_STEPS
+    return 1.0 if is_equal else down / across
 
 
 def _nearest_to_centre(grid: GridShape) -> list[GridIndex]:

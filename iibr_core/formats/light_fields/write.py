@@ -63,6 +63,12 @@ depth_map_scale = 1.0
 """
 
 
+def note_on_rows(row_step: float) -> str | None:
+    """Return a sentence that no layout states unequal steps; None if rows stand as far apart as columns."""
+    words = "Rows stand {:.2g} times as far apart as columns; the written layout cannot state that."
+    return None if row_step == 1 else words.format(row_step)
+
+
 class FieldScale(NamedTuple):
     """Geometry that HCI's parameters state.
 

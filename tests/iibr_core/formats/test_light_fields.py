@@ -9,8 +9,9 @@ import pytest
 from PIL import Image
 
 from iibr_core.evaluation.scenes import read_scene
+from iibr_core.formats.images.write import write_image
 from iibr_core.formats.light_fields.light_field_formats import open_light_field
-from iibr_core.formats.light_fields.views import disparity_range, read_stored_view, read_views
+from iibr_core.formats.light_fields.views import disparity_range, read_stored_view, read_views, row_step_of
 from iibr_core.formats.light_fields.write import WRITERS, FieldScale, write_light_field
 from iibr_core.formats.maps.pfm import read_pfm
 from iibr_core.types import GridShape, InputError, ViewUpdate
@@ -41,6 +42,16 @@ def test_the_viewer_and_the_evaluation_open_every_layout(tmp_path, name) -> None
         assert view.colors.shape == (*size, 3)
         np.testing.assert_array_equal(view.colors, read_stored_view(scene, row, column))
     assert sum(view.disparity is not None for view in by_place.values()) == len(scene.disparity)
+
+
+@pytest.mark.parametrize(("spacing", "row_step"), [(1.0, 1.0), (0.4, 0.4), (-2.5, 2.5)])
+def test_rows_stand_as_far_apart_as_positions_in_names_say_but_for_jitter(tmp_path, spacing, row_step) -> None:
+    jitter = np.random.default_rng(3).uniform(-0.02, 0.02, (5, 5, 2))
+    for row, column in np.ndindex(5, 5):
+        y, x = 10 * (np.array((spacing * row, column)) + jitter[row, column])
+        write_image(tmp_path / f"out_{row:02d}_{column:02d}_{y:.3f}_{x:.3f}.png", np.zeros((4, 4, 3), np.float32))
+    found = row_step_of(open_light_field(tmp_path))
+    assert found == pytest.approx(row_step, rel=0.0 if row_step == 1 else 0.02)
 
 
 def test_the_range_is_stated_or_that_of_the_map_nearest_to_the_centre(tmp_path) -> None:

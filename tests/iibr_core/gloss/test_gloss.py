@@ -270,7 +270,7 @@ def test_views_keep_their_kind_and_those_without_disparity_or_surface_stay(is_ma
     flat = np.full(SIZE, 0.75, np.float32)
     given = [ViewUpdate(1, 1, (GREY * 255).astype(np.uint8), flat), ViewUpdate(1, 0, GREY.astype(np.float16), None)]
     gloss = replace(GLOSS, surface=GlossSurface(strokes_only=not is_marked))
-    first, second = shade_views(iter(given), gloss, maps_of(gloss, flat), GridShape(3, 3))
+    first, second = shade_views(iter(given), gloss, maps_of(gloss, flat), GridShape(3, 3).offset)
     assert second is given[1]
     if is_marked:
         assert first.colors.dtype == np.uint8

@@ -136,6 +136,7 @@ class Passes:
             colors=COLORS,
             disparities=DISPARITIES,
             view_size_px=(field.width, field.height),
+            view_step=(1.0, field.row_step),
             nearest=near,
             farthest=far,
             focus_disparity=lens.optics.focus_disparity,
@@ -192,7 +193,7 @@ def _are_near(field: LightFieldTexture, lens: Lens, samples: Samples) -> bool:
     if lens.has_dolly:
         return False
     to_views = _to_views(field, lens, samples)
-    parallax_px = np.hypot(*to_views.T) * (field.range_px[1] - field.range_px[0])
+    parallax_px = np.hypot(field.row_step * to_views[:, 0], to_views[:, 1]) * (field.range_px[1] - field.range_px[0])
     max_px = NEAR_PX if field.present.sum() > 1 else ALONE_NEAR_PX
     is_in_cell = bool(np.abs(to_views).max() <= 1)
     return is_in_cell and (parallax_px + np.hypot(*samples.cameras.T) * 2 * lens.optics.focus_range).max() <= max_px

@@ -139,12 +139,18 @@ def lens_of(
         optics=optics,
         diameter=diameter,
         widest=widest,
-        dolly=(-2.0 * optics.dolly, -2.0 * optics.dolly * field.height / field.width),
+        dolly=dolly_of(optics, field),
         blur_px=min(diameter, widest) * _max_defocus(optics, field.range_px) * width_px / field.width,
         highlight_gain=optics.highlight_gain(diameter, field.hdr),
         level=level,
         color_space=field.color_space,
     )
+
+
+def dolly_of(optics: Optics, field: LightFieldTexture) -> tuple[float, float]:
+    """Return the change of the place (s, t) where rays cross the grid, in view steps per picture size."""
+    across = -2.0 * optics.dolly
+    return across, across * field.height / field.width / field.row_step
 
 
 def is_stored(eye: ViewOffset, field: LightFieldTexture) -> bool:

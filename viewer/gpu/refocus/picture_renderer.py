@@ -75,13 +75,16 @@ class Renderer:
         hdr: bool,
         with_disparity: bool,
         color_space: ColorSpace = SRGB,
+        row_step: float = 1.0,
     ) -> None:
-        """Start an empty light field of this size in place of the one before. color_space: of its views.
+        """Start an empty light field of this size in place of the one before.
+
+        color_space: of its views. row_step: distance between its rows, in distances between columns.
 
         Raises InputError if the graphics driver cannot hold it; the field before then stays.
         """
         field = LightFieldTexture(self.ctx, grid, width, height, hdr, with_disparity)
-        field.color_space = color_space
+        field.color_space, field.row_step = color_space, row_step
         if self.field is not None:
             self.field.release()
         self.field = field

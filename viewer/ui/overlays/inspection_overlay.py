@@ -184,7 +184,8 @@ def _draw_marks(
     line(0, eye_at, long_side, eye_at, pack_color(DARK.accent), 2 * scale)
     line(pointer_at, 0, pointer_at, short_side, pack_color(DARK.text, 0.8), scale)
     if state.hover is not None and state.hover.disparity is not None:
-        slope = -state.hover.disparity / size / span * long_side / band
+        step = scene.row_step if is_upright else 1.0
+        slope = -state.hover.disparity * step / size / span * long_side / band
         ends = [pointer_at + slope * (end - eye_at) for end in (0.0, short_side)]
         line(ends[0], 0, ends[1], short_side, pack_color(DARK.warning, 0.9), 1.5 * scale)
 
