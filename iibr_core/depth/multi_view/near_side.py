@@ -15,35 +15,39 @@ MAX_DIFFERENCE = 0.1
 """Difference of luma that counts most: larger ones count the same."""
 MIN_SLOPE = 0.01
 """Least step of luma from pixel to pixel of a place whose disparity is known."""
-MIN_HIDDEN_SHARE = 0.001
+MIN_HIDDEN_SHARE = 0.002
 """Smallest share of all pixels of the views that must be hidden on either assumption."""
+MIN_AGREEING = 0.8
+"""Smallest share of the hidden pixels that lie in views that show the same side as near."""
 
 
 def nearness_ratio(lumas: Sequence[FloatImage], offsets: Sequence[ViewOffset], values: FloatImage) -> float:
     """Return how much worse places match that are hidden if larger disparities are nearer than places that are hidden
-    if smaller ones are: above 1 larger ones are nearer, below 1 smaller ones; 1 if too little is hidden.
+    if smaller ones are: above 1 larger ones are nearer, below 1 smaller ones; 1 if too little is hidden, or views
+    disagree.
 
     lumas: (H, W), 0 .. 1, of small views, the reference first; offsets: their viewpoints from it. values: disparity
     (H, W) of the reference.
     """
-    sums, counts, total = np.zeros(2), np.zeros(2), 0
+    sums, counts, total = np.zeros((len(lumas), 2)), np.zeros((len(lumas), 2)), 0
     slopes = np.gradient(lumas[0])
     is_textured = np.hypot(*slopes) > MIN_SLOPE
-    for luma, (t, s) in zip(lumas, offsets):
+    for k, (luma, (t, s)) in enumerate(zip(lumas, offsets)):
         if t == s == 0:
             continue
         places, is_inside = _places(values, t, s)
-        away = np.minimum(np.abs(luma.ravel()[places] - lumas[0]), MAX_DIFFERENCE)
+        difference = luma.ravel()[places] - lumas[0]
+        away = np.minimum(np.abs(difference - np.median(difference[is_inside])), MAX_DIFFERENCE)
         margin = MIN_HIDING_PX / max(abs(t), abs(s))
         total += int(is_inside.sum())
         for side, sign in enumerate((1, -1)):
             is_hidden = is_textured & is_inside & _hidden(sign * values, places, is_textured, margin)
-            sums[side] += away[is_hidden].sum()
-            counts[side] += is_hidden.sum()
-    if counts.min() <= MIN_HIDDEN_SHARE * total:
+            sums[k, side], counts[k, side] = away[is_hidden].sum(), is_hidden.sum()
+    if counts.sum(axis=0).min() <= MIN_HIDDEN_SHARE * total:
         return 1.0
-    larger, smaller = sums / counts + 1e-3
-    return float(larger / smaller)
+    larger, smaller = sums.sum(axis=0) / counts.sum(axis=0) + 1e-3
+    agrees = ((sums / np.maximum(counts, 1)) @ (1, -1) > 0) == (larger > smaller)
+    return float(larger / smaller) if counts[agrees].sum() >= MIN_AGREEING * counts.sum() else 1.0
 
 
 def _places(values: FloatImage, t: float, s: float) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:

@@ -29,17 +29,19 @@ from iibr_core.types import InputError, StoredColors, image_size
 
 MAX_MEASURED = 16
 """Largest number of views that are measured."""
-MAX_STRAY, MAX_STRAY_ON_LINE = 0.35, 1.0
-"""Largest distance of a measured viewpoint from its place, in steps, on a grid and in a single row or column: a camera
-on a rail is moved by uneven steps.
+MAX_STRAY, MAX_STRAY_ON_LINE = 0.5, 1.0
+"""Largest distance of a measured viewpoint from its place, in steps, on a grid and in a single row or column. A
+camera on a rail is moved by uneven steps; views of a Lytro camera lie closer together at the edge of its lens.
 """
+MAX_STRAY_SHARE = 0.125
+"""Largest such distance on a short line, as a share of its half."""
 MIN_FITTING = 0.8
 """Smallest share of the measured views that must lie at their places; the others may be mistaken."""
 ROUNDS = 3
 MAX_SKEW = 0.2
 """Largest tangent of the angle between the axes of a grid and those of the picture."""
-MIN_MEASURED = 3
-"""Fewest measured views that decide between orders."""
+MIN_MEASURED = 4
+"""Fewest measured views that decide between orders, unless there are fewer."""
 EQUAL_STEPS = 0.06
 """Largest difference of the distances between rows and between columns that may be an error of measuring."""
 
@@ -77,9 +79,14 @@ def find_order(scene: MultiView, views: Sequence[StoredColors], given: Arrangeme
         return _with_flip(min(fits, key=lambda fit: round(fit.stray, 1)), given)
     if found.is_measured.sum() < min(MIN_MEASURED, len(chosen)) or given.order is not None:
         return None
+    if scene.is_guess:
+        raise InputError(
+            f"{scene.place}: holds no light field, or in an unusual order: the parallax of its {len(views)} numbered"
+            " pictures fits none. If they are views from a grid or a row, give --order and --grid, or correct the names"
+        )
     raise InputError(
         f"{scene.place}: the parallax of its views fits no order that their names suggest; give --order, --grid and"
-        " --flip, or correct the names"
+        " --flip, correct the names, or rectify views of cameras that were turned"
     )
 
 
@@ -126,7 +133,7 @@ def _fit(arrangement: Arrangement, places: NDArray[np.float64], found: Viewpoint
         found.agreeing[is_measured],
     )
     used = [axis for axis in (0, 1) if lengths[axis] > 1]
-    if len(places) < len(used) or not all(np.any(places[:, axis]) for axis in used):
+    if len(places) < min(MIN_MEASURED, len(is_measured)) or not all(np.any(places[:, axis]) for axis in used):
         return None
     axes, is_kept = np.zeros((2, 2)), np.ones(len(places), np.bool_)  # rows: (t, s) of a step down, of one to the right
     for _ in range(ROUNDS):
@@ -137,8 +144,10 @@ def _fit(arrangement: Arrangement, places: NDArray[np.float64], found: Viewpoint
     along, across = axes.diagonal()[used], axes[:, ::-1].diagonal()[used]
     if not (np.abs(along) > 0).all() or (np.abs(across) > MAX_SKEW * np.abs(along)).any():
         return None
-    stray = float(np.quantile(away, MIN_FITTING) / np.abs(along).min())
-    if stray > (MAX_STRAY if min(arrangement.grid) > 1 else MAX_STRAY_ON_LINE):
+    lengths_of_steps = np.abs(axes.diagonal()) if len(used) == 2 else np.abs(along)
+    stray = float(np.quantile(np.hypot(*((offsets - places @ axes) / lengths_of_steps).T), MIN_FITTING))
+    max_stray = MAX_STRAY if len(used) == 2 else min(MAX_STRAY_ON_LINE, MAX_STRAY_SHARE * np.abs(places).max())
+    if stray > max_stray:
         return None
     return Fit(arrangement, (float(axes[0, 0]), float(axes[1, 1])), stray, len(places))
 

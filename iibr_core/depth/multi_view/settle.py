@@ -17,7 +17,7 @@ from iibr_core.formats.light_fields.order import FLIPS, UNKNOWN, Arrangement, Fl
 from iibr_core.formats.light_fields.views import grid_of, view_offsets
 from iibr_core.types import FloatImage, InputError, ViewOffset, ViewUpdate, image_size
 
-CLEAR_RATIO, FINAL_CLEAR_RATIO = 1.4, 1.2
+CLEAR_RATIO, FINAL_CLEAR_RATIO = 1.4, 1.15
 """Ratios of `nearness_ratio` that decide, by a coarse map and by the final one."""
 COMPARED_VIEWS, COMPARED_PX = 8, 320
 """Number of views in which hidden places are compared, and the longer side of their copies."""
@@ -33,6 +33,9 @@ FLIP_WORDS = {
     "y": "rows run from bottom to top",
     "xy": "rows run from bottom to top and columns from right to left, as seen from behind",
 }
+
+UNSURE = "Near and far may be exchanged, as little hides anything behind it; --flip turns them round."
+UNTESTED = "The views are in the order of their names, as too little in them shows another."
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,14 +146,13 @@ def _turned(arrangement: Arrangement) -> Arrangement:
 def _notes_on_order(settled: Settled) -> tuple[str, ...]:
     """Return a sentence about an order, none if it is that of the names."""
     found, named, words = settled.arrangement, settled.named, []
+    is_folder = named.place != named.views[0].path  # a quilt states its order
     if found.grid is None:
-        return ()
+        return (UNTESTED,) if named.numbers and is_folder else ()
     if named.is_guess or found.grid != named.grid:
         words.append(f"{found.grid.rows} rows of {found.grid.columns}" if min(found.grid) > 1 else "one line of views")
     words += filter(None, (ORDER_WORDS[found.order or "rows"], FLIP_WORDS[found.flip or "none"]))
     if found.row_step not in (None, 1.0):
         words.append(f"rows are {found.row_step:.2g} times as far apart as columns")
-    if not words:
-        return ()
-    doubt = "" if settled.is_sure else "; near and far may be exchanged (--flip turns them round)"
-    return (f"The parallax of {settled.measured} views shows their order: {', '.join(words)}{doubt}.",)
+    order = f"The parallax of {settled.measured} views shows their order: {', '.join(words)}." if words else ""
+    return tuple(filter(None, (order, UNSURE if not settled.is_sure and (words or is_folder) else "")))

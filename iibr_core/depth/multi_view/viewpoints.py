@@ -24,6 +24,8 @@ LONGEST_PX = 256
 CELLS = 9, 12
 """Rows and columns of cells of the reference, in each of which one point is chosen."""
 PATCH_RADIUS_PX = 3
+LIGHT_RADIUS_PX = 8
+"""Radius of the squares whose mean is taken away, which differs with exposure and vignetting."""
 SEARCH_SHARE = 0.09
 """Largest shift that is looked for, as a share of the longer side."""
 MIN_CORNER = 5e-5
@@ -65,7 +67,7 @@ class Viewpoints:
 
 def measure_viewpoints(reference: FloatImage, others: Sequence[FloatImage]) -> Viewpoints:
     """Return the viewpoints of views (H, W), luma of 0 .. 1, that are alike in size."""
-    reference, *others = map(_smooth, (reference, *others))
+    reference, *others = (_without_light(_smooth(luma)) for luma in (reference, *others))
     points = find_corners(reference)
     if len(points) < MIN_POINTS:
         return Viewpoints(np.full((len(others), 2), np.nan), np.zeros(len(others)))
@@ -85,6 +87,12 @@ def _smooth(luma: FloatImage) -> FloatImage:
         padded = np.pad(luma, ((1, 1), (0, 0)), "edge")
         luma = np.ascontiguousarray((padded[:-2] + 2 * luma + padded[2:]).T / np.float32(4))
     return luma
+
+
+def _without_light(luma: FloatImage) -> FloatImage:
+    """Return a luma without its mean around each pixel, which differs with the exposure, and at the edge of a lens."""
+    radius = LIGHT_RADIUS_PX
+    return luma - _box_mean(np.pad(luma, radius, "edge"), radius)[radius:-radius, radius:-radius].astype(np.float32)
 
 
 def find_corners(luma: FloatImage) -> NDArray[np.int64]:

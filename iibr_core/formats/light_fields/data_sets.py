@@ -1,8 +1,8 @@
 """Folders of data sets whose views are no numbered grid: the Stanford archive and Middlebury stereo.
 
-Stanford: a folder of out_RR_CC_Y_X.png, with row, column and camera position. Positions count: X grows to the right and
-Y downwards. Rows and columns are counted as the camera moved, which differs from scene to scene. Cameras stand slightly
-off the grid; one view step is the mean spacing of columns.
+Stanford: a folder of out_RR_CC_Y_X.png, with row, column and camera position; renderers add focal length and sensor.
+Positions count: X grows to the right and Y downwards. Rows and columns are counted as the camera moved, which differs
+from scene to scene. Cameras stand slightly off the grid; one view step is the mean spacing of columns.
 
 Middlebury: pairs of 2014 and 2021 (im0, im1, disp0.pfm) and rows of views of 2001 to 2006 (im0..im8 or view0..view6)
 with ground truth for two of them. Pictures are rectified and evenly spaced, from left to right; one view step is the
@@ -29,6 +29,8 @@ from iibr_core.types import InputError, ViewOffset
 
 NUMBER = r"[-+]?\d{1,9}(?:\.\d{0,12})?"
 STANFORD_NAME = re.compile(rf"(?:.*_)?(\d{{1,3}})_+(\d{{1,3}})_+({NUMBER})_+({NUMBER})_*$")
+FRACTION = r"[-+]?\d{1,9}\.\d{1,12}"
+RENDERED_NAME = re.compile(rf".*_(\d{{1,3}})_(\d{{1,3}})_({FRACTION})_({FRACTION})_{NUMBER}_{NUMBER}$")
 MAX_STRAY = 0.5
 """Largest distance of a camera from its place in the grid, in view steps; beyond it, positions mean something else."""
 MIN_NOTED_STRAY = 0.005
@@ -47,7 +49,8 @@ QUANTIZED = (".png", ".pgm")
 def read_stanford(folder: Path) -> MultiView | None:
     """Return the views of a Stanford archive folder or of its subfolder `rectified`; None if names are different."""
     inside = folder / "rectified" if (folder / "rectified").is_dir() else folder
-    named = [(path, match) for path in pictures_in(inside) if (match := STANFORD_NAME.match(path.stem))]
+    matches = [(path, STANFORD_NAME.match(path.stem) or RENDERED_NAME.match(path.stem)) for path in pictures_in(inside)]
+    named = [(path, match) for path, match in matches if match]
     if not named:
         return None
     index = np.array([[int(match[1]), int(match[2])] for _, match in named])

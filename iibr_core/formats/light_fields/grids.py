@@ -9,6 +9,7 @@ by place (`gt_disp_u00_v00.npy`, estimates `disp_est_u00_v00.npy`).
 import configparser
 import math
 import re
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
@@ -36,6 +37,12 @@ NAMES = ((HCI_NAME, "input_Cam{:03d}"), (ROW_COLUMN_NAME, "v{:02d}_u{:02d}"))
 """Names of views by their numbers, for the error about a missing one."""
 PLENO_NAME = re.compile(r"(\d{3})_(\d{3})\.ppm$", re.IGNORECASE)
 MAP_WORDS = re.compile(r"disp|depth|mask|label|normal|edge|reliable", re.IGNORECASE)
+NUMBER = re.compile(r"(?<![A-Za-z\d-])[-+]\d{1,9}|\d{1,9}")
+"""Number in a name; views may be counted from the middle, as in `view_-1_+2`."""
+MIN_VIEWS_PER_PREVIEW = 9
+"""Fewest views for each picture of another name among them."""
+MIN_FILLED = 0.8
+"""Smallest share of a grid of rows and columns that pictures with any names fill."""
 MIN_SIDE = 9
 """Fewest rows of a square that only the number of its pictures suggests: 25 numbered photos may be of a holiday."""
 GUESSED_VIEWS = 3, 1000
@@ -102,20 +109,21 @@ def _from_least(views: Mapping[tuple[int, ...], Path]) -> dict[tuple[int, ...], 
 
 
 def _by_any_numbers(pictures: list[Path]) -> Numbered:
-    """Return pictures by the one or two numbers that vary among their names.
+    """Return pictures by the one or two numbers that vary among their names; a preview among them does not count.
 
-    Photos that are numbered by date and time fill less than half of a grid of rows and columns.
+    Photos that are numbered by date and time, and pictures of several scenes, leave many places of a grid empty.
     """
-    kinds = {re.sub(r"\d+", "#", path.stem.lower()) for path in pictures}
-    digits = {path: re.findall(r"\d{1,9}", path.stem) for path in pictures}
-    if len(pictures) < 2 or len(kinds) != 1 or len(set(map(len, digits.values()))) != 1:
+    kinds = Counter(NUMBER.sub("#", path.stem.lower()) for path in pictures)
+    kind, count = kinds.most_common(1)[0] if kinds else ("", 0)
+    if count < 2 or len(pictures) - count > count // MIN_VIEWS_PER_PREVIEW:
         return {}
+    digits = {path: NUMBER.findall(path.stem) for path in pictures if NUMBER.sub("#", path.stem.lower()) == kind}
     varying = [k for k, values in enumerate(zip(*digits.values())) if len(set(map(int, values))) > 1]
     if len(varying) not in (1, 2):
         return {}
     views = _by_numbers((path, [numbers[k] for k in varying]) for path, numbers in digits.items())
     sides = [max(axis) - min(axis) + 1 for axis in zip(*views)]
-    return views if len(varying) == 1 or math.prod(sides) <= 2 * len(views) else {}
+    return views if len(varying) == 1 or math.prod(sides) * MIN_FILLED <= len(views) else {}
 
 
 def _may_be_a_grid(views: Numbered) -> bool:

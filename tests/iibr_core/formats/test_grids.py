@@ -45,16 +45,24 @@ def test_hci_names_count_row_by_row(tmp_path, rows, columns) -> None:
 
 
 @pytest.mark.parametrize(
-    "name", ["v{v:02d}_u{u:02d}.png", "scene7_{v1}_{u1}.png", "{k:03d}.png", "img-{k1}.png", "lf_{v}_{u}.jpg"]
-)
+    "name",
+    [
+        "v{v:02d}_u{u:02d}.png", "scene7_{v1}_{u1}.png", "{k:03d}.png", "img-{k1}.png", "lf_{v}_{u}.jpg",
+        "image_{v5:+d}_{u5:+d}.png",
+    ],
+)  # fmt: skip
 def test_grids_under_any_numbering(tmp_path, name) -> None:
-    """By row and column or row by row, counted from 0 or from 1; the map without a number is the centre view's."""
+    """By row and column or row by row, counted from 0, 1 or the middle; the map without a number is the centre view's.
+
+    A preview among the views does not count.
+    """
     names = {
-        name.format(v=v, u=u, v1=v + 1, u1=u + 1, k=v * 11 + u, k1=v * 11 + u + 1): at
+        name.format(v=v, u=u, v1=v + 1, u1=u + 1, k=v * 11 + u, k1=v * 11 + u + 1, v5=v - 5, u5=u - 5): at
         for (v, u), at in offsets_of(11, 11).items()
     }
     for file in names:
         Image.new("RGB", (4, 4)).save(tmp_path / file)
+    Image.new("RGB", (8, 4)).save(tmp_path / "preview.png")
     write_pfm(tmp_path / "disparity.pfm", np.ones((4, 4), np.float32))
     scene = open_light_field(tmp_path)
     assert (scene.layout, scene.grid) == ("grid folder, 11x11", (11, 11))
@@ -95,8 +103,15 @@ def test_views_of_which_every_third_was_kept_stand_on_a_square(tmp_path) -> None
     assert open_light_field(tmp_path).grid == (3, 3)
 
 
-def test_photos_numbered_by_date_and_time_are_no_light_field(tmp_path) -> None:
-    write_flat(tmp_path, [f"IMG_202307{day}_1{day}{k}.png" for day in (11, 14) for k in range(3)])
+@pytest.mark.parametrize(
+    "names",
+    [
+        [f"IMG_202307{day}_1{day}{k}.png" for day in (11, 14) for k in range(3)],
+        [f"IMG_{n}-stk_{k:02d}.png" for n, count in enumerate((12, 4, 8)) for k in range(count)],
+    ],
+)
+def test_photos_numbered_by_date_and_stacks_of_photos_are_no_light_field(tmp_path, names) -> None:
+    write_flat(tmp_path, names)
     assert find_light_field(tmp_path) is None
 
 
@@ -163,6 +178,13 @@ def test_stanford_viewpoints_are_the_cameras_positions(tmp_path, jitter) -> None
         np.testing.assert_allclose(offset, steps[at] - steps[0, 0], atol=2 * jitter + 1e-6)
     assert {view.path.stem[:9]: view.place for view in scene.views}["out_04_03"] == (0, 0)
     assert ("stand up to" in scene.notes[0]) == (jitter > 0)
+
+
+def test_a_renderer_writes_focal_length_and_sensor_after_the_position(tmp_path) -> None:
+    at = list(np.ndindex(3, 3))
+    write_flat(tmp_path, [f"Camera 1_{v:02d}_{u:02d}_{10.0 - 5 * v:f}_{5.0 * u:f}_30_36.png" for v, u in at])
+    scene = scene_of(tmp_path)
+    assert {view.path.stem[:14]: view.place for view in scene.views}["Camera 1_02_01"] == (0, 1)
 
 
 @pytest.mark.parametrize(("rows", "columns", "step"), [(3, 3, 20.0), (3, 1, 45.0), (1, 3, 20.0)])
