@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from iibr_core.color import encoded_from_stored
 from iibr_core.depth.multi_view.matching import FINDING, STEP_PX, MatchingViews, matching_views, sweep
+from iibr_core.depth.multi_view.plain_areas import move_plain_areas_back
 from iibr_core.depth.multi_view.refinement import refine_by_gradients
 from iibr_core.depth.multi_view.semi_global import choose_disparity
 from iibr_core.formats.maps.resample import resample_surfaces
@@ -50,7 +51,7 @@ def estimate_coarse(views: Sequence[StoredColors], offsets: Sequence[ViewOffset]
     largest = 0.4 * max(small.luma.shape) / small.reach
     disparities = np.arange(-largest, largest + step, step, dtype=np.float32)
     with watched(ignore_progress):
-        values, sureness = _match(small, disparities)
+        values, sureness, _ = _match(small, disparities)
         is_sure = sureness >= 0.4
         if len(views) <= FEW_VIEWS:
             is_sure &= left_right_check(views, offsets, reference, values, disparities, shrink)
@@ -74,10 +75,10 @@ def estimate_disparity(
     # The last part is refinement.
     parts = 2 + is_checked
     with part_of_job(0, 1, parts):
-        values, _ = _match(matched, disparities)
+        values, _, is_plain = _match(matched, disparities)
     if is_checked:
         with part_of_job(1, 1, parts):
-            is_seen = left_right_check(views, offsets, reference, values, disparities)
+            is_seen = is_plain | left_right_check(views, offsets, reference, values, disparities)
         if is_seen.any():
             known = np.where(is_seen, values, np.float32(np.nan))
             values = fill_disparity_by_color(encoded_from_stored(views[reference]), known)
@@ -97,7 +98,7 @@ def left_right_check(
     """Return which pixels (H, W) of the reference's map the map of the farthest view confirms: both views see them."""
     at = offsets[reference]
     farthest = max(range(len(views)), key=lambda index: np.hypot(offsets[index].t - at.t, offsets[index].s - at.s))
-    other, _ = _match(matching_views(views, offsets, farthest, shrink), disparities)
+    other, _, _ = _match(matching_views(views, offsets, farthest, shrink), disparities)
     return find_confirmed([values, other], [at, offsets[farthest]], 0)
 
 
@@ -134,12 +135,14 @@ def _steps(range_px: tuple[float, float], reach: float) -> int:
     return int(np.clip(np.ceil((range_px[1] - range_px[0]) * reach / STEP_PX), 2, MAX_STEPS))
 
 
-def _match(views: MatchingViews, disparities: NDArray[np.float32]) -> tuple[FloatImage, FloatImage]:
-    """Return disparity and sureness (H, W), single pixels smoothed away by a median."""
-    values, sureness = choose_disparity(sweep(views, disparities), views.luma, disparities)
+def _match(views: MatchingViews, disparities: NDArray[np.float32]) -> tuple[FloatImage, FloatImage, NDArray[np.bool_]]:
+    """Return disparity and sureness (H, W), and which pixels are plain; a median smooths single pixels away."""
+    costs = sweep(views, disparities)
+    values, sureness = choose_disparity(costs, views.luma, disparities)
+    is_plain = move_plain_areas_back(costs, views.colors, disparities, values, len(views.textures))
     image = oiio.ImageBuf(np.ascontiguousarray(values[..., None]))
     median = oiio.ImageBufAlgo.median_filter(image, 5, 5).get_pixels(oiio.FLOAT)
-    return np.asarray(median, np.float32).reshape(values.shape), sureness
+    return np.asarray(median, np.float32).reshape(values.shape), sureness, is_plain
 
 
 def _sample(image: FloatImage, row: FloatImage, column: FloatImage) -> FloatImage:

@@ -16,6 +16,7 @@ from threading import Lock
 import numpy as np
 from numpy.typing import NDArray
 
+from iibr_core.color import encoded_from_stored
 from iibr_core.depth.guided_filter import GuidedFilter
 from iibr_core.runtime import tiling
 from iibr_core.runtime.kernels import kernel
@@ -40,6 +41,8 @@ MAX_DIFFERENCE = 0.03
 """Difference of texture (1 = white) that costs most: larger ones cost the same."""
 HIDDEN_FACTOR = 1.5
 """Factor by which one half of the views must match better than all, so that the other half counts as hidden."""
+HIDDEN_DIFFERENCE = 0.0012
+"""Difference of texture (1 = white) that a hidden half costs at least: outlines of plain objects count by it."""
 MIN_SEEN_SHARE = 0.3
 """Smallest share of the views that must see a place."""
 
@@ -49,12 +52,13 @@ class MatchingViews:
     """A reference view and other views of the same scene.
 
     textures: (N, H, W) float32, the reference first. offsets: (N, 2) float32, (t, s) from the reference in view steps.
-    luma: (H, W) of the reference.
+    luma: (H, W) of the reference. colors: (H, W, 3), sRGB-encoded.
     """
 
     textures: NDArray[np.float32]
     offsets: NDArray[np.float32]
     luma: FloatImage
+    colors: FloatImage
 
     @property
     def reach(self) -> float:
@@ -82,7 +86,8 @@ def matching_views(
 
     textures = np.stack(in_pieces(texture, chosen, tiling.THREADS))
     relative = np.array([offsets[index] for index in chosen], np.float32) - np.array(offsets[reference], np.float32)
-    return MatchingViews(textures, relative, luma_of(views[reference], shrink))
+    colors = colors_of(views[reference], shrink)
+    return MatchingViews(textures, relative, luma_of(views[reference], shrink), colors)
 
 
 def choose_views(offsets: Sequence[ViewOffset], reference: int) -> list[int]:
@@ -117,6 +122,14 @@ def luma_of(colors: StoredColors, shrink: int = 1) -> FloatImage:
     for y, x, channel in np.ndindex(shrink, shrink, colors.shape[2]):
         sums += values[y::shrink, x::shrink, channel][:height, :width]
     return sums / np.float32((1 if is_hdr else 255) * shrink**2 * colors.shape[2])
+
+
+def colors_of(colors: StoredColors, shrink: int = 1) -> FloatImage:
+    """Return the colours of a view (H, W, 3), sRGB-encoded, 0 .. 1, means over squares of `shrink` pixels."""
+    encoded = np.clip(np.nan_to_num(encoded_from_stored(colors), nan=0.0, posinf=1.0, neginf=0.0), 0, 1)
+    rows, columns = (length // shrink for length in image_size(encoded))
+    squares = encoded[: rows * shrink, : columns * shrink].reshape(rows, shrink, columns, shrink, 3)
+    return np.ascontiguousarray(squares.mean(axis=(1, 3)), np.float32)
 
 
 def sweep(views: MatchingViews, disparities: NDArray[np.float32]) -> NDArray[np.uint8]:
@@ -197,5 +210,5 @@ def _store_costs(parts, costs):
     for y in range(costs.shape[0]):
         for x in range(costs.shape[1]):
             half = min(min(parts[0, y, x], parts[1, y, x]), min(parts[2, y, x], parts[3, y, x]))
-            square = max(min(parts[4, y, x], HIDDEN_FACTOR * half), np.float32(0))
+            square = max(min(parts[4, y, x], max(HIDDEN_FACTOR * half, HIDDEN_DIFFERENCE**2)), np.float32(0))
             costs[y, x] = np.uint8(255 * min(np.sqrt(square) / np.float32(MAX_DIFFERENCE), np.float32(1)))

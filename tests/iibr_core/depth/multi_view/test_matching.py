@@ -5,7 +5,14 @@ import pytest
 from scipy.ndimage import map_coordinates
 
 from iibr_core.depth.guided_filter import GuidedFilter
-from iibr_core.depth.multi_view.matching import HIDDEN_FACTOR, MAX_DIFFERENCE, MIN_SEEN_SHARE, _match, _store_costs
+from iibr_core.depth.multi_view.matching import (
+    HIDDEN_DIFFERENCE,
+    HIDDEN_FACTOR,
+    MAX_DIFFERENCE,
+    MIN_SEEN_SHARE,
+    _match,
+    _store_costs,
+)
 from iibr_core.depth.multi_view.refinement import _apply, _diagonal, _measure, _smooth
 from iibr_core.depth.multi_view.semi_global import EDGE_LUMA, JUMP_COST, STEP_COST, choose_disparity
 from tests.iibr_core.scenes import smooth_texture
@@ -55,10 +62,11 @@ def test_matching_equals_its_slow_twin(disparity):
 
 def test_views_are_hidden_where_the_other_half_matches_much_better():
     parts = (1e-3 * np.random.default_rng(3).random((5, 6, 8))).astype(np.float32)
-    parts[4] = parts[:4].mean(axis=0)
+    parts[:4, 0] = 0  # one half matches without any difference
+    parts[4] = parts[:4].mean(axis=0) + 1e-4
     found = np.empty((6, 8), np.uint8)
     _store_costs(parts, found)
-    cost = np.minimum(parts[4], HIDDEN_FACTOR * parts[:4].min(axis=0))
+    cost = np.minimum(parts[4], np.maximum(HIDDEN_FACTOR * parts[:4].min(axis=0), HIDDEN_DIFFERENCE**2))
     assert (cost < parts[4]).any()
     np.testing.assert_allclose(found, 255 * np.minimum(np.sqrt(cost) / MAX_DIFFERENCE, 1), atol=1.01)
 
