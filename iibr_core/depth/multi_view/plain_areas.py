@@ -23,6 +23,8 @@ PLAIN_REFUTED, SIDE_REFUTED = 0.1, 0.6
 """Largest share of all disparities that do not match at a pixel of a plain area; the same at its borders."""
 MAX_COLOR_STEP = 0.03
 """Largest step of a channel (1 = white) between neighbours of one area."""
+MIN_PLAIN_SHARE = 0.8
+"""Smallest share of an area's pixels that must be plain: surfaces with faint texture stay as they were matched."""
 MIN_PIXELS = 64
 """Size of the smallest area that is moved."""
 MAX_EVIDENCE = 32
@@ -95,7 +97,7 @@ def _move_back(costs, colors, disparities, steps, limits, refuted, weights, valu
         # The ends of the range hold what is beyond it.
         totals[0] = totals[count - 1] = 0
         level = _farthest_level(totals)
-        if size < MIN_PIXELS or 2 * plain < size or level < 0:
+        if size < MIN_PIXELS or plain < MIN_PLAIN_SHARE * size or level < 0:
             continue
         # Outlines are a little in front of what they hide.
         behind = sums[level] / totals[level] - half_step
