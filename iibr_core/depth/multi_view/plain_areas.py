@@ -23,7 +23,7 @@ PLAIN_REFUTED, SIDE_REFUTED = 0.1, 0.6
 """Largest share of all disparities that do not match at a pixel of a plain area; the same at its borders."""
 MAX_COLOR_STEP = 0.03
 """Largest step of a channel (1 = white) between neighbours of one area."""
-MIN_PLAIN_SHARE = 0.8
+MIN_PLAIN_SHARE = 0.65
 """Smallest share of an area's pixels that must be plain: surfaces with faint texture stay as they were matched."""
 MIN_PIXELS = 64
 """Size of the smallest area that is moved."""
