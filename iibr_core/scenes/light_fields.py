@@ -158,11 +158,11 @@ def _with_disparity_of(settled: Settled) -> tuple[Settled, FloatImage, tuple[str
     """Return a light field, which may prove to be seen from behind, the disparity (H, W) of its centre, and notes."""
     colors, is_pair = [view.colors for view in settled.views], len(settled.views) == 2
     max_pixels = MATCHED_PIXELS if is_pair and settled.field.place.is_file() else None
-    values, note = estimate_within_memory(colors, settled.offsets, 0, settled.coarse.range_px, max_pixels)
+    values, notes = estimate_within_memory(colors, settled.offsets, 0, settled.coarse.range_px, max_pixels)
     confirmed = confirm(settled, values)
     if confirmed.arrangement != settled.arrangement:
         return _with_disparity_of(confirmed)
-    return confirmed, values, (note,) if note else ()
+    return confirmed, values, notes
 
 
 def read_dense(

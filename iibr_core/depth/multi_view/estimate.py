@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import OpenImageIO as oiio
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 
 from iibr_core.color import encoded_from_stored
 from iibr_core.depth.multi_view.matching import FINDING, STEP_PX, MatchingViews, matching_views, sweep
-from iibr_core.depth.multi_view.plain_areas import move_plain_areas_back
+from iibr_core.depth.multi_view.plain_areas import find_stripes, move_plain_areas_back
 from iibr_core.depth.multi_view.refinement import refine_by_gradients
 from iibr_core.depth.multi_view.semi_global import choose_disparity
 from iibr_core.formats.maps.resample import resample_surfaces
@@ -51,8 +52,8 @@ def estimate_coarse(views: Sequence[StoredColors], offsets: Sequence[ViewOffset]
     largest = 0.4 * max(small.luma.shape) / small.reach
     disparities = np.arange(-largest, largest + step, step, dtype=np.float32)
     with watched(ignore_progress):
-        values, sureness, _ = _match(small, disparities)
-        is_sure = sureness >= 0.4
+        matched = _match(small, disparities)
+        values, is_sure = matched.values, (matched.sureness >= 0.4) & ~matched.is_plain
         if len(views) <= FEW_VIEWS:
             is_sure &= left_right_check(views, offsets, reference, values, disparities, shrink)
     # A few sure pixels at either end may be mistaken, and a few steps beyond them may be needed.
@@ -69,22 +70,30 @@ def estimate_disparity(
 
     Arguments and errors are those of `estimate_coarse`, which finds the range.
     """
+    return estimate_with_doubt(views, offsets, reference, range_px)[0]
+
+
+def estimate_with_doubt(
+    views: Sequence[StoredColors], offsets: Sequence[ViewOffset], reference: int, range_px: tuple[float, float]
+) -> tuple[FloatImage, NDArray[np.bool_]]:
+    """Return the same, and where it is in doubt (H, W): in plain and in striped areas, which match anywhere."""
     matched = matching_views(views, offsets, reference)
     disparities = np.linspace(*range_px, _steps(range_px, matched.reach) + 1, dtype=np.float32)
     is_checked = len(views) <= FEW_VIEWS
     # The last part is refinement.
     parts = 2 + is_checked
     with part_of_job(0, 1, parts):
-        values, _, is_plain = _match(matched, disparities)
+        found = _match(matched, disparities)
+        values = found.values
     if is_checked:
         with part_of_job(1, 1, parts):
-            is_seen = is_plain | left_right_check(views, offsets, reference, values, disparities)
+            is_seen = found.is_plain | left_right_check(views, offsets, reference, values, disparities)
         if is_seen.any():
             known = np.where(is_seen, values, np.float32(np.nan))
             values = fill_disparity_by_color(encoded_from_stored(views[reference]), known)
     refined = np.clip(refine_by_gradients(matched, values), *range_px)
     report_progress(parts, parts, FINDING)
-    return refined
+    return refined, found.is_plain | found.is_striped
 
 
 def left_right_check(
@@ -98,7 +107,7 @@ def left_right_check(
     """Return which pixels (H, W) of the reference's map the map of the farthest view confirms: both views see them."""
     at = offsets[reference]
     farthest = max(range(len(views)), key=lambda index: np.hypot(offsets[index].t - at.t, offsets[index].s - at.s))
-    other, _, _ = _match(matching_views(views, offsets, farthest, shrink), disparities)
+    other = _match(matching_views(views, offsets, farthest, shrink), disparities).values
     return find_confirmed([values, other], [at, offsets[farthest]], 0)
 
 
@@ -135,14 +144,24 @@ def _steps(range_px: tuple[float, float], reach: float) -> int:
     return int(np.clip(np.ceil((range_px[1] - range_px[0]) * reach / STEP_PX), 2, MAX_STEPS))
 
 
-def _match(views: MatchingViews, disparities: NDArray[np.float32]) -> tuple[FloatImage, FloatImage, NDArray[np.bool_]]:
-    """Return disparity and sureness (H, W), and which pixels are plain; a median smooths single pixels away."""
+class _Match(NamedTuple):
+    """Disparity and sureness (H, W), and which pixels belong to plain and to striped areas."""
+
+    values: FloatImage
+    sureness: FloatImage
+    is_plain: NDArray[np.bool_]
+    is_striped: NDArray[np.bool_]
+
+
+def _match(views: MatchingViews, disparities: NDArray[np.float32]) -> _Match:
+    """Match every pixel; a median smooths single pixels away."""
     costs = sweep(views, disparities)
     values, sureness = choose_disparity(costs, views.luma, disparities)
     is_plain = move_plain_areas_back(costs, views.colors, disparities, values, len(views.textures))
     image = oiio.ImageBuf(np.ascontiguousarray(values[..., None]))
     median = oiio.ImageBufAlgo.median_filter(image, 5, 5).get_pixels(oiio.FLOAT)
-    return np.asarray(median, np.float32).reshape(values.shape), sureness, is_plain
+    smooth = np.asarray(median, np.float32).reshape(values.shape)
+    return _Match(smooth, sureness, is_plain, find_stripes(costs))
 
 
 def _sample(image: FloatImage, row: FloatImage, column: FloatImage) -> FloatImage:

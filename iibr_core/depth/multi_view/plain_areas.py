@@ -19,6 +19,8 @@ MIN_LIMIT = 12
 """Cost, of 255, that every match may have: that of a hidden half of the views, and errors of resampling."""
 UNSEEN_COST = 255
 """Cost of disparities at which too few views see a pixel; hardly any other costs as much."""
+STRIPE_RATIO = 2
+"""Ratio of a cost to that of a match, between two matches of a stripe."""
 PLAIN_REFUTED, SIDE_REFUTED = 0.1, 0.6
 """Largest share of all disparities that do not match at a pixel of a plain area; the same at its borders."""
 MAX_COLOR_STEP = 0.03
@@ -52,6 +54,33 @@ def move_plain_areas_back(
     _measure(costs, disparities, values, noise, steps, limits, refuted, weights)
     _move_back(costs, colors, disparities, steps, limits, refuted, weights, values, is_plain)
     return is_plain
+
+
+def find_stripes(costs: NDArray[np.uint8]) -> NDArray[np.bool_]:
+    """Return which pixels (H, W) match at several disparities with others between them that do not, as stripes do."""
+    is_striped = np.zeros(costs.shape[:2], np.bool_)
+    _find_stripes(costs, is_striped)
+    return is_striped
+
+
+@kernel
+def _find_stripes(costs, is_striped):
+    """Mark pixels with two low costs or more, parted by costs that are STRIPE_RATIO times as high."""
+    height, width, count = costs.shape
+    for y in range(height):
+        for x in range(width):
+            lowest = np.uint8(UNSEEN_COST)
+            for index in range(count):
+                lowest = min(lowest, costs[y, x, index])
+            low = max(int(lowest) + 2, MIN_LIMIT)
+            matches, is_low = 0, False
+            for index in range(count):
+                cost = costs[y, x, index]
+                if cost <= low and not is_low:
+                    matches, is_low = matches + 1, True
+                elif cost > STRIPE_RATIO * low:
+                    is_low = False
+            is_striped[y, x] = matches > 1
 
 
 @kernel

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
+from scipy.ndimage import gaussian_filter, map_coordinates
 
-from iibr_core.depth.multi_view.estimate import estimate_coarse, estimate_disparity
-from iibr_core.depth.multi_view.plain_areas import _farthest_level
+from iibr_core.depth.multi_view.estimate import estimate_coarse, estimate_disparity, estimate_with_doubt
 from iibr_core.types import GridShape, ImageSize, ViewOffset, image_size
 from tests.iibr_core.depth.multi_view.test_estimate import PAIR, textured
 
@@ -60,17 +60,16 @@ def test_a_plain_object_before_a_textured_wall_keeps_its_disparity():
     assert np.median(np.abs(found[shown == -1])) < 0.02
 
 
-@pytest.mark.parametrize(
-    ("weights", "level"),
-    [
-        ({3: 1, 10: 60, 11: 30, 30: 200}, 10),
-        ({30: 10}, 30),
-        (dict.fromkeys(range(5, 30), 1), -1),
-        ({}, -1),
-    ],
-)
-def test_the_farthest_level_with_enough_weight_counts_unless_it_is_slanted(weights, level):
-    totals = np.zeros(40, np.float32)
-    for step, weight in weights.items():
-        totals[step] = weight
-    assert _farthest_level(totals) == level
+def test_stripes_stay_smooth_and_are_in_doubt():
+    """Stripes of 4 px in a textured frame, all at 1.5 px: every 4 px they match again."""
+    waves = np.sin(2 * np.pi * (np.arange(144 + 80) - 40) / 4)
+    wall = 110 + 300 * gaussian_filter(np.random.default_rng(2).normal(size=(96 + 80, 144 + 80)), 1.2)
+    wall[60:116, 76:148] = 128 + 70 * waves[76:148]
+    y, x = np.mgrid[:96, :144].astype(float)
+    offsets = [ViewOffset(0.0, float(s)) for s in range(-2, 3)]
+    views = [map_coordinates(wall, [y + 40, x + 1.5 * s + 40], order=1).clip(0, 255) for _, s in offsets]
+    colors = [np.repeat(view.astype(np.uint8)[..., None], 3, -1) for view in views]
+    values, is_doubtful = estimate_with_doubt(colors, offsets, 2, (-12.0, 14.0))
+    assert np.abs(values[24:72, 40:104] - 1.5).max() < 0.3
+    assert is_doubtful[24:72, 40:104].mean() > 0.5
+    assert is_doubtful[:16].mean() < 0.05
