@@ -25,7 +25,7 @@ from iibr_core.runtime.work import report_progress
 from iibr_core.types import FloatImage, InputError, StoredColors, ViewOffset, image_size
 
 FINDING = "finding disparity"
-STEP_PX = 0.4
+STEP_PX = 0.5
 """Shift of the farthest view between two disparities of a sweep, in pixels."""
 MAX_VIEWS = 32
 """Largest number of views that are matched to the reference."""

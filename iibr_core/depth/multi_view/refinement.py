@@ -21,6 +21,8 @@ EDGE_LUMA = 0.05
 """Edge of the picture (1 = white) at which bends weigh a third."""
 EDGE_DISPARITY = 0.1
 """Bend of the map (px per view step) that weighs a quarter, as an edge."""
+ROUNDS = 3
+"""Number of times that differences are measured and the map is moved."""
 EPSILON = np.finfo(np.float32).eps
 
 
@@ -29,7 +31,7 @@ def refine_by_gradients(views: MatchingViews, disparity: FloatImage) -> FloatIma
     size = image_size(disparity)
     longest = np.float32(STEP_PX / views.reach)
     curvature, pull = np.empty(size, np.float32), np.empty(size, np.float32)
-    for _ in range(2):
+    for _ in range(ROUNDS):
 
         def measure(first: int, last: int, disparity: FloatImage = disparity) -> None:
             _measure(views.textures, views.offsets, disparity, first, last, curvature, pull)

@@ -163,7 +163,7 @@ def test_plain_surfaces_do_not_turn_a_quilt_round(tmp_path: Path) -> None:
         quilt[(1 - row) * HEIGHT + y :][:size, left : left + size] = light
     path = tmp_path / "plain_qs6x2a1.333.png"
     Image.fromarray(quilt).convert("RGB").save(path)
-    assert find_disparity(Source(str(path)))[2] == ()
+    assert not any("order" in note for note in find_disparity(Source(str(path)))[2])
 
 
 def test_viewpoints_are_measured_up_to_a_factor() -> None:
