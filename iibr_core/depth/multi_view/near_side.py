@@ -15,9 +15,9 @@ MAX_DIFFERENCE = 0.1
 """Difference of luma that counts most: larger ones count the same."""
 MIN_SLOPE = 0.01
 """Least step of luma from pixel to pixel of a place whose disparity is known."""
-MIN_HIDDEN_SHARE = 0.002
+MIN_HIDDEN_SHARE = 0.0005
 """Smallest share of all pixels of the views that must be hidden on either assumption."""
-MIN_AGREEING = 0.8
+MIN_AGREEING = 0.9
 """Smallest share of the hidden pixels that lie in views that show the same side as near."""
 
 

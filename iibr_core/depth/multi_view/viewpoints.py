@@ -24,8 +24,8 @@ LONGEST_PX = 256
 CELLS = 9, 12
 """Rows and columns of cells of the reference, in each of which one point is chosen."""
 PATCH_RADIUS_PX = 3
-LIGHT_RADIUS_PX = 8
-"""Radius of the squares whose mean is taken away, which differs with exposure and vignetting."""
+LIGHT_SHARE, MIN_LIGHT = 1 / 6, 0.02
+"""Radius of the squares whose mean is made alike, as a share of the longer side, and the luma added to it."""
 SEARCH_SHARE = 0.09
 """Largest shift that is looked for, as a share of the longer side."""
 MIN_CORNER = 5e-5
@@ -67,15 +67,15 @@ class Viewpoints:
 
 def measure_viewpoints(reference: FloatImage, others: Sequence[FloatImage]) -> Viewpoints:
     """Return the viewpoints of views (H, W), luma of 0 .. 1, that are alike in size."""
-    reference, *others = (_without_light(_smooth(luma)) for luma in (reference, *others))
+    reference, *others = map(_smooth, (reference, *others))
     points = find_corners(reference)
     if len(points) < MIN_POINTS:
         return Viewpoints(np.full((len(others), 2), np.nan), np.zeros(len(others)))
-    reach = max(round(SEARCH_SHARE * max(reference.shape)), 2)
+    reach, light = max(round(SEARCH_SHARE * max(reference.shape)), 2), _light(reference)
 
     def find(other: FloatImage) -> Doubles:
         found = np.empty((len(points), 2))
-        _find_points(reference, other, points, reach, found)
+        _find_points(reference, _in_same_light(other, light), points, reach, found)
         return found
 
     return factorise(np.stack(in_pieces(find, others, tiling.THREADS)))
@@ -89,10 +89,15 @@ def _smooth(luma: FloatImage) -> FloatImage:
     return luma
 
 
-def _without_light(luma: FloatImage) -> FloatImage:
-    """Return a luma without its mean around each pixel, which differs with the exposure, and at the edge of a lens."""
-    radius = LIGHT_RADIUS_PX
-    return luma - _box_mean(np.pad(luma, radius, "edge"), radius)[radius:-radius, radius:-radius].astype(np.float32)
+def _in_same_light(luma: FloatImage, light: Doubles) -> FloatImage:
+    """Return a luma as bright around each pixel as `light`: exposure and vignetting differ from view to view."""
+    return (luma * ((light + MIN_LIGHT) / (_light(luma) + MIN_LIGHT))).astype(np.float32)
+
+
+def _light(luma: FloatImage) -> Doubles:
+    """Return the mean (H, W) around each pixel."""
+    radius = round(LIGHT_SHARE * max(luma.shape))
+    return _box_mean(np.pad(luma, radius, "edge"), radius)[radius:-radius, radius:-radius]
 
 
 def find_corners(luma: FloatImage) -> NDArray[np.int64]:
