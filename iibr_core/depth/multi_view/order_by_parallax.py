@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.depth.multi_view.matching import luma_of
-from iibr_core.depth.multi_view.viewpoints import LONGEST_PX, Viewpoints, measure_viewpoints
+from iibr_core.depth.multi_view.viewpoints import LONGEST_PX, SEARCH_SHARE, Viewpoints, measure_viewpoints
 from iibr_core.formats.light_fields.multi_view_scene import GridIndex, MultiView
 from iibr_core.formats.light_fields.order import (
     UNKNOWN,
@@ -68,8 +68,7 @@ def find_order(scene: MultiView, views: Sequence[StoredColors], given: Arrangeme
     places = [places_in(numbers, arrangement) for arrangement in possible]
     reference = scene.centre
     chosen = _views_to_measure(places, reference)
-    shrink = max(round(max(image_size(views[reference])) / LONGEST_PX), 1)
-    found = measure_viewpoints(luma_of(views[reference], shrink), [luma_of(views[k], shrink) for k in chosen])
+    found = _measure([views[k] for k in (reference, *chosen)])
     fits = [
         fit
         for arrangement, at in zip(possible, places)
@@ -88,6 +87,17 @@ def find_order(scene: MultiView, views: Sequence[StoredColors], given: Arrangeme
         f"{scene.place}: the parallax of its views fits no order that their names suggest; give --order, --grid and"
         " --flip, correct the names, or rectify views of cameras that were turned"
     )
+
+
+def _measure(views: Sequence[StoredColors]) -> Viewpoints:
+    """Return the viewpoints of views from the first, searched twice as far in smaller copies if few are measured."""
+    for search in (1, 2):
+        shrink = max(round(max(image_size(views[0])) * search / LONGEST_PX), 1)
+        reference, *others = (luma_of(view, shrink) for view in views)
+        found = measure_viewpoints(reference, others, search * SEARCH_SHARE)
+        if found.is_measured.sum() >= min(MIN_MEASURED, len(others)):
+            break
+    return found
 
 
 def views_around(places: Sequence[GridIndex], reference: int) -> list[int]:

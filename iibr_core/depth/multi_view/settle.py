@@ -35,7 +35,7 @@ FLIP_WORDS = {
 }
 
 UNSURE = "Near and far may be exchanged, as little hides anything behind it; --flip turns them round."
-UNTESTED = "The views are in the order of their names, as too little in them shows another."
+UNTESTED = "The views are taken in the order of their names: too little of them is found again in others to test it."
 
 
 @dataclass(frozen=True, eq=False)

@@ -27,7 +27,7 @@ PATCH_RADIUS_PX = 3
 LIGHT_SHARE, MIN_LIGHT = 1 / 6, 0.02
 """Radius of the squares whose mean is made alike, as a share of the longer side, and the luma added to it."""
 SEARCH_SHARE = 0.09
-"""Largest shift that is looked for, as a share of the longer side."""
+"""Largest shift that is looked for first, as a share of the longer side."""
 MIN_CORNER = 5e-5
 """Smallest gradient across the weaker direction (mean square of luma a pixel) of a point that can be found again."""
 MAX_SECOND = 0.7
@@ -65,13 +65,15 @@ class Viewpoints:
         return np.isfinite(self.offsets[:, 0])
 
 
-def measure_viewpoints(reference: FloatImage, others: Sequence[FloatImage]) -> Viewpoints:
+def measure_viewpoints(
+    reference: FloatImage, others: Sequence[FloatImage], search_share: float = SEARCH_SHARE
+) -> Viewpoints:
     """Return the viewpoints of views (H, W), luma of 0 .. 1, that are alike in size."""
     reference, *others = map(_smooth, (reference, *others))
     points = find_corners(reference)
     if len(points) < MIN_POINTS:
         return Viewpoints(np.full((len(others), 2), np.nan), np.zeros(len(others)))
-    reach, light = max(round(SEARCH_SHARE * max(reference.shape)), 2), _light(reference)
+    reach, light = max(round(search_share * max(reference.shape)), 2), _light(reference)
 
     def find(other: FloatImage) -> Doubles:
         found = np.empty((len(points), 2))

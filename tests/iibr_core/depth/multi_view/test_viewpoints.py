@@ -1,11 +1,16 @@
-"""Viewpoints are measured in views whose parallax is tiny, and whose light differs."""
+"""Viewpoints are measured in views whose parallax is tiny or large, and whose light differs."""
+
+from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 from scipy.ndimage import gaussian_filter, shift
 
 from iibr_core.depth.multi_view.near_side import nearness_ratio
+from iibr_core.depth.multi_view.order_by_parallax import find_order
 from iibr_core.depth.multi_view.viewpoints import measure_viewpoints
+from iibr_core.formats.light_fields.light_field_formats import open_light_field
 from iibr_core.types import FloatImage, ViewOffset
 
 OFFSETS = [(0.0, 1.0), (1.0, 0.0), (-1.0, -1.0), (0.0, -2.0), (2.0, 1.0), (0.0, 3.0)]
@@ -35,6 +40,18 @@ def test_viewpoints_are_proportional(disparity_px: float, is_uneven: bool) -> No
         others = [darker_at_the_edge(luma, k) for k, luma in enumerate(others)]
     offsets = measure_viewpoints(reference, others).offsets
     assert offsets / offsets[0, 1] == pytest.approx(np.array(OFFSETS), abs=0.25 if is_uneven else 0.15)
+
+
+def test_the_order_of_views_is_found_where_neighbours_differ_by_a_seventh_of_the_width(tmp_path: Path) -> None:
+    wall = (128 + 200 * gaussian_filter(np.random.default_rng(5).normal(size=(140, 160, 3)), (2, 2, 0))).clip(0, 255)
+    colors = []
+    for column, row in np.ndindex(3, 3):
+        view = wall[14 * row :, 14 * column :][:80, :100].astype(np.uint8)
+        Image.fromarray(view).save(tmp_path / f"lf_{column}_{row}.png")
+        colors.append(np.float32(view / 255))
+    fit = find_order(open_light_field(tmp_path), colors)
+    assert fit is not None
+    assert (fit.arrangement.order, fit.arrangement.flip, fit.arrangement.row_step) == ("columns", "none", 1.0)
 
 
 def test_views_that_disagree_about_the_near_side_leave_it_open() -> None:
