@@ -29,7 +29,7 @@ from iibr_core.types import InputError, StoredColors, image_size
 
 MAX_MEASURED = 16
 """Largest number of views that are measured."""
-MAX_STRAY, MAX_STRAY_ON_LINE = 0.5, 1.0
+MAX_STRAY, MAX_STRAY_ON_LINE = 0.5, 1.5
 """Largest distance of a measured viewpoint from its place, in steps, on a grid and in a single row or column. A
 camera on a rail is moved by uneven steps; views of a Lytro camera lie closer together at the edge of its lens.
 """

@@ -34,6 +34,8 @@ MAX_SECOND = 0.7
 """Largest ratio of the least difference to that of another place, for a place that is found without doubt."""
 MAX_DIFFERENCE = 0.06
 """Largest root mean square difference of a patch and its place in another view."""
+MIN_SHIFT_PX, MIN_MOVING = 0.1, 0.05
+"""Least shift of a point that moves, and the smallest share of such points where views have any parallax."""
 MIN_POINTS = 8
 """Fewest points by which a viewpoint counts as measured."""
 MIN_AGREEING = 0.5
@@ -202,6 +204,8 @@ def factorise(shifts: Doubles) -> Viewpoints:
     """Return the viewpoints (N, 2) of shifts (N, P, 2), down and across, of P points in N views; NaN: not found."""
     is_found = np.isfinite(shifts[..., 0])
     best = Viewpoints(np.full((len(shifts), 2), np.nan), np.zeros(len(shifts)))
+    if not (np.abs(shifts[is_found]) > MIN_SHIFT_PX).any(axis=-1).mean() >= MIN_MOVING:
+        return best
     for base in np.argsort(-is_found.sum(axis=1))[:BASES]:
         disparity = _along(shifts[base])
         if np.isfinite(disparity).sum() < MIN_POINTS:

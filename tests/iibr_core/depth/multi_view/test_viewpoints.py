@@ -42,6 +42,12 @@ def test_viewpoints_are_proportional(disparity_px: float, is_uneven: bool) -> No
     assert offsets / offsets[0, 1] == pytest.approx(np.array(OFFSETS), abs=0.25 if is_uneven else 0.15)
 
 
+def test_pictures_that_do_not_differ_have_no_viewpoints() -> None:
+    reference = views(0.0)[0]
+    noisy = [reference + np.float32(np.random.default_rng(k).normal(0, 0.004, reference.shape)) for k in range(4)]
+    assert not measure_viewpoints(reference, [reference, *noisy]).is_measured.any()
+
+
 def test_the_order_of_views_is_found_where_neighbours_differ_by_a_seventh_of_the_width(tmp_path: Path) -> None:
     wall = (128 + 200 * gaussian_filter(np.random.default_rng(5).normal(size=(140, 160, 3)), (2, 2, 0))).clip(0, 255)
     colors = []
