@@ -21,6 +21,8 @@ class Remedy(Enum):
     """Download again, from the same place or another, or give a model file."""
     STRETCH = auto()
     """Stretch a depth map to the shape of the photo."""
+    VIEW_ORDER = auto()
+    """State the order of the views of a light field."""
 
 
 class FixableError(InputError):

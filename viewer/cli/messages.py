@@ -21,6 +21,9 @@ REMEDIES = {
     Remedy.SMALLER: "lower --grid or --max-pixels",
     Remedy.DEPTH: "get it with `iibr models get NAME`, or give a depth map with --disparity FILE",
     Remedy.DOWNLOAD: "check the network and try again, name a mirror in HF_ENDPOINT, or use an ONNX file of your own",
+    Remedy.VIEW_ORDER: (
+        "give --order, --grid and --flip, correct the names, or rectify views of cameras that were turned"
+    ),
     Remedy.STRETCH: "or add --stretch if it shows the whole photo",
 }
 

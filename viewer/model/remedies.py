@@ -12,6 +12,7 @@ WORDS = {
     Remedy.SMALLER: "open a smaller copy of the photo",
     Remedy.DEPTH: "get it, or open a depth map",
     Remedy.DOWNLOAD: "try again later, or choose a model file",
+    Remedy.VIEW_ORDER: "name them by row and column, and rectify views of cameras that were turned",
     Remedy.STRETCH: "or open it as a depth map if it shows the whole photo",
 }
 

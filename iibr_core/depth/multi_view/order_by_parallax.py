@@ -25,7 +25,8 @@ from iibr_core.formats.light_fields.order import (
     places_in,
     possible_arrangements,
 )
-from iibr_core.types import InputError, StoredColors, image_size
+from iibr_core.remedies import FixableError, Remedy
+from iibr_core.types import StoredColors, image_size
 
 MAX_MEASURED = 16
 """Largest number of views that are measured."""
@@ -79,13 +80,13 @@ def find_order(scene: MultiView, views: Sequence[StoredColors], given: Arrangeme
     if found.is_measured.sum() < min(MIN_MEASURED, len(chosen)) or given.order is not None:
         return None
     if scene.is_guess:
-        raise InputError(
+        raise FixableError(
             f"{scene.place}: holds no light field, or in an unusual order: the parallax of its {len(views)} numbered"
-            " pictures fits none. If they are views from a grid or a row, give --order and --grid, or correct the names"
+            " pictures fits none",
+            Remedy.VIEW_ORDER,
         )
-    raise InputError(
-        f"{scene.place}: the parallax of its views fits no order that their names suggest; give --order, --grid and"
-        " --flip, correct the names, or rectify views of cameras that were turned"
+    raise FixableError(
+        f"{scene.place}: the parallax of its views fits no order that their names suggest", Remedy.VIEW_ORDER
     )
 
 

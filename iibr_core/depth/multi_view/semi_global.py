@@ -27,8 +27,8 @@ def choose_disparity(
     """Return the disparity (H, W) that suits each pixel and its neighbours, and its sureness (H, W), 0 .. 1.
 
     costs: (H, W, D), 0 .. 255, of D >= 1 evenly spaced disparities. luma: (H, W) of the picture, 0 .. 1. The result
-    lies between two disparities, where two lines of one slope through its neighbours meet. A pixel is sure if its
-    disparity costs far less than the mean of all.
+    lies between two disparities, at the lowest point of a parabola. A pixel is sure if its disparity costs far less
+    than the mean of all.
     """
     directions = [at for at in product((-1, 0, 1), repeat=2) if any(at)]
     halves = np.zeros((2, *costs.shape), np.uint16)
@@ -85,7 +85,7 @@ def _add_path(costs, luma, down, across, sums):
 
 @kernel
 def _choose(sums, costs, disparities, values, sureness):
-    """Take the disparity with the lowest sum of both halves, moved to where two lines of one slope meet."""
+    """Take the disparity with the lowest sum of both halves, moved to the lowest point of the parabola there."""
     height, width, count = costs.shape
     totals = np.empty(count, np.float32)
     for y in range(height):
@@ -101,6 +101,6 @@ def _choose(sums, costs, disparities, values, sureness):
             values[y, x] = disparities[best]
             if best > 0 and best < count - 1:
                 below, above = totals[best - 1], totals[best + 1]
-                bend = max(below, above) - totals[best]
+                bend = below - 2 * totals[best] + above
                 if bend > 0:
                     values[y, x] += (disparities[1] - disparities[0]) * np.float32(0.5) * (below - above) / bend

@@ -15,7 +15,8 @@ from iibr_core.depth.multi_view.order_by_parallax import find_order, views_aroun
 from iibr_core.formats.light_fields.multi_view_scene import MultiView
 from iibr_core.formats.light_fields.order import FLIPS, UNKNOWN, Arrangement, Flip, arranged, as_given
 from iibr_core.formats.light_fields.views import grid_of, view_offsets
-from iibr_core.types import FloatImage, InputError, ViewOffset, ViewUpdate, image_size
+from iibr_core.remedies import FixableError, Remedy
+from iibr_core.types import FloatImage, ViewOffset, ViewUpdate, image_size
 
 CLEAR_RATIO, FINAL_CLEAR_RATIO = 1.4, 1.15
 """Ratios of `nearness_ratio` that decide, by a coarse map and by the final one."""
@@ -34,7 +35,7 @@ FLIP_WORDS = {
     "xy": "rows run from bottom to top and columns from right to left, as seen from behind",
 }
 
-UNSURE = "Near and far may be exchanged, as little hides anything behind it; --flip turns them round."
+UNSURE = "Near and far may be exchanged, as little hides anything behind it: flip both axes to turn them round."
 UNTESTED = "The views are taken in the order of their names: too little of them is found again in others to test it."
 
 
@@ -75,9 +76,10 @@ def settle(
     ordered = [by_place[view.place] for view in field.views if view.place is not None]
     fit = find_order(field, [view.colors for view in ordered], given) if field.numbers or given != UNKNOWN else None
     if fit is None and field.is_guess and given.order is None:
-        raise InputError(
+        raise FixableError(
             f"{field.place}: holds no light field; its {len(views)} numbered pictures do not look like views from a"
-            " grid or a row. If they are, give --order and --grid"
+            " grid or a row",
+            Remedy.VIEW_ORDER,
         )
     if fit is None:
         order = UNKNOWN if given == UNKNOWN else as_given(field, given)

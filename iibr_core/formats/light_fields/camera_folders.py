@@ -59,7 +59,7 @@ def read_posed(folder: Path) -> MultiView | None:
     if scene is None:
         raise InputError(
             f"{path}: its {len(cameras)} cameras do not look the same way from a regular grid, so they make no light"
-            f" field; `iibr generate PHOTO --poses {folder}` makes views of a photo for them"
+            " field; give them as poses for views of a photo"
         )
     return scene
 

@@ -107,9 +107,9 @@ def test_disparities_are_the_cheapest_of_all_paths_and_lie_between_steps():
         expected = disparities[best]
         if 0 < best < 5:
             below, least, above = sums[y, x, best - 1 : best + 2]
-            # Where the steeper side, mirrored, meets a line of its slope through the other neighbour.
-            slope, inner = max(below, above) - least, inner + 1
-            expected += 0.25 * (below - above) / slope if slope > 0 else 0
+            # The lowest point of the parabola through three sums.
+            a, b, _ = np.polyfit([-1, 0, 1], [below, least, above], 2)
+            expected, inner = expected - 0.5 * b / (2 * a) if a > 0 else expected, inner + 1
         # A sum that float32 rounds the other way is one of hundreds.
         assert abs(values[y, x] - expected) < 0.02
         mean = costs[y, x].mean()
