@@ -89,7 +89,9 @@ def test_other_cameras_make_no_light_field(tmp_path, change) -> None:
     content = json.loads((folder / "transforms.json").read_text())
     content["frames"][1]["transform_matrix"] = (np.array(content["frames"][1]["transform_matrix"]) @ change).tolist()
     (folder / "transforms.json").write_text(json.dumps(content))
-    with pytest.raises(InputError, match=r"its 6 cameras do not look the same way from a regular grid.*--poses"):
+    with pytest.raises(
+        InputError, match=r"its 6 cameras do not look the same way from a regular grid.*give them as poses"
+    ):
         open_light_field(folder)
 
 
