@@ -12,7 +12,6 @@ from __future__ import annotations
 import argparse
 import tempfile
 import time
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -24,7 +23,7 @@ from iibr_core.color import bytes_from_encoded
 from iibr_core.depth.multi_view.order_by_parallax import find_order
 from iibr_core.formats.light_fields.light_field_formats import open_light_field
 from iibr_core.formats.light_fields.order import Arrangement, places_in
-from iibr_core.formats.light_fields.views import read_views
+from iibr_core.formats.light_fields.views import in_order_of, read_views
 from iibr_core.scenes.light_fields import find_disparity
 from iibr_core.scenes.scene import Source
 from iibr_core.training.scenes.random_scene import random_scene
@@ -38,7 +37,6 @@ MAX_DISPARITY_PX = 2.5
 NOISE = 1.0
 """Standard deviation of noise, of 255."""
 HEAD = "scene", "grid", "files", "outcome", "note", "order, % of the time"
-Name = Callable[[int, int, GridShape], str]
 
 ORDERS: dict[str, tuple[Arrangement, bool]] = {
     "as named": (Arrangement("rows", None, "none"), True),
@@ -86,11 +84,9 @@ def judge(
         truth = render(scene, SIZE, ViewOffset(0.0, 0.0), samples=1)[1]
         try:
             field = open_light_field(Path(folder))
-            views = {view.place: view for view in field.views}
-            read = list(read_views(field)[1])
-            colors_of = {(view.row, view.column): view.colors for view in read}
+            views = in_order_of(field, list(read_views(field)[1]))
             begin = time.process_time()
-            find_order(field, [colors_of[place] for place in views if place is not None])
+            find_order(field, [view.colors for view in views])
             middle = time.process_time()
             _, found, notes = find_disparity(Source(folder))
             share = f"{100 * (middle - begin) / (time.process_time() - middle):.0f}"
@@ -108,7 +104,7 @@ def name_of(place: tuple[int, int], grid: GridShape, order: Arrangement, has_two
     sides = grid[::-1] if "columns" in (order.order or "") else grid
     numbers = list(np.ndindex(*sides)) if has_two else [(k,) for k in range(grid.rows * grid.columns)]
     at = places_in(numbers, Arrangement(order.order, grid, order.flip)).index(place)
-    return "_".join(f"{number:03d}" for number in ("", *numbers[at]) if number != "")
+    return "_".join(f"{number:03d}" for number in numbers[at])
 
 
 def write(folder: Path, pixels: NDArray[np.uint8], name: str) -> None:

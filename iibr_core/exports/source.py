@@ -18,7 +18,7 @@ from iibr_core.exports.kinds import ExportKind, ExportOptions, optics_of, with_d
 from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.formats.images.picture_kinds import AS_USUAL, PictureFormat
 from iibr_core.formats.images.write import write_picture
-from iibr_core.formats.light_fields.light_field_formats import is_light_field
+from iibr_core.formats.light_fields.light_field_formats import is_light_field, open_light_field
 from iibr_core.method.plan import ScenePlan
 from iibr_core.runtime.work import raise_if_stopped, report_progress
 from iibr_core.scenes.lens_limits import LensChoice
@@ -175,7 +175,8 @@ def open_for_export(
     from iibr_core.scenes.opening import results_of
 
     # A light field from disk is copied without waiting for its disparity, unless that shows the order of its views.
-    is_copied = kind.is_light_field and not (is_light_field(Path(source.path)) and not is_order_known(source))
+    path = Path(source.path)
+    is_copied = kind.is_light_field and (not is_light_field(path) or is_order_known(open_light_field(path), source))
     request = SceneRequest(0, source, depth_strength, takes_drafts=is_copied)
     ready = next(results_of(request, lambda: CENTRE))
     assert isinstance(ready, SceneReady)

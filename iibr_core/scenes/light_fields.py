@@ -23,6 +23,7 @@ from iibr_core.formats.light_fields.order import UNKNOWN, arranged, as_given, nu
 from iibr_core.formats.light_fields.views import (
     disparity_range,
     grid_of,
+    in_order_of,
     offsets_by_place,
     read_views,
     row_step_of,
@@ -104,23 +105,24 @@ def _offsets_of(field: MultiView, views: Sequence[ViewUpdate]) -> list[ViewOffse
 
 def open_field(source: Source) -> MultiView:
     """Return the light field of a source, in the order that is known of it."""
-    field, given = open_light_field(Path(source.path)), source.arrangement
-    is_final = given.is_complete or field.disparity or source.depth.file or not field.numbers
+    return _in_known_order(open_light_field(Path(source.path)), source)
+
+
+def _in_known_order(field: MultiView, source: Source) -> MultiView:
+    given, is_final = source.arrangement, is_order_known(field, source) or source.depth.file
     return arranged(field, as_given(field, given)) if given != UNKNOWN and is_final and numbers_of(field) else field
 
 
-def is_order_known(source: Source) -> bool:
+def is_order_known(field: MultiView, source: Source) -> bool:
     """Return whether the order of a light field's views needs no test: names, files or the user are sure of it."""
-    field = open_light_field(Path(source.path))
     return bool(source.arrangement.is_complete or field.disparity or not field.numbers)
 
 
 def open_settled(source: Source) -> tuple[MultiView, tuple[str, ...]]:
     """Return a light field in its right order, found from its views where it is not known, and notes."""
-    if is_order_known(source):
-        field = open_field(source)
-        return field, field.notes
     field = open_light_field(Path(source.path))
+    if is_order_known(field, source):
+        return _in_known_order(field, source), field.notes
     settled = settle(field, _read_all(field), source.arrangement)
     return settled.field, settled.notes
 
@@ -141,8 +143,7 @@ def find_range(source: Source) -> tuple[float, float] | None:
     """Return about the least and greatest disparity, in pixels per view step; None if none can be found."""
     field = open_field(source)
     with suppress(InputError):
-        colors = {(view.row, view.column): view.colors for view in _read_all(field)}
-        views = [colors[view.place] for view in field.views if view.place is not None]
+        views = [view.colors for view in in_order_of(field, _read_all(field))]
         values = estimate_coarse(views, view_offsets(field), field.centre).values
         return float(values.min()), float(values.max())
     return None

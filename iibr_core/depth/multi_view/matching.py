@@ -16,8 +16,8 @@ from threading import Lock
 import numpy as np
 from numpy.typing import NDArray
 
-from iibr_core.color import encoded_from_stored
 from iibr_core.depth.guided_filter import GuidedFilter
+from iibr_core.formats.light_fields.multi_view_scene import line_numbers
 from iibr_core.runtime import tiling
 from iibr_core.runtime.kernels import kernel
 from iibr_core.runtime.tiling import in_pieces
@@ -95,8 +95,10 @@ def choose_views(offsets: Sequence[ViewOffset], reference: int) -> list[int]:
 
     All views count if fewer than eight are on the rays. Of too many views, those at even distances are taken.
     """
-    lines = np.stack([_line_numbers(axis) for axis in np.array(offsets, float).T], axis=1)
-    steps, away = np.abs(lines - lines[reference]), np.array(offsets, float) - offsets[reference]
+    places = np.array(offsets, float)
+    gaps = np.diff(np.sort(places, axis=0), axis=0).max(axis=0)
+    lines = np.stack([line_numbers(axis, SAME_LINE * gap) for axis, gap in zip(places.T, gaps)], axis=1)
+    steps, away = np.abs(lines - lines[reference]), places - places[reference]
     others = sorted(set(range(len(offsets))) - {reference}, key=lambda index: hypot(*away[index]))
     on_rays = [index for index in others if 0 in steps[index] or steps[index, 0] == steps[index, 1]]
     chosen = on_rays if len(on_rays) >= min(8, len(others)) else others
@@ -104,32 +106,28 @@ def choose_views(offsets: Sequence[ViewOffset], reference: int) -> list[int]:
     return [reference, *(chosen[index] for index in kept)]
 
 
-def _line_numbers(values: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Return the number of the row or column of each view (N,) along an axis; cameras may stand a little off it."""
-    order = np.argsort(values)
-    gaps = np.diff(values[order], prepend=values[order[0]])
-    numbers = np.empty(len(values), np.int64)
-    numbers[order] = np.cumsum(gaps > SAME_LINE * gaps.max())
-    return numbers
-
-
 def luma_of(colors: StoredColors, shrink: int = 1) -> FloatImage:
     """Return the mean of the channels of a view (H, W, 3), 0 .. 1, over squares of `shrink` pixels."""
-    height, width = (length // shrink for length in image_size(colors))
-    is_hdr, sums, values = colors.dtype != np.uint8, np.zeros((height, width), np.float32), colors.astype(np.float32)
-    if is_hdr:
-        values = np.clip(np.nan_to_num(values, nan=0.0, posinf=1.0, neginf=0.0), 0, 1)
-    for y, x, channel in np.ndindex(shrink, shrink, colors.shape[2]):
-        sums += values[y::shrink, x::shrink, channel][:height, :width]
-    return sums / np.float32((1 if is_hdr else 255) * shrink**2 * colors.shape[2])
+    sums, white = _sums_over_squares(colors, shrink)
+    return np.asarray(sums.sum(axis=2) / np.float32(white * sums.shape[2]))
 
 
 def colors_of(colors: StoredColors, shrink: int = 1) -> FloatImage:
     """Return the colours of a view (H, W, 3), sRGB-encoded, 0 .. 1, means over squares of `shrink` pixels."""
-    encoded = np.clip(np.nan_to_num(encoded_from_stored(colors), nan=0.0, posinf=1.0, neginf=0.0), 0, 1)
-    rows, columns = (length // shrink for length in image_size(encoded))
-    squares = encoded[: rows * shrink, : columns * shrink].reshape(rows, shrink, columns, shrink, 3)
-    return np.ascontiguousarray(squares.mean(axis=(1, 3)), np.float32)
+    sums, white = _sums_over_squares(colors, shrink)
+    return sums / np.float32(white)
+
+
+def _sums_over_squares(colors: StoredColors, shrink: int) -> tuple[FloatImage, int]:
+    """Return the sums (H, W, C) of a view's channels over squares of `shrink` pixels, and that of white."""
+    height, width = (length // shrink for length in image_size(colors))
+    is_hdr, values = colors.dtype != np.uint8, colors.astype(np.float32)
+    if is_hdr:
+        values = np.clip(np.nan_to_num(values, nan=0.0, posinf=1.0, neginf=0.0), 0, 1)
+    sums = np.zeros((height, width, colors.shape[2]), np.float32)
+    for y, x in np.ndindex(shrink, shrink):
+        sums += values[y::shrink, x::shrink][:height, :width]
+    return sums, (1 if is_hdr else 255) * shrink**2
 
 
 def sweep(views: MatchingViews, disparities: NDArray[np.float32]) -> NDArray[np.uint8]:

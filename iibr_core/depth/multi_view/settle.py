@@ -14,7 +14,7 @@ from iibr_core.depth.multi_view.near_side import nearness_ratio
 from iibr_core.depth.multi_view.order_by_parallax import find_order, views_around
 from iibr_core.formats.light_fields.multi_view_scene import MultiView
 from iibr_core.formats.light_fields.order import FLIPS, UNKNOWN, Arrangement, Flip, arranged, as_given
-from iibr_core.formats.light_fields.views import grid_of, view_offsets
+from iibr_core.formats.light_fields.views import grid_of, in_order_of, view_offsets
 from iibr_core.remedies import FixableError, Remedy
 from iibr_core.types import FloatImage, ViewOffset, ViewUpdate, image_size
 
@@ -72,8 +72,7 @@ def settle(
     pair counts as its centre, not the right one, which is the centre of its grid. Raises InputError if the views
     contradict every order, or are too small for their disparity to be found.
     """
-    by_place = {(view.row, view.column): view for view in views}
-    ordered = [by_place[view.place] for view in field.views if view.place is not None]
+    ordered = in_order_of(field, views)
     fit = find_order(field, [view.colors for view in ordered], given) if field.numbers or given != UNKNOWN else None
     if fit is None and field.is_guess and given.order is None:
         raise FixableError(
@@ -132,8 +131,7 @@ def _faced(settled: Settled, values: FloatImage, clear_ratio: float) -> Settled:
     ratio = nearness_ratio(lumas, [settled.offsets[k] for k in chosen], small)
     if ratio >= 1 / clear_ratio:
         return replace(settled, is_sure=ratio > clear_ratio)
-    by_place = {(view.row, view.column): view for view in settled.views}
-    ordered = [by_place[view.place] for view in settled.field.views if view.place is not None]
+    ordered = in_order_of(settled.field, settled.views)
     return _placed(settled.named, ordered, _turned(settled.arrangement), settled.measured, is_sure=True)
 
 

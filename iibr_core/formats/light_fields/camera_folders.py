@@ -15,7 +15,15 @@ from numpy.typing import NDArray
 from iibr_core.formats.files import printable, stays_within
 from iibr_core.formats.images.decode import read_size
 from iibr_core.formats.images.picture_source import PictureSource
-from iibr_core.formats.light_fields.multi_view_scene import GridIndex, KnownView, MultiView, pictures_in, place_on_grid
+from iibr_core.formats.light_fields.multi_view_scene import (
+    GridIndex,
+    KnownView,
+    MultiView,
+    line_numbers,
+    pictures_in,
+    place_on_grid,
+    slope,
+)
 from iibr_core.formats.poses import central_camera, poses_in, read_llff_poses, read_named_poses
 from iibr_core.types import Camera, InputError, ViewOffset
 
@@ -122,8 +130,9 @@ def _grid_in(positions: Positions) -> tuple[NDArray[np.float64], list[GridIndex]
 
     None if the cameras stand on no regular grid.
     """
-    lines = [_lines_of(positions, axis) for axis in (1, 0)]  # rows, columns
-    steps = [_step_of(positions[:, axis], numbers) for axis, numbers in zip((1, 0), lines)]
+    largest = max(float(np.diff(np.sort(positions[:, axis])).max()) for axis in (0, 1))
+    lines = [line_numbers(positions[:, axis], MIN_STEP_RATIO * largest) for axis in (1, 0)]  # rows, columns
+    steps = [slope(numbers, positions[:, axis]) for axis, numbers in zip((1, 0), lines)]
     step = steps[1] or steps[0]
     if step == 0:
         return None
@@ -156,21 +165,6 @@ def _looks_alike(camera: Camera, central: Camera) -> bool:
     zoom = np.abs(np.subtract(camera.focal_px, central.focal_px)) / central.focal_px[0] * max(central.size) / 2
     aspect = abs(central.focal_px[0] - central.focal_px[1]) / central.focal_px[0] * max(central.size) / 2
     return bool(max(turn, *zoom, aspect) <= MAX_ERROR_PX)
-
-
-def _lines_of(positions: Positions, axis: int) -> NDArray[np.intp]:
-    """Return the number of the row or column of each camera (N,): gaps along the axis part them."""
-    largest = max(float(np.diff(np.sort(positions[:, k])).max()) for k in (0, 1))
-    order = np.argsort(positions[:, axis])
-    numbers = np.zeros(len(order), np.intp)
-    numbers[order[1:]] = np.cumsum(np.diff(positions[order, axis]) > MIN_STEP_RATIO * largest)
-    return numbers
-
-
-def _step_of(values: NDArray[np.float64], numbers: NDArray[np.intp]) -> float:
-    """Return the mean distance of neighbouring rows or columns; 0 if there is one only."""
-    spread = ((numbers - numbers.mean()) ** 2).sum()
-    return float(((numbers - numbers.mean()) * values).sum() / spread) if spread else 0.0
 
 
 def _free_scene(folder: Path, pictures: Sequence[Path], cameras: Sequence[Camera], notes: tuple[str, ...]) -> MultiView:

@@ -24,6 +24,7 @@ from iibr_core.formats.light_fields.multi_view_scene import (
     maps_in,
     pictures_in,
     place_on_grid,
+    slope,
 )
 from iibr_core.types import InputError, ViewOffset
 
@@ -77,7 +78,7 @@ def _viewpoints(index: np.ndarray, position: np.ndarray) -> tuple[np.ndarray, np
 
     index: rows and columns (N, 2). position: Y and X (N, 2) in any unit.
     """
-    slopes = np.array([_slope(index[:, axis], position[:, axis]) for axis in (0, 1)])
+    slopes = np.array([slope(index[:, axis], position[:, axis]) for axis in (0, 1)])
     step = float(abs(slopes[1] or slopes[0]))
     if step == 0:
         note = "Camera positions are unknown: a regular grid is assumed."
@@ -91,13 +92,6 @@ def _viewpoints(index: np.ndarray, position: np.ndarray) -> tuple[np.ndarray, np
         return index * USUAL_DIRECTIONS, USUAL_DIRECTIONS, note, False
     more = f"; cameras stand up to {stray:.2f} view steps off a regular grid" if stray >= MIN_NOTED_STRAY else ""
     return offsets, directions, f"Viewpoints from the names{more}.", True
-
-
-def _slope(x: np.ndarray, y: np.ndarray) -> float:
-    """Return the slope of the line fitted to (x, y), each (N,); 0 if all x are equal."""
-    centred = x - x.mean()
-    spread = float((centred**2).sum())
-    return float((centred * y).sum() / spread) if spread > 0 else 0.0
 
 
 def read_middlebury(folder: Path) -> MultiView | None:

@@ -7,6 +7,10 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from iibr_core.formats.files import entries_of
 from iibr_core.formats.images.picture_source import PictureSource, source_size
@@ -138,6 +142,23 @@ def place_on_grid(scene: MultiView, numbers: Sequence[GridIndex]) -> MultiView:
     places = [(rows.index(row), columns.index(column)) for row, column in numbers]
     views = tuple(replace(view, place=place) for view, place in zip(scene.views, places))
     return replace(scene, views=views, grid=GridShape(len(rows), len(columns)))
+
+
+def line_numbers(values: NDArray[np.float64], min_gap: float) -> NDArray[np.int64]:
+    """Return the number of the row or column of each view: places (N,) along an axis lie farther apart than `min_gap`
+    in different ones.
+    """
+    order = np.argsort(values)
+    numbers = np.zeros(len(values), np.int64)
+    numbers[order[1:]] = np.cumsum(np.diff(values[order]) > min_gap)
+    return numbers
+
+
+def slope(x: NDArray[Any], y: NDArray[Any]) -> float:
+    """Return the slope of the line fitted to (x, y), each (N,); 0 if all x are equal."""
+    centred = x - x.mean()
+    spread = float((centred**2).sum())
+    return float((centred * y).sum() / spread) if spread > 0 else 0.0
 
 
 def pictures_in(folder: Path) -> list[Path]:

@@ -1,7 +1,7 @@
 """Read the views of a light field on disk whose views fill a grid, the centre first."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from statistics import fmean
 
 from iibr_core.color import stored_from_encoded
@@ -81,6 +81,12 @@ def view_offsets(scene: MultiView) -> list[ViewOffset]:
     """Return the viewpoint of each view from the central one, in steps of the grid, as positions in names have it."""
     step, (t, s) = step_length(scene), scene.views[scene.centre].offset
     return [ViewOffset((view.offset.t - t) / step, (view.offset.s - s) / step) for view in scene.views]
+
+
+def in_order_of(scene: MultiView, views: Sequence[ViewUpdate]) -> list[ViewUpdate]:
+    """Return all views of a grid in the order of the scene's."""
+    by_place = {(view.row, view.column): view for view in views}
+    return [by_place[view.place] for view in scene.views if view.place is not None]
 
 
 def offsets_by_place(scene: MultiView) -> dict[GridIndex, ViewOffset]:
