@@ -115,7 +115,7 @@ def _in_known_order(field: MultiView, source: Source) -> MultiView:
 
 def is_order_known(field: MultiView, source: Source) -> bool:
     """Return whether the order of a light field's views needs no test: names, files or the user are sure of it."""
-    return bool(source.arrangement.is_complete or field.disparity or not field.numbers)
+    return bool(source.arrangement.is_complete or field.disparity or not field.numbers or len(field.views) == 1)
 
 
 def open_settled(source: Source) -> tuple[MultiView, tuple[str, ...]]:

@@ -69,6 +69,8 @@ def find_order(scene: MultiView, views: Sequence[StoredColors], given: Arrangeme
     places = [places_in(numbers, arrangement) for arrangement in possible]
     reference = scene.centre
     chosen = _views_to_measure(places, reference)
+    if not chosen:
+        return None
     found = _measure([views[k] for k in (reference, *chosen)])
     fits = [
         fit

@@ -50,7 +50,7 @@ def numbers_of(scene: MultiView) -> Sequence[tuple[int, ...]]:
 def possible_arrangements(scene: MultiView, given: Arrangement = UNKNOWN) -> list[Arrangement]:
     """Return the orders and grids that the names admit, the likeliest first, without flips.
 
-    Raises InputError if a grid is given that the views do not fill.
+    Raises InputError if a grid or an order is given that the views do not fill.
     """
     numbers = numbers_of(scene)
     if not numbers:
@@ -68,11 +68,12 @@ def possible_arrangements(scene: MultiView, given: Arrangement = UNKNOWN) -> lis
             f"{scene.place}: its {len(numbers)} views do not fill a grid of {given.grid.rows}x{given.grid.columns};"
             f" give {grids}"
         )
-    return [
-        Arrangement(order, shape)
-        for order, shape in pairs
-        if given.order in (None, order) and given.grid in (None, shape)
-    ]
+    ordered = [(order, shape) for order, shape in pairs if given.order in (None, order)]
+    possible = [Arrangement(order, shape) for order, shape in ordered if given.grid in (None, shape)]
+    if not possible:
+        ways = ", ".join(f"{order} {shape.rows}x{shape.columns}" for order, shape in pairs)
+        raise InputError(f"{scene.place}: its views are not counted by {given.order} of this grid; give {ways}")
+    return possible
 
 
 def _shapes(count: int) -> list[GridShape]:

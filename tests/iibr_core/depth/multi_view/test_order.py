@@ -136,6 +136,17 @@ def test_what_the_user_says_about_the_order_counts(tmp_path: Path) -> None:
         open_settled(Source(str(folder), arrangement=Arrangement(grid=GridShape(4, 6))))
 
 
+def test_an_order_that_contradicts_its_grid_and_a_single_view_are_named(tmp_path: Path) -> None:
+    folder = write_views(tmp_path / "field", {f"v{r}_u{c}": centred(r, c) for r, c in grid(3, 5)})
+    given = Arrangement("columns", GridShape(3, 5))
+    with pytest.raises(InputError, match="not counted by columns of this grid; give rows 3x5, columns 5x3"):
+        find_disparity(Source(str(folder), arrangement=given))
+    alone = write_views(tmp_path / "alone", {"v0_u0": (0.0, 0.0)})
+    assert open_settled(Source(str(alone)))[0].grid == (1, 1)
+    with pytest.raises(InputError, match="same viewpoint"):
+        find_disparity(Source(str(alone)))
+
+
 def test_views_in_no_order_are_refused(tmp_path: Path) -> None:
     places = np.random.default_rng(4).permutation(grid(5, 5))
     folder = write_views(tmp_path / "field", {f"v{k // 5}_u{k % 5}": centred(*at) for k, at in enumerate(places)})
