@@ -27,8 +27,8 @@ POLICY = (
     "default-src 'none'; script-src {script}; style-src {style}; img-src data: blob:; base-uri 'none';"
     " form-action 'none'"
 )
-SCRIPTS = "renderer.js", "viewer.js"
-LINK = re.compile(r"^import [^;]*;\n|^export (?=const|class|function)", re.MULTILINE)
+SCRIPTS = "renderer.js", "views.js", "viewer.js"
+LINK = re.compile(r"^import [^;]*;\n|^export (?=const|class|function|async)", re.MULTILINE)
 """Imports and exports of the scripts, which are one module in a page."""
 COMMENT = re.compile(r"[ \t]*//[^\n]*|\n(?=[ \t]*(?://[^\n]*)?\n)")
 """Comments and empty lines of a shader."""
