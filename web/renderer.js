@@ -227,11 +227,9 @@ class Program {
 export class Renderer {
     constructor(canvas, shaders, field) {
         const gl = canvas.getContext("webgl2", { alpha: false, antialias: false, preserveDrawingBuffer: true });
-        const extensions = ["EXT_color_buffer_float", "EXT_float_blend", "EXT_color_buffer_half_float"];
-        const [floats, sums, halves] = extensions.map((name) => gl?.getExtension(name));
-        if (!floats && !halves) throw new Error("no WebGL 2 that draws floats");
+        const extensions = ["EXT_color_buffer_half_float", "EXT_color_buffer_float"];
+        if (!extensions.some((name) => gl?.getExtension(name))) throw new Error("no WebGL 2 that draws half floats");
         Object.assign(this, { gl, canvas, shaders, field, programs: new Map() });
-        this.floats = floats && sums ? gl.RGBA32F : gl.RGBA16F;
         if ("drawingBufferColorSpace" in gl) gl.drawingBufferColorSpace = field.colorSpace;
         if (field.order.length > gl.getParameter(gl.MAX_ARRAY_TEXTURE_LAYERS)
             || Math.max(field.width, field.height) > gl.getParameter(gl.MAX_TEXTURE_SIZE)) {
@@ -271,7 +269,7 @@ export class Renderer {
         if (light?.width === width && light.height === height) return light;
         gl.deleteFramebuffer(light?.framebuffer ?? null);
         gl.deleteTexture(light?.texture ?? null);
-        const texture = this.texture(gl.TEXTURE_2D, this.floats, gl.NEAREST, width, height);
+        const texture = this.texture(gl.TEXTURE_2D, gl.RGBA16F, gl.NEAREST, width, height);
         const framebuffer = gl.createFramebuffer();
         gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);
         gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, texture, 0);

@@ -7,22 +7,17 @@ const SWING_S = 9, BAR_AWAY_MS = 4000, TAP_MS = 350, TAP_PX = 8, TILT_DEG = 20, 
 const SLOW_MS = 45, QUICK_MS = 24;  // of a frame while the hand moves
 
 class Page {
-    constructor(field, renderer) {
+    constructor(field) {
         const canvas = $("view"), still = matchMedia("(prefers-reduced-motion: reduce)").matches;
-        Object.assign(this, { field, renderer, canvas, part: WHOLE, level: 0, changed: true, drawnAt: 0, moves: 0 });
+        Object.assign(this, { field, canvas, part: WHOLE, level: 0, changed: true, drawnAt: 0, moves: 0 });
         this.optics = { eye: { t: 0, s: 0 }, focus: field.focus, aperture: field.aperture };
         this.swings = !still && field.order.length > 1;
         this.pointers = new Map();
-        canvas.hidden = false;
         for (const name of ["focus", "aperture"]) {
             [$(name).min, $(name).max] = field[`${name}Limits`];
             $(name).addEventListener("input", () => this.set({ [name]: $(name).valueAsNumber }));
         }
         new ResizeObserver(() => this.wake()).observe(canvas);
-        canvas.addEventListener("webglcontextlost", () => {
-            canvas.hidden = true;
-            say("The graphics driver gave up; load the page again.");
-        });
         canvas.addEventListener("pointercancel", ({ pointerId }) => this.pointers.delete(pointerId));
         for (const name of ["pointerdown", "pointermove", "pointerup", "wheel"]) {
             canvas.addEventListener(name, (event) => this[name](event), { passive: false });
@@ -34,6 +29,12 @@ class Page {
         }
         $("tilt").hidden = !globalThis.DeviceOrientationEvent || !matchMedia("(pointer: coarse)").matches;
         this.showBar();
+    }
+
+    // Draws by this renderer from now on: the first one, or the one that follows when the graphics driver lost its data.
+    use(field, renderer) {
+        Object.assign(this, { field, renderer });
+        this.canvas.hidden = false;
         this.set({});
     }
 
@@ -59,6 +60,7 @@ class Page {
     frame(now) {
         const { renderer } = this;
         this.asked = 0;
+        if (renderer.gl.isContextLost()) return;
         if (this.swings) this.swing(now);
         const rests = now - this.drawnAt > 150;
         if (this.changed || (this.level && rests && !this.isBest)) {
@@ -211,20 +213,33 @@ class Page {
 
 async function start() {
     if (!$("end")) return say("This page is cut off: get the whole file.");
-    const field = JSON.parse($("field").textContent);
-    Object.assign(NUMBERS, field.numbers);
-    Object.assign(field, { fullStep: field.step, step: 1e6, layers: new Map([["0,0", 0]]) });
-    let page = null, renderer = null;
-    try {
-        renderer = new Renderer($("view"), JSON.parse($("shaders").textContent), field);
-    } catch (error) {
-        return say(`The middle picture only: this browser draws no WebGL 2 (${error.message}).`);
-    }
-    return load(field, renderer, (count) => {
-        page ??= new Page(field, renderer);
-        page.wake();
-        document.documentElement.dataset.views = count;
-    }).catch((error) => say(`The views cannot be read: ${error.message}.`)).finally(() => page?.wake());
+    const stored = JSON.parse($("field").textContent), shaders = JSON.parse($("shaders").textContent);
+    Object.assign(NUMBERS, stored.numbers);
+    const canvas = $("view");
+    let page = null, newest = null;
+    // Opens the views, and opens them again when the graphics driver lost what it had.
+    const open = async () => {
+        const field = { ...stored, fullStep: stored.step, step: 1e6, layers: new Map([["0,0", 0]]) };
+        let renderer = null;
+        try {
+            renderer = newest = new Renderer(canvas, shaders, field);
+        } catch (error) {
+            return say(`The middle picture only: this browser draws no WebGL 2 (${error.message}).`);
+        }
+        return load(field, renderer, (count) => {
+            if (renderer !== newest) return;
+            page ??= new Page(field);
+            page.use(field, renderer);
+            document.documentElement.dataset.views = count;
+        }).catch((error) => say(`The views cannot be read: ${error.message}.`)).finally(() => page?.wake());
+    };
+    canvas.addEventListener("webglcontextlost", (event) => {
+        event.preventDefault();  // else the browser does not restore it
+        canvas.hidden = true;
+        say("The graphics driver stopped. If this message stays, load the page again.");
+    });
+    canvas.addEventListener("webglcontextrestored", open);
+    return open();
 }
 
 if (globalThis.document) start();

@@ -3,7 +3,7 @@
 import { hash } from "./renderer.js";
 
 export const $ = (id) => document.getElementById(id);
-export const say = (text) => ($("said").textContent = text);
+export const say = (text) => ($("status").textContent = text);
 
 // The pictures of a data element in their order: a line is a file, which may hold many frames.
 async function* pictures(element, type, isMoving) {
@@ -41,7 +41,6 @@ export async function load(field, renderer, onView) {
         onView(++layer);
     }
     if (layer < order.length) return say("This browser shows one view and its depth: it lacks ImageDecoder.");
-    for (const name of ["colors", "depths"]) $(name).remove();  // they take memory
     order.forEach((place, i) => field.layers.set(hash(place), i));
     field.step = field.fullStep;
     return say("");

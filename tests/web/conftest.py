@@ -12,7 +12,7 @@ from PIL import Image
 from tests.browser import Pipe, Tab, open_browser
 from viewer.cli.main import app
 
-STILL = "document.documentElement.dataset.state === 'still' && document.getElementById('said').textContent === ''"
+STILL = "document.documentElement.dataset.state === 'still' && document.getElementById('status').textContent === ''"
 ARROWS = {"ArrowLeft": 37, "ArrowUp": 38, "ArrowRight": 39, "ArrowDown": 40, "Home": 36}
 OpenPage = Callable[..., Tab]
 
