@@ -5,6 +5,7 @@ https://chromedevtools.github.io/devtools-protocol; messages end with a zero byt
 
 from __future__ import annotations
 
+import base64
 import json
 import os
 import shutil
@@ -16,14 +17,14 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO, Any
 
+from tests.browsers.page import Page, PageError, Place, required
+
 NAMES = ("chromium", "chromium-browser", "google-chrome")
 USUAL_FLAGS = (
     "--headless=new", "--no-sandbox", "--no-first-run", "--disable-background-networking", "--disable-component-update",
     "--disable-default-apps", "--disable-extensions", "--disable-sync", "--hide-scrollbars", "--mute-audio",
     "--force-color-profile=srgb",
 )  # fmt: skip
-DEADLINE_S = 100.0
-"""For a condition that always comes true."""
 SOFTWARE = ("--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
 """WebGL on the processor."""
 
@@ -37,11 +38,10 @@ os.execvp(sys.argv[3], sys.argv[3:])
 """A program that becomes another, which finds the two descriptors named where the protocol wants them."""
 
 
-class PageError(RuntimeError):
-    """What a page or the browser says went wrong."""
+KEY_CODES = {"ArrowLeft": 37, "ArrowUp": 38, "ArrowRight": 39, "ArrowDown": 40, "Home": 36}
 
 
-class Tab:
+class Tab(Page):
     """One page. events: what it told so far, the latest last, by (method, parameters)."""
 
     def __init__(self, pipe: Pipe, session: str) -> None:
@@ -77,22 +77,26 @@ class Tab:
             raise PageError(details.get("exception", {}).get("description") or details["text"])
         return answer["result"].get("value")
 
-    def wait_until(self, condition: str) -> None:
-        """Until a JavaScript condition holds, asked once a frame. Raises PageError, with what the page says, where that
-        takes longer than DEADLINE_S.
-        """
-        self.evaluate(
-            "new Promise((done, fail) => { const end = performance.now() + "
-            f"{1000 * DEADLINE_S}, ask = () => {condition} ? done() : performance.now() > end"
-            " ? fail(new Error(document.body.innerText)) : requestAnimationFrame(ask); ask() })"
-        )
-
     def resize(self, width: int, height: int, ratio: float = 1.0, is_phone: bool = False) -> None:
         """The size of the page, CSS pixels. is_phone: with touch instead of a mouse."""
         self.call(
             "Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=ratio, mobile=is_phone
         )
         self.call("Emulation.setTouchEmulationEnabled", enabled=is_phone)
+
+    def screenshot(self) -> bytes:
+        return base64.b64decode(self.call("Page.captureScreenshot", format="png")["data"])
+
+    def press(self, key: str, times: int = 1) -> None:
+        for _ in range(times):
+            for kind in ("keyDown", "keyUp"):
+                code = KEY_CODES.get(key, 0)
+                self.call("Input.dispatchKeyEvent", type=kind, key=key, windowsVirtualKeyCode=code)
+
+    def drag(self, *places: Place) -> None:
+        kinds = ["mousePressed", *["mouseMoved"] * (len(places) - 1), "mouseReleased"]
+        for kind, (x, y) in zip(kinds, [*places, places[-1]], strict=True):
+            self.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", clickCount=1)
 
     def prefer(self, **features: str) -> None:
         """Media features, as prefers_color_scheme="dark"."""
@@ -156,6 +160,10 @@ class Pipe:
         elif tab := self.tabs.get(message.get("sessionId")):
             tab.events.append((message["method"], message["params"]))
 
+    def save_to(self, folder: Path) -> None:
+        """Save downloads of all pages in a folder."""
+        self.call("Browser.setDownloadBehavior", {"behavior": "allow", "downloadPath": str(folder)})
+
     def new_tab(self) -> Tab:
         """An empty page of its own."""
         target = self.call("Target.createTarget", {"url": "about:blank"})["targetId"]
@@ -168,9 +176,7 @@ def open_browser(*flags: str) -> Iterator[Pipe]:
 
     Raises RuntimeError where there is none: `make test` installs it.
     """
-    program = next(filter(None, map(shutil.which, NAMES)), None)
-    if program is None:
-        raise RuntimeError("install chromium: tests of web pages need it")
+    program = required(next(filter(None, map(shutil.which, NAMES)), None), NAMES[0])
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
         (read, their_write), (their_read, write) = os.pipe(), os.pipe()
         command = [program, *USUAL_FLAGS, *(flags or SOFTWARE), f"--user-data-dir={folder}", "--remote-debugging-pipe"]

@@ -8,8 +8,8 @@ from contextlib import contextmanager
 
 
 @contextmanager
-def private_display() -> Iterator[str]:
-    """Start an X server of our own; DISPLAY names it while the block runs.
+def x_server() -> Iterator[str]:
+    """Start an X server of our own; yield the name of its display.
 
     Raises RuntimeError where Xvfb or xdotool are missing: `make test` installs them.
     """
@@ -24,12 +24,21 @@ def private_display() -> Iterator[str]:
         number = pipe.readline().strip()  # comes when the server is ready, or is empty when it died
     if not number:
         raise RuntimeError(f"Xvfb ended with {server.wait()}")
-    before = {name: os.environ.pop(name, None) for name in ("DISPLAY", "WAYLAND_DISPLAY")}
-    os.environ["DISPLAY"] = f":{number}"
     try:
         yield f":{number}"
     finally:
-        del os.environ["DISPLAY"]
-        os.environ.update({name: value for name, value in before.items() if value is not None})
         server.terminate()
         server.wait()
+
+
+@contextmanager
+def private_display() -> Iterator[str]:
+    """Start an X server of our own; DISPLAY names it while the block runs."""
+    with x_server() as name:
+        before = {name: os.environ.pop(name, None) for name in ("DISPLAY", "WAYLAND_DISPLAY")}
+        os.environ["DISPLAY"] = name
+        try:
+            yield name
+        finally:
+            del os.environ["DISPLAY"]
+            os.environ.update({name: value for name, value in before.items() if value is not None})

@@ -10,10 +10,13 @@ import pytest
 from PIL import Image
 
 from tests.browser import Pipe, Tab, open_browser
+from tests.browsers.engines import ENGINES, open_engine
+from tests.browsers.local_site import LocalSite, serve_site
+from tests.browsers.page import Page
+from tests.viewer.conftest import HEIGHT, WIDTH, write_scene
 from viewer.cli.main import app
 
 STILL = "document.documentElement.dataset.state === 'still' && document.getElementById('status').textContent === ''"
-ARROWS = {"ArrowLeft": 37, "ArrowUp": 38, "ArrowRight": 39, "ArrowDown": 40, "Home": 36}
 OpenPage = Callable[..., Tab]
 
 
@@ -23,6 +26,29 @@ def export(scene: Path, *words: str, grid: str = "3") -> Path:
         ["export", str(scene), "--to", "web", "--grid", grid, "-o", str(page), "--force", *words], standalone_mode=False
     )
     return page
+
+
+@pytest.fixture(scope="session")
+def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_scene(tmp_path_factory.mktemp("scene"))
+
+
+@pytest.fixture(scope="session")
+def page(scene: Path) -> Path:
+    return export(scene)
+
+
+@pytest.fixture(scope="session")
+def site() -> Iterator[LocalSite]:
+    with serve_site() as site:
+        yield site
+
+
+@pytest.fixture(scope="session", params=ENGINES)
+def engine(request: pytest.FixtureRequest, site: LocalSite) -> Iterator[Page]:
+    """Return the page of a browser, one engine after the other."""
+    with open_engine(request.param, site) as page:
+        yield page
 
 
 @pytest.fixture(scope="session")
@@ -39,34 +65,36 @@ def tab(browser) -> Iterator[Tab]:
     tab.close()
 
 
+@pytest.fixture
+def shown(tab: Tab, page: Path) -> Tab:
+    tab.resize(WIDTH, HEIGHT)
+    tab.open(page.as_uri())
+    wait_until_still(tab)
+    return tab
+
+
 def wait_until_still(tab: Tab) -> None:
     tab.wait_until(STILL)
     assert tab.complaints == []
 
 
-def press(tab: Tab, key: str, times: int = 1) -> None:
-    for _ in range(times):
-        for kind in ("keyDown", "keyUp"):
-            tab.call("Input.dispatchKeyEvent", type=kind, key=key, windowsVirtualKeyCode=ARROWS.get(key, 0))
-
-
-def slide(tab: Tab, name: str, value: float) -> None:
+def slide(tab: Page, name: str, value: float) -> None:
     tab.evaluate(
         f"(slider => {{ slider.value = {value}; slider.dispatchEvent(new Event('input')) }})"
         f"(document.getElementById('{name}'))"
     )
 
 
-def set_lens(tab: Tab, s: float, t: float, focus: float, aperture: float) -> None:
+def set_lens(tab: Page, s: float, t: float, focus: float, aperture: float) -> None:
     """By keys, a quarter of a view step each, and the sliders."""
-    press(tab, "Home")
-    press(tab, "ArrowRight" if s > 0 else "ArrowLeft", round(4 * abs(s)))
-    press(tab, "ArrowDown" if t > 0 else "ArrowUp", round(4 * abs(t)))
+    tab.press("Home")
+    tab.press("ArrowRight" if s > 0 else "ArrowLeft", round(4 * abs(s)))
+    tab.press("ArrowDown" if t > 0 else "ArrowUp", round(4 * abs(t)))
     slide(tab, "focus", focus)
     slide(tab, "aperture", aperture)
 
 
-def canvas(tab: Tab) -> np.ndarray:
+def canvas(tab: Page) -> np.ndarray:
     url = tab.evaluate("document.getElementById('view').toDataURL()")
     with Image.open(BytesIO(base64.b64decode(url.partition(",")[2]))) as image:
         return np.asarray(image.convert("RGB"))

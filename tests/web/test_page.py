@@ -1,16 +1,15 @@
 import json
 from itertools import combinations
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from iibr_core.scenes.scene import Source
 from iibr_core.types import GridShape, ViewOffset
-from tests.browser import Tab, open_browser
+from tests.browser import open_browser
 from tests.iibr_core.unequal_rows import SIZE, SQUARE_PX, write_unequal_rows
 from tests.viewer.conftest import HEIGHT, WIDTH, write_scene
-from tests.web.conftest import canvas, export, press, set_lens, slide, wait_until_still
+from tests.web.conftest import canvas, export, set_lens, slide, wait_until_still
 from viewer.cli.main import app
 from viewer.display.offscreen import OffscreenScene
 from viewer.model import lens
@@ -26,24 +25,6 @@ LEAST_PSNR_OF_NOISE_DB = 38.0
 """The same for a page of fine noise: 40.3 dB were measured at least."""
 BLOCK_PX, MOST_IN_BLOCK = 8, 8.0
 """A seam would change the whole of some block, of 255; compression changes each by less."""
-
-
-@pytest.fixture(scope="module")
-def scene(tmp_path_factory) -> Path:
-    return write_scene(tmp_path_factory.mktemp("scene"))
-
-
-@pytest.fixture(scope="module")
-def page(scene) -> Path:
-    return export(scene)
-
-
-@pytest.fixture
-def shown(tab, page) -> Tab:
-    tab.resize(WIDTH, HEIGHT)
-    tab.open(page.as_uri())
-    wait_until_still(tab)
-    return tab
 
 
 def psnr(one: np.ndarray, other: np.ndarray) -> float:
@@ -137,10 +118,9 @@ def test_a_tap_focuses_where_it_lands_and_r_resets(shown) -> None:
     lens = "['focus', 'aperture'].map(name => document.getElementById(name).valueAsNumber)"
     found = []
     for x, y in ((240, 320), (20, top + 20)):
-        for kind in ("mousePressed", "mouseReleased"):
-            shown.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", clickCount=1)
+        shown.drag((x, y))
         found.append(shown.evaluate(lens))
-        press(shown, "r")
+        shown.press("r")
     (near, opened), (far, _) = found
     assert near > far, "the square lies before the wall"
     assert opened > 0
