@@ -24,6 +24,7 @@ from viewer.app.side_effects import SideEffects
 from viewer.app.window import Window
 from viewer.background.maps import EntropyWork, GlossFinder, find_surface
 from viewer.background.newest import Newest
+from viewer.background.tracker import Tracker
 from viewer.display.filmstrip_view import FilmstripView
 from viewer.display.inspection_view import InspectionView
 from viewer.display.scene_view import VIEW_REFRESH_S, SceneView
@@ -65,6 +66,7 @@ class App:
         self.gloss_finder = GlossFinder(self.scene_view.gloss_request, self.scene_view.take_gloss, self.window.wake)
         self._entropy = Newest("iibr-entropy", EntropyWork(), self.window.wake)
         self._surfaces = Newest("iibr-surface", find_surface, self.window.wake)
+        self._tracker = Tracker(self.window.wake)
         self._ui = UiHost(self.look(), self.window.handle)
         self._filmstrip = FilmstripView(self._gl, self.window.wake)
         self.scene_loader = SceneLoader(self.scene_view, self.inspection_view, self.window.set_title, self.window.wake)
@@ -150,6 +152,7 @@ class App:
         self.scene_loader.close()
         self._entropy.close()
         self._surfaces.close()
+        self._tracker.close()
         self.gloss_finder.close()
         self._preferences.keep(self.state, is_closing=True)
         self._sessions.close(self.state)
@@ -184,6 +187,7 @@ class App:
         actions += self._notice_clock.expire(self.state, self._pace.stepped_at, is_on_notice)
         if self.state.motion.is_running:
             actions.append(do(viewpoint.tick, self._pace.stepped_at))
+        actions += self._tracker.advance(self.state)
         actions += self._place_window() + actions_from_drop(self.window.take_dropped(), self.state)
         if is_narrow(self.window.size, self.window.ui_scale) != self.state.is_narrow:
             actions.append(do(window.set_narrow, not self.state.is_narrow))
@@ -224,13 +228,15 @@ class App:
         self._gl.ctx.screen.use()
         self._ui.draw()
         self.window.show_frame()
+        self._tracker.note_shown()
         self._shown, self._pace.same_frames = frame, 0
         self.frames_shown += 1
 
 
-def run(state: AppState, kept_in: Path | None = None) -> None:
-    """Open the window on this state and show it until the user quits. Raises InputError."""
+def run(state: AppState, kept_in: Path | None = None, *actions: Action) -> None:
+    """Open the window on this state, take actions, and show it until the user quits. Raises InputError."""
     with closing(App(state, kept_in)) as app:
+        app.do(*actions)
         app.run()
 
 

@@ -23,6 +23,7 @@ from viewer.model.preferences import FONT_SCALE_LIMITS
 from viewer.model.state.app_state import AppState
 from viewer.model.state.notices import Notice
 from viewer.model.state.preferences import Preferences
+from viewer.model.tracking import HEAD_RANGE_LIMITS
 
 PREFERENCES_FILE = "preferences.json"
 RECENT_FILE = "recent.json"
@@ -41,7 +42,8 @@ def load_preferences(state: AppState, folder: Path) -> AppState:
     kept, damage = _read(folder / PREFERENCES_FILE, state.preferences, "The usual preferences are used.")
     recent, more = _read(folder / RECENT_FILE, state.recent, "The list of recent files is empty.")
     last_folder = kept.last_folder if os.path.isdir(kept.last_folder) else ""
-    kept = replace(kept, font_scale=clamp(kept.font_scale, *FONT_SCALE_LIMITS), last_folder=last_folder)
+    font_scale, head_cm = clamp(kept.font_scale, *FONT_SCALE_LIMITS), clamp(kept.head_range_cm, *HEAD_RANGE_LIMITS)
+    kept = replace(kept, font_scale=font_scale, head_range_cm=head_cm, last_folder=last_folder)
     return replace(state, preferences=kept, recent=recent[:MAX_RECENT], notices=(*state.notices, *damage, *more))
 
 

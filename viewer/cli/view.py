@@ -9,10 +9,12 @@ import typer
 
 from iibr_core.scenes.scene import Source
 from viewer.app.preferences_store import last_opened, user_folder
-from viewer.cli.option_records import with_option_records
+from viewer.cli.option_records import option, with_option_records
 from viewer.cli.options import SCENE, FocusDisparity, Grid, SceneOptions, require_heeded, require_source
+from viewer.model.action import Action, do
 from viewer.model.demo_photo import demo_photo
 from viewer.model.state.app_state import AppState
+from viewer.model.tracking import address_of, switch
 
 
 @with_option_records
@@ -23,6 +25,9 @@ def view(
     scene: SceneOptions,
     focus_disparity: FocusDisparity = None,
     grid: Grid = None,
+    tracker: Annotated[
+        str | None, option("Follow the head: poses from opentrack at this address.", "udp[:HOST][:PORT]", "off")
+    ] = None,
 ) -> None:
     """Open the viewer.
 
@@ -32,7 +37,9 @@ def view(
     source = scene.source(path, grid, focus_disparity)
     require_heeded(context, path)
     require_source(source)
-    open_window(source, scene.depth_strength)
+    if tracker is not None:
+        address_of(tracker)
+    open_window(source, scene.depth_strength, do(switch, tracker))
 
 
 def demo() -> None:
@@ -49,8 +56,8 @@ def open_last_scene() -> None:
     open_window(None if last is None else Source(last))
 
 
-def open_window(source: Source | None, depth_strength: float = 1.0) -> None:
-    """Run the window until it is closed. Raises InputError if it cannot be opened."""
+def open_window(source: Source | None, depth_strength: float = 1.0, *actions: Action) -> None:
+    """Run the window, first with these actions, until it is closed. Raises InputError if it cannot be opened."""
     from viewer.app.main_loop import initial_state, run
 
-    run(AppState() if source is None else initial_state(source, depth_strength), user_folder())
+    run(AppState() if source is None else initial_state(source, depth_strength), user_folder(), *actions)

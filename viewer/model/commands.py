@@ -20,6 +20,7 @@ from viewer.model import (
     opening,
     preferences,
     saving,
+    tracking,
     viewpoint,
     window,
 )
@@ -136,6 +137,8 @@ COMMANDS: tuple[Command, ...] = (
     Command("Redo", do(history.redo), "ctrl+shift+z ctrl+y", repeats=True),
     Command("Reset viewpoint, focus and aperture", do(lens.reset), "r"),
     Command("Recenter", do(viewpoint.return_home), "c"),
+    Command("Follow the head", lambda s: do(tracking.switch, None if s.tracking else s.preferences.tracker), "h"),
+    Command("Centre the head", do(viewpoint.return_home)),
     *(Command(f"Preset: {name}", do(lens.apply_preset, name)) for name in PRESETS),
     *(Command(f"Motion: {LOOP_WORDS[kind].lower()}", do(viewpoint.set_loop, kind)) for kind in LOOPS),
     Command("Motion: pause or resume", lambda s: do(viewpoint.pause, not s.motion.is_paused), "space"),

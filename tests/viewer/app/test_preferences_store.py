@@ -11,11 +11,12 @@ import pytest
 from iibr_core.types import InputError
 from tests.viewer.conftest import reduce
 from viewer.app.preferences_store import PREFERENCES_FILE, RECENT_FILE, last_opened, load_preferences, store_preferences
-from viewer.model import preferences
+from viewer.model import preferences, tracking
 from viewer.model.action import do
 from viewer.model.preferences import FONT_SCALE_LIMITS
 from viewer.model.state.app_state import AppState
 from viewer.model.state.preferences import Preferences
+from viewer.model.tracking import HEAD_RANGE_LIMITS
 
 
 def test_kept_values_come_back(tmp_path: Path) -> None:
@@ -26,6 +27,8 @@ def test_kept_values_come_back(tmp_path: Path) -> None:
         do(preferences.toggle_section, "scene"),
         do(preferences.place_window, (10, 20, 900, 700)),
         do(preferences.place_window, None),
+        do(tracking.switch, "udp:5000"),
+        do(tracking.set_head_range, 25.0),
     ):
         state = reduce(state, action)
     folder = tmp_path / "not" / "there" / "yet"
@@ -34,6 +37,7 @@ def test_kept_values_come_back(tmp_path: Path) -> None:
     assert again.preferences == state.preferences
     assert again.preferences.open_sections == ("more", "advanced", "scene")
     assert (again.preferences.window, again.preferences.is_maximized) == ((10, 20, 900, 700), True)
+    assert (again.preferences.tracker, again.preferences.head_range_cm) == ("udp:5000", 25.0)
     assert again.recent == ("/photos/ä.png", str(Path("b.png").absolute()))
     assert load_preferences(AppState(), tmp_path) == AppState(), "nothing is kept there"
 
@@ -60,10 +64,16 @@ def test_damaged_files_give_a_notice_each_and_the_usual_values(tmp_path: Path, d
 
 
 def test_values_of_other_versions_are_left_out_and_too_large_ones_limited(tmp_path: Path) -> None:
-    kept = {"theme": "light", "font_scale": 1e9, "language": "de", "last_folder": str(tmp_path / "gone")}
+    kept = {
+        "theme": "light",
+        "font_scale": 1e9,
+        "language": "de",
+        "last_folder": str(tmp_path / "gone"),
+        "head_range_cm": -1,
+    }
     (tmp_path / PREFERENCES_FILE).write_text(json.dumps(kept))
     state = load_preferences(AppState(), tmp_path)
-    assert state.preferences == Preferences("light", FONT_SCALE_LIMITS[1])
+    assert state.preferences == Preferences("light", FONT_SCALE_LIMITS[1], head_range_cm=HEAD_RANGE_LIMITS[0])
     assert state.notices == ()
 
 

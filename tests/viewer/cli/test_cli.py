@@ -61,6 +61,11 @@ def test_a_path_in_place_of_a_command_is_viewed(photo_path: Path, name: str) -> 
     assert "no such file" in alone if "missing" in name else "iibr screenshot" in alone
 
 
+def test_a_tracker_has_an_address(iibr: Iibr, photo_path: Path) -> None:
+    problem = refusal_of(iibr("view", photo_path, "--tracker", "tcp:4242"))
+    assert "'tcp:4242' is no tracker: give udp:PORT or udp:HOST:PORT" in problem
+
+
 def test_a_command_precedes_a_file_of_its_name_and_a_typo_is_no_path(
     iibr: Iibr, photo_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -22,7 +22,7 @@ from viewer.model.state.notices import Notice
 from viewer.model.state.preferences import Preferences
 from viewer.model.state.prompts import ExportPrompt, FinishedExport, JobProgress, Prompt
 from viewer.model.state.tasks import Task
-from viewer.model.state.viewpoint import FreeCamera, Motion, Zoom
+from viewer.model.state.viewpoint import FreeCamera, Motion, Tracking, Zoom
 
 
 @dataclass(frozen=True)
@@ -77,6 +77,7 @@ class AppState:
     refinement and edits; stroke: of the brush while it is drawn. chosen_focus: disparity that the user chose for this
     scene, focused_at: place that was clicked for it (see focal_plane), None without. facts: of a photo's file, perhaps
     of the one before. hides_panel: None to follow is_narrow. shows_before: whether the unchanged photo is shown.
+    tracking: None unless the viewpoint follows the head.
     """
 
     optics: Optics = field(default_factory=Optics)
@@ -124,6 +125,7 @@ class AppState:
     hides_panel: bool | None = None
     is_narrow: bool = False
     shows_before: bool = False
+    tracking: Tracking | None = None
 
     @property
     def at_rest(self) -> AppState:

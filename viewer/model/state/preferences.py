@@ -44,7 +44,8 @@ class Preferences:
 
     window: x, y, width, height in screen units, None before the first one; is_maximized: whether it filled the screen.
     last_folder: of the last saved or exported file, "" before the first. estimates_depth: whether photos without depth
-    get it from the recommended model once that is downloaded.
+    get it from the recommended model once that is downloaded. tracker: address of the tracker of the head.
+    head_range_cm: movement of the head from the middle to the outermost views.
     """
 
     theme: Theme = "dark"
@@ -57,3 +58,5 @@ class Preferences:
     units: Units = "photographic"
     estimates_depth: bool = False
     last_folder: str = ""
+    tracker: str = "udp:127.0.0.1:4242"
+    head_range_cm: float = 15.0

@@ -69,3 +69,20 @@ class Zoom:
 
     scale: float
     centre: tuple[float, float] = (0.5, 0.5)
+
+
+@dataclass(frozen=True)
+class Tracking:
+    """A viewpoint that follows the head. Places are right + 1j * down, in cm.
+
+    address: where packets arrive, as `udp:HOST:PORT`. head: its newest place; centre: the place for the photo's own
+    viewpoint; None before the first. eye: viewpoint that the head led to last. latency_ms: from packets to pictures on
+    the screen. is_receiving: whether packets arrive.
+    """
+
+    address: str
+    head: complex | None = None
+    centre: complex | None = None
+    eye: ViewOffset = CENTRE
+    latency_ms: float = 0.0
+    is_receiving: bool = False

@@ -1,4 +1,4 @@
-"""The panel's section for the viewpoint: the pad, buttons beside it, speed of loops, and dolly."""
+"""The panel's section for the viewpoint: the pad, buttons beside it, speed of loops, dolly, and a head to follow."""
 
 from __future__ import annotations
 
@@ -7,17 +7,23 @@ from imgui_bundle import imgui
 from iibr_core.exports.loops import LOOPS
 from iibr_core.scenes.lens_limits import dolly_limit
 from iibr_core.scenes.scene import Scene
-from viewer.model import lens, viewpoint
+from viewer.model import lens, tracking, viewpoint
 from viewer.model.action import Action, do
 from viewer.model.state.app_state import AppState
+from viewer.model.tracking import HEAD_RANGE_LIMITS
 from viewer.model.viewpoint import SPEED_LIMITS
 from viewer.ui.sections.viewpoint_pad import pad
-from viewer.ui.widgets import button, edit, slider, tooltip
+from viewer.ui.widgets import button, checkbox, edit, quiet, slider, tooltip
 
 PAD_TIP = "Drag to move the viewpoint. Dots are views; faint dots are views that are still being made."
 RECENTER_TIP = "Return to the photo's viewpoint (double click, or C)."
 PAUSE_TIP = "Pause or resume the motion (Space)."
 SPEED_TIP = "Speed of a motion."
+HEAD_TIP = (
+    "The viewpoint follows your head as if the screen were a window (H). opentrack sends its place: see Displays in the"
+    " documentation. C makes its present place the middle."
+)
+HEAD_RANGE_TIP = "Movement of the head from the middle to the outermost views."
 DOLLY_TIP = "Step into the picture or back, as far as the views reach."
 
 
@@ -36,6 +42,21 @@ def view_section(state: AppState, scene: Scene) -> list[Action]:
     if farthest := dolly_limit(scene.grid):
         edited = slider("Dolly", dolly, (-farthest, farthest), "%+.2f views", DOLLY_TIP)
         actions += edit(lens.set_dolly, dolly, edited)
+    return actions + _head_rows(state)
+
+
+def _head_rows(state: AppState) -> list[Action]:
+    """Build the switch of the tracker; while it is on, the movement that it takes, and its latency."""
+    head, preferences = state.tracking, state.preferences
+    actions: list[Action] = []
+    if checkbox("Follow the head", head is not None, HEAD_TIP) != (head is not None):
+        actions.append(do(tracking.switch, None if head else preferences.tracker))
+    if head is not None:
+        range_cm = slider("Head movement", preferences.head_range_cm, HEAD_RANGE_LIMITS, "%.0f cm", HEAD_RANGE_TIP)
+        actions += edit(tracking.set_head_range, preferences.head_range_cm, range_cm)
+        quiet(
+            f"{head.latency_ms:.0f} ms from packet to picture" if head.is_receiving else f"No packets at {head.address}"
+        )
     return actions
 
 

@@ -1,0 +1,221 @@
+"""A real window that follows poses from a socket: paths, noise, hostile packets, floods, and what people see."""
+
+from __future__ import annotations
+
+import math
+import socket
+import struct
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+
+import numpy as np
+import pytest
+
+from iibr_core.beyond.optics import CENTRE
+from tests.viewer.conftest import Driver, Opener
+from viewer.app.main_loop import App
+from viewer.background import tracker
+from viewer.model import tracking
+from viewer.model.action import do
+
+Send = Callable[..., None]
+FLOOD = """
+import socket, struct, sys
+sender = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+packets = [struct.pack("<6d", -x / 10, 0, 0, 0, 0, 0) for x in range(-50, 51)]
+while True:
+    for packet in packets:
+        sender.sendto(packet, ("127.0.0.1", int(sys.argv[1])))
+"""
+"""Program that sends as many poses as it can."""
+
+
+@pytest.fixture
+def port() -> int:
+    """A port of the loopback address that is free."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(("127.0.0.1", 0))
+        free: int = probe.getsockname()[1]
+        return free
+
+
+@pytest.fixture
+def following(viewer: Driver, port: int) -> Driver:
+    viewer.app.do(do(tracking.switch, f"udp:{port}"))
+    viewer.app.step()
+    return viewer
+
+
+@pytest.fixture
+def send(port: int) -> Iterator[Send]:
+    """Sends a packet, or the pose of a head so many cm to the right and up."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+
+        def send_pose(right: float = 0.0, up: float = 0.0, packet: bytes | None = None) -> None:
+            pose = struct.pack("<6d", -right, up, 60, 0, 0, 0) if packet is None else packet
+            sender.sendto(pose, ("127.0.0.1", port))
+
+        yield send_pose
+
+
+def head(app: App) -> complex | None:
+    """Return the newest place of the head that the window knows."""
+    return None if app.state.tracking is None else app.state.tracking.head
+
+
+def lean(viewer: Driver, send: Send, right: float, up: float = 0.0) -> None:
+    """Hold the head at a place until the window has followed."""
+    goal = complex(right, -up)
+
+    def has_followed(app: App) -> bool:
+        send(right, up)
+        at = head(app)
+        return at is not None and abs(at - goal) < 0.1
+
+    viewer.until(has_followed)
+
+
+def test_a_head_that_goes_right_and_up_moves_near_things_left_and_down(following: Driver, send: Send) -> None:
+    lean(following, send, 0)
+    following.until_idle()
+    before = red_middle(following)
+    lean(following, send, 14, 14)
+    following.until_idle()
+    eye = following.app.state.optics.eye
+    assert eye.s > 0.9
+    assert eye.t < -0.9
+    after = red_middle(following)
+    assert after[0] < before[0] - 2
+    assert after[1] > before[1] + 2
+    assert following.app.state.tracking is not None
+    assert following.app.state.tracking.latency_ms > 0
+    assert not following.app.state.history.past
+
+
+def red_middle(viewer: Driver) -> tuple[float, float]:
+    """Return the middle (x, y) of the near red square in the picture, in pixels."""
+    image = viewer.image()[..., :3].astype(float)
+    rows, columns = np.nonzero(image[..., 0] > image[..., 1] + 60 * image.max() / 255)
+    return float(columns.mean()), float(rows.mean())
+
+
+def test_the_window_rests_while_packets_repeat_a_place_and_after_they_stop(following: Driver, send: Send) -> None:
+    lean(following, send, 0)
+    lean(following, send, 5)
+    following.until_idle()
+    drawn, eye = following.app.scene_view.pictures_drawn, following.app.state.optics.eye
+    for _ in range(20):
+        send(5)
+        following.app.step()
+    assert following.app.state.optics.eye == pytest.approx(eye, abs=0.02)
+    assert following.app.scene_view.pictures_drawn - drawn < 10
+    drawn = following.app.scene_view.pictures_drawn
+    following.until(lambda app: app.state.tracking is not None and not app.state.tracking.is_receiving)
+    following.until_idle()
+    assert following.app.state.optics.eye == pytest.approx(eye, abs=0.02)
+
+
+def test_hostile_packets_move_nothing(following: Driver, send: Send) -> None:
+    lean(following, send, 3)
+    lean(following, send, 6)
+    following.until_idle()
+    eye = following.app.state.optics.eye
+    numbers = math.nan, math.inf, -math.inf, 1e308, -5e300, 1001.0
+    hostile = [struct.pack("<6d", *[number] * 6) for number in numbers] + [
+        b"",
+        b"x",
+        bytes(47),
+        bytes(49),
+        bytes(60000),
+    ]
+    for packet in hostile:
+        send(packet=packet)
+        following.app.step()
+    assert following.app.state.optics.eye == pytest.approx(eye, abs=0.02)
+    lean(following, send, 9)
+    assert following.app.state.optics.eye.s > eye.s
+
+
+def test_a_flood_moves_the_window_and_does_not_fill_it(following: Driver, port: int) -> None:
+    flood = subprocess.Popen([sys.executable, "-c", FLOOD, str(port)])
+    try:
+        drawn = following.app.scene_view.pictures_drawn
+        following.until(lambda app: app.scene_view.pictures_drawn >= drawn + 30)
+        assert following.app.state.optics.eye != CENTRE
+    finally:
+        flood.kill()
+        flood.wait()
+    following.until_idle()
+
+
+def test_a_drag_goes_on_from_where_the_head_is_and_a_key_centres_it(following: Driver, send: Send) -> None:
+    lean(following, send, 0)
+    lean(following, send, 9)
+    following.until_idle()
+    x, y = following.position(0.2, 0.2)
+    following.send("mousemove", x, y, "mousedown", 1)
+    following.send("mousemove", x + 60, y)
+    following.until(lambda app: app.state.history.last == "move_eye")
+    following.send("mouseup", 1)
+    following.until_idle()
+    dragged = following.app.state.optics.eye
+    lean(following, send, 8.5)
+    lean(following, send, 9)
+    following.until_idle()
+    assert following.app.state.optics.eye == pytest.approx(dragged, abs=0.05)
+    following.send("key", "c")
+    following.until(lambda app: app.state.history.last == "return_home" and not app.state.motion.is_running)
+    lean(following, send, 12)
+    following.until(lambda app: app.state.optics.eye.s > 0.1)
+    lean(following, send, 9)
+    following.until_idle()
+    assert following.app.state.optics.eye == pytest.approx(CENTRE, abs=0.02)
+
+
+def test_a_key_switches_it_on_and_off_at_the_port_that_was_given_last(viewer: Driver, port: int, send: Send) -> None:
+    app = viewer.app
+    app.do(do(tracking.switch, f"udp:{port}"), do(tracking.switch, None))
+    viewer.send("key", "h")
+    viewer.until(lambda app: app.state.tracking is not None)
+    lean(viewer, send, 0)
+    lean(viewer, send, 9)
+    viewer.until_idle()
+    eye = app.state.optics.eye
+    viewer.send("key", "h")
+    viewer.until(lambda app: app.state.tracking is None)
+    viewer.until_idle()
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
+        other.bind(("127.0.0.1", port))
+    assert app.state.optics.eye == eye
+
+
+def test_the_panel_switches_it_on_and_sets_the_movement(open_window: Opener, photo_path, wide_window: None) -> None:
+    viewer = open_window(photo_path)
+    viewer.until_idle()
+    viewer.press("Follow the head")
+    viewer.until(lambda app: app.state.tracking is not None)
+    viewer.slide("##Head movement", 1.0)
+    assert viewer.app.state.preferences.head_range_cm == pytest.approx(60, abs=4)
+    viewer.press("Follow the head")
+    viewer.until(lambda app: app.state.tracking is None)
+
+
+def test_a_port_in_use_is_an_error_that_names_it(viewer: Driver, port: int) -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
+        other.bind(("127.0.0.1", port))
+        viewer.app.do(do(tracking.switch, f"udp:{port}"))
+        viewer.until(lambda app: app.state.tracking is None)
+    notice = viewer.app.state.notices[-1]
+    assert notice.is_error
+    assert notice.text.startswith(f"cannot listen at 127.0.0.1:{port} (")
+    assert "--tracker udp:HOST:PORT" in notice.text
+
+
+def test_a_notice_comes_once_while_no_poses_arrive(viewer: Driver, port: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(tracker, "NOTICE_S", 0.0)
+    viewer.app.do(do(tracking.switch, f"udp:{port}"))
+    viewer.until(lambda app: bool(app.state.notices))
+    assert viewer.app.state.notices[-1].text.startswith(f"No poses at 127.0.0.1:{port}: ")
+    viewer.until_idle()
+    assert len(viewer.app.state.notices) == 1

@@ -1,0 +1,231 @@
+"""A head that moves the viewpoint: packets, directions, ends, the filter, and what a hand does meanwhile."""
+
+from __future__ import annotations
+
+import math
+import struct
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from iibr_core.beyond.optics import CENTRE
+from iibr_core.depth.editing.edits import Stroke
+from iibr_core.scenes.lens_limits import clamp_eye
+from iibr_core.types import GridShape, InputError, ViewOffset
+from tests.viewer.model.test_opening import grids, scene_of, state_with
+from viewer.model import gesture, history, lens, tracking, viewpoint
+from viewer.model.action import Action, do
+from viewer.model.state.app_state import AppState
+from viewer.model.state.viewpoint import FreeCamera
+from viewer.model.tracking import HEAD_RANGE_LIMITS, address_of, eye_of, head_in, offset_of, smooth
+
+FIVE = scene_of(GridShape(5, 5))
+
+
+def followed(state: AppState, *heads: complex) -> AppState:
+    for head in heads:
+        state = tracking.follow(state, head, 5.0)
+    return state
+
+
+def tracked(*heads: complex) -> AppState:
+    """Return the state after places of the head, the first of which is the centre."""
+    return followed(tracking.switch(state_with(FIVE), "udp"), *heads)
+
+
+def pose(x: float = 0.0, y: float = 0.0, yaw: float = 0.0, pitch: float = 0.0) -> bytes:
+    return struct.pack("<6d", x, y, 60.0, yaw, pitch, 3.0)
+
+
+@pytest.mark.parametrize(
+    ("packet", "eye"),
+    [
+        (pose(x=-15), ViewOffset(0, 2)),  # opentrack's x grows to the left of the person
+        (pose(x=15), ViewOffset(0, -2)),
+        (pose(y=15), ViewOffset(-2, 0)),
+        (pose(y=-15), ViewOffset(2, 0)),
+        (pose(yaw=30), ViewOffset(0, 2)),
+        (pose(pitch=30), ViewOffset(-2, 0)),
+        (pose(x=-15, yaw=-90, pitch=90), ViewOffset(0, 2)),
+        (pose(x=-1000, y=-1000), ViewOffset(2, 2)),
+    ],
+)
+def test_the_viewpoint_goes_where_the_head_goes(packet: bytes, eye: ViewOffset) -> None:
+    head = head_in(packet)
+    assert head is not None
+    assert tracked(0j, head).optics.eye == pytest.approx(eye)
+
+
+@pytest.mark.parametrize(
+    "packet",
+    [
+        b"",
+        pose()[:-1],
+        pose() + b"\0",
+        b"\xff" * 48,
+        *(pose(x=number) for number in (math.nan, math.inf, -math.inf, 1e300)),
+    ],
+)
+def test_packets_that_are_no_poses_are_dropped(packet: bytes) -> None:
+    assert head_in(packet) is None
+
+
+@given(st.binary(min_size=48, max_size=48))
+def test_every_place_of_the_head_is_finite(packet: bytes) -> None:
+    head = head_in(packet)
+    assert head is None or abs(head) <= math.hypot(1000, 1000)
+
+
+def test_the_viewpoint_slows_down_towards_the_outermost_views_and_stays_there() -> None:
+    eyes = [tracked(0j, complex(cm)).optics.eye.s for cm in range(0, 40)]
+    steps = np.diff(eyes)
+    assert np.all(np.diff(steps) <= 1e-12)
+    assert eyes[15:] == [2.0] * len(eyes[15:])
+
+
+@given(grids, st.floats(*HEAD_RANGE_LIMITS), st.floats(0.25, 4), st.complex_numbers(max_magnitude=1000))
+def test_any_viewpoint_has_its_place_of_the_head(
+    grid: GridShape, range_cm: float, row_step: float, cm: complex
+) -> None:
+    scene = scene_of(grid, row_step=row_step)
+    eye = eye_of(cm, range_cm, scene)
+    assert eye == clamp_eye(eye, grid)
+    assert eye_of(offset_of(eye, range_cm, scene), range_cm, scene) == pytest.approx(eye, abs=1e-6)
+
+
+def test_a_centimetre_is_as_long_across_as_down() -> None:
+    scene = scene_of(GridShape(3, 9), row_step=0.5)
+    eye = eye_of(0.1 + 0.1j, 15, scene)
+    assert scene.in_columns(eye).t == pytest.approx(eye.s, rel=1e-2)
+    assert eye_of(60 + 60j, 15, scene) == ViewOffset(1, 4)
+
+
+# Filter
+
+
+@pytest.mark.parametrize(("rate_hz", "factor"), [(30, 2.5), (60, 3.5), (250, 6)])
+def test_noise_of_a_millimetre_is_reduced(rate_hz: int, factor: float) -> None:
+    rng = np.random.default_rng(0)
+    noise = rng.normal(0, 0.1, (rate_hz * 20, 2)) @ (1, 1j)
+    smoothed, places = None, []
+    for i, place in enumerate(noise):
+        smoothed = smooth(smoothed, complex(place), i / rate_hz)
+        places.append(smoothed.place)
+    assert np.std(places[rate_hz:]) < np.std(noise) / factor
+
+
+@pytest.mark.parametrize("rate_hz", [30, 60, 250])
+@pytest.mark.parametrize("speed_cm", [5, 20, 100])
+def test_a_moving_head_lags_little(rate_hz: int, speed_cm: float) -> None:
+    smoothed = None
+    for i in range(rate_hz):
+        smoothed = smooth(smoothed, complex(speed_cm * i / rate_hz, 0), i / rate_hz)
+    assert smoothed is not None
+    lag_cm = speed_cm * (rate_hz - 1) / rate_hz - smoothed.place.real
+    assert 0 <= lag_cm < 0.35
+
+
+def test_the_filter_starts_again_after_a_pause_and_takes_packets_of_one_moment() -> None:
+    first = smooth(None, 1j, 10.0)
+    assert smooth(first, 5j, 10.0) == first
+    assert smooth(first, 5j, 9.0) == first
+    assert smooth(first, 5j, 11.0).place == 5j
+    assert 1 < smooth(first, 5j, 10.1).place.imag < 5
+
+
+# The hand
+
+
+def test_the_first_place_of_the_head_is_the_centre() -> None:
+    state = replace(tracking.switch(state_with(FIVE), "udp"), optics=replace(AppState().optics, eye=ViewOffset(1, -1)))
+    assert followed(state, 40 - 9j).optics.eye == pytest.approx((1, -1))
+    assert followed(state, 40 - 9j, 55 - 9j).optics.eye.s > 0
+
+
+def test_a_drag_moves_the_centre_and_the_head_goes_on_from_there() -> None:
+    state = lens.move_eye(tracked(0j, 6 + 0j), ViewOffset(1, -1))
+    state = followed(state, 6 + 0j)
+    assert state.optics.eye == pytest.approx((1, -1))
+    assert followed(state, 7 + 0j).optics.eye.s > -1
+    assert followed(state, 30 + 0j, 6 + 0j).optics.eye == pytest.approx((1, -1))
+
+
+def test_home_makes_the_present_place_the_centre() -> None:
+    state = viewpoint.return_home(tracked(0j, 6 + 3j))
+    for i in range(12):
+        state = followed(viewpoint.tick(state, i / 20), 6 + 3j)
+    assert not state.motion.is_running
+    assert state.optics.eye == pytest.approx(CENTRE)
+    assert state.tracking is not None
+    assert state.tracking.centre == pytest.approx(6 + 3j)
+
+
+def test_undo_of_a_focus_does_not_move_the_centre() -> None:
+    state = lens.set_focus(gesture.end_gesture(tracked(0j, 3 + 0j)), 0.5)
+    state = followed(history.undo(followed(state, 9 + 0j)), 9 + 0j)
+    assert state.optics.focus_disparity == 0
+    assert state.optics.eye == tracked(0j, 9 + 0j).optics.eye
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"stroke": Stroke("nearer", ((0.5, 0.5),), 0.1, 1.0)},
+        {"free_camera": FreeCamera(0.1)},
+        {"scene": None},
+    ],
+)
+def test_the_viewpoint_holds_while_something_else_needs_it(changes: dict[str, object]) -> None:
+    state = tracked(0j, 3 + 0j)
+    held = followed(replace(state, **changes), 9 + 0j)  # type: ignore[arg-type]
+    assert held.optics == state.optics
+    again = followed(replace(held, **{name: getattr(state, name) for name in changes}), 9 + 0j)  # type: ignore[arg-type]
+    assert again.optics.eye == tracked(0j, 9 + 0j).optics.eye
+
+
+def test_a_loop_goes_on_and_a_rack_leaves_the_viewpoint_to_the_head() -> None:
+    looping = viewpoint.set_loop(tracked(0j), "circle")
+    assert followed(looping, 9 + 0j).optics.eye == CENTRE
+    racked = replace(tracked(0j), chosen_focus=1.0, focus_before=0.0)
+    assert followed(viewpoint.rack_focus(racked), 9 + 0j).optics.eye.s > 0
+
+
+def test_following_is_no_edit_and_keeps_the_comparison_with_the_photo() -> None:
+    state = followed(lens.show_before(tracked(0j), True), 9 + 0j)
+    assert state.shows_before
+    assert not state.history.past
+
+
+def test_a_state_without_a_tracker_ignores_the_head() -> None:
+    state = state_with(FIVE)
+    actions: list[Action] = [do(tracking.follow, 3 + 0j, 1.0), do(tracking.set_receiving, True)]
+    assert [action.apply(state) for action in actions] == [state, state]
+
+
+@pytest.mark.parametrize(("wanted", "got"), [(1.0, 3.0), (25.0, 25.0), (1e9, 60.0), (math.nan, 3.0)])
+def test_the_movement_is_limited(wanted: float, got: float) -> None:
+    assert tracking.set_head_range(tracked(), wanted).preferences.head_range_cm == got
+
+
+@pytest.mark.parametrize(
+    ("text", "place"),
+    [
+        ("udp", ("127.0.0.1", 4242)),
+        ("udp:5000", ("127.0.0.1", 5000)),
+        ("udp:0.0.0.0", ("0.0.0.0", 4242)),
+        ("udp:localhost:65535", ("localhost", 65535)),
+    ],
+)
+def test_addresses(text: str, place: tuple[str, int]) -> None:
+    assert address_of(text) == place
+
+
+@pytest.mark.parametrize(
+    "text", ["", "tcp:4242", "udp:", "udp:0", "udp:65536", "udp:host:x", "udp:4242:4242:1", "4242"]
+)
+def test_other_addresses_are_refused(text: str) -> None:
+    with pytest.raises(InputError, match=r"is no tracker: give udp:PORT or udp:HOST:PORT"):
+        address_of(text)
