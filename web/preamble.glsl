@@ -4,3 +4,4 @@ precision highp float;
 precision highp int;
 precision highp sampler2D;
 precision highp sampler2DArray;
+#define DISPARITY_IN_ALPHA 1

@@ -215,9 +215,10 @@ class Program {
     use(values, textures) {
         const { gl } = this;
         gl.useProgram(this.program);
-        Object.entries(textures).forEach(([name, [target, texture]], unit) => {
+        Object.entries(textures).forEach(([name, [target, texture, sampler = null]], unit) => {
             gl.activeTexture(gl.TEXTURE0 + unit);
             gl.bindTexture(target, texture);
+            gl.bindSampler(unit, sampler);
             this.uniforms.get(name)?.(unit);
         });
         for (const [name, value] of Object.entries(values)) this.uniforms.get(name)?.(value);
@@ -239,14 +240,18 @@ export class Renderer {
         gl.blendFunc(gl.ONE, gl.ONE);
         gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
         gl.bindVertexArray(gl.createVertexArray());
-        const { width, height, order: { length: layers }, range: [far, near] } = field;
+        const { width, height, order: { length: layers } } = field;
         this.colors = this.texture(gl.TEXTURE_2D_ARRAY, gl.RGBA8, gl.LINEAR, width, height, layers);
-        this.disparities = this.texture(gl.TEXTURE_2D_ARRAY, gl.R16F, gl.NEAREST, width, height, layers);
-        this.values = new Float32Array(width * height);
+        this.nearest = gl.createSampler();
+        for (const name of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) {
+            gl.samplerParameteri(this.nearest, name, gl.NEAREST);
+        }
+        for (const name of [gl.TEXTURE_WRAP_S, gl.TEXTURE_WRAP_T]) {
+            gl.samplerParameteri(this.nearest, name, gl.CLAMP_TO_EDGE);
+        }
         this.table = new Float32Array(3 * NUMBERS.MAX_SAMPLES * 4);
         gl.bindBufferBase(gl.UNIFORM_BUFFER, 0, gl.createBuffer());
         gl.bufferData(gl.UNIFORM_BUFFER, this.table, gl.DYNAMIC_DRAW);
-        this.disparityOf = Float32Array.from({ length: 256 }, (_, i) => far + (near - far) * i / 255);
         this.rootOf = Uint8Array.from({ length: 256 }, (_, i) => {  // square root of linear light, see srgb.glsl
             const x = i / 255, light = x <= 0.04045 ? x / 12.92 : ((x + 0.055) / 1.055) ** 2.4;
             return Math.round(Math.sqrt(light) * 255);
@@ -276,22 +281,17 @@ export class Renderer {
         return this.light = { framebuffer, texture, width, height };
     }
 
-    // Stores a view. colors: RGBA bytes, sRGB-encoded; depth: RGBA bytes whose red is the disparity, or null. On the
-    // desktop alpha has the disparity too, for gloss, which a page has not.
-    upload(layer, colors, depth) {
-        const { gl, field: { width, height }, rootOf, disparityOf, values } = this;
-        for (let i = 0; i < colors.length; i += 4) {
-            colors[i] = rootOf[colors[i]];
-            colors[i + 1] = rootOf[colors[i + 1]];
-            colors[i + 2] = rootOf[colors[i + 2]];
-            if (depth) values[i / 4] = disparityOf[depth[i]];
+    // Stores a view. rgba: bytes, sRGB-encoded; alpha is the disparity in the range of the field.
+    upload(layer, rgba) {
+        const { gl, field: { width, height }, rootOf } = this;
+        for (let i = 0; i < rgba.length; i += 4) {
+            rgba[i] = rootOf[rgba[i]];
+            rgba[i + 1] = rootOf[rgba[i + 1]];
+            rgba[i + 2] = rootOf[rgba[i + 2]];
         }
-        const write = (texture, format, type, data) => {
-            gl.bindTexture(gl.TEXTURE_2D_ARRAY, texture);
-            gl.texSubImage3D(gl.TEXTURE_2D_ARRAY, 0, 0, 0, layer, width, height, 1, format, type, data);
-        };
-        write(this.colors, gl.RGBA, gl.UNSIGNED_BYTE, colors);
-        if (depth) write(this.disparities, gl.RED, gl.FLOAT, values);
+        const data = new Uint8Array(rgba.buffer);
+        gl.bindTexture(gl.TEXTURE_2D_ARRAY, this.colors);
+        gl.texSubImage3D(gl.TEXTURE_2D_ARRAY, 0, 0, 0, layer, width, height, 1, gl.RGBA, gl.UNSIGNED_BYTE, data);
     }
 
     // Draws with the program of a shader and its switches. values, textures: see Program.use.
@@ -365,7 +365,7 @@ export class Renderer {
             pixel_uv: [part.width / width, part.height / height], farthest, nearest, focus_disparity: lens.focus,
             focus_tilt: [0, 0], focus_range: 0, dolly: [0, 0], part: [part.x, part.y, part.width, part.height],
             field_part: [0, 0, 1, 1], view_step: [1, field.rowStep],
-        }, { colors: [gl.TEXTURE_2D_ARRAY, this.colors], disparities: [gl.TEXTURE_2D_ARRAY, this.disparities] });
+        }, { colors: [gl.TEXTURE_2D_ARRAY, this.colors], disparities: [gl.TEXTURE_2D_ARRAY, this.colors, this.nearest] });
     }
 
     // On the canvas, which gets the picture's own size.

@@ -1,47 +1,149 @@
-// Reads the pictures of the views that a page carries, and hands them to the renderer.
+// Reads the views that a page carries, and hands them to the renderer: streams of VP9 (web_streams.py), or moving
+// pictures in AVIF.
 
 import { hash } from "./renderer.js";
 
 export const $ = (id) => document.getElementById(id);
 export const say = (text) => ($("status").textContent = text);
 
-// The pictures of a data element in their order: a line is a file, which may hold many frames.
-async function* pictures(element, type, isMoving) {
-    for (const line of element.textContent.trim().split("\n")) {
-        const data = Uint8Array.from(atob(line), (letter) => letter.charCodeAt(0));
-        if (!isMoving || !await globalThis.ImageDecoder?.isTypeSupported(type)) {
-            yield await createImageBitmap(new Blob([data], { type }));  // of a moving picture the first frame
-            continue;
+const RATE = 25, SEEK_MS = 10000;
+const VP9 = { codec: "vp09.00.51.08", hardwareAcceleration: "prefer-software", optimizeForLatency: true };
+const bytesOf = (name) => Uint8Array.from(atob($(name).textContent), (letter) => letter.charCodeAt(0));
+
+// RGBA of the upper left part of a picture.
+function drawn(image, width, height, colorSpace) {
+    const context = new OffscreenCanvas(width, height).getContext("2d", { willReadFrequently: true, colorSpace });
+    context.drawImage(image, 0, 0);
+    return context.getImageData(0, 0, width, height).data;
+}
+
+// The frames of a stream by WebCodecs. Chunks are given no faster than the decoder takes them.
+async function* decoded(name, chunks) {
+    const data = bytesOf(name), frames = [];
+    let wake = null, failure = null;
+    const decoder = new VideoDecoder({
+        output: (frame) => wake?.(frames.push(frame)),
+        error: (error) => wake?.(failure = error),
+    });
+    decoder.ondequeue = () => wake?.();
+    try {
+        decoder.configure(VP9);
+        for (const [i, [begin, size]] of chunks.entries()) {
+            const chunk = data.subarray(begin, begin + size);
+            decoder.decode(new EncodedVideoChunk({ type: i ? "delta" : "key", timestamp: i, data: chunk }));
+            while (decoder.decodeQueueSize && !frames.length && !failure) await new Promise((done) => (wake = done));
+            while (frames.length) yield frames.shift();
+            if (failure) throw failure;
         }
-        const decoder = new ImageDecoder({ data, type, preferAnimation: true });
-        await decoder.tracks.ready;
-        await decoder.completed;
-        for (let i = 0; i < decoder.tracks.selectedTrack.frameCount; i++) {
-            yield (await decoder.decode({ frameIndex: i })).image;
+        await decoder.flush();
+        while (frames.length) yield frames.shift();
+    } finally {
+        frames.forEach((frame) => frame.close());
+        if (decoder.state !== "closed") decoder.close();
+    }
+}
+
+// The frames of a stream by an element that is stepped, where there is no WebCodecs: on pages by plain http, too.
+async function* stepped(name, chunks) {
+    const video = document.createElement("video"), type = "video/webm";
+    const has = (event, change) => new Promise((done, fail) => {
+        video.addEventListener(event, done, { once: true });
+        video.onerror = () => fail(new Error(video.error.message));
+        setTimeout(() => fail(new Error("no video")), SEEK_MS);
+        Object.assign(video, change);
+    });
+    const src = URL.createObjectURL(new Blob([bytesOf(name)], { type }));
+    try {
+        await has("loadeddata", { muted: true, playsInline: true, preload: "auto", src });
+        for (const i of chunks.keys()) {
+            await has("seeked", { currentTime: (i + 0.5) / RATE });
+            yield video;
         }
-        decoder.close();
+    } finally {
+        URL.revokeObjectURL(src);
+    }
+}
+
+// Levels 0 to 255 of a frame whose luma is 16 to 235, by `copyTo` where that gives luma: drawing is less exact.
+async function levelsOf(frame, width, height) {
+    const levels = new Uint8ClampedArray(width * height);
+    if (/^(I420|NV12)/.test(frame.format)) {
+        const luma = new Uint8Array(frame.allocationSize()), [{ offset, stride }] = await frame.copyTo(luma);
+        for (let y = 0, i = 0; y < height; y++) {
+            for (let at = offset + y * stride, end = at + width; at < end;) levels[i++] = (luma[at++] - 16) * 255 / 219;
+        }
+    } else {
+        const pixels = drawn(frame, width, height);
+        for (let i = 0; i < levels.length; i++) levels[i] = pixels[4 * i];
+    }
+    frame.close?.();
+    return levels;
+}
+
+// Views of streams as RGBA, alpha: disparity.
+async function* viewsOfStreams({ chunks, order, width, height }, framesOf) {
+    const streams = Object.fromEntries(Object.keys(chunks).map((name) => [name, framesOf(name, chunks[name])]));
+    const next = async (name, rows) => streams[name] && levelsOf((await streams[name].next()).value, width, rows);
+    for (let view = 0; view < order.length; view++) {
+        const [luma, chroma, disparity] = await Promise.all(
+            [next("luma", height), next("chroma", 2 * height), next("disparity", height)]);
+        const rgba = new Uint8ClampedArray(4 * luma.length);
+        for (let i = 0, at = 0; i < luma.length; i++, at += 4) {
+            const y = luma[i], blue = chroma[i] - 128, red = chroma[luma.length + i] - 128;
+            rgba[at] = y + 1.402 * red;
+            rgba[at + 1] = y - 0.344136 * blue - 0.714136 * red;
+            rgba[at + 2] = y + 1.772 * blue;
+            if (disparity) rgba[at + 3] = disparity[i];
+        }
+        yield rgba;
+    }
+}
+
+// The frames of a picture in AVIF; the first alone where the browser has no ImageDecoder.
+async function* framesOfPicture(name) {
+    const data = bytesOf(name), type = "image/avif";
+    if (!await globalThis.ImageDecoder?.isTypeSupported(type)) {
+        return yield await createImageBitmap(new Blob([data], { type }));
+    }
+    const decoder = new ImageDecoder({ data, type });
+    await decoder.tracks.ready;
+    await decoder.completed;
+    for (let i = 0; i < decoder.tracks.selectedTrack.frameCount; i++) {
+        yield (await decoder.decode({ frameIndex: i })).image;
+    }
+    return decoder.close();
+}
+
+// Views of pictures as RGBA, alpha: disparity. A page with streams has such a picture of the middle view only.
+async function* viewsOfPictures({ hasDisparity, width, height, colorSpace }) {
+    const depths = hasDisparity && framesOfPicture("depths");
+    for await (const image of $("colors") ? framesOfPicture("colors") : [$("first")]) {
+        const rgba = drawn(image, width, height, colorSpace);
+        const levels = depths && drawn((await depths.next()).value, width, height);
+        if (depths) for (let at = 3; at < rgba.length; at += 4) rgba[at] = levels[at - 3];
+        yield rgba;
     }
 }
 
 // Stores all views; `onView` hears of each. The middle one is shown alone until all are there.
 export async function load(field, renderer, onView) {
-    const { width, height, order, colorSpace } = field;
-    const context = new OffscreenCanvas(width, height).getContext("2d", { willReadFrequently: true, colorSpace });
-    const pixels = (image) => {
-        context.drawImage(image, 0, 0, width, height);
-        image.close();
-        return context.getImageData(0, 0, width, height).data;
-    };
-    const depths = field.hasDisparity && pictures($("depths"), field.type, field.isMoving);
+    const streams = field.chunks.luma ? [decoded, stepped].map((frames) => () => viewsOfStreams(field, frames)) : [];
     let layer = 0;
-    for await (const image of pictures($("colors"), field.type, field.isMoving)) {
-        const colors = pixels(image), depth = depths ? pixels((await depths.next()).value) : null;
-        renderer.upload(layer, colors, depth);
-        if (layer === 0 && depth) field.middle = Uint8Array.from({ length: width * height }, (_, i) => depth[4 * i]);
-        onView(++layer);
+    for (const views of [...streams, () => viewsOfPictures(field)]) {
+        layer = 0;
+        try {
+            for await (const rgba of views()) {
+                if (!layer && field.hasDisparity) field.middle = rgba.filter((_, i) => i % 4 === 3);
+                renderer.upload(layer, rgba);
+                onView(++layer);
+            }
+            break;
+        } catch (error) {
+            console.warn(error);
+        }
     }
-    if (layer < order.length) return say("This browser shows one view and its depth: it lacks ImageDecoder.");
-    order.forEach((place, i) => field.layers.set(hash(place), i));
+    if (layer < field.order.length) return say("This browser shows one view and its depth: it cannot decode the others.");
+    field.order.forEach((place, i) => field.layers.set(hash(place), i));
     field.step = field.fullStep;
     return say("");
 }

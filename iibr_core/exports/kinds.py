@@ -50,9 +50,8 @@ class ExportOptions:
     focus disparities (px per view step) of the motion "rack", None for the nearest and the farthest. frames: number of
     frames of an animation or pictures of a stack. rate: frames a second. row: row of an epipolar plane image. show:
     whether a quilt is shown on a display. budget: maximum size of a web page in bytes, None for no limit. credit:
-    whether the page names the photo's title, author and rights. stills: whether the page stores each view as a file,
-    for browsers that cannot decode frames of moving pictures. layout: place of the depth map beside its picture. bits:
-    bits a channel of the pictures of a stack.
+    whether the page names the photo's title, author and rights. layout: place of the depth map beside its picture.
+    bits: bits a channel of the pictures of a stack.
     """
 
     size: ScreenSize = DEFAULT_SIZE
@@ -67,7 +66,6 @@ class ExportOptions:
     show: bool = False
     budget: int | None = None
     credit: bool = False
-    stills: bool = False
     layout: DepthLayout = "right"
     bits: int = 8
 
@@ -165,7 +163,7 @@ EXPORTS = {
         optics="stereo:optics_of_eyes", purpose="display",
     ),
     "web": ExportKind(
-        "Web page, one file", (".html",), "web:write_page", ("budget", "credit", "stills"),
+        "Web page, one file", (".html",), "web:write_page", ("budget", "credit"),
         gallery="web_gallery:write_gallery",
     ),
     "mp4": _animation("Video, MP4", ".mp4", 30, needs=("av",)),

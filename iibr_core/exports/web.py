@@ -12,6 +12,7 @@ from typing import Any
 from iibr_core.beyond.picture_quality import page_numbers
 from iibr_core.exports.kinds import ExportOptions
 from iibr_core.exports.source import ExportSource
+from iibr_core.exports.web_streams import can_encode
 from iibr_core.exports.web_views import ViewStore, WebViews, form_that_fits
 from iibr_core.formats.images.metadata import Caption, read_caption
 from iibr_core.formats.outputs import write_file
@@ -24,14 +25,21 @@ AVIF = "image/avif"
 SHADERS = "fullscreen.vert", "lens.frag", "present.frag"
 """Shaders of the page, see `web/renderer.js`."""
 POLICY = (
-    "default-src 'none'; script-src {script}; style-src {style}; img-src data: blob:; base-uri 'none';"
+    "default-src 'none'; script-src {script}; style-src {style}; img-src data: blob:; media-src blob:; base-uri 'none';"
     " form-action 'none'"
 )
+FILE = '<script type="text/plain" id="{name}">{data}</script>'
 SCRIPTS = "renderer.js", "views.js", "viewer.js"
 LINK = re.compile(r"^import [^;]*;\n|^export (?=const|class|function|async)", re.MULTILINE)
 """Imports and exports of the scripts, which are one module in a page."""
 COMMENT = re.compile(r"[ \t]*//[^\n]*|\n(?=[ \t]*(?://[^\n]*)?\n)")
 """Comments and empty lines of a shader."""
+
+
+NO_STREAMS = (
+    " Safari will show the middle view only: streams of all views need PyAV; install it with"
+    " `pip install 'iibr[export]'` and export again."
+)
 
 
 def write_page(path: Path, source: ExportSource, options: ExportOptions) -> str:
@@ -40,17 +48,17 @@ def write_page(path: Path, source: ExportSource, options: ExportOptions) -> str:
     with write_file(path) as temporary:
         temporary.write_bytes(page)
     height, width = views.size
-    depth = "" if views.depths else ", without depth"
+    depth = "" if views.has_disparity else ", without depth"
     return (
         f"{len(views.places)} views of {width}x{height} px{depth} at quality {views.form.quality}:"
-        f" {len(page) / 1e6:.2f} MB."
+        f" {len(page) / 1e6:.2f} MB.{'' if views.form.is_video else NO_STREAMS}"
     )
 
 
 def make_page(source: ExportSource, options: ExportOptions) -> tuple[bytes, WebViews]:
     """Return the page and its views."""
     scene = source.scene
-    form = form_that_fits(scene.grid, ImageSize(scene.height, scene.width), options.stills)
+    form = form_that_fits(scene.grid, ImageSize(scene.height, scene.width), can_encode())
     store = ViewStore(source.views(with_disparity=True, in_srgb=False), scene.grid, form, scene.color_space)
     words = _words(source, options.credit)
     if options.budget is None:
@@ -88,8 +96,7 @@ def _page(source: ExportSource, words: dict[str, str], views: WebViews) -> bytes
         "first": f"data:{AVIF};base64,{_base64(views.first)}",
         "shaders": _json(_shaders(folder)),
         "field": _json(_field(source, views)),
-        "colors": "\n".join(map(_base64, views.colors)),
-        "depths": "\n".join(map(_base64, views.depths)),
+        "files": "\n".join(FILE.format(name=name, data=_base64(data)) for name, data in views.files.items()),
     }
     return Template((folder / "page.html").read_text("utf-8")).substitute(fields).encode("utf-8", "replace")
 
@@ -118,9 +125,8 @@ def _field(source: ExportSource, views: WebViews) -> dict[str, Any]:
         "step": views.form.every,
         "rowStep": scene.row_step,
         "order": [{"t": place.t, "s": place.s} for place in views.places],
-        "type": AVIF,
-        "isMoving": len(views.colors) < len(views.places),
-        "hasDisparity": bool(views.depths),
+        "chunks": {name: stream.chunks for name, stream in views.streams.items()},
+        "hasDisparity": views.has_disparity,
         "range": views.range_px,
         "colorSpace": "srgb" if scene.color_space == SRGB else "display-p3",
         "eyeLimits": {"t": eye_limits(scene.grid.rows), "s": eye_limits(scene.grid.columns)},

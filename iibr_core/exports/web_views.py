@@ -1,11 +1,12 @@
 """The views of a light field in a web page: their number, size, quality and container.
 
-Views differ little, so all lie in one moving picture (AVIF), one frame a view from the middle outwards: half the size
-of single files or less. Disparity is stored the same way, in 8 bits.
+Views differ little, so they are the frames of streams (VP9), from the middle outwards: half the size of single files or
+less. Disparity is stored the same way, in 8 bits. A moving picture (AVIF) serves where there is no encoder of VP9; not
+every browser shows its frames.
 """
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from io import BytesIO
 from itertools import product
@@ -17,6 +18,7 @@ from PIL import Image
 
 from iibr_core.beyond.resized_light import mean_of_areas
 from iibr_core.color import bytes_from_encoded, convert, encoded_from_stored, linear_from_srgb, srgb_from_linear
+from iibr_core.exports.web_streams import Stream, chroma_of, encode_levels, luma_of
 from iibr_core.formats.images.color_profile import icc_profile
 from iibr_core.types import (
     DISPLAY_P3,
@@ -32,7 +34,7 @@ from iibr_core.types import (
 )
 
 MAX_TEXELS = 56_000_000
-"""Largest number of pixels of all views; a browser keeps each pixel as six bytes."""
+"""Largest number of pixels of all views; a browser keeps each pixel as four bytes."""
 MAX_SIDE_PX = 4096
 """Largest texture of the graphics cards of phones."""
 MAX_VIEWS = 256
@@ -41,6 +43,9 @@ RANGE_MARGIN, OUTLIERS = 0.05, 0.0002
 """Margin and quantile of the disparity range, the same as in the desktop's texture (`light_field_texture.py`)."""
 QUALITIES, DEPTH_QUALITY, FIRST_QUALITY = (82, 65, 48), 60, 50
 """Qualities of colours, the lower ones for budgets; of disparity; and of the first picture."""
+CRFS, CHROMA_CRF_STEP, DEPTH_CRF = dict(zip(QUALITIES, (24, 32, 40))), 10, 32
+"""Qualities of the streams of VP9, 0 to 63, the best first: of luma by the quality of colours, the step by which chroma
+has a higher value, and of disparity."""
 MAX_HALVINGS = 4
 """Largest number of times that a budget halves the size of the views."""
 SPEED = 8
@@ -56,14 +61,13 @@ Bytes = NDArray[np.uint8]
 class WebForm:
     """The part of a field that a page stores: every n-th view across and down, resized by `scale`.
 
-    quality: of colours, 1 to 100. is_single: whether each view is a file, for browsers that cannot decode frames of
-    moving pictures.
+    quality: of colours, 1 to 100. is_video: whether views are streams of VP9, not moving pictures in AVIF.
     """
 
     every: int = 1
     scale: float = 1.0
     quality: int = QUALITIES[0]
-    is_single: bool = False
+    is_video: bool = True
 
     def size_of(self, size: ImageSize) -> ImageSize:
         """Return the size in the page of a view of this size."""
@@ -78,22 +82,30 @@ class WebForm:
 class WebViews:
     """Encoded views in the order of `places`, from the middle outwards.
 
-    range_px: disparities of the bytes 0 and 255, px per view step of this size. depths: none if no depth is known.
+    range_px: disparities of the bytes 0 and 255, px per view step of this size. has_disparity: whether all views have
+    disparity. first: still picture of the middle view. streams: files by their names in `web/views.js`. pictures: the
+    same for files in AVIF; of a page with streams, the middle view's disparity is one.
     """
 
     form: WebForm
     size: ImageSize
     places: tuple[ViewOffset, ...]
     range_px: tuple[float, float]
+    has_disparity: bool
     first: bytes
-    colors: tuple[bytes, ...]
-    depths: tuple[bytes, ...]
+    streams: Mapping[str, Stream]
+    pictures: Mapping[str, bytes]
+
+    @property
+    def files(self) -> dict[str, bytes]:
+        """All files of the views by name."""
+        return {**{name: stream.data for name, stream in self.streams.items()}, **self.pictures}
 
 
-def form_that_fits(grid: GridShape, size: ImageSize, is_single: bool) -> WebForm:
+def form_that_fits(grid: GridShape, size: ImageSize, is_video: bool) -> WebForm:
     """Return the form with the most views, at their size, that browsers can hold in memory."""
     for every in range(1, max(grid) + 1):
-        form = WebForm(every, min(1.0, MAX_SIDE_PX / max(size)), is_single=is_single)
+        form = WebForm(every, min(1.0, MAX_SIDE_PX / max(size)), is_video=is_video)
         count, (height, width) = len(places_of(grid, form)), form.size_of(size)
         if count <= MAX_VIEWS and count * height * width <= MAX_TEXELS:
             break
@@ -147,14 +159,19 @@ class ViewStore:
         colors = [_smaller_colors(self._colors[place], size) for place in places]
         depths = [_smaller_depth(self._disparities[place], size) for place in places if place in self._disparities]
         far, near = (size.width / stored.width * value for value in self._range_px)
+        has_disparity, is_video = len(depths) == len(colors), form.is_video
+        pictures = {} if is_video else {"colors": _moving(colors, form.quality, self._space, "4:4:4")}
+        if has_disparity:
+            pictures["depths"] = _moving(depths[: 1 if is_video else None], DEPTH_QUALITY, SRGB, "4:0:0")
         return WebViews(
             form,
             size,
             tuple(places),
             (far, near),
+            has_disparity,
             _first_picture(colors[0], self._space),
-            _files(colors, form.is_single, form.quality, self._space),
-            _files(depths, form.is_single, DEPTH_QUALITY, SRGB) if len(depths) == len(colors) else (),
+            _streams(colors, depths if has_disparity else [], CRFS[form.quality]) if is_video else {},
+            pictures,
         )
 
     def encode_within(self, budget: int, page_bytes: Callable[[WebViews], int]) -> WebViews:
@@ -194,11 +211,20 @@ def _first_picture(colors: Bytes, space: ColorSpace) -> bytes:
     return _avif([image], FIRST_QUALITY, space, "4:2:0")
 
 
-def _files(pictures: Sequence[Bytes], is_single: bool, quality: int, space: ColorSpace) -> tuple[bytes, ...]:
-    """Return the pictures, colours (H, W, 3) or grey (H, W), as one moving picture or as single ones."""
-    images = [Image.fromarray(picture) for picture in pictures]
-    groups = [[image] for image in images] if is_single else [images]
-    return tuple(_avif(group, quality, space, "4:4:4" if images[0].mode == "RGB" else "4:0:0") for group in groups)
+def _streams(colors: Sequence[Bytes], depths: Sequence[Bytes], crf: int) -> dict[str, Stream]:
+    """Return the streams of the views by name."""
+    height, width = size = image_size(colors[0])
+    chroma = map(chroma_of, colors), ImageSize(2 * height, width)
+    streams = {
+        "luma": encode_levels(map(luma_of, colors), size, crf),
+        "chroma": encode_levels(*chroma, crf + CHROMA_CRF_STEP),
+    }
+    return streams | ({"disparity": encode_levels(depths, size, DEPTH_CRF)} if depths else {})
+
+
+def _moving(pictures: Sequence[Bytes], quality: int, space: ColorSpace, subsampling: str) -> bytes:
+    """Return pictures, colours (H, W, 3) or grey (H, W), as one moving picture."""
+    return _avif([Image.fromarray(picture) for picture in pictures], quality, space, subsampling)
 
 
 def _avif(images: list[Any], quality: int, space: ColorSpace, subsampling: str) -> bytes:

@@ -27,8 +27,14 @@ vec2 place_at(Ray ray, float disparity) {
     return ray.uv - ray.camera * ray.focus - ray.to_view * disparity;
 }
 
+// DISPARITY_IN_ALPHA: `disparities` are the colours, whose alpha is 0 for the farthest and 1 for the nearest.
 float disparity_at(vec2 at, float layer) {
-    return textureLod(disparities, vec3(at, layer), 0.0).r;
+    vec4 texel = textureLod(disparities, vec3(at, layer), 0.0);
+#ifdef DISPARITY_IN_ALPHA
+    return mix(farthest, nearest, texel.a);
+#else
+    return texel.r;
+#endif
 }
 
 // Pixels at a depth edge mix both sides. Background shown apart from its foreground must not carry that seam along: it is

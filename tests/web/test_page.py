@@ -1,4 +1,9 @@
+import base64
 import json
+import os
+import re
+import subprocess
+import sys
 from itertools import combinations
 
 import numpy as np
@@ -210,11 +215,25 @@ def test_readers_of_screens_find_words(shown) -> None:
     assert {("slider", "Focus"), ("slider", "Aperture"), ("button", "Reset")} <= named
 
 
-def test_stills_show_the_same(tab, tmp_path) -> None:
+def test_without_pyav_views_are_a_moving_picture(tab, tmp_path) -> None:
+    """Its range is limited: Chromium 156 assumes that and ignores the range that the tracks state."""
+    (tmp_path / "av.py").write_text("raise ImportError('not installed')", "utf-8")
+    (scene := tmp_path / "scene").mkdir()
+    words = ["export", str(write_scene(scene)), "--to", "web", "--grid", "3", "-o", str(tmp_path / "a.html")]
+    command = [sys.executable, "-P", "-m", "viewer", *words]
+    with_path = {**os.environ, "PYTHONPATH": os.pathsep.join([str(tmp_path), *sys.path])}
+    done = subprocess.run(command, capture_output=True, text=True, env=with_path)
+    assert "Safari will show the middle view only" in done.stderr
+    assert "pip install 'iibr[export]'" in done.stderr
     tab.resize(WIDTH, HEIGHT)
-    tab.open(export(write_scene(tmp_path), "--stills").as_uri())
+    tab.open((tmp_path / "a.html").as_uri())
     wait_until_still(tab)
     assert tab.evaluate("+document.documentElement.dataset.views") == 9
+    for name in ("colors", "depths"):
+        data = base64.b64decode(tab.evaluate(f"document.getElementById('{name}').textContent"))
+        ranges = re.findall(rb"colrnclx.{6}(.)", data, re.DOTALL)
+        assert len(ranges) == 2, "of the item and of the track"
+        assert set(ranges) == {b"\0"}
 
 
 @pytest.mark.parametrize("size", [(1, 7), (211, 97)])

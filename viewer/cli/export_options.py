@@ -71,7 +71,6 @@ class KindOptions:
         int | None, option("Largest size of a web page, such as 3MB.", "SIZE", "no limit", parser=budget_from_text)
     ] = None
     credit: Annotated[bool, flag("--credit", "Show the photo's title, author and copyright in a web page.")] = False
-    stills: Annotated[bool, flag("--stills", "Write a web page for Safari, too; it is several times as large.")] = False
 
     def options(self, keys: Path | None = None, row: int | None = None, show: bool = False) -> kinds.ExportOptions:
         """Return the options of an export, with those that only single photos have."""

@@ -217,12 +217,6 @@ def _credit(options: ExportOptions, export: _Export) -> ExportOptions:
     return replace(options, credit=checkbox("title, author, copyright", options.credit, tip))
 
 
-def _stills(options: ExportOptions, export: _Export) -> ExportOptions:
-    label("Safari")
-    tip = "Stores each view as a picture of its own, which Safari needs. The file is several times as large."
-    return replace(options, stills=checkbox("all views in Safari, too", options.stills, tip))
-
-
 ROWS: dict[str, Row] = {
     "device": _device,
     "motion": _motion,
@@ -237,6 +231,5 @@ ROWS: dict[str, Row] = {
     "show": _show,
     "budget": _budget,
     "credit": _credit,
-    "stills": _stills,
 }
 """Rows from top to bottom, by the names in `ExportKind.supports`."""
