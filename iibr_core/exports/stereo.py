@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iibr_core.beyond.optics import Optics
-from iibr_core.color import bytes_from_encoded, linear_from_srgb, srgb_from_linear
+from iibr_core.exports.anaglyph import anaglyph
 from iibr_core.exports.framing import draw_framed, side_pictures
 from iibr_core.exports.kinds import ExportOptions
 from iibr_core.exports.render_settings import RenderSettings
@@ -19,11 +19,8 @@ from iibr_core.formats.images.spatial_photo import write_spatial_photo
 from iibr_core.formats.quilts import tagged
 from iibr_core.scenes.scene import Scene
 from iibr_core.scenes.screen_size import ScreenSize
-from iibr_core.types import SRGB, ColorSpace, FloatImage
+from iibr_core.types import SRGB, ColorSpace
 
-# Dubois 2009, for red-cyan glasses and sRGB displays: rows are red, green and blue of the display.
-LEFT = np.array([[0.437, 0.449, 0.164], [-0.062, -0.062, -0.024], [-0.048, -0.050, -0.017]], np.float32)
-RIGHT = np.array([[-0.011, -0.032, -0.007], [0.377, 0.761, 0.009], [-0.026, -0.093, 1.234]], np.float32)
 Eyes = tuple[NDArray[Any], NDArray[Any]]
 
 
@@ -81,17 +78,3 @@ def write_spatial(path: Path, source: ExportSource, options: ExportOptions) -> N
     left, right = draw_eyes(source, options)
     scale = left.shape[0] / source.scene.height
     write_spatial_photo(path, left, right, scale * (source.focal_px or source.scene.width))
-
-
-def anaglyph(left: NDArray[Any], right: NDArray[Any]) -> NDArray[np.uint8]:
-    """Return the anaglyph (H, W, 3) of two sRGB-encoded pictures (H, W, 3) uint8, by least squares in linear light.
-
-    Dubois, "A projection method to generate anaglyph stereo images", ICASSP 2001, with the matrices of 2009. Each eye's
-    light is clipped to the range of the display before the two are added.
-    """
-    return bytes_from_encoded(srgb_from_linear(_seen(left, LEFT) + _seen(right, RIGHT)))
-
-
-def _seen(eye: NDArray[Any], matrix: FloatImage) -> FloatImage:
-    light: FloatImage = np.clip(linear_from_srgb(eye / np.float32(255)) @ matrix.T, 0, 1)
-    return light

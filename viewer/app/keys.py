@@ -10,7 +10,7 @@ from imgui_bundle import imgui
 from iibr_core.beyond.optics import CENTRE
 from iibr_core.types import ViewOffset
 from viewer.app.pointer import is_marking_gloss
-from viewer.model import depth, inspection, lens, messages, selection, viewpoint, window
+from viewer.model import depth, inspection, lens, messages, selection, stereo, viewpoint, window
 from viewer.model.action import Action, do
 from viewer.model.commands import BY_NAME, COMMANDS, Chord
 from viewer.model.state.app_state import AppState
@@ -45,6 +45,8 @@ def _escape_actions(state: AppState) -> list[Action]:
     """Return the action that closes the topmost thing that Esc can close. Esc never quits."""
     if state.prompt is not None:
         return [do(messages.show_prompt, None)]
+    if state.stereo.is_shown:
+        return [do(stereo.show, False)]
     if state.free_camera is not None and state.stroke is None:
         return [do(viewpoint.leave_camera)]
     if state.stroke is not None:

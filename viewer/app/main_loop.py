@@ -21,6 +21,7 @@ from viewer.app.scene_loader import SceneLoader
 from viewer.app.session_store import SessionStore
 from viewer.app.sharpener import Sharpener
 from viewer.app.side_effects import SideEffects
+from viewer.app.stereo_screen import StereoScreen
 from viewer.app.window import Window
 from viewer.background.maps import EntropyWork, GlossFinder, find_surface
 from viewer.background.newest import Newest
@@ -33,7 +34,7 @@ from viewer.model import gesture, inspection, opening, preferences, saving, view
 from viewer.model.action import Action, do
 from viewer.model.inspection import NO_INSPECTION_TEXTURES
 from viewer.model.layout import Layout, is_narrow
-from viewer.model.state.app_state import AppState
+from viewer.model.state.app_state import AppState, Picture
 from viewer.ui.host import UiHost
 from viewer.ui.overlays.filmstrip import filmstrip_paths
 from viewer.ui.screen import build_screen
@@ -54,12 +55,14 @@ class App:
         self.state = replace(load_preferences(state, kept_in) if kept_in else state, has_dialogs=has_dialogs())
         self.frames_shown = 0
         self.window = Window("iibr", self.state.preferences.window, self.state.preferences.is_maximized)
+        self.state = replace(self.state, monitors=self.window.monitors)
         try:
             self._gl = create_for_window(self.window.handle)
         except InputError:
             self.window.close()
             raise
         self.scene_view = SceneView(self._gl)
+        self.stereo_screen = StereoScreen(self._gl, self.scene_view, self.window)
         self.inspection_view = InspectionView(self._gl, self.scene_view)
         self.sharpener = Sharpener(self._gl, self.scene_view, self.window.wake)
         self.free_camera_view = FreeCameraView(self.scene_view, self.window.wake)
@@ -77,6 +80,7 @@ class App:
         self._shown: tuple[object, ...] = ()
         self._pointer = NO_POINTER
         self._pace = Pace()
+        self._drawn_at = 0.0
 
     def run(self) -> None:
         """Show frames until the user quits."""
@@ -94,7 +98,7 @@ class App:
         self.do(*self.scene_loader.preview_depth(self.state))
         self.do(*self.gloss_finder.advance(self.state.optics.gloss))
         layout, look = self.layout(), self.look()
-        picture = self.scene_view.draw(self.state, layout.frame_px.size, layout.part) if layout.frame_px else None
+        picture = self._draw_picture(layout)
         if picture and self.scene_view.report != self.state.report:
             self.do(do(window.set_report, self.scene_view.report))
         textures = self.inspection_view.draw(self.state, layout) if picture else NO_INSPECTION_TEXTURES
@@ -106,9 +110,12 @@ class App:
         thumbnails = self._filmstrip.thumbnails(filmstrip_paths(self.state, layout))
         sharp = self.sharpener.texture(picture) if picture else None
         texture = sharp or (self.scene_view.renderer.image_texture if picture else None)
-        actions += build_screen(self.state, layout, texture, textures, thumbnails)
+        woven = self.stereo_screen.texture
+        actions += build_screen(self.state, layout, texture, textures, thumbnails, woven)
+        pointer = self.stereo_screen.pointer(pointer, layout)
         actions += self._input(pointer, layout)
-        self._show((picture, textures, self._ui.end(), layout, look, self.window.damages, sharp))
+        woven_picture = woven and self.stereo_screen.picture
+        self._show((picture, textures, self._ui.end(), layout, look, self.window.damages, sharp, woven_picture))
         is_still = not actions and not pointer.is_down and not pointer.pulls
         self.do(*actions)
         self.do(*self._side_effects.draw(self.state, SAVE_BUDGET_S))
@@ -116,10 +123,21 @@ class App:
         self.do(*self.sharpener.advance(picture, self.state, is_still and self._is_resting, SAVE_BUDGET_S))
         self.do(*self.free_camera_view.advance(self.state))
         is_drawing = self._side_effects.is_drawing or self.sharpener.is_drawing or self.inspection_view.is_drawing
+        is_drawing |= self.stereo_screen.view.is_drawing
         self._pace.is_busy |= bool(actions) or is_drawing
         self.scene_loader.advance(self.state)
         self.do(*self._preferences.keep(self.state))
         self._pace.took_s.append(time.perf_counter() - start)
+
+    def _draw_picture(self, layout: Layout) -> Picture | None:
+        """Draw the stereo picture, and the picture beside the panel, which waits for a moving stereo picture."""
+        before, now = self.scene_view.picture_drawn, time.perf_counter()
+        if self.stereo_screen.draw(self.state, layout):
+            self._pace.same_frames = 0
+            if before is not None and now - self._drawn_at < VIEW_REFRESH_S:
+                return before
+        self._drawn_at = now
+        return self.scene_view.draw(self.state, layout.frame_px.size, layout.part) if layout.frame_px else None
 
     @property
     def _is_resting(self) -> bool:
@@ -134,6 +152,7 @@ class App:
     def wait_s(self) -> float:
         """Time that the next turn may sleep, in seconds."""
         is_behind = self.scene_loader.holds_progress or not self.scene_view.shows_all_views()
+        is_behind |= not self.stereo_screen.view.shows_all_views
         idle_s = VIEW_REFRESH_S if is_behind else IDLE_WAIT_S
         idle_s = DIALOG_LOOK_S if self._side_effects.is_waiting else idle_s
         return self._pace.wait_s(self.state.motion.is_running, self._pointer.is_over_panel, idle_s)
@@ -161,6 +180,7 @@ class App:
         self._filmstrip.release()
         self.sharpener.close()
         self.free_camera_view.close()
+        self.stereo_screen.close()
         self.inspection_view.release()
         self.scene_view.release()
         self._gl.release()
@@ -188,6 +208,7 @@ class App:
         if self.state.motion.is_running:
             actions.append(do(viewpoint.tick, self._pace.stepped_at))
         actions += self._tracker.advance(self.state)
+        actions += self.stereo_screen.follow(self.state)
         actions += self._place_window() + actions_from_drop(self.window.take_dropped(), self.state)
         if is_narrow(self.window.size, self.window.ui_scale) != self.state.is_narrow:
             actions.append(do(window.set_narrow, not self.state.is_narrow))

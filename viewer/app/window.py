@@ -1,4 +1,4 @@
-"""The GLFW window. Only this module and `viewer.gpu` call GLFW.
+"""The GLFW window. Only this module, `second_window` and `viewer.gpu` call GLFW.
 
 The bundle is imported before glfw on purpose: it brings the GLFW library that both must share.
 """
@@ -17,6 +17,7 @@ import glfw
 # isort: on
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import InputError
+from viewer.model.state.stereo import Monitor
 
 WINDOW_SIZE = (1280, 800)
 SMALLEST_SIZE = (200, 150)
@@ -82,6 +83,13 @@ class Window:
         if monitor is not None:
             mode = glfw.get_video_mode(monitor)
             glfw.set_window_monitor(self.handle, monitor, 0, 0, *mode.size, mode.refresh_rate)
+
+    @property
+    def monitors(self) -> tuple[Monitor, ...]:
+        """The connected monitors, that with most of the window first."""
+        place = (*glfw.get_window_pos(self.handle), *self.size)
+        monitors = sorted(glfw.get_monitors(), key=lambda monitor: -_overlap(place, monitor))
+        return tuple(map(monitor_record, monitors))
 
     @property
     def is_hidden(self) -> bool:
@@ -161,6 +169,11 @@ class Window:
         """Show what was drawn."""
         glfw.swap_buffers(self.handle)
 
+    def wait_for_screen(self, is_wanted: bool) -> None:
+        """Let `show_frame` wait for the screen, or not; the window's context becomes current."""
+        glfw.make_context_current(self.handle)
+        glfw.swap_interval(int(is_wanted))
+
     def hide(self) -> None:
         """Hide the window."""
         glfw.hide_window(self.handle)
@@ -178,6 +191,12 @@ class Window:
 def _words_of(warning: Warning | str) -> str:
     """Return what stands between the quotes of GLFW's warnings, "(65550) b'X11: ...'"."""
     return str(warning).partition(" b'")[2].rstrip("'") or str(warning)
+
+
+def monitor_record(monitor: Any) -> Monitor:
+    """Return the record of one of GLFW's monitors."""
+    mode = glfw.get_video_mode(monitor)
+    return Monitor(glfw.get_monitor_name(monitor).decode(errors="replace"), *glfw.get_monitor_pos(monitor), *mode.size)
 
 
 def _overlap(place: tuple[int, int, int, int], monitor: Any) -> int:
@@ -198,14 +217,19 @@ def _is_on_a_screen(place: tuple[int, int, int, int]) -> bool:
 def _open(title: str, place: tuple[int, int, int, int] | None, is_maximized: bool) -> Any:
     if not glfw.init():
         return None
+    hint_context()
+    glfw.window_hint(glfw.SCALE_TO_MONITOR, True)
+    glfw.window_hint(glfw.MAXIMIZED, is_maximized)
+    return glfw.create_window(*_size_within_screens(place), title, None, None)
+
+
+def hint_context() -> None:
+    """Ask for OpenGL 3.3 core in the next window, and nothing else."""
     glfw.default_window_hints()
     glfw.window_hint(glfw.CONTEXT_VERSION_MAJOR, 3)
     glfw.window_hint(glfw.CONTEXT_VERSION_MINOR, 3)
     glfw.window_hint(glfw.OPENGL_PROFILE, glfw.OPENGL_CORE_PROFILE)
     glfw.window_hint(glfw.OPENGL_FORWARD_COMPAT, True)
-    glfw.window_hint(glfw.SCALE_TO_MONITOR, True)
-    glfw.window_hint(glfw.MAXIMIZED, is_maximized)
-    return glfw.create_window(*_size_within_screens(place), title, None, None)
 
 
 def _size_within_screens(place: tuple[int, int, int, int] | None) -> tuple[int, int]:

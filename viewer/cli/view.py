@@ -11,9 +11,11 @@ from iibr_core.scenes.scene import Source
 from viewer.app.preferences_store import last_opened, user_folder
 from viewer.cli.option_records import option, with_option_records
 from viewer.cli.options import SCENE, FocusDisparity, Grid, SceneOptions, require_heeded, require_source
+from viewer.model import stereo
 from viewer.model.action import Action, do
 from viewer.model.demo_photo import demo_photo
 from viewer.model.state.app_state import AppState
+from viewer.model.state.stereo import StereoMode
 from viewer.model.tracking import address_of, switch
 
 
@@ -28,6 +30,10 @@ def view(
     tracker: Annotated[
         str | None, option("Follow the head: poses from opentrack at this address.", "udp[:HOST][:PORT]", "off")
     ] = None,
+    stereo_mode: Annotated[
+        StereoMode | None,
+        option("Show a stereo picture, full screen, on a second monitor if there is one.", None, "", "--stereo"),
+    ] = None,
 ) -> None:
     """Open the viewer.
 
@@ -39,7 +45,8 @@ def view(
     require_source(source)
     if tracker is not None:
         address_of(tracker)
-    open_window(source, scene.depth_strength, do(switch, tracker))
+    shown = () if stereo_mode is None else (do(stereo.set_mode, stereo_mode), do(stereo.show, True))
+    open_window(source, scene.depth_strength, do(switch, tracker), *shown)
 
 
 def demo() -> None:

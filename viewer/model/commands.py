@@ -20,6 +20,7 @@ from viewer.model import (
     opening,
     preferences,
     saving,
+    stereo,
     tracking,
     viewpoint,
     window,
@@ -33,6 +34,7 @@ from viewer.model.state.inspection import COMPARISONS, OVERLAYS, Comparison, Ove
 from viewer.model.state.lens import PRESETS
 from viewer.model.state.preferences import SECTIONS
 from viewer.model.state.prompts import ChoiceOf, PalettePrompt
+from viewer.model.state.stereo import STEREO_MODES, StereoMode
 from viewer.model.state.tasks import ChooseTask, PlainTask
 from viewer.model.state.viewpoint import Zoom
 
@@ -45,6 +47,18 @@ COMPARE_WORDS: dict[Comparison, str] = {"photo": "Compare with the photo", "snap
 BRUSH_WORDS: dict[Tool, str] = {**{tool: tool.capitalize() for tool in TOOLS}, "fill": "Bucket"}
 OVERLAY_WORDS: dict[OverlayKind, str] = {"disparity": "depth", "entropy": "entropy", "inpainted": "inpainting"}
 LOOP_WORDS: dict[LoopKind, str] = {"circle": "Circle", "eight": "Figure of eight", "swing": "Swing"}
+
+STEREO_WORDS: dict[StereoMode, tuple[str, str]] = {
+    "half-sbs": ("Side by side, half width", "3D televisions and projectors"),
+    "sbs": ("Side by side, full", "displays that weave any full-screen pair, and screens twice as wide"),
+    "top-bottom": ("One above the other", "3D televisions and projectors"),
+    "rows": ("In turns by rows", "displays for polarised glasses"),
+    "columns": ("In turns by columns", "displays with a parallax barrier"),
+    "checkerboard": ("Checkerboard", "3D televisions of the DLP kind"),
+    "anaglyph": ("Anaglyph", "red-cyan glasses on any display"),
+    "cross-eyed": ("Cross-eyed", "eyes that cross, on any display"),
+}
+"""Name of each arrangement for people, and what it is for."""
 
 
 @dataclass(frozen=True)
@@ -174,6 +188,9 @@ COMMANDS: tuple[Command, ...] = (
     *(Command(f"Section: {section}", do(preferences.toggle_section, section)) for section in SECTIONS),
     Command("Full screen", lambda s: do(window.set_fullscreen, not s.is_fullscreen), "f11"),
     Command("Hide or show the panel", do(window.toggle_panel), "tab"),
+    Command("Stereo display", lambda s: do(stereo.show, not s.stereo.is_shown), "_3"),
+    Command("Stereo display: swap the eyes", do(stereo.swap_eyes), "l"),
+    *(Command(f"Stereo display: {STEREO_WORDS[mode][0].lower()}", do(stereo.set_mode, mode)) for mode in STEREO_MODES),
     Command("Before and after", lambda s: do(lens.show_before, not s.shows_before), "backslash"),
     Command("Take a snapshot", do(inspection.take_snapshot), "k"),
     Command(

@@ -97,6 +97,7 @@ def show_scene(state: AppState, generation: int, scene: Scene, new_depth: NewDep
         scene=scene,
         progress=_first_progress(state, scene),
         views_there=frozenset({scene.grid.centre}),
+        stereo=state.stereo if is_same else replace(state.stereo, eyes=None, screen=0.0),
         shown_generation=state.generation,
         optics=carried(state.optics),
         history=map_optics(state.history, carried),

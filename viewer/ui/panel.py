@@ -16,7 +16,15 @@ from viewer.model.commands import BY_NAME
 from viewer.model.layout import Layout
 from viewer.model.state.app_state import AppState, DrawReport
 from viewer.model.state.preferences import PARENT_SECTION, SECTIONS, Section, is_seen_open
-from viewer.ui.sections import depth_section, essentials, gloss_section, inspect, lens_section, view_section
+from viewer.ui.sections import (
+    depth_section,
+    essentials,
+    gloss_section,
+    inspect,
+    lens_section,
+    stereo_section,
+    view_section,
+)
 from viewer.ui.widgets import button, gap, heading, in_row, label, quiet, scale, tooltip
 
 TOOLS = (
@@ -183,7 +191,7 @@ def _section(section: Section, state: AppState, scene: Scene) -> list[Action]:
     sections = state.preferences.open_sections
     if section in PARENT_SECTION and not is_seen_open(PARENT_SECTION[section], sections):
         return []
-    if section in ("focus", "aperture", "view") and not aperture_limit(scene.grid):
+    if section in ("focus", "aperture", "view", "stereo display") and not aperture_limit(scene.grid):
         return []
     is_open = section in sections
     is_toggled = heading(section.capitalize(), is_open)
@@ -225,6 +233,7 @@ BUILDERS: dict[Section, Callable[[AppState, Scene], list[Action]]] = {
     "light": lens_section.light_section,
     "gloss": gloss_section.gloss_section,
     "depth": depth_section.depth_section,
+    "stereo display": stereo_section.stereo_section,
     "advanced": lambda state, scene: [],
     "inspect": inspect.inspect_section,
     "scene": _scene,

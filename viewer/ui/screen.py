@@ -32,16 +32,21 @@ def build_screen(
     picture_texture: int | None,
     textures: InspectionTextures = NO_INSPECTION_TEXTURES,
     thumbnails: Mapping[str, Thumbnail | None] = NO_THUMBNAILS,
+    woven_texture: int | None = None,
 ) -> list[Action]:
     """Build everything; return edits as actions. picture_texture: GL name of the picture, rows bottom-up. textures: of
-    inspection. thumbnails: of the filmstrip, by path.
+    inspection. thumbnails: of the filmstrip, by path. woven_texture: of a stereo picture that fills the window instead.
     """
     window, palette = layout.window, palette_of(state.preferences.theme)
     corner = imgui.ImVec2(window.width, window.height)
     imgui.get_background_draw_list().add_rect_filled(imgui.ImVec2(0, 0), corner, pack_color(palette.background))
     scene, picture, frame = state.scene, layout.picture, layout.frame
-    if picture_texture is not None and scene is not None and picture is not None and frame is not None:
-        _picture(layout, picture_texture)
+    if woven_texture is not None:
+        _image(woven_texture, (0, 0, window.width, window.height))
+    elif picture_texture is not None and scene is not None and picture is not None and frame is not None:
+        assert layout.frame_px is not None
+        x, y, width, height = (value / layout.pixel_ratio for value in layout.frame_px)
+        _image(picture_texture, (x, y, x + width, y + height))
         draw_inspection(state, scene, layout, textures)
         if not state.inspection.shows_views:
             draw_marks(state, scene, layout, picture, frame)
@@ -52,10 +57,7 @@ def build_screen(
     return actions + welcome(state, layout) + notices(state, layout) + prompts(state, layout)
 
 
-def _picture(layout: Layout, texture: int) -> None:
-    """Draw the picture pixel for pixel."""
-    assert layout.frame_px is not None
-    x, y, width, height = (value / layout.pixel_ratio for value in layout.frame_px)
-    imgui.get_background_draw_list().add_image(
-        imgui.ImTextureRef(texture), imgui.ImVec2(x, y), imgui.ImVec2(x + width, y + height), (0, 1), (1, 0)
-    )
+def _image(texture: int, corners: tuple[float, float, float, float]) -> None:
+    """Draw a picture pixel for pixel. corners: left, top, right and bottom."""
+    first, last = imgui.ImVec2(*corners[:2]), imgui.ImVec2(*corners[2:])
+    imgui.get_background_draw_list().add_image(imgui.ImTextureRef(texture), first, last, (0, 1), (1, 0))

@@ -71,7 +71,7 @@ def test_more_brings_headings_and_advanced_two_more(first: OffscreenScene, contr
     first.do(do(preferences.toggle_section, "more"))
     first.screen(WINDOW)
     headings = [words.partition("###section ")[2] for words in controls if "###section " in words]
-    assert headings == ["More", "View", "Focus", "Aperture", "Light", "Gloss", "Depth", "Advanced"]
+    assert headings == ["More", "View", "Focus", "Aperture", "Light", "Gloss", "Depth", "Stereo display", "Advanced"]
     first.do(do(preferences.toggle_section, "advanced"))
     first.screen(WINDOW)
     assert {"Inspect", "Scene"} <= {words.partition("###section ")[2] for words in controls}

@@ -106,10 +106,17 @@ class Passes:
         framebuffer.scissor = 0, 0, width, height
 
     def present(
-        self, lens: Lens, targets: PictureTargets, is_linear: bool = False, color_space: ColorSpace = SRGB
+        self,
+        lens: Lens,
+        targets: PictureTargets,
+        is_linear: bool = False,
+        color_space: ColorSpace = SRGB,
+        into: moderngl.Framebuffer | None = None,
     ) -> None:
-        """Write the finished picture. is_linear: as unclipped light, not encoded. color_space: of the result."""
-        targets.image.framebuffer.use()
+        """Write the finished picture. is_linear: as unclipped light, not encoded. color_space: of the result. into:
+        takes the picture in place of the image of the targets.
+        """
+        (into or targets.image.framebuffer).use()
         self._ctx.disable(moderngl.DEPTH_TEST | moderngl.CULL_FACE | moderngl.BLEND)
         switches = {"LINEAR": is_linear, "OTHER_PRIMARIES": lens.color_space != color_space}
         program = self._programs.get("present.frag", switches)

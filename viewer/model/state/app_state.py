@@ -21,6 +21,7 @@ from viewer.model.state.lens import GlossBrush, TiltHandles
 from viewer.model.state.notices import Notice
 from viewer.model.state.preferences import Preferences
 from viewer.model.state.prompts import ExportPrompt, FinishedExport, JobProgress, Prompt
+from viewer.model.state.stereo import Monitor, Stereo
 from viewer.model.state.tasks import Task
 from viewer.model.state.viewpoint import FreeCamera, Motion, Tracking, Zoom
 
@@ -78,6 +79,7 @@ class AppState:
     scene, focused_at: place that was clicked for it (see focal_plane), None without. facts: of a photo's file, perhaps
     of the one before. hides_panel: None to follow is_narrow. shows_before: whether the unchanged photo is shown.
     tracking: None unless the viewpoint follows the head.
+    monitors: the connected ones, that of the window first.
     """
 
     optics: Optics = field(default_factory=Optics)
@@ -126,6 +128,8 @@ class AppState:
     is_narrow: bool = False
     shows_before: bool = False
     tracking: Tracking | None = None
+    stereo: Stereo = field(default_factory=Stereo)
+    monitors: tuple[Monitor, ...] = ()
 
     @property
     def at_rest(self) -> AppState:

@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal, get_args
 
 from iibr_core.exports.photo_folder import FolderOrder
+from viewer.model.state.stereo import StereoChoice
 
 Theme = Literal["dark", "light"]
 Units = Literal["photographic", "light field"]
 """Units of distances and apertures: near to far and f-numbers, or pixels per view step and view steps."""
 
-Section = Literal["more", "view", "focus", "aperture", "light", "gloss", "depth", "advanced", "inspect", "scene"]
+Section = Literal[
+    "more", "view", "focus", "aperture", "light", "gloss", "depth", "stereo display", "advanced", "inspect", "scene"
+]
 SECTIONS: tuple[Section, ...] = get_args(Section)
 """Sections of the panel, from top to bottom."""
 PARENT_SECTION: dict[Section, Section] = {
-    **dict.fromkeys(SECTIONS[1:8], "more"),
+    **dict.fromkeys(SECTIONS[1:9], "more"),
     "inspect": "advanced",
     "scene": "advanced",
 }
@@ -60,3 +63,4 @@ class Preferences:
     last_folder: str = ""
     tracker: str = "udp:127.0.0.1:4242"
     head_range_cm: float = 15.0
+    stereo: StereoChoice = field(default_factory=StereoChoice)

@@ -1,0 +1,50 @@
+#version 330 core
+// The pictures of both eyes woven into one for a display. A switch names the arrangement: BESIDE, ABOVE, ROWS, COLUMNS,
+// CHECKERBOARD, ANAGLYPH.
+#include "sheet.glsl"
+#include "srgb.glsl"
+
+uniform vec2 screen_px;
+uniform vec2 frame_px;    // room of each picture on the screen
+uniform vec2 picture_px;  // each picture, in the middle of its room
+uniform int first_eye;    // eye that comes first: 0 the left, 1 the right
+uniform mat3 left_seen, right_seen;  // light of the display from the light of each eye's picture
+
+in vec2 uv;
+out vec4 color;
+
+// What an eye sees at a pixel of its room, from the upper left corner.
+vec3 seen(int eye, vec2 at) {
+    vec2 place = (at - floor((frame_px - picture_px) / 2.0)) / picture_px;
+    bool is_outside = any(lessThan(place, vec2(0.0))) || any(greaterThan(place, vec2(1.0)));
+    return is_outside ? vec3(0.0) : picture_at(eye ^ first_eye, place);
+}
+
+vec3 linear_from_srgb(vec3 code) {
+    return mix(pow((code + 0.055) / 1.055, vec3(2.4)), code / 12.92, vec3(lessThanEqual(code, vec3(0.04045))));
+}
+
+void main() {
+    vec2 at = vec2(gl_FragCoord.x, screen_px.y - gl_FragCoord.y);
+    ivec2 pixel = ivec2(at);
+#ifdef ANAGLYPH
+    vec3 left = clamp(left_seen * linear_from_srgb(seen(0, at)), 0.0, 1.0);
+    vec3 right = clamp(right_seen * linear_from_srgb(seen(1, at)), 0.0, 1.0);
+    color = vec4(srgb_from_linear(clamp(left + right, 0.0, 1.0)), 1.0);
+#else
+#if defined(BESIDE)
+    int second = int(at.x > frame_px.x);
+    at.x -= float(second) * frame_px.x;
+#elif defined(ABOVE)
+    int second = int(at.y > frame_px.y);
+    at.y -= float(second) * frame_px.y;
+#elif defined(ROWS)
+    int second = pixel.y & 1;
+#elif defined(COLUMNS)
+    int second = pixel.x & 1;
+#else
+    int second = (pixel.x + pixel.y) & 1;
+#endif
+    color = vec4(seen(second, at), 1.0);
+#endif
+}

@@ -1,0 +1,176 @@
+"""The stereo picture on a second monitor and in the window itself, read back from the screen."""
+
+from __future__ import annotations
+
+import subprocess
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from PIL import ImageGrab
+
+from iibr_core.evaluation.metrics import psnr
+from iibr_core.exports.anaglyph import anaglyph
+from iibr_core.exports.framing import centred, size_in_frame
+from iibr_core.exports.render_settings import RenderSettings
+from iibr_core.scenes.screen_size import ScreenSize
+from iibr_core.types import GridShape, ViewOffset
+from tests.viewer.conftest import Driver, Opener
+from tests.xvfb import display_with_monitors
+from viewer.app.preferences_store import load_preferences
+from viewer.display.offscreen import OffscreenScene
+from viewer.model import lens, messages, stereo
+from viewer.model.action import do
+from viewer.model.state.app_state import AppState
+from viewer.model.state.stereo import STEREO_MODES, Monitor, StereoMode
+
+FIRST, SECOND = ScreenSize(1024, 768), ScreenSize(640, 480)
+Pixels = NDArray[np.uint8]
+Eyes = Callable[[ScreenSize, float], tuple[Pixels, Pixels]]
+
+
+@pytest.fixture(scope="module")
+def display(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    """A server with two monitors."""
+    with display_with_monitors(tmp_path_factory.mktemp("x"), FIRST, SECOND) as name:
+        yield name
+
+
+@contextmanager
+def eyes_of(viewer: Driver) -> Iterator[Eyes]:
+    """Draws the pictures of both eyes without a window, in rooms of a size and displayed aspect; the window is closed
+    first, as its context cannot be current beside another.
+    """
+    state = viewer.app.state
+    assert state.source is not None
+    viewer.close()
+    with OffscreenScene("egl") as scene:
+        opened = scene.open(state.source)
+
+        def draw(frame: ScreenSize, aspect: float) -> tuple[Pixels, Pixels]:
+            pair = stereo.eyes_at(opened, state.optics, state.stereo)
+            size = size_in_frame(opened, frame, pair[0].part, aspect)
+            left, right = (scene.draw(RenderSettings(eye.optics, size, eye.part)) for eye in pair)
+            return centred(left, frame), centred(right, frame)
+
+        yield draw
+
+
+def grabbed(display: str, left: int, size: ScreenSize) -> Pixels:
+    """The screen from a column on."""
+    return np.asarray(ImageGrab.grab((left, 0, left + size.width, size.height), xdisplay=display))[..., :3]
+
+
+def woven(mode: StereoMode, draw: Eyes, size: ScreenSize) -> Pixels:
+    """The two pictures as a display of this kind expects them."""
+    (width, height), aspect = size, size.width / size.height
+    if mode == "top-bottom":
+        return np.vstack(draw(ScreenSize(width, height // 2), aspect))
+    if mode in ("sbs", "half-sbs", "cross-eyed"):
+        pair = draw(ScreenSize(width // 2, height), aspect if mode == "half-sbs" else aspect / 2)
+        return np.hstack(pair[::-1] if mode == "cross-eyed" else pair)
+    left, right = draw(size, aspect)
+    if mode == "anaglyph":
+        return anaglyph(left, right)
+    y, x = np.indices((height, width))
+    is_right = {"rows": y, "columns": x, "checkerboard": x + y}[mode] % 2 == 1
+    return np.where(is_right[..., None], right, left)
+
+
+def test_all_arrangements_reach_the_second_monitor(viewer: Driver, display: str) -> None:
+    viewer.app.do(do(stereo.show, True), do(stereo.set_screen, 0.5), do(lens.move_eye, ViewOffset(0.4, 0)))
+    viewer.app.do(do(stereo.set_eyes, 1.5))
+    shown = {}
+    for mode in STEREO_MODES:
+        viewer.app.do(do(stereo.set_mode, mode))
+        viewer.until_idle()
+        shown[mode] = grabbed(display, FIRST.width, SECOND)
+    viewer.app.do(do(stereo.set_mode, "columns"))
+    viewer.send("key", "l")
+    viewer.until(lambda app: app.state.preferences.stereo.is_swapped)
+    viewer.until_idle()
+    swapped = grabbed(display, FIRST.width, SECOND)
+    with eyes_of(viewer) as eyes:
+        for mode, pixels in shown.items():
+            assert psnr(pixels, woven(mode, eyes, SECOND)) >= 45, mode
+        left, right = eyes(SECOND, SECOND.width / SECOND.height)
+    near = [np.nonzero(picture[240, :, 0] > picture[240, :, 1] + 40)[0].mean() for picture in (left, right)]
+    assert near[0] > near[1], "near things are further right in the left eye's picture"
+    assert psnr(swapped[:, ::2], right[:, ::2]) >= 45
+
+
+def test_mouse_and_keys_on_the_second_monitor_count(viewer: Driver) -> None:
+    viewer.app.do(do(stereo.show, True), do(stereo.set_mode, "half-sbs"))
+    viewer.until_idle()
+    viewer.send("mousemove", FIRST.width + 480, 240)
+    viewer.until(lambda app: app.state.hover is not None and abs(app.state.hover.x_px - 48) < 2)
+    viewer.send("mousedown", 1)
+    viewer.app.step()
+    viewer.send("mousemove", FIRST.width + 430, 240)
+    viewer.until(lambda app: app.state.optics.eye.s > 0)
+    viewer.send("mouseup", 1)
+    viewer.until_idle()
+    focus = viewer.app.state.optics.focus_disparity
+    viewer.send("click", 4)
+    viewer.until(lambda app: app.state.optics.focus_disparity > focus)
+    viewer.until_idle()
+    picture = viewer.app.stereo_screen.picture
+    assert picture is not None
+    assert picture.weave.eyes[0].optics.focus_disparity == viewer.app.state.optics.focus_disparity
+    viewer.send("key", "Tab")
+    viewer.until(lambda app: app.state.is_panel_hidden)
+    viewer.send("key", "Escape")
+    viewer.until(lambda app: not app.state.stereo.is_shown)
+    viewer.until_idle()
+    assert viewer.app.stereo_screen.second is None
+
+
+def test_a_monitor_that_goes_closes_the_picture_and_the_window_shows_it_alone(viewer: Driver, display: str) -> None:
+    place = viewer.app.window.place
+    viewer.send("key", "3")
+    viewer.until(lambda app: app.stereo_screen.second is not None)
+    viewer.until_idle()
+    subprocess.run(["xrandr", "--output", "DUMMY1", "--off"], check=True)
+    try:
+        viewer.until(lambda app: not app.state.stereo.is_shown)
+        assert "DUMMY1" in viewer.app.state.notices[-1].text
+        viewer.send("mousemove", 100, 300, "key", "3")
+        viewer.until(lambda app: app.state.stereo.is_shown and app.window.is_fullscreen)
+        viewer.app.do(do(stereo.set_mode, "anaglyph"), do(messages.dismiss))
+        viewer.until_idle()
+        assert viewer.app.state.is_panel_hidden
+        alone = grabbed(display, 0, FIRST)
+        viewer.send("key", "Tab")
+        viewer.until(lambda app: not app.state.is_panel_hidden)
+        viewer.until_idle()
+        under_panel = grabbed(display, 0, FIRST)
+        viewer.send("key", "Escape")
+        viewer.until(lambda app: not app.state.stereo.is_shown and not app.window.is_fullscreen)
+        viewer.until_idle()
+        assert viewer.app.window.place == place
+    finally:
+        subprocess.run(["xrandr", "--output", "DUMMY1", "--mode", "640x480", "--pos", f"{FIRST.width}x0"], check=True)
+    with eyes_of(viewer) as eyes:
+        wanted = woven("anaglyph", eyes, FIRST)
+    assert psnr(alone[:, :-40], wanted[:, :-40]) >= 45, "all but the handle of the panel"
+    assert psnr(under_panel[:, :700], wanted[:, :700]) >= 45, "the panel lies over the picture"
+
+
+def test_monitor_and_arrangement_are_remembered(open_window: Opener, photo_path: Path, tmp_path: Path) -> None:
+    first = open_window(photo_path, tmp_path, grid=GridShape(3, 3))
+    first.until(lambda app: app.state.scene is not None)
+    wanted = first.app.state.monitors[1]
+    assert wanted == Monitor("DUMMY1", FIRST.width, 0, *SECOND)
+    first.app.do(do(stereo.choose_monitor, wanted), do(stereo.set_mode, "rows"), do(stereo.swap_eyes))
+    first.app.step()
+    first.close()
+    kept = load_preferences(AppState(), tmp_path).preferences.stereo
+    assert (kept.mode, kept.is_swapped, kept.monitor) == ("rows", True, wanted)
+    second = open_window(photo_path, tmp_path, grid=GridShape(3, 3))
+    second.app.do(do(stereo.show, True))
+    second.until(lambda app: app.stereo_screen.second is not None)
+    assert second.app.stereo_screen.second is not None
+    assert second.app.stereo_screen.second.monitor == wanted

@@ -1,0 +1,109 @@
+"""The stereo picture: viewpoints of the eyes, parallax on the screen, arrangements, and the choice of a monitor."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from iibr_core.beyond.optics import Optics
+from iibr_core.exports.framing import side_pictures
+from iibr_core.exports.render_settings import RenderSettings
+from iibr_core.scenes.scene import Scene, Source
+from iibr_core.scenes.screen_size import ScreenSize
+from iibr_core.types import GridShape, ViewOffset
+from viewer.app.keys import Keys, actions_from_keys
+from viewer.model import stereo
+from viewer.model.state.app_state import AppState
+from viewer.model.state.stereo import STEREO_MODES, Monitor, Stereo
+
+SCENE = Scene(Source("a.png"), "a", 600, 400, GridShape(3, 9), (-2.0, 4.0), "a.pfm")
+PANEL, TELEVISION = Monitor("eDP-1", 0, 0, 1920, 1080), Monitor("HDMI-1", 1920, 0, 3840, 2160)
+STATE = AppState(scene=SCENE, monitors=(PANEL, TELEVISION))
+
+
+def test_the_eyes_see_what_an_export_of_both_shows() -> None:
+    chosen = Stereo(eyes=3.0, screen=1.5)
+    eyes = stereo.eyes_at(SCENE, Optics(aperture_diameter=2.0), chosen)
+    wanted = side_pictures(SCENE, RenderSettings(Optics(focus_disparity=1.5), ScreenSize(60, 40)), 2, 3.0)
+    assert [eye.optics.eye for eye in eyes] == [each.optics.eye for each in wanted]
+    for eye, picture in zip(eyes, wanted, strict=True):
+        assert eye.part == pytest.approx(picture.part)
+    assert {eye.optics.aperture_diameter for eye in eyes} == {2.0}
+
+
+@pytest.mark.parametrize("count", [2, 45])
+@pytest.mark.parametrize("at", [-4.0, 0.3, 3.9, 99.0])
+def test_all_eyes_stay_within_the_views_and_the_picture(at: float, count: int) -> None:
+    eyes = stereo.eyes_at(SCENE, Optics(eye=ViewOffset(0.5, at)), Stereo(eyes=2.0, screen=4.0), count)
+    places = [eye.optics.eye.s for eye in eyes]
+    assert len(places) == count
+    assert places == sorted(places)
+    assert min(places) >= -4
+    assert max(places) <= 4
+    assert places[-1] - places[0] == pytest.approx(2.0)
+    assert all(eye.part.x >= -1e-9 and eye.part.x + eye.part.width <= 1 + 1e-9 for eye in eyes)
+    # what lies in the plane of the screen stays in place: its disparity times the step, less the shear
+    assert {round(-4.0 * eye.optics.eye.s / 600 - eye.part.x, 9) for eye in eyes} == {
+        round(-4.0 * places[0] / 600 - eyes[0].part.x, 9)
+    }
+
+
+def test_a_comfortable_eye_distance_is_found_and_more_is_warned_of() -> None:
+    usual = Stereo()
+    assert stereo.eye_distance(SCENE, usual) == pytest.approx(0.03 * 600 / 4)
+    assert stereo.warning(SCENE, usual) == ""
+    wide = replace(usual, eyes=8.0)
+    assert stereo.parallax(SCENE, wide) == pytest.approx((-2 * 8 / 600, 4 * 8 / 600))
+    assert stereo.warning(SCENE, wide).startswith("Parallax before the screen is 5.3% of the width")
+    assert stereo.warning(SCENE, replace(wide, screen=4.0)).startswith("Parallax behind the screen")
+    assert stereo.eye_distance(SCENE, replace(usual, eyes=100.0)) == 8.0
+    flat = replace(SCENE, grid=GridShape(1, 1), disparity_range_px=(0.0, 0.0))
+    assert stereo.eye_distance(flat, usual) == 1.0
+    assert stereo.warning(flat, usual) == ""
+
+
+@pytest.mark.parametrize("mode", STEREO_MODES)
+@pytest.mark.parametrize("size", [ScreenSize(1920, 1080), ScreenSize(641, 3), ScreenSize(1, 1)])
+def test_pictures_fit_their_rooms_and_places_lead_back(mode: str, size: ScreenSize) -> None:
+    state = stereo.set_mode(STATE, mode)  # type: ignore[arg-type]
+    weave = stereo.weave_of(state, SCENE, size)
+    assert all(1 <= inner <= room <= whole for inner, room, whole in zip(weave.picture_px, weave.frame_px, size))
+    assert weave.is_swapped == (mode == "cross-eyed")
+    middle = stereo.place_in_photo(weave, weave.frame_px.width / 2, weave.frame_px.height / 2)
+    assert middle == pytest.approx((0.5, 0.5), abs=0.51 / min(weave.picture_px))
+    assert stereo.place_in_photo(weave, 0, 0) == pytest.approx((0, 0), abs=1e-9)
+
+
+def test_the_picture_goes_to_the_chosen_monitor_else_to_the_second_else_to_the_window() -> None:
+    assert stereo.show(STATE, True).stereo.monitor == TELEVISION
+    alone = stereo.show(replace(STATE, monitors=(PANEL,), hides_panel=False), True)
+    assert alone.stereo.is_shown
+    assert (alone.stereo.monitor, alone.is_fullscreen, alone.hides_panel) == (None, True, True)
+    closed = stereo.show(alone, False)
+    assert (closed.stereo.is_shown, closed.is_fullscreen, closed.hides_panel) == (False, False, False)
+    moved = stereo.choose_monitor(stereo.show(STATE, True), PANEL)
+    assert moved.stereo.is_shown
+    assert (moved.stereo.monitor, moved.is_fullscreen) == (None, True)
+    assert stereo.choose_monitor(moved, TELEVISION).is_fullscreen is False
+    third = Monitor("DP-2", 5760, 0, 640, 480)
+    chosen = stereo.choose_monitor(replace(STATE, monitors=(PANEL, TELEVISION, third)), third)
+    assert not chosen.stereo.is_shown
+    assert stereo.show(chosen, True).stereo.monitor == third
+    assert stereo.show(replace(chosen, monitors=STATE.monitors), True).stereo.monitor == TELEVISION
+    assert stereo.show(replace(STATE, monitors=()), True).stereo.monitor is None
+
+
+def test_a_monitor_that_moves_is_followed_and_one_that_goes_closes_the_picture() -> None:
+    shown, moved = stereo.show(STATE, True), replace(TELEVISION, x=1024)
+    assert stereo.set_monitors(shown, (PANEL, moved)).stereo.monitor == moved
+    gone = stereo.set_monitors(shown, (PANEL,))
+    assert not gone.stereo.is_shown
+    assert "HDMI-1" in gone.notices[-1].text
+
+
+def test_the_command_and_escape_close_it() -> None:
+    shown, closed = stereo.show(STATE, True), stereo.show(stereo.show(STATE, True), False)
+    for keys in (Keys(is_escape=True), Keys(commands=("Stereo display",))):
+        (action,) = actions_from_keys(keys, shown)
+        assert action.apply(shown) == closed

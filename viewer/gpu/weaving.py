@@ -1,0 +1,105 @@
+"""Pictures from several viewpoints in one texture, woven into one picture for a screen, and shown in another window."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import moderngl
+
+from iibr_core.exports.anaglyph import LEFT, RIGHT
+from iibr_core.scenes.screen_size import ScreenSize
+from viewer.gpu.context import GLContext, create_for_window
+from viewer.gpu.programs import Program, ProgramCache
+from viewer.gpu.render_targets import RenderTarget
+from viewer.model.state.stereo import StereoMode, Weave
+
+SWITCHES: dict[StereoMode, str] = {
+    **dict.fromkeys(("sbs", "half-sbs", "cross-eyed"), "BESIDE"),
+    "top-bottom": "ABOVE",
+    "rows": "ROWS",
+    "columns": "COLUMNS",
+    "checkerboard": "CHECKERBOARD",
+    "anaglyph": "ANAGLYPH",
+}
+"""Switch of shaders/stereo.frag for each mode."""
+
+
+class Weaver:
+    """Holds the sheet of pictures and the woven picture. screen: the woven picture, rows bottom-up."""
+
+    def __init__(self, ctx: moderngl.Context, programs: ProgramCache) -> None:
+        self._ctx, self._programs = ctx, programs
+        self._sheet: RenderTarget | None = None
+        self.screen: RenderTarget | None = None
+        self._tile_px, self._columns = ScreenSize(1, 1), 1
+
+    def prepare(self, weave: Weave) -> None:
+        """Make room for the pictures and the screen of a weave."""
+        self._columns = math.ceil(math.sqrt(len(weave.eyes)))
+        self._tile_px = width, height = weave.picture_px
+        rows = math.ceil(len(weave.eyes) / self._columns)
+        self._sheet = self._sized(self._sheet, ScreenSize(self._columns * width, rows * height))
+        self.screen = self._sized(self.screen, weave.size_px)
+
+    def tile(self, index: int, drawn_px: ScreenSize) -> moderngl.Framebuffer:
+        """Return the framebuffer of the sheet, with the part in view that a picture of this size takes."""
+        assert self._sheet is not None
+        row, column = divmod(index, self._columns)
+        framebuffer: Any = self._sheet.framebuffer
+        framebuffer.viewport = column * self._tile_px.width, row * self._tile_px.height, *drawn_px
+        return framebuffer
+
+    def weave(self, weave: Weave, drawn_px: ScreenSize) -> None:
+        """Weave the pictures, which were drawn at this size."""
+        assert self._sheet is not None
+        assert self.screen is not None
+        program = self._program(weave)
+        self._sheet.texture.use(0)
+        program.set_uniforms(sheet=0, sheet_columns=self._columns, tile_px=self._tile_px, drawn_px=drawn_px)
+        program.set_uniforms(screen_px=weave.size_px)
+        self.screen.framebuffer.use()
+        self._ctx.disable(moderngl.DEPTH_TEST | moderngl.CULL_FACE | moderngl.BLEND)
+        program.draw()
+
+    def release(self) -> None:
+        """Free the textures."""
+        for target in (self._sheet, self.screen):
+            if target is not None:
+                target.release()
+        self._sheet = self.screen = None
+
+    def _program(self, weave: Weave) -> Program:
+        """Return the weaving program, its uniforms set."""
+        program = self._programs.get("stereo.frag", {SWITCHES[weave.mode]: True})
+        program.set_uniforms(frame_px=weave.frame_px, picture_px=weave.picture_px, first_eye=int(weave.is_swapped))
+        seen = (tuple(matrix.T.ravel().tolist()) for matrix in (LEFT, RIGHT))
+        program.set_uniforms(**dict(zip(("left_seen", "right_seen"), seen)))
+        return program
+
+    def _sized(self, target: RenderTarget | None, size_px: ScreenSize) -> RenderTarget:
+        if target is not None and target.size_px == size_px:
+            return target
+        if target is not None:
+            target.release()
+        return RenderTarget(self._ctx, size_px, "f1")
+
+
+class TextureScreen:
+    """Shows a texture in a window whose context shares the objects of the texture's context."""
+
+    def __init__(self, window: Any) -> None:
+        """Make the window's context current. Raises InputError."""
+        self._gl: GLContext = create_for_window(window)
+
+    def show(self, texture: int, size_px: ScreenSize) -> None:
+        """Copy the texture (RGBA8) onto the window, whose context is current."""
+        ctx = self._gl.ctx
+        picture = ctx.external_texture(texture, size_px, 4, 0, "f1")
+        framebuffer = ctx.framebuffer([picture])
+        ctx.copy_framebuffer(ctx.screen, framebuffer)
+        framebuffer.release()
+
+    def release(self) -> None:
+        """Free the context."""
+        self._gl.release()

@@ -1,0 +1,189 @@
+"""Verbs of the stereo picture; viewpoints, shears and arrangement of its pictures."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from iibr_core.beyond.optics import Optics
+from iibr_core.exports.framing import size_in_frame
+from iibr_core.scenes.lens_limits import clamp, eye_limits
+from iibr_core.scenes.rect import Rect
+from iibr_core.scenes.scene import Scene
+from iibr_core.scenes.screen_size import ScreenSize
+from iibr_core.types import ViewOffset
+from viewer.model.messages import notify
+from viewer.model.state.app_state import AppState
+from viewer.model.state.notices import Notice
+from viewer.model.state.stereo import Eye, Monitor, Stereo, StereoMode, Weave
+
+MAX_PARALLAX = 0.03
+"""Largest parallax that eyes bear, as a share of the picture's width."""
+MAX_MARGIN = 0.3
+"""Largest share of the width that the shear may crop at each side."""
+BESIDE: tuple[StereoMode, ...] = ("sbs", "half-sbs", "cross-eyed")
+"""Modes with the eyes' pictures side by side."""
+
+# Verbs
+
+
+def show(state: AppState, is_shown: bool) -> AppState:
+    """Show the stereo picture on its monitor, or close it. On the window's monitor, the window shows it."""
+    state, monitor = _closed(state), monitor_of(state)
+    if not is_shown:
+        return state
+    before = state.is_fullscreen, state.hides_panel
+    if monitor is None or monitor == state.monitors[0]:
+        state, monitor = replace(state, is_fullscreen=True, hides_panel=True), None
+    return replace(state, stereo=replace(state.stereo, is_shown=True, monitor=monitor, before=before))
+
+
+def monitor_of(state: AppState) -> Monitor | None:
+    """Return the monitor of the preferences if it is connected, else one beside the window's; None without any."""
+    usual = next(iter(state.monitors[1:2] or state.monitors), None)
+    return _same(state.preferences.stereo.monitor, state.monitors) or usual
+
+
+def choose_monitor(state: AppState, monitor: Monitor) -> AppState:
+    """Choose the monitor; a stereo picture that is shown moves there."""
+    chosen = replace(state.preferences.stereo, monitor=monitor)
+    state = replace(state, preferences=replace(state.preferences, stereo=chosen))
+    return show(state, True) if state.stereo.is_shown else state
+
+
+def set_monitors(state: AppState, monitors: tuple[Monitor, ...]) -> AppState:
+    """Note the connected monitors, the window's first. A stereo picture on another monitor that is gone is closed."""
+    shown = state.stereo.monitor
+    state = replace(state, monitors=monitors)
+    if not state.stereo.is_shown or shown is None or shown in monitors:
+        return state
+    if (moved := _same(shown, monitors)) is not None:
+        return replace(state, stereo=replace(state.stereo, monitor=moved))
+    words = f"The monitor {shown.name} is no longer there, so its stereo picture was closed."
+    return notify(_closed(state), Notice(words))
+
+
+def set_mode(state: AppState, mode: StereoMode) -> AppState:
+    """Arrange the pictures of both eyes in this way."""
+    chosen = replace(state.preferences.stereo, mode=mode)
+    return replace(state, preferences=replace(state.preferences, stereo=chosen))
+
+
+def swap_eyes(state: AppState) -> AppState:
+    """Give each eye the picture of the other."""
+    chosen = replace(state.preferences.stereo, is_swapped=not state.preferences.stereo.is_swapped)
+    return replace(state, preferences=replace(state.preferences, stereo=chosen))
+
+
+def set_eyes(state: AppState, eyes: float) -> AppState:
+    """Set the distance of the eyes, in view steps."""
+    return replace(state, stereo=replace(state.stereo, eyes=max(eyes, 0.0)))
+
+
+def set_screen(state: AppState, disparity: float) -> AppState:
+    """Set the disparity that lies in the plane of the screen."""
+    return replace(state, stereo=replace(state.stereo, screen=disparity))
+
+
+def _same(monitor: Monitor | None, among: tuple[Monitor, ...]) -> Monitor | None:
+    """Return the monitor if it is connected, else one of its name."""
+    named = [other for other in among if monitor is not None and other.name == monitor.name]
+    return monitor if monitor in among else next(iter(named), None)
+
+
+def _closed(state: AppState) -> AppState:
+    if not state.stereo.is_shown:
+        return state
+    closed = replace(state, stereo=replace(state.stereo, is_shown=False))
+    if state.stereo.monitor is not None:
+        return closed
+    return replace(closed, is_fullscreen=state.stereo.before[0], hides_panel=state.stereo.before[1])
+
+
+# Numbers
+
+
+def eye_distance_limit(scene: Scene) -> float:
+    """Return the largest distance of the eyes in view steps: from the first column of views to the last."""
+    low, high = eye_limits(scene.grid.columns)
+    return high - low
+
+
+def eye_distance(scene: Scene, stereo: Stereo) -> float:
+    """Return the distance of the eyes in view steps: the chosen one, else the largest that eyes bear."""
+    limit = eye_distance_limit(scene)
+    if stereo.eyes is not None:
+        return clamp(stereo.eyes, 0.0, limit)
+    farthest = max(abs(edge - screen_plane(scene, stereo)) for edge in scene.disparity_range_px)
+    return clamp(MAX_PARALLAX * scene.width / max(farthest, 1e-6), 0.0, limit)
+
+
+def screen_plane(scene: Scene, stereo: Stereo) -> float:
+    """Return the disparity in the plane of the screen: the chosen one, within the scene."""
+    return clamp(stereo.screen, *scene.disparity_range_px)
+
+
+def parallax(scene: Scene, stereo: Stereo) -> tuple[float, float]:
+    """Return the parallax of the farthest and of the nearest surface as shares of the picture's width; positive values
+    lie before the screen.
+    """
+    eyes = eyes_at(scene, Optics(), stereo)
+    moved = eye_distance(scene, stereo) / (scene.width * eyes[0].part.width)
+    far, near = ((edge - screen_plane(scene, stereo)) * moved for edge in scene.disparity_range_px)
+    return far, near
+
+
+def warning(scene: Scene, stereo: Stereo) -> str:
+    """Return words about parallax that eyes do not bear, "" without."""
+    far, near = parallax(scene, stereo)
+    place, worst = ("before", near) if near >= -far else ("behind", -far)
+    if worst <= MAX_PARALLAX:
+        return ""
+    return (
+        f"Parallax {place} the screen is {worst:.1%} of the width, and eyes bear {MAX_PARALLAX:.0%}: reduce the eye"
+        f" distance, or move the screen {'nearer' if place == 'before' else 'farther'}."
+    )
+
+
+def eyes_at(scene: Scene, optics: Optics, stereo: Stereo, count: int = 2) -> tuple[Eye, ...]:
+    """Return `count` pictures, the leftmost first, about the viewpoint or as near to it as the views reach.
+
+    They are sheared, so that the plane of the screen stays in place, and all are cropped by the largest shear.
+    """
+    span, (first, last) = eye_distance(scene, stereo), eye_limits(scene.grid.columns)
+    middle = clamp(optics.eye.s, first + span / 2, last - span / 2)
+    moved = clamp(screen_plane(scene, stereo) * span / scene.width, -2 * MAX_MARGIN, 2 * MAX_MARGIN)
+    margin = abs(moved) / 2
+    return tuple(
+        Eye(
+            replace(optics, eye=ViewOffset(optics.eye.t, middle + span * aside)),
+            Rect(margin - moved * aside, 0.0, 1 - 2 * margin, 1.0),
+        )
+        for aside in map(float, np.linspace(-0.5, 0.5, count))
+    )
+
+
+def weave_of(state: AppState, scene: Scene, size_px: ScreenSize) -> Weave:
+    """Return the pictures of both eyes, and their arrangement on a screen of this size."""
+    choice, eyes = state.preferences.stereo, eyes_at(scene, state.shown_optics, state.stereo)
+    width, height = size_px
+    frame = ScreenSize(
+        max(width // 2, 1) if choice.mode in BESIDE else width,
+        max(height // 2, 1) if choice.mode == "top-bottom" else height,
+    )
+    is_full = choice.mode in ("sbs", "cross-eyed")
+    aspect = frame.width / frame.height if is_full else width / height
+    picture = size_in_frame(scene, frame, eyes[0].part, aspect)
+    is_swapped = choice.is_swapped != (choice.mode == "cross-eyed")
+    return Weave(eyes, choice.mode, size_px, frame, picture, is_swapped)
+
+
+def place_in_photo(weave: Weave, x_px: float, y_px: float) -> tuple[float, float]:
+    """Return the place in the middle viewpoint's picture, as shares of its size, under a pixel of the woven screen."""
+    x, y = x_px % weave.frame_px.width, y_px % weave.frame_px.height
+    room = weave.frame_px.width - weave.picture_px.width, weave.frame_px.height - weave.picture_px.height
+    across, down = (x - room[0] // 2) / weave.picture_px.width, (y - room[1] // 2) / weave.picture_px.height
+    left, right = weave.eyes[0].part, weave.eyes[-1].part
+    part = left._replace(x=(left.x + right.x) / 2)
+    return part.x + part.width * clamp(across, 0.0, 1.0), part.y + part.height * clamp(down, 0.0, 1.0)

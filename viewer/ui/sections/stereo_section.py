@@ -1,0 +1,50 @@
+"""The panel's section for the stereo picture: display, arrangement, distance of the eyes, and plane of the screen."""
+
+from __future__ import annotations
+
+from imgui_bundle import imgui
+
+from iibr_core.scenes.scene import Scene
+from viewer.model import stereo
+from viewer.model.action import Action, do
+from viewer.model.commands import STEREO_WORDS
+from viewer.model.state.app_state import AppState
+from viewer.model.state.stereo import STEREO_MODES
+from viewer.ui.style import palette_of
+from viewer.ui.widgets import button, checkbox, colored, combo, edit, label, slider
+
+MONITOR_TIP = "Display that shows the stereo picture, full screen."
+WINDOW, WINDOW_TIP = "This window", "The window itself shows the picture, full screen; Tab shows the panel over it."
+MODE_TIP = "Arrangement of both eyes' pictures that the display or the glasses expect."
+EYES_TIP = "Distance of the eyes in view steps. A larger distance gives more depth."
+SCREEN_TIP = "Disparity of what lies in the plane of the screen. Nearer things stand before it."
+SHOW_TIP = "Show the stereo picture (3). Esc closes it."
+FOCUS_TIP = "Put what is in focus into the plane of the screen."
+SWAP_TIP = "Give each eye the picture of the other (L)."
+
+
+def stereo_section(state: AppState, scene: Scene) -> list[Action]:
+    """Build the section."""
+    shown, choice = state.stereo, state.preferences.stereo
+    label("Display", MONITOR_TIP)
+    wanted = stereo.monitor_of(state)
+    entries = [(monitor.words, WINDOW_TIP if i == 0 else "") for i, monitor in enumerate(state.monitors)]
+    picked = combo("Display", wanted.words if wanted else WINDOW, entries, MONITOR_TIP)
+    actions = [] if picked is None else [do(stereo.choose_monitor, state.monitors[picked])]
+    label("Arrangement", MODE_TIP)
+    picked = combo("Arrangement", STEREO_WORDS[choice.mode][0], [STEREO_WORDS[mode] for mode in STEREO_MODES], MODE_TIP)
+    actions += [] if picked is None else [do(stereo.set_mode, STEREO_MODES[picked])]
+    eyes, plane = stereo.eye_distance(scene, shown), stereo.screen_plane(scene, shown)
+    limits = 0.0, stereo.eye_distance_limit(scene)
+    actions += edit(stereo.set_eyes, eyes, slider("Eye distance", eyes, limits, "%.2f views", EYES_TIP))
+    edited = slider("Screen plane", plane, scene.disparity_range_px, "%.2f px", SCREEN_TIP)
+    actions += edit(stereo.set_screen, plane, edited)
+    if warning := stereo.warning(scene, shown):
+        colored(warning, imgui.ImVec4(*palette_of(state.preferences.theme).warning))
+    swaps = checkbox("Swap the eyes", choice.is_swapped, SWAP_TIP) != choice.is_swapped
+    actions += [do(stereo.swap_eyes)] if swaps else []
+    if button("Focus on the screen", FOCUS_TIP, state.optics.focus_disparity != plane):
+        actions.append(do(stereo.set_screen, state.optics.focus_disparity))
+    imgui.same_line()
+    word = "Close" if shown.is_shown else "Show"
+    return actions + ([do(stereo.show, not shown.is_shown)] if button(f"{word}###show stereo", SHOW_TIP) else [])
