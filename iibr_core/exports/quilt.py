@@ -9,6 +9,9 @@ from pathlib import Path
 from typing import Any
 from urllib.request import ProxyHandler, Request, build_opener
 
+import numpy as np
+from numpy.typing import NDArray
+
 from iibr_core.beyond.optics import Optics
 from iibr_core.exports.framing import draw_framed, side_pictures
 from iibr_core.exports.kinds import ExportOptions
@@ -35,19 +38,31 @@ def quilt_path(path: Path, scene: Scene, options: ExportOptions) -> Path:
 
 def optics_of_quilt(scene: Scene, optics: Optics, options: ExportOptions) -> list[Optics]:
     """Return the optics of its views, the leftmost first."""
-    tile, count = RenderSettings(optics, options.size), _quilt_of(scene, options.device).views
-    return [picture.optics for picture in side_pictures(scene, tile, count, options.eyes)]
+    return [each.optics for each in quilt_pictures(scene, optics, _quilt_of(scene, options.device), options.eyes)]
 
 
 def write_quilt(path: Path, source: ExportSource, options: ExportOptions) -> str | None:
     """Write a quilt and show it if that is asked for; return a sentence about the display."""
     bridge = Bridge() if options.show else None  # a missing display is reported before anything is drawn
     quilt = _quilt_of(source.scene, options.device)
-    tile = RenderSettings(source.optics, ScreenSize(quilt.tile.width, quilt.tile.height))
-    pictures = side_pictures(source.scene, tile, quilt.views, options.eyes)
-    drawn = (draw_framed(source, picture, quilt.aspect) for picture in pictures)
-    source.write_picture(path, lay_out(quilt, source.watched(drawn, quilt.views, "drawing views")))
+    source.write_picture(path, draw_quilt(source, quilt, options.eyes))
     return bridge.show_quilt(path, quilt) if bridge is not None else None
+
+
+def quilt_pictures(scene: Scene, optics: Optics, quilt: Quilt, span_views: float | None = None) -> list[RenderSettings]:
+    """Return the settings of the views of a quilt, the leftmost first.
+
+    span_views: view steps from the first viewpoint to the last, None for those of the scene.
+    """
+    tile = RenderSettings(optics, ScreenSize(quilt.tile.width, quilt.tile.height))
+    return side_pictures(scene, tile, quilt.views, scene.grid.columns - 1 if span_views is None else span_views)
+
+
+def draw_quilt(source: ExportSource, quilt: Quilt, span_views: float | None = None) -> NDArray[np.uint8]:
+    """Return the picture (H, W, 3) of a quilt. span_views: see `quilt_pictures`."""
+    pictures = quilt_pictures(source.scene, source.optics, quilt, span_views)
+    drawn = (draw_framed(source, picture, quilt.aspect) for picture in pictures)
+    return lay_out(quilt, source.watched(drawn, quilt.views, "drawing views"))
 
 
 def _quilt_of(scene: Scene, device: str | None) -> Quilt:

@@ -72,6 +72,15 @@ DEVICES = {
     "65": Quilt(8, 9, ImageSize(8192, 8192), 1.777),
 }
 """Recommended quilts of Looking Glass displays, by the names of the displays."""
+SCREENS = {
+    ImageSize(2560, 1440): "go",
+    ImageSize(2048, 1536): "portrait",
+    ImageSize(2160, 3840): "16-landscape",
+    ImageSize(3840, 2160): "16-portrait",
+    ImageSize(4320, 7680): "32-landscape",
+    ImageSize(7680, 4320): "32-portrait",
+}
+"""Names of displays by the size of their screens; the 65 inch one has that of 32 inches, and shows its quilt."""
 
 
 def quilt_named(path: Path, size: ImageSize) -> Quilt | None:

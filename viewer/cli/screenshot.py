@@ -12,11 +12,13 @@ import typer
 from iibr_core.beyond.optics import Optics
 from iibr_core.depth.editing.edits import UNEDITED
 from iibr_core.exports.full_picture import require_full
+from iibr_core.exports.quilt import quilt_pictures
 from iibr_core.formats.images.picture_kinds import AS_USUAL, BEST_QUALITY, KINDS, PROFILES, PictureFormat, is_float
+from iibr_core.formats.lenticular import Calibration, read_calibration
 from iibr_core.scenes.lens_limits import LensChoice
 from iibr_core.scenes.scene import Scene
 from iibr_core.scenes.screen_size import ScreenSize
-from iibr_core.types import ImageSize, InputError
+from iibr_core.types import SRGB, ImageSize, InputError
 from viewer.app.picture_files import export_picture, require_picture_place, shot_of
 from viewer.cli import options as shared
 from viewer.cli.messages import print_notes, show_progress
@@ -28,6 +30,10 @@ from viewer.model.state.saving import SavedSettings
 
 if TYPE_CHECKING:
     from viewer.display.offscreen import OffscreenScene
+
+SET_BY_DISPLAY = {"size", "full", "bits", "picture_quality", "profile"}
+"""Options that a display's screen leaves no choice about."""
+LOSSLESS = ".png", ".tif", ".tiff"
 
 
 @dataclass(frozen=True)
@@ -71,6 +77,9 @@ def screenshot(
         option("Size of the picture in pixels.", "WxH", "that of a view", parser=shared.size_from_text),
     ] = None,
     full: Annotated[bool, flag("--full", "Draw at the photo's own size, from all its pixels.")] = False,
+    calibration: Annotated[
+        Path | None, option("Calibration of a Looking Glass display (visual.json): draw what its screen shows.", "FILE")
+    ] = None,
     file: FileOptions,
     backend: Annotated[Literal["auto", "egl", "osmesa"], option("Source of OpenGL.")] = "auto",
     scene: shared.SceneOptions,
@@ -88,6 +97,8 @@ def screenshot(
     shared.require_heeded(context, path)
     if full and size is not None:
         raise InputError("--full sets the size of the picture: leave out --size")
+    display = _display(context, calibration, output)
+    form = file.format if display is None else PictureFormat(color_space=SRGB, keeps_position=file.gps)
     settings, note = None, ""
     if like is not None:
         from viewer.model import saved_settings
@@ -99,7 +110,8 @@ def screenshot(
         source = saved_settings.source_like(source, settings, given)
         depth_strength = depth_strength if "depth_strength" in given else settings.depth_strength
         note = saved_settings.left_out_note(settings)
-    require_picture_place(output, size, shared.inputs_of_command(context, source), force, file.format)
+    size = size if display is None else ScreenSize(display.screen.width, display.screen.height)
+    require_picture_place(output, size, shared.inputs_of_command(context, source), force, form)
     shared.require_source(source)
     choice = lens.choice()
     from iibr_core.formats.images.photo import smaller_note
@@ -110,21 +122,36 @@ def screenshot(
         def set_lens(opened: Scene) -> Collection[Optics]:
             lens.require_within(opened)
             viewer.state = _with_lens(viewer.state, settings, choice)
+            if display is not None:
+                return [each.optics for each in quilt_pictures(opened, viewer.state.optics, display.quilt)]
             return () if viewer.draws_own_pixels(_size_of(viewer, size, full)) else (viewer.state.optics,)
 
         with show_progress("reading"):
             opened = viewer.open(source, depth_strength, settings.depth_edits if settings else UNEDITED, set_lens)
         size = _size_of(viewer, size, full)
-        shot = shot_of(viewer.state, size or opened.size, file.format)
+        shot = shot_of(viewer.state, size or opened.size, form)
         with show_progress("drawing"):
-            pixels = viewer.picture(size, is_float(output, file.format), shot.color_space)
-        optics, draws_own = viewer.state.optics, viewer.draws_own_pixels(size)
+            if display is not None:
+                pixels = viewer.woven_picture(display)
+            else:
+                pixels = viewer.picture(size, is_float(output, form), shot.color_space)
+        optics, draws_own = viewer.state.optics, display is None and viewer.draws_own_pixels(size)
     export_picture(output, pixels, shot)
     print(output)
     own_size, view_size = (ImageSize(size.height, size.width) for size in (opened.own_size or opened.size, opened.size))
     unimportant = smaller_note(own_size, view_size) if draws_own else ""
     notes = (each for each in opened.notes if each != unimportant)
     print_notes(note, *notes, *lens.notes(optics), origin=opened.depth_origin)
+
+
+def _display(context: typer.Context, calibration: Path | None, output: Path) -> Calibration | None:
+    """Return the display whose screen is drawn, None without one."""
+    if calibration is None:
+        return None
+    shared.require_not_given(context, SET_BY_DISPLAY, "the screen of --calibration sets size and colours")
+    if output.suffix.lower() not in LOSSLESS:
+        raise InputError(f"{output}: each subpixel belongs to a view of its own; save them as {' or '.join(LOSSLESS)}")
+    return read_calibration(calibration)
 
 
 def _with_lens(state: AppState, settings: SavedSettings | None, choice: LensChoice) -> AppState:

@@ -19,8 +19,10 @@ from iibr_core.color import linear_from_srgb
 from iibr_core.depth.editing.edits import UNEDITED, DepthEdits
 from iibr_core.exports.framing import centred, size_in_frame
 from iibr_core.exports.full_picture import is_full
+from iibr_core.exports.quilt import draw_quilt
 from iibr_core.exports.render_settings import RenderSettings, require_size
 from iibr_core.exports.source import ExportSource, OpticsOf
+from iibr_core.formats.lenticular import Calibration
 from iibr_core.gloss.settings import Gloss
 from iibr_core.runtime.work import report_progress
 from iibr_core.scenes.lens_limits import LensChoice
@@ -33,6 +35,7 @@ from viewer.background.maps import Entropy, EntropyWork
 from viewer.display.inspection_view import InspectionView
 from viewer.display.scene_view import SceneView
 from viewer.gpu.context import Backend, create_headless
+from viewer.gpu.lenticular import weave
 from viewer.gpu.refocus.views_seen import views_seen_by
 from viewer.model import opening, window
 from viewer.model.action import Action, do
@@ -177,6 +180,15 @@ class OffscreenScene(ExitStack):
             pixels = self.draw(settings)
         background = np.array(BACKGROUND[:3])
         return centred(pixels, frame, linear_from_srgb(background) if is_linear else np.round(background * 255))
+
+    def woven_picture(self, display: Calibration) -> NDArray[np.uint8]:
+        """Return the picture for a lenticular display, (height, width, 3), at the size of its screen.
+
+        Raises InputError if the graphics driver cannot hold it.
+        """
+        source = ExportSource(self.scene, self.view.loaded, self.state.optics, self.draw, self.view.centre)
+        quilt, programs = display.quilt, self.view.renderer.programs
+        return weave(self.gl.ctx, programs, draw_quilt(source, quilt), quilt, display)
 
     def screen(self, size: ScreenSize) -> NDArray[np.uint8]:
         """Return the whole window of this size, (height, width, 3). Not for OSMesa, in which ImGui finds no OpenGL."""

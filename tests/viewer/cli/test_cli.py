@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import subprocess
@@ -189,6 +190,19 @@ def test_like_repeats_a_saved_picture_except_for_given_options(
     output_of(iibr("screenshot", photo_path, "--like", first, "--aperture", 0, "-o", other))
     assert read_photo(other).size == (100, 150)
     assert (read_photo(other).pixels != read_photo(first).pixels).any()
+
+
+def test_a_screenshot_is_woven_for_a_display(iibr: Iibr, photo_path: Path, tmp_path: Path) -> None:
+    values = {"pitch": 50, "slope": -7, "center": 0.2, "DPI": 300, "screenW": 90, "screenH": 120, "invView": 1}
+    (tmp_path / "visual.json").write_text(json.dumps({key: {"value": value} for key, value in values.items()}))
+    words = ("screenshot", photo_path, "--grid", 3, "--calibration", tmp_path / "visual.json")
+    output_of(iibr(*words, "-o", tmp_path / "woven.png"))
+    woven = read_photo(tmp_path / "woven.png").pixels
+    assert woven.shape == (120, 90, 3)
+    top = (120 - round(90 * HEIGHT / WIDTH)) // 2
+    assert not woven[: top - 1].any(), "the photo is broader than the screen"
+    green, blue = woven[..., 1], woven[..., 2]  # equal in the photo, hence in every view
+    assert (np.abs(green - blue) > 0.1).any(), "the subpixels of a pixel belong to different views"
 
 
 def test_values_beyond_the_scene_are_refused_or_limited_with_a_note(
