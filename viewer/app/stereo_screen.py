@@ -89,7 +89,7 @@ class StereoScreen:
         if self.second is not None:
             self.second.close()
             self.second = None
-        self.view.close()
+        self.view.release()
 
 
 def place_in_window(weave: Weave, layout: Layout, x_px: float, y_px: float) -> tuple[float, float]:

@@ -11,6 +11,7 @@ from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
+import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
@@ -39,27 +40,28 @@ class Renderer:
 
     field: None before the first. passes_shown: number of passes of the best picture on the screen, 0 for a softer
     picture. samples, samples_converged, draw_s: cameras of the last picture so far and in all, and the time of the
-    last drawing in seconds.
+    last drawing in seconds. level: index of the last picture's quality level.
     """
 
-    def __init__(self, gl: GLContext) -> None:
-        self.gl, self.ctx = gl, gl.ctx
+    def __init__(self, gl: GLContext, shared: Renderer | None = None) -> None:
+        """shared: renderer whose programs and field this one draws with; pictures are then written by `present`."""
+        self.gl, self.ctx, self._shares = gl, gl.ctx, shared
         self.field: LightFieldTexture | None = None
         self.passes_shown = self.samples = self.samples_converged = 0
         self.draw_s = 0.0
-        self.programs = ProgramCache(self.ctx)
+        self.programs = shared.programs if shared else ProgramCache(self.ctx)
         self._accumulator = Accumulator(self.ctx, self.programs)
         self._fallback_view: LightFieldTexture | None = None
         self._targets = TargetCache(self.ctx)
         self._accumulation: ProgressiveAccumulation | None = None
-        self._shown_from_pass = self._level = 0
+        self._shown_from_pass = self.level = 0
         self._frame_time = FrameTimeModel(gl.seconds_per_fetch)
         self._refining_s = 4 * gl.seconds_per_fetch
 
     @property
     def drawn_field(self) -> LightFieldTexture:
         """The field that is drawn, or the view in its place. Raises ValueError before the first."""
-        return self._fallback_view or self._loaded
+        return self._shares.drawn_field if self._shares else self._fallback_view or self._loaded
 
     @property
     def _loaded(self) -> LightFieldTexture:
@@ -132,23 +134,27 @@ class Renderer:
         self._draw(math.inf, passes=1)
         self._finish()
 
-    def render_in_time(self, optics: Optics, size_px: ScreenSize, budget_s: float, part: Rect = WHOLE) -> None:
+    def render_in_time(
+        self, optics: Optics, size_px: ScreenSize, budget_s: float, part: Rect = WHOLE, level: int | None = None
+    ) -> None:
         """Draw a picture as well as the time is expected to allow; `refine` then makes it better.
 
-        The image may be smaller than size_px. part: part of the picture, stretched to size_px.
+        The image may be smaller than size_px. part: part of the picture, stretched to size_px. level: index of the
+        quality level, None to choose it.
         """
         start, programs = time.perf_counter(), len(self.programs)
         fetches = partial(self._fetches, optics, size_px, part)
-        self._level = choose_quality_level(fetches, self._frame_time, budget_s, self._level)
-        level = QUALITY_LEVELS[self._level]
-        self.render(optics, scale_size(size_px, level.scale), level, part)
+        if level is None:
+            level = choose_quality_level(fetches, self._frame_time, budget_s, self.level)
+        self.level, quality = level, QUALITY_LEVELS[level]
+        self.render(optics, scale_size(size_px, quality.scale), quality, part)
         self.ctx.finish()
         seconds = time.perf_counter() - start
         if len(self.programs) == programs:  # compiling says nothing about drawing
-            self._frame_time.learn(fetches(level), seconds)
+            self._frame_time.learn(fetches(quality), seconds)
         drawn = self._current
         self._refining_s = seconds / max(drawn.done, 1) / math.prod(drawn.size_px)
-        if level != BEST_QUALITY:
+        if quality != BEST_QUALITY:
             self._accumulation = self._accumulation_of(optics, size_px, BEST_QUALITY, part)
             self.passes_shown = 0
         self._report(drawn.done, seconds)
@@ -230,6 +236,15 @@ class Renderer:
         """GL name of the shown image (RGBA8, rows bottom-up). Another picture may change it."""
         return self._shown.image.texture.glo
 
+    def present(self, framebuffer: moderngl.Framebuffer) -> None:
+        """Write the shown image into the viewport of a framebuffer, which has the size `shown_px`."""
+        self._accumulator.passes.present(self._current.lens, self._shown, into=framebuffer)
+
+    @property
+    def shown_px(self) -> ScreenSize:
+        """Size of the shown image."""
+        return self._shown.size_px
+
     def read_image(self) -> NDArray[np.uint8]:
         """Return the picture (H, W, 3), sRGB-encoded, row 0 at the top; stretched if it was drawn smaller."""
         image, size_px = self._shown.image.read(), self._shown.size_px
@@ -244,7 +259,8 @@ class Renderer:
 
     def release(self) -> None:
         """Free every GL object."""
-        self.programs.release()
+        if self._shares is None:
+            self.programs.release()
         self._accumulator.release()
         self._targets.release()
         for field in (self.field, self._fallback_view):
@@ -281,7 +297,8 @@ class Renderer:
 
     def _finish(self) -> None:
         self._targets.shown = targets = self._targets.get(self._current.size_px)
-        self._accumulator.passes.present(self._current.lens, targets)
+        if self._shares is None:
+            self._accumulator.passes.present(self._current.lens, targets)
         self.passes_shown = self._current.pass_index
 
     def _fetches(self, optics: Optics, size_px: ScreenSize, part: Rect, level: QualityLevel) -> float:
