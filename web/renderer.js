@@ -11,7 +11,7 @@ export const hash = (place) => `${place.t},${place.s}`;
 export const rounded = (x) => (x % 1 === 0.5 ? 2 * Math.round(x / 2) : Math.round(x));  // halves to even, as in Python
 
 const sumOf = (weighted) => weighted.reduce((sum, one) => sum + one.weight, 0);
-const fraction = (number, step) => (number * step + 0.5) % 1;
+export const fraction = (number, step) => (number * step + 0.5) % 1;
 
 // ---- Where in the aperture the cameras of a picture lie: see aperture_sampling.py. The aperture is a disc.
 
@@ -73,7 +73,7 @@ export function aperturePoints(diameter, widest, count, passIndex, cell = 0) {
 // { t, s, view, weight }: a camera's place from the eye, the view that answers it, and how much it counts.
 
 // The first and the last offset along an axis of so many views, of those that are there.
-const ends = (count, step) => [-(count >> 1), count - 1 - (count >> 1)].map((end) => Math.trunc(end / step) * step);
+export const ends = (count, step) => [-(count >> 1), count - 1 - (count >> 1)].map((end) => Math.trunc(end / step) * step);
 
 // The views before and after a place along an axis, and their shares, without those of 0.
 function bracket(x, count, step) {
@@ -295,17 +295,18 @@ export class Renderer {
     }
 
     // Draws with the program of a shader and its switches. values, textures: see Program.use.
-    draw(fragment, switches, { framebuffer, width, height }, values, textures) {
+    draw(fragment, switches, { framebuffer, x = 0, y = 0, width, height }, values, textures) {
         const { gl, shaders } = this, names = switches.filter(Boolean), key = [fragment, ...names].join(" ");
         if (!this.programs.has(key)) {
             const defines = names.map((name) => `#define ${name} 1\n`).join("");
-            const source = (name) => shaders.preamble + defines + shaders[name];
-            this.programs.set(key, new Program(gl, source("fullscreen.vert"), source(fragment), key));
+            const source = (name) => shaders["preamble.glsl"] + defines + shaders[name];
+            const vertex = fragment === "window.frag" ? "window.vert" : "fullscreen.vert";
+            this.programs.set(key, new Program(gl, source(vertex), source(fragment), key));
         }
         gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);
-        gl.viewport(0, 0, width, height);
+        gl.viewport(x, y, width, height);
         this.programs.get(key).use(values, textures);
-        gl.drawArrays(gl.TRIANGLES, 0, 3);
+        gl.drawArrays(gl.TRIANGLE_STRIP, 0, 4);  // the fourth corner of fullscreen.vert lies outside
     }
 
     // ---- Pictures: summed up in passes, as accumulation.py and passes.py have it
@@ -328,44 +329,55 @@ export class Renderer {
 
     // Draws the next pass, and shows what there is.
     step() {
-        const { gl, picture, field } = this, { lens, pass } = picture, samples = samplesOf(lens, field, pass);
+        const { picture: { lens, pass }, field } = this;
+        this.pass(samplesOf(lens, field, pass));
+        this.show();
+    }
+
+    // Adds the light of these cameras. more: switches, and further uniforms and textures, see `draw`. A camera with an
+    // answer has the shader find its view, see lens.frag.
+    pass(samples, ...more) {
+        const { gl, picture } = this;
         this.setSamples(samples);
         gl.enable(gl.BLEND);
-        this.drawLens(samples);
+        this.drawLens(samples, ...more);
         gl.disable(gl.BLEND);
-        Object.assign(picture, { pass: pass + 1, done: picture.done + samples.length });
-        this.show();
+        Object.assign(picture, { pass: picture.pass + 1, done: picture.done + samples.length });
     }
 
     setSamples(samples) {
         const { MAX_SAMPLES, OFF_BORDER_PX, SQRT_STEPS } = NUMBERS;
         const { gl, table, field: { layers, hasDisparity }, picture: { lens, gain, pass, done } } = this;
-        samples.forEach(({ t, s, view, weight }, i) => {
+        samples.forEach(({ t, s, view, weight, answer }, i) => {
             // All views that answer a pinhole are asked at the same place of the pixel.
             const number = lens.diameter === 0 ? pass : done + i;
             const within = SQRT_STEPS.slice(3).map((step) => fraction(number, step) - 0.5 + OFF_BORDER_PX);
             table.set([s, t, ...within], 4 * i);
-            table.set([view.s - lens.eye.s - s, view.t - lens.eye.t - t, 0, 0], 4 * (MAX_SAMPLES + i));
+            const toView = [view.s - lens.eye.s - s, view.t - lens.eye.t - t, 0];
+            table.set(answer ?? toView, 4 * (MAX_SAMPLES + i));
             table.set([layers.get(hash(view)), Number(hasDisparity), gain * weight, 0], 4 * (2 * MAX_SAMPLES + i));
         });
         gl.bufferSubData(gl.UNIFORM_BUFFER, 0, table);
     }
 
-    drawLens(samples) {
+    drawLens(samples, switches = [], values = {}, textures = {}) {
         const { gl, field, picture: { lens, part, width, height, target, pass } } = this;
         const { hasDisparity, range: [farthest, nearest] } = field;
         const mostPx = field.layers.size > 1 ? NUMBERS.NEAR_PX : NUMBERS.ALONE_NEAR_PX;
-        const isNear = samples.every(({ t, s, view }) => {
-            const [dt, ds] = [view.t - lens.eye.t - t, view.s - lens.eye.s - s];
+        const isNear = samples.every(({ t, s, view, answer }) => {
+            const [dt, ds] = answer ? [field.step, field.step] : [view.t - lens.eye.t - t, view.s - lens.eye.s - s];
             const isInCell = Math.max(Math.abs(dt), Math.abs(ds)) <= field.step;
             return isInCell && Math.hypot(field.rowStep * dt, ds) * (nearest - farthest) <= mostPx;
         });
-        this.draw("lens.frag", [hasDisparity && "WARP", hasDisparity && isNear && "NEAR"], target, {
+        this.draw("lens.frag", [hasDisparity && "WARP", hasDisparity && isNear && "NEAR", ...switches], target, {
             sample_count: samples.length, cell_views: cellOf(lens, pass), view_size_px: [field.width, field.height],
             pixel_uv: [part.width / width, part.height / height], farthest, nearest, focus_disparity: lens.focus,
             focus_tilt: [0, 0], focus_range: 0, dolly: [0, 0], part: [part.x, part.y, part.width, part.height],
-            field_part: [0, 0, 1, 1], view_step: [1, field.rowStep],
-        }, { colors: [gl.TEXTURE_2D_ARRAY, this.colors], disparities: [gl.TEXTURE_2D_ARRAY, this.colors, this.nearest] });
+            field_part: [0, 0, 1, 1], view_step: [1, field.rowStep], ...values,
+        }, {
+            colors: [gl.TEXTURE_2D_ARRAY, this.colors], disparities: [gl.TEXTURE_2D_ARRAY, this.colors, this.nearest],
+            ...textures,
+        });
     }
 
     // On the canvas, which gets the picture's own size.

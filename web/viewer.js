@@ -1,5 +1,6 @@
 // The page: moves the lens by touch, mouse and keys.
 
+import { enterHeadset, offerHeadset } from "./headset.js";
 import { NUMBERS, Renderer, WHOLE, clamp, pick } from "./renderer.js";
 import { $, load, say } from "./views.js";
 
@@ -28,6 +29,7 @@ class Page {
             button.addEventListener("click", () => this[button.dataset.do]());
         }
         $("tilt").hidden = !globalThis.DeviceOrientationEvent || !matchMedia("(pointer: coarse)").matches;
+        offerHeadset();
         this.showBar();
     }
 
@@ -60,7 +62,7 @@ class Page {
     frame(now) {
         const { renderer } = this;
         this.asked = 0;
-        if (renderer.gl.isContextLost()) return;
+        if (this.session || renderer.gl.isContextLost()) return;  // a headset shows the picture
         if (this.swings) this.swing(now);
         const rests = now - this.drawnAt > 150;
         if (this.changed || (this.level && rests && !this.isBest)) {
@@ -197,6 +199,10 @@ class Page {
             Object.assign(link, { href: URL.createObjectURL(blob), download: `${document.title}.png` }).click();
             setTimeout(() => URL.revokeObjectURL(link.href), 10000);
         });
+    }
+
+    headset() {
+        enterHeadset(this);
     }
 
     async tilt() {

@@ -23,13 +23,15 @@ from iibr_core.types import SRGB, ImageSize
 
 AVIF = "image/avif"
 SHADERS = "fullscreen.vert", "lens.frag", "present.frag"
-"""Shaders of the page, see `web/renderer.js`."""
+"""The desktop's shaders that the page has, see `web/renderer.js`."""
+PARTS = "preamble.glsl", "window.vert", "window.frag"
+"""The page's own parts of shaders."""
 POLICY = (
     "default-src 'none'; script-src {script}; style-src {style}; img-src data: blob:; media-src blob:; base-uri 'none';"
     " form-action 'none'"
 )
 FILE = '<script type="text/plain" id="{name}">{data}</script>'
-SCRIPTS = "renderer.js", "views.js", "viewer.js"
+SCRIPTS = "renderer.js", "views.js", "headset.js", "viewer.js"
 LINK = re.compile(r"^import [^;]*;\n|^export (?=const|class|function|async)", re.MULTILINE)
 """Imports and exports of the scripts, which are one module in a page."""
 COMMENT = re.compile(r"[ \t]*//[^\n]*|\n(?=[ \t]*(?://[^\n]*)?\n)")
@@ -110,7 +112,8 @@ def _shaders(folder: Path) -> dict[str, str]:
     """Return the shaders by name, without comments and without the version line, which the preamble replaces."""
     sources = {name: flatten(resource_folder("shaders") / name).text for name in SHADERS}
     without = {name: COMMENT.sub("", text.partition("\n")[2]) for name, text in sources.items()}
-    return {"preamble": (folder / "preamble.glsl").read_text("utf-8"), **without}
+    parts = {name: (folder / name).read_text("utf-8") for name in PARTS}
+    return {**parts, **without}
 
 
 def _field(source: ExportSource, views: WebViews) -> dict[str, Any]:

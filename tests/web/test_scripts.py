@@ -51,6 +51,7 @@ def node(code: str, given: Any = None) -> Any:
     )
     text = (
         f"import * as renderer from {json.dumps((WEB / 'renderer.js').as_uri())};\n"
+        f"import * as headset from {json.dumps((WEB / 'headset.js').as_uri())};\n"
         f"Object.assign(renderer.NUMBERS, {json.dumps(page_numbers())});\n"
         f"const given = {json.dumps(given)}, field = {field};\nconsole.log(JSON.stringify({code}));"
     )
@@ -151,3 +152,29 @@ def test_a_tap_finds_the_first_surface_on_its_ray() -> None:
     code = "renderer.pick({...field, width: 8, height: 1}, [0, 0, 0, 0, 255, 255, 0, 0], given, 0.3, 0.5)"
     assert node(code, {"t": 0, "s": 0}) == -2
     assert node(code, {"t": 0, "s": 1}) == 2, "the near one, two pixels aside"
+
+
+@pytest.mark.parametrize("focus", [-0.5, 0.0, 30.0])
+@pytest.mark.parametrize("limits", [((-2, 2), (-4, 4)), ((-0.5, 0.5), (-0.5, 0.5)), ((-0.5, 0.5), (-4, 3))])
+def test_heads_anywhere_see_what_the_grid_has_with_an_eye_each(limits, focus) -> None:
+    """Rays cross the grid; it stops the head smoothly, and the eyes stay apart."""
+    field = {"width": 96, "height": 64, "rowStep": 0.5, "range": [-1, 2], "eyeLimits": dict(zip("ts", limits))}
+    heads = [(x, y, z) for y in (-2.0, 0.01) for z in (-1.0, 0.0, 0.4, 1.5, 9.0) for x in np.linspace(-3, 3, 61)]
+    found = node(
+        "given.heads.map(([x, y, z]) => given.sides.map(side => headset.sightOf("
+        "given.field, given.focus, [1.2, 0.8], [x + side, y, z], [x, y, z])))",
+        {"field": field, "focus": focus, "heads": heads, "sides": (-0.03, 0.03)},
+    )
+    places = []
+    for sight in (sight for eyes in found for sight in eyes):
+        part, dolly = sight["part"], np.array(sight["dolly"])
+        ends = np.array([(part["y"], part["y"] + part["height"]), (part["x"], part["x"] + part["width"])])
+        assert ends.min() >= -1e-9
+        assert ends.max() <= 1 + 1e-9
+        rays = np.array([[sight["eye"]["t"]], [sight["eye"]["s"]]]) + dolly[::-1, None] * (ends - 0.5)
+        assert (np.array(limits)[:, :1] - 1e-9 <= rays).all()
+        assert (rays <= np.array(limits)[:, 1:] + 1e-9).all()
+        places.append(rays[1].mean())
+    across = np.array(places).reshape(-1, 61, 2)
+    assert (across[..., 1] > across[..., 0]).all(), "the right eye sees a view farther right"
+    assert np.diff(across, axis=1).min() >= -1e-9

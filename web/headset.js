@@ -1,0 +1,166 @@
+// Shows the picture in a headset (WebXR) as a window that stands upright before the head. The surface in focus lies in
+// the window's plane. The cameras lie in a plane DISTANCE_M before it: there a ray from the eye finds its view.
+
+import { NUMBERS, clamp, ends, fraction, hash, pick, samplesOf } from "./renderer.js";
+import { $, say } from "./views.js";
+
+const DISTANCE_M = 1.5, SIDE_M = 1.2, NEAREST_M = 0.1;  // from the head to the window; its longer side
+const EYES_M = 0.063, HEAD_M = 0.1;  // distance between the eyes, and how far the head moves within the grid
+const SOFT = 0.2, MOST_MARGIN = 0.3;  // share of a limit where movement slows down; share of the picture that is cropped
+const MOST_PX = 6e5, MOST_SCALE = 2;  // of an eye's picture, which is drawn in one pass
+const DRAG = 0.03, EASE = 0.2;  // of a hand, in windows, to open the aperture; share of a change of focus, per frame
+const CORNERS = [[0, 0], [1, 0], [0, 1], [1, 1]];
+
+// Returns x or, near the limit, less and less of it.
+function soft(x, limit) {
+    const over = Math.abs(x) - (1 - SOFT) * limit;
+    return over > 0 ? Math.sign(x) * limit * (1 - SOFT * Math.exp(-over / (SOFT * limit))) : x;
+}
+
+// Returns viewpoint, dolly and the part of the picture along an axis. at, middle: where the ray of the eye, and of the
+// place between both, through the window's middle crosses the cameras' plane; side: of the window; all in view steps.
+// share: DISTANCE_M, in distances of the eye. shear: how far the surface in focus moves per view step, in pictures.
+function axisOf(at, middle, side, share, shear, [low, high]) {
+    const reach = Math.min((high - low) / 2, MOST_MARGIN / Math.abs(shear)), aside = soft(at - middle, reach);
+    const free = reach - Math.abs(aside), between = soft(middle, free), place = between + aside;
+    const turn = soft(side * (1 - share), 2 * (free - Math.abs(between))), scale = 1 - shear * turn;
+    const dolly = turn / scale, shown = 1 - 2 * Math.abs(shear) * reach, size = shown * scale;
+    const eye = (low + high) / 2 + (1 + dolly * shear) * place;
+    return { eye, dolly, shown, start: 0.5 - size / 2 - shear * place, size };
+}
+
+// Returns what an eye [x, y, z] sees through the window, whose whole size [width, height] is given; all in m from the
+// window's middle. middle: between the eyes. A view step is as long as the grid allows; far surfaces part no eyes.
+export function sightOf(field, focus, whole, eye, middle) {
+    const { width, height, rowStep, eyeLimits: { t, s }, range: [farthest] } = field;
+    const step = Math.max((EYES_M + HEAD_M) / (s[1] - s[0]), (focus - farthest) * whole[0] / width);
+    const [share, shareOfMiddle] = [eye, middle].map((place) => DISTANCE_M / Math.max(place[2], NEAREST_M));
+    const along = (i, m, shear, limits) => (
+        axisOf(eye[i] * share / m, middle[i] * shareOfMiddle / m, whole[i] / Math.abs(m), share, shear, limits));
+    const across = along(0, step, focus / width, s), down = along(1, -step * rowStep, focus * rowStep / height, t);
+    return {
+        eye: { t: down.eye, s: across.eye }, dolly: [across.dolly, down.dolly],
+        part: { x: across.start, y: down.start, width: across.size, height: down.size },
+        size: [across.shown * whole[0], down.shown * whole[1]],
+    };
+}
+
+// Returns, for each place of the grid, column and row of the nearest view, whether it has disparity, and its layer.
+function nearestViews({ rows, columns, step, layers, hasDisparity }) {
+    const near = (x, count) => clamp(Math.round((x - (count >> 1)) / step) * step, ...ends(count, step));
+    return Float32Array.from(Array.from({ length: rows * columns }, (_, i) => {
+        const s = near(i % columns, columns), t = near(Math.floor(i / columns), rows);
+        return [s + (columns >> 1), t + (rows >> 1), Number(hasDisparity), layers.get(hash({ t, s }))];
+    }).flat());
+}
+
+const times = (m, v) => [0, 1, 2, 3].map((row) => v.reduce((sum, x, i) => sum + m[4 * i + row] * x, 0));
+
+class Headset {
+    constructor(page, session, local) {
+        const { renderer, field } = page, { gl } = renderer, views = [field.width, field.height];
+        Object.assign(this, { page, session, local, focus: page.optics.focus, held: new Map() });
+        this.whole = views.map((side) => SIDE_M * side / Math.max(...views));
+        const scale = Math.min(MOST_SCALE, Math.sqrt(MOST_PX / views[0] / views[1]));
+        this.px = views.map((side) => Math.max(Math.round(scale * side), 1));
+        this.nearest = renderer.texture(gl.TEXTURE_2D, gl.RGBA32F, gl.NEAREST, field.columns, field.rows);
+        local.addEventListener("reset", () => (this.space = null));
+        session.addEventListener("selectstart", ({ inputSource }) => this.held.set(inputSource, {}));
+        session.addEventListener("selectend", ({ inputSource }) => this.held.delete(inputSource));
+        session.addEventListener("select", ({ frame, inputSource }) => this.select(frame, inputSource));
+        session.addEventListener("squeeze", () => page.reset());
+        session.addEventListener("end", () => gl.deleteTexture(this.nearest));
+    }
+
+    frame(frame) {
+        const { page: { field, optics, renderer: { gl } }, session, whole } = this;
+        session.requestAnimationFrame((now, next) => this.frame(next));
+        this.space ??= this.standing(frame.getViewerPose(this.local));
+        const pose = this.space && frame.getViewerPose(this.space);
+        if (!pose) return;
+        this.focus += EASE * (optics.focus - this.focus);
+        const eyes = pose.views.map(({ transform: { position: { x, y, z } } }) => [x, y, z]);
+        const middle = [0, 1, 2].map((i) => eyes.reduce((sum, eye) => sum + eye[i] / eyes.length, 0));
+        this.sight = sightOf(field, this.focus, whole, middle, middle);
+        const pointed = [...session.inputSources].flatMap((hand) => this.open(hand, this.pointed(frame, hand)));
+        gl.bindTexture(gl.TEXTURE_2D, this.nearest);
+        gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, field.columns, field.rows, gl.RGBA, gl.FLOAT, nearestViews(field));
+        pose.views.forEach((view, i) => {
+            this.draw(view, sightOf(field, this.focus, whole, eyes[i], middle), [...pointed, -1, -1, -1, -1].slice(0, 4));
+        });
+    }
+
+    // Draws an eye's picture, in one pass, and the window with it.
+    draw(view, { eye, dolly, part, size }, pointed) {
+        const { page: { renderer, field, optics: { aperture } }, nearest } = this, { gl } = renderer;
+        renderer.begin({ eye, focus: this.focus, aperture }, part, ...this.px);
+        const { lens, target } = renderer.picture, thresholds = [1, 0].map((i) => NUMBERS.SQRT_STEPS[i]);
+        const cameras = aperture > 0 ? samplesOf(lens, { ...field, hasDisparity: true }, 0)
+            : CORNERS.map((corner) => ({ t: 0, s: 0, view: { t: 0, s: 0 }, weight: 1, answer: [...corner, 1] }));
+        renderer.pass(
+            cameras.map((camera, i) => ({ answer: [...thresholds.map((step) => fraction(i, step)), 0], ...camera })),
+            ["DOLLY"], { dolly, eye_in_grid: [eye.s + (field.columns >> 1), eye.t + (field.rows >> 1)] },
+            { nearest_views: [gl.TEXTURE_2D, nearest] },
+        );
+        const { transform: { inverse }, projectionMatrix } = view, layer = this.session.renderState.baseLayer;
+        const corners = CORNERS.map((corner) => [...corner.map((share, i) => (share - 0.5) * size[i]), 0, 1])
+            .flatMap((place) => times(projectionMatrix, times(inverse.matrix, place)));
+        const { x, y, width, height } = layer.getViewport(view);
+        renderer.draw("window.frag", [], { framebuffer: layer.framebuffer, x, y, width, height },
+            { "corners[0]": corners, size, pointed }, { light_sum: [gl.TEXTURE_2D, target.texture] });
+    }
+
+    // Returns the space of a window that stands upright before the head: x right, y up, z towards the head.
+    standing(pose) {
+        if (!pose) return null;
+        const { matrix: m, position: { x, y, z } } = pose.transform, turn = Math.atan2(m[8], m[10]);
+        const place = { x: x - DISTANCE_M * Math.sin(turn), y, z: z - DISTANCE_M * Math.cos(turn) };
+        const orientation = { x: 0, y: Math.sin(turn / 2), z: 0, w: Math.cos(turn / 2) };
+        return this.local.getOffsetReferenceSpace(new XRRigidTransform(place, orientation));
+    }
+
+    // Returns the place that a hand points at, as shares of the window from its lower left corner.
+    pointed(frame, { targetRaySpace }) {
+        const m = this.sight && frame.getPose(targetRaySpace, this.space)?.transform.matrix, far = m && m[14] / m[10];
+        return far > 0 ? [0, 1].map((i) => (m[12 + i] - far * m[8 + i]) / this.sight.size[i] + 0.5) : [-1, -1];
+    }
+
+    // Opens the aperture while a hand that pinches or holds its trigger is dragged up; returns the place.
+    open(hand, place) {
+        const { page } = this, held = this.held.get(hand), up = held ? place[1] - (held.y ??= place[1]) : 0;
+        if (held && (held.drags ||= Math.abs(up) > DRAG)) {
+            held.y = place[1];
+            page.set({ aperture: page.optics.aperture + up * page.field.apertureLimits[1] });
+        }
+        return place;
+    }
+
+    // Focuses where a hand points, unless it dragged.
+    select(frame, hand) {
+        const { field } = this.page, [across, up] = this.pointed(frame, hand);
+        if (this.held.get(hand)?.drags || !field.middle || Math.min(across, up, 1 - across, 1 - up) < 0) return;
+        const { eye, dolly, part } = this.sight, u = part.x + across * part.width, v = part.y + (1 - up) * part.height;
+        const from = { t: eye.t + dolly[1] * (v - 0.5), s: eye.s + dolly[0] * (u - 0.5) };
+        this.page.set({ focus: pick(field, field.middle, from, u, v) });
+    }
+}
+
+// Shows the button where there is a headset.
+export async function offerHeadset() {
+    $("headset").hidden = !await navigator.xr?.isSessionSupported("immersive-vr").catch(() => false);
+}
+
+// The page rests until the session ends.
+export async function enterHeadset(page) {
+    try {
+        const session = page.session = await navigator.xr.requestSession("immersive-vr"), { gl } = page.renderer;
+        session.addEventListener("end", () => page.wake(page.session = null));
+        await gl.makeXRCompatible();
+        session.updateRenderState({ baseLayer: new XRWebGLLayer(session, gl, { depth: false }) });
+        const headset = new Headset(page, session, await session.requestReferenceSpace("local"));
+        session.requestAnimationFrame((now, frame) => headset.frame(frame));
+    } catch (error) {
+        page.session?.end();
+        say(`The headset shows nothing: ${error.message}.`);
+    }
+}
