@@ -8,6 +8,7 @@ PIP := HATCH_BUILD_NO_HOOKS=true $(BIN)/python -m pip install --quiet --disable-
 READY := $(VENV)/.ready
 READY_TESTS := $(VENV)/.ready-tests
 KERNELS := $(VENV)/.kernels
+HEADSET := tests/web/node_modules
 
 .PHONY: run test bench figures fuzz site install kernels wheel clean
 
@@ -18,6 +19,7 @@ run: $(READY)
 
 test: install kernels
 	@.ci/system-libraries test
+	@$(MAKE) --no-print-directory $(HEADSET)
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
@@ -61,6 +63,11 @@ $(READY_TESTS): $(READY)
 	$(PIP) -e '.[dev]'
 	@touch $(READY_TESTS)
 
+# The headset that tests of web pages wear: a package of npm, by the hashes in package-lock.json.
+$(HEADSET): tests/web/package-lock.json
+	npm ci --silent --ignore-scripts --prefix tests/web
+	@touch $@
+
 # Compiles all kernels of the present sources, in a minute or two; what is missing is compiled where it is first used.
 kernels: $(KERNELS)
 
@@ -73,4 +80,4 @@ wheel: $(READY)
 	$(BIN)/python -m pip wheel --quiet --no-deps -c constraints.txt --wheel-dir dist .
 
 clean:
-	rm -rf $(VENV) out dist iibr_core/_kernels
+	rm -rf $(VENV) $(HEADSET) out dist iibr_core/_kernels

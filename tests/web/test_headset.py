@@ -248,7 +248,7 @@ def test_the_page_comes_back_where_a_session_ends_or_does_not_begin(worn, page) 
     wait_until_still(worn)
     assert (after == canvas(worn)).all()
     worn.evaluate(f"navigator.xr.requestSession = () => Promise.reject(new Error('no head')); {BUTTON}.click()")
-    worn.wait_until("document.getElementById('said').textContent.includes('no head')")
+    worn.wait_until("document.getElementById('status').textContent.includes('no head')")
 
 
 def test_without_a_headset_there_is_no_button(tab, page) -> None:
