@@ -1,19 +1,26 @@
-"""Time the real window on a private X server: first picture, all views, dragging, idling.
+"""Time the real window on a private X server: first picture, all views, dragging, a followed head, idling.
 
     python -m benchmarks window [--idle 5] [--cold]
 
 A frame's time is that of the processor, in the thread that draws. Drags make 60 pointer moves a second; latency is
-counted from the turn of the loop that reads a move to the frame that shows its viewpoint, both included. --cold: as if
-the graphics driver had compiled no shader before.
+counted from the turn of the loop that reads a move to the frame that shows its viewpoint, both included. A head jumps
+while the window is idle: latency is counted from sending its packet to asking for the picture. Then it moves, by 250
+packets a second, by as many beside a flood of 10,000 to another port, and by a flood; processor time is that of
+the whole program. --cold: as if the graphics driver had compiled no shader before.
 """
 
 from __future__ import annotations
 
 import argparse
 import os
+import socket
+import struct
 import subprocess
+import sys
+import threading
 import time
 from collections.abc import Callable, Iterator
+from functools import partial
 
 import numpy as np
 import psutil
@@ -24,9 +31,24 @@ from iibr_core.scenes.scene import Source
 from iibr_core.types import ViewOffset
 from tests.xvfb import private_display
 from viewer.app.main_loop import App, initial_state
-from viewer.model import lens
-from viewer.model.action import do
+from viewer.model import lens, tracking
+from viewer.model.action import Action, do
+from viewer.model.tracking import GAP_S
 
+SENDER = """
+import math, socket, struct, sys, time
+port, rate_hz = map(int, sys.argv[1:])
+sender, began, sent = socket.socket(socket.AF_INET, socket.SOCK_DGRAM), time.perf_counter(), 0
+while True:
+    x = 10 * math.sin(math.pi * (time.perf_counter() - began))
+    for _ in range(max(rate_hz // 1000, 1)):
+        sender.sendto(struct.pack("<6d", x, 0, 60, 0, 0, 0), ("127.0.0.1", port))
+        sent += 1
+    time.sleep(max(began + sent / rate_hz - time.perf_counter(), 0))
+"""
+"""Program that sends poses of a head that moves 10 cm to and fro, in two seconds."""
+CALM_HZ, FLOOD_HZ = 250, 10_000
+JUMPS, ROUNDS, ROUND_S = 21, 5, 2.0
 DEMO = resource_folder("assets") / "motorcycle" / "motorcycle.png"
 
 
@@ -40,14 +62,14 @@ def main() -> None:
         os.environ["MESA_SHADER_CACHE_DISABLE"] = "true"
     began = time.perf_counter(), time.process_time()
     with private_display():
-        app = App(initial_state(Source(str(DEMO))))
+        app = TimedApp(initial_state(Source(str(DEMO))))
         try:
             print(markdown(("what", "measured"), rows(app, began, options.idle)))
         finally:
             app.close()
 
 
-def rows(app: App, began: tuple[float, float], idle_s: float) -> Iterator[tuple[str, str]]:
+def rows(app: TimedApp, began: tuple[float, float], idle_s: float) -> Iterator[tuple[str, str]]:
     """Yield the rows of the table. began: times by the clock and of the processor."""
     first = step_while(app, lambda: app.scene_view.pictures_drawn == 0)
     yield "first picture", since(began)
@@ -60,6 +82,11 @@ def rows(app: App, began: tuple[float, float], idle_s: float) -> Iterator[tuple[
         step_while(app, lambda: not is_idle(app))
         yield f"dragging, aperture of {aperture} view steps", drag(app)
         step_while(app, lambda: not is_idle(app))
+    app.do(do(lens.set_aperture, 0))
+    yield "a head that jumps: from sending the packet to asking for the picture", jump(app)
+    yield from move_head(app)
+    app.do(do(tracking.switch, None))
+    step_while(app, lambda: not is_idle(app))
     before, frames, rested = psutil.Process().cpu_times(), app.frames_shown, time.perf_counter()
     step_while(app, lambda: time.perf_counter() - rested < idle_s)
     after = psutil.Process().cpu_times()
@@ -111,6 +138,83 @@ def drag(app: App) -> str:
     subprocess.run(["xdotool", "mouseup", "1"], check=True)
     times = (f"{np.median(ms):.0f} ms (90 %: {np.quantile(ms, 0.9):.0f})" for ms in (latencies, pictures))
     return f"latency at most {max(frames)} frames, {', a picture '.join(times)}"
+
+
+class TimedApp(App):
+    """The viewer, and the time on the clock when it followed a head last."""
+
+    followed_s = 0.0
+
+    def do(self, *actions: Action) -> None:
+        """Apply actions to the state."""
+        super().do(*actions)
+        if any(action.verb is tracking.follow for action in actions):
+            self.followed_s = time.perf_counter()
+
+
+def jump(app: TimedApp) -> str:
+    """Let a head jump while the window is idle; return the time from packets to asking for their pictures in words."""
+    place, latencies = free_place(), []
+    app.do(do(tracking.switch, "udp:{}:{}".format(*place)))
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+        for k in range(JUMPS):
+            step_while(app, lambda: not is_idle(app))
+            latencies.append(1e3 * follow_jump(app, partial(sender.sendto, struct.pack("<6d", k % 2, *5 * [0]), place)))
+    return f"{np.median(latencies):.1f} ms (90 %: {np.quantile(latencies, 0.9):.1f})"
+
+
+def follow_jump(app: TimedApp, send: Callable[[], int]) -> float:
+    """Send a packet once the window sleeps; return the time until it asks for the picture, in seconds."""
+    sent_s, before_s = [0.0], app.followed_s
+
+    def send_later() -> None:
+        sent_s[0] = time.perf_counter()
+        send()
+
+    threading.Timer(2 * GAP_S, send_later).start()
+    step_while(app, lambda: app.followed_s == before_s)
+    return app.followed_s - sent_s[0]
+
+
+def move_head(app: TimedApp) -> Iterator[tuple[str, str]]:
+    """Let a head move, by few packets and by floods in turns; yield rows of the table."""
+    place, elsewhere = free_place(), socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    elsewhere.bind(("127.0.0.1", 0))
+    app.do(do(tracking.switch, "udp:{}:{}".format(*place)))
+    calm, flood = (place[1], CALM_HZ), (place[1], FLOOD_HZ)
+    senders = {
+        f"{CALM_HZ} packets a second": [calm],
+        f"{CALM_HZ}, and {FLOOD_HZ} to another port": [calm, (elsewhere.getsockname()[1], FLOOD_HZ)],
+        f"{FLOOD_HZ}": [flood],
+    }
+    measured: dict[str, list[tuple[float, float]]] = {name: [] for name in senders}
+    for name, pairs in ROUNDS * list(senders.items()):
+        programs = [subprocess.Popen([sys.executable, "-c", SENDER, *map(str, pair)]) for pair in pairs]
+        measured[name].append(draw_for(app, ROUND_S))
+        for program in programs:
+            program.kill()
+            program.wait()
+    elsewhere.close()
+    for name, values in measured.items():
+        rate, used_ms = np.median(values, axis=0)
+        yield f"a head that moves: {name}", f"{rate:.1f} pictures a second, {used_ms:.1f} ms of processor time for each"
+
+
+def draw_for(app: App, seconds: float) -> tuple[float, float]:
+    """Turn the loop for some time, after five pictures; return pictures a second and milliseconds of processor time."""
+    drawn = app.scene_view.pictures_drawn
+    step_while(app, lambda: app.scene_view.pictures_drawn < drawn + 5)
+    first, began, used_s = app.scene_view.pictures_drawn, time.perf_counter(), time.process_time()
+    step_while(app, lambda: time.perf_counter() - began < seconds)
+    pictures, used_s = app.scene_view.pictures_drawn - first, time.process_time() - used_s
+    return pictures / (time.perf_counter() - began), 1e3 * used_s / pictures
+
+
+def free_place() -> tuple[str, int]:
+    """Return the loopback address with a free port."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(("127.0.0.1", 0))
+        return "127.0.0.1", probe.getsockname()[1]
 
 
 def pointer_moves(app: App) -> Iterator[str]:

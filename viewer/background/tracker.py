@@ -18,10 +18,10 @@ from viewer.model.state.notices import Notice
 
 WAIT_S = 0.2
 """Longest wait for a packet, in seconds: closing takes as long."""
-PAUSE_S = 0.002
-"""Shortest time between two looks at the socket, in seconds: a flood of packets takes no more of a core."""
-BUFFER_BYTES = 4096
-"""Size of the system's buffer: about ten packets, so none is old when it is read."""
+PAUSE_S = 0.004
+"""Shortest time between two looks at the socket, in seconds, as opentrack sends: a flood takes little of a core."""
+BUFFER_BYTES = 2048
+"""Size of the system's buffer: some five packets, so none is old when it is read."""
 MAX_PACKETS = 32
 """Largest number of packets that are read at a time."""
 MIN_STEP_CM = 0.02
@@ -79,16 +79,16 @@ class Listener:
 
     def _newest(self) -> complex | None:
         """Read the packets that wait; return the place of the head in the newest pose, None without."""
-        newest = None
+        packets: list[bytes] = []
         for _ in range(MAX_PACKETS):
             try:
-                head = tracking.head_in(self._socket.recv(tracking.POSE.size + 1))
+                packets.append(self._socket.recv(tracking.POSE.size + 1))
             except BlockingIOError:
                 break
             except OSError:  # Windows reports a packet that is too long, and a sender that is gone
                 continue
-            newest = newest if head is None else head
-        return newest
+        heads = map(tracking.head_in, reversed(packets))
+        return next((head for head in heads if head is not None), None)
 
 
 class Tracker:
@@ -105,12 +105,13 @@ class Tracker:
 
     def advance(self, state: AppState) -> list[Action]:
         """Begin or end listening as the state asks; return what came in, and problems."""
-        self._taken_s, wanted = None, state.tracking
-        if (wanted and wanted.address) != self._address:
-            return self._listen(wanted and wanted.address)
-        if wanted is None or self._listener is None:
+        self._taken_s, wanted, listener = None, state.tracking, self._listener
+        address = None if wanted is None else wanted.address
+        if address != self._address:
+            return self._listen(address)
+        if wanted is None or listener is None:
             return []
-        listener, now_s, actions = self._listener, time.perf_counter(), list[Action]()
+        now_s, actions = time.perf_counter(), list[Action]()
         if now_s > self._notice_at_s and listener.seen_s < 0:
             self._notice_at_s = math.inf
             text = f'No poses at {listener.words}: let opentrack send there, by its output "UDP over network".'

@@ -8,6 +8,7 @@ import struct
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -190,7 +191,9 @@ def test_a_key_switches_it_on_and_off_at_the_port_that_was_given_last(viewer: Dr
     assert app.state.optics.eye == eye
 
 
-def test_the_panel_switches_it_on_and_sets_the_movement(open_window: Opener, photo_path, wide_window: None) -> None:
+def test_the_panel_switches_it_on_and_sets_the_movement(
+    open_window: Opener, photo_path: Path, wide_window: None
+) -> None:
     viewer = open_window(photo_path)
     viewer.until_idle()
     viewer.press("Follow the head")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import struct
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -178,11 +179,11 @@ def test_undo_of_a_focus_does_not_move_the_centre() -> None:
         {"scene": None},
     ],
 )
-def test_the_viewpoint_holds_while_something_else_needs_it(changes: dict[str, object]) -> None:
+def test_the_viewpoint_holds_while_something_else_needs_it(changes: dict[str, Any]) -> None:
     state = tracked(0j, 3 + 0j)
-    held = followed(replace(state, **changes), 9 + 0j)  # type: ignore[arg-type]
+    held = followed(replace(state, **changes), 9 + 0j)
     assert held.optics == state.optics
-    again = followed(replace(held, **{name: getattr(state, name) for name in changes}), 9 + 0j)  # type: ignore[arg-type]
+    again = followed(replace(held, **{name: getattr(state, name) for name in changes}), 9 + 0j)
     assert again.optics.eye == tracked(0j, 9 + 0j).optics.eye
 
 
