@@ -15,9 +15,10 @@ from hypothesis import strategies as st
 from iibr_core.beyond.optics import CENTRE
 from iibr_core.depth.editing.edits import Stroke
 from iibr_core.scenes.lens_limits import clamp_eye
+from iibr_core.scenes.scene import Source
 from iibr_core.types import GridShape, InputError, ViewOffset
 from tests.viewer.model.test_opening import grids, scene_of, state_with
-from viewer.model import gesture, history, lens, tracking, viewpoint
+from viewer.model import gesture, history, lens, opening, tracking, viewpoint
 from viewer.model.action import Action, do
 from viewer.model.state.app_state import AppState
 from viewer.model.state.viewpoint import FreeCamera
@@ -169,6 +170,15 @@ def test_undo_of_a_focus_does_not_move_the_centre() -> None:
     state = followed(history.undo(followed(state, 9 + 0j)), 9 + 0j)
     assert state.optics.focus_disparity == 0
     assert state.optics.eye == tracked(0j, 9 + 0j).optics.eye
+
+
+def test_another_photo_keeps_the_centre() -> None:
+    state = followed(lens.move_eye(tracked(0j, 3 + 0j), CENTRE), 9 + 0j)
+    opened = opening.open_source(state, Source("other.png"))
+    assert opened.source is not None
+    shown = opening.show_scene(opened, opened.generation, scene_of(GridShape(5, 5), opened.source))
+    assert shown.optics.eye == CENTRE
+    assert followed(shown, 9 + 0j).optics.eye == state.optics.eye != CENTRE
 
 
 @pytest.mark.parametrize(
