@@ -36,11 +36,15 @@ def psnr(one: np.ndarray, other: np.ndarray) -> float:
     return float(10 * np.log10(255**2 / max(np.mean((one.astype(float) - other) ** 2), 1e-9)))
 
 
+def set_desktop_lens(viewer: OffscreenScene, s: float, t: float, focus: float, aperture: float) -> None:
+    viewer.do(do(lens.move_eye, ViewOffset(t, s)), do(lens.set_focus, focus), do(lens.set_aperture, aperture))
+
+
 def test_the_canvas_is_the_desktops_picture(shown, scene) -> None:
     with OffscreenScene("egl") as viewer:
         viewer.open(Source(str(scene), grid=GridShape(3, 3)))
         for s, t, focus, aperture in SETTINGS:
-            viewer.do(do(lens.move_eye, ViewOffset(t, s)), do(lens.set_focus, focus), do(lens.set_aperture, aperture))
+            set_desktop_lens(viewer, s, t, focus, aperture)
             set_lens(shown, s, t, focus, aperture)
             wait_until_still(shown)
             drawn = canvas(shown)
@@ -58,7 +62,7 @@ def test_rows_nearer_together_than_columns_are_drawn_as_on_the_desktop(tab, tmp_
     with OffscreenScene("egl") as viewer:
         viewer.open(Source(str(folder)))
         for t, focus, aperture in ((-1.5, 0.0, 0.0), (0.0, SQUARE_PX, 3.0)):
-            viewer.do(do(lens.move_eye, ViewOffset(t, 0.5)), do(lens.set_focus, focus), do(lens.set_aperture, aperture))
+            set_desktop_lens(viewer, 0.5, t, focus, aperture)
             set_lens(tab, 0.5, t, focus, aperture)
             wait_until_still(tab)
             assert psnr(canvas(tab), viewer.picture()) >= LEAST_PSNR_OF_NOISE_DB
