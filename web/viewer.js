@@ -2,10 +2,20 @@
 
 import { enterHeadset, offerHeadset } from "./headset.js";
 import { NUMBERS, Renderer, WHOLE, clamp, pick } from "./renderer.js";
+import { Tilt } from "./tilt.js";
 import { $, load, say } from "./views.js";
 
-const SWING_S = 9, BAR_AWAY_MS = 4000, TAP_MS = 350, TAP_PX = 8, TILT_DEG = 20, MOST_ZOOM = 16, MOST_SIDE_PX = 4096;
-const SLOW_MS = 45, QUICK_MS = 24;  // of a frame while the hand moves
+const SWING_S = 9, MOST_SWINGS = 3, BAR_AWAY_MS = 4000, HINT_MS = 6000, MOST_ZOOM = 16;
+const TAP_MS = 350, TAP_PX = 8, DOUBLE_TAP_PX = 30;  // Longest time between two taps; movement within one; between two.
+const LINE_PX = 33, NOTCH_PX = 100;  // Scrolling by a line, and by a notch of a plain wheel.
+const TILT_DEG = 20;  // Turn of a device that leads to the outermost view.
+const DETAIL = 2, MOST_SIDE_PX = 4096;  // Largest number of drawn pixels: for a pixel of a view; of the longer side.
+const SLOW_MS = 45, QUICK_MS = 24;  // Time of a frame, while the hand moves, above and below which quality changes.
+
+function hint(text) {
+    say(text);
+    setTimeout(() => say(""), HINT_MS);
+}
 
 class Page {
     constructor(field) {
@@ -19,17 +29,24 @@ class Page {
             $(name).addEventListener("input", () => this.set({ [name]: $(name).valueAsNumber }));
         }
         new ResizeObserver(() => this.wake()).observe(canvas);
-        canvas.addEventListener("pointercancel", ({ pointerId }) => this.pointers.delete(pointerId));
+        canvas.addEventListener("lostpointercapture", ({ pointerId }) => this.pointers.delete(pointerId));
         for (const name of ["pointerdown", "pointermove", "pointerup", "wheel"]) {
             canvas.addEventListener(name, (event) => this[name](event), { passive: false });
         }
         document.addEventListener("keydown", (event) => this.keydown(event));
-        document.addEventListener("pointermove", () => this.showBar());
-        for (const button of document.querySelectorAll("button")) {
-            button.addEventListener("click", () => this[button.dataset.do]());
+        // A finger shows the bar only after its tap: a button that came up under it would take the click.
+        document.addEventListener("pointermove", ({ pointerType }) => pointerType === "touch" || this.showBar());
+        for (const name of ["click", "keydown", "input"]) document.addEventListener(name, () => this.showBar());
+        for (const button of document.querySelectorAll("button[data-do]")) {
+            button.addEventListener("click", () => {
+                this[button.dataset.do]();
+                $("actions").hidePopover?.();
+            });
         }
+        this.tilted = this.tilted.bind(this);
         $("tilt").hidden = !globalThis.DeviceOrientationEvent || !matchMedia("(pointer: coarse)").matches;
         offerHeadset();
+        $("full").hidden = !document.fullscreenEnabled;
         this.showBar();
     }
 
@@ -49,8 +66,21 @@ class Page {
             eye: { t: clamp(wanted.eye.t, ...t), s: clamp(wanted.eye.s, ...s) },
             focus: clamp(wanted.focus, ...focusLimits), aperture: clamp(wanted.aperture, ...apertureLimits),
         };
-        for (const name of ["focus", "aperture"]) $(name).value = this.optics[name];
+        for (const [name, words] of Object.entries(this.words())) {
+            $(name).value = this.optics[name];
+            $(name).setAttribute("aria-valuetext", words);
+        }
         this.wake();
+    }
+
+    // Returns what a screen reader says of each slider.
+    words() {
+        const { focus, aperture } = this.optics, [far, near] = this.field.focusLimits;
+        const share = Math.round(100 * (focus - far) / (near - far || 1));
+        return {
+            focus: `${share} % of the way from far to near, disparity ${focus.toFixed(2)} pixels`,
+            aperture: aperture ? `${aperture.toFixed(1)} view steps wide` : "closed, everything is sharp",
+        };
     }
 
     wake() {
@@ -86,8 +116,10 @@ class Page {
     }
 
     swing(now) {
-        const turn = 2 * Math.PI * now / 1000 / SWING_S, { t, s } = this.field.eyeLimits;
-        this.set({ eye: { t: 0.2 * t[1] * Math.sin(2 * turn), s: 0.6 * s[1] * Math.sin(turn) } }, false);
+        const turns = (now - (this.swungAt ??= now)) / 1000 / SWING_S, { t, s } = this.field.eyeLimits;
+        const angle = 2 * Math.PI * Math.min(turns, MOST_SWINGS);
+        this.swings = turns < MOST_SWINGS;
+        this.set({ eye: { t: 0.2 * t[1] * Math.sin(2 * angle), s: 0.6 * s[1] * Math.sin(angle) } }, false);
     }
 
     // The picture's box on the canvas, CSS pixels, and its size on the screen.
@@ -99,46 +131,49 @@ class Page {
     }
 
     size() {
-        const { width, height } = this.box();
-        const ratio = Math.min(devicePixelRatio, MOST_SIDE_PX / Math.max(width, height, 1));
+        const { width, height } = this.box(), { field } = this;
+        const most = Math.min(DETAIL * Math.max(field.width, field.height), MOST_SIDE_PX);
+        const ratio = Math.min(devicePixelRatio, most / Math.max(width, height, 1));
         return { width: Math.max(Math.round(width * ratio), 1), height: Math.max(Math.round(height * ratio), 1) };
     }
 
-    // Where in the whole picture, 0..1.
-    place({ offsetX, offsetY }) {
+    // Returns a place of the canvas in the whole picture, 0..1.
+    place({ x, y }) {
         const { left, top, width, height } = this.box(), { part } = this;
-        const [across, down] = [(offsetX - left) / width, (offsetY - top) / height];
+        const [across, down] = [(x - left) / width, (y - top) / height];
         return { u: part.x + across * part.width, v: part.y + down * part.height };
     }
 
     pointerdown(event) {
+        if (event.button !== 0) return;
         this.canvas.setPointerCapture(event.pointerId);
-        this.pointers.set(event.pointerId, event);
+        this.pointers.set(event.pointerId, { x: event.offsetX, y: event.offsetY });
         this.moves = this.pointers.size > 1 ? Infinity : 0;
     }
 
-    pointermove(event) {
-        const before = this.pointers.get(event.pointerId), { width, height } = this.box();
+    pointermove({ pointerId, offsetX: x, offsetY: y }) {
+        const before = this.pointers.get(pointerId), { width, height } = this.box();
         if (!before) return;
-        const [dx, dy] = [event.offsetX - before.offsetX, event.offsetY - before.offsetY];
-        const [other] = [...this.pointers].filter(([id]) => id !== event.pointerId).map(([, one]) => one);
+        const [dx, dy] = [x - before.x, y - before.y];
+        const [other] = [...this.pointers].filter(([id]) => id !== pointerId).map(([, place]) => place);
         this.moves += Math.hypot(dx, dy);
-        this.pointers.set(event.pointerId, event);
+        this.pointers.set(pointerId, { x, y });
         if (other) {
-            const apart = (one) => Math.hypot(one.offsetX - other.offsetX, one.offsetY - other.offsetY);
-            const [offsetX, offsetY] = [(event.offsetX + other.offsetX) / 2, (event.offsetY + other.offsetY) / 2];
-            this.zoom(apart(event) / Math.max(apart(before), 1), { offsetX, offsetY }, dx / 2 / width, dy / 2 / height);
-        } else if (this.moves > TAP_PX) {
+            const apart = (place) => Math.max(Math.hypot(place.x - other.x, place.y - other.y), 1);
+            const middle = { x: (x + other.x) / 2, y: (y + other.y) / 2 };
+            this.zoom(apart({ x, y }) / apart(before), middle, dx / 2 / width, dy / 2 / height);
+        } else if (this.moves > TAP_PX && this.moves < Infinity) {  // the finger left of a pinch moves nothing
             const { eye } = this.optics, { columns, rows } = this.field;
             this.set({ eye: { t: eye.t - dy / height * rows, s: eye.s - dx / width * columns } });
         }
     }
 
-    pointerup(event) {
-        this.pointers.delete(event.pointerId);
-        if (this.moves > TAP_PX) return;
-        const isSecond = event.timeStamp - (this.tappedAt ?? -Infinity) < TAP_MS, { u, v } = this.place(event);
-        this.tappedAt = isSecond ? -Infinity : event.timeStamp;
+    pointerup({ pointerId, pointerType, timeStamp, offsetX: x, offsetY: y }) {
+        if (!this.pointers.delete(pointerId) || this.moves > TAP_PX) return;
+        const { last } = this, { u, v } = this.place({ x, y });
+        const isSecond = last?.pointerType === pointerType && timeStamp - last.timeStamp < TAP_MS
+            && Math.hypot(x - last.x, y - last.y) < DOUBLE_TAP_PX;
+        this.last = isSecond ? null : { pointerType, timeStamp, x, y };
         if (isSecond) return this.reset();
         if (!this.field.middle || u < 0 || v < 0 || u >= 1 || v >= 1) return;
         const focus = pick(this.field, this.field.middle, this.optics.eye, u, v);
@@ -146,10 +181,16 @@ class Page {
     }
 
     wheel(event) {
+        if (parent !== window && !document.hasFocus()) return;  // the page around this one scrolls
         event.preventDefault();
-        const [low, high] = this.field.focusLimits, turned = Math.sign(event.deltaY);
-        if (event.ctrlKey) this.zoom(Math.exp(-event.deltaY / 200), event);
-        else this.set({ focus: this.optics.focus - turned * (high - low) / 50 });
+        const notches = event.deltaY * [1, LINE_PX, this.canvas.clientHeight][event.deltaMode] / NOTCH_PX;
+        if (event.ctrlKey) this.zoom(Math.exp(-notches / 2), { x: event.offsetX, y: event.offsetY });
+        else this.set({ focus: this.optics.focus - notches * this.focusStep });
+    }
+
+    get focusStep() {
+        const [far, near] = this.field.focusLimits;
+        return (near - far) / 50;
     }
 
     // Enlarges about a place, and moves by a share of what is seen.
@@ -162,19 +203,25 @@ class Page {
 
     keydown(event) {
         if (event.ctrlKey || event.metaKey || event.altKey) return;
-        this.showBar();
-        const { eye, focus, aperture } = this.optics, [low, high] = this.field.focusLimits;
-        const onSlider = event.target.type === "range", far = event.shiftKey ? 1 : 0.25, step = (high - low) / 50;
-        const moved = (t, s) => !onSlider && this.set({ eye: { t: eye.t + far * t, s: eye.s + far * s } });
-        const done = {
-            ArrowLeft: () => moved(0, -1), ArrowRight: () => moved(0, 1), ArrowUp: () => moved(-1, 0),
-            ArrowDown: () => moved(1, 0), "+": () => this.set({ focus: focus + step }),
-            "-": () => this.set({ focus: focus - step }), "]": () => this.set({ aperture: aperture + 0.5 }),
-            "[": () => this.set({ aperture: aperture - 0.5 }), f: () => this.full(), s: () => this.save(),
-            r: () => this.reset(), Home: () => onSlider || this.reset(),
-        }[event.key];
-        done?.();
-        if (done && !onSlider) event.preventDefault();
+        const { eye, focus, aperture } = this.optics, { focusStep: step } = this;
+        const onSlider = event.target.type === "range", far = event.shiftKey ? 1 : 0.25;
+        const middle = { x: this.canvas.clientWidth / 2, y: this.canvas.clientHeight / 2 };
+        const ofPicture = {
+            ArrowLeft: () => this.set({ eye: { ...eye, s: eye.s - far } }),
+            ArrowRight: () => this.set({ eye: { ...eye, s: eye.s + far } }),
+            ArrowUp: () => this.set({ eye: { ...eye, t: eye.t - far } }),
+            ArrowDown: () => this.set({ eye: { ...eye, t: eye.t + far } }),
+            PageUp: () => this.zoom(1.25, middle), PageDown: () => this.zoom(0.8, middle), Home: () => this.reset(),
+        };
+        const ofPage = {
+            "+": () => this.set({ focus: focus + step }), "-": () => this.set({ focus: focus - step }),
+            "]": () => this.set({ aperture: aperture + 0.5 }), "[": () => this.set({ aperture: aperture - 0.5 }),
+            f: () => event.repeat || this.full(), s: () => event.repeat || this.save(), r: () => this.reset(),
+        };
+        const action = ofPage[event.key.toLowerCase()] ?? (onSlider ? null : ofPicture[event.key]);
+        if (!action) return;
+        action();
+        event.preventDefault();
     }
 
     showBar() {
@@ -190,14 +237,17 @@ class Page {
 
     full() {
         if (document.fullscreenElement) document.exitFullscreen();
-        else document.documentElement.requestFullscreen?.().catch(() => say("This place allows no full screen."));
+        else document.documentElement.requestFullscreen?.().catch(() => hint("The browser refuses full screen here."));
     }
 
     save() {
         this.canvas.toBlob((blob) => {
             const link = document.createElement("a");
-            Object.assign(link, { href: URL.createObjectURL(blob), download: `${document.title}.png` }).click();
-            setTimeout(() => URL.revokeObjectURL(link.href), 10000);
+            Object.assign(link, { href: URL.createObjectURL(blob), download: `${document.title}.png` });
+            document.body.append(link);  // Safari saves by no link outside the document
+            link.click();
+            link.remove();
+            setTimeout(() => URL.revokeObjectURL(link.href), 60000);  // people may be asked for a place
         });
     }
 
@@ -205,15 +255,25 @@ class Page {
         enterHeadset(this);
     }
 
+    // Starts or stops moving the viewpoint by the device's tilt.
     async tilt() {
-        const asked = await DeviceOrientationEvent.requestPermission?.().catch(() => "denied") ?? "granted";
-        if (asked !== "granted") return say("The device does not tell how it is held.");
-        let from = null;
-        return addEventListener("deviceorientation", ({ beta, gamma }) => {
-            from ??= { beta, gamma };
-            const { t, s } = this.field.eyeLimits;
-            this.set({ eye: { t: (from.beta - beta) / TILT_DEG * t[1], s: (from.gamma - gamma) / TILT_DEG * s[1] } });
-        });
+        const isOn = () => $("tilt").getAttribute("aria-pressed") === "true";
+        $("tilt").setAttribute("aria-pressed", !isOn());
+        removeEventListener("deviceorientation", this.tilted);
+        this.reading = new Tilt();
+        if (!isOn()) return;
+        const answer = await DeviceOrientationEvent.requestPermission?.().catch(() => "denied") ?? "granted";
+        if (answer === "granted" && isOn()) return addEventListener("deviceorientation", this.tilted);
+        $("tilt").setAttribute("aria-pressed", false);
+        if (answer !== "granted") hint("The browser does not share how the device is held: allow it, and press Tilt again.");
+    }
+
+    // Moves the viewpoint by as much as the device turned since the last event.
+    tilted(event) {
+        if (event.beta === null) return;
+        const { t, s } = this.reading.turn(event, screen.orientation?.angle ?? 0), { eye } = this.optics;
+        const { t: [, bottom], s: [, right] } = this.field.eyeLimits;
+        if (t || s) this.set({ eye: { t: eye.t - t / TILT_DEG * bottom, s: eye.s - s / TILT_DEG * right } });
     }
 }
 

@@ -31,7 +31,7 @@ POLICY = (
     " form-action 'none'"
 )
 FILE = '<script type="text/plain" id="{name}">{data}</script>'
-SCRIPTS = "renderer.js", "views.js", "headset.js", "viewer.js"
+SCRIPTS = "renderer.js", "views.js", "headset.js", "tilt.js", "viewer.js"
 LINK = re.compile(r"^import [^;]*;\n|^export (?=const|class|function|async)", re.MULTILINE)
 """Imports and exports of the scripts, which are one module in a page."""
 COMMENT = re.compile(r"[ \t]*//[^\n]*|\n(?=[ \t]*(?://[^\n]*)?\n)")

@@ -1,0 +1,35 @@
+// Turns of a device that a hand holds, from the events of its orientation.
+
+export const NOISE_DEG = 0.4;  // Largest turn that leaves the picture as it is.
+
+const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+
+// Returns where a device's right, top and front point to in the world: W3C's angles, Z-X'-Y''.
+function axesOf(event) {
+    const turns = [event.alpha, event.beta, event.gamma].map((angle) => angle * Math.PI / 180);
+    const [[ca, sa], [cb, sb], [cg, sg]] = turns.map((angle) => [Math.cos(angle), Math.sin(angle)]);
+    return [
+        [ca * cg - sa * sb * sg, sa * cg + ca * sb * sg, -cb * sg], [-sa * cb, ca * cb, sb],
+        [ca * sg + sa * sb * cg, sa * sg - ca * sb * cg, cb * cg],
+    ];
+}
+
+// Reads how far the screen's front turns between events, in degrees down and right; noise turns nothing.
+export class Tilt {
+    // screenAngle: of the screen's content in the device, degrees; where it changes, the reading starts again.
+    turn(event, screenAngle) {
+        const [right, top, front] = axesOf(event);
+        if (this.angle !== screenAngle) {
+            const angle = screenAngle * Math.PI / 180, [c, s] = [Math.cos(angle), Math.sin(angle)];
+            const mixed = (x, y) => right.map((_, i) => x * right[i] + y * top[i]);
+            Object.assign(this, { angle: screenAngle, axes: { t: mixed(-s, -c), s: mixed(c, -s) }, t: 0, s: 0 });
+        }
+        const turned = (axis) => {
+            const ahead = Math.asin(Math.max(Math.min(dot(front, this.axes[axis]), 1), -1)) * 180 / Math.PI - this[axis];
+            const beyond = ahead - Math.max(Math.min(ahead, NOISE_DEG), -NOISE_DEG);
+            this[axis] += beyond;
+            return beyond;
+        };
+        return { t: turned("t"), s: turned("s") };
+    }
+}
