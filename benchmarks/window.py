@@ -1,4 +1,4 @@
-"""Time the real window on a private X server: first picture, all views, dragging, a followed head, idling.
+"""Time the real window on a private X server: first picture, all views, dragging, stereo, a followed head, idling.
 
     python -m benchmarks window [--idle 5] [--cold]
 
@@ -6,12 +6,14 @@ A frame's time is that of the processor, in the thread that draws. Drags make 60
 counted from the turn of the loop that reads a move to the frame that shows its viewpoint, both included. A head jumps
 while the window is idle: latency is counted from sending its packet to asking for the picture. Then it moves, by 250
 packets a second, by as many beside a flood of 10,000 to another port, and by a flood; processor time is that of
-the whole program. --cold: as if the graphics driver had compiled no shader before.
+the whole program. A stereo frame is two pictures of a moving viewpoint at full quality and their weaving. --cold: as if
+the graphics driver had compiled no shader before.
 """
 
 from __future__ import annotations
 
 import argparse
+import math
 import os
 import socket
 import struct
@@ -28,10 +30,11 @@ import psutil
 from benchmarks.report import markdown
 from iibr_core.runtime.resources import resource_folder
 from iibr_core.scenes.scene import Source
+from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import ViewOffset
 from tests.xvfb import private_display
 from viewer.app.main_loop import App, initial_state
-from viewer.model import lens, tracking
+from viewer.model import lens, stereo, tracking
 from viewer.model.action import Action, do
 from viewer.model.tracking import GAP_S
 
@@ -49,6 +52,8 @@ while True:
 """Program that sends poses of a head that moves 10 cm to and fro, in two seconds."""
 CALM_HZ, FLOOD_HZ = 250, 10_000
 JUMPS, ROUNDS, ROUND_S = 21, 5, 2.0
+STEREO_SCREEN = ScreenSize(1280, 720)
+STEREO_FRAMES = 11
 DEMO = resource_folder("assets") / "motorcycle" / "motorcycle.png"
 
 
@@ -81,6 +86,8 @@ def rows(app: TimedApp, began: tuple[float, float], idle_s: float) -> Iterator[t
         app.do(do(lens.set_aperture, aperture))
         step_while(app, lambda: not is_idle(app))
         yield f"dragging, aperture of {aperture} view steps", drag(app)
+        step_while(app, lambda: not is_idle(app))
+        yield f"stereo frames, aperture of {aperture} view steps", stereo_frames(app)
         step_while(app, lambda: not is_idle(app))
     app.do(do(lens.set_aperture, 0))
     yield "a head that jumps: from sending the packet to asking for the picture", jump(app)
@@ -215,6 +222,27 @@ def free_place() -> tuple[str, int]:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         probe.bind(("127.0.0.1", 0))
         return "127.0.0.1", probe.getsockname()[1]
+
+
+def stereo_frames(app: App) -> str:
+    """Draw both eyes' pictures of a moving viewpoint at full quality, and the same pictures alone; return the time."""
+    scene, view = app.state.scene, app.stereo_screen.view
+    assert scene is not None
+    alone_s, woven_s = [], []
+    app.do(do(stereo.set_eyes, 1.0))
+    for s in np.linspace(-1, 1, STEREO_FRAMES):
+        app.do(do(lens.move_eye, ViewOffset(0.3, float(s))))
+        weave = stereo.weave_of(app.state, scene, STEREO_SCREEN)
+        began = time.process_time()
+        for eye in weave.eyes:
+            app.scene_view.renderer.render_in_time(eye.optics, weave.picture_px, math.inf, eye.part)
+        alone_s.append(time.process_time() - began)
+        began = time.process_time()
+        view.draw(weave, math.inf)
+        woven_s.append(time.process_time() - began)
+    view.release()
+    alone, woven = (1e3 * float(np.median(times)) for times in (alone_s, woven_s))
+    return f"{woven:.0f} ms of processor time, {woven / alone:.2f} times two frames of one eye"
 
 
 def pointer_moves(app: App) -> Iterator[str]:

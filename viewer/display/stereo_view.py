@@ -13,6 +13,9 @@ from viewer.gpu.render_targets import RenderTarget
 from viewer.gpu.weaving import Weaver
 from viewer.model.state.stereo import Weave
 
+MAX_RENDERERS = 2
+"""Largest number of pictures that are refined side by side; the targets of more would not fit the graphics card."""
+
 
 @dataclass(frozen=True)
 class WovenPicture:
@@ -36,7 +39,7 @@ class StereoView:
         self._weaver = Weaver(gl.ctx, scene_view.renderer.programs)
         self._renderers: list[Renderer] = []
         self._field: LightFieldTexture | None = None
-        self._drawn_at = 0.0
+        self._begun, self._complete, self._drawn_at = -1, 0, 0.0
         self.drawn: WovenPicture | None = None
 
     @property
@@ -48,7 +51,13 @@ class StereoView:
     @property
     def is_drawing(self) -> bool:
         """Whether the last picture can become better."""
+        if self._draws_in_turn:
+            return self.drawn is not None and self._complete < len(self.drawn.weave.eyes)
         return any(not renderer.is_converged for renderer in self._renderers)
+
+    @property
+    def _draws_in_turn(self) -> bool:
+        return self.drawn is not None and len(self._renderers) < len(self.drawn.weave.eyes)
 
     @property
     def shows_all_views(self) -> bool:
@@ -84,31 +93,57 @@ class StereoView:
     def _begin(self, weave: Weave, budget_s: float) -> None:
         """Draw each picture as well as the time is expected to allow, all at one level of quality."""
         view, count = self._scene_view, len(weave.eyes)
-        if len(self._renderers) != count:
+        wanted = count if count <= MAX_RENDERERS else 1
+        if len(self._renderers) != wanted:
             self.release()
-            self._renderers = [Renderer(self._gl, view.renderer) for _ in range(count)]
-        self._field, level = view.renderer.drawn_field, None
+            self._renderers = [Renderer(self._gl, view.renderer) for _ in range(wanted)]
+        self._field, level, converged = view.renderer.drawn_field, None, 0
         self._weaver.prepare(weave)
-        for renderer, eye in zip(self._renderers, weave.eyes):
+        for i, eye in enumerate(weave.eyes):
+            renderer = self._renderers[i % wanted]
             renderer.render_in_time(eye.optics, weave.picture_px, budget_s / count, eye.part, level)
-            level = renderer.level
-        self._present(weave)
+            level, converged = renderer.level, converged + renderer.is_converged
+            self._present(i)
+        self._begun, self._complete = -1, count if converged == count else 0
+        self._weave(weave)
 
     def _refined(self, drawn: WovenPicture, budget_s: float) -> WovenPicture:
-        """Continue a picture that is behind; show a pass once every picture has it."""
-        unfinished = [renderer for renderer in self._renderers if not renderer.is_converged]
-        passes = min(renderer.passes_shown for renderer in unfinished)
-        next(renderer for renderer in unfinished if renderer.passes_shown == passes).refine(budget_s)
-        if any(renderer.passes_shown == passes for renderer in unfinished):
+        """Continue the pictures; show a pass once every picture has it."""
+        if self._draws_in_turn:
+            self._refine_in_turn(drawn.weave, budget_s)
+            is_behind = self.is_drawing
+        else:
+            unfinished = [renderer for renderer in self._renderers if not renderer.is_converged]
+            passes = min(renderer.passes_shown for renderer in unfinished)
+            next(renderer for renderer in unfinished if renderer.passes_shown == passes).refine(budget_s)
+            is_behind = any(renderer.passes_shown == passes for renderer in unfinished)
+        if is_behind:
             return drawn
-        self._present(drawn.weave)
+        for i in range(0 if self._draws_in_turn else len(self._renderers)):
+            self._present(i)
+        self._weave(drawn.weave)
         self.drawn = replace(drawn, passes=drawn.passes + 1)
         return self.drawn
 
-    def _present(self, weave: Weave) -> None:
-        """Write the pictures as they are and weave them."""
-        size_px = self._renderers[0].shown_px
-        for i, renderer in enumerate(self._renderers):
-            renderer.present(self._weaver.tile(i, size_px))
-        self._weaver.weave(weave, size_px)
+    def _refine_in_turn(self, weave: Weave, budget_s: float) -> None:
+        """Draw pictures to their ends, one after the other, until the time is spent."""
+        renderer, end = self._renderers[0], time.perf_counter() + budget_s
+        while self._complete < len(weave.eyes):
+            if self._begun < self._complete:
+                self._begun, eye = self._complete, weave.eyes[self._complete]
+                renderer.render(eye.optics, weave.picture_px, part=eye.part)
+            renderer.refine(max(end - time.perf_counter(), 0.0))
+            if renderer.is_converged:
+                self._present(self._complete)
+                self._complete += 1
+            if time.perf_counter() >= end:
+                return
+
+    def _present(self, index: int) -> None:
+        """Write a picture as it is into the sheet."""
+        renderer = self._renderers[index % len(self._renderers)]
+        renderer.present(self._weaver.tile(index, renderer.shown_px))
+
+    def _weave(self, weave: Weave) -> None:
+        self._weaver.weave(weave, self._renderers[0].shown_px)
         self._gl.ctx.finish()

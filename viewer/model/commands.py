@@ -49,7 +49,7 @@ OVERLAY_WORDS: dict[OverlayKind, str] = {"disparity": "depth", "entropy": "entro
 LOOP_WORDS: dict[LoopKind, str] = {"circle": "Circle", "eight": "Figure of eight", "swing": "Swing"}
 
 STEREO_WORDS: dict[StereoMode, tuple[str, str]] = {
-    "half-sbs": ("Side by side, half width", "3D televisions and projectors"),
+    "half-sbs": ("Side by side, half", "3D televisions and projectors"),
     "sbs": ("Side by side, full", "displays that weave any full-screen pair, and screens twice as wide"),
     "top-bottom": ("One above the other", "3D televisions and projectors"),
     "rows": ("In turns by rows", "displays for polarised glasses"),

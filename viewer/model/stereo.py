@@ -141,7 +141,7 @@ def warning(scene: Scene, stereo: Stereo) -> str:
     if worst <= MAX_PARALLAX:
         return ""
     return (
-        f"Parallax {place} the screen is {worst:.1%} of the width, and eyes bear {MAX_PARALLAX:.0%}: reduce the eye"
+        f"Parallax {place} the screen is {100 * worst:.1f} % of the width, and eyes bear 3 %: reduce the eye"
         f" distance, or move the screen {'nearer' if place == 'before' else 'farther'}."
     )
 

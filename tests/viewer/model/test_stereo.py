@@ -15,7 +15,7 @@ from iibr_core.types import GridShape, ViewOffset
 from viewer.app.keys import Keys, actions_from_keys
 from viewer.model import stereo
 from viewer.model.state.app_state import AppState
-from viewer.model.state.stereo import STEREO_MODES, Monitor, Stereo
+from viewer.model.state.stereo import STEREO_MODES, Monitor, Stereo, StereoMode
 
 SCENE = Scene(Source("a.png"), "a", 600, 400, GridShape(3, 9), (-2.0, 4.0), "a.pfm")
 PANEL, TELEVISION = Monitor("eDP-1", 0, 0, 1920, 1080), Monitor("HDMI-1", 1920, 0, 3840, 2160)
@@ -55,7 +55,7 @@ def test_a_comfortable_eye_distance_is_found_and_more_is_warned_of() -> None:
     assert stereo.warning(SCENE, usual) == ""
     wide = replace(usual, eyes=8.0)
     assert stereo.parallax(SCENE, wide) == pytest.approx((-2 * 8 / 600, 4 * 8 / 600))
-    assert stereo.warning(SCENE, wide).startswith("Parallax before the screen is 5.3% of the width")
+    assert stereo.warning(SCENE, wide).startswith("Parallax before the screen is 5.3 % of the width")
     assert stereo.warning(SCENE, replace(wide, screen=4.0)).startswith("Parallax behind the screen")
     assert stereo.eye_distance(SCENE, replace(usual, eyes=100.0)) == 8.0
     flat = replace(SCENE, grid=GridShape(1, 1), disparity_range_px=(0.0, 0.0))
@@ -65,8 +65,8 @@ def test_a_comfortable_eye_distance_is_found_and_more_is_warned_of() -> None:
 
 @pytest.mark.parametrize("mode", STEREO_MODES)
 @pytest.mark.parametrize("size", [ScreenSize(1920, 1080), ScreenSize(641, 3), ScreenSize(1, 1)])
-def test_pictures_fit_their_rooms_and_places_lead_back(mode: str, size: ScreenSize) -> None:
-    state = stereo.set_mode(STATE, mode)  # type: ignore[arg-type]
+def test_pictures_fit_their_rooms_and_places_lead_back(mode: StereoMode, size: ScreenSize) -> None:
+    state = stereo.set_mode(STATE, mode)
     weave = stereo.weave_of(state, SCENE, size)
     assert all(1 <= inner <= room <= whole for inner, room, whole in zip(weave.picture_px, weave.frame_px, size))
     assert weave.is_swapped == (mode == "cross-eyed")

@@ -29,7 +29,7 @@ def stereo_section(state: AppState, scene: Scene) -> list[Action]:
     label("Display", MONITOR_TIP)
     wanted = stereo.monitor_of(state)
     entries = [(monitor.words, WINDOW_TIP if i == 0 else "") for i, monitor in enumerate(state.monitors)]
-    picked = combo("Display", wanted.words if wanted else WINDOW, entries, MONITOR_TIP)
+    picked = combo("Display", wanted.words if wanted else WINDOW, entries, wanted.words if wanted else MONITOR_TIP)
     actions = [] if picked is None else [do(stereo.choose_monitor, state.monitors[picked])]
     label("Arrangement", MODE_TIP)
     picked = combo("Arrangement", STEREO_WORDS[choice.mode][0], [STEREO_WORDS[mode] for mode in STEREO_MODES], MODE_TIP)
