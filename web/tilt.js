@@ -1,6 +1,8 @@
 // Turns of a device that a hand holds, from the events of its orientation.
 
-export const NOISE_DEG = 0.4;  // Largest turn that leaves the picture as it is.
+import { clamp } from "./renderer.js";
+
+const NOISE_DEG = 0.4;  // Largest turn that leaves the picture as it is.
 
 const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 
@@ -25,8 +27,8 @@ export class Tilt {
             Object.assign(this, { angle: screenAngle, axes: { t: mixed(-s, -c), s: mixed(c, -s) }, t: 0, s: 0 });
         }
         const turned = (axis) => {
-            const ahead = Math.asin(Math.max(Math.min(dot(front, this.axes[axis]), 1), -1)) * 180 / Math.PI - this[axis];
-            const beyond = ahead - Math.max(Math.min(ahead, NOISE_DEG), -NOISE_DEG);
+            const ahead = Math.asin(clamp(dot(front, this.axes[axis]), -1, 1)) * 180 / Math.PI - this[axis];
+            const beyond = ahead - clamp(ahead, -NOISE_DEG, NOISE_DEG);
             this[axis] += beyond;
             return beyond;
         };

@@ -5,7 +5,7 @@ import { NUMBERS, Renderer, WHOLE, clamp, pick } from "./renderer.js";
 import { Tilt } from "./tilt.js";
 import { $, load, say } from "./views.js";
 
-const SWING_S = 9, MOST_SWINGS = 3, BAR_AWAY_MS = 4000, HINT_MS = 6000, MOST_ZOOM = 16;
+const SWING_S = 9, MOST_SWINGS = 3, BAR_AWAY_MS = 4000, HINT_MS = 6000, MOST_ZOOM = 16, FOCUS_STEPS = 50;
 const TAP_MS = 350, TAP_PX = 8, DOUBLE_TAP_PX = 30;  // Longest time between two taps; movement within one; between two.
 const LINE_PX = 33, NOTCH_PX = 100;  // Scrolling by a line, and by a notch of a plain wheel.
 const TILT_DEG = 20;  // Turn of a device that leads to the outermost view.
@@ -24,6 +24,7 @@ class Page {
         this.optics = { eye: { t: 0, s: 0 }, focus: field.focus, aperture: field.aperture };
         this.swings = !still && field.order.length > 1;
         this.pointers = new Map();
+        this.focusStep = (field.focusLimits[1] - field.focusLimits[0]) / FOCUS_STEPS;
         for (const name of ["focus", "aperture"]) {
             [$(name).min, $(name).max] = field[`${name}Limits`];
             $(name).addEventListener("input", () => this.set({ [name]: $(name).valueAsNumber }));
@@ -38,19 +39,16 @@ class Page {
         document.addEventListener("pointermove", ({ pointerType }) => pointerType === "touch" || this.showBar());
         for (const name of ["click", "keydown", "input"]) document.addEventListener(name, () => this.showBar());
         for (const button of document.querySelectorAll("button[data-do]")) {
-            button.addEventListener("click", () => {
-                this[button.dataset.do]();
-                $("actions").hidePopover?.();
-            });
+            button.addEventListener("click", () => this[button.dataset.do]());
         }
-        this.tilted = this.tilted.bind(this);
+        $("actions").addEventListener("click", () => $("actions").hidePopover?.());
         $("tilt").hidden = !globalThis.DeviceOrientationEvent || !matchMedia("(pointer: coarse)").matches;
         offerHeadset();
         $("full").hidden = !document.fullscreenEnabled;
         this.showBar();
     }
 
-    // Draws by this renderer from now on: the first one, or the one that follows when the graphics driver lost its data.
+    // Draws by this renderer from now on: the first one, or the next when the graphics driver lost its data.
     use(field, renderer) {
         Object.assign(this, { field, renderer });
         this.canvas.hidden = false;
@@ -97,12 +95,11 @@ class Page {
         const rests = now - this.drawnAt > 150;
         if (this.changed || (this.level && rests && !this.isBest)) {
             // As good as there is time for while the hand moves, the best once it rests.
-            const took = now - this.drawnAt, { width, height } = this.size();
+            const took = now - this.drawnAt;
             const change = this.changed && took < 400 ? (took > SLOW_MS) - (took < QUICK_MS) : 0;
             this.level = clamp(this.level + change, 0, NUMBERS.LEVELS.length - 1);
             const level = NUMBERS.LEVELS[this.changed ? this.level : 0];
-            const [w, h] = [width, height].map((side) => Math.max(Math.round(side * level.scale), 1));
-            renderer.begin(this.optics, this.part, w, h, level);
+            renderer.begin(this.optics, this.part, ...this.size(level.scale), level);
             this.isBest = level === NUMBERS.LEVELS[0];
             [this.drawnAt, this.changed] = [now, false];
             renderer.step();
@@ -122,7 +119,7 @@ class Page {
         this.set({ eye: { t: 0.2 * t[1] * Math.sin(2 * angle), s: 0.6 * s[1] * Math.sin(angle) } }, false);
     }
 
-    // The picture's box on the canvas, CSS pixels, and its size on the screen.
+    // Returns the picture's box on the canvas, CSS pixels.
     box() {
         const { width, height } = this.canvas.getBoundingClientRect(), { field } = this;
         const scale = Math.min(width / field.width, height / field.height);
@@ -130,11 +127,12 @@ class Page {
         return { left: (width - w) / 2, top: (height - h) / 2, width: w, height: h };
     }
 
-    size() {
+    // Returns width and height of the drawn picture. scale: 1, or less for speed.
+    size(scale) {
         const { width, height } = this.box(), { field } = this;
         const most = Math.min(DETAIL * Math.max(field.width, field.height), MOST_SIDE_PX);
-        const ratio = Math.min(devicePixelRatio, most / Math.max(width, height, 1));
-        return { width: Math.max(Math.round(width * ratio), 1), height: Math.max(Math.round(height * ratio), 1) };
+        const ratio = scale * Math.min(devicePixelRatio, most / Math.max(width, height, 1));
+        return [width, height].map((side) => Math.max(Math.round(side * ratio), 1));
     }
 
     // Returns a place of the canvas in the whole picture, 0..1.
@@ -188,11 +186,6 @@ class Page {
         else this.set({ focus: this.optics.focus - notches * this.focusStep });
     }
 
-    get focusStep() {
-        const [far, near] = this.field.focusLimits;
-        return (near - far) / 50;
-    }
-
     // Enlarges about a place, and moves by a share of what is seen.
     zoom(factor, about, right = 0, down = 0) {
         const { x, y, width } = this.part, { u, v } = this.place(about), size = clamp(width / factor, 1 / MOST_ZOOM, 1);
@@ -203,22 +196,20 @@ class Page {
 
     keydown(event) {
         if (event.ctrlKey || event.metaKey || event.altKey) return;
-        const { eye, focus, aperture } = this.optics, { focusStep: step } = this;
-        const onSlider = event.target.type === "range", far = event.shiftKey ? 1 : 0.25;
-        const middle = { x: this.canvas.clientWidth / 2, y: this.canvas.clientHeight / 2 };
+        const { optics: { eye, focus, aperture }, focusStep: step } = this;
+        const { canvas: { clientWidth, clientHeight } } = this, middle = { x: clientWidth / 2, y: clientHeight / 2 };
+        const far = event.shiftKey ? 1 : 0.25, focused = (steps) => () => this.set({ focus: focus + steps * step });
+        const moved = (t, s) => () => this.set({ eye: { t: eye.t + far * t, s: eye.s + far * s } });
         const ofPicture = {
-            ArrowLeft: () => this.set({ eye: { ...eye, s: eye.s - far } }),
-            ArrowRight: () => this.set({ eye: { ...eye, s: eye.s + far } }),
-            ArrowUp: () => this.set({ eye: { ...eye, t: eye.t - far } }),
-            ArrowDown: () => this.set({ eye: { ...eye, t: eye.t + far } }),
+            ArrowLeft: moved(0, -1), ArrowRight: moved(0, 1), ArrowUp: moved(-1, 0), ArrowDown: moved(1, 0),
             PageUp: () => this.zoom(1.25, middle), PageDown: () => this.zoom(0.8, middle), Home: () => this.reset(),
         };
         const ofPage = {
-            "+": () => this.set({ focus: focus + step }), "-": () => this.set({ focus: focus - step }),
+            "+": focused(1), "=": focused(1), "-": focused(-1),
             "]": () => this.set({ aperture: aperture + 0.5 }), "[": () => this.set({ aperture: aperture - 0.5 }),
             f: () => event.repeat || this.full(), s: () => event.repeat || this.save(), r: () => this.reset(),
         };
-        const action = ofPage[event.key.toLowerCase()] ?? (onSlider ? null : ofPicture[event.key]);
+        const action = ofPage[event.key.toLowerCase()] ?? (event.target.type !== "range" && ofPicture[event.key]);
         if (!action) return;
         action();
         event.preventDefault();
@@ -251,9 +242,7 @@ class Page {
         });
     }
 
-    headset() {
-        enterHeadset(this);
-    }
+    headset = () => enterHeadset(this);
 
     // Starts or stops moving the viewpoint by the device's tilt.
     async tilt() {
@@ -265,16 +254,16 @@ class Page {
         const answer = await DeviceOrientationEvent.requestPermission?.().catch(() => "denied") ?? "granted";
         if (answer === "granted" && isOn()) return addEventListener("deviceorientation", this.tilted);
         $("tilt").setAttribute("aria-pressed", false);
-        if (answer !== "granted") hint("The browser does not share how the device is held: allow it, and press Tilt again.");
+        if (answer !== "granted") hint("The browser does not share the device's tilt: allow it, then press Tilt.");
     }
 
     // Moves the viewpoint by as much as the device turned since the last event.
-    tilted(event) {
+    tilted = (event) => {
         if (event.beta === null) return;
         const { t, s } = this.reading.turn(event, screen.orientation?.angle ?? 0), { eye } = this.optics;
         const { t: [, bottom], s: [, right] } = this.field.eyeLimits;
         if (t || s) this.set({ eye: { t: eye.t - t / TILT_DEG * bottom, s: eye.s - s / TILT_DEG * right } });
-    }
+    };
 }
 
 async function start() {

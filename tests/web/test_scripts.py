@@ -178,3 +178,24 @@ def test_heads_anywhere_see_what_the_grid_has_with_an_eye_each(limits, focus) ->
     across = np.array(places).reshape(-1, 61, 2)
     assert (across[..., 1] > across[..., 0]).all(), "the right eye sees a view farther right"
     assert np.diff(across, axis=1).min() >= -1e-9
+
+
+@pytest.mark.parametrize(
+    ("held", "screen", "turned"),
+    [
+        ({"alpha": 0, "beta": 40, "gamma": 0}, 0, {"beta": 50}),
+        ({"alpha": 0, "beta": 0, "gamma": -40}, 90, {"gamma": -50}),
+        ({"alpha": 0, "beta": 0, "gamma": 40}, 270, {"gamma": 50}),
+        ({"alpha": 0, "beta": 0, "gamma": -85}, 90, {"alpha": 180, "beta": 180, "gamma": 85}),
+    ],
+)
+def test_a_screen_whose_upper_border_is_raised_turns_down_however_it_is_held(held, screen, turned) -> None:
+    """A screen upright in landscape lies where angles jump."""
+    code = (
+        f"import {{ Tilt }} from {json.dumps((WEB / 'tilt.js').as_uri())};\n"
+        f"const tilt = new Tilt(), held = {json.dumps(held)}, turned = {{ ...held, ...{json.dumps(turned)} }};\n"
+        f"console.log(JSON.stringify([held, turned, held, held].map(one => tilt.turn(one, {screen}))));"
+    )
+    done = subprocess.run(["node", "--input-type=module", "-e", code], capture_output=True, text=True, check=True)
+    found = [one[axis] for one in json.loads(done.stdout) for axis in ("t", "s")]
+    assert found == pytest.approx([0, 0, 9.6, 0, -9.2, 0, 0, 0], abs=1e-6), "noise of 0.4 degrees turns nothing"
