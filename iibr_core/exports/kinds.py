@@ -17,7 +17,7 @@ from iibr_core.formats.light_fields.write import check_light_field
 from iibr_core.formats.outputs import check_output, check_output_folder
 from iibr_core.scenes.scene import Scene
 from iibr_core.scenes.screen_size import ScreenSize
-from iibr_core.types import ImageSize, InputError
+from iibr_core.types import GridShape, ImageSize, InputError
 
 AnimationKind = Literal["circle", "eight", "swing", "focus", "rack", "aperture"]
 ANIMATIONS: tuple[AnimationKind, ...] = ("circle", "eight", "swing", "focus", "rack", "aperture")
@@ -26,6 +26,9 @@ another and back, or the aperture."""
 DepthLayout = Literal["right", "left", "below"]
 DEPTH_LAYOUTS: tuple[DepthLayout, ...] = ("right", "left", "below")
 """Places of the depth map beside its picture."""
+Target = Literal["headset"]
+HEADSET_GRID = GridShape(5, 9)
+"""Grid of a photo's views for headsets: between both eyes lie three views, and a head moves more to the sides."""
 STACK_BITS = 8, 16
 DEFAULT_SIZE = ScreenSize(0, 0)
 DEFAULT_SECONDS = 4.0
@@ -50,8 +53,8 @@ class ExportOptions:
     focus disparities (px per view step) of the motion "rack", None for the nearest and the farthest. frames: number of
     frames of an animation or pictures of a stack. rate: frames a second. row: row of an epipolar plane image. show:
     whether a quilt is shown on a display. budget: maximum size of a web page in bytes, None for no limit. credit:
-    whether the page names the photo's title, author and rights. layout: place of the depth map beside its picture.
-    bits: bits a channel of the pictures of a stack.
+    whether the page names the photo's title, author and rights. target: device that shows the page, None for any
+    browser. layout: place of the depth map beside its picture. bits: bits a channel of the pictures of a stack.
     """
 
     size: ScreenSize = DEFAULT_SIZE
@@ -66,6 +69,7 @@ class ExportOptions:
     show: bool = False
     budget: int | None = None
     credit: bool = False
+    target: Target | None = None
     layout: DepthLayout = "right"
     bits: int = 8
 
@@ -163,7 +167,7 @@ EXPORTS = {
         optics="stereo:optics_of_eyes", purpose="display",
     ),
     "web": ExportKind(
-        "Web page, one file", (".html",), "web:write_page", ("budget", "credit"),
+        "Web page, one file", (".html",), "web:write_page", ("budget", "credit", "target"),
         gallery="web_gallery:write_gallery",
     ),
     "mp4": _animation("Video, MP4", ".mp4", 30, needs=("av",)),

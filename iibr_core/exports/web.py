@@ -60,7 +60,8 @@ def write_page(path: Path, source: ExportSource, options: ExportOptions) -> str:
 def make_page(source: ExportSource, options: ExportOptions) -> tuple[bytes, WebViews]:
     """Return the page and its views."""
     scene = source.scene
-    form = form_that_fits(scene.grid, ImageSize(scene.height, scene.width), can_encode())
+    size, keeps_views = ImageSize(scene.height, scene.width), options.target == "headset"
+    form = form_that_fits(scene.grid, size, can_encode(), keeps_views)
     store = ViewStore(source.views(with_disparity=True, in_srgb=False), scene.grid, form, scene.color_space)
     words = _words(source, options.credit)
     if options.budget is None:

@@ -102,11 +102,17 @@ class WebViews:
         return {**{name: stream.data for name, stream in self.streams.items()}, **self.pictures}
 
 
-def form_that_fits(grid: GridShape, size: ImageSize, is_video: bool) -> WebForm:
-    """Return the form with the most views, at their size, that browsers can hold in memory."""
+def form_that_fits(grid: GridShape, size: ImageSize, is_video: bool, keeps_views: bool = False) -> WebForm:
+    """Return the form with the most views, at their size, that browsers can hold in memory.
+
+    keeps_views: whether too large views are made smaller rather than fewer.
+    """
     for every in range(1, max(grid) + 1):
         form = WebForm(every, min(1.0, MAX_SIDE_PX / max(size)), is_video=is_video)
-        count, (height, width) = len(places_of(grid, form)), form.size_of(size)
+        count = len(places_of(grid, form))
+        if keeps_views:
+            form = replace(form, scale=min(form.scale, math.sqrt(MAX_TEXELS / (count * math.prod(size))) - 1e-3))
+        height, width = form.size_of(size)
         if count <= MAX_VIEWS and count * height * width <= MAX_TEXELS:
             break
     return form

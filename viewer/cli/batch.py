@@ -52,7 +52,7 @@ def batch(
         if workers is not None:
             raise InputError("--workers starts processes here, --dask uses other machines: leave out one of both")
         require_extra("batch", "distributed")
-    source = photo.source("", grid, is_literal=literal)
+    source = kind_options.finer(photo.source("", grid, is_literal=literal))
     require_model(source.depth)
     open_drawn: OpenDrawn | None = None
     if kind.is_drawn:

@@ -48,7 +48,7 @@ def export(
     Example: iibr export photo.png --to quilt --device portrait -o photo.png
     """
     kind = require_kind(context, to)
-    source = scene.source(path, grid, focus_disparity, literal)
+    source = kind_options.finer(scene.source(path, grid, focus_disparity, literal))
     shared.require_heeded(context, path)
     kinds.require_ending(kind, output)
     inputs = shared.inputs_of_command(context, source)

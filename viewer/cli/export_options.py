@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -13,6 +13,7 @@ from iibr_core.exports import kinds
 from iibr_core.exports.kinds import EXPORTS
 from iibr_core.formats.quilts import DEVICES
 from iibr_core.runtime.extras import require_extra
+from iibr_core.scenes.scene import Source
 from iibr_core.scenes.screen_size import ScreenSize
 from viewer.cli.option_records import flag, option
 from viewer.cli.options import LensOptions, name_in, require_not_given, size_from_text
@@ -71,6 +72,14 @@ class KindOptions:
         int | None, option("Largest size of a web page, such as 3MB.", "SIZE", "no limit", parser=budget_from_text)
     ] = None
     credit: Annotated[bool, flag("--credit", "Show the photo's title, author and copyright in a web page.")] = False
+    target: Annotated[
+        kinds.Target | None, option("Device for a web page: headset takes a finer grid.", None, "any browser", "--for")
+    ] = None
+
+    def finer(self, source: Source) -> Source:
+        """Return the source with the grid that the device needs, unless a grid is given."""
+        is_open = self.target == "headset" and source.grid is None
+        return replace(source, grid=kinds.HEADSET_GRID) if is_open else source
 
     def options(self, keys: Path | None = None, row: int | None = None, show: bool = False) -> kinds.ExportOptions:
         """Return the options of an export, with those that only single photos have."""

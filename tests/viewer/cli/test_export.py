@@ -38,6 +38,14 @@ def test_a_drawn_kind(iibr: Iibr, photo: Path) -> None:
         assert (image.size, image.n_frames) == ((30, 20), 3)  # type: ignore[attr-defined]
 
 
+def test_a_page_for_headsets_has_a_finer_grid_unless_one_is_given(iibr: Iibr, photo: Path) -> None:
+    words = ("export", photo, "-o", "a.html", "--for", "headset", "--to")
+    for grid, views in (((), 45), (("--grid", 3), 9)):
+        assert f"note: {views} views of 96x64 px" in iibr(*words, "web", *grid, "--force").stderr
+    assert "--for: not for --to quilt" in refusal_of(iibr(*words, "quilt"))
+    assert "'fridge' is not" in refusal_of(iibr(*words[:-2], "fridge", "--to", "web"))
+
+
 def test_the_name_with_its_tag_must_not_exist(iibr: Iibr, photo: Path) -> None:
     words = ("export", photo, "--to", "half-sbs", "-o", "a.png", "--grid", 3)
     assert output_of(iibr(*words)) == "a_LRF_Half_SBS.png\n"
