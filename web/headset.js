@@ -34,9 +34,9 @@ function axisOf(at, middle, side, share, shear, [low, high]) {
 export function sightOf(field, focus, whole, eye, middle) {
     const { width, height, rowStep, eyeLimits: { t, s }, range: [farthest] } = field;
     const step = Math.max((EYES_M + HEAD_M) / (s[1] - s[0]), (focus - farthest) * whole[0] / width);
-    const [share, shareOfMiddle] = [eye, middle].map((place) => DISTANCE_M / Math.max(place[2], NEAREST_M));
-    const along = (i, m, shear, limits) => (
-        axisOf(eye[i] * share / m, middle[i] * shareOfMiddle / m, whole[i] / Math.abs(m), share, shear, limits));
+    const share = DISTANCE_M / Math.max(eye[2], NEAREST_M);
+    const along = (i, m, ...rest) => (
+        axisOf(eye[i] * share / m, middle[i] * share / m, whole[i] / Math.abs(m), share, ...rest));
     const across = along(0, step, focus / width, s), down = along(1, -step * rowStep, focus * rowStep / height, t);
     return {
         eye: { t: down.eye, s: across.eye }, dolly: [across.dolly, down.dolly],
@@ -94,19 +94,17 @@ class Headset {
     draw(view, { eye, dolly, part, size }, pointed) {
         const { page: { renderer, field, optics: { aperture } }, nearest } = this, { gl } = renderer;
         renderer.begin({ eye, focus: this.focus, aperture }, part, ...this.px);
-        const { lens, target } = renderer.picture, thresholds = [1, 0].map((i) => NUMBERS.SQRT_STEPS[i]);
+        const { lens, target } = renderer.picture, [down, across] = NUMBERS.SQRT_STEPS;
         const cameras = aperture > 0 ? samplesOf(lens, { ...field, hasDisparity: true }, 0)
             : CORNERS.map((corner) => ({ t: 0, s: 0, view: { t: 0, s: 0 }, weight: 1, answer: [...corner, 1] }));
-        renderer.pass(
-            cameras.map((camera, i) => ({ answer: [...thresholds.map((step) => fraction(i, step)), 0], ...camera })),
-            ["DOLLY"], { dolly, eye_in_grid: [eye.s + (field.columns >> 1), eye.t + (field.rows >> 1)] },
-            { nearest_views: [gl.TEXTURE_2D, nearest] },
-        );
+        renderer.pass(cameras.map((one, i) => ({ answer: [fraction(i, across), fraction(i, down), 0], ...one })), ["DOLLY"],
+            { dolly, eye_in_grid: [eye.s + (field.columns >> 1), eye.t + (field.rows >> 1)] },
+            { nearest_views: [gl.TEXTURE_2D, nearest] });
         const { transform: { inverse }, projectionMatrix } = view, layer = this.session.renderState.baseLayer;
-        const corners = CORNERS.map((corner) => [...corner.map((share, i) => (share - 0.5) * size[i]), 0, 1])
+        const corners = CORNERS.map(([x, y]) => [(x - 0.5) * size[0], (y - 0.5) * size[1], 0, 1])
             .flatMap((place) => times(projectionMatrix, times(inverse.matrix, place)));
-        const { x, y, width, height } = layer.getViewport(view);
-        renderer.draw("window.frag", [], { framebuffer: layer.framebuffer, x, y, width, height },
+        const { x, y, width, height } = layer.getViewport(view), { framebuffer } = layer;
+        renderer.draw("window.frag", [], { framebuffer, x, y, width, height },
             { "corners[0]": corners, size, pointed }, { light_sum: [gl.TEXTURE_2D, target.texture] });
     }
 
@@ -150,17 +148,21 @@ export async function offerHeadset() {
     $("headset").hidden = !await navigator.xr?.isSessionSupported("immersive-vr").catch(() => false);
 }
 
-// The page rests until the session ends.
+// The page rests until the session ends; pressed again, the button ends it.
 export async function enterHeadset(page) {
+    if (page.session) return page.session.end();
     try {
         const session = page.session = await navigator.xr.requestSession("immersive-vr"), { gl } = page.renderer;
-        session.addEventListener("end", () => page.wake(page.session = null));
+        session.addEventListener("end", () => {
+            page.session = null;
+            page.wake();
+        });
         await gl.makeXRCompatible();
         session.updateRenderState({ baseLayer: new XRWebGLLayer(session, gl, { depth: false }) });
         const headset = new Headset(page, session, await session.requestReferenceSpace("local"));
-        session.requestAnimationFrame((now, frame) => headset.frame(frame));
+        return session.requestAnimationFrame((now, frame) => headset.frame(frame));
     } catch (error) {
         page.session?.end();
-        say(`The headset shows nothing: ${error.message}.`);
+        return say(`The headset shows nothing: ${error.message}.`);
     }
 }
