@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 # isort: off
@@ -26,24 +27,17 @@ class SecondWindow:
 
     def __init__(self, first: Window, monitor: Monitor) -> None:
         """Open it; the first window's context stays current. Raises InputError."""
-        self.monitor, self.place = monitor, _nowhere
-        self._first, self._was_closed = first, False
-        found = next((each for each in glfw.get_monitors() if monitor_record(each) == monitor), None)
-        if found is None:
-            raise InputError(f"{monitor.words}: no such monitor is connected")
+        self.monitor, self.place, self._first = monitor, lambda x, y: (x, y), first
+        self.handle: Any = None
         hint_context()
-        for hint in (glfw.AUTO_ICONIFY, glfw.CENTER_CURSOR, glfw.SCALE_TO_MONITOR):
-            glfw.window_hint(hint, False)
-        glfw.window_hint(glfw.REFRESH_RATE, glfw.get_video_mode(found).refresh_rate)
-        self.handle: Any = glfw.create_window(monitor.width, monitor.height, "iibr", found, first.handle)
+        for found in (each for each in glfw.get_monitors() if monitor_record(each) == monitor):
+            for hint in (glfw.AUTO_ICONIFY, glfw.CENTER_CURSOR):
+                glfw.window_hint(hint, False)
+            glfw.window_hint(glfw.REFRESH_RATE, glfw.get_video_mode(found).refresh_rate)
+            self.handle = glfw.create_window(monitor.width, monitor.height, "iibr", found, first.handle)
         if not self.handle:
             raise InputError(f"{monitor.words}: no window can be opened there")
-        try:
-            self._screen = TextureScreen(self.handle)
-        except InputError:
-            first.wait_for_screen(True)
-            glfw.destroy_window(self.handle)
-            raise
+        self._screen = TextureScreen(self.handle)
         glfw.swap_interval(1)
         first.wait_for_screen(False)  # two windows that wait would halve the frame rate
         self._listen()
@@ -74,18 +68,16 @@ class SecondWindow:
     def _listen(self) -> None:
         """Pass mouse and keys on to ImGui as if they were the first window's."""
         first = ctypes.cast(self._first.handle, ctypes.c_void_p).value or 0
-        backend = imgui.backends
 
         def move(_: Any, x: float, y: float) -> None:
             ratio = self.size_px.width / max(glfw.get_window_size(self.handle)[0], 1)
-            backend.glfw_cursor_pos_callback(first, *self.place(x * ratio, y * ratio))
+            imgui.backends.glfw_cursor_pos_callback(first, *self.place(x * ratio, y * ratio))
 
-        glfw.set_key_callback(self.handle, lambda _, *event: backend.glfw_key_callback(first, *event))
-        glfw.set_mouse_button_callback(self.handle, lambda _, *event: backend.glfw_mouse_button_callback(first, *event))
-        glfw.set_scroll_callback(self.handle, lambda _, *event: backend.glfw_scroll_callback(first, *event))
-        glfw.set_cursor_enter_callback(self.handle, lambda _, is_in: backend.glfw_cursor_enter_callback(first, is_in))
+        for name in ("key", "mouse_button", "scroll", "cursor_enter"):
+            take = partial(_pass_on, getattr(imgui.backends, f"glfw_{name}_callback"), first)
+            getattr(glfw, f"set_{name}_callback")(self.handle, take)
         glfw.set_cursor_pos_callback(self.handle, move)
 
 
-def _nowhere(x: float, y: float) -> tuple[float, float]:
-    return -1.0, -1.0
+def _pass_on(callback: Callable[..., None], window: int, _: Any, *event: float) -> None:
+    callback(window, *event)

@@ -6,7 +6,6 @@ from dataclasses import replace
 from functools import partial
 
 from iibr_core.scenes.rect import Rect
-from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import InputError
 from viewer.app.pointer import Pointer
 from viewer.app.second_window import SecondWindow
@@ -30,7 +29,6 @@ class StereoScreen:
         self._window = window
         self.second: SecondWindow | None = None
         self.picture: WovenPicture | None = None
-        self._shown: WovenPicture | None = None
 
     @property
     def texture(self) -> int | None:
@@ -39,24 +37,24 @@ class StereoScreen:
 
     def follow(self, state: AppState) -> list[Action]:
         """Open, move or close the second window as the state asks; return what the user or the system changed."""
-        if self._window.monitors != state.monitors:
-            return [do(stereo.set_monitors, self._window.monitors)]
-        wanted = state.stereo.monitor if state.stereo.is_shown else None
+        monitors, wanted = self._window.monitors, state.stereo.monitor if state.stereo.is_shown else None
+        if monitors != state.monitors:
+            return [do(stereo.set_monitors, monitors)]
         if self.second is not None and self.second.take_closing():
             return [do(stereo.show, False)]
         if self.second is not None and self.second.monitor != wanted:
             self.second.close()
             self.second = None
-        if not state.stereo.is_shown:
-            if self.picture is not None:
-                self.view.release()
+        if not state.stereo.is_shown and self.picture is not None:
+            self.view.release()
             self.picture = None
-        elif wanted is not None and self.second is None:
+        if wanted is not None and self.second is None:
+            self.picture = None
             try:
                 self.second = SecondWindow(self._window, wanted)
             except InputError as error:
+                self._window.wait_for_screen(True)
                 return [do(stereo.show, False), do(messages.notify, Notice(str(error), is_error=True))]
-            self._shown = None
         return []
 
     def draw(self, state: AppState, layout: Layout) -> bool:
@@ -64,31 +62,27 @@ class StereoScreen:
         size_px = self.second.size_px if self.second else self._window.framebuffer_size
         if not state.stereo.is_shown or state.scene is None or not all(size_px):
             return False
-        weave = stereo.weave_of(state, state.scene, size_px)
+        weave, before = stereo.weave_of(state, state.scene, size_px), self.picture
         self.picture = self.view.draw(weave)
-        if self.second is not None:
+        if self.second is not None and self.picture is not None:
             self.second.place = partial(place_in_window, weave, layout)
-        if self.picture is None or self.picture == self._shown:
-            return False
-        self._shown = self.picture
-        if self.second is not None:
-            self.second.show(self.view.screen.texture.glo, ScreenSize(*size_px))
-        return True
+            if self.picture != before:
+                self.second.show(self.view.screen.texture.glo, size_px)
+        return self.picture != before
 
     def pointer(self, pointer: Pointer, layout: Layout) -> Pointer:
         """Return the pointer over the picture beside the panel, if it is over a stereo picture in the first window."""
         if self.texture is None or self.picture is None:
             return pointer
-        weave, ratio = self.picture.weave, layout.pixel_ratio
-        x, y = place_in_window(weave, layout, ratio * pointer.x, ratio * pointer.y)
-        pressed = place_in_window(weave, layout, ratio * pointer.pressed_x, ratio * pointer.pressed_y)
-        return replace(pointer, x=x, y=y, pressed_x=pressed[0], pressed_y=pressed[1])
+        ratio, place = layout.pixel_ratio, partial(place_in_window, self.picture.weave, layout)
+        x, y = place(ratio * pointer.x, ratio * pointer.y)
+        pressed_x, pressed_y = place(ratio * pointer.pressed_x, ratio * pointer.pressed_y)
+        return replace(pointer, x=x, y=y, pressed_x=pressed_x, pressed_y=pressed_y)
 
     def close(self) -> None:
         """Close the second window and free everything."""
         if self.second is not None:
             self.second.close()
-            self.second = None
         self.view.release()
 
 

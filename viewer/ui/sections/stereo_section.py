@@ -43,7 +43,7 @@ def stereo_section(state: AppState, scene: Scene) -> list[Action]:
         colored(warning, imgui.ImVec4(*palette_of(state.preferences.theme).warning))
     swaps = checkbox("Swap the eyes", choice.is_swapped, SWAP_TIP) != choice.is_swapped
     actions += [do(stereo.swap_eyes)] if swaps else []
-    if button("Focus on the screen", FOCUS_TIP, state.optics.focus_disparity != plane):
+    if button("Screen at the focus", FOCUS_TIP, state.optics.focus_disparity != plane):
         actions.append(do(stereo.set_screen, state.optics.focus_disparity))
     imgui.same_line()
     word = "Close" if shown.is_shown else "Show"
