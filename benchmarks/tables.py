@@ -23,7 +23,7 @@ from pathlib import Path
 from benchmarks.report import ROOT, git, markdown
 from iibr_core.types import InputError
 
-CODE = ("iibr_core", "viewer", "shaders")
+CODE = ("iibr_core", "viewer", "shaders", "web")
 """Folders whose changes make a table old."""
 NEEDS = {
     "DATA": "scenes as `iibr evaluate` takes them: DATA=DIR",
@@ -49,7 +49,7 @@ class Table:
     @property
     def needs(self) -> list[str]:
         """Keys of NEEDS that the command needs."""
-        special = {"window": "X", "ablation": "torch"}
+        special = {"window": "X", "pages": "X", "ablation": "torch"}
         return [need for need in NEEDS if need in self.command.split() or need == special.get(self.name)]
 
     @property
@@ -72,6 +72,7 @@ TABLES = (
     Table("window", ACCURACY, "window", 1),
     Table("ablation", ACCURACY, "ablation --maps exact,soft --drawn 4 --data DATA", 6),
     Table("free-views", ACCURACY, "free-views", 2),
+    Table("pages", "docs/exports.md", "pages --data DATA", 6),
     Table("method", "", "method-figures docs/method", 1),
     Table("pictures", "", "docs/make_pictures.py docs/gallery", 4),
 )
