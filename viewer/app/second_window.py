@@ -27,7 +27,8 @@ class SecondWindow:
 
     def __init__(self, first: Window, monitor: Monitor) -> None:
         """Open it; the first window's context stays current. Raises InputError."""
-        self.monitor, self.place, self._first = monitor, lambda x, y: (x, y), first
+        self.monitor, self._first = monitor, first
+        self.place: Place = lambda x, y: (x, y)
         self.handle: Any = None
         hint_context()
         for found in (each for each in glfw.get_monitors() if monitor_record(each) == monitor):

@@ -206,8 +206,9 @@ def _words_of(warning: Warning | str) -> str:
 
 def monitor_record(monitor: Any) -> Monitor:
     """Return the record of one of GLFW's monitors."""
+    name: Any = glfw.get_monitor_name(monitor)  # bytes: the stub is wrong
     mode = glfw.get_video_mode(monitor)
-    return Monitor(glfw.get_monitor_name(monitor).decode(errors="replace"), *glfw.get_monitor_pos(monitor), *mode.size)
+    return Monitor(name.decode(errors="replace"), *glfw.get_monitor_pos(monitor), *mode.size)
 
 
 def _overlap(place: tuple[int, int, int, int], monitor: Any) -> int:

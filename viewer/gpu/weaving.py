@@ -46,7 +46,7 @@ class Weaver:
         """Return the framebuffer of the sheet, with the part in view that a picture of this size takes."""
         assert self._sheet is not None
         row, column = divmod(index, self._columns)
-        framebuffer: Any = self._sheet.framebuffer
+        framebuffer: moderngl.Framebuffer = self._sheet.framebuffer
         framebuffer.viewport = column * self._tile_px.width, row * self._tile_px.height, *drawn_px
         return framebuffer
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import subprocess
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -20,9 +21,11 @@ from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, ViewOffset
 from tests.viewer.conftest import Driver, Opener
 from tests.xvfb import display_with_monitors
+from viewer import entry
+from viewer.app.main_loop import App
 from viewer.app.preferences_store import load_preferences
 from viewer.display.offscreen import OffscreenScene
-from viewer.model import lens, messages, stereo
+from viewer.model import lens, messages, preferences, stereo
 from viewer.model.action import do
 from viewer.model.state.app_state import AppState
 from viewer.model.state.stereo import STEREO_MODES, Monitor, StereoMode
@@ -174,3 +177,39 @@ def test_monitor_and_arrangement_are_remembered(open_window: Opener, photo_path:
     second.until(lambda app: app.stereo_screen.second is not None)
     assert second.app.stereo_screen.second is not None
     assert second.app.stereo_screen.second.monitor == wanted
+
+
+def test_the_section_shows_it_and_sets_depth(viewer: Driver) -> None:
+    viewer.app.do(do(preferences.toggle_section, "stereo display"))
+    viewer.press("###show stereo")
+    viewer.until(lambda app: app.stereo_screen.second is not None)
+    viewer.slide("##Eye distance", 0.95)
+    viewer.slide("##Screen plane", 0.9)
+    state = viewer.app.state
+    assert state.scene is not None
+    assert state.stereo.eyes is not None
+    assert state.stereo.eyes > 1.5
+    assert state.stereo.screen > 0.8 * state.scene.disparity_range_px[1]
+    assert "behind the screen" in stereo.warning(state.scene, state.stereo)
+    picture = viewer.app.stereo_screen.picture
+    assert picture is not None
+    assert picture.weave == stereo.weave_of(state, state.scene, SECOND)
+
+
+@pytest.mark.usefixtures("display", "no_egl_context")
+def test_the_command_line_begins_with_it(photo_path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    shown = []
+
+    def look(app: App) -> None:
+        Driver(app).until(lambda app: app.stereo_screen.picture is not None)
+        shown.append((app.stereo_screen.picture, app.stereo_screen.second))
+
+    monkeypatch.setattr("viewer.app.main_loop.App.run", look)
+    monkeypatch.setattr("viewer.cli.view.user_folder", lambda: tmp_path / "kept")
+    monkeypatch.setattr(sys, "argv", ["iibr", "view", str(photo_path), "--grid", "3", "--stereo", "columns"])
+    assert entry.run() == 0
+    ((picture, second),) = shown
+    assert picture is not None
+    assert (picture.weave.mode, picture.weave.size_px) == ("columns", SECOND)
+    assert second is not None
+    assert load_preferences(AppState(), tmp_path / "kept").preferences.stereo.mode == "columns"

@@ -49,7 +49,7 @@ class Renderer:
         self.field: LightFieldTexture | None = None
         self.passes_shown = self.samples = self.samples_converged = 0
         self.draw_s = 0.0
-        self.programs = shared.programs if shared else ProgramCache(self.ctx)
+        self.programs: ProgramCache = shared.programs if shared else ProgramCache(self.ctx)
         self._accumulator = Accumulator(self.ctx, self.programs)
         self._fallback_view: LightFieldTexture | None = None
         self._targets = TargetCache(self.ctx)
