@@ -1,10 +1,12 @@
 #version 330 core
-// A quilt woven for a lenticular display: every subpixel shows what is seen from the side to which its lens sends the
-// light, blended from the two nearest views. Row 0 lies at the bottom, in the quilt and on the screen.
-uniform sampler2D quilt;     // view 0, the leftmost one, at the bottom left
-uniform ivec2 tiles;         // columns and rows
-uniform vec2 tile_px;        // size of a view
-uniform vec2 screen_px;      // size of the screen
+// Pictures woven for a lenticular display: every subpixel shows what is seen from the side to which its lens sends the
+// light, blended from the two nearest pictures. Row 0 of the screen lies at the bottom.
+#include "sheet.glsl"
+
+uniform vec2 screen_px;
+uniform vec2 frame_px;       // room of each picture, which is stretched over the screen
+uniform vec2 picture_px;     // each picture, in the middle of its room
+uniform int views;           // number of pictures, the leftmost first
 uniform vec2 lenses_per_px;  // lenses that a step of one pixel crosses
 uniform float center;        // part of a lens
 uniform vec2 is_mirrored;    // 1 where the picture is seen mirrored
@@ -21,21 +23,18 @@ int cell_of(ivec2 pixel) {
     return cell % cells;
 }
 
-vec3 view_color(int view, vec2 at) {
-    vec2 corner = vec2(view % tiles.x, view / tiles.x) * tile_px;
-    return texture(quilt, (corner + clamp(at * tile_px, vec2(0.5), tile_px - 0.5)) / vec2(textureSize(quilt, 0))).rgb;
-}
-
 void main() {
-    int first = 3 * cell_of(ivec2(gl_FragCoord.xy)), last = tiles.x * tiles.y - 1;
+    int first = 3 * cell_of(ivec2(gl_FragCoord.xy));
     vec2 at = mix(gl_FragCoord.xy, screen_px - gl_FragCoord.xy, is_mirrored) / screen_px;
+    vec2 place = (vec2(at.x, 1.0 - at.y) * frame_px - floor((frame_px - picture_px) / 2.0)) / picture_px;
+    color = vec4(0.0, 0.0, 0.0, 1.0);
+    if (any(lessThan(place, vec2(0.0))) || any(greaterThan(place, vec2(1.0)))) return;
     for (int i = 0; i < 3; i++) {
         vec2 emitter = gl_FragCoord.xy + emitters[first + i];
         emitter.x = mix(emitter.x, screen_px.x - emitter.x, is_mirrored.x);
         float across = fract(dot(emitter, lenses_per_px) - center);
-        float view = clamp(mix(across, 1.0 - across, is_inverted) * float(last + 1) - 0.5, 0.0, float(last));
+        float view = clamp(mix(across, 1.0 - across, is_inverted) * float(views) - 0.5, 0.0, float(views - 1));
         int left = int(view);
-        color[i] = mix(view_color(left, at), view_color(min(left + 1, last), at), view - float(left))[i];
+        color[i] = mix(picture_at(left, place), picture_at(min(left + 1, views - 1), place), view - float(left))[i];
     }
-    color.a = 1.0;
 }

@@ -9,15 +9,13 @@ from pathlib import Path
 from typing import Any
 from urllib.request import ProxyHandler, Request, build_opener
 
-import numpy as np
-from numpy.typing import NDArray
-
 from iibr_core.beyond.optics import Optics
 from iibr_core.exports.framing import draw_framed, side_pictures
 from iibr_core.exports.kinds import ExportOptions
 from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.exports.source import ExportSource
 from iibr_core.formats.files import reason_of
+from iibr_core.formats.lenticular import Calibration, parse_calibration
 from iibr_core.formats.quilts import Quilt, lay_out, quilt_for, tagged
 from iibr_core.scenes.scene import Scene
 from iibr_core.scenes.screen_size import ScreenSize
@@ -38,31 +36,19 @@ def quilt_path(path: Path, scene: Scene, options: ExportOptions) -> Path:
 
 def optics_of_quilt(scene: Scene, optics: Optics, options: ExportOptions) -> list[Optics]:
     """Return the optics of its views, the leftmost first."""
-    return [each.optics for each in quilt_pictures(scene, optics, _quilt_of(scene, options.device), options.eyes)]
+    tile, count = RenderSettings(optics, options.size), _quilt_of(scene, options.device).views
+    return [picture.optics for picture in side_pictures(scene, tile, count, options.eyes)]
 
 
 def write_quilt(path: Path, source: ExportSource, options: ExportOptions) -> str | None:
     """Write a quilt and show it if that is asked for; return a sentence about the display."""
     bridge = Bridge() if options.show else None  # a missing display is reported before anything is drawn
     quilt = _quilt_of(source.scene, options.device)
-    source.write_picture(path, draw_quilt(source, quilt, options.eyes))
-    return bridge.show_quilt(path, quilt) if bridge is not None else None
-
-
-def quilt_pictures(scene: Scene, optics: Optics, quilt: Quilt, span_views: float | None = None) -> list[RenderSettings]:
-    """Return the settings of the views of a quilt, the leftmost first.
-
-    span_views: view steps from the first viewpoint to the last, None for those of the scene.
-    """
-    tile = RenderSettings(optics, ScreenSize(quilt.tile.width, quilt.tile.height))
-    return side_pictures(scene, tile, quilt.views, scene.grid.columns - 1 if span_views is None else span_views)
-
-
-def draw_quilt(source: ExportSource, quilt: Quilt, span_views: float | None = None) -> NDArray[np.uint8]:
-    """Return the picture (H, W, 3) of a quilt. span_views: see `quilt_pictures`."""
-    pictures = quilt_pictures(source.scene, source.optics, quilt, span_views)
+    tile = RenderSettings(source.optics, ScreenSize(quilt.tile.width, quilt.tile.height))
+    pictures = side_pictures(source.scene, tile, quilt.views, options.eyes)
     drawn = (draw_framed(source, picture, quilt.aspect) for picture in pictures)
-    return lay_out(quilt, source.watched(drawn, quilt.views, "drawing views"))
+    source.write_picture(path, lay_out(quilt, source.watched(drawn, quilt.views, "drawing views")))
+    return bridge.show_quilt(path, quilt) if bridge is not None else None
 
 
 def _quilt_of(scene: Scene, device: str | None) -> Quilt:
@@ -79,11 +65,18 @@ class Bridge:
         if not isinstance(session, str) or not session:
             raise InputError(f"the program at {ADDRESS} is not Looking Glass Bridge (it names no session); update it")
         self._session = session
-        displays = _value(self._ask("available_output_devices"), "payload")
-        names = displays if isinstance(displays, dict) else {}
-        kinds = [_value(_value(displays, name), "hardwareVersion") for name in names]
-        if all(kind in (None, MONITOR) for kind in kinds):
+        listed = _value(self._ask("available_output_devices"), "payload")
+        displays = [_value(listed, name) for name in listed] if isinstance(listed, dict) else []
+        self._displays = [each for each in displays if _value(each, "hardwareVersion") not in (None, MONITOR)]
+        if not self._displays:
             raise InputError("Looking Glass Bridge sees no display; connect one, and switch it on")
+
+    def first_display(self) -> tuple[Calibration, tuple[int, int] | None]:
+        """Return the calibration of the first display, and the place (x, y) of its monitor on the desktop, if known."""
+        text, place = (_value(self._displays[0], name) for name in ("calibration", "windowCoords"))
+        x, y = (place.get(axis) if isinstance(place, dict) else None for axis in "xy")
+        display = parse_calibration(text if isinstance(text, str) else "", "the display that Bridge reports")
+        return display, (x, y) if isinstance(x, int) and isinstance(y, int) else None
 
     def show_quilt(self, path: Path, quilt: Quilt) -> str:
         """Show a written quilt on the first display; return a sentence for the user."""

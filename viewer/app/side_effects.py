@@ -21,7 +21,7 @@ from viewer.app.saving import add_copy, add_export, add_save
 from viewer.background.depth_models import actions_of_download, download, list_models
 from viewer.background.newest import Newest, message_of
 from viewer.display.scene_view import SceneView
-from viewer.model import depth_models, folder, lens, messages, opening
+from viewer.model import depth_models, folder, lens, messages, opening, stereo
 from viewer.model.action import Action, ask, do, forget_tasks
 from viewer.model.commands import action_for_path
 from viewer.model.opening import set_facts
@@ -111,6 +111,8 @@ class SideEffects:
             case tasks.PlainTask("stop download"):
                 self._downloads.cancel()
                 return [do(depth_models.set_downloading, None)]
+            case tasks.PlainTask("find display"):
+                self._submit(_find_display)
             case tasks.PlainTask("copy"):
                 return add_copy(state, self._jobs)
             case tasks.PlainTask("paste") if self._jobs.is_copying:
@@ -177,6 +179,13 @@ def _read_facts(path: str) -> Action:
     from iibr_core.formats.images.metadata import camera_facts, read_metadata
 
     return do(set_facts, PhotoFacts(path, camera_facts(read_metadata(Path(path)))))
+
+
+def _find_display() -> Action:
+    """Return the action that shows the scene on the first display that Bridge reports. Raises InputError."""
+    from iibr_core.exports.quilt import Bridge
+
+    return do(stereo.show_on, *Bridge().first_display())
 
 
 def _read_mask(path: Path) -> Action:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -12,7 +12,6 @@ import typer
 from iibr_core.beyond.optics import Optics
 from iibr_core.depth.editing.edits import UNEDITED
 from iibr_core.exports.full_picture import require_full
-from iibr_core.exports.quilt import quilt_pictures
 from iibr_core.formats.images.picture_kinds import AS_USUAL, BEST_QUALITY, KINDS, PROFILES, PictureFormat, is_float
 from iibr_core.formats.lenticular import Calibration, read_calibration
 from iibr_core.scenes.lens_limits import LensChoice
@@ -27,6 +26,8 @@ from viewer.model import lens as lens_verbs
 from viewer.model import opening
 from viewer.model.state.app_state import AppState
 from viewer.model.state.saving import SavedSettings
+from viewer.model.state.stereo import Stereo
+from viewer.model.stereo import weave_of
 
 if TYPE_CHECKING:
     from viewer.display.offscreen import OffscreenScene
@@ -122,8 +123,10 @@ def screenshot(
         def set_lens(opened: Scene) -> Collection[Optics]:
             lens.require_within(opened)
             viewer.state = _with_lens(viewer.state, settings, choice)
-            if display is not None:
-                return [each.optics for each in quilt_pictures(opened, viewer.state.optics, display.quilt)]
+            if display is not None and size is not None:
+                shown = Stereo(display=display, screen=viewer.state.optics.focus_disparity)
+                viewer.state = replace(viewer.state, stereo=shown)
+                return [eye.optics for eye in weave_of(viewer.state, opened, size).eyes]
             return () if viewer.draws_own_pixels(_size_of(viewer, size, full)) else (viewer.state.optics,)
 
         with show_progress("reading"):
@@ -131,8 +134,8 @@ def screenshot(
         size = _size_of(viewer, size, full)
         shot = shot_of(viewer.state, size or opened.size, form)
         with show_progress("drawing"):
-            if display is not None:
-                pixels = viewer.woven_picture(display)
+            if display is not None and size is not None:
+                pixels = viewer.woven_picture(size)
             else:
                 pixels = viewer.picture(size, is_float(output, form), shot.color_space)
         optics, draws_own = viewer.state.optics, display is None and viewer.draws_own_pixels(size)

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from iibr_core.formats.lenticular import read_calibration
 from iibr_core.scenes.scene import Source
 from viewer.app.preferences_store import last_opened, user_folder
 from viewer.cli.option_records import option, with_option_records
@@ -34,6 +35,9 @@ def view(
         StereoMode | None,
         option("Show a stereo picture, full screen, on a second monitor if there is one.", None, "", "--stereo"),
     ] = None,
+    calibration: Annotated[
+        Path | None, option("Show a Looking Glass display its pictures, by its calibration (visual.json).", "FILE")
+    ] = None,
 ) -> None:
     """Open the viewer.
 
@@ -46,7 +50,8 @@ def view(
     if tracker is not None:
         address_of(tracker)
     shown = () if stereo_mode is None else (do(stereo.set_mode, stereo_mode), do(stereo.show, True))
-    open_window(source, scene.depth_strength, do(switch, tracker), *shown)
+    display = () if calibration is None else (do(stereo.show_on, read_calibration(calibration)),)
+    open_window(source, scene.depth_strength, do(switch, tracker), *shown, *display)
 
 
 def demo() -> None:

@@ -5,6 +5,7 @@ Worker, state, pictures and panels are those of the window.
 
 from __future__ import annotations
 
+import math
 import threading
 from collections.abc import Callable, Iterable
 from contextlib import ExitStack
@@ -19,10 +20,8 @@ from iibr_core.color import linear_from_srgb
 from iibr_core.depth.editing.edits import UNEDITED, DepthEdits
 from iibr_core.exports.framing import centred, size_in_frame
 from iibr_core.exports.full_picture import is_full
-from iibr_core.exports.quilt import draw_quilt
 from iibr_core.exports.render_settings import RenderSettings, require_size
 from iibr_core.exports.source import ExportSource, OpticsOf
-from iibr_core.formats.lenticular import Calibration
 from iibr_core.gloss.settings import Gloss
 from iibr_core.runtime.work import report_progress
 from iibr_core.scenes.lens_limits import LensChoice
@@ -34,10 +33,10 @@ from iibr_core.types import SRGB, ColorSpace, ViewOffset
 from viewer.background.maps import Entropy, EntropyWork
 from viewer.display.inspection_view import InspectionView
 from viewer.display.scene_view import SceneView
+from viewer.display.stereo_view import StereoView
 from viewer.gpu.context import Backend, create_headless
-from viewer.gpu.lenticular import weave
 from viewer.gpu.refocus.views_seen import views_seen_by
-from viewer.model import opening, window
+from viewer.model import opening, stereo, window
 from viewer.model.action import Action, do
 from viewer.model.inspection import NO_INSPECTION_TEXTURES, InspectionTextures, set_probe
 from viewer.model.layout import BACKGROUND, Layout, is_narrow
@@ -181,14 +180,16 @@ class OffscreenScene(ExitStack):
         background = np.array(BACKGROUND[:3])
         return centred(pixels, frame, linear_from_srgb(background) if is_linear else np.round(background * 255))
 
-    def woven_picture(self, display: Calibration) -> NDArray[np.uint8]:
-        """Return the picture for a lenticular display, (height, width, 3), at the size of its screen.
-
-        Raises InputError if the graphics driver cannot hold it.
-        """
-        source = ExportSource(self.scene, self.view.loaded, self.state.optics, self.draw, self.view.centre)
-        quilt, programs = display.quilt, self.view.renderer.programs
-        return weave(self.gl.ctx, programs, draw_quilt(source, quilt), quilt, display)
+    def woven_picture(self, size: ScreenSize) -> NDArray[np.uint8]:
+        """Return the stereo picture, or that of a lenticular display, for a screen of this size, (height, width, 3)."""
+        self._prepare_gloss(self.state.optics.gloss)
+        view, weave = StereoView(self.gl, self.view), stereo.weave_of(self.state, self.scene, size)
+        view.draw(weave, math.inf)
+        while view.is_drawing:
+            view.draw(weave, math.inf)
+        pixels = view.screen.read()
+        view.release()
+        return pixels
 
     def screen(self, size: ScreenSize) -> NDArray[np.uint8]:
         """Return the whole window of this size, (height, width, 3). Not for OSMesa, in which ImGui finds no OpenGL."""

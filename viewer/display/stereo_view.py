@@ -5,9 +5,11 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass, replace
 
+from iibr_core.beyond.picture_quality import QUALITY_LEVELS
 from viewer.display.scene_view import VIEW_REFRESH_S, SceneView
 from viewer.gpu.context import GLContext
 from viewer.gpu.light_field_texture import LightFieldTexture
+from viewer.gpu.refocus.frame_budget import OVERHEAD_S
 from viewer.gpu.refocus.picture_renderer import Renderer
 from viewer.gpu.render_targets import RenderTarget
 from viewer.gpu.weaving import Weaver
@@ -99,12 +101,16 @@ class StereoView:
             self._renderers = [Renderer(self._gl, view.renderer) for _ in range(wanted)]
         self._field, level, converged = view.renderer.drawn_field, None, 0
         self._weaver.prepare(weave)
-        for i, eye in enumerate(weave.eyes):
-            renderer = self._renderers[i % wanted]
-            renderer.render_in_time(eye.optics, weave.picture_px, budget_s / count, eye.part, level)
+        each_s = budget_s / count + (OVERHEAD_S if wanted < count else 0.0)
+        for i in sorted(range(count), key=lambda i: i != count // 2):  # the middle one decides on the level
+            renderer, eye = self._renderers[i % wanted], weave.eyes[i]
+            if level is None or wanted == count:
+                renderer.render_in_time(eye.optics, weave.picture_px, each_s, eye.part, level)
+            else:  # tens of measurements would take longer than the pictures
+                renderer.render(eye.optics, renderer.shown_px, QUALITY_LEVELS[level], eye.part)
             level, converged = renderer.level, converged + renderer.is_converged
             self._present(i)
-        self._begun, self._complete = -1, count if converged == count else 0
+        self._begun, self._complete = -1, count if converged == count and level == 0 else 0
         self._weave(weave)
 
     def _refined(self, drawn: WovenPicture, budget_s: float) -> WovenPicture:

@@ -6,8 +6,10 @@ import math
 from typing import Any
 
 import moderngl
+import numpy as np
 
 from iibr_core.exports.anaglyph import LEFT, RIGHT
+from iibr_core.formats.lenticular import MAX_CELLS, Calibration
 from iibr_core.scenes.screen_size import ScreenSize
 from viewer.gpu.context import GLContext, create_for_window
 from viewer.gpu.programs import Program, ProgramCache
@@ -57,7 +59,7 @@ class Weaver:
         program = self._program(weave)
         self._sheet.texture.use(0)
         program.set_uniforms(sheet=0, sheet_columns=self._columns, tile_px=self._tile_px, drawn_px=drawn_px)
-        program.set_uniforms(screen_px=weave.size_px)
+        program.set_uniforms(screen_px=weave.size_px, frame_px=weave.frame_px, picture_px=weave.picture_px)
         self.screen.framebuffer.use()
         self._ctx.disable(moderngl.DEPTH_TEST | moderngl.CULL_FACE | moderngl.BLEND)
         program.draw()
@@ -71,10 +73,26 @@ class Weaver:
 
     def _program(self, weave: Weave) -> Program:
         """Return the weaving program, its uniforms set."""
+        if weave.display is not None:
+            return self._lenticular_program(weave.display, len(weave.eyes))
         program = self._programs.get("stereo.frag", {SWITCHES[weave.mode]: True})
-        program.set_uniforms(frame_px=weave.frame_px, picture_px=weave.picture_px, first_eye=int(weave.is_swapped))
+        program.set_uniforms(first_eye=int(weave.is_swapped))
         seen = (tuple(matrix.T.ravel().tolist()) for matrix in (LEFT, RIGHT))
         program.set_uniforms(**dict(zip(("left_seen", "right_seen"), seen)))
+        return program
+
+    def _lenticular_program(self, display: Calibration, views: int) -> Program:
+        program = self._programs.get("lenticular.frag")
+        program.set_uniforms(
+            views=views,
+            lenses_per_px=display.lenses_per_px,
+            center=display.center % 1.0,
+            is_mirrored=display.is_mirrored,
+            is_inverted=display.is_inverted,
+            emitters=np.resize(display.cells, (3 * MAX_CELLS, 2)).tolist(),
+            cells=len(display.cells),
+            pattern=display.pattern,
+        )
         return program
 
     def _sized(self, target: RenderTarget | None, size_px: ScreenSize) -> RenderTarget:

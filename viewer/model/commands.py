@@ -190,6 +190,7 @@ COMMANDS: tuple[Command, ...] = (
     Command("Hide or show the panel", do(window.toggle_panel), "tab"),
     Command("Stereo display", lambda s: do(stereo.show, not s.stereo.is_shown), "_3"),
     Command("Stereo display: swap the eyes", do(stereo.swap_eyes), "l"),
+    Command("Stereo display: Looking Glass", do(ask, PlainTask("find display"))),
     *(Command(f"Stereo display: {STEREO_WORDS[mode][0].lower()}", do(stereo.set_mode, mode)) for mode in STEREO_MODES),
     Command("Before and after", lambda s: do(lens.show_before, not s.shows_before), "backslash"),
     Command("Take a snapshot", do(inspection.take_snapshot), "k"),

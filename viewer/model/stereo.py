@@ -8,6 +8,7 @@ import numpy as np
 
 from iibr_core.beyond.optics import Optics
 from iibr_core.exports.framing import size_in_frame
+from iibr_core.formats.lenticular import Calibration
 from iibr_core.scenes.lens_limits import clamp, eye_limits
 from iibr_core.scenes.rect import Rect
 from iibr_core.scenes.scene import Scene
@@ -67,7 +68,17 @@ def set_monitors(state: AppState, monitors: tuple[Monitor, ...]) -> AppState:
 def set_mode(state: AppState, mode: StereoMode) -> AppState:
     """Arrange the pictures of both eyes in this way."""
     chosen = replace(state.preferences.stereo, mode=mode)
-    return replace(state, preferences=replace(state.preferences, stereo=chosen))
+    shown = replace(state.stereo, display=None)
+    return replace(state, preferences=replace(state.preferences, stereo=chosen), stereo=shown)
+
+
+def show_on(state: AppState, display: Calibration, place: tuple[int, int] | None = None) -> AppState:
+    """Show the pictures of a lenticular display, on the monitor at a place (x, y), else on one of its size."""
+    at_place = [each for each in state.monitors if (each.x, each.y) == place]
+    of_size = [each for each in state.monitors if (each.height, each.width) == display.screen]
+    state = replace(state, stereo=replace(state.stereo, display=display))
+    state = choose_monitor(state, (at_place + of_size)[0]) if at_place + of_size else state
+    return show(state, True)
 
 
 def swap_eyes(state: AppState) -> AppState:
@@ -111,10 +122,12 @@ def eye_distance_limit(scene: Scene) -> float:
 
 
 def eye_distance(scene: Scene, stereo: Stereo) -> float:
-    """Return the distance of the eyes in view steps: the chosen one, else the largest that eyes bear."""
+    """Return the distance of the eyes in view steps: the chosen one, else the largest that eyes bear, or for a display
+    with tens of pictures that from the first to the last.
+    """
     limit = eye_distance_limit(scene)
-    if stereo.eyes is not None:
-        return clamp(stereo.eyes, 0.0, limit)
+    if stereo.eyes is not None or stereo.display is not None:
+        return limit if stereo.eyes is None else clamp(stereo.eyes, 0.0, limit)
     farthest = max(abs(edge - screen_plane(scene, stereo)) for edge in scene.disparity_range_px)
     return clamp(MAX_PARALLAX * scene.width / max(farthest, 1e-6), 0.0, limit)
 
@@ -135,7 +148,12 @@ def parallax(scene: Scene, stereo: Stereo) -> tuple[float, float]:
 
 
 def warning(scene: Scene, stereo: Stereo) -> str:
-    """Return words about parallax that eyes do not bear, "" without."""
+    """Return words about parallax that eyes do not bear, or about a monitor that does not fit, "" without."""
+    if (display := stereo.display) is not None:
+        monitor = stereo.monitor
+        if monitor is None or (monitor.height, monitor.width) == display.screen:
+            return ""
+        return f"The calibration is that of a screen of {display.screen}, not of {monitor.words}."
     far, near = parallax(scene, stereo)
     place, worst = ("before", near) if near >= -far else ("behind", -far)
     if worst <= MAX_PARALLAX:
@@ -165,7 +183,12 @@ def eyes_at(scene: Scene, optics: Optics, stereo: Stereo, count: int = 2) -> tup
 
 
 def weave_of(state: AppState, scene: Scene, size_px: ScreenSize) -> Weave:
-    """Return the pictures of both eyes, and their arrangement on a screen of this size."""
+    """Return the pictures of both eyes or of a lenticular display, and their arrangement on a screen of this size."""
+    if (display := state.stereo.display) is not None:
+        quilt = display.quilt
+        eyes, room = eyes_at(scene, state.shown_optics, state.stereo, quilt.views), ScreenSize(*quilt.tile[::-1])
+        picture = size_in_frame(scene, room, eyes[0].part, quilt.aspect)
+        return Weave(eyes, state.preferences.stereo.mode, size_px, room, picture, display=display)
     choice, eyes = state.preferences.stereo, eyes_at(scene, state.shown_optics, state.stereo)
     width, height = size_px
     frame = ScreenSize(
@@ -181,6 +204,8 @@ def weave_of(state: AppState, scene: Scene, size_px: ScreenSize) -> Weave:
 
 def place_in_photo(weave: Weave, x_px: float, y_px: float) -> tuple[float, float]:
     """Return the place in the middle viewpoint's picture, as shares of its size, under a pixel of the woven screen."""
+    if weave.display is not None:
+        x_px, y_px = (at * room / size for at, room, size in zip((x_px, y_px), weave.frame_px, weave.size_px))
     x, y = x_px % weave.frame_px.width, y_px % weave.frame_px.height
     room = weave.frame_px.width - weave.picture_px.width, weave.frame_px.height - weave.picture_px.height
     across, down = (x - room[0] // 2) / weave.picture_px.width, (y - room[1] // 2) / weave.picture_px.height

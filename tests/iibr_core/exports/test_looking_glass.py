@@ -1,67 +1,24 @@
 import json
-import threading
 from collections.abc import Iterator
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from iibr_core.exports import quilt
 from iibr_core.exports.kinds import EXPORTS, ExportOptions
 from iibr_core.exports.source import write_export
+from iibr_core.formats.lenticular import parse_calibration
 from iibr_core.types import InputError
+from tests.fake_bridge import MONITOR, PORTRAIT, TOKEN, FakeBridge, fake_bridge
 from tests.iibr_core.exports.conftest import exported
 
-TOKEN = "some session"
-PORTRAIT, MONITOR = {"hardwareVersion": {"value": "portrait"}}, {"hardwareVersion": {"value": "thirdparty"}}
 SHOWING = ["show_window", "delete_playlist", "instance_playlist", "insert_playlist_entry", "play_playlist"]
-
-
-class FakeBridge(ThreadingHTTPServer):
-    """A Bridge with connected displays. failing: endpoints that fail; raw: answers in bytes by endpoint."""
-
-    daemon_threads = True
-
-    def __init__(self) -> None:
-        super().__init__(("localhost", 0), Handler)
-        self.displays: list[dict[str, Any]] = [MONITOR, PORTRAIT]
-        self.raw: dict[str, bytes] = {}
-        self.failing: set[str] = {"delete_playlist"}  # there is none at first
-        self.requests: list[tuple[str, dict[str, Any]]] = []
-
-
-class Handler(BaseHTTPRequestHandler):
-    server: FakeBridge
-
-    def do_PUT(self) -> None:
-        assert self.headers["Content-Type"] == "application/json"
-        endpoint = self.path.removeprefix("/")
-        body = json.loads(self.rfile.read(int(self.headers["Content-Length"])))
-        self.server.requests.append((endpoint, body))
-        payload: Any = {"value": TOKEN}
-        if endpoint == "available_output_devices":
-            payload = {"value": {str(i): {"value": display} for i, display in enumerate(self.server.displays)}}
-        status = "Failure" if endpoint in self.server.failing else "Completion"
-        answer = json.dumps({"name": endpoint, "payload": payload, "status": {"value": status}}).encode()
-        self.send_response(200)
-        self.end_headers()
-        self.wfile.write(self.server.raw.get(endpoint, answer))
-
-    def log_message(self, *_: Any) -> None:
-        """Print nothing."""
 
 
 @pytest.fixture
 def bridge(monkeypatch) -> Iterator[FakeBridge]:
-    monkeypatch.setenv("http_proxy", "http://localhost:1")  # must not be used for this machine
-    with FakeBridge() as server:
-        thread = threading.Thread(target=server.serve_forever, args=(0.02,))
-        thread.start()
-        monkeypatch.setattr(quilt, "ADDRESS", f"localhost:{server.server_port}")
+    with fake_bridge(monkeypatch) as server:
         yield server
-        server.shutdown()
-        thread.join()
 
 
 def test_a_quilt_is_shown(bridge, source, tmp_path, monkeypatch) -> None:
@@ -96,3 +53,27 @@ def test_failures_are_one_line(bridge, source, tmp_path, trouble, monkeypatch) -
         exported(source, "quilt", tmp_path / "a.png", show=True)
     assert "\n" not in str(error.value)
     assert bool(list(tmp_path.iterdir())) == (trouble == "failing"), "Bridge answers before anything is drawn"
+
+
+CALIBRATION = {"pitch": 52, "slope": -7, "center": 0.5, "DPI": 324, "screenW": 1536, "screenH": 2048}
+
+
+def reported(calibration: object, place: object = None) -> dict[str, object]:
+    """A display as Bridge reports it."""
+    return PORTRAIT | {"calibration": {"value": calibration}, "windowCoords": {"value": place}}
+
+
+def test_bridge_reports_how_the_lenses_of_its_first_display_lie(bridge) -> None:
+    text = json.dumps({key: {"value": value} for key, value in CALIBRATION.items()})
+    bridge.displays = [MONITOR, reported(text, {"x": -1536, "y": 20}), reported("{}")]
+    display, place = quilt.Bridge().first_display()
+    assert (display, place) == (parse_calibration(text, "a"), (-1536, 20))
+    bridge.displays = [reported(text, {"x": "left"})]
+    assert quilt.Bridge().first_display()[1] is None
+
+
+@pytest.mark.parametrize("text", [None, 3, "", "{}", "\0"])
+def test_a_display_without_a_calibration_is_named(bridge, text: object) -> None:
+    bridge.displays = [reported(text)]
+    with pytest.raises(InputError, match=r"^the display that Bridge reports: "):
+        quilt.Bridge().first_display()

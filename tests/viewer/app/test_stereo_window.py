@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +21,7 @@ from iibr_core.exports.framing import centred, size_in_frame
 from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, ViewOffset
+from tests.fake_bridge import PORTRAIT, fake_bridge
 from tests.viewer.conftest import Driver, Opener
 from tests.xvfb import display_with_monitors
 from viewer import entry
@@ -26,11 +29,13 @@ from viewer.app.main_loop import App
 from viewer.app.preferences_store import load_preferences
 from viewer.display.offscreen import OffscreenScene
 from viewer.model import lens, messages, preferences, stereo
-from viewer.model.action import do
+from viewer.model.action import ask, do
 from viewer.model.state.app_state import AppState
 from viewer.model.state.stereo import STEREO_MODES, Monitor, StereoMode
+from viewer.model.state.tasks import PlainTask
 
 FIRST, SECOND = ScreenSize(1024, 768), ScreenSize(640, 480)
+CALIBRATION = {"pitch": 50, "slope": -7, "center": 0.2, "DPI": 300, "screenW": SECOND.width, "screenH": SECOND.height}
 Pixels = NDArray[np.uint8]
 Eyes = Callable[[ScreenSize, float], tuple[Pixels, Pixels]]
 
@@ -197,8 +202,13 @@ def test_the_section_shows_it_and_sets_depth(viewer: Driver) -> None:
 
 
 @pytest.mark.usefixtures("display", "no_egl_context")
-def test_the_command_line_begins_with_it(photo_path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("words", [("--stereo", "columns"), ("--calibration", "visual.json")])
+def test_the_command_line_begins_with_it(
+    photo_path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: tuple[str, str]
+) -> None:
     shown = []
+    (tmp_path / "visual.json").write_text(json.dumps(CALIBRATION))
+    monkeypatch.chdir(tmp_path)
 
     def look(app: App) -> None:
         Driver(app).until(lambda app: app.stereo_screen.picture is not None)
@@ -206,10 +216,47 @@ def test_the_command_line_begins_with_it(photo_path: Path, tmp_path: Path, monke
 
     monkeypatch.setattr("viewer.app.main_loop.App.run", look)
     monkeypatch.setattr("viewer.cli.view.user_folder", lambda: tmp_path / "kept")
-    monkeypatch.setattr(sys, "argv", ["iibr", "view", str(photo_path), "--grid", "3", "--stereo", "columns"])
+    monkeypatch.setattr(sys, "argv", ["iibr", "view", str(photo_path), "--grid", "3", *words])
     assert entry.run() == 0
     ((picture, second),) = shown
     assert picture is not None
-    assert (picture.weave.mode, picture.weave.size_px) == ("columns", SECOND)
+    is_lenticular = words[0] == "--calibration"
+    mode = "half-sbs" if is_lenticular else "columns"
+    assert (picture.weave.mode, picture.weave.size_px) == (mode, SECOND)
+    assert len(picture.weave.eyes) == (48 if is_lenticular else 2)
     assert second is not None
-    assert load_preferences(AppState(), tmp_path / "kept").preferences.stereo.mode == "columns"
+    assert load_preferences(AppState(), tmp_path / "kept").preferences.stereo.mode == mode
+
+
+def test_a_lenticular_display_that_bridge_knows_gets_its_picture(
+    viewer: Driver, display: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with fake_bridge(monkeypatch) as bridge:
+        place = {"x": FIRST.width, "y": 0}
+        bridge.displays = [
+            PORTRAIT | {"calibration": {"value": json.dumps(CALIBRATION)}, "windowCoords": {"value": place}}
+        ]
+        viewer.app.do(do(ask, PlainTask("find display")))
+        viewer.until(lambda app: app.stereo_screen.second is not None)
+        viewer.until_idle()
+    viewer.app.do(do(lens.move_eye, ViewOffset(0.4, 0)))
+    viewer.until(lambda app: (each := app.stereo_screen.picture) is not None and each.weave.eyes[0].optics.eye.t == 0.4)
+    viewer.until_idle()
+    shown, state = grabbed(display, FIRST.width, SECOND), viewer.app.state
+    assert state.source is not None
+    viewer.close()
+    with OffscreenScene("egl") as scene:
+        scene.open(state.source)
+        scene.state = replace(scene.state, stereo=state.stereo, optics=state.optics)
+        wanted = scene.woven_picture(SECOND)
+    assert psnr(shown, wanted) >= 45
+    assert (np.abs(shown[..., 1].astype(int) - shown[..., 2]) > 30).any(), "views differ within a pixel of a grey photo"
+
+
+def test_without_bridge_a_notice_says_so(viewer: Driver, monkeypatch: pytest.MonkeyPatch) -> None:
+    with fake_bridge(monkeypatch) as bridge:
+        bridge.displays = []
+        viewer.app.do(do(ask, PlainTask("find display")))
+        viewer.until(lambda app: bool(app.state.notices))
+    assert "Looking Glass Bridge sees no display" in viewer.app.state.notices[-1].text
+    assert not viewer.app.state.stereo.is_shown

@@ -115,6 +115,7 @@ COMMANDS = {
     "export scene.png --to web --budget 0MB -o o.html": "is not the size of a file",
     "depth scene.png -o o.txt": "o.txt: ",
     "view gone.png": "gone.png: no such file",
+    "view scene.png --calibration gone.json": "gone.json: no such file",
     "view scene.png --disparity gone.pfm": "gone.pfm: no such file",
     "plan scene.png --fly": "--fly",
     "fly": "fly",

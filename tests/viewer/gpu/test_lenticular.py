@@ -1,4 +1,4 @@
-"""Woven quilts: against a slow twin, and through a simulated sheet of lenses, which sends each view to its side."""
+"""Pictures woven for lenticular displays: against a slow twin, and seen through a simulated sheet of lenses."""
 
 import json
 from functools import cache
@@ -9,12 +9,16 @@ import pytest
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
+from iibr_core.beyond.optics import Optics
 from iibr_core.evaluation.metrics import psnr
 from iibr_core.formats.lenticular import Calibration, parse_calibration
-from iibr_core.formats.quilts import Quilt, lay_out
+from iibr_core.scenes.rect import WHOLE
+from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import ImageSize
-from viewer.gpu.lenticular import weave
+from viewer.gpu.context import GLContext
 from viewer.gpu.programs import ProgramCache
+from viewer.gpu.weaving import Weaver
+from viewer.model.state.stereo import Eye, Weave
 
 PORTRAIT = {
     "configVersion": "1.0", "serial": "LKG-PORT-00000", "pitch": {"value": 52.5927}, "slope": {"value": -7.0835},
@@ -46,7 +50,7 @@ DISPLAYS: dict[str, dict[str, Any]] = {
 }  # fmt: skip
 CHECKERBOARD = {"cells in a checkerboard": {"CellPatternMode": 1, "subpixelCells": "landscape"}}
 """An order without a display: these subpixels would leave some sides dark."""
-COLUMNS, ROWS, TILE = 8, 6, ImageSize(80, 60)
+VIEWS, TILE = 48, ImageSize(80, 60)
 BLUR_PX = 5.0
 """A view has a subpixel of a colour in 48 pixels; what is smaller than about two of these distances is lost."""
 PARALLAX = 0.004
@@ -62,33 +66,39 @@ def stated(name: str) -> dict[str, Any]:
 def views() -> NDArray[np.uint8]:
     """Views (V, H, W, 3) of two crossing patterns, one that stays and one that moves to the left."""
     y, x = ((np.arange(side) + 0.5) / side for side in TILE)
-    s = np.arange(COLUMNS * ROWS)[:, None, None]
-    moving = x + PARALLAX * (s - COLUMNS * ROWS / 2)
+    s = np.arange(VIEWS)[:, None, None]
+    moving = x + PARALLAX * (s - VIEWS / 2)
     waves = [np.sin(38 * moving + 9 * y[:, None] + hue) + np.sin(17 * y[:, None] - 8 * x + 2 * hue) for hue in range(3)]
     return np.rint(127.5 + 55 * np.stack(waves, -1)).astype(np.uint8)
 
 
-@pytest.fixture(scope="module")
-def quilt() -> Quilt:
-    return Quilt(COLUMNS, ROWS, ImageSize(ROWS * TILE.height + 3, COLUMNS * TILE.width + 5), 0.75)
+def display_of(name: str) -> Calibration:
+    return parse_calibration(json.dumps(stated(name)), "a display")
 
 
-@pytest.fixture(scope="module")
-def pixels(quilt) -> NDArray[np.uint8]:
-    return lay_out(quilt, views())
-
-
-def woven(gl, pixels, quilt, name: str) -> NDArray[np.uint8]:
-    programs = ProgramCache(gl.ctx)
+def woven(gl: GLContext, name: str) -> NDArray[np.uint8]:
+    """The views woven for a display."""
+    programs, display = ProgramCache(gl.ctx), display_of(name)
+    weaver, tile = Weaver(gl.ctx, programs), ScreenSize(TILE.width, TILE.height)
+    eyes = (Eye(Optics(), WHOLE),) * VIEWS
+    weave = Weave(eyes, "sbs", ScreenSize(display.screen.width, display.screen.height), tile, tile, display=display)
     try:
-        return weave(gl.ctx, programs, pixels, quilt, parse_calibration(json.dumps(stated(name)), "a display"))
+        weaver.prepare(weave)
+        for i, view in enumerate(views()):
+            sheet = weaver.tile(i, tile)
+            texels = np.dstack([view[::-1], np.full(TILE, 255, np.uint8)])
+            sheet.color_attachments[0].write(texels.tobytes(), sheet.viewport)
+        weaver.weave(weave, tile)
+        assert weaver.screen is not None
+        return weaver.screen.read()
     finally:
+        weaver.release()
         programs.release()
 
 
 @pytest.mark.parametrize("name", DISPLAYS)
-def test_each_side_sees_its_view(gl, pixels, quilt, name) -> None:
-    numbers, screen = plain(stated(name)), woven(gl, pixels, quilt, name)
+def test_each_side_sees_its_view(gl: GLContext, name: str) -> None:
+    numbers, screen = plain(stated(name)), woven(gl, name)
     right = side_of_light(numbers)
     for view in (0, 1, 24, 47):
         picture = gathered(screen, right, view)
@@ -99,9 +109,8 @@ def test_each_side_sees_its_view(gl, pixels, quilt, name) -> None:
 
 
 @pytest.mark.parametrize("name", [*DISPLAYS, *CHECKERBOARD])
-def test_the_shader_does_as_its_slow_twin(gl, pixels, quilt, name) -> None:
-    drawn = woven(gl, pixels, quilt, name).astype(float)
-    expected = twin(parse_calibration(json.dumps(stated(name)), "a display"))
+def test_the_shader_does_as_its_slow_twin(gl: GLContext, name: str) -> None:
+    drawn, expected = woven(gl, name).astype(float), twin(display_of(name))
     differs = np.abs(drawn - expected) > 2
     assert differs.mean() < 2e-3, "rounding may end a lens one subpixel earlier"
 
@@ -139,7 +148,7 @@ def side_of_light(numbers: dict[str, Any]) -> NDArray[np.float64]:
 
 def gathered(screen: NDArray[np.uint8], right: NDArray[np.float64], view: int) -> NDArray[np.float64]:
     """What an eye sees that stands where a view belongs: the subpixels that shine there, with their gaps filled."""
-    weights = np.clip(1 - np.abs(right * COLUMNS * ROWS - 0.5 - view), 0, None)
+    weights = np.clip(1 - np.abs(right * VIEWS - 0.5 - view), 0, None)
     light, shares = (gaussian_filter(each, (BLUR_PX, BLUR_PX, 0)) for each in (screen * weights, weights))
     return light / np.maximum(shares, 1e-9) / 255
 

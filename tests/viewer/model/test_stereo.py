@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 
 import pytest
@@ -9,6 +10,7 @@ import pytest
 from iibr_core.beyond.optics import Optics
 from iibr_core.exports.framing import side_pictures
 from iibr_core.exports.render_settings import RenderSettings
+from iibr_core.formats.lenticular import Calibration, parse_calibration
 from iibr_core.scenes.scene import Scene, Source
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, ViewOffset
@@ -107,3 +109,32 @@ def test_the_command_and_escape_close_it() -> None:
     for keys in (Keys(is_escape=True), Keys(commands=("Stereo display",))):
         (action,) = actions_from_keys(keys, shown)
         assert action.apply(shown) == closed
+
+
+def lenticular(width: int, height: int) -> Calibration:
+    """The calibration of a display with a screen of this size."""
+    stated = {"pitch": 50, "slope": -7, "center": 0.5, "DPI": 300, "screenW": width, "screenH": height}
+    return parse_calibration(json.dumps(stated), "a display")
+
+
+def test_a_lenticular_display_gets_all_views_on_its_own_monitor() -> None:
+    display, twin = lenticular(1440, 2560), Monitor("DP-3", 9000, 0, 1440, 2560)
+    state = replace(STATE, monitors=(*STATE.monitors, replace(twin, name="DP-2", x=5760), twin))
+    assert stereo.show_on(state, display).stereo.monitor == state.monitors[2], "the first of its size"
+    shown = stereo.show_on(state, display, (9000, 0))
+    assert shown.stereo.monitor == twin
+    weave = stereo.weave_of(shown, SCENE, ScreenSize(1440, 2560))
+    assert len(weave.eyes) == 66
+    assert (weave.eyes[0].optics.eye.s, weave.eyes[-1].optics.eye.s) == (-4.0, 4.0)
+    assert weave.picture_px == (372, 256), "three to two on a tile that is displayed as 9 to 16"
+    assert stereo.place_in_photo(weave, 720, 1280) == pytest.approx((0.5, 0.5), abs=0.01)
+    assert stereo.place_in_photo(weave, 0, 0) == pytest.approx((0, 0))
+    assert stereo.warning(SCENE, shown.stereo) == ""
+    assert stereo.set_mode(shown, "rows").stereo.display is None
+
+
+def test_a_monitor_of_another_size_is_named() -> None:
+    shown = stereo.show_on(STATE, lenticular(1536, 2048))
+    assert shown.stereo.monitor == TELEVISION
+    assert "screen of 1536x2048, not of HDMI-1, 3840 x 2160" in stereo.warning(SCENE, shown.stereo)
+    assert stereo.eye_distance(SCENE, replace(shown.stereo, eyes=1.0)) == 1.0

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Literal, get_args
 
 from iibr_core.beyond.optics import Optics
+from iibr_core.formats.lenticular import Calibration
 from iibr_core.scenes.rect import Rect
 from iibr_core.scenes.screen_size import ScreenSize
 
@@ -44,7 +45,8 @@ class Stereo:
 
     monitor: monitor that it fills; None for the window itself. eyes: distance of the eyes in view steps, None for a
     comfortable one. screen: disparity that lies in the plane of the screen, px per view step. before: whether the
-    window was full screen, and `hides_panel`, before it showed the stereo picture.
+    window was full screen, and `hides_panel`, before it showed the stereo picture. display: the lenticular
+    display that shows it; None for both eyes' pictures.
     """
 
     is_shown: bool = False
@@ -52,6 +54,7 @@ class Stereo:
     eyes: float | None = None
     screen: float = 0.0
     before: tuple[bool, bool | None] = (False, None)
+    display: Calibration | None = None
 
 
 @dataclass(frozen=True)
@@ -67,7 +70,8 @@ class Weave:
     """Pictures from several viewpoints, the leftmost first, and how they are woven into one for a screen.
 
     mode: switch of the shader. size_px: of the screen. frame_px: room of each picture on the screen. picture_px: each
-    picture, which lies in the middle of its room.
+    picture, which lies in the middle of its room. display: lenticular display, whose rooms are stretched over the whole
+    screen; None for both eyes' pictures.
     """
 
     eyes: tuple[Eye, ...]
@@ -76,3 +80,4 @@ class Weave:
     frame_px: ScreenSize
     picture_px: ScreenSize
     is_swapped: bool = False
+    display: Calibration | None = None

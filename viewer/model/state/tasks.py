@@ -8,8 +8,9 @@ from typing import Literal
 from viewer.model.state.prompts import ChoiceOf, ExportPrompt, PathPrompt, SavePrompt
 
 PlainKind = Literal[
-    "copy", "paste", "read mask", "list folder", "read facts", "list models", "download model", "stop download"
-]
+    "copy", "paste", "find display", "read mask", "list folder", "read facts", "list models", "download model",
+    "stop download",
+]  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -17,7 +18,8 @@ class PlainTask:
     """A task without options. about: the path of a mask, folder or photo, or the name of a model, if it needs one.
 
     copy: put the picture, at the size of the views, into the system's clipboard. paste: open the picture that is there,
-    or the path of one. read facts: those that a photo's file states. A stopped download is continued by the next one.
+    or the path of one. find display: show the scene on the one that Looking Glass Bridge knows. read facts: those
+    that a photo's file states. A stopped download is continued by the next one.
     """
 
     kind: PlainKind

@@ -6,16 +6,18 @@ from imgui_bundle import imgui
 
 from iibr_core.scenes.scene import Scene
 from viewer.model import stereo
-from viewer.model.action import Action, do
+from viewer.model.action import Action, ask, do
 from viewer.model.commands import STEREO_WORDS
 from viewer.model.state.app_state import AppState
 from viewer.model.state.stereo import STEREO_MODES
+from viewer.model.state.tasks import PlainTask
 from viewer.ui.style import palette_of
 from viewer.ui.widgets import button, checkbox, colored, combo, edit, label, slider
 
 MONITOR_TIP = "Display that shows the stereo picture, full screen."
 WINDOW, WINDOW_TIP = "This window", "The window itself shows the picture, full screen; Tab shows the panel over it."
 MODE_TIP = "Arrangement of both eyes' pictures that the display or the glasses expect."
+LENTICULAR = "Looking Glass", "a lenticular display that Looking Glass Bridge knows"
 EYES_TIP = "Distance of the eyes in view steps. A larger distance gives more depth."
 SCREEN_TIP = "Disparity of what lies in the plane of the screen. Nearer things stand before it."
 SHOW_TIP = "Show the stereo picture (3). Esc closes it."
@@ -32,8 +34,12 @@ def stereo_section(state: AppState, scene: Scene) -> list[Action]:
     picked = combo("Display", wanted.words if wanted else WINDOW, entries, wanted.words if wanted else MONITOR_TIP)
     actions = [] if picked is None else [do(stereo.choose_monitor, state.monitors[picked])]
     label("Arrangement", MODE_TIP)
-    picked = combo("Arrangement", STEREO_WORDS[choice.mode][0], [STEREO_WORDS[mode] for mode in STEREO_MODES], MODE_TIP)
-    actions += [] if picked is None else [do(stereo.set_mode, STEREO_MODES[picked])]
+    entries = [*(STEREO_WORDS[mode] for mode in STEREO_MODES), LENTICULAR]
+    shown_words = LENTICULAR[0] if shown.display else STEREO_WORDS[choice.mode][0]
+    picked = combo("Arrangement", shown_words, entries, MODE_TIP)
+    if picked is not None:
+        is_pair = picked < len(STEREO_MODES)
+        actions.append(do(stereo.set_mode, STEREO_MODES[picked]) if is_pair else do(ask, PlainTask("find display")))
     eyes, plane = stereo.eye_distance(scene, shown), stereo.screen_plane(scene, shown)
     limits = 0.0, stereo.eye_distance_limit(scene)
     actions += edit(stereo.set_eyes, eyes, slider("Eye distance", eyes, limits, "%.2f views", EYES_TIP))
