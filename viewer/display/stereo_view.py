@@ -146,7 +146,7 @@ class StereoView:
                 return
 
     def _present(self, index: int) -> None:
-        """Write a picture as it is into the sheet."""
+        """Write the latest state of a picture into the sheet."""
         renderer = self._renderers[index % len(self._renderers)]
         renderer.present(self._weaver.tile(index, renderer.shown_px))
 
