@@ -54,8 +54,8 @@ Answer answer_of(int i) {
 #endif
 }
 
-// The surface that camera i sees. Which one is asked somewhere in the pixel, elsewhere by each camera, so that edges
-// become smooth; the colour is that of the pixel's middle, so that nothing else is blurred.
+// The surface that camera i sees. Each camera searches it at another place of the pixel, which makes edges smooth; the
+// colour is read at the pixel's middle, which blurs nothing else.
 Surface surface_seen(int i, Answer answer, float focus) {
     vec2 in_view = (uv - field_part.xy) / field_part.zw;
     vec2 camera = cameras[i].xy * view_step / view_size_px, to_view = answer.to_view * view_step / view_size_px;
@@ -75,7 +75,7 @@ Surface surface_seen(int i, Answer answer, float focus) {
     return Surface(focus, place_at(ray, focus), false);
 }
 
-// How much of a camera the lens barrel leaves.
+// The share of a camera that the lens barrel lets through.
 float barrel_share(vec2 camera) {
 #ifdef CAT_EYE
     return clamp(0.5 + (barrel.z - length(camera - barrel.xy * (uv - 0.5))) / barrel_edge, 1e-6, 1.0);
@@ -87,7 +87,7 @@ float barrel_share(vec2 camera) {
 void main() {
     float focus = focus_at(uv);
     sum = vec4(0.0);
-    // At least one camera: a loop that asks first costs software GL a whole turn more.
+    // There is at least one camera: a loop that tests first costs software GL one more turn.
     int i = 0;
     do {
         Answer answer = answer_of(i);

@@ -1,5 +1,5 @@
 #version 330 core
-// What one stored view knows beside its colours, laid over the picture seen from the eye: a number at every pixel.
+// A number at every pixel of one stored view, as colours over the picture seen from the eye.
 #include "first_hit.glsl"
 
 const int STOPS = 10;

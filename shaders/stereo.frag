@@ -13,7 +13,7 @@ uniform mat3 left_seen, right_seen;  // light of the display from the light of e
 in vec2 uv;
 out vec4 color;
 
-// What an eye sees at a pixel of its room, from the upper left corner.
+// The light that an eye sees at a pixel of its room, from the upper left corner.
 vec3 seen(int eye, vec2 at) {
     vec2 place = (at - floor((frame_px - picture_px) / 2.0)) / picture_px;
     bool is_outside = any(lessThan(place, vec2(0.0))) || any(greaterThan(place, vec2(1.0)));

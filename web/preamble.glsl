@@ -1,5 +1,5 @@
 #version 300 es
-// In place of the desktop's first line: the same shaders in WebGL 2, which asks for the precision of everything.
+// Replaces the first line of the desktop's shaders: WebGL 2 needs the precision of every type.
 precision highp float;
 precision highp int;
 precision highp sampler2D;

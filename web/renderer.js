@@ -1,8 +1,8 @@
 // Draws a light field through a virtual lens, by the desktop's shaders in WebGL 2. Offsets are { t, s } in view steps
-// (down, right), disparities px per view step, as in the core. Names, numbers and their reasons are those of
-// viewer/gpu/refocus and iibr_core/beyond/aperture_sampling.py, where everything is explained at length.
+// (down, right), disparities are in px per view step, as in the core. viewer/gpu/refocus and
+// iibr_core/beyond/aperture_sampling.py have the same names and numbers and explain them.
 
-// Numbers of iibr_core/beyond/picture_quality.py, by name: the page brings them.
+// The numbers of iibr_core/beyond/picture_quality.py by name, which the page carries.
 export const NUMBERS = {};
 export const WHOLE = { x: 0, y: 0, width: 1, height: 1 };
 
@@ -13,18 +13,18 @@ export const rounded = (x) => (x % 1 === 0.5 ? 2 * Math.round(x / 2) : Math.roun
 const sumOf = (weighted) => weighted.reduce((sum, one) => sum + one.weight, 0);
 export const fraction = (number, step) => (number * step + 0.5) % 1;
 
-// ---- Where in the aperture the cameras of a picture lie: see aperture_sampling.py. The aperture is a disc.
+// ---- Places of a picture's cameras in the aperture, which is a disc: see aperture_sampling.py
 
-// Diameter of the circle around it, for a diameter of 1. cut: side of the square of views, which cuts it off.
+// Returns the diameter of the circle around an aperture of diameter 1. cut: side of the square of views that crops it.
 const reachOf = (cut) => Math.min(Math.SQRT2 * cut, 1);
 
-// How open it is at a point, for a diameter of 1.
+// Returns how open an aperture of diameter 1 is at a point, 0 to 1.
 function openness(t, s, cut) {
     const inside = Math.min(0.5 - Math.hypot(t, s), cut / 2 - Math.max(Math.abs(t), Math.abs(s)));
     return clamp(0.5 + inside / (NUMBERS.EDGE * reachOf(cut)), 0, 1);
 }
 
-// Its area, as a share of the circle's, and its second moment about the middle, per axis, for a diameter of 1.
+// Returns the area of an aperture of diameter 1, as a share of the circle's, and its second moment per axis.
 function measure(cut) {
     const side = NUMBERS.GRID_SIDE;
     const places = Array.from({ length: side }, (_, i) => reachOf(cut) * ((i + 0.5) / side - 0.5));
@@ -39,7 +39,7 @@ function measure(cut) {
     return { area: Math.min(total / side ** 2 * 4 / Math.PI, 1), moment: moment / total / 2 };
 }
 
-// Those of `count` points of a spiral that pass, for a diameter of 1.
+// Returns those of `count` points of a spiral that lie in an aperture of diameter 1.
 function openSpiral(cut, count, passIndex) {
     const all = Array.from({ length: count }, (_, i) => {
         const radius = reachOf(cut) / 2 * Math.sqrt((i + fraction(passIndex, NUMBERS.SHIFT_STEP)) / count);
@@ -49,8 +49,8 @@ function openSpiral(cut, count, passIndex) {
     return all.filter(({ t, s }, i) => openness(t, s, cut) > fraction(passIndex * count + i, NUMBERS.SQRT_STEPS[2]));
 }
 
-// About `count` points of the aperture from its middle, for one pass; the first is moved and scaled to its centre and
-// its width.
+// Returns about `count` points of the aperture for one pass, from its middle. The first pass is moved and scaled: its
+// mean and its variance are the aperture's.
 export function aperturePoints(diameter, widest, count, passIndex, cell = 0) {
     const cut = Math.min(widest / diameter, 1), { area, moment } = measure(cut);
     const points = openSpiral(cut, Math.max(rounded(count / area), count), passIndex);
@@ -72,10 +72,10 @@ export function aperturePoints(diameter, widest, count, passIndex, cell = 0) {
 // among them; rowStep: distance between rows, in distances between columns; layers: theirs, by "t,s". Samples are
 // { t, s, view, weight }: a camera's place from the eye, the view that answers it, and how much it counts.
 
-// The first and the last offset along an axis of so many views, of those that are there.
+// Returns the first and the last offset of the stored views along an axis of `count` views.
 export const ends = (count, step) => [-(count >> 1), count - 1 - (count >> 1)].map((end) => Math.trunc(end / step) * step);
 
-// The views before and after a place along an axis, and their shares, without those of 0.
+// Returns the views before and after a place along an axis with their shares, without shares of 0.
 function bracket(x, count, step) {
     const [first, last] = ends(count, step), inside = clamp(x, first, last);
     const low = clamp(Math.floor(inside / step) * step, first, Math.max(last - step, first));
@@ -83,19 +83,19 @@ function bracket(x, count, step) {
     return [[low, 1 - share], [low + step, share]].filter(([, weight]) => weight > 0);
 }
 
-// The corners of a place's cell of the grid, with bilinear weights.
+// Returns the corners of a place's cell of the grid, with bilinear weights.
 function cornersOf({ t, s }, { rows, columns, step }) {
     const across = bracket(s, columns, step);
     return bracket(t, rows, step).flatMap(([row, wt]) => across.map(([column, ws]) => (
         { t: row, s: column, weight: wt * ws })));
 }
 
-// Up to four views around the eye, the heaviest first.
+// Returns up to four views around the eye, the heaviest first.
 export function pinholeSources(eye, field) {
     return cornersOf(eye, field).sort((a, b) => b.weight - a.weight);
 }
 
-// Cameras at these points of the lens, each answered by a corner of its cell: which one is chosen by a sequence.
+// Returns cameras at points of the lens. A sequence chooses the corner of its cell that answers each camera.
 export function answeredSamples(points, first, eye, { rows, columns, step }) {
     const chosen = (two, number) => (number < two.at(-1)[1] ? two.at(-1) : two[0])[0];
     return points.map(({ t, s }, i) => {
@@ -105,8 +105,8 @@ export function answeredSamples(points, first, eye, { rows, columns, step }) {
     });
 }
 
-// The stored views themselves in place of cameras, each weighted by what the points ask of it: without disparity views
-// cannot be warped.
+// Returns the stored views in place of cameras, weighted by the points around them: views without disparity cannot be
+// warped.
 export function blendedSamples(points, eye, field) {
     const asked = new Map();
     for (const point of points) {
@@ -120,7 +120,7 @@ export function blendedSamples(points, eye, field) {
     return kept.map((view) => ({ t: view.t - eye.t, s: view.s - eye.s, view, weight: view.weight / total }));
 }
 
-// ---- What the optics mean for one picture: see picture_lens.py
+// ---- The lens of one picture: see picture_lens.py
 
 export function lensOf(optics, field, widthPx, level = NUMBERS.LEVELS[0]) {
     const diameter = Math.max(optics.aperture, 0), widest = Math.max(field.rows, field.columns);
@@ -130,21 +130,21 @@ export function lensOf(optics, field, widthPx, level = NUMBERS.LEVELS[0]) {
     return { ...optics, diameter, widest, blurPx, level, camerasPerPass: Math.max(rounded(best * level.cameras), 1) };
 }
 
-// Number of passes until the most blurred surface is smooth.
+// Returns the number of passes until the most blurred surface is smooth.
 function passesThroughAperture({ level, blurPx, camerasPerPass }) {
     if (level !== NUMBERS.LEVELS[0]) return 1;
     return Math.ceil(clamp(NUMBERS.CAMERAS_PER_PX * blurPx, NUMBERS.MIN_CAMERAS, NUMBERS.MAX_CAMERAS) / camerasPerPass);
 }
 
-// The same for the picture, whose edges are to be smooth, too.
+// Returns the number of passes until surfaces and their edges are smooth.
 export function passCount(lens, field) {
     if (!field.hasDisparity) return 1;
     if (lens.diameter > 0) return passesThroughAperture(lens);
     return lens.level === NUMBERS.LEVELS[0] && !field.layers.has(hash(lens.eye)) ? NUMBERS.EDGE_PASSES : 1;
 }
 
-// Side, in view steps, of the square of the aperture that each camera of a pass stands for: among those of the first
-// pass, which is shown alone, or among all.
+// Returns the side, in view steps, of the square of the aperture that a camera stands for. The first pass is shown
+// alone: its cameras share the aperture among themselves.
 export function cellOf(lens, passIndex) {
     const { diameter, widest, camerasPerPass } = lens;
     if (diameter === 0) return 0;
@@ -153,7 +153,7 @@ export function cellOf(lens, passIndex) {
     return Math.sqrt(area / (camerasPerPass * passes));
 }
 
-// The cameras of a pass, and which views answer them.
+// Returns the cameras of a pass and the views that answer them.
 export function samplesOf(lens, field, passIndex) {
     const { eye, diameter, widest, camerasPerPass: count } = lens;
     if (diameter === 0) {
@@ -167,7 +167,7 @@ export function samplesOf(lens, field, passIndex) {
     return answeredSamples(points, passIndex * count, eye, field);
 }
 
-// Disparity at a place of the picture (0..1) as the eye sees it: the first surface met in the middle view.
+// Returns the disparity at a place of the picture (0..1) as the eye sees it: of the first surface in the middle view.
 export function pick(field, middle, eye, u, v) {
     const [far, near] = field.range, { width, height } = field;
     const across = eye.s, down = field.rowStep * eye.t;
@@ -211,7 +211,7 @@ class Program {
         if (block !== gl.INVALID_INDEX) gl.uniformBlockBinding(this.program, block, 0);
     }
 
-    // textures: by the names of their samplers. Names that the compiler left out are skipped.
+    // Binds the program. textures: by the names of their samplers. Names that the compiler left out are skipped.
     use(values, textures) {
         const { gl } = this;
         gl.useProgram(this.program);
@@ -268,7 +268,7 @@ export class Renderer {
         return texture;
     }
 
-    // The sum of light of a picture of this size, weighted by alpha, row 0 first; that of the size before is freed.
+    // Returns the target of a picture of this size: light weighted by alpha, row 0 first. Frees a target of another size.
     targetOf(width, height) {
         const { gl, light } = this;
         if (light?.width === width && light.height === height) return light;
@@ -309,13 +309,13 @@ export class Renderer {
         gl.drawArrays(gl.TRIANGLE_STRIP, 0, 4);  // the fourth corner of fullscreen.vert lies outside
     }
 
-    // ---- Pictures: summed up in passes, as accumulation.py and passes.py have it
+    // ---- Pictures, which are sums of passes: see accumulation.py and passes.py
 
     begin(optics, part, width, height, level = NUMBERS.LEVELS[0]) {
         const { gl, field } = this, lens = lensOf(optics, field, Math.round(width / part.width), level);
         const target = this.targetOf(width, height), passes = passCount(lens, field);
-        // Half floats are coarse near 0, where surfaces lie that no view sees, and end at 65504: weights add up to about
-        // half of that. Powers of two keep their sum exact.
+        // Half floats end at 65504 and are coarse near 0, where surfaces lie that no view sees: weights add up to about
+        // half of their range. Powers of two keep the sum exact.
         const cameras = lens.diameter > 0 ? passes * lens.camerasPerPass : passes;
         const gain = 2 ** (15 - Math.ceil(Math.log2(cameras)));
         this.picture = { lens, part, width, height, target, passes, gain, pass: 0, done: 0 };
@@ -349,7 +349,7 @@ export class Renderer {
         const { MAX_SAMPLES, OFF_BORDER_PX, SQRT_STEPS } = NUMBERS;
         const { gl, table, field: { layers, hasDisparity }, picture: { lens, gain, pass, done } } = this;
         samples.forEach(({ t, s, view, weight, answer }, i) => {
-            // All views that answer a pinhole are asked at the same place of the pixel.
+            // All views that answer a pinhole are looked up at the same place of the pixel.
             const number = lens.diameter === 0 ? pass : done + i;
             const within = SQRT_STEPS.slice(3).map((step) => fraction(number, step) - 0.5 + OFF_BORDER_PX);
             table.set([s, t, ...within], 4 * i);
@@ -380,7 +380,7 @@ export class Renderer {
         });
     }
 
-    // On the canvas, which gets the picture's own size.
+    // Shows the picture on the canvas, which gets its size.
     show() {
         const { gl, canvas, picture: { width, height, target } } = this;
         if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });

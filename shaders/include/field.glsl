@@ -31,7 +31,7 @@ float in_picture(vec2 at) {
 vec4 light_from_root(vec4 root) {
     vec4 light = vec4(root.rgb * root.rgb, root.a);
 #ifdef HIGHLIGHTS
-    // Only where all channels clip: a single clipped channel is a saturated colour.
+    // Light is clipped if all channels clip: a single clipped channel is a saturated colour.
     float clipped = clamp(20.0 * min(min(root.r, root.g), root.b) - 19.0, 0.0, 1.0);
     light.rgb *= 1.0 + highlight_gain * clipped * clipped;
 #endif

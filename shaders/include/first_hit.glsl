@@ -18,7 +18,7 @@ struct Surface {
     bool is_hidden;  // the stored view does not see it: `at` is the background beside what covers it
 };
 
-// Where the stored view holds a surface of some disparity that lies on the ray.
+// The place in the stored view of a surface of some disparity that lies on the ray.
 // RANGE: all within the focus range counts as in focus.
 vec2 place_at(Ray ray, float disparity) {
 #ifdef RANGE
@@ -57,7 +57,7 @@ Surface first_hit(Ray ray) {
     float stride = (nearest - farthest) / float(steps);  // disparity of one step
     for (int k = 0; k <= steps; k++) {
         float seen;
-        // On to the first step at which the view's surface agrees with the disparity of the step.
+        // Search the first step at which the view's surface agrees with the disparity of the step.
         for (; k <= steps; k++) {
             float disparity = nearest - stride * float(k);
             vec2 at = place_at(ray, disparity);

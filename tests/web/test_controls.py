@@ -103,12 +103,12 @@ def test_sliders_speak_words(shown) -> None:
     assert words()["Focus"].endswith("% of the way from far to near, disparity 0.25 pixels")
 
 
-@pytest.mark.parametrize(("width", "height"), [(390, 844), (320, 568), (720, 390), (844, 390), (1200, 800)])
+@pytest.mark.parametrize(("width", "height"), [(390, 844), (320, 568), (780, 390), (844, 390), (1200, 800)])
 def test_the_bar_is_a_row_of_targets_that_a_finger_hits(tab, page, width, height) -> None:
     tab.resize(width, height, is_phone=width < 1000)
     tab.open(page.as_uri())
     wait_until_still(tab)
-    tab.evaluate("document.getElementById('tilt').hidden = false")
+    tab.evaluate("for (const name of ['tilt', 'headset']) document.getElementById(name).hidden = false")
     code = """[...document.querySelectorAll('#bar, #bar input, #bar button')].map(one => one.getBoundingClientRect())
         .filter(({ width }) => width).map(({ left, top, width, height }) => [left, top, width, height])"""
     (_, _, _, row), *targets = tab.evaluate(code)
@@ -118,9 +118,9 @@ def test_the_bar_is_a_row_of_targets_that_a_finger_hits(tab, page, width, height
         assert left >= 0
         assert left + across <= width
         assert top + down <= height
-    if width < 700:
+    if width < 760:
         tab.evaluate("document.getElementById('more').click()")
-        assert len(tab.evaluate(code)) == len(targets) + 5, "tilt, reset, save, full screen"
+        assert len(tab.evaluate(code)) == len(targets) + 6, "tilt, reset, save, full screen, headset"
         slide(tab, "focus", 0.3)
         tab.evaluate("document.querySelector('[data-do=reset]').click()")
         assert len(tab.evaluate(code)) == len(targets) + 1
