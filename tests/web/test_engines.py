@@ -22,7 +22,7 @@ IS_STILL = "document.documentElement.dataset.state === 'still'"
 MOST_MOVED_DB = 40.0
 """Agreement of pictures from different viewpoints at most."""
 LEAST_SHOWN_DB = 45.0
-"""Agreement of the screen with the canvas, which lies there to a fraction of a pixel."""
+"""Agreement of the screen with the canvas, stretched to a fraction of a pixel: 50.8 dB were measured at least."""
 
 
 @pytest.fixture(params=SIZES.values(), ids=list(SIZES))
@@ -84,11 +84,13 @@ def test_drags_keys_and_taps_change_the_picture(opened) -> None:
 
 def test_the_canvas_is_what_the_screen_shows_and_what_is_saved(opened) -> None:
     drawn, (x, y, width, height) = canvas(opened), opened.evaluate(BOX)
-    rows, columns = drawn.shape[:2]
+    scale = min(width / drawn.shape[1], height / drawn.shape[0])
+    rows, columns = (round(scale * side) for side in drawn.shape[:2])
     left, top = round(x + (width - columns) / 2), round(y + (height - rows) / 2)
     shown = picture(opened.screenshot())[top : top + rows, left : left + columns]
+    stretched = np.asarray(Image.fromarray(drawn).resize((columns, rows), Image.Resampling.BILINEAR))
     middle = slice(rows // 4, rows // 2)
-    assert psnr(shown[middle], drawn[middle]) >= LEAST_SHOWN_DB, "between the words and the bar"
+    assert psnr(shown[middle], stretched[middle]) >= LEAST_SHOWN_DB, "between the words and the bar"
     saved = opened.downloads / "scene.png"
     saved.unlink(missing_ok=True)
     opened.press("s")
