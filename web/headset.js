@@ -117,25 +117,25 @@ class Headset {
         return this.local.getOffsetReferenceSpace(new XRRigidTransform(place, orientation));
     }
 
-    // Returns the place that a hand points at, as shares of the window from its lower left corner.
+    // Returns the place of the window's plane that a hand points at, from the lower left corner, in windows; or null.
     pointed(frame, { targetRaySpace }) {
         const m = this.sight && frame.getPose(targetRaySpace, this.space)?.transform.matrix, far = m && m[14] / m[10];
-        return far > 0 ? [0, 1].map((i) => (m[12 + i] - far * m[8 + i]) / this.sight.size[i] + 0.5) : [-1, -1];
+        return far > 0 ? [0, 1].map((i) => (m[12 + i] - far * m[8 + i]) / this.sight.size[i] + 0.5) : null;
     }
 
-    // Opens the aperture while a hand that pinches or holds its trigger is dragged up; returns the place.
+    // Opens the aperture while a hand that pinches or holds its trigger is dragged up. Returns the place, or one outside.
     open(hand, place) {
-        const { page } = this, held = this.held.get(hand), up = held ? place[1] - (held.y ??= place[1]) : 0;
-        if (held && (held.drags ||= Math.abs(up) > DRAG)) {
+        const { page } = this, held = this.held.get(hand), up = held && place ? place[1] - (held.y ??= place[1]) : 0;
+        if (up && (held.drags ||= Math.abs(up) > DRAG)) {
             held.y = place[1];
             page.set({ aperture: page.optics.aperture + up * page.field.apertureLimits[1] });
         }
-        return place;
+        return place ?? [-1, -1];
     }
 
     // Focuses where a hand points, unless it dragged.
     select(frame, hand) {
-        const { field } = this.page, [across, up] = this.pointed(frame, hand);
+        const { field } = this.page, [across, up] = this.pointed(frame, hand) ?? [-1, -1];
         if (this.held.get(hand)?.drags || !field.middle || Math.min(across, up, 1 - across, 1 - up) < 0) return;
         const { eye, dolly, part } = this.sight, u = part.x + across * part.width, v = part.y + (1 - up) * part.height;
         const from = { t: eye.t + dolly[1] * (v - 0.5), s: eye.s + dolly[0] * (u - 0.5) };

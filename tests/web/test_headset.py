@@ -226,16 +226,19 @@ def test_a_hand_focuses_where_it_points_and_opens_the_aperture(worn) -> None:
     assert near > far, "the square lies before the wall"
     assert beside == [near, aperture], "the hand points beside the window"
     wait_for_frames(worn, 24)
-    left, right = eyes_at(worn, Pose(np.zeros(3), np.zeros(3)))
+    left, right = eyes_at(worn, POSES[0])
     edge = EYES_M / DISTANCE_M * EYE_PX / 2
     assert red_middle(left)[0] - red_middle(right)[0] == pytest.approx(edge, abs=0.5)
     move_hand(worn, 0.0, 0.0, trigger=1)
-    assert eyes_at(worn, Pose(np.zeros(3), np.zeros(3)))[0][EYE_PX // 2, EYE_PX // 2 + round(edge / 2)].min() > 200, (
-        "a dot"
-    )
+    left, _ = eyes_at(worn, POSES[0])
+    assert left[EYE_PX // 2, EYE_PX // 2 + round(edge / 2)].min() > 200, "a dot"
+    move_hand(worn, 0.0, 0.2, trigger=1)
+    opened = lens(worn)
+    assert opened[1] > aperture
+    worn.evaluate("headset.controllers.right.quaternion.set(0, 1, 0, 0)")  # it points away
     move_hand(worn, 0.0, 0.2, trigger=1)
     move_hand(worn, 0.0, 0.2, trigger=0)
-    assert lens(worn)[1] > aperture
+    assert lens(worn) == pytest.approx(opened, abs=1e-3)
 
 
 def test_the_page_comes_back_where_a_session_ends_or_does_not_begin(worn, page) -> None:
