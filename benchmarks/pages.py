@@ -25,7 +25,7 @@ from iibr_core.runtime.resources import resource_folder
 from iibr_core.scenes.scene import Source
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import FloatImage, ViewOffset
-from tests.browser import Tab
+from tests.browsers.chromium import Tab
 from tests.browsers.engines import ENGINES, open_engine
 from tests.browsers.local_site import serve_site
 from tests.browsers.page import Page

@@ -1,1 +1,1 @@
-"""Browsers for tests and benchmarks of pages, all with the interface of `page.Page`; Chromium is in `tests.browser`."""
+"""Browsers for tests and benchmarks of pages, all with the interface of `page.Page`."""

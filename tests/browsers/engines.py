@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from tests.browser import SOFTWARE, open_browser
+from tests.browsers.chromium import SOFTWARE, open_browser
 from tests.browsers.firefox import open_firefox
 from tests.browsers.local_site import LocalSite
 from tests.browsers.page import Page

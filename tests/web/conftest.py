@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from tests.browser import Pipe, Tab, open_browser
+from tests.browsers.chromium import Pipe, Tab, open_browser
 from tests.browsers.engines import ENGINES, open_engine
 from tests.browsers.local_site import LocalSite, serve_site
 from tests.browsers.page import Page

@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from tests.browser import Tab
+from tests.browsers.chromium import Tab
 from tests.viewer.conftest import HEIGHT, WIDTH
 from tests.web.conftest import slide, wait_until_still
 

@@ -15,7 +15,7 @@ from iibr_core.scenes.rect import Rect
 from iibr_core.scenes.scene import Source
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, ViewOffset
-from tests.browser import Tab
+from tests.browsers.chromium import Tab
 from tests.viewer.conftest import HEIGHT, WIDTH, write_scene
 from tests.web.conftest import STILL, canvas, export, slide, wait_until_still
 from viewer.display.offscreen import OffscreenScene

@@ -11,7 +11,7 @@ import pytest
 
 from iibr_core.scenes.scene import Source
 from iibr_core.types import GridShape, ViewOffset
-from tests.browser import open_browser
+from tests.browsers.chromium import open_browser
 from tests.iibr_core.unequal_rows import SIZE, SQUARE_PX, write_unequal_rows
 from tests.viewer.conftest import HEIGHT, WIDTH, write_scene
 from tests.web.conftest import canvas, export, set_lens, slide, wait_until_still
