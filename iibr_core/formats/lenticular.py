@@ -16,7 +16,7 @@ from iibr_core.types import ImageSize, InputError
 
 NUMBERS: dict[str, tuple[float, float, float | None]] = {
     "pitch": (1.0, 1000.0, None), "slope": (-1000.0, 1000.0, None), "center": (-1000.0, 1000.0, None),
-    "DPI": (10.0, 5000.0, None), "screenW": (16.0, 16384.0, None), "screenH": (16.0, 16384.0, None),
+    "DPI": (10.0, 5000.0, None), "screenW": (16.0, 8192.0, None), "screenH": (16.0, 8192.0, None),
     "invView": (0.0, 1.0, 1.0), "flipImageX": (0.0, 1.0, 0.0), "flipImageY": (0.0, 1.0, 0.0),
     "flipSubp": (0.0, 1.0, 0.0), "CellPatternMode": (0.0, 4.0, 0.0),
 }  # fmt: skip

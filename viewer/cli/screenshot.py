@@ -27,7 +27,6 @@ from viewer.model import opening
 from viewer.model.state.app_state import AppState
 from viewer.model.state.saving import SavedSettings
 from viewer.model.state.stereo import Stereo
-from viewer.model.stereo import weave_of
 
 if TYPE_CHECKING:
     from viewer.display.offscreen import OffscreenScene
@@ -111,7 +110,7 @@ def screenshot(
         source = saved_settings.source_like(source, settings, given)
         depth_strength = depth_strength if "depth_strength" in given else settings.depth_strength
         note = saved_settings.left_out_note(settings)
-    size = size if display is None else ScreenSize(display.screen.width, display.screen.height)
+    size = size if display is None else ScreenSize(*display.screen[::-1])
     require_picture_place(output, size, shared.inputs_of_command(context, source), force, form)
     shared.require_source(source)
     choice = lens.choice()
@@ -122,23 +121,16 @@ def screenshot(
 
         def set_lens(opened: Scene) -> Collection[Optics]:
             lens.require_within(opened)
-            viewer.state = _with_lens(viewer.state, settings, choice)
-            if display is not None and size is not None:
-                shown = Stereo(display=display, screen=viewer.state.optics.focus_disparity)
-                viewer.state = replace(viewer.state, stereo=shown)
-                return [eye.optics for eye in weave_of(viewer.state, opened, size).eyes]
-            return () if viewer.draws_own_pixels(_size_of(viewer, size, full)) else (viewer.state.optics,)
+            viewer.state = _with_lens(viewer.state, settings, choice, display)
+            return viewer.optics_of_picture(_size_of(viewer, size, full))
 
         with show_progress("reading"):
             opened = viewer.open(source, depth_strength, settings.depth_edits if settings else UNEDITED, set_lens)
         size = _size_of(viewer, size, full)
         shot = shot_of(viewer.state, size or opened.size, form)
         with show_progress("drawing"):
-            if display is not None and size is not None:
-                pixels = viewer.woven_picture(size)
-            else:
-                pixels = viewer.picture(size, is_float(output, form), shot.color_space)
-        optics, draws_own = viewer.state.optics, display is None and viewer.draws_own_pixels(size)
+            pixels = viewer.picture(size, is_float(output, form), shot.color_space)
+        optics, draws_own = viewer.state.optics, viewer.draws_own_pixels(size)
     export_picture(output, pixels, shot)
     print(output)
     own_size, view_size = (ImageSize(size.height, size.width) for size in (opened.own_size or opened.size, opened.size))
@@ -157,13 +149,16 @@ def _display(context: typer.Context, calibration: Path | None, output: Path) -> 
     return read_calibration(calibration)
 
 
-def _with_lens(state: AppState, settings: SavedSettings | None, choice: LensChoice) -> AppState:
-    """Return the state with saved settings, and with the lens of the options."""
+def _with_lens(
+    state: AppState, settings: SavedSettings | None, choice: LensChoice, display: Calibration | None
+) -> AppState:
+    """Return the state with saved settings, and with lens and display of the options."""
     state = state if settings is None else opening.take_settings(state, settings)
     state = state if choice.eye is None else lens_verbs.move_eye(state, choice.eye)
     state = state if choice.focus is None else lens_verbs.set_focus(state, choice.focus)
     state = state if choice.aperture is None else lens_verbs.set_aperture(state, choice.aperture)
-    return state if choice.gloss is None else lens_verbs.set_gloss(state, choice.gloss)
+    state = state if choice.gloss is None else lens_verbs.set_gloss(state, choice.gloss)
+    return replace(state, stereo=Stereo(display=display, screen=state.optics.focus_disparity))
 
 
 def _size_of(viewer: OffscreenScene, size: ScreenSize | None, is_full: bool) -> ScreenSize | None:

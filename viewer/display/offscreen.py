@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable
 from contextlib import ExitStack
 from dataclasses import replace
 from typing import Any
@@ -157,7 +157,13 @@ class OffscreenScene(ExitStack):
 
     def draws_own_pixels(self, size: ScreenSize | None) -> bool:
         """Return whether `picture` draws this size from the photo's own pixels, without the views."""
-        return is_full(self.scene, self.state.optics, size or self.scene.size)
+        return self.state.stereo.display is None and is_full(self.scene, self.state.optics, size or self.scene.size)
+
+    def optics_of_picture(self, size: ScreenSize | None) -> Collection[Optics]:
+        """Return the optics of all that `picture` draws from the views."""
+        if self.state.stereo.display is not None and size is not None:
+            return [eye.optics for eye in stereo.weave_of(self.state, self.scene, size).eyes]
+        return () if self.draws_own_pixels(size) else (self.state.optics,)
 
     def picture(
         self, size: ScreenSize | None = None, is_linear: bool = False, color_space: ColorSpace = SRGB
@@ -168,6 +174,8 @@ class OffscreenScene(ExitStack):
         range, and if the photo cannot be read again at its own size.
         """
         frame, optics, loaded = ScreenSize(*(size or self.scene.size)), self.state.optics, self.view.loaded
+        if self.state.stereo.display is not None:
+            return self._woven_picture(frame)
         box_size = size_in_frame(self.scene, frame)
         require_size(box_size)
         settings = RenderSettings(optics, box_size, is_linear=is_linear, color_space=color_space)
@@ -180,8 +188,8 @@ class OffscreenScene(ExitStack):
         background = np.array(BACKGROUND[:3])
         return centred(pixels, frame, linear_from_srgb(background) if is_linear else np.round(background * 255))
 
-    def woven_picture(self, size: ScreenSize) -> NDArray[np.uint8]:
-        """Return the stereo picture, or that of a lenticular display, for a screen of this size, (height, width, 3)."""
+    def _woven_picture(self, size: ScreenSize) -> NDArray[np.uint8]:
+        """Return the picture for a lenticular display, whose screen has this size."""
         self._prepare_gloss(self.state.optics.gloss)
         view, weave = StereoView(self.gl, self.view), stereo.weave_of(self.state, self.scene, size)
         view.draw(weave, math.inf)

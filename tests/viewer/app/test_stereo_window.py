@@ -236,7 +236,13 @@ def test_a_lenticular_display_that_bridge_knows_gets_its_picture(
         bridge.displays = [
             PORTRAIT | {"calibration": {"value": json.dumps(CALIBRATION)}, "windowCoords": {"value": place}}
         ]
-        viewer.app.do(do(ask, PlainTask("find display")))
+        viewer.app.do(do(preferences.toggle_section, "stereo display"))
+        picked = [len(STEREO_MODES)]  # the entry after those for both eyes
+
+        def pick(name: str, *_: object) -> int | None:
+            return picked.pop() if name == "Arrangement" and picked else None
+
+        monkeypatch.setattr("viewer.ui.sections.stereo_section.combo", pick)
         viewer.until(lambda app: app.stereo_screen.second is not None)
         viewer.until_idle()
     viewer.app.do(do(lens.move_eye, ViewOffset(0.4, 0)))
@@ -248,7 +254,7 @@ def test_a_lenticular_display_that_bridge_knows_gets_its_picture(
     with OffscreenScene("egl") as scene:
         scene.open(state.source)
         scene.state = replace(scene.state, stereo=state.stereo, optics=state.optics)
-        wanted = scene.woven_picture(SECOND)
+        wanted = scene.picture(SECOND)
     assert psnr(shown, wanted) >= 45
     assert (np.abs(shown[..., 1].astype(int) - shown[..., 2]) > 30).any(), "views differ within a pixel of a grey photo"
 
