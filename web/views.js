@@ -10,58 +10,46 @@ const RATE = 25, SEEK_MS = 10000;
 const VP9 = { codec: "vp09.00.51.08", hardwareAcceleration: "prefer-software", optimizeForLatency: true };
 const bytesOf = (name) => Uint8Array.from(atob($(name).textContent), (letter) => letter.charCodeAt(0));
 
-// RGBA of the upper left part of a picture.
-function drawn(image, width, height, colorSpace) {
+// RGBA of a picture, enlarged to `scaled`, or of its upper left part.
+function drawn(image, width, height, colorSpace, scaled = []) {
     const context = new OffscreenCanvas(width, height).getContext("2d", { willReadFrequently: true, colorSpace });
-    context.drawImage(image, 0, 0);
+    context.drawImage(image, 0, 0, ...scaled);
     return context.getImageData(0, 0, width, height).data;
 }
 
 // The frames of a stream by WebCodecs. Chunks are given no faster than the decoder takes them.
 async function* decoded(name, chunks) {
     const data = bytesOf(name), frames = [];
-    let wake = null, failure = null;
-    const decoder = new VideoDecoder({
-        output: (frame) => wake?.(frames.push(frame)),
-        error: (error) => wake?.(failure = error),
-    });
+    let wake = null;
+    const decoder = new VideoDecoder({ output: (frame) => wake?.(frames.push(frame)), error: () => wake?.() });
     decoder.ondequeue = () => wake?.();
-    try {
-        decoder.configure(VP9);
-        for (const [i, [begin, size]] of chunks.entries()) {
-            const chunk = data.subarray(begin, begin + size);
-            decoder.decode(new EncodedVideoChunk({ type: i ? "delta" : "key", timestamp: i, data: chunk }));
-            while (decoder.decodeQueueSize && !frames.length && !failure) await new Promise((done) => (wake = done));
-            while (frames.length) yield frames.shift();
-            if (failure) throw failure;
-        }
-        await decoder.flush();
+    decoder.configure(VP9);
+    for (const [i, [begin, size]] of chunks.entries()) {
+        const chunk = { type: i ? "delta" : "key", timestamp: i, data: data.subarray(begin, begin + size) };
+        decoder.decode(new EncodedVideoChunk(chunk));  // throws after an error
+        while (decoder.decodeQueueSize && !frames.length) await new Promise((done) => (wake = done));
         while (frames.length) yield frames.shift();
-    } finally {
-        frames.forEach((frame) => frame.close());
-        if (decoder.state !== "closed") decoder.close();
     }
+    await decoder.flush();
+    while (frames.length) yield frames.shift();
+    decoder.close();
 }
 
 // The frames of a stream by an element that is stepped, where there is no WebCodecs: on pages by plain http, too.
 async function* stepped(name, chunks) {
-    const video = document.createElement("video"), type = "video/webm";
-    const has = (event, change) => new Promise((done, fail) => {
-        video.addEventListener(event, done, { once: true });
-        video.onerror = () => fail(new Error(video.error.message));
-        setTimeout(() => fail(new Error("no video")), SEEK_MS);
-        Object.assign(video, change);
+    const video = document.createElement("video"), file = new Blob([bytesOf(name)], { type: "video/webm" });
+    const after = (event, changes) => new Promise((done, fail) => {
+        Object.assign(video, { [event]: done, onerror: fail, ...changes });
+        setTimeout(fail, SEEK_MS);
     });
-    const src = URL.createObjectURL(new Blob([bytesOf(name)], { type }));
-    try {
-        await has("loadeddata", { muted: true, playsInline: true, preload: "auto", src });
-        for (const i of chunks.keys()) {
-            await has("seeked", { currentTime: (i + 0.5) / RATE });
-            yield video;
-        }
-    } finally {
-        URL.revokeObjectURL(src);
+    await after("onloadeddata", { muted: true, playsInline: true, preload: "auto", src: URL.createObjectURL(file) });
+    for (const i of chunks.keys()) {
+        const isShown = new Promise((done) => video.requestVideoFrameCallback?.(done) ?? done());
+        await after("onseeked", { currentTime: (i + 0.5) / RATE });
+        await isShown;
+        yield video;
     }
+    URL.revokeObjectURL(video.src);
 }
 
 // Levels 0 to 255 of a frame whose luma is 16 to 235, by `copyTo` where that gives luma: drawing is less exact.
@@ -69,7 +57,7 @@ async function levelsOf(frame, width, height) {
     const levels = new Uint8ClampedArray(width * height);
     if (/^(I420|NV12)/.test(frame.format)) {
         const luma = new Uint8Array(frame.allocationSize()), [{ offset, stride }] = await frame.copyTo(luma);
-        for (let y = 0, i = 0; y < height; y++) {
+        for (let i = 0, y = 0; y < height; y++) {
             for (let at = offset + y * stride, end = at + width; at < end;) levels[i++] = (luma[at++] - 16) * 255 / 219;
         }
     } else {
@@ -80,20 +68,19 @@ async function levelsOf(frame, width, height) {
     return levels;
 }
 
-// Views of streams as RGBA, alpha: disparity.
+// Views of streams as RGBA, alpha: disparity. Colours are as in JPEG.
 async function* viewsOfStreams({ chunks, order, width, height }, framesOf) {
     const streams = Object.fromEntries(Object.keys(chunks).map((name) => [name, framesOf(name, chunks[name])]));
     const next = async (name, rows) => streams[name] && levelsOf((await streams[name].next()).value, width, rows);
     for (let view = 0; view < order.length; view++) {
-        const [luma, chroma, disparity] = await Promise.all(
-            [next("luma", height), next("chroma", 2 * height), next("disparity", height)]);
-        const rgba = new Uint8ClampedArray(4 * luma.length);
-        for (let i = 0, at = 0; i < luma.length; i++, at += 4) {
+        const all = [next("luma", height), next("chroma", 2 * height), next("disparity", height)];
+        const [luma, chroma, disparity] = await Promise.all(all), rgba = new Uint8ClampedArray(4 * luma.length);
+        for (let i = 0, at = 0; i < luma.length; i++) {
             const y = luma[i], blue = chroma[i] - 128, red = chroma[luma.length + i] - 128;
-            rgba[at] = y + 1.402 * red;
-            rgba[at + 1] = y - 0.344136 * blue - 0.714136 * red;
-            rgba[at + 2] = y + 1.772 * blue;
-            if (disparity) rgba[at + 3] = disparity[i];
+            rgba[at++] = y + 1.402 * red;
+            rgba[at++] = y - 0.344136 * blue - 0.714136 * red;
+            rgba[at++] = y + 1.772 * blue;
+            rgba[at++] = disparity?.[i];
         }
         yield rgba;
     }
@@ -102,9 +89,7 @@ async function* viewsOfStreams({ chunks, order, width, height }, framesOf) {
 // The frames of a picture in AVIF; the first alone where the browser has no ImageDecoder.
 async function* framesOfPicture(name) {
     const data = bytesOf(name), type = "image/avif";
-    if (!await globalThis.ImageDecoder?.isTypeSupported(type)) {
-        return yield await createImageBitmap(new Blob([data], { type }));
-    }
+    if (!globalThis.ImageDecoder) return yield await createImageBitmap(new Blob([data], { type }));
     const decoder = new ImageDecoder({ data, type });
     await decoder.tracks.ready;
     await decoder.completed;
@@ -114,36 +99,37 @@ async function* framesOfPicture(name) {
     return decoder.close();
 }
 
-// Views of pictures as RGBA, alpha: disparity. A page with streams has such a picture of the middle view only.
+// Views of pictures as RGBA, alpha: disparity. A page with streams has such pictures of the middle view only.
 async function* viewsOfPictures({ hasDisparity, width, height, colorSpace }) {
     const depths = hasDisparity && framesOfPicture("depths");
     for await (const image of $("colors") ? framesOfPicture("colors") : [$("first")]) {
-        const rgba = drawn(image, width, height, colorSpace);
+        const rgba = drawn(image, width, height, colorSpace, [width, height]);
         const levels = depths && drawn((await depths.next()).value, width, height);
-        if (depths) for (let at = 3; at < rgba.length; at += 4) rgba[at] = levels[at - 3];
+        for (let at = 3; levels && at < rgba.length; at += 4) rgba[at] = levels[at - 3];
         yield rgba;
     }
 }
 
 // Stores all views; `onView` hears of each. The middle one is shown alone until all are there.
 export async function load(field, renderer, onView) {
-    const streams = field.chunks.luma ? [decoded, stepped].map((frames) => () => viewsOfStreams(field, frames)) : [];
-    let layer = 0;
+    const { order, chunks, layers, hasDisparity } = field;
+    const streams = chunks.luma ? [decoded, stepped].map((frames) => () => viewsOfStreams(field, frames)) : [];
+    let count = 0;
     for (const views of [...streams, () => viewsOfPictures(field)]) {
-        layer = 0;
+        count = 0;
         try {
             for await (const rgba of views()) {
-                if (!layer && field.hasDisparity) field.middle = rgba.filter((_, i) => i % 4 === 3);
-                renderer.upload(layer, rgba);
-                onView(++layer);
+                if (!count && hasDisparity) field.middle = rgba.filter((_, i) => i % 4 === 3);
+                renderer.upload(count, rgba);
+                onView(++count);
             }
             break;
         } catch (error) {
             console.warn(error);
         }
     }
-    if (layer < field.order.length) return say("This browser shows one view and its depth: it cannot decode the others.");
-    field.order.forEach((place, i) => field.layers.set(hash(place), i));
+    if (count < order.length) return say("This browser shows one view and its depth: it cannot decode the others.");
+    order.forEach((place, i) => layers.set(hash(place), i));
     field.step = field.fullStep;
     return say("");
 }

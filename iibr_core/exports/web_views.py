@@ -18,7 +18,7 @@ from PIL import Image
 
 from iibr_core.beyond.resized_light import mean_of_areas
 from iibr_core.color import bytes_from_encoded, convert, encoded_from_stored, linear_from_srgb, srgb_from_linear
-from iibr_core.exports.web_streams import Stream, chroma_of, encode_levels, luma_of
+from iibr_core.exports.web_streams import SMALL_SPEED, Stream, chroma_of, encode_levels, luma_of
 from iibr_core.formats.images.color_profile import icc_profile
 from iibr_core.types import (
     DISPLAY_P3,
@@ -43,7 +43,7 @@ RANGE_MARGIN, OUTLIERS = 0.05, 0.0002
 """Margin and quantile of the disparity range, the same as in the desktop's texture (`light_field_texture.py`)."""
 QUALITIES, DEPTH_QUALITY, FIRST_QUALITY = (82, 65, 48), 60, 50
 """Qualities of colours, the lower ones for budgets; of disparity; and of the first picture."""
-CRFS, CHROMA_CRF_STEP, DEPTH_CRF = dict(zip(QUALITIES, (24, 32, 40))), 10, 32
+CRFS, CHROMA_CRF_STEP, DEPTH_CRF = dict(zip(QUALITIES, (23, 31, 39))), 10, 32
 """Qualities of the streams of VP9, 0 to 63, the best first: of luma by the quality of colours, the step by which chroma
 has a higher value, and of disparity."""
 MAX_HALVINGS = 4
@@ -225,7 +225,7 @@ def _streams(colors: Sequence[Bytes], depths: Sequence[Bytes], crf: int) -> dict
         "luma": encode_levels(map(luma_of, colors), size, crf),
         "chroma": encode_levels(*chroma, crf + CHROMA_CRF_STEP),
     }
-    return streams | ({"disparity": encode_levels(depths, size, DEPTH_CRF)} if depths else {})
+    return streams | ({"disparity": encode_levels(depths, size, DEPTH_CRF, SMALL_SPEED)} if depths else {})
 
 
 def _moving(pictures: Sequence[Bytes], quality: int, space: ColorSpace, subsampling: str) -> bytes:

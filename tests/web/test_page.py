@@ -221,6 +221,37 @@ def test_readers_of_screens_find_words(shown) -> None:
         assert {("slider", "Focus"), ("slider", "Aperture"), ("button", button)} <= named
 
 
+HIDE_DECODER, HIDE_VIDEO = "delete globalThis.VideoDecoder;", "delete HTMLMediaElement.prototype.src;"
+
+
+def test_a_stepped_video_shows_the_same_as_a_decoder(tab, shown, page) -> None:
+    """Pages that come by plain http have no WebCodecs in most browsers."""
+    set_lens(shown, *SETTINGS[1])
+    wait_until_still(shown)
+    tab.call("Page.addScriptToEvaluateOnNewDocument", source=HIDE_DECODER)
+    decoded = canvas(shown)
+    tab.open(page.as_uri())
+    wait_until_still(tab)
+    assert tab.evaluate("typeof VideoDecoder") == "undefined"
+    assert tab.evaluate("+document.documentElement.dataset.views") == 9
+    set_lens(tab, *SETTINGS[1])
+    wait_until_still(tab)
+    assert psnr(canvas(tab), decoded) >= LEAST_PSNR_OF_HALVES_DB
+
+
+def test_without_video_the_middle_view_moves_by_its_depth(tab, page) -> None:
+    tab.call("Page.addScriptToEvaluateOnNewDocument", source=HIDE_DECODER + HIDE_VIDEO)
+    tab.resize(WIDTH, HEIGHT)
+    tab.open(page.as_uri())
+    tab.wait_until("document.getElementById('status').textContent.includes('shows one view and its depth')")
+    tab.wait_until("document.documentElement.dataset.state === 'still'")
+    first = canvas(tab)
+    assert tab.evaluate("+document.documentElement.dataset.views") == 1
+    set_lens(tab, *SETTINGS[1])
+    tab.wait_until("document.documentElement.dataset.state === 'still'")
+    assert 12 < psnr(canvas(tab), first) < 40
+
+
 def test_without_pyav_views_are_a_moving_picture(tab, tmp_path) -> None:
     """Its range is limited: Chromium 156 assumes that and ignores the range that the tracks state."""
     (tmp_path / "av.py").write_text("raise ImportError('not installed')", "utf-8")
