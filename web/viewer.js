@@ -284,7 +284,7 @@ async function start() {
         return load(field, renderer, (count) => {
             if (renderer !== newest) return;
             page ??= new Page(field);
-            page.use(field, renderer);
+            if (count === 1) page.use(field, renderer);  // the middle view shows alone until all are there
             document.documentElement.dataset.views = count;
         }).catch((error) => say(`The views cannot be read: ${error.message}.`)).finally(() => page?.wake());
     };
