@@ -64,7 +64,7 @@ async function levelsOf(frame, width, height) {
         const pixels = drawn(frame, width, height);
         for (let i = 0; i < levels.length; i++) levels[i] = pixels[4 * i];
     }
-    frame.close?.();
+    frame.close?.();  // a video has none
     return levels;
 }
 
