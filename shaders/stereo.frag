@@ -1,6 +1,6 @@
 #version 330 core
 // The pictures of both eyes woven into one for a display. A switch names the arrangement: BESIDE, ABOVE, ROWS, COLUMNS,
-// CHECKERBOARD, ANAGLYPH.
+// CHECKERBOARD, ANAGLYPH. EXACT: the pictures are drawn in the pixels of the screen.
 #include "sheet.glsl"
 #include "srgb.glsl"
 
@@ -15,9 +15,14 @@ out vec4 color;
 
 // The light that an eye sees at a pixel of its room, from the upper left corner.
 vec3 seen(int eye, vec2 at) {
-    vec2 place = (at - floor((frame_px - picture_px) / 2.0)) / picture_px;
-    bool is_outside = any(lessThan(place, vec2(0.0))) || any(greaterThan(place, vec2(1.0)));
-    return is_outside ? vec3(0.0) : picture_at(eye ^ first_eye, place);
+    vec2 place = at - floor((frame_px - picture_px) / 2.0);
+    if (any(lessThan(place, vec2(0.0))) || any(greaterThan(place, picture_px))) return vec3(0.0);
+#ifdef EXACT
+    ivec2 texel = ivec2(place.x + float(eye ^ first_eye) * picture_px.x, picture_px.y - place.y);
+    return texelFetch(sheet, texel, 0).rgb;
+#else
+    return picture_at(eye ^ first_eye, place / picture_px);
+#endif
 }
 
 vec3 linear_from_srgb(vec3 code) {

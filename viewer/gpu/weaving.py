@@ -56,7 +56,7 @@ class Weaver:
         """Weave the pictures, which were drawn at this size."""
         assert self._sheet is not None
         assert self.screen is not None
-        program = self._program(weave)
+        program = self._program(weave, drawn_px)
         self._sheet.texture.use(0)
         program.set_uniforms(sheet=0, sheet_columns=self._columns, tile_px=self._tile_px, drawn_px=drawn_px)
         program.set_uniforms(screen_px=weave.size_px, frame_px=weave.frame_px, picture_px=weave.picture_px)
@@ -71,11 +71,11 @@ class Weaver:
                 target.release()
         self._sheet = self.screen = None
 
-    def _program(self, weave: Weave) -> Program:
+    def _program(self, weave: Weave, drawn_px: ScreenSize) -> Program:
         """Return the weaving program, its uniforms set."""
         if weave.display is not None:
             return self._lenticular_program(weave.display, len(weave.eyes))
-        program = self._programs.get("stereo.frag", {SWITCHES[weave.mode]: True})
+        program = self._programs.get("stereo.frag", {SWITCHES[weave.mode]: True, "EXACT": drawn_px == weave.picture_px})
         program.set_uniforms(first_eye=int(weave.is_swapped))
         seen = (tuple(matrix.T.ravel().tolist()) for matrix in (LEFT, RIGHT))
         program.set_uniforms(**dict(zip(("left_seen", "right_seen"), seen)))
