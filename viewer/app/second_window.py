@@ -15,7 +15,8 @@ import glfw
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import InputError
 from viewer.app.window import Window, hint_context, monitor_record
-from viewer.gpu.weaving import TextureScreen
+from viewer.gpu.context import create_for_window
+from viewer.gpu.weaving import show_texture
 from viewer.model.state.stereo import Monitor
 
 Place = Callable[[float, float], tuple[float, float]]
@@ -38,7 +39,7 @@ class SecondWindow:
             self.handle = glfw.create_window(monitor.width, monitor.height, "iibr", found, first.handle)
         if not self.handle:
             raise InputError(f"{monitor.words}: no window can be opened there")
-        self._screen = TextureScreen(self.handle)
+        self._gl = create_for_window(self.handle)
         glfw.swap_interval(1)
         first.wait_for_screen(False)  # two windows that wait would halve the frame rate
         self._listen()
@@ -51,7 +52,7 @@ class SecondWindow:
     def show(self, texture: int, size_px: ScreenSize) -> None:
         """Show a texture of the first window's context, which stays current."""
         glfw.make_context_current(self.handle)
-        self._screen.show(texture, size_px)
+        show_texture(self._gl, texture, size_px)
         glfw.swap_buffers(self.handle)
         glfw.make_context_current(self._first.handle)
 
@@ -62,7 +63,7 @@ class SecondWindow:
     def close(self) -> None:
         """Close the window."""
         glfw.make_context_current(self.handle)
-        self._screen.release()
+        self._gl.release()
         self._first.wait_for_screen(True)
         glfw.destroy_window(self.handle)
 

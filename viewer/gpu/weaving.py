@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import moderngl
 import numpy as np
@@ -11,7 +10,7 @@ import numpy as np
 from iibr_core.exports.anaglyph import LEFT, RIGHT
 from iibr_core.formats.lenticular import MAX_CELLS, Calibration
 from iibr_core.scenes.screen_size import ScreenSize
-from viewer.gpu.context import GLContext, create_for_window
+from viewer.gpu.context import GLContext
 from viewer.gpu.programs import Program, ProgramCache
 from viewer.gpu.render_targets import RenderTarget
 from viewer.model.state.stereo import StereoMode, Weave
@@ -103,21 +102,8 @@ class Weaver:
         return RenderTarget(self._ctx, size_px, "f1")
 
 
-class TextureScreen:
-    """Shows a texture in a window whose context shares the objects of the texture's context."""
-
-    def __init__(self, window: Any) -> None:
-        """Make the window's context current. Raises InputError."""
-        self._gl: GLContext = create_for_window(window)
-
-    def show(self, texture: int, size_px: ScreenSize) -> None:
-        """Copy the texture (RGBA8) onto the window, whose context is current."""
-        ctx = self._gl.ctx
-        picture = ctx.external_texture(texture, size_px, 4, 0, "f1")
-        framebuffer = ctx.framebuffer([picture])
-        ctx.copy_framebuffer(ctx.screen, framebuffer)
-        framebuffer.release()
-
-    def release(self) -> None:
-        """Free the context."""
-        self._gl.release()
+def show_texture(gl: GLContext, texture: int, size_px: ScreenSize) -> None:
+    """Copy a texture (RGBA8) onto the window of a context that is current and shares the texture."""
+    framebuffer = gl.ctx.framebuffer([gl.ctx.external_texture(texture, size_px, 4, 0, "f1")])
+    gl.ctx.copy_framebuffer(gl.ctx.screen, framebuffer)
+    framebuffer.release()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -48,8 +49,7 @@ def monitor_of(state: AppState) -> Monitor | None:
 
 def choose_monitor(state: AppState, monitor: Monitor) -> AppState:
     """Choose the monitor; a stereo picture that is shown moves there."""
-    chosen = replace(state.preferences.stereo, monitor=monitor)
-    state = replace(state, preferences=replace(state.preferences, stereo=chosen))
+    state = _chosen(state, monitor=monitor)
     return show(state, True) if state.stereo.is_shown else state
 
 
@@ -67,9 +67,7 @@ def set_monitors(state: AppState, monitors: tuple[Monitor, ...]) -> AppState:
 
 def set_mode(state: AppState, mode: StereoMode) -> AppState:
     """Arrange the pictures of both eyes in this way."""
-    chosen = replace(state.preferences.stereo, mode=mode)
-    shown = replace(state.stereo, display=None)
-    return replace(state, preferences=replace(state.preferences, stereo=chosen), stereo=shown)
+    return replace(_chosen(state, mode=mode), stereo=replace(state.stereo, display=None))
 
 
 def show_on(state: AppState, display: Calibration, place: tuple[int, int] | None = None) -> AppState:
@@ -83,8 +81,7 @@ def show_on(state: AppState, display: Calibration, place: tuple[int, int] | None
 
 def swap_eyes(state: AppState) -> AppState:
     """Give each eye the picture of the other."""
-    chosen = replace(state.preferences.stereo, is_swapped=not state.preferences.stereo.is_swapped)
-    return replace(state, preferences=replace(state.preferences, stereo=chosen))
+    return _chosen(state, is_swapped=not state.preferences.stereo.is_swapped)
 
 
 def set_eyes(state: AppState, eyes: float) -> AppState:
@@ -95,6 +92,12 @@ def set_eyes(state: AppState, eyes: float) -> AppState:
 def set_screen(state: AppState, disparity: float) -> AppState:
     """Set the disparity that lies in the plane of the screen."""
     return replace(state, stereo=replace(state.stereo, screen=disparity))
+
+
+def _chosen(state: AppState, **changes: Any) -> AppState:
+    """Return the state with changed preferences of the stereo picture."""
+    choice = replace(state.preferences.stereo, **changes)
+    return replace(state, preferences=replace(state.preferences, stereo=choice))
 
 
 def _same(monitor: Monitor | None, among: tuple[Monitor, ...]) -> Monitor | None:
@@ -137,16 +140,6 @@ def screen_plane(scene: Scene, stereo: Stereo) -> float:
     return clamp(stereo.screen, *scene.disparity_range_px)
 
 
-def parallax(scene: Scene, stereo: Stereo) -> tuple[float, float]:
-    """Return the parallax of the farthest and of the nearest surface as shares of the picture's width; positive values
-    lie before the screen.
-    """
-    eyes = eyes_at(scene, Optics(), stereo)
-    moved = eye_distance(scene, stereo) / (scene.width * eyes[0].part.width)
-    far, near = ((edge - screen_plane(scene, stereo)) * moved for edge in scene.disparity_range_px)
-    return far, near
-
-
 def warning(scene: Scene, stereo: Stereo) -> str:
     """Return words about parallax that eyes do not bear, or about a monitor that does not fit, "" without."""
     if (display := stereo.display) is not None:
@@ -154,7 +147,9 @@ def warning(scene: Scene, stereo: Stereo) -> str:
         if monitor is None or (monitor.height, monitor.width) == display.screen:
             return ""
         return f"The calibration is that of a screen of {display.screen}, not of {monitor.words}."
-    far, near = parallax(scene, stereo)
+    shown_px = scene.width * eyes_at(scene, Optics(), stereo)[0].part.width
+    moved, plane = eye_distance(scene, stereo) / shown_px, screen_plane(scene, stereo)
+    far, near = ((edge - plane) * moved for edge in scene.disparity_range_px)
     place, worst = ("before", near) if near >= -far else ("behind", -far)
     if worst <= MAX_PARALLAX:
         return ""
