@@ -235,7 +235,7 @@ def stereo_frames(app: App) -> str:
         weave = stereo.weave_of(app.state, scene, STEREO_SCREEN)
         began = time.process_time()
         for eye in weave.eyes:
-            app.scene_view.renderer.render_in_time(eye.optics, weave.picture_px, math.inf, eye.part)
+            app.scene_view.renderer.render_in_time(eye.optics, eye.size_px, math.inf, eye.part)
         alone_s.append(time.process_time() - began)
         began = time.process_time()
         view.draw(weave, math.inf)

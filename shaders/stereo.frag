@@ -1,13 +1,12 @@
 #version 330 core
-// The pictures of both eyes woven into one for a display. A switch names the arrangement: BESIDE, ABOVE, ROWS, COLUMNS,
-// CHECKERBOARD, ANAGLYPH. EXACT: the pictures are drawn in the pixels of the screen.
+// The pictures of both eyes woven into one for a display. A switch names the arrangement, as SBS or TOP_BOTTOM does.
+// EXACT: the pictures are drawn in the pixels of the screen.
 #include "sheet.glsl"
 #include "srgb.glsl"
 
 uniform vec2 screen_px;
 uniform vec2 frame_px;    // room of each picture on the screen
 uniform vec2 picture_px;  // each picture, in the middle of its room
-uniform int first_eye;    // eye that comes first: 0 the left, 1 the right
 uniform mat3 left_seen, right_seen;  // light of the display from the light of each eye's picture
 
 in vec2 uv;
@@ -18,10 +17,10 @@ vec3 seen(int eye, vec2 at) {
     vec2 place = at - floor((frame_px - picture_px) / 2.0);
     if (any(lessThan(place, vec2(0.0))) || any(greaterThan(place, picture_px))) return vec3(0.0);
 #ifdef EXACT
-    ivec2 texel = ivec2(place.x + float(eye ^ first_eye) * picture_px.x, picture_px.y - place.y);
+    ivec2 texel = ivec2(place.x + float(eye) * picture_px.x, picture_px.y - place.y);
     return texelFetch(sheet, texel, 0).rgb;
 #else
-    return picture_at(eye ^ first_eye, place / picture_px);
+    return picture_at(eye, place / picture_px);
 #endif
 }
 
@@ -37,10 +36,10 @@ void main() {
     vec3 right = clamp(right_seen * linear_from_srgb(seen(1, at)), 0.0, 1.0);
     color = vec4(srgb_from_linear(clamp(left + right, 0.0, 1.0)), 1.0);
 #else
-#if defined(BESIDE)
+#if defined(SBS) || defined(HALF_SBS) || defined(CROSS_EYED)
     int second = int(at.x > frame_px.x);
     at.x -= float(second) * frame_px.x;
-#elif defined(ABOVE)
+#elif defined(TOP_BOTTOM)
     int second = int(at.y > frame_px.y);
     at.y -= float(second) * frame_px.y;
 #elif defined(ROWS)

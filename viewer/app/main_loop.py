@@ -217,7 +217,7 @@ class App:
     def _place_window(self) -> list[Action]:
         """Return where the window is, if that is news."""
         before, place = self.state.preferences, self.window.place
-        self.window.set_fullscreen(self.state.is_fullscreen)
+        self.window.set_fullscreen(self.state.is_fullscreen or self.state.stereo.fills_window)
         if self.window.is_fullscreen or self.window.is_hidden or (place is None and before.is_maximized):
             return []
         is_known = place == before.window and not before.is_maximized

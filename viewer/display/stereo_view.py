@@ -105,7 +105,7 @@ class StereoView:
         for i in sorted(range(count), key=lambda i: i != count // 2):  # the middle one decides on the level
             renderer, eye = self._renderers[i % wanted], weave.eyes[i]
             if level is None or wanted == count:
-                renderer.render_in_time(eye.optics, weave.picture_px, each_s, eye.part, level)
+                renderer.render_in_time(eye.optics, eye.size_px, each_s, eye.part, level)
             else:  # tens of measurements would take longer than the pictures
                 renderer.render(eye.optics, renderer.shown_px, QUALITY_LEVELS[level], eye.part)
             level, converged = renderer.level, converged + renderer.is_converged
@@ -137,7 +137,7 @@ class StereoView:
         while self._complete < len(weave.eyes):
             if self._begun < self._complete:
                 self._begun, eye = self._complete, weave.eyes[self._complete]
-                renderer.render(eye.optics, weave.picture_px, part=eye.part)
+                renderer.render(eye.optics, eye.size_px, part=eye.part)
             renderer.refine(max(end - time.perf_counter(), 0.0))
             if renderer.is_converged:
                 self._present(self._complete)

@@ -13,17 +13,7 @@ from iibr_core.scenes.screen_size import ScreenSize
 from viewer.gpu.context import GLContext
 from viewer.gpu.programs import Program, ProgramCache
 from viewer.gpu.render_targets import RenderTarget
-from viewer.model.state.stereo import StereoMode, Weave
-
-SWITCHES: dict[StereoMode, str] = {
-    **dict.fromkeys(("sbs", "half-sbs", "cross-eyed"), "BESIDE"),
-    "top-bottom": "ABOVE",
-    "rows": "ROWS",
-    "columns": "COLUMNS",
-    "checkerboard": "CHECKERBOARD",
-    "anaglyph": "ANAGLYPH",
-}
-"""Switch of shaders/stereo.frag for each mode."""
+from viewer.model.state.stereo import Weave
 
 
 class Weaver:
@@ -38,7 +28,7 @@ class Weaver:
     def prepare(self, weave: Weave) -> None:
         """Make room for the pictures and the screen of a weave."""
         self._columns = math.ceil(math.sqrt(len(weave.eyes)))
-        self._tile_px = width, height = weave.picture_px
+        self._tile_px = width, height = weave.eyes[0].size_px
         rows = math.ceil(len(weave.eyes) / self._columns)
         self._sheet = self._sized(self._sheet, ScreenSize(self._columns * width, rows * height))
         self.screen = self._sized(self.screen, weave.size_px)
@@ -58,7 +48,7 @@ class Weaver:
         program = self._program(weave, drawn_px)
         self._sheet.texture.use(0)
         program.set_uniforms(sheet=0, sheet_columns=self._columns, tile_px=self._tile_px, drawn_px=drawn_px)
-        program.set_uniforms(screen_px=weave.size_px, frame_px=weave.frame_px, picture_px=weave.picture_px)
+        program.set_uniforms(screen_px=weave.size_px, frame_px=weave.frame_px, picture_px=self._tile_px)
         self.screen.framebuffer.use()
         self._ctx.disable(moderngl.DEPTH_TEST | moderngl.CULL_FACE | moderngl.BLEND)
         program.draw()
@@ -72,12 +62,12 @@ class Weaver:
 
     def _program(self, weave: Weave, drawn_px: ScreenSize) -> Program:
         """Return the weaving program, its uniforms set."""
-        if weave.display is not None:
-            return self._lenticular_program(weave.display, len(weave.eyes))
-        program = self._programs.get("stereo.frag", {SWITCHES[weave.mode]: True, "EXACT": drawn_px == weave.picture_px})
-        program.set_uniforms(first_eye=int(weave.is_swapped))
-        seen = (tuple(matrix.T.ravel().tolist()) for matrix in (LEFT, RIGHT))
-        program.set_uniforms(**dict(zip(("left_seen", "right_seen"), seen)))
+        if isinstance(weave.arrangement, Calibration):
+            return self._lenticular_program(weave.arrangement, len(weave.eyes))
+        switch = weave.arrangement.replace("-", "_").upper()
+        program = self._programs.get("stereo.frag", {switch: True, "EXACT": drawn_px == self._tile_px})
+        left, right = (tuple(matrix.T.ravel().tolist()) for matrix in (LEFT, RIGHT))
+        program.set_uniforms(left_seen=left, right_seen=right)
         return program
 
     def _lenticular_program(self, display: Calibration, views: int) -> Program:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
 from iibr_core.beyond.optics import Optics
 from iibr_core.exports.framing import size_in_frame
+from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.formats.lenticular import Calibration
 from iibr_core.scenes.lens_limits import clamp, eye_limits
 from iibr_core.scenes.rect import Rect
@@ -18,7 +18,7 @@ from iibr_core.types import ViewOffset
 from viewer.model.messages import notify
 from viewer.model.state.app_state import AppState
 from viewer.model.state.notices import Notice
-from viewer.model.state.stereo import Eye, Monitor, Stereo, StereoMode, Weave
+from viewer.model.state.stereo import Monitor, Stereo, StereoMode, Weave
 
 MAX_PARALLAX = 0.03
 """Largest parallax that eyes bear, as a share of the picture's width."""
@@ -32,24 +32,21 @@ BESIDE: tuple[StereoMode, ...] = ("sbs", "half-sbs", "cross-eyed")
 
 def show(state: AppState, is_shown: bool) -> AppState:
     """Show the stereo picture on its monitor, or close it. On the window's monitor, the window shows it."""
-    state, monitor = _closed(state), monitor_of(state)
-    if not is_shown:
-        return state
-    before = state.is_fullscreen, state.hides_panel
-    if monitor is None or monitor == state.monitors[0]:
-        state, monitor = replace(state, is_fullscreen=True, hides_panel=True), None
-    return replace(state, stereo=replace(state.stereo, is_shown=True, monitor=monitor, before=before))
+    wanted = monitor_of(state)
+    monitor = None if wanted in state.monitors[:1] else wanted
+    shown = replace(state, stereo=replace(state.stereo, is_shown=is_shown, monitor=monitor))
+    return replace(shown, hides_panel=None) if shown.stereo.fills_window else shown
 
 
 def monitor_of(state: AppState) -> Monitor | None:
     """Return the monitor of the preferences if it is connected, else one beside the window's; None without any."""
     usual = next(iter(state.monitors[1:2] or state.monitors), None)
-    return _same(state.preferences.stereo.monitor, state.monitors) or usual
+    return _same(state.preferences.stereo_monitor, state.monitors) or usual
 
 
 def choose_monitor(state: AppState, monitor: Monitor) -> AppState:
     """Choose the monitor; a stereo picture that is shown moves there."""
-    state = _chosen(state, monitor=monitor)
+    state = replace(state, preferences=replace(state.preferences, stereo_monitor=monitor))
     return show(state, True) if state.stereo.is_shown else state
 
 
@@ -57,17 +54,18 @@ def set_monitors(state: AppState, monitors: tuple[Monitor, ...]) -> AppState:
     """Note the connected monitors, the window's first. A stereo picture on another monitor that is gone is closed."""
     shown = state.stereo.monitor
     state = replace(state, monitors=monitors)
-    if not state.stereo.is_shown or shown is None or shown in monitors:
+    if not state.stereo.is_shown or shown is None:
         return state
     if (moved := _same(shown, monitors)) is not None:
         return replace(state, stereo=replace(state.stereo, monitor=moved))
     words = f"The monitor {shown.name} is no longer there, so its stereo picture was closed."
-    return notify(_closed(state), Notice(words))
+    return notify(show(state, False), Notice(words))
 
 
 def set_mode(state: AppState, mode: StereoMode) -> AppState:
     """Arrange the pictures of both eyes in this way."""
-    return replace(_chosen(state, mode=mode), stereo=replace(state.stereo, display=None))
+    preferences = replace(state.preferences, stereo_mode=mode)
+    return replace(state, preferences=preferences, stereo=replace(state.stereo, display=None))
 
 
 def show_on(state: AppState, display: Calibration, place: tuple[int, int] | None = None) -> AppState:
@@ -81,7 +79,7 @@ def show_on(state: AppState, display: Calibration, place: tuple[int, int] | None
 
 def swap_eyes(state: AppState) -> AppState:
     """Give each eye the picture of the other."""
-    return _chosen(state, is_swapped=not state.preferences.stereo.is_swapped)
+    return replace(state, preferences=replace(state.preferences, swaps_eyes=not state.preferences.swaps_eyes))
 
 
 def set_eyes(state: AppState, eyes: float) -> AppState:
@@ -94,25 +92,10 @@ def set_screen(state: AppState, disparity: float) -> AppState:
     return replace(state, stereo=replace(state.stereo, screen=disparity))
 
 
-def _chosen(state: AppState, **changes: Any) -> AppState:
-    """Return the state with changed preferences of the stereo picture."""
-    choice = replace(state.preferences.stereo, **changes)
-    return replace(state, preferences=replace(state.preferences, stereo=choice))
-
-
 def _same(monitor: Monitor | None, among: tuple[Monitor, ...]) -> Monitor | None:
     """Return the monitor if it is connected, else one of its name."""
     named = [other for other in among if monitor is not None and other.name == monitor.name]
     return monitor if monitor in among else next(iter(named), None)
-
-
-def _closed(state: AppState) -> AppState:
-    if not state.stereo.is_shown:
-        return state
-    closed = replace(state, stereo=replace(state.stereo, is_shown=False))
-    if state.stereo.monitor is not None:
-        return closed
-    return replace(closed, is_fullscreen=state.stereo.before[0], hides_panel=state.stereo.before[1])
 
 
 # Numbers
@@ -128,11 +111,10 @@ def eye_distance(scene: Scene, stereo: Stereo) -> float:
     """Return the distance of the eyes in view steps: the chosen one, else the largest that eyes bear, or for a display
     with tens of pictures that from the first to the last.
     """
-    limit = eye_distance_limit(scene)
-    if stereo.eyes is not None or stereo.display is not None:
-        return limit if stereo.eyes is None else clamp(stereo.eyes, 0.0, limit)
-    farthest = max(abs(edge - screen_plane(scene, stereo)) for edge in scene.disparity_range_px)
-    return clamp(MAX_PARALLAX * scene.width / max(farthest, 1e-6), 0.0, limit)
+    limit, plane = eye_distance_limit(scene), screen_plane(scene, stereo)
+    farthest = max(*(abs(edge - plane) for edge in scene.disparity_range_px), 1e-6)
+    usual = limit if stereo.display else MAX_PARALLAX * scene.width / farthest
+    return clamp(usual if stereo.eyes is None else stereo.eyes, 0.0, limit)
 
 
 def screen_plane(scene: Scene, stereo: Stereo) -> float:
@@ -159,8 +141,8 @@ def warning(scene: Scene, stereo: Stereo) -> str:
     )
 
 
-def eyes_at(scene: Scene, optics: Optics, stereo: Stereo, count: int = 2) -> tuple[Eye, ...]:
-    """Return `count` pictures, the leftmost first, about the viewpoint or as near to it as the views reach.
+def eyes_at(scene: Scene, optics: Optics, stereo: Stereo, count: int = 2) -> tuple[RenderSettings, ...]:
+    """Return `count` pictures of the views' size, the leftmost first, about the viewpoint if the views allow.
 
     They are sheared, so that the plane of the screen stays in place, and all are cropped by the largest shear.
     """
@@ -169,8 +151,9 @@ def eyes_at(scene: Scene, optics: Optics, stereo: Stereo, count: int = 2) -> tup
     moved = clamp(screen_plane(scene, stereo) * span / scene.width, -2 * MAX_MARGIN, 2 * MAX_MARGIN)
     margin = abs(moved) / 2
     return tuple(
-        Eye(
+        RenderSettings(
             replace(optics, eye=ViewOffset(optics.eye.t, middle + span * aside)),
+            ScreenSize(scene.width, scene.height),
             Rect(margin - moved * aside, 0.0, 1 - 2 * margin, 1.0),
         )
         for aside in map(float, np.linspace(-0.5, 0.5, count))
@@ -179,31 +162,26 @@ def eyes_at(scene: Scene, optics: Optics, stereo: Stereo, count: int = 2) -> tup
 
 def weave_of(state: AppState, scene: Scene, size_px: ScreenSize) -> Weave:
     """Return the pictures of both eyes or of a lenticular display, and their arrangement on a screen of this size."""
-    if (display := state.stereo.display) is not None:
+    mode, display = state.preferences.stereo_mode, state.stereo.display
+    if display is not None:
         quilt = display.quilt
-        eyes, room = eyes_at(scene, state.shown_optics, state.stereo, quilt.views), ScreenSize(*quilt.tile[::-1])
-        picture = size_in_frame(scene, room, eyes[0].part, quilt.aspect)
-        return Weave(eyes, state.preferences.stereo.mode, size_px, room, picture, display=display)
-    choice, eyes = state.preferences.stereo, eyes_at(scene, state.shown_optics, state.stereo)
-    width, height = size_px
-    frame = ScreenSize(
-        max(width // 2, 1) if choice.mode in BESIDE else width,
-        max(height // 2, 1) if choice.mode == "top-bottom" else height,
-    )
-    is_full = choice.mode in ("sbs", "cross-eyed")
-    aspect = frame.width / frame.height if is_full else width / height
-    picture = size_in_frame(scene, frame, eyes[0].part, aspect)
-    is_swapped = choice.is_swapped != (choice.mode == "cross-eyed")
-    return Weave(eyes, choice.mode, size_px, frame, picture, is_swapped)
+        count, frame, aspect = quilt.views, ScreenSize(*quilt.tile[::-1]), quilt.aspect
+    else:
+        across, down = 1 + (mode in BESIDE), 1 + (mode == "top-bottom")
+        count, frame = 2, ScreenSize(max(size_px.width // across, 1), max(size_px.height // down, 1))
+        aspect = frame.width / frame.height if mode in ("sbs", "cross-eyed") else size_px.width / size_px.height
+    eyes = eyes_at(scene, state.shown_optics, state.stereo, count)
+    picture_px = size_in_frame(scene, frame, eyes[0].part, aspect)
+    is_swapped = display is None and state.preferences.swaps_eyes != (mode == "cross-eyed")
+    eyes = tuple(replace(eye, size_px=picture_px) for eye in (eyes[::-1] if is_swapped else eyes))
+    return Weave(eyes, display or mode, size_px, frame)
 
 
 def place_in_photo(weave: Weave, x_px: float, y_px: float) -> tuple[float, float]:
     """Return the place in the middle viewpoint's picture, as shares of its size, under a pixel of the woven screen."""
-    if weave.display is not None:
-        x_px, y_px = (at * room / size for at, room, size in zip((x_px, y_px), weave.frame_px, weave.size_px))
-    x, y = x_px % weave.frame_px.width, y_px % weave.frame_px.height
-    room = weave.frame_px.width - weave.picture_px.width, weave.frame_px.height - weave.picture_px.height
-    across, down = (x - room[0] // 2) / weave.picture_px.width, (y - room[1] // 2) / weave.picture_px.height
-    left, right = weave.eyes[0].part, weave.eyes[-1].part
-    part = left._replace(x=(left.x + right.x) / 2)
-    return part.x + part.width * clamp(across, 0.0, 1.0), part.y + part.height * clamp(down, 0.0, 1.0)
+    (width, height), frame, part = weave.eyes[0].size_px, weave.frame_px, weave.eyes[0].part
+    if isinstance(weave.arrangement, Calibration):
+        x_px, y_px = (at * room / size for at, room, size in zip((x_px, y_px), frame, weave.size_px))
+    across = (x_px % frame.width - (frame.width - width) // 2) / width
+    down = (y_px % frame.height - (frame.height - height) // 2) / height
+    return 0.5 + part.width * (clamp(across, 0.0, 1.0) - 0.5), clamp(down, 0.0, 1.0)

@@ -16,9 +16,9 @@ def set_fullscreen(state: AppState, is_fullscreen: bool) -> AppState:
 
 
 def toggle_panel(state: AppState) -> AppState:
-    """Show or hide the panel; a choice that agrees with the window's width is forgotten."""
-    hides = not state.is_panel_hidden
-    return replace(state, hides_panel=None if hides == state.is_narrow else hides)
+    """Show or hide the panel; a choice that agrees with the window is forgotten."""
+    usual, hides = replace(state, hides_panel=None), not state.is_panel_hidden
+    return usual if usual.is_panel_hidden == hides else replace(state, hides_panel=hides)
 
 
 def set_narrow(state: AppState, is_narrow: bool) -> AppState:

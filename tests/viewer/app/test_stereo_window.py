@@ -19,6 +19,7 @@ from iibr_core.evaluation.metrics import psnr
 from iibr_core.exports.anaglyph import anaglyph
 from iibr_core.exports.framing import centred, size_in_frame
 from iibr_core.exports.render_settings import RenderSettings
+from iibr_core.formats.lenticular import Calibration
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import GridShape, ViewOffset
 from tests.fake_bridge import PORTRAIT, fake_bridge
@@ -98,7 +99,7 @@ def test_all_arrangements_reach_the_second_monitor(viewer: Driver, display: str)
         shown[mode] = grabbed(display, FIRST.width, SECOND)
     viewer.app.do(do(stereo.set_mode, "columns"))
     viewer.send("key", "l")
-    viewer.until(lambda app: app.state.preferences.stereo.is_swapped)
+    viewer.until(lambda app: app.state.preferences.swaps_eyes)
     viewer.until_idle()
     swapped = grabbed(display, FIRST.width, SECOND)
     with eyes_of(viewer) as eyes:
@@ -175,8 +176,8 @@ def test_monitor_and_arrangement_are_remembered(open_window: Opener, photo_path:
     first.app.do(do(stereo.choose_monitor, wanted), do(stereo.set_mode, "rows"), do(stereo.swap_eyes))
     first.app.step()
     first.close()
-    kept = load_preferences(AppState(), tmp_path).preferences.stereo
-    assert (kept.mode, kept.is_swapped, kept.monitor) == ("rows", True, wanted)
+    kept = load_preferences(AppState(), tmp_path).preferences
+    assert (kept.stereo_mode, kept.swaps_eyes, kept.stereo_monitor) == ("rows", True, wanted)
     second = open_window(photo_path, tmp_path, grid=GridShape(3, 3))
     second.app.do(do(stereo.show, True))
     second.until(lambda app: app.stereo_screen.second is not None)
@@ -222,10 +223,11 @@ def test_the_command_line_begins_with_it(
     assert picture is not None
     is_lenticular = words[0] == "--calibration"
     mode = "half-sbs" if is_lenticular else "columns"
-    assert (picture.weave.mode, picture.weave.size_px) == (mode, SECOND)
+    assert picture.weave.size_px == SECOND
+    assert isinstance(picture.weave.arrangement, Calibration) if is_lenticular else picture.weave.arrangement == mode
     assert len(picture.weave.eyes) == (48 if is_lenticular else 2)
     assert second is not None
-    assert load_preferences(AppState(), tmp_path / "kept").preferences.stereo.mode == mode
+    assert load_preferences(AppState(), tmp_path / "kept").preferences.stereo_mode == mode
 
 
 def test_a_lenticular_display_that_bridge_knows_gets_its_picture(

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from iibr_core.evaluation.metrics import psnr
-from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import ViewOffset
 from tests.viewer.conftest import headless_with_scene
@@ -40,7 +39,7 @@ def test_pictures_are_quick_first_and_converge(tmp_path: Path, count: int, apert
         moved = replace(weave, eyes=weave.eyes[::-1])
         assert view.draw(moved, math.inf) != last
         view.release()
-        pair = (RenderSettings(eye.optics, weave.picture_px, eye.part) for eye in weave.eyes[:2])
+        pair = weave.eyes[:2]
         wanted = np.hstack([scene.draw(each) for each in pair])
     assert psnr(shown, wanted) >= 60
     assert 15 < psnr(quick, wanted) < 60

@@ -11,14 +11,14 @@ from scipy.ndimage import gaussian_filter
 
 from iibr_core.beyond.optics import Optics
 from iibr_core.evaluation.metrics import psnr
+from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.formats.lenticular import Calibration, parse_calibration
-from iibr_core.scenes.rect import WHOLE
 from iibr_core.scenes.screen_size import ScreenSize
 from iibr_core.types import ImageSize
 from viewer.gpu.context import GLContext
 from viewer.gpu.programs import ProgramCache
 from viewer.gpu.weaving import Weaver
-from viewer.model.state.stereo import Eye, Weave
+from viewer.model.state.stereo import Weave
 
 PORTRAIT = {
     "configVersion": "1.0", "serial": "LKG-PORT-00000", "pitch": {"value": 52.5927}, "slope": {"value": -7.0835},
@@ -80,8 +80,8 @@ def woven(gl: GLContext, name: str) -> NDArray[np.uint8]:
     """The views woven for a display."""
     programs, display = ProgramCache(gl.ctx), display_of(name)
     weaver, tile = Weaver(gl.ctx, programs), ScreenSize(TILE.width, TILE.height)
-    eyes = (Eye(Optics(), WHOLE),) * VIEWS
-    weave = Weave(eyes, "sbs", ScreenSize(display.screen.width, display.screen.height), tile, tile, display=display)
+    eyes = (RenderSettings(Optics(), tile),) * VIEWS
+    weave = Weave(eyes, display, ScreenSize(display.screen.width, display.screen.height), tile)
     try:
         weaver.prepare(weave)
         for i, view in enumerate(views()):

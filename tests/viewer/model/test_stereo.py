@@ -70,10 +70,10 @@ def test_a_comfortable_eye_distance_is_found_and_more_is_warned_of() -> None:
 def test_pictures_fit_their_rooms_and_places_lead_back(mode: StereoMode, size: ScreenSize) -> None:
     state = stereo.set_mode(STATE, mode)
     weave = stereo.weave_of(state, SCENE, size)
-    assert all(1 <= inner <= room <= whole for inner, room, whole in zip(weave.picture_px, weave.frame_px, size))
-    assert weave.is_swapped == (mode == "cross-eyed")
+    assert all(1 <= inner <= room <= whole for inner, room, whole in zip(weave.eyes[0].size_px, weave.frame_px, size))
+    assert (weave.eyes[0].optics.eye.s > weave.eyes[1].optics.eye.s) == (mode == "cross-eyed")
     middle = stereo.place_in_photo(weave, weave.frame_px.width / 2, weave.frame_px.height / 2)
-    assert middle == pytest.approx((0.5, 0.5), abs=0.51 / min(weave.picture_px))
+    assert middle == pytest.approx((0.5, 0.5), abs=0.51 / min(weave.eyes[0].size_px))
     assert stereo.place_in_photo(weave, 0, 0) == pytest.approx((0, 0), abs=1e-9)
 
 
@@ -81,13 +81,12 @@ def test_the_picture_goes_to_the_chosen_monitor_else_to_the_second_else_to_the_w
     assert stereo.show(STATE, True).stereo.monitor == TELEVISION
     alone = stereo.show(replace(STATE, monitors=(PANEL,), hides_panel=False), True)
     assert alone.stereo.is_shown
-    assert (alone.stereo.monitor, alone.is_fullscreen, alone.hides_panel) == (None, True, True)
+    assert (alone.stereo.fills_window, alone.is_panel_hidden) == (True, True)
     closed = stereo.show(alone, False)
-    assert (closed.stereo.is_shown, closed.is_fullscreen, closed.hides_panel) == (False, False, False)
+    assert (closed.stereo.is_shown, closed.stereo.fills_window, closed.is_panel_hidden) == (False, False, False)
     moved = stereo.choose_monitor(stereo.show(STATE, True), PANEL)
-    assert moved.stereo.is_shown
-    assert (moved.stereo.monitor, moved.is_fullscreen) == (None, True)
-    assert stereo.choose_monitor(moved, TELEVISION).is_fullscreen is False
+    assert moved.stereo.fills_window
+    assert not stereo.choose_monitor(moved, TELEVISION).stereo.fills_window
     third = Monitor("DP-2", 5760, 0, 640, 480)
     chosen = stereo.choose_monitor(replace(STATE, monitors=(PANEL, TELEVISION, third)), third)
     assert not chosen.stereo.is_shown
@@ -126,7 +125,7 @@ def test_a_lenticular_display_gets_all_views_on_its_own_monitor() -> None:
     weave = stereo.weave_of(shown, SCENE, ScreenSize(1440, 2560))
     assert len(weave.eyes) == 66
     assert (weave.eyes[0].optics.eye.s, weave.eyes[-1].optics.eye.s) == (-4.0, 4.0)
-    assert weave.picture_px == (372, 256), "three to two on a tile that is displayed as 9 to 16"
+    assert weave.eyes[0].size_px == (372, 256), "three to two on a tile that is displayed as 9 to 16"
     assert stereo.place_in_photo(weave, 720, 1280) == pytest.approx((0.5, 0.5), abs=0.01)
     assert stereo.place_in_photo(weave, 0, 0) == pytest.approx((0, 0))
     assert stereo.warning(SCENE, shown.stereo) == ""

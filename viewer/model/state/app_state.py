@@ -77,7 +77,7 @@ class AppState:
     free_camera: None in the plane of the views; free_progress: share of its preparation, None once done. depth:
     refinement and edits; stroke: of the brush while it is drawn. chosen_focus: disparity that the user chose for this
     scene, focused_at: place that was clicked for it (see focal_plane), None without. facts: of a photo's file, perhaps
-    of the one before. hides_panel: None to follow is_narrow. shows_before: whether the unchanged photo is shown.
+    of the one before. hides_panel: None to follow the window. shows_before: whether the unchanged photo is shown.
     tracking: None unless the viewpoint follows the head.
     monitors: the connected ones, that of the window first.
     """
@@ -146,8 +146,8 @@ class AppState:
 
     @property
     def is_panel_hidden(self) -> bool:
-        """Whether the panel is hidden: by the user, or because the window is narrow."""
-        return self.is_narrow if self.hides_panel is None else self.hides_panel
+        """Whether the panel is hidden: by the user, or because the window is narrow or shows a stereo picture."""
+        return self.is_narrow or self.stereo.fills_window if self.hides_panel is None else self.hides_panel
 
     def with_tasks(self, *tasks: Task) -> AppState:
         """Return the state with more tasks for the outside world."""

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Literal, get_args
 
 from iibr_core.exports.photo_folder import FolderOrder
-from viewer.model.state.stereo import StereoChoice
+from viewer.model.state.stereo import Monitor, StereoMode
 
 Theme = Literal["dark", "light"]
 Units = Literal["photographic", "light field"]
@@ -48,7 +48,8 @@ class Preferences:
     window: x, y, width, height in screen units, None before the first one; is_maximized: whether it filled the screen.
     last_folder: of the last saved or exported file, "" before the first. estimates_depth: whether photos without depth
     get it from the recommended model once that is downloaded. tracker: address of the tracker of the head.
-    head_range_cm: movement of the head from the middle to the outermost views.
+    head_range_cm: movement of the head from the middle to the outermost views. stereo_monitor: chosen
+    last; None for any.
     """
 
     theme: Theme = "dark"
@@ -63,4 +64,6 @@ class Preferences:
     last_folder: str = ""
     tracker: str = "udp:127.0.0.1:4242"
     head_range_cm: float = 15.0
-    stereo: StereoChoice = field(default_factory=StereoChoice)
+    stereo_mode: StereoMode = "half-sbs"
+    swaps_eyes: bool = False
+    stereo_monitor: Monitor | None = None

@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal, get_args
 
-from iibr_core.beyond.optics import Optics
+from iibr_core.exports.render_settings import RenderSettings
 from iibr_core.formats.lenticular import Calibration
-from iibr_core.scenes.rect import Rect
 from iibr_core.scenes.screen_size import ScreenSize
 
 StereoMode = Literal["sbs", "half-sbs", "top-bottom", "rows", "columns", "checkerboard", "anaglyph", "cross-eyed"]
@@ -31,21 +30,11 @@ class Monitor:
 
 
 @dataclass(frozen=True)
-class StereoChoice:
-    """Preferences of the stereo picture. monitor: chosen last; None for the window's own."""
-
-    mode: StereoMode = "half-sbs"
-    is_swapped: bool = False
-    monitor: Monitor | None = None
-
-
-@dataclass(frozen=True)
 class Stereo:
     """The stereo picture of the open scene.
 
-    monitor: monitor that it fills; None for the window itself. eyes: distance of the eyes in view steps, None for a
-    comfortable one. screen: disparity that lies in the plane of the screen, px per view step. before: whether the
-    window was full screen, and `hides_panel`, before it showed the stereo picture. display: the lenticular
+    monitor: monitor that it fills; None for the window's. eyes: distance of the eyes in view steps, None for a
+    comfortable one. screen: disparity that lies in the plane of the screen, px per view step. display: the lenticular
     display that shows it; None for both eyes' pictures.
     """
 
@@ -53,31 +42,23 @@ class Stereo:
     monitor: Monitor | None = None
     eyes: float | None = None
     screen: float = 0.0
-    before: tuple[bool, bool | None] = (False, None)
     display: Calibration | None = None
 
-
-@dataclass(frozen=True)
-class Eye:
-    """The optics of a picture, and the part of it that is shown."""
-
-    optics: Optics
-    part: Rect
+    @property
+    def fills_window(self) -> bool:
+        """Whether the window itself shows it."""
+        return self.is_shown and self.monitor is None
 
 
 @dataclass(frozen=True)
 class Weave:
-    """Pictures from several viewpoints, the leftmost first, and how they are woven into one for a screen.
+    """Pictures of one size from several viewpoints, the leftmost first, and how they are woven into one for a screen.
 
-    mode: switch of the shader. size_px: of the screen. frame_px: room of each picture on the screen. picture_px: each
-    picture, which lies in the middle of its room. display: lenticular display, whose rooms are stretched over the whole
-    screen; None for both eyes' pictures.
+    arrangement: that of both eyes' pictures, or a lenticular display. size_px: of the screen. frame_px: room of each
+    picture, which lies in the middle of it, on the screen; on a lenticular display rooms are stretched over the screen.
     """
 
-    eyes: tuple[Eye, ...]
-    mode: StereoMode
+    eyes: tuple[RenderSettings, ...]
+    arrangement: StereoMode | Calibration
     size_px: ScreenSize
     frame_px: ScreenSize
-    picture_px: ScreenSize
-    is_swapped: bool = False
-    display: Calibration | None = None

@@ -27,7 +27,7 @@ SWAP_TIP = "Give each eye the picture of the other (L)."
 
 def stereo_section(state: AppState, scene: Scene) -> list[Action]:
     """Build the section."""
-    shown, choice = state.stereo, state.preferences.stereo
+    shown, is_swapped = state.stereo, state.preferences.swaps_eyes
     label("Display", MONITOR_TIP)
     wanted = stereo.monitor_of(state)
     entries = [(monitor.words, WINDOW_TIP if i == 0 else "") for i, monitor in enumerate(state.monitors)]
@@ -35,7 +35,7 @@ def stereo_section(state: AppState, scene: Scene) -> list[Action]:
     actions = [] if picked is None else [do(stereo.choose_monitor, state.monitors[picked])]
     label("Arrangement", MODE_TIP)
     entries = [*(STEREO_WORDS[mode] for mode in STEREO_MODES), LENTICULAR]
-    shown_words = LENTICULAR[0] if shown.display else STEREO_WORDS[choice.mode][0]
+    shown_words = LENTICULAR[0] if shown.display else STEREO_WORDS[state.preferences.stereo_mode][0]
     picked = combo("Arrangement", shown_words, entries, MODE_TIP)
     if picked is not None:
         is_pair = picked < len(STEREO_MODES)
@@ -47,7 +47,7 @@ def stereo_section(state: AppState, scene: Scene) -> list[Action]:
     actions += edit(stereo.set_screen, plane, edited)
     if warning := stereo.warning(scene, shown):
         colored(warning, imgui.ImVec4(*palette_of(state.preferences.theme).warning))
-    swaps = checkbox("Swap the eyes", choice.is_swapped, SWAP_TIP) != choice.is_swapped
+    swaps = checkbox("Swap the eyes", is_swapped, SWAP_TIP) != is_swapped
     actions += [do(stereo.swap_eyes)] if swaps else []
     if button("Screen at the focus", FOCUS_TIP, state.optics.focus_disparity != plane):
         actions.append(do(stereo.set_screen, state.optics.focus_disparity))
