@@ -26,23 +26,24 @@ MAX_PACKETS = 32
 """Largest number of packets that are read at a time."""
 MIN_STEP_CM = 0.02
 """Shortest movement of the head that moves the viewpoint: the picture becomes fine while the head rests."""
-SILENCE_S, NOTICE_S = 1.0, 3.0
-"""Seconds without a pose after which the panel shows it, and after which a notice shows that none came at all."""
+SILENCE_S = 2.0
+"""Time without a pose after which the window shows that none come, in seconds."""
+LATENCY_WEIGHT = 0.1
+"""Weight of the newest latency in the running mean."""
 
 
 class Listener:
     """A thread that receives poses at an address and smooths them.
 
     news: at most one place of the head that the window has not taken, with the time of its packet on the clock.
-    seen_s: time of the last pose.
+    seen_s: time of the last pose, that of the start before the first.
     """
 
     def __init__(self, address: str, wake: Callable[[], None]) -> None:
-        """wake: called in the thread when there are news and there were none. Raises InputError."""
+        """wake: called in the thread when there are news. Raises InputError."""
         host, port = tracking.address_of(address)
-        self.words = f"{host}:{port}"
+        self.address, self.seen_s = address, time.perf_counter()
         self.news: deque[tuple[complex, float]] = deque(maxlen=1)
-        self.seen_s = -math.inf
         self._wake, self._is_closing = wake, threading.Event()
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, BUFFER_BYTES)
@@ -51,7 +52,7 @@ class Listener:
             self._socket.bind((host, port))
         except (OSError, UnicodeError) as error:
             self._socket.close()
-            reason = f"cannot listen at {self.words} ({getattr(error, 'strerror', None) or error})"
+            reason = f"cannot listen at {host}:{port} ({getattr(error, 'strerror', None) or error})"
             raise InputError(f"{reason}: end what listens there, or give another --tracker udp:HOST:PORT") from error
         self._thread = threading.Thread(target=self._run, name="iibr-tracker", daemon=True)
         self._thread.start()
@@ -72,10 +73,9 @@ class Listener:
             self.seen_s = time.perf_counter()
             smoothed = tracking.smooth(smoothed, head, self.seen_s)
             if abs(smoothed.place - shown) >= MIN_STEP_CM:
-                shown, is_first = smoothed.place, not self.news
+                shown = smoothed.place
                 self.news.append((shown, self.seen_s))
-                if is_first:
-                    self._wake()
+                self._wake()
 
     def _newest(self) -> complex | None:
         """Read the packets that wait; return the place of the head in the newest pose, None without."""
@@ -98,48 +98,37 @@ class Tracker:
         """wake: called, in a thread, when the head has moved."""
         self._wake = wake
         self._listener: Listener | None = None
-        self._address: str | None = None
-        self._notice_at_s = math.inf
         self._taken_s: float | None = None
         self._latency_ms = 0.0
 
     def advance(self, state: AppState) -> list[Action]:
         """Begin or end listening as the state asks; return what came in, and problems."""
-        self._taken_s, wanted, listener = None, state.tracking, self._listener
-        address = None if wanted is None else wanted.address
-        if address != self._address:
-            return self._listen(address)
-        if wanted is None or listener is None:
+        self._taken_s, wanted = None, state.tracking
+        if (wanted and wanted.address) != (self._listener and self._listener.address):
+            self.close()
+            try:
+                self._listener = Listener(wanted.address, self._wake) if wanted else None
+            except InputError as error:
+                return [do(tracking.switch, None), do(messages.notify, Notice(str(error), is_error=True))]
+        if wanted is None or self._listener is None:
             return []
-        now_s, actions = time.perf_counter(), list[Action]()
-        if now_s > self._notice_at_s and listener.seen_s < 0:
-            self._notice_at_s = math.inf
-            text = f'No poses at {listener.words}: let opentrack send there, by its output "UDP over network".'
-            actions.append(do(messages.notify, Notice(text)))
-        if (now_s - listener.seen_s < SILENCE_S) != wanted.is_receiving:
-            actions.append(do(tracking.set_receiving, not wanted.is_receiving))
-        if listener.news:
-            head, self._taken_s = listener.news.popleft()
+        actions = list[Action]()
+        is_receiving = time.perf_counter() - self._listener.seen_s < SILENCE_S
+        if is_receiving != wanted.is_receiving:
+            actions.append(do(tracking.set_receiving, is_receiving))
+        if self._listener.news:
+            head, self._taken_s = self._listener.news.popleft()
             actions.append(do(tracking.follow, head, self._latency_ms))
         return actions
 
     def note_shown(self) -> None:
         """Measure the latency: what was taken in this turn of the loop is on the screen now."""
         if self._taken_s is not None:
-            self._latency_ms = 1e3 * (time.perf_counter() - self._taken_s)
+            newest_ms = 1e3 * (time.perf_counter() - self._taken_s)
+            self._latency_ms += LATENCY_WEIGHT * (newest_ms - self._latency_ms)
 
     def close(self) -> None:
         """End listening."""
         if self._listener is not None:
             self._listener.close()
         self._listener = None
-
-    def _listen(self, address: str | None) -> list[Action]:
-        self.close()
-        self._address, self._notice_at_s = address, time.perf_counter() + NOTICE_S
-        try:
-            self._listener = Listener(address, self._wake) if address else None
-        except InputError as error:
-            self._address = None
-            return [do(tracking.switch, None), do(messages.notify, Notice(str(error), is_error=True))]
-        return []

@@ -17,7 +17,9 @@ from dataclasses import dataclass, replace
 from iibr_core.scenes.lens_limits import clamp, clamp_eye, eye_limits
 from iibr_core.scenes.scene import Scene
 from iibr_core.types import InputError, ViewOffset
+from viewer.model.messages import notify
 from viewer.model.state.app_state import AppState
+from viewer.model.state.notices import Notice
 from viewer.model.state.viewpoint import Tracking
 
 POSE = struct.Struct("<6d")
@@ -31,8 +33,6 @@ GAP_S = 0.5
 """Pause between two packets after which the filter starts again, in seconds."""
 HEAD_RANGE_LIMITS = 3.0, 60.0
 """Shortest and longest movement of the head from the middle to the outermost views, in cm."""
-LATENCY_WEIGHT = 0.1
-"""Weight of the newest latency in the running mean."""
 EDITS_BY_HAND = "move_eye", "return_home", "reset", "set_loop"
 """Kinds of edits after which the head's present place belongs to the viewpoint that they led to."""
 
@@ -129,8 +129,15 @@ def set_head_range(state: AppState, range_cm: float) -> AppState:
 
 
 def set_receiving(state: AppState, is_receiving: bool) -> AppState:
-    """Show whether packets arrive."""
-    return replace(state, tracking=state.tracking and replace(state.tracking, is_receiving=is_receiving))
+    """Show whether poses arrive, with a notice if none ever came."""
+    before = state.tracking
+    if before is None:
+        return state
+    state = replace(state, tracking=replace(before, is_receiving=is_receiving))
+    if is_receiving or before.head is not None:
+        return state
+    place = "{}:{}".format(*address_of(before.address))
+    return notify(state, Notice(f'No poses at {place}: let opentrack send there, by its output "UDP over network".'))
 
 
 def follow(state: AppState, head: complex, latency_ms: float) -> AppState:
@@ -142,7 +149,6 @@ def follow(state: AppState, head: complex, latency_ms: float) -> AppState:
     if before is None:
         return state
     is_moving = state.motion.is_running and state.motion.kind != "rack"
-    latency_ms = before.latency_ms + LATENCY_WEIGHT * (latency_ms - before.latency_ms)
     tracking = replace(before, head=head, latency_ms=latency_ms)
     if scene is None or is_moving or state.stroke is not None or state.free_camera is not None:
         return replace(state, tracking=tracking)

@@ -216,7 +216,7 @@ def test_a_port_in_use_is_an_error_that_names_it(viewer: Driver, port: int) -> N
 
 
 def test_a_notice_comes_once_while_no_poses_arrive(viewer: Driver, port: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(tracker, "NOTICE_S", 0.0)
+    monkeypatch.setattr(tracker, "SILENCE_S", 0.0)
     viewer.app.do(do(tracking.switch, f"udp:{port}"))
     viewer.until(lambda app: bool(app.state.notices))
     assert viewer.app.state.notices[-1].text.startswith(f"No poses at 127.0.0.1:{port}: ")

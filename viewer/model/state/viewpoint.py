@@ -77,7 +77,7 @@ class Tracking:
 
     address: where packets arrive, as `udp:HOST:PORT`. head: its newest place; centre: the place for the photo's own
     viewpoint; None before the first. eye: viewpoint that the head led to last. latency_ms: from packets to pictures on
-    the screen. is_receiving: whether packets arrive.
+    the screen. is_receiving: whether poses arrive.
     """
 
     address: str
@@ -85,4 +85,4 @@ class Tracking:
     centre: complex | None = None
     eye: ViewOffset = CENTRE
     latency_ms: float = 0.0
-    is_receiving: bool = False
+    is_receiving: bool = True

@@ -54,9 +54,8 @@ def _head_rows(state: AppState) -> list[Action]:
     if head is not None:
         range_cm = slider("Head movement", preferences.head_range_cm, HEAD_RANGE_LIMITS, "%.0f cm", HEAD_RANGE_TIP)
         actions += edit(tracking.set_head_range, preferences.head_range_cm, range_cm)
-        quiet(
-            f"{head.latency_ms:.0f} ms from packet to picture" if head.is_receiving else f"No packets at {head.address}"
-        )
+        latency = f"{head.latency_ms:.0f} ms from packet to picture"
+        quiet(latency if head.is_receiving else f"No poses at {head.address}")
     return actions
 
 
