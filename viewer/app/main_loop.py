@@ -114,7 +114,7 @@ class App:
         actions += build_screen(self.state, layout, texture, textures, thumbnails, woven)
         pointer = self.stereo_screen.pointer(pointer, layout)
         actions += self._input(pointer, layout)
-        woven_picture = woven and self.stereo_screen.picture
+        woven_picture = woven and self.stereo_screen.view.drawn
         self._show((picture, textures, self._ui.end(), layout, look, self.window.damages, sharp, woven_picture))
         is_still = not actions and not pointer.is_down and not pointer.pulls
         self.do(*actions)

@@ -1,4 +1,4 @@
-"""The GLFW window. Only this module, `second_window` and `viewer.gpu` call GLFW.
+"""The GLFW window. Only this module, `stereo_screen` and `viewer.gpu` call GLFW.
 
 The bundle is imported before glfw on purpose: it brings the GLFW library that both must share.
 """
@@ -46,16 +46,15 @@ class Window:
             raise InputError(f"no window can be opened ({reason}): `iibr screenshot` works without a display")
         if place is not None and not is_maximized and _is_on_a_screen(place):
             glfw.set_window_pos(self.handle, place[0], place[1])
-        self.damages = self._moves = 0
+        self.damages = 0
         self._monitors: tuple[Monitor, ...] = ()
-        self._monitors_of: tuple[list[int | None], int] | None = None
+        self._monitors_of: tuple[object, ...] = ()
         self._place_before = (0, 0, *WINDOW_SIZE)
         self._dropped: list[str] = []
         self.held_at: dict[str, tuple[bool, bool]] = {}
         glfw.set_key_callback(self.handle, self._on_key)  # ImGui's own callback calls it
         glfw.set_drop_callback(self.handle, self.on_drop)  # type: ignore[arg-type]  # the stub is wrong
         glfw.set_window_refresh_callback(self.handle, self._on_damage)
-        glfw.set_window_pos_callback(self.handle, self._on_move)
         glfw.make_context_current(self.handle)
         glfw.swap_interval(1)
         self._take_sizes()
@@ -91,12 +90,11 @@ class Window:
     @property
     def monitors(self) -> tuple[Monitor, ...]:
         """The connected monitors, that with most of the window first. Looked up after changes only: it takes time."""
-        connected = [ctypes.cast(monitor, ctypes.c_void_p).value for monitor in glfw.get_monitors()]
-        if (connected, self._moves) != self._monitors_of:
-            self._monitors_of = connected, self._moves
-            place = (*glfw.get_window_pos(self.handle), *self.size)
-            monitors = sorted(glfw.get_monitors(), key=lambda monitor: -_overlap(place, monitor))
-            self._monitors = tuple(map(monitor_record, monitors))
+        connected, place = glfw.get_monitors(), (*glfw.get_window_pos(self.handle), *self.size)
+        monitors_of = place, *(ctypes.cast(monitor, ctypes.c_void_p).value for monitor in connected)
+        if monitors_of != self._monitors_of:
+            by_overlap = sorted(connected, key=lambda monitor: -_overlap(place, monitor))
+            self._monitors_of, self._monitors = monitors_of, tuple(map(monitor_record, by_overlap))
         return self._monitors
 
     @property
@@ -194,9 +192,6 @@ class Window:
 
     def _on_damage(self, _: Any) -> None:
         self.damages += 1
-
-    def _on_move(self, *_: Any) -> None:
-        self._moves += 1
 
 
 def _words_of(warning: Warning | str) -> str:

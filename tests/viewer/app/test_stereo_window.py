@@ -126,7 +126,7 @@ def test_mouse_and_keys_on_the_second_monitor_count(viewer: Driver) -> None:
     viewer.send("click", 4)
     viewer.until(lambda app: app.state.optics.focus_disparity > focus)
     viewer.until_idle()
-    picture = viewer.app.stereo_screen.picture
+    picture = viewer.app.stereo_screen.view.drawn
     assert picture is not None
     assert picture.weave.eyes[0].optics.focus_disparity == viewer.app.state.optics.focus_disparity
     viewer.send("key", "Tab")
@@ -197,7 +197,7 @@ def test_the_section_shows_it_and_sets_depth(viewer: Driver) -> None:
     assert state.stereo.eyes > 1.5
     assert state.stereo.screen > 0.8 * state.scene.disparity_range_px[1]
     assert "behind the screen" in stereo.warning(state.scene, state.stereo)
-    picture = viewer.app.stereo_screen.picture
+    picture = viewer.app.stereo_screen.view.drawn
     assert picture is not None
     assert picture.weave == stereo.weave_of(state, state.scene, SECOND)
 
@@ -212,8 +212,8 @@ def test_the_command_line_begins_with_it(
     monkeypatch.chdir(tmp_path)
 
     def look(app: App) -> None:
-        Driver(app).until(lambda app: app.stereo_screen.picture is not None)
-        shown.append((app.stereo_screen.picture, app.stereo_screen.second))
+        Driver(app).until(lambda app: app.stereo_screen.view.drawn is not None)
+        shown.append((app.stereo_screen.view.drawn, app.stereo_screen.second))
 
     monkeypatch.setattr("viewer.app.main_loop.App.run", look)
     monkeypatch.setattr("viewer.cli.view.user_folder", lambda: tmp_path / "kept")
@@ -248,7 +248,9 @@ def test_a_lenticular_display_that_bridge_knows_gets_its_picture(
         viewer.until(lambda app: app.stereo_screen.second is not None)
         viewer.until_idle()
     viewer.app.do(do(lens.move_eye, ViewOffset(0.4, 0)))
-    viewer.until(lambda app: (each := app.stereo_screen.picture) is not None and each.weave.eyes[0].optics.eye.t == 0.4)
+    viewer.until(
+        lambda app: (each := app.stereo_screen.view.drawn) is not None and each.weave.eyes[0].optics.eye.t == 0.4
+    )
     viewer.until_idle()
     shown, state = grabbed(display, FIRST.width, SECOND), viewer.app.state
     assert state.source is not None
